@@ -1,5 +1,5 @@
-//! Which tests can run here: `pyserial` where Python has that package, so that a client in Python can be tried. Counted as
-//! skipped elsewhere.
+//! Sets `pyserial` where Python has that package, so that the Python client's test runs; it counts as skipped
+//! elsewhere.
 
 use std::process::Command;
 

@@ -1,5 +1,3 @@
-//! Which tests can run here.
-
 fn main() {
     farnear_test_data::declare_emulated_rig();
     farnear_test_data::declare_programs();

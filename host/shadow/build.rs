@@ -1,4 +1,4 @@
-//! Says whether the real data that some tests need lie beside the repository.
+//! Sets whether the real data of some tests is available.
 
 fn main() {
     farnear_test_data::declare();

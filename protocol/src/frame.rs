@@ -3,11 +3,12 @@
 //! ```text
 //! COBS( version u8 | kind u8 | id u32 | boot u32 | postcard body | CRC-32 ) 0x00
 //! ```
-//! All numbers little-endian. The CRC is CRC-32/ISO-HDLC over everything before it. A frame is at most
-//! [`FRAME_MAX`] bytes with its delimiter. The layout of this header and of the CRC is the same in every
-//! protocol version, so that a board can refuse a version it does not speak.
+//! Little-endian. The CRC is CRC-32/ISO-HDLC over all bytes before it. A frame has at most [`FRAME_MAX`]
+//! bytes with its
+//! delimiter. Header and CRC are the same in every protocol version, so that a board can reject other
+//! versions.
 //!
-//! Cost: one pass over the bytes for each of COBS and CRC; no allocation.
+//! Cost: one pass each for COBS and CRC; no allocation.
 
 use crc::{CRC_32_ISO_HDLC, Crc, Table};
 use heapless::Vec;
@@ -19,7 +20,7 @@ pub const FRAME_MAX: usize = 256;
 pub const HEADER: usize = 10;
 /// Bytes of the CRC after the body.
 pub const CRC_BYTES: usize = 4;
-/// Largest body: [`FRAME_MAX`] less header, CRC, delimiter and the byte that COBS adds to up to 254 bytes.
+/// Largest body: [`FRAME_MAX`] without header, CRC, delimiter and the byte of COBS overhead.
 pub const BODY_MAX: usize = FRAME_MAX - HEADER - CRC_BYTES - 2;
 
 const CRC: Crc<u32, Table<1>> = Crc::<u32, Table<1>>::new(&CRC_32_ISO_HDLC);
@@ -27,10 +28,10 @@ const CRC: Crc<u32, Table<1>> = Crc::<u32, Table<1>>::new(&CRC_32_ISO_HDLC);
 /// An encoded frame, ready for the wire.
 pub type Encoded = Vec<u8, FRAME_MAX>;
 
-/// A frame as it travels: see [`delimited`].
+/// An encoded frame with leading delimiter, see [`delimited`].
 pub type Delimited = Vec<u8, { FRAME_MAX + 1 }>;
 
-/// What a frame carries.
+/// Type of a frame's body.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[repr(u8)]
 pub enum Kind {
@@ -54,30 +55,30 @@ impl Kind {
     }
 }
 
-/// What stands before the body.
+/// Fields before the body.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Header {
     /// Protocol version of the body.
     pub version: u8,
-    /// What the body is.
+    /// Type of the body.
     pub kind: Kind,
-    /// Request id, or event number.
+    /// Request id or event number.
     pub id: u32,
-    /// Boot number of the board; 0 = not known yet.
+    /// Boot number of the board; 0 = unknown.
     pub boot: u32,
 }
 
-/// A frame whose CRC is right; its body is not decoded yet.
+/// A frame with a correct CRC and an undecoded body.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Packet {
-    /// The header.
+    /// Fields before the body.
     pub header: Header,
-    /// The postcard body.
+    /// Undecoded postcard body.
     pub body: Vec<u8, BODY_MAX>,
 }
 
 impl Packet {
-    /// Decodes the body. `None` where it is no `T`, or where bytes are left over.
+    /// Decodes the body; `None` if it is not exactly one `T`.
     pub fn message<'a, T: Deserialize<'a>>(&'a self) -> Option<T> {
         match postcard::take_from_bytes(&self.body) {
             Ok((message, [])) => Some(message),
@@ -86,22 +87,22 @@ impl Packet {
     }
 }
 
-/// Why bytes between two delimiters are no frame.
+/// Why bytes between two delimiters are rejected.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum FrameError {
     /// More than [`FRAME_MAX`] bytes without a delimiter.
     TooLong,
-    /// Fewer bytes than a header and a CRC.
+    /// Shorter than header and CRC.
     TooShort,
-    /// Not COBS.
+    /// Invalid COBS encoding.
     Encoding,
-    /// The CRC does not fit the bytes.
+    /// The CRC does not match.
     Crc,
-    /// The kind is none of [`Kind`].
+    /// Unknown value of [`Kind`].
     Kind,
 }
 
-/// Encodes a message. `None` where it does not fit a frame, which no message of [`crate::message`] does.
+/// Encodes a message; `None` if it exceeds a frame, as no message of [`crate::message`] does.
 pub fn encode<T: Serialize>(header: Header, message: &T) -> Option<Encoded> {
     let mut raw = [0u8; HEADER + BODY_MAX + CRC_BYTES];
     raw[0] = header.version;
@@ -116,14 +117,14 @@ pub fn encode<T: Serialize>(header: Header, message: &T) -> Option<Encoded> {
     let mut wire = Encoded::new();
     wire.resize(FRAME_MAX, 0).ok()?;
     let length = cobs::try_encode(&raw[..end + CRC_BYTES], &mut wire).ok()?;
-    // The encoder may have touched the byte behind the encoding.
+    // The encoder may have changed the byte after the encoding.
     wire.truncate(length);
     wire.push(0).ok()?;
     Some(wire)
 }
 
-/// A frame with a delimiter in front as well: one that the line spoils then costs one frame and not the next, too. Both sides
-/// send so, and neither expects it.
+/// Adds a leading delimiter, so that a damaged frame costs only itself. Both sides send it, neither requires
+/// it.
 pub fn delimited(frame: &Encoded) -> Delimited {
     let mut bytes = Delimited::new();
     // There is room for the longest frame and one byte.
@@ -132,7 +133,7 @@ pub fn delimited(frame: &Encoded) -> Delimited {
     bytes
 }
 
-/// Decodes the bytes between two delimiters (delimiters not included).
+/// Decodes the bytes between two delimiters.
 pub fn decode(between: &[u8]) -> Result<Packet, FrameError> {
     if between.len() >= FRAME_MAX {
         return Err(FrameError::TooLong);
@@ -157,7 +158,7 @@ pub fn decode(between: &[u8]) -> Result<Packet, FrameError> {
     })
 }
 
-/// Cuts a stream of bytes into frames; after any garbage it is right again at the next delimiter.
+/// Cuts a byte stream into frames; resynchronises at the next delimiter.
 #[derive(Clone, Debug, Default)]
 pub struct Decoder {
     between: Vec<u8, FRAME_MAX>,
@@ -165,13 +166,13 @@ pub struct Decoder {
 }
 
 impl Decoder {
-    /// A decoder that starts in the middle of anything.
+    /// Accepts a stream from any position.
     pub const fn new() -> Self {
         Self { between: Vec::new(), overlong: false }
     }
 
-    /// Takes one byte; at a delimiter gives the frame before it, or what is wrong with it. Empty frames (two
-    /// delimiters in a row) are skipped: a sender may put one in front to flush garbage.
+    /// Accepts one byte; at a delimiter returns the frame before it or its error. Empty frames are skipped,
+    /// because senders may flush garbage with a delimiter.
     pub fn push(&mut self, byte: u8) -> Option<Result<Packet, FrameError>> {
         if byte != 0 {
             self.overlong |= self.between.push(byte).is_err();

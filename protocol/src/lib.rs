@@ -3,10 +3,9 @@
 //! # Modules
 //!
 //! - [`message`]: requests, responses, events and errors, with units.
-//! - [`frame`]: COBS(version, kind, id, boot, postcard body, CRC-32), at most [`frame::FRAME_MAX`] bytes, and a decoder
-//!   that resynchronises after any garbage.
+//! - [`frame`]: framing with COBS and CRC-32, and a decoder that resynchronises after any garbage.
 //! - [`settle`]: when a position counts as reached.
-//! - [`camera`]: the length-prefixed frames of the simulator's camera endpoint (TCP, not the serial link).
+//! - [`camera`]: frames of the simulator's camera endpoint (TCP, not the serial link).
 #![no_std]
 #![deny(missing_docs)]
 
@@ -22,7 +21,7 @@ pub use message::{Call, Event, EventKind, Request, RequestError, Response};
 pub use settle::Settle;
 pub use units::{BoardMicros, Micros, Nanometres};
 
-/// The oldest protocol version this crate can still speak.
+/// Oldest supported protocol version.
 pub const PROTOCOL_MIN: u8 = 3;
-/// The protocol version this crate speaks.
+/// Newest supported protocol version.
 pub const PROTOCOL_CURRENT: u8 = 3;

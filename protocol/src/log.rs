@@ -1,14 +1,14 @@
-//! The board's log on the link: the bytes of its defmt stream, to be decoded with the firmware's ELF file.
+//! The board's log on the link: its defmt stream, decoded with the firmware's ELF.
 
 use heapless::Vec;
 use serde::{Deserialize, Serialize};
 
-/// Bytes in one message.
+/// Largest payload of a log frame, bytes.
 pub const LOG_BYTES_MAX: usize = 200;
 
-/// Some bytes of the defmt stream. A gap in the frames' numbers means that bytes are missing.
+/// A part of the defmt stream. A gap in the frame numbers means lost bytes.
 #[derive(Serialize, Deserialize, Clone, PartialEq, Eq, Debug, Default)]
 pub struct Log {
-    /// The bytes, as the encoder gave them.
+    /// Bytes of the defmt encoder.
     pub bytes: Vec<u8, LOG_BYTES_MAX>,
 }

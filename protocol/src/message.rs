@@ -1,16 +1,14 @@
-//! The message table: everything host and board can say. Four tables, a file each: [`Request`]; [`Response`] and
-//! [`RequestError`]; [`EventKind`]. What their messages are made of lies in one file per subject beside them.
+//! The message tables: [`Request`]; [`Response`] and [`RequestError`]; [`EventKind`]. Their parts are in one
+//! file per subject.
 //!
-//! Conventions: positions are [`Nanometres`], positive = sensor and lens away from each other (near focus lies on the
-//! positive side); 0 = home switch; sensor distance = datum + coarse + fine + lens ([`sensor_distance_nm`]). Set-points
-//! are absolute, so a request that arrives twice asks for nothing new. Moments are [`BoardMicros`]; durations [`Micros`].
+//! Positions are [`Nanometres`], positive = sensor and lens apart (towards near focus), 0 = home switch;
+//! sensor distance = datum + coarse + fine + lens ([`sensor_distance_nm`]). Set-points are absolute, so a
+//! repeated request asks for nothing new. Times are [`BoardMicros`], durations [`Micros`].
 //!
-//! [`BoardMicros`]: crate::BoardMicros
-//! [`Micros`]: crate::Micros
-//! [`Nanometres`]: crate::Nanometres
+//! [`BoardMicros`]: crate::BoardMicros [`Micros`]: crate::Micros [`Nanometres`]: crate::Nanometres
 //!
-//! Growing the table: append variants and messages at the end; anything else is a new protocol version. The
-//! bytes of version 3 are frozen in `tests/it/frozen_wire`.
+//! Variants and messages may be appended; any other change is a new protocol version. `tests/it/frozen_wire`
+//! freezes the bytes of version 3.
 
 mod alarm;
 mod answer;
@@ -47,7 +45,7 @@ pub use self::{
     shot::{DropReason, ProgramState, ProgramStatus, Shot, ShotFault, ShotRecord, TriggerMode},
 };
 
-/// A key of the whole message table: two programs with the same key agree on every byte of every message.
+/// Key of all message tables: equal keys mean equal bytes for every message.
 pub const SCHEMA_KEY: u64 = {
     let keys = [
         Key::for_path::<Request>("request").to_bytes(),

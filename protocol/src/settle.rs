@@ -1,29 +1,29 @@
-//! When a position counts as reached: the usual numbers, in one place for board and host.
+//! Settle criteria for board and host.
 //!
-//! A wider window or a shorter dwell trades accuracy for time; each purpose is a multiple of what a move asks for, so that
-//! to change the piezo's window is to change one number here.
+//! A wider window or shorter dwell trades accuracy for time. Each purpose is a multiple of a move's window,
+//! so the piezo's window is changed in one place.
 
 use crate::message::Axis;
 use crate::units::{Micros, Nanometres};
 
-/// A position has settled when it was measured within a window of its target for a while without a break.
+/// Settled: measured within a window of the target without interruption.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Settle {
     /// Largest distance from the target.
     pub window: Nanometres,
-    /// For so long.
+    /// Duration within the window.
     pub dwell: Micros,
 }
 
-/// The piezo's window: 50 nm of sensor travel are 0.02 mm of depth at most, and 16 times the gauge's noise.
+/// 50 nm of sensor travel is at most 0.02 mm of depth, and 16 times the gauge's noise.
 const PIEZO: Nanometres = Nanometres(50);
-/// A stepper's window: an encoder count and a microstep leave 0.2 um, 1 um is what the axis promises.
+/// Encoder count and microstep leave 0.2 um; the axis is specified to 1 um.
 const STEPPER: Nanometres = Nanometres(1_000);
-/// Ten control ticks, so that a swing of the piezo (200 Hz) through its target does not count.
+/// Ten control ticks, so that a 200 Hz swing of the piezo through its target does not count.
 const DWELL: Micros = Micros(2_000);
 
 impl Settle {
-    /// Of a move, and of both images of a pair.
+    /// For a move, and for both images of a pair.
     pub const fn of_move(axis: Axis) -> Self {
         let window = match axis {
             Axis::SensorCoarse | Axis::Lens => STEPPER,
@@ -32,7 +32,7 @@ impl Settle {
         Self { window, dwell: DWELL }
     }
 
-    /// Of a shot in a sequence of many, where nothing else is asked for.
+    /// Default for a shot in a long sequence.
     pub const fn of_shot(axis: Axis) -> Self {
         match axis {
             Axis::SensorCoarse | Axis::Lens => Self::of_move(axis),
@@ -40,7 +40,7 @@ impl Settle {
         }
     }
 
-    /// Of the images that only tell about where the focus lies.
+    /// For images that only locate the focus.
     pub const fn of_search(axis: Axis) -> Self {
         match axis {
             Axis::SensorCoarse | Axis::Lens => Self::of_move(axis).wider(2).briefly(),
@@ -48,7 +48,7 @@ impl Settle {
         }
     }
 
-    /// Of the images of a sweep through the focus: a twentieth of the accuracy that is promised.
+    /// For a focus sweep: a twentieth of the specified accuracy.
     pub const fn of_sweep(axis: Axis) -> Self {
         Self::of_shot(axis).briefly()
     }

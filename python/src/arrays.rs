@@ -10,7 +10,7 @@ use pyo3::{
 
 use crate::optics::Optics;
 
-/// An argument by its name, which the message of a `TypeError` states: notes of an exception exist from Python 3.11 on only.
+/// Extracts an argument and puts its name into a `TypeError`; exception notes need Python 3.11.
 pub fn named<'py, T>(name: &str, object: &Bound<'py, PyAny>) -> PyResult<T>
 where
     T: for<'a> FromPyObject<'a, 'py, Error = PyErr>,
@@ -23,7 +23,6 @@ where
     })
 }
 
-/// Optics by the name of the argument.
 pub fn optics_named<'py>(name: &str, object: &Bound<'py, PyAny>) -> PyResult<PyRef<'py, Optics>> {
     object.extract::<PyRef<'py, Optics>>().map_err(|_| {
         PyTypeError::new_err(format!("{name}: expected farnear.Optics, not {}", type_name(object)))
@@ -45,19 +44,18 @@ impl Values<'_> {
     }
 }
 
-/// A grey image.
 pub struct Image<'py> {
     values: Values<'py>,
     scaled: bool,
 }
 
 impl Image<'_> {
-    /// Its values: those of `uint8` and `uint16` from 0 to 1, others as they are; NaN where a masked array is masked.
+    /// `uint8` and `uint16` scaled to 0..1, others unchanged; NaN where a masked array is masked.
     pub fn view(&self) -> ArrayView2<'_, f32> {
         self.values.view()
     }
 
-    /// Whether its values are camera codes over the full range of their type, so that the largest one is a saturated pixel.
+    /// Whether values are camera codes over the full range, so that the largest is saturated.
     pub fn is_scaled(&self) -> bool {
         self.scaled
     }
@@ -82,11 +80,11 @@ impl<'py> FromPyObject<'_, 'py> for Image<'py> {
     }
 }
 
-/// A map, for example of depth: any numeric type.
+/// A map of any numeric type, e.g. depth.
 pub struct Map<'py>(Values<'py>);
 
 impl Map<'_> {
-    /// Its values; NaN where a masked array is masked.
+    /// NaN where a masked array is masked.
     pub fn view(&self) -> ArrayView2<'_, f32> {
         self.0.view()
     }
@@ -101,7 +99,7 @@ impl<'py> FromPyObject<'_, 'py> for Map<'py> {
     }
 }
 
-/// A mask: bool, or integers that are set where they are not 0. What a masked array masks is not set.
+/// A mask: bool, or integers that are not 0. Masked elements are not set.
 pub struct Mask(pub Array2<bool>);
 
 impl<'py> FromPyObject<'_, 'py> for Mask {
@@ -119,7 +117,7 @@ impl<'py> FromPyObject<'_, 'py> for Mask {
     }
 }
 
-/// An array of two dimensions whose type is not known while compiling.
+/// A two-dimensional array of dynamic type.
 struct Untyped<'py> {
     data: Bound<'py, PyAny>,
     masked: Option<PyReadonlyArray2<'py, bool>>,
@@ -174,7 +172,7 @@ impl<'py> Untyped<'py> {
     }
 }
 
-/// Whether numpy can make an array of it that has the type its owner meant: not a list, whose type would be a guess.
+/// Whether numpy can convert it with a definite type: not a list, whose type would be a guess.
 fn is_array_like(object: &Bound<'_, PyAny>) -> bool {
     let plain = object.is_instance_of::<PyList>()
         || object.is_instance_of::<PyTuple>()

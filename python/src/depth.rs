@@ -20,7 +20,7 @@ use crate::{
     optics::Operators,
 };
 
-/// How regions of low texture are filled: not, as `farnear depth` does by itself, or by name.
+/// Fill method for low texture: none, the default of `farnear depth`, or by name.
 pub struct Fill(Option<FillBy>);
 
 impl<'py> FromPyObject<'_, 'py> for Fill {
@@ -40,7 +40,7 @@ impl<'py> FromPyObject<'_, 'py> for Fill {
     }
 }
 
-/// The run time's settings for what is to be filled, and by what it is told.
+/// Fill settings, and the criterion of low texture.
 fn filling(fill: &Fill, low_texture: &str) -> PyResult<Settings> {
     let criterion: LowTexture = low_texture.parse().map_err(wrong)?;
     if fill.0.is_none() && criterion != LowTexture::default() {
@@ -254,7 +254,7 @@ impl Processor {
         let (far, near): (Image<'py>, Image<'py>) = (named("far", far)?, named("near", near)?);
         let (far, near) = (far.view(), near.view());
         let (depth_mm, confidence) = py.detach(|| {
-            // A panic in another thread leaves buffers that the next run overwrites.
+            // After a panic in another thread the next run overwrites the buffers.
             let mut processor = self.0.lock().unwrap_or_else(PoisonError::into_inner);
             let map = processor.run(far, near).map_err(wrong)?;
             // The processor reuses its map for the next pair.

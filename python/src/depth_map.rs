@@ -15,7 +15,7 @@ use crate::{
     optics::Optics,
 };
 
-/// What `depth.toml` of a result folder holds of interest here; the command line writes more.
+/// Used contents of `depth.toml`; the command line writes more.
 #[derive(Serialize, Deserialize)]
 struct Record {
     #[serde(default)]
@@ -70,7 +70,7 @@ pub struct DepthMap {
     optics: Optics,
 }
 
-/// The arguments of `DepthMap._assemble`.
+/// Arguments of `DepthMap._assemble`.
 type Parts<'py> = (
     Bound<'py, PyArray2<f32>>,
     Bound<'py, PyArray2<f32>>,

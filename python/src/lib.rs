@@ -1,5 +1,6 @@
-//! farnear for Python: thin functions and classes over the libraries. Doc comments of
-//! what Python sees are its docstrings; `python/docstrings.py` copies them into the stub. Arrays go in without a copy where they are `float32` and come out without one.
+//! farnear for Python: thin functions and classes over the libraries. Doc comments of Python items are
+//! docstrings, which `python/docstrings.py` copies into the stub. `float32` arrays are passed and returned
+//! without copies.
 
 mod arrays;
 mod calibrate;

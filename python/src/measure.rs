@@ -1,4 +1,4 @@
-//! How long Rust itself takes in this very process, to hold Python's time against: `python/measure.py`.
+//! Times of the Rust code in this process, for comparison with Python's: `python/measure.py`.
 
 use std::{hint::black_box, time::Instant};
 
@@ -12,7 +12,7 @@ use pyo3::prelude::*;
 
 use crate::{errors::wrong, optics::Optics};
 
-/// Seconds of each of `repeats` runs of what `depth` does with two `float32` images and given operators.
+/// Seconds per run of `depth` for two `float32` images and given operators.
 #[pyfunction]
 pub fn seconds_of_depth(
     far: PyReadonlyArray2<'_, f32>,
@@ -33,7 +33,7 @@ pub fn seconds_of_depth(
     (0..repeats).map(run).collect()
 }
 
-/// The same of a `Processor`.
+/// Seconds per run of a `Processor`.
 #[pyfunction]
 pub fn seconds_of_processor(
     far: PyReadonlyArray2<'_, f32>,

@@ -1,4 +1,4 @@
-//! Sun, shadow and what the embedding sees of a silhouette.
+//! Sun, shadow and silhouette descriptors.
 
 use farnear_recognition::embedding::descriptor::{self, Scaling};
 use farnear_shadow::sun::{self, Model, Place, SunPosition};

@@ -1,4 +1,4 @@
-//! Recognising what a person does.
+//! Activity recognition.
 
 use std::path::{Path, PathBuf};
 

@@ -1,4 +1,4 @@
-//! What a camera would see.
+//! Rendering of scenes.
 
 use farnear_scene::{Camera, EllipticalDistortion, Lens, Noise, OpticsFile, Psf, Renderer, Scene, truth};
 use ndarray::Array2;
@@ -73,7 +73,7 @@ pub fn render<'py>(
     Ok((of_codes(py, far, bits), of_codes(py, near, bits), truth.into_pyarray(py)))
 }
 
-/// Codes of a camera with so many bits, over the whole of the type that holds them.
+/// Scales camera codes of this bit depth to the full range of their type.
 fn of_codes(py: Python<'_>, codes: Array2<u16>, bits: u8) -> Bound<'_, PyAny> {
     if bits <= 8 {
         return codes.mapv(|code| code as u8).into_pyarray(py).into_any();

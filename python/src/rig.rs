@@ -1,4 +1,4 @@
-//! The board, as `farnear.rig.Rig` uses it: every call can be interrupted by Ctrl-C, which stops what moves.
+//! The board for `farnear.rig.Rig`: Ctrl-C interrupts each call and stops all motion.
 
 use std::{
     collections::BTreeMap,
@@ -32,10 +32,10 @@ use crate::{
     optics::Optics,
 };
 
-/// From one look at the keyboard to the next.
+/// Polling interval for interruptions.
 const LOOK: Duration = Duration::from_millis(2);
 
-/// An image (height, width), its bits, and its record.
+/// An image (height, width), its bit depth, and its record.
 type Taken<'py> = (Bound<'py, PyArray2<u16>>, u8, Bound<'py, PyDict>);
 
 /// A connected board.
@@ -182,7 +182,7 @@ impl RigClient {
     }
 }
 
-/// What went wrong aside of Python.
+/// An error outside Python.
 struct Failed(String);
 
 impl<E: std::error::Error> From<E> for Failed {
@@ -192,8 +192,7 @@ impl<E: std::error::Error> From<E> for Failed {
 }
 
 impl RigClient {
-    /// Does `work` in a thread while this one looks whether the user interrupts; then the rig is stopped before the interruption
-    /// goes on.
+    /// Runs `work` in a thread while this one polls for interruptions; an interruption stops the rig first.
     fn interruptibly<T: Send>(
         &self,
         py: Python<'_>,
@@ -234,7 +233,7 @@ fn axis(name: &str) -> PyResult<Axis> {
 
 fn position(to_um: f64) -> PyResult<Nanometres> {
     nanometres(to_um).ok_or_else(|| {
-        FarnearError::new_err(format!("{to_um} um is no position; expected -2147483 to 2147483 um"))
+        FarnearError::new_err(format!("{to_um} um is out of range; expected -2147483 to 2147483 um"))
     })
 }
 

@@ -1,4 +1,4 @@
-//! Silhouettes of people made by a program.
+//! Synthetic silhouettes of people.
 
 use farnear_recognition::synthetic::activities::{ACTIVITIES, performance};
 use farnear_silhouettes::mask::Mask;

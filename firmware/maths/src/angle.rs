@@ -1,8 +1,8 @@
-//! Angles as 32-bit binary fractions of a turn, and their sine and cosine in single precision.
+//! Angles as 32-bit binary fractions of a turn; sine and cosine in single precision.
 //!
-//! A binary angle wraps by itself, loses nothing however many turns have passed, and resolves 8.4e-8 deg everywhere. A
-//! phase in radians or days kept as `f32` does not: 25 years of days leave 3.6 deg. The board's FPU has single precision
-//! only; everything here uses the exactly rounded operations, so the bits are those of any other processor.
+//! A binary angle wraps by itself and resolves 8.4e-8 deg after any number of turns; an `f32` of 25 years in
+//! days has an error of 3.6 deg. Only exactly rounded single-precision operations are used, so all processors
+//! give the same bits.
 
 use core::f32::consts::PI;
 
@@ -14,30 +14,30 @@ pub struct BinaryAngle(u32);
 const RADIANS: f32 = PI / 2_147_483_648.0;
 
 impl BinaryAngle {
-    /// The angle with these units.
+    /// Angle from these units.
     pub const fn from_units(units: u32) -> Self {
         Self(units)
     }
 
-    /// The units.
+    /// Angle in units of 2^-32 turns.
     pub const fn units(self) -> u32 {
         self.0
     }
 
-    /// The nearest angle to whole 1e-7 deg, the usual integer form of latitude and longitude.
+    /// Nearest angle to whole 1e-7 deg, the usual integer form of latitude and longitude.
     pub const fn from_degrees_e7(degrees_e7: i32) -> Self {
         const TURN_E7: i64 = 3_600_000_000;
         Self((((degrees_e7 as i64) << 32) + TURN_E7 / 2).div_euclid(TURN_E7) as u32)
     }
 
-    /// The nearest angle to `degrees`; 0 where that is not finite. Beyond a turn single precision tells little.
+    /// Nearest angle to `degrees`; 0 if not finite. Inaccurate beyond a turn.
     pub fn from_degrees(degrees: f32) -> Self {
         Self::from_radians(degrees * (PI / 180.0))
     }
 
-    /// The nearest angle to `radians`; 0 where that is not finite. Best below one radian.
+    /// Nearest angle to `radians`; 0 if not finite. Best below one radian.
     pub fn from_radians(radians: f32) -> Self {
-        // A conversion of a float saturates; through i64 it wraps as an angle should.
+        // Float conversion saturates; via i64 it wraps as an angle must.
         Self((radians * (1.0 / RADIANS)) as i64 as u32)
     }
 
@@ -58,11 +58,11 @@ impl BinaryAngle {
 
     /// Sine and cosine, to 1.2e-7.
     pub fn sin_cos(self) -> (f32, f32) {
-        // To the nearest quarter turn, exactly; the rest is within an eighth.
+        // Exact reduction to the nearest quarter turn.
         let quarters = self.0.wrapping_add(1 << 29) >> 30;
         let x = self.0.wrapping_sub(quarters << 30) as i32 as f32 * RADIANS;
         let x2 = x * x;
-        // Taylor: what is left out is below 2e-9 for |x| <= pi / 4.
+        // Taylor: truncation below 2e-9 for |x| <= pi / 4.
         let sin =
             x - x * x2 * (1.0 / 6.0 - x2 * (1.0 / 120.0 - x2 * (1.0 / 5040.0 - x2 * (1.0 / 362_880.0))));
         let cos = 1.0
@@ -82,7 +82,7 @@ pub(crate) fn atan2_degrees(y: f32, x: f32) -> f32 {
     libm::atan2f(y, x) * (180.0 / PI)
 }
 
-/// `sqrt(x^2 + y^2)` of numbers near 1, so that nothing overflows.
+/// `sqrt(x^2 + y^2)` of numbers near 1, without overflow.
 pub(crate) fn length(x: f32, y: f32) -> f32 {
     libm::sqrtf(x * x + y * y)
 }

@@ -1,8 +1,9 @@
-//! Correction by least squares fit (CLSF) in fixed point, one row at a time.
+//! Correction by least squares fit (CLSF) in fixed point, row by row.
 //!
-//! A flat target seen through a real lens comes out of depth from defocus as a bowl that depends on the depth
-//! itself. CLSF maps the distorted depth `U` at column `x` and row `y` to the corrected depth by a third-order
-//! polynomial fitted to flat targets (Li 2014, eq. 6.11). Three forms:
+//! Depth from defocus maps a flat target through a real lens to a bowl that depends on depth. CLSF corrects
+//! the distorted depth
+//! `U` at column `x` and row `y` by a third-order polynomial fitted to flat targets (Li 2014, eq. 6.11).
+//! Three forms:
 //!
 //! | form | terms | seams | table words | instructions per pixel (640-pixel rows; with the tables) |
 //! |---|---|---|---|---|
@@ -10,22 +11,26 @@
 //! | [`Blend`] | the same, bilinear between region centres | none | `3 width` | 22.1 (23.6) |
 //! | [`Full`] | all 20 of third order, one set | none | `3 width` | 22.7 (22.7) |
 //!
-//! (Counted on an emulated Cortex-M4F, built with `opt-level = "s"` and fat LTO.) [`RegionFit`] and [`FullFit`] find the
-//! coefficients from rows of flat targets.
+//! (Emulated Cortex-M4F, `opt-level = "s"`, fat LTO.) [`RegionFit`] and [`FullFit`] fit the coefficients to
+//! flat targets.
 //!
-//! Units: depth is normalised to `U = (depth - centre) / half_span` ([`DepthScale`]) and travels as Q1.15 in an
-//! `i16`; `x` and `y` run from -1 (first column, row) to +1 (last). Coefficients are Q2.29 ([`Coefficient`]).
-//! A pixel without a depth is [`NO_VALUE`] and stays so; a result beyond the scale saturates to a code that
-//! [`DepthScale::decode`] takes for no value either.
+//! Units: `U = (depth - centre) / half_span` ([`DepthScale`]) as Q1.15 in an `i16`; `x` and `y` from -1
+//! (first column, row) to
+//! +1 (last). Coefficients are Q2.29 ([`Coefficient`]). [`NO_VALUE`] passes unchanged; a result beyond the
+//! scale saturates to a
+//! code that [`DepthScale::decode`] also treats as no value.
 //!
-//! ## Shifts, and why nothing overflows
-//! Places and depths are Q1.31; a product keeps its upper 32 bits (one `SMMLA` on a Cortex-M4), so each Horner step
-//! takes a fraction bit away: a factor of third order (`U^3`, `x U^2`, `x^2 y`, ...) has 26, of second 25, of first
-//! 24, the constant and the result 23. Thus the range of an `i32` doubles from step to step: 32, 64, 128, 256.
-//! With every coefficient below 4 and |x|, |y|, |U| <= 1 a partial sum is at most 4 times the number of its terms:
-//! 4 of 32, 16 of 64, 40 of 128 and 80 of 256. A blend is a convex combination; the difference of two factors, which
-//! is multiplied by a weight, carries one fraction bit more and at most twice the value.
-//! Truncation costs at most 16 units of 2^-23, which is a sixteenth of a unit of the Q1.15 result.
+//! ## Shifts and overflow
+//! Positions and depths are Q1.31. A product keeps its upper 32 bits (one `SMMLA` on a Cortex-M4), so each
+//! Horner step removes a
+//! fraction bit: a third-order factor (`U^3`, `x U^2`, `x^2 y`, ...) has 26, second 25, first 24, constant
+//! and result 23. The
+//! range of an `i32` doubles per step: 32, 64, 128, 256. With coefficients below 4 and |x|, |y|, |U| <= 1 a
+//! partial sum is at
+//! most 4 times its number of terms: 4 of 32, 16 of 64, 40 of 128 and 80 of 256. A blend is a convex
+//! combination; the
+//! difference of two factors, multiplied by a weight, has one more fraction bit and at most twice the value.
+//! Truncation costs at most 16 units of 2^-23, a sixteenth of a Q1.15 unit.
 
 mod blend;
 mod fit;
@@ -48,6 +53,6 @@ pub use regions::{REGION_TERMS, REGIONS, RegionCoefficients, Regions};
 pub struct TableState(Option<(usize, usize)>);
 
 impl TableState {
-    /// Nothing: the table will be built.
+    /// Empty: the table will be built.
     pub const EMPTY: Self = Self(None);
 }

@@ -1,18 +1,18 @@
-//! Where a standing person's shadow falls in a level camera's image, and how sure that is.
+//! Shadow of a standing person in a level camera's image, with its standard deviation.
 //!
-//! The shadow on the ground is `s (-east, -north) / hypot(east, north)` long, `s = H / tan(elevation)`. In the camera's
-//! frame (x right, y forward; the camera looks `azimuth` anticlockwise from north) it is `(rx, ry)`. The image of its
-//! end lies `mx`, `my` from the image of the feet (Li 2014, eqs. 8.15 and 8.18, the latter without the lateral
-//! offset `X0` that it forgets):
+//! On the ground the shadow is `s (-east, -north) / hypot(east, north)`, `s = H / tan(elevation)`; in the
+//! camera's frame (x right, y forward; the camera looks `azimuth` anticlockwise from north) `(rx, ry)`. Its
+//! end is imaged `mx`, `my` from the feet (Li 2014, eqs. 8.15 and 8.18, the latter corrected for the lateral
+//! offset `X0`):
 //!
 //! `mx = v ((X0 + rx) / (u + ry) - X0 / u)`, `my = Hc v (1 / (u + ry) - 1 / u)`,
 //!
-//! so `tan(eta) = my / mx = -Hc ry / (u rx - X0 ry)`. The silhouette is turned by `beta = 3 pi / 4 - eta / 2` (8.20), after
-//! mirroring where `mx < 0`; thus `beta` lies between 90 and 180 deg.
+//! so `tan(eta) = my / mx = -Hc ry / (u rx - X0 ry)`. The silhouette is rotated by `beta = 3 pi / 4 - eta /
+//! 2` (8.20), between 90 and 180 deg, after mirroring if `mx < 0`.
 //!
-//! The standard deviation is first order ([`Shadow::deviation`]); where the shadow's end comes near the camera, or
-//! `eta` near the fold of the mirror, that fails, and the result says so. Cost: 950 instructions on a Cortex-M4F, sun
-//! included, and 1,160 for the deviation.
+//! The standard deviation is first order ([`Shadow::deviation`]); the result reports where that fails, near
+//! the camera or the fold of the mirror. Cost: 950 instructions on a Cortex-M4F, sun included, and 1,160 for
+//! the deviation.
 
 mod deviation;
 
@@ -24,45 +24,32 @@ use crate::sun::{Place, Sun};
 
 pub use deviation::{Deviation, Deviations, Reliability};
 
-/// Below this elevation a shadow is longer than nineteen times the person: nobody's lens sees its end.
+/// Lower suns cast shadows beyond nineteen statures, outside any image.
 pub const LEAST_ELEVATION_DEG: f32 = 3.0;
 
-/// What the camera and the subject are like; lengths in metres.
+/// Camera and subject; lengths in metres.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Geometry {
     /// Camera azimuth, anticlockwise from north.
     pub azimuth: BinaryAngle,
-    /// Height of the lens above the ground, Hc.
+    /// Height Hc of the lens above the ground.
     pub camera_height_m: f32,
-    /// Distance of the subject along the optical axis, u.
+    /// Subject distance u along the optical axis.
     pub distance_m: f32,
-    /// Distance of the subject from the optical axis, X0, right positive.
+    /// Subject offset X0 from the optical axis, right positive.
     pub lateral_m: f32,
-    /// Height of the subject, H.
+    /// Height H of the subject.
     pub height_m: f32,
 }
 
 /// Why there is no shadow angle.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[non_exhaustive]
+#[allow(missing_docs, reason = "the names describe these fields")]
 pub enum Error {
-    /// The sun is too low, or below the horizon.
-    SunTooLow {
-        /// Its elevation.
-        elevation_deg: f32,
-    },
-    /// The sun is overhead: there is no shadow to speak of.
-    SunOverhead {
-        /// Its elevation.
-        elevation_deg: f32,
-    },
-    /// A length that must be positive and finite is not.
-    Senseless {
-        /// The name of the length that cannot be.
-        what: &'static str,
-        /// Its value, m.
-        value_m: f32,
-    },
+    SunTooLow { elevation_deg: f32 },
+    SunOverhead { elevation_deg: f32 },
+    Senseless { what: &'static str, value_m: f32 },
 }
 
 impl fmt::Display for Error {
@@ -84,18 +71,18 @@ impl fmt::Display for Error {
 
 impl core::error::Error for Error {}
 
-/// A shadow in the image.
+/// Shadow in the image.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Shadow {
-    /// Angle of the shadow's image from the image's horizontal, degrees, -90 to 90, after mirroring; positive = below.
+    /// Angle from the horizontal, -90 to 90, after mirroring; positive = below.
     pub eta_deg: f32,
-    /// Angle by which the silhouette is turned, degrees, 90 to 180.
+    /// Rotation of the silhouette, 90 to 180.
     pub beta_deg: f32,
-    /// Whether the shadow points left, so that the silhouette is mirrored first.
+    /// The shadow points left, so the silhouette is mirrored first.
     pub mirrored: bool,
-    /// Length of the shadow on the ground, m.
+    /// Length of the shadow on the ground.
     pub length_m: f32,
-    /// Distance of the shadow's end from the camera's plane, m; not positive where it lies beside or behind the camera.
+    /// Distance of the shadow's end from the camera's plane; not positive next to or behind the camera.
     pub end_distance_m: f32,
     right_m: f32,
     forward_m: f32,
@@ -103,9 +90,7 @@ pub struct Shadow {
 
 impl Shadow {
     /// The shadow of a subject.
-    ///
-    /// # Errors
-    /// [`Error::SunTooLow`], [`Error::SunOverhead`], [`Error::Senseless`].
+    /// Errors: [`Error::SunTooLow`], [`Error::SunOverhead`], [`Error::Senseless`].
     pub fn of(sun: &Sun, geometry: &Geometry) -> Result<Self, Error> {
         for (what, value_m) in [
             ("camera height", geometry.camera_height_m),
@@ -133,7 +118,7 @@ impl Shadow {
         let right_m = length_m * (east * cos_a + north * sin_a);
         let forward_m = length_m * (north * cos_a - east * sin_a);
         let end_distance_m = geometry.distance_m + forward_m;
-        // Multiplied by u (u + ry) / v, whose sign is that of the end's distance.
+        // Multiplied by u (u + ry) / v, which has the sign of the end's distance.
         let behind = end_distance_m < 0.0;
         let across = geometry.distance_m * right_m - geometry.lateral_m * forward_m;
         let down = -geometry.camera_height_m * forward_m;
@@ -145,9 +130,7 @@ impl Shadow {
     }
 
     /// The shadow at a moment (Unix time, UT) and place.
-    ///
-    /// # Errors
-    /// As [`Self::of`].
+    /// Errors: as [`Self::of`].
     pub fn at(unix_seconds: i64, place: &Place, geometry: &Geometry) -> Result<Self, Error> {
         Self::of(&Sun::at(unix_seconds, place), geometry)
     }

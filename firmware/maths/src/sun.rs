@@ -1,12 +1,12 @@
-//! Where the sun is: PSA+ (Blanco et al. 2020) with binary phases and single precision.
+//! Sun position: PSA+ (Blanco et al. 2020) with binary phases and single precision.
 //!
-//! The mean longitude, mean anomaly, node and sidereal time grow linearly with time: each is a 64-bit phase, the product
-//! of whole seconds and a rate in 2^-64 turns per second, exact modulo a turn. What is added to them is small and may be
-//! single precision. Right ascension, declination and hour angle are never formed: the sun's vector is rotated from the
-//! ecliptic to the equator, by the sidereal time, and into the observer's horizon, without branch or division.
+//! Mean longitude, mean anomaly, node and sidereal time are 64-bit phases: seconds times a rate in 2^-64
+//! turns per second, exact modulo a turn. Small corrections are in single precision. The sun's vector is
+//! rotated from ecliptic to equator, by sidereal time, and to the horizon, without right ascension,
+//! declination, branch or division.
 //!
-//! Accuracy: 1e-4 deg in elevation and (below 89 deg) 1e-3 deg in azimuth from the same formulas in double precision; PSA+
-//! itself is within 0.007 / 0.05 deg of NREL's SPA for 2014 to 2040. No refraction. Cost: 550 instructions on a
+//! Accuracy: 1e-4 deg in elevation and (below 89 deg) 1e-3 deg in azimuth relative to double precision; PSA+
+//! is within 0.007 / 0.05 deg of NREL's SPA for 2014 to 2040. No refraction. Cost: 550 instructions on a
 //! Cortex-M4F, and 250 for the angles.
 
 use crate::angle::{BinaryAngle, atan2_degrees, length};
@@ -14,15 +14,15 @@ use crate::angle::{BinaryAngle, atan2_degrees, length};
 /// 2000-01-01 12:00 UT as Unix time.
 const EPOCH: i64 = 946_728_000;
 
-/// A phase that grows linearly with time, in 2^-64 turns.
+/// Phase that grows linearly with time, in 2^-64 turns.
 struct Phase {
     at_epoch: u64,
     per_second: u64,
 }
 
-/// `turns` as 2^-64 turns, modulo one turn; negative ones wrap.
+/// `turns` in 2^-64 turns, modulo one turn; negative ones wrap.
 const fn turns(turns: f64) -> u64 {
-    // 2^64 = 2^32 * 2^32: the whole part is cut off before it could be rounded away.
+    // 2^64 = 2^32 * 2^32: the integer part is removed before it could be rounded.
     let whole = turns as i64 as f64;
     ((turns - whole) * 18_446_744_073_709_551_616.0) as i128 as u64
 }
@@ -54,10 +54,10 @@ const SIDEREAL: Phase = Phase {
     per_second: turns((1.0 + 6.570_984_737e-2 / 24.0) / DAY),
 };
 
-/// Parallax at the horizon, radians (0.00244 deg).
+/// Horizontal parallax, radians (0.00244 deg).
 const PARALLAX: f32 = 4.2586e-5;
 
-/// A place on the earth.
+/// Place on the earth.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Place {
     /// Latitude, north positive.
@@ -66,10 +66,10 @@ pub struct Place {
     pub longitude: BinaryAngle,
 }
 
-/// The direction to the sun.
+/// Unit vector to the sun.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Sun {
-    /// Eastern component of the unit vector.
+    /// Eastern component.
     pub east: f32,
     /// Northern component.
     pub north: f32,
@@ -77,14 +77,14 @@ pub struct Sun {
     pub up: f32,
 }
 
-/// The sun's place on the sky of a moment, before it is seen from somewhere: what error propagation needs too.
+/// Equatorial position of the sun, also for error propagation.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Equatorial {
-    /// Components along the vernal equinox, 90 deg east of it on the equator, and the pole.
+    /// Components along the vernal equinox, 90 deg east of it, and the pole.
     pub(crate) vector: [f32; 3],
-    /// The same, differentiated by the longitude along the ecliptic.
+    /// Derivative by the ecliptic longitude.
     pub(crate) derivative: [f32; 3],
-    /// Growth of the longitude, radians a day.
+    /// Growth of the longitude per day, radians.
     pub(crate) per_day: f32,
     /// Sidereal time at Greenwich.
     pub(crate) sidereal: BinaryAngle,
@@ -111,31 +111,31 @@ pub(crate) fn equatorial(unix_seconds: i64) -> Equatorial {
     }
 }
 
-/// An equatorial vector seen from a place: east, north and up.
+/// Equatorial vector in the horizon: east, north, up.
 pub(crate) fn horizontal(vector: [f32; 3], sidereal: BinaryAngle, place: &Place) -> [f32; 3] {
     let (sin_t, cos_t) = sidereal.plus(place.longitude).sin_cos();
     let (sin_lat, cos_lat) = place.latitude.sin_cos();
     let [x, y, z] = vector;
-    // Toward the meridian, and west of it.
+    // Towards the meridian, and west of it.
     let (meridian, west) = (x * cos_t + y * sin_t, x * sin_t - y * cos_t);
     [-west, z * cos_lat - meridian * sin_lat, z * sin_lat + meridian * cos_lat]
 }
 
 impl Sun {
-    /// The sun at a moment (Unix time, UT) and place.
+    /// The sun at a time (Unix time, UT) and place.
     pub fn at(unix_seconds: i64, place: &Place) -> Self {
         let equatorial = equatorial(unix_seconds);
         let [east, north, up] = horizontal(equatorial.vector, equatorial.sidereal, place);
         Self { east, north, up }
     }
 
-    /// Elevation above the horizon in degrees, parallax taken off, refraction not added.
+    /// Elevation with parallax, without refraction.
     pub fn elevation_deg(&self) -> f32 {
         let level = length(self.east, self.north);
         atan2_degrees(self.up, level) - PARALLAX * (180.0 / core::f32::consts::PI) * level
     }
 
-    /// Azimuth in degrees, clockwise from north, 0 to below 360.
+    /// Azimuth clockwise from north, 0 to below 360.
     pub fn azimuth_deg(&self) -> f32 {
         let azimuth = atan2_degrees(self.east, self.north);
         if azimuth < 0.0 { azimuth + 360.0 } else { azimuth }

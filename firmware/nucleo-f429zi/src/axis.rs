@@ -12,8 +12,8 @@ use crate::{
     stepper::{StepInstance, Stepper},
 };
 
-/// The end switches: normally closed to ground with a pull-up, so that a broken wire reads "actuated switch" and
-/// stops the axis.
+/// End switches, normally closed to ground with a pull-up: a broken wire reads as actuated and stops the
+/// axis.
 pub struct Switches {
     home: Input<'static>,
     far: Input<'static>,
@@ -25,16 +25,13 @@ impl Switches {
     }
 }
 
-/// The hardware of a stage.
 pub struct Axis<S: StepInstance, E: GeneralInstance4Channel> {
     pub stepper: Stepper<S>,
-    /// Encoder on its shaft.
     pub encoder: Encoder<E>,
     pub switches: Switches,
 }
 
 impl<S: StepInstance, E: GeneralInstance4Channel> Axis<S, E> {
-    /// What there is to see.
     pub fn read(&mut self) -> MotorInputs {
         MotorInputs {
             encoder_counts: self.encoder.counts(),
@@ -45,7 +42,7 @@ impl<S: StepInstance, E: GeneralInstance4Channel> Axis<S, E> {
         }
     }
 
-    /// Carries out the orders of one tick.
+    /// Applies the outputs of one tick.
     pub fn apply(&mut self, outputs: &MotorOutputs) {
         self.stepper.apply(outputs);
     }

@@ -1,4 +1,4 @@
-//! The board: its pins, and what the control loop asks of them ([`farnear_rig::control::Board`]).
+//! Pins of the board, and its implementation of [`farnear_rig::control::Board`].
 
 use defmt::{error, info, warn};
 use embassy_stm32::{
@@ -28,35 +28,35 @@ use crate::{
     supply::Supply,
 };
 
-/// Without a tick for this long the board is reset (LSI is 17 to 47 kHz, so 68 to 188 ms).
+/// Watchdog timeout without a tick (LSI is 17 to 47 kHz, so 68 to 188 ms).
 const WATCHDOG_US: u32 = 100_000;
 
-/// All hardware that the control loop works on.
+/// Hardware of the control loop.
 pub struct Nucleo {
     coarse: Axis<TIM1, TIM4>,
     lens: Axis<TIM8, TIM3>,
     piezo: Piezo,
     camera: CameraPort,
     lights: LightPort,
-    /// Where records survive without power; `None` where no such chip answers.
+    /// FRAM; `None` if it does not answer.
     pub memory: Option<Memory>,
     supply: Supply,
     link: Link,
     watchdog: IndependentWatchdog<'static, IWDG>,
 }
 
-/// The board and what does not belong to the control loop.
+/// The board, and parts outside the control loop.
 pub struct Parts {
     pub board: Nucleo,
-    /// The LED that shows that the loop runs.
+    /// Blinks while the loop runs.
     pub led: Peri<'static, PB0>,
-    /// Whether the strap says that this is an emulated board.
+    /// Emulated board, by the strap.
     pub emulated: bool,
 }
 
 impl Nucleo {
-    /// Sets everything up: the drivers are off, the trigger is low, the watchdog sleeps. Fails where the serial port cannot
-    /// be set up. As long as the board has pins: a table, which shorter functions would only tear apart.
+    /// Drivers off, trigger low, watchdog stopped. Fails if the serial port cannot be set up. One long
+    /// function because it is a table of pins.
     pub fn set_up(p: Peripherals) -> Result<Parts, ConfigError> {
         let emulated = Input::new(p.PD15, Pull::Down).is_high();
         let link = Link::open(p.USART3, p.PD8, p.PD9)?;
@@ -85,7 +85,7 @@ impl Nucleo {
         Ok(Parts { board, led: p.PB0, emulated })
     }
 
-    /// Wakes the watchdog: from now on it wants to be fed.
+    /// Starts the watchdog.
     pub fn wake_watchdog(&mut self) {
         self.watchdog.unleash();
     }
@@ -117,7 +117,7 @@ impl Board for Nucleo {
     }
 
     fn emergency_stop(&mut self) -> bool {
-        // Both are read: reading the flag clears it.
+        // Both are read, because reading clears the flag.
         let [coarse, lens] = [self.coarse.stepper.emergency_stop(), self.lens.stepper.emergency_stop()];
         coarse || lens
     }

@@ -1,5 +1,5 @@
-//! The chip's clocks: the ST-LINK feeds 8 MHz into HSE, or the chip's own oscillator gives 16 MHz; the PLL makes 168 MHz of either.
-//! Timers on APB1 count at 84 MHz, on APB2 at 168 MHz.
+//! Clocks: 8 MHz HSE from the ST-LINK or the internal 16 MHz; the PLL gives 168 MHz. Timers: APB1 84 MHz,
+//! APB2 168 MHz.
 
 use embassy_stm32::{
     Config,
@@ -9,7 +9,7 @@ use embassy_stm32::{
     time::Hertz,
 };
 
-/// What embassy is to set up.
+/// Configuration for embassy.
 pub fn config(own_clock: bool) -> Config {
     let mut config = Config::default();
     let prediv = if own_clock {

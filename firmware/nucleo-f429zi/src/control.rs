@@ -1,5 +1,5 @@
-//! The control loop's clockwork: a tick every 200 us, every 2 ms at rest, how long each took, and a LED. What a tick does is
-//! [`farnear_rig::control`]'s.
+//! Timing of the control loop: a tick every 200 us, 2 ms at rest, its duration, and a LED. The tick itself is
+//! [`farnear_rig::control`].
 
 use cortex_m::peripheral::DWT;
 use defmt::warn;
@@ -17,12 +17,11 @@ use farnear_rig::{
 
 use crate::{board::Nucleo, clock::SYSCLK_HZ, registers};
 
-/// Ticks of half a period of the LED that shows that the loop runs.
+/// Ticks per half period of the LED.
 const BLINK: u32 = TICK_HZ / 2;
-/// A tick this long is worth a line in the log: three quarters of its period.
+/// Longer ticks are logged: three quarters of the period.
 const LONG_TICK_CYCLES: u32 = SYSCLK_HZ / 1_000_000 * TICK_US * 3 / 4;
 
-/// Runs the rig for ever.
 pub async fn run(mut board: Nucleo, rig: &mut Rig, led: Peri<'static, PB0>) -> ! {
     registers::retained::set_boot(rig.boot());
     let mut led = Output::new(led, Level::High, Speed::Low);
@@ -32,7 +31,7 @@ pub async fn run(mut board: Nucleo, rig: &mut Rig, led: Peri<'static, PB0>) -> !
     let mut due = Instant::now();
     let mut ticks = 1;
     loop {
-        // What comes late is made up for: the next tick is due when it would have been.
+        // Late ticks are caught up.
         due += Duration::from_micros(u64::from(ticks * TICK_US));
         Timer::at(due).await;
         let begin = DWT::cycle_count();

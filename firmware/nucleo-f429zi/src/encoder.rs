@@ -1,5 +1,5 @@
-//! An axis' incremental encoder: the timer counts all four edges of a quadrature period, 16 bits, extended
-//! here. Read at least once per 32,767 counts (0.6 s at 6.25 mm/s; the control loop reads every 200 us).
+//! Incremental encoder: the 16-bit timer counts all four edges and is extended here. Must be read once per
+//! 32,767 counts (0.6 s at 6.25 mm/s; the loop reads every 200 us).
 
 use embassy_stm32::{
     Peri,
@@ -10,7 +10,6 @@ use embassy_stm32::{
     },
 };
 
-/// The encoder with its extended count.
 pub struct Encoder<T: GeneralInstance4Channel> {
     timer: Qei<'static, T>,
     last: u16,
@@ -18,7 +17,7 @@ pub struct Encoder<T: GeneralInstance4Channel> {
 }
 
 impl<T: GeneralInstance4Channel> Encoder<T> {
-    /// Starts counting at 0, wherever the axis is.
+    /// Starts counting at 0.
     pub fn new(
         timer: Peri<'static, T>,
         a: Peri<'static, impl TimerPin<T, Ch1>>,
@@ -30,7 +29,7 @@ impl<T: GeneralInstance4Channel> Encoder<T> {
         Self { timer, last, counts: 0 }
     }
 
-    /// Counts since the start, positive = sensor and lens away from each other.
+    /// Counts since the start, positive = sensor and lens apart.
     pub fn counts(&mut self) -> i32 {
         let count = self.timer.count();
         let moved = count.wrapping_sub(self.last) as i16;

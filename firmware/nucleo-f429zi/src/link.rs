@@ -1,10 +1,10 @@
-//! The serial link: USART3 on the ST-LINK's virtual COM port, 8N1, 2 Mbaud or what
-//! the host asks for, both directions by DMA.
+//! Serial link: USART3 on the ST-LINK's virtual COM port, 8N1, 2 Mbaud or as requested, both directions by
+//! DMA.
 //!
-//! No interrupt takes part. A circular transfer lays received bytes into a ring that each control tick empties; what the
-//! ticks write into a second ring is sent piece by piece. The HAL's buffered port is not used: at the end of each frame sent
-//! its handler writes back the status register it has read, and a byte received in between is lost, for a written zero
-//! clears RXNE (RM0090, USART_SR); of frames in both directions at a time that spoiled one in 2,000.
+//! No interrupts: a circular transfer fills a ring that each tick empties; a second ring is sent piece by
+//! piece. The HAL's buffered port is not used: at the end of each frame its handler writes back the status
+//! register, and a byte received in between is lost, because a written zero clears RXNE (RM0090, USART_SR).
+//! That damaged one in 2,000 frames with traffic in both directions.
 
 use core::sync::atomic::{AtomicU8, Ordering, fence};
 
@@ -29,34 +29,34 @@ use crate::clock::APB1_TIMER_HZ;
 const APB1_HZ: u32 = APB1_TIMER_HZ / 2;
 /// 5 ms of bytes, 25 control ticks.
 const RECEIVE_RING: usize = 1024;
-/// Three of the longest frames with a delimiter in front of each, and a power of two, so that going round costs no division.
+/// Three of the longest frames with leading delimiters, and a power of two, so that wrapping needs no
+/// division.
 const SEND_RING: usize = 4 * FRAME_MAX;
 
-/// Streams of DMA1 that serve USART3, and their channel (RM0090, table 42).
+/// Streams and channel of USART3 on DMA1 (RM0090, table 42).
 const RECEIVE_STREAM: usize = 1;
 const SEND_STREAM: usize = 3;
 const CHANNEL: u8 = 4;
 
-// Atomic, for somebody else writes or reads them: the DMA.
+// Atomic, because the DMA accesses them.
 static RECEIVED: [AtomicU8; RECEIVE_RING] = [const { AtomicU8::new(0) }; RECEIVE_RING];
 static TO_SEND: [AtomicU8; SEND_RING] = [const { AtomicU8::new(0) }; SEND_RING];
 
-/// The link's end on the board.
 pub struct Link {
     /// Keeps pins and clock.
     _port: Uart<'static, Blocking>,
-    /// The next byte to take from [`RECEIVED`].
+    /// Next byte of [`RECEIVED`] to take.
     taken: usize,
-    /// In [`TO_SEND`]: from here on places are in use.
+    /// First used place of [`TO_SEND`].
     sent: usize,
-    /// In [`TO_SEND`]: up to here the transfer under way sends.
+    /// End of the current transfer in [`TO_SEND`].
     handed_over: usize,
-    /// In [`TO_SEND`]: up to here frames are written.
+    /// End of the written frames in [`TO_SEND`].
     written: usize,
 }
 
 impl Link {
-    /// Sets the port up and begins to receive.
+    /// Sets up the port and starts receiving.
     pub fn open(
         port: Peri<'static, USART3>,
         tx: Peri<'static, PD8>,
@@ -79,12 +79,12 @@ impl Link {
         Ok(Self { _port: port, taken: 0, sent: 0, handed_over: 0, written: 0 })
     }
 
-    /// Hands over what has come in; `true` where the ring was full, so that bytes were lost. Once per tick, also for what waits
-    /// to be sent.
+    /// Passes received bytes; `true` if the ring was full and bytes were lost. Once per tick, also to
+    /// continue sending.
     pub fn drain(&mut self, mut take: impl FnMut(u8)) -> bool {
         self.hand_over();
         let (end, lapped) = received();
-        // Only where the transfer went once round and past what was not taken yet.
+        // Only if the transfer wrapped and passed unread bytes.
         let full = lapped && end >= self.taken;
         if full {
             self.taken = end;
@@ -96,13 +96,13 @@ impl Link {
         full
     }
 
-    /// Whether another frame can be queued.
+    /// Room for another frame.
     pub const fn has_room(&self) -> bool {
-        // One place stays free to tell full from empty.
+        // One place stays free to distinguish full from empty.
         (self.sent + SEND_RING - self.written - 1) % SEND_RING > FRAME_MAX
     }
 
-    /// Queues a frame with its delimiters. Only after [`Link::has_room`]; else it is dropped, and the host asks again.
+    /// Queues a frame with its delimiters. Dropped without [`Link::has_room`]; the host repeats its request.
     pub fn send(&mut self, bytes: &[u8]) {
         if !self.has_room() {
             warn!("a frame was dropped: no room");
@@ -115,11 +115,11 @@ impl Link {
         self.hand_over();
     }
 
-    /// Sends and receives at another rate from now on. Only while nothing is sent. The divider makes 2,000,000 baud exactly and
-    /// 913,043 of 921,600: 0.9 % off, of the 3 % that both ends together may be (RM0090, tolerance of the receiver).
+    /// Changes the rate while nothing is sent. The divider gives exactly 2,000,000 baud and 913,043 for
+    /// 921,600: 0.9 % off, of 3 % permitted for both ends (RM0090, tolerance of the receiver).
     pub fn set_rate(&mut self, rate: LinkRate) {
         let baud = rate.baud();
-        // Sixteen samples a bit: the register counts sixteenths of the divider.
+        // Sixteen samples per bit: the register counts sixteenths of the divider.
         pac::USART3.brr().write(|w| w.0 = (APB1_HZ + baud / 2) / baud);
     }
 
@@ -128,7 +128,7 @@ impl Link {
         self.handed_over == self.written && !is_running(SEND_STREAM) && pac::USART3.sr().read().tc()
     }
 
-    /// Gives the DMA what is written, up to the ring's end, where it has nothing to do.
+    /// Starts an idle DMA with the written bytes up to the ring's end.
     fn hand_over(&mut self) {
         if is_running(SEND_STREAM) {
             return;
@@ -138,7 +138,7 @@ impl Link {
             return;
         }
         let end = if self.written > self.sent { self.written } else { SEND_RING };
-        // "Sent to the last bit" is forgotten by a zero in its place and ones in all others, which change nothing.
+        // TC is cleared by a zero; ones in the other bits have no effect.
         pac::USART3.sr().write(|w| {
             w.0 = 0x3ff;
             w.set_tc(false);
@@ -148,7 +148,7 @@ impl Link {
     }
 }
 
-/// Starts a stream between the port's data register and bytes.
+/// Starts a stream between the data register and bytes.
 fn start(stream: usize, bytes: &'static [AtomicU8], set: impl FnOnce(&mut Cr)) {
     clear(stream);
     let registers = pac::DMA1.st(stream);
@@ -156,7 +156,7 @@ fn start(stream: usize, bytes: &'static [AtomicU8], set: impl FnOnce(&mut Cr)) {
     registers.m0ar().write_value(bytes.as_ptr() as u32);
     // The rings are shorter than the counter's 65,535.
     registers.ndtr().write(|w| w.set_ndt(bytes.len() as u16));
-    // What was written before is in the memory when the transfer reads it.
+    // Earlier writes are in memory when the transfer reads it.
     fence(Ordering::Release);
     registers.cr().write(|w| {
         w.set_chsel(CHANNEL);
@@ -166,7 +166,7 @@ fn start(stream: usize, bytes: &'static [AtomicU8], set: impl FnOnce(&mut Cr)) {
     });
 }
 
-/// Forgets the stream's events: it cannot be started before.
+/// Clears the stream's flags, required before a start.
 fn clear(stream: usize) {
     pac::DMA1.ifcr(stream / 4).write(|w| {
         w.set_tcif(stream % 4, true);
@@ -182,19 +182,20 @@ fn is_running(stream: usize) -> bool {
     pac::DMA1.st(stream).cr().read().en()
 }
 
-/// Up to where bytes were received, and whether the ring's end was passed since the last look.
+/// End of the received bytes, and whether the ring wrapped since the last call.
 fn received() -> (usize, bool) {
     let left = || usize::from(pac::DMA1.st(RECEIVE_STREAM).ndtr().read().ndt());
     loop {
         let before = left();
         let lapped = pac::DMA1.isr(RECEIVE_STREAM / 4).read().tcif(RECEIVE_STREAM % 4);
-        // The count falls; where it has risen, the end was passed in between, and the flag may be the one or the other.
+        // The count falls; a rise means that it wrapped in between, with the flag in either state.
         if left() <= before {
             if lapped {
                 clear(RECEIVE_STREAM);
             }
-            // An error's flag is cleared by reading it, then the data: the DMA does that with the next byte, which may not come
-            // after an overrun. A byte that is taken from the DMA here is one of a frame that is lost already.
+            // An error flag is cleared by reading it, then the data. The DMA does that with the next byte,
+            // which may not come after an overrun. The byte taken here belongs to a frame that is lost
+            // already.
             if pac::USART3.sr().read().ore() {
                 let _ = pac::USART3.dr().read();
             }

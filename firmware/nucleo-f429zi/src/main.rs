@@ -1,7 +1,8 @@
 //! # farnear-nucleo-f429zi
 //!
-//! The firmware on a NUCLEO-F429ZI. Thin on purpose: what the board does lives in `farnear-rig`; here are
-//! clocks, pins and registers. One file per driver; [`board`] joins them, and [`control`] ticks 5000 times a second, 500 times at rest.
+//! Firmware of a NUCLEO-F429ZI. Behaviour is in `farnear-rig`; here are clocks, pins and registers. One file
+//! per driver;
+//! [`board`] combines them, and [`control`] ticks 5000 times a second, 500 times at rest.
 //!
 //! | pin | function | signal |
 //! |---|---|---|
@@ -22,8 +23,9 @@
 //! | PD15 | GPIO, pull-down | strap: high only on the emulated board |
 //! | PB0 | GPIO | LED: blinks while the control loop runs |
 //!
-//! Interrupts: the step timers' update and break above TIM2 (camera) above TIM5 (time); the link has none, for its bytes
-//! travel by DMA; the loop runs in thread mode below them all.
+//! Interrupts: step timers' update and break above TIM2 (camera) above TIM5 (time); the link uses DMA only;
+//! the loop runs in
+//! thread mode below them.
 #![no_std]
 #![no_main]
 
@@ -63,8 +65,8 @@ use crate::{
 /// From power-on to the FRAM's first answer (FM25V02, t_PU).
 const MEMORY_STARTS: Duration = Duration::from_micros(250);
 
-/// The rig with what its memory holds; a memory that does not answer is taken off the board. Not inside `main`, whose
-/// variables would have a place of their own for ever, and moved ones several.
+/// The rig with its memory's contents; a silent memory is removed. Separate from `main`, whose variables keep
+/// their place forever, and moved ones several.
 #[inline(never)]
 fn start(identity: Identity, fitted: &mut Option<Memory>) -> &'static mut Rig {
     static RIG: StaticCell<Rig> = StaticCell::new();
@@ -80,7 +82,7 @@ fn start(identity: Identity, fitted: &mut Option<Memory>) -> &'static mut Rig {
     rig
 }
 
-/// Counts cycles: the measure of waits and of the control loop.
+/// Enables the cycle counter, used for waits and the control loop.
 fn count_cycles() {
     if let Some(mut core) = cortex_m::Peripherals::take() {
         core.DCB.enable_trace();
@@ -97,7 +99,7 @@ fn kept_piezo_code(cause: ResetCause) -> Option<u16> {
     }
 }
 
-/// Says why the boot before this ended itself.
+/// Logs why the last boot ended.
 fn tell_of(last: Option<Last>) {
     match last {
         Some(Last::Panic { file, line }) => error!("panicked at {}:{}", file.unwrap_or("?"), line),
@@ -127,7 +129,7 @@ async fn main(_spawner: Spawner) {
     let Parts { mut board, led, emulated } = match Nucleo::set_up(peripherals) {
         Ok(parts) => parts,
         Err(fault) => {
-            // Nobody can be told; the log is all there is.
+            // Only the log can report this.
             error!("the serial port cannot be set up: {}", fault);
             return;
         }

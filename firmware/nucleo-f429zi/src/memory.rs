@@ -1,8 +1,8 @@
-//! The memory without power: Cypress FM25V02 (document 001-84494) or FM25V02A (001-90865), 32 KiB of FRAM on SPI4, mode 0. It
-//! writes at the speed of the bus, with no pages and no busy time: 64 bytes take 26 us.
+//! FRAM: Cypress FM25V02 (document 001-84494) or FM25V02A (001-90865), 32 KiB on SPI4, mode 0. Writes at bus
+//! speed without pages or busy time: 64 bytes take 26 us.
 //!
-//! It is read twice, piece by piece, and asked for its name more than once: a bit that flips on the bus, where plugs
-//! still bounce, must not cost a record, nor the whole memory.
+//! Reads are repeated until two agree, and the name is queried several times: a flipped bit on the bus while
+//! plugs bounce must not lose a record or the memory.
 
 use embassy_stm32::{
     Peri,
@@ -15,7 +15,7 @@ use embassy_stm32::{
 };
 use farnear_rig::io::{MEMORY_BYTES, MemoryWrite};
 
-/// APB2 / 4; the chip stands 40 MHz.
+/// APB2 / 4; the chip permits 40 MHz.
 const SPI_HZ: Hertz = Hertz(21_000_000);
 const WRITE_ENABLE: u8 = 0x06;
 const WRITE: u8 = 0x02;
@@ -26,12 +26,12 @@ const READ_STATUS: u8 = 0x05;
 /// the chip they all read as ones.
 const STATUS_MASK: u8 = 0b0011_0011;
 const WRITE_ENABLED: u8 = 0b0000_0010;
-/// Manufacturer, family and density (table 6), behind six bytes of a continuation code. A last byte, the revision, follows: 00
-/// of the FM25V02, 08 of the FM25V02A.
+/// Manufacturer, family and density (table 6), after six continuation bytes. The last byte is the revision:
+/// 00 FM25V02, 08 FM25V02A.
 const ID: [u8; 8] = [0x7f, 0x7f, 0x7f, 0x7f, 0x7f, 0x7f, 0xc2, 0x22];
-/// How often it is asked for its name, and a piece is read until it is the same twice in a row.
+/// Attempts to read the name, or a piece equal twice in a row.
 const ATTEMPTS: usize = 4;
-/// What is read at once.
+/// Bytes per read.
 const PIECE: usize = 256;
 
 pub struct Memory {
@@ -41,7 +41,6 @@ pub struct Memory {
 }
 
 impl Memory {
-    /// Sets SPI4 and the select up.
     pub fn new(
         spi: Peri<'static, SPI4>,
         clock: Peri<'static, PE2>,
@@ -69,7 +68,6 @@ impl Memory {
         done
     }
 
-    /// Whether the chip answers with its name.
     pub fn is_there(&mut self) -> bool {
         (0..ATTEMPTS).any(|_| {
             let mut id = [0; ID.len()];
@@ -77,7 +75,7 @@ impl Memory {
         })
     }
 
-    /// Reads what the rig keeps, from address 0; `false` where the bus failed.
+    /// Reads the records from address 0; `false` on a bus error.
     pub fn read(&mut self, bytes: &mut [u8; MEMORY_BYTES]) -> bool {
         let pieces = bytes.chunks_exact_mut(PIECE).zip((0..).step_by(PIECE));
         for (piece, address) in pieces {
@@ -88,7 +86,7 @@ impl Memory {
         true
     }
 
-    /// Reads a piece until it is the same twice; one that never is is left to the records' checksums.
+    /// Reads a piece until two agree; otherwise the records' checksums decide.
     fn read_piece(&mut self, address: u16, piece: &mut [u8]) -> bool {
         let mut again = [0; PIECE];
         let [high, low] = address.to_be_bytes();
@@ -118,14 +116,14 @@ impl Memory {
         answered && status[0] & STATUS_MASK == WRITE_ENABLED
     }
 
-    /// Writes. A chip that does not answer is reported; its contents are checked at the next start.
+    /// Write errors are detected at the next start by the checksums.
     pub fn write(&mut self, order: &MemoryWrite) {
         let [high, low] = order.address.to_be_bytes();
         self.failed |= !(0..ATTEMPTS).any(|_| self.enable_write());
         self.send(&[WRITE, high, low], &order.bytes);
     }
 
-    /// Sends bytes one right behind the other. The HAL waits for what comes back after each, which takes twice as long as the bus.
+    /// Sends bytes without gaps. The HAL waits for each received byte, which takes twice as long.
     fn send(&mut self, head: &[u8], bytes: &[u8]) {
         let spi = pac::SPI4;
         self.select.set_low();
@@ -136,7 +134,7 @@ impl Memory {
         while !spi.sr().read().txe() {}
         while spi.sr().read().bsy() {}
         self.select.set_high();
-        // What came meanwhile says nothing, and was too much: reading data and status clears both.
+        // Reading data and status clears the overrun.
         let _ = spi.dr().read();
         let _ = spi.sr().read();
     }

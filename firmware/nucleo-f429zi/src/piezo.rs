@@ -1,16 +1,22 @@
-//! The piezo's DAC and its strain gauge's converter, both on SPI3.
+//! The piezo's DAC and the strain gauge's converter on SPI3.
 //!
-//! - DAC: TI DAC8830 (SLAS449): 16 bit, +-1 LSB, SPI mode 0 up to 50 MHz, 16-bit frame, takes the value when
-//!   its select rises; starts at code 0, which leaves the piezo relaxed. Select PD0.
-//! - Converter: Analog Devices AD7691 (18 bit, 250 kS/s, 0.75 LSB noise) in its three-wire CS mode with busy
-//!   indicator: the rising edge of CNV (PD1) samples; CNV stays high for at least 50 ns (10 ns are the minimum of the
-//!   AD7685, a part of the same family) and is low again before the shortest conversion (0.5 us) ends, which no interrupt may delay. When the longest (3.7 us at a supply of 3.3 V) has ended, the output, released and
-//!   pulled up till then, is low; each clock then gives a bit of the result, two's complement, most significant first, in SPI
-//!   mode 0; after the last one the output is released again, and what is read there is as good as the pull-up is fast: it
-//!   says nothing. The leading 0 tells a converter from a broken wire, as do codes at either end, which the rig refuses.
+//! - DAC: TI DAC8830 (SLAS449): 16 bit, +-1 LSB, SPI mode 0 up to 50 MHz, 16-bit frame, updated when its
+//!   select rises; starts
+//!   at code 0, the relaxed piezo. Select PD0.
+//! - Converter: Analog Devices AD7691 (18 bit, 250 kS/s, 0.75 LSB noise), three-wire CS mode with busy
+//!   indicator. The rising
+//!   edge of CNV (PD1) samples; CNV is high for at least 50 ns (the related AD7685 needs 10 ns) and low again
+//!   before the
+//!   shortest conversion (0.5 us) ends, which no interrupt may delay. After the longest (3.7 us at 3.3 V) the
+//!   output, until
+//!   then released and pulled up, is low; each clock gives a bit, two's complement, MSB first, SPI mode 0.
+//!   After the last bit
+//!   the output is released and meaningless. The leading 0 distinguishes a converter from a broken wire, as
+//!   do codes at
+//!   either end, which the rig rejects.
 //!
-//! Words of 16 bits, of which each takes 1.5 us: the processor looks for its end rarely instead of all the time, which
-//! leaves the bus alone (and is most of what an emulated tick costs).
+//! A 16-bit word takes 1.5 us: the processor polls rarely, which leaves the bus free (and is most of an
+//! emulated tick's cost).
 
 use cortex_m::peripheral::DWT;
 use embassy_stm32::{
@@ -26,40 +32,39 @@ use farnear_rig::io::GAUGE_CODE_MAX;
 
 use crate::{clock, registers::retained};
 
-/// APB1 / 4; the slowest part stands twice this.
+/// APB1 / 4; the slowest device tolerates twice this rate.
 const SPI_HZ: Hertz = Hertz(10_500_000);
-/// Longest conversion of the AD7691 at VDD = 2.3 to 4.5 V, 3.7 us (2.2 us at 5 V), of the 168 MHz clock.
+/// Longest conversion of the AD7691 at VDD = 2.3 to 4.5 V, 3.7 us (2.2 us at 5 V), at 168 MHz.
 const CONVERSION_CYCLES: u32 = 622;
-/// CNV is high for this long: 60 ns, between the 50 ns that are wanted and the 500 ns of the shortest conversion.
+/// CNV pulse: 60 ns, between the 50 ns required and the 500 ns of the shortest conversion.
 const PULSE_CYCLES: u32 = 10;
 /// Half of a word's 256 cycles.
 const HALF_A_WORD_CYCLES: u32 = 128;
-/// From one look for the word's end to the next.
+/// Polling interval for the word's end.
 const LOOK_CYCLES: u32 = 12;
-/// The busy indicator, the first of the 32 bits that are read.
+/// Busy indicator, first of the 32 bits.
 const BUSY_BIT: u32 = 1 << 31;
-/// Clocks after the indicator and the 18 bits.
+/// Clocks after indicator and 18 bits.
 const TRAILING_BITS: u32 = 13;
-/// Control ticks (5 ms) after which the DAC is told again what it should hold: it may have missed it, by a loose contact or a dip of
-/// its supply, and a loop that stands at the end of its range would never say anything else.
+/// Control ticks (5 ms) after which the DAC's code is repeated: a loose contact or supply dip may have lost
+/// it, and a loop at the end of its range would not change it.
 const AGAIN_TICKS: u8 = 25;
-/// Turns two's complement into 0 = most negative.
+/// Converts two's complement to 0 = most negative.
 const SIGN_BIT: u32 = 1 << 17;
 
-/// DAC and gauge of the fine axis.
 pub struct Piezo {
     _spi: Spi<'static, Blocking, Master>,
     dac_select: Output<'static>,
     convert: Output<'static>,
     code: Option<u16>,
-    /// Control ticks since the DAC was told.
+    /// Control ticks since the DAC was written.
     silent_ticks: u8,
-    /// When the gauge was sampled, in cycles.
+    /// Sampling time, cycles.
     sampled: u32,
 }
 
 impl Piezo {
-    /// Sets SPI3 and the selects up; the piezo stays as it is.
+    /// Sets up SPI3 and the selects; the piezo is unchanged.
     pub fn new(
         spi: Peri<'static, SPI3>,
         clock: Peri<'static, PC10>,
@@ -75,12 +80,12 @@ impl Piezo {
         config.frequency = SPI_HZ;
         config.miso_pull = embassy_stm32::gpio::Pull::Up;
         let mut spi = Spi::new_blocking(spi, clock, data_out, data_in, config);
-        // Nothing is sent, but from now on words have 16 bits. An error has no cause where nothing is sent.
+        // Sends nothing, but switches to 16-bit words; cannot fail.
         let _ = spi.blocking_write::<u16>(&[]);
         Self { _spi: spi, dac_select, convert, code: None, silent_ticks: 0, sampled: 0 }
     }
 
-    /// Sends a word and gives the one that comes meanwhile.
+    /// Sends a word and returns the received one.
     fn exchange(&mut self, word: u16) -> u16 {
         pac::SPI3.dr().write(|w| w.set_dr(word));
         clock::wait_cycles(HALF_A_WORD_CYCLES);
@@ -91,7 +96,7 @@ impl Piezo {
     }
 
     pub fn sample(&mut self) {
-        // An interrupt between the two would make the pulse longer than a conversion, and the result without its indicator.
+        // An interrupt in between would make the pulse longer than a conversion and lose the indicator.
         critical_section::with(|_| {
             self.convert.set_high();
             clock::wait_cycles(PULSE_CYCLES);
@@ -100,7 +105,8 @@ impl Piezo {
         self.sampled = DWT::cycle_count();
     }
 
-    /// Reads the last sample when it is converted: 0 to [`GAUGE_CODE_MAX`], `None` where no converter answers. Takes 3.8 us.
+    /// The last sample once converted: 0 to [`GAUGE_CODE_MAX`], `None` without an answering converter. Takes
+    /// 3.8 us.
     pub fn gauge(&mut self) -> Option<u32> {
         clock::wait_cycles_since(self.sampled, CONVERSION_CYCLES);
         let word = u32::from(self.exchange(0)) << 16 | u32::from(self.exchange(0));
@@ -108,7 +114,7 @@ impl Piezo {
         (word & BUSY_BIT == 0).then_some(code ^ SIGN_BIT)
     }
 
-    /// Sets the DAC, once in a control tick; what it should hold already is sent again now and then only.
+    /// Sets the DAC, once per tick; unchanged codes are repeated only occasionally.
     pub fn set(&mut self, code: u16) {
         self.silent_ticks += 1; // sent before it could overflow
         if self.code == Some(code) && self.silent_ticks < AGAIN_TICKS {

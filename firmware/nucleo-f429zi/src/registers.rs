@@ -1,5 +1,5 @@
-//! The only `unsafe` code of the firmware: interrupt enables, the memory that survives a reset, the way out of a fault, the
-//! log's encoder, and the names under which a debugger finds what was measured.
+//! All `unsafe` code of the firmware: interrupt enables, retained memory, fault exit, log encoder, and
+//! symbols for debuggers.
 #![allow(unsafe_code)]
 
 mod faults;
@@ -17,13 +17,13 @@ use farnear_protocol::message::ResetCause;
 
 pub use self::logger::take_log;
 
-/// Cycles of the longest control tick since the reset, interrupts included; a debugger (and the emulated board's
-/// tests) find it by its name.
+/// Cycles of the longest control tick since the reset, with interrupts; read by debuggers and the emulated
+/// board's tests.
 // SAFETY: no other symbol has this name.
 #[unsafe(no_mangle)]
 static FARNEAR_LONGEST_TICK_CYCLES: AtomicU32 = AtomicU32::new(0);
 
-/// Notes how long a tick took; `true` where it is the longest so far.
+/// Records a tick's duration; `true` if it is the longest so far.
 pub fn note_tick(cycles: u32) -> bool {
     let longest = cycles > FARNEAR_LONGEST_TICK_CYCLES.load(Ordering::Relaxed);
     if longest {
@@ -32,7 +32,7 @@ pub fn note_tick(cycles: u32) -> bool {
     longest
 }
 
-/// Lets an interrupt in, at a priority. Call when its handler's state is ready.
+/// Enables an interrupt. Its handler's state must be ready.
 pub fn enable_interrupt(interrupt: Interrupt, priority: Priority) {
     interrupt.set_priority(priority);
     interrupt.unpend();
@@ -40,17 +40,17 @@ pub fn enable_interrupt(interrupt: Interrupt, priority: Priority) {
     unsafe { interrupt.enable() };
 }
 
-/// Forgets a request of an interrupt that was set before its cause was cleared.
+/// Clears a pending interrupt whose cause was cleared later.
 pub fn unpend(interrupt: Interrupt) {
     NVIC::unpend(interrupt);
 }
 
-/// Why the board was reset; clears the flags, so that the next reset shows its own (RM0090, RCC_CSR).
+/// Cause of the reset; clears the flags (RM0090, RCC_CSR).
 pub fn take_reset_cause() -> ResetCause {
     let flags = pac::RCC.csr().read();
     pac::RCC.csr().modify(|csr| csr.set_rmvf(true));
-    // From the special to the general: every reset also sets PINRSTF, power-on sets BORRSTF too. Power-on comes before a
-    // reset of the program's: that of the option bytes clears no flag.
+    // From specific to general: each reset also sets PINRSTF, power-on also BORRSTF. Power-on precedes the
+    // program's reset, because the option bytes' reset clears no flag.
     if flags.porrstf() {
         ResetCause::PowerOn
     } else if flags.lpwrrstf() {

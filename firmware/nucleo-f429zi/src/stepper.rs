@@ -1,15 +1,14 @@
-//! STEP pulses from an advanced timer, exactly as many as ordered: TIM1 for stage A, TIM8 for stage B.
+//! Exact numbers of STEP pulses from an advanced timer: TIM1 for stage A, TIM8 for stage B.
 //!
-//! The timer runs in one-pulse mode: it plays one [`Segment`] from its repetition counter and stops by itself at the
-//! update event, so no late interrupt can ever add a pulse. The update interrupt, the highest of the program,
-//! loads the waiting segment and starts the timer again; that takes well under a microsecond, which the motor's
-//! spacing absorbs (at least 25 us). STEP is low for the first half of a period and high for the second.
+//! One-pulse mode: the timer plays one [`Segment`] from its repetition counter and stops at the update event,
+//! so a late interrupt never adds a pulse. The update interrupt, the highest priority, loads the next segment
+//! and restarts the timer in well under a microsecond, which the pulse spacing (at least 25 us) absorbs. STEP
+//! is low for the first half of a period.
 //!
-//! The emergency stop's circuit is on the timer's break input: when it opens, the hardware takes STEP low at once,
-//! whatever the program does; the break interrupt then empties the queue. Pulses of the segment that was running are not
-//! counted, for nobody knows how many of them came; the axis is lost anyway.
+//! The emergency stop is on the break input: hardware takes STEP low immediately, then the break interrupt
+//! clears the queue. Pulses of the interrupted segment are not counted; the position is lost anyway.
 //!
-//! DIR, EN and DIAG are the driver chip's other lines (TMC2209 class: EN is active low, DIAG active high).
+//! DIR, EN and DIAG are the driver's other lines (TMC2209 class: EN active low, DIAG active high).
 
 use core::cell::RefCell;
 
@@ -32,7 +31,7 @@ use heapless::Deque;
 
 use crate::{clock::APB2_TIMER_HZ, registers};
 
-/// Segments that can wait: at least 8 ms of motion at the longest, two ticks' worth at the shortest.
+/// At least 8 ms of the longest segments, two ticks of the shortest.
 const QUEUE: usize = 8;
 const PRESCALER: u16 = (APB2_TIMER_HZ / STEP_TIMER_HZ - 1) as u16;
 
@@ -41,11 +40,11 @@ struct Queue {
     running: Option<Segment>,
     pulses: u32,
     underrun: bool,
-    /// The break input has stopped the timer since the last look.
+    /// Set by the break input until read.
     broken: bool,
 }
 
-/// A step timer and what it is to play.
+/// A step timer with its queue.
 pub struct StepTimer {
     registers: TimAdv,
     queue: Mutex<RefCell<Queue>>,
@@ -76,9 +75,8 @@ fn TIM8_BRK_TIM12() {
     LENS.broke();
 }
 
-/// A timer that can make STEP pulses.
 pub trait StepInstance: AdvancedInstance4Channel {
-    /// Its registers and its queue.
+    /// Registers and queue.
     fn steps() -> &'static StepTimer;
 }
 
@@ -114,11 +112,11 @@ impl StepTimer {
             w.set_ocm(0, vals::Ocm::PWM_MODE2);
             w.set_ocpe(0, true);
         });
-        // The working registers first, then the output: otherwise it would come up high and give one edge.
+        // Working registers first, then the output: otherwise it would start high and give one edge.
         timer.egr().write(|w| w.set_ug(true));
         timer.ccer().write(|w| w.set_cce(0, true));
         timer.bdtr().write(|w| {
-            // An open circuit (the pull-up makes it high) takes STEP to its idle level, low.
+            // An open circuit (high by the pull-up) takes STEP to its idle level, low.
             w.set_bke(0, true);
             w.set_bkp(0, vals::Bkp::ACTIVE_HIGH);
             w.set_ossi(vals::Ossi::IDLE_LEVEL);
@@ -133,7 +131,7 @@ impl StepTimer {
         critical_section::with(|cs| work(&mut self.queue.borrow_ref_mut(cs)))
     }
 
-    /// Starts the next segment. Only while the timer stands.
+    /// Starts the next segment on a stopped timer.
     fn start_next(&self, queue: &mut Queue) {
         queue.running = queue.waiting.pop_front();
         let Some(segment) = queue.running else { return };
@@ -141,10 +139,10 @@ impl StepTimer {
         timer.arr().write(|w| w.set_arr(segment.period_ticks - 1));
         timer.ccr(0).write(|w| w.set_ccr(segment.period_ticks / 2));
         timer.rcr().write(|w| w.set_rep(segment.pulses - 1));
-        // Takes the three into the working registers; makes no flag (URS) and no edge (the count is 0 already).
+        // Loads the working registers without flag (URS) or edge (the count is 0 already).
         timer.egr().write(|w| w.set_ug(true));
         if !timer.bdtr().read().moe() {
-            // At the first segment, and after an emergency stop. While that lasts the hardware refuses.
+            // At the first segment and after an emergency stop; refused by hardware during one.
             timer.bdtr().modify(|w| w.set_moe(true));
             if !timer.bdtr().read().moe() {
                 queue.running = None;
@@ -164,7 +162,7 @@ impl StepTimer {
     /// A segment has ended.
     fn updated(&self) {
         self.registers.sr().write(|w| {
-            // Flags are cleared by writing 0; ones leave the others alone.
+            // Flags are cleared by writing 0; ones have no effect.
             w.0 = u32::MAX;
             w.set_uif(false);
         });
@@ -176,10 +174,10 @@ impl StepTimer {
         });
     }
 
-    /// The emergency stop's circuit has opened; STEP is low already.
+    /// The emergency stop has opened; STEP is low already.
     fn broke(&self) {
         self.registers.cr1().modify(|w| w.set_cen(false));
-        // Its flag stays while the circuit is open, so it is heard once, until the next start.
+        // The flag stays while the circuit is open, so it is handled once, until the next start.
         self.registers.dier().modify(|w| w.set_bie(false));
         self.registers.sr().write(|w| {
             w.0 = u32::MAX;
@@ -193,7 +191,6 @@ impl StepTimer {
     }
 }
 
-/// The pins of a motor's driver chip.
 pub struct DriverPins<S, D, E, G, B>
 where
     S: PeripheralType + 'static,
@@ -206,14 +203,14 @@ where
     pub direction: Peri<'static, D>,
     pub enable: Peri<'static, E>,
     pub diagnosis: Peri<'static, G>,
-    /// Break input: the emergency stop.
+    /// Break input for the emergency stop.
     pub stop: Peri<'static, B>,
 }
 
 pub struct Stepper<T: StepInstance> {
     direction: Output<'static>,
     enable: Output<'static>,
-    /// What the two were last set to, as orders have it: a write to a port that changes nothing costs as much as one that does.
+    /// Last DIR and enable orders: unchanged values are not written, because a port write costs the same.
     away_enabled: (bool, bool),
     diagnosis: Input<'static>,
     stop: Flex<'static>,
@@ -221,7 +218,7 @@ pub struct Stepper<T: StepInstance> {
 }
 
 impl<T: StepInstance> Stepper<T> {
-    /// Sets the timer and the pins up; the driver is off.
+    /// Driver off.
     pub fn new(
         _timer: Peri<'static, T>,
         pins: DriverPins<impl TimerPin<T, Ch1>, impl Pin, impl Pin, impl Pin, impl BreakInputPin<T, BkIn1>>,
@@ -241,7 +238,6 @@ impl<T: StepInstance> Stepper<T> {
         }
     }
 
-    /// What the timer is doing.
     pub fn state(&self) -> StepperState {
         T::steps().with(|queue| StepperState {
             pulses: queue.pulses,
@@ -251,18 +247,17 @@ impl<T: StepInstance> Stepper<T> {
         })
     }
 
-    /// The driver chip reports a fault.
     pub fn fault(&self) -> bool {
         self.diagnosis.is_high()
     }
 
-    /// The emergency stop's circuit is open, or was since the last look.
+    /// The emergency stop is open, or was since the last call.
     pub fn emergency_stop(&mut self) -> bool {
         let broke = T::steps().with(|queue| core::mem::take(&mut queue.broken));
         broke || self.stop.is_high()
     }
 
-    /// Carries out the orders of one tick.
+    /// Applies the outputs of one tick.
     pub fn apply(&mut self, outputs: &MotorOutputs) {
         let wanted = (outputs.direction_away, outputs.enable);
         if core::mem::replace(&mut self.away_enabled, wanted) != wanted {
@@ -274,19 +269,20 @@ impl<T: StepInstance> Stepper<T> {
             if outputs.abort_steps {
                 queue.waiting.clear();
                 queue.underrun = false;
-                // What runs ends by itself within a millisecond, and that is no underrun.
+                // The running segment ends within a millisecond, which is no underrun.
                 if let Some(running) = &mut queue.running {
                     running.last = true;
                 }
             }
             for segment in &outputs.segments {
                 if queue.waiting.push_back(*segment).is_err() {
-                    // More than `room`: stop rather than lose pulses silently.
+                    // Beyond `room`: stop rather than lose pulses silently.
                     queue.waiting.clear();
                     queue.underrun = true;
                 }
             }
-            // Behind a break nothing starts until the loop has read it: `emergency_stop` clears the flag, and the rig aborts then.
+            // After a break nothing starts until the loop has read it: `emergency_stop` clears the flag, and
+            // the rig aborts.
             if queue.broken {
                 queue.waiting.clear();
             }

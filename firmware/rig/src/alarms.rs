@@ -1,8 +1,8 @@
-//! Alarms: latched, numbered over the board's life, kept without power, cleared one by one by their numbers.
+//! Alarms: latched, numbered over the board's life, stored, cleared one by one by number.
 //!
-//! Alarms that come while one is latched are latched behind it: the host sees the oldest first, which is the cause more
-//! often than not. Nothing that is latched already is latched again, so a cause that stays gives one alarm. The last
-//! eight are kept, and those not cleared are always among them: with eight latched, nothing more is.
+//! Further alarms are latched behind the first; the host reads the oldest first, usually the cause. A cause
+//! that is already latched raises no second alarm. The last eight are stored, always including those not
+//! cleared; with eight latched, no more are.
 
 use farnear_protocol::BoardMicros;
 use farnear_protocol::message::{Alarm, AlarmRecord, Axis, Failure, RequestError};
@@ -11,11 +11,11 @@ pub(crate) const RETAINED: usize = 8;
 
 #[derive(Clone, PartialEq, Debug)]
 pub(crate) struct Alarms {
-    /// The number of the last.
+    /// Number of the last alarm.
     count: u32,
-    /// How many of the last are latched.
+    /// Number of latched ones.
     latched: u8,
-    /// Alarm `n` is in place `n % RETAINED`.
+    /// Alarm `n` is at index `n % RETAINED`.
     kept: [Option<AlarmRecord>; RETAINED],
 }
 
@@ -24,7 +24,7 @@ impl Alarms {
         Self { count: 0, latched: 0, kept: [None; RETAINED] }
     }
 
-    /// Alarms as they were kept; what does not fit together is dropped.
+    /// Restores stored alarms; inconsistent ones are dropped.
     pub(crate) fn restored(count: u32, latched: u8, records: impl Iterator<Item = AlarmRecord>) -> Self {
         let mut alarms = Self { count, latched: 0, kept: [None; RETAINED] };
         for record in records {
@@ -40,28 +40,26 @@ impl Alarms {
         alarms
     }
 
-    /// The number of the last alarm, 0 = none ever.
+    /// Number of the last alarm, 0 = none.
     pub(crate) const fn count(&self) -> u32 {
         self.count
     }
 
-    /// How many are latched.
     pub(crate) const fn latched_count(&self) -> u8 {
         self.latched
     }
 
-    /// What is kept, in no order.
     pub(crate) const fn kept(&self) -> &[Option<AlarmRecord>; RETAINED] {
         &self.kept
     }
 
-    /// The oldest latched alarm.
+    /// Oldest latched alarm.
     pub(crate) fn latched(&self) -> Option<&AlarmRecord> {
         let oldest = self.count.checked_sub(u32::from(self.latched.checked_sub(1)?))?;
         self.kept[oldest as usize % RETAINED].as_ref()
     }
 
-    /// Latches an alarm. `None` where its like is latched already.
+    /// Latches an alarm; `None` if an equal one is latched.
     pub(crate) fn raise(&mut self, alarm: Alarm, boot: u32, time: BoardMicros) -> Option<AlarmRecord> {
         let full = usize::from(self.latched) == RETAINED;
         let number = self.count.checked_add(1)?;
@@ -80,14 +78,14 @@ impl Alarms {
         (0..latched).filter_map(|ago| self.kept[self.count.wrapping_sub(ago) as usize % RETAINED].as_ref())
     }
 
-    /// An alarm that is kept; 0 = the last.
+    /// A stored alarm; 0 = the last.
     pub(crate) fn read(&self, number: u32) -> Result<AlarmRecord, RequestError> {
         let number = if number == 0 { self.count } else { number };
         let kept = self.kept[number as usize % RETAINED].filter(|record| record.number == number);
         kept.ok_or_else(|| self.unknown())
     }
 
-    /// Clears the latched alarm; its cause must be gone.
+    /// Clears the latched alarm unless its cause persists.
     pub(crate) fn clear(
         &mut self,
         number: u32,
@@ -113,7 +111,7 @@ impl Alarms {
     }
 }
 
-/// The same thing happened, though perhaps with other figures.
+/// Same cause, possibly with other values.
 fn is_like(one: &Alarm, other: &Alarm) -> bool {
     use Alarm::{Following, HostSilence};
     match (one, other) {
@@ -123,7 +121,7 @@ fn is_like(one: &Alarm, other: &Alarm) -> bool {
     }
 }
 
-/// The alarm that a stepper's fault is; `None` for what is a failure of the work alone.
+/// Alarm for a stepper's fault; `None` if only the work fails.
 pub(crate) const fn of_fault(axis: Axis, fault: Failure) -> Option<Alarm> {
     match fault {
         Failure::Following { error } => Some(Alarm::Following { axis, error }),
@@ -135,7 +133,7 @@ pub(crate) const fn of_fault(axis: Axis, fault: Failure) -> Option<Alarm> {
     }
 }
 
-/// The axis that an alarm is about and what its work fails with; other work fails with the alarm's number.
+/// Axis of an alarm and the failure of its work; other work fails with the alarm's number.
 pub(crate) const fn as_failure(alarm: &Alarm) -> Option<(Axis, Failure)> {
     match *alarm {
         Alarm::Following { axis, error } => Some((axis, Failure::Following { error })),

@@ -1,6 +1,6 @@
-//! Calibration: routines by which the board measures its own mechanics.
+//! Calibration routines.
 //!
-//! Each occupies the whole rig. What it finds, travel apart, becomes a setting; an axis is homed when its routine ends.
+//! Each occupies the whole rig. Results, except travel, become settings; the axis is homed at the end.
 
 mod backlash;
 mod gauge;
@@ -19,7 +19,6 @@ use crate::motion::stage::Stage;
 use crate::settings::{Settings, StepperSettings};
 use farnear_protocol::Nanometres;
 
-/// A routine under way.
 #[derive(Clone, Debug)]
 pub(crate) enum Calibrating {
     Travel(Travel),
@@ -28,18 +27,18 @@ pub(crate) enum Calibrating {
     Gauge(GaugeScale),
 }
 
-/// What a tick of a routine brought.
+/// Result of a routine's tick.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Step {
     On,
-    /// It goes on with this setting.
+    /// Continue with this setting.
     Set(SettingKey, i32),
     Done(Calibration),
     Failed(Axis, Failure),
 }
 
 impl Calibrating {
-    /// Begins with the next tick. `None` where the axis has no such routine.
+    /// Starts with the next tick; `None` if the axis has no such routine.
     pub(crate) const fn new(routine: Routine) -> Option<Self> {
         match routine {
             Routine::Travel { axis: Axis::SensorFine } | Routine::Backlash { axis: Axis::SensorFine } => None,
@@ -69,7 +68,6 @@ impl Calibrating {
     }
 }
 
-/// A list of one axis.
 const fn only(axis: Axis) -> &'static [Axis] {
     match axis {
         Axis::SensorCoarse => &[Axis::SensorCoarse],
@@ -78,7 +76,7 @@ const fn only(axis: Axis) -> &'static [Axis] {
     }
 }
 
-/// Homes the axis of a routine; until that is done, and where it fails, gives what the routine's tick brings.
+/// Homes the axis of a routine; returns its step until that is done or fails.
 fn go_home(
     homing: &mut Homing,
     axis: Axis,

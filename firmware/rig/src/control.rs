@@ -1,24 +1,27 @@
-//! The control loop: what a board does in a tick, and in which order.
+//! The control loop of all boards.
 //!
-//! A board implements [`Board`], a few small things that only it can do, and calls [`Control::tick`]
-//! [`crate::io::TICK_HZ`] times a second. The order is here, once for all boards:
+//! A board implements [`Board`] and calls [`Control::tick`] [`crate::io::TICK_HZ`] times a second. Order
+//! within a tick:
 //!
-//! 1. The strain gauge is sampled, so that its samples come evenly whatever else a tick has to do. Its converter takes some microseconds;
-//!    what it says is read at the end of the second step.
-//! 2. Bytes from the link go to the rig, where whole requests wait. Then the rest of the hardware is read. The
-//!    emergency stop comes after the step timers: its circuit stops them by itself, and one that opens between the two
-//!    readings must not look like a timer that ran dry.
-//! 3. A request to stop waits for nothing but what was asked before it. The rig decides, and its outputs are carried out.
-//! 4. One thing is done for the host, for a tick has time for one beside two motors and the piezo: a frame is sent where the link
-//!    takes one and there is something to say, answers and events first, then the log, which a host that asks without
-//!    a pause does not keep waiting for ever; or else an answer is put into its frame; or else a request is carried out. In a tick in
-//!    which the memory was written, or a frame came to its end, this waits for the next.
-//! 5. The watchdog is fed. It comes last, so that whatever hangs in a tick leaves it not fed.
+//! 1. The gauge is sampled first, so that samples are evenly spaced; the converter is read at the end of step
+//!    2.
+//! 2. Bytes from the link go to the rig, then the hardware is read. The emergency stop is read after the step
+//!    timers: its
+//!    circuit stops them in hardware, and opening between both reads must not look like an underrun.
+//! 3. The rig decides, and its outputs are applied. A stop request waits only for earlier requests.
+//! 4. One thing is done for the host, as a tick has time for one besides two motors and the piezo: send a
+//!    frame (answers and
+//!    events, then the log, which continuous requests cannot block forever), encode an answer, or execute a
+//!    request. It is
+//!    deferred in ticks with a memory write or a completed frame.
+//! 5. The watchdog is fed last, so that any hang leaves it unfed.
 //!
-//! A rig at which nothing moves and to which nobody has spoken for [`QUIET_TICKS`] rests: then only every [`REST_TICKS`]th tick is
-//! carried out, for a processor that sleeps warms no optics. The first byte, switch, alarm or step off the piezo's target ends it.
+//! An idle rig without requests for [`QUIET_TICKS`] executes only every [`REST_TICKS`]th tick, so that the
+//! processor does not
+//! warm the optics. A byte, switch, alarm or step off the piezo's target ends this.
 //!
-//! A reset that the rig orders waits for the frame under way, at most [`LAST_FRAME`]; nothing else is done meanwhile.
+//! A reset ordered by the rig waits for the current frame, at most [`LAST_FRAME`]; nothing else is done
+//! meanwhile.
 
 use farnear_protocol::frame::{Header, Kind, delimited, encode};
 use farnear_protocol::message::LinkRate;
@@ -29,98 +32,92 @@ use crate::io::{ExposureEdges, Inputs, MotorInputs, Outputs, REST_TICKS, StrobeE
 use crate::motion::since;
 pub use crate::notes::Note;
 
-/// Answers and events after which the log has a turn.
+/// Answers and events before the log gets a turn.
 const FRAMES_BEFORE_LOG: u8 = 8;
-/// Ticks without a byte, a frame or a request after which the rig may rest: 20 ms. A host that asks more often is answered at once.
+/// Ticks without byte, frame or request before resting: 20 ms. More frequent requests are answered
+/// immediately.
 pub const QUIET_TICKS: u32 = TICK_HZ / 50;
-/// A reset waits so long for the last frame: the longest takes 1.3 ms on the wire, and one may wait before it.
+/// Limit for the last frame before a reset: the longest takes 1.3 ms, and one may wait before it.
 pub const LAST_FRAME: Micros = Micros(10_000);
 
-/// The hardware of a board, as the loop sees it. Each method does one thing, at once.
+/// Hardware of a board. Each method returns immediately.
 pub trait Board {
-    /// The board's time.
     fn now(&mut self) -> BoardMicros;
 
-    /// Hands over the bytes that came in over the link; `true` where some may have been lost.
+    /// Passes received bytes; returns `true` if some may have been lost.
     fn receive(&mut self, take: impl FnMut(u8)) -> bool;
 
-    /// Samples the strain gauge; its converter is at work from now on.
+    /// Starts a gauge conversion.
     fn sample_gauge(&mut self);
 
-    /// What the converter made of the sample, once it is done: [`Inputs::gauge_code`].
+    /// Result of the conversion, once done: [`Inputs::gauge_code`].
     fn gauge(&mut self) -> Option<u32>;
 
-    /// Reads stage A's stepper.
     fn coarse(&mut self) -> MotorInputs;
 
-    /// Reads stage B's stepper.
     fn lens(&mut self) -> MotorInputs;
 
-    /// Whether the emergency stop's circuit is open, or was since the last look.
+    /// Whether the emergency stop is or was open since the last call.
     fn emergency_stop(&mut self) -> bool;
 
-    /// Whether the supply is below the level at which the board can still stop in order.
+    /// Whether the supply is too low for an orderly stop.
     fn supply_low(&mut self) -> bool;
 
     /// [`Inputs::memory_failed`].
     fn memory_failed(&mut self) -> bool;
 
-    /// [`Inputs::exposure`]; edges are stamped as moments before `now`.
+    /// [`Inputs::exposure`], with stamps before `now`.
     fn exposure(&mut self, now: BoardMicros) -> Option<ExposureEdges>;
 
-    /// [`Inputs::strobe`]; likewise.
+    /// [`Inputs::strobe`], with stamps before `now`.
     fn strobe(&mut self, now: BoardMicros) -> Option<StrobeEdges>;
 
-    /// Carries the outputs out in the order of their fields; the reset is the loop's.
+    /// Applies the outputs in order of their fields, except the reset.
     fn apply(&mut self, outputs: &Outputs);
 
-    /// Whether another frame can be sent.
     fn has_room(&self) -> bool;
 
-    /// Sends a frame with its delimiters, [`farnear_protocol::frame::Delimited`]; only where there is room.
+    /// Sends a frame, delimiters included ([`farnear_protocol::frame::Delimited`]); requires room.
     fn send(&mut self, bytes: &[u8]);
 
-    /// Whether the last bit of the last frame has left the board.
+    /// Whether the last bit has left.
     fn all_sent(&self) -> bool;
 
-    /// Gives the link another rate, now.
     fn set_link_rate(&mut self, rate: LinkRate);
 
-    /// The next piece of the board's log and its number.
+    /// The next part of the log and its number.
     fn take_log(&mut self) -> Option<(u32, Log)>;
 
-    /// Writes a line into the log.
+    /// Writes to the log.
     fn note(&mut self, note: Note);
 
-    /// Keeps the watchdog from resetting the board.
     fn feed_watchdog(&mut self);
 
     fn reset(&mut self);
 }
 
-/// The loop's state: the rig, and what was said of the hardware.
+/// State of the loop.
 #[derive(Debug)]
 pub struct Control<'r> {
     rig: &'r mut Rig,
-    /// A STEP queue is dry, and it was said.
+    /// A STEP queue underran, already noted.
     dry: bool,
-    /// Since when the board is about to be reset.
+    /// Time at which a reset was ordered.
     reset_pending: Option<BoardMicros>,
-    /// Frames since the log had its turn.
+    /// Frames since the log's last turn.
     frames_before_log: u8,
-    /// What is to be done for the host was put off in the tick before.
+    /// The host's turn was deferred in the last tick.
     deferred: bool,
-    /// Ticks since something was heard, said or done.
+    /// Ticks without activity.
     quiet_ticks: u32,
 }
 
 impl<'r> Control<'r> {
-    /// A loop that has not begun.
     pub const fn new(rig: &'r mut Rig) -> Self {
         Self { rig, dry: false, reset_pending: None, frames_before_log: 0, deferred: false, quiet_ticks: 0 }
     }
 
-    /// One tick; gives after how many ticks' time the next is due.
+    /// Executes a tick; returns the interval to the next one, in ticks.
     pub fn tick(&mut self, board: &mut impl Board) -> u32 {
         if let Some(since) = self.reset_pending {
             leave(board, since);
@@ -148,7 +145,7 @@ impl<'r> Control<'r> {
         if let Some(rate) = self.rig.link_rate_due(inputs.now, || board.all_sent()) {
             board.set_link_rate(rate);
         }
-        // Frames without a pause put it off by a tick at most; the memory's writes leave a tick out by themselves.
+        // Continuous frames defer it by one tick at most; memory writes skip a tick on their own.
         let has_time = outputs.memory.is_none() && (!frame_came || self.deferred);
         self.deferred = !has_time;
         let acted = !has_time || self.speak(board) || self.rig.serve(inputs.now);
@@ -172,7 +169,7 @@ impl<'r> Control<'r> {
         self.dry = dry;
     }
 
-    /// Sends a frame; says whether there was one, and room for it.
+    /// Sends a frame; returns whether there was one with room.
     fn speak(&mut self, board: &mut impl Board) -> bool {
         if !board.has_room() {
             return false;
@@ -182,7 +179,7 @@ impl<'r> Control<'r> {
             return true;
         }
         let Some(frame) = self.rig.transmit() else {
-            // An answer that is being made comes before the log.
+            // A pending answer has priority over the log.
             return !self.rig.has_work() && self.speak_log(board);
         };
         self.frames_before_log = self.frames_before_log.saturating_add(1);
@@ -190,8 +187,8 @@ impl<'r> Control<'r> {
         true
     }
 
-    /// Sends a piece of the log; says whether there was one. What was logged at the start waits for the first session: a host
-    /// that connects throws away what came before.
+    /// Sends a part of the log; returns whether there was one. Early log waits for the first session, because
+    /// a connecting host drops older input.
     fn speak_log(&mut self, board: &mut impl Board) -> bool {
         if !self.rig.has_session() {
             return false;
@@ -206,7 +203,7 @@ impl<'r> Control<'r> {
     }
 }
 
-/// Reads the hardware; what is read when matters, see the module's documentation.
+/// Reads the hardware in the order of the module's documentation.
 fn read(board: &mut impl Board, gauge_code: Option<u32>, link_overflow: bool) -> Inputs {
     let now = board.now();
     let (coarse, lens) = (board.coarse(), board.lens());

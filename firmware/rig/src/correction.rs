@@ -1,10 +1,10 @@
-//! Depth correction over the link: a row in, the row corrected, the row out; and the fit of its coefficients.
+//! Depth correction over the link: rows in and out, and the fit of coefficients.
 //!
-//! One correction is open, one is kept in the memory. The mathematics is `farnear_maths::clsf`, here is its state: the
-//! coefficients, a row, and scratch memory, which holds either a correction's table or a fit's sums.
+//! One correction is open, one is stored. The mathematics is `farnear_maths::clsf`; here are coefficients, a
+//! row, and scratch memory for either a correction's table or a fit's sums.
 //!
-//! RAM: 15 KiB. Cost: a row of 640 pixels 9,000 to 15,000 instructions; where the row is the first of a region, up to
-//! 160,000 more for the table; a solution 730,000. Therefore none of this while a stepper moves.
+//! RAM: 15 KiB. Cost: 9,000 to 15,000 instructions for a row of 640 pixels, up to 160,000 more for the first
+//! row of a region, 730,000 for a solution. Therefore refused while a stepper moves.
 
 use farnear_maths::clsf::{
     Blend, Coefficient, Columns, Error, FULL_TERMS, Frame, Full, FullFit, REGION_TERMS, REGIONS,
@@ -19,7 +19,7 @@ pub const ROW_PIXELS_MAX: u16 = 1024;
 pub(crate) const COEFFICIENTS: usize = REGIONS * REGIONS * REGION_TERMS;
 const TABLE_WORDS: usize = Full::table_words(ROW_PIXELS_MAX);
 
-/// A correction: what it is for, and its coefficients.
+/// Form and coefficients of a correction.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub(crate) struct StoredCorrection {
     info: CorrectionInfo,
@@ -27,7 +27,7 @@ pub(crate) struct StoredCorrection {
 }
 
 impl StoredCorrection {
-    /// A correction that the memory kept; `None` where it cannot be one.
+    /// Restores a stored correction; `None` if invalid.
     pub(crate) fn restored(info: CorrectionInfo, bits: [i32; COEFFICIENTS]) -> Option<Self> {
         frame(&info).ok()?;
         Some(Self { info, bits })
@@ -37,13 +37,13 @@ impl StoredCorrection {
         &self.info
     }
 
-    /// Its coefficients, all that there may be.
+    /// Coefficients of the largest form.
     pub(crate) const fn bits(&self) -> &[i32; COEFFICIENTS] {
         &self.bits
     }
 
     fn coefficient(&self, index: usize) -> Coefficient {
-        // Bits are checked when they come in.
+        // Checked on input.
         Coefficient::from_bits(self.bits[index]).unwrap_or_default()
     }
 
@@ -61,7 +61,7 @@ impl StoredCorrection {
         }
     }
 
-    /// Places of the coefficients from `first`, all of which the form has.
+    /// Index range of coefficients within the form.
     fn places(&self, first: u8, count: usize) -> Result<core::ops::Range<usize>, CorrectionFault> {
         let (start, end) = (usize::from(first), usize::from(first) + count);
         if end > usize::from(self.info.form.coefficients()) {
@@ -70,7 +70,7 @@ impl StoredCorrection {
         Ok(start..end)
     }
 
-    /// Places of the pixels from `first`, all of which a row has.
+    /// Index range of pixels within a row.
     fn pixels(&self, first: u16, count: usize) -> Result<core::ops::Range<usize>, CorrectionFault> {
         let (start, end) = (usize::from(first), usize::from(first) + count);
         if end > usize::from(self.info.width) {
@@ -88,7 +88,7 @@ fn frame(info: &CorrectionInfo) -> Result<Frame, CorrectionFault> {
     }
 }
 
-/// What the scratch memory holds.
+/// Use of the scratch memory.
 #[derive(Clone, Debug)]
 #[expect(clippy::large_enum_variant, reason = "one place for all, there is no heap to put the large one on")]
 enum Scratch {
@@ -98,7 +98,7 @@ enum Scratch {
     FullFit(FullFit),
 }
 
-/// The open correction and the kept one.
+/// Open and stored correction.
 #[derive(Clone, Debug)]
 pub(crate) struct Correction {
     stored: Option<StoredCorrection>,
@@ -108,18 +108,16 @@ pub(crate) struct Correction {
 }
 
 impl Correction {
-    /// None open. Inlined, so that its 15 KiB are made in their place.
+    /// None open. Inlined, so that its 15 KiB are built in place.
     #[inline(always)]
     pub(crate) const fn new(stored: Option<StoredCorrection>) -> Self {
         Self { stored, open: None, row: [0; ROW_PIXELS_MAX as usize], scratch: Scratch::Empty }
     }
 
-    /// The one that is kept in the memory.
     pub(crate) const fn stored(&self) -> Option<&StoredCorrection> {
         self.stored.as_ref()
     }
 
-    /// Opens an empty correction.
     pub(crate) fn open(&mut self, info: CorrectionInfo) -> Result<(), CorrectionFault> {
         frame(&info)?;
         if info.half_span_um <= 0 {
@@ -130,7 +128,7 @@ impl Correction {
         Ok(())
     }
 
-    /// Opens the kept correction.
+    /// Opens the stored correction.
     pub(crate) fn load(&mut self) -> Result<CorrectionInfo, CorrectionFault> {
         let stored = self.stored.as_ref().ok_or(CorrectionFault::None)?;
         self.open = Some(stored.clone());
@@ -138,7 +136,7 @@ impl Correction {
         Ok(stored.info)
     }
 
-    /// Keeps the open correction; the caller has it written.
+    /// Stores the open correction; the caller marks the record.
     pub(crate) fn store(&mut self) -> Result<(), CorrectionFault> {
         self.stored = Some(self.open.clone().ok_or(CorrectionFault::None)?);
         Ok(())
@@ -161,7 +159,7 @@ impl Correction {
         CoefficientBits::from_slice(&open.bits[places]).map_err(|_| CorrectionFault::Coefficient)
     }
 
-    /// Adds samples to the fit, which they begin.
+    /// Adds samples; starts a fit if none is active.
     pub(crate) fn add_samples(
         &mut self,
         row: u16,
@@ -198,7 +196,6 @@ impl Correction {
         Ok(())
     }
 
-    /// Puts pixels into the row buffer.
     pub(crate) fn put_row(&mut self, first: u16, codes: &Codes) -> Result<(), CorrectionFault> {
         let open = self.open.as_ref().ok_or(CorrectionFault::None)?;
         let pixels = open.pixels(first, codes.len())?;
@@ -239,7 +236,6 @@ impl Correction {
         Ok(())
     }
 
-    /// Reads pixels from the row buffer.
     pub(crate) fn get_row(&self, first: u16, count: u8) -> Result<Codes, CorrectionFault> {
         let open = self.open.as_ref().ok_or(CorrectionFault::None)?;
         let pixels = open.pixels(first, usize::from(count))?;

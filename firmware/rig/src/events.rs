@@ -1,7 +1,7 @@
-//! Events: numbered, sent once unasked, the last ones kept for whoever saw a gap.
+//! Numbered events, sent once, the last ones stored for repetition.
 //!
-//! One ring is both the memory for `ReadEvent` and the transmit queue: an event that was overwritten before it
-//! could be sent is skipped, which the host sees as a gap. RAM: about 1.5 KiB.
+//! One ring serves `ReadEvent` and as transmit queue: an event overwritten before it was sent is skipped,
+//! which the host detects as a gap. RAM: about 1.5 KiB.
 
 use farnear_protocol::BoardMicros;
 use farnear_protocol::message::{Event, EventKind};
@@ -20,23 +20,21 @@ impl Events {
         Self { ring: [const { None }; RETAINED as usize], next: 0, unsent: 0 }
     }
 
-    /// The number the next event will get.
     pub(crate) const fn next_number(&self) -> u32 {
         self.next
     }
 
-    /// The oldest event that can be read.
+    /// Oldest stored event.
     pub(crate) const fn oldest(&self) -> u32 {
         self.next.saturating_sub(RETAINED)
     }
 
-    /// Adds an event. Numbers would run out after 2^32 events, years at a thousand a second.
+    /// Numbers would overflow after 2^32 events, years at a thousand a second.
     pub(crate) fn push(&mut self, time: BoardMicros, kind: EventKind) {
         self.ring[(self.next % RETAINED) as usize] = Some(Event { time, kind });
         self.next = self.next.saturating_add(1);
     }
 
-    /// An event by its number.
     pub(crate) fn get(&self, number: u32) -> Option<&Event> {
         if !(self.oldest()..self.next).contains(&number) {
             return None;
@@ -44,7 +42,7 @@ impl Events {
         self.ring[(number % RETAINED) as usize].as_ref()
     }
 
-    /// The next event to send and its number; counts as sent.
+    /// The next event to send; counts as sent.
     pub(crate) fn send(&mut self) -> Option<(u32, &Event)> {
         let number = self.unsent.max(self.oldest());
         if number >= self.next {
@@ -54,7 +52,6 @@ impl Events {
         self.get(number).map(|event| (number, event))
     }
 
-    /// Whether events wait to be sent.
     pub(crate) const fn all_sent(&self) -> bool {
         self.unsent >= self.next
     }

@@ -1,16 +1,19 @@
-//! Control gains of the piezo, worked out by the compiler from a few physical numbers.
+//! Control gains of the piezo, computed at compile time from physical numbers.
 //!
-//! The piezo with the sensor on it is a lightly damped second-order system. With position `p` and scaled velocity
-//! `w = v / omega`, both in nm, and the commanded free stroke `u`:
+//! The piezo with the sensor is a lightly damped second-order system. With position `p`, scaled velocity `w =
+//! v / omega`, both
+//! in nm, and the commanded free stroke `u`:
 //! ```text
 //! d/dt [p]   [   0          omega     ] [p]   [  0  ]
 //!      [w] = [-omega  -2 zeta omega   ] [w] + [omega] (u + d)
 //! ```
-//! `d` is what hysteresis and creep add to the command. Sampled with a zero-order hold at the control tick
-//! (Franklin, Powell, Workman 1998, "Digital Control of Dynamic Systems", ch. 4) this gives
+//! `d` is the effect of hysteresis and creep. Sampled with a zero-order hold at the control tick (Franklin,
+//! Powell, Workman
+//! 1998, "Digital Control of Dynamic Systems", ch. 4) this gives
 //! - the input shaper: two zero-vibration stages (Singer and Seering 1990) on the tick grid, together a ZVD;
-//! - a current observer for `p`, `w`, `d` and the drift of `d` (ibid. section 8.2), which is integral control: the
-//!   estimated disturbance is taken off the command;
+//! - a current observer for `p`, `w`, `d` and the drift of `d` (ibid. section 8.2), which acts as integral
+//!   control: the
+//!   estimated disturbance is subtracted from the command;
 //! - state feedback that damps the resonance; both by Ackermann's formula.
 //!
 //! Gains are integers in 2^-24. Nothing here runs on the board.
@@ -20,45 +23,45 @@ use crate::matrix::{Matrix, add_scaled, apply, exponential, identity, product, s
 /// Fraction bits of a gain.
 pub(crate) const GAIN_BITS: u32 = 24;
 
-/// What is known of the piezo.
+/// Physical numbers of the piezo.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct PiezoModel {
     /// First resonance with the sensor board mounted.
     pub resonance_hz: f64,
     pub damping: f64,
-    /// Control period in seconds.
+    /// Control period.
     pub tick_s: f64,
-    /// From sampling the gauge to the DAC's answer to it, in seconds; less than a tick.
+    /// From the gauge sample to the DAC's effect; less than a tick.
     pub latency_s: f64,
-    /// Where state feedback puts the resonance.
+    /// Poles of the state feedback.
     pub feedback: Poles,
-    /// Where the observer's errors die away: two equal pairs.
+    /// Poles of the observer: two equal pairs.
     pub observer: Poles,
 }
 
-/// Everything the piezo's control loop multiplies with, in 2^-24.
+/// Factors of the piezo's control loop, in 2^-24.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Gains {
-    /// State transition over a tick, rows first.
+    /// State transition per tick, by rows.
     pub(crate) transition: [[i32; 2]; 2],
-    /// Effect of the command over the rest of its tick, after the latency.
+    /// Effect of the command after the latency.
     pub(crate) input: [i32; 2],
-    /// Effect of the command of the tick before, during the latency.
+    /// Effect of the previous command during the latency.
     pub(crate) input_before: [i32; 2],
     /// Feedback of position and scaled velocity errors.
     pub(crate) feedback: [i32; 2],
     /// Correction of position, scaled velocity, disturbance and drift per nm of innovation.
     pub(crate) observer: [i32; 4],
-    /// One zero-vibration stage.
     pub(crate) shaper: ShaperGains,
 }
 
-/// A zero-vibration stage: `out[k] = now x[k] + early x[k - half] + late x[k - half - 1]`; the weights sum to 1.
+/// A zero-vibration stage: `out[k] = now x[k] + early x[k - half] + late x[k - half - 1]`; the weights sum to
+/// 1.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct ShaperGains {
-    /// Whole ticks in half a period of the resonance.
+    /// Whole ticks in half a resonance period.
     pub(crate) half: usize,
-    /// Weight of the present sample; the other two follow.
+    /// Weight of the present sample.
     pub(crate) now: i32,
     /// Weight of the sample `half` ticks ago.
     pub(crate) early: i32,
@@ -66,7 +69,7 @@ pub struct ShaperGains {
     pub(crate) late: i32,
 }
 
-/// A pair of poles: natural frequency in Hz and damping ratio.
+/// A pair of poles: natural frequency and damping ratio.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Poles {
     pub hz: f64,
@@ -74,7 +77,7 @@ pub struct Poles {
 }
 
 impl Gains {
-    /// Designs the gains. The resonance must lie between a sixtieth and a sixth of the tick rate.
+    /// The resonance must be between 1/60 and 1/6 of the tick rate.
     pub const fn design(model: &PiezoModel) -> Self {
         let (a, b) = sampled(model, model.tick_s);
         let (rest, b_after) = sampled(model, model.tick_s - model.latency_s);
@@ -114,13 +117,13 @@ impl Gains {
     }
 }
 
-/// The free motion `d/dt [p, w]` of a second-order system.
+/// Free motion `d/dt [p, w]` of a second-order system.
 const fn continuous(hz: f64, damping: f64) -> Matrix<2> {
     let omega = 2.0 * core::f64::consts::PI * hz;
     [[0.0, omega], [-omega, -2.0 * damping * omega]]
 }
 
-/// Transition and input of the model over a time with the command held.
+/// Transition and input of the model over a time with constant command.
 const fn sampled(model: &PiezoModel, time_s: f64) -> (Matrix<2>, [f64; 2]) {
     let [m0, m1] = continuous(model.resonance_hz, model.damping);
     let omega = m0[1];
@@ -132,7 +135,7 @@ const fn scaled<const N: usize>(a: &Matrix<N>, factor: f64) -> Matrix<N> {
     add_scaled(&[[0.0; N]; N], a, factor)
 }
 
-/// `a` put into the characteristic polynomial of a sampled pair of poles: `a^2 - trace a + determinant`.
+/// `a` in the characteristic polynomial of a sampled pole pair: `a^2 - trace a + determinant`.
 const fn characteristic<const N: usize>(a: &Matrix<N>, poles: Poles, tick_s: f64) -> Matrix<N> {
     let sampled = exponential(&scaled(&continuous(poles.hz, poles.damping), tick_s));
     let trace = sampled[0][0] + sampled[1][1];
@@ -140,9 +143,9 @@ const fn characteristic<const N: usize>(a: &Matrix<N>, poles: Poles, tick_s: f64
     add_scaled(&add_scaled(&product(a, a), a, -trace), &identity::<N>(), determinant)
 }
 
-/// Weights that leave no vibration at the resonance: `now + early M^-half + late M^-(half + 1) = 0` for the free
-/// motion `M` over a tick, and `now + early + late = 1`. Every `M^-n` is `x + y F` (Cayley and Hamilton), so these
-/// are three linear equations.
+/// Weights without residual vibration: `now + early M^-half + late M^-(half + 1) = 0` for the free motion `M`
+/// per tick, and `now + early + late = 1`. Each `M^-n` is `x + y F` (Cayley and Hamilton), which gives three
+/// linear equations.
 const fn shaper(model: &PiezoModel) -> ShaperGains {
     let half = (0.5 / (model.resonance_hz * model.tick_s)) as usize;
     let motion = continuous(model.resonance_hz, model.damping);
@@ -172,8 +175,8 @@ mod tests {
 
     #[test]
     fn the_shaper_has_a_zero_at_the_resonance() {
-        // The zero-vibration condition written with sines and cosines instead of matrices (Singer and Seering,
-        // eq. 7): sum of w_i exp(zeta omega t_i) exp(j omega_d t_i) = 0.
+        // The zero-vibration condition with sines and cosines (Singer and Seering, eq. 7): sum of w_i
+        // exp(zeta omega t_i) exp(j omega_d t_i) = 0.
         let omega = core::f64::consts::TAU * 200.0;
         let (grow, swing) = (0.03 * omega, omega * (1.0f64 - 0.03 * 0.03).sqrt());
         let shaper = GAINS.shaper;
@@ -218,8 +221,8 @@ mod tests {
 
     #[test]
     fn the_observer_forgets_a_wrong_start() {
-        // Errors of the observer follow A (I - L C); started anywhere they die within 40 ticks (the poles are at
-        // exp(-2 pi 500 / 5000) = 0.53, four times).
+        // Observer errors follow A (I - L C) and decay within 40 ticks (four poles at exp(-2 pi 500 / 5000) =
+        // 0.53).
         let a = GAINS.transition.map(|row| row.map(real));
         let b = [0, 1].map(|i| real(GAINS.input[i]) + real(GAINS.input_before[i]));
         let mut error = [1.0, 1.0, 1.0, 1.0];

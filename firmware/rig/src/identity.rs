@@ -1,36 +1,34 @@
-//! Who this board is: what the binary knows at start and hello tells.
+//! Identity of the board, known to the binary at start.
 
 use farnear_protocol::message::ResetCause;
 
-/// What the binary knows of itself and its chip when it starts.
+/// Identity of binary and chip.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Identity {
-    /// Name of the board, at most 24 bytes, e.g. `nucleo-f429zi`; what is beyond is cut off.
+    /// Board name, at most 24 bytes (truncated), e.g. `nucleo-f429zi`.
     pub board: &'static str,
-    /// Firmware version, at most 24 bytes; what is beyond is cut off.
+    /// At most 24 bytes (truncated).
     pub firmware: &'static str,
-    /// The chip's unique id.
     pub unique_id: [u8; 12],
-    /// What retained RAM says is the number of this boot, not 0: one more than [`crate::Rig::boot`] of the boot before, or
-    /// 1 after a loss of power. The memory knows better, where it is good.
+    /// Boot number by retained RAM, not 0: one more than the last [`crate::Rig::boot`], or 1 after a power
+    /// loss. A valid memory overrides it.
     pub boot: u32,
     /// Code that the piezo's DAC has kept over the reset; `None` where it is not known.
     pub piezo_code: Option<u16>,
-    /// Why the board was reset.
     pub reset_cause: ResetCause,
-    /// Whether the clock from outside did not come, or stopped in the boot before, so that the chip runs on its own.
+    /// The external clock is missing or stopped in the last boot; the internal one is used.
     pub own_clock: bool,
-    /// Whether the strap says that this is an emulated board.
+    /// Emulated board, by the strap.
     pub emulated: bool,
-    /// What the firmware wrote into retained RAM before it stopped itself; given once.
+    /// Cause written to retained RAM before a self-stop; given once.
     pub last_words: Option<LastWords>,
 }
 
-/// Why the firmware stopped itself in the boot before this.
+/// Why the firmware stopped itself in the last boot.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum LastWords {
-    /// A panic or a hard fault.
+    /// Panic or hard fault.
     Panic,
-    /// The stack grew into its guard.
+    /// The stack reached its guard.
     StackOverflow,
 }

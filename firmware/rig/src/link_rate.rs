@@ -1,26 +1,25 @@
-//! The link's rate: when it changes, and when it changes back.
+//! Link rate changes with fallback.
 //!
-//! The answer to the request still leaves at the old rate. Then the new one is on trial: the first good request that comes in at it
-//! makes it stay, and where none comes within [`LINK_TRIAL`] the old one is back, so a host whose adapter cannot follow finds
-//! the board where it was.
+//! The answer leaves at the old rate. The new one is then on trial: the first valid request confirms it;
+//! without one within [`LINK_TRIAL`] the old rate returns.
 
 use farnear_protocol::message::{LINK_TRIAL, LinkRate};
 use farnear_protocol::{BoardMicros, Micros};
 
 use crate::motion::since;
 
-/// The answer has left after so long, whatever else is said: the longest frame takes 1.3 ms at the fast rate.
+/// Limit for the answer: the longest frame takes 1.3 ms at the fast rate.
 const ANSWER_LEAVES: Micros = Micros(20_000);
 
 #[derive(Clone, Copy, Debug)]
 enum Change {
     None,
-    /// Asked for; the answer is to leave first.
+    /// Requested; the answer leaves first.
     Asked {
         to: LinkRate,
         at: BoardMicros,
     },
-    /// On trial since then; so many good requests had come before.
+    /// On trial since `since`, with this number of valid requests before.
     Trial {
         back: LinkRate,
         at: BoardMicros,
@@ -39,18 +38,18 @@ impl LinkSpeed {
         Self { now: LinkRate::START, change: Change::None }
     }
 
-    /// Whether no change is under way.
+    /// No change is pending.
     pub(crate) const fn is_settled(&self) -> bool {
         matches!(self.change, Change::None)
     }
 
-    /// Takes a request on. It came in at the present rate, which is a good one then.
+    /// Accepts a request, which confirms the present rate.
     pub(crate) fn ask(&mut self, to: LinkRate, at: BoardMicros) {
         self.change = if to == self.now { Change::None } else { Change::Asked { to, at } };
     }
 
-    /// The rate that the link is to have from now on, where that is another. `said`: nothing that was said at the old one is
-    /// still on its way; `requests`: good ones so far.
+    /// The new rate, when it changes. `said`: nothing sent at the old one is in transit; `requests`: valid
+    /// ones so far.
     pub(crate) fn due(
         &mut self,
         now: BoardMicros,
@@ -82,7 +81,7 @@ mod tests {
         BoardMicros(u64::from(micros))
     }
 
-    /// A link that has been changed to the slow rate at 1 ms, after three requests.
+    /// A link changed to the slow rate at 1 ms, after three requests.
     fn changed() -> LinkSpeed {
         let mut speed = LinkSpeed::new();
         speed.ask(SLOW, at(0));

@@ -1,9 +1,7 @@
-//! Small square matrices in `const` functions: what the gain design needs, evaluated by the compiler.
-//!
-//! Everything is f64 and runs at compile time when used in a constant, so that no floating point reaches the
-//! board. Cost at run time: n^3 multiplications for a product or a solution.
+//! Small square f64 matrices in `const` functions, for the gain design at compile time; no floating point
+//! reaches the board. A product or solution costs n^3 multiplications.
 
-/// A square matrix, rows first.
+/// Square matrix by rows.
 pub(crate) type Matrix<const N: usize> = [[f64; N]; N];
 
 pub(crate) const fn identity<const N: usize>() -> Matrix<N> {
@@ -50,7 +48,7 @@ pub(crate) const fn apply<const N: usize>(a: &Matrix<N>, v: &[f64; N]) -> [f64; 
     out
 }
 
-/// The matrix exponential by its Taylor series; right to f64 precision for norms up to about 4.
+/// Matrix exponential by Taylor series; accurate to f64 for norms up to about 4.
 pub(crate) const fn exponential<const N: usize>(a: &Matrix<N>) -> Matrix<N> {
     let mut sum = identity::<N>();
     let mut term = identity::<N>();
@@ -64,7 +62,7 @@ pub(crate) const fn exponential<const N: usize>(a: &Matrix<N>) -> Matrix<N> {
     sum
 }
 
-/// Solves `a x = b` by Gaussian elimination with row exchange. `a` must be regular.
+/// Solves `a x = b` by Gaussian elimination with pivoting. `a` must be regular.
 pub(crate) const fn solve<const N: usize>(a: &Matrix<N>, b: &[f64; N]) -> [f64; N] {
     let (mut a, mut x) = (*a, *b);
     let mut column = 0;

@@ -1,7 +1,7 @@
-//! What the board keeps without power: records in two copies each.
+//! Non-volatile records in two copies each.
 //!
-//! [`record`] is their place and form, and how the good copy is found; [`store`] writes them, a few bytes a tick, always
-//! over the older copy; [`contents`] turns the rig's values into blocks and back.
+//! [`record`]: addresses, format, and selection of the valid copy; [`store`]: writes a few bytes per tick,
+//! always over the older copy; [`contents`]: conversion of values to blocks.
 
 pub(crate) mod contents;
 pub(crate) mod record;

@@ -1,4 +1,4 @@
-//! Motion of the stages: two steppers and a piezo, ways to positions, homing.
+//! Motion of the stages: two steppers and a piezo, moves, homing.
 
 pub(crate) mod axis;
 pub(crate) mod home;
@@ -12,7 +12,7 @@ pub(crate) mod switch;
 
 use farnear_protocol::{BoardMicros, Micros};
 
-/// Time from one moment to a later one; saturates.
+/// Elapsed time; saturates.
 pub(crate) fn since(earlier: BoardMicros, now: BoardMicros) -> Micros {
     Micros(u32::try_from(now.0.saturating_sub(earlier.0)).unwrap_or(u32::MAX))
 }

@@ -1,65 +1,52 @@
-//! What the rig tells whoever reads the board's log: what changed, what it refused, what stopped it.
+//! Entries of the board's log: changes, refusals, alarms.
 //!
-//! The host is told all of it by answers, events and status; the log is for whoever looks afterwards, or while no host is there.
+//! The host gets all of it by answers, events and status; the log is for later analysis, or times without a
+//! host.
 
 use farnear_protocol::BoardMicros;
 use farnear_protocol::message::{AlarmRecord, Axis, LinkRate, PositionState, RequestError};
 use heapless::Deque;
 
-/// Notes that wait: one is taken in a tick. What finds no room is left out; the host is told all the same.
+/// Queue length; one is taken per tick, surplus ones are dropped.
 const WAITING: usize = 8;
 
-/// A line of the log.
 #[derive(Clone, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Note {
-    /// A STEP queue ran dry; said once, until none is dry any more.
+    /// A STEP queue underran; noted once until it recovers.
     StepQueueDry {
-        /// When it was seen.
         time: BoardMicros,
     },
-    /// The board is going to be reset, for the host asked for it.
+    /// The host requested a reset.
     Reset,
-    /// An alarm came up.
     Alarm(AlarmRecord),
-    /// It was cleared.
     AlarmCleared {
-        /// Its number.
         number: u32,
     },
-    /// A request was refused.
     Refused {
-        /// Its id.
         request: u32,
-        /// Why.
         error: RequestError,
     },
-    /// What is known of an axis' position changed.
+    /// An axis' position state changed.
     Position {
-        /// The axis.
         axis: Axis,
-        /// What is known now.
         state: PositionState,
     },
-    /// A host opened a session.
     Session {
-        /// With this request.
         request: u32,
     },
-    /// The link has another rate from now on.
     LinkRate(LinkRate),
 }
 
-/// Notes that wait for the log.
 #[derive(Clone, Debug)]
 pub(crate) struct Notes {
     waiting: Deque<Note, WAITING>,
-    /// What was known of the axes' positions when they were looked at last.
+    /// Last known position states.
     states: [PositionState; Axis::ALL.len()],
 }
 
 impl Notes {
-    /// Of a rig that was just reset.
+    /// After a reset.
     pub(crate) const fn new() -> Self {
         // The piezo's gauge is absolute.
         let states = [PositionState::Unknown, PositionState::Homed, PositionState::Unknown];
@@ -70,7 +57,7 @@ impl Notes {
         let _ = self.waiting.push_back(note); // without room it is left out
     }
 
-    /// Looks whether an axis is known otherwise than before.
+    /// Notes changed position states.
     pub(crate) fn look(&mut self, state: impl Fn(Axis) -> PositionState) {
         for (axis, known) in Axis::ALL.into_iter().zip(&mut self.states) {
             let state = state(axis);

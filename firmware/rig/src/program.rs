@@ -1,13 +1,11 @@
-//! The exposure program: up to 64 shots, and the one that runs.
+//! Exposure program of up to 64 shots, and its execution.
 //!
-//! Each shot: move, settle, expose, wait for the strobe, report; `repeat` exposures at each position. The next
-//! move begins with the end of the exposure and so overlaps the camera's read-out; the next exposure waits for the
-//! camera. At the trigger the position has been inside the settle window for the whole dwell, however long the
-//! camera took.
+//! Each shot: move, settle, expose, wait for the strobe, report; `repeat` exposures per position. The next
+//! move starts at the end of the exposure and overlaps read-out; the next exposure waits for the camera. At
+//! the trigger the position has been settled for the whole dwell, however long the camera took.
 //!
-//! A pause waits for the exposure that is under way; a resumed program settles anew.
-//!
-//! A continuous run goes from the last shot to the first, at a pace or as fast as it can, until it is stopped.
+//! A pause waits for the current exposure; a resumed program settles again. A continuous run cycles through
+//! the shots with a period, or as fast as possible, until stopped.
 
 pub(crate) mod pace;
 
@@ -24,10 +22,9 @@ use crate::motion::positioning::Positioning;
 use crate::motion::stage::Stage;
 use crate::settings::{SETTLE_DWELL_MAX, SETTLE_WINDOW_MAX, Settings};
 
-/// Shots a program may have.
 pub const SHOTS_MAX: usize = 64;
 
-/// The loaded shots, and how many of them are armed.
+/// Loaded shots, and number of armed ones.
 #[derive(Clone, Debug)]
 pub(crate) struct Shots {
     shots: [Option<Shot>; SHOTS_MAX],
@@ -41,7 +38,7 @@ impl Shots {
         Self { shots: [None; SHOTS_MAX], lights: [None; SHOTS_MAX], armed: 0 }
     }
 
-    /// Puts a shot into its place; limits of the axis are the caller's.
+    /// Loads a shot; the caller checks the axis' limits.
     pub(crate) fn load(&mut self, index: u8, shot: Shot, settings: &Settings) -> Result<(), ShotFault> {
         let place = self.shots.get_mut(usize::from(index)).ok_or(ShotFault::Index)?;
         let camera = &settings.camera;
@@ -62,7 +59,7 @@ impl Shots {
         Ok(())
     }
 
-    /// Puts a shot back that the memory kept; one that the settings no longer allow is dropped.
+    /// Restores a stored shot; one that the settings no longer permit is dropped.
     pub(crate) fn restore(&mut self, index: usize, shot: Shot, settings: &Settings) {
         let (min, max) = settings.limits(shot.axis);
         if (min..=max).contains(&shot.target) {
@@ -75,7 +72,7 @@ impl Shots {
         self.armed = shots;
     }
 
-    /// How many are armed, 0 = none.
+    /// 0 = none.
     pub(crate) const fn armed(&self) -> u8 {
         self.armed
     }
@@ -91,13 +88,12 @@ impl Shots {
         self.lights.get(usize::from(index)).copied().flatten()
     }
 
-    /// A loaded shot.
     pub(crate) fn get(&self, index: u8) -> Option<&Shot> {
         self.shots.get(usize::from(index))?.as_ref()
     }
 }
 
-/// Where the axes are at an exposure.
+/// Axis positions at an exposure.
 #[derive(Clone, Copy, Debug)]
 struct Places {
     coarse: Nanometres,
@@ -105,14 +101,13 @@ struct Places {
     lens: Nanometres,
 }
 
-/// What a shot is doing.
 #[derive(Clone, Debug)]
 enum Phase {
-    /// On the way, settling, or waiting for the camera.
+    /// Moving, settling, or waiting for the camera.
     Positioning,
-    /// Waiting for the strobe of this exposure; the positions are those of the trigger, and the deviation is the largest since.
+    /// Waiting for the strobe; positions at the trigger, largest deviation since.
     Exposing { number: u32, frame: u32, places: Places, deviation: Nanometres },
-    /// Standing between two exposures.
+    /// Between two exposures.
     Paused,
 }
 
@@ -124,7 +119,6 @@ pub(crate) struct Flash {
     pub(crate) edges: [BoardMicros; 2],
 }
 
-/// A program under way.
 #[derive(Clone, Debug)]
 pub(crate) struct Run {
     shots: u8,
@@ -137,41 +131,41 @@ pub(crate) struct Run {
     exposures: u16,
     pace: Option<Pace>,
     positioning: Positioning,
-    /// From the start of the move until it was first settled.
+    /// Time from the start of the move until settled.
     settle: Option<Micros>,
     phase: Phase,
     pausing: bool,
-    /// It was told to go on while it still brakes: it does once it stands.
+    /// Resumed while still braking: continues at rest.
     resuming: bool,
 }
 
-/// What a tick of a program brought.
+/// Result of a program's tick.
 #[derive(Debug)]
 pub(crate) enum Progress {
     On,
-    /// The shot is settled and the host triggers the camera: number of the exposure.
+    /// Settled; the host triggers this exposure number.
     Ready {
         number: u32,
     },
     Paused,
-    /// An exposure was taken; with the number of exposures, if it was the last.
+    /// Exposure complete; total number if it was the last.
     Taken {
         shot: ShotRecord,
         end: Option<u16>,
     },
-    /// An exposure of a continuous run was taken; with all exposures and dropped frames, if it was the last.
+    /// Exposure of a continuous run complete; totals if it was the last.
     Frame {
         frame: u32,
         deviation: Nanometres,
         shot: ShotRecord,
         end: Option<(u32, u32)>,
     },
-    /// A moment of a continuous run's pace passed without an exposure.
+    /// A period without exposure.
     Dropped {
         frame: u32,
         reason: DropReason,
     },
-    /// It cannot go on; whether that is the axis' fault.
+    /// Failed; whether by the axis.
     Failed {
         axis: Option<Axis>,
         reason: Failure,
@@ -179,7 +173,7 @@ pub(crate) enum Progress {
 }
 
 impl Run {
-    /// Sets off to the first of `count` shots; all of them are loaded, and `first` is the first. With a pace it goes on for ever.
+    /// Starts `count` loaded shots with `first`; endless with a pace.
     pub(crate) fn start(
         (count, (first, light)): (u8, (Shot, Option<ShotLight>)),
         pace: Option<Pace>,
@@ -209,33 +203,32 @@ impl Run {
         self.flash.take()
     }
 
-    /// For the status answer.
     pub(crate) const fn status(&self) -> ProgramStatus {
         let paused = matches!(self.phase, Phase::Paused);
         let state = if paused { ProgramState::Paused } else { ProgramState::Running };
         ProgramStatus { state, shots: self.shots, index: self.index, exposures: self.exposures }
     }
 
-    /// The shot under way and which of its repeats.
+    /// Current shot and its repeat.
     pub(crate) const fn shot(&self) -> (u8, u16, &Shot) {
         (self.index, self.repeat, &self.shot)
     }
 
-    /// Stands after the exposure under way.
+    /// Pauses after the current exposure.
     pub(crate) const fn pause(&mut self) {
         (self.pausing, self.resuming) = (true, false);
     }
 
-    /// Whether it stands, or is going to.
+    /// Paused or about to be.
     pub(crate) const fn is_pausing(&self) -> bool {
         self.pausing && !self.resuming
     }
 
-    /// Goes on after a pause; settles anew.
+    /// Resumes; settles again.
     pub(crate) fn resume(&mut self, stage: &mut Stage, settings: &Settings, now: BoardMicros) {
         match self.phase {
             Phase::Paused => self.set_off_anew(stage, settings, now),
-            // What it was on its way to, or where it is to go next, is not where it brakes to.
+            // It may still brake at another position than the target.
             Phase::Positioning => self.resuming = true,
             Phase::Exposing { .. } => self.pausing = false,
         }
@@ -262,7 +255,7 @@ impl Run {
         match self.phase {
             Phase::Paused => Progress::On,
             Phase::Positioning if self.pausing => {
-                // Stopped on the way it stands where it stopped; to the piezo a way is 5 ms.
+                // A stopped move ends where it stopped; a piezo's move takes 5 ms.
                 stage.stop();
                 if !stage.steppers_still() {
                     return Progress::On;
@@ -314,7 +307,7 @@ impl Run {
         }
     }
 
-    /// Exposes where position and camera are ready; of a continuous run at its moment.
+    /// Exposes when position and camera are ready; in a continuous run at its time.
     fn expose_when_due(
         &mut self,
         settled: bool,
@@ -339,7 +332,7 @@ impl Run {
         Progress::Dropped { frame: pace.drop_frame(), reason }
     }
 
-    /// A moment of the pace may pass while the exposure before it is still under way.
+    /// A period may pass during the previous exposure.
     fn pass_while_exposing(&mut self, now: BoardMicros) -> Progress {
         match self.pace.as_mut().filter(|pace| pace.presses() && pace.due(now).is_some()) {
             Some(pace) => Progress::Dropped { frame: pace.drop_frame(), reason: DropReason::CameraBusy },
@@ -347,7 +340,7 @@ impl Run {
         }
     }
 
-    /// The camera did not answer: a continuous run goes on without that frame, unless there are several in a row.
+    /// No answer of the camera: a continuous run continues without the frame, unless several fail in a row.
     fn go_without(&mut self, frame: u32) -> Progress {
         if self.pace.as_mut().is_some_and(Pace::unanswered) {
             self.phase = Phase::Positioning;
@@ -377,7 +370,7 @@ impl Run {
         if self.shot.mode == TriggerMode::Software { Progress::Ready { number } } else { Progress::On }
     }
 
-    /// After an exposure: the next repeat, the next shot, or the end.
+    /// After an exposure: next repeat, next shot, or end.
     fn next(
         &mut self,
         shots: &Shots,

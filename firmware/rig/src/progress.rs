@@ -1,4 +1,4 @@
-//! How long work goes on, tick by tick, and ends.
+//! Continuation and end of long work.
 
 use farnear_protocol::BoardMicros;
 use farnear_protocol::message::{Axis, Calibration, EventKind, Failure, RecordName};
@@ -9,7 +9,7 @@ use crate::rig::Rig;
 use crate::work::{AxisWork, WholeWork};
 
 impl Rig {
-    /// Takes all work one tick further.
+    /// Advances all work by a tick.
     pub(crate) fn advance(&mut self, now: BoardMicros) {
         for axis in Axis::ALL {
             self.advance_axis(axis, now);
@@ -95,7 +95,7 @@ impl Rig {
         }
     }
 
-    /// Takes a program one tick further: its end, or why it cannot go on.
+    /// Advances a program; returns its end or failure.
     fn advance_program(
         &mut self,
         run: &mut Run,
@@ -132,7 +132,7 @@ impl Rig {
         Ok(end)
     }
 
-    /// Takes over what a tick of a calibration brought: its result at the end, or why it cannot be done.
+    /// Applies a calibration's step; returns its result or failure.
     fn take_step(&mut self, step: Step) -> Result<Option<Calibration>, (Option<Axis>, Failure)> {
         match step {
             Step::On => Ok(None),
@@ -147,7 +147,7 @@ impl Rig {
     }
 }
 
-/// The axis of a failure; a stop concerns none, and an alarm says itself what it is about.
+/// Axis of a failure; a stop has none, and an alarm names its own.
 const fn named(axis: Axis, reason: Failure) -> Option<Axis> {
     match reason {
         Failure::Stopped | Failure::Alarm { .. } => None,

@@ -1,4 +1,4 @@
-//! What the rig says of itself: hello and status.
+//! Hello and status.
 
 use farnear_protocol::message::{
     Axis, Capabilities, Hello, Limits, ProgramState, ProgramStatus, SCHEMA_KEY, Status,
@@ -94,7 +94,7 @@ impl Rig {
     }
 }
 
-/// As much of a text as fits.
+/// Truncates a text to its capacity.
 fn cut<const N: usize>(text: &str) -> String<N> {
     let mut out = String::new();
     for character in text.chars() {

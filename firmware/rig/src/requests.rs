@@ -1,7 +1,6 @@
-//! Requests: what each is checked for, and what it starts.
+//! Requests: checks and start.
 //!
-//! [`Rig::carry_out`] names every request once and has no arm for the rest, so a request that is added to the protocol does
-//! not compile until it is carried out here.
+//! [`Rig::carry_out`] names every request without a wildcard, so that a new request must be handled here.
 
 mod checks;
 mod exposures;
@@ -20,11 +19,10 @@ use crate::rig::{Reboot, Rig};
 use crate::session::Incoming;
 use crate::sun_query;
 
-/// What a request is answered.
 type Answer = Result<Response, RequestError>;
 
 impl Rig {
-    /// Carries a request out, or begins it.
+    /// Executes or starts a request.
     pub(crate) fn carry_out(&mut self, incoming: &Incoming, now: BoardMicros) -> Answer {
         let id = incoming.id;
         match &incoming.request {
@@ -102,7 +100,7 @@ impl Rig {
         Response::Accepted
     }
 
-    /// Depth correction, while nothing moves: it may take longer than a tick.
+    /// Depth correction, refused during motion: it may exceed a tick.
     fn correction(&mut self) -> Result<&mut Correction, RequestError> {
         self.must_stand()?;
         Ok(&mut self.correction)
@@ -117,12 +115,12 @@ impl Rig {
     }
 }
 
-/// The answer to a request about depth correction that gives something.
+/// Answer with a result.
 fn answer<T>(found: Result<T, CorrectionFault>, response: impl FnOnce(T) -> Response) -> Answer {
     found.map(response).map_err(RequestError::Correction)
 }
 
-/// The answer to one that gives nothing.
+/// Answer without a result.
 fn accepted(done: Result<(), CorrectionFault>) -> Answer {
     answer(done, |()| Response::Accepted)
 }

@@ -1,4 +1,4 @@
-//! The rig as a whole: what happens in a tick, what stops everything, what is remembered.
+//! The rig: a tick, alarms, stored state.
 
 use farnear_protocol::BoardMicros;
 use farnear_protocol::frame::{self, Encoded, Kind};
@@ -26,21 +26,21 @@ use crate::settings::{Settings, Values};
 use crate::silence::{Silence, Verdict};
 use crate::work::Works;
 
-/// A reboot that was asked for.
+/// A requested reboot.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Reboot {
     pub(crate) request: u32,
     pub(crate) asked: BoardMicros,
-    /// Since when nothing moves and nothing waits to be sent or written.
+    /// Start of the idle time with nothing to send or write.
     pub(crate) quiet_since: Option<BoardMicros>,
 }
 
-/// Everything the board does, without its hardware.
+/// Behaviour of the board without its hardware.
 #[derive(Clone, Debug)]
 pub struct Rig {
     pub(crate) identity: Identity,
     pub(crate) boot: u32,
-    /// What the rig is made of, the settings by key, and all numbers with them.
+    /// Settings of the parts, values by key, and all numbers combined.
     pub(crate) parts: Settings,
     pub(crate) values: Values,
     pub(crate) settings: Settings,
@@ -58,38 +58,38 @@ pub struct Rig {
     pub(crate) notes: Notes,
     pub(crate) reboot: Option<Reboot>,
     pub(crate) store: Store,
-    /// As of the start of this boot; what was counted since is added.
+    /// Counts at the start of this boot; later ones are added.
     pub(crate) counters: Counters,
-    /// Axes that may be moving, a bit each, as they are to be in the memory and as they are.
+    /// Bit per axis that may be moving: intended in memory, and actual.
     in_motion: u8,
     in_motion_stored: u8,
     pub(crate) emergency_stop: bool,
     pub(crate) supply_low: bool,
-    /// The memory was written in the tick before.
+    /// Memory was written in the last tick.
     wrote: bool,
-    /// The tick before was followed by a rest.
+    /// A rest followed the last tick.
     rested: bool,
     untold: Option<Untold>,
 }
 
-/// What there is to say at the start.
+/// Reports pending from the start.
 #[derive(Clone, Copy, Debug)]
 struct Untold {
     found: Option<[Found; RECORDS]>,
     in_motion: u8,
 }
 
-/// What the rig may take of a board's memory.
+/// RAM limit of the rig.
 const _: () = assert!(size_of::<Rig>() <= 36 * 1024);
 
 impl Rig {
-    /// The rig of `docs/rig.md`, just reset, at `now`: 25 KiB, best made in static memory. `memory` is what the
-    /// FRAM holds, `None` where none answers.
+    /// The rig of `docs/rig.md` after a reset at `now`: 25 KiB, for static memory. `memory` is the FRAM's
+    /// contents, if it answers.
     pub fn new(identity: Identity, memory: Option<&[u8; MEMORY_BYTES]>, now: BoardMicros) -> Self {
         Self::with_parts(identity, Settings::DEFAULT, memory, now)
     }
 
-    /// A rig of other parts.
+    /// A rig with other parts.
     pub fn with_parts(
         identity: Identity,
         parts: Settings,
@@ -98,7 +98,7 @@ impl Rig {
     ) -> Self {
         let Restored { mut counters, in_motion, alarms, values, shots, correction } =
             memory.map_or_else(Restored::nothing, |memory| Restored::from(memory, &parts));
-        // Both grow; after a loss of power only the memory's does, without a memory only the other.
+        // Both increase; after a power loss only the memory's counts, without memory only the other.
         let boot = counters.boots.saturating_add(1).max(identity.boot);
         counters.boots = boot;
         let settings = parts.with(&values);
@@ -106,7 +106,7 @@ impl Rig {
         events.push(now, EventKind::Started { cause: identity.reset_cause });
         let mut store = memory.map_or_else(Store::absent, Store::new);
         store.mark(RecordName::Counters);
-        // Nothing is done to the rig here: it is made where the caller wants it, and not on the stack first.
+        // Built in place to save stack.
         Self {
             identity,
             boot,
@@ -138,15 +138,15 @@ impl Rig {
         }
     }
 
-    /// What a board writes to its memory before it says or hears anything: call it until it gives `None`. Else the power
-    /// could go once the boot had told its number and before that was kept, and the next boot would have the same one.
+    /// Writes that a board must do before it sends or receives; call until `None`. Otherwise a power loss
+    /// after the boot number was reported, but not stored, would repeat it.
     pub fn keep_boot(&mut self) -> Option<MemoryWrite> {
         if !self.store.is_marked(RecordName::Counters) {
             return None;
         }
         let contents = Contents {
             counters: self.counters(),
-            // What moved is to stay there until its alarm is kept.
+            // Moving axes stay recorded until their alarm is stored.
             in_motion: self.untold.map_or(self.in_motion, |untold| untold.in_motion),
             alarms: &self.alarms,
             values: &self.values,
@@ -157,12 +157,11 @@ impl Rig {
         Some(write)
     }
 
-    /// Whether a host has opened a session since the start.
     pub(crate) const fn has_session(&self) -> bool {
         self.session.is_open()
     }
 
-    /// Says, before anything else is done, how the last boot ended and what the memory held.
+    /// Reports the last boot's end and the memory's state first.
     fn begin(&mut self, now: BoardMicros) {
         let Some(Untold { found, in_motion }) = self.untold.take() else { return };
         if found.is_none() && self.parts.memory {
@@ -177,7 +176,7 @@ impl Rig {
         self.tell_of_last_boot(in_motion, now);
     }
 
-    /// Says whether a record was damaged.
+    /// Reports a damaged record.
     fn tell_of_record(&mut self, record: RecordName, found: Found, now: BoardMicros) {
         match found {
             Found::Good { sequence, repaired: true, .. } => {
@@ -193,7 +192,7 @@ impl Rig {
         }
     }
 
-    /// Latches what ended the boot before.
+    /// Latches the cause of the last boot's end.
     fn tell_of_last_boot(&mut self, in_motion: u8, now: BoardMicros) {
         let cause = match (self.identity.last_words, self.identity.reset_cause) {
             (Some(LastWords::StackOverflow), _) => Some(Alarm::StackOverflow),
@@ -219,39 +218,38 @@ impl Rig {
         &self.identity
     }
 
-    /// A loaded shot, for whoever looks behind the protocol.
+    /// A loaded shot, for tests and tools.
     pub fn shot(&self, index: u8) -> Option<&farnear_protocol::message::Shot> {
         self.shots.get(index)
     }
 
-    /// The number of this boot.
     pub const fn boot(&self) -> u32 {
         self.boot
     }
 
-    /// Takes one byte from the link. A whole request waits for [`Self::serve`].
+    /// Accepts a byte from the link. Complete requests wait for [`Self::serve`].
     pub fn receive(&mut self, byte: u8) {
         self.session.receive(byte);
     }
 
-    /// Whether a request or its answer waits for [`Self::serve`].
+    /// A request or answer waits for [`Self::serve`].
     pub(crate) fn has_work(&self) -> bool {
         self.session.has_work()
     }
 
-    /// Whether a request to stop is among what waits for [`Self::serve`].
+    /// A stop request waits for [`Self::serve`].
     pub(crate) fn stop_waits(&self) -> bool {
         self.session.stop_waits()
     }
 
-    /// Frames that came to their end, good and bad ones; wraps.
+    /// Frames completed, valid or not; wraps.
     pub(crate) const fn frames_received(&self) -> u32 {
         let link = self.session.counters();
         link.frames.wrapping_add(link.bad_frames)
     }
 
-    /// Takes a step for the host, of which a tick has time for one: puts an answer into a frame, which waits in
-    /// [`Self::transmit`] then, or carries the next request out, or begins it. `false` where there was nothing to do.
+    /// One step for the host per tick: encodes an answer for [`Self::transmit`], or executes the next
+    /// request. `false` if there is none.
     pub fn serve(&mut self, now: BoardMicros) -> bool {
         if self.session.has_answer() {
             self.session.put_answer();
@@ -276,12 +274,11 @@ impl Rig {
         true
     }
 
-    /// The next thing to be told in the log.
     pub(crate) fn take_note(&mut self) -> Option<Note> {
         self.notes.take()
     }
 
-    /// The rate that the link is to have from now on, where that is another. `sent`: whether all frames have left the board.
+    /// The new link rate, when it changes. `sent`: all frames have left.
     pub(crate) fn link_rate_due(
         &mut self,
         now: BoardMicros,
@@ -293,7 +290,7 @@ impl Rig {
         Some(rate)
     }
 
-    /// The next frame for the link, answers before events; call it until it gives `None`.
+    /// The next frame, answers before events; call until `None`.
     pub fn transmit(&mut self) -> Option<Encoded> {
         if let Some(answer) = self.session.send() {
             return Some(answer);
@@ -302,12 +299,12 @@ impl Rig {
         frame::encode(self.session.header(Kind::Event, number), event)
     }
 
-    /// One control tick; call it [`crate::io::TICK_HZ`] times a second and carry its outputs out at once.
+    /// One control tick, [`crate::io::TICK_HZ`] times a second; apply the outputs immediately.
     pub fn tick(&mut self, inputs: &Inputs) -> Outputs {
         let now = inputs.now;
         self.begin(now);
         (self.emergency_stop, self.supply_low) = (inputs.emergency_stop, inputs.supply_low);
-        // First: an open circuit has cut the pulses, which is no fault of the step timers then.
+        // First: an open circuit has cut the pulses, which is no timer fault.
         self.watch_inputs(inputs);
         self.stage.sense(inputs, core::mem::take(&mut self.rested));
         let stage = &self.stage;
@@ -333,8 +330,8 @@ impl Rig {
         outputs
     }
 
-    /// Whether the next tick may come after a rest, [`crate::io::REST_TICKS`]; that is reckoned with then. Nothing is under way, nothing waits to
-    /// be said or written, and all that is watched has said the same for long.
+    /// Whether the next tick may follow after [`crate::io::REST_TICKS`]: nothing is active or pending, and
+    /// all inputs are steady.
     pub(crate) fn rest(&mut self) -> bool {
         let said = self.session.all_sent() && self.events.all_sent() && self.link_speed.is_settled();
         let idle = self.works.any().is_none() && self.reboot.is_none() && self.camera.is_idle();
@@ -343,7 +340,7 @@ impl Rig {
         self.rested
     }
 
-    /// Looks for what must stop the rig in what the board reads.
+    /// Checks the board's inputs for alarms.
     fn watch_inputs(&mut self, inputs: &Inputs) {
         let now = inputs.now;
         if inputs.emergency_stop {
@@ -360,7 +357,7 @@ impl Rig {
         }
     }
 
-    /// Looks for what must stop the rig in what the axes and the host do.
+    /// Checks axes and host for alarms.
     fn watch(&mut self, now: BoardMicros) {
         for axis in Axis::ALL {
             let fault = self.stage.stepper_mut(axis).and_then(|stepper| stepper.take_fault());
@@ -378,7 +375,7 @@ impl Rig {
         }
     }
 
-    /// Stops everything, latches why and says so. Nothing where its like is latched: then nothing moves either.
+    /// Stops everything, latches and reports the cause; no effect if it is latched.
     pub(crate) fn alarm(&mut self, alarm: Alarm, now: BoardMicros) {
         let Some(record) = self.alarms.raise(alarm, self.boot, now) else { return };
         self.counters.alarms = self.counters.alarms.saturating_add(1);
@@ -401,7 +398,7 @@ impl Rig {
         }
     }
 
-    /// Has the memory know which axes may be moving before they do.
+    /// Records axes that may move before they do.
     fn remember_motion(&mut self) {
         let mut in_motion = 0;
         for axis in Axis::ALL {
@@ -421,9 +418,9 @@ impl Rig {
         }
     }
 
-    /// What is to be written to the memory now.
+    /// The next memory write.
     fn write(&mut self) -> Option<MemoryWrite> {
-        // A tick has no time for a write and for the host. They take turns; once the supply sinks nothing but the write counts.
+        // A tick has time for a write or the host, in turns; with a sinking supply only the write counts.
         let said = self.session.all_sent() && self.events.all_sent();
         let gives_way = self.wrote && !self.supply_low && !said;
         self.wrote = false;
@@ -440,14 +437,14 @@ impl Rig {
         };
         let (write, done) = self.store.tick(|record, index| contents.block(record, index))?;
         if done == Some(RecordName::Counters) {
-            // A change begins the record again, so what was written is what is wanted now.
+            // A change restarts the record, so the written state is current.
             self.in_motion_stored = self.in_motion;
         }
         self.wrote = true;
         Some(write)
     }
 
-    /// What was counted in the board's life.
+    /// Lifetime counters.
     pub(crate) fn counters(&self) -> Counters {
         let base = &self.counters;
         Counters {
@@ -458,7 +455,7 @@ impl Rig {
         }
     }
 
-    /// Everything was said and written and nothing moves, or that took too long.
+    /// Everything is sent, written and at rest, or it took too long.
     fn reset_is_due(&mut self, now: BoardMicros) -> bool {
         let said = self.session.all_sent() && self.events.all_sent();
         let quiet = self.works.any().is_none() && said && self.store.is_idle();
@@ -473,7 +470,7 @@ impl Rig {
     }
 }
 
-/// A stepper axis' bit in the memory; the piezo's gauge is absolute, so its motion need not be remembered.
+/// A stepper's bit in memory; the piezo's absolute gauge needs none.
 const fn bit(axis: Axis) -> u8 {
     match axis {
         Axis::SensorCoarse => 1,

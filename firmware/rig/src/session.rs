@@ -1,18 +1,17 @@
-//! The link's session: bytes in, requests out; answers in, frames out.
+//! Link session: bytes to requests, answers to frames.
 //!
-//! A request acts once. Ids only grow, over the whole boot (`ids`); with the last [`REMEMBERED`] requests their
-//! answers are remembered: the same again is answered from memory, the same id with another request is refused, and so is
-//! everything older. A request also names its host's session: one that belongs to another session than the one that is
-//! open is refused, so that of two hosts only the one that came last is heard. Hello belongs to none and changes nothing.
+//! A request acts once. Ids increase over the boot (`ids`); the last [`REMEMBERED`] requests are stored with
+//! their answers. An equal repeat is answered from memory, another request with the same id and older ids are
+//! refused. A request names its session; other than the open one is refused, so only the latest host is
+//! served. Hello belongs to none and changes nothing.
 //!
-//! What takes long is done in steps, of which a control tick takes one: a frame's bytes come, and it waits; it is looked at and
-//! carried out; its answer is put into a frame; that is sent.
+//! Steps, one per tick: a frame arrives; it is checked and executed; its answer is encoded; that is sent.
 //!
-//! Answers wait in a queue of their own, so no burst of events can push one out. Where frames and answers together are as many as are promised,
-//! a request is not looked at but refused with `QueueFull`; of the refusals only the ids wait, so that there is room for many. A burst that
-//! is too long even for that is counted.
+//! Answers have their own queue, so bursts of events cannot displace them. With the promised number of frames
+//! and answers pending, requests are refused with `QueueFull`, for which only ids are queued. Longer bursts
+//! are counted.
 //!
-//! RAM: about 8 KiB, most of it remembered answers.
+//! RAM: about 8 KiB, mostly stored answers.
 
 mod ids;
 
@@ -23,20 +22,19 @@ use heapless::Deque;
 
 use self::ids::Ids;
 
-/// Bytes of a [`Call`] whose request has no fields: the session and the request's number.
+/// Size of a [`Call`] without fields: session and request number.
 const BARE_CALL: usize = 5;
-/// Answers remembered for retries.
+/// Stored answers.
 pub const REMEMBERED: usize = 8;
-/// Answers that may wait for the UART: what [`farnear_protocol::message::Hello::outstanding`] promises.
+/// Answers that may wait for the UART: [`farnear_protocol::message::Hello::outstanding`].
 pub const OUTSTANDING: usize = 8;
-/// Requests without room that may wait for being told so. At the link's speed 10 small requests arrive in the
-/// millisecond in which as many refusals leave: this is several ticks' worth.
+/// Refusals that may wait: 10 small requests arrive per millisecond in which as many refusals leave; several
+/// ticks' worth.
 const REFUSED: usize = 64;
 
-// A host that repeats the oldest of its outstanding requests must meet its answer.
+// A repeat of the oldest outstanding request must find its answer.
 const _: () = assert!(OUTSTANDING <= REMEMBERED && REMEMBERED <= ids::IDS as usize);
 
-/// A request that was answered.
 #[derive(Clone, Debug)]
 struct Answered {
     id: u32,
@@ -44,35 +42,33 @@ struct Answered {
     reply: Encoded,
 }
 
-/// A request to be carried out and answered with [`Session::answer`].
+/// A request to execute and answer with [`Session::answer`].
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub(crate) struct Incoming {
     pub(crate) id: u32,
     pub(crate) request: Request,
 }
 
-/// The board's end of the link.
 #[derive(Clone, Debug)]
 pub(crate) struct Session {
     boot: u32,
     decoder: Decoder,
-    /// The open session's number, or [`NO_SESSION`].
+    /// Open session, or [`NO_SESSION`].
     number: u32,
     ids: Ids,
-    /// Requests whose frames are whole, and that nobody has looked at.
+    /// Complete, unchecked requests.
     frames: Deque<Packet, OUTSTANDING>,
-    /// A request that was carried out, and its answer, not in a frame yet.
+    /// An executed request with its unencoded answer.
     done: Option<(Incoming, Result<Response, RequestError>)>,
     answered: Deque<Answered, REMEMBERED>,
     waiting: Deque<Encoded, OUTSTANDING>,
     refused: Deque<u32, REFUSED>,
     counters: LinkCounters,
-    /// Requests of the open session, repeated ones too.
+    /// Requests of the open session, including repeats.
     heard: u32,
 }
 
 impl Session {
-    /// Whether a host has opened a session since the start.
     pub(crate) const fn is_open(&self) -> bool {
         self.number != NO_SESSION
     }
@@ -94,22 +90,21 @@ impl Session {
         }
     }
 
-    /// What the link has seen.
     pub(crate) const fn counters(&self) -> LinkCounters {
         self.counters
     }
 
-    /// The largest request id so far.
+    /// Largest request id so far.
     pub(crate) const fn last_id(&self) -> u32 {
         self.ids.last()
     }
 
-    /// How often the open session's host was heard: whoever speaks for another session, or for none, does not count.
+    /// Requests of the open session's host; others do not count.
     pub(crate) const fn heard(&self) -> u32 {
         self.heard
     }
 
-    /// Takes a byte; at the end of a request it waits for [`Self::next_request`].
+    /// Accepts a byte; complete requests wait for [`Self::next_request`].
     pub(crate) fn receive(&mut self, byte: u8) {
         match self.decoder.push(byte) {
             None => {}
@@ -122,18 +117,17 @@ impl Session {
                     let _ = self.refused.push_back(id); // without room for that either, being counted is all
                 }
             }
-            // A whole frame of another kind is no request either: an echo of what this board sent.
+            // Frames of another kind are no requests either, such as echoes.
             Some(Ok(_) | Err(_)) => count(&mut self.counters.bad_frames),
         }
     }
 
-    /// Whether a request waits to be looked at.
     pub(crate) fn has_request(&self) -> bool {
         !self.frames.is_empty()
     }
 
-    /// Whether a request to stop waits to be looked at. It has no fields, so its frame is among the shortest, and looking into those costs
-    /// next to nothing.
+    /// Whether a stop request waits. It has no fields, so only the shortest frames are checked, at little
+    /// cost.
     pub(crate) fn stop_waits(&self) -> bool {
         let short = self.frames.iter().filter(|packet| packet.body.len() == BARE_CALL);
         short
@@ -141,8 +135,8 @@ impl Session {
             .any(|call: Call| matches!(call.request, Request::Stop | Request::Halt))
     }
 
-    /// Looks at the next request; gives it where it is new and was made for this boot and this session. What it is answered has
-    /// room, and so has its refusal.
+    /// Checks the next request; returns it if new and for this boot and session. Room for its answer or
+    /// refusal is guaranteed.
     pub(crate) fn next_request(&mut self) -> Option<Incoming> {
         let packet = self.frames.pop_front()?;
         let id = packet.header.id;
@@ -152,7 +146,7 @@ impl Session {
                 if matches!(error, RequestError::NotInSession | RequestError::IdNotNew { .. }) {
                     count(&mut self.counters.stale);
                 }
-                // Without being remembered: nothing was done, and the same will be refused again.
+                // Not stored: nothing was done, and a repeat is refused again.
                 if let Some(reply) = frame::encode(self.header(Kind::Error, id), &error) {
                     let _ = self.waiting.push_back(reply); // not full, see `receive`
                 }
@@ -161,7 +155,7 @@ impl Session {
         }
     }
 
-    /// A request to be carried out; nothing where it repeats one, whose answer is on its way then.
+    /// A request to execute; `None` for a repeat, which is answered.
     fn admit(&mut self, packet: &Packet) -> Result<Option<Incoming>, RequestError> {
         let Header { version, id, boot, .. } = packet.header;
         if !(PROTOCOL_MIN..=PROTOCOL_CURRENT).contains(&version) {
@@ -197,7 +191,7 @@ impl Session {
         Ok(None)
     }
 
-    /// Gives the remembered answer again.
+    /// Repeats the stored answer.
     fn repeat(&mut self, id: u32, request: &Request) -> Result<(), RequestError> {
         match self.answered.iter().find(|answered| answered.id == id) {
             Some(answered) if answered.request == *request => {
@@ -211,29 +205,27 @@ impl Session {
         }
     }
 
-    /// Answers a request: with the next [`Self::put_answer`].
+    /// Answers a request; sent by [`Self::put_answer`].
     pub(crate) fn answer(&mut self, incoming: Incoming, answer: Result<Response, RequestError>) {
         self.done = Some((incoming, answer));
     }
 
-    /// Whether a step is to be taken for the host.
     pub(crate) fn has_work(&self) -> bool {
         self.has_answer() || self.has_request()
     }
 
-    /// Whether an answer waits to be put into a frame.
     pub(crate) const fn has_answer(&self) -> bool {
         self.done.is_some()
     }
 
-    /// Puts the answer into a frame and remembers it.
+    /// Encodes and stores the answer.
     pub(crate) fn put_answer(&mut self) {
         let Some((incoming, answer)) = self.done.take() else { return };
         let reply = match &answer {
             Ok(response) => frame::encode(self.header(Kind::Response, incoming.id), response),
             Err(error) => frame::encode(self.header(Kind::Error, incoming.id), error),
         };
-        // Every message fits a frame (the protocol crate tests it).
+        // Every message fits a frame (tested in the protocol crate).
         let Some(reply) = reply else { return };
         let _ = self.waiting.push_back(reply.clone()); // there was room when the request was admitted
         if incoming.request == Request::Hello {
@@ -245,12 +237,11 @@ impl Session {
         let _ = self.answered.push_back(Answered { id: incoming.id, request: incoming.request, reply });
     }
 
-    /// The header of a frame of this boot.
+    /// Header of a frame of this boot.
     pub(crate) const fn header(&self, kind: Kind, id: u32) -> Header {
         Header { version: PROTOCOL_CURRENT, kind, id, boot: self.boot }
     }
 
-    /// The next answer to send.
     pub(crate) fn send(&mut self) -> Option<Encoded> {
         if let Some(reply) = self.waiting.pop_front() {
             return Some(reply);
@@ -260,7 +251,6 @@ impl Session {
         frame::encode(self.header(Kind::Error, id), &error)
     }
 
-    /// Whether no answers wait to be sent.
     pub(crate) fn all_sent(&self) -> bool {
         let looked_at = self.frames.is_empty() && self.done.is_none();
         looked_at && self.waiting.is_empty() && self.refused.is_empty()

@@ -1,8 +1,7 @@
-//! The rig's numbers: every value that depends on the parts, with its unit and its reason.
+//! The rig's numbers: each value that depends on the parts, with unit and reason.
 //!
-//! [`Settings::DEFAULT`] describes the rig of `docs/rig.md`. What the host may change, and the memory keeps, are
-//! [`Values`]; [`Settings::with`] puts them in. A `Settings` is a plain value that the rig is given, so another rig
-//! changes nothing else.
+//! [`Settings::DEFAULT`] is the rig of `docs/rig.md`. [`Values`] are those that the host may change and the
+//! memory stores; [`Settings::with`] applies them.
 
 mod table;
 
@@ -15,24 +14,18 @@ use crate::io::TICK_US;
 pub(crate) use self::table::KEYS;
 pub use self::table::Values;
 
-/// All numbers of a rig.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Settings {
-    /// Distance from the lens' principal plane to the sensor with all axes at 0.
+    /// Principal plane to sensor with all axes at 0.
     pub datum: Nanometres,
-    /// Smallest distance between sensor and lens.
+    /// Sensor to lens.
     pub distance_min: Nanometres,
-    /// The stepper and screw of stage A.
     pub coarse: StepperSettings,
-    /// The stepper and screw of stage B.
     pub lens: StepperSettings,
-    /// The piezo of stage A.
     pub fine: FineSettings,
-    /// The camera's timing.
     pub camera: CameraSettings,
-    /// The link's timing.
     pub link: LinkSettings,
-    /// The board has a memory without power: without it an alarm says so.
+    /// The board has a memory; its absence is an alarm.
     pub memory: bool,
 }
 
@@ -41,53 +34,51 @@ pub struct Settings {
 pub struct StepperSettings {
     pub min: Nanometres,
     pub max: Nanometres,
-    /// Speed of a move, STEP pulses per second.
+    /// STEP pulses/s.
     pub speed: u32,
-    /// Speed of the search for the home switch, STEP pulses per second.
+    /// STEP pulses/s.
     pub home_search_speed: u32,
-    /// Speed of leaving the home switch, STEP pulses per second.
+    /// STEP pulses/s.
     pub home_leave_speed: u32,
-    /// Speed of the second, exact approach to the home switch, STEP pulses per second.
+    /// Exact approach, STEP pulses/s.
     pub home_approach_speed: u32,
-    /// Speed that the motor starts and stops with at once, STEP pulses per second.
+    /// Speed without ramp, STEP pulses/s.
     pub start_speed: u32,
-    /// Acceleration of a move, STEP pulses per second squared.
+    /// STEP pulses/s2.
     pub acceleration: u32,
-    /// Jerk of a move, STEP pulses per second cubed.
+    /// STEP pulses/s3.
     pub jerk: u32,
-    /// Acceleration while a switch is sought, STEP pulses per second squared.
+    /// STEP pulses/s2.
     pub home_acceleration: u32,
-    /// Jerk while a switch is sought, STEP pulses per second cubed.
+    /// STEP pulses/s3.
     pub home_jerk: u32,
     /// Longest search for the home switch.
     pub home_search: Nanometres,
-    /// Longest way out of the closed home switch.
+    /// Longest way out of the closed switch.
     pub home_leave: Nanometres,
-    /// Distance from the opened switch at which the exact approach begins.
+    /// Distance from the opened switch to the start of the exact approach.
     pub home_clearance: Nanometres,
     /// Longest exact approach.
     pub home_approach: Nanometres,
-    /// Way from where the home switch closes to where it opens again, of its data sheet.
+    /// Distance between closing and opening, by data sheet.
     pub home_hysteresis: Nanometres,
-    /// The home switch may be closed up to this position.
+    /// The home switch may be closed below this position.
     pub home_zone: Nanometres,
-    /// Backlash of the screw, 0 = moves come from both sides.
+    /// 0 = moves from both sides.
     pub backlash: Nanometres,
-    /// Moves come this much farther than the backlash from below their target.
+    /// Extra distance of the approach from below.
     pub approach_margin: Nanometres,
-    /// Largest difference between counted steps and encoder.
+    /// Largest difference of steps and encoder.
     pub following: Nanometres,
-    /// When a plain move has settled.
     pub settle: Settle,
-    /// Time to settle after the last pulse, dwell not included.
+    /// Settling time after the last pulse, without dwell.
     pub settle_deadline: Micros,
-    /// From switching the driver on to the first pulse.
+    /// From enabling the driver to the first pulse.
     pub enable_delay: Micros,
-    /// Longest time without a finished segment while segments are out.
+    /// Longest time without a finished segment.
     pub pulse_deadline: Micros,
 }
 
-/// Piezo and strain gauge.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct FineSettings {
     /// Smallest position that the closed loop can hold.
@@ -96,62 +87,58 @@ pub struct FineSettings {
     pub max: Nanometres,
     /// Input shaper and control gains.
     pub gains: Gains,
-    /// The same for a flexure with a second mode.
+    /// Gains for a flexure with a second mode.
     pub gentle_gains: Gains,
-    /// When a plain move has settled.
     pub settle: Settle,
-    /// No dwell of this axis is shorter, whatever is asked.
+    /// Lower limit of this axis' dwell.
     pub dwell_min: Micros,
-    /// Time to settle from the start of the move, dwell not included.
+    /// Settling time from the start of the move, without dwell.
     pub settle_deadline: Micros,
-    /// Longest time without a believable gauge reading.
+    /// Longest time without a plausible reading.
     pub gauge_deadline: Micros,
-    /// Stroke per code of the DAC.
+    /// Stroke per DAC code.
     pub gain_pm_per_code: u32,
-    /// Width of the hysteresis loop, parts per million of the stroke; 0 = not known.
+    /// Loop width / stroke; 0 = unknown.
     pub hysteresis_ppm: u32,
-    /// Creep, parts per million of a step per decade of time; 0 = not known.
+    /// Creep per decade / step; 0 = unknown.
     pub creep_ppm_per_decade: u32,
-    /// Position for what the gauge says, parts per million.
+    /// Position / reading.
     pub gauge_gain_ppm: u32,
-    /// What the gauge says where the piezo is relaxed.
+    /// Reading at the relaxed piezo.
     pub gauge_offset: Nanometres,
 }
 
-/// Timing of the camera.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct CameraSettings {
     pub exposure_min: Micros,
     pub exposure_max: Micros,
-    /// From the end of an exposure until the camera may be triggered again.
+    /// From the end of an exposure to the next trigger.
     pub readout: Micros,
-    /// The strobe's edges must be known this long after the trigger pulse ended.
+    /// Strobe edges must be known this long after the trigger pulse.
     pub strobe_deadline: Micros,
-    /// An exposure that the board does not trigger must have ended this long after the shot was ready.
+    /// Deadline of an untriggered exposure after the shot is ready.
     pub patience: Micros,
 }
 
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct LinkSettings {
-    /// From the last answer handed to the UART until the reset.
+    /// From the last answer to the reset.
     pub reset_drain: Micros,
-    /// A reboot waits no longer than this for motion and answers.
+    /// Limit of a reboot's wait for motion and answers.
     pub reset_deadline: Micros,
-    /// Shortest time that a request may allow the host to say nothing.
     pub silence_min: Micros,
-    /// Longest time that a request may allow the host to say nothing.
     pub silence_max: Micros,
 }
 
-/// Largest settle window a shot may ask for: beyond half the piezo's stroke it would mean nothing.
+/// Half the piezo's stroke; larger windows are meaningless.
 pub const SETTLE_WINDOW_MAX: Nanometres = Nanometres(100_000);
-/// Longest settle dwell a shot may ask for: a second, 5000 samples of the gauge.
+/// A second, 5000 samples.
 pub const SETTLE_DWELL_MAX: Micros = Micros(1_000_000);
 
-/// Distance of a stepper axis per STEP pulse in picometres: 0.5 mm screw, 200 full steps of 16 microsteps.
+/// 0.5 mm screw, 200 full steps of 16 microsteps.
 pub const STEP_PM: u32 = 156_250;
 
-/// Both steppers of `docs/rig.md`, but for what the settings say.
+/// Both steppers of `docs/rig.md`, apart from the settings.
 const STEPPER: StepperSettings = StepperSettings {
     min: Nanometres(0),
     max: Nanometres(0),
@@ -162,13 +149,13 @@ const STEPPER: StepperSettings = StepperSettings {
     following: Nanometres(0),
     // 4 mm/s: stops within 0.25 mm of the switch, inside its over-travel of 0.5 mm.
     home_search_speed: 25_600,
-    // 1 mm/s: stops within 0.01 mm, so that the switch opens only just.
+    // 1 mm/s: stops within 0.01 mm, so that the switch just opens.
     home_leave_speed: 6_400,
     // 0.16 mm/s, a pulse a millisecond: a fifth of a pulse per control tick when the switch is read.
     home_approach_speed: 1_000,
     // 62 full steps per second, far below any motor's pull-in rate; also the slowest segment of 1 ms.
     start_speed: 1_000,
-    // Its own, whatever moves are set to: the over-travel behind the switches is what it is.
+    // Independent of the moves' settings: the over-travel is fixed.
     home_acceleration: 320_000,
     home_jerk: 10_240_000,
     // Friction differs a little along the screw.
@@ -177,28 +164,26 @@ const STEPPER: StepperSettings = StepperSettings {
     home_search: Nanometres(14_500_000),
     // Over-travel 0.5 mm plus the switch's own hysteresis.
     home_leave: Nanometres(1_500_000),
-    // More than the switch's hysteresis is not needed, its edge was just crossed: room for the ramp.
+    // The edge was just crossed, so the ramp's length suffices.
     home_clearance: Nanometres(50_000),
     // Clearance, ramp and the switch's hysteresis.
     home_approach: Nanometres(500_000),
     // A precision switch (Baumer My-Com class); a snap-action one has 0.1 mm.
     home_hysteresis: Nanometres(2_000),
-    // A micro-switch opens up to 0.2 mm behind where it closes.
+    // A micro-switch opens up to 0.2 mm after its closing position.
     home_zone: Nanometres(300_000),
     settle: Settle::of_move(Axis::SensorCoarse),
     settle_deadline: Micros(500_000),
-    // The TMC2209 tunes its current regulator while the motor stands, 130 ms at least, and 10 ms more (its data sheet,
-    // section 6.1, AT#1); only once, for the driver then stays on.
+    // The TMC2209 tunes its current regulator at standstill, at least 130 ms plus 10 ms (data sheet, section
+    // 6.1, AT#1); once, because the driver stays on.
     enable_delay: Micros(140_000),
     // A segment lasts 1 ms at most.
     pulse_deadline: Micros(10_000),
 };
 
 impl Settings {
-    /// The rig of `docs/rig.md`.
     pub const DEFAULT: Self = PARTS.with(&Values::DEFAULT);
 
-    /// Smallest and largest position of an axis.
     pub const fn limits(&self, axis: Axis) -> (Nanometres, Nanometres) {
         match axis {
             Axis::SensorCoarse => (self.coarse.min, self.coarse.max),
@@ -207,7 +192,6 @@ impl Settings {
         }
     }
 
-    /// When a plain move of an axis has settled.
     pub const fn settle(&self, axis: Axis) -> Settle {
         match axis {
             Axis::SensorCoarse => self.coarse.settle,
@@ -217,22 +201,22 @@ impl Settings {
     }
 }
 
-/// The piezo of the parts list, and the fast loop.
+/// The piezo of the parts list with the fast loop.
 const PIEZO: PiezoModel = PiezoModel {
     resonance_hz: 200.0,
     damping: 0.03,
     tick_s: TICK_US as f64 * 1e-6,
-    // The gauge's conversion, the control law and the DAC's frame (40 us), and the amplifier's lag (5 kHz, 32 us). 10 to 80 us
-    // besides the amplifier all do.
+    // Gauge conversion, control law and DAC frame (40 us) plus the amplifier's lag (5 kHz, 32 us). 10 to 80
+    // us besides the amplifier all work.
     latency_s: 80e-6,
-    // As fast as the resonance itself, so that the command stays small, and without overshoot.
+    // As fast as the resonance, so that the command stays small, without overshoot.
     feedback: Poles { hz: 200.0, damping: 1.0 },
-    // Learns the offset of 12 % hysteresis within 5 ms, lives with 5 % error in the resonance, and turns 3 nm of gauge noise into less than
-    // 10 nm of motion. The tests hold all three together.
+    // Learns the offset of 12 % hysteresis within 5 ms, tolerates 5 % error in the resonance, and turns 3 nm
+    // of gauge noise into less than 10 nm of motion; all three are tested.
     observer: Poles { hz: 500.0, damping: 1.0 },
 };
 
-/// The parts of `docs/rig.md`; what is 0 here comes from the settings.
+/// The parts of `docs/rig.md`; zeros come from the settings.
 const PARTS: Settings = Settings {
     datum: Nanometres(0),
     distance_min: Nanometres(0),
@@ -248,8 +232,9 @@ const PARTS: Settings = Settings {
         gauge_gain_ppm: 0,
         gauge_offset: Nanometres(0),
         gains: Gains::design(&PIEZO),
-        // Fed with what the gauge sees of a second mode, the loop must not answer: by its eigenvalues a mode with a damping of 0.01, from 320 Hz on, may
-        // have a share of 0.3 of what a slow drive moves, and 0.05 against it. A calibrated piezo is within 50 nm after 41 ms.
+        // The loop must not react to a second mode in the gauge's signal: by its eigenvalues a mode with
+        // damping 0.01, from 320 Hz, may have a share of 0.3 of a static deflection, and 0.05 against it. A
+        // calibrated piezo is within 50 nm after 41 ms.
         gentle_gains: Gains::design(&PiezoModel {
             feedback: Poles { hz: 200.0, damping: 0.3 },
             observer: Poles { hz: 80.0, damping: 1.0 },
@@ -257,18 +242,18 @@ const PARTS: Settings = Settings {
         }),
         settle: Settle::of_move(Axis::SensorFine),
         dwell_min: Micros(0),
-        // A full-stroke step settles within 15 ms; 20 times that is broken.
+        // A full-stroke step settles within 15 ms; 20 times that indicates a fault.
         settle_deadline: Micros(300_000),
-        // Five samples: single lost conversions are bridged by the observer.
+        // Five samples: the observer bridges single lost conversions.
         gauge_deadline: Micros(1_000),
     },
     camera: CameraSettings {
-        // The camera's trigger latency; shorter pulses are not seen.
+        // The camera's trigger latency; shorter pulses are ignored.
         exposure_min: Micros(20),
         exposure_max: Micros(1_000_000),
         readout: Micros(0),
         strobe_deadline: Micros(0),
-        // The longest exposure, a slow camera's frame, and a host that has to be told first.
+        // The longest exposure, a slow camera's frame, and the host's notification.
         patience: Micros(5_000_000),
     },
     link: LinkSettings {

@@ -1,9 +1,9 @@
-//! Input shaping: a step of the set-point becomes three smaller ones that leave no vibration.
+//! Input shaping: a step becomes three smaller ones without residual vibration.
 //!
-//! Two equal zero-vibration stages in series (N. Singer, W. Seering, "Preshaping command inputs to reduce system
-//! vibration", J. Dyn. Sys. 1990) make a ZVD shaper: the residual grows only with the square of an error in the
-//! resonance (5 % off: 0.6 %). Weights are exact on the tick grid, see [`crate::gains`]. A step takes one period
-//! of the resonance (26 ticks of 0.2 ms at 200 Hz). All values in the fine loop's fixed point.
+//! Two equal zero-vibration stages in series (N. Singer, W. Seering, "Preshaping command inputs to reduce
+//! system vibration", J. Dyn. Sys. 1990) form a ZVD shaper: the residual grows with the square of the
+//! resonance error (5 % off: 0.6 %). Weights are exact on the tick grid ([`crate::gains`]). A step takes one
+//! resonance period (26 ticks of 0.2 ms at 200 Hz).
 //!
 //! Cost: six multiplications a tick, 256 bytes.
 
@@ -12,10 +12,9 @@ use crate::gains::{GAIN_BITS, ShaperGains};
 /// Longest half period in ticks.
 const HALF_MAX: usize = 31;
 
-/// One zero-vibration stage.
 #[derive(Clone, Debug)]
 struct Stage {
-    /// The last inputs, a ring.
+    /// Ring of the last inputs.
     past: [i32; HALF_MAX + 1],
     newest: usize,
 }
@@ -45,13 +44,12 @@ pub(crate) struct Shaper {
 }
 
 impl Shaper {
-    /// A shaper that has stood at `value` for ever.
+    /// A shaper settled at `value`.
     pub(crate) const fn at(value: i32) -> Self {
         let stage = Stage { past: [value; HALF_MAX + 1], newest: 0 };
         Self { first: Stage { ..stage }, second: stage, unchanged: u16::MAX, last: value }
     }
 
-    /// The shaped set-point of this tick.
     pub(crate) fn push(&mut self, gains: &ShaperGains, value: i32) -> i32 {
         self.unchanged = if value == self.last { self.unchanged.saturating_add(1) } else { 0 };
         self.last = value;

@@ -1,26 +1,25 @@
-//! The host's silence: whoever moves things must stay in touch.
+//! Supervision of the host's silence.
 //!
-//! Each request that moves something says for how long the host may say nothing. The shortest of those under way counts.
-//! Half-way the host is reminded, once; any request of the open session starts the time anew, and what others say does not.
+//! Each request with motion has a silence deadline; the shortest active one counts. Half-way the host is
+//! reminded once. Any request of the open session restarts the time; other hosts do not.
 
 use farnear_protocol::{BoardMicros, Micros};
 
 use crate::motion::since;
 
-/// When the host was last heard.
+/// Time of the host's last request.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Silence {
     heard: BoardMicros,
     reminded: bool,
 }
 
-/// What is to be done about it.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Verdict {
     Fine,
-    /// Say [`farnear_protocol::EventKind::StillThere`] with this request.
+    /// Send [`farnear_protocol::EventKind::StillThere`] for this request.
     Remind(u32),
-    /// Stop: this request's deadline has passed.
+    /// Stop: the deadline of this request has passed.
     Expired(u32),
 }
 
@@ -29,7 +28,7 @@ impl Silence {
         Self { heard: now, reminded: false }
     }
 
-    /// The open session's host said something.
+    /// Notes a request of the open session's host.
     pub(crate) const fn hear(&mut self, now: BoardMicros) {
         *self = Self::new(now);
     }
@@ -39,7 +38,7 @@ impl Silence {
         since(self.heard, now)
     }
 
-    /// Looks at the clock, with the request under way that allows the shortest silence.
+    /// Checks the time with the active request of the shortest deadline.
     pub(crate) fn check(&mut self, now: BoardMicros, shortest: Option<(u32, Micros)>) -> Verdict {
         let Some((request, allowed)) = shortest else { return Verdict::Fine };
         let silent = since(self.heard, now);

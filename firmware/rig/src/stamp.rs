@@ -1,9 +1,9 @@
-//! Moments of which a counter of 32 bits kept the lower half.
+//! Extension of 32-bit time stamps.
 
 use farnear_protocol::BoardMicros;
 
-/// The moment whose lower 32 bits are `stamp`, less than 35 minutes before or behind `now`: an edge may come after `now` was
-/// read and before its stamp is.
+/// The time with these lower 32 bits within 35 minutes of `now`, before or after: an edge may come after
+/// `now` was read.
 pub const fn extend(stamp: u32, now: BoardMicros) -> BoardMicros {
     let ahead = stamp.wrapping_sub(now.0 as u32) as i32;
     BoardMicros(now.0.saturating_add_signed(ahead as i64))

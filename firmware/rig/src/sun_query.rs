@@ -1,7 +1,7 @@
-//! Where the sun is and how a subject's shadow lies: the message's integers into `farnear_maths`, its answer back.
+//! Sun and shadow: converts the message's integers for `farnear_maths` and the answer back.
 //!
-//! The only place that knows what those integers mean: the board answers with it, and the host calls it to hold its own
-//! answer beside the board's, bit by bit (`docs/decisions/0009-sun-query.md`).
+//! The only definition of those integers; the host calls it too, to compare with the board bit by bit
+//! (`docs/decisions/0009-sun-query.md`).
 //!
 //! Cost: 550 instructions for the sun, 250 for its angles, 400 for the shadow, 1,160 for its deviation.
 
@@ -12,7 +12,7 @@ use farnear_protocol::message::{
     QueryDeviations, ShadowAnswer, ShadowQuery, ShadowReliability, SunAnswer, SunQuery,
 };
 
-/// Answers a query: angles in degrees without refraction, as [`SunAnswer`] says. The same bits on every processor.
+/// Angles in degrees without refraction, as in [`SunAnswer`]; the same bits on every processor.
 pub fn answer(query: &SunQuery) -> SunAnswer {
     let place = Place {
         latitude: BinaryAngle::from_degrees_e7(query.latitude_e7),
@@ -86,7 +86,7 @@ mod tests {
         distance_mm: 0,
     };
 
-    /// 2014-06-21 09:00 UT at 52.4 N, 1.5 W; somebody 0.6 m left of the axis of a camera that looks 20 deg west of north.
+    /// 2014-06-21 09:00 UT at 52.4 N, 1.5 W; a person 0.6 m left of the axis, camera 20 deg west of north.
     const QUERY: SunQuery = SunQuery {
         unix_seconds: 1_403_341_200,
         latitude_e7: 524_000_000,
@@ -102,7 +102,7 @@ mod tests {
         deviations: EXACT,
     };
 
-    /// The standard deviation of the shadow's angle, where the subject is known as well as this.
+    /// Standard deviation of the shadow's angle for these input deviations.
     fn sigma_deg(deviations: QueryDeviations) -> f32 {
         let query = SunQuery { shadow: Some(ShadowQuery { deviations, ..SHADOW }), ..QUERY };
         match answer(&query).shadow {
@@ -111,8 +111,8 @@ mod tests {
         }
     }
 
-    /// Every integer of a query has its unit. The values come from elsewhere: the Astronomical Almanac's low-precision sun
-    /// (0.01 deg) and a pinhole camera, in double precision, by a program that shares nothing with this one.
+    /// Every integer has its unit. Reference values: the Astronomical Almanac's low-precision sun (0.01 deg)
+    /// and a pinhole camera in double precision, by an independent program.
     #[test]
     fn a_query_gives_what_an_independent_calculation_gives() {
         let sun = answer(&QUERY);
@@ -121,14 +121,14 @@ mod tests {
         let Some(ShadowAnswer::Angle { beta_deg, mirrored, length_m, reliability, .. }) = sun.shadow else {
             panic!("{sun:?}")
         };
-        // 0.02 deg of the sun's direction turn the shadow's image by no more than that.
+        // 0.02 deg of the sun's direction rotate the shadow's image by no more than that.
         assert!((beta_deg - 139.8957).abs() < 0.03, "{sun:?}");
         assert!((length_m - 1.7986).abs() < 0.002, "{sun:?}");
         assert!(mirrored, "the sun is on the right, the shadow falls to the left");
         assert_eq!(reliability, ShadowReliability::FirstOrder);
     }
 
-    /// Each standard deviation alone, against central differences of the same calculation.
+    /// Each standard deviation alone, compared with central differences.
     #[test]
     fn each_deviation_has_its_unit_and_its_weight() {
         for (name, deviations, expected) in [
@@ -141,7 +141,7 @@ mod tests {
             ("0.3 m of distance", QueryDeviations { distance_mm: 300, ..EXACT }, 0.180_04),
         ] {
             let sigma = sigma_deg(deviations);
-            // 1 % is what the deviation promises; near the solstice the day's own slope is small and known less well.
+            // The deviation is accurate to 1 %; near the solstice the day's slope is small and less accurate.
             let tolerance = if deviations.day_e3 > 0 { 0.03 } else { 0.01 };
             assert!((sigma / expected - 1.0).abs() < tolerance, "{name}: {sigma} instead of {expected}");
         }

@@ -1,7 +1,7 @@
-//! Long work: what is under way on each axis, or on the whole rig, and how it ends.
+//! Long work per axis or for the whole rig, and its end.
 //!
-//! Each axis has a piece of work of its own; a program or a calibration occupies all. Work that fails or is stopped stays
-//! until nothing of it moves any more, and then ends with its one terminal event.
+//! A program or calibration occupies all axes. Work that fails or is stopped ends with its terminal event
+//! once its motion has stopped.
 
 use farnear_protocol::message::{Axis, Failure};
 use farnear_protocol::{Micros, Nanometres};
@@ -11,11 +11,11 @@ use crate::motion::home::Homing;
 use crate::motion::positioning::Positioning;
 use crate::program::Run;
 
-/// Work and the request that began it.
+/// Work and its request.
 #[derive(Clone, Debug)]
 pub(crate) struct Active<W> {
     pub(crate) request: u32,
-    /// How long the host may say nothing.
+    /// Permitted silence of the host.
     pub(crate) silence: Micros,
     pub(crate) work: W,
 }
@@ -27,7 +27,7 @@ pub(crate) enum AxisWork {
         target: Nanometres,
         positioning: Positioning,
     },
-    /// Ends with this once the axis stands.
+    /// Ends with this once the axis is at rest.
     Ending(Failure),
 }
 
@@ -35,14 +35,13 @@ pub(crate) enum AxisWork {
 pub(crate) enum WholeWork {
     Program(Run),
     Calibration(Calibrating),
-    /// Ends with this once everything stands.
+    /// Ends with this once everything is at rest.
     Ending {
         axis: Option<Axis>,
         reason: Failure,
     },
 }
 
-/// Everything that is under way.
 #[derive(Clone, Debug)]
 pub(crate) struct Works {
     axes: [Option<Active<AxisWork>>; Axis::ALL.len()],
@@ -54,28 +53,26 @@ impl Works {
         Self { axes: [const { None }; Axis::ALL.len()], whole: None }
     }
 
-    /// The work of an axis alone.
     pub(crate) const fn on(&mut self, axis: Axis) -> &mut Option<Active<AxisWork>> {
         &mut self.axes[axis as usize]
     }
 
-    /// The request that an axis is busy with.
+    /// Active request of an axis.
     pub(crate) fn request_on(&self, axis: Axis) -> Option<u32> {
         let own = self.axes[axis as usize].as_ref().map(|active| active.request);
         own.or(self.whole.as_ref().map(|active| active.request))
     }
 
-    /// A request that is under way, if one is.
+    /// Any active request.
     pub(crate) fn any(&self) -> Option<u32> {
         Axis::ALL.into_iter().find_map(|axis| self.request_on(axis))
     }
 
-    /// Whether an axis has work of its own.
     pub(crate) const fn is_on(&self, axis: Axis) -> bool {
         self.axes[axis as usize].is_some()
     }
 
-    /// The request under way that allows the host the shortest silence.
+    /// Active request with the shortest silence.
     pub(crate) fn shortest_silence(&self) -> Option<(u32, Micros)> {
         let axes = self.axes.iter().flatten();
         let of_axes = axes
@@ -89,17 +86,16 @@ impl Works {
         of_axes.chain(of_whole).min_by_key(|(_, silence)| *silence)
     }
 
-    /// Ends the work of an axis.
     pub(crate) fn end(&mut self, axis: Axis, reason: Failure) {
         if let Some(active) = &mut self.axes[axis as usize] {
-            // What broke on the way to a stop tells more than the stop; nothing tells more than what broke first.
+            // A failure during a stop is more informative than the stop; the first failure more than later
+            // ones.
             if !matches!(active.work, AxisWork::Ending(before) if before != Failure::Stopped) {
                 active.work = AxisWork::Ending(reason);
             }
         }
     }
 
-    /// Ends the work on all axes.
     pub(crate) fn end_whole(&mut self, axis: Option<Axis>, reason: Failure) {
         if let Some(active) = &mut self.whole
             && !matches!(active.work, WholeWork::Ending { reason: before, .. } if before != Failure::Stopped)

@@ -1,7 +1,7 @@
-//! An hour of the board's time with a far- and a near-focused picture every ten seconds: how long that takes, and how much memory.
+//! One hour of board time with a far/near pair every ten seconds: measures run time and memory.
 //!
-//! `cargo run --release --ignore-rust-version -p farnear-sim --example hour` (after `cargo xtask firmware`); a number behind it asks for
-//! another count of pairs. Linux only, for the memory.
+//! `cargo run --release --ignore-rust-version -p farnear-sim --example hour [PAIRS]` (after `cargo xtask
+//! firmware`). Linux only, because of the memory figure.
 
 mod common;
 
@@ -18,7 +18,7 @@ use farnear_sim::{EmulatedRig, RigConfig, cpu_time::cpu_time, imager::Imager};
 
 const SESSION: u32 = 1;
 const SILENCE: Micros = Micros(60_000_000);
-/// From one pair to the next.
+/// Interval between pairs.
 const EVERY_NS: u64 = 10_000_000_000;
 
 struct Host {
@@ -27,7 +27,7 @@ struct Host {
 }
 
 impl Host {
-    /// Asks, and lets the rig work until it stands.
+    /// Sends a request and runs until the rig is idle.
     fn ask(&mut self, request: Request) -> Result<()> {
         self.id += 1;
         let header = Header { version: PROTOCOL_CURRENT, kind: Kind::Request, id: self.id, boot: 1 };
@@ -37,7 +37,7 @@ impl Host {
         Ok(())
     }
 
-    /// How many programs of two exposures have ended.
+    /// Number of completed two-exposure programs.
     fn programs(&mut self) -> Result<u32> {
         let mut ended = 0;
         for packet in self.rig.take_frames() {
@@ -73,7 +73,7 @@ fn main() -> Result<()> {
         host.ask(Request::LoadShot { index, shot })?;
     }
     host.ask(Request::ArmProgram { shots: 2 })?;
-    // Where the first exposure was tells how far the stage is from the far-focused place.
+    // The position at the first exposure gives the offset of the stage from far focus.
     host.ask(Request::RunProgram { silence: SILENCE })?;
     let first = host.rig.take_shots().into_iter().next().context("nothing was exposed")?;
     let target = Nanometres((1e6 * (lens.sensor_far_mm - first.truth.sensor_mm)).round() as i32);

@@ -1,8 +1,8 @@
-//! How fast the emulated rig is: board seconds per CPU second, idle, with two motors moving, taking captures, and idle with the
-//! piezo held where the last exposure was. Cold: with the translation of what runs for the first time.
+//! Speed of the emulated rig in board seconds per CPU second: idle, two motors moving, capturing, and idle
+//! with the piezo held. "Cold" includes the translation of the firmware.
 //!
-//! `cargo run --release --ignore-rust-version -p farnear-sim --example speed` (after `cargo xtask firmware`). CPU time, not the
-//! wall clock, so that other work on the machine hardly shows; Linux only.
+//! `cargo run --release --ignore-rust-version -p farnear-sim --example speed` (after `cargo xtask firmware`).
+//! CPU time is used because other load hardly affects it; Linux only.
 
 mod common;
 
@@ -31,7 +31,7 @@ impl Host {
         self.rig.send(&frame.unwrap_or_default())
     }
 
-    /// Does something and says how fast.
+    /// Runs `work` and prints its speed.
     fn measure(
         &mut self,
         what: &str,

@@ -1,4 +1,4 @@
-//! The host's adapter: it keeps what the board says for its latency, from the first byte on.
+//! The host's USB serial adapter: holds received bytes for its latency, counted from the first byte.
 
 #[derive(Debug, Default)]
 pub struct Adapter {
@@ -7,7 +7,7 @@ pub struct Adapter {
 }
 
 impl Adapter {
-    /// Takes bytes; gives what it hands on now.
+    /// Accepts bytes; returns those that are due.
     pub fn pass(&mut self, bytes: Vec<u8>, now_ns: u64, latency_ns: u64) -> Vec<u8> {
         if self.kept.is_empty() {
             self.until_ns = now_ns + latency_ns;
@@ -16,7 +16,6 @@ impl Adapter {
         if now_ns >= self.until_ns { std::mem::take(&mut self.kept) } else { Vec::new() }
     }
 
-    /// Whether it keeps nothing.
     pub fn is_empty(&self) -> bool {
         self.kept.is_empty()
     }

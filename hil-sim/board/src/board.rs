@@ -1,8 +1,7 @@
-//! The board as the emulator sees it: one STM32F427, an 8 MHz clock, two chips on SPI3, the FRAM on SPI4, the link on
-//! USART3, and the levels that the outside puts on its pins.
+//! The emulated board: STM32F427, 8 MHz clock, two chips on SPI3, FRAM on SPI4, link on USART3, and the
+//! external pin levels.
 //!
-//! The firmware is built for the STM32F429ZI, which is the F427 plus a display controller (one reference manual,
-//! RM0090); the emulator has the F427.
+//! The firmware targets the STM32F429ZI, which is the F427 plus a display controller (same manual, RM0090).
 
 use std::{
     collections::BTreeMap,
@@ -42,24 +41,24 @@ use crate::{
     serial::Line,
 };
 
-/// SYSCLK; also what the emulator takes for instructions per second: [`Metered`] counts cycles.
+/// SYSCLK; also the emulator's instructions per second, because [`Metered`] counts cycles.
 const SYSCLK_HZ: u64 = 168_000_000;
 const HSE_HZ: u64 = 8_000_000;
-/// The supply as it should be, millivolts.
+/// Nominal supply, millivolts.
 pub const SUPPLY_MV: u32 = 3300;
-/// Where the chip keeps its unique id (RM0090, section 39.1).
+/// Address of the unique id (RM0090, section 39.1).
 const UNIQUE_ID_AT: u64 = 0x1FFF_7A10;
 
-/// RCC_CSR after each kind of reset that the emulator's part does not know (RM0090, section 6.3.21): power-on sets
-/// PORRSTF, PINRSTF and BORRSTF; a brown-out the last two.
+/// RCC_CSR after resets that the emulator does not model (RM0090, section 6.3.21): power-on sets PORRSTF,
+/// PINRSTF and BORRSTF; brown-out sets the last two.
 const CSR_POWER_ON: u64 = 0x0e00_0000;
 const CSR_BROWN_OUT: u64 = 0x0600_0000;
 
-/// SPI3, SPI4 and USART3 in the part's tables.
+/// SPI3, SPI4 and USART3 in the emulator's tables.
 const SPI3: usize = 2;
 const SPI4: usize = 3;
 const USART3: usize = 2;
-/// TIM2 in the part's table of general timers.
+/// TIM2 in the table of general timers.
 pub const TIM2: usize = 0;
 pub const TIM3: usize = 1;
 pub const TIM4: usize = 2;
@@ -67,24 +66,20 @@ pub const TIM4: usize = 2;
 pub const TIM1: usize = 0;
 pub const TIM8: usize = 1;
 
-/// The volatile memory of the chip: where it begins and how long it is. SRAM1 to 3, and the core's own.
+/// Volatile memory, start and length: SRAM1 to 3, then CCM.
 pub const RAM: [(u64, u64); 2] = [(0x2000_0000, 192 << 10), (0x1000_0000, 64 << 10)];
 
-/// Below the SRAM, down to the option bytes, the chip has nothing, and its bus answers every access with an error (RM0090,
-/// section 2.3). The emulator would drop it silently; a stack that overflows ends there.
+/// Unmapped range below the SRAM: the bus returns an error (RM0090, section 2.3), which is where a stack
+/// overflow ends. The emulator would ignore the access.
 pub const NOTHING: std::ops::Range<u64> = 0x1fff_c010..0x2000_0000;
 
-/// A chip on SPI3 or SPI4.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum SpiChip {
-    /// The piezo's DAC.
     Dac,
-    /// The gauge's converter.
     Gauge,
     Memory,
 }
 
-/// A pin of the chip: port A is 0.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub struct PinName {
     /// Port, A = 0.
@@ -97,32 +92,30 @@ impl PinName {
         Self { port: (port - b'A') as usize, pin }
     }
 
-    /// The emulator's name of the pin.
     pub fn pin(self) -> Pin {
-        // The constants below name pins that every port has.
+        // The constants below use valid pin numbers only.
         Pin::new(self.pin & 15).unwrap_or_else(|| unreachable!("four bits name a pin"))
     }
 }
 
-/// The wires of one motorised stage.
 #[derive(Clone, Copy, Debug)]
 pub struct StagePins {
-    /// STEP, and the advanced timer and alternate function that drive it.
+    /// STEP with its advanced timer and alternate function.
     pub step: (PinName, usize, u8),
-    /// DIR, high = sensor and lens away from each other.
+    /// DIR; high moves sensor and lens apart.
     pub direction: PinName,
     pub enable: PinName,
     pub diagnosis: PinName,
-    /// Encoder A and B, and the general timer that counts them (alternate function 2).
+    /// Encoder A and B with the general timer that counts them (alternate function 2).
     pub encoder: ([PinName; 2], usize),
-    /// Home switch, high = open = actuated.
+    /// Home switch; high = open = actuated.
     pub home: PinName,
     pub far: PinName,
-    /// Break input, which the emergency stop's circuit reaches; the STEP timer's, with its alternate function.
+    /// Break input of the STEP timer for the emergency stop, with its alternate function.
     pub stop: (PinName, u8),
 }
 
-/// Stage A's wires (DS9405, table 12, for the alternate functions).
+/// Stage A (alternate functions: DS9405, table 12).
 const SENSOR_PINS: StagePins = StagePins {
     step: (PinName::new(b'E', 9), TIM1, 1),
     direction: PinName::new(b'F', 13),
@@ -133,7 +126,6 @@ const SENSOR_PINS: StagePins = StagePins {
     far: PinName::new(b'G', 1),
     stop: (PinName::new(b'E', 15), 1),
 };
-/// Stage B's wires.
 const LENS_PINS: StagePins = StagePins {
     step: (PinName::new(b'C', 6), TIM8, 3),
     direction: PinName::new(b'F', 0),
@@ -145,7 +137,6 @@ const LENS_PINS: StagePins = StagePins {
     stop: (PinName::new(b'A', 6), 3),
 };
 
-/// The wires of a stage.
 pub const fn pins(stage: StageName) -> &'static StagePins {
     match stage {
         StageName::Sensor => &SENSOR_PINS,
@@ -157,20 +148,20 @@ pub const TRIGGER: PinName = PinName::new(b'B', 10);
 pub const STROBE: PinName = PinName::new(b'B', 11);
 /// Light outputs.
 pub const LIGHTS: [PinName; 2] = [PinName::new(b'B', 14), PinName::new(b'B', 15)];
-/// Strap that tells the firmware that it is emulated.
+/// Strap that marks an emulated board.
 const STRAP: PinName = PinName::new(b'D', 15);
 
-/// The chip, and what the outside holds its pins at, which a reset does not change.
+/// The chip and its external pin levels, which survive a reset.
 pub struct Chip {
     part: Stm32f427,
     pins: BTreeMap<PinName, Level>,
     inputs: BTreeMap<(usize, Channel), Level>,
-    /// What each break input was last given, in the order of the advanced timers; a reset forgets it.
+    /// Last level of each break input, in the order of the advanced timers; cleared by a reset.
     breaks: [Option<Level>; 2],
-    /// The flags of the reset that comes, where they are not what the emulator's part makes of it.
+    /// Reset flags for the next reset where they differ from the emulator's.
     reset_flags: Option<u64>,
     supply: SupplyParts,
-    /// The brown-out level, as the option bytes had it at the last reset.
+    /// Brown-out level read from the option bytes at the last reset.
     brown_out: u64,
     clock: Arc<OuterClock>,
 }
@@ -180,7 +171,6 @@ impl Chip {
         &mut self.part
     }
 
-    /// Holds a pin at a level.
     pub fn drive_pin(&mut self, at: VirtualNanos, name: PinName, level: Level) {
         if self.pins.insert(name, level) != Some(level) {
             self.put_pin(at, name, level);
@@ -193,7 +183,6 @@ impl Chip {
         });
     }
 
-    /// Holds the input of a general timer's channel at a level.
     pub fn drive_timer(&mut self, at: VirtualNanos, timer: usize, channel: Channel, level: Level) {
         if self.inputs.insert((timer, channel), level) != Some(level) {
             self.put_input(at, timer, channel, level);
@@ -203,22 +192,21 @@ impl Chip {
     fn put_input(&mut self, at: VirtualNanos, timer: usize, channel: Channel, level: Level) {
         self.part.drive_timer(at, timer, |tim, registers, context| {
             tim.drive_input(channel, level, registers, context);
-            // The emulator looks at what an input did to the interrupts only at an event. A timer that asks for none only
-            // counts: no need to stop for each edge of an encoder.
+            // The emulator checks interrupts only at events. A timer without interrupts needs none, which
+            // saves a stop per encoder edge.
             if registers.get(tim3::Register::Dier) != 0 {
                 context.schedule(at);
             }
         });
     }
 
-    /// The level of a pin, as a wire on it would have it.
     pub fn level(&mut self, name: PinName) -> Level {
         let (port, registers) = self.part.port(name.port);
         port.level(name.pin(), registers)
     }
 
-    /// Brings the level on the emergency stop's pins to the break inputs of the timers, as far as the firmware has
-    /// switched the pins to them.
+    /// Copies the emergency stop's level to the timers' break inputs, where the firmware has selected that
+    /// alternate function.
     pub fn join_breaks(&mut self, at: VirtualNanos) {
         for stage in [StageName::Sensor, StageName::Lens] {
             let StagePins { stop: (pin, function), step: (_, timer, _), .. } = *pins(stage);
@@ -232,15 +220,15 @@ impl Chip {
         }
     }
 
-    /// Of a million bytes that the link hears so many come with a framing error; the seed says which.
+    /// Framing errors per million received bytes; `seed` selects which.
     pub fn set_framing_errors(&mut self, per_million: u32, seed: u64) {
         let errors = self.part.usart[USART3].errors_mut();
         errors.framing = rigless::chip::uart::Rate { name: "framing", per_million };
         errors.seed = seed;
     }
 
-    /// The clock that the ST-LINK feeds into HSE stops, or comes back. One that drives the system and stops is told by the clock
-    /// security system; where the firmware has left that off, the chip stands until its power has been away.
+    /// Stops or restarts the ST-LINK's HSE clock. With clock security the firmware is notified; without it
+    /// the chip halts until the next power cycle.
     pub fn set_outer_clock(&mut self, at: VirtualNanos, there: bool) {
         if !self.clock.set(there) || there {
             return;
@@ -258,20 +246,18 @@ impl Chip {
         }
     }
 
-    /// Cuts the part's supply or gives it back.
     pub fn power(&mut self, at: VirtualNanos, on: bool) {
         if on && let Some(memory) = self.memory() {
             memory.power_up(at);
         }
         self.part.drive_port(at, 0, |_, _, context| {
             context.request_power(on);
-            // What a model asks for is looked at only at an event.
+            // The emulator checks a model's requests only at events.
             context.schedule(at);
         });
     }
 
-    /// The supply dips to this for a moment: whether the chip resets itself, and notes why. One whose option bytes leave the
-    /// brown-out reset off runs on, whatever it then does.
+    /// Dips the supply; returns whether the chip resets. A chip without brown-out reset keeps running.
     pub fn dips(&mut self, millivolts: u32) -> bool {
         if millivolts >= self.supply.reset_mv(self.brown_out) {
             return false;
@@ -281,12 +267,11 @@ impl Chip {
         true
     }
 
-    /// The brown-out level that the option bytes have now; it counts from the next reset on.
+    /// Brown-out level of the option bytes; takes effect at the next reset.
     fn read_brown_out(&mut self) -> u64 {
         BOR_LEV.get(self.part.flash.committed_options().0)
     }
 
-    /// The gauge's converter.
     pub fn gauge_converter(&mut self) -> Option<&mut GaugeConverter> {
         self.part.spi[SPI3].chip_mut::<GaugeConverter>(1)
     }
@@ -295,12 +280,12 @@ impl Chip {
         self.part.spi[SPI4].chip_mut::<MemoryChip>(0)
     }
 
-    /// Cuts the data lines of a chip, or mends them.
+    /// Cuts or reconnects a chip's data lines.
     pub fn disconnect(&mut self, chip: SpiChip, cut: bool) {
         let (interface, nth) = match chip {
             SpiChip::Dac => (SPI3, 0),
             SpiChip::Gauge => {
-                // A silent chip of the emulator's bus reads as zeros; this line has a pull-up.
+                // The emulator reads a silent chip as zeros; this line has a pull-up.
                 if let Some(converter) = self.gauge_converter() {
                     converter.cut(cut);
                 }
@@ -308,11 +293,10 @@ impl Chip {
             }
             SpiChip::Memory => (SPI4, 0),
         };
-        // It says whether such a chip is there; all are, since `RigBoard::new`.
+        // The result only reports whether the chip exists; `RigBoard::new` adds all of them.
         let _ = self.part.spi[interface].silence(nth, cut);
     }
 
-    /// The alternate function that a pin is set to.
     pub fn function(&mut self, name: PinName) -> Option<u8> {
         let (_, registers) = self.part.port(name.port);
         rigless::soc::stm32f427::peripherals::gpio::Gpio::function(name.pin(), registers)
@@ -335,7 +319,7 @@ impl Mcu for Chip {
     }
 
     fn reset(&mut self, at: VirtualNanos, cause: ResetCause) {
-        // The emulator's part knows no power-on reset; all that differs is in its flags.
+        // The emulator has no power-on reset; only the flags differ.
         let (cause, flags) = match cause {
             ResetCause::PowerOn => (ResetCause::Pin, Some(CSR_POWER_ON)),
             other => (other, self.reset_flags.take()),
@@ -348,7 +332,7 @@ impl Mcu for Chip {
         }
         self.breaks = [None; 2];
         self.brown_out = self.read_brown_out();
-        // The part comes back with floating pins; the outside still holds them.
+        // A reset floats the chip's pins; external levels persist.
         for (name, level) in self.pins.clone() {
             self.put_pin(at, name, level);
         }
@@ -366,18 +350,16 @@ impl Mcu for Chip {
     }
 }
 
-/// The NUCLEO-F429ZI with the rig's chips.
 #[derive(Debug)]
 pub struct RigBoard {
     pub chip: Chip,
     unique_id: [u8; 12],
     costs: Costs,
-    /// Tells its program from another one.
     program: u64,
 }
 
 impl RigBoard {
-    /// Assembles the board of these parts; the seed makes its unique id, `program` tells what it will run from other programs.
+    /// Builds the board; `seed` sets its unique id, `program` is the fingerprint of the firmware.
     pub fn new(
         plant: &SharedPlant,
         line: Line,
@@ -427,7 +409,7 @@ impl RigBoard {
     }
 }
 
-// No snapshots: a run starts at power-on.
+// No snapshots: every run starts at power-on.
 impl Store for RigBoard {}
 
 impl Board for RigBoard {

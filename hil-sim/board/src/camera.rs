@@ -1,8 +1,8 @@
-//! The camera's timing: from the trigger's edges to strobe, exposure and frame.
+//! Camera timing from trigger edges to strobe, exposure and frame.
 //!
-//! A global-shutter camera in trigger-width mode: it collects light while the trigger is high, from 20 us after
-//! its edge (with 2 us of jitter), and says so on the strobe; then it reads out for 10 ms and hears no trigger. A
-//! command of its host makes it expose once as if triggered 1 ms later, or freely, one exposure a period.
+//! A global-shutter camera in trigger-width mode: exposure starts 20 us (2 us jitter) after the rising edge
+//! and lasts while the trigger is high. Read-out takes 10 ms, during which triggers are ignored. Software
+//! triggers start 1 ms after the command; free running exposes once per period.
 
 use std::collections::BTreeMap;
 
@@ -10,23 +10,21 @@ use farnear_protocol::camera::FREE_RUNNING;
 
 use crate::plant::Noise;
 
-/// From the trigger's edge to the exposure's.
+/// Delay from trigger edge to exposure.
 const LATENCY_NS: f64 = 20_000.0;
 /// Standard deviation of the latency.
 const JITTER_NS: f64 = 2_000.0;
 const READOUT_NS: u64 = 10_000_000;
-/// From a command of the host to the exposure: USB and the camera's own program.
+/// Delay from a host command to the exposure: USB and camera firmware.
 const COMMAND_NS: u64 = 1_000_000;
 
-/// What happens to the sensor at a moment.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Edge {
-    /// It begins to collect light for the image of this name.
+    /// Exposure starts for this image id.
     Begin(u32),
     End,
 }
 
-/// A camera that runs freely.
 #[derive(Clone, Copy, Debug)]
 struct FreeRun {
     period_ns: u64,
@@ -43,13 +41,12 @@ pub struct Camera {
     free_run: Option<FreeRun>,
     triggers: u32,
     missed: u32,
-    deaf: bool,
-    /// A frame's read-out takes so much longer.
+    ignores: bool,
+    /// Extra read-out time.
     delay_ns: u64,
 }
 
 impl Camera {
-    /// A camera whose jitter the seed draws.
     pub fn new(seed: u64) -> Self {
         Self {
             jitter: Noise::new(seed, "camera jitter"),
@@ -60,7 +57,7 @@ impl Camera {
             free_run: None,
             triggers: 0,
             missed: 0,
-            deaf: false,
+            ignores: false,
             delay_ns: 0,
         }
     }
@@ -81,11 +78,10 @@ impl Camera {
         self.busy_until_ns = end_ns + READOUT_NS + self.delay_ns;
     }
 
-    /// An edge of the trigger line.
     pub fn trigger(&mut self, now_ns: u64, rising: bool) {
         if rising {
             self.triggers += 1;
-            if self.deaf || self.is_busy(now_ns) {
+            if self.ignores || self.is_busy(now_ns) {
                 self.missed += 1;
                 return;
             }
@@ -94,7 +90,7 @@ impl Camera {
             self.coming.insert(now_ns + self.latency_ns, Edge::Begin(self.triggers - 1));
         } else if self.armed {
             self.armed = false;
-            // A pulse of no length would end where it began.
+            // The end must follow the beginning of an exposure.
             let begin = self.coming.keys().next_back().copied().unwrap_or(0);
             let end = (now_ns + self.latency_ns).max(begin + 1);
             self.coming.insert(end, Edge::End);
@@ -102,7 +98,7 @@ impl Camera {
         }
     }
 
-    /// The host's software trigger, for an image of this name; waits for the end of a read-out.
+    /// Software trigger; waits for the end of a read-out.
     pub fn expose(&mut self, now_ns: u64, exposure_ns: u64, id: u32) {
         if self.armed || !self.coming.is_empty() {
             self.missed += 1;
@@ -112,9 +108,9 @@ impl Camera {
         self.schedule(begin_ns, exposure_ns, id);
     }
 
-    /// The host lets the camera run freely, or (period 0) stops that.
+    /// Starts free running; period 0 stops it.
     pub fn run_freely(&mut self, now_ns: u64, period_ns: u64, exposure_ns: u64) {
-        // The next exposure is due a period ahead: one that has not begun never will, and is in no trigger's way.
+        // An exposure scheduled but not begun is cancelled, so that it does not block triggers.
         if let (Some(run), Some((&begin_ns, Edge::Begin(FREE_RUNNING)))) =
             (self.free_run.take(), self.coming.first_key_value())
             && begin_ns > now_ns
@@ -133,12 +129,10 @@ impl Camera {
         }
     }
 
-    /// When the next edge comes.
     pub fn next_ns(&self) -> Option<u64> {
         self.coming.keys().next().copied()
     }
 
-    /// The next edge that is due.
     pub fn due(&mut self, now_ns: u64) -> Option<(u64, Edge)> {
         let at_ns = self.next_ns().filter(|at_ns| *at_ns <= now_ns)?;
         let edge = self.coming.remove(&at_ns)?;
@@ -151,32 +145,31 @@ impl Camera {
         Some((at_ns, edge))
     }
 
-    /// Rising edges of the trigger since the board's reset.
+    /// Rising trigger edges since the board's reset.
     pub fn triggers(&self) -> u32 {
         self.triggers
     }
 
-    /// Triggers that came while the camera was busy, since the start.
+    /// Triggers that arrived while the camera was busy, since power-on.
     pub fn missed(&self) -> u32 {
         self.missed
     }
 
-    /// It hears no trigger, or hears them again.
-    pub fn set_deaf(&mut self, deaf: bool) {
-        self.deaf = deaf;
+    /// Makes the camera ignore triggers.
+    pub fn set_ignores_triggers(&mut self, ignores: bool) {
+        self.ignores = ignores;
     }
 
-    /// A frame's read-out takes so much longer than it should.
     pub fn set_delay_ns(&mut self, delay_ns: u64) {
         self.delay_ns = delay_ns;
     }
 
-    /// Whether it collects light, or is about to.
+    /// Whether an exposure is active or scheduled.
     pub fn is_exposing(&self) -> bool {
         self.armed || !self.coming.is_empty()
     }
 
-    /// The board was reset: the triggers are counted anew.
+    /// Resets the trigger count.
     pub fn board_reset(&mut self) {
         self.triggers = 0;
     }
@@ -187,7 +180,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn exposure_is_as_long_as_the_pulse_and_readout_is_deaf() {
+    fn exposure_lasts_as_long_as_the_pulse_and_readout_ignores_triggers() {
         let mut camera = Camera::new(1);
         camera.trigger(1_000_000, true);
         let (begin, edge) = camera.due(2_000_000).expect("begins");
@@ -205,7 +198,7 @@ mod tests {
     }
 
     #[test]
-    fn it_exposes_on_command_and_freely() {
+    fn exposes_on_command_and_free_running() {
         let mut camera = Camera::new(1);
         camera.expose(1_000_000, 5_000_000, 7);
         let (begin, edge) = camera.due(3_000_000).expect("begins");
@@ -222,7 +215,7 @@ mod tests {
             edges.iter().filter(|e| e.1 == Edge::Begin(FREE_RUNNING)).map(|e| e.0).collect();
         assert_eq!(begins, [21_000_000, 61_000_000, 101_000_000]);
         camera.run_freely(130_000_000, 0, 0);
-        assert_eq!(camera.next_ns(), None, "the next had not begun, so that it hears a trigger at once");
+        assert_eq!(camera.next_ns(), None, "the next had not begun, so a trigger is accepted immediately");
         camera.expose(130_000_000, 5_000_000, 8);
         assert!(camera.next_ns().is_some_and(|begin_ns| begin_ns < 132_000_000), "{:?}", camera.next_ns());
 
@@ -230,7 +223,11 @@ mod tests {
         camera.run_freely(20_000_000, 40_000_000, 5_000_000);
         assert_eq!(camera.due(21_000_000).map(|e| e.1), Some(Edge::Begin(FREE_RUNNING)));
         camera.run_freely(23_000_000, 0, 0);
-        assert_eq!(camera.due(200_000_000), Some((26_000_000, Edge::End)), "what has begun comes to its end");
+        assert_eq!(
+            camera.due(200_000_000),
+            Some((26_000_000, Edge::End)),
+            "a started exposure ends normally"
+        );
         assert_eq!(camera.next_ns(), None);
     }
 }

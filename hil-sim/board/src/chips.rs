@@ -1,4 +1,4 @@
-//! The two chips on SPI3, as their data sheets say: TI DAC8830 and Analog Devices AD7691.
+//! The chips on SPI3 according to their data sheets: TI DAC8830 and Analog Devices AD7691.
 
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -9,21 +9,20 @@ use rigless::{
 
 use crate::{parts::ConverterParts, plant::Plant};
 
-/// The plant, shared by the chips and by the wiring; all run on the emulator's thread.
+/// The plant, shared by chips and wiring on the emulator's thread.
 pub type SharedPlant = Arc<Mutex<Plant>>;
 
-/// Runs something on the shared plant. A panic elsewhere does not make its state wrong, so poison is ignored.
+/// Runs `work` on the plant. Poison is ignored: a panic elsewhere does not invalidate the state.
 pub fn with_plant<T>(plant: &SharedPlant, work: impl FnOnce(&mut Plant) -> T) -> T {
     work(&mut plant.lock().unwrap_or_else(PoisonError::into_inner))
 }
 
-/// Bits of a conversion.
 const RESULT_BITS: u32 = 18;
 const SIGN_BIT: u32 = 1 << 17;
-/// A bit on SPI3, which the firmware clocks with 10.5 MHz.
+/// SPI3 clock of the firmware: 10.5 MHz.
 const BIT_NS: f64 = 1e9 / 10.5e6;
 
-/// TI DAC8830: shifts 16 bits in while selected; when the select rises, exactly 16 bits are taken.
+/// TI DAC8830: shifts 16 bits while selected and accepts exactly 16 when the select line rises.
 pub struct Dac {
     plant: SharedPlant,
     shift: u32,
@@ -31,7 +30,6 @@ pub struct Dac {
 }
 
 impl Dac {
-    /// The chip, driving the plant's piezo.
     pub fn new(plant: SharedPlant) -> Self {
         Self { plant, shift: 0, bits: 0 }
     }
@@ -41,7 +39,7 @@ impl Peer for Dac {
     fn transfer(&mut self, mosi: u32, bits: u8, _context: &mut Timeline<'_, '_>) -> u32 {
         self.shift = (self.shift << bits) | mosi;
         self.bits += u32::from(bits);
-        // It has no data output; the bus' pull-up stays.
+        // No data output; the pull-up holds the bus high.
         (1 << bits) - 1
     }
 
@@ -66,17 +64,18 @@ impl std::fmt::Debug for Dac {
     }
 }
 
-/// AD7691 in three-wire CS mode: the select line is CNV. Its rising edge samples. Where CNV is low again before
-/// the shortest conversion ends, a 0 (busy indicator) comes before the result; until the longest has ended, and from half a
-/// clock after the last bit on, the output is released and only the pull-up drives it: a line that was low then reads as
-/// low for as long as it takes to charge it.
+/// AD7691 in three-wire CS mode: the rising edge of CNV samples. If CNV is low again before the shortest
+/// conversion ends, a 0 (busy indicator) precedes the result.
+///
+/// The output is released until the longest conversion ends and from half a clock after the last bit. The
+/// pull-up then needs time to charge a line that was low.
 pub struct GaugeConverter {
     plant: SharedPlant,
     parts: ConverterParts,
     sampled_ns: u64,
     low_ns: u64,
     result: u32,
-    /// What is shifted out, most significant bit first, and ones after it; `None` until it is read.
+    /// Bits to shift out, MSB first, then ones; `None` until read.
     shift: Option<u64>,
     without_indicator: u64,
     short_pulses: u64,
@@ -84,7 +83,6 @@ pub struct GaugeConverter {
 }
 
 impl GaugeConverter {
-    /// The chip, sampling the plant's gauge.
     pub fn new(plant: SharedPlant, parts: ConverterParts) -> Self {
         Self {
             plant,
@@ -99,22 +97,22 @@ impl GaugeConverter {
         }
     }
 
-    /// Conversions that were read without a busy indicator, because CNV was high for too long.
+    /// Conversions read without a busy indicator, because CNV stayed high too long.
     pub fn without_indicator(&self) -> u64 {
         self.without_indicator
     }
 
-    /// Pulses of CNV that were shorter than the converter needs.
+    /// CNV pulses below the converter's minimum.
     pub fn short_pulses(&self) -> u64 {
         self.short_pulses
     }
 
-    /// Cuts its data line, which the pull-up then holds high, or mends it.
+    /// Cuts the data line (the pull-up holds it high), or reconnects it.
     pub const fn cut(&mut self, cut: bool) {
         self.cut = cut;
     }
 
-    /// What comes out when the first bit is read at this moment.
+    /// Output word when the first bit is read at `now_ns`.
     fn output(&mut self, now_ns: u64) -> u64 {
         if now_ns < self.sampled_ns + self.parts.conversion_max_ns {
             return u64::MAX;
@@ -123,7 +121,7 @@ impl GaugeConverter {
         self.without_indicator += u64::from(!indicates);
         let bits = RESULT_BITS + u32::from(indicates);
         let driven = u64::from(self.result) << (64 - bits);
-        // The released line, sampled in the middle of each bit.
+        // The released line is sampled in the middle of each bit.
         let low = if self.result & 1 == 0 { libm::ceil(self.parts.rise_ns() / BIT_NS - 0.5) } else { 0.0 };
         let charged = (u64::MAX >> bits).checked_shr(low.clamp(0.0, 64.0) as u32).unwrap_or(0);
         driven | charged
@@ -170,7 +168,7 @@ mod tests {
     use super::*;
     use crate::parts::Parts;
 
-    /// The 32 bits that are read of a result.
+    /// The 32 bits read for a result.
     fn read(result: u32, (low_ns, read_ns): (u64, u64)) -> u32 {
         let parts = Parts::default();
         let plant = SharedPlant::new(Plant::new(1, &parts, None).into());
@@ -181,13 +179,13 @@ mod tests {
 
     #[test]
     fn the_released_line_stays_low_for_a_while_after_a_zero() {
-        // 0.22 us are 2.4 bits, of which the first is half over when it is sampled: two are low.
+        // 0.22 us is 2.4 bits. The first bit is sampled at its middle, so two bits read low.
         assert_eq!(read(0x2_0001, (100, 4_000)), 0x2_0001 << 13 | 0x1fff);
         assert_eq!(read(0x2_0000, (100, 4_000)), 0x2_0000 << 13 | 0x07ff);
     }
 
     #[test]
-    fn a_long_pulse_takes_the_indicator_away_and_an_early_look_sees_nothing() {
+    fn a_long_pulse_suppresses_the_busy_indicator_and_an_early_read_returns_ones() {
         assert_eq!(read(0x3_ffff, (501, 4_000)), u32::MAX, "shifted by a bit");
         assert_eq!(read(0x1_0001, (501, 4_000)) >> 14, 0x1_0001);
         assert_eq!(read(0x1_0001, (100, 3_600)), u32::MAX);

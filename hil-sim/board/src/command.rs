@@ -1,23 +1,21 @@
-//! What a running rig can be asked from other threads, and where it puts what comes out of it.
+//! Commands to a running rig from other threads, and its outputs.
 
 use std::sync::{Arc, mpsc::Sender};
 
 use crate::{access::RigAccess, observer::Sight, pictures::Pictures, report::Report, wiring::Shot};
 
-/// Work to be done on a rig between two instructions.
+/// Work for a rig between two instructions.
 pub type Work = Box<dyn FnOnce(&mut RigAccess<'_, '_>) + Send>;
 
-/// What the camera's host can ask of the camera.
+/// Requests of the camera's host.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum CameraOrder {
     Expose {
         exposure_us: u64,
-        /// The image's name.
         id: u32,
     },
-    /// Run freely, or (period 0) stop that.
+    /// Period 0 stops free running.
     FreeRun {
-        /// From one exposure to the next.
         period_us: u64,
         exposure_us: u64,
     },
@@ -32,46 +30,41 @@ impl CameraOrder {
     }
 }
 
-/// What the rig can be asked.
 pub enum Command {
-    /// Put bytes on the line to the board.
     Bytes(Vec<u8>),
-    /// The host's end of the line has this rate from now on, in baud.
     HostRate(u32),
-    /// Let this much time pass.
     Advance {
         nanos: u64,
-        /// Told when it has passed.
+        /// Receives the report when the time has passed.
         done: Sender<Report>,
     },
-    /// Let time pass until the board owes nothing.
+    /// Runs until no answer or event is outstanding.
     Settle {
         done: Sender<Report>,
     },
-    /// Do something with the rig between two instructions.
     Access(Work),
-    /// Something that the camera's host asks of the camera; the host of the rig has spoken.
+    /// Counts as activity of the rig's host.
     Camera(CameraOrder),
-    /// Take back what the scenario did to the rig; nothing more of it happens.
+    /// Reverts the scenario's faults and cancels the rest.
     Heal,
-    /// Give what was seen since the last time.
+    /// Returns the observations since the last call.
     Sights {
         done: Sender<Vec<Sight>>,
     },
     End,
 }
 
-/// Opens another port in place of the one that there is, and gives where its bytes go; `None` where it cannot be.
+/// Replaces the port and returns the sender for its bytes; `None` where that fails.
 pub type AnotherPort = Box<dyn FnMut() -> Option<Sender<Vec<u8>>> + Send>;
 
-/// Where bytes and exposures go that come out of the rig.
+/// Destinations of the rig's outputs.
 pub struct Outlets {
-    /// Bytes for the host, as the line delivers them; dropped when the port goes away.
+    /// Bytes for the host; dropped when the port closes.
     pub bytes: Option<Sender<Vec<u8>>>,
-    /// For an adapter that comes back under another name; `None` where there is no port.
+    /// Simulates an adapter that reappears under a new name; `None` without a port.
     pub another_port: Option<AnotherPort>,
-    /// Exposures, when they end.
+    /// Completed exposures.
     pub shots: Sender<Shot>,
-    /// What becomes of their pictures, where these are rendered beside the board.
+    /// Picture queue, where pictures are rendered on another thread.
     pub pictures: Option<Arc<Pictures>>,
 }

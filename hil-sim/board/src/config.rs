@@ -1,46 +1,43 @@
-//! What an emulated rig is made of, and how its time passes.
+//! Configuration of an emulated rig.
 
 use std::path::PathBuf;
 
 use crate::{parts::Parts, scenario::Scenario};
 
-/// How virtual time passes.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum Pace {
-    /// Only as long as it is told to.
+    /// Time passes only on request.
     #[default]
-    Told,
-    /// While the board owes an answer or an event, and when told to.
+    OnRequest,
+    /// Time also passes while the board has an answer or event outstanding.
     Lockstep,
-    /// With the wall clock, while the board is at work or has just been spoken to.
+    /// Follows the wall clock while the board is busy or a host was recently active.
     Realtime,
 }
 
-/// What an emulated rig is made of.
 #[derive(Clone, Debug)]
 pub struct RigConfig {
-    /// The firmware's ELF; `None` looks beside the program and the tests ([`crate::firmware::find`]).
+    /// Firmware ELF; `None` searches ([`crate::firmware::find`]).
     pub firmware: Option<PathBuf>,
-    /// Decides everything random: the mechanics' errors, noise, jitter, the unique id, the line's faults.
+    /// Seed of mechanics, noise, jitter, unique id and line faults.
     pub seed: u64,
-    /// What the parts are like.
     pub parts: Parts,
-    /// Each instruction takes what its kind takes, instead of the average: some hundred times slower, for measuring.
+    /// Cycle cost per instruction kind instead of the average: about 100 times slower, for measurements.
     pub costs_by_kind: bool,
-    /// What happens to it. Its seed, its parts and its host's steps are the caller's business ([`RigConfig::of`]).
+    /// Faults. Seed, parts and host steps are applied by the caller ([`RigConfig::of`]).
     pub scenario: Scenario,
     pub pace: Pace,
-    /// What the board's memory holds at power-on, and where it is kept when the rig ends; a new one is made where there is
-    /// none. `None`: a blank memory, which is forgotten.
+    /// File of the board's memory, loaded at power-on and saved at the end; created if missing. `None`: blank
+    /// memory, not saved.
     pub memory: Option<PathBuf>,
-    /// Note what crosses the line, what the plant does and what happens, for the invariants of a campaign.
+    /// Records line, plant and faults for a campaign's invariants.
     pub observe: bool,
-    /// Where to write what the plant really did, as CSV.
+    /// CSV or VCD file for the plant's true state.
     pub trace: Option<PathBuf>,
 }
 
 impl Default for RigConfig {
-    /// Seed 1, the standard parts, no faults, time only when told.
+    /// Seed 1, standard parts, no faults, [`Pace::OnRequest`].
     fn default() -> Self {
         Self {
             firmware: None,
@@ -48,7 +45,7 @@ impl Default for RigConfig {
             parts: Parts::default(),
             costs_by_kind: false,
             scenario: Scenario::default(),
-            pace: Pace::Told,
+            pace: Pace::OnRequest,
             memory: None,
             observe: false,
             trace: None,
@@ -57,10 +54,8 @@ impl Default for RigConfig {
 }
 
 impl RigConfig {
-    /// The rig of a scenario, with its own seed (or 1) and parts, whose time passes when told to.
-    ///
-    /// # Errors
-    /// Which number of its parts is wrong.
+    /// The rig of a scenario with its seed (default 1) and parts, in [`Pace::OnRequest`].
+    /// Errors: an invalid number of its parts.
     pub fn of(scenario: &Scenario) -> Result<Self, String> {
         Ok(Self {
             seed: scenario.seed.unwrap_or(1),

@@ -1,6 +1,6 @@
-//! Counts the instructions of the on-board routines: runs `farnear-count`, a firmware made for that, and reads what it
-//! noted. Here one instruction takes one cycle, so its cycle counter counts instructions, the same number every time. A
-//! real board takes longer (flash wait states, branches, divisions): a time made of these counts is a lower bound.
+//! Instruction counts of the on-board routines, measured by the firmware `farnear-count`. One instruction
+//! takes one cycle here, so the counts repeat exactly. Flash wait states, branches and divisions make a real
+//! board slower: times from these counts are lower bounds.
 
 use std::path::Path;
 
@@ -24,43 +24,41 @@ use crate::{
     serial::Line,
 };
 
-/// Where the counting program lays its routines and its counts.
+/// Symbols of the routine table and the counts.
 const ROUTINES: &str = "FARNEAR_ROUTINES";
 const COUNTS: &str = "FARNEAR_COUNTS";
-/// Bytes of a routine's description and of a count.
+/// Bytes per routine description and per count.
 const ROUTINE_BYTES: u64 = 24;
 const COUNT_BYTES: u64 = 4;
-/// Longer than all routines together take.
+/// Longer than all routines together.
 const PATIENCE_NS: u64 = 10_000_000_000;
-/// Between two looks whether it has ended.
+/// Polling interval.
 const LOOK_NS: u64 = 1_000_000;
 
-/// What a routine takes.
+/// Measured cost of a routine.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Count {
     pub routine: String,
-    /// What it does that to.
+    /// Unit of work, e.g. pixel.
     pub unit: String,
-    /// How many of these a run had.
+    /// Units of work in the run.
     pub units: u32,
     /// Instructions of the whole run.
     pub instructions: u32,
 }
 
 impl Count {
-    /// Instructions for one unit.
     pub fn per_unit(&self) -> f64 {
         f64::from(self.instructions) / f64::from(self.units.max(1))
     }
 }
 
-/// Address and length of a variable of the program.
 fn place(elf: &object::File<'_>, name: &str) -> Option<(u64, u64)> {
     let found = elf.symbols().find(|symbol| symbol.name() == Ok(name))?;
     Some((found.address(), found.size()))
 }
 
-/// Lets the program run until its last count is there.
+/// Runs the program until its last count is written.
 struct Counting {
     routines: u64,
     counts: u64,
@@ -115,9 +113,7 @@ impl emulator::Driver<RigBoard> for Counting {
 }
 
 /// Runs the counting program.
-///
-/// # Errors
-/// [`SimError::Firmware`] where the file is no such program, or does not end.
+/// Errors: [`SimError::Firmware`] if the file is another program or does not end.
 pub fn count(path: &Path) -> Result<Vec<Count>, SimError> {
     let unusable = |reason: String| SimError::Firmware { path: path.into(), reason };
     let bytes = std::fs::read(path).map_err(|error| unusable(error.to_string()))?;
@@ -130,7 +126,7 @@ pub fn count(path: &Path) -> Result<Vec<Count>, SimError> {
         return Err(missing(COUNTS));
     }
     let image = Image::read(path, None).map_err(|error| unusable(error.to_string()))?;
-    // Instructions are what is counted here, not cycles.
+    // One cycle per instruction, so that the cycle counter counts instructions.
     let processor = ProcessorParts { cycles_per_instruction: 1.0, without_accelerator: 1.0 };
     let parts = Parts { processor, ..Parts::default() };
     let plant = SharedPlant::new(Plant::new(1, &parts, None).into());

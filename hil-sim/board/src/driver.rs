@@ -1,5 +1,5 @@
-//! Joins the emulator to the plant and to the outside: what happens whenever the firmware touches a pin, and at each
-//! moment at which the emulator stops.
+//! Connects the emulator to the plant and the outside: runs whenever the firmware touches a pin and whenever
+//! the emulator stops.
 
 mod scenario;
 
@@ -40,16 +40,16 @@ use crate::{
     wiring::Wiring,
 };
 
-/// SPI4's registers: the memory hangs there, and its supply may be set to fail in the middle of a write.
+/// SPI4's registers: the memory's supply may fail in the middle of a write.
 const SPI4: std::ops::Range<u64> = 0x4001_3400..0x4001_3800;
 
-/// From one look for fetched pictures to the next.
+/// Polling interval for fetched pictures.
 const PICTURE: Duration = Duration::from_millis(2);
 
-/// What the driver saw when it looked last.
+/// State at the previous stop.
 #[derive(Debug, Default)]
 struct Last {
-    /// STEP edges of both motors, and when one of them was seen.
+    /// STEP edges of both motors, and the time of the last one.
     step_edges: [(u64, u64); 2],
     exposures: u64,
     /// Bytes written to the memory, and when.
@@ -68,20 +68,19 @@ pub struct Driver {
     rates: LinkRates,
     scenario: Scenario,
     parts: Parts,
-    /// What is still to happen.
+    /// Pending faults.
     schedule: Schedule,
     observer: Observer,
-    /// What was seen at the last stop: STEP edges, exposures begun and ended, bytes of the memory and when they were written.
     last: Last,
     trace: Option<Trace>,
-    /// A run that is made again.
+    /// Recorded run to replay.
     script: Option<Script>,
-    /// The moment at which somebody's time ends.
+    /// When the requested time ends.
     looks_at_ns: Option<u64>,
-    /// Where the memory's contents are kept at the end, and what they are then.
+    /// File and final contents of the memory.
     memory: Option<(PathBuf, Vec<u8>)>,
     adapter: Adapter,
-    /// Bytes for the board that came while time passes on request.
+    /// Bytes for the board that arrived during a requested advance.
     held: Vec<u8>,
     resets: usize,
     powered: bool,
@@ -89,7 +88,6 @@ pub struct Driver {
 }
 
 impl Driver {
-    /// A driver for a board that has not run yet.
     pub fn new(
         config: &RigConfig,
         commands: Receiver<Command>,
@@ -131,14 +129,12 @@ impl Driver {
 
     fn hand_out(&mut self, bytes: Vec<u8>) {
         if let Some(outlet) = self.outlets.bytes.as_ref().filter(|_| !bytes.is_empty()) {
-            let _ = outlet.send(bytes); // whoever listened may have gone
+            let _ = outlet.send(bytes); // the receiver may have gone
         }
     }
 
-    /// After the run: writes what is left.
-    ///
-    /// # Errors
-    /// What went wrong during the run.
+    /// Writes the remaining outputs.
+    /// Errors: the first error of the run.
     pub fn finish(self) -> Result<(), SimError> {
         self.trace.map_or(Ok(()), Trace::finish)?;
         if let Some((path, contents)) = self.memory.filter(|(_, contents)| !contents.is_empty()) {
@@ -179,7 +175,7 @@ impl Driver {
         }
     }
 
-    /// Brings everything outside the chip to this moment.
+    /// Brings everything outside the chip to `now_ns`.
     fn exchange(&mut self, now_ns: u64) {
         let mut bytes = self.line.take();
         self.pacing.lockstep.received(&bytes, now_ns);
@@ -189,7 +185,7 @@ impl Driver {
         });
         for moment in self.observer.received(now_ns, &bytes, truth) {
             if matches!(moment, Moment::Alarm | Moment::Answer) {
-                // Pulses before it and after it are two bursts.
+                // Pulses before and after the event are separate bursts.
                 for burst in self.wiring.take_bursts(now_ns, true) {
                     self.observer.note(burst.last_ns, Seen::Stepped(burst));
                 }
@@ -217,11 +213,11 @@ impl Driver {
             self.schedule.notice(Moment::ExposureEnds, now_ns);
             self.observer.note(shot.end_ns, Seen::Exposed(shot));
             self.patience.expose();
-            let _ = self.outlets.shots.send(shot); // whoever looked may have gone
+            let _ = self.outlets.shots.send(shot); // the receiver may have gone
         }
     }
 
-    /// Carries out a command; `false` ends the run.
+    /// Executes a command; `false` ends the run.
     fn carry_out(
         &mut self,
         command: Command,
@@ -230,10 +226,10 @@ impl Driver {
         host: &mut dyn Host,
     ) -> bool {
         let now_ns = stop.at.0;
-        self.pacing.hear();
+        self.pacing.note_activity();
         match command {
             Command::Bytes(bytes) => {
-                // What comes while time passes on request comes after it, however fast the host is.
+                // Bytes that arrive during a requested advance follow it, independent of the host's speed.
                 self.held.extend(bytes);
                 self.send_held(now_ns);
             }
@@ -247,7 +243,7 @@ impl Driver {
                 self.access(work, session, stop, host);
             }
             Command::Camera(order) => {
-                self.pacing.lockstep.host_spoke();
+                self.pacing.lockstep.host_answered();
                 self.order(order, session, stop, host);
             }
             Command::Heal => self.heal(session, stop, host),
@@ -255,7 +251,7 @@ impl Driver {
                 for burst in self.wiring.take_bursts(now_ns, true) {
                     self.observer.note(burst.last_ns, Seen::Stepped(burst));
                 }
-                let _ = done.send(self.observer.take()); // whoever asked may have gone
+                let _ = done.send(self.observer.take()); // the caller may have gone
             }
             Command::End => return false,
         }
@@ -280,7 +276,6 @@ impl Driver {
         self.trace.as_mut().and_then(Trace::vcd)
     }
 
-    /// The camera's host gives an order.
     fn order(
         &mut self,
         order: CameraOrder,
@@ -297,9 +292,9 @@ impl Driver {
         }
     }
 
-    /// Puts on the line what came for the board, unless time passes on request.
+    /// Sends the held bytes, unless a requested advance is active.
     fn send_held(&mut self, now_ns: u64) {
-        if self.held.is_empty() || self.pacing.is_told(now_ns) || self.comes_to_rest(now_ns) {
+        if self.held.is_empty() || self.pacing.is_advancing(now_ns) || self.is_braking(now_ns) {
             return;
         }
         let mut bytes = std::mem::take(&mut self.held);
@@ -313,7 +308,6 @@ impl Driver {
         }
     }
 
-    /// Bytes of the host go on the line to the board.
     fn put_on_the_line(&mut self, mut bytes: Vec<u8>, now_ns: u64) {
         self.pacing.lockstep.sent(&bytes, now_ns);
         self.rates.carry(&mut bytes);
@@ -327,16 +321,16 @@ impl Driver {
         self.line.send(&bytes);
     }
 
-    /// Whether time passes for a motor alone, which brakes behind the end of its work. What the host says meanwhile comes when
-    /// it stands, however fast the host is: else no two runs would be the same.
-    fn comes_to_rest(&mut self, now_ns: u64) -> bool {
+    /// Whether time passes only for a motor that still brakes. Host bytes wait until it stops: otherwise runs
+    /// would depend on the host's speed.
+    fn is_braking(&mut self, now_ns: u64) -> bool {
         self.pacing.is_lockstep()
             && self.wiring.is_stepping(now_ns)
             && !self.line.is_sending()
             && !self.pacing.lockstep.is_busy(now_ns)
     }
 
-    /// Until when the emulator runs; where somebody asked for time, that is noted.
+    /// Time of the next stop; records it where a caller requested an advance.
     fn next_look_ns(&mut self, now_ns: u64) -> u64 {
         let look_ns = self.pacing.next_look_ns(now_ns);
         if look_ns < now_ns + self.pacing.quantum_ns() {
@@ -345,12 +339,11 @@ impl Driver {
         look_ns
     }
 
-    /// Whether something is to happen by itself: an exposure, or what was asked of the faults.
-    fn is_awaited(&self) -> bool {
+    /// Whether an exposure or a fault is pending.
+    fn has_pending(&self) -> bool {
         self.wiring.next_ns().is_some() || !self.schedule.is_over() || self.scenario.unplug_after_ms.is_some()
     }
 
-    /// Whether the chip was reset since the last look.
     fn note_resets(&mut self, session: &Session<RigBoard>, at: VirtualNanos) {
         let (resets, powered) = (session.resets().len(), !session.unpowered());
         if (resets, powered) == (self.resets, self.powered) {
@@ -373,12 +366,12 @@ impl Driver {
         self.pacing.lockstep.reset(at.0);
     }
 
-    /// Whether the board has taken more pictures than are fetched. A host that asks something is answered all the same.
+    /// Whether time stops because pictures are waiting. Requests are still answered.
     fn stands_for_pictures(&mut self, now_ns: u64) -> bool {
-        !self.pacing.is_told(now_ns) && !self.pacing.lockstep.is_asked() && self.patience.is_asked()
+        !self.pacing.is_advancing(now_ns) && !self.pacing.lockstep.is_asked() && self.patience.is_asked()
     }
 
-    /// Carries out what is asked until time may pass; `false` ends the run.
+    /// Executes commands until time may pass; `false` ends the run.
     fn serve(&mut self, session: &mut Session<RigBoard>, stop: Stop, host: &mut dyn Host) -> bool {
         let now_ns = stop.at.0;
         loop {
@@ -388,16 +381,16 @@ impl Driver {
                 }
             }
             self.send_held(now_ns);
-            // Its time goes on until what it was sent has arrived and what moves has come to rest, also when its host has gone.
+            // Time passes until sent bytes have arrived and motion has stopped, even without a host.
             let at_work = self.line.is_sending()
                 || !self.adapter.is_empty()
                 || self.wiring.is_stepping(now_ns)
-                || self.pacing.is_realtime() && self.is_awaited();
+                || self.pacing.is_realtime() && self.has_pending();
             let waiting = self.pacing.take_waiting(now_ns, at_work);
             if !waiting.is_empty() {
                 let report = self.report(now_ns);
                 for done in waiting {
-                    let _ = done.send(report); // whoever asked may have gone
+                    let _ = done.send(report); // the caller may have gone
                 }
             }
             let command = if self.stands_for_pictures(now_ns) {
@@ -424,7 +417,7 @@ impl emulator::Driver<RigBoard> for Driver {
     fn on_settled(&mut self, session: &mut Session<RigBoard>, host: &mut dyn Host, settled: Settled) {
         let (at, written) = match settled {
             Settled::Access { access, .. } if NOTHING.contains(&access.address) => {
-                // The emulator fails one access only, so the next one is to fail again.
+                // The emulator fails one access only, so the failure is set again.
                 session.fail_next(NOTHING.start, NOTHING.end);
                 return;
             }
@@ -482,7 +475,7 @@ impl emulator::Driver<RigBoard> for Driver {
             None => self.serve(session, stop, host).then(|| self.next_look_ns(stop.at.0)),
         };
         if let Some(look_ns) = runs {
-            // What the scenario wants at a moment happens at that moment.
+            // Stop exactly at the next scheduled fault.
             let next_ns = self.schedule.next_ns().map_or(look_ns, |due_ns| look_ns.min(due_ns));
             return Some(VirtualNanos(next_ns.max(stop.at.0 + 1)));
         }

@@ -1,8 +1,7 @@
-//! The camera endpoint: loopback TCP that hands out frames and takes control messages.
+//! Camera endpoint: sends frames and receives control messages on loopback TCP.
 //!
-//! One client at a time; a second one is told so ([`IN_USE`]) and sent away. Frames without a client wait, the newest 32
-//! of them; with one that fetches slowly two wait, and those behind them, too. Each frame is handed out once, and what a client has left
-//! behind is not the next one's.
+//! Accepts one client; others receive [`IN_USE`]. The newest 32 frames wait for a client; two wait for a slow
+//! one. Each frame is sent once; frames left over by a client are dropped.
 
 use std::{
     collections::VecDeque,
@@ -17,19 +16,19 @@ use farnear_protocol::camera::{Control, IN_USE};
 
 use crate::error::SimError;
 
-/// Frames that wait until a client comes.
+/// Frames kept until a client connects.
 const WAITING: usize = 32;
-/// Frames that wait for one that is there.
+/// Frames kept for a connected client.
 const AHEAD: usize = 2;
-/// Longest control message: far more than any has.
+/// Maximum control message; real ones are far shorter.
 const CONTROL_MAX: u32 = 64;
-/// A client that has just gone may still look as if it were there, to the one that follows it.
+/// Grace period in which a client that just disconnected may still appear connected.
 const FAREWELL: Duration = Duration::from_millis(500);
 
 #[derive(Default)]
 struct State {
     frames: VecDeque<Vec<u8>>,
-    /// The client, with a number of its own: of a connection that was reset the system no longer says whose it was.
+    /// The client with an id: after a reset the system no longer reports the peer.
     client: Option<(u64, TcpStream)>,
 }
 
@@ -45,10 +44,9 @@ fn lock(shared: &Shared) -> std::sync::MutexGuard<'_, State> {
     shared.state.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Opens the endpoint on a free port: `frames` go to the client, its control messages to `control`; `left` is told when one has gone.
-///
-/// # Errors
-/// [`SimError::Io`] where loopback has no port or no thread can be started.
+/// Opens the endpoint on a free port. `frames` go to the client, its messages to `control`; `left` is
+/// notified when it disconnects.
+/// Errors: [`SimError::Io`] if no loopback port or thread is available.
 pub fn open(
     frames: Receiver<Vec<u8>>,
     control: impl Fn(Control) + Send + Clone + 'static,
@@ -90,7 +88,7 @@ fn accept(listener: &TcpListener, shared: &Shared, control: &(impl Fn(Control) +
         drop(state);
         shared.changed.notify_all();
         let (control, shared) = (control.clone(), shared.clone());
-        // Without a thread to listen to it, the client still gets its frames.
+        // Without a reader thread the client still gets its frames.
         let _ = thread::Builder::new().name("camera control".into()).spawn(move || {
             listen(reader, &control);
             forget(&shared, number);
@@ -98,13 +96,12 @@ fn accept(listener: &TcpListener, shared: &Shared, control: &(impl Fn(Control) +
     }
 }
 
-/// Tells a client that another one has the camera.
 fn refuse(mut stream: TcpStream) {
     let _ = stream.write_all(&IN_USE.to_le_bytes()); // it may have gone already
     let _ = stream.shutdown(Shutdown::Both);
 }
 
-/// A client has gone, unless the present one is another.
+/// Removes a client that has disconnected, unless another one has replaced it.
 fn forget(shared: &Shared, gone: u64) {
     let mut state = lock(shared);
     if let Some((_, stream)) = state.client.take_if(|(number, _)| *number == gone) {
@@ -115,7 +112,7 @@ fn forget(shared: &Shared, gone: u64) {
     }
 }
 
-/// Reads control messages until the client goes or says something that is none.
+/// Reads control messages until the client disconnects or sends an invalid one.
 fn listen(mut reader: TcpStream, control: &impl Fn(Control)) {
     let mut length = [0; 4];
     while reader.read_exact(&mut length).is_ok() {
@@ -133,7 +130,7 @@ fn listen(mut reader: TcpStream, control: &impl Fn(Control)) {
         }
         match postcard::from_bytes(&body) {
             Ok(message) => control(message),
-            Err(error) => eprintln!("camera endpoint: a control message that is none: {error}"),
+            Err(error) => eprintln!("camera endpoint: invalid control message: {error}"),
         }
     }
 }
@@ -173,7 +170,6 @@ mod tests {
 
     use super::*;
 
-    /// What has not come by then does not come.
     const LONG: Duration = Duration::from_secs(20);
 
     fn connect(address: SocketAddr) -> TcpStream {
@@ -183,12 +179,12 @@ mod tests {
     }
 
     #[test]
-    fn frames_wait_for_a_client_and_control_comes_back() {
+    fn frames_wait_for_a_client_and_control_messages_arrive() {
         let (frames, receiver) = mpsc::channel();
         let (heard, hear) = mpsc::channel();
         let (gone, goes) = mpsc::channel();
         let left = move || {
-            let _ = gone.send(()); // nobody listens at the end
+            let _ = gone.send(()); // the receiver may have gone
         };
         let address =
             open(receiver, move |message| heard.send(message).expect("heard"), left).expect("loopback");
@@ -205,7 +201,7 @@ mod tests {
         client.write_all(body).expect("open");
         assert_eq!(hear.recv_timeout(LONG), Ok(Control::AdvanceMicros(1234)));
 
-        // A second client is told that it is one, and the first goes on.
+        // A second client is refused; the first is not disturbed.
         let mut second = connect(address);
         second.read_exact(&mut bytes).expect("a refusal");
         assert_eq!(u32::from_le_bytes(bytes), IN_USE);
@@ -213,7 +209,7 @@ mod tests {
         frames.send(vec![9]).expect("open");
         client.read_exact(&mut bytes[..1]).expect("the frame");
         assert_eq!(bytes[0], 9);
-        // Once it has gone the next may come.
+        // The next client is accepted after the first has left.
         client.shutdown(Shutdown::Write).expect("open");
         goes.recv_timeout(LONG).expect("told");
         assert_eq!(client.read(&mut bytes).expect("closed in order"), 0);

@@ -1,8 +1,7 @@
-//! What can happen to a rig: one table of kinds, each with how it comes about and how it is taken back. When it happens
-//! stands in a scenario ([`crate::scenario`]); `docs/hil.md` tells of each kind.
+//! Table of fault kinds, each with its action and its repair. A scenario ([`crate::scenario`]) sets the
+//! times; `docs/hil.md` describes each kind.
 //!
-//! A new kind is a constant in one of the files of this module (or in a new one), a line in [`KINDS`], and a row in
-//! `docs/hil.md`.
+//! A new kind is a constant in a file of this module, a line in [`KINDS`] and a row in `docs/hil.md`.
 
 pub mod chips;
 mod happening;
@@ -25,18 +24,17 @@ pub use self::{
 };
 use crate::access::RigAccess;
 
-/// A way to do something to a rig.
+/// Applies or reverts a fault.
 pub type Deed = fn(&mut RigAccess<'_, '_>, &Happening);
 
-/// A kind of thing that may happen to a rig.
 #[derive(Clone, Copy)]
 pub struct Kind {
     pub name: &'static str,
-    /// Which fields it has beside the moment.
+    /// Fields other than the time.
     pub takes: Takes,
     pub happen: Deed,
-    /// Takes it back; `None` where nothing can be.
-    pub mend: Option<Deed>,
+    /// Reverts the fault; `None` if that is impossible.
+    pub revert: Option<Deed>,
 }
 
 pub const KINDS: [Kind; 41] = [
@@ -112,12 +110,12 @@ impl<'de> Deserialize<'de> for Kind {
 }
 
 impl Due {
-    /// Lets it happen, or takes it back.
+    /// Applies or reverts the fault.
     pub fn happen(&self, rig: &mut RigAccess<'_, '_>) {
-        let Self { happening, mends } = self;
-        match (mends, happening.what.mend) {
+        let Self { happening, reverts } = self;
+        match (reverts, happening.what.revert) {
             (false, _) => (happening.what.happen)(rig, happening),
-            (true, Some(mend)) => mend(rig, happening),
+            (true, Some(revert)) => revert(rig, happening),
             (true, None) => {}
         }
     }
@@ -128,7 +126,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_page_tells_of_every_kind_and_every_moment_once() {
+    fn docs_describe_each_fault_kind_and_moment_once() {
         let page = include_str!("../../../docs/hil.md");
         let rows =
             |name: &str| page.lines().filter(|line| line.starts_with(&format!("| `{name}` |"))).count();

@@ -1,4 +1,4 @@
-//! Where the firmware's ELF lies.
+//! Location of the firmware's ELF.
 
 use std::{
     fs::File,
@@ -8,23 +8,21 @@ use std::{
 
 use crate::error::SimError;
 
-/// Name of the ELF beside the programs.
 pub const FILE_NAME: &str = "farnear-nucleo-f429zi.elf";
-/// Environment variable that names the ELF for tests.
+/// Environment variable with the ELF's path, for tests.
 pub const VARIABLE: &str = "FARNEAR_FIRMWARE";
 const ELF_MAGIC: [u8; 4] = *b"\x7fELF";
 
-/// Tells a firmware from another one: FNV-1a, 64 bit (Fowler, Noll, Vo).
+/// Fingerprint of a firmware: FNV-1a, 64 bit (Fowler, Noll, Vo).
 pub fn fingerprint(elf: &[u8]) -> u64 {
     let hash = |sum: u64, byte: &u8| (sum ^ u64::from(*byte)).wrapping_mul(0x0000_0100_0000_01b3);
     elf.iter().fold(0xcbf2_9ce4_8422_2325, hash)
 }
 
-/// The ELF: the one named, else the one `FARNEAR_FIRMWARE` names, else the one beside the running program (for a
-/// test, which lies in `deps`, one folder up).
-///
-/// # Errors
-/// [`SimError::NoFirmware`] with the place where it should be; [`SimError::Firmware`] where that is no ELF.
+/// ELF path: `named`, else `FARNEAR_FIRMWARE`, else next to the running program (for tests: one folder above
+/// `deps`).
+/// Errors: [`SimError::NoFirmware`] with the expected place; [`SimError::Firmware`] if the file is not an
+/// ELF.
 pub fn find(named: Option<&Path>) -> Result<PathBuf, SimError> {
     let path = match (named, std::env::var_os(VARIABLE)) {
         (Some(path), _) => path.to_path_buf(),
@@ -37,7 +35,7 @@ pub fn find(named: Option<&Path>) -> Result<PathBuf, SimError> {
     let mut start = [0; 4];
     let reason = match File::open(&path).and_then(|mut file| file.read_exact(&mut start)) {
         Ok(()) if start == ELF_MAGIC => return Ok(path),
-        Ok(()) => "it is no ELF file".to_string(),
+        Ok(()) => "it is not an ELF file".to_string(),
         Err(error) if error.kind() == ErrorKind::UnexpectedEof => "it is empty or cut short".to_string(),
         Err(error) => error.to_string(),
     };

@@ -1,17 +1,17 @@
-//! A half mirror behind the lens, with a second camera in its other path: both expose at each trigger, and the second one's sensor stands
-//! further from the lens, so that one exposure gives the far and the near image (Li 2014, sections 5.5 and 10.2).
+//! Half mirror behind the lens with a second camera. Both expose at each trigger; the second sensor is
+//! further from the lens, so one exposure gives the far and the near image (Li 2014, sections 5.5 and 10.2).
 
 use std::str::FromStr;
 
 use farnear_scene::Lens;
 
-/// Largest distance of the two sensors along the light: far more than any pair of focus settings has.
+/// Largest sensor distance; far above the range of useful focus settings.
 const FURTHER_MAX_UM: f64 = 10_000.0;
 
-/// How much further from the lens the second sensor stands.
+/// Extra distance of the second sensor from the lens.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub enum Further {
-    /// As far as near focus lies behind far focus.
+    /// The distance between far and near focus.
     Near,
     Micrometres(f64),
 }
@@ -19,7 +19,6 @@ pub enum Further {
 impl FromStr for Further {
     type Err = String;
 
-    /// `near`, or micrometres.
     fn from_str(text: &str) -> Result<Self, String> {
         if text == "near" {
             return Ok(Self::Near);
@@ -31,7 +30,7 @@ impl FromStr for Further {
 }
 
 impl Further {
-    /// In mm, behind this lens.
+    /// Distance in mm behind this lens.
     pub fn mm(self, lens: &Lens) -> f64 {
         match self {
             Self::Near => lens.sensor_near_mm - lens.sensor_far_mm,
@@ -47,10 +46,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn near_is_as_far_as_the_focus_settings_lie_apart() {
+    fn near_is_the_distance_between_the_focus_settings() {
         let lens = Lens::from_optics(&OpticsFile::parse(standard::OPTICS).expect("optics")).expect("a lens");
         let near: Further = "near".parse().expect("a word");
-        // 2.703 px of blur on either side are 2 * 2.703 px * 7.4 um * 50 / 12.8.
+        // 2.703 px of blur on either side: 2 * 2.703 px * 7.4 um * 50 / 12.8.
         assert!((near.mm(&lens) - 0.156_27).abs() < 1e-5, "{}", near.mm(&lens));
         assert_eq!("150".parse(), Ok(Further::Micrometres(150.0)));
         for wrong in ["0", "-1", "NaN", "10001", "far"] {

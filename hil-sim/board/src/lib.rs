@@ -1,23 +1,25 @@
 //! # farnear-sim
 //!
-//! The rig without hardware: the unmodified firmware ELF on an emulated STM32, and around it a plant with
-//! two motorised stages, a piezo, encoders, end switches and a camera. What the firmware measures, it measures through the
-//! registers it uses on the real board; what is really there is in [`plant`], and only tests may look.
+//! The rig without hardware: the unmodified firmware ELF on an emulated STM32, with a plant of two motorised
+//! stages, a piezo, encoders, end switches and a camera. The firmware measures through its registers;
+//! the true state is in [`plant`] and visible to tests only.
 //!
-//! - [`parts`]: what the parts are like, the numbers of `parts.toml`; [`processor`]: what its instructions cost.
-//! - [`rig`]: the emulated rig in this process, for tests; [`config`], [`command`], [`report`]: what it is made of, what
-//!   it can be asked and what it answers.
-//! - [`run`](mod@run): the program: a pty ([`port`]) and a camera [`endpoint`] for any client; the same camera as one of GigE Vision ([`farnear_gige`]).
-//! - [`board`], [`chips`], [`memory`], [`memory_file`], [`serial`], [`wiring`]: the board as the emulator sees it, and its wires.
-//! - [`camera`], [`imager`], [`half_mirror`]: when the camera exposes, its images, and a second camera.
-//! - [`driver`]: what happens whenever the emulator stops; [`pacing`], [`lockstep`]: when virtual time passes.
-//! - [`mod@count`]: instructions of the on-board routines.
-//! - [`faults`]: what can be broken, from a file; [`access`]: the same from a test; [`trace`]: what can be watched.
+//! - [`parts`]: properties of the parts (`parts.toml`); [`processor`]: instruction costs.
+//! - [`rig`]: the rig in this process, for tests; [`config`], [`command`], [`report`]: its configuration,
+//!   commands and state.
+//! - [`run`](mod@run): the program: a pty ([`port`]) and a camera [`endpoint`], or a GigE Vision camera
+//!   ([`farnear_gige`]).
+//! - [`board`], [`chips`], [`memory`], [`memory_file`], [`serial`], [`wiring`]: the emulated board and its
+//!   wires.
+//! - [`camera`], [`imager`], [`half_mirror`]: exposure timing, images, and the second camera.
+//! - [`driver`]: the emulator's stops; [`pacing`], [`lockstep`]: when virtual time passes.
+//! - [`mod@count`]: instruction counts of on-board routines.
+//! - [`faults`]: faults from a file; [`access`]: faults from a test; [`trace`]: recordings.
 //!
 //! # Time
-//! Virtual time is counted in nanoseconds and has nothing to do with the clock on the wall. In lockstep it
-//! passes only while the board owes the host something, so the same requests give the same bytes on any
-//! machine, as long as the host asks while time stands (a request sent during a move arrives when it arrives).
+//! Virtual time is counted in nanoseconds and is independent of the wall clock. In lockstep it passes only
+//! while the board has something outstanding. The same requests then give the same bytes on any machine,
+//! if they are sent while time stands; a request during a move arrives at a time that depends on the host.
 
 pub mod access;
 mod adapter;

@@ -1,45 +1,45 @@
-//! Whether both ends of the line have the same rate.
+//! Baud rates of both ends of the line.
 //!
-//! An end that is slower or faster than the other reads other bytes. Which ones depends on where its samples fall; here each byte
-//! becomes another one, always the same, so that runs repeat. Bytes take the time that they take at the board's rate.
+//! With different rates the receiver reads wrong bytes. Here each byte is replaced by a fixed other one, so
+//! that runs repeat; the duration is that of the board's rate.
 
 use std::ops::Range;
 
 use farnear_protocol::message::LinkRate;
 
-/// Divider of USART3's rate (RM0090: base 0x4000_4800, USART_BRR at 0x08), and what it divides.
+/// USART3's divider (RM0090: base 0x4000_4800, USART_BRR at 0x08) and its clock.
 const BRR: Range<u64> = 0x4000_4808..0x4000_480c;
 const APB1_HZ: u32 = 42_000_000;
-/// A receiver bears a twentieth of a bit per bit at most; beyond that it reads something else.
+/// A receiver tolerates 1/20 bit of drift per bit.
 const TOLERANCE: u32 = 20;
 
 #[derive(Debug)]
 pub struct LinkRates {
     board: LinkRate,
-    /// What the board has set, once what it sent before is taken from the line.
+    /// New rate of the board, valid once earlier bytes have left.
     next: Option<LinkRate>,
     host: Option<LinkRate>,
 }
 
 impl LinkRates {
-    /// Of a board that was just reset, and a host that has set no rate.
+    /// After a reset, with no rate set by the host.
     pub const fn new() -> Self {
         Self { board: LinkRate::START, next: None, host: None }
     }
 
-    /// Whether the board changes its rate by writing to this address.
+    /// Whether a write to `address` changes the board's rate.
     pub fn watches(address: u64) -> bool {
         BRR.contains(&address)
     }
 
-    /// The board has written its divider: what it sends from now on has another rate, see [`LinkRates::settle`].
+    /// The board has written its divider; takes effect in [`LinkRates::settle`].
     pub fn divide(&mut self, divider: u32) {
         let baud = APB1_HZ / divider.max(1);
         let near = |rate: &LinkRate| baud.abs_diff(rate.baud()) < rate.baud() / TOLERANCE;
         self.next = LinkRate::ALL.into_iter().find(near);
     }
 
-    /// What was sent has been taken from the line.
+    /// Earlier bytes have left the line.
     pub fn settle(&mut self) {
         self.board = self.next.take().unwrap_or(self.board);
     }
@@ -48,13 +48,12 @@ impl LinkRates {
         (self.board, self.next) = (LinkRate::START, None);
     }
 
-    /// The host's end has another rate. One that this link does not have is that of a program that does not care, as a
-    /// pseudo-terminal does not either.
+    /// Sets the host's rate. An unsupported rate is ignored: a program on a pseudo-terminal need not set one.
     pub fn set_host(&mut self, baud: u32) {
         self.host = LinkRate::of(baud);
     }
 
-    /// What becomes of bytes on their way, in either direction.
+    /// Corrupts bytes in transit if the rates differ.
     pub fn carry(&self, bytes: &mut [u8]) {
         if self.host.is_some_and(|host| host != self.board) {
             for byte in bytes {
@@ -69,23 +68,23 @@ mod tests {
     use super::*;
 
     #[test]
-    fn bytes_pass_between_ends_of_one_rate_only() {
+    fn bytes_pass_only_at_equal_rates() {
         let mut rates = LinkRates::new();
         let passes = |rates: &LinkRates| {
             let mut bytes = [1, 2, 0];
             rates.carry(&mut bytes);
             bytes == [1, 2, 0]
         };
-        assert!(passes(&rates), "a host that has set none");
+        assert!(passes(&rates), "no rate set by the host");
         rates.set_host(921_600);
         assert!(!passes(&rates));
         rates.divide(APB1_HZ / 921_600);
-        assert!(!passes(&rates), "what it sent before is still on the line");
+        assert!(!passes(&rates), "earlier bytes are still on the line");
         rates.settle();
         assert!(passes(&rates));
         rates.reset();
         assert!(!passes(&rates));
         rates.set_host(38_400);
-        assert!(passes(&rates), "a program that does not care");
+        assert!(passes(&rates), "an unsupported rate is ignored");
     }
 }

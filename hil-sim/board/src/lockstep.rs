@@ -1,13 +1,11 @@
-//! When virtual time may pass.
+//! Decides when virtual time may pass in lockstep.
 //!
-//! In lockstep it runs only while the board owes something: an answer to a request, the terminal event of a move,
-//! a homing, a calibration or a program, its first event after a reset, or the rest of a motor that still brakes. Otherwise it stands still, however long the
-//! host takes, so a run repeats to the byte. It also stands while the board waits for its host: after "still there?", and
-//! after "trigger your camera". All of it is decided from the frames that cross the line; a request that
-//! is lost on the way is given up after a while of virtual time, and the host asks again.
+//! Time passes only while the board has something outstanding: an answer, the terminal event of long work,
+//! its first event after a reset, or a motor that still brakes. It also stops while the board waits for its
+//! host (keep-alive, camera trigger). A run therefore repeats to the byte.
 //!
-//! A host on a slow machine may lose its patience and repeat a request while time stands; such a repeat is dropped, for the
-//! answer is on its way.
+//! The decision uses only frames on the line. A lost request expires after a virtual timeout. A repeat of a
+//! request that is still being answered is dropped, because a slow host may time out while time stands.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
@@ -16,38 +14,37 @@ use farnear_protocol::{
     frame::{Decoder, Kind, Packet},
 };
 
-/// A request without an answer after this long was lost on the line (the board answers within milliseconds).
+/// An unanswered request expires after this time (the board answers within milliseconds).
 const ANSWER_NS: u64 = 60_000_000;
-/// Work without a terminal event after this long will never end: the longest exposure program is far shorter. A continuous run
-/// tells of each frame, and so long after the last of them it will never end either.
+/// Timeout for a terminal event, far above the longest program. In a continuous run it counts from the last
+/// frame.
 const WORK_NS: u64 = 600_000_000_000;
-/// From the answer to another rate of the link: a control tick, and a little.
+/// From the answer to the new link rate: one control tick and a margin.
 const RATE_NS: u64 = 1_000_000;
-/// A reset without the started event after this long: the firmware does not run.
+/// Timeout for the started event after a reset.
 pub const BOOT_NS: u64 = 2_000_000_000;
-/// Ended requests that are remembered, more than the board remembers answers.
+/// Remembered ended requests; more than the board remembers answers.
 const ENDED: usize = 256;
 
 #[derive(Debug, Default)]
 pub struct Lockstep {
     to_board: Decoder,
     from_board: Decoder,
-    /// Requests without an answer: what was asked, and until when it is waited for.
+    /// Unanswered requests by id.
     asked: BTreeMap<u32, Asked>,
-    /// Accepted long work: until when its end is waited for.
+    /// Accepted long work by id, with its timeout.
     running: BTreeMap<u32, u64>,
-    /// Requests whose work has ended; a repeated answer to one of them starts nothing.
+    /// Ended requests; a repeated answer to one starts nothing.
     ended: VecDeque<u32>,
-    /// The board is starting: until when its first event is waited for.
+    /// Timeout of the start after a reset.
     starting: Option<u64>,
     boots: BTreeSet<u32>,
-    /// The program that stands between two exposures until its host lets it go on.
+    /// Program paused between two exposures.
     paused: Option<u32>,
-    /// The board has said something that its host must answer.
+    /// The board has sent a message that its host must answer.
     waits_for_host: bool,
 }
 
-/// A request without an answer.
 #[derive(Debug)]
 struct Asked {
     work: Work,
@@ -55,23 +52,21 @@ struct Asked {
     body: Vec<u8>,
 }
 
-/// What an accepted request leaves under way.
+/// What an accepted request leaves running.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Work {
-    /// Nothing: the answer is all.
     Done,
-    /// Something that ends with a terminal event.
+    /// Ends with a terminal event.
     Long,
-    /// A paused program goes on.
+    /// Continues a paused program.
     Resume,
-    /// A reset.
     Reset,
-    /// Another rate of the link, which comes when the answer has left.
+    /// Changes the link rate once the answer has left.
     Rate,
 }
 
 impl Work {
-    /// Each request by its name and none in passing: time would stand still for a new one that begins long work.
+    /// No wildcard: time would stand still for a new request that starts long work.
     fn of(request: &Request) -> Self {
         match request {
             Request::Home { .. }
@@ -114,18 +109,16 @@ impl Work {
 }
 
 impl Lockstep {
-    /// A board that has just got power.
     pub fn new() -> Self {
         Self { starting: Some(BOOT_NS), ..Self::default() }
     }
 
-    /// Bytes leave for the board.
     pub fn sent(&mut self, bytes: &[u8], now_ns: u64) {
-        self.host_spoke();
+        self.host_answered();
         for byte in bytes {
             let Some(Ok(packet)) = self.to_board.push(*byte) else { continue };
             if packet.header.kind == Kind::Request {
-                // What is not a request of this version is only refused.
+                // Anything but a request of this version is only refused.
                 let work = packet.message().map_or(Work::Done, |call: Call| Work::of(&call.request));
                 let asked = Asked { work, until_ns: now_ns + ANSWER_NS, body: packet.body.to_vec() };
                 self.asked.insert(packet.header.id, asked);
@@ -133,7 +126,7 @@ impl Lockstep {
         }
     }
 
-    /// Whether this frame repeats a request whose answer is still awaited.
+    /// Whether this frame repeats an unanswered request.
     pub fn repeats(&self, frame: &[u8]) -> bool {
         let mut decoder = Decoder::new();
         let packets: Vec<Packet> = frame.iter().filter_map(|byte| decoder.push(*byte)?.ok()).collect();
@@ -142,22 +135,21 @@ impl Lockstep {
         packet.header.kind == Kind::Request && asked.is_some_and(|asked| asked.body == packet.body.as_slice())
     }
 
-    /// The host has said something, or will not: time may pass again.
-    pub fn host_spoke(&mut self) {
+    /// The host has answered or timed out: time may pass.
+    pub fn host_answered(&mut self) {
         self.waits_for_host = false;
     }
 
-    /// Whether a request waits for its answer.
+    /// Whether a request is unanswered.
     pub fn is_asked(&self) -> bool {
         !self.asked.is_empty()
     }
 
-    /// Whether time stands because the board waits for its host, though it owes something itself.
+    /// Whether time stands because the board waits for its host.
     pub fn waits_for_host(&self) -> bool {
         self.waits_for_host
     }
 
-    /// Bytes have come from the board.
     pub fn received(&mut self, bytes: &[u8], now_ns: u64) {
         for byte in bytes {
             if let Some(Ok(packet)) = self.from_board.push(*byte) {
@@ -198,7 +190,7 @@ impl Lockstep {
     fn event(&mut self, event: &Event, boot: u32, now_ns: u64) {
         let ended = match event.kind {
             EventKind::Started { .. } => {
-                // Only a new boot ends the wait: the old one's first event may be asked for again.
+                // Only a new boot ends the wait: the old started event may be requested again.
                 if self.boots.insert(boot) {
                     self.starting = None;
                     self.running.clear();
@@ -239,18 +231,18 @@ impl Lockstep {
         self.ended.push_back(ended);
     }
 
-    /// The board is being reset, by whatever.
+    /// The board was reset, for any reason.
     pub fn reset(&mut self, now_ns: u64) {
         self.running.clear();
         self.asked.clear();
         self.ended.clear();
         self.paused = None;
         self.waits_for_host = false;
-        // One that is reset again and again before it has started is waited for only once.
+        // Repeated resets before the start do not extend the timeout.
         self.starting.get_or_insert(now_ns + BOOT_NS);
     }
 
-    /// Whether the board owes something at this moment.
+    /// Whether the board has something outstanding.
     pub fn is_busy(&mut self, now_ns: u64) -> bool {
         self.asked.retain(|_, asked| asked.until_ns > now_ns);
         self.running.retain(|_, until| *until > now_ns);
@@ -259,7 +251,7 @@ impl Lockstep {
         !self.asked.is_empty() || runs || self.starting.is_some()
     }
 
-    /// Whether the board has ever said that it started.
+    /// Whether the board has ever reported its start.
     pub fn has_started(&self) -> bool {
         !self.boots.is_empty()
     }
@@ -296,7 +288,7 @@ mod tests {
     }
 
     #[test]
-    fn a_move_keeps_time_running_until_its_end_and_its_repeat_does_not() {
+    fn time_passes_until_a_move_ends_and_a_repeat_adds_nothing() {
         let mut lockstep = started();
         let asked = Nanometres(5);
         let silence = Micros(1_000_000);
@@ -327,7 +319,7 @@ mod tests {
     }
 
     #[test]
-    fn a_paused_program_owes_nothing_until_it_goes_on() {
+    fn a_paused_program_stops_time_until_it_resumes() {
         let mut lockstep = started();
         let run = Request::RunProgram { silence: Micros(1_000_000) };
         let accepted = |id| frame(Kind::Response, id, &Response::Accepted);
@@ -343,14 +335,14 @@ mod tests {
     }
 
     #[test]
-    fn a_lost_request_is_given_up() {
+    fn a_lost_request_times_out() {
         let mut lockstep = started();
         lockstep.sent(&request(1, Request::Status), 0);
         assert!(lockstep.is_busy(ANSWER_NS - 1) && !lockstep.is_busy(ANSWER_NS));
     }
 
     #[test]
-    fn garbage_owes_nothing() {
+    fn garbage_does_not_keep_time_running() {
         let mut lockstep = started();
         lockstep.sent(&[1, 2, 3, 0, 255, 0], 0);
         assert!(!lockstep.is_busy(1));

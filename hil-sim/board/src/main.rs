@@ -25,92 +25,90 @@ struct Program {
 
 #[derive(Subcommand)]
 enum Job {
-    /// Start the rig; prints one line of JSON with its serial port and its camera's address, and runs until
-    /// it is interrupted or, where its standard input is a pipe, until that is closed.
+    /// Start the rig. Prints one line of JSON with its serial port and its camera's address. Runs until
+    /// interrupted or, if standard input is a pipe, until that closes.
     #[command(after_help = "Example:\n  \
         farnear-sim run --scene staircase --psf gaussian:k=0.4578 --noise 8bit --seed 1\n  \
         {\"port\": \"/dev/pts/3\", \"camera\": \"127.0.0.1:40123\"}")]
     Run(Box<Run>),
-    /// Make a run again from its trace, and say where it departs from it.
+    /// Replay a recorded run and report the first difference.
     #[command(after_help = "Example:\n  farnear-sim run --trace run.vcd ...\n  farnear-sim replay run.vcd")]
     Replay {
-        /// The trace, a VCD file of `farnear-sim run --trace`.
+        /// Trace of `farnear-sim run --trace FILE.vcd`.
         trace: PathBuf,
-        /// The firmware; without it the one that lies beside this program.
+        /// Firmware ELF; default: the one next to this program.
         #[arg(long, value_name = "ELF")]
         firmware: Option<PathBuf>,
     },
-    /// Count the instructions of the on-board routines: runs the counting firmware and prints its table.
+    /// Count the instructions of the on-board routines and print a table.
     #[command(after_help = "Example:\n  farnear-sim count farnear-count.elf")]
     Count {
-        /// The counting firmware, which `cargo xtask firmware` builds.
+        /// Counting firmware, built by `cargo xtask firmware`.
         elf: PathBuf,
     },
 }
 
 #[derive(Args)]
 struct Run {
-    /// What stands before the camera: plane:MM, staircase, slant, cone or sphere; or -, a scene file with its maps, packed on the
-    /// standard input by `farnear rig ... --port sim` or `farnear serve --rig sim`.
+    /// Scene: plane:MM, staircase, slant, cone or sphere; or - for a packed scene file on standard input
+    /// (sent by `farnear rig ... --port sim` and `farnear serve --rig sim`).
     #[arg(long, default_value = standard::SCENE)]
     scene: SceneSource,
-    /// The lens' blur: pillbox, gaussian:k=K or generalised:p=P,k=K.
+    /// Blur of the lens: pillbox, gaussian:k=K or generalised:p=P,k=K.
     #[arg(long, default_value_t = standard::PSF)]
     psf: Psf,
-    /// optics.toml of the rig; without it a 50 mm lens with its far focus at 933 mm.
+    /// optics.toml of the rig; default: a 50 mm lens with far focus at 933 mm.
     #[arg(long, value_name = "FILE")]
     optics: Option<PathBuf>,
-    /// The camera's noise and bits: none, 8bit or 12bit.
+    /// Noise and bit depth of the camera: none, 8bit or 12bit.
     #[arg(long, default_value_t = standard::NOISE)]
     noise: Noise,
-    /// Decides everything random; 1 unless it or the scenario says otherwise.
+    /// Random seed; default: the scenario's, else 1.
     #[arg(long)]
     seed: Option<u64>,
-    /// The firmware; without it the one that lies beside this program.
+    /// Firmware ELF; default: the one next to this program.
     #[arg(long, value_name = "ELF")]
     firmware: Option<PathBuf>,
-    /// TOML file with what happens to the rig, when and how long (docs/hil.md). `farnear-campaign play` plays one
-    /// with [[host]] steps.
+    /// TOML file with faults and their times (docs/hil.md). `farnear-campaign play` also runs its [[host]]
+    /// steps.
     #[arg(long, visible_alias = "faults", value_name = "FILE")]
     scenario: Option<PathBuf>,
-    /// TOML file with what the parts are like where they differ from the standard rig's; `parts.toml` in the sources has all of
-    /// it, with the source of each number.
+    /// TOML file with part properties that differ from the standard rig; `parts.toml` in the sources lists
+    /// all of them with their origin.
     #[arg(long, value_name = "FILE")]
     parts: Option<PathBuf>,
-    /// Let the board's time follow the wall clock, for a person who watches; without it time passes only while
-    /// the board owes an answer or an event, and a run repeats to the byte.
+    /// Follow the wall clock. By default time passes only while the board has an answer or event outstanding,
+    /// and runs repeat to the byte.
     #[arg(long)]
     paced: bool,
-    /// Keep the board's memory (settings, alarms, counters, programs) in this file between runs; it is made where it is
-    /// missing, and written when the rig ends.
+    /// File for the board's memory (settings, alarms, counters, programs); created if missing, written when
+    /// the rig ends.
     #[arg(long, value_name = "FILE")]
     memory: Option<PathBuf>,
-    /// Give the serial port this name too, a link that is removed at the end: a client finds a rig again that was started anew.
+    /// Link to the serial port, removed at the end. A client finds a restarted rig by this name.
     #[arg(long, value_name = "PATH")]
     link: Option<PathBuf>,
-    /// Write what the mechanics really did to this file: CSV, or by the ending .vcd a value change dump that `replay` can
-    /// make again.
+    /// File for the true motion of the mechanics: CSV, or VCD (ending .vcd), which `replay` can run again.
     #[arg(long, value_name = "FILE")]
     trace: Option<PathBuf>,
-    /// Be a GigE Vision camera, too, on this network interface: lo, or an IPv4 address of this computer. Its identification stands in
-    /// the line of JSON; `farnear camera list` finds it.
+    /// Also serve a GigE Vision camera on this interface: lo, or an IPv4 address of this computer. The JSON
+    /// line has its identification; `farnear camera list` finds it.
     #[arg(long, value_name = "INTERFACE", value_parser = gige::interface)]
     gige: Option<std::net::Ipv4Addr>,
-    /// Set a half mirror behind the lens and a second camera in its other path, whose sensor stands so many micrometres further from
-    /// the lens; without a number as far as near focus lies behind far focus. Each exposure gives a picture of both cameras, each with
-    /// half of the light (`[half_mirror]` of the parts says otherwise). The second one's address stands in the line of JSON.
+    /// Add a half mirror and a second camera whose sensor is this many micrometres further from the lens;
+    /// default: the distance between far and near focus. Both cameras deliver each exposure and share the
+    /// light equally (see `[half_mirror]` of the parts). The JSON line has the second address.
     #[arg(long, value_name = "UM", num_args = 0..=1, require_equals = true, default_missing_value = "near")]
     half_mirror: Option<Further>,
-    /// So many of 1000 packets of the GigE Vision camera are lost.
+    /// Lost packets per 1000 of the GigE Vision camera.
     #[arg(long, value_name = "N", default_value_t = 0, requires = "gige", value_parser = clap::value_parser!(u32).range(0..=1000))]
     gige_lost: u32,
 }
 
-/// Where the scene comes from.
 #[derive(Clone)]
 enum SceneSource {
     Named(Box<Scene>),
-    /// A [`PackedScene`]; what follows it is of no interest, its end is.
+    /// A [`PackedScene`]; input after it is ignored until its end.
     StandardInput,
 }
 
@@ -161,7 +159,7 @@ fn play_again(trace: &Path, firmware: Option<&Path>) -> Result<()> {
     Ok(())
 }
 
-/// Prints a line per routine: instructions, units, unit, name; separated by tabs.
+/// Prints instructions, units, unit and name per routine, separated by tabs.
 fn count(elf: &Path) -> Result<()> {
     let mut stdout = std::io::stdout();
     for count in farnear_sim::count::count(elf)? {
@@ -170,7 +168,7 @@ fn count(elf: &Path) -> Result<()> {
     Ok(())
 }
 
-/// The rig that was asked for. The command line's seed and parts go before the scenario's.
+/// Configuration of the rig. The command line overrides the scenario.
 fn config(run: &Run) -> Result<RigConfig> {
     let scenario = run.scenario.as_deref().map(Scenario::read).transpose()?.unwrap_or_default();
     let own = scenario.parts().map_err(anyhow::Error::msg)?;
@@ -234,7 +232,7 @@ fn serve(run: &Run) -> Result<()> {
         if let Some(Err(error)) = linked.as_deref().map(|path| Link::point(path, port)) {
             eprintln!("farnear-sim: {error:#}");
         }
-        // Whoever read the first line may be gone.
+        // The reader of the first line may have closed the pipe.
         let _ = writeln!(std::io::stdout(), "{{\"port\": \"{port}\"}}");
     };
     let rig = ServedRig::start(&config, first, second, gige.as_ref(), renamed)?;
@@ -244,7 +242,7 @@ fn serve(run: &Run) -> Result<()> {
     let stop = rig.stopper();
     if stdin_is_a_pipe() {
         std::thread::spawn(move || {
-            // Whatever is written to it is of no interest; its end is.
+            // Input is ignored; its end stops the program.
             let _ = std::io::copy(&mut std::io::stdin(), &mut std::io::sink());
             stop();
         });
@@ -259,23 +257,23 @@ fn serve(run: &Run) -> Result<()> {
     Ok(())
 }
 
-/// Another name of the pty, which goes with this value.
+/// Link to the pty, removed on drop.
 struct Link(PathBuf);
 
 impl Link {
-    /// Makes the link. One that leads nowhere any more, left by a rig that was killed, is replaced; anything else stays.
+    /// Creates the link. A dangling link of a killed rig is replaced; other files are kept.
     fn new(path: &Path, port: &str) -> Result<Self> {
         if path.is_symlink() && !path.exists() {
             std::fs::remove_file(path).with_context(|| format!("cannot replace {}", path.display()))?;
         }
         std::os::unix::fs::symlink(port, path)
-            .with_context(|| format!("cannot make the link {} to {port}", path.display()))?;
+            .with_context(|| format!("cannot create the link {} to {port}", path.display()))?;
         Ok(Self(path.into()))
     }
 
-    /// Lets the link lead to another port; there is no moment without it.
+    /// Points the link to another port atomically.
     fn point(path: &Path, port: &str) -> Result<()> {
-        let cannot = || format!("cannot let the link {} lead to {port}", path.display());
+        let cannot = || format!("cannot point the link {} to {port}", path.display());
         let name = path.file_name().with_context(cannot)?.to_string_lossy();
         let other = path.with_file_name(format!(".{name}.{}", std::process::id()));
         std::os::unix::fs::symlink(port, &other).with_context(cannot)?;
@@ -285,11 +283,11 @@ impl Link {
 
 impl Drop for Link {
     fn drop(&mut self) {
-        let _ = std::fs::remove_file(&self.0); // somebody may have removed it
+        let _ = std::fs::remove_file(&self.0); // it may have been removed
     }
 }
 
-/// Whether somebody holds the other end of the standard input (a terminal or /dev/null has no such end).
+/// Whether standard input is a pipe rather than a terminal or /dev/null.
 fn stdin_is_a_pipe() -> bool {
     let stdin = std::io::stdin();
     let Ok(handle) = stdin.as_fd().try_clone_to_owned() else { return false };

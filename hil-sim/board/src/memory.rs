@@ -1,5 +1,5 @@
-//! The board's FRAM, Cypress FM25V02 or FM25V02A (the emulator's model with the name of either), and what can happen to such
-//! a chip: its supply fails in the middle of a write, a bit flips in it or on the bus, somebody solders in a new one or none.
+//! The board's FRAM (Cypress FM25V02 or FM25V02A) with its faults: supply failure during a write, flipped
+//! bits, replaced or missing chip.
 
 use rigless::{
     chip::{
@@ -13,29 +13,29 @@ use rigless::{
 
 use crate::parts::MemoryMake;
 
-/// Opcode of a write; two bytes of address follow it.
+/// Write opcode; two address bytes follow.
 const WRITE: u32 = 0x02;
 const READ: u32 = 0x03;
-/// Opcode of the question for its name.
+/// Opcode of the identification.
 const READ_ID: u32 = 0x9f;
 
-/// The chip behind its select.
+/// The chip behind its select line.
 #[derive(Debug)]
 pub struct MemoryChip {
     chip: Fm25v02,
     make: MemoryMake,
-    /// Bytes of the command under way, and its opcode.
+    /// Bytes of the current command, and its opcode.
     command: (u32, u32),
-    /// A bit of each of the next so many answers is flipped on the bus: of its name, of what it holds.
+    /// Remaining answers with a flipped bit: identification, reads.
     spoilt: (u32, u32),
     written: u64,
-    /// The supply fails when so many bytes have been written.
+    /// Write count at which the supply fails.
     fails_at: Option<u64>,
     failed: bool,
 }
 
 impl MemoryChip {
-    /// A new chip: all zero.
+    /// A new chip, all zero.
     pub fn new(make: MemoryMake) -> Self {
         Self {
             chip: Fm25v02::new(),
@@ -48,12 +48,12 @@ impl MemoryChip {
         }
     }
 
-    /// Another chip is soldered in, with the same contents; or none.
+    /// Replaces the chip and keeps the contents; or removes it.
     pub fn set_make(&mut self, make: MemoryMake) {
         self.make = make;
     }
 
-    /// Flips a bit on the bus in each of the next so many answers to the question for its name, and in so many reads.
+    /// Flips one bit in each of the next `names` identification answers and `reads` reads.
     pub fn spoil_answers(&mut self, names: u32, reads: u32) {
         self.spoilt = (names, reads);
     }
@@ -62,32 +62,30 @@ impl MemoryChip {
         self.chip.stored()
     }
 
-    /// Bytes written since power-on of the rig.
+    /// Bytes written since power-on.
     pub fn written(&self) -> u64 {
         self.written
     }
 
-    /// Lets the supply fail when this many more bytes have been written: the last of them still lands.
+    /// Fails the supply after this many more bytes; the last one is still stored.
     pub fn fail_after(&mut self, bytes: u64) {
         self.fails_at = Some(self.written + bytes);
     }
 
-    /// The supply does not fail after all.
+    /// Cancels the supply failure.
     pub fn keep_supply(&mut self) {
         self.fails_at = None;
     }
 
-    /// Whether the supply has failed as [`MemoryChip::fail_after`] asked; said once.
+    /// Whether the supply has just failed; resets the flag.
     pub fn take_failure(&mut self) -> bool {
         self.failed && self.fails_at.take().is_some()
     }
 
-    /// Puts these contents into the chip.
     pub fn set_contents(&mut self, contents: &[u8; SIZE]) {
         self.rebuild(contents, VirtualNanos(0));
     }
 
-    /// The supply has come back.
     pub fn power_up(&mut self, at: VirtualNanos) {
         let contents = self.chip.stored().to_vec();
         self.rebuild(&contents, VirtualNanos(at.0 + POWER_UP.0));
@@ -95,7 +93,7 @@ impl MemoryChip {
         self.fails_at = None;
     }
 
-    /// The emulator's chip has no door for this, so a new one is made from its description.
+    /// The emulator's chip has no method for this, so a new one is created.
     fn rebuild(&mut self, contents: &[u8], ready_at: VirtualNanos) {
         let described = serde_json::to_value(Fm25v02::new()).and_then(|mut chip| {
             chip["memory"] = contents.into();
@@ -124,18 +122,18 @@ impl Peer for MemoryChip {
             self.written += 1;
             self.failed = self.fails_at.is_some_and(|at| self.written >= at);
         }
-        let told = match (*opcode, *count) {
+        let altered = match (*opcode, *count) {
             (READ_ID, 2..=10) => Some(u32::from(self.make.name()[*count as usize - 2])),
             _ => None,
         };
         let answer = self.chip.transfer(mosi, bits, context);
-        let answer = told.unwrap_or(answer);
+        let answer = altered.unwrap_or(answer);
         let left = match *opcode {
             READ_ID => &mut self.spoilt.0,
             READ => &mut self.spoilt.1,
             _ => return answer,
         };
-        // Somewhere in what comes back, behind opcode and address, and each time another bit.
+        // A position in the answer (after opcode and address) that differs each time.
         if *count == 8 && *left > 0 {
             *left -= 1;
             return answer ^ 1 << (*left % 8);
@@ -168,7 +166,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn contents_can_be_put_in_and_survive_a_loss_of_power() {
+    fn contents_survive_a_power_loss() {
         let mut chip = MemoryChip::new(MemoryMake::Fm25v02a);
         let mut contents = [0; SIZE];
         contents[77] = 0xa5;

@@ -1,4 +1,4 @@
-//! The board's memory between two runs: a file with the bytes of the FRAM.
+//! File with the bytes of the FRAM, kept between runs.
 
 use std::{fs, io::ErrorKind, path::Path};
 
@@ -11,10 +11,8 @@ fn failed(what: &str, path: &Path) -> impl FnOnce(std::io::Error) -> SimError {
     move |source| SimError::Io { what, source }
 }
 
-/// What the memory held when the last run ended; `None` where there is no such file yet.
-///
-/// # Errors
-/// [`SimError::Memory`] where the file is not as large as the memory, [`SimError::Io`] where it cannot be read.
+/// Contents at the end of the last run; `None` without a file.
+/// Errors: [`SimError::Memory`] for a wrong size, [`SimError::Io`] if it cannot be read.
 pub fn read(path: &Path) -> Result<Option<Box<[u8; SIZE]>>, SimError> {
     let bytes = match fs::read(path) {
         Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),
@@ -25,7 +23,7 @@ pub fn read(path: &Path) -> Result<Option<Box<[u8; SIZE]>>, SimError> {
     contents.map(Some).map_err(|_| SimError::Memory { path: path.into(), length, expected: SIZE })
 }
 
-/// Keeps what the memory holds: written aside first, so that a file is whole or the old one.
+/// Writes atomically through a temporary file.
 pub fn write(path: &Path, contents: &[u8]) -> Result<(), SimError> {
     let aside = path.with_added_extension(format!("partial-{}", std::process::id()));
     let written = fs::write(&aside, contents).and_then(|()| fs::rename(&aside, path));
@@ -40,16 +38,16 @@ mod tests {
     use super::*;
 
     #[test]
-    fn contents_are_kept_and_a_file_of_another_size_is_refused() {
+    fn keeps_the_contents_and_refuses_a_file_of_another_size() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("memory.bin");
-        assert!(read(&path).expect("no file is no error").is_none());
+        assert!(read(&path).expect("a missing file is accepted").is_none());
         let mut contents = [0; SIZE];
         contents[77] = 0xa5;
         write(&path, &contents).expect("writable");
         assert_eq!(read(&path).expect("readable").as_deref(), Some(&contents));
         fs::write(&path, [1, 2, 3]).expect("writable");
-        let refused = read(&path).expect_err("three bytes are no memory").to_string();
+        let refused = read(&path).expect_err("three bytes are refused").to_string();
         assert!(refused.contains("3 bytes") && refused.contains("32768"), "{refused}");
     }
 }

@@ -1,6 +1,5 @@
-//! Sees everything in a run: what crosses the line (as the board said it, before the line could spoil it), where the
-//! mechanics really are when it does, each burst of STEP pulses, each exposure, each reset, each injected fault. The invariants
-//! of a campaign (`farnear-campaign`) compare them.
+//! Records a run for the invariants of a campaign (`farnear-campaign`): frames on the line before its faults,
+//! the true mechanics, STEP bursts, exposures, resets and faults.
 
 use farnear_protocol::{
     Call, Event, EventKind, RequestError, Response,
@@ -13,16 +12,15 @@ use crate::{
     wiring::{Burst, Shot},
 };
 
-/// Where the mechanics are.
+/// True positions of the mechanics.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub struct Truth {
-    /// The sensor's stage, micrometres from its true home edge.
+    /// Sensor stage, from its true home edge.
     pub coarse_um: f64,
-    /// The lens' stage likewise.
+    /// Lens stage, likewise.
     pub lens_um: f64,
-    /// The piezo, micrometres.
     pub piezo_um: f64,
-    /// Microsteps against a hard stop so far: the sensor's stage, the lens'.
+    /// Microsteps against a hard stop so far: sensor stage, lens stage.
     pub pressed: [u64; 2],
 }
 
@@ -38,53 +36,47 @@ impl Truth {
     }
 }
 
-/// Something that was seen.
 #[derive(Clone, PartialEq, Debug)]
 pub enum Seen {
-    /// A good frame with a request goes on the line to the board.
+    /// A valid request was sent to the board.
     Asked {
         id: u32,
-        /// The boot that it is for.
+        /// Boot number of the request.
         boot: u32,
-        /// The request, with its session.
         call: Call,
     },
-    /// The board has given an answer.
     Answered {
         id: u32,
         boot: u32,
         answer: Box<Result<Response, RequestError>>,
-        /// Where everything was then.
+        /// Positions at that time.
         truth: Truth,
     },
-    /// The board has told of an event.
-    Told {
+    Reported {
         number: u32,
         boot: u32,
         event: Box<Event>,
-        /// Where everything was then.
+        /// Positions at that time.
         truth: Truth,
     },
-    /// A motor was given pulses, the last of them 20 ms ago.
+    /// A burst of STEP pulses that ended 20 ms ago.
     Stepped(Burst),
-    /// The camera has taken a picture.
     Exposed(Shot),
     Reset,
-    /// Its power went, or came back.
+    /// Power switched on or off.
     Powered(bool),
-    /// Something happened to the rig, or was taken back.
+    /// A fault started or was reverted.
     Happened {
         what: &'static str,
-        mends: bool,
+        reverts: bool,
     },
-    /// Everything is mended; what comes now has to work.
+    /// All faults are reverted; later requests must succeed.
     Healed,
 }
 
-/// Something that was seen, and when.
+/// An observation with its time.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Sight {
-    /// Virtual time, nanoseconds.
     pub at_ns: u64,
     pub seen: Seen,
 }
@@ -98,7 +90,7 @@ pub struct Observer {
 }
 
 impl Observer {
-    /// One that keeps what it sees, or only tells of moments.
+    /// `keeps`: record observations; else only report moments.
     pub fn new(keeps: bool) -> Self {
         Self { keeps, ..Self::default() }
     }
@@ -109,12 +101,11 @@ impl Observer {
         }
     }
 
-    /// What was seen since the last call.
     pub fn take(&mut self) -> Vec<Sight> {
         std::mem::take(&mut self.sights)
     }
 
-    /// Bytes go on the line to the board; gives how many requests are among them.
+    /// Bytes sent to the board; returns the number of requests in them.
     pub fn sent(&mut self, at_ns: u64, bytes: &[u8]) -> usize {
         let mut requests = 0;
         for byte in bytes {
@@ -130,7 +121,7 @@ impl Observer {
         requests
     }
 
-    /// Bytes have come from the board; gives the moments that they are.
+    /// Bytes received from the board; returns the moments in them.
     pub fn received(&mut self, at_ns: u64, bytes: &[u8], truth: Truth) -> Vec<Moment> {
         let mut moments = Vec::new();
         for byte in bytes {
@@ -143,13 +134,13 @@ impl Observer {
         moments
     }
 
-    /// The board was reset: what it was saying is cut off.
+    /// The board was reset: its unfinished frame is dropped.
     pub fn reset(&mut self) {
         self.from_board = Decoder::new();
     }
 }
 
-/// What a frame from the board is.
+/// Moment and observation of a frame from the board.
 fn read(packet: &Packet, truth: Truth) -> Option<(Option<Moment>, Seen)> {
     let (id, boot) = (packet.header.id, packet.header.boot);
     let answer = match packet.header.kind {
@@ -164,7 +155,7 @@ fn read(packet: &Packet, truth: Truth) -> Option<(Option<Moment>, Seen)> {
                 EventKind::Alarm(_) => Some(Moment::Alarm),
                 _ => None,
             };
-            return Some((moment, Seen::Told { number: id, boot, event: event.into(), truth }));
+            return Some((moment, Seen::Reported { number: id, boot, event: event.into(), truth }));
         }
         Kind::Request | Kind::Log => return None,
     };

@@ -1,4 +1,4 @@
-//! Whether virtual time may pass, and for how long the emulator's thread waits where it may not.
+//! Decides whether virtual time passes, and how long the emulator's thread waits otherwise.
 
 use std::{
     sync::mpsc::{Receiver, RecvTimeoutError, Sender},
@@ -7,88 +7,85 @@ use std::{
 
 use crate::{command::Command, config::Pace, lockstep::Lockstep, report::Report};
 
-/// Virtual time between two looks at line, commands and the right to go on.
+/// Virtual time between two checks of line and commands.
 const QUANTUM_NS: u64 = 100_000;
-/// The same when time follows the wall clock.
+/// The same in real time.
 const REALTIME_QUANTUM_NS: u64 = 1_000_000;
-/// So long by the wall clock time stands for a host that the board waits for; then it is taken for gone.
+/// Wall-clock timeout for a host that the board waits for.
 const HOST_PATIENCE: Duration = Duration::from_secs(1);
-/// With the wall clock time passes for so long after somebody has said something, and as long as the board is at work; then
-/// a rig that nobody asks anything takes no processor time.
+/// In real time the clock keeps running this long after activity of a host. An idle rig then uses no
+/// processor time.
 const AWAKE: Duration = Duration::from_millis(200);
-/// A machine that is this far behind follows the wall clock from where it is.
+/// A machine that is this late restarts the pace from now.
 const BEHIND: Duration = Duration::from_millis(100);
 
 pub struct Pacing {
     pace: Pace,
     pub lockstep: Lockstep,
-    /// Until when time passes because somebody said so.
-    told_ns: u64,
-    /// Who waits for that moment.
-    told: Vec<Sender<Report>>,
-    /// Who waits for a board that owes nothing.
+    /// End of the requested advance.
+    advance_until_ns: u64,
+    /// Callers that wait for this time.
+    advancing: Vec<Sender<Report>>,
+    /// Callers that wait for an idle board.
     settling: Vec<Sender<Report>>,
-    /// A moment of the wall clock, and the virtual one that goes with it.
+    /// Wall-clock time and the matching virtual time.
     wall: Option<(Instant, u64)>,
-    /// When somebody said something, by the wall clock.
-    spoken: Instant,
+    /// Wall-clock time of the last activity.
+    last_activity: Instant,
 }
 
 impl Pacing {
-    /// Of a board that has just got power.
     pub fn new(pace: Pace) -> Self {
         Self {
             pace,
             lockstep: Lockstep::new(),
-            told_ns: 0,
-            told: Vec::new(),
+            advance_until_ns: 0,
+            advancing: Vec::new(),
             settling: Vec::new(),
             wall: None,
-            spoken: Instant::now(),
+            last_activity: Instant::now(),
         }
     }
 
-    /// Time follows the wall clock.
     pub fn is_realtime(&self) -> bool {
         self.pace == Pace::Realtime
     }
 
-    /// Somebody has said something.
-    pub fn hear(&mut self) {
-        self.spoken = Instant::now();
+    /// Notes activity of a host.
+    pub fn note_activity(&mut self) {
+        self.last_activity = Instant::now();
     }
 
-    /// Time passes only while the board owes something.
     pub fn is_lockstep(&self) -> bool {
         self.pace == Pace::Lockstep
     }
 
-    /// Lets `nanos` pass from now on, and tells `done` then.
+    /// Lets `nanos` pass, then notifies `done`.
     pub fn advance(&mut self, now_ns: u64, nanos: u64, done: Sender<Report>) {
-        self.told_ns = self.told_ns.max(now_ns.saturating_add(nanos));
-        self.told.push(done);
+        self.advance_until_ns = self.advance_until_ns.max(now_ns.saturating_add(nanos));
+        self.advancing.push(done);
     }
 
-    /// Lets time pass until the board owes nothing, and tells `done` then.
+    /// Runs until the board is idle, then notifies `done`.
     pub fn settle(&mut self, done: Sender<Report>) {
         self.settling.push(done);
     }
 
-    /// Whether time passes because somebody said how much of it is to pass.
-    pub fn is_told(&self, now_ns: u64) -> bool {
-        now_ns < self.told_ns
+    /// Whether a requested advance is active.
+    pub fn is_advancing(&self, now_ns: u64) -> bool {
+        now_ns < self.advance_until_ns
     }
 
-    /// Whether the board owes something. `at_work`: bytes are on their way to it, or a motor is.
+    /// Whether the board is busy. `at_work`: bytes are in transit or a motor moves.
     fn is_busy(&mut self, now_ns: u64, at_work: bool) -> bool {
         self.lockstep.is_busy(now_ns) || at_work
     }
 
-    /// Who has waited for this moment, to be told how the rig is now.
+    /// Callers whose wait ends now.
     pub fn take_waiting(&mut self, now_ns: u64, at_work: bool) -> Vec<Sender<Report>> {
         let mut waiting = Vec::new();
-        if !self.is_told(now_ns) {
-            waiting.append(&mut self.told);
+        if !self.is_advancing(now_ns) {
+            waiting.append(&mut self.advancing);
         }
         if !self.settling.is_empty() && !self.is_busy(now_ns, at_work) {
             waiting.append(&mut self.settling);
@@ -96,44 +93,43 @@ impl Pacing {
         waiting
     }
 
-    /// Whether time may pass.
     pub fn may_pass(&mut self, now_ns: u64, at_work: bool) -> bool {
-        self.is_told(now_ns)
+        self.is_advancing(now_ns)
             || match self.pace {
-                Pace::Told => !self.settling.is_empty() && self.is_busy(now_ns, at_work),
+                Pace::OnRequest => !self.settling.is_empty() && self.is_busy(now_ns, at_work),
                 Pace::Lockstep => self.is_busy(now_ns, at_work) && !self.lockstep.waits_for_host(),
-                Pace::Realtime => self.is_busy(now_ns, at_work) || self.spoken.elapsed() < AWAKE,
+                Pace::Realtime => self.is_busy(now_ns, at_work) || self.last_activity.elapsed() < AWAKE,
             }
     }
 
-    /// Waits for a command while time stands; `None` where the host has let the board wait for too long.
+    /// Waits for a command while time stands; `None` once the host has timed out.
     pub fn wait(&mut self, commands: &Receiver<Command>) -> Option<Command> {
-        // When time passes again, the clock on the wall is followed from then on.
+        // When time continues, the pace restarts from then.
         self.wall = None;
-        // Nobody left who could command: end.
+        // No caller is left: end.
         if !self.lockstep.waits_for_host() {
             return Some(commands.recv().unwrap_or(Command::End));
         }
         match commands.recv_timeout(HOST_PATIENCE) {
             Ok(command) => Some(command),
             Err(RecvTimeoutError::Timeout) => {
-                self.lockstep.host_spoke();
+                self.lockstep.host_answered();
                 None
             }
             Err(RecvTimeoutError::Disconnected) => Some(Command::End),
         }
     }
 
-    /// Where time follows the wall clock: waits until that has caught up; a command ends the wait.
+    /// In real time: waits for the wall clock; a command ends the wait.
     pub fn keep_pace(&mut self, now_ns: u64, commands: &Receiver<Command>) -> Option<Command> {
-        if !self.is_realtime() || self.is_told(now_ns) {
+        if !self.is_realtime() || self.is_advancing(now_ns) {
             return None;
         }
         let (wall, virtual_ns) = *self.wall.get_or_insert((Instant::now(), now_ns));
         let due = wall + Duration::from_nanos(now_ns - virtual_ns);
         let wait = due.saturating_duration_since(Instant::now());
         if wait.is_zero() {
-            // Too slow a host: the wall clock is followed from here, not chased.
+            // Too slow: restart the pace instead of catching up.
             if due + BEHIND < Instant::now() {
                 self.wall = None;
             }
@@ -146,14 +142,14 @@ impl Pacing {
         }
     }
 
-    /// Until when the emulator runs where nobody asked for less.
+    /// Default interval to the next stop.
     pub fn quantum_ns(&self) -> u64 {
         if self.is_realtime() { REALTIME_QUANTUM_NS } else { QUANTUM_NS }
     }
 
-    /// Until when the emulator may run before it is asked again.
+    /// Time of the next check.
     pub fn next_look_ns(&self, now_ns: u64) -> u64 {
         let until = now_ns + self.quantum_ns();
-        if self.is_told(now_ns) { until.min(self.told_ns) } else { until }
+        if self.is_advancing(now_ns) { until.min(self.advance_until_ns) } else { until }
     }
 }

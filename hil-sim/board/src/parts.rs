@@ -1,6 +1,6 @@
-//! What the emulated parts are like: the numbers of `parts.toml`, each with its source there.
+//! Properties of the emulated parts (`parts.toml`, with sources).
 //!
-//! A file of the same form, whole or in part, makes another rig: what it leaves out is as in `parts.toml`.
+//! A file in the same form overrides the values that it contains.
 
 use std::path::Path;
 
@@ -10,54 +10,47 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::SimError;
 
-/// The rig that tests and the program have where nobody says otherwise.
+/// The default rig.
 const STANDARD: &str = include_str!("../parts.toml");
 
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Parts {
-    /// What instructions cost.
     pub processor: ProcessorParts,
-    /// The converter behind the strain gauge.
     pub gauge_converter: ConverterParts,
-    /// The strain gauge with its amplifier.
     pub gauge: GaugeParts,
-    /// The piezo with its flexure.
     pub piezo: PiezoParts,
     pub memory: MemoryParts,
-    /// The chip's own supervision of its supply.
     pub supply: SupplyParts,
     pub switches: SwitchParts,
-    /// The motors' driver chips.
     pub driver: DriverParts,
-    /// Lens, light and sensor besides blur and noise.
+    /// Lens, light and sensor, except blur and noise.
     pub imaging: ImagingParts,
-    /// The half mirror and the second camera, where there are some.
     pub half_mirror: HalfMirrorParts,
 }
 
-/// The half mirror behind the lens, and the second camera.
+/// The half mirror and the second camera.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct HalfMirrorParts {
-    /// Share of the light that each camera gets, the first and the second.
+    /// Share of the light: first and second camera.
     pub light: [f64; 2],
-    /// How far the second camera's picture lies beside the first's, right and down.
+    /// Offset of the second image from the first, right and down.
     pub second_shift_px: [f64; 2],
-    /// How far it is turned against the first's, from x towards y.
+    /// Rotation of the second image, from x towards y.
     pub second_rotation_deg: f64,
-    /// Whether left is right in the second camera's picture.
+    /// Whether the second image is mirrored left to right.
     pub second_mirrored: bool,
 }
 
 impl HalfMirrorParts {
-    /// How the second camera sees what the first one sees.
+    /// View of the second camera relative to the first.
     pub fn second_view(&self) -> View {
         View { shift_px: self.second_shift_px, rotation_deg: self.second_rotation_deg, ..View::default() }
     }
 }
 
-/// Lens, light and sensor besides blur and noise.
+/// Lens, light and sensor, except blur and noise.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ImagingParts {
@@ -79,7 +72,7 @@ pub struct ImagingParts {
     pub hot_pixel_share: f64,
     /// [`Defects::hot_pixel_e`].
     pub hot_pixel_e: f64,
-    /// How fast the scene moves across the image.
+    /// Speed of the scene in the image, right and down.
     pub scene_px_per_s: [f64; 2],
     pub light: LightParts,
 }
@@ -112,7 +105,7 @@ impl LightParts {
 }
 
 impl ImagingParts {
-    /// The lens with the focus that varies over its field, where it does.
+    /// The lens with its field curvature, if any.
     pub fn lens(&self, lens: Lens) -> Lens {
         if [self.field_offset, self.field_curvature, self.field_slope] == [0.0; 3] {
             return lens;
@@ -126,7 +119,6 @@ impl ImagingParts {
         })
     }
 
-    /// What light and sensor do.
     pub fn defects(&self) -> Defects {
         Defects {
             vignetting: self.vignetting,
@@ -137,49 +129,45 @@ impl ImagingParts {
     }
 }
 
-/// What instructions cost.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ProcessorParts {
-    /// Cycles of an instruction, on average.
+    /// Average cycles per instruction.
     pub cycles_per_instruction: f64,
-    /// That is multiplied by this while the flash accelerator is not wholly on.
+    /// Factor while the flash accelerator is not fully on.
     pub without_accelerator: f64,
 }
 
-/// The converter behind the strain gauge, and the released line of its data.
+/// The gauge's converter and its data line.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ConverterParts {
-    /// CNV is high for at least this, or the converter may not sample.
+    /// Minimum CNV pulse; the converter may not sample a shorter one.
     pub pulse_min_ns: u64,
-    /// Shortest conversion: CNV is low again before that, or there is no busy indicator.
+    /// Shortest conversion. Without CNV low by then there is no busy indicator.
     pub conversion_min_ns: u64,
-    /// Longest conversion: before that nothing can be read.
+    /// Longest conversion; nothing can be read before.
     pub conversion_max_ns: u64,
-    /// What pulls the released line up.
     pub pull_up_ohm: f64,
-    /// What it has to charge.
     pub line_pf: f64,
-    /// Share of the supply at which the input takes the line for high.
+    /// Input threshold as a share of the supply.
     pub threshold: f64,
 }
 
 impl ConverterParts {
-    /// How long a released line that was low still reads as low.
+    /// Time for a released low line to reach the threshold.
     pub fn rise_ns(&self) -> f64 {
         let time_constant_ns = self.pull_up_ohm * self.line_pf * 1e-3;
         -time_constant_ns * libm::log(1.0 - self.threshold)
     }
 }
 
-/// The strain gauge with its amplifier.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct GaugeParts {
-    /// What it says for a micrometre, 1 = as its data sheet has it.
+    /// Reading per micrometre, relative to the data sheet.
     pub gain: f64,
-    /// What it says where the piezo is relaxed.
+    /// Reading at the relaxed piezo.
     pub offset_um: f64,
     pub noise_um: f64,
 }
@@ -190,12 +178,11 @@ pub struct MemoryParts {
     pub make: MemoryMake,
 }
 
-/// A make of FRAM.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
 pub enum MemoryMake {
     #[serde(rename = "FM25V02")]
     Fm25v02,
-    /// Its successor, with another revision in its name.
+    /// Successor with another revision in its name.
     #[serde(rename = "FM25V02A")]
     Fm25v02a,
     #[serde(rename = "none")]
@@ -203,7 +190,7 @@ pub enum MemoryMake {
 }
 
 impl MemoryMake {
-    /// What it answers when it is asked for its name.
+    /// Bytes of its identification.
     pub const fn name(self) -> [u8; 9] {
         match self {
             Self::Fm25v02 => DEVICE_ID,
@@ -213,25 +200,24 @@ impl MemoryMake {
     }
 }
 
-/// The chip's own supervision of its supply.
+/// The chip's supply supervision.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SupplyParts {
-    /// What its option bytes say at the first power-on.
+    /// Option bytes at the first power-on.
     pub brown_out: BrownOut,
-    /// Falling thresholds of the levels 1 to 3.
+    /// Falling thresholds of levels 1 to 3.
     pub brown_out_mv: [u32; 3],
-    /// Where the power-down reset holds the chip, whatever the option bytes say.
+    /// Threshold of the power-down reset, which is always on.
     pub power_down_mv: u32,
 }
 
-/// Levels of the brown-out reset.
+/// Brown-out reset levels.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum BrownOut {
-    /// As the chip comes from its factory.
+    /// Factory setting.
     Off,
-    /// The lowest threshold.
     #[serde(rename = "level-1")]
     Level1,
     #[serde(rename = "level-2")]
@@ -241,7 +227,7 @@ pub enum BrownOut {
 }
 
 impl BrownOut {
-    /// The field BOR_LEV of the option bytes (RM0090, section 3.9.10).
+    /// Field BOR_LEV of the option bytes (RM0090, section 3.9.10).
     pub const fn bits(self) -> u64 {
         match self {
             Self::Level3 => 0b00,
@@ -253,7 +239,6 @@ impl BrownOut {
 }
 
 impl SupplyParts {
-    /// Below this the chip is held in reset, by the field BOR_LEV of its option bytes.
     pub fn reset_mv(&self, bor_lev: u64) -> u32 {
         match bor_lev {
             0b00 => self.brown_out_mv[2],
@@ -264,27 +249,25 @@ impl SupplyParts {
     }
 }
 
-/// The piezo with its flexure.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PiezoParts {
-    /// Frequency of the flexure's second mode.
     pub second_mode_hz: f64,
     pub second_mode_damping: f64,
-    /// Its share of what a slow drive moves; 0 = there is none.
+    /// Share of the second mode in a static deflection; 0 = none.
     pub second_mode_share: f64,
 }
 
 #[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SwitchParts {
-    /// How long a contact bounces that has changed.
+    /// Bounce time of a contact.
     pub bounce_us: u64,
-    /// How often it changes meanwhile, on average.
+    /// Mean changes while it bounces.
     pub bounces_per_ms: f64,
-    /// How long a false opening lasts.
+    /// Length of a false opening.
     pub glitch_us: u64,
-    /// How many of them there are while the driver is on.
+    /// Rate of false openings while the driver is on.
     pub glitches_per_s: f64,
 }
 
@@ -292,33 +275,31 @@ pub struct SwitchParts {
 #[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct DriverParts {
-    /// From a change of DIR to the next STEP.
+    /// Minimum time from DIR to STEP.
     pub direction_setup_ns: u64,
-    /// From a STEP to the next change of DIR.
+    /// Minimum time from STEP to DIR.
     pub direction_hold_ns: u64,
-    /// How long the motor stands under current before its first motion.
+    /// Standstill under current before the first motion.
     pub standstill_ms: u64,
 }
 
 impl Default for Parts {
     fn default() -> Self {
-        // A constant of this program, and a test reads it.
+        // Constant input, checked by a test.
         toml::from_str(STANDARD).unwrap_or_else(|error| unreachable!("parts.toml: {error}"))
     }
 }
 
 impl Parts {
-    /// Reads a file in which what differs from the standard rig stands.
-    ///
-    /// # Errors
-    /// [`SimError::Parts`] where it cannot be read, is not such TOML, or a number is out of its range.
+    /// Reads a file with the values that differ from the default.
+    /// Errors: [`SimError::Parts`] for an unreadable file, invalid TOML or a value out of range.
     pub fn read(path: &Path) -> Result<Self, SimError> {
         let wrong = |reason: String| SimError::Parts { path: path.into(), reason };
         let text = std::fs::read_to_string(path).map_err(|error| wrong(error.to_string()))?;
         Self::parse(&text).map_err(wrong)
     }
 
-    /// The standard rig with what the text says otherwise.
+    /// The default rig with these changes.
     pub(crate) fn parse(text: &str) -> Result<Self, String> {
         let mut table: toml::Table = toml::from_str(STANDARD).map_err(|error| error.to_string())?;
         let other: toml::Table = toml::from_str(text).map_err(|error| error.to_string())?;
@@ -384,7 +365,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_standard_rig_is_read_and_a_file_says_only_what_differs() {
+    fn a_file_overrides_only_the_values_that_it_contains() {
         assert_eq!(Parts::default().check(), Ok(()));
         let parts = Parts::parse("[memory]\nmake = \"FM25V02\"").expect("a good file");
         assert_eq!(parts, Parts { memory: MemoryParts { make: MemoryMake::Fm25v02 }, ..Parts::default() });
@@ -400,7 +381,7 @@ mod tests {
     }
 
     #[test]
-    fn a_released_line_rises_as_slowly_as_its_resistor_lets_it() {
+    fn a_released_line_rises_with_its_time_constant() {
         // 21.6 kOhm and 15 pF: 0.32 us, half way after 0.69 of that.
         let rise_ns = Parts::default().gauge_converter.rise_ns();
         assert!((rise_ns - 224.6).abs() < 1.0, "{rise_ns}");

@@ -1,5 +1,4 @@
-//! Whether virtual time stands for pictures: the emulated board may expose faster than pictures are rendered and fetched, and no camera
-//! has room for hundreds of them.
+//! Stops virtual time while pictures wait: exposures may be faster than rendering and transfer.
 
 use std::{
     sync::{
@@ -11,18 +10,18 @@ use std::{
 
 /// Pictures that may wait.
 const WAITING_MAX: usize = 8;
-/// So long by the wall clock time stands without a picture being fetched; then nobody is taken to want them.
+/// Wall-clock timeout without a transfer; after it no client is assumed.
 const PATIENCE: Duration = Duration::from_secs(1);
 
-/// Cameras that a rig may have: two behind a half mirror.
+/// A half mirror has two cameras.
 pub const CAMERAS_MAX: usize = 2;
 
-/// What was exposed, and of how much of it there is a picture: shared by the board, who renders and who fetches.
+/// Counts of exposures and finished pictures, shared between board, renderer and endpoint.
 #[derive(Default)]
 pub struct Pictures {
     exposed: AtomicUsize,
     done: AtomicUsize,
-    /// Nobody wants those that were exposed before this one, of each camera.
+    /// First wanted exposure per camera; earlier ones are dropped.
     wanted_from: [AtomicUsize; CAMERAS_MAX],
     /// The free run that exposed those before this one has ended.
     free_run_from: AtomicUsize,
@@ -33,12 +32,12 @@ impl Pictures {
         self.exposed.fetch_add(1, Ordering::Relaxed);
     }
 
-    /// One was fetched, or is not wanted.
+    /// A picture was transferred or dropped.
     pub fn finish(&self) {
         self.done.fetch_add(1, Ordering::Relaxed);
     }
 
-    /// Whoever fetched this camera's has gone: what was exposed until now nobody wants of it.
+    /// Drops pictures captured for a client that has disconnected.
     pub fn forget(&self, camera: usize) {
         if let Some(wanted_from) = self.wanted_from.get(camera) {
             wanted_from.store(self.exposed.load(Ordering::Relaxed), Ordering::Relaxed);
@@ -61,7 +60,7 @@ impl Pictures {
     }
 
     fn waiting(&self) -> usize {
-        // The first is looked at first: it grows, and the other never beyond it.
+        // Load `done` first: it only grows, and never beyond the other.
         let done = self.done.load(Ordering::Relaxed);
         self.exposed.load(Ordering::Relaxed).saturating_sub(done)
     }
@@ -70,17 +69,16 @@ impl Pictures {
 pub struct Patience {
     pictures: Option<Arc<Pictures>>,
     last: usize,
-    /// When the last one was fetched, or the first was too many.
+    /// Time of the last transfer, or when the queue became full.
     since: Option<Instant>,
 }
 
 impl Patience {
-    /// Without pictures nobody renders any.
+    /// Without `pictures` time never stops.
     pub fn new(pictures: Option<Arc<Pictures>>) -> Self {
         Self { pictures, last: 0, since: None }
     }
 
-    /// An exposure was taken.
     pub fn expose(&self) {
         if let Some(pictures) = &self.pictures {
             pictures.expose();
@@ -125,7 +123,7 @@ mod tests {
     }
 
     #[test]
-    fn what_was_exposed_before_its_host_left_is_not_wanted() {
+    fn drops_pictures_exposed_before_the_client_left() {
         let pictures = Pictures::default();
         pictures.expose();
         pictures.expose();

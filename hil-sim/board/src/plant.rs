@@ -1,9 +1,8 @@
-//! The mechanics behind the board: what is really there, as opposed to what the firmware measures.
+//! The mechanics: true positions, as opposed to what the firmware measures.
 //!
-//! Lengths are f64 micrometres in a stage's own frame: 0 = the true home edge, positive = sensor and lens away from
-//! each other.
-//! Times are virtual nanoseconds. The plant advances only when someone asks for a moment; the order of those
-//! moments changes nothing but rounding, and lockstep fixes the order.
+//! Lengths are micrometres in a stage's frame: 0 = true home edge, positive = sensor and lens apart. Times
+//! are virtual nanoseconds. The plant advances on request only; the request times affect nothing but
+//! rounding, and lockstep fixes them.
 
 mod contact;
 mod motor;
@@ -21,31 +20,27 @@ pub use stage::{Stage, StageName};
 
 use crate::parts::{GaugeParts, Parts};
 
-/// Distance from the lens' principal plane to the sensor with both stages and the piezo at 0, millimetres. The rig
-/// is assembled and measured to this; the firmware holds the same number.
+/// Distance from principal plane to sensor with all axes at 0, millimetres. The rig is assembled to it; the
+/// firmware has the same value.
 pub const DATUM_MM: f64 = 47.0;
-/// Converter code at the relaxed piezo; one code is 1 nm (data sheet of the gauge's amplifier board).
+/// Converter code at the relaxed piezo; 1 nm per code (data sheet of the gauge amplifier).
 const GAUGE_CODE_ZERO: f64 = 10_000.0;
 const GAUGE_CODE_MAX: f64 = 262_143.0;
 
-/// What the sensor did during an exposure.
+/// Sensor position during an exposure.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct ExposureTruth {
-    /// Mean distance of the sensor from the principal plane, millimetres.
+    /// Mean distance from the principal plane.
     pub sensor_mm: f64,
-    /// Mean position of the sensor's stage, micrometres.
+    /// Mean position of the sensor stage.
     pub coarse_um: f64,
-    /// Mean position of the lens' stage, micrometres.
+    /// Mean position of the lens stage.
     pub lens_um: f64,
-    /// Mean position of the piezo, micrometres.
     pub piezo_um: f64,
-    /// Smallest position of the piezo, micrometres.
     pub piezo_min_um: f64,
-    /// Largest position of the piezo, micrometres.
     pub piezo_max_um: f64,
 }
 
-/// Sums over an exposure that is under way.
 #[derive(Clone, Copy, Debug)]
 struct Exposing {
     since_ns: u64,
@@ -56,7 +51,7 @@ struct Exposing {
     piezo_max_um: f64,
 }
 
-/// The gauge's zero on its way.
+/// Gauge zero drift.
 #[derive(Clone, Copy, Debug, Default)]
 struct Drift {
     since_ns: u64,
@@ -69,7 +64,6 @@ impl Drift {
     }
 }
 
-/// Both stages, piezo and gauge.
 #[derive(Debug)]
 pub struct Plant {
     now_ns: u64,
@@ -83,8 +77,8 @@ pub struct Plant {
 }
 
 impl Plant {
-    /// The mechanics as they stand at power-on; the seed decides how their screws err. Where the sensor's and the lens' stage stand it
-    /// draws it unless `start_um` says otherwise.
+    /// The mechanics at power-on; `seed` sets the screw errors and, without `start_um`, the positions of
+    /// sensor and lens stage.
     pub fn new(seed: u64, parts: &Parts, start_um: Option<[f64; 2]>) -> Self {
         Self {
             now_ns: 0,
@@ -98,7 +92,7 @@ impl Plant {
         }
     }
 
-    /// Lets time pass until `now_ns`; a moment in the past changes nothing.
+    /// Advances to `now_ns`; a time in the past has no effect.
     pub fn advance(&mut self, now_ns: u64) {
         let moves = self.now_ns < now_ns;
         while self.now_ns < now_ns {
@@ -123,7 +117,6 @@ impl Plant {
         }
     }
 
-    /// A rising edge of STEP reaches a driver that is on.
     pub fn step_edge(&mut self, now_ns: u64, name: StageName, away: bool) {
         if self.exposing.is_some() {
             self.advance(now_ns);
@@ -133,13 +126,12 @@ impl Plant {
         stage.step(away);
     }
 
-    /// The piezo's DAC takes a code.
     pub fn set_dac(&mut self, now_ns: u64, code: u16) {
         self.advance(now_ns);
         self.piezo.set_dac(code);
     }
 
-    /// The gauge's converter samples: 18 bit.
+    /// Gauge sample, 18 bit.
     pub fn sample_gauge(&mut self, now_ns: u64) -> u32 {
         self.advance(now_ns);
         let GaugeParts { gain, offset_um, noise_um } = self.gauge;
@@ -150,12 +142,11 @@ impl Plant {
         libm::round(GAUGE_CODE_ZERO + 1000.0 * um).clamp(0.0, GAUGE_CODE_MAX) as u32
     }
 
-    /// The gauge's zero moves from now on as it warms up, so fast; 0 takes all of it back.
+    /// Starts a gauge zero drift; 0 removes it completely.
     pub fn drift_gauge(&mut self, now_ns: u64, um_per_s: f64) {
         self.drift = Drift { since_ns: now_ns, um_per_s };
     }
 
-    /// The sensor begins to collect light.
     pub fn begin_exposure(&mut self, now_ns: u64) {
         self.advance(now_ns);
         let um = self.piezo.position_um();
@@ -169,7 +160,7 @@ impl Plant {
         });
     }
 
-    /// The sensor stops collecting light; `None` where it was not collecting.
+    /// Ends the exposure; `None` if there was none.
     pub fn end_exposure(&mut self, now_ns: u64) -> Option<ExposureTruth> {
         self.advance(now_ns);
         let sums = self.exposing.take()?;
@@ -194,7 +185,7 @@ impl Plant {
         }
     }
 
-    /// One of the stages, to break something.
+    /// A stage, for fault injection.
     pub fn stage_mut(&mut self, name: StageName) -> &mut Stage {
         match name {
             StageName::Sensor => &mut self.sensor_stage,
@@ -212,7 +203,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_exposure_sees_the_mean_of_what_moved() {
+    fn an_exposure_reports_mean_positions() {
         let mut plant = Plant::new(1, &Parts::default(), None);
         let start_um = plant.stage(StageName::Sensor).position_um();
         let lens_um = plant.stage(StageName::Lens).position_um();
@@ -223,7 +214,7 @@ mod tests {
         }
         let truth = plant.end_exposure(101_000_000).expect("it was exposing");
         let end_um = plant.stage(StageName::Sensor).position_um();
-        // It was there for 46 to 50 ms; the rotor swings about its place for some milliseconds.
+        // 46 to 50 ms at the new position; the rotor swings for some milliseconds.
         let share = (truth.coarse_um - start_um) / (end_um - start_um);
         assert!((end_um - start_um) > 5.0 && (0.44..0.52).contains(&share), "{share} {truth:?}");
         assert!((truth.lens_um - lens_um).abs() < 1e-6);
@@ -232,7 +223,7 @@ mod tests {
     }
 
     #[test]
-    fn a_gauge_that_warms_up_drifts_and_one_that_is_mended_does_not() {
+    fn the_gauge_drifts_until_it_is_repaired() {
         let mut parts = Parts::default();
         parts.gauge.noise_um = 0.0;
         let mut plant = Plant::new(1, &parts, None);
@@ -245,7 +236,7 @@ mod tests {
     }
 
     #[test]
-    fn the_gauge_reads_its_zero_with_its_noise() {
+    fn the_gauge_reads_zero_with_noise() {
         let mut plant = Plant::new(7, &Parts::default(), None);
         let codes: Vec<f64> =
             (1..=2000u32).map(|i| f64::from(plant.sample_gauge(u64::from(i) * 200_000))).collect();

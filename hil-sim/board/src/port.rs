@@ -1,7 +1,7 @@
 //! The serial port that clients open: a pty.
 //!
-//! Bytes from the client travel on in whole frames, so that a frame reaches the board as one, however the
-//! operating system cut it, and what the client writes at once travels at once: what comes a moment later finds the board elsewhere.
+//! Client bytes are forwarded in whole frames, however the operating system splits them. Bytes written
+//! together stay together, because later ones would reach the board in another state.
 
 use std::{
     io::{ErrorKind, Read, Write},
@@ -19,16 +19,15 @@ use serialport::{SerialPort, TTYPort};
 
 use crate::{command::Command, error::SimError};
 
-/// How long a read waits before it looks whether the port has been unplugged, and whole frames for the rest of one behind them.
+/// Read timeout: interval of checks for an unplugged port, and how long whole frames wait for the rest of one
+/// behind them.
 const LOOK: Duration = Duration::from_millis(20);
-/// A client that reads nothing for this long loses bytes, as on a real serial line.
+/// A client that reads nothing for this long loses bytes, as on a real line.
 const PATIENCE: Duration = Duration::from_millis(500);
 
-/// Opens a pty; gives its name. Bytes of `to_client` go out; whole frames that come in, and the rate that the client has given its
-/// end where that is another than before, go to `from_client`, which says whether it still wants them. When `to_client` ends, the port goes away.
-///
-/// # Errors
-/// [`SimError::Port`] where there is no pty, [`SimError::Io`] where no thread can be started.
+/// Opens a pty and returns its name. `to_client` goes out; whole frames and changed baud rates go to
+/// `from_client`, which returns whether it accepts more. The port closes when `to_client` ends.
+/// Errors: [`SimError::Port`] without a pty, [`SimError::Io`] if no thread can be started.
 pub fn open(
     to_client: Receiver<Vec<u8>>,
     from_client: impl Fn(Command) -> bool + Send + 'static,
@@ -45,11 +44,11 @@ pub fn open(
         .name("port out".into())
         .spawn(move || {
             for bytes in to_client {
-                // Nobody reads: the bytes are lost.
+                // Without a reader the bytes are lost.
                 let _ = writer.write_all(&bytes);
             }
             unplugged.store(true, Ordering::Relaxed);
-            // Kept open till here, so that a client may come and go.
+            // Kept open so that clients may reconnect.
             drop(slave);
         })
         .map_err(no_thread)?;
@@ -68,7 +67,7 @@ fn read(port: &mut TTYPort, unplugged: &AtomicBool, from_client: &impl Fn(Comman
     while !unplugged.load(Ordering::Relaxed) {
         let rest_may_come = match port.read(&mut bytes) {
             Ok(count) => {
-                // What a pseudo-terminal's client sets its rate to can be read at this end.
+                // The client's baud rate can be read at this end of a pty.
                 let now = port.baud_rate().ok();
                 if now != rate && !now.is_some_and(|baud| from_client(Command::HostRate(baud))) {
                     return;
@@ -89,15 +88,14 @@ fn read(port: &mut TTYPort, unplugged: &AtomicBool, from_client: &impl Fn(Comman
     }
 }
 
-/// Of noise without a delimiter so much goes to the board; the rest of it is left out, up to the next delimiter, as an adapter
-/// does whose buffer is full. It cannot be part of a frame, and a megabyte of it would hold the line for five seconds.
+/// Limit for noise without a delimiter; the rest up to the next delimiter is dropped, as by an adapter with a
+/// full buffer. It cannot be part of a frame, and 1 MB would block the line for five seconds.
 const NOISE_MAX: usize = 4096;
 
-/// Cuts a stream of bytes into frames, delimiter included, and garbage into pieces.
+/// Cuts a byte stream into frames with their delimiters, and garbage into pieces.
 ///
-/// A delimiter alone, with which hosts end what the line may have made of an earlier frame, travels in front of the
-/// frame that follows: by itself it would let time pass until it is on the board, and how much of that had passed
-/// when the frame came would be up to the host's threads.
+/// A single delimiter, which hosts send to end a broken frame, is joined to the next frame. On its own it
+/// would let a host-dependent amount of time pass before that frame.
 #[derive(Debug, Default)]
 pub struct FrameCutter {
     piece: Vec<u8>,
@@ -106,7 +104,7 @@ pub struct FrameCutter {
 }
 
 impl FrameCutter {
-    /// The whole frames that these bytes complete.
+    /// Frames completed by these bytes.
     pub fn cut(&mut self, bytes: &[u8]) -> Vec<Vec<u8>> {
         let mut frames = Vec::new();
         for byte in bytes {
@@ -119,7 +117,7 @@ impl FrameCutter {
                 continue;
             }
             self.piece.push(*byte);
-            // What is longer than a frame and the delimiter before it is none and need not wait for its end.
+            // More than a frame and its leading delimiter is garbage and is sent without waiting.
             if *byte == 0 || self.piece.len() > FRAME_MAX {
                 frames.push(std::mem::take(&mut self.piece));
             }
@@ -127,7 +125,6 @@ impl FrameCutter {
         frames
     }
 
-    /// Whether a frame has begun that has not ended.
     fn is_within_frame(&self) -> bool {
         self.run > 0 && !self.piece.is_empty()
     }
@@ -140,7 +137,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_a_client_writes_at_once_travels_at_once_however_the_system_cuts_it() {
+    fn bytes_written_together_stay_together() {
         let (mut client, mut port) = TTYPort::pair().expect("a pty");
         port.set_timeout(LOOK).expect("a timeout");
         let (heard, commands) = channel();
@@ -158,7 +155,7 @@ mod tests {
             });
             assert_eq!(bytes, Some(vec![1, 2, 0, 3, 4, 0]));
         }
-        // A frame that never ends holds up no other for long.
+        // A frame that never ends delays others only briefly.
         client.write_all(&[5, 6, 0, 7]).expect("room");
         let first = commands.recv_timeout(10 * LOOK);
         assert!(matches!(first, Ok(Command::Bytes(bytes)) if bytes == [5, 6, 0]));
@@ -176,12 +173,12 @@ mod tests {
     }
 
     #[test]
-    fn noise_without_a_delimiter_does_not_hold_the_line_and_its_end_is_not_kept_back() {
+    fn noise_without_a_delimiter_does_not_block_the_line() {
         for length in [1, FRAME_MAX, FRAME_MAX + 1, 2 * (FRAME_MAX + 1), 14_000, 1_000_000] {
             let mut cutter = FrameCutter::default();
             let noise: usize = cutter.cut(&vec![7; length]).iter().map(Vec::len).sum();
             assert!(noise <= NOISE_MAX, "{noise} of {length} bytes");
-            // A request behind it, which the noise spoils, and its repeat: both travel at once.
+            // A request, which the noise spoils, and its repeat: both travel together.
             let pieces = cutter.cut(&[1, 2, 0]);
             assert_eq!(pieces.concat().last(), Some(&0), "{length}");
             assert_eq!(cutter.cut(&[0, 1, 2, 0]), [[0, 1, 2, 0]], "{length}");

@@ -1,13 +1,16 @@
-//! What instructions cost: the emulator's processor retires one a cycle, a real one does not.
+//! Instruction costs: the emulator retires one instruction per cycle, a real processor does not.
 //!
-//! [`Metered`] stands between the emulator's run loop and its processor and counts cycles where that counts instructions, so
-//! that the firmware's cycle counter, its timers and the plant all see a processor that is as slow as a real one.
+//! [`Metered`] sits between the emulator's run loop and its processor and counts cycles instead of
+//! instructions. The
+//! firmware's cycle counter, its timers and the plant then run as on a real processor.
 //!
-//! - By the average: an instruction takes [`ProcessorParts::cycles_per_instruction`] cycles, and more while the flash
-//!   accelerator is not wholly on (the firmware's writes to FLASH_ACR are watched). Costs nothing.
-//! - By kind: each instruction takes what the Cortex-M4's manual says for its kind (`kinds`), its fetch what the flash with
-//!   its wait states, instruction cache and prefetch takes (`flash`), and a peripheral's register its bus. For that
-//!   the processor goes step by step, some hundred times slower, so it is for measuring.
+//! - Average: [`ProcessorParts::cycles_per_instruction`] cycles, and more while the flash accelerator is not
+//!   fully on
+//!   (writes to FLASH_ACR are watched). No run-time cost.
+//! - By kind: cycles per kind from the Cortex-M4 manual (`kinds`), fetches with wait states, instruction
+//!   cache and
+//!   prefetch (`flash`), and bus cycles of peripheral registers. Single-steps, about 100 times slower; for
+//!   measurements.
 
 mod cached;
 mod flash;
@@ -34,26 +37,25 @@ use self::{
 };
 use crate::parts::ProcessorParts;
 
-/// Fraction bits of a count of cycles.
+/// Fraction bits of a cycle count.
 const FRACTION: u32 = 16;
-/// FLASH_ACR (RM0090, section 3.9.2): its wait states, and its bits PRFTEN, ICEN and DCEN.
+/// FLASH_ACR (RM0090, section 3.9.2): wait states, bits PRFTEN, ICEN and DCEN.
 const FLASH_ACR: u64 = 0x4002_3c00;
 const LATENCY: u64 = 0xf;
 const ACCELERATOR: u64 = 0x700;
-/// Where the program lies.
+/// Start of the program.
 const FLASH: u64 = 0x0800_0000;
 const FLASH_BYTES: u64 = 2 << 20;
 
-/// How an instruction's cycles are found.
 #[derive(Clone, PartialEq, Debug)]
 pub enum Costs {
     Average(ProcessorParts),
-    /// By kind, for the program with these bytes at the beginning of the flash.
+    /// By kind, for these bytes at the start of the flash.
     ByKind(Vec<u8>),
 }
 
 impl Costs {
-    /// By kind, for the program of an ELF. `None` where it has none in the flash.
+    /// By kind, for an ELF; `None` if it has no flash segment.
     pub fn by_kind(elf: &[u8]) -> Option<Self> {
         let elf = object::File::parse(elf).ok()?;
         let mut program = Vec::new();
@@ -69,36 +71,36 @@ impl Costs {
     }
 }
 
-/// Where a segment begins in the flash.
+/// Flash offset of a segment.
 fn physical(segment: &object::Segment<'_, '_>) -> Option<usize> {
     let from = segment.address().checked_sub(FLASH)?;
     (from + segment.size() <= FLASH_BYTES).then_some(usize::try_from(from).ok()?)
 }
 
-/// Counts cycles along with instructions.
+/// Converts instructions to cycles.
 #[derive(Clone, Copy, Debug)]
 struct Meter {
-    /// Instructions that are in `cycles`.
+    /// Instructions included in `cycles`.
     counted: u64,
-    /// Their cycles, with [`FRACTION`] bits behind the point.
+    /// Cycles with [`FRACTION`] fraction bits.
     cycles: u64,
-    /// What each further one takes.
+    /// Cycles per further instruction.
     each: u64,
 }
 
 impl Meter {
-    /// Cycles after so many instructions.
+    /// Cycles after this many instructions.
     fn at(&self, instructions: u64) -> u64 {
         (self.cycles + instructions.saturating_sub(self.counted) * self.each) >> FRACTION
     }
 
-    /// From here on each takes another time, and this many more cycles have passed.
+    /// Adds `more` cycles and changes the cost of further instructions.
     fn note(&mut self, instructions: u64, more: u64, each: u64) {
         self.cycles += instructions.saturating_sub(self.counted) * self.each + (more << FRACTION);
         (self.counted, self.each) = (instructions, each);
     }
 
-    /// Instructions that fit a budget of cycles, at least one: the processor cannot stop within one.
+    /// Instructions that fit a cycle budget, at least one.
     fn fitting(&self, cycles: u32) -> u32 {
         let fitting = (u64::from(cycles) << FRACTION) / self.each.max(1);
         u32::try_from(fitting.max(1)).unwrap_or(u32::MAX)
@@ -125,7 +127,7 @@ enum Model {
 }
 
 impl Model {
-    /// Cycles of an instruction where they are all alike.
+    /// Average cycles per instruction.
     fn each(&self) -> u64 {
         match self {
             Self::Average { parts, acr } => {
@@ -137,7 +139,7 @@ impl Model {
         }
     }
 
-    /// The firmware has set the flash interface.
+    /// FLASH_ACR was written.
     fn set_acr(&mut self, value: u64) {
         match self {
             Self::Average { acr, .. } => *acr = value,
@@ -147,10 +149,8 @@ impl Model {
 }
 
 impl Metered {
-    /// Counts for a processor that `make` makes, or that an earlier rig with the same program has left.
-    ///
-    /// # Errors
-    /// Those of `make`.
+    /// Wraps a new processor, or one left by an earlier rig with the same program.
+    /// Errors: errors of `make`.
     pub fn new(
         program: u64,
         make: impl Fn() -> Result<Box<dyn Processor>, Error>,
@@ -191,7 +191,7 @@ impl Metered {
         }
     }
 
-    /// Cycles of the instruction at `pc` after which the processor is at `next`.
+    /// Cycles of the instruction at `pc`, followed by `next`.
     fn cost(&mut self, pc: u64, next: u64) -> u64 {
         let Model::ByKind { program, flash, handlers, bus } = &mut self.model else { return 1 };
         let waited = std::mem::take(bus);
@@ -199,7 +199,7 @@ impl Metered {
         let Some(instruction) = code.and_then(Instruction::decode) else { return 1 + waited };
         let mut cycles = instruction.cycles(next != pc + instruction.bytes());
         if !instruction.may_branch() && next != pc + instruction.bytes() {
-            // An interrupt came first: what ran was the first instruction of its handler.
+            // An interrupt came first: the first instruction of its handler ran.
             *handlers += 1;
             cycles += kinds::EXCEPTION_ENTRY;
         } else if *handlers > 0 && instruction.may_return() && !(FLASH..FLASH + FLASH_BYTES).contains(&next) {
@@ -211,7 +211,7 @@ impl Metered {
     }
 }
 
-/// The run's bus, asked in cycles.
+/// Bus of the run, with requests in cycles.
 struct MeteredBus<'a> {
     bus: &'a mut dyn CoreBus,
     meter: &'a mut Meter,
@@ -280,7 +280,7 @@ impl CoreBus for MeteredBus<'_> {
     }
 }
 
-/// Everything but the count is the emulator's processor's.
+/// Everything but the count is forwarded.
 impl Processor for Metered {
     fn run(&mut self, budget: u32, bus: &mut dyn CoreBus) -> (Exit, u64) {
         let before = self.retired();
@@ -313,10 +313,11 @@ impl Processor for Metered {
         self.inner.page_size()
     }
 
-    #[expect(unsafe_code, reason = "passed on as it came")]
+    #[expect(unsafe_code, reason = "forwarded unchanged")]
     unsafe fn map(&mut self, start: u64, length: u64, host: *mut u8, writable: bool) {
-        // SAFETY: the caller keeps what this method's trait asks for as long as this processor lives. What outlives it in `cached`
-        // runs no instruction before the next run has mapped memory of its own at the same places: every board has the same.
+        // SAFETY: the caller upholds this trait method's contract while this processor lives. A processor in
+        // `cached` runs no instruction before the next run has mapped its own memory at the same addresses,
+        // which all boards share.
         unsafe { self.inner.map(start, length, host, writable) };
     }
 
@@ -409,7 +410,7 @@ impl Processor for Metered {
     }
 
     fn load(&mut self, bytes: &[u8]) -> Result<(), Error> {
-        // The cycles are not in it: the board keeps no snapshots.
+        // Cycles are not included: the board keeps no snapshots.
         let _ = bytes;
         Err(Error::State)
     }
@@ -452,7 +453,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn cycles_grow_with_the_average_and_what_has_passed_keeps_its_price() {
+    fn a_changed_cost_applies_to_later_instructions_only() {
         let mut meter = Meter { counted: 0, cycles: 0, each: fixed(1.0) };
         assert_eq!((meter.at(100), meter.fitting(50)), (100, 50));
         meter.note(100, 7, fixed(1.9));
@@ -462,7 +463,7 @@ mod tests {
     }
 
     #[test]
-    fn without_any_of_the_accelerators_bits_instructions_take_longer() {
+    fn each_cleared_accelerator_bit_makes_instructions_slower() {
         let parts = ProcessorParts { cycles_per_instruction: 1.5, without_accelerator: 2.0 };
         let each = |acr| Model::Average { parts, acr }.each();
         assert_eq!(each(0), fixed(1.5), "without wait states there is nothing to accelerate");

@@ -1,5 +1,5 @@
-//! Makes a run again from its trace (VCD), and says where it departs from it: the same rig, the same bytes at the same moments,
-//! the same things happening; all that comes of it must be the same, line by line.
+//! Replays a run from its VCD trace with the same rig, bytes and faults, and compares the result line by
+//! line.
 
 use std::{collections::VecDeque, path::Path};
 
@@ -14,18 +14,15 @@ use crate::{
     trace::vcd::{END_OF_HEADING, MADE_OF, name_of, unhex},
 };
 
-/// What somebody did to the rig at a moment.
+/// A recorded action.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub enum Entry {
-    /// Bytes went on the line to the board.
     Sent(Vec<u8>),
-    /// The camera's host gave an order.
     Ordered(CameraOrder),
-    /// Everything was mended.
     Healed,
-    /// Somebody's time ended, so that the emulator stopped.
+    /// The emulator stopped because a requested time ended.
     Looked {
-        /// When; it stops behind the instruction that crosses that.
+        /// Requested time; the stop follows the instruction that crosses it.
         asked_ns: u64,
     },
 }
@@ -36,13 +33,13 @@ pub struct Departure {
     /// Line of the trace, from 1.
     pub line: usize,
     pub signal: &'static str,
-    /// What the trace has; `None` behind its end.
+    /// Recorded line; `None` after its end.
     pub recorded: Option<String>,
-    /// What the run has now; `None` where it ended before.
+    /// Replayed line; `None` if the run ended early.
     pub now: Option<String>,
 }
 
-/// Lines of a run, held against those of another.
+/// Compares the lines of two runs.
 #[derive(Clone, Debug, Default)]
 pub struct Comparer {
     lines: VecDeque<String>,
@@ -52,7 +49,7 @@ pub struct Comparer {
 }
 
 impl Comparer {
-    /// A line of the run.
+    /// Compares the next line.
     pub fn hold(&mut self, line: &str) {
         let recorded = self.lines.pop_front();
         self.line += 1;
@@ -71,7 +68,7 @@ impl Comparer {
         }
     }
 
-    /// Whether the two have parted.
+    /// Whether the runs differ.
     pub fn departs(&self) -> bool {
         self.first().is_some()
     }
@@ -81,19 +78,18 @@ impl Comparer {
     }
 
     fn depart(&self, recorded: Option<String>, now: Option<String>) {
-        let told = recorded.as_ref().or(now.as_ref());
-        let signal = told.and_then(|line| line.chars().next_back()).map_or("?", name_of);
+        let line = recorded.as_ref().or(now.as_ref());
+        let signal = line.and_then(|line| line.chars().next_back()).map_or("?", name_of);
         let departure = Departure { at_ns: self.at_ns, line: self.line, signal, recorded, now };
         self.departure.lock().unwrap_or_else(std::sync::PoisonError::into_inner).get_or_insert(departure);
     }
 }
 
-/// What a trace says was done.
+/// Recorded actions of a trace.
 #[derive(Debug)]
 pub struct Script {
-    /// Of the firmware's file.
     pub firmware: u64,
-    /// What the memory held at power-on.
+    /// Memory contents at power-on.
     pub memory: Option<Box<[u8; SIZE]>>,
     pub comparer: Comparer,
     entries: VecDeque<(u64, Entry)>,
@@ -101,27 +97,26 @@ pub struct Script {
 }
 
 impl Script {
-    /// What is to be done at this moment and was not done yet.
+    /// The next action that is due.
     pub fn take_due(&mut self, now_ns: u64) -> Option<Entry> {
         let (_, entry) = self.entries.pop_front_if(|(at_ns, _)| *at_ns <= now_ns)?;
         Some(entry)
     }
 
-    /// When something is to be done next; `None` at the end of the trace.
+    /// Time of the next action; `None` at the end of the trace.
     pub fn next_ns(&self, now_ns: u64) -> Option<u64> {
         let next_ns = self.entries.front().map_or(u64::MAX, |(at_ns, _)| *at_ns);
         (now_ns < self.end_ns).then_some(next_ns.min(self.end_ns))
     }
 }
 
-/// The words between a prefix and `$end`.
 fn words<'a>(heading: &'a str, prefix: &str) -> Result<&'a str, String> {
     let rest = heading.split_once(prefix).map(|(_, rest)| rest);
     let text = rest.and_then(|rest| rest.split_once("$end")).map(|(text, _)| text.trim());
     text.ok_or_else(|| format!("it has no line \"{prefix}...\": a VCD that farnear-sim wrote is expected"))
 }
 
-/// Reads a comment of the body.
+/// Parses a comment of the body.
 fn comment(text: &str) -> Result<Option<Entry>, String> {
     let words: Vec<&str> = text.split(' ').collect();
     let number = |place: usize| words.get(place).and_then(|word| word.parse::<u64>().ok());
@@ -129,7 +124,7 @@ fn comment(text: &str) -> Result<Option<Entry>, String> {
         Some("look") => return Ok(number(1).map(|asked_ns| Entry::Looked { asked_ns })),
         Some("heal") => return Ok(Some(Entry::Healed)),
         Some("touched") => {
-            return Err("a test reached into that rig, which a trace cannot do again".into());
+            return Err("a test accessed that rig directly, which a trace cannot replay".into());
         }
         Some("expose") => number(1).zip(number(2)).map(|(exposure_us, id)| CameraOrder::Expose {
             exposure_us,
@@ -143,7 +138,7 @@ fn comment(text: &str) -> Result<Option<Entry>, String> {
     Ok(order.map(Entry::Ordered))
 }
 
-/// Reads a trace: the rig, and what was done to it.
+/// Parses a trace: configuration and actions.
 fn parse(text: &str) -> Result<(RigConfig, Script), String> {
     let (heading, body) = text
         .split_once(END_OF_HEADING)
@@ -151,17 +146,17 @@ fn parse(text: &str) -> Result<(RigConfig, Script), String> {
     let [firmware, pace, memory, scenario] = MADE_OF;
     let firmware = words(heading, firmware)?;
     let firmware =
-        u64::from_str_radix(firmware, 16).map_err(|_| format!("firmware {firmware:?} is no number"))?;
+        u64::from_str_radix(firmware, 16).map_err(|_| format!("firmware {firmware:?} is not a number"))?;
     let memory = match words(heading, memory)? {
         "" => None,
         hex => {
             let bytes = unhex(hex).and_then(|bytes| bytes.into_boxed_slice().try_into().ok());
-            Some(bytes.ok_or("its memory is none")?)
+            Some(bytes.ok_or("the memory has the wrong size")?)
         }
     };
     let scenario = Scenario::parse(words(heading, scenario)?)?;
     let mut config = RigConfig::of(&scenario)?;
-    config.pace = if words(heading, pace)? == "paced" { Pace::Realtime } else { Pace::Told };
+    config.pace = if words(heading, pace)? == "paced" { Pace::Realtime } else { Pace::OnRequest };
     let (mut entries, mut at_ns) = (VecDeque::new(), 0);
     let first = heading.lines().count() + 2; // behind the line that ends the heading
     let lines: VecDeque<String> = body.lines().skip(1).map(Into::into).collect();
@@ -184,10 +179,9 @@ fn parse(text: &str) -> Result<(RigConfig, Script), String> {
     Ok((config, Script { firmware, memory, comparer, entries, end_ns: at_ns }))
 }
 
-/// Makes a run again; gives its length in virtual nanoseconds and where it departs, if it does.
-///
-/// # Errors
-/// [`SimError::Replay`] where the file is no such trace, or of another firmware; else as [`crate::EmulatedRig::new`].
+/// Replays a run; returns its length in virtual ns and the first difference.
+/// Errors: [`SimError::Replay`] for an invalid trace or another firmware; else as
+/// [`crate::EmulatedRig::new`].
 pub fn replay(path: &Path, firmware: Option<&Path>) -> Result<(u64, Option<Departure>), SimError> {
     let wrong = |reason: String| SimError::Replay { path: path.into(), reason };
     let text = std::fs::read_to_string(path).map_err(|error| wrong(error.to_string()))?;
@@ -196,7 +190,7 @@ pub fn replay(path: &Path, firmware: Option<&Path>) -> Result<(u64, Option<Depar
     let (end_ns, comparer) = (script.end_ns, script.comparer.clone());
     let (shots, _) = std::sync::mpsc::channel();
     let outlets = Outlets { bytes: None, another_port: None, shots, pictures: None };
-    // The bytes of the board go nowhere, as those of an unplugged port.
+    // The board's bytes are dropped, as with an unplugged port.
     let (_commands, thread) = launch(&config, outlets, Some(script))?;
     thread.join().unwrap_or_else(|_| Err(SimError::Emulator("it panicked".into())))?;
     Ok((end_ns, comparer.first()))
@@ -207,7 +201,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_no_trace_is_refused_with_its_line() {
+    fn rejects_an_invalid_trace_with_its_line() {
         let heading = format!(
             "$comment firmware 00ff $end\n$comment pace lockstep $end\n$comment memory  $end\n\
              $comment scenario \nseed = 3\n$end\n{END_OF_HEADING}\n"

@@ -1,53 +1,50 @@
-//! How a rig is at a moment: what a test may compare with what the firmware says.
+//! State of a rig, for comparison with the firmware's reports.
 
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct StageReport {
-    /// Where it really is, micrometres from its true home edge.
+    /// True position from the home edge.
     pub position_um: f64,
-    /// Where its driver's sequencer stands, microsteps from the true home edge: exactly what STEP and DIR said.
+    /// Sequencer position from the true home edge: the exact sum of STEP and DIR.
     pub microsteps: i64,
-    /// That, less where the rotor is.
+    /// Commanded minus actual rotor position.
     pub lost_microsteps: f64,
-    /// Rising edges on its STEP pin since power-on.
+    /// Rising STEP edges since power-on.
     pub step_edges: u64,
-    /// When the last of them was.
+    /// Time of the last edge.
     pub last_step_ns: u64,
-    /// Times that its driver chip was given STEP or DIR sooner than its data sheet allows.
+    /// STEP or DIR edges that violated the driver's timing.
     pub driver_violations: u64,
 }
 
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Report {
-    /// Virtual time since power-on, nanoseconds.
+    /// Virtual time since power-on.
     pub now_ns: u64,
-    /// The firmware has said that it started.
+    /// The firmware has reported its start.
     pub started: bool,
-    /// Resets of the chip since power-on.
     pub resets: usize,
-    /// Whether the chip has power.
     pub powered: bool,
-    /// The sensor's stage.
     pub coarse: StageReport,
     pub lens: StageReport,
-    /// Where the piezo really is, micrometres.
+    /// True position.
     pub piezo_um: f64,
-    /// How far the piezo's stack was pulled at most since power-on, micrometres: 200 are its blocking force.
+    /// Largest tension of the piezo stack since power-on; 200 is its blocking force.
     pub piezo_pulled_um: f64,
     /// Triggers since the board's reset.
     pub triggers: u32,
-    /// Triggers that the camera was too busy to hear.
+    /// Triggers ignored by a busy camera.
     pub missed_triggers: u32,
-    /// Bits that the line flipped, both directions.
+    /// Bits flipped by the line, both directions.
     pub flipped_bits: u64,
 }
 
 impl Report {
-    /// Rising edges on both STEP pins since power-on.
+    /// Rising STEP edges of both motors since power-on.
     pub fn step_edges(&self) -> u64 {
         self.coarse.step_edges + self.lens.step_edges
     }
 
-    /// When the last of them was.
+    /// Time of the last edge of either motor.
     pub fn last_step_ns(&self) -> u64 {
         self.coarse.last_step_ns.max(self.lens.last_step_ns)
     }

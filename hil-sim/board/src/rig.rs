@@ -1,8 +1,8 @@
-//! The emulated rig in this process: the firmware on its board, the plant around it, and the time they run in.
+//! The emulated rig in this process: firmware, board, plant and time.
 //!
-//! The emulator runs on a thread of its own and is asked through a channel; what a call asks for has happened
-//! when it returns. [`EmulatedRig::advance_us`] and [`EmulatedRig::settle`] let time pass; in [`crate::Pace::Lockstep`]
-//! and [`crate::Pace::Realtime`] it also passes by itself.
+//! The emulator has its own thread; a call returns when its request is done. [`EmulatedRig::advance_us`] and
+//! [`EmulatedRig::settle`] let time pass. In [`crate::Pace::Lockstep`] and [`crate::Pace::Realtime`] it also
+//! passes on its own terms.
 
 use std::{
     sync::mpsc::{self, Receiver, Sender},
@@ -39,7 +39,7 @@ use crate::{
     wiring::{Shot, Wiring},
 };
 
-/// A running emulated rig; ends when dropped.
+/// A running rig; ends when dropped.
 pub struct EmulatedRig {
     commands: Sender<Command>,
     thread: Option<JoinHandle<Result<(), SimError>>>,
@@ -49,10 +49,8 @@ pub struct EmulatedRig {
 }
 
 impl EmulatedRig {
-    /// Builds the rig and lets the firmware start, up to its first idle moment.
-    ///
-    /// # Errors
-    /// [`SimError`] where there is no firmware, it does not start, or a file cannot be written.
+    /// Builds the rig and runs the firmware to its first idle moment.
+    /// Errors: [`SimError`] if the firmware is missing or does not start, or a file cannot be written.
     pub fn new(config: &RigConfig) -> Result<Self, SimError> {
         let (bytes_out, bytes) = mpsc::channel();
         let (shots_out, shots) = mpsc::channel();
@@ -62,47 +60,44 @@ impl EmulatedRig {
         Ok(Self { commands, thread: Some(thread), bytes, shots, decoder: Decoder::new() })
     }
 
-    /// Puts bytes on the line to the board; they travel when time passes.
+    /// Sends bytes to the board; they travel when time passes.
     pub fn send(&mut self, bytes: &[u8]) -> Result<(), SimError> {
         self.commands.send(Command::Bytes(bytes.to_vec())).map_err(|_| SimError::Stopped)
     }
 
-    /// Gives the host's end of the line a rate, in baud; bytes pass only where the board has the same.
+    /// Sets the host's baud rate; bytes pass only if the board has the same.
     pub fn set_host_rate(&mut self, baud: u32) -> Result<(), SimError> {
         self.commands.send(Command::HostRate(baud)).map_err(|_| SimError::Stopped)
     }
 
-    /// Lets this much virtual time pass.
-    ///
-    /// # Errors
-    /// [`SimError::Stopped`], also where the emulation failed on the way.
+    /// Advances virtual time.
+    /// Errors: [`SimError::Stopped`] if the emulation has ended or failed.
     pub fn advance_us(&mut self, micros: u64) -> Result<Report, SimError> {
         self.ask(|done| Command::Advance { nanos: micros * 1000, done })
     }
 
-    /// Lets time pass until the board owes nothing more: no answer, no terminal event.
+    /// Runs until no answer or terminal event is outstanding.
     pub fn settle(&mut self) -> Result<Report, SimError> {
         self.ask(|done| Command::Settle { done })
     }
 
-    /// Takes back what the scenario did to the rig, and lets nothing more of it happen.
+    /// Reverts the scenario's faults and cancels the rest.
     pub fn heal(&mut self) -> Result<(), SimError> {
         self.commands.send(Command::Heal).map_err(|_| SimError::Stopped)
     }
 
-    /// What was seen since the last call, where the rig was asked to keep it ([`RigConfig::observe`]).
+    /// Observations since the last call ([`RigConfig::observe`]).
     pub fn take_sights(&mut self) -> Result<Vec<Sight>, SimError> {
         let (done, wait) = mpsc::channel();
         self.commands.send(Command::Sights { done }).map_err(|_| SimError::Stopped)?;
         wait.recv().map_err(|_| SimError::Stopped)
     }
 
-    /// The plant and the wires as they are now.
     pub fn report(&mut self) -> Result<Report, SimError> {
         self.advance_us(0)
     }
 
-    /// Does something with the rig between two instructions: breaks something, presses the reset button.
+    /// Runs `work` on the rig between two instructions.
     pub fn access(
         &mut self,
         work: impl FnOnce(&mut RigAccess<'_, '_>) + Send + 'static,
@@ -116,26 +111,23 @@ impl EmulatedRig {
         wait.recv().map_err(|_| SimError::Stopped)
     }
 
-    /// Bytes that have come from the board.
     pub fn take_bytes(&mut self) -> Vec<u8> {
         self.bytes.try_iter().flatten().collect()
     }
 
-    /// Good frames that have come from the board; bad ones are dropped.
+    /// Valid frames from the board; bad ones are dropped.
     pub fn take_frames(&mut self) -> Vec<Packet> {
         let bytes = self.take_bytes();
         bytes.into_iter().filter_map(|byte| self.decoder.push(byte)?.ok()).collect()
     }
 
-    /// Exposures that have ended.
+    /// Completed exposures.
     pub fn take_shots(&mut self) -> Vec<Shot> {
         self.shots.try_iter().collect()
     }
 
     /// Ends the rig.
-    ///
-    /// # Errors
-    /// What ended it before, if something did.
+    /// Errors: the error that ended it earlier.
     pub fn stop(mut self) -> Result<(), SimError> {
         self.end()
     }
@@ -150,15 +142,14 @@ impl EmulatedRig {
 
 impl Drop for EmulatedRig {
     fn drop(&mut self) {
-        // Whoever wants to know calls `stop`.
+        // Errors are reported by `stop`.
         let _ = self.end();
     }
 }
 
-/// A rig's thread and the way to command it.
 type Launched = (Sender<Command>, JoinHandle<Result<(), SimError>>);
 
-/// Starts the rig's thread, with the board started to its first idle moment. With a `script` it does what that says, to its end.
+/// Starts the rig's thread and the board up to its first idle moment. A `script` is replayed to its end.
 pub fn launch(config: &RigConfig, outlets: Outlets, script: Option<Script>) -> Result<Launched, SimError> {
     let script_given = script.is_some();
     let path = firmware::find(config.firmware.as_deref())?;
@@ -221,7 +212,7 @@ pub fn launch(config: &RigConfig, outlets: Outlets, script: Option<Script>) -> R
         return Ok((commands, thread));
     }
     let (done, wait) = mpsc::channel();
-    // A board that lost its power before it said that it started, as a scenario may have it, is no wrong firmware.
+    // A scenario may cut the power before the start; that is not a firmware error.
     let runs = |report: Report| report.started || !report.powered;
     if commands.send(Command::Settle { done }).is_ok() && wait.recv().is_ok_and(runs) {
         return Ok((commands, thread));

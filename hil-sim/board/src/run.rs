@@ -1,4 +1,4 @@
-//! The program: an emulated rig behind a pty and a camera endpoint, or several.
+//! The program: emulated rigs behind a pty and a camera endpoint.
 
 use std::{
     net::SocketAddr,
@@ -24,27 +24,24 @@ use crate::{
     rig::launch,
 };
 
-/// The board is asked for its time; one that does not answer by then has ended.
+/// Timeout for the board's time; after it the rig has ended.
 const ANSWER: Duration = Duration::from_secs(2);
 
-/// A rig that clients can open.
 pub struct ServedRig {
     pub port: String,
-    /// Address of the camera endpoint.
     pub camera: SocketAddr,
-    /// Address of the second camera's endpoint, where there is a half mirror.
     pub second_camera: Option<SocketAddr>,
-    /// Identification of its GigE Vision camera, where it has one.
+    /// Identification of the GigE Vision camera.
     pub gige: Option<String>,
     commands: Sender<Command>,
     thread: JoinHandle<Result<(), SimError>>,
 }
 
 impl ServedRig {
-    /// Starts the rig and opens its two doors; behind a half mirror a `second` camera has a door of its own, and with `gige` the first
-    /// camera has another one.
+    /// Starts the rig with its port and camera. `second` is a camera behind a half mirror; `gige` serves the
+    /// first camera over GigE Vision, too.
     ///
-    /// `renamed` hears the new name of a pty that a scenario gives another one.
+    /// `renamed` receives the new name when a scenario renames the pty.
     pub fn start(
         config: &RigConfig,
         first: Imager,
@@ -55,7 +52,7 @@ impl ServedRig {
         let (bytes_out, bytes) = mpsc::channel();
         let (shots_out, shots) = mpsc::channel();
         let pictures = Arc::new(Pictures::default());
-        // The way to the board, for the ports to come: there is none before the board.
+        // Set after the board exists; ports opened later use it.
         let to_board = Arc::new(OnceLock::new());
         let outlets = Outlets {
             bytes: Some(bytes_out),
@@ -64,7 +61,7 @@ impl ServedRig {
             pictures: Some(Arc::clone(&pictures)),
         };
         let (commands, thread) = launch(config, outlets, None)?;
-        let _ = to_board.set(commands.clone()); // nobody else sets it
+        let _ = to_board.set(commands.clone()); // set only here
         let ask = asker(&commands);
         let (gige, frames_to_gige) = match gige {
             Some(gige) => {
@@ -75,11 +72,11 @@ impl ServedRig {
         };
         let mut cameras = Vec::new();
         let mut door = |imager: Imager| {
-            // One picture at a time is handed on: what is not fetched holds the imager up, and the imager the board.
+            // One picture at a time: an unfetched one blocks the imager, and the imager blocks the board.
             let (frames_out, frames) = mpsc::sync_channel(1);
             let at = cameras.len();
             cameras.push((imager, frames_out));
-            // Of a camera with two doors nobody knows whether both clients have left.
+            // With two endpoints a camera cannot tell whether both clients have left.
             let alone = (at > 0 || frames_to_gige.is_none()).then(|| Arc::clone(&pictures));
             let left = move || alone.iter().for_each(|pictures| pictures.forget(at));
             endpoint::open(frames, ask.clone(), left)
@@ -92,7 +89,7 @@ impl ServedRig {
         Ok(Self { port, camera, second_camera, gige, commands, thread })
     }
 
-    /// A way to end the rig from elsewhere.
+    /// Returns a function that ends the rig.
     pub fn stopper(&self) -> impl Fn() + Send + 'static {
         let commands = self.commands.clone();
         move || {
@@ -100,16 +97,14 @@ impl ServedRig {
         }
     }
 
-    /// Waits until the rig has ended.
-    ///
-    /// # Errors
-    /// What ended it, if it was not asked to.
+    /// Waits for the end of the rig.
+    /// Errors: the error that ended it, unless requested.
     pub fn wait(self) -> Result<(), SimError> {
         self.thread.join().unwrap_or_else(|_| Err(SimError::Emulator("it panicked".into())))
     }
 }
 
-/// Opens a pty with another name. Without a way to the board, or without a pty, there is none.
+/// Opens a pty with another name; `None` if that fails.
 fn another_port(
     to_board: Arc<OnceLock<Sender<Command>>>,
     renamed: impl Fn(&str) + Send + 'static,
@@ -123,12 +118,12 @@ fn another_port(
     })
 }
 
-/// Hands on what the camera's host asks of it.
+/// Forwards requests of the camera's host.
 fn asker(commands: &Sender<Command>) -> impl Fn(Control) + Send + Clone + 'static {
     let commands = commands.clone();
     move |asked| {
         let command = match asked {
-            // Nobody waits for the end: what comes from the host meanwhile is held until the time has passed.
+            // Does not wait: bytes from the host are held until the time has passed.
             Control::AdvanceMicros(micros) => {
                 Command::Advance { nanos: micros.saturating_mul(1000), done: mpsc::channel().0 }
             }
@@ -144,15 +139,15 @@ fn asker(commands: &Sender<Command>) -> impl Fn(Control) + Send + Clone + 'stati
     }
 }
 
-/// Tells the rig's time in ns.
+/// The rig's time in ns.
 fn clock(commands: &Sender<Command>) -> impl Fn() -> u64 + Send + 'static {
     let commands = commands.clone();
     move || {
-        let (tell, told) = mpsc::channel();
+        let (send, receive) = mpsc::channel();
         let look = Box::new(move |rig: &mut crate::RigAccess<'_, '_>| {
-            let _ = tell.send(rig.now_ns()); // whoever asked may have given up
+            let _ = send.send(rig.now_ns()); // the caller may have timed out
         });
         let _ = commands.send(Command::Access(look)); // the rig may have ended
-        told.recv_timeout(ANSWER).unwrap_or(0)
+        receive.recv_timeout(ANSWER).unwrap_or(0)
     }
 }

@@ -1,23 +1,24 @@
-//! A scenario: which rig, what happens to it, and what its host asks of it. One TOML file, which `farnear-sim run --scenario`
-//! carries out and a campaign writes; `docs/hil.md` tells of each field.
+//! A scenario: the rig, its faults, and its host's requests. `farnear-sim run --scenario` executes this TOML
+//! file, campaigns
+//! write it; `docs/hil.md` describes each field.
 //!
 //! ```toml
-//! seed = 7                   # the rig's mechanics and everything by chance; --seed says it otherwise
-//! start_um = [800.0, 900.0]  # where the sensor's and the lens' stage stand at power-on
-//! bit_error_rate = 1e-4      # of each bit, in both directions
-//! garbage = [1, 255, 0, 66]  # the host hears this before anything else
-//! unplug_after_ms = 500      # virtual time after power-on; the port goes away
+//! seed = 7                   # mechanics and random faults; --seed overrides it
+//! start_um = [800.0, 900.0]  # sensor and lens stage at power-on
+//! bit_error_rate = 1e-4      # per bit, in both directions
+//! garbage = [1, 255, 0, 66]  # the host receives this first
+//! unplug_after_ms = 500      # virtual time after power-on; the port closes
 //!
 //! [parts.gauge]              # as in parts.toml
 //! gain = 1.01
 //!
-//! [[happens]]                # in any number and order
+//! [[happens]]                # any number, any order
 //! after_ms = 1500            # or: on = "exposure-begins", nth = 2, delay_ms = 1; or: chance_per_s = 0.5
 //! what = "motor-stalls"
-//! stage = "lens"             # or "sensor", which is the default
-//! for_ms = 200               # then it is taken back; without it, never
+//! stage = "lens"             # or "sensor" (default)
+//! for_ms = 200               # then reverted; without it, never
 //!
-//! [[host]]                   # without any, the host is whoever opens the port
+//! [[host]]                   # without steps, any client is the host
 //! does = "home"
 //! [[host]]
 //! does = "move"
@@ -42,57 +43,50 @@ use crate::{
 #[derive(Clone, PartialEq, Debug, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Scenario {
-    /// Decides everything random; `None`: as the caller has it.
+    /// `None`: the caller's seed.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub seed: Option<u64>,
-    /// Where the sensor's and the lens' stage stand at power-on, micrometres from their home edges; `None`: the seed
-    /// draws it.
+    /// Sensor and lens stage at power-on, micrometres from their home edges; `None`: random.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub start_um: Option<[f64; 2]>,
-    /// Probability that a bit on the line is flipped, in each direction.
+    /// Probability per bit in each direction.
     #[serde(skip_serializing_if = "is_zero")]
     pub bit_error_rate: f64,
-    /// Bytes that the host receives before anything else.
+    /// Bytes that the host receives first.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub garbage: Vec<u8>,
-    /// The port goes away after this much virtual time since the board's start, in milliseconds.
+    /// Virtual time after the board's start at which the port closes.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub unplug_after_ms: Option<u64>,
-    /// What differs from the standard rig's parts.
+    /// Differences from the default parts.
     #[serde(skip_serializing_if = "toml::Table::is_empty")]
     pub parts: toml::Table,
-    /// What happens to the rig, in any order.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub happens: Vec<Happening>,
-    /// What the host does, one after the other.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub host: Vec<Step>,
 }
 
-#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde wants it so")]
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "signature required by serde")]
 fn is_zero(rate: &f64) -> bool {
     *rate == 0.0
 }
 
 impl Scenario {
     /// Reads a file.
-    ///
-    /// # Errors
-    /// [`SimError::Scenario`] where it cannot be read, is not such TOML, or a value is out of its range: with line, field
-    /// and what is expected.
+    /// Errors: [`SimError::Scenario`] if it cannot be read, is invalid TOML or has a value out of range, with
+    /// line, field and range.
     pub fn read(path: &Path) -> Result<Self, SimError> {
         let wrong = |reason: String| SimError::Scenario { path: path.into(), reason };
         let text = std::fs::read_to_string(path).map_err(|error| wrong(error.to_string()))?;
         Self::parse(&text).map_err(wrong)
     }
 
-    /// Reads its text.
-    ///
-    /// # Errors
-    /// What is wrong with it.
+    /// Parses the text.
+    /// Errors: Description of the first error.
     pub fn parse(text: &str) -> Result<Self, String> {
         let scenario: Self = toml::from_str(text).map_err(|error| error.to_string())?;
-        // Numbers beside tables have no table whose place could be told; their line is looked for.
+        // TOML gives no position for numbers next to tables; their line is searched.
         let wrong = |field: &str, what: String| {
             let line = text.lines().position(|line| line.trim_start().starts_with(field));
             line.map_or(what.clone(), |line| format!("line {}: {what}", line + 1))
@@ -113,19 +107,17 @@ impl Scenario {
     }
 
     pub fn text(&self) -> String {
-        // All of it are tables, numbers and strings.
-        toml::to_string(self).unwrap_or_else(|error| unreachable!("a scenario that is no TOML: {error}"))
+        // Tables, numbers and strings only, so it cannot fail.
+        toml::to_string(self)
+            .unwrap_or_else(|error| unreachable!("a scenario that TOML cannot express: {error}"))
     }
 
     /// The rig's parts.
-    ///
-    /// # Errors
-    /// Which number is wrong, and its range.
+    /// Errors: the invalid number and its range.
     pub fn parts(&self) -> Result<Parts, String> {
         Parts::parse(&self.parts.to_string())
     }
 
-    /// Where a stage stands at power-on.
     pub fn start_um(&self, stage: StageName) -> Option<f64> {
         let [sensor, lens] = self.start_um?;
         Some(match stage {
@@ -148,7 +140,7 @@ mod tests {
     }
 
     #[test]
-    fn a_file_is_read_and_written_alike() {
+    fn a_written_scenario_reads_back_equal() {
         let text = "seed = 7\nstart_um = [800, 900.5]\n[parts.gauge]\ngain = 1.01\n\
                     [[happens]]\nafter_ms = 7\nwhat = \"motor-stalls\"\nstage = \"lens\"\nfor_ms = 1.5\n\
                     [[happens]]\non = \"exposure-begins\"\nnth = 3\nwhat = \"link-noise\"\n\
@@ -166,7 +158,7 @@ mod tests {
     }
 
     #[test]
-    fn mistakes_are_told_with_line_field_and_what_is_expected() {
+    fn errors_have_line_field_and_expected_range() {
         refused("seed = 1\nbit_error_rate = 2.0", &["line 2", "bit_error_rate = 2", "0 to 1"]);
         refused("bit_eror_rate = 0.1", &["line 1", "bit_eror_rate"]);
         refused("\nstart_um = [1.0, 99999.0]", &["line 2", "start_um", "13000"]);

@@ -1,4 +1,4 @@
-//! The far end of the board's UART: two queues of bytes between the emulator and the outside.
+//! Far end of the board's UART: byte queues between emulator and outside.
 
 use std::{
     collections::VecDeque,
@@ -11,14 +11,13 @@ use rigless::{
     time::VirtualNanos,
 };
 
-/// Bytes on their way, both directions.
 #[derive(Debug, Default)]
 struct Queues {
     to_board: VecDeque<u8>,
     from_board: Vec<u8>,
 }
 
-/// The line; clones are the same line.
+/// Shared handle of the line.
 #[derive(Clone, Debug, Default)]
 pub struct Line(Arc<Mutex<Queues>>);
 
@@ -27,17 +26,15 @@ impl Line {
         work(&mut self.0.lock().unwrap_or_else(PoisonError::into_inner))
     }
 
-    /// Puts bytes on the line to the board; they arrive one after the other at its baud rate.
+    /// Sends bytes to the board at its baud rate.
     pub fn send(&self, bytes: &[u8]) {
         self.with(|queues| queues.to_board.extend(bytes));
     }
 
-    /// Whether bytes are still on their way to the board.
     pub fn is_sending(&self) -> bool {
         self.with(|queues| !queues.to_board.is_empty())
     }
 
-    /// Takes what the board has sent.
     pub fn take(&self) -> Vec<u8> {
         self.with(|queues| std::mem::take(&mut queues.from_board))
     }
@@ -45,7 +42,7 @@ impl Line {
 
 impl Peer for Line {
     fn receive(&mut self, word: u16, _context: &mut Timeline<'_, '_>) {
-        // 8 data bits; the ninth does not exist on this link.
+        // 8 data bits; the ninth is unused on this link.
         self.with(|queues| queues.from_board.push(word as u8));
     }
 

@@ -1,5 +1,5 @@
-//! What the plant really did, as a file: CSV for tables and plots, VCD for waveform viewers and for
-//! [`crate::replay`]. The name's ending says which.
+//! File with the plant's true state: CSV for tables, VCD for waveform viewers and [`crate::replay`]. The file
+//! ending selects the format.
 
 mod csv;
 pub mod vcd;
@@ -14,7 +14,6 @@ use crate::{
     wiring::{Shot, Wiring},
 };
 
-/// A file of either kind.
 pub enum Trace {
     /// `time_us,event,coarse_um,lens_um,piezo_um,dac,step_edges,triggers`.
     Csv(Csv),
@@ -23,7 +22,6 @@ pub enum Trace {
 }
 
 impl Trace {
-    /// Opens the file and writes its heading.
     pub fn create(path: &Path, config: &RigConfig, firmware: u64) -> Result<Self, SimError> {
         let vcd = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("vcd"));
         if vcd {
@@ -32,7 +30,7 @@ impl Trace {
         Csv::create(path).map(Self::Csv)
     }
 
-    /// Looks at everything at a stop of the emulator.
+    /// Records the state at a stop of the emulator.
     pub fn look(&mut self, now_ns: u64, plant: &Plant, wiring: &mut Wiring, shots: &[Shot]) {
         match self {
             Self::Csv(csv) => {
@@ -43,7 +41,7 @@ impl Trace {
         }
     }
 
-    /// The VCD, if it is one: a CSV holds nothing of what went in.
+    /// The VCD trace; a CSV has no record of the inputs.
     pub fn vcd(&mut self) -> Option<&mut Vcd> {
         match self {
             Self::Csv(_) => None,
@@ -51,10 +49,8 @@ impl Trace {
         }
     }
 
-    /// Writes what is left.
-    ///
-    /// # Errors
-    /// The first error of all.
+    /// Flushes the file.
+    /// Errors: the first write error.
     pub fn finish(self) -> Result<(), SimError> {
         match self {
             Self::Csv(csv) => csv.finish(),

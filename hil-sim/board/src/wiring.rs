@@ -1,4 +1,4 @@
-//! The wires between board and rig: what the plant sees of the pins, and what the pins see of the plant.
+//! Wires between board and plant: pins to plant and plant to pins.
 
 use rigless::{
     device::Level,
@@ -16,39 +16,36 @@ use crate::{
     plant::{Contact, ExposureTruth, Noise, StageName},
 };
 
-/// Alternate functions of TIM2, and of TIM3 and TIM4, on their pins (DS9405, table 12). A pin that the firmware
-/// has not switched to its timer is not connected to it.
+/// Alternate functions of TIM2, and of TIM3 and TIM4 (DS9405, table 12). A pin not switched to its timer is
+/// disconnected from it.
 const TIM2_FUNCTION: u8 = 1;
 const ENCODER_FUNCTION: u8 = 2;
-/// TIM2's counter, which the firmware keeps at the lower 32 bits of its microseconds.
+/// TIM2's counter: lower 32 bits of the firmware's microseconds.
 const TIM2_CNT: u64 = 0x4000_0024;
-/// Addresses of the registers whose writes can move one of the watched pins: TIM2, TIM1 and TIM8, port F.
+/// Registers that affect watched pins: TIM2, TIM1 and TIM8, port F.
 const WATCHED: [std::ops::Range<u64>; 3] = [0x4000_0000..0x4000_0400, 0x4001_0000..0x4001_0800, DRIVER_PORT];
-/// Port F, on which DIR and EN of both drivers are.
+/// Port F: DIR and EN of both drivers.
 const DRIVER_PORT: std::ops::Range<u64> = 0x4002_1400..0x4002_1800;
 
-/// A motor without a step for this long stands. The first step of the slowest ramp that settings allow comes after 10 ms.
+/// Standstill time. The first step of the slowest permitted ramp comes after 10 ms.
 const STANDS_NS: u64 = 20_000_000;
 
-/// One exposure, as it really was.
+/// An exposure with its true timing.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Shot {
-    /// The image's name: the running number of the trigger since the board's reset, from 0, or what the camera's host
-    /// said.
+    /// Trigger number since the board's reset, from 0, or the id given by the camera's host.
     pub id: u32,
-    /// Start of the exposure in the board's microseconds.
+    /// Start in the board's microseconds.
     pub board_us: u64,
-    /// Start of the exposure, virtual nanoseconds.
+    /// Start.
     pub begin_ns: u64,
-    /// End of the exposure, virtual nanoseconds.
     pub end_ns: u64,
-    /// Where the sensor was.
     pub truth: ExposureTruth,
     /// Mean brightness of both light outputs during the exposure, 0 to 1.
     pub light: [f64; 2],
 }
 
-/// STEP pulses of one motor, one behind the other.
+/// Consecutive STEP pulses of one motor.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Burst {
     pub stage: StageName,
@@ -57,27 +54,25 @@ pub struct Burst {
     pub steps: u64,
 }
 
-/// The wires of a stage, with the levels they had when last looked at.
 #[derive(Debug)]
 struct StageWires {
     name: StageName,
     step: bool,
     driver: DriverWires,
-    /// Home and far switch, and when the wire of one of them changes by itself.
+    /// Home and far switch, and the time of the next spontaneous change.
     contacts: [Contact; 2],
     due_ns: u64,
     counts: i64,
-    /// Counts that the encoder's wires have and its shaft has not, and whether they are cut.
+    /// Encoder counts without motion, and whether the wires are cut.
     slip: i64,
     cut: bool,
     burst: Option<Burst>,
     step_edges: u64,
     last_step_ns: u64,
-    /// When each edge of STEP came, while somebody wants to know.
+    /// Times of STEP edges, while recording.
     record: Option<Vec<u64>>,
 }
 
-/// The wires, with the levels they had when last looked at.
 #[derive(Debug)]
 pub struct Wiring {
     plant: SharedPlant,
@@ -95,20 +90,20 @@ fn channel(number: u8) -> Channel {
     Channel::new(number).unwrap_or_else(|| unreachable!("timers have channels 1 to 4"))
 }
 
-/// What a driver chip has seen of its other lines.
+/// Timing of a driver chip's inputs.
 #[derive(Debug)]
 struct DriverWires {
     parts: DriverParts,
     enabled_ns: Option<u64>,
     away: bool,
     direction_ns: u64,
-    /// It has not moved since it was switched on.
+    /// No motion since it was switched on.
     fresh: bool,
     violations: u64,
 }
 
 impl DriverWires {
-    /// EN or DIR may have changed.
+    /// Updates EN and DIR.
     fn look(&mut self, chip: &mut Chip, name: StageName, (at_ns, last_step_ns): (u64, u64)) {
         let enabled = chip.level(pins(name).enable) == Level::Low;
         if enabled != self.enabled_ns.is_some() {
@@ -123,7 +118,7 @@ impl DriverWires {
         }
     }
 
-    /// A STEP edge: whether the driver takes it, and notes where it came too early.
+    /// Whether the driver accepts a STEP edge; records timing violations.
     fn step(&mut self, at_ns: u64) -> bool {
         let Some(enabled_ns) = self.enabled_ns else { return false };
         let too_early = at_ns.saturating_sub(self.direction_ns) < self.parts.direction_setup_ns;
@@ -170,7 +165,7 @@ impl StageWires {
         }
     }
 
-    /// Looks at STEP, and at DIR and EN where they were written.
+    /// Reads STEP, and DIR and EN after a write to them.
     fn look(&mut self, plant: &SharedPlant, chip: &mut Chip, at: VirtualNanos, driver_written: bool) {
         if driver_written {
             self.driver.look(chip, self.name, (at.0, self.last_step_ns));
@@ -202,7 +197,7 @@ impl StageWires {
         self.put(plant, chip, at);
     }
 
-    /// Brings encoder and switches to where the stage is.
+    /// Updates encoder and switches from the stage.
     fn put(&mut self, plant: &SharedPlant, chip: &mut Chip, at: VirtualNanos) {
         let (counts, home, far) = with_plant(plant, |plant| {
             let stage = plant.stage(self.name);
@@ -232,7 +227,7 @@ impl StageWires {
         self.due_ns = due.unwrap_or(u64::MAX);
     }
 
-    /// Quadrature: A leads B when the count rises.
+    /// Quadrature; A leads B when the count rises.
     fn put_encoder(&self, chip: &mut Chip, at: VirtualNanos) {
         let (_, timer) = pins(self.name).encoder;
         let phase = self.counts.rem_euclid(4);
@@ -242,7 +237,7 @@ impl StageWires {
 }
 
 impl Wiring {
-    /// Connects the board to the plant at power-on; the seed decides when contacts bounce.
+    /// Connects board and plant at power-on; `seed` sets the contact bounce.
     pub fn new(plant: SharedPlant, camera: Camera, chip: &mut Chip, parts: (u64, &Parts)) -> Self {
         let stages = [StageName::Sensor, StageName::Lens].map(|name| StageWires::new(&plant, name, parts));
         let mut wiring = Self {
@@ -263,12 +258,12 @@ impl Wiring {
         wiring
     }
 
-    /// Whether a write to this address can move a watched pin.
+    /// Whether a write to `address` may move a watched pin.
     pub fn watches(address: u64) -> bool {
         Lights::watches(address) || WATCHED.iter().any(|range| range.contains(&address))
     }
 
-    /// Looks at the pins at a moment, after a register was `written` where one was, and lets what is due at the camera happen.
+    /// Reads the pins after a register was `written` (if any), and executes due camera events.
     pub fn look(&mut self, chip: &mut Chip, at: VirtualNanos, written: Option<u64>) {
         let driver_written = written.is_some_and(|address| DRIVER_PORT.contains(&address));
         if written.is_some_and(Lights::watches) {
@@ -290,7 +285,7 @@ impl Wiring {
         }
     }
 
-    /// Brings encoders and switches to where the stages are: a rotor also turns between two steps.
+    /// Updates encoders and switches; a rotor also turns between two steps.
     pub fn put(&mut self, chip: &mut Chip, at: VirtualNanos) {
         for stage in &mut self.stages {
             stage.put(&self.plant, chip, at);
@@ -304,7 +299,8 @@ impl Wiring {
                 self.lights.begin_exposure(at_ns);
                 with_plant(&self.plant, |plant| plant.begin_exposure(at_ns));
                 let low = Operate::peek(chip, at, TIM2_CNT, Width::W32).unwrap_or(0);
-                // The counter has the lower 32 bits of about the virtual time; a run has few of their periods.
+                // The counter is the lower 32 bits of about the virtual time, which exceeds few of its
+                // periods.
                 let high = (at_ns / 1000) & !0xffff_ffff;
                 self.begun = Some((id, high | low, at_ns));
             }
@@ -319,19 +315,17 @@ impl Wiring {
         self.put_strobe(chip, at);
     }
 
-    /// When the camera or a switch needs attention next.
+    /// Time of the next camera or switch event.
     pub fn next_ns(&self) -> Option<u64> {
         let switches_ns = self.stages.iter().map(|stage| stage.due_ns).min();
         self.camera.next_ns().into_iter().chain(switches_ns).min().filter(|at| *at < u64::MAX)
     }
 
-    /// STEP edges that came sooner than the driver chip wants them after a change of DIR or after it was switched on, and changes
-    /// of DIR that came too soon after one.
+    /// Violations of the driver's timing: STEP too soon after DIR or enable, DIR too soon after STEP.
     pub fn driver_violations(&self, name: StageName) -> u64 {
         self.stage(name).driver.violations
     }
 
-    /// Takes the exposures that have ended.
     pub fn take_shots(&mut self) -> Vec<Shot> {
         std::mem::take(&mut self.shots)
     }
@@ -343,48 +337,46 @@ impl Wiring {
         }
     }
 
-    /// Rising edges on a STEP pin since power-on, whether or not the driver was on.
+    /// Rising STEP edges since power-on, whether or not the driver was on.
     pub fn step_edges(&self, name: StageName) -> u64 {
         self.stage(name).step_edges
     }
 
-    /// When the last of them was.
     pub fn last_step_ns(&self, name: StageName) -> u64 {
         self.stage(name).last_step_ns
     }
 
-    /// Whether a motor is on its way: the slowest steps of a ramp are nearer to each other than `STANDS_NS`.
+    /// Whether a motor moves: steps of the slowest ramp are closer than `STANDS_NS`.
     pub fn is_stepping(&self, now_ns: u64) -> bool {
         self.stages.iter().any(|stage| stage.step_edges > 0 && now_ns < stage.last_step_ns + STANDS_NS)
     }
 
-    /// Takes the bursts of pulses that have come to their end, or (`all`) are under way.
+    /// Takes the completed bursts, or (`all`) also current ones.
     pub fn take_bursts(&mut self, now_ns: u64, all: bool) -> Vec<Burst> {
         let ended = |burst: &mut Burst| all || now_ns >= burst.last_ns + STANDS_NS;
         self.stages.iter_mut().filter_map(|stage| stage.burst.take_if(ended)).collect()
     }
 
-    /// When the exposure began that is under way.
+    /// Start of the current exposure.
     pub fn begun_ns(&self) -> Option<u64> {
         self.begun.map(|(_, _, at_ns)| at_ns)
     }
 
-    /// Exposures that have begun since power-on.
+    /// Exposures started since power-on.
     pub fn exposures_begun(&self) -> u64 {
         self.exposures_begun
     }
 
-    /// Cuts the wire of the strobe, which its resistor then holds low, or mends it.
+    /// Cuts the strobe's wire (its resistor holds it low), or reconnects it.
     pub fn cut_strobe(&mut self, chip: &mut Chip, at: VirtualNanos, cut: bool) {
         self.strobe_cut = cut;
         self.put_strobe(chip, at);
     }
 
-    /// Brings the strobe to the board.
     fn put_strobe(&mut self, chip: &mut Chip, at: VirtualNanos) {
         let level = Level::from(self.begun.is_some() && !self.strobe_cut);
         chip.drive_pin(at, STROBE, level);
-        // A pin that is not switched to its timer leaves the timer's input low, also one that a reset has switched off.
+        // The timer's input is low unless the pin is switched to it, also after a reset.
         let connected = chip.function(STROBE) == Some(TIM2_FUNCTION);
         let input = if connected { level } else { Level::Low };
         chip.drive_timer(at, TIM2, channel(4), input);
@@ -397,36 +389,32 @@ impl Wiring {
         }
     }
 
-    /// The encoder counts what its shaft has not done.
     pub fn slip_encoder(&mut self, name: StageName, counts: i64) {
         self.stage_mut(name).slip += counts;
     }
 
-    /// Cuts the encoder's wires, or mends them.
     pub fn cut_encoder(&mut self, name: StageName, cut: bool) {
         self.stage_mut(name).cut = cut;
     }
 
-    /// So many false openings of the switches a second from now on.
     pub fn set_glitches_per_s(&mut self, now_ns: u64, name: StageName, per_s: f64) {
         for contact in &mut self.stage_mut(name).contacts {
             contact.set_glitches_per_s(now_ns, per_s);
         }
     }
 
-    /// Begins to note when each STEP edge comes, unless that is done already.
+    /// Starts recording STEP edges, unless active.
     pub fn record_steps_once(&mut self) {
         for stage in &mut self.stages {
             stage.record.get_or_insert_default();
         }
     }
 
-    /// Begins to note when each STEP edge comes.
     pub fn record_steps(&mut self) {
         self.stages.iter_mut().for_each(|stage| stage.record = Some(Vec::new()));
     }
 
-    /// The edges noted so far, stage A's and stage B's, in virtual nanoseconds; goes on with empty notes.
+    /// Takes the edges of stages A and B, in virtual nanoseconds; recording continues.
     pub fn take_steps(&mut self) -> [Vec<u64>; 2] {
         self.stages.each_mut().map(|stage| stage.record.as_mut().map(std::mem::take).unwrap_or_default())
     }
@@ -435,7 +423,6 @@ impl Wiring {
         &mut self.lights
     }
 
-    /// The camera, for its host's commands.
     pub fn camera_mut(&mut self) -> &mut Camera {
         &mut self.camera
     }
@@ -457,7 +444,7 @@ impl Wiring {
     }
 }
 
-/// The level of a timer's pin: high only where the pin is switched to the timer.
+/// Level of a timer's pin; low unless the pin is switched to the timer.
 fn is_high(
     chip: &mut Chip,
     name: PinName,

@@ -1,4 +1,4 @@
-//! Draws a scenario: a rig, what its host does, and what happens to it.
+//! Draws a random scenario: rig, host steps and faults.
 
 use farnear_protocol::message::{Axis, SettingKey};
 
@@ -11,16 +11,15 @@ use farnear_sim::{
     },
 };
 
-/// Kinds that only take another one back: that happens by its length.
+/// Kinds that only revert another one; that happens by its duration.
 const TAKES_BACK: [&str; 5] =
     ["emergency-stop-released", "power-return", "supply-normal", "driver-fine", "motor-free"];
-/// Kinds that are not drawn: no board can see its gauge drift, for it has nothing to hold it against, so that what it says of its
-/// position is then not true; and a scenario that is its own host has no port that could get another name.
+/// Kinds that are not drawn. No board can detect gauge drift, so its reported position would be wrong; and a
+/// scenario with its own host has no port to rename.
 const LEFT_OUT: [&str; 2] = ["gauge-drifts", "link-renamed"];
-/// Where the records lie in the memory, and a little more.
+/// End of the records in the memory, plus a margin.
 const RECORDS_END: u64 = 8_192;
 
-/// A random number below `end`.
 fn below(noise: &mut Noise, end: u64) -> u64 {
     noise.bits() % end.max(1)
 }
@@ -33,21 +32,20 @@ fn one_of<T: Copy>(noise: &mut Noise, list: &[T]) -> T {
     list[below(noise, list.len() as u64) as usize]
 }
 
-/// Between two limits, each order of magnitude as often.
+/// Log-uniform between two limits.
 fn over_orders(noise: &mut Noise, low: f64, high: f64) -> f64 {
     low * libm::pow(high / low, noise.uniform())
 }
 
-/// To a thousandth: what a file holds is to be read by people.
+/// Rounded to three decimals, to keep files readable.
 fn rounded(value: f64) -> f64 {
     libm::round(value * 1e3) / 1e3
 }
 
-/// The scenario of a seed.
 pub fn draw(seed: u64) -> Scenario {
     let mut noise = Noise::new(seed, "campaign");
     let noise = &mut noise;
-    // Near their switches, so that homing is short; sometimes anywhere, or on the switch.
+    // Near the switches, so that homing is short; sometimes anywhere, or on the switch.
     let start_um = happens(noise, 0.9).then(|| [0; 2].map(|_| rounded(noise.between(-20.0, 400.0))));
     let mut host = Vec::new();
     if happens(noise, 0.9) {
@@ -65,7 +63,7 @@ fn goes_on(noise: &mut Noise, probability: f64) -> Option<f64> {
     happens(noise, probability).then(|| rounded(over_orders(noise, 1.0, 800.0)))
 }
 
-/// Now and then another rig: slower, with another memory, switches that bounce more, a gauge as it comes.
+/// Occasionally another rig: slower processor, other memory, more bounce, uncalibrated gauge.
 fn parts(noise: &mut Noise) -> toml::Table {
     let mut text = String::new();
     if happens(noise, 0.3) {
@@ -82,7 +80,7 @@ fn parts(noise: &mut Noise) -> toml::Table {
         let (gain, offset_um) = (noise.between(0.98, 1.02), noise.between(-1.0, 1.0));
         text += &format!("[gauge]\ngain = {gain:.4}\noffset_um = {offset_um:.3}\n");
     }
-    // Written above.
+    // The text above is valid.
     toml::from_str(&text).unwrap_or_default()
 }
 
@@ -144,7 +142,7 @@ impl Waits {
 
 fn when(noise: &mut Noise, what: &Kind) -> When {
     let moment = one_of(noise, &Moment::ALL);
-    // So often it comes in most runs.
+    // Limit of n: moments that occur in most runs.
     let most = match moment {
         Moment::Started | Moment::Alarm => 1,
         Moment::Homed | Moment::MoveDone => 3,
@@ -153,13 +151,13 @@ fn when(noise: &mut Noise, what: &Kind) -> When {
         Moment::Request | Moment::Answer => 30,
     };
     match below(noise, 10) {
-        // Most of it happens while something is under way: the start takes 0.1 s, homing a second.
+        // Mostly during activity: the start takes 0.1 s, homing a second.
         0..=3 => When::After { ms: rounded(noise.between(0.0, 3_500.0)) },
-        4 if what.mend.is_some() => When::Chance { per_s: rounded(over_orders(noise, 0.2, 5.0)) },
+        4 if what.revert.is_some() => When::Chance { per_s: rounded(over_orders(noise, 0.2, 5.0)) },
         _ => When::On {
             moment,
             nth: 1 + below(noise, most) as u32,
-            // Most of what breaks something is near to what it breaks.
+            // Most faults shortly follow the moment.
             delay_ms: if happens(noise, 0.3) { 0.0 } else { rounded(over_orders(noise, 0.01, 100.0)) },
         },
     }
@@ -174,7 +172,7 @@ fn happening(noise: &mut Noise) -> Happening {
     };
     let when = when(noise, &what);
     let by_chance = matches!(when, When::Chance { .. });
-    let lasts = what.mend.is_some() && (by_chance || happens(noise, 0.8));
+    let lasts = what.revert.is_some() && (by_chance || happens(noise, 0.8));
     let amount = what.takes.amount.map_or(0.0, |range| {
         let sign = if range.min < 0.0 && happens(noise, 0.5) { -1.0 } else { 1.0 };
         let amount = sign * range.usual * over_orders(noise, 0.1, 10.0);

@@ -1,6 +1,5 @@
-//! An honest host that carries out the steps of a scenario on a rig in this process, and at the end, with everything mended,
-//! looks whether the rig works. It asks again where an answer is missed, says hello to each new boot, and answers the
-//! board's questions.
+//! A well-behaved host that executes a scenario on a rig in this process, then reverts all faults and checks
+//! that the rig works. It repeats unanswered requests, says hello to each new boot and answers keep-alives.
 
 mod client;
 mod recovery;
@@ -22,30 +21,26 @@ use farnear_sim::{
 
 use crate::invariants::{Broken, Case, check};
 
-/// What a host may be silent for while something moves.
+/// Permitted silence during motion.
 const SILENCE: Micros = Micros(2_000_000);
 
-/// What came of a scenario.
+/// Result of a scenario.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub struct Outcome {
     pub broken: Vec<Broken>,
-    /// Virtual time of it, nanoseconds.
+    /// Virtual time of the run.
     pub board_ns: u64,
-    /// Requests that were answered.
     pub answered: u64,
-    /// Long work that came to its end, and that did not.
+    /// Long work that ended with and without success.
     pub done: u32,
     pub failed: u32,
     pub alarms: u32,
-    /// Exposures that were taken.
     pub exposures: u32,
     pub resets: usize,
 }
 
-/// Plays a scenario from its power-on to its end, and judges it.
-///
-/// # Errors
-/// [`SimError`] where the rig cannot start or does not run on.
+/// Plays a scenario from power-on to its end and checks the invariants.
+/// Errors: [`SimError`] if the rig cannot start or stops.
 pub fn play(scenario: &Scenario, config: &RigConfig) -> Result<Outcome, SimError> {
     let config = RigConfig { observe: true, ..config.clone() };
     let mut client = Client::new(EmulatedRig::new(&config)?);
@@ -77,7 +72,6 @@ pub fn play(scenario: &Scenario, config: &RigConfig) -> Result<Outcome, SimError
     })
 }
 
-/// A move.
 fn go(axis: Axis, to_um: f64) -> Request {
     Request::Move { axis, target: Nanometres((1e3 * to_um).round() as i32), silence: SILENCE }
 }
@@ -116,7 +110,7 @@ fn carry_out(client: &mut Client, step: &Step) -> Result<(), SimError> {
     }
 }
 
-/// Steps without long work.
+/// Executes a step without long work.
 fn carry_out_at_once(client: &mut Client, deed: &Deed) -> Result<(), SimError> {
     let request = match deed {
         Deed::Set { key, value } => {
@@ -131,7 +125,7 @@ fn carry_out_at_once(client: &mut Client, deed: &Deed) -> Result<(), SimError> {
         Deed::Clear => return recovery::clear_alarms(client).map(|_| ()),
         Deed::Silent { ms } => return client.rig.advance_us((ms * 1e3) as u64).map(|_| ()),
         Deed::Wait { ms } => return client.wait_us((ms * 1e3) as u64),
-        // Long work was carried out by the caller.
+        // Long work is handled by the caller.
         Deed::Home(_)
         | Deed::Move { .. }
         | Deed::Expose(_)
@@ -143,7 +137,6 @@ fn carry_out_at_once(client: &mut Client, deed: &Deed) -> Result<(), SimError> {
     client.ask(&request).map(|_| ())
 }
 
-/// Loads and arms a program.
 fn load(client: &mut Client, program: &Program) -> Result<(), SimError> {
     for (index, at_um) in (0..).zip(&program.at_um) {
         let shot = Shot {

@@ -1,17 +1,18 @@
-//! What must hold in every run, whatever happens to the rig: held against what a witness saw.
+//! Invariants of every run, checked against the observer's record.
 //!
-//! | property | that is |
+//! | property | meaning |
 //! |---|---|
-//! | `hard-stop` | no driver pushes a stage against its hard stop: not at all with a home switch that works, and not beyond a stall with a dead one |
-//! | `step-after-alarm` | no STEP pulse comes later than 2 ms after an alarm, until that is cleared |
-//! | `acts-twice` | no request acts twice: one end for each, the same answer to its repeats, no more exposures than were asked for |
-//! | `moves-unasked` | no motor moves without work that was asked for |
-//! | `exposure` | every exposure is told, with its own stamps, and was inside its window, or that is told |
-//! | `position` | a position that is called homed was homed in this boot and is the true one within its stated error |
-//! | `records` | settings, alarms and boot numbers outlast everything, or their loss is told |
-//! | `works-after` | once everything is mended the alarms can be cleared, and the rig homes, moves and exposes |
+//! | `hard-stop` | no driver pushes a stage against its hard stop if the home switch works, and at most until a stall otherwise |
+//! | `step-after-alarm` | no STEP pulse later than 2 ms after an alarm until it is cleared |
+//! | `acts-twice` | no request acts twice: one end each, equal answers to repeats, no extra exposures |
+//! | `moves-unasked` | no motor moves without requested work |
+//! | `exposure` | each exposure is reported with its own stamps, and was within its tolerance or reported otherwise |
+//! | `position` | a position reported as homed was homed in this boot and is correct within its stated error |
+//! | `records` | settings, alarms and boot numbers survive everything, or their loss is reported |
+//! | `works-after` | without faults the alarms can be cleared, and the rig homes, moves and captures |
 //!
-//! A new property is a file of this module with a function over all sights, a line in [`check`], and a row above.
+//! A new property is a file of this module with a function over all observations, a line in [`check`], and a
+//! row above.
 
 mod exposures;
 mod motion;
@@ -25,17 +26,15 @@ use farnear_sim::{
     scenario::Scenario,
 };
 
-/// A property that did not hold.
+/// A violated property.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Broken {
     pub property: &'static str,
-    /// When, virtual nanoseconds.
     pub at_ns: u64,
-    /// What was seen instead.
     pub what: String,
 }
 
-/// A run, and what is known of the rig.
+/// A run and its rig.
 #[derive(Clone, Copy, Debug)]
 pub struct Case<'a> {
     pub scenario: &'a Scenario,
@@ -44,19 +43,19 @@ pub struct Case<'a> {
 }
 
 impl Case<'_> {
-    /// Whether something of these kinds is in the scenario.
+    /// Whether the scenario has a fault of these kinds.
     fn has(&self, kinds: &[&str]) -> bool {
         self.scenario.happens.iter().any(|happening| kinds.contains(&happening.what.name))
     }
 
-    /// For each life of the board, from one reset to the next, virtual nanoseconds less the board's time: the least delay with which one of
-    /// its events was heard. Not by the number of its boot: a board whose memory is dead counts from 1 again when power comes back.
+    /// Per board life (reset to reset): virtual time minus board time, as the smallest event delay. Boot
+    /// numbers cannot serve as keys, because a board with dead memory restarts at 1.
     fn clocks(&self) -> Vec<u64> {
         let mut clocks = vec![u64::MAX];
         for sight in self.sights {
             match &sight.seen {
                 Seen::Reset => clocks.push(u64::MAX),
-                Seen::Told { event, .. } => {
+                Seen::Reported { event, .. } => {
                     let offset = sight.at_ns.saturating_sub(event.time.0.saturating_mul(1000));
                     clocks.last_mut().into_iter().for_each(|least| *least = offset.min(*least));
                 }
@@ -67,7 +66,7 @@ impl Case<'_> {
     }
 }
 
-/// Everything that did not hold, in the order of time.
+/// All violations, ordered by time.
 pub fn check(case: &Case<'_>) -> Vec<Broken> {
     let checks = [
         motion::hard_stop,

@@ -1,9 +1,10 @@
 //! # farnear-campaign
 //!
-//! Seeded fault campaigns on the emulated board: draws scenarios, plays them on all cores, checks the invariants of each run
-//! and shrinks the scenarios that break one.
+//! Seeded fault campaigns on the emulated board: draws scenarios, plays them on all cores, checks the
+//! invariants and
+//! shrinks the scenarios that violate one.
 //!
-//! - [`host_model`]: a protocol client that carries out the steps of a scenario.
+//! - [`host_model`]: a protocol client that executes a scenario's steps.
 //! - [`invariants`]: the properties that must hold in every run.
 
 mod draw;
@@ -30,7 +31,7 @@ use farnear_sim::{RigConfig, Scenario, SimError};
 use host_model::{Outcome, play};
 use invariants::Broken;
 
-/// A part of a campaign's seeds: the `index`th of `count` parts.
+/// A part of a campaign's seeds: part `index` of `count`.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Shard {
     pub index: u64,
@@ -41,7 +42,8 @@ impl FromStr for Shard {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let wrong = || format!("{text:?} is no shard: 2/8 is the second of eight");
+        let wrong =
+            || format!("{text:?} is not a shard: expected INDEX/COUNT, e.g. 2/8 for the second of eight");
         let (index, count) = text.split_once('/').ok_or_else(wrong)?;
         let (index, count) = (index.parse().map_err(|_| wrong())?, count.parse().map_err(|_| wrong())?);
         if index == 0 || index > count {
@@ -51,28 +53,27 @@ impl FromStr for Shard {
     }
 }
 
-/// What a campaign is to do.
 #[derive(Clone, Debug)]
 pub struct Campaign {
-    /// Seeds: the first, and the one behind the last.
+    /// Seeds, end exclusive.
     pub seeds: std::ops::Range<u64>,
     pub shard: Shard,
-    /// How many rigs run at a time.
+    /// Rigs in parallel.
     pub jobs: usize,
-    /// The firmware; `None`: the one beside the program.
+    /// `None`: next to the program.
     pub firmware: Option<PathBuf>,
-    /// Where the small scenarios of what broke are written.
+    /// Folder for the shrunk scenarios.
     pub out: PathBuf,
 }
 
-/// What came of a campaign.
+/// Result of a campaign.
 #[derive(Clone, Default, Debug)]
 pub struct Summary {
     pub played: u64,
-    /// Those of them that broke a property: seed, first broken property, file.
+    /// Violations: seed, first violated property, file.
     pub broken: Vec<(u64, Broken, PathBuf)>,
     pub board_s: f64,
-    /// Requests answered, long work done and failed, alarms, exposures, resets.
+    /// Answered requests, work done and failed, alarms, exposures, resets.
     pub counts: [u64; 6],
 }
 
@@ -91,7 +92,7 @@ impl Summary {
         self.counts.iter_mut().zip(seen).for_each(|(sum, one)| *sum += one);
     }
 
-    /// As JSON for programs, nothing that differs between two runs; files by their names.
+    /// JSON with repeatable content only; files by name.
     pub fn json(&self) -> serde_json::Value {
         let [answered, done, failed, alarms, exposures, resets] = self.counts;
         let broken = self.broken.iter().map(|(seed, broken, file)| {
@@ -107,7 +108,7 @@ impl Summary {
         })
     }
 
-    /// As a table for people. `cpu`: what it took.
+    /// Table for the terminal. `cpu`: CPU time used.
     pub fn table(&self, cpu: Duration) -> String {
         let [answered, done, failed, alarms, exposures, resets] = self.counts;
         let per = cpu.as_secs_f64() / (self.played.max(1) as f64);
@@ -138,19 +139,15 @@ impl Summary {
 }
 
 /// Plays a scenario with its own seed and parts.
-///
-/// # Errors
-/// [`SimError`] where the rig cannot start, or its parts are wrong.
+/// Errors: [`SimError`] if the rig cannot start or its parts are invalid.
 pub fn play_alone(scenario: &Scenario, firmware: Option<&Path>) -> Result<Outcome, SimError> {
     let config =
         RigConfig::of(scenario).map_err(|reason| SimError::Scenario { path: "scenario".into(), reason })?;
     play(scenario, &RigConfig { firmware: firmware.map(Into::into), ..config })
 }
 
-/// Runs a campaign. `progress` hears of each scenario, in the order in which they end.
-///
-/// # Errors
-/// [`SimError`] where a rig cannot start or a file cannot be written; scenarios that break a property are no error.
+/// Runs a campaign. `progress` is called for each scenario when it ends.
+/// Errors: [`SimError`] if a rig cannot start or a file cannot be written. Violations are not errors.
 pub fn run(campaign: &Campaign, mut progress: impl FnMut(u64, &Outcome)) -> Result<Summary, SimError> {
     let Shard { index, count } = campaign.shard;
     let seeds: Vec<u64> = campaign.seeds.clone().filter(|seed| seed % count == index - 1).collect();
@@ -164,7 +161,7 @@ pub fn run(campaign: &Campaign, mut progress: impl FnMut(u64, &Outcome)) -> Resu
             scope.spawn(move || {
                 while let Some(seed) = seeds.get(next.fetch_add(1, Ordering::Relaxed) as usize) {
                     match one(campaign, *seed) {
-                        Ok(result) => drop(tell.send((*seed, result))), // whoever counts may have gone
+                        Ok(result) => drop(tell.send((*seed, result))), // the receiver may have gone
                         Err(error) => {
                             *stopped.lock().unwrap_or_else(PoisonError::into_inner) = Some(error);
                             next.store(u64::MAX / 2, Ordering::Relaxed);
@@ -187,7 +184,7 @@ pub fn run(campaign: &Campaign, mut progress: impl FnMut(u64, &Outcome)) -> Resu
     stopped.map_or(Ok(summary), Err)
 }
 
-/// One seed; what breaks a property is made small and written.
+/// Plays one seed; shrinks and writes a violating scenario.
 fn one(campaign: &Campaign, seed: u64) -> Result<(Outcome, Option<PathBuf>), SimError> {
     let scenario = draw(seed);
     let firmware = campaign.firmware.as_deref();
@@ -207,7 +204,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_shard_is_read_and_a_wrong_one_refused() {
+    fn parses_a_shard_and_rejects_an_invalid_one() {
         assert_eq!("2/8".parse(), Ok(Shard { index: 2, count: 8 }));
         for text in ["", "2", "0/8", "9/8", "a/b", "1/0"] {
             let refused = text.parse::<Shard>().expect_err(text);
@@ -216,7 +213,7 @@ mod tests {
     }
 
     #[test]
-    fn every_seed_gives_a_scenario_of_its_own_that_a_file_holds() {
+    fn each_seed_gives_a_distinct_scenario_that_a_file_can_hold() {
         let mut kinds = std::collections::BTreeSet::new();
         for seed in 0..2_000 {
             let scenario = draw(seed);
@@ -225,18 +222,18 @@ mod tests {
             kinds.extend(scenario.happens.iter().map(|happening| happening.what.name));
         }
         assert_ne!(draw(1), draw(2));
-        // All but those that only take another back, a gauge that drifts, which no board can see, and a port's other name.
+        // All but those that only revert another one, gauge drift, and a renamed port.
         assert!(!kinds.contains("gauge-drifts") && !kinds.contains("link-renamed"));
         assert_eq!(kinds.len(), farnear_sim::faults::KINDS.len() - 7, "{kinds:?}");
     }
 
     #[test]
-    fn a_scenario_is_made_as_small_as_what_breaks_it() {
+    fn shrinks_a_scenario_to_what_violates_the_property() {
         let text = "seed = 1\n[[happens]]\nafter_ms = 123.456\nwhat = \"motor-stalls\"\nfor_ms = 7\n\
                     [[happens]]\non = \"alarm\"\nnth = 3\ndelay_ms = 2\nwhat = \"reset-button\"\n\
                     [[host]]\ndoes = \"home\"\n[[host]]\ndoes = \"halt\"\n[[host]]\ndoes = \"stop\"\n";
         let scenario = Scenario::parse(text).expect("a scenario");
-        // Broken as long as it resets and halts.
+        // Violates the property while it resets and halts.
         let breaks = |scenario: &Scenario| {
             let text = scenario.text();
             let broken = text.contains("reset-button") && text.contains("halt");

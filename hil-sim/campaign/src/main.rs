@@ -28,9 +28,9 @@ enum Job {
     /// Play one scenario file with [[host]] steps and check the invariants.
     #[command(after_help = "Example:\n  farnear-campaign play broken/position-126.toml")]
     Play {
-        /// The scenario (docs/hil.md).
+        /// Scenario file (docs/hil.md).
         scenario: PathBuf,
-        /// The firmware; default: the one next to this program.
+        /// Firmware ELF; default: the one next to this program.
         #[arg(long, value_name = "ELF")]
         firmware: Option<PathBuf>,
         /// Write the true positions to this file: CSV, or a value change dump if it ends in .vcd.
@@ -41,28 +41,28 @@ enum Job {
 
 #[derive(Args)]
 struct Seeds {
-    /// How many scenarios.
+    /// Number of scenarios.
     #[arg(long, default_value_t = 100)]
     seeds: u64,
-    /// The first seed.
+    /// First seed.
     #[arg(long, default_value_t = 1)]
     first: u64,
     /// Only one part of the seeds, e.g. 2/8: for several machines.
     #[arg(long, default_value = "1/1")]
     shard: Shard,
-    /// Rigs that run at a time; default: the number of cores.
+    /// Rigs in parallel; default: the number of cores.
     #[arg(long)]
     jobs: Option<usize>,
-    /// The firmware; default: the one next to this program.
+    /// Firmware ELF; default: the one next to this program.
     #[arg(long, value_name = "ELF")]
     firmware: Option<PathBuf>,
-    /// Where the small scenarios are written that break a property.
+    /// Folder for the shrunk scenarios of violations.
     #[arg(long, default_value = "campaign", value_name = "FOLDER")]
     out: PathBuf,
-    /// Print the scenario of the first seed and play none.
+    /// Print the scenario of the first seed without playing it.
     #[arg(long)]
     show: bool,
-    /// Print the sum as JSON.
+    /// Print the summary as JSON.
     #[arg(long)]
     json: bool,
 }

@@ -1,5 +1,5 @@
-//! Makes a scenario that breaks a property as small as it still does: parts of it are left out, one after the other, as
-//! long as the same property breaks (Zeller & Hildebrandt, IEEE Trans. Software Engineering 28, 2002, in its simplest form).
+//! Shrinks a scenario that violates a property: removes parts one after the other while the same property is
+//! violated (Zeller & Hildebrandt, IEEE Trans. Software Engineering 28, 2002, simplest form).
 
 use farnear_sim::{
     SimError,
@@ -9,10 +9,10 @@ use farnear_sim::{
 
 use crate::host_model::Outcome;
 
-/// Runs that it may take: each costs seconds.
+/// Limit of runs; each takes seconds.
 const RUNS: u32 = 60;
 
-/// Everything that is one thing smaller.
+/// All scenarios with one part less.
 fn smaller(scenario: &Scenario) -> Vec<Scenario> {
     let mut found = Vec::new();
     let mut with = |change: &dyn Fn(&mut Scenario)| {
@@ -47,7 +47,6 @@ fn smaller(scenario: &Scenario) -> Vec<Scenario> {
     found
 }
 
-/// A rounder moment.
 fn simpler(when: When) -> When {
     match when {
         When::After { ms } => When::After { ms: ms.round() },
@@ -56,10 +55,8 @@ fn simpler(when: When) -> When {
     }
 }
 
-/// Makes a scenario small in which `property` breaks. `play` tells what comes of one.
-///
-/// # Errors
-/// Those of `play`.
+/// Shrinks a scenario that violates `property`; `play` runs one.
+/// Errors: errors of `play`.
 pub fn shrink(
     scenario: &Scenario,
     property: &str,

@@ -1,18 +1,17 @@
-//! The control channel's packets (GVCP): commands that came, and their answers.
+//! Control channel (GVCP): commands and acknowledgements.
 
 use crate::{
     features::{ACQUISITION, START},
     registers::{DISCOVERY_BYTES, Refusal, Registers},
 };
 
-/// Longest packet of the channel: 540 bytes of payload behind a header of 8.
+/// Longest packet: 540 bytes of payload after a header of 8.
 pub const PACKET_MAX: usize = 548;
-/// Bytes that one command reads at most, by the standard.
+/// Longest read of the standard.
 const READ_MAX: usize = 536;
 const HEADER: usize = 8;
-/// First byte of a command.
 const KEY: u8 = 0x42;
-/// The flag of a command that wants an answer.
+/// Flag: acknowledgement required.
 const WANTS_ANSWER: u8 = 1;
 
 const DISCOVERY: u16 = 0x0002;
@@ -22,27 +21,26 @@ const WRITE_REGISTERS: u16 = 0x0082;
 const READ_MEMORY: u16 = 0x0084;
 const WRITE_MEMORY: u16 = 0x0086;
 
-/// What a client asks for.
+/// Request of a client.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub enum Ask {
     Discovery,
-    /// Packets of a frame again.
+    /// Resend packets of a frame.
     Resend {
-        /// The frame's short number.
+        /// 16-bit frame id.
         frame: u16,
         first: u32,
         last: u32,
     },
     Registers(Vec<u32>),
     Write(Vec<(u32, u32)>),
-    /// Bytes from an address on.
+    /// Read memory: address and length.
     Memory(u32, usize),
 }
 
-/// A command that came.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Command {
-    /// What it asks for; the refusal of what cannot be asked.
+    /// The request, or the refusal of an invalid one.
     pub ask: Result<Ask, Refusal>,
     wants_answer: bool,
     code: u16,
@@ -58,7 +56,7 @@ fn words(bytes: &[u8]) -> Vec<u32> {
 }
 
 impl Command {
-    /// Reads a packet; `None` for one that is no command.
+    /// Parses a packet; `None` if it is not a command.
     pub fn read(bytes: &[u8]) -> Option<Self> {
         let &[KEY, flags, c0, c1, l0, l1, n0, n1] = bytes.get(..HEADER)? else { return None };
         let (code, number) = (u16::from_be_bytes([c0, c1]), u16::from_be_bytes([n0, n1]));
@@ -89,7 +87,7 @@ impl Command {
                 }
                 _ => Err(bad),
             },
-            // What this camera lets be written are registers.
+            // Only registers are writable.
             WRITE_MEMORY if all.len() >= 2 => {
                 let writes =
                     (0..).zip(&all[1..]).map(|(index, value)| (all[0].wrapping_add(4 * index), *value));
@@ -100,7 +98,7 @@ impl Command {
         }
     }
 
-    /// The answer with this payload, or the refusal; `None` where none is wanted.
+    /// Acknowledgement with payload or refusal; `None` if none is required.
     pub fn answer(&self, result: Result<&[u8], Refusal>) -> Option<Vec<u8>> {
         // A resend is answered by the packets themselves.
         if !self.wants_answer || self.code == RESEND {
@@ -118,7 +116,7 @@ impl Command {
         Some(bytes)
     }
 
-    /// The first four bytes of the answer to something written: where the last write went, or how many there were.
+    /// First four bytes of a write acknowledgement: the last address, or the number of writes.
     pub fn written(&self, writes: &[(u32, u32)]) -> [u8; 4] {
         match self.code {
             WRITE_MEMORY => writes.first().map_or(0, |(address, _)| *address).to_be_bytes(),
@@ -127,7 +125,7 @@ impl Command {
     }
 }
 
-/// The answer to somebody who looks for cameras; `None` for anything else.
+/// Discovery acknowledgement; `None` for any other packet.
 pub fn discovery(bytes: &[u8], registers: &Registers) -> Option<Vec<u8>> {
     let mut command = Command::read(bytes)?;
     if command.ask != Ok(Ask::Discovery) {
@@ -137,7 +135,6 @@ pub fn discovery(bytes: &[u8], registers: &Registers) -> Option<Vec<u8>> {
     command.answer(registers.read(0, DISCOVERY_BYTES))
 }
 
-/// Whether a packet starts an acquisition.
 pub fn starts_acquisition(bytes: &[u8]) -> bool {
     match Command::read(bytes).map(|command| command.ask) {
         Some(Ok(Ask::Write(writes))) => writes.contains(&(ACQUISITION, START)),
@@ -160,7 +157,7 @@ mod tests {
     }
 
     #[test]
-    fn commands_are_read_and_answered() {
+    fn parses_and_answers_commands() {
         let command = Command::read(&packet(READ_REGISTERS, &[0, 0, 0x0a, 0])).expect("a command");
         assert_eq!(command.ask, Ok(Ask::Registers(vec![0x0a00])));
         assert_eq!(
@@ -179,9 +176,9 @@ mod tests {
     }
 
     proptest! {
-        // Whatever comes by the network is answered or passed over.
+        // Any packet is answered or ignored.
         #[test]
-        fn no_packet_is_too_bad(mut bytes in prop::collection::vec(any::<u8>(), 0..64), as_command: bool) {
+        fn answers_or_ignores_any_packet(mut bytes in prop::collection::vec(any::<u8>(), 0..64), as_command: bool) {
             if as_command && !bytes.is_empty() {
                 bytes[0] = KEY;
             }

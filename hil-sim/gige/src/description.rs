@@ -1,18 +1,16 @@
-//! The camera's description of itself (GenICam's GenApi 1.0, XML), which clients read from it.
+//! GenICam description (GenApi 1.0, XML) that clients read from the camera.
 
 use crate::features::{CHUNK_ENABLE, CHUNK_MODE, CHUNK_SELECTOR, Feature, Value};
 
-/// Name under which the camera has it.
 pub const FILE: &str = "farnear-emulated.xml";
-/// Of the model, as it stands in the registers, too.
+/// Also in the bootstrap registers.
 pub const MODEL: &str = "emulated";
 pub const VENDOR: &str = "farnear";
-/// Chunks by their numbers in the frame: time and number of the frame.
+/// Chunk ids: timestamp and frame id.
 pub const CHUNKS: [(&str, u32); 2] = [("Timestamp", 0xFA00_0001), ("FrameID", 0xFA00_0002)];
-/// Ticks of the camera's clock in a second.
+/// Ticks per second of the camera's clock.
 pub const TICKS_PER_SECOND: u32 = 1_000_000_000;
 
-/// The description of a camera with these features.
 pub fn description(features: &[Feature]) -> String {
     let mut categories: Vec<&str> = features.iter().map(|feature| feature.category).collect();
     categories.dedup();
@@ -101,7 +99,6 @@ fn int_register(name: &str, address: &str, length: u32, access: &str, port: &str
     )
 }
 
-/// The chunks and how they are turned on.
 fn chunks() -> String {
     let entries: String = (0..)
         .zip(CHUNKS)

@@ -1,4 +1,4 @@
-//! What the camera does: who has it under control, when it acquires, which picture goes out as which frame.
+//! The camera's state: control, acquisition, and frames for pictures.
 
 use std::{
     collections::VecDeque,
@@ -30,33 +30,31 @@ use crate::{
     stream::{Frame, HEADERS_BYTES, UDP_HEADERS_BYTES},
 };
 
-/// Frames that can be asked for again.
+/// Frames kept for resends.
 const FRAMES_RETAINED: usize = 8;
-/// Largest packet of UDP.
+/// Largest UDP packet.
 const PACKET_BYTES_MAX: usize = 65_507;
-/// Where the size of packets stands in its register.
+/// Mask of the packet size in its register.
 const PACKET_BYTES: u32 = 0xFFFF;
-/// What a camera that runs freely needs beside its exposures: its read-out, and some time to spare.
+/// Minimum time between free-running exposures: read-out and a margin.
 pub(super) const BETWEEN_EXPOSURES_US: u32 = 15_000;
-/// Names of software-triggered pictures: far from the board's own numbers.
+/// First id of software-triggered pictures, far from the board's numbers.
 const SOFTWARE_SHOTS: u32 = 0x4000_0000;
 
-/// What a packet of the control channel led to.
+/// Result of a control packet.
 #[derive(Default)]
 pub struct Done {
     pub answer: Option<Vec<u8>>,
-    /// What the rig is asked for.
+    /// Requests to the rig.
     pub asks: Vec<Control>,
-    /// Packets that are to be sent (again).
+    /// Packets to send (again).
     pub again: Option<Sending>,
 }
 
-/// Packets for the stream.
 pub struct Sending {
     pub to: SocketAddr,
-    /// The packets, in order.
     pub packets: Vec<Vec<u8>>,
-    /// From one to the next, at least: what the client asked for.
+    /// Minimum gap requested by the client.
     pub gap: Duration,
 }
 
@@ -65,9 +63,9 @@ pub struct Device {
     bits: u8,
     lost_per_thousand: u32,
     losses: ChaCha8Rng,
-    /// Who has it under control, and when that was heard of last.
+    /// Controlling client, and time of its last command.
     controller: Option<(SocketAddr, Instant)>,
-    /// Rig time at which the acquisition began, in ns.
+    /// Rig time at which the acquisition began.
     acquires_since_ns: Option<u64>,
     frames: u64,
     triggers: u32,
@@ -91,12 +89,10 @@ impl Device {
         }
     }
 
-    /// By which clients open it.
     pub fn id(&self) -> String {
         self.registers.id()
     }
 
-    /// What can be read of it.
     pub fn registers(&self) -> &Registers {
         &self.registers
     }
@@ -106,7 +102,7 @@ impl Device {
         self.frames
     }
 
-    /// Does what a packet asks for; `now_ns` is the rig's time, `now` the wall clock's.
+    /// Executes a packet; `now_ns` is rig time, `now` the wall clock.
     pub fn obey(&mut self, bytes: &[u8], from: SocketAddr, now: Instant, now_ns: u64) -> Done {
         let Some(command) = Command::read(bytes) else { return Done::default() };
         let controls = self.controller.is_some_and(|(controller, _)| controller == from);
@@ -129,7 +125,7 @@ impl Device {
                 read.map(|bytes| [&address.to_be_bytes(), bytes].concat())
             }
             Ok(Ask::Resend { frame, first, last }) => {
-                // The client's stream asks, by a port of its own.
+                // Resends come from the stream's own port.
                 let of_client = self.controller.is_some_and(|(controller, _)| controller.ip() == from.ip());
                 done.again = self.again(*frame, *first, *last).filter(|_| of_client);
                 Ok(Vec::new())
@@ -180,7 +176,7 @@ impl Device {
                 let shot_id = SOFTWARE_SHOTS + self.triggers % SOFTWARE_SHOTS;
                 self.triggers += 1;
                 done.asks.push(Control::Expose { shot_id, exposure });
-                // A rig at which nothing happens stands still in time; this much passes.
+                // An idle rig's time stands; this much passes.
                 done.asks
                     .push(Control::AdvanceMicros(u64::from(exposure.0.saturating_add(BETWEEN_EXPOSURES_US))));
             }
@@ -195,7 +191,6 @@ impl Device {
         on && self.acquires_since_ns.is_some()
     }
 
-    /// From one exposure to the next of a camera that runs freely now.
     pub fn free_period(&self) -> Option<Micros> {
         let free = self.acquires_since_ns.is_some() && self.registers.get(TRIGGER_MODE) == 0;
         let exposure = self.registers.get(EXPOSURE_US);
@@ -203,7 +198,7 @@ impl Device {
         free.then(|| Micros(by_rate.max(exposure.saturating_add(BETWEEN_EXPOSURES_US))))
     }
 
-    /// What the rig's camera is to be told, where it begins or ends to run freely.
+    /// Request to start or stop free running, if it changes.
     fn change_free_run(&mut self) -> Option<Control> {
         let period = self.free_period();
         if period.is_some() == self.free_run {
@@ -214,7 +209,7 @@ impl Device {
         Some(Control::FreeRun { period: period.unwrap_or(Micros(0)), exposure })
     }
 
-    /// Whoever had it has it no more.
+    /// Ends the control of the client.
     fn release(&mut self) -> Option<Control> {
         self.controller = None;
         self.acquires_since_ns = None;
@@ -223,7 +218,7 @@ impl Device {
         self.change_free_run()
     }
 
-    /// Takes the camera from a controller that has said nothing for too long; `from` has just said something.
+    /// Ends the control of a client that missed its heartbeat; `from` has just sent a packet.
     pub fn look_for_controller(&mut self, now: Instant, from: Option<SocketAddr>) -> Option<Control> {
         let allowed = Duration::from_millis(u64::from(self.registers.get(HEARTBEAT_MS)));
         let (controller, heard) = self.controller?;
@@ -238,8 +233,8 @@ impl Device {
         asked.clamp(HEADERS_BYTES + 64, PACKET_BYTES_MAX)
     }
 
-    /// A picture as packets and where they go; `None` where it is nobody's: without an acquisition, exposed before it began, or not triggered
-    /// as the camera is now.
+    /// A picture as packets; `None` without an acquisition, if exposed before it began, or with another
+    /// trigger source.
     pub fn frame(&mut self, picture: &Picture) -> Option<Sending> {
         let since_ns = self.acquires_since_ns?;
         let free = picture.header.shot_id == FREE_RUNNING;
@@ -268,13 +263,13 @@ impl Device {
         self.sending(sent)
     }
 
-    /// Packets on their way to whoever has the camera; `None` where it has not said where they go.
+    /// Addresses packets to the client; `None` before it has set the destination.
     fn sending(&self, packets: Vec<Vec<u8>>) -> Option<Sending> {
         let gap = Duration::from_nanos(u64::from(self.registers.get(PACKET_DELAY_NS)));
         self.registers.destination().map(|to| Sending { to, packets, gap })
     }
 
-    /// The packets of a frame that can be sent again; some of them are lost again.
+    /// Packets of a frame that can be resent; some of them are lost again.
     fn again(&mut self, frame: u16, first: u32, last: u32) -> Option<Sending> {
         let (_, packets) = self.sent_frames.iter().find(|(number, _)| *number == frame)?;
         let (first, last) = (first as usize, (last as usize).min(packets.len().saturating_sub(1)));
@@ -284,18 +279,18 @@ impl Device {
         self.sending(sent)
     }
 
-    /// The region, with gain and black level, in the pixel format.
+    /// Applies region, gain, black level and pixel format.
     fn picture(&self, picture: &Picture) -> Option<Frame> {
         let get = |register| self.registers.get(register) as usize;
         let (sensor_width, sensor_height) =
             (usize::from(picture.header.width), usize::from(picture.header.height));
         let (left, top) = (get(OFFSET_X).min(sensor_width), get(OFFSET_Y).min(sensor_height));
-        // A region that reaches over the edge ends there; the offset may have been set after the size.
+        // Clip the region at the sensor's edge: the offset may have been set after the size.
         let (width, height) = (get(WIDTH).min(sensor_width - left), get(HEIGHT).min(sensor_height - top));
         let format = self.registers.get(PIXEL_FORMAT);
         let (gain, black) = (self.registers.get(GAIN), self.registers.get(BLACK_LEVEL));
         let max = (1_u32 << self.bits) - 1;
-        // To the next code, half of one up.
+        // Rounds half up.
         let developed = |code: u16| ((u32::from(code) * gain + 50) / 100 + black).min(max);
         let pixels = &picture.pixels;
         let mut bytes = Vec::with_capacity(2 * width * height);

@@ -1,40 +1,37 @@
-//! The camera's features by their standard names (GenICam SFNC): one table, from which the registers get their places, first values and
-//! ranges, and the description its nodes.
+//! The camera's features (GenICam SFNC) in one table, which defines registers, defaults, ranges and
+//! description nodes.
 
-/// What kind of value a feature has. Each lies in a register of 32 bits.
+/// Type of a feature. Each has a 32-bit register.
 #[derive(Clone, PartialEq, Debug)]
 pub enum Value {
     Constant,
-    /// A whole number.
     Integer {
         min: u32,
         max: u32,
     },
-    /// A number that the register holds in parts.
+    /// Fixed-point number.
     Number {
         min: u32,
         max: u32,
         parts: u32,
-        /// Unit of the number; empty for a factor.
+        /// Empty for a factor.
         unit: &'static str,
     },
     Choice(Vec<(&'static str, u32)>),
-    /// Something that is done when this is written.
+    /// Value that triggers the command.
     Command(u32),
 }
 
-/// A feature.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Feature {
     pub name: &'static str,
     pub category: &'static str,
     pub register: u32,
     pub value: Value,
-    /// The register at power-on.
+    /// Register value at power-on.
     pub initial: u32,
 }
 
-/// Columns of the sensor.
 pub const SENSOR_WIDTH: u32 = 0xA000;
 pub const SENSOR_HEIGHT: u32 = 0xA004;
 /// First column of the region.
@@ -46,39 +43,37 @@ pub const WIDTH: u32 = 0xA010;
 pub const HEIGHT: u32 = 0xA014;
 /// [`MONO_8`] and so on.
 pub const PIXEL_FORMAT: u32 = 0xA018;
-/// Bytes of a frame, with its chunks.
+/// Bytes per frame with chunks.
 pub const PAYLOAD_SIZE: u32 = 0xA01C;
-/// Continuous, and nothing else.
+/// Continuous only.
 pub const ACQUISITION_MODE: u32 = 0xA020;
 /// Starts ([`START`]) and stops ([`STOP`]).
 pub const ACQUISITION: u32 = 0xA024;
-/// Frames in 1000 s of a camera that runs freely.
+/// Frames per 1000 s when free running.
 pub const FRAME_RATE: u32 = 0xA028;
-/// FrameStart, and nothing else.
+/// FrameStart only.
 pub const TRIGGER_SELECTOR: u32 = 0xA02C;
 pub const TRIGGER_MODE: u32 = 0xA030;
 /// [`LINE_1`] or [`SOFTWARE`].
 pub const TRIGGER_SOURCE: u32 = 0xA034;
-/// Rising edge, and nothing else.
+/// Rising edge only.
 pub const TRIGGER_ACTIVATION: u32 = 0xA038;
 pub const TRIGGER_SOFTWARE: u32 = 0xA03C;
-/// Exposure of software triggers and of a camera that runs freely, in us; a hardware trigger's pulse is its own measure.
+/// Exposure in us for software triggers and free running; a hardware trigger's pulse sets its own.
 pub const EXPOSURE_US: u32 = 0xA040;
 /// Factor, in hundredths.
 pub const GAIN: u32 = 0xA044;
 pub const BLACK_LEVEL: u32 = 0xA048;
 /// Whether frames have chunks.
 pub const CHUNK_MODE: u32 = 0xA04C;
-/// Which chunk [`CHUNK_ENABLE`] is about.
+/// Chunk selected for [`CHUNK_ENABLE`].
 pub const CHUNK_SELECTOR: u32 = 0xA050;
-/// Whether the frame's time is a chunk; behind it the same of the frame's number.
+/// Enables the timestamp chunk; the next register enables the frame id.
 pub const CHUNK_ENABLE: u32 = 0xA054;
-/// What begins an acquisition.
 pub const START: u32 = 1;
 pub const STOP: u32 = 2;
 /// The board's trigger line.
 pub const LINE_1: u32 = 1;
-/// A command.
 pub const SOFTWARE: u32 = 7;
 /// PFNC: 8 bits in a byte.
 pub const MONO_8: u32 = 0x0108_0001;
@@ -86,7 +81,7 @@ pub const MONO_8: u32 = 0x0108_0001;
 pub const MONO_12: u32 = 0x0110_0005;
 pub const MONO_16: u32 = 0x0110_0007;
 
-/// Pixel formats of a sensor with a converter of so many bits, its own first.
+/// Pixel formats for a sensor of this many bits, native format first.
 fn formats(bits: u8) -> Vec<(&'static str, u32)> {
     match bits {
         ..=8 => vec![("Mono8", MONO_8)],
@@ -95,7 +90,7 @@ fn formats(bits: u8) -> Vec<(&'static str, u32)> {
     }
 }
 
-/// All features of a camera with this sensor (width, height) and bits.
+/// All features for a sensor of this width, height and bits.
 pub fn table((width, height): (u16, u16), bits: u8) -> Vec<Feature> {
     let (width, height) = (u32::from(width), u32::from(height));
     let formats = formats(bits);

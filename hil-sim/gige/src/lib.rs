@@ -1,18 +1,24 @@
 //! # farnear-gige
 //!
-//! A GigE Vision server for the emulated camera: a client can test its whole path from trigger to depth without buying a camera.
+//! A GigE Vision server for the emulated camera: clients can test the whole path from trigger to depth
+//! without a camera.
 //!
-//! Written from the protocol's public descriptions (packet layouts and register addresses as Aravis' headers give them), because Aravis' own
-//! fake camera has no line that triggers it, stamps its frames by the wall clock, and takes pictures from a C callback only. Here:
+//! Written from public protocol descriptions (packet layouts and register addresses as in Aravis' headers).
+//! Aravis' own fake
+//! camera cannot be triggered by a line, stamps frames by the wall clock, and takes pictures from a C
+//! callback only. Here:
 //!
 //! - the hardware trigger is the emulated board's trigger line; software triggers and free running work, too;
-//! - frames are stamped in the emulated rig's time, in the leader and as chunks, and counted from the start of the acquisition;
-//! - lost packets are sent again when asked for, and can be lost on purpose;
-//! - gain (a factor), black level, region and pixel format are applied to the finished picture, as digital cameras do behind the converter.
+//! - frames are stamped in rig time, in leader and chunks, and counted from the start of the acquisition;
+//! - lost packets are resent on request, and can be lost on purpose;
+//! - gain (a factor), black level, region and pixel format are applied after the converter, as in digital
+//!   cameras.
 //!
-//! [`control`]: the control channel (GVCP, UDP port 3956); [`registers`]: what can be read and written; [`features`]: the camera's features, one
-//! table from which registers and the GenICam [`description`] are made; [`stream`]: frames as packets (GVSP); [`pace`]: when they leave; [`device`]: what
-//! the camera does.
+//! [`control`]: control channel (GVCP, UDP port 3956); [`registers`]: readable and writable memory;
+//! [`features`]: table of
+//! registers and GenICam nodes for the [`description`]; [`stream`]: frames as packets (GVSP); [`pace`]:
+//! packet timing;
+//! [`device`]: the camera's state.
 
 pub mod control;
 pub mod description;
@@ -36,35 +42,30 @@ use thiserror::Error;
 use device::{Device, Sending};
 use pace::Pace;
 
-/// Where cameras listen, by the standard.
 const CONTROL_PORT: u16 = 3956;
-/// From one look at the heartbeat to the next.
+/// Interval of heartbeat checks.
 const LOOK: Duration = Duration::from_millis(100);
-/// A camera that runs freely waits so long for its picture to be rendered before time passes for the next: without that, a slow computer would
-/// render pictures of long ago.
+/// A free-running camera waits this long for rendering before time passes; otherwise slow computers would
+/// send outdated pictures.
 const RENDERING: Duration = Duration::from_secs(20);
-/// Longest wait for the rig's time to pass, by the wall clock.
+/// Longest wall-clock wait for rig time.
 const PATIENCE: Duration = Duration::from_millis(500);
 
-/// What a GigE Vision camera is made of.
 #[derive(Clone, Debug)]
 pub struct GigeConfig {
-    /// Address of the network interface on which it answers.
+    /// Address of its network interface.
     pub address: Ipv4Addr,
-    /// Its serial number is made of it, and which packets are lost.
+    /// Seed of the serial number and of packet loss.
     pub seed: u64,
-    /// So many of 1000 packets are lost.
+    /// Lost packets per 1000.
     pub lost_per_thousand: u32,
-    /// Size of the sensor: width, height.
+    /// Width and height of the sensor.
     pub sensor_px: (u16, u16),
-    /// Bits of its converter.
     pub bits: u8,
 }
 
-/// The address that a user names: `lo`, or an IPv4 address of this computer.
-///
-/// # Errors
-/// Anything else, in words.
+/// Parses `lo` or an IPv4 address of this computer.
+/// Errors: a message for anything else.
 pub fn interface(text: &str) -> Result<Ipv4Addr, String> {
     match text {
         "lo" => Ok(Ipv4Addr::LOCALHOST),
@@ -74,22 +75,20 @@ pub fn interface(text: &str) -> Result<Ipv4Addr, String> {
     }
 }
 
-/// An exposure of the emulated camera.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Picture {
-    /// Start of the exposure, virtual nanoseconds.
+    /// Start of the exposure.
     pub begin_ns: u64,
     pub header: FrameHeader,
-    /// Row by row, 16 bits each, the lower byte first.
+    /// Rows of 16-bit values, little-endian.
     pub pixels: Vec<u8>,
 }
 
-/// The camera cannot open its sockets or threads.
+/// Sockets or threads cannot be opened.
 #[derive(Debug, Error)]
 #[error("{what}: {source}")]
 pub struct OpenError {
     pub what: String,
-    /// The system's error.
     pub source: std::io::Error,
 }
 
@@ -99,11 +98,9 @@ fn lock(device: &Shared) -> MutexGuard<'_, Device> {
     device.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Opens the camera: `pictures` go to whoever has it under control, and what its host asks of it to `ask`; `now` is the emulated rig's time in
-/// ns. Gives its identification, by which clients open it.
-///
-/// # Errors
-/// [`OpenError`] where the address is not this computer's, or another camera has the port.
+/// Opens the camera and returns its identification. `pictures` go to the controlling client, requests of its
+/// host to `ask`; `now` returns rig time in ns.
+/// Errors: [`OpenError`] if the address is not local or the port is taken.
 pub fn open(
     config: &GigeConfig,
     pictures: Receiver<Picture>,
@@ -133,7 +130,7 @@ pub fn open(
     let spawn = |name: &str, work: Box<dyn FnOnce() + Send>| {
         thread::Builder::new().name(name.into()).spawn(work).map_err(failed)
     };
-    // Whoever looks for cameras shouts to all; what is sent to this computer's own address arrives by the other socket.
+    // Discovery is broadcast; unicast packets to this address arrive at the other socket.
     match UdpSocket::bind((Ipv4Addr::BROADCAST, CONTROL_PORT)) {
         Ok(shouts) => {
             let (device, answers) = (Arc::clone(&device), control.try_clone().map_err(failed)?);
@@ -152,11 +149,10 @@ pub fn open(
     Ok(id)
 }
 
-/// Answers those who look for cameras.
 fn discover(shouts: &UdpSocket, answers: &UdpSocket, device: &Shared) {
     let mut bytes = [0; control::PACKET_MAX];
     while let Ok((length, from)) = shouts.recv_from(&mut bytes) {
-        // A shout in another network is heard here, too; a camera would not hear it, and its frames would not get there.
+        // Ignore broadcasts from other networks: frames could not get there.
         let reachable =
             from.ip().is_loopback() == answers.local_addr().is_ok_and(|own| own.ip().is_loopback());
         if reachable && let Some(answer) = control::discovery(&bytes[..length], lock(device).registers()) {
@@ -165,7 +161,7 @@ fn discover(shouts: &UdpSocket, answers: &UdpSocket, device: &Shared) {
     }
 }
 
-/// Does what comes by the control channel.
+/// Serves the control channel.
 fn obey(
     control: &UdpSocket,
     stream: &UdpSocket,
@@ -177,14 +173,14 @@ fn obey(
     let mut pace = Pace::new(Instant::now());
     loop {
         let received = control.recv_from(&mut bytes);
-        // Each time, not in silence only: others may be talking all the while.
+        // Checked on every packet, because other clients may be active.
         lock(device)
             .look_for_controller(Instant::now(), received.as_ref().ok().map(|(_, from)| *from))
             .into_iter()
             .for_each(ask);
-        // Without: nothing came, or an answer that nobody took came back as an error.
+        // Errors: timeout, or an answer that was refused.
         if let Ok((length, from)) = received {
-            // The time is asked for before the device is held: the rig may be waiting for a picture to be taken.
+            // The time is read before locking the device: the rig may wait for a picture to be fetched.
             let starts = control::starts_acquisition(&bytes[..length]);
             let now_ns = if starts { now() } else { 0 };
             let done = lock(device).obey(&bytes[..length], from, Instant::now(), now_ns);
@@ -201,7 +197,8 @@ fn obey(
     }
 }
 
-/// Asks the rig; a camera that runs freely no more has ended its last exposure when this returns, so that it hears the next trigger.
+/// Forwards to the rig. After free running ends, waits for the last exposure, so that the next trigger is
+/// accepted.
 fn carry_out(asked: Control, ask: &impl Fn(Control), now: &impl Fn() -> u64) {
     let ends = match asked {
         Control::FreeRun { period, exposure } if period.0 == 0 => Some(exposure),
@@ -217,7 +214,7 @@ fn carry_out(asked: Control, ask: &impl Fn(Control), now: &impl Fn() -> u64) {
     }
 }
 
-/// Sends pictures as frames while there is an acquisition.
+/// Sends pictures as frames during an acquisition.
 fn show(pictures: &Receiver<Picture>, stream: &UdpSocket, device: &Shared) {
     let mut pace = Pace::new(Instant::now());
     for picture in pictures {
@@ -235,7 +232,7 @@ fn send(stream: &UdpSocket, sending: &Sending, pace: &mut Pace) {
     }
 }
 
-/// A rig at which nothing happens stands still in time; a camera that runs freely lets it pass, a picture's worth at a time.
+/// An idle rig's time stands; free running advances it by one picture at a time.
 fn run_freely(device: &Shared, ask: &impl Fn(Control)) {
     loop {
         let (period, frames) = {
@@ -261,7 +258,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn interfaces_are_named_or_refused() {
+    fn parses_interfaces_and_rejects_others() {
         assert_eq!(interface("lo"), Ok(Ipv4Addr::LOCALHOST));
         assert_eq!(interface("127.0.0.7"), Ok(Ipv4Addr::new(127, 0, 0, 7)));
         let error = interface("eth7").unwrap_err();

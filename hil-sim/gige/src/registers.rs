@@ -1,4 +1,4 @@
-//! What can be read and written by the control channel: the bootstrap registers of GigE Vision 1.2, the camera's features, and its description.
+//! Memory of the control channel: bootstrap registers of GigE Vision 1.2, features and description.
 
 use std::net::Ipv4Addr;
 
@@ -12,34 +12,31 @@ use crate::{
     stream,
 };
 
-/// Who has the camera under control.
 pub const PRIVILEGE: u32 = 0x0A00;
-/// Both ways of having it: exclusively, and so that others may read.
+/// Exclusive access, or control with read access for others.
 pub const PRIVILEGE_CONTROL: u32 = 0b11;
-/// How long its controller may say nothing, in ms.
 pub const HEARTBEAT_MS: u32 = 0x0938;
-/// Port to which frames go.
+/// Destination port of frames.
 pub const STREAM_PORT: u32 = 0x0D00;
-/// Size of the stream's packets with their headers of IP and UDP, and flags.
+/// Packet size including IP and UDP headers, with flags.
 pub const PACKET_SIZE: u32 = 0x0D04;
-/// From one packet to the next at least, in ticks of the camera's clock, which are ns.
+/// Minimum gap of packets, in clock ticks, which are ns.
 pub const PACKET_DELAY_NS: u32 = 0x0D08;
-/// Address to which frames go.
+/// Destination address of frames.
 pub const STREAM_ADDRESS: u32 = 0x0D18;
-/// Bytes that a discovery is answered with.
+/// Size of the discovery answer.
 pub const DISCOVERY_BYTES: usize = 0xF8;
-/// The flag that has one packet of this size sent, to see whether it arrives.
+/// Flag: send one test packet of this size.
 pub const FIRE_TEST: u32 = 1 << 31;
 
-/// Where the description lies.
 const DESCRIPTION: u32 = 0x0001_0000;
-/// Packets at power-on: Ethernet's usual size.
+/// Default packet size: Ethernet's.
 const USUAL_PACKET_BYTES: u32 = 1500;
-/// The standard's own heartbeat.
+/// Default of the standard.
 const USUAL_HEARTBEAT_MS: u32 = 3000;
-/// Resends packets; has a register for a name; tells its serial number.
+/// Packet resend, register for a name, serial number.
 const CAPABILITIES: u32 = 1 << 2 | 1 << 1 | 1 | 1 << 30;
-/// What the standard lets be written, with its range.
+/// Writable bootstrap registers with ranges.
 const WRITABLE: [(u32, u32, u32); 9] = [
     (PRIVILEGE, 0, u32::MAX),
     (HEARTBEAT_MS, 500, 600_000),
@@ -52,28 +49,26 @@ const WRITABLE: [(u32, u32, u32); 9] = [
     (0x0D24, 0, u32::MAX), // configuration of the stream: nothing of it is here, and it reads as 0
 ];
 
-/// Why something cannot be read or written, by the standard's numbers.
+/// Status codes of the standard.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 #[repr(u16)]
 pub enum Refusal {
     NotImplemented = 0x8001,
-    /// A value out of range, or a packet that is none.
+    /// Value out of range, or invalid packet.
     InvalidParameter = 0x8002,
     InvalidAddress = 0x8003,
     WriteProtect = 0x8004,
     BadAlignment = 0x8005,
-    /// Somebody else has the camera.
+    /// Another client has control.
     AccessDenied = 0x8006,
 }
 
-/// The camera's memory.
 pub struct Registers {
     bytes: Vec<u8>,
     features: Vec<Feature>,
 }
 
 impl Registers {
-    /// As they are at power-on.
     pub fn new(config: &GigeConfig) -> Self {
         let features = table(config.sensor_px, config.bits);
         let text = description(&features);
@@ -93,7 +88,7 @@ impl Registers {
             let text = &text.as_bytes()[..text.len().min(room - 1)];
             registers.bytes[at..at + text.len()].copy_from_slice(text);
         }
-        // A locally administered address of its own for each seed.
+        // Locally administered address, unique per seed.
         let mac = config.seed as u32;
         for (register, value) in [
             (0x00, 0x0001_0002), // version 1.2
@@ -120,7 +115,7 @@ impl Registers {
         registers
     }
 
-    /// Maker, model and serial number, as clients put them together.
+    /// Vendor, model and serial number, joined as clients do.
     pub fn id(&self) -> String {
         let text = |at: usize, room: usize| {
             let bytes = &self.bytes[at..at + room];
@@ -130,14 +125,14 @@ impl Registers {
         format!("{}-{}-{}", text(0x48, 32), text(0x68, 32), text(0xD8, 16))
     }
 
-    /// Value of a register of the camera's own; 0 for what lies nowhere.
+    /// Value of a camera register; 0 outside of it.
     pub fn get(&self, register: u32) -> u32 {
         let at = register as usize;
         let bytes = self.bytes.get(at..at + 4).and_then(|bytes| bytes.try_into().ok());
         bytes.map_or(0, u32::from_be_bytes)
     }
 
-    /// Sets a register of the camera's own, whoever may write it.
+    /// Sets a camera register without access check.
     pub fn put(&mut self, register: u32, value: u32) {
         let at = register as usize;
         if let Some(bytes) = self.bytes.get_mut(at..at + 4) {
@@ -145,10 +140,8 @@ impl Registers {
         }
     }
 
-    /// Bytes from an address on.
-    ///
-    /// # Errors
-    /// [`Refusal`] where not all of them lie in the memory.
+    /// Bytes from an address.
+    /// Errors: [`Refusal`] if they are not all in the memory.
     pub fn read(&self, address: u32, length: usize) -> Result<&[u8], Refusal> {
         if !address.is_multiple_of(4) || !length.is_multiple_of(4) {
             return Err(Refusal::BadAlignment);
@@ -157,10 +150,8 @@ impl Registers {
         self.bytes.get(address as usize..end).ok_or(Refusal::InvalidAddress)
     }
 
-    /// Writes what a client may write.
-    ///
-    /// # Errors
-    /// [`Refusal`]: nothing is brought into its range in silence.
+    /// Writes a register on behalf of a client.
+    /// Errors: [`Refusal`]; values are never clamped silently.
     pub fn write(&mut self, register: u32, value: u32) -> Result<(), Refusal> {
         if !register.is_multiple_of(4) {
             return Err(Refusal::BadAlignment);
@@ -203,7 +194,7 @@ impl Registers {
         if may_write { Ok(false) } else { Err(Refusal::WriteProtect) }
     }
 
-    /// What follows from other registers.
+    /// Updates registers derived from others.
     fn settle(&mut self) {
         let pixel = if self.get(PIXEL_FORMAT) == MONO_8 { 1 } else { 2 };
         let image = self.get(WIDTH) * self.get(HEIGHT) * pixel;
@@ -211,7 +202,6 @@ impl Registers {
         self.put(PAYLOAD_SIZE, image + chunks);
     }
 
-    /// Which chunks are turned on.
     pub fn chunk_flags(&self) -> [bool; CHUNKS.len()] {
         let mut index = 0;
         [(); CHUNKS.len()].map(|()| {
@@ -221,7 +211,7 @@ impl Registers {
         })
     }
 
-    /// Where frames go; `None` where nobody has said.
+    /// Destination of frames; `None` until set.
     pub fn destination(&self) -> Option<std::net::SocketAddr> {
         let port = u16::try_from(self.get(STREAM_PORT)).ok().filter(|port| *port > 0)?;
         Some((Ipv4Addr::from_bits(self.get(STREAM_ADDRESS)), port).into())
@@ -243,7 +233,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_written_is_in_its_range_or_refused() {
+    fn rejects_register_values_out_of_range() {
         let mut registers = Registers::new(&config());
         assert_eq!(registers.id(), "farnear-emulated-S7");
         assert_eq!(registers.get(PAYLOAD_SIZE), 640 * 480 * 2);

@@ -1,50 +1,46 @@
-//! Frames as packets of the stream (GVSP 1.x): a leader, the payload, a trailer.
+//! Frames as stream packets (GVSP 1.x): leader, payload, trailer.
 
 use crate::description::CHUNKS;
 
-/// Headers of IP, UDP and GVSP, which the size of a packet counts.
+/// IP, UDP and GVSP headers, included in the packet size.
 pub const HEADERS_BYTES: usize = 20 + 8 + 8;
-/// Headers of IP and UDP.
 pub const UDP_HEADERS_BYTES: usize = 20 + 8;
 
 const LEADER: u32 = 1;
 const TRAILER: u32 = 2;
 const PAYLOAD: u32 = 3;
-/// Payload of type image; with this flag chunks follow it.
+/// Payload type image; with this flag chunks follow.
 const IMAGE: u16 = 1;
 const WITH_CHUNKS: u16 = 0x4000;
-/// Number of the chunk that the image itself is.
 const IMAGE_CHUNK: u32 = 0xFA00_0000;
-/// A chunk's number and length stand behind it.
+/// Chunk id and length.
 const CHUNK_TRAILER_BYTES: u32 = 8;
-/// Time and number of a frame.
+/// Timestamp and frame id.
 const CHUNK_VALUE_BYTES: u32 = 8;
 
-/// A picture as it leaves.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Frame {
-    /// Running number since the start of the acquisition, from 1.
+    /// From 1 at the start of the acquisition.
     pub number: u64,
-    /// Start of the exposure, in ns.
+    /// Start of the exposure.
     pub time_ns: u64,
-    /// PFNC's number.
+    /// PFNC code.
     pub pixel_format: u32,
     pub size_px: (u32, u32),
     /// First column and row.
     pub offset_px: (u32, u32),
-    /// Pixels in their format.
     pub pixels: Vec<u8>,
-    /// Which chunks follow, where any do.
+    /// Enabled chunks, if any.
     pub chunks: Option<[bool; CHUNKS.len()]>,
 }
 
 impl Frame {
-    /// The number that the packets carry: 16 bits, which go around past 0.
+    /// 16-bit frame id; skips 0 on overflow.
     pub fn short_number(&self) -> u16 {
         ((self.number - 1) % 65_535 + 1) as u16
     }
 
-    /// Its packets, of at most so many bytes with all headers.
+    /// Packets of at most this size with all headers.
     pub fn packets(&self, packet_bytes: usize) -> Vec<Vec<u8>> {
         let room = packet_bytes.saturating_sub(HEADERS_BYTES).max(1);
         let payload = self.payload();
@@ -100,7 +96,7 @@ impl Frame {
     }
 }
 
-/// Bytes behind the image's pixels.
+/// Bytes after the pixels.
 pub fn chunk_bytes(active: bool, on: [bool; CHUNKS.len()]) -> u32 {
     let values = on.iter().filter(|on| **on).count() as u32;
     if active { CHUNK_TRAILER_BYTES + values * (CHUNK_VALUE_BYTES + CHUNK_TRAILER_BYTES) } else { 0 }

@@ -1,31 +1,35 @@
-//! The blurred scene on the sensor: every texture cell spreads by its own blur, nearer surfaces hide
-//! farther ones.
+//! The blurred scene on the sensor: each texture cell spreads by its own blur, nearer surfaces hide farther
+//! ones.
 //!
-//! # What is computed
+//! # Method
 //!
-//! *Scatter.* Each texture sample (one per cell of half a pixel) adds its light to the pixels around it
-//! with the weights of the [kernel](crate::kernel) of its own blur radius. For one plane this is the exact
-//! convolution.
+//! *Scatter.* Each texture sample (one per cell of half a pixel) adds light to the surrounding pixels with
+//! the weights of the
+//! [kernel](crate::kernel) of its blur radius. For one plane this is the exact convolution.
 //!
-//! *Occlusion.* Cells are grouped into slabs of the signed blur, nearest first. A slab gives each pixel
-//! light `L` and cover `C` (the same sum with radiance 1). Front to back, a pixel takes `L` while its
-//! aperture is not yet full; the slab that would overfill it gives its mean `L / C` for the rest that is
-//! left open. So a surface of uniform radiance looks uniform whatever its shape (radiance is conserved
-//! along rays), a sharp near edge stays sharp before a blurred background, and what a near edge hides is
-//! filled in with the mean of what is visible beside it. Within the blur radius of a depth step this is an
-//! approximation (the exact image there depends on which part of the aperture sees past the edge): beside a
-//! step over the whole working range it is 1.5 % RMS and at most 8 % off for white noise of contrast 0.2;
-//! elsewhere the image agrees with ray casting to 1e-4 (planes) and 6e-4 (slopes), the ray caster's own
-//! error (`tests/exact.rs`).
+//! *Occlusion.* Cells are grouped into slabs of signed blur, nearest first. A slab gives each pixel light `L`
+//! and cover `C`
+//! (the same sum with radiance 1). Front to back, a pixel adds `L` until its aperture is full; the slab that
+//! overfills it
+//! contributes its mean `L / C` to the remaining part. Uniform radiance therefore looks uniform on any shape,
+//! and a sharp near
+//! edge stays sharp before a blurred background. Within the blur radius of a depth step this is an
+//! approximation: for a step
+//! over the whole working range 1.5 % RMS and at most 8 % off (white noise of contrast 0.2). Elsewhere it
+//! agrees with ray
+//! casting to 1e-4 (planes) and 6e-4 (slopes), the ray caster's own error (`tests/exact.rs`).
 //!
-//! *Levels.* Up to [`MAX_EXACT_LEVELS`] different depths have a slab with its exact kernel each. A
-//! continuous surface has slabs of [`SLAB_PX`] blur, in which kernels are tabulated every [`LEVEL_PX`] and
-//! interpolated linearly in the square of the radius, which keeps the second moment exact.
+//! *Levels.* Up to [`MAX_EXACT_LEVELS`] depths have a slab with its exact kernel each. A continuous surface
+//! has slabs of
+//! [`SLAB_PX`] blur. Their kernels are tabulated every [`LEVEL_PX`] and interpolated in the square of the
+//! radius, which keeps
+//! the second moment exact.
 //!
 //! # Cost
-//! Cells times the kernel's pixels, twice (light and cover; a plane has full cover and needs one): 20 to
-//! 300 ms for 640 x 480 at 2.7 px. Kernels wider than [`MAX_DIRECT_PX`] go through the FFT as one slab with
-//! levels spaced by [`LEVEL_RATIO`] of the radius: up to a second, but a rig is there only while it homes.
+//! Cells times kernel pixels, twice (light and cover; a plane needs one): 20 to 300 ms for 640 x 480 at 2.7
+//! px. Kernels wider
+//! than [`MAX_DIRECT_PX`] use one FFT slab with levels spaced by [`LEVEL_RATIO`] of the radius: up to a
+//! second.
 
 use ndarray::Array2;
 use rustfft::num_complex::Complex32;
@@ -35,9 +39,9 @@ use crate::fourier::{Fourier2, good_size};
 use crate::kernel::{CELLS_PER_PIXEL, CellKernel};
 use crate::psf::Psf;
 
-/// Number of different depths up to which each has its own exact kernel.
+/// Number of depths with an exact kernel each.
 pub const MAX_EXACT_LEVELS: usize = 32;
-/// Thickness of an occlusion slab on a continuous surface, px of blur radius.
+/// Thickness of an occlusion slab, px of blur radius.
 pub const SLAB_PX: f32 = 0.25;
 /// Spacing of tabulated kernels, px of blur radius.
 pub const LEVEL_PX: f32 = 0.05;
@@ -46,7 +50,7 @@ pub const LEVEL_RATIO: f32 = 0.02;
 /// Widest kernel that is scattered directly, px from its centre.
 pub const MAX_DIRECT_PX: usize = 15;
 
-/// The cells of a scene around an image, with what they need to be blurred.
+/// Cells of a scene around an image.
 pub(crate) struct Cells {
     /// Cells beyond each border of the image, px.
     pub(crate) margin_px: usize,
@@ -62,13 +66,13 @@ pub(crate) enum Blur {
     Varying(Array2<f32>),
 }
 
-/// Pixels that the kernel of `psf` reaches from its own at the blur radius `blur_px`.
+/// Reach of the kernel of `psf` at the blur radius `blur_px`, px.
 pub(crate) fn kernel_reach_px(psf: &Psf, blur_px: f32) -> usize {
     CellKernel::reach(psf, f64::from(blur_px.abs())).div_ceil(CELLS_PER_PIXEL)
 }
 
 impl Cells {
-    /// The mean radiance of each pixel of the image, shape (height, width).
+    /// Mean radiance of each pixel, shape (height, width).
     pub(crate) fn blurred(&self, psf: &Psf) -> Array2<f32> {
         let (slabs, members) = self.slabs(psf);
         let mut image = Composite::new(self.image_size());
@@ -98,7 +102,7 @@ impl Cells {
         (pixels(self.radiance.nrows()), pixels(self.radiance.ncols()))
     }
 
-    /// Slabs, nearest first, and the slab of each cell (`None`: all are in the one slab).
+    /// Slabs, nearest first, and the slab of each cell (`None`: one slab).
     fn slabs(&self, psf: &Psf) -> (Vec<Slab>, Option<Array2<u8>>) {
         let blur = match &self.blur_px {
             Blur::Uniform(blur) => return (vec![Slab::new(psf, vec![blur.abs()], false)], None),
@@ -128,7 +132,7 @@ impl Cells {
         (slabs, Some(members))
     }
 
-    /// Light and cover that the chosen cells give to each pixel.
+    /// Light and cover of the chosen cells per pixel.
     fn scatter(
         &self,
         psf: &Psf,
@@ -146,8 +150,7 @@ impl Cells {
         }
     }
 
-    /// The same with kernel rows of `LANES` pixels, zero beyond the kernel, so that the compiler unrolls
-    /// them.
+    /// Uses kernel rows of `LANES` pixels, zero-padded, so that the compiler unrolls them.
     fn scatter_lanes<const LANES: usize>(
         &self,
         psf: &Psf,
@@ -192,11 +195,10 @@ impl Cells {
         sums
     }
 
-    /// Light and cover of all cells by FFT: one convolution per level, cells shared between the two levels
-    /// around their blur.
+    /// Light and cover by FFT: one convolution per level; each cell is shared between two levels.
     fn convolve(&self, psf: &Psf, slab: &Slab) -> Sums {
         let (rows, columns) = self.radiance.dim();
-        // Circular wrap reaches the margin only, which is as wide as the kernel.
+        // Circular wrap affects only the margin, which is as wide as the kernel.
         let mut fourier = Fourier2::new(good_size(rows), good_size(columns));
         let (height, width) = (fourier.height, fourier.width);
         let mut total = vec![Complex32::default(); height * width];
@@ -249,7 +251,7 @@ impl Cells {
     }
 }
 
-/// Adds `amount` times the kernel to the square of pixels that starts with the first of `target`.
+/// Adds `amount` times the kernel to the pixels starting at `target`.
 #[inline(always)]
 fn add_kernel<const LANES: usize>(target: &mut [f32], stride: usize, kernel: &[[f32; LANES]], amount: f32) {
     for (row, weights) in target.chunks_mut(stride).zip(kernel) {
@@ -261,7 +263,7 @@ fn add_kernel<const LANES: usize>(target: &mut [f32], stride: usize, kernel: &[[
     }
 }
 
-/// The kernels of one blur radius for the four places of a cell in its pixel, `(row % 2) * 2 + column % 2`.
+/// Kernels for the four positions of a cell in its pixel, `(row % 2) * 2 + column % 2`.
 fn pixel_kernels<const LANES: usize>(psf: &Psf, radius_px: f32, reach_px: usize) -> [Vec<[f32; LANES]>; 4] {
     let cells = CellKernel::new(psf, f64::from(radius_px));
     let reach = reach_px as isize;
@@ -309,7 +311,7 @@ fn distinct_values(blur: &Array2<f32>) -> Option<Vec<f32>> {
 struct Slab {
     /// Blur radii of the tabulated kernels, ascending, evenly spaced, px.
     radii_px: Vec<f32>,
-    /// Pixels that the widest kernel reaches.
+    /// Reach of the widest kernel.
     reach_px: usize,
     /// Whether the slab may leave pixels uncovered.
     needs_cover: bool,

@@ -1,9 +1,8 @@
-//! From irradiance to codes: the camera's size, its electrons and its quantisation.
+//! From irradiance to codes: size, electrons and quantisation.
 //!
-//! A pixel of mean scene radiance collects `exposure_level` of the full well on average. Each pixel draws a
-//! Poisson number of electrons (shot noise), gets normal read noise, is limited to 0..full well and rounded
-//! to the camera's codes, the largest code being the full well (Janesick, Photon Transfer, 2007, ch. 3).
-//! Costs about 0.1 us a pixel.
+//! A pixel of mean radiance collects `exposure_level` of the full well. Each pixel draws Poisson shot noise
+//! and normal read noise, is limited to 0..full well and rounded to codes, the largest being the full well
+//! (Janesick, Photon Transfer, 2007, ch. 3). Costs about 0.1 us a pixel.
 
 use std::fmt;
 use std::str::FromStr;
@@ -16,10 +15,10 @@ use thiserror::Error;
 
 use crate::defects::Defects;
 
-/// What the camera adds to the light.
+/// Noise and bit depth of the camera.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Noise {
-    /// No noise; codes of 16 bit, so that what rounding takes is far below any noise.
+    /// No noise; 16-bit codes, so that rounding is negligible.
     None,
     /// Shot and read noise, codes 0..=255.
     EightBit,
@@ -28,7 +27,7 @@ pub enum Noise {
 }
 
 impl Noise {
-    /// Largest code; it stands for the full well.
+    /// Largest code; equals the full well.
     #[must_use]
     pub fn max_code(self) -> u16 {
         match self {
@@ -38,7 +37,7 @@ impl Noise {
         }
     }
 
-    /// Bits of a code.
+    /// Bits per code.
     #[must_use]
     pub fn bits(self) -> u8 {
         match self {
@@ -49,32 +48,16 @@ impl Noise {
     }
 }
 
-/// Why a camera was refused.
+/// An invalid camera.
 #[derive(Debug, Clone, PartialEq, Error)]
+#[expect(missing_docs, reason = "the messages name the fields")]
 pub enum CameraError {
-    /// A noise name that does not exist.
     #[error("unknown noise {0:?}, expected none, 8bit or 12bit")]
     UnknownNoise(String),
-    /// An image without pixels, or too large to render.
     #[error("camera of {width_px} x {height_px} pixels, expected 1 to {max_px} along each side")]
-    Size {
-        /// Width, px.
-        width_px: usize,
-        /// Height, px.
-        height_px: usize,
-        /// Largest side, px.
-        max_px: usize,
-    },
-    /// A number that makes no camera.
+    Size { width_px: usize, height_px: usize, max_px: usize },
     #[error("camera: {name} = {value}, expected {expected}")]
-    Unusable {
-        /// Which number.
-        name: &'static str,
-        /// Its value.
-        value: f64,
-        /// What it has to be.
-        expected: &'static str,
-    },
+    Unusable { name: &'static str, value: f64, expected: &'static str },
 }
 
 impl FromStr for Noise {
@@ -108,9 +91,9 @@ pub struct Camera {
     pub width_px: usize,
     /// Image height, px.
     pub height_px: usize,
-    /// Noise and bits.
+    /// Noise and bit depth.
     pub noise: Noise,
-    /// Electrons that a pixel holds; the largest code.
+    /// Electrons at the largest code.
     pub full_well_e: f64,
     /// Mean signal as a fraction of the full well.
     pub exposure_level: f64,
@@ -121,7 +104,7 @@ pub struct Camera {
 }
 
 impl Default for Camera {
-    /// 640 x 480, 8 bit.
+    /// 640 x 480 px, 8 bit, with noise.
     fn default() -> Self {
         Self::new(640, 480, Noise::EightBit)
     }
@@ -131,8 +114,7 @@ impl Camera {
     /// Largest side of an image, px.
     pub const MAX_SIDE_PX: usize = 16_384;
 
-    /// A camera of this size with a full well of 20,000 electrons, exposed to 45 % of it, and a read noise
-    /// of 12 electrons.
+    /// Full well 20,000 electrons, exposed to 45 %, read noise 12 electrons.
     #[must_use]
     pub fn new(width_px: usize, height_px: usize, noise: Noise) -> Self {
         Self {
@@ -146,8 +128,7 @@ impl Camera {
         }
     }
 
-    /// # Errors
-    /// [`CameraError`] for a size or a number that no camera has.
+    /// Errors: [`CameraError`] for an invalid size or number.
     pub(crate) fn check(&self) -> Result<(), CameraError> {
         let sides = 1..=Self::MAX_SIDE_PX;
         if !sides.contains(&self.width_px) || !sides.contains(&self.height_px) {
@@ -170,9 +151,9 @@ impl Camera {
         self.defects.check()
     }
 
-    /// Codes of one exposure of `radiance` (blurred scene, mean 1). The noise is a function of `seed` and
-    /// `exposure_number` alone. Where the camera makes no sense (which [`Renderer::new`](crate::Renderer::new) refuses) so do
-    /// the codes.
+    /// Codes of one exposure of `radiance` (blurred scene, mean 1). The noise depends on `seed` and
+    /// `exposure_number` only. The camera must be valid, as checked by
+    /// [`Renderer::new`](crate::Renderer::new).
     #[must_use]
     pub fn expose(&self, radiance: ArrayView2<'_, f32>, seed: u64, exposure_number: u32) -> Array2<u16> {
         let max_code = f64::from(self.noise.max_code());
@@ -191,10 +172,10 @@ impl Camera {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         random.set_stream(1 + u64::from(exposure_number)); // stream 0 is the texture's
         let read_noise = Normal::new(0.0, self.read_noise_e).ok();
-        // Row by row in a fixed order: the noise of a pixel depends on its place, not on threads.
+        // Fixed order: noise depends on the pixel's position, not on threads.
         radiance.map(|&radiance| {
             let expected_e = f64::from(radiance) * mean_e;
-            // No light has no Poisson distribution, and no electrons.
+            // Poisson is undefined without light.
             let collected_e = Poisson::new(expected_e).map_or(0.0, |shot| shot.sample(&mut random));
             code(hot_e() + collected_e + read_noise.map_or(0.0, |read_noise| read_noise.sample(&mut random)))
         })
@@ -205,7 +186,7 @@ impl Camera {
 mod tests {
     use super::*;
 
-    /// Mean and variance of the electrons of a flat exposure.
+    /// Mean and variance of a flat exposure, electrons.
     fn statistics(camera: &Camera, radiance: f32) -> (f64, f64) {
         let flat = Array2::from_elem((camera.height_px, camera.width_px), radiance);
         let e_per_code = camera.full_well_e / f64::from(camera.noise.max_code());
@@ -224,8 +205,7 @@ mod tests {
                 let expected_mean = f64::from(radiance) * 9_000.0;
                 let code_e = 20_000.0 / f64::from(noise.max_code());
                 let expected_variance = expected_mean + 12.0 * 12.0 + code_e * code_e / 12.0;
-                // 200,000 pixels: the mean to 0.22 %, the variance to 0.32 % of the standard deviation and
-                // variance (1 SD).
+                // 200,000 pixels: the mean to 0.22 %, the variance to 0.32 % (1 SD).
                 assert!(
                     (mean - expected_mean).abs() < 0.01 * expected_variance.sqrt(),
                     "{noise} {radiance} {mean}"
@@ -265,7 +245,7 @@ mod tests {
     }
 
     #[test]
-    fn senseless_cameras_are_named() {
+    fn rejects_invalid_cameras_by_name() {
         let text = |camera: Camera| camera.check().unwrap_err().to_string();
         assert!(text(Camera::new(0, 480, Noise::None)).contains("0 x 480"));
         assert!(text(Camera { full_well_e: f64::NAN, ..Camera::default() }).contains("full_well_e = NaN"));

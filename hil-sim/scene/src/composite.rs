@@ -1,11 +1,11 @@
-//! Slabs of a scene laid behind each other, front to back (see [`crate::blur`]). Costs a few operations a pixel.
+//! Combines slabs of a scene, front to back (see [`crate::blur`]).
 
 use ndarray::Array2;
 
-/// Light and cover per pixel, with a border that takes what falls beside the image.
+/// Light and cover per pixel, with a border for light outside the image.
 pub(crate) struct Sums {
     pub(crate) light: Vec<f32>,
-    /// Empty where the slab covers everything.
+    /// Empty if the slab covers everything.
     pub(crate) cover: Vec<f32>,
     pub(crate) border_px: usize,
     pub(crate) stride: usize,
@@ -30,10 +30,9 @@ impl Sums {
     }
 }
 
-/// The image while slabs are laid behind each other.
 pub(crate) struct Composite {
     light: Array2<f32>,
-    /// Share of the aperture that no slab has filled yet.
+    /// Share of the aperture that is still open.
     open: Array2<f32>,
 }
 
@@ -42,7 +41,6 @@ impl Composite {
         Self { light: Array2::zeros(size), open: Array2::ones(size) }
     }
 
-    /// Lays a slab behind those before it.
     pub(crate) fn add_behind(&mut self, sums: &Sums) {
         let width = self.light.ncols();
         for (row, (mut light, mut open)) in
@@ -71,7 +69,7 @@ impl Composite {
         }
     }
 
-    /// The image; what rounding or the spread of slopes left open is scaled away.
+    /// The image; scales away gaps from rounding or the spread of slopes.
     pub(crate) fn finish(mut self) -> Array2<f32> {
         self.light.zip_mut_with(&self.open, |light, open| *light /= (1.0 - open).max(f32::MIN_POSITIVE));
         self.light

@@ -1,7 +1,7 @@
-//! What a real lens, lamp and sensor do to the light besides blurring it: shading and hot pixels. None of it by default.
+//! Shading and hot pixels of a real lens, lamp and sensor; none by default.
 //!
-//! Shading scales the light of each pixel; hot pixels add electrons after it, the same ones in every exposure of a seed. Costs
-//! about 5 ns a pixel, and nothing where there is none.
+//! Shading scales each pixel's light; then hot pixels add electrons, the same ones in every exposure of a
+//! seed. Costs about 5 ns a pixel.
 
 use ndarray::Array2;
 use rand::{RngCore, SeedableRng};
@@ -9,25 +9,24 @@ use rand_chacha::ChaCha8Rng;
 
 use crate::camera::CameraError;
 
-/// Stream of the seeded generator that says which pixels are hot; the texture's is 0, exposures count up from 1.
+/// Generator stream of hot pixels; the texture uses 0, exposures count from 1.
 const HOT_STREAM: u64 = u64::MAX;
 
-/// See the module.
+/// Shading and hot pixels of a camera.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Defects {
-    /// Share of the light that the corners lose, 0 to 1: the loss grows with the square of the distance from the middle.
+    /// Share of the light lost in the corners, 0 to 1; grows with the squared distance from the centre.
     pub vignetting: f64,
-    /// Change of the illumination from the left border to the right and from the top to the bottom, relative to the middle's.
+    /// Change of illumination from left to right and top to bottom, relative to the centre.
     pub uneven_light: [f64; 2],
-    /// Share of the pixels that are hot.
+    /// Share of hot pixels, 0 to 1.
     pub hot_pixel_share: f64,
-    /// Electrons that a hot pixel adds at most; each has its own, up to that.
+    /// Largest number of electrons added by a hot pixel.
     pub hot_pixel_e: f64,
 }
 
 impl Defects {
-    /// # Errors
-    /// [`CameraError::Unusable`] for what no camera has.
+    /// Errors: [`CameraError::Unusable`] for an invalid number.
     pub(crate) fn check(&self) -> Result<(), CameraError> {
         let [across, down] = self.uneven_light;
         let ranges = [
@@ -45,7 +44,6 @@ impl Defects {
         Ok(())
     }
 
-    /// Scales the light, shape (height, width).
     pub(crate) fn shade(&self, light: &mut Array2<f32>) {
         let [across, down] = self.uneven_light;
         if self.vignetting == 0.0 && across == 0.0 && down == 0.0 {
@@ -55,7 +53,7 @@ impl Defects {
         let (width, height) = (width as f64, height as f64);
         let corner2 = width * width + height * height;
         for ((row, column), light) in light.indexed_iter_mut() {
-            // From the middle, in px; twice that, so that the corner lies at `corner2`.
+            // Doubled distance from the centre, so that the corner is at `corner2`.
             let (x, y) = (column as f64 + 0.5 - 0.5 * width, row as f64 + 0.5 - 0.5 * height);
             let vignetted = 1.0 - self.vignetting * 4.0 * (x * x + y * y) / corner2;
             let lit = 1.0 + across * x / width + down * y / height;
@@ -63,7 +61,7 @@ impl Defects {
         }
     }
 
-    /// Electrons that each pixel adds, row by row; `None` where none does.
+    /// Electrons added to each pixel, row by row; `None` without hot pixels.
     pub(crate) fn hot_e(&self, (height, width): (usize, usize), seed: u64) -> Option<Array2<f64>> {
         if self.hot_pixel_share <= 0.0 || self.hot_pixel_e <= 0.0 {
             return None;
@@ -101,7 +99,7 @@ mod tests {
     }
 
     #[test]
-    fn light_from_one_side_falls_off_evenly() {
+    fn uneven_light_changes_linearly() {
         let defects = Defects { uneven_light: [0.3, 0.0], ..Defects::default() };
         let camera = Camera { defects, ..Camera::new(300, 10, Noise::None) };
         let codes = flat(&camera, 0);
@@ -124,7 +122,7 @@ mod tests {
     }
 
     #[test]
-    fn senseless_defects_are_named() {
+    fn rejects_invalid_defects_by_name() {
         let text = |defects: Defects| defects.check().unwrap_err().to_string();
         assert!(text(Defects { vignetting: 1.5, ..Defects::default() }).contains("vignetting = 1.5"));
         assert!(

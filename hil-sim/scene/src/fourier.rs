@@ -1,12 +1,11 @@
-//! Two-dimensional FFTs on row-major arrays, for texture synthesis and very large blur.
+//! Two-dimensional FFTs on row-major arrays.
 //!
-//! rustfft's scalar planner is used on purpose: its vector planners round differently from CPU to CPU, and
-//! a seed must give the same image everywhere.
+//! Uses rustfft's scalar planner: vector planners round differently per CPU, and a seed must give the same
+//! image everywhere.
 
 use rustfft::FftPlannerScalar;
 use rustfft::num_complex::Complex32;
 
-/// In-place FFTs of one size.
 pub(crate) struct Fourier2 {
     pub(crate) height: usize,
     pub(crate) width: usize,
@@ -20,14 +19,14 @@ impl Fourier2 {
         Self { height, width, planner: FftPlannerScalar::new(), scratch }
     }
 
-    /// Forward transform, without a factor.
+    /// Forward transform, unscaled.
     pub(crate) fn forward(&mut self, data: &mut [Complex32]) {
         let (rows, columns) =
             (self.planner.plan_fft_forward(self.width), self.planner.plan_fft_forward(self.height));
         self.run(data, &*rows, &*columns);
     }
 
-    /// Inverse transform, without a factor: forward then inverse multiplies by `height * width`.
+    /// Inverse transform, unscaled: a round trip multiplies by `height * width`.
     pub(crate) fn inverse(&mut self, data: &mut [Complex32]) {
         let (rows, columns) =
             (self.planner.plan_fft_inverse(self.width), self.planner.plan_fft_inverse(self.height));
@@ -42,7 +41,7 @@ impl Fourier2 {
     }
 }
 
-/// Writes the transpose of `from` (`height` rows) into `to`, in blocks that stay in the cache.
+/// Transposes `from` (`height` rows) into `to` in cache-sized blocks.
 fn transpose(from: &[Complex32], to: &mut [Complex32], height: usize, width: usize) {
     const BLOCK: usize = 16;
     for row_block in (0..height).step_by(BLOCK) {
@@ -56,7 +55,7 @@ fn transpose(from: &[Complex32], to: &mut [Complex32], height: usize, width: usi
     }
 }
 
-/// The smallest even size of at least `least` without prime factors above 5.
+/// Smallest even size of at least `least` without prime factors above 5.
 pub(crate) fn good_size(least: usize) -> usize {
     (least.max(2)..)
         .find(|&size| {

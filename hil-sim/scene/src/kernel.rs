@@ -1,22 +1,26 @@
-//! PSFs integrated over texture cells and pixels: the weights with which the scene reaches the sensor.
+//! PSFs integrated over texture cells and pixels.
 //!
-//! A texture sample lies at the centre of a square cell of half a pixel; between samples the radiance is
-//! bilinear. (Cells of constant radiance would be a mosaic in step with the pixels: what such a mosaic has
-//! above its own sampling frequency folds back in phase and makes a focused image up to 10 % crisper than its
-//! texture, which shows as a depth error of half a millimetre at the ends of the working range.)
+//! A texture sample is the centre of a square cell of half a pixel, with bilinear radiance in between. Cells
+//! of constant
+//! radiance would alias in phase with the pixels and make focused images up to 10 % too crisp, a depth error
+//! of 0.5 mm at the
+//! ends of the working range.
 //!
-//! Lengths here are in cells. A sample of radiance 1 gives the cell-sized square at the offset `d` the mean
-//! `V(d) = integral psf(x, y) B(x - d_x) B(y - d_y) dx dy`, where `B` is the quadratic B-spline: the
-//! triangle of linear interpolation averaged over the square. A pixel is the mean of its four cells. So the
-//! weights are exact for the stated model: no sampling of the PSF enters.
+//! Lengths are in cells. A sample of radiance 1 gives the cell at offset `d` the mean
+//! `V(d) = integral psf(x, y) B(x - d_x) B(y - d_y) dx dy` with the quadratic B-spline `B` (the triangle of
+//! linear
+//! interpolation averaged over the cell). A pixel is the mean of its four cells. The weights are exact for
+//! this model.
 //!
-//! * Pill-box: the inner integral over y is a polynomial in the height of the disc, the outer one over x is
-//!   split at every kink and, with `x = R sin t`, integrated by Gauss-Legendre to rounding.
+//! * Pill-box: the inner integral over y is a polynomial in the disc's height; the outer one over `x = R sin
+//!   t` is split at
+//!   each kink and integrated by Gauss-Legendre to rounding.
 //! * Gaussian: closed form in the error function.
-//! * Generalised Gaussian: Gauss-Legendre over the smooth parts; near the centre, where `f` has a cusp for
-//!   `p < 2`, as a mixture of discs, `f(r) = integral of -f'(R) [r < R] dR`.
+//! * Generalised Gaussian: Gauss-Legendre over the smooth parts; near the centre, with its cusp for `p < 2`,
+//!   a mixture of
+//!   discs, `f(r) = integral of -f'(R) [r < R] dR`.
 //!
-//! Tails beyond `exp(-12)` of the peak are cut and the kernel is normalised to 1.
+//! Tails below `exp(-12)` of the peak are cut and the kernel is normalised to 1.
 //! Cost: 10 us (pill-box, 2.7 px) to 1 ms (generalised) a kernel, growing with the square of the radius.
 
 use std::f64::consts::{FRAC_1_SQRT_2, PI};
@@ -24,19 +28,19 @@ use std::f64::consts::{FRAC_1_SQRT_2, PI};
 use crate::psf::{Profile, Psf};
 use crate::quadrature::{EIGHT, FOUR, integrate};
 
-/// Texture cells along a pixel's side.
+/// Texture cells per pixel side.
 pub const CELLS_PER_PIXEL: usize = 2;
 
-/// Exponent at which the tails of Gaussians are cut.
+/// Exponent at which Gaussian tails are cut.
 const TAIL_EXPONENT: f64 = 12.0;
 /// Half the width of the quadratic B-spline, cells.
 const SPLINE_REACH: f64 = 1.5;
-/// Places at which its pieces meet.
+/// Knots of the spline.
 const KNOTS: [f64; 4] = [-1.5, -0.5, 0.5, 1.5];
-/// Below this blur radius in cells the PSF is a point: its kernel differs from the point's by less than 1e-6.
+/// Blur radius in cells below which the PSF is a point: the kernels differ by less than 1e-6.
 const POINT_RADIUS: f64 = 1e-6;
 
-/// Weights `V(d)` for the offsets -radius..=radius in both directions, in cells.
+/// Weights `V(d)` for offsets -radius..=radius in both directions, in cells.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CellKernel {
     /// Largest offset, cells.
@@ -46,7 +50,7 @@ pub struct CellKernel {
 }
 
 impl CellKernel {
-    /// The kernel of `psf` at the blur radius `blur_px` (0 or more, px).
+    /// Kernel of `psf` at the blur radius `blur_px` (>= 0, px).
     #[must_use]
     pub fn new(psf: &Psf, blur_px: f64) -> Self {
         let blur = blur_px * CELLS_PER_PIXEL as f64;
@@ -73,7 +77,7 @@ impl CellKernel {
         }
     }
 
-    /// Largest offset of the kernel of `psf` at the blur radius `blur_px`, cells.
+    /// Largest offset of the kernel of `psf` at `blur_px`, cells.
     #[must_use]
     pub fn reach(psf: &Psf, blur_px: f64) -> usize {
         let blur = blur_px * CELLS_PER_PIXEL as f64;
@@ -83,11 +87,11 @@ impl CellKernel {
             Psf::Gaussian { k } => Profile { p: 2.0, sigma: k * blur }.radius_at(TAIL_EXPONENT),
             Psf::Generalised { p, k } => Profile { p, sigma: k * blur }.radius_at(TAIL_EXPONENT),
         };
-        // The spline at the offset d sees the PSF if d - 1.5 < extent.
+        // The spline at offset d overlaps the PSF if d - 1.5 < extent.
         (extent + SPLINE_REACH).ceil() as usize - 1
     }
 
-    /// Fills the square from the eighth with `0 <= y <= x`: every PSF here is a function of the distance.
+    /// Mirrors the octant `0 <= y <= x`: every PSF here is radially symmetric.
     fn from_octant(radius: usize, weight: impl Fn(usize, usize) -> f64) -> Self {
         let side = 2 * radius + 1;
         let mut weights = vec![0.0; side * side];
@@ -129,13 +133,12 @@ impl CellKernel {
     }
 }
 
-/// Quadratic B-spline: three unit squares convolved.
+/// Quadratic B-spline.
 fn spline(t: f64) -> f64 {
     let t = t.abs();
     if t < 0.5 { 0.75 - t * t } else { 0.5 * (SPLINE_REACH - t).max(0.0).powi(2) }
 }
 
-/// Integral of the spline up to `t`.
 fn spline_integral(t: f64) -> f64 {
     let tail = |t: f64| (SPLINE_REACH - t).max(0.0).powi(3) / 6.0;
     if t <= -0.5 {
@@ -147,7 +150,7 @@ fn spline_integral(t: f64) -> f64 {
     }
 }
 
-/// Integral of the product of splines at `(x, y)` over the disc of radius `radius` around the origin.
+/// Integral of the splines at `(x, y)` over a disc around the origin.
 fn disc_weight(x: f64, y: f64, radius: f64) -> f64 {
     let nearest = (x.abs() - SPLINE_REACH).max(0.0).hypot((y.abs() - SPLINE_REACH).max(0.0));
     if nearest >= radius {
@@ -157,7 +160,7 @@ fn disc_weight(x: f64, y: f64, radius: f64) -> f64 {
         return 1.0;
     }
     let angle = |position: f64| libm::asin((position / radius).clamp(-1.0, 1.0));
-    // Columns of the disc at radius * sin(t), cut where the spline or the disc's rim crosses a knot.
+    // Columns of the disc at radius * sin(t), cut where the spline or the disc's border crosses a knot.
     let mut cuts = KNOTS.map(|knot| angle(x + knot)).to_vec();
     let (start, end) = (cuts[0], cuts[3]);
     for edge in KNOTS.map(|knot| y + knot) {
@@ -178,7 +181,7 @@ fn disc_weight(x: f64, y: f64, radius: f64) -> f64 {
         .sum()
 }
 
-/// Integral of the spline at `d` under a Gaussian of standard deviation `sigma` on the line.
+/// Integral of the spline at `d` with a Gaussian of standard deviation `sigma`.
 fn gaussian_line_weight(d: f64, sigma: f64) -> f64 {
     // The spline is the third difference of a half parabola; its mean under the Gaussian, without the
     // quadratic polynomial that the difference removes.
@@ -191,9 +194,9 @@ fn gaussian_line_weight(d: f64, sigma: f64) -> f64 {
     (e - a) - 3.0 * (c - b)
 }
 
-/// Integral of the product of splines at `(x, y)` under a generalised Gaussian.
+/// Integral of the splines at `(x, y)` with a generalised Gaussian.
 fn profile_weight(x: f64, y: f64, profile: Profile) -> f64 {
-    // Scale on which the profile changes: the flanks of a large p are steeper than sigma.
+    // Scale of the profile: the flanks of a large p are steeper than sigma.
     let smooth = profile.sigma / profile.p.max(1.0) > 0.8;
     if !smooth || x.max(y) < 2.0 {
         return mixture_weight(x, y, profile);
@@ -214,12 +217,12 @@ fn profile_weight(x: f64, y: f64, profile: Profile) -> f64 {
         .sum()
 }
 
-/// The same as a mixture of discs: discs that hold the whole support sum to `f` at its far corner.
+/// [`profile_weight`] as a mixture of discs; discs that hold the whole support sum to `f` at its far corner.
 fn mixture_weight(x: f64, y: f64, profile: Profile) -> f64 {
     let nearest = (x - SPLINE_REACH).max(0.0).hypot((y - SPLINE_REACH).max(0.0));
     let farthest = (x + SPLINE_REACH).hypot(y + SPLINE_REACH);
     let outermost = farthest.min(profile.radius_at(30.0)).max(nearest);
-    // Panels: where the disc meets corners and edges of the spline's pieces, and where the profile bends.
+    // Panel borders: where the disc meets the spline's pieces, and where the profile bends.
     let mut radii = vec![nearest, outermost];
     for u in KNOTS.map(|knot| x + knot) {
         for v in KNOTS.map(|knot| y + knot) {
@@ -261,7 +264,7 @@ mod tests {
 
     #[test]
     fn weights_sum_to_one_before_normalisation() {
-        // Splines at all cells sum to 1 everywhere, so the weights sum to the PSF's integral.
+        // Splines at all cells sum to 1, so the weights sum to the PSF's integral.
         for radius in [0.01f64, 0.3, 1.0, 5.4, 23.0] {
             let reach = (radius + 1.5).ceil() as i32;
             let offsets =
@@ -297,22 +300,21 @@ mod tests {
 
     #[test]
     fn pixel_weights_agree_with_monte_carlo() {
-        // A point of the sample's hat goes where the PSF throws it; the share that lands on a pixel is its
-        // weight.
+        // Monte Carlo: the share of points on a pixel is its weight.
         const THROWS: u32 = 2_000_000;
         let mut random = ChaCha8Rng::seed_from_u64(3);
         for (radius_px, cell) in [(2.703, 0.0), (0.8, 0.5), (0.2, 0.0)] {
             let kernel = CellKernel::new(&Psf::PillBox, radius_px);
             let mut hits = std::collections::BTreeMap::new();
             for _ in 0..THROWS {
-                // Uniform on the disc by rejection, so that no formula of the kernel is used.
+                // Uniform on the disc by rejection, independent of the kernel's formulas.
                 let (x, y) = loop {
                     let (x, y): (f64, f64) = (random.random_range(-1.0..1.0), random.random_range(-1.0..1.0));
                     if x * x + y * y <= 1.0 {
                         break (x * radius_px, y * radius_px);
                     }
                 };
-                // The hat of linear interpolation around the centre of the cell: two uniform steps.
+                // The triangle of linear interpolation: two uniform steps.
                 let mut hat =
                     || 0.25 + random.random_range(-0.25..0.25) + random.random_range(-0.25..0.25f64);
                 let pixel = ((x + hat() + cell).floor() as isize, (y + hat() + cell).floor() as isize);
@@ -322,7 +324,7 @@ mod tests {
             for row in -4..=4 {
                 for column in -4..=4 {
                     let share = f64::from(*hits.get(&(row, column)).unwrap_or(&0)) / f64::from(THROWS);
-                    // A pixel gathers the mean of its cells: four cells' weights to a pixel make up 1.
+                    // A pixel is the mean of four cells, so their weights on a pixel sum to 1.
                     let weight = 4.0 * kernel.on_pixel(2 * row - first_cell, 2 * column - first_cell);
                     let deviation = (weight.max(1e-7) / f64::from(THROWS)).sqrt();
                     assert!(
@@ -347,8 +349,7 @@ mod tests {
 
     #[test]
     fn second_moment_is_the_psfs_plus_that_of_the_spline() {
-        // The spline has 1/4 in each direction; sampling at cells adds a ripple that fades with the
-        // blur.
+        // The spline adds 1/4 in each direction; sampling at cells adds a ripple that fades with the blur.
         for text in PSFS {
             let psf: Psf = text.parse().unwrap();
             let (blur_px, cells) = (2.703, CELLS_PER_PIXEL as f64);
@@ -359,7 +360,7 @@ mod tests {
                 .map(|(row, column)| kernel.at(row, column) * (row * row + column * column) as f64)
                 .sum();
             let expected = psf.second_moment(blur_px) * cells * cells + 2.0 / 4.0;
-            // The cut tail holds 1e-5 of a Gaussian, but 4e-4 of the long tails of p = 0.7, far out.
+            // The cut tail holds 1e-5 of a Gaussian, but 4e-4 for p = 0.7.
             let tolerance = if text.contains("p=0.7") { 1e-2 } else { 2e-3 };
             assert!((moment / expected - 1.0).abs() < tolerance, "{text}: {moment} {expected}");
         }

@@ -1,16 +1,16 @@
-//! The image-side telecentric thin lens: which blur an object distance gives at a sensor position.
+//! The image-side telecentric thin lens: blur of an object distance at a sensor position.
 //!
 //! Distances in mm from the lens: `u` on the object side, `w` and `s` on the image side. `1/F = 1/u + 1/w`;
-//! the blur radius on the sensor is `|s - w(u)| D / 2F` because the telecentric aperture sits in the front
-//! focal plane, so every cone of light has the half-angle of the f-number `F/D` whatever the object
-//! distance, and the magnification does not depend on `s` (Watanabe & Nayar 1997).
+//! the blur radius is `|s - w(u)| D / 2F`. The telecentric aperture in the front focal plane gives each cone
+//! of light the half-angle of the f-number `F/D`, so the magnification is independent of `s` (Watanabe &
+//! Nayar 1997).
 
 use thiserror::Error;
 
 use crate::optics::OpticsFile;
 pub use crate::thin_lens::image_distance_mm;
 
-/// A telecentric lens before a sensor, with its two focus settings.
+/// Telecentric lens with its two focus settings.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Lens {
     /// Focal length, mm.
@@ -19,52 +19,38 @@ pub struct Lens {
     pub aperture_mm: f64,
     /// Pixel pitch, mm.
     pub pixel_mm: f64,
-    /// Object distance in focus at the far setting, mm.
+    /// In-focus object distance of the far setting, mm.
     pub far_mm: f64,
-    /// Object distance in focus at the near setting, mm.
+    /// In-focus object distance of the near setting, mm.
     pub near_mm: f64,
-    /// Sensor distance of the far setting, mm from the lens.
+    /// Sensor distance of the far setting, mm.
     pub sensor_far_mm: f64,
-    /// Sensor distance of the near setting, mm from the lens; larger than the far one.
+    /// Sensor distance of the near setting, mm; larger than the far one.
     pub sensor_near_mm: f64,
-    /// Field dependence of the focus; `None` is a perfect lens.
+    /// Field dependence of the focus; `None`: flat field.
     pub distortion: Option<EllipticalDistortion>,
-    /// Whether the lens is telecentric on the image side: then moving the sensor does not change the magnification,
-    /// else the image grows with the sensor's distance.
+    /// Image-side telecentric: moving the sensor keeps the magnification; otherwise the image grows with its
+    /// distance.
     pub telecentric: bool,
 }
 
-/// What a lens cannot image.
+/// Why a lens forms no image.
 #[derive(Debug, Clone, PartialEq, Error)]
+#[expect(missing_docs, reason = "the messages name the fields")]
 pub enum LensError {
-    /// An object at or inside the focal length has no real image.
+    /// Object at or inside the focal length.
     #[error(
         "an object at {object_mm} mm has no image behind a lens of {focal_length_mm} mm focal length; place it \
          beyond the focal length"
     )]
-    NoImage {
-        /// Object distance, mm.
-        object_mm: f64,
-        /// Focal length, mm.
-        focal_length_mm: f64,
-    },
-    /// A number of the lens is not finite and above zero, or near is not nearer than far.
+    NoImage { object_mm: f64, focal_length_mm: f64 },
     #[error("lens: {what} = {value}, expected {expected}")]
-    Unusable {
-        /// Which number.
-        what: &'static str,
-        /// Its value.
-        value: f64,
-        /// What it has to be.
-        expected: &'static str,
-    },
+    Unusable { what: &'static str, value: f64, expected: &'static str },
 }
 
 impl Lens {
-    /// The lens that an `optics.toml` describes, without distortion.
-    ///
-    /// # Errors
-    /// [`LensError::Unusable`] for numbers that [`OpticsFile::parse`] would have refused.
+    /// The lens of an `optics.toml`, without distortion.
+    /// Errors: [`LensError::Unusable`] for numbers that [`OpticsFile::parse`] rejects.
     pub fn from_optics(optics: &OpticsFile) -> Result<Self, LensError> {
         let positive = [
             ("focal_length_mm", optics.focal_length_mm),
@@ -98,16 +84,14 @@ impl Lens {
         })
     }
 
-    /// The same lens with a focus that varies over the field.
+    /// Adds a field dependence of the focus.
     #[must_use]
     pub fn with_distortion(self, distortion: EllipticalDistortion) -> Self {
         Self { distortion: Some(distortion), ..self }
     }
 
-    /// Image distance of an object on the axis, mm.
-    ///
-    /// # Errors
-    /// [`LensError::NoImage`] unless the object lies beyond the focal length.
+    /// Image distance of an on-axis object, mm.
+    /// Errors: [`LensError::NoImage`] unless the object is beyond the focal length.
     pub fn image_distance_mm(&self, object_mm: f64) -> Result<f64, LensError> {
         if object_mm.is_finite() && object_mm > self.focal_length_mm {
             Ok(image_distance_mm(self.focal_length_mm, object_mm))
@@ -116,7 +100,7 @@ impl Lens {
         }
     }
 
-    /// Image distance of an object seen at the relative image position `x`, `y` (0..1 over the image), mm.
+    /// Image distance at the relative image position `x`, `y` (0..1), mm.
     pub(crate) fn distorted_image_distance_mm(&self, image_mm: f64, x: f64, y: f64) -> f64 {
         let Some(distortion) = &self.distortion else { return image_mm };
         let half_travel_mm = 0.5 * (self.sensor_near_mm - self.sensor_far_mm);
@@ -124,43 +108,42 @@ impl Lens {
         self.sensor_far_mm + (1.0 + distortion.apply(alpha, x, y)) * half_travel_mm
     }
 
-    /// Blur radius on the sensor in pixels, signed: positive where the sensor lies behind the image (the
-    /// object is beyond the plane in focus), negative where it lies before it.
+    /// Signed blur radius on the sensor, px: positive behind the image (object beyond the focused plane),
+    /// else negative.
     #[must_use]
     pub fn signed_blur_px(&self, sensor_distance_mm: f64, image_mm: f64) -> f64 {
         (sensor_distance_mm - image_mm) * self.aperture_mm / (2.0 * self.focal_length_mm * self.pixel_mm)
     }
 }
 
-/// A focus that varies over the field in ellipses, as cheap telecentric lenses have it (Li 2014, ch. 6).
+/// Elliptical field dependence of the focus of simple telecentric lenses (Li 2014, ch. 6).
 ///
-/// With the normalised depth `alpha` (-1 at far focus, +1 at near focus) and the relative image position
-/// `x`, `y` in 0..1:
-/// `alpha_eff = alpha + offset + 0.5 (curvature + slope alpha) rho2`,
-/// `rho2 = ((x - centre_x) / radius_x)^2 + ((y - centre_y) / radius_y)^2`.
+/// With the normalised depth `alpha` (-1 at far focus, +1 at near focus) and `x`, `y` in 0..1 over the image:
+/// `alpha_eff = alpha + offset + 0.5 (curvature + slope alpha) rho2`, `rho2 = ((x - centre_x) / radius_x)^2 +
+/// ((y - centre_y) / radius_y)^2`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct EllipticalDistortion {
-    /// Shift of alpha everywhere.
+    /// Uniform shift of alpha.
     pub offset: f64,
-    /// Curvature of the field at alpha 0.
+    /// Field curvature at alpha 0.
     pub curvature: f64,
     /// Change of the curvature with alpha.
     pub slope: f64,
-    /// Centre of the ellipses, relative to the image's width and height.
+    /// Centre relative to the image's width and height.
     pub centre: [f64; 2],
-    /// Semi-axes of the ellipse `rho = 1`, relative to the image's width and height.
+    /// Semi-axes of `rho = 1`, relative to width and height.
     pub radius: [f64; 2],
 }
 
 impl Default for EllipticalDistortion {
-    /// The distortion used in this project's accuracy figures: raw planes are about 1.9 mm RMS off.
+    /// Used for this project's accuracy figures: uncorrected planes are about 1.9 mm RMS off.
     fn default() -> Self {
         Self { offset: -0.08, curvature: 0.45, slope: -0.20, centre: [0.65, 0.6], radius: [0.75, 0.6] }
     }
 }
 
 impl EllipticalDistortion {
-    /// The normalised depth that the lens shows for `alpha` at the relative image position `x`, `y`.
+    /// Effective normalised depth for `alpha` at `x`, `y` (0..1).
     #[must_use]
     pub fn apply(&self, alpha: f64, x: f64, y: f64) -> f64 {
         let rho2 =

@@ -1,15 +1,17 @@
 #![doc = include_str!("../README.md")]
 //!
-//! # The model
+//! # Model
 //!
-//! 1. **Surface.** A height field over the image ([`scene`]), painted with a texture at two samples
-//!    per pixel ([`texture`]); radiance is bilinear between samples.
-//! 2. **Lens.** Image-side telecentric thin lens ([`lens`]): an object at `u` mm focuses `w(u)` mm behind
-//!    the lens, a sensor at `s` sees it blurred with radius `|s - w| D / 2F`, and moving the sensor does not
-//!    change the magnification.
-//! 3. **Blur.** Each cell spreads by the PSF ([`psf`]) of its own blur radius, integrated over the cell and
-//!    over the pixel ([`kernel`]); nearer surfaces hide farther ones ([`blur`]).
-//! 4. **Exposure.** Shading and hot pixels, where asked for ([`defects`]); electrons, shot noise, read noise, full well, quantisation ([`camera`]).
+//! 1. **Surface.** A height field over the image ([`scene`]) with a texture of two samples per pixel
+//!    ([`texture`]), bilinear.
+//! 2. **Lens.** Image-side telecentric thin lens ([`lens`]): an object at `u` mm focuses `w(u)` mm behind it,
+//!    a sensor at `s`
+//!    sees blur of radius `|s - w| D / 2F`, and moving the sensor keeps the magnification.
+//! 3. **Blur.** Each cell spreads by the PSF ([`psf`]) of its blur radius, integrated over cell and pixel
+//!    ([`kernel`]);
+//!    nearer surfaces hide farther ones ([`blur`]).
+//! 4. **Exposure.** Optional shading and hot pixels ([`defects`]); electrons, noise, full well, quantisation
+//!    ([`camera`]).
 //!
 //! [`wave`] has a lens by wave optics for flat surfaces: diffraction, spherical aberration, astigmatism, several wavelengths.
 //!

@@ -1,39 +1,34 @@
-//! Surfaces and pictures given as arrays, stretched over the image.
+//! Height maps and pictures, stretched over the image.
 
 use ndarray::Array2;
 
 use crate::scene_error::SceneError;
 
-/// A height field: depths in mm, rows from the top, of any size.
+/// A height field: depths in mm, rows from the top.
 #[derive(Debug, Clone, PartialEq)]
 pub struct HeightMap(Array2<f32>);
 
 impl HeightMap {
-    /// Takes depths in mm.
-    ///
-    /// # Errors
-    /// [`SceneError::Empty`] and [`SceneError::MapValue`] name what no surface can have.
+    /// Accepts depths in mm.
+    /// Errors: [`SceneError::Empty`] and [`SceneError::MapValue`].
     pub fn new(depth_mm: Array2<f32>) -> Result<Self, SceneError> {
         check("depth", &depth_mm, "a finite depth in mm above 0", |value| value > 0.0)?;
         Ok(Self(depth_mm))
     }
 
-    /// Depth at the relative image position `x`, `y` (0..1 over the image), mm.
+    /// Depth at the relative image position `x`, `y` (0..1), mm.
     pub(crate) fn depth_mm(&self, x: f64, y: f64) -> f64 {
         sample(&self.0, x, y)
     }
 }
 
-/// A picture to paint a surface with: radiance, scaled to a mean of 1, of any size.
+/// A surface picture: radiance scaled to a mean of 1.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Picture(Array2<f32>);
 
 impl Picture {
-    /// Takes radiances of 0 or more in any unit.
-    ///
-    /// # Errors
-    /// [`SceneError::Empty`], [`SceneError::MapValue`] and [`SceneError::Black`] name what no picture can
-    /// have.
+    /// Accepts radiances >= 0 in any unit.
+    /// Errors: [`SceneError::Empty`], [`SceneError::MapValue`] and [`SceneError::Black`].
     pub fn new(mut radiance: Array2<f32>) -> Result<Self, SceneError> {
         check("texture", &radiance, "a finite radiance of 0 or more", |value| value >= 0.0)?;
         let mean = radiance.iter().map(|&value| f64::from(value)).sum::<f64>() / radiance.len() as f64;
@@ -44,7 +39,7 @@ impl Picture {
         Ok(Self(radiance))
     }
 
-    /// Radiance at the relative image position `x`, `y` (0..1 over the image).
+    /// Radiance at the relative image position `x`, `y` (0..1).
     pub(crate) fn radiance(&self, x: f64, y: f64) -> f64 {
         sample(&self.0, x, y)
     }
@@ -66,14 +61,14 @@ fn check(
     }
 }
 
-/// `map` at the relative position `x`, `y`: bilinear between the centres of its pixels, mirrored outside.
+/// Bilinear sample at relative `x`, `y`, mirrored outside.
 fn sample(map: &Array2<f32>, x: f64, y: f64) -> f64 {
     let (height, width) = map.dim();
     let taps = |position: f64, size: usize| {
         let position = position * size as f64 - 0.5;
         let low = position.floor();
         let index = |i: f64| {
-            // About the outer edges: ... 1 0 | 0 1 2 ... n-1 | n-1 n-2 ...
+            // Mirrored at the outer edges: ... 1 0 | 0 1 2 ... n-1 | n-1 n-2 ...
             let folded = (i as i64).rem_euclid(2 * size as i64) as usize;
             if folded < size { folded } else { 2 * size - 1 - folded }
         };
@@ -109,7 +104,7 @@ mod tests {
     }
 
     #[test]
-    fn impossible_maps_are_named() {
+    fn rejects_invalid_maps_by_name() {
         let text = |result: Result<HeightMap, SceneError>| result.unwrap_err().to_string();
         assert!(text(HeightMap::new(array![[900.0, f32::NAN]])).contains("holds NaN at row 0, column 1"));
         assert!(text(HeightMap::new(array![[900.0], [-2.0]])).contains("holds -2 at row 1, column 0"));

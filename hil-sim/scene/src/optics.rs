@@ -1,8 +1,8 @@
-//! `optics.toml`: the lens, the pixel and the two focus settings of a rig.
+//! `optics.toml`: lens, pixel and the two focus settings of a rig.
 //!
-//! Lengths are in mm except the pixel pitch (um) and the largest blur (px). The near focus and the largest
-//! blur follow from each other (Li 2014, eq. 4.3): between far and near focus the sensor moves by twice the
-//! f-number times the blur radius that each setting gives on the other one's plane.
+//! Lengths in mm, pixel pitch in um, largest blur in px. Near focus and largest blur determine each other (Li
+//! 2014, eq. 4.3): between the settings the sensor moves by twice the f-number times the blur radius that
+//! each gives on the other's plane.
 
 use serde::Deserialize;
 use thiserror::Error;
@@ -10,10 +10,10 @@ use thiserror::Error;
 use crate::psf::{Psf, PsfError};
 use crate::thin_lens::image_distance_mm;
 
-/// Largest relative disagreement of two values that follow from each other.
+/// Tolerated relative disagreement of dependent values.
 const AGREEMENT: f64 = 0.02;
 
-/// The contents of `optics.toml`, checked.
+/// Checked contents of an `optics.toml`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OpticsFile {
     /// Focal length, mm.
@@ -22,111 +22,80 @@ pub struct OpticsFile {
     pub aperture_mm: f64,
     /// Pixel pitch, um.
     pub pixel_um: f64,
-    /// Object distance in focus at the far setting, mm.
+    /// In-focus object distance of the far setting, mm.
     pub far_mm: f64,
-    /// Object distance in focus at the near setting, mm.
+    /// In-focus object distance of the near setting, mm.
     pub near_mm: f64,
     /// Blur radius of either focused plane at the other setting, px.
     pub max_blur_px: f64,
-    /// The PSF of `[psf]`, if the file has one.
+    /// The PSF of `[psf]`, if present.
     pub psf: Option<Psf>,
-    /// Whether moving the sensor leaves the magnification as it is, if the file says so.
+    /// Whether moving the sensor keeps the magnification, if stated.
     pub telecentric: Option<bool>,
 }
 
-/// Why an `optics.toml` was refused.
+/// Why an `optics.toml` was rejected.
 ///
-/// The messages are word for word those of the depth estimation's own reader, which a test of that crate holds them to:
-/// two readers, so that a wrong formula in one shows against the other, but one language for the user.
+/// The messages equal those of the depth crate's reader, which a test there checks. Two independent readers
+/// expose wrong formulas; one wording serves the user.
 #[derive(Debug, Clone, PartialEq, Error)]
+#[expect(missing_docs, reason = "the messages name the fields")]
 pub enum OpticsError {
-    /// Not TOML, or a key is missing, unknown or of the wrong type.
     #[error("{0}")]
     Syntax(String),
-    /// A length that must be a finite number above zero is not.
     #[error("[{section}] {name} = {value}: must be a positive, finite number{unit}")]
     NotPositive {
-        /// Section of the file.
         section: &'static str,
-        /// Key in the section.
         name: &'static str,
-        /// What the file says.
         value: f64,
-        /// Its unit as the message ends, such as ` of mm`.
+        /// Unit as the message ends, such as ` of mm`.
         unit: &'static str,
     },
-    /// Neither `aperture_mm` nor `f_number`.
     #[error("[lens] needs aperture_mm or f_number")]
     NoAperture,
-    /// `aperture_mm` and `f_number` contradict each other.
     #[error(
         "[lens] aperture_mm = {aperture_mm} and f_number = {f_number} disagree: with focal_length_mm = \
          {focal_length_mm} that aperture is f_number = {implied:.5}; give one of them"
     )]
     ApertureDisagreement {
-        /// `focal_length_mm` in the file.
         focal_length_mm: f64,
-        /// `aperture_mm` in the file.
         aperture_mm: f64,
-        /// `f_number` in the file.
         f_number: f64,
         /// The f-number of that aperture.
         implied: f64,
     },
-    /// An object inside the focal length has no image.
     #[error(
         "[focus] {name} = {distance_mm} is not beyond the focal length of {focal_length_mm} mm: no real image forms"
     )]
-    InsideFocalLength {
-        /// Key in `[focus]`.
-        name: &'static str,
-        /// The object distance, mm.
-        distance_mm: f64,
-        /// The focal length, mm.
-        focal_length_mm: f64,
-    },
-    /// Near focus is not nearer than far focus.
+    InsideFocalLength { name: &'static str, distance_mm: f64, focal_length_mm: f64 },
     #[error(
         "[focus] near_mm = {near_mm} is not nearer than far_mm = {far_mm}: the near focus must be the smaller distance"
     )]
-    NearBeyondFar {
-        /// Near focus, mm.
-        near_mm: f64,
-        /// Far focus, mm.
-        far_mm: f64,
-    },
-    /// Neither `max_blur_px` nor `near_mm`.
+    NearBeyondFar { near_mm: f64, far_mm: f64 },
     #[error("[focus] needs max_blur_px or near_mm")]
     NoRange,
-    /// `max_blur_px` and `near_mm` contradict each other.
     #[error(
         "[focus] max_blur_px = {given_px} and near_mm = {near_mm} disagree by {percent:.1} % (2 % allowed): \
          near_mm = {implied_near_mm:.2} would agree with that blur, max_blur_px = {implied_px:.4} with that distance"
     )]
     Disagreement {
-        /// `max_blur_px` in the file.
         given_px: f64,
-        /// `near_mm` in the file.
         near_mm: f64,
         /// Relative difference of the blur radii in percent.
         percent: f64,
-        /// The blur that `near_mm` implies, px.
+        /// Blur implied by `near_mm`.
         implied_px: f64,
-        /// The near focus that `max_blur_px` implies, mm.
+        /// Near focus implied by `max_blur_px`.
         implied_near_mm: f64,
     },
-    /// `[psf]` is not a PSF.
     #[error("[psf] {0}")]
     Psf(#[from] PsfError),
 }
 
 impl OpticsFile {
-    /// Reads and checks the text of an `optics.toml`. Where both `near_mm` and `max_blur_px` are given, the
-    /// blur is kept and the near focus computed from it; of `aperture_mm` and `f_number` the latter is
-    /// kept.
-    ///
-    /// # Errors
-    /// [`OpticsError`] names the key, its value and what was expected.
+    /// Parses an `optics.toml`. Of `near_mm` and `max_blur_px` the blur takes precedence; of `aperture_mm`
+    /// and `f_number` the latter.
+    /// Errors: [`OpticsError`] with key, value and expectation.
     pub fn parse(text: &str) -> Result<Self, OpticsError> {
         let raw: RawFile =
             toml::from_str(text).map_err(|error| OpticsError::Syntax(error.to_string().trim_end().into()))?;
@@ -148,11 +117,11 @@ impl OpticsFile {
     }
 }
 
-/// How the sensor travels from far to near focus.
+/// Sensor travel from far to near focus.
 struct Travel {
     focal_length_mm: f64,
     sensor_far_mm: f64,
-    /// Travel for each px of the largest blur.
+    /// Travel per px of the largest blur.
     per_blur_mm: f64,
 }
 
@@ -168,7 +137,7 @@ impl Travel {
 }
 
 impl RawLens {
-    /// Diameter of the aperture, mm.
+    /// Aperture diameter, mm.
     fn aperture(&self, focal_length_mm: f64) -> Result<f64, OpticsError> {
         let given = self.aperture_mm.map(|a| positive("lens", "aperture_mm", a, " of mm")).transpose()?;
         let f_number = self.f_number.map(|f| positive("lens", "f_number", f, "")).transpose()?;
@@ -299,7 +268,7 @@ mod tests {
     }
 
     #[test]
-    fn f_number_and_aperture_say_the_same() {
+    fn f_number_and_aperture_are_equivalent() {
         let by_aperture =
             OpticsFile::parse(&file("aperture_mm = 12.8", "far_mm = 933.0\nmax_blur_px = 2.703"));
         let by_number = OpticsFile::parse(&file("f_number = 3.90625", "far_mm = 933.0\nmax_blur_px = 2.703"));
@@ -339,7 +308,7 @@ mod tests {
     }
 
     #[test]
-    fn senseless_optics_are_refused_by_name() {
+    fn rejects_invalid_optics_by_name() {
         let cases = [
             ("aperture_mm = 12.8", "far_mm = 933.0\nnear_mm = 940.0", "not nearer than far_mm = 933"),
             ("f_number = 0.0", "far_mm = 933.0\nmax_blur_px = 2.7", "f_number = 0"),

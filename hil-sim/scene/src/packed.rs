@@ -1,8 +1,9 @@
-//! A scene with its maps as bytes, to hand it to a program that opens no map files: what `farnear` writes to the standard
-//! input of `farnear-sim run --scene -`.
+//! A scene with its maps as bytes, for programs that open no map files: `farnear` writes it to `farnear-sim
+//! run --scene -`.
 //!
-//! Little-endian: `FNSCENE1`, the length of the scene file's text in bytes (u32), the text, then the depth map (mm) and the texture, each
-//! as height and width (u32) and its values (f32) row by row; 0 x 0 stands for none. What follows is not read.
+//! Little-endian: `FNSCENE1`, length of the scene text in bytes (u32), the text, then depth map (mm) and
+//! texture, each as height and width (u32) and values (f32) row by row; 0 x 0 means none. Later bytes are not
+//! read.
 
 use std::io::{self, Read};
 
@@ -12,12 +13,11 @@ use thiserror::Error;
 use crate::{scene::Scene, scene_error::SceneError, scene_file::SceneFile};
 
 const MAGIC: [u8; 8] = *b"FNSCENE1";
-/// Longest text of a scene file.
 const LONGEST_TEXT: usize = 1 << 16;
-/// Most values of a map: a picture of 100 million pixels has 400 MB here.
+/// Largest map: 100 million values are 400 MB.
 const MOST_VALUES: u64 = 100_000_000;
 
-/// A scene file's text with the maps that it names.
+/// Scene text with its maps.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PackedScene {
     /// Text of the scene file.
@@ -28,38 +28,28 @@ pub struct PackedScene {
     pub texture: Option<Array2<f32>>,
 }
 
-/// Why bytes make no scene.
+/// Why packed bytes were rejected.
 #[derive(Debug, Error)]
+#[expect(missing_docs, reason = "the messages name the fields")]
 pub enum PackedSceneError {
-    /// The bytes end too early, or cannot be read.
     #[error("a packed scene cannot be read: {0}")]
     Read(#[from] io::Error),
-    /// Something else than a packed scene.
     #[error("{found:?} begins no packed scene, expected {MAGIC:?}")]
-    Magic {
-        /// What stands there.
-        found: [u8; 8],
-    },
-    /// A length that no scene has.
+    Magic { found: [u8; 8] },
     #[error("a packed scene's {what} has {found}, expected at most {most}")]
     Size {
         /// `text` or `map`.
         what: &'static str,
-        /// Bytes or values that it claims to have.
         found: u64,
-        /// As many as it may have.
         most: u64,
     },
-    /// A text that is no scene file, or does not go with the maps.
     #[error(transparent)]
     Scene(#[from] SceneError),
 }
 
 impl PackedScene {
-    /// The bytes.
-    ///
-    /// # Errors
-    /// [`PackedSceneError::Size`].
+    /// Serialises the scene.
+    /// Errors: [`PackedSceneError::Size`].
     pub fn to_bytes(&self) -> Result<Vec<u8>, PackedSceneError> {
         let mut bytes = MAGIC.to_vec();
         bytes.extend(bounded("text", self.text.len() as u64, LONGEST_TEXT as u64)?.to_le_bytes());
@@ -74,10 +64,8 @@ impl PackedScene {
         Ok(bytes)
     }
 
-    /// Takes the bytes of one scene, and no more of `source`.
-    ///
-    /// # Errors
-    /// [`PackedSceneError::Read`], [`PackedSceneError::Magic`], [`PackedSceneError::Size`].
+    /// Reads exactly one scene from `source`.
+    /// Errors: [`PackedSceneError::Read`], [`PackedSceneError::Magic`], [`PackedSceneError::Size`].
     pub fn read(source: &mut impl Read) -> Result<Self, PackedSceneError> {
         let mut found = [0; 8];
         source.read_exact(&mut found)?;
@@ -91,10 +79,8 @@ impl PackedScene {
         Ok(Self { text, depth_mm: map(source)?, texture: map(source)? })
     }
 
-    /// The scene.
-    ///
-    /// # Errors
-    /// [`PackedSceneError::Scene`].
+    /// Parses text and maps.
+    /// Errors: [`PackedSceneError::Scene`].
     pub fn into_scene(self) -> Result<Scene, PackedSceneError> {
         Ok(SceneFile::parse(&self.text)?.into_scene(self.depth_mm, self.texture)?)
     }
@@ -119,7 +105,7 @@ fn map(source: &mut impl Read) -> Result<Option<Array2<f32>>, PackedSceneError> 
     if values == 0 {
         return Ok(None);
     }
-    // As the bytes come, so that a wrong size asks for no memory.
+    // Grows with the data, so that a wrong size allocates nothing.
     let mut bytes = Vec::new();
     let all = u64::from(values) * 4;
     if source.take(all).read_to_end(&mut bytes)? as u64 != all {
@@ -146,7 +132,7 @@ mod tests {
     }
 
     #[test]
-    fn bytes_give_the_scene_again_and_leave_what_follows() {
+    fn reads_a_packed_scene_and_leaves_later_bytes() {
         let bytes = [bust().to_bytes().unwrap(), b"the rest".to_vec()].concat();
         let mut source = bytes.as_slice();
         let read = PackedScene::read(&mut source).unwrap();
@@ -157,14 +143,14 @@ mod tests {
     }
 
     #[test]
-    fn a_scene_without_maps_is_packed_too() {
+    fn packs_a_scene_without_maps() {
         let cone = PackedScene { text: "scene = \"cone\"".into(), depth_mm: None, texture: None };
         let bytes = cone.to_bytes().unwrap();
         assert_eq!(PackedScene::read(&mut bytes.as_slice()).unwrap(), cone);
     }
 
     #[test]
-    fn what_is_wrong_is_said() {
+    fn rejects_invalid_bytes_with_a_reason() {
         let good = bust().to_bytes().unwrap();
         let mut other = good.clone();
         other[7] = b'2';
@@ -184,7 +170,7 @@ mod tests {
         }
     }
 
-    /// The text, by the layout that the module's head tells.
+    /// The text, found by the layout above.
     fn read_text(bytes: &[u8]) -> String {
         let length = u32::from_le_bytes(bytes[8..12].try_into().unwrap()) as usize;
         String::from_utf8(bytes[12..12 + length].to_vec()).unwrap()
@@ -195,11 +181,11 @@ mod tests {
         fn any_bytes_are_a_scene_or_an_error(
             length in 0_u32..8, text in "[a-z]{4}", sizes in vec(0_u32..4, 4), tail in vec(any::<u8>(), 0..200)
         ) {
-            // Small lengths, or hardly any bytes would be read to their end.
+            // Small lengths; otherwise most inputs would end early.
             let sizes = sizes.iter().flat_map(|size| size.to_le_bytes()).collect::<Vec<u8>>();
             let bytes = [&MAGIC[..], &length.to_le_bytes(), text.as_bytes(), &sizes, &tail].concat();
             if let Ok(read) = PackedScene::read(&mut bytes.as_slice()) {
-                // A map of 0 x 3 is none; and NaN is no number to compare, so the bytes are.
+                // A map of 0 x 3 is no map; bytes are compared because of NaN.
                 let once = read.to_bytes().unwrap();
                 let twice = PackedScene::read(&mut once.as_slice()).unwrap().to_bytes().unwrap();
                 prop_assert_eq!((once, read.text), (twice, read_text(&bytes)));

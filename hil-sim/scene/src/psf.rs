@@ -1,14 +1,13 @@
-//! Point spread functions in space, normalised to 1, for a blur radius `R`.
+//! Point spread functions, normalised to 1, for a blur radius `R` in any unit.
 //!
 //! * Pill-box: constant over the disc of radius `R`, the image of a round aperture.
 //! * Gaussian: standard deviation `sigma = k R` in each direction.
-//! * Generalised Gaussian: `f(r) = p^(1 - 2/p) / (2 pi sigma^2 Gamma(2/p)) exp(-(r / sigma)^p / p)`, `sigma
-//!   = k R` (Claxton & Staunton 2008; the constant here is that of the plane, Li 2014, eq. 5.16 has that of
-//!   the line). At `p = 2` it is the Gaussian; for other `p` sigma is a scale, not the standard deviation.
-//!
-//! * Ring: constant between the radii `inner R` and `R`, the image of a round aperture whose middle is covered.
-//!
-//! Radii and scales in any one unit; the functions here have no sampling in them.
+//! * Generalised Gaussian: `f(r) = p^(1 - 2/p) / (2 pi sigma^2 Gamma(2/p)) exp(-(r / sigma)^p / p)`, `sigma =
+//!   k R`
+//!   (Claxton & Staunton 2008, normalised in the plane; Li 2014, eq. 5.16 normalises on the line). `p = 2` is
+//!   the Gaussian;
+//!   for other `p` sigma is a scale, not the standard deviation.
+//! * Ring: constant between the radii `inner R` and `R`, the image of a round aperture with a covered centre.
 
 use std::f64::consts::PI;
 use std::fmt;
@@ -16,80 +15,54 @@ use std::str::FromStr;
 
 use thiserror::Error;
 
-/// Below, the tails reach over hundreds of pixels; above, it is a pill-box to three digits.
+/// Smaller p: tails of hundreds of pixels; larger: a pill-box to three digits.
 const P_RANGE: std::ops::RangeInclusive<f64> = 0.5..=64.0;
 const K_RANGE: std::ops::RangeInclusive<f64> = 0.01..=10.0;
 const INNER_RANGE: std::ops::RangeInclusive<f64> = 0.0..=0.99;
 
-/// Shape of the blur; its size comes from the blur radius. Text form as in [`Psf::from_str`].
+/// Shape of the blur; its size is the blur radius. Text form: [`Psf::from_str`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Psf {
-    /// Constant over the blur disc.
+    /// Constant over the disc of the blur.
     PillBox,
     /// Gaussian with sigma = `k` times the blur radius.
     Gaussian {
-        /// sigma / blur radius.
+        /// Ratio of sigma to blur radius.
         k: f64,
     },
     /// Generalised Gaussian with shape `p` and scale `k` times the blur radius.
     Generalised {
-        /// Exponent; 2 is the Gaussian, towards infinity it becomes a pill-box.
+        /// Exponent; 2 is the Gaussian, infinity the pill-box.
         p: f64,
-        /// Scale / blur radius.
+        /// Ratio of scale to blur radius.
         k: f64,
     },
-    /// Constant over the blur disc outside of `inner` times its radius.
+    /// Constant outside of `inner` times the blur radius.
     Ring {
-        /// Inner radius / blur radius.
+        /// Ratio of inner to outer radius.
         inner: f64,
     },
 }
 
-/// Why a PSF was refused.
+/// Why a PSF was rejected.
 #[derive(Debug, Clone, PartialEq, Error)]
+#[expect(missing_docs, reason = "the messages name the fields")]
 pub enum PsfError {
-    /// A name that is no PSF.
     #[error(
         "unknown PSF {0:?}, expected pillbox, gaussian:k=0.4578, generalised:p=1.8,k=0.4802 or ring:inner=0.5"
     )]
     Unknown(String),
-    /// A parameter that the model needs is missing.
     #[error("PSF {model} needs {name}=NUMBER, for instance {example}")]
-    Missing {
-        /// The model.
-        model: &'static str,
-        /// The missing parameter.
-        name: &'static str,
-        /// A complete PSF.
-        example: &'static str,
-    },
-    /// A parameter that the model does not have, or has twice.
+    Missing { model: &'static str, name: &'static str, example: &'static str },
     #[error("PSF {model} takes no {name:?} here")]
-    Unexpected {
-        /// The model.
-        model: String,
-        /// The parameter.
-        name: String,
-    },
-    /// A parameter that is no number or out of range.
+    Unexpected { model: String, name: String },
     #[error("PSF parameter {name} = {value}, expected a number from {low} to {high}")]
-    Range {
-        /// The parameter.
-        name: &'static str,
-        /// What was given.
-        value: String,
-        /// Smallest.
-        low: f64,
-        /// Largest.
-        high: f64,
-    },
+    Range { name: &'static str, value: String, low: f64, high: f64 },
 }
 
 impl Psf {
     /// A PSF from the keys of `[psf]` in `optics.toml`.
-    ///
-    /// # Errors
-    /// [`PsfError`] for an unknown model, missing, surplus or senseless parameters.
+    /// Errors: [`PsfError`] for an unknown model or a missing, surplus or invalid parameter.
     pub fn from_parts(
         model: &str,
         p: Option<f64>,
@@ -133,7 +106,7 @@ impl Psf {
         }
     }
 
-    /// Value at the distance `r` from the centre for the blur radius `radius` (above 0), per unit area.
+    /// Density at the distance `r` for the blur radius `radius` (> 0), per unit area.
     #[must_use]
     pub fn density(&self, r: f64, radius: f64) -> f64 {
         match *self {
@@ -156,7 +129,7 @@ impl Psf {
         }
     }
 
-    /// Mean square distance from the centre, `integral f r^2`, for the blur radius `radius`.
+    /// Mean squared distance from the centre for the blur radius `radius`.
     #[must_use]
     pub fn second_moment(&self, radius: f64) -> f64 {
         match *self {
@@ -170,7 +143,7 @@ impl Psf {
     }
 }
 
-/// A generalised Gaussian of a given scale.
+/// Generalised Gaussian of a given scale.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Profile {
     pub(crate) p: f64,
@@ -178,17 +151,16 @@ pub(crate) struct Profile {
 }
 
 impl Profile {
-    /// Constant before the exponential.
+    /// Factor of the exponential.
     pub(crate) fn peak(&self) -> f64 {
         self.p.powf(1.0 - 2.0 / self.p) / (2.0 * PI * self.sigma * self.sigma * libm::tgamma(2.0 / self.p))
     }
 
-    /// Value at the distance `r` from the centre.
     pub(crate) fn density(&self, r: f64) -> f64 {
         self.peak() * libm::exp(-libm::pow(r / self.sigma, self.p) / self.p)
     }
 
-    /// Distance at which the exponent has fallen to `-exponent`.
+    /// Distance at which the exponent is `-exponent`.
     pub(crate) fn radius_at(&self, exponent: f64) -> f64 {
         self.sigma * libm::pow(self.p * exponent, 1.0 / self.p)
     }
@@ -274,7 +246,7 @@ mod tests {
         ] {
             let psf: Psf = text.parse().unwrap();
             for radius in [0.4, 2.7] {
-                // The midpoint rule is good to a step of the grid at the pill-box's edge, 1e-4.
+                // The midpoint rule is accurate to a grid step at the pill-box's edge, 1e-4.
                 assert!((radial_integral(&psf, radius, 0) - 1.0).abs() < 1e-4, "{text}");
                 let moment = radial_integral(&psf, radius, 2);
                 assert!((moment / psf.second_moment(radius) - 1.0).abs() < 2e-4, "{text} {moment}");

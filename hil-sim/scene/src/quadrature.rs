@@ -1,12 +1,11 @@
 //! Gauss-Legendre quadrature: `n` nodes are exact for polynomials of degree `2n - 1`.
 
-/// Positive half of the nodes on -1..1 with their weights, four nodes (Abramowitz & Stegun, table 25.4).
+/// Positive nodes on -1..1 with weights (Abramowitz & Stegun, table 25.4).
 pub(crate) const FOUR: [(f64, f64); 2] = [
     (0.339_981_043_584_856_26, 0.652_145_154_862_546_1),
     (0.861_136_311_594_052_6, 0.347_854_845_137_453_85),
 ];
 
-/// The same for eight nodes.
 pub(crate) const EIGHT: [(f64, f64); 4] = [
     (0.183_434_642_495_649_8, 0.362_683_783_378_362),
     (0.525_532_409_916_329, 0.313_706_645_877_887_3),
@@ -14,7 +13,7 @@ pub(crate) const EIGHT: [(f64, f64); 4] = [
     (0.960_289_856_497_536_3, 0.101_228_536_290_376_26),
 ];
 
-/// Integral of `f` from `a` to `b` with the given nodes.
+/// Integral of `f` from `a` to `b` with these nodes.
 pub(crate) fn integrate(nodes: &[(f64, f64)], a: f64, b: f64, mut f: impl FnMut(f64) -> f64) -> f64 {
     let (middle, half) = (0.5 * (a + b), 0.5 * (b - a));
     half * nodes.iter().map(|&(x, w)| w * (f(middle - half * x) + f(middle + half * x))).sum::<f64>()

@@ -1,4 +1,4 @@
-//! One exposure of a scene: texture, depth, blur and noise put together.
+//! One exposure of a scene from texture, depth, blur and noise.
 
 use ndarray::Array2;
 use thiserror::Error;
@@ -13,52 +13,35 @@ use crate::scene::{Scene, Shape};
 use crate::texture::{Spectrum, Texture};
 use crate::view::{self, View};
 
-/// Largest blur radius that is rendered, px: memory grows with its square.
+/// Largest rendered blur radius: memory grows with its square.
 const MAX_BLUR_PX: f64 = 600.0;
-/// Pixels beyond each border for which the renderer keeps the surface; more is computed when needed.
+/// Margin for which the renderer keeps the surface; a wider one is computed on demand.
 const KEPT_MARGIN_PX: usize = 8;
 
 /// Why nothing was rendered.
 #[derive(Debug, Clone, PartialEq, Error)]
+#[expect(missing_docs, reason = "the messages name the fields")]
 pub enum RenderError {
-    /// The camera makes no sense.
     #[error(transparent)]
     Camera(#[from] CameraError),
-    /// The lens makes no image of the scene.
     #[error(transparent)]
     Lens(#[from] LensError),
-    /// The sensor is at an impossible place.
+    /// Sensor distance not finite or not positive.
     #[error("sensor at {sensor_distance_mm} mm from the lens, expected a finite distance above 0")]
-    Sensor {
-        /// The sensor distance, mm.
-        sensor_distance_mm: f64,
-    },
-    /// The blur is beyond all use.
+    Sensor { sensor_distance_mm: f64 },
+    /// Blur radius above the limit.
     #[error(
         "the sensor at {sensor_distance_mm} mm blurs the scene over a radius of {blur_px:.0} px, at most {limit_px} px is \
          rendered; focus lies between {far_mm:.3} and {near_mm:.3} mm"
     )]
-    Blur {
-        /// The sensor distance, mm.
-        sensor_distance_mm: f64,
-        /// The blur radius, px.
-        blur_px: f64,
-        /// The limit, px.
-        limit_px: f64,
-        /// Sensor distance of far focus, mm.
-        far_mm: f64,
-        /// Sensor distance of near focus, mm.
-        near_mm: f64,
-    },
+    Blur { sensor_distance_mm: f64, blur_px: f64, limit_px: f64, far_mm: f64, near_mm: f64 },
 }
 
 /// Renders one exposure: codes of shape (height, width), 0 to [`Noise::max_code`](crate::Noise::max_code).
 ///
-/// `sensor_distance_mm` is the distance of the sensor from the lens. The texture depends on `seed`, the
-/// noise on `seed` and `exposure_number`. To render many exposures of a scene keep a [`Renderer`].
-///
-/// # Errors
-/// [`RenderError`] where lens, scene, camera or position make no image.
+/// `sensor_distance_mm` is measured from the lens. The texture depends on `seed`, the noise on `seed` and
+/// `exposure_number`. For many exposures of a scene keep a [`Renderer`].
+/// Errors: [`RenderError`] for a lens, scene, camera or position without an image.
 pub fn render(
     scene: &Scene,
     lens: &Lens,
@@ -71,11 +54,9 @@ pub fn render(
     Renderer::new(scene, lens, psf, camera, seed)?.expose(sensor_distance_mm, exposure_number)
 }
 
-/// Renders the light of an exposure without noise, quantisation and full well: shape (height, width), as a
-/// fraction of the full well ([`Camera::exposure_level`] on average).
-///
-/// # Errors
-/// As [`render`].
+/// Renders without noise, quantisation and full well: shape (height, width), as a fraction of the full well
+/// ([`Camera::exposure_level`] on average).
+/// Errors: as [`render`].
 pub fn render_f32(
     scene: &Scene,
     lens: &Lens,
@@ -88,7 +69,7 @@ pub fn render_f32(
     Ok(Renderer::new(scene, lens, psf, camera, seed)?.radiance(sensor_distance_mm)? * level)
 }
 
-/// The depth of the surface at each pixel's centre, mm, shape (height, width).
+/// True depth at each pixel's centre, mm, shape (height, width).
 #[must_use]
 pub fn truth(scene: &Scene, lens: &Lens, camera: &Camera) -> Array2<f32> {
     Array2::from_shape_fn((camera.height_px, camera.width_px), |(row, column)| {
@@ -96,21 +77,19 @@ pub fn truth(scene: &Scene, lens: &Lens, camera: &Camera) -> Array2<f32> {
     })
 }
 
-/// A scene before a camera, with its texture made: one exposure after the other at any sensor position.
+/// A scene with its texture, for many exposures.
 #[derive(Debug, Clone)]
 pub struct Renderer {
     scene: Scene,
     lens: Lens,
     psf: Psf,
     camera: Camera,
-    /// Decides noise and hot pixels.
     seed: u64,
     texture: Paint,
     surface: Surface,
     view: View,
 }
 
-/// What the surface is painted with.
 #[derive(Debug, Clone)]
 enum Paint {
     /// One period of a random texture, in cells.
@@ -118,7 +97,7 @@ enum Paint {
     Picture(Picture),
 }
 
-/// Image distance of the surface beyond the far setting's sensor distance, mm.
+/// Image distance of the surface relative to the far setting's sensor distance, mm.
 #[derive(Debug, Clone)]
 enum Surface {
     Plane(f64),
@@ -127,10 +106,8 @@ enum Surface {
 }
 
 impl Renderer {
-    /// Makes the texture and checks that the lens images every place of the scene.
-    ///
-    /// # Errors
-    /// As [`render`].
+    /// Creates the texture; checks that all of the scene has an image.
+    /// Errors: as [`render`].
     pub fn new(
         scene: &Scene,
         lens: &Lens,
@@ -164,35 +141,33 @@ impl Renderer {
         })
     }
 
-    /// The same scene before a camera that has been shifted, turned or zoomed.
+    /// Shifts, rotates or zooms the camera.
     #[must_use]
     pub fn seen_by(mut self, view: View) -> Self {
         self.view = view;
         self
     }
 
-    /// The same scene before another sensor: with noise and hot pixels of its own, and the scene's texture.
+    /// Another sensor: noise and hot pixels of this seed, same texture.
     #[must_use]
     pub fn with_noise_of(mut self, seed: u64) -> Self {
         self.seed = seed;
         self
     }
 
-    /// The same, for a scene that moves: where it lies from now on.
+    /// Changes the view, for a moving scene.
     pub fn look(&mut self, view: View) {
         self.view = view;
     }
 
-    /// How the scene lies in an exposure: the camera's own view, and the magnification of a lens that is not telecentric.
+    /// View of an exposure: the camera's own, times the magnification of a lens that is not telecentric.
     fn view_at(&self, sensor_distance_mm: f64) -> View {
         let grown = if self.lens.telecentric { 1.0 } else { sensor_distance_mm / self.lens.sensor_far_mm };
         View { magnification: self.view.magnification * grown, ..self.view }
     }
 
-    /// One exposure with the sensor at `sensor_distance_mm`: codes of shape (height, width).
-    ///
-    /// # Errors
-    /// [`RenderError::Sensor`] and [`RenderError::Blur`] for positions that make no image.
+    /// One exposure: codes of shape (height, width).
+    /// Errors: [`RenderError::Sensor`] and [`RenderError::Blur`].
     pub fn expose(&self, sensor_distance_mm: f64, exposure_number: u32) -> Result<Array2<u16>, RenderError> {
         let radiance = self.radiance(sensor_distance_mm)?;
         Ok(self.camera.expose(radiance.view(), self.seed, exposure_number))
@@ -216,10 +191,8 @@ impl Renderer {
         Ok(self.camera.expose(radiance.view(), self.seed, exposure_number))
     }
 
-    /// The mean radiance on each pixel, shape (height, width); the scene's mean is 1.
-    ///
-    /// # Errors
-    /// As [`Renderer::expose`].
+    /// Mean radiance of each pixel, shape (height, width); the scene's mean is 1.
+    /// Errors: as [`Renderer::expose`].
     pub fn radiance(&self, sensor_distance_mm: f64) -> Result<Array2<f32>, RenderError> {
         if !(sensor_distance_mm.is_finite() && sensor_distance_mm > 0.0) {
             return Err(RenderError::Sensor { sensor_distance_mm });
@@ -260,7 +233,7 @@ impl Renderer {
         Ok(Cells { margin_px, radiance: self.cell_radiance(margin_px, &view), blur_px }.blurred(&self.psf))
     }
 
-    /// Radiance of the cells of the image and `margin_px` around it.
+    /// Radiance of the cells, including `margin_px`.
     fn cell_radiance(&self, margin_px: usize, view: &View) -> Array2<f32> {
         let size = cell_grid(&self.camera, margin_px);
         match &self.texture {
@@ -291,7 +264,7 @@ impl Renderer {
     }
 }
 
-/// Rows and columns of cells of the image and `margin_px` around it.
+/// Rows and columns of cells, including `margin_px`.
 fn cell_grid(camera: &Camera, margin_px: usize) -> (usize, usize) {
     let cells = |pixels: usize| (pixels + 2 * margin_px) * CELLS_PER_PIXEL;
     (cells(camera.height_px), cells(camera.width_px))
@@ -303,7 +276,7 @@ fn cell_centre_px((row, column): (usize, usize), margin_px: usize) -> (f64, f64)
     (position(column), position(row))
 }
 
-/// Image distance of each cell beyond the far setting's sensor distance, mm.
+/// Image distance of each cell relative to the far setting's sensor distance, mm.
 fn image_field(
     scene: &Scene,
     lens: &Lens,

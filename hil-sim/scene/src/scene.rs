@@ -1,48 +1,45 @@
-//! Scenes: a height field over the image and what it is painted with.
+//! Scenes: a height field over the image, and its texture.
 //!
-//! Depths in mm from the lens. The lens is telecentric, so a place of the surface keeps its image position
-//! whatever its depth, and the height field lives in image coordinates (px, the centre of the first pixel
-//! at 0.5, 0.5). Named shapes span the lens's working range exactly, far focus to near focus; outside the
-//! image they go on.
+//! Depths in mm from the lens. The lens is telecentric, so a surface point keeps its image position at any
+//! depth; the height field uses image coordinates (px, centre of the first pixel at 0.5, 0.5). Named shapes
+//! span far to near focus exactly and continue outside the image.
 
 use crate::camera::Camera;
 use crate::lens::Lens;
 use crate::maps::HeightMap;
 use crate::texture::Texture;
 
-/// A surface with its paint. Text form as in [`Scene::from_str`](std::str::FromStr).
+/// A textured surface. Text form: [`Scene::from_str`](std::str::FromStr).
 #[derive(Debug, Clone, PartialEq)]
 pub struct Scene {
-    /// Where the surface lies.
+    /// Shape of the surface.
     pub shape: Shape,
-    /// What it is painted with.
+    /// Texture of the surface.
     pub texture: Texture,
-    /// Standard deviation of a random texture, the mean being 1; a picture has its own.
+    /// Standard deviation of a random texture of mean 1; pictures ignore it.
     pub contrast: f64,
 }
 
-/// Where the surface lies.
+/// Shape of the surface.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Shape {
-    /// A plane across the axis.
+    /// Plane perpendicular to the axis.
     Plane {
-        /// Its depth, mm.
+        /// Depth of the plane, mm.
         depth_mm: f64,
     },
-    /// Upright steps of equal width and equal height, far focus on the left, near focus on the right.
+    /// Steps of equal width and height, far focus left, near focus right.
     Staircase {
-        /// Number of levels, 2 or more.
+        /// Number of levels, at least 2.
         steps: usize,
     },
-    /// A plane tilted about the vertical, far focus at the left border, near focus at the right one.
+    /// Plane tilted about the vertical, far focus at the left border, near focus at the right.
     Slant,
-    /// A cone towards the camera: near focus at the tip in the image's centre, far focus from half the
-    /// image's larger side outwards.
+    /// Cone: near focus at the centre, far focus from half the larger image side outwards.
     Cone,
-    /// A cap of 60 degrees half-angle of a ball, stretched along the axis to span the range; as wide as the
-    /// cone.
+    /// Ball cap of 60 degrees half-angle, stretched to span the range; as wide as the cone.
     Sphere,
-    /// A height field given as an array, stretched over the image.
+    /// Height field, stretched over the image.
     HeightMap(HeightMap),
 }
 
@@ -53,12 +50,12 @@ impl Scene {
         Self { shape, texture: Texture::Sand, contrast: 0.2 }
     }
 
-    /// Depth of the surface at the image position `x_px`, `y_px`, mm.
+    /// Depth at the image position `x_px`, `y_px`, mm.
     #[must_use]
     pub fn depth_mm(&self, lens: &Lens, camera: &Camera, x_px: f64, y_px: f64) -> f64 {
         let (far, near) = (lens.far_mm, lens.near_mm);
         let (width, height) = (camera.width_px as f64, camera.height_px as f64);
-        // Relative distance from the image's centre: 1 at half the larger side.
+        // Relative distance from the centre: 1 at half the larger side.
         let rho = || (x_px - 0.5 * width).hypot(y_px - 0.5 * height) / (0.5 * width.max(height));
         match &self.shape {
             Shape::Plane { depth_mm } => *depth_mm,

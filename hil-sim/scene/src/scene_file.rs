@@ -1,11 +1,11 @@
-//! Scene files: a scene whose maps lie in files of their own.
+//! Scene files, whose maps are separate files.
 //!
 //! ```toml
 //! depth = "bust.npy"      # depths in mm; or: scene = "cone"
 //! texture = "bricks.png"  # a picture; or: "sand", "fractal"
 //! contrast = 0.3          # of a random texture
 //! ```
-//! This crate opens no files: it says which maps are wanted and takes them as arrays.
+//! This crate opens no files: the caller reads the named maps and passes arrays.
 
 use ndarray::Array2;
 use serde::Deserialize;
@@ -15,7 +15,7 @@ use crate::scene::{Scene, Shape};
 use crate::scene_error::SceneError;
 use crate::texture::Texture;
 
-/// A parsed scene file.
+/// A scene description with the names of its maps.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SceneFile {
     /// File of the depth map, relative to the scene file.
@@ -37,10 +37,8 @@ struct Raw {
 }
 
 impl SceneFile {
-    /// Reads the text of a scene file.
-    ///
-    /// # Errors
-    /// [`SceneError`] names the key and what was expected.
+    /// Parses a scene file.
+    /// Errors: [`SceneError`] with key and expectation.
     pub fn parse(text: &str) -> Result<Self, SceneError> {
         let raw: Raw =
             toml::from_str(text).map_err(|error| SceneError::Syntax(error.to_string().trim_end().into()))?;
@@ -69,11 +67,9 @@ impl SceneFile {
         Ok(Self { depth: raw.depth, texture, scene, random, contrast: raw.contrast })
     }
 
-    /// The scene, given the maps that [`SceneFile::depth`] (mm) and [`SceneFile::texture`] (any radiance)
-    /// name.
-    ///
-    /// # Errors
-    /// [`SceneError`] if a map is missing, surplus or holds what it cannot.
+    /// Combines the scene with the maps of [`SceneFile::depth`] (mm) and [`SceneFile::texture`] (any
+    /// radiance).
+    /// Errors: [`SceneError`] for a missing, surplus or invalid map.
     pub fn into_scene(
         self,
         depth_mm: Option<Array2<f32>>,
@@ -109,7 +105,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_file_names_the_maps_it_wants() {
+    fn a_scene_file_names_its_maps() {
         let file = SceneFile::parse("depth = \"bust.npy\"\ntexture = \"bricks.png\"").unwrap();
         assert_eq!((file.depth.as_deref(), file.texture.as_deref()), (Some("bust.npy"), Some("bricks.png")));
         let (depth, texture) = (Array2::from_elem((2, 2), 900.0), Array2::ones((3, 3)));
@@ -120,7 +116,7 @@ mod tests {
     }
 
     #[test]
-    fn a_named_scene_with_a_random_texture_wants_no_maps() {
+    fn a_named_scene_with_a_random_texture_needs_no_maps() {
         let file = SceneFile::parse("scene = \"cone\"\ntexture = \"fractal\"\ncontrast = 0.4").unwrap();
         assert_eq!((&file.depth, &file.texture), (&None, &None));
         assert_eq!(file.into_scene(None, None).unwrap().to_string(), "cone,texture=fractal,contrast=0.4");

@@ -7,7 +7,7 @@ use crate::scene::{Scene, Shape};
 use crate::scene_error::SceneError;
 use crate::texture::Texture;
 
-/// Levels of a staircase that does not say how many.
+/// Default number of levels of a staircase.
 const DEFAULT_STEPS: usize = 8;
 
 impl FromStr for Scene {
@@ -71,7 +71,6 @@ fn number(
 impl FromStr for Texture {
     type Err = SceneError;
 
-    /// `sand` or `fractal`.
     fn from_str(text: &str) -> Result<Self, SceneError> {
         match text {
             "sand" => Ok(Self::Sand),
@@ -82,8 +81,7 @@ impl FromStr for Texture {
 }
 
 impl fmt::Display for Scene {
-    /// The text that parses to this scene; height maps and pictures, which have none, are called by these
-    /// names.
+    /// Text that parses to this scene; height maps and pictures print their kind only.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match &self.shape {
             Shape::Plane { depth_mm } => write!(f, "plane:{depth_mm}")?,

@@ -1,10 +1,9 @@
-//! Random textures: what the surfaces of a scene are painted with.
+//! Random textures.
 //!
-//! A texture is a Gaussian random field of a stated spectrum with two samples per pixel, mean 1, standard
-//! deviation = contrast, clipped to 0.2..1.8. It repeats with a period that is at least 64 px larger than
-//! the image, so within an image nothing repeats and every surface goes on beyond the border however large
-//! the blur is. A texture depends on the seed and the image size alone. Cost: one FFT of the period, 0.1 s
-//! for 640 x 480.
+//! A Gaussian random field of a given spectrum with two samples per pixel, mean 1, standard deviation =
+//! contrast, clipped to 0.2..1.8. Its period exceeds the image by at least 64 px, so nothing repeats within
+//! an image and surfaces continue beyond it. Depends on seed and image size only. Cost: one FFT of the
+//! period, 0.1 s for 640 x 480.
 
 use std::fmt;
 
@@ -18,20 +17,19 @@ use crate::fourier::{Fourier2, good_size};
 use crate::kernel::CELLS_PER_PIXEL;
 use crate::maps::Picture;
 
-/// Pixels by which the period exceeds the image.
+/// Minimum excess of the period over the image.
 const MARGIN_PX: usize = 64;
-/// Radiance is clipped to this range around the mean of 1.
+/// Range of the radiance; the mean is 1.
 const CLIP: (f32, f32) = (0.2, 1.8);
 
-/// What a surface is painted with.
+/// Texture of a surface.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Texture {
-    /// White noise blurred by a Gaussian of SD 0.5 px, plus 1/f noise (0.954 and 0.3 of the standard
-    /// deviation).
+    /// White noise blurred by a Gaussian of SD 0.5 px, plus 1/f noise (0.954 and 0.3 of the SD).
     Sand,
     /// Amplitude 1/f, flat below one cycle per 64 px.
     Fractal,
-    /// A picture given as an array, stretched over the image and mirrored beyond it.
+    /// Picture, stretched over the image, mirrored outside.
     Picture(Picture),
 }
 
@@ -45,18 +43,18 @@ impl fmt::Display for Texture {
     }
 }
 
-/// Amplitude of the fractal field at `f` cycles per px, unscaled.
+/// Unscaled amplitude of the fractal at `f` cycles per px.
 fn fractal_amplitude(f: f32) -> f32 {
     1.0 / f.max(1.0 / 64.0)
 }
 
-/// Amplitude of the blurred white noise at `f` cycles per px: a Gaussian of SD 0.5 px.
+/// Amplitude of the blurred white noise at `f` cycles per px.
 fn grain_amplitude(f: f32) -> f32 {
     let z = std::f32::consts::TAU * f * 0.5;
     libm::expf(-0.5 * z * z)
 }
 
-/// Spectrum of a random texture: amplitude at a frequency in cycles per px.
+/// Spectrum of a random texture.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Spectrum {
     Sand,
@@ -64,7 +62,7 @@ pub(crate) enum Spectrum {
 }
 
 impl Spectrum {
-    /// One period of the texture in cells (half pixels) for an image of this size.
+    /// One period in cells (half pixels) for an image of this size.
     pub(crate) fn synthesise(
         self,
         width_px: usize,
@@ -76,8 +74,7 @@ impl Spectrum {
         let (height, width) = (period(height_px), period(width_px));
         let amplitude = self.amplitudes(height, width);
         let mut random = ChaCha8Rng::seed_from_u64(seed);
-        // The real part of a field with independent complex coefficients is a real Gaussian field of that
-        // spectrum.
+        // The real part of independent complex coefficients is a real Gaussian field of that spectrum.
         let mut field: Vec<Complex32> = amplitude
             .iter()
             .map(|amplitude| {
@@ -179,7 +176,7 @@ mod tests {
     }
 
     #[test]
-    fn a_seed_is_a_texture() {
+    fn equal_seeds_give_equal_textures() {
         let field = |seed| Spectrum::Sand.synthesise(40, 30, 0.2, seed);
         assert_eq!(field(1), field(1));
         assert_ne!(field(1), field(2));

@@ -1,15 +1,15 @@
-//! A camera that is not quite where it was: shift, magnification and rotation of an exposure.
+//! Shift, magnification and rotation of an exposure.
 
 use ndarray::Array2;
 
-/// Where a place of the scene lies in an exposure: magnified and turned about the image's middle, then shifted.
+/// Transform from scene to image: scaled and rotated about the image's centre, then shifted.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct View {
-    /// Right and down, px.
+    /// Shift right and down, px.
     pub shift_px: [f64; 2],
-    /// Size relative to the scene's own.
+    /// Scale relative to the scene.
     pub magnification: f64,
-    /// From x towards y, degrees.
+    /// Rotation from x towards y.
     pub rotation_deg: f64,
 }
 
@@ -27,7 +27,6 @@ impl View {
     }
 }
 
-/// A view over an image.
 pub(crate) struct Placed {
     view: View,
     middle: (f64, f64),
@@ -36,7 +35,7 @@ pub(crate) struct Placed {
 }
 
 impl Placed {
-    /// The place of the scene that is seen at a place of the image.
+    /// Scene position at an image position.
     pub(crate) fn scene_px(&self, (x_px, y_px): (f64, f64)) -> (f64, f64) {
         if self.view == View::default() {
             return (x_px, y_px);
@@ -48,8 +47,8 @@ impl Placed {
     }
 }
 
-/// Value of a field that repeats, between its cells: Lanczos' kernel of four lobes, whose error is far below the camera's noise
-/// because textures have little at the cells' own frequency.
+/// Interpolates a periodic field with a four-lobe Lanczos kernel; its error is far below the camera's noise,
+/// because textures have little power at the cell frequency.
 pub(crate) fn periodic(field: &Array2<f32>, x: f64, y: f64) -> f32 {
     const LOBES: isize = 4;
     let sinc = |x: f64| {
@@ -87,7 +86,7 @@ mod tests {
     fn a_view_places_the_scene() {
         let view = View { shift_px: [2.0, -1.0], magnification: 1.02, rotation_deg: 0.5 };
         let placed = view.placed(64.0, 48.0);
-        // The image's middle shows what lay 2 px left of it and 1 px below, but for the turn and the magnification.
+        // The image's centre shows a point 2 px left and 1 px below, apart from rotation and magnification.
         let (x, y) = placed.scene_px((32.0, 24.0));
         assert!((x - (32.0 - 2.0 / 1.02)).abs() < 0.02 && (y - (24.0 + 1.0 / 1.02)).abs() < 0.03, "{x} {y}");
         let (a, b) = (placed.scene_px((0.0, 0.0)), placed.scene_px((10.0, 0.0)));
@@ -96,10 +95,10 @@ mod tests {
     }
 
     #[test]
-    fn a_field_is_found_again_between_its_cells() {
+    fn interpolates_a_field_between_its_cells() {
         let wave = |x: f64, y: f64| (std::f64::consts::TAU * (3.0 * x / 32.0 + 5.0 * y / 24.0)).sin();
         let field = Array2::from_shape_fn((24, 32), |(y, x)| wave(x as f64, y as f64) as f32);
-        // A wave of 5 cells, where sand has a tenth of its strength left.
+        // A wave of 5 cells, where sand has a tenth of its amplitude.
         for (x, y) in [(0.3, 0.6), (-4.7, 30.2), (31.5, 23.5)] {
             let error = (f64::from(periodic(&field, x, y)) - wave(x, y)).abs();
             assert!(error < 0.01, "{error} at ({x}, {y})");

@@ -1,25 +1,24 @@
-//! Several exposures of one thing as one image: the noise falls with the root of their number.
+//! Averages several exposures: noise falls with the square root of their number.
 
 use ndarray::{Array2, Zip};
 
 use crate::{camera::Image, expose::CaptureError};
 
-/// Bits of an image file.
+/// Bit limit of image files.
 const BITS_MAX: u32 = 16;
 
-/// Images of one size and depth of bits, summed up.
+/// Sum of images of equal size and bit depth.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Average {
     first: Image,
-    /// Sum of the codes; 65,535 images of 16 bits fit.
+    /// Sum of codes; 65,535 16-bit images fit.
     sum: Array2<u32>,
-    /// Pixels that were saturated in any of the images: their mean would say less light than there was.
+    /// Pixels saturated in any image: their mean would be too dark.
     saturated: Array2<bool>,
     count: u32,
 }
 
 impl Average {
-    /// Begins with an image.
     pub fn of(image: Image) -> Self {
         let white = white(image.bits.into());
         let sum = image.pixels.mapv(u32::from);
@@ -27,10 +26,8 @@ impl Average {
         Self { first: image, sum, saturated, count: 1 }
     }
 
-    /// Adds another one.
-    ///
-    /// # Errors
-    /// [`CaptureError::Unlike`] for one of another size or depth of bits.
+    /// Adds an image.
+    /// Errors: [`CaptureError::Unlike`] for another size or bit depth.
     pub fn add(&mut self, image: &Image) -> Result<(), CaptureError> {
         let ((far_height, far_width), (near_height, near_width)) = (self.sum.dim(), image.pixels.dim());
         let (far_bits, near_bits) = (self.first.bits, image.bits);
@@ -55,8 +52,8 @@ impl Average {
         Ok(())
     }
 
-    /// The mean: with a bit more for each doubling, as far as 16 carry them; black and white stay where they were. One image is given
-    /// back as it came.
+    /// The mean, with one more bit per doubling up to 16; black and white keep their meaning. A single image
+    /// is returned unchanged.
     pub fn finish(self) -> Image {
         if self.count == 1 {
             return self.first;
@@ -66,7 +63,7 @@ impl Average {
         let (whole, of) = (u64::from(white(bits)), u64::from(white(before)) * u64::from(self.count));
         let pixels = Zip::from(&self.sum).and(&self.saturated).map_collect(|sum, saturated| {
             let mean = (u64::from(*sum) * whole + of / 2) / of;
-            // What was never saturated stays below white.
+            // Unsaturated pixels stay below white.
             (if *saturated { whole } else { mean.min(whole - 1) }) as u16
         });
         Image { pixels, bits: bits as u8 }
@@ -88,7 +85,7 @@ mod tests {
     }
 
     #[test]
-    fn the_mean_has_more_bits_and_keeps_white() {
+    fn the_mean_has_more_bits_and_preserves_white() {
         let mut average = Average::of(image(array![[0, 100, 254, 255]]));
         for pixels in [array![[0, 101, 255, 255]], array![[1, 100, 254, 255]], array![[0, 100, 254, 255]]] {
             average.add(&image(pixels)).unwrap();
@@ -100,7 +97,7 @@ mod tests {
     }
 
     #[test]
-    fn one_image_is_itself_and_another_size_is_refused() {
+    fn returns_a_single_image_unchanged_and_rejects_another_size() {
         let one = image(array![[7, 255]]);
         assert_eq!(Average::of(one.clone()).finish(), one);
         let error = Average::of(one).add(&image(array![[7]])).unwrap_err();

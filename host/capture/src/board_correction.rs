@@ -1,7 +1,7 @@
-//! Depth correction by the board: a correction is sent, rows of a depth map go out and come back; or flat targets are
-//! sent and the board fits the correction itself.
+//! Depth correction on the board: sends a correction and rows of a depth map, or flat targets for a fit on
+//! the board.
 //!
-//! Rows travel in pieces of [`CODES_MAX`] codes. A row of 640 pixels takes 19 requests, some 25 ms on the serial line.
+//! Rows travel in pieces of [`CODES_MAX`] codes. A row of 640 pixels takes 19 requests, some 25 ms.
 
 use farnear_depth::corrections::{BoardCorrection, BoardForm, CorrectionError, Method};
 use farnear_maths::clsf::{DepthScale, Frame};
@@ -13,46 +13,26 @@ use ndarray::{Array2, ArrayView2};
 
 use crate::{client::Client, error::ClientError, owner::nonsense};
 
-/// The board could not correct.
 #[derive(Debug, thiserror::Error)]
 pub enum BoardCorrectionError {
-    /// The board, or the way to it.
     #[error(transparent)]
     Board(#[from] ClientError),
-    /// The correction is none for a board.
     #[error(transparent)]
     Correction(#[from] CorrectionError),
-    /// The rows are longer than the board's buffer.
     #[error("the depth map is {width} px wide, the board's row buffer holds {max}")]
-    TooWide {
-        width: usize,
-        /// What the board holds.
-        max: u16,
-    },
-    /// The map is not of the correction's size.
+    TooWide { width: usize, max: u16 },
     #[error(
         "the depth map has {width}x{height} px, the correction is for {made_for_width}x{made_for_height}"
     )]
-    Size {
-        width: usize,
-        height: usize,
-        /// Width of the correction.
-        made_for_width: u16,
-        /// Height of the correction.
-        made_for_height: u16,
-    },
-    /// The user interrupted.
+    Size { width: usize, height: usize, made_for_width: u16, made_for_height: u16 },
     #[error("interrupted at row {row}")]
-    Interrupted {
-        /// The row that was due.
-        row: u16,
-    },
+    Interrupted { row: u16 },
 }
 
-/// A flat target for a fit on the board: its depth map in codes and its true depth.
+/// Flat target for a fit on the board.
 #[derive(Clone, Debug)]
 pub struct CodedTarget {
-    /// Codes of the depths, (height, width).
+    /// Depth codes, (height, width).
     pub codes: Array2<i16>,
     /// Code of the true depth.
     pub truth: i16,
@@ -74,18 +54,18 @@ fn info(method: Method, frame: Frame, scale: DepthScale) -> Result<CorrectionInf
     })
 }
 
-/// Depths in mm as codes.
+/// Encodes depths in mm.
 pub fn encode(depth_mm: ArrayView2<f32>, scale: DepthScale) -> Array2<i16> {
     depth_mm.mapv(|depth| scale.encode(depth))
 }
 
-/// Codes as depths in mm.
+/// Decodes to depths in mm.
 pub fn decode(codes: ArrayView2<i16>, scale: DepthScale) -> Array2<f32> {
     codes.mapv(|code| scale.decode(code))
 }
 
 impl Client {
-    /// Sends a correction, which becomes the board's open one.
+    /// Sends a correction and opens it on the board.
     pub fn send_correction(&self, correction: &BoardCorrection) -> Result<(), BoardCorrectionError> {
         let BoardCorrection { method, frame, scale, coefficients, .. } = correction;
         let during = "sending a depth correction";
@@ -99,7 +79,7 @@ impl Client {
         Ok(())
     }
 
-    /// Coefficients of the board's open correction, in the order of [`BoardCorrection::coefficients`].
+    /// Coefficients of the open correction, in the order of [`BoardCorrection::coefficients`].
     pub fn read_coefficients(&self, form: CorrectionForm) -> Result<Vec<i32>, ClientError> {
         let during = "reading the depth correction";
         let mut coefficients = Vec::new();
@@ -116,12 +96,12 @@ impl Client {
         Ok(coefficients)
     }
 
-    /// Keeps the board's open correction without power.
+    /// Stores the open correction permanently.
     pub fn store_correction(&self) -> Result<(), ClientError> {
         self.expect_accepted(&Request::StoreCorrection, "storing the depth correction")
     }
 
-    /// Lets the board correct a depth map's codes, with the correction that was sent. `progress` is told of each row.
+    /// Corrects the codes of a depth map on the board; calls `progress` per row.
     pub fn correct_codes(
         &self,
         codes: ArrayView2<i16>,
@@ -154,8 +134,8 @@ impl Client {
         Ok(corrected)
     }
 
-    /// Lets the board fit a correction to flat targets, every `step`th pixel of every `step`th row. It becomes the
-    /// board's open correction; its coefficients are given. `progress` is told of each row of each target.
+    /// Fits a correction to every `step`th pixel and row of flat targets. Opens it on the board and returns
+    /// its coefficients; calls `progress` per row of each target.
     pub fn fit_correction(
         &self,
         method: Method,

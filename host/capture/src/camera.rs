@@ -1,4 +1,4 @@
-//! Cameras: what gives an image for a trigger of the board. One file per kind.
+//! Cameras: one image per trigger of the board. One file per kind.
 
 use std::{
     path::PathBuf,
@@ -31,12 +31,12 @@ pub use sim::SimCamera;
 #[cfg(all(feature = "v4l2", target_os = "linux"))]
 pub use v4l::V4lCamera;
 
-/// One exposure as the camera delivers it.
+/// An image of a camera.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Image {
-    /// Shape (height, width); values lie in 0..2^bits.
+    /// Shape (height, width); values in 0..2^bits.
     pub pixels: Array2<u16>,
-    /// Bits that carry the picture, 8 to 16.
+    /// Significant bits, 8 to 16.
     pub bits: u8,
 }
 
@@ -47,12 +47,12 @@ impl Image {
         self.pixels.mapv(|code| f32::from(code) / largest)
     }
 
-    /// The codes as they came, as floats.
+    /// Codes as floats.
     pub fn codes(&self) -> Array2<f32> {
         self.pixels.mapv(f32::from)
     }
 
-    /// How many pixels have each code, from 0 to the largest that the bits carry; codes above it count as it.
+    /// Histogram over all codes; values above the largest code count as it.
     pub fn counts(&self) -> Vec<u32> {
         let largest = (1usize << self.bits.clamp(1, 16)) - 1;
         let mut counts = vec![0; largest + 1];
@@ -62,7 +62,7 @@ impl Image {
         counts
     }
 
-    /// The upper eight bits of each pixel, row by row.
+    /// Upper eight bits of each pixel, row by row.
     pub fn eight_bits(&self) -> Vec<u8> {
         let (bits, pixels) = (self.bits, self.pixels.iter());
         if bits >= 8 {
@@ -73,193 +73,129 @@ impl Image {
     }
 }
 
-/// A picture as it came, to look at.
+/// A picture for live view.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Frame {
     pub image: Image,
-    /// What the camera says of it.
     pub stamp: Stamp,
 }
 
-/// Something that takes an image at each trigger.
 pub trait Camera {
-    /// What it is, for a capture's record: the same for each camera of the kind, without address or path.
+    /// Kind of camera for a capture's record, without address or path.
     fn kind(&self) -> &'static str;
 
-    /// Makes ready for exposures that come about like this: images from before do not count. A camera that runs freely
-    /// takes pictures of this exposure until it is armed again.
+    /// Prepares for exposures of this kind; earlier images are dropped. A free-running camera uses this
+    /// exposure time until armed again.
     fn arm(&mut self, mode: TriggerMode, exposure: Micros) -> Result<(), CameraError>;
 
-    /// Triggers the camera by its own means, once, now.
+    /// Software trigger of one exposure.
     fn trigger(&mut self, trigger_number: u32, exposure: Micros) -> Result<(), CameraError>;
 
-    /// The image of this exposure, waiting at most `wait` for it. Called for each exposure, in order; after
-    /// [`CameraError::Late`] it may be called for the same exposure again.
+    /// The image of this exposure, waiting at most `wait`. Called in order of exposures; may be repeated
+    /// after [`CameraError::Late`].
     fn image(&mut self, shot: &ShotRecord, wait: Duration) -> Result<Image, CameraError>;
 
-    /// Called for each exposure that the board reports, before its image is fetched; `received` is when the report arrived.
+    /// Called per reported exposure before its image is fetched; `received` is the arrival time of the
+    /// report.
     fn reported(&mut self, _shot: &ShotRecord, _received: Instant) {}
 
-    /// How long no further picture may come after the last image of a program.
+    /// Time without a picture that ends a program.
     fn quiet_time(&self) -> Duration {
         Duration::ZERO
     }
 
-    /// Called after the last image of a program, repeatedly until [`Self::quiet_time`] has passed: waits at most `wait` for a
-    /// picture that no exposure accounts for. With such a picture, no picture of the program is certain to be paired correctly.
+    /// Called after a program's last image until [`Self::quiet_time`] has passed: waits at most `wait` for a
+    /// surplus picture. Any surplus makes the pairing of the whole program uncertain.
     fn finish(&mut self, _wait: Duration) -> Result<(), CameraError> {
         Ok(())
     }
 
-    /// What can be set, with its range, and what can be read.
+    /// Adjustable settings with ranges, and readable values.
     fn controls(&mut self) -> Result<Vec<Control>, CameraError> {
         Ok(Vec::new())
     }
 
-    /// Sets something, until it is set again; what is out of range is refused, never brought into it.
+    /// Changes a setting permanently; values out of range are refused, not clamped.
     fn set(&mut self, setting: &Setting) -> Result<(), CameraError> {
         let expected = format!("a camera of the kind `{}` has nothing to set", self.kind());
         Err(CameraError::Setting { name: setting.name(), value: setting.value(), expected })
     }
 
-    /// Takes pictures without a board from now on, as many as the camera can, until it is armed.
+    /// Starts a live view without a board until the camera is armed.
     fn watch(&mut self) -> Result<(), CameraError> {
         let reason = "this kind gives pictures to a rig only".into();
         Err(CameraError::Unusable { camera: self.kind().into(), reason })
     }
 
-    /// The newest picture since [`Self::watch`] that was not given yet, waiting at most `wait` for it; `None` when time is up.
-    /// An error when nothing more can come.
+    /// The newest unread picture since [`Self::watch`], waiting at most `wait`; `None` at the timeout. An
+    /// error if no more can come.
     fn newest(&mut self, _wait: Duration) -> Result<Option<Frame>, CameraError> {
         Ok(None)
     }
 }
 
-/// A camera did not deliver.
 #[derive(Debug, thiserror::Error)]
 pub enum CameraError {
-    /// No camera answers at the address.
     #[error("no camera at {address}: {reason}; does a simulator run, and is this its camera's address?")]
-    Connect {
-        address: String,
-        /// What the system says.
-        reason: String,
-    },
-    /// The connection broke off.
+    Connect { address: String, reason: String },
     #[error("the camera at {address} went away: {reason}")]
-    Gone {
-        address: String,
-        /// What the system says.
-        reason: String,
-    },
-    /// Another program has the camera.
+    Gone { address: String, reason: String },
     #[error("the camera at {address} is in use by another program; end that program first")]
     InUse { address: String },
-    /// What came is no image.
     #[error("the camera at {address} sends no images: {reason}")]
     Nonsense { address: String, reason: String },
-    /// The camera knows no such trigger.
     #[error("a camera of the kind `{camera}` cannot be triggered by {mode}; use hardware triggers")]
-    Trigger {
-        /// The camera's kind.
-        camera: &'static str,
-        /// How it was to be triggered.
-        mode: &'static str,
-    },
-    /// Nothing came in time.
+    Trigger { camera: &'static str, mode: &'static str },
     #[error("the camera gave no image of exposure {trigger_number} within {waited:?} ({camera})")]
     Late { camera: String, trigger_number: u32, waited: Duration },
-    /// The image of this exposure was passed over.
     #[error("the camera skipped exposure {wanted}: it sent the image of exposure {came}")]
-    Skipped {
-        /// Which exposure was due.
-        wanted: u32,
-        came: u32,
-    },
-    /// The folder cannot be looked into.
+    Skipped { wanted: u32, came: u32 },
     #[error("cannot look into the camera's folder {}: {source}", folder.display())]
-    Folder {
-        folder: PathBuf,
-        /// What the system says.
-        source: std::io::Error,
-    },
-    /// An image file that appeared cannot be used.
+    Folder { folder: PathBuf, source: std::io::Error },
     #[error("{} cannot be used: {reason}", path.display())]
     File { path: PathBuf, reason: String },
-    /// What a frame says of itself contradicts what the board says of the exposure.
+    /// Camera and board contradict each other about an exposure.
     #[error(
-        "the picture for exposure {wanted} cannot be told from others ({camera}): {reason}; does the camera take one picture \
+        "the picture for exposure {wanted} cannot be distinguished from others ({camera}): {reason}; does the camera take one picture \
          for each trigger, and is its strobe wired to the board?"
     )]
-    Mispaired {
-        camera: String,
-        /// Which exposure was due.
-        wanted: u32,
-        reason: String,
-    },
-    /// More pictures than triggers.
+    Mispaired { camera: String, wanted: u32, reason: String },
     #[error(
         "the camera gave a picture more than it was triggered ({camera}), so none is certain to belong to its exposure; it \
          must take one picture for each trigger and not run freely{}",
         ffmpeg_hint(camera)
     )]
     Surplus { camera: String },
-    /// A picture that arrived before its exposure can have begun.
     #[error(
         "the next picture arrived {} ms before exposure {wanted} began ({camera}), so it belongs to an earlier one: the camera gave \
          a picture more than it was triggered; it must take one picture for each trigger and not run freely{}",
         early.as_millis(),
         ffmpeg_hint(camera)
     )]
-    Stale {
-        camera: String,
-        /// Exposure that was due.
-        wanted: u32,
-        /// At least so much too early.
-        early: Duration,
-    },
-    /// Two exposures with the same pixels.
+    Stale { camera: String, wanted: u32, early: Duration },
+    /// Two exposures with equal pixels.
     #[error(
         "the pictures for exposures {earlier} and {wanted} are identical ({camera}): one of them is a copy; each trigger must \
          give one picture of its own{}",
         ffmpeg_hint(camera)
     )]
-    Doubled {
-        camera: String,
-        /// Exposure that has the same picture.
-        earlier: u32,
-        /// Exposure that was due.
-        wanted: u32,
-    },
-    /// A picture that is older than one that was already used.
+    Doubled { camera: String, earlier: u32, wanted: u32 },
+    /// A picture older than its predecessor.
     #[error(
         "{} was taken before the picture of the exposure before it: pictures arrive in another order than they were taken; \
          let them be transferred one after the other",
         path.display()
     )]
     Reordered { path: PathBuf },
-    /// A picture file that was written again.
     #[error(
-        "{} was overwritten: each picture needs a file name of its own (gphoto2: --filename 'image-%n.jpg')",
+        "{} was overwritten: each picture needs its own file name (gphoto2: --filename 'image-%n.jpg')",
         path.display()
     )]
     Overwritten { path: PathBuf },
-    /// A frame that did not come whole.
     #[error("frame {frame} of {camera} came incomplete: {reason}")]
-    Incomplete {
-        camera: String,
-        /// Its number, as the camera counts.
-        frame: u64,
-        reason: String,
-    },
-    /// A device or program that cannot be used.
+    Incomplete { camera: String, frame: u64, reason: String },
     #[error("{camera} cannot be used as a camera: {reason}")]
-    Unusable {
-        /// The device, or the program.
-        camera: String,
-        reason: String,
-    },
-    /// A value that cannot be set.
+    Unusable { camera: String, reason: String },
     #[error("{name} {value}: {expected}")]
     Setting { name: &'static str, value: String, expected: String },
 }

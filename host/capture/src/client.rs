@@ -1,10 +1,11 @@
-//! A handle of a board: requests that are answered or fail, and streams of what the board says by itself.
+//! Handle of a board: requests, and streams of events and logs.
 //!
-//! A request is sent with an id and the board's boot number and sent again, byte for byte, until its answer
-//! comes; the board acts once per id. Handles can be cloned and used from any thread; one thread owns the port and sends
-//! one request after the other. A handle belongs to one session: after a reset or an unplugging every
-//! request gives [`ClientError::Reset`] or [`ClientError::Gone`] until [`Client::reopen`] says that this is understood,
-//! for the rig may have lost its position. See `docs/protocol.md`.
+//! A request is repeated byte for byte until its answer comes; the board acts once per id. Handles can be
+//! cloned and used from any thread; one thread owns the port and sends requests in sequence.
+//!
+//! A handle belongs to one session. After a reset or unplugging each request fails with
+//! [`ClientError::Reset`] or [`ClientError::Gone`] until [`Client::reopen`], because the rig may have lost
+//! its position. See `docs/protocol.md`.
 
 use std::{
     sync::{
@@ -29,14 +30,14 @@ use crate::{
     transport::{Place, Transport, with_rate},
 };
 
-/// Interval at which the wait for an answer checks for an interruption.
+/// Polling interval for interruptions while waiting for an answer.
 const INTERRUPT_POLL: Duration = Duration::from_millis(25);
-/// How long an answer is still awaited after an interruption.
+/// Time to wait for an answer after an interruption.
 const ANSWER_GRACE: Duration = Duration::from_millis(150);
-/// From one attempt to reach a board that restarts to the next.
+/// Retry interval for a restarting board.
 const NEXT_ATTEMPT: Duration = Duration::from_millis(50);
 
-/// A handle of a board.
+/// Handle of a board.
 #[derive(Clone)]
 pub struct Client {
     port: Arc<Port>,
@@ -46,13 +47,13 @@ pub struct Client {
     light: Option<LightLevels>,
 }
 
-/// The way to the thread that owns the port; the thread ends with the last handle.
+/// Channel to the port's thread, which ends with the last handle.
 struct Port {
     name: String,
     timing: Arc<Mutex<Timing>>,
-    /// The rate that the link was to have.
+    /// Requested link rate.
     wanted: Option<LinkRate>,
-    /// How fast the axes move, as far as the board was asked.
+    /// Cached speeds of the axes.
     paces: Mutex<Vec<(Axis, Pace)>>,
     inbox: Option<Sender<Command>>,
     thread: Option<JoinHandle<()>>,
@@ -62,35 +63,33 @@ impl Drop for Port {
     fn drop(&mut self) {
         drop(self.inbox.take());
         if let Some(thread) = self.thread.take() {
-            let _ = thread.join(); // it never panics; what it still had to send is sent now
+            let _ = thread.join(); // it never panics; pending output is sent now
         }
     }
 }
 
 impl Client {
-    /// Opens a serial port and says hello. Once the board was there, the port is opened again whenever it comes back. A rate
-    /// behind its name, `/dev/ttyACM0@921600`, is asked of the board; where it is not heard at it, the link goes on at the rate
-    /// it had, see [`Client::link_note`].
+    /// Opens a serial port and says hello. An unplugged board is reconnected when it returns.
+    /// `/dev/ttyACM0@921600` requests a link rate; without it on both ends the link keeps its rate, see
+    /// [`Client::link_note`].
     pub fn open(port: &str) -> Result<Self, ClientError> {
         let (port, wanted) = with_rate(port)?;
         Self::start(serial(port), port, false, wanted)
     }
 
-    /// As [`Client::open`], where the board is known to be emulated: hello is asked as patiently as all else, so
-    /// that a slow computer does not ask it twice, which would make the run another one.
+    /// As [`Client::open`] for an emulated board: hello has the long timeout, because a repeat on a slow
+    /// computer would change the run.
     pub fn open_emulated(port: &str) -> Result<Self, ClientError> {
         Self::start(serial(port), port, true, None)
     }
 
-    /// Says hello over what `connect` opens, the first time and whenever the line broke. `port` is its name in messages.
-    ///
-    /// # Errors
-    /// [`ClientError`] where nothing can be opened, nobody answers, or no protocol version is shared.
+    /// Says hello over `connect`, initially and after the line broke. `port` is its name in messages.
+    /// Errors: [`ClientError`] if nothing opens or answers, or without a common protocol version.
     pub fn connect(connect: Connect, port: &str) -> Result<Self, ClientError> {
         Self::start(connect, port, false, None)
     }
 
-    /// As [`Client::connect`], at this rate of the link, where both ends can have it.
+    /// As [`Client::connect`] at this link rate, if both ends support it.
     pub fn connect_at(connect: Connect, port: &str, rate: LinkRate) -> Result<Self, ClientError> {
         Self::start(connect, port, false, Some(rate))
     }
@@ -133,11 +132,8 @@ impl Client {
         self.light
     }
 
-    /// Goes on with a board after it was reset or unplugged: says hello if that has not happened yet. What was moving is
-    /// at rest and not homed, whatever it was before.
-    ///
-    /// # Errors
-    /// [`ClientError`] where the board is not there (yet): it may be tried again.
+    /// Continues after a reset or unplugging; says hello if necessary. Axes are at rest and not homed.
+    /// Errors: [`ClientError`] if the board is absent; may be repeated.
     pub fn reopen(&mut self) -> Result<(), ClientError> {
         let (answer, joined) = sync_channel(1);
         self.command(Command::Join { known: self.session.number, answer }, "saying hello")?;
@@ -146,10 +142,8 @@ impl Client {
         Ok(())
     }
 
-    /// As [`Client::reopen`], tried again for at most `allowed`.
-    ///
-    /// # Errors
-    /// The last error, when time is up.
+    /// As [`Client::reopen`], repeated for at most `allowed`.
+    /// Errors: the last error at the timeout.
     pub fn reopen_within(&mut self, allowed: Duration) -> Result<(), ClientError> {
         let until = Instant::now() + allowed;
         loop {
@@ -161,7 +155,7 @@ impl Client {
         }
     }
 
-    /// How fast the axes move, as far as the board was asked; cleared where that may have changed.
+    /// Cached speeds of the axes; cleared if they may have changed.
     pub(crate) fn paces(&self) -> MutexGuard<'_, Vec<(Axis, Pace)>> {
         self.port.paces.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -170,13 +164,12 @@ impl Client {
         &self.session.hello
     }
 
-    /// The protocol version of this session.
+    /// Protocol version of this session.
     pub fn protocol(&self) -> u8 {
         self.session.version
     }
 
-    /// What is to be said about the firmware's version, where it is another than this program's. Both speak the same
-    /// protocol all the same.
+    /// Note if the firmware's version differs from this program's; both use the same protocol.
     pub fn firmware_note(&self) -> Option<String> {
         let (theirs, ours) = (self.hello().firmware.as_str(), env!("CARGO_PKG_VERSION"));
         (theirs != ours).then(|| {
@@ -187,12 +180,12 @@ impl Client {
         })
     }
 
-    /// The link's rate in this session.
+    /// Link rate of this session.
     pub fn link_rate(&self) -> LinkRate {
         self.session.rate
     }
 
-    /// What is to be said about the link's rate, where it is another than was asked for.
+    /// Note if the link rate differs from the requested one.
     pub fn link_note(&self) -> Option<String> {
         let (wanted, has) = (self.port.wanted?, self.link_rate());
         (wanted != has).then(|| {
@@ -204,40 +197,38 @@ impl Client {
         })
     }
 
-    /// What is to be said about the port, where the board has come back under another name than it was opened by.
+    /// Note if the board has reappeared under another port name.
     pub fn port_note(&self) -> Option<String> {
         let (named, has) = (self.port(), &*self.session.port);
         (named != has).then(|| format!("the board that was on {named} has come back on {has}"))
     }
 
-    /// Name of the port, as it was opened first.
+    /// Port name as first opened.
     pub fn port(&self) -> &str {
         &self.port.name
     }
 
-    /// The waiting times in use.
     pub fn timing(&self) -> Timing {
         *self.port.timing.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Uses other waiting times, for a test or an unusual line; for all handles.
+    /// Changes the timeouts of all handles, for tests or unusual lines.
     pub fn set_timing(&self, timing: Timing) {
         *self.port.timing.lock().unwrap_or_else(PoisonError::into_inner) = timing;
     }
 
-    /// Once this flag becomes true, waiting for work ends: the board is told to stop and
-    /// [`ClientError::Interrupted`] is returned. Handles cloned from now on share it.
+    /// Once this flag is set, waits for work stop the board and return [`ClientError::Interrupted`]. Later
+    /// clones share it.
     pub fn interrupt_by(&mut self, flag: Arc<AtomicBool>) {
         self.interrupt = Some(flag);
     }
 
-    /// Whether the user interrupted.
     pub fn interrupted(&self) -> bool {
         self.interrupt.as_ref().is_some_and(|flag| flag.load(Ordering::Relaxed))
     }
 
-    /// Sends a request until its answer comes. `during` says what for, e.g. "homing". Gives the request's id,
-    /// which events will name.
+    /// Sends a request until it is answered; `during` describes it, e.g. "homing". Returns the id that events
+    /// refer to.
     pub fn request(&self, request: &Request, during: &str) -> Result<(u32, Response), ClientError> {
         self.ask(request, during, None)
     }
@@ -253,7 +244,7 @@ impl Client {
         answered.into_iter().next().unwrap_or_else(|| Err(nothing(during)))
     }
 
-    /// Asks for several things by one write, so that they come at the same time however slow this computer is.
+    /// Sends several requests in one write, so that they arrive together even from a slow computer.
     pub(crate) fn ask_together(
         &self,
         questions: Vec<Question>,
@@ -269,7 +260,7 @@ impl Client {
                 Err(RecvTimeoutError::Disconnected) => return Err(self.ended(during)),
                 Err(RecvTimeoutError::Timeout) if stopping || !self.interrupted() => {}
                 Err(RecvTimeoutError::Timeout) => {
-                    // Work that is accepted later has no listener and is stopped by the port's owner.
+                    // Work accepted later has no listener and is stopped by the port's owner.
                     if interrupted.get_or_insert_with(Instant::now).elapsed() >= ANSWER_GRACE {
                         return Err(ClientError::Interrupted { during: during.into() });
                     }
@@ -278,7 +269,7 @@ impl Client {
         }
     }
 
-    /// Asks for something that is done at once.
+    /// Sends a request without long work.
     pub(crate) fn expect_accepted(&self, request: &Request, during: &str) -> Result<(), ClientError> {
         match self.request(request, during)? {
             (_, Response::Accepted) => Ok(()),
@@ -294,10 +285,8 @@ impl Client {
         }
     }
 
-    /// The board's log from now on: pieces of its defmt stream, to be decoded with the firmware's ELF file.
-    ///
-    /// # Errors
-    /// [`ClientError::Gone`] where the port's owner has ended.
+    /// The board's log from now on: its defmt stream, to be decoded with the firmware's ELF.
+    /// Errors: [`ClientError::Gone`] if the port's thread has ended.
     pub fn logs(&self) -> Result<LogStream, ClientError> {
         let (sender, stream) = LogStream::new();
         self.command(Command::Logs(sender), "listening")?;

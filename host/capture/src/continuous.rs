@@ -1,9 +1,8 @@
-//! Continuous capture: far, near, far, near ..., or any cycle of shots, each exposure with its image, until it has taken as
-//! many as wanted or is stopped.
+//! Continuous capture: cycles of shots (far, near, ...) with an image each, for a number of exposures or
+//! until stopped.
 //!
-//! The board holds the pace and numbers its frames without a gap; what it drops it says. What is lost on the way to here is reported likewise:
-//! an event that the board no longer remembers shows as a missing number, an image that does not come as such. Nothing is passed
-//! over in silence, and no image is given to another exposure than its own.
+//! The board numbers its frames without gaps and reports dropped ones. Losses on the way are reported, too: a
+//! missing event by its number, a missing image as such. No image is assigned to another exposure.
 
 use std::{
     collections::VecDeque,
@@ -24,65 +23,62 @@ use crate::{
     work::{Step, Work},
 };
 
-/// Images in a row that do not come, after which none is expected.
+/// Missing images in a row that end the run.
 const UNDELIVERED_MAX: u32 = 8;
 
-/// How it goes on, and for how long.
+/// Period and number of exposures.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Pace {
-    /// From one trigger to the next; 0 = as fast as position and camera allow.
+    /// Trigger period; 0 = as fast as possible.
     pub period: Micros,
-    /// Exposures after which it ends; 0 = none, it goes on until it is stopped.
+    /// Number of exposures; 0 = until stopped.
     pub exposures: u32,
 }
 
-/// An exposure with its image.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Frame {
-    /// Which moment of the pace, from 0.
+    /// Period number, from 0.
     pub number: u32,
-    /// Largest distance of the measured position from the one asked for, from the trigger's order to the end of the exposure.
+    /// Largest deviation from the target between trigger and end of exposure.
     pub deviation: Nanometres,
-    /// What the board measured.
     pub record: ShotRecord,
     pub image: Image,
 }
 
-/// Why there is no exposure, or no image of it.
+/// Why a frame or its image is missing.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub enum Loss {
     Board(DropReason),
-    /// The event that tells of it was lost, and the board no longer remembers it.
+    /// The event was lost and the board has forgotten it.
     EventLost,
-    /// The image of this exposure did not come; with the camera's word for it.
+    /// The image did not arrive.
     Image {
         trigger_number: u32,
-        /// What the camera says.
         reason: String,
     },
 }
 
-/// What became of a frame.
+/// Result of a period.
 #[derive(Clone, PartialEq, Debug)]
 pub enum Outcome {
-    /// It was exposed, and its image is here.
     Taken(Box<Frame>),
     Dropped {
-        /// Which moment of the pace, from 0.
+        /// Period number, from 0.
         number: u32,
         loss: Loss,
     },
 }
 
-/// An exposure that was reported of, without its image yet.
+/// A reported exposure whose image is pending.
 enum Reported {
     Taken { number: u32, deviation: Nanometres, record: ShotRecord },
     Dropped { number: u32, loss: Loss },
 }
 
-/// A continuous run; dropped before its end it stops the rig.
+/// A continuous run; dropping it stops the rig.
 ///
-/// Images wait in the camera until they are asked for: a caller that takes longer than a period for each [`Self::outcome`] loses some, which is reported.
+/// Unread images wait in the camera. If [`Self::outcome`] is called less than once a period, some are lost
+/// and reported.
 pub struct Continuous<'c> {
     client: Client,
     camera: &'c mut dyn Camera,
@@ -90,14 +86,13 @@ pub struct Continuous<'c> {
     mode: TriggerMode,
     exposure: Micros,
     image_wait: Duration,
-    /// The frame that is due next.
     next: u32,
     reported: VecDeque<Reported>,
     undelivered: u32,
 }
 
 impl<'c> Continuous<'c> {
-    /// Arms camera and board with a cycle of shots and begins. Waits for each image at most `image_wait`.
+    /// Arms camera and board and starts. Waits for each image at most `image_wait`.
     pub fn start(
         client: &Client,
         camera: &'c mut dyn Camera,
@@ -114,7 +109,7 @@ impl<'c> Continuous<'c> {
         Ok(Self { client, camera, work, mode, exposure, image_wait, next: 0, reported, undelivered: 0 })
     }
 
-    /// Frames that the board has reported of and nobody has asked for yet: whoever falls behind may want to leave some out.
+    /// Number of reported frames not yet read; callers that fall behind may skip some.
     pub fn waiting(&mut self) -> Result<usize, CaptureError> {
         while let Some(work) = &mut self.work
             && let Some(step) = work.step_within(Duration::ZERO)?
@@ -125,10 +120,8 @@ impl<'c> Continuous<'c> {
         Ok(self.reported.len())
     }
 
-    /// What became of the next frame; `None` after the last. Frames come in order, none is left out.
-    ///
-    /// # Errors
-    /// [`CaptureError`]; nothing comes after it, and the rig was stopped.
+    /// Result of the next frame; `None` after the last. Frames come in order without gaps.
+    /// Errors: [`CaptureError`]; the rig is stopped and the run has ended.
     pub fn outcome(&mut self) -> Result<Option<Outcome>, CaptureError> {
         let outcome = self.try_outcome();
         if outcome.is_err() {
@@ -186,7 +179,7 @@ impl<'c> Continuous<'c> {
         Ok(())
     }
 
-    /// Nothing was reported of the frames before this one.
+    /// Reports all frames before `frame` as lost.
     fn miss_until(&mut self, frame: u32) {
         while (frame.wrapping_sub(self.next) as i32) > 0 {
             self.reported.push_back(Reported::Dropped { number: self.next, loss: Loss::EventLost });
@@ -222,29 +215,28 @@ impl Drop for Continuous<'_> {
     fn drop(&mut self) {
         self.work = None; // stops the board where it still runs
         if self.mode == TriggerMode::FreeRunning {
-            // The camera is to heed its trigger line again; whoever lets go has an error of their own, or none.
+            // Re-enables the trigger line; the caller has its own error, if any.
             let _ = self.camera.arm(TriggerMode::Hardware, self.exposure);
         }
     }
 }
 
-/// Puts frames together to whole cycles: far and near to pairs. A cycle of which an image is missing is left out.
+/// Groups frames into cycles, e.g. far/near pairs; incomplete cycles are dropped.
 #[derive(Clone, Debug)]
 pub struct Cycles {
-    /// Place in the program and repeat of each exposure of a cycle.
+    /// Program index and repeat of each exposure of a cycle.
     places: Vec<(u8, u16)>,
     taken: Vec<Frame>,
     broken: u32,
 }
 
 impl Cycles {
-    /// Of a cycle of these shots.
     pub fn of(shots: &[Shot]) -> Self {
         let places = (0..).zip(shots).flat_map(|(index, shot)| (0..shot.repeat).map(move |n| (index, n)));
         Self { places: places.collect(), taken: Vec::new(), broken: 0 }
     }
 
-    /// Takes a frame; gives the cycle that it completes.
+    /// Adds a frame; returns the cycle that it completes.
     pub fn push(&mut self, frame: Frame) -> Option<Vec<Frame>> {
         let place = (frame.record.index, frame.record.repeat);
         if self.places.get(self.taken.len()) != Some(&place) {
@@ -258,16 +250,16 @@ impl Cycles {
         (self.taken.len() == self.places.len()).then(|| std::mem::take(&mut self.taken))
     }
 
-    /// Cycles that were begun and not completed.
+    /// Incomplete cycles so far.
     pub fn broken(&self) -> u32 {
         self.broken
     }
 }
 
 impl Client {
-    /// Runs the armed program again and again, a trigger each period (0: as fast as position and camera allow), until it has
-    /// taken so many exposures (0: until the work is dropped). Its events are [`EventKind::FrameTaken`] and
-    /// [`EventKind::FrameDropped`]; of those that are lost nothing is reported, their numbers are missing.
+    /// Repeats the armed program with this trigger period (0: as fast as possible) for `exposures` (0: until
+    /// the work is dropped). Events are [`EventKind::FrameTaken`] and [`EventKind::FrameDropped`]; lost ones
+    /// show as missing numbers.
     pub fn start_continuous(
         &self,
         shots: &[Shot],
@@ -276,7 +268,7 @@ impl Client {
     ) -> Result<Work, ClientError> {
         let round = self.program_time(shots)?;
         let silence = self.keep_alive();
-        // No event comes for longer than a whole round, or a slow pace, takes.
+        // Events come at least once per round or period.
         let work = round + Duration::from_micros(2 * u64::from(period.0));
         let during = "capturing continuously".to_string();
         self.start_work(&Request::RunContinuously { period, exposures, silence }, work, during)
@@ -309,7 +301,7 @@ mod tests {
     }
 
     #[test]
-    fn a_pair_is_a_far_image_and_the_near_one_after_it() {
+    fn cycles_pair_a_far_image_with_the_following_near_one() {
         let shot = Shot {
             axis: Axis::SensorFine,
             target: Nanometres(0),

@@ -1,4 +1,4 @@
-//! The protocol's enums in words, for errors and for people.
+//! The protocol's enums in words.
 
 mod alarm;
 mod refusal;
@@ -11,7 +11,7 @@ use farnear_protocol::{
 pub use alarm::{alarm_text, failure_text};
 pub use refusal::refusal_text;
 
-/// A position in micrometres, the unit people read.
+/// Position in micrometres.
 pub fn um(position: Nanometres) -> f64 {
     f64::from(position.0) / 1000.0
 }
@@ -24,7 +24,6 @@ pub fn axis_name(axis: Axis) -> &'static str {
     }
 }
 
-/// What is known of a position.
 pub fn state_name(state: PositionState) -> &'static str {
     match state {
         PositionState::Unknown => "unknown",
@@ -33,7 +32,6 @@ pub fn state_name(state: PositionState) -> &'static str {
     }
 }
 
-/// What an exposure program does.
 pub fn program_name(state: ProgramState) -> &'static str {
     match state {
         ProgramState::Idle => "not armed",
@@ -43,7 +41,6 @@ pub fn program_name(state: ProgramState) -> &'static str {
     }
 }
 
-/// How an exposure comes about.
 pub fn trigger_name(mode: TriggerMode) -> &'static str {
     match mode {
         TriggerMode::Hardware => "hardware",
@@ -52,7 +49,6 @@ pub fn trigger_name(mode: TriggerMode) -> &'static str {
     }
 }
 
-/// Why a frame of a continuous run was dropped.
 pub fn drop_text(reason: DropReason) -> String {
     match reason {
         DropReason::NotSettled { error } => format!("not settled, {:.3} um off", um(error)),
@@ -61,7 +57,6 @@ pub fn drop_text(reason: DropReason) -> String {
     }
 }
 
-/// Why a board was reset.
 pub fn cause_name(cause: ResetCause) -> &'static str {
     match cause {
         ResetCause::PowerOn => "power on",
@@ -74,7 +69,6 @@ pub fn cause_name(cause: ResetCause) -> &'static str {
     }
 }
 
-/// Name of a record in the board's memory.
 pub fn record_name(record: RecordName) -> &'static str {
     match record {
         RecordName::Settings => "settings",
@@ -85,7 +79,6 @@ pub fn record_name(record: RecordName) -> &'static str {
     }
 }
 
-/// What a calibration routine measures.
 pub fn routine_name(routine: Routine) -> String {
     match routine {
         Routine::Travel { axis } => format!("travel of the {}", axis_name(axis)),

@@ -1,4 +1,4 @@
-//! The board's events in order, and what they say about work.
+//! The board's events in order, and their relation to work.
 
 use std::collections::BTreeMap;
 
@@ -10,21 +10,21 @@ use farnear_protocol::{
 
 use crate::error::ClientError;
 
-/// An event further ahead of the due one cannot come from a sane board, whose memory is smaller.
+/// Limit for event numbers ahead of the next one; a board stores fewer.
 const AHEAD_MAX: u32 = 4096;
 
-/// The events of one boot, in order.
+/// Events of one boot, in order.
 #[derive(Default)]
 pub(crate) struct Events {
     pub boot: u32,
-    /// Number of the event that is to be given out next.
+    /// Number of the next event to deliver.
     pub due: u32,
-    /// What has arrived and was not given out.
+    /// Arrived, not delivered.
     pub arrived: BTreeMap<u32, Event>,
 }
 
 impl Events {
-    /// Keeps an event, unless it is old. An event of another boot means that the board was reset.
+    /// Stores a new event. An event of another boot means a reset.
     pub(crate) fn take(&mut self, packet: &Packet, during: &str) -> Result<(), ClientError> {
         let event = packet.message::<Event>();
         if packet.header.boot != self.boot {
@@ -52,7 +52,7 @@ impl Events {
     }
 }
 
-/// Whether the board works on this request. While a program or a routine runs, not every axis need name it.
+/// Whether the board still works on this request; in a program or routine not every axis names it.
 pub(crate) fn is_under_way(request: u32, status: &Status) -> bool {
     use farnear_protocol::message::ProgramState::{Paused, Running};
     let axes = [&status.coarse, &status.fine, &status.lens];
@@ -60,7 +60,7 @@ pub(crate) fn is_under_way(request: u32, status: &Status) -> bool {
         || matches!(status.program.state, Running | Paused)
 }
 
-/// The request that an event is about, and whether it ends it.
+/// The request of an event, and whether it ends it.
 pub(crate) fn request_of(kind: &EventKind) -> Option<(u32, bool)> {
     match *kind {
         EventKind::Homed { request, .. }

@@ -1,4 +1,4 @@
-//! Running an exposure program together with a camera: each exposure with its image, in order.
+//! Runs an exposure program with a camera.
 
 use std::time::{Duration, Instant};
 
@@ -15,66 +15,43 @@ use crate::{
     work::{Step, wrong_end},
 };
 
-/// Longest single wait for an image, so that an interruption by the user is seen soon.
+/// Polling interval for interruptions while waiting for an image.
 const SLICE: Duration = Duration::from_millis(50);
 
-/// Images could not be taken.
 #[derive(Debug, thiserror::Error)]
 pub enum CaptureError {
-    /// The board, or the way to it.
     #[error(transparent)]
     Board(#[from] ClientError),
-    /// The rig does not reach that far.
     #[error(transparent)]
     Plan(#[from] PlanError),
     #[error(transparent)]
     Camera(#[from] CameraError),
-    /// One of several cameras that expose together.
+    /// One of several simultaneous cameras failed.
     #[error("camera {number} of {cameras}: {source}")]
     OneCamera { number: usize, cameras: usize, source: CameraError },
-    /// The two images do not belong together.
     #[error(
         "the far image has {far_width}x{far_height} pixels of {far_bits} bits, the near one {near_width}x{near_height} of {near_bits}"
     )]
     Unlike {
-        /// Width of the far image.
         far_width: usize,
-        /// Height of the far image.
         far_height: usize,
-        /// Bits of the far image.
         far_bits: u8,
-        /// Width of the near image.
         near_width: usize,
-        /// Height of the near image.
         near_height: usize,
-        /// Bits of the near image.
         near_bits: u8,
     },
-    /// The board ended the program with another number of exposures than asked for.
-    #[error("the board told of {told} exposures where {asked} were asked for")]
-    Count {
-        told: usize,
-        /// How many there should have been.
-        asked: usize,
-    },
-    /// A program whose shots come about in different ways: no camera does that.
+    #[error("the board reported {told} exposures, {asked} were requested")]
+    Count { told: usize, asked: usize },
+    /// Shots with different trigger modes, which no camera supports.
     #[error(
         "shot {index} is triggered by {found}, the ones before by {first}; a program's shots must have one trigger"
     )]
-    MixedTriggers {
-        /// The first shot that differs.
-        index: usize,
-        found: &'static str,
-        /// The trigger of the first.
-        first: &'static str,
-    },
+    MixedTriggers { index: usize, found: &'static str, first: &'static str },
 }
 
-/// Runs a program of shots and gives each exposure with its image to `on_image`, which may break off: the rig is stopped
-/// then. Waits for each image at most `image_wait`.
-///
-/// # Errors
-/// [`CaptureError`], or what `on_image` gives.
+/// Runs a program; passes each exposure with its image to `on_image`, whose error stops the rig. Waits for
+/// each image at most `image_wait`.
+/// Errors: [`CaptureError`], or that of `on_image`.
 pub fn expose<E: From<CaptureError> + From<ClientError>>(
     client: &Client,
     camera: &mut dyn Camera,
@@ -85,11 +62,9 @@ pub fn expose<E: From<CaptureError> + From<ClientError>>(
     expose_together(client, &mut [camera], shots, image_wait, |_, shot, image| on_image(shot, image))
 }
 
-/// As [`expose`], with several cameras that hang on one trigger: `on_image` is given the image of each, with the camera's place in
-/// `cameras`, camera after camera.
-///
-/// # Errors
-/// As [`expose`]; [`CaptureError::OneCamera`] says which of several did not deliver.
+/// As [`expose`] with several cameras on one trigger: `on_image` receives each camera's image with its index
+/// in `cameras`.
+/// Errors: as [`expose`]; [`CaptureError::OneCamera`] names the camera.
 pub fn expose_together<E: From<CaptureError> + From<ClientError>>(
     client: &Client,
     cameras: &mut [&mut dyn Camera],
@@ -133,7 +108,7 @@ pub fn expose_together<E: From<CaptureError> + From<ClientError>>(
         Ok(())
     });
     if mode == TriggerMode::FreeRunning {
-        // Whatever happened, the cameras are to heed their trigger line again.
+        // Re-enables the cameras' trigger lines in any case.
         let disarm = |(at, camera): (usize, &mut &mut dyn Camera)| {
             camera.arm(TriggerMode::Hardware, exposure).map_err(of(at))
         };
@@ -156,7 +131,7 @@ pub fn expose_together<E: From<CaptureError> + From<ClientError>>(
     Ok(())
 }
 
-/// As [`Client::run_program`], with the time at which each event was received.
+/// As [`Client::run_program`], with the arrival time of each event.
 fn run_program<E: From<CaptureError> + From<ClientError>>(
     client: &Client,
     shots: &[Shot],
@@ -175,7 +150,7 @@ fn run_program<E: From<CaptureError> + From<ClientError>>(
     }
 }
 
-/// Waits until no surplus picture of a program can come any more.
+/// Waits until surplus pictures of a program are impossible.
 fn expect_no_more(client: &Client, camera: &mut dyn Camera) -> Result<(), CaptureError> {
     let until = Instant::now() + camera.quiet_time();
     loop {
@@ -189,12 +164,12 @@ fn expect_no_more(client: &Client, camera: &mut dyn Camera) -> Result<(), Captur
     }
 }
 
-/// Checks the exposures of a program against the board's limits.
+/// Checks exposures against the board's limits.
 pub fn check_exposures(client: &Client, shots: &[Shot]) -> Result<(), PlanError> {
     shots.iter().try_for_each(|shot| check_exposure(client, shot.exposure))
 }
 
-/// Checks the length of an exposure against the board's limits.
+/// Checks an exposure against the board's limits.
 pub fn check_exposure(client: &Client, asked: Micros) -> Result<(), PlanError> {
     let limits = &client.hello().limits;
     let (min, max) = (limits.exposure_min, limits.exposure_max);
@@ -204,7 +179,7 @@ pub fn check_exposure(client: &Client, asked: Micros) -> Result<(), PlanError> {
     }
 }
 
-/// How the exposures of a program come about, and the length of the first.
+/// Common trigger mode of a program, and its first exposure time.
 pub(crate) fn one_trigger(shots: &[Shot]) -> Result<(TriggerMode, Micros), CaptureError> {
     let Some(first) = shots.first() else { return Ok((TriggerMode::Hardware, Micros(0))) };
     match shots.iter().position(|shot| shot.mode != first.mode) {
@@ -217,12 +192,12 @@ pub(crate) fn one_trigger(shots: &[Shot]) -> Result<(TriggerMode, Micros), Captu
     }
 }
 
-/// Sensor distance from the lens' principal plane at an exposure, by encoders and gauge, in mm.
+/// Distance of sensor and principal plane by encoders and gauge, mm.
 pub fn sensor_mm(record: &ShotRecord, limits: &Limits) -> f64 {
     sensor_distance_nm(limits.datum, |axis| record.measured(axis)) as f64 / 1e6
 }
 
-/// The image of an exposure, or why it cannot be had; an interruption by the user ends the wait.
+/// The image of an exposure; interruptions end the wait.
 pub(crate) fn wait_for_image(
     client: &Client,
     camera: &mut dyn Camera,

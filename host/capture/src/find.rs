@@ -1,4 +1,4 @@
-//! Which port has the board, where nobody names one.
+//! Finds the board's port.
 
 use std::path::Path;
 
@@ -6,22 +6,20 @@ use serialport::{SerialPortInfo, SerialPortType};
 
 use crate::error::PortError;
 
-/// STMicroelectronics' number as a maker of USB devices.
+/// USB vendor id of STMicroelectronics.
 const ST: u16 = 0x0483;
-/// The ST-LINKs that have a serial port: V2-1 and V3, with and without a disk and a second port.
+/// ST-LINKs with a serial port: V2-1 and V3, with and without disk and second port.
 const ST_LINKS: [u16; 7] = [0x374b, 0x374e, 0x374f, 0x3752, 0x3753, 0x3754, 0x3757];
 
-/// The port of the only ST-LINK, as every NUCLEO has one. Nothing is sent to find out: other instruments would hear it too.
-///
-/// # Errors
-/// [`PortError::NoBoard`] without any, [`PortError::SeveralBoards`] where a choice would be a guess.
+/// The port of the only ST-LINK (on every NUCLEO). Sends nothing, because other instruments would receive it.
+/// Errors: [`PortError::NoBoard`], or [`PortError::SeveralBoards`] if ambiguous.
 pub fn board_port() -> Result<String, PortError> {
     only(&present())
 }
 
-/// The serial ports of this computer; none where it does not tell.
+/// Serial ports of this computer; empty if unknown.
 pub(crate) fn present() -> Vec<SerialPortInfo> {
-    // On Linux the listing panics where there is no such folder, as in some containers.
+    // On Linux the listing panics without this folder, as in some containers.
     if cfg!(target_os = "linux") && !Path::new("/sys/class/tty").is_dir() {
         return Vec::new();
     }
@@ -32,7 +30,7 @@ fn only(present: &[SerialPortInfo]) -> Result<String, PortError> {
     let names: Vec<String> = present.iter().map(|port| port.port_name.clone()).collect();
     let mut boards: Vec<String> =
         present.iter().filter(|port| is_board(port)).map(|port| port.port_name.clone()).collect();
-    // macOS lists each port twice; the one for calling out does not wait for a modem.
+    // macOS lists each port twice; the `cu` one does not wait for a modem.
     boards.retain(|name| {
         !name.strip_prefix("/dev/tty.").is_some_and(|of| names.contains(&format!("/dev/cu.{of}")))
     });
@@ -58,7 +56,7 @@ mod tests {
     }
 
     #[test]
-    fn the_only_st_link_is_the_board_and_two_are_a_question() {
+    fn finds_the_only_st_link_and_rejects_two() {
         let modem = port("/dev/ttyUSB0", 0x0403, 0x6001);
         let built_in = SerialPortInfo { port_name: "/dev/ttyS0".into(), port_type: SerialPortType::Unknown };
         let board = port("/dev/ttyACM0", ST, 0x374b);
@@ -72,7 +70,7 @@ mod tests {
     }
 
     #[test]
-    fn a_port_that_macos_lists_twice_is_one() {
+    fn counts_a_port_that_macos_lists_twice_once() {
         let twice = [port("/dev/tty.usbmodem3", ST, 0x374e), port("/dev/cu.usbmodem3", ST, 0x374e)];
         assert_eq!(only(&twice).unwrap(), "/dev/cu.usbmodem3");
     }

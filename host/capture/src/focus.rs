@@ -1,11 +1,11 @@
-//! Finding the sensor distance of the best focus.
+//! Finds the sensor distance of best focus.
 //!
-//! *Coarse*: at each place of the stepper the piezo takes three images, 190 um of travel apart at most. How their spectra
-//! differ tells on which side the focus lies and about how far away (`model`), so the stepper goes there
-//! directly instead of sweeping the whole range. *Fine*: a sweep by piezo around the estimate, and the tip of the parabola
-//! through the largest measures ([`farnear_depth::focus_measure::peak`]). All images are taken by exposure programs.
+//! *Coarse*: at each stepper position three images up to 190 um apart are taken by piezo. Their spectra give
+//! side and distance of the focus (`model`), so the stepper moves there directly. *Fine*: a piezo sweep
+//! around the estimate; the result is the tip of a parabola through the largest measures
+//! ([`farnear_depth::focus_measure::peak`]).
 //!
-//! Positions are sums of stage A's coarse and fine positions in nanometres unless a name says otherwise.
+//! Positions are sums of coarse and fine position in nanometres unless named otherwise.
 
 mod model;
 
@@ -33,26 +33,24 @@ use crate::{
 };
 use model::{Spectrum, estimate};
 
-/// Places of the stepper before the search is given up.
+/// Limit of stepper positions.
 const PLACES_MAX: usize = 8;
-/// The estimate is good enough for the fine sweep when it lies so near to the middle of what was looked at.
+/// The estimate suffices for the fine sweep within this distance of the centre.
 const GOOD_NM: f64 = 45_000.0;
-/// Steps of the fine sweep to either side, and their size.
+/// Steps of the fine sweep on either side, and their size.
 const FINE_STEPS: i32 = 4;
 const FINE_STEP_NM: i32 = 14_000;
-/// The fine sweep may run out of the peak so often.
+/// Limit of sweeps if the peak lies outside.
 const SWEEPS_MAX: usize = 3;
 
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct FocusSettings {
     pub measure: FocusMeasure,
-    /// How far the focus may be from where the sensor stands, mm.
+    /// Search range around the present sensor position.
     pub range_mm: f64,
-    /// Length of each exposure.
     pub exposure: Micros,
-    /// Longest wait for an image.
     pub image_wait: Duration,
-    /// Part of the image that is looked at: column, row, width, height in pixels. All of it where none.
+    /// Evaluated region: column, row, width, height in pixels; `None`: all.
     pub region: Option<[usize; 4]>,
 }
 
@@ -70,19 +68,18 @@ impl Default for FocusSettings {
 
 #[derive(Clone, PartialEq, Debug)]
 pub struct Focus {
-    /// Sensor distance of the best focus, mm: m1, where the sensor stands now.
+    /// Sensor distance of best focus, where the sensor is now.
     pub sensor_mm: f64,
-    /// Coarse position, by its encoder.
+    /// By encoder.
     pub coarse: Nanometres,
-    /// Piezo position, by its gauge.
+    /// By gauge.
     pub fine: Nanometres,
-    /// Places of the stepper that were looked at.
+    /// Stepper positions used.
     pub places: usize,
-    /// Images that were taken.
     pub exposures: usize,
-    /// The board's time for all of it.
+    /// Board time.
     pub board: Duration,
-    /// The fine sweep: sensor distance in mm, and focus measure.
+    /// Fine sweep: sensor distance in mm, focus measure.
     pub sweep: Vec<(f64, f64)>,
 }
 
@@ -92,7 +89,6 @@ pub enum FocusSearchError {
     Capture(#[from] CaptureError),
     #[error(transparent)]
     Measure(#[from] FocusError),
-    /// The region is not inside the image.
     #[error(
         "the region {column},{row},{region_width},{region_height} does not lie in an image of {width}x{height} px"
     )]
@@ -100,24 +96,15 @@ pub enum FocusSearchError {
         column: usize,
         row: usize,
         region_width: usize,
-        /// Height of the region.
         region_height: usize,
         width: usize,
         height: usize,
     },
-    /// The search left the range, or did not settle.
     #[error(
         "no focus within {range_mm} mm of the start at {start_mm:.4} mm (last looked at {last_mm:.4} mm): is there a textured \
          target, is the lens cap off, does the start suit the target's distance?"
     )]
-    NotFound {
-        /// How far it was sought.
-        range_mm: f64,
-        /// Where the sensor stood, mm.
-        start_mm: f64,
-        /// Where it was looked at last, mm.
-        last_mm: f64,
-    },
+    NotFound { range_mm: f64, start_mm: f64, last_mm: f64 },
 }
 
 impl From<ClientError> for FocusSearchError {
@@ -126,8 +113,8 @@ impl From<ClientError> for FocusSearchError {
     }
 }
 
-/// Finds the best focus near where the sensor stands, and leaves the sensor there. Both of stage A's axes must be homed.
-/// `say` is told in words what is being done.
+/// Finds the best focus near the present position and leaves the sensor there. Both axes of stage A must be
+/// homed. `say` receives progress messages.
 pub fn find_focus(
     client: &Client,
     camera: &mut dyn Camera,
@@ -172,7 +159,7 @@ struct Search<'a> {
     settings: &'a FocusSettings,
     limits: Limits,
     base_nm: i64,
-    /// Where the axes stood at the last exposure.
+    /// Axes at the last exposure.
     coarse: Nanometres,
     fine: Nanometres,
     exposures: usize,
@@ -183,7 +170,7 @@ impl Search<'_> {
         (self.limits.fine_min.0 + self.limits.fine_max.0) / 2
     }
 
-    /// Where the piezo goes for a position, with the stepper where it is.
+    /// Piezo position for a total position.
     fn fine_at(&self, position: f64) -> Nanometres {
         let fine = position - f64::from(self.coarse.0);
         Nanometres(
@@ -213,12 +200,12 @@ impl Search<'_> {
         }
     }
 
-    /// A shot of the search: roughly where it was sent is enough.
+    /// A shot with a wide settle tolerance.
     fn look(&self, axis: Axis, target: i32) -> Shot {
         self.shot(axis, target, Settle::of_search(axis))
     }
 
-    /// Takes the shots and gives each with the part of its image that counts.
+    /// Takes the shots; returns each with its evaluated region.
     fn take(&mut self, shots: &[Shot]) -> Result<Vec<(ShotRecord, Array2<f32>)>, FocusSearchError> {
         let mut taken = Vec::new();
         let (wait, region) = (self.settings.image_wait, self.settings.region);
@@ -233,8 +220,8 @@ impl Search<'_> {
         Ok(taken)
     }
 
-    /// Brings the stepper to where the focus lies in the middle of the piezo's range. Gives about where that is, and how
-    /// many places it took.
+    /// Moves the stepper until the focus is in the middle of the piezo's range. Returns the estimate and the
+    /// number of positions.
     fn coarse(&mut self, start: f64, say: &mut dyn FnMut(&str)) -> Result<(f64, usize), FocusSearchError> {
         let reach = self.settings.range_mm * 1e6;
         let mut goal = None;
@@ -278,17 +265,17 @@ impl Search<'_> {
         Err(self.not_found(start))
     }
 
-    /// Standard deviation of the blur in pixels, per nanometre from focus.
+    /// Standard deviation of the blur in px per nm of defocus.
     fn blur_per_nm(&self) -> f64 {
         let k = match self.optics.psf() {
             Psf::Gaussian { k } | Psf::Generalised { k, .. } => k,
-            // Along an axis; of a disc of radius R that is R / 2.
+            // Along one axis; R / 2 for a disc of radius R.
             psf => (0.5 * psf.second_moment()).sqrt(),
         };
         k / (2.0 * self.optics.f_number() * self.optics.pixel_um() * 1e3)
     }
 
-    /// Sweeps the piezo around a position. Gives the best position and the sweep.
+    /// Sweeps the piezo around a position; returns the best position and the sweep.
     fn fine(
         &mut self,
         around: f64,
@@ -323,7 +310,7 @@ impl Search<'_> {
                 let sweep = samples.iter().map(|(place, value)| (self.mm(*place), *value)).collect();
                 return Ok((best, sweep));
             }
-            // The largest measure stands at an end: go on beyond it.
+            // The maximum is at an end: continue beyond it.
             let largest = samples.iter().max_by(|a, b| a.1.total_cmp(&b.1)).map_or(around, |best| best.0);
             around = largest + (largest - around).signum() * f64::from(reach) / 2.0;
             let room = self.fine_at(around);
@@ -337,7 +324,7 @@ impl Search<'_> {
     }
 }
 
-/// The part of an image that counts, as floats.
+/// Evaluated region as floats.
 fn cut(image: &Image, region: Option<[usize; 4]>) -> Result<Array2<f32>, FocusSearchError> {
     let (height, width) = image.pixels.dim();
     let [column, row, region_width, region_height] = region.unwrap_or([0, 0, width, height]);
@@ -351,7 +338,7 @@ fn cut(image: &Image, region: Option<[usize; 4]>) -> Result<Array2<f32>, FocusSe
     Ok(part.mapv(f32::from))
 }
 
-/// Means over squares of `bin` pixels; as large as whole squares go.
+/// Means over squares of `bin` pixels; partial squares are dropped.
 fn binned(image: &Array2<f32>, bin: usize) -> Array2<f32> {
     let (height, width) = image.dim();
     let scale = 1.0 / (bin * bin) as f32;
@@ -365,7 +352,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn binning_means_and_regions_are_cut() {
+    fn bins_images_and_crops_regions() {
         let image = Image { pixels: Array2::from_shape_fn((5, 6), |(r, c)| (r * 6 + c) as u16), bits: 8 };
         let part = cut(&image, Some([2, 1, 4, 2])).unwrap();
         assert_eq!(binned(&part, 2), ndarray::array![[11.5, 13.5]]);

@@ -1,5 +1,5 @@
-//! A pair behind a half mirror: the mirror stands behind the lens, each of its two paths has a camera, and the second one's sensor stands
-//! further from the lens. One trigger gives both images, and nothing moves between them (Li 2014, sections 5.5 and 10.2).
+//! A pair behind a half mirror: two cameras, the second sensor further from the lens. One trigger gives both
+//! images without motion in between (Li 2014, sections 5.5 and 10.2).
 
 use farnear_protocol::message::{Shot, ShotRecord};
 
@@ -13,11 +13,9 @@ use crate::{
     plan::SensorPair,
 };
 
-/// Takes a pair with one exposure (or so many as are averaged), with the stage at the far place: the far image by the first camera, the
-/// near one by the second, whose sensor stands `further_mm` further from the lens. `say` is told in words what is being done.
-///
-/// # Errors
-/// [`CaptureError`]; a picture of another trigger, by either camera, is [`CaptureError::OneCamera`].
+/// Takes a pair with one exposure (or several, averaged) at the far position: far image by the first camera,
+/// near image by the second, whose sensor is `further_mm` further away. `say` receives progress messages.
+/// Errors: [`CaptureError`]; [`CaptureError::OneCamera`] for a picture of another trigger.
 pub fn capture_behind_mirror(
     client: &Client,
     cameras: [&mut dyn Camera; 2],
@@ -26,7 +24,7 @@ pub fn capture_behind_mirror(
     exposures: &Exposures,
     say: &mut dyn FnMut(&str),
 ) -> Result<Pair, CaptureError> {
-    // The piezo has one place to reach: the far one, in the middle of its range.
+    // The piezo only has to reach the far position, in the middle of its range.
     let only_far = SensorPair { far_mm: sensor.far_mm, near_mm: sensor.far_mm };
     let reach = reach(client, &only_far, exposures, say)?;
     let [far, _] = reach.shots;

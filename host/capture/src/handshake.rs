@@ -1,4 +1,4 @@
-//! Hello: who is there, and which protocol version both speak; and the session that follows.
+//! Hello, protocol version and session.
 
 use std::time::Duration;
 
@@ -10,18 +10,18 @@ use farnear_protocol::{
 
 use crate::{error::ClientError, link::Link, timing::Timing};
 
-/// Hello is asked with these waits: 3 s altogether, for the board may still be starting, and whether it is an emulated one is not
-/// known yet. In between it is asked at the link's other rates: a host that ended may have left it there.
+/// Timeouts of hello, 3 s in total: the board may be starting, and may be emulated. The link's other rates
+/// are tried in between, because an earlier host may have changed it.
 const FIRST_MS: [u64; 4] = [50, 100, 200, 400];
 const OTHER_RATE_MS: [u64; 2] = [50, 50];
 const LAST_MS: [u64; 2] = [800, 1500];
 const DURING: &str = "asking the board who it is";
-/// The session of an emulated board: a number drawn at random would make the run another one. Two programs that use it one
-/// after the other are told apart by their request ids.
+/// Fixed session of an emulated board: a random one would change the run. Successive programs differ by their
+/// request ids.
 const EMULATED_SESSION: u32 = 0x5eed_0001;
 
-/// Cleans the line, asks who is there and agrees on a version. A board that is known to be emulated is given its
-/// own time: hello asked twice, because this computer is slow, would make the run another one.
+/// Drains the line, identifies the board and selects a version. A known emulated board gets its long timeout:
+/// a repeated hello would change the run.
 pub(crate) fn shake_hands(link: &mut Link, known_emulated: bool) -> Result<(Hello, u8), ClientError> {
     link.drain(DURING)?;
     let millis = |waits: &[u64]| waits.iter().map(|ms| Duration::from_millis(*ms)).collect::<Vec<_>>();
@@ -40,7 +40,7 @@ pub(crate) fn shake_hands(link: &mut Link, known_emulated: bool) -> Result<(Hell
     Ok((hello, version))
 }
 
-/// Asks with these waits at one rate after the other until somebody answers; that rate is the link's then.
+/// Tries these timeouts at one rate after the other; the rate that is answered becomes the link's.
 fn say_hello(
     link: &mut Link,
     rounds: impl Iterator<Item = (LinkRate, Vec<Duration>)>,
@@ -48,13 +48,12 @@ fn say_hello(
     let mut silent: Option<ClientError> = None;
     for (rate, waits) in rounds {
         link.set_rate(rate, DURING)?;
-        // Events of this boot are not lost by being passed over here: the status that follows tells where their
-        // numbers stand.
+        // Skipped events are not lost: the following status has their number.
         match link.ask((PROTOCOL_CURRENT, 0), &Request::Hello, &waits, DURING, &mut |_| Ok(())) {
             Ok((_, packet)) => return Ok(packet),
             Err(error @ ClientError::Silent { .. }) => {
                 silent = Some(both(silent, error));
-                // The same bytes at the next rate: a board that is only slow takes them for the repeat that they are.
+                // Equal bytes at the next rate: a slow board recognises the repeat.
                 link.reuse_id();
             }
             Err(error) => return Err(error),
@@ -63,7 +62,7 @@ fn say_hello(
     Err(silent.unwrap_or_else(|| ClientError::Nonsense { during: DURING.into(), answer: "no rate".into() }))
 }
 
-/// What was not answered before, and now.
+/// The earlier and the present failure.
 fn both(before: Option<ClientError>, now: ClientError) -> ClientError {
     match (before, now) {
         (
@@ -81,7 +80,7 @@ fn both(before: Option<ClientError>, now: ClientError) -> ClientError {
     }
 }
 
-/// Opens a session: what another host had begun on this board ends, and its requests are refused from now on.
+/// Opens a session: another host's work ends and its requests are refused.
 pub(crate) fn open_session(link: &mut Link, (hello, version): (&Hello, u8)) -> Result<(), ClientError> {
     let during = "opening a session";
     let number = if hello.emulated { EMULATED_SESSION } else { random_session() };
@@ -89,14 +88,14 @@ pub(crate) fn open_session(link: &mut Link, (hello, version): (&Hello, u8)) -> R
     let timing = if hello.emulated { Timing::EMULATED } else { Timing::REAL };
     let waits = vec![timing.reply; timing.retries as usize + 1];
     let address = (version, hello.boot);
-    // What the events say of the session before is nobody's business here.
+    // Events of the previous session are ignored.
     let (_, packet) = link.ask(address, &Request::OpenSession, &waits, during, &mut |_| Ok(()))?;
     if packet.header.kind == Kind::Response {
         return Ok(());
     }
     let during = during.into();
     Err(match packet.message() {
-        // It was reset between hello and this.
+        // The board was reset in between.
         Some(RequestError::Boot { current }) => {
             ClientError::Reset { during, was: hello.boot, now: current, cause: None }
         }
@@ -105,9 +104,9 @@ pub(crate) fn open_session(link: &mut Link, (hello, version): (&Hello, u8)) -> R
     })
 }
 
-/// A number that no other host has: 0 means none.
+/// Unique session number; 0 is reserved.
 fn random_session() -> u32 {
-    // Where the system has no random numbers, the process and the time tell hosts apart as well.
+    // Fallback without system random numbers: process id and time.
     let chance = getrandom::u32().unwrap_or_else(|_| {
         let now = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).unwrap_or_default();
         std::process::id() ^ now.subsec_nanos()
@@ -138,8 +137,8 @@ fn read_answer(packet: &Packet) -> Result<Hello, ClientError> {
     }
 }
 
-/// The version to talk in: the newest that both know. The schema key is that of the board's newest version,
-/// so it can be compared where that is this program's too.
+/// The newest common version. The schema key applies to the board's newest version, so it is compared only if
+/// equal to this program's.
 fn agree(hello: &Hello) -> Result<u8, ClientError> {
     let version = hello.protocol_current.min(PROTOCOL_CURRENT);
     if version < hello.protocol_min || version < PROTOCOL_MIN {

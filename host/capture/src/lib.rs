@@ -1,20 +1,19 @@
 //! # farnear-capture
 //!
-//! Talks to the rig and takes pictures with it; blocking, no async runtime.
+//! Controls the rig and takes pictures with it; blocking, no async runtime.
 //!
-//! - [`transport`], [`client`], [`work`], [`log_stream`]: the serial port, handles of the board behind it, long work with
-//!   its end, and the board's log.
-//! - [`camera`]: where images come from.
-//! - [`ready`], [`plan`], [`pair`], [`record`]: homing, where the axes go for a pair, taking it, and the folder it is kept in.
+//! - [`transport`], [`client`], [`work`], [`log_stream`]: serial port, board handles, long work, and the
+//!   board's log.
+//! - [`camera`]: image sources.
+//! - [`ready`], [`plan`], [`pair`], [`record`]: homing, positions of a pair, its capture, and its folder.
 //! - [`half_mirror`]: a pair of one exposure, by two cameras.
-//! - [`expose`], [`focus`], [`sequence`]: programs with a camera: finding the focus, focus stacks, programs from a file.
-//! - [`continuous`]: a cycle of shots without an end, for live depth: a stream of exposures with their images.
-//! - [`board_correction`]: depth correction by the board's own mathematics.
-//! - [`timing`]: how long the host waits, and why.
-//! - [`error`], [`describe`]: what can go wrong, in words.
+//! - [`expose`], [`focus`], [`sequence`]: programs with a camera: focus search, focus stacks, program files.
+//! - [`continuous`]: endless cycles of shots for live depth.
+//! - [`board_correction`]: depth correction by the board's mathematics.
+//! - [`timing`]: timeouts and their reasons.
+//! - [`error`], [`describe`]: errors in words.
 //!
-//! A handle of a board behind a serial port comes from [`Client::open`]; here a scripted board stands at the other end of
-//! the line.
+//! [`Client::open`] opens a serial port; this example uses a scripted board.
 //!
 //! ```
 //! use farnear_capture::{Client, ClientError};
@@ -24,13 +23,13 @@
 //! let board = Peer::new(Faults::default());
 //! let rig = Client::connect(board.connect(), "scripted")?;
 //!
-//! // Nothing but the piezo moves before homing, and the refusal says why.
+//! // Only the piezo moves before homing.
 //! let refused = rig.move_to(Axis::SensorCoarse, Nanometres(5_800_000));
 //! assert!(matches!(refused, Err(ClientError::Refused { .. })));
 //!
 //! rig.home(Axis::SensorCoarse)?;
 //! let moved = rig.move_to(Axis::SensorCoarse, Nanometres(5_800_000))?;
-//! // The encoder says where the screw has come to; the piezo makes up for the rest.
+//! // Position by encoder; the piezo compensates for the difference.
 //! assert_eq!(moved.measured, Nanometres(5_800_375));
 //! # Ok::<(), ClientError>(())
 //! ```

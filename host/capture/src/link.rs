@@ -1,7 +1,7 @@
-//! One question, one answer: frames over a [`Transport`], sent again until answered.
+//! Requests and answers: frames over a [`Transport`], with repeats.
 //!
-//! Which boot and version a request carries, and what an event means, is the caller's; the session and its request ids are
-//! kept here, see [`Link::begin_session`].
+//! The caller chooses boot and version and interprets events; the link keeps session and request ids
+//! ([`Link::begin_session`]).
 
 use std::{
     io::{self, ErrorKind},
@@ -17,14 +17,14 @@ use farnear_protocol::{
 
 use crate::{error::ClientError, owner::nothing, transport::Transport};
 
-/// Quiet on the line that tells that nothing older is still under way.
+/// Silence after which no older answer is in transit.
 const QUIET: Duration = Duration::from_millis(5);
-/// Longest time to wait for that quiet.
+/// Longest wait for silence.
 const QUIET_AT_MOST: Duration = Duration::from_millis(500);
-/// Shortest time allowed for writing a frame.
+/// Shortest timeout for writing a frame.
 const SEND_AT_LEAST: Duration = Duration::from_millis(20);
 
-/// Throws away what comes until nothing comes any more, or for so long.
+/// Drops input until the line is silent, or the timeout.
 fn until_quiet(transport: &mut dyn Transport, buffer: &mut [u8]) -> io::Result<()> {
     transport.discard_input()?;
     let until = Instant::now() + QUIET_AT_MOST;
@@ -36,23 +36,23 @@ fn is_queue_full(packet: &Packet) -> bool {
     matches!(packet.message(), Some(RequestError::QueueFull { .. }))
 }
 
-/// A request on its way.
+/// A pending request.
 struct Asked {
     id: u32,
-    /// The same each time that it is sent.
+    /// Identical for each repeat.
     bytes: Delimited,
     answer: Option<Packet>,
 }
 
-/// A transport with framing, request ids and retries.
+/// A transport with framing, request ids and repeats.
 pub(crate) struct Link {
-    /// `None` between an unplugging and the next connection.
+    /// `None` while unplugged.
     transport: Option<Box<dyn Transport>>,
     port: String,
     rate: LinkRate,
     decoder: Decoder,
     buffer: [u8; 512],
-    /// Bytes of `buffer` that were received and not decoded yet.
+    /// Undecoded bytes of `buffer`.
     unread: std::ops::Range<usize>,
     session: u32,
     next_id: u32,
@@ -76,18 +76,18 @@ impl Link {
         }
     }
 
-    /// From now on requests belong to this session, and their ids follow the last one that the board has seen.
+    /// Starts a session whose ids follow the last one seen by the board.
     pub(crate) fn begin_session(&mut self, number: u32, last_id: u32) {
         self.session = number;
         self.next_id = last_id.wrapping_add(1);
     }
 
-    /// The next request has the id of the last one.
+    /// The next request reuses the last id.
     pub(crate) fn reuse_id(&mut self) {
         self.next_id = self.next_id.wrapping_sub(1).max(1);
     }
 
-    /// Goes on over another transport, after the first broke; at the rate of a board that was just reset.
+    /// Continues over a new transport, at the rate of a board after reset.
     pub(crate) fn replace(&mut self, transport: Box<dyn Transport>) {
         if let Some(port) = transport.port() {
             self.port = port.into();
@@ -98,12 +98,11 @@ impl Link {
         self.unread = 0..0;
     }
 
-    /// The rate of this end.
     pub(crate) const fn rate(&self) -> LinkRate {
         self.rate
     }
 
-    /// Gives this end another rate.
+    /// Changes the rate of this end.
     pub(crate) fn set_rate(&mut self, rate: LinkRate, during: &str) -> Result<(), ClientError> {
         if rate == self.rate {
             return Ok(());
@@ -130,8 +129,7 @@ impl Link {
         Ok(())
     }
 
-    /// Closes the port. As long as a program holds a port that has gone, the system gives the board that comes back another
-    /// name.
+    /// Closes the port: while a program holds a port that has gone, a returning board gets another name.
     pub(crate) fn close(&mut self) {
         self.transport = None;
     }
@@ -170,8 +168,8 @@ impl Link {
         Ok(Asked { id, bytes: delimited(&frame), answer: None })
     }
 
-    /// Sends requests, no more than the board lets wait for their answers, each at most `waits.len()` times, and gives
-    /// for each its id and the frame that answers it. Events and log frames that come meanwhile go to `on_other`.
+    /// Sends requests, limited to the board's outstanding ones, each at most `waits.len()` times. Returns id
+    /// and answer per request; events and log frames go to `on_other`.
     pub(crate) fn ask_all(
         &mut self,
         address: (u8, u32),
@@ -194,7 +192,7 @@ impl Link {
             if attempt > 0 && attempt + 1 == waits.len() {
                 self.renew(during)?;
             }
-            // One write for all of them, so that an emulated board never sees one alone.
+            // One write, so that an emulated board receives them together.
             let open = asked.iter().filter(|one| one.answer.is_none());
             let bytes: Vec<u8> = open.flat_map(|one| one.bytes.iter().copied()).collect();
             self.send(&bytes, *wait, during)?;
@@ -202,10 +200,10 @@ impl Link {
             while let Some(packet) = self.receive(until, during)? {
                 match packet.header.kind {
                     Kind::Event | Kind::Log => on_other(&packet)?,
-                    // The board had no room for it and asks to be asked again.
+                    // Queue full: repeat later.
                     Kind::Error if is_queue_full(&packet) => {}
                     Kind::Response | Kind::Error => {
-                        // Any other is the late answer to an earlier request.
+                        // Otherwise it is a late answer to an earlier request.
                         if let Some(one) = asked.iter_mut().find(|one| one.id == packet.header.id) {
                             one.answer = Some(packet);
                         }
@@ -228,8 +226,7 @@ impl Link {
         })
     }
 
-    /// The next good frame, if one comes before `until`. However late this thread gets to it, it looks once: on a crowded computer it may
-    /// stand for longer than any answer takes.
+    /// The next valid frame before `until`. Reads at least once, because the thread may be scheduled late.
     pub(crate) fn receive(&mut self, until: Instant, during: &str) -> Result<Option<Packet>, ClientError> {
         let mut looked = false;
         loop {
@@ -259,7 +256,7 @@ impl Link {
         }
     }
 
-    /// Reads until the line is quiet, so that no answer meant for an earlier program is taken for ours.
+    /// Reads until the line is silent, so that no answer for an earlier program is accepted.
     pub(crate) fn drain(&mut self, during: &str) -> Result<(), ClientError> {
         let drained = match &mut self.transport {
             Some(transport) => until_quiet(transport.as_mut(), &mut self.buffer),
@@ -277,7 +274,7 @@ impl Link {
             None => Err(ErrorKind::NotConnected.into()),
         };
         match sent {
-            // Nobody takes the bytes; the missing answer will tell.
+            // No reader for the bytes; the missing answer reports it.
             Err(error) if error.kind() == ErrorKind::TimedOut => Ok(()),
             result => result.map_err(|source| self.gone(source, during)),
         }

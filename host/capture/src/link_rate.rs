@@ -1,4 +1,4 @@
-//! The link's rate: asking for another one, and going back where the board is not heard at it.
+//! Changes the link rate, with fallback to the old one.
 
 use std::{thread::sleep, time::Duration};
 
@@ -11,17 +11,15 @@ use farnear_protocol::{
 use crate::{error::ClientError, link::Link, owner::nonsense, timing::Timing};
 
 const DURING: &str = "changing the link's rate";
-/// From the answer to the board's new rate: a control tick, and what an adapter keeps back.
+/// From the answer to the new rate: one control tick and the adapter's latency.
 const CHANGE: Duration = Duration::from_millis(20);
-/// What another host had begun brakes when a session is opened: so many looks, so far apart.
+/// Polls and their interval while another host's motion brakes.
 const LOOKS: u32 = 20;
 const LOOK: Duration = Duration::from_millis(100);
 
-/// Gives the link the rate that is wanted; it keeps the one it has where the board does not know the request, or is not heard
-/// at the other. Which it has in the end, [`Link::rate`] tells.
-///
-/// # Errors
-/// [`ClientError`] where the board is not heard any more, or refuses.
+/// Changes the link to the requested rate. Keeps the old rate if the request is unknown or the board does not
+/// answer at the new one; see [`Link::rate`].
+/// Errors: [`ClientError`] if the board no longer answers, or refuses.
 pub(crate) fn change(
     link: &mut Link,
     address: (u8, u32),
@@ -47,7 +45,7 @@ pub(crate) fn change(
     link.ask(address, &Request::Status, &waits, DURING, &mut |_| Ok(())).map(|_| ())
 }
 
-/// Asks the board; `false` where it does not know the request.
+/// Whether the board accepts; `false` if it does not know the request.
 fn is_granted(
     link: &mut Link,
     address: (u8, u32),

@@ -1,26 +1,25 @@
-//! The board's log as a stream, for whoever wants to follow it.
+//! The board's log as a stream.
 
 use std::{
     sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TrySendError, sync_channel},
     time::Duration,
 };
 
-/// What a stream holds for a reader that is late; a reader that is later loses the stream, not the memory.
+/// Queue limit; a slower reader loses the stream.
 const BACKLOG: usize = 4096;
 
-/// A piece of the board's log.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct LogPart {
-    /// Its running number in this boot.
+    /// Running number in this boot.
     pub number: u32,
-    /// So many pieces before it are missing.
+    /// Missing parts before this one.
     pub missing: u32,
     /// Bytes of the defmt stream.
     pub bytes: Vec<u8>,
 }
 
-/// A stream of [`LogPart`]s. It ends when the last [`crate::Client`] has gone, or when this reader is thousands of items
-/// behind.
+/// Stream of [`LogPart`]s. Ends with the last [`crate::Client`], or when the reader is thousands of items
+/// late.
 pub struct LogStream {
     parts: Receiver<LogPart>,
 }
@@ -31,7 +30,7 @@ impl LogStream {
         (sender, Self { parts })
     }
 
-    /// The next piece, waiting at most `wait`; `Ok(None)` where none came.
+    /// The next part, waiting at most `wait`; `Ok(None)` at the timeout.
     pub fn next_within(&self, wait: Duration) -> Result<Option<LogPart>, LogEnded> {
         match self.parts.recv_timeout(wait) {
             Ok(part) => Ok(Some(part)),
@@ -45,7 +44,6 @@ impl LogStream {
 #[error("the log has ended: its port was closed, or this reader was too far behind")]
 pub struct LogEnded;
 
-/// The readers of the log.
 #[derive(Default)]
 pub(crate) struct Readers(Vec<SyncSender<LogPart>>);
 
@@ -58,7 +56,7 @@ impl Readers {
         self.0.is_empty()
     }
 
-    /// Tells all; who has gone or is too far behind is left out from now on.
+    /// Sends to all readers; closed or late ones are removed.
     pub(crate) fn tell(&mut self, part: &LogPart) {
         self.0.retain(|reader| match reader.try_send(part.clone()) {
             Ok(()) => true,

@@ -1,9 +1,9 @@
-//! The one owner of a port: a thread that sends requests, receives frames and hands them to whom they concern.
+//! Thread that owns a port: sends requests, receives frames and distributes them.
 //!
-//! Handles ([`crate::Client`]) give it commands over a channel. It keeps the events in order and without gaps, answers
-//! the board's [`EventKind::StillThere`] as long as somebody holds the work that is asked about, and says hello anew
-//! after a reset or an unplugging. A new hello begins a new *session*: what belongs to the old one, a handle or running
-//! work, gets an error and has to decide for itself, because the rig may have lost its position.
+//! Handles ([`crate::Client`]) send commands over a channel. The thread delivers events in order without
+//! gaps, answers keep-alives ([`EventKind::StillThere`]) while the work is held, and says hello after a reset
+//! or unplugging. A new hello starts a new *session*: older handles and work fail, because the rig may have
+//! lost its position.
 
 mod session;
 
@@ -35,19 +35,19 @@ use crate::{
 
 pub(crate) use session::{Break, Session};
 
-/// Opens the line to the board, the first time and after it broke.
+/// Opens the line, initially and after it broke.
 pub type Connect = Box<dyn FnMut() -> Result<Box<dyn Transport>, PortError> + Send>;
 
-/// Longest wait for a command while events are awaited, and so the delay of an event.
+/// Polling interval while events are awaited, hence their delay.
 const ALERT: Duration = Duration::from_millis(1);
-/// Longest wait for a command while nobody awaits an event.
+/// Polling interval while no event is awaited.
 const IDLE: Duration = Duration::from_millis(50);
-/// A board that does not answer so many polls in a row, each asked as often as any request, is dead.
+/// Unanswered polls in a row, each with all repeats, after which the board is dead.
 const UNANSWERED_POLLS: u32 = 2;
-/// Longest look for bytes between two commands.
+/// Longest read between two commands.
 const GLANCE: Duration = Duration::from_millis(1);
 
-/// What running work is told.
+/// Messages to running work.
 pub(crate) enum Message {
     Event(EventKind, Instant),
     Broken(Break),
@@ -55,38 +55,38 @@ pub(crate) enum Message {
         from: u32,
         to: u32,
     },
-    /// The board says that it is not working on it, and no event tells how it ended.
+    /// The board has ended the work without an event.
     NoEnd,
 }
 
-/// Where messages about work go.
+/// Receiver of messages about work.
 pub(crate) struct Listener {
     pub messages: Sender<Message>,
-    /// Gone when nobody holds the work any more.
+    /// Dropped with the work.
     pub held: Weak<()>,
-    /// Events that are lost for ever are no reason to give it up.
+    /// Lost events do not end it.
     pub bears_loss: bool,
 }
 
-/// A request and what it is for.
+/// A request with its description.
 pub(crate) struct Question {
     pub request: Request,
     pub during: String,
-    /// Where it is long work.
+    /// For long work.
     pub listener: Option<Listener>,
 }
 
-/// The number of a request, and its answer or refusal.
+/// Request id, and answer or refusal.
 pub(crate) type Answered = Result<(u32, Response), ClientError>;
 
-/// What handles ask of the owner.
+/// Commands of the handles.
 pub(crate) enum Command {
     Ask {
         session: u32,
         questions: Vec<Question>,
         answers: SyncSender<Vec<Answered>>,
     },
-    /// Gives the present session; says hello anew where it is still the known one, or none.
+    /// Returns the present session; says hello if `known` has ended.
     Join {
         known: u32,
         answer: SyncSender<Result<Session, ClientError>>,
@@ -97,14 +97,14 @@ pub(crate) enum Command {
 pub(crate) struct Owner {
     link: Link,
     connect: Connect,
-    /// The rate that the link is to have, where somebody asked for one.
+    /// Requested link rate.
     wanted: Option<LinkRate>,
     inbox: Receiver<Command>,
     timing: Arc<Mutex<Timing>>,
     session: Session,
-    /// Set while there is no session.
+    /// Set without a session.
     broken: Option<Break>,
-    /// What ended the session before this one.
+    /// End of the previous session.
     last_break: Option<Break>,
     next_attempt: Instant,
     events: Events,
@@ -113,7 +113,7 @@ pub(crate) struct Owner {
     next_log: Option<u32>,
     still_there: bool,
     last_heard: Instant,
-    /// Polls in a row that nobody answered.
+    /// Unanswered polls in a row.
     unanswered: u32,
 }
 
@@ -128,7 +128,7 @@ impl Owner {
         inbox: Receiver<Command>,
     ) -> Result<Self, ClientError> {
         let mut link = Link::new(connect()?, port);
-        // A host before this one may have asked for the same.
+        // An earlier host may have set this rate.
         link.set_rate(wanted.unwrap_or(LinkRate::START), "opening the port")?;
         let (hello, version) = shake_hands(&mut link, emulated)?;
         open_session(&mut link, (&hello, version))?;
@@ -172,7 +172,7 @@ impl Owner {
         self.session.clone()
     }
 
-    /// Works until the last handle has gone.
+    /// Runs until the last handle is dropped.
     pub(crate) fn run(mut self) {
         loop {
             let awaited = !self.works.is_empty() || !self.logs.is_empty();
@@ -209,7 +209,7 @@ impl Owner {
         }
     }
 
-    /// The answer to each question; one error where nobody answers.
+    /// Answers of several requests, or one error.
     fn ask_for(&mut self, session: u32, questions: Vec<Question>) -> Vec<Answered> {
         if let Some(broken) = self.break_of(session) {
             let port = self.link.port();
@@ -225,19 +225,19 @@ impl Owner {
         for (question, answered) in questions.into_iter().zip(&answered) {
             if let (Some(listener), Ok((id, Response::Accepted))) = (question.listener, answered) {
                 abandoned |= listener.held.strong_count() == 0;
-                // Before any event is given out, so that even work that has ended already is told its end.
+                // Registered before events are delivered, so that even ended work gets its end.
                 self.works.insert(*id, listener);
             }
         }
         self.give_out();
         if abandoned {
-            // The user interrupted before the board had accepted the work.
+            // Interrupted before the board accepted the work.
             let _ = self.ask(&Request::Stop, "stopping");
         }
         answered
     }
 
-    /// Sends a request until its answer comes.
+    /// Sends a request until it is answered.
     fn ask(&mut self, request: &Request, during: &str) -> Answered {
         let answered = self.ask_all(&[(request, during)])?;
         answered.into_iter().next().unwrap_or_else(|| Err(nothing(during)))
@@ -266,7 +266,7 @@ impl Owner {
         Ok(answers.map(|((id, packet), (_, during))| Ok((id, self.read(&packet, during)?))).collect())
     }
 
-    /// What a frame answers.
+    /// Answer in a frame.
     fn read(&mut self, packet: &Packet, during: &str) -> Result<Response, ClientError> {
         let unreadable = || ClientError::Nonsense {
             during: during.into(),
@@ -298,7 +298,7 @@ impl Owner {
         }
     }
 
-    /// Takes what has arrived by itself.
+    /// Reads unsolicited frames.
     fn glance(&mut self) {
         loop {
             match self.link.receive(Instant::now() + GLANCE, "listening") {
@@ -332,7 +332,7 @@ impl Owner {
         self.logs.tell(&LogPart { number, missing, bytes: log.bytes.to_vec() });
     }
 
-    /// Gives the events out that are due, fetches those that got lost, and answers the board's question.
+    /// Delivers due events, fetches lost ones, and answers keep-alives.
     fn give_out(&mut self) {
         while self.broken.is_none() {
             if let Some(event) = self.events.pop() {
@@ -340,7 +340,7 @@ impl Owner {
             } else if !self.events.arrived.is_empty() {
                 self.fetch_due_event();
             } else if std::mem::take(&mut self.still_there) {
-                // Any good frame would do; what goes wrong ends the session, or is seen by the next poll.
+                // Any valid frame suffices; errors end the session or appear at the next poll.
                 let _ = self.status("answering whether this program is still there");
             } else {
                 return;
@@ -372,7 +372,7 @@ impl Owner {
         }
     }
 
-    /// Asks the board for the due event, which did not arrive by itself.
+    /// Requests the next event, which did not arrive.
     fn fetch_due_event(&mut self) {
         let number = self.events.due;
         match self.ask(&Request::ReadEvent { number }, "reading an event that got lost") {
@@ -380,7 +380,7 @@ impl Owner {
                 self.events.arrived.insert(number, event);
             }
             Err(ClientError::Refused { error: RequestError::EventGone { oldest, next }, .. }) => {
-                // What has arrived by itself is not lost, whatever the board remembers.
+                // Events that arrived are not lost, whatever the board stores.
                 let arrived = self.events.arrived.keys().next().copied();
                 let forgotten = oldest.min(next).max(number + 1);
                 self.events.due = arrived.map_or(forgotten, |first| first.clamp(number + 1, forgotten));
@@ -392,13 +392,12 @@ impl Owner {
                     work.bears_loss
                 });
             }
-            // Nobody answers: pass over the event, so that the rest is given out. The session's end is known already.
+            // No answer: skip the event, so that later ones are delivered. The session has ended anyway.
             Ok(_) | Err(_) => self.events.due += 1,
         }
     }
 
-    /// While work is under way and nothing was heard for long: an event that got lost is fetched, and where the board
-    /// is not working any more and no event is left, its end is unknown.
+    /// Polls during work after a silence: fetches lost events, and detects work that ended without one.
     fn poll_when_quiet(&mut self) {
         self.works.retain(|_, work| work.held.strong_count() > 0);
         if self.works.is_empty() || self.last_heard.elapsed() < self.timing().poll {
@@ -435,12 +434,12 @@ impl Owner {
     }
 }
 
-/// Nothing where an answer must be.
+/// A required answer is missing.
 pub(crate) fn nothing(during: &str) -> ClientError {
     ClientError::Nonsense { during: during.into(), answer: "no answer".into() }
 }
 
-/// An answer that is none to what was asked.
+/// An answer that does not match the request.
 pub(crate) fn nonsense(during: &str, response: &Response) -> ClientError {
     ClientError::Nonsense { during: during.into(), answer: format!("{response:?}") }
 }

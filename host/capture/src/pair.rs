@@ -1,4 +1,4 @@
-//! Taking a pair: home where needed, bring the coarse stage near, expose far and near by piezo.
+//! Takes a pair: homes if necessary, moves the coarse stage, exposes far and near by piezo.
 
 use std::time::Duration;
 
@@ -21,15 +21,15 @@ use crate::{
 
 pub use crate::expose::CaptureError;
 
-/// How the exposures are taken.
+/// Settings of the exposures.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Exposures {
     pub exposure: Micros,
-    /// When the piezo counts as settled, before the trigger.
+    /// Settle criterion before the trigger.
     pub settle: Settle,
-    /// Longest wait for an image once the board has told of its exposure.
+    /// Longest wait for an image after its exposure was reported.
     pub image_wait: Duration,
-    /// Exposures of each image of a pair, which are averaged; 1 or more.
+    /// Averaged exposures per image, at least 1.
     pub averaged: u16,
 }
 
@@ -44,34 +44,29 @@ impl Default for Exposures {
     }
 }
 
-/// One image and how it was taken.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Taken {
     pub image: Image,
-    /// Sensor distance that the optics ask for, in mm.
+    /// Sensor distance by the optics.
     pub sensor_asked_mm: f64,
-    /// Sensor distance by encoder and gauge at the trigger, in mm.
+    /// Sensor distance by encoder and gauge at the trigger.
     pub sensor_measured_mm: f64,
-    /// What the board measured.
     pub record: ShotRecord,
 }
 
-/// A far- and a near-focused image.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Pair {
-    /// Focused on the far plane.
     pub far: Taken,
-    /// Focused on the near plane.
     pub near: Taken,
-    /// The coarse stage during both.
+    /// Coarse stage during both.
     pub coarse: Moved,
-    /// How much further from the lens the near image's sensor stands, where it is a second camera's behind a half mirror and both images
-    /// are of one exposure ([`crate::half_mirror`]); `None`: one camera, two exposures.
+    /// Extra distance of the second sensor behind a half mirror ([`crate::half_mirror`]), with both images of
+    /// one exposure; `None`: one camera, two exposures.
     pub further_mm: Option<f64>,
 }
 
 impl Pair {
-    /// Board time from the start of the far move to the end of the near exposure, less the exposures, in us.
+    /// Board time from the far move to the end of the near exposure, without exposures.
     pub fn moving_us(&self) -> u64 {
         let (far, near) = (&self.far.record, &self.near.record);
         let begin = far.trigger.0.saturating_sub(u64::from(far.settle.0));
@@ -81,18 +76,16 @@ impl Pair {
     }
 }
 
-/// A rig that stands where its piezo reaches both places of a pair.
+/// A rig whose piezo reaches both positions of a pair.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Reach {
     pub coarse: Moved,
-    /// The far and the near shot.
+    /// Far and near shot.
     pub shots: [Shot; 2],
 }
 
-/// Brings the coarse stage where the piezo reaches both places; homes where needed.
-///
-/// # Errors
-/// [`CaptureError`]; what the stage cannot reach is said before anything moves.
+/// Moves the coarse stage so that the piezo reaches both positions; homes if necessary.
+/// Errors: [`CaptureError`]; limits are checked before any motion.
 pub fn reach(
     client: &Client,
     sensor: &SensorPair,
@@ -121,7 +114,7 @@ pub fn reach(
     Ok(Reach { coarse, shots: [shot(sensor.far_mm)?, shot(sensor.near_mm)?] })
 }
 
-/// Takes a pair. `say` is told in words what is being done. Of exposures that are averaged the first stands in the record.
+/// Takes a pair. `say` receives progress messages. The record has the first of averaged exposures.
 pub fn capture_pair(
     client: &Client,
     camera: &mut dyn Camera,
@@ -152,7 +145,6 @@ pub fn capture_pair(
     pair_of(both, sensor, reach.coarse, &client.hello().limits)
 }
 
-/// A pair of a far and a near exposure.
 pub fn pair_of(
     [far, near]: [(ShotRecord, Image); 2],
     sensor: &SensorPair,
@@ -168,7 +160,7 @@ pub fn pair_of(
     Ok(Pair { far, near, coarse, further_mm: None })
 }
 
-/// Refuses two images of different size or depth of bits.
+/// Checks size and bit depth.
 fn alike(far: &Image, near: &Image) -> Result<(), CaptureError> {
     let ((far_height, far_width), (near_height, near_width)) = (far.pixels.dim(), near.pixels.dim());
     let (far_bits, near_bits) = (far.bits, near.bits);

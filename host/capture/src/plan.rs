@@ -1,62 +1,40 @@
-//! Where the axes go for a pair of images.
+//! Axis positions for a pair.
 //!
-//! `sensor distance = datum + coarse + fine + lens`. The lens stage stays where it is; datum and lens together are the
-//! *base*, the sensor distance with both axes of stage A at 0. The coarse stage is put where both sensor distances lie inside the
-//! piezo's range, in its middle; the piezo then makes up for what the coarse stage is off, and toggles between
-//! the two in milliseconds. Lengths in nanometres unless a name says otherwise.
+//! `sensor distance = datum + coarse + fine + lens`. The lens stage is not moved; datum plus lens is the
+//! *base*, the distance with stage A at 0. The coarse stage centres both distances in the piezo's range; the
+//! piezo corrects its error and switches between them in milliseconds. Nanometres unless named otherwise.
 
 use farnear_protocol::{
     message::Limits,
     units::{Micros, Nanometres},
 };
 
-/// Sensor distances of a pair from the lens' principal plane, in millimetres.
+/// Sensor distances of a pair from the principal plane.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct SensorPair {
-    /// For the far-focused image.
     pub far_mm: f64,
-    /// For the near-focused image; larger than `far_mm`.
+    /// Larger than `far_mm`.
     pub near_mm: f64,
 }
 
-/// The rig cannot reach what the optics ask for.
 #[derive(Clone, PartialEq, Debug, thiserror::Error)]
 pub enum PlanError {
-    /// An exposure that the board refuses.
     #[error("an exposure of {} us is outside the board's limits, {} to {} us", asked.0, min.0, max.0)]
-    Exposure {
-        asked: Micros,
-        /// The board's shortest.
-        min: Micros,
-        /// The board's longest.
-        max: Micros,
-    },
-    /// The two distances are further apart than the piezo can go.
+    Exposure { asked: Micros, min: Micros, max: Micros },
     #[error(
         "the optics ask for {travel_um:.2} um between the two images, the piezo has {piezo_um:.2} um; \
          a smaller max_blur_px or f-number needs less"
     )]
     Travel { travel_um: f64, piezo_um: f64 },
-    /// The stage does not go there.
     #[error(
         "the optics ask for a sensor distance of {sensor_mm:.4} mm, the stage reaches {min_mm:.4} to {max_mm:.4} mm; \
          check focal length, focus distances and where the lens stage stands"
     )]
     Reach { sensor_mm: f64, min_mm: f64, max_mm: f64 },
-    /// The coarse stage stands too far off for the piezo to make up for it.
     #[error(
         "with the coarse stage at {coarse_um:.3} um the piezo would have to go to {fine_um:.3} um, outside {min_um:.3} to {max_um:.3} um"
     )]
-    CoarseOff {
-        /// Where the coarse stage stands.
-        coarse_um: f64,
-        /// Where the piezo would have to go.
-        fine_um: f64,
-        /// Its smallest position.
-        min_um: f64,
-        /// Its largest position.
-        max_um: f64,
-    },
+    CoarseOff { coarse_um: f64, fine_um: f64, min_um: f64, max_um: f64 },
 }
 
 fn nm(mm: f64) -> i64 {
@@ -67,12 +45,11 @@ fn um(nm: impl Into<i64>) -> f64 {
     nm.into() as f64 / 1e3
 }
 
-/// Where the coarse stage goes for a pair: the whole number of its steps that puts the pair nearest to the middle
-/// of the piezo's range.
+/// Coarse position for a pair: the whole step that centres it in the piezo's range.
 pub fn coarse_for(pair: &SensorPair, base_nm: i64, limits: &Limits) -> Result<Nanometres, PlanError> {
     let (fine_min, fine_max) = (i64::from(limits.fine_min.0), i64::from(limits.fine_max.0));
     let (coarse_min, coarse_max) = (i64::from(limits.coarse_min.0), i64::from(limits.coarse_max.0));
-    // Half a step to either side is what rounding to whole steps may cost.
+    // Rounding costs up to half a step on either side.
     let step_nm = f64::from(limits.coarse_step_pm.max(1)) / 1e3;
     let travel = nm(pair.near_mm - pair.far_mm);
     if travel as f64 + step_nm > (fine_max - fine_min) as f64 {
@@ -90,7 +67,7 @@ pub fn coarse_for(pair: &SensorPair, base_nm: i64, limits: &Limits) -> Result<Na
     Ok(Nanometres((whole_steps.round() as i64).clamp(coarse_min, coarse_max) as i32))
 }
 
-/// Where the piezo goes for one sensor distance, with the coarse stage where its encoder says it is.
+/// Piezo position for a sensor distance and the measured coarse position.
 pub fn fine_for(
     sensor_mm: f64,
     base_nm: i64,
@@ -144,12 +121,12 @@ mod tests {
         let far = fine_for(pair.far_mm, BASE, coarse, &limits()).unwrap();
         let near = fine_for(pair.near_mm, BASE, coarse, &limits()).unwrap();
         assert_eq!(near.0 - far.0, 156_200);
-        // Middle of the two and middle of the piezo's range agree to a step.
+        // Centres of both and of the piezo's range agree to a step.
         assert!(((far.0 + near.0) / 2 - 100_000).abs() <= 157, "{far:?} {near:?}");
     }
 
     #[test]
-    fn a_lens_stage_that_stands_further_out_brings_the_sensor_in() {
+    fn a_lens_stage_further_out_moves_the_sensor_in() {
         let pair = SensorPair { far_mm: 52.8313, near_mm: 52.9875 };
         let coarse = coarse_for(&pair, BASE, &limits()).unwrap();
         let with_lens = coarse_for(&pair, BASE + 1_000_000, &limits()).unwrap();
@@ -157,7 +134,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_reached_is_said() {
+    fn rejects_unreachable_distances() {
         let wide = SensorPair { far_mm: 52.0, near_mm: 52.2 };
         assert!(matches!(coarse_for(&wide, BASE, &limits()), Err(PlanError::Travel { .. })));
         let long = SensorPair { far_mm: 75.0, near_mm: 75.1 };
@@ -167,7 +144,7 @@ mod tests {
     }
 
     proptest! {
-        /// Every pair inside the whole reach can be taken, with the coarse stage up to 2 um off.
+        /// Every pair in reach can be taken with the coarse stage up to 2 um off.
         #[test]
         fn every_pair_in_reach_is_reached(far in 47.1..59.9f64, travel in 0.001..0.185f64, off in -2_000..2_000i32) {
             let pair = SensorPair { far_mm: far, near_mm: far + travel };

@@ -1,4 +1,4 @@
-//! Making the rig ready: every axis homed, and where that leaves the sensor.
+//! Homes the axes, and gives the sensor position that results.
 
 use farnear_protocol::{
     Nanometres,
@@ -11,12 +11,12 @@ use crate::{
     error::ClientError,
 };
 
-/// The axes with a home switch that this rig has.
+/// Fitted axes with a home switch.
 pub fn steppers(capabilities: &Capabilities) -> Vec<Axis> {
     [Axis::SensorCoarse, Axis::Lens].into_iter().filter(|axis| capabilities.has(*axis)).collect()
 }
 
-/// Homes what is not homed, all at the same time.
+/// Homes all axes that are not homed, simultaneously.
 pub fn ensure_homed(client: &Client, say: &mut dyn FnMut(&str)) -> Result<(), ClientError> {
     let status = client.status()?;
     let mut axes = steppers(&client.hello().capabilities);
@@ -31,12 +31,12 @@ pub fn ensure_homed(client: &Client, say: &mut dyn FnMut(&str)) -> Result<(), Cl
     Ok(())
 }
 
-/// Sensor distance with both axes of stage A at 0, in nanometres: the datum and where the lens stage stands.
+/// Sensor distance with stage A at 0: datum plus lens position, nm.
 pub fn base_nm(client: &Client, status: &Status) -> i64 {
     base(client, |axis| status.axis(axis).measured)
 }
 
-/// As [`base_nm`] after [`ensure_homed`], which brings a lens stage to 0 that was not homed.
+/// As [`base_nm`] after [`ensure_homed`], which moves an unhomed lens stage to 0.
 pub fn base_when_homed_nm(client: &Client, status: &Status) -> i64 {
     base(client, |axis| match status.axis(axis).state {
         PositionState::Homed => status.axis(axis).measured,

@@ -1,7 +1,8 @@
-//! A capture folder: `far.png`, `near.png`, or the images of a sequence, and `capture.toml`, which says how they came about.
+//! Capture folder: `far.png` and `near.png`, or the images of a sequence, and `capture.toml` with their
+//! settings.
 //!
-//! The folder appears whole or not at all. From an emulated rig it holds no clock time, port or random number:
-//! the same scene and seed give the same bytes.
+//! The folder is created atomically. An emulated rig's has no clock time, port or random number: equal scenes
+//! and seeds give equal bytes.
 
 use std::{collections::BTreeMap, path::Path};
 
@@ -22,121 +23,111 @@ use crate::{
     sequence::SequenceShot,
 };
 
-/// Name of the record in a capture folder.
 pub const CAPTURE_FILE: &str = "capture.toml";
-/// Version of the record's layout.
 const FORMAT: u32 = 2;
 
-/// The content of `capture.toml`.
 #[derive(Serialize, Deserialize, Clone, PartialEq, Debug)]
 pub struct CaptureRecord {
-    /// Version of this layout.
     pub format: u32,
-    /// The program that wrote it.
+    /// Program and version.
     pub made_by: String,
-    /// When, by the host's clock (RFC 3339); only from real hardware.
+    /// RFC 3339; real hardware only.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub time: Option<String>,
-    /// Datum and coarse stage.
     pub stage: StageRecord,
-    /// The exposures; of a pair far first.
+    /// Far first in a pair.
     pub exposure: Vec<ExposureRecord>,
     pub camera: CameraRecord,
-    /// The second camera, where both images are of one exposure.
+    /// Second camera, for pairs of one exposure.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub half_mirror: Option<HalfMirrorRecord>,
     pub board: BoardRecord,
-    /// What was simulated, if it was.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub simulation: Option<SimulationRecord>,
-    /// The optics file, as it was given.
+    /// Contents of the optics file.
     #[serde(default, skip_serializing_if = "toml::Table::is_empty")]
     pub optics: toml::Table,
 }
 
-/// Where the stage stood.
 #[derive(Serialize, Deserialize, Clone, PartialEq, Debug)]
 pub struct StageRecord {
     /// Sensor distance with all axes at 0.
     pub datum_mm: f64,
-    /// Where the lens stage's encoder said it was.
+    /// By encoder.
     #[serde(default)]
     pub lens_measured_um: f64,
-    /// Where the coarse stage was sent for a pair.
+    /// Coarse target of a pair.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub coarse_asked_um: Option<f64>,
-    /// Where its encoder said it came to.
+    /// By encoder.
     pub coarse_measured_um: f64,
-    /// Board time for both settled moves and both images of a pair, without the exposures.
+    /// Board time of both moves and images of a pair, without exposures.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub moving_us: Option<u64>,
 }
 
-/// One exposure. Times are the board's, since its reset.
+/// One exposure. Times since the board's reset.
 #[derive(Serialize, Deserialize, Clone, PartialEq, Debug)]
 pub struct ExposureRecord {
     pub image: String,
-    /// Sensor distance the optics ask for, in a pair.
+    /// Sensor distance by the optics, in a pair.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sensor_asked_mm: Option<f64>,
-    /// Sensor distance by encoders and gauge.
+    /// By encoders and gauge.
     pub sensor_measured_mm: f64,
-    /// The axis that was moved, in a sequence: `coarse`, `fine` or `lens`.
+    /// Moved axis in a sequence: `coarse`, `fine` or `lens`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub axis: Option<String>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub asked_um: Option<f64>,
-    /// Where the piezo was sent, in a pair.
+    /// Piezo target in a pair.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub fine_asked_um: Option<f64>,
-    /// Where its gauge said it was.
+    /// By gauge.
     pub fine_measured_um: f64,
-    /// Where the coarse stage's encoder said it was.
+    /// By encoder.
     pub coarse_measured_um: f64,
-    /// Where the lens stage's encoder said it was, in a sequence.
+    /// By encoder, in a sequence.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub lens_measured_um: Option<f64>,
-    /// How the exposure came about, in a sequence: `hardware`, `software` or `free-running`.
+    /// In a sequence: `hardware`, `software` or `free-running`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub triggered_by: Option<String>,
-    /// From the start of the move until it was settled.
+    /// From the start of the move until settled.
     pub settle_us: u32,
-    /// Length of the exposure.
     pub exposure_us: u32,
-    /// Running number of the trigger.
     pub trigger_number: u32,
     pub trigger_us: u64,
-    /// Start of the exposure, as the camera reported it.
+    /// By the camera's signal.
     pub strobe_start_us: u64,
     pub strobe_end_us: u64,
 }
 
-/// The camera and its images.
 #[derive(Serialize, Deserialize, Clone, PartialEq, Debug)]
 pub struct CameraRecord {
     pub kind: String,
     pub width: usize,
     pub height: usize,
-    /// Bits of the camera; 9 to 15 are shifted up to 16 in the files.
+    /// Camera bits; 9 to 15 are shifted up to 16 in the files.
     pub bits: u8,
-    /// Exposures that each image is the mean of, where there are several.
+    /// Averaged exposures per image, if several.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub averaged: Option<u16>,
-    /// Whether the camera's dark and flat frames were taken off.
+    /// Whether dark and flat frames were applied.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub corrected: bool,
-    /// What was set on the camera for this.
+    /// Camera settings.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub settings: BTreeMap<String, String>,
 }
 
-/// The second camera behind a half mirror, which took the near image.
+/// The second camera, which took the near image.
 #[derive(Serialize, Deserialize, Clone, PartialEq, Debug)]
 pub struct HalfMirrorRecord {
     pub second_camera: String,
-    /// How much further from the lens its sensor stands than the first one's, as it was said.
+    /// Extra sensor distance as given by the user.
     pub second_further_um: f64,
-    /// Whether its picture was turned round, left to right.
+    /// Whether its image was mirrored left to right.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub second_mirrored: bool,
 }
@@ -144,62 +135,51 @@ pub struct HalfMirrorRecord {
 #[derive(Serialize, Deserialize, Clone, PartialEq, Debug)]
 pub struct BoardRecord {
     pub name: String,
-    /// Its firmware's version.
     pub firmware: String,
-    /// The protocol version that was spoken.
     pub protocol: u8,
     /// Key of the message table.
     pub schema_key: String,
-    /// The chip's unique id.
     pub unique_id: String,
     pub boot: u32,
-    /// Why it was reset last.
     pub reset_cause: String,
-    /// Whether it was emulated.
     pub emulated: bool,
 }
 
-/// What `farnear-sim` was told.
+/// Settings of `farnear-sim`.
 #[derive(Serialize, Deserialize, Clone, PartialEq, Eq, Debug)]
 pub struct SimulationRecord {
     pub scene: String,
-    /// The point spread function.
     pub psf: String,
     pub noise: String,
     pub seed: u64,
 }
 
-/// What the record says beside what the pair and the board tell.
+/// Further contents of the record.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Circumstances {
-    /// The program that captures, with its version.
+    /// Program and version.
     pub made_by: String,
-    /// When; only for real hardware.
+    /// Real hardware only.
     pub time: Option<String>,
     /// [`crate::camera::Camera::kind`].
     pub camera: &'static str,
     pub simulation: Option<SimulationRecord>,
-    /// The optics file; empty where none was given.
+    /// Contents of the optics file, or empty.
     pub optics: toml::Table,
 }
 
-/// A capture folder could not be written or read.
 #[derive(Debug, thiserror::Error)]
 pub enum RecordError {
-    /// The folder or a file in it.
     #[error(transparent)]
     Staging(#[from] StagingError),
     #[error(transparent)]
     Image(#[from] EncodeError),
-    /// The record cannot be put into TOML.
     #[error("cannot write the capture's record: {0}")]
     Toml(#[from] toml::ser::Error),
-    /// The record is not readable.
     #[error("{path}: {reason}")]
     Read { path: String, reason: String },
 }
 
-/// The record of a pair.
 pub fn record_of(pair: &Pair, client: &Client, circumstances: Circumstances) -> CaptureRecord {
     let stage = StageRecord {
         datum_mm: um(client.hello().limits.datum) / 1000.0,
@@ -212,7 +192,7 @@ pub fn record_of(pair: &Pair, client: &Client, circumstances: Circumstances) -> 
     record(client, circumstances, stage, exposure, &pair.far.image)
 }
 
-/// The record of a sequence, `None` where it has no images.
+/// `None` without images.
 pub fn record_of_sequence(
     shots: &[SequenceShot],
     client: &Client,
@@ -305,17 +285,17 @@ fn exposure_record(name: &str, record: &ShotRecord, sensor_measured_mm: f64) -> 
     }
 }
 
-/// Begins a capture folder; call it before the rig moves, so that a folder that cannot be written is known.
+/// Begins a capture folder; called before motion, so that an unwritable folder is reported first.
 pub fn begin_folder(folder: &Path) -> Result<Staging, RecordError> {
     Ok(Staging::new_folder(folder)?)
 }
 
-/// Writes pair and record into the folder and puts it in place.
+/// Writes pair and record, and publishes the folder.
 pub fn finish_folder(staged: Staging, pair: &Pair, record: &CaptureRecord) -> Result<(), RecordError> {
     finish_with(staged, [("far.png", &pair.far.image), ("near.png", &pair.near.image)], record)
 }
 
-/// Writes a sequence's images and record into the folder and puts it in place.
+/// Writes a sequence and its record, and publishes the folder.
 pub fn finish_sequence(
     staged: Staging,
     shots: &[SequenceShot],
@@ -337,7 +317,7 @@ fn finish_with<'a>(
     Ok(staged.finish()?)
 }
 
-/// Reads the record of a capture folder; `None` where the folder has none.
+/// Reads the record of a folder, if it has one.
 pub fn read_record(folder: &Path) -> Result<Option<CaptureRecord>, RecordError> {
     let path = folder.join(CAPTURE_FILE);
     let failed = |reason: String| RecordError::Read { path: path.display().to_string(), reason };

@@ -1,4 +1,4 @@
-//! What is asked and answered at once: stopping, alarms, settings, counters, the sun.
+//! Requests without long work: stop, alarms, settings, counters, sun.
 
 use std::time::Duration;
 
@@ -10,23 +10,21 @@ use farnear_protocol::{
 
 use crate::{client::Client, error::ClientError, owner::nonsense};
 
-/// Longest wait for a reset board to answer again.
+/// Timeout of a restarting board.
 const RESTART: Duration = Duration::from_secs(5);
-/// Longest a healthy stepper brakes, also from the fastest that settings allow.
+/// Longest braking time at the fastest settings.
 const BRAKING: Duration = Duration::from_secs(3);
-/// From one look whether the rig stands to the next.
+/// Polling interval for standstill.
 const LOOK: Duration = Duration::from_millis(10);
 
 impl Client {
-    /// Stops all motion along the ramps and ends a running program; positions stay known.
+    /// Stops along the ramps and ends a program; positions remain valid.
     pub fn stop(&self) -> Result<(), ClientError> {
         self.expect_accepted(&Request::Stop, "stopping")
     }
 
-    /// Waits until no axis moves any more: after a stop steppers brake along their ramps.
-    ///
-    /// # Errors
-    /// [`ClientError`]; [`ClientError::Overdue`] where something still moves after longer than any ramp takes.
+    /// Waits until all axes are at rest: steppers brake along their ramps after a stop.
+    /// Errors: [`ClientError`]; [`ClientError::Overdue`] after longer than any ramp.
     pub fn wait_until_it_stands(&self) -> Result<(), ClientError> {
         let allowed = self.timing().allowance(BRAKING);
         let until = std::time::Instant::now() + allowed;
@@ -48,20 +46,18 @@ impl Client {
         self.expect_accepted(&request, "switching the light")
     }
 
-    /// Emergency stop: the last step comes within a millisecond, what moved has lost its position, and the alarm has to
-    /// be cleared.
+    /// Emergency stop: the last step comes within a millisecond, moving axes lose their position, and an
+    /// alarm is latched.
     pub fn halt(&self) -> Result<(), ClientError> {
         self.expect_accepted(&Request::Halt, "halting")
     }
 
-    /// Resets the board and says hello to it again.
-    ///
-    /// # Errors
-    /// [`ClientError`]; [`ClientError::Overdue`] where it does not come back.
+    /// Resets the board and says hello again.
+    /// Errors: [`ClientError`]; [`ClientError::Overdue`] if it does not return.
     pub fn reboot(&mut self) -> Result<(), ClientError> {
         let before = self.hello().boot;
         match self.expect_accepted(&Request::Reboot, "rebooting") {
-            // The answer was lost and a retry met the next boot: it has rebooted.
+            // The answer was lost and a repeat met the next boot: it has rebooted.
             Ok(()) | Err(ClientError::Reset { .. }) => {}
             Err(error) => return Err(error),
         }
@@ -78,10 +74,8 @@ impl Client {
         }
     }
 
-    /// The alarm of this number; 0 = the last.
-    ///
-    /// # Errors
-    /// [`ClientError`]; refused with `NoSuchAlarm` where it is not kept.
+    /// The alarm with this number; 0 = the last.
+    /// Errors: [`ClientError`]; `NoSuchAlarm` if it is not stored.
     pub fn alarm(&self, number: u32) -> Result<AlarmRecord, ClientError> {
         let during = "reading an alarm";
         match self.request(&Request::ReadAlarm { number }, during)? {
@@ -90,7 +84,7 @@ impl Client {
         }
     }
 
-    /// The alarms that the board keeps, the last one first.
+    /// Stored alarms, newest first.
     pub fn alarms(&self) -> Result<Vec<AlarmRecord>, ClientError> {
         let mut alarms = Vec::new();
         let mut number = 0;
@@ -111,24 +105,18 @@ impl Client {
         }
     }
 
-    /// Clears the latched alarm of this number.
-    ///
-    /// # Errors
-    /// [`ClientError`]; refused while its cause is there.
+    /// Clears the latched alarm with this number.
+    /// Errors: [`ClientError`]; refused while its cause persists.
     pub fn clear_alarm(&self, number: u32) -> Result<(), ClientError> {
         self.expect_accepted(&Request::ClearAlarm { number }, &format!("clearing alarm {number}"))
     }
 
-    /// A setting and what it may be.
     pub fn setting(&self, key: SettingKey) -> Result<Setting, ClientError> {
         self.setting_by(&Request::ReadSetting { key }, &format!("reading {}", key.name()))
     }
 
-    /// Changes a setting, now and for later boots. Limits that this client has read in the hello message change with it:
-    /// [`Client::reopen`] reads them again.
-    ///
-    /// # Errors
-    /// [`ClientError`]; refused outside the allowed range and while anything moves.
+    /// Changes a setting permanently. [`Client::reopen`] updates limits derived from it.
+    /// Errors: [`ClientError`]; refused out of range and during motion.
     pub fn set_setting(&self, key: SettingKey, value: i32) -> Result<Setting, ClientError> {
         self.paces().clear();
         let during = format!("setting {} to {value}", key.name());
@@ -142,7 +130,6 @@ impl Client {
         }
     }
 
-    /// What the board has counted in its life.
     pub fn counters(&self) -> Result<Counters, ClientError> {
         let during = "reading the counters";
         match self.request(&Request::ReadCounters, during)? {
@@ -151,10 +138,8 @@ impl Client {
         }
     }
 
-    /// Where the sun is, and how a subject's shadow lies, as the board calculates it.
-    ///
-    /// # Errors
-    /// [`ClientError`]; refused while a stepper moves.
+    /// Sun and shadow calculated by the board.
+    /// Errors: [`ClientError`]; refused while a stepper moves.
     pub fn sun(&self, query: &SunQuery) -> Result<SunAnswer, ClientError> {
         let during = "asking for the sun";
         match self.request(&Request::Sun(*query), during)? {

@@ -1,7 +1,7 @@
-//! Exposure programs from a file, and focus stacks: shots, and the folder with their images.
+//! Exposure programs from a file, and focus stacks.
 //!
 //! ```toml
-//! exposure_us = 5000            # of shots that do not say otherwise; so are the next four
+//! exposure_us = 5000            # defaults of all shots
 //! settle_window_nm = 100
 //! settle_dwell_us = 2000
 //! repeat = 1
@@ -26,18 +26,16 @@ use serde::{Deserialize, Deserializer, de::Error};
 
 use crate::camera::Image;
 
-/// How shots are taken that do not say otherwise.
+/// Defaults of shots.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct ShotDefaults {
-    /// Length of the exposure.
     pub exposure: Micros,
-    /// Settle window; where none is given that of [`Settle::of_shot`].
+    /// `None`: that of [`Settle::of_shot`].
     pub settle_window: Option<Nanometres>,
-    /// Settle dwell; likewise.
+    /// `None`: that of [`Settle::of_shot`].
     pub settle_dwell: Option<Micros>,
-    /// Exposures at a position.
+    /// Exposures per position.
     pub repeat: u16,
-    /// How exposures come about.
     pub mode: TriggerMode,
 }
 
@@ -54,7 +52,6 @@ impl Default for ShotDefaults {
 }
 
 impl ShotDefaults {
-    /// A shot at a position.
     pub fn shot(&self, axis: Axis, target: Nanometres) -> Shot {
         let usual = Settle::of_shot(axis);
         Shot {
@@ -68,7 +65,7 @@ impl ShotDefaults {
         }
     }
 
-    /// A focus stack: `steps` shots from one position to another, both included. With one step only the first.
+    /// Focus stack of `steps` shots, both ends included; a single step uses the first.
     pub fn stack(&self, axis: Axis, from: Nanometres, to: Nanometres, steps: usize) -> Vec<Shot> {
         let span = i64::from(to.0) - i64::from(from.0);
         let intervals = steps.saturating_sub(1).max(1) as i64;
@@ -81,20 +78,17 @@ impl ShotDefaults {
     }
 }
 
-/// A program file is of no use.
 #[derive(Debug, thiserror::Error)]
 pub enum ProgramError {
-    /// It is no TOML of this kind.
     #[error("{0}")]
     Toml(#[from] toml::de::Error),
     #[error("it has no [[shot]]")]
     Empty,
-    /// A position that the wire cannot carry.
-    #[error("shot {index}: {to_um} um is no position: expected a number between -2147483 and 2147483 um")]
+    #[error("shot {index}: {to_um} um is out of range: expected a number between -2147483 and 2147483 um")]
     Position { index: usize, to_um: f64 },
 }
 
-// The options stand in both, because serde cannot refuse unknown keys beside a flattened struct.
+// Repeated in both structs, because serde cannot reject unknown keys next to a flattened struct.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct ProgramFile {
@@ -120,7 +114,7 @@ struct ShotEntry {
     trigger: Option<Trigger>,
 }
 
-/// What is said of how shots are taken.
+/// Options of a shot.
 struct Options {
     exposure_us: Option<u32>,
     settle_window_nm: Option<i32>,
@@ -161,13 +155,13 @@ impl Options {
     }
 }
 
-/// A position in micrometres as the wire carries it; `None` where it does not.
+/// Position in nm, if representable.
 pub fn nanometres(position_um: f64) -> Option<Nanometres> {
     let nm = (position_um * 1e3).round();
     (nm.is_finite() && nm.abs() <= f64::from(i32::MAX)).then_some(Nanometres(nm as i32))
 }
 
-/// The shots of a program file; the board checks them when it is armed.
+/// Shots of a program file; the board checks them when armed.
 pub fn read_program(text: &str) -> Result<Vec<Shot>, ProgramError> {
     let ProgramFile { exposure_us, settle_window_nm, settle_dwell_us, repeat, trigger, shot } =
         toml::from_str(text)?;
@@ -186,18 +180,14 @@ pub fn read_program(text: &str) -> Result<Vec<Shot>, ProgramError> {
     shots.collect()
 }
 
-/// One exposure of a sequence.
 #[derive(Clone, PartialEq, Debug)]
 pub struct SequenceShot {
     pub name: String,
-    /// What the board measured.
     pub record: ShotRecord,
-    /// How it was triggered.
     pub mode: TriggerMode,
     pub image: Image,
 }
 
-/// Name of the file for an exposure.
 pub fn image_name(record: &ShotRecord, repeats: u16) -> String {
     match repeats {
         0..=1 => format!("shot-{:02}.png", record.index),
@@ -210,7 +200,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_program_file_gives_shots_with_its_defaults() {
+    fn a_program_file_applies_its_defaults_to_shots() {
         let shots = read_program(
             "exposure_us = 3000\ntrigger = \"software\"\n\
              [[shot]]\naxis = \"coarse\"\nto_um = 5800.0\nsettle_window_nm = 700\n\
@@ -233,7 +223,7 @@ mod tests {
             ("exposure_us = 3", "no [[shot]]"),
             ("[[shot]]\naxis = \"z\"\nto_um = 1.0", "unknown axis `z`"),
             ("[[shot]]\naxis = \"fine\"", "to_um"),
-            ("[[shot]]\naxis = \"fine\"\nto_um = 1e12", "shot 0: 1000000000000 um is no position"),
+            ("[[shot]]\naxis = \"fine\"\nto_um = 1e12", "shot 0: 1000000000000 um is out of range"),
             ("exposre_us = 3\n[[shot]]\naxis = \"fine\"\nto_um = 1.0", "exposre_us"),
             ("[[shot]]\naxis = \"fine\"\nto_um = 1.0\nexposre_us = 3", "exposre_us"),
         ] {

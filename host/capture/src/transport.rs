@@ -1,6 +1,6 @@
-//! What carries bytes to the board: the trait [`Transport`] and its serial-port implementation.
+//! Byte pipes to a board: the trait [`Transport`] and its serial port.
 //!
-//! Every operation takes the longest time it may wait; none blocks for ever.
+//! Every operation has a timeout.
 
 use std::{
     io,
@@ -12,43 +12,42 @@ use serialport::{ClearBuffer, SerialPort, SerialPortInfo, SerialPortType};
 
 use crate::{error::PortError, find};
 
-/// A byte pipe to a board.
 pub trait Transport: Send {
-    /// Reads what is there, at most `buffer.len()` bytes, waiting at most `wait` for the first. `Ok(0)` means
-    /// that nothing came in time; an error means that the pipe is gone.
+    /// Reads at most `buffer.len()` bytes, waiting at most `wait` for the first. `Ok(0)` is a timeout; an
+    /// error means that the pipe is gone.
     fn receive(&mut self, buffer: &mut [u8], wait: Duration) -> io::Result<usize>;
 
-    /// Writes all bytes, taking at most `wait`.
+    /// Writes all bytes within `wait`.
     fn send(&mut self, bytes: &[u8], wait: Duration) -> io::Result<()>;
 
-    /// Throws away what has arrived and was not read.
+    /// Drops unread input.
     fn discard_input(&mut self) -> io::Result<()>;
 
-    /// Sends and receives at another rate from now on. A pipe that has none does nothing.
+    /// Changes the baud rate; ignored by pipes without one.
     fn set_rate(&mut self, _: LinkRate) -> io::Result<()> {
         Ok(())
     }
 
-    /// Opens the line anew with its own settings, which another program may have changed. A pipe without settings does nothing.
+    /// Reapplies the settings of the line, which another program may have changed.
     fn renew(&mut self, _: LinkRate) -> io::Result<()> {
         Ok(())
     }
 
-    /// Name of the port behind it, where that may be another one than was asked for.
+    /// Port name, if it may differ from the requested one.
     fn port(&self) -> Option<&str> {
         None
     }
 }
 
-/// A serial port, held exclusively: a second program that opens it gets [`PortError::Busy`].
+/// A serial port, held exclusively: a second program gets [`PortError::Busy`].
 pub struct SerialTransport {
-    /// Absent only while it is opened anew.
+    /// `None` only while it is reopened.
     port: Option<Box<dyn SerialPort>>,
     name: String,
 }
 
 impl SerialTransport {
-    /// Opens the port at the rate that the board begins with, 8 data bits, no parity, no flow control.
+    /// Opens the port at the board's initial rate, 8 data bits, no parity, no flow control.
     pub fn open(path: &str) -> Result<Self, PortError> {
         refuse_what_is_no_port(path)?;
         let port = serialport::new(path, LinkRate::START.baud())
@@ -66,19 +65,18 @@ impl SerialTransport {
     }
 }
 
-/// Where a board is found again after it was unplugged, for the system may give the port another name: by the serial number of its
-/// USB adapter, where it has one; else by the name, and where that is gone by the only adapter of the same make that has no number
-/// either. A link that the system keeps (`/dev/serial/by-id`) is a name that stays. Who asks has to see by the board's own
-/// identity that it is the same.
+/// Finds a board that reappears under another port name: by the serial number of its USB adapter, else by the
+/// name, else by the only unnumbered adapter of the same make. A link such as `/dev/serial/by-id` is a stable
+/// name. The caller must verify the board's identity.
 #[derive(Clone, Debug)]
 pub(crate) struct Place {
     name: String,
     adapter: Option<Adapter>,
-    /// Whether the board was there before.
+    /// Whether the board was connected before.
     known: bool,
 }
 
-/// A USB adapter.
+/// USB adapter.
 #[derive(Clone, PartialEq, Eq, Debug)]
 struct Adapter {
     maker: u16,
@@ -87,7 +85,7 @@ struct Adapter {
 }
 
 impl Adapter {
-    /// Of a port, if it is on USB.
+    /// `None` unless on USB.
     fn of(port: &SerialPortInfo) -> Option<Self> {
         let SerialPortType::UsbPort(usb) = &port.port_type else { return None };
         let serial = usb.serial_number.clone().filter(|number| !number.is_empty());
@@ -96,12 +94,11 @@ impl Adapter {
 }
 
 impl Place {
-    /// A port as the user named it.
     pub(crate) fn new(name: &str) -> Self {
         Self { name: name.into(), adapter: None, known: false }
     }
 
-    /// Opens the port, and remembers whose it is.
+    /// Opens the port and remembers its adapter.
     pub(crate) fn open(&mut self) -> Result<SerialTransport, PortError> {
         let present = find::present();
         let name = self.find(&present).unwrap_or(&self.name).to_owned();
@@ -116,17 +113,17 @@ impl Place {
         Ok(opened)
     }
 
-    /// The port that the board has now, as far as its adapter tells.
+    /// Present port of the board, by its adapter.
     fn find<'a>(&self, present: &'a [SerialPortInfo]) -> Option<&'a str> {
         let wanted = self.adapter.as_ref()?;
         let mut found = present.iter().filter(|port| Adapter::of(port).as_ref() == Some(wanted));
         let (first, another) = (found.next()?, found.next());
         let has_name = present.iter().any(|port| port.port_name == self.name);
         match (&wanted.serial, another) {
-            // An adapter with several ports has one number for all of them: then the name decides.
+            // A multi-port adapter has one number for all ports: the name decides.
             (Some(_), Some(_)) if has_name => None,
             (Some(_), _) => Some(&first.port_name),
-            // Without a number the name decides as long as it is there, and two of a make are a guess.
+            // Without a number the name decides while present; two of a make are ambiguous.
             (None, Some(_)) => None,
             (None, None) if has_name => None,
             (None, None) => Some(&first.port_name),
@@ -134,7 +131,7 @@ impl Place {
     }
 }
 
-/// A file that is no character device is not worth an ioctl's riddle ("Not a typewriter").
+/// Rejects files that are not character devices, whose ioctl error ("Not a typewriter") explains nothing.
 #[cfg(unix)]
 fn refuse_what_is_no_port(path: &str) -> Result<(), PortError> {
     use std::os::unix::fs::FileTypeExt;
@@ -150,10 +147,8 @@ fn refuse_what_is_no_port(_: &str) -> Result<(), PortError> {
     Ok(())
 }
 
-/// Parts a port from the rate that the link is to have: `/dev/ttyACM0@921600`. A name that exists as it is has none.
-///
-/// # Errors
-/// [`PortError::Rate`] where the link does not have that rate.
+/// Separates port and link rate: `/dev/ttyACM0@921600`. An existing file name has no rate.
+/// Errors: [`PortError::Rate`] for an unsupported rate.
 pub(crate) fn with_rate(given: &str) -> Result<(&str, Option<LinkRate>), PortError> {
     let is_number = |rate: &str| !rate.is_empty() && rate.bytes().all(|byte| byte.is_ascii_digit());
     let parts = given.rsplit_once('@').filter(|(_, rate)| is_number(rate));
@@ -165,7 +160,7 @@ pub(crate) fn with_rate(given: &str) -> Result<(&str, Option<LinkRate>), PortErr
     Ok((port, Some(rate)))
 }
 
-/// The ports behind which a board may be: those on USB.
+/// USB serial ports, which may have a board.
 pub fn ports() -> Vec<String> {
     let present = find::present();
     let on_usb = present.into_iter().filter(|port| matches!(port.port_type, SerialPortType::UsbPort(_)));
@@ -182,7 +177,7 @@ fn explain(path: &str, error: serialport::Error) -> PortError {
     match error.kind() {
         ErrorKind::Io(io::ErrorKind::NotFound) => absent(path),
         ErrorKind::Io(io::ErrorKind::PermissionDenied) => PortError::Denied { port: path.into() },
-        // The crate gives this kind both when another program holds the port and when there is none.
+        // The crate returns this kind for a busy and for a missing port.
         ErrorKind::NoDevice if std::path::Path::new(path).exists() => PortError::Busy { port: path.into() },
         ErrorKind::NoDevice => absent(path),
         _ => PortError::Open { port: path.into(), reason: error.to_string() },
@@ -194,7 +189,7 @@ impl Transport for SerialTransport {
         let port = self.open_port()?;
         port.set_timeout(wait.max(Duration::from_millis(1)))?;
         match port.read(buffer) {
-            // Readable, yet without bytes: the other side has hung up.
+            // Readable without bytes: the other side has closed.
             Ok(0) => Err(io::ErrorKind::UnexpectedEof.into()),
             Ok(count) => Ok(count),
             Err(error) if matches!(error.kind(), io::ErrorKind::TimedOut | io::ErrorKind::Interrupted) => {
@@ -252,7 +247,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_port_may_name_the_links_rate() {
+    fn a_port_can_include_the_link_rate() {
         assert_eq!(with_rate("/dev/ttyACM0").unwrap(), ("/dev/ttyACM0", None));
         assert_eq!(with_rate("/dev/ttyACM0@921600").unwrap(), ("/dev/ttyACM0", Some(LinkRate::Baud921600)));
         for other in ["/dev/usb@left", "/dev/usb@"] {
@@ -270,7 +265,7 @@ mod tests {
     }
 
     #[test]
-    fn a_board_that_comes_back_under_another_name_is_found_by_its_serial_number() {
+    fn finds_a_renamed_board_by_its_serial_number() {
         let port = |name: &str, serial: Option<&str>| SerialPortInfo {
             port_name: name.into(),
             port_type: serial.map_or(SerialPortType::Unknown, |serial| {
@@ -298,7 +293,7 @@ mod tests {
     }
 
     #[test]
-    fn an_adapter_without_a_number_is_found_again_where_no_other_can_be_meant() {
+    fn finds_an_unnumbered_adapter_if_unambiguous() {
         let port = |name: &str, serial: Option<&str>| SerialPortInfo {
             port_name: name.into(),
             port_type: SerialPortType::UsbPort(serialport::UsbPortInfo {
@@ -322,9 +317,9 @@ mod tests {
 
     #[cfg(unix)]
     #[test]
-    fn a_link_that_leads_to_another_port_is_followed_and_a_name_that_does_not_come_back_is_told() {
+    fn follows_a_changed_link_and_reports_a_missing_port() {
         let folder = tempfile::tempdir().unwrap();
-        // Both are links: the system may give a pseudo-terminal's name to another one at once.
+        // Links, because the system may reuse a pseudo-terminal's name immediately.
         let [link, name] = ["board", "port"].map(|name| folder.path().join(name));
         let (first, old) = serialport::TTYPort::pair().unwrap();
         let (_second, new) = serialport::TTYPort::pair().unwrap();
@@ -351,14 +346,14 @@ mod tests {
 
     #[cfg(unix)]
     #[test]
-    fn a_plain_file_is_no_port() {
+    fn rejects_a_plain_file_as_port() {
         let error = SerialTransport::open(concat!(env!("CARGO_MANIFEST_DIR"), "/Cargo.toml")).err().unwrap();
         assert!(matches!(error, PortError::NoPort { .. }), "{error:?}");
     }
 
     #[cfg(unix)]
     #[test]
-    fn a_port_that_is_held_is_busy_and_one_that_hangs_up_is_gone() {
+    fn a_held_port_is_busy_and_a_closed_one_is_gone() {
         let (master, slave) = serialport::TTYPort::pair().unwrap();
         let path = slave.name().unwrap();
         let mut first = SerialTransport::open(&path).unwrap();

@@ -1,9 +1,9 @@
-//! Long work: homing, moves, exposure programs and calibrations, from the request to the event that ends it.
+//! Long work: homing, moves, exposure programs and calibrations, from the request to the final event.
 //!
-//! A [`Work`] is held by whoever wants it done: as long as it lives, the board's question whether anybody is still there
-//! is answered; dropped before its end it stops the rig, and a program that dies leaves the board to its own deadline
-//! ([`crate::Timing::keep_alive`]). Every wait has a deadline computed from the work ([`crate::timing`]); at the deadline,
-//! and when the user interrupts, the board is told to stop before the error is returned.
+//! While a [`Work`] is held, keep-alives are answered. Dropping it before its end stops the rig; if the
+//! program dies, the board stops at its deadline ([`crate::Timing::keep_alive`]). Each wait has a deadline
+//! ([`crate::timing`]). At the deadline and on interruption the board is stopped before the error is
+//! returned.
 
 use std::{
     sync::{
@@ -27,37 +27,36 @@ use crate::{
     timing::{Pace, calibration_time, homing_time, move_time, program_time},
 };
 
-/// Longest single wait for an event, so that an interruption by the user is seen soon.
+/// Polling interval for interruptions.
 const SLICE: Duration = Duration::from_millis(50);
 
-/// Long work that is to begin.
+/// Long work to start.
 struct Plan {
     request: Request,
-    /// How long a healthy board takes for it at most.
+    /// Longest time of a healthy board.
     work: Duration,
     during: String,
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Moved {
-    /// Where the axis was sent.
     pub asked: Nanometres,
-    /// Where its encoder or gauge says it is.
+    /// By encoder or gauge.
     pub measured: Nanometres,
 }
 
-/// Work that the board has taken on.
+/// Accepted long work.
 pub struct Work {
     client: Client,
     id: u32,
     request: Request,
     during: String,
     messages: Receiver<Message>,
-    /// What the owner of the port holds weakly.
+    /// Held weakly by the port's thread.
     _held: Arc<()>,
     allowed: Duration,
     left: Duration,
-    /// A program that stands still takes no time.
+    /// A paused program has no timeout.
     paused: bool,
     alarm: Option<AlarmRecord>,
     over: bool,
@@ -66,27 +65,25 @@ pub struct Work {
 
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub enum Step {
-    /// Something on the way, such as an exposure that was taken.
+    /// Intermediate event, e.g. an exposure.
     Event(EventKind),
     Done(EventKind),
 }
 
 impl Work {
-    /// Number of the request, by which events name it.
+    /// Request id used by events.
     pub fn id(&self) -> u32 {
         self.id
     }
 
-    /// When the last event was received.
+    /// Arrival time of the last event.
     pub fn received(&self) -> Instant {
         self.received
     }
 
-    /// The next event, waiting at most `wait`; `None` where none came. Time between two calls does not count as
-    /// the board's.
-    ///
-    /// # Errors
-    /// [`ClientError`]; the work is over then.
+    /// The next event, waiting at most `wait`; `None` at the timeout. Time between calls does not count
+    /// against the deadline.
+    /// Errors: [`ClientError`]; the work has ended.
     pub fn step_within(&mut self, wait: Duration) -> Result<Option<Step>, ClientError> {
         let until = Instant::now() + wait;
         loop {
@@ -115,10 +112,8 @@ impl Work {
         }
     }
 
-    /// The next event, however long it takes; the work's own deadline holds.
-    ///
-    /// # Errors
-    /// [`ClientError`]; the work is over then.
+    /// The next event; only the work's deadline applies.
+    /// Errors: [`ClientError`]; the work has ended.
     pub fn step(&mut self) -> Result<Step, ClientError> {
         loop {
             if let Some(step) = self.step_within(Duration::from_secs(3600))? {
@@ -135,7 +130,6 @@ impl Work {
         }
     }
 
-    /// Waits for the end of a move.
     pub fn moved(self) -> Result<Moved, ClientError> {
         let during = self.during.clone();
         match self.wait()? {
@@ -144,7 +138,7 @@ impl Work {
         }
     }
 
-    /// Waits for the end of a homing. Gives how far the encoder's old zero was from the new one.
+    /// Waits for the end of a homing. Returns the change of the encoder's zero.
     pub fn homed(self) -> Result<Nanometres, ClientError> {
         let during = self.during.clone();
         match self.wait()? {
@@ -178,7 +172,7 @@ impl Work {
             return Err(self.stop_with(ClientError::Nonsense { during: during(), answer }));
         }
         match kind {
-            // Whoever wished it may have told the board, too, and that word may come first.
+            // The stop may have been sent by the caller of the interruption; its event may come first.
             EventKind::Failed { reason: Failure::Stopped, .. } if self.client.interrupted() => {
                 self.over = true;
                 Err(ClientError::Interrupted { during: during() })
@@ -208,20 +202,20 @@ impl Work {
         }
     }
 
-    /// What the alarm is that a failure names: from the event that came before, else from the board's list.
+    /// The alarm of a failure: from an earlier event, else from the board's list.
     fn alarm_of(&self, reason: Failure) -> Option<AlarmRecord> {
         let Failure::Alarm { number } = reason else { return self.alarm };
         self.alarm.filter(|record| record.number == number).or_else(|| self.client.alarm(number).ok())
     }
 
-    /// It has no end to wait for: the deadline is that of its next event.
+    /// Endless work: the deadline is that of its next event.
     fn is_continuous(&self) -> bool {
         matches!(self.request, Request::RunContinuously { .. })
     }
 
     fn stop_with(&mut self, error: ClientError) -> ClientError {
         self.over = true;
-        // What is said of a rig that was stopped is true when it stands: until then it brakes.
+        // The rig's state is valid only at standstill, so wait until it has braked.
         match self.client.stop().and_then(|()| self.client.wait_until_it_stands()) {
             Ok(()) => error,
             Err(failed) => failed,
@@ -232,7 +226,7 @@ impl Work {
 impl Drop for Work {
     fn drop(&mut self) {
         if !self.over {
-            // Whoever gave the work up is on the way out with an error of their own; the board has its deadline.
+            // The caller has its own error; the board has its deadline.
             let _ = self.client.stop();
         }
     }
@@ -298,14 +292,14 @@ impl Client {
         }
     }
 
-    /// The keep-alive timeout that goes with work, within what the board allows.
+    /// Keep-alive timeout, limited to the board's range.
     pub(crate) fn keep_alive(&self) -> Micros {
         let limits = &self.hello().limits;
         let asked = Micros(u32::try_from(self.timing().keep_alive.as_micros()).unwrap_or(u32::MAX));
         asked.max(limits.silence_min).min(limits.silence_max)
     }
 
-    /// How fast an axis moves, by the board's settings, which are read when they are needed first.
+    /// Speed of an axis by the board's settings, read on first use.
     fn pace(&self, axis: Axis) -> Result<Pace, ClientError> {
         let known = self.paces().iter().find(|(of, _)| *of == axis).map(|(_, pace)| *pace);
         if let Some(pace) = known {
@@ -316,7 +310,7 @@ impl Client {
         Ok(pace)
     }
 
-    /// Begins to home axes, all at the same time.
+    /// Starts homing axes simultaneously.
     pub fn start_homing(&self, axes: &[Axis]) -> Result<Vec<Work>, ClientError> {
         let plan = |axis: &Axis| {
             Ok(Plan {
@@ -328,17 +322,16 @@ impl Client {
         self.start_together(axes.iter().map(plan).collect::<Result<_, ClientError>>()?)
     }
 
-    /// Begins to home an axis.
     pub fn start_home(&self, axis: Axis) -> Result<Work, ClientError> {
         only(self.start_homing(&[axis])?, "homing")
     }
 
-    /// Homes an axis. Gives how far the encoder's old zero was from the new one.
+    /// Homes an axis. Returns the change of the encoder's zero.
     pub fn home(&self, axis: Axis) -> Result<Nanometres, ClientError> {
         self.start_home(axis)?.homed()
     }
 
-    /// Begins to move axes to absolute positions, all at the same time.
+    /// Starts moving axes to absolute positions simultaneously.
     pub fn start_moves(&self, targets: &[(Axis, Nanometres)]) -> Result<Vec<Work>, ClientError> {
         let status = self.status()?;
         let plan = |&(axis, target): &(Axis, Nanometres)| {
@@ -351,17 +344,15 @@ impl Client {
         self.start_together(targets.iter().map(plan).collect::<Result<_, ClientError>>()?)
     }
 
-    /// Begins to move an axis to an absolute position.
     pub fn start_move(&self, axis: Axis, target: Nanometres) -> Result<Work, ClientError> {
         only(self.start_moves(&[(axis, target)])?, "moving")
     }
 
-    /// Moves an axis to an absolute position.
     pub fn move_to(&self, axis: Axis, target: Nanometres) -> Result<Moved, ClientError> {
         self.start_move(axis, target)?.moved()
     }
 
-    /// Lets the board measure its own mechanics.
+    /// Runs a calibration routine.
     pub fn calibrate(&self, routine: Routine) -> Result<Calibration, ClientError> {
         let during = format!("measuring the {}", routine_name(routine));
         let axis = match routine {
@@ -377,11 +368,8 @@ impl Client {
         }
     }
 
-    /// Loads shots into the board's program and arms it: the board checks all of them. It stays armed for any number of
-    /// runs.
-    ///
-    /// # Errors
-    /// [`ClientError`]; [`ClientError::TooManyShots`] before anything is loaded.
+    /// Loads and arms a program, which the board checks. It stays armed.
+    /// Errors: [`ClientError`]; [`ClientError::TooManyShots`] before anything is loaded.
     pub fn arm(&self, shots: &[Shot]) -> Result<(), ClientError> {
         let max = self.hello().limits.shots_max;
         let Some(count) = u8::try_from(shots.len()).ok().filter(|count| *count <= max) else {
@@ -399,14 +387,14 @@ impl Client {
         self.expect_accepted(&Request::ArmProgram { shots: count }, "arming the exposure program")
     }
 
-    /// Runs the armed program, whose shots tell how long it may take.
+    /// Runs the armed program; `shots` set its deadline.
     pub fn start_program(&self, shots: &[Shot]) -> Result<Work, ClientError> {
         let work = self.program_time(shots)?;
         let during = "running the exposure program".to_string();
         self.start_work(&Request::RunProgram { silence: self.keep_alive() }, work, during)
     }
 
-    /// Longest time that a healthy board takes for a run of the armed program.
+    /// Longest time of the armed program.
     pub(crate) fn program_time(&self, shots: &[Shot]) -> Result<Duration, ClientError> {
         let status = self.status()?;
         if status.program.state == ProgramState::Idle {
@@ -421,12 +409,9 @@ impl Client {
         Ok(program_time(shots, &status, &paces))
     }
 
-    /// Arms and runs an exposure program. `on_event` is told of each exposure
-    /// ([`EventKind::ShotDone`]) and of each that the host has to trigger ([`EventKind::ShotReady`]) as soon as the
-    /// board tells of it; an error from it stops the board and is returned. Gives the number of exposures.
-    ///
-    /// # Errors
-    /// [`ClientError`], and what `on_event` returns.
+    /// Arms and runs a program. `on_event` receives [`EventKind::ShotDone`] and [`EventKind::ShotReady`]
+    /// immediately; its error stops the board and is returned. Returns the number of exposures.
+    /// Errors: [`ClientError`], and those of `on_event`.
     pub fn run_program<E: From<ClientError>>(
         &self,
         shots: &[Shot],
@@ -444,12 +429,11 @@ impl Client {
     }
 }
 
-/// The one that was started.
 fn only(started: Vec<Work>, during: &str) -> Result<Work, ClientError> {
     started.into_iter().next().ok_or_else(|| nothing(during))
 }
 
-/// Whether an event that bears the request's id can be about it: the same axis and the same target.
+/// Whether an event with the request's id matches its axis and target.
 fn belongs(kind: &EventKind, request: &Request) -> bool {
     match (kind, request) {
         (EventKind::Homed { axis, .. }, Request::Home { axis: asked, .. }) => axis == asked,

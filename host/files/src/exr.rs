@@ -1,10 +1,8 @@
-//! OpenEXR: maps as channels of one picture, in full precision, with texts in the header, as compositors and NumPy's
-//! neighbours read them.
+//! OpenEXR: maps as channels of one picture, in full precision, with texts in the header.
 //!
-//! One part, scan lines from the top, 32-bit float, not compressed: measured depths have noise in their low bits, which no
-//! lossless method makes smaller by much. Layout: "OpenEXR File Layout", <https://openexr.com/en/latest/OpenEXRFileLayout.html>.
-//! Written by hand because the crate `exr` takes as long to compile as the rest of this one; tests read it back with that
-//! crate.
+//! One part, scan lines from the top, uncompressed 32-bit float (noise in the low bits of measured depths
+//! hardly compresses). Layout: "OpenEXR File Layout", <https://openexr.com/en/latest/OpenEXRFileLayout.html>.
+//! The crate `exr` is used only to read it back in tests, because of its compile time.
 
 use std::io::{self, Write};
 
@@ -15,26 +13,22 @@ use crate::EncodeError;
 const MAGIC: [u8; 4] = [0x76, 0x2f, 0x31, 0x01];
 /// Version 2: one part, scan lines, short names.
 const VERSION: i32 = 2;
-/// Longest name of a channel or an attribute, bytes.
+/// Longest channel or attribute name.
 const NAME_MAX: usize = 31;
-/// Code of 32-bit float.
+/// Pixel type code of 32-bit float.
 const FLOAT: i32 = 2;
 
-/// A picture whose channels are maps of one size, NaN for no value, as the bytes of a file. `texts` are attributes of the
-/// header: name (with the namespace of whoever knows its meaning, `farnear:units`) and value.
-///
-/// # Errors
-/// Maps of different sizes or without pixels; names that are empty, longer than 31 bytes or given twice.
+/// Encodes maps of one size as channels; NaN means no value. `texts` are header attributes: name (with
+/// namespace, e.g. `farnear:units`) and value.
+/// Errors: maps of different or zero size; empty, duplicate or longer names than 31 bytes.
 pub fn write(channels: &[(&str, ArrayView2<f32>)], texts: &[(&str, &str)]) -> Result<Vec<u8>, EncodeError> {
     let mut bytes = Vec::new();
     write_to(channels, texts, &mut bytes).map_err(EncodeError::of("an EXR"))?;
     Ok(bytes)
 }
 
-/// The same, row by row into a file.
-///
-/// # Errors
-/// As [`write()`], and what the system says.
+/// [`write()`] into a file, row by row.
+/// Errors: as [`write()`], and I/O errors.
 pub fn write_to(
     channels: &[(&str, ArrayView2<f32>)],
     texts: &[(&str, &str)],
@@ -55,7 +49,7 @@ pub fn write_to(
     {
         return Err(refused(format!("the name \"{name}\" does not have 1 to {NAME_MAX} bytes")));
     }
-    // Readers expect the channels in the order of their names.
+    // Readers expect channels ordered by name.
     let mut channels = channels.to_vec();
     channels.sort_by_key(|(name, _)| *name);
     if let Some(pair) = channels.windows(2).find(|pair| pair[0].0 == pair[1].0) {
@@ -82,7 +76,7 @@ pub fn write_to(
     Ok(())
 }
 
-/// Everything before the table of the rows' places.
+/// Everything before the table of row offsets.
 fn header(channels: &[(&str, ArrayView2<f32>)], texts: &[(&str, &str)], columns: i32, rows: i32) -> Vec<u8> {
     let integers = |values: &[i32]| values.iter().flat_map(|value| value.to_le_bytes()).collect::<Vec<u8>>();
     let window = integers(&[0, 0, columns - 1, rows - 1]);
@@ -92,9 +86,9 @@ fn header(channels: &[(&str, ArrayView2<f32>)], texts: &[(&str, &str)], columns:
         list.extend(name.bytes());
         list.push(0);
         list.extend(integers(&[FLOAT]));
-        // Linear light is for half floats; three bytes are reserved.
+        // Flag for linear half floats (0) and three reserved bytes.
         list.extend([0; 4]);
-        // Every column and row is there.
+        // No subsampling.
         list.extend(integers(&[1, 1]));
     }
     list.push(0);
@@ -129,11 +123,11 @@ mod tests {
     use ndarray::{Array2, array};
 
     #[test]
-    fn another_reader_finds_what_was_written() {
+    fn another_reader_returns_the_written_values() {
         use exr::prelude::*;
         let depth = array![[933.0f32, f32::NAN, -0.0], [887.5, 1e-30, f32::INFINITY]];
         let confidence = array![[1.0f32, 0.0, 0.25], [0.5, 0.125, 0.75]];
-        // Not contiguous, and not in the order of the names.
+        // Not contiguous, and not in order of names.
         let turned = confidence.t().as_standard_layout().into_owned();
         let bytes = write(
             &[("confidence", turned.t()), ("Z", depth.view())],
@@ -168,7 +162,7 @@ mod tests {
     }
 
     #[test]
-    fn what_no_file_can_hold_is_refused() {
+    fn rejects_values_that_the_format_cannot_hold() {
         let (map, other) = (Array2::<f32>::zeros((2, 3)), Array2::<f32>::zeros((3, 2)));
         let empty = Array2::<f32>::zeros((0, 3));
         for (channels, texts, phrase) in [

@@ -1,16 +1,16 @@
-//! Reading and writing images.
+//! Reads and writes images.
 //!
-//! | format | read |
+//! | format | supported |
 //! |---|---|
 //! | PNG, BMP, PGM/PPM | all that `image` reads |
-//! | JPEG | complete files only, through `zune-jpeg` in its strict mode: half an image would be half a guess |
-//! | TIFF, BigTIFF | 1 to 16-bit and 32-bit integers, 16 to 64-bit float, grey and RGB, planar or not, in strips or tiles |
+//! | JPEG | complete files only (`zune-jpeg`, strict mode) |
+//! | TIFF, BigTIFF | 1 to 16-bit and 32-bit integers, 16 to 64-bit float, grey and RGB, planar or not, strips or tiles |
 //!
-//! The first bytes decide the format, not the name. EXIF orientation is applied. Raw files of cameras, previews (reduced
-//! resolution) and formats that are not read are refused with what to do. A TIFF of several pages is a stack: one page of it
-//! is `file.tif#3`, counted from 1.
+//! The content, not the name, selects the format. EXIF orientation is applied. Raw camera files, previews and
+//! other formats are
+//! refused with a remedy. `file.tif#3` is page 3 (from 1) of a multi-page TIFF.
 //!
-//! Colour becomes grey by `(R + G + B) / 3`, as in Li 2014, unless [`Grey`] asks for another; alpha is ignored.
+//! Colour becomes `(R + G + B) / 3`, as in Li 2014, unless [`Grey`] differs; alpha is ignored.
 
 mod complete;
 mod decode;
@@ -32,27 +32,25 @@ pub(crate) use tiff_file::{Page, pages};
 pub(crate) use write::encode_to;
 pub use write::{encode_png, encode_tiff, png_to, png8_to};
 
-/// An image as floating-point grey values.
+/// Floating-point grey image.
 #[derive(Clone, PartialEq, Debug)]
 pub struct GreyImage {
-    /// Shape (height, width). Integer files are divided by their full scale, so values lie in 0..=1; float files
-    /// keep their values.
+    /// Shape (height, width). Integers are divided by their full scale (0..=1); floats are unchanged.
     pub pixels: Array2<f32>,
-    /// How the file stored its samples.
+    /// Sample format of the file.
     pub samples: Samples,
-    /// Whether the file was in colour.
     pub colour: bool,
-    /// Pixel value at which the camera saturates, where that is known to lie below the full scale (12 bits in 16).
+    /// Saturation value, if known to be below full scale (12 bits in 16).
     pub white_level: Option<f32>,
 }
 
 impl GreyImage {
-    /// Values relative to a white level (in units of the pixels), with as many bits as it has.
+    /// Rescales to a white level (in units of the pixels) and its bit depth.
     pub fn relative_to(mut self, white_level: f32) -> Self {
         let Samples::Integer(bits) = self.samples else { return self };
         let code = (f64::from(white_level) * (2_f64.powi(i32::from(bits)) - 1.0)).round() as u32;
         let shifted = code.trailing_zeros();
-        // Shifted up to 16 bits, or in the lower ones.
+        // Shifted up to 16 bits, or in the lower bits.
         let of_camera =
             if code == 0xffff << shifted & 0xffff { 16 - shifted } else { 32 - code.leading_zeros() };
         self.samples = Samples::Integer(bits.min(of_camera as u8).max(1));
@@ -62,7 +60,7 @@ impl GreyImage {
     }
 }
 
-/// The white level that several images of one camera share: the lowest that any of them has, where no image exceeds it.
+/// Common white level of images of one camera: the lowest of all, if no image exceeds it.
 pub fn shared_white_level<'a>(images: impl Iterator<Item = &'a GreyImage> + Clone) -> Option<f32> {
     let white = images.clone().filter_map(|image| image.white_level).reduce(f32::min)?;
     let exceeds = |image: &GreyImage| {
@@ -71,12 +69,10 @@ pub fn shared_white_level<'a>(images: impl Iterator<Item = &'a GreyImage> + Clon
     (!images.into_iter().any(exceeds)).then_some(white)
 }
 
-/// How a file stores a pixel.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Samples {
-    /// Unsigned integers of so many bits.
+    /// Unsigned integers of this many bits.
     Integer(u8),
-    /// Floating point.
     Float,
 }
 
@@ -89,7 +85,7 @@ impl std::fmt::Display for Samples {
     }
 }
 
-/// How colour becomes grey.
+/// Conversion of colour to grey.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Grey {
@@ -98,11 +94,9 @@ pub enum Grey {
     Mean,
     /// 0.299 R + 0.587 G + 0.114 B (ITU-R BT.601).
     Luma,
-    /// The red channel.
     Red,
-    /// The green channel: least noise and chromatic aberration with a Bayer sensor.
+    /// Least noise and chromatic aberration with a Bayer sensor.
     Green,
-    /// The blue channel.
     Blue,
 }
 
@@ -118,7 +112,7 @@ impl Grey {
         }
     }
 
-    /// The name as the command line writes it.
+    /// Command-line name.
     pub fn name(self) -> &'static str {
         match self {
             Self::Mean => "mean",
@@ -146,51 +140,27 @@ impl FromStr for Grey {
     }
 }
 
-/// What a file does not say of itself.
+/// Properties that a file does not state.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub struct ReadSettings {
-    /// How colour becomes grey.
     pub grey: Grey,
-    /// Code at which the camera saturates, such as 4095; without it the file's metadata or its values decide.
+    /// Saturation code, e.g. 4095; `None`: from metadata or values.
     pub white_level: Option<u32>,
 }
 
-/// An image could not be read or written.
 #[derive(Debug, thiserror::Error)]
 pub enum ImageError {
-    /// The file cannot be read.
     #[error("cannot read {}: {source}", path.display())]
-    Read {
-        /// The file.
-        path: PathBuf,
-        /// What the system says.
-        source: std::io::Error,
-    },
-    /// The file has no bytes.
+    Read { path: PathBuf, source: std::io::Error },
     #[error("{} is empty", path.display())]
-    Empty {
-        /// The file.
-        path: PathBuf,
-    },
-    /// The bytes are no image that can be read here.
+    Empty { path: PathBuf },
     #[error("{} is not an image that farnear reads (PNG, TIFF, JPEG, BMP, PGM): {reason}", path.display())]
-    Format {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong.
-        reason: String,
-    },
-    /// The file cannot be written.
+    Format { path: PathBuf, reason: String },
     #[error("cannot write {}: {reason}", path.display())]
-    Write {
-        /// The file.
-        path: PathBuf,
-        /// What the system or the encoder says.
-        reason: String,
-    },
+    Write { path: PathBuf, reason: String },
 }
 
-/// A file and the page of it that a path names: `stack.tif#3` is the third page of `stack.tif`, unless a file has that name.
+/// Splits `stack.tif#3` into file and page, unless a file has that name.
 pub fn file_and_page(path: &Path) -> (PathBuf, Option<usize>) {
     let named = || {
         let (file, page) = path.to_str()?.rsplit_once('#')?;
@@ -200,27 +170,22 @@ pub fn file_and_page(path: &Path) -> (PathBuf, Option<usize>) {
 }
 
 /// Reads an image file, or one page of it (`file.tif#3`).
-///
-/// # Errors
-/// [`ImageError`] where it cannot be read, is empty, broken or incomplete, has several pages of which none is named, or holds no
-/// grey or RGB image.
+/// Errors: [`ImageError`] if unreadable, broken, incomplete, neither grey nor RGB, or multi-page without a
+/// page number.
 pub fn read_grey(path: &Path) -> Result<GreyImage, ImageError> {
     read_grey_with(path, &ReadSettings::default())
 }
 
 /// [`read_grey`] with settings.
-///
-/// # Errors
-/// Those of [`read_grey`].
+/// Errors: as [`read_grey`].
 pub fn read_grey_with(path: &Path, settings: &ReadSettings) -> Result<GreyImage, ImageError> {
     let (decoded, path) = read_decoded(path)?;
     decoded.grey(settings).map_err(|reason| ImageError::Format { path, reason })
 }
 
-/// Reads an image file with 8 bits a sample: grey, or RGB of shape (height, width, 3). Of 16 bits the upper half stays.
-///
-/// # Errors
-/// Those of [`read_grey`]; float images, whose scale is not known.
+/// Reads with 8 bits per sample: grey, or RGB of shape (height, width, 3). 16-bit samples keep their upper
+/// half.
+/// Errors: as [`read_grey`]; float images, whose scale is unknown.
 pub(crate) fn read_8_bit(path: &Path) -> Result<Samples8, ImageError> {
     let (decoded, path) = read_decoded(path)?;
     decoded.in_8_bits().map_err(|reason| ImageError::Format { path, reason })
@@ -241,7 +206,7 @@ pub(crate) fn read_bytes(path: &Path) -> Result<Vec<u8>, ImageError> {
     Ok(bytes)
 }
 
-/// Decodes the bytes of an image file; the error says what is wrong with them.
+/// Decodes an image file; the error is a message.
 pub fn decode_grey(bytes: &[u8]) -> Result<GreyImage, String> {
     decode(bytes, None)?.grey(&ReadSettings::default())
 }

@@ -1,14 +1,14 @@
 //! # farnear-files
 //!
-//! What farnear reads and writes, without knowing what it means: pictures, maps of numbers, masks, meshes and video, and
-//! results that are there whole or not at all.
+//! File formats of farnear: pictures, maps, masks, meshes and video, and atomic output.
 //!
-//! - [`image_file`]: an image of any common kind, as grey values; [`map`]: depths in `.npy` and float TIFF; [`masks`]: silhouettes as
-//!   pictures; [`mesh`]: a surface as PLY; [`video`]: frames one by one.
-//! - [`stack`]: images at different focus in a folder or a TIFF of many pages; [`order`]: the order in which they were taken.
-//! - [`npy`], [`exr`]: the formats themselves, where no crate is worth its compile time.
-//! - [`view`]: a depth map as a picture for people; [`text`]: words on a picture.
-//! - [`staging`]: written aside, then renamed.
+//! - [`image_file`]: images as grey values; [`map`]: depths in `.npy` and float TIFF; [`masks`]: silhouettes
+//!   as pictures;
+//!   [`mesh`]: surfaces as PLY; [`video`]: frames.
+//! - [`stack`]: focus stacks in a folder or multi-page TIFF; [`order`]: order of capture.
+//! - [`npy`], [`exr`]: own implementations where a crate is not worth its compile time.
+//! - [`view`]: depth map as a colour picture; [`text`]: text on a picture.
+//! - [`staging`]: atomic files and folders.
 //!
 //! ```
 //! use farnear_files::{map, npy, staging};
@@ -16,7 +16,7 @@
 //! let folder = std::env::temp_dir().join(format!("farnear-files-{}", std::process::id()));
 //! let staged = staging::Staging::new_folder(&folder)?;
 //! staged.write("depth.npy", &npy::write(ndarray::array![[933.0f32, f32::NAN]].view()))?;
-//! assert!(!folder.exists()); // nothing half-written is ever seen
+//! assert!(!folder.exists()); // incomplete output is never visible
 //! staged.finish()?;
 //! assert_eq!(map::read(&folder.join("depth.npy"))?[[0, 0]], 933.0);
 //! # std::fs::remove_dir_all(&folder)?;
@@ -37,13 +37,10 @@ pub mod text;
 pub mod video;
 pub mod view;
 
-/// Something could not be put into the bytes of a file: what the encoder says.
 #[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
 #[error("cannot encode {what}: {reason}")]
 pub struct EncodeError {
-    /// What was to be encoded.
     pub what: &'static str,
-    /// The encoder's words.
     pub reason: String,
 }
 

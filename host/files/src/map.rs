@@ -17,53 +17,23 @@ use crate::{
     npy::{self, NpyError},
 };
 
-/// A map could not be read.
 #[derive(Debug, thiserror::Error)]
 pub enum MapError {
-    /// The file cannot be read.
     #[error("cannot read {}: {source}", path.display())]
-    Read {
-        /// The file.
-        path: PathBuf,
-        /// What the system says.
-        source: std::io::Error,
-    },
-    /// The file has no bytes.
+    Read { path: PathBuf, source: std::io::Error },
     #[error("{} is empty", path.display())]
-    Empty {
-        /// The file.
-        path: PathBuf,
-    },
-    /// An array of another kind.
+    Empty { path: PathBuf },
     #[error("{} is not a map, a 2-D array of f32 or f64: {reason}", path.display())]
-    Npy {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong.
-        reason: NpyError,
-    },
-    /// Another file format.
+    Npy { path: PathBuf, reason: NpyError },
     #[error("{} is neither .npy nor TIFF: {reason}", path.display())]
-    Format {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong.
-        reason: String,
-    },
-    /// Integers, whose unit nobody knows.
+    Format { path: PathBuf, reason: String },
+    /// Integers have no known unit.
     #[error("{} holds {samples} integers, not mm; give the .npy or the float .tiff", path.display())]
-    Integers {
-        /// The file.
-        path: PathBuf,
-        /// How it stores its pixels.
-        samples: image_file::Samples,
-    },
+    Integers { path: PathBuf, samples: image_file::Samples },
 }
 
-/// Reads a map of numbers: `.npy` with f32 or f64, or a TIFF.
-///
-/// # Errors
-/// [`MapError`].
+/// Reads `.npy` with f32 or f64, or a TIFF.
+/// Errors: [`MapError`].
 pub fn read(path: &Path) -> Result<Array2<f32>, MapError> {
     let bytes = std::fs::read(path).map_err(|source| MapError::Read { path: path.into(), source })?;
     if bytes.is_empty() {
@@ -80,25 +50,22 @@ pub fn read(path: &Path) -> Result<Array2<f32>, MapError> {
     Ok(image.pixels)
 }
 
-/// Reads a mask: what is not black counts.
-///
-/// # Errors
-/// [`ImageError`].
+/// Reads a mask: set where not black.
+/// Errors: [`ImageError`].
 pub fn read_mask(path: &Path) -> Result<Array2<bool>, ImageError> {
     Ok(image_file::read_grey(path)?.pixels.mapv(|value| value > 0.0))
 }
 
-/// How a map is written, by the ending of its file's name.
+/// Format by file ending.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Format {
-    /// `.npy`.
     Npy,
-    /// `.tiff` or `.tif`, float.
+    /// Float `.tiff` or `.tif`.
     Tiff,
 }
 
 impl Format {
-    /// `None` for a name with another ending.
+    /// `None` for another ending.
     pub fn of(path: &Path) -> Option<Self> {
         match path.extension()?.to_str()?.to_lowercase().as_str() {
             "npy" => Some(Self::Npy),
@@ -107,10 +74,7 @@ impl Format {
         }
     }
 
-    /// A map as the bytes of such a file.
-    ///
-    /// # Errors
-    /// An encoder that refuses.
+    /// Errors: of the encoder.
     pub fn encode(self, map: ArrayView2<f32>) -> Result<Vec<u8>, EncodeError> {
         match self {
             Self::Npy => Ok(npy::write(map)),
@@ -119,20 +83,16 @@ impl Format {
     }
 }
 
-/// A map as the bytes of a float TIFF.
-///
-/// # Errors
-/// An encoder that refuses.
+/// Encodes a float TIFF.
+/// Errors: of the encoder.
 pub fn tiff(map: ArrayView2<f32>) -> Result<Vec<u8>, EncodeError> {
     let mut bytes = Cursor::new(Vec::new());
     tiff_to(map, &mut bytes).map_err(EncodeError::of("a TIFF"))?;
     Ok(bytes.into_inner())
 }
 
-/// The same into a file, without its bytes in memory.
-///
-/// # Errors
-/// What the system or the encoder says.
+/// [`tiff`] into a file, without a copy in memory.
+/// Errors: of the system or the encoder.
 pub fn tiff_to(map: ArrayView2<f32>, to: &mut (impl Write + Seek)) -> io::Result<()> {
     let (height, width) = map.dim();
     let standard = map.as_standard_layout();
@@ -148,13 +108,13 @@ pub fn tiff_to(map: ArrayView2<f32>, to: &mut (impl Write + Seek)) -> io::Result
 /// How the codes of a 16-bit depth image stand for mm: `mm = offset_mm + scale_mm * code`, 0 = no value.
 #[derive(Clone, Copy, Debug, serde::Serialize, serde::Deserialize)]
 pub struct Scale {
-    /// Depth of code 0, which stands for "no value".
+    /// Depth of code 0, which means "no value".
     pub offset_mm: f64,
-    /// Depth between codes.
+    /// Depth step per code.
     pub scale_mm: f64,
 }
 
-/// The scale whose codes span a map's own range.
+/// Scale that spans the map's range.
 pub fn scale(map: ArrayView2<f32>) -> Scale {
     let finite = || map.iter().copied().filter(|value| value.is_finite());
     let low = finite().fold(f32::INFINITY, f32::min);
@@ -167,9 +127,8 @@ pub fn scale(map: ArrayView2<f32>) -> Scale {
     Scale { offset_mm: f64::from(low) - scale_mm, scale_mm }
 }
 
-/// A map as 16-bit codes.
 pub fn codes(map: ArrayView2<f32>, Scale { offset_mm, scale_mm }: Scale) -> Array2<u16> {
-    // Codes are positive, so that half a code more and no fraction is the nearest one.
+    // Positive codes: adding a half and truncating rounds to nearest.
     let code = |value: f32| ((f64::from(value) - offset_mm) / scale_mm + 0.5) as u16;
     map.mapv(|value| if value.is_finite() { code(value) } else { 0 })
 }
@@ -180,7 +139,7 @@ mod tests {
     use ndarray::array;
 
     #[test]
-    fn maps_come_back_from_npy_and_tiff() {
+    fn maps_round_trip_through_npy_and_tiff() {
         let map = array![[933.0f32, f32::NAN, 900.5], [887.0, 888.0, 889.0]];
         let folder = tempfile::tempdir().unwrap();
         for name in ["a.npy", "a.tiff", "b.TIF"] {
@@ -193,7 +152,7 @@ mod tests {
     }
 
     #[test]
-    fn codes_stand_for_the_depth_they_came_from() {
+    fn codes_round_trip_to_depths() {
         let map = array![[933.0f32, f32::NAN], [887.0, 900.0]];
         let scale = scale(map.view());
         let codes = codes(map.view(), scale);

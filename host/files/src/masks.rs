@@ -19,28 +19,18 @@ use crate::{
 /// Shape (height, width); true = set.
 pub type Mask = Array2<bool>;
 
-/// Masks could not be read.
 #[derive(Debug, thiserror::Error)]
 pub enum MaskError {
-    /// Neither a picture nor a folder.
     #[error("{}: no such picture or folder", path.display())]
-    Missing {
-        /// The place.
-        path: PathBuf,
-    },
-    /// A picture or folder that cannot be read.
+    Missing { path: PathBuf },
     #[error(transparent)]
     Picture(#[from] VideoError),
-    /// Colour where grey levels are needed.
     #[error("{}: colour {colour:?} at column {column}, row {row}; masks and truths are grey", path.display())]
     Coloured {
-        /// The picture.
         path: PathBuf,
-        /// Red, green and blue of the first such pixel.
+        /// RGB of the first coloured pixel.
         colour: [u8; 3],
-        /// Its place from the left.
         column: usize,
-        /// Its place from the top.
         row: usize,
     },
     /// Several dark levels, of which none is known to be the person.
@@ -54,29 +44,24 @@ pub enum MaskError {
         path.display(), found.1, found.0, expected.1, expected.0
     )]
     Size {
-        /// The picture.
         path: PathBuf,
-        /// Its height and width.
+        /// Height and width.
         found: (usize, usize),
-        /// Name of the first.
         first: String,
-        /// Height and width of the first.
+        /// Height and width.
         expected: (usize, usize),
     },
 }
 
-/// A mask and the name of the frame it belongs to.
+/// A mask with its frame name.
 pub struct Named {
-    /// The picture's name without its extension.
+    /// File name without extension.
     pub name: String,
-    /// The mask.
     pub mask: Mask,
 }
 
 /// The pictures of a folder in natural order, or the one picture.
-///
-/// # Errors
-/// A path that is neither, a folder without pictures.
+/// Errors: neither, or a folder without pictures.
 pub fn listed(path: &Path) -> Result<Vec<PathBuf>, MaskError> {
     if path.is_dir() {
         return Ok(pictures::list(path)?);
@@ -87,10 +72,8 @@ pub fn listed(path: &Path) -> Result<Vec<PathBuf>, MaskError> {
     Ok(vec![path.into()])
 }
 
-/// Grey levels of a picture; one in colour must have equal channels.
-///
-/// # Errors
-/// Pictures that cannot be read, and coloured ones.
+/// Grey levels of a picture; coloured ones must have equal channels.
+/// Errors: unreadable or coloured pictures.
 pub fn grey(path: &Path) -> Result<Array2<u8>, MaskError> {
     match pictures::read(path)? {
         Pixels::Grey(levels) => Ok(levels),
@@ -164,18 +147,14 @@ pub fn read_all(path: &Path) -> Result<Masks, MaskError> {
     Ok(Masks { named: all.into_iter().map(named).collect(), remark: levels.remark.clone() })
 }
 
-/// A mask as PNG: 255 = set.
-///
-/// # Errors
-/// An encoder that refuses.
+/// Mask as PNG: 255 = set.
+/// Errors: of the encoder.
 pub fn png(mask: &Mask) -> Result<Vec<u8>, EncodeError> {
     encoded(mask, |&set| if set { 255 } else { 0 })
 }
 
-/// A picture of one grey level per pixel as PNG.
-///
-/// # Errors
-/// An encoder that refuses.
+/// Grey PNG with `level` per pixel.
+/// Errors: of the encoder.
 pub fn encoded<T>(pixels: &Array2<T>, level: impl Fn(&T) -> u8) -> Result<Vec<u8>, EncodeError> {
     let (height, width) = pixels.dim();
     let levels = |x: u32, y: u32| Luma([level(&pixels[[y as usize, x as usize]])]);

@@ -1,4 +1,4 @@
-//! The surface as a mesh: binary PLY, as MeshLab, CloudCompare and Blender read it.
+//! Surface mesh as binary PLY for MeshLab, CloudCompare and Blender.
 //!
 //! The aperture stands in the front focal plane, so the chief ray of an object point at distance z from the lens goes
 //! through the front focus: a pixel of pitch p sees p (z - F) / F of the object, wherever the sensor stands. x to the
@@ -8,27 +8,25 @@ use std::io::{self, Write};
 
 use ndarray::ArrayView2;
 
-/// Neighbours that differ by more than this part of the map's range belong to different surfaces.
+/// Depth step between surfaces, share of the map's range.
 const STEP: f32 = 0.1;
 
-/// What of the optics decides where a pixel's ray goes.
+/// Optics that define a pixel's ray.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Projection {
-    /// Focal length of the lens.
     pub focal_length_mm: f64,
-    /// Pitch of the pixels.
     pub pixel_um: f64,
-    /// Column and row at which the optical axis meets the map; without it its middle.
+    /// Column and row of the optical axis; `None`: centre.
     pub axis_px: Option<[f64; 2]>,
 }
 
 impl Projection {
-    /// Column and row at which the optical axis meets a map of (height, width).
+    /// Column and row of the optical axis in a map of (height, width).
     pub fn axis_in(&self, (height, width): (usize, usize)) -> [f64; 2] {
         self.axis_px.unwrap_or([width, height].map(|n| 0.5 * (n as f64 - 1.0)))
     }
 
-    /// Where a pixel of a map of size `dim` sees the object `z` mm from the lens, beside the optical axis: to the right and up, mm.
+    /// Distance of the object seen by a pixel at depth `z` from the optical axis: right and up, mm.
     pub fn beside_axis_mm(&self, dim: (usize, usize), column: usize, row: usize, z: f64) -> [f64; 2] {
         let axis = self.axis_in(dim);
         let scale = self.pixel_um * 1e-3 * (z / self.focal_length_mm - 1.0);
@@ -117,7 +115,7 @@ pub fn write(
          property uchar red\nproperty uchar green\nproperty uchar blue\n\
          element face {faces}\nproperty list uchar uint vertex_indices\nend_header\n"
     )?;
-    // A row at a time, so that the file is written in large pieces.
+    // Whole rows, so that the file is written in large pieces.
     let mut bytes = Vec::with_capacity(2 * FACE_BYTES * width);
     for row in 0..height {
         bytes.clear();
@@ -133,7 +131,7 @@ pub fn write(
         }
         to.write_all(&bytes)?;
     }
-    // Vertices are numbered as they come, so that two rows of numbers are enough.
+    // Vertices are numbered in order, so two rows of numbers suffice.
     let mut next = 0;
     let mut numbers = [vec![NONE; width], vec![NONE; width]];
     for row in 0..height {
@@ -161,11 +159,10 @@ pub fn write(
     Ok(())
 }
 
-/// Bytes of a vertex and of a face.
+/// Bytes per vertex and face.
 const VERTEX_BYTES: usize = 15;
 const FACE_BYTES: usize = 13;
 
-/// A triangle of vertices of these numbers.
 fn face(corners: [u32; 3]) -> [u8; FACE_BYTES] {
     let mut face = [3_u8; FACE_BYTES];
     for (place, number) in face[1..].chunks_exact_mut(4).zip(corners) {
@@ -181,13 +178,13 @@ pub fn ply(depth: ArrayView2<f32>, grey: ArrayView2<f32>, lateral: Lateral, unit
     bytes
 }
 
-/// Which triangles there are between the row before `row` and this one, right of each column: 1 = the one with two upper corners
-/// (upper, lower, upper right), 2 = the one with two lower corners (upper right, lower, lower right), 3 = both.
+/// Triangles between the previous row and this one, right of each column: 1 = upper, lower, upper right; 2 =
+/// upper right, lower, lower right; 3 = both.
 fn mark_faces(depth_mm: ArrayView2<f32>, row: usize, step: f32, marks: &mut [u8]) {
     let (upper, lower) = (depth_mm.row(row - 1), depth_mm.row(row));
     marks.fill(0);
     let joined = |a: f32, b: f32, c: f32| {
-        // NaN propagates through the sum, but not through the extremes.
+        // NaN propagates through the sum, but not through min and max.
         let spread = a.max(b).max(c) - a.min(b).min(c);
         u8::from((a + b + c).is_finite() & (spread <= step))
     };

@@ -1,9 +1,9 @@
-//! `.npy`, NumPy's format for one array, as far as maps need it: two axes of f32 or f64.
+//! `.npy`, NumPy's array format, for maps: two axes of f32 or f64.
 //!
-//! A file is `\x93NUMPY`, the version (two bytes), the length of the header (two bytes in version 1, four in 2 and 3,
-//! little-endian), the header (a Python dictionary, padded with blanks and ended by a line feed) and the values (NumPy
-//! Enhancement Proposal 1). Both byte orders and both orders of the axes are read; little-endian f32, row by row, is
-//! written. Why this is no crate's work: `docs/decisions/0011-npy.md`.
+//! A file has `\x93NUMPY`, the version (two bytes), the header length (two bytes in version 1, four in 2 and
+//! 3, little-endian), the header (a Python dictionary padded with blanks, ending with a line feed) and the
+//! values (NumPy Enhancement Proposal 1). Reads both byte and axis orders; writes little-endian f32 by rows.
+//! Reasons for an own implementation: `docs/decisions/0011-npy.md`.
 
 mod header;
 
@@ -13,73 +13,48 @@ use ndarray::{Array2, ArrayView2};
 
 use header::Header;
 
-/// What every file begins with.
 pub const MAGIC: &[u8] = b"\x93NUMPY";
 
-/// All before the values fills whole blocks of this many bytes, so that the values can be mapped into memory.
+/// Alignment of the values, for memory mapping.
 const BLOCK: usize = 64;
-/// Bytes before the header in version 1: the magic, the version and the header's length.
+/// Bytes before the header in version 1: magic, version, header length.
 const PREFIX: usize = MAGIC.len() + 2 + 2;
 
-/// Why bytes are no array that can be read.
 #[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
 pub enum NpyError {
-    /// The first bytes are others.
     #[error("it does not begin with \\x93NUMPY")]
     Magic,
-    /// A version that nobody has written yet.
     #[error("it has version {major}.{minor}; 1.0, 2.0 and 3.0 are known")]
-    Version {
-        /// First byte.
-        major: u8,
-        /// Second byte.
-        minor: u8,
-    },
-    /// The file ends before its header does.
+    Version { major: u8, minor: u8 },
     #[error("it breaks off in the header")]
     Cut,
-    /// The header is not the dictionary that it should be.
+    /// Invalid dictionary.
     #[error("byte {at} of its header should be {expected}")]
     Header {
-        /// How far into the header.
+        /// Offset in the header.
         at: usize,
-        /// What should stand there.
         expected: &'static str,
     },
-    /// The header is silent about something.
     #[error("its header has no '{key}'")]
-    Missing {
-        /// What is missing.
-        key: &'static str,
-    },
-    /// Values of another kind.
+    Missing { key: &'static str },
     #[error("its values are '{descr}', and '<f4', '>f4', '<f8' and '>f8' are read")]
     Kind {
-        /// NumPy's name of the kind.
+        /// NumPy's type name.
         descr: String,
     },
-    /// Another number of axes.
     #[error("its shape is {shape:?}, and a map has two axes (height, width)")]
-    Axes {
-        /// Lengths of the axes.
-        shape: Vec<usize>,
-    },
-    /// More or fewer bytes than the shape says.
+    Axes { shape: Vec<usize> },
     #[error("its shape is {shape:?} of '{descr}', and {found} bytes follow the header")]
     Size {
-        /// Lengths of the axes.
         shape: [usize; 2],
-        /// NumPy's name of the kind of values.
+        /// NumPy's type name.
         descr: String,
-        /// Bytes there are.
         found: usize,
     },
 }
 
-/// Reads an array of (height, width); f64 is rounded to f32. Needs no more memory than the file is long.
-///
-/// # Errors
-/// [`NpyError`].
+/// Reads an array of (height, width); f64 is rounded to f32. Uses no more memory than the file's size.
+/// Errors: [`NpyError`].
 pub fn read(bytes: &[u8]) -> Result<Array2<f32>, NpyError> {
     let (header, values) = split(bytes)?;
     let Header { descr, fortran_order, shape } = Header::parse(header)?;
@@ -100,7 +75,7 @@ pub fn read(bytes: &[u8]) -> Result<Array2<f32>, NpyError> {
     Array2::from_shape_vec((height, width), numbers).map_err(|_| size())
 }
 
-/// Header and values.
+/// Splits header and values.
 fn split(bytes: &[u8]) -> Result<(&[u8], &[u8]), NpyError> {
     let rest = bytes.strip_prefix(MAGIC).ok_or(NpyError::Magic)?;
     let (&[major, minor], rest) = rest.split_first_chunk().ok_or(NpyError::Cut)?;
@@ -118,13 +93,13 @@ fn split(bytes: &[u8]) -> Result<(&[u8], &[u8]), NpyError> {
     rest.split_at_checked(length).ok_or(NpyError::Cut)
 }
 
-/// `None` where a number is cut off.
+/// `None` for a truncated number.
 fn numbers<const SIZE: usize>(values: &[u8], number: fn([u8; SIZE]) -> f32) -> Option<Vec<f32>> {
     let (whole, cut) = values.as_chunks();
     cut.is_empty().then(|| whole.iter().map(|bytes| number(*bytes)).collect())
 }
 
-/// A map of (height, width) as the bytes of a file: version 1.0, little-endian f32, row by row.
+/// Encodes a map of (height, width): version 1.0, little-endian f32 by rows.
 pub fn write(map: ArrayView2<f32>) -> Vec<u8> {
     let mut bytes = header(map.dim());
     bytes.reserve_exact(4 * map.len());
@@ -139,13 +114,11 @@ pub fn write(map: ArrayView2<f32>) -> Vec<u8> {
     bytes
 }
 
-/// The same, row by row into a file.
-///
-/// # Errors
-/// What the system says.
+/// [`write()`] into a file by rows.
+/// Errors: I/O errors.
 pub fn write_to(map: ArrayView2<f32>, to: &mut impl Write) -> io::Result<()> {
     to.write_all(&header(map.dim()))?;
-    // A slice of four bytes per value, which the compiler turns into a copy.
+    // Four bytes per value, which the compiler turns into a copy.
     let mut row_bytes = vec![[0; 4]; map.ncols()];
     for row in map.rows() {
         row_bytes.iter_mut().zip(row).for_each(|(bytes, value)| *bytes = value.to_le_bytes());
@@ -154,10 +127,10 @@ pub fn write_to(map: ArrayView2<f32>, to: &mut impl Write) -> io::Result<()> {
     Ok(())
 }
 
-/// All before the values.
+/// Everything before the values.
 fn header((height, width): (usize, usize)) -> Vec<u8> {
     let header = format!("{{'descr': '<f4', 'fortran_order': False, 'shape': ({height}, {width})}}");
-    // At least one blank, then the line feed. Two numbers never make the header longer than 65,535 bytes.
+    // At least one blank, then the line feed. Two numbers never exceed 65,535 bytes.
     let values_from = (PREFIX + header.len() + 1) / BLOCK * BLOCK + BLOCK;
     let header_length = (values_from - PREFIX) as u16;
     let mut bytes = Vec::with_capacity(values_from);
@@ -176,7 +149,7 @@ mod tests {
     use ndarray::array;
     use proptest::prelude::*;
 
-    /// A file of this version with this header, not padded.
+    /// An unpadded file of this version.
     fn file(version: u8, header: &str, values: &[u8]) -> Vec<u8> {
         let mut bytes = [MAGIC, &[version, 0]].concat();
         match version {
@@ -192,7 +165,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_written_is_known_to_the_byte() {
+    fn writes_the_expected_bytes() {
         let bytes = write(array![[933.0f32, f32::NAN, -0.0]].view());
         let head = b"\x93NUMPY\x01\x00\x76\x00{'descr': '<f4', 'fortran_order': False, 'shape': (1, 3)}";
         assert_eq!(bytes[..head.len()], head[..]);
@@ -201,7 +174,7 @@ mod tests {
     }
 
     #[test]
-    fn all_kinds_versions_and_orders_are_read() {
+    fn reads_all_types_versions_and_orders() {
         let expected = array![[933.5f32, -2.0]];
         let little4 = [933.5f32, -2.0].map(f32::to_le_bytes).concat();
         let big4 = [933.5f32, -2.0].map(f32::to_be_bytes).concat();
@@ -210,7 +183,7 @@ mod tests {
         for (descr, values) in [("<f4", &little4), (">f4", &big4), ("<f8", &little8), (">f8", &big8)] {
             assert_eq!(of_kind(descr, values).unwrap(), expected, "{descr}");
         }
-        // As NumPy 1 on Python 2, NumPy 2 and ndarray-npy write it, and in a dictionary's other orders.
+        // As written by NumPy 1 on Python 2, NumPy 2 and ndarray-npy, and in other key orders.
         for header in [
             "{'descr': '<f4', 'fortran_order': False, 'shape': (1L, 2L), }     \n",
             "{'descr': '<f4', 'fortran_order': False, 'shape': (1, 2), }\n",
@@ -227,7 +200,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_is_named() {
+    fn rejects_invalid_files_with_a_reason() {
         let eight = [0u8; 8];
         let of_shape = |shape: &str| {
             let header = format!("{{'descr': '<f4', 'fortran_order': False, 'shape': {shape}, }}\n");
@@ -270,9 +243,9 @@ mod tests {
             prop_assert_eq!(back.mapv(f32::to_bits), map.mapv(f32::to_bits));
         }
 
-        /// Whatever the bytes, reading ends with a map no larger than they are, or with an error.
+        /// Any bytes give an error or a map no larger than the input.
         #[test]
-        fn any_bytes_are_survived(
+        fn survives_any_bytes(
             version in 0..4u8,
             header in "\\{?('descr'|'shape'|'fortran_order'|[\\]\\[:,(){}'\"<>f480-9A-Za-zL ]){0,24}\\}?\\n?",
             values in proptest::collection::vec(any::<u8>(), 0..64),

@@ -1,8 +1,8 @@
-//! The order in which the images of a folder were taken, by the numbers in their names.
+//! Order of capture by the numbers in file names.
 //!
-//! Text counts by letters and runs of digits by value: `in9` before `in10`. A camera's counter starts again after 9999 (DCF):
-//! where the numbers lie in two dense groups at both ends of their range, the upper group comes first, unless the files'
-//! time stamps show the other order.
+//! Text compares by letters, digits by value: `in9` before `in10`. Camera counters restart after 9999 (DCF):
+//! if the numbers form two dense groups at the ends of the range, the upper one comes first, unless the time
+//! stamps contradict.
 
 use std::{
     cmp::Ordering,
@@ -10,7 +10,7 @@ use std::{
     time::SystemTime,
 };
 
-/// Sorts files by the numbers in their names, across the end of a camera's counter.
+/// Sorts files by number, across a counter restart.
 pub fn sort(paths: &mut [PathBuf]) {
     paths.sort_by(|a, b| natural(&stem(a), &stem(b)));
     if let Some(first) = roll_over(paths) {
@@ -18,7 +18,7 @@ pub fn sort(paths: &mut [PathBuf]) {
     }
 }
 
-/// Two neighbours of a sorted list between which the camera's counter started again.
+/// Neighbours of a sorted list between which the counter restarted.
 pub fn counter_started_again(sorted: &[PathBuf]) -> Option<[&PathBuf; 2]> {
     sorted.windows(2).find_map(|two| {
         let [before, after] = two else { return None };
@@ -27,29 +27,28 @@ pub fn counter_started_again(sorted: &[PathBuf]) -> Option<[&PathBuf; 2]> {
     })
 }
 
-/// Two files whose names differ in their endings only.
+/// Two files that differ only in their ending.
 pub fn same_stem(paths: &[PathBuf]) -> Option<[PathBuf; 2]> {
     let mut stems = std::collections::HashMap::new();
     paths.iter().find_map(|path| stems.insert(stem(path), path).map(|other| [other.clone(), path.clone()]))
 }
 
-/// A file's name without its ending.
 fn stem(path: &Path) -> String {
     path.file_stem().unwrap_or_default().to_string_lossy().into_owned()
 }
 
-/// The last number of a name, and the text around it with the number of its digits.
+/// Last number of a name, with the surrounding text and digit count.
 fn number(path: &Path) -> Option<(u64, (String, usize, String))> {
     let stem = stem(path);
     let end = stem.rfind(|c: char| c.is_ascii_digit())? + 1;
     let begin = stem[..end].rfind(|c: char| !c.is_ascii_digit()).map_or(0, |at| at + 1);
-    // `rfind` gives the first byte of a character that may have several.
+    // `rfind` returns the first byte of a possibly multi-byte character.
     let begin = (begin..end).find(|at| stem.is_char_boundary(*at))?;
     let digits = &stem[begin..end];
     Some((digits.parse().ok()?, (stem[..begin].into(), digits.len(), stem[end..].into())))
 }
 
-/// Where the order begins, if the counter started again within it.
+/// Start of the order after a counter restart, if any.
 fn roll_over(sorted: &[PathBuf]) -> Option<usize> {
     let numbers: Vec<_> = sorted.iter().map(|path| number(path)).collect::<Option<_>>()?;
     let (largest, text) = numbers.last()?;
@@ -59,14 +58,14 @@ fn roll_over(sorted: &[PathBuf]) -> Option<usize> {
     let gaps = || numbers.windows(2).enumerate().map(|(at, two)| (two[1].0 - two[0].0, at + 1));
     let (gap, first) = gaps().max()?;
     let second = gaps().filter(|(_, at)| *at != first).map(|(gap, _)| gap).max().unwrap_or(1);
-    // Counters end at 999, 9999 or further nines; the name may have more digits (DSC09999).
+    // Counters end at 999, 9999 etc.; the name may have more digits (DSC09999).
     let end = (3..=9).map(|digits| 10_u64.pow(digits)).find(|end| end > largest)?;
     let across = numbers[0].0 + end - largest;
     let two_groups = 2 * gap > end && 8 * second < gap && 8 * across < gap;
     (two_groups && !written_in_order(sorted)).then_some(first)
 }
 
-/// Whether the files were clearly written one after the other in this order, seconds apart.
+/// Whether time stamps rise in this order, seconds apart.
 fn written_in_order(paths: &[PathBuf]) -> bool {
     let times: Option<Vec<SystemTime>> =
         paths.iter().map(|path| path.metadata().ok()?.modified().ok()).collect();
@@ -74,11 +73,10 @@ fn written_in_order(paths: &[PathBuf]) -> bool {
     let rising = times.windows(2).all(|two| two[0] < two[1]);
     let last = times.len().saturating_sub(1);
     let span = times.get(last).zip(times.first()).and_then(|(last, first)| last.duration_since(*first).ok());
-    // Copying writes files in the order of their names within moments; taking them takes longer.
+    // Copying writes files by name within moments; capturing takes longer.
     rising && span.is_some_and(|span| span.as_secs_f64() >= last as f64)
 }
 
-/// Text by letters, runs of digits by value.
 fn natural(a: &str, b: &str) -> Ordering {
     let (mut a_rest, mut b_rest) = (a, b);
     while let (Some(x), Some(y)) = (a_rest.chars().next(), b_rest.chars().next()) {
@@ -95,7 +93,7 @@ fn natural(a: &str, b: &str) -> Ordering {
         }
         (a_rest, b_rest) = (&a_rest[a_step..], &b_rest[b_step..]);
     }
-    // Equal up to here: the shorter first, and `01` before `1` so that the order is total.
+    // Equal so far: shorter first, and `01` before `1`, so that the order is total.
     a_rest.len().cmp(&b_rest.len()).then_with(|| a.cmp(b))
 }
 
@@ -125,7 +123,7 @@ mod tests {
     }
 
     #[test]
-    fn a_counter_that_starts_again_continues_the_stack() {
+    fn continues_the_stack_after_a_counter_restart() {
         let names = ["IMG_0001.jpg", "IMG_0002.jpg", "IMG_9997.jpg", "IMG_9998.jpg", "IMG_9999.jpg"];
         let expected = ["IMG_9997.jpg", "IMG_9998.jpg", "IMG_9999.jpg", "IMG_0001.jpg", "IMG_0002.jpg"];
         assert_eq!(sorted(&names), expected);
@@ -133,12 +131,12 @@ mod tests {
         assert_eq!(counter_started_again(&paths), Some([&paths[2], &paths[3]]));
         assert_eq!(counter_started_again(&paths[..3]), None);
         assert_eq!(sorted(&["DSC00001.tif", "DSC09999.tif"]), ["DSC09999.tif", "DSC00001.tif"]);
-        // Some pictures were deleted around the end.
+        // Some pictures around the end were deleted.
         assert_eq!(sorted(&["p0004.png", "p0006.png", "p9990.png"]), ["p9990.png", "p0004.png", "p0006.png"]);
     }
 
     #[test]
-    fn numbers_that_are_no_counter_stay_in_order() {
+    fn other_numbers_stay_in_order() {
         for names in [
             &["z0001.tif", "z0500.tif", "z0999.tif"][..],
             &["1.png", "2.png", "3.png", "1000.png"],
@@ -174,7 +172,7 @@ mod tests {
     }
 
     #[test]
-    fn one_name_with_two_endings_is_found() {
+    fn finds_one_name_with_two_endings() {
         let paths = ["a.tif", "b.tif", "b.png"].map(PathBuf::from);
         assert_eq!(same_stem(&paths), Some([paths[1].clone(), paths[2].clone()]));
         assert_eq!(same_stem(&paths[..2]), None);

@@ -1,19 +1,18 @@
-//! Exact quantiles of large maps in two passes, without a copy and without sorting.
+//! Exact quantiles of large maps in two passes, without copy or sort.
 
 use ndarray::ArrayView2;
 
-/// Numbers of values by their upper half, in the order of the values.
+/// Histogram bins by the upper half of the ordered key.
 const BINS: usize = 1 << 16;
 
-/// The finite values of a map, counted.
+/// Histogram of the finite values.
 pub struct Quantiles<'a> {
     map: ArrayView2<'a, f32>,
-    /// How many values have each upper half.
     counts: Vec<u32>,
     finite: usize,
 }
 
-/// A number that is ordered as the value is.
+/// Integer key with the order of the values.
 fn key(value: f32) -> u32 {
     let bits = value.to_bits();
     if bits >> 31 == 0 { bits | 1 << 31 } else { !bits }
@@ -24,7 +23,6 @@ fn value(key: u32) -> f32 {
 }
 
 impl<'a> Quantiles<'a> {
-    /// Counts the values.
     pub fn new(map: ArrayView2<'a, f32>) -> Self {
         let mut counts = vec![0_u32; BINS];
         for value in map.iter().filter(|value| value.is_finite()) {
@@ -34,12 +32,12 @@ impl<'a> Quantiles<'a> {
         Self { map, counts, finite }
     }
 
-    /// How many values are finite.
+    /// Number of finite values.
     pub fn finite(&self) -> usize {
         self.finite
     }
 
-    /// The value that `rank` finite values are below, the smallest one being rank 0; `None` beyond the last.
+    /// The finite value of this rank (0: smallest).
     pub fn at(&self, rank: usize) -> Option<f32> {
         let (upper, before) = place(&self.counts, rank)?;
         let mut counts = vec![0_u32; BINS];
@@ -53,7 +51,7 @@ impl<'a> Quantiles<'a> {
     }
 }
 
-/// The bin that holds a rank, and how many values lie in those before.
+/// Bin of a rank, and the number of values before it.
 fn place(counts: &[u32], rank: usize) -> Option<(usize, usize)> {
     let mut before = 0;
     for (bin, count) in counts.iter().enumerate() {

@@ -1,4 +1,4 @@
-//! Images at different focus: the files of a folder, or the pages of a TIFF with their positions.
+//! Focus stacks: files of a folder, or pages of a TIFF with positions.
 //!
 //! Positions come from the ImageJ description (`spacing`, `unit`), OME-XML (`PositionZ` of each plane, else `PhysicalSizeZ`) or
 //! Micro-Manager's page tag (`ZPositionUm`). The side of a pixel comes from OME-XML (`PhysicalSizeX`) or the resolution of an ImageJ file.
@@ -16,12 +16,11 @@ use crate::{
     video::{VideoError, pictures},
 };
 
-/// The images of a stack, in their order.
 #[derive(Debug, Clone, Default)]
 pub struct Stack {
-    /// Each image; a page is `file.tif#3`.
+    /// Pages are `file.tif#3`.
     pub images: Vec<PathBuf>,
-    /// Where each is focused along the axis, um, from the file's metadata.
+    /// Focus positions from metadata.
     pub positions_um: Option<Vec<f64>>,
     /// Side of a pixel at the object, um, from the file's metadata.
     pub object_pixel_um: Option<f64>,
@@ -29,51 +28,30 @@ pub struct Stack {
     pub remarks: Vec<String>,
 }
 
-/// Files that make no stack.
 #[derive(Debug, thiserror::Error)]
 pub enum StackError {
-    /// An image or the stack's file cannot be read.
     #[error(transparent)]
     Image(#[from] ImageError),
-    /// The folder cannot be listed.
     #[error(transparent)]
     Folder(#[from] VideoError),
-    /// Neither.
     #[error("{}: no such folder or file", path.display())]
-    Missing {
-        /// The place.
-        path: PathBuf,
-    },
-    /// Files of several formats in one folder.
+    Missing { path: PathBuf },
     #[error("{} holds {found}: the images of a stack have one format; move the others away", path.display())]
     Mixed {
-        /// The folder.
         path: PathBuf,
-        /// How many of which.
+        /// Counts per format.
         found: String,
     },
-    /// Two images are one.
+    /// Two equal images.
     #[error("{} and {} hold the same image; move one of them away", first.display(), second.display())]
-    Twice {
-        /// One.
-        first: PathBuf,
-        /// The other.
-        second: PathBuf,
-    },
-    /// A file whose planes are not a focus series.
+    Twice { first: PathBuf, second: PathBuf },
+    /// Planes that are not a focus series.
     #[error("{}: {reason}", path.display())]
-    Planes {
-        /// The file.
-        path: PathBuf,
-        /// What it holds.
-        reason: String,
-    },
+    Planes { path: PathBuf, reason: String },
 }
 
-/// Lists a stack: a folder with images of one format, or a TIFF with several pages.
-///
-/// # Errors
-/// [`StackError`], except [`StackError::Twice`].
+/// Lists a folder with images of one format, or a multi-page TIFF.
+/// Errors: [`StackError`], except [`StackError::Twice`].
 pub fn list(path: &Path) -> Result<Stack, StackError> {
     if path.is_dir() { folder(path) } else { file(path) }
 }
@@ -128,10 +106,8 @@ fn file(path: &Path) -> Result<Stack, StackError> {
     })
 }
 
-/// Reads the images of a stack one after the other; `each` is called before each with its index and may stop the reading.
-///
-/// # Errors
-/// [`StackError::Image`], [`StackError::Twice`] for two images that are equal in every pixel; what `each` returns.
+/// Reads the images in order; `each` is called with each index first and may stop.
+/// Errors: [`StackError::Image`], [`StackError::Twice`] for two equal images; errors of `each`.
 pub fn read<E: From<StackError>>(
     images: &[PathBuf],
     settings: &ReadSettings,

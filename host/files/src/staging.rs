@@ -1,4 +1,4 @@
-//! Files that are there whole or not at all: written aside, then renamed.
+//! Atomic output: written to a temporary name, then renamed.
 
 use std::{
     ffi::{OsStr, OsString},
@@ -8,51 +8,39 @@ use std::{
     time::Duration,
 };
 
-/// A result could not be put in place.
 #[derive(Debug, thiserror::Error)]
 pub enum StagingError {
-    /// There is something at the place already.
     #[error("{} exists already and is not empty; name another folder or remove it", path.display())]
-    Exists {
-        /// The place.
-        path: PathBuf,
-    },
-    /// The system refuses.
+    Exists { path: PathBuf },
     #[error("cannot write {}: {source}", path.display())]
-    Io {
-        /// The place.
-        path: PathBuf,
-        /// What the system says.
-        source: io::Error,
-    },
+    Io { path: PathBuf, source: io::Error },
 }
 
 impl StagingError {
-    /// What the system says of a place.
+    /// For `map_err`.
     pub fn at(path: &Path) -> impl FnOnce(io::Error) -> Self + '_ {
         move |source| Self::Io { path: path.into(), source }
     }
 }
 
-/// In the name of everything that is not whole yet.
+/// Part of all temporary names.
 const PARTIAL: &str = ".partial-";
-/// A folder this young may belong to a program that is just about to lock it.
+/// A younger folder may be about to be locked by its program.
 const JUST_BEGUN: Duration = Duration::from_secs(10);
-/// Folders that killed programs left behind under one name, before the user is asked to look.
+/// Limit of leftover folders of one name, before the user must check.
 const LEFT_BEHIND_MAX: u32 = 100;
 
-/// What a file that is written piece by piece gathers before the system is asked.
+/// Write buffer.
 const BUFFER_BYTES: usize = 1 << 18;
 
-/// A folder that becomes visible under its name only when all its files are written. Dropped before, it leaves
-/// nothing behind.
+/// A folder that appears under its name once complete. Dropping it earlier removes everything.
 #[derive(Debug)]
 pub struct Staging {
     folder: PathBuf,
-    /// Locked as long as this process lives, so that others see that somebody works on the folder.
+    /// Lock that marks the folder as in use.
     _in_use: Option<File>,
     target: PathBuf,
-    /// Whether the folder that files go into was made for them.
+    /// Whether the target folder was created for these files.
     made_target: bool,
     /// Files of an earlier result, of which those that are not written again are removed.
     replaced: Vec<&'static str>,
@@ -61,10 +49,8 @@ pub struct Staging {
 }
 
 impl Staging {
-    /// Begins a new folder. Its parents are made where they are missing.
-    ///
-    /// # Errors
-    /// [`StagingError::Exists`] where something but an empty folder has the name already.
+    /// Begins a new folder; creates its parents.
+    /// Errors: [`StagingError::Exists`] unless the target is missing or an empty folder.
     pub fn new_folder(target: &Path) -> Result<Self, StagingError> {
         let target: PathBuf = target.components().collect(); // without a slash at its end
         if occupied(&target) {
@@ -79,8 +65,8 @@ impl Staging {
         Self::begin(parent.join(partial_name(&name)), target, false)
     }
 
-    /// Begins a set of files that go into a folder together, which is made where it is missing. Files of the
-    /// same names are replaced, others stay.
+    /// Begins a set of files for a folder, which is created if missing. Files of equal names are replaced,
+    /// others stay.
     pub fn into_folder(target: &Path) -> Result<Self, StagingError> {
         let made_target = !target.exists();
         fs::create_dir_all(target).map_err(StagingError::at(target))?;
@@ -96,7 +82,7 @@ impl Staging {
     }
 
     fn begin(folder: PathBuf, target: PathBuf, made_target: bool) -> Result<Self, StagingError> {
-        // A program that was killed may have left the name behind, and a container gives its number out again.
+        // A killed program may have left this name; containers reuse process ids.
         let mut free = folder.clone();
         for number in 1..LEFT_BEHIND_MAX {
             if !free.exists() {
@@ -111,26 +97,23 @@ impl Staging {
         Ok(Self { folder: free, _in_use: in_use, target, made_target, replaced, record })
     }
 
-    /// Where a file is to be written for the time being.
+    /// Temporary path of a file.
     pub fn path(&self, name: &str) -> PathBuf {
         self.folder.join(name)
     }
 
-    /// Makes a folder in it, with its parents; `name` may be a path.
+    /// Creates a subfolder with its parents; `name` may be a path.
     pub fn make_folder(&self, name: &str) -> Result<(), StagingError> {
         fs::create_dir_all(self.path(name)).map_err(StagingError::at(&self.target.join(name)))
     }
 
-    /// Writes a file.
     pub fn write(&self, name: &str, bytes: &[u8]) -> Result<(), StagingError> {
         let path = self.path(name);
         fs::write(&path, bytes).map_err(StagingError::at(&self.target.join(name)))
     }
 
-    /// Writes a file piece by piece.
-    ///
-    /// # Errors
-    /// [`StagingError::Io`] with what `fill` or the system says.
+    /// Writes a file through `fill`.
+    /// Errors: [`StagingError::Io`] of `fill` or the system.
     pub fn fill(
         &self,
         name: &str,
@@ -139,13 +122,13 @@ impl Staging {
         let written = File::create(self.path(name)).and_then(|file| {
             let mut file = BufWriter::with_capacity(BUFFER_BYTES, file);
             fill(&mut file)?;
-            // Dropped, it would keep what the system says of its last bytes to itself.
+            // Flushes explicitly, because drop hides errors.
             file.flush()
         });
         written.map_err(StagingError::at(&self.target.join(name)))
     }
 
-    /// Puts everything in place: a new folder with one rename, a set of files with one rename each.
+    /// Publishes everything: a new folder with one rename, files with one rename each.
     pub fn finish(self) -> Result<(), StagingError> {
         let into_folder = self.folder.parent() == Some(self.target.as_path());
         if !into_folder {
@@ -185,16 +168,16 @@ impl Staging {
 
 impl Drop for Staging {
     fn drop(&mut self) {
-        // After `finish` of a new folder there is nothing left to remove, which is as good.
+        // Nothing is left after `finish` of a new folder.
         let _ = fs::remove_dir_all(&self.folder);
         if self.made_target {
-            // Not where anything is in it.
+            // Fails if it is not empty, as intended.
             let _ = fs::remove_dir(&self.target);
         }
     }
 }
 
-/// Writes one file aside and renames it into place.
+/// Writes one file atomically.
 pub fn write_file(path: &Path, bytes: &[u8]) -> Result<(), StagingError> {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     let partial = path.with_file_name(partial_name(&name));
@@ -205,8 +188,8 @@ pub fn write_file(path: &Path, bytes: &[u8]) -> Result<(), StagingError> {
     })
 }
 
-/// Removes what killed programs left half-written in a folder. Whoever still writes holds a lock, which the system takes away
-/// from the dead; on systems without such locks on folders, and where something cannot be removed, everything stays.
+/// Removes leftovers of killed programs. Active writers hold a lock that ends with them; where folders cannot
+/// be locked or removed, everything stays.
 fn sweep(folder: &Path) {
     for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
         let name = entry.file_name();
@@ -216,12 +199,12 @@ fn sweep(folder: &Path) {
             Ok(path.is_dir() && age >= JUST_BEGUN && File::open(path)?.try_lock().is_ok())
         };
         if partial && left(&entry.path()).unwrap_or(false) {
-            let _ = fs::remove_dir_all(entry.path()); // it is in nobody's way
+            let _ = fs::remove_dir_all(entry.path()); // failure is harmless
         }
     }
 }
 
-/// Hidden, and another name for each process, so that two that write the same result do not mix.
+/// Hidden and unique per process.
 fn partial_name(name: &str) -> String {
     format!(".{name}{PARTIAL}{}", std::process::id())
 }
@@ -264,7 +247,7 @@ mod tests {
     }
 
     #[test]
-    fn what_a_killed_program_left_is_in_nobodys_way() {
+    fn leftovers_of_a_killed_program_do_not_block() {
         let root = tempfile::tempdir().unwrap();
         let target = root.path().join("pair");
         std::mem::forget(Staging::new_folder(&target).unwrap());
@@ -276,14 +259,14 @@ mod tests {
 
     #[cfg(unix)]
     #[test]
-    fn what_a_killed_program_left_is_swept_and_what_a_living_one_writes_is_not() {
+    fn removes_leftovers_of_a_killed_program_but_not_active_output() {
         let root = tempfile::tempdir().unwrap();
         let old = |path: &Path| {
             let folder = File::open(path).unwrap();
             folder.set_modified(std::time::SystemTime::now() - 2 * JUST_BEGUN).unwrap();
         };
         let living = Staging::new_folder(&root.path().join("living")).unwrap();
-        // Nobody holds its lock, as after a kill; another one has only just been made.
+        // Unlocked as after a kill; the other one is recent.
         let dead = root.path().join(".dead.partial-1");
         fs::create_dir(&dead).unwrap();
         fs::write(dead.join("half"), b"1").unwrap();
@@ -303,7 +286,7 @@ mod tests {
     }
 
     #[test]
-    fn an_empty_folder_is_filled() {
+    fn fills_an_empty_folder() {
         let root = tempfile::tempdir().unwrap();
         let staged = Staging::new_folder(root.path()).unwrap();
         staged.write("a", b"1").unwrap();
@@ -312,7 +295,7 @@ mod tests {
     }
 
     #[test]
-    fn files_join_a_folder_together() {
+    fn publishes_files_of_a_folder_together() {
         let root = tempfile::tempdir().unwrap();
         fs::write(root.path().join("old"), b"0").unwrap();
         fs::write(root.path().join("b"), b"0").unwrap();

@@ -1,7 +1,7 @@
-//! Video in, frame by frame: a folder of pictures, a Y4M file, or anything that an installed ffmpeg reads.
+//! Video frames from a folder of pictures, a Y4M file, or any file through an installed ffmpeg.
 //!
-//! All frames of a video have one size and are all grey or all RGB, 8 bits a sample; anything else is an error that
-//! names the frame. Nothing is read ahead, so a video may be longer than memory.
+//! All frames have one size and are all grey or all RGB, 8 bits per sample; other frames are errors. Nothing
+//! is read ahead, so a video may exceed memory.
 
 mod ffmpeg;
 pub mod pictures;
@@ -15,12 +15,10 @@ use std::{
 
 use ndarray::{Array2, Array3};
 
-/// A frame and where it came from.
 #[derive(Clone, Debug, PartialEq)]
 pub struct VideoFrame {
-    /// A picture's name without its extension, else `frame_000001` and so on.
+    /// File name without extension, else `frame_000001` etc.
     pub name: String,
-    /// Its samples.
     pub pixels: Pixels,
 }
 
@@ -29,12 +27,11 @@ pub struct VideoFrame {
 pub enum Pixels {
     /// Shape (height, width).
     Grey(Array2<u8>),
-    /// Red, green and blue, shape (height, width, 3).
+    /// RGB, shape (height, width, 3).
     Rgb(Array3<u8>),
 }
 
 impl Pixels {
-    /// Width and height in pixels, and whether in colour.
     pub fn kind(&self) -> Kind {
         match self {
             Self::Grey(pixels) => Kind { width: pixels.ncols(), height: pixels.nrows(), colour: false },
@@ -46,12 +43,10 @@ impl Pixels {
     }
 }
 
-/// What all frames of a video share.
+/// Common properties of all frames.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Kind {
-    /// Pixels across.
     pub width: usize,
-    /// Pixels down.
     pub height: usize,
     /// RGB rather than grey.
     pub colour: bool,
@@ -63,84 +58,37 @@ impl std::fmt::Display for Kind {
     }
 }
 
-/// Why a video cannot be read.
 #[derive(Debug, thiserror::Error)]
 pub enum VideoError {
-    /// The file or folder cannot be opened or read.
     #[error("{}: {source}", path.display())]
-    Io {
-        /// Which.
-        path: PathBuf,
-        /// The system's words.
-        source: io::Error,
-    },
-    /// A folder without a picture.
+    Io { path: PathBuf, source: io::Error },
     #[error("{}: no picture in this folder; expected files ending in {}", path.display(), pictures::EXTENSIONS.join(", "))]
-    NoPictures {
-        /// The folder.
-        path: PathBuf,
-    },
-    /// One picture in two files.
+    NoPictures { path: PathBuf },
     #[error("{} and {} have one name: they may be the same picture twice; move one of them away", first.display(), second.display())]
-    SameStem {
-        /// One.
-        first: PathBuf,
-        /// The other.
-        second: PathBuf,
-    },
-    /// A video without a frame.
+    SameStem { first: PathBuf, second: PathBuf },
     #[error("{}: no frame in this video", path.display())]
-    NoFrames {
-        /// The file.
-        path: PathBuf,
-    },
-    /// A picture that cannot be decoded.
+    NoFrames { path: PathBuf },
     #[error("{}: not a picture that can be read: {reason}", path.display())]
-    Picture {
-        /// The file.
-        path: PathBuf,
-        /// The decoder's words.
-        reason: String,
-    },
-    /// A Y4M stream that is damaged or of a kind that is not read.
+    Picture { path: PathBuf, reason: String },
     #[error("{}: frame {frame} of the Y4M stream: {reason}", path.display())]
     Y4m {
-        /// The file.
         path: PathBuf,
-        /// Frame number from 1; 0 for the header.
+        /// From 1; 0 for the header.
         frame: usize,
-        /// What is wrong.
         reason: String,
     },
-    /// A frame unlike the first.
     #[error("{}: frame `{name}` is {found}, but the video began {expected}; all frames must be alike", path.display())]
-    Changed {
-        /// The video.
-        path: PathBuf,
-        /// The frame.
-        name: String,
-        /// This frame's kind.
-        found: Kind,
-        /// The first frame's.
-        expected: Kind,
-    },
-    /// Neither pictures nor Y4M, and no ffmpeg to read it with.
+    Changed { path: PathBuf, name: String, found: Kind, expected: Kind },
     #[error(
         "{}: only a folder of pictures and Y4M files are read directly, and there is no `ffmpeg` on the PATH for other \
          videos; install ffmpeg, or convert with it elsewhere: ffmpeg -i VIDEO -pix_fmt yuv444p out.y4m", path.display()
     )]
-    NoFfmpeg {
-        /// The file.
-        path: PathBuf,
-    },
-    /// ffmpeg gave up.
+    NoFfmpeg { path: PathBuf },
     #[error("{}: ffmpeg could not read it ({status}): {message}", path.display())]
     Ffmpeg {
-        /// The file.
         path: PathBuf,
-        /// How it ended.
         status: String,
-        /// The end of what it printed.
+        /// End of its messages.
         message: String,
     },
 }
@@ -153,7 +101,7 @@ impl VideoError {
 
 type Frames = Box<dyn Iterator<Item = Result<VideoFrame, VideoError>>>;
 
-/// An opened video: an iterator over its frames, which ends after the first error.
+/// Iterator over frames; ends after the first error.
 pub struct Video {
     path: PathBuf,
     frames: Frames,
@@ -170,10 +118,8 @@ impl std::fmt::Debug for Video {
 }
 
 impl Video {
-    /// Opens a folder of pictures, a `.y4m` file, or, through ffmpeg, any other file.
-    ///
-    /// # Errors
-    /// [`VideoError`] where nothing can be read at all; damage further on comes with its frame.
+    /// Opens a folder of pictures, a `.y4m` file, or any other file through ffmpeg.
+    /// Errors: [`VideoError`] if nothing can be read; later errors come with their frames.
     pub fn open(path: &Path) -> Result<Self, VideoError> {
         let metadata = path.metadata().map_err(|source| VideoError::io(path, source))?;
         let mut remark = None;
@@ -216,7 +162,7 @@ impl Iterator for Video {
     }
 }
 
-/// The name of frame `number`, counted from 1, of a video without names.
+/// Frame name by number, from 1.
 fn numbered(number: usize) -> String {
     format!("frame_{number:06}")
 }
@@ -227,7 +173,7 @@ mod tests {
     use image::{GrayImage, Luma, Rgb, RgbImage};
 
     #[test]
-    fn a_folder_is_read_in_the_order_of_its_numbers() {
+    fn reads_a_folder_in_order_of_numbers() {
         let folder = tempfile::tempdir().unwrap();
         for number in [10_u8, 2, 1] {
             let picture = GrayImage::from_pixel(4, 3, Luma([number]));
@@ -263,7 +209,7 @@ mod tests {
     }
 
     #[test]
-    fn a_damaged_picture_is_named() {
+    fn names_a_damaged_picture() {
         let folder = tempfile::tempdir().unwrap();
         std::fs::write(folder.path().join("a.png"), b"\x89PNG\r\n\x1a\nrubbish").unwrap();
         let error = Video::open(folder.path()).unwrap().next().unwrap().unwrap_err();

@@ -1,14 +1,14 @@
-//! `view.png`: a depth map as a person likes to look at it - near is warm, far is cold, grey where there is no
-//! value, with a scale bar in mm.
+//! `view.png`: depth map as a colour picture: near is warm, far is cold, grey has no value, with a scale bar
+//! in mm.
 
 use image::{Rgb, RgbImage};
 use ndarray::ArrayView2;
 
 use crate::{EncodeError, image_file::encode_to, quantiles::Quantiles, text::Writer};
 
-/// Small maps are enlarged to at least this height, by a whole number of pixels.
+/// Small maps are enlarged by an integer factor to at least this height.
 const MIN_HEIGHT_PX: usize = 320;
-/// Left and right outliers that do not stretch the colours.
+/// Share of outliers on either side that do not affect the colours.
 const OUTLIERS: f64 = 0.005;
 const MARGIN_PX: u32 = 24;
 const BAR_PX: u32 = 22;
@@ -16,19 +16,17 @@ const BACKGROUND: Rgb<u8> = Rgb([250, 250, 248]);
 const INK: Rgb<u8> = Rgb([40, 40, 44]);
 const NO_VALUE: Rgb<u8> = Rgb([150, 150, 152]);
 
-/// Confidence from which a pixel has its full colour.
+/// Confidence with full colour.
 const CONFIDENT: f32 = 0.5;
-/// Part of its colour that a pixel of confidence 0 keeps.
+/// Share of colour at confidence 0.
 const FAINTEST: f32 = 0.15;
 
-/// The picture of a depth map in mm as the bytes of a PNG.
-///
-/// `confidence` (0 to 1, same shape) decides how much of its colour a pixel keeps.
+/// Picture of a depth map in mm as PNG. `confidence` (0 to 1, same shape) reduces the colour.
 pub fn view_png(depth_mm: ArrayView2<f32>, confidence: ArrayView2<f32>) -> Result<Vec<u8>, EncodeError> {
     view_png_in("mm", depth_mm, confidence)
 }
 
-/// The same of a map in another unit, which the scale names.
+/// [`view_png`] with another unit for the scale.
 pub fn view_png_in(
     unit: &str,
     depth: ArrayView2<f32>,
@@ -46,7 +44,7 @@ fn draw(unit: &str, depth_mm: ArrayView2<f32>, confidence: ArrayView2<f32>) -> R
     let zoom = MIN_HEIGHT_PX.div_ceil(rows.max(1)).max(1) as u32;
     let (width, height) = (columns as u32 * zoom, rows as u32 * zoom);
     let range = Range::of(depth_mm);
-    // Text grows with the picture: 4 % of its height between sensible bounds.
+    // Text height is 3.5 % of the picture within limits.
     let mut writer = Writer::new((height as f32 * 0.035).clamp(13.0, 60.0))?;
     let label_width = writer.width(&format!("0000.0 {unit}"));
     let bar_left = MARGIN_PX * 2 + width;
@@ -68,7 +66,7 @@ fn draw(unit: &str, depth_mm: ArrayView2<f32>, confidence: ArrayView2<f32>) -> R
         writer.write(&mut canvas, bar_left, MARGIN_PX, "no depth", INK);
         return Ok(canvas);
     };
-    // The bar: far at the top, as in the scene's distance.
+    // Scale bar: far at the top.
     for y in 0..height {
         let depth = far + (near - far) * (y as f32 + 0.5) / height as f32;
         for x in 0..BAR_PX {
@@ -91,7 +89,7 @@ fn draw(unit: &str, depth_mm: ArrayView2<f32>, confidence: ArrayView2<f32>) -> R
     Ok(canvas)
 }
 
-/// The colours of a range, computed once: the scale takes longer than all else of a large picture.
+/// Colour table of a range: the scale takes longer than the rest of a large picture.
 struct Colours {
     /// Nearest depth, and colours per mm.
     line: Option<[f32; 2]>,
@@ -99,7 +97,7 @@ struct Colours {
 }
 
 impl Colours {
-    /// Far finer than the steps between two colours.
+    /// Far finer than visible steps.
     const NUMBER: usize = 4096;
 
     fn new(range: &Range) -> Self {
@@ -112,13 +110,13 @@ impl Colours {
 
     fn of(&self, depth_mm: f32) -> Rgb<u8> {
         let Some([near, per_mm]) = self.line.filter(|_| depth_mm.is_finite()) else { return NO_VALUE };
-        // A float below 0 becomes 0.
+        // Negative floats become 0.
         let index = ((depth_mm - near) * per_mm + 0.5) as usize;
         self.colours[index.min(Self::NUMBER - 1)]
     }
 }
 
-/// Nearest and farthest depth that the colours span; `None` for a map without values.
+/// Depth range of the colours; `None` without values.
 struct Range(Option<(f32, f32)>);
 
 impl Range {
@@ -130,7 +128,7 @@ impl Range {
             return Self(None);
         };
         let middle = 0.5 * (near + far);
-        // A plane has noise, not structure: never spread less than a thousandth of the distance over all colours.
+        // A plane has only noise: at least a thousandth of the distance spans the colours.
         let half = (0.5 * (far - near)).max(5e-4 * middle.abs());
         Self(Some((middle - half, middle + half)))
     }
@@ -138,22 +136,22 @@ impl Range {
     fn colour(&self, depth_mm: f32) -> Rgb<u8> {
         let Some((near, far)) = self.0.filter(|_| depth_mm.is_finite()) else { return NO_VALUE };
         let part = ((far - depth_mm) / (far - near)).clamp(0.0, 1.0);
-        // Turbo's ends are almost black; what lies between tells depths apart best.
+        // Turbo's ends are almost black and are left out.
         let colour = colorous::TURBO.eval_continuous(0.06 + 0.88 * f64::from(part));
         Rgb([colour.r, colour.g, colour.b])
     }
 }
 
-/// A colour that is believed so much: what is unsure goes to the grey of what is unknown, but keeps a tint.
+/// Mixes towards grey by confidence, but keeps a tint.
 fn faded(colour: Rgb<u8>, confidence: f32) -> Rgb<u8> {
     let kept = FAINTEST + (1.0 - FAINTEST) * (confidence / CONFIDENT).clamp(0.0, 1.0);
-    // Positive, so that half more and no fraction is the nearest.
+    // Positive: adding a half and truncating rounds to nearest.
     let mix =
         |value: u8, grey: u8| (f32::from(grey) + (f32::from(value) - f32::from(grey)) * kept + 0.5) as u8;
     Rgb(std::array::from_fn(|channel| mix(colour[channel], NO_VALUE[channel])))
 }
 
-/// Distance between ticks: 1, 2 or 5 times a power of ten, for five to eleven of them.
+/// Tick distance: 1, 2 or 5 times a power of ten, for five to eleven ticks.
 fn tick_step(span: f64) -> f64 {
     let rough = span / 8.0;
     let power = 10f64.powf(rough.log10().floor());

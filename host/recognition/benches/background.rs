@@ -1,10 +1,10 @@
-//! Frames per second of the background model, of the way from frame to centred silhouette, and of all the way from frame to
-//! embedded point, on one thread, 640x480, grey and colour: `cargo bench -p farnear-recognition --bench background`. With
-//! `FARNEAR_JSON=1` every figure is one JSON line.
+//! Frames per second of the background model, of frame to centred silhouette, and of frame to embedded point;
+//! one thread, 640x480, grey and colour: `cargo bench -p farnear-recognition --bench background`.
+//! `FARNEAR_JSON=1` prints one JSON line per figure.
 //!
-//! The scene: a textured background with sensor noise, a tenth of the pixels flickering between two grey levels
-//! (foliage), and three moving discs, so that pixels have one to five components as in real video. Where the
-//! highway sequence of ChangeDetection.net is at hand its frames, doubled to 640x480, are timed too.
+//! Scene: textured background with sensor noise, a tenth of the pixels flickering (foliage), three moving
+//! discs: one to five components per pixel, as in real video. The highway sequence of ChangeDetection.net,
+//! doubled to 640x480, is timed if present.
 
 use std::{fs, hint::black_box, time::Instant};
 
@@ -20,10 +20,10 @@ use farnear_silhouettes::mask::{
 use ndarray::{Array2, Array3, ArrayView1, s};
 
 const SIZE: (usize, usize) = (480, 640);
-/// Different frames; the sequence repeats after them.
+/// Frames before the sequence repeats.
 const FRAMES: usize = 60;
 
-/// A small generator of reproducible noise (xorshift, Marsaglia 2003): the benchmark needs speed, not quality.
+/// Fast repeatable noise (xorshift, Marsaglia 2003).
 struct Noise(u64);
 
 impl Noise {
@@ -34,7 +34,7 @@ impl Noise {
         self.0
     }
 
-    /// About Gaussian with a standard deviation of 3 grey levels: the sum of four uniform bytes.
+    /// Roughly Gaussian with a standard deviation of 3 grey levels: the sum of four uniform bytes.
     fn grey_levels(&mut self) -> f32 {
         let bytes = self.next().to_le_bytes();
         let sum: u32 = bytes[..4].iter().map(|&byte| u32::from(byte)).sum();
@@ -82,7 +82,7 @@ fn highway() -> Option<Vec<Array3<u8>>> {
     frames.collect::<Option<Vec<_>>>().filter(|frames| frames.len() == FRAMES)
 }
 
-/// Milliseconds a frame: the best and the middle of five passes over the sequence, after one to warm up.
+/// Milliseconds per frame: best and median of five passes, after a warm-up.
 fn milliseconds(mut frame: impl FnMut(usize)) -> [f64; 2] {
     (0..FRAMES).for_each(&mut frame);
     let mut passes: Vec<f64> = (0..5)
@@ -96,7 +96,7 @@ fn milliseconds(mut frame: impl FnMut(usize)) -> [f64; 2] {
     [passes[0], passes[2]]
 }
 
-/// An RBF map over 1500 centres: its values do not change the time.
+/// An RBF map over 1500 centres; its values do not affect the time.
 fn map() -> Rbf {
     let mut noise = Noise(11);
     let mut uniform = || (noise.next() >> 40) as f32 / (1 << 24) as f32;

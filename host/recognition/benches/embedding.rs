@@ -1,8 +1,9 @@
-//! Times of the way from silhouettes to points and of cutting shadows: `cargo bench -p farnear-recognition --bench embedding`.
+//! Times from silhouettes to points, and of shadow removal: `cargo bench -p farnear-recognition --bench
+//! embedding`.
 //!
-//! The gallery is 1500 seeded synthetic silhouettes. `-- --features FILE.npy` only writes its descriptors (N x 360), so that another
-//! implementation can be timed on the same data. With `FARNEAR_JSON=1` every figure is one JSON line. `landmark_20000` runs first
-//! and in this process, so the peak of resident memory that is printed with it is its own (and the gallery's).
+//! The gallery is 1500 seeded synthetic silhouettes. `-- --features FILE.npy` only writes its descriptors (N
+//! x 360), for comparison with other implementations. `FARNEAR_JSON=1` prints one JSON line per figure.
+//! `landmark_20000` runs first, so the printed peak memory is its own (with the gallery).
 
 use std::{hint::black_box, io::Write, time::Instant};
 
@@ -27,7 +28,7 @@ const GALLERY: usize = 1500;
 const LARGE: usize = 20_000;
 const NEIGHBOURHOOD: Neighbourhood = Neighbourhood::Nearest(12);
 
-/// Silhouette `i` of the gallery: somebody walking, leaning and reaching, seen from one of eight sides.
+/// Silhouette `i`: a person walking, leaning and reaching, from one of eight sides.
 fn silhouette(i: usize) -> Mask {
     let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(i as u64);
     let build = Build { height_mm: rng.random_range(1600.0..1900.0), ..Build::default() };
@@ -84,7 +85,7 @@ fn time<T: Send>(
     })
 }
 
-/// The most resident memory this process ever had, MiB; `None` where the system does not tell.
+/// Peak resident memory of this process, MiB, if known.
 fn peak_mib() -> Option<f64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
@@ -111,7 +112,7 @@ fn main() -> std::io::Result<()> {
         let path = arguments.get(at + 1).map_or("features.npy", String::as_str);
         return write_features(path);
     }
-    // Each mask is dropped when it is described: together they would be what the memory goes to.
+    // Each mask is dropped once described, to limit the memory.
     let rows: Vec<[f32; ANGLES]> =
         (0..LARGE).into_par_iter().map(|i| centroid_distances(&silhouette(i))).collect();
     let large = Array2::from_shape_fn((LARGE, ANGLES), |(i, angle)| rows[i][angle]);

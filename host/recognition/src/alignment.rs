@@ -10,16 +10,16 @@ use crate::embedding::spectral;
 use ndarray::{Array1, Array2, Axis};
 use serde::{Deserialize, Serialize};
 
-/// What of the target is brought to the training clips'.
+/// Matched statistics of the target.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Alignment {
-    /// Nothing.
+    /// No alignment of frame vectors.
     #[default]
     None,
-    /// The mean of every number of a frame.
+    /// Mean of each frame number.
     Mean,
-    /// Its mean and spread.
+    /// Mean and spread of each number.
     Spread,
     /// Mean and covariance of all numbers.
     Coral,
@@ -38,22 +38,22 @@ impl std::str::FromStr for Alignment {
     }
 }
 
-/// Mean and covariance of frame vectors, every clip counting alike however long it is.
+/// Mean and covariance of frame vectors, with equal weight per clip.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Statistics {
-    /// Per number of a frame.
+    /// Mean per number of a frame.
     pub mean: Array1<f32>,
-    /// Numbers x numbers.
+    /// Covariance, numbers x numbers.
     pub covariance: Array2<f32>,
 }
 
-/// Added to variances, in mean variances, so that directions in which nothing varies stay as they are.
+/// Ridge on variances, relative to their mean, so that constant directions are unchanged.
 const RIDGE: f32 = 0.1;
-/// A number's spread is changed by this factor at most.
+/// Largest change of a spread.
 const MOST: f32 = 4.0;
 
 impl Statistics {
-    /// Of the frame vectors of clips (frames x F each); `None` without a frame.
+    /// Statistics of frame vectors (frames x F per clip); `None` without frames.
     pub fn of<'a>(clips: impl Iterator<Item = &'a Array2<f32>> + Clone) -> Option<Self> {
         let clips = clips.filter(|clip| clip.nrows() > 0);
         let (count, width) = (clips.clone().count() as f32, clips.clone().next()?.ncols());
@@ -69,7 +69,7 @@ impl Statistics {
         Some(Self { mean, covariance })
     }
 
-    /// What brings frame vectors with these statistics to others.
+    /// Map from these statistics to others.
     pub fn to(&self, other: &Self, alignment: Alignment) -> Brought {
         let (from, to) = (self.mean.clone(), other.mean.clone());
         let turn = match alignment {
@@ -91,7 +91,7 @@ impl Statistics {
     }
 }
 
-/// A map of frame vectors.
+/// Affine map of frame vectors.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Brought {
     from: Array1<f32>,
@@ -100,7 +100,7 @@ pub struct Brought {
 }
 
 impl Brought {
-    /// Frame vectors (frames x F) where they belong.
+    /// Maps frame vectors (frames x F).
     pub fn apply(&self, frames: &Array2<f32>) -> Array2<f32> {
         let off = frames - &self.from;
         match &self.turn {
@@ -116,7 +116,7 @@ fn ridged(covariance: &Array2<f32>) -> Array2<f32> {
     covariance + &(Array2::<f32>::eye(width) * ridge.max(1e-9))
 }
 
-/// A power of a symmetric matrix whose eigenvalues are positive.
+/// Power of a symmetric positive definite matrix.
 fn power(matrix: &Array2<f32>, exponent: f64) -> Array2<f32> {
     let width = matrix.nrows();
     let flat: Vec<f64> = matrix.iter().map(|v| f64::from(*v)).collect();
@@ -138,7 +138,7 @@ mod tests {
     use super::*;
     use rand::{Rng, SeedableRng};
 
-    /// Clips of three numbers that hang together, turned and moved by `other`.
+    /// Clips of three correlated numbers, optionally rotated and shifted.
     fn clips(other: bool) -> Vec<Array2<f32>> {
         let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(3);
         (0..40)
@@ -173,7 +173,7 @@ mod tests {
         }
         let spread = after(Alignment::Spread).covariance;
         assert!(spread.diag().iter().zip(learned.covariance.diag()).all(|(a, b)| (a - b).abs() < 1e-3));
-        // The ridge keeps the covariance from being met exactly.
+        // The ridge prevents an exact match.
         let (plain, coral) = (after(Alignment::Mean).covariance, after(Alignment::Coral).covariance);
         assert!(off(&coral, &learned.covariance) < 0.25 * off(&plain, &learned.covariance), "{coral}");
         assert_eq!(seen.to(&learned, Alignment::None).apply(&target[0]), target[0]);

@@ -1,11 +1,10 @@
 //! An auxiliary model: another recogniser's answer for a clip, compared with its answers for the training clips of the activity.
 //!
-//! A recogniser knows the activities that it was taught, and what nobody taught often lies among them. Another one that knows many more
-//! activities - from synthetic people, whom everybody has - tells strangers from them better, though its own answer may be wrong: it need
-//! not know an activity's name, only say of a clip what it says of such clips. An activity's profile is the mean over its training
-//! clips of the square roots of the other's probabilities, to length 1; a clip lies off by the Bhattacharyya distance to it, -ln of the
-//! scalar product (Kailath, IEEE Trans. Communication Technology 15, 1967). Clips of other activities as a background: Hendrycks et al.,
-//! ICLR 2019.
+//! Untrained activities often lie among the trained ones. A recogniser with many more activities, taught on
+//! synthetic people, separates them better: it need not know the activity, only describe clips consistently.
+//! An activity's profile is the normalised mean of the square roots of its probabilities over the training
+//! clips; the distance of a clip is the Bhattacharyya distance, -ln of the scalar product (Kailath, IEEE
+//! Trans. Communication Technology 15, 1967). Background clips: Hendrycks et al., ICLR 2019.
 
 use super::classifier::largest;
 use super::clip::Clip;
@@ -18,11 +17,11 @@ use std::sync::Arc;
 /// Another recogniser with its answers for the trained activities.
 #[derive(Clone, Debug, PartialEq)]
 pub struct AuxiliaryModel {
-    /// The other.
+    /// Recogniser that describes clips.
     pub recogniser: Arc<Recogniser>,
-    /// Activities taught x activities of the other: square roots, each row of length 1.
+    /// Trained x auxiliary activities: square roots, rows of length 1.
     pub profiles: Array2<f32>,
-    /// Distances to an activity's profile beyond which a clip is unknown.
+    /// Distance limits per activity; beyond them a clip is unknown.
     pub limits: Limits,
 }
 
@@ -53,7 +52,7 @@ impl AuxiliaryModel {
             .into_par_iter()
             .filter_map(|i| {
                 let other = |j: usize| if alone { j != i } else { clips[j].subject != clips[i].subject };
-                // Of a class that nobody else has taught there is nothing to compare with.
+                // Classes of a single subject have no comparison.
                 let others =
                     Some(profile(labels[i], &other)).filter(|sum| sum.iter().any(|root| *root > 0.0))?;
                 Some((labels[i], distance(said[i].as_ref()?.view(), others.view())))
@@ -63,7 +62,7 @@ impl AuxiliaryModel {
         Ok(Self { recogniser, profiles, limits })
     }
 
-    /// How strange what the other says of a clip is for the activity answered: above 1 is unknown.
+    /// Outlier score of a clip for the answered activity; above 1 is unknown.
     pub(super) fn outlier_score(&self, said: &Answer, answer: &Answer) -> f32 {
         let probabilities: Vec<f32> =
             answer.probabilities.iter().map(|(_, probability)| *probability).collect();
@@ -71,7 +70,7 @@ impl AuxiliaryModel {
         self.limits.score(class, distance(roots_of(said).view(), self.profiles.row(class)))
     }
 
-    /// Whether all sizes fit a recogniser of these activities.
+    /// Whether all sizes match a recogniser of these activities.
     pub(super) fn fits(&self, classes: usize, boxes: bool) -> bool {
         self.recogniser.second.is_none()
             && self.recogniser.views == 1
@@ -96,7 +95,7 @@ fn to_unit_length(sum: Array1<f32>) -> Array1<f32> {
     if length > 0.0 { sum / length } else { sum }
 }
 
-/// Bhattacharyya distance of square roots of probabilities; what has nothing in common is far, but not at infinity.
+/// Bhattacharyya distance of square roots of probabilities, with a finite maximum.
 fn distance(said: ArrayView1<f32>, profile: ArrayView1<f32>) -> f32 {
     -said.dot(&profile).clamp(1e-9, 1.0).ln()
 }

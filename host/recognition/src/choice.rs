@@ -1,7 +1,7 @@
-//! Choosing by cross-validation over the training subjects.
+//! Cross-validation over training subjects.
 //!
-//! Spaces are learned once from all training clips (that is unsupervised: no label is looked at), classifiers are trained and
-//! tested over folds of subjects on the patterns' Gram matrix. O(spaces x (clips^2 P + folds clips^2)) and mostly the spaces' training.
+//! Spaces are learned once from all training clips (unsupervised); classifiers are trained and tested over
+//! folds of subjects on the Gram matrix. O(spaces x (clips^2 P + folds clips^2)), mostly for the spaces.
 
 use super::classifier::ClassifierKind;
 use super::classifier::method::Fold;
@@ -16,11 +16,11 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 
-/// Which views are recognised together.
+/// Combination of views.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Views {
-    /// Every view by itself.
+    /// Each view separately.
     Each,
     /// All views as one pattern.
     #[default]
@@ -39,7 +39,7 @@ impl std::str::FromStr for Views {
 }
 
 impl Views {
-    /// The groups of views that make a pattern each.
+    /// Groups of views that form a pattern each.
     pub fn arrangements(self, views: usize) -> Vec<Vec<usize>> {
         match self {
             Self::Each => (0..views).map(|view| vec![view]).collect(),
@@ -48,23 +48,23 @@ impl Views {
     }
 }
 
-/// What cross-validation chose.
+/// Result of cross-validation.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Chosen {
-    /// The space, learned from all training clips.
+    /// Space learned from all training clips.
     pub space: Space,
-    /// Sharpness of the codebook's soft assignments.
+    /// Sharpness of soft assignments.
     pub sharpness: f32,
-    /// The classifier and its parameter.
+    /// Classifier with its parameter.
     pub classifier: ClassifierKind,
-    /// Accuracy over the inner folds, 0 to 1; `None` where there was nothing to choose from.
+    /// Inner accuracy, 0 to 1; `None` without alternatives.
     pub inner_accuracy: Option<f64>,
-    /// Patterns of the training clips: `[clip][view]`.
+    /// Patterns of the training clips, `[clip][view]`.
     pub patterns: Vec<Vec<Array1<f32>>>,
 }
 
 impl Chosen {
-    /// Condition number of the RBF system, if there is one.
+    /// Condition number of the RBF system, if any.
     pub fn condition(&self) -> Option<f64> {
         match &self.space.map {
             Map::Rbf(rbf) => Some(rbf.condition),
@@ -73,17 +73,15 @@ impl Chosen {
     }
 }
 
-/// Names in sorted order, each once.
+/// Sorted unique names.
 pub fn names<'a>(all: impl Iterator<Item = &'a String>) -> Vec<String> {
     all.cloned().collect::<BTreeSet<_>>().into_iter().collect()
 }
 
-/// Chooses space, sharpness and classifier for training clips that all have the same views. Labels are indices into `classes`.
-/// With fewer than two subjects nothing can be held out, and the first of everything is taken. Right answers of all arrangements of views
-/// count together: one choice that serves them all rests on more trials than one for each.
-///
-/// # Errors
-/// A space that cannot be learned; [`EmbeddingError::Stopped`].
+/// Selects space, sharpness and classifier for clips with equal views; labels index `classes`. With fewer
+/// than two subjects the first values are taken. Answers of all arrangements count together, because one
+/// choice for all has more trials.
+/// Errors: a space that cannot be learned; [`EmbeddingError::Stopped`].
 pub fn choose(
     clips: &[&Clip],
     classes: &[String],
@@ -144,7 +142,7 @@ struct Candidate {
 }
 
 impl Problem<'_> {
-    /// The best sharpness and classifier in a space; without `compare` the first ones.
+    /// Best sharpness and classifier in a space; the first ones without `compare`.
     fn best_of(
         &self,
         settings: &SpaceSettings,
@@ -171,7 +169,7 @@ impl Problem<'_> {
             };
             let grams: Vec<Array2<f32>> =
                 if compare { self.arrangements.iter().map(product).collect() } else { Vec::new() };
-            // The first of equals, so that nothing hangs on the order of the values.
+            // The first of equals, independent of the order of values.
             let scored = self.experiment.classifiers.iter().map(|&kind| {
                 let right: usize = grams.iter().map(|gram| self.right(gram, kind)).sum();
                 (right, kind)
@@ -192,7 +190,7 @@ impl Problem<'_> {
         })
     }
 
-    /// Right answers of a classifier over the folds of training subjects, from the patterns' Gram matrix.
+    /// Right answers of a classifier over folds of subjects, from the Gram matrix.
     fn right(&self, gram: &Array2<f32>, kind: ClassifierKind) -> usize {
         (0..self.folds)
             .into_par_iter()

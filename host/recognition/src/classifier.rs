@@ -1,7 +1,7 @@
-//! From patterns to activities: the classifiers there are, each with a probability for every class.
+//! Classifiers with probabilities per class.
 //!
-//! A classifier is a file of this module that implements [`Method`], and a line in the table below. Training, choosing by
-//! cross-validation, model files and the command line's `--classifier` follow from the table.
+//! A classifier is a file of this module that implements [`Method`], and a line in the table below, which
+//! also serves training, cross-validation, model files and `--classifier`.
 
 pub mod method;
 pub mod neighbours;
@@ -17,13 +17,13 @@ use svc::LinearSvc;
 
 macro_rules! classifiers {
     ($($(#[$about:meta])* $name:ident($parameter:ty) => $trained:ty;)+) => {
-        /// Which classifier, its parameter still to be chosen.
+        /// Classifier without parameter.
         #[derive(Clone, Copy, Debug, PartialEq, Eq)]
         pub enum Family {
             $($(#[$about])* $name,)+
         }
 
-        /// Which classifier, and its parameter.
+        /// Classifier with its parameter.
         #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
         #[serde(rename_all = "lowercase")]
         pub enum ClassifierKind {
@@ -37,17 +37,17 @@ macro_rules! classifiers {
         }
 
         impl Family {
-            /// All there are.
+            /// All classifiers of the table.
             pub const ALL: &[Self] = &[$(Self::$name,)+];
 
-            /// Its name, as users write it.
+            /// Name for users.
             pub fn name(self) -> &'static str {
                 match self {
                     $(Self::$name => <$trained as Method>::NAME,)+
                 }
             }
 
-            /// The parameters to choose from, the usual one first.
+            /// Candidate parameters, default first.
             pub fn tried(self) -> Vec<ClassifierKind> {
                 match self {
                     $(Self::$name => {
@@ -58,7 +58,7 @@ macro_rules! classifiers {
         }
 
         impl ClassifierKind {
-            /// Its parameter in words, for tables: `k = 3`.
+            /// Parameter as text, e.g. `k = 3`.
             pub fn described(self) -> String {
                 match self {
                     $(Self::$name(parameter) => <$trained as Method>::described(parameter),)+
@@ -89,7 +89,7 @@ macro_rules! classifiers {
                 }
             }
 
-            /// Probability of every class, adding up to 1.
+            /// Probabilities per class with sum 1.
             pub fn probabilities(&self, pattern: ArrayView1<f32>) -> Vec<f32> {
                 match self {
                     $(Self::$name(trained) => trained.probabilities(pattern),)+
@@ -106,9 +106,9 @@ macro_rules! classifiers {
     };
 }
 
-// Model files number them in this order: new ones come last.
+// Model files number them in this order: append new ones.
 classifiers! {
-    /// This many nearest neighbours.
+    /// Number of nearest neighbours.
     Knn(usize) => Neighbours;
     /// Linear support vectors with this cost.
     Svc(f32) => LinearSvc;
@@ -128,13 +128,13 @@ impl std::str::FromStr for Family {
 }
 
 impl Classifier {
-    /// The most probable class (the first of equals) and its probability.
+    /// Most probable class (the first of equals) and its probability.
     pub fn best(&self, pattern: ArrayView1<f32>) -> (usize, f32) {
         largest(&self.probabilities(pattern))
     }
 }
 
-/// The place of the largest value (the first of equals), and the value.
+/// Index of the largest value (the first of equals), and the value.
 pub(crate) fn largest(values: &[f32]) -> (usize, f32) {
     let best = |best: (usize, f32), (place, value): (usize, &f32)| {
         if *value > best.1 { (place, *value) } else { best }
@@ -148,7 +148,7 @@ mod tests {
     use ndarray::Array2;
     use rand::{Rng, SeedableRng};
 
-    /// Every classifier of the table, with the first of its parameters, on three clouds.
+    /// Every classifier, with its first parameter, on three clouds.
     #[test]
     fn all_tell_separable_classes_apart_trained_and_over_folds() {
         let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(9);

@@ -12,7 +12,7 @@ use farnear_silhouettes::silhouette::{
 use ndarray::{Array2, ArrayViewMut1, Axis};
 use rayon::prelude::*;
 
-/// Numbers of the box per frame: height, width, and the silhouette's centroid (x, y), pixels.
+/// Box numbers per frame: height, width, centroid x and y, pixels.
 pub const BOX_NUMBERS: usize = 4;
 
 /// One view of one performance.
@@ -22,26 +22,27 @@ pub struct Track {
     pub descriptors: Array2<f32>,
     /// Coarse silhouettes, one frame per row.
     pub cells: Array2<u8>,
-    /// Height, width, centroid x and y in pixels, one frame per row; `None` for silhouettes that are already cut out and scaled, whose
-    /// motion is gone.
+    /// Height, width, centroid x and y in pixels per frame; `None` for cropped silhouettes, which have no
+    /// motion.
     pub boxes: Option<Array2<f32>>,
-    /// Frames left out because their mask was empty.
+    /// Number of skipped empty masks.
     pub empty_frames: usize,
 }
 
 /// One performance of an activity by a person.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Clip {
-    /// The person, by any name; clips of one subject are never split between training and test.
+    /// Subject name; clips of a subject are never split between training and test.
     pub subject: String,
-    /// The activity's name, which recognition answers with.
+    /// Activity name, the answer of recognition.
     pub activity: String,
-    /// Seen from where; all clips of a set have the same views in the same order.
+    /// Views, equal in number and order for all clips of a set.
     pub views: Vec<Track>,
 }
 
 impl Track {
-    /// Describes the masks of a clip. With `full_frames` the masks are whole camera frames and the box's motion is kept.
+    /// Describes the masks of a clip. With `full_frames` they are whole camera frames, so that the box's
+    /// motion is kept.
     pub fn from_masks(masks: &[Mask], scaling: Scaling, full_frames: bool) -> Self {
         let found: Vec<Option<(CentroidDistance, CoarseSilhouette, [f32; BOX_NUMBERS])>> = masks
             .par_iter()
@@ -68,8 +69,8 @@ impl Track {
         Self { descriptors, cells, boxes, empty_frames: masks.len() - kept.len() }
     }
 
-    /// Draws every frame of a performance of capsule bodies on one canvas (10 mm per pixel), so that the box's motion is kept, and
-    /// describes it. Bodies without a finite point give an empty track.
+    /// Draws capsule bodies on one canvas (10 mm per pixel), so that the box's motion is kept, and describes
+    /// them. Bodies without a finite point give an empty track.
     pub fn from_bodies(bodies: &[Vec<Capsule>], view: &View, scaling: Scaling) -> Self {
         const MM_PER_PX: f64 = 10.0;
         let reach: Vec<Point> = bodies.iter().flat_map(|body| extent(body, view)).collect();
@@ -85,8 +86,8 @@ impl Track {
         self.descriptors.nrows()
     }
 
-    /// What principal components over as many numbers as `row` see of a frame: its centroid distances, and where there is more room than for
-    /// those its coarse silhouette too, weighted so that both vary alike over everyday activities.
+    /// Input of principal components with `row` numbers: centroid distances and, with more room, the coarse
+    /// silhouette, weighted to vary equally over everyday activities.
     pub(super) fn seen(&self, frame: usize, row: ArrayViewMut1<f32>) {
         const WEIGHT: f32 = 0.35 / CELL_PIXELS as f32;
         let (mut distances, mut cells) = row.split_at(Axis(0), ANGLES);
@@ -96,7 +97,7 @@ impl Track {
         }
     }
 
-    /// The track as a mirror would show it: angle a becomes 180 - a, columns and x turn round.
+    /// Mirrored track: angle a becomes 180 - a, columns and x are reversed.
     pub fn mirrored(&self) -> Self {
         let angles: Vec<usize> = (0..ANGLES).map(|a| (ANGLES + ANGLES / 2 - a) % ANGLES).collect();
         let cells: Vec<usize> = (0..CELLS)
@@ -115,7 +116,7 @@ impl Track {
         }
     }
 
-    /// The track with frames chosen by index, in that order (shuffled, slowed down, sped up, cut).
+    /// Frames selected by index in this order (shuffled, slowed, sped up, cut).
     pub fn select(&self, frames: &[usize]) -> Self {
         Self {
             descriptors: self.descriptors.select(Axis(0), frames),
@@ -127,15 +128,15 @@ impl Track {
 }
 
 impl Clip {
-    /// The mirrored performance. With views at equal steps round the subject, the first from the front, view v of the mirrored
-    /// person is the mirror of view n - v.
+    /// Mirrored performance. With views at equal steps, the first from the front, view v becomes the mirror
+    /// of view n - v.
     pub fn mirrored(&self) -> Self {
         let n = self.views.len();
         let views = (0..n).map(|v| self.views[(n - v) % n].mirrored()).collect();
         Self { subject: self.subject.clone(), activity: self.activity.clone(), views }
     }
 
-    /// All views with frames chosen by a function of their number.
+    /// Selects frames of all views by a function of their number.
     pub fn select(&self, choose: impl Fn(usize) -> Vec<usize>) -> Self {
         let views = self.views.iter().map(|view| view.select(&choose(view.frames()))).collect();
         Self { subject: self.subject.clone(), activity: self.activity.clone(), views }
@@ -167,7 +168,7 @@ mod tests {
         let (mirrored, expected) = (of(&mask).mirrored(), of(&turned));
         assert_eq!(mirrored.cells, expected.cells);
         assert_ne!(mirrored.cells, of(&mask).cells);
-        // A ray that just meets a corner or just misses it: all but a few of 360.
+        // A ray may just hit or miss a corner: all but a few of 360.
         let off =
             mirrored.descriptors.iter().zip(&expected.descriptors).filter(|(a, b)| (*a - *b).abs() > 0.011);
         assert!(off.count() < 8, "a step of the march and a pixel's half");

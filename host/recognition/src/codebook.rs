@@ -1,4 +1,4 @@
-//! A clip's pattern over a codebook: how often its frames were near each of some hundred typical frames.
+//! A clip's pattern over a codebook of typical frames.
 //!
 //! Typical frames are k-means centres of the training frames (instead of the thesis' grid, whose cells grow with the power of the
 //! dimensions). Each frame is assigned softly, to all centres by a Gaussian of its distance; the assignments are averaged over the clip and
@@ -14,24 +14,24 @@ use rand::{Rng, SeedableRng};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-/// Typical frames and the width of the Gaussians about them.
+/// Typical frames with the width of their Gaussians.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Codebook {
-    /// Centres (M x F).
+    /// Centres of k-means (M x F).
     pub centres: Array2<f32>,
     /// Mean squared distance of training frames to their nearest centre.
     pub spread: f32,
-    /// A smaller codebook whose residuals are part of the pattern.
+    /// Smaller codebook for residuals in the pattern.
     pub residual: Option<Box<Codebook>>,
 }
 
-/// Frames drawn for the clustering at most.
+/// Limit of clustered frames.
 const MOST_FRAMES: usize = 8000;
-/// Rounds of Lloyd's iteration.
+/// Iterations of Lloyd's algorithm.
 const ROUNDS: usize = 12;
 
 impl Codebook {
-    /// Clusters training frames (N x F) into `size` centres by k-means++ and Lloyd's iteration.
+    /// Clusters frames (N x F) into `size` centres by k-means++ and Lloyd's algorithm.
     pub fn train(frames: ArrayView2<f32>, size: usize, seed: u64) -> Self {
         let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
         let step = frames.nrows().div_ceil(MOST_FRAMES).max(1);
@@ -72,23 +72,23 @@ impl Codebook {
         Self { centres, spread, residual: None }
     }
 
-    /// The same with the residuals of another `size` centres in its patterns; 0 leaves them out.
+    /// Adds residuals of `size` further centres; 0 for none.
     #[must_use]
     pub fn with_residuals(mut self, frames: ArrayView2<f32>, size: usize, seed: u64) -> Self {
         self.residual = (size > 0).then(|| Box::new(Self::train(frames, size, seed)));
         self
     }
 
-    /// Numbers in a pattern.
+    /// Length of a pattern.
     pub fn pattern_width(&self, mode: Mode) -> Option<usize> {
         let residual = self.residual.as_ref().map_or(0, |book| book.centres.len());
         self.centres.nrows().checked_mul(segments(mode).len())?.checked_add(residual)
     }
 
-    /// How much of every frame goes to which centre (frames x M): each row adds up to 1. `sharpness` scales the Gaussians' exponent
-    /// (1 = the training frames' spread).
+    /// Soft assignments (frames x M) with row sums of 1. `sharpness` scales the exponent (1 = spread of the
+    /// training frames).
     pub fn soft_assignments(&self, frames: ArrayView2<f32>, sharpness: f32) -> Array2<f32> {
-        // |f - c|^2 up to |f|^2, which the division by the row's sum takes out again.
+        // |f - c|^2 without |f|^2, which cancels in the normalisation.
         let norms = squared_norms(self.centres.view());
         let mut assignments = times_transposed(frames, self.centres.view());
         let scale = sharpness / self.spread.max(1e-9);
@@ -109,7 +109,7 @@ impl Codebook {
         assignments
     }
 
-    /// A clip's pattern from its frame vectors (frames x F); empty clips give zeros.
+    /// Pattern of frame vectors (frames x F); zeros for an empty clip.
     pub fn pattern(&self, frames: ArrayView2<f32>, mode: Mode, sharpness: f32) -> Array1<f32> {
         let size = self.centres.nrows();
         let assignments = self.soft_assignments(frames, sharpness);
@@ -134,7 +134,7 @@ impl Codebook {
     }
 }
 
-/// The nearest centre of every frame and the squared distance to it.
+/// Nearest centre of each frame and its squared distance.
 fn assigned(frames: ArrayView2<f32>, centres: &Array2<f32>) -> Vec<(usize, f32)> {
     let (lengths, norms) = (squared_norms(frames), squared_norms(centres.view()));
     let products = times_transposed(frames, centres.view());
@@ -152,7 +152,7 @@ fn assigned(frames: ArrayView2<f32>, centres: &Array2<f32>) -> Vec<(usize, f32)>
         .collect()
 }
 
-/// The parts of a clip that a pattern holds: (which, of how many).
+/// Parts of a clip in a pattern: (index, count).
 fn segments(mode: Mode) -> &'static [(usize, usize)] {
     match mode {
         Mode::OrderFree => &[(0, 1)],
@@ -164,7 +164,7 @@ fn squared(a: ArrayView1<f32>, b: ArrayView1<f32>) -> f32 {
     a.iter().zip(b).map(|(p, q)| (p - q) * (p - q)).sum()
 }
 
-/// The rows of many matrices under one another.
+/// Stacks the rows of matrices.
 pub(crate) fn stacked<'a>(parts: impl Iterator<Item = ArrayView2<'a, f32>>) -> Array2<f32> {
     let parts: Vec<_> = parts.collect();
     ndarray::concatenate(Axis(0), &parts).unwrap_or_else(|_| Array2::zeros((0, 0)))

@@ -1,10 +1,9 @@
 //! From silhouettes to points in few dimensions (Li 2014, section 9.3.1).
 //!
-//! A mask becomes a 360-number centroid distance ([`descriptor`]); a gallery of those is laid out by [`isomap`] (or [`landmark`]
-//! Isomap for large galleries, or [`pca`] for comparison); [`rbf`] learns the map that embeds new silhouettes.
+//! A mask becomes 360 centroid distances ([`descriptor`]); a gallery of them is laid out by [`isomap`],
+//! [`landmark`] Isomap (large galleries) or [`pca`]; [`rbf`] embeds new silhouettes.
 //!
-//! Matrices are row-major `Array2<f32>`, one sample per row. Work is spread over the current rayon pool: inside a pool of one
-//! thread everything runs on that thread.
+//! Matrices are row-major `Array2<f32>`, one sample per row. Uses the current rayon pool.
 
 pub mod descriptor;
 pub mod geodesic;
@@ -17,30 +16,20 @@ pub(crate) mod spectral;
 
 use ndarray::{Array2, ArrayView2};
 
-/// Why an embedding could not be made.
+/// Why an embedding failed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "the messages name the fields")]
 pub enum EmbeddingError {
     /// The work was cancelled.
     #[error("stopped before the embedding was made")]
     Stopped,
-    /// Fewer samples than needed.
     #[error("{found} samples are too few: {needed} are needed")]
-    TooFewSamples {
-        /// Rows of the matrix.
-        found: usize,
-        /// Rows that the layout needs at least.
-        needed: usize,
-    },
-    /// A value is not a number.
+    TooFewSamples { found: usize, needed: usize },
     #[error("sample {row} holds a value that is not finite")]
-    NotFinite {
-        /// Row of the sample.
-        row: usize,
-    },
-    /// The neighbour graph falls apart.
+    NotFinite { row: usize },
     #[error("the neighbour graph falls into {} parts ({}); raise the number of neighbours (now {neighbours}), or drop the samples that lie apart", .components.len(), describe(.components))]
     Disconnected {
-        /// The samples of each part, largest part first.
+        /// Samples of each part, largest first.
         components: Vec<Vec<usize>>,
         /// The requested neighbourhood, in words.
         neighbours: String,
@@ -50,32 +39,24 @@ pub enum EmbeddingError {
         "only {found} eigenvalues are positive, {asked} dimensions were asked for: ask for at most {found}"
     )]
     TooFewDimensions {
-        /// Eigenvalues above nought.
+        /// Positive eigenvalues.
         found: usize,
-        /// Dimensions asked for.
         asked: usize,
     },
-    /// The RBF system cannot be solved.
     #[error(
         "the RBF system is singular with ridge {ridge}: raise it (1e-4 to 1e-2 are usual) or drop doubled samples"
     )]
-    Singular {
-        /// The ridge used.
-        ridge: f64,
-    },
-    /// Shapes that do not belong together.
+    Singular { ridge: f64 },
     #[error("{what}: expected {expected}, found {found}")]
     Shape {
-        /// The array or the dimension of it that is off.
+        /// Mismatched array or dimension.
         what: &'static str,
-        /// Its length where things fit.
         expected: usize,
-        /// Its length here.
         found: usize,
     },
 }
 
-/// Sizes and first members of the parts of a graph, for the error's text.
+/// Sizes and first members of a graph's parts, for the error text.
 fn describe(components: &[Vec<usize>]) -> String {
     const SHOWN: usize = 4;
     let mut text: Vec<String> = components
@@ -94,7 +75,7 @@ fn describe(components: &[Vec<usize>]) -> String {
     text.join("; ")
 }
 
-/// Checks that all rows are finite and that there are enough.
+/// Checks that all rows are finite and sufficient in number.
 fn check(samples: ArrayView2<f32>, needed: usize) -> Result<(), EmbeddingError> {
     if samples.nrows() < needed {
         return Err(EmbeddingError::TooFewSamples { found: samples.nrows(), needed });
@@ -105,7 +86,7 @@ fn check(samples: ArrayView2<f32>, needed: usize) -> Result<(), EmbeddingError> 
     }
 }
 
-/// `a b^T` of two row-major matrices over the current rayon pool.
+/// `a b^T` of row-major matrices on the current rayon pool.
 pub(crate) fn times_transposed(a: ArrayView2<f32>, b: ArrayView2<f32>) -> Array2<f32> {
     let (a, b) = (a.as_standard_layout(), b.as_standard_layout());
     let mut product = Array2::<f32>::zeros((a.nrows(), b.nrows()));
@@ -130,7 +111,7 @@ pub(crate) fn squared_norms(samples: ArrayView2<f32>) -> Vec<f32> {
     samples.rows().into_iter().map(|row| row.iter().map(|v| v * v).sum()).collect()
 }
 
-/// Squared distance in eight partial sums, so that it vectorises.
+/// Eight partial sums, so that it vectorises.
 #[inline(always)]
 pub(crate) fn squared_distance(a: &[f32], b: &[f32]) -> f32 {
     let mut sums = [0.0_f32; 8];

@@ -1,5 +1,5 @@
-//! How well activities are recognised: leave-one-subject-out with every parameter chosen inside the training subjects, and
-//! confusion matrices with intervals, and whether answers are as sure as they should be.
+//! Evaluation: leave-one-subject-out with parameters chosen inside the training subjects, confusion matrices
+//! with intervals, calibration.
 
 pub mod calibration;
 pub mod confusion;

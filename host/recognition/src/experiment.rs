@@ -1,8 +1,8 @@
 //! Parameters chosen by cross-validation, and their candidates.
 //!
-//! Choices are made by a sweep: every parameter in turn takes each of its values, the best stays. Accuracy is that of inner folds
-//! over the training subjects, so nothing is ever tuned on who is tested. Values were laid out by what they mean (factors of two or
-//! three about equal weight), not by what did best on any set.
+//! A sweep: each parameter in turn takes each of its values, the best is kept. Accuracy is that of inner
+//! folds over the training subjects. Values are spaced by meaning (factors of two or three around equal
+//! weight), not by results on any set.
 
 use super::alignment::Alignment;
 use super::classifier::{ClassifierKind, Family};
@@ -11,27 +11,27 @@ use super::model::Recogniser;
 use super::space::{Layout, PatternKind, Space, SpaceSettings};
 use std::sync::Arc;
 
-/// One parameter of the space and the values it may take.
+/// A parameter of the space with its candidate values.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Sweep {
-    /// How the gallery is laid out, with the number of dimensions.
+    /// Layout of the gallery with its dimensions.
     Layout(Vec<(Layout, usize)>),
-    /// Coefficient of the RBF map; without effect on principal components.
+    /// Coefficient of the RBF map; no effect on principal components.
     Gamma(Vec<f32>),
-    /// Members per dimension of the thesis' grid, or centres of a codebook.
+    /// Members per dimension of the thesis' grid, or codebook size.
     Pattern(Vec<PatternKind>),
-    /// [`SpaceSettings::residuals`]; without effect on the thesis' grid.
+    /// [`SpaceSettings::residuals`]; no effect on the thesis' grid.
     Residuals(Vec<usize>),
     /// [`Weights::box_weight`].
     BoxWeight(Vec<f32>),
     /// [`Weights::relative_weight`].
     RelativeWeight(Vec<f32>),
-    /// [`Weights::motion_weight`]; without effect where order does not count.
+    /// [`Weights::motion_weight`]; no effect without order.
     MotionWeight(Vec<f32>),
 }
 
 impl Sweep {
-    /// The settings with this parameter at each of its values, those left out that change nothing.
+    /// Settings with each value of the parameter, without those of no effect.
     pub fn variants(&self, base: &SpaceSettings) -> Vec<SpaceSettings> {
         let with = |change: &dyn Fn(&mut SpaceSettings)| {
             let mut settings = base.clone();
@@ -70,30 +70,30 @@ impl Sweep {
 /// Candidates of the search.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Experiment {
-    /// Where the sweeps start.
+    /// Start of the sweeps.
     pub space: SpaceSettings,
-    /// Parameters of the space, in the order in which they are chosen.
+    /// Sweeps in the order of choice.
     pub sweeps: Vec<Sweep>,
-    /// Sharpness of the codebook's soft assignments to choose from, with every space.
+    /// Candidate sharpness values of soft assignments.
     pub sharpness: Vec<f32>,
-    /// Classifiers to choose from, with every space.
+    /// Candidate classifiers for every space.
     pub classifiers: Vec<ClassifierKind>,
-    /// Whether the training clips' mirrors train too (people are left- and right-handed).
+    /// Also train on mirrored clips (left- and right-handed people).
     pub mirror: bool,
-    /// Folds of the choice inside the training subjects.
+    /// Folds inside the training subjects.
     pub inner_folds: usize,
-    /// What of the clips that are recognised is brought to the training clips', without their labels.
+    /// Unsupervised alignment of recognised clips to the training clips.
     pub align: Alignment,
-    /// Rounds of learning from one's own surest answers for the clips that are recognised ([`super::self_training`]); 0 for none.
+    /// Rounds of [`super::self_training`] on the recognised clips; 0 for none.
     pub self_training: usize,
-    /// A space that is learned already, of a model's network: then only the classifier is trained, and nothing about spaces is chosen.
+    /// Pretrained space of a network: only the classifier is trained.
     pub features: Option<Box<Space>>,
     /// The auxiliary model that decides whether a clip is unknown ([`super::auxiliary_model`]).
     pub second: Option<Arc<Recogniser>>,
 }
 
 impl Experiment {
-    /// One space as it is, with a linear SVC; only sharpness and the SVC's cost are chosen.
+    /// One fixed space with a linear SVC; chooses sharpness and cost.
     pub fn codebook(space: SpaceSettings) -> Self {
         Self {
             space,
@@ -109,7 +109,7 @@ impl Experiment {
         }
     }
 
-    /// The default method with everything chosen: layout, gamma, weights, size of the codebook, sharpness, the SVC's cost.
+    /// Default method with a full search: layout, gamma, weights, codebook size, sharpness, cost.
     pub fn searched(mode: Mode) -> Self {
         let even = Weights { relative_weight: 1.0, box_weight: 3.0, motion_weight: 1.0 };
         Self {
@@ -126,7 +126,7 @@ impl Experiment {
         }
     }
 
-    /// The thesis' method: 0/1 grids of several sizes over an Isomap embedding, gamma of its RBF map, k nearest neighbours.
+    /// The thesis' method: 0/1 grids over an Isomap embedding, gamma of its RBF map, k nearest neighbours.
     pub fn thesis() -> Self {
         let grid = |bins: [usize; 3]| PatternKind::Thesis(bins.to_vec());
         Self {
@@ -146,8 +146,7 @@ impl Experiment {
         }
     }
 
-    /// A classifier on what a network gives for every view: features that a model learned from thousands of clips serve
-    /// where one's own are few or look otherwise.
+    /// Classifier on a network's features, for few or unusual clips.
     pub fn on_features(space: Space, family: Family) -> Self {
         Self {
             space: space.settings.clone(),
@@ -158,18 +157,18 @@ impl Experiment {
         }
     }
 
-    /// The same with another classifier, its parameter chosen from all that it tries.
+    /// Another classifier with all its candidate parameters.
     #[must_use]
     pub fn with_classifier(self, family: Family) -> Self {
         Self { classifiers: family.tried(), ..self }
     }
 
-    /// How many spaces are tried. Which variants of a parameter change nothing hangs on what was chosen before, so that a search may try some more or fewer.
+    /// Approximate number of spaces tried; it depends on earlier choices.
     pub fn spaces(&self) -> usize {
         1 + self.sweeps.iter().map(|sweep| sweep.variants(&self.space).len()).sum::<usize>()
     }
 
-    /// The same with nothing chosen: the first of everything.
+    /// Fixed settings: the first of each.
     #[must_use]
     pub fn fixed(mut self) -> Self {
         self.sweeps.clear();

@@ -1,11 +1,11 @@
 //! Features of one frame of a clip: its embedded point, its box relative to the clip, and (ordered mode) how both move.
 //!
-//! - Point: embedded coordinates over the gallery's spread, so that one unit is one standard deviation of the first dimension.
-//! - Relative point: the same against the clip's mean, which takes a person's build out.
-//! - Box: height and width over the clip's largest height, centroid against the clip's mean over the same. The 100 x 100
-//!   normalisation throws these away. All are the same when frames are shuffled.
-//! - Motion: central difference over two frames either way, over the clip's RMS difference: its direction and relative size stay
-//!   when the whole clip runs slower or faster.
+//! - Point: embedded coordinates in standard deviations of the first dimension.
+//! - Relative point: minus the clip's mean, which removes the person's build.
+//! - Box: height and width over the clip's largest height, centroid relative to the clip's mean in the same
+//!   unit, which the
+//!   100 x 100 normalisation removes. Independent of the order of frames.
+//! - Motion: central difference over two frames, relative to the clip's RMS, so it is independent of speed.
 
 use super::clip::BOX_NUMBERS;
 use ndarray::{Array2, ArrayView2, Axis, s};
@@ -15,10 +15,10 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Mode {
-    /// Shuffling frames changes nothing (the thesis' promise).
+    /// Independent of the order (as promised by the thesis).
     #[default]
     OrderFree,
-    /// Motion counts: sitting down is not standing up.
+    /// Motion counts: sitting down differs from standing up.
     Ordered,
 }
 
@@ -33,14 +33,14 @@ impl std::str::FromStr for Mode {
     }
 }
 
-/// How much each part of a frame's vector weighs.
+/// Weights of a frame vector's parts.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Weights {
     /// Embedded point relative to the clip's mean, in addition to the point itself.
     pub relative_weight: f32,
-    /// Box against embedded point.
+    /// Box, compared with the point.
     pub box_weight: f32,
-    /// Motion against position.
+    /// Motion, compared with position.
     pub motion_weight: f32,
 }
 
@@ -50,10 +50,10 @@ impl Default for Weights {
     }
 }
 
-/// Frames before and after over which motion is taken.
+/// Frames before and after for motion.
 const REACH: usize = 2;
 
-/// The frame vectors of a track (frames x F) from its embedded points (frames x D, already over the gallery's spread) and its boxes.
+/// Frame vectors (frames x F) from embedded points (frames x D, over the gallery's spread) and boxes.
 pub fn vectors(
     points: ArrayView2<f32>,
     boxes: Option<ArrayView2<f32>>,
@@ -90,7 +90,7 @@ pub fn vectors(
     out
 }
 
-/// Central differences of the rows, over their RMS length in the clip.
+/// Central differences over their RMS length in the clip.
 fn differences(rows: ArrayView2<f32>) -> Array2<f32> {
     let n = rows.nrows();
     let mut out = Array2::zeros(rows.dim());

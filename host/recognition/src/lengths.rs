@@ -1,32 +1,32 @@
-//! How long clips of an activity last.
+//! Durations of activities.
 //!
-//! The durations of a hidden semi-Markov model's states (Yu, Artificial Intelligence 174, 2010), log-normal here: people differ by factors. The
-//! spread is drawn towards one that any activity may have, as if that had been seen in some clips more, so that it is not 0 of one clip.
+//! Log-normal state durations as in a hidden semi-Markov model (Yu, Artificial Intelligence 174, 2010). The
+//! spread is regularised by a prior worth some clips, so that a single clip does not give 0.
 
 use super::clip::Clip;
 use serde::{Deserialize, Serialize};
 
-/// Spread of the logarithm of lengths where nothing is known of an activity.
+/// Prior spread of log length.
 const SPREAD: f32 = 0.6;
-/// Clips that this counts as much as.
+/// Number of clips that the prior counts for.
 const PRIOR_CLIPS: f32 = 2.0;
 
-/// Lengths of an activity's clips.
+/// Distribution of an activity's clip lengths.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Lengths {
-    /// Mean of the logarithm of frames.
+    /// Mean of the log of frames.
     pub mean_ln: f32,
-    /// Its spread.
+    /// Spread of the log of frames.
     pub spread: f32,
 }
 
 impl Lengths {
-    /// About a number of frames, of an activity of which no more is known.
+    /// Prior around a number of frames.
     pub fn about(frames: usize) -> Self {
         Self { mean_ln: (frames.max(1) as f32).ln(), spread: SPREAD }
     }
 
-    /// Of each activity's clips.
+    /// Lengths of each activity's clips.
     pub(super) fn of(clips: &[Clip], activities: &[String]) -> Vec<Self> {
         activities.iter().map(|activity| Self::of_activity(clips, activity)).collect()
     }
@@ -41,13 +41,13 @@ impl Lengths {
         Self { mean_ln, spread: variance.sqrt() }
     }
 
-    /// How unlikely it is that one lasts so many frames, in nats, against the likeliest of an activity of which nothing is known.
+    /// Negative log likelihood of a length, in nats, relative to the prior's maximum.
     pub fn unlikely(&self, frames: f32) -> f32 {
         let off = (frames.ln() - self.mean_ln) / self.spread;
         0.5 * off * off + (self.spread / SPREAD).ln()
     }
 
-    /// Whether they can be lengths at all.
+    /// Whether the values are valid.
     pub(super) fn is_sound(&self) -> bool {
         self.mean_ln.is_finite() && self.spread.is_finite() && self.spread > 0.0
     }
@@ -69,10 +69,10 @@ mod tests {
         };
         let clips = [clip("wave", 10), clip("sit", 20), clip("sit", 80)];
         let [sit, wave] = Lengths::of(&clips, &["sit".into(), "wave".into()])[..] else { panic!("two") };
-        // The geometric mean of 20 and 80 is 40, each a factor of 2 away: (2 ln(2)^2 + 2 * 0.36) / 4 by hand.
+        // The geometric mean of 20 and 80 is 40, each a factor of 2 away: (2 ln(2)^2 + 2 * 0.36) / 4.
         assert!((sit.mean_ln.exp() - 40.0).abs() < 1e-3, "{sit:?}");
         assert!((sit.spread - 0.420_2_f32.sqrt()).abs() < 1e-3, "{sit:?}");
-        // One clip: two thirds of what any activity may have.
+        // One clip: two thirds of the prior's variance.
         assert!((wave.spread - (0.36_f32 * 2.0 / 3.0).sqrt()).abs() < 1e-6, "{wave:?}");
         assert_eq!(Lengths::about(10).unlikely(10.0), 0.0);
         assert!(wave.unlikely(10.0) < wave.unlikely(20.0) && wave.unlikely(20.0) < wave.unlikely(2.0));

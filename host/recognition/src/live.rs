@@ -1,4 +1,4 @@
-//! Recognition while frames come in: a streaming answer over the last frames, and windows over a long recording.
+//! Streaming recognition over the last frames, and windows over long recordings.
 
 use super::clip::Track;
 use super::model::{Answer, ModelError, Recogniser};
@@ -8,8 +8,8 @@ use farnear_silhouettes::mask::Mask;
 use ndarray::{Array1, Array2, Axis, concatenate};
 use std::collections::VecDeque;
 
-/// Keeps the last frames of every view and answers for them. Every frame is embedded once, and the nearest of all training patterns is
-/// found by an index: a frame costs what its window's pattern costs.
+/// Keeps the last frames of every view. Each frame is embedded once and the nearest pattern found by an
+/// index, so a frame costs one window's pattern.
 #[derive(Debug)]
 pub struct Live<'a> {
     recogniser: &'a Recogniser,
@@ -30,7 +30,7 @@ struct Seen {
 }
 
 impl<'a> Live<'a> {
-    /// Watches the last `window` frames (at least one).
+    /// Uses the last `window` frames (at least one).
     pub fn new(recogniser: &'a Recogniser, window: usize, full_frames: bool) -> Self {
         let nearest = Nearest::new(recogniser.patterns.view());
         Self { recogniser, nearest, window: window.max(1), full_frames, frames: VecDeque::new() }
@@ -38,9 +38,7 @@ impl<'a> Live<'a> {
 
     /// Takes the masks of one moment, one per view, and answers for the window that ends with it. Empty masks are left out, so a moment
     /// without anybody changes nothing but pushes old frames out.
-    ///
-    /// # Errors
-    /// Another number of views than the model's.
+    /// Errors: Another number of views than the model's.
     pub fn push(&mut self, masks: &[Mask]) -> Result<Answer, ModelError> {
         let scaling = self.recogniser.settings.scaling;
         let moment =
@@ -49,9 +47,7 @@ impl<'a> Live<'a> {
     }
 
     /// As [`Self::push`], for masks that are described already: one track of a single frame per view.
-    ///
-    /// # Errors
-    /// Another number of views than the model's.
+    /// Errors: Another number of views than the model's.
     pub fn push_described(&mut self, moment: Vec<Track>) -> Result<Answer, ModelError> {
         self.recogniser.check(&moment)?;
         let boxed = self.recogniser.uses_boxes();
@@ -106,7 +102,7 @@ impl<'a> Live<'a> {
     }
 }
 
-/// Tracks one after the other.
+/// Concatenates tracks.
 pub fn joined<'t>(parts: impl Iterator<Item = &'t Track>) -> Track {
     let parts: Vec<&Track> = parts.collect();
     let empty_frames = parts.iter().map(|part| part.empty_frames).sum();
@@ -121,8 +117,7 @@ pub fn joined<'t>(parts: impl Iterator<Item = &'t Track>) -> Track {
     }
 }
 
-/// A recording cut where the answer changes: every frame goes to the window whose middle is nearest, neighbours with one answer
-/// become one stretch, whose confidence is the mean.
+/// Segments of equal answers: each frame takes the window with the nearest middle; confidence is the mean.
 pub fn segments(windows: &[Stretch]) -> Vec<Segment> {
     let mut found: Vec<Segment> = Vec::new();
     let mut merged = 0.0;
@@ -150,14 +145,14 @@ pub fn segments(windows: &[Stretch]) -> Vec<Segment> {
     found
 }
 
-/// A part of a recording with one answer.
+/// Part of a recording with one answer.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Segment {
-    /// First frame, counted from 0.
+    /// First frame, from 0.
     pub from: usize,
-    /// One past the last frame.
+    /// End frame, exclusive.
     pub to: usize,
-    /// The activity, `None` = unknown.
+    /// Activity, `None` = unknown.
     pub activity: Option<String>,
     /// Mean confidence of its windows, 0 to 1.
     pub confidence: f32,
@@ -166,18 +161,16 @@ pub struct Segment {
 /// Answer for a segment of a recording.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Stretch {
-    /// First frame, counted from 0.
+    /// First frame, from 0.
     pub from: usize,
-    /// One past the last frame.
+    /// End frame, exclusive.
     pub to: usize,
-    /// The answer for it.
+    /// Answer for these frames.
     pub answer: Answer,
 }
 
 /// Recognises a long recording window by window: `length` frames every `step`. The last window is shorter if it has to be.
-///
-/// # Errors
-/// Another number of views than the model's.
+/// Errors: Another number of views than the model's.
 pub fn windows(
     recogniser: &Recogniser,
     views: &[Track],

@@ -14,18 +14,18 @@ use crate::embedding::{EmbeddingError, descriptor::Scaling, squared_distance};
 use ndarray::{Array1, Array2, ArrayView1};
 use serde::{Deserialize, Serialize};
 
-/// Everything that is chosen for a recogniser.
+/// Settings of a recogniser.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RecogniserSettings {
-    /// How masks are scaled before they are described.
+    /// Scaling of masks before description.
     pub scaling: Scaling,
-    /// How frames are embedded and clips become patterns.
+    /// Settings of embedding and patterns.
     pub space: SpaceSettings,
-    /// Sharpness of the codebook's soft assignments.
+    /// Sharpness of soft assignments.
     pub sharpness: f32,
-    /// Which classifier, with its parameter.
+    /// Classifier with its parameter.
     pub classifier: ClassifierKind,
-    /// Whether the training clips' mirrors train too.
+    /// Also train on mirrored clips.
     pub mirror: bool,
 }
 
@@ -44,42 +44,41 @@ impl Default for RecogniserSettings {
 /// A trained recogniser.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Recogniser {
-    /// How it was trained.
+    /// Settings of the training.
     pub settings: RecogniserSettings,
-    /// Activities by class.
+    /// Activities by class index.
     pub activities: Vec<String>,
-    /// Views that are fused, in order.
+    /// Number of fused views.
     pub views: usize,
-    /// The learned space.
+    /// Learned space of frames and patterns.
     pub space: Space,
-    /// The classifier, trained on the patterns.
+    /// Classifier of the patterns.
     pub classifier: Classifier,
-    /// Squared distances to the nearest of [`Self::patterns`] beyond which a clip is unknown where there is no auxiliary model.
+    /// Squared distance limits to the nearest of [`Self::patterns`]; used without an auxiliary model.
     pub limits: Limits,
     /// Training patterns, or prototypes of them; the outlier score is measured from the nearest.
     pub patterns: Array2<f32>,
-    /// Class of each of [`Self::patterns`], where they are training clips; empty for networks, and in models of older formats.
+    /// Class of each of [`Self::patterns`] if they are training clips; empty for networks and older models.
     pub labels: Vec<usize>,
-    /// What another recogniser says, from which clips and windows are called unknown.
+    /// Auxiliary model for unknown clips and windows.
     pub second: Option<AuxiliaryModel>,
-    /// Frames of a training clip, median: what a window over a long recording should hold.
+    /// Median frames of a training clip, the suggested window length.
     pub typical_frames: usize,
-    /// How long its clips last, by class; empty in models of older formats.
+    /// Clip lengths by class; empty in older models.
     pub lengths: Vec<Lengths>,
 }
 
-/// An activity, and how sure that is.
+/// Answer for a clip.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Answer {
-    /// The activity, `None` = unknown: too far from all training data, or nothing to see.
+    /// Activity; `None` = unknown or nothing to see.
     pub activity: Option<String>,
     /// Probability of the best activity, 0 to 1.
     pub confidence: f32,
     /// Probability of every activity.
     pub probabilities: Vec<(String, f32)>,
-    /// How far the clip is from what was learned over the largest such distance at which the activity still counts as known: above 1
-    /// is unknown. The distance is that of an auxiliary model from what it said of the activity's training clips, or the squared one
-    /// to the nearest training pattern.
+    /// Distance from the training data relative to the limit of the activity: above 1 is unknown. The
+    /// distance is the auxiliary model's, or the squared one to the nearest training pattern.
     pub outlier_score: f32,
 }
 
@@ -90,7 +89,7 @@ impl Answer {
         Self { activity: None, confidence: 0.0, probabilities, outlier_score: f32::INFINITY }
     }
 
-    /// One answer from those of several views: probabilities by their geometric mean, the outlier score by its mean.
+    /// Joint answer of several views: geometric mean of probabilities, mean outlier score.
     pub(super) fn joint(answers: &[Self]) -> Self {
         let n = answers.len().max(1) as f32;
         let mut values: Vec<f32> = (0..answers[0].probabilities.len())
@@ -102,7 +101,7 @@ impl Answer {
         Self::of(names.zip(values).collect(), outlier_score)
     }
 
-    /// The answer if only some activities can be: their probabilities, which add up to 1 again.
+    /// Restricts the answer to some activities; their probabilities sum to 1.
     #[must_use]
     pub fn among(&self, activities: &[String]) -> Self {
         let mut kept: Vec<(String, f32)> =
@@ -112,7 +111,7 @@ impl Answer {
         Self::of(kept, self.outlier_score)
     }
 
-    /// The most probable activity (the first of equals), also where it is called unknown.
+    /// Most probable activity (the first of equals), also if unknown.
     pub fn best(&self) -> Option<&String> {
         most_probable(&self.probabilities).map(|(name, _)| name)
     }
@@ -133,59 +132,34 @@ fn most_probable(probabilities: &[(String, f32)]) -> Option<&(String, f32)> {
 
 /// Why a model could not be made, read or used.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "the messages name the fields")]
 pub enum ModelError {
-    /// Not a model.
     #[error("not a farnear activity model: {0}")]
     NotAModel(&'static str),
-    /// Made by another version of the program.
     #[error("the model has {what} version {found}, this program reads {expected}: train it again")]
     Version {
-        /// The part of the file that has versions: format or descriptor.
+        /// `format` or `descriptor`.
         what: &'static str,
-        /// In the file.
         found: u32,
-        /// Read by this program.
         expected: u32,
     },
-    /// Some of the body's bytes have changed.
     #[error("the model is damaged: checksum {found:#010x}, expected {expected:#010x}")]
-    Checksum {
-        /// Of the body.
-        found: u32,
-        /// In the header.
-        expected: u32,
-    },
-    /// The body cannot be read.
+    Checksum { found: u32, expected: u32 },
     #[error("the model's body cannot be read: {0}")]
     Body(String),
-    /// The parts of the body do not belong together.
     #[error("the model's parts do not belong together: {0}")]
     Parts(&'static str),
-    /// The clip does not fit the model.
     #[error("the clip has {found} views{boxes}, the model was trained on {expected}{expected_boxes}", boxes = with(*.found_boxes), expected_boxes = with(*.expected_boxes))]
-    Clip {
-        /// Views of the clip.
-        found: usize,
-        /// Whether it has box motion.
-        found_boxes: bool,
-        /// Views of the model.
-        expected: usize,
-        /// Whether the model uses box motion.
-        expected_boxes: bool,
-    },
-    /// A model without the patterns of its training clips.
+    Clip { found: usize, found_boxes: bool, expected: usize, expected_boxes: bool },
     #[error(
         "the model keeps no training clips of its own to learn on with (those that come with the program do not, for learning on made them \
          worse): train one on labelled samples, with this model's features if they are few"
     )]
     Unlabelled,
-    /// The other recogniser in a model's file.
     #[error("the model's auxiliary model: {0}")]
     Second(Box<ModelError>),
-    /// Nothing to train on.
     #[error("a model needs clips of at least two activities, found {0}")]
     Activities(usize),
-    /// A space could not be learned or used.
     #[error(transparent)]
     Embedding(#[from] EmbeddingError),
 }
@@ -199,9 +173,8 @@ impl Recogniser {
     ///
     /// A model of one view takes any number of views: the answers of all that see a person count together. Whether the clip is unknown
     /// says the auxiliary model, where the model has one.
-    ///
-    /// # Errors
-    /// A clip with other views than the model's, or with cut-out silhouettes where the model knows full frames.
+    /// Errors: a clip with other views than the model's, or with cut-out silhouettes where the model knows
+    /// full frames.
     pub fn recognise(&self, views: &[Track]) -> Result<Answer, ModelError> {
         self.check(views)?;
         let mut answers = self
@@ -219,7 +192,7 @@ impl Recogniser {
         Ok(Answer::of(answer.probabilities, outlier_score))
     }
 
-    /// Whether views fit the model.
+    /// Checks that views match the model.
     pub(super) fn check(&self, views: &[Track]) -> Result<(), ModelError> {
         let boxes = self.uses_boxes();
         let found_boxes = views.iter().all(|view| view.boxes.is_some());
@@ -248,18 +221,18 @@ impl Recogniser {
         if self.views > 1 {
             return vec![views.to_vec()];
         }
-        // A network was taught mirrors too: what it says of a clip's mirror is an auxiliary model.
+        // A network was taught mirrors too, so the mirror's answer counts as a second opinion.
         let mirrors = matches!(self.space.pattern, Pattern::Network(_) | Pattern::Features(_));
         let both = |view: &Track| std::iter::once(view.clone()).chain(mirrors.then(|| view.mirrored()));
         views.iter().flat_map(both).map(|view| vec![view]).collect()
     }
 
-    /// The answer for a pattern.
+    /// Answer for a pattern.
     pub(super) fn answer(&self, pattern: ArrayView1<f32>) -> Answer {
         self.answer_by(pattern, self.distance(pattern))
     }
 
-    /// The answer for a pattern whose squared distance to the nearest of what was learned is known.
+    /// Answer for a pattern with a known squared distance to the nearest training pattern.
     pub(super) fn answer_by(&self, pattern: ArrayView1<f32>, squared_distance: f32) -> Answer {
         let probabilities = self.classifier.probabilities(pattern);
         let (best, confidence) = largest(&probabilities);
@@ -272,7 +245,7 @@ impl Recogniser {
         }
     }
 
-    /// The pattern of views that fit the model. A model of cut-out silhouettes looks at shapes only, also in full frames.
+    /// Pattern of matching views. A model of cropped silhouettes uses shapes only.
     pub(super) fn pattern(&self, views: &[Track]) -> Result<Array1<f32>, ModelError> {
         if self.uses_boxes() || views.iter().all(|view| view.boxes.is_none()) {
             return pattern(&self.space, views, self.settings.sharpness);
@@ -283,9 +256,7 @@ impl Recogniser {
 
     /// The same recogniser for clips from elsewhere (another camera, sensor, laboratory), of which none is labelled: its classifier is trained on
     /// with its surest answers for them ([`super::self_training`]). What counts as unknown stays.
-    ///
-    /// # Errors
-    /// Clips that do not fit; [`ModelError::Unlabelled`].
+    /// Errors: Clips that do not fit; [`ModelError::Unlabelled`].
     pub fn adapted(&self, clips: &[Vec<Track>], rounds: usize) -> Result<Self, ModelError> {
         if self.labels.is_empty() || self.labels.len() != self.patterns.nrows() {
             return Err(ModelError::Unlabelled);
@@ -327,7 +298,7 @@ impl Recogniser {
     }
 }
 
-/// All views' patterns, one after the other.
+/// Concatenated patterns of all views.
 pub(super) fn pattern(space: &Space, views: &[Track], sharpness: f32) -> Result<Array1<f32>, ModelError> {
     let patterns: Result<Vec<Array1<f32>>, EmbeddingError> =
         views.iter().map(|view| Ok(space.pattern_of(space.vectors(view)?.view(), sharpness))).collect();

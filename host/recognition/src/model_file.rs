@@ -1,9 +1,9 @@
-//! Models as files: bytes with a version and a checksum.
+//! Model files with version and checksum.
 //!
-//! The 8 bytes `farnearA`, format version (u32), descriptor version (u32), length of the body (u64), CRC-32 of the body (u32), all
-//! little-endian, then the body (postcard), the classes of its patterns, an auxiliary model or none, and how long clips last. Files of older
-//! versions, which end earlier, are read too. Anything that does not fit is refused by name, never guessed; a body that decodes is also
-//! checked part against part, so that a crafted file cannot make recognition panic.
+//! 8 bytes `farnearA`, format version (u32), descriptor version (u32), body length (u64), CRC-32 of the body
+//! (u32), little-endian; then the body (postcard), pattern classes, an optional auxiliary model, and clip
+//! lengths. Older versions, which end earlier, are read too. Anything invalid is rejected by name; decoded
+//! parts are checked against each other, so a crafted file cannot cause a panic.
 
 use super::auxiliary_model::AuxiliaryModel;
 use super::classifier::Classifier;
@@ -26,9 +26,9 @@ use ndarray::{Array1, Array2};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
-/// Version of the file's format.
+/// Version of the file format.
 pub const FORMAT_VERSION: u32 = 6;
-/// The versions before, which are read: without lengths,
+/// Older versions: without lengths,
 const LENGTHLESS_VERSION: u32 = 5;
 /// with an auxiliary model in every file,
 const SECOND_VERSION: u32 = 4;
@@ -39,7 +39,7 @@ const UNLABELLED_VERSION: u32 = 2;
 const MAGIC: &[u8; 8] = b"farnearA";
 const HEADER: usize = 28;
 
-/// The body of a file: plain values only.
+/// Body of a file.
 #[derive(Serialize, Deserialize)]
 struct Body {
     settings: RecogniserSettings,
@@ -71,7 +71,7 @@ enum SavedPattern {
     FeaturesOfMembers(Box<Features>),
 }
 
-/// A network of one member, as files had it when there were no others.
+/// Network with one member, as in older files.
 #[derive(Serialize, Deserialize)]
 struct OneMember {
     mean: Array1<f32>,
@@ -109,10 +109,10 @@ impl SavedPattern {
     }
 }
 
-/// An auxiliary model: the other recogniser's file, its profiles and limits.
+/// File of the auxiliary recogniser, its profiles and limits.
 type SavedAuxiliary = (Vec<u8>, Array2<f32>, Limits);
 
-/// A body's bytes behind their header.
+/// Header and body.
 fn framed(version: u32, body: &[u8]) -> Vec<u8> {
     let mut bytes = Vec::with_capacity(HEADER + body.len());
     bytes.extend(MAGIC);
@@ -126,9 +126,7 @@ fn framed(version: u32, body: &[u8]) -> Vec<u8> {
 
 impl Recogniser {
     /// The model as a file's bytes.
-    ///
-    /// # Errors
-    /// [`ModelError::Body`] if it cannot be encoded.
+    /// Errors: [`ModelError::Body`] if it cannot be encoded.
     pub fn to_bytes(&self) -> Result<Vec<u8>, ModelError> {
         let saved = |second: &AuxiliaryModel| -> Result<SavedAuxiliary, ModelError> {
             Ok((second.recogniser.to_bytes()?, second.profiles.clone(), second.limits.clone()))
@@ -168,14 +166,12 @@ impl Recogniser {
     }
 
     /// A model from a file's bytes.
-    ///
-    /// # Errors
-    /// Anything that is not a whole, undamaged model of this version and this descriptor.
+    /// Errors: Anything that is not a whole, undamaged model of this version and this descriptor.
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, ModelError> {
         Self::read(bytes, true)
     }
 
-    /// A model; who says something of another has nobody behind it, or a file might nest without end.
+    /// A model; an auxiliary one has no auxiliary model, which bounds the nesting.
     fn read(bytes: &[u8], may_have_second: bool) -> Result<Self, ModelError> {
         let header = bytes.get(..HEADER).ok_or(ModelError::NotAModel("shorter than its header"))?;
         if &header[..8] != MAGIC {
@@ -258,7 +254,7 @@ fn checksum(body: &[u8]) -> u32 {
 }
 
 impl Recogniser {
-    /// Checks that all parts have the sizes that recognition relies on.
+    /// Checks the sizes that recognition relies on.
     fn checked(self) -> Result<Self, ModelError> {
         let fits =
             |holds: bool, what: &'static str| if holds { Ok(()) } else { Err(ModelError::Parts(what)) };
@@ -349,10 +345,10 @@ mod tests {
             .expect("trained")
     }
 
-    /// As a model's file was in an older version.
+    /// A model's file in an older version.
     fn written_before(model: &Recogniser, version: u32) -> Vec<u8> {
         let mut body = model.body();
-        // In version 3 a network was its mean, spread and three layers, with no count before them.
+        // In version 3 a network was its mean, spread and three layers without a count.
         if let (Pattern::Network(network), SINGLE_VERSION) = (&model.space.pattern, version) {
             let [layers] = &network.members[..] else { panic!("one member") };
             let (mean, spread) = (network.mean.clone(), network.spread.clone());

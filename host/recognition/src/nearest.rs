@@ -1,33 +1,33 @@
-//! The nearest of many patterns, found without looking at all of them.
+//! Exact nearest pattern without comparing all.
 //!
-//! Patterns are projected on some dozen orthonormal directions. The distance there, and how much of either lies outside, bound the whole
-//! distance from below (the directions' complement counts as one dimension), so that only patterns whose bound is smaller than the
-//! smallest distance so far are compared number by number: the answer is exact. O(patterns x directions) a query and few comparisons.
+//! Patterns are projected on some dozen orthonormal directions. Distances there and the residual lengths
+//! bound the total distance from below, so only patterns with a smaller bound than the best distance are
+//! compared. O(patterns x directions) per query.
 
 use crate::embedding::squared_distance;
 use ndarray::{Array1, Array2, ArrayView1, ArrayView2, Axis};
 
-/// Directions that patterns are projected on.
+/// Directions of projection.
 const DIRECTIONS: usize = 64;
-/// Fewer patterns are all compared.
+/// Fewer patterns are compared directly.
 const WORTH_IT: usize = 256;
-/// Bounds are computed in f32: what is nearer than this share to the smallest distance is compared too.
+/// Tolerance of the f32 bounds.
 const ROUNDING: f32 = 1e-4;
 
-/// Patterns, one per row, with their projections.
+/// Patterns (rows) with their projections.
 #[derive(Clone, Debug)]
 pub struct Nearest<'a> {
     patterns: ArrayView2<'a, f32>,
-    /// Directions x width, rows orthonormal; none for few patterns.
+    /// Orthonormal rows of pattern width; empty for few patterns.
     directions: Array2<f32>,
     /// Patterns x directions.
     projected: Array2<f32>,
-    /// Length of what of each pattern lies outside the directions.
+    /// Residual length of each pattern.
     outside: Vec<f32>,
 }
 
 impl<'a> Nearest<'a> {
-    /// Projects patterns. O(patterns x width x directions).
+    /// O(patterns x width x directions).
     pub fn new(patterns: ArrayView2<'a, f32>) -> Self {
         let directions = if patterns.nrows() < WORTH_IT {
             Array2::zeros((0, patterns.ncols()))
@@ -77,12 +77,12 @@ impl<'a> Nearest<'a> {
     }
 }
 
-/// Length of what of a row lies outside the directions in which it has the coordinates `inside`.
+/// Residual length of a row with coordinates `inside`.
 fn rest(row: ArrayView1<f32>, inside: ArrayView1<f32>) -> f32 {
     (row.iter().map(|v| v * v).sum::<f32>() - inside.dot(&inside)).max(0.0).sqrt()
 }
 
-/// Orthonormal directions that span patterns spread evenly over all (Gram and Schmidt, twice).
+/// Orthonormal directions from evenly sampled patterns (Gram-Schmidt, twice).
 fn orthonormal(patterns: ArrayView2<f32>, count: usize) -> Array2<f32> {
     let mut found: Vec<Array1<f32>> = Vec::with_capacity(count);
     for n in 0..count {

@@ -1,15 +1,14 @@
-//! A small network over the frames of a clip: every frame goes through the same two layers, mean and largest of what comes out over the
-//! clip go through a third (deep sets: Zaheer et al., NeurIPS 2017; Qi et al., CVPR 2017).
+//! A small network over a clip's frames: two layers per frame, mean and maximum over the clip, a third layer
+//! (deep sets: Zaheer et al., NeurIPS 2017; Qi et al., CVPR 2017).
 //!
-//! Mean and largest do not know the order of frames, so that what shuffling leaves unchanged stays unchanged; order comes in by the
-//! frames' own motion ([`super::frames`]) and, where order counts, by a second layer that sees neighbours too: a frame with some before
-//! and behind it, nothing beyond the clip's ends (a convolution over time; Waibel et al., IEEE TASSP 37, 1989). How many is told by the layer's size.
-//! A clip's pattern is what the third layer gives. Unlike a codebook it is learned with the activities' names, and needs many more clips: tens of
-//! thousands, which synthetic people can give. O(frames x (F x 64 + 5 x 64 x 128)) a clip and member.
+//! Mean and maximum ignore the order. Order enters by the frames' motion ([`super::frames`]) and, if it
+//! counts, by a second layer that also sees neighbouring frames, zero beyond the clip (convolution over time;
+//! Waibel et al., IEEE TASSP 37, 1989); its size gives their number. The third layer's output is the pattern.
+//! Supervised, so it needs tens of thousands of clips, e.g. of synthetic people. O(frames x (F x 64 + 5 x 64
+//! x 128)) per clip and member.
 //!
-//! A network may have several members, which were taught the same from other first weights: where they have learned little, each is wrong in
-//! its own way, and their mean is more often right and knows better how sure it is (Lakshminarayanan et al., NeurIPS 2017). The pattern is
-//! theirs side by side, so that whatever stands behind it needs to know nothing of members.
+//! Several members with different initial weights are better calibrated and more accurate together
+//! (Lakshminarayanan et al., NeurIPS 2017). Their outputs are concatenated.
 
 pub mod features;
 pub mod recogniser;
@@ -22,19 +21,19 @@ use serde::{Deserialize, Serialize};
 /// A layer: inputs x outputs, and the bias.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Dense {
-    /// Inputs x outputs.
+    /// Weights, inputs x outputs.
     pub weights: Array2<f32>,
-    /// One per output.
+    /// Offsets, one per output.
     pub offsets: Array1<f32>,
 }
 
 impl Dense {
-    /// The layer's answer, row by row.
+    /// Applies the layer row by row.
     pub fn apply(&self, inputs: ArrayView2<f32>) -> Array2<f32> {
         inputs.dot(&self.weights) + &self.offsets
     }
 
-    /// The mean of what several layers give, each of which has inputs of its own.
+    /// Mean of several layers with their own inputs.
     fn mean_of(layers: &[Self]) -> Self {
         let share = 1.0 / layers.len().max(1) as f32;
         let weights: Vec<ArrayView2<f32>> = layers.iter().map(|layer| layer.weights.view()).collect();
@@ -45,24 +44,24 @@ impl Dense {
         }
     }
 
-    /// Whether the weights are inputs x outputs and the offsets fit.
+    /// Whether sizes are inputs x outputs.
     fn is(&self, inputs: usize, outputs: usize) -> bool {
         self.weights.dim() == (inputs, outputs) && self.offsets.len() == outputs
     }
 }
 
-/// The trained network.
+/// A trained network.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Network {
-    /// Mean of the training frames, subtracted first.
+    /// Mean of the training frames.
     pub mean: Array1<f32>,
-    /// Spread of the training frames, divided by.
+    /// Spread of the training frames.
     pub spread: Array1<f32>,
-    /// Of every member two layers of a frame, then one of a clip.
+    /// Layers of every member.
     pub members: Vec<Layers>,
 }
 
-/// The layers of a member: two of a frame, then one of a clip.
+/// Two layers per frame, one per clip.
 pub type Layers = [Dense; 3];
 
 /// Rectifier: negative values become zero.
@@ -76,7 +75,7 @@ fn with_neighbours(rows: ArrayView2<f32>, reach: usize) -> Array2<f32> {
     let (n, width) = rows.dim();
     let mut out = Array2::zeros((n, (2 * reach + 1) * width));
     for (place, from) in (0..=2 * reach).map(|place| (place, place * width)) {
-        // Row i stands at this place of row i + reach - place.
+        // Row i is at this place of row i + reach - place.
         let (begin, shift) = (reach.saturating_sub(place).min(n), place.saturating_sub(reach).min(n));
         let count = n - begin - shift;
         out.slice_mut(s![begin..begin + count, from..from + width])
@@ -85,7 +84,7 @@ fn with_neighbours(rows: ArrayView2<f32>, reach: usize) -> Array2<f32> {
     out
 }
 
-/// Mean and largest of the rows, side by side.
+/// Mean and maximum of the rows, concatenated.
 fn pooled(rows: ArrayView2<f32>) -> Array1<f32> {
     let (n, width) = rows.dim();
     let mut out = Array1::zeros(2 * width);
@@ -99,12 +98,12 @@ fn pooled(rows: ArrayView2<f32>) -> Array1<f32> {
 }
 
 impl Network {
-    /// Numbers of a clip's pattern.
+    /// Length of a pattern.
     pub fn width(&self) -> usize {
         self.members.iter().map(width).sum()
     }
 
-    /// The clip's pattern from its frame vectors (frames x F): values of the members' third layers; zeros for an empty clip.
+    /// Pattern of frame vectors (frames x F): outputs of the members' third layers; zeros for an empty clip.
     pub fn pattern(&self, frames: ArrayView2<f32>) -> Array1<f32> {
         let mut out = Array1::zeros(self.width());
         if frames.nrows() == 0 {
@@ -120,7 +119,7 @@ impl Network {
         out
     }
 
-    /// Whether all sizes fit one another and frame vectors of `inputs` numbers.
+    /// Whether all sizes match each other and frame vectors of `inputs` numbers.
     pub fn fits(&self, inputs: usize) -> bool {
         !self.members.is_empty()
             && self.members.iter().all(|member| layers_fit(member, inputs))
@@ -129,12 +128,12 @@ impl Network {
     }
 }
 
-/// Numbers that a member gives for a clip.
+/// Outputs of a member.
 fn width([_, _, third]: &Layers) -> usize {
     third.offsets.len()
 }
 
-/// What a member gives for the scaled frames of a clip.
+/// Outputs of a member for the scaled frames of a clip.
 fn values(member: &Layers, inputs: ArrayView2<f32>) -> Array1<f32> {
     let [first, second, third] = member;
     let hidden = rectified(first.apply(inputs));
@@ -143,12 +142,12 @@ fn values(member: &Layers, inputs: ArrayView2<f32>) -> Array1<f32> {
     rectified(third.apply(clip.view())).remove_axis(Axis(0))
 }
 
-/// Frames before and behind a frame that a member's second layer sees.
+/// Neighbours on each side seen by a member's second layer.
 fn reach([first, second, _]: &Layers) -> usize {
     second.weights.nrows() / first.offsets.len().max(1) / 2
 }
 
-/// Whether a member's sizes fit one another and frame vectors of `inputs` numbers.
+/// Whether a member's sizes match frame vectors of `inputs` numbers.
 fn layers_fit(member: &Layers, inputs: usize) -> bool {
     let [first, second, third] = member;
     let (a, b, c) = (first.offsets.len(), second.offsets.len(), third.offsets.len());

@@ -1,24 +1,25 @@
-//! Embedded pattern learning (EPL) exactly as in Li 2014 (eq. 9.11 to 9.13): which cells of a grid over the embedding a clip has visited.
+//! Embedded pattern learning (EPL) as in Li 2014 (eq. 9.11 to 9.13): visited cells of a grid over the
+//! embedding.
 //!
-//! Per dimension the grid has members at `min + (n - 1/2) R / Nt`; a frame goes to the nearest in each; a visited cell is 1. (Printed
-//! as `n R / Nt + min`, which leaves half a cell unused at the lower end.) The order of frames does not count, and exactly not.
+//! Members per dimension are at `min + (n - 1/2) R / Nt`; a frame selects the nearest in each; a visited cell
+//! is 1. (The printed `n R / Nt + min` leaves half a cell unused.) Independent of the order of frames.
 
 use ndarray::{Array1, ArrayView2, Axis};
 use serde::{Deserialize, Serialize};
 
-/// The grid over the first dimensions of an embedding.
+/// Grid over the first dimensions of an embedding.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct OccupancyGrid {
     /// Smallest embedded value per dimension.
     pub low: Vec<f32>,
     /// Range of embedded values per dimension.
     pub range: Vec<f32>,
-    /// Members per dimension: Nt.
+    /// Members Nt per dimension.
     pub bins: Vec<usize>,
 }
 
 impl OccupancyGrid {
-    /// The grid over the gallery's embedded points (N x D), one entry of `bins` per dimension used.
+    /// Grid over the gallery's points (N x D), one entry of `bins` per used dimension.
     pub fn new(points: ArrayView2<f32>, bins: &[usize]) -> Self {
         let fold = |k: usize, start: f32, pick: fn(f32, f32) -> f32| {
             points.index_axis(Axis(1), k).iter().fold(start, |m, v| pick(m, *v))
@@ -34,7 +35,7 @@ impl OccupancyGrid {
         self.bins.iter().product()
     }
 
-    /// The clip's pattern: 1 for visited cells. Points outside the gallery's range go to the outermost cells.
+    /// Pattern with 1 for visited cells. Points outside the gallery's range use the outermost cells.
     pub fn pattern(&self, points: ArrayView2<f32>) -> Array1<f32> {
         let mut pattern = Array1::zeros(self.cells());
         for point in points.rows() {
@@ -58,7 +59,7 @@ mod tests {
     fn frames_go_to_the_nearest_member_once() {
         let gallery = array![[0.0_f32, 0.0], [3.0, 2.0]];
         let grid = OccupancyGrid::new(gallery.view(), &[3, 2]);
-        // Members lie at 0.5, 1.5, 2.5 and 0.5, 1.5.
+        // Members are at 0.5, 1.5, 2.5 and 0.5, 1.5.
         let pattern = grid.pattern(array![[0.4_f32, 0.9], [0.9, 0.1], [2.6, 1.9], [99.0, -5.0]].view());
         assert_eq!(pattern.to_vec(), vec![1.0, 0.0, 0.0, 0.0, 1.0, 1.0]);
     }

@@ -1,4 +1,4 @@
-//! Patterns of many clips: from their views to the rows that classifiers are trained on.
+//! Patterns of clips, from views to training rows.
 
 use super::clip::Clip;
 use super::space::Space;
@@ -6,12 +6,12 @@ use crate::embedding::EmbeddingError;
 use ndarray::{Array1, Array2};
 use rayon::prelude::*;
 
-/// Frame vectors of clips: `[clip][view]`.
+/// Frame vectors of clips, `[clip][view]`.
 pub(crate) fn vectors_of(space: &Space, clips: &[&Clip]) -> Result<Vec<Vec<Array2<f32>>>, EmbeddingError> {
     clips.par_iter().map(|clip| clip.views.iter().map(|view| space.vectors(view)).collect()).collect()
 }
 
-/// Patterns of frame vectors: `[clip][view]`.
+/// Patterns of frame vectors, `[clip][view]`.
 pub(crate) fn patterns_of(
     space: &Space,
     clips: &[Vec<Array2<f32>>],
@@ -22,13 +22,13 @@ pub(crate) fn patterns_of(
     clips.par_iter().map(clip).collect()
 }
 
-/// The chosen views' patterns, one clip per row.
+/// Patterns of the chosen views, one clip per row.
 pub(crate) fn gathered(patterns: &[Vec<Array1<f32>>], chosen: &[usize]) -> Array2<f32> {
     rows(&patterns.iter().map(|views| joined(views, chosen)).collect::<Vec<_>>())
 }
 
-/// The patterns of some views, one after the other, over the square root of their number: the product of two joined patterns is the mean
-/// of the views' products, so that a classifier's cost means the same for one view and for many.
+/// Concatenated patterns over the square root of the number of views: products are the mean of the views'
+/// products, so a cost is comparable.
 pub(crate) fn joined(views: &[Array1<f32>], chosen: &[usize]) -> Array1<f32> {
     let scale = 1.0 / (chosen.len().max(1) as f32).sqrt();
     chosen.iter().flat_map(|&view| views[view].iter().map(move |v| scale * v)).collect()

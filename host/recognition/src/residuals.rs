@@ -1,15 +1,13 @@
-//! What soft assignments to typical frames leave out: on which side of each typical frame a clip's frames lie, and how far off.
+//! Residuals of soft assignments: mean direction and distance of a clip's frames from typical frames.
 //!
-//! Vectors of locally aggregated descriptors (Jégou et al., CVPR 2010): the mean over the clip of every frame's difference from
-//! some dozen typical frames, each weighted by how much the frame is
-//! assigned to it. Signed square roots take the weight off few
-//! large differences, and the whole has unit length (Jégou et al., PAMI 34, 2012). A mean does not know the order of frames,
-//! so what shuffling leaves unchanged stays unchanged. O(frames x centres x F) a clip.
+//! Vectors of locally aggregated descriptors (Jégou et al., CVPR 2010): mean difference from some dozen
+//! typical frames, weighted by the assignment, with signed square roots and unit length (Jégou et al., PAMI
+//! 34, 2012). Independent of the order. O(frames x centres x F) per clip.
 
 use ndarray::{Array1, Array2, ArrayView2, Axis};
 
-/// The clip's mean differences from `centres` (M x F) from its frame vectors (frames x F) and their soft assignments to the
-/// centres (frames x M): M x F numbers in one row of unit length, zeros for an empty clip.
+/// Residuals from `centres` (M x F) for frame vectors (frames x F) and soft assignments (frames x M): M x F
+/// numbers of unit length, zeros for an empty clip.
 pub fn residuals(
     centres: ArrayView2<f32>,
     frames: ArrayView2<f32>,

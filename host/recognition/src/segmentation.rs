@@ -1,11 +1,10 @@
 //! Un-segmented recordings: where one activity ends and the next begins.
 //!
-//! A recording is a row of segments, each with one activity: a hidden semi-Markov model (Yu, Artificial Intelligence 174, 2010) whose states
-//! last as long as an activity's clips do. A segment from frame a to b is worth
-//! `(b - a) (ln p(a, b) - strange * outlier(a, b)) - change - unlikely(b - a)`: the probability of an activity and how far the segment is from all
-//! that was learned, as the recogniser says of a whole clip, what a change costs, and how unlikely its length is ([`Lengths`]); the activity
-//! is the one with which it is worth most. The row that is worth most is found by dynamic programming over a grid of borders, which then
-//! move frame by frame to where both neighbours are worth most. O(frames / step x lengths) answers; frames are embedded once.
+//! A hidden semi-Markov model (Yu, Artificial Intelligence 174, 2010) with the durations of each activity's
+//! clips. The score of a segment from frame a to b is `(b - a) (ln p(a, b) - strange * outlier(a, b)) -
+//! change - unlikely(b - a)`: probability, outlier score, cost of a change, and duration ([`Lengths`]), for
+//! the best activity. Dynamic programming over a grid of borders finds the best sequence; borders are then
+//! refined frame by frame. O(frames / step x lengths) answers; frames are embedded once.
 
 use super::clip::Track;
 use super::lengths::Lengths;
@@ -17,12 +16,12 @@ use ndarray::{Array1, Array2, s};
 use rayon::prelude::*;
 use std::collections::HashMap;
 
-/// What a row of segments is worth.
+/// Score parameters of a segmentation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Worth {
-    /// What a change costs, nats.
+    /// Cost of a change, nats.
     pub change: f32,
-    /// What being an outlier costs a frame, nats per unit of the outlier score.
+    /// Cost of outliers, nats per frame and unit of outlier score.
     pub strange: f32,
     /// Shortest and longest segment, in typical clips.
     pub lengths: [f32; 2],
@@ -36,14 +35,14 @@ impl Default for Worth {
 
 /// Borders are looked for at this many places in a typical clip first.
 const PLACES: usize = 12;
-/// In long recordings at no more places than this in all.
+/// Limit of grid borders.
 const MOST_PLACES: usize = 1500;
-/// From one length to the next.
+/// Ratio of successive lengths.
 const LONGER: f32 = 1.15;
-/// Fewest frames of a segment.
+/// Smallest segment.
 const LEAST: usize = 4;
 
-/// A view embedded once.
+/// A view, embedded once.
 struct Embedded {
     points: Array2<f32>,
     boxes: Option<Array2<f32>>,
@@ -57,12 +56,12 @@ struct Recording<'a> {
     groups: Vec<Vec<Embedded>>,
     among: &'a [String],
     typical: f32,
-    /// Between places where borders are looked for first, frames.
+    /// Grid spacing, frames.
     step: usize,
     worth: Worth,
 }
 
-/// What a stretch is worth, with the activity with which it is worth most, `None` = unknown.
+/// Score of a part with its best activity, `None` = unknown.
 struct Valued {
     worth: f32,
     activity: Option<String>,
@@ -115,16 +114,14 @@ impl Recording<'_> {
 
 /// Cuts a recording into segments of one activity each, of all that the model knows or `among` some; neighbours with the same activity
 /// become one. Frames are counted as in the tracks.
-///
-/// # Errors
-/// Views that do not fit the model.
+/// Errors: Views that do not fit the model.
 pub fn segmented(
     recogniser: &Recogniser,
     views: &[Track],
     among: &[String],
     worth: Worth,
 ) -> Result<Vec<Segment>, ModelError> {
-    // A frame of everybody tells whether the views fit.
+    // One frame of each view checks the shape.
     let first: Vec<Track> = views.iter().map(|view| view.select(&[0][..view.frames().min(1)])).collect();
     recogniser.recognise(&first)?;
     let frames = views.iter().map(Track::frames).filter(|frames| *frames > 0).min().unwrap_or(0);
@@ -146,7 +143,7 @@ pub fn segmented(
     Ok(merged(&recording, &borders))
 }
 
-/// The borders of the row that is worth most, over a grid; first 0, last the number of frames.
+/// Borders of the best sequence on the grid; first 0, last the number of frames.
 fn best_borders(recording: &Recording, frames: usize) -> Vec<usize> {
     let step = recording.step;
     let places: Vec<usize> = (0..frames).step_by(step).chain([frames]).collect();
@@ -155,12 +152,12 @@ fn best_borders(recording: &Recording, frames: usize) -> Vec<usize> {
         .take_while(|l| *l <= longest)
         .map(|l| (l / step as f32).round().max(1.0) as usize)
         .collect();
-    // The stretches that end at each place: where they begin, and what they are worth.
+    // Per border: starts of the parts that end there, with scores.
     let ending: Vec<Vec<(usize, f32)>> = (0..places.len())
         .into_par_iter()
         .map(|end| {
             let mut begins: Vec<usize> = lengths.iter().filter_map(|l| end.checked_sub(*l)).collect();
-            // What is shorter than a segment may stand where the recording begins, for all of it may be that short.
+            // A shorter part may start the recording, which may be that short.
             if end > 0 && (begins.is_empty() || lengths.iter().all(|l| *l >= end)) {
                 begins.push(0);
             }
@@ -188,7 +185,7 @@ fn best_borders(recording: &Recording, frames: usize) -> Vec<usize> {
     borders
 }
 
-/// Moves every border to the frame within a step at which both neighbours are worth most.
+/// Moves every border within a step to the best frame.
 fn refined(recording: &Recording, mut borders: Vec<usize>) -> Vec<usize> {
     let step = recording.step;
     let mut known: HashMap<(usize, usize), f32> = HashMap::new();
@@ -210,7 +207,7 @@ fn refined(recording: &Recording, mut borders: Vec<usize>) -> Vec<usize> {
     borders
 }
 
-/// Segments between borders, neighbours with one activity together.
+/// Segments between borders; neighbours with one activity are joined.
 fn merged(recording: &Recording, borders: &[usize]) -> Vec<Segment> {
     let mut found: Vec<Segment> = Vec::new();
     for pair in borders.windows(2) {
@@ -241,7 +238,7 @@ mod tests {
 
     const ACTIVITIES: [&str; 3] = ["star", "stretch", "turn"];
 
-    /// Somebody whose outline has as many waves as the activity says, which turn.
+    /// A rotating outline with as many waves as the activity's number.
     fn track(activity: usize, frames: usize, rng: &mut ChaCha8Rng) -> Track {
         let phase = rng.random_range(0.0..6.0_f32);
         let descriptors = Array2::from_shape_fn((frames, ANGLES), |(frame, angle)| {
@@ -287,7 +284,7 @@ mod tests {
             assert!(segment.from.abs_diff(border) <= 3, "{found:?}");
         }
         assert!(found.windows(2).all(|pair| pair[0].to == pair[1].from));
-        // What cannot be is not answered, and one activity is one segment, however long or short.
+        // Excluded activities are never answered, and one activity is one segment of any length.
         let two = ["star".to_owned(), "turn".to_owned()];
         let among = segmented(&model, &[joined(parts.iter())], &two, Worth::default()).expect("fits");
         assert!(among.iter().all(|s| s.activity.as_deref() != Some("stretch")));

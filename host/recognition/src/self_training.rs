@@ -1,28 +1,28 @@
-//! Learning from clips without labels: a classifier answers for them, is trained again with its surest answers as labels, and so on
-//! (self-training: Yarowsky, ACL 1995; as many of every class in proportion: Zou et al., ECCV 2018).
+//! Self-training on unlabelled clips: the classifier is retrained with its surest answers as labels
+//! (Yarowsky, ACL 1995; equal shares per class: Zou et al., ECCV 2018).
 //!
-//! For clips of another camera, sensor or laboratory than the labelled ones. It lives on most of the first answers being right.
+//! For clips from another camera, sensor or laboratory. Requires mostly correct first answers.
 
 use super::classifier::{Classifier, ClassifierKind, largest};
 use ndarray::{Array2, ArrayView2, Axis, concatenate};
 
-/// Rounds that the command line asks for.
+/// Rounds used by the command line.
 pub const ROUNDS: usize = 3;
-/// Share of every class' answers that are taken for true in the first round, and what the last one has more, about.
+/// Share of each class' answers used in the first round, and the increase until the last.
 const SHARES: [f64; 2] = [0.4, 0.5];
 
 /// Labelled patterns, one per row.
 #[derive(Clone, Copy, Debug)]
 pub struct Labelled<'a> {
-    /// Patterns.
+    /// Labelled patterns as rows.
     pub patterns: ArrayView2<'a, f32>,
-    /// Their classes.
+    /// Classes of the patterns.
     pub labels: &'a [usize],
     /// Number of classes.
     pub classes: usize,
 }
 
-/// A classifier trained on labelled patterns and, in `rounds`, on its own answers for others (one per row).
+/// Trains on labelled patterns and, for `rounds`, on its own answers for others (one per row).
 pub fn self_trained(
     kind: ClassifierKind,
     labelled: Labelled,
@@ -49,7 +49,7 @@ pub fn self_trained(
     classifier
 }
 
-/// The surest share of every class' answers: (row, class).
+/// Surest share of every class' answers: (row, class).
 fn surest(answers: &[(usize, f32)], classes: usize, share: f64) -> Vec<(usize, usize)> {
     let of_class = |class: usize| {
         let mut own: Vec<(f32, usize)> = answers
@@ -73,7 +73,7 @@ mod tests {
     #[test]
     fn what_lies_a_little_elsewhere_is_followed() {
         let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(2);
-        // Two clouds; in the target both lie 1.1 further to the right, so that the old border cuts the left one.
+        // Two clouds; in the target both are 1.1 further right, so the old border splits the left one.
         let mut cloud = |moved: f32| {
             Array2::from_shape_fn((80, 2), |(i, k)| {
                 let centre = if k == 0 { [-1.5, 1.5][i % 2] + moved } else { 0.0 };

@@ -1,4 +1,4 @@
-//! The learned part before the classifier: how frames are embedded and clips become patterns.
+//! Embedding of frames and patterns of clips.
 
 use super::alignment::Brought;
 use super::clip::{Clip, Track};
@@ -20,21 +20,21 @@ use ndarray::{Array1, Array2, ArrayView2, s};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-/// How the gallery is laid out.
+/// Layout of the gallery.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Layout {
-    /// Isomap with at least this many neighbours: doubled until the graph holds together.
+    /// Isomap with at least this many neighbours, doubled until the graph is connected.
     Isomap(usize),
-    /// Principal components (PCA), which need no neighbours.
+    /// Principal components (PCA), without neighbours.
     Pca,
 }
 
-/// How a clip becomes a pattern.
+/// Type of a clip's pattern.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum PatternKind {
-    /// Visited cells of a grid, exactly as in Li 2014: members per dimension.
+    /// Visited cells of a grid as in Li 2014: members per dimension.
     Thesis(Vec<usize>),
     /// Square-rooted mean soft assignments to a codebook of this size.
     Codebook(usize),
@@ -43,30 +43,30 @@ pub enum PatternKind {
     Network,
 }
 
-/// Everything that is chosen before patterns exist.
+/// Settings before patterns exist.
 ///
-/// The default lays frames out by twenty principal components: they need no neighbour graph that could fall apart.
-/// [`SpaceSettings::thesis`] keeps Isomap. Accuracies are to be reported for settings that were chosen on other subjects
+/// The default uses twenty principal components, which need no connected neighbour graph.
+/// [`SpaceSettings::thesis`] uses Isomap. Report accuracies for settings chosen on other subjects
 /// ([`super::experiment::Experiment::searched`]), not for these defaults.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SpaceSettings {
-    /// How the gallery is laid out.
+    /// Layout of the gallery.
     pub layout: Layout,
     /// Dimensions of the embedding.
     pub dimensions: usize,
-    /// Silhouettes in the gallery at most.
+    /// Largest number of gallery silhouettes.
     pub gallery: usize,
     /// Coefficient of the RBF map.
     pub gamma: f32,
     /// Ridge of the RBF map.
     pub ridge: f64,
-    /// How a clip becomes a pattern.
+    /// Type of a clip's pattern.
     pub pattern: PatternKind,
-    /// Centres whose residuals a codebook's patterns hold too; 0 for none, without effect on the thesis' grid.
+    /// Centres of residuals in codebook patterns; 0 for none, no effect on the thesis' grid.
     pub residuals: usize,
     /// Whether the order of frames counts.
     pub mode: Mode,
-    /// Parts of a frame's vector against one another.
+    /// Weights of a frame vector's parts.
     pub weights: Weights,
     /// Seed of the clustering.
     pub seed: u64,
@@ -90,7 +90,7 @@ impl Default for SpaceSettings {
 }
 
 impl SpaceSettings {
-    /// The thesis' choices: three dimensions, 15 x 9 x 9 cells.
+    /// Settings of the thesis: three dimensions, 15 x 9 x 9 cells.
     pub fn thesis() -> Self {
         Self {
             layout: Layout::Isomap(12),
@@ -101,25 +101,25 @@ impl SpaceSettings {
     }
 }
 
-/// How new silhouettes are embedded.
+/// Embedding of new silhouettes.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Map {
-    /// By radial basis functions on the gallery.
+    /// Radial basis functions on the gallery.
     Rbf(Rbf),
-    /// By projection on the principal components.
+    /// Projection on principal components.
     Pca(Pca),
 }
 
-/// How embedded clips become patterns.
+/// Patterns of embedded clips.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Pattern {
-    /// The thesis' grid.
+    /// Grid of the thesis.
     Thesis(OccupancyGrid),
-    /// A codebook of frame vectors.
+    /// Codebook of frame vectors.
     Codebook(Codebook),
-    /// A network over frame vectors.
+    /// Network over frame vectors.
     Network(Box<Network>),
-    /// What a network gives, as features for another classifier.
+    /// Network features for another classifier.
     Features(Box<Features>),
 }
 
@@ -128,45 +128,39 @@ pub enum Pattern {
 pub struct Space {
     /// Its training options.
     pub settings: SpaceSettings,
-    /// How silhouettes are embedded.
+    /// Embedding of silhouettes.
     pub map: Map,
-    /// Spread of the gallery along the first dimension; embedded points are divided by it.
+    /// Gallery spread along the first dimension, the divisor of points.
     pub spread: f32,
-    /// How clips become patterns.
+    /// Patterns of clips.
     pub pattern: Pattern,
-    /// Neighbours that the Isomap graph needed, 0 for PCA.
+    /// Neighbours of the connected Isomap graph, 0 for PCA.
     pub neighbours: usize,
-    /// What brings frame vectors to those of the training clips, where clips come from elsewhere; not saved.
+    /// Alignment to the training clips, for clips from elsewhere; not saved.
     pub brought: Option<Brought>,
 }
 
 impl Space {
     /// Learns from the training clips, all of their views together.
-    ///
-    /// # Errors
-    /// Too few silhouettes, or a gallery that cannot be laid out.
+    /// Errors: Too few silhouettes, or a gallery that cannot be laid out.
     pub fn train(clips: &[&Clip], settings: &SpaceSettings) -> Result<Self, EmbeddingError> {
         Galleries::default().space(clips, settings).map(|(space, _)| space)
     }
 
     /// Embeds the frames of a track: frames x D, over the gallery's spread.
-    ///
-    /// # Errors
-    /// Descriptors of another length.
+    /// Errors: Descriptors of another length.
     pub fn points(&self, track: &Track) -> Result<Array2<f32>, EmbeddingError> {
         self.map.points(track, self.spread)
     }
 
     /// Frame vectors of a track: what the codebook sees.
-    ///
-    /// # Errors
-    /// Descriptors of another length.
+    /// Errors: Descriptors of another length.
     pub fn vectors(&self, track: &Track) -> Result<Array2<f32>, EmbeddingError> {
         let points = self.points(track)?;
         Ok(self.vectors_of(points.view(), track.boxes.as_ref().map(|boxes| boxes.view())))
     }
 
-    /// The same from frames that are embedded already, and their boxes.
+    /// Frame vectors from embedded frames and boxes.
     pub fn vectors_of(&self, points: ArrayView2<f32>, boxes: Option<ArrayView2<f32>>) -> Array2<f32> {
         let vectors = match self.settings.pattern {
             PatternKind::Thesis(_) => points.to_owned(),
@@ -181,9 +175,7 @@ impl Space {
     }
 
     /// The same space with its network's values as features, by their statistics over clips; other spaces as they are.
-    ///
-    /// # Errors
-    /// Descriptors of another length.
+    /// Errors: Descriptors of another length.
     pub fn with_features(&self, clips: &[&Clip]) -> Result<Self, EmbeddingError> {
         let network = match &self.pattern {
             Pattern::Network(network) => network,
@@ -196,7 +188,7 @@ impl Space {
         Ok(Self { pattern: Pattern::Features(Box::new(features)), ..self.clone() })
     }
 
-    /// The pattern of frame vectors.
+    /// Pattern of frame vectors.
     pub fn pattern_of(&self, vectors: ArrayView2<f32>, sharpness: f32) -> Array1<f32> {
         match &self.pattern {
             Pattern::Thesis(grid) => grid.pattern(vectors),
@@ -207,7 +199,7 @@ impl Space {
     }
 }
 
-/// What an embedding of `width` numbers sees of at most `count` frames, evenly spread over all of the tracks'.
+/// At most `count` evenly spaced frames of all tracks, with `width` numbers.
 fn evenly(tracks: &[&Track], count: usize, width: usize) -> Array2<f32> {
     let frames: Vec<(&Track, usize)> =
         tracks.iter().flat_map(|track| (0..track.frames()).map(|frame| (*track, frame))).collect();
@@ -221,10 +213,10 @@ fn evenly(tracks: &[&Track], count: usize, width: usize) -> Array2<f32> {
     rows
 }
 
-/// Galleries above this size are laid out by landmarks.
+/// Larger galleries use landmarks.
 const LARGE: usize = 4000;
 
-/// A gallery laid out: what spaces share that differ in their RBF map, weights or patterns only.
+/// Gallery layout, shared by spaces with different RBF maps, weights or patterns.
 #[derive(Debug)]
 struct Gallery {
     key: (Layout, usize, usize, usize),
@@ -237,7 +229,7 @@ struct Gallery {
 /// Frame vectors of clips, `[clip][view]`.
 type FrameVectors = Vec<Vec<Array2<f32>>>;
 
-/// Galleries of one set of clips, each laid out once, and the clips' frames in each of their maps, embedded once.
+/// Cached galleries of one set of clips, and their embedded frames.
 #[derive(Debug, Default)]
 pub struct Galleries {
     galleries: Vec<Gallery>,
@@ -246,9 +238,7 @@ pub struct Galleries {
 
 impl Galleries {
     /// The space of `settings` for the clips, all of their views together, and its frame vectors of them, `[clip][view]`; always ask with the same clips.
-    ///
-    /// # Errors
-    /// Too few silhouettes, or a gallery that cannot be laid out.
+    /// Errors: Too few silhouettes, or a gallery that cannot be laid out.
     pub fn space(
         &mut self,
         clips: &[&Clip],
@@ -278,7 +268,7 @@ impl Galleries {
             })
             .collect();
         match &settings.pattern {
-            // Learned afterwards, with the activities' names.
+            // Learned later with labels.
             PatternKind::Network => {}
             PatternKind::Thesis(bins) => {
                 let coordinates = &gallery.coordinates / embedded.spread;
@@ -294,7 +284,7 @@ impl Galleries {
         Ok((space, vectors))
     }
 
-    /// The place of the clips embedded by these settings' map: weights and patterns do not change it.
+    /// Index of the clips embedded by these settings' map, independent of weights and patterns.
     fn embedded(&mut self, clips: &[&Clip], settings: &SpaceSettings) -> Result<usize, EmbeddingError> {
         let gallery = self.gallery(clips, settings)?;
         let key = match settings.layout {
@@ -316,10 +306,10 @@ impl Galleries {
         Ok(self.embedded.len() - 1)
     }
 
-    /// The place of the gallery that these settings ask for.
+    /// Index of the gallery of these settings.
     fn gallery(&mut self, clips: &[&Clip], settings: &SpaceSettings) -> Result<usize, EmbeddingError> {
-        // Codebooks keep to the distances: with coarse silhouettes too they know the people of their own set a little better (fused, 0 to 3
-        // points on two public sets), and those of another one mostly worse (by up to 15).
+        // Codebooks use distances only: coarse silhouettes improve known sets slightly (fused, 0 to 3 points
+        // on two public sets), but worsen others (by up to 15).
         let width = if settings.pattern == PatternKind::Network { ANGLES + CELLS } else { ANGLES };
         let key = (settings.layout, settings.dimensions, settings.gallery, width);
         if let Some(index) = self.galleries.iter().position(|gallery| gallery.key == key) {
@@ -332,10 +322,10 @@ impl Galleries {
     }
 }
 
-/// Clips in a map.
+/// Clips embedded by a map.
 #[derive(Debug)]
 struct Embedded {
-    /// Place of the gallery.
+    /// Index of the gallery.
     gallery: usize,
     /// Coefficient and ridge of an RBF map.
     key: [f64; 2],
@@ -346,7 +336,7 @@ struct Embedded {
 }
 
 impl Map {
-    /// Every frame of a track in the map, in units of the spread.
+    /// Embedded frames of a track, in units of the spread.
     fn points(&self, track: &Track, spread: f32) -> Result<Array2<f32>, EmbeddingError> {
         let points = match self {
             Self::Rbf(rbf) => rbf.embed_all(track.descriptors.view())?,
@@ -395,12 +385,12 @@ impl Gallery {
         (first.iter().map(|v| (v - mean).powi(2)).sum::<f32>() / count).sqrt().max(1e-6)
     }
 
-    /// The map that embeds new silhouettes.
+    /// Embedding of new silhouettes.
     fn map(&self, settings: &SpaceSettings) -> Result<Map, EmbeddingError> {
         if let Some(pca) = &self.pca {
             return Ok(Map::Pca(pca.clone()));
         }
-        // Landmark placement is for all samples; the map's centres stay few enough to embed a frame in microseconds.
+        // Landmarks place all samples; fewer centres keep an embedding within microseconds.
         let step = self.samples.nrows().div_ceil(LARGE).max(1);
         let rbf = Rbf::train(
             self.samples.slice(s![..;step, ..]),

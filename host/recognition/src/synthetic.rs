@@ -1,4 +1,4 @@
-//! Seeded clips to learn from: the ten activities, everyday activities, and recorded motion drawn from any view.
+//! Seeded training clips: the ten activities, everyday activities, and recorded motion from any view.
 
 pub mod activities;
 pub mod everyday;

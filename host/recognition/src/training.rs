@@ -1,4 +1,4 @@
-//! Training a recogniser: settings chosen or given, the classifier trained, and what counts as unknown.
+//! Training of a recogniser: settings, classifier, unknown limits.
 
 use super::alignment::Alignment;
 use super::auxiliary_model::AuxiliaryModel;
@@ -17,9 +17,7 @@ use rayon::prelude::*;
 
 impl Recogniser {
     /// Trains on clips that all have the same views, with settings as they are.
-    ///
-    /// # Errors
-    /// Fewer than two activities, clips with other views, a gallery that cannot be laid out.
+    /// Errors: Fewer than two activities, clips with other views, a gallery that cannot be laid out.
     pub fn train(clips: &[Clip], settings: &RecogniserSettings) -> Result<Self, ModelError> {
         let experiment = Experiment {
             space: settings.space.clone(),
@@ -39,9 +37,7 @@ impl Recogniser {
 
     /// Trains with settings chosen by cross-validation over the clips' subjects; gives the accuracy over the folds next to it (0 to
     /// 1, of the chosen settings and so a little too good), `None` where nothing was compared: one subject, or one of everything.
-    ///
-    /// # Errors
-    /// As [`Self::train`], and where `watch` stops it.
+    /// Errors: as [`Self::train`], and where `watch` stops it.
     pub fn train_searched(
         clips: &[Clip],
         experiment: &Experiment,
@@ -101,7 +97,7 @@ impl Recogniser {
     }
 }
 
-/// Views of a clip and whether they have box motion.
+/// Number of views, and whether they have box motion.
 fn shape(clip: &Clip) -> (usize, bool) {
     (clip.views.len(), clip.views.iter().all(|view| view.boxes.is_some()))
 }

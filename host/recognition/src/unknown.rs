@@ -1,31 +1,31 @@
-//! What counts as unknown: the conformal rule (Vovk et al., Algorithmic Learning in a Random World, 2005).
+//! Unknown activities by the conformal rule (Vovk et al., Algorithmic Learning in a Random World, 2005).
 //!
-//! Clips of people who taught nothing are measured by how far they are from all that was learned. A clip is unknown when it lies
-//! further off than the k-th of these n, k = ceil((n + 1) (1 - share)): whoever comes next from the same population is wrongly
-//! called unknown with at most that share as probability, whatever the distances' distribution. The rule is applied to each activity
-//! that is answered (Mondrian), where enough clips were; the others share one limit.
+//! A clip is unknown if its distance exceeds the k-th of n calibration distances of people not used for
+//! training, k = ceil((n + 1) (1 - share)): a new person of the same population is wrongly called unknown
+//! with at most that probability, for any distribution. Applied per answered activity (Mondrian) with enough
+//! clips; the others share a limit.
 
 use serde::{Deserialize, Serialize};
 
-/// Distances beyond which an answer is unknown.
+/// Distance limits for unknown answers.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Limits {
-    /// Per class.
+    /// Distance limit per class.
     pub distances: Vec<f32>,
     /// Share of known clips that is called unknown.
     pub false_alarms: f32,
 }
 
 impl Limits {
-    /// The share of false alarms that models are made for.
+    /// Default share of false alarms.
     pub const FALSE_ALARMS: f32 = 0.05;
 
-    /// Nothing is unknown.
+    /// No limits: nothing is unknown.
     pub fn none(classes: usize) -> Self {
         Self { distances: vec![f32::INFINITY; classes], false_alarms: 0.0 }
     }
 
-    /// From the class and distance of clips that are known and taught nothing.
+    /// From class and distance of calibration clips.
     pub fn conformal(scored: &[(usize, f32)], classes: usize, false_alarms: f32) -> Self {
         let all = limit(scored.iter().map(|(_, distance)| *distance).collect(), false_alarms)
             .unwrap_or(f32::INFINITY);
@@ -36,18 +36,18 @@ impl Limits {
         Self { distances: (0..classes).map(of_class).collect(), false_alarms }
     }
 
-    /// Clips without which no limit can keep a share of false alarms.
+    /// Smallest number of clips for this share.
     pub fn fewest(false_alarms: f32) -> usize {
         (1..).find(|clips| place(*clips, false_alarms) <= *clips).unwrap_or(usize::MAX)
     }
 
-    /// The outlier score of an answer: above 1 is unknown.
+    /// Outlier score of an answer; above 1 is unknown.
     pub fn score(&self, class: usize, distance: f32) -> f32 {
         distance / self.distances.get(class).copied().unwrap_or(f32::INFINITY).max(1e-9)
     }
 }
 
-/// The conformal limit, `None` where there are too few distances for it.
+/// Conformal limit; `None` with too few distances.
 fn limit(mut distances: Vec<f32>, false_alarms: f32) -> Option<f32> {
     distances.retain(|distance| distance.is_finite());
     distances.sort_by(f32::total_cmp);
@@ -69,7 +69,7 @@ mod tests {
         let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(8);
         let (mut alarms, mut asked) = (0, 0);
         for _ in 0..400 {
-            // Distances of any distribution: here with a heavy tail, and another one for each of two classes.
+            // Any distribution works: heavy tails, different for two classes.
             let mut draw =
                 |class: usize| (class, (1.0 / rng.random_range(0.01..1.0_f32)) * (1 + 9 * class) as f32);
             let scored: Vec<(usize, f32)> = (0..120).map(|i| draw(i % 2)).collect();
@@ -81,7 +81,7 @@ mod tests {
             }
         }
         let share = f64::from(alarms) / f64::from(asked);
-        // 5 % of 8000 with a spread of 0.25 points, and a little less by the rounding up to whole clips.
+        // 5 % of 8000 with a spread of 0.25 points, slightly less by rounding to whole clips.
         assert!((0.03..=0.058).contains(&share), "{share}");
     }
 

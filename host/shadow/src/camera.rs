@@ -1,4 +1,4 @@
-//! The camera file: how the camera stands and what is known of the subject, as TOML.
+//! Camera file (TOML): pose of the camera and prior knowledge of the subject.
 //!
 //! ```toml
 //! [camera]
@@ -14,7 +14,7 @@
 //! [subject]                  # optional, these are the defaults
 //! height_m = 1.75
 //! head_width_m = 0.17
-//! distance_m = 6.0           # optional, has no default: where it is known; else the head tells it
+//! distance_m = 6.0           # optional, no default; otherwise estimated from the head
 //!
 //! [standard_deviations]      # optional, these are the defaults
 //! day = 0.3
@@ -32,7 +32,6 @@
 use crate::sun::SunPosition;
 use serde::{Deserialize, Serialize};
 
-/// How the camera stands.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Camera {
@@ -40,19 +39,17 @@ pub struct Camera {
     pub height_m: f64,
     /// Viewing direction, anticlockwise from north (Li 2014, eq. 8.12).
     pub azimuth_deg: f64,
-    /// Viewing direction below the horizontal.
+    /// Downwards positive.
     #[serde(default)]
     pub pitch_deg: f64,
-    /// Focal length; far subjects make it the image distance v as well.
+    /// Also the image distance v, as subjects are far.
     pub focal_length_mm: f64,
-    /// Distance of neighbouring pixels on the sensor, micrometres.
     pub pixel_um: f64,
-    /// Columns of the image.
     #[serde(default = "default_width")]
     pub width_px: usize,
     #[serde(default = "default_height")]
     pub height_px: usize,
-    /// Where the optical axis meets the image; the middle unless given.
+    /// Optical axis in the image; default: centre.
     #[serde(default)]
     pub principal_point_px: Option<[f64; 2]>,
 }
@@ -64,14 +61,14 @@ fn default_height() -> usize {
     480
 }
 
-/// What is known of the subject beforehand.
+/// Prior knowledge of the subject.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct SubjectPrior {
     pub height_m: f64,
-    /// Mean width of a head w.
+    /// Mean width w.
     pub head_width_m: f64,
-    /// Distance from the lens along the ground, where it is known; else the head's width and row tell it.
+    /// Distance from the lens along the ground; `None`: from the head's width and row.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub distance_m: Option<f64>,
 }
@@ -82,25 +79,21 @@ impl Default for SubjectPrior {
     }
 }
 
-/// Standard deviations of everything that goes in (Li 2014, eq. 8.23 to 8.37).
+/// Standard deviations of all inputs (Li 2014, eq. 8.23 to 8.37).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct StandardDeviations {
-    /// Day of the year, days.
+    /// Day of the year.
     pub day: f64,
     pub time_h: f64,
     pub latitude_deg: f64,
     pub longitude_deg: f64,
     pub subject_height_m: f64,
-    /// Camera height, metres.
     pub camera_height_m: f64,
-    /// Camera azimuth, degrees.
     pub azimuth_deg: f64,
-    /// Head width in the world, metres.
     pub head_width_m: f64,
-    /// Head width in the image, pixels.
     pub head_width_px: f64,
-    /// Image distance v, micrometres.
+    /// Image distance v.
     pub image_distance_um: f64,
 }
 
@@ -121,52 +114,34 @@ impl Default for StandardDeviations {
     }
 }
 
-/// A whole camera file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CameraFile {
-    /// How the camera stands.
     pub camera: Camera,
-    /// What is known of the subject.
     #[serde(default)]
     pub subject: SubjectPrior,
-    /// How sure all that is.
     #[serde(default)]
     pub standard_deviations: StandardDeviations,
 }
 
-/// What is wrong with a camera file.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum CameraError {
-    /// Not the TOML that is expected.
     #[error("camera file: {0}")]
     Syntax(String),
-    /// A number outside its range.
     #[error("camera file: {name} = {value} is not {expected}")]
-    Range {
-        name: &'static str,
-        /// The value that stands there.
-        value: f64,
-        /// The values that it may have.
-        expected: &'static str,
-    },
+    Range { name: &'static str, value: f64, expected: &'static str },
 }
 
 impl CameraFile {
-    /// Reads and checks a camera file.
-    ///
-    /// # Errors
-    /// TOML errors, unknown keys, and numbers out of range, each by name.
+    /// Parses and checks a camera file.
+    /// Errors: TOML errors, unknown keys, numbers out of range.
     pub fn parse(text: &str) -> Result<Self, CameraError> {
         let file: Self = toml::from_str(text).map_err(|error| CameraError::Syntax(error.to_string()))?;
         file.check()?;
         Ok(file)
     }
 
-    /// Checks every number.
-    ///
-    /// # Errors
-    /// The first number out of range, by name.
+    /// Errors: the first number out of range.
     pub fn check(&self) -> Result<(), CameraError> {
         let c = &self.camera;
         let within = |name, value: f64, low: f64, high: f64, expected| {
@@ -208,24 +183,23 @@ impl CameraFile {
 }
 
 impl Camera {
-    /// Focal length in pixels.
     pub fn focal_px(&self) -> f64 {
         1e3 * self.focal_length_mm / self.pixel_um
     }
 
-    /// Where the optical axis meets the image.
+    /// Optical axis in the image, px.
     pub fn principal_point(&self) -> [f64; 2] {
         self.principal_point_px
             .unwrap_or([0.5 * (self.width_px as f64 - 1.0), 0.5 * (self.height_px as f64 - 1.0)])
     }
 
-    /// Distance along the optical axis of a world point (metres; x right, y forward, z up, origin on the ground under the lens).
+    /// Depth of a world point (metres; x right, y forward, z up, origin on the ground under the lens).
     pub fn depth_m(&self, point: [f64; 3]) -> f64 {
         let (s, c) = self.pitch_deg.to_radians().sin_cos();
         point[1] * c + (self.height_m - point[2]) * s
     }
 
-    /// Pixel position of a world point, `None` behind or beside the lens (nearer than 1 cm along the axis).
+    /// Pixel position of a world point; `None` nearer than 1 cm along the axis.
     pub fn project(&self, point: [f64; 3]) -> Option<[f64; 2]> {
         let depth = self.depth_m(point);
         if depth.is_nan() || depth <= 0.01 {
@@ -237,10 +211,10 @@ impl Camera {
         Some([cx + self.focal_px() * point[0] / depth, cy + self.focal_px() * down / depth])
     }
 
-    /// Whether the sun itself stands in the picture: its glare spoils masks, and all shadows come towards the camera.
+    /// Whether the sun is in the image: its glare damages masks, and all shadows point to the camera.
     pub fn sees_sun(&self, sun: SunPosition) -> bool {
         let (sin_e, cos_e) = sun.elevation_deg.to_radians().sin_cos();
-        // The camera's azimuth is counted anticlockwise.
+        // The camera's azimuth is anticlockwise.
         let (right, forward) = (sun.azimuth_deg + self.azimuth_deg).to_radians().sin_cos();
         const FAR_M: f64 = 1e9;
         let at = [FAR_M * cos_e * right, FAR_M * cos_e * forward, FAR_M * sin_e];
@@ -249,7 +223,7 @@ impl Camera {
         })
     }
 
-    /// The ground point seen at a pixel, `[x, y]` in metres, `None` at or above the horizon.
+    /// Ground point seen by a pixel, `[x, y]` in metres; `None` at or above the horizon.
     pub fn ground_point(&self, pixel: [f64; 2]) -> Option<[f64; 2]> {
         let [cx, cy] = self.principal_point();
         let (right, down) = ((pixel[0] - cx) / self.focal_px(), (pixel[1] - cy) / self.focal_px());
@@ -271,7 +245,7 @@ mod tests {
         "[camera]\nheight_m = 0.8\nazimuth_deg = 140.0\nfocal_length_mm = 4.0\npixel_um = 6.0\n";
 
     #[test]
-    fn a_short_file_takes_the_defaults_and_bad_ones_name_the_key() {
+    fn a_short_file_uses_defaults_and_errors_name_the_key() {
         let file = CameraFile::parse(TEXT).expect("valid");
         assert_eq!((file.camera.width_px, file.subject.height_m), (640, 1.75));
         assert!((file.camera.focal_px() - 666.67).abs() < 0.01);
@@ -282,9 +256,10 @@ mod tests {
     }
 
     #[test]
-    fn the_sun_is_seen_where_the_camera_looks() {
+    fn detects_the_sun_in_the_field_of_view() {
         let mut camera = CameraFile::parse(TEXT).expect("valid").camera;
-        // 140 deg anticlockwise from north is 220 deg clockwise; the picture reaches 19.8 deg up and 25.6 deg sideways.
+        // 140 deg anticlockwise from north is 220 deg clockwise; the field of view is 19.8 deg up and 25.6
+        // deg sideways.
         let sees = |camera: &Camera, azimuth_deg, elevation_deg| {
             camera.sees_sun(SunPosition { azimuth_deg, elevation_deg })
         };

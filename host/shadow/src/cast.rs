@@ -1,14 +1,15 @@
-//! A silhouette explained as a body and the shadow that this body throws: what `hybrid` does where the light's place is known.
+//! Splits a silhouette into a body and its cast shadow, for `hybrid` with a known light position.
 //!
-//! The body stands in an upright plane at the subject's distance, as deep as it is wide up to 0.17 of the stature. Its rows are read from the head downwards: every run of
-//! pixels throws the ellipse of its own width on the ground, at the place that its height and the light say, and what lies in the shadow thrown so far is shadow, unless
-//! the body goes on there from the row above. Below the feet there is no body, and near the ground none beside the legs.
+//! The body is in an upright plane at the subject's distance, as deep as wide, up to 0.17 of the stature.
+//! Rows are read from the head down: each run of pixels casts an ellipse of its width on the ground. Pixels
+//! inside the shadow cast so far are shadow, unless they continue the body of the row above. Below the feet
+//! there is no body; near the ground only legs.
 //!
-//! Only the subject's distance has to be known, and the silhouette tells it: with a wrong one the shadow thrown does not lie on the one that was seen. All distances that put the feet
-//! into the silhouette are tried on a small copy. No head is measured, so that people may bend, and no direction in
-//! the picture is used, so that the camera may be pitched.
+//! The only unknown is the subject's distance: a wrong one casts a shadow that does not match. All distances
+//! with the feet in the silhouette are tried on a reduced copy. No head is measured and no image direction is
+//! used, so bent people and pitched cameras work.
 //!
-//! Cost: O(tries x pixels of the small copy); 640 x 480 takes some milliseconds.
+//! Cost: O(tries x pixels of the copy); some milliseconds for 640 x 480.
 
 use super::camera::{Camera, CameraFile};
 use super::light::Light;
@@ -16,44 +17,42 @@ use super::projection::{ShadowError, Subject};
 use farnear_silhouettes::mask::{BoundingBox, Mask};
 use farnear_silhouettes::silhouette::raster::{Point, fill_convex};
 
-/// Half the depth of a body, of its stature: a chest is 0.17 deep without clothes and arms.
+/// Half the depth of a body / stature: a chest is 0.17 deep without clothes and arms.
 const DEEPEST: f64 = 0.086;
-/// How much wider than drawn a shadow is taken: a run is cut at pixels, and a shadow's edge is soft.
+/// Widening of the cast shadow: runs are cut at pixels, and shadow edges are soft.
 const WIDER: f64 = 1.05;
-/// Below this height, of the stature, there are legs only (knees are at 0.285).
+/// Height / stature below which there are only legs (knees are at 0.285).
 const LEGS: f64 = 0.26;
-/// How far legs reach beside the thighs, of the stature: a stride.
+/// Reach of legs beyond the thighs / stature: a stride.
 const REACH: f64 = 0.26;
-/// Heights between which the thighs are, of the stature: their middle is where the legs come from.
+/// Height range of the thighs / stature; legs start at their centre.
 const THIGHS: [f64; 2] = [0.23, 0.46];
-/// How far below the feet's middle a foot nearer to the camera may be seen, of the stature.
+/// Depth of a nearer foot below the feet's middle / stature.
 const BELOW: f64 = 0.028;
-/// Where shadow lies beside or behind it, a body is taken to become narrower from row to row, by a pixel on either side in so many rows.
+/// Next to shadow a body narrows by a pixel on either side per this many rows.
 const NARROWS: usize = 3;
-/// Statures that a silhouette may come to, of the subject's: who bends or crouches is low, and a head's hair and a lifted hand are above it.
+/// Range of the silhouette's height relative to the subject's stature: bending lowers it, hair and raised
+/// hands increase it.
 const STATURES: [f64; 2] = [0.35, 1.2];
-/// Rows of the copy on which distances are tried.
+/// Rows of the reduced copy.
 const TRIED_ROWS: usize = 45;
-/// Share of silhouette and shadow that may stay unexplained.
+/// Largest unexplained share of silhouette and shadow.
 const UNEXPLAINED: f64 = 0.4;
 
-/// How a silhouette was explained.
+/// Result of a split.
 #[derive(Clone, Debug)]
 pub struct Explanation {
-    /// The silhouette's pixels that are the body's.
     pub body: Mask,
-    /// The shadow that the body throws, also where it lies hidden or beside the silhouette.
+    /// Cast shadow, including hidden parts and parts outside the silhouette.
     pub thrown: Mask,
-    /// Where the subject stands.
     pub subject: Subject,
-    /// Pixels that neither body nor shadow explains, and of the shadow beside the silhouette, as a share of the silhouette's.
+    /// Pixels explained by neither body nor shadow, plus shadow outside the silhouette, relative to the
+    /// silhouette.
     pub unexplained: f64,
 }
 
-/// Explains the silhouette; `None` where the light's place is not known, or where no distance explains enough of it.
-///
-/// # Errors
-/// A light that throws no usable shadow.
+/// Splits the silhouette; `None` without a light position, or if no distance explains enough.
+/// Errors: a light without a usable shadow.
 pub fn explain(mask: &Mask, file: &CameraFile, light: Light) -> Result<Option<Explanation>, ShadowError> {
     let Some(bounds) = BoundingBox::of(mask.view()) else { return Err(ShadowError::EmptyMask) };
     if matches!(light, Light::Direction { .. }) {
@@ -70,14 +69,14 @@ pub fn explain(mask: &Mask, file: &CameraFile, light: Light) -> Result<Option<Ex
             let Some(bounds) = BoundingBox::of(small.view()) else { return Ok(None) };
             let scene = Scene { mask: &small, bounds, camera: &camera, ..whole };
             let Some(near) = scene.best_of(scene.feet_rows()) else { return Ok(None) };
-            // The row of the feet is known to half a row of the small copy, which is enough: the body as a whole throws the shadow.
+            // Half a row of the copy is accurate enough for the feet: the whole body casts the shadow.
             whole.split(near.subject.distance_m)
         }
     };
     Ok(best.filter(|found| found.unexplained <= UNEXPLAINED || file.subject.distance_m.is_some()))
 }
 
-/// Every `by`th pixel of a mask, and the camera that would have taken it.
+/// Every `by`th pixel of a mask, with the matching camera.
 fn shrunk(mask: &Mask, camera: &Camera, by: usize) -> (Mask, Camera) {
     let (rows, columns) = (mask.nrows() / by, mask.ncols() / by);
     let small = Mask::from_shape_fn((rows, columns), |(y, x)| mask[[y * by + by / 2, x * by + by / 2]]);
@@ -93,7 +92,6 @@ fn shrunk(mask: &Mask, camera: &Camera, by: usize) -> (Mask, Camera) {
     (small, camera)
 }
 
-/// A silhouette and how it came to be.
 #[derive(Clone, Copy)]
 struct Scene<'a> {
     mask: &'a Mask,
@@ -103,15 +101,15 @@ struct Scene<'a> {
     stature_m: f64,
 }
 
-/// A row's pixels of the body, from the first to the last.
+/// First and last column of a run of body pixels.
 type Run = (usize, usize);
 
-/// A row of the upright plane in which a body stands.
+/// A row of the body's upright plane.
 #[derive(Clone, Copy)]
 struct Row {
     up_m: f64,
     pixel_m: f64,
-    /// The column straight ahead of the camera.
+    /// Column straight ahead of the camera.
     ahead_px: f64,
 }
 
@@ -121,7 +119,7 @@ impl Row {
     }
 }
 
-/// What is counted from the head downwards.
+/// Accumulated from the head down.
 struct Split {
     body: Mask,
     thrown: Mask,
@@ -131,7 +129,7 @@ struct Split {
 }
 
 impl Scene<'_> {
-    /// The rows in which the feet may be, upwards; a silhouette that the picture's lower edge cuts has them below.
+    /// Candidate rows of the feet, upwards; below the image if the silhouette is cut there.
     fn feet_rows(&self) -> impl Iterator<Item = f64> + use<> {
         let cut = self.bounds.bottom == self.mask.nrows();
         let last = self.bounds.bottom as f64 + if cut { 0.3 * self.bounds.height() as f64 } else { 1.0 };
@@ -145,7 +143,6 @@ impl Scene<'_> {
         tried.reduce(|best, next| if next.unexplained < best.unexplained { next } else { best })
     }
 
-    /// A row of the upright plane at a distance.
     fn row(&self, y: f64, distance_m: f64) -> Row {
         let [cx, cy] = self.camera.principal_point();
         let focal = self.camera.focal_px();
@@ -155,7 +152,7 @@ impl Scene<'_> {
         Row { up_m: self.camera.height_m - along * (s + down * c), pixel_m: along / focal, ahead_px: cx }
     }
 
-    /// Body and shadow if the subject stands at a distance; `None` where nobody can be that large or small.
+    /// Split at a distance; `None` for an implausible size.
     fn split(&self, distance_m: f64) -> Option<Explanation> {
         let top = self.row(self.bounds.top as f64, distance_m);
         let possible = (STATURES[0]..STATURES[1]).contains(&(top.up_m / self.stature_m));
@@ -195,7 +192,7 @@ impl Scene<'_> {
         })
     }
 
-    /// Tells a row's pixels apart and gives the body's.
+    /// Classifies a row's pixels; returns the body's runs.
     fn read(&self, y: usize, row: Row, above: &[Run], split: &mut Split, runs: &mut Vec<Run>) {
         let height = row.up_m / self.stature_m;
         let middle_m = (split.thigh_pixels > 0).then(|| split.thighs_m / split.thigh_pixels as f64);
@@ -230,7 +227,7 @@ impl Scene<'_> {
         }
     }
 
-    /// Draws the shadow of a run of the body's pixels: an ellipse on the ground.
+    /// Draws the shadow of a run: an ellipse on the ground.
     fn throw(&self, (first, last): Run, row: Row, distance_m: f64, split: &mut Split) {
         const CORNERS: usize = 12;
         let half_m = 0.5 * (last + 1 - first) as f64 * row.pixel_m;
@@ -247,14 +244,14 @@ impl Scene<'_> {
         for (i, corner) in corners.iter_mut().enumerate() {
             let (sin, cos) = (std::f64::consts::TAU * i as f64 / CORNERS as f64).sin_cos();
             let on_ground = [x_m + WIDER * half_m * cos, y_m + depth_m * sin, 0.0];
-            // In front of the lens as a whole, or there is nothing to draw.
+            // Skipped unless fully in front of the lens.
             let Some(seen) = self.camera.project(on_ground) else { return };
             *corner = seen;
         }
         fill_convex(&mut split.thrown, &corners);
     }
 
-    /// Whether a shadow at that place lies beyond an edge of the picture that the silhouette does not touch.
+    /// Whether shadow there is beyond an image edge that the silhouette does not touch.
     fn would_be_cut(&self, [x, y]: [f64; 2]) -> bool {
         let (rows, columns) = self.mask.dim();
         (y >= rows as f64 && self.bounds.bottom < rows)

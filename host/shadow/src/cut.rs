@@ -1,16 +1,24 @@
-//! Cutting the shadow off a silhouette: `thesis` (Li 2014, section 8.2.4) and `hybrid`, the default.
+//! Removes the shadow from a silhouette: `thesis` (Li 2014, section 8.2.4) and `hybrid`, the default.
 //!
-//! - `thesis`: the run-point cut at angles from beta minus to beta plus its standard deviation, at most 10 degrees apart, the longest run wins; shadows that point
-//!   straight down are cut by length. It removes much and takes a good part of the person with it when the run is broken by the legs.
-//! - `hybrid`: where the light's place is known the silhouette is explained as a body and the shadow that it throws ([`super::cast`]), and what is not the body goes;
-//!   where the shadow lies sideways the run-point cut over +-3 degrees takes off what is left. Where nothing explains the silhouette, and for a
-//!   direction measured in the picture, it is by angles alone: shadows that lie sideways (|sin eta| < 0.45) get the run-point cut over +-3 degrees, and a half-plane through the
-//!   feet where that would take more than 60 % of the silhouette; others get the half-plane at once. The half-plane's edge is the
-//!   bisector of body and shadow; where the shadow points away only a strip of ground as wide as a person is cut. A shadow behind
-//!   the person cannot be told apart without colour: such frames are cut as well as it goes and flagged.
+//! - `thesis`: run-point cut at angles within beta plus or minus its standard deviation, at most 10 degrees
+//!   apart; the longest
+//!   run wins. Shadows straight down are cut by length. Removes much, with a good part of the person if legs
+//!   break the run.
+//! - `hybrid`: with a known light position the silhouette is split into body and cast shadow
+//!   ([`super::cast`]); for sideways
+//!   shadows the run-point cut over +-3 degrees removes the rest. Without a split, or with a measured
+//!   direction, only angles
+//!   are used: sideways shadows (|sin eta| < 0.45) get the run-point cut over +-3 degrees, or a half-plane
+//!   through the feet
+//!   if that would remove more than 60 %; others get the half-plane. Its edge is the bisector of body and
+//!   shadow; for a
+//!   shadow pointing away only a person-wide strip of ground is cut. Shadows behind the person need colour:
+//!   such frames are
+//!   flagged.
 //!
-//! Angles are tried on the outline ([`super::envelope`]), so that a cut by angles on 640 x 480 costs a fraction of a millisecond; an
-//! explanation some milliseconds.
+//! Angles are evaluated on the outline ([`super::envelope`]): a fraction of a millisecond for 640 x 480; a
+//! split takes some
+//! milliseconds.
 
 use super::camera::CameraFile;
 use super::cast;
@@ -22,14 +30,13 @@ use serde::{Deserialize, Serialize};
 use std::f64::consts::{FRAC_PI_2, PI};
 use std::str::FromStr;
 
-/// A way to cut, by name.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Method {
-    /// The body that explains silhouette and shadow, by angles where none does.
+    /// Body and cast shadow, else by angles.
     #[default]
     Hybrid,
-    /// As printed in Li 2014.
+    /// As in Li 2014.
     Thesis,
 }
 
@@ -44,29 +51,28 @@ impl FromStr for Method {
     }
 }
 
-/// How a silhouette was cut, and how far the result can be trusted.
+/// How a silhouette was cut, and its reliability.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CutReport {
-    /// Angle of the cut that was made, radians (thesis' beta).
+    /// Cut angle (thesis' beta).
     pub beta_rad: f64,
-    /// Share of the silhouette removed, 0 to 1.
+    /// Share of the silhouette, 0 to 1.
     pub removed_fraction: f64,
-    /// Whether the half-plane through the feet was used in place of the run point.
+    /// Half-plane through the feet instead of the run point.
     pub half_plane: bool,
-    /// Where the straight edge lies that was cut along, pixels: beyond it `x cos beta - y sin beta` is less, x counted from the right in mirrored
-    /// pictures; `None` where the body that explains the silhouette alone decided.
+    /// Position of the straight edge, px: pixels with `x cos beta - y sin beta` below it were cut, x from the
+    /// right in mirrored pictures; `None` if the split alone decided.
     pub edge_px: Option<f64>,
-    /// Share of the silhouette that body and shadow together leave unexplained, 0 to 1; `None` where the cut went by angles alone.
+    /// Share not explained by body and shadow, 0 to 1; `None` for a cut by angles.
     pub unexplained: Option<f64>,
-    /// The shadow found for this silhouette.
     pub shadow: ImageShadow,
-    /// The subject as estimated from the silhouette.
+    /// Estimated from the silhouette.
     pub subject: Subject,
-    /// False when more than half of the silhouette went or the shadow points away, where cutting is guesswork: look at the frame.
+    /// False if more than half was removed or the shadow points away: check the frame.
     pub trustworthy: bool,
 }
 
-/// The straight edge that a cut goes along.
+/// Straight edge of a cut.
 struct Edge {
     beta_rad: f64,
     /// [`CutReport::edge_px`].
@@ -74,15 +80,13 @@ struct Edge {
     half_plane: bool,
 }
 
-/// Sine of eta up to which a shadow counts as lying sideways.
+/// Largest |sin eta| of a sideways shadow.
 pub const SIDEWAYS: f64 = 0.45;
 /// Smoothing window of the lower edge's gradient, columns.
 const GRADIENT_WINDOW: usize = 9;
 
-/// Distance and offset of the subject in a mask, from its head's width and row.
-///
-/// # Errors
-/// Empty masks, a mask of another shape than the camera's.
+/// Distance and offset of the subject, from its head's width and row.
+/// Errors: an empty mask, or one of another shape than the camera's.
 pub fn subject_of(mask: &Mask, file: &CameraFile) -> Result<Subject, ShadowError> {
     let outline = checked_outline(mask, file)?;
     Ok(estimate_subject(mask, &outline, file))
@@ -97,12 +101,12 @@ fn checked_outline(mask: &Mask, file: &CameraFile) -> Result<Outline, ShadowErro
     Outline::new(mask).ok_or(ShadowError::EmptyMask)
 }
 
-/// Removes the shadow of the one subject in `mask`, with the camera and the light known, mostly the sun's position.
+/// Removes the shadow of the single subject in `mask`, with known camera and light.
 ///
-/// `beta_sd_rad` is the standard deviation of the cutting angle ([`super::uncertainty`]); only `thesis` uses it.
-///
-/// # Errors
-/// Empty masks, a mask of another shape than the camera's, a sun below [`projection::LOWEST_SUN_DEG`], a lamp below the head.
+/// `beta_sd_rad` is the standard deviation of the cutting angle ([`super::uncertainty`]), used by `thesis`
+/// only.
+/// Errors: an empty mask or one of another shape; a sun below [`projection::LOWEST_SUN_DEG`], a lamp below
+/// the head.
 pub fn remove(
     mask: &Mask,
     file: &CameraFile,
@@ -147,7 +151,7 @@ pub fn remove(
     ))
 }
 
-/// How far the silhouette reaches from the feet in the direction that was measured, pixels: so long is the shadow at most.
+/// Extent of the silhouette from the feet in the measured direction: the largest shadow length, px.
 fn reach_px(mask: &Mask, outline: &Outline, foot_px: [f64; 2], eta_rad: f64) -> f64 {
     let (sin, cos) = eta_rad.sin_cos();
     let (top, bottom, left, right) = outline.bounds;
@@ -155,10 +159,11 @@ fn reach_px(mask: &Mask, outline: &Outline, foot_px: [f64; 2], eta_rad: f64) -> 
     set.map(|[y, x]| (x as f64 - foot_px[0]) * cos + (y as f64 - foot_px[1]) * sin).fold(0.0, f64::max)
 }
 
-/// Distance and offset of the subject from its silhouette: the head's width (8.17) and the head's row, weighted by how sure each is.
+/// Distance and offset from the head's width (8.17) and row, weighted by their precision.
 fn estimate_subject(mask: &Mask, outline: &Outline, file: &CameraFile) -> Subject {
     let (top, bottom, _, _) = outline.bounds;
-    // The head is the top seventh or so; the widest row of the top tenth is a head's width, or less where hair is thin.
+    // The head is about the top seventh; the widest row of the top tenth is its width, or less with thin
+    // hair.
     let rows = ((bottom - top) / 12).max(2);
     let (mut widest, mut centre) = (1.0_f64, outline.bounds.2 as f64);
     for y in top..=(top + rows).min(bottom) {
@@ -188,9 +193,9 @@ fn estimate_subject(mask: &Mask, outline: &Outline, file: &CameraFile) -> Subjec
 }
 
 fn thesis(mask: &Mask, out: &mut Mask, outline: &Outline, shadow: &ImageShadow, sd_rad: f64) -> Edge {
-    /// The largest step over beta's range (10 degrees).
+    /// Largest step within beta's range.
     const STEP_RAD: f64 = 10.0 * PI / 180.0;
-    /// "Close to 90 degrees": the shadow is cut by length.
+    /// "Close to 90 degrees": cut by length.
     const VERTICAL_RAD: f64 = 10.0 * PI / 180.0;
     if (shadow.eta_rad - FRAC_PI_2).abs() < VERTICAL_RAD {
         let bottom = outline.bounds.1 as f64;
@@ -200,7 +205,7 @@ fn thesis(mask: &Mask, out: &mut Mask, outline: &Outline, shadow: &ImageShadow, 
     }
     let flip = shadow.mirrored.then_some(mask.ncols() as f32);
     let sd_rad = sd_rad.abs().min(FRAC_PI_2);
-    // Also where the step is larger than the range: its middle and both ends.
+    // Also for a step above the range: its middle and both ends.
     let steps = (sd_rad / STEP_RAD).ceil().max(1.0) as i32;
     let angles = (-steps..=steps).map(|i| shadow.beta_rad + sd_rad * f64::from(i) / f64::from(steps));
     let Some((beta_rad, limit)) = longest_run(outline, flip, angles) else {
@@ -210,8 +215,8 @@ fn thesis(mask: &Mask, out: &mut Mask, outline: &Outline, shadow: &ImageShadow, 
     Edge { beta_rad, limit: Some(limit), half_plane: false }
 }
 
-/// The angle at which the run of negative slope is longest, and where it ends there. Beta lies in [pi/2, pi] (8.20); of equals the angle nearest to the
-/// middle of those tried is taken.
+/// Angle of the longest run of negative slope, and its end. Beta is in [pi/2, pi] (8.20); ties take the angle
+/// nearest to the middle.
 fn longest_run(
     outline: &Outline,
     flip: Option<f32>,
@@ -227,13 +232,13 @@ fn longest_run(
     from_middle.map(|(_, &(beta, (_, limit)))| (beta, limit))
 }
 
-/// The angle and up to 3 degrees beside it.
+/// The angle and up to 3 degrees around it.
 fn degrees_about(beta_rad: f64) -> impl Iterator<Item = f64> {
     (-3..=3).map(move |i| beta_rad + f64::from(i).to_radians())
 }
 
-/// Clears what lies beyond the run point of a shadow that lies sideways, and gives the edge; `None` where it lies otherwise, and
-/// where that would take more than 60 % of the silhouette.
+/// Clears pixels beyond the run point of a sideways shadow and returns the edge; `None` for other shadows, or
+/// if more than 60 % would go.
 fn clear_sideways(mask: &Mask, out: &mut Mask, outline: &Outline, shadow: &ImageShadow) -> Option<Edge> {
     if shadow.eta_rad.sin().abs() >= SIDEWAYS {
         return None;
@@ -248,8 +253,8 @@ fn clear_sideways(mask: &Mask, out: &mut Mask, outline: &Outline, shadow: &Image
     Some(Edge { beta_rad, limit: Some(limit), half_plane: false })
 }
 
-/// Takes off what is not the body's, and of a shadow that lies sideways also what lies beyond the run point: a body and its shadow look
-/// alike near the feet.
+/// Removes all but the body, and for a sideways shadow also pixels beyond the run point, as both look alike
+/// near the feet.
 fn explained_cut(
     mask: &Mask,
     out: &mut Mask,
@@ -263,7 +268,7 @@ fn explained_cut(
     edge
 }
 
-/// The default method where nothing explains the silhouette.
+/// The default method without a split.
 fn hybrid(mask: &Mask, out: &mut Mask, outline: &Outline, shadow: &ImageShadow) -> Edge {
     if let Some(edge) = clear_sideways(mask, out, outline, shadow) {
         return edge;
@@ -275,12 +280,12 @@ fn hybrid(mask: &Mask, out: &mut Mask, outline: &Outline, shadow: &ImageShadow) 
     edge
 }
 
-/// Where the shadow points away, the half-plane takes the near side of the upper body with it. The shadow lies on a strip of ground
-/// from the feet to its tip, as wide as a person: what the half-plane took beside that strip is the body's again.
+/// For a shadow pointing away the half-plane also removes part of the upper body. The shadow covers a
+/// person-wide strip from feet to tip; pixels removed outside it are restored.
 fn give_back_the_body(mask: &Mask, out: &mut Mask, outline: &Outline, shadow: &ImageShadow) {
-    /// Of the stature: a person with their arms and stride.
+    /// Of the stature: a person with arms and stride.
     const HALF_WIDTH: f64 = 0.17;
-    /// Of the stature: the head is round, its shadow reaches beyond that of its top.
+    /// Of the stature: the head is round, its shadow extends beyond that of its top.
     const BEYOND: f64 = 0.04;
     let half_width = HALF_WIDTH * shadow.height_px;
     let (sin, cos) = shadow.eta_rad.sin_cos();

@@ -1,13 +1,12 @@
-//! Image-based shadow detectors: which foreground pixels are shadow, told from the pictures alone.
+//! Image-based shadow detectors: which foreground pixels are shadow.
 //!
-//! The five that Li 2014 (tables 8.1 and 8.2) compares his own cut with, as chosen and described by Sanin,
-//! Sanderson and Lovell, "Shadow detection: a survey and comparative evaluation of recent methods", Pattern
-//! Recognition 45 (2012), 1684-1695. Each is built from its own paper, named in its module; thresholds are this
-//! project's. All need the picture of the empty scene ([`farnear_silhouettes::background::BackgroundModel::background`]) and
-//! colour. [`crate::synthetic::pictures`] makes pictures whose shadow is known to score them on.
+//! The five that Li 2014 (tables 8.1 and 8.2) compares with, selected and described by Sanin, Sanderson and
+//! Lovell, "Shadow detection: a survey and comparative evaluation of recent methods", Pattern Recognition 45
+//! (2012), 1684-1695. Each follows its own paper, named in its module; thresholds are this project's. All
+//! need colour and the empty scene ([`farnear_silhouettes::background::BackgroundModel::background`]).
 //!
-//! The limits that the survey names hold here too: chromaticity fails on grey clothes, geometry on shadows that fall
-//! under the body's own columns, texture on smooth ground.
+//! Known limits from the survey: chromaticity fails on grey clothes, geometry on shadows under the body's own
+//! columns, texture on smooth ground.
 
 pub mod chromaticity;
 pub mod geometry;
@@ -22,23 +21,22 @@ pub use images::{Images, ImagesError};
 
 use farnear_silhouettes::mask::Mask;
 
-/// One of the five detectors.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Method {
     /// Hue and saturation stay while the value drops (Cucchiara et al. 2003).
     Chromaticity,
-    /// The colour change points away from the light source's colour, learnt per scene (Huang and Chen 2009).
+    /// The colour changes along the light's colour, learnt per scene (Huang and Chen 2009).
     Physical,
-    /// The part of the region that leans away from the upright body (Hsieh et al. 2003).
+    /// The part that leans away from the upright body (Hsieh et al. 2003).
     Geometry,
     /// Gabor texture around each pixel stays (Leone and Distante 2007).
     SmallRegionTexture,
-    /// Gradient directions over a whole candidate region stay (Sanin et al. 2010).
+    /// Gradient directions over a whole region stay (Sanin et al. 2010).
     LargeRegionTexture,
 }
 
 impl Method {
-    /// All five, in the order of the thesis' tables.
+    /// In the order of the thesis' tables.
     pub const ALL: [Self; 5] = [
         Self::Chromaticity,
         Self::Physical,
@@ -47,7 +45,7 @@ impl Method {
         Self::LargeRegionTexture,
     ];
 
-    /// The name that [`FromStr`] reads.
+    /// Name for [`FromStr`].
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -60,22 +58,18 @@ impl Method {
     }
 }
 
-/// One of the detectors with its default settings, ready for a sequence of frames.
+/// A detector with default settings, for a sequence of frames.
 #[derive(Clone, Debug)]
 pub enum Detector {
-    /// See [`chromaticity`].
     Chromaticity(chromaticity::Settings),
-    /// See [`physical`]; learns from frame to frame.
+    /// Learns from frame to frame.
     Physical(physical::Physical),
     Geometry(geometry::Settings),
-    /// See [`small_region`].
     SmallRegionTexture(small_region::Settings),
-    /// See [`large_region`].
     LargeRegionTexture(large_region::Settings),
 }
 
 impl Detector {
-    /// The detector of this name with its default settings.
     #[must_use]
     pub fn new(method: Method) -> Self {
         match method {
@@ -87,7 +81,7 @@ impl Detector {
         }
     }
 
-    /// The shadow pixels among the foreground of the next frame, shape (height, width).
+    /// Shadow pixels of the next frame's foreground, shape (height, width).
     pub fn detect(&mut self, images: &Images<'_>) -> Mask {
         match self {
             Self::Chromaticity(settings) => chromaticity::detect(images, settings),
@@ -99,7 +93,6 @@ impl Detector {
     }
 }
 
-/// A name that is none of the five.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
     "`{0}` is not a shadow detector; choose chromaticity, physical, geometry, small-region-texture or large-region-texture"
@@ -119,7 +112,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_are_read_back() {
+    fn names_round_trip() {
         for method in Method::ALL {
             assert_eq!(method.name().parse(), Ok(method));
         }

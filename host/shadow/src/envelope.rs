@@ -1,26 +1,25 @@
-//! Silhouettes seen along a turned axis, without turning any picture.
+//! Silhouettes along a rotated axis, without image rotation.
 //!
-//! The thesis rotates the whole silhouette for every angle tried. Only two things are needed of the rotated picture: the lower
-//! edge of each column, and which pixels lie left of a column. Both follow from the outline's coordinates
-//! `x' = x cos b - y sin b`, `y' = x sin b + y cos b` (Li 2014, eq. 8.38), so an angle costs a pass over the outline
-//! (some thousand points) and no resampling loss.
+//! The thesis rotates the silhouette for each angle. Only the lower edge of each column and the pixels left
+//! of a column are needed, which follow from `x' = x cos b - y sin b`, `y' = x sin b + y cos b` (Li 2014, eq.
+//! 8.38). An angle costs one pass over the outline (some thousand points), without resampling loss.
 
 use farnear_silhouettes::mask::Mask;
 use ndarray::ArrayView2;
 
-/// The outline's pixels (set, with an unset 4-neighbour or the border beside them), and all row extents.
+/// Outline pixels (set, next to an unset 4-neighbour or the border) and row extents.
 #[derive(Clone, Debug)]
 pub struct Outline {
     /// (x, y) of the outline's pixels.
     pub points: Vec<[f32; 2]>,
     /// Number of set pixels.
     pub area: usize,
-    /// Rows and columns with set pixels: (top, bottom, left, right).
+    /// (top, bottom, left, right) of the set pixels.
     pub bounds: (usize, usize, usize, usize),
 }
 
 impl Outline {
-    /// Collects the outline; `None` for an empty mask. One pass over the mask.
+    /// `None` for an empty mask. One pass.
     pub fn new(mask: &Mask) -> Option<Self> {
         let (height, width) = mask.dim();
         let mut points = Vec::with_capacity(4096);
@@ -52,8 +51,8 @@ impl Outline {
         bounds.map(|bounds| Self { points, area, bounds })
     }
 
-    /// The lower edge under a rotation by `angle_rad`: the lowest y' of every column x', and the x' of column 0.
-    /// Columns without a point take their left neighbour's value.
+    /// Lower edge after a rotation by `angle_rad`: largest y' per column x', and the x' of column 0. Empty
+    /// columns repeat their left neighbour.
     pub fn lower_edge(&self, angle_rad: f32, flip_width: Option<f32>) -> LowerEdge {
         let (sin, cos) = angle_rad.sin_cos();
         let turn = |p: &[f32; 2]| {
@@ -82,23 +81,22 @@ impl Outline {
     }
 }
 
-/// The lower edge of a turned silhouette.
 #[derive(Clone, Debug)]
 pub struct LowerEdge {
-    /// Lowest y' (y down) per column.
+    /// Largest y' (y down) per column.
     pub edge: Vec<f32>,
     pub origin: f32,
 }
 
 impl LowerEdge {
-    /// The rotation point of Li 2014, section 8.2.4: the end of the longest run of negative slope of the edge, whose gradient is
-    /// smoothed by a unity-gain mean over `window` columns. Gives the run's length in columns and the x' of its end.
+    /// Rotation point of Li 2014, section 8.2.4: the end of the longest run of negative slope, smoothed over
+    /// `window` columns. Returns the run's length in columns and the x' of its end.
     pub fn rotation_point(&self, window: usize) -> (usize, f32) {
         let n = self.edge.len();
         let (mut best, mut run) = ((0_usize, self.origin), 0_usize);
         let half = (window / 2).max(1);
         for i in 0..n.saturating_sub(1) {
-            // The mean of a gradient over a window is the difference of the window's ends over its length.
+            // The mean gradient over a window is the difference of its ends over its length.
             let (from, to) = (i.saturating_sub(half), (i + half).min(n - 1));
             if self.edge[to] - self.edge[from] < 0.0 {
                 run += 1;
@@ -113,7 +111,7 @@ impl LowerEdge {
     }
 }
 
-/// Clears the pixels with `x cos b - y sin b < limit` and gives how many were set; `view` is read, `out` is written.
+/// Clears pixels with `x cos b - y sin b < limit` in `out` and returns their number; `view` is the input.
 pub fn clear_left_of(
     view: ArrayView2<bool>,
     out: &mut Mask,
@@ -138,7 +136,7 @@ pub fn clear_left_of(
     cleared
 }
 
-/// First and last set pixel of a row, `None` if the row is empty. Long empty stretches are skipped 32 pixels at a time.
+/// First and last set pixel of a row, if any. Skips 32 empty pixels at a time.
 pub(super) fn row_extent(row: &[bool]) -> Option<(usize, usize)> {
     const BLOCK: usize = 32;
     let any = |part: &[bool]| part.iter().fold(false, |found, &set| found | set);
@@ -155,7 +153,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn row_extents_reach_over_blocks() {
+    fn row_extents_span_blocks() {
         let mut row = [false; 130];
         assert_eq!(row_extent(&row), None);
         row[101] = true;

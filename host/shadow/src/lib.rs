@@ -1,11 +1,12 @@
-//! The sun, the shadows it casts, and their removal from masks and pictures (Li 2014, chapter 8). No input or output.
+//! Sun, cast shadows, and their removal from masks and pictures (Li 2014, chapter 8). No I/O.
 //!
-//! [`sun`] gives elevation and azimuth, or [`light`] describes a lamp or a measured direction; [`projection`] computes the shadow on the
-//! ground and in the image; [`uncertainty`] the standard deviation of the cutting angle; [`cast`] models a silhouette as a body and
-//! its cast shadow; [`cut`] removes the shadow; [`detectors`] find shadows by colour and texture; [`score`] compares with truth;
-//! [`synthetic`] draws scenes whose shadow is known.
+//! [`sun`] gives elevation and azimuth, [`light`] a lamp or a measured direction; [`projection`] the shadow
+//! on the ground and in the image; [`uncertainty`] the standard deviation of the cutting angle; [`cast`]
+//! models body and cast shadow; [`cut`] removes the shadow; [`detectors`] use colour and texture; [`score`]
+//! compares with truth; [`synthetic`] draws scenes with known shadow.
 //!
-//! Frames: on the ground, `r_x` to the camera's right and `r_y` along its viewing direction, metres; in the image x right, y DOWN.
+//! Frames: ground `r_x` to the camera's right, `r_y` along its viewing direction, metres; image x right, y
+//! DOWN.
 
 pub mod camera;
 pub mod cast;

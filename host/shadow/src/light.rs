@@ -1,5 +1,5 @@
-//! What throws the shadow: the sun, a lamp whose place is known, or something unknown whose shadow's direction was measured in the
-//! picture (as Li 2014 does for the KTH clips, section 9.2).
+//! Light source: sun, lamp at a known position, or a shadow direction measured in the picture (Li 2014,
+//! section 9.2).
 
 use super::{
     camera::Camera,
@@ -7,26 +7,25 @@ use super::{
 };
 use crate::sun::SunPosition;
 
-/// What throws the shadow.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Light {
     Sun(SunPosition),
-    /// A lamp, small beside its distance, in the camera's frame on the ground below the lens.
+    /// Small lamp, in the camera's frame on the ground below the lens.
     Lamp(Lamp),
-    /// The shadow's direction in the picture, radians from right towards down.
+    /// Shadow direction in the picture, from right towards down.
     Direction {
-        /// The angle eta of eq. 8.20.
+        /// Angle eta of eq. 8.20.
         eta_rad: f64,
     },
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lamp {
-    /// To the camera's right, metres.
+    /// To the camera's right.
     pub right_m: f64,
-    /// Along the viewing direction, metres.
+    /// Along the viewing direction.
     pub ahead_m: f64,
-    /// Above the ground, metres.
+    /// Above the ground.
     pub up_m: f64,
 }
 
@@ -37,10 +36,8 @@ impl From<SunPosition> for Light {
 }
 
 impl Light {
-    /// Whether anybody of that stature has a shadow that can be used.
-    ///
-    /// # Errors
-    /// [`ShadowError::SunTooLow`], [`ShadowError::LampTooLow`].
+    /// Whether a person of this stature has a usable shadow.
+    /// Errors: [`ShadowError::SunTooLow`], [`ShadowError::LampTooLow`].
     pub fn check(&self, height_m: f64, camera: &Camera) -> Result<(), ShadowError> {
         match self {
             Self::Sun(sun) => on_ground(*sun, height_m, camera).map(drop),
@@ -49,8 +46,8 @@ impl Light {
         }
     }
 
-    /// Where the shadow of a point (metres: right, ahead, up) falls on the ground, right and ahead; `None` at or below the ground, where the light is too low
-    /// for that height, and where its place is not known.
+    /// Ground position (right, ahead) of the shadow of a point (metres: right, ahead, up); `None` at or below
+    /// the ground, for too low a light, or without a light position.
     pub fn thrown_to(&self, [right_m, ahead_m, up_m]: [f64; 3], camera: &Camera) -> Option<[f64; 2]> {
         if up_m <= 0.0 {
             return None;
@@ -64,10 +61,9 @@ impl Light {
         Some([right_m + ground.rx_m, ahead_m + ground.ry_m])
     }
 
-    /// The subject's shadow in the image. Of a shadow whose direction alone is known, `length_px` says how long it is, given the foot and that direction.
-    ///
-    /// # Errors
-    /// As [`Light::check`]; a subject that is not in front of the lens.
+    /// The subject's shadow in the image. For a known direction only, `length_px` gives the length from foot
+    /// and direction.
+    /// Errors: as [`Light::check`]; a subject not in front of the lens.
     pub fn shadow_of(
         &self,
         subject: Subject,
@@ -86,7 +82,7 @@ impl Light {
 
 impl Lamp {
     fn check(&self, height_m: f64) -> Result<(), ShadowError> {
-        /// A lamp at the height of the head throws its shadow to infinity.
+        /// A lamp at head height casts an infinite shadow.
         const ABOVE_HEAD: f64 = 1.1;
         if self.up_m >= ABOVE_HEAD * height_m {
             return Ok(());
@@ -94,7 +90,7 @@ impl Lamp {
         Err(ShadowError::LampTooLow { up_m: self.up_m, least_m: ABOVE_HEAD * height_m })
     }
 
-    /// The ray from the lamp over the top of the head goes on to the ground: as far beyond the feet as the feet are from below the lamp, times
+    /// The ray over the head reaches the ground beyond the feet by their distance from the lamp's foot times
     /// `H / (up - H)`.
     fn on_ground(&self, subject: Subject) -> Result<GroundShadow, ShadowError> {
         self.check(subject.height_m)?;
@@ -118,10 +114,10 @@ mod tests {
     const SUBJECT: Subject = Subject { distance_m: 6.0, offset_m: -0.4, height_m: 1.75 };
 
     #[test]
-    fn a_lamp_far_away_is_a_sun() {
+    fn a_distant_lamp_equals_the_sun() {
         let camera = camera();
         let sun = SunPosition { elevation_deg: 35.0, azimuth_deg: 200.0 };
-        // Towards the sun in the camera's frame: against the shadow.
+        // Towards the sun in the camera's frame, opposite to the shadow.
         let ground = on_ground(sun, 1.0, &camera).expect("sun is up");
         let far_m = 1e7;
         let lamp = Light::Lamp(Lamp {
@@ -140,7 +136,7 @@ mod tests {
     fn lamp_head_and_tip_are_in_line() {
         let lamp = Lamp { right_m: 1.5, ahead_m: 8.0, up_m: 3.0 };
         let shadow = lamp.on_ground(SUBJECT).expect("above the head");
-        // At the height of the head the ray from the lamp to the tip is over the feet.
+        // At head height the ray from lamp to tip is over the feet.
         let part = (3.0 - SUBJECT.height_m) / 3.0;
         let tip = [SUBJECT.offset_m + shadow.rx_m, SUBJECT.distance_m + shadow.ry_m];
         assert!((1.5 + part * (tip[0] - 1.5) - SUBJECT.offset_m).abs() < 1e-12);
@@ -148,13 +144,13 @@ mod tests {
     }
 
     #[test]
-    fn a_lamp_below_the_head_is_refused() {
+    fn rejects_a_lamp_below_the_head() {
         let error = Light::Lamp(Lamp { right_m: 0.0, ahead_m: 3.0, up_m: 1.8 }).check(1.75, &camera());
         assert_eq!(error, Err(ShadowError::LampTooLow { up_m: 1.8, least_m: 1.1 * 1.75 }));
     }
 
     #[test]
-    fn a_measured_direction_is_taken_as_it_is() {
+    fn uses_a_measured_direction_unchanged() {
         let shadow =
             Light::Direction { eta_rad: 0.3 }.shadow_of(SUBJECT, &camera(), |_, _| 80.0).expect("visible");
         assert!((shadow.eta_rad - 0.3).abs() < 1e-12 && !shadow.mirrored && !shadow.shortened);

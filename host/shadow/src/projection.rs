@@ -1,126 +1,95 @@
-//! From the sun to the shadow on the ground (Li 2014, eq. 8.1 and 8.9 to 8.13) and in the image (8.14 to 8.20).
+//! Shadow on the ground (Li 2014, eq. 8.1 and 8.9 to 8.13) and in the image (8.14 to 8.20).
 //!
-//! Put right against the printed form: the shadow's lateral image component takes the subject's lateral offset X0 into account,
-//! `m_x = v ((X0 + r_x) / (u + r_y) - X0 / u)` (8.18 forgets it), angles come from `atan2`, and with a pitched camera the two
-//! ground points are projected as they are.
+//! Corrected: the lateral component includes the subject's offset X0, `m_x = v ((X0 + r_x) / (u + r_y) - X0 /
+//! u)` (missing in 8.18); angles use `atan2`; a pitched camera projects both ground points exactly.
 
 use super::camera::{Camera, CameraFile};
 use crate::sun::SunPosition;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4};
 
-/// Below this the shadow is many body lengths and every angle of it unsure.
+/// Lower suns cast shadows of many body lengths with uncertain angles.
 pub const LOWEST_SUN_DEG: f64 = 3.0;
 
-/// Why no shadow could be computed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ShadowError {
-    /// The sun is down or too low.
     #[error(
         "the sun stands at {elevation_deg:.2} deg: no usable shadow below {LOWEST_SUN_DEG} deg; check time, latitude and longitude"
     )]
-    SunTooLow {
-        /// The sun's elevation, degrees.
-        elevation_deg: f64,
-    },
-    /// A lamp at the height of the head or below.
+    SunTooLow { elevation_deg: f64 },
     #[error(
         "the lamp hangs {up_m} m above the ground: no usable shadow below {least_m:.2} m, a tenth above the subject's head"
     )]
-    LampTooLow {
-        up_m: f64,
-        /// The least that would do, metres.
-        least_m: f64,
-    },
-    /// The mask holds nothing.
-    #[error("the mask is empty: there is no subject to remove a shadow from")]
+    LampTooLow { up_m: f64, least_m: f64 },
+    #[error("the mask is empty: no subject was found")]
     EmptyMask,
-    /// The mask's shape is not the camera's.
     #[error(
         "the mask has {mask_height} x {mask_width} pixels, the camera file {camera_height} x {camera_width}"
     )]
-    Shape {
-        mask_height: usize,
-        mask_width: usize,
-        /// Rows by the camera file.
-        camera_height: usize,
-        /// Columns by the camera file.
-        camera_width: usize,
-    },
-    /// The subject does not stand before the camera.
+    Shape { mask_height: usize, mask_width: usize, camera_height: usize, camera_width: usize },
     #[error("the subject's distance of {distance_m} m is not one that the camera can see")]
-    Distance {
-        /// The distance that was given, metres.
-        distance_m: f64,
-    },
+    Distance { distance_m: f64 },
 }
 
-/// A shadow on the ground in the camera's frame.
+/// Shadow on the ground in the camera's frame.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct GroundShadow {
-    /// To the camera's right, metres.
+    /// To the camera's right.
     pub rx_m: f64,
-    /// Along the viewing direction (positive = away from the camera), metres.
+    /// Along the viewing direction (positive = away from the camera).
     pub ry_m: f64,
-    /// From the feet to the tip of the head's shadow, metres.
+    /// From the feet to the tip of the head's shadow.
     pub length_m: f64,
 }
 
-/// Where the subject stands.
+/// Position of the subject.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Subject {
     /// Distance u from the lens along the ground.
     pub distance_m: f64,
     /// Offset X0 to the right of the optical axis.
     pub offset_m: f64,
-    /// Stature H of (8.14), metres.
+    /// Stature H of (8.14).
     pub height_m: f64,
 }
 
-/// A shadow in the image.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ImageShadow {
-    /// Where the feet stand, pixels.
     pub foot_px: [f64; 2],
-    /// Where the shadow of the head falls, pixels.
+    /// Shadow of the head.
     pub tip_px: [f64; 2],
-    /// Tip minus foot, pixels: the thesis' (m_x, m_y).
+    /// Tip minus foot: (m_x, m_y).
     pub m_px: [f64; 2],
-    /// Direction of the shadow, radians from +x towards +y (down): eq. 8.20's eta by atan2.
+    /// Direction from +x towards +y (down): eta of eq. 8.20 by atan2.
     pub eta_rad: f64,
-    /// Angle by which the silhouette (mirrored when m_x <= 0) is turned so that the bisector of body and shadow points
-    /// down: `3 pi / 4 - eta / 2`, in [pi/2, pi].
+    /// Rotation of the silhouette (mirrored if m_x <= 0) that points the bisector of body and shadow down: `3
+    /// pi / 4 - eta / 2`, in [pi/2, pi].
     pub beta_rad: f64,
-    /// Whether m_x <= 0, so that the silhouette is mirrored before it is turned.
+    /// m_x <= 0: mirrored before the rotation.
     pub mirrored: bool,
-    /// Stature in the image, pixels (8.14).
+    /// Stature in the image (8.14).
     pub height_px: f64,
-    /// Whether the shadow left the image towards the camera and was shortened (8.19).
+    /// Shortened at the near image border (8.19).
     pub shortened: bool,
 }
 
-/// The shadow of a person of `height_m` on level ground.
-///
-/// # Errors
-/// A sun below [`LOWEST_SUN_DEG`].
+/// Shadow of a person on level ground.
+/// Errors: a sun below [`LOWEST_SUN_DEG`].
 pub fn on_ground(sun: SunPosition, height_m: f64, camera: &Camera) -> Result<GroundShadow, ShadowError> {
     if sun.elevation_deg.is_nan() || sun.elevation_deg < LOWEST_SUN_DEG {
         return Err(ShadowError::SunTooLow { elevation_deg: sun.elevation_deg });
     }
     let length_m = height_m / sun.elevation_deg.to_radians().tan();
-    // Angle from east, anticlockwise: the shadow points away from the sun (8.9), the frame turns with the camera (8.13).
+    // Angle from east, anticlockwise: away from the sun (8.9), in the camera's frame (8.13).
     let direction = (270.0 - sun.azimuth_deg - camera.azimuth_deg).to_radians();
     Ok(GroundShadow { rx_m: length_m * direction.cos(), ry_m: length_m * direction.sin(), length_m })
 }
 
 /// Projects foot and tip into the image.
-///
-/// # Errors
-/// A subject that is not in front of the lens.
+/// Errors: a subject not in front of the lens.
 pub fn in_image(shadow: GroundShadow, subject: Subject, camera: &Camera) -> Result<ImageShadow, ShadowError> {
     let (foot_px, height_px) = foot_and_height(subject, camera)?;
-    // The lowest row of the image shows the ground at the near limit; a tip beyond it is drawn in along the shadow, which
-    // keeps its direction on the ground (8.19).
+    // The lowest image row limits the visible ground; a nearer tip is shortened along the shadow (8.19).
     let near_m = camera
         .ground_point([camera.principal_point()[0], camera.height_px as f64 - 1.0])
         .map_or(0.1 * subject.distance_m, |ground| ground[1].min(0.9 * subject.distance_m));
@@ -135,10 +104,9 @@ pub fn in_image(shadow: GroundShadow, subject: Subject, camera: &Camera) -> Resu
     Ok(ImageShadow::new(foot_px, m_px, height_px, shortened))
 }
 
-/// A shadow of which the direction in the image is known, radians from right towards down; `length_px` says how long it is, given the foot.
-///
-/// # Errors
-/// A subject that is not in front of the lens.
+/// Shadow with a known image direction, radians from right towards down; `length_px` gives its length from
+/// the foot.
+/// Errors: a subject not in front of the lens.
 pub fn of_direction(
     eta_rad: f64,
     subject: Subject,
@@ -147,12 +115,12 @@ pub fn of_direction(
 ) -> Result<ImageShadow, ShadowError> {
     let (foot_px, height_px) = foot_and_height(subject, camera)?;
     let (sin, cos) = eta_rad.sin_cos();
-    // Not nothing: a shadow without length has no direction.
+    // At least 1, because a direction needs a length.
     let length = length_px(foot_px).max(1.0);
     Ok(ImageShadow::new(foot_px, [length * cos, length * sin], height_px, false))
 }
 
-/// Where the feet stand in the image, and how tall the subject is there.
+/// Foot position and height in the image.
 fn foot_and_height(subject: Subject, camera: &Camera) -> Result<([f64; 2], f64), ShadowError> {
     let seen = |up_m| {
         let point = [subject.offset_m, subject.distance_m, up_m];
@@ -177,25 +145,25 @@ impl ImageShadow {
     }
 }
 
-/// The thesis' rotation angle beta (8.20) of a shadow (m_x, m_y), mirrored to the right first: in [pi/2, pi].
+/// Rotation angle beta (8.20) of a shadow (m_x, m_y), mirrored to the right: in [pi/2, pi].
 pub fn rotation_angle(m_px: [f64; 2]) -> f64 {
     let eta = m_px[1].atan2(m_px[0].abs());
     (3.0 * FRAC_PI_4 - 0.5 * eta).clamp(FRAC_PI_2, 2.0 * FRAC_PI_2)
 }
 
-/// Distance by the width of the head in the image (8.17): `u = w v / w_i`.
+/// Distance by the head's width in the image (8.17): `u = w v / w_i`.
 pub fn distance_from_head_m(file: &CameraFile, head_width_px: f64) -> f64 {
     file.subject.head_width_m * file.camera.focal_px() / head_width_px
 }
 
-/// Distance by the row of the top of the head: a level view of stature H from height Hc shows the head `f (H - Hc) / u` above
-/// the horizon. `None` when camera and head are at nearly one height, where that says nothing.
+/// Distance by the head's row: a level camera at height Hc sees the head of stature H `f (H - Hc) / u` above
+/// the horizon. `None` if both heights are nearly equal.
 pub fn distance_from_head_row_m(file: &CameraFile, top_row_px: f64) -> Option<f64> {
     let camera = &file.camera;
     let above_m = file.subject.height_m - camera.height_m;
     let up = (camera.principal_point()[1] - top_row_px) / camera.focal_px();
     let (s, c) = camera.pitch_deg.to_radians().sin_cos();
-    // Slope of the ray through that row above the horizontal.
+    // Slope of the ray above the horizontal.
     let slope = (up * c - s) / (c + up * s);
     let distance_m = above_m / slope;
     (above_m.abs() > 0.25 && distance_m.is_finite() && distance_m > 0.5).then_some(distance_m)
@@ -215,12 +183,13 @@ mod tests {
 
     #[test]
     fn shadows_point_away_from_the_sun() {
-        // Sun in the south-west, camera looking north: the shadow falls to the right and away (Li 2014, fig. 8.1).
+        // Sun in the south-west, camera looking north: the shadow is to the right and away (Li 2014, fig.
+        // 8.1).
         let sun = SunPosition { elevation_deg: 45.0, azimuth_deg: 225.0 };
         let shadow = on_ground(sun, 2.0, &camera(0.0)).expect("sun is up");
         assert!((shadow.length_m - 2.0).abs() < 1e-12);
         assert!((shadow.rx_m - 2_f64.sqrt()).abs() < 1e-9 && (shadow.ry_m - 2_f64.sqrt()).abs() < 1e-9);
-        // Turned 90 deg anticlockwise the camera looks west: north-east is behind it, to the right.
+        // Rotated 90 deg anticlockwise the camera looks west: north-east is behind it, to the right.
         let turned = on_ground(sun, 2.0, &camera(90.0)).expect("sun is up");
         assert!((turned.rx_m - 2_f64.sqrt()).abs() < 1e-9 && (turned.ry_m + 2_f64.sqrt()).abs() < 1e-9);
     }
@@ -240,7 +209,7 @@ mod tests {
     }
 
     #[test]
-    fn a_low_sun_is_refused_and_a_shadow_behind_the_camera_shortened() {
+    fn rejects_a_low_sun_and_shortens_a_shadow_behind_the_camera() {
         let low = SunPosition { elevation_deg: 1.0, azimuth_deg: 90.0 };
         assert!(matches!(on_ground(low, 1.75, &camera(0.0)), Err(ShadowError::SunTooLow { .. })));
         let long = GroundShadow { rx_m: 1.0, ry_m: -9.0, length_m: 9.06 };
@@ -250,7 +219,7 @@ mod tests {
     }
 
     #[test]
-    fn the_head_tells_the_distance() {
+    fn estimates_the_distance_from_the_head() {
         let text = "[camera]\nheight_m = 0.8\nazimuth_deg = 0.0\npitch_deg = 5.0\nfocal_length_mm = 4.0\npixel_um = 6.0\n";
         let file = CameraFile::parse(text).expect("valid");
         let top = file.camera.project([0.0, 7.0, 1.75]).expect("visible");

@@ -1,34 +1,32 @@
-//! How well shadow was taken off silhouettes, counted in pixels against a ground truth.
+//! Quality of shadow removal in pixels, compared with ground truth.
 //!
-//! The three figures of Li 2014 (tables 8.1 and 8.2) and of Sanin, Sanderson and Lovell, "Shadow detection: a
-//! survey and comparative evaluation of recent methods", Pattern Recognition 45 (2012), 1684-1695:
+//! Figures of Li 2014 (tables 8.1 and 8.2) and of Sanin, Sanderson and Lovell, "Shadow detection: a survey
+//! and comparative
+//! evaluation of recent methods", Pattern Recognition 45 (2012), 1684-1695:
 //!
-//! | figure | counts |
+//! | figure | definition |
 //! |---|---|
-//! | shadow removed, % | shadow pixels that the removal took off, of all shadow pixels (Li's table 8.1; the survey's detection rate) |
-//! | wrongly removed, % | subject pixels that the removal took off, of all subject pixels (Li's table 8.2; 100 minus the survey's discrimination rate) |
-//! | intersection over union, % | of what is left and the true subject |
+//! | shadow removed, % | removed shadow pixels of all shadow pixels (table 8.1; the survey's detection rate) |
+//! | wrongly removed, % | removed subject pixels of all subject pixels (table 8.2; 100 minus the survey's discrimination rate) |
+//! | intersection over union, % | of the result and the true subject |
 //!
 //! Cost: one pass over the pixels of a frame.
 
 use ndarray::{ArrayView2, Zip};
 
-/// What the ground truth says of a pixel.
+/// Ground truth of a pixel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Truth {
-    /// Neither subject nor shadow.
     Background,
-    /// Shadow cast by the subject.
     Shadow,
     Subject,
-    /// Not judged: outside the region of interest, or too blurred to tell.
+    /// Excluded: outside the region of interest, or too blurred.
     Ignored,
 }
 
 impl Truth {
-    /// Reads the grey values of the ChangeDetection.net ground truth: 0 static, 50 shadow, 85 outside the region
-    /// of interest, 170 unknown, 255 moving. 127, the shadow value of many background models, is read as
-    /// shadow too. `None` for any other value.
+    /// ChangeDetection.net grey values: 0 static, 50 shadow, 85 outside the region of interest, 170 unknown,
+    /// 255 moving. 127, the shadow value of many background models, is shadow too. `None` for others.
     #[must_use]
     pub fn from_grey(value: u8) -> Option<Self> {
         match value {
@@ -41,42 +39,35 @@ impl Truth {
     }
 }
 
-/// The arrays of one frame differ in shape.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("the {what} is {}x{} pixels but the ground truth is {}x{}; they must be the same frame", .found.1, .found.0, .expected.1, .expected.0)]
 pub struct ShapeError {
-    /// The array whose shape differs.
     pub what: &'static str,
-    /// Its shape (height, width).
+    /// Shape (height, width).
     pub found: (usize, usize),
-    /// The ground truth's shape (height, width).
+    /// Shape (height, width).
     pub expected: (usize, usize),
 }
 
 /// Pixel counts over any number of frames.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ShadowScore {
-    /// Shadow pixels of the ground truth (of those in the mask before removal, where that is given).
+    /// True shadow pixels (in the mask before removal, if given).
     pub shadow_pixels: u64,
-    /// Those of them that are gone.
     pub shadow_removed: u64,
-    /// Subject pixels of the ground truth (of those in the mask before removal, where that is given).
+    /// True subject pixels (in the mask before removal, if given).
     pub subject_pixels: u64,
-    /// Those of them that are gone.
     pub subject_removed: u64,
-    /// Pixels both in the mask after removal and in the true subject.
+    /// Pixels of the result in the true subject.
     pub intersection: u64,
-    /// Pixels in the mask after removal or in the true subject.
+    /// Pixels of the result or the true subject.
     pub union: u64,
 }
 
 impl ShadowScore {
-    /// Adds one frame: `before` and `after` are the masks before and after the removal, all of shape (height,
-    /// width). Without `before` every pixel of true shadow or subject counts as having been there, so what the
-    /// background model missed is counted as removed.
-    ///
-    /// # Errors
-    /// [`ShapeError`] where the shapes differ.
+    /// Adds a frame with the masks before and after removal, all of shape (height, width). Without `before`
+    /// all true pixels count as present, so pixels missed by the background model count as removed.
+    /// Errors: [`ShapeError`].
     pub fn add(
         &mut self,
         before: Option<ArrayView2<'_, bool>>,
@@ -117,25 +108,25 @@ impl ShadowScore {
         self.union += u64::from(after || truth == Truth::Subject);
     }
 
-    /// Shadow removed in per cent of the shadow there was; `None` where there was none.
+    /// Share of shadow removed; `None` without shadow.
     #[must_use]
     pub fn removed_percent(&self) -> Option<f64> {
         percent(self.shadow_removed, self.shadow_pixels)
     }
 
-    /// Subject wrongly removed in per cent of the subject there was; `None` where there was none.
+    /// Share of subject removed; `None` without a subject.
     #[must_use]
     pub fn wrongly_removed_percent(&self) -> Option<f64> {
         percent(self.subject_removed, self.subject_pixels)
     }
 
-    /// Discrimination rate in per cent (Sanin et al. 2012, section 4): subject pixels that were kept.
+    /// Discrimination rate (Sanin et al. 2012, section 4): subject pixels kept.
     #[must_use]
     pub fn discrimination_percent(&self) -> Option<f64> {
         self.wrongly_removed_percent().map(|wrong| 100.0 - wrong)
     }
 
-    /// Intersection over union of what is left and the true subject, in per cent; `None` where both are empty.
+    /// Intersection over union of result and subject; `None` if both are empty.
     #[must_use]
     pub fn iou_percent(&self) -> Option<f64> {
         percent(self.intersection, self.union)
@@ -164,10 +155,10 @@ mod tests {
             arr2(&[[true, true, false, false], [false, true, false, true], [true, false, false, false]]);
         let mut score = ShadowScore::default();
         score.add(Some(before.view()), after.view(), truth.view()).unwrap();
-        // Of the three shadow pixels that were in the mask two went, of the three subject pixels one went.
+        // Two of three shadow pixels in the mask were removed, and one of three subject pixels.
         assert_eq!((score.shadow_removed, score.shadow_pixels), (2, 3));
         assert_eq!((score.subject_removed, score.subject_pixels), (1, 3));
-        // Left: 2 subject, 1 shadow, 1 background; the true subject has 4.
+        // Result: 2 subject, 1 shadow, 1 background; the true subject has 4.
         assert_eq!((score.intersection, score.union), (2, 6));
         assert!((score.iou_percent().unwrap() - 100.0 / 3.0).abs() < 1e-12);
 
@@ -178,7 +169,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_to_count_is_not_nought_per_cent() {
+    fn empty_counts_give_no_percentage() {
         let mut score = ShadowScore::default();
         score
             .add(None, Array2::from_elem((2, 2), false).view(), Array2::from_elem((2, 2), B).view())

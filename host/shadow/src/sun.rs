@@ -1,14 +1,13 @@
-//! Position of the sun for a place and an instant: topocentric elevation and azimuth, no refraction.
+//! Sun position for a place and time: topocentric elevation and azimuth without refraction.
 //!
-//! Every closed form first gives declination and Greenwich hour angle ([`Equatorial`]); one shared vector form then
-//! turns them to the horizon (no branch and no division, so nothing to go wrong at noon, at the pole or in the zenith):
+//! Closed forms give declination and Greenwich hour angle ([`Equatorial`]); one vector form converts them
+//! without branch or division, safe at noon, pole and zenith:
 //!
 //! `U = sin d sin L + cos d cos L cos h`, `E = -cos d sin h`, `N = sin d cos L - cos d sin L cos h`,
 //! elevation `atan2(U, hypot(E, N))`, azimuth `atan2(E, N)` clockwise from north.
 //!
-//! Largest differences from NREL's SPA with the sun up (1910 to 2210): PSA+ 0.0097 deg in elevation and 0.045 deg in
-//! azimuth, the Almanac's form 0.0122 and 0.081, the thesis' form 1.03 and 10.7. A position costs well under a microsecond
-//! but for SPA (a few microseconds).
+//! Largest differences from NREL's SPA, sun up, 1910 to 2210: PSA+ 0.0097 deg elevation and 0.045 deg
+//! azimuth; Almanac 0.0122 and 0.081; thesis 1.03 and 10.7. Cost: below a microsecond, SPA a few.
 
 mod almanac;
 mod angles;
@@ -26,10 +25,10 @@ use chrono::{DateTime, Utc};
 use serde::{Deserialize, Serialize};
 use std::str::FromStr;
 
-/// The sun's parallax seen from the ground, degrees times cos(elevation) (8.794 arc seconds).
+/// Parallax of the sun, degrees times cos(elevation) (8.794 arc seconds).
 const PARALLAX_DEG: f64 = 8.794 / 3600.0;
 
-/// Which formula gives declination and hour angle.
+/// Formula for declination and hour angle.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Model {
@@ -38,7 +37,7 @@ pub enum Model {
     Psa,
     /// The Astronomical Almanac's low-precision form with two sines.
     Almanac,
-    /// Li 2014, eq. 8.2 to 8.10 with the units put right: kept for comparison.
+    /// Li 2014, eq. 8.2 to 8.10 with corrected units, for comparison.
     Thesis,
     /// NREL's Solar Position Algorithm (Reda and Andreas 2004), the reference.
     Spa,
@@ -57,10 +56,8 @@ impl FromStr for Model {
     }
 }
 
-/// Elevation and azimuth of the sun (UT1 - UTC, below 0.9 s or 0.004 deg, is neglected).
-///
-/// # Errors
-/// A latitude or longitude out of range, an instant that SPA does not cover.
+/// Elevation and azimuth (neglects UT1 - UTC, below 0.9 s or 0.004 deg).
+/// Errors: latitude or longitude out of range, or a time outside SPA.
 pub fn position(time: DateTime<Utc>, place: Place, model: Model) -> Result<SunPosition, SunError> {
     let place = Place::new(place.latitude_deg, place.longitude_deg)?;
     if model == Model::Spa {
@@ -76,8 +73,8 @@ pub fn position(time: DateTime<Utc>, place: Place, model: Model) -> Result<SunPo
     })
 }
 
-/// Declination and Greenwich hour angle by a closed form; SPA has none to offer and answers with PSA+, from which it
-/// differs by less than 0.01 deg (only derivatives are taken from it then).
+/// Declination and Greenwich hour angle in closed form; for SPA those of PSA+ (within 0.01 deg), used for
+/// derivatives only.
 pub fn equatorial(time: DateTime<Utc>, model: Model) -> Equatorial {
     match model {
         Model::Psa | Model::Spa => psa::equatorial(time),
@@ -101,7 +98,7 @@ mod tests {
     }
 
     #[test]
-    fn morning_sun_stands_east_and_afternoon_sun_west_in_both_hemispheres() {
+    fn morning_sun_is_east_and_afternoon_sun_west_in_both_hemispheres() {
         for latitude_deg in [52.0, -34.0] {
             let place = Place { latitude_deg, longitude_deg: 0.0 };
             let morning =

@@ -1,4 +1,4 @@
-//! Seeded scenes and pictures with a shadow whose truth is known.
+//! Seeded scenes and pictures with known shadow.
 
 pub mod pictures;
 pub mod scene;

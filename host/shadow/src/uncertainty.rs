@@ -1,14 +1,14 @@
-//! How sure the cutting angle beta is: error propagation (Li 2014, eq. 8.21 to 8.37, put right).
+//! Standard deviation of the cutting angle beta: error propagation (Li 2014, eq. 8.21 to 8.37, corrected).
 //!
-//! The printed chain counts the elevation twice, divides by the wrong root, drops covariances and comes out ten times too large.
-//! Here beta is differentiated as a whole. With `A = -Hc r_y`, `B = u r_x - X0 r_y` (X0 = u times a fixed image slope) and
-//! `D = A^2 + B^2`:
+//! The printed chain counts the elevation twice, divides by the wrong root, drops covariances and is ten
+//! times too large. Here beta is differentiated as a whole. With `A = -Hc r_y`, `B = u r_x - X0 r_y` (X0 = u
+//! times a fixed image slope) and `D = A^2 + B^2`:
 //!
-//! `s_beta^2 = 1/4 [ (Hc u s^2 / D)^2 (s_psi^2 + s_alpha^2) + (A B / (u D))^2 s_u^2 + (B r_y / D)^2 s_Hc^2 ]`,
-//! `s_u^2 = (v / w_i)^2 s_w^2 + (w / w_i)^2 s_v^2 + (u / w_i)^2 s_wi^2`.
+//! `s_beta^2 = 1/4 [ (Hc u s^2 / D)^2 (s_psi^2 + s_alpha^2) + (A B / (u D))^2 s_u^2 + (B r_y / D)^2 s_Hc^2
+//! ]`, `s_u^2 = (v / w_i)^2 s_w^2 + (w / w_i)^2 s_v^2 + (u / w_i)^2 s_wi^2`.
 //!
-//! Stature and image distance cancel (but for u). It agrees with Monte Carlo to 2 %, unless the shadow's tip nears
-//! the camera, where first order fails: then [`Uncertainty::first_order_holds`] is false and the number is not to be used as if it held.
+//! Stature and image distance cancel (except in u). Agrees with Monte Carlo to 2 %, unless the shadow's tip
+//! nears the camera: then [`Uncertainty::first_order_holds`] is false and the value is invalid.
 
 use super::camera::CameraFile;
 use super::projection::{GroundShadow, ShadowError, Subject, on_ground};
@@ -16,42 +16,40 @@ use crate::sun::{self, Equatorial, Model, Place, SunError};
 use chrono::{DateTime, TimeDelta, Utc};
 use serde::{Deserialize, Serialize};
 
-/// Standard deviations of what comes out.
+/// Standard deviations of the results.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Uncertainty {
-    /// Of the sun's azimuth psi, radians.
+    /// Sun azimuth psi.
     pub azimuth_rad: f64,
-    /// Of the sun's elevation theta, radians.
+    /// Sun elevation theta.
     pub elevation_rad: f64,
-    /// Of the subject's distance u, metres.
+    /// Subject distance u.
     pub distance_m: f64,
-    /// Of the distance of the shadow's tip, u + r_y, metres.
+    /// Distance of the shadow's tip, u + r_y.
     pub tip_distance_m: f64,
-    /// Of the rotation angle beta, radians.
+    /// Rotation angle beta.
     pub beta_rad: f64,
-    /// False when the shadow's tip comes within three standard deviations of the lens' plane: the projection has its pole
-    /// there and `beta_rad` means nothing.
+    /// False if the tip is within three standard deviations of the lens' plane, a pole of the projection:
+    /// `beta_rad` is then invalid.
     pub first_order_holds: bool,
 }
 
-/// Why there is no answer.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum UncertaintyError {
-    /// The sun's position.
     #[error(transparent)]
     Sun(#[from] SunError),
     #[error(transparent)]
     Shadow(#[from] ShadowError),
 }
 
-/// Partial derivatives of azimuth and elevation by declination, hour angle and latitude (all radians).
+/// Partial derivatives of azimuth and elevation by declination, hour angle and latitude (radians).
 #[derive(Clone, Copy, Debug)]
 struct HorizonPartials {
     azimuth: [f64; 3],
     elevation: [f64; 3],
 }
 
-/// Differentiates [`sun::to_horizon`] in closed form.
+/// Derivative of [`sun::to_horizon`] in closed form.
 fn horizon_partials(declination: f64, hour_angle: f64, latitude: f64) -> HorizonPartials {
     let ((sd, cd), (sh, ch), (sl, cl)) = (declination.sin_cos(), hour_angle.sin_cos(), latitude.sin_cos());
     let (east, north) = (-cd * sh, sd * cl - cd * sl * ch);
@@ -76,10 +74,8 @@ fn per_day(time: DateTime<Utc>, model: Model) -> [f64; 2] {
     [0.5 * (after.declination_rad - before.declination_rad), 0.5 * hour_angle]
 }
 
-/// Propagates the camera file's standard deviations to beta for a subject at a known place and time.
-///
-/// # Errors
-/// A place that is none, a sun too low for a shadow.
+/// Propagates the camera file's standard deviations to beta.
+/// Errors: an invalid place, or a sun too low.
 pub fn propagate(
     file: &CameraFile,
     time: DateTime<Utc>,
@@ -94,7 +90,8 @@ pub fn propagate(
     let hour_angle = equatorial.greenwich_hour_angle_rad + place.longitude_deg.to_radians();
     let partial = horizon_partials(equatorial.declination_rad, hour_angle, place.latitude_deg.to_radians());
     let [declination_per_day, hour_angle_per_day] = per_day(time, model);
-    // Day moves declination and hour angle together, so its two paths add before they are squared (the slip in 8.24 and 8.25).
+    // Day moves declination and hour angle together, so both paths are added before squaring (the error in
+    // 8.24 and 8.25).
     let variance = |d: [f64; 3]| {
         let hour = (15_f64.to_radians() * sd.time_h).powi(2) + sd.longitude_deg.to_radians().powi(2);
         ((d[0] * declination_per_day + d[1] * hour_angle_per_day) * sd.day).powi(2)
@@ -102,7 +99,7 @@ pub fn propagate(
             + (d[2] * sd.latitude_deg.to_radians()).powi(2)
     };
     let (azimuth, elevation) = (variance(partial.azimuth), variance(partial.elevation));
-    // What was measured is as sure as nothing else here.
+    // A measured distance has no uncertainty here.
     let known = file.subject.distance_m.is_some();
     let distance = if known { 0.0 } else { distance_variance(file, subject.distance_m) };
     let tip = tip_variance(file, position.elevation_deg.to_radians(), shadow, azimuth, elevation) + distance;
@@ -129,7 +126,7 @@ fn distance_variance(file: &CameraFile, distance_m: f64) -> f64 {
         + (distance_m / wi_m * 1e-6 * camera.pixel_um * sd.head_width_px).powi(2)
 }
 
-/// Variance of r_y: the shadow's length by stature and elevation (8.28), its direction by azimuth and camera.
+/// Variance of r_y: length by stature and elevation (8.28), direction by azimuth and camera.
 fn tip_variance(
     file: &CameraFile,
     elevation: f64,

@@ -1,6 +1,6 @@
-//! What moves in a video: a background model per pixel.
+//! Background model per pixel: detects motion in video.
 //!
-//! An adaptive Gaussian mixture whose number of components adapts, after Z. Zivkovic, "Improved adaptive Gaussian
+//! Adaptive Gaussian mixture with an adaptive number of components: Z. Zivkovic, "Improved adaptive Gaussian
 //! mixture model for background subtraction", ICPR 2004, and Z. Zivkovic and F. van der Heijden, "Efficient
 //! adaptive density estimation per image pixel for the task of background subtraction", Pattern Recognition
 //! Letters 27 (2006), 773-780.

@@ -1,8 +1,7 @@
-//! Binary masks of moving people: their bounding box, area and centroid; cleaning, regions and the choice of
-//! the subject stand in this module's children.
+//! Binary masks of moving people.
 //!
-//! A mask is an `Array2<bool>` of shape (height, width), row 0 at the top, `true` where the subject is.
-//! Coordinates are pixels; a pixel's centre lies at (row + 0.5, column + 0.5).
+//! An `Array2<bool>` of shape (height, width), row 0 at the top, `true` for the subject. Coordinates are
+//! pixels with centres at (row + 0.5, column + 0.5).
 
 pub mod assignment;
 pub mod bits;
@@ -17,10 +16,10 @@ pub mod tracking;
 
 use ndarray::{Array2, ArrayView2};
 
-/// A mask of shape (height, width), `true` where the subject is.
+/// Shape (height, width), `true` for the subject.
 pub type Mask = Array2<bool>;
 
-/// The smallest upright rectangle that holds some pixels; half open, in pixels.
+/// Smallest upright rectangle, half open, px.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BoundingBox {
     pub top: usize,
@@ -32,7 +31,7 @@ pub struct BoundingBox {
 }
 
 impl BoundingBox {
-    /// The bounding box of a mask's pixels; `None` for an empty mask. Cost: one pass over the pixels.
+    /// `None` for an empty mask. One pass.
     #[must_use]
     pub fn of(mask: ArrayView2<'_, bool>) -> Option<Self> {
         let mut found: Option<Self> = None;
@@ -45,7 +44,7 @@ impl BoundingBox {
         found
     }
 
-    /// The smallest box that holds both.
+    /// Smallest box that holds both.
     #[must_use]
     pub fn union(self, other: Self) -> Self {
         Self {
@@ -66,7 +65,7 @@ impl BoundingBox {
         self.right - self.left
     }
 
-    /// The gap in pixels between two boxes along the worse axis; 0 where they touch or overlap.
+    /// Gap between two boxes along the larger axis, px; 0 if they touch or overlap.
     #[must_use]
     pub fn gap(self, other: Self) -> usize {
         let between = |a_end: usize, b_start: usize| b_start.saturating_sub(a_end);
@@ -82,7 +81,7 @@ impl BoundingBox {
     }
 }
 
-/// The number of pixels set.
+/// Number of set pixels.
 #[must_use]
 pub fn area(mask: ArrayView2<'_, bool>) -> usize {
     mask.iter().filter(|&&set| set).count()

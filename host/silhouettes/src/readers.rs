@@ -46,9 +46,7 @@ pub const READERS: [Reader; 8] = [
 
 /// Reads a recording with the reader of its file's ending (any case, without the dot). What the caller names in `choices` goes before what the
 /// file says or suggests; what was guessed is in [`Recording::remarks`].
-///
-/// # Errors
-/// [`RecordingError::Extension`] for an ending that no reader has, and whatever the reader says.
+/// Errors: [`RecordingError::Extension`] for an ending that no reader has, and whatever the reader says.
 pub fn read(bytes: &[u8], extension: &str, choices: Choices) -> Result<Recording, RecordingError> {
     let ending = extension.to_lowercase();
     let reader = READERS.iter().find(|reader| reader.extensions.contains(&ending.as_str()));

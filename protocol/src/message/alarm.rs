@@ -1,5 +1,5 @@
-//! Alarms: what stopped the rig. An alarm is latched, survives the reset (in the board's memory), refuses all motion,
-//! and goes only when the host clears it by its number: nobody can clear what was not read.
+//! Alarms stop the rig. An alarm is latched in memory, survives resets and blocks all motion until the host
+//! clears it by number, so that only a reported alarm can be cleared.
 
 use postcard_schema::Schema;
 use serde::{Deserialize, Serialize};
@@ -7,84 +7,68 @@ use serde::{Deserialize, Serialize};
 use super::{Axis, RecordName};
 use crate::units::{BoardMicros, Nanometres};
 
-/// An alarm that came up.
+/// A raised alarm.
 #[derive(Serialize, Deserialize, Schema, Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct AlarmRecord {
-    /// Running number of alarms in this board's life, from 1.
+    /// Number in this board's life, from 1.
     pub number: u32,
-    /// The boot in which it came up.
+    /// Boot in which it was raised.
     pub boot: u32,
-    /// When, in the time of that boot.
+    /// Time in that boot.
     pub time: BoardMicros,
-    /// What.
+    /// Cause of the alarm.
     pub alarm: Alarm,
 }
 
-/// What stopped the rig.
+/// Cause of an alarm.
 #[derive(Serialize, Deserialize, Schema, Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[allow(missing_docs, reason = "names and types describe these fields")]
 pub enum Alarm {
-    /// The emergency-stop input is open. Clearing is refused while it is.
+    /// Emergency-stop input open; cannot be cleared until it closes.
     EmergencyStop,
-    /// The host asked for [`super::Request::Halt`].
+    /// [`super::Request::Halt`] of the host.
     Halt,
-    /// A motor driver reports a fault on its DIAG line.
-    DriverFault {
-        /// The axis.
-        axis: Axis,
-    },
-    /// The encoder is this far from the commanded position: stall or slip.
+    /// Fault on a motor driver's DIAG line.
+    DriverFault { axis: Axis },
+    /// Encoder off the commanded position: stall or slip.
     Following {
-        /// The axis.
         axis: Axis,
         /// Commanded minus measured.
         error: Nanometres,
     },
-    /// A step timer could not be fed in time: a step came late or not at all.
-    StepUnderrun {
-        /// The axis.
-        axis: Axis,
-    },
-    /// An end switch closed where none should be.
+    /// A step timer underran: a step was late or missing.
+    StepUnderrun { axis: Axis },
+    /// An end switch closed unexpectedly.
     UnexpectedSwitch {
-        /// The axis.
         axis: Axis,
-        /// Whether it was the far one, and not the home switch.
+        /// Far switch rather than home switch.
         far: bool,
     },
-    /// The strain gauge answers nonsense, or the piezo does not follow.
+    /// Invalid strain gauge data, or the piezo does not follow.
     Gauge,
-    /// The host said nothing for as long as the request had allowed, while something moved.
-    HostSilence {
-        /// The request that was under way.
-        request: u32,
-    },
-    /// The supply fell below the level at which the board can still stop in order.
+    /// No request within the permitted silence during motion.
+    HostSilence { request: u32 },
+    /// Supply below the level for an orderly stop.
     SupplyLow,
     /// The last reset was a brown-out.
     BrownOut,
-    /// The last reset came from the watchdog: the firmware had stopped responding.
+    /// Last reset by the watchdog: the firmware had hung.
     Watchdog,
-    /// The firmware stopped itself at an inner contradiction.
+    /// Internal error of the firmware.
     Panic,
-    /// The stack grew into its guard.
+    /// The stack reached its guard.
     StackOverflow,
-    /// More came from the link than the board could take.
+    /// Input overflow on the link.
     QueueOverflow,
-    /// The power went, or the board was reset, while this axis moved: its position is lost.
-    MotionInterrupted {
-        /// The axis.
-        axis: Axis,
-    },
-    /// Both copies of a record in the board's memory are bad; its defaults are in use.
-    RecordLost {
-        /// Which.
-        record: RecordName,
-    },
-    /// The board's memory does not answer: nothing outlasts a loss of power.
+    /// Power loss or reset while this axis moved: position lost.
+    MotionInterrupted { axis: Axis },
+    /// Both copies of a record are damaged; defaults are in use.
+    RecordLost { record: RecordName },
+    /// No answer from the memory: nothing survives a power loss.
     MemoryMissing,
-    /// The clock that the board is fed did not come, or stopped, which resets the board. As long as it is missing the board runs on
-    /// the chip's own, by which times and speeds are a few per cent off.
+    /// The external clock is missing or has stopped (which resets the board). The internal clock changes
+    /// times and speeds by a few per cent.
     ClockLost,
 }

@@ -1,4 +1,4 @@
-//! What the board answers to a request: a response, or why it refuses.
+//! Answers to requests: responses and errors.
 
 use postcard_schema::Schema;
 use serde::{Deserialize, Serialize};
@@ -9,14 +9,14 @@ use super::{
 };
 use crate::units::{Micros, Nanometres};
 
-/// The board's answer to a request it carried out or took on.
+/// Answer to a request that was executed or accepted.
 #[derive(Serialize, Deserialize, Schema, Clone, PartialEq, Debug)]
 pub enum Response {
     /// Answer to [`super::Request::Hello`].
     Hello(Hello),
     /// Answer to [`super::Request::Status`].
     Status(Status),
-    /// Done, or begun: long work ends with an event that names the request.
+    /// Done or accepted: long work ends with an event that names the request.
     Accepted,
     /// Answer to [`super::Request::ReadEvent`].
     Event(Event),
@@ -36,132 +36,85 @@ pub enum Response {
     Row(Codes),
 }
 
-/// Why the board did not do what was asked. Nothing has changed when one of these comes.
+/// Why a request was refused. Nothing has changed.
 #[derive(Serialize, Deserialize, Schema, Clone, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[allow(missing_docs, reason = "names and types describe these fields")]
 pub enum RequestError {
-    /// The frame's version is not spoken here. This variant keeps its bytes in all versions.
+    /// Unsupported frame version. This variant has the same bytes in all versions.
     Version {
-        /// Oldest version the board speaks.
+        /// Oldest supported version.
         min: u8,
-        /// Newest version the board speaks.
+        /// Newest supported version.
         current: u8,
     },
-    /// The request was made for another boot of the board.
-    Boot {
-        /// The present boot number.
-        current: u32,
-    },
-    /// The body is no request of this version.
+    /// The request was for another boot.
+    Boot { current: u32 },
+    /// The body is not a request of this version.
     Malformed,
-    /// This id was used for another request.
+    /// The id was used for another request.
     IdReused,
-    /// The position lies outside the axis' limits.
-    OutOfRange {
-        /// The axis.
-        axis: Axis,
-        /// What was asked.
-        asked: Nanometres,
-        /// Smallest position allowed.
-        min: Nanometres,
-        /// Largest position allowed.
-        max: Nanometres,
-    },
+    /// Target outside the limits of the axis.
+    OutOfRange { axis: Axis, asked: Nanometres, min: Nanometres, max: Nanometres },
     /// The axis must be homed first.
-    NotHomed {
-        /// The axis.
-        axis: Axis,
-        /// Its state.
-        state: PositionState,
-    },
-    /// Something else is under way; stop it or wait for its end.
-    Busy {
-        /// The request that is under way.
-        request: u32,
-    },
-    /// The axis has no home switch, so it cannot be homed.
-    CannotHome {
-        /// The axis.
-        axis: Axis,
-    },
-    /// A shot or a program is not possible.
-    Shot {
-        /// Place in the program.
-        index: u8,
-        /// What is wrong with it.
-        reason: ShotFault,
-    },
-    /// The event is no longer (or not yet) known.
+    NotHomed { axis: Axis, state: PositionState },
+    /// Other work is active; stop it or wait for its end.
+    Busy { request: u32 },
+    /// The axis has no home switch.
+    CannotHome { axis: Axis },
+    /// Invalid shot or program.
+    Shot { index: u8, reason: ShotFault },
+    /// The event is not (or no longer) stored.
     EventGone {
-        /// The oldest event that can be read.
+        /// Oldest stored event.
         oldest: u32,
-        /// The number the next event will get.
+        /// Number of the next event.
         next: u32,
     },
-    /// An alarm is latched: clear it first.
-    Alarm {
-        /// Its number.
-        number: u32,
-        /// What it is.
-        alarm: Alarm,
-    },
-    /// No alarm with this number is latched, or kept.
+    /// A latched alarm must be cleared first.
+    Alarm { number: u32, alarm: Alarm },
+    /// No latched or stored alarm has this number.
     NoSuchAlarm {
-        /// The latched one, or 0.
+        /// Latched alarm, or 0.
         latched: u32,
-        /// The number of the last alarm, or 0.
+        /// Last alarm, or 0.
         last: u32,
     },
-    /// The alarm's cause is still there, so it cannot be cleared.
-    AlarmRemains {
-        /// What it is.
-        alarm: Alarm,
-    },
-    /// Sensor and lens would come too close to each other.
+    /// The cause persists, so the alarm cannot be cleared.
+    AlarmRemains { alarm: Alarm },
+    /// Sensor and lens would come too close.
     TooClose {
-        /// Their smallest distance on the way.
+        /// Smallest distance on the way.
         distance: Nanometres,
-        /// The smallest allowed.
         min: Nanometres,
     },
-    /// The deadline for the host's silence is outside what the board allows.
-    Silence {
-        /// Shortest.
-        min: Micros,
-        /// Longest.
-        max: Micros,
-    },
-    /// The program is in another state than the request needs.
-    Program {
-        /// Its state.
-        state: ProgramState,
-    },
-    /// The setting's value is not allowed.
+    /// Silence deadline outside the limits.
+    Silence { min: Micros, max: Micros },
+    /// The program is in the wrong state.
+    Program { state: ProgramState },
+    /// Setting value out of range.
     SettingRange(Setting),
-    /// A depth correction is not possible.
+    /// Invalid depth correction.
     Correction(CorrectionFault),
-    /// The board has not this part.
-    NotFitted {
-        /// The axis.
-        axis: Axis,
-    },
-    /// The calibration routine is not possible on this axis.
+    /// The axis does not exist on this board.
+    NotFitted { axis: Axis },
+    /// The axis has no such calibration routine.
     NoSuchRoutine,
-    /// The request's session is not the one that is open: another host has opened one since, or none is open yet.
+    /// The session is not open: another host has opened one, or none is open.
     NotInSession,
-    /// The id is not new, and its answer, where there was one, is no longer remembered. Nothing was done now.
+    /// The id is old and its answer no longer stored; nothing was done.
     IdNotNew {
-        /// The largest id so far. New ids go on from here, by at most [`super::ID_STEP_MAX`] at a time.
+        /// Largest id so far; new ids exceed it by at most [`super::ID_STEP_MAX`].
         last: u32,
     },
-    /// More requests wait for their answers than the board can hold. This one was not looked at: repeat it.
+    /// Too many outstanding requests. This one was ignored: repeat it.
     QueueFull {
-        /// How many may wait.
+        /// Limit of outstanding requests.
         outstanding: u8,
     },
-    /// The pace of a continuous run is faster than the camera.
+    /// Period shorter than the camera permits.
     Period {
-        /// The longest exposure of the armed shots and the camera's read-out.
+        /// Longest exposure of the armed shots plus read-out.
         min: Micros,
     },
     /// The light cannot be set like this.

@@ -1,27 +1,27 @@
-//! The movable parts of the rig.
+//! Axes of the rig.
 
 use postcard_schema::Schema;
 use serde::{Deserialize, Serialize};
 
 use crate::units::Nanometres;
 
-/// A movable part of the rig.
+/// An axis of the rig.
 #[derive(Serialize, Deserialize, Schema, Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Axis {
-    /// Stage A's stepper and screw, 0 at the home switch.
+    /// Stage A's stepper and screw; 0 at the home switch.
     SensorCoarse,
-    /// Stage A's piezo, 0 = relaxed, as its strain gauge measures it.
+    /// Stage A's piezo; 0 = relaxed, measured by its strain gauge.
     SensorFine,
-    /// Stage B's stepper and screw, which carry the lens: 0 at the home switch, positive away from the sensor.
+    /// Stage B's stepper and screw with the lens; 0 at the home switch, positive away from the sensor.
     Lens,
 }
 
 impl Axis {
-    /// All, in the order of their numbers on the wire.
+    /// All axes in wire order.
     pub const ALL: [Self; 3] = [Self::SensorCoarse, Self::SensorFine, Self::Lens];
 
-    /// Its name in commands, in files and among the settings.
+    /// Name in commands, files and settings.
     pub const fn name(self) -> &'static str {
         match self {
             Self::SensorCoarse => "coarse",
@@ -30,8 +30,7 @@ impl Axis {
         }
     }
 
-    /// Whether its position is part of the distance between sensor and lens. Not every movable part is: a filter wheel
-    /// would turn and leave the distance as it is.
+    /// Whether its position adds to the distance of sensor and lens; a filter wheel's would not.
     pub const fn is_in_distance(self) -> bool {
         match self {
             Self::SensorCoarse | Self::SensorFine | Self::Lens => true,
@@ -39,37 +38,36 @@ impl Axis {
     }
 }
 
-/// Sensor distance from the lens' principal plane, nanometres: the datum and the positions of those axes that are part
-/// of it ([`Axis::is_in_distance`]). The one sum of this kind: whoever adds an axis says there whether it joins.
+/// Distance from the lens' principal plane to the sensor, nm: the datum plus all axes with
+/// [`Axis::is_in_distance`].
 pub fn sensor_distance_nm(datum: Nanometres, mut position: impl FnMut(Axis) -> Nanometres) -> i64 {
     let parts = Axis::ALL.into_iter().filter(|axis| axis.is_in_distance());
     i64::from(datum.0) + parts.map(|axis| i64::from(position(axis).0)).sum::<i64>()
 }
 
-/// What is known of an axis' position.
+/// Validity of a position.
 #[derive(Serialize, Deserialize, Schema, Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum PositionState {
-    /// Never homed since the reset, and at rest before it.
+    /// Not homed since the reset.
     Unknown,
-    /// Homed, and steps and encoder have agreed since.
+    /// Homed; steps and encoder agree.
     Homed,
-    /// Was homed, but steps and encoder disagree, or it moved when the power went: home again. The piezo's as long as its
-    /// gauge is silent.
+    /// Steps and encoder disagree, power was lost in motion, or the gauge is silent: home again.
     Lost,
 }
 
-/// How an axis is.
+/// State of an axis.
 #[derive(Serialize, Deserialize, Schema, Clone, Copy, PartialEq, Eq, Debug)]
 pub struct AxisStatus {
-    /// What is known of its position.
+    /// Validity of the position.
     pub state: PositionState,
-    /// Where it was last sent.
+    /// Last target position.
     pub asked: Nanometres,
-    /// Where the encoder or gauge says it is.
+    /// Position by encoder or gauge.
     pub measured: Nanometres,
-    /// Whether it moves.
+    /// Whether the axis moves.
     pub moving: bool,
-    /// The request that is under way on it.
+    /// Active request of this axis.
     pub request: Option<u32>,
 }

@@ -1,4 +1,4 @@
-//! Who the board is and how it is.
+//! Identity and state of the board.
 
 use heapless::String;
 use postcard_schema::Schema;
@@ -7,56 +7,56 @@ use serde::{Deserialize, Serialize};
 use super::{AlarmRecord, Axis, AxisStatus, ProgramStatus};
 use crate::units::{BoardMicros, Micros, Nanometres};
 
-/// Who the board is and what it can do.
+/// Identity and capabilities of the board.
 #[derive(Serialize, Deserialize, Schema, Clone, PartialEq, Eq, Debug)]
 pub struct Hello {
-    /// Oldest protocol version it speaks.
+    /// Oldest supported protocol version.
     pub protocol_min: u8,
-    /// Newest protocol version it speaks.
+    /// Newest supported protocol version.
     pub protocol_current: u8,
-    /// [`super::SCHEMA_KEY`] of its message table.
+    /// [`super::SCHEMA_KEY`] of the firmware.
     pub schema_key: u64,
-    /// Name of the board, e.g. `nucleo-f429zi`.
+    /// Board name, e.g. `nucleo-f429zi`.
     pub board: String<24>,
-    /// Firmware version.
+    /// Version of the firmware.
     pub firmware: String<24>,
-    /// The chip's unique id.
+    /// Unique id of the chip.
     pub unique_id: [u8; 12],
-    /// Number of this boot; every other request must carry it.
+    /// Boot number, required in all other requests.
     pub boot: u32,
-    /// Why the board was reset last.
+    /// Cause of the last reset.
     pub reset_cause: ResetCause,
-    /// Whether this is an emulated board.
+    /// Whether the board is emulated.
     pub emulated: bool,
-    /// What it can do.
+    /// Fitted parts of the board.
     pub capabilities: Capabilities,
-    /// How far and how much.
+    /// Ranges and sizes of the board.
     pub limits: Limits,
-    /// The largest request id of this boot, 0 where there was none; ids of a new session go on from it.
+    /// Largest request id of this boot, 0 = none; a new session continues from it.
     pub last_id: u32,
-    /// How many requests may wait for their answers at a time.
+    /// Limit of outstanding requests.
     pub outstanding: u8,
 }
 
-/// What a board can do; all `true` for the rig of `docs/rig.md`.
+/// Fitted parts; all `true` for the rig of `docs/rig.md`.
 #[derive(Serialize, Deserialize, Schema, Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Capabilities {
-    /// Has the stepper of stage A.
+    /// Stepper of stage A.
     pub sensor_coarse: bool,
-    /// Has the piezo of stage A.
+    /// Piezo of stage A.
     pub sensor_fine: bool,
-    /// Measures the camera's exposure-active signal.
+    /// Measurement of the camera's exposure signal.
     pub strobe: bool,
-    /// Has the stepper of stage B.
+    /// Stepper of stage B.
     pub lens: bool,
-    /// Has memory that keeps records without power.
+    /// Non-volatile memory for records.
     pub memory: bool,
-    /// Has an emergency-stop input.
+    /// Emergency-stop input.
     pub emergency_stop: bool,
 }
 
 impl Capabilities {
-    /// Whether the board has an axis.
+    /// Whether this axis exists.
     pub const fn has(&self, axis: Axis) -> bool {
         match axis {
             Axis::SensorCoarse => self.sensor_coarse,
@@ -66,40 +66,40 @@ impl Capabilities {
     }
 }
 
-/// How far the axes go and how much fits.
+/// Ranges and sizes of the board.
 #[derive(Serialize, Deserialize, Schema, Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Limits {
-    /// Sensor distance from the lens' principal plane with all axes at 0.
+    /// Distance of principal plane and sensor with all axes at 0.
     pub datum: Nanometres,
     /// Smallest coarse position.
     pub coarse_min: Nanometres,
     /// Largest coarse position.
     pub coarse_max: Nanometres,
-    /// Coarse distance per STEP pulse, in picometres.
+    /// Coarse travel per STEP pulse, pm.
     pub coarse_step_pm: u32,
     /// Smallest fine position.
     pub fine_min: Nanometres,
     /// Largest fine position.
     pub fine_max: Nanometres,
-    /// Shots a program may have.
+    /// Most shots of a program.
     pub shots_max: u8,
     /// Shortest exposure.
     pub exposure_min: Micros,
     /// Longest exposure.
     pub exposure_max: Micros,
-    /// Smallest position of the lens stage.
+    /// Smallest lens position.
     pub lens_min: Nanometres,
-    /// Largest position of the lens stage.
+    /// Largest lens position.
     pub lens_max: Nanometres,
-    /// Distance of the lens stage per STEP pulse, in picometres.
+    /// Lens travel per STEP pulse, pm.
     pub lens_step_pm: u32,
-    /// Smallest distance between sensor and lens.
+    /// Smallest distance of sensor and lens.
     pub distance_min: Nanometres,
-    /// Shortest deadline for the host's silence.
+    /// Shortest silence deadline.
     pub silence_min: Micros,
-    /// Longest deadline for the host's silence.
+    /// Longest silence deadline.
     pub silence_max: Micros,
-    /// Pixels of the row buffer for depth correction.
+    /// Size of the row buffer for depth correction.
     pub row_pixels_max: u16,
 }
 
@@ -114,35 +114,35 @@ impl Limits {
     }
 }
 
-/// Why the board was reset.
+/// Cause of a reset.
 #[derive(Serialize, Deserialize, Schema, Clone, Copy, PartialEq, Eq, Debug)]
 pub enum ResetCause {
-    /// Power came on.
+    /// Power was switched on.
     PowerOn,
-    /// The reset pin or button.
+    /// Reset pin or button.
     Pin,
     /// [`super::Request::Reboot`].
     Software,
-    /// The independent watchdog: the firmware had stopped responding.
+    /// Independent watchdog: the firmware had hung.
     Watchdog,
-    /// The supply dipped.
+    /// Brown-out of the supply.
     BrownOut,
-    /// Left a low-power state by reset.
+    /// Reset from a low-power state.
     LowPower,
-    /// The flags fit none of these.
+    /// Unknown combination of flags.
     Unknown,
 }
 
-/// How the board is.
+/// State of the board.
 #[derive(Serialize, Deserialize, Schema, Clone, PartialEq, Eq, Debug)]
 pub struct Status {
-    /// The board's time at this answer.
+    /// Board time of this answer.
     pub time: BoardMicros,
-    /// The coarse axis.
+    /// State of the coarse axis.
     pub coarse: AxisStatus,
-    /// The fine axis; always homed, its gauge is absolute.
+    /// State of the fine axis; always homed, because its gauge is absolute.
     pub fine: AxisStatus,
-    /// The lens axis.
+    /// State of the lens axis.
     pub lens: AxisStatus,
     /// Whether stage A's home switch is closed.
     pub home_switch: bool,
@@ -154,24 +154,24 @@ pub struct Status {
     pub lens_far_switch: bool,
     /// Whether the emergency-stop input is open.
     pub emergency_stop: bool,
-    /// Whether the supply is below the level at which the board can stop in order.
+    /// Whether the supply is too low for an orderly stop.
     pub supply_low: bool,
-    /// The latched alarm.
+    /// Latched alarm, if any.
     pub alarm: Option<AlarmRecord>,
-    /// The exposure program.
+    /// State of the exposure program.
     pub program: ProgramStatus,
-    /// The number the next event will get.
+    /// Number of the next event.
     pub next_event: u32,
-    /// Triggers given since the reset.
+    /// Triggers since the reset.
     pub triggers: u32,
-    /// STEP pulses given to both motors since the reset.
+    /// STEP pulses of both motors since the reset.
     pub steps: u64,
-    /// What the link has seen.
+    /// Statistics of the link.
     pub link: LinkCounters,
 }
 
 impl Status {
-    /// How an axis is.
+    /// State of an axis.
     pub const fn axis(&self, axis: Axis) -> &AxisStatus {
         match axis {
             Axis::SensorCoarse => &self.coarse,
@@ -180,7 +180,7 @@ impl Status {
         }
     }
 
-    /// Whether an axis' home switch and its far switch are closed; an axis without switches has both open.
+    /// Whether home and far switch of an axis are closed; both open for an axis without switches.
     pub const fn switches(&self, axis: Axis) -> [bool; 2] {
         match axis {
             Axis::SensorCoarse => [self.home_switch, self.far_switch],
@@ -190,17 +190,17 @@ impl Status {
     }
 }
 
-/// What the board's link has seen since the reset.
+/// Link statistics since the reset.
 #[derive(Serialize, Deserialize, Schema, Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct LinkCounters {
-    /// Good frames.
+    /// Valid frames received.
     pub frames: u32,
-    /// Frames dropped for a wrong CRC, length or encoding.
+    /// Frames with a wrong CRC, length or encoding.
     pub bad_frames: u32,
-    /// Repeated requests answered from memory.
+    /// Repeated requests, answered from memory.
     pub repeated: u32,
-    /// Requests refused because they belong to no open session, or are older than what is remembered.
+    /// Requests refused for a wrong session or an old id.
     pub stale: u32,
-    /// Requests that found no room: [`super::RequestError::QueueFull`], also where there was no room for that answer.
+    /// Requests without room, with or without [`super::RequestError::QueueFull`].
     pub overflowed: u32,
 }

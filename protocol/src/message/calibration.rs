@@ -1,4 +1,4 @@
-//! Routines by which the board measures its own mechanics.
+//! Calibration routines of the board.
 
 use postcard_schema::Schema;
 use serde::{Deserialize, Serialize};
@@ -6,59 +6,49 @@ use serde::{Deserialize, Serialize};
 use super::Axis;
 use crate::units::Nanometres;
 
-/// A routine.
+/// A calibration routine.
 #[derive(Serialize, Deserialize, Schema, Clone, Copy, PartialEq, Eq, Debug)]
+#[allow(missing_docs, reason = "names and types describe these fields")]
 pub enum Routine {
-    /// From the home switch to the far switch and back. The axis is homed.
-    Travel {
-        /// A stepper axis.
-        axis: Axis,
-    },
-    /// The screw's backlash: the way that the motor turns at a reversal until the stage follows. Measured at the home
-    /// switch, which the stage itself actuates.
-    Backlash {
-        /// A stepper axis.
-        axis: Axis,
-    },
-    /// The piezo's gain and hysteresis: an open-loop sweep up and down.
+    /// Travel between home and far switch; homes the axis.
+    Travel { axis: Axis },
+    /// Backlash of the screw: motor travel at a reversal until the stage follows, measured at its home
+    /// switch.
+    Backlash { axis: Axis },
+    /// Gain and hysteresis of the piezo: open-loop sweep.
     Piezo,
-    /// Gain and zero of the strain gauge against stage A's encoder, by way of its home switch. The axis is homed.
+    /// Gain and zero of the strain gauge, compared with stage A's encoder at its home switch; homes the axis.
     Gauge,
 }
 
-/// What a routine found. Travel is only reported; the rest is also stored as settings.
+/// Result of a routine. All but travel is stored as settings.
 #[derive(Serialize, Deserialize, Schema, Clone, Copy, PartialEq, Eq, Debug)]
+#[allow(missing_docs, reason = "names and types describe these fields")]
 pub enum Calibration {
     /// Distance between the switches.
-    Travel {
-        /// The axis.
-        axis: Axis,
-        /// How far.
-        length: Nanometres,
-    },
-    /// The screw's backlash.
+    Travel { axis: Axis, length: Nanometres },
+    /// Backlash of the screw.
     Backlash {
-        /// The axis.
         axis: Axis,
         /// Mean over the reversals.
         backlash: Nanometres,
         /// Largest deviation from the mean.
         spread: Nanometres,
     },
-    /// The piezo.
+    /// Result of the piezo sweep.
     Piezo {
-        /// Stroke per code of the converter.
+        /// Stroke per DAC code.
         gain_pm_per_code: u32,
-        /// Width of the hysteresis loop in parts per million of the sweep.
+        /// Loop width relative to the sweep.
         hysteresis_ppm: u32,
-        /// Creep in parts per million of a step per decade of time.
+        /// Creep per decade of time, relative to a step.
         creep_ppm_per_decade: u32,
     },
-    /// The strain gauge.
+    /// Result of the gauge calibration.
     Gauge {
-        /// Position for what the gauge says, parts per million.
+        /// Position relative to the reading.
         gain_ppm: i32,
-        /// What it says where the piezo is relaxed.
+        /// Reading at the relaxed piezo.
         offset: Nanometres,
     },
 }

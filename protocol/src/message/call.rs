@@ -1,22 +1,21 @@
-//! The body of a request's frame: a request, and the session it belongs to.
+//! Body of a request frame: request and session.
 
 use serde::{Deserialize, Serialize};
 
 use super::Request;
 
-/// [`Call::session`] of [`Request::Hello`], which belongs to none.
+/// [`Call::session`] of [`Request::Hello`].
 pub const NO_SESSION: u32 = 0;
-/// A new request's id lies at most this far above the last one. So no frame that went wrong on the way, or was never meant for
-/// this board, can use all ids up.
+/// Largest step of a new request id, so that a damaged or stray frame cannot exhaust the ids.
 pub const ID_STEP_MAX: u32 = 65_536;
 
-/// A request and its session.
+/// A request with its session.
 #[derive(Serialize, Deserialize, Clone, PartialEq, Eq, Debug)]
 pub struct Call {
-    /// The number that [`Request::OpenSession`] came with, or [`NO_SESSION`]. Four bytes, little-endian, whatever its
-    /// value: a frame's length, and so its time on the wire, does not depend on it.
+    /// Number of [`Request::OpenSession`], or [`NO_SESSION`]. Always four bytes, little-endian, so that a
+    /// frame's duration on the wire does not depend on it.
     #[serde(with = "postcard::fixint::le")]
     pub session: u32,
-    /// The request.
+    /// The request itself.
     pub request: Request,
 }

@@ -1,31 +1,31 @@
-//! How fast the link is.
+//! Link rates.
 
 use postcard_schema::Schema;
 use serde::{Deserialize, Serialize};
 
 use crate::units::Micros;
 
-/// A new rate is on trial for so long: where no good request comes in at it, the board goes back to the one before. Longer than a
-/// host takes that asks four times, 50 ms each.
+/// Trial time of a new rate: without a valid request the board returns to the old one. Longer than four
+/// attempts of a host, 50 ms each.
 pub const LINK_TRIAL: Micros = Micros(300_000);
 
-/// A rate of the link, 8 data bits, no parity, 1 stop bit. Each reset begins with [`LinkRate::START`].
+/// A link rate, 8N1. Each reset starts with [`LinkRate::START`].
 #[derive(Serialize, Deserialize, Schema, Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum LinkRate {
     /// 2,000,000 baud.
     Baud2000000,
-    /// 921,600 baud, for adapters and cables that lose bytes at the other.
+    /// 921,600 baud, for adapters and cables that lose bytes at 2,000,000.
     Baud921600,
 }
 
 impl LinkRate {
-    /// All, in the order of their numbers on the wire.
+    /// All rates in wire order.
     pub const ALL: [Self; 2] = [Self::Baud2000000, Self::Baud921600];
-    /// After each reset.
+    /// Rate after each reset.
     pub const START: Self = Self::Baud2000000;
 
-    /// Symbols per second.
+    /// Rate in baud.
     pub const fn baud(self) -> u32 {
         match self {
             Self::Baud2000000 => 2_000_000,
@@ -33,7 +33,7 @@ impl LinkRate {
         }
     }
 
-    /// The rate of this many symbols per second.
+    /// The rate with this baud number.
     pub fn of(baud: u32) -> Option<Self> {
         Self::ALL.into_iter().find(|rate| rate.baud() == baud)
     }

@@ -1,35 +1,35 @@
-//! Mathematics on the board: depth correction row by row, its fit, and the sun with a person's shadow.
+//! Mathematics on the board: depth correction by rows, its fit, and sun and shadow.
 //!
-//! Depths travel as the Q1.15 codes of `farnear-maths` (`DepthScale`), coefficients as its Q2.29 bits. Requests carry
-//! integers, so that a request equals its repetition; answers carry the board's `f32` as they are, bit for bit.
+//! Depths are Q1.15 codes of `farnear-maths` (`DepthScale`), coefficients its Q2.29 bits. Requests carry
+//! integers, so that a repeat is equal; answers carry the board's `f32` bit for bit.
 
 use heapless::Vec;
 use postcard_schema::Schema;
 use serde::{Deserialize, Serialize};
 
-/// Depth codes in one message.
+/// Depth codes per message.
 pub const CODES_MAX: usize = 72;
-/// Coefficients in one message.
+/// Coefficients per message.
 pub const COEFFICIENTS_MAX: usize = 40;
 
-/// Depth codes of neighbouring (or every n-th) pixels of a row.
+/// Depth codes of every n-th pixel of a row.
 pub type Codes = Vec<i16, CODES_MAX>;
-/// Bits of coefficients.
+/// Q2.29 bits of coefficients.
 pub type CoefficientBits = Vec<i32, COEFFICIENTS_MAX>;
 
-/// The form of a depth correction.
+/// Form of a depth correction.
 #[derive(Serialize, Deserialize, Schema, Clone, Copy, PartialEq, Eq, Debug)]
 pub enum CorrectionForm {
     /// Ten terms in each of 3x3 regions: 90 coefficients.
     Regions,
-    /// The same 90 coefficients, blended between the regions' centres.
+    /// The same 90 coefficients, blended between region centres.
     Blend,
     /// Twenty terms for the whole image.
     Full,
 }
 
 impl CorrectionForm {
-    /// How many coefficients it has.
+    /// Number of coefficients.
     pub const fn coefficients(self) -> u8 {
         match self {
             Self::Regions | Self::Blend => 90,
@@ -38,51 +38,51 @@ impl CorrectionForm {
     }
 }
 
-/// What a correction was made for.
+/// Form and scale of a correction.
 #[derive(Serialize, Deserialize, Schema, Clone, Copy, PartialEq, Eq, Debug)]
 pub struct CorrectionInfo {
-    /// Its form.
+    /// Form of the correction.
     pub form: CorrectionForm,
-    /// Width of the depth map in pixels.
+    /// Width of the depth map, px.
     pub width: u16,
-    /// Height of the depth map in pixels.
+    /// Height of the depth map, px.
     pub height: u16,
-    /// Depth of code 0, micrometres.
+    /// Depth of code 0.
     pub centre_um: i32,
-    /// Depth from code 0 to full scale, micrometres.
+    /// Depth from code 0 to full scale.
     pub half_span_um: i32,
 }
 
-/// What is wrong with a request about depth correction.
+/// Why a correction request was refused.
 #[derive(Serialize, Deserialize, Schema, Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum CorrectionFault {
     /// None is open or stored.
     None,
-    /// The map is too small or larger than the board's row buffer ([`super::Limits::row_pixels_max`]).
+    /// Map too small, or larger than [`super::Limits::row_pixels_max`].
     Size,
-    /// The row lies outside the map, or the pixels outside the row.
+    /// Row outside the map, or pixels outside the row.
     Place,
-    /// Coefficients outside those of the form, or a value beyond their range.
+    /// Coefficient index or value out of range.
     Coefficient,
-    /// The samples do not determine the terms (fewer than four depths, too few pixels in a region).
+    /// Samples do not determine the terms (fewer than four depths, or too few pixels in a region).
     Underdetermined,
     /// More samples than the sums can hold.
     TooManySamples,
-    /// A coefficient of the solution is too large: the scale does not fit the samples.
+    /// Coefficient too large: the scale does not fit the samples.
     CoefficientTooLarge,
 }
 
-/// Where and when the sun is asked for, and for whose shadow. Degrees times 10^7; north and east positive.
+/// Place and time for sun and shadow. Degrees times 10^7; north and east positive.
 #[derive(Serialize, Deserialize, Schema, Clone, Copy, PartialEq, Eq, Debug)]
 pub struct SunQuery {
     /// Seconds since 1970-01-01T00:00:00Z.
     pub unix_seconds: i64,
-    /// Latitude.
+    /// Latitude, north positive.
     pub latitude_e7: i32,
-    /// Longitude.
+    /// Longitude, east positive.
     pub longitude_e7: i32,
-    /// Camera and subject; without it only the sun is answered.
+    /// Camera and subject; `None`: sun only.
     pub shadow: Option<ShadowQuery>,
 }
 
@@ -93,78 +93,78 @@ pub struct ShadowQuery {
     pub azimuth_e7: i32,
     /// Height of the lens above the ground.
     pub camera_height_mm: u32,
-    /// Distance of the subject along the optical axis.
+    /// Subject distance along the optical axis.
     pub distance_mm: u32,
-    /// Distance of the subject from the optical axis, right positive.
+    /// Subject distance from the optical axis, right positive.
     pub lateral_mm: i32,
     /// Height of the subject.
     pub height_mm: u32,
-    /// How well all of this is known.
+    /// Standard deviations of all inputs.
     pub deviations: QueryDeviations,
 }
 
-/// Standard deviations of what a shadow is calculated from.
+/// Standard deviations of a shadow's inputs.
 #[derive(Serialize, Deserialize, Schema, Clone, Copy, PartialEq, Eq, Debug)]
 pub struct QueryDeviations {
-    /// Of the day, in thousandths of a day.
+    /// Day, in thousandths of a day.
     pub day_e3: u32,
-    /// Of the time of day.
+    /// Time of day, seconds.
     pub time_s: u32,
-    /// Of the latitude, degrees times 10^7.
+    /// Latitude, degrees times 10^7.
     pub latitude_e7: u32,
-    /// Of the longitude, degrees times 10^7.
+    /// Longitude, degrees times 10^7.
     pub longitude_e7: u32,
-    /// Of the camera azimuth, degrees times 10^7.
+    /// Camera azimuth, degrees times 10^7.
     pub azimuth_e7: u32,
-    /// Of the camera height.
+    /// Height of the camera.
     pub camera_height_mm: u32,
-    /// Of the subject's height.
+    /// Height of the subject.
     pub height_mm: u32,
-    /// Of the subject's distance.
+    /// Distance of the subject.
     pub distance_mm: u32,
 }
 
-/// Where the sun is, without refraction.
+/// Position of the sun, without refraction.
 #[derive(Serialize, Deserialize, Schema, Clone, Copy, PartialEq, Debug)]
 pub struct SunAnswer {
     /// Elevation above the horizon.
     pub elevation_deg: f32,
     /// Azimuth, clockwise from north.
     pub azimuth_deg: f32,
-    /// The shadow, where it was asked for.
+    /// The shadow, if requested.
     pub shadow: Option<ShadowAnswer>,
 }
 
-/// A shadow's angle in the image.
+/// Angle of a shadow in the image.
 #[derive(Serialize, Deserialize, Schema, Clone, Copy, PartialEq, Debug)]
 pub enum ShadowAnswer {
-    /// It has one.
+    /// The shadow is visible.
     Angle {
-        /// Angle by which the silhouette is turned.
+        /// Rotation of the silhouette.
         beta_deg: f32,
-        /// Its standard deviation.
+        /// Standard deviation of the angle.
         sigma_beta_deg: f32,
         /// Whether the silhouette is mirrored first.
         mirrored: bool,
         /// Length of the shadow on the ground.
         length_m: f32,
-        /// Whether the standard deviation can be believed.
+        /// Validity of the standard deviation.
         reliability: ShadowReliability,
     },
-    /// The sun is too low, or below the horizon.
+    /// Sun too low or below the horizon.
     SunTooLow,
-    /// The sun is overhead.
+    /// Sun at the zenith.
     SunOverhead,
-    /// A length that must be positive is not.
+    /// A length is not positive.
     Senseless,
 }
 
-/// Whether a first-order standard deviation holds.
+/// Validity of the first-order standard deviation.
 #[derive(Serialize, Deserialize, Schema, Clone, Copy, PartialEq, Eq, Debug)]
 pub enum ShadowReliability {
-    /// It holds to a few percent.
+    /// Valid to a few percent.
     FirstOrder,
-    /// The shadow's end may lie beside or behind the camera.
+    /// The shadow may end next to or behind the camera.
     ShadowNearCamera,
     /// The shadow may point to either side.
     EitherSide,

@@ -1,33 +1,33 @@
-//! What the board keeps without power: settings by key, and the records they lie in.
+//! Non-volatile settings and records.
 
 use postcard_schema::Schema;
 use serde::{Deserialize, Serialize};
 
 use super::Axis;
 
-/// A record in the board's memory. Each has a version, a CRC and two copies.
+/// A record in memory with version, CRC and two copies.
 #[derive(Serialize, Deserialize, Schema, Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum RecordName {
-    /// The settings.
+    /// All settings.
     Settings,
-    /// Boots, alarms, steps, and what moved last.
+    /// Boots, alarms, steps, and the last moved axes.
     Counters,
     /// The last alarms.
     Alarms,
-    /// The loaded exposure program.
+    /// Loaded exposure program.
     Program,
-    /// The coefficients of the depth correction.
+    /// Coefficients of the depth correction.
     Correction,
 }
 
-/// Names a setting; the unit of its value is in the name.
+/// A setting; its name has the unit.
 #[derive(Serialize, Deserialize, Schema, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum SettingKey {
-    /// Distance from the lens' principal plane to the sensor with all axes at 0.
+    /// Distance of principal plane and sensor with all axes at 0.
     DatumNm,
-    /// Smallest distance between sensor and lens stage (datum + coarse + fine + lens).
+    /// Smallest distance of sensor and lens (datum + coarse + fine + lens).
     DistanceMinNm,
     /// Smallest position of stage A's stepper.
     CoarseMinNm,
@@ -39,9 +39,9 @@ pub enum SettingKey {
     CoarseAccelerationUmPerS2,
     /// Jerk of stage A's stepper.
     CoarseJerkUmPerS3,
-    /// Backlash of stage A's screw; moves end from the same side, this far and a little more before the target.
+    /// Backlash of stage A's screw; moves end from the same side, this far and a margin before the target.
     CoarseBacklashNm,
-    /// Largest difference between steps and encoder of stage A.
+    /// Largest difference of steps and encoder of stage A.
     CoarseFollowingNm,
     /// Smallest position of stage B.
     LensMinNm,
@@ -55,32 +55,32 @@ pub enum SettingKey {
     LensJerkUmPerS3,
     /// Backlash of stage B's screw.
     LensBacklashNm,
-    /// Largest difference between steps and encoder of stage B.
+    /// Largest difference of steps and encoder of stage B.
     LensFollowingNm,
     /// Smallest position of the piezo.
     FineMinNm,
     /// Largest position of the piezo.
     FineMaxNm,
-    /// Stroke of the piezo per code of its converter, from the sweep.
+    /// Piezo stroke per DAC code, from the sweep.
     PiezoGainPmPerCode,
-    /// Width of the piezo's hysteresis loop in parts per million of the sweep, from the sweep.
+    /// Width of the piezo's hysteresis loop relative to the sweep.
     PiezoHysteresisPpm,
-    /// Creep of the piezo in parts per million of a step per decade of time.
+    /// Piezo creep per decade of time, relative to a step.
     PiezoCreepPpmPerDecade,
-    /// From the end of an exposure until the camera may be triggered again.
+    /// Time from the end of an exposure to the next trigger.
     CameraReadoutUs,
-    /// The camera's exposure signal must have come this long after the trigger pulse has ended.
+    /// Longest delay of the exposure signal after the trigger pulse.
     StrobeDeadlineUs,
-    /// Position for what the strain gauge says, parts per million, from its calibration.
+    /// Position relative to the gauge's reading, from its calibration.
     GaugeGainPpm,
-    /// What the strain gauge says where the piezo is relaxed, from its calibration.
+    /// Gauge reading at the relaxed piezo, from its calibration.
     GaugeOffsetNm,
-    /// 1 where the piezo's flexure has a second mode that the fast loop would feed: a slower one then leaves it alone.
+    /// 1 if the fast loop would excite a second mode of the piezo's flexure; a slower loop is then used.
     PiezoSecondMode,
 }
 
 impl SettingKey {
-    /// All, in order.
+    /// All settings in wire order.
     pub const ALL: [Self; 26] = [
         Self::DatumNm,
         Self::DistanceMinNm,
@@ -110,7 +110,7 @@ impl SettingKey {
         Self::PiezoSecondMode,
     ];
 
-    /// Its name for people and files, e.g. `coarse_min_nm`.
+    /// Name for users and files, e.g. `coarse_min_nm`.
     pub const fn name(self) -> &'static str {
         match self {
             Self::DatumNm => "datum_nm",
@@ -143,7 +143,7 @@ impl SettingKey {
     }
 }
 
-/// The settings that every stepper axis has.
+/// Settings of a stepper axis.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct StepperKeys {
     /// Smallest position.
@@ -158,12 +158,12 @@ pub struct StepperKeys {
     pub jerk: SettingKey,
     /// Backlash of the screw.
     pub backlash: SettingKey,
-    /// Largest difference between steps and encoder.
+    /// Largest difference of steps and encoder.
     pub following: SettingKey,
 }
 
 impl StepperKeys {
-    /// Of stage A's stepper.
+    /// Settings of stage A's stepper.
     pub const COARSE: Self = Self {
         min: SettingKey::CoarseMinNm,
         max: SettingKey::CoarseMaxNm,
@@ -173,7 +173,7 @@ impl StepperKeys {
         backlash: SettingKey::CoarseBacklashNm,
         following: SettingKey::CoarseFollowingNm,
     };
-    /// Of stage B's stepper.
+    /// Settings of stage B's stepper.
     pub const LENS: Self = Self {
         min: SettingKey::LensMinNm,
         max: SettingKey::LensMaxNm,
@@ -184,7 +184,7 @@ impl StepperKeys {
         following: SettingKey::LensFollowingNm,
     };
 
-    /// Of an axis; `None` where that is not a stepper.
+    /// Settings of an axis; `None` if it is not a stepper.
     pub const fn of(axis: Axis) -> Option<Self> {
         match axis {
             Axis::SensorCoarse => Some(Self::COARSE),
@@ -194,37 +194,37 @@ impl StepperKeys {
     }
 }
 
-/// A setting and what it may be.
+/// A setting with its range.
 #[derive(Serialize, Deserialize, Schema, Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Setting {
-    /// Which.
+    /// Key of the setting.
     pub key: SettingKey,
-    /// Its value, in the unit of its name.
+    /// Value in the unit of the name.
     pub value: i32,
-    /// What it is on a board that was never set.
+    /// Factory default.
     pub default: i32,
-    /// Smallest value allowed.
+    /// Smallest permitted value.
     pub min: i32,
-    /// Largest value allowed.
+    /// Largest permitted value.
     pub max: i32,
 }
 
-/// What the board has counted in its life; kept without power.
+/// Lifetime counters, kept without power.
 #[derive(Serialize, Deserialize, Schema, Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct Counters {
-    /// Boots.
+    /// Number of boots.
     pub boots: u32,
-    /// Alarms.
+    /// Number of alarms.
     pub alarms: u32,
-    /// Triggers.
+    /// Number of triggers.
     pub triggers: u64,
     /// STEP pulses of stage A.
     pub coarse_steps: u64,
     /// STEP pulses of stage B.
     pub lens_steps: u64,
-    /// Homings that reached their end.
+    /// Completed homings.
     pub homings: u32,
-    /// Records of which only the older copy was good at a boot.
+    /// Boots with a damaged newer copy of a record.
     pub repaired: u32,
 }

@@ -1,4 +1,4 @@
-//! Exposure programs: what is asked of a shot, and what was measured.
+//! Exposure programs: shots and their records.
 
 use postcard_schema::Schema;
 use serde::{Deserialize, Serialize};
@@ -6,74 +6,74 @@ use serde::{Deserialize, Serialize};
 use super::Axis;
 use crate::units::{BoardMicros, Micros, Nanometres};
 
-/// One entry of an exposure program.
+/// An entry of an exposure program.
 #[derive(Serialize, Deserialize, Schema, Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Shot {
-    /// The axis to move before the exposure.
+    /// Axis to move before the exposure.
     pub axis: Axis,
-    /// Where to.
+    /// Target position of the axis.
     pub target: Nanometres,
-    /// The exposure time; with a hardware trigger the length of the pulse.
+    /// Exposure time; with a hardware trigger the pulse length.
     pub exposure: Micros,
-    /// The position counts as settled while it is within this distance of the target...
+    /// Settled while within this distance of the target...
     pub settle_window: Nanometres,
-    /// ...for this long without a break.
+    /// ...for this long without interruption.
     pub settle_dwell: Micros,
     /// Exposures at this position, at least 1.
     pub repeat: u16,
-    /// How the exposure comes about.
+    /// Source of the trigger.
     pub mode: TriggerMode,
 }
 
-/// What is wrong with a shot.
+/// Why a shot was refused.
 #[derive(Serialize, Deserialize, Schema, Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum ShotFault {
-    /// The index is not below [`super::Limits::shots_max`], or the program has no shots.
+    /// Index not below [`super::Limits::shots_max`], or an empty program.
     Index,
-    /// This shot of the program was never loaded.
+    /// The shot was not loaded.
     Missing,
-    /// The exposure is outside [`super::Limits::exposure_min`] to [`super::Limits::exposure_max`].
+    /// Exposure outside [`super::Limits::exposure_min`] to [`super::Limits::exposure_max`].
     Exposure,
-    /// The settle window or its dwell time is 0 or larger than the board can watch.
+    /// Settle window or dwell is 0 or too large.
     Settle,
     /// The repeat count is 0.
     Repeat,
 }
 
-/// What was measured at one exposure.
+/// Measurements of one exposure.
 #[derive(Serialize, Deserialize, Schema, Clone, Copy, PartialEq, Eq, Debug)]
 pub struct ShotRecord {
-    /// Place in the program.
+    /// Index in the program.
     pub index: u8,
-    /// Which of the repeats, from 0.
+    /// Repeat of the shot, from 0.
     pub repeat: u16,
-    /// Running number of the trigger since the reset; the camera's shot id.
+    /// Trigger number since the reset; the camera's shot id.
     pub trigger_number: u32,
-    /// The axis that was moved.
+    /// Axis that was moved.
     pub axis: Axis,
-    /// Where it was sent.
+    /// Target position of the axis.
     pub asked: Nanometres,
-    /// Encoder position of the coarse axis at the trigger.
+    /// Coarse position by encoder at the trigger.
     pub coarse: Nanometres,
-    /// Gauge position of the fine axis at the trigger (mean over the settle dwell).
+    /// Fine position by gauge, mean over the settle dwell.
     pub fine: Nanometres,
-    /// Encoder position of the lens stage at the trigger.
+    /// Lens position by encoder at the trigger.
     pub lens: Nanometres,
-    /// From the start of the move until it was settled.
+    /// Time from the start of the move until settled.
     pub settle: Micros,
-    /// Rising edge of the trigger; without a trigger, when the shot was ready.
+    /// Rising trigger edge; without a trigger, the time when the shot was ready.
     pub trigger: BoardMicros,
-    /// Start of the exposure as the camera reports it.
+    /// Start of the exposure by the camera's signal.
     pub strobe_start: BoardMicros,
-    /// End of the exposure as the camera reports it.
+    /// End of the exposure by the camera's signal.
     pub strobe_end: BoardMicros,
-    /// Length of the trigger pulse, or what the shot asks for.
+    /// Trigger pulse length, or the requested exposure.
     pub exposure: Micros,
 }
 
 impl ShotRecord {
-    /// Where an axis was at the trigger, by its encoder or gauge.
+    /// Position of an axis at the trigger, by encoder or gauge.
     pub const fn measured(&self, axis: Axis) -> Nanometres {
         match axis {
             Axis::SensorCoarse => self.coarse,
@@ -83,46 +83,46 @@ impl ShotRecord {
     }
 }
 
-/// Why a moment of a continuous run's pace passed without an exposure.
+/// Why a period of a continuous run had no exposure.
 #[derive(Serialize, Deserialize, Schema, Clone, Copy, PartialEq, Eq, Debug)]
 pub enum DropReason {
-    /// The position was still on its way, or had not settled.
+    /// Position still moving or not settled.
     NotSettled {
-        /// Asked minus measured then.
+        /// Target minus measured position.
         error: Nanometres,
     },
-    /// The camera still exposed, or read the frame before out.
+    /// Camera still exposing or reading out.
     CameraBusy,
-    /// The camera was triggered, and its exposure-active signal did not come.
+    /// Triggered, but without exposure signal.
     NoStrobe,
 }
 
-/// How an exposure comes about.
+/// Source of the trigger.
 #[derive(Serialize, Deserialize, Schema, Clone, Copy, PartialEq, Eq, Debug)]
 pub enum TriggerMode {
-    /// The board triggers the camera by a pulse as long as the exposure.
+    /// The board sends a pulse as long as the exposure.
     Hardware,
-    /// The board says [`super::EventKind::ShotReady`]; the host triggers the camera by its own means, and the camera's
-    /// exposure signal ends the shot.
+    /// The host triggers the camera after [`super::EventKind::ShotReady`]; the camera's exposure signal ends
+    /// the shot.
     Software,
-    /// The camera runs freely; the first exposure that begins after the position has settled is the shot.
+    /// Free-running camera; the shot is the first exposure that begins after settling.
     FreeRunning,
 }
 
-/// How the exposure program is.
+/// State of the exposure program.
 #[derive(Serialize, Deserialize, Schema, Clone, Copy, PartialEq, Eq, Debug)]
 pub struct ProgramStatus {
-    /// What it does.
+    /// Phase of the program.
     pub state: ProgramState,
-    /// Shots that were armed.
+    /// Number of armed shots.
     pub shots: u8,
-    /// The shot that is under way, or comes next.
+    /// Current or next shot.
     pub index: u8,
-    /// Exposures taken in this run; 65,535 where a continuous run has taken more.
+    /// Exposures of this run, saturating at 65,535.
     pub exposures: u16,
 }
 
-/// What the exposure program does.
+/// Phase of the exposure program.
 #[derive(Serialize, Deserialize, Schema, Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum ProgramState {
@@ -130,8 +130,8 @@ pub enum ProgramState {
     Idle,
     /// Checked; `RunProgram` starts it.
     Armed,
-    /// Runs.
+    /// Exposures are being taken.
     Running,
-    /// Stands between two exposures until it is resumed or stopped.
+    /// Paused between two exposures.
     Paused,
 }

@@ -1,4 +1,4 @@
-//! What the messages say of each axis.
+//! Properties of axes in messages.
 
 use farnear_protocol::{
     Micros, Nanometres, Settle,
@@ -37,7 +37,7 @@ fn the_distance_is_the_datum_and_the_axes_that_carry_sensor_or_lens() {
 }
 
 #[test]
-fn a_steppers_settings_bear_its_name() {
+fn stepper_settings_have_the_axis_name() {
     for axis in Axis::ALL {
         let Some(keys) = StepperKeys::of(axis) else {
             assert_eq!(axis, Axis::SensorFine, "the piezo is not a stepper");
@@ -55,8 +55,8 @@ fn a_steppers_settings_bear_its_name() {
 }
 
 #[test]
-fn what_counts_as_settled_for_which_purpose() {
-    // Captures of earlier versions were made with these: another number is another measurement.
+fn settle_criteria_have_the_expected_values() {
+    // Existing captures used these values; a change is another measurement.
     let numbers = |settle: Settle| (settle.window.0, settle.dwell.0);
     let table = Axis::ALL.map(|axis| {
         [Settle::of_move(axis), Settle::of_shot(axis), Settle::of_search(axis), Settle::of_sweep(axis)]

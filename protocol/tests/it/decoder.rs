@@ -1,4 +1,4 @@
-//! The decoder against garbage, cuts and flipped bits.
+//! The decoder with garbage, cuts and flipped bits.
 
 use farnear_protocol::{
     BoardMicros, Event, EventKind, Log, Micros, Nanometres, Request, RequestError, Response,
@@ -62,8 +62,8 @@ fn any_request() -> impl Strategy<Value = Request> {
 
 #[test]
 fn a_million_random_byte_strings_neither_panic_nor_pass_the_crc() {
-    // xorshift64*: fast, seeded, and good enough to hit every branch; the CRC lets a random frame of at least 14
-    // bytes pass once in 2^32, so a single pass in 10^6 strings would be a fault.
+    // xorshift64*: fast and seeded. The CRC accepts a random frame of at least 14 bytes once in 2^32, so a
+    // single pass in 10^6 strings would be an error.
     let mut state = 0x9E37_79B9_7F4A_7C15_u64;
     let mut next = move || {
         state ^= state >> 12;
@@ -105,7 +105,6 @@ fn a_body_too_large_for_a_frame_is_refused_and_the_largest_fits() {
     assert_eq!(encode(header(Kind::Event, 1, 1), &Raw(&[1u8; BODY_MAX + 1])), None);
 }
 
-/// Serialises to exactly its bytes.
 struct Raw<'a>(&'a [u8]);
 
 impl serde::Serialize for Raw<'_> {
@@ -120,7 +119,7 @@ impl serde::Serialize for Raw<'_> {
 }
 
 #[test]
-fn bytes_left_over_make_a_body_no_message() {
+fn rejects_bodies_with_surplus_bytes() {
     let mut packet =
         decode(request(1, &Request::Status).split_last().expect("not empty").1).expect("decodes");
     assert_eq!(packet.message::<Request>(), Some(Request::Status));
@@ -144,7 +143,7 @@ fn frames_of_up_to_256_bytes_are_read_and_one_more_is_too_long() {
             );
         }
     }
-    // No zero anywhere: a run of 254 bytes, behind which COBS need not say more.
+    // No zero byte: a run of 254 bytes needs no further COBS code.
     let header = Header { id: 0x0101_0101, boot: 0x0101_0101, ..header };
     let encoded = encode(header, &Raw(&[2; BODY_MAX])).expect("it fits");
     assert_eq!((encoded.len(), encoded.last()), (FRAME_MAX, Some(&0)));

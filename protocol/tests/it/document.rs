@@ -1,4 +1,4 @@
-//! The document that a stranger writes a client from.
+//! The protocol document agrees with the code.
 
 use std::{fs, path::Path};
 
@@ -11,9 +11,9 @@ use farnear_protocol::{
 use crate::frozen_wire::{BY_HAND, requests};
 
 #[test]
-fn the_document_tells_of_every_request() {
+fn the_document_lists_every_request() {
     let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/protocol.md");
-    let page = fs::read_to_string(&page).expect("the page lies beside the crate");
+    let page = fs::read_to_string(&page).expect("the page lies next to the crate");
     for request in requests::table() {
         let name = format!("{request:?}");
         let name = name.split([' ', '(', '{']).next().expect("a name");
@@ -22,9 +22,9 @@ fn the_document_tells_of_every_request() {
 }
 
 #[test]
-fn the_documents_frame_by_hand_is_the_frozen_one() {
+fn the_documents_frame_equals_the_frozen_one() {
     let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/protocol.md");
-    let page = fs::read_to_string(&page).expect("the page lies beside the crate");
+    let page = fs::read_to_string(&page).expect("the page lies next to the crate");
     let wire = page.lines().find_map(|line| line.strip_prefix("wire ")).expect("the frame by hand");
     assert_eq!(wire.replace(' ', ""), BY_HAND);
 }
@@ -32,7 +32,7 @@ fn the_documents_frame_by_hand_is_the_frozen_one() {
 #[test]
 fn the_document_states_the_numbers_of_the_code() {
     let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/protocol.md");
-    let page = fs::read_to_string(&page).expect("the page lies beside the crate");
+    let page = fs::read_to_string(&page).expect("the page lies next to the crate");
     let step = format!("{},{:03}", ID_STEP_MAX / 1000, ID_STEP_MAX % 1000);
     for stated in [
         format!("Version {PROTOCOL_CURRENT}."),

@@ -1,9 +1,9 @@
 //! The bytes of protocol version 3: every message and every variant.
 //!
-//! Do not change an expectation here: a message whose bytes differ is another protocol, so either the change is
-//! a mistake or `PROTOCOL_CURRENT` grows and a new folder freezes the new version. Messages may be appended.
-//! The first frame was also put together by hand from `docs/protocol.md` (see `by_hand`), with the CRC from an
-//! independent calculation (Python's `zlib.crc32`).
+//! Do not change an expectation: different bytes are another protocol. Either the change is a mistake, or
+//! `PROTOCOL_CURRENT` grows and a new folder freezes the new version. Messages may be appended. The first
+//! frame was also assembled by hand from `docs/protocol.md` (see `by_hand`), with an independent CRC
+//! (Python's `zlib.crc32`).
 
 pub mod answers;
 mod events;
@@ -24,7 +24,6 @@ fn wire<T: Serialize>(kind: Kind, id: u32, message: &T) -> String {
     encode(header, message).expect("fits").iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
-/// The session that the frozen requests belong to.
 const SESSION: u32 = 0x0506_0708;
 
 fn check(found: &[String], frozen: &[&str]) {
@@ -34,15 +33,15 @@ fn check(found: &[String], frozen: &[&str]) {
     assert_eq!(found.len(), frozen.len(), "freeze these:\n\"{}\",", found.join("\",\n\""));
 }
 
-/// That `table` holds every variant of an enum, each at its place: its first byte is its place in the table (several
-/// neighbours may show the same variant), and a place beyond the table's last decodes to nothing.
+/// Checks that `table` has every variant of an enum in order: the first byte is the variant's index
+/// (neighbours may repeat a variant), and the next index does not decode.
 #[track_caller]
 fn lists_every_variant<T: Serialize + DeserializeOwned>(table: &[T]) {
     let mut buffer = [0; 512];
     let mut next = 0;
     for value in table {
         let place = postcard::to_slice(value, &mut buffer).expect("it fits")[0];
-        assert!(place == next || place + 1 == next, "variant {place} stands where {next} is due");
+        assert!(place == next || place + 1 == next, "variant {place} is at the position of {next}");
         next = next.max(place + 1);
     }
     let mut beyond = [0; 512];

@@ -1,4 +1,4 @@
-//! The protocol through its public face, one program for all of it: what is frozen, what is decoded, what an axis is.
+//! The protocol through its public API, in one test binary.
 
 mod axes;
 mod decoder;

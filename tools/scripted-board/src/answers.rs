@@ -1,4 +1,4 @@
-//! What the scripted board answers, and what it remembers of it.
+//! Answers of the scripted board.
 
 use farnear_protocol::{
     PROTOCOL_CURRENT, Request, RequestError, Response,

@@ -1,4 +1,4 @@
-//! What the scripted board keeps and calculates: alarms, settings, counters. It has no mathematics.
+//! Alarms, settings and counters of the scripted board.
 
 use farnear_protocol::{
     Request, RequestError, Response,

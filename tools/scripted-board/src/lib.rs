@@ -1,10 +1,10 @@
-//! A scripted board at the other end of a line, with the faults a line and a board can have: for tests and examples.
+//! A scripted board with configurable faults of line and board, for tests and examples.
 //!
-//! It keeps the protocol's promises (an id acts once, events are numbered and can be read again), so that what
-//! the client makes of a fault is seen, not what the peer makes of it. Work ends at once. The line is in memory
-//! ([`Peer::connect`]) or, on Linux, a pseudo-terminal (`plug_in`). How a rig really behaves is `farnear-sim`'s to show.
+//! It follows the protocol (an id acts once, events are numbered and can be read again), so tests see how the
+//! client handles a fault. Work ends immediately. The line is in memory ([`Peer::connect`]) or, on Linux, a
+//! pseudo-terminal (`plug_in`). For realistic behaviour use `farnear-sim`.
 
-#![allow(clippy::unwrap_used)] // a test that panics has failed, which is what it is for
+#![allow(clippy::unwrap_used)] // panics fail the test
 
 use std::{
     collections::{BTreeMap, VecDeque},
@@ -35,117 +35,101 @@ mod work;
 #[cfg(target_os = "linux")]
 pub use port::plug_in;
 
-/// What is wrong with the line or the board.
 #[derive(Default, Clone)]
 pub struct Faults {
-    /// So many requests are lost on their way to the board.
+    /// Requests to lose.
     pub lose_requests: u32,
-    /// So many answers are lost on their way back.
+    /// Answers to lose.
     pub lose_answers: u32,
-    /// Every answer comes twice.
     pub duplicate_answers: bool,
-    /// Events with these numbers are lost.
+    /// Event numbers to lose.
     pub lose_events: Vec<u32>,
-    /// These bytes come before every frame of the board.
+    /// Bytes before each frame of the board.
     pub garbage: Vec<u8>,
-    /// The board resets instead of carrying out this kind of request.
+    /// Resets instead of executing a move.
     pub reset_at_move: bool,
-    /// Whether the reset announces itself with a `Started` event.
+    /// The reset sends no `Started` event.
     pub silent_reset: bool,
-    /// The line breaks at the first request of this kind.
+    /// The line breaks at a program request.
     pub gone_at_program: bool,
-    /// A continuous run drops the frames with these numbers.
+    /// Frame numbers dropped by a continuous run.
     pub drop_frames: Vec<u32>,
-    /// Work is taken on and never ends.
     pub never_ends: bool,
-    /// Work that was taken on asks so often whether the host is still there, and ends at the last answer.
+    /// Number of keep-alives before work ends.
     pub asks_first: u32,
-    /// The board forgets events at once.
+    /// Events are forgotten immediately.
     pub forgetful: bool,
-    /// The board works, ends, and says nothing.
+    /// Work ends without an event.
     pub end_unsaid: bool,
     pub fails_with: Option<Failure>,
-    /// Work ends with this alarm.
     pub alarm_at_work: Option<Alarm>,
-    /// After a stop it brakes for so many looks at its status.
+    /// Status requests during which it brakes after a stop.
     pub brakes_for: u32,
-    /// The board refuses every version but this.
+    /// The only accepted protocol version.
     pub other_version: Option<u8>,
-    /// The board does not know the request for another rate.
+    /// The board rejects rate changes.
     pub one_rate: bool,
-    /// The adapter passes nothing at this rate.
+    /// Rate at which the adapter passes nothing.
     pub no_rate: Option<LinkRate>,
 }
 
-/// The board: what it is, where it stands, what it was told.
+/// State of the board.
 pub struct Board {
-    /// What it says of itself.
     pub hello: Hello,
-    /// What is wrong with it and its line.
     pub faults: Faults,
-    /// Its clock since the reset, us.
+    /// Clock since the reset, us.
     pub time: u64,
-    /// Where the sensor's coarse axis stands.
     pub coarse: Nanometres,
-    /// Where the piezo stands.
     pub fine: Nanometres,
-    /// Where the lens stage stands.
     pub lens: Nanometres,
-    /// Whether the coarse axis was homed.
     pub homed: bool,
-    /// Whether the lens stage was homed.
     pub lens_homed: bool,
-    /// Homings, moves and programs that were carried out.
+    /// Completed homings, moves and programs.
     pub acts: u32,
-    /// How often it was told to stop.
     pub stops: u32,
-    /// How often it was halted.
     pub halts: u32,
-    /// Keep-alive timeouts that came with work.
+    /// Keep-alive timeouts of the requests.
     pub keep_alives: Vec<Micros>,
-    /// The shots that were loaded, by their place.
+    /// Loaded shots by index.
     pub program: Vec<Option<Shot>>,
-    /// How many of them are armed.
+    /// Number of armed shots.
     pub armed: u8,
-    /// What happened, from the first event on.
+    /// All events since power-on.
     pub events: Vec<Event>,
-    /// Exposures that were triggered.
     pub triggers: u32,
     pub alarms: Vec<AlarmRecord>,
-    /// Whether the last of them is latched.
+    /// Whether the last alarm is latched.
     pub latched: bool,
-    /// Settings that were changed, by name.
+    /// Changed settings by name.
     pub settings: BTreeMap<&'static str, i32>,
-    /// Whether the home and the far switch of the coarse axis are closed.
+    /// Home and far switch of the coarse axis.
     pub switches: [bool; 2],
-    /// The same of the lens stage.
+    /// Home and far switch of the lens stage.
     pub lens_switches: [bool; 2],
-    /// Whether the emergency stop is pressed.
     pub emergency_stop: bool,
     pub counters: Counters,
     /// Status requests that answered [`EventKind::StillThere`].
     pub still_there: u32,
-    /// Connections that are open at the host's end.
+    /// Connections open at the host's end.
     pub connections: usize,
-    /// The line is broken: nothing arrives and nothing can be opened.
+    /// Line broken: nothing arrives or can be opened.
     pub gone: bool,
     active: Option<(u32, Request)>,
-    /// Looks at its status until it stands.
+    /// Remaining status requests before it stands still.
     pub braking: u32,
     asking: u32,
     logs: u32,
-    /// The rate of the board's end, the one it goes back to and when, and the rate of the host's end.
+    /// Board rate, fallback rate with its time, and host rate.
     pub rate: LinkRate,
     trial: Option<(LinkRate, Instant)>,
     host_rate: LinkRate,
-    /// The number of the open session.
+    /// Id of the open session.
     pub session: u32,
     remembered: BTreeMap<u32, Vec<u8>>,
     decoder: Decoder,
     out: VecDeque<u8>,
 }
 
-/// An open connection to a board.
 struct Connection(Peer);
 
 impl Drop for Connection {
@@ -159,7 +143,7 @@ impl Drop for Connection {
 pub struct Peer(Arc<Mutex<Board>>);
 
 impl Peer {
-    /// A board that is at rest and was not homed yet.
+    /// A board at rest, not homed.
     pub fn new(faults: Faults) -> Self {
         let limits = Limits {
             datum: Nanometres(47_000_000),
@@ -243,7 +227,7 @@ impl Peer {
         })))
     }
 
-    /// What opens the line to this board again and again.
+    /// Opens connections to this board.
     pub fn connect(&self) -> farnear_capture::Connect {
         let peer = self.clone();
         Box::new(move || {
@@ -255,7 +239,6 @@ impl Peer {
         })
     }
 
-    /// One more connection to this board.
     fn connection(&self) -> Connection {
         let mut board = self.board();
         board.connections += 1;
@@ -264,10 +247,8 @@ impl Peer {
         Connection(self.clone())
     }
 
-    /// The board, to look at it or to change it.
-    ///
-    /// # Panics
-    /// Where a thread that had it panicked.
+    /// Locks the board.
+    /// Panics: if the lock is poisoned.
     pub fn board(&self) -> MutexGuard<'_, Board> {
         self.0.lock().unwrap()
     }
@@ -324,7 +305,8 @@ impl Board {
         self.send(&frame);
     }
 
-    /// Whether both ends have one rate, which the adapter passes. A rate at which nobody was heard is left.
+    /// Whether both ends have a rate that the adapter passes. An unconfirmed rate is abandoned after its
+    /// trial.
     fn hears_the_host(&mut self) -> bool {
         if let Some((back, _)) = self.trial.filter(|(_, until)| Instant::now() >= *until) {
             (self.rate, self.trial) = (back, None);
@@ -336,20 +318,20 @@ impl Board {
         hears
     }
 
-    /// Has another rate from now on, on trial.
+    /// Changes the rate on trial.
     fn change_rate(&mut self, rate: LinkRate) {
         let until = Instant::now() + Duration::from_micros(u64::from(LINK_TRIAL.0));
         self.trial = Some((self.rate, until));
         self.rate = rate;
     }
 
-    /// A frame, behind whatever garbage the line adds.
+    /// Sends a frame after the configured garbage.
     fn send(&mut self, frame: &[u8]) {
         self.out.extend(&self.faults.garbage);
         self.out.extend(frame);
     }
 
-    /// Something that another program left on the line.
+    /// Puts a stale frame of another program on the line.
     pub fn put_stale(&mut self, id: u32, response: &Response) {
         self.put(Kind::Response, id, response);
     }
@@ -364,12 +346,12 @@ impl Board {
         }
     }
 
-    /// Says that something happened, whether or not it did.
+    /// Sends an event.
     pub fn say(&mut self, kind: EventKind) {
         self.event(kind);
     }
 
-    /// The coarse axis lands where a screw lands: near the place asked for.
+    /// Position near the target, with an error like a screw's.
     fn place(&mut self, axis: Axis, target: Nanometres) {
         match axis {
             Axis::SensorCoarse => self.coarse = Nanometres(target.0 + 375),
@@ -386,7 +368,7 @@ impl Board {
         }
     }
 
-    /// The board starts anew, in its next boot.
+    /// Restarts the board with the next boot number.
     pub fn reset(&mut self, cause: ResetCause) {
         self.hello.boot += 1;
         (self.rate, self.trial) = (LinkRate::START, None);
@@ -407,10 +389,8 @@ impl Board {
         }
     }
 
-    /// Says something into the log.
-    ///
-    /// # Panics
-    /// Where it does not fit a frame.
+    /// Writes to the log.
+    /// Panics: if it does not fit a frame.
     pub fn log(&mut self, bytes: &[u8]) {
         let log = Log { bytes: bytes.try_into().unwrap() };
         let number = self.logs;
@@ -418,7 +398,7 @@ impl Board {
         self.put(Kind::Log, number, &log);
     }
 
-    /// A piece of the log that gets lost on the line.
+    /// Loses a piece of the log.
     pub fn lose_log(&mut self) {
         self.logs += 1;
     }

@@ -1,4 +1,4 @@
-//! The scripted board behind a pseudo-terminal, where programs find it like any board.
+//! The scripted board behind a pseudo-terminal.
 
 use std::{
     fs::File,
@@ -12,13 +12,11 @@ use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
 
 use crate::{Faults, Peer};
 
-/// Puts a scripted board behind a pseudo-terminal; gives the port's name. The port goes away when the board is told
-/// that its line is broken ([`crate::Board::gone`]).
-///
-/// # Panics
-/// Where the system has no pseudo-terminals.
+/// Puts a scripted board behind a pseudo-terminal; returns the port's name. The port closes when
+/// [`crate::Board::gone`] is set.
+/// Panics: without pseudo-terminals.
 pub fn plug_in(faults: Faults) -> (String, Peer) {
-    // Not with serialport's pair: the programs that tests start would inherit its ends and hold the line.
+    // Not serialport's pair: programs started by tests would inherit its ends and keep the line open.
     let far_end = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY | OpenptFlags::CLOEXEC).expect("a pty");
     grantpt(&far_end).and_then(|()| unlockpt(&far_end)).expect("a pty");
     let port = ptsname(&far_end, Vec::new()).expect("a pty's name").into_string().expect("a plain name");

@@ -1,5 +1,5 @@
-//! What the scripted board does: homing, moves, programs, calibrations. All of it ends at once, unless a fault says
-//! otherwise.
+//! Work of the scripted board: homing, moves, programs, calibrations. All end immediately, unless a fault is
+//! configured.
 
 use farnear_protocol::{
     Request, RequestError, Response,
@@ -12,7 +12,7 @@ use farnear_protocol::{
 
 use crate::Board;
 
-/// Exposures of a continuous run that nobody ends.
+/// Exposures of an endless continuous run.
 const UNTIL_STOPPED: u32 = 40;
 
 impl Board {
@@ -99,7 +99,7 @@ impl Board {
         (target < min || target > max).then_some(RequestError::OutOfRange { axis, asked: target, min, max })
     }
 
-    /// The host was heard: where it had been asked whether it is there, work goes on.
+    /// The host has answered the keep-alive; work continues.
     pub(super) fn hear_from_host(&mut self) {
         if self.asking == 0 {
             return;
@@ -114,7 +114,7 @@ impl Board {
         }
     }
 
-    /// An alarm comes up and is latched.
+    /// Raises and latches an alarm.
     pub fn raise(&mut self, alarm: Alarm) -> u32 {
         let number = self.alarms.len() as u32 + 1;
         let record = AlarmRecord { number, boot: self.hello.boot, time: BoardMicros(self.time), alarm };
@@ -191,7 +191,6 @@ impl Board {
         self.event(EventKind::ProgramDone { request: id, exposures });
     }
 
-    /// Takes an exposure, now.
     fn expose(&mut self, index: u8, repeat: u16, shot: &Shot) -> ShotRecord {
         let trigger_number = self.triggers;
         self.triggers += 1;
@@ -213,7 +212,7 @@ impl Board {
         }
     }
 
-    /// Frames at a pace, of which some are dropped; without an end it has taken [`UNTIL_STOPPED`] when it waits for the stop.
+    /// Paced frames, some dropped; an endless run takes [`UNTIL_STOPPED`] and waits for the stop.
     fn run_continuously(&mut self, id: u32, (period, wanted): (Micros, u32), request: &Request) {
         let shots: Vec<Shot> =
             self.program[..usize::from(self.armed)].iter().map(|shot| shot.unwrap()).collect();

@@ -1,6 +1,6 @@
-//! Damage to texts that a user may have written, for tests of readers: random bytes fail in a file's first line, these reach beyond it.
+//! Damaged texts for tests of parsers. Random bytes fail in the first line; these reach further.
 
-/// Words that readers stumble over.
+/// Words that parsers may mishandle.
 const WORDS: [&str; 21] = [
     "",
     "-1",
@@ -25,8 +25,8 @@ const WORDS: [&str; 21] = [
     "é",
 ];
 
-/// A text in which the words at these places gave way to others (each by its number, taken around), and of which all from a word on may be
-/// lost.
+/// Replaces the words at these places by others (indices wrap around), and optionally cuts the text after a
+/// word.
 pub fn damaged(text: &str, words: &[(usize, usize)], lost: Option<usize>) -> String {
     let mut split: Vec<&str> = text.split_inclusive([' ', '\t', '\n', ',', '"']).collect();
     let count = split.len().max(1);

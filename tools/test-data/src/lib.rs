@@ -1,13 +1,12 @@
-//! What tests share: damaged texts ([`damaged`]), and what some need and not every machine has: real data (photographs, motion capture,
-//! video), kept beside the repository and not in it, programs, and the emulated rig.
+//! Shared by tests: damaged texts ([`damaged`]), and optional resources: real data next to the repository,
+//! programs, and the emulated rig.
 //!
-//! A test that needs them is counted as skipped where they are missing. Its crate's build script calls [`declare`],
-//! which sets the configuration `shared_data` where the data are; the test bears
-//! `#[cfg_attr(not(shared_data), ignore = "needs the real data beside the repository")]` and finds its files by [`path`].
+//! Tests without their resource count as skipped. The crate's build script calls [`declare`], which sets the
+//! configuration `shared_data`; the test has `#[cfg_attr(not(shared_data), ignore = "needs the real data
+//! beside the repository")]` and uses [`path`].
 //!
-//! Build scripts watch what they have found, and nothing that was missing: cargo takes that for changed, so that every build would
-//! compile the crate anew, and all that use it. `cargo xtask test` has them look again where [`at_hand`] says something else than
-//! before.
+//! Build scripts watch only files that exist: cargo treats missing ones as changed and would rebuild the
+//! crate each time. `cargo xtask test` reruns them when [`at_hand`] changes.
 
 mod damage;
 
@@ -15,23 +14,22 @@ use std::path::{Path, PathBuf};
 
 pub use damage::damaged;
 
-/// Programs that tests start: the configuration, the file.
+/// Programs started by tests: configuration and file name.
 const PROGRAMS: [(&str, &str); 2] = [("ffmpeg", "ffmpeg"), ("fake_gige_camera", "arv-fake-gv-camera-0.8")];
 
-/// The folder of the data, whether it is there or not.
 fn folder() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data")
 }
 
-/// For build scripts: the configuration `shared_data` is set where the data are.
+/// For build scripts: sets `shared_data` if the data exist.
 pub fn declare() {
     println!("cargo::rustc-check-cfg=cfg(shared_data)");
     found("shared_data", data());
 }
 
-/// For build scripts: the configuration `emulated_rig` is set where `FARNEAR_REQUIRE_SIM=1` says that `farnear-sim` and its
-/// firmware have been built, as `cargo xtask test` does. A test that starts them bears
-/// `#[cfg_attr(not(emulated_rig), ignore = "needs farnear-sim: cargo xtask test")]`.
+/// For build scripts: sets `emulated_rig` if `FARNEAR_REQUIRE_SIM=1`, which `cargo xtask test` sets after
+/// building `farnear-sim` and its firmware. Tests use `#[cfg_attr(not(emulated_rig), ignore = "needs
+/// farnear-sim: cargo xtask test")]`.
 pub fn declare_emulated_rig() {
     println!("cargo::rustc-check-cfg=cfg(emulated_rig)");
     println!("cargo::rerun-if-env-changed=FARNEAR_REQUIRE_SIM");
@@ -40,8 +38,8 @@ pub fn declare_emulated_rig() {
     }
 }
 
-/// For build scripts: a configuration is set for each of the programs that tests start, where it is on the PATH. A test that starts
-/// it bears `#[cfg_attr(not(NAME), ignore = "needs PROGRAM")]`.
+/// For build scripts: sets a configuration per program on the PATH. Tests use `#[cfg_attr(not(NAME), ignore =
+/// "needs PROGRAM")]`.
 pub fn declare_programs() {
     println!("cargo::rerun-if-env-changed=PATH");
     for (name, program) in PROGRAMS {
@@ -50,12 +48,11 @@ pub fn declare_programs() {
     }
 }
 
-/// Where the data and the programs lie that tests may need, as a text that changes with that.
+/// Locations of data and programs, as a text that changes with them.
 pub fn at_hand() -> String {
     format!("{:?} {:?}\n", data(), PROGRAMS.map(|(_, program)| on_the_path(program)))
 }
 
-/// Sets a configuration where something is there.
 fn found(name: &str, place: Option<PathBuf>) {
     println!("cargo::rerun-if-changed=build.rs");
     if let Some(place) = place {

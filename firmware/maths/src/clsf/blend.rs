@@ -1,9 +1,8 @@
-//! The 3x3 regions blended bilinearly between their centres, so that no seam is left.
+//! The 3x3 regions blended bilinearly between their centres, without seams.
 //!
-//! Between two region centres the factors of `U`, `U^2` and `U^3` and the terms in y are linear in the column's
-//! weight: one product each. The terms in x are not (a cubic times a weight); they come from a table that
-//! holds, per column, the blend along x for the upper and the lower of the two region rows that mix, to be
-//! blended along y by one more product. Beyond the outer centres the outer regions hold alone.
+//! Between two centres the factors of `U`, `U^2`, `U^3` and the terms in y are linear in the column's weight:
+//! one product each. The terms in x are not; a table holds their blend along x for both region rows, blended
+//! along y by one more product. Beyond the outer centres the outer regions apply alone.
 
 use super::{
     Coefficient, Error, Frame, REGION_TERMS, REGIONS, RegionCoefficients, TableState,
@@ -15,30 +14,28 @@ use super::{
 
 const BANDS: usize = REGIONS + 1;
 
-/// The correction blended between region centres. Cost: see [`crate::clsf`]; per band of rows (there are four) the
-/// table, about 245 instructions a column.
+/// Correction blended between region centres. Cost: [`crate::clsf`]; the table of each of four row bands
+/// takes about 245 instructions per column.
 #[derive(Debug)]
 pub struct Blend<'t> {
     coefficients: RegionCoefficients,
     frame: Frame,
     rows: [Band; BANDS],
     columns: [Band; BANDS],
-    /// Per column: the terms in x for the upper region row of the band, and the lower's excess over it, with one
-    /// fraction bit more, and the weight of the right region.
+    /// Per column: terms in x for the upper region row, the lower's excess (one more fraction bit), and the
+    /// weight of the right region.
     table: &'t mut [i32],
     table_band: Option<(usize, usize)>,
 }
 
 impl<'t> Blend<'t> {
-    /// How many words of table a frame needs.
+    /// Table words for this width.
     pub const fn table_words(width: u16) -> usize {
         3 * width as usize
     }
 
     /// A correction for `frame`; `table` is scratch memory of at least [`Self::table_words`].
-    ///
-    /// # Errors
-    /// [`Error::TableTooSmall`].
+    /// Errors: [`Error::TableTooSmall`].
     pub fn new(coefficients: RegionCoefficients, frame: Frame, table: &'t mut [i32]) -> Result<Self, Error> {
         let (given, needed) = (table.len(), Self::table_words(frame.width()));
         let table = table.get_mut(..needed).ok_or(Error::TableTooSmall { given, needed })?;
@@ -47,9 +44,7 @@ impl<'t> Blend<'t> {
     }
 
     /// Goes on with a table that a correction with the same coefficients and frame has left in this state.
-    ///
-    /// # Errors
-    /// [`Error::TableTooSmall`].
+    /// Errors: [`Error::TableTooSmall`].
     pub fn resume(
         coefficients: RegionCoefficients,
         frame: Frame,
@@ -61,15 +56,13 @@ impl<'t> Blend<'t> {
         Ok(correction)
     }
 
-    /// What the table holds now.
+    /// Present state of the table.
     pub fn table_state(&self) -> TableState {
         TableState(self.table_band)
     }
 
     /// Corrects row `row` in place; rows may come in any order, but in order the table is built only four times.
-    ///
-    /// # Errors
-    /// [`Error::NoSuchRow`], [`Error::RowLength`]; the row is then untouched.
+    /// Errors: [`Error::NoSuchRow`], [`Error::RowLength`]; the row is then untouched.
     pub fn correct_row(&mut self, row: u16, depths: &mut [i16]) -> Result<(), Error> {
         self.frame.check_row(row, depths.len())?;
         let Some(band) = self.rows.iter().find(|band| row < band.pixels.end) else {
@@ -125,7 +118,7 @@ fn build_table(
     }
 }
 
-/// What multiplies `U^3`, `U^2`, `U` and 1 in one region column at one row, the terms in x left out.
+/// Factors of `U^3`, `U^2`, `U` and 1 in a region column at one row, without terms in x.
 #[derive(Clone, Copy)]
 struct AtRow {
     cubic: i32,
@@ -162,8 +155,8 @@ impl AtRow {
         }
     }
 
-    /// As polynomials in the weight of `other`. The difference is doubled, because a product with a weight takes a
-    /// fraction bit; it stays below 2 * 8 * 2^26, 2 * 8 * 2^25, 2 * 8 * 2^24 and 2 * 24 * 2^23.
+    /// Polynomials in the weight of `other`. The difference is doubled, because the product loses a fraction
+    /// bit; it stays below 2 * 8 * 2^26, 2 * 8 * 2^25, 2 * 8 * 2^24 and 2 * 24 * 2^23.
     fn toward(&self, other: &Self) -> Factors<2, 2, 2, 2> {
         let pair = |from: i32, to: i32| [from, 2 * (to - from)];
         Factors {

@@ -1,13 +1,12 @@
-//! The fit of CLSF's coefficients, rows of flat targets streamed in.
+//! Streaming fit of CLSF's coefficients to rows of flat targets.
 //!
-//! The normal equations are summed in integers: every term (a product of powers of x, y and U) is rounded to 20 fraction
-//! bits, a product of two has 40, and 2^22 of them fit an `i64` with a bit to spare. Integer sums do not depend on
-//! the order of the rows. Only the solution, once at the end, is in double precision (Cholesky), which the board does
-//! in software.
+//! Normal equations are integer sums: a term (a product of powers of x, y and U) is rounded to 20 fraction
+//! bits, a product has 40, and 2^22 of them fit an `i64`. The order of rows has no effect. Only the final
+//! Cholesky solution uses double precision, in software on the board.
 //!
-//! A subsample is enough: every eighth pixel of every eighth row of 24 targets at 640x480 is 115,200 samples. Cost on a
-//! Cortex-M4F: 620 instructions a sample for ten terms, 1,900 for twenty; 730,000 (all regions) and 460,000 to solve.
-//! Memory: 8 KiB for all regions, 3.4 KiB for the full form.
+//! A subsample suffices: every eighth pixel of every eighth row of 24 targets at 640x480 is 115,200 samples.
+//! Cost on a Cortex-M4F: 620 instructions a sample for ten terms, 1,900 for twenty; 730,000 (all regions) and
+//! 460,000 to solve. Memory: 8 KiB for all regions, 3.4 KiB for the full form.
 
 use nalgebra::{SMatrix, SVector};
 
@@ -19,11 +18,11 @@ use super::{
 /// Fraction bits of a term.
 const TERM_BITS: u32 = 20;
 
-/// Samples that the sums hold.
+/// Capacity of the sums, samples.
 const MOST_SAMPLES: u32 = 1 << 22;
 
-/// Below this a pivot of the normalised matrix is rounding: the samples do not tell the terms apart. The third powers on
-/// a third of the image leave 6e-3; three depths in place of four leave less than 1e-6.
+/// Smaller pivots of the normalised matrix are rounding: the samples do not determine the terms. Third powers
+/// on a third of the image give 6e-3; three depths instead of four less than 1e-6.
 const LEAST_PIVOT: f64 = 3e-5;
 
 /// Sums of products of `N` terms.
@@ -77,7 +76,7 @@ impl<const N: usize> Sums<N> {
     }
 }
 
-/// `value` (Q1.31 or, for a depth, widened to it) with the term's fraction bits, rounded.
+/// `value` (Q1.31, depths widened) with the term's fraction bits, rounded.
 fn narrow(q31: i32) -> i32 {
     (q31 >> (31 - TERM_BITS - 1)).wrapping_add(1) >> 1
 }
@@ -98,17 +97,17 @@ fn widen(code: i16) -> i32 {
     i32::from(code) << 16
 }
 
-/// Which pixels of a row are handed in: every `step`th from `first`.
+/// Columns of a row's samples: every `step`th from `first`.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Columns {
-    /// The first.
+    /// First column of the samples.
     pub first: u16,
-    /// From one to the next, at least 1.
+    /// Column step, at least 1.
     pub step: u16,
 }
 
 impl Columns {
-    /// All.
+    /// Every column of the row.
     pub const ALL: Self = Self { first: 0, step: 1 };
 
     fn check(self, frame: Frame, row: u16, pixels: usize) -> Result<(), Error> {
@@ -122,7 +121,7 @@ impl Columns {
         Ok(())
     }
 
-    /// The columns of the depths that are there. After [`Self::check`] no column lies beyond the frame.
+    /// Columns with their depths, within the frame after [`Self::check`].
     fn zip(self, depths: &[i16]) -> impl Iterator<Item = (u16, i16)> {
         let columns =
             depths.iter().enumerate().map(move |(i, depth)| (self.first + i as u16 * self.step, *depth));
@@ -130,7 +129,7 @@ impl Columns {
     }
 }
 
-/// The fit of ten terms in each of 3x3 regions. (For a blend the same coefficients serve.)
+/// Fit of ten terms in each of 3x3 regions, also for a blend.
 #[derive(Clone, Debug)]
 pub struct RegionFit {
     frame: Frame,
@@ -138,16 +137,14 @@ pub struct RegionFit {
 }
 
 impl RegionFit {
-    /// A fit without samples.
+    /// Fit without samples.
     pub const fn new(frame: Frame) -> Self {
         Self { frame, sums: [const { [const { Sums::new() }; REGIONS] }; REGIONS] }
     }
 
     /// Adds pixels of row `row` of a flat target at `truth`; depths are Q1.15 codes of one
     /// [`DepthScale`](super::DepthScale), [`NO_VALUE`] is passed over.
-    ///
-    /// # Errors
-    /// [`Error::NoSuchRow`], [`Error::RowLength`], [`Error::TooManySamples`].
+    /// Errors: [`Error::NoSuchRow`], [`Error::RowLength`], [`Error::TooManySamples`].
     pub fn add_row(&mut self, row: u16, columns: Columns, depths: &[i16], truth: i16) -> Result<(), Error> {
         columns.check(self.frame, row, depths.len())?;
         let (rows, across) = (self.frame.rows(), self.frame.columns());
@@ -163,10 +160,8 @@ impl RegionFit {
     }
 
     /// The coefficients.
-    ///
-    /// # Errors
-    /// [`Error::Underdetermined`] where a region's samples do not determine its terms (fewer than four depths, too few
-    /// pixels), [`Error::CoefficientTooLarge`].
+    /// Errors: [`Error::Underdetermined`] where a region's samples do not determine its terms (fewer than
+    /// four depths, too few pixels), [`Error::CoefficientTooLarge`].
     pub fn solve(&self) -> Result<RegionCoefficients, Error> {
         let mut coefficients = RegionCoefficients::default();
         for (coefficients, sums) in coefficients.as_flattened_mut().iter_mut().zip(self.sums.as_flattened()) {
@@ -176,7 +171,7 @@ impl RegionFit {
     }
 }
 
-/// The fit of all twenty terms for the whole image.
+/// Fit of all twenty terms for the whole image.
 #[derive(Clone, Debug)]
 pub struct FullFit {
     frame: Frame,
@@ -184,15 +179,13 @@ pub struct FullFit {
 }
 
 impl FullFit {
-    /// A fit without samples.
+    /// Fit without samples.
     pub const fn new(frame: Frame) -> Self {
         Self { frame, sums: Sums::new() }
     }
 
     /// As [`RegionFit::add_row`].
-    ///
-    /// # Errors
-    /// [`Error::NoSuchRow`], [`Error::RowLength`], [`Error::TooManySamples`].
+    /// Errors: [`Error::NoSuchRow`], [`Error::RowLength`], [`Error::TooManySamples`].
     pub fn add_row(&mut self, row: u16, columns: Columns, depths: &[i16], truth: i16) -> Result<(), Error> {
         columns.check(self.frame, row, depths.len())?;
         let y = powers(self.frame.rows().coordinate(row));
@@ -229,9 +222,7 @@ impl FullFit {
     }
 
     /// The coefficients.
-    ///
-    /// # Errors
-    /// [`Error::Underdetermined`], [`Error::CoefficientTooLarge`].
+    /// Errors: [`Error::Underdetermined`], [`Error::CoefficientTooLarge`].
     pub fn solve(&self) -> Result<FullCoefficients, Error> {
         self.sums.solve()
     }

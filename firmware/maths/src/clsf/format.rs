@@ -1,15 +1,15 @@
-//! Number formats: normalised depth in Q1.15, coefficients in Q2.29, the Horner step.
+//! Number formats: depth Q1.15, coefficients Q2.29, the Horner step.
 
 use super::Error;
 
-/// The code of a pixel without a depth; it passes through a correction unchanged.
+/// Code of a pixel without depth; a correction keeps it.
 pub const NO_VALUE: i16 = i16::MIN;
 
-/// The largest code that is a depth. `i16::MAX` is what a corrected value beyond the scale saturates to, and the
-/// lower end saturates to [`NO_VALUE`], so neither end is ever taken for a measurement.
+/// Largest code of a depth. Values beyond the scale saturate to `i16::MAX` or [`NO_VALUE`], so neither end is
+/// taken for a measurement.
 const LARGEST: f32 = 32766.0;
 
-/// The linear map between depth in mm and normalised depth.
+/// Linear map between mm and normalised depth.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct DepthScale {
     centre_mm: f32,
@@ -17,13 +17,11 @@ pub struct DepthScale {
 }
 
 impl DepthScale {
-    /// Half the working range is stretched by this, so that a distorted depth still lies inside the scale.
+    /// Factor on half the working range, so that a distorted depth still fits the scale.
     pub const MARGIN: f32 = 1.3;
 
     /// The scale for a working range, its ends in mm in either order.
-    ///
-    /// # Errors
-    /// [`Error::EmptyRange`] where the ends coincide or are not finite.
+    /// Errors: [`Error::EmptyRange`] where the ends coincide or are not finite.
     pub fn for_range(one_end_mm: f32, other_end_mm: f32) -> Result<Self, Error> {
         let half = (one_end_mm - other_end_mm) / 2.0;
         let half = if half < 0.0 { -half } else { half };
@@ -35,25 +33,25 @@ impl DepthScale {
         }
     }
 
-    /// The depth at normalised depth 0, in mm.
+    /// Depth of code 0, mm.
     pub fn centre_mm(self) -> f32 {
         self.centre_mm
     }
 
-    /// The depth difference between normalised depths 0 and 1, in mm.
+    /// Depth difference of a normalised unit, mm.
     pub fn half_span_mm(self) -> f32 {
         self.half_span_mm
     }
 
-    /// Depth in mm to Q1.15; NaN and what lies beyond the scale become [`NO_VALUE`].
+    /// Encodes mm as Q1.15; NaN and values beyond the scale give [`NO_VALUE`].
     pub fn encode(self, depth_mm: f32) -> i16 {
         let code = (depth_mm - self.centre_mm) / self.half_span_mm * 32768.0;
         let rounded = if code < 0.0 { code - 0.5 } else { code + 0.5 };
-        // Written so that NaN fails the comparison.
+        // NaN fails this comparison.
         if rounded > -LARGEST - 1.0 && rounded < LARGEST + 1.0 { rounded as i16 } else { NO_VALUE }
     }
 
-    /// Q1.15 to depth in mm; NaN for [`NO_VALUE`] and for a value that ran into the end of the scale.
+    /// Decodes Q1.15 to mm; NaN for [`NO_VALUE`] and saturated values.
     pub fn decode(self, code: i16) -> f32 {
         if code == NO_VALUE || code == i16::MAX {
             f32::NAN
@@ -63,7 +61,7 @@ impl DepthScale {
     }
 }
 
-/// A polynomial coefficient, Q2.29: magnitude below 4 in steps of 1.9e-9.
+/// Polynomial coefficient, Q2.29: below 4 in steps of 1.9e-9.
 #[derive(Clone, Copy, PartialEq, Eq, Default, Debug)]
 pub struct Coefficient(i32);
 
@@ -72,9 +70,7 @@ impl Coefficient {
     const SCALE: f64 = (1_u32 << Self::FRACTION_BITS) as f64;
 
     /// The coefficient nearest to a value.
-    ///
-    /// # Errors
-    /// [`Error::CoefficientTooLarge`] where the magnitude is not below 4 (NaN included).
+    /// Errors: [`Error::CoefficientTooLarge`] where the magnitude is not below 4 (NaN included).
     pub fn from_f64(value: f64) -> Result<Self, Error> {
         let scaled = value * Self::SCALE;
         let rounded = if scaled < 0.0 { scaled - 0.5 } else { scaled + 0.5 };
@@ -86,61 +82,59 @@ impl Coefficient {
     }
 
     /// The coefficient with these bits, for example from the board's memory; every pattern but `i32::MIN` is one.
-    ///
-    /// # Errors
-    /// [`Error::CoefficientTooLarge`] for `i32::MIN`, which would be -4.
+    /// Errors: [`Error::CoefficientTooLarge`] for `i32::MIN`, which would be -4.
     pub fn from_bits(bits: i32) -> Result<Self, Error> {
         if bits == i32::MIN { Err(Error::CoefficientTooLarge { value: -4.0 }) } else { Ok(Self(bits)) }
     }
 
-    /// The Q2.29 bit pattern.
+    /// Q2.29 bit pattern.
     pub fn to_bits(self) -> i32 {
         self.0
     }
 
-    /// The bits with `fraction_bits` (at most 29) after the binary point, truncated.
+    /// Bits with `fraction_bits` (at most 29), truncated.
     pub(super) fn at(self, fraction_bits: u32) -> i32 {
         self.0 >> (Self::FRACTION_BITS - fraction_bits)
     }
 
-    /// As [`Self::at`] in 64 bits, for sums that are rounded once at their end.
+    /// [`Self::at`] in 64 bits, for sums rounded once.
     pub(super) fn wide(self) -> i64 {
         i64::from(self.0)
     }
 }
 
-/// Fraction bits before the first Horner step (of the factor of `U^3`); each step takes one away.
+/// Fraction bits of the factor of `U^3`; each Horner step removes one.
 pub(super) const CUBIC_BITS: u32 = 26;
 /// Fraction bits of the factor of `U^2`.
 pub(super) const SQUARE_BITS: u32 = CUBIC_BITS - 1;
 /// Fraction bits of the factor of `U`.
 pub(super) const LINEAR_BITS: u32 = CUBIC_BITS - 2;
-/// Fraction bits of what does not depend on `U`, and of the result.
+/// Fraction bits of the constant and the result.
 pub(super) const CONSTANT_BITS: u32 = CUBIC_BITS - 3;
-/// From the result's fraction bits to Q1.15.
+/// Shift from the result to Q1.15.
 const RESULT_SHIFT: u32 = CONSTANT_BITS - 15;
-/// Half a unit of the Q1.15 result; added to the constant ahead of time, it turns truncation into rounding.
+/// Half a Q1.15 unit, added to the constant so that truncation rounds.
 pub(super) const HALF_UNIT: i32 = 1 << (RESULT_SHIFT - 1);
 
-/// `addend + a * b` where the product keeps its upper 32 bits: `b` in Q1.31 takes one fraction bit from `a`.
+/// `addend + a * b` with the product's upper 32 bits: `b` in Q1.31 removes one fraction bit of `a`.
 #[inline(always)]
 pub(super) fn step(addend: i32, a: i32, b: i32) -> i32 {
     addend + ((i64::from(a) * i64::from(b)) >> 32) as i32
 }
 
-/// `a * b` for `a` in Q.29 below 16 in magnitude and `b` in Q1.31, rounded, in 64 bits. For setting up.
+/// `a * b` for `a` in Q.29 below 16 and `b` in Q1.31, rounded, in 64 bits.
 pub(super) fn multiply(a: i64, q31: i32) -> i64 {
-    // 2^33 times 2^30: the last bit of b is dropped so that the product has room.
+    // 2^33 times 2^30: the last bit of b is dropped to make room.
     (a * i64::from(q31 >> 1) + (1 << 29)) >> 30
 }
 
-/// A Q.29 sum at fewer fraction bits, rounded; the caller has shown that it fits.
+/// A Q.29 sum at fewer fraction bits, rounded; the caller guarantees that it fits.
 pub(super) fn narrow(sum_q29: i64, fraction_bits: u32) -> i32 {
     let shift = Coefficient::FRACTION_BITS - fraction_bits;
     ((sum_q29 + (1 << (shift - 1))) >> shift) as i32
 }
 
-/// `from` moved toward `to` by a weight in Q1.31, 0 or more; the difference may take 33 bits, the product 64.
+/// Moves `from` towards `to` by a weight in Q1.31, >= 0; the difference may take 33 bits, the product 64.
 #[inline(always)]
 pub(super) fn mix(from: i32, to: i32, weight: i32) -> i32 {
     from + (((i64::from(to) - i64::from(from)) * i64::from(weight)) >> 31) as i32

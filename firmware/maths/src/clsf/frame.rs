@@ -1,10 +1,10 @@
-//! The image's size, its normalised coordinates, its division into regions, and what can be wrong.
+//! Image size, normalised coordinates, regions, and errors.
 
 use core::{fmt, ops::Range};
 
 use super::REGIONS;
 
-/// Width and height of the depth maps that a correction is for, in pixels.
+/// Size of the corrected depth maps, px.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Frame {
     width: u16,
@@ -12,15 +12,13 @@ pub struct Frame {
 }
 
 impl Frame {
-    /// The smallest width and height: with two pixels a region there is a centre to blend from.
+    /// Smallest side: two pixels per region, for a centre to blend from.
     pub const SMALLEST: u16 = 2 * REGIONS as u16;
-    /// The largest width and height: the coordinate of the last of 8192 columns is still good to 4e-6.
+    /// Largest side: the last of 8192 columns is accurate to 4e-6.
     pub const LARGEST: u16 = 8192;
 
     /// A frame of `width` by `height` pixels.
-    ///
-    /// # Errors
-    /// [`Error::FrameSize`] outside [`Self::SMALLEST`] to [`Self::LARGEST`].
+    /// Errors: [`Error::FrameSize`] outside [`Self::SMALLEST`] to [`Self::LARGEST`].
     pub fn new(width: u16, height: u16) -> Result<Self, Error> {
         let fits = |length| (Self::SMALLEST..=Self::LARGEST).contains(&length);
         if fits(width) && fits(height) {
@@ -30,7 +28,7 @@ impl Frame {
         }
     }
 
-    /// Columns.
+    /// Width of the frame in pixels.
     pub fn width(self) -> u16 {
         self.width
     }
@@ -66,18 +64,18 @@ pub(super) struct Axis {
 }
 
 impl Axis {
-    /// Normalised coordinate of a pixel, Q1.31: -1 at the first, +1 (less a few units) at the last.
+    /// Normalised coordinate, Q1.31: -1 at the first pixel, +1 (minus a few units) at the last.
     pub(super) fn coordinate(self, index: u16) -> i32 {
         i32::MIN.wrapping_add(i32::from(index).wrapping_mul(self.coordinate_step()))
     }
 
-    /// The step of [`Self::coordinate`] from a pixel to the next, rounded down so that +1 is never passed.
+    /// Step of [`Self::coordinate`], rounded down so that it never exceeds +1.
     pub(super) fn coordinate_step(self) -> i32 {
-        // A frame has at least 6 pixels a side; the maximum only shows the compiler that nothing divides by 0.
+        // At least 6 pixels per side; the maximum proves to the compiler that no division by 0 occurs.
         (u32::MAX / u32::from(self.length - 1).max(1)) as i32
     }
 
-    /// The pixels of a region; the three tile the axis.
+    /// Pixels of a region; the three tile the axis.
     pub(super) fn region(self, region: usize) -> Range<u16> {
         let start = |region: usize| (usize::from(self.length) * region / REGIONS) as u16;
         start(region)..start(region + 1)
@@ -87,9 +85,9 @@ impl Axis {
         (1..REGIONS).take_while(|&region| index >= self.region(region).start).count()
     }
 
-    /// The four bands of a blend, in order: before the first region's centre, between centres, after the last.
+    /// The four bands of a blend, in order: before the first centre, between centres, after the last.
     pub(super) fn bands(self) -> [Band; REGIONS + 1] {
-        // Twice the centre of a region, so that it is whole: first plus last pixel.
+        // First plus last pixel: twice the centre, an integer.
         let centres: [i64; REGIONS] = core::array::from_fn(|region| {
             let pixels = self.region(region);
             i64::from(pixels.start) + i64::from(pixels.end) - 1
@@ -102,7 +100,7 @@ impl Axis {
             let weights = if before == after {
                 Weights { first: 0, step: 0 }
             } else {
-                // A frame has at least 6 pixels a side, so centres lie apart.
+                // At least 6 pixels per side, so centres differ.
                 let span = (centres[after] - centres[before]).max(1);
                 let into = 2 * i64::from(start) - centres[before];
                 Weights { first: ((into << 31) / span) as i32, step: ((2_i64 << 31) / span) as i32 }
@@ -112,14 +110,14 @@ impl Axis {
     }
 }
 
-/// A part of an axis on which the same two regions mix.
+/// Part of an axis with the same two regions.
 #[derive(Clone, Debug)]
 pub(super) struct Band {
     /// Which pixels.
     pub(super) pixels: Range<u16>,
-    /// The region that weighs all at the band's start...
+    /// Region with full weight at the start...
     pub(super) before: usize,
-    /// ...and the one that does at its end; the same in the outer bands.
+    /// ...and at the end; equal in the outer bands.
     pub(super) after: usize,
     weights: Weights,
 }
@@ -131,71 +129,52 @@ struct Weights {
 }
 
 impl Band {
-    /// Whether only one region acts here.
+    /// Whether only one region applies.
     pub(super) fn is_outer(&self) -> bool {
         self.before == self.after
     }
 
-    /// The weight of region `after` at a pixel of the band, Q1.31; 0 in the outer bands.
+    /// Weight of region `after`, Q1.31; 0 in the outer bands.
     pub(super) fn weight(&self, index: u16) -> i32 {
         self.weights.first + i32::from(index - self.pixels.start) * self.weights.step
     }
 }
 
-/// Why a correction cannot be set up or a row cannot be corrected.
+/// Why a correction was rejected.
 #[derive(Clone, Copy, PartialEq, Debug)]
 #[non_exhaustive]
+#[allow(missing_docs, reason = "the names describe these fields")]
 pub enum Error {
-    /// The working range has no extent.
     EmptyRange {
-        /// One end, mm.
         one_end_mm: f32,
-        /// The other end, mm.
         other_end_mm: f32,
     },
-    /// A coefficient does not fit Q2.29.
     CoefficientTooLarge {
-        /// The coefficient.
         value: f64,
     },
-    /// The frame is smaller than [`Frame::SMALLEST`] or larger than [`Frame::LARGEST`].
+    /// Outside of [`Frame::SMALLEST`] to [`Frame::LARGEST`].
     FrameSize {
-        /// Columns.
         width: u16,
-        /// Height that was asked for, in pixels.
         height: u16,
     },
-    /// The samples do not determine the terms.
+    /// Samples do not determine the terms.
     Underdetermined {
-        /// Samples there are.
         samples: u32,
-        /// Terms to be found.
         terms: u16,
     },
-    /// More samples than the sums hold.
     TooManySamples {
-        /// How many they hold.
         most: u32,
     },
-    /// The table handed in is too short.
     TableTooSmall {
-        /// Words given.
         given: usize,
-        /// Words needed.
         needed: usize,
     },
-    /// There is no such row.
     NoSuchRow {
-        /// The row asked for.
         row: u16,
-        /// Rows there are.
         height: u16,
     },
-    /// The row has another length than the correction's frame.
     RowLength {
-        /// Pixels given.
         pixels: usize,
-        /// Pixels a row of the frame has.
         width: u16,
     },
 }

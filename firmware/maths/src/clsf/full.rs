@@ -1,8 +1,8 @@
-//! One polynomial with all twenty terms of third order in x, y and U for the whole image.
+//! One polynomial with all twenty third-order terms in x, y and U.
 //!
-//! Seamless, and with the cross terms that ten terms lack (a bowl whose depth changes with `U` is `U x^2`). Once a
-//! row is chosen, what multiplies each power of `U` is a polynomial in x with fixed coefficients, evaluated by
-//! Horner's rule beside the one in `U`: seven products a pixel.
+//! Seamless, with the cross terms that ten terms lack (a bowl that changes with `U` is `U x^2`). In a given
+//! row the factor of each power of `U` is a polynomial in x, evaluated by Horner's rule: seven products a
+//! pixel.
 
 use super::{
     Coefficient, Error, Frame, TableState,
@@ -10,14 +10,14 @@ use super::{
     row::{Factors, polynomial},
 };
 
-/// Terms of the full polynomial, in this order:
-/// 1, x, x^2, x^3, y, xy, x^2 y, y^2, x y^2, y^3, U, xU, x^2 U, yU, xyU, y^2 U, U^2, xU^2, yU^2, U^3.
+/// Terms of the full polynomial, in this order: 1, x, x^2, x^3, y, xy, x^2 y, y^2, x y^2, y^3, U, xU, x^2 U,
+/// yU, xyU, y^2 U, U^2, xU^2, yU^2, U^3.
 pub const FULL_TERMS: usize = 20;
 
-/// The coefficients, in the order of [`FULL_TERMS`].
+/// Coefficients in the order of [`FULL_TERMS`].
 pub type FullCoefficients = [Coefficient; FULL_TERMS];
 
-/// The correction with one set of twenty coefficients.
+/// Correction with twenty coefficients.
 #[derive(Debug)]
 pub struct Full<'t> {
     coefficients: FullCoefficients,
@@ -27,15 +27,13 @@ pub struct Full<'t> {
 }
 
 impl<'t> Full<'t> {
-    /// How many words of table a frame needs.
+    /// Table words for this width.
     pub const fn table_words(width: u16) -> usize {
         3 * width as usize
     }
 
     /// A correction for `frame`; `table` is scratch memory of at least [`Self::table_words`].
-    ///
-    /// # Errors
-    /// [`Error::TableTooSmall`].
+    /// Errors: [`Error::TableTooSmall`].
     pub fn new(coefficients: FullCoefficients, frame: Frame, table: &'t mut [i32]) -> Result<Self, Error> {
         let (given, needed) = (table.len(), Self::table_words(frame.width()));
         let table = table.get_mut(..needed).ok_or(Error::TableTooSmall { given, needed })?;
@@ -50,9 +48,7 @@ impl<'t> Full<'t> {
     }
 
     /// Goes on with a table that a correction with the same coefficients and frame has left in this state.
-    ///
-    /// # Errors
-    /// [`Error::TableTooSmall`].
+    /// Errors: [`Error::TableTooSmall`].
     pub fn resume(
         coefficients: FullCoefficients,
         frame: Frame,
@@ -67,15 +63,13 @@ impl<'t> Full<'t> {
         Ok(Self { coefficients, frame, table })
     }
 
-    /// What the table holds now.
+    /// Present state of the table.
     pub fn table_state(&self) -> TableState {
         TableState(Some((0, 0)))
     }
 
     /// Corrects row `row` in place; rows may come in any order.
-    ///
-    /// # Errors
-    /// [`Error::NoSuchRow`], [`Error::RowLength`]; the row is then untouched.
+    /// Errors: [`Error::NoSuchRow`], [`Error::RowLength`]; the row is then untouched.
     pub fn correct_row(&mut self, row: u16, depths: &mut [i16]) -> Result<(), Error> {
         self.frame.check_row(row, depths.len())?;
         let y = self.frame.rows().coordinate(row);
@@ -84,17 +78,17 @@ impl<'t> Full<'t> {
     }
 }
 
-/// A polynomial in x with the coefficients in the order of rising powers, Q.29, below 16.
+/// Polynomial in x with rising powers, Q.29, below 16.
 fn horner_in<const N: usize>(x: i32, terms: [Coefficient; N]) -> i64 {
     terms.iter().rev().fold(0, |sum, term| term.wide() + multiply(sum, x))
 }
 
-/// What multiplies the powers of `U` along the row at `y`, as polynomials in x, without what the table has.
+/// Factors of the powers of `U` at `y`, as polynomials in x, without the table's share.
 fn along_row(coefficients: &FullCoefficients, y: i32) -> Factors<1, 2, 2, 3> {
     let cubic = |term: usize| coefficients[term].at(CUBIC_BITS);
     let square = |term: usize, rest| step(coefficients[term].at(SQUARE_BITS), rest, y);
     let linear = |term: usize, rest| step(coefficients[term].at(LINEAR_BITS), rest, y);
-    // A last factor y of its own.
+    // One more factor y.
     let by_y = |rest| step(0, rest, y);
     Factors {
         cubic: [cubic(19)],

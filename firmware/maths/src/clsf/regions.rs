@@ -6,36 +6,34 @@ use super::{
     row::{Factors, uniform},
 };
 
-/// Regions along each side of the image.
+/// Regions per side of the image.
 pub const REGIONS: usize = 3;
 
-/// Terms of a region's polynomial, in this order: 1, x, x^2, x^3, y, y^2, y^3, U, U^2, U^3.
+/// Terms of a region in this order: 1, x, x^2, x^3, y, y^2, y^3, U, U^2, U^3.
 pub const REGION_TERMS: usize = 10;
 
-/// The coefficients of all regions, `[region row][region column][term]`.
+/// Coefficients as `[region row][region column][term]`.
 pub type RegionCoefficients = [[[Coefficient; REGION_TERMS]; REGIONS]; REGIONS];
 
-/// The correction with a set of coefficients per region. Cost per pixel: one cubic in `U` by Horner's rule on top
-/// of a table entry; per region row: the table, about 50 instructions a column.
+/// Correction per region. Cost per pixel: a cubic in `U` plus a table entry; per region row: about 50
+/// instructions a column for the table.
 #[derive(Debug)]
 pub struct Regions<'t> {
     coefficients: RegionCoefficients,
     frame: Frame,
-    /// Per column: the terms in x and the constant, for the region row `table_row`.
+    /// Per column: terms in x and the constant, for the region row `table_row`.
     table: &'t mut [i32],
     table_row: Option<usize>,
 }
 
 impl<'t> Regions<'t> {
-    /// How many words of table a frame needs.
+    /// Table words for this width.
     pub const fn table_words(width: u16) -> usize {
         width as usize
     }
 
     /// A correction for `frame`; `table` is scratch memory of at least [`Self::table_words`].
-    ///
-    /// # Errors
-    /// [`Error::TableTooSmall`].
+    /// Errors: [`Error::TableTooSmall`].
     pub fn new(coefficients: RegionCoefficients, frame: Frame, table: &'t mut [i32]) -> Result<Self, Error> {
         let (given, needed) = (table.len(), Self::table_words(frame.width()));
         let table = table.get_mut(..needed).ok_or(Error::TableTooSmall { given, needed })?;
@@ -43,9 +41,7 @@ impl<'t> Regions<'t> {
     }
 
     /// Goes on with a table that a correction with the same coefficients and frame has left in this state.
-    ///
-    /// # Errors
-    /// [`Error::TableTooSmall`].
+    /// Errors: [`Error::TableTooSmall`].
     pub fn resume(
         coefficients: RegionCoefficients,
         frame: Frame,
@@ -57,15 +53,13 @@ impl<'t> Regions<'t> {
         Ok(correction)
     }
 
-    /// What the table holds now.
+    /// Present state of the table.
     pub fn table_state(&self) -> TableState {
         TableState(self.table_row.map(|row| (row, row)))
     }
 
     /// Corrects row `row` in place; rows may come in any order, but in order the table is built only three times.
-    ///
-    /// # Errors
-    /// [`Error::NoSuchRow`], [`Error::RowLength`]; the row is then untouched.
+    /// Errors: [`Error::NoSuchRow`], [`Error::RowLength`]; the row is then untouched.
     pub fn correct_row(&mut self, row: u16, depths: &mut [i16]) -> Result<(), Error> {
         self.frame.check_row(row, depths.len())?;
         let region_row = self.frame.rows().region_of(row);
@@ -106,7 +100,7 @@ pub(super) fn x_terms(terms: &[Coefficient; REGION_TERMS], x: i32) -> i64 {
     terms[0].wide() + multiply(sum, x)
 }
 
-/// `c4 y + c5 y^2 + c6 y^3` with the fraction bits of the constant.
+/// `c4 y + c5 y^2 + c6 y^3` with the constant's fraction bits.
 pub(super) fn y_terms(terms: &[Coefficient; REGION_TERMS], y: i32) -> i32 {
     let sum = step(terms[5].at(SQUARE_BITS), terms[6].at(CUBIC_BITS), y);
     step(0, step(terms[4].at(LINEAR_BITS), sum, y), y)

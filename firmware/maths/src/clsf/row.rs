@@ -1,16 +1,15 @@
-//! The inner loops: the cubic in `U`, its factors varying along the row in three ways.
+//! Inner loops: the cubic in `U` with three kinds of factors along the row.
 //!
-//! Each loop is kept to one pass and few values, because a Cortex-M4 has 13 registers for them and pays an
-//! instruction to load each that does not fit. Places along the row come from a table too: a running sum would cost
-//! the same addition and two registers more.
+//! Each loop is one pass with few values: a Cortex-M4 has 13 registers and needs a load for each value
+//! beyond. Positions come from a table too, because a running sum needs two registers more.
 
 use super::{
     NO_VALUE,
     format::{horner, step},
 };
 
-/// `U^3`, `U^2` and `U`'s factors and what does not depend on `U`, each a polynomial in the place along the row;
-/// index = power, and each power has one fraction bit more than the one before.
+/// Factors of `U^3`, `U^2`, `U` and 1 as polynomials in the position along the row; index = power, each with
+/// one more fraction bit.
 pub(super) struct Factors<const CUBIC: usize, const SQUARE: usize, const LINEAR: usize, const CONSTANT: usize>
 {
     pub(super) cubic: [i32; CUBIC],
@@ -19,7 +18,7 @@ pub(super) struct Factors<const CUBIC: usize, const SQUARE: usize, const LINEAR:
     pub(super) constant: [i32; CONSTANT],
 }
 
-/// Factors that are the same along the segment; a table adds what depends on the column.
+/// Constant factors along the segment; a table adds the column's share.
 #[inline(never)]
 pub(super) fn uniform(depths: &mut [i16], of_columns: &[i32], factors: &Factors<1, 1, 1, 1>) {
     for_each_pixel(depths, of_columns, |depth, of_column| {
@@ -30,7 +29,7 @@ pub(super) fn uniform(depths: &mut [i16], of_columns: &[i32], factors: &Factors<
     });
 }
 
-/// As [`uniform`] with a table of three words per column: a value, what is added in proportion to `weight`, and one not used.
+/// [`uniform`] with three words per column: a value, one added in proportion to `weight`, and one unused.
 #[inline(never)]
 pub(super) fn uniform_mixed(
     depths: &mut [i16],
@@ -46,7 +45,7 @@ pub(super) fn uniform_mixed(
     });
 }
 
-/// As [`uniform_mixed`] with factors that are linear in a third word of the table.
+/// [`uniform_mixed`] with factors linear in the table's third word.
 #[inline(never)]
 pub(super) fn linear_mixed(
     depths: &mut [i16],
@@ -63,8 +62,8 @@ pub(super) fn linear_mixed(
     });
 }
 
-/// Factors that are polynomials in the place along the row, which is the table's first word. The second word is
-/// added to the factor of `U`, the third to what does not depend on `U`.
+/// Factors as polynomials in the position, the table's first word. The second word is added to the factor of
+/// `U`, the third to the constant.
 #[inline(never)]
 pub(super) fn polynomial(depths: &mut [i16], of_columns: &[[i32; 3]], factors: &Factors<1, 2, 2, 3>) {
     for_each_pixel(depths, of_columns, |depth, &[place, linear, constant]| {
@@ -78,8 +77,8 @@ pub(super) fn polynomial(depths: &mut [i16], of_columns: &[[i32; 3]], factors: &
     });
 }
 
-/// Four pixels a turn, spelt out because a compiler that optimises for size does not: a turn's counters are paid
-/// once, and the offsets within it are part of the instructions.
+/// Four pixels per turn, written out because size optimisation does not unroll: counters are paid once, and
+/// offsets are part of the instructions.
 #[inline(always)]
 fn for_each_pixel<T>(depths: &mut [i16], of_columns: &[T], mut pixel: impl FnMut(&mut i16, &T)) {
     let (fours, rest) = depths.as_chunks_mut::<4>();

@@ -1,4 +1,4 @@
-//! First-order error propagation to the angle beta, and when not to believe it.
+//! First-order error propagation to beta, and its validity.
 //!
 //! `s_beta^2 = 1/4 [(Hc u s^2 / D)^2 (s_psi^2 + s_alpha^2) + (Hc rx ry / D)^2 s_u^2 + (u rx ry / D)^2 s_Hc^2]` with
 //! `D = u^2 rx^2 + Hc^2 ry^2`, for a subject on the optical axis; the general form has `t = u rx - X0 ry` instead of
@@ -12,66 +12,67 @@ use super::{Geometry, RADIAN, Shadow};
 use crate::angle::BinaryAngle;
 use crate::sun::{Place, equatorial, horizontal};
 
-/// Standard deviations of what goes in.
+/// Standard deviations of the inputs.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Deviations {
-    /// Of the day, days (the hour of the day kept).
+    /// Day, with the hour unchanged.
     pub day: f32,
-    /// Of the time of day, hours.
+    /// Time of day, hours.
     pub time_h: f32,
-    /// Of the latitude, degrees.
+    /// Latitude, degrees.
     pub latitude_deg: f32,
-    /// Of the longitude, degrees.
+    /// Longitude, degrees.
     pub longitude_deg: f32,
-    /// Of the camera azimuth, degrees.
+    /// Camera azimuth, degrees.
     pub azimuth_deg: f32,
-    /// Of the camera height, m.
+    /// Height of the camera.
     pub camera_height_m: f32,
-    /// Of the subject's height, m.
+    /// Height of the subject.
     pub height_m: f32,
-    /// Of the subject's distance, m: see [`Deviations::of_distance`].
+    /// Distance of the subject: [`Deviations::of_distance`].
     pub distance_m: f32,
 }
 
 impl Deviations {
-    /// Of a distance that was estimated by `u = w v / wi` from a head of width `w`, seen with the image distance `v` as
-    /// `wi` (Li 2014, eq. 8.17); each a value and its standard deviation, all in one unit.
+    /// For a distance estimated by `u = w v / wi` from a head of width `w`, imaged as `wi` at image distance
+    /// `v` (Li 2014, eq. 8.17); each a value and its standard deviation in one unit.
     pub fn of_distance(w: (f32, f32), v: (f32, f32), wi: (f32, f32)) -> f32 {
         let u = w.0 * v.0 / wi.0;
         u * root(square(w.1 / w.0) + square(v.1 / v.0) + square(wi.1 / wi.0))
     }
 }
 
-/// Whether the first-order deviation holds.
+/// Validity of the first-order deviation.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Reliability {
-    /// It holds to a few percent.
+    /// Valid to a few percent.
     FirstOrder,
     /// The shadow's end may lie next to or behind the camera: beta may jump, the deviation is too small.
     ShadowNearCamera,
-    /// The shadow may point to either side: beta folds back at the mirror, the deviation is too large or too small.
+    /// The shadow may point to either side: beta folds at the mirror, the deviation is too large or too
+    /// small.
     EitherSide,
 }
 
-/// The deviation of beta.
+/// Standard deviation of beta.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Deviation {
-    /// First-order standard deviation of beta, degrees.
+    /// First-order standard deviation of beta.
     pub beta_deg: f32,
-    /// Standard deviation of the sun's azimuth, degrees.
+    /// Standard deviation of the sun's azimuth.
     pub sun_azimuth_deg: f32,
-    /// Whether to believe it.
+    /// Validity of the deviation.
     pub reliability: Reliability,
 }
 
-/// The end of the shadow must stay clear of the camera by this many standard deviations.
+/// Required distance of the shadow's end from the camera, standard deviations.
 const CLEARANCE: f32 = 4.0;
 
-/// And eta of the fold at 90 deg by this many.
+/// Required distance of eta from the fold at 90 deg, standard deviations.
 const FOLD: f32 = 2.0;
 
 impl Shadow {
-    /// The standard deviation of beta for a shadow made by [`Shadow::at`] of the same moment, place and geometry.
+    /// Standard deviation of beta for a shadow of [`Shadow::at`] with the same time, place and geometry.
     pub fn deviation(
         &self,
         unix_seconds: i64,
@@ -85,7 +86,7 @@ impl Shadow {
         let (rx, ry, s) = (self.right_m, self.forward_m, self.length_m);
         let (across, down) = (u * rx - geometry.lateral_m * ry, hc * ry);
         let d = square(across) + square(down);
-        // d eta by the direction, by u and by Hc; the subject's offset is measured in the image, X0 = x u / v.
+        // d eta by direction, u and Hc; the subject's offset is measured in the image, X0 = x u / v.
         let by_direction = hc * u * s * s / d;
         let by_distance = hc * across * ry / (u * d);
         let by_height = across * ry / d;
@@ -93,7 +94,7 @@ impl Shadow {
             + square(by_distance * given.distance_m)
             + square(by_height * given.camera_height_m);
         let eta = root(eta2);
-        // The end's distance u + ry: by u, by the shadow's length (height and elevation) and its direction.
+        // The end's distance u + ry: by u, by the shadow's length (height and elevation) and direction.
         let of_length2 = square(ry * given.height_m / geometry.height_m)
             + square(ry / self.sine_times_cosine(geometry)) * elevation2;
         let end = root(square(given.distance_m) + of_length2 + square(rx) * direction2);
@@ -108,7 +109,7 @@ impl Shadow {
         Deviation { beta_deg: eta / (2.0 * RADIAN), sun_azimuth_deg: root(psi2) / RADIAN, reliability }
     }
 
-    /// `sin(elevation) cos(elevation)`: the relative change of the length is the elevation's over this.
+    /// `sin(elevation) cos(elevation)`: relative length change per change of elevation, inverted.
     fn sine_times_cosine(&self, geometry: &Geometry) -> f32 {
         let (s, h) = (self.length_m, geometry.height_m);
         s * h / (s * s + h * h)
@@ -120,14 +121,15 @@ fn of_sun(unix_seconds: i64, place: &Place, given: &Deviations) -> (f32, f32) {
     let sun = equatorial(unix_seconds);
     let sidereal = sun.sidereal;
     let at = horizontal(sun.vector, sidereal, place);
-    // By the hour angle: the vector at the meridian's place turned by a quarter.
+    // By the hour angle: the vector rotated by a quarter turn.
     let quarter = BinaryAngle::from_units(1 << 30);
     let turned = horizontal(sun.vector, sidereal.plus(quarter), place);
-    // Turning leaves the part along the pole, which does not change with the hour angle.
+    // The polar component is independent of the hour angle.
     let polar = horizontal([0.0, 0.0, sun.vector[2]], sidereal, place);
     let by_hour_angle: [f32; 3] = core::array::from_fn(|i| turned[i] - polar[i]);
     let by_latitude = [0.0, -at[2], at[1]];
-    // A day later at the same hour the sidereal time is 0.9856 deg on, and so is the sun along the ecliptic.
+    // A day later at the same hour the sidereal time has advanced by 0.9856 deg, like the sun along the
+    // ecliptic.
     let along = horizontal(sun.derivative, sidereal, place);
     let by_day: [f32; 3] =
         core::array::from_fn(|i| along[i] * sun.per_day + by_hour_angle[i] * SIDEREAL_PER_DAY);
@@ -144,16 +146,15 @@ fn of_sun(unix_seconds: i64, place: &Place, given: &Deviations) -> (f32, f32) {
     (variance(&azimuth), variance(&elevation))
 }
 
-/// Growth of the sidereal time beyond a turn, radians a day.
+/// Growth of the sidereal time beyond a turn, radians per day.
 const SIDEREAL_PER_DAY: f32 = 0.065_709_85 / 24.0 * core::f32::consts::TAU;
 
 fn square(x: f32) -> f32 {
     x * x
 }
 
-/// The square root, at most 0.2 % too large and never too small: micromath's, which may be 6.1 % too large, after one step of
-/// Heron's method, which halves the square of a relative error. What is known to a few percent needs no more digits
-/// (`docs/decisions/0010-micromath.md`). The root of 0 is 4e-20.
+/// Square root, 0 to 0.2 % too large: micromath's (up to 6.1 % too large) after one step of Heron's method.
+/// Sufficient for values known to a few percent (`docs/decisions/0010-micromath.md`). The root of 0 is 4e-20.
 fn root(x: f32) -> f32 {
     let F32(near) = F32(x).sqrt();
     0.5 * (near + x / near)
@@ -163,7 +164,7 @@ fn root(x: f32) -> f32 {
 mod tests {
     use super::*;
 
-    /// All mantissas of two octaves; others repeat them.
+    /// All mantissas of two octaves; others repeat.
     #[test]
     fn the_root_is_at_most_two_thousandths_too_large() {
         let (mut raw, mut least, mut most) = (0.0_f64, f64::MAX, 0.0_f64);
@@ -173,7 +174,7 @@ mod tests {
             raw = raw.max(square(F32(x).sqrt().0));
             (least, most) = (least.min(square(root(x))), most.max(square(root(x))));
         }
-        // Squares: 6.1 % and 0.2 % of the root are twice that here; the rounding of single precision is 1e-7.
+        // In squares, 6.1 % and 0.2 % double; single precision rounds by 1e-7.
         assert!(raw < 1.061 * 1.061, "{raw}");
         assert!(least > 1.0 - 3e-7 && most < 1.002 * 1.002, "{least} to {most}");
     }
@@ -186,7 +187,7 @@ mod tests {
         assert!((root(1e30) / 1e15 - 1.0).abs() < 0.002);
     }
 
-    /// On every processor: integers and exactly rounded operations.
+    /// Integers and exactly rounded operations on every processor.
     #[test]
     fn bits_are_frozen() {
         let bits = [0.5_f32, 2.0, 3.0, 1e-6, 12_345.0].map(|x| root(x).to_bits());

@@ -1,4 +1,4 @@
-//! Fixed-point CLSF against the same polynomials in f64, written out term by term.
+//! Fixed-point CLSF compared with the polynomials in f64.
 
 use farnear_maths::clsf::{
     Blend, Coefficient, DepthScale, Error, FULL_TERMS, Frame, Full, FullCoefficients, NO_VALUE, REGION_TERMS,
@@ -9,7 +9,7 @@ use proptest::prelude::*;
 /// Working range of the rig in Li 2014: half of it times 1.3 is 30 mm.
 const FAR_MM: f32 = 933.0;
 const NEAR_MM: f32 = 886.81;
-/// What the board must stay below; quantising depth in and out alone may take (0.5 + 0.5 slope) of 0.92 um.
+/// Specified error; quantisation of input and output alone may take (0.5 + 0.5 slope) of 0.92 um.
 const TOLERANCE_MM: f64 = 0.005;
 
 pub type RegionReals = [[[f64; REGION_TERMS]; REGIONS]; REGIONS];
@@ -30,7 +30,7 @@ pub fn twenty_terms(c: &[f64; FULL_TERMS], x: f64, y: f64, u: f64) -> f64 {
     c.iter().zip(of_xy.iter().chain(&of_u).chain(&of_u2)).map(|(c, power)| c * power).sum()
 }
 
-/// Region of a pixel and centre of a region, in pixels.
+/// Start of a region, px.
 fn region_start(region: usize, length: usize) -> usize {
     length * region / REGIONS
 }
@@ -43,7 +43,7 @@ fn centre(region: usize, length: usize) -> f64 {
     (region_start(region, length) + region_start(region + 1, length) - 1) as f64 / 2.0
 }
 
-/// The weight of each region at a pixel.
+/// Weight of each region at a pixel.
 fn weights(index: usize, length: usize) -> [f64; REGIONS] {
     let place = index as f64;
     std::array::from_fn(|region| {
@@ -73,7 +73,7 @@ fn blend_f64(c: &RegionReals, (w, h): (usize, usize), (row, column): (usize, usi
     sum
 }
 
-/// A small generator of repeatable numbers in [0, 1), so that the rows of a frame need no strategy each.
+/// Repeatable numbers in [0, 1), so that rows need no strategy each.
 pub struct Numbers(pub u64);
 
 impl Numbers {
@@ -91,7 +91,7 @@ fn quantise_regions(c: &RegionReals) -> RegionCoefficients {
     c.map(|row| row.map(|terms| quantise(&terms)))
 }
 
-/// Identity plus a distortion about as strong as the one in Li 2014, fig. 6.1.
+/// Identity plus a distortion like that in Li 2014, fig. 6.1.
 fn realistic_terms(numbers: &mut Numbers) -> [f64; REGION_TERMS] {
     let mut terms = std::array::from_fn(|_| 0.4 * (numbers.next() - 0.5));
     terms[7] += 1.0;
@@ -102,8 +102,8 @@ fn realistic_regions(numbers: &mut Numbers) -> RegionReals {
     std::array::from_fn(|_| std::array::from_fn(|_| realistic_terms(numbers)))
 }
 
-/// Runs rows of random depths through `fixed` and returns the largest distance from `exact` in mm over pixels
-/// whose exact result lies inside the scale.
+/// Largest difference of `fixed` from `exact` in mm, over random depths whose exact result is inside the
+/// scale.
 fn largest_error_mm(
     (w, h): (usize, usize),
     rows: impl Iterator<Item = usize>,
@@ -179,8 +179,8 @@ fn fingerprint(codes: &[i16]) -> u64 {
     })
 }
 
-/// The board must give these bits too. A change of the arithmetic changes them: then every stored result of a board
-/// with the older firmware differs, so change them only with a new firmware version.
+/// The board must give these bits. They may change only with a new firmware version, because stored results
+/// would differ.
 #[test]
 fn bits_are_frozen() {
     let mut numbers = Numbers(4);
@@ -277,8 +277,8 @@ fn extreme() -> impl Strategy<Value = f64> {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
-    /// Tests run with overflow checks, so coefficients at the edge of Q2.29 and depths at the ends prove the ranges
-    /// that the module states; the result still agrees with f64 in the same units.
+    /// With overflow checks: coefficients at the edge of Q2.29 and extreme depths verify the stated ranges;
+    /// results agree with f64.
     #[test]
     fn nothing_overflows(
         c in prop::array::uniform3(prop::array::uniform3(prop::array::uniform10(extreme()))),

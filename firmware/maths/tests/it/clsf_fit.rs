@@ -1,4 +1,4 @@
-//! The board's fit of a depth correction against the polynomials that it must find.
+//! The board's fit of a depth correction finds known polynomials.
 
 use farnear_maths::clsf::{
     Columns, Error, FULL_TERMS, Frame, Full, FullFit, NO_VALUE, REGION_TERMS, RegionFit, Regions,
@@ -6,8 +6,8 @@ use farnear_maths::clsf::{
 
 use crate::clsf::{Numbers, RegionReals, coordinate, regions_f64, twenty_terms};
 
-/// Flat targets seen through a known inverse: `truth = polynomial(x, y, U)` holds for every sample, up to the rounding of
-/// codes, so the fit must find the polynomial. `U` is found by bisection.
+/// Flat targets through a known inverse: `truth = polynomial(x, y, U)` for every sample up to rounding. `U`
+/// is found by bisection.
 fn target_row(
     (w, h): (usize, usize),
     row: usize,
@@ -55,7 +55,7 @@ fn the_boards_fit_finds_the_correction() {
             full_fit.add_row(row as u16, columns, &depths, code).unwrap();
         }
     }
-    // Compared where the targets taught: at their depths, at pixels between the samples.
+    // Compared at the targets' depths, at pixels between the samples.
     let (mut a, mut b) = (vec![0; 160], vec![0; 480]);
     let mut by_regions = Regions::new(region_fit.solve().unwrap(), frame, &mut a).unwrap();
     let mut by_full = Full::new(full_fit.solve().unwrap(), frame, &mut b).unwrap();

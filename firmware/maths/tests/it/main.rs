@@ -1,4 +1,4 @@
-//! The mathematics through its public face, one program for all of it.
+//! The mathematics through its public API, in one test binary.
 #![allow(clippy::unwrap_used, reason = "a helper of tests fails the test")]
 
 mod clsf;

@@ -1,4 +1,4 @@
-//! The shadow's angle against the same formulas in f64, and its standard deviation by Monte Carlo.
+//! The shadow's angle compared with f64, its standard deviation with Monte Carlo.
 
 use std::f64::consts::{PI, TAU};
 
@@ -9,7 +9,7 @@ use proptest::prelude::*;
 
 use crate::sun::{TOLERANCE_DEG, days_since_epoch, place, sun_f64, unix_seconds};
 
-/// One of the cases of error propagation.
+/// A case of error propagation.
 struct Case {
     name: &'static str,
     day: i64,
@@ -122,10 +122,10 @@ impl Case {
         shadow.deviation(time, &place, &geometry, &self.deviations())
     }
 
-    /// beta in degrees by the projection itself, in f64; each of `e` multiplies a standard deviation.
+    /// beta in degrees by projection in f64; each of `e` scales a standard deviation.
     fn beta_deg(&self, e: &[f64; 10]) -> f64 {
         let days = days_since_epoch(self.time()) + 0.3 * e[0].round_to(1.0 / 86_400.0) + 0.05 / 24.0 * e[1];
-        // The day's error leaves the time of day alone: PSA+ takes both from one number, so turn the place back.
+        // The day's error keeps the time of day: PSA+ uses one number for both, so the place is rotated back.
         let turned_back = TAU * 0.3 * e[0].round_to(1.0 / 86_400.0);
         let latitude = (self.latitude_deg + 0.05 * e[2]).to_radians();
         let longitude = (self.longitude_deg + 0.05 * e[3]).to_radians() - turned_back;
@@ -168,7 +168,7 @@ impl RoundTo for f64 {
     }
 }
 
-/// Normal numbers, repeatable (Box-Muller over a linear congruential generator).
+/// Repeatable normal numbers (Box-Muller over a linear congruential generator).
 struct Normal(u64);
 
 impl Normal {
@@ -186,7 +186,7 @@ impl Normal {
 fn deviation_agrees_with_monte_carlo_where_first_order_holds() {
     for case in &CASES {
         let deviation = case.deviation();
-        // 60,000 draws tell a standard deviation to 0.3 %.
+        // 60,000 samples give a standard deviation to 0.3 %.
         let monte_carlo = case.monte_carlo_deg(60_000);
         let first_order = f64::from(deviation.beta_deg);
         println!(
@@ -223,7 +223,7 @@ fn shadow_angle_agrees_with_f64() {
                 continue;
             }
             let shadow = shadow.unwrap();
-            // At the camera's own plane the image is at infinity and either sign is right.
+            // In the camera's plane the image is at infinity with either sign.
             if shadow.end_distance_m.abs() < 1e-3 {
                 continue;
             }
@@ -237,8 +237,8 @@ fn shadow_angle_agrees_with_f64() {
 
 #[test]
 fn a_shadow_has_the_direction_that_one_expects() {
-    // Noon in the north: the sun stands south, the shadow points north. A camera that looks north sees it rise from the
-    // feet, straight up; one that looks west sees it point right.
+    // Noon in the north: the sun is south, the shadow points north. A camera looking north sees it go
+    // straight up from the feet, one looking west to the right.
     let noon = unix_seconds(2023, 6, 21, 12 * 3600);
     let greenwich = place(50.0, 0.5);
     let camera = |azimuth_deg: f32| Geometry {
@@ -277,7 +277,7 @@ fn no_angle_without_a_shadow() {
 }
 
 proptest! {
-    /// Whatever the moment, the place and the camera: no panic, and angles inside their ranges.
+    /// No panic, and angles in range, for any time, place and camera.
     #[test]
     fn angles_stay_in_their_ranges(
         time in any::<i64>(), latitude in -900_000_000..=900_000_000_i32, longitude in any::<i32>(),

@@ -1,14 +1,14 @@
-//! The sun against the same formulas in f64 and against NREL's SPA.
+//! The sun compared with f64 and with NREL's SPA.
 
 use std::f64::consts::{PI, TAU};
 
 use farnear_maths::angle::BinaryAngle;
 use farnear_maths::sun::{Place, Sun};
 
-/// What the board's single precision may differ from f64, degrees.
+/// Tolerance of single precision.
 pub const TOLERANCE_DEG: f64 = 0.01;
 
-/// East, north, up by PSA+ (Blanco et al. 2020) in f64, with the time as days since 2000-01-01 12:00 UT.
+/// East, north, up by PSA+ (Blanco et al. 2020) in f64, time in days since 2000-01-01 12:00 UT.
 pub fn sun_f64(days: f64, latitude: f64, longitude: f64) -> [f64; 3] {
     let n = days;
     let hours = 24.0 * (n + 0.5).rem_euclid(1.0);
@@ -50,7 +50,7 @@ fn turn_apart_deg(a: f64, b: f64) -> f64 {
     ((a - b + 180.0).rem_euclid(360.0) - 180.0).abs()
 }
 
-/// Seconds from 1970 of a date and time, by counting days (Howard Hinnant's days_from_civil).
+/// Unix seconds of a date and time (Howard Hinnant's days_from_civil).
 pub fn unix_seconds(year: i64, month: i64, day: i64, seconds: i64) -> i64 {
     let y = if month <= 2 { year - 1 } else { year };
     let era = y.div_euclid(400);
@@ -98,7 +98,7 @@ fn sun_agrees_with_f64_over_a_century_and_the_globe() {
         let exact = sun_f64(days_since_epoch(time), latitude.to_radians(), longitude.to_radians());
         let (elevation, azimuth) = elevation_azimuth_deg(exact);
         elevation_error = elevation_error.max((f64::from(sun.elevation_deg()) - elevation).abs());
-        // Near the zenith azimuth loses its meaning.
+        // Near the zenith azimuth is ill-defined.
         if elevation.abs() < 89.0 {
             azimuth_error = azimuth_error.max(turn_apart_deg(f64::from(sun.azimuth_deg()), azimuth));
         }
@@ -110,8 +110,8 @@ fn sun_agrees_with_f64_over_a_century_and_the_globe() {
     assert!(azimuth_error < TOLERANCE_DEG / 5.0, "{azimuth_error}");
 }
 
-/// Example of NREL's report on the Solar Position Algorithm (Reda & Andreas, TP-560-34302, table A5.1): topocentric
-/// elevation without refraction 39.872046 deg, azimuth 194.340241 deg. PSA+ is within 0.007 and 0.05 deg of it.
+/// Example of NREL's report on SPA (Reda & Andreas, TP-560-34302, table A5.1): elevation without refraction
+/// 39.872046 deg, azimuth 194.340241 deg. PSA+ is within 0.007 and 0.05 deg.
 #[test]
 fn sun_agrees_with_the_example_of_spa() {
     let time = unix_seconds(2003, 10, 17, 19 * 3600 + 30 * 60 + 30);
@@ -120,7 +120,7 @@ fn sun_agrees_with_the_example_of_spa() {
     assert!((sun.azimuth_deg() - 194.34024).abs() < 0.05, "{}", sun.azimuth_deg());
 }
 
-/// NREL's reference values, where they are present.
+/// NREL's reference values, if present.
 #[test]
 fn sun_agrees_with_the_values_of_spa() {
     let file = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/data/sun/spa_c_reference.csv");
@@ -139,7 +139,7 @@ fn sun_agrees_with_the_values_of_spa() {
             unix_seconds(date[0], date[1], date[2], date[3] * 3600 + date[4] * 60 + date[5]),
             &place(latitude, longitude),
         );
-        // SPA's own refraction at 1000 mbar and 10 C, taken off again; below the horizon it has none.
+        // Removes SPA's refraction at 1000 mbar and 10 C; it has none below the horizon.
         let apparent = 90.0 - zenith;
         if apparent < 1.0 || zenith < 1.0 {
             continue;

@@ -1,8 +1,8 @@
-//! The log: defmt's frames into a ring, from which the control loop takes them for the link.
+//! defmt log into a ring, which the control loop sends over the link.
 //!
-//! A line that does not fit is dropped as a whole, and the log's frames then skip a number, so that its reader knows.
-//! Logging costs the encoding (some hundred instructions) with interrupts off, so handlers of the motors log nothing. What is
-//! taken for the link is copied in short pieces: a byte on the line may wait for 5 us, and a step of the motors for less.
+//! Lines that do not fit are dropped as a whole, and a frame number is skipped. Encoding takes some hundred
+//! instructions with interrupts off, so motor handlers never log. Output is copied in short pieces: a
+//! received byte may wait 5 us, a motor step less.
 
 use core::cell::{RefCell, UnsafeCell};
 
@@ -11,14 +11,14 @@ use defmt::Encoder;
 use farnear_protocol::Log;
 use heapless::Deque;
 
-/// Bytes that can wait: some twenty lines.
+/// Some twenty lines.
 const RING: usize = 1024;
-/// Bytes that are copied with interrupts off: below 2 us.
+/// Bytes copied with interrupts off: below 2 us.
 const PIECE: usize = 16;
 
 struct Ring {
     bytes: Deque<u8, RING>,
-    /// Where the line that is being written begins.
+    /// Start of the current line.
     line: usize,
     dropping: bool,
     /// Number of the next frame.
@@ -59,7 +59,7 @@ fn append(bytes: &[u8]) {
     critical_section::with(|cs| LOG.borrow_ref_mut(cs).push(bytes));
 }
 
-/// What has been logged, at most a frame's worth, with the frame's number.
+/// Logged bytes, at most a frame, with the frame's number.
 pub fn take_log() -> Option<(u32, Log)> {
     let mut log = Log::default();
     let mut number = None;
@@ -70,10 +70,10 @@ pub fn take_log() -> Option<(u32, Log)> {
             && !log.bytes.is_full()
             && let Some(byte) = ring.bytes.pop_front()
         {
-            // There is room, as was just seen.
+            // There is room, as checked above.
             let _ = log.bytes.push(byte);
         }
-        // A line that is dropped between two pieces belongs behind this frame.
+        // A line dropped between two pieces belongs after this frame.
         if number.is_none() && !log.bytes.is_empty() {
             number = Some(ring.number);
             ring.number = ring.number.wrapping_add(1);

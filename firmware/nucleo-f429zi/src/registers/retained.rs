@@ -1,15 +1,13 @@
-//! Memory that survives a reset, but not a loss of power: the boot number, and the last words of a program that had to
-//! stop itself.
+//! Memory that survives a reset, but not a power loss: boot number and the cause of a self-stop.
 
 use core::{cell::UnsafeCell, mem::MaybeUninit, slice, str};
 
 use farnear_rig::identity::LastWords;
 
-/// Says that the memory holds what this program put there and not what was there at power-on ("fnRT").
+/// Marks valid contents ("fnRT").
 const MAGIC: u32 = 0x666e_5254;
-/// Words of [`Retained`].
 const WORDS: usize = 8;
-/// Where constants lie, and the most of a file's name that is believed.
+/// Range of constants, and longest plausible file name.
 const FLASH: core::ops::Range<usize> = 0x0800_0000..0x0820_0000;
 const NAME_MAX: usize = 200;
 
@@ -52,26 +50,24 @@ pub fn piezo_code() -> Option<u16> {
 /// Why the program stopped itself.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub enum Last {
-    /// A panic at this place.
     Panic {
-        /// The source file, where it is known.
+        /// Source file, if known.
         file: Option<&'static str>,
         line: u32,
     },
-    /// The processor refused an instruction, or an access.
+    /// Refused instruction or access.
     Fault {
-        /// Where the program was.
         program_counter: u32,
-        /// The configurable fault status register (ARMv7-M, B3.2.15).
+        /// Configurable fault status register (ARMv7-M, B3.2.15).
         status: u32,
     },
     StackOverflow,
-    /// The clock from outside stopped.
+    /// The external clock stopped.
     ClockLost,
 }
 
 impl Last {
-    /// What the rig is told; of a lost clock it hears by the one that it has.
+    /// Report for the rig; a lost clock is reported by the clock in use.
     pub fn words(self) -> Option<LastWords> {
         match self {
             Self::Panic { .. } | Self::Fault { .. } => Some(LastWords::Panic),
@@ -103,13 +99,13 @@ impl Last {
     }
 }
 
-/// A constant text that an earlier run of this program pointed at.
+/// A constant text of an earlier run of this program.
 fn name(pointer: u32, length: u32) -> Option<&'static str> {
     let (from, length) = (pointer as usize, length as usize);
     let within = FLASH.contains(&from) && length <= NAME_MAX && FLASH.contains(&(from + length));
     // SAFETY: the bytes lie in the flash, which is always there and is not written while the program runs.
     let bytes = within.then(|| unsafe { slice::from_raw_parts(pointer as *const u8, length) })?;
-    // Another program may have been flashed since.
+    // Another program may have been flashed.
     str::from_utf8(bytes).ok()
 }
 
@@ -132,8 +128,8 @@ fn write(boot: u32, last: [u32; 4]) {
     unsafe { RETAINED.0.get().cast::<[u32; WORDS]>().write_volatile(words) };
 }
 
-/// What the boot before left: the number for this one (one more than the last, or 1 after a loss of power; never 0,
-/// which means "not known" on the wire), and its last words. The words are given once.
+/// Boot number (one more than the last, or 1 after a power loss; never 0, "unknown" on the wire) and cause of
+/// the last stop, given once.
 pub fn take() -> (u32, Option<Last>) {
     critical_section::with(|_| {
         let Some([_, boot, a, b, c, d, ..]) = read() else {
@@ -146,12 +142,12 @@ pub fn take() -> (u32, Option<Last>) {
     })
 }
 
-/// The number of this boot is another one, as the board's memory knows it.
+/// Corrects the boot number from the board's memory.
 pub fn set_boot(boot: u32) {
     critical_section::with(|_| write(boot, [0; 4]));
 }
 
-/// Leaves last words for the next boot. Call with interrupts off, just before a reset.
+/// Stores the cause for the next boot. Call with interrupts off, just before a reset.
 pub fn leave(last: Last) {
     let boot = read().map_or(0, |words| words[1]);
     write(boot, last.to_words());

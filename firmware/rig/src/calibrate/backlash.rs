@@ -1,9 +1,8 @@
-//! The backlash of a screw, measured at the home switch, which the stage itself actuates.
+//! Backlash of a screw, measured at the home switch, which the stage actuates.
 //!
-//! Going down the stage closes the switch, going up it opens it again a known way farther: what the motor turns
-//! beyond that is the play. Each round closes and opens the switch once, a pulse a millisecond. The encoder on the
-//! motor's shaft says where the motor is at the edges. Afterwards the axis is homed anew, because position 0
-//! depends on the backlash.
+//! The switch closes going down and opens a known distance higher going up; additional motor travel is the
+//! play. Each round closes and opens it once, a pulse per millisecond, with positions by encoder. The axis is
+//! then homed again, because position 0 depends on the backlash.
 
 use farnear_protocol::Nanometres;
 use farnear_protocol::message::{Axis, Calibration, Failure, StepperKeys};
@@ -15,12 +14,11 @@ use crate::motion::leg::{Leg, Until};
 use crate::motion::stage::Stage;
 use crate::settings::{Settings, StepperSettings};
 
-/// Reversals that are measured.
+/// Measured reversals.
 const ROUNDS: usize = 5;
-/// Largest backlash that is believed; also the setting's range.
+/// Largest plausible backlash; also the setting's range.
 const MOST: i32 = 100_000;
 
-/// Where the routine is.
 #[derive(Clone, Debug)]
 enum Phase {
     Home(Homing),
@@ -28,7 +26,7 @@ enum Phase {
     Clear,
     /// Down until it closes.
     Close,
-    /// On, farther than the play may be wide.
+    /// Further than the play may be wide.
     Pass {
         closed: Nanometres,
     },
@@ -76,7 +74,7 @@ impl Backlash {
                 (Phase::Close, Some(edge)) => Phase::Pass { closed: edge.measured },
                 (Phase::Pass { closed }, _) => Phase::Open { closed: *closed },
                 (Phase::Open { closed }, Some(opened)) => {
-                    // The routine goes on elsewhere when this is full.
+                    // Full only at the end of the routine.
                     let _ = self.rounds.push(opened.measured.0.saturating_sub(closed.0));
                     if self.rounds.is_full() {
                         self.phase = Phase::HomeAgain(Homing::new());
@@ -84,7 +82,7 @@ impl Backlash {
                     }
                     Phase::Clear
                 }
-                // The switch was seen to work at homing.
+                // Homing has shown that the switch works.
                 _ => return Step::Failed(axis, Failure::Implausible),
             },
         };
@@ -93,7 +91,7 @@ impl Backlash {
         Step::On
     }
 
-    /// What was found, as a setting.
+    /// Result as a setting.
     fn found(&self, settings: &StepperSettings) -> Step {
         let backlash = self.mean(settings);
         match StepperKeys::of(self.axis) {
@@ -102,7 +100,7 @@ impl Backlash {
         }
     }
 
-    /// Mean of the rounds, less the switch's own way.
+    /// Mean of the rounds, without the switch's hysteresis.
     fn mean(&self, settings: &StepperSettings) -> i32 {
         let sum: i64 = self.rounds.iter().map(|round| i64::from(*round)).sum();
         (sum / ROUNDS as i64) as i32 - settings.home_hysteresis.0

@@ -1,13 +1,17 @@
-//! Gain and zero of the strain gauge, held against the encoder.
+//! Gain and zero of the strain gauge, compared with the encoder.
 //!
-//! The tab that actuates stage A's home switch is on the sensor's plate, which the piezo carries. So the switch is met at another
-//! place of the screw for each position of the piezo, and the encoder says how far apart these places are:
+//! The tab of stage A's home switch is on the sensor plate, which the piezo moves. The switch is therefore
+//! met at a screw
+//! position that depends on the piezo, and the encoder measures the difference:
 //!
-//! 1. The piezo is relaxed: what the gauge says there is its zero.
-//! 2. Homed, the switch is met from above with the piezo low and with the piezo high, in turns, a pulse a millisecond.
-//! 3. The ways by encoder over those by gauge are the gain. Then the stage is homed anew, for the piezo's part in it has changed.
+//! 1. The relaxed piezo's reading is the zero.
+//! 2. After homing the switch is met from above with the piezo alternately low and high, a pulse per
+//!    millisecond.
+//! 3. Encoder distance over gauge distance is the gain. The stage is homed again, because the piezo's share
+//!    has changed.
 //!
-//! What is left is the repeatability of the switch and the screw's error within a third of a turn, together 0.3 % of the way.
+//! Remaining error: the switch's repeatability and the screw's error within a third of a turn, together 0.3
+//! %.
 
 use farnear_protocol::Nanometres;
 use farnear_protocol::message::{Axis, Calibration, Failure, SettingKey};
@@ -22,36 +26,35 @@ use crate::motion::stage::Stage;
 use crate::piezo::Piezo;
 use crate::settings::{Settings, StepperSettings};
 
-/// Where the piezo is for the two meetings, by the gauge.
+/// Piezo positions for the two contacts, by gauge.
 const PLACES: [Nanometres; 2] = [Nanometres(20_000), Nanometres(180_000)];
-/// Meetings of each kind.
+/// Contacts per position.
 const ROUNDS: usize = 4;
-/// The exact approach begins so far above where the switch should be: more than the gauge may err.
+/// Start of the exact approach above the switch: more than the gauge's error.
 const NEAR_NM: i32 = 30_000;
-/// Ticks of the way to the relaxed piezo, of its rest, of a settling, and of a mean at the end of the two.
+/// Ticks to relax the piezo, to rest, to settle, and to average at the end of the last two.
 const LOWER: u32 = TICK_HZ / 4;
 const REST: u32 = TICK_HZ;
 const SETTLE: u32 = TICK_HZ / 10;
 const MEAN: u32 = TICK_HZ / 20;
-/// A gain farther from 1 than this, or a zero, is none of a gauge that works; also the settings' ranges.
+/// Gains further from 1, or zeros beyond, indicate a defective gauge; also the settings' ranges.
 const GAIN_PPM: core::ops::RangeInclusive<i64> = 900_000..=1_100_000;
 const OFFSET_NM: core::ops::RangeInclusive<i64> = -9_000..=9_000;
 
-/// Where the routine is.
 #[derive(Clone, Debug)]
 enum Phase {
     Begin,
-    /// The piezo goes down from a code.
+    /// The piezo moves down from a code.
     Lower(u16),
     Rest,
     Home(Homing),
-    /// The stage goes up, so far that the piezo may go anywhere.
+    /// The stage moves up, clear of any piezo position.
     Lift,
-    /// The piezo goes to its place.
+    /// The piezo moves to its position.
     Place,
     Near,
     Approach,
-    /// The piezo goes down again, all meetings made.
+    /// The piezo moves down after all contacts.
     LowerAgain(u16),
     Tell(u8),
     HomeAgain(Homing),
@@ -63,9 +66,9 @@ pub(crate) struct GaugeScale {
     leg: Leg,
     ticks: u32,
     sum: i64,
-    /// What the gauge says where the piezo is relaxed.
+    /// Reading at the relaxed piezo.
     relaxed: i64,
-    /// Meetings so far, and of each kind the sums of the gauge's and of the encoder's positions.
+    /// Contacts so far, and per position the sums of gauge and encoder positions.
     met: usize,
     gauge: [i64; 2],
     encoder: [i64; 2],
@@ -155,12 +158,12 @@ impl GaugeScale {
         Step::On
     }
 
-    /// Where the piezo is to be at the next meeting.
+    /// Piezo position for the next contact.
     const fn target(&self) -> Nanometres {
         PLACES[self.met % 2]
     }
 
-    /// The phase after a leg; `None` where the switch was not where it should be.
+    /// The phase after a leg; `None` if the switch was elsewhere.
     fn after_leg(&mut self, stepper: &Stepper, piezo: &Piezo) -> Option<Phase> {
         match (&self.phase, self.leg.edge()) {
             (Phase::Lift, _) if self.met == 2 * ROUNDS => Some(Phase::LowerAgain(piezo.code())),
@@ -175,7 +178,7 @@ impl GaugeScale {
         }
     }
 
-    /// The gauge's mean over the last ticks of a wait, once that is over.
+    /// Mean reading over the last ticks of a wait, once it is over.
     fn mean(&mut self, piezo: &Piezo, wait: u32) -> Option<i64> {
         if self.ticks > wait - MEAN {
             self.sum += i64::from(piezo.measured().0);
@@ -183,10 +186,10 @@ impl GaugeScale {
         (self.ticks >= wait).then_some(self.sum / i64::from(MEAN))
     }
 
-    /// Gain and zero as settings; `None` where they make no sense.
+    /// Gain and zero as settings; `None` if implausible.
     fn evaluate(&self, settings: &Settings) -> Option<(i32, i32)> {
         let by_gauge = self.gauge[1] - self.gauge[0];
-        // The farther the piezo holds the tab away, the lower is the stage that meets the switch.
+        // A higher piezo position meets the switch at a lower stage position.
         let by_encoder = self.encoder[0] - self.encoder[1];
         let (gain_ppm, offset) = (i64::from(settings.fine.gauge_gain_ppm), settings.fine.gauge_offset);
         if by_gauge <= 0 || gain_ppm == 0 {
@@ -206,7 +209,7 @@ fn set_off(phase: &Phase, stepper: &mut Stepper, numbers: &StepperSettings, piez
             ((span + numbers.home_clearance.0, numbers.home_leave_speed), Until::Arrival)
         }
         Phase::Near => {
-            // Position 0 is where the switch is met, from below, with the piezo's position taken off.
+            // Position 0 is the contact from below, without the piezo's position.
             let switch = -numbers.backlash.0 - piezo.0;
             ((switch + NEAR_NM - stepper.measured().0, numbers.home_leave_speed), Until::Arrival)
         }

@@ -1,10 +1,10 @@
-//! The piezo's gain, hysteresis and creep: an open-loop sweep up and down, and a step that is watched.
+//! Gain, hysteresis and creep of the piezo: open-loop sweep and a step.
 //!
-//! 1. Down to code 0, wherever it was, and once up and down, so that the loop does not depend on what was before.
-//! 2. Up and down again, 0.5 s each way, read at sixteen places: the stroke gives the gain, the largest distance between
-//!    the ways the width of the loop. Each way begins and ends gently, so that the resonance is not
-//!    excited; creep adds less than a tenth to the width.
-//! 3. Rest, then up to half the range, and the position 0.15 and 1.5 s later: a decade of creep.
+//! 1. Down to code 0, then up and down once, so that the loop does not depend on the history.
+//! 2. Up and down again, 0.5 s each, read at sixteen positions: the stroke gives the gain, the largest
+//!    difference the loop's
+//!    width. Smooth ends do not excite the resonance; creep adds less than a tenth to the width.
+//! 3. Rest, then up to half the range; positions 0.15 and 1.5 s later give a decade of creep.
 
 use farnear_protocol::message::{Axis, Calibration, Failure, SettingKey};
 
@@ -12,22 +12,22 @@ use super::Step;
 use crate::io::{DAC_CODE_MAX, TICK_HZ};
 use crate::piezo::Piezo;
 
-/// Ticks of a way over the whole range.
+/// Ticks per sweep.
 const SWEEP: u32 = TICK_HZ / 2;
 /// Ticks of rest, and of the step.
 const REST: u32 = TICK_HZ;
 const STEP: u32 = TICK_HZ / 20;
-/// When creep is read after the step began, in ticks; over how many ticks.
+/// Ticks from the step to the creep readings, and ticks averaged.
 const EARLY: u32 = TICK_HZ * 15 / 100;
 const LATE: u32 = TICK_HZ * 15 / 10;
 const MEAN: u32 = 50;
 const PLACES: usize = 16;
 const HALF: u16 = DAC_CODE_MAX / 2;
 
-/// Where the routine is; counts ticks.
+/// Phase and its ticks.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Phase {
-    /// From the code where it was.
+    /// From the present code.
     Down {
         from: u16,
     },
@@ -52,7 +52,7 @@ pub(crate) struct Sweep {
     late: i32,
 }
 
-/// What was found, as settings.
+/// Results as settings.
 struct Found {
     gain_pm_per_code: i32,
     hysteresis_ppm: i32,
@@ -113,7 +113,7 @@ impl Sweep {
         Step::On
     }
 
-    /// The settings one by one, then the end.
+    /// Returns the settings one by one, then the end.
     fn tell(&mut self, done: u8) -> Step {
         let Some(found) = self.evaluate() else {
             return Step::Failed(Axis::SensorFine, Failure::Implausible);
@@ -132,7 +132,7 @@ impl Sweep {
         }
     }
 
-    /// `None` where the readings make no sense.
+    /// `None` for implausible readings.
     fn evaluate(&self) -> Option<Found> {
         let stroke = i64::from(self.up[PLACES]) - i64::from(self.up[0]);
         let pairs = self.up.iter().zip(self.down.iter().rev());
@@ -151,16 +151,16 @@ impl Sweep {
     }
 }
 
-/// Drives from one code to another over some ticks, gently at both ends so that nothing swings; gives whether it is there.
+/// Drives from one code to another with smooth ends; returns whether it has arrived.
 pub(super) fn ramp(piezo: &mut Piezo, ticks: u32, over: u32, from: u16, to: u16) -> bool {
     let (at, over) = (i64::from(ticks.min(over)), i64::from(over));
-    // Three squares less two cubes of the time. The way has 17 bits and the time 12: all of it has 54.
+    // 3 t^2 - 2 t^3. The distance has 17 bits and the time 12: 54 bits in total.
     let way = (i64::from(to) - i64::from(from)) * at * at * (3 * over - 2 * at) / (over * over * over);
     piezo.drive((i64::from(from) + way) as u16); // between the two
     at == over
 }
 
-/// Reads the position where a way has come to one of the places.
+/// Reads the position at each of the measured codes.
 fn read(places: &mut [i32; PLACES + 1], ticks: u32, position: i32) {
     let (place, rest) = (ticks as usize * PLACES / SWEEP as usize, ticks as usize * PLACES % SWEEP as usize);
     if ticks == 1 {
@@ -176,7 +176,7 @@ mod tests {
     use crate::piezo::plant::{NOMINAL, Part, Plant};
     use crate::settings::Settings;
 
-    /// Runs the routine on a part; gives the settings that it makes and its end.
+    /// Runs the routine on a part; returns its settings and its end.
     fn run(part: Part, seed: u64) -> (std::vec::Vec<(SettingKey, i32)>, Step) {
         let (mut piezo, mut plant) = (Piezo::new(Settings::DEFAULT.fine), Plant::new(part, seed));
         let (mut sweep, mut settings) = (Sweep::new(), std::vec::Vec::new());
@@ -202,7 +202,7 @@ mod tests {
             else {
                 panic!("{end:?}")
             };
-            // Creep of half a second makes the stroke longer, and the loop wider.
+            // Creep of half a second lengthens the stroke and widens the loop.
             let gain = f64::from(gain_pm_per_code) / 3_052.0;
             assert!((gain - 1.0 - 2.0 * creep).abs() < 0.03, "{gain} for {creep}");
             let width = f64::from(hysteresis_ppm) * 1e-6;

@@ -1,6 +1,6 @@
-//! The travel of a stepper axis: from the home switch to the far switch and back.
+//! Travel of a stepper axis between home and far switch.
 //!
-//! After homing the far switch is sought as the home switch was: fast, away from it, and then exactly, from below.
+//! After homing the far switch is found in the same way: fast, then exactly from below.
 
 use farnear_protocol::Nanometres;
 use farnear_protocol::message::{Axis, Calibration, Failure};
@@ -12,7 +12,6 @@ use crate::motion::leg::{Leg, Until};
 use crate::motion::stage::Stage;
 use crate::settings::{Settings, StepperSettings};
 
-/// Where the routine is.
 #[derive(Clone, Debug)]
 enum Phase {
     Home(Homing),

@@ -1,6 +1,6 @@
-//! What is in the records: the rig's values as blocks, and back.
+//! Contents of the records.
 //!
-//! Numbers are little-endian at fixed places; shots and alarms are in postcard, one a block, as on the wire.
+//! Little-endian numbers at fixed places; shots and alarms in postcard, one per block, as on the wire.
 
 use farnear_protocol::message::{AlarmRecord, CorrectionForm, CorrectionInfo, Counters, RecordName, Shot};
 use serde::{Serialize, de::DeserializeOwned};
@@ -12,11 +12,10 @@ use crate::memory::record::{self, BLOCK, Block, Found, VALUES};
 use crate::program::{SHOTS_MAX, Shots};
 use crate::settings::{KEYS, Settings, Values};
 
-/// Everything that is kept.
 #[derive(Debug)]
 pub(crate) struct Contents<'r> {
     pub(crate) counters: Counters,
-    /// A bit for each axis that may be moving: 1 = stage A's stepper, 2 = stage B's.
+    /// Bit per axis that may be moving: 1 = stage A, 2 = stage B.
     pub(crate) in_motion: u8,
     pub(crate) alarms: &'r Alarms,
     pub(crate) values: &'r Values,
@@ -25,7 +24,6 @@ pub(crate) struct Contents<'r> {
 }
 
 impl Contents<'_> {
-    /// A block of a record.
     pub(crate) fn block(&self, record: RecordName, index: usize) -> Block {
         match record {
             RecordName::Counters => self.counters(index),
@@ -62,7 +60,7 @@ impl Contents<'_> {
     }
 }
 
-/// What was kept: everything that could be read.
+/// All readable contents.
 #[derive(Debug)]
 pub(crate) struct Restored {
     pub(crate) counters: Counters,
@@ -74,7 +72,7 @@ pub(crate) struct Restored {
 }
 
 impl Restored {
-    /// What a board has that was never used.
+    /// Contents of a new board.
     pub(crate) fn nothing() -> Self {
         Self {
             counters: Counters::default(),
@@ -86,7 +84,7 @@ impl Restored {
         }
     }
 
-    /// Reads the memory; `parts` are the settings that are not kept.
+    /// Reads the memory; `parts` are the settings that are not stored.
     pub(crate) fn from(memory: &[u8; MEMORY_BYTES], parts: &Settings) -> Self {
         let mut restored = Self::nothing();
         let copy = |record| match record::find(memory, record) {
@@ -140,7 +138,7 @@ impl Restored {
     }
 }
 
-/// A block of a correction: the first says what it is for, the others hold its coefficients.
+/// A block of a correction: the first has its form, the others coefficients.
 fn correction(kept: &StoredCorrection, index: usize) -> Block {
     let Some(index) = index.checked_sub(1) else {
         let CorrectionInfo { form, width, height, centre_um, half_span_um } = *kept.info();
@@ -154,7 +152,7 @@ fn correction(kept: &StoredCorrection, index: usize) -> Block {
     values(kept.bits(), index)
 }
 
-/// And back; `None` where none was kept.
+/// Inverse of [`correction`]; `None` if none was stored.
 fn kept_correction(block: impl Fn(usize) -> Block) -> Option<StoredCorrection> {
     let head = block(0);
     let form = match u32_at(&head, 0) {
@@ -192,7 +190,7 @@ fn u64_at(block: &Block, at: usize) -> u64 {
     block.get(at..at + 8).and_then(|bytes| bytes.try_into().ok()).map_or(0, u64::from_le_bytes)
 }
 
-/// A message in a block: its length, then its bytes; length 0 = none.
+/// A message in a block: length, then bytes; length 0 = none.
 fn item<T: Serialize>(item: Option<&T>) -> Block {
     let mut block = [0; BLOCK];
     let (length, bytes) = block.split_at_mut(1);
@@ -215,7 +213,7 @@ mod tests {
     use farnear_protocol::message::{Alarm, Axis, TriggerMode};
     use farnear_protocol::{BoardMicros, Micros, Nanometres};
 
-    /// A memory whose settings were written by a firmware of this version that had so many of them.
+    /// A memory with settings written by a firmware of this version with this number of values.
     fn of_version(version: u8, kept: usize, write: [i32; KEYS]) -> std::boxed::Box<[u8; MEMORY_BYTES]> {
         let mut memory = std::boxed::Box::new([0; MEMORY_BYTES]);
         let mut header = record::header(RecordName::Settings, 9);
@@ -236,7 +234,7 @@ mod tests {
     fn settings_of_an_older_firmware_are_taken_over_and_those_it_did_not_have_are_at_their_defaults() {
         let mut write = *Values::DEFAULT.raw();
         write[0] = 48_000_000;
-        // The backlash may be 0, and is not where the older firmware knew nothing of it.
+        // A stored backlash of 0 is valid, unlike one unknown to the older firmware.
         let backlash = farnear_protocol::message::SettingKey::CoarseBacklashNm as usize;
         write[backlash] = 7_000;
         for (version, kept) in [(1, KEYS), (2, KEYS), (2, backlash)] {
@@ -250,7 +248,7 @@ mod tests {
                 "{version} {kept}"
             );
         }
-        // What is to come is not known, and not guessed at.
+        // A future version is not interpreted.
         let memory = of_version(3, KEYS, write);
         assert_eq!(record::find(&memory, RecordName::Settings), Found::Blank, "the other copy is blank");
     }

@@ -1,19 +1,23 @@
-//! Form and place of the records.
+//! Format and addresses of the records.
 //!
 //! A copy is a header and the record's blocks, 32 bytes each, little-endian:
 //! ```text
 //! header: magic "fnR1" | record u8 | version u8 | blocks u8 | values u8 | sequence u32 | CRC-32 | 0...
 //! ```
-//! The CRC (ISO-HDLC) covers the header's first twelve bytes and all blocks. Each record has two copies, one behind
-//! the other, and a place of its own from address 0 up. The copy with the newer sequence number counts; the other
-//! is the one that is written over, its header last, so that a torn write leaves a copy whose CRC does not fit, and
-//! the one before untouched. A record's first write is of both copies, one after the other.
+//! The CRC (ISO-HDLC) covers the header's first twelve bytes and all blocks. Each record has two adjacent
+//! copies at a fixed
+//! address. The copy with the newer sequence number is valid; the other is overwritten, its header last, so a
+//! torn write leaves
+//! a wrong CRC and an intact older copy. The first write of a record writes both copies.
 //!
-//! A copy of an older version is read as that version had it, and the next write is of the present one: over the other copy,
-//! as always, so that a firmware that is exchanged loses nothing, whenever the power goes. So a new version may give
-//! blocks another meaning but not another place: a record that outgrows its place gets a place of its own behind all others.
-//! Version 1 did not say how many values a list had; version 2 does, so that a setting that came later is at its default
-//! and not at the 0 behind the list. A version that is not known yet (an older firmware was put back) is no good copy.
+//! Older versions are read as they were defined, and the next write uses the present one, over the other
+//! copy: a firmware
+//! change loses nothing, even with a power loss. A new version may change the meaning of blocks but not their
+//! place; a record
+//! that outgrows its place moves behind all others. Version 2 added the number of values, so that newer
+//! settings get their
+//! default instead of the 0 behind the list. A copy of an unknown version (older firmware restored) is
+//! invalid.
 
 use crc::{CRC_32_ISO_HDLC, Crc, Digest, Table};
 use farnear_protocol::message::RecordName;
@@ -24,23 +28,21 @@ use crate::program::SHOTS_MAX;
 use crate::settings::KEYS;
 
 pub(crate) const BLOCK: usize = 32;
-/// Numbers of 32 bits in a block.
+/// 32-bit numbers per block.
 pub(crate) const VALUES: usize = BLOCK / 4;
-/// A block.
 pub(crate) type Block = [u8; BLOCK];
-/// How many records there are.
 pub(crate) const RECORDS: usize = 5;
-/// Version of the records' contents; older ones are read too.
+/// Version of the contents; older ones are read too.
 const VERSION: u8 = 2;
-/// Settings that a record of version 1 holds.
+/// Settings in a record of version 1.
 const SETTINGS_OF_VERSION_1: usize = 25;
 const MAGIC: [u8; 4] = *b"fnR1";
-/// Bytes of the header that the CRC covers.
+/// Header bytes covered by the CRC.
 const COVERED: usize = 12;
 
 static CRC: Crc<u32, Table<1>> = Crc::<u32, Table<1>>::new(&CRC_32_ISO_HDLC);
 
-/// All records, in the order of their places.
+/// All records by address.
 pub(crate) const ALL: [RecordName; RECORDS] = [
     RecordName::Counters,
     RecordName::Alarms,
@@ -49,8 +51,8 @@ pub(crate) const ALL: [RecordName; RECORDS] = [
     RecordName::Correction,
 ];
 
-/// All records, the most urgent first. Alarms come before the counters, which also say what moved: at a start they take
-/// that over, and a power that goes again in between must not lose it.
+/// All records by urgency. Alarms precede the counters, which also store the moving axes: alarms take these
+/// over at a start, and a power loss in between must not lose them.
 pub(crate) const URGENCY: [RecordName; RECORDS] = [
     RecordName::Alarms,
     RecordName::Counters,
@@ -59,7 +61,7 @@ pub(crate) const URGENCY: [RecordName; RECORDS] = [
     RecordName::Correction,
 ];
 
-/// A record's place in [`ALL`].
+/// Index in [`ALL`].
 pub(crate) const fn index(record: RecordName) -> usize {
     match record {
         RecordName::Counters => 0,
@@ -70,7 +72,7 @@ pub(crate) const fn index(record: RecordName) -> usize {
     }
 }
 
-/// Blocks of a record, its header not counted.
+/// Blocks without header.
 pub(crate) const fn blocks(record: RecordName) -> usize {
     match record {
         RecordName::Counters => 2,
@@ -81,7 +83,7 @@ pub(crate) const fn blocks(record: RecordName) -> usize {
     }
 }
 
-/// Address of a copy (0 or 1) of a record.
+/// Address of copy 0 or 1.
 pub(crate) const fn address(record: RecordName, copy: usize) -> usize {
     let mut address = 0;
     let mut i = 0;
@@ -94,19 +96,16 @@ pub(crate) const fn address(record: RecordName, copy: usize) -> usize {
 
 const _: () = assert!(address(RecordName::Correction, 2) <= MEMORY_BYTES);
 
-/// The CRC of a copy, block by block.
 #[derive(Clone)]
 pub(crate) struct Checksum(Digest<'static, u32, Table<1>>);
 
 impl Checksum {
-    /// Of a header and what follows.
     pub(crate) fn new(header: &Block) -> Self {
         let mut digest = CRC.digest();
         digest.update(&header[..COVERED]);
         Self(digest)
     }
 
-    /// Takes the next block.
     pub(crate) fn push(&mut self, block: &Block) {
         self.0.update(block);
     }
@@ -124,7 +123,7 @@ impl core::fmt::Debug for Checksum {
     }
 }
 
-/// The header of a copy, its CRC not yet filled in.
+/// Header without CRC.
 pub(crate) fn header(record: RecordName, sequence: u32) -> Block {
     let mut header = [0; BLOCK];
     header[..4].copy_from_slice(&MAGIC);
@@ -137,7 +136,7 @@ pub(crate) fn header(record: RecordName, sequence: u32) -> Block {
     header
 }
 
-/// What lies in the place of a copy.
+/// Contents of a copy's place.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Copy {
     Blank,
@@ -145,12 +144,12 @@ enum Copy {
     Bad,
 }
 
-/// What was found of a record.
+/// Search result of a record.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Found {
-    /// Never written: defaults, and nothing is wrong.
+    /// Never written: defaults.
     Blank,
-    /// A good copy, the newer of two, and whether the other was bad.
+    /// The newer valid copy, and whether the other was damaged.
     Good {
         copy: usize,
         sequence: u32,
@@ -159,7 +158,7 @@ pub(crate) enum Found {
     Lost,
 }
 
-/// Looks for the good copy of a record.
+/// Finds the valid copy of a record.
 pub(crate) fn find(memory: &[u8; MEMORY_BYTES], record: RecordName) -> Found {
     match [look(memory, record, 0), look(memory, record, 1)] {
         [Copy::Good { sequence: first }, Copy::Good { sequence: second }] => {
@@ -169,23 +168,22 @@ pub(crate) fn find(memory: &[u8; MEMORY_BYTES], record: RecordName) -> Found {
         }
         [Copy::Good { sequence }, other] => Found::Good { copy: 0, sequence, repaired: other == Copy::Bad },
         [other, Copy::Good { sequence }] => Found::Good { copy: 1, sequence, repaired: other == Copy::Bad },
-        // The first write is of both copies, so a blank one says that it was torn: there was nothing to lose.
+        // The first write covers both copies, so a blank one means that it was torn: nothing is lost.
         [Copy::Blank, _] | [_, Copy::Blank] => Found::Blank,
         [Copy::Bad, Copy::Bad] => Found::Lost,
     }
 }
 
-/// Looks for all records, in the order of [`ALL`].
+/// All records in order of [`ALL`].
 pub(crate) fn find_all(memory: &[u8; MEMORY_BYTES]) -> [Found; RECORDS] {
     ALL.map(|record| find(memory, record))
 }
 
-/// A block of a copy.
 pub(crate) fn block(memory: &[u8; MEMORY_BYTES], record: RecordName, copy: usize, block: usize) -> Block {
     at(memory, address(record, copy) + (1 + block) * BLOCK)
 }
 
-/// How many values the list in a good copy has.
+/// Number of values in a valid copy.
 pub(crate) fn values(memory: &[u8; MEMORY_BYTES], record: RecordName, copy: usize) -> usize {
     let [.., version, _, values] = *at(memory, address(record, copy)).first_chunk::<8>().unwrap_or(&[0; 8]);
     if version == 1 { SETTINGS_OF_VERSION_1 } else { usize::from(values) }
@@ -207,7 +205,7 @@ fn look(memory: &[u8; MEMORY_BYTES], record: RecordName, copy: usize) -> Copy {
     let sequence = u32::from_le_bytes([found[8], found[9], found[10], found[11]]);
     let mut expected = header(record, sequence);
     if (1..=VERSION).contains(&found[5]) {
-        // The checksum covers both: as that version had them.
+        // The checksum covers both values of that version.
         (expected[5], expected[7]) = (found[5], found[7]);
     }
     let mut checksum = Checksum::new(&expected);

@@ -1,8 +1,8 @@
-//! Writes records, a chunk a tick.
+//! Writes records, one chunk per tick.
 //!
-//! What changed is marked; the most urgent marked record is written over its older copy, blocks first, header last. A
-//! change while a record is being written begins it again, so that a copy never holds half of one state and half of the
-//! next. Cost: a chunk of two blocks and its CRC, some 700 instructions in a tick in which something is written.
+//! The most urgent marked record is written over its older copy, blocks first, header last. A change during
+//! the write restarts it, so that no copy mixes two states. Cost: two blocks and their CRC, some 700
+//! instructions per tick.
 
 use farnear_protocol::message::RecordName;
 use heapless::Vec;
@@ -16,11 +16,10 @@ struct Slot {
     sequence: u32,
     copy: usize,
     changed: bool,
-    /// Neither copy is good: the first write is followed by that of the other copy.
+    /// No copy is valid: the first write covers both.
     fresh: bool,
 }
 
-/// A copy being written.
 #[derive(Clone, Debug)]
 struct Job {
     record: RecordName,
@@ -29,7 +28,6 @@ struct Job {
     next: usize,
 }
 
-/// The board's memory as it is written.
 #[derive(Clone, Debug)]
 pub(crate) struct Store {
     fitted: bool,
@@ -38,13 +36,12 @@ pub(crate) struct Store {
 }
 
 impl Store {
-    /// No memory: nothing is ever written.
+    /// No memory: nothing is written.
     pub(crate) const fn absent() -> Self {
         let slot = Slot { sequence: 0, copy: 0, changed: false, fresh: true };
         Self { fitted: false, slots: [slot; RECORDS], job: None }
     }
 
-    /// A memory, with what was found of each record.
     pub(crate) fn new(memory: &[u8; MEMORY_BYTES]) -> Self {
         let mut store = Self { fitted: true, ..Self::absent() };
         for (slot, record) in store.slots.iter_mut().zip(ALL) {
@@ -56,12 +53,11 @@ impl Store {
         store
     }
 
-    /// Whether there is a memory.
     pub(crate) const fn is_fitted(&self) -> bool {
         self.fitted
     }
 
-    /// Has a record written.
+    /// Schedules a write.
     pub(crate) fn mark(&mut self, record: RecordName) {
         if self.fitted {
             self.slots[record::index(record)].changed = true;
@@ -71,17 +67,15 @@ impl Store {
         }
     }
 
-    /// Whether a record is to be written.
     pub(crate) const fn is_marked(&self, record: RecordName) -> bool {
         self.slots[record::index(record)].changed
     }
 
-    /// Whether everything is written.
     pub(crate) fn is_idle(&self) -> bool {
         self.job.is_none() && self.slots.iter().all(|slot| !slot.changed)
     }
 
-    /// The next bytes to write, and the record that is complete with them. `contents` gives a record's blocks.
+    /// The next bytes to write, and the record that they complete. `contents` returns a record's blocks.
     pub(crate) fn tick(
         &mut self,
         contents: impl Fn(RecordName, usize) -> Block,
@@ -90,7 +84,7 @@ impl Store {
         let slot = &mut self.slots[record::index(record)];
         let mut job = match self.job.take() {
             Some(job) if job.record == record => job,
-            // Something more urgent goes first; what was begun begins anew.
+            // A more urgent record first; this one restarts.
             _ => {
                 let header = record::header(record, slot.sequence);
                 Job { record, header, checksum: Checksum::new(&header), next: 0 }
@@ -116,7 +110,7 @@ impl Store {
     }
 }
 
-/// Addresses stay below [`MEMORY_BYTES`], which fits.
+/// Addresses are below [`MEMORY_BYTES`], which fits.
 fn write(address: usize, bytes: Vec<u8, MEMORY_CHUNK>) -> MemoryWrite {
     MemoryWrite { address: address as u16, bytes }
 }

@@ -1,17 +1,18 @@
 //! Homing: finds the switch fast, then exactly.
 //!
-//! 1. Search: towards the switch at some speed, braking when it closes. Left out where it is closed already.
-//! 2. Leave: away until it opens, then a little further.
-//! 3. Approach: a pulse a millisecond until it closes again; that edge, with the screw's backlash and what a piezo on the
-//!    stage carries the switch's tab away, becomes position 0. Only from a switch that is open: one that closed again by
-//!    itself would put position 0 anywhere.
+//! 1. Search towards the switch, braking when it closes; skipped if already closed.
+//! 2. Leave until it opens, then a little further.
+//! 3. Approach, a pulse per millisecond, until it closes again; this edge, corrected for backlash and the
+//!    piezo's
+//!    displacement of the tab, becomes position 0. Requires an open switch.
 //!
-//!    It has to close where it closed first, in the search or in an approach before this one, and to open where a switch
-//!    opens that closes there: edges that lie apart are a broken wire's or a dead contact's.
-//! 4. Return: to position 0 from below, like every move.
+//!    The switch must close where it first closed, and open where its hysteresis predicts: other edges
+//!    indicate a broken wire
+//!    or a dead contact.
+//! 4. Return to position 0 from below, like every move.
 //!
-//! The exact approach always comes from the same side at the same speed, so that the switch's hysteresis and its
-//! delay cancel; what is left is its own repeatability.
+//! The approach always has the same side and speed, so that hysteresis and delay cancel; the switch's
+//! repeatability remains.
 
 use farnear_protocol::Nanometres;
 use farnear_protocol::message::{Failure, PositionState};
@@ -31,39 +32,38 @@ enum Phase {
     Return { shift: Nanometres },
 }
 
-/// How far the edges of one switch, met at different speeds, may lie on the wrong side of each other.
+/// Tolerance between edges of one switch at different speeds.
 const REPEATS: i32 = 5_000;
 
-/// How much lower the fast search may see it close: a contact bounces for 5 ms, at 4 mm/s, and is believed 0.6 ms after that.
+/// Delay of the closing edge in the fast search: 5 ms of bounce at 4 mm/s, and 0.6 ms of filtering.
 const SEARCH_LATE: i32 = 25_000;
 
-/// Whether pulse `upper` lies above pulse `lower`, by no more than `most` (nm).
+/// Whether pulse `upper` is above pulse `lower` by at most `most` (nm).
 fn is_above(lower: i32, upper: i32, most: i32) -> bool {
     let apart = steps::to_nanometres(upper.saturating_sub(lower)).0;
     (-REPEATS..=most).contains(&apart)
 }
 
-/// A homing under way.
 #[derive(Clone, Debug)]
 pub(crate) struct Homing {
     phase: Phase,
     leg: Leg,
-    /// The pulse at which it closed first.
+    /// Pulse of the first closing.
     closed: Option<i32>,
-    /// The pulse at which it opened.
+    /// Pulse of the opening.
     opened: i32,
-    /// Whether the position was ever known, so that the shift says something.
+    /// The position was known before, so the shift is meaningful.
     known_before: bool,
 }
 
 impl Homing {
-    /// Begins with the next tick, when the switch was read.
+    /// Starts with the next tick.
     pub(crate) const fn new() -> Self {
         Self { phase: Phase::Begin, leg: Leg::REST, closed: None, opened: 0, known_before: false }
     }
 
-    /// Goes on while the axis has no fault; gives the shift of position 0 at the end. `carried`: how far the piezo on the stage
-    /// holds the switch's tab away, where that is known.
+    /// Continues while the axis has no fault; returns the shift of position 0 at the end. `carried`:
+    /// displacement of the switch's tab by the piezo, if known.
     pub(crate) fn tick(
         &mut self,
         axis: &mut Stepper,
@@ -75,11 +75,11 @@ impl Homing {
         }
         let Some(carried) = carried else { return Some(Err(Failure::Gauge)) };
         self.phase = match (self.phase, self.leg.edge()) {
-            // One that bounces, or was just released, says in a moment what it is.
+            // A bouncing switch settles soon.
             (Phase::Begin, _) if !axis.home_is_steady() => return None,
             (Phase::Begin, _) => {
                 self.known_before = axis.state() != PositionState::Unknown;
-                // A disagreement that is allowed at rest becomes a fault by the encoder's lag in motion.
+                // A deviation permitted at rest would become a fault with the encoder's lag in motion.
                 axis.begin_to_home();
                 if axis.home_closed() { Phase::Leave } else { Phase::Search }
             }
@@ -103,7 +103,7 @@ impl Homing {
             {
                 return Some(Err(Failure::HomeSwitchStuck));
             }
-            // It was closed from the beginning: a second approach bears the first one out.
+            // It was closed initially: a second approach confirms the first.
             (Phase::Approach, Some(edge)) if self.closed.is_none() => {
                 self.closed = Some(edge.position);
                 Phase::Leave

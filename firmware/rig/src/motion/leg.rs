@@ -1,4 +1,4 @@
-//! A leg: a way on a stepper axis that a switch may end early. Homing and the calibrations are made of legs.
+//! A leg: travel that a switch may end. Homing and calibrations consist of legs.
 
 use farnear_protocol::Nanometres;
 
@@ -6,7 +6,7 @@ use crate::motion::axis::{Purpose, Stepper};
 use crate::motion::steps;
 use crate::motion::switch::Place;
 
-/// What ends a leg before its way is over.
+/// Early end of a leg.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Until {
     Arrival,
@@ -16,7 +16,6 @@ pub(crate) enum Until {
     Far(bool),
 }
 
-/// A leg under way.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct Leg {
     until: Until,
@@ -24,10 +23,10 @@ pub(crate) struct Leg {
 }
 
 impl Leg {
-    /// No way: over as soon as the axis stands, whoever moves it.
+    /// No travel: over once the axis is at rest.
     pub(crate) const REST: Self = Self { until: Until::Arrival, edge: None };
 
-    /// Sets off from where the axis stands, over `way_nm` (positive = away from the home switch) at a speed.
+    /// Starts a travel of `way_nm` (positive = away from the home switch) at a speed.
     pub(crate) fn start(
         axis: &mut Stepper,
         (way_nm, speed): (i32, u32),
@@ -39,7 +38,7 @@ impl Leg {
         Self { until, edge: None }
     }
 
-    /// Goes on while the axis has no fault: brakes where the switch did what was waited for. `true` once the axis stands.
+    /// Continues while the axis has no fault; brakes at the switch's edge. `true` once at rest.
     pub(crate) fn is_over(&mut self, axis: &mut Stepper) -> bool {
         let met = match self.until {
             Until::Arrival => false,
@@ -53,7 +52,7 @@ impl Leg {
         axis.is_still()
     }
 
-    /// Where the switch did it; `None` where the whole way was gone without.
+    /// Position of the edge; `None` if the travel ended without it.
     pub(crate) const fn edge(&self) -> Option<Place> {
         self.edge
     }

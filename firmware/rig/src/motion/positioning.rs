@@ -1,4 +1,4 @@
-//! The way to a position on any axis: motion, then settling.
+//! Move to a position on any axis, and settling.
 
 use farnear_protocol::message::{Axis, Failure};
 use farnear_protocol::{BoardMicros, Micros, Nanometres, Settle};
@@ -8,20 +8,19 @@ use crate::motion::since;
 use crate::motion::stage::Stage;
 use crate::settings::Settings;
 
-/// A way to a position.
 #[derive(Clone, Debug)]
 pub(crate) struct Positioning {
     axis: Axis,
     target: Nanometres,
     settling: Settling,
     started: BoardMicros,
-    /// From when the time to settle counts; for a stepper the end of its motion.
+    /// Start of the settling deadline; for a stepper the end of its motion.
     waiting_since: Option<BoardMicros>,
     patience: Micros,
 }
 
 impl Positioning {
-    /// Sets off. The caller has checked limits and state.
+    /// The caller has checked limits and state.
     pub(crate) fn start(
         stage: &mut Stage,
         settings: &Settings,
@@ -44,8 +43,8 @@ impl Positioning {
         Self { axis, target, settling: Settling::new(settle), started: now, waiting_since, patience }
     }
 
-    /// Goes on while no alarm comes; gives the time from the start once the position is settled. May be asked again
-    /// while it stays.
+    /// Continues while there is no alarm; returns the time from the start once settled. May be called again
+    /// while it stays settled.
     pub(crate) fn tick(&mut self, stage: &Stage, now: BoardMicros) -> Option<Result<Micros, Failure>> {
         if !stage.is_still(self.axis) {
             return None;
@@ -58,7 +57,7 @@ impl Positioning {
             self.settling.interrupt();
         }
         if self.settling.is_settled() {
-            // A knock much later is borne as one on the way is.
+            // A later disturbance is tolerated like one during the move.
             self.waiting_since = Some(now);
             return Some(Ok(since(self.started, now)));
         }
@@ -66,17 +65,17 @@ impl Positioning {
         (since(waiting_since, now) > self.patience).then_some(Err(Failure::NotSettled { error }))
     }
 
-    /// Asked minus measured.
+    /// Target minus measured.
     pub(crate) fn error(&self, stage: &Stage) -> Nanometres {
         Nanometres(self.target.0.saturating_sub(stage.measured(self.axis).0))
     }
 
-    /// Distance of the measured position from the target.
+    /// Distance from the target.
     pub(crate) fn deviation(&self, stage: &Stage) -> Nanometres {
         Nanometres(self.error(stage).0.saturating_abs())
     }
 
-    /// Gauge position, mean over the last whole dwell.
+    /// Mean gauge position over the last dwell.
     pub(crate) const fn mean_fine(&self) -> Nanometres {
         self.settling.mean()
     }

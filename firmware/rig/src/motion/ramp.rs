@@ -1,45 +1,43 @@
-//! The jerk-limited ramp: a distance in STEP pulses becomes segments of equal pulses.
+//! Jerk-limited ramp: splits a distance in STEP pulses into segments of equal pulses.
 //!
-//! The speed rises from the start speed with limited jerk (bend), at constant acceleration (straight), bends into the
-//! top speed, and falls as the mirror image of that at the end of the way (the seven-phase profile of L. Biagiotti and
-//! C. Melchiorri, "Trajectory Planning for Automatic Machines and Robots", 2008, sec. 3.4, with equal limits up and
-//! down). One [`Curve`] describes both ends: time as a function of the distance from rest. A segment of `n` pulses lasts
-//! exactly as long as the curve needs for them, so no error adds up, and the way ends with its last pulse at the start
-//! speed, whatever was rounded. On a short way top speed and bend shrink until two curves fit into it.
+//! The speed rises from the start speed with limited jerk (bend), constant acceleration (straight), and a
+//! bend into the top speed; the end mirrors this (seven-phase profile of L. Biagiotti and C. Melchiorri,
+//! "Trajectory Planning for Automatic Machines and Robots", 2008, sec. 3.4). One [`Curve`] gives time as a
+//! function of distance for both ends. A segment of `n` pulses lasts exactly as long as the curve, so errors
+//! never accumulate. Short distances reduce top speed and bend.
 //!
-//! A stop is the same way with a lower top: the curve to the speed that is reached by bending down from now on is the
-//! old one up to now. So it never needs more pulses than the way had.
+//! A stop lowers the top speed: the curve to the speed reached by bending down now equals the old one so far.
+//! It never needs more pulses than remain.
 //!
-//! Single precision: positions are good to 0.004 pulses, and the count of pulses is integer. Cost on a Cortex-M4F: some
-//! 200 instructions a segment, 600 to plan a way (a bisection, no root).
+//! Single precision: 0.004 pulses; the pulse count is integer. Cost on a Cortex-M4F: some 200 instructions
+//! per segment, 600 to plan (a bisection, no root).
 
 use crate::io::{SEGMENT_MAX_PULSES, SEGMENT_MAX_TICKS, STEP_TIMER_HZ, Segment};
 
-/// Segments are made a little shorter than they may be, so that rounding up the period still fits.
+/// Slightly below the maximum, so that a rounded period still fits.
 const SEGMENT_S: f32 = 0.95e-3;
-/// Slowest speed at which a pulse fits a segment.
+/// Slowest speed with a pulse per segment.
 const SLOWEST: u32 = STEP_TIMER_HZ / SEGMENT_MAX_TICKS;
 
-/// How fast a ramp may be.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct RampLimits {
-    /// Speed of the first and of the last pulse, pulses/s; at least one pulse a millisecond.
+    /// Speed of the first and last pulse, pulses/s; at least one pulse per millisecond.
     pub(crate) start_speed: u32,
-    /// Top speed, pulses/s; at least `start_speed`.
+    /// Pulses/s; at least `start_speed`.
     pub(crate) speed: u32,
-    /// Acceleration and deceleration, pulses/s2.
+    /// Pulses/s2.
     pub(crate) acceleration: u32,
     pub(crate) jerk: u32,
 }
 
-/// Speed from rest to the top as a function of time, and the distance under it.
+/// Speed from rest to the top as a function of time, and its integral.
 #[derive(Clone, Copy, PartialEq, Debug)]
 struct Curve {
     start: f32,
     jerk: f32,
-    /// Time of each of the two bends.
+    /// Time of each bend.
     bend: f32,
-    /// Time at constant acceleration between them.
+    /// Time of constant acceleration.
     straight: f32,
     top: f32,
     /// Time and pulses until the top.
@@ -54,7 +52,7 @@ impl Curve {
         Self { start, jerk, bend, straight, top, time, way: 0.5 * (start + top) * time }
     }
 
-    /// The highest curve within the limits of which two fit into `pulses`.
+    /// Highest curve within the limits that fits twice into `pulses`.
     fn fit(limits: &RampLimits, pulses: u32) -> Self {
         let (start, speed) = (limits.start_speed as f32, limits.speed as f32);
         let (acceleration, jerk) = (limits.acceleration as f32, limits.jerk as f32);
@@ -95,7 +93,7 @@ impl Curve {
         }
     }
 
-    /// Pulses from rest; goes on at top speed beyond the curve.
+    /// Pulses from rest; continues at top speed beyond the curve.
     fn distance(&self, time: f32) -> f32 {
         let left = self.time - time;
         if time < self.bend {
@@ -112,7 +110,7 @@ impl Curve {
         }
     }
 
-    /// The time at a distance, by Newton's method from a time near it; the speed is never 0.
+    /// Time at a distance, by Newton's method from a nearby time; the speed is never 0.
     fn time_at(&self, distance: f32, near: f32) -> f32 {
         let mut time = near;
         for _ in 0..3 {
@@ -121,34 +119,32 @@ impl Curve {
         time
     }
 
-    /// Mean speed between two times: Simpson's rule, exact within a phase, and without cancellation.
+    /// Mean speed between two times: Simpson's rule, exact within a phase, without cancellation.
     fn mean_speed(&self, a: f32, b: f32) -> f32 {
         (self.speed(a) + 4.0 * self.speed(0.5 * (a + b)) + self.speed(b)) * (1.0 / 6.0)
     }
 }
 
-/// Pulses from top speed to rest.
 pub(crate) fn braking(limits: &RampLimits) -> u32 {
     ceil(Curve::fit(limits, u32::MAX).way)
 }
 
-/// A way that is being planned, segment by segment.
+/// Progressive plan of a distance.
 #[derive(Clone, Debug)]
 pub(crate) struct Ramp {
     curve: Curve,
     speed: u32,
     total: u32,
     planned: u32,
-    /// Pulses of the rise and of the fall.
+    /// Pulses of rise and fall.
     rise: u32,
     fall: u32,
-    /// On the curve, after what was planned: time from rest while it rises, time to rest while it falls.
+    /// Position on the curve: time from rest while rising, to rest while falling.
     time: f32,
     falling: bool,
 }
 
 impl Ramp {
-    /// From rest over `pulses` to rest.
     pub(crate) fn new(pulses: u32, limits: RampLimits) -> Self {
         let start_speed = limits.start_speed.max(SLOWEST);
         let limits = RampLimits {
@@ -162,17 +158,15 @@ impl Ramp {
         Self { curve, speed: limits.speed, total: pulses, planned: 0, rise, fall, time: 0.0, falling: false }
     }
 
-    /// Pulses not planned yet.
     pub(crate) const fn remaining(&self) -> u32 {
         self.total - self.planned
     }
 
-    /// Whether a segment was planned.
     pub(crate) const fn has_begun(&self) -> bool {
         self.planned > 0
     }
 
-    /// Cuts the way short: as few more pulses as jerk and deceleration allow.
+    /// Stops as early as jerk and deceleration allow.
     pub(crate) fn stop(&mut self) {
         if self.planned == 0 {
             self.total = 0;
@@ -191,7 +185,7 @@ impl Ramp {
         }
     }
 
-    /// The next segment; `None` at the end of the way.
+    /// The next segment; `None` at the end.
     pub(crate) fn next(&mut self) -> Option<Segment> {
         let remaining = self.remaining();
         if remaining == 0 {
@@ -231,7 +225,7 @@ impl Ramp {
         }
     }
 
-    /// The time on the curve after some more pulses, and the mean speed until then.
+    /// Time on the curve after more pulses, and the mean speed until then.
     fn after(&self, pulses: u32, rising: bool, speed: f32) -> (f32, f32) {
         let step = pulses as f32 / speed;
         if rising {
@@ -248,13 +242,13 @@ impl Ramp {
     }
 }
 
-/// Pulses of rise and fall: whole ones, and together no more than the way.
+/// Whole pulses of rise and fall, together at most the distance.
 fn ends(curve: &Curve, pulses: u32) -> (u32, u32) {
     let way = ceil(curve.way);
     (way.min(pulses - pulses / 2), way.min(pulses / 2))
 }
 
-/// The next whole number; saturates.
+/// Rounds up; saturates.
 fn ceil(value: f32) -> u32 {
     let whole = value as u32;
     if (whole as f32) < value { whole.saturating_add(1) } else { whole }

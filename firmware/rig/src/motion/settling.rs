@@ -1,18 +1,16 @@
-//! Settled: measured within a window of the target for a dwell time without a break.
-//!
-//! Counts control ticks; cost: a comparison and an addition a tick, a division once a dwell.
+//! Settled: measured within a window of the target for a dwell time without interruption. Cost: a comparison
+//! and an addition per tick, a division per dwell.
 
 use farnear_protocol::{Nanometres, Settle};
 
 use crate::io::TICK_US;
 
-/// Watches one position.
 #[derive(Clone, Debug)]
 pub(crate) struct Settling {
     window: Nanometres,
     dwell_ticks: u32,
     inside_ticks: u32,
-    /// Sum over the dwell that runs, and its length so far.
+    /// Sum over the current dwell, and its length.
     sum: i64,
     summed: u32,
     mean: Nanometres,
@@ -20,7 +18,7 @@ pub(crate) struct Settling {
 }
 
 impl Settling {
-    /// Watches for the dwell, at least one tick.
+    /// At least one tick.
     pub(crate) const fn new(settle: Settle) -> Self {
         let dwell_ticks = settle.dwell.0.div_ceil(TICK_US);
         Self {
@@ -34,14 +32,14 @@ impl Settling {
         }
     }
 
-    /// Takes the error of this tick, and a position to average over the dwell.
+    /// Adds the error of this tick, and a position to average.
     pub(crate) fn push(&mut self, error: Nanometres, position: Nanometres) {
         if error.0.saturating_abs() > self.window.0 {
             return self.interrupt();
         }
         self.sum += i64::from(position.0);
         self.summed += 1;
-        // The dwell lies between its first and its last sample: one sample more than ticks.
+        // The dwell is between its first and last sample: one sample more than ticks.
         if self.summed > self.dwell_ticks {
             self.mean = Nanometres((self.sum / i64::from(self.summed)) as i32);
             (self.sum, self.summed) = (i64::from(position.0), 1);
@@ -50,17 +48,16 @@ impl Settling {
         self.inside_ticks = self.inside_ticks.saturating_add(1);
     }
 
-    /// Starts again: outside the window, or not measured.
+    /// Restarts: outside the window, or not measured.
     pub(crate) const fn interrupt(&mut self) {
         (self.inside_ticks, self.sum, self.summed, self.settled) = (0, 0, 0, false);
     }
 
-    /// Whether the dwell is over and the position is still inside.
     pub(crate) const fn is_settled(&self) -> bool {
         self.settled
     }
 
-    /// Mean of the positions over the last whole dwell.
+    /// Mean position over the last dwell.
     pub(crate) const fn mean(&self) -> Nanometres {
         self.mean
     }

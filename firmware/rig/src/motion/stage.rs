@@ -1,4 +1,4 @@
-//! Both stages: two steppers and a piezo, sensed and driven together.
+//! Both stages: two steppers and a piezo.
 
 use farnear_protocol::message::{Axis, AxisStatus, PositionState};
 use farnear_protocol::{BoardMicros, Nanometres};
@@ -14,7 +14,7 @@ pub(crate) struct Stage {
     pub(crate) coarse: Stepper,
     pub(crate) lens: Stepper,
     pub(crate) fine: Piezo,
-    /// When the piezo's loop ran last, and whether it runs in this tick.
+    /// Last run of the piezo's loop, and whether it runs in this tick.
     looped: Option<BoardMicros>,
     on_time: bool,
 }
@@ -32,18 +32,18 @@ impl Stage {
         }
     }
 
-    /// Takes other numbers; everything stands still.
+    /// All axes must be at rest.
     pub(crate) fn apply(&mut self, settings: &Settings) {
         self.coarse.apply(settings.coarse);
         self.lens.apply(settings.lens);
         self.fine.apply(settings.fine);
     }
 
-    /// Reads the board, after a rest or not.
+    /// Reads the board; `rested`: after a rest.
     pub(crate) fn sense(&mut self, inputs: &Inputs, rested: bool) {
         self.coarse.sense(&inputs.coarse);
         self.lens.sense(&inputs.lens);
-        // Ticks that catch up after a long calculation follow each other faster than the loop's model of the piezo knows.
+        // Catch-up ticks are faster than the loop's model.
         let since = self.looped.map_or(TICK_US, |looped| since(looped, inputs.now).0);
         self.on_time = since >= TICK_US / 2;
         if self.on_time {
@@ -59,7 +59,7 @@ impl Stage {
         outputs.piezo_dac = if self.on_time { self.fine.act() } else { self.fine.played() };
     }
 
-    /// A stepper axis; the piezo is none.
+    /// A stepper axis; `None` for the piezo.
     pub(crate) const fn stepper(&self, axis: Axis) -> Option<&Stepper> {
         match axis {
             Axis::SensorCoarse => Some(&self.coarse),
@@ -68,7 +68,6 @@ impl Stage {
         }
     }
 
-    /// A stepper axis, to be moved.
     pub(crate) const fn stepper_mut(&mut self, axis: Axis) -> Option<&mut Stepper> {
         match axis {
             Axis::SensorCoarse => Some(&mut self.coarse),
@@ -77,7 +76,7 @@ impl Stage {
         }
     }
 
-    /// A stepper axis to be moved, with its numbers.
+    /// A stepper axis with its settings.
     pub(crate) const fn with_numbers<'s>(
         &mut self,
         axis: Axis,
@@ -90,7 +89,7 @@ impl Stage {
         }
     }
 
-    /// Where the encoder or gauge says the axis is.
+    /// By encoder or gauge.
     pub(crate) const fn measured(&self, axis: Axis) -> Nanometres {
         match self.stepper(axis) {
             Some(stepper) => stepper.measured(),
@@ -98,8 +97,8 @@ impl Stage {
         }
     }
 
-    /// How far the piezo holds the tab of the axis' home switch away from it: that of stage A is on the sensor's plate. `None` where
-    /// nobody knows, so that no homing could say where position 0 is.
+    /// Displacement of the home switch's tab by the piezo (stage A's is on the sensor plate). `None` if
+    /// unknown: homing could not find position 0.
     pub(crate) fn carried(&self, axis: Axis) -> Option<Nanometres> {
         match axis {
             Axis::SensorCoarse => self.fine.extension(),
@@ -107,7 +106,7 @@ impl Stage {
         }
     }
 
-    /// What is known of the axis' position. The gauge is absolute: as long as it speaks.
+    /// The absolute gauge is valid while it responds.
     pub(crate) const fn state(&self, axis: Axis) -> PositionState {
         match self.stepper(axis) {
             Some(stepper) => stepper.state(),
@@ -116,7 +115,6 @@ impl Stage {
         }
     }
 
-    /// For the status answer.
     pub(crate) fn status(&self, axis: Axis, request: Option<u32>) -> AxisStatus {
         let (asked, moving) = match self.stepper(axis) {
             Some(stepper) => (stepper.target(), !stepper.is_still()),
@@ -125,31 +123,28 @@ impl Stage {
         AxisStatus { state: self.state(axis), asked, measured: self.measured(axis), moving, request }
     }
 
-    /// Ends all motion: the steppers brake, the piezo stays where it is.
+    /// Steppers brake, the piezo stays.
     pub(crate) fn stop(&mut self) {
         self.coarse.stop();
         self.lens.stop();
         self.fine.hold();
     }
 
-    /// Ends all motion within a millisecond.
     pub(crate) fn abort(&mut self) {
         self.coarse.abort();
         self.lens.abort();
         self.fine.hold();
     }
 
-    /// Whether no pulse comes any more on an axis.
     pub(crate) fn is_still(&self, axis: Axis) -> bool {
         self.stepper(axis).is_none_or(Stepper::is_still)
     }
 
-    /// Whether it is enough to look rarely.
+    /// All axes are idle, so that rare ticks suffice.
     pub(crate) fn is_settled_idle(&self) -> bool {
         self.coarse.is_settled_idle() && self.lens.is_settled_idle() && self.fine.is_settled_idle()
     }
 
-    /// Whether no pulse comes any more.
     pub(crate) const fn steppers_still(&self) -> bool {
         self.coarse.is_still() && self.lens.is_still()
     }

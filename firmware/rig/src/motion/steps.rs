@@ -1,19 +1,18 @@
-//! Positions in nanometres and in STEP pulses: exact integer arithmetic.
+//! Conversion of positions between nanometres and STEP pulses in exact integers.
 //!
-//! A pulse is 156.25 nm = 625 / 4 nm. Positions are always converted from their absolute value, so roundings never
-//! add up. Nearest, halves away from zero.
+//! A pulse is 156.25 nm = 625 / 4 nm. Absolute positions are converted, so rounding never accumulates.
+//! Nearest, halves away from zero.
 
 use farnear_protocol::Nanometres;
 
 use crate::io::ENCODER_NM_PER_COUNT;
 use crate::settings::STEP_PM;
 
-/// Four pulses in nanometres: in whole numbers, so that one way divides by 4 and the other fits 32 bits. A division of 64 bits takes the
-/// processor 100 instructions and more, and a tick makes many.
+/// Four pulses: an integer, so that one direction divides by 4 and the other fits 32 bits. 64-bit divisions
+/// take 100 instructions and more.
 const FOUR_STEPS_NM: i32 = 625;
 const _: () = assert!(STEP_PM as i64 * 4 == FOUR_STEPS_NM as i64 * 1_000);
 
-/// The pulses nearest to a position.
 pub(crate) const fn to_steps(position: Nanometres) -> i32 {
     const HALF: i32 = FOUR_STEPS_NM / 2;
     let nm = position.0;
@@ -24,17 +23,16 @@ pub(crate) const fn to_steps(position: Nanometres) -> i32 {
     divide_rounded(nm as i64 * 4, FOUR_STEPS_NM as i64) as i32 // smaller than the nanometres
 }
 
-/// The position of a pulse, to the nanometre; saturates beyond 2 m.
+/// Saturates beyond 2 m.
 pub(crate) const fn to_nanometres(steps: i32) -> Nanometres {
     saturate(divide_rounded(steps as i64 * FOUR_STEPS_NM as i64, 4))
 }
 
-/// The position of an encoder count; saturates beyond 2 m.
+/// Saturates beyond 2 m.
 pub(crate) const fn encoder_to_nanometres(counts: i32) -> Nanometres {
     saturate(counts as i64 * ENCODER_NM_PER_COUNT as i64)
 }
 
-/// The encoder count nearest to a position.
 pub(crate) const fn to_encoder(position: Nanometres) -> i32 {
     divide_rounded(position.0 as i64, ENCODER_NM_PER_COUNT as i64) as i32
 }

@@ -1,40 +1,38 @@
-//! An end switch, believed only when it says the same several times.
+//! An end switch with a filter.
 //!
-//! A contact bounces for most of a millisecond, and a motor's chopper is coupled into its wire: a single sample says nothing.
-//! [`SAMPLES`] equal ones in a row do, and the axis was where it changed at the first of them.
+//! Contacts bounce for most of a millisecond and pick up chopper noise: [`SAMPLES`] equal samples in a row
+//! change the state, at the position of the first.
 
 use farnear_protocol::Nanometres;
 
-/// Equal samples in a row that are believed: 0.6 ms, in which a stage at full speed goes 4 um.
+/// 0.6 ms, in which a stage at full speed moves 4 um.
 pub(crate) const SAMPLES: u8 = 3;
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct Place {
-    /// In pulses of the present count.
+    /// Counted pulses.
     pub(crate) position: i32,
-    /// By the encoder on the motor's shaft.
+    /// By encoder.
     pub(crate) measured: Nanometres,
 }
 
-/// A switch.
 #[derive(Clone, Debug)]
 pub(crate) struct Switch {
     closed: bool,
     seen: bool,
-    /// How often in a row it has said the opposite, and where that began.
+    /// Number of opposite samples in a row, and the position of the first.
     opposite: u8,
     began: Place,
     changed: Place,
 }
 
 impl Switch {
-    /// A switch that was not looked at.
     pub(crate) const fn new() -> Self {
         let nowhere = Place { position: 0, measured: Nanometres(0) };
         Self { closed: false, seen: false, opposite: 0, began: nowhere, changed: nowhere }
     }
 
-    /// Takes a sample; the axis is `at` this place.
+    /// Adds a sample at position `at`.
     pub(crate) fn sample(&mut self, says: bool, at: Place) {
         if !self.seen {
             (self.seen, self.closed) = (true, says);
@@ -52,17 +50,16 @@ impl Switch {
         }
     }
 
-    /// Whether it is closed.
     pub(crate) const fn is_closed(&self) -> bool {
         self.closed
     }
 
-    /// Whether its last sample said the same.
+    /// The last sample agrees with the state.
     pub(crate) const fn is_steady(&self) -> bool {
         self.opposite == 0
     }
 
-    /// Where it changed last.
+    /// Position of the last change.
     pub(crate) const fn changed(&self) -> Place {
         self.changed
     }

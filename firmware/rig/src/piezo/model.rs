@@ -1,32 +1,32 @@
-//! The piezo as calibrated: stroke per code, hysteresis, creep.
+//! Calibrated piezo: stroke per code, hysteresis, creep.
 //!
-//! Hysteresis by Prandtl and Ishlinskii (K. Kuhnen, European J. Control 9, 2003, sec. 2): play operators of equal weight,
-//! their half widths evenly up to a quarter of the stroke, and a linear share that closes the loop at both ends. Creep by
-//! first-order lags a decade apart. Both give the offset of the position from the command, and both are approximations
-//! with one measured figure each: the loop's observer learns the rest.
+//! Hysteresis by Prandtl and Ishlinskii (K. Kuhnen, European J. Control 9, 2003, sec. 2): play operators of
+//! equal weight, half widths evenly up to a quarter of the stroke, and a linear share that closes the loop.
+//! Creep by first-order lags a decade apart. Each is an approximation with one measured figure; the observer
+//! learns the rest.
 //!
-//! All positions in the fine loop's fixed point. Cost: 12 comparisons and 6 multiplications a tick.
+//! Fixed point of the fine loop. Cost: 12 comparisons and 6 multiplications a tick.
 
 use farnear_protocol::Nanometres;
 
 use super::BITS;
 use crate::io::{DAC_CODE_MAX, DAC_FULL_SCALE_NM};
 
-/// The stroke that the model's figures refer to.
+/// Stroke that the model's figures refer to.
 const STROKE: i32 = DAC_FULL_SCALE_NM << BITS;
 const PLAYS: usize = 6;
-/// Half width of the i-th play.
+/// Half width of play `i`.
 const fn half_width(i: usize) -> i32 {
     STROKE / 4 / PLAYS as i32 * (i as i32 + 1)
 }
-/// Half widths of all plays together, in strokes times 2^16.
+/// Sum of all half widths, in strokes times 2^16.
 const HALF_WIDTHS: i64 = ((PLAYS as i64 + 1) << 16) / 8;
-/// Time constants of the creep's lags, powers of two of ticks: 0.1, 0.8 and 13 s.
+/// Time constants of creep, powers of two of ticks: 0.1, 0.8 and 13 s.
 const LAGS: [u32; 3] = [9, 12, 16];
-/// Fraction bits that a lag has beyond a position's.
+/// Additional fraction bits of a lag.
 const LAG_BITS: u32 = 16;
 
-/// Between what the gauge says and the position.
+/// Conversion of gauge readings to positions.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct GaugeScale {
     offset: i32,
@@ -38,14 +38,14 @@ impl GaugeScale {
         Self { offset: offset.0, gain: ((gain_ppm as i64) << 24) / 1_000_000 }
     }
 
-    /// The position where the gauge says this, in nanometres from its nominal zero.
+    /// Position for a reading, in nanometres from its nominal zero.
     pub(crate) const fn position(&self, says: i32) -> Nanometres {
         let nm = (says - self.offset) as i64 * self.gain; // 18 bits times 25
         Nanometres(((nm + (1 << 23)) >> 24) as i32)
     }
 }
 
-/// Between codes and the stroke that they command.
+/// Conversion between codes and commanded stroke.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct Scale {
     /// Codes per unit of command, times 2^32.
@@ -61,7 +61,7 @@ impl Scale {
         Self { codes: (1i64 << 48) / units, units }
     }
 
-    /// The nearest code to a command, and the command that it really is.
+    /// Nearest code to a command, and its exact command.
     pub(crate) const fn playable(&self, command: i32) -> (u16, i32) {
         let code = (command as i64 * self.codes + (1 << 31)) >> 32;
         let code = if code < 0 {
@@ -74,16 +74,15 @@ impl Scale {
         (code, self.played(code))
     }
 
-    /// The command that a code is.
     pub(crate) const fn played(&self, code: u16) -> i32 {
         ((code as i64 * self.units + (1 << 15)) >> 16) as i32
     }
 }
 
-/// How far the position should lag behind the command.
+/// Predicted lag of the position behind the command.
 #[derive(Clone, Debug)]
 pub(crate) struct Lag {
-    /// Weight of each play and of each of the creep's lags, times 2^24.
+    /// Weight of each play and each creep lag, times 2^24.
     play_weight: i64,
     creep_weight: i64,
     plays: [i32; PLAYS],
@@ -95,7 +94,7 @@ pub(crate) struct Lag {
 }
 
 impl Lag {
-    /// A piezo that has come down from the top.
+    /// After a descent from full drive.
     pub(crate) const fn new(hysteresis_ppm: u32, creep_ppm_per_decade: u32) -> Self {
         let mut plays = [0; PLAYS];
         let mut i = 0;
@@ -107,7 +106,7 @@ impl Lag {
         Self { play_weight, creep_weight, plays, crept: [0; LAGS.len()], creep: 0, offset: 0 }
     }
 
-    /// The same piezo with other figures.
+    /// The same state with other figures.
     pub(crate) const fn with(&self, hysteresis_ppm: u32, creep_ppm_per_decade: u32) -> Self {
         let [play_weight, creep_weight] = weights(hysteresis_ppm, creep_ppm_per_decade);
         Self { play_weight, creep_weight, ..*self }
@@ -117,13 +116,13 @@ impl Lag {
         self.offset
     }
 
-    /// What it would be after this command.
+    /// Lag after this command.
     pub(crate) fn ahead(&self, command: i32) -> i32 {
         let command = command.clamp(0, STROKE); // no other can be played
         self.hysteresis(command, &self.moved(command)).saturating_add(self.creep)
     }
 
-    /// A tick with this command.
+    /// Advances a tick with this command.
     pub(crate) fn push(&mut self, command: i32) {
         self.plays = self.moved(command);
         for (crept, shift) in self.crept.iter_mut().zip(LAGS) {
@@ -143,14 +142,14 @@ impl Lag {
 
     fn hysteresis(&self, command: i32, plays: &[i32; PLAYS]) -> i32 {
         let held = plays.iter().enumerate().map(|(i, play)| i64::from(*play) - i64::from(half_width(i)));
-        // Plays give stroke - 2 half widths at the top; the linear share makes up for it.
+        // Plays give stroke - 2 half widths at the top; the linear share completes it.
         let linear = (i64::from(command) * (((PLAYS as i64) << 16) - 2 * HALF_WIDTHS)) >> 16;
         (((held.sum::<i64>() - linear) * self.play_weight) >> 24) as i32 // a fraction of the stroke
     }
 }
 
-/// In the middle of the stroke all plays are used up, half a width below the line through the ends on the way up and above
-/// it on the way down: the loop is as wide there as all plays together, times their weight.
+/// In mid-stroke all plays are used up, half a width below the line through the ends upwards and above it
+/// downwards: the loop's width is the sum of all plays times their weight.
 const fn weights(hysteresis_ppm: u32, creep_ppm_per_decade: u32) -> [i64; 2] {
     let play = ((hysteresis_ppm as i64) << 40) / 1_000_000 / (2 * HALF_WIDTHS);
     let creep = ((creep_ppm_per_decade as i64) << 24) / 1_000_000;
@@ -165,7 +164,7 @@ mod tests {
     fn a_gauge_is_taken_as_it_was_calibrated() {
         let plain = GaugeScale::new(1_000_000, Nanometres(0));
         assert!((-10_000..252_143).all(|says| plain.position(says) == Nanometres(says)));
-        // It says 2 % too much, and 1 um where the piezo is relaxed.
+        // Reads 2 % too high, and 1 um at the relaxed piezo.
         let scale = GaugeScale::new(980_392, Nanometres(1_000));
         assert_eq!(scale.position(1_000), Nanometres(0));
         assert!((scale.position(205_000).0 - 200_000).abs() <= 1);

@@ -1,32 +1,32 @@
-//! A model of the piezo for the tests: amplifier, second-order resonance, hysteresis, creep, gauge noise, latency.
+//! Piezo model for tests: amplifier, second-order resonance, hysteresis, creep, gauge noise, latency.
 
 use crate::io::{GAUGE_CODE_MAX, GAUGE_CODE_ZERO};
 
-/// What a piezo may be like.
+/// Properties of a piezo.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Part {
     pub(crate) resonance_hz: f64,
-    /// Width of the major hysteresis loop as a share of the stroke.
+    /// Width of the major loop / stroke.
     pub(crate) hysteresis: f64,
-    /// Creep per decade of time as a share of the step.
+    /// Creep per decade / step.
     pub(crate) creep: f64,
-    /// From the gauge's sample to the DAC's answer.
+    /// From the gauge sample to the DAC's output.
     pub(crate) latency_us: usize,
-    /// A second mode's frequency, and its share of what a slow drive moves.
+    /// Frequency of a second mode, and its share of a static deflection.
     pub(crate) second: (f64, f64),
 }
 
 pub(crate) const NOMINAL: Part =
     Part { resonance_hz: 200.0, hysteresis: 0.0, creep: 0.0, latency_us: 40, second: (700.0, 0.0) };
 
-/// A piezo, stepped at 10 us.
+/// Stepped at 10 us.
 pub(crate) struct Plant {
     part: Part,
-    /// Prandtl-Ishlinskii hysteresis: half widths of its play operators and what they hold, in nm.
+    /// Prandtl-Ishlinskii play operators: half widths and states, nm.
     plays: [(f64, f64); 6],
-    /// Creep: first-order lags a decade apart, in nm.
+    /// Creep: first-order lags a decade apart, nm.
     crept: [f64; 5],
-    /// The amplifier's output, in nm.
+    /// Amplifier output, nm.
     drive: f64,
     pub(crate) position: f64,
     velocity: f64,
@@ -39,7 +39,7 @@ pub(crate) struct Plant {
 impl Plant {
     const DAMPING: f64 = 0.03;
     const SECOND_DAMPING: f64 = 0.02;
-    /// First-order lag of the amplifier: 5 kHz.
+    /// Amplifier lag: 5 kHz.
     const AMPLIFIER_S: f64 = 32e-6;
     const STROKE: f64 = 200e3;
     const NOISE: f64 = 3.0;
@@ -47,7 +47,7 @@ impl Plant {
     pub(crate) fn new(part: Part, seed: u64) -> Self {
         Self {
             part,
-            // After a descent from the top each play hangs at its upper edge: that corner of the loop is 0.
+            // After a descent from the top each play is at its upper edge: that corner of the loop is 0.
             plays: core::array::from_fn(|i| [Self::STROKE * (i as f64 + 1.0) / 24.0; 2].into()),
             crept: [0.0; 5],
             drive: 0.0,
@@ -59,12 +59,12 @@ impl Plant {
         }
     }
 
-    /// Where the sensor is: [`Self::position`] where there is one mode alone.
+    /// Sensor position; [`Self::position`] with a single mode.
     pub(crate) fn at(&self) -> f64 {
         self.position + self.part.second.1 * (self.second.0 - self.position)
     }
 
-    /// The gauge with its noise: a sum of twelve uniform numbers is normal enough.
+    /// Gauge with noise: the sum of twelve uniform numbers is nearly normal.
     pub(crate) fn gauge(&mut self) -> Option<u32> {
         let mut noise = -6.0;
         for _ in 0..12 {
@@ -75,7 +75,7 @@ impl Plant {
         Some(code.round().clamp(0.0, f64::from(GAUGE_CODE_MAX)) as u32)
     }
 
-    /// One control tick, in which the DAC gets this code, or none.
+    /// One control tick with this code, or none.
     pub(crate) fn tick(&mut self, code: Option<u16>) {
         let before = self.part.latency_us / 10;
         self.run(before);
@@ -85,7 +85,8 @@ impl Plant {
 
     fn run(&mut self, steps: usize) {
         let command = f64::from(self.code) / 65_535.0 * Self::STROKE;
-        // Six plays of weight w, up to a quarter of the stroke, widen the loop by the sum of 2 w r = 1.75 w * stroke.
+        // Six plays of weight w, up to a quarter of the stroke, widen the loop by the sum of 2 w r = 1.75 w *
+        // stroke.
         let weight = self.part.hysteresis / 1.75;
         let h = 10e-6;
         for _ in 0..steps {
@@ -93,7 +94,7 @@ impl Plant {
             let mut free = self.drive;
             for (half_width, held) in &mut self.plays {
                 *held = held.clamp(self.drive - *half_width, self.drive + *half_width);
-                // Plays reach stroke - 2 r at the top; the linear share makes up for it.
+                // Plays reach stroke - 2 r at the top; the linear share completes it.
                 let linear = (1.0 - 2.0 * *half_width / Self::STROKE) * self.drive;
                 free += weight * (*held - *half_width - linear);
             }

@@ -1,5 +1,4 @@
-//! The loop against a model of the piezo: amplifier, second-order resonance, hysteresis, creep, gauge noise,
-//! latency.
+//! The loop with the piezo model.
 
 use super::*;
 use crate::io::REST_TICKS;
@@ -7,7 +6,7 @@ use crate::piezo::plant::{NOMINAL, Part, Plant};
 use crate::settings::{Settings, Values};
 use farnear_protocol::message::SettingKey;
 
-/// Moves, and gives the ticks after which the plant itself stays within 50 nm, and its worst overshoot in nm.
+/// Moves; returns the ticks until the plant stays within 50 nm, and its largest overshoot in nm.
 fn step(piezo: &mut Piezo, plant: &mut Plant, target: i32) -> (usize, f64) {
     let up = f64::from(target) > plant.at();
     piezo.go(Nanometres(target));
@@ -40,7 +39,7 @@ fn far_to_near_is_inside_50_nm_within_15_ms_whatever_the_part_is_like() {
     ];
     let blind = Settings::DEFAULT.fine;
     let calibrated = FineSettings { hysteresis_ppm: 120_000, creep_ppm_per_decade: 15_000, ..blind };
-    // Everything wrong at once is too much for a piezo that was never calibrated: 16 ms.
+    // All errors at once are too much for an uncalibrated piezo: 16 ms.
     let worst = Part { resonance_hz: 190.0, hysteresis: 0.12, creep: 0.015, ..NOMINAL };
     for (part, settings) in parts.map(|part| (part, blind)).into_iter().chain([(worst, calibrated)]) {
         for seed in 1..4 {
@@ -50,7 +49,7 @@ fn far_to_near_is_inside_50_nm_within_15_ms_whatever_the_part_is_like() {
             for target in [176_270, 20_000, 176_270, 20_000] {
                 let (ticks, overshoot) = step(&mut piezo, &mut plant, target);
                 assert!(ticks as u32 * TICK_US <= 15_000, "{part:?}: {ticks} ticks to {target}");
-                // The command is shaped, so what swings is small against the step.
+                // The command is shaped, so vibration is small relative to the step.
                 assert!(overshoot < 0.04 * 156_270.0, "{part:?}: {overshoot} nm beyond {target}");
             }
         }
@@ -72,9 +71,9 @@ fn a_second_mode_is_left_alone_where_the_setting_says_that_there_is_one() {
         step(&mut piezo, &mut plant, 20_000);
         [176_270, 20_000, 176_270].map(|target| step(&mut piezo, &mut plant, target).0).into_iter().max()
     };
-    // The fast loop feeds it until the amplifier is at its ends.
+    // The fast loop excites it until the amplifier saturates.
     assert_eq!(ticks(fast, (900.0, 0.05), 200.0), Some(500));
-    // What swings against a slow drive is the harder the nearer it is to the resonance.
+    // Modes nearer to the resonance that oppose a slow drive are harder.
     let modes = [350.0, 500.0, 700.0, 900.0, 1_300.0, 2_000.0]
         .into_iter()
         .flat_map(|hz| [0.02, 0.05, 0.1, 0.2].map(|share| (hz, share)))
@@ -82,17 +81,18 @@ fn a_second_mode_is_left_alone_where_the_setting_says_that_there_is_one() {
     for second in modes {
         for resonance_hz in [190.0, 200.0, 210.0] {
             let longest = ticks(gentle, second, resonance_hz);
-            // 0.1 s; the mode itself takes as long to die away.
+            // 0.1 s; the mode itself takes as long to decay.
             assert!(longest < Some(500), "{second:?}, {resonance_hz} Hz: {longest:?}");
         }
     }
-    // And without one: 41 ms.
+    // Without one: 41 ms.
     assert!(ticks(gentle, (700.0, 0.0), 200.0) < Some(220));
 }
 
 #[test]
 fn it_is_called_at_rest_only_where_what_it_says_is_where_it_is() {
-    // Found by the campaign: the set-point had arrived, and the piezo was still on its way by a micrometre a millisecond.
+    // Found by the campaign: the set-point had arrived while the piezo still moved a micrometre per
+    // millisecond.
     let mut piezo = Piezo::new(Settings::DEFAULT.fine);
     let mut plant = Plant::new(Part { hysteresis: 0.12, creep: 0.015, ..NOMINAL }, 1);
     let mut rests = 0;
@@ -104,7 +104,7 @@ fn it_is_called_at_rest_only_where_what_it_says_is_where_it_is() {
             if !piezo.is_moving() {
                 rests += 1;
                 let off = plant.position - f64::from(piezo.measured().0);
-                // Five standard deviations of the gauge, and what it swings in a tick within 100 nm of its target.
+                // Five standard deviations of the gauge, and the swing per tick within 100 nm of the target.
                 assert!(off.abs() < 120.0, "{off} nm beside what is told, to {target}");
             }
         }
@@ -114,7 +114,8 @@ fn it_is_called_at_rest_only_where_what_it_says_is_where_it_is() {
 
 #[test]
 fn stopped_on_its_way_it_is_called_at_rest_only_where_it_no_more_swings_through() {
-    // Found by the campaign: the loop's own swing after a stop passed the target for a millisecond, and an answer took as long.
+    // Found by the campaign: after a stop the loop's swing passed the target for a millisecond, as long as an
+    // answer took.
     const ANSWER_TICKS: usize = 6;
     let (mut worst, mut longest) = (0f64, 0);
     for stop in 1..120_usize {
@@ -136,7 +137,7 @@ fn stopped_on_its_way_it_is_called_at_rest_only_where_it_no_more_swings_through(
         }
         longest = longest.max(moved);
     }
-    // Five standard deviations of the gauge and what still swings; 30 ms.
+    // Five standard deviations of the gauge plus the remaining swing; 30 ms.
     assert!(
         worst < 50.0 && longest < 150,
         "{worst} nm beside what is told, {longest} ticks until it is at rest"
@@ -161,8 +162,7 @@ fn holding_turns_3_nm_of_gauge_noise_into_less_than_10_nm_of_motion() {
     assert!(rms < 10.0 && worst < 50.0, "{rms} nm RMS, {worst} nm at worst");
 }
 
-/// Looks at the piezo for so long, rarely where that is enough; gives how far it was off at worst, and the share of control ticks that
-/// was carried out.
+/// Observes the piezo, rarely where idle; returns the largest error and the share of executed ticks.
 fn look(piezo: &mut Piezo, plant: &mut Plant, seconds: u32) -> (f64, f64) {
     let (mut worst, mut looks, mut tick) = (0f64, 0, 0);
     while tick < seconds * TICK_HZ {
@@ -196,7 +196,7 @@ fn at_ease_it_is_held_as_well_by_a_tenth_of_the_ticks_whatever_the_part_is_like(
                 // A second of all ticks, then nine of every tenth.
                 assert!(off < 100.0, "{off} nm off {target} at {resonance_hz} Hz");
                 assert!(share < 0.25, "{share} of the ticks");
-                // And the next move is as good as ever: 16 ms where it was never calibrated.
+                // The next move is unaffected: 16 ms uncalibrated.
                 let (ticks, _) = step(&mut piezo, &mut plant, target / 2);
                 assert!(ticks <= 80, "{ticks} ticks from {target}");
             }
@@ -247,7 +247,7 @@ fn a_dead_gauge_opens_the_loop_and_holds_the_command() {
         assert!(code.abs_diff(held) < 20, "{code} after {held}");
         piezo.go(Nanometres(20_000));
     }
-    // It comes back: the next move begins without a jump.
+    // The gauge returns: the next move starts smoothly.
     let gauge = plant.gauge();
     piezo.sense(gauge);
     assert!(!piezo.gauge_failed());
@@ -286,13 +286,13 @@ fn a_loop_that_feeds_a_mode_is_opened_before_the_stack_is_pulled_apart() {
             "{second:?}: opened after {failed} ticks, {off:.0} nm off at worst, {:.0} at the end",
             plant.at() - 100e3
         );
-        // In the middle of its stroke of 200 um the stack is pulled from 100 um on.
+        // In the middle of its 200 um stroke the stack is in tension from 100 um on.
         assert!(failed > 0 && off < 100e3, "{second:?}: tick {failed}, {off} nm off");
         assert!((plant.at() - 100e3).abs() < 100e3 && !piezo.gauge_failed());
     }
 }
 
-/// The largest mean innovation of some ways, um.
+/// Largest mean innovation of some moves, um.
 fn surprise_um(settings: FineSettings, part: Part) -> f64 {
     let (mut piezo, mut plant, mut worst) = (Piezo::new(settings), Plant::new(part, 7), 0);
     for target in [20_000, 176_270, 20_000, 100_000] {
@@ -330,7 +330,7 @@ fn a_piezo_that_follows_is_far_from_one_that_does_not() {
     }
     let limit = f64::from(INNOVATION_LIMIT >> BITS) / 1e3;
     std::println!("{fast} um with the fast loop, {gentle} um with the gentle one, of {limit}");
-    // A fifth for what a piezo may be off its data sheet in both, and a second mode of any share within what the gentle one bears.
+    // 20 % deviation from the data sheet, and a second mode of any share tolerated by the gentle loop.
     assert!(fast < 0.2 * limit && gentle < 0.8 * limit, "{fast} um, {gentle} um");
 }
 
@@ -342,7 +342,7 @@ fn a_single_wrong_reading_is_no_piezo_that_does_not_follow() {
         step(&mut piezo, &mut plant, 100_000);
         piezo.sense(plant.gauge().and_then(|code| code.checked_add_signed(jump)));
         plant.tick(piezo.act());
-        // It is no more than a way of that length, which takes 15 ms.
+        // Not longer than a move of that distance, 15 ms.
         let (ticks, _) = step(&mut piezo, &mut plant, 100_000);
         assert!(!piezo.take_failure() && ticks as u32 * TICK_US <= 15_000, "{jump} nm: {ticks} ticks");
     }
@@ -389,7 +389,7 @@ fn any_gauge_keeps_the_loop_in_bounds() {
         random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
         let wild = (random >> 40) as u32 & GAUGE_CODE_MAX;
         piezo.sense(Some(wild.clamp(1, GAUGE_CODE_MAX - 1)));
-        // One that does not follow is let go at once.
+        // Released immediately if it does not follow.
         if tick % 101 == 0 || piezo.control.is_none() {
             piezo.go(Nanometres((random >> 33) as i32 % 200_000));
         }
@@ -428,7 +428,7 @@ fn what_the_calibration_knows_makes_the_way_cleaner() {
         worst
     };
     let (blind, knowing) = (swing(0, 0), swing(120_000, 15_000));
-    // The plant's plays are wider than the model's, so a part is left to the observer.
+    // The plant's plays are wider than the model's, so a part remains for the observer.
     assert!(knowing < 0.7 * blind, "{knowing} nm in place of {blind} nm beyond the target");
 }
 
@@ -439,7 +439,7 @@ fn after_a_reset_it_is_led_down_from_where_it_stands() {
         plant.tick(Some(51_000));
     }
     let mut piezo = Piezo::new(Settings::DEFAULT.fine);
-    // The converter does not answer at once.
+    // The converter does not answer immediately.
     piezo.sense(None);
     assert_eq!(piezo.act(), None, "nothing is played while nobody knows");
     let mut lowest = f64::MAX;

@@ -1,29 +1,29 @@
-//! The pace of a continuous run: at which moments exposures are due, and how many were taken.
+//! Timing of a continuous run: due times and counts.
 //!
-//! Frame k is due a whole number of periods after the first one, so that no delay adds up. Its trigger is ordered a tick ahead and
-//! rises by the camera timer's compare match: to the microsecond, whatever the tick has to do. A moment that finds position or
-//! camera not ready passes; the same shot is due at the next.
+//! Frame k is due a whole number of periods after the first, so delays never accumulate. Triggers are ordered
+//! a tick ahead and rise by compare match, exact to the microsecond. If position or camera are not ready, the
+//! period passes and the same shot is due next.
 
 use farnear_protocol::{BoardMicros, Micros};
 
 use crate::io::TICK_US;
 
-/// From the tick that orders a trigger to its edge: the order is carried out before the next tick, however long that one waits.
+/// From the ordering tick to the edge: the order is executed before the next tick, however late that is.
 const AHEAD_US: u64 = 2 * TICK_US as u64;
-/// Triggers in a row that the camera did not answer, after which it is taken for dead.
+/// Unanswered triggers in a row after which the camera is dead.
 const UNANSWERED_MAX: u8 = 3;
 
 #[derive(Clone, Debug)]
 pub(crate) struct Pace {
-    /// 0 = as fast as position and camera allow.
+    /// 0 = as fast as possible.
     period: Micros,
-    /// Exposures after which it ends; 0 = none.
+    /// Number of exposures; 0 = endless.
     wanted: u32,
     taken: u32,
     dropped: u32,
-    /// The frame that is due next.
+    /// Next frame.
     frame: u32,
-    /// A frame and its moment, from which the others count.
+    /// A frame and its time, the reference of all others.
     begin: Option<(u32, BoardMicros)>,
     unanswered: u8,
 }
@@ -33,7 +33,7 @@ impl Pace {
         Self { period, wanted, taken: 0, dropped: 0, frame: 0, begin: None, unanswered: 0 }
     }
 
-    /// The moment of the next frame, where its trigger is to be ordered now.
+    /// Time of the next frame, if its trigger must be ordered now.
     pub(crate) fn due(&self, now: BoardMicros) -> Option<BoardMicros> {
         if self.period.0 == 0 {
             return Some(now);
@@ -45,12 +45,12 @@ impl Pace {
         (due <= ahead).then_some(due)
     }
 
-    /// Whether a moment that finds nothing ready is lost: before the first one, and without a pace, none is.
+    /// Whether a missed period is lost: not before the first exposure, and not without a period.
     pub(crate) const fn presses(&self) -> bool {
         self.begin.is_some()
     }
 
-    /// The next frame is exposed at this moment; gives its number.
+    /// Schedules the next frame at this time; returns its number.
     pub(crate) fn take(&mut self, due: BoardMicros) -> u32 {
         if self.period.0 > 0 {
             self.begin.get_or_insert((self.frame, due));
@@ -58,7 +58,7 @@ impl Pace {
         self.pass()
     }
 
-    /// The next frame's moment passes without an exposure; gives its number.
+    /// Skips the next frame; returns its number.
     pub(crate) const fn drop_frame(&mut self) -> u32 {
         self.dropped = self.dropped.saturating_add(1);
         self.pass()
@@ -70,21 +70,21 @@ impl Pace {
         frame
     }
 
-    /// An exposure was answered; gives exposures and dropped frames, if it was the last one wanted.
+    /// An exposure was answered; returns exposures and dropped frames if it was the last.
     pub(crate) fn answered(&mut self) -> Option<(u32, u32)> {
         self.unanswered = 0;
         self.taken = self.taken.saturating_add(1);
         (self.taken == self.wanted).then_some((self.taken, self.dropped))
     }
 
-    /// A trigger was not answered: its frame is dropped. Whether that is to be borne.
+    /// A trigger was not answered: drops its frame. Returns whether to continue.
     pub(crate) const fn unanswered(&mut self) -> bool {
         self.dropped = self.dropped.saturating_add(1);
         self.unanswered += 1; // at most to its limit, which ends the run
         self.unanswered < UNANSWERED_MAX
     }
 
-    /// The run goes on after a pause: from a moment of its own.
+    /// Restarts the timing after a pause.
     pub(crate) const fn begin_anew(&mut self) {
         self.begin = None;
     }

@@ -1,4 +1,4 @@
-//! What must hold before a request is carried out.
+//! Preconditions of requests.
 
 use farnear_protocol::message::{Axis, PositionState, RequestError, sensor_distance_nm};
 use farnear_protocol::{Micros, Nanometres};
@@ -8,7 +8,7 @@ use crate::rig::Rig;
 use crate::work::Active;
 
 impl Rig {
-    /// Nothing forbids motion, and the host's deadline is sensible.
+    /// Motion is permitted, and the silence deadline is in range.
     pub(super) fn may_move(&self, silence: Micros) -> Result<(), RequestError> {
         if let Some(record) = self.alarms.latched() {
             return Err(RequestError::Alarm { number: record.number, alarm: record.alarm });
@@ -29,7 +29,7 @@ impl Rig {
         Axis::ALL.into_iter().try_for_each(|axis| self.must_be_free(axis))
     }
 
-    /// Nothing moves: what takes longer than a tick harms nobody.
+    /// Nothing moves, so work beyond a tick is harmless.
     pub(super) fn must_stand(&self) -> Result<(), RequestError> {
         match self.works.any() {
             Some(request) => Err(RequestError::Busy { request }),
@@ -60,7 +60,7 @@ impl Rig {
         }
     }
 
-    /// The lowest that an axis comes on the way it is on.
+    /// Lowest position of an axis' current move.
     pub(super) fn lowest(&self, axis: Axis) -> Nanometres {
         let Some(stepper) = self.stage.stepper(axis) else { return self.stage.fine.lowest() };
         let lowest = stepper.lowest();
@@ -68,25 +68,25 @@ impl Rig {
         if homes { self.below_carried(axis, lowest) } else { lowest }
     }
 
-    /// The lowest that an axis comes to where it is homed with the piezo where it is; the piezo, where it is relaxed.
+    /// Lowest position of homing with the present piezo; for the piezo, relaxed.
     pub(super) fn lowest_of_homing(&self, axis: Axis) -> Nanometres {
         let lowest = self.stage.stepper(axis).map_or(Nanometres(0), Stepper::lowest_of_homing);
         self.below_carried(axis, lowest)
     }
 
-    /// The piezo carries the tab of stage A's home switch, so that the switch is met lower by the piezo's extension.
+    /// Stage A's home switch is met lower by the piezo's extension, which carries its tab.
     fn below_carried(&self, axis: Axis, lowest: Nanometres) -> Nanometres {
         let carried = self.stage.carried(axis).unwrap_or(self.stage.measured(Axis::SensorFine));
         Nanometres(lowest.0.saturating_sub(carried.0.max(0)))
     }
 
-    /// A routine keeps sensor and lens apart with every axis that it moves at its extreme: one check for all of them, because
-    /// each axis alone may stay outside the limit while both together pass it.
+    /// Checks the distance of sensor and lens for a routine with all its axes at their extreme: each alone
+    /// may pass while all together violate it.
     pub(super) fn routine_must_not_come_close(&self, axes: &[Axis]) -> Result<(), RequestError> {
         let piezo_relaxes = axes.contains(&Axis::SensorFine);
         let extreme = |axis| {
             let homing = match self.stage.stepper(axis) {
-                // The routine relaxes the piezo before it looks for the switch.
+                // The routine relaxes the piezo first.
                 Some(stepper) if piezo_relaxes => stepper.lowest_of_homing(),
                 _ => self.lowest_of_homing(axis),
             };
@@ -101,19 +101,19 @@ impl Rig {
         self.must_be_apart(|axis| if axes.contains(&axis) { extreme(axis) } else { self.lowest(axis) })
     }
 
-    /// The lowest that an axis comes on its way to a target.
+    /// Lowest position on the way to a target.
     pub(super) fn lowest_to(&self, axis: Axis, target: Nanometres) -> Nanometres {
         self.with_approach(axis, target).min(self.stage.measured(axis))
     }
 
-    /// The lowest that an axis comes where it comes to a target from below.
+    /// Lowest position with an approach from below.
     pub(super) fn with_approach(&self, axis: Axis, target: Nanometres) -> Nanometres {
         let approach = self.stage.stepper(axis).map_or(0, |stepper| stepper.approach().0);
         Nanometres(target.0.saturating_sub(approach))
     }
 
-    /// With an axis at its lowest, and the others on their ways, sensor and lens stay apart. To move apart is always
-    /// allowed.
+    /// Sensor and lens stay apart with an axis at its lowest and the others on their ways. Moving apart is
+    /// always permitted.
     pub(super) fn must_not_come_close(&self, axis: Axis, lowest: Nanometres) -> Result<(), RequestError> {
         let homed = self.stage.state(axis) == PositionState::Homed;
         if homed && lowest >= self.stage.measured(axis) {
@@ -122,7 +122,7 @@ impl Rig {
         self.must_be_apart(|other| if other == axis { lowest } else { self.lowest(other) })
     }
 
-    /// With the axes at these positions there is the smallest distance between sensor and lens.
+    /// Smallest distance of sensor and lens at these positions.
     pub(super) fn must_be_apart(&self, position: impl Fn(Axis) -> Nanometres) -> Result<(), RequestError> {
         let min = self.settings.distance_min;
         let distance = sensor_distance_nm(self.settings.datum, position);

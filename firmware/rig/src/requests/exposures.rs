@@ -74,7 +74,7 @@ impl Rig {
         self.run(Some(Pace::new(period, exposures)), request, now)
     }
 
-    /// Runs the armed program; with a pace for ever.
+    /// Runs the armed program; endless with a pace.
     fn run(&mut self, pace: Option<Pace>, (request, silence): (u32, Micros), now: BoardMicros) -> Answer {
         self.may_move(silence)?;
         self.all_must_be_free()?;
@@ -82,7 +82,8 @@ impl Rig {
         let Some(first) = self.shots.get(0).copied().filter(|_| count > 0) else {
             return Err(RequestError::Program { state: self.program_status().state });
         };
-        // Since it was armed axes may have lost their positions, or moved. The second round begins where the first one ends.
+        // Axes may have moved or lost their positions since arming. The second round starts where the first
+        // ends.
         self.check_program(count, if pace.is_some() { 2 } else { 1 })?;
         let first = (first, self.shots.light(0));
         let run = Run::start((count, first), pace, &mut self.stage, &self.settings, now);
@@ -90,7 +91,7 @@ impl Rig {
         Ok(Response::Accepted)
     }
 
-    /// Whether the first `count` shots can be run from here, so often.
+    /// Checks the first `count` shots for this number of rounds.
     pub(super) fn check_program(&self, count: u8, rounds: u8) -> Result<(), RequestError> {
         if count == 0 || usize::from(count) > SHOTS_MAX {
             return Err(RequestError::Shot { index: count, reason: ShotFault::Index });

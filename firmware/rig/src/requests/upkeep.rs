@@ -38,7 +38,7 @@ impl Rig {
         Ok(Response::Setting(self.values.setting(key)))
     }
 
-    /// Takes changed settings over, and has them kept.
+    /// Applies and stores changed settings.
     pub(crate) fn apply_settings(&mut self) {
         self.settings = self.parts.with(&self.values);
         self.stage.apply(&self.settings);

@@ -1,12 +1,12 @@
-//! Which request ids are new.
+//! Request ids.
 //!
-//! Ids only grow, over a whole boot. A request that got lost on the line may still arrive behind later ones, so of the
-//! last [`IDS`] ids it is known which were used (the anti-replay window of IPsec, RFC 4303, section 3.4.3); everything
-//! older counts as used. Cost: twelve bytes, and a few operations a request.
+//! Ids increase over a boot. A delayed request may arrive after later ones, so the last [`IDS`] ids are
+//! tracked (anti-replay window of IPsec, RFC 4303, section 3.4.3); older ones count as used. Cost: twelve
+//! bytes, a few operations per request.
 
 use farnear_protocol::message::ID_STEP_MAX;
 
-/// Ids of which it is known whether they were used.
+/// Tracked ids.
 pub(super) const IDS: u32 = u64::BITS;
 
 #[derive(Clone, Copy, Debug)]
@@ -17,17 +17,16 @@ pub(super) struct Ids {
 }
 
 impl Ids {
-    /// A boot in which nobody has asked anything; 0 is no id.
+    /// A new boot; 0 is no id.
     pub(super) const fn new() -> Self {
         Self { last: 0, used: u64::MAX }
     }
 
-    /// The largest id that was used, 0 where none was.
+    /// Largest used id, 0 = none.
     pub(super) const fn last(&self) -> u32 {
         self.last
     }
 
-    /// Whether a request with this id would be a new one.
     pub(super) const fn is_new(&self, id: u32) -> bool {
         if id > self.last {
             id - self.last <= ID_STEP_MAX
@@ -37,7 +36,7 @@ impl Ids {
         }
     }
 
-    /// A request with this new id was taken on.
+    /// Marks a new id as used.
     pub(super) fn take(&mut self, id: u32) {
         if id > self.last {
             self.used = self.used.checked_shl(id - self.last).unwrap_or(0) | 1;
@@ -47,7 +46,7 @@ impl Ids {
         }
     }
 
-    /// A session begins with this new id: what lies below it belongs to the ones before.
+    /// Starts a session with this id: lower ones belong to earlier sessions.
     pub(super) fn begin(&mut self, id: u32) {
         *self = Self { last: id.max(self.last), used: u64::MAX };
     }

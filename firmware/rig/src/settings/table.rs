@@ -1,19 +1,18 @@
-//! Settings by key: the numbers that the host may change and the memory keeps, with their ranges.
+//! Settings by key with ranges.
 
 use farnear_protocol::message::{Axis, Setting, SettingKey, StepperKeys};
 use farnear_protocol::{Micros, Nanometres};
 
 use super::{STEP_PM, Settings, StepperSettings};
 
-/// How many settings there are.
 pub(crate) const KEYS: usize = SettingKey::ALL.len();
 
-/// The values of all settings, in the order of [`SettingKey::ALL`].
+/// Values in the order of [`SettingKey::ALL`].
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Values([i32; KEYS]);
 
 impl Values {
-    /// A board that was never set.
+    /// Factory defaults.
     pub const DEFAULT: Self = {
         let mut values = [0; KEYS];
         let mut i = 0;
@@ -24,12 +23,11 @@ impl Values {
         Self(values)
     };
 
-    /// A setting's value.
     pub const fn get(&self, key: SettingKey) -> i32 {
         self.0[key as usize]
     }
 
-    /// A setting as the host is told it. Largest and smallest position of an axis bound each other.
+    /// A setting for the host. Smallest and largest position bound each other.
     pub fn setting(&self, key: SettingKey) -> Setting {
         let (default, mut min, mut max) = range(key);
         for (low, high) in Axis::ALL.map(limit_keys) {
@@ -43,9 +41,7 @@ impl Values {
     }
 
     /// Changes a setting.
-    ///
-    /// # Errors
-    /// The setting with the range that the value is outside of.
+    /// Errors: the setting with its range.
     pub fn set(&mut self, key: SettingKey, value: i32) -> Result<(), Setting> {
         let setting = self.setting(key);
         if !(setting.min..=setting.max).contains(&value) {
@@ -55,7 +51,7 @@ impl Values {
         Ok(())
     }
 
-    /// Values from the memory: what is outside its range, perhaps written by another firmware, is the default.
+    /// Values from memory: those out of range, e.g. of another firmware, become the default.
     pub(crate) fn restored(values: [i32; KEYS]) -> Self {
         let mut restored = Self::DEFAULT;
         for (key, value) in SettingKey::ALL.into_iter().zip(values) {
@@ -78,7 +74,7 @@ impl Values {
     }
 }
 
-/// The settings that bound an axis' positions.
+/// Keys of an axis' position limits.
 const fn limit_keys(axis: Axis) -> (SettingKey, SettingKey) {
     match StepperKeys::of(axis) {
         Some(StepperKeys { min, max, .. }) => (min, max),
@@ -86,12 +82,12 @@ const fn limit_keys(axis: Axis) -> (SettingKey, SettingKey) {
     }
 }
 
-/// Default, smallest and largest value. Values that come with a reason in [`Settings`] are not explained again.
+/// Default, smallest and largest value. Reasons in [`Settings`] are not repeated.
 const fn range(key: SettingKey) -> (i32, i32, i32) {
     match key {
         // The thesis' lens (f = 50 mm) needs 52.8 to 53.0 mm (Li 2014, chapter 4): 5.9 mm into the travel.
         SettingKey::DatumNm => (47_000_000, 10_000_000, 200_000_000),
-        // Homing brakes a quarter of a millimetre beyond the switch, and both stages may be homed at once.
+        // Homing brakes a quarter of a millimetre beyond the switch, possibly on both stages.
         SettingKey::DistanceMinNm => (46_450_000, 0, 200_000_000),
         SettingKey::CoarseMinNm | SettingKey::LensMinNm => (0, 0, TRAVEL_NM),
         SettingKey::CoarseMaxNm | SettingKey::LensMaxNm => (TRAVEL_NM, 0, TRAVEL_NM),
@@ -103,7 +99,7 @@ const fn range(key: SettingKey) -> (i32, i32, i32) {
         }
         // Bends of 31 ms, two periods of the lowest resonance that such a stage may have.
         SettingKey::CoarseJerkUmPerS3 | SettingKey::LensJerkUmPerS3 => (1_600_000, 10_000, 100_000_000),
-        // Of the screw in the parts list; the calibration measures the real one.
+        // Screw of the parts list; the calibration measures the real one.
         SettingKey::CoarseBacklashNm | SettingKey::LensBacklashNm => (4_000, 0, 100_000),
         // A stalled motor slips by four full steps (10 um) at a time; load angle and latency stay below 4 um.
         SettingKey::CoarseFollowingNm | SettingKey::LensFollowingNm => (6_000, 1_000, 100_000),
@@ -111,31 +107,31 @@ const fn range(key: SettingKey) -> (i32, i32, i32) {
         SettingKey::FineMaxNm => (FINE_MAX_NM, FINE_MIN_NM, FINE_MAX_NM),
         // 200 um over 65535 codes.
         SettingKey::PiezoGainPmPerCode => (3_052, 2_000, 4_000),
-        // Not measured yet: the loop alone takes hysteresis and creep out.
+        // Not measured yet: the loop alone compensates hysteresis and creep.
         SettingKey::PiezoHysteresisPpm => (0, 0, 300_000),
         SettingKey::PiezoCreepPpmPerDecade => (0, 0, 100_000),
-        // The sensor is read out in 10 ms, which overlaps the next move; 5 % for its clock.
+        // Read-out takes 10 ms and overlaps the next move; 5 % for its clock.
         SettingKey::CameraReadoutUs => (10_500, 0, 1_000_000),
-        // Latency 20 us; a camera that has not answered after 5 ms did not hear.
+        // Latency 20 us; without answer after 5 ms the trigger was missed.
         SettingKey::StrobeDeadlineUs => (5_000, 100, 1_000_000),
-        // As its data sheet has it, until it is calibrated; a tenth is more than such a gauge errs.
+        // Data sheet value until calibrated; such a gauge errs by less than a tenth.
         SettingKey::GaugeGainPpm => (1_000_000, 900_000, 1_100_000),
-        // The converter sees 10 um below zero.
+        // The converter's range starts 10 um below zero.
         SettingKey::GaugeOffsetNm => (0, -9_000, 9_000),
-        // The fast loop, for a flexure that has its resonance and little else.
+        // The fast loop, for a flexure with a single resonance.
         SettingKey::PiezoSecondMode => (0, 0, 1),
     }
 }
 
 /// The micrometers' travel; the far switches sit beyond it.
 const TRAVEL_NM: i32 = 13_000_000;
-/// 5 um at each end of the 200 um stroke are kept for the loop: hysteresis and creep move the ends of the free stroke,
-/// and a saturated amplifier cannot damp the resonance.
+/// 5 um at each end of the 200 um stroke are reserved for the loop: hysteresis and creep move the ends, and a
+/// saturated amplifier cannot damp the resonance.
 const FINE_MIN_NM: i32 = 5_000;
 const FINE_MAX_NM: i32 = 195_000;
 
 impl Settings {
-    /// These numbers with the values of the settings.
+    /// Applies the settings' values.
     pub const fn with(mut self, values: &Values) -> Self {
         self.datum = Nanometres(values.get(SettingKey::DatumNm));
         self.distance_min = Nanometres(values.get(SettingKey::DistanceMinNm));
@@ -149,7 +145,7 @@ impl Settings {
         self.fine.gauge_gain_ppm = values.get(SettingKey::GaugeGainPpm) as u32;
         if values.get(SettingKey::PiezoSecondMode) != 0 {
             self.fine.gains = self.fine.gentle_gains;
-            // Within a shorter one this loop may still creep through the window.
+            // With a shorter one this loop may still creep through the window.
             self.fine.dwell_min = Micros(10_000);
         }
         self.fine.gauge_offset = Nanometres(values.get(SettingKey::GaugeOffsetNm));
@@ -165,7 +161,7 @@ impl StepperSettings {
         self.min = Nanometres(values.get(min));
         self.max = Nanometres(values.get(max));
         self.speed = pulses(values.get(speed), 1_000);
-        // A rig that was told to go slowly also homes slowly.
+        // A rig set to be slow also homes slowly.
         self.home_search_speed = smaller(self.home_search_speed, self.speed);
         self.home_leave_speed = smaller(self.home_leave_speed, self.speed);
         self.acceleration = pulses(values.get(acceleration), 1_000_000);

@@ -141,7 +141,7 @@ fn break_in_motion(faults: Faults) -> (Failure, f64, Bench) {
 }
 
 #[test]
-fn a_stall_is_seen_and_loses_the_position() {
+fn a_stall_is_detected_and_invalidates_the_position() {
     let (reason, time, mut bench) = break_in_motion(Faults { stalled: true, ..Faults::default() });
     let Failure::Following { error } = reason else { panic!("{reason:?}") };
     assert!((6_000..20_000).contains(&error.0), "{error:?}");

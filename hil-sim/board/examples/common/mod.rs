@@ -1,11 +1,11 @@
-//! What the examples expose.
+//! Exposures of the examples.
 
 use farnear_protocol::{
     Micros, Nanometres,
     message::{Axis, Shot, TriggerMode},
 };
 
-/// A far- and a near-focused shot by the piezo alone.
+/// A far- and a near-focused shot that move only the piezo.
 pub fn far_and_near() -> [Shot; 2] {
     [10_000, 166_270].map(|target| Shot {
         axis: Axis::SensorFine,

@@ -1,4 +1,4 @@
-//! What a scenario lets happen to the rig, and what a trace says was done to it.
+//! Executes a scenario's faults or a recorded run.
 
 use rigless::{
     emulator::{Host, Stop},
@@ -15,20 +15,20 @@ use crate::{
     trace::{Trace, vcd::Vcd},
 };
 
-/// A motor that steps after so long has set off anew.
+/// A step after this pause starts a new motion.
 const MOTION_GAP_NS: u64 = 20_000_000;
-/// A byte that is written to the memory after so long begins a write.
+/// A write after this pause starts a new write.
 const WRITE_GAP_NS: u64 = 5_000_000;
 
 impl Driver {
-    /// Does from now on what a trace says, to its end, and holds what comes of it against it.
+    /// Replays a trace to its end and compares the results with it.
     pub fn follow(&mut self, mut script: Script) {
         let comparer = std::mem::take(&mut script.comparer);
         self.trace = Some(Trace::Vcd(Box::new(Vcd::compare(comparer))));
         self.script = Some(script);
     }
 
-    /// Does what the script has for this moment; gives until when the emulator may run, `None` at the end.
+    /// Executes the entries that are due; returns the time of the next stop, `None` at the end.
     pub(super) fn next_of_script(
         &mut self,
         session: &mut Session<RigBoard>,
@@ -53,7 +53,6 @@ impl Driver {
         Some(next_ns.min(now_ns + self.pacing.quantum_ns()))
     }
 
-    /// Takes back what the scenario did.
     pub(super) fn heal(&mut self, session: &mut Session<RigBoard>, stop: Stop, host: &mut dyn Host) {
         if let Some(vcd) = self.vcd() {
             vcd.healed(stop.at.0);
@@ -64,16 +63,15 @@ impl Driver {
         self.observer.note(stop.at.0, Seen::Healed);
     }
 
-    /// Lets happen what is due.
     pub(super) fn happen(&mut self, session: &mut Session<RigBoard>, stop: Stop, host: &mut dyn Host) {
         let now_ns = stop.at.0;
         self.notice(session, now_ns);
         for due in self.schedule.take_due(now_ns) {
             let what = due.happening.what.name;
             if let Some(vcd) = self.vcd() {
-                vcd.happened(now_ns, what, due.mends);
+                vcd.happened(now_ns, what, due.reverts);
             }
-            self.observer.note(now_ns, Seen::Happened { what, mends: due.mends });
+            self.observer.note(now_ns, Seen::Happened { what, reverts: due.reverts });
             self.access(|rig| due.happen(rig), session, stop, host);
         }
         if std::mem::take(&mut self.lines.renamed) {
@@ -81,7 +79,7 @@ impl Driver {
         }
     }
 
-    /// The port goes away, and there is another one. The new one is opened first, or it would get the name of the old.
+    /// Replaces the port. The new one is opened first, because it would get the old name otherwise.
     fn rename_port(&mut self) {
         if let Some(open) = &mut self.outlets.another_port {
             self.outlets.bytes = open();
@@ -89,7 +87,7 @@ impl Driver {
         }
     }
 
-    /// Looks for the moments of a run that no frame tells of.
+    /// Detects run events that no frame reports.
     fn notice(&mut self, session: &mut Session<RigBoard>, now_ns: u64) {
         for burst in self.wiring.take_bursts(now_ns, false) {
             self.observer.note(burst.last_ns, Seen::Stepped(burst));

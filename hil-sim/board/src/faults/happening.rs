@@ -1,52 +1,41 @@
-//! One thing that happens: when, what, to what, how long.
+//! One scheduled fault: time, kind, target, duration.
 
 use serde::{Deserialize, Serialize};
 
 use super::{Kind, Moment};
 use crate::plant::StageName;
 
-/// When something happens.
+/// Trigger time of a fault.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub enum When {
-    /// At a moment of virtual time after power-on.
-    After {
-        /// How long after it, milliseconds.
-        ms: f64,
-    },
-    /// When something else has happened so many times.
-    On {
-        moment: Moment,
-        nth: u32,
-        /// How long after it, milliseconds.
-        delay_ms: f64,
-    },
-    /// Again and again, by chance (a Poisson process that the seed draws).
+    /// Virtual time after power-on.
+    After { ms: f64 },
+    /// After the n-th occurrence of a moment.
+    On { moment: Moment, nth: u32, delay_ms: f64 },
+    /// Random times (Poisson process, drawn from the seed).
     Chance {
-        /// So often a second, on average.
+        /// Mean rate, 1/s.
         per_s: f64,
     },
 }
 
-/// Something that happens, and to what.
+/// A scheduled fault with its target.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
 #[serde(try_from = "Row", into = "Row")]
 pub struct Happening {
     pub when: When,
-    /// The kind of thing that happens.
     pub what: Kind,
-    /// How long until it is taken back, milliseconds; `None`: for good.
+    /// Duration in ms; `None`: never reverted.
     pub for_ms: Option<f64>,
-    /// The stage concerned, if one is.
     pub stage: StageName,
-    /// How much of it, in the unit of its kind.
+    /// Amount in the unit of the kind.
     pub amount: f64,
-    /// The address of the memory concerned, if one is.
     pub address: u16,
-    /// The bit there, 0 to 7.
+    /// Bit at this address, 0 to 7.
     pub bit: u8,
 }
 
-/// A table `[[happens]]` of a file.
+/// A table `[[happens]]`.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Row {
@@ -75,15 +64,14 @@ struct Row {
     bit: Option<u8>,
 }
 
-/// The longest time that a file may name: a day.
+/// Longest time in a file: one day.
 const LONGEST_MS: f64 = 86_400_000.0;
 
-/// Cycles of the core, at 168 MHz. Written back, such a moment is one in milliseconds.
+/// Core clock 168 MHz: times are rounded to whole cycles.
 const CYCLES_PER_MS: f64 = 168_000.0;
 
-/// Checks that a number is in its range.
 fn within(name: &str, value: f64, (min, max): (f64, f64)) -> Result<f64, String> {
-    // Not a number is in no range.
+    // NaN is outside every range.
     if (min..=max).contains(&value) {
         Ok(value)
     } else {
@@ -102,12 +90,12 @@ impl Row {
         let delay_ms = self.delay_ms.map(|ms| within("delay_ms", ms, (0.0, LONGEST_MS))).transpose()?;
         let per_s = self.chance_per_s.map(|rate| within("chance_per_s", rate, (1e-6, 1e4))).transpose()?;
         if self.on.is_none() && (self.nth.is_some() || delay_ms.is_some()) {
-            return Err("nth and delay_ms belong to `on`, which is missing".into());
+            return Err("nth and delay_ms require `on`".into());
         }
         match (after_ms, self.on, per_s) {
             (Some(ms), None, None) => Ok(When::After { ms }),
             (None, Some(moment), None) => match self.nth.unwrap_or(1) {
-                0 => Err("nth = 0 is never: the first time is nth = 1".into()),
+                0 => Err("nth = 0 is invalid: the first time is nth = 1".into()),
                 nth => Ok(When::On { moment, nth, delay_ms: delay_ms.unwrap_or(0.0) }),
             },
             (None, None, Some(per_s)) => Ok(When::Chance { per_s }),
@@ -119,7 +107,7 @@ impl Row {
         }
     }
 
-    /// Fields that stand there and mean nothing to this kind.
+    /// A field that this kind does not use.
     fn superfluous(&self) -> Option<&'static str> {
         let Takes { stage, amount, place } = self.what.takes;
         let fields = [
@@ -127,7 +115,7 @@ impl Row {
             ("amount", self.amount.is_some() && amount.is_none()),
             ("address", self.address.is_some() && !place),
             ("bit", self.bit.is_some() && !place),
-            ("for_ms", self.for_ms.is_some() && self.what.mend.is_none()),
+            ("for_ms", self.for_ms.is_some() && self.what.revert.is_none()),
         ];
         fields.into_iter().find_map(|(name, there)| there.then_some(name))
     }
@@ -139,7 +127,7 @@ impl TryFrom<Row> for Happening {
     fn try_from(row: Row) -> Result<Self, String> {
         let kind = row.what;
         if let Some(field) = row.superfluous() {
-            return Err(format!("{field} means nothing to what = \"{}\": leave it out", kind.name));
+            return Err(format!("{field} has no effect with what = \"{}\": leave it out", kind.name));
         }
         let (address, bit) = (row.address.unwrap_or(0), row.bit.unwrap_or(0));
         within("address", f64::from(address), (0.0, (rigless::chip::fram::SIZE - 1) as f64))?;
@@ -188,7 +176,7 @@ impl From<Happening> for Row {
     }
 }
 
-/// Which fields beside the moment a kind has.
+/// Fields that a kind uses.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub struct Takes {
     pub stage: bool,
@@ -196,27 +184,26 @@ pub struct Takes {
     pub place: bool,
 }
 
-/// What `amount` may be.
+/// Range of `amount`.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Amount {
     pub min: f64,
     pub max: f64,
-    /// Where nothing is said.
+    /// Default.
     pub usual: f64,
 }
 
 impl Takes {
     pub const NOTHING: Self = Self { stage: false, amount: None, place: false };
     pub const STAGE: Self = Self { stage: true, ..Self::NOTHING };
-    /// An address and a bit of the memory.
+    /// Memory address and bit.
     pub const PLACE: Self = Self { place: true, ..Self::NOTHING };
 
-    /// How much, and what is usual.
+    /// Range and default of the amount.
     pub const fn amount(min: f64, max: f64, usual: f64) -> Self {
         Self { amount: Some(Amount { min, max, usual }), ..Self::NOTHING }
     }
 
-    /// How much of it at which stage.
     pub const fn stage_and_amount(min: f64, max: f64, usual: f64) -> Self {
         Self { amount: Some(Amount { min, max, usual }), ..Self::STAGE }
     }

@@ -1,25 +1,25 @@
-//! A serial line that flips bits, loses bytes and makes some up.
+//! Serial line that flips bits, loses bytes and inserts bytes.
 
 use crate::plant::Noise;
 
-/// What goes wrong on a line.
+/// Fault probabilities of a line.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub struct Rates {
-    /// Probability of each bit to flip.
+    /// Per bit.
     pub flipped: f64,
-    /// Probability of each byte to get lost.
+    /// Per byte.
     pub lost: f64,
-    /// Probability of a byte to come out of nothing in front of each byte.
+    /// Probability of an inserted byte in front of each byte.
     pub inserted: f64,
     pub cut: bool,
 }
 
-/// Something that happens to a thing in a row with a probability.
+/// Bernoulli trials, drawn as gaps between hits.
 #[derive(Clone, Debug)]
 struct Chance {
     rate: f64,
     noise: Noise,
-    /// Things until the next that it happens to.
+    /// Trials until the next hit.
     gap: u64,
 }
 
@@ -30,7 +30,7 @@ impl Chance {
         chance
     }
 
-    /// Another probability: the length of the run is drawn anew.
+    /// Sets the probability and draws a new gap.
     fn set_rate(&mut self, rate: f64) {
         if rate != self.rate {
             self.rate = rate;
@@ -38,17 +38,17 @@ impl Chance {
         }
     }
 
-    /// Length of the run to which nothing happens: geometric.
+    /// Geometric gap length.
     fn draw(&mut self) -> u64 {
         if self.rate <= 0.0 {
             return u64::MAX;
         }
         let good = libm::log(1.0 - self.noise.uniform()) / libm::log1p(-self.rate);
-        // A float too large for the integer saturates, which is what is meant.
+        // Large floats saturate, as intended.
         if good.is_finite() { good as u64 } else { 0 }
     }
 
-    /// Whether it happens to the next one.
+    /// Whether the next trial hits.
     fn strikes(&mut self) -> bool {
         if self.gap == 0 {
             self.gap = self.draw();
@@ -59,7 +59,6 @@ impl Chance {
     }
 }
 
-/// One direction of such a line.
 #[derive(Clone, Debug)]
 pub struct NoisyLine {
     rates: Rates,
@@ -70,7 +69,6 @@ pub struct NoisyLine {
 }
 
 impl NoisyLine {
-    /// A line with this rate of flipped bits; `direction` names its streams of random numbers.
     pub fn new(rate: f64, seed: u64, direction: &str) -> Self {
         let chance = |of: &str, rate| Chance::new(rate, Noise::new(seed, &format!("{direction}{of}")));
         Self {
@@ -82,7 +80,6 @@ impl NoisyLine {
         }
     }
 
-    /// Changes what goes wrong.
     pub fn set_rates(&mut self, change: impl FnOnce(&mut Rates)) {
         change(&mut self.rates);
         self.flip.set_rate(self.rates.flipped);
@@ -90,7 +87,7 @@ impl NoisyLine {
         self.insert.set_rate(self.rates.inserted);
     }
 
-    /// Carries bytes over the line.
+    /// Applies the faults to these bytes.
     pub fn carry(&mut self, bytes: &mut Vec<u8>) {
         if self.rates.cut {
             bytes.clear();
@@ -128,18 +125,16 @@ impl NoisyLine {
 
 #[derive(Clone, Debug)]
 pub struct Lines {
-    /// From the host to the board.
     pub to_board: NoisyLine,
-    /// From the board to the host.
     pub to_host: NoisyLine,
-    /// The host's adapter keeps what comes for so long, from the first byte on.
+    /// Latency of the host's adapter, counted from the first byte.
     pub latency_ns: u64,
-    /// The adapter is to come back under another name.
+    /// Whether the adapter shall reappear under another name.
     pub renamed: bool,
 }
 
 impl Lines {
-    /// Lines with this rate of flipped bits.
+    /// Lines with this bit error rate.
     pub fn new(rate: f64, seed: u64) -> Self {
         Self {
             to_board: NoisyLine::new(rate, seed, "line to the board"),
@@ -149,7 +144,7 @@ impl Lines {
         }
     }
 
-    /// Does the same with both.
+    /// Applies `change` to both directions.
     pub fn each(&mut self, change: impl Fn(&mut NoisyLine)) {
         change(&mut self.to_board);
         change(&mut self.to_host);
@@ -161,7 +156,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn flips_its_share_of_bits() {
+    fn flips_bits_at_the_given_rate() {
         let mut line = NoisyLine::new(1e-3, 1, "test");
         let mut bytes = vec![0u8; 1_000_000];
         line.carry(&mut bytes);
@@ -176,7 +171,7 @@ mod tests {
     }
 
     #[test]
-    fn loses_and_inserts_its_share_of_bytes_until_it_is_mended() {
+    fn loses_and_inserts_bytes_at_the_given_rate_until_repaired() {
         let carry = |change: fn(&mut Rates)| {
             let mut line = NoisyLine::new(0.0, 1, "test");
             line.set_rates(change);

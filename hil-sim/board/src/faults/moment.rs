@@ -1,30 +1,23 @@
-//! Moments of a run to which a fault can be tied.
+//! Moments of a run that can trigger a fault.
 
 use serde::{Deserialize, Serialize};
 
-/// Something that happens in every run.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Moment {
-    /// A motor makes its first step after it has stood.
+    /// First step of a motor after standstill.
     MotionBegins,
-    /// The camera begins to collect light.
     ExposureBegins,
-    /// It stops, and reads out.
+    /// Exposure ends, read-out begins.
     ExposureEnds,
-    /// The board begins to write its memory after 5 ms without a write.
+    /// The board writes its memory after 5 ms without a write.
     MemoryWrite,
-    /// A request goes on the line to the board.
+    /// A request is sent to the board.
     Request,
-    /// The board has given an answer.
     Answer,
-    /// The board has said that it started.
     Started,
-    /// The board has said that an axis is homed.
     Homed,
-    /// The board has said that a move is done.
     MoveDone,
-    /// The board has raised an alarm.
     Alarm,
 }
 

@@ -1,102 +1,99 @@
-//! Motors, their drivers, their encoders, their switches and the emergency stop.
+//! Faults of motors, drivers, encoders, switches and the emergency stop.
 
 use super::{Kind, Takes};
 
-/// Somebody presses the emergency stop, or its wire breaks.
+/// Emergency stop pressed or its wire broken.
 pub const EMERGENCY_STOP: Kind = Kind {
     name: "emergency-stop",
     takes: Takes::NOTHING,
     happen: |rig, _| rig.set_emergency_stop(true),
-    mend: Some(|rig, _| rig.set_emergency_stop(false)),
+    revert: Some(|rig, _| rig.set_emergency_stop(false)),
 };
-/// The emergency stop is released.
 pub const EMERGENCY_STOP_RELEASED: Kind = Kind {
     name: "emergency-stop-released",
     takes: Takes::NOTHING,
     happen: |rig, _| rig.set_emergency_stop(false),
-    mend: None,
+    revert: None,
 };
-/// The motor's driver reports a fault.
 pub const DRIVER_FAULT: Kind = Kind {
     name: "driver-fault",
     takes: Takes::STAGE,
     happen: |rig, at| rig.set_driver_fault(at.stage, true),
-    mend: Some(|rig, at| rig.set_driver_fault(at.stage, false)),
+    revert: Some(|rig, at| rig.set_driver_fault(at.stage, false)),
 };
-/// The motor's driver takes it back.
+/// The driver clears its fault.
 pub const DRIVER_FINE: Kind = Kind {
     name: "driver-fine",
     takes: Takes::STAGE,
     happen: |rig, at| rig.set_driver_fault(at.stage, false),
-    mend: None,
+    revert: None,
 };
-/// The driver's own supply dips: its sequencer begins anew at a whole period.
+/// The driver's supply dips: its sequencer restarts at a full period.
 pub const DRIVER_RESETS: Kind = Kind {
     name: "driver-resets",
     takes: Takes::STAGE,
     happen: |rig, at| rig.plant(|plant| plant.stage_mut(at.stage).reset_sequencer()),
-    mend: None,
+    revert: None,
 };
-/// The motor is held fast.
+/// The rotor is blocked.
 pub const MOTOR_STALLS: Kind = Kind {
     name: "motor-stalls",
     takes: Takes::STAGE,
     happen: |rig, at| rig.plant(|plant| plant.stage_mut(at.stage).set_stalled(true)),
-    mend: Some(|rig, at| rig.plant(|plant| plant.stage_mut(at.stage).set_stalled(false))),
+    revert: Some(|rig, at| rig.plant(|plant| plant.stage_mut(at.stage).set_stalled(false))),
 };
-/// The motor is free again.
 pub const MOTOR_FREE: Kind = Kind {
     name: "motor-free",
     takes: Takes::STAGE,
     happen: |rig, at| rig.plant(|plant| plant.stage_mut(at.stage).set_stalled(false)),
-    mend: None,
+    revert: None,
 };
-/// The motor has only a part of its torque.
+/// Reduced torque.
 pub const MOTOR_WEAK: Kind = Kind {
     name: "motor-weak",
     takes: Takes::stage_and_amount(0.0, 1.0, 0.2),
     happen: |rig, at| rig.plant(|plant| plant.stage_mut(at.stage).set_torque(at.amount)),
-    mend: Some(|rig, at| rig.plant(|plant| plant.stage_mut(at.stage).set_torque(1.0))),
+    revert: Some(|rig, at| rig.plant(|plant| plant.stage_mut(at.stage).set_torque(1.0))),
 };
-/// The encoder loses counts (or gains some) that its shaft has not made.
+/// The encoder gains or loses counts.
 pub const ENCODER_SLIPS: Kind = Kind {
     name: "encoder-slips",
     takes: Takes::stage_and_amount(-4_000.0, 4_000.0, 100.0),
     happen: |rig, at| rig.slip_encoder(at.stage, at.amount as i64), // the range fits
-    mend: None,
+    revert: None,
 };
-/// The encoder's wires are cut: what its shaft does meanwhile is not counted.
+/// Encoder wires cut: motion meanwhile is not counted.
 pub const ENCODER_DEAD: Kind = Kind {
     name: "encoder-dead",
     takes: Takes::STAGE,
     happen: |rig, at| rig.cut_encoder(at.stage, true),
-    mend: Some(|rig, at| rig.cut_encoder(at.stage, false)),
+    revert: Some(|rig, at| rig.cut_encoder(at.stage, false)),
 };
-/// The home switch says for ever that it is open (not actuated).
+/// Home switch stuck open (not actuated).
 pub const HOME_SWITCH_DEAD: Kind = Kind {
     name: "home-switch-dead",
     takes: Takes::STAGE,
     happen: |rig, at| rig.plant(|plant| plant.stage_mut(at.stage).set_stuck_home(Some(false))),
-    mend: Some(|rig, at| rig.plant(|plant| plant.stage_mut(at.stage).set_stuck_home(None))),
+    revert: Some(|rig, at| rig.plant(|plant| plant.stage_mut(at.stage).set_stuck_home(None))),
 };
-/// The home switch's wire breaks: it says that it is reached.
+/// Home switch wire broken: reads actuated.
 pub const HOME_SWITCH_BROKEN: Kind = Kind {
     name: "home-switch-broken",
     takes: Takes::STAGE,
     happen: |rig, at| rig.plant(|plant| plant.stage_mut(at.stage).set_stuck_home(Some(true))),
-    mend: Some(|rig, at| rig.plant(|plant| plant.stage_mut(at.stage).set_stuck_home(None))),
+    revert: Some(|rig, at| rig.plant(|plant| plant.stage_mut(at.stage).set_stuck_home(None))),
 };
-/// The far switch's wire breaks: it says that it is reached.
+/// Far switch wire broken: reads actuated.
 pub const FAR_SWITCH_BROKEN: Kind = Kind {
     name: "far-switch-broken",
     takes: Takes::STAGE,
     happen: |rig, at| rig.plant(|plant| plant.stage_mut(at.stage).set_stuck_far(Some(true))),
-    mend: Some(|rig, at| rig.plant(|plant| plant.stage_mut(at.stage).set_stuck_far(None))),
+    revert: Some(|rig, at| rig.plant(|plant| plant.stage_mut(at.stage).set_stuck_far(None))),
 };
-/// The motor's chopper is coupled into the switches' wires, so often a second.
+/// Chopper noise in the switch wires, events per second.
 pub const SWITCH_NOISE: Kind = Kind {
     name: "switch-noise",
     takes: Takes::stage_and_amount(0.0, 10_000.0, 200.0),
     happen: |rig, at| rig.set_switch_noise(at.stage, Some(at.amount)),
-    mend: Some(|rig, at| rig.set_switch_noise(at.stage, None)),
+    revert: Some(|rig, at| rig.set_switch_noise(at.stage, None)),
 };

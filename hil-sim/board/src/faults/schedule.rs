@@ -1,29 +1,28 @@
-//! When the things of a file happen in a run.
+//! Schedule of a scenario's faults.
 
 use super::{Happening, Moment, When};
 use crate::plant::Noise;
 
-/// Something that is due.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Due {
     pub happening: Happening,
-    /// It is taken back, and does not begin.
-    pub mends: bool,
+    /// Reverts the fault instead of starting it.
+    pub reverts: bool,
 }
 
-/// An entry of the file, and what comes of it next.
+/// A fault of the file with its next event.
 #[derive(Debug)]
 struct Entry {
     happening: Happening,
     noise: Noise,
-    /// Times that its moment has come.
+    /// Occurrences of its moment so far.
     seen: u32,
     begins_ns: Option<u64>,
     ends_ns: Option<u64>,
 }
 
 impl Entry {
-    /// Draws the next time of something that happens by chance.
+    /// Draws the next random time.
     fn draw(&mut self, now_ns: u64) {
         if let When::Chance { per_s } = self.happening.when {
             let wait_s = -libm::log(1.0 - self.noise.uniform()) / per_s;
@@ -42,7 +41,7 @@ fn nanos(ms: f64) -> u64 {
 }
 
 impl Schedule {
-    /// Of these happenings; the seed draws what happens by chance, each entry for itself.
+    /// `seed` draws the random times, independently per entry.
     pub fn new(happenings: &[Happening], seed: u64) -> Self {
         let entry = |(number, happening): (usize, &Happening)| {
             let noise = Noise::new(seed, &format!("happening {number}"));
@@ -57,7 +56,6 @@ impl Schedule {
         Self { entries: happenings.iter().enumerate().map(entry).collect() }
     }
 
-    /// A moment of the run has come.
     pub fn notice(&mut self, what: Moment, now_ns: u64) {
         for entry in &mut self.entries {
             let When::On { moment, nth, delay_ms } = entry.happening.when else { continue };
@@ -70,29 +68,28 @@ impl Schedule {
         }
     }
 
-    /// When something is due next.
     pub fn next_ns(&self) -> Option<u64> {
         self.entries.iter().flat_map(|entry| [entry.begins_ns, entry.ends_ns]).flatten().min()
     }
 
-    /// Whether anything may still happen by itself.
+    /// Whether no further fault can occur on its own.
     pub fn is_over(&self) -> bool {
         self.next_ns().is_none()
     }
 
-    /// Takes what is due, in the order of time, and of the file where two moments are one.
+    /// Due faults, ordered by time, then by their order in the file.
     pub fn take_due(&mut self, now_ns: u64) -> Vec<Due> {
         let mut due = Vec::new();
         while let Some(at_ns) = self.next_ns().filter(|at_ns| *at_ns <= now_ns) {
             for entry in &mut self.entries {
                 if entry.ends_ns == Some(at_ns) {
                     entry.ends_ns = None;
-                    due.push(Due { happening: entry.happening, mends: true });
+                    due.push(Due { happening: entry.happening, reverts: true });
                     entry.draw(at_ns);
                 }
                 if entry.begins_ns == Some(at_ns) {
                     entry.begins_ns = None;
-                    due.push(Due { happening: entry.happening, mends: false });
+                    due.push(Due { happening: entry.happening, reverts: false });
                     match entry.happening.for_ms {
                         Some(ms) => entry.ends_ns = Some(at_ns.saturating_add(nanos(ms))),
                         None => entry.draw(at_ns.saturating_add(1)),
@@ -103,10 +100,10 @@ impl Schedule {
         due
     }
 
-    /// Nothing happens any more: gives what can be taken back, in force or not.
+    /// Ends the schedule; returns everything that can be reverted.
     pub fn end(&mut self) -> Vec<Due> {
         let entries = std::mem::take(&mut self.entries);
-        entries.iter().map(|entry| Due { happening: entry.happening, mends: true }).collect()
+        entries.iter().map(|entry| Due { happening: entry.happening, reverts: true }).collect()
     }
 }
 
@@ -119,25 +116,25 @@ mod tests {
         Schedule::new(&Scenario::parse(text).expect("a good file").happens, 1)
     }
 
-    fn told(due: &[Due]) -> Vec<(&'static str, bool)> {
-        due.iter().map(|due| (due.happening.what.name, due.mends)).collect()
+    fn reported(due: &[Due]) -> Vec<(&'static str, bool)> {
+        due.iter().map(|due| (due.happening.what.name, due.reverts)).collect()
     }
 
     #[test]
-    fn what_has_a_length_is_taken_back_and_the_order_is_that_of_time() {
+    fn reverts_faults_after_their_duration_in_order_of_time() {
         let mut schedule = schedule(
             "[[happens]]\nafter_ms = 2.5\nwhat = \"motor-stalls\"\nfor_ms = 1\n\
              [[happens]]\nafter_ms = 1\nwhat = \"power-loss\"",
         );
         assert_eq!(schedule.next_ns(), Some(1_000_000));
-        assert_eq!(told(&schedule.take_due(999_999)), []);
+        assert_eq!(reported(&schedule.take_due(999_999)), []);
         let expected = [("power-loss", false), ("motor-stalls", false), ("motor-stalls", true)];
-        assert_eq!(told(&schedule.take_due(3_500_000)), expected);
+        assert_eq!(reported(&schedule.take_due(3_500_000)), expected);
         assert!(schedule.is_over());
     }
 
     #[test]
-    fn a_moment_counts_and_chance_repeats() {
+    fn counts_moments_and_repeats_random_faults() {
         let mut counted = schedule(
             "[[happens]]\non = \"exposure-begins\"\nnth = 2\ndelay_ms = 1\nwhat = \"emergency-stop\"",
         );

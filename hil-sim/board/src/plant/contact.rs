@@ -1,26 +1,25 @@
-//! The contact of an end switch as its wire has it: it bounces when it changes, and the motor's chopper is coupled into it.
+//! Contact of an end switch: bounces on changes and picks up chopper noise.
 
 use std::collections::VecDeque;
 
 use super::Noise;
 use crate::parts::SwitchParts;
 
-/// See the module. High, `true`, is open, which is actuated.
+/// High (`true`) is open, which means actuated.
 #[derive(Debug)]
 pub struct Contact {
     parts: SwitchParts,
     noise: Noise,
-    /// Whether the switch is actuated, and what its contact says.
+    /// Actuated, and contact level.
     actuated: bool,
     level: bool,
-    /// When the contact changes while it bounces.
+    /// Times of changes while it bounces.
     changes: VecDeque<u64>,
-    /// When the next false opening begins and ends.
+    /// Begin and end of the next false opening.
     glitch_ns: (u64, u64),
 }
 
 impl Contact {
-    /// A contact at rest.
     pub fn new(parts: SwitchParts, noise: Noise, actuated: bool) -> Self {
         let mut contact =
             Self { parts, noise, actuated, level: actuated, changes: VecDeque::new(), glitch_ns: (0, 0) };
@@ -28,9 +27,9 @@ impl Contact {
         contact
     }
 
-    /// Nanoseconds until something happens that happens so often a second.
+    /// Random time to the next event at this mean rate.
     fn wait_ns(&mut self, per_s: f64) -> u64 {
-        // 1 - u is never 0; without any it never comes.
+        // 1 - u is never 0. At rate 0 the event never occurs.
         let wait_s = -libm::log(1.0 - self.noise.between(0.0, 1.0)) / per_s;
         (wait_s * 1e9) as u64 // saturates
     }
@@ -67,20 +66,19 @@ impl Contact {
             }
             self.changes.push_back(at_ns);
         }
-        // It ends where it belongs.
+        // The last level must be the final one.
         if self.changes.len() % 2 == 1 {
             self.changes.pop_back();
         }
     }
 
-    /// So many false openings a second from now on.
     pub fn set_glitches_per_s(&mut self, now_ns: u64, per_s: f64) {
         self.parts.glitches_per_s = per_s;
         self.glitch_ns = (now_ns, now_ns);
         self.plan_glitch();
     }
 
-    /// When the wire may change by itself next.
+    /// Next time at which the wire may change without a cause.
     pub fn next_ns(&self, now_ns: u64, driven: bool) -> u64 {
         let (begin_ns, end_ns) = self.glitch_ns;
         let glitch_ns = match (driven, begin_ns > now_ns) {
@@ -100,7 +98,7 @@ mod tests {
         SwitchParts { bounce_us: 800, bounces_per_ms: 10.0, glitch_us: 30, glitches_per_s: 2.0 };
 
     #[test]
-    fn it_bounces_for_a_while_and_ends_where_it_belongs() {
+    fn a_contact_bounces_and_settles_at_its_final_level() {
         let mut bounces = 0;
         for seed in 0..50 {
             let parts = SwitchParts { glitches_per_s: 0.0, ..PARTS };
@@ -114,7 +112,7 @@ mod tests {
                 before = level;
             }
         }
-        // Eight changes on average in 0.8 ms, of which a last odd one does not count; and the change itself.
+        // Eight changes on average in 0.8 ms, a last odd one dropped, and the change itself.
         assert!((300..500).contains(&bounces), "{bounces}");
     }
 

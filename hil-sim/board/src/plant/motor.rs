@@ -1,17 +1,16 @@
-//! A stepper motor with its driver: the field steps exactly, the rotor follows as well as its torque lets it.
+//! A stepper motor with its driver: the field steps exactly, the rotor follows as far as its torque allows.
 //!
-//! Lengths are microsteps (3200 a turn). The rotor is pulled towards the field by a torque that goes with the sine of
-//! the angle between them, a period of which is four full steps, 64 microsteps:
-//! `J x'' = T(x') sin(2 pi (field - x) / 64) - D x' - friction` (Acarnley, Stepping Motors, 4th ed. 2002, ch. 4).
-//! A rotor that cannot follow falls back by whole periods, 10 um of a 0.5 mm screw: that is how real motors lose steps.
+//! Lengths are microsteps (3200 per turn). The torque is a sine of field minus rotor with a period of four
+//! full steps (64 microsteps): `J x'' = T(x') sin(2 pi (field - x) / 64) - D x' - friction` (Acarnley,
+//! Stepping Motors, 4th ed. 2002, ch. 4). A rotor that cannot follow loses whole periods, 10 um with a 0.5 mm
+//! screw, as real motors do.
 //!
-//! Numbers of a NEMA 17 motor of 0.4 N m holding torque and 54 g cm2 with as much again for coupling and screw; ball
-//! bearings and the preloaded nut take 10 mN m; torque falls with speed so that the motor falls out of step at about
-//! 11 mm/s. Exact enough at steps of [`Motor::STEP_NS`]: 1/200 of the rotor's own period of 4 ms.
+//! Values of a NEMA 17 motor: 0.4 N m holding torque, 54 g cm2 plus the same for coupling and screw, 10 mN m
+//! friction of bearings and nut. Torque falls with speed, so the motor stalls at about 11 mm/s.
+//! [`Motor::STEP_NS`] is 1/200 of the rotor's period of 4 ms.
 
-/// Microsteps of one turn.
 pub const MICROSTEPS_PER_TURN: f64 = 3200.0;
-/// Microsteps of one period of the torque: four full steps.
+/// Microsteps per torque period: four full steps.
 const PERIOD: f64 = 64.0;
 /// Acceleration at the full holding torque, microsteps/s2: 0.4 N m / 8.4e-6 kg m2.
 const HOLDING: f64 = 2.425e7;
@@ -25,21 +24,20 @@ const HALF_TORQUE_SPEED: f64 = 60_000.0;
 #[derive(Debug)]
 pub struct Motor {
     now_ns: u64,
-    /// Where the driver's sequencer stands.
+    /// Position of the driver's sequencer.
     field: i64,
     rotor: f64,
     speed: f64,
-    /// Share of the torque that is there.
+    /// Available share of the torque.
     torque: f64,
     blocked: bool,
     resting: bool,
 }
 
 impl Motor {
-    /// Longest step of the solver, nanoseconds.
+    /// Longest solver step.
     pub const STEP_NS: u64 = 20_000;
 
-    /// A motor at rest.
     pub fn new(microsteps: i64) -> Self {
         Self {
             now_ns: 0,
@@ -52,42 +50,40 @@ impl Motor {
         }
     }
 
-    /// A STEP pulse.
     pub fn step(&mut self, away: bool) {
         self.field += if away { 1 } else { -1 };
         self.resting = false;
     }
 
-    /// Where the rotor is, microsteps.
+    /// Rotor position, microsteps.
     pub fn rotor(&self) -> f64 {
         self.rotor
     }
 
-    /// Where the driver believes that it is, microsteps.
+    /// Commanded position, microsteps.
     pub fn field(&self) -> i64 {
         self.field
     }
 
-    /// The share of its torque that the motor has left: a loose coupling, a current set too low.
+    /// Available torque (0 to 1): simulates a loose coupling or low current.
     pub fn set_torque(&mut self, share: f64) {
         self.torque = share;
         self.resting = false;
     }
 
-    /// The sequencer begins anew: at the whole period nearest to where it stood.
+    /// Restarts the sequencer at the nearest full period.
     pub fn reset_sequencer(&mut self) {
         let period = PERIOD as i64;
         self.field = (self.field + period / 2).div_euclid(period) * period;
         self.resting = false;
     }
 
-    /// Holds the rotor fast, or lets it go.
     pub fn set_blocked(&mut self, blocked: bool) {
         self.blocked = blocked;
         self.resting = false;
     }
 
-    /// Lets time pass; `moved` hears of each new place, and answers where an end stop holds the rotor instead.
+    /// Advances the rotor. `moved` receives each position and returns the limit of an end stop that it hits.
     pub fn advance(&mut self, now_ns: u64, mut moved: impl FnMut(f64) -> f64) {
         while self.now_ns < now_ns && !self.resting {
             let step_ns = (now_ns - self.now_ns).min(Self::STEP_NS);
@@ -110,7 +106,7 @@ impl Motor {
             self.speed = 0.0;
             return;
         }
-        // Speed first, then place with the new speed: keeps the energy of an oscillation where it belongs.
+        // Velocity first, then position with the new velocity: keeps an oscillation's energy.
         let pulled = self.speed + seconds * (pull - DAMPING * self.speed);
         let rubbed = seconds * FRICTION;
         self.speed = if pulled.abs() <= rubbed { 0.0 } else { pulled - rubbed.copysign(pulled) };
@@ -123,7 +119,7 @@ impl Motor {
 mod tests {
     use super::*;
 
-    /// Steps along a ramp up to a rate and, where it brakes, down again; 50 mm/s2.
+    /// Ramps up to a rate and, if `brakes`, down again; 50 mm/s2.
     fn run(motor: &mut Motor, top: f64, seconds: f64, brakes: bool) {
         let (mut at_s, mut rate) = (motor.now_ns as f64 * 1e-9, 500.0);
         let brake_s = at_s + seconds;
@@ -141,7 +137,7 @@ mod tests {
     }
 
     #[test]
-    fn it_follows_at_working_speed_and_falls_out_of_step_beyond_its_torque() {
+    fn follows_at_working_speed_and_stalls_beyond_its_torque() {
         let mut motor = Motor::new(0);
         run(&mut motor, 40_000.0, 0.5, true);
         stand(&mut motor);
@@ -160,7 +156,7 @@ mod tests {
     }
 
     #[test]
-    fn a_weak_motor_loses_steps_at_a_speed_that_a_good_one_holds() {
+    fn a_weak_motor_loses_steps_at_working_speed() {
         let mut motor = Motor::new(0);
         motor.set_torque(0.3);
         run(&mut motor, 40_000.0, 0.5, true);

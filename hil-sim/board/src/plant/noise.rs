@@ -1,16 +1,16 @@
-//! Seeded noise that is the same on every machine.
+//! Seeded noise, identical on every machine.
 
 use rand_chacha::{
     ChaCha8Rng,
     rand_core::{RngCore, SeedableRng},
 };
 
-/// A stream of random numbers for one purpose.
+/// Random numbers for one purpose.
 #[derive(Clone, Debug)]
 pub struct Noise(ChaCha8Rng);
 
 impl Noise {
-    /// The stream that `seed` and `purpose` name; streams of different purposes are independent.
+    /// Streams of different purposes are independent.
     pub fn new(seed: u64, purpose: &str) -> Self {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         // FNV-1a of the purpose selects one of ChaCha's 2^64 streams.
@@ -19,12 +19,11 @@ impl Noise {
         Self(rng)
     }
 
-    /// Uniform in 0..1 (never 1).
+    /// Uniform in [0, 1).
     pub fn uniform(&mut self) -> f64 {
         (self.0.next_u64() >> 11) as f64 * (1.0 / (1u64 << 53) as f64)
     }
 
-    /// Uniform in `low`..`high`.
     pub fn between(&mut self, low: f64, high: f64) -> f64 {
         low + (high - low) * self.uniform()
     }
@@ -56,7 +55,7 @@ mod tests {
     }
 
     #[test]
-    fn normal_has_the_moments_of_a_normal() {
+    fn normal_has_mean_zero_and_unit_variance() {
         let mut noise = Noise::new(3, "moments");
         let n = 100_000;
         let sample: Vec<f64> = (0..n).map(|_| noise.normal()).collect();

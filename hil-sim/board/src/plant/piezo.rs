@@ -1,35 +1,35 @@
-//! The fine stage: amplifier, piezo with hysteresis and creep, flexure with the sensor board on it.
+//! The fine stage: amplifier, piezo with hysteresis and creep, flexure with the sensor board.
 //!
 //! - Amplifier: first order, 5 kHz.
-//! - Hysteresis: Prandtl & Ishlinskii, ten play operators (Kuhnen, European J. Control 9, 2003, sec. 2); the full
+//! - Hysteresis: Prandtl & Ishlinskii, ten play operators (Kuhnen, European J. Control 9, 2003, sec. 2); the
+//!   full
 //!   loop is 12 % of the stroke wide, closed at both ends.
-//! - Creep: 1.5 % of the stroke per decade of time from 0.1 s to 1000 s, four first-order lags.
-//! - Flexure: second order, 200 Hz, damping 0.03; a second mode of the same kind where `parts.toml` has one.
-//! - Tension: the board's inertia may pull the stack beyond its own length. Stacks bear pressure and little else, so what they are pulled at most is
-//!   kept for whoever asks; nothing breaks here.
+//! - Creep: 1.5 % of the stroke per decade from 0.1 s to 1000 s, four first-order lags.
+//! - Flexure: second order, 200 Hz, damping 0.03; optional second mode (`parts.toml`).
+//! - Tension: inertia may pull the stack, which tolerates little tension. The maximum is recorded; nothing
+//!   breaks.
 //!
-//! Solved exactly over steps of [`Piezo::STEP_NS`] with a constant drive: 0.2 us of the host per step.
+//! Solved exactly over steps of [`Piezo::STEP_NS`] with a constant drive: 0.2 us of host time per step.
 
 use crate::parts::PiezoParts;
 
-/// Free stroke at full voltage, micrometres; also what the DAC's full scale asks for.
+/// Free stroke at full voltage, micrometres; also the DAC's full scale.
 const STROKE_UM: f64 = 200.0;
-/// Largest code of the 16-bit DAC.
 const DAC_MAX: f64 = 65_535.0;
 const AMPLIFIER_HZ: f64 = 5_000.0;
 const RESONANCE_HZ: f64 = 200.0;
 const DAMPING: f64 = 0.03;
-/// Width of the full loop as a fraction of the stroke.
+/// Width of the full loop, share of the stroke.
 const HYSTERESIS: f64 = 0.12;
 const PLAYS: usize = 10;
-/// Creep per decade, and the time constants of its lags in seconds.
+/// Creep per decade, and the lags' time constants in seconds.
 const CREEP: f64 = 0.015;
 const CREEP_S: [f64; 4] = [0.3, 3.0, 30.0, 300.0];
 
 #[derive(Debug)]
 pub struct Piezo {
     code: u16,
-    /// Amplifier's output as the stroke it stands for, micrometres.
+    /// Amplifier output as stroke, micrometres.
     drive_um: f64,
     plays_um: [f64; PLAYS],
     creep_um: [f64; CREEP_S.len()],
@@ -40,7 +40,7 @@ pub struct Piezo {
     full_step: Propagator,
 }
 
-/// How a mode of the flexure stands.
+/// State of a flexure mode.
 #[derive(Clone, Copy, Debug, Default)]
 struct Mode {
     position_um: f64,
@@ -55,7 +55,7 @@ impl Mode {
     }
 }
 
-/// An oscillator's state after a step of constant drive: deviation and velocity mix by these factors.
+/// Propagation of an oscillator over one step: factors of deviation and velocity.
 #[derive(Clone, Copy, Debug)]
 struct Oscillation {
     xx: f64,
@@ -80,7 +80,7 @@ impl Oscillation {
     }
 }
 
-/// What a step of constant drive does to both modes, and what the first-order lags keep.
+/// Propagation of both modes and the first-order lags over one step.
 #[derive(Clone, Copy, Debug)]
 struct Propagator {
     first: Oscillation,
@@ -95,7 +95,7 @@ impl Propagator {
         let second = if parts.second_mode_share > 0.0 {
             Oscillation::over(seconds, parts.second_mode_hz, parts.second_mode_damping)
         } else {
-            first // nobody sees it
+            first
         };
         Self {
             first,
@@ -106,27 +106,26 @@ impl Propagator {
     }
 }
 
-/// Radius of the i-th play, up to a quarter of the stroke: wider ones would be cut short in mid-loop.
+/// Radius of play `i`, up to a quarter of the stroke: wider ones would not close in mid-loop.
 fn radius_um(i: usize) -> f64 {
     0.25 * STROKE_UM * (i + 1) as f64 / PLAYS as f64
 }
 
-/// Weight of each play: the widths 2 r w of all plays add up to the full loop's.
+/// Weight of each play: the widths 2 r w add up to the full loop.
 fn play_weight() -> f64 {
     let radii: f64 = (0..PLAYS).map(radius_um).sum();
     HYSTERESIS * STROKE_UM / (2.0 * radii)
 }
 
 impl Piezo {
-    /// Longest step of the solver, nanoseconds.
+    /// Longest solver step.
     pub const STEP_NS: u64 = 20_000;
 
-    /// A relaxed piezo.
     pub fn new(parts: PiezoParts) -> Self {
         Self {
             code: 0,
             drive_um: 0.0,
-            // As after a descent from the top: the loop's lower left corner is position 0.
+            // State after a descent from full drive: the loop's lower left corner is position 0.
             plays_um: core::array::from_fn(radius_um),
             creep_um: [0.0; CREEP_S.len()],
             first: Mode::default(),
@@ -137,28 +136,27 @@ impl Piezo {
         }
     }
 
-    /// The DAC's output changes.
     pub fn set_dac(&mut self, code: u16) {
         self.code = code;
     }
 
-    /// Code that the DAC holds.
     pub fn dac(&self) -> u16 {
         self.code
     }
 
-    /// Where the sensor board really is, micrometres from the relaxed position.
+    /// True position of the sensor board, micrometres from relaxed.
     pub fn position_um(&self) -> f64 {
         let Mode { position_um, .. } = self.first;
         position_um + self.parts.second_mode_share * (self.second.position_um - position_um)
     }
 
-    /// How far the stack was pulled at most, beyond the length that its drive gave it: over the full stroke that is the share of its blocking force.
+    /// Largest tension so far as elongation, micrometres; relative to the full stroke it is the share of the
+    /// blocking force.
     pub fn pulled_um(&self) -> f64 {
         self.pulled_um
     }
 
-    /// Stroke that the drive makes in the end, creep aside: hysteresis.
+    /// Static stroke of the drive with hysteresis, without creep.
     fn strain_um(&mut self) -> f64 {
         let u = self.drive_um;
         let weight = play_weight();
@@ -168,12 +166,12 @@ impl Piezo {
             *play = play.min(u + r).max(u - r);
             sum += weight * (*play - r);
         }
-        // The linear share makes full drive the full stroke: plays give `stroke - 2 r` there.
+        // The linear share completes the stroke at full drive: plays give `stroke - 2 r` there.
         let plays_at_top: f64 = (0..PLAYS).map(|i| weight * (STROKE_UM - 2.0 * radius_um(i))).sum();
         u * (1.0 - plays_at_top / STROKE_UM) + sum
     }
 
-    /// Lets at most [`Piezo::STEP_NS`] pass.
+    /// Advances at most [`Piezo::STEP_NS`].
     pub fn step(&mut self, nanoseconds: u64) {
         let by = if nanoseconds == Self::STEP_NS {
             self.full_step
@@ -222,11 +220,12 @@ mod tests {
     }
 
     #[test]
-    fn a_second_mode_rings_beside_the_first_with_its_share() {
+    fn a_second_mode_adds_its_share_of_ringing() {
         let parts = PiezoParts { second_mode_hz: 800.0, second_mode_share: 0.1, ..Parts::default().piezo };
         let [mut with, mut without] = [parts, Parts::default().piezo].map(Piezo::new);
         let [a, b] = [&mut with, &mut without].map(|piezo| run(piezo, 6554, 0.02));
-        // A tenth of 17.6 um, and of as much beyond it; while the second mode swings once, the first one has hardly begun.
+        // A tenth of 17.6 um plus the overshoot; during one swing of the second mode the first has hardly
+        // moved.
         let most = a.iter().zip(&b).take(63).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
         assert!((1.0..5.0).contains(&most), "{most}");
         let [a, b] = [&mut with, &mut without].map(|piezo| *run(piezo, 6554, 0.5).last().expect("not empty"));
@@ -234,7 +233,7 @@ mod tests {
     }
 
     #[test]
-    fn letting_a_stretched_stack_go_at_once_pulls_it_and_a_ramp_does_not() {
+    fn releasing_a_stretched_stack_in_a_step_puts_it_under_tension_and_a_ramp_does_not() {
         let mut piezo = Piezo::new(Parts::default().piezo);
         for code in 0..=52_000 / 20 {
             run(&mut piezo, 20 * code, 40e-6);
@@ -242,13 +241,13 @@ mod tests {
         assert!(piezo.pulled_um() < 2.0, "{} um by a ramp of 0.1 s", piezo.pulled_um());
         let before_um = piezo.position_um();
         run(&mut piezo, 0, 0.05);
-        // All of it at once, less what hysteresis and creep keep and the amplifier delays.
+        // Nearly the full step, reduced by hysteresis, creep and the amplifier's delay.
         assert!((0.7..1.0).contains(&(piezo.pulled_um() / before_um)), "{} um", piezo.pulled_um());
     }
 
     #[test]
     fn the_full_loop_is_twelve_percent_wide_and_closed_at_both_ends() {
-        // Strain alone, as creep and ringing are not what is measured here.
+        // Strain alone: creep and ringing are excluded.
         let mut piezo = Piezo::new(Parts::default().piezo);
         let mut at = |um: f64| {
             piezo.drive_um = um;
@@ -262,7 +261,7 @@ mod tests {
     }
 
     #[test]
-    fn a_held_drive_creeps_by_its_share_per_decade() {
+    fn a_constant_drive_creeps_by_a_fixed_share_per_decade() {
         let mut piezo = Piezo::new(Parts::default().piezo);
         run(&mut piezo, 32_768, 1.0);
         let early = piezo.position_um();

@@ -1,22 +1,20 @@
 //! The micrometer screw between rotor and stage: pitch, errors, backlash.
 //!
-//! 0.5 mm pitch, 13 mm travel. The screw errs as one of Mitutoyo's 148 series of micrometer heads may (catalogue
-//! accuracy +-2 um over the travel): here a slow error of the lead and a periodic one per turn, each drawn from the
-//! seed, together below 2 um. 1 um of sensor position is about 0.3 mm of depth, so a rig keeps this below its depth
-//! accuracy only because the far and the near exposure differ by the PIEZO, whose gauge sees its true
-//! position: the screw's error shifts both exposures alike, a bias of up to 0.6 mm and no noise.
+//! 0.5 mm pitch, 13 mm travel. Errors as in Mitutoyo's 148 series (catalogue accuracy +-2 um over the
+//! travel): a slow lead error and a periodic one per turn, drawn from the seed, together below 2 um. 1 um of
+//! sensor position is about 0.3 mm of depth. The pair's distance comes from the piezo, whose gauge measures
+//! the true position, so the screw shifts both exposures alike: a bias of up to 0.6 mm, no noise.
 //!
-//! The nut has play: where the rotor turns round, the stage stands until the play is used up.
+//! After a reversal the stage rests until the nut's play is used up.
 
 use super::{Noise, motor::MICROSTEPS_PER_TURN};
 
-/// Travel between the end switches, micrometres.
+/// Travel between the end switches.
 pub const TRAVEL_UM: f64 = 13_000.0;
-/// Stage per turn of the rotor, micrometres.
+/// Pitch per turn.
 const PITCH_UM: f64 = 500.0;
-/// Stage per microstep, micrometres.
 pub const MICROSTEP_UM: f64 = PITCH_UM / MICROSTEPS_PER_TURN;
-/// Play of the nut from flank to flank, micrometres.
+/// Play of the nut, flank to flank.
 pub const BACKLASH_UM: f64 = 4.0;
 /// Amplitudes of the screw's errors, micrometres: lowest and highest.
 const LEAD_ERROR_UM: (f64, f64) = (0.3, 0.7);
@@ -40,7 +38,6 @@ impl Wave {
     }
 }
 
-/// The screw with its stage.
 #[derive(Debug)]
 pub struct Screw {
     lead: Wave,
@@ -50,7 +47,7 @@ pub struct Screw {
 }
 
 impl Screw {
-    /// A screw whose errors `noise` draws, with its stage where a rotor at 0 puts it, in the middle of the play.
+    /// `noise` draws the errors; a rotor at 0 puts the stage in the middle of the play.
     pub fn new(noise: &mut Noise) -> Self {
         let tau = core::f64::consts::TAU;
         let lead_um = noise.between(LEAD_ERROR_UM.0, LEAD_ERROR_UM.1);
@@ -60,25 +57,24 @@ impl Screw {
         Self { lead, turn, backlash_um: BACKLASH_UM, stage_um: 0.0 }
     }
 
-    /// Where the nut's middle is for a rotor at this many microsteps.
+    /// Centre of the nut at a rotor position in microsteps.
     fn nut_um(&self, rotor: f64) -> f64 {
         let turns = rotor / MICROSTEPS_PER_TURN;
         turns * PITCH_UM + self.lead.um(turns * PITCH_UM / TRAVEL_UM) + self.turn.um(turns)
     }
 
-    /// The rotor turns: the stage goes along as far as a flank pushes it.
+    /// Moves the stage as far as a flank pushes it.
     pub fn turn(&mut self, rotor: f64) {
         let nut_um = self.nut_um(rotor);
         let half_um = 0.5 * self.backlash_um;
         self.stage_um = self.stage_um.clamp(nut_um - half_um, nut_um + half_um);
     }
 
-    /// Where the stage is, micrometres.
     pub fn stage_um(&self) -> f64 {
         self.stage_um
     }
 
-    /// Another play of the nut, as wear makes it.
+    /// Sets the nut's play, as wear would.
     pub fn set_backlash_um(&mut self, um: f64) {
         self.backlash_um = um.max(0.0);
     }
@@ -89,7 +85,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn it_stays_within_its_data_sheet() {
+    fn screw_errors_stay_within_the_data_sheet() {
         for seed in 0..50 {
             let screw = Screw::new(&mut Noise::new(seed, "screw"));
             let steps = (TRAVEL_UM / MICROSTEP_UM) as i64;
@@ -101,7 +97,7 @@ mod tests {
     }
 
     #[test]
-    fn the_stage_stands_for_the_width_of_the_play_at_a_reversal() {
+    fn the_stage_rests_within_the_play_after_a_reversal() {
         let mut screw = Screw::new(&mut Noise::new(1, "screw"));
         for microsteps in 0..=640 {
             screw.turn(f64::from(microsteps));

@@ -1,8 +1,8 @@
 //! A motorised stage: motor, screw, encoder on the motor's shaft, end switches at the stage.
 //!
-//! Micrometres from the true home edge, positive = sensor and lens away from each other. The encoder sees the rotor,
-//! not the screw's error nor its play. The switches see the stage; stage A's home switch sees the sensor's plate, which the piezo
-//! carries: so the strain gauge can be held against the encoder.
+//! Micrometres from the true home edge, positive = sensor and lens apart. The encoder measures the rotor, so
+//! it misses screw errors and play. The switches detect the stage; stage A's home switch detects the sensor
+//! plate on the piezo, so the gauge can be checked against the encoder.
 
 use super::{
     Noise,
@@ -10,32 +10,28 @@ use super::{
     screw::{MICROSTEP_UM, Screw, TRAVEL_UM},
 };
 
-/// Counts of the encoder per turn.
 const COUNTS_PER_TURN: f64 = 4000.0;
-/// The carriage runs against rubber this far beyond either switch: the motor stalls.
+/// Distance from a switch to the rubber end stop, where the motor stalls.
 const END_STOP_UM: f64 = 700.0;
-/// Where it holds the rotor, microsteps.
+/// Rotor position at the lower end stop, microsteps.
 const LOWEST: f64 = -END_STOP_UM / MICROSTEP_UM;
 const HIGHEST: f64 = (TRAVEL_UM + END_STOP_UM) / MICROSTEP_UM;
-/// The far switch closes this far beyond the travel.
 const FAR_SWITCH_UM: f64 = TRAVEL_UM + 150.0;
 /// Repeatability of the home switch, standard deviation in micrometres.
 const HOME_SD_UM: f64 = 0.3;
-/// Way from where the home switch closes to where it opens again (a precision switch of the Baumer My-Com
-/// class has micrometres; a snap-action one has 0.1 mm).
+/// Hysteresis of the home switch (precision switches such as Baumer My-Com have micrometres; snap-action ones
+/// 0.1 mm).
 const HOME_DIFFERENTIAL_UM: f64 = 2.0;
 
-/// Which of the two stages.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum StageName {
-    /// Stage A: carries the sensor with its piezo.
+    /// Stage A with sensor and piezo.
     Sensor,
-    /// Stage B: carries the lens.
     Lens,
 }
 
-/// A switch with its own repeatability.
+/// A switch with limited repeatability.
 #[derive(Debug)]
 struct HomeSwitch {
     noise: Noise,
@@ -44,7 +40,7 @@ struct HomeSwitch {
 }
 
 impl HomeSwitch {
-    /// Each closing is at another place: that is the repeatability.
+    /// Each closing draws another position.
     fn update(&mut self, um: f64) {
         if !self.closed && um <= self.offset_um {
             self.closed = true;
@@ -60,16 +56,16 @@ pub struct Stage {
     motor: Motor,
     screw: Screw,
     home: HomeSwitch,
-    /// How far a piezo on the stage carries what the home switch sees.
+    /// Piezo position that the home switch sees in addition.
     carried_um: f64,
     stuck_home: Option<bool>,
     stuck_far: Option<bool>,
-    /// Microsteps that the driver made against a hard stop.
+    /// Microsteps against a hard stop.
     pressed: u64,
 }
 
 impl Stage {
-    /// A stage at `start_um`, or somewhere in the first half of its travel.
+    /// A stage at `start_um`, else at a random place in the first half of its travel.
     pub fn new(name: StageName, seed: u64, start_um: Option<f64>) -> Self {
         let (screw, switch) = match name {
             StageName::Sensor => ("screw", "home switch"),
@@ -82,7 +78,7 @@ impl Stage {
         home.offset_um = HOME_SD_UM * home.noise.normal();
         let microsteps = libm::round(start_um / MICROSTEP_UM) as i64;
         let mut screw = Screw::new(&mut noise);
-        // It came from its lower end.
+        // The last motion was upwards.
         screw.turn(microsteps as f64);
         Self {
             motor: Motor::new(microsteps),
@@ -95,19 +91,19 @@ impl Stage {
         }
     }
 
-    /// A STEP pulse reaches the driver while it is on.
+    /// A STEP pulse while the driver is on.
     pub fn step(&mut self, away: bool) {
         let rotor = self.motor.rotor();
         self.pressed += u64::from(if away { rotor >= HIGHEST } else { rotor <= LOWEST });
         self.motor.step(away);
     }
 
-    /// Microsteps that its driver made against a hard stop, since power-on.
+    /// Microsteps against a hard stop since power-on.
     pub fn pressed(&self) -> u64 {
         self.pressed
     }
 
-    /// Lets time pass until `now_ns`.
+    /// Advances to `now_ns`.
     pub fn advance(&mut self, now_ns: u64) {
         let Self { motor, screw, home, carried_um, .. } = self;
         motor.advance(now_ns, |rotor| {
@@ -118,68 +114,63 @@ impl Stage {
         });
     }
 
-    /// The piezo on the stage is here now.
+    /// Sets the piezo's position.
     pub fn set_carried_um(&mut self, um: f64) {
         self.carried_um = um;
         self.home.update(self.screw.stage_um() + um);
     }
 
-    /// Where the stage really is, micrometres from the true home edge.
+    /// True position from the home edge.
     pub fn position_um(&self) -> f64 {
         self.screw.stage_um()
     }
 
-    /// Where the driver's sequencer stands, microsteps from the true home edge.
+    /// Sequencer position, microsteps from the true home edge.
     pub fn microsteps(&self) -> i64 {
         self.motor.field()
     }
 
-    /// Steps that the motor has lost: where the driver believes the rotor, less where it is, microsteps.
+    /// Commanded minus actual rotor position, microsteps.
     pub fn lost_microsteps(&self) -> f64 {
         self.motor.field() as f64 - self.motor.rotor()
     }
 
-    /// The encoder's count on the rotor.
     pub fn encoder_counts(&self) -> i64 {
         libm::floor(self.motor.rotor() * (COUNTS_PER_TURN / MICROSTEPS_PER_TURN)) as i64
     }
 
-    /// The home switch is closed.
     pub fn home_closed(&self) -> bool {
         self.stuck_home.unwrap_or(self.home.closed)
     }
 
-    /// The far switch is closed.
     pub fn far_closed(&self) -> bool {
         self.stuck_far.unwrap_or_else(|| self.position_um() >= FAR_SWITCH_UM)
     }
 
-    /// Blocks the motor, or frees it.
     pub fn set_stalled(&mut self, stalled: bool) {
         self.motor.set_blocked(stalled);
     }
 
-    /// The share of its torque that the motor has left.
+    /// Available torque (0 to 1).
     pub fn set_torque(&mut self, share: f64) {
         self.motor.set_torque(share);
     }
 
-    /// Another play of the screw's nut.
     pub fn set_backlash_um(&mut self, um: f64) {
         self.screw.set_backlash_um(um);
     }
 
-    /// The driver's sequencer begins anew, at the whole period nearest to where it stood.
+    /// Restarts the driver's sequencer at the nearest full period.
     pub fn reset_sequencer(&mut self) {
         self.motor.reset_sequencer();
     }
 
-    /// Breaks the far switch so that it says this for ever, or repairs it.
+    /// Sticks the far switch at this level, or repairs it.
     pub fn set_stuck_far(&mut self, says: Option<bool>) {
         self.stuck_far = says;
     }
 
-    /// Breaks the home switch so that it says this for ever, or repairs it.
+    /// Sticks the home switch at this level, or repairs it.
     pub fn set_stuck_home(&mut self, says: Option<bool>) {
         self.stuck_home = says;
     }
@@ -208,13 +199,13 @@ mod tests {
     }
 
     #[test]
-    fn the_encoder_counts_five_per_four_steps_and_the_stops_hold() {
+    fn the_encoder_counts_five_per_four_steps_and_the_end_stops_block() {
         let mut turned = Turned::new(1);
         let start = turned.stage.encoder_counts();
         for _ in 0..401 {
             turned.step(true);
         }
-        // A floor on either side, and the rotor within a microstep: within two counts of 500.
+        // Rounding on either side and one microstep of the rotor: within two counts of 500.
         assert!((turned.stage.encoder_counts() - start - 500).abs() <= 2);
         for _ in 0..60_000 {
             turned.step(false);
@@ -244,7 +235,7 @@ mod tests {
     }
 
     #[test]
-    fn the_two_stages_are_not_the_same() {
+    fn the_two_stages_have_different_errors() {
         let at = |name| Stage::new(name, 1, None).position_um();
         assert_ne!(at(StageName::Sensor), at(StageName::Lens));
     }

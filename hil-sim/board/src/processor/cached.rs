@@ -1,9 +1,9 @@
-//! Translations that outlast a reset and a rig.
+//! Translations that survive a reset and a rig.
 //!
-//! The emulator translates the firmware's instructions into the host's when they first run, and drops all of that at each reset and
-//! with each rig: more than half of a short scenario's processor time. Here a reset is worked out on an idle twin, whose state the
-//! processor then takes over, and the processor of a rig that has ended waits for the next rig with the same program. What a
-//! processor does and when does not depend on what it has translated before, so runs stay the same to the bit.
+//! The emulator translates firmware instructions on first use and drops them at each reset and rig, which is
+//! more than half of a short scenario's CPU time. Here an idle twin computes the reset state, and a processor
+//! is reused by the next rig with the same program. Behaviour does not depend on translations, so runs stay
+//! identical to the bit.
 
 use std::{
     collections::BTreeSet,
@@ -15,38 +15,35 @@ use rigless::emulator::{Error, Processor, Queued};
 
 use crate::board::RAM;
 
-/// So many wait at most: each keeps some ten megabytes of translations.
+/// Each cached processor holds some ten megabytes.
 const WAITING: usize = 8;
 
-/// Processors whose rig has ended.
+/// Processors of ended rigs.
 static ENDED: Mutex<Vec<Waiting>> = Mutex::new(Vec::new());
 
 struct Waiting {
     program: u64,
     processor: Box<dyn Processor>,
-    /// Its state before the first instruction.
+    /// State before the first instruction.
     fresh: Vec<u8>,
 }
 
-/// A processor with its translations.
 #[derive(Debug)]
 pub struct Translated {
     running: Box<dyn Processor>,
-    /// Of the same make, without memory or translations. There until the end.
+    /// Idle twin without memory or translations; always present until the end.
     twin: Option<Box<dyn Processor>>,
     program: u64,
     fresh: Vec<u8>,
-    /// Pages whose accesses the run wants to see.
+    /// Pages with watched accesses.
     routed: BTreeSet<u64>,
-    /// Whether something was done to it that no state holds.
+    /// Changed in a way that its state does not contain.
     altered: bool,
 }
 
 impl Translated {
-    /// A processor for this program, as before its first instruction.
-    ///
-    /// # Errors
-    /// Those of `make`.
+    /// A processor for this program, before its first instruction.
+    /// Errors: errors of `make`.
     pub fn new(program: u64, make: impl Fn() -> Result<Box<dyn Processor>, Error>) -> Result<Self, Error> {
         let twin = Some(make()?);
         let (running, fresh) = match take(program) {
@@ -60,7 +57,7 @@ impl Translated {
         Ok(Self { running, twin, program, fresh, routed: BTreeSet::new(), altered: false })
     }
 
-    /// As [`Processor::reset`]; the translations stay. The run tells of each byte that it writes on the way.
+    /// As [`Processor::reset`]; keeps the translations. The run reports each byte that it writes.
     pub fn reset(&mut self) {
         let state = self.running.save();
         let reset = self.twin.as_mut().and_then(|twin| {
@@ -71,7 +68,7 @@ impl Translated {
         if reset.is_none_or(|reset| self.running.load(&reset).is_err()) {
             self.running.reset();
         }
-        self.running.take_reset_request(); // a request that came before the reset is no other one
+        self.running.take_reset_request(); // drops a request from before the reset
     }
 
     /// As [`Processor::ask`].
@@ -79,14 +76,14 @@ impl Translated {
         match queued {
             Queued::Route(address) => drop(self.routed.insert(address)),
             Queued::Unroute(address) => drop(self.routed.remove(&address)),
-            // The run lays the program into the flash: the same that is translated already.
+            // The run loads the program that is translated already.
             Queued::Invalidate(begin, _) if self.running.retired() == 0 && !is_ram(begin) => return,
             Queued::Line(..) | Queued::Invalidate(..) | Queued::Return => {}
         }
         self.running.ask(queued);
     }
 
-    /// The processor, for what a debugger does to it: no other rig gets it then.
+    /// Access for a debugger; prevents reuse by another rig.
     pub fn altered(&mut self) -> &mut dyn Processor {
         self.altered = true;
         self.running.as_mut()
@@ -97,7 +94,6 @@ fn is_ram(address: u64) -> bool {
     RAM.iter().any(|(begin, length)| (*begin..begin + length).contains(&address))
 }
 
-/// The processor of a rig with this program that has ended.
 fn take(program: u64) -> Option<(Box<dyn Processor>, Vec<u8>)> {
     let mut ended = ENDED.lock().unwrap_or_else(PoisonError::into_inner);
     let at = ended.iter().position(|waiting| waiting.program == program)?;
@@ -129,7 +125,7 @@ impl Drop for Translated {
         for page in std::mem::take(&mut self.routed) {
             self.running.ask(Queued::Unroute(page));
         }
-        // What was translated from memory that programs write is this rig's.
+        // Translations of RAM belong to this rig only.
         for (begin, length) in RAM {
             self.running.ask(Queued::Invalidate(begin, begin + length));
         }

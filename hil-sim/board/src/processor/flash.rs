@@ -1,10 +1,10 @@
-//! What a fetch waits for: the flash with its wait states, and the accelerator in front of it (RM0090, section 3.5.2).
+//! Fetch delays: flash wait states and the accelerator (RM0090, section 3.5.2).
 //!
-//! The flash gives 16 bytes at once, after its wait states. The line that was read last is kept; the instruction cache
-//! keeps 64 more, the data cache 8 for constants, both replaced oldest first here; the prefetch reads the next line while
-//! this one runs. How the real ones choose a line to replace is not published.
+//! The flash delivers 16 bytes after its wait states. Buffers: the current line, 64 lines of instruction
+//! cache, 8 of data cache, and a prefetch of the next line. The real replacement policy is unpublished; here
+//! the oldest line is replaced.
 
-/// Bytes of a line, lines of the instruction cache and of the data cache.
+/// Bytes per line; lines of the instruction and data cache.
 const LINE: u64 = 16;
 const INSTRUCTION_LINES: usize = 64;
 const DATA_LINES: usize = 8;
@@ -12,12 +12,12 @@ const PREFETCH: u64 = 1 << 8;
 const INSTRUCTION_CACHE: u64 = 1 << 9;
 const DATA_CACHE: u64 = 1 << 10;
 
-/// Lines that are kept, oldest first.
+/// Cached lines, oldest first.
 #[derive(Debug, Default)]
 struct Lines(Vec<u64>);
 
 impl Lines {
-    /// Whether a line is kept; it is from now on.
+    /// Whether the line is cached; inserts it.
     fn take(&mut self, line: u64, most: usize) -> bool {
         let found = self.0.iter().position(|kept| *kept == line);
         if let Some(at) = found {
@@ -30,20 +30,18 @@ impl Lines {
     }
 }
 
-/// The flash's interface.
 #[derive(Debug, Default)]
 pub(super) struct FlashInterface {
     acr: u64,
     instructions: Lines,
     data: Lines,
-    /// The line that was read last.
+    /// Line read last.
     current: u64,
-    /// Cycles that the program has spent in it: what a prefetch of the next one had.
+    /// Cycles spent in this line, available to the prefetch.
     spent: u64,
 }
 
 impl FlashInterface {
-    /// FLASH_ACR was written.
     pub(super) fn set(&mut self, acr: u64) {
         *self = Self { acr, ..Self::default() };
     }
@@ -52,7 +50,7 @@ impl FlashInterface {
         self.acr & 0xf
     }
 
-    /// Cycles for which an instruction of these bytes, which then takes `cycles`, is waited for.
+    /// Wait cycles for an instruction at `address` that takes `cycles`.
     pub(super) fn fetch(&mut self, address: u64, bytes: u64, cycles: u64) -> u64 {
         let mut waits = 0;
         for line in address / LINE..=(address + bytes - 1) / LINE {
@@ -75,7 +73,7 @@ impl FlashInterface {
         self.wait_states().saturating_sub(ahead)
     }
 
-    /// Cycles for which a constant in the flash is waited for.
+    /// Wait cycles for a constant in the flash.
     pub(super) fn read(&mut self, address: u64) -> u64 {
         let kept = self.acr & DATA_CACHE != 0 && self.data.take(address / LINE, DATA_LINES);
         if kept { 0 } else { self.wait_states() }
@@ -94,7 +92,7 @@ mod tests {
     }
 
     #[test]
-    fn a_loop_waits_only_where_it_is_not_kept() {
+    fn a_cached_loop_has_no_wait_cycles() {
         // 64 short instructions are 8 lines.
         assert_eq!(straight_on(0x005, 2), 8 * 5, "five wait states a line");
         assert_eq!(straight_on(0x105, 2), 5, "a line lasts longer than the prefetch of the next one");
@@ -103,7 +101,7 @@ mod tests {
     }
 
     #[test]
-    fn constants_are_kept_too() {
+    fn caches_constants() {
         let mut flash = FlashInterface::default();
         flash.set(0x705);
         assert_eq!([0, 4, 16, 0].map(|at| flash.read(0x0800_0100 + at)), [5, 0, 5, 0]);

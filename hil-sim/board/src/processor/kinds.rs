@@ -1,24 +1,23 @@
-//! Cycles of an instruction by its kind, on memory without wait states: Arm Cortex-M4 technical reference manual (DDI 0439),
-//! table 3-1 and section 3.3.3; floating point: table 7-1.
+//! Cycles per instruction kind without wait states: Cortex-M4 manual (DDI 0439), table 3-1 and section 3.3.3;
+//! floating point: table 7-1.
 //!
-//! On the slow side where the manual gives a range: a load takes 2 although loads in a row take 1, a division 12, and the
-//! pipeline is refilled in 2. Encodings: ARMv7-M (DDI 0403), chapter A5.
+//! Upper values where the manual gives a range: a load takes 2 even in a row, a division 12, a pipeline
+//! refill 2. Encodings: ARMv7-M (DDI 0403), chapter A5.
 
-/// Cycles of a refilled pipeline (the manual: 1 to 3).
+/// Pipeline refill (manual: 1 to 3).
 const REFILL: u64 = 2;
-/// Cycles from an interrupt to its handler's first instruction, and back.
 pub(super) const EXCEPTION_ENTRY: u64 = 12;
 pub(super) const EXCEPTION_RETURN: u64 = 10;
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) struct Instruction {
     first: u16,
-    /// The second half of a long one.
+    /// Second half of a 32-bit instruction.
     second: Option<u16>,
 }
 
-/// Wait cycles of a peripheral's register: APB1 runs at a quarter of the processor's clock, APB2 at half of it, and a
-/// bridge takes two of their cycles; the AHB has one more (RM0090, section 2.1; the sums are not checked).
+/// Wait cycles of a peripheral register: a bridge takes two bus cycles, APB1 runs at 1/4 and APB2 at 1/2 of
+/// the clock; AHB has one (RM0090, section 2.1; sums not checked).
 pub(super) const fn bus_cycles(address: u64) -> u64 {
     match address {
         0x4000_0000..0x4001_0000 => 8,
@@ -29,7 +28,6 @@ pub(super) const fn bus_cycles(address: u64) -> u64 {
 }
 
 impl Instruction {
-    /// The instruction with which these bytes begin.
     pub(super) fn decode(bytes: &[u8]) -> Option<Self> {
         let half = |at: usize| Some(u16::from_le_bytes(*bytes.get(at..at + 2)?.first_chunk()?));
         let first = half(0)?;
@@ -41,7 +39,7 @@ impl Instruction {
         if self.second.is_some() { 4 } else { 2 }
     }
 
-    /// Whether the next instruction may be another than the one behind it.
+    /// Whether the next instruction may be elsewhere.
     pub(super) const fn may_branch(self) -> bool {
         let first = self.first;
         match self.second {
@@ -65,12 +63,12 @@ impl Instruction {
         }
     }
 
-    /// Whether it may be the way out of an interrupt's handler.
+    /// Whether it may return from an interrupt handler.
     pub(super) const fn may_return(self) -> bool {
         self.may_branch()
     }
 
-    /// Where a load takes its constant from, which lies near the instruction at `pc`.
+    /// Address of the constant of a PC-relative load.
     pub(super) const fn literal(self, pc: u64) -> Option<u64> {
         let base = (pc + 4) & !3;
         match self.second {
@@ -83,7 +81,6 @@ impl Instruction {
         }
     }
 
-    /// Its cycles where it goes on elsewhere (`branches`), or behind itself.
     pub(super) const fn cycles(self, branches: bool) -> u64 {
         let base = match self.second {
             None => short(self.first),
@@ -95,14 +92,14 @@ impl Instruction {
 
 const fn short(first: u16) -> u64 {
     match first >> 11 {
-        // Loads: of a constant, by register, by offset, from the stack.
+        // Loads: literal, register, offset, stack.
         0b01001 | 0b01101 | 0b01111 | 0b10001 | 0b10011 => 2,
         0b01010 | 0b01011 if (first & 0x0800 != 0 || first & 0x0e00 == 0x0600) => 2,
         // PUSH and POP, STM and LDM.
         0b10110 if first & 0xfe00 == 0xb400 => 1 + (first & 0x1ff).count_ones() as u64,
         0b10111 if first & 0xfe00 == 0xbc00 => 1 + (first & 0x1ff).count_ones() as u64,
         0b11000 | 0b11001 => 1 + (first & 0xff).count_ones() as u64,
-        // Everything else, and stores, which a buffer takes.
+        // Everything else, and buffered stores.
         _ => 1,
     }
 }
@@ -124,7 +121,7 @@ const fn long(first: u16, second: u16) -> u64 {
         // 1111 1011: multiplications and divisions.
         0b1101 if first & 0xff80 == 0xfb80 && second & 0x00f0 == 0x00f0 => 12,
         0b1101 if first & 0xff80 == 0xfb00 => {
-            // With an addition: one more.
+            // With accumulation: one more.
             if second & 0xf000 == 0xf000 { 1 } else { 2 }
         }
         // MRS and MSR.
@@ -133,7 +130,8 @@ const fn long(first: u16, second: u16) -> u64 {
     }
 }
 
-/// VLDR and VSTR 2 (double 3), several 1 + N, division and root 14, fused and chained 3, moves and the rest 1.
+/// VLDR and VSTR 2 (double 3), several 1 + N, division and root 14, fused and chained 3, moves and the rest
+/// 1.
 const fn floating(first: u16, second: u16) -> u64 {
     if first & 0xfe00 == 0xec00 {
         let words = (second & 0xff) as u64;
@@ -160,7 +158,7 @@ mod tests {
     }
 
     #[test]
-    fn kinds_take_what_the_manual_says() {
+    fn cycles_per_kind_match_the_manual() {
         for (halves, expected, what) in [
             (&[0x1840][..], (1, false), "adds r0, r0, r1"),
             (&[0x4348], (1, false), "muls r0, r1"),
@@ -198,7 +196,7 @@ mod tests {
     }
 
     #[test]
-    fn a_constants_place_is_found() {
+    fn finds_the_address_of_a_literal() {
         let literal = |halves: &[u16], pc| {
             let bytes: Vec<u8> = halves.iter().flat_map(|half| half.to_le_bytes()).collect();
             Instruction::decode(&bytes).and_then(|instruction| instruction.literal(pc))

@@ -1,70 +1,61 @@
-//! What a scenario's host asks of the rig, one step after the other.
+//! Steps of a scenario's host.
 
 use farnear_protocol::message::{Axis, SettingKey};
 use serde::{Deserialize, Serialize};
 
-/// What a step asks for.
 #[derive(Clone, PartialEq, Debug)]
 pub enum Deed {
-    /// Homes an axis, or both steppers at once.
+    /// Homes one axis, or both steppers simultaneously.
     Home(Option<Axis>),
     Move {
         axis: Axis,
-        /// Where to, micrometres.
         to_um: f64,
     },
-    /// Loads, arms and runs a program on the piezo, a shot for each position.
+    /// Loads, arms and runs a piezo program with one shot per position.
     Expose(Program),
-    /// The same again and again.
+    /// Repeats the program.
     Continuous {
         program: Program,
-        /// From one trigger to the next; 0: as fast as it goes.
+        /// Trigger period; 0: as fast as possible.
         period_us: u32,
         exposures: u32,
     },
-    /// Measures the backlash of an axis.
     Calibrate(Axis),
     Set {
         key: SettingKey,
         value: i32,
     },
-    /// Stops along the ramps.
     Stop,
-    /// Stops at once, with an alarm.
+    /// Immediate stop with an alarm.
     Halt,
     Reboot,
-    /// Lets the program stand after the exposure that is under way.
+    /// Pauses the program after the current exposure.
     Pause,
     Resume,
-    /// Clears what is latched.
     Clear,
     Silent {
-        /// So long, milliseconds.
         ms: f64,
     },
-    /// Waits, and answers when it is asked.
+    /// Waits and answers keep-alives.
     Wait {
-        /// So long, milliseconds.
         ms: f64,
     },
 }
 
-/// Exposures on the piezo.
+/// Piezo exposures.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Program {
     pub at_um: Vec<f64>,
-    /// How long each exposure is.
     pub exposure_us: u32,
-    /// How near the position must stay.
+    /// Position tolerance.
     pub window_nm: i32,
 }
 
-/// A step of the host.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 #[serde(try_from = "Row", into = "Row")]
 pub struct Step {
     pub deed: Deed,
-    /// It goes on after so long, milliseconds, whether or not that has come to its end; `None`: it waits for the end.
+    /// Continue after this time even if the step has not ended; `None`: wait for its end.
     pub goes_on_after_ms: Option<f64>,
 }
 
@@ -87,7 +78,7 @@ enum Verb {
     Wait,
 }
 
-/// A table `[[host]]` of a file.
+/// A table `[[host]]`.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Row {
@@ -134,7 +125,7 @@ impl Row {
         }
     }
 
-    /// Which fields stand there.
+    /// Fields present in the file.
     fn given(&self) -> Vec<&'static str> {
         let fields = [
             ("axis", self.axis.is_some()),
@@ -151,17 +142,18 @@ impl Row {
         fields.into_iter().filter_map(|(name, there)| there.then_some(name)).collect()
     }
 
-    /// Refuses fields that mean nothing to it.
+    /// Rejects other fields.
     fn only(&self, allowed: &[&str]) -> Result<(), String> {
         let verb = toml::Value::try_from(self.does).ok();
         let verb = verb.as_ref().and_then(toml::Value::as_str).unwrap_or_default();
         match self.given().into_iter().find(|field| !allowed.contains(field)) {
             Some(field) if allowed.is_empty() => {
-                Err(format!("{field} means nothing to does = \"{verb}\": leave it out"))
+                Err(format!("{field} has no effect with does = \"{verb}\": leave it out"))
             }
-            Some(field) => {
-                Err(format!("{field} means nothing to does = \"{verb}\", which knows {}", allowed.join(", ")))
-            }
+            Some(field) => Err(format!(
+                "{field} has no effect with does = \"{verb}\", which accepts {}",
+                allowed.join(", ")
+            )),
             None => Ok(()),
         }
     }

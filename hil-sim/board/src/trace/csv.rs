@@ -1,7 +1,6 @@
-//! What the plant really did, as CSV: `time_us,event,coarse_um,lens_um,piezo_um,dac,step_edges,triggers`.
+//! The plant's true state as CSV: `time_us,event,coarse_um,lens_um,piezo_um,dac,step_edges,triggers`.
 //!
-//! A `tick` row each millisecond of virtual time in which something moved, and a row `shot` per exposure with its
-//! mean positions.
+//! One `tick` row per millisecond with motion, one `shot` row per exposure with its mean positions.
 
 use std::{
     fs::File,
@@ -15,10 +14,9 @@ use crate::{
     wiring::Wiring,
 };
 
-/// Virtual time between two looks.
+/// Sampling period, virtual time.
 const PERIOD_NS: u64 = 1_000_000;
 
-/// The file, and what was written last.
 pub struct Csv {
     file: BufWriter<File>,
     next_ns: u64,
@@ -27,7 +25,6 @@ pub struct Csv {
 }
 
 impl Csv {
-    /// Opens the file and writes the heading.
     pub fn create(path: &Path) -> Result<Self, SimError> {
         let wrong =
             |source| SimError::Io { what: format!("cannot write the trace {}", path.display()), source };
@@ -36,7 +33,7 @@ impl Csv {
         Ok(Self { file, next_ns: 0, last: String::new(), failed: None })
     }
 
-    /// Looks at the plant, if it is time and something has moved.
+    /// Writes a row if one is due and something has moved.
     pub fn tick(&mut self, now_ns: u64, plant: &Plant, wiring: &Wiring) {
         if now_ns < self.next_ns {
             return;
@@ -57,7 +54,6 @@ impl Csv {
         }
     }
 
-    /// An exposure has ended.
     pub fn shot(&mut self, shot: &crate::wiring::Shot, plant: &Plant, wiring: &Wiring) {
         self.write(&format!(
             "{},shot,{:.3},{:.3},{:.4},{},{},{}",
@@ -77,17 +73,14 @@ impl Csv {
         }
     }
 
-    /// Writes what is left.
-    ///
-    /// # Errors
-    /// The first error of all.
+    /// Flushes the file.
+    /// Errors: the first write error.
     pub fn finish(mut self) -> Result<(), SimError> {
         let result = self.failed.take().map_or_else(|| self.file.flush(), Err);
         result.map_err(|source| SimError::Io { what: "cannot write the trace".into(), source })
     }
 }
 
-/// Edges on both STEP pins.
 fn step_edges(wiring: &Wiring) -> u64 {
     wiring.step_edges(StageName::Sensor) + wiring.step_edges(StageName::Lens)
 }

@@ -1,8 +1,8 @@
-//! A run as a value change dump: positions, pulses, exposures, bytes of the line, what happened; and, in comments, all that is
-//! needed to run it again.
+//! A run as a value change dump: positions, pulses, exposures, line bytes, faults; comments hold all that a
+//! replay needs.
 //!
-//! Times are virtual nanoseconds. STEP pulses and exposures stand at their own moments, positions each millisecond in which
-//! something moved, bytes and happenings where the emulator stopped (every 0.1 ms at least).
+//! Times are virtual nanoseconds. STEP pulses and exposures have exact times, positions are sampled each
+//! millisecond with motion, bytes and faults at stops of the emulator (at least every 0.1 ms).
 
 use std::{
     fmt::Write as _,
@@ -21,7 +21,7 @@ use crate::{
     wiring::{Shot, Wiring},
 };
 
-/// Virtual time between two looks at the positions.
+/// Sampling period of positions, virtual time.
 const PERIOD_NS: u64 = 1_000_000;
 /// Signals: type, size, letter, name.
 const SIGNALS: [(&str, u32, char, &str); 11] = [
@@ -37,15 +37,14 @@ const SIGNALS: [(&str, u32, char, &str); 11] = [
     ("string", 1, 'i', "to_board"),
     ("string", 1, 'o', "to_host"),
 ];
-/// What happens, by its name.
+/// Fault events by name.
 const HAPPENS: (&str, u32, char, &str) = ("string", 1, 'h', "happens");
-/// The line that ends the heading.
+/// Last line of the heading.
 pub const END_OF_HEADING: &str = "$enddefinitions $end";
-/// Words behind which the heading has what the run was made of.
+/// Prefixes of the heading's lines with the rig's configuration.
 pub const MADE_OF: [&str; 4] =
     ["$comment firmware ", "$comment pace ", "$comment memory ", "$comment scenario "];
 
-/// The name of the signal of a letter.
 pub fn name_of(letter: char) -> &'static str {
     let all = SIGNALS.iter().chain(std::iter::once(&HAPPENS));
     all.copied().find(|signal| signal.2 == letter).map_or("?", |signal| signal.3)
@@ -53,24 +52,23 @@ pub fn name_of(letter: char) -> &'static str {
 
 enum Sink {
     File(BufWriter<File>),
-    /// Held against those of another run.
+    /// Compares lines with those of another run.
     Compare(Comparer),
 }
 
 pub struct Vcd {
     sink: Sink,
-    /// Changes since the last stop: when, and the line.
+    /// Changes since the last stop: time and line.
     changes: Vec<(u64, String)>,
-    /// The moment of the last line.
+    /// Time of the last line.
     at_ns: Option<u64>,
     next_ns: u64,
     last: [String; 4],
-    /// The beginning of the exposure that is under way is written.
+    /// Whether the start of the current exposure is written.
     exposing: bool,
     failed: Option<std::io::Error>,
 }
 
-/// Bytes in hexadecimal.
 pub fn hex(bytes: &[u8]) -> String {
     bytes.iter().fold(String::with_capacity(2 * bytes.len()), |mut text, byte| {
         let _ = write!(text, "{byte:02x}"); // a string takes everything
@@ -124,7 +122,6 @@ impl Vcd {
         vcd
     }
 
-    /// Opens the file and writes its heading.
     pub fn create(path: &Path, config: &RigConfig, firmware: u64) -> Result<Self, SimError> {
         let wrong =
             |source| SimError::Io { what: format!("cannot write the trace {}", path.display()), source };
@@ -134,7 +131,7 @@ impl Vcd {
         Ok(Self::with(Sink::File(file)))
     }
 
-    /// One whose lines are held against those of another run.
+    /// Compares with another run instead of writing.
     pub fn compare(with: Comparer) -> Self {
         Self::with(Sink::Compare(with))
     }
@@ -143,40 +140,36 @@ impl Vcd {
         self.changes.push((at_ns, line));
     }
 
-    /// Bytes go on the line to the board, as the host sent them.
     pub fn sent(&mut self, at_ns: u64, bytes: &[u8]) {
         self.change(at_ns, format!("s{} i", hex(bytes)));
     }
 
-    /// Bytes have come from the board.
     pub fn received(&mut self, at_ns: u64, bytes: &[u8]) {
         if !bytes.is_empty() {
             self.change(at_ns, format!("s{} o", hex(bytes)));
         }
     }
 
-    /// Something happens, or is taken back.
-    pub fn happened(&mut self, at_ns: u64, what: &str, mends: bool) {
-        let back = if mends { "/" } else { "" };
+    /// A fault starts or is reverted.
+    pub fn happened(&mut self, at_ns: u64, what: &str, reverts: bool) {
+        let back = if reverts { "/" } else { "" };
         self.change(at_ns, format!("s{back}{what} h"));
     }
 
-    /// The chip was reset, or its power has changed.
+    /// The chip was reset, or its power changed.
     pub fn reset(&mut self, at_ns: u64, powered: Option<bool>) {
         self.change(at_ns, powered.map_or("1r".into(), |on| format!("{}w", u8::from(on))));
     }
 
-    /// The emulator stopped because somebody asked for time until a moment; it stops behind the instruction that crosses it.
+    /// Records a stop requested by a caller; it follows the instruction that crosses `asked_ns`.
     pub fn looked(&mut self, at_ns: u64, asked_ns: u64) {
         self.change(at_ns, format!("$comment look {asked_ns} $end"));
     }
 
-    /// Everything is mended.
     pub fn healed(&mut self, at_ns: u64) {
         self.change(at_ns, "$comment heal $end".into());
     }
 
-    /// The camera's host has given an order.
     pub fn ordered(&mut self, at_ns: u64, order: CameraOrder) {
         let line = match order {
             CameraOrder::Expose { exposure_us, id } => format!("$comment expose {exposure_us} {id} $end"),
@@ -187,12 +180,12 @@ impl Vcd {
         self.change(at_ns, line);
     }
 
-    /// Somebody has reached into the rig, which cannot be done again.
+    /// Marks direct access to the rig, which a replay cannot repeat.
     pub fn touched(&mut self, at_ns: u64) {
         self.change(at_ns, "$comment touched $end".into());
     }
 
-    /// Looks at everything at a stop of the emulator, and writes what has changed.
+    /// Writes what has changed since the last stop.
     pub fn look(&mut self, now_ns: u64, plant: &Plant, wiring: &mut Wiring, shots: &[Shot]) {
         wiring.record_steps_once();
         for (edges, letter) in wiring.take_steps().into_iter().zip(['C', 'L']) {
@@ -226,7 +219,6 @@ impl Vcd {
         self.flush();
     }
 
-    /// Writes the changes in the order of time.
     fn flush(&mut self) {
         let mut changes = std::mem::take(&mut self.changes);
         changes.sort_by_key(|(at_ns, _)| *at_ns);
@@ -248,15 +240,13 @@ impl Vcd {
         }
     }
 
-    /// Whether the run that this is held against was another one.
+    /// Whether the compared runs differ.
     pub fn departs(&self) -> bool {
         matches!(&self.sink, Sink::Compare(comparer) if comparer.departs())
     }
 
-    /// Writes what is left.
-    ///
-    /// # Errors
-    /// The first error of all.
+    /// Flushes the file.
+    /// Errors: the first write error.
     pub fn finish(mut self) -> Result<(), SimError> {
         self.flush();
         let result = match (self.failed.take(), &mut self.sink) {

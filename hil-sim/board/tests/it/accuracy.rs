@@ -1,21 +1,19 @@
-//! Positions against the plant's truth: random moves of each axis, homing again and again, the longest tick.
+//! Positions compared with the plant's true state: random moves, repeated homing, the longest tick.
 
 use crate::bench::{Bench, amount, go};
 use farnear_protocol::{EventKind, message::Axis};
 use farnear_sim::{Report, plant::Noise};
 
-/// Moves of each axis; the campaign makes 1,000.
+/// Moves per axis; the campaign makes 1,000.
 const MOVES: u32 = 40;
-/// A tick's period in cycles.
 const TICK_CYCLES: u32 = 33_600;
-/// Cycles of it that the longest tick in motion may take: an answer, an event and a piece of memory in one.
+/// Limit of the longest tick in motion: an answer, an event and a piece of memory in one.
 const TICK_BUDGET: u32 = TICK_CYCLES * 9 / 10;
 
 fn rms(errors: &[f64]) -> f64 {
     (errors.iter().map(|error| error * error).sum::<f64>() / errors.len() as f64).sqrt()
 }
 
-/// Where an axis truly is, micrometres.
 fn truth_um(report: &Report, axis: Axis) -> f64 {
     match axis {
         Axis::SensorCoarse => report.coarse.position_um,
@@ -24,7 +22,7 @@ fn truth_um(report: &Report, axis: Axis) -> f64 {
     }
 }
 
-/// Moves an axis at random; gives the errors in micrometres.
+/// Random moves; returns the errors in micrometres.
 fn errors_um(bench: &mut Bench, axis: Axis, (low_um, high_um): (f64, f64), moves: u32) -> Vec<f64> {
     let mut noise = Noise::new(amount("FARNEAR_SEED", 1), "test of accuracy");
     let once = |_| {
@@ -32,7 +30,7 @@ fn errors_um(bench: &mut Bench, axis: Axis, (low_um, high_um): (f64, f64), moves
         let target_nm = (target_um * 1e3).round() as i32;
         let end = bench.carry_out(&go(axis, target_nm));
         assert!(matches!(end, EventKind::MoveDone { .. }), "{end:?}");
-        // What still swings has time to come to rest.
+        // Lets oscillations decay.
         let report = bench.rig.advance_us(50_000).expect("runs");
         truth_um(&report, axis) - 1e-3 * f64::from(target_nm)
     };
@@ -40,12 +38,12 @@ fn errors_um(bench: &mut Bench, axis: Axis, (low_um, high_um): (f64, f64), moves
 }
 
 #[test]
-fn random_moves_end_where_they_should() {
+fn random_moves_reach_their_targets() {
     let mut bench = Bench::new(amount("FARNEAR_SEED", 1));
     bench.forget_longest_tick();
     bench.home();
     let moves = amount("FARNEAR_MOVES", MOVES);
-    // Short ones where there are few, the whole travel in the campaign.
+    // Few short moves; the campaign covers the whole travel.
     let far_um = if moves > MOVES { 12_900.0 } else { 1_500.0 };
     for axis in [Axis::SensorCoarse, Axis::Lens] {
         let errors = errors_um(&mut bench, axis, (10.0, far_um), moves);

@@ -1,11 +1,11 @@
-//! A line that flips one bit in ten thousand: every request is answered rightly or fails, and none acts twice.
+//! With one flipped bit in ten thousand each request is answered correctly or fails, and none acts twice.
 
 use crate::bench::{Bench, SILENCE, fine_shot};
 use farnear_protocol::{EventKind, Request, Response};
 use farnear_sim::{RigConfig, Scenario};
 
 const REQUESTS: u32 = 10_000;
-/// Every so many requests one that acts.
+/// Interval of requests that act.
 const RUN_EVERY: u32 = 50;
 
 #[test]
@@ -18,15 +18,14 @@ fn ten_thousand_requests_over_a_bad_line() {
     while asked < REQUESTS {
         asked += 1;
         if asked % RUN_EVERY == 0 {
-            // The position does not matter, so that it is settled at once; the trigger is what counts.
-            // Loading has disarmed it.
+            // Any position settles immediately; only the trigger counts. Loading has disarmed the board.
             match bench.try_ask(&Request::ArmProgram { shots: 1 }) {
                 Some(Ok(Response::Accepted)) => {}
-                other => panic!("the program was not armed but {other:?}"),
+                other => panic!("expected Armed, got {other:?}"),
             }
             match bench.try_ask(&Request::RunProgram { silence: SILENCE }) {
                 Some(Ok(Response::Accepted)) => {}
-                other => panic!("a run was not accepted but {other:?}"),
+                other => panic!("expected an accepted run, got {other:?}"),
             }
             bench.rig.settle().expect("runs");
             bench.answers();
@@ -34,7 +33,7 @@ fn ten_thousand_requests_over_a_bad_line() {
             assert_eq!(bench.report().triggers, runs, "a run gave more or less than one trigger");
             continue;
         }
-        // What was asked can be told from the answer: the exposure's position, or the board's counters.
+        // The answers differ per request: the exposure's position, or the board's counters.
         index = (index + 1) % 4;
         let request = if asked % 2 == 0 || runs == 0 {
             Request::LoadShot { index: if runs == 0 { 0 } else { index }, shot: shot(20_000) }

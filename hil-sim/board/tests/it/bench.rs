@@ -1,4 +1,4 @@
-//! A host that speaks the protocol to the rig in this process.
+//! A protocol host for the rig in this process.
 
 use farnear_protocol::{
     Call, Event, EventKind, Log, Micros, Nanometres, PROTOCOL_CURRENT, Request, RequestError, Response,
@@ -8,13 +8,12 @@ use farnear_protocol::{
 use farnear_sim::{EmulatedRig, Report, RigAccess, RigConfig};
 use object::{Object, ObjectSymbol, Symbol, SymbolKind};
 
-/// Long enough that no test's host is silent for so long, unless silence is what it tests.
+/// Longer than any test's pause, unless the test is about silence.
 pub const SILENCE: Micros = Micros(60_000_000);
 
-/// The session that the tests' hosts open.
 pub const SESSION: u32 = 0x1234_5678;
 
-/// A rig and a host that keeps count of its requests.
+/// A rig and a host that numbers its requests.
 pub struct Bench {
     pub rig: EmulatedRig,
     pub boot: u32,
@@ -26,14 +25,12 @@ pub struct Bench {
 
 pub type Answer = Result<Response, RequestError>;
 
-/// The frame of a request.
 pub fn request_frame(id: u32, boot: u32, request: &Request) -> Vec<u8> {
     let header = Header { version: PROTOCOL_CURRENT, kind: Kind::Request, id, boot };
     let session = if *request == Request::Hello { NO_SESSION } else { SESSION };
     encode(header, &Call { session, request: request.clone() }).expect("requests fit").to_vec()
 }
 
-/// The answer that a frame carries, if it is one.
 pub fn answer_in(packet: &Packet) -> Option<(u32, Answer)> {
     let answer = match packet.header.kind {
         Kind::Response => Ok(packet.message().expect("a response of this version")),
@@ -44,7 +41,7 @@ pub fn answer_in(packet: &Packet) -> Option<(u32, Answer)> {
 }
 
 impl Bench {
-    /// A rig with this seed that has said hello.
+    /// A rig that has answered hello.
     pub fn new(seed: u64) -> Self {
         Self::with(&RigConfig { seed, ..RigConfig::default() })
     }
@@ -56,7 +53,7 @@ impl Bench {
         bench
     }
 
-    /// Says hello and opens a session; from now on requests carry the board's boot number.
+    /// Sends hello and opens a session; later requests carry the board's boot number.
     pub fn say_hello(&mut self) -> Hello {
         self.boot = 0;
         match self.ask(&Request::Hello) {
@@ -66,16 +63,16 @@ impl Bench {
                 assert_eq!(self.ask(&Request::OpenSession), Ok(Response::Accepted));
                 hello
             }
-            other => panic!("no hello but {other:?}"),
+            other => panic!("expected Hello, got {other:?}"),
         }
     }
 
-    /// Goes on with the ids behind this one, which somebody used by hand.
+    /// Skips ids that a test used directly.
     pub fn skip_to(&mut self, id: u32) {
         self.next = self.next.max(id);
     }
 
-    /// Sends a request and gives its id, without letting time pass.
+    /// Sends a request without letting time pass; returns its id.
     pub fn send(&mut self, request: &Request) -> u32 {
         self.next += 1;
         let id = self.next;
@@ -83,13 +80,12 @@ impl Bench {
         id
     }
 
-    /// Puts a request's frame on the line, between two delimiters.
     fn put(&mut self, id: u32, request: &Request) {
         let frame = request_frame(id, self.boot, request);
         self.rig.send(&[&[0], frame.as_slice()].concat()).expect("the rig runs");
     }
 
-    /// The answers that have come; events are kept in [`Bench::events`].
+    /// Received answers; events go to [`Bench::events`].
     pub fn answers(&mut self) -> Vec<(u32, Answer)> {
         let mut answers = Vec::new();
         for packet in self.rig.take_frames() {
@@ -104,8 +100,8 @@ impl Bench {
         answers
     }
 
-    /// Sends a request and lets time pass until it is answered; asks again as hosts do, and gives up after three
-    /// repeats. Hosts wait 50 ms; the board answers within 2 ms, so waiting 10 ms is as good and cheaper.
+    /// Sends a request and waits for the answer with up to three repeats. Hosts wait 50 ms; 10 ms suffice
+    /// here, because the board answers within 2 ms.
     pub fn try_ask(&mut self, request: &Request) -> Option<Answer> {
         let id = self.send(request);
         for attempt in 0..4 {
@@ -122,31 +118,29 @@ impl Bench {
         None
     }
 
-    /// The same, where an answer must come.
+    /// As [`Bench::try_ask`], but panics without an answer.
     pub fn ask(&mut self, request: &Request) -> Answer {
         self.try_ask(request).unwrap_or_else(|| panic!("no answer to {request:?}"))
     }
 
-    /// Asks for something long and lets it end; gives the terminal event.
+    /// Runs long work to its end; returns the terminal event.
     pub fn carry_out(&mut self, request: &Request) -> EventKind {
         assert_eq!(self.ask(request), Ok(Response::Accepted), "{request:?}");
         self.settle()
     }
 
-    /// Lets the board come to rest; gives the last event.
+    /// Runs until idle; returns the last event.
     pub fn settle(&mut self) -> EventKind {
         self.rig.settle().expect("the rig runs");
         self.answers();
         self.events.last().expect("a terminal event").kind.clone()
     }
 
-    /// Homes a stepper axis.
     pub fn home_axis(&mut self, axis: Axis) {
         let end = self.carry_out(&Request::Home { axis, silence: SILENCE });
         assert!(matches!(end, EventKind::Homed { .. }), "{end:?}");
     }
 
-    /// Homes both stepper axes.
     pub fn home(&mut self) {
         self.home_axis(Axis::SensorCoarse);
         self.home_axis(Axis::Lens);
@@ -156,22 +150,20 @@ impl Bench {
         self.carry_out(&go(axis, target.0))
     }
 
-    /// Does something to the rig.
     pub fn access(&mut self, work: impl FnOnce(&mut RigAccess<'_, '_>) + Send + 'static) {
         self.rig.access(work).expect("the rig runs");
     }
 
-    /// Looks at something in the rig.
     pub fn peek<T: Send + 'static>(
         &mut self,
         look: impl FnOnce(&mut RigAccess<'_, '_>) -> T + Send + 'static,
     ) -> T {
-        let (tell, told) = std::sync::mpsc::channel();
-        self.access(move |rig| tell.send(look(rig)).expect("somebody waits"));
-        told.recv().expect("the rig runs")
+        let (send, receive) = std::sync::mpsc::channel();
+        self.access(move |rig| send.send(look(rig)).expect("the receiver waits"));
+        receive.recv().expect("the rig runs")
     }
 
-    /// Address and length of a variable of the firmware, by a part of its name.
+    /// Address and length of a firmware variable, by a part of its name.
     pub fn variable(&mut self, part: &str) -> (u64, u64) {
         let found = symbols(|symbol| {
             let named =
@@ -181,24 +173,21 @@ impl Bench {
         *found.first().unwrap_or_else(|| panic!("the firmware has no {part}"))
     }
 
-    /// Cycles of the firmware's longest control tick since its reset.
+    /// Longest control tick since reset, cycles.
     pub fn longest_tick(&mut self) -> u32 {
         let (at, _) = self.variable("FARNEAR_LONGEST_TICK_CYCLES");
         self.peek(move |rig| rig.read_word(at)).expect("RAM")
     }
 
-    /// Counts the longest tick anew.
     pub fn forget_longest_tick(&mut self) {
         let (at, _) = self.variable("FARNEAR_LONGEST_TICK_CYCLES");
         self.access(move |rig| rig.write_word(at, 0));
     }
 
-    /// The alarm that is latched.
     pub fn alarm(&mut self) -> Option<AlarmRecord> {
         self.status().alarm
     }
 
-    /// Clears the latched alarm, which must be this one.
     pub fn clear(&mut self, expected: impl FnOnce(&Alarm) -> bool) {
         let latched = self.alarm().expect("an alarm is latched");
         assert!(expected(&latched.alarm), "{latched:?}");
@@ -207,7 +196,6 @@ impl Bench {
         assert_eq!(self.alarm(), None);
     }
 
-    /// Loads and arms a program.
     pub fn arm(&mut self, shots: &[Shot]) {
         for (index, shot) in (0..).zip(shots) {
             assert_eq!(self.ask(&Request::LoadShot { index, shot: *shot }), Ok(Response::Accepted));
@@ -216,7 +204,7 @@ impl Bench {
         assert_eq!(self.ask(&Request::ArmProgram { shots }), Ok(Response::Accepted));
     }
 
-    /// Runs the armed program; gives its last event.
+    /// Runs the armed program; returns its last event.
     pub fn run(&mut self) -> EventKind {
         self.carry_out(&Request::RunProgram { silence: SILENCE })
     }
@@ -224,7 +212,7 @@ impl Bench {
     pub fn status(&mut self) -> Status {
         match self.ask(&Request::Status) {
             Ok(Response::Status(status)) => status,
-            other => panic!("no status but {other:?}"),
+            other => panic!("expected Status, got {other:?}"),
         }
     }
 
@@ -237,7 +225,6 @@ pub fn go(axis: Axis, target_nm: i32) -> Request {
     Request::Move { axis, target: Nanometres(target_nm), silence: SILENCE }
 }
 
-/// A shot on the piezo with a trigger pulse.
 pub fn fine_shot(target_nm: i32, exposure_us: u32, window_nm: i32, dwell_us: u32) -> Shot {
     Shot {
         axis: Axis::SensorFine,
@@ -250,12 +237,12 @@ pub fn fine_shot(target_nm: i32, exposure_us: u32, window_nm: i32, dwell_us: u32
     }
 }
 
-/// How much of something a test does: what the environment says (`cargo xtask campaign` says more), or else this.
+/// Size of a test: the environment variable (set by `cargo xtask campaign`), else this default.
 pub fn amount<T: std::str::FromStr>(variable: &str, else_this: T) -> T {
     std::env::var(variable).ok().and_then(|text| text.parse().ok()).unwrap_or(else_this)
 }
 
-/// Address and length of the firmware's symbols that `wanted` takes.
+/// Address and length of matching firmware symbols.
 pub fn symbols(wanted: impl Fn(&Symbol<'_, '_>) -> bool) -> Vec<(u64, u64)> {
     let elf = farnear_sim::firmware::find(None).expect("a firmware");
     let bytes = std::fs::read(elf).expect("readable");

@@ -1,4 +1,4 @@
-//! The board measures its own mechanics, and what it finds is what the plant is.
+//! The board's calibration finds the plant's properties.
 
 use crate::bench::{Bench, SILENCE};
 use farnear_protocol::{
@@ -19,7 +19,7 @@ fn set(bench: &mut Bench, key: SettingKey, value: i32) {
 }
 
 #[test]
-fn travel_and_backlash_are_the_screws() {
+fn calibration_finds_travel_and_backlash() {
     let mut bench = Bench::new(1);
     for (axis, key) in
         [(Axis::SensorCoarse, SettingKey::CoarseBacklashNm), (Axis::Lens, SettingKey::LensBacklashNm)]
@@ -31,7 +31,7 @@ fn travel_and_backlash_are_the_screws() {
             panic!("another routine's result")
         };
         println!("{axis:?}: backlash {backlash:?}, spread {spread:?}");
-        // 4 um of play; the switch closes and opens at the same place in a round, a step is 0.16 um.
+        // 4 um of play; the switch repeats within a round, a step is 0.16 um.
         assert!((backlash.0 - 4_000).abs() <= 500, "{backlash:?}");
         assert!(spread.0 <= 500, "{spread:?}");
     }
@@ -41,12 +41,12 @@ fn travel_and_backlash_are_the_screws() {
         panic!("another routine's result")
     };
     println!("travel {length:?}");
-    // 13.15 mm, the screw's error of 2 um and the home switch's 0.3 um.
+    // 13.15 mm with the screw's error of 2 um and the switch's 0.3 um.
     assert!((length.0 - 13_150_000).abs() <= 3_500, "{length:?}");
 }
 
 #[test]
-fn moves_end_where_they_should_from_either_side() {
+fn moves_reach_their_targets_from_either_side() {
     let mut bench = Bench::new(2);
     bench.home();
     let places = [4_000_000, 2_000_000, 4_000_000, 4_020_000, 4_000_000, 9_000_000, 4_000_000];
@@ -66,7 +66,7 @@ fn moves_end_where_they_should_from_either_side() {
 }
 
 #[test]
-fn the_piezos_figures_are_found_and_help() {
+fn piezo_calibration_makes_moves_faster() {
     let mut bench = Bench::new(3);
     let settle = |bench: &mut Bench| {
         bench.move_to(Axis::SensorFine, Nanometres(20_000));
@@ -88,6 +88,6 @@ fn the_piezos_figures_are_found_and_help() {
     assert!(hysteresis_ppm.abs_diff(120_000) <= 15_000);
     assert!(creep_ppm_per_decade.abs_diff(15_000) <= 8_000);
     let knowing = settle(&mut bench);
-    println!("far to near in {blind} ms, calibrated in {knowing} ms, asking and telling included");
+    println!("far to near in {blind} ms, calibrated in {knowing} ms, communication included");
     assert!(knowing <= 17.0 && knowing <= blind + 1.0);
 }

@@ -1,4 +1,4 @@
-//! Continuous capture on the emulated board: the pace, what is dropped, where the sensor really is, and the same bits again.
+//! Continuous capture on the emulated board: rate, dropped frames, true sensor positions, repeatability.
 
 use std::hash::{DefaultHasher, Hash, Hasher};
 
@@ -12,16 +12,15 @@ use crate::bench::{Bench, SILENCE, amount, fine_shot};
 const EXPOSURE_US: u32 = 5_000;
 const WINDOW_NM: i32 = 50;
 const PLACES_NM: [i32; 2] = [10_000, 166_270];
-/// 40 exposures a second: less than move, exposure and read-out one after the other.
+/// 40 exposures a second: shorter than move, exposure and read-out in sequence.
 const PERIOD_US: u64 = 25_000;
-/// Board time of each run.
 const SECONDS: u64 = 2;
 
 struct Ran {
     frames: Vec<(u32, Nanometres, ShotRecord)>,
     dropped: Vec<DropReason>,
     end: EventKind,
-    /// How far the sensor really was from its place during each exposure, at worst, nm.
+    /// Worst distance of the sensor from its target per exposure.
     truths_nm: Vec<f64>,
     digest: u64,
 }
@@ -34,7 +33,7 @@ fn run(bench: &mut Bench, period_us: u64, exposures: u32) -> Ran {
     assert_eq!(bench.ask(&request), Ok(Response::Accepted));
     let mut shots = Vec::new();
     let ends = |kind: &EventKind| matches!(kind, EventKind::ContinuousDone { .. } | EventKind::Failed { .. });
-    // A host that asks now and then; the events of a second are far more than the board remembers.
+    // The host must poll: a second has far more events than the board remembers.
     while !bench.events.iter().any(|event| ends(&event.kind)) {
         bench.rig.advance_us(200_000).expect("runs");
         bench.status();
@@ -63,7 +62,7 @@ fn run(bench: &mut Bench, period_us: u64, exposures: u32) -> Ran {
     Ran { frames, dropped, end: end.expect("it ended"), truths_nm, digest: hasher.finish() }
 }
 
-/// Prints how it was, and holds what is promised.
+/// Prints the result and checks the specification.
 fn hold(name: &str, ran: &Ran, exposures: u32) {
     let [first, last] = [ran.frames[0], ran.frames[ran.frames.len() - 1]].map(|(_, _, shot)| shot.trigger.0);
     let seconds = (last - first) as f64 / 1e6;
@@ -91,7 +90,7 @@ fn hold(name: &str, ran: &Ran, exposures: u32) {
 }
 
 #[test]
-fn far_and_near_follow_each_other_inside_their_windows_at_a_pace_held_to_the_microsecond() {
+fn alternates_far_and_near_within_tolerance_at_an_exact_period() {
     let exposures =
         u32::try_from(amount("FARNEAR_CONTINUOUS_S", SECONDS) * 1_000_000 / PERIOD_US).expect("fits");
     let mut bench = Bench::new(amount("FARNEAR_SEED", 1));
@@ -110,13 +109,13 @@ fn far_and_near_follow_each_other_inside_their_windows_at_a_pace_held_to_the_mic
 }
 
 #[test]
-fn without_a_pace_it_is_as_fast_as_it_can_be_and_two_runs_give_the_same_bits() {
+fn without_a_period_runs_at_full_speed_and_repeats_to_the_bit() {
     let exposures = u32::try_from(amount("FARNEAR_CONTINUOUS_S", 1) * 50).expect("fits");
     let seed = amount("FARNEAR_SEED", 1);
     let [first, second] = [(); 2].map(|()| run(&mut Bench::new(seed), 0, exposures));
     hold("as fast as it can", &first, exposures);
     let us = first.frames[first.frames.len() - 1].2.trigger.0 - first.frames[0].2.trigger.0;
-    // At least 25 a second are asked for.
+    // The specification is 25 a second.
     assert!(us / u64::from(exposures - 1) <= 21_000, "{us} us");
     assert_eq!(first.digest, second.digest, "two runs differ");
 }

@@ -1,4 +1,4 @@
-//! Anything may come over the link: the board answers what is a request, stays alive, and never leaves its limits.
+//! Random input on the link: the board answers valid requests, stays alive and respects its limits.
 
 use crate::bench::{Bench, amount, fine_shot, request_frame};
 use farnear_protocol::{
@@ -10,11 +10,11 @@ use farnear_protocol::{
 };
 use farnear_sim::plant::Noise;
 
-/// Frames; the campaign sends more. About 600 in a second of the board's time.
+/// About 600 frames per second of board time; the campaign sends more.
 const FRAMES: u64 = 1_000;
-/// Good frames that are kept to be sent again.
+/// Valid frames kept for repetition.
 const KEPT: usize = 256;
-/// Most positions and durations are wild, some are near the limits, some sensible.
+/// Positions and durations: mostly extreme, some near the limits, some sensible.
 const EDGES: [i32; 12] =
     [0, 1, -1, i32::MIN, i32::MAX, 13_000_000, 13_000_001, 5_000, 195_000, 100_000, 500_000, 6_000_000];
 
@@ -22,7 +22,7 @@ struct Fuzz {
     noise: Noise,
     boot: u32,
     id: u32,
-    /// What was said before, and may come again.
+    /// Earlier frames, which may be repeated.
     said: Vec<Vec<u8>>,
 }
 
@@ -145,7 +145,7 @@ impl Fuzz {
         }
     }
 
-    /// Bytes for the line: mostly good frames, some spoilt, some garbage.
+    /// Mostly valid frames, some damaged, some garbage.
     fn bytes(&mut self) -> Vec<u8> {
         self.id += 1;
         let request = self.request();
@@ -194,7 +194,7 @@ fn nothing_on_the_link_stops_the_board() {
             let pause = fuzz.below(3_000);
             bench.rig.advance_us(pause).expect("the emulated board runs");
         }
-        // Whatever was said: the ends of the travel are not touched, and the board is the same boot.
+        // The ends of the travel are not touched, and the board has not restarted.
         let report = bench.report();
         assert_eq!(report.resets, 0, "the board was reset after {sent} frames");
         for stage in [report.coarse, report.lens] {
@@ -202,7 +202,7 @@ fn nothing_on_the_link_stops_the_board() {
         }
         bench.rig.take_bytes();
     }
-    // The end of a broken frame and the answers that are owed, and the board answers as ever.
+    // Ends a broken frame and collects pending answers; then the board answers normally.
     bench.rig.send(&[0]).expect("runs");
     bench.rig.advance_us(20_000).expect("runs");
     bench.rig.take_bytes();

@@ -1,4 +1,4 @@
-//! The camera as one of GigE Vision, to a client that knows nothing but the protocol: no library is needed for these tests.
+//! GigE Vision camera tested with a minimal client, without a library.
 
 use std::{
     collections::BTreeMap,
@@ -16,20 +16,19 @@ use farnear_gige::{
 
 use crate::pty::{Program, capture};
 
-/// Far longer than anything here takes: the stages home while a frame is awaited, as slowly as a busy computer emulates it.
+/// The stages home while a frame is awaited, which takes long on a busy computer.
 const PATIENCE: Duration = Duration::from_secs(600);
-/// A packet that has not come by then is asked for again.
+/// Timeout before a packet is requested again.
 const GAP: Duration = Duration::from_millis(300);
 const ACCESS_DENIED: u16 = 0x8006;
 
-/// A client of the protocol.
 struct Client {
     control: UdpSocket,
     stream: UdpSocket,
     number: u16,
-    /// Frames of which something came, by their numbers: one may begin before what is missing of another has come again.
+    /// Incomplete frames by number: the next may begin before a resend completes the last.
     begun: BTreeMap<u16, Packets>,
-    /// The last frame that was given.
+    /// Last returned frame.
     given: u16,
 }
 
@@ -45,7 +44,7 @@ impl Packets {
     }
 
     fn missing(&self) -> (u32, u32) {
-        // The end is not known where the trailer was lost, too.
+        // The end is unknown if the trailer was lost, too.
         let end = self.last.unwrap_or_else(|| self.packets.keys().next_back().map_or(0, |last| last + 1000));
         let is_there = |packet: &u32| self.packets.contains_key(packet);
         let missing = (0..=end).find(|packet| !is_there(packet)).expect("something is");
@@ -53,7 +52,6 @@ impl Packets {
     }
 }
 
-/// A frame that came.
 #[derive(Debug)]
 struct Frame {
     number: u16,
@@ -71,13 +69,13 @@ impl Client {
         Self { control, stream, number: 0, begun: BTreeMap::new(), given: 0 }
     }
 
-    /// A camera under control, whose frames come here.
+    /// Takes control of the camera and receives its frames.
     fn controlling(camera: Ipv4Addr) -> Self {
         let mut client = Self::new(camera);
-        let Ok(SocketAddr::V4(to)) = client.stream.local_addr() else { panic!("no address of its own") };
+        let Ok(SocketAddr::V4(to)) = client.stream.local_addr() else { panic!("expected an IPv4 address") };
         for (register, value) in [
             (PRIVILEGE, 2),
-            // This client sends none, and a busy computer takes its time.
+            // This client sends no heartbeat.
             (HEARTBEAT_MS, 600_000),
             (STREAM_ADDRESS, to.ip().to_bits()),
             (STREAM_PORT, u32::from(to.port())),
@@ -124,13 +122,13 @@ impl Client {
         String::from_utf8(text[..length as usize].to_vec()).expect("text")
     }
 
-    /// Passes over what was on its way; the next acquisition counts anew.
+    /// Drops packets in flight; the next acquisition restarts the numbers.
     fn drain(&mut self) {
         while self.stream.recv(&mut [0; 2048]).is_ok() {}
         (self.begun, self.given) = (BTreeMap::new(), 0);
     }
 
-    /// The next frame; what is missing is asked for again until all of it is there.
+    /// The next complete frame; missing packets are requested again.
     fn frame(&mut self) -> Frame {
         let deadline = Instant::now() + PATIENCE;
         let mut bytes = [0; 2048];
@@ -164,7 +162,7 @@ impl Client {
                     let again = [u32::from(*id), from, until].map(u32::to_be_bytes).concat();
                     self.number += 1;
                     let head = [0x42, 0, 0, 0x40, 0, 12, 0, self.number as u8];
-                    // As Aravis' client does: the stream itself asks, and so by another port than that of the control channel.
+                    // As in Aravis, the stream requests resends from its own port.
                     let camera = self.control.peer_addr().expect("connected");
                     self.stream.send_to(&[&head[..], &again].concat(), camera).expect("sent");
                 }
@@ -173,14 +171,14 @@ impl Client {
     }
 }
 
-/// One that no other test has: there is one port for cameras on each.
+/// A unique loopback address: each has one port for cameras.
 fn address(last: u8) -> (Ipv4Addr, String) {
     let address = Ipv4Addr::new(127, 0, 77, last);
     (address, address.to_string())
 }
 
 #[test]
-fn frames_over_lossy_gige_are_those_of_the_endpoint_to_the_bit() {
+fn frames_over_lossy_gige_equal_those_of_the_endpoint() {
     let (camera, text) = address(1);
     let program = Program::start(&["--seed", "3", "--gige", &text, "--gige-lost", "30"]);
     assert_eq!(program.gige.as_deref(), Some("farnear-emulated-S3"));
@@ -200,9 +198,10 @@ fn frames_over_lossy_gige_are_those_of_the_endpoint_to_the_bit() {
         assert_eq!(frame.number, number);
         let grey: Vec<u8> = pixels.chunks(2).map(|pixel| pixel[0]).collect();
         assert!(frame.payload[..640 * 480] == grey, "frame {number} differs from the endpoint's");
-        // The frame's number as a chunk: 8 bytes before its own trailer.
+        // The frame id as a chunk: 8 bytes before its trailer.
         assert_eq!(frame.payload[frame.payload.len() - 16..][..8], u64::from(number).to_be_bytes());
-        // The board counts its time from its reset, the camera from power-on; they run alike within the crystal's 50 ppm and a microsecond.
+        // Board time starts at its reset, camera time at power-on; their rates agree within 50 ppm and a
+        // microsecond.
         let apart = (frame.time_ns / 1000).abs_diff(header.exposure.0);
         assert!(apart < 2_000_000, "{apart} us");
     }
@@ -214,7 +213,7 @@ fn frames_over_lossy_gige_are_those_of_the_endpoint_to_the_bit() {
 }
 
 #[test]
-fn it_is_found_described_set_and_held_by_one_client_until_that_falls_silent() {
+fn discovery_settings_and_exclusive_control_until_the_heartbeat_ends() {
     let (camera, text) = address(2);
     let program = Program::start(&["--noise", "12bit", "--gige", &text]);
     let mut client = Client::controlling(camera);
@@ -229,15 +228,15 @@ fn it_is_found_described_set_and_held_by_one_client_until_that_falls_silent() {
     assert_eq!(client.ask(0x0100, &[]).0, 0x8001);
     let mut other = Client::new(camera);
     assert_eq!((other.write(PRIVILEGE, 2), other.write(GAIN, 200)), (ACCESS_DENIED, ACCESS_DENIED));
-    assert_eq!(other.read(PRIVILEGE), 2, "who may not write may read");
+    assert_eq!(other.read(PRIVILEGE), 2, "a client without control may read");
     assert_eq!(client.write(HEARTBEAT_MS, 500), 0);
     let until = Instant::now() + PATIENCE;
     while other.write(PRIVILEGE, 2) == ACCESS_DENIED {
-        assert!(Instant::now() < until, "a silent client has it for ever");
+        assert!(Instant::now() < until, "a silent client keeps control");
         std::thread::sleep(Duration::from_millis(50));
     }
     assert_eq!(client.write(GAIN, 200), ACCESS_DENIED);
-    // The same address twice: the second camera says what is the matter.
+    // A second camera at the same address reports the conflict.
     let second = std::process::Command::new(env!("CARGO_BIN_EXE_farnear-sim"))
         .args(["run", "--gige", &text])
         .stdin(std::process::Stdio::piped())
@@ -249,7 +248,7 @@ fn it_is_found_described_set_and_held_by_one_client_until_that_falls_silent() {
 }
 
 #[test]
-fn it_runs_freely_and_by_software_with_region_gain_and_format() {
+fn free_running_and_software_trigger_with_region_gain_and_format() {
     let (camera, text) = address(3);
     let program = Program::start(&["--scene", "plane:900", "--noise", "12bit", "--gige", &text]);
     let mut client = Client::controlling(camera);
@@ -259,7 +258,7 @@ fn it_runs_freely_and_by_software_with_region_gain_and_format() {
     }
     let (first, second) = (client.frame(), client.frame());
     assert_eq!((first.payload.len(), first.number, second.number), (64 * 32 * 2, 1, 2));
-    // 25 frames a second by the rig's own time, whatever the computer does meanwhile.
+    // 25 frames a second of rig time, independent of the computer's speed.
     assert_eq!(second.time_ns - first.time_ns, 40_000_000);
     assert_eq!(client.write(ACQUISITION, STOP), 0);
     client.drain();
@@ -267,7 +266,7 @@ fn it_runs_freely_and_by_software_with_region_gain_and_format() {
         let codes = frame.payload.chunks(2).map(|code| f64::from(u16::from_le_bytes([code[0], code[1]])));
         codes.sum::<f64>() / (frame.payload.len() / 2) as f64
     };
-    // By software: once for each, and brighter by the factor.
+    // One frame per software trigger; brightness follows the factor.
     let settings = [
         (TRIGGER_MODE, 1),
         (TRIGGER_SOURCE, SOFTWARE),
@@ -282,7 +281,7 @@ fn it_runs_freely_and_by_software_with_region_gain_and_format() {
     let bright = client.frame();
     assert_eq!(bright.number, 1);
     let factor = mean(&bright) / mean(&first);
-    // Noise of a few codes on 2048 pixels, and what saturates.
+    // Noise of a few codes on 2048 pixels, and saturation.
     assert!((factor - 1.5).abs() < 0.03, "{factor}");
     assert!(program.end().success());
 }

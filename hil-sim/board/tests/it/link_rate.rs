@@ -1,4 +1,4 @@
-//! The link at another rate: both ends change, or the board goes back. And an adapter that takes its time.
+//! Change of the link rate on both ends, fallback to the old rate, and a slow adapter.
 
 use farnear_protocol::{
     Request, Response,
@@ -21,7 +21,7 @@ fn rate_of_host(bench: &mut Bench, rate: LinkRate) {
 }
 
 #[test]
-fn the_board_speaks_at_the_rate_that_its_host_asks_for_until_it_is_reset() {
+fn uses_the_requested_link_rate_until_reset() {
     let mut bench = Bench::new(1);
     rate_of_host(&mut bench, LinkRate::START);
     set(&mut bench, SLOW);
@@ -31,7 +31,7 @@ fn the_board_speaks_at_the_rate_that_its_host_asks_for_until_it_is_reset() {
         bench.rig.advance_us(50_000).expect("the rig runs");
     }
     assert_eq!(bench.status().link.bad_frames, 0);
-    // And back, and once more.
+    // Back, and once more.
     for rate in [LinkRate::START, SLOW] {
         set(&mut bench, rate);
         rate_of_host(&mut bench, rate);
@@ -45,7 +45,7 @@ fn the_board_speaks_at_the_rate_that_its_host_asks_for_until_it_is_reset() {
 }
 
 #[test]
-fn a_host_that_does_not_follow_finds_the_board_where_it_was() {
+fn returns_to_the_old_rate_if_the_host_does_not_follow() {
     let mut bench = Bench::new(1);
     rate_of_host(&mut bench, LinkRate::START);
     set(&mut bench, SLOW);
@@ -57,7 +57,7 @@ fn a_host_that_does_not_follow_finds_the_board_where_it_was() {
 }
 
 #[test]
-fn an_adapter_that_keeps_what_it_hears_delays_answers_and_loses_none() {
+fn adapter_latency_delays_answers_and_loses_none() {
     let scenario = "[[happens]]\nafter_ms = 200\nwhat = \"link-latency\"\namount = 16";
     let scenario = Scenario::parse(scenario).expect("a good file");
     let mut bench = Bench::with(&RigConfig { seed: 1, scenario, ..RigConfig::default() });
@@ -70,7 +70,8 @@ fn an_adapter_that_keeps_what_it_hears_delays_answers_and_loses_none() {
             waited_us += 200;
             assert!(waited_us < 100_000, "no answer");
         }
-        // The answer's first byte comes within 4 ms, of which the board rests 2; it waits 16 ms, or what was left of them for the log before it.
+        // The first byte comes within 4 ms, including 2 ms of rest; the adapter then holds it for up to 16
+        // ms.
         assert!(waited_us <= 20_200, "{waited_us} us");
         assert!(waited_us >= 1_000, "{waited_us} us");
         bench.rig.advance_us(40_000).expect("the rig runs");
@@ -78,7 +79,7 @@ fn an_adapter_that_keeps_what_it_hears_delays_answers_and_loses_none() {
 }
 
 #[test]
-fn a_scenario_may_count_cycles() {
+fn a_scenario_can_use_cycles() {
     let text = "[[happens]]\nafter_cycles = 84000000\nwhat = \"reset-button\"";
     let scenario = Scenario::parse(text).expect("a good file");
     let mut bench = Bench::with(&RigConfig { seed: 1, scenario, ..RigConfig::default() });

@@ -1,5 +1,4 @@
-//! The emulated board: the real firmware, the plant around it, and the program that offers both to clients. One
-//! program for all of it, so that it is linked once and its tests run side by side.
+//! The emulated board: firmware, plant and program. One test binary, linked once.
 
 mod accuracy;
 mod bad_line;

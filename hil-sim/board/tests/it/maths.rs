@@ -1,4 +1,4 @@
-//! Mathematics on the board: the answers to the same requests on the emulated Cortex-M4F and on this machine, bit for bit.
+//! Mathematics on the board: answers of the emulated Cortex-M4F and of this machine agree to the bit.
 
 use crate::bench::{Bench, answer_in, request_frame};
 use farnear_protocol::{
@@ -18,7 +18,7 @@ use farnear_sim::plant::Noise;
 const WIDTH: u16 = 640;
 const HEIGHT: u16 = 480;
 
-/// The board's behaviour, run on this machine with nothing connected.
+/// The board's code on this machine, without devices.
 struct Here {
     rig: Rig,
     now: u64,
@@ -89,7 +89,7 @@ impl Here {
     }
 }
 
-/// Asks both; gives the answer that they agree on.
+/// Asks both and returns the common answer.
 fn both(bench: &mut Bench, here: &mut Here, request: &Request) -> Response {
     let (there, here) = (bench.ask(request), here.ask(request));
     assert_eq!(there, here, "{request:?}");
@@ -152,7 +152,7 @@ fn a_fit_on_the_board_has_the_same_bits() {
 }
 
 #[test]
-fn suns_and_shadows_have_the_same_bits() {
+fn sun_positions_and_shadows_have_the_same_bits() {
     let (mut bench, mut here) = (Bench::new(1), Here::new());
     let mut noise = Noise::new(3, "test of shadows");
     let mut angles = 0;

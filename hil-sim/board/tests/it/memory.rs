@@ -1,4 +1,4 @@
-//! What the board keeps without power: it survives, and where a copy is damaged the older one serves, and that is said.
+//! Non-volatile memory: survives power loss; a damaged copy is reported and replaced by the older one.
 
 use crate::bench::{Bench, go};
 use farnear_protocol::{
@@ -12,11 +12,11 @@ const KEY: SettingKey = SettingKey::CoarseBacklashNm;
 fn read(bench: &mut Bench) -> i32 {
     match bench.ask(&Request::ReadSetting { key: KEY }) {
         Ok(Response::Setting(setting)) => setting.value,
-        other => panic!("no setting but {other:?}"),
+        other => panic!("expected a setting, got {other:?}"),
     }
 }
 
-/// Writes a setting, and waits until it is in the memory.
+/// Writes a setting and waits until it is stored.
 fn write(bench: &mut Bench, value: i32) {
     let answer = bench.ask(&Request::WriteSetting { key: KEY, value });
     assert!(matches!(answer, Ok(Response::Setting(setting)) if setting.value == value), "{answer:?}");
@@ -24,7 +24,7 @@ fn write(bench: &mut Bench, value: i32) {
 }
 
 #[test]
-fn the_memory_is_kept_between_two_runs_where_it_is_asked_to() {
+fn keeps_the_memory_between_runs_on_request() {
     let folder = tempfile::tempdir().expect("a folder");
     let config = RigConfig { memory: Some(folder.path().join("fram.bin")), ..RigConfig::default() };
     let mut bench = Bench::with(&config);
@@ -58,13 +58,13 @@ fn repaired(bench: &Bench) -> Vec<RecordName> {
         .collect()
 }
 
-/// The addresses at which two contents differ.
+/// Addresses at which two contents differ.
 fn changed(before: &[u8], after: &[u8]) -> Vec<usize> {
     (0..before.len()).filter(|&i| before[i] != after[i]).collect()
 }
 
 #[test]
-fn a_setting_survives_the_loss_of_power_and_boots_count_on() {
+fn settings_survive_a_power_loss_and_the_boot_count_continues() {
     let mut bench = Bench::new(1);
     assert_eq!(bench.boot, 1);
     write(&mut bench, 3_210);
@@ -74,7 +74,7 @@ fn a_setting_survives_the_loss_of_power_and_boots_count_on() {
 }
 
 #[test]
-fn a_flipped_bit_is_found_the_older_copy_used_and_that_said() {
+fn a_flipped_bit_is_reported_and_the_older_copy_used() {
     let mut bench = Bench::new(1);
     write(&mut bench, 3_000);
     let before = bench.peek(|rig| rig.memory());
@@ -82,7 +82,7 @@ fn a_flipped_bit_is_found_the_older_copy_used_and_that_said() {
     let after = bench.peek(|rig| rig.memory());
     let places = changed(&before, &after);
     assert!(places.len() > 4, "a sequence number, a value and a checksum: {places:?}");
-    // The first, the last and one in the middle; every byte is the campaign's.
+    // First, last and a middle byte; the campaign tests every byte.
     let all = std::env::var_os("FARNEAR_CAMPAIGN").is_some();
     let some = [0, places.len() / 2, places.len() - 1].map(|i| places[i]);
     for place in if all { places } else { some.to_vec() } {
@@ -99,7 +99,7 @@ fn a_flipped_bit_is_found_the_older_copy_used_and_that_said() {
             bench.events.clear();
             bench.answers();
             bench.say_hello();
-            assert_eq!(read(&mut bench), 3_000, "bit {bit} of byte {place}: the older copy serves");
+            assert_eq!(read(&mut bench), 3_000, "bit {bit} of byte {place}: the older copy is used");
             assert_eq!(repaired(&bench), [RecordName::Settings], "bit {bit} of byte {place}");
             assert_eq!(bench.alarm(), None);
         }
@@ -107,7 +107,7 @@ fn a_flipped_bit_is_found_the_older_copy_used_and_that_said() {
 }
 
 #[test]
-fn with_both_copies_bad_the_defaults_serve_and_an_alarm_says_so() {
+fn two_damaged_copies_give_the_defaults_and_an_alarm() {
     let mut bench = Bench::new(1);
     write(&mut bench, 3_000);
     let before = bench.peek(|rig| rig.memory());
@@ -137,7 +137,7 @@ fn with_both_copies_bad_the_defaults_serve_and_an_alarm_says_so() {
 }
 
 #[test]
-fn power_lost_in_the_middle_of_a_write_leaves_the_old_value_or_the_new() {
+fn power_loss_during_a_write_leaves_the_old_or_the_new_value() {
     let mut bench = Bench::new(1);
     let mut value = 3_000;
     write(&mut bench, value);
@@ -168,7 +168,7 @@ fn power_lost_in_the_middle_of_a_write_leaves_the_old_value_or_the_new() {
 }
 
 #[test]
-fn power_lost_in_motion_loses_the_position() {
+fn power_loss_during_motion_invalidates_the_position() {
     let mut bench = Bench::new(1);
     for axis in [Axis::SensorCoarse, Axis::Lens] {
         bench.home();
@@ -185,10 +185,10 @@ fn power_lost_in_motion_loses_the_position() {
         assert!(matches!(refused, Err(RequestError::Alarm { .. })), "{refused:?}");
         bench.clear(|alarm| *alarm == Alarm::MotionInterrupted { axis });
         bench.home_axis(axis);
-        // The motor has come to rest, and the memory knows.
+        // The motor is at rest and the position stored.
         bench.rig.advance_us(200_000).expect("runs");
     }
-    // At rest nothing is lost.
+    // At rest a power loss loses nothing.
     power_cycle(&mut bench);
     assert_eq!((bench.alarm(), bench.status().coarse.state), (None, PositionState::Unknown));
 }

@@ -1,14 +1,12 @@
-//! As many requests at a time as the board promises to hold: each is answered once, and none of its frames is lost on a good
-//! line.
+//! The maximum number of outstanding requests: each is answered once, without lost frames on a good line.
 
 use crate::bench::{Bench, amount, request_frame};
 use farnear_protocol::{Request, Response};
 
-/// Rounds of six requests; the campaign sends more.
 const ROUNDS: u32 = 400;
 
 #[test]
-fn six_requests_at_a_time_are_all_good_frames_and_all_answered() {
+fn six_outstanding_requests_are_all_answered() {
     let mut bench = Bench::new(1);
     let begin = bench.status().link;
     let rounds = amount("FARNEAR_ROUNDS", ROUNDS);

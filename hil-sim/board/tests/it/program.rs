@@ -1,4 +1,4 @@
-//! Exposure programs: how fast a pair is, and how still the sensor stands while it exposes.
+//! Exposure programs: duration of a pair and standstill during exposures.
 
 use crate::bench::{Bench, SILENCE, fine_shot};
 use farnear_protocol::{
@@ -6,19 +6,17 @@ use farnear_protocol::{
     message::{Shot, ShotRecord, TriggerMode},
 };
 
-/// Far and near setting of the 50 mm lens are this far apart (933 and 886.81 mm).
+/// Far and near settings of the 50 mm lens (933 and 886.81 mm).
 const TRAVEL_NM: i32 = 156_270;
 const EXPOSURE: Micros = Micros(5_000);
 const WINDOW: Nanometres = Nanometres(50);
-/// The piezo's position of the far-focused exposure.
 const FAR: Nanometres = Nanometres(10_000);
 
-/// Loads a far and near pair.
 fn load_pair(bench: &mut Bench) {
     bench.arm(&[FAR, Nanometres(FAR.0 + TRAVEL_NM)].map(|at| fine_shot(at.0, EXPOSURE.0, WINDOW.0, 2_000)));
 }
 
-/// Runs the pair; gives its records.
+/// Runs the pair; returns its records.
 fn run_pair(bench: &mut Bench) -> Vec<ShotRecord> {
     let before = bench.events.len();
     let end = bench.run();
@@ -31,7 +29,7 @@ fn run_pair(bench: &mut Bench) -> Vec<ShotRecord> {
 }
 
 #[test]
-fn a_pair_is_fast_and_stands_still() {
+fn a_pair_is_fast_and_at_rest_during_exposures() {
     let mut bench = Bench::new(1);
     load_pair(&mut bench);
     for turn in 0..5 {
@@ -42,7 +40,7 @@ fn a_pair_is_fast_and_stands_still() {
         let took_us = (shots[1].end_ns - begin_ns) / 1000;
         let moved_us = took_us - 2 * u64::from(EXPOSURE.0);
         println!("pair {turn}: {took_us} us, without its exposures {moved_us} us");
-        assert!(moved_us <= 60_000, "a pair takes {moved_us} us beside its exposures");
+        assert!(moved_us <= 60_000, "a pair takes {moved_us} us besides its exposures");
         for (record, shot) in records.iter().zip(&shots) {
             let asked_um = f64::from(record.asked.0) * 1e-3;
             let off_nm = [shot.truth.piezo_min_um, shot.truth.piezo_um, shot.truth.piezo_max_um]
@@ -58,7 +56,7 @@ fn a_pair_is_fast_and_stands_still() {
                 "{off_nm:?} nm during the exposure"
             );
             assert_eq!(record.trigger_number, shot.id);
-            // Latency 20 us with 2 us of jitter, six standard deviations; the stamps are whole microseconds.
+            // Latency 20 us, six standard deviations of 2 us; stamps are whole microseconds.
             let latency_us = record.strobe_start.0 - record.trigger.0;
             assert!((7..=33).contains(&latency_us), "{latency_us} us");
             assert_eq!(record.strobe_end.0 - record.strobe_start.0, u64::from(EXPOSURE.0));
@@ -67,11 +65,11 @@ fn a_pair_is_fast_and_stands_still() {
     }
 }
 
-/// A cycle at 168 MHz, rounded up.
+/// One cycle at 168 MHz, rounded up.
 const CYCLE_NS: u64 = 6;
 
 #[test]
-fn exposures_are_as_long_as_asked_from_the_shortest_on() {
+fn exposures_have_the_requested_duration() {
     let mut bench = Bench::new(2);
     for exposure in [20, 21, 37, 100, 999, 10_000, 200_000] {
         bench.arm(&[Shot { repeat: 3, ..fine_shot(50_000, exposure, 200, 400) }]);
@@ -80,8 +78,7 @@ fn exposures_are_as_long_as_asked_from_the_shortest_on() {
         let shots = bench.rig.take_shots();
         assert_eq!(shots.len(), 3);
         for shot in shots {
-            // The timer's edges are exact; the camera's latency is the same for both.
-            // The emulator stops at whole cycles of the processor.
+            // Timer edges are exact and the camera's latency cancels; the emulator stops at whole cycles.
             let length_ns = shot.end_ns - shot.begin_ns;
             assert!(
                 length_ns.abs_diff(1000 * u64::from(exposure)) <= CYCLE_NS,
@@ -93,7 +90,7 @@ fn exposures_are_as_long_as_asked_from_the_shortest_on() {
 }
 
 #[test]
-fn the_cameras_host_triggers_it_and_the_strobe_ends_the_shot() {
+fn a_software_triggered_shot_ends_with_the_strobe() {
     let mut bench = Bench::new(3);
     bench.arm(&[Shot { mode: TriggerMode::Software, repeat: 2, ..fine_shot(60_000, 4_000, 100, 1_000) }]);
     let run = bench.send(&Request::RunProgram { silence: SILENCE });
@@ -128,7 +125,7 @@ fn the_cameras_host_triggers_it_and_the_strobe_ends_the_shot() {
 }
 
 #[test]
-fn of_a_camera_that_runs_freely_the_first_exposure_after_settling_is_the_shot() {
+fn free_running_uses_the_first_exposure_after_settling() {
     let mut bench = Bench::new(4);
     bench.access(|rig| rig.run_camera_freely(40_000, 5_000));
     bench.arm(

@@ -1,4 +1,4 @@
-//! The program as a client sees it: its JSON line, the pty through `serialport`, the camera endpoint, its end.
+//! The program as a client sees it: JSON line, pty, camera endpoint, exit.
 
 use std::{
     collections::VecDeque,
@@ -18,7 +18,7 @@ use farnear_protocol::{
 };
 use serialport::SerialPort;
 
-/// Far longer than anything here takes, so that a hang fails instead of hanging.
+/// Turns a hang into a failure.
 const PATIENCE: Duration = Duration::from_secs(60);
 
 pub struct Program {
@@ -51,7 +51,7 @@ impl Program {
         Self { child, port, camera, second_camera, gige }
     }
 
-    /// Closes its standard input and waits for its end.
+    /// Closes standard input and waits for the exit.
     pub fn end(mut self) -> std::process::ExitStatus {
         drop(self.child.stdin.take());
         let deadline = Instant::now() + PATIENCE;
@@ -71,7 +71,7 @@ impl Program {
 struct Client {
     port: Box<dyn SerialPort>,
     decoder: Decoder,
-    /// Bytes that came behind what was waited for.
+    /// Bytes received after the last match.
     rest: VecDeque<u8>,
     boot: u32,
     next: u32,
@@ -92,7 +92,7 @@ impl Client {
         client
     }
 
-    /// The next frame that `wanted` takes.
+    /// The next frame accepted by `wanted`.
     fn wait<T>(&mut self, wanted: impl Fn(&farnear_protocol::frame::Packet) -> Option<T>) -> T {
         let deadline = Instant::now() + PATIENCE;
         let mut bytes = [0; 256];
@@ -127,7 +127,7 @@ impl Client {
     fn time_us(&mut self) -> u64 {
         match self.ask(&Request::Status) {
             Ok(Response::Status(status)) => status.time.0,
-            other => panic!("no status but {other:?}"),
+            other => panic!("expected Status, got {other:?}"),
         }
     }
 
@@ -151,7 +151,7 @@ fn receive_frame(camera: &mut TcpStream) -> (FrameHeader, Vec<u8>) {
     (FrameHeader::from_bytes(&header).expect("a valid header"), pixels)
 }
 
-/// Homes, goes to the far focus, exposes far and near; gives both frames.
+/// Homes, moves to far focus, captures a pair; returns both frames.
 pub fn capture(program: &Program) -> Vec<(FrameHeader, Vec<u8>)> {
     let mut client = Client::open(&program.port);
     for axis in [Axis::SensorCoarse, Axis::Lens] {
@@ -169,11 +169,11 @@ pub fn capture(program: &Program) -> Vec<(FrameHeader, Vec<u8>)> {
     assert_eq!(client.ask(&Request::ArmProgram { shots: 2 }), Ok(Response::Accepted));
     let done = client.carry_out(&Request::RunProgram { silence: SILENCE });
     assert!(matches!(done, EventKind::ProgramDone { exposures: 2, .. }), "{done:?}");
-    // The frames have waited for us.
+    // The frames were queued.
     frames_at(&program.camera)
 }
 
-/// The two frames that have waited at an endpoint.
+/// Two queued frames of an endpoint.
 fn frames_at(address: &str) -> Vec<(FrameHeader, Vec<u8>)> {
     let mut camera = TcpStream::connect(address).expect("the endpoint is open");
     camera.set_read_timeout(Some(PATIENCE)).expect("a timeout");
@@ -196,22 +196,23 @@ fn a_capture_through_pty_and_camera_repeats_to_the_byte() {
 }
 
 #[test]
-fn behind_a_half_mirror_each_trigger_gives_both_cameras_a_picture() {
+fn a_half_mirror_gives_a_picture_of_both_cameras_per_trigger() {
     let program = Program::start(&["--noise", "8bit", "--seed", "3", "--half-mirror"]);
     let first = capture(&program);
     let second = frames_at(program.second_camera.as_ref().expect("a second address"));
     assert!(program.end().success());
     for (first, second) in first.iter().zip(&second) {
         assert_eq!(first.0, second.0, "trigger, moment, size and bits");
-        assert_ne!(first.1, second.1, "both sensors stand at one place");
+        assert_ne!(first.1, second.1, "both sensors are at the same place");
     }
     assert_eq!([second[0].0.shot_id, second[1].0.shot_id], [0, 1]);
-    // Half of 45 % of the full well, on average; 3 codes are far less than the other half, and more than what the texture's mean is off.
+    // Half of 45 % of the full well. 3 codes exceed the texture's deviation and are far below the other half.
     for (_, pixels) in first.iter().chain(&second) {
         let mean = pixels.chunks(2).map(|code| f64::from(code[0])).sum::<f64>() / (640.0 * 480.0);
         assert!((mean - 0.225 * 255.0).abs() < 3.0, "{mean}");
     }
-    // Like the near one of a single camera is the first exposure's at the sensor that stands further: more so than its own far one.
+    // The first exposure at the further sensor resembles a single camera's near image more than its own far
+    // image.
     let program = Program::start(&["--noise", "8bit", "--seed", "3"]);
     let single = capture(&program);
     assert!(program.end().success());
@@ -223,13 +224,13 @@ fn behind_a_half_mirror_each_trigger_gives_both_cameras_a_picture() {
 }
 
 #[test]
-fn time_stands_still_unless_told_to_pass() {
+fn time_passes_only_on_request() {
     let program = Program::start(&[]);
     let mut client = Client::open(&program.port);
     let before = client.time_us();
     std::thread::sleep(Duration::from_millis(300));
     let asked_us = client.time_us() - before;
-    assert!(asked_us < 50_000, "{asked_us} us passed while nobody asked for anything");
+    assert!(asked_us < 50_000, "{asked_us} us passed without a request");
 
     let mut camera = TcpStream::connect(&program.camera).expect("the endpoint is open");
     let mut body = [0; 16];
@@ -244,7 +245,7 @@ fn time_stands_still_unless_told_to_pass() {
 }
 
 #[test]
-fn a_paced_rig_answers_too() {
+fn a_paced_rig_answers() {
     let program = Program::start(&["--paced"]);
     let mut client = Client::open(&program.port);
     let before = client.time_us();
@@ -273,7 +274,7 @@ fn garbage_comes_first_and_the_port_goes_away_in_mid_move() {
         }
     };
     println!("the client sees: {gone}");
-    assert!(!Path::new(&program.port).exists(), "its name has gone, too");
+    assert!(!Path::new(&program.port).exists(), "its name is removed, too");
     assert!(program.end().success());
 }
 
@@ -289,10 +290,10 @@ fn a_missing_firmware_names_the_command_that_builds_it() {
 }
 
 #[test]
-fn a_file_that_is_no_firmware_is_refused() {
+fn refuses_a_file_that_is_not_firmware() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let elf = folder.path().join("no.elf");
-    for content in [&b"this is no ELF"[..], b""] {
+    for content in [&b"not an ELF file"[..], b""] {
         std::fs::write(&elf, content).expect("can write");
         let output = Command::new(env!("CARGO_BIN_EXE_farnear-sim"))
             .args(["run", "--firmware", elf.to_str().expect("text")])
@@ -305,7 +306,7 @@ fn a_file_that_is_no_firmware_is_refused() {
 }
 
 #[test]
-fn an_adapter_that_comes_back_under_another_name_is_behind_the_same_link() {
+fn the_link_follows_an_adapter_that_reappears_under_another_name() {
     let folder = tempfile::tempdir().expect("a folder");
     let (link, scenario) = (folder.path().join("rig"), folder.path().join("scenario.toml"));
     std::fs::write(&scenario, "[[happens]]\non = \"answer\"\nnth = 4\nwhat = \"link-renamed\"\n")
@@ -315,25 +316,25 @@ fn an_adapter_that_comes_back_under_another_name_is_behind_the_same_link() {
     let leads_to = || std::fs::read_link(&link).expect("the link is always there");
     let before = leads_to();
     let mut client = Client::open(&name(&link));
-    // Hello, the session, and two questions: the fourth answer is the last one through the old port.
+    // Hello, session, two requests: the fourth answer is the last through the old port.
     for _ in 0..2 {
         assert!(matches!(client.ask(&Request::Status), Ok(Response::Status(_))));
     }
     let deadline = Instant::now() + PATIENCE;
     while leads_to() == before {
-        assert!(Instant::now() < deadline, "the link leads to {} for ever", before.display());
+        assert!(Instant::now() < deadline, "the link still points to {}", before.display());
         std::thread::sleep(Duration::from_millis(5));
     }
     let mut bytes = [0; 64];
     while !client.port.read(&mut bytes).is_err_and(|error| error.kind() != std::io::ErrorKind::TimedOut) {
-        assert!(Instant::now() < deadline, "the old port does not go away");
+        assert!(Instant::now() < deadline, "the old port is still open");
     }
-    // The board has not noticed: the same boot.
+    // The board has not restarted.
     let boot = client.boot;
     let mut client = Client::open(&name(&link));
     assert_eq!(client.boot, boot);
     assert!(matches!(client.ask(&Request::Status), Ok(Response::Status(_))));
     drop(client);
     assert!(program.end().success());
-    assert!(!link.is_symlink(), "the link goes with the rig");
+    assert!(!link.is_symlink(), "the link is removed with the rig");
 }

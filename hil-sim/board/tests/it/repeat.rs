@@ -1,11 +1,11 @@
-//! The same seed gives the same bytes; another one others.
+//! Equal seeds give equal bytes; different seeds do not.
 
 use crate::bench::{Bench, fine_shot};
 use farnear_protocol::{Nanometres, message::Axis};
 use farnear_scene::{Camera, Lens, Noise, OpticsFile, Scene, standard};
 use farnear_sim::{config::RigConfig, imager::Imager};
 
-/// Homes, moves, exposes a pair; gives everything that came out: trace, events, pictures.
+/// Homes, moves, captures a pair; returns trace, events and pictures.
 fn session(seed: u64) -> (String, String, Vec<Vec<u8>>) {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let trace = folder.path().join("trace.csv");
@@ -32,5 +32,5 @@ fn one_seed_gives_one_session() {
     assert!(first.0.lines().count() > 100, "the trace has rows");
     assert!(first == second, "two runs with one seed differ");
     let other = session(12);
-    assert!(first.0 != other.0 && first.1 != other.1 && first.2 != other.2, "the seed decides nothing");
+    assert!(first.0 != other.0 && first.1 != other.1 && first.2 != other.2, "the seed has no effect");
 }

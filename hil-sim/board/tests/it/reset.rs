@@ -1,5 +1,5 @@
-//! Resets: each has its cause and the next boot number, nobody acts on requests of an earlier boot, and what was grave
-//! enough to reset the board is an alarm that stays until somebody has read and cleared it.
+//! Resets: each reports its cause and the next boot number. Requests for an earlier boot are ignored, and
+//! severe causes latch an alarm until it is cleared.
 
 use std::collections::HashSet;
 
@@ -11,23 +11,23 @@ use farnear_protocol::{
 use farnear_sim::RigAccess;
 use object::{ObjectSymbol, SymbolKind};
 
-/// TIM5, which keeps the firmware's time.
+/// TIM5 is the firmware's time base.
 const TIM5_CR1: u64 = 0x4000_0c00;
 
 fn check_boot(bench: &mut Bench, boot: u32, cause: ResetCause) {
     let started = bench.events.iter().rev().find(|event| matches!(event.kind, EventKind::Started { .. }));
-    assert_eq!(started.expect("the board says that it started").kind, EventKind::Started { cause });
+    assert_eq!(started.expect("a started event").kind, EventKind::Started { cause });
     let hello = bench.say_hello();
     assert_eq!((hello.boot, hello.reset_cause), (boot, cause));
 }
 
 #[test]
-fn reboot_counts_up_and_its_repeat_is_refused() {
+fn a_reboot_counts_up_and_refuses_its_repeat() {
     let mut bench = Bench::new(1);
     let id = bench.send(&Request::Reboot);
     bench.settle();
     check_boot(&mut bench, 2, ResetCause::Software);
-    // The repeat of the request of boot 1, as if the answer had been lost.
+    // Repeats the request of boot 1, as after a lost answer.
     bench.rig.send(&request_frame(id, 1, &Request::Reboot)).expect("runs");
     bench.rig.settle().expect("runs");
     assert_eq!(bench.answers(), [(id, Err(RequestError::Boot { current: 2 }))]);
@@ -36,10 +36,10 @@ fn reboot_counts_up_and_its_repeat_is_refused() {
 }
 
 #[test]
-fn the_reset_button_is_told_from_a_request() {
+fn distinguishes_the_reset_button_from_a_request() {
     let mut bench = Bench::new(1);
     bench.home_axis(Axis::SensorCoarse);
-    // The motor has come to rest, and the memory knows.
+    // The motor is at rest and the position stored.
     bench.rig.advance_us(200_000).expect("runs");
     bench.access(|rig| rig.press_reset());
     bench.settle();
@@ -48,7 +48,7 @@ fn the_reset_button_is_told_from_a_request() {
     assert_eq!(bench.alarm(), None, "it stood still");
 }
 
-/// Something resets the board; the alarm that names it survives further resets and is cleared only by its number.
+/// After the reset an alarm is latched that survives further resets and is cleared only by its number.
 fn leaves_an_alarm(
     happen: impl FnOnce(&mut RigAccess<'_, '_>) + Send + 'static,
     cause: ResetCause,
@@ -56,7 +56,7 @@ fn leaves_an_alarm(
 ) {
     let mut bench = Bench::new(1);
     bench.access(happen);
-    // The watchdog bites within 0.19 s.
+    // The watchdog resets within 0.19 s.
     bench.rig.advance_us(250_000).expect("runs");
     bench.settle();
     check_boot(&mut bench, 2, cause);
@@ -80,26 +80,26 @@ fn leaves_an_alarm(
     let wrong = bench.ask(&Request::ClearAlarm { number: latched.number + 1 });
     assert!(matches!(wrong, Err(RequestError::NoSuchAlarm { .. })), "{wrong:?}");
     bench.clear(|latched| *latched == alarm);
-    // A reset within the next millisecond would find the record as it was: latched, which is the safe side.
+    // A reset within the next millisecond would restore the latched alarm, which is the safe side.
     bench.rig.advance_us(10_000).expect("runs");
     bench.access(|rig| rig.press_reset());
     bench.settle();
     check_boot(&mut bench, 5, ResetCause::Pin);
-    assert_eq!(bench.alarm(), None, "what was cleared stays so");
+    assert_eq!(bench.alarm(), None, "a cleared alarm stays cleared");
 }
 
 #[test]
 fn the_watchdog_resets_a_firmware_whose_clock_has_died() {
-    // A stray write stops the timer that wakes the control loop.
+    // A stray write stops the control loop's timer.
     leaves_an_alarm(|rig| rig.write_register(TIM5_CR1, 0), ResetCause::Watchdog, Alarm::Watchdog);
 }
 
 #[test]
-fn a_brown_out_is_told() {
+fn reports_a_brown_out() {
     leaves_an_alarm(|rig| rig.brown_out(), ResetCause::BrownOut, Alarm::BrownOut);
 }
 
-/// Lets the program's next step be this code, as a stray pointer in the right place would.
+/// Executes this code as a stray function pointer would.
 fn astray(code: &'static [u16], alarm: Alarm) {
     let mut bench = Bench::new(1);
     let resets = bench.report().resets;
@@ -107,7 +107,7 @@ fn astray(code: &'static [u16], alarm: Alarm) {
     let functions: HashSet<u64> =
         symbols(|symbol| symbol.kind() == SymbolKind::Text).into_iter().map(|(at, _)| at & !1).collect();
     let is_function = move |word: u32| word & 1 == 1 && functions.contains(&u64::from(word & !1));
-    let replaced = bench.peek(move |rig| rig.lead_astray(task, is_function, code));
+    let replaced = bench.peek(move |rig| rig.redirect_program(task, is_function, code));
     assert!(replaced, "the task's function is found and replaced");
     for _ in 0..100 {
         bench.rig.advance_us(100).expect("runs");
@@ -119,20 +119,20 @@ fn astray(code: &'static [u16], alarm: Alarm) {
 }
 
 #[test]
-fn a_fault_of_the_program_is_told() {
-    // UDF: an instruction that is none.
+fn reports_a_program_fault() {
+    // UDF: undefined instruction.
     astray(&[0xde00], Alarm::Panic);
 }
 
 #[test]
-fn a_stack_overflow_is_told_and_reaches_no_variable() {
-    // PUSH {R0-R7, LR}, again and again.
+fn reports_a_stack_overflow_before_it_reaches_variables() {
+    // PUSH {R0-R7, LR} in a loop.
     astray(&[0xb5ff, 0xe7fd], Alarm::StackOverflow);
 }
 
 #[test]
-fn a_stack_overflow_by_a_large_frame_is_told() {
-    // SUB SP, #508 sixteen times, STR R0, [SP], again and again: 8 KiB at once.
+fn reports_a_stack_overflow_by_a_large_frame() {
+    // SUB SP, #508 sixteen times, then STR R0, [SP]: skips 8 KiB at a time.
     const CODE: [u16; 18] = {
         let mut code = [0xb0ff; 18];
         (code[16], code[17]) = (0x9000, 0xe7ed);

@@ -1,4 +1,4 @@
-//! Hello, homing, moves, and what goes wrong with them.
+//! Hello, homing, moves and their failures.
 
 use crate::bench::{Bench, SILENCE, go};
 use farnear_protocol::{
@@ -8,7 +8,7 @@ use farnear_protocol::{
 use farnear_sim::{board::SpiChip, plant::StageName};
 
 #[test]
-fn hello_tells_who_the_board_is() {
+fn hello_identifies_the_board() {
     let hello = Bench::new(1).say_hello();
     assert_eq!((hello.board.as_str(), hello.boot), ("nucleo-f429zi", 1));
     assert_eq!(hello.schema_key, SCHEMA_KEY);
@@ -31,13 +31,13 @@ fn homing_finds_the_edge_and_moves_reach_their_target() {
         let EventKind::MoveDone { measured, .. } = end else { panic!("{end:?}") };
         assert!((measured.0 - target).abs() <= 200, "{measured:?}: within a microstep and an encoder count");
         let off_um = bench.report().coarse.position_um - 1e-3 * f64::from(target);
-        // The screw's data sheet (2 um), the home switch (3 SD = 0.9 um) and the resolution of switch and steps.
-        assert!(off_um.abs() < 3.2, "truly {off_um} um beside {target} nm");
+        // Screw (2 um), home switch (3 SD = 0.9 um) and resolution of switch and steps.
+        assert!(off_um.abs() < 3.2, "true position {off_um} um off at {target} nm");
     }
 }
 
 #[test]
-fn a_stall_is_seen_and_loses_the_position() {
+fn a_stall_is_detected_and_invalidates_the_position() {
     let mut bench = Bench::new(3);
     bench.home();
     bench.access(|rig| rig.plant(|plant| plant.stage_mut(StageName::Sensor).set_stalled(true)));
@@ -54,7 +54,7 @@ fn a_home_switch_that_never_closes_ends_the_search() {
     let mut bench = Bench::new(4);
     bench.access(|rig| rig.plant(|plant| plant.stage_mut(StageName::Sensor).set_stuck_home(Some(false))));
     let end = bench.carry_out(&Request::Home { axis: Axis::SensorCoarse, silence: SILENCE });
-    // The carriage runs against its end stop, which the encoder notices first.
+    // The carriage hits its end stop; the encoder detects it first.
     assert!(
         matches!(
             end,
@@ -68,7 +68,7 @@ fn a_home_switch_that_never_closes_ends_the_search() {
 fn a_cut_gauge_and_a_dead_drive_end_a_fine_move() {
     let mut bench = Bench::new(6);
     let go = |target| go(Axis::SensorFine, target);
-    // The gauge's code passes through every pattern of bits on the way, none of which may look like a cut wire.
+    // The gauge's code passes through all bit patterns; none may look like a cut wire.
     for target in [20_000, 121_071, 121_072, 121_073, 180_000] {
         let end = bench.carry_out(&go(target));
         assert!(matches!(end, EventKind::MoveDone { .. }), "{target} nm: {end:?}");

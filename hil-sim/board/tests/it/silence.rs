@@ -1,4 +1,4 @@
-//! A host that falls silent while something moves: the board asks, then stops.
+//! Host silence during motion: the board sends a keep-alive, then stops.
 
 use crate::bench::{Bench, SILENCE};
 use farnear_protocol::{
@@ -7,7 +7,7 @@ use farnear_protocol::{
 };
 
 const DEADLINE: Micros = Micros(400_000);
-/// Within this long a request is answered.
+/// Time limit of an answer.
 const ANSWER_US: u64 = 2_000;
 
 fn move_off(bench: &mut Bench, silence: Micros) -> u32 {
@@ -34,7 +34,7 @@ fn a_silent_host_stops_the_move_within_its_deadline() {
         "the last STEP came {stopped_us} us after the host's last frame; allowed were {} us",
         DEADLINE.0
     );
-    // The segment that runs at the deadline ends within a millisecond.
+    // The current segment ends within a millisecond.
     assert!(stopped_us <= u64::from(DEADLINE.0) + 1_300, "{stopped_us} us");
     assert_eq!(bench.status().coarse.state, PositionState::Lost);
     bench.clear(|alarm| *alarm == Alarm::HostSilence { request });

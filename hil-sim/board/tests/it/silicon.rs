@@ -1,4 +1,4 @@
-//! What real parts do not forgive: each test failed with a firmware that worked on a kinder emulated rig.
+//! Constraints of real parts. Each test failed with firmware that worked on a more tolerant rig.
 
 use farnear_protocol::{
     EventKind, Nanometres, Request, Response,
@@ -11,10 +11,8 @@ use farnear_sim::{
 
 use crate::bench::{Bench, SILENCE, fine_shot, go};
 
-/// A tick's period in cycles.
 const TICK_CYCLES: u32 = 33_600;
 
-/// A rig of other parts.
 fn rig_with(change: impl FnOnce(&mut Parts)) -> Bench {
     let mut parts = Parts::default();
     change(&mut parts);
@@ -22,8 +20,8 @@ fn rig_with(change: impl FnOnce(&mut Parts)) -> Bench {
 }
 
 #[test]
-fn a_gauge_is_read_whatever_its_last_bit_is() {
-    // The released data line stays low for two bits after a 0: nothing may be read from it.
+fn reads_the_gauge_with_either_last_bit() {
+    // The released line stays low for two bits after a 0; these must not be read.
     let mut bench = Bench::new(1);
     for nm in [40_000, 100_001, 170_002] {
         let end = bench.move_to(Axis::SensorFine, Nanometres(nm));
@@ -37,7 +35,7 @@ fn a_gauge_is_read_whatever_its_last_bit_is() {
 fn no_interrupt_makes_the_converters_pulse_longer_than_its_conversion() {
     let mut bench = Bench::new(1);
     bench.move_to(Axis::SensorFine, Nanometres(150_000));
-    // Bytes one behind the other, for a third of a second: an interrupt each 5 us. Zeros: frames without anything in them.
+    // Continuous bytes for a third of a second: an interrupt each 5 us. Zeros are empty frames.
     for _ in 0..60 {
         bench.rig.send(&[0; 1_000]).expect("runs");
         bench.rig.advance_us(5_000).expect("runs");
@@ -48,13 +46,13 @@ fn no_interrupt_makes_the_converters_pulse_longer_than_its_conversion() {
 
 #[test]
 fn the_flash_accelerator_is_on() {
-    // Without it this rig is so slow that no tick keeps its time.
+    // Without it no tick of this rig meets its deadline.
     let mut bench = rig_with(|parts| parts.processor.without_accelerator = 5.0);
     bench.rig.advance_us(100_000).expect("runs");
     bench.forget_longest_tick();
     bench.move_to(Axis::SensorFine, Nanometres(50_000));
     let longest = bench.longest_tick();
-    // A tick that carries a move out has half of it with the accelerator.
+    // With the accelerator a move's tick takes half of it.
     assert!(longest < TICK_CYCLES * 7 / 10, "{longest} cycles");
 }
 
@@ -62,7 +60,7 @@ fn the_flash_accelerator_is_on() {
 fn an_exposure_may_end_at_any_moment_of_a_tick() {
     let mut bench = Bench::new(1);
     for first in [0, 64, 128] {
-        // The end goes through a tick's 200 us, microsecond by microsecond.
+        // The end passes through a tick's 200 us in steps of one microsecond.
         let shots: Vec<Shot> = (0..64).map(|i| fine_shot(50_000, 300 + first + i, 1_000, 200)).collect();
         let before = bench.events.len();
         bench.arm(&shots);
@@ -88,7 +86,7 @@ fn has_memory(bench: &mut Bench) -> bool {
 }
 
 #[test]
-fn either_make_of_memory_is_taken_and_a_missing_one_is_told() {
+fn accepts_either_memory_make_and_reports_a_missing_one() {
     for make in [MemoryMake::Fm25v02, MemoryMake::Fm25v02a] {
         let mut bench = rig_with(|parts| parts.memory.make = make);
         assert!(has_memory(&mut bench), "{make:?}");
@@ -101,7 +99,7 @@ fn either_make_of_memory_is_taken_and_a_missing_one_is_told() {
 }
 
 #[test]
-fn bad_reads_at_the_start_cost_neither_the_memory_nor_a_record() {
+fn read_errors_at_start_lose_neither_the_memory_nor_a_record() {
     let mut bench = Bench::new(1);
     let key = SettingKey::CoarseBacklashNm;
     for value in [3_000, 3_100, 3_200] {
@@ -127,13 +125,13 @@ fn bad_reads_at_the_start_cost_neither_the_memory_nor_a_record() {
 
 #[test]
 fn the_firmware_never_programs_the_option_bytes() {
-    // Programming erases their sector: a supply that fails in that moment leaves the chip protected.
+    // Programming erases the sector: a supply failure then leaves the chip protected.
     let mut bench = rig_with(|parts| parts.supply.brown_out = BrownOut::Off);
     assert_eq!(bench.boot, 1);
     bench.access(|rig| rig.press_reset());
     bench.settle();
     assert_eq!(bench.say_hello().boot, 2);
-    // Still off: the dip passes unnoticed.
+    // Brown-out reset off: the dip is not detected.
     bench.access(|rig| rig.brown_out());
     bench.rig.advance_us(200_000).expect("runs");
     assert_eq!(bench.say_hello().boot, 2);
@@ -172,7 +170,7 @@ fn the_converters_pulse_is_long_enough() {
 }
 
 #[test]
-fn a_reset_does_not_let_the_piezo_go_at_once() {
+fn a_reset_releases_the_piezo_gradually() {
     let mut bench = Bench::new(1);
     bench.move_to(Axis::SensorFine, Nanometres(156_000));
     bench.access(|rig| rig.press_reset());
@@ -184,15 +182,15 @@ fn a_reset_does_not_let_the_piezo_go_at_once() {
     println!(
         "pulled by {pulled:.1} um; after the reset down to {lowest:.2} um at least, {rest:.2} um at rest"
     );
-    // Let go at once it would swing to some -130 um. Creep and hysteresis leave it a little above its zero.
+    // Without shaping it would swing to about -130 um. Creep and hysteresis leave it slightly above zero.
     assert!(lowest > -5.0, "{lowest} um: the stack is under tension");
     assert!(rest.abs() < 10.0, "{rest} um: it is relaxed");
-    // The shaper takes a quarter of the way at a time, 39 um.
+    // The shaper moves a quarter of the way at a time, 39 um.
     assert!((30.0..50.0).contains(&pulled), "{pulled} um");
 }
 
 #[test]
-fn a_second_mode_of_the_flexure_is_left_alone_where_the_board_knows_of_it() {
+fn does_not_excite_a_configured_second_mode_of_the_flexure() {
     const WINDOW_NM: f64 = 200.0;
     for (hz, share) in [(700.0, 0.0), (500.0, 0.05), (700.0, 0.1), (1_000.0, 0.1), (700.0, 0.2)] {
         let mut bench = rig_with(|parts| {
@@ -200,7 +198,8 @@ fn a_second_mode_of_the_flexure_is_left_alone_where_the_board_knows_of_it() {
         });
         let shots = [10_000, 166_270].map(|nm| fine_shot(nm, 5_000, WINDOW_NM as i32, 2_000));
         if share >= 0.1 {
-            // The fast loop feeds it, and is opened before the stack bears its blocking force, its stroke of 200 um: left alone it pulls by 230 to 370 um.
+            // The fast loop excites it and must be opened before the stack reaches its blocking force at 200
+            // um. Unchecked, the tension is 230 to 370 um.
             bench.arm(&shots);
             let end = bench.run();
             assert!(matches!(end, EventKind::Failed { .. }), "{hz} Hz, {share}: {end:?}");
@@ -210,7 +209,7 @@ fn a_second_mode_of_the_flexure_is_left_alone_where_the_board_knows_of_it() {
             bench.rig.take_shots();
             assert!(pulled < 200.0, "{hz} Hz, {share}: {pulled} um");
         }
-        // What the calibration finds of hysteresis and creep is left for the slow loop to learn otherwise.
+        // The calibrated hysteresis and creep are cleared, so the slow loop has more to correct.
         for (key, value) in [
             (SettingKey::PiezoSecondMode, 1),
             (SettingKey::PiezoHysteresisPpm, 120_000),
@@ -243,7 +242,7 @@ fn a_second_mode_of_the_flexure_is_left_alone_where_the_board_knows_of_it() {
 }
 
 #[test]
-fn homing_and_moves_bear_bouncing_switches_and_the_motors_chopper() {
+fn homing_and_moves_tolerate_switch_bounce_and_chopper_noise() {
     let switches =
         SwitchParts { bounce_us: 3_000, bounces_per_ms: 4.0, glitch_us: 150, glitches_per_s: 60.0 };
     let mut bench = rig_with(|parts| parts.switches = switches);
@@ -257,13 +256,13 @@ fn homing_and_moves_bear_bouncing_switches_and_the_motors_chopper() {
         places.push(bench.rig.advance_us(50_000).expect("runs").coarse.position_um);
     }
     let mean = places.iter().sum::<f64>() / places.len() as f64;
-    // The switch repeats to 0.3 um; three pulses more, for a contact that bounces for 3 ms.
+    // The switch repeats to 0.3 um; three more pulses for a contact that bounces for 3 ms.
     assert!(places.iter().all(|place| (place - mean).abs() <= 1.5), "{places:.3?}");
     assert_eq!(bench.alarm(), None);
 }
 
 #[test]
-fn the_motors_drivers_get_the_time_they_want() {
+fn respects_the_motor_drivers_timing() {
     let mut bench = Bench::new(1);
     bench.home();
     for target in [200_000, 50_000, 120_000] {
@@ -286,7 +285,7 @@ fn the_gauge_is_calibrated_against_the_encoder() {
         places[0] - places[1]
     };
     let before = way(&mut bench);
-    assert!((before - 156.27 / 1.02).abs() < 0.2, "{before} um: the gauge says 2 % too much");
+    assert!((before - 156.27 / 1.02).abs() < 0.2, "{before} um: the gauge reads 2 % too high");
     let result = match bench.carry_out(&Request::Calibrate { routine: Routine::Gauge, silence: SILENCE }) {
         EventKind::Calibrated { result: Calibration::Gauge { gain_ppm, offset }, .. } => (gain_ppm, offset),
         other => panic!("{other:?}"),
@@ -294,12 +293,12 @@ fn the_gauge_is_calibrated_against_the_encoder() {
     println!("gain and offset {result:?}");
     let after = way(&mut bench);
     println!("156.27 um are {before:.3} um before, {after:.3} um after the calibration");
-    // The screw's own error over the way, up to 0.4 um, and the switch's 0.3 um eight times.
+    // The screw's error over the way, up to 0.4 um, and the switch's 0.3 um eight times.
     assert!((after - 156.27).abs() < 0.7, "{after} um");
-    // Zero is where the piezo is relaxed, give or take what creep leaves.
+    // Zero is the relaxed piezo, up to the remaining creep.
     assert!((result.1.0 - 800).abs() < 3_000, "{result:?}");
     assert_eq!(bench.status().coarse.state, PositionState::Homed);
-    // What homing finds does not depend on where the piezo stands: the sensor is where coarse and fine say.
+    // Homing does not depend on the piezo's position: coarse plus fine is the sensor's position.
     let mut sensors = Vec::new();
     for fine in [20_000, 170_000] {
         bench.move_to(Axis::SensorFine, Nanometres(fine));
@@ -311,7 +310,7 @@ fn the_gauge_is_calibrated_against_the_encoder() {
     assert!((sensors[0] - sensors[1]).abs() < 2.0, "{sensors:?}");
 }
 
-/// Everything at once: both stages homed and moved, the piezo, a program, questions in between; gives the longest tick.
+/// Homing, moves, piezo, a program and requests simultaneously; returns the longest tick.
 fn busy(bench: &mut Bench) -> u32 {
     bench.rig.advance_us(50_000).expect("runs");
     bench.forget_longest_tick();
@@ -335,20 +334,20 @@ fn busy(bench: &mut Bench) -> u32 {
 }
 
 #[test]
-fn on_a_processor_as_slow_as_any_was_measured_no_tick_takes_seven_tenths_of_its_period() {
+fn ticks_stay_below_seven_tenths_of_their_period_on_the_slowest_processor() {
     let mut bench = rig_with(|parts| parts.processor.cycles_per_instruction = 1.9);
     let longest = busy(&mut bench);
     let share = 100.0 * f64::from(longest) / f64::from(TICK_CYCLES);
     println!(
         "at 1.9 cycles an instruction the longest tick takes {longest} cycles, {share:.1} % of its period"
     );
-    // A tick has time for one thing beside motion: a write to the memory, a frame that comes to its end, or one that is answered or sent.
+    // Besides motion a tick has time for one of: a memory write, a completed frame, an answer.
     assert!(longest < TICK_CYCLES * 7 / 10, "{longest} cycles");
     assert_eq!(bench.alarm(), None);
 }
 
 #[test]
-fn by_kind_a_tick_takes_about_as_long_as_is_reckoned_with() {
+fn cycles_by_kind_agree_with_the_average_cost() {
     let idle_tick = |costs_by_kind| {
         let mut bench = Bench::with(&RigConfig { costs_by_kind, ..RigConfig::default() });
         bench.rig.advance_us(20_000).expect("runs");
@@ -361,11 +360,11 @@ fn by_kind_a_tick_takes_about_as_long_as_is_reckoned_with() {
     println!(
         "a tick at rest: {one_each} cycles at one an instruction, {by_kind} by kind: {ratio:.2} times as many"
     );
-    // 1.93 with every cost on its slow side: loads never overlap, waiting loops and registers of the slow bus count in full.
+    // 1.93 with every cost at its upper value: no overlapping loads, waiting loops and slow bus in full.
     assert!((1.3..2.2).contains(&ratio), "{by_kind} cycles by kind, {one_each} at one an instruction");
 }
 
-/// Homes a stage and exposes once.
+/// Homes a stage and captures one frame.
 fn works(bench: &mut Bench) {
     bench.home_axis(Axis::Lens);
     bench.arm(&[fine_shot(50_000, 1_000, 1_000, 200)]);
@@ -374,13 +373,13 @@ fn works(bench: &mut Bench) {
 }
 
 #[test]
-fn a_board_whose_clock_does_not_start_runs_on_its_own_and_says_so() {
+fn without_the_outer_clock_the_board_runs_on_its_internal_one_and_reports_it() {
     let mut bench = Bench::new(1);
     bench.access(|rig| {
         rig.set_outer_clock(false);
         rig.press_reset();
     });
-    // It waits for the clock at first.
+    // It first waits for the clock.
     bench.rig.advance_us(500_000).expect("runs");
     bench.settle();
     let hello = bench.say_hello();
@@ -398,7 +397,7 @@ fn a_board_whose_clock_does_not_start_runs_on_its_own_and_says_so() {
 }
 
 #[test]
-fn a_clock_that_stops_in_mid_move_stops_the_motors_and_is_told() {
+fn a_clock_failure_during_a_move_stops_the_motors_and_is_reported() {
     let mut bench = Bench::new(1);
     bench.home_axis(Axis::Lens);
     bench.send(&go(Axis::Lens, 2_000_000));
@@ -421,7 +420,7 @@ fn a_clock_that_stops_in_mid_move_stops_the_motors_and_is_told() {
 }
 
 #[test]
-fn a_clock_that_fails_for_a_moment_is_told() {
+fn a_short_clock_failure_is_reported() {
     let mut bench = Bench::new(1);
     bench.access(|rig| rig.set_outer_clock(false));
     bench.rig.advance_us(100).expect("runs");

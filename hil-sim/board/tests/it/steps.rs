@@ -1,4 +1,4 @@
-//! STEP pulses are counted exactly on both axes, come when they are due, and stop in time.
+//! STEP pulses on both axes: exact count, timing, and prompt stop.
 
 use crate::bench::{Bench, amount, go};
 use farnear_protocol::{
@@ -7,16 +7,17 @@ use farnear_protocol::{
 };
 use farnear_sim::plant::{Noise, StageName};
 
-/// A STEP pulse moves a stage by 156.25 nm.
+/// Stage travel per STEP pulse.
 const STEP_NM: f64 = 156.25;
 const MOVES: u32 = 1_000;
 const RIGS: u32 = 2;
 /// One period of STEP at 40 kHz.
 const PERIOD_NS: u64 = 25_000;
-/// Between two segments a handler of the highest priority starts the timer again, behind the other axis' one at worst.
+/// Between segments an interrupt of the highest priority restarts the timer, in the worst case after the
+/// other axis.
 const RESTART_NS: u64 = 1_500;
 
-/// Random moves on one rig; every one must give exactly its steps on the pin.
+/// Random moves with an exact number of steps on the pin.
 fn random_moves(seed: u64, moves: u32) {
     let mut bench = Bench::new(seed);
     bench.home();
@@ -26,17 +27,17 @@ fn random_moves(seed: u64, moves: u32) {
     let start = bench.report().coarse.microsteps as f64 - at;
     for _ in 0..moves {
         let sign = if noise.uniform() < 0.5 { -1.0 } else { 1.0 };
-        // Mostly a few steps, now and then many, so that one, two and several segments occur.
+        // Mostly short moves, some long, so that one, two and several segments occur.
         let steps = (1.0 + 30.0 * noise.uniform().powi(3)) as i64 as f64;
         at = (at + sign * steps).max(10.0);
         let end = bench.carry_out(&go(Axis::SensorCoarse, (at * STEP_NM).round() as i32));
         assert!(matches!(end, EventKind::MoveDone { .. }), "{end:?}");
         let report = bench.report();
         assert_eq!(report.coarse.microsteps as f64, start + at, "a move of {steps} steps to {at}");
-        // The rotor swings out about where the steps put it; a lost step would be 64.
+        // The rotor oscillates about the commanded position; a lost step would be 64.
         assert!(report.coarse.lost_microsteps.abs() < 2.0, "{report:?}");
     }
-    // The board's own count is the same.
+    // The board's count agrees.
     assert_eq!(bench.status().steps, bench.report().step_edges());
 }
 
@@ -51,7 +52,7 @@ fn a_thousand_random_moves_lose_no_step() {
     }
 }
 
-/// Sends both axes to and fro at full speed; gives the longest time between two edges of a cruise.
+/// Moves both axes back and forth at full speed; returns the longest gap between two cruise edges.
 fn travels(bench: &mut Bench, edges_wanted: u64) -> u64 {
     bench.home();
     bench.access(|rig| rig.record_steps());
@@ -69,7 +70,7 @@ fn travels(bench: &mut Bench, edges_wanted: u64) -> u64 {
         assert_eq!([status.coarse.state, status.lens.state], [PositionState::Homed; 2], "{status:?}");
         for (axis, edges) in bench.peek(|rig| rig.take_steps()).into_iter().enumerate() {
             let gaps: Vec<u64> = edges.windows(2).map(|pair| pair[1] - pair[0]).collect();
-            // The ramps take less than a tenth of the way at either end.
+            // Each ramp takes less than a tenth of the way.
             let cruise = &gaps[gaps.len() / 10..gaps.len() - gaps.len() / 10];
             let slowest = cruise.iter().copied().max().unwrap_or(0);
             let fastest = gaps.iter().copied().min().unwrap_or(0);
@@ -87,7 +88,7 @@ fn travels(bench: &mut Bench, edges_wanted: u64) -> u64 {
 }
 
 #[test]
-fn both_axes_at_40_khz_lose_no_step_and_none_is_late() {
+fn both_axes_at_40_khz_give_every_step_on_time() {
     let mut bench = Bench::new(1);
     let edges = amount("FARNEAR_STEPS", 300_000);
     let worst_ns = travels(&mut bench, edges);
@@ -95,8 +96,7 @@ fn both_axes_at_40_khz_lose_no_step_and_none_is_late() {
     assert!(worst_ns <= PERIOD_NS + RESTART_NS, "a step came {} ns late", worst_ns - PERIOD_NS);
 }
 
-/// Starts a long move on both axes and lets them run for a while, in the ramp or at full speed, at any phase of a
-/// segment.
+/// Starts a long move on both axes and stops at a random phase of a segment, in the ramp or at full speed.
 fn in_mid_move(bench: &mut Bench, turn: u32) -> farnear_sim::Report {
     let far = bench.status().coarse.measured.0 < 6_000_000;
     for (axis, less) in [(Axis::SensorCoarse, 0), (Axis::Lens, 10_000)] {
@@ -106,7 +106,7 @@ fn in_mid_move(bench: &mut Bench, turn: u32) -> farnear_sim::Report {
     bench.rig.advance_us(60_000 + u64::from(turn) * 23_137).expect("runs")
 }
 
-/// Stops both axes in mid-move, again and again; gives the longest time to the last STEP edge in microseconds.
+/// Stops both axes during moves; returns the longest time to the last STEP edge in microseconds.
 fn stops(
     stop: impl Fn(&mut Bench) -> bool,
     release: impl Fn(&mut Bench),
@@ -145,7 +145,7 @@ fn stops(
 }
 
 #[test]
-fn the_emergency_stop_ends_the_steps_at_once() {
+fn the_emergency_stop_ends_the_steps_immediately() {
     let worst_us = stops(
         |bench| {
             bench.access(|rig| rig.set_emergency_stop(true));
@@ -174,7 +174,7 @@ fn a_halt_ends_the_steps_within_a_millisecond() {
         |alarm| *alarm == Alarm::Halt,
     );
     println!("last STEP at most {worst_us} us after the host began to send the halt");
-    // The running segment lasts 1 ms at most; the frame takes 0.1 ms, the tick that reads it 0.2 ms.
+    // The current segment lasts 1 ms at most, the frame 0.1 ms, its tick 0.2 ms.
     assert!(worst_us <= 1_300, "{worst_us} us");
 }
 
@@ -211,7 +211,7 @@ fn a_stop_in_mid_move_brakes_along_the_ramp_and_loses_nothing() {
         assert_eq!(states, [PositionState::Homed; 2], "position and encoder still agree");
     }
     println!("last STEP at most {worst_us} us after the request left the host");
-    // 6.25 mm/s at 50 mm/s2 takes 125 ms, rounding its corners as long again at most; the request takes 0.1 ms, what
-    // waits in the step queue a few more.
+    // 6.25 mm/s at 50 mm/s2 takes 125 ms, twice that with rounded corners; request 0.1 ms, step queue a few
+    // ms.
     assert!(worst_us <= 250_000 + 10_000, "{worst_us} us");
 }

@@ -1,4 +1,4 @@
-//! The protocol's client half: ids, sessions, repeats, what the board asks.
+//! Client half of the protocol: ids, sessions, repeats, keep-alives.
 
 use farnear_protocol::{
     Call, Event, EventKind, PROTOCOL_CURRENT, Request, RequestError, Response,
@@ -8,30 +8,27 @@ use farnear_protocol::{
 
 use farnear_sim::{EmulatedRig, SimError};
 
-/// Board time between two looks for an answer, and for the end of work.
+/// Board time between polls for an answer or the end of work.
 const LOOK_US: u64 = 500;
 const WAIT_US: u64 = 2_000;
-/// An answer that has not come after so long is asked for again, so many times.
+/// Timeout of an answer, and number of repeats.
 const ANSWER_US: u64 = 20_000;
 const ATTEMPTS: u32 = 4;
-/// From one look at the board to the next while work is under way.
+/// Interval of status requests during work.
 const STATUS_US: u64 = 300_000;
-/// Work that has no end after so long has none.
 const WORK_US: u64 = 40_000_000;
 
 pub type Answer = Result<Response, RequestError>;
 
-/// How work came to its end.
 #[derive(Clone, PartialEq, Debug)]
 pub enum Ended {
     Done,
-    /// The board said why not.
     Failed(Failure),
-    /// The board no longer knows of it: its end was missed, or it was reset.
+    /// The board no longer lists it: the event was missed, or the board was reset.
     Gone,
 }
 
-/// What a host has seen.
+/// Statistics of the host.
 #[derive(Clone, Copy, Default)]
 pub struct Counts {
     pub answered: u64,
@@ -44,14 +41,13 @@ pub struct Counts {
 pub struct Client {
     pub rig: EmulatedRig,
     pub counts: Counts,
-    /// Settings that were written.
     pub written: Vec<SettingKey>,
     boot: u32,
     session: u32,
     last_id: u32,
-    /// Ends of work that were told and not asked for yet.
+    /// Received ends of work that have not been queried.
     ends: Vec<(u32, Ended)>,
-    /// The board has asked whether somebody is there.
+    /// A keep-alive request is pending.
     asked: bool,
     answers: Vec<(u32, Answer)>,
 }
@@ -76,13 +72,13 @@ impl Client {
         let boot = if hello { 0 } else { self.boot };
         let session = if hello { NO_SESSION } else { self.session };
         let header = Header { version: PROTOCOL_CURRENT, kind: Kind::Request, id, boot };
-        // Requests of a scenario fit; one that did not would simply not be sent.
+        // All requests of a scenario fit; one that did not would not be sent.
         encode(header, &Call { session, request: request.clone() })
             .map(|frame| delimited(&frame).to_vec())
             .unwrap_or_default()
     }
 
-    /// Lets time pass, and takes what has come.
+    /// Advances time and collects frames.
     fn pass(&mut self, micros: u64) -> Result<(), SimError> {
         self.rig.advance_us(micros)?;
         for packet in self.rig.take_frames() {
@@ -95,7 +91,7 @@ impl Client {
                 }
                 Kind::Event => {
                     if let Some(event) = packet.message::<Event>() {
-                        self.hear(&event);
+                        self.receive(&event);
                     }
                 }
                 Kind::Request | Kind::Log => {}
@@ -104,7 +100,7 @@ impl Client {
         Ok(())
     }
 
-    fn hear(&mut self, event: &Event) {
+    fn receive(&mut self, event: &Event) {
         let (request, end) = match &event.kind {
             EventKind::StillThere { .. } => {
                 self.asked = true;
@@ -133,8 +129,8 @@ impl Client {
         self.ends.push((request, end));
     }
 
-    /// Asks, and asks again; `None` where no answer comes. Another boot, or another session, is joined, and the request is not
-    /// made again there.
+    /// Sends with repeats; `None` without an answer. After a reset it joins the new boot or session without
+    /// repeating the request.
     pub fn ask(&mut self, request: &Request) -> Result<Option<(u32, Answer)>, SimError> {
         self.last_id += 1;
         let id = self.last_id;
@@ -164,7 +160,7 @@ impl Client {
         Ok(None)
     }
 
-    /// Says hello and opens a session; whether the board answers.
+    /// Says hello and opens a session; returns whether the board answers.
     pub fn join(&mut self) -> Result<bool, SimError> {
         let Some((_, Ok(Response::Hello(hello)))) = self.ask(&Request::Hello)? else { return Ok(false) };
         self.boot = hello.boot;
@@ -192,7 +188,7 @@ impl Client {
         })
     }
 
-    /// Waits, and answers the board.
+    /// Waits and answers keep-alives.
     pub fn wait_us(&mut self, micros: u64) -> Result<(), SimError> {
         let mut left_us = micros;
         while left_us > 0 {
@@ -211,7 +207,7 @@ impl Client {
         Some(self.ends.swap_remove(place).1)
     }
 
-    /// Waits for the end of work.
+    /// Waits until all of this work has ended.
     pub fn wait_for_ends(&mut self, ids: &[u32]) -> Result<Vec<Ended>, SimError> {
         let mut ends: Vec<Option<Ended>> = vec![None; ids.len()];
         let mut waited_us = 0;
@@ -243,7 +239,6 @@ impl Client {
     }
 }
 
-/// Whether the board still works on one of these.
 fn is_at_work(status: &Status, ids: &[u32]) -> bool {
     let axes = [&status.coarse, &status.fine, &status.lens];
     let on_an_axis = axes.iter().any(|axis| axis.request.is_some_and(|request| ids.contains(&request)));

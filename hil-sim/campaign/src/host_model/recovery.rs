@@ -1,4 +1,4 @@
-//! The end of every scenario: everything is mended, and the rig has to work.
+//! End of each scenario: all faults are reverted, and the rig must work.
 
 use farnear_protocol::{
     Request, RequestError, Response,
@@ -12,26 +12,27 @@ use super::{
 };
 use farnear_sim::{SimError, scenario::host::Program};
 
-/// A board that is mended answers within so long: the watchdog takes 0.2 s, a start 0.1 s.
+/// Timeout of a repaired board: the watchdog takes 0.2 s, a start 0.1 s.
 const ANSWERS_US: u64 = 3_000_000;
-/// Where both stages are sent, micrometres.
+/// Target of both stages, micrometres.
 const AWAY_UM: [(Axis, f64); 2] = [(Axis::SensorCoarse, 350.0), (Axis::Lens, 250.0)];
 
-/// A stage that stands lower than this was led there: more than a homed one errs by (3.2 um), less than homing brakes beyond its switch.
+/// A stage below this was driven there: beyond a homed one's error (3.2 um), less than homing brakes behind
+/// its switch.
 const BELOW_NM: i32 = -10_000;
 
-/// Mends everything and looks whether the rig works; says what does not.
+/// Reverts all faults and checks that the rig works; returns what fails.
 pub fn recover(client: &mut Client) -> Result<Option<String>, SimError> {
     client.rig.heal()?;
     client.wait_us(300_000)?;
-    // What noise is left of a frame ends here.
+    // Ends a frame that noise has left open.
     client.rig.send(&[0])?;
     let mut waited_us = 0;
     while !client.join()? {
         client.wait_us(50_000)?;
         waited_us += 50_000;
         if waited_us > ANSWERS_US {
-            return Ok(Some("the board does not answer, and everything is mended".into()));
+            return Ok(Some("the board does not answer without faults".into()));
         }
     }
     client.ask(&Request::Stop)?;
@@ -47,7 +48,7 @@ pub fn recover(client: &mut Client) -> Result<Option<String>, SimError> {
     works(client)
 }
 
-/// Clears what is latched; says what cannot be cleared.
+/// Clears latched alarms; returns one that cannot be cleared.
 pub fn clear_alarms(client: &mut Client) -> Result<Option<String>, SimError> {
     for _ in 0..24 {
         let Some(status) = client.status()? else { return Ok(Some("no status comes".into())) };
@@ -61,11 +62,11 @@ pub fn clear_alarms(client: &mut Client) -> Result<Option<String>, SimError> {
     Ok(latched.map(|latched| format!("alarm {} cannot be cleared: {:?}", latched.number, latched.alarm)))
 }
 
-/// Homes, moves and exposes; says what fails.
+/// Homes, moves and captures; returns what fails.
 fn works(client: &mut Client) -> Result<Option<String>, SimError> {
     let home = |axis| Request::Home { axis, silence: SILENCE };
     let Some(status) = client.status()? else { return Ok(Some("no status comes before homing".into())) };
-    // What was led below its zero comes up first: the other may not come near it.
+    // A stage below zero moves up first: the other may not approach it.
     let axes = [Axis::SensorCoarse, Axis::Lens];
     for axis in axes.into_iter().filter(|axis| status.axis(*axis).measured.0 < BELOW_NM) {
         if let Some(what) = all(client, "homing", &[home(axis)])? {
@@ -94,11 +95,11 @@ fn all(client: &mut Client, what: &str, requests: &[Request]) -> Result<Option<S
             Some((id, Ok(Response::Accepted))) => ids.push(id),
             other => {
                 let answer = other.map(|(_, answer)| answer);
-                return Ok(Some(format!("{what} is not accepted, with everything mended, but {answer:?}")));
+                return Ok(Some(format!("{what} is not accepted without faults: {answer:?}")));
             }
         }
     }
     let ends = client.wait_for_ends(&ids)?;
     let bad = ends.iter().find(|end| **end != Ended::Done);
-    Ok(bad.map(|end| format!("{what} does not come to its end, with everything mended, but {end:?}")))
+    Ok(bad.map(|end| format!("{what} fails without faults: {end:?}")))
 }

@@ -1,4 +1,4 @@
-//! Exposures: each is told, and where the sensor was.
+//! Exposures: each is reported, at the true position.
 
 use farnear_protocol::{
     EventKind,
@@ -12,9 +12,9 @@ use farnear_sim::{
     wiring::Shot,
 };
 
-/// The board stamps whole microseconds, each end rounded by itself.
+/// Stamps are whole microseconds; each end is rounded separately.
 const STAMP_US: u64 = 2;
-/// What ends a run is told within so long of an exposure that is not told itself.
+/// Deadline for the event that ends a run after an unreported exposure.
 const TOLD_NS: u64 = 50_000_000;
 
 fn broken(at_ns: u64, what: String) -> Broken {
@@ -23,7 +23,7 @@ fn broken(at_ns: u64, what: String) -> Broken {
 
 pub fn exposure(case: &Case<'_>) -> Vec<Broken> {
     let mut found = Vec::new();
-    // The exposures since the last reset, and whether they were told.
+    // Exposures since the last reset, and whether they were reported.
     let mut taken: Vec<(Shot, bool)> = Vec::new();
     let mut shots: std::collections::BTreeMap<u32, u32> = std::collections::BTreeMap::new();
     let mut windows: Vec<i32> = Vec::new();
@@ -35,61 +35,64 @@ pub fn exposure(case: &Case<'_>) -> Vec<Broken> {
                     windows.push(shot.settle_window.0);
                 }
             }
-            // The camera ends what it has begun, also where the board was reset meanwhile.
+            // The camera completes an exposure even if the board was reset meanwhile.
             Seen::Exposed(shot) if shot.begin_ns >= reset_ns => taken.push((*shot, false)),
             Seen::Reset | Seen::Powered(_) => {
-                // A reset is told by the first event of the next boot.
+                // The reset is reported by the first event of the next boot.
                 reset_ns = sight.at_ns;
                 taken.clear();
                 shots.clear();
             }
-            Seen::Told { number, event, .. } => {
+            Seen::Reported { number, event, .. } => {
                 let (record, deviation) = match &event.kind {
                     EventKind::ShotDone { shot, .. } => (shot, None),
                     EventKind::FrameTaken { shot, deviation, .. } => (shot, Some(deviation.0)),
                     _ => continue,
                 };
                 if *shots.entry(record.trigger_number).or_insert(*number) != *number {
-                    let what = format!("trigger {} was told by two events", record.trigger_number);
+                    let what = format!("trigger {} was reported by two events", record.trigger_number);
                     found.push(broken(sight.at_ns, what));
                     continue;
                 }
-                let Some((shot, told)) = taken.iter_mut().find(|(shot, _)| shot.id == record.trigger_number)
+                let Some((shot, reported)) =
+                    taken.iter_mut().find(|(shot, _)| shot.id == record.trigger_number)
                 else {
-                    let what = format!("trigger {} was told and never taken", record.trigger_number);
+                    let what = format!("trigger {} was reported but never taken", record.trigger_number);
                     found.push(broken(sight.at_ns, what));
                     continue;
                 };
-                *told = true;
-                // Which window was asked for does not stand in the record: the widest that was.
+                *reported = true;
+                // The record has no tolerance; the widest requested one applies.
                 let window_nm = windows.iter().copied().max().unwrap_or(0);
-                let told_off = deviation.is_some_and(|nm| nm > window_nm);
-                found.extend(judge(case, sight, (shot, record), (window_nm, told_off)));
+                let reported_off = deviation.is_some_and(|nm| nm > window_nm);
+                found.extend(check_exposure(case, sight, (shot, record), (window_nm, reported_off)));
             }
             _ => {}
         }
-        let untold = taken
-            .iter_mut()
-            .find(|(shot, told)| !told && shot.id != FREE_RUNNING && sight.at_ns > shot.end_ns + TOLD_NS);
-        if let Some((shot, told)) = untold {
-            *told = true;
+        let unreported = taken.iter_mut().find(|(shot, reported)| {
+            !reported && shot.id != FREE_RUNNING && sight.at_ns > shot.end_ns + TOLD_NS
+        });
+        if let Some((shot, reported)) = unreported {
+            *reported = true;
             if !is_excused(case.sights, shot) {
-                found
-                    .push(broken(shot.end_ns, format!("the exposure of trigger {} was never told", shot.id)));
+                found.push(broken(
+                    shot.end_ns,
+                    format!("the exposure of trigger {} was never reported", shot.id),
+                ));
             }
         }
     }
     found
 }
 
-/// Whether something told that the run had ended, or the exposure was missed.
+/// Whether an event reported the end of the run or a missed exposure.
 fn is_excused(sights: &[Sight], shot: &Shot) -> bool {
     let near = |sight: &&Sight| {
         sight.at_ns + TOLD_NS > shot.begin_ns && sight.at_ns < shot.end_ns + TOLD_NS + 500_000_000
     };
     sights.iter().filter(near).any(|sight| match &sight.seen {
         Seen::Reset | Seen::Powered(_) => true,
-        Seen::Told { event, .. } => matches!(
+        Seen::Reported { event, .. } => matches!(
             event.kind,
             EventKind::Failed { .. } | EventKind::FrameDropped { .. } | EventKind::Alarm(_)
         ),
@@ -97,12 +100,11 @@ fn is_excused(sights: &[Sight], shot: &Shot) -> bool {
     })
 }
 
-/// Holds one exposure against its record.
-fn judge(
+fn check_exposure(
     case: &Case<'_>,
     sight: &Sight,
     (shot, record): (&Shot, &ShotRecord),
-    (window_nm, told_off): (i32, bool),
+    (window_nm, reported_off): (i32, bool),
 ) -> Option<Broken> {
     let stamped = record.strobe_start.0;
     if stamped.abs_diff(shot.board_us) > STAMP_US {
@@ -120,10 +122,10 @@ fn judge(
         Axis::Lens => (truth.lens_um - asked_um).abs(),
     };
     let allowed_um = 1e-3 * f64::from(window_nm) + positions::stated_um(case, record.axis, asked_um);
-    (off_um > allowed_um && !told_off).then(|| {
+    (off_um > allowed_um && !reported_off).then(|| {
         let what = format!(
-            "trigger {} was taken {off_um:.3} um off, its window and stated error are {allowed_um:.3} um, and nothing \
-             tells of it",
+            "trigger {} was taken {off_um:.3} um off, its tolerance and stated error are {allowed_um:.3} um, and no event \
+             reports it",
             record.trigger_number
         );
         broken(sight.at_ns, what)

@@ -1,17 +1,17 @@
-//! Motors: hard stops, alarms, and motion that nobody asked for.
+//! Motors: hard stops, alarms and unrequested motion.
 
 use farnear_protocol::{EventKind, Request, Response};
 
 use super::{Broken, Case};
 use farnear_sim::observer::Seen;
 
-/// Microsteps against a hard stop until a stall has ended the motion: 6 um of following error are 38, the running segment of
-/// a millisecond 26 at the speed of homing, and a rotor that snaps back by a period comes to it once more.
+/// Microsteps against a hard stop until a stall ends the motion: 38 for 6 um of following error, 26 for the
+/// running segment at homing speed, and one rotor period.
 const PRESSED_MAX: u64 = 150;
-/// From an alarm to the last STEP: the running segment lasts a millisecond, a tick 0.2 ms; the board's clock is known to half
-/// a millisecond.
+/// From an alarm to the last STEP: running segment 1 ms, tick 0.2 ms, uncertainty of the board's clock 0.5
+/// ms.
 const LAST_STEP_NS: u64 = 2_000_000;
-/// A stop brakes along the ramp behind the event that ends the work.
+/// A stop brakes along the ramp after the terminal event.
 const BRAKING_NS: u64 = 400_000_000;
 
 /// Property `hard-stop`.
@@ -20,7 +20,7 @@ pub fn hard_stop(case: &Case<'_>) -> Vec<Broken> {
     let mut alarms = 0;
     for sight in case.sights {
         let truth = match &sight.seen {
-            Seen::Told { event, truth, .. } => {
+            Seen::Reported { event, truth, .. } => {
                 alarms += u64::from(matches!(event.kind, EventKind::Alarm(_)));
                 truth
             }
@@ -44,12 +44,12 @@ pub fn hard_stop(case: &Case<'_>) -> Vec<Broken> {
 pub fn step_after_alarm(case: &Case<'_>) -> Vec<Broken> {
     let clocks = case.clocks();
     let mut life = 0;
-    // Since when an alarm is latched, and its number; and when the last was cleared or the board reset.
+    // When an alarm was latched, its number, and when it was cleared or the board reset.
     let mut spans: Vec<(u64, u64, u32)> = Vec::new();
     let mut known = std::collections::BTreeSet::new();
     for sight in case.sights {
         match &sight.seen {
-            Seen::Told { boot, event, .. } => match &event.kind {
+            Seen::Reported { boot, event, .. } => match &event.kind {
                 EventKind::Alarm(record) if record.boot == *boot && known.insert(record.number) => {
                     let at_ns = clocks[life] + record.time.0 * 1000;
                     spans.push((at_ns.min(sight.at_ns), u64::MAX, record.number));
@@ -74,7 +74,7 @@ pub fn step_after_alarm(case: &Case<'_>) -> Vec<Broken> {
             let (since, _, number) = *spans
                 .iter()
                 .find(|(since, until, _)| burst.last_ns > since + LAST_STEP_NS && burst.first_ns < *until)?;
-            // Pulses before the alarm and after it was cleared are two bursts: an answer lies between them.
+            // An answer separates the bursts before the alarm from those after clearing.
             let late_us = (burst.last_ns - since) / 1000;
             let what =
                 format!("the {:?} stage's last STEP came {late_us} us after alarm {number}", burst.stage);
@@ -89,7 +89,6 @@ fn end(spans: &mut [(u64, u64, u32)], number: u32, at_ns: u64) {
     }
 }
 
-/// Work that was asked for.
 struct Work {
     id: u32,
     boot: u32,
@@ -112,7 +111,7 @@ pub fn moves_unasked(case: &Case<'_>) -> Vec<Broken> {
             Seen::Answered { id, boot, answer, .. } if !matches!(**answer, Ok(Response::Accepted)) => {
                 close(&mut works, (*id, *boot), at_ns);
             }
-            Seen::Told { boot, event, .. } => {
+            Seen::Reported { boot, event, .. } => {
                 if let Some(request) = ended(&event.kind) {
                     close(&mut works, (request, *boot), at_ns + BRAKING_NS);
                 }
@@ -131,7 +130,7 @@ pub fn moves_unasked(case: &Case<'_>) -> Vec<Broken> {
         })
         .map(|burst| {
             let what =
-                format!("{} pulses for the {:?} stage that no work asked for", burst.steps, burst.stage);
+                format!("{} pulses for the {:?} stage without requested work", burst.steps, burst.stage);
             Broken { property: "moves-unasked", at_ns: burst.first_ns, what }
         })
         .collect()
@@ -143,7 +142,6 @@ fn close(works: &mut [Work], of: (u32, u32), at_ns: u64) {
     }
 }
 
-/// Whether a request moves something.
 fn is_long(request: &Request) -> bool {
     matches!(
         request,
@@ -155,7 +153,7 @@ fn is_long(request: &Request) -> bool {
     )
 }
 
-/// The request whose work an event ends.
+/// The request whose work ends with this event.
 pub fn ended(kind: &EventKind) -> Option<u32> {
     match kind {
         EventKind::Homed { request, .. }

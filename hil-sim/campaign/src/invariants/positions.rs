@@ -1,4 +1,4 @@
-//! Positions: what is called homed is so.
+//! Positions: each one reported as homed is correct.
 
 use std::collections::BTreeSet;
 
@@ -12,19 +12,18 @@ use farnear_sim::observer::{Seen, Truth};
 
 /// Screw (2 um), home switch (three standard deviations, 0.9 um), a step and a count.
 const STEPPER_UM: f64 = 3.2;
-/// The screw's play, where a motion ended before its approach from below.
+/// Screw play, if a motion ended before its approach from below.
 const PLAY_UM: f64 = 4.0;
-/// What steps and encoder may differ before that is an alarm, and the rotor's swing.
+/// Permitted difference of steps and encoder before an alarm, plus the rotor's swing.
 const FOLLOWING_UM: f64 = 6.5;
-/// Gauge (five standard deviations of its noise) and what the piezo moves until the answer has left.
+/// Gauge noise (five standard deviations) and piezo motion until the answer has left.
 const PIEZO_UM: f64 = 0.1;
 
-/// The stated error of an axis at a position, micrometres.
 pub fn stated_um(case: &Case<'_>, axis: Axis, at_um: f64) -> f64 {
     match axis {
         Axis::SensorFine => {
             let gauge = &case.parts.gauge;
-            // As it comes, before its calibration.
+            // Uncalibrated gauge.
             PIEZO_UM + (gauge.gain - 1.0).abs() * at_um.abs() + gauge.offset_um.abs() + 5.0 * gauge.noise_um
         }
         Axis::SensorCoarse | Axis::Lens => STEPPER_UM + PLAY_UM + FOLLOWING_UM,
@@ -42,16 +41,16 @@ fn truly_um(truth: &Truth, axis: Axis) -> f64 {
 pub fn position(case: &Case<'_>) -> Vec<Broken> {
     let mut homed: BTreeSet<(u32, &str)> = BTreeSet::new();
     let mut broken = Vec::new();
-    // What is asked again is answered again as it was: what was true then may have moved since.
+    // A repeat returns the first answer, which may be outdated.
     let mut answered = BTreeSet::new();
     for sight in case.sights {
         let off = match &sight.seen {
-            // The edge is found some time before the end of the homing; calibrations home, too.
+            // The edge is found before the homing ends; calibrations home, too.
             Seen::Asked { boot, call, .. } => {
                 homed.extend(homes(&call.request).map(|axis| (*boot, axis.name())));
                 continue;
             }
-            Seen::Told { event, truth, .. } => match &event.kind {
+            Seen::Reported { event, truth, .. } => match &event.kind {
                 EventKind::MoveDone { axis, measured, .. } => {
                     off(case, *axis, measured.0, truth).map(|what| format!("a move is done, {what}"))
                 }
@@ -63,8 +62,8 @@ pub fn position(case: &Case<'_>) -> Vec<Broken> {
                     continue;
                 }
                 Axis::ALL.into_iter().find_map(|axis| {
-                    let told = status.axis(axis);
-                    if told.state != PositionState::Homed {
+                    let reported = status.axis(axis);
+                    if reported.state != PositionState::Homed {
                         return None;
                     }
                     if axis != Axis::SensorFine && !homed.contains(&(*boot, axis.name())) {
@@ -72,7 +71,7 @@ pub fn position(case: &Case<'_>) -> Vec<Broken> {
                     }
                     // A program's next move may begin before the answer has left.
                     let led = axis == Axis::SensorFine && status.program.state == ProgramState::Running;
-                    if told.moving || led { None } else { off(case, axis, told.measured.0, truth) }
+                    if reported.moving || led { None } else { off(case, axis, reported.measured.0, truth) }
                 })
             }
             _ => continue,
@@ -82,7 +81,6 @@ pub fn position(case: &Case<'_>) -> Vec<Broken> {
     broken
 }
 
-/// The axis that a request homes.
 fn homes(request: &Request) -> Option<Axis> {
     match request {
         Request::Home { axis, .. } => Some(*axis),
@@ -95,11 +93,11 @@ fn homes(request: &Request) -> Option<Axis> {
     }
 }
 
-/// How far what is told lies beside the truth, where that is too far.
+/// Position error, if it is too large.
 fn off(case: &Case<'_>, axis: Axis, measured_nm: i32, truth: &Truth) -> Option<String> {
-    let (told_um, true_um) = (1e-3 * f64::from(measured_nm), truly_um(truth, axis));
+    let (measured_um, true_um) = (1e-3 * f64::from(measured_nm), truly_um(truth, axis));
     let stated_um = stated_um(case, axis, true_um);
-    ((told_um - true_um).abs() > stated_um).then(|| {
-        format!("{axis:?} is told at {told_um:.3} um and is at {true_um:.3} um; its stated error is {stated_um:.2} um")
+    ((measured_um - true_um).abs() > stated_um).then(|| {
+        format!("{axis:?} is reported at {measured_um:.3} um but is at {true_um:.3} um; its stated error is {stated_um:.2} um")
     })
 }

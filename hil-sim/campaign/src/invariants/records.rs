@@ -1,4 +1,4 @@
-//! Records: what was confirmed outlasts everything, or its loss is told.
+//! Records: confirmed values survive everything, or their loss is reported.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -10,25 +10,24 @@ use farnear_protocol::{
 use super::{Broken, Case};
 use farnear_sim::observer::Seen;
 
-/// So long after its confirmation a record is in the memory: some milliseconds a record, five of them, and a tick of each two
-/// is the host's.
+/// Time from confirmation to storage: some milliseconds per record, five records, every second tick.
 const WRITTEN_NS: u64 = 60_000_000;
 
 fn broken(at_ns: u64, what: String) -> Broken {
     Broken { property: "records", at_ns, what }
 }
 
-/// What is known of a setting: which values it may have.
+/// Possible values of a setting.
 #[derive(Default)]
 struct Known {
-    /// The value that is in the memory for sure, once there is one.
+    /// Stored value.
     kept: Option<i32>,
-    /// Values confirmed since, and when.
+    /// Values confirmed since, with times.
     since: Vec<(u64, i32)>,
 }
 
 pub fn records(case: &Case<'_>) -> Vec<Broken> {
-    // Without a memory nothing is kept, and the board says so; and bits that flip in both copies are told as such.
+    // A board without memory reports the loss; flipped bits in both copies are reported, too.
     let lossy = case.has(&["memory-dead", "memory-misread"]);
     let mut found = boots(case, lossy);
     if !lossy {
@@ -38,56 +37,57 @@ pub fn records(case: &Case<'_>) -> Vec<Broken> {
     found
 }
 
-/// Each boot has its own number, larger than those before it.
+/// Boot numbers increase.
 fn boots(case: &Case<'_>, lossy: bool) -> Vec<Broken> {
     let mut last = 0;
     let mut begun = BTreeSet::new();
-    let (mut told, mut resets) = (Vec::new(), 0u64);
+    let (mut reported, mut resets) = (Vec::new(), 0u64);
     let counters_lost = loses(case, RecordName::Counters);
     for sight in case.sights {
         match &sight.seen {
             Seen::Reset | Seen::Powered(true) => resets += 1,
-            Seen::Told { boot, event, .. } if matches!(event.kind, EventKind::Started { .. }) => {
-                // Told again, the same event has the same number; a new boot with an old number had no reset between.
+            Seen::Reported { boot, event, .. } if matches!(event.kind, EventKind::Started { .. }) => {
+                // A repeated event has the same number; a new boot with an old number had no reset in
+                // between.
                 let new = begun.insert((*boot, resets));
                 if new && *boot <= last && !lossy && !counters_lost {
                     let what = format!("boot {boot} came after boot {last}");
-                    told.push(broken(sight.at_ns, what));
+                    reported.push(broken(sight.at_ns, what));
                 }
                 last = last.max(*boot);
             }
             _ => {}
         }
     }
-    told
+    reported
 }
 
-/// Whether the board told that a record was lost.
+/// Whether the board reported the loss of a record.
 fn loses(case: &Case<'_>, record: RecordName) -> bool {
     case.sights.iter().any(|sight| match &sight.seen {
-        Seen::Told { event, .. } => {
-            matches!(&event.kind, EventKind::Alarm(told) if told.alarm == Alarm::RecordLost { record })
+        Seen::Reported { event, .. } => {
+            matches!(&event.kind, EventKind::Alarm(reported) if reported.alarm == Alarm::RecordLost { record })
         }
         _ => false,
     })
 }
 
-/// Until when the board wrote that was reset at this moment: one that hangs writes nothing.
+/// When writing stopped before this reset: a hung board writes nothing.
 fn wrote_until_ns(case: &Case<'_>, reset_ns: u64) -> u64 {
     let before = case.sights.iter().take_while(|sight| sight.at_ns < reset_ns);
     before.fold(reset_ns, |until, sight| match &sight.seen {
-        Seen::Happened { what: "firmware-hangs", mends: false } => until.min(sight.at_ns),
+        Seen::Happened { what: "firmware-hangs", reverts: false } => until.min(sight.at_ns),
         Seen::Reset => reset_ns,
         _ => until,
     })
 }
 
-/// Alarms stay latched until they are cleared.
+/// Alarms stay latched until cleared.
 fn alarms(case: &Case<'_>) -> Vec<Broken> {
     if loses(case, RecordName::Alarms) {
         return Vec::new();
     }
-    // By number: when each latched alarm was told, and what it is.
+    // By number: when each latched alarm was reported, and the alarm.
     let mut latched: BTreeMap<u32, (u64, AlarmRecord)> = BTreeMap::new();
     let mut asked: BTreeMap<(u32, u32), u32> = BTreeMap::new();
     for sight in case.sights {
@@ -98,18 +98,18 @@ fn alarms(case: &Case<'_>) -> Vec<Broken> {
                     asked.insert((*boot, *id), number);
                 }
             }
-            Seen::Told { event, .. } => match &event.kind {
+            Seen::Reported { event, .. } => match &event.kind {
                 EventKind::Alarm(record) => {
                     latched.entry(record.number).or_insert((at_ns, *record));
                 }
                 EventKind::AlarmCleared { number } => drop(latched.remove(number)),
                 _ => {}
             },
-            // What was not written yet may be forgotten; and a clearing whose answer never left may have been done.
+            // Unwritten alarms may be lost; a clearing may have succeeded without an answer.
             Seen::Reset | Seen::Powered(false) => {
                 let wrote_ns = wrote_until_ns(case, at_ns);
-                latched.retain(|number, (told_ns, _)| {
-                    wrote_ns > *told_ns + WRITTEN_NS && !asked.values().any(|asked| asked == number)
+                latched.retain(|number, (advance_until_ns, _)| {
+                    wrote_ns > *advance_until_ns + WRITTEN_NS && !asked.values().any(|asked| asked == number)
                 });
             }
             Seen::Answered { id, boot, answer, .. } => match &**answer {
@@ -119,13 +119,14 @@ fn alarms(case: &Case<'_>) -> Vec<Broken> {
                     }
                 }
                 Ok(Response::Status(status)) => {
-                    // An answer that was made before the alarm may leave after it.
+                    // An answer created before the alarm may leave after it.
                     let mut known = latched
                         .values()
                         .filter(|(_, alarm)| alarm.boot != *boot || alarm.time <= status.time);
                     let oldest = known.next().map(|(_, alarm)| alarm.number);
                     if let (Some(oldest), None) = (oldest, &status.alarm) {
-                        let what = format!("alarm {oldest} was told and not cleared, and none is latched");
+                        let what =
+                            format!("alarm {oldest} was reported and not cleared, and none is latched");
                         return vec![broken(at_ns, what)];
                     }
                 }
@@ -137,7 +138,7 @@ fn alarms(case: &Case<'_>) -> Vec<Broken> {
     Vec::new()
 }
 
-/// Settings have the value that was confirmed last.
+/// Settings have the last confirmed value.
 fn settings(case: &Case<'_>) -> Vec<Broken> {
     if loses(case, RecordName::Settings) {
         return Vec::new();
@@ -145,7 +146,7 @@ fn settings(case: &Case<'_>) -> Vec<Broken> {
     let mut known: BTreeMap<SettingKey, Known> = BTreeMap::new();
     let mut asked: BTreeMap<(u32, u32), (SettingKey, Option<i32>)> = BTreeMap::new();
     let repaired = case.sights.iter().any(|sight| match &sight.seen {
-        Seen::Told { event, .. } => {
+        Seen::Reported { event, .. } => {
             matches!(event.kind, EventKind::RecordRepaired { record: RecordName::Settings, .. })
         }
         _ => false,
@@ -156,7 +157,7 @@ fn settings(case: &Case<'_>) -> Vec<Broken> {
             Seen::Asked { id, boot, call } => match call.request {
                 Request::WriteSetting { key, value } => {
                     asked.insert((*boot, *id), (key, Some(value)));
-                    // From here on it may have it.
+                    // From now on the value is possible.
                     let known = known.entry(key).or_default();
                     if !known.since.iter().any(|(_, earlier)| *earlier == value) {
                         known.since.push((u64::MAX, value));
@@ -176,12 +177,12 @@ fn settings(case: &Case<'_>) -> Vec<Broken> {
                 }
                 let before = known.kept.unwrap_or(setting.default);
                 let may = setting.value == before || known.since.iter().any(|(_, may)| *may == setting.value);
-                // The older copy may serve where the newer one was damaged, and that is told.
+                // A damaged newer copy may be replaced by the older one, which is reported.
                 if !may && !repaired {
                     let what = format!("{} is {}, it was {before}", key.name(), setting.value);
                     return vec![broken(at_ns, what)];
                 }
-                // It is what it is, in this boot and after.
+                // This value is now certain.
                 *known = Known { kept: Some(setting.value), since: Vec::new() };
             }
             Seen::Reset | Seen::Powered(false) => {

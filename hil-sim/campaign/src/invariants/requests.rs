@@ -23,14 +23,14 @@ fn twice(at_ns: u64, what: String) -> Broken {
     Broken { property: "acts-twice", at_ns, what }
 }
 
-/// One end for each request.
+/// One end per request.
 fn ends(case: &Case<'_>) -> Vec<Broken> {
     let mut ends: BTreeMap<(u32, u32), u32> = BTreeMap::new();
     let mut broken = Vec::new();
     for sight in case.sights {
-        let Seen::Told { boot, event, number, .. } = &sight.seen else { continue };
+        let Seen::Reported { boot, event, number, .. } = &sight.seen else { continue };
         let Some(request) = ended(&event.kind) else { continue };
-        // The same event may be told again; another one with another number may not.
+        // An event may be repeated with the same number only.
         let first = *ends.entry((*boot, request)).or_insert(*number);
         if first != *number {
             let what =
@@ -41,7 +41,7 @@ fn ends(case: &Case<'_>) -> Vec<Broken> {
     broken
 }
 
-/// The same answer to each repeat, or a refusal that says why there is none.
+/// Repeats get the same answer, or a refusal with its reason.
 fn answers(case: &Case<'_>) -> Vec<Broken> {
     let mut given: BTreeMap<(u32, u32), &Answer> = BTreeMap::new();
     let mut broken = Vec::new();
@@ -70,7 +70,7 @@ fn answers(case: &Case<'_>) -> Vec<Broken> {
     broken
 }
 
-/// No more exposures than were asked for, and than a continuous run took again because it was not told of one.
+/// No more exposures than requested plus those repeated by a continuous run.
 fn exposures(case: &Case<'_>) -> Vec<Broken> {
     let mut unseen = BTreeSet::new();
     let mut runs: BTreeMap<(u32, u32), u64> = BTreeMap::new();
@@ -90,7 +90,7 @@ fn exposures(case: &Case<'_>) -> Vec<Broken> {
                 runs.entry((*boot, *id)).or_insert(exposures);
             }
             Seen::Exposed(shot) if shot.id != FREE_RUNNING => taken += 1,
-            Seen::Told { boot, number, event, .. } => {
+            Seen::Reported { boot, number, event, .. } => {
                 if matches!(event.kind, EventKind::FrameDropped { reason: DropReason::NoStrobe, .. }) {
                     unseen.insert((*boot, *number));
                 }
@@ -99,7 +99,7 @@ fn exposures(case: &Case<'_>) -> Vec<Broken> {
         }
         let asked = runs.values().sum::<u64>() + unseen.len() as u64;
         if taken > asked {
-            let what = format!("{taken} exposures were taken, {asked} were asked for");
+            let what = format!("{taken} exposures were taken, {asked} requested");
             return vec![twice(sight.at_ns, what)];
         }
     }

@@ -1,4 +1,4 @@
-//! Each property on a run that breaks it, and on one that does not.
+//! Each property on a run that violates it, and on one that does not.
 
 use farnear_protocol::{
     BoardMicros, Call, Event, EventKind, Micros, Nanometres, Request, Response,
@@ -21,9 +21,9 @@ fn asked(at_ms: u64, id: u32, request: Request) -> Sight {
     Sight { at_ns: at_ms * MS, seen: Seen::Asked { id, boot: 1, call: Call { session: 1, request } } }
 }
 
-fn told(at_ms: u64, number: u32, kind: EventKind, truth: Truth) -> Sight {
+fn reported(at_ms: u64, number: u32, kind: EventKind, truth: Truth) -> Sight {
     let event = Event { time: BoardMicros(at_ms * 1000), kind }.into();
-    Sight { at_ns: at_ms * MS, seen: Seen::Told { number, boot: 1, event, truth } }
+    Sight { at_ns: at_ms * MS, seen: Seen::Reported { number, boot: 1, event, truth } }
 }
 
 fn answered(at_ms: u64, id: u32, response: Response) -> Sight {
@@ -54,7 +54,7 @@ fn at(lens_um: f64) -> Truth {
     Truth { lens_um, ..Truth::default() }
 }
 
-/// The properties that a run breaks.
+/// Violated properties of a run.
 fn broken(scenario: &str, sights: &[Sight]) -> Vec<&'static str> {
     let scenario = Scenario::parse(scenario).expect("a scenario");
     let parts = Parts::default();
@@ -62,42 +62,45 @@ fn broken(scenario: &str, sights: &[Sight]) -> Vec<&'static str> {
 }
 
 #[test]
-fn a_good_run_breaks_nothing() {
+fn a_good_run_violates_nothing() {
     let sights = [
         asked(1, 7, go()),
         answered(2, 7, Response::Accepted),
         stepped(3, 9),
-        told(10, 0, done(7, 5_000), at(5.5)),
-        told(12, 0, done(7, 5_000), at(5.5)),
+        reported(10, 0, done(7, 5_000), at(5.5)),
+        reported(12, 0, done(7, 5_000), at(5.5)),
     ];
     assert_eq!(broken("", &sights), [""; 0]);
 }
 
 #[test]
-fn steps_after_an_alarm_or_without_work_are_seen() {
+fn detects_steps_after_an_alarm_or_without_work() {
     let record = AlarmRecord { number: 1, boot: 1, time: BoardMicros(5_000), alarm: Alarm::Halt };
-    let alarm = told(6, 0, EventKind::Alarm(record), Truth::default());
+    let alarm = reported(6, 0, EventKind::Alarm(record), Truth::default());
     let begin = [asked(1, 7, go()), alarm];
     assert_eq!(broken("", &[&begin[..], &[stepped(2, 7)]].concat()), [""; 0]);
     assert_eq!(broken("", &[&begin[..], &[stepped(2, 9)]].concat()), ["step-after-alarm"]);
-    let cleared = told(20, 1, EventKind::AlarmCleared { number: 1 }, Truth::default());
+    let cleared = reported(20, 1, EventKind::AlarmCleared { number: 1 }, Truth::default());
     assert_eq!(broken("", &[&begin[..], &[cleared, stepped(30, 40)]].concat()), [""; 0]);
     assert_eq!(broken("", &[stepped(2, 9)]), ["moves-unasked"]);
     let reset = Sight { at_ns: 5 * MS, seen: Seen::Reset };
     assert_eq!(broken("", &[asked(1, 7, go()), reset, stepped(6, 7)]), ["moves-unasked"]);
-    // Seed 107727: a memory that died with the power, so that the next boot has the number of the one before and its clock begins anew.
+    // Seed 107727: the memory died with the power, so the next boot has the same number and its clock
+    // restarts.
     let reset = Sight { at_ns: 95 * MS, seen: Seen::Reset };
     let (Sight { seen, .. }, at_ns) = (begin[1].clone(), 106 * MS);
     let next_life = [asked(101, 7, go()), Sight { at_ns, seen }];
-    let lives =
-        [&[asked(1, 6, go()), told(3, 0, done(9, 5_000), at(5.0)), stepped(60, 70), reset], &next_life[..]];
+    let lives = [
+        &[asked(1, 6, go()), reported(3, 0, done(9, 5_000), at(5.0)), stepped(60, 70), reset],
+        &next_life[..],
+    ];
     assert_eq!(broken("", &lives.concat()), [""; 0]);
     assert_eq!(broken("", &[&lives.concat()[..], &[stepped(102, 115)]].concat()), ["step-after-alarm"]);
 }
 
 #[test]
-fn a_hard_stop_is_seen_and_a_dead_switch_excuses_one_stall() {
-    let pressed = |count| told(9, 0, done(7, 0), Truth { pressed: [0, count], ..at(0.0) });
+fn detects_a_hard_stop_and_permits_one_stall_with_a_dead_switch() {
+    let pressed = |count| reported(9, 0, done(7, 0), Truth { pressed: [0, count], ..at(0.0) });
     assert_eq!(broken("", &[asked(1, 7, go()), pressed(1)]), ["hard-stop"]);
     let dead = "[[happens]]\nafter_ms = 0\nwhat = \"home-switch-dead\"\nstage = \"lens\"";
     assert_eq!(broken(dead, &[asked(1, 7, go()), pressed(100)]), [""; 0]);
@@ -105,9 +108,9 @@ fn a_hard_stop_is_seen_and_a_dead_switch_excuses_one_stall() {
 }
 
 #[test]
-fn work_that_ends_twice_and_other_answers_are_seen() {
+fn detects_work_that_ends_twice_and_changed_answers() {
     let run = asked(1, 7, go());
-    let twice = [run.clone(), told(9, 0, done(7, 0), at(0.0)), told(10, 1, done(7, 0), at(0.0))];
+    let twice = [run.clone(), reported(9, 0, done(7, 0), at(0.0)), reported(10, 1, done(7, 0), at(0.0))];
     assert_eq!(broken("", &twice), ["acts-twice"]);
     let counters = Response::Counters(farnear_protocol::message::Counters::default());
     assert_eq!(
@@ -117,12 +120,12 @@ fn work_that_ends_twice_and_other_answers_are_seen() {
 }
 
 #[test]
-fn a_position_beside_the_truth_is_seen() {
-    assert_eq!(broken("", &[asked(1, 7, go()), told(9, 0, done(7, 5_000), at(19.0))]), ["position"]);
+fn detects_a_wrong_position() {
+    assert_eq!(broken("", &[asked(1, 7, go()), reported(9, 0, done(7, 5_000), at(19.0))]), ["position"]);
 }
 
 #[test]
-fn a_piezo_beside_the_truth_is_seen_but_where_a_program_may_have_sent_it_on() {
+fn detects_a_wrong_piezo_position_unless_a_program_moves_it() {
     let said = |state: ProgramState, measured_nm: i32| {
         let mut status = status(3);
         (status.fine.state, status.fine.measured) = (PositionState::Homed, Nanometres(measured_nm));
@@ -147,18 +150,18 @@ fn setting(value: i32) -> Response {
 }
 
 #[test]
-fn a_setting_that_is_another_one_is_seen() {
+fn detects_a_changed_setting() {
     let key = SettingKey::CameraReadoutUs;
     let written = [asked(1, 1, Request::WriteSetting { key, value: 3 }), answered(2, 1, setting(3))];
     let reset = |ms| Sight { at_ns: ms * MS, seen: Seen::Reset };
     let read = |value| [asked(500, 2, Request::ReadSetting { key }), answered(501, 2, setting(value))];
     let run = |ms, value| broken("", &[&written[..], &[reset(ms)], &read(value)].concat());
     assert_eq!((run(400, 3), run(400, 10_500)), (vec![], vec!["records"]));
-    // Right behind the answer the old value may still be there, and nothing else.
+    // Shortly after the answer the old value may still be stored, and nothing else.
     assert_eq!((run(3, 10_500), run(3, 4)), (vec![], vec!["records"]));
 }
 
-/// What a board says of itself at a moment at which nothing is homed, armed or wrong.
+/// Status of a board with nothing homed, armed or latched.
 fn status(made_ms: u64) -> Status {
     let axis = AxisStatus {
         state: PositionState::Unknown,
@@ -187,28 +190,28 @@ fn status(made_ms: u64) -> Status {
     }
 }
 
-/// An answer that was made at a moment, of a board without an alarm.
+/// An answer created at `made_ms` by a board without an alarm.
 fn without_alarm(answered_ms: u64, made_ms: u64) -> Sight {
     answered(answered_ms, 2, Response::Status(status(made_ms)))
 }
 
 #[test]
-fn an_alarm_that_is_gone_is_seen_and_an_answer_from_before_it_is_none() {
+fn detects_a_lost_alarm_and_ignores_an_earlier_answer() {
     let record = |number| AlarmRecord {
         number,
         boot: 1,
         time: BoardMicros(9_000),
         alarm: Alarm::DriverFault { axis: Axis::Lens },
     };
-    let alarm = told(10, 0, EventKind::Alarm(record(1)), Truth::default());
-    let cleared = told(11, 1, EventKind::AlarmCleared { number: 1 }, Truth::default());
+    let alarm = reported(10, 0, EventKind::Alarm(record(1)), Truth::default());
+    let cleared = reported(11, 1, EventKind::AlarmCleared { number: 1 }, Truth::default());
     assert_eq!(broken("", &[alarm.clone(), without_alarm(12, 12)]), ["records"]);
     assert_eq!(broken("", &[alarm.clone(), without_alarm(12, 8)]), [""; 0]);
     assert_eq!(broken("", &[alarm, cleared, without_alarm(12, 12)]), [""; 0]);
 }
 
 #[test]
-fn an_exposure_too_many_is_seen_and_one_that_takes_the_place_of_an_unseen_one_is_none() {
+fn detects_an_extra_exposure_and_permits_a_repeated_one() {
     let run = Request::RunContinuously { period: Micros(0), exposures: 1, silence: Micros(1_000_000) };
     let exposed = |ms: u64, id| {
         let (begin_ns, end_ns) = (ms * MS, (ms + 1) * MS);
@@ -227,15 +230,15 @@ fn an_exposure_too_many_is_seen_and_one_that_takes_the_place_of_an_unseen_one_is
     };
     let reason = DropReason::NoStrobe;
     let dropped =
-        told(4, 0, EventKind::FrameDropped { request: 7, frame: 0, index: 0, reason }, Truth::default());
+        reported(4, 0, EventKind::FrameDropped { request: 7, frame: 0, index: 0, reason }, Truth::default());
     assert_eq!(broken("", &[asked(1, 7, run.clone()), exposed(2, 0), exposed(5, 1)]), ["acts-twice"]);
     assert_eq!(broken("", &[asked(1, 7, run), exposed(2, 0), dropped, exposed(5, 1)]), [""; 0]);
 }
 
 #[test]
-fn a_boot_that_comes_again_is_seen() {
-    let started = |ms| told(ms, 0, EventKind::Started { cause: ResetCause::Pin }, Truth::default());
+fn detects_a_repeated_boot_number() {
+    let started = |ms| reported(ms, 0, EventKind::Started { cause: ResetCause::Pin }, Truth::default());
     let reset = Sight { at_ns: 5 * MS, seen: Seen::Reset };
-    assert_eq!(broken("", &[started(1), started(2)]), [""; 0], "told again");
+    assert_eq!(broken("", &[started(1), started(2)]), [""; 0], "reported again");
     assert_eq!(broken("", &[started(1), reset, started(9)]), ["records"]);
 }

@@ -1,4 +1,4 @@
-//! A run is made again from its trace, and a trace of another run is told from it.
+//! Replays a run from its trace and detects a trace of another run.
 
 use std::fs;
 
@@ -10,7 +10,7 @@ const SCENARIO: &str = "start_um = [60.0, 80.0]\nbit_error_rate = 1e-5\n\
     [[host]]\ndoes = \"home\"\naxis = \"lens\"\n[[host]]\ndoes = \"expose\"";
 
 #[test]
-fn a_trace_is_made_again_to_its_end_and_a_changed_one_is_told_where() {
+fn replays_a_trace_and_locates_a_change() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("run.vcd");
     let scenario = Scenario::parse(SCENARIO).expect("a scenario");
@@ -28,7 +28,7 @@ fn a_trace_is_made_again_to_its_end_and_a_changed_one_is_told_where() {
     assert_eq!(departure, None, "the same run again");
     assert!(end_ns > 1_000_000_000, "{end_ns}");
 
-    // A position that was another one in the record.
+    // A position that differs from the record.
     let place = text.rfind(" l\n").expect("the lens' position") - 1;
     let digit = if text.as_bytes()[place] == b'1' { "2" } else { "1" };
     let changed = [&text[..place], digit, &text[place + 1..]].concat();

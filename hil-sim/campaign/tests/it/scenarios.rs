@@ -1,4 +1,5 @@
-//! The scenarios that broke something once, and some that show what a file can say: every property holds in each of them.
+//! Scenarios that once violated a property, and some that show the file format: every property holds in each
+//! of them.
 
 use std::{fs, path::PathBuf, process::Command, sync::Mutex};
 
@@ -14,32 +15,32 @@ fn files() -> Vec<PathBuf> {
 }
 
 #[test]
-fn every_property_holds_in_every_scenario_that_broke_one() {
+fn every_property_holds_in_each_recorded_scenario() {
     let files = files();
     assert!(files.len() >= 4, "{files:?}");
     let (next, told) = (Mutex::new(files.iter()), Mutex::new(Vec::new()));
-    // Two at a time: other tests run beside this one.
+    // Two in parallel: other tests run at the same time.
     std::thread::scope(|scope| {
         for _ in 0..2 {
             scope.spawn(|| {
                 loop {
-                    let Some(file) = next.lock().expect("nobody panics").next() else { return };
+                    let Some(file) = next.lock().expect("not poisoned").next() else { return };
                     let scenario = Scenario::read(file).unwrap_or_else(|error| panic!("{error}"));
                     let outcome = play_alone(&scenario, None).unwrap_or_else(|error| panic!("{error}"));
                     assert!(outcome.answered > 10, "{} plays nothing: {outcome:?}", file.display());
-                    told.lock().expect("nobody panics").extend(
+                    told.lock().expect("not poisoned").extend(
                         outcome.broken.iter().map(|broken| format!("{}: {broken:?}", file.display())),
                     );
                 }
             });
         }
     });
-    let told = told.into_inner().expect("nobody panics");
+    let told = told.into_inner().expect("not poisoned");
     assert!(told.is_empty(), "{told:#?}");
 }
 
 #[test]
-fn the_program_plays_a_scenario_and_refuses_a_wrong_one_by_line_and_field() {
+fn plays_a_scenario_and_rejects_an_invalid_one_with_line_and_field() {
     let folder = tempfile::tempdir().expect("a folder");
     let run = |text: &str| {
         let file = folder.path().join("scenario.toml");

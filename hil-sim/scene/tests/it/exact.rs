@@ -1,8 +1,7 @@
-//! The renderer against ray casting, which shares no formula with it.
+//! The renderer compared with independent ray casting.
 //!
-//! Differences are given relative to the mean radiance; one 8-bit code is 8.7e-3 there. The ray caster's
-//! own error with the rays used here is 1e-4 RMS on planes and 3 to 6e-4 on slopes; where a bound is not
-//! larger, the renderer's error does not show.
+//! Differences are relative to the mean radiance; one 8-bit code is 8.7e-3. The ray caster's own error is
+//! 1e-4 RMS on planes and 3 to 6e-4 on slopes; smaller bounds would only measure that.
 
 #![allow(clippy::unwrap_used, reason = "a test's helpers fail by panicking, as the tests do")]
 
@@ -20,8 +19,7 @@ fn thesis_lens() -> Lens {
     Lens::from_optics(&OpticsFile::parse(text).unwrap()).unwrap()
 }
 
-/// White noise per cell, the hardest texture: mean 1, SD 0.2, no correlation that could hide a misplaced
-/// weight.
+/// White noise per cell, the hardest texture: mean 1, SD 0.2, uncorrelated.
 fn noise(camera: &Camera) -> Array2<f32> {
     let mut random = ChaCha8Rng::seed_from_u64(5);
     let half_width = 0.2 * 3f32.sqrt();
@@ -33,7 +31,6 @@ fn noise(camera: &Camera) -> Array2<f32> {
     texture
 }
 
-/// One exposure to compare.
 struct Check<'a> {
     scene: &'a str,
     psf: &'a str,
@@ -43,7 +40,7 @@ struct Check<'a> {
 }
 
 impl Check<'_> {
-    /// RMS and largest difference of the renderer from the ray caster over the given pixels.
+    /// RMS and largest difference from the ray caster over these pixels.
     fn difference(&self, pixels: &[(usize, usize)], rays: u32) -> (f64, f64) {
         let Self { lens, camera, sensor_mm, .. } = *self;
         let texture = noise(camera);
@@ -53,7 +50,7 @@ impl Check<'_> {
         let image = Renderer::new(&scene, lens, &psf, camera, 0).unwrap().radiance(sensor_mm).unwrap();
 
         let blur_px = scene_blur(&scene, lens, camera, sensor_mm);
-        // Over all the places that a ray can reach.
+        // All cells that a ray can reach.
         let (rows, columns) = (camera.height_px as i64, camera.width_px as i64);
         let places = (-40..rows + 40).flat_map(|y| (-40..columns + 40).map(move |x| (x as f64, y as f64)));
         let range_px = places.fold((f64::MAX, f64::MIN), |(low, high), (x, y)| {
@@ -75,7 +72,7 @@ impl Check<'_> {
 
 const PSFS: [&str; 3] = ["pillbox", "gaussian:k=0.4578", "generalised:p=1.8,k=0.4802"];
 
-/// Pixels spread over the image in the same low-discrepancy way whatever its size, its corners first.
+/// Low-discrepancy pixels over the image, corners first.
 fn spread(camera: &Camera, count: usize) -> Vec<(usize, usize)> {
     let (last_row, last_column) = (camera.height_px - 1, camera.width_px - 1);
     let mut pixels = vec![(0, 0), (0, last_column), (last_row, 0), (last_row, last_column)];
@@ -132,7 +129,7 @@ fn the_distorted_field_is_exact_to_a_thousandth() {
 
 #[test]
 fn a_steep_cone_stays_within_half_a_percent() {
-    // The whole range within twelve pixels, 0.11 px of blur per pixel, forty times steeper than in a full
+    // The whole range within twelve pixels, 0.11 px of blur per pixel: forty times steeper than in a full
     // image.
     let (lens, camera) = (thesis_lens(), Camera::new(48, 32, Noise::None));
     for psf in PSFS {

@@ -1,4 +1,4 @@
-//! Exposures through the public face: depths, seeds, noise, borders and refusals.
+//! Exposures through the public API: depths, seeds, noise, borders and errors.
 
 #![allow(clippy::unwrap_used, reason = "a test's helpers fail by panicking, as the tests do")]
 
@@ -46,8 +46,7 @@ fn the_staircase_has_eight_equal_levels_of_equal_width() {
 fn a_plane_in_focus_is_its_texture_averaged_over_pixels() {
     let (lens, camera) = (thesis_lens(), Camera::new(32, 24, Noise::None));
     let texture = Array2::from_shape_fn((48, 64), |(row, column)| 1.0 + ((row * 7 + column * 3) % 5) as f32);
-    // The mean over a cell of what is linear between samples: 1/8, 3/4, 1/8 in each direction, mirrored
-    // outside.
+    // The mean over a cell of linear interpolation: 1/8, 3/4, 1/8 in each direction, mirrored outside.
     let at = |row: isize, column: isize| {
         let fold = |i: isize, size: isize| i.clamp(0, size - 1) as usize; // one cell beyond is the border's mirror
         texture[[fold(row, 48), fold(column, 64)]]
@@ -72,7 +71,7 @@ fn a_plane_in_focus_is_its_texture_averaged_over_pixels() {
 
 #[test]
 fn a_uniform_surface_looks_uniform_whatever_its_shape() {
-    // Radiance is conserved along rays: no seam, step or border may darken it.
+    // Radiance is conserved: no seam, step or border may darken it.
     let lens = thesis_lens();
     let camera = Camera::new(160, 120, Noise::None);
     let psf: Psf = "generalised:p=1.8,k=0.4802".parse().unwrap();
@@ -88,15 +87,14 @@ fn a_uniform_surface_looks_uniform_whatever_its_shape() {
 
 #[test]
 fn a_sharp_near_edge_stays_sharp_before_a_blurred_background() {
-    // Near half in focus, far half blurred: the near pixels beside the edge must not take the background's
-    // light.
+    // Near half in focus, far half blurred: background light must not reach near pixels at the edge.
     let (lens, camera) = (thesis_lens(), Camera::new(40, 16, Noise::None));
     let two = scene("staircase,steps=2");
     let near = scene(&format!("plane:{}", lens.near_mm));
     let image =
         |scene: &Scene| render_f32(scene, &lens, &Psf::PillBox, lens.sensor_near_mm, &camera, 1).unwrap();
     let (stepped, plane) = (image(&two), image(&near));
-    // A sixteenth of the first pixel has the texture sample across the edge, which may differ by its half.
+    // A sixteenth of the first pixel uses the texture sample across the edge, which may differ by half of it.
     for (a, b) in stepped.slice(s![.., 20]).iter().zip(plane.slice(s![.., 20])) {
         assert!((a / b - 1.0).abs() < 0.04, "{a} {b}");
     }
@@ -113,7 +111,7 @@ fn a_height_map_renders_as_the_shape_it_samples() {
     assert_eq!(truth(&mapped, &lens, &camera), truth(&scene("cone"), &lens, &camera));
     let image = |scene: &Scene| render_f32(scene, &lens, &psf, lens.sensor_far_mm, &camera, 1).unwrap();
     let (from_map, from_shape) = (image(&mapped), image(&scene("cone")));
-    // Mirrored instead of continued at the border; linear between pixels.
+    // Mirrored at the border; linear between pixels.
     let inner = s![8..40, 8..56];
     for (a, b) in from_map.slice(inner).iter().zip(from_shape.slice(inner)) {
         assert!((a - b).abs() < 1e-3, "{a} {b}");
@@ -188,9 +186,9 @@ fn impossible_exposures_are_refused_by_name() {
 }
 
 #[test]
-fn a_seed_gives_the_bytes_it_gave_before() {
-    // Recorded from this renderer: whoever changes them changes every figure measured on rendered pairs, and
-    // says so in the changelog. It also shows that machines agree.
+fn a_seed_gives_the_recorded_bytes() {
+    // Recorded from this renderer. A change affects every figure measured on rendered pairs and belongs in
+    // the changelog. Also checks that machines agree.
     let (lens, camera) = (thesis_lens(), Camera::new(48, 32, Noise::EightBit));
     let psf = Psf::Gaussian { k: 0.4578 };
     let codes = render(&scene("staircase"), &lens, &psf, lens.sensor_near_mm, &camera, 1, 0).unwrap();

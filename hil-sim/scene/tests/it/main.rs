@@ -1,4 +1,4 @@
-//! The renderer through its public face, in one program, because each would be linked on its own.
+//! The renderer through its public API, in one test binary.
 
 mod exact;
 mod exposures;

@@ -1,27 +1,25 @@
-//! The slow exact renderer: rays from a pixel through the aperture to the first surface they meet.
+//! Slow exact renderer: traces rays from a pixel through the aperture to the first surface.
 //!
-//! A telecentric lens maps the aperture point `a` (unit disc) and the sensor point `p` to a ray that, where
-//! the signed blur radius is `b`, lies at the image position `p + b a`. A height field is met at the first
-//! `b`, coming from the lens (near, small `b`), with `b >= b_surface(p + b a)`. What the ray meets at `x`
-//! has the radiance of the texture at `x`; walls of steps too. Nothing here is a convolution and no kernel,
-//! slab or interpolation is shared with the crate.
+//! A telecentric lens maps the aperture point `a` (unit disc) and the sensor point `p` to a ray that passes
+//! the image position `p + b a` at the signed blur radius `b`. It hits a height field at the first `b`, from
+//! near to far, with `b >= b_surface(p + b a)`, and takes the texture's radiance there. No convolution,
+//! kernel, slab or interpolation of the crate is used.
 
 use farnear_scene::{Lens, Psf, Scene};
 use ndarray::Array2;
 
-/// Where rays go.
 pub struct RayCaster<'a> {
-    /// Signed blur radius of the surface at an image position in px.
+    /// Signed blur radius of the surface at an image position.
     pub blur_px: Box<dyn Fn(f64, f64) -> f64 + 'a>,
-    /// Least and largest signed blur radius of the surface.
+    /// Smallest and largest signed blur radius.
     pub range_px: (f64, f64),
-    /// Radiance at the centres of cells of half a pixel; linear between, mirrored beyond the borders.
+    /// Radiance at cell centres (half a pixel); linear between, mirrored outside.
     pub texture: &'a Array2<f32>,
     /// Radii in the aperture at evenly spaced quantiles.
     pub radial_quantiles: Vec<f64>,
 }
 
-/// Radii that hold evenly spaced shares of the PSF for a blur radius of 1.
+/// Radii of evenly spaced quantiles of the PSF for a blur radius of 1.
 pub fn radial_quantiles(psf: &Psf) -> Vec<f64> {
     let (steps, limit) = (400_000, 12.0);
     let dr = limit / f64::from(steps);
@@ -45,7 +43,6 @@ pub fn radial_quantiles(psf: &Psf) -> Vec<f64> {
     quantiles
 }
 
-/// Signed blur of a scene before a lens.
 pub fn scene_blur<'a>(
     scene: &'a Scene,
     lens: &'a Lens,
@@ -71,7 +68,7 @@ pub fn scene_blur<'a>(
 }
 
 impl RayCaster<'_> {
-    /// Mean radiance on the pixel over `rays` rays of a four-dimensional low-discrepancy sequence.
+    /// Mean radiance over `rays` rays of a four-dimensional low-discrepancy sequence.
     pub fn pixel(&self, row: usize, column: usize, rays: u32) -> f64 {
         // Roberts' R4 sequence: powers of the reciprocal of the root of x^5 = x + 1.
         let g = 1.167_303_978_261_418_7f64;

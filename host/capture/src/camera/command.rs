@@ -1,9 +1,9 @@
-//! A program as a camera: whatever writes pictures to its standard output, as YUV4MPEG2 (Y4M) or as raw frames of a size and format
-//! that the user tells. `ffmpeg`, `rpicam-vid`, a maker's tool.
+//! A program as a camera. It writes pictures to standard output, as YUV4MPEG2 (Y4M) or as raw frames of a
+//! given size and format: `ffmpeg`, `rpicam-vid`, vendor tools.
 //!
-//! The program runs from the moment the camera is opened. For a rig it must give one picture for each trigger (a camera in external-trigger
-//! mode behind it): its pictures bear neither number nor time, so their order is all there is, and a picture too many or too few
-//! makes the whole program of exposures an error.
+//! The program runs while the camera is open. It must give one picture per trigger (external-trigger mode).
+//! Its pictures have neither number nor time, so only their order identifies them, and a surplus or missing
+//! one fails the whole program of exposures.
 
 use std::{
     io::{BufRead, BufReader, Read},
@@ -29,29 +29,26 @@ use super::{
 };
 use crate::describe::trigger_name;
 
-/// Pictures that wait to be fetched; then the program is held up, and memory stays bounded.
+/// Picture queue; a full queue blocks the program and bounds the memory.
 const QUEUE: usize = 16;
-/// A program that cannot work mostly says so at once.
+/// Programs that cannot work usually end within this time.
 const EARLY_END: Duration = Duration::from_millis(300);
-/// What is kept of the program's messages.
+/// Kept bytes of the program's messages.
 const MESSAGES: usize = 400;
-/// No side may be longer: a damaged header must not ask for all memory.
+/// Limit for damaged headers.
 const LONGEST_SIDE_PX: usize = 16_384;
 
-/// A program, and what it writes.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct CommandLine {
     words: Vec<String>,
-    /// Of raw frames; without it the output is Y4M.
+    /// Raw frame format; `None`: Y4M.
     raw: Option<Raw>,
 }
 
-/// Size and format of raw frames.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 struct Raw {
     width: usize,
     height: usize,
-    /// Bytes from one row to the next.
     stride: usize,
     layout: Layout,
 }
@@ -81,13 +78,13 @@ impl Raw {
             return layout.decode(bytes, width, height);
         }
         let bytes = layout.without_padding(bytes, width, height, stride)?;
-        // The colour that follows is not used.
+        // The colour planes are ignored.
         let layout =
             if let Layout::Grey8 { .. } = layout { Layout::Grey8 { colour_twelfths: 0 } } else { layout };
         layout.decode(&bytes, width, height)
     }
 
-    /// What surplus bytes mostly mean.
+    /// Usual cause of surplus bytes.
     fn padding_hint(self) -> String {
         let Self { width, height, layout, .. } = self;
         let row = layout.row_bytes(width).unwrap_or(width);
@@ -103,15 +100,15 @@ impl Raw {
     }
 }
 
-/// Rows are padded to a multiple of this by the Raspberry Pi's programs and many others.
+/// Row padding of the Raspberry Pi's programs and many others.
 const PADDING: usize = 64;
-/// How raw frames are described.
+/// Syntax of raw frames.
 const RAW_FORMAT: &str = "WIDTHxHEIGHT[/STRIDE]:FORMAT:PROGRAM";
 
 impl FromStr for CommandLine {
     type Err = String;
 
-    /// `PROGRAM ARGUMENTS`, quoted as for a shell, or `WIDTHxHEIGHT[/STRIDE]:FORMAT:PROGRAM ARGUMENTS`.
+    /// `PROGRAM ARGUMENTS` with shell quoting, or `WIDTHxHEIGHT[/STRIDE]:FORMAT:PROGRAM ARGUMENTS`.
     fn from_str(text: &str) -> Result<Self, String> {
         let size = |part: &str| {
             let (width, height) = part.split_once('x')?;
@@ -144,42 +141,38 @@ impl FromStr for CommandLine {
     }
 }
 
-/// A picture, and when its last byte arrived.
+/// A picture with its arrival time.
 type Arrived = (Image, Instant);
 
-/// A running program.
 pub struct CommandCamera {
-    /// The program's name, for messages.
     name: String,
     child: Child,
     frames: Receiver<Result<Arrived, String>>,
-    /// Bytes of a frame that is not complete yet.
+    /// Bytes of an incomplete frame.
     partial: Arc<AtomicUsize>,
     raw: Option<Raw>,
-    /// The end of what the program wrote to its standard error.
+    /// End of the program's standard error.
     messages: Arc<Mutex<String>>,
     pairing: Pairing,
-    /// Nothing more comes, and why.
+    /// Why no more frames come.
     ended: Option<String>,
 }
 
 impl CommandCamera {
     /// Starts the program.
-    ///
-    /// # Errors
-    /// [`CameraError::Unusable`] where it cannot be started or ends at once.
+    /// Errors: [`CameraError::Unusable`] if it cannot start or ends immediately.
     pub fn start(line: &CommandLine) -> Result<Self, CameraError> {
         let name = line.words[0].clone();
         let unusable = |reason: String| CameraError::Unusable { camera: format!("`{name}`"), reason };
         let mut command = Command::new(&line.words[0]);
         command.args(&line.words[1..]);
         command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
-        // A group of its own, so that what the program starts ends with it, and Ctrl-C is ours to hear.
+        // Own process group: grandchildren end with it, and Ctrl-C goes to this program only.
         #[cfg(unix)]
         std::os::unix::process::CommandExt::process_group(&mut command, 0);
         let mut child = command.spawn().map_err(|error| match error.kind() {
             std::io::ErrorKind::NotFound => {
-                unusable("there is no such program; is it installed, is its path right?".into())
+                unusable("no such program; check its path and installation".into())
             }
             _ => unusable(format!("it cannot be started: {error}")),
         })?;
@@ -187,7 +180,7 @@ impl CommandCamera {
         let messages = Arc::new(Mutex::new(String::new()));
         let (output, errors) = (child.stdout.take(), child.stderr.take());
         let kept = Arc::clone(&messages);
-        // Neither is waited for at the end: they end when the pipes do, or when nobody takes pictures any more.
+        // Not joined: these threads end with the pipes or the receiver.
         std::thread::spawn(move || errors.map(|errors| keep_messages(errors, &kept)));
         let raw = line.raw;
         let partial = Arc::new(AtomicUsize::new(0));
@@ -199,7 +192,7 @@ impl CommandCamera {
         Ok(camera)
     }
 
-    /// The next picture; `None` when time is up.
+    /// The next picture; `None` at the timeout.
     fn take(&mut self, wait: Duration) -> Result<Option<Arrived>, CameraError> {
         if self.ended.is_none() {
             match self.frames.recv_timeout(wait) {
@@ -212,11 +205,11 @@ impl CommandCamera {
         Err(self.failed())
     }
 
-    /// Why nothing more comes, with how the program ended and what it said.
+    /// Why no more frames come, with exit status and messages.
     fn failed(&mut self) -> CameraError {
         let mut reason = self.ended.clone().unwrap_or_default();
-        // Its output has ended or is of no use; a moment later it has mostly ended itself and said why. The thread that keeps its
-        // messages holds them as long as there may be more.
+        // The program usually ends shortly after its output and explains why. The message thread holds an
+        // `Arc` until then.
         let until = Instant::now() + EARLY_END;
         let status = loop {
             let status = self.child.try_wait().ok().flatten();
@@ -236,7 +229,7 @@ impl CommandCamera {
         CameraError::Unusable { camera: format!("`{}`", self.name), reason }
     }
 
-    /// Throws away what waits.
+    /// Drops queued pictures.
     fn drain(&mut self) -> Result<(), CameraError> {
         while self.take(Duration::ZERO)?.is_some() {}
         Ok(())
@@ -249,7 +242,7 @@ impl Camera for CommandCamera {
     }
 
     fn arm(&mut self, mode: TriggerMode, _: Micros) -> Result<(), CameraError> {
-        // Of a program that runs freely nobody could tell which picture belongs to which exposure.
+        // Pictures of a free-running program cannot be assigned to exposures.
         if mode != TriggerMode::Hardware {
             return Err(CameraError::Trigger { camera: self.kind(), mode: trigger_name(mode) });
         }
@@ -287,10 +280,10 @@ impl Camera for CommandCamera {
     fn finish(&mut self, wait: Duration) -> Result<(), CameraError> {
         match self.frames.recv_timeout(wait) {
             Ok(Ok(_)) => return Err(CameraError::Surplus { camera: format!("`{}`", self.name) }),
-            // A program may end after its last picture; the next one reports it.
+            // The program may end after its last picture; the next one reports it.
             Ok(Err(reason)) => self.ended = Some(reason),
             Err(RecvTimeoutError::Timeout) => {}
-            // The channel of a program that has ended does not wait.
+            // The channel of an ended program does not block.
             Err(RecvTimeoutError::Disconnected) => std::thread::sleep(wait),
         }
         match (self.partial.load(Ordering::Relaxed), self.raw) {
@@ -327,7 +320,7 @@ impl Drop for CommandCamera {
             let _ = rustix::process::kill_process_group(group, rustix::process::Signal::KILL);
         }
         let _ = self.child.kill();
-        // Killed, it ends at once; waited for, it leaves no zombie.
+        // Reaps the killed process, so that no zombie remains.
         let _ = self.child.wait();
     }
 }
@@ -343,7 +336,7 @@ fn keep_messages(errors: impl Read, kept: &Mutex<String>) {
     }
 }
 
-/// Sends frames until there are none any more, or nobody takes them; at last why there are none.
+/// Sends frames until the program or the receiver ends, then the reason.
 fn read_frames(
     output: ChildStdout,
     raw: Option<Raw>,
@@ -356,11 +349,11 @@ fn read_frames(
         None => read_y4m(output, frames),
     };
     if let Some(reason) = reason {
-        let _ = frames.send(Err(reason)); // nobody takes them any more: nobody asks why
+        let _ = frames.send(Err(reason)); // the receiver may have gone
     }
 }
 
-/// Gives why it ended; nothing where nobody takes frames any more.
+/// Returns why the program ended; `None` if the receiver has gone.
 fn read_raw(
     output: &mut impl Read,
     raw: Raw,
@@ -449,7 +442,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_command_is_split_as_a_shell_does_and_raw_frames_have_a_size() {
+    fn splits_commands_like_a_shell_and_parses_raw_formats() {
         let line: CommandLine = "ffmpeg -i 'my clip.mkv' -f yuv4mpegpipe -".parse().unwrap();
         assert_eq!(line.words, ["ffmpeg", "-i", "my clip.mkv", "-f", "yuv4mpegpipe", "-"]);
         assert_eq!(line.raw, None);

@@ -1,25 +1,23 @@
-//! What can be set at a camera, with its range.
+//! Camera settings with ranges.
 
 use std::{fmt, str::FromStr};
 
-/// A value to set.
 #[derive(Clone, PartialEq, Debug)]
 pub enum Setting {
-    /// Length of an exposure in microseconds.
     ExposureUs(f64),
-    /// Gain, in the unit that the camera's [`Control`] names.
+    /// Unit as in the camera's [`Control`].
     Gain(f64),
-    /// Black level, likewise.
+    /// Unit as in the camera's [`Control`].
     BlackLevel(f64),
-    /// Name of the pixel format, as the camera lists it.
+    /// Name as listed by the camera.
     PixelFormat(String),
-    /// Part of the sensor that is read out: column, row, width, height in pixels.
+    /// Region of the sensor: column, row, width, height in pixels.
     Region([u32; 4]),
-    /// Which input line triggers, as the camera lists it.
+    /// Input line as listed by the camera.
     TriggerSource(String),
 }
 
-/// Names of the settings, as a user writes them.
+/// Names in the user interface.
 const NAMES: [&str; 6] = ["exposure_us", "gain", "black_level", "pixel_format", "region", "trigger_source"];
 
 impl Setting {
@@ -34,7 +32,7 @@ impl Setting {
         }
     }
 
-    /// To which value, as a user writes it.
+    /// Value as the user writes it.
     pub fn value(&self) -> String {
         match self {
             Self::ExposureUs(value) | Self::Gain(value) | Self::BlackLevel(value) => value.to_string(),
@@ -74,31 +72,30 @@ impl FromStr for Setting {
     }
 }
 
-/// Something that can be set, or only read where it has no range.
+/// A setting, or a read-only value if it has no range.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Control {
-    /// As [`Setting::name`], or the camera's own name of what can only be read.
+    /// [`Setting::name`], or the camera's own name of a read-only value.
     pub name: String,
     pub value: String,
     pub range: Range,
 }
 
-/// What a control may be.
 #[derive(Clone, PartialEq, Debug)]
 pub enum Range {
     Fixed,
-    /// A number between two others, both included.
+    /// Closed interval.
     Number {
         min: f64,
         max: f64,
-        /// Its unit; empty for the camera's own steps.
+        /// Empty for the camera's own steps.
         unit: &'static str,
     },
     Choice(Vec<String>),
 }
 
 impl Range {
-    /// Whether a number lies in it; names always do not.
+    /// Whether a number is in range; always false for names.
     pub fn has(&self, value: f64) -> bool {
         matches!(self, Self::Number { min, max, .. } if (*min..=*max).contains(&value))
     }
@@ -120,7 +117,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn settings_are_read_as_they_are_written() {
+    fn settings_round_trip_through_text() {
         for text in ["exposure_us=1250.5", "gain=-3", "pixel_format=Mono12", "region=8,16,640,480"] {
             let setting: Setting = text.parse().unwrap();
             assert_eq!(format!("{}={}", setting.name(), setting.value()), text);
@@ -138,7 +135,7 @@ mod tests {
     }
 
     #[test]
-    fn ranges_are_said_with_their_unit() {
+    fn ranges_print_their_unit() {
         let range = Range::Number { min: 10.0, max: 1e6, unit: "us" };
         assert_eq!(range.to_string(), "10 to 1000000 us");
         assert!(range.has(10.0) && !range.has(9.0) && !Range::Fixed.has(0.0));

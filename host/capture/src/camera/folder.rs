@@ -1,5 +1,5 @@
-//! A folder as a camera: whatever takes the pictures (a maker's program, `gphoto2 --capture-tethered`, a phone
-//! that synchronises) puts an image file into it for each trigger.
+//! A folder as a camera: a vendor program, `gphoto2 --capture-tethered` or a phone stores one image file per
+//! trigger.
 
 use std::{
     collections::BTreeMap,
@@ -22,31 +22,31 @@ use super::{
 use crate::describe::trigger_name;
 
 const POLL: Duration = Duration::from_millis(20);
-/// A file that does not change for this long and still is no image will not become one.
+/// A file unchanged for this long that is no image is invalid.
 const QUIET: Duration = Duration::from_secs(2);
 const ENDINGS: [&str; 7] = ["png", "tif", "tiff", "jpg", "jpeg", "pgm", "ppm"];
 
-/// Images that appear in a folder, in the order in which they were written.
+/// New image files of a folder, in order of writing.
 #[derive(Debug)]
 pub struct FolderCamera {
     folder: PathBuf,
     used: BTreeMap<PathBuf, Used>,
-    /// The next image, while it may still be being written: its bytes, and since when they are the same.
+    /// The next file, possibly incomplete: contents and the time of the last change.
     candidate: Option<(PathBuf, Vec<u8>, Instant)>,
     pairing: Pairing,
 }
 
-/// A file that is no new picture.
+/// A file that was already used.
 #[derive(Clone, Debug)]
 struct Used {
     written: SystemTime,
     bytes: u64,
-    /// Whether it was the picture of an exposure since the camera was armed; else it was there before.
+    /// Paired since arming, rather than present before.
     paired: bool,
 }
 
 impl FolderCamera {
-    /// Watches a folder, which must exist.
+    /// Watches an existing folder.
     pub fn watch(folder: &Path) -> Result<Self, CameraError> {
         let mut camera = Self {
             folder: folder.into(),
@@ -67,7 +67,7 @@ impl FolderCamera {
         Ok(())
     }
 
-    /// Image files with the time at which they were written and their size.
+    /// Image files with modification time and size.
     fn pictures(&self) -> Result<Vec<(SystemTime, PathBuf, u64)>, CameraError> {
         let failed = |source| CameraError::Folder { folder: self.folder.clone(), source };
         let mut pictures = Vec::new();
@@ -78,7 +78,7 @@ impl FolderCamera {
             if !ENDINGS.contains(&ending.as_str()) {
                 continue;
             }
-            // A file that is renamed away in between is no image any more.
+            // A file renamed meanwhile is no longer an image.
             let Ok(data) = fs::metadata(&path) else { continue };
             if let Ok(written) = data.modified() {
                 pictures.push((written, path, data.len()));
@@ -87,10 +87,9 @@ impl FolderCamera {
         Ok(pictures)
     }
 
-    /// New image files, oldest first; those written within the same tick of the file system's clock by number or name.
-    ///
-    /// # Errors
-    /// [`CameraError::Overwritten`] for a file that was written again, [`CameraError::File`] for one picture in two formats.
+    /// New image files, oldest first; equal times are ordered by number or name.
+    /// Errors: [`CameraError::Overwritten`] for a rewritten file, [`CameraError::File`] for one picture in
+    /// two formats.
     fn fresh(&self) -> Result<Vec<(SystemTime, PathBuf)>, CameraError> {
         let mut fresh = Vec::new();
         for (written, path, bytes) in self.pictures()? {
@@ -121,14 +120,14 @@ impl FolderCamera {
         Ok(fresh)
     }
 
-    /// The next image with its file and the time at which it was taken; `None` when time is up.
+    /// The next image with file and time; `None` at the timeout.
     fn next(&mut self, wait: Duration) -> Result<Option<(Image, SystemTime, PathBuf)>, CameraError> {
         let until = Instant::now() + wait;
         loop {
             if let Some((written, path)) = self.fresh()?.into_iter().next() {
                 let bytes = fs::read(&path).unwrap_or_default();
                 match &self.candidate {
-                    // The same bytes twice: it is no longer being written.
+                    // Equal bytes twice: the file is complete.
                     Some((same, content, since)) if *same == path && *content == bytes => {
                         match complete(&bytes).and_then(|()| decode_grey(&bytes)) {
                             Ok(picture) => {
@@ -157,15 +156,15 @@ impl FolderCamera {
     }
 }
 
-/// Whether a file had been at rest for long before it was written again.
+/// Whether the file had been complete before it was rewritten.
 fn was_complete(used: &Used, written: SystemTime) -> bool {
     written.duration_since(used.written).is_ok_and(|apart| apart > QUIET)
 }
 
-/// Refuses a JPEG without its end: decoders fill the missing rows.
+/// Rejects a truncated JPEG: decoders fill missing rows.
 fn complete(bytes: &[u8]) -> Result<(), String> {
     let last = |marker: u8| bytes.windows(2).rposition(|pair| pair == [0xff, marker]);
-    // A thumbnail within has an end of its own, before the scan of the picture.
+    // An embedded thumbnail has its own end marker before the main scan.
     match (bytes.starts_with(&[0xff, 0xd8]), last(0xda), last(0xd9)) {
         (false, ..) => Ok(()),
         (true, Some(scan), Some(end)) if end > scan => Ok(()),
@@ -179,7 +178,7 @@ impl Camera for FolderCamera {
     }
 
     fn arm(&mut self, mode: TriggerMode, _: Micros) -> Result<(), CameraError> {
-        // Of a camera that runs freely nobody could tell which file belongs to which exposure.
+        // Files of a free-running camera cannot be assigned to exposures.
         if mode == TriggerMode::FreeRunning {
             return Err(CameraError::Trigger { camera: self.kind(), mode: trigger_name(mode) });
         }

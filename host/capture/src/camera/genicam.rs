@@ -1,5 +1,5 @@
-//! GigE Vision and USB3 Vision cameras through Aravis, by the standard feature names of GenICam's SFNC. Behind the cargo feature
-//! `genicam`, because the library (Debian: `libaravis-dev`) is not everywhere.
+//! GigE Vision and USB3 Vision cameras through Aravis with GenICam SFNC feature names. Cargo feature
+//! `genicam`, because not every system has the library (Debian: `libaravis-dev`).
 
 mod settings;
 
@@ -27,23 +27,22 @@ use super::{
 };
 use crate::describe::trigger_name;
 
-/// Frames that the library may fill while nobody fetches them.
+/// Frame buffers of the library.
 const BUFFERS: usize = 16;
-/// Ticks of a GigE Vision camera's clock in a second where it does not say.
+/// Default clock of a GigE Vision camera, ticks per second.
 const USUAL_TICKS: i64 = 1_000_000_000;
-/// The trigger source that is a command.
+/// Trigger source of software triggers.
 const SOFTWARE: &str = "Software";
 
-/// A camera that answers.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct FoundCamera {
-    /// By which it is opened.
+    /// Identifier for opening.
     pub id: String,
-    /// Maker, model, and how it is reached.
+    /// Vendor, model and transport.
     pub about: String,
 }
 
-/// Asks all networks and USB for cameras; takes about a second.
+/// Discovers cameras on all networks and USB; takes about a second.
 pub fn devices() -> Vec<FoundCamera> {
     static LIBRARY: Mutex<Option<Aravis>> = Mutex::new(None);
     let mut library = LIBRARY.lock().unwrap_or_else(PoisonError::into_inner);
@@ -67,7 +66,6 @@ pub fn devices() -> Vec<FoundCamera> {
         .collect()
 }
 
-/// A camera that is open.
 pub struct GenicamCamera {
     id: String,
     camera: aravis::Camera,
@@ -75,16 +73,14 @@ pub struct GenicamCamera {
     chunks: Option<aravis::ChunkParser>,
     ticks_per_second: i64,
     pairing: Pairing,
-    /// Which line triggers; the first of the camera's where none was set.
+    /// Trigger line; `None`: the camera's first.
     trigger_source: Option<String>,
     lost: Arc<AtomicBool>,
 }
 
 impl GenicamCamera {
-    /// Opens the camera of this identification, as [`devices`] lists it; the first one where it is empty.
-    ///
-    /// # Errors
-    /// [`CameraError::Unusable`] for one that is absent, or that another program holds.
+    /// Opens the camera with this id from [`devices`], or the first one if empty.
+    /// Errors: [`CameraError::Unusable`] if absent or held by another program.
     pub fn open(id: &str) -> Result<Self, CameraError> {
         let found = devices();
         let there = |found: &[FoundCamera]| {
@@ -105,7 +101,7 @@ impl GenicamCamera {
         let lost = Arc::new(AtomicBool::new(false));
         let told = Arc::clone(&lost);
         let device = camera.device();
-        // Aravis opens one that another program holds, too, and then nothing can be written.
+        // Aravis also opens a camera held by another program; writes then fail.
         let held = device.as_ref().and_then(|device| device.downcast_ref::<GvDevice>());
         if held.is_some_and(|device| !device.is_controller()) {
             let reason =
@@ -130,19 +126,19 @@ impl GenicamCamera {
         Ok(camera)
     }
 
-    /// Allows the camera's time stamps to differ by so much from the strobe: for one whose clock is a computer's, as Aravis' fake camera.
+    /// Tolerated jitter of time stamps against the strobe, for software clocks such as Aravis' fake camera.
     #[must_use]
     pub fn with_jitter(mut self, jitter: Duration) -> Self {
         self.pairing = Pairing::with_jitter(jitter);
         self
     }
 
-    /// Lets the camera add its own number and time to each frame, where it can.
+    /// Enables frame number and time chunks, if available.
     fn ask_for_chunks(&mut self) {
         if self.camera.set_chunk_mode(true).is_err() {
             return;
         }
-        // By SFNC; a camera that lacks one of them still has what GigE Vision puts before each frame.
+        // SFNC names; without them the GigE Vision leader is used.
         for chunk in ["Timestamp", "FrameID"] {
             let _ = self.camera.set_chunk_state(chunk, true);
         }
@@ -152,7 +148,8 @@ impl GenicamCamera {
     fn failed(&self) -> impl Fn(aravis::glib::Error) -> CameraError + '_ {
         move |error| {
             let silent = self.lost.load(Ordering::Relaxed) || error.matches(DeviceError::Timeout);
-            // Of a camera that is silent Aravis says, too, that it has no channel, or packets of 0 bytes: so it is asked once more.
+            // For a silent camera Aravis also reports a missing channel or packets of 0 bytes, so the camera
+            // is queried again.
             match silent || !self.answers() {
                 true => self.gone(),
                 false => unusable(&self.id, error.to_string()),
@@ -160,7 +157,7 @@ impl GenicamCamera {
         }
     }
 
-    /// Whether its first register, the version of its standard (GigE Vision and USB3 Vision alike), can be read; some seconds where not.
+    /// Whether its first register (GigE Vision and USB3 Vision version) can be read; takes seconds otherwise.
     fn answers(&self) -> bool {
         self.camera.device().is_some_and(|device| device.read_register(0).is_ok())
     }
@@ -177,7 +174,7 @@ impl GenicamCamera {
         Ok(())
     }
 
-    /// Starts with nothing from before.
+    /// Starts an empty stream.
     fn start(&mut self) -> Result<(), CameraError> {
         let stream = self.streaming().map_err(self.failed())?;
         self.stream = Some(stream);
@@ -196,7 +193,7 @@ impl GenicamCamera {
         Ok(stream)
     }
 
-    /// The line that triggers.
+    /// Trigger line.
     fn line(&self) -> Result<String, CameraError> {
         if let Some(source) = &self.trigger_source {
             return Ok(source.clone());
@@ -207,7 +204,7 @@ impl GenicamCamera {
             .ok_or_else(|| unusable(&self.id, "it has no input line for a trigger".into()))
     }
 
-    /// The next frame; `None` when time is up.
+    /// The next frame; `None` at the timeout.
     fn take(&mut self, wait: Duration) -> Result<Option<Frame>, CameraError> {
         let Some(stream) = &self.stream else { return Ok(None) };
         let micros = u64::try_from(wait.as_micros()).unwrap_or(u64::MAX).max(1);
@@ -247,7 +244,7 @@ impl GenicamCamera {
         Ok(Frame { image, stamp })
     }
 
-    /// The camera's own number and time: of the chunks where there are some, else of the frame's leader.
+    /// Number and time from chunks, else from the frame's leader.
     fn stamp(&self, buffer: &Buffer) -> Stamp {
         let chunk = |name| {
             let parser = self.chunks.as_ref().filter(|_| buffer.has_chunks())?;
@@ -262,7 +259,7 @@ impl GenicamCamera {
     }
 }
 
-/// What is known of lost packets.
+/// Description of lost packets.
 fn packets(stream: &Stream) -> String {
     stream.downcast_ref::<GvStream>().map_or_else(String::new, |stream| {
         let (resent, missing) = stream.statistics();
@@ -271,7 +268,7 @@ fn packets(stream: &Stream) -> String {
 }
 
 fn layout_of(format: PixelFormat) -> Option<Layout> {
-    /// PFNC: 10 and 12 bits in a stream of bits; the bindings have no names for them.
+    /// PFNC: 10 and 12 bits, bit-packed; missing in the bindings.
     const MONO_10P: u32 = 0x010a_0046;
     const MONO_12P: u32 = 0x010c_0047;
     match format {
@@ -301,7 +298,7 @@ impl Camera for GenicamCamera {
         let source = match mode {
             TriggerMode::Hardware => self.line()?,
             TriggerMode::Software => SOFTWARE.into(),
-            // Of a camera that runs freely nobody could tell which frame belongs to which exposure.
+            // Frames of a free-running camera cannot be assigned to exposures.
             TriggerMode::FreeRunning => {
                 return Err(CameraError::Trigger { camera: self.kind(), mode: trigger_name(mode) });
             }
@@ -415,7 +412,7 @@ impl Camera for GenicamCamera {
     }
 
     fn newest(&mut self, wait: Duration) -> Result<Option<Frame>, CameraError> {
-        // Older frames are not looked into: where that takes longer than an exposure there would be no end of them.
+        // Older frames are skipped undecoded: decoding may take longer than an exposure.
         if let Some(stream) = &self.stream {
             let waiting = stream.n_buffers().1;
             for _ in 1..waiting {
@@ -430,6 +427,6 @@ impl Camera for GenicamCamera {
 
 impl Drop for GenicamCamera {
     fn drop(&mut self) {
-        let _ = self.stop(); // a camera that is gone streams no more
+        let _ = self.stop(); // a disconnected camera has no stream
     }
 }

@@ -1,10 +1,10 @@
-//! Which frame belongs to which exposure.
+//! Pairs frames with exposures.
 //!
-//! One set of rules for every kind of camera. They use what the camera offers: the count of its pictures, its time stamps, when a picture
-//! arrived and was taken, and its pixels. Between arming and the end of a program every trigger gives one frame, so the n-th frame belongs to the n-th trigger. What a camera says
-//! of its frames is held against what the board says of its exposures: the camera's own count must advance as the board's trigger number
-//! does, and its time stamps must be as far apart as the starts of the strobe. What does not agree is an error, never a guess; a whole
-//! program counts, because a frame that came too often or not at all shows at its end ([`super::Camera::finish`]) at the latest.
+//! One set of rules for all cameras, based on frame count, time stamps, arrival, file time and pixels.
+//! Between arming and the end of a program the n-th frame belongs to the n-th trigger. The camera's count
+//! must advance with the board's trigger number, and its time stamps with the strobe. Contradictions are
+//! errors, never guesses. A surplus or missing frame is found at the end of the program at the latest
+//! ([`super::Camera::finish`]).
 
 use std::{
     cmp::Ordering,
@@ -16,36 +16,35 @@ use farnear_protocol::message::ShotRecord;
 
 use super::{CameraError, Image};
 
-/// A camera's stamp may jitter by so much against the strobe: GigE Vision cameras stamp to a microsecond, drivers of Video4Linux in an
-/// interrupt, some a line or two of the read-out late.
+/// Jitter of stamps against the strobe: GigE Vision a microsecond, Video4Linux an interrupt or some lines of
+/// read-out.
 const JITTER: Duration = Duration::from_millis(2);
-/// Reading a picture from a pipe is stamped no later than this after it arrived, so that it is never taken for an earlier one.
+/// Delay until a picture from a pipe is stamped; it never counts as earlier.
 const ARRIVAL_JITTER: Duration = Duration::from_millis(10);
-/// Least time in which no picture may come after the last one of a program.
+/// Shortest quiet time after a program.
 const QUIET: Duration = Duration::from_millis(200);
-/// Two free crystals differ by 50 ppm each at most, and some margin.
+/// Two crystals differ by 50 ppm each, plus a margin.
 const DRIFT_PPM: u64 = 200;
-/// The count of GigE Vision 1.x goes from 1 to this and around, past 0.
+/// GigE Vision 1.x counts from 1 to this, skipping 0.
 const SHORT_COUNT_MAX: u64 = 65_535;
 
-/// What a camera says of a frame.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct Stamp {
-    /// Running number by the camera itself, which counts frames that were lost on the way, too.
+    /// Frame number of the camera, including lost frames.
     pub count: Option<u64>,
-    /// When it was exposed, by a clock of the camera's or the driver's that starts at any time.
+    /// Exposure time by a camera or driver clock with arbitrary origin.
     pub time: Option<Duration>,
 }
 
-/// What is known of a picture.
+/// Known properties of a picture.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub struct Evidence {
     pub stamp: Stamp,
-    /// When it arrived, by this computer's clock; only if that is known to a few milliseconds.
+    /// Local arrival time, if known to a few milliseconds.
     pub arrived: Option<Instant>,
-    /// When it was taken or written, by one clock for all pictures of this camera, and its file.
+    /// File and its time, by one clock for all pictures of the camera.
     pub taken: Option<(SystemTime, PathBuf)>,
-    /// [`content`] of it, if nothing else identifies it.
+    /// [`content`] hash, if nothing else identifies it.
     pub content: Option<u64>,
 }
 
@@ -55,7 +54,7 @@ impl From<Stamp> for Evidence {
     }
 }
 
-/// Identifies pixels. `None` for an even picture (a closed lens cap, a saturated sensor), which may come twice.
+/// Hash of the pixels. `None` for a uniform picture (lens cap, saturation), which may repeat.
 pub fn content(image: &Image) -> Option<u64> {
     let first = image.pixels.first()?;
     if image.pixels.iter().all(|pixel| pixel == first) {
@@ -66,30 +65,28 @@ pub fn content(image: &Image) -> Option<u64> {
     Some(image.pixels.iter().fold(0xcbf2_9ce4_8422_2325, hash))
 }
 
-/// Where a frame stands to an exposure.
+/// Relation of a frame to an exposure.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Belongs {
-    /// It came of an earlier trigger.
     Earlier,
-    /// It is the exposure's.
     Here,
-    /// It came of a later trigger: so many were passed over.
+    /// Of a later trigger: number of skipped ones.
     Later(u64),
 }
 
-/// The frames since a camera was armed.
+/// Frames since arming.
 #[derive(Clone, Debug)]
 pub struct Pairing {
-    /// The last frame that was paired, with its exposure.
+    /// Last pair.
     last: Option<(Evidence, ShotRecord)>,
     jitter: Duration,
     armed: Option<Instant>,
-    /// Board time at which the first move of the program began, in us.
+    /// Board time of the program's first move, us.
     begin_us: Option<u64>,
-    /// Whether the board's time is that of this computer's clock; an emulated board may run faster.
+    /// Whether board time follows the local clock; an emulated board may run faster.
     in_real_time: bool,
     contents: Vec<(u64, u32)>,
-    /// Longest time between two exposures.
+    /// Longest interval of two exposures.
     longest: Duration,
 }
 
@@ -100,7 +97,7 @@ impl Default for Pairing {
 }
 
 impl Pairing {
-    /// For a camera whose stamps jitter by more than those of hardware.
+    /// For cameras with larger jitter than hardware stamps.
     pub fn with_jitter(jitter: Duration) -> Self {
         Self {
             last: None,
@@ -113,13 +110,13 @@ impl Pairing {
         }
     }
 
-    /// Forgets what was paired: the camera is armed anew.
+    /// Restarts after arming.
     pub fn begin(&mut self) {
         *self = Self::with_jitter(self.jitter);
         self.armed = Some(Instant::now());
     }
 
-    /// Takes the board's report of an exposure, received at this time.
+    /// Accepts the board's report of an exposure.
     pub fn reported(&mut self, shot: &ShotRecord, received: Instant) {
         if self.begin_us.is_none() {
             self.begin_us = Some(shot.trigger.0.saturating_sub(u64::from(shot.settle.0)));
@@ -129,23 +126,21 @@ impl Pairing {
         self.in_real_time &= over.is_some_and(|over| over <= received);
     }
 
-    /// Earliest time of this computer's clock that a board time, in us, can be: the program began after the camera was armed.
+    /// Earliest local time of a board time in us: the program began after arming.
     fn at_least(&self, board_us: u64) -> Option<Instant> {
         let since_us = board_us.saturating_sub(self.begin_us?);
         let drift_us = since_us.saturating_mul(DRIFT_PPM) / 1_000_000;
         Some(self.armed? + Duration::from_micros(since_us - drift_us))
     }
 
-    /// How long a surplus picture is awaited after the program: as long as its longest interval.
+    /// Quiet time after the program: its longest interval.
     pub fn quiet_time(&self) -> Duration {
         self.longest.max(QUIET)
     }
 
-    /// Judges the next frame that came against the exposure that waits for one. `camera` is for messages.
-    ///
-    /// # Errors
-    /// [`CameraError::Mispaired`] where count and time contradict each other.
-    /// [`CameraError::Doubled`], [`CameraError::Reordered`], [`CameraError::Stale`] where a picture cannot be the exposure's.
+    /// Checks the next frame against the pending exposure. `camera` is for messages.
+    /// Errors: [`CameraError::Mispaired`] if count and time contradict each other; [`CameraError::Doubled`],
+    /// [`CameraError::Reordered`], [`CameraError::Stale`] for an impossible picture.
     pub fn judge(
         &mut self,
         camera: &str,
@@ -198,7 +193,7 @@ impl Pairing {
                     return Ok(u64::try_from(ahead).map_or(Belongs::Earlier, Belongs::Later));
                 }
             } else if triggers != 1 {
-                // Nobody counts but we: what became of the triggers in between cannot be told.
+                // Without a count the skipped triggers are unknown.
                 let reason = format!("the one before it was of exposure {}", last_shot.trigger_number);
                 return Err(mispaired(camera, shot, reason));
             }
@@ -219,8 +214,8 @@ impl Pairing {
     }
 }
 
-/// Orders two files of a camera by the number at the end of their names; a counter of four digits starts anew after 9999. `None` where
-/// the names have no number or differ in more than it.
+/// Orders two files by their trailing number; four-digit counters wrap after 9999. `None` unless only the
+/// number differs.
 pub fn by_number(a: &Path, b: &Path) -> Option<Ordering> {
     let split = |path: &Path| {
         let stem = path.file_stem()?.to_str()?.to_owned();
@@ -232,7 +227,7 @@ pub fn by_number(a: &Path, b: &Path) -> Option<Ordering> {
     if name_a != name_b {
         return None;
     }
-    // Half of the counter is further than any two pictures of one program are apart.
+    // Half of the counter exceeds any distance within a program.
     let rolled_over = digits_a == 4 && digits_b == 4 && a.abs_diff(b) > 5_000;
     Some(if rolled_over { b.cmp(&a) } else { a.cmp(&b) })
 }
@@ -241,7 +236,7 @@ fn mispaired(camera: &str, shot: &ShotRecord, reason: String) -> CameraError {
     CameraError::Mispaired { camera: camera.into(), wanted: shot.trigger_number, reason }
 }
 
-/// How far a count has come; less than 0 for an earlier frame. A short count goes around, and half of it is further than any frame is late.
+/// Signed advance of a count. Short counts wrap, and half of one exceeds any delay.
 fn counted(from: u64, to: u64) -> i64 {
     let way = i128::from(to) - i128::from(from);
     let around = i128::from(SHORT_COUNT_MAX);
@@ -284,7 +279,7 @@ mod tests {
         ShotRecord { settle: Micros(10_000), ..shot(trigger_number, strobe_us) }
     }
 
-    /// Judges a picture that arrived so many ms after arming, of an exposure that was reported at its end.
+    /// Checks a picture that arrived `arrived_ms` after arming, for an exposure reported at its end.
     fn arrive(pairing: &mut Pairing, shot: ShotRecord, arrived_ms: u64) -> Result<Belongs, CameraError> {
         let armed = pairing.armed.unwrap();
         let reported = armed
@@ -323,7 +318,7 @@ mod tests {
     }
 
     #[test]
-    fn refuses_the_same_pixels_twice_but_for_an_even_picture() {
+    fn rejects_repeated_pixels_unless_the_picture_is_uniform() {
         let image = |pixels: [u16; 3]| Image { pixels: ndarray::array![pixels], bits: 8 };
         assert_eq!(content(&image([7, 7, 7])), None);
         assert_ne!(content(&image([1, 2, 3])), content(&image([3, 2, 1])));
@@ -349,7 +344,7 @@ mod tests {
         };
         assert!(matches!(judge(at(9, "a.jpg"), at(8, "b.jpg")), Err(CameraError::Reordered { .. })));
         assert!(judge(at(8, "b.jpg"), at(9, "a.jpg")).is_ok());
-        // Within one tick of the clock the number counts, which starts anew after 9999.
+        // Within one clock tick the number decides; it wraps after 9999.
         assert!(judge(at(9, "IMG_0007.jpg"), at(9, "IMG_0006.jpg")).is_err());
         assert!(judge(at(9, "IMG_9999.jpg"), at(9, "IMG_0001.jpg")).is_ok());
         assert!(judge(at(9, "IMG_0001.jpg"), at(9, "IMG_9999.jpg")).is_err());
@@ -365,7 +360,7 @@ mod tests {
         let mut judge = |count, time, shot: ShotRecord| pairing.judge("c", stamp(count, time), &shot);
         assert_eq!(judge(Some(65_534), Some(9_000_000), shot(4, 100_000)).unwrap(), Belongs::Here);
         assert_eq!(judge(Some(65_535), Some(9_100_500), shot(5, 200_000)).unwrap(), Belongs::Here);
-        // Around, past 0: 1 is the next one.
+        // Wraps past 0 to 1.
         assert_eq!(judge(Some(1), Some(9_200_000), shot(6, 300_000)).unwrap(), Belongs::Here);
         assert_eq!(judge(Some(3), Some(9_400_000), shot(7, 400_000)).unwrap(), Belongs::Later(1));
         assert_eq!(judge(Some(65_535), Some(9_100_000), shot(7, 400_000)).unwrap(), Belongs::Earlier);
@@ -377,11 +372,11 @@ mod tests {
     }
 
     #[test]
-    fn without_a_count_the_time_tells_a_lost_frame() {
+    fn time_stamps_reveal_a_lost_frame_without_a_count() {
         let mut pairing = Pairing::default();
         let mut judge = |time, shot: ShotRecord| pairing.judge("c", stamp(None, time), &shot);
         assert_eq!(judge(Some(50), shot(0, 1_000)).unwrap(), Belongs::Here);
-        // The frame of trigger 1 was lost; that of trigger 2 comes in its place.
+        // The frame of trigger 1 was lost; that of trigger 2 takes its place.
         let error = judge(Some(80_050), shot(1, 41_000)).unwrap_err();
         assert!(matches!(error, CameraError::Mispaired { wanted: 1, .. }), "{error:?}");
     }
@@ -404,7 +399,7 @@ mod tests {
     }
 
     #[test]
-    fn with_nothing_but_their_order_frames_go_with_consecutive_triggers_only() {
+    fn frames_without_count_or_time_require_consecutive_triggers() {
         let mut pairing = Pairing::default();
         let nothing = Stamp::default();
         assert_eq!(pairing.judge("c", nothing, &shot(8, 0)).unwrap(), Belongs::Here);
@@ -413,7 +408,7 @@ mod tests {
     }
 
     proptest! {
-        // Whatever is lost on the way, no exposure is given the frame of another one, and none that came is refused.
+        // Lost frames never shift later ones, and no received frame is refused.
         #[test]
         fn lost_frames_never_shift_the_others(
             lost in prop::collection::vec(prop::bool::weighted(0.1), 2..300),
@@ -433,7 +428,7 @@ mod tests {
                 let exposure = shot(index as u32, board_us);
                 let came = pairing.judge("c", stamp(Some(count), Some(77 + camera_us)), &exposure).unwrap();
                 prop_assert_eq!(came, Belongs::Here);
-                // The same frame for the exposure after it is an earlier one.
+                // For the next exposure the same frame is an earlier one.
                 let next = shot(index as u32 + 1, board_us + period_us);
                 let again = pairing.judge("c", stamp(Some(count), Some(77 + camera_us)), &next).unwrap();
                 prop_assert_eq!(again, Belongs::Earlier);

@@ -1,7 +1,7 @@
-//! Pixels as cameras deliver them, made grey values of 16 bits: one function for all kinds of cameras.
+//! Converts camera pixels to 16-bit grey values.
 //!
-//! Names are those of the field: Video4Linux and ffmpeg for what programs and webcams send, GenICam's PFNC for what machine-vision
-//! cameras send. Colour gives its luma (YUV) or is averaged (MJPEG), as when a picture file is read. Cost: one pass over the bytes.
+//! Names as in Video4Linux and ffmpeg, and GenICam's PFNC for machine vision. YUV gives its luma, MJPEG the
+//! mean of the colours, as for picture files. Cost: one pass.
 
 use std::{fmt, str::FromStr};
 
@@ -10,29 +10,30 @@ use ndarray::Array2;
 
 use super::Image;
 
-/// How the pixels of a frame lie in its bytes.
+/// Pixel layout of a frame.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Layout {
-    /// One byte per pixel: GREY, gray, Mono8; also the luma of planar YUV, whose colour follows and is passed over.
+    /// One byte per pixel (GREY, gray, Mono8), or the luma of planar YUV.
     Grey8 {
-        /// Bytes that follow each picture, in twelfths of its pixels: 0 for grey, 6 for 4:2:0, 12 for 4:2:2, 24 for 4:4:4.
+        /// Ignored bytes after each picture, in twelfths of its pixels: 0 grey, 6 4:2:0, 12 4:2:2, 24 4:4:4.
         colour_twelfths: u8,
     },
-    /// Two bytes per pixel, the lower first, of which so many bits carry the picture: Y10, Y12, Y16, gray12le, Mono12.
-    Grey16 { bits: u8 },
-    /// Ten bits per pixel in a stream of bits, the lowest first: Mono10p.
+    /// Two bytes per pixel, little-endian, with `bits` significant: Y10, Y12, Y16, gray12le, Mono12.
+    Grey16 {
+        bits: u8,
+    },
+    /// Ten bits per pixel, LSB first: Mono10p.
     Packed10,
-    /// Twelve bits per pixel in a stream of bits, the lowest first: Mono12p.
+    /// Twelve bits per pixel, LSB first: Mono12p.
     Packed12,
-    /// Two pixels of 12 bits in three bytes as GigE Vision packs them: Mono12Packed. The middle byte has the low bits of both.
+    /// Two 12-bit pixels in three bytes: Mono12Packed; the middle byte has the low bits of both.
     GigePacked12,
     /// Two pixels in four bytes, luma first: YUYV, yuyv422.
     Yuyv,
-    /// A JPEG per frame.
     Jpeg,
 }
 
-/// The names by which a user tells the layout of raw frames, as ffmpeg's `-pix_fmt` writes them.
+/// Names of raw layouts, as in ffmpeg's `-pix_fmt`.
 const RAW_NAMES: [(&str, Layout); 8] = [
     ("gray", Layout::Grey8 { colour_twelfths: 0 }),
     ("gray10le", Layout::Grey16 { bits: 10 }),
@@ -57,7 +58,7 @@ impl FromStr for Layout {
     }
 }
 
-/// Bytes that are no frame of the size and layout that were announced.
+/// Bytes that do not match the announced size and layout.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct BadFrame(pub String);
 
@@ -68,7 +69,7 @@ impl fmt::Display for BadFrame {
 }
 
 impl Layout {
-    /// Bits that carry the picture. Of a JPEG 8.
+    /// Significant bits; 8 for a JPEG.
     pub fn bits(self) -> u8 {
         match self {
             Self::Grey16 { bits } => bits,
@@ -78,7 +79,7 @@ impl Layout {
         }
     }
 
-    /// Bytes of a frame of so many pixels; `None` where each frame has another length (JPEG) or the size is beyond memory.
+    /// Bytes per frame; `None` for JPEG or overflow.
     pub fn frame_bytes(self, width: usize, height: usize) -> Option<usize> {
         let pixels = width.checked_mul(height)?;
         let halves = |side: usize| side.div_ceil(2);
@@ -96,7 +97,7 @@ impl Layout {
         }
     }
 
-    /// Bytes of a row without padding; `None` where rows do not begin at a byte of their own.
+    /// Bytes per row without padding; `None` if rows do not start at whole bytes.
     pub fn row_bytes(self, width: usize) -> Option<usize> {
         match self {
             Self::Grey8 { .. } => Some(width),
@@ -105,16 +106,14 @@ impl Layout {
         }
     }
 
-    /// As [`Self::frame_bytes`], where rows are `stride` bytes apart.
+    /// As [`Self::frame_bytes`] with rows of `stride` bytes.
     pub fn padded_frame_bytes(self, stride: usize, height: usize) -> Option<usize> {
         let per_pixel = self.row_bytes(1)?;
         self.frame_bytes(stride.div_ceil(per_pixel), height)
     }
 
-    /// A frame's bytes without the padding at the end of each row, where rows are `stride` bytes apart.
-    ///
-    /// # Errors
-    /// [`BadFrame`] for too few bytes.
+    /// Removes the padding of rows of `stride` bytes.
+    /// Errors: [`BadFrame`] for too few bytes.
     pub fn without_padding(
         self,
         bytes: &[u8],
@@ -137,10 +136,9 @@ impl Layout {
         Ok(rows.concat())
     }
 
-    /// The picture in a frame's bytes; what follows the picture in a longer buffer is passed over.
-    ///
-    /// # Errors
-    /// [`BadFrame`] for too few bytes, a value above what the bits allow, a JPEG that is broken or of another size.
+    /// Decodes a frame; surplus bytes are ignored.
+    /// Errors: [`BadFrame`] for too few bytes, a value above the bit depth, a broken JPEG or one of another
+    /// size.
     pub fn decode(self, bytes: &[u8], width: usize, height: usize) -> Result<Image, BadFrame> {
         if self == Self::Jpeg {
             return jpeg(bytes, width, height);
@@ -174,7 +172,7 @@ impl Layout {
     }
 }
 
-/// Values of `bits` bits each, the lowest bit first; `bytes` has enough of them.
+/// Values of `bits` bits each, LSB first; the caller checks the length.
 fn bit_stream(bytes: &[u8], pixels: usize, bits: u32) -> Vec<u16> {
     let mut bytes = bytes.iter();
     let (mut waiting, mut count) = (0_u32, 0);
@@ -216,10 +214,8 @@ fn jpeg(bytes: &[u8], width: usize, height: usize) -> Result<Image, BadFrame> {
     Ok(image)
 }
 
-/// A picture file as a camera's image.
-///
-/// # Errors
-/// In words, for floating-point pixels: no camera has them.
+/// Converts a picture file.
+/// Errors: a message for floating-point pixels.
 pub fn of_picture(picture: GreyImage) -> Result<Image, String> {
     let Samples::Integer(bits) = picture.samples else {
         return Err("a camera's image has integer pixels, this one has float".into());
@@ -235,7 +231,7 @@ mod tests {
     use proptest::prelude::*;
 
     #[test]
-    fn each_layout_gives_the_grey_values_that_its_definition_says() {
+    fn each_layout_decodes_to_its_defined_grey_values() {
         let grey = Layout::Grey8 { colour_twelfths: 0 };
         assert_eq!(grey.decode(&[1, 2, 3, 4], 2, 2).unwrap().pixels, array![[1, 2], [3, 4]]);
         let y10 = Layout::Grey16 { bits: 10 }.decode(&[0xff, 0x03, 1, 0], 2, 1).unwrap();
@@ -246,12 +242,12 @@ mod tests {
         let planar = Layout::Grey8 { colour_twelfths: 6 };
         assert_eq!(planar.frame_bytes(3, 1), Some(7));
         assert_eq!(planar.decode(&[7, 8, 9, 0, 0, 0, 0], 3, 1).unwrap().pixels, array![[7, 8, 9]]);
-        // PFNC: Mono12p puts the low byte of the first pixel first, Mono12Packed its high byte.
+        // PFNC: Mono12p stores the low byte of the first pixel first, Mono12Packed its high byte.
         let bytes = [0xbc, 0x3a, 0x12];
         assert_eq!(Layout::Packed12.decode(&bytes, 2, 1).unwrap().pixels, array![[0xabc, 0x123]]);
         let bytes = [0xab, 0x3c, 0x12];
         assert_eq!(Layout::GigePacked12.decode(&bytes, 2, 1).unwrap().pixels, array![[0xabc, 0x123]]);
-        // 0x155, 0x2aa, 0x3ff, 0x001 in forty bits, the lowest first.
+        // 0x155, 0x2aa, 0x3ff, 0x001 in forty bits, LSB first.
         let bytes = [0x55, 0xa9, 0xfa, 0x7f, 0x00];
         assert_eq!(Layout::Packed10.decode(&bytes, 4, 1).unwrap().pixels, array![[0x155, 0x2aa, 0x3ff, 1]]);
     }
@@ -263,7 +259,7 @@ mod tests {
             .encode(&[128; 64], 8, 8, image::ExtendedColorType::L8)
             .unwrap();
         let image = Layout::Jpeg.decode(&jpeg, 8, 8).unwrap();
-        // An even picture survives JPEG to the last step of its quantisation, which is 1 at quality 100.
+        // A uniform picture survives JPEG to one quantisation step, which is 1 at quality 100.
         assert!(image.pixels.iter().all(|value| value.abs_diff(128) <= 1), "{:?}", image.pixels);
         let other = Layout::Jpeg.decode(&jpeg, 16, 8).unwrap_err().to_string();
         assert!(other.contains("8x8 px where 16x8"), "{other}");
@@ -271,7 +267,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_too_short_or_too_bright_is_refused() {
+    fn rejects_short_frames_and_values_above_the_bit_depth() {
         let short = Layout::Grey16 { bits: 12 }.decode(&[0; 7], 2, 2).unwrap_err().to_string();
         assert!(short.contains("7 bytes where a frame of 2x2 px has 8"), "{short}");
         let bright = Layout::Grey16 { bits: 12 }.decode(&[0, 0x10], 1, 1).unwrap_err().to_string();

@@ -1,4 +1,4 @@
-//! The simulator's camera: images over a loopback TCP stream ([`farnear_protocol::camera`]).
+//! The simulator's camera: images on a loopback TCP stream ([`farnear_protocol::camera`]).
 
 use std::{
     collections::VecDeque,
@@ -22,30 +22,30 @@ use ndarray::Array2;
 use super::{Camera, CameraError, Frame as Picture, Image, Stamp};
 
 const CONNECT: Duration = Duration::from_secs(5);
-/// How long the simulator may take to end the stream of a client that goes.
+/// Longest wait for the simulator to end the stream at disconnection.
 const FAREWELL: Duration = Duration::from_secs(1);
-/// Images that wait to be fetched; a full queue holds the sender back, and memory stays bounded.
+/// Image queue; a full queue blocks the sender and bounds the memory.
 const QUEUE: usize = 8;
-/// What a camera that runs freely needs beside its exposures: its read-out, and some time to spare.
+/// Minimum gap of free-running exposures: read-out and a margin.
 const BETWEEN_EXPOSURES_US: u32 = 15_000;
-/// An image belongs to the exposure whose strobe began when the camera says that it began, within this.
+/// Tolerance between strobe and reported exposure start.
 const SAME_MOMENT_US: u64 = 50;
-/// How long each picture is exposed that is only looked at.
+/// Exposure time of the live view.
 const WATCH_EXPOSURE: Micros = Micros(5_000);
 
-/// A connection to the camera endpoint of `farnear-sim`.
+/// Connection to the camera endpoint of `farnear-sim`.
 pub struct SimCamera {
     address: String,
     stream: TcpStream,
     queue: Arc<Queue>,
-    // Reads all the time, so that the simulator is not held up while the host waits for the board's events.
+    // Reads continuously, so that the simulator is not blocked while the host waits for events.
     reader: Option<JoinHandle<()>>,
-    /// Nothing comes of it but its end, with the reader's.
+    /// Signals the end of the reader.
     ended: Receiver<()>,
     runs_freely: bool,
-    /// An image that came where an earlier one was due.
+    /// Image that came in place of an earlier one.
     early: Option<Frame>,
-    /// Whose image was passed over last since the camera was armed: that of an earlier exposure than the one that was due.
+    /// Last image since arming that belonged to an earlier exposure than the due one.
     passed: Option<u32>,
 }
 
@@ -54,7 +54,7 @@ struct Frame {
     pixels: Vec<u16>,
 }
 
-/// Images between the reader and who wants them.
+/// Queue between reader and consumer.
 #[derive(Default)]
 struct Queue {
     frames: Mutex<Waiting>,
@@ -64,7 +64,7 @@ struct Queue {
 #[derive(Default)]
 struct Waiting {
     frames: VecDeque<Result<Frame, CameraError>>,
-    /// Nothing more is read, or nobody fetches any more.
+    /// One side has ended.
     closed: bool,
 }
 
@@ -73,8 +73,8 @@ impl Queue {
         self.frames.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Adds an image, waiting for room. Images of a camera that runs freely make room themselves, the oldest first:
-    /// most of them nobody wants. Gives whether anybody fetches.
+    /// Adds an image, waiting for room; free-running images replace the oldest instead. Returns whether there
+    /// is a consumer.
     fn push(&self, frame: Result<Frame, CameraError>) -> bool {
         let mut waiting = self.lock();
         while waiting.frames.len() >= QUEUE && !waiting.closed {
@@ -91,7 +91,7 @@ impl Queue {
         !waiting.closed
     }
 
-    /// The next image; `None` when time is up, an error when nothing more can come.
+    /// The next image; `None` at the timeout, an error if no more can come.
     fn pop(&self, until: Instant) -> Result<Option<Result<Frame, CameraError>>, ()> {
         let mut waiting = self.lock();
         loop {
@@ -137,7 +137,7 @@ impl SimCamera {
                 }
             }
             filled.close();
-            // What still comes is nobody's; the end comes when the simulator knows that this client has gone.
+            // Drains the stream until the simulator has noticed the disconnection.
             let _ = io::copy(&mut input, &mut io::sink());
             drop(reading);
         });
@@ -154,7 +154,7 @@ impl SimCamera {
         })
     }
 
-    /// Lets virtual time pass in the simulator though nothing is under way there.
+    /// Advances the simulator's virtual time while it is idle.
     pub fn advance(&mut self, micros: u64) -> Result<(), CameraError> {
         self.control(&Control::AdvanceMicros(micros))
     }
@@ -189,7 +189,7 @@ impl Camera for SimCamera {
 
     fn arm(&mut self, mode: TriggerMode, exposure: Micros) -> Result<(), CameraError> {
         self.passed = None;
-        // An older image is told by its trigger number, or by its time, when it comes up.
+        // Old images are recognised later by trigger number or time.
         let free = mode == TriggerMode::FreeRunning;
         if free {
             let period = Micros(exposure.0.saturating_add(BETWEEN_EXPOSURES_US));
@@ -247,7 +247,7 @@ impl Camera for SimCamera {
     }
 
     fn newest(&mut self, wait: Duration) -> Result<Option<Picture>, CameraError> {
-        // Where nothing is under way virtual time stands still: as much of it as one picture takes.
+        // Idle virtual time stands; advance it by one picture.
         self.advance(u64::from(WATCH_EXPOSURE.0 + BETWEEN_EXPOSURES_US))?;
         let frame = match self.queue.pop(Instant::now() + wait) {
             Ok(Some(frame)) => frame?,
@@ -262,7 +262,7 @@ impl Camera for SimCamera {
 impl Drop for SimCamera {
     fn drop(&mut self) {
         let _ = self.stream.shutdown(Shutdown::Write);
-        // A reader that waits with a full queue sees that nobody fetches any more, one that waits for a frame that the stream ends.
+        // Closing the queue ends a blocked reader; ending the stream ends a waiting one.
         self.queue.close();
         let _ = self.ended.recv_timeout(FAREWELL);
         let _ = self.stream.shutdown(Shutdown::Both);
@@ -285,7 +285,7 @@ fn read_frame(input: &mut impl Read, address: &str) -> Result<Frame, CameraError
     let length = u32::from_le_bytes(length);
     let header =
         FrameHeader::from_bytes(&header).ok_or_else(|| nonsense("a header with no picture in it".into()))?;
-    // Checked before the pixels are read, so that the size below is that of a 16-bit width and height.
+    // Checked before the pixels are read, which bounds the size below.
     if length != header.length() {
         return Err(nonsense(format!("a frame of {length} bytes where {} were due", header.length())));
     }
@@ -313,7 +313,7 @@ mod tests {
     }
 
     #[test]
-    fn frames_are_read_and_nonsense_is_refused() {
+    fn reads_frames_and_rejects_invalid_ones() {
         let frame = read_frame(&mut frame_bytes(0, 12, &[0, 4095]).as_slice(), "a").unwrap();
         assert_eq!(frame.pixels, [0, 4095]);
         assert_eq!(frame.header.shot_id, 3);

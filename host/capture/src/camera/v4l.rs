@@ -1,5 +1,5 @@
-//! Video4Linux: webcams, and sensors with a driver in the kernel. What is here needs no device: which devices there are, which of their
-//! formats are read, and what is said of one that cannot be opened. The device itself is in `device`, with the cargo feature `v4l2`.
+//! Video4Linux cameras: device list, formats and error messages. The device itself is in `device` (cargo
+//! feature `v4l2`).
 
 #[cfg(all(feature = "v4l2", target_os = "linux"))]
 mod device;
@@ -14,16 +14,15 @@ pub use device::V4lCamera;
 
 use super::{CameraError, pixels::Layout};
 
-/// A device file and what its driver calls itself.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct FoundDevice {
-    /// e.g. `/dev/video0`.
+    /// E.g. `/dev/video0`.
     pub path: PathBuf,
-    /// The driver's name of it; empty where the system does not say.
+    /// Driver's name; empty if unknown.
     pub name: String,
 }
 
-/// The video devices of this computer, by their number. Metadata devices, which give no pictures, are among them.
+/// Video devices by number, including metadata devices without pictures.
 pub fn devices() -> Vec<FoundDevice> {
     listed(Path::new("/sys/class/video4linux"))
 }
@@ -42,7 +41,7 @@ fn listed(class: &Path) -> Vec<FoundDevice> {
     numbered.into_iter().map(|(_, device)| device).collect()
 }
 
-/// The formats that are read, the best first: their four characters, and how their pixels lie.
+/// Supported formats, best first: fourcc and layout.
 pub const FORMATS: [([u8; 4], Layout); 6] = [
     (*b"Y16 ", Layout::Grey16 { bits: 16 }),
     (*b"Y12 ", Layout::Grey16 { bits: 12 }),
@@ -52,10 +51,8 @@ pub const FORMATS: [([u8; 4], Layout); 6] = [
     (*b"MJPG", Layout::Jpeg),
 ];
 
-/// The best of a device's formats: the one with most bits, then the one that is least altered.
-///
-/// # Errors
-/// [`CameraError::Unusable`] with the formats that there are.
+/// The device's best format: most bits, then least processed.
+/// Errors: [`CameraError::Unusable`] with the offered formats.
 pub fn best_format(device: &Path, offered: &[[u8; 4]]) -> Result<([u8; 4], Layout), CameraError> {
     FORMATS.into_iter().find(|(name, _)| offered.contains(name)).ok_or_else(|| {
         let text = |name: &[u8; 4]| String::from_utf8_lossy(name).trim().to_owned();
@@ -66,10 +63,8 @@ pub fn best_format(device: &Path, offered: &[[u8; 4]]) -> Result<([u8; 4], Layou
     })
 }
 
-/// Opens nothing: says of a device file what its kind forbids, so that the reason is clear before any driver is asked.
-///
-/// # Errors
-/// [`CameraError::Unusable`] for a file that is absent or not a device.
+/// Checks a device file without opening it, for a clear error.
+/// Errors: [`CameraError::Unusable`] if absent or not a device.
 pub fn check_path(device: &Path) -> Result<(), CameraError> {
     let metadata = fs::metadata(device).map_err(|error| refused(device, &error))?;
     #[cfg(unix)]
@@ -80,18 +75,15 @@ pub fn check_path(device: &Path) -> Result<(), CameraError> {
     Ok(())
 }
 
-/// What the system's refusal means, and what to do.
+/// Explains a system error and its remedy.
 pub fn refused(device: &Path, error: &io::Error) -> CameraError {
-    // Linux: ENODEV and ENXIO after an unplug, EBUSY while another program streams, ENOTTY from what is no video device.
+    // Linux: ENODEV and ENXIO after an unplug, EBUSY while another program streams, ENOTTY for other devices.
     let reason = match (error.kind(), error.raw_os_error()) {
         (io::ErrorKind::NotFound, _) => {
             let found: Vec<String> = devices().iter().map(|found| found.path.display().to_string()).collect();
             match found.is_empty() {
-                true => {
-                    "there is no such device, and no other video device either: is the camera plugged in?"
-                        .into()
-                }
-                false => format!("there is no such device; there are {}", found.join(", ")),
+                true => "no such device, and no other video device: is the camera plugged in?".into(),
+                false => format!("no such device; found: {}", found.join(", ")),
             }
         }
         (io::ErrorKind::PermissionDenied, _) => {
@@ -101,7 +93,7 @@ pub fn refused(device: &Path, error: &io::Error) -> CameraError {
             )
         }
         (_, Some(16)) => "another program uses it; end that program first".into(),
-        (_, Some(19 | 6)) => "it is gone: was the camera unplugged?".into(),
+        (_, Some(19 | 6)) => "it has been disconnected: was the camera unplugged?".into(),
         (_, Some(25)) => "it is not a video device".into(),
         _ => format!("the system says: {error}"),
     };
@@ -112,7 +104,7 @@ fn unusable(device: &Path, reason: String) -> CameraError {
     CameraError::Unusable { camera: device.display().to_string(), reason }
 }
 
-/// Name of the group that may use a file.
+/// Group of a file.
 #[cfg(unix)]
 fn group_of(path: &Path) -> Option<String> {
     let number = std::os::unix::fs::MetadataExt::gid(&fs::metadata(path).ok()?);
@@ -124,7 +116,7 @@ fn group_of(_: &Path) -> Option<String> {
     None
 }
 
-/// A group's name in the text of `/etc/group`.
+/// Group name in the text of `/etc/group`.
 #[cfg_attr(not(unix), allow(dead_code))]
 fn group_name(groups: &str, number: u32) -> Option<String> {
     groups.lines().find_map(|line| {
@@ -139,7 +131,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_best_format_is_taken_and_others_are_named() {
+    fn selects_the_best_format_or_lists_the_offered_ones() {
         let device = Path::new("/dev/video7");
         let best = |offered: &[[u8; 4]]| best_format(device, offered);
         assert_eq!(best(&[*b"MJPG", *b"YUYV", *b"Y10 "]).unwrap(), (*b"Y10 ", Layout::Grey16 { bits: 10 }));
@@ -152,7 +144,7 @@ mod tests {
     }
 
     #[test]
-    fn a_device_that_cannot_be_used_is_said_with_what_to_do() {
+    fn unusable_devices_give_a_remedy() {
         let absent = check_path(Path::new("/dev/video4711")).unwrap_err().to_string();
         assert!(absent.contains("/dev/video4711") && absent.contains("no such device"), "{absent}");
         let file = tempfile::NamedTempFile::new().unwrap();
@@ -167,7 +159,7 @@ mod tests {
     }
 
     #[test]
-    fn the_group_of_a_device_has_a_name() {
+    fn finds_the_group_name_of_a_device() {
         let groups = "root:x:0:\naudio:x:29:pulse\nvideo:x:44:a,b\n";
         assert_eq!(group_name(groups, 44).as_deref(), Some("video"));
         assert_eq!(group_name(groups, 45), None);

@@ -1,10 +1,9 @@
-//! Alarms and failures, each with what to do.
+//! Texts of alarms and failures, with remedies.
 
 use farnear_protocol::message::{Alarm, AlarmRecord, Failure};
 
 use super::{axis_name, record_name, um};
 
-/// What stopped the rig, with what to do.
 pub fn alarm_text(alarm: Alarm) -> String {
     match alarm {
         Alarm::EmergencyStop => "the emergency stop was pressed; release it".into(),
@@ -57,7 +56,7 @@ pub fn alarm_text(alarm: Alarm) -> String {
     }
 }
 
-/// Why long work ended early, with what to do. `alarm` is the one that the failure names, where it is known.
+/// `alarm`: the one that the failure refers to, if known.
 pub fn failure_text(reason: Failure, alarm: Option<&AlarmRecord>) -> String {
     let text: String = match reason {
         Failure::Stopped => "it was stopped".into(),

@@ -1,4 +1,4 @@
-//! Why the board refused, with what to do.
+//! Texts of refusals, with remedies.
 
 use farnear_protocol::{
     RequestError,
@@ -7,7 +7,7 @@ use farnear_protocol::{
 
 use super::{alarm_text, axis_name, program_name, state_name, um};
 
-/// Why the board refused. Long because it is one table: a line for each reason.
+/// Long because it is one table with a line per reason.
 pub fn refusal_text(error: &RequestError) -> String {
     match error {
         RequestError::Version { min, current } => format!("it speaks protocol {min} to {current}"),
@@ -39,7 +39,7 @@ pub fn refusal_text(error: &RequestError) -> String {
             um(*max)
         ),
         RequestError::NotHomed { axis: axis @ Axis::SensorFine, .. } => format!(
-            "nobody knows where the {} stands, for its gauge says nothing: check its converter, its cable and its supply",
+            "the position of the {} is unknown because its gauge is silent: check its converter, cable and supply",
             axis_name(*axis)
         ),
         RequestError::NotHomed { axis, state } => {
@@ -94,7 +94,7 @@ pub fn refusal_text(error: &RequestError) -> String {
 
 fn shot_fault_text(fault: ShotFault) -> &'static str {
     match fault {
-        ShotFault::Index => "there is no such place in the program, or the program has no shots",
+        ShotFault::Index => "the index is outside the program, or the program has no shots",
         ShotFault::Missing => "it was never loaded",
         ShotFault::Exposure => "the exposure time is outside the board's limits",
         ShotFault::Settle => "the settle window or its time is not possible",

@@ -1,46 +1,47 @@
-//! Where the focus lies, from how the spectra of three blurred images differ.
+//! Focus position from the spectra of three blurred images.
 //!
-//! Blur of standard deviation `s` pixels takes `exp(-s^2 w^2)` off the power at frequency `w`, and `s = k e / (2 Fe d)` at the
-//! distance `e` from focus (`d` = pixel pitch). Whatever the texture is, the logarithm of the ratio of two images' power
-//! is therefore a line in `w^2`, and its slope, with the two places known, tells `e`:
-//! `ln(Pi / Pj) = -(k / (2 Fe d))^2 (ei^2 - ej^2) w^2`. This is depth from defocus after Subbarao, used to steer. It holds for
-//! other lenses' PSFs too while the blur is small against `1 / w`, so higher frequencies are left out; a wrong `k` only makes the next step too long or short.
+//! Blur of standard deviation `s` pixels multiplies the power at frequency `w` by `exp(-s^2 w^2)`, with `s =
+//! k e / (2 Fe d)` at the distance `e` from focus (`d` = pixel pitch). The log ratio of two images' power is
+//! therefore linear in `w^2`, independent of texture: `ln(Pi / Pj) = -(k / (2 Fe d))^2 (ei^2 - ej^2) w^2`.
+//! With both positions known, the slope gives `e` (after Subbarao). For other PSFs it holds while blur is
+//! small against `1 / w`, so higher frequencies are excluded. A wrong `k` only changes the next step's
+//! length.
 //!
 //! Cost: one FFT of the image binned by two, and 30 operations a pixel.
 
 use farnear_depth::fourier::{Complex64, transform};
 use ndarray::Array2;
 
-/// Images are binned by this first: what is sought lies below a quarter of the sampling rate.
+/// Binning: the used frequencies are below a quarter of the sampling rate.
 const BIN: usize = 2;
-/// Rings of the spectrum, from 0 to the binned image's highest frequency.
+/// Spectral rings, from 0 to the binned image's highest frequency.
 const RINGS: usize = 48;
-/// The first rings hold shading and what the window leaks from it.
+/// The first rings contain shading and its leakage.
 const FIRST_RING: usize = 2;
-/// Rings with less than so many times the noise say nothing.
+/// Rings below this multiple of the noise are ignored.
 const ABOVE_NOISE: f64 = 3.0;
-/// Beyond a frequency at which the two images differ by more than this, a PSF that is no Gaussian may have its first zero.
+/// Larger log ratios may be beyond the first zero of a PSF that is not Gaussian.
 const SMALL_RATIO: f64 = 1.0;
-/// The rings in which only noise is left once an image is blurred.
+/// Rings that contain only noise in a blurred image.
 const NOISE_RINGS: usize = 8;
 
-/// The power spectrum of an image, averaged over rings of equal frequency.
+/// Power spectrum of an image, averaged over rings.
 #[derive(Clone, PartialEq, Debug)]
 pub(super) struct Spectrum {
-    /// Where the image was taken, nm.
+    /// Position of the image, nm.
     pub place: f64,
     power: [f64; RINGS],
-    /// Frequencies in a ring.
+    /// Frequencies per ring.
     count: [f64; RINGS],
 }
 
-/// Frequency of a ring in rad per pixel of the image as it was.
+/// Frequency of a ring, rad per original pixel.
 fn frequency(ring: usize) -> f64 {
     (ring as f64 + 0.5) / RINGS as f64 * std::f64::consts::PI / BIN as f64
 }
 
 impl Spectrum {
-    /// The spectrum of an image of at least 16 pixels to a side; larger than that it is never too small.
+    /// Spectrum of an image of at least 16 x 16 px.
     pub(super) fn of(image: &Array2<f32>, place: f64) -> Self {
         let mut binned = super::binned(image, BIN);
         let (height, width) = binned.dim();
@@ -72,8 +73,8 @@ impl Spectrum {
     }
 }
 
-/// The place of the best focus, nm; `None` where the images hold nothing but noise, or were taken at one place.
-/// `blur_per_nm` is the blur's standard deviation in pixels per nanometre from focus.
+/// Focus position in nm; `None` for noise only or equal positions. `blur_per_nm`: blur SD in px per nm of
+/// defocus.
 pub(super) fn estimate(images: &[Spectrum], blur_per_nm: f64) -> Option<f64> {
     let noise = images.iter().map(Spectrum::noise).fold(f64::INFINITY, f64::min);
     let (mut sum, mut weights) = (0.0, 0.0);
@@ -90,7 +91,7 @@ pub(super) fn estimate(images: &[Spectrum], blur_per_nm: f64) -> Option<f64> {
     (weights > 0.0).then(|| sum / weights)
 }
 
-/// Slope of the log of two images' power ratio against the squared frequency, by weighted least squares through 0.
+/// Slope of the log power ratio against the squared frequency, by weighted least squares through 0.
 fn slope(one: &Spectrum, other: &Spectrum, noise: f64) -> Option<f64> {
     let (mut xy, mut xx) = (0.0, 0.0);
     for ring in FIRST_RING..RINGS {
@@ -103,7 +104,7 @@ fn slope(one: &Spectrum, other: &Spectrum, noise: f64) -> Option<f64> {
             break;
         }
         let x = frequency(ring).powi(2);
-        // The logarithm is as uncertain as the noise is large beside the power.
+        // The logarithm's uncertainty is that of noise relative to power.
         let weight = one.count[ring] * (a.min(b) / (a.min(b) + noise)).powi(2);
         xy += weight * x * ratio;
         xx += weight * x * x;
@@ -115,7 +116,7 @@ fn slope(one: &Spectrum, other: &Spectrum, noise: f64) -> Option<f64> {
 mod tests {
     use super::*;
 
-    /// A texture of waves of many directions and lengths, blurred by a Gaussian of so many pixels.
+    /// Waves of many directions and lengths, blurred by a Gaussian of `blur_px`.
     fn texture(blur_px: f64) -> Array2<f32> {
         let waves: Vec<(f64, f64, f64)> = (1..120)
             .map(|i| {
@@ -137,7 +138,7 @@ mod tests {
     }
 
     #[test]
-    fn three_blurred_images_tell_where_the_focus_is() {
+    fn three_blurred_images_locate_the_focus() {
         // k / (2 Fe d) of the rig's optics: 0.4578 / (2 * 3.90625 * 7400 nm).
         let blur_per_nm = 0.4578 / (2.0 * 3.90625 * 7400.0);
         for focus in [-1_000e3, -400e3, -60e3, 0.0, 250e3, 800e3] {
@@ -145,13 +146,13 @@ mod tests {
                 .map(|place: f64| Spectrum::of(&texture(blur_per_nm * (place - focus).abs()), place))
                 .into();
             let found = estimate(&images, blur_per_nm).expect("an estimate");
-            // A quarter of the way from afar, and well inside the fine sweep from near by.
+            // A quarter of the way from afar, and well inside the fine sweep nearby.
             assert!((found - focus).abs() < 0.25 * f64::abs(focus) + 15e3, "{focus}: {found}");
         }
     }
 
     #[test]
-    fn nothing_to_go_by_gives_nothing() {
+    fn noise_alone_gives_no_estimate() {
         let flat = Array2::from_elem((64, 64), 7.0);
         let images: Vec<Spectrum> = [0.0, 1.0].map(|place| Spectrum::of(&flat, place)).into();
         assert_eq!(estimate(&images, 1e-6), None);

@@ -1,4 +1,4 @@
-//! A session of an owner: how it ends, and how the next one begins.
+//! End and begin of sessions.
 
 use std::{
     io,
@@ -16,34 +16,32 @@ use crate::{
     link_rate,
 };
 
-/// From one attempt to reach the board again to the next.
+/// Reconnection interval.
 const RECONNECT: Duration = Duration::from_millis(500);
 
 /// A board between two hellos.
 #[derive(Clone)]
 pub(crate) struct Session {
-    /// Counts the sessions of this owner.
+    /// Session count of this owner.
     pub number: u32,
     pub hello: Arc<Hello>,
     pub version: u8,
-    /// The link's rate.
     pub rate: LinkRate,
-    /// Name of the port that the board has in this session.
+    /// Port name in this session.
     pub port: Arc<str>,
 }
 
-/// What ended a session.
+/// Cause of a session's end.
 #[derive(Clone, Debug)]
 pub(crate) enum Break {
     Gone(Arc<io::Error>),
     /// Another host has opened a session.
     TakenOver,
-    /// Another board has come back than went.
     OtherBoard {
         was: [u8; 12],
         now: [u8; 12],
     },
-    /// The port is there, and nobody answers: asked so often, for so long.
+    /// Port open, but no answer: attempts and duration.
     Silent {
         attempts: u32,
         waited: Duration,
@@ -56,7 +54,7 @@ pub(crate) enum Break {
 }
 
 impl Break {
-    /// Whether the port is to be opened anew.
+    /// Whether the port must be reopened.
     fn has_no_line(&self) -> bool {
         matches!(self, Self::Gone(_) | Self::OtherBoard { .. })
     }
@@ -76,16 +74,16 @@ impl Break {
 }
 
 impl Owner {
-    /// Why a handle of this session may not go on.
+    /// Error for a handle of this session.
     pub(super) fn break_of(&self, session: u32) -> Option<Break> {
         if self.broken.is_some() {
             return self.broken.clone();
         }
-        // The board is back, but the handle has not been told yet.
+        // The board is back, but this handle has not been informed.
         self.last_break.clone().filter(|_| session != self.session.number)
     }
 
-    /// Ends the session where the error does.
+    /// Ends the session if the error does.
     pub(super) fn break_off(&mut self, error: &ClientError) {
         let broken = match error {
             ClientError::Gone { source, .. } => Break::Gone(Arc::clone(source)),
@@ -109,7 +107,7 @@ impl Owner {
         self.events.arrived.clear();
         self.still_there = false;
         self.unanswered = 0;
-        // A board that was reset is there; one that was unplugged takes a while.
+        // A reset board is present; an unplugged one takes a while.
         let is_there = matches!(broken, Break::Reset { .. } | Break::TakenOver);
         let pause = if is_there { Duration::ZERO } else { RECONNECT };
         self.next_attempt = Instant::now() + pause;
@@ -118,16 +116,16 @@ impl Owner {
     }
 
     pub(super) fn try_again_when_due(&mut self) {
-        // The port of a simulator that has ended may be anybody's next, unless it has a name of its own (a link).
+        // The port name of an ended simulator may be reused, unless it is a link.
         let gone = matches!(self.broken, Some(Break::Gone(_)));
         let named = std::fs::symlink_metadata(self.link.port()).is_ok_and(|found| found.is_symlink());
         let nobodys = gone && self.session.hello.emulated && !named;
-        // Whoever has taken the board over keeps it, until somebody here asks for it.
+        // A board taken over by another host is left alone until requested.
         let taken = matches!(self.broken, Some(Break::TakenOver));
-        // Another board is left alone likewise.
+        // Likewise another board.
         let others = matches!(self.broken, Some(Break::OtherBoard { .. }));
         if !nobodys && !taken && !others && Instant::now() >= self.next_attempt {
-            // It is tried again, for as long as anybody holds a handle.
+            // Retried while handles exist.
             let _ = self.reconnect();
         }
     }
@@ -166,7 +164,7 @@ impl Owner {
         self.session.version = version;
         if hello.boot == before && !was_broken {
             self.session.hello = Arc::new(hello);
-            return Ok(()); // the same session: work goes on, and events that were drained are fetched
+            return Ok(()); // same session: work continues, and drained events are fetched
         }
         if !was_broken {
             let (was, now, cause) = (before, hello.boot, Some(hello.reset_cause));
@@ -189,7 +187,7 @@ impl Owner {
         self.join_events()
     }
 
-    /// Events count from now on.
+    /// Starts event delivery.
     pub(super) fn join_events(&mut self) -> Result<(), ClientError> {
         let due = self.status("reading the status")?.next_event;
         self.events.due = due;

@@ -1,4 +1,4 @@
-//! Cameras: a folder in which images appear, and the simulator's endpoint.
+//! Cameras: image folder and simulator endpoint.
 
 use std::{
     fs,
@@ -40,7 +40,7 @@ pub fn shot(trigger_number: u32) -> ShotRecord {
 }
 
 #[test]
-fn a_folder_gives_its_new_images_in_order_and_waits_for_half_written_ones() {
+fn reads_new_images_in_order_and_waits_for_incomplete_ones() {
     let folder = tempfile::tempdir().unwrap();
     let write = |name: &str, value: u16| {
         fs::write(folder.path().join(name), encode_png(Array2::from_elem((2, 2), value).view(), 8).unwrap())
@@ -69,7 +69,7 @@ fn a_folder_gives_its_new_images_in_order_and_waits_for_half_written_ones() {
     assert!(late.to_string().contains("exposure 7"), "{late}");
 }
 
-/// A camera endpoint that sends images with these shot ids and then hangs up.
+/// Endpoint that sends images with these shot ids and disconnects.
 fn endpoint(shots: &'static [u32], trailing: &'static [u8]) -> String {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let address = listener.local_addr().unwrap().to_string();
@@ -103,7 +103,7 @@ fn the_simulators_images_are_matched_to_their_exposures() {
 }
 
 #[test]
-fn the_simulator_knows_that_a_client_has_gone_before_the_next_one_comes() {
+fn disconnects_from_the_simulator_before_the_next_client() {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let address = listener.local_addr().unwrap().to_string();
     let knows = Arc::new(AtomicBool::new(false));
@@ -111,7 +111,7 @@ fn the_simulator_knows_that_a_client_has_gone_before_the_next_one_comes() {
     let simulator = thread::spawn(move || {
         let (mut stream, _) = listener.accept().unwrap();
         assert_eq!(stream.read(&mut [0]).unwrap(), 0, "it hangs up");
-        // A busy computer: until it knows, it would give a picture to whoever has gone.
+        // On a busy computer the endpoint notices the disconnection late.
         thread::sleep(Duration::from_millis(200));
         told.store(true, Ordering::Relaxed);
     });
@@ -121,7 +121,7 @@ fn the_simulator_knows_that_a_client_has_gone_before_the_next_one_comes() {
 }
 
 #[test]
-fn a_camera_that_hangs_up_or_is_none_is_named() {
+fn names_a_camera_that_disconnects_or_is_invalid() {
     let wait = Duration::from_secs(20);
     let mut camera = SimCamera::connect(&endpoint(&[], &[1, 2])).unwrap();
     let gone = camera.image(&shot(0), wait).unwrap_err();
@@ -138,7 +138,7 @@ fn picture(value: u16) -> Vec<u8> {
         .unwrap()
 }
 
-/// A folder camera that is armed, after a first picture was used.
+/// An armed folder camera after its first picture.
 fn used_folder(first: &str) -> (tempfile::TempDir, FolderCamera) {
     let folder = tempfile::tempdir().unwrap();
     let mut camera = FolderCamera::watch(folder.path()).unwrap();
@@ -190,7 +190,7 @@ fn an_older_picture_after_a_newer_one_is_refused() {
 }
 
 #[test]
-fn a_file_that_is_written_again_is_named() {
+fn names_a_rewritten_file() {
     let (folder, mut camera) = used_folder("capt0000.png");
     fs::write(folder.path().join("capt0000.png"), picture(200)).unwrap();
     let later = std::time::SystemTime::now() + Duration::from_secs(1);
@@ -202,7 +202,7 @@ fn a_file_that_is_written_again_is_named() {
 }
 
 #[test]
-fn a_jpeg_without_its_end_is_waited_for_and_refused() {
+fn waits_for_and_rejects_a_truncated_jpeg() {
     let (folder, mut camera) = used_folder("a.png");
     let mut jpeg = Vec::new();
     let pixels: Vec<u8> = (0..64 * 64).map(|at| (at * 7 % 251) as u8).collect();

@@ -1,4 +1,4 @@
-//! Programs as cameras: ffmpeg, and small ones of the tests' own in the shell's language.
+//! Programs as cameras: ffmpeg and shell scripts.
 #![cfg(unix)]
 
 use std::{
@@ -18,19 +18,18 @@ fn start(line: &str) -> Result<CommandCamera, CameraError> {
     CommandCamera::start(&line.parse().unwrap())
 }
 
-/// A program that runs this script.
 fn script(text: &str) -> Result<CommandCamera, CameraError> {
     assert!(!text.contains('"'));
     start(&format!("sh -c \"{text}\""))
 }
 
-/// Opens the camera, waits for an image, and gives what went wrong.
+/// Opens the camera, waits for an image, and returns the error.
 fn failure(camera: Result<CommandCamera, CameraError>) -> String {
     let failed = |mut camera: CommandCamera| camera.image(&shot(1), WAIT).map(|_| ());
     camera.and_then(failed).unwrap_err().to_string()
 }
 
-/// A camera with a trigger: each file `go-N` that appears in the folder releases a Y4M frame of 2x1 px.
+/// Triggered camera: each file `go-N` in the folder releases a Y4M frame of 2x1 px.
 fn triggered(folder: &Path) -> Result<CommandCamera, CameraError> {
     script(&format!(
         "printf 'YUV4MPEG2 W2 H1 F25:1 Cmono\\n'; n=1; while sleep 0.02; do \
@@ -40,13 +39,13 @@ fn triggered(folder: &Path) -> Result<CommandCamera, CameraError> {
 }
 
 #[test]
-fn each_trigger_gives_its_picture_and_one_too_many_is_an_error() {
+fn each_trigger_gives_a_picture_and_a_surplus_one_is_an_error() {
     let folder = tempfile::tempdir().unwrap();
     let mut camera = triggered(folder.path()).unwrap();
     let trigger = |number: u32| fs::write(folder.path().join(format!("go-{number}")), "").unwrap();
     trigger(1);
     camera.image(&shot(0), WAIT).unwrap();
-    // Armed anew, what came before does not count.
+    // Arming drops earlier frames.
     camera.arm(TriggerMode::Hardware, Micros(1)).unwrap();
     for number in [2, 3] {
         trigger(number);
@@ -62,7 +61,7 @@ fn each_trigger_gives_its_picture_and_one_too_many_is_an_error() {
 }
 
 #[test]
-fn a_program_that_runs_freely_is_found_out() {
+fn detects_a_free_running_program() {
     let mut camera =
         script("printf 'YUV4MPEG2 W1 H1 Cmono\\n'; while sleep 0.02; do printf 'FRAME\\nA'; done").unwrap();
     camera.arm(TriggerMode::Hardware, Micros(1)).unwrap();
@@ -70,7 +69,7 @@ fn a_program_that_runs_freely_is_found_out() {
     assert!(matches!(camera.finish(Duration::from_millis(200)).unwrap_err(), CameraError::Surplus { .. }));
     let free = camera.arm(TriggerMode::FreeRunning, Micros(1)).unwrap_err();
     assert!(matches!(free, CameraError::Trigger { camera: "command", .. }), "{free:?}");
-    // To look at, it is good enough.
+    // Accepted for a live view.
     camera.watch().unwrap();
     assert_eq!(camera.newest(WAIT).unwrap().unwrap().image.pixels[[0, 0]], 65);
 }
@@ -90,9 +89,9 @@ fn what_is_wrong_with_a_program_is_said() {
 }
 
 #[test]
-fn raw_frames_have_the_size_that_they_are_said_to_have() {
+fn raw_frames_have_the_given_size() {
     let mut camera = start("2x1:gray12le:printf '\\001\\000\\377\\017'").unwrap();
-    // The frame came before it was armed, and the program has ended.
+    // The frame came before arming, and the program has ended.
     let image = camera.image(&shot(1), Duration::from_millis(10));
     assert!(image.is_err() || image.unwrap().bits == 12);
     let mut camera = start("2x1:gray12le:sh -c \"sleep 0.5; printf '\\001\\000\\377\\017'\"").unwrap();
@@ -105,7 +104,7 @@ fn raw_frames_have_the_size_that_they_are_said_to_have() {
 }
 
 #[test]
-fn no_child_and_no_grandchild_stays_behind() {
+fn ends_child_and_grandchild_processes() {
     let folder = tempfile::tempdir().unwrap();
     let pids = folder.path().join("pids");
     let camera = script(&format!(
@@ -121,7 +120,7 @@ fn no_child_and_no_grandchild_stays_behind() {
     let pids = fs::read_to_string(pids).unwrap();
     let pids: Vec<&str> = pids.split_whitespace().collect();
     drop(camera);
-    // Reaped: not even a zombie is left of the child. The grandchild is killed with it and adopted by another process.
+    // The child is reaped; the grandchild was killed and adopted by another process.
     assert!(!Path::new("/proc").join(pids[0]).exists());
     let until = Instant::now() + WAIT;
     loop {
@@ -137,7 +136,7 @@ fn no_child_and_no_grandchild_stays_behind() {
 
 #[test]
 #[cfg_attr(not(ffmpeg), ignore = "needs ffmpeg")]
-fn ffmpegs_test_picture_comes_as_y4m_and_as_raw_frames() {
+fn reads_ffmpegs_test_picture_as_y4m_and_raw() {
     let source = "ffmpeg -v error -re -f lavfi -i testsrc=size=64x48:rate=25";
     let mut camera = start(&format!("{source} -pix_fmt gray -f yuv4mpegpipe -")).unwrap();
     camera.watch().unwrap();
@@ -147,8 +146,8 @@ fn ffmpegs_test_picture_comes_as_y4m_and_as_raw_frames() {
     camera.watch().unwrap();
     let raw = camera.newest(WAIT).unwrap().unwrap().image;
     assert_eq!((raw.pixels.dim(), raw.bits), ((48, 64), 16));
-    // The same colour bars, once in 8 and once in 16 bits: ffmpeg's grey is full range in both. Its moving parts are left out: the
-    // ramp and the counter lie below the upper third. Converted by way of different YUV, they agree to a few steps of 8 bits.
+    // Equal colour bars in 8 and 16 bits: ffmpeg's grey has full range in both. The moving ramp and counter
+    // are below the upper third. Different YUV conversions agree to a few 8-bit steps.
     for column in (4..64).step_by(8) {
         let (eight, sixteen) =
             (f64::from(y4m.pixels[[2, column]]), f64::from(raw.pixels[[2, column]]) / 257.0);
@@ -157,7 +156,7 @@ fn ffmpegs_test_picture_comes_as_y4m_and_as_raw_frames() {
 }
 
 #[test]
-fn a_surplus_picture_later_than_any_fixed_wait_is_refused_before_the_next_exposure() {
+fn rejects_a_late_surplus_picture_before_the_next_exposure() {
     let folder = tempfile::tempdir().unwrap();
     let mut camera = triggered(folder.path()).unwrap();
     let trigger = |number: u32| fs::write(folder.path().join(format!("go-{number}")), "").unwrap();
@@ -174,7 +173,7 @@ fn a_surplus_picture_later_than_any_fixed_wait_is_refused_before_the_next_exposu
     std::thread::sleep(Duration::from_millis(20));
     camera.reported(&first, Instant::now());
     camera.image(&first, WAIT).unwrap();
-    // 400 ms after the first picture another one comes, of no exposure; the second exposure is after 900 ms.
+    // A surplus picture comes 400 ms after the first; the second exposure is after 900 ms.
     std::thread::sleep(Duration::from_millis(400).saturating_sub(armed.elapsed()));
     trigger(2);
     std::thread::sleep(Duration::from_millis(920).saturating_sub(armed.elapsed()));
@@ -200,7 +199,7 @@ fn waits_for_surplus_pictures_as_long_as_the_longest_interval() {
 }
 
 #[test]
-fn padded_rows_are_named_and_read_with_their_stride() {
+fn explains_padded_rows_and_reads_them_with_a_stride() {
     // Rows of 3 px, padded to 64 bytes: two frames of 2 rows.
     let bytes = "printf '\\001\\002\\003%061d\\004\\005\\006%061d' 0 0";
     let mut camera = start(&format!("3x2/64:gray:sh -c \"sleep 0.5; {bytes}; sleep 30\"")).unwrap();
@@ -217,7 +216,7 @@ fn padded_rows_are_named_and_read_with_their_stride() {
 }
 
 #[test]
-fn doubled_pictures_of_ffmpeg_have_a_hint() {
+fn repeated_ffmpeg_pictures_give_a_hint() {
     let error = CameraError::Doubled { camera: "`ffmpeg`".into(), earlier: 1, wanted: 2 }.to_string();
     assert!(error.contains("-fps_mode passthrough"), "{error}");
 }

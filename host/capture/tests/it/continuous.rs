@@ -1,4 +1,4 @@
-//! Continuous capture with a scripted board: what comes, what is dropped, what is lost on the way, and how it ends.
+//! Continuous capture with a scripted board: frames, drops, losses, end.
 
 use std::time::Duration;
 
@@ -20,7 +20,7 @@ use crate::scripted::{SHOT, connect};
 const WAIT: Duration = Duration::from_millis(20);
 const PAIR: [Shot; 2] = [SHOT, Shot { target: Nanometres(150_000), ..SHOT }];
 
-/// Gives each exposure a picture that tells its trigger number, but for those that it loses.
+/// A camera whose pictures contain their trigger number, with configured losses.
 #[derive(Default)]
 struct Losing {
     lost: Vec<u32>,
@@ -45,7 +45,7 @@ impl Camera for Losing {
     }
 }
 
-/// Runs so many exposures; of each frame its picture, or why there is none.
+/// Runs; returns picture or loss per frame.
 fn run(faults: Faults, mut camera: Losing, exposures: u32) -> Result<Vec<Result<u16, Loss>>, CaptureError> {
     let (client, _peer) = connect(faults);
     let pace = Pace { period: Micros(40_000), exposures };
@@ -63,7 +63,7 @@ fn run(faults: Faults, mut camera: Losing, exposures: u32) -> Result<Vec<Result<
 }
 
 #[test]
-fn every_frame_comes_with_its_picture_or_its_reason() {
+fn every_frame_has_a_picture_or_a_reason() {
     let dropped = Faults { drop_frames: vec![2, 3], ..Faults::default() };
     let frames = run(dropped, Losing { lost: vec![3] }, 5).unwrap();
     let busy = || Err(Loss::Board(DropReason::CameraBusy));
@@ -74,21 +74,21 @@ fn every_frame_comes_with_its_picture_or_its_reason() {
 }
 
 #[test]
-fn events_that_the_board_forgot_are_told_and_do_not_end_it() {
-    // Event 0 is the start: 3 and 4 tell of the frames 2 and 3.
+fn reports_forgotten_events_without_ending_the_run() {
+    // Event 0 is the start: 3 and 4 belong to frames 2 and 3.
     let faults = Faults { lose_events: vec![3, 4], forgetful: true, ..Faults::default() };
     let frames = run(faults, Losing::default(), 6).unwrap();
     assert_eq!(frames, [Ok(0), Ok(1), Err(Loss::EventLost), Err(Loss::EventLost), Ok(4), Ok(5)]);
 }
 
 #[test]
-fn a_camera_that_gives_nothing_ends_it() {
+fn a_silent_camera_ends_the_run() {
     let error = run(Faults::default(), Losing { lost: (0..100).collect() }, 30).unwrap_err();
     assert!(matches!(error, CaptureError::Camera(CameraError::Late { .. })), "{error:?}");
 }
 
 #[test]
-fn it_is_stopped_by_letting_go_and_what_waits_is_counted() {
+fn dropping_stops_the_run_and_waiting_frames_are_counted() {
     let (client, peer) = connect(Faults::default());
     let mut camera = Losing::default();
     let pace = Pace { period: Micros(0), exposures: 0 };

@@ -1,7 +1,7 @@
-//! A GigE Vision camera over the real transport: Aravis' fake camera on the loopback interface.
+//! GigE Vision over the real transport with Aravis' fake camera on loopback.
 //!
-//! It draws the number of each frame into it: the pixel in column x, row y of frame n is (x + y + n) mod 255 at an exposure of 10 ms and
-//! no gain. So each test can tell which frame it really got.
+//! The fake camera draws the frame number: the pixel in column x, row y of frame n is (x + y + n) mod 255 at
+//! 10 ms exposure without gain. Tests can therefore identify each frame.
 
 use std::{
     process::{Child, Command, Stdio},
@@ -21,14 +21,14 @@ use farnear_protocol::{
 use super::cameras::shot;
 
 const WAIT: Duration = Duration::from_secs(20);
-/// The exposure at which the fake camera draws full contrast.
+/// Exposure for full contrast.
 const EXPOSURE: Micros = Micros(10_000);
-/// Numbers in the picture go around here.
+/// Modulus of the numbers.
 const NUMBERS: u64 = 255;
-/// Any delay of this computer's; the fake camera's time stamps are taken by a process of its own.
+/// Scheduling delay: the fake camera stamps frames in its own process.
 const SCHEDULING: Duration = Duration::from_secs(15);
 
-/// There is one port for cameras on one address, so there is one at a time.
+/// One camera port per address, so one test at a time.
 pub static ALONE: Mutex<()> = Mutex::new(());
 
 struct Fake {
@@ -48,7 +48,7 @@ impl Fake {
         Self { child, _alone: alone }
     }
 
-    /// Opens it, as soon as it answers.
+    /// Opens it once it answers.
     fn open(&self) -> GenicamCamera {
         let until = Instant::now() + WAIT;
         loop {
@@ -72,7 +72,7 @@ impl Drop for Fake {
     }
 }
 
-/// The number that is drawn into a frame, modulo [`NUMBERS`].
+/// Number drawn into a frame, modulo [`NUMBERS`].
 fn drawn(pixels: &ndarray::Array2<u16>) -> u64 {
     u64::from(pixels[[0, 0]])
 }
@@ -87,7 +87,7 @@ fn next(camera: &mut GenicamCamera) -> Frame {
 
 #[test]
 #[cfg_attr(not(fake_gige_camera), ignore = "needs arv-fake-gv-camera-0.8")]
-fn the_camera_is_found_shown_set_and_seen() {
+fn discovers_describes_configures_and_watches_the_camera() {
     let fake = Fake::start(0);
     let mut camera = fake.open();
     let found = genicam::devices();
@@ -121,7 +121,7 @@ fn the_camera_is_found_shown_set_and_seen() {
 
 #[test]
 #[cfg_attr(not(fake_gige_camera), ignore = "needs arv-fake-gv-camera-0.8")]
-fn each_software_trigger_gives_its_frame_and_one_too_many_is_an_error() {
+fn each_software_trigger_gives_a_frame_and_a_surplus_one_is_an_error() {
     let fake = Fake::start(0);
     let mut camera = fake.open();
     camera.arm(TriggerMode::Software, EXPOSURE).unwrap();
@@ -140,7 +140,7 @@ fn each_software_trigger_gives_its_frame_and_one_too_many_is_an_error() {
     camera.finish().unwrap();
     let late = camera.image(&shot_at(12, begin), Duration::from_millis(50)).unwrap_err();
     assert!(matches!(late, CameraError::Late { trigger_number: 12, .. }), "{late:?}");
-    // A strobe at another time than the frame's: it is of another exposure.
+    // A strobe at another time belongs to another exposure.
     camera.trigger(12, EXPOSURE).unwrap();
     let elsewhere = ShotRecord { strobe_start: BoardMicros(3_600_000_000), ..shot(12) };
     let mispaired = camera.image(&elsewhere, WAIT).unwrap_err();
@@ -158,7 +158,7 @@ fn each_software_trigger_gives_its_frame_and_one_too_many_is_an_error() {
 
 #[test]
 #[cfg_attr(not(fake_gige_camera), ignore = "needs arv-fake-gv-camera-0.8")]
-fn lost_packets_are_told_and_never_give_another_exposures_frame() {
+fn reports_lost_packets_and_never_returns_another_exposures_frame() {
     // FARNEAR_GIGE_FRAMES=10000 for the long run.
     let frames = std::env::var("FARNEAR_GIGE_FRAMES").ok().and_then(|text| text.parse().ok()).unwrap_or(150);
     let fake = Fake::start(10);
@@ -166,7 +166,7 @@ fn lost_packets_are_told_and_never_give_another_exposures_frame() {
     camera.set(&Setting::ExposureUs(f64::from(EXPOSURE.0))).unwrap();
     camera.set(&Setting::Region([0, 0, 128, 128])).unwrap(); // a dozen packets a frame
     camera.watch().unwrap();
-    // The camera exposes once a period; what is drawn into the first frame says which exposure is which.
+    // One exposure per period; the first frame's number gives the offset.
     let (mut pairing, mut exposure, mut first) = (Pairing::with_jitter(WAIT * 1000), 0_u32, None);
     let (mut paired, mut told, mut passed_over) = (0, 0, 0);
     while exposure < frames {
@@ -200,7 +200,7 @@ fn lost_packets_are_told_and_never_give_another_exposures_frame() {
 
 #[test]
 #[cfg_attr(not(fake_gige_camera), ignore = "needs arv-fake-gv-camera-0.8")]
-fn a_camera_that_dies_is_said_and_the_next_one_works() {
+fn reports_a_dead_camera_and_opens_the_next_one() {
     let mut fake = Fake::start(0);
     let mut camera = fake.open();
     camera.arm(TriggerMode::Software, EXPOSURE).unwrap();
@@ -208,7 +208,7 @@ fn a_camera_that_dies_is_said_and_the_next_one_works() {
     let until = Instant::now() + 3 * WAIT;
     let gone = loop {
         match camera.image(&shot(1), Duration::from_millis(200)) {
-            Err(CameraError::Late { .. }) => assert!(Instant::now() < until, "nobody noticed"),
+            Err(CameraError::Late { .. }) => assert!(Instant::now() < until, "the end was not detected"),
             Err(error) => break error,
             Ok(_) => panic!("an image from nowhere"),
         }

@@ -1,5 +1,5 @@
-//! The whole way over GigE Vision: the emulated rig's board triggers, its camera answers over the real transport through Aravis, and what
-//! comes is held against the same rig's TCP endpoint.
+//! GigE Vision end to end: the emulated board triggers, the camera answers through Aravis, and frames are
+//! compared with the rig's TCP endpoint.
 
 use std::{
     io::{BufRead, BufReader},
@@ -19,18 +19,17 @@ use farnear_capture::{
 };
 use farnear_protocol::{message::TriggerMode, units::Micros};
 
-/// Far and near focus of the emulated rig's usual lens.
+/// Far and near focus of the default lens.
 const SENSOR: SensorPair = SensorPair { far_mm: 52.831_257, near_mm: 52.987_52 };
 const WAIT: Duration = Duration::from_secs(60);
 
-/// `farnear-sim` as `cargo xtask test` builds it, beside this test.
+/// `farnear-sim` next to this test, built by `cargo xtask test`.
 fn simulator() -> PathBuf {
     let test = std::env::current_exe().unwrap();
     let folder = test.ancestors().nth(2).unwrap_or(Path::new("."));
     folder.join("farnear-sim")
 }
 
-/// An emulated rig with its two cameras.
 struct Rig {
     child: Child,
     port: String,
@@ -69,7 +68,7 @@ impl Rig {
         loop {
             match GenicamCamera::open(&self.gige) {
                 Ok(camera) => return camera,
-                // One that was killed holds it until its heartbeat runs out.
+                // A killed client holds it until the heartbeat timeout.
                 Err(error) => assert!(Instant::now() < until, "{error}"),
             }
         }
@@ -89,20 +88,20 @@ fn pair(client: &Client, camera: &mut dyn Camera) -> Result<Pair, CaptureError> 
 
 #[test]
 #[cfg_attr(not(emulated_rig), ignore = "needs farnear-sim: cargo xtask test")]
-fn a_pair_over_gige_is_that_of_the_endpoint_bit_for_bit() {
+fn a_pair_over_gige_equals_that_of_the_endpoint() {
     let by_tcp = {
         let rig = Rig::start(5, &[]);
         let mut camera = SimCamera::connect(&rig.camera).unwrap();
         pair(&rig.client(), &mut camera).unwrap()
     };
-    // One packet in a hundred is lost, and sent again.
+    // One percent packet loss, with resends.
     let rig = Rig::start(5, &["--gige-lost", "10"]);
     let mut camera = rig.gige();
     let by_gige = pair(&rig.client(), &mut camera).unwrap();
     assert!(by_gige.far.image == by_tcp.far.image && by_gige.near.image == by_tcp.near.image);
     assert!(by_gige.far.image != by_gige.near.image);
     assert_eq!(by_gige.far.record, by_tcp.far.record);
-    // What is set acts: half the sensor, a quarter of it in bits.
+    // Half the sensor at a quarter of the bits.
     camera.set(&Setting::Region([64, 32, 320, 240])).unwrap();
     let part = pair(&rig.client(), &mut camera).unwrap();
     assert_eq!(part.far.image.pixels.dim(), (240, 320));
@@ -112,7 +111,7 @@ fn a_pair_over_gige_is_that_of_the_endpoint_bit_for_bit() {
 
 #[test]
 #[cfg_attr(not(emulated_rig), ignore = "needs farnear-sim: cargo xtask test")]
-fn a_rig_killed_in_mid_capture_is_said_and_the_next_one_works() {
+fn reports_a_killed_rig_and_works_with_the_next_one() {
     let mut rig = Rig::start(6, &["--paced"]);
     let (client, mut camera) = (rig.client(), rig.gige());
     let exposing = Arc::new(Mutex::new(false));
@@ -140,7 +139,7 @@ fn a_rig_killed_in_mid_capture_is_said_and_the_next_one_works() {
 
 #[test]
 #[cfg_attr(not(emulated_rig), ignore = "needs farnear-sim: cargo xtask test")]
-fn a_camera_that_falls_silent_while_it_is_armed_is_gone() {
+fn a_camera_silent_while_armed_is_gone() {
     for instant in [150_000, 153_300].map(Duration::from_micros) {
         let mut rig = Rig::start(6, &[]);
         let mut camera = rig.gige();
@@ -151,7 +150,7 @@ fn a_camera_that_falls_silent_while_it_is_armed_is_gone() {
                 }
             }
         });
-        // Arming takes some 60 ms; whatever it is about when it is told nothing more, the answer is the same.
+        // Arming takes some 60 ms; the result must not depend on when the rig dies.
         std::thread::sleep(instant);
         rig.child.kill().unwrap();
         let error = arming.join().unwrap();
@@ -161,7 +160,7 @@ fn a_camera_that_falls_silent_while_it_is_armed_is_gone() {
 
 #[test]
 #[cfg_attr(not(emulated_rig), ignore = "needs farnear-sim: cargo xtask test")]
-fn software_triggers_give_their_frames_and_a_camera_that_is_held_says_so() {
+fn software_triggers_give_their_frames_and_a_held_camera_is_reported() {
     let rig = Rig::start(7, &[]);
     let mut camera = rig.gige();
     let held = GenicamCamera::open(&rig.gige).err().unwrap();
@@ -172,7 +171,7 @@ fn software_triggers_give_their_frames_and_a_camera_that_is_held_says_so() {
     camera.watch().unwrap();
     let mut newest = || camera.newest(WAIT).unwrap().expect("a frame within the wait");
     let (first, second) = (newest(), newest());
-    // Chunks carry number and time in the rig's own time, whatever this computer does meanwhile.
+    // Chunks carry number and rig time.
     let frames = second.stamp.count.unwrap() - first.stamp.count.unwrap();
     let time = second.stamp.time.unwrap() - first.stamp.time.unwrap();
     assert_eq!(time, Duration::from_millis(40) * u32::try_from(frames).unwrap());
@@ -180,12 +179,12 @@ fn software_triggers_give_their_frames_and_a_camera_that_is_held_says_so() {
 
 #[test]
 #[cfg_attr(not(emulated_rig), ignore = "needs farnear-sim: cargo xtask test")]
-fn each_frame_of_a_lossy_line_is_of_its_own_exposure() {
+fn frames_of_a_lossy_line_match_their_exposures() {
     // FARNEAR_GIGE_FRAMES=10000 for the long run.
     let frames = std::env::var("FARNEAR_GIGE_FRAMES").ok().and_then(|text| text.parse().ok()).unwrap_or(24);
     let rig = Rig::start(8, &["--gige-lost", "10"]);
     let (client, mut camera) = (rig.client(), rig.gige());
-    // The endpoint has the same pictures, each with the number of its trigger.
+    // The endpoint has the same pictures with trigger numbers.
     let mut endpoint = SimCamera::connect(&rig.camera).unwrap();
     let shots = reach(&client, &SENSOR, &Exposures::default(), &mut |_| {}).unwrap().shots;
     let pace = Pace { period: Micros(0), exposures: frames };
@@ -206,11 +205,11 @@ fn each_frame_of_a_lossy_line_is_of_its_own_exposure() {
                 assert!(reason.contains("packets were lost"), "{reason}");
                 told += 1;
             }
-            // The board waits for its camera's read-out where it must.
+            // The board waits for read-out where necessary.
             Outcome::Dropped { .. } => {}
         }
     }
     println!("{frames} exposures: {whole} frames whole, {told} told as incomplete");
-    // What is lost is sent again, and again; five losses of one packet in a row are not to be seen in a lifetime.
+    // Lost packets are resent repeatedly; five losses of one packet in a row practically never occur.
     assert!(whole > 0 && told * 20 <= whole, "{whole} whole, {told} incomplete");
 }

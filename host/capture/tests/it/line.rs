@@ -1,4 +1,4 @@
-//! What the client makes of a bad line.
+//! The client on a bad line.
 
 use std::{collections::VecDeque, time::Duration};
 
@@ -14,7 +14,7 @@ use proptest::prelude::*;
 use crate::scripted::{SHORT, SHOT, connect, run_shots};
 
 #[test]
-fn lost_requests_and_lost_answers_are_asked_again_and_act_once() {
+fn repeats_lost_requests_and_acts_once() {
     let (client, peer) = connect(Faults::default());
     peer.board().faults.lose_requests = 2;
     client.home(Axis::SensorCoarse).unwrap();
@@ -24,7 +24,7 @@ fn lost_requests_and_lost_answers_are_asked_again_and_act_once() {
 }
 
 #[test]
-fn a_board_that_falls_silent_is_an_error_after_three_retries() {
+fn a_silent_board_is_an_error_after_three_retries() {
     let (client, peer) = connect(Faults::default());
     peer.board().faults.lose_requests = 100;
     let error = client.status().err().unwrap();
@@ -33,7 +33,7 @@ fn a_board_that_falls_silent_is_an_error_after_three_retries() {
 }
 
 #[test]
-fn answers_that_come_twice_do_not_answer_the_next_request() {
+fn duplicate_answers_do_not_answer_the_next_request() {
     let (client, _) = connect(Faults { duplicate_answers: true, ..Faults::default() });
     client.home(Axis::SensorCoarse).unwrap();
     for target in [1_000, 2_000, 3_000] {
@@ -44,9 +44,9 @@ fn answers_that_come_twice_do_not_answer_the_next_request() {
 }
 
 #[test]
-fn what_an_earlier_program_left_on_the_line_is_not_believed() {
+fn ignores_stale_frames_of_an_earlier_program() {
     let peer = Peer::new(Faults::default());
-    // The hello and status of this session will have the ids 1 and 2; so had those of the last one.
+    // Hello and status of this session have the ids 1 and 2, as in the last one.
     let mut stale = peer.board().hello.clone();
     stale.boot = 3;
     peer.board().put_stale(1, &Response::Hello(stale));
@@ -56,8 +56,8 @@ fn what_an_earlier_program_left_on_the_line_is_not_believed() {
 }
 
 #[test]
-fn an_answer_that_came_while_the_host_stood_still_is_not_asked_for_again() {
-    /// Gives one frame at a look. Before each answer the board says something else, and that comes at the last moment.
+fn an_answer_received_during_a_delay_is_not_requested_again() {
+    /// Delivers one frame per read; each answer comes last, after an event.
     struct Late {
         line: Box<dyn Transport>,
         peer: Peer,
@@ -98,7 +98,7 @@ fn an_answer_that_came_while_the_host_stood_still_is_not_asked_for_again() {
 }
 
 #[test]
-fn a_line_that_breaks_in_mid_program_is_named() {
+fn names_a_line_that_breaks_during_a_program() {
     let (client, _) = connect(Faults { gone_at_program: true, ..Faults::default() });
     let shot = SHOT;
     let error = run_shots(&client, &[shot], |_| Ok::<(), ClientError>(())).err().unwrap();
@@ -107,7 +107,7 @@ fn a_line_that_breaks_in_mid_program_is_named() {
 }
 
 #[test]
-fn a_line_with_noise_and_no_board_is_told_from_a_dead_one() {
+fn distinguishes_a_noisy_line_from_a_dead_one() {
     struct Noise;
     impl Transport for Noise {
         fn receive(&mut self, buffer: &mut [u8], wait: Duration) -> std::io::Result<usize> {
@@ -130,10 +130,10 @@ fn a_line_with_noise_and_no_board_is_told_from_a_dead_one() {
 
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
-    /// Garbage that ends with a delimiter costs nothing; without one it costs the frame after it, whose
-    /// request is asked again behind a flushing delimiter.
+    /// Garbage with a final delimiter costs nothing; otherwise the next frame is lost and its request
+    /// repeated behind a flushing delimiter.
     #[test]
-    fn garbage_on_the_line_is_survived(garbage in proptest::collection::vec(any::<u8>(), 0..600)) {
+    fn survives_garbage_on_the_line(garbage in proptest::collection::vec(any::<u8>(), 0..600)) {
         let mut delimited = garbage;
         delimited.push(0);
         let (client, peer) = connect(Faults { garbage: delimited, ..Faults::default() });
@@ -151,7 +151,7 @@ fn recovers_when_another_program_changes_the_ports_settings() {
     let (port, board) = farnear_scripted_board::plug_in(Faults::default());
     let client = farnear_capture::Client::open(&port).unwrap();
     client.status().unwrap();
-    // Echo and line editing, as a login shell wants them: frames have no ends of lines.
+    // Echo and line editing of a login shell: frames have no line ends.
     let set = std::process::Command::new("stty").args(["-F", &port, "sane"]).status().unwrap();
     assert!(set.success());
     client.status().unwrap();

@@ -1,4 +1,4 @@
-//! The link at another rate: asked for, found, and gone without.
+//! Link rates: requested, discovered, unavailable.
 
 use farnear_capture::Client;
 use farnear_protocol::message::{Axis, LinkRate};
@@ -11,13 +11,13 @@ fn connect_at(peer: &Peer, rate: LinkRate) -> Client {
 }
 
 #[test]
-fn a_rate_that_is_asked_for_is_had_and_the_next_program_finds_the_board_there() {
+fn sets_the_requested_rate_and_the_next_program_finds_the_board() {
     let peer = Peer::new(Faults::default());
     let client = connect_at(&peer, SLOW);
     assert_eq!((client.link_rate(), peer.board().rate, client.link_note()), (SLOW, SLOW, None));
     client.home(Axis::SensorCoarse).unwrap();
     drop(client);
-    // One that asks for none begins at the other rate.
+    // The next client requests no rate and starts at the other one.
     let next = Client::connect(peer.connect(), "scripted").unwrap();
     assert_eq!(next.link_rate(), SLOW);
     next.home(Axis::SensorCoarse).unwrap();
@@ -26,7 +26,7 @@ fn a_rate_that_is_asked_for_is_had_and_the_next_program_finds_the_board_there() 
 }
 
 #[test]
-fn a_board_that_was_reset_has_the_wanted_rate_again() {
+fn restores_the_requested_rate_after_a_reset() {
     let peer = Peer::new(Faults::default());
     let mut client = connect_at(&peer, SLOW);
     client.reboot().unwrap();
@@ -35,7 +35,7 @@ fn a_board_that_was_reset_has_the_wanted_rate_again() {
 }
 
 #[test]
-fn an_adapter_that_cannot_have_the_rate_leaves_the_link_as_it_was() {
+fn keeps_the_old_rate_if_the_adapter_cannot_change() {
     let peer = Peer::new(Faults { no_rate: Some(SLOW), ..Faults::default() });
     let client = connect_at(&peer, SLOW);
     assert_eq!((client.link_rate(), peer.board().rate), (LinkRate::START, LinkRate::START));
@@ -45,7 +45,7 @@ fn an_adapter_that_cannot_have_the_rate_leaves_the_link_as_it_was() {
 }
 
 #[test]
-fn firmware_that_does_not_know_the_request_goes_on_as_it_is() {
+fn keeps_the_old_rate_with_older_firmware() {
     let peer = Peer::new(Faults { one_rate: true, ..Faults::default() });
     let client = connect_at(&peer, SLOW);
     assert!(client.link_note().is_some());

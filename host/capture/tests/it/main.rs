@@ -1,5 +1,5 @@
-//! farnear-capture through its public face, one program for all of it: a scripted board stands at the other end of the line.
-#![allow(clippy::unwrap_used)] // a test that panics has failed, which is what it is for
+//! farnear-capture through its public API with a scripted board, in one test binary.
+#![allow(clippy::unwrap_used)]
 
 mod cameras;
 mod command_camera;

@@ -1,4 +1,4 @@
-//! Taking a pair with a scripted board, and cameras that do and do not deliver.
+//! Pairs with a scripted board and various cameras.
 
 use std::{
     fs,
@@ -23,7 +23,7 @@ use ndarray::Array2;
 
 const SENSOR: SensorPair = SensorPair { far_mm: 52.8313, near_mm: 52.9875 };
 
-/// A camera that answers for each exposure so.
+/// A camera with this answer per exposure.
 struct Answering(fn(&ShotRecord) -> Result<Image, CameraError>);
 
 impl Camera for Answering {
@@ -41,12 +41,12 @@ impl Camera for Answering {
     }
 }
 
-/// Gives each exposure a picture that tells its trigger number.
+/// Pictures contain their trigger number.
 fn numbered() -> Answering {
     Answering(|shot| Ok(Image { pixels: Array2::from_elem((3, 4), shot.trigger_number as u16), bits: 8 }))
 }
 
-/// Gives the picture of the trigger after the one that was asked for.
+/// Returns the picture of the next trigger.
 fn one_ahead() -> Answering {
     Answering(|shot| Err(CameraError::Skipped { wanted: shot.trigger_number, came: shot.trigger_number + 1 }))
 }
@@ -80,7 +80,7 @@ fn names(folder: &Path) -> Vec<String> {
 }
 
 #[test]
-fn a_pair_is_homed_moved_exposed_and_written() {
+fn homes_moves_exposes_and_writes_a_pair() {
     let (client, peer) = client();
     let mut said = Vec::new();
     let pair = capture_pair(&client, &mut numbered(), &SENSOR, &exposures(), &mut |text| {
@@ -89,7 +89,7 @@ fn a_pair_is_homed_moved_exposed_and_written() {
     .unwrap();
     assert!(said[0].contains("homing the sensor's coarse axis (its position is unknown)"), "{said:?}");
     assert_eq!((pair.far.image.pixels[[0, 0]], pair.near.image.pixels[[0, 0]]), (0, 1));
-    // The piezo makes up for the 375 nm that the scripted coarse stage is off; its own 2 nm remain.
+    // The piezo compensates the coarse stage's error of 375 nm; its own 2 nm remain.
     for taken in [&pair.far, &pair.near] {
         assert!((taken.sensor_measured_mm - taken.sensor_asked_mm + 2e-6).abs() < 1.5e-6, "{taken:?}");
     }
@@ -103,7 +103,7 @@ fn a_pair_is_homed_moved_exposed_and_written() {
     assert_eq!(read_record(&folder).unwrap().unwrap(), record);
     assert_eq!(names(root.path()), ["pair"]);
 
-    // The second time it is homed already, and needs no homing.
+    // Already homed the second time.
     let acts = peer.board().acts;
     let mut said = Vec::new();
     client.set_timing(Timing::EMULATED);
@@ -125,12 +125,12 @@ fn behind_a_half_mirror_one_trigger_gives_both_images() {
     let pair = take(&exposures());
     assert_eq!((pair.far.image.pixels[[0, 0]], pair.near.image.pixels[[0, 0]]), (0, 0));
     assert_eq!(pair.far.record, pair.near.record);
-    // The second sensor's place is what was said of it, whatever the optics ask for.
+    // The second sensor's position is the given one, independent of the optics.
     let apart_mm = pair.near.sensor_measured_mm - pair.far.sensor_measured_mm;
     assert!((apart_mm - 0.15).abs() < 1e-9 && pair.further_mm == Some(0.15), "{apart_mm}");
     assert_eq!(pair.near.sensor_asked_mm, SENSOR.near_mm);
     let acts = peer.board().acts;
-    // One exposure was taken, and it is not counted as motion.
+    // One exposure, which does not count as motion.
     let record = &pair.far.record;
     let until_end = record.strobe_end.0 - record.trigger.0 + u64::from(record.settle.0);
     assert_eq!(pair.moving_us(), until_end - u64::from(record.exposure.0));
@@ -138,14 +138,14 @@ fn behind_a_half_mirror_one_trigger_gives_both_images() {
     let averaged = take(&Exposures { averaged: 3, ..exposures() });
     let more = peer.board().acts - acts;
     assert_eq!(more, 2, "the coarse stage moved, one program ran");
-    // The triggers 1 to 3 in two bits more: 2 of 255 are 8 of 1023.
+    // Triggers 1 to 3 with two more bits: 2 of 255 is 8 of 1023.
     for taken in [&averaged.far, &averaged.near] {
         assert_eq!((taken.image.bits, taken.image.pixels[[0, 0]]), (10, 8));
     }
 }
 
 #[test]
-fn a_picture_of_another_trigger_by_either_camera_is_an_error_with_both_numbers() {
+fn a_picture_of_another_trigger_is_an_error_with_both_numbers() {
     for which in [1, 2] {
         let (client, peer) = client();
         let (mut good, mut bad) = (numbered(), one_ahead());
@@ -177,7 +177,7 @@ fn a_port_that_goes_away_leaves_no_folder() {
     assert_eq!(names(root.path()), Vec::<String>::new());
 }
 
-/// Gives a picture for each exposure, and has one more at the end.
+/// Delivers a surplus picture at the end.
 struct OneTooMany;
 
 impl Camera for OneTooMany {
@@ -199,14 +199,14 @@ impl Camera for OneTooMany {
 }
 
 #[test]
-fn a_picture_that_no_exposure_accounts_for_makes_the_pair_an_error() {
+fn a_surplus_picture_fails_the_pair() {
     let (client, _peer) = client();
     let error = capture_pair(&client, &mut OneTooMany, &SENSOR, &exposures(), &mut |_| {}).unwrap_err();
     assert!(matches!(error, CaptureError::Camera(CameraError::Surplus { .. })), "{error:?}");
 }
 
 #[test]
-fn a_camera_that_gives_nothing_stops_the_rig() {
+fn a_silent_camera_stops_the_rig() {
     let (client, peer) = client();
     let folder = tempfile::tempdir().unwrap();
     let mut camera = FolderCamera::watch(folder.path()).unwrap();

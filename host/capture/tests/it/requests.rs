@@ -1,4 +1,4 @@
-//! What is asked and answered at once, and what refusals and failures say.
+//! Requests without long work; texts of refusals and failures.
 
 use std::time::Duration;
 
@@ -45,7 +45,7 @@ fn settings_are_read_and_changed_within_their_range() {
 }
 
 #[test]
-fn the_log_comes_in_pieces_that_tell_what_is_missing() {
+fn log_parts_report_missing_ones() {
     let (client, peer) = connect(Faults::default());
     let stream = client.logs().unwrap();
     client.status().unwrap(); // the stream is open
@@ -59,7 +59,7 @@ fn the_log_comes_in_pieces_that_tell_what_is_missing() {
 }
 
 #[test]
-fn refusals_and_failures_say_what_to_do() {
+fn refusals_and_failures_give_a_remedy() {
     let (client, peer) = connect(Faults::default());
     let error = client.move_to(Axis::SensorCoarse, Nanometres(5)).err().unwrap();
     assert!(error.to_string().contains("home it first"), "{error}");

@@ -1,4 +1,4 @@
-//! A client with the scripted board at the other end of the line.
+//! A client connected to the scripted board.
 
 use std::time::Duration;
 
@@ -9,8 +9,8 @@ use farnear_protocol::{
 };
 use farnear_scripted_board::{Board, Faults, Peer};
 
-/// Short waits: the board answers at once or never. Work has longer than a crowded machine makes this thread
-/// stand, or good work is called overdue.
+/// Short timeouts for a board that answers immediately or never. The one for work tolerates scheduling
+/// delays.
 pub const SHORT: Timing = Timing {
     reply: Duration::from_millis(20),
     retries: 3,
@@ -23,7 +23,6 @@ pub const SHORT: Timing = Timing {
 /// As [`SHORT`], for work that never ends.
 pub const OVERDUE_SOON: Timing = Timing { work_slack: Duration::from_millis(80), ..SHORT };
 
-/// A shot by piezo.
 pub const SHOT: Shot = Shot {
     axis: Axis::SensorFine,
     target: Nanometres(10_000),
@@ -34,7 +33,6 @@ pub const SHOT: Shot = Shot {
     mode: TriggerMode::Hardware,
 };
 
-/// A connected client and the board.
 pub fn connect(faults: Faults) -> (Client, Peer) {
     let peer = Peer::new(faults);
     let client = Client::connect(peer.connect(), "scripted").unwrap();
@@ -42,14 +40,14 @@ pub fn connect(faults: Faults) -> (Client, Peer) {
     (client, peer)
 }
 
-/// Why a board with these faults and this change cannot be talked to.
+/// Connection error with these faults and this change.
 pub fn connect_error(faults: Faults, change: impl FnOnce(&mut Board)) -> ClientError {
     let peer = Peer::new(faults);
     change(&mut peer.board());
     Client::connect(peer.connect(), "scripted").err().unwrap()
 }
 
-/// Arms and runs a program; `on_shot` is told of each exposure.
+/// Arms and runs a program; `on_shot` receives each exposure.
 pub fn run_shots(
     client: &Client,
     shots: &[Shot],

@@ -1,4 +1,4 @@
-//! Who is there, and what becomes of a session: versions, resets, an unplugged board.
+//! Sessions: versions, resets, unplugged boards.
 
 use std::time::Duration;
 
@@ -20,7 +20,7 @@ fn hello_gives_the_board_and_its_boot() {
 }
 
 #[test]
-fn handles_are_used_from_many_threads_and_the_port_is_closed_with_the_last() {
+fn handles_work_from_many_threads_and_the_last_one_closes_the_port() {
     let (client, peer) = connect(Faults::default());
     std::thread::scope(|scope| {
         for thread in 0..4 {
@@ -35,12 +35,12 @@ fn handles_are_used_from_many_threads_and_the_port_is_closed_with_the_last() {
     assert_eq!(peer.board().acts, 80);
     let log = client.logs().unwrap();
     drop(client);
-    // The last handle has gone, and with it the thread that told the log.
+    // The last handle is dropped, and with it the port's thread.
     assert!(log.next_within(Duration::ZERO).is_err());
 }
 
 #[test]
-fn a_board_that_was_unplugged_is_found_again() {
+fn finds_an_unplugged_board_again() {
     let peer = Peer::new(Faults { never_ends: true, ..Faults::default() });
     let mut client = Client::connect(peer.connect(), "scripted").unwrap();
     client.set_timing(SHORT);
@@ -59,7 +59,7 @@ fn a_board_that_was_unplugged_is_found_again() {
 }
 
 #[test]
-fn a_board_that_comes_back_on_another_port_is_told_and_another_board_is_not_taken_for_it() {
+fn reports_a_board_on_another_port_and_rejects_another_board() {
     struct Named(Box<dyn Transport>, &'static str);
     impl Transport for Named {
         fn receive(&mut self, buffer: &mut [u8], wait: Duration) -> std::io::Result<usize> {
@@ -100,7 +100,7 @@ fn a_board_that_comes_back_on_another_port_is_told_and_another_board_is_not_take
     leave(&client);
     let sessions = peer.board().session;
     let until = std::time::Instant::now() + Duration::from_secs(20);
-    // The owner looks for the board by itself, and may have found the other one before it is asked.
+    // The owner reconnects on its own and may have found the other board already.
     let error = loop {
         match client.reopen().err().unwrap() {
             ClientError::Gone { .. } if std::time::Instant::now() < until => {}
@@ -117,8 +117,8 @@ fn a_board_that_comes_back_on_another_port_is_told_and_another_board_is_not_take
 }
 
 #[test]
-fn the_work_of_a_program_that_died_is_not_taken_for_this_ones() {
-    // The first program dies in mid-move: its work goes on, and its ids were the smallest there are.
+fn ignores_the_work_of_a_dead_program() {
+    // The first program dies during a move: its work continues, with the smallest ids.
     let peer = Peer::new(Faults { never_ends: true, ..Faults::default() });
     let died = Client::connect(peer.connect(), "scripted").unwrap();
     let old = died.start_home(Axis::SensorCoarse).unwrap();
@@ -131,13 +131,13 @@ fn the_work_of_a_program_that_died_is_not_taken_for_this_ones() {
     assert!(work.id() > old_id);
     let error = work.homed().err().unwrap();
     assert!(matches!(error, ClientError::Overdue { .. }), "the old work's end is not this one's: {error:?}");
-    // The first one's next words are refused, and it is told why.
+    // Its later requests are refused with the reason.
     let error = died.status().err().unwrap();
     assert!(matches!(error, ClientError::TakenOver { .. }), "{error:?}");
 }
 
 #[test]
-fn an_end_on_another_axis_or_at_another_place_is_not_believed() {
+fn ignores_an_end_on_another_axis_or_at_another_position() {
     let (client, peer) = connect(Faults { never_ends: true, ..Faults::default() });
     let work = client.start_move(Axis::SensorFine, Nanometres(5_000)).unwrap();
     let (request, measured) = (work.id(), Nanometres(5_000));
@@ -148,11 +148,11 @@ fn an_end_on_another_axis_or_at_another_place_is_not_believed() {
 }
 
 #[test]
-fn a_board_that_dies_in_mid_move_is_told() {
+fn reports_a_board_that_dies_during_a_move() {
     let (client, peer) = connect(Faults { never_ends: true, ..Faults::default() });
     client.set_timing(Timing { work_slack: Duration::from_secs(3600), ..SHORT });
     let work = client.start_home(Axis::SensorCoarse).unwrap();
-    // The power goes and does not come back; the adapter stays where it is.
+    // Power fails permanently; the adapter stays.
     peer.board().faults.lose_requests = u32::MAX;
     let error = work.homed().err().unwrap();
     assert!(matches!(error, ClientError::Silent { attempts: 8, .. }), "{error:?}");
@@ -164,7 +164,7 @@ fn a_board_that_dies_in_mid_move_is_told() {
 }
 
 #[test]
-fn the_old_port_is_closed_before_the_board_is_looked_for() {
+fn closes_the_old_port_before_searching_the_board() {
     let peer = Peer::new(Faults { never_ends: true, ..Faults::default() });
     let mut client = Client::connect(peer.connect(), "scripted").unwrap();
     client.set_timing(SHORT);
@@ -172,18 +172,14 @@ fn the_old_port_is_closed_before_the_board_is_looked_for() {
     peer.board().gone = true;
     assert!(matches!(work.homed().err().unwrap(), ClientError::Gone { .. }));
     assert!(client.reopen().is_err());
-    assert_eq!(
-        peer.board().connections,
-        0,
-        "whoever holds a port that has gone makes the board come back under another name"
-    );
+    assert_eq!(peer.board().connections, 0, "a held port would give the returning board another name");
     peer.board().gone = false;
     client.reopen_within(Duration::from_secs(20)).unwrap();
     assert_eq!(peer.board().connections, 1);
 }
 
 #[test]
-fn a_reset_while_nothing_is_asked_has_to_be_understood() {
+fn an_idle_reset_requires_a_reopen() {
     let (mut client, peer) = connect(Faults::default());
     client.home(Axis::SensorCoarse).unwrap();
     peer.board().reset(ResetCause::BrownOut);
@@ -197,7 +193,7 @@ fn a_reset_while_nothing_is_asked_has_to_be_understood() {
 }
 
 #[test]
-fn a_reset_in_mid_move_is_seen_whether_it_announces_itself_or_not() {
+fn detects_a_reset_during_a_move_with_and_without_event() {
     for silent_reset in [false, true] {
         let (mut client, peer) = connect(Faults { silent_reset, ..Faults::default() });
         client.home(Axis::SensorCoarse).unwrap();
@@ -213,7 +209,7 @@ fn a_reset_in_mid_move_is_seen_whether_it_announces_itself_or_not() {
 }
 
 #[test]
-fn a_reboot_happens_once_though_its_answer_is_lost() {
+fn reboots_once_despite_a_lost_answer() {
     let (mut client, peer) = connect(Faults::default());
     peer.board().faults.lose_answers = 1;
     client.reboot().unwrap();
@@ -237,7 +233,7 @@ fn a_board_of_another_protocol_is_refused_with_both_versions() {
 }
 
 #[test]
-fn a_newer_board_that_still_speaks_our_version_is_welcome_whatever_its_key() {
+fn accepts_a_newer_board_with_a_common_version() {
     let peer = Peer::new(Faults::default());
     peer.board().hello.protocol_current = 9;
     peer.board().hello.schema_key ^= 1;
@@ -246,7 +242,7 @@ fn a_newer_board_that_still_speaks_our_version_is_welcome_whatever_its_key() {
 }
 
 #[test]
-fn another_message_table_under_the_same_number_is_refused_with_both_keys() {
+fn rejects_another_message_table_with_both_keys() {
     let error = connect_error(Faults::default(), |board| board.hello.schema_key ^= 0xff);
     let ClientError::Schema { board_key, host_key, .. } = error else { panic!("{error:?}") };
     assert_eq!(board_key, host_key ^ 0xff);

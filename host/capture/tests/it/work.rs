@@ -1,4 +1,4 @@
-//! Long work: its end, its deadline, its interruption, and what is lost on the way.
+//! Long work: end, deadline, interruption, lost events.
 
 use std::{
     sync::{Arc, atomic::AtomicBool},
@@ -24,7 +24,7 @@ fn homing_and_moving_end_with_their_events() {
 }
 
 #[test]
-fn lost_events_are_read_again() {
+fn rereads_lost_events() {
     // Event 0 is the start, 1 homed, 2 the move, 3 and 4 the shots, 5 the end of the program.
     for lost in [vec![1], vec![3], vec![5], vec![1, 2, 3, 4, 5]] {
         let (client, peer) = connect(Faults { lose_events: lost.clone(), ..Faults::default() });
@@ -50,14 +50,14 @@ fn events_that_the_board_forgot_are_an_error() {
 }
 
 #[test]
-fn work_whose_end_is_never_told_is_an_error() {
+fn work_without_a_final_event_is_an_error() {
     let (client, _) = connect(Faults { end_unsaid: true, ..Faults::default() });
     let error = client.home(Axis::SensorCoarse).err().unwrap();
     assert!(matches!(error, ClientError::NoEnd { .. }), "{error:?}");
 }
 
 #[test]
-fn work_that_does_not_end_is_stopped_at_its_deadline() {
+fn stops_endless_work_at_its_deadline() {
     let (client, peer) = connect(Faults { never_ends: true, ..Faults::default() });
     client.set_timing(OVERDUE_SOON);
     let error = client.home(Axis::SensorCoarse).err().unwrap();
@@ -78,11 +78,11 @@ fn an_interruption_stops_the_rig() {
     interrupter.join().unwrap();
     assert!(matches!(error, ClientError::Interrupted { .. }), "{error:?}");
     let board = peer.board();
-    assert_eq!((board.stops, board.braking), (1, 0), "it is told when it stands");
+    assert_eq!((board.stops, board.braking), (1, 0), "reported at standstill");
 }
 
 #[test]
-fn an_error_in_mid_program_stops_the_rig() {
+fn an_error_during_a_program_stops_the_rig() {
     let (client, peer) = connect(Faults::default());
     let shot = SHOT;
     let no_image = || ClientError::NoEnd { during: "waiting for the image".into() };
@@ -92,12 +92,12 @@ fn an_error_in_mid_program_stops_the_rig() {
 }
 
 #[test]
-fn a_board_that_asks_is_answered_as_long_as_somebody_holds_the_work() {
+fn answers_keep_alives_while_the_work_is_held() {
     let (client, peer) = connect(Faults { asks_first: 3, ..Faults::default() });
     client.home(Axis::SensorCoarse).unwrap();
     assert_eq!(peer.board().still_there, 3);
     assert_eq!(peer.board().keep_alives, [Micros(2_000_000)]);
-    // Held, but not waited for: the thread that owns the port answers.
+    // Held without waiting: the port's thread answers.
     let work = client.start_home(Axis::Lens).unwrap();
     let until = Instant::now() + Duration::from_secs(20);
     while peer.board().still_there < 6 && Instant::now() < until {
@@ -105,7 +105,7 @@ fn a_board_that_asks_is_answered_as_long_as_somebody_holds_the_work() {
     }
     assert_eq!(peer.board().still_there, 6);
     work.homed().unwrap();
-    // Nobody holds it: the rig is stopped.
+    // Dropped: the rig is stopped.
     peer.board().faults = Faults { never_ends: true, ..Faults::default() };
     let stops = peer.board().stops;
     drop(client.start_home(Axis::Lens).unwrap());
@@ -126,7 +126,7 @@ fn two_axes_move_at_the_same_time() {
 }
 
 #[test]
-fn what_begins_together_ends_each_by_itself_and_where_one_is_refused_none_goes_on() {
+fn works_started_together_end_separately_and_one_refusal_stops_all() {
     let (client, peer) = connect(Faults::default());
     let homed = client.start_homing(&[Axis::SensorCoarse, Axis::Lens]).unwrap();
     for work in homed {
@@ -145,7 +145,7 @@ fn what_begins_together_ends_each_by_itself_and_where_one_is_refused_none_goes_o
 }
 
 #[test]
-fn a_program_is_armed_once_run_twice_and_told_of_shots_that_the_host_triggers() {
+fn runs_an_armed_program_twice_and_reports_software_triggered_shots() {
     let (client, peer) = connect(Faults::default());
     let error = client.start_program(&[]).err().unwrap();
     assert!(matches!(error, ClientError::NotArmed), "{error:?}");

@@ -1,10 +1,10 @@
-//! Whether the bytes of an image file are all there, and which formats are not read.
+//! Checks for truncated files and unsupported formats.
 
-/// What to do with a raw file.
+/// Remedy for raw files.
 pub(super) const RAW: &str = "it is a camera's raw file: develop it to a 16-bit TIFF, linear and without sharpening (with `dcraw -4 -T`, \
                               RawTherapee or darktable), and give that";
 
-/// What an image file in a format that is not read is, and what to do with it; `None` for all others.
+/// Description and remedy of an unsupported format, else `None`.
 pub(super) fn unsupported(bytes: &[u8]) -> Option<&'static str> {
     let brand = |names: &[&[u8]]| {
         bytes.get(4..8) == Some(b"ftyp") && names.iter().any(|name| bytes.get(8..12) == Some(name))
@@ -37,11 +37,11 @@ pub(super) fn unsupported(bytes: &[u8]) -> Option<&'static str> {
     OTHERS.iter().find(|(magic, _)| bytes.starts_with(magic)).map(|(_, advice)| *advice)
 }
 
-/// Whether a JPEG has its end: the marker after the last scan. What follows it (previews, films) does not matter.
+/// Whether a JPEG has its end marker after the last scan; later data (previews, films) is ignored.
 pub(super) fn jpeg_has_its_end(bytes: &[u8]) -> bool {
     let mut at = 2;
     loop {
-        // Between segments: a marker, perhaps after fill bytes.
+        // Between segments: a marker, possibly after fill bytes.
         let Some(found) = bytes
             .get(at..)
             .and_then(|rest| rest.windows(2).position(|two| two[0] == 0xff && two[1] != 0xff && two[1] != 0))
@@ -56,13 +56,13 @@ pub(super) fn jpeg_has_its_end(bytes: &[u8]) -> bool {
             _ => {
                 let Some(&[high, low]) = bytes.get(at..at + 2) else { return false };
                 at += usize::from(u16::from_be_bytes([high, low])).max(2);
-                // Data of a scan has no marker but resets, and the search above passes over it.
+                // Scan data has no marker except resets, which the search skips.
             }
         }
     }
 }
 
-/// Significant bits of a PNG's first channel (chunk sBIT), where it gives them.
+/// Significant bits of a PNG's first channel (chunk sBIT), if given.
 pub(super) fn png_significant_bits(bytes: &[u8]) -> Option<u8> {
     let mut at = 8;
     loop {

@@ -1,4 +1,4 @@
-//! From bytes to samples: the right format, the right way up, grey.
+//! Decodes files to upright grey samples.
 
 use std::io::Cursor;
 
@@ -12,44 +12,42 @@ use zune_jpeg::{
 use super::{GreyImage, ReadSettings, Samples, complete, tiff_file, tiff_tags};
 use crate::video::Pixels;
 
-/// Images in 8 bits a sample.
 pub(crate) type Samples8 = Pixels;
 
-/// Most bytes that a byte of a file can stand for (deflate: 1032), and what small files may have anyway.
+/// Largest expansion of a compressed byte (deflate: 1032), with a margin for small files.
 const EXPANSION: u64 = 1100;
 const SMALL_BYTES: u64 = 64 << 20;
-/// Bits in which a saturated camera's largest code is looked for within 16.
+/// Bit depths searched for a saturated camera in 16-bit samples.
 const CAMERA_BITS: std::ops::RangeInclusive<u32> = 8..=15;
-/// Pixels at the largest code from which that is the white level.
+/// Pixels at the largest code that make it the white level.
 const SATURATED_PX: usize = 4;
 
-/// Samples as a file stores them.
 pub(crate) enum Values {
     U8(Vec<u8>),
     U16(Vec<u16>),
-    /// 32-bit integers as their part of the full scale.
+    /// 32-bit integers as a fraction of full scale.
     U32(Vec<f32>),
     F32(Vec<f32>),
 }
 
-/// A decoded image: rows of pixels of `channels` samples each.
+/// Rows of pixels with `channels` samples each.
 pub(crate) struct Decoded {
     pub width: usize,
     pub height: usize,
     pub channels: usize,
-    /// 1 or 3: samples of a pixel that are grey or colour; the rest is alpha.
+    /// 1 (grey) or 3 (colour); further samples are alpha.
     pub colours: usize,
     pub values: Values,
-    /// Bits of the camera within a 16-bit sample, from the file's metadata: a white level in codes.
+    /// White level in codes from metadata on the camera's bit depth.
     pub white_level: Option<u16>,
 }
 
-/// Most bytes that a file of this length can hold decoded.
+/// Largest decoded size of a file of this length.
 pub(super) fn most_bytes(file: usize) -> u64 {
     SMALL_BYTES.max((file as u64).saturating_mul(EXPANSION))
 }
 
-/// Decodes a file's only image, or the page (from 1).
+/// Decodes the only image, or this page (from 1).
 pub(crate) fn decode(bytes: &[u8], page: Option<usize>) -> Result<Decoded, String> {
     if let Some(advice) = complete::unsupported(bytes) {
         return Err(advice.into());
@@ -96,7 +94,7 @@ fn jpeg(bytes: &[u8]) -> Result<(Decoded, u8), String> {
     Ok((decoded, orientation.map_or(1, image::metadata::Orientation::to_exif)))
 }
 
-/// Whether a decoder still reads when the data go on before the end marker: then they ended early.
+/// Whether the decoder reads on when the data continue before the end marker: then they ended early.
 fn needs_more(bytes: &[u8], values: &[u8], options: DecoderOptions, to: ColorSpace) -> bool {
     const FURTHER: [u8; 64] = [0xa6; 64];
     let Some(end) = bytes.windows(2).rposition(|two| two == [0xff, 0xd9]) else { return true };
@@ -116,7 +114,7 @@ fn other(bytes: &[u8]) -> Result<(Decoded, u8), String> {
         let (width, height) = decoder.dimensions();
         return Err(format!("it is incomplete: {} bytes cannot hold {width}x{height} px", bytes.len()));
     }
-    // What it decodes to was checked; what the decoder needs on its way is of that size.
+    // The decoded size was checked; the decoder's buffers are of that size.
     let mut limits = Limits::no_limits();
     limits.max_alloc = Some(2 * most_bytes(bytes.len()));
     decoder.set_limits(limits).map_err(|error| error.to_string())?;
@@ -136,14 +134,13 @@ fn other(bytes: &[u8]) -> Result<(Decoded, u8), String> {
         other => return Err(format!("its pixels are {:?}; convert it to grey or RGB", other.color())),
     };
     let significant = (format == ImageFormat::Png).then(|| complete::png_significant_bits(bytes)).flatten();
-    // Shifted up to 16 bits: the largest code has zeros at its end.
+    // Shifted up to 16 bits: the largest code has trailing zeros.
     let white_level = significant.filter(|bits| (8..16).contains(bits)).map(|bits| 0xffff << (16 - bits));
     let colours = if channels < 3 { 1 } else { 3 };
     Ok((Decoded { width, height, channels, colours, values, white_level }, orientation))
 }
 
 impl Decoded {
-    /// Grey values, by the settings.
     pub(crate) fn grey(self, settings: &ReadSettings) -> Result<GreyImage, String> {
         let of_file = if let Values::U16(codes) = &self.values {
             settings
@@ -183,7 +180,7 @@ impl Decoded {
         Ok(GreyImage { pixels, samples, colour: self.colours == 3, white_level })
     }
 
-    /// 8 bits a sample, without alpha.
+    /// 8 bits per sample without alpha.
     pub(crate) fn in_8_bits(self) -> Result<Pixels, String> {
         let bytes = match self.values {
             Values::U8(values) => values,
@@ -208,7 +205,7 @@ impl Decoded {
         Array3::from_shape_vec((size.0, size.1, 3), kept).map(Pixels::Rgb).map_err(wrong)
     }
 
-    /// The image the right way up, by an EXIF orientation from 1 to 8.
+    /// Applies an EXIF orientation (1 to 8).
     fn turned(mut self, orientation: u8) -> Self {
         if !(2..=8).contains(&orientation) {
             return self;
@@ -247,7 +244,7 @@ fn turn<T: Copy>(values: &mut Vec<T>, (height, width): (usize, usize), channels:
     *values = turned;
 }
 
-/// Weighted mean of each pixel's colours, divided by the full scale.
+/// Weighted mean of the colours, divided by full scale.
 fn greys<T: Copy + Into<f64>>(
     samples: &[T],
     (channels, colours): (usize, usize),
@@ -269,8 +266,8 @@ fn greys<T: Copy + Into<f64>>(
     pixels.map(|p| (p[0].into() * r + p[1].into() * g + p[2].into() * b) as f32).collect()
 }
 
-/// The code at which a camera of fewer than 16 bits saturates, where several pixels have it: 2^n - 1 in the lower bits, or with
-/// zeros below in the upper bits. `None` where nothing is saturated, for then it does not matter.
+/// Saturation code of a camera with fewer than 16 bits, if several pixels have it: 2^n - 1 in the lower bits,
+/// or in the upper bits with zeros below. `None` without saturation.
 fn white_of_values(codes: &[u16]) -> Option<u16> {
     let (mut largest, mut used) = (0, 0);
     for code in codes {

@@ -1,4 +1,4 @@
-//! One small image of each kind that is read, and of each that is refused.
+//! A small image of each supported and each refused kind.
 
 mod made;
 mod refused;
@@ -64,7 +64,7 @@ fn tiff_with_16_bits_and_float_is_read() {
 }
 
 #[test]
-fn what_is_no_image_is_named() {
+fn names_files_that_are_not_images() {
     let missing = read_grey(Path::new("no-such.png")).unwrap_err();
     assert!(missing.to_string().starts_with("cannot read no-such.png"), "{missing}");
     let text = read_grey(Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/Cargo.toml"))).unwrap_err();
@@ -75,7 +75,7 @@ fn what_is_no_image_is_named() {
 }
 
 proptest! {
-    /// Whatever follows an image's magic number, reading ends with an image or an error.
+    /// Random data after a magic number gives an image or an error.
     #[test]
     fn broken_files_do_not_panic(kind in 0..5usize, tail in proptest::collection::vec(any::<u8>(), 0..200)) {
         let heads: [&[u8]; 5] = [b"\x89PNG\r\n\x1a\n", b"\xff\xd8\xff\xe0", b"II*\0", b"MM\0*", b"P5 "];
@@ -83,7 +83,7 @@ proptest! {
         let _ = decode_grey(&bytes);
     }
 
-    /// The same of real ones of which some bytes are others, or of which the end is lost: these are read beyond their first lines.
+    /// Damaged or truncated pictures, which pass their first lines, are read or refused.
     #[test]
     fn damaged_pictures_are_read_or_refused(
         which in any::<Index>(),
@@ -103,7 +103,7 @@ proptest! {
     }
 }
 
-/// One of each kind that is read, 7 x 5 pixels.
+/// One picture of each supported kind, 7 x 5 px.
 static PICTURES: LazyLock<Vec<Vec<u8>>> = LazyLock::new(|| {
     use image::{ImageFormat, Luma, Rgb, RgbImage, codecs::jpeg::JpegEncoder};
     use tiff::encoder::{Compression, colortype};

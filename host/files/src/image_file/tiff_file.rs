@@ -1,4 +1,4 @@
-//! TIFF files: which of their images are pages, and the pixels of one.
+//! TIFF pages and their pixels.
 
 use std::{io::Cursor, path::Path};
 
@@ -17,18 +17,16 @@ use super::{
 /// Photometric interpretations of raw files: colour filter array and linear raw (TIFF/EP, DNG).
 const RAW_PHOTOMETRIC: [u64; 2] = [32803, 34892];
 
-/// An image of full resolution in a TIFF file.
+/// A full-resolution image of a TIFF file.
 #[derive(Debug, Clone)]
 pub(crate) struct Page {
-    /// Its place among all images of the file, from 0.
+    /// Index among all images of the file, from 0.
     pub index: usize,
     pub directory: Directory,
 }
 
-/// Number of images of full resolution in a file: 1 unless it is a TIFF with several pages.
-///
-/// # Errors
-/// [`ImageError`] for a file that cannot be read, a raw file, one with previews only.
+/// Number of full-resolution images; 1 for other formats.
+/// Errors: [`ImageError`] for an unreadable or raw file, or one with previews only.
 pub fn page_count(path: &Path) -> Result<usize, ImageError> {
     let bytes = read_bytes(path)?;
     if !tiff_tags::is_tiff(&bytes) || complete::unsupported(&bytes).is_some() {
@@ -37,10 +35,8 @@ pub fn page_count(path: &Path) -> Result<usize, ImageError> {
     pages(&bytes).map(|pages| pages.len()).map_err(|reason| ImageError::Format { path: path.into(), reason })
 }
 
-/// The images of full resolution.
-///
-/// # Errors
-/// In words, for raw files and files that hold only previews.
+/// Full-resolution images.
+/// Errors: a message for raw files, or previews only.
 pub(crate) fn pages(bytes: &[u8]) -> Result<Vec<Page>, String> {
     let directories = tiff_tags::directories(bytes)?;
     let Some(first) = directories.first() else { return Err("it holds no image".into()) };
@@ -161,7 +157,7 @@ fn decode_page(bytes: &[u8], page: &Page) -> Result<Decoded, String> {
         }
         other => return Err(format!("its pixels are {other:?}: convert it to grey or RGB")),
     };
-    // With other extra samples than alpha a pixel has more samples than its colours.
+    // Extra samples other than alpha count as channels.
     let channels = channels.max(samples_per_pixel as usize);
     let mut data = DecodingResult::U8(Vec::new());
     let layout = decoder.read_image_to_buffer(&mut data).map_err(say)?;
@@ -199,19 +195,19 @@ fn decode_page(bytes: &[u8], page: &Page) -> Result<Decoded, String> {
     Ok(Decoded { width, height, channels, colours, values, white_level })
 }
 
-/// The code at which the camera saturates, where the file gives it: in the description, as farnear writes it, or as the largest
-/// sample of fewer than 16 bits.
+/// Saturation code from the description (as written by farnear), or from the maximum sample value below 16
+/// bits.
 fn camera_white(directory: &Directory) -> Option<u16> {
     let described = directory.description.as_deref().and_then(|text| {
         text.split_whitespace().find_map(|word| word.strip_prefix("white_level=")?.parse().ok())
     });
-    // Tag 281 is often the largest value of the image instead.
+    // Tag 281 is often the image's maximum instead.
     let largest = directory.max_sample_value.and_then(|v| u16::try_from(v).ok());
     let of_bits = largest.filter(|v| *v >= 255 && *v < u16::MAX && (u32::from(*v) + 1).is_power_of_two());
     described.or(of_bits)
 }
 
-/// Planes one after the other become pixels.
+/// Converts planes to interleaved pixels.
 fn interleaved<T: Copy>(values: Vec<T>, planes: usize) -> Vec<T> {
     if planes == 1 {
         return values;
@@ -223,7 +219,7 @@ fn interleaved<T: Copy>(values: Vec<T>, planes: usize) -> Vec<T> {
         .collect()
 }
 
-/// Samples of 1, 2 or 4 bits, highest first, rows beginning with a byte, spread over 8 bits.
+/// Unpacks samples of 1, 2 or 4 bits, MSB first, with byte-aligned rows, to 8 bits.
 fn unpacked(bytes: &[u8], width: usize, height: usize, bits: u8) -> Result<Vec<u8>, String> {
     let per_byte = usize::from(8 / bits);
     let row_bytes = width.div_ceil(per_byte);

@@ -1,25 +1,21 @@
-//! The directories of a TIFF file: sizes, kinds and descriptions of its images, without their pixels.
+//! TIFF directories without pixels: sizes, kinds and descriptions.
 //!
-//! The `tiff` crate refuses a file whose first directory it cannot decode, as raw files of cameras have; what such a file is
-//! has to be known to say what to do. TIFF 6.0, section 2; BigTIFF as in libtiff's design.
+//! The `tiff` crate refuses files whose first directory it cannot decode, such as raw files; error messages
+//! need their kind. TIFF 6.0, section 2; BigTIFF as in libtiff's design.
 
-/// Most directories that are followed.
 const DIRECTORIES_MAX: usize = 100_000;
-/// Most entries of a directory that are read.
 const ENTRIES_MAX: u64 = 4096;
-/// Longest text that is read, bytes: OME-XML of large stacks has megabytes.
+/// OME-XML of large stacks has megabytes.
 const TEXT_MAX: u64 = 64 << 20;
-/// Most sub-images that are looked at.
 const SUB_IMAGES_MAX: usize = 16;
 
-/// One image of a TIFF file.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct Directory {
     pub width: u64,
     pub height: u64,
-    /// Tag 254: bit 0 = reduced resolution, bit 2 = a mask.
+    /// Tag 254: bit 0 = reduced resolution, bit 2 = mask.
     pub subfile: u64,
-    /// Tag 255, the old form of it: 2 = reduced resolution.
+    /// Tag 255 (obsolete): 2 = reduced resolution.
     pub old_subfile: u64,
     pub photometric: u64,
     /// Tag 266: 2 = the lowest bit of a byte comes first.
@@ -46,7 +42,7 @@ pub(crate) struct Directory {
     pub software: Option<String>,
     pub date_time: Option<String>,
     pub is_dng: bool,
-    /// (width, height) of the images in tag 330.
+    /// Width and height of the images in tag 330.
     pub sub_images: Vec<(u64, u64)>,
     /// Tag 51123: JSON of Micro-Manager.
     pub micro_manager: Option<String>,
@@ -62,15 +58,13 @@ impl Directory {
     }
 }
 
-/// Whether these bytes begin a TIFF or a BigTIFF.
+/// Whether the data starts as TIFF or BigTIFF.
 pub(crate) fn is_tiff(bytes: &[u8]) -> bool {
     [b"II*\0", b"MM\0*", b"II+\0", b"MM\0+"].iter().any(|magic| bytes.starts_with(*magic))
 }
 
-/// All directories in the order of the file.
-///
-/// # Errors
-/// In words: a directory beyond the end of the file, or a chain of directories that does not end.
+/// All directories in file order.
+/// Errors: a message for a directory beyond the end, or an endless chain.
 pub(crate) fn directories(bytes: &[u8]) -> Result<Vec<Directory>, String> {
     let file = File::new(bytes)?;
     let mut at = file.first;

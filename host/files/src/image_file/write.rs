@@ -1,4 +1,4 @@
-//! Encoding images.
+//! Image encoders.
 
 use std::io::{self, Cursor, Write};
 
@@ -17,22 +17,19 @@ use tiff::{
 
 use crate::EncodeError;
 
-/// The picture of a camera with `bits` bits as the bytes of a grey PNG: 8 bits as they are, 9 to 16 bits
-/// shifted up to full scale in 16 bits, so that any viewer shows it with the right brightness; chunk sBIT
-/// gives their number.
-///
-/// # Errors
-/// An encoder that refuses.
+/// Encodes a camera picture as grey PNG: 8 bits unchanged, 9 to 16 bits shifted to full 16-bit scale so that
+/// viewers show the right brightness; chunk sBIT has the bit depth.
+/// Errors: of the encoder.
 pub fn encode_png(pixels: ArrayView2<u16>, bits: u8) -> Result<Vec<u8>, EncodeError> {
     let mut png = Vec::new();
     png_to(pixels, bits, &mut png)?;
     Ok(png)
 }
 
-/// Bytes of a PNG before its second chunk: signature and IHDR.
+/// Signature and IHDR.
 const HEADER_BYTES: usize = 8 + 25;
 
-/// Passes a PNG on with a chunk sBIT after its header.
+/// Inserts a chunk sBIT after a PNG's header.
 struct WithSignificantBits<W> {
     to: W,
     significant: Option<u8>,
@@ -61,37 +58,34 @@ impl<W: Write> Write for WithSignificantBits<W> {
     }
 }
 
-/// The checksum of PNG chunks (ISO 3309), bit by bit: of five bytes.
+/// CRC-32 of PNG chunks (ISO 3309), bit by bit for five bytes.
 fn crc32(bytes: &[u8]) -> u32 {
     let shifted = |crc: u32, _| if crc & 1 == 1 { crc >> 1 ^ 0xedb8_8320 } else { crc >> 1 };
     !bytes.iter().fold(!0, |crc, byte| (0..8).fold(crc ^ u32::from(*byte), shifted))
 }
 
-/// The same into a file.
-///
-/// # Errors
-/// What the system or the encoder says.
+/// [`encode_png`] into a file.
+/// Errors: of the system or the encoder.
 pub fn png_to(pixels: ArrayView2<u16>, bits: u8, to: &mut impl Write) -> Result<(), EncodeError> {
     if bits <= 8 {
         return png8_to(pixels.mapv(|value| value.min(255) as u8).view(), to);
     }
     let shift = 16 - u32::from(bits.min(16));
-    // `image` takes 16-bit samples in the machine's byte order.
+    // `image` expects 16-bit samples in native byte order.
     let samples: Vec<[u8; 2]> = pixels.iter().map(|value| (value << shift).to_ne_bytes()).collect();
     let to = WithSignificantBits { to, significant: (bits < 16).then_some(bits), passed: 0 };
     encode_to(samples.as_flattened(), pixels.dim(), ExtendedColorType::L16, to)
 }
 
-/// A grey PNG of 8 bits.
-///
-/// # Errors
-/// What the system or the encoder says.
+/// Writes an 8-bit grey PNG.
+/// Errors: of the system or the encoder.
 pub fn png8_to(pixels: ArrayView2<u8>, to: &mut impl Write) -> Result<(), EncodeError> {
     let samples: Vec<u8> = pixels.iter().copied().collect();
     encode_to(&samples, pixels.dim(), ExtendedColorType::L8, to)
 }
 
-/// Uses one filter for all rows: trying all five takes three quarters of the time and saves some percent of a noisy image.
+/// A single filter for all rows: trying all five takes three quarters of the time and saves few percent of a
+/// noisy image.
 pub(crate) fn encode_to(
     samples: &[u8],
     (height, width): (usize, usize),
@@ -103,11 +97,8 @@ pub(crate) fn encode_to(
         .map_err(EncodeError::of("a PNG"))
 }
 
-/// The same as the bytes of a grey TIFF of 8 or 16 bits, whose values stay as the camera gave them; its description gives the
-/// white level.
-///
-/// # Errors
-/// An encoder that refuses.
+/// Encodes a grey TIFF of 8 or 16 bits with unchanged values and the white level in its description.
+/// Errors: of the encoder.
 pub fn encode_tiff(pixels: ArrayView2<u16>, bits: u8) -> Result<Vec<u8>, EncodeError> {
     let (height, width) = pixels.dim();
     let (width, height) = (width as u32, height as u32);
@@ -122,7 +113,7 @@ pub fn encode_tiff(pixels: ArrayView2<u16>, bits: u8) -> Result<Vec<u8>, EncodeE
                 let values: Vec<u16> = pixels.iter().copied().collect();
                 let mut image = file.new_image::<Gray16>(width, height)?;
                 if bits < 16 {
-                    // Read back by `tiff_file::camera_white`.
+                    // Read by `tiff_file::camera_white`.
                     let white = format!("white_level={}", (1_u32 << bits) - 1);
                     image.encoder().write_tag(Tag::ImageDescription, white.as_str())?;
                 }

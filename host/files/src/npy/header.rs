@@ -1,20 +1,18 @@
-//! The header of an `.npy` file: so much of Python's syntax as NumPy writes.
+//! Parser for the Python dictionary in an `.npy` header.
 
 use super::NpyError;
 
-/// What a header says.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Header {
-    /// NumPy's name of the kind of values, e.g. `<f4`.
+    /// NumPy's type name, e.g. `<f4`.
     pub descr: String,
-    /// Whether the first axis runs fastest.
+    /// Whether the first axis varies fastest.
     pub fortran_order: bool,
-    /// Lengths of the axes.
     pub shape: Vec<usize>,
 }
 
 impl Header {
-    /// Reads a dictionary with `descr`, `fortran_order` and `shape`, in any order.
+    /// Parses `descr`, `fortran_order` and `shape` in any order.
     pub fn parse(bytes: &[u8]) -> Result<Self, NpyError> {
         let mut text = Text { bytes, at: 0 };
         let (mut descr, mut fortran_order, mut shape) = (None, None, None);
@@ -46,7 +44,7 @@ impl Header {
     }
 }
 
-/// The text and how far it has been read.
+/// Text and position.
 struct Text<'a> {
     bytes: &'a [u8],
     at: usize,
@@ -61,7 +59,7 @@ impl<'a> Text<'a> {
         self.at += self.bytes[self.at..].iter().take_while(|byte| byte.is_ascii_whitespace()).count();
     }
 
-    /// Goes past the next mark if it is this one.
+    /// Skips the next mark if it is this one.
     fn has(&mut self, mark: u8) -> bool {
         self.skip_blanks();
         let found = self.bytes.get(self.at) == Some(&mark);
@@ -73,7 +71,7 @@ impl<'a> Text<'a> {
         if self.has(mark) { Ok(()) } else { self.fail(expected) }
     }
 
-    /// What stands between quotes of one kind; NumPy's names need no escapes.
+    /// Quoted text; NumPy's names need no escapes.
     fn quoted(&mut self, expected: &'static str) -> Result<&'a [u8], NpyError> {
         self.skip_blanks();
         let rest = &self.bytes[self.at..];
@@ -95,7 +93,7 @@ impl<'a> Text<'a> {
         Ok(truth)
     }
 
-    /// A tuple of whole numbers.
+    /// Tuple of integers.
     fn lengths(&mut self) -> Result<Vec<usize>, NpyError> {
         self.must(b'(', "(")?;
         let mut lengths = Vec::new();
@@ -116,7 +114,7 @@ impl<'a> Text<'a> {
         let number = str::from_utf8(&rest[..digits]).ok().and_then(|digits| digits.parse().ok());
         let Some(number) = number else { return self.fail("the length of an axis") };
         self.at += digits;
-        // Python 2 marked long numbers so.
+        // Suffix of long integers in Python 2.
         self.at += usize::from(self.bytes.get(self.at) == Some(&b'L'));
         Ok(number)
     }

@@ -1,11 +1,9 @@
-//! Where the pages of a TIFF are focused, from what microscopes and ImageJ write.
+//! Focus positions of TIFF pages by microscopes and ImageJ.
 
 use crate::image_file::Page;
 
-/// Positions of the pages along the axis, um; `None` where the file says nothing of them.
-///
-/// # Errors
-/// In words: channels or times in one file, planes that are in other files.
+/// Positions along the axis, um; `None` if not stated.
+/// Errors: a message for channels or times in one file, or planes in other files.
 pub(super) fn of(pages: &[Page]) -> Result<Option<Vec<f64>>, String> {
     let Some(first) = pages.first() else { return Ok(None) };
     let description = first.directory.description.as_deref().unwrap_or_default();
@@ -100,7 +98,7 @@ fn ome(xml: &str, pixels: &str, pages: &[Page]) -> Result<Option<Vec<f64>>, Stri
     Ok(spacing.map(|spacing| (0..planes).map(|plane| plane as f64 * spacing).collect()))
 }
 
-/// Micrometres in a unit of length; `None` for pixels and what is no length.
+/// Micrometres per unit; `None` for pixels and unknown units.
 fn unit_um(unit: &str) -> Option<f64> {
     let unit = unit.replace("\\u00B5", "u").replace("&#181;", "u").replace("&#xB5;", "u");
     let unit = unit.replace(['\u{b5}', '\u{3bc}'], "u");
@@ -116,7 +114,6 @@ fn unit_um(unit: &str) -> Option<f64> {
     })
 }
 
-/// The text of an element's tag.
 fn element<'a>(xml: &'a str, name: &str) -> Option<&'a str> {
     let begin = xml.find(&format!("<{name} "))?;
     let end = xml[begin..].find('>')?;

@@ -1,4 +1,4 @@
-//! Any video through an installed ffmpeg, which is asked for a Y4M stream on its standard output.
+//! Any video through an installed ffmpeg with Y4M output.
 
 use std::{
     io::{BufReader, ErrorKind, Read},
@@ -9,10 +9,10 @@ use std::{
 
 use super::{VideoError, VideoFrame, timing::Timing, y4m::Y4m};
 
-/// How much of ffmpeg's complaint an error quotes.
+/// Characters of ffmpeg's messages quoted in errors.
 const QUOTED_CHARS: usize = 400;
 
-/// Frames from a running ffmpeg, which ends with this value.
+/// Frames of an ffmpeg process, which ends with this value.
 struct Ffmpeg {
     path: PathBuf,
     child: Child,
@@ -39,11 +39,11 @@ pub(super) fn open(
         ErrorKind::NotFound => VideoError::NoFfmpeg { path: path.into() },
         _ => VideoError::io(path, source),
     })?;
-    // Read in a thread of its own, or a talkative ffmpeg would wait for room in the pipe for ever.
+    // Read in its own thread, so that ffmpeg never blocks on the pipe.
     let complaint = child.stderr.take().map(|mut stderr| {
         std::thread::spawn(move || {
             let mut bytes = Vec::new();
-            // What could be read is what there is to quote.
+            // Quotes what could be read.
             let _ = stderr.read_to_end(&mut bytes);
             String::from_utf8_lossy(&bytes).into_owned()
         })
@@ -53,7 +53,7 @@ pub(super) fn open(
     let stream = stdout.map(|stdout| Y4m::new(path, BufReader::new(stdout)));
     match stream {
         Some(Ok(frames)) => ffmpeg.frames = Some(frames),
-        // No header: ffmpeg says better why than the parser does.
+        // Without a header ffmpeg's error is clearer than the parser's.
         Some(Err(error)) => return Err(ffmpeg.failure().unwrap_or(error)),
         None => return Err(ffmpeg.failure().unwrap_or(VideoError::NoFrames { path: path.into() })),
     }
@@ -61,7 +61,7 @@ pub(super) fn open(
 }
 
 impl Ffmpeg {
-    /// Waits for its end; `Some` where that was not a success.
+    /// Waits for the end; `Some` on failure.
     fn failure(&mut self) -> Option<VideoError> {
         self.frames = None;
         let status = self.child.wait();
@@ -95,7 +95,7 @@ impl Iterator for Ffmpeg {
 impl Drop for Ffmpeg {
     fn drop(&mut self) {
         if self.frames.is_some() {
-            // Stopped half-way: it may have ended by itself already, which is as good.
+            // It may have ended already.
             let _ = self.child.kill();
             let _ = self.child.wait();
         }

@@ -1,4 +1,4 @@
-//! A folder of pictures as a video, in the order of their numbers (`in9` before `in10`), see [`crate::order`].
+//! A folder of pictures as a video, ordered by number ([`crate::order`]).
 
 use std::{
     fs,
@@ -11,13 +11,11 @@ use crate::{
     order,
 };
 
-/// Endings of files that count as pictures, small letters; other files are left alone.
+/// Lower-case endings of pictures; other files are ignored.
 pub const EXTENSIONS: [&str; 8] = ["png", "tif", "tiff", "jpg", "jpeg", "bmp", "pgm", "ppm"];
 
-/// Paths of the pictures in a folder, in natural order.
-///
-/// # Errors
-/// [`VideoError::Io`] for a folder that cannot be listed, [`VideoError::NoPictures`] where there is none.
+/// Pictures of a folder in natural order.
+/// Errors: [`VideoError::Io`] for an unreadable folder, [`VideoError::NoPictures`].
 pub fn list(folder: &Path) -> Result<Vec<PathBuf>, VideoError> {
     let entries = fs::read_dir(folder).map_err(|source| VideoError::io(folder, source))?;
     let mut paths = Vec::new();
@@ -40,7 +38,6 @@ pub fn list(folder: &Path) -> Result<Vec<PathBuf>, VideoError> {
     Ok(paths)
 }
 
-/// The frames of a folder.
 pub(super) fn open(
     folder: &Path,
 ) -> Result<impl Iterator<Item = Result<VideoFrame, VideoError>> + 'static, VideoError> {
@@ -48,10 +45,8 @@ pub(super) fn open(
     Ok(paths.into_iter().map(|path| Ok(VideoFrame { name: stem(&path), pixels: read(&path)? })))
 }
 
-/// A picture's samples: grey stays grey, everything else becomes RGB; 16 bits lose their lower half.
-///
-/// # Errors
-/// [`VideoError`] for a file that cannot be opened or decoded.
+/// Samples of a picture: grey or RGB; 16-bit samples keep their upper half.
+/// Errors: [`VideoError`] for an unreadable file.
 pub fn read(path: &Path) -> Result<Pixels, VideoError> {
     image_file::read_8_bit(path).map_err(|error| match error {
         ImageError::Read { path, source } => VideoError::io(&path, source),
@@ -60,7 +55,6 @@ pub fn read(path: &Path) -> Result<Pixels, VideoError> {
     })
 }
 
-/// A file's name without its extension.
 pub fn stem(path: &Path) -> String {
     path.file_stem().unwrap_or_default().to_string_lossy().into_owned()
 }

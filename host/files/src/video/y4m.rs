@@ -1,5 +1,5 @@
-//! YUV4MPEG2 streams, 8 to 12 bits, 4:2:0, 4:2:2, 4:4:4 and grey, to 8-bit RGB by ITU-R BT.601 (the coefficients of
-//! its section 2.5.1; studio range unless the stream says `XCOLORRANGE=FULL`). Chroma is taken from the nearest sample.
+//! YUV4MPEG2 streams (8 to 12 bits, 4:2:0, 4:2:2, 4:4:4, grey) to 8-bit RGB by ITU-R BT.601, section 2.5.1;
+//! studio range unless `XCOLORRANGE=FULL`. Nearest chroma sample.
 
 use std::{
     cell::Cell,
@@ -13,10 +13,10 @@ use y4m::{Colorspace, Decoder};
 
 use super::{Pixels, VideoError, VideoFrame, numbered};
 
-/// No side may be longer: a damaged header must not ask for all memory.
+/// Limit for damaged headers.
 const LONGEST_SIDE_PX: usize = 16_384;
 
-/// Counts what was read, to tell a stream that ended from one that broke off.
+/// Counts bytes, to distinguish the end from a truncation.
 struct Counting<R> {
     reader: R,
     bytes: Rc<Cell<u64>>,
@@ -30,7 +30,6 @@ impl<R: Read> Read for Counting<R> {
     }
 }
 
-/// The frames of a stream.
 pub(super) struct Y4m<R: Read> {
     path: PathBuf,
     decoder: Decoder<Counting<R>>,
@@ -40,7 +39,7 @@ pub(super) struct Y4m<R: Read> {
 }
 
 impl<R: Read> Y4m<R> {
-    /// Reads the stream's header; `path` is for messages.
+    /// Reads the header; `path` is for messages.
     pub(super) fn new(path: &Path, reader: R) -> Result<Self, VideoError> {
         let bytes = Rc::new(Cell::new(0));
         let header = |reason: String| VideoError::Y4m { path: path.into(), frame: 0, reason };
@@ -48,9 +47,10 @@ impl<R: Read> Y4m<R> {
         let decoder = Decoder::new_with_limits(Counting { reader, bytes: bytes.clone() }, limits);
         let decoder = decoder.map_err(|error| match error {
             y4m::Error::EOF => header("the header is missing or broken off".into()),
-            y4m::Error::UnknownColorspace => {
-                header("its colour space is none of mono, 420, 422 and 444 of 8, 10 or 12 bits".into())
-            }
+            y4m::Error::UnknownColorspace => header(
+                "its colour space is unsupported; expected mono, 420, 422 or 444 with 8, 10 or 12 bits"
+                    .into(),
+            ),
             other => header(other.to_string()),
         })?;
         let (width, height) = (decoder.get_width(), decoder.get_height());
@@ -123,7 +123,7 @@ impl<R: Read> Iterator for Y4m<R> {
     }
 }
 
-/// Pixels per chroma sample, across and down; `None` without chroma.
+/// Pixels per chroma sample, horizontally and vertically; `None` without chroma.
 fn subsampling(colour_space: Colorspace) -> Option<(usize, usize)> {
     match colour_space {
         Colorspace::Cmono | Colorspace::Cmono12 => None,
@@ -152,8 +152,8 @@ mod tests {
     }
 
     #[test]
-    fn bt601_primaries_come_back() {
-        // Studio-range codes of BT.601's 100 % colour bars: white, red, green, blue (as printed in its test signals).
+    fn decodes_bt601_primaries() {
+        // Studio-range codes of BT.601's 100 % colour bars: white, red, green, blue.
         let planes = [235, 81, 145, 41, 128, 90, 54, 240, 128, 240, 34, 110];
         let Pixels::Rgb(rgb) = &frames(&stream("W4 H1 F25:1 C444", &[&planes])).unwrap()[0] else { panic!() };
         let expected = [[255, 255, 255], [255, 0, 0], [0, 255, 0], [0, 0, 255]];
@@ -184,7 +184,7 @@ mod tests {
     }
 
     #[test]
-    fn a_stream_that_breaks_off_says_where() {
+    fn a_truncated_stream_reports_its_position() {
         let text = frames(&stream("W2 H2 F25:1 Cmono", &[&[1, 2, 3, 4], &[1, 2]])).unwrap_err().to_string();
         assert!(text.contains("frame 2") && text.contains("breaks off"), "{text}");
         let text = frames(b"YUV4MPEG2 W99999999 H2\n").unwrap_err().to_string();

@@ -1,10 +1,10 @@
-//! k nearest neighbours over patterns, by Euclidean distance.
+//! k nearest neighbours by Euclidean distance.
 
 use super::method::{Fold, Method, largest};
 use ndarray::{Array2, ArrayView1, ArrayView2};
 use serde::{Deserialize, Serialize};
 
-/// Training patterns, which vote for their classes.
+/// Training patterns that vote for their classes.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Neighbours {
     /// One training clip per row.
@@ -13,7 +13,7 @@ pub struct Neighbours {
     pub labels: Vec<usize>,
     /// Number of classes.
     pub classes: usize,
-    /// Neighbours that vote.
+    /// Number of voting neighbours.
     pub k: usize,
 }
 
@@ -39,7 +39,7 @@ impl Method for Neighbours {
     }
 
     fn answers(fold: &Fold, k: usize) -> Vec<usize> {
-        // |a - b|^2 up to |b|^2, which is the same for all neighbours.
+        // |a - b|^2 without |b|^2, which is equal for all neighbours.
         let distance = |i: usize, j: usize| fold.gram[[j, j]] - 2.0 * fold.gram[[i, j]];
         let answer = |&i: &usize| {
             let distances = fold.kept.iter().map(|&j| (distance(i, j), fold.labels[j])).collect();
@@ -55,8 +55,8 @@ impl Method for Neighbours {
     }
 }
 
-/// Votes per class of the `k` smallest of (squared distance, class), each weighing 1 plus a hair for nearness, so that ties go
-/// to the nearer class.
+/// Votes of the `k` smallest (squared distance, class), each 1 plus a small bonus for nearness, so that ties
+/// go to the nearer class.
 fn vote(mut distances: Vec<(f32, usize)>, classes: usize, k: usize) -> Vec<f32> {
     distances.sort_by(|a, b| a.0.total_cmp(&b.0));
     let mut votes = vec![0.0; classes];

@@ -1,7 +1,6 @@
-//! Multinomial logistic regression: a linear value per class, and their softmax as probabilities, which it is trained to get right.
+//! Multinomial logistic regression: softmax of a linear value per class.
 //!
-//! Trained by steps down the gradient with Nesterov's momentum on the patterns' Gram matrix, as the support vectors are; the squared
-//! length of the weights holds it back.
+//! Gradient descent with Nesterov's momentum on the Gram matrix, regularised by the squared weights.
 
 use super::method::{Fold, Method, largest};
 use ndarray::{Array1, Array2, ArrayView1, ArrayView2, Axis};
@@ -10,19 +9,20 @@ use serde::{Deserialize, Serialize};
 /// A trained classifier.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Softmax {
-    /// One row per class.
+    /// Weights, one row per class.
     pub weights: Array2<f32>,
-    /// One offset per class.
+    /// Offsets, one per class.
     pub offsets: Array1<f32>,
 }
 
-/// Steps down the gradient.
+/// Number of gradient steps.
 const STEPS: usize = 300;
 
-/// Per sample and class what its pattern adds to the class' weights, and the offsets.
+/// Dual weights per sample and class, and the offsets.
 fn dual(gram: ArrayView2<f32>, labels: &[usize], classes: usize, cost: f32) -> (Array2<f32>, Array1<f32>) {
     let n = labels.len();
-    // The gradient's Lipschitz constant: half of the Gram matrix' largest eigenvalue (at most its trace), offsets and length.
+    // Lipschitz constant of the gradient: half the Gram matrix' largest eigenvalue (at most its trace),
+    // offsets and length.
     let largest = gram.diag().sum().max(1e-6);
     let hold = 1.0 / cost.max(1e-6);
     let step = 1.0 / (0.5 * (largest + n as f32) + hold);
@@ -45,7 +45,7 @@ fn dual(gram: ArrayView2<f32>, labels: &[usize], classes: usize, cost: f32) -> (
     (signed, offsets)
 }
 
-/// Values become probabilities.
+/// Converts values to probabilities.
 pub fn softmax(values: &mut [f32]) {
     let best = values.iter().fold(f32::NEG_INFINITY, |m, v| m.max(*v));
     values.iter_mut().for_each(|v| *v = (*v - best).exp());
@@ -62,7 +62,7 @@ impl Method for Softmax {
         format!("cost {cost}")
     }
 
-    /// `cost` weighs errors against the length of the weights.
+    /// `cost` weighs errors against the squared weights.
     fn train(patterns: ArrayView2<f32>, labels: &[usize], classes: usize, cost: f32) -> Self {
         let (signed, offsets) = dual(patterns.dot(&patterns.t()).view(), labels, classes, cost);
         Self { weights: signed.t().dot(&patterns), offsets }

@@ -1,5 +1,5 @@
-//! Linear support vector classifier, one class against the rest, by dual coordinate descent (Hsieh et al., ICML 2008, with the
-//! squared hinge loss).
+//! Linear support vector classifier, one against the rest, by dual coordinate descent (Hsieh et al., ICML
+//! 2008, squared hinge loss).
 //!
 //! Clips are few and patterns long, so the descent runs on the patterns' Gram matrix: a step costs as many operations as
 //! there are clips, independent of the patterns' length, and cross-validation folds share one Gram matrix.
@@ -12,29 +12,30 @@ use serde::{Deserialize, Serialize};
 /// A trained classifier.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LinearSvc {
-    /// One row per class.
+    /// Weights, one row per class.
     pub weights: Array2<f32>,
-    /// One offset per class.
+    /// Offsets, one per class.
     pub offsets: Array1<f32>,
 }
 
-/// Passes over the samples at most.
+/// Limit of passes over the samples.
 const PASSES: usize = 200;
-/// Largest projected gradient at which a class is settled.
+/// Convergence limit of the projected gradient.
 const TOLERANCE: f32 = 0.02;
 
 /// A classifier in terms of its training samples.
 struct DualSvc<'a> {
-    /// Rows of the Gram matrix that were trained on.
+    /// Rows of the Gram matrix used for training.
     rows: &'a [usize],
-    /// Per class: multiplier times sign of each of those rows.
+    /// Per class: multiplier times sign of each row.
     signed: Vec<Vec<f32>>,
-    /// Per class: offset.
+    /// Offset per class.
     offsets: Vec<f32>,
 }
 
 impl<'a> DualSvc<'a> {
-    /// Trains on some rows of a Gram matrix (`labels` of all of its rows, below `classes`); `c` weighs errors against the margin.
+    /// Trains on rows of a Gram matrix (`labels` of all rows, below `classes`); `c` weighs errors against the
+    /// margin.
     fn train(gram: ArrayView2<f32>, rows: &'a [usize], labels: &[usize], classes: usize, c: f32) -> Self {
         let part = Array2::from_shape_fn((rows.len(), rows.len()), |(i, j)| gram[[rows[i], rows[j]]]);
         let own: Vec<usize> = rows.iter().map(|&row| labels[row]).collect();
@@ -43,7 +44,7 @@ impl<'a> DualSvc<'a> {
         Self { rows, signed, offsets }
     }
 
-    /// Decision value of every class for a row of the Gram matrix.
+    /// Decision values for a row of the Gram matrix.
     fn decide(&self, gram_row: ArrayView1<f32>) -> Vec<f32> {
         self.signed
             .iter()
@@ -56,7 +57,7 @@ impl<'a> DualSvc<'a> {
 }
 
 impl LinearSvc {
-    /// Decision value of every class: positive inside the class' half-space.
+    /// Decision value per class, positive inside its half-space.
     pub fn decide(&self, pattern: ArrayView1<f32>) -> Array1<f32> {
         self.weights.dot(&pattern) + &self.offsets
     }
@@ -80,9 +81,9 @@ impl Method for LinearSvc {
         Self { weights: signed.dot(&patterns), offsets: dual.offsets.into() }
     }
 
-    /// The softmax of the decision values.
+    /// Softmax of the decision values.
     fn probabilities(&self, pattern: ArrayView1<f32>) -> Vec<f32> {
-        /// Decision values lie about -1 to 1; this turns a margin of one into odds of twenty.
+        /// Decision values are about -1 to 1; a margin of one becomes odds of twenty.
         const SLOPE: f32 = 3.0;
         let decision = self.decide(pattern);
         let best = decision.iter().fold(f32::NEG_INFINITY, |m, v| m.max(*v));
@@ -110,11 +111,11 @@ fn one_against_rest(
 ) -> (Vec<f32>, f32) {
     let n = gram.nrows();
     let inside = labels.iter().filter(|&&label| label == class).count().max(1);
-    // The class is outnumbered by the rest: its errors weigh twice, corrected for classes of unequal size.
+    // Errors of the class weigh twice, corrected for unequal class sizes.
     let balance = 2.0 * ((n - inside).max(1) as f32 / inside as f32 / (classes.max(2) - 1) as f32).max(0.1);
     let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(class as u64);
     let mut order: Vec<usize> = (0..n).collect();
-    // `value` is the decision of every sample without the offset.
+    // `value` is the decision of each sample without offset.
     let (mut value, mut offset, mut alpha) = (Array1::<f32>::zeros(n), 0.0_f32, vec![0.0_f32; n]);
     for _ in 0..PASSES {
         order.shuffle(&mut rng);

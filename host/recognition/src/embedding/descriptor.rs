@@ -1,9 +1,10 @@
-//! Centroid distance function: 360 distances from a silhouette's centroid to its outermost pixels (Li 2014, section 9.3.1).
+//! Centroid distance function: 360 distances from a silhouette's centroid to its outermost pixels (Li 2014,
+//! section 9.3.1).
 //!
-//! The silhouette is scaled to 100 x 100 pixels; from the frame inwards a ray is marched along every whole degree until it meets
-//! a set pixel. Walking boundary pixels and binning them by angle leaves half of the angles empty; marching leaves none, and
-//! holes and breaks inside the outermost contour change nothing. Distances are in units of the frame's side, so they lie in
-//! [0, 0.7072] for a centroid at the middle. Angle 0 points right, angles grow anticlockwise. About 20 us a silhouette.
+//! The silhouette is scaled to 100 x 100 pixels. A ray per degree is marched inwards until it meets a set
+//! pixel, so that no angle is empty, and holes inside the contour have no effect. Distances are in units of
+//! the frame's side: [0, 0.7072] for a central centroid. Angle 0 points right, anticlockwise. About 20 us per
+//! silhouette.
 //!
 //! Next to it the silhouette itself, coarsely: set pixels in each cell of that frame ("zoning": Trier, Jain and Taxt, Pattern Recognition 29,
 //! 1996). It describes the inside of the outermost contour: an arm before the body's side, the gap under a raised hand.
@@ -13,53 +14,51 @@ use ndarray::ArrayView2;
 use serde::{Deserialize, Serialize};
 use std::sync::LazyLock;
 
-/// Number of angles.
+/// Angles of the descriptor.
 pub const ANGLES: usize = 360;
-/// Side of the normalised silhouette, pixels.
+/// Side of the normalised silhouette.
 pub const SIDE: usize = 100;
-/// Cells of the coarse silhouette across and down.
+/// Cells of the coarse silhouette per side.
 pub const CELLS_ACROSS: usize = 20;
 /// Cells of the coarse silhouette.
 pub const CELLS: usize = CELLS_ACROSS * CELLS_ACROSS;
-/// Pixels of a cell's side.
+/// Side of a cell.
 const CELL_SIDE: usize = SIDE / CELLS_ACROSS;
 /// Pixels of a cell.
 pub const CELL_PIXELS: usize = CELL_SIDE * CELL_SIDE;
-/// Version of this descriptor; a model says which one it was trained with.
+/// Descriptor version, stored in models.
 pub const DESCRIPTOR_VERSION: u32 = 1;
 
-/// How a silhouette fills the 100 x 100 frame.
+/// Scaling of a silhouette to the 100 x 100 frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Scaling {
-    /// The bounding box is stretched to the frame.
+    /// Stretches the bounding box.
     Stretch,
     /// The longer side fills the frame, the shorter is centred.
     #[default]
     KeepAspect,
 }
 
-/// A silhouette without a single pixel has no descriptor.
+/// An empty silhouette has no descriptor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("the mask is empty: a frame without a subject has no descriptor")]
 pub struct EmptyMask;
 
-/// A frame's descriptor: what the embedding sees.
+/// Descriptor of a frame.
 pub type CentroidDistance = [f32; ANGLES];
 
-/// Set pixels of every cell, 0 to [`CELL_PIXELS`], row by row from the top left.
+/// Set pixels of each cell, 0 to [`CELL_PIXELS`], by rows.
 pub type CoarseSilhouette = [u8; CELLS];
 
-/// March step in pixels of the frame; half of it bounds the error from stepping.
+/// March step; half of it bounds the error.
 const STEP_PX: f64 = 0.5;
-/// Empty pixels round the frame, so that a ray may start a step outside.
+/// Padding of the frame, so that a ray may start outside.
 const MARGIN: usize = 2;
 const PADDED: usize = SIDE + 2 * MARGIN;
 
 /// The centroid distance of the subject in a mask of any size.
-///
-/// # Errors
-/// [`EmptyMask`].
+/// Errors: [`EmptyMask`].
 pub fn centroid_distance(mask: ArrayView2<bool>, scaling: Scaling) -> Result<CentroidDistance, EmptyMask> {
     let bounds = BoundingBox::of(mask).ok_or(EmptyMask)?;
     let (frame, inner) = normalise(mask, bounds, scaling);
@@ -67,9 +66,7 @@ pub fn centroid_distance(mask: ArrayView2<bool>, scaling: Scaling) -> Result<Cen
 }
 
 /// The centroid distance and the coarse silhouette of the subject in a mask of any size, and its bounds.
-///
-/// # Errors
-/// [`EmptyMask`].
+/// Errors: [`EmptyMask`].
 pub fn described(
     mask: ArrayView2<bool>,
     scaling: Scaling,
@@ -79,7 +76,7 @@ pub fn described(
     Ok((march(&frame, inner), coarse(&frame), bounds))
 }
 
-/// Set pixels of every cell of the padded frame.
+/// Set pixels per cell of the padded frame.
 fn coarse(frame: &[bool]) -> CoarseSilhouette {
     let mut cells = [0_u8; CELLS];
     for y in 0..SIDE {
@@ -93,7 +90,7 @@ fn coarse(frame: &[bool]) -> CoarseSilhouette {
     cells
 }
 
-/// The box scaled into the padded frame, nearest neighbour, and where it lies there.
+/// Scales the box into the padded frame by nearest neighbour; returns its position there.
 fn normalise(mask: ArrayView2<bool>, bounds: BoundingBox, scaling: Scaling) -> (Vec<bool>, BoundingBox) {
     let (height, width) = (bounds.height(), bounds.width());
     let longest = height.max(width);
@@ -120,7 +117,7 @@ fn normalise(mask: ArrayView2<bool>, bounds: BoundingBox, scaling: Scaling) -> (
     (frame, BoundingBox { top, left, bottom: top + rows, right: left + columns })
 }
 
-/// Centroid of the set pixels, (x, y) of pixel centres at whole numbers.
+/// Centroid of the set pixels; pixel centres are integers.
 fn centroid(frame: &[bool]) -> (f64, f64) {
     let (mut count, mut sum_x, mut sum_y) = (0_u64, 0_u64, 0_u64);
     for (y, row) in frame.chunks_exact(PADDED).enumerate() {
@@ -138,15 +135,15 @@ fn centroid(frame: &[bool]) -> (f64, f64) {
 
 /// Marches all rays over the padded frame.
 fn march(frame: &[bool], inner: BoundingBox) -> CentroidDistance {
-    /// Fractional bits of the marching position.
+    /// Fraction bits of the position.
     const FRACTION: u32 = 16;
     let (cx, cy) = centroid(frame);
     let scale = f64::from(1_u32 << FRACTION);
-    // Positions are kept relative to pixel corners so that truncation finds the pixel.
+    // Relative to pixel corners, so that truncation finds the pixel.
     let start = (((cx + 0.5) * scale) as i32, ((cy + 0.5) * scale) as i32);
     static DIRECTIONS: LazyLock<Vec<(f64, f64)>> = LazyLock::new(|| (0..ANGLES).map(direction).collect());
     let mut distance = [0.0_f32; ANGLES];
-    // Outside the scaled box nothing is set, so the march starts at its faces.
+    // Nothing is set outside the scaled box, so the march starts at its faces.
     let (left_face, right_face) = (inner.left as f64 - 0.5, inner.right as f64 - 0.5);
     let (top_face, bottom_face) = (inner.top as f64 - 0.5, inner.bottom as f64 - 0.5);
     let along = |low: f64, high: f64, slope: f64| match slope {
@@ -171,13 +168,13 @@ fn march(frame: &[bool], inner: BoundingBox) -> CentroidDistance {
             y -= dy;
             left -= 1;
         }
-        // The edge lies between this sample and the one before it, half a step further out on average.
+        // The edge is between this sample and the previous one, half a step further out on average.
         *out = if left < 0 { 0.0 } else { ((f64::from(left) + 0.5) * STEP_PX / SIDE as f64) as f32 };
     }
     distance
 }
 
-/// (sin, cos) in image coordinates (y down) of a whole degree, anticlockwise from the right; exact zeros on the axes.
+/// (sin, cos) of a whole degree, y down, anticlockwise from the right; exact on the axes.
 fn direction(angle: usize) -> (f64, f64) {
     match angle {
         0 => (0.0, 1.0),
@@ -196,7 +193,7 @@ mod tests {
     use super::*;
     use farnear_silhouettes::mask::Mask;
 
-    /// Largest difference from a known curve, in units of the frame's side.
+    /// Largest difference from a known curve, in units of the side.
     fn worst(mask: &Mask, scaling: Scaling, known: impl Fn(f64) -> f64) -> f64 {
         let found = centroid_distance(mask.view(), scaling).expect("not empty");
         (0..ANGLES).map(|a| (f64::from(found[a]) - known((a as f64).to_radians())).abs()).fold(0.0, f64::max)
@@ -222,7 +219,7 @@ mod tests {
 
     #[test]
     fn an_l_shape_has_its_arms_where_they_are() {
-        // An upright bar of 20 x 100 and a foot of 80 x 20 to the right; the centroid lies outside neither arm's box.
+        // An upright bar of 20 x 100 and a foot of 80 x 20 to the right; the centroid is outside both boxes.
         let mask = Mask::from_shape_fn((100, 100), |(y, x)| x < 20 || y >= 80);
         let found = centroid_distance(mask.view(), Scaling::Stretch).expect("not empty");
         // Area 2000 + 1600; centroid x = (2000 * 9.5 + 1600 * 59.5) / 3600, y likewise mirrored.
@@ -233,7 +230,7 @@ mod tests {
             "left reaches the bar's outer face"
         );
         assert!((f64::from(found[270]) - down / 100.0).abs() < 0.012, "down reaches the foot's lower face");
-        // The toe's lower corner; angles grow anticlockwise with y down.
+        // Lower corner of the toe; angles are anticlockwise with y down.
         let toe = (-down).atan2(right);
         let degrees = toe.to_degrees().rem_euclid(360.0).round() as usize;
         assert!((f64::from(found[degrees]) - right.hypot(down) / 100.0).abs() < 0.03);

@@ -1,9 +1,9 @@
-//! Shortest paths over the neighbour graph.
+//! Shortest paths in the neighbour graph.
 //!
-//! Two exact ways. [`dijkstra`] from one node with a binary heap. [`all_pairs`] and [`from_sources`] relax the whole graph for
-//! sixteen sources side by side (Bellman and Ford's label correction, sweeping nodes forth and back in an order that runs along
-//! the data), so that an edge costs one vector addition and minimum for sixteen sources; a handful of sweeps settle a neighbour
-//! graph. N = 1500, K = 12: a few tens of milliseconds on one thread, where heaps take 150.
+//! [`dijkstra`] uses a binary heap for one source. [`all_pairs`] and [`from_sources`] relax the graph for
+//! sixteen sources at a time (Bellman-Ford label correction, sweeping nodes forwards and backwards along the
+//! data), so an edge costs one vector operation for sixteen sources; a few sweeps suffice. N = 1500, K = 12:
+//! a few tens of milliseconds on one thread instead of 150 with heaps.
 
 use super::neighbours::Graph;
 use ndarray::Array2;
@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
-/// Sources relaxed side by side.
+/// Sources relaxed together.
 const LANES: usize = 16;
 
 #[derive(PartialEq)]
@@ -48,7 +48,7 @@ pub fn dijkstra(graph: &Graph, source: usize) -> Vec<f32> {
     distance
 }
 
-/// The N x N matrix of path lengths.
+/// N x N path lengths.
 pub fn all_pairs(graph: &Graph) -> Array2<f32> {
     let sources: Vec<usize> = (0..graph.nodes()).collect();
     from_sources(graph, &sources)
@@ -141,7 +141,7 @@ fn relax(graph: &Graph, order: &[u32], sources: &[usize], distance: &mut [[f32; 
     }
 }
 
-/// Nodes by their distance from one end of the graph, so that most shortest paths run with or against the order.
+/// Nodes by distance from one end, so that most paths follow the order.
 fn sweep_order(graph: &Graph) -> Vec<u32> {
     let mut order: Vec<u32> = (0..graph.nodes() as u32).collect();
     if order.is_empty() {
@@ -176,7 +176,7 @@ mod tests {
             for source in 0..n {
                 let one = dijkstra(&graph, source);
                 for (a, b) in all.row(source).iter().zip(&one) {
-                    // Sums may be taken in another order: a few units in the last place.
+                    // Sums in another order: a few units in the last place.
                     assert!((a == b) || (a - b).abs() <= 1e-5 * b, "{a} {b}");
                 }
             }

@@ -1,8 +1,8 @@
-//! Isomap (Tenenbaum, de Silva, Langford, Science 290, 2000): geodesic distances laid out by classical scaling.
+//! Isomap (Tenenbaum, de Silva, Langford, Science 290, 2000): classical scaling of geodesic distances.
 //!
-//! `B = -1/2 J D^2 J` of the squared path lengths D^2, coordinates are the leading eigenvectors times the square roots of their
-//! eigenvalues. With K = N - 1 every pair is an edge and the result is PCA's exactly; the thesis used that, so it is offered
-//! ([`Neighbourhood::Nearest`] with N - 1) but a small K is what makes it Isomap. O(N^2 (d + K)) time, 8 N^2 bytes.
+//! Coordinates are the leading eigenvectors of `B = -1/2 J D^2 J` times the square roots of their
+//! eigenvalues. With K = N - 1 (the thesis' choice, [`Neighbourhood::Nearest`]) the result is exactly PCA;
+//! Isomap needs a small K. O(N^2 (d + K)) time, 8 N^2 bytes.
 
 use super::geodesic::all_pairs;
 use super::neighbours::{Graph, Neighbourhood};
@@ -12,21 +12,20 @@ use faer::{Accum, Mat, MatRef, Par};
 use ndarray::{Array2, ArrayView2};
 use rayon::prelude::*;
 
-/// A gallery laid out in few dimensions.
+/// Layout of a gallery in few dimensions.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Isomap {
     /// One row per sample, one column per dimension.
     pub coordinates: Array2<f32>,
-    /// The eigenvalues of the dimensions, falling.
+    /// Descending eigenvalues.
     pub eigenvalues: Vec<f64>,
     /// Path lengths between all samples.
     pub geodesics: Array2<f32>,
 }
 
 /// Lays out `samples` (N x d) in `dimensions` dimensions.
-///
-/// # Errors
-/// Too few or non-finite samples, a neighbour graph that falls apart (its parts are named), fewer positive eigenvalues than dimensions.
+/// Errors: Too few or non-finite samples, a neighbour graph that falls apart (its parts are named), fewer
+/// positive eigenvalues than dimensions.
 pub fn isomap(
     samples: ArrayView2<f32>,
     neighbourhood: Neighbourhood,
@@ -40,10 +39,10 @@ pub fn isomap(
     Ok(Isomap { coordinates, eigenvalues, geodesics })
 }
 
-/// Residual of a pair over the largest eigenvalue: what single precision can give, far below what the graph is worth.
+/// Residual over the largest eigenvalue: single precision, far below the graph's accuracy.
 const TOLERANCE: f64 = 1e-5;
 
-/// Classical multidimensional scaling of a symmetric matrix of distances.
+/// Classical multidimensional scaling of a symmetric distance matrix.
 pub(super) fn classical_scaling(
     distances: &Array2<f32>,
     dimensions: usize,
@@ -61,8 +60,8 @@ pub(super) fn classical_scaling(
     Ok((coordinates, values))
 }
 
-/// The leading pairs of `-1/2 J D^2 J`, which is never formed: the squared distances stay in single precision, half the memory that
-/// every product has to read, and J only takes the mean off vectors.
+/// Leading pairs of `-1/2 J D^2 J` without forming it: squared distances stay in single precision, half the
+/// memory traffic, and J only subtracts means.
 fn leading(distances: &Array2<f32>, dimensions: usize) -> Option<spectral::Pairs> {
     let n = distances.nrows();
     let mut squared = vec![0.0_f32; n * n];
@@ -108,7 +107,7 @@ mod tests {
     use super::*;
     use rand::{Rng, SeedableRng};
 
-    /// Points of a Swiss roll and their true (unrolled) coordinates.
+    /// Swiss roll points with their true (unrolled) coordinates.
     fn swiss_roll(n: usize) -> (Array2<f32>, Vec<[f64; 2]>) {
         let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(5);
         let flat: Vec<[f64; 2]> =
@@ -143,7 +142,7 @@ mod tests {
     fn a_swiss_roll_is_unrolled() {
         let (rolled, flat) = swiss_roll(700);
         let found = isomap(rolled.view(), Neighbourhood::Nearest(9), 2).expect("connected");
-        // Distances of the layout follow the unrolled sheet's.
+        // Distances of the layout follow the unrolled sheet.
         let (mut a, mut b) = (Array2::<f32>::zeros((700, 700)), Array2::<f32>::zeros((700, 700)));
         for i in 0..700 {
             for j in 0..700 {
@@ -153,7 +152,7 @@ mod tests {
             }
         }
         assert!(squared_correlation(&a, &b) > 0.99);
-        // What the layout leaves of the path lengths: little in two dimensions, more in one.
+        // Residual of the path lengths: small in two dimensions, larger in one.
         let one = Array2::from_shape_fn((700, 700), |(i, j)| {
             (found.coordinates[[i, 0]] - found.coordinates[[j, 0]]).powi(2)
         });

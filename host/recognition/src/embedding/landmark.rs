@@ -1,5 +1,5 @@
-//! Landmark Isomap (de Silva and Tenenbaum, NIPS 15, 2003) for galleries of thousands: only the paths from some landmarks are
-//! found and scaled, the other samples are placed by their distances to the landmarks.
+//! Landmark Isomap (de Silva and Tenenbaum, NIPS 15, 2003) for large galleries: scales the paths from some
+//! landmarks and places other samples by their distances to them.
 //!
 //! Landmarks are chosen by farthest-point steps over the path lengths, so they cover the data. Memory is L N floats instead of
 //! N^2; 20,000 samples of 360 numbers take seconds, most of it the neighbour search.
@@ -11,21 +11,19 @@ use super::{EmbeddingError, check};
 use ndarray::{Array2, ArrayView2, s};
 use rayon::prelude::*;
 
-/// A gallery laid out by way of landmarks.
+/// Layout of a gallery by landmarks.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LandmarkIsomap {
     /// One row per sample, one column per dimension.
     pub coordinates: Array2<f32>,
-    /// Rows of the landmarks among the samples.
+    /// Sample rows of the landmarks.
     pub landmarks: Vec<usize>,
-    /// The eigenvalues of the landmarks' dimensions, falling.
+    /// Descending eigenvalues.
     pub eigenvalues: Vec<f64>,
 }
 
 /// Lays out `samples` (N x d) by `landmarks` landmarks.
-///
-/// # Errors
-/// As [`super::isomap::isomap`], and fewer landmarks than dimensions + 2.
+/// Errors: as [`super::isomap::isomap`], and fewer landmarks than dimensions + 2.
 pub fn landmark_isomap(
     samples: ArrayView2<f32>,
     neighbourhood: Neighbourhood,
@@ -47,7 +45,8 @@ pub fn landmark_isomap(
     let paths = from_sources(&graph, &chosen);
     let between = Array2::from_shape_fn((count, count), |(i, j)| paths[[i, chosen[j]]]);
     let (landmark_coordinates, eigenvalues) = classical_scaling(&between, dimensions)?;
-    // Triangulation: y = -1/2 L# (delta - mean delta), with L# the rows v_k^T / sqrt(lambda_k) = coordinate_k^T / lambda_k.
+    // Triangulation: y = -1/2 L# (delta - mean delta), with L# the rows v_k^T / sqrt(lambda_k) =
+    // coordinate_k^T / lambda_k.
     let mean: Vec<f64> = between
         .rows()
         .into_iter()
@@ -73,7 +72,7 @@ pub fn landmark_isomap(
     Ok(LandmarkIsomap { coordinates, landmarks: chosen, eigenvalues })
 }
 
-/// Farthest-point landmarks: the first tenth one by one, the rest spread evenly by rank of distance to those.
+/// Farthest-point landmarks: the first tenth individually, the rest evenly by rank of distance to those.
 fn spread(graph: &Graph, count: usize) -> Vec<usize> {
     let n = graph.nodes();
     let careful = (count / 10).max(8).min(count);

@@ -1,20 +1,20 @@
-//! The neighbour graph: K nearest or all within a radius, made symmetric, as compressed sparse rows.
+//! Neighbour graph: K nearest or within a radius, symmetric, in compressed sparse rows.
 //!
-//! Squared distances come in blocks from one matrix product (`|a|^2 + |b|^2 - 2 a.b`), never all at once; the few that become
-//! edges are recomputed from the samples, so that nearly equal samples do not suffer from cancellation. O(N^2 d) flops, O(N K) memory.
+//! Squared distances come in blocks from one matrix product (`|a|^2 + |b|^2 - 2 a.b`); edges are recomputed
+//! from the samples to avoid cancellation. O(N^2 d) flops, O(N K) memory.
 
 use super::{EmbeddingError, squared_distance, squared_norms, times_transposed};
 use ndarray::{ArrayView2, s};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-/// Which samples are neighbours.
+/// Selection of neighbours.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Neighbourhood {
-    /// The K nearest others. K = N - 1 makes Isomap the same as PCA (so the thesis' choice does).
+    /// The K nearest others. K = N - 1 makes Isomap equal to PCA (the thesis' choice).
     Nearest(usize),
-    /// All others nearer than this, in the samples' units.
+    /// All others within this distance, in the samples' units.
     Radius(f32),
 }
 
@@ -27,25 +27,23 @@ impl std::fmt::Display for Neighbourhood {
     }
 }
 
-/// An undirected weighted graph in compressed sparse rows; every edge stands in both its rows.
+/// Undirected weighted graph in compressed sparse rows; each edge is in both rows.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Graph {
-    /// Where each row starts; one longer than the number of nodes.
+    /// Start of each row, plus the end.
     pub offsets: Vec<u32>,
-    /// The other end of each edge.
+    /// Other end of each edge.
     pub targets: Vec<u32>,
-    /// The edge's length.
+    /// Length of each edge.
     pub lengths: Vec<f32>,
 }
 
-/// Rows of the distance matrix made at once.
+/// Rows of the distance matrix per block.
 const BLOCK: usize = 256;
 
 impl Graph {
     /// The graph of a sample matrix (N x d).
-    ///
-    /// # Errors
-    /// No neighbours asked for.
+    /// Errors: No neighbours asked for.
     pub fn new(samples: ArrayView2<f32>, neighbourhood: Neighbourhood) -> Result<Self, EmbeddingError> {
         let n = samples.nrows();
         if let Neighbourhood::Nearest(k) = neighbourhood
@@ -88,7 +86,7 @@ impl Graph {
         Ok(Self::from_edges(n, &edges))
     }
 
-    /// A graph of `n` nodes from edges that are taken both ways; the shorter of two between the same nodes counts.
+    /// Graph of `n` nodes from undirected edges; the shortest of duplicates counts.
     pub fn from_edges(n: usize, edges: &[(u32, u32, f32)]) -> Self {
         let mut rows: Vec<Vec<(u32, f32)>> = vec![Vec::new(); n];
         for &(a, b, length) in edges.iter().filter(|(a, b, _)| a != b) {
@@ -113,13 +111,13 @@ impl Graph {
         self.offsets.len() - 1
     }
 
-    /// The edges of a node: other end and length.
+    /// Edges of a node: other end and length.
     pub fn edges(&self, node: usize) -> impl Iterator<Item = (usize, f32)> + '_ {
         let range = self.offsets[node] as usize..self.offsets[node + 1] as usize;
         range.map(|e| (self.targets[e] as usize, self.lengths[e]))
     }
 
-    /// The connected parts, largest first, members in rising order.
+    /// Connected parts, largest first, members ascending.
     pub fn components(&self) -> Vec<Vec<usize>> {
         let mut seen = vec![false; self.nodes()];
         let mut components = Vec::new();
@@ -145,9 +143,7 @@ impl Graph {
     }
 
     /// Ok for a connected graph.
-    ///
-    /// # Errors
-    /// [`EmbeddingError::Disconnected`] with the parts by name.
+    /// Errors: [`EmbeddingError::Disconnected`] with the parts by name.
     pub fn connected(&self, neighbourhood: Neighbourhood) -> Result<(), EmbeddingError> {
         let components = self.components();
         if components.len() <= 1 {
@@ -157,7 +153,7 @@ impl Graph {
     }
 }
 
-/// Neighbours of sample `i` given `|b|^2 - 2 a.b` for all b.
+/// Neighbours of sample `i` from `|b|^2 - 2 a.b` for all b.
 fn pick(squared: &[f32], norm: f32, i: usize, neighbourhood: Neighbourhood) -> Vec<u32> {
     match neighbourhood {
         Neighbourhood::Radius(radius) => {

@@ -1,4 +1,4 @@
-//! Principal components, for comparison with Isomap (on some data they do as well).
+//! Principal components, for comparison with Isomap.
 
 use super::{EmbeddingError, check, spectral};
 use ndarray::{Array1, Array2, ArrayView2, Axis};
@@ -6,9 +6,9 @@ use ndarray::{Array1, Array2, ArrayView2, Axis};
 /// Mean and leading principal directions.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Pca {
-    /// Mean of the training samples, taken off before projecting.
+    /// Mean of the training samples.
     pub mean: Array1<f32>,
-    /// One row per direction, unit length.
+    /// Unit directions, one per row.
     pub directions: Array2<f32>,
     /// Variance along each direction.
     pub variances: Vec<f64>,
@@ -16,9 +16,7 @@ pub struct Pca {
 
 impl Pca {
     /// Fits `dimensions` directions to `samples` (N x d). O(N d^2 + d^3).
-    ///
-    /// # Errors
-    /// Too few or non-finite samples, fewer directions with variance than asked for.
+    /// Errors: Too few or non-finite samples, fewer directions with variance than asked for.
     pub fn fit(samples: ArrayView2<f32>, dimensions: usize) -> Result<Self, EmbeddingError> {
         check(samples, 2)?;
         let mean = samples.mean_axis(Axis(0)).unwrap_or_else(|| Array1::zeros(samples.ncols()));
@@ -35,9 +33,7 @@ impl Pca {
     }
 
     /// Coordinates of samples (N x d) along the directions (N x D).
-    ///
-    /// # Errors
-    /// Samples of another width.
+    /// Errors: Samples of another width.
     pub fn transform(&self, samples: ArrayView2<f32>) -> Result<Array2<f32>, EmbeddingError> {
         if samples.ncols() != self.mean.len() {
             return Err(EmbeddingError::Shape {

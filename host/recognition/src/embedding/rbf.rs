@@ -1,9 +1,10 @@
-//! The map that embeds new silhouettes: Gaussian radial basis functions on all gallery samples, solved with a ridge
-//! (Li 2014, eq. 9.3 to 9.7).
+//! Embedding of new silhouettes by Gaussian radial basis functions on the gallery, with a ridge (Li 2014, eq.
+//! 9.3 to 9.7).
 //!
-//! `y = sum_m w_m exp(-gamma |x - c_m|^2)`, `W = (B + ridge I)^-1 Y`. gamma belongs to the descriptor's units: for centroid distances
-//! in [0, 0.7] 0.03 to 0.1 do best (the thesis' 1e-4 is for pixels). Training is O(N^3 / 3); embedding one frame is one pass over the
-//! centres, kept as 16-bit fixed point so that 1500 x 360 fit a core's cache: some 15 us, error far below 1e-3 of the range.
+//! `y = sum_m w_m exp(-gamma |x - c_m|^2)`, `W = (B + ridge I)^-1 Y`. gamma depends on the descriptor's
+//! units: 0.03 to 0.1 for centroid distances in [0, 0.7] (the thesis' 1e-4 is for pixels). Training is O(N^3
+//! / 3). Embedding is one pass over the centres in 16-bit fixed point (1500 x 360 fit a cache): some 15 us,
+//! error far below 1e-3.
 
 use super::{EmbeddingError, check, squared_distance, squared_norms, times_transposed};
 use faer::linalg::solvers::Solve;
@@ -11,11 +12,11 @@ use faer::{Mat, Side};
 use ndarray::{Array1, Array2, ArrayView1, ArrayView2};
 use rayon::prelude::*;
 
-/// Fixed-point scale and the largest value it is used for (no centroid distance in a unit frame exceeds its diagonal): the
-/// squares of a run of [`RUN`] differences then fit an i32 (64 x (3990 x 1.45)^2 < 2^31).
+/// Fixed-point scale and largest value (no centroid distance in a unit frame exceeds its diagonal): squares
+/// of a run of [`RUN`] differences fit an i32 (64 x (3990 x 1.45)^2 < 2^31).
 const SCALE: f32 = 3990.0;
 const LARGEST: f32 = 1.45;
-/// Differences summed in integers before they go to floating point.
+/// Differences summed as integers before conversion to float.
 const RUN: usize = 64;
 
 /// A trained map.
@@ -23,25 +24,23 @@ const RUN: usize = 64;
 pub struct Rbf {
     /// Gallery samples (M x d).
     pub centres: Array2<f32>,
-    /// Weights (M x D).
+    /// Weights of centres (M x D).
     pub weights: Array2<f32>,
     /// Coefficient of the squared distance.
     pub gamma: f32,
     /// Ridge used in training.
     pub ridge: f64,
-    /// Condition number of the system that was solved (largest over smallest eigenvalue, estimated by power iteration).
+    /// Condition number of the system, by power iteration.
     pub condition: f64,
-    /// The centres in 16-bit fixed point, where they fit.
+    /// Centres in 16-bit fixed point, if they fit.
     fixed: Option<Vec<[i16; RUN]>>,
-    /// Weights with one row per dimension, so that a dimension is one dot product.
+    /// Weights by dimension, so that each is a dot product.
     by_dimension: Array2<f32>,
 }
 
 impl Rbf {
     /// Learns the map from `samples` (N x d) to `coordinates` (N x D).
-    ///
-    /// # Errors
-    /// Shapes that differ, non-finite samples, a singular system.
+    /// Errors: Shapes that differ, non-finite samples, a singular system.
     pub fn train(
         samples: ArrayView2<f32>,
         coordinates: ArrayView2<f32>,
@@ -71,7 +70,7 @@ impl Rbf {
         Ok(Self::assemble(samples.to_owned(), weights, gamma, ridge, condition))
     }
 
-    /// A map from its parts, as read back from a model.
+    /// A map from its parts, as read from a model.
     pub fn assemble(
         centres: Array2<f32>,
         weights: Array2<f32>,
@@ -91,9 +90,7 @@ impl Rbf {
     }
 
     /// Embeds one sample (d) to D coordinates.
-    ///
-    /// # Errors
-    /// A sample of another width.
+    /// Errors: a sample of another width.
     pub fn embed(&self, sample: ArrayView1<f32>) -> Result<Array1<f32>, EmbeddingError> {
         if sample.len() != self.centres.ncols() {
             return Err(EmbeddingError::Shape {
@@ -118,9 +115,7 @@ impl Rbf {
     }
 
     /// Embeds many samples (N x d) to N x D coordinates, over the current rayon pool.
-    ///
-    /// # Errors
-    /// Samples of another width.
+    /// Errors: Samples of another width.
     pub fn embed_all(&self, samples: ArrayView2<f32>) -> Result<Array2<f32>, EmbeddingError> {
         let rows: Result<Vec<Array1<f32>>, EmbeddingError> =
             samples.outer_iter().into_par_iter().map(|row| self.embed(row)).collect();
@@ -160,7 +155,7 @@ impl Rbf {
     }
 }
 
-/// A sample in fixed point, in runs filled up with zeros.
+/// Fixed-point sample in runs padded with zeros.
 fn quantised(sample: ArrayView1<f32>) -> impl Iterator<Item = [i16; RUN]> {
     let runs = sample.len().div_ceil(RUN);
     let values: Vec<i16> = sample.iter().map(|v| (v * SCALE).round() as i16).collect();
@@ -178,7 +173,7 @@ fn run_of_squares(a: &[i16; RUN], b: &[i16; RUN]) -> i32 {
     sum
 }
 
-/// Dot product in eight partial sums, so that it vectorises.
+/// Eight partial sums, so that it vectorises.
 #[inline(always)]
 fn dot(a: &[f32], b: &[f32]) -> f32 {
     let mut sums = [0.0_f32; 8];
@@ -209,10 +204,11 @@ fn kernel(samples: ArrayView2<f32>, gamma: f32) -> Array2<f32> {
     kernel
 }
 
-/// `exp(-x)` for x >= 0 within 2e-5 relative, in a form that vectorises: 2^(-x log2 e) split into exponent bits and a polynomial.
+/// `exp(-x)` for x >= 0 within 2e-5 relative, vectorisable: 2^(-x log2 e) from exponent bits and a
+/// polynomial.
 #[inline(always)]
 pub(crate) fn exp_negative(x: f32) -> f32 {
-    // Below 2^-125 the result is denormal: cut there.
+    // Cut at 2^-125, below which results are denormal.
     let t = (-x * std::f32::consts::LOG2_E).clamp(-125.0, 0.0);
     let whole = t.floor();
     let part = t - whole;
@@ -224,7 +220,7 @@ pub(crate) fn exp_negative(x: f32) -> f32 {
     f32::from_bits(((whole as i32 + 127) as u32) << 23) * polynomial
 }
 
-/// The largest eigenvalue of a positive map by a few power iterations (within some per cent: enough for a condition number).
+/// Largest eigenvalue of a positive map by power iteration, within some per cent.
 fn largest(n: usize, apply: impl Fn(&Mat<f64>) -> Mat<f64>) -> f64 {
     let mut v = Mat::<f64>::from_fn(n, 1, |i, _| 1.0 + 0.5 * ((i as f64) * 0.618_034).fract());
     let mut value = 0.0;
@@ -243,7 +239,7 @@ mod tests {
 
     fn data(n: usize, d: usize) -> (Array2<f32>, Array2<f32>) {
         let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(2);
-        // Smooth curves in [0, 0.7] that two parameters steer.
+        // Smooth curves in [0, 0.7] with two parameters.
         let parameters: Vec<[f32; 2]> =
             (0..n).map(|_| [rng.random_range(0.0..1.0), rng.random_range(0.0..1.0)]).collect();
         let samples = Array2::from_shape_fn((n, d), |(i, j)| {

@@ -1,25 +1,25 @@
-//! The leading eigenpairs of a symmetric matrix by block Krylov subspaces and Rayleigh-Ritz.
+//! Leading eigenpairs of a symmetric matrix by block Krylov subspaces and Rayleigh-Ritz.
 //!
-//! A start block is multiplied by the matrix again and again, every new block made orthogonal to all before (twice, which keeps
-//! it so); the matrix, seen from the subspace, gives the pairs (Golub and Van Loan, Matrix Computations, section 10.3.6). A block
-//! costs one pass over the matrix however many vectors it holds, and passes are what large matrices cost: eight or so settle
-//! the pairs of a gallery of 1500. Where they do not, the dense solver takes over.
+//! A block is repeatedly multiplied by the matrix and orthogonalised twice against all previous ones; the
+//! projected matrix gives the pairs (Golub and Van Loan, Matrix Computations, section 10.3.6). A block costs
+//! one pass over the matrix for any number of vectors; about eight suffice for a gallery of 1500. Otherwise
+//! the dense solver is used.
 
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, MatRef, Par, Side};
 
-/// Below this size the whole decomposition is as fast as a part of it.
+/// Smaller matrices are decomposed completely.
 const WHOLE: usize = 128;
-/// Vectors in a block beyond the wanted pairs: they keep pairs of nearly equal value apart from each other's way.
+/// Additional vectors that separate pairs of nearly equal value.
 const SPARE: usize = 5;
-/// Blocks after which the dense solver takes over.
+/// Limit of blocks before the dense solver.
 const MOST_BLOCKS: usize = 24;
 
-/// Eigenvalues, falling, and as many eigenvectors of unit length.
+/// Descending eigenvalues with unit eigenvectors.
 pub(crate) type Pairs = (Vec<f64>, Vec<Vec<f64>>);
 
-/// The `wanted` algebraically largest POSITIVE eigenpairs of a symmetric row-major n x n matrix, falling; fewer if fewer are
-/// positive. Eigenvectors are rows, of unit length, with their largest entry positive so that results repeat.
+/// The `wanted` largest POSITIVE eigenpairs of a symmetric row-major n x n matrix, descending, or fewer. Unit
+/// eigenvectors as rows, largest entry positive for repeatability.
 pub(crate) fn leading(matrix: &[f64], n: usize, wanted: usize) -> Pairs {
     let view = MatRef::from_row_major_slice(matrix, n, n);
     let apply = |block: &Mat<f64>| {
@@ -30,8 +30,8 @@ pub(crate) fn leading(matrix: &[f64], n: usize, wanted: usize) -> Pairs {
     leading_of(n, wanted, 1e-8, apply).unwrap_or_else(|| positive(whole(view), wanted))
 }
 
-/// The same of a symmetric operator that multiplies blocks of vectors; pairs are settled when their residual is below
-/// `tolerance` times the largest eigenvalue. `None` where the operator is small enough for the dense solver, or does not settle.
+/// [`leading`] for an operator on blocks of vectors; converged below `tolerance` times the largest
+/// eigenvalue. `None` for small operators, or without convergence.
 pub(super) fn leading_of(
     n: usize,
     wanted: usize,
@@ -42,7 +42,7 @@ pub(super) fn leading_of(
     if n <= WHOLE || 4 * width > n {
         return None;
     }
-    // A start with every direction in it, the same in every run.
+    // A repeatable start block with all directions.
     let start = Mat::<f64>::from_fn(n, width, |i, k| {
         0.5 - ((i as f64 + 1.0) * (0.754_877_666_2 + 0.569_840_290_998 * k as f64)).fract()
     });
@@ -58,7 +58,7 @@ pub(super) fn leading_of(
         basis = beside(&basis, &fresh);
         images = beside(&images, &image);
         block = image;
-        // The first blocks settle nothing.
+        // No convergence is possible earlier.
         if round >= 4 {
             let seen = product_of(basis.transpose(), images.as_ref());
             let symmetric =
@@ -82,8 +82,7 @@ pub(super) fn leading_of(
     None
 }
 
-/// The block's part that is orthogonal to an orthonormal basis, made orthonormal itself; directions that are in the basis but for
-/// rounding are left out.
+/// Orthonormal part of the block, orthogonal to a basis; directions within rounding of the basis are dropped.
 fn orthonormal(basis: &Mat<f64>, mut block: Mat<f64>) -> Mat<f64> {
     let lengths: Vec<f64> = (0..block.ncols()).map(|k| block.col(k).norm_l2()).collect();
     for _ in 0..2 {
@@ -92,7 +91,7 @@ fn orthonormal(basis: &Mat<f64>, mut block: Mat<f64>) -> Mat<f64> {
             matmul(block.as_mut(), Accum::Add, basis, &along, -1.0, Par::rayon(0));
         }
     }
-    // Gram-Schmidt inside the block, again twice.
+    // Gram-Schmidt inside the block, also twice.
     let n = block.nrows();
     let mut kept: Vec<Vec<f64>> = Vec::new();
     for (k, length) in lengths.into_iter().enumerate() {
@@ -118,7 +117,7 @@ fn product_of(a: MatRef<f64>, b: MatRef<f64>) -> Mat<f64> {
     product
 }
 
-/// The columns of both.
+/// Joins the columns of both.
 fn beside(a: &Mat<f64>, b: &Mat<f64>) -> Mat<f64> {
     let mut both = Mat::<f64>::zeros(b.nrows(), a.ncols() + b.ncols());
     both.as_mut().subcols_mut(0, a.ncols()).copy_from(a);
@@ -126,7 +125,7 @@ fn beside(a: &Mat<f64>, b: &Mat<f64>) -> Mat<f64> {
     both
 }
 
-/// The `wanted` largest positive pairs, falling.
+/// The `wanted` largest positive pairs, descending.
 pub(super) fn positive(mut pairs: Vec<(f64, Vec<f64>)>, wanted: usize) -> Pairs {
     let largest = pairs.iter().fold(0.0_f64, |m, pair| m.max(pair.0.abs()));
     pairs.retain(|pair| pair.0 > 1e-10 * largest);
@@ -135,7 +134,7 @@ pub(super) fn positive(mut pairs: Vec<(f64, Vec<f64>)>, wanted: usize) -> Pairs 
     pairs.into_iter().map(|(value, vector)| (value, signed(vector))).unzip()
 }
 
-/// The vector with its largest entry positive.
+/// Sign with a positive largest entry.
 fn signed(mut vector: Vec<f64>) -> Vec<f64> {
     let peak = vector.iter().fold(0.0_f64, |peak, v| if v.abs() > peak.abs() + 1e-12 { *v } else { peak });
     if peak < 0.0 {
@@ -144,7 +143,7 @@ fn signed(mut vector: Vec<f64>) -> Vec<f64> {
     vector
 }
 
-/// All eigenpairs by the dense solver; empty where it does not converge.
+/// All eigenpairs by the dense solver; empty without convergence.
 pub(super) fn whole(view: MatRef<f64>) -> Vec<(f64, Vec<f64>)> {
     let Ok(eigen) = view.self_adjoint_eigen(Side::Lower) else { return Vec::new() };
     let values = eigen.S().column_vector();
@@ -157,7 +156,7 @@ mod tests {
 
     #[test]
     fn partial_and_whole_solver_agree_and_negative_pairs_are_dropped() {
-        // A matrix with known spectrum: Householder-reflected diagonal with one large negative entry.
+        // Known spectrum: Householder-reflected diagonal with one large negative entry.
         let n = 200;
         let diagonal = |i: usize| match i {
             0 => 50.0,

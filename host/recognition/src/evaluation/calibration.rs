@@ -3,27 +3,27 @@
 /// Bins of confidence.
 const BINS: usize = 15;
 
-/// Confidences and right answers in bins of equal width: a reliability diagram.
+/// Reliability diagram: confidences and right answers in bins of equal width.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Reliability {
-    /// Per bin: answers, sum of their confidences, right ones.
+    /// Per bin: answers, sum of confidences, right ones.
     bins: [(u32, f64, u32); BINS],
 }
 
 impl Reliability {
-    /// Counts an answer of that confidence, 0 to 1.
+    /// Adds an answer with confidence 0 to 1.
     pub fn count(&mut self, confidence: f32, right: bool) {
         let bin = &mut self.bins[((confidence * BINS as f32) as usize).min(BINS - 1)];
         *bin = (bin.0 + 1, bin.1 + f64::from(confidence), bin.2 + u32::from(right));
     }
 
-    /// Mean confidence, share of right answers and number of answers of every bin that has any.
+    /// Mean confidence, share of right answers and count of each non-empty bin.
     pub fn curve(&self) -> Vec<(f64, f64, u32)> {
         let filled = self.bins.iter().filter(|(answers, ..)| *answers > 0);
         filled.map(|&(n, sum, right)| (sum / f64::from(n), f64::from(right) / f64::from(n), n)).collect()
     }
 
-    /// Expected calibration error (Naeini et al., AAAI 2015): the mean over answers of how far their bin's confidence is from its share
+    /// Expected calibration error (Naeini et al., AAAI 2015): mean difference of a bin's confidence and share
     /// of right answers; 0 without answers.
     pub fn expected_error(&self) -> f64 {
         let curve = self.curve();
@@ -33,8 +33,8 @@ impl Reliability {
     }
 }
 
-/// Area under the receiver operating characteristic: the chance that something strange has a higher score than something known, ties
-/// counting half (Mann and Whitney 1947). NaN without one of them. O(n log n).
+/// Area under the ROC curve: probability that a stranger scores higher than a known clip, ties counting half
+/// (Mann and Whitney 1947). NaN if either is empty. O(n log n).
 pub fn area_under_roc(known: &[f32], strange: &[f32]) -> f64 {
     let mut all: Vec<(f32, bool)> =
         known.iter().map(|v| (*v, false)).chain(strange.iter().map(|v| (*v, true))).collect();

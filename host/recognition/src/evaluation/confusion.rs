@@ -1,8 +1,8 @@
-//! Confusion matrices and the confidence interval of an accuracy.
+//! Confusion matrices and confidence intervals of accuracies.
 
 use serde::{Deserialize, Serialize};
 
-/// How often clips of one class were taken for another.
+/// Counts of answers per true class.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Confusion {
     /// Names of the classes.
@@ -12,25 +12,25 @@ pub struct Confusion {
 }
 
 impl Confusion {
-    /// No clips yet.
+    /// An empty matrix for these classes.
     pub fn new(classes: Vec<String>) -> Self {
         let n = classes.len();
         Self { classes, counts: vec![vec![0; n]; n] }
     }
 
-    /// Counts one clip.
+    /// Adds one clip to the counts.
     pub fn count(&mut self, truth: usize, answer: usize) {
         self.counts[truth][answer] += 1;
     }
 
-    /// Adds another matrix of the same classes.
+    /// Adds a matrix of the same classes.
     pub fn add(&mut self, other: &Self) {
         for (row, more) in self.counts.iter_mut().zip(&other.counts) {
             row.iter_mut().zip(more).for_each(|(count, more)| *count += more);
         }
     }
 
-    /// Right answers and clips.
+    /// Right answers and number of clips.
     pub fn right_of(&self) -> (u32, u32) {
         let right = (0..self.counts.len()).map(|i| self.counts[i][i]).sum();
         (right, self.counts.iter().flatten().sum())
@@ -48,7 +48,7 @@ impl Confusion {
         wilson(right, of, 1.96)
     }
 
-    /// A Markdown table in per cent of each truth, as the thesis' tables 9.1 to 9.3.
+    /// Markdown table in per cent of each truth, as the thesis' tables 9.1 to 9.3.
     pub fn to_markdown(&self) -> String {
         let mut text =
             format!("| | {} |\n|---|{}\n", self.classes.join(" | "), "---|".repeat(self.classes.len()));
@@ -64,7 +64,7 @@ impl Confusion {
     }
 }
 
-/// Wilson's score interval of `right` out of `of` at `z` standard deviations; (0, 1) without clips.
+/// Wilson's score interval of `right` of `of` at `z` standard deviations; (0, 1) without clips.
 pub fn wilson(right: u32, of: u32, z: f64) -> (f64, f64) {
     if of == 0 {
         return (0.0, 1.0);

@@ -1,9 +1,8 @@
-//! Leave one subject out, all parameters chosen on the others.
+//! Leave-one-subject-out evaluation.
 //!
-//! Per left-out subject: the space (gallery, layout, RBF map, codebook) is learned from the other subjects' clips; its
-//! parameters, sharpness and the classifier's parameter are chosen by cross-validation over those subjects
-//! ([`crate::choice`]); the classifier is trained on all of them; the left-out subject's clips are recognised once. Nothing of the
-//! left-out subject is ever seen before.
+//! Per subject: the space is learned from the other subjects' clips; its parameters, sharpness and classifier
+//! are chosen by cross-validation over those ([`crate::choice`]); the classifier is trained on all of them;
+//! the left-out clips are recognised once and influence nothing.
 
 use super::confusion::Confusion;
 use crate::alignment::{Alignment, Statistics};
@@ -20,12 +19,12 @@ use ndarray::Array2;
 use rayon::prelude::*;
 use serde::Serialize;
 
-/// Right and wrong answers over all left-out subjects.
+/// Answers over all left-out subjects.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Outcome {
-    /// Every view by itself, all views' answers counted together.
+    /// Separate views, counted together.
     pub each: Confusion,
-    /// All views fused.
+    /// Fused views of all clips.
     pub fused: Confusion,
     /// Choices of every fold.
     pub chosen: Vec<Choice>,
@@ -34,19 +33,19 @@ pub struct Outcome {
 /// Choices of one fold.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Choice {
-    /// Who was left out.
+    /// Subjects that were left out.
     pub left_out: Vec<String>,
-    /// Whether views were recognised one by one or together.
+    /// Separate or fused views.
     pub views: Views,
-    /// How frames were embedded and clips became patterns.
+    /// Settings of embedding and patterns.
     pub space: SpaceSettings,
-    /// Sharpness of the codebook's soft assignments.
+    /// Sharpness of soft assignments.
     pub sharpness: f32,
-    /// The classifier and its parameter.
+    /// Classifier with its parameter.
     pub classifier: ClassifierKind,
-    /// Accuracy over the inner folds, 0 to 1.
+    /// Inner accuracy, 0 to 1.
     pub inner_accuracy: Option<f64>,
-    /// Condition number of the RBF system, if there is one.
+    /// Condition number of the RBF system, if any.
     pub condition: Option<f64>,
 }
 
@@ -57,54 +56,39 @@ impl Outcome {
     }
 }
 
-/// Why an evaluation could not be done.
+/// Why an evaluation failed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "the messages name the fields")]
 pub enum EvaluationError {
-    /// Leaving one out needs two.
     #[error("leave-one-subject-out needs at least 3 subjects, the samples have {0}")]
     Subjects(usize),
     /// Two halves of subjects, each enough for a threshold.
     #[error("an open set needs at least 4 subjects, the samples have {0}")]
     OpenSetSubjects(usize),
-    /// Two activities are taught when one is left out.
     #[error("an open set needs at least 3 activities, the samples have {0}")]
     Activities(usize),
-    /// What is unknown has no limit.
     #[error(
         "an open set needs at least {fewest} clips of what is taught by either half of the subjects, without the activity that is left out, one half has {found}: \
          with fewer nothing can be called unknown at a stated share of false alarms; evaluate more people or clips"
     )]
     OpenSetClips {
-        /// Clips taught when one of the activities is left out on one of the halves.
+        /// Clips that would be trained.
         found: usize,
-        /// Clips wanted.
         fewest: usize,
     },
-    /// A model could not be made or used.
     #[error(transparent)]
     Model(Box<crate::model::ModelError>),
-    /// A clip was seen from another number of views than the first.
     #[error(
         "clip {clip} has {found} views, the first has {expected}: fused views need the same in all clips"
     )]
-    Views {
-        /// Index of the clip.
-        clip: usize,
-        /// Views of that clip.
-        found: usize,
-        /// Views of the first clip.
-        expected: usize,
-    },
-    /// A space could not be learned.
+    Views { clip: usize, found: usize, expected: usize },
     #[error(transparent)]
     Embedding(#[from] EmbeddingError),
 }
 
 /// Runs the experiment over all subjects. `change` alters the left-out subject's clips before they are recognised (speed, shuffling,
 /// damage); training is never altered.
-///
-/// # Errors
-/// See [`EvaluationError`].
+/// Errors: See [`EvaluationError`].
 pub fn leave_one_subject_out(
     clips: &[Clip],
     experiment: &Experiment,
@@ -121,9 +105,7 @@ pub fn leave_one_subject_out(
 /// Recognises the clips of every subject of `test`, trained on the clips of all OTHER subjects of `train` (which may be the same
 /// people: clean clips for damaged ones, say). Only the asked arrangements of views are computed; others stay empty.
 /// `watch` hears of every fold, and may stop the work.
-///
-/// # Errors
-/// See [`EvaluationError`].
+/// Errors: See [`EvaluationError`].
 pub fn train_on_others(
     train: &[Clip],
     test: &[Clip],
@@ -139,7 +121,7 @@ pub fn train_on_others(
         return Err(EvaluationError::Views { clip, found: found.views.len(), expected: views });
     }
     let subjects = names(test.iter().map(|clip| &clip.subject));
-    // Where training and test share nobody, one training does for all.
+    // Disjoint training and test subjects need one training only.
     let shared = |subject: &String| train.iter().any(|clip| clip.subject == *subject);
     let (left_out, strangers): (Vec<&String>, Vec<&String>) = subjects.iter().partition(|s| shared(s));
     let mut groups: Vec<Vec<&String>> = left_out.into_iter().map(|subject| vec![subject]).collect();
@@ -192,7 +174,7 @@ fn one_fold(
     let asked: Vec<Views> =
         arrangements.iter().copied().filter(|arrangement| !doubled(arrangement)).collect();
     let chosen = choose(train, classes, experiment, &asked, watch)?;
-    // What a network was taught mirrors for gives an auxiliary model of every clip.
+    // A network taught on mirrors gives an auxiliary model for every clip.
     let mirrors: Vec<Clip> = if experiment.features.is_some() {
         test.iter().map(|clip| clip.mirrored()).collect()
     } else {
@@ -233,14 +215,14 @@ fn one_fold(
             condition: chosen.condition(),
         });
     }
-    // One view by itself is all of its views.
+    // A single view equals all views.
     if views == 1 && arrangements.contains(&Views::Each) {
         outcome.fused = outcome.each.clone();
     }
     Ok(outcome)
 }
 
-/// Frame vectors `[clip][view]` brought to those that were learned from.
+/// Aligned frame vectors `[clip][view]`.
 fn aligned(
     align: Alignment,
     seen: Vec<Vec<Array2<f32>>>,

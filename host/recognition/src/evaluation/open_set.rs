@@ -1,6 +1,7 @@
 //! Activities outside the training set: are they called unknown, and known ones not?
 //!
-//! Each activity in turn is left out of the training, on half of the subjects; the other half does all activities, and the other way round.
+//! Each activity in turn is left out of the training on half of the subjects; the other half performs all
+//! activities, and vice versa.
 
 use super::calibration::area_under_roc;
 use super::leave_one_out::EvaluationError;
@@ -19,13 +20,13 @@ use serde::Serialize;
 pub struct OpenSet {
     /// The activity left out of training; in a mean over all of them, `None`.
     pub left_out: Option<String>,
-    /// Clips of activities that were taught.
+    /// Clips of trained activities.
     pub known: usize,
-    /// Share of those that was called unknown.
+    /// Share of known clips called unknown.
     pub unknown_of_known: f64,
-    /// Clips of the activity that was not.
+    /// Clips of the untrained activity.
     pub strangers: usize,
-    /// Share of those that was called unknown.
+    /// Share of those called unknown.
     pub unknown_of_strangers: f64,
     /// Area under the ROC curve of the outlier score.
     pub auroc: f64,
@@ -40,9 +41,7 @@ struct Scores {
 
 /// Leaves every activity out in turn; `experiment` is told which. An experiment's first settings are taken; all views are fused. Gives a
 /// row per activity and their mean last.
-///
-/// # Errors
-/// Fewer than 4 subjects or 3 activities, too few clips for a limit; see [`EvaluationError`].
+/// Errors: Fewer than 4 subjects or 3 activities, too few clips for a limit; see [`EvaluationError`].
 pub fn open_set(
     clips: &[Clip],
     experiment: impl Fn(&str) -> Experiment + Sync,
@@ -94,7 +93,7 @@ pub fn open_set(
     Ok(rows)
 }
 
-/// Models are made of what evaluation was given.
+/// Converts model errors.
 fn of_model(error: ModelError) -> EvaluationError {
     match error {
         ModelError::Embedding(error) => error.into(),

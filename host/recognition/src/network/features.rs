@@ -1,5 +1,5 @@
-//! What a network gives for a clip as features for a classifier of one's own: every value against its mean over the training clips, over its
-//! spread there, so that a classifier's cost means the same as for other patterns.
+//! Network outputs as features for another classifier, normalised by mean and spread over the training clips,
+//! so that a classifier's cost is comparable.
 
 use super::Network;
 use ndarray::{Array1, Array2, ArrayView2, Axis};
@@ -8,16 +8,16 @@ use serde::{Deserialize, Serialize};
 /// A network and the statistics of its output.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Features {
-    /// The network, learned from other clips.
+    /// Network learned from other clips.
     pub network: Network,
-    /// Mean of its values over the training clips.
+    /// Mean output over the training clips.
     pub mean: Array1<f32>,
-    /// What they are multiplied by: patterns are of unit length in the mean.
+    /// Scale to unit mean length.
     pub scale: Array1<f32>,
 }
 
 impl Features {
-    /// From the network's values for the training clips, one per row.
+    /// From the network's outputs for the training clips, one per row.
     pub fn fitted(network: Network, values: ArrayView2<f32>) -> Self {
         let width = values.ncols();
         let mean = values.mean_axis(Axis(0)).unwrap_or_else(|| Array1::zeros(width));
@@ -26,19 +26,19 @@ impl Features {
         Self { network, mean, scale: spread.mapv(|v| if v > 1e-6 { unit / v } else { 0.0 }) }
     }
 
-    /// The clip's pattern from its frame vectors (frames x F).
+    /// Pattern of frame vectors (frames x F).
     pub fn pattern(&self, frames: ArrayView2<f32>) -> Array1<f32> {
         (self.network.pattern(frames) - &self.mean) * &self.scale
     }
 
-    /// Whether all sizes fit one another and frame vectors of `inputs` numbers.
+    /// Whether all sizes match each other and frame vectors of `inputs` numbers.
     pub fn fits(&self, inputs: usize) -> bool {
         let width = self.network.width();
         self.network.fits(inputs) && [self.mean.len(), self.scale.len()] == [width; 2]
     }
 }
 
-/// Values of a network for clips, one per row.
+/// Network outputs for clips, one per row.
 pub(crate) fn values(network: &Network, clips: &[Array2<f32>]) -> Array2<f32> {
     let rows: Vec<Array1<f32>> = clips.iter().map(|frames| network.pattern(frames.view())).collect();
     Array2::from_shape_fn((rows.len(), network.width()), |(i, k)| rows[i][k])

@@ -1,4 +1,4 @@
-//! A recogniser around the network: trained on thousands of clips in one view, calibrated on other people.
+//! Recogniser with a network: trained on thousands of one-view clips, calibrated on other people.
 
 use super::training::{NetworkSettings, train};
 use super::variation::{Embedded, varied};
@@ -18,16 +18,14 @@ use crate::watch::Watch;
 use ndarray::{Array1, Array2, ArrayView2, Axis, concatenate};
 use rayon::prelude::*;
 
-/// Typical patterns of an activity that outliers are measured from.
+/// Typical patterns per activity for outlier scores.
 const TYPICAL: usize = 24;
 
 impl Recogniser {
     /// Trains a network on clips in one view each, and on their mirrors; how sure its answers are and what counts as unknown is found
     /// on `others`: clips of people who are not among the first.
-    ///
-    /// # Errors
-    /// Fewer than two activities, clips without frames or with several views, a gallery that cannot be laid out,
-    /// [`EmbeddingError::Stopped`].
+    /// Errors: Fewer than two activities, clips without frames or with several views, a gallery that cannot
+    /// be laid out, [`EmbeddingError::Stopped`].
     pub fn train_network(
         clips: &[Clip],
         others: &[Clip],
@@ -73,7 +71,7 @@ impl Recogniser {
                 offsets: last.offsets,
             }),
             patterns,
-            // Learning on from typical patterns made models worse on every set that was tried.
+            // Further training from typical patterns made models worse on every tested set.
             labels: Vec::new(),
             second: None,
             lengths: Lengths::of(clips, &activities),
@@ -85,8 +83,8 @@ impl Recogniser {
         Ok(recogniser)
     }
 
-    /// How steep the softmax is (temperature scaling; Guo et al., ICML 2017) and what counts as unknown, from clips of other people, varied as
-    /// a step of the training varies them: as they are they would be more alike to what was learned than anybody real.
+    /// Softmax temperature (Guo et al., ICML 2017) and unknown limits from other people's clips, varied as in
+    /// training: unvaried they would be more similar to the training data than real people.
     fn calibrate(&mut self, others: &[Clip], taught: &NetworkSettings) -> Result<(), ModelError> {
         let known: Vec<(usize, &Clip)> = others
             .iter()
@@ -117,18 +115,18 @@ impl Recogniser {
     }
 }
 
-/// A clip's frames in the space.
+/// Embeds a clip's frames.
 fn embedded(space: &Space, clip: &Clip) -> Result<Embedded, ModelError> {
     let view = only_view(clip)?;
     Ok(Embedded { points: space.points(view)?, boxes: view.boxes.clone() })
 }
 
-/// Its frame vectors.
+/// Frame vectors of a clip.
 fn vectors(space: &Space, clip: &Embedded) -> Array2<f32> {
     space.vectors_of(clip.points.view(), clip.boxes.as_ref().map(|boxes| boxes.view()))
 }
 
-/// The view of a clip that has one.
+/// The view of a one-view clip.
 fn only_view(clip: &Clip) -> Result<&Track, ModelError> {
     match clip.views.as_slice() {
         [view] if view.frames() > 0 => Ok(view),
@@ -138,7 +136,7 @@ fn only_view(clip: &Clip) -> Result<&Track, ModelError> {
     }
 }
 
-/// The factor on all decisions at which the right answers are most probable, by golden sections of its logarithm.
+/// Factor on all decisions with the highest likelihood, by golden-section search of its logarithm.
 fn best_slope(decisions: &[Vec<f32>], labels: &[usize]) -> f32 {
     let loss = |slope: f32| -> f64 {
         decisions

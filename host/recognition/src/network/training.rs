@@ -1,4 +1,4 @@
-//! Training of the network: gradients by the chain rule, steps by Adam (Kingma and Ba, ICLR 2015) whose size falls as a cosine.
+//! Network training by Adam (Kingma and Ba, ICLR 2015) with cosine decay.
 
 use super::variation::{self, Embedded};
 use super::{Dense, Layers, Network, pooled, rectified, rows, with_neighbours};
@@ -9,35 +9,35 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, Normal};
 use rayon::prelude::*;
 
-/// How the network is trained.
+/// Settings of the network's training.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NetworkSettings {
-    /// Outputs of the first three layers.
+    /// Outputs of the three layers.
     pub widths: [usize; 3],
-    /// Frames before and behind a frame that the second layer sees; 0 where order must not count.
+    /// Neighbouring frames on each side of the second layer; 0 for order-free.
     pub reach: usize,
     /// Passes over all clips.
     pub passes: usize,
-    /// Clips of a step.
+    /// Clips per step.
     pub batch: usize,
-    /// Size of the first steps.
+    /// Initial learning rate.
     pub rate: f32,
-    /// How much weights shrink in a step, times its size.
+    /// Weight decay, times the learning rate.
     pub decay: f32,
     /// Least share of a clip's frames that a step sees: each clip draws its share between this and all again, 1 for all. Motion is taken between
     /// those that are left.
     pub keep: f32,
-    /// Spread of what is added at random to each component of a clip in a step, the same to all of its frames, in spreads of that component.
+    /// Random offset per component, constant over a clip, in spreads of the component.
     pub shift: f32,
-    /// Share of the pooled values that is left out at random in a step.
+    /// Dropout share of the pooled values.
     pub dropout: f32,
-    /// Spread of what is added at random to every number of a frame in a step, in spreads of that number.
+    /// Random noise per number of a frame, in spreads of the number.
     pub noise: f32,
-    /// Share of the probability that goes to all activities alike (label smoothing; Szegedy et al., CVPR 2016).
+    /// Label smoothing (Szegedy et al., CVPR 2016).
     pub smoothing: f32,
-    /// Networks that are taught the same and answer together.
+    /// Members of the ensemble.
     pub members: usize,
-    /// Seed of everything random.
+    /// Seed of all random numbers.
     pub seed: u64,
 }
 
@@ -75,7 +75,7 @@ struct Learner {
 }
 
 impl Learner {
-    /// Weights drawn after He et al. (ICCV 2015).
+    /// Initial weights after He et al. (ICCV 2015).
     fn new(inputs: usize, outputs: usize, rng: &mut ChaCha8Rng) -> Self {
         let spread = (2.0 / inputs.max(1) as f32).sqrt();
         let mut draw = || Normal::new(0.0, spread).map_or(0.0, |normal| normal.sample(rng));
@@ -88,7 +88,7 @@ impl Learner {
         }
     }
 
-    /// One step down the gradient; gives the gradient of the inputs.
+    /// One gradient step; returns the gradient of the inputs.
     fn step(
         &mut self,
         inputs: ArrayView2<f32>,
@@ -135,9 +135,8 @@ impl Step {
 /// Frame vectors (frames x F) of an embedded clip.
 pub type Vectors<'a> = &'a (dyn Fn(&Embedded) -> Array2<f32> + Sync);
 
-/// Trains on clips (at least one frame each), what their frame vectors are, and labels below `classes`; gives the network and
-/// the linear values per class that its patterns were learned for: the mean of the members' own. `watch` may stop it (`None`), and hears of
-/// every pass of every member.
+/// Trains on non-empty clips with their frame vectors and labels below `classes`; returns the network and the
+/// mean of the members' linear output layers. `watch` may stop it (`None`) and is called per pass and member.
 pub fn train(
     clips: &[Embedded],
     vectors: Vectors<'_>,
@@ -200,11 +199,11 @@ fn one_member(
     Some(([first, second, third], last))
 }
 
-/// Mean and spread of the frame vectors of all clips as they are; what never changes is left as it is.
+/// Mean and spread of all frame vectors; constant ones are unchanged.
 struct Scale {
     mean: Array1<f32>,
     spread: Array1<f32>,
-    /// Spread of the embedded frames themselves.
+    /// Spread of the embedded points.
     points: Array1<f32>,
 }
 
@@ -228,7 +227,7 @@ impl Scale {
     }
 }
 
-/// One step on a few clips.
+/// One step on a batch.
 fn one_step(
     learners: &mut [Learner; 4],
     clips: &[Array2<f32>],
@@ -295,7 +294,7 @@ fn one_step(
     first.step(frames.view(), &of_hidden, step, false);
 }
 
-/// The gradient of rows from that of every row with its neighbours: the sum over all places where a row stands.
+/// Adjoint of [`with_neighbours`]: sums the gradients over all places of a row.
 fn to_neighbours(windows: ArrayView2<f32>, reach: usize) -> Array2<f32> {
     let (n, width) = (windows.nrows(), windows.ncols() / (2 * reach + 1));
     let mut out = Array2::zeros((n, width));
@@ -308,7 +307,7 @@ fn to_neighbours(windows: ArrayView2<f32>, reach: usize) -> Array2<f32> {
     out
 }
 
-/// Gradient of the mean cross entropy between the softmax of decisions and smoothed labels.
+/// Gradient of the mean cross entropy with smoothed labels.
 fn cross_entropy(decision: &Array2<f32>, labels: impl Iterator<Item = usize>, smoothing: f32) -> Array2<f32> {
     let (n, classes) = decision.dim();
     let mut gradient = decision.clone();
@@ -338,7 +337,7 @@ mod tests {
     use std::collections::BTreeSet;
     use std::sync::Mutex;
 
-    /// Clips whose frame vectors are their points.
+    /// Trains on clips whose frame vectors are their points.
     fn trained(
         clips: &[Array2<f32>],
         labels: &[usize],
@@ -351,7 +350,7 @@ mod tests {
             .expect("not stopped")
     }
 
-    /// Clips of two kinds of frames: classes differ in which kinds come up, not in how often.
+    /// Classes differ in which kinds of frames occur, not in how often.
     fn clips(rng: &mut ChaCha8Rng) -> (Vec<Array2<f32>>, Vec<usize>) {
         (0..240)
             .map(|i| {
@@ -373,7 +372,7 @@ mod tests {
         let windows = with_neighbours(rows.view(), 1);
         assert_eq!(windows.row(0).to_vec(), [0.0, 0.0, 10.0, 11.0, 20.0, 21.0]);
         assert_eq!(windows.row(1).to_vec(), [10.0, 11.0, 20.0, 21.0, 30.0, 31.0]);
-        // The one is the other's transpose: <W x, y> = <x, W' y>, also where the reach is beyond both ends.
+        // Adjoint test: <W x, y> = <x, W' y>, also for a reach beyond both ends.
         for reach in 0..5 {
             let there = with_neighbours(rows.view(), reach);
             let other = Array2::from_shape_fn(there.dim(), |(row, k)| (3 * row + 7 * k % 5) as f32);
@@ -385,7 +384,7 @@ mod tests {
     #[test]
     fn with_neighbours_it_tells_what_only_the_order_of_frames_tells() {
         let mut rng = ChaCha8Rng::seed_from_u64(7);
-        // The same frames, in turn or in pairs.
+        // The same frames, alternating or in pairs.
         let mut clips = |n: usize| -> (Vec<Array2<f32>>, Vec<usize>) {
             let clip = |label: usize, rng: &mut ChaCha8Rng| {
                 Array2::from_shape_fn((12, 2), |(frame, k)| {
@@ -431,7 +430,7 @@ mod tests {
                 train(&whole, &vectors, &[0, 1, 0, 1], 2, &settings, &Unwatched).expect("not stopped");
             assert!((network.mean[0] - 14.5).abs() < 1e-4, "{}", network.mean);
             let sums = sums.into_inner().expect("not poisoned");
-            // Twice for mean and spread, then once in each pass; 435 is that of all frames.
+            // Twice for mean and spread, then once per pass; 435 is that of all frames.
             assert_eq!(sums.len(), 4 * 2 + 4 * 5);
             assert!(sums[..8].iter().all(|sum| *sum == 435.0), "{sums:?}");
             sums[8..].iter().map(|sum| sum.to_bits()).collect::<BTreeSet<u32>>().len()

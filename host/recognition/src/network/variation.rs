@@ -1,8 +1,8 @@
-//! Clips as a step of the training sees them, never twice the same: some frames are left out at random, and motion is taken between those that
-//! are left, as by a camera that is slower and not always in time; and a whole clip is shifted, as by another build, clothes or tracker.
+//! Augmentation of training clips: random frames are dropped, with motion between the remaining ones (slow or
+//! irregular cameras), and whole clips are shifted (build, clothes, tracker).
 //!
-//! Synthetic people are seen at an even rate, and look as they were drawn; a network that sees every clip at many rates and places leans less
-//! on that (domain randomisation; Tobin et al., IROS 2017).
+//! Synthetic people have even frame rates and exact shapes; domain randomisation (Tobin et al., IROS 2017)
+//! reduces the dependence on these.
 
 use super::training::NetworkSettings;
 use ndarray::{Array1, Array2, Axis};
@@ -10,16 +10,16 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 
-/// A clip's frames, embedded: what frame vectors are made of.
+/// Embedded frames of a clip.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Embedded {
     /// Frames x dimensions, over the gallery's spread.
     pub points: Array2<f32>,
-    /// Height, width and centroid of each, where they are known.
+    /// Height, width and centroid, if known.
     pub boxes: Option<Array2<f32>>,
 }
 
-/// Frames that a clip is left with at least, if it has them.
+/// Smallest number of remaining frames.
 const FEWEST: usize = 6;
 
 /// Clips as a step of the training sees them, drawn with its own seed.
@@ -29,7 +29,7 @@ pub(super) fn varied(clips: &[Embedded], settings: &NetworkSettings) -> Vec<Embe
     clips.iter().map(|clip| clip.varied(settings, &spread, &mut rng)).collect()
 }
 
-/// Spread of each component over all frames of all clips.
+/// Spread of each component over all frames.
 pub(super) fn spread(clips: &[Embedded]) -> Array1<f32> {
     let frames: usize = clips.iter().map(|clip| clip.points.nrows()).sum();
     let n = frames.max(1) as f32;
@@ -41,7 +41,7 @@ pub(super) fn spread(clips: &[Embedded]) -> Array1<f32> {
 }
 
 impl Embedded {
-    /// The clip as a step of the training sees it; `spread` as [`spread`] gives it.
+    /// Augmented clip; `spread` as returned by [`spread`].
     pub(super) fn varied(
         &self,
         settings: &NetworkSettings,
@@ -51,8 +51,7 @@ impl Embedded {
         self.thinned(settings.keep, rng).shifted(spread, settings.shift, rng)
     }
 
-    /// The clip with a share of its frames, drawn between `least` and all of them; every frame stays with that probability. Nothing is drawn
-    /// where all stay.
+    /// Keeps each frame with a probability drawn between `least` and 1. Draws nothing if all stay.
     fn thinned(&self, least: f32, rng: &mut ChaCha8Rng) -> Self {
         if least >= 1.0 {
             return self.clone();
@@ -111,7 +110,7 @@ mod tests {
                 numbers.len()
             })
             .collect();
-        // Shares are even between a half and all: three quarters in the mean, of some clips nearly all and of some half.
+        // Shares are uniform between a half and all: mean three quarters, with extremes.
         let mean = counts.iter().sum::<usize>() as f32 / 200.0;
         assert!((28.5..31.5).contains(&mean), "{mean}");
         assert!(counts.iter().any(|n| *n < 22) && counts.iter().any(|n| *n > 37), "{counts:?}");
@@ -130,7 +129,7 @@ mod tests {
             assert!((&moved - &offset).iter().all(|v| v.abs() < 1e-4), "the same in all frames: {moved}");
             squares += &offset.mapv(|v| v * v / 500.0);
         }
-        // The spread of 500 drawn values is known to a thirtieth; four of these.
+        // The spread of 500 values is known to a thirtieth; four of these.
         assert!((squares[0].sqrt() - 0.2).abs() < 0.03 && (squares[1].sqrt() - 2.0).abs() < 0.3, "{squares}");
         assert_eq!(squares[2], 0.0);
     }

@@ -1,8 +1,8 @@
-//! Synthetic people at the ten activities of Li 2014, table 7.1: seeded, jointed, dressed with capsules.
+//! Synthetic people performing the ten activities of Li 2014, table 7.1, as capsules.
 //!
-//! Every subject has a build and habits of their own (stature, girth, stride, how deep they bend, how long they take, which
-//! hand they use); every performance varies round those. Positions, directions and counts follow the table: most activities begin and end with
-//! walking, which is what makes them hard to tell apart.
+//! Every subject has a build and habits (stature, girth, stride, bending, tempo, handedness); performances
+//! vary around these. Positions, directions and counts follow the table: most activities begin and end with
+//! walking, which makes them similar.
 
 use crate::clip::{Clip, Track};
 use crate::embedding::descriptor::Scaling;
@@ -12,11 +12,11 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
-/// The activities of table 7.1.
+/// Activities of table 7.1.
 pub const ACTIVITIES: [&str; 10] =
     ["walk", "drop", "crouch", "peer", "mobile", "place", "bag", "shoot", "gun", "dig"];
 
-/// A person's build and habits.
+/// Build and habits of a person.
 #[derive(Clone, Copy, Debug)]
 struct Person {
     build: Build,
@@ -26,7 +26,7 @@ struct Person {
     left_handed: bool,
 }
 
-/// A thing in the hands.
+/// A hand-held object.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Prop {
     None,
@@ -36,7 +36,7 @@ enum Prop {
     LongGun,
 }
 
-/// A stretch of a performance.
+/// Part of a performance.
 #[derive(Clone, Copy, Debug)]
 struct Stretch {
     seconds: f64,
@@ -46,25 +46,25 @@ struct Stretch {
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Kind {
-    /// Walking straight; the upper body as the prop or the phone asks.
+    /// Straight walk; the upper body depends on prop or phone.
     Walk { phone: bool },
-    /// Walking round the centre.
+    /// Walk around the centre.
     Circle { phone: bool },
-    /// Leaning forward and down with an arm, once: how deep, 0 to 1.
+    /// Leaning forward and down with an arm: depth 0 to 1.
     Reach { depth: f64 },
-    /// Down on the knees and up.
+    /// Kneeling down and getting up.
     Crouch,
-    /// Stretching up on the toes with both arms over a wall.
+    /// On tiptoe with both arms over a wall.
     PeerOver,
-    /// Raising the arm with a gun and firing.
+    /// Raising a gun and firing.
     Aim,
     /// Digging strokes.
     Dig,
-    /// Lifting the bag over an edge and letting go.
+    /// Lifting the bag over an edge and dropping it.
     DropBag,
 }
 
-/// The stretches of an activity.
+/// Parts of an activity.
 fn script(activity: usize, person: &Person, rng: &mut ChaCha8Rng) -> Vec<Stretch> {
     let mut vary = |seconds: f64| seconds * person.tempo * rng.random_range(0.85..1.18);
     let plain = Kind::Walk { phone: false };
@@ -123,7 +123,7 @@ fn script(activity: usize, person: &Person, rng: &mut ChaCha8Rng) -> Vec<Stretch
     parts.into_iter().map(|(seconds, kind, prop)| Stretch { seconds, kind, prop }).collect()
 }
 
-/// Rises from 0 to 1, stays, and falls back over a stretch: `share` of it on either side.
+/// Rises from 0 to 1, holds, and falls; `share` of the time on either side.
 fn swell(t: f64, share: f64) -> f64 {
     let ease = |x: f64| {
         let x = x.clamp(0.0, 1.0);
@@ -132,7 +132,7 @@ fn swell(t: f64, share: f64) -> f64 {
     ease(t / share) * ease((1.0 - t) / share)
 }
 
-/// The pose `t` (0 to 1) into a stretch.
+/// Pose at `t` (0 to 1) of a part.
 fn pose(stretch: &Stretch, t: f64, phase: f64, person: &Person) -> Pose {
     let moving = matches!(stretch.kind, Kind::Walk { .. } | Kind::Circle { .. });
     let mut pose =
@@ -155,10 +155,10 @@ fn pose(stretch: &Stretch, t: f64, phase: f64, person: &Person) -> Pose {
     pose
 }
 
-/// Which arm does it and which helps.
+/// Main and other arm.
 type Hands = (usize, usize);
 
-/// The arms as the prop asks.
+/// Arms for the prop.
 fn carry(pose: &mut Pose, prop: Prop, (main, other): Hands) {
     match prop {
         Prop::Bag => pose.arms[main] = Arm { shoulder_deg: 8.0, spread_deg: 14.0, elbow_deg: 12.0 },
@@ -201,7 +201,7 @@ fn peer_over(pose: &mut Pose, s: f64) {
 }
 
 fn aim(pose: &mut Pose, s: f64, t: f64, (main, other): Hands) {
-    // Three shots kick the arm.
+    // Three shots with recoil.
     let kick = if s > 0.9 { 8.0 * (18.0 * t).sin().max(0.0) } else { 0.0 };
     pose.arms[main] = Arm { shoulder_deg: 88.0 * s + kick, spread_deg: 4.0, elbow_deg: 6.0 };
     pose.arms[other] = Arm { shoulder_deg: 80.0 * s, spread_deg: -8.0, elbow_deg: 25.0 * s };
@@ -228,7 +228,7 @@ fn drop_bag(pose: &mut Pose, s: f64, (main, other): Hands) {
     pose.arms[other] = Arm { shoulder_deg: 60.0 * s, spread_deg: 8.0, elbow_deg: 35.0 * s };
 }
 
-/// The prop's capsules at a moment; a dropped bag is gone once the arm has let go.
+/// Capsules of the prop; a dropped bag disappears on release.
 fn prop(stretch: &Stretch, t: f64, body: &Joints, person: &Person) -> Vec<Capsule> {
     let main = usize::from(!person.left_handed);
     let (hand, other) = (body.hands[main], body.hands[1 - main]);
@@ -264,7 +264,7 @@ fn prop(stretch: &Stretch, t: f64, body: &Joints, person: &Person) -> Vec<Capsul
     }
 }
 
-/// The bodies of one performance at `rate_hz` frames per second.
+/// Bodies of one performance at `rate_hz` frames per second.
 pub fn performance(subject: usize, activity: usize, repetition: usize, rate_hz: f64) -> Vec<Vec<Capsule>> {
     let mut habits = ChaCha8Rng::seed_from_u64(1000 + subject as u64);
     let person = Person {
@@ -312,14 +312,14 @@ pub fn performance(subject: usize, activity: usize, repetition: usize, rate_hz: 
     bodies
 }
 
-/// Clips of `subjects` people at all ten activities from `views` views round the place, at `rate_hz` frames per second.
+/// Clips of `subjects` people at all ten activities from `views` views, at `rate_hz` frames per second.
 pub fn clips(subjects: usize, views: usize, rate_hz: f64, scaling: Scaling) -> Vec<Clip> {
     (0..subjects * ACTIVITIES.len())
         .into_par_iter()
         .map(|index| {
             let (subject, activity) = (index / ACTIVITIES.len(), index % ACTIVITIES.len());
             let bodies = performance(subject, activity, 0, rate_hz);
-            // Starting obliquely, so that no view looks exactly along the path.
+            // Oblique start, so that no view looks along the path.
             let views = views_round(views, 0.0).into_iter().map(|mut view| {
                 view.gamma_deg += 45.0;
                 Track::from_bodies(&bodies, &view, scaling)

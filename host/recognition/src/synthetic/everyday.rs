@@ -1,11 +1,11 @@
-//! Everyday activities of synthetic people, made to be learned from by a recogniser that has seen no recording: anybody, anywhere
-//! before any camera, cut and segmented as recordings are.
+//! Everyday activities of synthetic people, as training data without recordings, for any camera, cut and
+//! segmentation.
 //!
-//! Bodies are drawn from published anthropometry ([`person`]), going from published joint angles ([`gait`]), hands follow least-jerk paths
-//! between places ([`gestures`], [`postures`]); amplitude, tempo, handedness, stance and cut vary ([`motion`]), cameras stand anywhere and
-//! segmentation damages masks ([`camera`]). No recording is part of this, but spreads were chosen after looking at some: clothes, damage and
-//! the picture's borders are as wide as public sets show them to be, and proportions, errors of trackers, places of hands and what
-//! a clip begins and ends with as wide as the joints of UTKinect and Florence have them. Everything is seeded.
+//! Bodies follow published anthropometry ([`person`]), gait published joint angles ([`gait`]), hands
+//! minimum-jerk paths ([`gestures`], [`postures`]); amplitude, tempo, handedness, stance and cut vary
+//! ([`motion`]), as do camera and segmentation ([`camera`]). Spreads were chosen after viewing public sets:
+//! clothes, damage and image borders; proportions, tracker errors, hand positions and clip limits as in the
+//! joints of UTKinect and Florence. Seeded.
 
 pub mod camera;
 pub mod gait;
@@ -29,10 +29,10 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, Normal};
 use rayon::prelude::*;
 
-/// An activity: its name, and one of its performances.
+/// Name of an activity and its generator.
 type Activity = (&'static str, fn(&mut Maker) -> Motion);
 
-/// All activities.
+/// All everyday activities by name.
 pub const ACTIVITIES: &[Activity] = &[
     ("walk", |maker| Motion::Gait(Gait::walking_about(maker.rng, maker.main))),
     ("jog", |maker| Motion::Gait(Gait::jog(maker.rng))),
@@ -65,15 +65,15 @@ pub const ACTIVITIES: &[Activity] = &[
     ("peer", postures::peer),
 ];
 
-/// One performance: who, and where the joints are.
+/// One performance: person and joints.
 pub struct Performance {
     /// Name of the person.
     pub person: Person,
-    /// Joints of every frame, about the origin.
+    /// Joints of every frame, around the origin.
     pub joints: Vec<Joints>,
 }
 
-/// A performance of an activity (its place in [`ACTIVITIES`]) by a person, from seeds.
+/// Performance of an activity (index in [`ACTIVITIES`]) from seeds.
 pub fn performance(activity: usize, seed: u64) -> Performance {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let rng = &mut rng;
@@ -87,7 +87,7 @@ pub fn performance(activity: usize, seed: u64) -> Performance {
     Performance { person, joints }
 }
 
-/// Joints of every moment. Who goes is where the way has led; who stands keeps the middle of the feet in place.
+/// Joints of every moment; `going` follows the path, otherwise the feet's middle stays in place.
 fn placed(person: &Person, moments: &[Moment], going: bool) -> Vec<Joints> {
     let h = person.build.height_mm;
     let (mut at, mut gone) = ([0.0_f64; 2], moments.first().map_or(0.0, |moment| moment.ahead));
@@ -111,11 +111,11 @@ fn placed(person: &Person, moments: &[Moment], going: bool) -> Vec<Joints> {
     joints
 }
 
-/// Coordinates of all joints of a body.
+/// Joint coordinates of a body.
 const COORDINATES: usize = 51;
 
-/// What trackers of joints add: nothing for half of all clips, else millimetres from frame to frame and, for they smooth, centimetres that
-/// stay or wander over the clip.
+/// Errors of joint trackers: none for half of the clips, else millimetres per frame and centimetres of
+/// constant or slow drift.
 fn tremble(joints: &mut [Joints], rng: &mut ChaCha8Rng) {
     if rng.random_bool(0.5) {
         return;
@@ -137,7 +137,7 @@ fn tremble(joints: &mut [Joints], rng: &mut ChaCha8Rng) {
     }
 }
 
-/// Clips of `people` people at all activities, each once, in one view from anywhere. Subjects are numbered from `first`.
+/// Clips of `people` people at all activities, once each, from any view. Subjects count from `first`.
 pub fn clips(first: usize, people: usize, scaling: Scaling) -> Vec<Clip> {
     (0..people * ACTIVITIES.len())
         .into_par_iter()

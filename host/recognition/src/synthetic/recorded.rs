@@ -1,8 +1,8 @@
-//! Recorded motion as training clips: recorded bodies before the cameras and segmentations that synthetic people stand before
-//! ([`super::everyday`]), so that few recordings teach what a camera at any place would see.
+//! Training clips from recorded motion with synthetic cameras and segmentation ([`super::everyday`]), so that
+//! few recordings cover many views.
 //!
-//! A recording is seen from sides spread round it. Every clip has a frame rate, a cut, a thickness of clothes, a camera and damage of its own,
-//! drawn from a seed.
+//! A recording is seen from sides around it. Frame rate, cut, clothes, camera and damage of each clip are
+//! random, from a seed.
 
 use super::everyday::camera::Camera;
 use crate::clip::Track;
@@ -19,21 +19,21 @@ use std::collections::HashMap;
 /// A person's body frame by frame, millimetres, z up.
 #[derive(Clone, Debug)]
 pub enum Bodies<'a> {
-    /// Capsules about bones.
+    /// Capsules around bones.
     Capsules(Vec<Vec<Capsule>>),
-    /// Points of a suit or joints by name, of which a template makes parts.
+    /// Named points of a suit, or joints, with a template of parts.
     Parts(Vec<HashMap<&'a str, Point3>>, Template),
 }
 
-/// Frames per second of a recording that states none.
+/// Default frame rate.
 const USUAL_HZ: f64 = 30.0;
-/// Fewest and most frames of a clip.
+/// Smallest and largest number of frames of a clip.
 const FRAMES: [usize; 2] = [6, 64];
-/// A longer recording, seconds, is cut to a piece; a shorter one loses a little at either end.
+/// Longer recordings are cut to a piece; shorter ones lose a little at both ends.
 const LONG_S: f64 = 6.0;
-/// Gaps between parts that are closed: as in Li 2014, and where parts have a thickness, which fills joints by itself.
+/// Closed gaps between parts: as in Li 2014, and for parts with thickness, which fills joints.
 const CLOSED_MM: [f64; 2] = [126.0, 40.0];
-/// Cameras that look, one after the other, until one sees at least half of the frames.
+/// Cameras tried until one sees at least half of the frames.
 const LOOKS: usize = 8;
 
 /// A recording from `count` sides, one track each; fewer without a visible person.
@@ -92,7 +92,7 @@ impl Bodies<'_> {
         }
     }
 
-    /// Leaves out frames without a single point.
+    /// Drops frames without points.
     fn drop_empty(&mut self) {
         match self {
             Self::Capsules(frames) => frames.retain(|body| body.iter().any(Capsule::is_finite)),
@@ -110,7 +110,7 @@ impl Bodies<'_> {
         }
     }
 
-    /// Lowest and highest coordinates of every frame.
+    /// Smallest and largest coordinates per frame.
     fn extents(&self) -> Vec<[Point3; 2]> {
         let of = |points: &mut dyn Iterator<Item = Point3>| {
             points.filter(|p| p.iter().all(|v| v.is_finite())).fold(
@@ -129,8 +129,8 @@ impl Bodies<'_> {
         }
     }
 
-    /// Sets the ground to 0 and the middle of the way to the origin; gives how long the person is (the largest extent of a frame, of
-    /// nine frames in ten). `None` without a point.
+    /// Moves the ground to 0 and the middle of the path to the origin; returns the person's size (largest
+    /// extent, 90th percentile of frames). `None` without points.
     fn set_down(&mut self) -> Option<f64> {
         let extents = self.extents();
         let rank = |mut values: Vec<f64>, share: f64| {
@@ -187,7 +187,7 @@ impl Bodies<'_> {
 mod tests {
     use super::*;
 
-    /// A post with an arm that goes up, 3 m off the origin and 1 m above the ground.
+    /// A post with an arm that rises, 3 m off the origin and 1 m above the ground.
     fn capsules(frames: usize) -> Vec<Vec<Capsule>> {
         let at = |x: f64, z: f64| [3000.0 + x, 500.0, 1000.0 + z];
         (0..frames)
@@ -239,7 +239,8 @@ mod tests {
         for (a, b) in suit.iter().zip(&post) {
             assert_eq!(a.frames(), b.frames());
             let off = (&a.descriptors - &b.descriptors).mapv(f32::abs).mean().unwrap_or(1.0);
-            // Perspective grows capsules but not a suit's parts, and small gaps are closed: a pixel or two of a hundred.
+            // Perspective scales capsules but not a suit's parts, and small gaps are closed: a pixel or two
+            // of a hundred.
             assert!(off < 0.03, "{off}");
         }
     }

@@ -1,4 +1,4 @@
-//! Models of everyday activities: made of synthetic people, and those that come with the program.
+//! Models of everyday activities: trained on synthetic people, and those of the package.
 
 use farnear_recognition::clip::Clip;
 use farnear_recognition::embedding::descriptor::Scaling;
@@ -18,7 +18,7 @@ const SHIPPED: [&[u8]; 4] = [
     include_bytes!("../../models/everyday-order-free-cut-out.fnm"),
 ];
 
-/// Clips of a few activities that look nothing like one another.
+/// Clips of a few very different activities.
 fn few(first: usize, people: usize) -> Vec<Clip> {
     let kept = ["walk", "jumping jack", "crouch", "lie down"];
     let mut clips = everyday::clips(first, people, Scaling::default());
@@ -46,7 +46,8 @@ fn a_network_learns_from_synthetic_people_survives_a_file_and_takes_any_number_o
     assert!(found >= 24, "{found} of {}", others.len());
     let back = Recogniser::from_bytes(&model.to_bytes().expect("encoded")).expect("decoded");
     assert_eq!(back, model);
-    // Two views of one performance: none is surer than both together where they agree, and one that sees nobody changes nothing.
+    // Two views of one performance: the joint answer is at least as sure where they agree, and an empty view
+    // changes nothing.
     let view = others[0].views[0].clone();
     let one = model.recognise(std::slice::from_ref(&view)).expect("fits");
     let two = model.recognise(&[view.clone(), view.clone()]).expect("fits");
@@ -54,13 +55,12 @@ fn a_network_learns_from_synthetic_people_survives_a_file_and_takes_any_number_o
     let nobody = view.select(&[]);
     assert_eq!(model.recognise(&[view.clone(), nobody.clone()]).expect("fits"), one);
     assert_eq!(model.recognise(&[nobody.clone(), nobody]).expect("fits").activity, None);
-    // Only some can be: probabilities add up to 1 over those.
+    // Restricted answers sum to 1.
     let among = one.among(&["walk".into(), "crouch".into()]);
     assert_eq!(among.probabilities.len(), 2);
     assert!((among.probabilities.iter().map(|p| p.1).sum::<f32>() - 1.0).abs() < 1e-5);
 }
 
-/// Stops at once.
 struct Stopping;
 
 impl Watch for Stopping {
@@ -84,18 +84,18 @@ fn training_stops_when_asked_and_refuses_a_single_activity() {
 #[test]
 fn the_shipped_models_are_small_and_know_people_they_never_saw() {
     let bytes: usize = SHIPPED.iter().map(|bytes| bytes.len()).sum();
-    // A fifth of the program that they come with.
+    // A fifth of the program.
     assert!(bytes <= 5_000_000, "{bytes} bytes in the repository and the program");
-    // Nobody who taught (from 0) or calibrated (from 100 000).
+    // People used neither for training (from 0) nor for calibration (from 100 000).
     let people = everyday::clips(700_000, 4, Scaling::default());
     for (index, shipped) in SHIPPED.iter().enumerate() {
         let model = Recogniser::from_bytes(shipped).expect("whole");
         assert_eq!(model.activities.len(), everyday::ACTIVITIES.len());
         assert_eq!((model.views, model.uses_boxes()), (1, index < 2));
         let found = right(&model, &people);
-        // Three in five: the weakest of the four is right in 73 % of such people's clips, of 116 with a standard deviation of 4.
+        // Three in five: the weakest of the four is right in 73 % of 116 such clips, standard deviation 4.
         assert!(5 * found >= 3 * people.len(), "model {index}: {found} of {}", people.len());
-        // The limits were set for 5 % of false alarms; 116 clips leave room for chance.
+        // Limits are set for 5 % of false alarms; 116 clips leave room for chance.
         let unknown =
             people.iter().filter(|clip| model.recognise(&clip.views).expect("fits").outlier_score > 1.0);
         let unknown = unknown.count();
@@ -111,7 +111,7 @@ fn with_auxiliary_model() -> Experiment {
     Experiment { second: Some(Arc::new(other)), ..Experiment::codebook(space).fixed() }
 }
 
-/// A model that has one, taught without an activity.
+/// A model with auxiliary, trained without an activity.
 fn taught_without(left_out: &str, mut clips: Vec<Clip>) -> Recogniser {
     clips.retain(|clip| clip.activity != left_out);
     let trained = Recogniser::train_searched(&clips, &with_auxiliary_model(), Scaling::default(), &Unwatched);
@@ -131,7 +131,8 @@ fn a_auxiliary_model_calls_what_nobody_taught_unknown_and_survives_a_file() {
         called.iter().filter(|unknown| **unknown).count() as f64 / called.len() as f64
     };
     let (strange, known) = (unknown(true), unknown(false));
-    // Asked of open sets: 60 % of strangers; 5 % of what is known, which is one of these 24 clips, and two more by chance.
+    // Specification of open sets: 60 % of strangers, 5 % of known clips: one of these 24, and two more by
+    // chance.
     assert!(strange >= 0.6 && known <= 0.125, "{strange} {known}");
 
     let mut nested = model.clone();
@@ -153,7 +154,8 @@ fn an_activity_that_one_person_taught_does_not_lift_the_limits_of_others() {
     }
     let model = taught_without("lie down", clips);
     let limits = model.second.expect("asked for").limits.distances;
-    // What has nothing in common is 20 apart; people who do the same, as everyday sees them, not a tenth of that.
+    // Nothing in common is a distance of 20; the same activity as seen by the everyday model less than a
+    // tenth of that.
     assert!(limits.iter().all(|limit| *limit < 2.0), "{limits:?}");
 }
 
@@ -164,7 +166,7 @@ fn an_open_set_needs_clips_for_a_limit_and_most_strangers_are_found() {
         |clips: &[Clip]| open_set(clips, |_| with_auxiliary_model(), Scaling::default(), &Unwatched);
     let rows = evaluated(&people).expect("seven people teach 21 clips");
     let mean = rows.last().expect("a mean");
-    // Four activities that look nothing like one another; half the rate that is asked of hard ones, for chance.
+    // Four very different activities; half the rate specified for hard ones, for chance.
     assert!(rows.len() == 5 && mean.auroc > 0.9 && mean.unknown_of_strangers > 0.3, "{mean:?}");
     assert!(mean.unknown_of_known < 0.15, "5 % and what chance adds to 42 clips: {mean:?}");
     let few: Vec<Clip> = people.into_iter().take(4 * 12).collect();

@@ -1,9 +1,9 @@
-//! Behaviour through the public interface, in one program: every program of tests costs a link.
+//! Public API tests in one binary.
 
 mod everyday;
 mod recognition;
 
-/// Cases of a property: few in every test run, as many as asked for when fuzzing.
+/// Number of property cases: few by default, more for fuzzing.
 fn cases(usual: u32) -> u32 {
     std::env::var("PROPTEST_CASES").ok().and_then(|text| text.parse().ok()).unwrap_or(usual)
 }

@@ -1,4 +1,4 @@
-//! Recognition through the public face: synthetic people, order, speed, damage, models and live use.
+//! Recognition through the public API: synthetic people, order, speed, damage, models, live use.
 
 use farnear_recognition::auxiliary_model::AuxiliaryModel;
 use farnear_recognition::choice::names;
@@ -20,7 +20,7 @@ use proptest::prelude::*;
 use proptest::test_runner::TestRunner;
 use std::sync::{Arc, OnceLock};
 
-/// A small space: enough to recognise, quick to train.
+/// A small, quickly trained space.
 fn small(mode: Mode) -> SpaceSettings {
     SpaceSettings { gallery: 500, pattern: PatternKind::Codebook(80), mode, ..SpaceSettings::default() }
 }
@@ -33,8 +33,8 @@ fn experiment(mode: Mode) -> Experiment {
     }
 }
 
-/// Shares of right answers for the clips as they are and changed in several ways, every subject left out once; training is the same
-/// for all changes and done once.
+/// Right answers for the clips and several changes of them, leaving out every subject once; one training
+/// serves all changes.
 fn right(people: &[Clip], mode: Mode, changes: &[fn(&Clip) -> Clip]) -> Vec<f64> {
     let settings = RecogniserSettings { space: small(mode), ..RecogniserSettings::default() };
     let mut right = vec![0_u32; changes.len()];
@@ -72,14 +72,14 @@ fn unseen_people_are_recognised_and_neither_order_nor_speed_matters_much() {
     let evaluated = |mode: Mode| {
         leave_one_subject_out(&people, &experiment(mode), Clone::clone).expect("an outcome").each.accuracy()
     };
-    // The same trainings and clips: only probabilities that round to a tie could differ, one clip of sixty.
+    // Equal trainings and clips: only probabilities that round to a tie may differ, one clip of sixty.
     let free = evaluated(Mode::OrderFree);
     assert!((free - plain).abs() < 0.02, "{free} {plain}");
     let ordered = evaluated(Mode::Ordered);
     assert!(ordered > 0.75, "{ordered}");
 }
 
-/// Clips and what was trained on them, once for all tests.
+/// Clips and a model trained on them, shared by all tests.
 fn trained() -> &'static (Vec<Clip>, Recogniser) {
     static TRAINED: OnceLock<(Vec<Clip>, Recogniser)> = OnceLock::new();
     TRAINED.get_or_init(|| {
@@ -123,7 +123,7 @@ fn clips_that_do_not_fit_are_refused_and_strange_ones_unknown() {
     let nothing = farnear_recognition::clip::Track::from_masks(&blank, Scaling::KeepAspect, true);
     assert_eq!(nothing.empty_frames, 20);
     assert_eq!(recogniser.recognise(&[nothing]).expect("an answer").activity, None);
-    // A lying slab that pulses is not a person.
+    // A pulsating horizontal slab is not a person.
     let slabs: Vec<Mask> = (0..20)
         .map(|i| {
             Mask::from_shape_fn((200, 300), |(y, x)| (90..100 + 3 * i).contains(&y) && (20..280).contains(&x))
@@ -159,7 +159,7 @@ fn live_answers_settle_on_what_is_done_and_windows_cover_a_recording() {
     assert_eq!((stretches[0].from, stretches.last().map(|s| s.to)), (0, Some(track[0].frames())));
 }
 
-/// A model whose body was changed at some places, with a checksum that holds again.
+/// A model with changed body bytes and a valid checksum.
 fn tampered(bytes: &[u8], places: &[(usize, u8)]) -> Vec<u8> {
     const HEADER: usize = 28;
     let mut bytes = bytes.to_vec();
@@ -188,7 +188,7 @@ fn crafted_models_with_good_checksums_are_refused_or_answer_but_never_panic() {
         failure_persistence: None,
         ..ProptestConfig::with_cases(crate::cases(150))
     });
-    // Settings, names and lengths stand at the front, where most damage goes.
+    // Settings, names and lengths are at the front, where most damage is placed.
     let place = prop_oneof![3 => 0..200_usize, 1 => 0..files[1].len()];
     let damage = proptest::collection::vec((place, any::<u8>()), 1..6);
     runner

@@ -1,8 +1,8 @@
 //! Chromaticity: in shadow the value drops while hue and saturation stay.
 //!
-//! R. Cucchiara, C. Grana, M. Piccardi and A. Prati, "Detecting moving objects, ghosts, and shadows in video streams",
-//! IEEE PAMI 25 (2003), 1337-1342, equation 5; with the differences averaged over a window as Sanin et al. 2012 do
-//! against noise. Cost: a few operations per foreground pixel and window pixel.
+//! R. Cucchiara, C. Grana, M. Piccardi and A. Prati, "Detecting moving objects, ghosts, and shadows in video
+//! streams", IEEE PAMI 25 (2003), 1337-1342, equation 5; differences are averaged over a window as in Sanin
+//! et al. 2012. Cost: a few operations per foreground and window pixel.
 
 use ndarray::Array2;
 
@@ -11,17 +11,17 @@ use farnear_silhouettes::mask::Mask;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
-    /// Least value in proportion to the background's.
+    /// Smallest value relative to the background.
     pub darkest: f32,
-    /// Greatest value in proportion to the background's.
+    /// Largest value relative to the background.
     pub lightest: f32,
-    /// Greatest saturation in excess of the background's, 0 to 1.
+    /// Largest excess saturation over the background, 0 to 1.
     pub saturation: f32,
-    /// Greatest difference of hue, degrees.
+    /// Largest hue difference.
     pub hue_deg: f32,
-    /// Below this saturation a colour counts as grey, whose hue is noise and is not compared, 0 to 1.
+    /// Below this saturation (0 to 1) hue is noise and ignored.
     pub least_saturation: f32,
-    /// Radius of the square averaging window, pixels.
+    /// Radius of the square averaging window.
     pub window_radius_px: usize,
 }
 
@@ -38,7 +38,6 @@ impl Default for Settings {
     }
 }
 
-/// The foreground pixels that pass the test.
 #[must_use]
 pub fn detect(images: &Images<'_>, settings: &Settings) -> Mask {
     let mut ratio = Array2::zeros(images.size());
@@ -46,7 +45,7 @@ pub fn detect(images: &Images<'_>, settings: &Settings) -> Mask {
     for (at, _) in images.foreground.indexed_iter().filter(|&(_, &set)| set) {
         let [hue, saturation, value] = hsv(rgb(images.frame, at));
         let [background_hue, background_saturation, background_value] = hsv(rgb(images.background, at));
-        // Over a black background nothing can be darker: not shadow.
+        // Nothing is darker than a black background.
         ratio[at] = if background_value > 0.0 { value / background_value } else { f32::INFINITY };
         let coloured = saturation.min(background_saturation) >= settings.least_saturation;
         let hue = if coloured { hue_difference(hue, background_hue) } else { 0.0 };
@@ -66,7 +65,6 @@ mod tests {
     use super::*;
     use ndarray::Array3;
 
-    /// One colour everywhere.
     fn plain(colour: [u8; 3]) -> Array3<u8> {
         Array3::from_shape_fn((6, 6, 3), |(_, _, channel)| colour[channel])
     }

@@ -1,16 +1,19 @@
-//! Geometry: a standing body is upright, its shadow lies to one side; no colour is needed.
+//! Geometry: a standing body is upright, its shadow is on one side; needs no colour.
 //!
-//! J.-W. Hsieh, W.-F. Hu, C.-J. Chang and Y.-S. Chen, "Shadow elimination for effective moving object detection by
-//! Gaussian shadow modeling", Image and Vision Computing 21 (2003), 505-516. For each region: the tallest columns are the
-//! body; what leans out of them on the heavier side and lies in the lower part is a first guess of the shadow; its
-//! centre, orientation and grey level make a Gaussian, and the region's pixels that fit it are shadow:
+//! J.-W. Hsieh, W.-F. Hu, C.-J. Chang and Y.-S. Chen, "Shadow elimination for effective moving object
+//! detection by
+//! Gaussian shadow modeling", Image and Vision Computing 21 (2003), 505-516. Per region: the tallest columns
+//! are the body;
+//! the lower part that leans out on the heavier side is the first guess. Its centre, orientation and grey
+//! level define a
+//! Gaussian; pixels that fit are shadow:
 //!
 //! ```text
 //! exp(-(s^2 / (w sd_s)^2 + t^2 / (w sd_t)^2 + (g - mean_g)^2 / (w sd_g)^2) / 2) >= threshold
 //! ```
 //!
-//! with s and t along and across the guess. Shadows that fall under or behind the body's own columns are not found:
-//! the method's known limit. Cost: linear in the region's pixels.
+//! with s and t along and across the guess. Shadows under or behind the body's own columns are missed. Cost:
+//! linear.
 
 use ndarray::Array2;
 
@@ -20,18 +23,17 @@ use farnear_silhouettes::mask::{
     regions::{Connectivity, Region, regions},
 };
 
-/// Settings of the detector.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
-    /// Columns at least this share of the tallest belong to the body.
+    /// Body columns have at least this share of the tallest.
     pub body_share: f32,
-    /// The guess may use the lower share of the body's height.
+    /// Lower share of the body's height used by the guess.
     pub lower_share: f32,
-    /// By how much the Gaussian is wider than the guess, w.
+    /// Widening w of the Gaussian.
     pub widening: f32,
-    /// Least value of the Gaussian, of 1 at its middle.
+    /// Threshold of the Gaussian, 1 at its centre.
     pub threshold: f32,
-    /// Regions smaller than this are left alone, pixels.
+    /// Smaller regions are skipped, px.
     pub smallest_region_px: usize,
 }
 
@@ -41,7 +43,6 @@ impl Default for Settings {
     }
 }
 
-/// The foreground pixels that fit the shadow of their region.
 #[must_use]
 pub fn detect(images: &Images<'_>, settings: &Settings) -> Mask {
     let grey = intensity(images.frame);
@@ -57,18 +58,17 @@ pub fn detect(images: &Images<'_>, settings: &Settings) -> Mask {
     found
 }
 
-/// Where a region's body stands.
+/// Position of a region's body.
 struct Split {
-    /// First and one past the last column of the body.
+    /// First and one past the last body column.
     body: (usize, usize),
-    /// Rows from here on may hold shadow.
+    /// First row that may have shadow.
     first_row: usize,
-    /// Whether the shadow lies to the right.
     right: bool,
 }
 
 impl Split {
-    /// `None` where nothing leans out of the body.
+    /// `None` if nothing leans out of the body.
     fn of(region: &Region, settings: &Settings) -> Option<Self> {
         let bounds = region.bounds;
         let mut heights = vec![0_usize; bounds.width()];
@@ -83,7 +83,7 @@ impl Split {
         let right =
             heights[peak..].iter().position(|height| !tall(height)).map_or(heights.len(), |at| peak + at);
         let body = (bounds.left + left, bounds.left + right);
-        // The body's span of rows, then its lower part.
+        // Row range of the body, then its lower part.
         let rows = region.runs.iter().filter(|run| run.start < body.1 && run.end > body.0).map(|run| run.row);
         let (top, bottom) =
             rows.fold((usize::MAX, 0), |(top, bottom), row| (top.min(row), bottom.max(row + 1)));
@@ -107,7 +107,7 @@ impl Split {
         row >= self.first_row && if self.right { column >= self.body.1 } else { column < self.body.0 }
     }
 
-    /// Fits the Gaussian to the guess and marks what fits it.
+    /// Fits the Gaussian and marks matching pixels.
     fn mark(&self, region: &Region, grey: &Array2<f32>, settings: &Settings, found: &mut Mask) {
         let pixels =
             || region.runs.iter().flat_map(|run| (run.start..run.end).map(|column| (run.row, column)));
@@ -117,7 +117,7 @@ impl Split {
         }
         let Some(model) = moments.gaussian(f64::from(settings.widening)) else { return };
         for (row, column) in pixels() {
-            // Nothing on the far side of the body, and nothing above its lower part, is its shadow.
+            // No shadow on the far side of the body or above its lower part.
             let beyond = if self.right { column < self.body.0 } else { column >= self.body.1 };
             if beyond || row < self.first_row {
                 continue;
@@ -138,9 +138,9 @@ struct Moments {
 
 struct Gaussian {
     mean: [f64; 3],
-    /// Direction of the long axis in the image.
+    /// Direction of the long axis.
     along: [f64; 2],
-    /// Standard deviations along, across and of the grey level, widened.
+    /// Widened standard deviations: along, across, grey level.
     sd: [f64; 3],
 }
 
@@ -155,7 +155,7 @@ impl Moments {
         }
     }
 
-    /// `None` for fewer than three pixels: they have no orientation.
+    /// `None` for fewer than three pixels, which have no orientation.
     fn gaussian(&self, widening: f64) -> Option<Gaussian> {
         if self.count < 3.0 {
             return None;
@@ -166,7 +166,7 @@ impl Moments {
         let angle = 0.5 * (2.0 * xy).atan2(xx - yy);
         let spread = (0.25 * (xx - yy).powi(2) + xy * xy).sqrt();
         let middle = 0.5 * (xx + yy);
-        // A line of pixels is still a pixel wide, and a camera has about two grey levels of noise.
+        // A line is still a pixel wide, and a camera has about two grey levels of noise.
         let sd = |variance: f64, least: f64| widening * variance.max(0.0).sqrt().max(least);
         Some(Gaussian {
             mean,
@@ -201,7 +201,7 @@ mod tests {
     }
 
     #[test]
-    fn a_shadow_to_either_side_goes_and_the_body_stays() {
+    fn removes_a_shadow_on_either_side_and_keeps_the_body() {
         for columns in [90..140, 20..70] {
             let (frame, mask) = scene(columns.clone());
             let images = Images::new(frame.view(), frame.view(), mask.view()).unwrap();
@@ -215,14 +215,14 @@ mod tests {
     }
 
     #[test]
-    fn a_body_without_a_shadow_is_left_alone() {
+    fn keeps_a_body_without_shadow() {
         let (frame, mask) = scene(80..80);
         let images = Images::new(frame.view(), frame.view(), mask.view()).unwrap();
         assert!(detect(&images, &Settings::default()).iter().all(|&set| !set));
     }
 
     #[test]
-    fn the_gaussian_turns_with_its_pixels() {
+    fn the_gaussian_follows_the_orientation_of_its_pixels() {
         let mut moments = Moments::default();
         (0..40).for_each(|i| moments.add([f64::from(i), f64::from(i), 50.0]));
         let model = moments.gaussian(1.0).unwrap();

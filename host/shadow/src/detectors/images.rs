@@ -1,39 +1,31 @@
-//! What every detector looks at: a frame, the empty scene, and the pixels in question; with the colour and gradient
-//! measures that several detectors share.
+//! Inputs of all detectors (frame, empty scene, foreground), and shared colour and gradient measures.
 
 use ndarray::{Array2, ArrayView2, ArrayView3};
 
-/// A frame, its background and the foreground mask, all of one size.
+/// Frame, background and foreground mask of one size.
 #[derive(Clone, Copy, Debug)]
 pub struct Images<'a> {
-    /// The frame, RGB, shape (height, width, 3).
+    /// RGB, shape (height, width, 3).
     pub frame: ArrayView3<'a, u8>,
     /// The scene without the subject, same shape.
     pub background: ArrayView3<'a, u8>,
-    /// Pixels in question, subject or shadow, shape (height, width).
+    /// Subject or shadow, shape (height, width).
     pub foreground: ArrayView2<'a, bool>,
 }
 
-/// The pictures do not fit each other.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
     "shadow detectors need a frame and a background of shape (height, width, 3) and a mask of shape (height, width); \
      got {frame:?}, {background:?} and {foreground:?}"
 )]
 pub struct ImagesError {
-    /// The frame's shape.
     pub frame: (usize, usize, usize),
-    /// The background's shape.
     pub background: (usize, usize, usize),
-    /// The mask's shape.
     pub foreground: (usize, usize),
 }
 
 impl<'a> Images<'a> {
-    /// Takes the three together.
-    ///
-    /// # Errors
-    /// [`ImagesError`] where the shapes do not fit.
+    /// Errors: [`ImagesError`] for different shapes.
     pub fn new(
         frame: ArrayView3<'a, u8>,
         background: ArrayView3<'a, u8>,
@@ -50,13 +42,13 @@ impl<'a> Images<'a> {
         Ok(Self { frame, background, foreground })
     }
 
-    /// Height and width in pixels.
+    /// Height and width.
     #[must_use]
     pub fn size(&self) -> (usize, usize) {
         self.foreground.dim()
     }
 
-    /// A mask of the foreground pixels for which `test` holds.
+    /// Foreground pixels for which `test` holds.
     pub(super) fn foreground_where(&self, mut test: impl FnMut((usize, usize)) -> bool) -> Array2<bool> {
         let mut mask = Array2::from_elem(self.size(), false);
         for (at, &set) in self.foreground.indexed_iter() {
@@ -68,7 +60,6 @@ impl<'a> Images<'a> {
     }
 }
 
-/// The RGB sample at a pixel.
 pub(super) fn rgb(image: ArrayView3<'_, u8>, (row, column): (usize, usize)) -> [f32; 3] {
     [0, 1, 2].map(|channel| f32::from(image[[row, column, channel]]))
 }
@@ -79,7 +70,7 @@ pub(super) fn intensity(image: ArrayView3<'_, u8>) -> Array2<f32> {
     Array2::from_shape_fn((height, width), |at| rgb(image, at).iter().sum::<f32>() / 3.0)
 }
 
-/// Hue in degrees [0, 360) (0 for grey), saturation and value in 0..1, of an RGB sample in 0..255.
+/// Hue in [0, 360) degrees (0 for grey), saturation and value in 0..1, of RGB in 0..255.
 pub(super) fn hsv([r, g, b]: [f32; 3]) -> [f32; 3] {
     let (high, low) = (r.max(g).max(b), r.min(g).min(b));
     let span = high - low;
@@ -95,13 +86,13 @@ pub(super) fn hsv([r, g, b]: [f32; 3]) -> [f32; 3] {
     [hue, if high == 0.0 { 0.0 } else { span / high }, high / 255.0]
 }
 
-/// The angle between two hues, degrees, 0 to 180.
+/// Angle between two hues, 0 to 180 degrees.
 pub(super) fn hue_difference(a: f32, b: f32) -> f32 {
     let difference = (a - b).abs();
     difference.min(360.0 - difference)
 }
 
-/// Horizontal and vertical central differences, grey levels per pixel; 0 on the image's edge.
+/// Horizontal and vertical central differences, grey levels per pixel; 0 at the border.
 pub(super) fn gradient(image: &Array2<f32>) -> Array2<[f32; 2]> {
     let (height, width) = image.dim();
     Array2::from_shape_fn((height, width), |(row, column)| {
@@ -114,8 +105,7 @@ pub(super) fn gradient(image: &Array2<f32>) -> Array2<[f32; 2]> {
     })
 }
 
-/// Means over the set pixels of a square window round each set pixel. `values` holds what to average, one array per
-/// pixel. Cost: O(N window^2) for N set pixels.
+/// Means over the set pixels of a square window around each set pixel. Cost: O(N window^2).
 pub(super) fn window_means<const N: usize>(
     values: &Array2<[f32; N]>,
     among: ArrayView2<'_, bool>,
@@ -176,14 +166,14 @@ mod tests {
     }
 
     #[test]
-    fn window_means_leave_unset_pixels_out() {
+    fn window_means_ignore_unset_pixels() {
         let values = arr2(&[[[1.0], [5.0], [100.0]], [[3.0], [7.0], [100.0]]]);
         let among = arr2(&[[true, true, false], [true, true, false]]);
         assert_eq!(window_means(&values, among.view(), 1)[[0, 1]], [4.0]);
     }
 
     #[test]
-    fn pictures_that_do_not_fit_are_refused() {
+    fn rejects_pictures_of_different_sizes() {
         let (frame, narrow) = (Array3::zeros((4, 5, 3)), Array3::zeros((4, 4, 3)));
         let mask = Array2::from_elem((4, 5), true);
         assert!(Images::new(frame.view(), frame.view(), mask.view()).is_ok());

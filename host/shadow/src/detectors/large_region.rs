@@ -1,16 +1,17 @@
-//! Large-region texture: over a whole region, gradients keep their direction in shadow.
+//! Large-region texture: over a region, gradients keep their direction in shadow.
 //!
-//! A. Sanin, C. Sanderson and B. C. Lovell, "Improved shadow removal for robust person tracking in surveillance
-//! scenarios", ICPR 2010. Candidates come from a loose chromaticity test; edges that the frame has and the background
-//! has not part them into regions; over a region's n pixels with a gradient worth the name,
+//! A. Sanin, C. Sanderson and B. C. Lovell, "Improved shadow removal for robust person tracking in
+//! surveillance
+//! scenarios", ICPR 2010. Candidates pass a loose chromaticity test; edges missing in the background split
+//! them into regions.
+//! Over a region's n pixels with sufficient gradient,
 //!
 //! ```text
 //! c = (1 / n) sum H(largest angle - angle between the frame's and the background's gradient)
 //! ```
 //!
-//! and the whole region is shadow where c reaches a threshold (H is the unit step). A region with too few such pixels
-//! has no texture to compare, and colour alone has the say.
-//!
+//! and the region is shadow if c reaches a threshold (H is the unit step). With too few such pixels colour
+//! alone decides.
 //! Cost: linear in pixels.
 
 use ndarray::Array2;
@@ -25,20 +26,19 @@ use farnear_silhouettes::mask::{
     regions::{Connectivity, regions},
 };
 
-/// Settings of the detector.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
-    /// The loose test that candidates pass.
+    /// Loose test of the candidates.
     pub candidates: chromaticity::Settings,
-    /// Least gradient worth comparing, grey levels per pixel, in frame or background.
+    /// Smallest compared gradient, grey levels per pixel, in frame or background.
     pub least_gradient: f32,
-    /// Greatest angle between gradients that counts as the same direction, degrees.
+    /// Largest angle between gradients of equal direction.
     pub largest_angle_deg: f32,
-    /// Least share of a region's gradients that keep their direction, c.
+    /// Smallest share c of matching gradients.
     pub least_share: f32,
-    /// Gradient beyond the shaded background's that parts regions, grey levels per pixel.
+    /// Excess gradient over the shaded background that splits regions, grey levels per pixel.
     pub edge_gradient: f32,
-    /// Least number of gradients that a region is judged by.
+    /// Smallest number of gradients for a decision.
     pub fewest_gradients: usize,
 }
 
@@ -60,7 +60,6 @@ impl Default for Settings {
     }
 }
 
-/// The foreground pixels of regions whose gradients keep their direction.
 #[must_use]
 pub fn detect(images: &Images<'_>, settings: &Settings) -> Mask {
     let candidates = chromaticity::detect(images, &settings.candidates);
@@ -74,7 +73,7 @@ pub fn detect(images: &Images<'_>, settings: &Settings) -> Mask {
     });
     let parted = Array2::from_shape_fn(images.size(), |at| candidates[at] && !edges[at]);
 
-    // On the foreground's outline frame and background differ by the outline itself.
+    // At the foreground's outline the difference is the outline itself.
     let inside = BitMask::pack(images.foreground).eroded(1).unpack();
     let least_cosine = settings.largest_angle_deg.to_radians().cos();
     let mut shadow = Mask::from_elem(images.size(), false);
@@ -82,7 +81,7 @@ pub fn detect(images: &Images<'_>, settings: &Settings) -> Mask {
         let (mut worthy, mut alike) = (0_usize, 0_usize);
         for at in region.runs.iter().flat_map(|run| (run.start..run.end).map(|column| (run.row, column))) {
             let (f, b) = (frame_slope[at], background_slope[at]);
-            // The background's gradient counts as it would look in this shade, so that darkness does not hide texture.
+            // The background's gradient is scaled to this shade, so that darkness does not hide texture.
             if !inside[at] || size(f).max(shade(at) * size(b)) < settings.least_gradient * shade(at) {
                 continue;
             }
@@ -94,7 +93,7 @@ pub fn detect(images: &Images<'_>, settings: &Settings) -> Mask {
             region.paint(&mut shadow, true);
         }
     }
-    // Edges next to shadow go with it.
+    // Edges next to shadow belong to it.
     let near = BitMask::pack(shadow.view()).dilated(1).unpack();
     shadow.zip_mut_with(&Array2::from_shape_fn(images.size(), |at| edges[at] && near[at]), |set, &edge| {
         *set |= edge
@@ -107,13 +106,13 @@ mod tests {
     use super::*;
     use ndarray::{Array3, s};
 
-    /// Paving of changing brightness; every channel in proportion.
+    /// Paving of varying brightness, equal in all channels.
     fn paving(row: usize, column: usize) -> f32 {
         120.0 + 25.0 * ((row as f32 * 0.9).sin() + (column as f32 * 0.7).cos())
     }
 
     #[test]
-    fn a_shaded_region_goes_whole_and_a_textured_garment_stays() {
+    fn removes_a_shaded_region_and_keeps_a_textured_garment() {
         let colour = [1.0, 0.9, 0.8];
         let background = Array3::from_shape_fn((60, 80, 3), |(row, column, channel)| {
             (colour[channel] * paving(row, column)) as u8

@@ -1,12 +1,12 @@
-//! Physical: what a shadow takes away is the direct light's share of the illumination, and that share is the same
-//! on every matt surface of the scene, so it can be learnt while the scene is watched.
+//! Physical: a shadow removes the direct light's share of the illumination, which is equal on all matt
+//! surfaces and can be learnt.
 //!
-//! J.-B. Huang and C.-S. Chen, "Moving cast shadow detection using physics-based features", CVPR 2009. With direct
-//! light d, ambient light a and a surface that reflects b, a lit pixel is b (d + a) and a shaded one b a, so
-//! `g = (background - frame) / background = d / (d + a)` per channel, whatever b. Its direction is described by
-//! `theta = atan2(g_green, g_red)` and `phi = acos(g_blue / |g|)`; a weak detector (darker, and inside a cone round the
-//! background's colour) proposes pixels, whose angles feed a Gaussian mixture, each with a confidence that falls where
-//! the frame has gradients that the background has not. A proposed pixel near a heavy component is shadow.
+//! J.-B. Huang and C.-S. Chen, "Moving cast shadow detection using physics-based features", CVPR 2009. With
+//! direct light d, ambient light a and reflectance b, a lit pixel is b (d + a) and a shaded one b a, so `g =
+//! (background - frame) / background = d / (d + a)` per channel. Its direction is `theta = atan2(g_green,
+//! g_red)` and `phi = acos(g_blue / |g|)`. A weak detector (darker, within a cone around the background's
+//! colour) proposes pixels. Their angles feed a Gaussian mixture with a confidence that drops at new
+//! gradients. A proposed pixel near a heavy component is shadow.
 //!
 //! Cost: a few trigonometric functions per proposed pixel.
 
@@ -15,22 +15,21 @@ use ndarray::Array2;
 use super::images::{Images, gradient, intensity, rgb};
 use farnear_silhouettes::mask::Mask;
 
-/// Settings of the detector.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
-    /// Least brightness in proportion to the background's that the weak detector proposes.
+    /// Smallest proposed brightness relative to the background.
     pub darkest: f32,
-    /// Greatest brightness in proportion to the background's.
+    /// Largest brightness relative to the background.
     pub lightest: f32,
-    /// Greatest angle between the frame's and the background's colour, degrees.
+    /// Largest angle between the frame's and the background's colour.
     pub cone_deg: f32,
-    /// Scale of the gradient difference at which confidence has dropped to exp(-1/2), grey levels per pixel.
+    /// Gradient difference at confidence exp(-1/2), grey levels per pixel.
     pub gradient_scale: f32,
-    /// Share of the mixture that a frame's pixels replace, 0 to 1.
+    /// Share of the mixture replaced per frame, 0 to 1.
     pub learning_rate: f32,
-    /// Distance from a component within which a pixel is its, standard deviations.
+    /// Distance within which a pixel belongs to a component, standard deviations.
     pub reach_sd: f32,
-    /// Least weight of a component that stands for shadow.
+    /// Smallest weight of a shadow component.
     pub least_weight: f32,
 }
 
@@ -48,12 +47,11 @@ impl Default for Settings {
     }
 }
 
-/// Components that the mixture may have.
 const COMPONENTS: usize = 5;
-/// Standard deviation of a new component, radians, and the least that one may shrink to.
+/// Standard deviation of a new component, radians, and lower limit.
 const FIRST_SD: f32 = 0.12;
 const LEAST_SD: f32 = 0.03;
-/// The least confidence-weighted pixels that a frame must have to teach something.
+/// Smallest confidence-weighted number of pixels for learning.
 const LEAST_EVIDENCE: f32 = 20.0;
 
 #[derive(Clone, Copy, Debug)]
@@ -70,7 +68,7 @@ impl Component {
     }
 }
 
-/// The detector and what it has learnt of the scene's light.
+/// The detector with the learnt light.
 #[derive(Clone, Debug)]
 pub struct Physical {
     settings: Settings,
@@ -78,13 +76,12 @@ pub struct Physical {
 }
 
 impl Physical {
-    /// A detector that knows nothing of the scene yet.
     #[must_use]
     pub fn new(settings: Settings) -> Self {
         Self { settings, mixture: Vec::new() }
     }
 
-    /// Learns from the next frame, then tells its shadow pixels.
+    /// Learns from the next frame, then returns its shadow pixels.
     pub fn detect(&mut self, images: &Images<'_>) -> Mask {
         let (frame, background) = (intensity(images.frame), intensity(images.background));
         let (frame_slope, background_slope) = (gradient(&frame), gradient(&background));
@@ -97,7 +94,7 @@ impl Physical {
             }
             let angles = direction(f, b);
             proposed[at] = Some(angles);
-            // The slope that the shaded background would have, against the one that the frame has.
+            // Gradient of the shaded background, compared with the frame's.
             let shade = frame[at] / background[at].max(1.0);
             let [across, down] =
                 [0, 1].map(|axis| frame_slope[at][axis] - shade * background_slope[at][axis]);
@@ -108,7 +105,7 @@ impl Physical {
         images.foreground_where(|at| proposed[at].is_some_and(|angles| self.is_shadow(angles)))
     }
 
-    /// Darker than the background and of about its colour.
+    /// Darker than the background and of similar colour.
     fn weakly_shadow(&self, frame: [f32; 3], background: [f32; 3]) -> bool {
         let dot = |a: [f32; 3], b: [f32; 3]| a.iter().zip(b).map(|(x, y)| x * y).sum::<f32>();
         let (along, length) = (dot(frame, background), dot(background, background));
@@ -125,7 +122,7 @@ impl Physical {
         })
     }
 
-    /// One step of the mixture: every sample goes to the nearest component within reach, strays found a new one.
+    /// One update: each sample joins the nearest component within reach; the rest start a new one.
     fn learn(&mut self, samples: &[([f32; 2], f32)]) {
         let evidence: f32 = samples.iter().map(|&(_, confidence)| confidence).sum();
         if evidence < LEAST_EVIDENCE {
@@ -135,7 +132,7 @@ impl Physical {
             let middle = [0, 1].map(|axis| weighted_median(samples, axis));
             self.mixture.push(Component { weight: 1.0, mean: middle, variance: FIRST_SD * FIRST_SD });
         }
-        // Sums of confidence, angles and squared distances per component; the last place is for strays.
+        // Per component: confidence, angles, squared distances; the last entry is for outliers.
         let mut sums = vec![(0.0_f32, [0.0_f32; 2], 0.0_f32); self.mixture.len() + 1];
         for &(angles, confidence) in samples {
             let nearest = self
@@ -159,12 +156,12 @@ impl Physical {
         for (component, &(confidence, angles, squared)) in self.mixture.iter_mut().zip(&sums) {
             component.weight += rate * (confidence / evidence - component.weight);
             if confidence > 0.0 {
-                // What a component has seen lately weighs against what it knew by their shares of its weight.
+                // New and old evidence are weighted by their shares of the weight.
                 let step = (rate * confidence / evidence / component.weight.max(rate)).min(1.0);
                 for (mean, total) in component.mean.iter_mut().zip(angles) {
                     *mean += step * (total / confidence - *mean);
                 }
-                // Half, for the variance is one axis' and the distance is over two.
+                // Half, because the variance is per axis and the distance has two.
                 component.variance += step * (0.5 * squared / confidence - component.variance);
                 component.variance = component.variance.max(LEAST_SD * LEAST_SD);
             }
@@ -183,14 +180,14 @@ impl Physical {
     }
 }
 
-/// Where the light that is missing points to, (theta, phi) in radians.
+/// Direction of the missing light, (theta, phi) in radians.
 fn direction(frame: [f32; 3], background: [f32; 3]) -> [f32; 2] {
     let lost = [0, 1, 2].map(|channel| (background[channel] - frame[channel]) / background[channel].max(1.0));
     let norm = lost.iter().map(|share| share * share).sum::<f32>().sqrt().max(f32::MIN_POSITIVE);
     [lost[1].atan2(lost[0]), (lost[2] / norm).clamp(-1.0, 1.0).acos()]
 }
 
-/// The value of one angle that halves the confidence; a robust place for the first component.
+/// Confidence-weighted median of one angle; a robust start of the first component.
 fn weighted_median(samples: &[([f32; 2], f32)], axis: usize) -> f32 {
     let mut sorted: Vec<(f32, f32)> =
         samples.iter().map(|&(angles, weight)| (angles[axis], weight)).collect();
@@ -211,7 +208,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_direction_of_the_lost_light_does_not_depend_on_the_surface() {
+    fn the_direction_of_missing_light_is_independent_of_the_surface() {
         // Sun to sky in the three channels: 3, 2 and 1.
         let lit = |surface: [f32; 3]| [4.0 * surface[0], 3.0 * surface[1], 2.0 * surface[2]];
         let expected = direction([30.0, 30.0, 30.0], lit([30.0, 30.0, 30.0]));
@@ -224,13 +221,13 @@ mod tests {
     }
 
     #[test]
-    fn the_median_weighs_confidence() {
+    fn the_median_is_weighted_by_confidence() {
         let samples = [([1.0, 0.0], 1.0), ([2.0, 0.0], 1.0), ([9.0, 0.0], 3.0)];
         assert_eq!(weighted_median(&samples, 0), 9.0);
     }
 
     #[test]
-    fn too_little_evidence_teaches_nothing() {
+    fn ignores_too_little_evidence() {
         let mut detector = Physical::new(Settings::default());
         detector.learn(&[([0.8, 0.9], 1.0); 5]);
         assert!(detector.mixture.is_empty());

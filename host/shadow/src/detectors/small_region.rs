@@ -1,11 +1,11 @@
-//! Small-region texture: the texture round a pixel stays in shadow, only its gain drops.
+//! Small-region texture: in shadow the texture around a pixel stays and only its gain drops.
 //!
-//! A. Leone and C. Distante, "Shadow detection for moving objects based on texture analysis", Pattern Recognition 40 (2007),
-//! 1222-1233. Darker foreground pixels are candidates; round each, frame and background are projected on a bank of
-//! Gabor functions (two wavelengths, four orientations, even and odd), both divided by their local mean so that
-//! the gain drops out. Where the projections' squared distance, averaged over a small region and less what camera noise
-//! brings, is small beside the background's own squared length, the region is shadow. Windows are weighted by the
-//! Gabor functions' own Gaussian, and only foreground pixels count: a shadow's edge is not texture.
+//! A. Leone and C. Distante, "Shadow detection for moving objects based on texture analysis", Pattern
+//! Recognition 40 (2007), 1222-1233. For each darker foreground pixel, frame and background are projected on
+//! Gabor functions (two wavelengths, four orientations, even and odd) and divided by their local mean. If the
+//! squared distance, averaged over a small region and without the noise, is small relative to the
+//! background's squared length, the region is shadow. Windows have the Gabor functions' Gaussian weight and
+//! include foreground pixels only, because a shadow's edge is not texture.
 //!
 //! Cost: window area times 16 functions, twice, per candidate: about 2600 multiplications.
 
@@ -14,21 +14,19 @@ use ndarray::{Array2, ArrayView2};
 use super::images::{Images, intensity, window_means};
 use farnear_silhouettes::mask::{Mask, bits::BitMask};
 
-/// Settings of the detector.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
-    /// Least intensity of a candidate in proportion to the background's.
+    /// Smallest intensity of a candidate relative to the background.
     pub darkest: f32,
-    /// Greatest intensity of a candidate in proportion to the background's.
+    /// Largest intensity of a candidate relative to the background.
     pub lightest: f32,
-    /// Greatest distance of the projections in proportion to the background's length.
+    /// Largest distance relative to the background's length.
     pub distance: f32,
-    /// Length below which a background has no texture to lose, in proportion to the local mean; such ground counts as
-    /// alike.
+    /// Background length without texture, relative to the local mean; such ground counts as equal.
     pub smooth: f32,
-    /// Camera noise, standard deviation in grey levels (of the mean of three channels).
+    /// Camera noise, standard deviation in grey levels (mean of three channels).
     pub noise_sd: f32,
-    /// Radius of the square region that distances are averaged over, pixels.
+    /// Radius of the square region for averaging.
     pub region_radius_px: usize,
 }
 
@@ -38,18 +36,16 @@ impl Default for Settings {
     }
 }
 
-/// Radius of the window, pixels.
 const RADIUS: usize = 4;
 const SIDE: usize = 2 * RADIUS + 1;
 const WAVELENGTHS_PX: [f32; 2] = [4.0, 8.0];
 const ORIENTATIONS: usize = 4;
 const FUNCTIONS: usize = WAVELENGTHS_PX.len() * ORIENTATIONS * 2;
-/// Standard deviation of the Gaussian window, pixels.
+/// Standard deviation of the Gaussian window.
 const SD_PX: f32 = 2.0;
 
 type Window = [[f32; SIDE]; SIDE];
 
-/// The foreground pixels whose texture is the background's.
 #[must_use]
 pub fn detect(images: &Images<'_>, settings: &Settings) -> Mask {
     let (frame, background) = (intensity(images.frame), intensity(images.background));
@@ -58,7 +54,7 @@ pub fn detect(images: &Images<'_>, settings: &Settings) -> Mask {
         let ratio = frame[at] / background[at].max(f32::MIN_POSITIVE);
         (settings.darkest..=settings.lightest).contains(&ratio)
     });
-    // On a shadow's soft outline the gain changes from pixel to pixel: what lies inside speaks for it.
+    // At a soft outline the gain varies; inner pixels decide.
     let inside = BitMask::pack(images.foreground).eroded(1).unpack();
     let mut squares = Array2::from_elem(images.size(), [0.0_f32; 3]);
     for (at, _) in candidates.indexed_iter().filter(|&(at, &set)| set && inside[at]) {
@@ -70,14 +66,14 @@ pub fn detect(images: &Images<'_>, settings: &Settings) -> Mask {
     }
     let means = window_means(&squares, candidates.view(), settings.region_radius_px);
     images.foreground_where(|at| {
-        // The share of pixels that speak is in all three, so it cancels.
+        // The share of valid pixels is in all three and cancels.
         let [apart, length, speaking] = means[at];
         let limit = settings.distance.powi(2) * length + settings.smooth.powi(2) * speaking;
         candidates[at] && speaking > 0.0 && apart <= limit
     })
 }
 
-/// Projections of the foreground pixels of the window round a pixel, less their weighted mean and divided by it; and that mean.
+/// Projections of the foreground pixels in the window, relative to their weighted mean; and that mean.
 fn project(
     image: &Array2<f32>,
     foreground: ArrayView2<'_, bool>,
@@ -107,11 +103,11 @@ fn project(
 }
 
 struct Bank {
-    /// The Gaussian window, of sum 1.
+    /// Gaussian window, sum 1.
     mean: Window,
-    /// Zero-mean Gabor functions, of absolute sum 1.
+    /// Zero-mean Gabor functions, absolute sum 1.
     functions: [Window; FUNCTIONS],
-    /// Sum of the functions' squares: what white noise of variance 1 brings to a squared length.
+    /// Sum of squares: the squared length of white noise with variance 1.
     energy: f32,
 }
 
@@ -156,7 +152,7 @@ mod tests {
     use ndarray::Array3;
 
     #[test]
-    fn no_function_sees_a_constant_and_the_gain_drops_out() {
+    fn functions_ignore_constants_and_gain() {
         let bank = gabor_bank();
         let all = Array2::from_elem((20, 20), true);
         let (flat, _) = project(&Array2::from_elem((20, 20), 90.0), all.view(), (10, 10), &bank);
@@ -170,7 +166,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_foreground_does_not_count() {
+    fn ignores_pixels_outside_the_foreground() {
         let bank = gabor_bank();
         let texture =
             Array2::from_shape_fn((20, 20), |(row, column)| 60.0 + ((row * 7 + column * 13) % 11) as f32);
@@ -184,7 +180,7 @@ mod tests {
     }
 
     #[test]
-    fn an_orientation_answers_to_its_own_stripes() {
+    fn orientations_respond_to_their_own_stripes() {
         let bank = gabor_bank();
         let stripes = Array2::from_shape_fn((30, 30), |(_, column)| {
             100.0 + 20.0 * (std::f32::consts::PI * 0.5 * column as f32).cos()

@@ -1,10 +1,10 @@
-//! The Astronomical Almanac's low-precision formulas for the sun (section C, about 0.01 deg from 1950 to 2050).
+//! The Astronomical Almanac's low-precision formulas (section C, about 0.01 deg from 1950 to 2050).
 
 use super::angles::Equatorial;
 use super::clock::{hours_of_day, seconds_since_j2000};
 use chrono::{DateTime, Utc};
 
-/// Declination and Greenwich hour angle; coefficients in degrees and degrees per day since 2000-01-01 12:00 UT.
+/// Coefficients in degrees and degrees per day since 2000-01-01 12:00 UT.
 pub(super) fn equatorial(time: DateTime<Utc>) -> Equatorial {
     let n = seconds_since_j2000(time) / 86_400.0;
     let mean_longitude = 280.460 + 0.985_647_4 * n;

@@ -1,26 +1,26 @@
-//! The sun's direction, against the equator and against the horizon, and the way from one to the other.
+//! Equatorial and horizontal direction of the sun, and their conversion.
 
 use serde::{Deserialize, Serialize};
 
-/// Declination and Greenwich hour angle, radians; the hour angle grows westwards and is not wrapped.
+/// Declination and Greenwich hour angle; the latter grows westwards without wrapping.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Equatorial {
-    /// Angle above the celestial equator.
+    /// Above the celestial equator.
     pub declination_rad: f64,
     /// Hour angle at longitude zero.
     pub greenwich_hour_angle_rad: f64,
 }
 
-/// Where the sun stands, seen from the ground, without refraction.
+/// Sun direction from the ground without refraction.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SunPosition {
-    /// Above the horizon, degrees.
+    /// Above the horizon.
     pub elevation_deg: f64,
-    /// Clockwise from north, 0 to 360 degrees.
+    /// Clockwise from north, 0 to 360.
     pub azimuth_deg: f64,
 }
 
-/// From declination, local hour angle and latitude (radians) to elevation and azimuth.
+/// Converts declination, local hour angle and latitude (radians).
 pub fn to_horizon(declination_rad: f64, hour_angle_rad: f64, latitude_rad: f64) -> SunPosition {
     let (sin_d, cos_d) = declination_rad.sin_cos();
     let (sin_h, cos_h) = hour_angle_rad.sin_cos();

@@ -1,26 +1,23 @@
-//! Instants as text and as the counts that the formulas take.
+//! Conversion of times.
 
 use super::place::SunError;
 use chrono::{DateTime, Utc};
 
-/// Reads an RFC 3339 time, e.g. `2014-06-23T11:30:00Z` or `2014-06-23T12:30:00+01:00`.
-///
-/// # Errors
-/// Text that is not such a time.
+/// Parses RFC 3339, e.g. `2014-06-23T11:30:00Z` or `2014-06-23T12:30:00+01:00`.
+/// Errors: any other text.
 pub fn parse_time(text: &str) -> Result<DateTime<Utc>, SunError> {
     DateTime::parse_from_rfc3339(text)
         .map(|time| time.with_timezone(&Utc))
         .map_err(|error| SunError::Time { text: text.to_owned(), reason: error.to_string() })
 }
 
-/// Seconds of a time since 2000-01-01 12:00 UTC, exact to the nanosecond's rounding in f64.
+/// Seconds since 2000-01-01 12:00 UTC, f64 precision.
 pub(super) fn seconds_since_j2000(time: DateTime<Utc>) -> f64 {
-    /// Unix time of 2000-01-01T12:00:00Z.
+    /// 2000-01-01T12:00:00Z.
     const J2000_UNIX_S: i64 = 946_728_000;
     (time.timestamp() - J2000_UNIX_S) as f64 + f64::from(time.timestamp_subsec_nanos()) * 1e-9
 }
 
-/// Hours since midnight UTC.
 pub(super) fn hours_of_day(time: DateTime<Utc>) -> f64 {
     (time.timestamp().rem_euclid(86_400) as f64 + f64::from(time.timestamp_subsec_nanos()) * 1e-9) / 3600.0
 }

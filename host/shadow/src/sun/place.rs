@@ -1,45 +1,34 @@
-//! Where the observer stands, and why a position could not be computed.
+//! Observer position, and errors of the sun position.
 
 use serde::{Deserialize, Serialize};
 
-/// Why a position could not be computed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SunError {
-    /// Latitude outside -90 to 90 degrees or not a number.
+    /// Outside -90 to 90, or NaN.
     #[error("latitude {0} deg is outside -90 to 90 deg")]
     Latitude(f64),
-    /// Longitude outside -180 to 360 degrees or not a number.
+    /// Outside -180 to 360, or NaN.
     #[error("longitude {0} deg is outside -180 to 360 deg (east is positive)")]
     Longitude(f64),
     #[error("unknown sun model `{0}`: expected psa, almanac, thesis or spa")]
     UnknownModel(String),
-    /// The text is not an RFC 3339 time.
     #[error("`{text}` is not an RFC 3339 time such as 2014-06-23T11:30:00Z: {reason}")]
-    Time {
-        /// The text that was given.
-        text: String,
-        /// The parser's reason.
-        reason: String,
-    },
-    /// SPA is not defined for the instant or the place.
+    Time { text: String, reason: String },
+    /// SPA is undefined for this time or place.
     #[error("SPA: {0}")]
     Spa(String),
 }
 
-/// A place on the ground.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Place {
-    /// North positive, degrees.
+    /// North positive.
     pub latitude_deg: f64,
-    /// East positive, degrees.
+    /// East positive.
     pub longitude_deg: f64,
 }
 
 impl Place {
-    /// A checked place.
-    ///
-    /// # Errors
-    /// Latitude outside ±90 degrees, longitude outside -180 to 360 degrees.
+    /// Errors: latitude outside ±90, longitude outside -180 to 360 degrees.
     pub fn new(latitude_deg: f64, longitude_deg: f64) -> Result<Self, SunError> {
         if !(-90.0..=90.0).contains(&latitude_deg) {
             return Err(SunError::Latitude(latitude_deg));

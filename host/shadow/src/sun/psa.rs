@@ -4,7 +4,7 @@ use super::angles::Equatorial;
 use super::clock::{hours_of_day, seconds_since_j2000};
 use chrono::{DateTime, Utc};
 
-/// Declination and Greenwich hour angle; `n` are days since 2000-01-01 12:00 UT, angles in radians.
+/// `n` is days since 2000-01-01 12:00 UT; angles in radians.
 pub(super) fn equatorial(time: DateTime<Utc>) -> Equatorial {
     let n = seconds_since_j2000(time) / 86_400.0;
     let node = 2.267_127_827 - 9.300_339_267e-4 * n;

@@ -1,4 +1,4 @@
-//! NREL's SPA through the `solar-positioning` crate: the reference on the host.
+//! NREL's SPA through the `solar-positioning` crate: the host's reference.
 
 use super::angles::SunPosition;
 use super::place::{Place, SunError};

@@ -1,9 +1,8 @@
-//! Made colour pictures with known shadow, to score detectors where no labelled video is at hand.
+//! Synthetic colour pictures with known shadow, for scoring detectors.
 //!
-//! A scene's masks of body and shadow ([`super::scene`]) are coloured in: the ground is speckled paving lit
-//! by a warm sun and a blue sky, the shadow keeps the sky's light only (with a soft edge), the body wears a
-//! patterned shirt and plain trousers under the same light, and the camera adds noise. Nothing of the detectors'
-//! models is used but the fact that light adds up.
+//! Colours a scene's masks ([`super::scene`]): speckled paving under a warm sun and a blue sky, shadow with
+//! sky light only (soft edge), patterned shirt and plain trousers, camera noise. Shares nothing with the
+//! detectors' models except that light is additive.
 
 use ndarray::{Array2, Array3, ArrayView2};
 use rand::{Rng, SeedableRng};
@@ -11,22 +10,21 @@ use rand_chacha::ChaCha8Rng;
 
 use crate::score::Truth;
 
-/// A coloured scene.
 #[derive(Clone, Debug)]
 pub struct Pictures {
-    /// With person and shadow, shape (height, width, 3).
+    /// Person and shadow, shape (height, width, 3).
     pub frame: Array3<u8>,
-    /// Without, of the same shape, as a background model would know it (noise averaged out).
+    /// Without person, noise averaged out as by a background model.
     pub background: Array3<u8>,
 }
 
-/// Sun and sky per channel, in proportion to full sunlight.
+/// Sun and sky per channel, relative to full sunlight.
 const SUN: [f32; 3] = [0.62, 0.58, 0.50];
 const SKY: [f32; 3] = [0.38, 0.42, 0.50];
-/// Camera noise, standard deviation in grey levels.
+/// Standard deviation in grey levels.
 const NOISE_SD: f32 = 2.0;
 
-/// Colours in a scene of shape (height, width). Seeded: the same truth and seed give the same pictures.
+/// Colours a scene of shape (height, width); equal truth and seed give equal pictures.
 #[must_use]
 pub fn colour_in(truth: ArrayView2<'_, Truth>, seed: u64) -> Pictures {
     let (height, width) = truth.dim();
@@ -54,7 +52,7 @@ pub fn colour_in(truth: ArrayView2<'_, Truth>, seed: u64) -> Pictures {
                     } else {
                         trousers[channel]
                     };
-                    // One side of the body is turned from the sun.
+                    // One side of the body faces away from the sun.
                     cloth * (0.7 * SUN[channel] + SKY[channel])
                 } else {
                     empty * light
@@ -68,7 +66,7 @@ pub fn colour_in(truth: ArrayView2<'_, Truth>, seed: u64) -> Pictures {
     Pictures { frame, background }
 }
 
-/// How much of the sun reaches each pixel of the ground, 0 to 1: the shadow's edge is three pixels soft.
+/// Share of sunlight per ground pixel, 0 to 1: three pixels of soft edge.
 fn soft_light(truth: ArrayView2<'_, Truth>) -> Array2<f32> {
     let (height, width) = truth.dim();
     Array2::from_shape_fn((height, width), |(row, column)| {
@@ -85,19 +83,19 @@ fn soft_light(truth: ArrayView2<'_, Truth>) -> Array2<f32> {
     })
 }
 
-/// The row that parts shirt and trousers: the middle of the subject's rows.
+/// Row between shirt and trousers: the middle of the subject.
 fn waist_row(truth: ArrayView2<'_, Truth>) -> usize {
     let rows = truth.indexed_iter().filter(|&(_, &what)| what == Truth::Subject).map(|((row, _), _)| row);
     let (top, bottom) = rows.fold((usize::MAX, 0), |(top, bottom), row| (top.min(row), bottom.max(row)));
     if top == usize::MAX { 0 } else { (top + bottom) / 2 }
 }
 
-/// About Gaussian, of variance 1: twelve uniform numbers.
+/// Roughly Gaussian, variance 1: sum of twelve uniform numbers.
 fn gaussian(rng: &mut ChaCha8Rng) -> f32 {
     (0..12).map(|_| rng.random::<f32>()).sum::<f32>() - 6.0
 }
 
-/// Noise of about unit variance whose grain is `grain_px` wide.
+/// Noise of about unit variance with a grain of `grain_px`.
 fn smooth_noise(rng: &mut ChaCha8Rng, (height, width): (usize, usize), grain_px: usize) -> Array2<f32> {
     let coarse = Array2::from_shape_fn((height / grain_px + 2, width / grain_px + 2), |_| gaussian(rng));
     Array2::from_shape_fn((height, width), |(row, column)| {

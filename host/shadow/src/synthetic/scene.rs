@@ -1,8 +1,8 @@
-//! Seeded scenes for shadow removal: a walking person on level ground under the sun, rendered with the truth of body and shadow.
+//! Seeded scenes: a walking person on level ground under the sun, with true body and shadow.
 //!
-//! Body: the image of every capsule through the camera. Shadow: the outline of every capsule's end spheres carried along the
-//! sun's rays to the ground, hull per capsule, projected. Nothing here uses the formulas of [`crate::projection`], so a
-//! mistake there shows.
+//! Body: image of each capsule. Shadow: outlines of each capsule's end spheres along the sun's rays on the
+//! ground, convex hull per capsule, projected. Independent of [`crate::projection`], so that errors there
+//! show.
 
 use crate::camera::{Camera, CameraFile, StandardDeviations, SubjectPrior};
 use crate::score::Truth;
@@ -17,38 +17,35 @@ use ndarray::Array2;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-/// What makes a scene hard.
+/// Difficulty of a scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
-    /// Level camera, upright person, the shadow falls sideways or towards the camera.
+    /// Level camera, upright person, shadow sideways or towards the camera.
     Standard,
-    /// As standard, with the camera pitched down by 5 to 15 degrees.
+    /// Camera pitched down by 5 to 15 degrees.
     Pitched,
-    /// As standard, with the person bending by 40 to 80 degrees.
+    /// Person bending by 40 to 80 degrees.
     Bending,
-    /// The shadow falls behind the person (within 60 degrees of straight away).
+    /// Shadow behind the person (within 60 degrees of straight away).
     Behind,
 }
 
-/// A rendered scene and its truth.
 #[derive(Clone, Debug)]
 pub struct Scene {
-    /// Pixels of the person.
     pub body: Mask,
-    /// Pixels of the shadow on the ground (also where the person hides it).
+    /// Shadow on the ground, including hidden parts.
     pub shadow: Mask,
-    /// Both: what a background model would find.
+    /// Union, as a background model would find it.
     pub silhouette: Mask,
     pub camera: CameraFile,
     pub sun: SunPosition,
-    /// Where the person truly stands, [offset to the right, distance], metres.
+    /// [right, distance] of the person.
     pub stands_at_m: [f64; 2],
-    /// True stature, metres.
     pub height_m: f64,
 }
 
 impl Scene {
-    /// The ground truth of every pixel: subject before shadow before background.
+    /// Per pixel: subject before shadow before background.
     pub fn truth(&self) -> Array2<Truth> {
         Array2::from_shape_fn(self.body.dim(), |i| match (self.body[i], self.shadow[i]) {
             (true, _) => Truth::Subject,
@@ -58,7 +55,7 @@ impl Scene {
     }
 }
 
-/// Draws scene `seed` of a kind at 640 x 480 pixels. Scenes whose person or shadow leaves the picture are drawn again.
+/// Draws scene `seed` at 640 x 480; redraws if person or shadow leave the image.
 pub fn scene(kind: Kind, seed: u64) -> Scene {
     let mut rng = ChaCha8Rng::seed_from_u64(seed.wrapping_mul(4).wrapping_add(kind as u64));
     loop {
@@ -86,7 +83,7 @@ fn draw(kind: Kind, rng: &mut ChaCha8Rng) -> Scene {
         height_px: 480,
         principal_point_px: None,
     };
-    // Direction of the shadow on the ground in the camera's frame, degrees from its right towards its front.
+    // Shadow direction on the ground in the camera's frame, degrees from right towards front.
     let direction_deg = match kind {
         Kind::Behind => rng.random_range(30.0..150.0),
         _ => rng.random_range(-210.0..30.0),
@@ -120,15 +117,16 @@ fn draw(kind: Kind, rng: &mut ChaCha8Rng) -> Scene {
     Scene { body, shadow, silhouette, camera, sun, stands_at_m: at, height_m: stature }
 }
 
-/// Body and shadow of capsules (millimetres, camera's ground frame); the shadow falls along `direction_deg` from the camera's right.
+/// Renders capsules (mm, camera's ground frame) with the shadow along `direction_deg` from the camera's
+/// right.
 pub fn render(capsules: &[Capsule], camera: &Camera, direction_deg: f64, elevation_deg: f64) -> (Mask, Mask) {
     const RING: usize = 20;
     let shape = (camera.height_px, camera.width_px);
     let (mut body, mut shadow) = (Mask::default(shape), Mask::default(shape));
     let per_height = 1.0 / elevation_deg.to_radians().tan();
     let along = [direction_deg.to_radians().cos(), direction_deg.to_radians().sin()];
-    // The terminator of a sphere is a great circle perpendicular to the rays: across the shadow's direction on the ground,
-    // and the direction perpendicular to that and to the ray.
+    // A sphere's terminator is a great circle perpendicular to the rays: across the shadow's ground
+    // direction, and perpendicular to that and to the ray.
     let (se, ce) = elevation_deg.to_radians().sin_cos();
     let across = [-along[1], along[0], 0.0];
     let upward = [along[0] * se, along[1] * se, ce];

@@ -1,4 +1,4 @@
-//! Damaged camera files and any silhouette.
+//! Damaged camera files and random silhouettes.
 
 use crate::cases;
 use farnear_shadow::sun::SunPosition;
@@ -35,7 +35,7 @@ proptest! {
         for light in lights {
             for method in [Method::Hybrid, Method::Thesis] {
                 if let Ok((left, report)) = remove(&mask, &file, light, sd, method) {
-                    // Nothing is added, and the share told is the one taken.
+                    // Nothing is added, and the reported share equals the removed one.
                     prop_assert!(left.iter().zip(&mask).all(|(&left, &set)| set || !left));
                     prop_assert!((0.0..=1.0).contains(&report.removed_fraction));
                 }

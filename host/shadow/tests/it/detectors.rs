@@ -1,5 +1,5 @@
-//! The five image-based detectors on made scenes with known shadow. The floors lie some points below what they reach, so
-//! that a broken detector shows and a retuned one need not.
+//! The five detectors on synthetic scenes. Floors are some points below the results, so that retuning is
+//! possible and a failure shows.
 
 use farnear_shadow::detectors::{Detector, Images, Method};
 use farnear_shadow::score::ShadowScore;
@@ -10,7 +10,7 @@ use farnear_shadow::synthetic::{
 use ndarray::Array2;
 use std::sync::OnceLock;
 
-/// Ten scenes, coloured in once for all detectors.
+/// Ten coloured scenes, shared by all tests.
 fn scenes() -> &'static [(Scene, Pictures)] {
     static SCENES: OnceLock<Vec<(Scene, Pictures)>> = OnceLock::new();
     SCENES.get_or_init(|| {
@@ -23,7 +23,7 @@ fn scenes() -> &'static [(Scene, Pictures)] {
     })
 }
 
-/// The score over the scenes; the foreground given to the detector is body and shadow.
+/// Score over the scenes; the foreground is body and shadow.
 fn score(method: Method) -> ShadowScore {
     let mut total = ShadowScore::default();
     let mut detector = Detector::new(method);
@@ -37,7 +37,7 @@ fn score(method: Method) -> ShadowScore {
     total
 }
 
-/// At least `removed` % of the shadow goes and at most `wrongly` % of the subject.
+/// At least `removed` % of the shadow and at most `wrongly` % of the subject go.
 #[track_caller]
 fn reaches(method: Method, removed: f64, wrongly: f64) {
     let score = score(method);

@@ -1,8 +1,9 @@
-//! The background model and the shadow detectors on the highway sequence of ChangeDetection.net (Goyette et al. 2012).
+//! Background model and shadow detectors on the highway sequence of ChangeDetection.net (Goyette et al.
+//! 2012).
 //!
-//! The figures to agree with are those of OpenCV 5.0.0's `createBackgroundSubtractorMOG2()` with its default
-//! settings (the same as ours), fed with the same frames in order and scored in the same way: label 255 against
-//! truth 255, truth 85 and 170 left out, frames 470 onwards (the sequence's temporal region of interest).
+//! Reference: OpenCV 5.0.0's `createBackgroundSubtractorMOG2()` with default settings (equal to ours) on the
+//! same frames and with the same score: label 255 against truth 255, truth 85 and 170 excluded, frames 470
+//! onwards (temporal region of interest).
 
 #![allow(clippy::unwrap_used)] // helpers of tests: data that cannot be read must stop the test
 
@@ -14,13 +15,12 @@ use farnear_silhouettes::background::{BackgroundModel, Frame, Label, Settings};
 use image::{DynamicImage, GrayImage};
 use ndarray::{Array2, ArrayView2, ArrayView3};
 
-/// A frame of the sequence.
 struct Shot {
     picture: DynamicImage,
     truth: Option<GrayImage>,
 }
 
-/// The frames in order, read once for all tests.
+/// The frames in order, read once.
 fn shots() -> &'static [Shot] {
     static SHOTS: OnceLock<Vec<Shot>> = OnceLock::new();
     SHOTS.get_or_init(|| {
@@ -123,8 +123,8 @@ fn grey_without_shadow_agrees_with_opencv() {
     agrees(false, false, 0.1715);
 }
 
-/// Detection and discrimination rates (Sanin et al. 2012) of the five detectors on the background model's foreground.
-/// Where the frames at hand have no pixel labelled shadow, only the discrimination rate can be given.
+/// Detection and discrimination rates (Sanin et al. 2012) on the background model's foreground. Without
+/// labelled shadow only the discrimination rate is available.
 #[test]
 #[cfg_attr(not(shared_data), ignore = "needs the real data beside the repository")]
 fn detectors_keep_most_of_what_moves() {

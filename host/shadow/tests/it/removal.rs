@@ -1,4 +1,4 @@
-//! Shadow removal on seeded scenes, and the error propagation against Monte Carlo.
+//! Shadow removal on seeded scenes, and error propagation against Monte Carlo.
 
 use chrono::{DateTime, TimeDelta, Utc};
 use farnear_shadow::projection::{ShadowError, Subject, in_image, on_ground};
@@ -28,7 +28,7 @@ fn score(kind: Kind, method: Method, scenes: u64) -> ShadowScore {
 }
 
 #[test]
-fn hybrid_removes_shadows_of_a_hundred_scenes_and_spares_the_person() {
+fn hybrid_removes_shadows_of_a_hundred_scenes_and_keeps_the_person() {
     let total = score(Kind::Standard, Method::Hybrid, 100);
     println!(
         "removed {:.1} %, wrongly {:.1} %, IoU {:.1} %",
@@ -48,7 +48,8 @@ fn the_thesis_method_removes_shadows_too_and_harder_scenes_stay_usable() {
         percent(printed.removed_percent()) > 60.0 && percent(printed.wrongly_removed_percent()) < 10.0,
         "{printed:?}"
     );
-    // Some points under what 50 scenes come to (93.8, 94.7 and 84.0 removed), well over what angles alone did (80, 57 and 83).
+    // Some points below the results of 50 scenes (93.8, 94.7 and 84.0 removed), well above angles alone (80,
+    // 57 and 83).
     for (kind, removed, iou) in
         [(Kind::Pitched, 88.0, 95.0), (Kind::Bending, 88.0, 94.0), (Kind::Behind, 78.0, 92.0)]
     {
@@ -61,7 +62,8 @@ fn the_thesis_method_removes_shadows_too_and_harder_scenes_stay_usable() {
 
 #[test]
 fn the_thesis_method_searches_the_range_of_its_angle() {
-    // With a standard deviation below its step of 10 degrees it once tried one angle only. The angle found lies in the range, and not always in its middle.
+    // A standard deviation below the step of 10 degrees must still try several angles; the result is in the
+    // range, not always its middle.
     const SD_RAD: f64 = 0.05;
     let mut moved = 0;
     for seed in 0..10 {
@@ -80,10 +82,10 @@ fn the_thesis_method_searches_the_range_of_its_angle() {
 }
 
 #[test]
-fn a_lamp_far_away_takes_the_same_off_as_the_sun() {
+fn a_distant_lamp_removes_the_same_pixels_as_the_sun() {
     let scene = scene(Kind::Bending, 3);
     let ground = on_ground(scene.sun, 1.0, &scene.camera.camera).expect("sun is up");
-    // At 100 km a person's width and height turn its rays by 1e-5.
+    // At 100 km a person's width and height change its rays by 1e-5.
     let lamp = Lamp { right_m: -1e5 * ground.rx_m, ahead_m: -1e5 * ground.ry_m, up_m: 1e5 };
     let cut = |light: Light| {
         remove(&scene.silhouette, &scene.camera, light, 0.0, Method::Hybrid).expect("a result")
@@ -93,13 +95,13 @@ fn a_lamp_far_away_takes_the_same_off_as_the_sun() {
     let differ = by_sun.iter().zip(&by_lamp).filter(|(a, b)| a != b).count();
     let left = by_sun.iter().filter(|&&set| set).count();
     assert!(differ * 100 <= left, "{differ} of {left} pixels");
-    // The direction in the picture alone says nothing of where a body's parts throw their shadow.
+    // An image direction alone does not locate the shadows of body parts.
     let (_, report) = cut(Light::Direction { eta_rad: report.shadow.eta_rad });
     assert_eq!(report.unexplained, None);
 }
 
 #[test]
-fn bad_input_is_refused_by_name() {
+fn rejects_invalid_input_by_name() {
     let scene = scene(Kind::Standard, 1);
     let night = SunPosition { elevation_deg: -4.0, azimuth_deg: 10.0 };
     let refused = remove(&scene.silhouette, &scene.camera, night, 0.0, Method::Hybrid).expect_err("night");
@@ -116,7 +118,7 @@ fn bad_input_is_refused_by_name() {
     ));
 }
 
-/// One Monte Carlo case: day, hours, latitude, longitude, camera azimuth, distance, camera height.
+/// A Monte Carlo case: day, hours, latitude, longitude, camera azimuth, distance, camera height.
 type Case = [f64; 7];
 
 fn at(day: f64, hours: f64) -> DateTime<Utc> {
@@ -132,7 +134,7 @@ fn file(case: &Case) -> CameraFile {
     .expect("valid")
 }
 
-/// Standard deviation of beta in degrees over `n` draws of every input.
+/// Standard deviation of beta in degrees over `n` random inputs.
 fn monte_carlo_deg(case: &Case, model: Model, n: usize) -> f64 {
     let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(7);
     let mut normal = |sd: f64| -> f64 {
@@ -144,9 +146,9 @@ fn monte_carlo_deg(case: &Case, model: Model, n: usize) -> f64 {
     let (mut sum, mut squares) = (0.0, 0.0);
     let sun = position(at(case[0], case[1]), Place { latitude_deg: case[2], longitude_deg: case[3] }, model)
         .expect("sun");
-    // Shadows to the left are mirrored, as the method does, by what is nominally the case.
+    // Shadows to the left are mirrored by the nominal case, as in the method.
     let mirror = on_ground(sun, 1.75, &nominal.camera).expect("shadow").rx_m.signum();
-    // Drawn day and hour move apart: a day's fraction changes the season, not the time of day.
+    // Day and hour vary independently: a fraction of a day changes the season, not the time of day.
     let [day, hours, lat, lon, _, u, _] = *case;
     for _ in 0..n {
         let mut drawn = nominal.clone();
@@ -174,7 +176,7 @@ fn monte_carlo_deg(case: &Case, model: Model, n: usize) -> f64 {
             azimuth_deg: a.azimuth_deg + fraction * turn,
         };
         let shadow = on_ground(sun, stature, &drawn.camera).expect("shadow");
-        // The angle itself, without the shortening of (8.19): the formulas' own projection.
+        // The angle without the shortening of (8.19).
         let (mx, my) = (
             mirror * shadow.rx_m / (distance_m + shadow.ry_m),
             drawn.camera.height_m * (1.0 / (distance_m + shadow.ry_m) - 1.0 / distance_m),
@@ -188,7 +190,7 @@ fn monte_carlo_deg(case: &Case, model: Model, n: usize) -> f64 {
 }
 
 #[test]
-fn error_propagation_agrees_with_monte_carlo_and_flags_where_it_cannot() {
+fn error_propagation_agrees_with_monte_carlo_or_is_flagged() {
     let cases: [(&str, Case); 5] = [
         ("S1", [174.0, 10.5, 52.38, -1.56, 140.0, 5.0, 0.8]),
         ("S2", [174.0, 15.0, 52.38, -1.56, 60.0, 5.0, 1.5]),
@@ -196,7 +198,7 @@ fn error_propagation_agrees_with_monte_carlo_and_flags_where_it_cannot() {
         ("S4", [81.0, 9.0, 1.0, 0.0, 0.0, 6.0, 2.0]),
         ("S5", [1.0, 10.0, -33.9, 20.0, 200.0, 10.0, 3.0]),
     ];
-    // The published Monte Carlo figures for these cases with the thesis' corrected sun.
+    // Published Monte Carlo figures for these cases with the thesis' corrected sun.
     let published = [0.197, 0.669, 16.3, 0.337, 0.649];
     for ((name, case), published) in cases.into_iter().zip(published) {
         let subject = Subject { distance_m: case[5], offset_m: 0.0, height_m: 1.75 };
@@ -214,7 +216,7 @@ fn error_propagation_agrees_with_monte_carlo_and_flags_where_it_cannot() {
             continue;
         }
         assert!(first_order.first_order_holds, "{name} {first_order:?}");
-        // 20,000 draws know a standard deviation to 0.5 %; second order adds some 2 %.
+        // 20,000 samples give a standard deviation to 0.5 %; second order adds some 2 %.
         assert!((first_order.beta_rad.to_degrees() / drawn_deg - 1.0).abs() < 0.03, "{name}");
         assert!((drawn_deg / published - 1.0).abs() < 0.04, "{name}: {drawn_deg} against {published}");
     }
@@ -222,7 +224,7 @@ fn error_propagation_agrees_with_monte_carlo_and_flags_where_it_cannot() {
 
 #[test]
 fn the_drawn_scene_and_the_projection_agree_on_where_the_shadow_falls() {
-    // The renderer knows nothing of the projection's formulas: the tip must lie at the shadow's far end.
+    // The renderer is independent of the projection: the tip must be at the shadow's far end.
     for seed in 0..20 {
         let scene = scene(Kind::Standard, seed);
         let ground = on_ground(scene.sun, scene.height_m, &scene.camera.camera).expect("sun");
@@ -237,7 +239,7 @@ fn the_drawn_scene_and_the_projection_agree_on_where_the_shadow_falls() {
             .map(|((y, x), _)| along([x as f64, y as f64]))
             .fold(f64::NEG_INFINITY, f64::max);
         let length = image.m_px[0].hypot(image.m_px[1]);
-        // The head is round and the body as wide as 0.2 m either way, so the far end is not one point.
+        // The head is round and the body 0.2 m wide on either side, so the far end is not one point.
         let width = scene.camera.camera.focal_px() * 0.25 / distance_m;
         assert!((far - along(image.tip_px)).abs() < 0.12 * length + width, "seed {seed}: {far} {image:?}");
     }

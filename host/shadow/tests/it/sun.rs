@@ -1,9 +1,9 @@
-//! The sun's position against NREL's published values and against SPA.
+//! Sun position compared with NREL's published values and SPA.
 
 use chrono::{DateTime, TimeDelta, Utc};
 use farnear_shadow::sun::{Model, Place, parse_time, position};
 
-/// Refraction as SPA adds it (Reda and Andreas 2004, eq. 42) at 1000 hPa and 10 deg C for a true elevation, degrees.
+/// Refraction of SPA (Reda and Andreas 2004, eq. 42) at 1000 hPa and 10 deg C for a true elevation, degrees.
 fn refraction_deg(elevation_deg: f64) -> f64 {
     let argument = elevation_deg + 10.3 / (elevation_deg + 5.11);
     1000.0 / 1010.0 * 283.0 / 283.0 * 1.02 / (60.0 * argument.to_radians().tan())
@@ -24,7 +24,7 @@ fn psa_agrees_with_nrel_values_from_1910_to_2210() {
         let fields: Vec<&str> = line.split(',').collect();
         let number = |i: usize| fields[i].trim().parse::<f64>().expect("a number");
         let apparent = 90.0 - number(4);
-        // Refraction moves the horizon by half a degree; above it the sun is up whichever way it is counted.
+        // Refraction moves the horizon by half a degree; above it the sun is up either way.
         if apparent < 0.6 {
             continue;
         }
@@ -45,8 +45,9 @@ fn psa_agrees_with_nrel_values_from_1910_to_2210() {
 }
 
 #[test]
-fn the_published_spa_example_is_met() {
-    // NREL/TP-560-34302, table A5.1: e0 = 39.872046 at 1830 m, azimuth 194.340241; height moves the sun by less than 0.0001 deg.
+fn reproduces_the_published_spa_example() {
+    // NREL/TP-560-34302, table A5.1: e0 = 39.872046 at 1830 m, azimuth 194.340241; altitude moves the sun by
+    // less than 0.0001 deg.
     let at = parse_time("2003-10-17T12:30:30-07:00").expect("a time");
     let place = Place::new(39.742_476, -105.178_6).expect("a place");
     for (model, elevation, azimuth) in [
@@ -66,7 +67,7 @@ fn closed_forms_stay_near_spa_over_places_and_years() {
     let start: DateTime<Utc> = parse_time("2014-01-01T00:10:00Z").expect("a time");
     let mut worst = [[0.0_f64; 2]; 3];
     for step in 0..2600 {
-        // 87.3 hours a step covers 26 years and walks through hours and seasons.
+        // 87.3 hours per step covers 26 years and all hours and seasons.
         let at = start + TimeDelta::seconds(step * 314_280);
         for (latitude_deg, longitude_deg) in [(52.38, -1.56), (1.0, 103.8), (-33.9, 20.0), (67.0, 25.0)] {
             let place = Place { latitude_deg, longitude_deg };
@@ -77,7 +78,7 @@ fn closed_forms_stay_near_spa_over_places_and_years() {
             for (worst, model) in worst.iter_mut().zip([Model::Psa, Model::Almanac, Model::Thesis]) {
                 let sun = position(at, place, model).expect("a position");
                 worst[0] = worst[0].max((sun.elevation_deg - truth.elevation_deg).abs());
-                // Near the zenith azimuth loses its meaning: compare the angle on the sky.
+                // Near the zenith azimuth is ill-defined: compare the angle on the sky.
                 let sky = turn_deg(sun.azimuth_deg, truth.azimuth_deg).abs()
                     * truth.elevation_deg.to_radians().cos();
                 worst[1] = worst[1].max(sky);
@@ -87,6 +88,6 @@ fn closed_forms_stay_near_spa_over_places_and_years() {
     println!("psa {:?} almanac {:?} thesis {:?}", worst[0], worst[1], worst[2]);
     assert!(worst[0][0] < 0.01 && worst[0][1] < 0.01, "{:?}", worst[0]);
     assert!(worst[1][0] < 0.015 && worst[1][1] < 0.015, "{:?}", worst[1]);
-    // The thesis' form is known to be a degree off, and not more.
+    // The thesis' form is about a degree off.
     assert!(worst[2][0] > 0.3 && worst[2][0] < 1.3 && worst[2][1] < 1.3, "{:?}", worst[2]);
 }

@@ -1,8 +1,10 @@
-//! The mixture update of one frame, several pixels at a time with whatever vectors the processor has (chosen when
-//! the program runs, `pulp`; on a processor without AVX2 or NEON one pixel at a time).
+//! Mixture update of one frame with the processor's vectors (selected at run time by `pulp`; one pixel at a
+//! time without AVX2
+//! or NEON).
 //!
 //! The recursive equations of Zivkovic 2004 (equations 4 to 6 with the prior of 14) and Zivkovic and van der
-//! Heijden 2006 (equations 4 to 9), for isotropic components; o is 1 for the component that owns the sample:
+//! Heijden 2006
+//! (equations 4 to 9), for isotropic components; o is 1 for the component that owns the sample:
 //!
 //! ```text
 //! weight   += rate (o - weight) - rate c_T       discarded at 0, then normalised to sum 1
@@ -10,17 +12,19 @@
 //! variance += o (rate / weight) (|x - mean|^2 - variance)
 //! ```
 //!
-//! The owner is the heaviest component within `component_threshold`. Components stay sorted by weight, which takes
-//! one pass of neighbour exchanges because at most one of them has grown.
+//! The owner is the heaviest component within `component_threshold`. Components stay sorted by weight with
+//! one pass of
+//! neighbour exchanges, because at most one has grown.
 //!
 //! # Layout
-//! Pixels come in tiles of [`TILE`]; a tile of one component holds weight, variance and the means of its channels,
-//! each for 16 pixels. Tiles of the same component lie side by side, and each tile knows how many components any of
-//! its pixels uses, so memory that holds nothing is never touched.
+//! Pixels come in tiles of [`TILE`]; a tile of a component holds weight, variance and channel means for 16
+//! pixels. Tiles of a
+//! component are adjacent, and each tile stores the number of components in use, so unused memory is never
+//! touched.
 //!
 //! # Cost
-//! Linear in pixels times components in use; about 10 floating-point operations per component and channel, one
-//! division per component.
+//! Pixels times components in use; about 10 floating-point operations per component and channel, one division
+//! per component.
 
 use std::array::from_fn;
 
@@ -28,7 +32,7 @@ use pulp::{Simd, WithSimd};
 
 use super::settings::Settings;
 
-/// Pixels per tile: the widest vector of f32 (AVX-512).
+/// Pixels per tile: the widest f32 vector (AVX-512).
 pub const TILE: usize = 16;
 
 /// Fields of a component before its channel means.
@@ -36,17 +40,17 @@ const WEIGHT: usize = 0;
 const VARIANCE: usize = 1;
 const MEAN: usize = 2;
 
-/// Label codes as the kernel writes them.
+/// Label codes of the kernel.
 pub const BACKGROUND: u8 = 0;
 pub const SHADOW: u8 = 1;
 pub const FOREGROUND: u8 = 2;
 
-/// Values of one component of one tile.
+/// Values per component and tile.
 pub const fn component_len(channels: usize) -> usize {
     (MEAN + channels) * TILE
 }
 
-/// Where the means of a channel begin in a component of a tile.
+/// Offset of a channel's means in a component of a tile.
 pub const fn mean_offset(channel: usize) -> usize {
     (MEAN + channel) * TILE
 }
@@ -59,13 +63,13 @@ pub const fn state_len(tiles: usize, components: usize, channels: usize) -> usiz
 /// One frame's update of all tiles.
 pub struct Update<'a, const CHANNELS: usize> {
     pub settings: &'a Settings,
-    /// Learning rate of this frame, 0 (nothing is learnt) to 1.
+    /// Learning rate of this frame, 0 to 1.
     pub rate: f32,
-    /// The model, [`state_len`] long.
+    /// Model of [`state_len`] values.
     pub state: &'a mut [f32],
-    /// Components in use by any pixel of each tile.
+    /// Components in use per tile.
     pub used: &'a mut [u8],
-    /// Interleaved samples, row by row.
+    /// Interleaved samples by rows.
     pub pixels: &'a [u8],
     pub labels: &'a mut [u8],
     /// Tiles that are labelled and learn nothing; none where it is empty.
@@ -112,7 +116,7 @@ fn planes<const CHANNELS: usize>(pixels: &[u8]) -> [[f32; TILE]; CHANNELS] {
     let whole = pixels.len() / CHANNELS;
     for (channel, plane) in out.iter_mut().enumerate() {
         for (i, sample) in plane.iter_mut().enumerate() {
-            // The first test is the same for all pixels of a full tile and leaves the loop.
+            // The first test is constant for full tiles and moves out of the loop.
             let from = if whole == TILE || i < whole { i } else { 0 };
             *sample = f32::from(pixels[from * CHANNELS + channel]);
         }
@@ -173,13 +177,13 @@ impl<S: Simd> Constants<S> {
     }
 }
 
-/// The mixtures of one vector of neighbouring pixels.
+/// Mixtures of one vector of pixels.
 struct Mixture<'a, S: Simd, const CHANNELS: usize> {
     simd: S,
     state: &'a mut [f32],
-    /// Where the first component's weights of these pixels lie.
+    /// Offset of the first component's weights.
     first: usize,
-    /// From one component to the next.
+    /// Distance between components.
     stride: usize,
 }
 
@@ -199,7 +203,7 @@ impl<S: Simd, const CHANNELS: usize> Mixture<'_, S, CHANNELS> {
         from_fn(|channel| self.get(component, MEAN + channel))
     }
 
-    /// Takes in one sample per pixel; answers how many components are in use now and each pixel's label code.
+    /// Adds one sample per pixel; returns the components in use and each pixel's label code.
     #[inline(always)]
     fn observe(&mut self, c: &Constants<S>, used: usize, x: [S::f32s; CHANNELS]) -> (usize, S::f32s) {
         let simd = self.simd;
@@ -222,7 +226,8 @@ impl<S: Simd, const CHANNELS: usize> Mixture<'_, S, CHANNELS> {
 
             let reward = simd.sub_f32s(simd.select_f32s(owner, c.rate, c.zero), c.prior);
             let weight = simd.max_f32s(simd.mul_add_f32s(weight, c.keep, reward), c.zero);
-            // A pixel without this component must not gain one, and a lone young component weighs less than the rate.
+            // A pixel without this component must not gain one; a single young component weighs less than the
+            // rate.
             let step = simd.min_f32s(simd.div_f32s(c.rate, simd.max_f32s(weight, c.rate)), c.one);
             let step = simd.select_f32s(owner, step, c.zero);
             for i in 0..CHANNELS {
@@ -257,8 +262,8 @@ impl<S: Simd, const CHANNELS: usize> Mixture<'_, S, CHANNELS> {
         (used, code)
     }
 
-    /// Founds a component for each orphan sample: in the first empty place, else in place of the lightest.
-    /// Answers components in use and the total weight.
+    /// Creates a component for each orphan sample, in the first empty place or instead of the lightest.
+    /// Returns components in use and total weight.
     #[inline(always)]
     fn found(
         &mut self,
@@ -279,7 +284,7 @@ impl<S: Simd, const CHANNELS: usize> Mixture<'_, S, CHANNELS> {
             if !any(simd, here) {
                 continue;
             }
-            // A model that is not learning (rate 0) still needs a first component to exist, hence the tiny floor.
+            // At rate 0 a first component must still exist, hence the tiny floor.
             let young = simd.max_f32s(c.rate, simd.splat_f32s(f32::MIN_POSITIVE));
             let gain = simd.select_f32s(here, simd.sub_f32s(young, weight), c.zero);
             total = simd.add_f32s(total, gain);
@@ -317,10 +322,9 @@ impl<S: Simd, const CHANNELS: usize> Mixture<'_, S, CHANNELS> {
         }
     }
 
-    /// Which samples are a darker copy of a background component: with a the sample's brightness in proportion to
-    /// the mean (its projection on the mean's line), darkest <= a <= 1 and the rest |a mean - x|^2 within
-    /// background_threshold a^2 variance. The brightness and chromaticity distortion test that Prati et al.
-    /// (PAMI 25, 2003, 918-923) compare as "statistical non-parametric".
+    /// Samples that are a darker copy of a background component: with a the projection on the mean's line,
+    /// darkest <= a <= 1 and the rest |a mean - x|^2 within background_threshold a^2 variance. Brightness and
+    /// chromaticity distortion test, "statistical non-parametric" in Prati et al. (PAMI 25, 2003, 918-923).
     #[inline(always)]
     fn shadow(&self, c: &Constants<S>, darkest: S::f32s, used: usize, x: [S::f32s; CHANNELS]) -> S::m32s {
         let simd = self.simd;
@@ -346,7 +350,7 @@ impl<S: Simd, const CHANNELS: usize> Mixture<'_, S, CHANNELS> {
                 simd.less_than_or_equal_f32s(along, length),
                 simd.greater_than_or_equal_f32s(along, simd.mul_f32s(darkest, length)),
             );
-            // A black mean makes the ratio NaN, which no comparison admits.
+            // A black mean gives NaN, which fails all comparisons.
             let same_colour = simd.less_than_f32s(squared_norm(simd, c.zero, rest), limit);
             found = simd.or_m32s(found, simd.and_m32s(common, simd.and_m32s(darker, same_colour)));
             total = simd.add_f32s(total, weight);

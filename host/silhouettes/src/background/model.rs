@@ -1,4 +1,4 @@
-//! The background model over frames: sizes checked, learning rate scheduled, labels out.
+//! Background model over frames: size checks, learning rate, labels.
 
 use ndarray::{Array2, Array3, ArrayView2, ArrayView3};
 use pulp::Arch;
@@ -12,9 +12,9 @@ use super::{
 /// A video frame of 8-bit samples.
 #[derive(Clone, Copy, Debug)]
 pub enum Frame<'a> {
-    /// Grey levels, shape (height, width).
+    /// Shape (height, width).
     Grey(ArrayView2<'a, u8>),
-    /// Red, green and blue, shape (height, width, 3).
+    /// RGB, shape (height, width, 3).
     Rgb(ArrayView3<'a, u8>),
 }
 
@@ -36,7 +36,7 @@ impl Frame<'_> {
     }
 }
 
-/// What a pixel is in a frame.
+/// Class of a pixel.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Label {
     /// Explained by the background components.
@@ -44,39 +44,28 @@ pub enum Label {
     Background,
     /// A darker copy of the background (only with [`Settings::shadow`]).
     Shadow,
-    /// Neither: something that is not part of the scene.
+    /// Not part of the scene.
     Foreground,
 }
 
-/// Why a model was not made or a frame not taken in; the model is as before.
+/// Errors leave the model unchanged.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum BackgroundError {
-    /// The settings make no sense.
     #[error(transparent)]
     Settings(#[from] SettingsError),
-    /// A frame without pixels.
     #[error("background model: a frame of {width}x{height} pixels has nothing in it")]
     Empty { height: usize, width: usize },
-    /// Neither grey nor RGB.
     #[error("background model: {channels} channels per pixel; give 1 (grey) or 3 (red, green, blue)")]
-    Channels {
-        /// Channels per pixel that were given.
-        channels: usize,
-    },
-    /// A frame that is not like the first.
+    Channels { channels: usize },
     #[error(
         "background model: this frame is {}x{} with {found_channels} channel(s), but the video began with {}x{} \
          and {expected_channels}; scale the frames to one size or start a new model",
         .found.1, .found.0, .expected.1, .expected.0
     )]
     Changed {
-        /// (height, width) of this frame.
         found: (usize, usize),
-        /// Channels of this frame.
         found_channels: usize,
-        /// (height, width) of the first frame.
         expected: (usize, usize),
-        /// Channels of the first frame.
         expected_channels: usize,
     },
 }
@@ -111,11 +100,9 @@ pub struct BackgroundModel {
 }
 
 impl BackgroundModel {
-    /// A model that knows nothing yet, for frames of `size` (height, width) with 1 or 3 channels. Memory:
-    /// 4 (2 + channels) bytes per pixel and component.
-    ///
-    /// # Errors
-    /// [`BackgroundError`] for settings that make no sense, an empty size, or another number of channels.
+    /// An untrained model for frames of `size` (height, width) with 1 or 3 channels. Memory: 4 (2 + channels)
+    /// bytes per pixel and component.
+    /// Errors: [`BackgroundError`] for invalid settings, an empty size, or another number of channels.
     pub fn new(size: (usize, usize), channels: usize, settings: Settings) -> Result<Self, BackgroundError> {
         settings.check()?;
         let (height, width) = size;
@@ -139,17 +126,14 @@ impl BackgroundModel {
         })
     }
 
-    /// A model for frames like this one, which is not taken in yet.
+    /// A model for frames like this one, which is not learnt.
     pub fn like(frame: Frame<'_>, settings: Settings) -> Result<Self, BackgroundError> {
         Self::new(frame.size(), frame.channels(), settings)
     }
 
-    /// Takes in the next frame and labels its pixels. The learning rate is the mean over what has been seen while
-    /// that is short, 1 / (2 n) for frame n >= 2, and 1 / history from then on. The first frame founds the model:
-    /// nothing explains it, so all of it is foreground.
-    ///
-    /// # Errors
-    /// [`BackgroundError::Changed`] for a frame of another size or kind; the model is as before.
+    /// Learns the next frame and labels its pixels. The learning rate is 1 / (2 n) for frame n >= 2, then 1 /
+    /// history. All of the first frame is foreground.
+    /// Errors: [`BackgroundError::Changed`] for a frame of another size or kind.
     pub fn apply(&mut self, frame: Frame<'_>) -> Result<Array2<Label>, BackgroundError> {
         self.apply_at(frame, self.usual_rate())
     }
@@ -161,8 +145,8 @@ impl BackgroundModel {
         if n == 1 { 1.0 } else { 1.0 / self.settings.history_frames.min(n.saturating_mul(2)) as f32 }
     }
 
-    /// As [`BackgroundModel::apply`] with a learning rate of one's own, clamped to 0 (labels only; unexplained
-    /// samples still leave a component of no weight) to 1 (forgets everything).
+    /// [`BackgroundModel::apply`] with another learning rate, clamped to 0 (labels only; unexplained samples
+    /// leave a component without weight) to 1 (forgets everything).
     pub fn apply_at(&mut self, frame: Frame<'_>, rate: f32) -> Result<Array2<Label>, BackgroundError> {
         self.apply_outside(frame, rate, None)
     }
@@ -310,7 +294,7 @@ impl BackgroundModel {
         })
     }
 
-    /// How many components each pixel has, shape (height, width).
+    /// Components per pixel, shape (height, width).
     #[must_use]
     pub fn components(&self) -> Array2<u8> {
         let (_, width) = self.size;
@@ -332,7 +316,7 @@ fn split(pixel: usize) -> (usize, usize) {
 mod tests {
     use super::*;
 
-    /// Textured frames with reproducible noise and a block that comes and goes.
+    /// Textured frames with noise and a temporary block.
     fn frame(number: usize, (height, width): (usize, usize)) -> Array3<u8> {
         Array3::from_shape_fn((height, width, 3), |(row, column, channel)| {
             let hash = (number * 7919 + row * 104_729 + column * 1_299_709 + channel * 15_485_863) % 1009;
@@ -344,7 +328,7 @@ mod tests {
 
     #[test]
     fn every_vector_width_gives_the_same_bits() {
-        // 11 x 13 pixels: the last tile is not full.
+        // The last tile is partial.
         let size = (11, 13);
         let mut narrow = BackgroundModel::new(size, 3, Settings::default()).unwrap();
         narrow.arch = Arch::Scalar;

@@ -1,46 +1,42 @@
-//! The background model's settings and what they must satisfy.
+//! Settings of the background model.
 
-/// Settings of the adaptive Gaussian mixture. Grey levels run from 0 to 255.
+/// Settings of the Gaussian mixture. Grey levels from 0 to 255.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Settings {
-    /// Frames over which the model remembers, T; the learning rate is 1 / T once T frames have been seen.
+    /// History T; the learning rate is 1 / T after T frames.
     pub history_frames: u32,
-    /// The most components a pixel may have, 1 to [`Settings::MAX_COMPONENTS`].
+    /// 1 to [`Settings::MAX_COMPONENTS`].
     pub max_components: usize,
-    /// Squared Mahalanobis distance within which a pixel is background.
+    /// Squared Mahalanobis distance of background.
     pub background_threshold: f32,
-    /// Squared Mahalanobis distance within which a sample belongs to a component, else it founds a new one.
+    /// Squared Mahalanobis distance of a component; larger ones create a new component.
     pub component_threshold: f32,
-    /// Share of the data that the background components account for, 1 - c_f (2006, equation 9).
+    /// Share of the data explained by background components, 1 - c_f (2006, equation 9).
     pub background_share: f32,
-    /// Weight that the Dirichlet prior takes off every component, c_T (2004, equation 14): the share of the
-    /// data that a component must explain to be kept.
+    /// Weight removed from every component by the Dirichlet prior, c_T (2004, equation 14): the smallest
+    /// share of data of a component.
     pub complexity_prior: f32,
-    /// Variance of a new component, squared grey levels.
+    /// Squared grey levels.
     pub initial_variance: f32,
-    /// Smallest variance, squared grey levels.
+    /// Squared grey levels.
     pub min_variance: f32,
-    /// Largest variance, squared grey levels.
+    /// Squared grey levels.
     pub max_variance: f32,
-    /// Tells shadow from foreground; `None` calls both foreground.
+    /// Shadow test; `None` labels shadow as foreground.
     pub shadow: Option<ShadowSettings>,
 }
 
-/// Settings of the shadow test of a background model.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ShadowSettings {
-    /// The darkest shadow in proportion to the lit background, 0 to 1.
+    /// Darkest shadow relative to the lit background, 0 to 1.
     pub darkest: f32,
 }
 
 impl Settings {
-    /// The most components per pixel that the model's layout holds.
+    /// Capacity of the model's layout.
     pub const MAX_COMPONENTS: usize = 8;
 
-    /// Checks that the settings make sense.
-    ///
-    /// # Errors
-    /// [`SettingsError`] names the first setting that does not, its value and what it must be.
+    /// Errors: [`SettingsError`] with the first invalid setting, its value and range.
     pub fn check(&self) -> Result<(), SettingsError> {
         let require = |holds: bool, name: &'static str, value: f32, must: &'static str| {
             if holds { Ok(()) } else { Err(SettingsError { name, value, must }) }
@@ -84,8 +80,8 @@ impl Settings {
 }
 
 impl Default for Settings {
-    /// The papers' values where they give one (c_T 0.05, c_f 0.1, three and four standard deviations), and the
-    /// variances that are in common use with this model.
+    /// The papers' values (c_T 0.05, c_f 0.1, three and four standard deviations) and commonly used
+    /// variances.
     fn default() -> Self {
         Self {
             history_frames: 500,
@@ -102,15 +98,11 @@ impl Default for Settings {
     }
 }
 
-/// A setting that makes no sense.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("background model: {name} is {value}, but must be {must}")]
 pub struct SettingsError {
-    /// The setting's name.
     pub name: &'static str,
-    /// The value that was given.
     pub value: f32,
-    /// The values that it may have.
     pub must: &'static str,
 }
 

@@ -1,4 +1,4 @@
-//! Who is who: rows and columns paired at the least cost in all, by shortest augmenting paths (Kuhn 1955; Jonker and Volgenant, Computing 38,
+//! Minimum-cost assignment by shortest augmenting paths (Kuhn 1955; Jonker and Volgenant, Computing 38,
 //! 1987).
 
 use ndarray::{Array2, ArrayView2};

@@ -1,10 +1,10 @@
-//! The subject centred in a small square picture, as the thesis feeds its descriptor (Li 2014, section 9.3.1).
+//! The subject centred in a small square picture, as in Li 2014, section 9.3.1.
 
 use ndarray::{Array2, ArrayView2};
 
 use super::{BoundingBox, Mask};
 
-/// Side of the thesis' silhouettes, pixels.
+/// Side of the thesis' silhouettes.
 pub const SIDE_PX: usize = 100;
 
 /// The mask's bounding box scaled, its aspect kept, until the longer side fills a square of `side_px`, and centred in it.
@@ -16,7 +16,7 @@ pub fn centred(mask: ArrayView2<'_, bool>, side_px: usize) -> Option<Mask> {
     let bounds = BoundingBox::of(mask)?;
     let longest = bounds.height().max(bounds.width()) as f64;
     let scale = longest / side_px as f64;
-    // The square's corner in the image, so that the box lies in its middle.
+    // Corner of the square that centres the box.
     let top = bounds.top as f64 - 0.5 * (longest - bounds.height() as f64);
     let left = bounds.left as f64 - 0.5 * (longest - bounds.width() as f64);
     let rows: Vec<_> = (0..side_px).map(|at| weights(top + at as f64 * scale, scale, mask.nrows())).collect();
@@ -32,12 +32,12 @@ pub fn centred(mask: ArrayView2<'_, bool>, side_px: usize) -> Option<Mask> {
                 height * width
             })
             .sum();
-        // A hair of tolerance, so that a half-covered pixel does not hang on rounding.
+        // Tolerance, so that rounding does not decide half-covered pixels.
         covered >= half * (1.0 - 1e-9)
     }))
 }
 
-/// Pixels of an axis of `length` that the interval [start, start + extent) covers, each with how much of it.
+/// Pixels covered by the interval [start, start + extent), with their coverage.
 fn weights(start: f64, extent: f64, length: usize) -> Vec<(usize, f64)> {
     let first = start.max(0.0).floor() as usize;
     let last = (start + extent).ceil().max(0.0) as usize;

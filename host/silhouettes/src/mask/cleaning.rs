@@ -1,4 +1,4 @@
-//! Cleaning a raw foreground mask: specks off, cracks closed, small holes filled.
+//! Cleaning of a raw foreground mask: removes specks, closes gaps, fills small holes.
 
 use ndarray::ArrayView2;
 
@@ -8,20 +8,20 @@ use super::{
     regions::{Connectivity, regions},
 };
 
-/// How a mask is cleaned. Radii are those of squares of side 2 r + 1 pixels; 0 leaves a step out.
+/// Radii are those of squares of side 2 r + 1 pixels; 0 skips a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Cleaning {
-    /// What is thinner than 2 r + 1 pixels goes.
+    /// Thinner parts than 2 r + 1 pixels are removed.
     pub opening_radius_px: usize,
     /// Gaps narrower than 2 r + 1 pixels are closed.
     pub closing_radius_px: usize,
-    /// Enclosed holes up to this area are filled. Larger ones, as between arm and trunk, belong to the shape.
+    /// Largest filled hole; larger ones, as between arm and trunk, belong to the shape.
     pub largest_hole_px: usize,
 }
 
 impl Cleaning {
-    /// Settings for people in images of this (height, width): one pixel of opening, a closing of about 1/120 of the
-    /// height, holes up to 1/3000 of the image.
+    /// For people in images of this (height, width): opening 1 px, closing about 1/120 of the height, holes
+    /// up to 1/3000 of the image.
     #[must_use]
     pub fn for_size((height, width): (usize, usize)) -> Self {
         Self {
@@ -31,7 +31,7 @@ impl Cleaning {
         }
     }
 
-    /// The cleaned mask, of the same shape (height, width). Cost: one pass to pack, one to unpack, one to find holes.
+    /// Cleaned mask of shape (height, width). Cost: one pass each to pack, unpack and find holes.
     #[must_use]
     pub fn clean(&self, mask: ArrayView2<'_, bool>) -> Mask {
         let mut clean = if self.opening_radius_px == 0 && self.closing_radius_px == 0 {
@@ -44,7 +44,7 @@ impl Cleaning {
     }
 }
 
-/// Sets the pixels of holes up to `largest_px`: unset regions of 4-connected pixels that do not reach the image's edge.
+/// Fills 4-connected unset regions up to `largest_px` that do not touch the image's edge.
 pub fn fill_holes(mask: &mut Mask, largest_px: usize) {
     if largest_px == 0 {
         return;

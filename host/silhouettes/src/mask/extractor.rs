@@ -128,9 +128,7 @@ const ANEW: f32 = 1.0 / 15.0;
 
 impl Extractor {
     /// An extractor for frames like this one, which is not taken in yet.
-    ///
-    /// # Errors
-    /// [`BackgroundError`] for an empty frame or settings that make no sense.
+    /// Errors: [`BackgroundError`] for an empty frame or settings that make no sense.
     pub fn like(frame: Frame<'_>, settings: ExtractorSettings) -> Result<Self, BackgroundError> {
         Ok(Self {
             model: BackgroundModel::like(frame, settings.background.clone())?,
@@ -157,9 +155,7 @@ impl Extractor {
     }
 
     /// Takes in the next frame. Pixels that the background model calls shadow are not the subject's.
-    ///
-    /// # Errors
-    /// [`BackgroundError::Changed`] for a frame of another size or kind; the extractor is as before.
+    /// Errors: [`BackgroundError::Changed`] for a frame of another size or kind; the extractor is as before.
     pub fn extract(&mut self, frame: Frame<'_>) -> Result<Extracted, BackgroundError> {
         let Sighted { people, labels, shift } = self.sighted(frame)?;
         let mut subject = match people {

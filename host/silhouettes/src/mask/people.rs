@@ -1,4 +1,5 @@
-//! People in a cleaned mask: regions that are near and above one another are one person (a body broken by a belt or by bad contrast).
+//! People in a cleaned mask: nearby regions above one another are one person (split by a belt or low
+//! contrast).
 
 use ndarray::ArrayView2;
 
@@ -8,18 +9,18 @@ use super::{
     subject::SubjectSettings,
 };
 
-/// Fragments that are one person, or several who hide one another.
+/// Fragments of one person, or of several that occlude each other.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Person {
-    /// The connected regions.
+    /// Connected regions.
     pub fragments: Vec<Region>,
     pub area: usize,
-    /// The smallest box that holds them.
+    /// Smallest box that holds them.
     pub bounds: BoundingBox,
 }
 
 impl Person {
-    /// The mean of the pixels' centres as (row, column), pixels.
+    /// Mean of pixel centres as (row, column).
     #[must_use]
     pub fn centroid(&self) -> (f64, f64) {
         let mut mean = (0.0, 0.0);
@@ -31,7 +32,7 @@ impl Person {
         mean
     }
 
-    /// Only this person, in an image of shape (height, width).
+    /// Mask of this person, shape (height, width).
     #[must_use]
     pub fn mask(&self, size: (usize, usize)) -> Mask {
         let mut mask = Mask::from_elem(size, false);
@@ -40,7 +41,7 @@ impl Person {
     }
 }
 
-/// Groups of fragments that are large enough to be people, in no particular order. Cost: as [`regions`], then quadratic in fragments.
+/// Groups of fragments of a person's size, unordered. Cost: as [`regions`], then quadratic in fragments.
 #[must_use]
 pub fn people(mask: ArrayView2<'_, bool>, settings: &SubjectSettings) -> Vec<Person> {
     let mut people: Vec<Person> = Vec::new();
@@ -49,7 +50,7 @@ pub fn people(mask: ArrayView2<'_, bool>, settings: &SubjectSettings) -> Vec<Per
             continue;
         }
         let mut whole = Person { area: region.area, bounds: region.bounds, fragments: vec![region] };
-        // A fragment may join several groups into one, whose box may then reach further ones.
+        // A fragment may join several groups, whose box may reach further ones.
         while let Some(at) = people.iter().position(|other| one_person(other.bounds, whole.bounds, settings))
         {
             let other = people.swap_remove(at);
@@ -63,7 +64,7 @@ pub fn people(mask: ArrayView2<'_, bool>, settings: &SubjectSettings) -> Vec<Per
     people
 }
 
-/// Near each other, and one above the other: at least half of the narrower lies over or under the wider.
+/// Near each other and stacked: at least half of the narrower is over or under the wider.
 fn one_person(a: BoundingBox, b: BoundingBox, settings: &SubjectSettings) -> bool {
     let shared = a.right.min(b.right).saturating_sub(a.left.max(b.left));
     2 * shared >= a.width().min(b.width()) && a.gap(b) <= settings.widest_break_px

@@ -1,23 +1,20 @@
-//! Connected regions of a mask, by runs: each row's runs of set pixels are joined with the runs they touch in the row
-//! above (union and find), after He, Chao and Suzuki, "A run-based two-scan labeling algorithm", IEEE Transactions
-//! on Image Processing 17 (2008), 749-756.
+//! Connected regions by runs: each row's runs are joined with overlapping runs of the row above (union-find),
+//! after He, Chao and Suzuki, "A run-based two-scan labeling algorithm", IEEE Transactions on Image
+//! Processing 17 (2008), 749-756.
 //!
-//! Cost: linear in pixels to find the runs, nearly linear in runs to join them.
+//! Cost: linear in pixels, nearly linear in runs.
 
 use ndarray::ArrayView2;
 
 use super::{BoundingBox, Mask};
 
-/// Which neighbours hang together.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Connectivity {
-    /// Up, down, left and right.
     Four,
-    /// Those and the diagonals.
     Eight,
 }
 
-/// Neighbouring set pixels of one row; half open columns.
+/// Run of set pixels in a row, half-open columns.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Run {
     pub row: usize,
@@ -26,13 +23,12 @@ pub struct Run {
     pub end: usize,
 }
 
-/// A connected region.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Region {
-    /// Its pixels, row by row.
+    /// Pixels by rows.
     pub runs: Vec<Run>,
     pub area: usize,
-    /// The smallest box that holds them.
+    /// Smallest box that holds them.
     pub bounds: BoundingBox,
 }
 
@@ -49,7 +45,7 @@ impl Region {
         self.runs.push(run);
     }
 
-    /// The mean of its pixels' centres as (row, column), pixels.
+    /// Mean of pixel centres as (row, column).
     #[must_use]
     pub fn centroid(&self) -> (f64, f64) {
         let (mut rows, mut columns) = (0.0, 0.0);
@@ -61,7 +57,7 @@ impl Region {
         (rows / self.area as f64, columns / self.area as f64)
     }
 
-    /// Sets (or clears) its pixels in a mask of the image's shape.
+    /// Sets or clears its pixels.
     pub fn paint(&self, mask: &mut Mask, value: bool) {
         for run in &self.runs {
             mask.slice_mut(ndarray::s![run.row, run.start..run.end]).fill(value);
@@ -69,13 +65,13 @@ impl Region {
     }
 }
 
-/// The connected regions of `mask` where it equals `value`, in the order of their first pixels.
+/// Connected regions of `mask` with this `value`, in order of their first pixels.
 #[must_use]
 pub fn regions(mask: ArrayView2<'_, bool>, value: bool, connectivity: Connectivity) -> Vec<Region> {
     let reach = usize::from(connectivity == Connectivity::Eight);
     let mut runs: Vec<Run> = Vec::new();
     let mut parent: Vec<usize> = Vec::new();
-    // Runs of the row above begin here.
+    // First run of the row above.
     let mut above = 0;
     for (row, pixels) in mask.outer_iter().enumerate() {
         let here = runs.len();
@@ -94,7 +90,8 @@ pub fn regions(mask: ArrayView2<'_, bool>, value: bool, connectivity: Connectivi
             let run = Run { row, start, end: column };
             let label = runs.len();
             parent.push(label);
-            // Skip what ends before this run, join what overlaps; the last of them may touch the next run too.
+            // Skips runs that end before this one, joins overlapping ones; the last may touch the next run
+            // too.
             while candidate < here && runs[candidate].end + reach <= run.start {
                 candidate += 1;
             }
@@ -122,7 +119,7 @@ pub fn regions(mask: ArrayView2<'_, bool>, value: bool, connectivity: Connectivi
     found
 }
 
-/// The smallest label of a set, halving paths on the way.
+/// Root of a set, with path halving.
 fn find(parent: &mut [usize], mut label: usize) -> usize {
     while parent[label] != label {
         parent[label] = parent[parent[label]];
@@ -137,7 +134,7 @@ mod tests {
     use ndarray::{Array2, arr2};
     use proptest::prelude::*;
 
-    /// Region numbers by flooding from each pixel in turn.
+    /// Region numbers by flood fill.
     fn flooded(mask: &Array2<bool>, connectivity: Connectivity) -> Array2<usize> {
         let (height, width) = mask.dim();
         let mut labels = Array2::zeros(mask.dim());

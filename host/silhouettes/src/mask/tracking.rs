@@ -1,10 +1,10 @@
-//! Several people in one picture, each followed from frame to frame.
+//! Tracking of several people.
 //!
-//! Everybody moves as a filter expects that allows for changes of pace (Kalman 1960; constant velocity). Blobs of the mask ([`super::people`])
-//! are given to people at the least cost in all ([`super::assignment`]): how far they are from where somebody was expected, in spreads of
-//! that expectation, and how much higher or lower. Where people hide one another there is one blob for several: nobody's silhouette is in it, so
-//! nobody gets one, and all are said to be crossing. Where they part again they are told apart by how they moved; if the other way round would
-//! be nearly as likely the crossing counts as ambiguous.
+//! Each person has a constant-velocity Kalman filter. Blobs of the mask ([`super::people`]) are assigned at
+//! minimum cost ([`super::assignment`]): distance from the prediction in standard deviations, and height
+//! change. People who occlude each other share a blob, so none has a silhouette and all are reported as
+//! crossing. After separation they are identified by their motion; if the swap is nearly as likely, the
+//! crossing is ambiguous.
 
 mod motion;
 
@@ -18,14 +18,13 @@ use super::{
 };
 use motion::Motion;
 
-/// How people are followed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TrackingSettings {
-    /// What counts as a person.
+    /// Criteria of a person.
     pub subject: SubjectSettings,
-    /// Somebody new counts from so many frames on; before it may be a speck.
+    /// Frames before a new person is reported; earlier it may be a speck.
     pub confirmed_after_frames: usize,
-    /// Somebody who is not seen in so many frames has gone.
+    /// Frames without detection after which a person has left.
     pub gone_after_frames: usize,
 }
 
@@ -37,59 +36,58 @@ impl TrackingSettings {
     }
 }
 
-/// What is seen of somebody in a frame.
+/// Detection of a person in a frame.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Sight {
-    /// The silhouette, and whether it reaches the picture's edge.
+    /// A silhouette of its own.
     Alone {
-        /// Its pixels in the full frame.
+        /// Full-frame mask.
         mask: Mask,
         bounds: BoundingBox,
-        /// Part of it may be outside.
+        /// Touches the image's edge; part of it may be outside.
         cut_by_edge: bool,
-        /// Masks of the frames just before, in which nobody knew yet that this is a person.
+        /// Masks of the preceding frames, before confirmation.
         before: Vec<Mask>,
     },
     /// In one blob with these people.
     Crossing { with: Vec<usize>, bounds: BoundingBox },
-    /// Nowhere, for the moment.
+    /// Not detected in this frame.
     Missed,
 }
 
 #[derive(Clone, Debug, PartialEq)]
 pub struct Followed {
-    /// The person's number, from 1 in the order of coming.
+    /// Number from 1 in order of appearance.
     pub person: usize,
     pub sight: Sight,
     /// Crossings that have just ended.
     pub parted: Vec<Parting>,
 }
 
-/// The end of a crossing.
+/// End of a crossing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Parting {
     pub from: usize,
-    /// Whether the two might as well be each other.
+    /// Whether the two may be swapped.
     pub ambiguous: bool,
 }
 
-/// Costs beyond which a blob is not somebody's: five spreads.
+/// Largest cost of an assignment: five standard deviations.
 const GATE: f64 = 25.0;
-/// The other way round is ruled out from this cost on: odds of twenty to one.
+/// Cost from which a swap is ruled out: odds of twenty to one.
 const SURE: f64 = 6.0;
-/// Spread of the logarithm of a person's height from frame to frame.
+/// Standard deviation of log height from frame to frame.
 const HEIGHT_SPREAD: f64 = 0.2;
-/// So much of somebody's expected box lies in a blob that hides them.
+/// Share of a person's predicted box in a blob that occludes them.
 const HIDDEN: f64 = 0.4;
-/// A blob of up to so many times one person's area may well hold only one.
+/// A blob up to this multiple of a person's area may hold one person.
 const ONE_ALONE: f64 = 1.15;
-/// How fast usual sizes follow new ones.
+/// Adaptation rate of usual sizes.
 const FOLLOWING: f64 = 0.2;
 
-/// Somebody who is followed.
 #[derive(Clone, Debug)]
 struct Track {
-    /// 0 until it is known to be a person.
+    /// 0 until confirmed.
     person: usize,
     row: Motion,
     column: Motion,
@@ -99,7 +97,7 @@ struct Track {
     seen: usize,
     missed: usize,
     before: Vec<Mask>,
-    /// Whom it is or was crossing with, until they part.
+    /// People in the same crossing, until they separate.
     crossing: Vec<usize>,
 }
 
@@ -121,7 +119,7 @@ impl Track {
         }
     }
 
-    /// How unlikely a blob is, squared spreads.
+    /// Cost of a blob, squared standard deviations.
     fn cost(&self, blob: &Person) -> f64 {
         let (row, column) = blob.centroid();
         let of_place = |motion: &Motion, at: f64| (at - motion.at).powi(2) / motion.variance(self.height);
@@ -139,7 +137,7 @@ impl Track {
         follow(&mut self.area, blob.area as f64);
     }
 
-    /// Share of the expected box that lies in another.
+    /// Share of the predicted box that lies in another.
     fn covered_by(&self, bounds: BoundingBox) -> f64 {
         let shared = |at: f64, length: f64, low: usize, high: usize| {
             let (from, to) = (at - 0.5 * length, at + 0.5 * length);
@@ -150,7 +148,6 @@ impl Track {
     }
 }
 
-/// Follows everybody from frame to frame.
 #[derive(Clone, Debug)]
 pub struct Tracker {
     settings: TrackingSettings,
@@ -159,13 +156,12 @@ pub struct Tracker {
 }
 
 impl Tracker {
-    /// A tracker that has seen nobody yet.
     #[must_use]
     pub fn new(settings: TrackingSettings) -> Self {
         Self { settings, tracks: Vec::new(), people: 0 }
     }
 
-    /// Everybody in the next frame, from its cleaned mask of shape (height, width); those who have gone are left out.
+    /// All people in the next frame's cleaned mask of shape (height, width), without those who have left.
     pub fn follow(&mut self, mask: ArrayView2<'_, bool>) -> Vec<Followed> {
         let size = mask.dim();
         let blobs = people(mask, &self.settings.subject);
@@ -202,7 +198,8 @@ impl Tracker {
         found
     }
 
-    /// The blob that each track shares with others: who has no blob of their own but is expected inside one, and whose that is.
+    /// The blob that each track shares: for a track without its own blob that is predicted inside one, and
+    /// for the blob's owner.
     fn shared(&self, blobs: &[Person], blob_of: &[Option<usize>]) -> Vec<Option<usize>> {
         let mut shared = vec![None; self.tracks.len()];
         for (index, track) in self.tracks.iter().enumerate() {
@@ -219,7 +216,7 @@ impl Tracker {
                 shared[index] = *blob;
             }
         }
-        // Somebody alone in a blob that is not theirs is not sharing it.
+        // A single track in another's blob is not sharing it.
         let alone: Vec<usize> = (0..shared.len())
             .filter(|&index| {
                 shared[index].is_some() && shared.iter().filter(|other| **other == shared[index]).count() == 1
@@ -231,7 +228,7 @@ impl Tracker {
         shared
     }
 
-    /// What has parted from whom in this frame.
+    /// Crossings that end in this frame.
     fn partings(
         &mut self,
         costs: &Array2<f64>,
@@ -259,7 +256,7 @@ impl Tracker {
         partings
     }
 
-    /// What is seen of a track in its blob, together with others and perhaps hidden by them; the track learns from it.
+    /// Detection of a track in its blob, with others and possibly occluded; updates the track.
     fn sight(
         &mut self,
         index: usize,
@@ -274,7 +271,7 @@ impl Tracker {
         };
         let bounds = blob.bounds;
         if !together.is_empty() {
-            // In a blob no larger than one person the hidden one may have gone.
+            // In a blob no larger than one person the occluded one may have left.
             let gone = hidden && blob.area as f64 <= ONE_ALONE * track.area;
             track.missed = if gone { track.missed + 1 } else { 0 };
             track.row.keep_within(bounds.top, bounds.bottom);
@@ -309,7 +306,7 @@ mod tests {
 
     const SIZE: (usize, usize) = (120, 320);
 
-    /// Boxes by their left and top edges, 20 wide and as high as given.
+    /// Boxes by left and top edges, 20 wide with the given height.
     fn frame(boxes: &[(f64, usize, usize)]) -> Mask {
         let mut mask = Mask::from_elem(SIZE, false);
         for &(left, top, height) in boxes {
@@ -367,7 +364,7 @@ mod tests {
                 parted.extend(followed.parted.iter().map(|parting| (followed.person, *parting)));
             }
         }
-        // 20 wide and 8 nearer to each other in a frame: five frames of touching, for both.
+        // 20 wide and 8 closer per frame: five frames of contact each.
         assert!((6..=14).contains(&crossing), "{crossing}");
         let sure = |from: usize| Parting { from, ambiguous: false };
         assert_eq!(parted, [(1, sure(2)), (2, sure(1))]);
@@ -387,7 +384,7 @@ mod tests {
             let found =
                 tracker.follow(frame(&[(150.0 - 0.5 * gap, 20, 70), (150.0 + 0.5 * gap, 20, 70)]).view());
             parted.extend(found.iter().flat_map(|followed| followed.parted.clone()));
-            assert!(found.iter().all(|followed| followed.person <= 2), "frame {n}: nobody new");
+            assert!(found.iter().all(|followed| followed.person <= 2), "frame {n}: no new person");
         }
         assert_eq!(parted.len(), 2, "{parted:?}");
         assert!(parted.iter().all(|parting| parting.ambiguous), "{parted:?}");
@@ -412,6 +409,6 @@ mod tests {
         for _ in 0..4 {
             again = tracker.follow(frame(&[(100.0, 20, 70)]).view());
         }
-        assert_eq!(again[0].person, 2, "who comes back after long is somebody new");
+        assert_eq!(again[0].person, 2, "a person who returns late is new");
     }
 }

@@ -1,8 +1,8 @@
-//! BVH motion capture (Biovision hierarchical data): a skeleton and its joints' angles, turned into joints in space.
+//! BVH motion capture: a skeleton and joint angles, converted to joint positions.
 //!
-//! [`parse`] reads the text, [`kinematics`] puts the joints where the angles say, [`guess`] tells the unit and the axis that points
-//! up, which BVH files do not state. Every joint and every end site becomes a named point, visible in every frame, so that templates
-//! dress them as they dress markers. Cost: linear in the file.
+//! [`parse`] reads the text, [`kinematics`] computes positions, [`guess`] estimates the unit and the up axis,
+//! which BVH files do not state. Each joint and end site becomes a named point, visible in every frame. Cost:
+//! linear in the file.
 
 pub mod guess;
 pub mod kinematics;
@@ -12,7 +12,7 @@ use super::reader::Reader;
 use super::recording::{Found, RecordingError, text};
 use kinematics::Kinematics;
 
-/// The entry of [`super::READERS`].
+/// Entry of [`super::READERS`].
 pub const READER: Reader = Reader {
     name: "BVH",
     extensions: &["bvh"],
@@ -20,10 +20,7 @@ pub const READER: Reader = Reader {
     read,
 };
 
-/// Reads a BVH file.
-///
-/// # Errors
-/// [`RecordingError::Line`]: what stands there and what was expected.
+/// Errors: [`RecordingError::Line`] with what was found and expected.
 pub fn read(bytes: &[u8]) -> Result<Found, RecordingError> {
     let motion = parse::parse(&text(bytes)?)?;
     let kinematics = Kinematics::new(&motion);

@@ -1,17 +1,17 @@
-//! C3D motion-capture files (c3d.org user guide): the 3-D points of every frame.
+//! C3D motion capture (c3d.org user guide): 3-D points of every frame.
 //!
-//! Integer and floating-point data, Intel, DEC and SGI numbers. Analogue samples are read past. A point whose residual is
-//! negative was hidden. Nothing in a damaged file makes this panic or ask for more memory than the file holds.
+//! Integer and floating-point data; Intel, DEC and SGI numbers. Analogue samples are skipped. A negative
+//! residual means hidden. Damaged files cause neither panics nor allocations beyond their size.
 
 use super::reader::Reader;
 use super::recording::{Found, Known, RecordingError, Source, Unit, Up};
 use crate::silhouette::capsule::Point3;
 use std::collections::HashMap;
 
-/// Size of the blocks in which everything is counted.
+/// Block size of the format.
 const BLOCK: usize = 512;
 
-/// How numbers are stored.
+/// Number format.
 #[derive(Clone, Copy, PartialEq)]
 enum Processor {
     Intel,
@@ -46,27 +46,25 @@ impl File<'_> {
         Ok(match self.processor {
             Processor::Intel => f32::from_le_bytes(raw),
             Processor::Sgi => f32::from_be_bytes(raw),
-            // DEC's exponent counts two more, and its 16-bit halves are swapped.
+            // DEC exponents are two larger, and 16-bit halves are swapped.
             Processor::Dec => f32::from_le_bytes([raw[2], raw[3], raw[0], raw[1]]) / 4.0,
         })
     }
 }
 
-/// A parameter's dimensions and where its data stand.
+/// Dimensions and data offset of a parameter.
 struct Parameter {
     element: i8,
     dimensions: Vec<usize>,
     at: usize,
 }
 
-/// The entry of [`super::READERS`].
+/// Entry of [`super::READERS`].
 pub const READER: Reader =
     Reader { name: "C3D", extensions: &["c3d"], about: "Vicon and most other systems, z up", read };
 
-/// Reads the points of a C3D file. The file says nothing of its axes; nearly all have z up.
-///
-/// # Errors
-/// See [`RecordingError`]; a file without points is an error too.
+/// Reads the points. The axes are not stated; nearly all files have z up.
+/// Errors: [`RecordingError`], also for a file without points.
 pub fn read(bytes: &[u8]) -> Result<Found, RecordingError> {
     let (file, parameters_at) = opened(bytes)?;
     let parameters = parameters(&file, parameters_at + 4);
@@ -94,7 +92,7 @@ pub fn read(bytes: &[u8]) -> Result<Found, RecordingError> {
     })
 }
 
-/// Checks the key and the kind of processor; gives the file and where its parameters stand.
+/// Checks key and processor; returns the file and the offset of its parameters.
 fn opened(bytes: &[u8]) -> Result<(File<'_>, usize), RecordingError> {
     let bad = |reason: String| RecordingError::Kind { kind: "C3D", reason };
     let (first_block, magic) = match bytes {
@@ -118,13 +116,13 @@ fn opened(bytes: &[u8]) -> Result<(File<'_>, usize), RecordingError> {
     Ok((file, parameters_at))
 }
 
-/// What the header says of the frames.
+/// Frame layout from the header.
 struct Layout {
     points: usize,
-    /// Values of a frame that are not points.
+    /// Values per frame other than points.
     analogue: usize,
     frames_by_header: usize,
-    /// Of integer data, in units; negative for floating-point data.
+    /// Unit of integer data; negative for floating-point data.
     scale: f32,
     data_at: usize,
     rate_hz: f64,
@@ -147,14 +145,14 @@ impl Layout {
         })
     }
 
-    /// Bytes of a number and of a frame.
+    /// Bytes per number and per frame.
     fn sizes(&self) -> (usize, usize) {
         let size = if self.scale < 0.0 { 4 } else { 2 };
         (size, size * (4 * self.points + self.analogue))
     }
 
-    /// Frames to read, and what to report about them. The header counts in 16 bits, so that a longer recording wraps round, and some
-    /// programs trim only the header: the parameters say how many frames there are where they declare more, and there is room for them.
+    /// Frames to read, and remarks. The header's 16-bit count wraps, and some programs trim only the header:
+    /// a larger count in the parameters is used if the data suffice.
     fn count(&self, file: &File, declared: &[usize]) -> (usize, Vec<String>) {
         let (_, stride) = self.sizes();
         let bytes = file.bytes.len().saturating_sub(self.data_at);
@@ -181,7 +179,7 @@ impl Layout {
         (frames, remarks)
     }
 
-    /// The points of the first `frames` frames, in the file's unit.
+    /// Points of the first `frames` frames, file unit.
     fn frames(&self, file: &File, frames: usize) -> Result<Vec<Vec<Option<Point3>>>, RecordingError> {
         let (size, stride) = self.sizes();
         let room = file.bytes.len().saturating_sub(self.data_at) / stride;
@@ -199,7 +197,7 @@ impl Layout {
         (0..frames).map(frame).collect()
     }
 
-    /// The point at a place of the file: three coordinates and the residual, negative where it was hidden.
+    /// Point at an offset: coordinates and residual, negative if hidden.
     fn point(&self, file: &File, at: usize) -> Result<Option<Point3>, RecordingError> {
         let mut values = [0.0_f64; 4];
         for (k, value) in values.iter_mut().enumerate() {
@@ -216,8 +214,8 @@ impl Layout {
     }
 }
 
-/// Numbers of frames that parameters declare: `TRIAL:ACTUAL_START_FIELD` to `ACTUAL_END_FIELD` (two words each, the low one first) and
-/// `POINT:FRAMES`.
+/// Frame counts in parameters: `TRIAL:ACTUAL_START_FIELD` to `ACTUAL_END_FIELD` (two words each, low first)
+/// and `POINT:FRAMES`.
 fn declared_frames(file: &File, parameters: &HashMap<String, Parameter>) -> Vec<usize> {
     let word = |at: usize| file.word(at, "a parameter").ok().map(usize::from);
     let field = |name: &str| -> Option<usize> {
@@ -236,7 +234,7 @@ fn declared_frames(file: &File, parameters: &HashMap<String, Parameter>) -> Vec<
     trial.into_iter().chain(points).collect()
 }
 
-/// All parameters by `GROUP:NAME`; stops quietly where the section is damaged (points can be read without names).
+/// Parameters by `GROUP:NAME`; stops at damage, because points need no names.
 fn parameters(file: &File, start: usize) -> HashMap<String, Parameter> {
     let mut groups: HashMap<i8, String> = HashMap::new();
     let mut found: Vec<(i8, String, Parameter)> = Vec::new();
@@ -272,7 +270,7 @@ fn parameters(file: &File, start: usize) -> HashMap<String, Parameter> {
     found.into_iter().map(named).collect()
 }
 
-/// The rows of a character parameter, trimmed.
+/// Rows of a character parameter, trimmed.
 fn text_rows(file: &File, parameter: Option<&Parameter>) -> Vec<String> {
     let Some(parameter) = parameter.filter(|p| p.element == -1) else { return Vec::new() };
     let width = parameter.dimensions.first().copied().unwrap_or(1).max(1);

@@ -4,7 +4,7 @@ use super::reader::Reader;
 use super::recording::{Found, Known, RecordingError, Source, Unit, Up, text};
 use super::trc::point;
 
-/// The entry of [`super::READERS`].
+/// Entry of [`super::READERS`].
 pub const READER: Reader = Reader {
     name: "CSV",
     extensions: &["csv"],
@@ -12,10 +12,8 @@ pub const READER: Reader = Reader {
     read,
 };
 
-/// Reads such a table. First columns without a coordinate's ending (frame number, time) are ignored.
-///
-/// # Errors
-/// Columns that do not come as x, y, z of one marker, rows of another length, values that are not numbers; each with its line.
+/// Leading columns without a coordinate suffix (frame number, time) are ignored.
+/// Errors: incomplete x, y, z of a marker, rows of another length, invalid numbers, with their line.
 pub fn read(bytes: &[u8]) -> Result<Found, RecordingError> {
     let text = text(bytes)?;
     let mut lines =

@@ -1,10 +1,11 @@
-//! Joints of a Kinect as text, a frame a line: 20 joints of a first or 25 of a second one, each x, y, z in metres (x across, y up, z away
-//! from the sensor), with or without a number before them that counts frames (as UTKinect's `joints_s01_e01.txt`).
+//! Kinect joints as text, one frame per line: 20 joints of the first or 25 of the second generation, x, y, z
+//! in metres (x across, y up, z away from the sensor), with or without a frame number (as UTKinect's
+//! `joints_s01_e01.txt`).
 
 use super::reader::Reader;
 use super::recording::{Found, Known, RecordingError, Source, Unit, Up, text};
 
-/// The entry of [`super::READERS`].
+/// Entry of [`super::READERS`].
 pub const READER: Reader = Reader {
     name: "Kinect joints",
     extensions: &["txt"],
@@ -12,7 +13,7 @@ pub const READER: Reader = Reader {
     read,
 };
 
-/// The 25 joints of a second Kinect, the first 20 of them in the order of a first one's; a template knows both by these names.
+/// Joints of the second generation; the first 20 have the order of the first generation.
 pub const JOINTS_25: [&str; 25] = [
     "hip centre",
     "spine",
@@ -41,13 +42,9 @@ pub const JOINTS_25: [&str; 25] = [
     "right thumb",
 ];
 
-/// Frames per second of the sensor.
 const RATE_HZ: f64 = 30.0;
 
-/// Reads a file of joints.
-///
-/// # Errors
-/// [`RecordingError::Line`]: what stands there and what was expected.
+/// Errors: [`RecordingError::Line`] with what was found and expected.
 pub fn read(bytes: &[u8]) -> Result<Found, RecordingError> {
     let mut frames = Vec::new();
     let mut joints = None;
@@ -79,7 +76,7 @@ pub fn read(bytes: &[u8]) -> Result<Found, RecordingError> {
             return Err(wrong(format!("{found} joints, the lines before have others")));
         }
         let points = &numbers[numbers.len() % 3..];
-        // What the sensor did not find it puts at its own place.
+        // Joints that were not found are at the sensor's position.
         frames.push(
             points.chunks_exact(3).map(|p| p.iter().any(|v| *v != 0.0).then(|| [p[0], p[1], p[2]])).collect(),
         );
@@ -92,7 +89,7 @@ pub fn read(bytes: &[u8]) -> Result<Found, RecordingError> {
     };
     let mut names: Vec<String> = JOINTS_25.iter().take(joints).map(|name| (*name).to_owned()).collect();
     if joints == 20 {
-        // A first Kinect has no neck but a point between the shoulders.
+        // The first generation has no neck but a point between the shoulders.
         names[2] = JOINTS_25[20].into();
     }
     Ok(Found {

@@ -1,54 +1,47 @@
-//! MATLAB 5 MAT-files (MathWorks, "MAT-File Format", rev. 2016): numeric arrays and cell arrays, plain or zlib-compressed.
+//! MATLAB 5 MAT-files (MathWorks, "MAT-File Format", rev. 2016): numeric and cell arrays, plain or
+//! zlib-compressed.
 //!
-//! Enough for skeleton data sets, which keep one cell array of numeric arrays. Values come as f64 in MATLAB's order (first index
-//! fastest). Other classes (structs, strings, sparse) are read past and come as [`Array::Other`].
+//! Enough for skeleton data sets (a cell array of numeric arrays). f64 values in MATLAB's order (first index
+//! fastest). Other classes are skipped as [`Array::Other`].
 
 use flate2::read::ZlibDecoder;
 use std::io::Read;
 
-/// A MATLAB array.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Array {
-    /// Numbers, first index fastest.
+    /// First index fastest.
     Numeric {
-        /// Length of each dimension.
         dimensions: Vec<usize>,
-        /// As many values as the dimensions' product.
+        /// One value per element.
         values: Vec<f64>,
     },
-    /// Arrays of arrays, first index fastest.
+    /// First index fastest.
     Cell {
-        /// Length of each dimension.
         dimensions: Vec<usize>,
-        /// As many cells as the dimensions' product.
+        /// One array per cell.
         cells: Vec<Array>,
     },
-    /// A class that is not read, by its number.
+    /// Number of an unsupported class.
     Other(u8),
 }
 
-/// What is wrong with a MAT-file.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum MatlabError {
     #[error("not a MATLAB 5 MAT-file: {0}")]
     Header(&'static str),
-    /// The file ends within an element.
     #[error("the file ends within {what} at byte {at}")]
     Truncated {
         what: &'static str,
         /// Offset in the (decompressed) element.
         at: usize,
     },
-    /// Something that cannot be.
     #[error("{what} at byte {at} is {value}, which is not valid")]
     Invalid {
         what: &'static str,
-        /// The value that stands there.
         value: u64,
         /// Offset in the (decompressed) element.
         at: usize,
     },
-    /// The compressed data are damaged.
     #[error("damaged compressed data: {0}")]
     Compression(String),
 }
@@ -58,15 +51,13 @@ const MI_MATRIX: u32 = 14;
 const MI_COMPRESSED: u32 = 15;
 const CELL_CLASS: u8 = 1;
 const NUMERIC_CLASSES: std::ops::RangeInclusive<u8> = 6..=15;
-/// Cells within cells are read no deeper than this.
+/// Limit of nested cells.
 const DEEPEST: usize = 16;
-/// Compressed elements may grow to no more than this.
+/// Limit of decompressed elements.
 const LARGEST_BYTES: u64 = 1 << 30;
 
-/// All named variables of a file, in its order.
-///
-/// # Errors
-/// See [`MatlabError`].
+/// All named variables in file order.
+/// Errors: [`MatlabError`].
 pub fn read(bytes: &[u8]) -> Result<Vec<(String, Array)>, MatlabError> {
     const HEADER: usize = 128;
     let header = bytes.get(..HEADER).ok_or(MatlabError::Header("shorter than its 128-byte header"))?;
@@ -123,7 +114,7 @@ impl<'a> Cursor<'a> {
         Ok(if self.big_endian { u32::from_be_bytes(raw) } else { u32::from_le_bytes(raw) })
     }
 
-    /// Type and payload of the next element, in its long or small form, with the padding to 8 bytes read past.
+    /// Type and payload of the next element, long or small form; skips the padding to 8 bytes.
     fn element(&mut self, what: &'static str) -> Result<(u32, &'a [u8]), MatlabError> {
         let first = self.word(what)?;
         if first >> 16 != 0 {
@@ -146,7 +137,7 @@ impl<'a> Cursor<'a> {
     }
 }
 
-/// Name and content of a matrix element; `None` for the empty matrix that fills unset cells.
+/// Name and contents of a matrix element; `None` for an unset cell.
 fn matrix(mut cursor: Cursor, depth: usize) -> Result<Option<(String, Array)>, MatlabError> {
     if cursor.bytes.is_empty() {
         return Ok(None);
@@ -171,7 +162,7 @@ fn matrix(mut cursor: Cursor, depth: usize) -> Result<Option<(String, Array)>, M
     let count = dimensions.iter().try_fold(1_usize, |product, &d| product.checked_mul(d));
     let (_, name) = cursor.element("name")?;
     let name = String::from_utf8_lossy(name).into_owned();
-    // A value takes at least a byte and a cell eight, so no count can be larger than what is left.
+    // A value takes at least a byte, a cell eight: bounds the count.
     let count = count.filter(|&count| count <= cursor.bytes.len()).ok_or(MatlabError::Invalid {
         what: "number of values",
         value: count.unwrap_or(usize::MAX) as u64,
@@ -202,7 +193,7 @@ fn matrix(mut cursor: Cursor, depth: usize) -> Result<Option<(String, Array)>, M
     Ok(Some((name, Array::Other(class))))
 }
 
-/// Numbers of a storage type (MATLAB stores small whole numbers in the smallest type that holds them).
+/// Numbers of a storage type (MATLAB uses the smallest that fits).
 fn numbers(kind: u32, raw: &[u8], big_endian: bool, at: usize) -> Result<Vec<f64>, MatlabError> {
     macro_rules! as_f64 {
         ($type:ty) => {
@@ -238,7 +229,7 @@ fn numbers(kind: u32, raw: &[u8], big_endian: bool, at: usize) -> Result<Vec<f64
 mod tests {
     use super::*;
 
-    /// A numeric matrix element in long form.
+    /// Numeric matrix element, long form.
     fn numeric(name: &str, dimensions: &[i32], values: &[f64]) -> Vec<u8> {
         let mut body = Vec::new();
         let mut element = |kind: u32, data: &[u8]| {

@@ -27,9 +27,7 @@ const RATE_HZ: f64 = 30.0;
 type Body = Vec<Option<Point3>>;
 
 /// Reads a skeleton file.
-///
-/// # Errors
-/// [`RecordingError::Line`]: what stands there and what was expected.
+/// Errors: [`RecordingError::Line`]: what stands there and what was expected.
 pub fn read(bytes: &[u8]) -> Result<Found, RecordingError> {
     let content = text(bytes)?;
     let mut lines = Lines { lines: content.lines(), at: 0 };

@@ -32,9 +32,7 @@ impl Unit {
     pub const MM: Self = Self { mm: 1.0 };
 
     /// The unit of a name, as files write it: short or written out.
-    ///
-    /// # Errors
-    /// [`RecordingError::Unit`] for any other name.
+    /// Errors: [`RecordingError::Unit`] for any other name.
     pub fn named(name: &str) -> Result<Self, RecordingError> {
         let name = name.trim().trim_matches('\0').to_ascii_lowercase();
         let short = match name.as_str() {
@@ -333,9 +331,7 @@ pub enum RecordingError {
 }
 
 /// The text of a file without a byte-order mark. Bytes that are not UTF-8 are read as Latin-1, which older programs write.
-///
-/// # Errors
-/// Bytes that are neither, with the line of the first of them.
+/// Errors: Bytes that are neither, with the line of the first of them.
 pub(super) fn text(bytes: &[u8]) -> Result<Cow<'_, str>, RecordingError> {
     let control = |byte: &u8| byte.is_ascii_control() && !byte.is_ascii_whitespace();
     match std::str::from_utf8(bytes) {

@@ -1,22 +1,22 @@
-//! Body joints of skeleton data sets, and how to dress them with capsules.
+//! Joints of skeleton data sets as capsules.
 //!
-//! Clips come in the world frame of [`crate::silhouette`]: x right, y away from the sensor, z up, millimetres.
+//! Clips use the world frame of [`crate::silhouette`]: x right, y away from the sensor, z up, millimetres.
 
 use super::matlab::{self, Array, MatlabError};
 use crate::silhouette::capsule::{Capsule, Point3};
 
-/// Which joints there are and how thick the bones between them are.
+/// Joints and bone thickness.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Layout {
-    /// Joint names in file order.
+    /// Names in file order.
     pub joints: &'static [&'static str],
-    /// Bones: two joints and a radius in millimetres; equal joints make a ball.
+    /// Two joints and a radius in millimetres; equal joints make a ball.
     pub bones: &'static [(usize, usize, f64)],
     /// Millimetres per unit of the file.
     pub unit_mm: f64,
 }
 
-/// The 20 joints of a first Kinect, metres (as in UTKinect-Action3D).
+/// First-generation Kinect, metres (as in UTKinect-Action3D).
 pub const KINECT_20: Layout = Layout {
     joints: &[
         "hip centre",
@@ -64,7 +64,7 @@ pub const KINECT_20: Layout = Layout {
     unit_mm: 1000.0,
 };
 
-/// The 15 joints of the Florence 3D Actions set, millimetres.
+/// Florence 3D Actions, millimetres.
 pub const FLORENCE_15: Layout = Layout {
     joints: &[
         "head",
@@ -105,57 +105,40 @@ pub const FLORENCE_15: Layout = Layout {
     unit_mm: 1.0,
 };
 
-/// The activities of UTKinect-Action3D in file order.
+/// In file order.
 pub const UTKINECT_ACTIVITIES: [&str; 10] =
     ["walk", "sit down", "stand up", "pick up", "carry", "throw", "push", "pull", "wave hands", "clap hands"];
-/// The activities of Florence 3D Actions in file order.
+/// In file order.
 pub const FLORENCE_ACTIVITIES: [&str; 9] =
     ["wave", "drink", "answer phone", "clap", "tight lace", "sit down", "stand up", "read watch", "bow"];
 
-/// One performance of one activity.
+/// One performance of an activity.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SkeletonClip {
-    /// Its number, the first index of the cell array.
+    /// First index of the cell array, from 0.
     pub activity: usize,
-    /// Number of the person, the second index.
+    /// Second index.
     pub subject: usize,
-    /// Which of the person's performances, the third index.
+    /// Third index.
     pub repetition: usize,
-    /// Joints of every frame.
     pub frames: Vec<Vec<Point3>>,
 }
 
-/// Why a skeleton file could not be read.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum SkeletonError {
     #[error(transparent)]
     Matlab(#[from] MatlabError),
-    /// No cell array of the expected form.
     #[error("no cell array `data` of activities x subjects x repetitions in the file")]
     NoData,
-    /// A clip of another form.
     #[error(
         "clip (activity {activity}, subject {subject}, repetition {repetition}) is {found:?}, expected [3, {joints}, frames]"
     )]
-    Form {
-        /// First index of the cell.
-        activity: usize,
-        /// Second index of the cell.
-        subject: usize,
-        /// Third index of the cell.
-        repetition: usize,
-        /// Dimensions of the array in the cell.
-        found: Vec<usize>,
-        /// Joints that the layout has.
-        joints: usize,
-    },
+    Form { activity: usize, subject: usize, repetition: usize, found: Vec<usize>, joints: usize },
 }
 
-/// Reads a cell array `data{activity, subject, repetition}` of 3 x joints x frames arrays in a sensor's frame (x right, y up,
-/// z away); empty cells are performances that do not exist.
-///
-/// # Errors
-/// See [`SkeletonError`].
+/// Reads a cell array `data{activity, subject, repetition}` of 3 x joints x frames arrays in a sensor's frame
+/// (x right, y up, z away); empty cells are skipped.
+/// Errors: [`SkeletonError`].
 pub fn read_cells(bytes: &[u8], layout: &Layout) -> Result<Vec<SkeletonClip>, SkeletonError> {
     let variables = matlab::read(bytes)?;
     let found = variables.into_iter().find_map(|(name, array)| match array {
@@ -179,7 +162,7 @@ pub fn read_cells(bytes: &[u8], layout: &Layout) -> Result<Vec<SkeletonClip>, Sk
         if values.is_empty() {
             continue;
         }
-        // A single frame is saved without its third dimension.
+        // A single frame lacks the third dimension.
         if dimensions.len() < 2 || dimensions[0] != 3 || dimensions[1] != layout.joints.len() {
             return Err(form(dimensions));
         }
@@ -193,7 +176,7 @@ pub fn read_cells(bytes: &[u8], layout: &Layout) -> Result<Vec<SkeletonClip>, Sk
     Ok(clips)
 }
 
-/// The capsules of one frame's joints.
+/// Capsules of a frame's joints.
 pub fn dress(joints: &[Point3], layout: &Layout) -> Vec<Capsule> {
     layout
         .bones

@@ -4,14 +4,12 @@ use super::reader::Reader;
 use super::recording::{Found, Known, RecordingError, Source, Up, text};
 use crate::silhouette::capsule::Point3;
 
-/// The entry of [`super::READERS`].
+/// Entry of [`super::READERS`].
 pub const READER: Reader =
     Reader { name: "TRC", extensions: &["trc"], about: "Motion Analysis and OpenSim markers, y up", read };
 
-/// Reads a TRC file. OpenSim's and most others have y up.
-///
-/// # Errors
-/// Missing header lines, unknown units, rows of another length, values that are not numbers; each with its line.
+/// Most files, such as OpenSim's, have y up.
+/// Errors: missing header lines, unknown units, rows of another length, invalid numbers, with their line.
 pub fn read(bytes: &[u8]) -> Result<Found, RecordingError> {
     let text = text(bytes)?;
     let lines: Vec<&str> = text.lines().collect();
@@ -42,7 +40,7 @@ pub fn read(bytes: &[u8]) -> Result<Found, RecordingError> {
     };
     let unit = Found::stated_unit(value("Units")?);
     let (rate_hz, count) = (number("DataRate")?, number("NumMarkers")?);
-    // A name stands above the first of its three columns; Cortex leaves the names of unidentified trajectories out.
+    // A name is above the first of its three columns; Cortex omits names of unidentified trajectories.
     let cells: Vec<&str> = line(3)?.split('\t').skip(2).map(str::trim).collect();
     let all: Vec<(usize, String)> = (0..)
         .zip(cells.chunks(3))
@@ -68,7 +66,7 @@ pub fn read(bytes: &[u8]) -> Result<Found, RecordingError> {
         remarks.push(format!("{unnamed} of {count} trajectories have no name and are not read"));
     }
     let frames = rows(&lines, &places)?;
-    // Files without the number are read as far as they go; one that promises more was cut short.
+    // Without the number all frames are read; a larger promised number means truncation.
     if let Ok(promised) = number("NumFrames")
         && promised > frames.len() as f64
     {
@@ -86,11 +84,12 @@ pub fn read(bytes: &[u8]) -> Result<Found, RecordingError> {
     Ok(Found { names, rate_hz, frames, others: Vec::new(), planar: false, unit, up, remarks })
 }
 
-/// The frames of the lines after the header: number, time, then x, y and z of the markers at these places; missing cells at the end are hidden.
+/// Frames of the lines after the header: number, time, then x, y, z of the markers in these columns; missing
+/// cells at the end are hidden.
 fn rows(lines: &[&str], places: &[usize]) -> Result<Vec<Vec<Option<Point3>>>, RecordingError> {
     let mut frames = Vec::new();
     for (index, row) in lines.iter().enumerate().skip(5) {
-        // Trailing tabs are common; a row that is only white space separates header and data.
+        // Trailing tabs are common; a blank row separates header and data.
         let cells: Vec<&str> = row.trim_end_matches(['\t', '\r']).split('\t').collect();
         if row.trim().is_empty() {
             continue;
@@ -105,7 +104,7 @@ fn rows(lines: &[&str], places: &[usize]) -> Result<Vec<Vec<Option<Point3>>>, Re
     Ok(frames)
 }
 
-/// Three cells; one that is empty (or not a number) is a hidden marker.
+/// Three cells; an empty or invalid one is a hidden marker.
 pub(super) fn point(cells: [&str; 3], line: usize) -> Result<Option<Point3>, RecordingError> {
     if cells.iter().any(|cell| {
         cell.is_empty()

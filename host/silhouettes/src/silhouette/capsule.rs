@@ -1,25 +1,23 @@
-//! Bodies made of capsules: a cylinder with round ends about each bone, enough to dress joints with flesh.
+//! Capsules: cylinders with round ends around bones.
 
-/// A point in space, millimetres.
+/// Millimetres.
 pub type Point3 = [f64; 3];
 
-/// All points nearer than `radius_mm` to the segment from `from` to `to`.
+/// All points within `radius_mm` of the segment from `from` to `to`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Capsule {
     pub from: Point3,
-    /// The other end; equal to `from` it makes a sphere.
+    /// Equal to `from` for a sphere.
     pub to: Point3,
-    /// Radius in millimetres.
     pub radius_mm: f64,
 }
 
 impl Capsule {
-    /// From the ends of its axis and its radius.
     pub fn new(from: Point3, to: Point3, radius_mm: f64) -> Self {
         Self { from, to, radius_mm }
     }
 
-    /// Whether every number is finite and the radius not negative.
+    /// All numbers are finite and the radius is not negative.
     pub fn is_finite(&self) -> bool {
         self.from.iter().chain(&self.to).all(|v| v.is_finite()) && self.radius_mm >= 0.0
     }

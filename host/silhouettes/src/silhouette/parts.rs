@@ -1,8 +1,8 @@
-//! Silhouettes by parts: the markers of every part of the body, projected and filled (Li 2014, section 7.2.2).
+//! Silhouettes by parts: the markers of each body part, projected and filled (Li 2014, section 7.2.2).
 //!
-//! The thesis fills all triplets of a part's markers, so that a hidden marker leaves no hole. The union of all triangles over a set of
-//! points is the points' convex hull, so the hull gives the same picture in a fraction of the time. Both are here and are held against
-//! each other. Rigid parts leave gaps at joints: [`close`] fills them (21 pixels at 167 pixels per metre in the thesis).
+//! The thesis fills all triplets of a part's markers, so that hidden markers leave no hole. Their union is
+//! the convex hull, which is much faster; tests compare both. Gaps between rigid parts are filled by
+//! [`close`] (21 pixels at 167 pixels per metre in the thesis).
 
 use super::capsule::Point3;
 use super::raster::{Point, convex_hull, fill_convex, fill_discs_hull};
@@ -13,13 +13,13 @@ use ndarray::s;
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
 
-/// How a part is filled.
+/// Fill method of a part.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Fill {
     #[default]
     Hull,
-    /// All triplets, as printed.
+    /// All triplets, as in the thesis.
     Triplets,
 }
 
@@ -27,11 +27,11 @@ pub enum Fill {
 #[derive(Clone, Debug, PartialEq)]
 pub struct PartsSilhouette {
     pub mask: Mask,
-    /// Parts without a single visible marker: the picture lacks them.
+    /// Parts without a visible marker, missing in the picture.
     pub missing_parts: Vec<String>,
 }
 
-/// All visible template markers of frames in a view, for [`Canvas::fitting`], with room for the parts' thickness.
+/// Visible template markers of frames in a view, for [`Canvas::fitting`], with the parts' thickness.
 pub fn extent(frames: &[HashMap<&str, Point3>], template: &Template, view: &View) -> Vec<Point> {
     let mut points = Vec::new();
     for (frame, part) in frames.iter().flat_map(|frame| template.parts.iter().map(move |part| (frame, part)))
@@ -45,7 +45,6 @@ pub fn extent(frames: &[HashMap<&str, Point3>], template: &Template, view: &View
     points
 }
 
-/// Draws one frame's markers.
 pub fn draw(
     markers: &HashMap<&str, Point3>,
     template: &Template,
@@ -71,7 +70,7 @@ pub fn draw(
             Fill::Triplets => fill_triplets(&mut mask, &points),
         }
         if part.thickness_mm > 0.0 {
-            // Growing a hull by a radius is the union of its edges' capsules with it.
+            // A hull grown by a radius is its union with its edges' capsules.
             let radius = part.thickness_mm / canvas.mm_per_px;
             let hull = convex_hull(&points);
             for (i, &corner) in hull.iter().enumerate() {
@@ -95,13 +94,13 @@ fn fill_triplets(mask: &mut Mask, points: &[Point]) {
     }
 }
 
-/// Morphological closing by a square of `size_px` pixels (odd): gaps narrower than that are filled, the outline stays.
+/// Morphological closing by a square of `size_px` pixels (odd): fills narrower gaps, keeps the outline.
 pub fn close(mask: &Mask, size_px: usize) -> Mask {
     let half = size_px / 2;
     if half == 0 {
         return mask.clone();
     }
-    // A border of background keeps the picture's edge from being eaten or grown.
+    // A background border keeps the image's edge unchanged.
     let (height, width) = mask.dim();
     let inner = s![half..half + height, half..half + width];
     let mut wide = Mask::default((height + 2 * half, width + 2 * half));

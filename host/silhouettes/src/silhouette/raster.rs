@@ -1,10 +1,10 @@
-//! Filling convex shapes: hulls, triangles and the swept discs of capsules.
+//! Fills convex shapes: hulls, triangles and capsules.
 //!
-//! A pixel is set when its centre lies in the shape (edges included); cost is the number of rows plus the pixels set.
+//! A pixel is set if its centre is in the shape (edges included); cost: rows plus set pixels.
 
 use crate::mask::Mask;
 
-/// A point of the image plane, (x, y) in pixels, y down.
+/// (x, y) in pixels, y down.
 pub type Point = [f64; 2];
 
 /// Twice the signed area of the triangle a, b, c.
@@ -12,8 +12,7 @@ fn cross(a: Point, b: Point, c: Point) -> f64 {
     (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
 }
 
-/// Convex hull by Andrew's monotone chain, in order round the hull; points that are not finite are left out.
-/// O(n log n).
+/// Andrew's monotone chain, in order around the hull; ignores non-finite points. O(n log n).
 pub fn convex_hull(points: &[Point]) -> Vec<Point> {
     let mut sorted: Vec<Point> =
         points.iter().copied().filter(|p| p[0].is_finite() && p[1].is_finite()).collect();
@@ -38,10 +37,10 @@ pub fn convex_hull(points: &[Point]) -> Vec<Point> {
     hull
 }
 
-/// Sets the pixels whose centres lie in the convex polygon (corners in order, either sense); parts outside the mask are
-/// ignored. Polygons with one or two corners set the nearest pixels of that point or line.
+/// Sets pixels with centres in the convex polygon (either orientation), clipped to the mask. One or two
+/// corners set the nearest pixels of that point or line.
 pub fn fill_convex(mask: &mut Mask, polygon: &[Point]) {
-    /// Centres this near an edge count as inside, so that shared edges leave no seam.
+    /// Tolerance, so that shared edges leave no seam.
     const EDGE_PX: f64 = 1e-9;
     let (height, width) = mask.dim();
     if polygon.is_empty() || height == 0 || width == 0 {
@@ -83,14 +82,14 @@ pub fn fill_convex(mask: &mut Mask, polygon: &[Point]) {
     }
 }
 
-/// Sets the pixels nearest to a straight line.
+/// Sets the pixels nearest to a line.
 pub fn draw_line(mask: &mut Mask, a: Point, b: Point) {
     let (height, width) = mask.dim();
     let steps = (b[0] - a[0]).abs().max((b[1] - a[1]).abs()).ceil();
     if !steps.is_finite() {
         return;
     }
-    // A line far outside is only walked where it can touch the mask.
+    // A line far outside is followed only near the mask.
     let steps = steps.min(8.0 * (height + width) as f64);
     for step in 0..=steps as usize {
         let t = if steps > 0.0 { step as f64 / steps } else { 0.0 };
@@ -101,9 +100,9 @@ pub fn draw_line(mask: &mut Mask, a: Point, b: Point) {
     }
 }
 
-/// Sets the image of a capsule: the convex hull of two discs (centre, radius in pixels).
+/// Sets the image of a capsule: the hull of two discs (centre, radius in pixels).
 pub fn fill_discs_hull(mask: &mut Mask, a: (Point, f64), b: (Point, f64)) {
-    /// Corners per disc: a 24-gon lies within 0.9 % of the radius of the circle.
+    /// A 24-gon lies within 0.9 % of the radius of the circle.
     const CORNERS: usize = 24;
     let mut points = Vec::with_capacity(2 * CORNERS);
     for (centre, radius) in [a, b] {

@@ -1,11 +1,11 @@
-//! Thinning out a gallery: of many similar silhouettes the least alike stay (Li 2014, eq. 7.3 and 7.4).
+//! Thins a gallery to the least similar silhouettes (Li 2014, eq. 7.3 and 7.4).
 
 use crate::mask::Mask;
 use rayon::prelude::*;
 
-/// Which of many similar silhouettes to keep (Li 2014, eq. 7.3 and 7.4): the two most alike are found, one of them goes (in turn
-/// the first and the second), until `keep` are left. The printed method only strikes the removed silhouette's row; its column is
-/// struck too, else a removed silhouette could be removed again. Gives the kept indices in rising order. O(N^2 P / 64).
+/// Selects silhouettes (Li 2014, eq. 7.3 and 7.4): of the two most similar one is removed (alternately the
+/// first and the second), until `keep` remain. The printed method removes only the row; here the column too,
+/// otherwise it could be removed again. Returns ascending indices. O(N^2 P / 64).
 pub fn remove_redundant(masks: &[Mask], keep: usize) -> Vec<usize> {
     let n = masks.len();
     let packed: Vec<Vec<u64>> = masks
@@ -26,7 +26,7 @@ pub fn remove_redundant(masks: &[Mask], keep: usize) -> Vec<usize> {
     let matrix: Vec<Vec<u32>> =
         (0..n).into_par_iter().map(|a| (0..a).map(|b| difference(a, b)).collect()).collect();
     let mut alive = vec![true; n];
-    // The nearest lower-numbered living silhouette of each row; only rows that lose theirs are searched again.
+    // Nearest lower-numbered remaining silhouette per row; only rows that lose theirs are searched again.
     let nearest = |alive: &[bool], a: usize| (0..a).filter(|&b| alive[b]).min_by_key(|&b| matrix[a][b]);
     let mut best: Vec<Option<usize>> = (0..n).map(|a| nearest(&alive, a)).collect();
     let mut left = n;

@@ -76,9 +76,7 @@ fn listed(names: &[String]) -> String {
 
 impl Template {
     /// Reads and checks a template.
-    ///
-    /// # Errors
-    /// TOML errors, empty or doubled parts, negative thickness.
+    /// Errors: TOML errors, empty or doubled parts, negative thickness.
     pub fn parse(text: &str) -> Result<Self, TemplateError> {
         let template: Self =
             toml::from_str(text).map_err(|error| TemplateError::Syntax(error.to_string()))?;
@@ -144,9 +142,7 @@ impl Template {
     }
 
     /// A built-in template: one of [`Template::BUILT_IN`].
-    ///
-    /// # Errors
-    /// [`TemplateError::Name`] for any other name.
+    /// Errors: [`TemplateError::Name`] for any other name.
     pub fn named(name: &str) -> Result<Self, TemplateError> {
         match Self::BUILT_IN.iter().find(|(known, _)| *known == name) {
             Some((_, text)) => Self::parse(text),

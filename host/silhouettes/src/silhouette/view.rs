@@ -1,24 +1,23 @@
-//! Turning a body to a view and projecting it (Li 2014, eq. 7.1 and 7.2, with the last entry of Ry being cos beta).
+//! Rotation and projection to a view (Li 2014, eq. 7.1 and 7.2, with cos beta as the last entry of Ry).
 //!
-//! A point is turned by `Rx(alpha) Ry(beta) Rz(gamma)` and projected along y: the picture's x is the turned x, its height the turned z.
-//! `gamma` walks round the subject, `alpha` raises the camera.
+//! A point is rotated by `Rx(alpha) Ry(beta) Rz(gamma)` and projected along y: image x is the rotated x,
+//! image height the rotated z. `gamma` moves around the subject, `alpha` raises the camera.
 
 use super::capsule::{Capsule, Point3};
 use super::raster::{Point, fill_discs_hull};
 use crate::mask::Mask;
 use serde::{Deserialize, Serialize};
 
-/// A direction of view, degrees.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct View {
     /// About x: positive looks down on the subject.
     pub alpha_deg: f64,
     pub beta_deg: f64,
-    /// About z: round the subject.
+    /// About z: around the subject.
     pub gamma_deg: f64,
 }
 
-/// Views at equal steps round the subject from one elevation.
+/// Views at equal steps around the subject from one elevation.
 pub fn views_round(count: usize, elevation_deg: f64) -> Vec<View> {
     (0..count)
         .map(|i| View { alpha_deg: elevation_deg, beta_deg: 0.0, gamma_deg: 360.0 * i as f64 / count as f64 })
@@ -26,7 +25,7 @@ pub fn views_round(count: usize, elevation_deg: f64) -> Vec<View> {
 }
 
 impl View {
-    /// The matrix `Rx Ry Rz`.
+    /// `Rx Ry Rz`.
     pub fn matrix(&self) -> [[f64; 3]; 3] {
         let (sa, ca) = self.alpha_deg.to_radians().sin_cos();
         let (sb, cb) = self.beta_deg.to_radians().sin_cos();
@@ -37,7 +36,7 @@ impl View {
         product(&product(&rx, &ry), &rz)
     }
 
-    /// (x, z) of a point after turning, millimetres.
+    /// (x, z) of a rotated point, millimetres.
     pub fn project(&self, point: Point3) -> Point {
         project(&self.matrix(), point)
     }
@@ -47,29 +46,28 @@ fn product(a: &[[f64; 3]; 3], b: &[[f64; 3]; 3]) -> [[f64; 3]; 3] {
     std::array::from_fn(|i| std::array::from_fn(|j| (0..3).map(|k| a[i][k] * b[k][j]).sum()))
 }
 
-/// (x, z) of a point turned by a matrix.
+/// (x, z) of a point rotated by a matrix.
 pub(super) fn project(matrix: &[[f64; 3]; 3], p: Point3) -> Point {
     let along = |row: &[f64; 3]| row[0] * p[0] + row[1] * p[1] + row[2] * p[2];
     [along(&matrix[0]), along(&matrix[2])]
 }
 
-/// The picture that a view is drawn into: its size, scale, and which point of the view lies in its middle.
+/// Size, scale and centre of a picture.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Canvas {
     pub height_px: usize,
     pub width_px: usize,
     /// Millimetres per pixel: D in (7.2).
     pub mm_per_px: f64,
-    /// (x, z) in millimetres at the middle of the picture.
+    /// (x, z) in millimetres at the centre.
     pub middle_mm: Point,
 }
 
-/// No picture is made larger than this on a side.
+/// Largest side of a picture.
 const LARGEST_PX: usize = 8192;
 
 impl Canvas {
-    /// The smallest canvas that holds all points with `margin_px` to spare; `None` without finite points or where it would be
-    /// larger than 8192 pixels.
+    /// Smallest canvas for all points with `margin_px`; `None` without finite points or above 8192 pixels.
     pub fn fitting(points: &[Point], mm_per_px: f64, margin_px: usize) -> Option<Self> {
         let mut range = [[f64::INFINITY; 2], [f64::NEG_INFINITY; 2]];
         for p in points.iter().filter(|p| p[0].is_finite() && p[1].is_finite()) {
@@ -88,7 +86,6 @@ impl Canvas {
         })
     }
 
-    /// Pixel position of a projected point.
     pub fn pixel(&self, p: Point) -> Point {
         [
             0.5 * (self.width_px as f64 - 1.0) + (p[0] - self.middle_mm[0]) / self.mm_per_px,
@@ -96,13 +93,12 @@ impl Canvas {
         ]
     }
 
-    /// An empty mask of this size.
     pub fn blank(&self) -> Mask {
         Mask::default((self.height_px, self.width_px))
     }
 }
 
-/// The points that bound capsules in a view, for [`Canvas::fitting`].
+/// Bounding points of capsules in a view, for [`Canvas::fitting`].
 pub fn extent(capsules: &[Capsule], view: &View) -> Vec<Point> {
     let matrix = view.matrix();
     let mut points = Vec::with_capacity(4 * capsules.len());
@@ -116,7 +112,7 @@ pub fn extent(capsules: &[Capsule], view: &View) -> Vec<Point> {
     points
 }
 
-/// The silhouette of capsules in a view; capsules with numbers that are not finite (missing joints) are left out.
+/// Silhouette of capsules in a view; skips capsules with non-finite numbers (missing joints).
 pub fn draw(capsules: &[Capsule], view: &View, canvas: &Canvas) -> Mask {
     let matrix = view.matrix();
     let mut mask = canvas.blank();
@@ -141,7 +137,7 @@ mod tests {
                 let dot: f64 = (0..3).map(|k| m[i][k] * m[j][k]).sum();
                 assert!(
                     (dot - f64::from(u8::from(i == j))).abs() < 1e-12,
-                    "with cos alpha in Ry's corner it is none"
+                    "with cos alpha in Ry's corner it is not a rotation"
                 );
             }
         }

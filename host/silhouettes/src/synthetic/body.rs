@@ -1,19 +1,18 @@
-//! A jointed body of capsules posed by angles: the synthetic person.
+//! Synthetic person: a jointed body of capsules posed by angles.
 //!
-//! Proportions are fractions of stature after Winter (Biomechanics and Motor Control of Human Movement, fig. 4.1). Frame:
-//! x to the person's right, y forward, z up, millimetres, origin on the ground between the feet's mean position.
+//! Proportions after Winter (Biomechanics and Motor Control of Human Movement, fig. 4.1). Frame: x to the
+//! person's right, y forward, z up, millimetres, origin on the ground between the feet's mean position.
 
 use crate::silhouette::capsule::{Capsule, Point3};
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Build {
-    /// Stature in millimetres.
     pub height_mm: f64,
-    /// Girth relative to the average (1.0).
+    /// Relative to the average (1.0).
     pub girth: f64,
     /// Shoulder and hip width relative to the average (1.0).
     pub breadth: f64,
-    /// Leg length relative to the average (1.0); the trunk takes up the difference.
+    /// Relative to the average (1.0); the trunk compensates.
     pub leg: f64,
 }
 
@@ -23,7 +22,6 @@ impl Default for Build {
     }
 }
 
-/// Angles of one leg, degrees.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Leg {
     /// Thigh forward of the vertical.
@@ -32,17 +30,16 @@ pub struct Leg {
     pub spread_deg: f64,
 }
 
-/// Angles of one arm, degrees.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Arm {
     /// Upper arm forward of the trunk's axis (hanging = 0, straight ahead = 90, up = 180).
     pub shoulder_deg: f64,
     pub spread_deg: f64,
-    /// Elbow bend, forearm forwards.
+    /// Forearm forwards.
     pub elbow_deg: f64,
 }
 
-/// A whole pose; `[left, right]` where there are two.
+/// `[left, right]` for pairs.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Pose {
     /// Trunk forward of the vertical.
@@ -53,13 +50,12 @@ pub struct Pose {
     pub arms: [Arm; 2],
 }
 
-/// Joint positions of a posed person.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Joints {
     pub pelvis: Point3,
     pub neck: Point3,
     pub head: Point3,
-    /// Hips, left and right, as all pairs below.
+    /// [left, right], as all pairs.
     pub hips: [Point3; 2],
     pub knees: [Point3; 2],
     pub ankles: [Point3; 2],
@@ -73,14 +69,14 @@ fn add(a: Point3, b: Point3) -> Point3 {
     [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
 }
 
-/// `length` along a limb that hangs down, is swung forward by `forward` and out by `out` (to +x) degrees.
+/// Vector of a hanging limb after swinging forward and out (to +x).
 fn limb(length: f64, forward_deg: f64, out_deg: f64) -> Point3 {
     let (sf, cf) = forward_deg.to_radians().sin_cos();
     let (so, co) = out_deg.to_radians().sin_cos();
     [length * so, length * sf * co, -length * cf * co]
 }
 
-/// Poses a person: the lowest foot stands on the ground, the pelvis above the origin.
+/// The lowest foot is on the ground, the pelvis above the origin.
 pub fn joints(build: &Build, pose: &Pose) -> Joints {
     let h = build.height_mm;
     let (thigh, shank) = (0.245 * h * build.leg, 0.246 * h * build.leg);
@@ -109,7 +105,7 @@ pub fn joints(build: &Build, pose: &Pose) -> Joints {
         found.knees[side] = add(found.hips[side], limb(thigh, leg.hip_deg, sign * leg.spread_deg));
         let shank_deg = leg.hip_deg - leg.knee_deg;
         found.ankles[side] = add(found.knees[side], limb(shank, shank_deg, sign * leg.spread_deg));
-        // The foot stands at a right angle to the shank, flattened half-way towards the ground.
+        // The foot is perpendicular to the shank, tilted half-way to the ground.
         let (sf, cf) = (0.5 * shank_deg).to_radians().sin_cos();
         found.toes[side] = add(found.ankles[side], [0.0, 0.13 * h * cf, 0.13 * h * sf - 0.6 * ankle_height]);
         found.shoulders[side] = add(found.neck, [sign * shoulder_half, -0.01 * h * sl, -0.01 * h * cl]);
@@ -141,13 +137,12 @@ impl Joints {
         }
     }
 
-    /// Turns by `heading_deg` anticlockwise about the vertical, then moves by (x, y).
+    /// Rotates by `heading_deg` anticlockwise about the vertical, then moves by (x, y).
     pub fn place(&mut self, heading_deg: f64, at_mm: [f64; 2]) {
         let (s, c) = heading_deg.to_radians().sin_cos();
         self.each(|p| *p = [c * p[0] - s * p[1] + at_mm[0], s * p[0] + c * p[1] + at_mm[1], p[2]]);
     }
 
-    /// The body as capsules.
     pub fn capsules(&self, build: &Build) -> Vec<Capsule> {
         let unit = build.height_mm * build.girth;
         // A head is 0.124 of stature high and 0.097 wide: a capsule along the neck's axis.
@@ -172,12 +167,12 @@ impl Joints {
     }
 }
 
-/// One moment of walking; `phase` in turns (0 to 1 is a stride), `stride` scales all swings (1 = average).
+/// Pose in a walk; `phase` in strides (0 to 1), `stride` scales all swings (1 = average).
 pub fn walking(phase: f64, stride: f64) -> Pose {
     let mut pose = Pose { lean_deg: 4.0, ..Pose::default() };
     for side in 0..2 {
         let angle = std::f64::consts::TAU * (phase + 0.5 * side as f64);
-        // Knees bend most while the leg swings forward, a quarter of a stride after the thigh's backmost point.
+        // Knees bend most during the forward swing, a quarter of a stride after the thigh's backmost point.
         let swing = (angle + 0.35 * std::f64::consts::PI).sin().max(0.0);
         pose.legs[side] = Leg {
             hip_deg: stride * (24.0 * -angle.cos() + 5.0),

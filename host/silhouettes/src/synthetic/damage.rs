@@ -1,21 +1,18 @@
-//! Silhouettes as bad as segmentation makes them: heads and limbs cut off, holes, ragged outlines; seeded.
+//! Seeded damage to silhouettes as by bad segmentation: missing heads and limbs, holes, ragged outlines.
 
 use crate::mask::{BoundingBox, Mask, bits::BitMask};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-/// What is done to every mask.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Damage {
-    /// A gap at the neck (four frames in five), one across the body at any height (every other frame) and three holes of up to
-    /// 12 % of the height; one frame in ten loses up to a quarter of its width, as if the person were just coming into
-    /// the picture. Like the broken silhouettes of the KTH set.
+    /// A gap at the neck (four of five frames), one at any height (every other frame) and three holes of up
+    /// to 12 % of the height; one frame in ten loses up to a quarter of its width. Like the KTH set.
     Broken,
-    /// Every pixel within two of the outline turns into its opposite with a chance of 30 %.
+    /// Pixels within two of the outline are inverted with probability 30 %.
     Ragged,
 }
 
-/// The damaged copy of a mask.
 pub fn damaged(mask: &Mask, damage: Damage, seed: u64) -> Mask {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let Some(bounds) = BoundingBox::of(mask.view()) else { return mask.clone() };
@@ -102,7 +99,7 @@ mod tests {
         let whole = bar();
         let found = damaged(&whole, Damage::Ragged, 1);
         let changed = differs(&found, &whole);
-        // The outline is 2 (160 + 30) pixels long, four pixels thick, three in ten of them turn.
+        // The outline is 2 (160 + 30) pixels long and four thick; three in ten are inverted.
         assert!((350..600).contains(&changed), "{changed}");
         assert!(found[[100, 40]] && !found[[100, 10]]);
     }

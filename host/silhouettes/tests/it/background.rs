@@ -1,12 +1,12 @@
-//! The background model through its public face, on sequences whose truth is known, and against a plain
-//! transcription of the papers' equations.
+//! The background model on sequences with known truth, and compared with a direct transcription of the
+//! equations.
 
 use farnear_silhouettes::background::{BackgroundError, BackgroundModel, Frame, Label, Settings};
 use ndarray::{Array2, Array3};
 
 const SIZE: (usize, usize) = (60, 80);
 
-/// Reproducible noise, about Gaussian, of standard deviation `sd` grey levels.
+/// Repeatable, roughly Gaussian noise of standard deviation `sd` grey levels.
 struct Noise(u64);
 
 impl Noise {
@@ -39,10 +39,10 @@ fn a_moving_disc_is_found_over_noise_while_the_gain_drifts() {
     let mut model = BackgroundModel::new(SIZE, 1, Settings { shadow: None, ..Settings::default() }).unwrap();
     let (mut hit, mut missed, mut false_alarm) = (0, 0, 0);
     for frame in 0..200_usize {
-        // The light grows by a tenth over the sequence.
+        // Light increases by a tenth over the sequence.
         let gain = 1.0 + 0.1 * frame as f32 / 200.0;
-        // Two pixels a frame: on a pixel for 8 frames, fewer than make a component background; and only once, for
-        // what comes back again and again is background to a mixture.
+        // Two pixels a frame: 8 frames per pixel, too few for a background component; once only, because
+        // repeated motion becomes background.
         let (x, y) = (2 * frame as i32 - 310, 30);
         let inside = |row: usize, column: usize| (row as i32 - y).pow(2) + (column as i32 - x).pow(2) < 64;
         let picture = grey(&mut noise, 3.0, |row, column| {
@@ -104,7 +104,7 @@ fn what_stays_long_enough_becomes_background() {
         foreground.push(count(&labels, Label::Foreground));
     }
     assert!(foreground[0] > 390, "{}", foreground[0]);
-    // (1 - 1/100)^n < 0.9 first holds for n = 11 frames (Zivkovic 2004, after equation 9); some more for the prior.
+    // (1 - 1/100)^n < 0.9 first holds for n = 11 (Zivkovic 2004, after equation 9); a few more for the prior.
     assert!(foreground[8] > 390, "{foreground:?}");
     assert!(foreground[20] < 20, "{foreground:?}");
 }
@@ -128,9 +128,9 @@ fn a_darker_copy_is_shadow_and_another_colour_is_not() {
         .apply(Frame::Rgb(
             picture(&|row, column, channel, level| match (row, column) {
                 (0..20, 0..20) => 0.7 * level,
-                // As dark, but red turned to blue.
+                // As dark, but red becomes blue.
                 (0..20, 40..60) => 0.7 * lit(row, column, 2 - channel),
-                // Darker than any shadow that the settings allow.
+                // Darker than the permitted shadow.
                 (40..60, 0..20) => 0.3 * level,
                 _ => level,
             })
@@ -163,7 +163,7 @@ fn the_background_picture_is_the_empty_scene() {
         model.apply(Frame::Grey(picture.view())).unwrap();
     }
     for ((row, column, _), &level) in model.background().indexed_iter() {
-        // 2 grey levels of noise, averaged; the cast to whole levels takes off half of one.
+        // 2 grey levels of noise, averaged; truncation removes half a level.
         assert!((f32::from(level) - texture(row, column)).abs() <= 3.0, "row {row} column {column}: {level}");
     }
 }
@@ -199,7 +199,7 @@ fn odd_frames_are_refused_by_name() {
     assert_eq!(model.frames_seen(), 0);
 }
 
-/// One pixel's mixture, straight from the equations in f64: a list of (weight, mean, variance).
+/// One pixel's mixture by the equations in f64: (weight, mean, variance).
 #[derive(Default)]
 struct Plain(Vec<(f64, f64, f64)>);
 
@@ -247,7 +247,7 @@ fn the_kernel_agrees_with_the_equations_written_plainly() {
     let mut noise = Noise(7);
     let (mut differ, mut all) = (0_usize, 0_usize);
     for frame in 1..=150_u32 {
-        // Every pixel hops between levels at its own pace, so that components come, grow and go.
+        // Pixels alternate between levels at different rates, so components appear, grow and vanish.
         let picture = grey(&mut noise, 4.0, |row, column| {
             let pace = 2 + (row * 7 + column * 3) % 23;
             60.0 + 35.0 * ((frame as usize / pace + row) % 5) as f32
@@ -260,7 +260,7 @@ fn the_kernel_agrees_with_the_equations_written_plainly() {
             all += 1;
         }
     }
-    // f32 against f64 may differ where a distance lies on the threshold, or two weights are equal.
+    // f32 and f64 may differ at thresholds and for equal weights.
     assert!(differ * 1000 < all, "{differ} of {all} labels differ");
     let counts = model.components();
     let same = counts.iter().zip(&plain).filter(|(n, plain)| usize::from(**n) == plain.0.len()).count();

@@ -1,4 +1,4 @@
-//! BVH through the public face: a person made by hand walks and is seen; files damaged in seeded ways name the line.
+//! BVH through the public API: a synthetic walker, and damaged files that name the line.
 
 use crate::cases;
 use farnear_silhouettes::mask::{BoundingBox, area};
@@ -14,7 +14,8 @@ use farnear_silhouettes::silhouette::{
 use proptest::prelude::*;
 use std::fmt::Write;
 
-/// The walker's joints below the hips: name, depth in the tree, offset; the tree in the order of the file. `-` closes a chain with an end site.
+/// Walker's joints below the hips: name, tree depth, offset, in file order. `-` closes a chain with an end
+/// site.
 const TREE: [(&str, usize, [f64; 3]); 27] = [
     ("LHipJoint", 1, [0.0, 0.0, 0.0]),
     ("LeftUpLeg", 2, [1.7, -1.7, 0.4]),
@@ -45,8 +46,8 @@ const TREE: [(&str, usize, [f64; 3]); 27] = [
     ("-", 7, [-1.5, 0.0, 0.0]),
 ];
 
-/// A person of some 1.65 m in units of the CMU library (56.444 mm) with the joints of its BVH conversions, walking towards +z.
-/// Left is +x. Angles are in the library's order, Z, Y, X; a limb swings about x, forward is negative.
+/// A person of about 1.65 m in CMU units (56.444 mm) with its joints, walking towards +z. Left is +x. Angles
+/// in the order Z, Y, X; limbs swing about x, negative forward.
 fn walk(frames: usize) -> String {
     let mut text = "HIERARCHY\nROOT Hips\n{\n\tOFFSET 0 0 0\n\tCHANNELS 6 Xposition Yposition Zposition Zrotation Yrotation \
                     Xrotation \n"
@@ -73,7 +74,8 @@ fn walk(frames: usize) -> String {
         let phase = std::f64::consts::TAU * frame as f64 / 30.0;
         let _ = write!(text, "0 17.6 {:.4} 0 0 0", 0.8 * frame as f64);
         for (name, _, _) in TREE.iter().filter(|(name, _, _)| *name != "-") {
-            // Half a period apart: left and right legs, arms against legs. Arms hang down from the rest pose's spread.
+            // Left and right legs, and arms and legs, are half a period apart. Arms hang down from the rest
+            // pose.
             let side = if name.starts_with("Left") { 1.0 } else { -1.0 };
             let [z, y, x] = match &name[name.len().min(if side > 0.0 { 4 } else { 5 })..] {
                 "UpLeg" => [0.0, 0.0, -25.0 * side * phase.sin()],
@@ -130,7 +132,7 @@ fn feet_stay_under_the_body_and_the_caller_may_know_better() {
     for frame in 0..30 {
         let joints = walked.by_name(frame);
         let lowest = joints["LeftFoot"][2].min(joints["RightFoot"][2]);
-        // Hips 17.6 units up, legs of 16.6: an ankle stands within 8 cm of where a straight leg reaches.
+        // Hips at 17.6 units, legs of 16.6: an ankle is within 8 cm of a straight leg's reach.
         assert!((0.0..150.0).contains(&lowest) && joints["Head"][2] > 1200.0, "frame {frame}: {lowest}");
     }
     let told = read(Choices { unit: Some(Unit { mm: 10.0 }), up: Some(Up::Z), person: None });
@@ -177,7 +179,7 @@ proptest! {
             bytes[at] = *value;
         }
         names_a_line(&bytes);
-        // Whole words put in other words' places get further than bytes.
+        // Exchanged words reach further than random bytes.
         let text = String::from_utf8_lossy(&bytes).into_owned();
         let mut split: Vec<&str> = text.split(' ').collect();
         for (at, word) in &words {

@@ -1,4 +1,4 @@
-//! Files of every kind with words damaged, so that readers are reached beyond their first line; and what they let through is used.
+//! Files of every kind with damaged words, to reach beyond the first line; accepted results are used.
 
 use crate::cases;
 use farnear_silhouettes::readers::{self, c3d, csv, kinect, matlab, ntu, recording::Choices, trc};
@@ -60,7 +60,8 @@ proptest! {
 
     #[test]
     fn binary_files_with_their_own_beginning_are_read_or_refused(mut bytes in proptest::collection::vec(any::<u8>(), 600..3000), blocks in 0..6_u8) {
-        // C3D: parameters in block 2, the key 0x50, a processor; MATLAB 5: 124 bytes of text, version, byte order.
+        // C3D: parameters in block 2, the key 0x50, a processor; MATLAB 5: 124 bytes of text, version, byte
+        // order.
         bytes[..4].copy_from_slice(&[2, 0x50, blocks, 0]);
         bytes[512..516].copy_from_slice(&[1, 0x50, blocks, 84]);
         let _ = c3d::read(&bytes);

@@ -1,4 +1,4 @@
-//! Behaviour through the public face, in one program: every program of tests costs a link.
+//! Public API tests in one binary.
 
 mod background;
 mod bvh;
@@ -7,7 +7,7 @@ mod long_c3d;
 mod readers;
 mod standing;
 
-/// Cases of a property: few in every test run, as many as asked for when fuzzing.
+/// Number of property cases: few by default, more for fuzzing.
 fn cases(usual: u32) -> u32 {
     std::env::var("PROPTEST_CASES").ok().and_then(|text| text.parse().ok()).unwrap_or(usual)
 }

@@ -1,4 +1,4 @@
-//! Readers on real recordings, and on the same recordings damaged in seeded ways.
+//! Readers on real recordings, and on damaged copies.
 
 use crate::cases;
 use farnear_silhouettes::mask::area;
@@ -44,7 +44,7 @@ fn a_real_c3d_walk_makes_silhouettes_from_eight_views() {
         let drawn = draw(&frame, &template, &view, &canvas, Fill::Hull);
         assert!(drawn.missing_parts.is_empty(), "{:?}", drawn.missing_parts);
         let mask = close(&drawn.mask, 21);
-        // A person covers between 0.25 and 1.6 square metres of a picture.
+        // A person covers between 0.25 and 1.6 square metres.
         let square_metres = area(mask.view()) as f64 * 36e-6;
         assert!((0.25..1.6).contains(&square_metres), "{square_metres}");
     }
@@ -60,8 +60,7 @@ fn other_c3d_and_trc_recordings_are_read() {
         assert_eq!(recording.names.len(), 51);
         assert!(recording.frames.len() > 100);
         let first = recording.by_name(0)["C7"];
-        // The file is in metres with y up: a neck stands 1.4 m above the ground, 1.8 m at the top
-        // of a drop jump's box.
+        // In metres with y up: a neck is 1.4 m above the ground, 1.8 m on a drop jump's box.
         assert!((1200.0..1900.0).contains(&first[2]), "{first:?}");
     }
 }
@@ -96,7 +95,7 @@ fn truncated_recordings_are_errors_not_panics() {
 #[test]
 #[cfg_attr(not(shared_data), ignore = "needs the real data beside the repository")]
 fn damaged_recordings_never_panic() {
-    // The header and parameter blocks decide everything: damage is aimed there.
+    // Header and parameter blocks decide everything, so damage is placed there.
     let mut motion = shared("mocap/nick_freeform_001.c3d");
     motion.truncate(60_000);
     let mut joints = shared("skeletons/Florence_3D_Action_Skeletons.mat");
@@ -155,7 +154,7 @@ fn unknown_markers_are_named() {
     assert!(Template::parse("name = 'x'\n[[part]]\nname = 'head'\nmarkers = []\n").is_err());
 }
 
-/// A whole small C3D file: one marker, two frames of floating-point data, its label and unit.
+/// A complete small C3D file: one marker, two float frames, label and unit.
 fn small_c3d() -> Vec<u8> {
     let mut bytes = vec![0_u8; 4 * 512];
     bytes[..2].copy_from_slice(&[2, 0x50]);
@@ -190,7 +189,7 @@ fn a_small_c3d_file_is_read_as_written() {
 }
 
 const TRC: &str = "PathFileType\t4\t(X/Y/Z)\tx.trc\nDataRate\tNumMarkers\tUnits\n100\t2\tm\nFrame#\tTime\tA\t\t\tB\n\t\tX1\tY1\tZ1\tX2\tY2\tZ2\n\n1\t0\t0.1\t0.2\t0.3\t\t\t\n2\t0.01\t1\t2\t3\t4\t5\t6\n";
-/// A header that promises more frames than there are tells of a copy that was cut short.
+/// A header with more frames than present means truncation.
 #[test]
 fn a_trc_file_cut_short_is_refused_with_both_numbers() {
     let promising = |frames: &str| {
@@ -198,7 +197,7 @@ fn a_trc_file_cut_short_is_refused_with_both_numbers() {
         keys.replace("100\t2\tm", &format!("100\t{frames}\t2\tm"))
     };
     assert_eq!(trc::read(promising("2").as_bytes()).expect("whole").frames.len(), 2);
-    // Fewer than there are, or no number at all, does no harm.
+    // Fewer frames, or no number, are accepted.
     assert!(trc::read(promising("1").as_bytes()).is_ok() && trc::read(promising("?").as_bytes()).is_ok());
     let error = trc::read(promising("139").as_bytes()).expect_err("cut short").to_string();
     assert!(error.contains("139") && error.contains("ends after 2") && error.contains("line 3"), "{error}");

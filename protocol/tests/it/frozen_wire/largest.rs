@@ -1,4 +1,4 @@
-//! Every message at its largest fits a frame.
+//! The largest form of every message fits a frame.
 
 use farnear_protocol::{
     BoardMicros, Call, Event, EventKind, LOG_BYTES_MAX, Log, Micros, Nanometres, Request, Response,
@@ -16,7 +16,7 @@ const NM: Nanometres = Nanometres(i32::MIN);
 const US: Micros = Micros(u32::MAX);
 const TIME: BoardMicros = BoardMicros(u64::MAX);
 
-/// The frame's length; all its numbers at their longest.
+/// Frame length with all numbers at their longest.
 #[track_caller]
 fn length<T: Serialize>(kind: Kind, message: &T) -> usize {
     let header = Header { version: 255, kind, id: u32::MAX, boot: u32::MAX };
@@ -25,19 +25,18 @@ fn length<T: Serialize>(kind: Kind, message: &T) -> usize {
     frame.len()
 }
 
-/// The same of a request.
 #[track_caller]
 fn asked_length(request: Request) -> usize {
     length(Kind::Request, &Call { session: u32::MAX, request })
 }
 
 #[test]
-fn rows_and_coefficients_fill_a_frame_and_do_not_burst_it() {
+fn rows_and_coefficients_fill_but_never_exceed_a_frame() {
     let codes = Codes::from_slice(&[i16::MIN; CODES_MAX]).expect("that many");
     let bits = CoefficientBits::from_slice(&[i32::MIN; COEFFICIENTS_MAX]).expect("that many");
     let (row, first, step, truth) = (u16::MAX, u16::MAX, u16::MAX, i16::MIN);
     let samples = asked_length(Request::FitSamples { row, first, step, truth, codes: codes.clone() });
-    // One more code could be three bytes longer, and would no longer be sure to fit.
+    // One more code could exceed the frame.
     assert!(samples + 3 > BODY_MAX, "{samples}: the message could take more codes");
     asked_length(Request::PutRow { first, codes: codes.clone() });
     asked_length(Request::PutCoefficients { first: 255, bits: bits.clone() });
@@ -48,7 +47,7 @@ fn rows_and_coefficients_fill_a_frame_and_do_not_burst_it() {
 }
 
 #[test]
-fn the_long_answers_fit() {
+fn the_longest_answers_fit() {
     let axis = AxisStatus {
         state: PositionState::Lost,
         asked: NM,
@@ -154,7 +153,7 @@ fn an_event_fits_an_answer_too() {
 }
 
 #[test]
-fn the_long_questions_fit() {
+fn the_longest_requests_fit() {
     let deviations = QueryDeviations {
         day_e3: u32::MAX,
         time_s: u32::MAX,

@@ -1,4 +1,4 @@
-//! What messages are made of: one of each, and that no variant is missing.
+//! One of each message part; checks that no variant is missing.
 
 use farnear_protocol::{
     BoardMicros, Micros, Nanometres,
@@ -168,11 +168,11 @@ fn enums_without_fields_keep_their_order() {
 }
 
 #[test]
-fn settings_keep_the_names_that_files_know_them_by() {
+fn settings_keep_their_names_in_files() {
     let names = SettingKey::ALL.map(SettingKey::name);
     assert_eq!((names[0], names[7], names[22]), ("datum_nm", "coarse_backlash_nm", "strobe_deadline_us"));
     for (key, name) in SettingKey::ALL.iter().zip(names) {
-        // The name is the variant's own, in snake case: none can be exchanged with its neighbour's.
+        // Names equal the variants in snake case, so that no two can be swapped.
         let variant = format!("{key:?}").to_lowercase();
         assert_eq!(name.replace('_', ""), variant);
     }

@@ -1,8 +1,9 @@
 //! # farnear-count
 //!
-//! Counts the cycles of the on-board routines, one after the other, with interrupts off. It is built like the firmware
-//! (same profile, same target) and made for the emulated board, where one instruction takes one cycle; on a real board it
-//! counts the flash's wait states too. `farnear-sim count` runs it and reads [`FARNEAR_COUNTS`].
+//! Counts the cycles of on-board routines with interrupts off. Built like the firmware for the emulated
+//! board, where an
+//! instruction takes one cycle; a real board adds flash wait states. `farnear-sim count` runs it and reads
+//! [`FARNEAR_COUNTS`].
 #![no_std]
 #![no_main]
 #![allow(unsafe_code, reason = "the names of two statics, by which the emulated board's side finds them")]
@@ -22,7 +23,7 @@ use self::rig::Work;
 mod maths;
 mod rig;
 
-/// A routine, and how many of its units a run of it does.
+/// A routine, and its units per run.
 #[repr(C)]
 pub struct Routine {
     name: *const u8,
@@ -84,14 +85,14 @@ pub static FARNEAR_ROUTINES: [Routine; ROUTINES] = [
     Routine::new("start of the rig from its memory", "start", 1, rig::start),
 ];
 
-/// Cycles of each, for all its units; written as each ends, so the last is not 0 when all are done.
+/// Cycles of each routine for all units, written as each ends: a non-zero last entry means that all are done.
 // SAFETY: no other symbol has this name.
 #[unsafe(no_mangle)]
 pub static FARNEAR_COUNTS: [AtomicU32; ROUTINES] = [const { AtomicU32::new(0) }; ROUTINES];
 
 #[entry]
 fn main() -> ! {
-    // At the firmware's clock: the emulated core's instructions come at that rate, whatever the clock.
+    // The firmware's clock; emulated instructions run at that rate in any case.
     let _peripherals = embassy_stm32::init(clock_tree::config(false));
     if let Some(mut core) = Peripherals::take() {
         core.DCB.enable_trace();
@@ -107,7 +108,7 @@ fn main() -> ! {
     }
 }
 
-/// Cycles that `work` takes, less what counting takes.
+/// Cycles of `work` without the counting overhead.
 #[inline(never)]
 fn cycles<T>(mut work: impl FnMut() -> T) -> u32 {
     let begin = DWT::cycle_count();
@@ -118,13 +119,13 @@ fn cycles<T>(mut work: impl FnMut() -> T) -> u32 {
 }
 
 fn fail() -> ! {
-    // The counts stay 0, and whoever waits for them says so.
+    // The counts stay 0, which the reader reports.
     loop {
         cortex_m::asm::wfi();
     }
 }
 
-/// Nobody reads a log here, but embassy writes one.
+/// Discards embassy's log.
 #[defmt::global_logger]
 struct Silence;
 

@@ -1,4 +1,4 @@
-//! The mathematics: depth correction and its fit, sun and shadow.
+//! Depth correction and its fit, sun and shadow.
 
 use core::hint::black_box;
 
@@ -14,16 +14,16 @@ use farnear_maths::{
 
 use crate::{cycles, fail};
 
-/// A row of the camera.
+/// Pixels of a camera row.
 const WIDTH: usize = 640;
 const HEIGHT: u16 = 480;
 pub const PIXELS: u32 = WIDTH as u32;
-/// A row in the middle of a region, so that tables are made already.
+/// A row inside a region, so that tables exist already.
 pub const FIRST_ROW: u16 = 100;
-/// Pixels of a fit's row.
+/// Pixels per row of a fit.
 pub const SAMPLES: u32 = 80;
 
-/// A small generator of repeatable numbers (Marsaglia, xorshift, 2003).
+/// Repeatable numbers (Marsaglia, xorshift, 2003).
 struct Numbers(u32);
 
 impl Numbers {
@@ -34,12 +34,12 @@ impl Numbers {
         self.0
     }
 
-    /// A depth code well inside the scale.
+    /// Well inside the scale.
     fn code(&mut self) -> i16 {
         (self.next() >> 16) as i16 / 2
     }
 
-    /// A small coefficient, as a correction has.
+    /// A realistically small coefficient.
     fn coefficient(&mut self) -> Coefficient {
         Coefficient::from_bits(self.next() as i32 >> 8).unwrap_or_default()
     }
@@ -72,7 +72,7 @@ pub enum Form {
     Full,
 }
 
-/// Two rows; counts the second.
+/// Counts the second of two rows.
 pub fn of_rows(form: Form, first: u16) -> u32 {
     let mut numbers = Numbers(1);
     let mut row: [i16; WIDTH] = core::array::from_fn(|_| numbers.code());
@@ -98,7 +98,7 @@ pub fn of_rows(form: Form, first: u16) -> u32 {
     }
 }
 
-/// Rows of flat targets at six depths, with a little noise, all over the frame.
+/// Noisy rows of flat targets at six depths over the frame.
 fn targets(mut add: impl FnMut(u16, Columns, &[i16], i16)) {
     let mut numbers = Numbers(3);
     for depth in 0..6 {

@@ -1,4 +1,4 @@
-//! The link's frames and the rig's control tick.
+//! Link frames and the rig's control tick.
 
 use core::hint::black_box;
 
@@ -31,7 +31,7 @@ pub fn frame_encoded() -> u32 {
     cycles(|| encode(HEADER, &event))
 }
 
-/// Per byte: the whole of it divided by its length.
+/// Per byte: the total divided by the length.
 pub fn frame_received() -> u32 {
     let Some(bytes) = encode(HEADER, &event()) else { fail() };
     let mut decoder = Decoder::new();
@@ -59,7 +59,7 @@ fn identity() -> Identity {
     }
 }
 
-/// Without a memory: what is written to it is not counted.
+/// Memory writes are not counted.
 const WITHOUT_MEMORY: Settings = Settings { memory: false, ..Settings::DEFAULT };
 
 pub fn tick_at_rest() -> u32 {
@@ -81,7 +81,7 @@ pub enum Work {
     Fine,
 }
 
-/// A motor that is where its pulses take it, with its home switch at 0.
+/// A motor that follows its pulses, with its home switch at 0.
 struct Motor {
     queue: heapless::Deque<Segment, 8>,
     left: u32,
@@ -136,7 +136,7 @@ impl Motor {
     }
 }
 
-/// A piezo that swings at its 200 Hz, damped by 0.03: one that does not is none, and the board would open its loop.
+/// A piezo with its 200 Hz resonance, damping 0.03; otherwise the rig would open its loop.
 #[derive(Default)]
 struct Piezo {
     /// In nm.
@@ -146,7 +146,7 @@ struct Piezo {
 
 impl Piezo {
     fn run(&mut self, code: u16) {
-        // A tick of 0.2 ms is 0.2513 rad; the damping of that is its factor 0.9925.
+        // A tick of 0.2 ms is 0.2513 rad; the damping factor is 0.9925.
         const COS: f32 = 0.9925 * 0.9686;
         const SIN: f32 = 0.9925 * 0.2487;
         let drive = f32::from(code) * 3.052;
@@ -155,7 +155,7 @@ impl Piezo {
     }
 }
 
-/// A rig with hardware that does what it is told.
+/// A rig with ideal hardware.
 struct Bench {
     rig: Rig,
     now: u64,
@@ -194,7 +194,7 @@ impl Bench {
         while self.rig.transmit().is_some() {}
     }
 
-    /// Sends a request; gives the cycles of its last byte, of carrying it out, and of its answer's frame.
+    /// Cycles of a request's last byte, its execution, and its answer's frame.
     fn ask(&mut self, request: &Request) -> [u32; 3] {
         self.id += 1;
         let header = Header { version: PROTOCOL_CURRENT, kind: Kind::Request, id: self.id, boot: 1 };
@@ -226,7 +226,7 @@ fn go(axis: Axis, nm: i32) -> Request {
     Request::Move { axis, target: Nanometres(nm), silence: SILENCE }
 }
 
-/// The longest tick of half a second of moves, which take all phases of the ramps.
+/// The longest tick of half a second of moves with all ramp phases.
 pub fn longest_tick(works: &[Work]) -> u32 {
     let mut bench = Bench::new();
     for work in works {
@@ -256,7 +256,7 @@ pub fn longest_tick(works: &[Work]) -> u32 {
     bench.longest
 }
 
-/// A step of a move request: its last byte, carrying it out, its answer's frame.
+/// Step of a move request: last byte, execution, or answer's frame.
 pub fn move_request(step: usize) -> u32 {
     let mut bench = Bench::new();
     bench.home(Axis::SensorCoarse);

@@ -1,4 +1,4 @@
-//! The records against torn writes, flipped bits and a worn-out cell.
+//! Records with torn writes, flipped bits and a worn-out cell.
 
 use std::boxed::Box;
 use std::vec::Vec as List;
@@ -12,7 +12,7 @@ fn blank() -> Memory {
     Box::new([0; MEMORY_BYTES])
 }
 
-/// The blocks of a record in its `version`th state.
+/// Blocks of a record in state `version`.
 fn state(version: u8) -> impl Fn(RecordName, usize) -> Block {
     move |record, index| {
         let mut block = [version; BLOCK];
@@ -22,7 +22,7 @@ fn state(version: u8) -> impl Fn(RecordName, usize) -> Block {
     }
 }
 
-/// Every write that it takes to store a record.
+/// All writes of a record.
 fn writes(store: &mut Store, record: RecordName, version: u8) -> List<MemoryWrite> {
     store.mark(record);
     let mut writes = List::new();
@@ -41,7 +41,7 @@ fn apply(memory: &mut Memory, writes: &[MemoryWrite]) {
     }
 }
 
-/// The version of the state that is read back, and whether a bad copy was found.
+/// Version that is read back, and whether a damaged copy was found.
 fn read(memory: &Memory, record: RecordName) -> Option<(u8, bool)> {
     match record::find(memory, record) {
         Found::Good { copy, repaired, .. } => {
@@ -121,7 +121,7 @@ fn a_write_torn_at_any_byte_leaves_the_copy_before() {
                 bytes.len()
             );
             if found == Some((2, true)) {
-                // It is written anew after the reset, and is good again.
+                // Rewritten after the reset and valid again.
                 let mut store = Store::new(&torn);
                 assert!(!store.is_idle());
                 let mut mended = torn.clone();

@@ -1,4 +1,4 @@
-//! What a stepper axis is watched for: counts, and whether steps, encoder, switches and driver agree.
+//! Supervision of a stepper axis: counts, encoder, switches, driver.
 
 use farnear_protocol::Nanometres;
 use farnear_protocol::message::{Failure, PositionState};
@@ -9,7 +9,7 @@ use crate::motion::steps;
 use crate::motion::switch::Place;
 
 impl Stepper {
-    /// Reads the board; finds faults.
+    /// Reads the board; detects faults.
     pub(crate) fn sense(&mut self, inputs: &MotorInputs) {
         self.encoder = inputs.encoder_counts;
         self.driver_fault = inputs.driver_fault;
@@ -21,7 +21,7 @@ impl Stepper {
             *ticks += 1;
             let late = *ticks * TICK_US > self.settings.pulse_deadline.0;
             if late && !inputs.stepper.idle {
-                // A timer that does not end its segment cannot be trusted to stop: without current nothing moves.
+                // A timer that does not finish its segment may not stop; without current nothing moves.
                 self.enabled = false;
                 self.lose();
             }
@@ -41,7 +41,7 @@ impl Stepper {
         }
     }
 
-    /// Takes the timer's count over; gives whether it moved on.
+    /// Updates the count; returns whether it advanced.
     fn count(&mut self, stepper: &StepperState) -> bool {
         let new = stepper.pulses.wrapping_sub(self.pulses.unwrap_or(stepper.pulses));
         self.pulses = Some(stepper.pulses);
@@ -65,7 +65,7 @@ impl Stepper {
         new > 0
     }
 
-    /// Whether all was planned, played and counted.
+    /// All pulses were planned, played and counted.
     fn has_ended(&self, stepper: &StepperState) -> bool {
         matches!(&self.motion, Motion::Stepping { ramp, .. } if ramp.remaining() == 0)
             && self.outstanding.is_empty()
@@ -75,11 +75,11 @@ impl Stepper {
     fn find_fault(&mut self, inputs: &MotorInputs, progressed: bool) -> Option<Failure> {
         let resting = matches!(self.motion, Motion::Still | Motion::Preparing { .. });
         if resting && self.state != PositionState::Homed {
-            // Nothing is known that could be lost: a motor that was stopped from full speed rolls on, and one that gets
-            // its current back is pulled to the next phase.
+            // No position to lose: a stopped motor may roll on, and a re-energised one snaps to the next
+            // phase.
             self.follow_encoder();
         } else if let Some(error) = self.following_error() {
-            // Left over from a homing that came to nothing it counts for nothing.
+            // Irrelevant after a failed homing.
             if resting || self.falling == 0 || self.purpose != Purpose::SeekHome {
                 return Some(Failure::Following { error });
             }
@@ -92,7 +92,7 @@ impl Stepper {
         match &mut self.motion {
             Motion::Stepping { ramp, quiet_ticks } => {
                 *quiet_ticks = if progressed || !waiting { 0 } else { *quiet_ticks + 1 };
-                // Dry too early, silent too long, or more or fewer pulses than ordered.
+                // Underrun, silence, or a wrong number of pulses.
                 let silent = *quiet_ticks * TICK_US > self.settings.pulse_deadline.0;
                 let short = inputs.stepper.idle && (waiting || (ramp.has_begun() && ramp.remaining() > 0));
                 let over = !waiting && self.counted_of_oldest > 0;
@@ -110,8 +110,8 @@ impl Stepper {
         (self.home_closed() && outside && self.purpose != Purpose::SeekHome).then_some(Failure::HomeSwitch)
     }
 
-    /// How far the encoder is from where the pulses may have brought the motor, where that is too far. Without
-    /// current nothing holds the motor, so before the first motion nothing is compared.
+    /// Encoder deviation from the possible motor positions, if too large. Not checked before the first
+    /// motion, because an unpowered motor may be moved.
     fn following_error(&self) -> Option<Nanometres> {
         if !self.enabled {
             return None;
@@ -126,14 +126,14 @@ impl Stepper {
         (error.saturating_abs() > self.settings.following.0).then_some(Nanometres(error))
     }
 
-    /// Throws the motion away.
+    /// Aborts the motion.
     fn fail(&mut self, fault: Failure) {
-        // Where steps and encoder may disagree, the position is lost at rest too.
+        // If steps and encoder may disagree, the position is also lost at rest.
         if matches!(fault, Failure::Following { .. } | Failure::DriverFault | Failure::StepUnderrun) {
             self.lose();
         }
         self.abort();
-        // A driver in distress gets no current; a motor that was blocked stays where it is and is believed.
+        // No current for a faulty driver; a blocked motor stays where the encoder says.
         self.enabled = !matches!(fault, Failure::DriverFault) && self.enabled;
         self.fault = Some(fault);
         if self.is_still() {
@@ -141,14 +141,14 @@ impl Stepper {
         }
     }
 
-    /// Steps and encoder can no longer be trusted to agree.
+    /// Steps and encoder may disagree.
     pub(super) const fn lose(&mut self) {
         if matches!(self.state, PositionState::Homed) {
             self.state = PositionState::Lost;
         }
     }
 
-    /// After an abort: nothing is under way, and what was lost is what the encoder says.
+    /// After an abort: nothing is outstanding, and a lost position is the encoder's.
     fn settle_accounts(&mut self) {
         self.motion = Motion::Still;
         self.outstanding.clear();

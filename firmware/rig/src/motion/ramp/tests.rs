@@ -1,4 +1,4 @@
-//! The planner against its limits: any way, any limits, a stop at any moment.
+//! The planner at its limits: any distance and limits, a stop at any time.
 
 use std::vec::Vec;
 
@@ -8,7 +8,7 @@ use proptest::prelude::*;
 const LIMITS: RampLimits =
     RampLimits { start_speed: 1_000, speed: 40_000, acceleration: 320_000, jerk: 10_240_000 };
 
-/// A played segment: when it ended, how long it took, pulses so far, its speed.
+/// A played segment: end, duration, total pulses, speed.
 #[derive(Clone, Copy, Debug)]
 struct Played {
     end_s: f64,
@@ -17,7 +17,7 @@ struct Played {
     speed: f64,
 }
 
-/// Plays a ramp, perhaps stops it, and checks each segment against the limits.
+/// Plays a ramp, optionally stops it, and checks each segment.
 fn play(mut ramp: Ramp, limits: RampLimits, stop_after: Option<usize>) -> Vec<Played> {
     let (mut pulses, mut time, mut ended) = (0u32, 0.0, false);
     let mut played = Vec::new();
@@ -45,8 +45,8 @@ fn play(mut ramp: Ramp, limits: RampLimits, stop_after: Option<usize>) -> Vec<Pl
     played
 }
 
-/// The mean speeds of neighbours are reached in the time between their middles; whole ticks shift a speed by up to
-/// v^2 / timer clock. First and last segment go at the start speed, and what their own length adds to it.
+/// Mean speeds of neighbours are reached between their middles; whole ticks change a speed by up to v^2 /
+/// timer clock. First and last segment have the start speed and the gain of their own length.
 fn accelerations(played: &[Played], limits: RampLimits) {
     let rounding = |speed: f64| 1.0 + speed * speed / f64::from(STEP_TIMER_HZ);
     let most = f64::from(limits.acceleration);
@@ -70,8 +70,8 @@ fn pulses(played: &[Played]) -> u32 {
 fn the_whole_travel_takes_what_the_seven_phases_take() {
     let played = play(Ramp::new(83_200, LIMITS), LIMITS, None);
     assert_eq!(pulses(&played), 83_200);
-    // Way / top speed + top speed / acceleration + acceleration / jerk = 2.08 + 0.125 + 0.031 s; the start speed saves
-    // up to 6 ms.
+    // Distance / top speed + top speed / acceleration + acceleration / jerk = 2.08 + 0.125 + 0.031 s; the
+    // start speed saves up to 6 ms.
     let time = played.last().map_or(0.0, |last| last.end_s);
     assert!((time - 2.236).abs() < 0.008, "{time}");
 }
@@ -80,7 +80,7 @@ fn the_whole_travel_takes_what_the_seven_phases_take() {
 fn the_played_speed_keeps_the_jerk() {
     for way in [40, 900, 5_000, 83_200] {
         let played = play(Ramp::new(way, LIMITS), LIMITS, None);
-        // Positions every 8 ms, by interpolation within a segment, and their third differences.
+        // Positions every 8 ms by interpolation, and their third differences.
         let position = |at: f64| {
             let index = played.iter().position(|segment| segment.end_s > at)?;
             let (segment, before) = (played[index], index.checked_sub(1).map_or(0, |i| played[i].pulses));
@@ -91,7 +91,7 @@ fn the_played_speed_keeps_the_jerk() {
         let samples: Vec<f64> = (0..).map_while(|i| position(f64::from(i) * step)).collect();
         for four in samples.windows(4) {
             let jerk = (four[3] - 3.0 * four[2] + 3.0 * four[1] - four[0]) / step.powi(3);
-            // A tick of rounding at 40 kHz is 0.3 pulses in 8 ms, a pulse's place in a slow segment half of one.
+            // A tick of rounding at 40 kHz is 0.3 pulses in 8 ms, a pulse in a slow segment half of one.
             assert!(jerk.abs() <= f64::from(LIMITS.jerk) + 2.4 / step.powi(3), "{jerk} on a way of {way}");
         }
     }
@@ -121,7 +121,7 @@ fn limits() -> impl Strategy<Value = RampLimits> {
     )
 }
 
-/// As the ramp sees them.
+/// Limits as applied by the ramp.
 fn effective(limits: RampLimits) -> RampLimits {
     let start_speed = limits.start_speed.max(1_000);
     RampLimits { start_speed, speed: limits.speed.max(start_speed), ..limits }

@@ -1,4 +1,4 @@
-//! Which processor a rig gets, and what it is told.
+//! Reuse of processors and the calls that they receive.
 
 use std::sync::Arc;
 
@@ -9,7 +9,7 @@ use rigless::{
 
 use super::*;
 
-/// A processor that notes what it is asked. Its state is the number that it was reset or loaded with.
+/// Records its calls. Its state is the number that it was reset or loaded with.
 #[derive(Debug)]
 struct Noting {
     state: u8,
@@ -18,7 +18,7 @@ struct Noting {
 
 impl Noting {
     fn note(&self, what: &str) {
-        self.notes.lock().expect("nobody panics").push(what.into());
+        self.notes.lock().expect("not poisoned").push(what.into());
     }
 }
 
@@ -51,7 +51,7 @@ impl Processor for Noting {
     }
 
     fn data_model(&self) -> DataModel {
-        unreachable!("nobody reads its structures")
+        unreachable!("not used here")
     }
 
     fn byte_order(&self, _: u64) -> Endian {
@@ -68,35 +68,31 @@ impl Processor for Noting {
     }
 }
 
-/// A processor for this program, and what those that were made for it have noted.
+/// A processor for this program, and the calls of all processors made for it.
 fn rig(program: u64) -> (Translated, Arc<Mutex<Vec<String>>>) {
     let notes: Arc<Mutex<Vec<String>>> = Arc::default();
     let of_each = Arc::clone(&notes);
     let make = move || {
-        of_each.lock().expect("nobody panics").push("made".into());
+        of_each.lock().expect("not poisoned").push("made".into());
         Ok(Box::new(Noting { state: 7, notes: Arc::clone(&of_each) }) as Box<dyn Processor>)
     };
     (Translated::new(program, make).expect("it is made"), notes)
 }
 
 fn taken(notes: &Arc<Mutex<Vec<String>>>) -> Vec<String> {
-    std::mem::take(&mut notes.lock().expect("nobody panics"))
+    std::mem::take(&mut notes.lock().expect("not poisoned"))
 }
 
 #[test]
-fn the_next_rig_with_the_same_program_gets_the_processor_as_it_began() {
+fn reuses_the_processor_for_the_next_rig_with_the_same_program() {
     let (mut first, notes) = rig(1);
     first.load(&[142]).expect("a state");
     first.ask(Queued::Route(0x4000));
     assert_eq!(taken(&notes), ["made", "made", "Route(16384)"]);
     drop(first);
-    let told = taken(&notes);
-    assert_eq!(told[0], "Unroute(16384)");
-    assert_eq!(
-        told.len(),
-        1 + RAM.len(),
-        "what was translated from memory that programs write goes: {told:?}"
-    );
+    let calls = taken(&notes);
+    assert_eq!(calls[0], "Unroute(16384)");
+    assert_eq!(calls.len(), 1 + RAM.len(), "translations of RAM are dropped: {calls:?}");
 
     let (other, others) = rig(2);
     assert_eq!((other.pc(), taken(&others).len()), (7, 2), "another program has its own");
@@ -110,7 +106,7 @@ fn the_next_rig_with_the_same_program_gets_the_processor_as_it_began() {
 }
 
 #[test]
-fn a_reset_is_worked_out_on_the_twin() {
+fn computes_a_reset_on_the_twin() {
     let (mut rig, notes) = rig(3);
     rig.load(&[50]).expect("a state");
     taken(&notes);
@@ -123,7 +119,7 @@ fn a_reset_is_worked_out_on_the_twin() {
 }
 
 #[test]
-fn laying_the_same_program_into_the_flash_drops_nothing_and_any_later_write_does() {
+fn loading_the_same_program_keeps_translations_and_later_writes_drop_them() {
     let (mut rig, notes) = rig(4);
     taken(&notes);
     rig.ask(Queued::Invalidate(0x0800_0000, 0x0810_0000));

@@ -1,4 +1,4 @@
-//! What can be set of a camera: within which range, and among which choices.
+//! Ranges and choices of camera settings.
 
 use aravis::{Auto, prelude::*};
 
@@ -19,7 +19,7 @@ impl GenicamCamera {
         if !range.has(value) {
             return Err(wrong(format!("expected {range}")));
         }
-        // What the camera would do by itself is turned off; a camera without it needs nothing.
+        // Automatic modes are switched off; a camera without them needs nothing.
         let set = match setting {
             Setting::ExposureUs(_) => {
                 let _ = self.camera.set_exposure_time_auto(Auto::Off);
@@ -34,7 +34,7 @@ impl GenicamCamera {
         set.map_err(self.failed())
     }
 
-    /// The range of a number, where the camera has it.
+    /// Range of a number, if available.
     pub(super) fn range(&self, setting: &Setting) -> Option<Range> {
         let camera = &self.camera;
         let (bounds, unit) = match setting {
@@ -47,7 +47,7 @@ impl GenicamCamera {
         Some(Range::Number { min, max, unit })
     }
 
-    /// By name, because the bindings' own question says yes to whatever is absent without an error.
+    /// Checked by name, because the bindings report success for absent features.
     fn has_black_level(&self) -> bool {
         ["BlackLevel", "BlackLevelRaw"]
             .iter()

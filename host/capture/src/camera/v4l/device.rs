@@ -1,4 +1,4 @@
-//! A Video4Linux device, streaming from memory that the driver maps.
+//! A streaming Video4Linux device with mapped buffers.
 
 use std::{
     io,
@@ -33,9 +33,8 @@ use crate::{
     describe::trigger_name,
 };
 
-/// Buffers that the driver fills in turn.
 const BUFFERS: u32 = 4;
-/// `poll` tells of a frame that is ready by this bit, on every Linux.
+/// Flag of `poll` for a ready frame on every Linux.
 const POLLIN: i16 = 1;
 
 // linux/v4l2-controls.h.
@@ -49,7 +48,6 @@ const ANALOGUE_GAIN: u32 = 0x009e_0903;
 const BLACK_LEVEL: u32 = 0x0098_090b;
 const BRIGHTNESS: u32 = 0x0098_0900; // what webcams have for it
 
-/// A device that is open.
 pub struct V4lCamera {
     path: PathBuf,
     device: Device,
@@ -57,16 +55,14 @@ pub struct V4lCamera {
     width: usize,
     height: usize,
     stride: usize,
-    /// Runs once armed or watched.
+    /// Present while armed or watched.
     stream: Option<Stream<'static>>,
     pairing: Pairing,
 }
 
 impl V4lCamera {
-    /// Opens e.g. `/dev/video0` with its best format, at the size that the driver has set.
-    ///
-    /// # Errors
-    /// [`CameraError::Unusable`] with what to do.
+    /// Opens e.g. `/dev/video0` with its best format at the driver's size.
+    /// Errors: [`CameraError::Unusable`] with a remedy.
     pub fn open(path: &Path) -> Result<Self, CameraError> {
         check_path(path)?;
         let failed = |error: io::Error| refused(path, &error);
@@ -74,7 +70,10 @@ impl V4lCamera {
         let capabilities = device.query_caps().map_err(failed)?.capabilities;
         let needed = capability::Flags::VIDEO_CAPTURE | capability::Flags::STREAMING;
         if !capabilities.contains(needed) {
-            return Err(unusable(path, format!("it gives no pictures of its own; it can {capabilities}")));
+            return Err(unusable(
+                path,
+                format!("it does not capture pictures; its capabilities: {capabilities}"),
+            ));
         }
         let offered: Vec<[u8; 4]> =
             device.enum_formats().map_err(failed)?.iter().map(|format| format.fourcc.repr).collect();
@@ -97,7 +96,7 @@ impl V4lCamera {
         |error| refused(&self.path, &error)
     }
 
-    /// Sets a format; the driver decides on the size.
+    /// Sets a format; the driver chooses the size.
     fn choose(&mut self, name: [u8; 4], layout: Layout) -> Result<(), CameraError> {
         self.stream = None; // a format cannot change under a stream
         let mut format = self.device.format().map_err(self.failed())?;
@@ -106,23 +105,23 @@ impl V4lCamera {
         let format = self.device.set_format(&format).map_err(self.failed())?;
         if format.fourcc.repr != name {
             let (asked, got) = (FourCC::new(&name), format.fourcc);
-            return Err(unusable(&self.path, format!("it was asked for {asked} and gives {got}")));
+            return Err(unusable(&self.path, format!("requested {asked}, got {got}")));
         }
         (self.width, self.height) = (format.width as usize, format.height as usize);
         (self.stride, self.layout) = (format.stride as usize, layout);
         Ok(())
     }
 
-    /// Streams from the beginning: frames from before are gone, and the driver counts from 0.
+    /// Restarts the stream: old frames are dropped, the driver counts from 0.
     fn restart(&mut self) -> Result<(), CameraError> {
         self.stream = None;
         self.pairing.begin();
         let started = (|| {
             let mut stream = Stream::with_buffers(&self.device, Type::VideoCapture, BUFFERS)?;
-            // The first stays out: `next` queues the buffer that it gave before, which at the beginning is the first.
+            // Skips the first: `next` queues its previous buffer, initially the first.
             for index in 1..BUFFERS as usize {
                 match CaptureStream::queue(&mut stream, index) {
-                    // The driver may give fewer buffers than asked for.
+                    // The driver may allocate fewer buffers.
                     Err(_) if index > 1 => break,
                     result => result?,
                 }
@@ -134,11 +133,11 @@ impl V4lCamera {
         Ok(())
     }
 
-    /// The next frame; `None` when time is up.
+    /// The next frame; `None` at the timeout.
     fn take(&mut self, wait: Duration) -> Result<Option<Frame>, CameraError> {
         let Some(stream) = &mut self.stream else { return Ok(None) };
         let failed = |error: io::Error| refused(&self.path, &error);
-        // Asked before `next`, which after a timeout of its own would queue a buffer twice.
+        // Polls before `next`, which would queue a buffer twice after its own timeout.
         let wait_ms = i32::try_from(wait.as_millis()).unwrap_or(i32::MAX);
         if self.device.handle().poll(POLLIN, wait_ms).map_err(failed)? == 0 {
             return Ok(None);
@@ -162,7 +161,7 @@ impl V4lCamera {
         Ok(Some(Frame { image, stamp: stamp(metadata) }))
     }
 
-    /// Which control of the driver stands for a setting, and how many of its steps one of the setting's unit is.
+    /// Driver control of a setting, and its steps per unit.
     fn control_of(&self, setting: &Setting) -> Option<(control::Description, f64)> {
         let (ids, steps): (&[u32], f64) = match setting {
             Setting::ExposureUs(_) => (&[EXPOSURE_ABSOLUTE], 1.0 / EXPOSURE_UNIT_US),
@@ -175,7 +174,7 @@ impl V4lCamera {
         Some((known.swap_remove(at), steps))
     }
 
-    /// The driver's controls; none where it has one of a type that the bindings do not know (they panic there).
+    /// The driver's controls; empty if one has a type on which the bindings panic.
     fn descriptions(&self) -> Vec<control::Description> {
         let device = std::panic::AssertUnwindSafe(&self.device);
         catch_unwind(|| device.query_controls()).ok().and_then(Result::ok).unwrap_or_default()
@@ -194,7 +193,7 @@ impl V4lCamera {
         if !range.has(value) {
             return Err(wrong(format!("expected {range}")));
         }
-        // What the camera would do by itself is turned off; a driver without it needs nothing.
+        // Automatic modes are switched off; a driver without them needs nothing.
         let by_itself = match setting {
             Setting::ExposureUs(_) => Some((EXPOSURE_AUTO, EXPOSURE_AUTO_MANUAL)),
             Setting::Gain(_) => Some((AUTOGAIN, 0)),
@@ -213,7 +212,7 @@ fn number_range(control: &control::Description, steps: f64, setting: &Setting) -
     Range::Number { min: control.minimum as f64 / steps, max: control.maximum as f64 / steps, unit }
 }
 
-/// The driver's count, and its time where that is of the monotonic clock.
+/// Driver's count, and its time if monotonic.
 fn stamp(metadata: &Metadata) -> Stamp {
     let monotonic = metadata.flags & Flags::TIMESTAMP_MASK == Flags::TIMESTAMP_MONOTONIC;
     Stamp { count: Some(metadata.sequence.into()), time: monotonic.then(|| metadata.timestamp.into()) }
@@ -225,12 +224,12 @@ impl Camera for V4lCamera {
     }
 
     fn arm(&mut self, mode: TriggerMode, exposure: Micros) -> Result<(), CameraError> {
-        // Of a camera that runs freely nobody could tell which frame belongs to which exposure.
+        // Frames of a free-running camera cannot be assigned to exposures.
         if mode != TriggerMode::Hardware {
             return Err(CameraError::Trigger { camera: self.kind(), mode: trigger_name(mode) });
         }
         let exposure = Setting::ExposureUs(f64::from(exposure.0));
-        // Without the control the length of the trigger pulse decides, or the camera's own setting.
+        // Without the control the pulse length or the camera's own setting applies.
         if self.control_of(&exposure).is_some() {
             self.set(&exposure)?;
         }
@@ -324,7 +323,7 @@ impl Camera for V4lCamera {
     fn newest(&mut self, wait: Duration) -> Result<Option<Frame>, CameraError> {
         let Some(first) = self.take(wait)? else { return Ok(None) };
         let mut newest = Some(first);
-        // No more than may wait: where looking into a frame takes longer than an exposure there would be no end of them.
+        // At most the buffered frames: decoding may take longer than an exposure.
         for _ in 1..BUFFERS {
             match self.take(Duration::ZERO)? {
                 Some(newer) => newest = Some(newer),

@@ -1,8 +1,7 @@
-//! TIFF files tag by tag, and JPEG files with EXIF, as cameras and microscopes write them.
+//! Builds TIFF files tag by tag, and JPEG files with EXIF.
 
 use std::io::Cursor;
 
-/// How a file is laid out.
 #[derive(Clone, Copy)]
 pub(super) struct Layout {
     pub little: bool,
@@ -11,7 +10,7 @@ pub(super) struct Layout {
 
 pub(super) const CLASSIC: Layout = Layout { little: true, big: false };
 
-/// A page: its tags (number, values) and its strips. Types follow from the values.
+/// A page with tags (number, values) and strips; types follow from the values.
 #[derive(Clone, Default)]
 pub(super) struct Page {
     pub shorts: Vec<(u16, Vec<u16>)>,
@@ -20,7 +19,6 @@ pub(super) struct Page {
 }
 
 impl Page {
-    /// A grey page of integers.
     pub(super) fn grey(width: u16, height: u16, bits: u16, data: Vec<u8>) -> Self {
         let shorts = vec![
             (256, vec![width]),
@@ -34,7 +32,6 @@ impl Page {
         Self { shorts, texts: Vec::new(), strips: vec![data] }
     }
 
-    /// Another value of a tag.
     pub(super) fn with(mut self, tag: u16, values: &[u16]) -> Self {
         self.shorts.retain(|(other, _)| *other != tag);
         self.shorts.push((tag, values.to_vec()));
@@ -42,7 +39,6 @@ impl Page {
     }
 }
 
-/// The bytes of a TIFF file.
 pub(super) fn tiff(layout: Layout, pages: &[Page]) -> Vec<u8> {
     let number = |value: u64, size: usize| {
         if layout.little {
@@ -109,7 +105,7 @@ pub(super) fn tiff(layout: Layout, pages: &[Page]) -> Vec<u8> {
     file
 }
 
-/// A JPEG of a grey ramp, brighter to the right.
+/// Grey ramp, brighter to the right.
 pub(super) fn jpeg(width: u32, height: u32) -> Vec<u8> {
     let image = image::GrayImage::from_fn(width, height, |x, y| {
         image::Luma([(200 * x / width + (x * 7 + y * 13) % 11) as u8])
@@ -119,7 +115,7 @@ pub(super) fn jpeg(width: u32, height: u32) -> Vec<u8> {
     bytes
 }
 
-/// The same with an EXIF block that holds an orientation.
+/// [`jpeg`] with an EXIF orientation.
 pub(super) fn jpeg_turned(width: u32, height: u32, orientation: u8) -> Vec<u8> {
     let jpeg = jpeg(width, height);
     let mut exif = b"Exif\0\0MM\0*\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0".to_vec();
@@ -128,7 +124,6 @@ pub(super) fn jpeg_turned(width: u32, height: u32, orientation: u8) -> Vec<u8> {
     [&jpeg[..2], &[0xff, 0xe1], &length, &exif, &jpeg[2..]].concat()
 }
 
-/// An image as a BMP.
 pub(super) fn bmp(image: image::DynamicImage) -> Vec<u8> {
     let mut bytes = Cursor::new(Vec::new());
     // The encoder belongs to the feature that reads it.

@@ -1,4 +1,4 @@
-//! TIFF as microscopes, cameras and scientists write it.
+//! TIFF variants of microscopes, cameras and scientific software.
 
 use ndarray::{Array2, array};
 
@@ -61,13 +61,13 @@ fn a_file_of_several_pages_needs_a_page_number() {
     assert!(page("4").unwrap_err().to_string().contains("1 to 3"));
     assert!(page("0").is_err());
     assert_eq!(page_count(&path).unwrap(), 3);
-    // A file whose own name has such an end is that file.
+    // A file whose name has such an ending is that file.
     fs::write(folder.path().join("odd#2"), tiff(CLASSIC, &pages[2..])).unwrap();
     assert_eq!(read_grey(&folder.path().join("odd#2")).unwrap().pixels[(0, 0)], 20.0 / 255.0);
 }
 
 #[test]
-fn previews_next_to_the_image_are_passed_over() {
+fn skips_previews_next_to_the_image() {
     let image = Page::grey(4, 3, 8, ramp());
     let preview = Page::grey(2, 1, 8, vec![1, 2]).with(254, &[1]);
     for pages in [[image.clone(), preview.clone()], [preview, image]] {
@@ -76,7 +76,7 @@ fn previews_next_to_the_image_are_passed_over() {
 }
 
 #[test]
-fn the_orientation_is_applied() {
+fn applies_the_orientation() {
     // 1 2 3
     // 4 5 6
     let stored = Page::grey(3, 2, 8, vec![1, 2, 3, 4, 5, 6]);
@@ -96,7 +96,7 @@ fn the_orientation_is_applied() {
 }
 
 #[test]
-fn the_white_level_of_fewer_bits_is_found() {
+fn finds_the_white_level_of_fewer_bits() {
     let codes = |codes: &[u16]| codes.iter().flat_map(|code| code.to_le_bytes()).collect::<Vec<u8>>();
     let white =
         |page: Page| decode_grey(&tiff(CLASSIC, &[page])).unwrap().white_level.map(|v| (v * 65535.0).round());
@@ -104,7 +104,7 @@ fn the_white_level_of_fewer_bits_is_found() {
     assert_eq!(white(Page::grey(6, 1, 16, codes(&saturated))), Some(4095.0));
     assert_eq!(white(Page::grey(6, 1, 16, codes(&saturated.map(|v| v << 4)))), Some(65520.0));
     assert_eq!(white(Page::grey(6, 1, 16, codes(&saturated.map(|v| v / 4)))), Some(1023.0));
-    // One pixel at that code may be chance, and others are no limit of any camera.
+    // A single pixel at that code may be chance; other codes are no camera's limit.
     assert_eq!(white(Page::grey(6, 1, 16, codes(&[4095, 4094, 1, 2, 3, 4]))), None);
     assert_eq!(white(Page::grey(6, 1, 16, codes(&[3000; 6]))), None);
     assert_eq!(white(Page::grey(6, 1, 16, codes(&[3, 4, 5, 6, 7, 8])).with(281, &[16383])), Some(16383.0));
@@ -121,7 +121,7 @@ fn the_white_level_of_fewer_bits_is_found() {
 }
 
 #[test]
-fn our_own_cameras_keep_their_white_level_in_the_file() {
+fn written_files_keep_the_white_level() {
     let pixels = array![[0u16, 1, 1022], [17, 200, 300]];
     for bytes in [encode_tiff(pixels.view(), 10).unwrap(), encode_png(pixels.view(), 10).unwrap()] {
         let image = decode_grey(&bytes).unwrap();

@@ -1,4 +1,4 @@
-//! What a camera makes of it: perspective, the picture's border, and how good the segmentation is.
+//! Camera effects: perspective, image border, segmentation.
 
 use crate::clip::Track;
 use crate::embedding::descriptor::Scaling;
@@ -21,17 +21,17 @@ use std::collections::HashMap;
 pub struct Camera {
     view: View,
     distance_mm: f64,
-    /// Height of the point it looks at.
+    /// Height of the target point.
     target_mm: f64,
     /// Pixels of a standing person.
     person_px: f64,
-    /// How good masks are.
+    /// Quality of the masks.
     segmentation: Segmentation,
-    /// Shares of the standing person cut off by the picture's border: below, and at a side of where the person goes.
+    /// Shares of the standing person cut off by the image border: below, and at a side.
     cut: [f64; 2],
 }
 
-/// What the segmentation does to a clip.
+/// Segmentation damage of a clip.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Segmentation {
     Clean,
@@ -41,10 +41,10 @@ enum Segmentation {
 }
 
 impl Camera {
-    /// A camera anywhere: 2.5 to 12 m off, 0.5 to 3 m high, level to looking down by 35 deg.
+    /// Random camera: 2.5 to 12 m away, 0.5 to 3 m high, level to 35 deg down.
     pub fn drawn(rng: &mut ChaCha8Rng) -> Self {
         let distance_mm = rng.random_range(2.5_f64.ln()..12.0_f64.ln()).exp() * 1000.0;
-        // Half of all cameras look from near eye level, the others from anywhere.
+        // Half of the cameras are near eye level, the others at any height.
         let height_mm = if rng.random_bool(0.5) {
             rng.random_range(900.0..1700.0)
         } else {
@@ -74,13 +74,13 @@ impl Camera {
         }
     }
 
-    /// The same camera walked round to that side.
+    /// The same camera moved around to this side.
     #[must_use]
     pub fn from_side(self, gamma_deg: f64) -> Self {
         Self { view: View { gamma_deg, ..self.view }, ..self }
     }
 
-    /// A point's image in the plane through the target, and how much larger than there things are where it is.
+    /// Image of a point in the target plane, and its magnification.
     fn seen(&self, matrix: &[[f64; 3]; 3], p: Point3) -> (Point3, f64) {
         let p = [p[0], p[1], p[2] - self.target_mm];
         let [x, depth, z] =
@@ -90,7 +90,7 @@ impl Camera {
         ([scale * x, 0.0, scale * z], scale)
     }
 
-    /// A body's image: capsules in the plane through the target, larger the nearer they are.
+    /// Image of a body: capsules in the target plane, magnified by distance.
     fn image(&self, body: &[Capsule]) -> Vec<Capsule> {
         let matrix = self.view.matrix();
         body.iter()
@@ -101,7 +101,7 @@ impl Camera {
             .collect()
     }
 
-    /// The clip as this camera's segmentation sees it; whole frames, so that the box's motion is kept.
+    /// Segmented clip in whole frames, so that the box's motion is kept.
     pub fn track(
         &self,
         bodies: &[Vec<Capsule>],
@@ -142,7 +142,7 @@ impl Camera {
         self.filmed(&reach, stature_mm, drawn, scaling, rng)
     }
 
-    /// What is drawn on a canvas that holds `reach`, cut by the picture's border and segmented.
+    /// Frames drawn on a canvas for `reach`, cut by the border and segmented.
     fn filmed(
         &self,
         reach: &[Point],

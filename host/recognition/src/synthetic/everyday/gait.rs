@@ -1,7 +1,7 @@
-//! Going: joint angles over the gait cycle as published, with spreads in amplitude, tempo and what the arms do.
+//! Gait from published joint angles, with spreads in amplitude, tempo and arms.
 //!
-//! Hip and knee angles of walking are those of Winter (The Biomechanics and Motor Control of Human Gait, 1991, natural cadence), of running
-//! those of Novacheck (Gait and Posture 7, 1998), read off at every tenth of the cycle, which begins with the heel's contact.
+//! Walking: Winter (The Biomechanics and Motor Control of Human Gait, 1991, natural cadence); running:
+//! Novacheck (Gait and Posture 7, 1998); angles at every tenth of the cycle from heel contact.
 
 use super::moment::{Hand, Moment};
 use farnear_silhouettes::synthetic::body::Leg;
@@ -21,24 +21,24 @@ const RUN_KNEE: Cycle = [18.0, 41.0, 36.0, 22.0, 28.0, 66.0, 98.0, 104.0, 78.0, 
 pub struct Gait {
     /// 0 walking to 1 running.
     run: f64,
-    /// Scales all swings of the legs.
+    /// Scale of leg swings.
     stride: f64,
-    /// Knees bent all the time, as when sneaking, degrees.
+    /// Permanent knee bend, as when sneaking.
     stoop_deg: f64,
     lean_deg: f64,
     nod_deg: f64,
-    /// How far arms swing, degrees.
+    /// Arm swing.
     swing_deg: f64,
     elbow_deg: f64,
     out: f64,
-    /// Strides in a second.
+    /// Stride frequency, Hz.
     pub strides_hz: f64,
-    /// Hands that do something else: `None` swings.
+    /// Hands with another task: `None` swings.
     held: [Option<Hand>; 2],
 }
 
 impl Gait {
-    /// Walking somewhere. Strides of 0.75 to 1.1 Hz (Winter 1991, slow to fast cadence, a little widened).
+    /// Walking: strides of 0.75 to 1.1 Hz (Winter 1991, slightly widened).
     fn walk(rng: &mut ChaCha8Rng) -> Self {
         Self {
             run: 0.0,
@@ -67,7 +67,7 @@ impl Gait {
         }
     }
 
-    /// Sneaking: slowly, stooping, knees bent, arms before the body.
+    /// Slow, stooping, knees bent, arms before the body.
     pub fn sneak(rng: &mut ChaCha8Rng) -> Self {
         let mut hand = || {
             Some(Hand::at(
@@ -88,7 +88,7 @@ impl Gait {
         }
     }
 
-    /// Walking with something before the body in both hands, or hanging from one.
+    /// Carrying something in both hands, or hanging from one.
     pub fn carry(rng: &mut ChaCha8Rng) -> Self {
         let mut gait = Self::walk(rng);
         gait.lean_deg = rng.random_range(-6.0..8.0);
@@ -102,7 +102,7 @@ impl Gait {
         gait
     }
 
-    /// Walking, one in six with a bag in a hand, one in twelve with a phone at the ear.
+    /// Walking, one in six with a bag, one in twelve with a phone.
     pub fn walking_about(rng: &mut ChaCha8Rng, main: usize) -> Self {
         match rng.random_range(0..12) {
             0 | 1 => Self::bag(rng, main),
@@ -125,7 +125,7 @@ impl Gait {
         gait
     }
 
-    /// The moment `phase` cycles into the gait.
+    /// Moment at `phase` cycles.
     pub fn at(&self, phase: f64) -> Moment {
         let mut moment = Moment::standing().bent(self.lean_deg, self.nod_deg);
         for side in 0..2 {
@@ -137,18 +137,18 @@ impl Gait {
                 knee_deg: (self.stride * mixed(&WALK_KNEE, &RUN_KNEE) + self.stoop_deg).max(0.0),
                 spread_deg: 1.0,
             };
-            // Arms swing against the legs: furthest back when the heel of their side touches the ground.
+            // Arms swing against the legs: furthest back at heel contact of their side.
             let swing = -self.swing_deg * (std::f64::consts::TAU * phase).cos();
             let elbow = self.elbow_deg * (1.0 + 0.25 * swing / self.swing_deg.max(1.0));
             moment.hands[side] = self.held[side].unwrap_or(Hand::swung(swing, elbow, self.out));
         }
         moment.twist_deg = 5.0 * self.stride * (std::f64::consts::TAU * phase).cos();
-        // Running bodies fly between the steps.
+        // Running bodies fly between steps.
         moment.lift = 0.02 * self.run * (0.5 + 0.5 * (2.0 * std::f64::consts::TAU * (phase - 0.4)).cos());
         moment
     }
 
-    /// Statures gone ahead in a stride: two steps, each as long as the legs are apart at contact.
+    /// Stride length in statures: two steps, each the leg distance at contact.
     pub fn stride_statures(&self) -> f64 {
         let apart = |degrees: f64| (degrees * self.stride).to_radians().sin();
         let walk = 2.0 * 0.66 * (apart(24.0) + apart(10.0));
@@ -156,7 +156,7 @@ impl Gait {
     }
 }
 
-/// A cycle at a phase, by periodic cubics through its points (Catmull and Rom).
+/// Periodic Catmull-Rom interpolation of a cycle.
 fn on(cycle: &Cycle, phase: f64) -> f64 {
     let x = phase.rem_euclid(1.0) * cycle.len() as f64;
     let (i, t) = (x.floor() as usize, x.fract());

@@ -1,20 +1,20 @@
 //! Gestures of arms and hands while the body stands.
 //!
-//! Places of hands are in lengths of the stretched arm from the shoulder: the mouth is 0.3 inwards and 0.3 up, the ear 0.1 inwards and
-//! 0.35 up (Winter's proportions). Times are those of unhurried grown-ups; all vary.
+//! Hand positions are in arm lengths from the shoulder: mouth 0.3 inwards and 0.3 up, ear 0.1 inwards and
+//! 0.35 up (Winter's proportions). Times are those of unhurried adults with variation.
 
 use super::moment::{Hand, Moment};
 use super::motion::{Maker, Motion};
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 
-/// A hand at the ear.
+/// Hand at the ear.
 pub fn ear(rng: &mut ChaCha8Rng) -> Hand {
     Hand::at(rng.random_range(-0.14..0.06), rng.random_range(0.06..0.28), rng.random_range(0.1..0.4))
         .elbow(rng.random_range(0.0..0.4))
 }
 
-/// The two ends of a wave: with the forearm, or with the whole arm up and down at the side.
+/// End positions of a wave: with the forearm, or the whole arm at the side.
 fn wave_ends(maker: &mut Maker) -> (Hand, Hand) {
     let ahead = maker.draw(0.0, 0.55);
     if maker.chance(0.5) {
@@ -72,7 +72,7 @@ pub fn clap(maker: &mut Maker) -> Motion {
     maker.repeated(vec![(rise, apart)], &[(beat, together), (beat, apart)], times)
 }
 
-/// A hand goes somewhere near the head or chest, stays and comes back, the head following.
+/// A hand moves near head or chest, stays and returns; the head follows.
 fn bring(maker: &mut Maker, hand: Hand, nod_deg: f64, hold: f64, back: bool) -> Motion {
     let main = maker.main;
     let there = maker.rest.hand(main, hand).bent(maker.rest.pose.lean_deg, nod_deg);
@@ -81,25 +81,25 @@ fn bring(maker: &mut Maker, hand: Hand, nod_deg: f64, hold: f64, back: bool) -> 
     if back {
         parts.push((maker.seconds(0.9), maker.rest));
     }
-    // Most clips show how the hand gets there.
+    // Most clips include the approach.
     if maker.chance(0.8) { maker.once(parts) } else { maker.gesture(parts) }
 }
 
-/// For how long a hand stays, seconds: mostly no longer than it takes to see what it does.
+/// Duration of a hold, seconds; usually short.
 fn hold(maker: &mut Maker) -> f64 {
     maker.draw(0.1_f64.ln(), 2.2_f64.ln()).exp()
 }
 
-/// Taking a call: the hand goes to the ear and stays.
+/// Phone call: the hand stays at the ear.
 pub fn answer_phone(maker: &mut Maker) -> Motion {
     let hand = ear(maker.rng);
     let (hold, back, nod) = (hold(maker), maker.chance(0.25), maker.draw(-5.0, 20.0));
     bring(maker, hand, nod, hold, back)
 }
 
-/// Drinking: the hand goes to the mouth, the head goes back.
+/// Drinking: the hand at the mouth, the head back.
 pub fn drink(maker: &mut Maker) -> Motion {
-    // A cup that is tilted is held above the mouth; some bring it in the hand.
+    // A tilted cup is above the mouth; some hold it from the start.
     let mouth = Hand::at(-0.06, 0.28, 0.46).elbow(0.35);
     let hand = maker.near(mouth, 0.15);
     if maker.chance(0.3) {
@@ -110,7 +110,7 @@ pub fn drink(maker: &mut Maker) -> Motion {
     bring(maker, hand, nod, hold, back)
 }
 
-/// Reading the watch: the forearm comes up before the chest, the head bends to it.
+/// Reading a watch: forearm before the chest, head bent.
 pub fn read_watch(maker: &mut Maker) -> Motion {
     // The watch is on the other arm.
     maker.main = 1 - maker.main;
@@ -120,7 +120,7 @@ pub fn read_watch(maker: &mut Maker) -> Motion {
     bring(maker, hand, nod, hold, back)
 }
 
-/// Throwing: over the shoulder, or from below.
+/// Throwing over the shoulder or from below.
 pub fn throw(maker: &mut Maker) -> Motion {
     let main = maker.main;
     let sign = if main == 1 { 1.0 } else { -1.0 };
@@ -128,7 +128,7 @@ pub fn throw(maker: &mut Maker) -> Motion {
     let (back, front, end) = if under {
         (Hand::swung(-50.0, 10.0, 0.15), Hand::swung(85.0, 8.0, 0.0), Hand::swung(120.0, 20.0, 0.0))
     } else {
-        // The hand winds up a little behind the shoulder, or is ready before it.
+        // The hand winds up behind the shoulder, or is ready before it.
         let behind = maker.draw(-0.15, 0.75);
         (
             Hand::at(maker.draw(0.0, 0.3), behind, maker.draw(0.2, 0.55)).elbow(0.35),
@@ -139,7 +139,7 @@ pub fn throw(maker: &mut Maker) -> Motion {
     let (back, front, end) = (maker.near(back, 0.16), maker.near(front, 0.16), maker.near(end, 0.2));
     let turn = sign * maker.draw(5.0, 38.0);
     let (lean, step) = (maker.draw(0.0, 16.0), if maker.chance(0.4) { maker.draw(0.05, 0.3) } else { 0.0 });
-    // The other hand hangs, balances, or has held what is thrown.
+    // The other hand hangs, balances, or has held the object.
     let other = Hand::at(maker.draw(-0.3, 0.25), maker.draw(0.0, 0.5), maker.draw(-0.95, -0.25));
     let stride = |mut moment: Moment, s: f64| {
         moment.pose.legs[1 - main].hip_deg += 60.0 * step * s;
@@ -164,8 +164,8 @@ fn both_or_one(maker: &mut Maker, both: f64) -> Vec<usize> {
     if maker.chance(both) { vec![0, 1] } else { vec![maker.main] }
 }
 
-/// The two places between which hands push and pull: at the chest or waist, and stretched ahead; and how far the shoulders turn after a
-/// single hand. Seen from turned shoulders, what lies ahead of the body lies outwards.
+/// Near and far hand positions for pushing and pulling (chest or waist, and stretched ahead), and the
+/// shoulders' turn for one hand. Relative to turned shoulders, ahead is outwards.
 fn near_and_far(maker: &mut Maker, single: bool) -> (Hand, Hand, f64) {
     let up = maker.draw(-0.35, 0.25);
     let turn = if single { maker.draw(0.0, 40.0) } else { 0.0 };
@@ -210,7 +210,7 @@ pub fn pull(maker: &mut Maker) -> Motion {
     let (near, far, turn) = near_and_far(maker, hands.len() == 1);
     let (lean, step) = (maker.draw(0.0, 14.0), maker.draw(0.0, 0.08));
     let rest = maker.rest;
-    // A single arm often reaches for it at the side.
+    // A single arm often reaches sideways.
     let far = if hands.len() == 1 { far.moved(maker.draw(0.0, 0.45), 0.0, 0.0) } else { far };
     let reached = with(rest, &hands, far).bent(rest.pose.lean_deg + 0.6 * lean, 5.0).twisted(turn);
     let pulled = with(rest, &hands, near.moved(0.0, -0.1, maker.draw(-0.2, 0.15)))
@@ -252,7 +252,7 @@ pub fn punch(maker: &mut Maker) -> Motion {
     maker.repeated(vec![(raise, guard)], &cycle, times)
 }
 
-/// Aiming a short gun in one or both hands, and firing.
+/// Aiming and firing a short gun with one or both hands.
 pub fn shoot(maker: &mut Maker) -> Motion {
     let both = maker.chance(0.65);
     let main = maker.main;
@@ -276,7 +276,7 @@ pub fn shoot(maker: &mut Maker) -> Motion {
     maker.gesture(parts)
 }
 
-/// Standing about, perhaps looking round or shifting a hand.
+/// Standing, possibly looking around or shifting a hand.
 pub fn stand(maker: &mut Maker) -> Motion {
     let shift = maker.draw(0.0, 0.12);
     let side = maker.main;

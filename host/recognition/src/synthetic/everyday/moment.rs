@@ -2,31 +2,31 @@
 
 use farnear_silhouettes::synthetic::body::{Leg, Pose};
 
-/// Where a hand is, seen from its shoulder in lengths of the stretched arm, in a frame that stands upright and turns with the shoulders.
+/// Hand position from the shoulder in arm lengths, in an upright frame that turns with the shoulders.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hand {
-    /// Away from the body's middle; negative reaches across it.
+    /// Outwards; negative reaches across the body.
     pub out: f64,
-    /// Ahead.
+    /// Forwards, in arm lengths.
     pub ahead: f64,
-    /// Up.
+    /// Upwards, in arm lengths.
     pub up: f64,
-    /// Where the elbow points: 0 down and back, 1 outwards.
+    /// Elbow direction: 0 down and back, 1 outwards.
     pub elbow: f64,
 }
 
 impl Hand {
-    /// A hand at a place, elbow down.
+    /// Hand position with the elbow down.
     pub const fn at(out: f64, ahead: f64, up: f64) -> Self {
         Self { out, ahead, up, elbow: 0.25 }
     }
 
-    /// The same with the elbow pointing elsewhere.
+    /// Same position with another elbow direction.
     pub const fn elbow(self, elbow: f64) -> Self {
         Self { elbow, ..self }
     }
 
-    /// An arm swung forward by `shoulder_deg` with the elbow bent by `elbow_deg`, in the vertical plane ahead.
+    /// Arm swung forward by `shoulder_deg` with the elbow bent by `elbow_deg`, in the vertical plane ahead.
     pub fn swung(shoulder_deg: f64, elbow_deg: f64, out: f64) -> Self {
         // Upper arm and forearm with hand: 0.186 and 0.2 of stature, as in the body.
         let (upper, fore) = (0.482, 0.518);
@@ -39,14 +39,14 @@ impl Hand {
         }
     }
 
-    /// On an arc to the side: `angle_deg` above the horizontal, `reach` of the arm's length.
+    /// Sideways arc: `angle_deg` above the horizontal, at `reach` arm lengths.
     pub fn sideways(angle_deg: f64, reach: f64, ahead: f64) -> Self {
         let (s, c) = angle_deg.to_radians().sin_cos();
         Self { out: reach * c, ahead, up: reach * s, elbow: 0.5 }
     }
 
-    /// Some way to another place, between the straight line (`arc` 0) and the arc round the shoulder (1): hands keep to neither, for
-    /// arms turn about their joints (Atkeson and Hollerbach, J. Neurosci. 5, 1985).
+    /// Interpolates between the straight line (`arc` 0) and the arc around the shoulder (1); real hands
+    /// follow neither, because arms rotate about joints (Atkeson and Hollerbach, J. Neurosci. 5, 1985).
     fn on_the_way(self, to: Self, s: f64, arc: f64) -> Self {
         let straight = Self {
             out: mixed(self.out, to.out, s),
@@ -58,7 +58,7 @@ impl Hand {
         let cosine = (self.out * to.out + self.ahead * to.ahead + self.up * to.up) / (a * b);
         let angle = cosine.clamp(-1.0, 1.0).acos();
         let sine = angle.sin();
-        // Places in one direction are on a line; between opposite ones there is no shortest arc.
+        // Equal directions are on a line; opposite ones have no shortest arc.
         if sine < 0.05 {
             return straight;
         }
@@ -73,37 +73,37 @@ impl Hand {
         }
     }
 
-    /// How far from the shoulder.
+    /// Distance from the shoulder.
     fn reach(self) -> f64 {
         (self.out * self.out + self.ahead * self.ahead + self.up * self.up).sqrt()
     }
 
-    /// Moved by so much.
+    /// Shifted hand position.
     pub fn moved(self, out: f64, ahead: f64, up: f64) -> Self {
         Self { out: self.out + out, ahead: self.ahead + ahead, up: self.up + up, ..self }
     }
 }
 
-/// A moment of a motion; pairs are `[left, right]`.
+/// State at a moment; pairs are `[left, right]`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Moment {
-    /// Trunk, head and legs; its arms are not used.
+    /// Trunk, head and legs; its arms are unused.
     pub pose: Pose,
-    /// Hands.
+    /// Hand positions, left and right.
     pub hands: [Hand; 2],
-    /// Shoulders turned against the hips, to the left, degrees.
+    /// Shoulder rotation against the hips, to the left.
     pub twist_deg: f64,
-    /// Trunk bent to the right, degrees.
+    /// Trunk bend to the right, degrees.
     pub side_deg: f64,
-    /// Whole body tipped backwards about the feet, degrees.
+    /// Backward tilt of the body about the feet.
     pub tilt_deg: f64,
-    /// Off the ground, of stature.
+    /// Height off the ground / stature.
     pub lift: f64,
-    /// Gone ahead since the beginning, of stature, along the way.
+    /// Distance along the path / stature.
     pub ahead: f64,
-    /// Where the way leads, degrees to the left of where it began.
+    /// Heading to the left of the start.
     pub heading_deg: f64,
-    /// How hands get here: 0 straight, 1 round the shoulder as the arm turns.
+    /// Path of hands: 0 straight, 1 around the shoulder.
     pub arc: f64,
 }
 
@@ -113,7 +113,7 @@ fn mixed(a: f64, b: f64, s: f64) -> f64 {
 }
 
 impl Moment {
-    /// Standing, hands hanging.
+    /// Standing with hanging hands.
     pub fn standing() -> Self {
         Self {
             pose: Pose { lean_deg: 3.0, ..Pose::default() },
@@ -128,7 +128,7 @@ impl Moment {
         }
     }
 
-    /// Between two moments, `s` from 0 to 1.
+    /// Interpolation at `s` from 0 to 1.
     pub fn between(a: &Self, b: &Self, s: f64) -> Self {
         let leg = |side: usize| {
             let (p, q): (Leg, Leg) = (a.pose.legs[side], b.pose.legs[side]);
@@ -160,7 +160,7 @@ impl Moment {
         }
     }
 
-    /// Both legs bent alike.
+    /// Both legs bent equally.
     pub fn legs(mut self, hip_deg: f64, knee_deg: f64, spread_deg: f64) -> Self {
         self.pose.legs = [Leg { hip_deg, knee_deg, spread_deg }; 2];
         self
@@ -178,7 +178,7 @@ impl Moment {
         self
     }
 
-    /// Both hands elsewhere, alike.
+    /// Both hands elsewhere, equally.
     pub fn both(self, hand: Hand) -> Self {
         Self { hands: [hand; 2], ..self }
     }
@@ -188,7 +188,7 @@ impl Moment {
         Self { twist_deg, ..self }
     }
 
-    /// Ahead of where it began.
+    /// Moved ahead.
     pub fn gone(self, ahead: f64) -> Self {
         Self { ahead, ..self }
     }
@@ -197,13 +197,13 @@ impl Moment {
 /// A motion: its duration, seconds, and the posture at its end.
 pub type Keys = Vec<(f64, Moment)>;
 
-/// Seconds that keys take.
+/// Total duration, seconds.
 pub fn duration(keys: &Keys) -> f64 {
     keys.iter().map(|(seconds, _)| seconds).sum()
 }
 
-/// The moment `t` seconds into a motion that begins at the first key. Between keys everything goes with the least jerk (Flash and
-/// Hogan, J. Neurosci. 5, 1985), as hands do.
+/// State `t` seconds into a motion from its first key, with minimum jerk between keys (Flash and Hogan, J.
+/// Neurosci. 5, 1985).
 pub fn at(keys: &Keys, t: f64) -> Moment {
     let Some((_, first)) = keys.first() else { return Moment::standing() };
     let (mut from, mut gone) = (first, keys[0].0);
@@ -232,7 +232,7 @@ mod tests {
         assert_eq!(at(&keys, 9.0), Moment::standing());
         let half = at(&keys, 0.5).hands[0].up;
         assert!((half - 0.5 * (0.9 - 0.96)).abs() < 1e-9, "{half}");
-        // Least jerk: hardly any way in the first tenth of the time.
+        // Minimum jerk: little motion in the first tenth.
         assert!((at(&keys, 0.1).hands[0].up + 0.96).abs() < 0.02);
     }
 
@@ -241,10 +241,10 @@ mod tests {
         let (low, ahead) = (Hand::at(0.1, 0.0, -0.9), Hand::at(0.1, 0.9, 0.0));
         let half = |arc: f64| low.on_the_way(ahead, 0.5, arc);
         assert!((half(1.0).reach() - low.reach()).abs() < 1e-9, "{:?}", half(1.0));
-        // The chord of a right angle is nearer by the square root of a half, but for what both are outwards.
+        // The chord of a right angle is shorter by sqrt(0.5), apart from the outward share.
         assert!((half(0.0).reach() - (0.405_f64 + 0.01).sqrt()).abs() < 1e-9, "{:?}", half(0.0));
         assert_eq!(low.on_the_way(ahead, 0.5, 0.0), Hand::at(0.1, 0.45, -0.45));
-        // Between opposite places there is no shortest arc: the line is as good.
+        // Opposite positions have no shortest arc: the line is used.
         let up = Hand::at(-0.1, 0.0, 0.9);
         assert!(low.on_the_way(up, 0.5, 1.0).reach() < 1e-9);
     }

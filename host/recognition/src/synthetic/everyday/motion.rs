@@ -1,4 +1,4 @@
-//! A motion in seconds, and the stretch of it that is the activity.
+//! A motion in seconds, and the part that is the activity.
 
 use super::gait::Gait;
 use super::moment::{Hand, Keys, Moment, at, duration};
@@ -8,24 +8,24 @@ use rand_chacha::ChaCha8Rng;
 /// Kind of motion.
 #[derive(Clone, Debug)]
 pub enum Motion {
-    /// Going, without an end.
+    /// Endless gait of a person.
     Gait(Gait),
-    /// Something with a beginning and an end: what comes before and after it (seconds) may be cut off.
+    /// Single action; times before and after (seconds) may be cut.
     Once {
-        /// All of it.
+        /// All keys of the motion.
         keys: Keys,
-        /// Where the activity begins.
+        /// Start of the activity.
         from: f64,
         /// Posture at the end.
         to: f64,
-        /// Where everything is ready for it, from which some clips begin.
+        /// Preparation complete; some clips start here.
         ready: f64,
     },
-    /// Something that is repeated between `from` and `to`.
+    /// Action repeated between `from` and `to`.
     Repeated {
-        /// All of it.
+        /// All keys of the motion.
         keys: Keys,
-        /// Where repetition begins.
+        /// Start of the repetition.
         from: f64,
         /// Posture at the end.
         to: f64,
@@ -34,15 +34,15 @@ pub enum Motion {
     },
 }
 
-/// Makes motions of one person: how they stand, which hand they use, how fast they are.
+/// Generates motions of one person with their stance, handedness and tempo.
 pub struct Maker<'r> {
-    /// Where all spreads come from.
+    /// Random numbers of all spreads.
     pub rng: &'r mut ChaCha8Rng,
-    /// The hand that does it: 0 left, 1 right.
+    /// Main hand: 0 left, 1 right.
     pub main: usize,
-    /// How they stand while nothing happens.
+    /// Stance while nothing happens.
     pub rest: Moment,
-    /// Scales all times.
+    /// Scale of all times.
     tempo: f64,
 }
 
@@ -79,29 +79,29 @@ impl<'r> Maker<'r> {
         Self { rng, main, rest, tempo }
     }
 
-    /// Between two values.
+    /// Uniform between two values.
     pub fn draw(&mut self, low: f64, high: f64) -> f64 {
         self.rng.random_range(low..high)
     }
 
-    /// True so often.
+    /// True with this probability.
     pub fn chance(&mut self, share: f64) -> bool {
         self.rng.random_bool(share)
     }
 
-    /// Seconds about a usual time: the person's tempo, and a fifth either way.
+    /// Seconds around a typical time: the person's tempo, and a fifth either way.
     pub fn seconds(&mut self, usual: f64) -> f64 {
         usual * self.tempo * self.rng.random_range(0.8..1.25)
     }
 
-    /// A place about another, by so much in each direction.
+    /// Random position near another.
     pub fn near(&mut self, hand: Hand, by: f64) -> Hand {
         let mut off = || self.rng.random_range(-by..by);
         let moved = hand.moved(off(), off(), off());
         Hand { elbow: hand.elbow + 0.6 * self.rng.random_range(-0.5..0.5), ..moved }
     }
 
-    /// Rest, then the parts, then rest again, all but the rests being the activity.
+    /// Rest, parts, rest; the activity excludes the rests.
     pub fn once(&mut self, parts: Keys) -> Motion {
         let length = duration(&parts);
         let (before, after) = (self.draw(0.2, 0.8 + length), self.draw(0.4, 1.2));
@@ -112,7 +112,7 @@ impl<'r> Maker<'r> {
         Motion::Once { keys, from: before, to: before + length, ready: before }
     }
 
-    /// As [`Self::once`], for what a clip may show without how the hands got there.
+    /// As [`Self::once`], for clips that may omit the approach.
     pub fn gesture(&mut self, parts: Keys) -> Motion {
         let way_in = parts.first().map_or(0.0, |(seconds, _)| *seconds);
         match self.once(parts) {
@@ -121,7 +121,7 @@ impl<'r> Maker<'r> {
         }
     }
 
-    /// A way in, then `cycle` so many times (a little different each time), then back to rest.
+    /// Approach, varied repetitions of `cycle`, then rest.
     pub fn repeated(&mut self, way_in: Keys, cycle: &[(f64, Moment)], times: usize) -> Motion {
         let before = self.draw(0.1, 1.5);
         let mut keys = vec![(0.0, self.rest), (before, self.rest)];
@@ -144,16 +144,16 @@ impl<'r> Maker<'r> {
 }
 
 impl Motion {
-    /// The moments of a clip at `rate_hz`, cut as clips are: tight or with something before and after, begun anywhere where it repeats.
+    /// Moments of a clip at `rate_hz`, cut tightly or with margins, at any phase of a repetition.
     pub fn clip(&self, rng: &mut ChaCha8Rng, rate_hz: f64) -> Vec<Moment> {
         let (begin, end) = self.cut(rng);
         let length = (end - begin).max(0.1);
         let frames = ((length * rate_hz).round() as usize).clamp(LEAST_FRAMES, MOST_FRAMES);
-        // Sways of a standing body, and steps that it makes on the way.
+        // Sway of a standing body, and steps.
         let sway = rng.random_range(0.0..2.5);
         let sway_hz = rng.random_range(0.2..0.7);
         let phase = rng.random_range(0.0..std::f64::consts::TAU);
-        // One in three who go turn on the way.
+        // One in three walkers turns.
         let turning = matches!(self, Self::Gait(_)) && rng.random_bool(0.33);
         let turn_deg_s = if turning { rng.random_range(-60.0..60.0) } else { 0.0 };
         (0..frames)
@@ -177,7 +177,7 @@ impl Motion {
 }
 
 impl Motion {
-    /// Where a clip begins and ends, seconds.
+    /// Start and end of a clip, seconds.
     fn cut(&self, rng: &mut ChaCha8Rng) -> (f64, f64) {
         match self {
             Self::Gait(gait) => {
@@ -185,7 +185,7 @@ impl Motion {
                 (begin, begin + rng.random_range(0.9..4.2) / gait.strides_hz)
             }
             Self::Once { keys, from, to, ready } => {
-                // Half are cut tight at either side, up to a tenth short; some begin when everything is ready.
+                // Half are cut tightly on either side, up to a tenth short; some start when prepared.
                 let (core, all) = (to - from, duration(keys));
                 let begin = match rng.random_range(0..20) {
                     0..6 => from + rng.random_range(-0.04..0.1) * core,
@@ -199,7 +199,7 @@ impl Motion {
                 (begin.max(0.0), end.min(all))
             }
             Self::Repeated { keys, from, to, period } => {
-                // From rest or from the middle, to rest or to the middle.
+                // From rest or mid-action, to rest or mid-action.
                 let begin = if rng.random_bool(0.5) {
                     rng.random_range(0.0..1.0) * from
                 } else {
@@ -209,7 +209,7 @@ impl Motion {
                 let end = match rng.random_range(0..4) {
                     0 => duration(keys),
                     1 => *to,
-                    // Hands have hardly got there.
+                    // The hands have just arrived.
                     2 => begin.max(*from) + rng.random_range(0.3..1.2) * period,
                     _ => least + rng.random_range(0.0..3.0) * period,
                 };
@@ -220,6 +220,6 @@ impl Motion {
     }
 }
 
-/// Fewest and most frames of a clip.
+/// Smallest and largest number of frames of a clip.
 const LEAST_FRAMES: usize = 6;
 const MOST_FRAMES: usize = 64;

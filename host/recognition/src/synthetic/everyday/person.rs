@@ -1,4 +1,4 @@
-//! Whom a motion happens to: build, clothes, and where the joints are at a moment.
+//! Build and clothes of a person, and joint positions at a moment.
 
 use super::moment::{Hand, Moment};
 use farnear_silhouettes::silhouette::capsule::{Capsule, Point3};
@@ -6,10 +6,10 @@ use farnear_silhouettes::synthetic::body::{Build, Joints, joints};
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 
-/// A person's build and clothes; thicknesses relative to the average body's.
+/// Build and clothes; thickness relative to the average body.
 #[derive(Clone, Copy, Debug)]
 pub struct Person {
-    /// Proportions.
+    /// Body proportions.
     pub build: Build,
     /// Trunk, with clothes.
     trunk: f64,
@@ -17,15 +17,15 @@ pub struct Person {
     arms: f64,
     /// Legs.
     legs: f64,
-    /// Head, with hair or a hat.
+    /// Head with hair or hat.
     head: f64,
-    /// Length of the arms; body trackers and short sleeves end at the wrist.
+    /// Arm length; trackers and short sleeves end at the wrist.
     reach: f64,
-    /// Whether feet stick out ahead; body trackers often know ankles only.
+    /// Feet visible; trackers often have ankles only.
     feet: bool,
-    /// A skirt or coat: down to this share of the legs.
+    /// Length of a skirt or coat as a share of the legs.
     skirt: f64,
-    /// Something on the back: its radius in millimetres.
+    /// Radius of a backpack, mm.
     pack_mm: f64,
 }
 
@@ -53,7 +53,7 @@ impl Person {
         }
     }
 
-    /// The joints at a moment, standing on the ground at the origin and looking along y.
+    /// Joints at a moment, on the ground at the origin, facing along y.
     pub fn joints(&self, moment: &Moment) -> Joints {
         let mut found = joints(&self.build, &moment.pose);
         let pelvis = found.pelvis;
@@ -74,14 +74,14 @@ impl Person {
             let tilt = moment.tilt_deg.to_radians();
             found.each(|p| *p = turned_about(*p, [0.0; 3], [1.0, 0.0, 0.0], tilt));
         }
-        // Bodies that are tipped over or sit down still lie on the ground, not in it.
+        // Tilted or sitting bodies still rest on the ground.
         let lowest = [found.pelvis, found.head].iter().fold(f64::INFINITY, |low, p| low.min(p[2]));
         let lift = (90.0 - lowest).max(0.0) + moment.lift * self.build.height_mm;
         found.each(|p| p[2] += lift);
         found
     }
 
-    /// Elbow and hand: two bones that reach for a place (the law of cosines), the elbow on the side that the hand asks for.
+    /// Elbow and hand by the law of cosines, with the requested elbow direction.
     fn arm(&self, shoulder: Point3, side: usize, moment: &Moment) -> (Point3, Point3) {
         let h = self.build.height_mm;
         let (upper, fore) = (0.186 * self.reach * h, 0.2 * self.reach * h);
@@ -102,7 +102,7 @@ impl Person {
         (bent, std::array::from_fn(|k| shoulder[k] + length * direction[k]))
     }
 
-    /// The dressed body.
+    /// Capsules of the dressed body.
     pub fn dressed(&self, found: &Joints) -> Vec<Capsule> {
         let h = self.build.height_mm;
         let ball = |at: Point3, radius: f64| Capsule::new(at, at, radius);
@@ -146,7 +146,7 @@ impl Person {
     }
 }
 
-/// The point half-way.
+/// Midpoint.
 pub fn middle(a: Point3, b: Point3) -> Point3 {
     std::array::from_fn(|k| 0.5 * (a[k] + b[k]))
 }
@@ -172,7 +172,7 @@ fn cross(a: Point3, b: Point3) -> Point3 {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
-/// A point turned about an axis of unit length through `about` (Rodrigues).
+/// Rotation about a unit axis through `about` (Rodrigues).
 fn turned_about(p: Point3, about: Point3, axis: Point3, angle: f64) -> Point3 {
     let (v, (s, c)) = (difference(p, about), angle.sin_cos());
     let (beside, along) = (cross(axis, v), dot(axis, v));
@@ -206,7 +206,7 @@ mod tests {
                 let found = norm(difference(found.hands[side], found.shoulders[side]));
                 assert!((found - reach).abs() < 1e-6, "{found} {reach}");
             }
-            // Left is left: negative x.
+            // Left is negative x.
             assert!(found.shoulders[0][0] < found.shoulders[1][0]);
         }
     }

@@ -4,9 +4,9 @@ use super::moment::{Hand, Moment};
 use super::motion::{Maker, Motion};
 use rand::Rng;
 
-/// Reaching down to the ground: by the back, by the knees or by both.
+/// Reaching to the ground with the back, the knees or both.
 fn down(maker: &mut Maker, hands: &[usize], deep: f64) -> Moment {
-    // How much of it the knees do.
+    // Share of the knees.
     let squat = maker.draw(0.0, 1.0);
     let lean = deep * (95.0 - 45.0 * squat) * maker.draw(0.8, 1.15);
     let knee = (deep * (15.0 + 110.0 * squat) * maker.draw(0.85, 1.15)).min(150.0);
@@ -37,7 +37,7 @@ fn steps(maker: &mut Maker) -> (f64, f64) {
     (-maker.draw(0.0, 0.3), maker.draw(-0.25, 0.25))
 }
 
-/// Something held before the body in the hands that have picked it up.
+/// Holding a picked-up object before the body.
 fn held(maker: &mut Maker, hands: &[usize]) -> Moment {
     let mut moment = maker.rest;
     let place = maker.near(Hand::at(-0.1, 0.4, -0.5), 0.2);
@@ -51,7 +51,7 @@ fn one_or_two(maker: &mut Maker) -> Vec<usize> {
     if maker.chance(0.5) { vec![0, 1] } else { vec![maker.main] }
 }
 
-/// Picking something up from the ground.
+/// Picking something up.
 pub fn pick_up(maker: &mut Maker) -> Motion {
     let hands = one_or_two(maker);
     let deep = maker.draw(0.85, 1.2);
@@ -64,7 +64,7 @@ pub fn pick_up(maker: &mut Maker) -> Motion {
     maker.once(parts)
 }
 
-/// Putting something down on the ground.
+/// Putting something down.
 pub fn put_down(maker: &mut Maker) -> Motion {
     let hands = one_or_two(maker);
     let deep = maker.draw(0.85, 1.2);
@@ -76,7 +76,7 @@ pub fn put_down(maker: &mut Maker) -> Motion {
     maker.once(parts)
 }
 
-/// Bending down with the legs straight and up again, arms towards the ground.
+/// Bending down with straight legs and up again.
 pub fn bend(maker: &mut Maker) -> Motion {
     let rest = maker.rest;
     let mut low = rest.bent(maker.draw(75.0, 125.0), maker.draw(-10.0, 35.0)).legs(
@@ -92,7 +92,7 @@ pub fn bend(maker: &mut Maker) -> Motion {
     maker.once(parts)
 }
 
-/// Bowing: the trunk bends at the hip, arms along the body or hanging, and comes up again.
+/// Bowing: the trunk bends at the hip, arms along the body or hanging.
 pub fn bow(maker: &mut Maker) -> Motion {
     let rest = maker.rest;
     let lean = maker.draw(35.0, 95.0);
@@ -108,19 +108,19 @@ pub fn bow(maker: &mut Maker) -> Motion {
     maker.once(parts)
 }
 
-/// Tying a lace: down on a knee or bent over a foot, hands busy there.
+/// Tying a lace, kneeling or bent over a foot.
 pub fn tie_laces(maker: &mut Maker) -> Motion {
     let foot = maker.near(Hand::at(-0.06, 0.2, -0.85), 0.2);
     let deep = maker.draw(0.9, 1.2);
     let mut low = down(maker, &[0, 1], deep);
     let side = maker.main;
     match maker.rng.random_range(0..4) {
-        // One foot set ahead or up.
+        // One foot ahead or raised.
         0 => {
             low.pose.legs[side].hip_deg += maker.draw(10.0, 35.0);
             low.pose.legs[1 - side].hip_deg -= maker.draw(5.0, 25.0);
         }
-        // Down on a knee.
+        // Kneeling.
         1 | 2 => {
             let knee = maker.draw(70.0, 115.0);
             low.pose.legs[side].hip_deg = knee + maker.draw(-5.0, 25.0);
@@ -140,11 +140,11 @@ pub fn tie_laces(maker: &mut Maker) -> Motion {
     if maker.chance(0.35) {
         return maker.repeated(vec![(go, busy[1])], &[(beat, busy[0]), (beat, busy[1])], times);
     }
-    // From standing to the lace, and no further.
+    // From standing to the lace only.
     maker.once(vec![(go, busy[1]), (beat, busy[0]), (0.5 * beat, busy[1])])
 }
 
-/// Crouching, staying there, and getting up.
+/// Crouching, holding, getting up.
 pub fn crouch(maker: &mut Maker) -> Motion {
     let knee = maker.draw(95.0, 145.0);
     let mut low = maker.rest.bent(maker.draw(12.0, 55.0), maker.draw(-25.0, 15.0)).legs(
@@ -161,7 +161,7 @@ pub fn crouch(maker: &mut Maker) -> Motion {
     maker.once(parts)
 }
 
-/// Sitting on a chair, and the way there: trunk ahead while the seat is not reached.
+/// Sitting on a chair, and the approach with the trunk ahead.
 fn seated(maker: &mut Maker) -> (Moment, Moment) {
     let knee = maker.draw(60.0, 112.0);
     let hip = knee + maker.draw(-20.0, 10.0);
@@ -200,7 +200,7 @@ pub fn stand_up(maker: &mut Maker) -> Motion {
     maker.once(parts)
 }
 
-/// Lying down on the back: to the seat on the ground, then the trunk goes down and the legs stretch.
+/// Lying down on the back: sitting on the ground, then lowering the trunk.
 pub fn lie_down(maker: &mut Maker) -> Motion {
     let low = maker
         .rest
@@ -262,7 +262,7 @@ pub fn jumping_jack(maker: &mut Maker) -> Motion {
     maker.repeated(Vec::new(), &[(beat, flight), (beat, open), (beat, flight), (beat, closed)], times)
 }
 
-/// Digging with a spade: strokes into the ground, and lifting.
+/// Digging with a spade.
 pub fn dig(maker: &mut Maker) -> Motion {
     let main = maker.main;
     let (upright, deep) = (maker.draw(12.0, 35.0), maker.draw(40.0, 75.0));
@@ -282,7 +282,7 @@ pub fn dig(maker: &mut Maker) -> Motion {
     maker.repeated(vec![(go, up)], &[(beat, low), (beat, lifted), (0.6 * beat, up)], times)
 }
 
-/// Peering over a wall on the toes, both hands on its edge.
+/// Peering over a wall on tiptoe, both hands on its edge.
 pub fn peer(maker: &mut Maker) -> Motion {
     let edge = maker.near(Hand::at(0.05, 0.55, 0.65), 0.15);
     let mut up = maker.rest.bent(maker.draw(0.0, 12.0), maker.draw(-20.0, 0.0)).both(edge);

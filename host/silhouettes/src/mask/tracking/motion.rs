@@ -1,27 +1,27 @@
-//! Where somebody is expected: place and pace along one axis (Kalman, Journal of Basic Engineering 82, 1960). Lengths are in pixels, spreads in
-//! heights of the person.
+//! Kalman filter of position and velocity along one axis (Journal of Basic Engineering 82, 1960). Lengths in
+//! pixels, standard deviations in heights of the person.
 
-/// Spreads of a place as measured, and of the change of pace per frame, in heights.
+/// Standard deviations of a measured position, and of the velocity change per frame, in heights.
 const MEASURED: f64 = 0.04;
 const PACE: f64 = 0.012;
 
-/// Place and pace along one axis, with their covariance.
+/// Position and velocity along one axis with covariance.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Motion {
-    /// Expected place, pixels.
+    /// Predicted position, px.
     pub at: f64,
     pace: f64,
     covariance: [f64; 3],
 }
 
 impl Motion {
-    /// At a place, with nothing known of the pace.
+    /// At a position with unknown velocity.
     pub fn new(at: f64, height: f64) -> Self {
-        // Up to a tenth of a height per frame before anything is known.
+        // Up to a tenth of a height per frame initially.
         Self { at, pace: 0.0, covariance: [(MEASURED * height).powi(2), 0.0, (0.1 * height).powi(2)] }
     }
 
-    /// A frame later.
+    /// Predicts one frame ahead.
     pub fn predict(&mut self, height: f64) {
         self.at += self.pace;
         let [a, b, c] = self.covariance;
@@ -29,12 +29,11 @@ impl Motion {
         self.covariance = [a + 2.0 * b + c + 0.25 * q, b + c + 0.5 * q, c + q];
     }
 
-    /// Of a place that will be measured, pixels squared.
+    /// Variance of a measurement, px squared.
     pub fn variance(&self, height: f64) -> f64 {
         self.covariance[0] + (MEASURED * height).powi(2)
     }
 
-    /// Learns from a measured place.
     pub fn correct(&mut self, measured: f64, height: f64) {
         let [a, b, c] = self.covariance;
         let s = self.variance(height);
@@ -45,11 +44,11 @@ impl Motion {
         self.covariance = [a * (1.0 - gain), b * (1.0 - gain), c - of_pace * b];
     }
 
-    /// Somewhere between two places, for all that is seen.
+    /// Limits the position to an interval, as for an occluded person.
     pub fn keep_within(&mut self, low: usize, high: usize) {
         let within = self.at.clamp(low as f64, high as f64);
         if within != self.at {
-            // Whoever has not come out has slowed down.
+            // A person who has not emerged has slowed down.
             (self.at, self.pace) = (within, 0.5 * self.pace);
         }
     }

@@ -1,24 +1,24 @@
-//! What a BVH file does not say: its unit of length and which axis points up. Both are told from the body.
+//! Estimates the unit and up axis of a BVH file from the body.
 //!
-//! Joints are known by their names: whatever holds `head` is the head, whatever holds `foot`, `ankle` or `toe` a foot. Some writers
-//! keep every bone along one axis and put the body upright by rotations only, so that the rest pose folds head and feet to one
-//! side of the hips; it then says nothing of up, and the frames are asked. Lengths along the bones hold in every pose.
+//! Joints are identified by name: `head`; `foot`, `ankle` or `toe`. Some writers keep all bones along one
+//! axis, so that the rest pose folds head and feet to one side of the hips; then the frames give the up axis.
+//! Lengths along bones are valid in every pose.
 
 use super::super::recording::{Known, Source, Unit, Up};
 use super::kinematics::{Kinematics, at_rest};
 use super::parse::{Joint, Motion};
 use crate::silhouette::capsule::Point3;
 
-/// Statures that a person has, metres.
+/// Range of a person's stature, metres.
 const STATURE_M: std::ops::RangeInclusive<f64> = 1.4..=2.1;
-/// The middle of them by ratio.
+/// Geometric mean of it.
 const TYPICAL_M: f64 = 1.7;
-/// Part of the way from the feet to the head that lies along an axis for it to be up beyond doubt.
+/// Share of the feet-to-head vector along an axis for a sure up axis.
 const UPRIGHT: f64 = 0.8;
-/// Frames that are asked for up at most, spread over the recording.
+/// Frames sampled for the up axis.
 const FRAMES_ASKED: usize = 100;
 
-/// The joints by which a body is measured.
+/// Joints that measure a body.
 struct Body {
     root: usize,
     head: usize,
@@ -26,7 +26,7 @@ struct Body {
 }
 
 impl Body {
-    /// By names; `None` where no joint is named head or no joint foot.
+    /// `None` without a head or foot joint.
     fn of(joints: &[Joint]) -> Option<Self> {
         let named = |keys: &[&str]| -> Vec<usize> {
             let holds = |joint: &Joint| {
@@ -35,7 +35,7 @@ impl Body {
             };
             (0..joints.len()).filter(|&j| holds(&joints[j])).collect()
         };
-        // The end of the longest way up is the crown, or as near to it as the file goes.
+        // The joint with the longest path up is the crown, or nearest to it.
         let longest = |among: Vec<usize>| {
             among.into_iter().max_by(|&a, &b| length(joints, a).total_cmp(&length(joints, b)))
         };
@@ -55,7 +55,7 @@ impl Body {
         std::array::from_fn(|k| places[self.head][k] - feet[k])
     }
 
-    /// Whether head and feet lie on either side of the root.
+    /// Whether head and feet are on opposite sides of the root.
     fn unfolded(&self, places: &[Point3]) -> bool {
         let root = places[self.root];
         let up = self.upward(places);
@@ -71,7 +71,7 @@ impl Body {
     }
 }
 
-/// The length of the way from a joint to its root along the bones; the root's own offset is a place and not a bone.
+/// Path length from a joint to its root; the root's own offset is a position, not a bone.
 fn length(joints: &[Joint], mut joint: usize) -> f64 {
     let mut sum = 0.0;
     while let Some(parent) = joints[joint].parent {
@@ -81,7 +81,7 @@ fn length(joints: &[Joint], mut joint: usize) -> f64 {
     sum
 }
 
-/// The unit that makes the skeleton a person's.
+/// The unit that gives a human size.
 pub fn unit(joints: &[Joint]) -> Known<Unit> {
     let (size, what) = match Body::of(joints) {
         Some(body) => (body.stature(joints), "from head to toe along the bones"),
@@ -104,7 +104,7 @@ pub fn unit(joints: &[Joint]) -> Known<Unit> {
     Known { value, source: Source::Guess { reason, sure } }
 }
 
-/// The largest extent of the rest pose along an axis: a body with its arms out is as wide as it is tall.
+/// Largest extent of the rest pose along an axis: a body with arms out is as wide as tall.
 fn extent(joints: &[Joint]) -> f64 {
     let places = at_rest(joints);
     let along = |k: usize| {
@@ -114,7 +114,7 @@ fn extent(joints: &[Joint]) -> f64 {
     (0..3).map(along).fold(0.0, f64::max)
 }
 
-/// The axis along which the head lies above the feet.
+/// The axis along which the head is above the feet.
 pub fn up(motion: &Motion, kinematics: &Kinematics) -> Known<Up> {
     let Some(body) = Body::of(&motion.joints) else {
         let reason = "for BVH files mostly have it so, and no joint is named head or foot to tell by".into();
@@ -134,7 +134,7 @@ pub fn up(motion: &Motion, kinematics: &Kinematics) -> Known<Up> {
     };
     let length = upward.iter().map(|v| v * v).sum::<f64>().sqrt();
     let axes = [Up::X, Up::Y, Up::Z].into_iter().zip(upward);
-    // BVH files mostly have y up: another axis must do better, not as well.
+    // BVH files mostly have y up: another axis must be better, not equal.
     let (value, along) =
         axes.fold((Up::Y, upward[1]), |best, next| if next.1 > best.1 { next } else { best });
     let part = if length > 0.0 { along / length } else { 0.0 };
@@ -148,7 +148,7 @@ mod tests {
     use super::super::parse::parse;
     use super::*;
 
-    /// A body of 17 from toe to head at rest, `scale` times as large, its rest pose turned by a function of the axes.
+    /// A body of 17 from toe to head at rest, times `scale`, with transformed axes.
     fn body(scale: f64, turned: fn(Point3) -> Point3, frame: &str) -> Motion {
         let at = |p: Point3| {
             let [x, y, z] = turned(p.map(|v| v * scale));
@@ -176,7 +176,7 @@ mod tests {
             let found = unit(&body(scale, |p| p, STILL).joints);
             assert!((found.value.mm - mm).abs() < 1e-9 && sure(&found), "{scale} {found:?}");
         }
-        // 17 x 60 units: a metre if they are millimetres, and nothing else is nearer.
+        // 17 x 60 units: a metre in millimetres, the nearest possibility.
         let dwarf = unit(&body(60.0, |p| p, STILL).joints);
         assert!(!sure(&dwarf), "{dwarf:?}");
     }
@@ -195,10 +195,11 @@ mod tests {
 
     #[test]
     fn a_folded_rest_pose_is_not_asked() {
-        // All bones along x; the hips' rotation by 90 deg about z points the head up, the leg's by 180 deg the foot down.
+        // All bones along x; the hips' rotation by 90 deg about z points the head up, the leg's by 180 deg
+        // the foot down.
         let motion = body(1.0, |[x, y, z]| [y.abs(), x, z], "90 0 0 0 0 0 180 0 0 0 0 0");
         let found = up(&motion, &Kinematics::new(&motion));
-        // The leg's own joint is 4 up; the foot hangs 5 below that.
+        // The leg's joint is 4 up; the foot hangs 5 below.
         assert_eq!(found.value, Up::Y);
         assert!(
             matches!(&found.source, Source::Guess { reason, .. } if reason.contains("over the frames")),

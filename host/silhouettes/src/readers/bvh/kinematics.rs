@@ -1,8 +1,8 @@
-//! Forward kinematics: from a frame's numbers to where every joint is.
+//! Forward kinematics: joint positions from a frame's values.
 //!
-//! A joint's rotation is the product of its rotation channels in the order of the file, each about the axes as the ones before
-//! have turned them (intrinsic): `Zrotation Yrotation Xrotation` is `Rz Ry Rx` before a column vector. A joint lies at its parent's
-//! place plus the parent's whole turn times its own translation; its own rotation turns what hangs on it. O(joints) a frame.
+//! A joint's rotation is the product of its rotation channels in file order, intrinsic: `Zrotation Yrotation
+//! Xrotation` is `Rz Ry Rx` before a column vector. A joint is at its parent's position plus the parent's
+//! total rotation times its own translation. O(joints) per frame.
 
 use super::parse::{Channel, Joint, Motion};
 use crate::silhouette::capsule::Point3;
@@ -11,7 +11,7 @@ type Matrix = [[f64; 3]; 3];
 
 const STRAIGHT: Matrix = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 
-/// The joints' places at rest: all rotations nought, every joint at its offset. The file's unit and axes.
+/// Rest pose: all rotations 0, every joint at its offset; file units and axes.
 pub fn at_rest(joints: &[Joint]) -> Vec<Point3> {
     let mut places: Vec<Point3> = Vec::with_capacity(joints.len());
     for joint in joints {
@@ -21,19 +21,19 @@ pub fn at_rest(joints: &[Joint]) -> Vec<Point3> {
     places
 }
 
-/// Where the joints are, frame by frame.
+/// Joint positions of frames.
 #[derive(Clone, Debug)]
 pub struct Kinematics<'a> {
     joints: &'a [Joint],
-    /// Per joint, whether its position channels take the place of its offset (or are added to it).
+    /// Per joint, whether position channels replace the offset (or are added).
     replaces: Vec<bool>,
 }
 
 impl<'a> Kinematics<'a> {
-    /// For the joints of a motion, whose first frame tells how position channels are meant.
+    /// The first frame decides how position channels are meant.
     ///
-    /// Biovision's own description adds them to the joint's offset; most of today's writers put the whole translation into the
-    /// channels. With offset o and first position p the channels replace the offset where p is nearer to o than to nought.
+    /// Biovision's description adds them to the offset; most current writers store the whole translation.
+    /// With offset o and first position p they replace the offset if p is nearer to o than to 0.
     pub fn new(motion: &'a Motion) -> Self {
         let mut replaces = Vec::with_capacity(motion.joints.len());
         let mut from = 0;
@@ -52,7 +52,7 @@ impl<'a> Kinematics<'a> {
         Self { joints: &motion.joints, replaces }
     }
 
-    /// The joints' places in a frame of as many values as there are channels; the file's unit and axes.
+    /// Joint positions of a frame with one value per channel; file units and axes.
     pub fn places(&self, frame: &[f64]) -> Vec<Point3> {
         let mut values = frame.iter().copied();
         let mut places: Vec<Point3> = Vec::with_capacity(self.joints.len());
@@ -76,7 +76,7 @@ impl<'a> Kinematics<'a> {
     }
 }
 
-/// The rotation about a coordinate axis, anticlockwise as seen from its tip.
+/// Rotation about a coordinate axis, anticlockwise seen from its tip.
 fn about(axis: usize, angle_deg: f64) -> Matrix {
     let (sin, cos) = angle_deg.to_radians().sin_cos();
     let (j, k) = ((axis + 1) % 3, (axis + 2) % 3);
@@ -94,7 +94,7 @@ mod tests {
     use super::super::parse::parse;
     use super::*;
 
-    /// Root with an arm up by 2 and out by 1, whose hand is 3 along z; `order` of the root's rotations and of the arm's.
+    /// Root with an arm up by 2 and out by 1, whose hand is 3 along z; `order` of both rotations.
     fn places(order: &str, frame: &str) -> Vec<Point3> {
         let text = format!(
             "HIERARCHY\nROOT root\n{{\nOFFSET 0 0 0\nCHANNELS 6 Xposition Yposition Zposition {order}\nJOINT arm\n{{\n\

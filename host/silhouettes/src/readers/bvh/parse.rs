@@ -28,16 +28,16 @@
 use super::super::recording::RecordingError;
 use crate::silhouette::capsule::Point3;
 
-/// What a number of a frame moves.
+/// Meaning of a value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Channel {
-    /// Along this axis (0 to 2), in the file's unit.
+    /// Along this axis (0 to 2), file unit.
     Position(usize),
     /// About this axis (0 to 2), degrees.
     Rotation(usize),
 }
 
-/// The channels by name.
+/// Channels by name.
 const CHANNELS: [(&str, Channel); 6] = [
     ("Xposition", Channel::Position(0)),
     ("Yposition", Channel::Position(1)),
@@ -47,38 +47,35 @@ const CHANNELS: [(&str, Channel); 6] = [
     ("Zrotation", Channel::Rotation(2)),
 ];
 
-/// A joint, or the end of a chain of them.
+/// A joint or end site.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Joint {
-    /// Its name; an end site is called after its joint, with `_End` behind.
+    /// End sites have their joint's name with `_End`.
     pub name: String,
-    /// The joint that it hangs on, which stands before it in the list; `None` for roots.
+    /// Parent, earlier in the list; `None` for roots.
     pub parent: Option<usize>,
-    /// From its parent at rest, in the file's unit.
+    /// Offset from the parent at rest, file unit.
     pub offset: Point3,
-    /// What its numbers are, in the order of the file.
+    /// Channels in file order.
     pub channels: Vec<Channel>,
 }
 
-/// A file's contents.
+/// Contents of a file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Motion {
-    /// All joints and end sites, parents before their children.
+    /// Joints and end sites, parents first.
     pub joints: Vec<Joint>,
-    /// Seconds from one frame to the next.
+    /// Frame interval.
     pub frame_time_s: f64,
-    /// The numbers of every frame, for the joints' channels in their order.
+    /// Values of all channels per frame.
     pub frames: Vec<Vec<f64>>,
 }
 
-/// Points that a byte of text may stand for. A joint with its three channels takes six bytes of every frame at least and has one end
-/// site at most, so that files of people stay far below; without a limit a few bytes could ask for any memory.
+/// Limit of points per byte of text. A joint with three channels takes at least six bytes per frame and has
+/// at most one end site, so real files are far below; without it a few bytes could request any memory.
 const POINTS_PER_BYTE: usize = 4;
 
-/// Reads a file's text.
-///
-/// # Errors
-/// [`RecordingError::Line`] for whatever does not fit: what stands there and what was expected.
+/// Errors: [`RecordingError::Line`] with what was found and expected.
 pub fn parse(text: &str) -> Result<Motion, RecordingError> {
     let mut cursor = Cursor { rest: text, line: 1 };
     cursor.expect("HIERARCHY")?;
@@ -102,11 +99,11 @@ pub fn parse(text: &str) -> Result<Motion, RecordingError> {
     Ok(Motion { joints, frame_time_s, frames })
 }
 
-/// The joints up to and with the word MOTION. One loop over the words with an arm for each, and the errors beside them: in parts
-/// the brackets' bookkeeping would be everywhere.
+/// Joints up to the word MOTION. One loop with an arm per word and its errors, because splitting would spread
+/// the bracket handling.
 fn hierarchy(cursor: &mut Cursor) -> Result<Vec<Joint>, RecordingError> {
     let mut joints: Vec<Joint> = Vec::new();
-    // The joints whose brackets are open, and whether each has had its OFFSET.
+    // Open joints, and whether each has had its OFFSET.
     let mut open: Vec<(usize, bool)> = Vec::new();
     loop {
         let word = cursor.word();
@@ -171,7 +168,7 @@ fn wrong(line: usize, reason: String) -> RecordingError {
     RecordingError::Line { line, reason }
 }
 
-/// The beginning of a text that may be long.
+/// Start of a possibly long text.
 fn short(text: &str) -> &str {
     const LONGEST: usize = 40;
     text.char_indices().nth(LONGEST).map_or(text, |(at, _)| &text[..at])
@@ -186,7 +183,7 @@ fn number(text: &str, line: usize, what: &str) -> Result<f64, RecordingError> {
     value.ok_or_else(|| wrong(line, format!("found `{}`, expected a number: {what}", short(text))))
 }
 
-/// Where reading has come to.
+/// Reading position.
 struct Cursor<'a> {
     rest: &'a str,
     /// Line of the last word.
@@ -194,7 +191,7 @@ struct Cursor<'a> {
 }
 
 impl<'a> Cursor<'a> {
-    /// Skips white space; the line that is counted is that of what comes next.
+    /// Skips white space; the counted line is that of the next word.
     fn skip(&mut self) {
         let trimmed = self.rest.trim_start();
         let skipped = &self.rest[..self.rest.len() - trimmed.len()];
@@ -202,7 +199,7 @@ impl<'a> Cursor<'a> {
         self.rest = trimmed;
     }
 
-    /// The next word; a bracket is a word by itself.
+    /// The next word; a bracket is a word.
     fn word(&mut self) -> Option<&'a str> {
         self.skip();
         let ends = |c: char| c.is_whitespace() || matches!(c, '{' | '}');
@@ -222,7 +219,7 @@ impl<'a> Cursor<'a> {
         }
     }
 
-    /// What stands up to the end of the line or the bracket.
+    /// Text up to the end of the line or the bracket.
     fn name(&mut self, what: &str) -> Result<String, RecordingError> {
         let length = self.rest.find(['\n', '{', '}']).unwrap_or(self.rest.len());
         let (name, rest) = self.rest.split_at(length);
@@ -271,7 +268,7 @@ impl<'a> Cursor<'a> {
         Ok(channels)
     }
 
-    /// The brackets of an end site, which hold an offset and nothing else.
+    /// Brackets of an end site with its offset.
     fn end_site(&mut self) -> Result<Point3, RecordingError> {
         self.expect("{")?;
         self.expect("OFFSET")?;
@@ -281,10 +278,10 @@ impl<'a> Cursor<'a> {
     }
 }
 
-/// The lines after the word MOTION that are not empty, with their numbers.
+/// Non-empty lines after MOTION with their numbers.
 struct Lines<'a> {
     lines: Box<dyn Iterator<Item = (usize, &'a str)> + 'a>,
-    /// The file's last line.
+    /// Last line of the file.
     last: usize,
 }
 
@@ -296,7 +293,7 @@ impl<'a> Lines<'a> {
         Self { lines: Box::new(lines.filter(|(_, line)| !line.is_empty())), last }
     }
 
-    /// The line `key: value`, with or without blanks about the colon.
+    /// Line `key: value`, with optional blanks around the colon.
     fn value(&mut self, key: &str) -> Result<(usize, &'a str), RecordingError> {
         let Some((line, text)) = self.lines.next() else {
             return Err(wrong(self.last, format!("found the end of the file, expected `{key}:`")));
@@ -306,7 +303,7 @@ impl<'a> Lines<'a> {
         value.ok_or_else(|| wrong(line, format!("found `{}`, expected `{key}:`", short(text))))
     }
 
-    /// As many frames as promised, but not more than `most`, of as many numbers as there are channels.
+    /// The promised number of frames, at most `most`, with one value per channel.
     fn frames(
         mut self,
         promised: usize,
@@ -432,7 +429,7 @@ mod tests {
         let text = format!(
             "HIERARCHY ROOT a {{ OFFSET 0 0 0 CHANNELS 1 Xposition {joints} }} MOTION\nFrames: 3000\nFrame Time: 1\n{frames}"
         );
-        // Names run to the bracket, so this is a chain of 3001 joints of which one moves.
+        // Names extend to the bracket: a chain of 3001 joints with one moving.
         let error = parse(&text).expect_err("nine million points from 80 kB");
         assert!(error.to_string().contains("found 1 channels for so many joints"), "{error}");
     }
