@@ -31,9 +31,7 @@ impl Rig {
         if levels.is_on() {
             self.may_move(silence)?; // no alarm, and a silence within its limits
         }
-        self.lights
-            .set(levels, (time, silence), now)
-            .map_err(|reason| RequestError::Light { reason })?;
+        self.lights.set(levels, (time, silence), now).map_err(|reason| RequestError::Light { reason })?;
         Ok(Response::Accepted)
     }
 

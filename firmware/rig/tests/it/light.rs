@@ -94,7 +94,9 @@ fn a_flash_is_reported_with_each_exposure_of_its_shot() {
         .events
         .iter()
         .filter_map(|(_, event)| match event.kind {
-            EventKind::Flash { trigger_number, levels, on, off, .. } => Some((trigger_number, levels, on.0, off.0)),
+            EventKind::Flash { trigger_number, levels, on, off, .. } => {
+                Some((trigger_number, levels, on.0, off.0))
+            }
             _ => None,
         })
         .collect();

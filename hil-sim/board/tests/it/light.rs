@@ -67,7 +67,9 @@ fn a_flash_is_within_its_exposure_and_stamped_to_the_microsecond() {
     }
     let changes = bench.peek(|rig| rig.take_light_changes());
     let flash = bench.events.iter().find_map(|event| match event.kind {
-        EventKind::Flash { trigger_number, levels, on, off, .. } => Some((trigger_number, levels, on.0, off.0)),
+        EventKind::Flash { trigger_number, levels, on, off, .. } => {
+            Some((trigger_number, levels, on.0, off.0))
+        }
         _ => None,
     });
     let (number, levels, on_us, off_us) = flash.expect("the flash is reported");

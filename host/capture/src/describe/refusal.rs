@@ -124,7 +124,9 @@ fn light_fault_text(reason: LightFault) -> String {
     match reason {
         LightFault::Level => format!("a brightness exceeds {} %", LIGHT_LEVEL_MAX / 10),
         LightFault::Time => format!("its time is outside 1 us to {} s", LIGHT_TIME_MAX.0 / 1_000_000),
-        LightFault::Exposure => "the flash does not end within the exposure; shorten its delay or its length".into(),
+        LightFault::Exposure => {
+            "the flash does not end within the exposure; shorten its delay or its length".into()
+        }
         LightFault::Mode => "only a shot that the board triggers can have a flash".into(),
     }
 }

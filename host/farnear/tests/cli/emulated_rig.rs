@@ -146,7 +146,8 @@ fn a_lamp_of_the_board_makes_both_images_brighter() {
         succeeds(&mut capture);
         ["far.png", "near.png"].map(|file| {
             let image = image::open(format!("{out}/{file}")).expect("an image").into_luma16();
-            image.pixels().map(|pixel| f64::from(pixel.0[0])).sum::<f64>() / f64::from(image.width() * image.height())
+            image.pixels().map(|pixel| f64::from(pixel.0[0])).sum::<f64>()
+                / f64::from(image.width() * image.height())
         })
     });
     for lit in &means[1..] {

@@ -4,9 +4,9 @@ use farnear_protocol::{
     BoardMicros, Event, EventKind, Micros, Nanometres, RequestError, Response,
     frame::Kind,
     message::{
-        Alarm, Axis, AxisStatus, Capabilities, CorrectionFault, Counters, Hello, LightFault, Limits, LinkCounters,
-        PositionState, ProgramState, ResetCause, ShadowAnswer, ShadowReliability, ShotFault, Status,
-        SunAnswer,
+        Alarm, Axis, AxisStatus, Capabilities, CorrectionFault, Counters, Hello, LightFault, Limits,
+        LinkCounters, PositionState, ProgramState, ResetCause, ShadowAnswer, ShadowReliability, ShotFault,
+        Status, SunAnswer,
     },
 };
 

@@ -3,9 +3,9 @@
 use farnear_protocol::{
     BoardMicros, Micros, Nanometres,
     message::{
-        Alarm, AlarmRecord, Axis, AxisStatus, CorrectionFault, CorrectionForm, CorrectionInfo, LightLevels, PositionState,
-        ProgramState, ProgramStatus, QueryDeviations, RecordName, ResetCause, Setting, SettingKey,
-        ShadowQuery, ShadowReliability, Shot, ShotFault, ShotRecord, SunQuery, TriggerMode,
+        Alarm, AlarmRecord, Axis, AxisStatus, CorrectionFault, CorrectionForm, CorrectionInfo, LightLevels,
+        PositionState, ProgramState, ProgramStatus, QueryDeviations, RecordName, ResetCause, Setting,
+        SettingKey, ShadowQuery, ShadowReliability, Shot, ShotFault, ShotRecord, SunQuery, TriggerMode,
     },
 };
 
