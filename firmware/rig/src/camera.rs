@@ -1,1 +1,179 @@
+//! When the camera may be exposed, and the meaning of its strobe.
+//!
+//! Read-out overlaps the next move, but the next trigger waits for [`CameraSettings::readout`] after the
+//! exposure. Its end is known from the strobe, before that estimated from pulse length and the longest
+//! permitted latency.
+//!
+//! A strobe shorter than the pulse has lost its beginning (loose contact) and counts as missing, because its
+//! time would be wrong.
+//!
+//! For exposures not triggered by the board (host, free running) the first one that begins after listening
+//! started counts.
 
+use farnear_protocol::message::ShotLight;
+use farnear_protocol::{BoardMicros, Micros};
+
+use crate::io::{ExposureEdges, Inputs, Trigger};
+use crate::settings::CameraSettings;
+
+/// Permitted shortening of the strobe: cameras count exposure in lines of some 10 us.
+const SHORTER_US: u64 = 100;
+
+/// Source of the awaited exposure.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+enum Awaited {
+    /// The board's pulse.
+    Triggered,
+    /// Free running or by the host, from this time on.
+    Since(BoardMicros),
+}
+
+/// An exposure with unknown edges.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+struct Pending {
+    number: u32,
+    deadline: BoardMicros,
+    awaited: Awaited,
+    /// A shorter strobe is invalid.
+    shortest_us: u64,
+}
+
+#[derive(Clone, Debug)]
+pub(crate) struct Camera {
+    settings: CameraSettings,
+    ready_at: BoardMicros,
+    triggers: u32,
+    pending: Option<Pending>,
+    order: Option<Trigger>,
+    edges: Option<(u32, ExposureEdges)>,
+}
+
+impl Camera {
+    pub(crate) const fn new(settings: CameraSettings) -> Self {
+        Self { settings, ready_at: BoardMicros(0), triggers: 0, pending: None, order: None, edges: None }
+    }
+
+    pub(crate) const fn apply(&mut self, settings: CameraSettings) {
+        self.settings = settings;
+    }
+
+    /// Exposures since the reset; number of the next one.
+    pub(crate) const fn triggers(&self) -> u32 {
+        self.triggers
+    }
+
+    pub(crate) fn is_ready(&self, at: BoardMicros) -> bool {
+        self.pending.is_none() && at >= self.ready_at
+    }
+
+    /// Shortest time from one exposure to the next.
+    pub(crate) const fn period(&self, exposure: Micros) -> Micros {
+        Micros(exposure.0.saturating_add(self.settings.readout.0))
+    }
+
+    /// Schedules an exposure; returns its number, from 0. The camera must be ready.
+    pub(crate) fn trigger(&mut self, exposure: Micros, flash: Option<ShotLight>, at: BoardMicros) -> u32 {
+        let end = at.0 + u64::from(exposure.0) + u64::from(self.settings.strobe_deadline.0);
+        self.ready_at = BoardMicros(end + u64::from(self.settings.readout.0));
+        self.order = Some(Trigger { at, length: exposure, flash });
+        let shortest_us = u64::from(exposure.0).saturating_sub(SHORTER_US);
+        self.expect(BoardMicros(end), Awaited::Triggered, shortest_us)
+    }
+
+    /// Listens for an exposure from now on; returns its number.
+    pub(crate) fn listen(&mut self, now: BoardMicros) -> u32 {
+        let deadline = BoardMicros(now.0 + u64::from(self.settings.patience.0));
+        self.expect(deadline, Awaited::Since(now), 0)
+    }
+
+    fn expect(&mut self, deadline: BoardMicros, awaited: Awaited, shortest_us: u64) -> u32 {
+        let number = self.triggers;
+        self.triggers = self.triggers.wrapping_add(1);
+        self.pending = Some(Pending { number, deadline, awaited, shortest_us });
+        number
+    }
+
+    /// Stops listening.
+    pub(crate) fn give_up(&mut self) {
+        self.pending = self.pending.filter(|pending| pending.awaited == Awaited::Triggered);
+    }
+
+    /// Takes the exposure scheduled in this tick.
+    pub(crate) const fn take_order(&mut self) -> Option<Trigger> {
+        self.order.take()
+    }
+
+    /// No exposure is scheduled or awaited.
+    pub(crate) const fn is_idle(&self) -> bool {
+        self.pending.is_none() && self.order.is_none()
+    }
+
+    /// The board shall report exposures without trigger.
+    pub(crate) fn is_listening(&self) -> bool {
+        self.pending.is_some_and(|pending| pending.awaited != Awaited::Triggered)
+    }
+
+    /// Reads the board; unexpected edges are dropped.
+    pub(crate) fn sense(&mut self, inputs: &Inputs) {
+        self.edges = None;
+        let Some(pending) = self.pending else { return };
+        let edges = match pending.awaited {
+            Awaited::Triggered => inputs.exposure,
+            Awaited::Since(ready) => {
+                inputs.strobe.filter(|strobe| strobe.start >= ready).map(|strobe| ExposureEdges {
+                    trigger: ready,
+                    strobe_start: strobe.start,
+                    strobe_end: strobe.end,
+                    flash: None,
+                })
+            }
+        };
+        if let Some(edges) = edges {
+            let length_us = edges.strobe_end.0.saturating_sub(edges.strobe_start.0);
+            self.edges = (length_us >= pending.shortest_us).then_some((pending.number, edges));
+            self.ready_at =
+                BoardMicros(edges.strobe_end.0.saturating_add(u64::from(self.settings.readout.0)));
+            self.pending = None;
+        } else if inputs.now > pending.deadline {
+            self.pending = None;
+        }
+    }
+
+    /// Edges of an exposure in the tick of their arrival; an error at the deadline.
+    pub(crate) fn result(&self, number: u32) -> Option<Result<ExposureEdges, NoAnswer>> {
+        match self.edges {
+            Some((of, edges)) if of == number => Some(Ok(edges)),
+            _ if self.pending.is_some_and(|pending| pending.number == number) => None,
+            _ => Some(Err(NoAnswer)),
+        }
+    }
+}
+
+/// The exposure signal was missing or incomplete.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) struct NoAnswer;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::settings::Settings;
+
+    #[test]
+    fn a_strobe_that_has_lost_its_beginning_is_none_and_the_read_out_is_waited_for_all_the_same() {
+        // Found by the campaign: a wire reconnected during an exposure, which was reported 0.86 ms late.
+        let answer = |lost_us: u64| {
+            let mut camera = Camera::new(Settings::DEFAULT.camera);
+            let number = camera.trigger(Micros(5_884), None, BoardMicros(1_000));
+            let edges = ExposureEdges {
+                trigger: BoardMicros(1_000),
+                strobe_start: BoardMicros(1_020 + lost_us),
+                strobe_end: BoardMicros(6_904),
+                flash: None,
+            };
+            camera.sense(&Inputs { exposure: Some(edges), ..Inputs::idle(BoardMicros(7_000)) });
+            assert!(!camera.is_ready(BoardMicros(7_000)), "it reads out");
+            camera.result(number).map(|edges| edges.is_ok())
+        };
+        assert_eq!([0, 90, 859].map(answer), [Some(true), Some(true), Some(false)]);
+    }
+}

@@ -134,7 +134,7 @@ impl Request for OpticsRequest {
         if let Some(path) = &self.optics {
             let (optics, doubts) = GivenOptics::read(path)?.with_doubts();
             let mut found = figures(&optics, 1, self.contrast, None);
-            found.advice.extend(doubts);
+            found.advice.extend(doubts.iter().map(ToString::to_string));
             return Ok(found);
         }
         let (optics, found) = propose(self)?;

@@ -1,1 +1,142 @@
+//! Refused files with their remedies.
 
+use super::super::*;
+use super::made::{CLASSIC, Page, bmp, jpeg, jpeg_turned, tiff};
+
+fn refusal(bytes: &[u8]) -> String {
+    decode_grey(bytes).expect_err("a refusal")
+}
+
+#[test]
+fn rejects_a_truncated_jpeg() {
+    let whole = jpeg(64, 48);
+    assert!(decode_grey(&whole).is_ok());
+    // Data after the end is ignored.
+    assert!(decode_grey(&[&whole[..], b"preview"].concat()).is_ok());
+    for end in [whole.len() - 2, whole.len() - 1, whole.len() * 3 / 4, whole.len() / 2] {
+        assert!(refusal(&whole[..end]).contains("incomplete"), "{end}");
+    }
+    // The file ends properly although its data were cut.
+    for end in [whole.len() / 2, whole.len() * 3 / 4] {
+        let closed = [&whole[..end], &[0xff, 0xd9]].concat();
+        assert!(refusal(&closed).contains("incomplete"), "{end}");
+    }
+}
+
+#[test]
+fn rejects_truncated_files_of_every_format() {
+    let grey = image::GrayImage::from_fn(40, 30, |x, y| image::Luma([(x * 5 + y) as u8]));
+    let pixels = ndarray::Array2::from_shape_fn((30, 40), |(y, x)| (x * 5 + y) as u16);
+    let pgm = [b"P5 40 30 255\n".as_slice(), grey.as_raw()].concat();
+    let files = [
+        encode_png(pixels.view(), 8).unwrap(),
+        encode_tiff(pixels.view(), 12).unwrap(),
+        tiff(CLASSIC, &[Page::grey(40, 30, 8, grey.as_raw().clone())]),
+        pgm,
+        bmp(grey.into()),
+    ];
+    for (number, whole) in files.iter().enumerate() {
+        assert_eq!(decode_grey(whole).unwrap().pixels.dim(), (30, 40), "{number}");
+        // The last chunk of a PNG has no pixels.
+        for lost in [whole.len() / 10, whole.len() / 2, whole.len() - 20] {
+            assert!(decode_grey(&whole[..whole.len() - lost]).is_err(), "{number}, {lost} bytes lost");
+        }
+    }
+}
+
+#[test]
+fn rejects_reversed_bits_and_tiles_of_planes() {
+    let reversed = tiff(CLASSIC, &[Page::grey(4, 3, 8, vec![1; 12]).with(266, &[2])]);
+    assert!(refusal(&reversed).contains("FillOrder"));
+    let plain = tiff(CLASSIC, &[Page::grey(4, 3, 8, vec![1; 12]).with(266, &[1])]);
+    assert!(decode_grey(&plain).is_ok());
+    let planes = Page::grey(16, 16, 8, vec![1; 768]).with(258, &[8, 8, 8]).with(262, &[2]).with(277, &[3]);
+    let tiled = planes.with(284, &[2]).with(322, &[16]).with(323, &[16]);
+    assert!(refusal(&tiff(CLASSIC, &[tiled])).contains("separate planes in tiles"));
+}
+
+#[test]
+fn rejects_raw_files_with_a_remedy() {
+    let page = || Page::grey(4, 3, 8, vec![0; 12]);
+    let dng = tiff(CLASSIC, &[page().with(254, &[1]).with(50706, &[0x0401])]);
+    let mosaic = tiff(CLASSIC, &[page().with(262, &[32803])]);
+    let mut cr2 = tiff(CLASSIC, &[page()]);
+    cr2[8..10].copy_from_slice(b"CR");
+    for raw in [
+        dng,
+        mosaic,
+        cr2,
+        b"FUJIFILMCCD-RAW 0201".to_vec(),
+        b"\0\0\0\x18ftypcrx \0".to_vec(),
+        b"IIU\0\x18".to_vec(),
+    ] {
+        let said = refusal(&raw);
+        assert!(said.contains("raw file") && said.contains("develop"), "{said}");
+    }
+    // As in a NEF: a thumbnail first, the image in a sub-directory.
+    let preview = refusal(&tiff(CLASSIC, &[page().with(254, &[1])]));
+    assert!(preview.contains("preview of 4x3 px") && preview.contains("develop"), "{preview}");
+}
+
+#[test]
+fn rejects_a_page_whose_image_is_in_a_sub_directory() {
+    let mut file = tiff(
+        CLASSIC,
+        &[Page::grey(2, 1, 8, vec![0; 2]).with(330, &[0]), Page::grey(400, 300, 8, vec![0; 9])],
+    );
+    // Point tag 330 of the first directory to the second, and end the chain after the first.
+    let word = |at: usize| u32::from_le_bytes(file[at..at + 4].try_into().unwrap()) as usize;
+    let first = word(4);
+    let count = usize::from(u16::from_le_bytes([file[first], file[first + 1]]));
+    let link = first + 2 + 12 * count;
+    let second = word(link) as u32;
+    let entry =
+        (0..count).map(|i| first + 2 + 12 * i).find(|at| file[*at..at + 2] == 330_u16.to_le_bytes()).unwrap();
+    file[entry + 2..entry + 4].copy_from_slice(&4_u16.to_le_bytes());
+    file[entry + 8..entry + 12].copy_from_slice(&second.to_le_bytes());
+    file[link..link + 4].fill(0);
+    let said = refusal(&file);
+    assert!(said.contains("preview of 2x1 px") && said.contains("400x300"), "{said}");
+}
+
+#[test]
+fn names_unsupported_formats() {
+    for (bytes, name) in [
+        (&b"\0\0\0\x18ftypheic\0\0"[..], "HEIC"),
+        (b"GIF89a\0\0", "GIF"),
+        (b"RIFF\0\0\0\0WEBPVP8 ", "WebP"),
+        (b"\xff\x0a\0\0", "JPEG XL"),
+    ] {
+        assert!(refusal(bytes).contains(name) && refusal(bytes).contains("convert"), "{name}");
+    }
+    let jpeg_in_tiff = tiff(CLASSIC, &[Page::grey(4, 3, 8, vec![0; 12]).with(259, &[50000])]);
+    assert!(refusal(&jpeg_in_tiff).contains("zstd compression"));
+    let signed = tiff(CLASSIC, &[Page::grey(4, 3, 8, vec![0; 12]).with(339, &[2])]);
+    assert!(refusal(&signed).contains("signed"));
+    let huge = tiff(CLASSIC, &[Page::grey(65535, 65535, 16, vec![0; 12])]);
+    assert!(refusal(&huge).contains("65535x65535"));
+}
+
+#[test]
+fn rotates_a_jpeg_by_its_orientation() {
+    let plain = decode_grey(&jpeg(48, 32)).unwrap().pixels;
+    let turned = decode_grey(&jpeg_turned(48, 32, 6)).unwrap().pixels;
+    assert_eq!(turned.dim(), (48, 32));
+    // Right is down.
+    assert_eq!(turned[(40, 10)], plain[(31 - 10, 40)]);
+    assert_eq!(decode_grey(&jpeg_turned(48, 32, 1)).unwrap().pixels, plain);
+}
+
+#[test]
+fn bmp_is_read() {
+    let image = image::RgbImage::from_fn(5, 4, |x, y| image::Rgb([x as u8 * 3, y as u8 * 3, 9]));
+    let read = decode_grey(&bmp(image.into())).unwrap();
+    assert_eq!((read.pixels.dim(), read.colour), ((4, 5), true));
+    assert!((read.pixels[(3, 4)] - (12.0 + 9.0 + 9.0) / 3.0 / 255.0).abs() < 1e-6);
+}
+
+#[test]
+fn a_deep_pgm_has_the_scale_of_its_header() {
+    let pgm = decode_grey(b"P5 2 1 4095\n\x0f\xff\x07\xff").unwrap();
+    assert!((pgm.pixels[(0, 0)] - 1.0).abs() < 1e-6 && (pgm.pixels[(0, 1)] - 0.5).abs() < 1e-3, "{pgm:?}");
+}
