@@ -25,8 +25,7 @@ use farnear_rig::{
 
 use crate::{
     clock::{self, APB1_TIMER_HZ},
-    light,
-    registers,
+    light, registers,
 };
 
 /// Channels 1 to 4 in the register arrays, which start at 0.

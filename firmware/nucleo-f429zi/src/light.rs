@@ -56,7 +56,11 @@ pub struct LightPort {
 
 impl LightPort {
     /// Sets both up, off.
-    pub fn new(_timer: Peri<'static, TIM12>, first: Peri<'static, PB14>, second: Peri<'static, PB15>) -> Self {
+    pub fn new(
+        _timer: Peri<'static, TIM12>,
+        first: Peri<'static, PB14>,
+        second: Peri<'static, PB15>,
+    ) -> Self {
         rcc::enable_and_reset::<TIM12>();
         let timer = pac::TIM12;
         timer.psc().write_value(PRESCALER);
