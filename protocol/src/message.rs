@@ -5,7 +5,9 @@
 //! sensor distance = datum + coarse + fine + lens ([`sensor_distance_nm`]). Set-points are absolute, so a
 //! repeated request asks for nothing new. Times are [`BoardMicros`], durations [`Micros`].
 //!
-//! [`BoardMicros`]: crate::BoardMicros [`Micros`]: crate::Micros [`Nanometres`]: crate::Nanometres
+//! [`BoardMicros`]: crate::BoardMicros
+//! [`Micros`]: crate::Micros
+//! [`Nanometres`]: crate::Nanometres
 //!
 //! Variants and messages may be appended; any other change is a new protocol version. `tests/it/frozen_wire`
 //! freezes the bytes of version 3.

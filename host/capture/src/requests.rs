@@ -40,7 +40,7 @@ impl Client {
         }
     }
 
-    /// Switches both light outputs for `time`, at most 60 s. They go off earlier after [`Client::keep_alive`] without a request.
+    /// Switches both light outputs for `time`, at most 60 s. They go off earlier after `Client::keep_alive` without a request.
     pub fn set_lights(&self, levels: LightLevels, time: Micros) -> Result<(), ClientError> {
         let request = Request::SetLights { levels, time, silence: self.keep_alive() };
         self.expect_accepted(&request, "switching the light")

@@ -91,7 +91,7 @@ pub fn tiff(map: ArrayView2<f32>) -> Result<Vec<u8>, EncodeError> {
     Ok(bytes.into_inner())
 }
 
-/// [`tiff`] into a file, without a copy in memory.
+/// [`tiff()`] into a file, without a copy in memory.
 /// Errors: of the system or the encoder.
 pub fn tiff_to(map: ArrayView2<f32>, to: &mut (impl Write + Seek)) -> io::Result<()> {
     let (height, width) = map.dim();
