@@ -1,8 +1,8 @@
 //! # farnear
 //!
-//! The command line: parses, shows and asks; what is done lies in `farnear-workflows`. One file per command in [`commands`];
-//! [`terminal`] shows progress, asks, and hears Ctrl-C; [`report`] prints figures as text or JSON; [`hints`] says what to type
-//! after an error; [`render`] draws scenes, because a simulated lens is no part of the workflows.
+//! The command line: parses, shows and asks; the tasks are in `farnear-workflows`. One file per command in [`commands`];
+//! [`terminal`] shows progress, asks, and handles Ctrl-C; [`report`] prints figures as text or JSON; [`hints`] suggests what to type
+//! after an error; [`render`] draws scenes, because a simulated lens does not belong to the workflows.
 //!
 //! Exit code 0 only on success, 1 for failure, 2 for bad usage. Figures go to stdout, everything else to stderr.
 

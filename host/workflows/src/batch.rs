@@ -60,7 +60,7 @@ pub struct BatchSettings {
     pub shard: Shard,
     /// Whether results that are done already are looked through byte by byte, not only by the lengths of their files.
     pub verify: bool,
-    /// Where failures are written, a JSON line each; without it `NAME.failures.jsonl` beside the manifest.
+    /// Where failures are written, a JSON line each; by default `NAME.failures.jsonl` next to the manifest.
     pub failures: Option<PathBuf>,
     /// Table of all jobs of the shard with their figures, as CSV.
     pub summary: Option<PathBuf>,
@@ -79,7 +79,7 @@ pub struct Shard {
 
 /// A text that names no part.
 #[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
-#[error("`{0}` is no shard: expected I/N, from 1/N to N/N")]
+#[error("`{0}` is not a shard: expected I/N, from 1/N to N/N")]
 pub struct UnknownShard(String);
 
 impl Default for Shard {
@@ -166,7 +166,7 @@ fn is_zero(count: &usize) -> bool {
     *count == 0
 }
 
-/// Does the jobs of a manifest; `on_job` is told of each as it ends, one at a time.
+/// Does the jobs of a manifest; `on_job` is called for each as it ends, one at a time.
 ///
 /// # Errors
 /// A manifest that cannot be read, before anything is done; [`BatchError::Failed`] after all jobs where some failed;
@@ -207,7 +207,7 @@ pub fn run(
     let BatchFigures { jobs, done, already, todo, failed, seconds } = figures;
     let planned = if settings.dry_run { format!("{todo} to do, ") } else { String::new() };
     let sum = format!("{planned}{done} done, {already} already done, {failed} failed, of {jobs} jobs");
-    context.cancel.check(&format!("doing jobs ({sum}); the same command goes on where this one ended"))?;
+    context.cancel.check(&format!("doing jobs ({sum}); the same command continues"))?;
     context.info(&format!("{sum}, in {seconds} s"));
     if let Some(path) = &settings.summary {
         let table = summary.lock().unwrap_or_else(PoisonError::into_inner).csv();

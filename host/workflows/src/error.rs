@@ -217,7 +217,7 @@ pub enum WorkflowError {
     Sun(#[from] SunError),
     #[error(transparent)]
     Silhouettes(#[from] crate::silhouettes::SilhouettesError),
-    /// What moves in a video.
+    /// Moving regions of a video.
     #[error(transparent)]
     Background(#[from] BackgroundError),
     /// Pictures that a shadow detector cannot take.
@@ -303,7 +303,7 @@ impl WorkflowError {
         move |source| Self::Read { what, path: path.into(), source }
     }
 
-    /// Whether the work was given up because somebody wished so.
+    /// Whether the work was cancelled.
     pub fn is_cancelled(&self) -> bool {
         match self {
             Self::Cancelled { .. }
@@ -321,7 +321,7 @@ impl WorkflowError {
         }
     }
 
-    /// Whether what was asked for was wrong, and not the world: nothing has been done.
+    /// Whether the request was invalid: nothing has been done.
     pub fn is_usage(&self) -> bool {
         match self {
             Self::Parameter { .. } | Self::Request(_) => true,

@@ -244,7 +244,7 @@ pub struct FocusStackFigures {
     pub warnings: Vec<String>,
 }
 
-/// What is in `stack.toml`.
+/// Contents of `stack.toml`.
 #[derive(Serialize)]
 struct Record<'a> {
     made_by: &'static str,

@@ -1,4 +1,4 @@
-//! The working range as it is typed: what follows from lens, sensor and focus distances, or from a micrometer's readings.
+//! The working range from lens, sensor and focus distances, or from a micrometer's readings.
 //!
 //! A rig that is turned by hand has readings instead of positions: m1 where the far target is sharp, and m2 = m1 + 2 Fe Rmax
 //! for the near-focused image (Li 2014, eqs. 4.3 and 4.4). Given both readings, Rmax follows from them.

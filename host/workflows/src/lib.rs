@@ -44,7 +44,7 @@
 //!     home: true,
 //! };
 //! let face = Face::default();
-//! // Whoever holds a clone of `cancel` can stop the rig, from any thread.
+//! // A clone of `cancel` can stop the rig from any thread.
 //! let cancel = Cancel::default();
 //! let context = Context::new(&face, &Unattended, cancel.clone());
 //! let moved = rig::motion::move_to(&settings, &context)?;

@@ -26,9 +26,9 @@ use crate::{
 #[derive(Clone, Debug)]
 pub struct GivenOptics {
     pub path: PathBuf,
-    /// What it says, checked.
+    /// The checked contents.
     pub optics: Optics,
-    /// What it says, as it was written, for records.
+    /// The contents as written, for records.
     pub table: toml::Table,
 }
 
@@ -42,7 +42,7 @@ impl GivenOptics {
         Self::parse(&text, path)
     }
 
-    /// Checks optics that stand in another file, at `path`.
+    /// Checks optics that are part of another file, at `path`.
     ///
     /// # Errors
     /// Which value makes no optics.

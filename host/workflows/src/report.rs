@@ -1,6 +1,6 @@
 //! A capture or a result as one page that needs nothing else: pictures, figures and what made them, for a notebook or a printer.
 //!
-//! The pictures stand in the page as data, its style is in it, and nothing is fetched from anywhere.
+//! The pictures are in the page as data, its style is in it, and nothing is fetched from anywhere.
 
 mod kinds;
 mod page;
@@ -55,7 +55,6 @@ impl Request for ReportRequest {
     }
 }
 
-/// What is in a report.
 #[derive(Clone, PartialEq, Eq, Debug, Serialize)]
 pub struct ReportFigures {
     /// Pictures in the page.

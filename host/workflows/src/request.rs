@@ -91,7 +91,7 @@ pub enum RequestError {
     #[error("{field}: {reason}")]
     Value {
         field: String,
-        /// The value and what was expected.
+        /// The value and the expected ones.
         reason: String,
     },
 }

@@ -215,7 +215,7 @@ fn first_line(output: impl Read + Send + 'static, cancel: &Cancel) -> Result<Str
     std::thread::spawn(move || {
         let mut line = String::new();
         let read = BufReader::new(output).read_line(&mut line);
-        let _ = sender.send(read.map(|_| line)); // nobody listens after the deadline
+        let _ = sender.send(read.map(|_| line)); // the receiver is closed after the deadline
     });
     let until = Instant::now() + START;
     loop {

@@ -1,4 +1,4 @@
-//! Where the sun stands for a place and a time.
+//! The sun's position at a place and time.
 
 use std::str::FromStr;
 

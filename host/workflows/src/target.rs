@@ -30,7 +30,7 @@ const LEAST_DOTS: f64 = 2.0;
 const COARSE_PX: f64 = 4.0;
 /// What printers leave white around a page, mm.
 const MARGIN_MM: f64 = 10.0;
-/// For the line of 100 mm and what stands on it.
+/// Height of the line of 100 mm with its label.
 const FOOT_MM: f64 = 18.0;
 /// Cells of a page of 16 MB.
 const MOST_CELLS: usize = 1 << 27;

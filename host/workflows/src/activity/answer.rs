@@ -32,7 +32,7 @@ pub struct AnswerSummary {
 pub struct PersonInFrame {
     /// The number, from 1 in the order of coming.
     pub person: usize,
-    /// First row, first column, one past the last row and column of what is seen; `None` where nothing is.
+    /// Box of the person: first row, first column, one past the last row and column; `None` if empty.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub top_left_bottom_right: Option<[usize; 4]>,
     /// The activity so far; `None` is unknown.
@@ -41,7 +41,7 @@ pub struct PersonInFrame {
     pub confidence: f64,
     /// Outlier score: above 1 unknown; `None` where no silhouette has been seen.
     pub outlier_score: Option<f64>,
-    /// What is doubtful: `crossing:2`, `parted:2`, `perhaps-swapped:2`, `missed`, `cut-by-edge`.
+    /// Doubts: `crossing:2`, `parted:2`, `perhaps-swapped:2`, `missed`, `cut-by-edge`.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub flags: Vec<String>,
 }

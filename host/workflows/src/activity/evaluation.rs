@@ -35,7 +35,6 @@ use crate::{
 /// How often the time of an answer is taken; the shortest counts.
 const TIMINGS: usize = 3;
 
-/// What is evaluated, how, and where to.
 #[derive(Clone, PartialEq, Debug)]
 pub struct EvaluationSettings {
     /// The samples that are recognised, TOML.
@@ -48,7 +47,7 @@ pub struct EvaluationSettings {
     pub adaptation: Adaptation,
     /// Which views are recognised together; without it fused, or each by itself where clips differ in their views.
     pub views: Option<Views>,
-    /// A new folder for confusion.png, confusion.md and evaluation.toml (what was chosen in every fold).
+    /// A new folder for confusion.png, confusion.md and evaluation.toml (the choices of every fold).
     pub out: Option<PathBuf>,
 }
 
@@ -109,7 +108,7 @@ struct Record<'a> {
     fold: &'a [Choice],
 }
 
-/// Recognises every subject by what was learned from others.
+/// Recognises every subject by a model of the others.
 ///
 /// # Errors
 /// Samples that cannot be read or used, too few subjects, results that cannot be written.
@@ -161,7 +160,7 @@ pub fn evaluate(settings: &EvaluationSettings, context: &Context<'_>) -> Result<
 /// What of an open set is shown.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct OpenSetFigures {
-    /// Share of what is known that models were made to call unknown at most.
+    /// Largest share of known clips that models may call unknown.
     pub false_alarms: f64,
     /// Mean over the activities of the area under the outlier score's ROC curve.
     pub auroc: f64,
@@ -207,7 +206,7 @@ pub fn open_set(samples: &Path, method: &Method, context: &Context<'_>) -> Resul
 struct Clips {
     views: Views,
     test: Vec<Clip>,
-    /// What is learned from, where that is not the same.
+    /// The training set, if it is another one.
     train: Option<Vec<Clip>>,
 }
 
@@ -246,7 +245,7 @@ fn check_subjects(settings: &EvaluationSettings, subjects: &[String], learned: &
     }
 }
 
-/// Refuses to recognise what nobody has taught: an accuracy of 0 that only says that names differ.
+/// Refuses activities outside the training set: an accuracy of 0 would only mean that names differ.
 fn check_activities(settings: &EvaluationSettings, test: &[Clip], learned: &[Clip]) -> Result<()> {
     let (found, known) =
         (names(test.iter().map(|clip| &clip.activity)), names(learned.iter().map(|clip| &clip.activity)));

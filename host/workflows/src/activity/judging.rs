@@ -19,7 +19,6 @@ use super::{
 };
 use crate::{context::Context, counter::Counter, error::Result, figures::rounded};
 
-/// What is judged by what.
 #[derive(Clone, PartialEq, Debug)]
 pub struct JudgingSettings {
     pub samples: PathBuf,
@@ -27,7 +26,7 @@ pub struct JudgingSettings {
     pub same: Vec<(String, String)>,
     /// Rounds in which the model learns from its own surest answers for the samples first, without their labels; 0 for none.
     pub self_training: usize,
-    /// All views of a clip together, in place of each by itself.
+    /// All views of a clip together, instead of each separately.
     pub fused: bool,
     /// Why a blind set is opened; without it one is refused.
     pub open_blind: Option<String>,
@@ -40,7 +39,7 @@ pub struct JudgingSettings {
 pub struct JudgingFigures {
     /// Answers for clips of activities that the model knows.
     pub answers: u32,
-    /// Share of them that are right, whatever the model could answer.
+    /// Share of right answers among all activities of the model.
     pub accuracy: f64,
     /// Its 95 % interval (Wilson).
     pub confidence_interval: [f64; 2],

@@ -31,10 +31,10 @@ const DURING: &str = "drawing motion files";
 /// Ending of MATLAB files, which hold sets of joints.
 const MATLAB: &str = "mat";
 
-/// A motion file, and what is done in it by whom.
+/// A motion file with its activity and person.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct MotionFile {
-    /// What is done; `None` for files that say it: a set's MATLAB file, or NTU's in their names.
+    /// The activity; `None` for files that name it: a set's MATLAB file, or NTU's file names.
     pub activity: Option<String>,
     /// Who does it; `None` for the file's name, or what a set says.
     pub subject: Option<String>,
@@ -55,7 +55,7 @@ impl FromStr for MotionFile {
         };
         if path.trim().is_empty() || (names.is_some() && activity.is_none()) {
             return Err(
-                "expected ACTIVITY=FILE, SUBJECT:ACTIVITY=FILE, or FILE where it says what is done".into()
+                "expected ACTIVITY=FILE, SUBJECT:ACTIVITY=FILE, or FILE if it names its activity".into()
             );
         }
         Ok(Self { activity, subject, path: path.trim().into() })
@@ -68,7 +68,7 @@ pub struct MotionSettings {
     pub files: Vec<MotionFile>,
     /// What makes bodies of points: a built-in template's name, or a TOML file; without it the built-in one that fits best.
     pub template: Option<String>,
-    /// Unit and upward axis, where they are known better than the files say or suggest.
+    /// Unit and upward axis, to override the file.
     pub choices: Choices,
     /// Sides that every recording is seen from, 1 to 500.
     pub cameras: usize,
@@ -77,14 +77,14 @@ pub struct MotionSettings {
 /// Why a motion file teaches nothing.
 #[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
 pub enum MotionError {
-    /// Nothing says what is done in it.
-    #[error("{}: nothing says what is done in it; name it ACTIVITY=FILE", path.display())]
+    /// The activity is unknown.
+    #[error("{}: the activity is unknown; name it ACTIVITY=FILE", path.display())]
     Activity { path: PathBuf },
     /// A set has its own names.
     #[error("{}: a set of joints says itself who does what; give the file alone", path.display())]
     Named { path: PathBuf },
     /// No camera sees anybody.
-    #[error("{}: nobody is seen; the unit or the upward axis may be wrong", path.display())]
+    #[error("{}: no person is visible; the unit or the upward axis may be wrong", path.display())]
     NobodySeen { path: PathBuf },
 }
 
@@ -181,7 +181,7 @@ fn recorded(file: &MotionFile, settings: &MotionSettings, context: &Context<'_>)
     }])
 }
 
-/// The performances of UTKinect or Florence, told by their joints.
+/// The performances of UTKinect or Florence, recognised by their joints.
 fn set(path: &Path) -> Result<Vec<Recorded>> {
     /// Frames per second that both sets come to after their own cutting.
     const RATE_HZ: f64 = 15.0;

@@ -49,7 +49,7 @@ pub struct FrameOfPeople {
     pub name: String,
     /// Those who are followed, by their numbers.
     pub people: Vec<PersonInFrame>,
-    /// Why nobody is looked for in the frame.
+    /// Why the frame is not searched for people.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub flags: Vec<String>,
 }

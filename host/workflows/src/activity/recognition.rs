@@ -158,11 +158,11 @@ pub struct FrameAnswer {
     pub activity: Option<String>,
     /// Probability of the activity, 0 to 1.
     pub confidence: f64,
-    /// Outlier score: the distance from all training data over what is known, above 1 unknown; `None` where nobody was seen.
+    /// Outlier score; above 1 the activity is unknown. `None` without a person.
     pub outlier_score: Option<f64>,
     /// The person in the first view, if any: the schema of several people.
     pub people: Vec<PersonInFrame>,
-    /// What is doubtful about the frame's masks.
+    /// Doubts about the frame's masks.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub flags: Vec<String>,
 }

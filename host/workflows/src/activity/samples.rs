@@ -65,10 +65,10 @@ pub enum SamplesError {
     /// A sample without a person or without an activity.
     #[error("a sample has an empty subject or activity")]
     Nameless,
-    /// A folder in which nobody is seen.
+    /// A folder without a visible person.
     #[error("{}: all {count} masks are empty", folder.display())]
     NobodySeen { folder: PathBuf, count: usize },
-    /// Full frames beside cut-out silhouettes.
+    /// Full frames mixed with cut-out silhouettes.
     #[error(
         "the masks of {} are full frames, those of {} cut out at 100x100; samples must be alike", full.display(), cut_out.display()
     )]
@@ -115,7 +115,7 @@ pub enum SamplesError {
         /// The model's.
         known: Vec<String>,
     },
-    /// The same person in what is learned and what is tested.
+    /// The same person in training and test.
     #[error(
         "subject `{subject}` is in both {} and {}: recognising people by themselves says nothing", test.display(), train.display()
     )]
@@ -256,7 +256,7 @@ impl Samples {
         Err(SamplesError::Views { least, most }).about(|| self.path.display().to_string())
     }
 
-    /// Every view of every clip as a clip of its own.
+    /// Every view of every clip as a separate clip.
     pub fn split(self) -> Vec<Clip> {
         let alone = |clip: Clip| {
             let Clip { subject, activity, views } = clip;

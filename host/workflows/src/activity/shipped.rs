@@ -17,14 +17,14 @@ use crate::{context::Context, error::Result, figures::rounded, parameters::withi
 /// A recogniser that comes with the program.
 #[derive(PartialEq)]
 pub struct Shipped {
-    /// What it is called in place of a file.
+    /// Name, used instead of a file.
     pub name: &'static str,
-    /// What it is, in a line.
+    /// Description, one line.
     pub about: &'static str,
     /// Figures of a blind set; `None` if none was measured.
     new_set: Option<NewSet>,
     bytes: &'static [u8],
-    /// Its file for silhouettes that are cut out at 100x100, whose motion through the picture is gone.
+    /// Its file for silhouettes cut out at 100x100, without motion through the picture.
     cut_out: &'static [u8],
 }
 

@@ -1,4 +1,4 @@
-//! A streaming answer with what it rests on, the picture and the person cut out of it: for a face that shows both while they come, from a
+//! A streaming answer with its data, the picture and the person cut out of it: for a face that shows both while they come, from a
 //! video or from the rig's camera.
 
 use std::{path::Path, time::Instant};

@@ -57,7 +57,7 @@ impl ViewKind {
     }
 }
 
-/// A view: where it lies, and what it is.
+/// A view: its path and kind.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct View {
     /// A folder, a picture or a video.
@@ -80,7 +80,7 @@ impl View {
     }
 }
 
-/// A frame's mask and what is doubtful about it.
+/// A frame's mask and the doubts about it.
 pub(super) struct Seen {
     pub name: String,
     pub mask: Mask,
@@ -89,10 +89,10 @@ pub(super) struct Seen {
     pub picture: Option<Pixels>,
 }
 
-/// All that moves in a frame, whoever it is.
+/// Everything that moves in a frame.
 pub(super) struct Moved {
     pub name: String,
-    /// Or why there is no mask.
+    /// Or why the frame has no mask.
     pub mask: std::result::Result<Mask, Flag>,
     /// The video's frame; `None` for masks.
     pub picture: Option<Pixels>,

@@ -32,7 +32,7 @@ pub(super) struct Listed {
     pub positions: Vec<f64>,
     /// The files with the optics and the positions.
     pub described_by: Vec<PathBuf>,
-    /// The lens, where it is known.
+    /// The lens, if known.
     pub optics: Option<Optics>,
     /// Side of a pixel at the object, um, from the file's metadata.
     pub object_pixel_um: Option<f64>,
@@ -40,7 +40,7 @@ pub(super) struct Listed {
     pub remarks: Vec<String>,
 }
 
-/// The images, and what is known of them.
+/// The images with their positions.
 pub(super) fn of(request: &FocusStackRequest) -> Result<Listed> {
     let record = if request.stack.is_dir() { read_record(&request.stack)? } else { None };
     let listed = match &record {
@@ -138,7 +138,7 @@ impl Axis {
 }
 
 impl Listed {
-    /// How the lens bends lines, where that is known.
+    /// The lens' distortion, if known.
     pub(super) fn distortion(&self) -> Option<Distortion> {
         self.optics.and_then(|lens| lens.distortion())
     }

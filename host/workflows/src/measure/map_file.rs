@@ -22,7 +22,7 @@ use crate::{
     result_folder::{DEPTH_RECORD, STACK_RECORD},
 };
 
-/// What is read of `depth.toml`.
+/// The part of `depth.toml` that is read.
 #[derive(Deserialize)]
 struct DepthRecord {
     optics: Optics,
@@ -30,7 +30,7 @@ struct DepthRecord {
     png: Option<Scale>,
 }
 
-/// What is read of `stack.toml`.
+/// The part of `stack.toml` that is read.
 #[derive(Deserialize)]
 struct StackRecord {
     unit: Unit,

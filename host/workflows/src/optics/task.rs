@@ -1,4 +1,4 @@
-//! `farnear optics`: what a pair of given optics can measure, and optics for what is to be measured.
+//! `farnear optics`: what a pair with given optics can measure, and optics for a given distance, range and error.
 
 use std::path::PathBuf;
 
@@ -19,7 +19,7 @@ use crate::{
     request::{PathKind, Request},
 };
 
-/// Largest blur radius that the operators are made for, px, and what is aimed at.
+/// Largest blur radius that the operators are made for, px, and the target.
 const USABLE_BLUR_PX: [f64; 2] = [2.0, 4.0];
 const BEST_BLUR_PX: f64 = 2.7;
 /// Focal lengths of common lenses, mm.
@@ -38,7 +38,7 @@ const AVERAGED_MAX: f64 = 64.0;
 /// Print what a pair can measure: working range, blur, expected error, and what to change; or propose optics.
 ///
 /// With --optics: the working range, the largest blur, the limits within which depths are accepted, and the error that noise causes.
-/// With --distance-mm, --range-mm and --error-mm: focal length, aperture, focus pair and pixel binning for what is to be measured;
+/// With --distance-mm, --range-mm and --error-mm: focal length, aperture, focus pair and pixel binning for these;
 /// --out writes them as an optics file.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize, JsonSchema)]
 #[cfg_attr(feature = "clap", derive(clap::Args))]
@@ -52,7 +52,7 @@ pub struct OpticsRequest {
     /// The optics file.
     #[cfg_attr(feature = "clap", arg(long, value_name = "FILE"))]
     pub optics: Option<PathBuf>,
-    /// Distance from the lens to the middle of what is to be measured, in mm, instead of an optics file.
+    /// Distance from the lens to the middle of the range, in mm, instead of an optics file.
     #[cfg_attr(feature = "clap", arg(long, value_name = "MM", conflicts_with = "optics"))]
     pub distance_mm: Option<f64>,
     /// Depth range to be measured, in mm.
@@ -123,7 +123,7 @@ impl Request for OpticsRequest {
             }
             (optics, ..) => {
                 let value = optics.as_ref().map_or("nothing".into(), |file| file.display().to_string());
-                let expected = "an optics file, or --distance-mm and --range-mm of what is to be measured";
+                let expected = "an optics file, or --distance-mm and --range-mm";
                 Err(WorkflowError::parameter("optics", value, expected))
             }
         }
@@ -256,7 +256,7 @@ fn of_blur(optics: &Optics, blur_px: f64) -> Option<f64> {
     file.check().ok().map(|optics| optics.working_range().near_mm)
 }
 
-/// Optics for what is to be measured.
+/// Optics for a given distance, range and error.
 fn propose(request: &OpticsRequest) -> Result<(Optics, OpticsFigures)> {
     let (distance, range) = (request.distance_mm.unwrap_or(f64::NAN), request.range_mm.unwrap_or(f64::NAN));
     let accepted = request.error_mm.unwrap_or(f64::INFINITY);

@@ -1,4 +1,4 @@
-//! What is on the page of each kind of folder.
+//! Contents of the page for each kind of folder.
 
 use std::{fmt::Write as _, fs, path::Path};
 

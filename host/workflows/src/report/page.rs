@@ -73,7 +73,7 @@ impl Page {
     }
 }
 
-/// A text as it may stand in a page, also inside quotes.
+/// Escapes a text for a page, also inside quotes.
 pub(super) fn escaped(text: &str) -> String {
     text.chars().fold(String::with_capacity(text.len()), |mut escaped, letter| {
         match letter {

@@ -1,4 +1,4 @@
-//! Maps as pictures with a colour map that is told apart by every eye (viridis), and a histogram as SVG.
+//! Maps as pictures with a colour map for every eye (viridis), and a histogram as SVG.
 
 use std::{fmt::Write as _, io::Cursor};
 

@@ -126,13 +126,13 @@ pub struct CameraSettings {
 /// Reads `FIRST` or `FIRST,SECOND`, percent.
 ///
 /// # Errors
-/// What is wrong with it.
+/// Why the device cannot be used.
 pub fn parse_light(text: &str) -> std::result::Result<LightLevels, String> {
     let level = |part: &str| match part.trim().parse::<f64>() {
         Ok(percent) if (0.0..=100.0).contains(&percent) => {
             Ok((percent / 100.0 * f64::from(LIGHT_LEVEL_MAX)).round() as u16)
         }
-        _ => Err(format!("{part:?} is no brightness: expected 0 to 100 %")),
+        _ => Err(format!("{part:?} is not a brightness: expected 0 to 100 %")),
     };
     let (first, second) = text.split_once(',').unwrap_or((text, "0"));
     Ok(LightLevels { first: level(first)?, second: level(second)? })

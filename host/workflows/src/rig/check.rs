@@ -1,4 +1,4 @@
-//! The bring-up checklist: its steps in order, each with a verdict and what was found.
+//! The bring-up checklist: its steps in order, each with a verdict and details.
 //!
 //! Prompts the person before each step that needs actuation by hand and measures the rest. On an emulated rig these steps
 //! are skipped; their detail names the later step that shows the same.
@@ -142,7 +142,7 @@ struct Checkup<'a> {
     equipped: EquippedRig,
     settings: &'a CheckSettings,
     context: &'a Context<'a>,
-    /// Whether somebody can press switches.
+    /// Whether a person can press switches.
     actuation: bool,
     outcomes: Vec<Outcome>,
 }

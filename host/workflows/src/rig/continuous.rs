@@ -1,4 +1,4 @@
-//! Continuous capture: far, near, far, near ... or a cycle of shots at a pace that the board holds, until it is enough or somebody
+//! Continuous capture: far, near, far, near ... or a cycle of shots at a pace that the board holds, until its end or until a user
 //! ends it; with figures of the pace, and pairs or images in a folder where one is named.
 
 mod figures;

@@ -31,7 +31,7 @@ use crate::{
 
 /// Fewest and most pairs.
 const PAIRS: std::ops::RangeInclusive<usize> = 2..=50;
-/// Part of the image that is looked at, along each side: the rim has less light and more distortion.
+/// Part of the image that is measured, along each side: the rim has less light and more distortion.
 const MIDDLE: f64 = 0.8;
 
 #[derive(Clone, PartialEq, Debug)]

@@ -29,7 +29,7 @@ use crate::{
     sun::Moment,
 };
 
-/// What the file is called that says how a camera stands.
+/// Name of the file with the camera's pose.
 pub const CAMERA_FILE: &str = "the camera file";
 
 /// Above this share of a silhouette removed the cut is doubted, 0 to 1.
@@ -47,7 +47,7 @@ pub struct RemovalSettings {
     pub method: Method,
     /// The new folder for the masks without shadow.
     pub out: PathBuf,
-    /// A new folder for a picture per mask of how it was cut, beside `out`.
+    /// A new folder for a picture of each cut, next to `out`.
     pub stages: Option<PathBuf>,
 }
 
@@ -193,7 +193,6 @@ pub fn remove_from_masks(settings: &RemovalSettings, context: &Context<'_>) -> R
 /// A lamp's place, `RIGHT,AHEAD,UP` in metres from the ground below the lens.
 ///
 /// # Errors
-/// What was expected.
 pub fn parse_lamp(text: &str) -> Result<Lamp, String> {
     let numbers: Vec<f64> = text.split(',').filter_map(|part| part.trim().parse().ok()).collect();
     let [right_m, ahead_m, up_m] = numbers[..] else {
@@ -218,8 +217,7 @@ impl RemovalSettings {
     fn check_folders(&self) -> Result<()> {
         let Some(stages) = &self.stages else { return Ok(()) };
         if stages.starts_with(&self.out) || self.out.starts_with(stages) {
-            let expected =
-                format!("a folder of its own, not in {} nor the other way round", self.out.display());
+            let expected = format!("another folder, neither inside {} nor around it", self.out.display());
             return Err(WorkflowError::parameter("stages' folder", stages.display(), expected));
         }
         Ok(())
@@ -264,7 +262,7 @@ fn camera(path: &Path) -> Result<CameraFile> {
     CameraFile::parse(&text).about(|| path.display().to_string())
 }
 
-/// What goes on from frame to frame.
+/// State carried from frame to frame.
 struct Work<'a> {
     settings: &'a RemovalSettings,
     camera: &'a CameraFile,
@@ -329,7 +327,7 @@ impl Work<'_> {
     }
 }
 
-/// What is doubtful about a cut.
+/// Doubts about a cut.
 fn doubts(cut: &CutReport, light: Light) -> Vec<&'static str> {
     /// Below this the shadow is so long that its direction in the picture hangs on small errors.
     const LOW_DEG: f64 = 8.0;

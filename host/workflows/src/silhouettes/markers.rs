@@ -37,12 +37,11 @@ use crate::{
     parameters::{at_least, within},
 };
 
-/// What is drawn, how, and where to.
 #[derive(Clone, Debug)]
 pub struct MarkersSettings {
-    /// The recording; its ending says what kind of file it is.
+    /// The recording; its ending determines the format.
     pub file: PathBuf,
-    /// The file's unit and upward axis, where they are known better than the file says or suggests.
+    /// Unit and upward axis, to override the file.
     pub choices: Choices,
     /// A built-in template's name, or a TOML file; without it the built-in one that fits best.
     pub template: Option<String>,
@@ -53,7 +52,7 @@ pub struct MarkersSettings {
     pub first_view_deg: f64,
     /// From how high the views look down, -90 to 90 degrees.
     pub elevation_deg: f64,
-    /// What a pixel stands for, 0.1 to 1000 mm.
+    /// Scale, mm per px, 0.1 to 1000.
     pub mm_per_px: f64,
     /// Gaps at joints up to this width are closed, 0 to 1000 mm; without it 126 as in the thesis, or 40 where the template's
     /// parts have a thickness, which fills joints by itself.
@@ -64,7 +63,7 @@ pub struct MarkersSettings {
     pub every: usize,
     /// Masks of 100x100 pixels with the subject centred, instead of full frames.
     pub centred: bool,
-    /// Keep only so many silhouettes of all views, the least alike (Li 2014, eq. 7.3), at 100x100 pixels.
+    /// Keep only this many silhouettes of all views, the least alike (Li 2014, eq. 7.3), at 100x100 pixels.
     pub keep: Option<usize>,
     /// Write `samples.toml` too, for training and evaluation: who does what.
     pub samples: Option<Performer>,
@@ -109,7 +108,7 @@ pub struct MarkersFigures {
     pub views: usize,
     /// Frames drawn of each.
     pub frames: usize,
-    /// Masks that hold somebody.
+    /// Masks with a person.
     pub silhouettes: usize,
     /// Frames of which a part could not be drawn.
     pub flagged_frames: usize,
@@ -120,7 +119,7 @@ pub struct MarkersFigures {
     /// Share of all points in all frames that were hidden.
     pub hidden_markers_percent: f64,
     pub seconds: f64,
-    /// What was guessed about the recording.
+    /// Guesses about the recording.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub warnings: Vec<String>,
 }
@@ -135,7 +134,7 @@ struct Index<'a> {
     view_directions_deg: Vec<f64>,
     /// Parts of the template of which the recording has no marker at all.
     parts_not_recorded: &'a [String],
-    /// What was guessed about the recording.
+    /// Guesses about the recording.
     #[serde(skip_serializing_if = "<[String]>::is_empty")]
     guessed: &'a [String],
     #[serde(skip_serializing_if = "Vec::is_empty")]
@@ -268,7 +267,7 @@ fn lying(recording: &Recording) -> Option<String> {
         longer += usize::from(along > LONGER * up);
     }
     (frames > 0 && 2 * longer > frames).then(|| {
-        format!("longer than high in {longer} of {frames} frames: if nobody lies there, another axis points up (--up x, y or z)")
+        format!("longer than high in {longer} of {frames} frames: if the person does not lie, another axis points up (--up x, y or z)")
     })
 }
 

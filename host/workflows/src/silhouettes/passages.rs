@@ -1,4 +1,4 @@
-//! A folder of masks cut into passages: one for every time that somebody comes through the picture (KTH's walking, say).
+//! A folder of masks cut into passages: one for each passage of a person (KTH's walking, say).
 
 use std::{path::PathBuf, time::Instant};
 
@@ -12,7 +12,6 @@ use serde::Serialize;
 use super::{SilhouettesError, markers::Performer, performances::samples_entry};
 use crate::{context::Context, counter::Counter, error::Result, figures::rounded, parameters::at_least};
 
-/// What is cut, how, and where to.
 #[derive(Clone, PartialEq, Debug)]
 pub struct PassagesSettings {
     /// The folder of masks, in the order of their names.
@@ -23,7 +22,7 @@ pub struct PassagesSettings {
     pub performer: Performer,
     /// Shorter passages are left out, frames.
     pub least_frames: usize,
-    /// Fewer pixels are nobody.
+    /// Smallest person, px.
     pub least_px: usize,
 }
 
@@ -40,7 +39,7 @@ pub struct PassagesFigures {
 /// A mask on its way into a passage.
 type Kept = (String, Mask);
 
-/// Cuts where the numbers in the masks' names leap, and where nobody is seen.
+/// Cuts at gaps in the numbers of the masks' names, and at frames without a person.
 ///
 /// # Errors
 /// Masks that cannot be read, no passage of enough frames, a folder that cannot be written.

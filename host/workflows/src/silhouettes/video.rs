@@ -1,6 +1,6 @@
 //! Masks of the person who moves in a video, one picture per frame.
 //!
-//! A background model learns what stands still; what moves is cleaned and the person chosen. Memory does not grow with the
+//! A background model learns static pixels; moving regions are cleaned and the person chosen. Memory does not grow with the
 //! video's length but for the index.
 
 use std::{path::PathBuf, time::Instant};
@@ -59,7 +59,7 @@ pub enum ShadowTreatment {
     /// The background model tells it by colour; in grey it stays.
     #[default]
     ByModel,
-    /// What is merely darker than the background counts as the person.
+    /// Count pixels that are only darker than the background as the person.
     Keep,
     /// An image-based detector takes it off; colour only.
     Detector(Method),
@@ -127,7 +127,7 @@ struct Entry {
     top_left_bottom_right: Option<[usize; 4]>,
 }
 
-/// Makes a mask of every frame (255 = person) and `silhouettes.toml`, which flags what is doubtful.
+/// Makes a mask of every frame (255 = person) and `silhouettes.toml`, which flags doubtful frames.
 ///
 /// # Errors
 /// Where the video cannot be read, its frames differ, or the masks cannot be written; then the new folder is not there.

@@ -40,7 +40,7 @@ pub(super) fn pdf(texture: &Texture, paper: Paper, cell_mm: f64, label: &str) ->
     pdf.finish()
 }
 
-/// What stands where on the page.
+/// Layout of the page.
 fn drawing(
     texture: &Texture,
     paper: Paper,

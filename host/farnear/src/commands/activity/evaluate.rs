@@ -21,14 +21,14 @@ use serde::Serialize;
 use super::method::MethodArguments;
 use crate::{report, terminal};
 
-/// Evaluates the method: every subject is recognised by what was learned from the others.
+/// Evaluates the method: every subject is recognised by a model of the others.
 ///
 /// With --leave-one-subject-out each subject in turn is left out of the training, in which everything that can be
 /// chosen is chosen by cross-validation over the remaining subjects. --train gives other samples to learn from (clean
 /// masks for damaged ones of the same people, say; a subject's own are left out as before). Without
 /// --leave-one-subject-out but with --train all of that is learned from, and the subjects must be others.
 ///
-/// --open-set leaves out activities in place of subjects: half of the subjects teach the others, the other half does all.
+/// --open-set leaves out activities instead of subjects: half of the subjects train the others, the other half performs all.
 ///
 /// --model judges a finished model instead: answers among all that it knows and among what the samples hold, how far confidences are
 /// from the fraction of right answers, how many known and unknown activities it calls unknown. With --leave-one-set-out it is judged on several
@@ -60,7 +60,7 @@ pub struct Arguments {
     /// An activity's name in the samples and in the model, where they differ; may be repeated.
     #[arg(long, value_name = "SAMPLES=MODEL", requires = "model", value_parser = same)]
     same: Vec<(String, String)>,
-    /// Leave every activity out of the training in turn, and say how well it is told to be unknown.
+    /// Leave every activity out of the training in turn, and report how often it is called unknown.
     #[arg(long, conflicts_with_all = ["leave_one_subject_out", "train", "model", "views", "out"])]
     open_set: bool,
     /// Learn on from one's own surest answers for the clips that are recognised, without their labels: for clips from another camera,
@@ -77,7 +77,7 @@ pub struct Arguments {
     /// differ in their views].
     #[arg(long)]
     views: Option<Views>,
-    /// Folder for confusion.png, confusion.md and evaluation.toml (what was chosen in every fold), or wrong.csv (a model's mistakes).
+    /// Folder for confusion.png, confusion.md and evaluation.toml (the choices of every fold), or wrong.csv (a model's mistakes).
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Print figures as JSON.

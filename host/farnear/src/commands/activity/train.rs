@@ -21,7 +21,7 @@ use crate::{report, terminal};
 /// views are fused; give them a common `clip = "name"` where a subject does an activity more than once and the order does not tell.
 /// With two or more subjects the settings are chosen by cross-validation over them.
 ///
-/// --motion learns from motion files, alone or beside samples: recordings of markers or joints (.c3d, .trc, .bvh, .csv, .skeleton, .txt), or
+/// --motion learns from motion files, alone or with samples: recordings of markers or joints (.c3d, .trc, .bvh, .csv, .skeleton, .txt), or
 /// UTKinect's and Florence's MATLAB files. Each recording is seen by cameras all round, at any height and distance, in clothes of any
 /// thickness, cut and segmented as recordings are.
 ///
@@ -37,7 +37,7 @@ pub struct Arguments {
     samples: Option<PathBuf>,
     #[command(flatten)]
     motion: MotionArguments,
-    /// Learn from synthetic people in place of samples.
+    /// Learn from synthetic people instead of samples.
     #[arg(long, value_name = "WHICH", conflicts_with_all = ["samples", "motion", "window", "any_view", "mode", "epl", "classifier", "no_search", "features"])]
     synthetic: Option<Synthetic>,
     /// Synthetic people to learn from.
@@ -51,10 +51,10 @@ pub struct Arguments {
     out: PathBuf,
     #[command(flatten)]
     method: MethodArguments,
-    /// Cut clips into windows of so many frames first: for recognition in recordings that nobody cut.
+    /// Cut clips into windows of this many frames first: for un-segmented recordings.
     #[arg(long, value_name = "FRAMES")]
     window: Option<usize>,
-    /// Take every view as a clip of its own, so that the model recognises from one view, whichever it is.
+    /// Use every view as a separate clip, so that the model recognises from any single view.
     #[arg(long)]
     any_view: bool,
     /// Print figures as JSON.
@@ -62,10 +62,9 @@ pub struct Arguments {
     json: bool,
 }
 
-/// What is learned from motion files.
 #[derive(Args)]
 struct MotionArguments {
-    /// Motion files to learn from: FILE that says itself what is done in it (UTKinect, Florence, NTU), or with the activity and, where it
+    /// Motion files to learn from: FILE that names its activity (UTKinect, Florence, NTU), or with the activity and, where it
     /// is not the file's name, the person before it.
     #[arg(long, value_name = "[[SUBJECT:]ACTIVITY=]FILE", num_args = 1..)]
     motion: Vec<MotionFile>,

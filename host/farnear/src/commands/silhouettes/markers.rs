@@ -25,7 +25,7 @@ pub struct Arguments {
     /// of such files, a frame each. Keypoints have one view.
     file: PathBuf,
     /// plug-in-gait (also CMU's 41 markers), vicon-53, opencap, thesis, bvh, kinect, keypoints, or a TOML file of `[[part]] name, markers,
-    /// thickness_mm` [default: the one of these that fits best, which is said].
+    /// thickness_mm` [default: the one of these that fits best, which is reported].
     #[arg(long, value_name = "NAME|FILE")]
     template: Option<String>,
     /// Folder for the masks; must not exist or be empty.
@@ -66,7 +66,7 @@ pub struct Arguments {
     /// Write masks of 100x100 pixels with the subject centred, instead of full frames.
     #[arg(long)]
     centred: bool,
-    /// Keep only the so many least alike silhouettes of all views (Li 2014, eq. 7.3): a gallery, no longer a sequence. The
+    /// Keep only this many silhouettes, the least alike of all views (Li 2014, eq. 7.3): a gallery, no longer a sequence. The
     /// masks are 100x100 then.
     #[arg(long, value_name = "COUNT")]
     keep: Option<usize>,

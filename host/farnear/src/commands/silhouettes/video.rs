@@ -12,9 +12,9 @@ use crate::{report, terminal};
 
 /// Masks of the person who moves in a video, one PNG per frame (255 = person).
 ///
-/// A background model learns what stands still; what moves is cleaned and the person chosen. Frames with nobody, with
-/// several people, of a changed scene, with a person in pieces or standing still, or from before the background is known are flagged in `silhouettes.toml` beside
-/// the masks; where nobody can be told the mask is empty.
+/// A background model learns static pixels; moving regions are cleaned and the person chosen. Frames without a person, with
+/// several people, of a changed scene, with a person in pieces or standing still, or from before the background is known are flagged in `silhouettes.toml` next to
+/// the masks; without a recognisable person the mask is empty.
 #[derive(Args)]
 #[command(after_help = "Example: farnear silhouettes video walk.y4m --out masks/ --learn-first")]
 pub struct Arguments {
@@ -36,7 +36,7 @@ pub struct Arguments {
     /// nothing), always (who stands becomes background within seconds) or never (only --learn-first or --learning-frames).
     #[arg(long, value_name = "WHEN", default_value = "outside-people")]
     learning: Learning,
-    /// Count what is merely darker than the background as the person, not as shadow.
+    /// Count pixels that are only darker than the background as the person, not as shadow.
     #[arg(long)]
     keep_shadow: bool,
     /// Take shadow off with one of the image-based detectors instead of the background model's own test (colour only):

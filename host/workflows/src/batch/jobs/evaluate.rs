@@ -25,7 +25,7 @@ use crate::{
     error::{Result, WorkflowError},
 };
 
-/// Name of the figures beside the pictures.
+/// Name of the figures next to the pictures.
 const FIGURES: &str = "figures.json";
 
 pub(super) fn work(fields: &mut Fields) -> Result<Box<dyn Job>> {
@@ -100,7 +100,7 @@ fn judged(
     kept(value(judging::judge(&model, &settings, context)?)?, out)
 }
 
-/// Lays the figures beside the pictures, without times: the same samples are to give the same file.
+/// Writes the figures next to the pictures, without times: the same samples are to give the same file.
 fn kept(figures: Value, out: &Path) -> Result<Value> {
     let mut same = figures.clone();
     if let Some(same) = same.as_object_mut() {

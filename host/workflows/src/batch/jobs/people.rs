@@ -36,7 +36,7 @@ pub(super) fn video(fields: &mut Fields) -> Result<Box<dyn Job>> {
         learning: fields.optional("learning")?.unwrap_or_default(),
         shadow: match (detector, fields.flag("keep_shadow")?) {
             (Some(detector), true) => {
-                let reason = "keep_shadow says that nothing takes it off; name one of them";
+                let reason = "keep_shadow excludes removing it; name one of them";
                 return Err(BatchError::field("shadow_detector", detector.name(), reason).into());
             }
             (Some(detector), false) => ShadowTreatment::Detector(detector),
@@ -143,7 +143,6 @@ fn light(fields: &mut Fields) -> Result<LightSource> {
     Ok(LightSource::Sun { moment, rate_hz: fields.optional("rate_hz")? })
 }
 
-/// What is recognised by which model.
 struct Recognising {
     model: PathBuf,
     views: Vec<PathBuf>,

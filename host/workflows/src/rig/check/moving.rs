@@ -90,7 +90,7 @@ pub(super) fn full_speed(checkup: &mut Checkup<'_>) -> Found {
             return failed(format!("the {} stands {error:+.3} um off", axis_name(axis)));
         }
         if axis == Axis::Lens {
-            // Where it stands decides which distances of the sensor can be reached: whoever captures next expects it where homing
+            // Where it stands decides which distances of the sensor can be reached: the next capture expects it where homing
             // leaves it.
             client.move_to(axis, Nanometres(min))?;
         }

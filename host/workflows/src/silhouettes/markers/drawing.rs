@@ -46,7 +46,7 @@ pub struct Job<'a> {
 }
 
 impl Job<'_> {
-    /// All frames of every view, a folder of masks each; gives how many masks hold somebody.
+    /// All frames of every view, a folder of masks each; returns the number of masks with a person.
     pub fn sequences(&self, views: &[View], out: &Staging) -> Result<usize> {
         let counter = Counter::new(self.context, UNIT);
         let drawn: Result<Vec<usize>> = views
