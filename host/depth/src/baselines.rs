@@ -30,7 +30,7 @@ use crate::pipeline::{DepthMap, RunError, Settings};
 
 pub use favaro::{Favaro, FavaroSettings};
 
-/// Which baseline.
+/// Name of the baseline.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Method {
@@ -54,9 +54,9 @@ pub enum BaselineError {
     /// Favaro's settings make no sense.
     #[error("{name} = {value}: must lie between {least} and {most}")]
     Setting {
-        /// Which.
+        /// Name of the parameter.
         name: &'static str,
-        /// What was given.
+        /// The value that was given.
         value: usize,
         /// Least.
         least: usize,

@@ -105,7 +105,7 @@ pub enum CalibrationError {
         "pair {index}: the far image is {far_width}x{far_height}, the near image {near_width}x{near_height}"
     )]
     SizeMismatch {
-        /// Which pair.
+        /// Index of the pair.
         index: usize,
         /// Width of the far image.
         far_width: usize,
@@ -119,11 +119,11 @@ pub enum CalibrationError {
     /// An image that has no usable spectrum.
     #[error("pair {index}, {which} image: {reason}")]
     Image {
-        /// Which pair.
+        /// Index of the pair.
         index: usize,
         /// `far` or `near`.
         which: &'static str,
-        /// What is wrong.
+        /// Description of the fault.
         reason: SpectrumError,
     },
     /// The target stands where the pair says nothing.
@@ -131,7 +131,7 @@ pub enum CalibrationError {
         "pair {index}: at alpha = {alpha:.2} both images are blurred alike; put the target at the far or the near focus"
     )]
     MiddleOfRange {
-        /// Which pair.
+        /// Index of the pair.
         index: usize,
         /// Where the target stands.
         alpha: f64,
@@ -142,7 +142,7 @@ pub enum CalibrationError {
          put the target at the far or the near focus, or say at which depth it stands"
     )]
     NeitherSharp {
-        /// Which pair.
+        /// Index of the pair.
         index: usize,
         /// Energy of the far image over that of the near one.
         ratio: f64,
@@ -164,11 +164,11 @@ pub enum CalibrationError {
     /// A flat target gave no depth map.
     #[error("flat target {index} at {true_mm} mm: {reason}")]
     FlatTarget {
-        /// Which target.
+        /// Index of the target.
         index: usize,
         /// Its depth.
         true_mm: f64,
-        /// Why.
+        /// The reason, in words.
         reason: RunError,
     },
 }

@@ -43,7 +43,7 @@ pub const GROWN_TEXTURE: f32 = 0.7;
 /// Confidence of a filled pixel: less than any that was measured on enough texture.
 pub const FILLED_CONFIDENCE: f32 = 0.2;
 
-/// What was done.
+/// Report of the work.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Filled {
     /// Number of regions that were filled.

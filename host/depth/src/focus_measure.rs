@@ -24,7 +24,7 @@ use crate::fourier::{Complex64, transform};
 /// Smallest side of an image that can be judged.
 const SMALLEST_PX: usize = 8;
 
-/// Which measure.
+/// Name of the measure.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum FocusMeasure {

@@ -37,7 +37,7 @@ const BAND: usize = 48;
 pub const MOST_SMOOTHING_PX: f32 = 10.0;
 /// Most that places are corrected over, px.
 pub const MOST_GUIDED_PX: f32 = 100.0;
-/// Reliability below which a place has no depth, where nothing else is asked for.
+/// Reliability below which a place has no depth, where nothing else is requested.
 pub const USUAL_RELIABILITY: f32 = 0.1;
 
 /// How a stack is measured.

@@ -20,7 +20,7 @@ pub enum CompareError {
         "{what} is {found_width}x{found_height}, the depth map {width}x{height}: they must have one size"
     )]
     Size {
-        /// What differs.
+        /// The quantity that differs.
         what: &'static str,
         /// Width of the depth map.
         width: usize,

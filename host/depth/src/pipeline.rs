@@ -78,7 +78,7 @@ pub enum RunError {
     /// The smoothing or median window is unusable.
     #[error("{what} window of {size} px: must be odd and from 1 to {largest}")]
     Window {
-        /// Which window.
+        /// Name of the window.
         what: &'static str,
         /// The size asked for.
         size: usize,
@@ -110,7 +110,7 @@ pub struct Settings {
     pub median_px: usize,
     /// Whether regions of low texture are filled from what surrounds them ([`crate::fill`]).
     pub fill: bool,
-    /// What is filled.
+    /// Selection of the holes to fill.
     #[serde(skip_serializing_if = "is_usual")]
     pub low_texture: LowTexture,
     /// In which order it is filled, and from what.

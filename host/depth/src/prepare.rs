@@ -1,14 +1,14 @@
 //! What a pair goes through before depth, so that both images are of one scene, one place and one brightness.
 //!
 //! 1. The camera's dark and flat frames are taken off ([`CameraFrames`]).
-//! 2. Saturated, black, bad and missing pixels are mended where they stand alone, and left out where they do not.
+//! 2. Saturated, black, bad and missing pixels are corrected where they are single, and left out where they do not.
 //! 3. Lens distortion is taken out of both, where the optics name one.
 //! 4. The near image is laid on the far one ([`align`]): by the magnification that follows from the optics of a lens that is
 //!    not telecentric, and by what is measured.
 //! 5. Both are brought to one brightness ([`balance`]).
 //! 6. What moved between the exposures is marked, and a pair of different scenes is refused ([`agreement`]).
 //!
-//! By itself ([`Align::Auto`], [`Balance::Auto`]) it changes only what it finds to be different beyond doubt: a good pair
+//! By itself ([`Align::Auto`], [`Balance::Auto`]) it changes only what it finds to be different for certain: a good pair
 //! goes through untouched.
 
 pub mod agreement;
@@ -56,7 +56,7 @@ const TELLING: f64 = 0.05;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Align {
-    /// As the optics say, and a similarity where one is found beyond doubt.
+    /// As the optics say, and a similarity where one is found for certain.
     #[default]
     Auto,
     /// Not at all.
@@ -75,7 +75,7 @@ pub enum Align {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Balance {
-    /// By a gain, or one that varies, where one is found beyond doubt.
+    /// By a gain, or one that varies, where one is found for certain.
     #[default]
     Auto,
     /// Not at all.
@@ -177,7 +177,7 @@ pub struct Balanced {
     pub range: Option<[f64; 2]>,
 }
 
-/// What was found and done.
+/// Report of the preparation.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Report {
     /// `None` where the geometry was left as it is.
@@ -213,11 +213,11 @@ pub struct Prepared {
     pub far: Array2<f32>,
     /// The near image, as seen from the far one.
     pub near: Array2<f32>,
-    /// Code of the [`Reason`] for each pixel that says nothing or was mended, 0 for the others.
+    /// Code of the [`Reason`] for each pixel that says nothing or was corrected, 0 for the others.
     pub reasons: Array2<u8>,
     /// The noise of the images as they came.
     pub noise: PairNoise,
-    /// What was found and done.
+    /// Report of the preparation.
     pub report: Report,
 }
 
@@ -297,7 +297,7 @@ fn check_sizes(
     Err(crate::pipeline::RunError::SizeMismatch { far_width, far_height, near_width, near_height }.into())
 }
 
-/// What follows once single pixels are mended and lines are straight: geometry, brightness, agreement.
+/// What follows once single pixels are corrected and lines are straight: geometry, brightness, agreement.
 fn finish(
     [far, mut near]: [Array2<f32>; 2],
     recorded: Option<Recorded>,

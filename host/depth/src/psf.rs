@@ -63,7 +63,7 @@ pub enum PsfError {
     Range {
         /// The parameter.
         name: &'static str,
-        /// What was given.
+        /// The value that was given.
         value: String,
         /// Smallest.
         low: f64,

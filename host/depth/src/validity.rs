@@ -39,12 +39,12 @@ pub struct ValiditySettings {
     pub filled: bool,
 }
 
-/// What was found.
+/// Result of the calculation.
 #[derive(Debug, Clone)]
 pub struct Validity {
     /// For each pixel the code of the [`Reason`] why it has no depth, 0 where it has one.
     pub reasons: Array2<u8>,
-    /// Standard deviation of each depth, mm; NaN where there is none.
+    /// Standard deviation of each depth, mm; NaN without a depth.
     pub deviation_mm: Array2<f32>,
     /// How many pixels have no depth, by reason.
     pub lost: Vec<Lost>,

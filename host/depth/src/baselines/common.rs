@@ -22,7 +22,7 @@ pub(super) struct Pair {
 
 /// What a method found out, each (height, width).
 pub(super) struct Evidence {
-    /// Normalised depth; NaN where there is none.
+    /// Normalised depth; NaN without a depth.
     pub alpha: Array2<f32>,
     /// Energy of the texture that it rests on.
     pub texture: Array2<f32>,

@@ -43,7 +43,7 @@ pub struct OtfPoint {
     pub standard_error: f64,
 }
 
-/// What was found.
+/// Result of the calculation.
 pub(super) struct Found {
     pub psf: RadialPsf,
     pub cost: f64,

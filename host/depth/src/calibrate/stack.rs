@@ -66,7 +66,7 @@ pub enum StackError {
     /// A number that makes no sense.
     #[error("{name} = {value}: expected a positive number")]
     NotPositive {
-        /// Which.
+        /// Name of the parameter.
         name: &'static str,
         /// Its value.
         value: f64,
@@ -94,7 +94,7 @@ pub enum StackError {
     Optics(#[from] crate::optics::OpticsError),
 }
 
-/// What was learned.
+/// Result of the calibration.
 #[derive(Debug, Clone)]
 pub struct StackLens {
     /// For measuring pairs by operators with a white residual.

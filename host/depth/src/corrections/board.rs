@@ -22,7 +22,7 @@ pub enum BoardForm {
 /// [`Correction::apply_as_board`](super::Correction::apply_as_board).
 #[derive(Debug, Clone, PartialEq)]
 pub struct BoardCorrection {
-    /// Which correction.
+    /// Name of the correction.
     pub method: Method,
     /// How the board computes it.
     pub form: BoardForm,

@@ -26,7 +26,7 @@ pub enum CorrectionError {
     TrueDepth {
         /// Index of the pattern.
         index: usize,
-        /// What was given.
+        /// The value that was given.
         true_mm: f64,
     },
     /// Patterns of different size.
@@ -60,7 +60,7 @@ pub enum CorrectionError {
         "{what}: {samples} valid samples do not determine {terms} terms; take targets whose depth maps have fewer holes"
     )]
     Underdetermined {
-        /// Which fit.
+        /// Name of the fit.
         what: String,
         /// Valid samples.
         samples: usize,
@@ -82,9 +82,9 @@ pub enum CorrectionError {
     /// A setting of CDC that makes no sense.
     #[error("{name} = {value}: must lie between {least} and {most}")]
     Setting {
-        /// Which.
+        /// Name of the parameter.
         name: &'static str,
-        /// What was given.
+        /// The value that was given.
         value: f64,
         /// Least.
         least: f64,

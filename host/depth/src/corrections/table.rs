@@ -33,7 +33,7 @@ pub(super) trait Learned: Sized {
 /// Makes [`Method`](super::Method), the names, and the stored form `Map` of the table of corrections.
 macro_rules! corrections {
     ($(#[doc = $summary:literal] $variant:ident = $name:literal: $learned:ty,)+) => {
-        /// Which correction.
+        /// Name of the correction.
         #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
         pub enum Method {
             $(

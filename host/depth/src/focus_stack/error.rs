@@ -16,7 +16,7 @@ pub enum StackError {
         "image {number} has {width}x{height} px and the first one {}x{}: they must have one size", of.1, of.0
     )]
     Size {
-        /// Which one, from 1.
+        /// Number of the image, from 1.
         number: usize,
         /// Its width.
         width: usize,
@@ -38,7 +38,7 @@ pub enum StackError {
     /// A number that must be odd and in a range.
     #[error("{what} is {value}: an odd number from {least} to {most} is needed")]
     Odd {
-        /// What.
+        /// Name of the parameter.
         what: &'static str,
         /// Its value.
         value: usize,
@@ -66,7 +66,7 @@ pub enum StackError {
     /// A pixel without a value.
     #[error("image {number}: the pixel in column {column}, row {row} is not finite")]
     NotFinite {
-        /// Which one, from 1.
+        /// Number of the image, from 1.
         number: usize,
         /// Column.
         column: usize,

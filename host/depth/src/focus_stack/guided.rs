@@ -9,7 +9,7 @@
 //!
 //! Places that the median confirms keep their own value, so that smooth surfaces lose nothing of their accuracy.
 //!
-//! Cost: about 200 places for each pixel, whatever the window, and a histogram of 8 bins for each image of the stack.
+//! Cost: about 200 places for each pixel, for any window, and a histogram of 8 bins for each image of the stack.
 
 use ndarray::{Array2, ArrayView2, Axis, Zip};
 use rayon::prelude::*;

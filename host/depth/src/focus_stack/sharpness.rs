@@ -2,7 +2,7 @@
 //! operators for shape-from-focus, Pattern Recognition 46, 2013), by the method's name; their short names next to them.
 //!
 //! Each is a value per pixel, from its neighbours, and a mean or a variance over a window around it. Borders are reflected.
-//! Cost: 10 to 60 operations a pixel, whatever the window, but for the range (twice the window's side).
+//! Cost: 10 to 60 operations a pixel, for any window, but for the range (twice the window's side).
 
 use std::{fmt, str::FromStr};
 

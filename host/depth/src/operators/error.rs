@@ -51,7 +51,7 @@ pub enum DesignError {
         what: &'static str,
         /// The text.
         name: String,
-        /// What can be used.
+        /// The accepted values.
         known: &'static str,
     },
     /// Stored operators of another version.

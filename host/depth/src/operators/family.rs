@@ -10,9 +10,9 @@ use crate::psf::Psf;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Family {
-    /// Watanabe & Nayar 1998, pill-box, by their procedure ([`watanabe`](super::watanabe)) whatever the [`Design`].
+    /// Watanabe & Nayar 1998, pill-box, by their procedure ([`watanabe`](super::watanabe)) for every [`Design`].
     Watanabe,
-    /// Raj & Staunton 2012, pill-box, by their procedure ([`raj`](super::raj)) whatever the [`Design`].
+    /// Raj & Staunton 2012, pill-box, by their procedure ([`raj`](super::raj)) for every [`Design`].
     Raj,
     /// Rational operators by the procedures of Li 2014 for the pill-box, a ring and any measured PSF.
     Ro,
@@ -26,7 +26,7 @@ impl Family {
     /// All families.
     pub const ALL: [Self; 5] = [Self::Watanabe, Self::Raj, Self::Ro, Self::Gro, Self::Ggro];
 
-    /// The family that a PSF gets if none is asked for.
+    /// The family that a PSF gets if none is requested.
     pub fn of(psf: Psf) -> Self {
         match psf {
             Psf::PillBox | Psf::Ring { .. } | Psf::Radial(_) => Self::Ro,

@@ -7,11 +7,11 @@ use super::Optics;
 /// A value far from what cameras have.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Doubt {
-    /// What it is.
+    /// Description of the value.
     what: &'static str,
     value: f64,
     unit: &'static str,
-    /// What is usual.
+    /// The usual range.
     usual: [f64; 2],
 }
 

@@ -18,7 +18,7 @@ pub enum OpticsError {
         section: &'static str,
         /// Name of the value.
         name: &'static str,
-        /// What was given.
+        /// The value that was given.
         value: f64,
         /// Its unit as the message ends, such as ` of mm`.
         unit: &'static str,
@@ -59,7 +59,7 @@ pub enum OpticsError {
         "[focus] {name} = {value_mm} is not beyond the focal length of {focal_length_mm} mm: no real image forms"
     )]
     InsideFocalLength {
-        /// Which distance.
+        /// Name of the distance.
         name: &'static str,
         /// Its value.
         value_mm: f64,
@@ -105,7 +105,7 @@ pub enum OpticsError {
     DistortionCoefficient {
         /// Its place in OpenCV's order.
         index: usize,
-        /// What was given.
+        /// The value that was given.
         value: f64,
     },
     /// The point-spread function's parameters are unusable.

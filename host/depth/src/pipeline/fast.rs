@@ -4,7 +4,7 @@
 //! input is reflected there, which with symmetric kernels is the same as reflecting at every stage. Rows go in blocks of
 //! [`BLOCK`] through normalisation, pre-filter, the three operators, the window sums and the cubic; each stage keeps what
 //! it still needs, so nothing is computed twice within a tile. Next to the three maps a tile holds about 100 rows: less
-//! than 1 MB whatever the size of the image.
+//! than 1 MB for any image size.
 //!
 //! Bands are independent: threads share nothing but the input.
 

@@ -43,7 +43,7 @@ pub enum CameraError {
     /// No exposures of a kind.
     #[error("no {kind} exposures: give at least one")]
     None {
-        /// Which kind.
+        /// Kind of frame.
         kind: &'static str,
     },
     /// A flat exposure is saturated.
@@ -53,7 +53,7 @@ pub enum CameraError {
     Saturated {
         /// Flat or dark.
         kind: &'static str,
-        /// Which one, from 1.
+        /// Number of the image, from 1.
         number: usize,
         /// Part of the pixels at full scale, percent.
         percent: f64,
@@ -66,14 +66,14 @@ pub enum CameraError {
     Structured {
         /// Flat or dark.
         kind: &'static str,
-        /// Which one, from 1.
+        /// Number of the image, from 1.
         number: usize,
         /// Standard deviation of the smoothed brightness around its surroundings, percent of the mean (of full scale in the
         /// dark).
         percent: f64,
-        /// What is usual.
+        /// The usual range.
         expected: &'static str,
-        /// What to do.
+        /// Remedy for the fault.
         advice: &'static str,
     },
     /// The flat exposures are hardly brighter than the dark ones.

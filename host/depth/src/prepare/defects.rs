@@ -69,7 +69,7 @@ pub(super) fn find(
 /// Replaces defects that stand alone, and makes holes of the others.
 pub(super) fn mend(image: &mut Array2<f32>, marks: &Array2<u8>) {
     let (height, width) = image.dim();
-    // Gathered first: no pixel is mended from a mended one.
+    // Gathered first: no pixel is corrected from a corrected one.
     let mut mended = Vec::new();
     for ((y, x), _) in marks.indexed_iter().filter(|(_, mark)| **mark != 0) {
         let around = |reach: isize| {

@@ -22,7 +22,7 @@ pub struct Warp {
 }
 
 impl Warp {
-    /// The same place.
+    /// Position in the other image.
     pub const IDENTITY: Self = Self { matrix: [[1.0, 0.0], [0.0, 1.0]], shift: [0.0; 2] };
 
     /// Magnification, rotation (degrees, x towards y) and shift (px) about the middle of an image of (height, width).

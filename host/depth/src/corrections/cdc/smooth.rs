@@ -9,7 +9,7 @@ use ndarray::{Array2, ArrayView2};
 /// The weight reaches this many SDs.
 const REACH: f64 = 3.0;
 
-/// SD with which holes are bridged where no smoothing is asked for.
+/// SD with which holes are bridged where no smoothing is requested.
 const BRIDGE_PX: f64 = 2.0;
 
 /// Grid points on a side: the last lies on or behind the last pixel.
