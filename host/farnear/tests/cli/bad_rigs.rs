@@ -43,7 +43,7 @@ fn a_missing_or_broken_firmware_is_named_with_what_to_do() {
     fails(&mut command, 1, &["no firmware at", elf, "cargo xtask firmware", "--firmware"]);
     assert_eq!(folder.listing(), ["farnear", SIM]);
     for (content, reason) in
-        [("", "empty or cut short"), ("not a program", "no ELF"), ("\x7fELF", "cannot be loaded")]
+        [("", "empty or cut short"), ("not a program", "not an ELF"), ("\x7fELF", "cannot be loaded")]
     {
         folder.file(elf, content);
         fails(&mut command, 1, &[elf, "cannot be loaded", reason]);

@@ -298,7 +298,7 @@ fn masks_are_cut_into_passages_where_numbers_leap_and_nobody_is_seen() {
     let samples = fs::read_to_string(folder.path("passages/samples.toml")).expect("samples");
     let samples: toml::Table = samples.parse().expect("TOML");
     assert_eq!(samples["sample"][1]["activity"].as_str(), Some("walk \"fast\""));
-    fails(&mut cut("6", "none"), 1, &["masks", "6 frames in a row"]);
+    fails(&mut cut("6", "none"), 1, &["masks", "6 successive frames"]);
     assert!(!folder.path("none").exists());
 }
 
