@@ -214,7 +214,7 @@ mod tests {
         refused(&heading.replace("firmware", "software"), "$comment firmware");
         refused(&(heading.clone() + "#x\n"), "line 8: a time is expected: \"#x\"");
         refused(&(heading.clone() + "#7\nsa i\n"), "line 9: bytes");
-        refused(&(heading.clone() + "#7\n$comment touched $end\n"), "line 9: a test reached");
+        refused(&(heading.clone() + "#7\n$comment touched $end\n"), "line 9: a test accessed");
         let text = heading + "#7\ns00ff i\n#9\n$comment expose 20 3 $end\n$comment look 8 $end\n";
         let (config, script) = parse(&text).expect("a good trace");
         assert_eq!((config.seed, script.firmware, script.end_ns), (3, 255, 9));

@@ -171,8 +171,8 @@ mod tests {
         refused(&happens("\"memory-bit-flips\"\nbit = 99"), &["line 3", "bit = 99", "0 to 7"]);
         refused(&happens("\"memory-bit-flips\"\naddress = 32768"), &["line 3", "address = 32768", "32767"]);
         refused(&happens("\"motor-weak\"\namount = 2"), &["line 3", "amount = 2", "0 to 1"]);
-        refused(&happens("\"reset-button\"\nstage = \"lens\""), &["line 3", "stage means nothing"]);
-        refused(&happens("\"reset-button\"\nfor_ms = 3"), &["line 3", "for_ms means nothing"]);
+        refused(&happens("\"reset-button\"\nstage = \"lens\""), &["line 3", "stage has no effect"]);
+        refused(&happens("\"reset-button\"\nfor_ms = 3"), &["line 3", "for_ms has no effect"]);
         refused(&happens("\"reset-button\"\non = \"alarm\""), &["line 3", "exclude each other"]);
         refused(&happens("\"reset-button\"\nnth = 2"), &["line 3", "nth"]);
         refused(
