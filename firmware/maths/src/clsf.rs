@@ -47,7 +47,7 @@ pub use frame::{Error, Frame};
 pub use full::{FULL_TERMS, Full, FullCoefficients};
 pub use regions::{REGION_TERMS, REGIONS, RegionCoefficients, Regions};
 
-/// What the scratch table of a correction holds. Kept next to the table by whoever takes the correction apart between two
+/// What the scratch table of a correction holds. Stored next to the table by a caller that interrupts the correction between two
 /// rows (a board that has other work), so that it need not be built again.
 #[derive(Clone, Copy, PartialEq, Eq, Default, Debug)]
 pub struct TableState(Option<(usize, usize)>);

@@ -174,7 +174,7 @@ pub struct Segment {
     /// STEP period in ticks of [`STEP_TIMER_HZ`]; the last pulse also has a full period, so that segments
     /// join smoothly.
     pub period_ticks: u16,
-    /// The motor stops after this segment: an empty queue is no underrun.
+    /// The motor stops after this segment: an empty queue is not an underrun.
     pub last: bool,
 }
 

@@ -38,7 +38,7 @@ impl Lights {
         Ok(())
     }
 
-    /// Both off, and no flash goes on.
+    /// Switches both off and cancels a flash.
     pub(crate) const fn off(&mut self) {
         (self.levels, self.cancel_flash) = (LightLevels::OFF, true);
     }

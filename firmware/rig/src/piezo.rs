@@ -287,7 +287,7 @@ impl Piezo {
     pub(crate) fn sense(&mut self, gauge_code: Option<u32>) {
         let Some(code) = gauge_code.filter(|code| (1..GAUGE_CODE_MAX).contains(code)) else {
             self.gauge_missing_ticks = self.gauge_missing_ticks.saturating_add(1);
-            (self.near_ticks, self.still_ticks) = (0, 0); // nobody has seen it near
+            (self.near_ticks, self.still_ticks) = (0, 0); // not seen near yet
             if self.gauge_failed() {
                 self.failed |= self.closing || self.driven || self.control.is_some();
                 (self.control, self.closing, self.driven) = (None, false, false);

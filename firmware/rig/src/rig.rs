@@ -304,7 +304,7 @@ impl Rig {
         let now = inputs.now;
         self.begin(now);
         (self.emergency_stop, self.supply_low) = (inputs.emergency_stop, inputs.supply_low);
-        // First: an open circuit has cut the pulses, which is no timer fault.
+        // First: an open circuit has cut the pulses, which is not a timer fault.
         self.watch_inputs(inputs);
         self.stage.sense(inputs, core::mem::take(&mut self.rested));
         let stage = &self.stage;

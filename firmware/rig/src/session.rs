@@ -117,7 +117,7 @@ impl Session {
                     let _ = self.refused.push_back(id); // without room for that either, being counted is all
                 }
             }
-            // Frames of another kind are no requests either, such as echoes.
+            // Frames of another kind, such as echoes, are not requests.
             Some(Ok(_) | Err(_)) => count(&mut self.counters.bad_frames),
         }
     }

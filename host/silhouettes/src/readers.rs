@@ -1,7 +1,7 @@
 //! Readers of what others' instruments write: bytes in, arrays out. Damaged files give errors that say where; none makes a
 //! reader panic or ask for more memory than a fixed multiple of the file.
 //!
-//! Motion capture goes through one table, [`READERS`]: a further format is a file beside the others with a `READER` in it, and a
+//! Motion capture goes through one table, [`READERS`]: a further format is a file next to the others with a `READER` in it, and a
 //! line in the table. [`read`] chooses by a file's ending and gives millimetres with z up:
 //!
 //! ```
@@ -45,8 +45,8 @@ pub const READERS: [Reader; 8] = [
 ];
 
 /// Reads a recording with the reader of its file's ending (any case, without the dot). What the caller names in `choices` goes before what the
-/// file says or suggests; what was guessed is in [`Recording::remarks`].
-/// Errors: [`RecordingError::Extension`] for an ending that no reader has, and whatever the reader says.
+/// file says or suggests; guesses are in [`Recording::remarks`].
+/// Errors: [`RecordingError::Extension`] for an ending that no reader has, and the errors of the reader.
 pub fn read(bytes: &[u8], extension: &str, choices: Choices) -> Result<Recording, RecordingError> {
     let ending = extension.to_lowercase();
     let reader = READERS.iter().find(|reader| reader.extensions.contains(&ending.as_str()));

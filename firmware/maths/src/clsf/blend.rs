@@ -43,7 +43,7 @@ impl<'t> Blend<'t> {
         Ok(Self { coefficients, frame, rows, columns, table, table_band: None })
     }
 
-    /// Goes on with a table that a correction with the same coefficients and frame has left in this state.
+    /// Continues with a table that a correction with the same coefficients and frame has left in this state.
     /// Errors: [`Error::TableTooSmall`].
     pub fn resume(
         coefficients: RegionCoefficients,

@@ -47,7 +47,7 @@ impl<'t> Full<'t> {
         Ok(Self { coefficients, frame, table })
     }
 
-    /// Goes on with a table that a correction with the same coefficients and frame has left in this state.
+    /// Continues with a table that a correction with the same coefficients and frame has left in this state.
     /// Errors: [`Error::TableTooSmall`].
     pub fn resume(
         coefficients: FullCoefficients,

@@ -40,7 +40,7 @@ impl<'t> Regions<'t> {
         Ok(Self { coefficients, frame, table, table_row: None })
     }
 
-    /// Goes on with a table that a correction with the same coefficients and frame has left in this state.
+    /// Continues with a table that a correction with the same coefficients and frame has left in this state.
     /// Errors: [`Error::TableTooSmall`].
     pub fn resume(
         coefficients: RegionCoefficients,

@@ -17,7 +17,7 @@ pub(super) struct Ids {
 }
 
 impl Ids {
-    /// A new boot; 0 is no id.
+    /// A new boot; 0 is not an id.
     pub(super) const fn new() -> Self {
         Self { last: 0, used: u64::MAX }
     }

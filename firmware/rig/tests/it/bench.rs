@@ -54,7 +54,7 @@ pub struct Bench {
     /// The next write to the FRAM ends after this many bytes; whether one has.
     pub tear: Option<usize>,
     pub torn: bool,
-    /// The power goes when so many more bytes have been written to the FRAM; nothing is written after that.
+    /// The power goes when this many more bytes have been written to the FRAM; nothing is written after that.
     pub cut_after: Option<usize>,
     pub now: u64,
     pub next_id: u32,
@@ -204,7 +204,7 @@ impl Bench {
         }
     }
 
-    /// Takes what the rig has to say.
+    /// Takes the rig's frames.
     pub fn collect(&mut self) {
         while let Some(frame) = self.rig.transmit() {
             for byte in frame {

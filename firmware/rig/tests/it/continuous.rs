@@ -1,4 +1,4 @@
-//! Continuous capture through the rig's public face: the pace, what is dropped, and how it ends.
+//! Continuous capture through the rig's public interface: period, dropped frames, and the end.
 
 use crate::bench::{Bench, SILENCE, go};
 use farnear_protocol::message::{

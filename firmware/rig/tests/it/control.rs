@@ -1,4 +1,4 @@
-//! The control loop against a fake board: what it does in which order, what it waits for, and what it says once.
+//! The control loop against a fake board: order of its actions, waiting, and single reports.
 
 mod fake;
 
@@ -163,7 +163,7 @@ fn a_rig_at_rest_is_looked_at_rarely_until_somebody_speaks_or_something_moves() 
     let homing = awake(&mut control, &mut fake);
     assert!(matches!(events(&fake).last(), Some(EventKind::Homed { axis: Axis::SensorCoarse, .. })));
     assert!(homing > 100_000, "{homing} us");
-    // An emergency stop is told one rest later at most, its motors stood still.
+    // An emergency stop is reported one rest period later at most; the motors were at rest.
     let (pressed, heard) = (fake.now, events(&fake).len());
     fake.hardware.open_circuit();
     while events(&fake).len() == heard {
@@ -171,7 +171,7 @@ fn a_rig_at_rest_is_looked_at_rarely_until_somebody_speaks_or_something_moves() 
     }
     let rest = u64::from((REST_TICKS + 2) * TICK_US);
     assert!(fake.now - pressed <= rest, "{} us", fake.now - pressed);
-    // A supply that sinks is looked at all the time.
+    // A sinking supply is polled continuously.
     assert!(awake(&mut control, &mut fake) >= quiet);
     fake.hardware.faults.supply_low = true;
     tick(&mut control, &mut fake);
@@ -322,7 +322,7 @@ fn each_frame_has_a_delimiter_before_it_too() {
     for bytes in &fake.sent {
         assert!(bytes.starts_with(&[0]) && bytes.ends_with(&[0]), "{bytes:02x?}");
     }
-    // One flipped delimiter, whichever, costs one frame.
+    // One flipped delimiter costs one frame.
     let frames = packets(&fake).len();
     let bytes: Vec<u8> = fake.sent.concat();
     for place in 0..bytes.len() {

@@ -18,7 +18,7 @@ enum Deed {
     Break(Fault, bool),
     /// The power goes and comes.
     PowerCycle,
-    /// Somebody turns the motor by hand.
+    /// The motor is turned by hand.
     Push(i64),
 }
 
@@ -130,7 +130,7 @@ proptest! {
             prop_assert_eq!(latched, Some(interrupted));
             prop_assert_eq!(bench.status().coarse.state, PositionState::Lost);
         }
-        // Whatever was torn is corrected by the next write.
+        // The next write corrects torn records.
         bench.run_ms(20);
         bench.restart(1, ResetCause::PowerOn);
         bench.tick();

@@ -1,5 +1,5 @@
 //! A hostile link: recorded frames again and again, bursts, noise, other hosts that come and are killed, resets in between.
-//! Nothing acts twice, nothing is told that was not done, and the next honest host works at once.
+//! Nothing acts twice, nothing is reported that was not done, and the next honest host works at once.
 
 use std::collections::BTreeMap;
 
@@ -58,10 +58,10 @@ impl Enemy {
     }
 }
 
-/// Everything that was asked of the rig by somebody who may, by its id; and what came of it.
+/// Valid requests by id, with their results.
 struct Ledger {
     session: u32,
-    /// Long work that was accepted: how often its end was told.
+    /// Long work that was accepted: how often its end was reported.
     ends: BTreeMap<u32, u32>,
     /// The piezo's last place and the setting's last value.
     fine: i32,
@@ -166,7 +166,7 @@ fn last_id(bench: &mut Bench) -> u32 {
     panic!("no hello: {:?}", bench.answers);
 }
 
-/// Checks what was told against what was asked.
+/// Compares the reports with the requests.
 fn settle_accounts(bench: &mut Bench, ledger: &mut Ledger) {
     for (_, event) in bench.events.drain(..) {
         match event.kind {
@@ -190,7 +190,7 @@ fn settle_accounts(bench: &mut Bench, ledger: &mut Ledger) {
                     | EventKind::FrameTaken { request, .. }
                     | EventKind::FrameDropped { request, .. }
                     | EventKind::Failed { request, .. } => {
-                        assert!(known(request), "nobody asked for {request}")
+                        assert!(known(request), "{request} was not requested")
                     }
                     _ => {}
                 }
@@ -202,7 +202,7 @@ fn settle_accounts(bench: &mut Bench, ledger: &mut Ledger) {
     }
 }
 
-/// An honest host comes, and everything is as the last one who was heard left it.
+/// An honest host comes, and everything is as the last accepted host left it.
 fn honest_host(bench: &mut Bench, ledger: &mut Ledger, enemy: &mut Enemy) {
     ledger.session = SESSION;
     assert!(say(bench, ledger, enemy, &Request::OpenSession).1, "a session is opened at once");
@@ -289,7 +289,7 @@ fn nothing_acts_twice_however_hostile_the_link() {
         }
         settle_accounts(&mut bench, &mut ledger);
         if ledger.ends.len() > 400 {
-            // Whoever asked is gone for long; of a motion that still ran something would have been told.
+            // The requesting host is long gone; a motion that still ran would have been reported.
             let last = ledger.ends.keys().next_back().copied().unwrap_or(0);
             ledger.ends.retain(|id, _| id + 200 > last);
         }

@@ -1,4 +1,4 @@
-//! The link through the rig's public face: who may ask what, what acts twice (nothing), what is remembered.
+//! The link through the rig's public interface: sessions, repeated requests, memory of answers.
 
 use crate::bench::{self, BOOT, Bench, SESSION};
 use farnear_protocol::frame::{self, Header, Kind};

@@ -54,7 +54,7 @@ fn shot(target: i32) -> Shot {
     }
 }
 
-/// Asks for a change; gives what is known once it is written.
+/// Requests a change; returns the state once it is written.
 fn change(bench: &mut Bench, random: &mut Random, before: &Known) -> Known {
     let mut after = before.clone();
     match random.below(8) {
@@ -67,7 +67,7 @@ fn change(bench: &mut Bench, random: &mut Random, before: &Known) -> Known {
             after.settings.insert(key, value);
         }
         3 => {
-            // Halt is one alarm however often it is asked for.
+            // Repeated halts are one alarm.
             let like = bench.alarm() == Some(Alarm::Halt);
             bench.accepted(&Request::Halt);
             if !like {

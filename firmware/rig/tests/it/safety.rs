@@ -405,7 +405,7 @@ fn an_encoder_that_is_just_not_wrong_enough_to_be_told_at_rest_does_not_keep_its
     }
 }
 
-/// The lens' rotor falls by so many microsteps with the first pulse of a request; gives how that ended.
+/// The lens' rotor falls by this many microsteps with the first pulse of a request; returns the end.
 fn falls(bench: &mut Bench, request: &Request, microsteps: i64) -> EventKind {
     let id = bench.accepted(request);
     let edges = bench.hardware.lens.edges;

@@ -12,7 +12,7 @@ fn fine(nm: i32) -> Request {
     bench::go(Axis::SensorFine, nm)
 }
 
-/// What is answered to these bytes, within a tick; `None` where nothing is.
+/// Answer to these bytes, within a tick; `None` without one.
 fn answer_to(bench: &mut Bench, bytes: &[u8]) -> Option<Answer> {
     bench.answers.clear();
     bench.send_bytes(bytes);

@@ -305,7 +305,7 @@ fn damaged_models_and_samples_are_named_and_nothing_is_written() {
 }
 
 #[test]
-#[cfg_attr(not(shared_data), ignore = "needs the real data beside the repository")]
+#[cfg_attr(not(shared_data), ignore = "needs the real data next to the repository")]
 fn skeletons_of_a_public_set_become_people_to_train_on() {
     let file = farnear_test_data::path("skeletons/Florence_3D_Action_Skeletons.mat");
     let file = file.to_str().expect("a plain path");

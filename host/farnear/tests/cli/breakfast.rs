@@ -24,7 +24,7 @@ fn median_and_sd(region: ndarray::ArrayView2<f32>) -> [f64; 2] {
 }
 
 #[test]
-#[cfg_attr(not(shared_data), ignore = "needs the real data beside the repository")]
+#[cfg_attr(not(shared_data), ignore = "needs the real data next to the repository")]
 fn breakfast_has_the_reference_depths() {
     let folder = farnear_test_data::path("breakfast");
     let text = std::fs::read_to_string(folder.join("optics.toml")).unwrap();

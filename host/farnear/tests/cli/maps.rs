@@ -165,7 +165,7 @@ fn median_and_sd(region: ndarray::ArrayView2<f32>) -> [f64; 2] {
 
 /// The pair that Watanabe and Nayar took, where it is at hand.
 #[test]
-#[cfg_attr(not(shared_data), ignore = "needs the real data beside the repository")]
+#[cfg_attr(not(shared_data), ignore = "needs the real data next to the repository")]
 fn a_real_pair_gives_the_reference_depths() {
     let data = farnear_test_data::path("breakfast");
     let folder = Folder::new();

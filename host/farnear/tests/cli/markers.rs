@@ -245,7 +245,7 @@ fn a_broken_skeleton_is_refused_with_its_line() {
 }
 
 #[test]
-#[cfg_attr(not(shared_data), ignore = "needs the real data beside the repository")]
+#[cfg_attr(not(shared_data), ignore = "needs the real data next to the repository")]
 fn real_recordings_fit_built_in_templates() {
     let data = farnear_test_data::path("mocap");
     let folder = Folder::new();

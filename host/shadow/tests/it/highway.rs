@@ -100,25 +100,25 @@ fn agrees(colour: bool, shadow: bool, opencv: f64) {
 }
 
 #[test]
-#[cfg_attr(not(shared_data), ignore = "needs the real data beside the repository")]
+#[cfg_attr(not(shared_data), ignore = "needs the real data next to the repository")]
 fn colour_with_shadow_agrees_with_opencv() {
     agrees(true, true, 0.2155);
 }
 
 #[test]
-#[cfg_attr(not(shared_data), ignore = "needs the real data beside the repository")]
+#[cfg_attr(not(shared_data), ignore = "needs the real data next to the repository")]
 fn colour_without_shadow_agrees_with_opencv() {
     agrees(true, false, 0.2037);
 }
 
 #[test]
-#[cfg_attr(not(shared_data), ignore = "needs the real data beside the repository")]
+#[cfg_attr(not(shared_data), ignore = "needs the real data next to the repository")]
 fn grey_with_shadow_agrees_with_opencv() {
     agrees(false, true, 0.1317);
 }
 
 #[test]
-#[cfg_attr(not(shared_data), ignore = "needs the real data beside the repository")]
+#[cfg_attr(not(shared_data), ignore = "needs the real data next to the repository")]
 fn grey_without_shadow_agrees_with_opencv() {
     agrees(false, false, 0.1715);
 }
@@ -126,7 +126,7 @@ fn grey_without_shadow_agrees_with_opencv() {
 /// Detection and discrimination rates (Sanin et al. 2012) on the background model's foreground. Without
 /// labelled shadow only the discrimination rate is available.
 #[test]
-#[cfg_attr(not(shared_data), ignore = "needs the real data beside the repository")]
+#[cfg_attr(not(shared_data), ignore = "needs the real data next to the repository")]
 fn detectors_keep_most_of_what_moves() {
     let mut detectors = Method::ALL.map(|method| (method, Detector::new(method), ShadowScore::default()));
     let mut model: Option<BackgroundModel> = None;

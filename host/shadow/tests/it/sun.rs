@@ -15,7 +15,7 @@ fn turn_deg(a: f64, b: f64) -> f64 {
 }
 
 #[test]
-#[cfg_attr(not(shared_data), ignore = "needs the real data beside the repository")]
+#[cfg_attr(not(shared_data), ignore = "needs the real data next to the repository")]
 fn psa_agrees_with_nrel_values_from_1910_to_2210() {
     let path = farnear_test_data::path("sun/spa_c_reference.csv");
     let text = std::fs::read_to_string(path).expect("NREL's values");

@@ -43,7 +43,7 @@ fn augment(
     let mut least = vec![f64::INFINITY; n];
     let mut from: Vec<Option<usize>> = vec![None; n];
     let mut done = vec![false; n];
-    // The column whose row is looked at, none for the new row.
+    // The column whose row is examined, none for the new row.
     let mut at: Option<usize> = None;
     let end = loop {
         let here = at.and_then(|column| row_of[column]).unwrap_or(row);

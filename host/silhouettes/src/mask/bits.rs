@@ -65,7 +65,7 @@ impl BitMask {
         self.inverted().dilated(radius_px).inverted()
     }
 
-    /// Without what is thinner than 2 `radius_px` + 1: eroded, then dilated.
+    /// Removes parts thinner than 2 `radius_px` + 1: eroded, then dilated.
     #[must_use]
     pub fn opened(self, radius_px: usize) -> Self {
         self.eroded(radius_px).dilated(radius_px)

@@ -68,7 +68,7 @@ pub struct ExtractorSettings {
 }
 
 impl ExtractorSettings {
-    /// Settings for people in frames like this one. In grey frames no shadow is told from the subject: without
+    /// Settings for people in frames like this one. In grey frames shadow and subject are not distinguished: without
     /// colour every darker copy of the background passes for shadow, dark clothes too.
     #[must_use]
     pub fn for_frame(frame: Frame<'_>) -> Self {
@@ -90,7 +90,7 @@ impl ExtractorSettings {
 
 #[derive(Clone, Debug, PartialEq)]
 pub struct Extracted {
-    /// The subject's mask, its bounds and what is doubtful about them.
+    /// The subject's mask, its bounds and doubts about them.
     pub subject: Subject,
     /// The background model's answer before cleaning.
     pub labels: Array2<Label>,
@@ -99,7 +99,7 @@ pub struct Extracted {
 /// All that moves in a frame.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Moving {
-    /// The cleaned mask, or why there is none.
+    /// The cleaned mask, or the reason for its absence.
     pub mask: Result<Mask, Flag>,
     /// The background model's answer before cleaning.
     pub labels: Array2<Label>,
@@ -115,7 +115,7 @@ pub struct Extractor {
     changes_of_light: usize,
 }
 
-/// A frame's people, or why there are none.
+/// A frame's people, or the reason for their absence.
 struct Sighted {
     people: Result<(Mask, Vec<Person>), Flag>,
     labels: Array2<Label>,
@@ -175,7 +175,7 @@ impl Extractor {
         Ok(Extracted { subject, labels })
     }
 
-    /// As [`Self::extract`], for whoever wants all that moves and not one subject.
+    /// As [`Self::extract`], for all moving regions instead of one subject.
     pub fn moving(&mut self, frame: Frame<'_>) -> Result<Moving, BackgroundError> {
         let Sighted { people, labels, shift } = self.sighted(frame)?;
         let moving = Moving { mask: people.map(|(mask, _)| mask), labels };

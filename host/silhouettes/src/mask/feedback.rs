@@ -1,4 +1,4 @@
-//! Feedback from people to the background, which must not learn them: a person who stands still would become background within seconds.
+//! Feedback from people to the background, which must not learn them: a motionless person would become background within seconds.
 //!
 //! A region that entered over the picture's edge or walked is a person for as long as it exists. A region that appears and never moves is furniture,
 //! a change of light, or a hole left by a person who was part of the background; those are learned. The outline of a hole is

@@ -1,4 +1,4 @@
-//! The subject among the regions of a cleaned mask, and what is doubtful about the frame.
+//! The subject among the regions of a cleaned mask, and doubts about the frame.
 //!
 //! The subject is the person ([`super::people`]) nearest to the last one, or the largest where there is no last. Whatever is doubtful is
 //! flagged; a frame without a person gives an empty mask, never a guess.
@@ -12,10 +12,10 @@ use super::{
     people::{Person, people},
 };
 
-/// What is doubtful about a frame.
+/// Doubts about a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Flag {
-    /// Nobody is in the frame.
+    /// No person is in the frame.
     Empty,
     /// More than one person is; the mask holds one of them.
     SeveralPeople {
@@ -92,11 +92,11 @@ impl SubjectSettings {
 /// The subject of one frame.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Subject {
-    /// Its pixels in the full frame, shape (height, width); all unset where nobody is.
+    /// Its pixels in the full frame, shape (height, width); all unset without a person.
     pub mask: Mask,
-    /// What it spans; `None` where nobody is.
+    /// Its bounding box; `None` without a person.
     pub bounds: Option<BoundingBox>,
-    /// What is doubtful; empty for a frame to rely on.
+    /// Doubts; empty for a reliable frame.
     pub flags: Vec<Flag>,
 }
 
@@ -109,7 +109,7 @@ pub struct SubjectChooser {
 }
 
 impl SubjectChooser {
-    /// A chooser that has seen nobody yet.
+    /// A chooser before the first person.
     #[must_use]
     pub fn new(settings: SubjectSettings) -> Self {
         Self { settings, last: None, absent_frames: 0 }
@@ -199,7 +199,7 @@ mod tests {
         let both = chooser.choose(people(&[[60, 44, 140, 74], [40, 200, 160, 250]]).view());
         assert_eq!(both.flags, [Flag::SeveralPeople { count: 2 }]);
         assert_eq!(both.mask, people(&[[60, 44, 140, 74]]));
-        // Without a past the larger one is taken, flagged all the same.
+        // Without a past the larger one is taken, but flagged.
         let fresh = super::tests::chooser().choose(people(&[[60, 44, 140, 74], [40, 200, 160, 250]]).view());
         assert_eq!(fresh.mask, people(&[[40, 200, 160, 250]]));
         assert!(fresh.flags[0].spoils());

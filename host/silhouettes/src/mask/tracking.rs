@@ -39,7 +39,7 @@ impl TrackingSettings {
 /// Detection of a person in a frame.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Sight {
-    /// A silhouette of its own.
+    /// An independent silhouette.
     Alone {
         /// Full-frame mask.
         mask: Mask,

@@ -1,11 +1,11 @@
-//! What recordings of bodies have in common, whatever their format: missing points written as zeros, and a plausible size.
+//! Common parts of all formats of body recordings: missing points written as zeros, and a plausible size.
 
 use super::recording::{Known, Source, Unit, Up};
 use crate::silhouette::capsule::Point3;
 
 /// Points of a frame without which it has no size that could be checked.
 const POINTS: usize = 4;
-/// Extents of a body with its props, millimetres: outside of these it is no person, whatever the file states.
+/// Extents of a body with its props, millimetres: beyond these it cannot be a person, even if the file states so.
 const POSSIBLE_MM: [f64; 2] = [100.0, 20_000.0];
 /// Extents that need no second look, millimetres.
 const USUAL_MM: [f64; 2] = [400.0, 6000.0];

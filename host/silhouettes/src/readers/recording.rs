@@ -1,7 +1,7 @@
 //! A recording of named points over time: the common form of all motion-capture files, and what a reader makes of its file.
 //!
 //! A reader gives what the file holds in the file's own unit and axes ([`Found`]), each with where it is known from;
-//! [`Found::settled`] turns that to millimetres and z up, or to whatever the caller knows better.
+//! [`Found::settled`] turns that to millimetres and z up, or to the caller's values.
 
 use super::body;
 use crate::silhouette::{aliases, capsule::Point3};
@@ -139,7 +139,7 @@ pub struct Known<T> {
 }
 
 impl<T> Known<T> {
-    /// The caller's value in place of this one, where there is one.
+    /// The caller's value instead of this one, if given.
     fn unless(self, named: Option<T>) -> Self {
         match named {
             Some(value) => Self { value, source: Source::Caller },
@@ -269,7 +269,7 @@ impl Recording {
         self.names.iter().chain(self.aliases.iter().map(|(_, alias)| alias)).cloned().collect()
     }
 
-    /// What was guessed about the file, one sentence each: to be shown, for the caller can name it better.
+    /// Guesses about the file, one sentence each, to be shown: the caller can override them.
     pub fn remarks(&self) -> Vec<String> {
         let remark = |what: String, source: &Source| match source {
             Source::Guess { reason, sure } => {
@@ -305,7 +305,7 @@ pub enum RecordingError {
     Truncated {
         kind: &'static str,
         what: &'static str,
-        /// Bytes up to the end of what was being read.
+        /// Bytes up to the end of the incomplete part.
         needed: usize,
         found: usize,
     },
@@ -384,7 +384,7 @@ mod tests {
 
     #[test]
     fn turning_up_keeps_hands_apart() {
-        // A right-handed frame stays one: x cross y is z, whichever axis points up.
+        // A right-handed frame stays one: x cross y is z, for every upward axis.
         for up in [Up::X, Up::Y, Up::Z] {
             let [x, y, z] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(|p| up.to_z(p));
             let cross = [x[1] * y[2] - x[2] * y[1], x[2] * y[0] - x[0] * y[2], x[0] * y[1] - x[1] * y[0]];

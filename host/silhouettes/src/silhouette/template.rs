@@ -8,7 +8,7 @@
 //! thickness_mm = 90.0     # optional: grows the part by so much all round, for suits with few markers
 //! ```
 //!
-//! Left and right limbs are parts of their own. Markers may stand in several parts, which closes joints.
+//! Left and right limbs are parts of their own. Markers may belong to several parts, which closes joints.
 
 use serde::{Deserialize, Serialize};
 
@@ -19,7 +19,7 @@ pub struct Part {
     /// Its name, by which flags and errors call it.
     pub name: String,
     pub markers: Vec<String>,
-    /// Grown by so many millimetres all round.
+    /// Grown by this many millimetres all round.
     #[serde(default)]
     pub thickness_mm: f64,
 }
@@ -35,7 +35,7 @@ pub struct Template {
     pub parts: Vec<Part>,
 }
 
-/// What is wrong with a template.
+/// A fault of a template.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum TemplateError {
     /// Not the TOML that is expected.

@@ -23,7 +23,7 @@ fn read(bytes: &[u8], ending: &str) -> Result<Recording, RecordingError> {
 }
 
 #[test]
-#[cfg_attr(not(shared_data), ignore = "needs the real data beside the repository")]
+#[cfg_attr(not(shared_data), ignore = "needs the real data next to the repository")]
 fn a_real_c3d_walk_makes_silhouettes_from_eight_views() {
     let recording = read(&shared("mocap/cmu_02_05.c3d"), "c3d").expect("a C3D file");
     assert!(recording.remarks().is_empty(), "unit and axes are the file's and the format's");
@@ -51,7 +51,7 @@ fn a_real_c3d_walk_makes_silhouettes_from_eight_views() {
 }
 
 #[test]
-#[cfg_attr(not(shared_data), ignore = "needs the real data beside the repository")]
+#[cfg_attr(not(shared_data), ignore = "needs the real data next to the repository")]
 fn other_c3d_and_trc_recordings_are_read() {
     let recording = read(&shared("mocap/nick_freeform_001.c3d"), "c3d").expect("a C3D file");
     assert!(recording.frames.len() > 10 && !recording.names.is_empty());
@@ -66,7 +66,7 @@ fn other_c3d_and_trc_recordings_are_read() {
 }
 
 #[test]
-#[cfg_attr(not(shared_data), ignore = "needs the real data beside the repository")]
+#[cfg_attr(not(shared_data), ignore = "needs the real data next to the repository")]
 fn skeleton_sets_hold_what_they_should() {
     let bytes = shared("skeletons/UTKinect_Skeletons.mat");
     let clips = skeletons::read_cells(&bytes, &skeletons::KINECT_20).expect("a MAT-file");
@@ -79,7 +79,7 @@ fn skeleton_sets_hold_what_they_should() {
 }
 
 #[test]
-#[cfg_attr(not(shared_data), ignore = "needs the real data beside the repository")]
+#[cfg_attr(not(shared_data), ignore = "needs the real data next to the repository")]
 fn truncated_recordings_are_errors_not_panics() {
     let bytes = shared("mocap/cmu_02_05.c3d");
     for cut in [0, 1, 2, 100, 511, 512, 600, 2000, 5000, bytes.len() / 2, bytes.len() - 600] {
@@ -93,7 +93,7 @@ fn truncated_recordings_are_errors_not_panics() {
 }
 
 #[test]
-#[cfg_attr(not(shared_data), ignore = "needs the real data beside the repository")]
+#[cfg_attr(not(shared_data), ignore = "needs the real data next to the repository")]
 fn damaged_recordings_never_panic() {
     // Header and parameter blocks decide everything, so damage is placed there.
     let mut motion = shared("mocap/nick_freeform_001.c3d");

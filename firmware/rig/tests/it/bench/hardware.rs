@@ -11,7 +11,7 @@ use super::motor::Motor;
 /// What can be wrong next to the motors.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub struct Faults {
-    /// The gauge answers this whatever the position.
+    /// Fixed answer of the gauge, for every position.
     pub gauge: Option<Option<u32>>,
     /// The piezo does not move.
     pub piezo_dead: bool,
@@ -117,7 +117,7 @@ impl Hardware {
         (!self.faults.no_strobe).then_some(ExposureEdges { trigger, strobe_start, strobe_end, flash })
     }
 
-    /// An exposure without a trigger that ended in the last tick and began while somebody listened.
+    /// An exposure without a trigger that ended in the last tick and began while the board listened.
     pub fn strobe(&self, BoardMicros(now): BoardMicros) -> Option<StrobeEdges> {
         let since = self.listened_since.filter(|_| !self.faults.no_strobe)?;
         let last_of = |(period, length): (u64, u64)| {

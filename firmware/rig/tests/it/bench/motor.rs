@@ -26,9 +26,9 @@ pub struct MotorFaults {
     pub extra_pulse: bool,
     /// The board loses what waits behind the running segment.
     pub queue_lost: bool,
-    /// The switch says this whatever the position.
+    /// Fixed state of the switch, for every position.
     pub home_switch: Option<bool>,
-    /// The switch says this whatever the position.
+    /// Fixed state of the switch, for every position.
     pub far_switch: Option<bool>,
     /// The driver's DIAG line.
     pub driver: bool,

@@ -1,4 +1,4 @@
-//! A board that is none: the bench's hardware behind the loop's trait, with a record of what the loop did.
+//! A fake board: the bench's hardware behind the loop's trait, with a record of the loop's calls.
 
 use std::collections::VecDeque;
 
@@ -35,11 +35,11 @@ pub struct Fake {
     pub now: u64,
     /// Everything the loop did, in order.
     pub calls: Vec<Call>,
-    /// After so many calls the board hangs.
+    /// The board hangs after this many calls.
     pub hangs_after: Option<usize>,
     /// The emergency stop's circuit opens just before this is done.
     pub opens_before: Option<Call>,
-    /// A step timer says that it ran dry.
+    /// A step timer reports an underrun.
     pub dry: bool,
     received: VecDeque<u8>,
     next_id: u32,

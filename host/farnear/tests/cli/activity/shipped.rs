@@ -112,7 +112,7 @@ fn an_unknown_answer_says_why() {
 
 /// Silhouettes of two people walking through the picture, eight times, as a background model cut them out of video.
 #[test]
-#[cfg_attr(not(shared_data), ignore = "needs the real data beside the repository")]
+#[cfg_attr(not(shared_data), ignore = "needs the real data next to the repository")]
 fn somebody_walking_before_a_real_camera_is_said_to_walk() {
     let folder = Folder::new();
     let mut walking = 0;
