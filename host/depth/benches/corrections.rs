@@ -2,7 +2,7 @@
 //! median.
 //!
 //! `cargo bench -p farnear-depth --bench corrections [-- FILTER]`; with `FARNEAR_JSON=1` one JSON object per line. The
-//! images are random: only the time is of interest. Timings are no tests: nothing here can fail.
+//! images are random: only the time is of interest. Timings are not tests: nothing here can fail.
 #![allow(clippy::unwrap_used, missing_docs)] // A benchmark may stop; it has no users.
 
 use std::hint::black_box;

@@ -4,7 +4,7 @@
 //! `executed_flop`: what is really done), `fma_peak` tells what the core could do: multiply-adds in registers.
 //!
 //! `cargo bench -p farnear-depth [-- FILTER]`; with `FARNEAR_JSON=1` one JSON object per line. The images are random: only
-//! the time is of interest. Timings are no tests: nothing here can fail.
+//! the time is of interest. Timings are not tests: nothing here can fail.
 #![allow(clippy::unwrap_used, missing_docs)] // A benchmark may stop; it has no users.
 
 use std::hint::black_box;
@@ -97,7 +97,7 @@ fn side_by_side(threads: usize, rounds: usize, chain: impl Fn(&mut dyn FnMut()) 
                 let mut start = Instant::now();
                 chain(&mut || {
                     if pairs % PAIRS == 0 {
-                        // The slowest ends a round; whoever comes last writes it down.
+                        // The slowest ends a round; the last one records it.
                         if barrier.wait().is_leader() && pairs > PAIRS {
                             let ms = 1e3 * start.elapsed().as_secs_f64();
                             times.lock().unwrap().push(ms / (PAIRS * threads) as f64);

@@ -95,7 +95,7 @@ impl TryFrom<String> for Window {
     }
 }
 
-/// How a pair is looked at.
+/// Analysis of a pair.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WindowSettings {
     /// The windows.

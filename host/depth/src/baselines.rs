@@ -46,7 +46,7 @@ pub enum Method {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum BaselineError {
     /// No method of that name.
-    #[error("`{0}` is no baseline: use subbarao, subbarao-fourier or favaro")]
+    #[error("`{0}` is not a baseline: use subbarao, subbarao-fourier or favaro")]
     Unknown(String),
     /// The images cannot be used.
     #[error(transparent)]

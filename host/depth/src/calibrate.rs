@@ -42,7 +42,7 @@ const LEAST_ALPHA: f64 = 0.2;
 /// The sharper image must have this many times the other's energy for the target to stand at its focus.
 const SHARPER: f64 = 1.1;
 
-/// What is left, relative to the noise, from which a PSF does not explain the pairs.
+/// Residual relative to the noise above which a PSF does not explain the pairs.
 const EXCESS: f64 = 1.3;
 
 /// What may be left besides, part of the images' energy: of images without noise it is what aliases leave.
@@ -95,7 +95,7 @@ impl FromStr for Model {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum CalibrationError {
     /// No model of that name.
-    #[error("`{0}` is no PSF that can be calibrated: use gaussian, generalised or free")]
+    #[error("`{0}` cannot be calibrated: use gaussian, generalised or free")]
     UnknownModel(String),
     /// No pair was given.
     #[error("no pair to calibrate on")]
@@ -126,7 +126,7 @@ pub enum CalibrationError {
         /// Description of the fault.
         reason: SpectrumError,
     },
-    /// The target stands where the pair says nothing.
+    /// The target is where the pair carries no information.
     #[error(
         "pair {index}: at alpha = {alpha:.2} both images are blurred alike; put the target at the far or the near focus"
     )]

@@ -26,7 +26,7 @@ pub(crate) fn sample((height, width): (usize, usize)) -> SliceInfo<[SliceInfoEle
     s![step / 2..;step, step / 2..;step]
 }
 
-/// Median texture energy of the pixels that have any, by which texture is measured; 0 if there is none.
+/// Median texture energy of the pixels that have any, by which texture is measured; 0 without any.
 pub fn texture_scale(texture: ArrayView2<f32>) -> f32 {
     // The bits of positive numbers are ordered as they are, and faster to compare.
     let mut values: Vec<u32> =

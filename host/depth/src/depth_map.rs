@@ -1,4 +1,4 @@
-//! A depth map with what is known about it: confidence, and what a user should know before trusting it.
+//! A depth map with confidence and warnings.
 
 use std::fmt;
 
@@ -6,14 +6,14 @@ use ndarray::Array2;
 
 use crate::psf::Psf;
 
-/// A depth map and what is known about it.
+/// A depth map with its quality.
 #[derive(Debug, Clone)]
 pub struct DepthMap {
     /// Object distance in mm, (height, width); NaN = no value.
     pub depth_mm: Array2<f32>,
     /// Confidence, 0 (none) to 1; 0 exactly where the depth is NaN.
     pub confidence: Array2<f32>,
-    /// Pixels whose depth was interpolated from their surroundings; `None` if there are none.
+    /// Pixels whose depth was interpolated from their surroundings; `None` without any.
     pub filled: Option<Array2<bool>>,
     /// Part of the pixels whose texture energy is below [`LOW_TEXTURE`](crate::confidence::LOW_TEXTURE) times its median.
     pub low_texture_fraction: f64,
@@ -60,14 +60,10 @@ impl fmt::Display for Warning {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::NotFinite { pixels } => {
-                write!(f, "{pixels} pixels are NaN or infinite: there is no depth around them")
+                write!(f, "{pixels} pixels are NaN or infinite: no depth around them")
             }
             Self::Saturated { fraction } => {
-                write!(
-                    f,
-                    "{:.1} % of the pixels are saturated: there is no depth around them",
-                    100.0 * fraction
-                )
+                write!(f, "{:.1} % of the pixels are saturated: no depth around them", 100.0 * fraction)
             }
             Self::PsfMismatch { operators, optics } => write!(
                 f,

@@ -61,7 +61,7 @@ pub enum FillBy {
     /// `surface`: each grown as far as kernels reach, from a wide margin, none from another one's filling.
     #[default]
     Surface,
-    /// `thesis`: one after the other, each from the rectangle around it, what was filled before included.
+    /// `thesis`: one after the other, each from the rectangle around it, with the earlier filled ones.
     Thesis,
 }
 
@@ -95,7 +95,7 @@ impl FromStr for FillBy {
     }
 }
 
-/// What is filled, and how.
+/// Selection and method of filling.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Filling {
     /// What counts as low texture.
@@ -135,7 +135,7 @@ pub fn fill_low_texture(map: &mut DepthMap, texture: ArrayView2<f32>, reach_px: 
     fill_by_surfaces(map, texture, low, reach_px)
 }
 
-/// Fills again what was filled in a map that was changed since, in the thesis' order: there, a map is corrected first and filled
+/// Fills the same pixels again in a map that was changed since, in the thesis' order: there, a map is corrected first and filled
 /// last.
 pub fn refill_as_thesis(map: &mut DepthMap) -> Filled {
     match map.filled.take() {
@@ -168,7 +168,7 @@ fn fill_as_thesis(map: &mut DepthMap, low: Array2<bool>) -> Filled {
     filled
 }
 
-/// The measured depths of all regions are gone before any surroundings are looked at.
+// The measured depths of all regions are removed before any surroundings are examined.
 fn empty(map: &mut DepthMap, regions: &Regions) {
     for at in regions.pixels() {
         map.depth_mm[at] = f32::NAN;
@@ -215,7 +215,7 @@ pub(crate) struct Sample {
     pub depth_mm: f64,
     /// Inverse to the variance of the depth, up to a factor.
     pub weight: f64,
-    /// How many independent measurements it stands for.
+    /// Number of independent measurements it represents.
     pub independent: f64,
     /// Distance to the region, px.
     pub distance_px: usize,

@@ -40,7 +40,7 @@ pub enum FocusMeasure {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum FocusError {
     /// No measure of that name.
-    #[error("`{0}` is no focus measure: use fft-sum, tenengrad or modified-laplacian")]
+    #[error("`{0}` is not a focus measure: use fft-sum, tenengrad or modified-laplacian")]
     Unknown(String),
     /// Too small.
     #[error("an image of {width}x{height} px: at least 8x8 are needed")]
@@ -59,7 +59,7 @@ pub enum FocusError {
         row: usize,
     },
     /// Nothing to see.
-    #[error("the image is dark (mean {0}): no focus can be told")]
+    #[error("the image is too dark to focus (mean {0})")]
     Dark(f64),
 }
 
@@ -182,7 +182,7 @@ pub fn peak(places: &[f64], values: &[f64]) -> Option<f64> {
     }
     let solution = matrix.lu().solve(&right)?;
     let (b, c) = (solution[1], solution[2]);
-    // A tip outside the neighbours is no tip of this peak.
+    // A maximum outside the neighbours does not belong to this peak.
     let tip = -b / (2.0 * c);
     (c < 0.0 && tip.abs() <= 1.0).then_some(places[largest] + unit * tip)
 }

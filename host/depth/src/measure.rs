@@ -326,7 +326,7 @@ fn respond(depth_mm: &mut Array2<f32>, deviation_mm: &mut Array2<f32>, stage: &S
     });
 }
 
-/// The image with `bin` x `bin` pixels averaged into one; what is left over at the right and lower border is dropped.
+/// The image with `bin` x `bin` pixels averaged into one; surplus pixels at the right and lower border are dropped.
 pub fn binned(image: Array2<f32>, bin: usize) -> Array2<f32> {
     if bin <= 1 {
         return image;
@@ -393,7 +393,7 @@ fn findings(map: &DepthMap, prepared: &Prepared, estimate: &Estimate, optics: &O
     let mut findings: Vec<Finding> = map
         .warnings
         .iter()
-        // Holes are told by their reasons.
+        // Holes have reasons.
         .filter(|warning| !matches!(warning, Warning::NotFinite { .. } | Warning::Saturated { .. }))
         .map(|warning| match warning {
             Warning::LooksSwapped(_) => Finding::SwappedByScene(warning.to_string()),

@@ -33,7 +33,7 @@ pub struct GridPoint {
     pub v: f64,
     /// Radial frequency, rad/px.
     pub w: f64,
-    /// Number of grid points it stands for.
+    /// Number of grid points it represents.
     pub multiplicity: f64,
 }
 
@@ -68,7 +68,7 @@ pub fn normalised_ratio(otf: &Otf, max_blur_px: f64, w: f64, alpha: f64) -> f64 
 }
 
 /// Smallest slope of the NIR over alpha in [-1, 1], at the radial frequency `w`: where it is not positive, a ratio
-/// stands for more than one depth.
+/// represents more than one depth.
 pub fn smallest_slope(otf: &Otf, max_blur_px: f64, w: f64) -> f64 {
     const STEPS: usize = 80;
     let at = |i: usize| normalised_ratio(otf, max_blur_px, w, -1.0 + 2.0 * i as f64 / STEPS as f64);

@@ -107,12 +107,12 @@ impl Operators {
         design(&Request::for_optics(optics))
     }
 
-    /// A name that says what they are.
+    /// A descriptive name.
     pub fn name(&self) -> &str {
         &self.name
     }
 
-    /// What was asked for: family, design, PSF, blur, size.
+    /// The request: family, design, PSF, blur, size.
     pub fn request(&self) -> &Request {
         &self.request
     }

@@ -44,7 +44,7 @@ pub struct Optics {
     stage: Option<Stage>,
 }
 
-/// The distances between which a pair measures depth, and where the sensor stands for them.
+/// The distances between which a pair measures depth, and the sensor positions for them.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct WorkingRange {
     /// Object distance of the far focus (alpha = -1).

@@ -68,7 +68,7 @@ pub enum RunError {
     #[error("no pixel has a finite value in both images")]
     NothingFinite,
     /// An image has the same value everywhere.
-    #[error("the {which} image is constant ({value}): without texture there is no depth")]
+    #[error("the {which} image is constant ({value}): depth needs texture")]
     Constant {
         /// `far` or `near`.
         which: &'static str,
@@ -161,7 +161,7 @@ impl Settings {
 ///
 /// # Errors
 /// [`RunError`]: sizes, windows, constant or wholly invalid images, operators for another blur. Single invalid or
-/// saturated pixels are no error: depth is NaN and confidence 0 wherever they take part, and a warning says so.
+/// saturated pixels are not an error: depth is NaN and confidence 0 wherever they take part, with a warning.
 pub fn depth_from_pair(
     far: ArrayView2<f32>,
     near: ArrayView2<f32>,

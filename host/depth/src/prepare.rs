@@ -39,13 +39,13 @@ use warp::Warp;
 
 pub use camera::{CameraError, CameraFrames};
 
-/// Displacement (root mean square over the image) below which a pair is left as it is, px.
+/// Displacement (root mean square over the image) below which a pair is not changed, px.
 const LEAST_DISPLACEMENT_PX: f64 = 0.06;
-/// A displacement below so many standard errors is none.
+/// A displacement below this many standard errors counts as none.
 const SIGNIFICANT: f64 = 5.0;
 /// Correlation of the shared band from which an alignment is believed.
 const BELIEVED: f64 = 0.25;
-/// Difference of brightness below which a pair is left as it is: 0.5 % costs 0.05 mm in squares on the thesis' rig.
+/// Difference of brightness below which a pair is not changed: 0.5 % costs 0.05 mm in squares on the thesis' rig.
 const LEAST_GAIN: f64 = 0.005;
 /// Correlation relative to what noise allows below which the images show different scenes.
 const UNRELATED: f64 = 0.3;
@@ -116,7 +116,7 @@ macro_rules! named {
 named!(Align, UnknownAlign, "auto" => Auto, "none" => None, "optics" => Optics, "shift" => Shift, "similarity" => Similarity, "affine" => Affine);
 named!(Balance, UnknownBalance, "auto" => Auto, "none" => None, "gain" => Gain, "local" => Local);
 
-/// What is done to a pair.
+/// Corrections of a pair.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct PrepareSettings {
     /// Geometry.
@@ -127,11 +127,11 @@ pub struct PrepareSettings {
     pub limits: Option<[f32; 2]>,
     /// Keep what moved between the exposures and pairs of different scenes.
     pub trust: bool,
-    /// The camera's noise, where it is known; else it is measured in the pair.
+    /// The camera's noise, if known; otherwise it is measured in the pair.
     pub noise: Option<PairNoise>,
 }
 
-/// Why a pair is none.
+/// Why a pair is invalid.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum PrepareError {
     /// The images differ in size.
@@ -180,10 +180,10 @@ pub struct Balanced {
 /// Report of the preparation.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Report {
-    /// `None` where the geometry was left as it is.
+    /// `None` for unchanged geometry.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub aligned: Option<Aligned>,
-    /// `None` where the brightness was left as it is.
+    /// `None` for unchanged brightness.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub balanced: Option<Balanced>,
     /// Correlation of what both images share, relative to what noise allows; `None` where nothing rises above it.
@@ -402,7 +402,7 @@ fn geometry(
     Some(warp)
 }
 
-/// Whether what was found differs from the start by more than chance and by more than matters.
+/// Whether the result differs from the start by more than chance and by more than matters.
 fn significant(found: &Alignment, start: &Warp, size: (usize, usize)) -> bool {
     let Some(back) = start.inverse() else { return false };
     let displacement = found.warp.after(&back).rms_px(size);

@@ -32,7 +32,7 @@ const K_RANGE: [f64; 2] = [0.01, 10.0];
 /// Inner radii of a ring: above, no light is left.
 const INNER_RANGE: [f64; 2] = [0.0, 0.99];
 
-/// What is wrong with a point-spread function's text or parameters.
+/// An error of a point-spread function's text or parameters.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum PsfError {
     /// The name is that of no model.
@@ -70,7 +70,7 @@ pub enum PsfError {
         /// Largest.
         high: f64,
     },
-    /// A profile that is none.
+    /// An invalid profile.
     #[error("the PSF's profile or image has {0}")]
     Profile(String),
 }

@@ -25,7 +25,7 @@ pub enum Reason {
     Misfit = 8,
     /// No finite number in the file.
     NotFinite = 9,
-    /// Less confident than was asked for.
+    /// Confidence below the requested one.
     Unsure = 10,
     /// Beyond what a correction was taught.
     BeyondCorrection = 11,
@@ -47,7 +47,7 @@ impl Reason {
         Self::BeyondCorrection,
     ];
 
-    /// Its number; 0 stands for a pixel that has a depth.
+    /// Its number; 0 is a pixel with a depth.
     pub fn code(self) -> u8 {
         self as u8
     }

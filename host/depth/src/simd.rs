@@ -1,4 +1,4 @@
-//! The inner loops of the run time for whatever vector unit the processor has.
+//! The inner loops of the run time for the processor's vector unit.
 //!
 //! Each loop is written once over [`Lanes`](lanes::Lanes) and compiled for each unit: AVX-512, AVX2 with FMA, NEON on 64-bit ARM, and
 //! portable code of four lanes that any compiler turns into what it can. Which one runs is decided at run time
@@ -80,7 +80,7 @@ pub enum Backend {
     Avx2,
     /// 4 lanes, 64-bit ARM.
     Neon,
-    /// Whatever the compiler makes of four lanes, on any processor.
+    /// Four lanes of portable code, on any processor.
     Portable,
 }
 

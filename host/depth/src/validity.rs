@@ -39,7 +39,7 @@ pub struct ValiditySettings {
     pub filled: bool,
 }
 
-/// Result of the calculation.
+/// Validity of each pixel.
 #[derive(Debug, Clone)]
 pub struct Validity {
     /// For each pixel the code of the [`Reason`] why it has no depth, 0 where it has one.
@@ -164,7 +164,7 @@ impl Range {
         }
     }
 
-    /// The confidence of a depth, or why there is none.
+    /// The confidence of a depth, or the reason for its absence.
     /// `deviations_mm` are from noise alone, and with what the model leaves.
     fn verdict(
         &self,

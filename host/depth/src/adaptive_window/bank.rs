@@ -38,7 +38,7 @@ impl Bank {
         }
     }
 
-    /// Least c1 in energies of the matched filter: half of what it is expected to be.
+    /// Least c1 in energies of the matched filter: half of the expected value.
     pub(super) fn least_slope(&self) -> f32 {
         match self {
             Self::Whitened(filters) => 0.5 * filters.slope_in_energy as f32,

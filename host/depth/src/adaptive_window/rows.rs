@@ -372,7 +372,7 @@ impl<'a> Tile<'a> {
         let (alpha, variance) = (&mut row.alpha[..wide], &mut row.variance[..wide]);
         let found = Found { alpha: &mut *alpha, variance: &mut *variance };
         simd::roots(backend, CubicSums { c: [c0, c1, c2, c3], energy }, bank.least_slope(), found);
-        // Energy that is noise is no evidence.
+        // Energy of noise is not evidence.
         let of_noise = bank.noise_energy() * (side * side) as f32;
         simd::without_noise(backend, energy, noise, [of_noise, LEAST_EVIDENCE], variance);
         let [chosen, of_chosen, low, high, open] = row.chosen.each_mut().map(|values| &mut values[..wide]);

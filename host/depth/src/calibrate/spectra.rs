@@ -36,7 +36,7 @@ pub enum SpectrumError {
         row: usize,
     },
     /// No texture.
-    #[error("it is constant or dark: there is no texture to compare")]
+    #[error("it is constant or dark, without texture to compare")]
     Constant,
 }
 

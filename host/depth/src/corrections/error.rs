@@ -19,9 +19,9 @@ pub enum CorrectionError {
         needed: usize,
     },
     /// Two patterns of one depth.
-    #[error("two patterns at {0} mm: each must be taken at a depth of its own")]
+    #[error("two patterns at {0} mm: each needs another depth")]
     RepeatedDepth(f64),
-    /// A true depth that is none.
+    /// An invalid true depth.
     #[error("the true depth {true_mm} mm of pattern {index} is not a positive, finite number")]
     TrueDepth {
         /// Index of the pattern.

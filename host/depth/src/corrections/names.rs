@@ -11,7 +11,7 @@ impl Method {
         Self::listed(Self::ALL.map(|method| method.name().to_owned()).to_vec(), "or")
     }
 
-    /// The names of all methods, each with what it is: the text of a help.
+    /// Names of all methods with descriptions, for help texts.
     pub fn choices() -> String {
         Self::listed(Self::ALL.map(Self::with_summary).to_vec(), "or")
     }

@@ -1,4 +1,4 @@
-//! A smooth surface over field and depth: what is to be added to a measured depth, as a tensor-product cubic B-spline.
+//! A smooth surface over field and depth: the correction of a measured depth, as a tensor-product cubic B-spline.
 //!
 //! `t - u = sum c(i, j, k) B_i(x) B_j(y) B_k(u)` with uniform knots, fitted by penalised least squares (P-splines; Eilers
 //! & Marx 1996): the second differences of neighbouring coefficients along each of the three axes cost as well, so that
@@ -62,7 +62,7 @@ fn basis(place: f64, count: usize) -> Basis<f64> {
     Basis { first, values: values.map(|value| value / 6.0) }
 }
 
-/// What a block of a pattern says: its place, measured depth, what is to be added, and how many pixels say so.
+/// Data of a block of a pattern: place, measured depth, correction, and number of pixels.
 struct Sample {
     y: f64,
     x: f64,
@@ -90,7 +90,7 @@ fn samples(series: &Series<'_>) -> Vec<(usize, Sample)> {
                     weight += 1.0;
                 }
                 let [y, x, u] = [y, x, u].map(|sum| sum / weight);
-                // What lies beyond the scale has no value when it is corrected either.
+                // Values beyond the scale stay without a value when corrected.
                 if u.abs() <= 1.0 {
                     samples.push((index, Sample { y, x, u, add: truth - u, weight }));
                 }
@@ -263,7 +263,7 @@ fn correct_row(
     for (depth, of_column) in depths.iter_mut().zip(of_columns) {
         let d = *depth - centre;
         let position = (d + span) * per_mm;
-        // A depth that is not finite or beyond the scale ends as NaN below, whatever its interval.
+        // A depth that is not finite or beyond the scale ends as NaN below, for every interval.
         let first = (position as usize).min(intervals - 1);
         let t = position - first as f32;
         let (square, cube, rest) = (t * t, t * t * t, 1.0 - t);

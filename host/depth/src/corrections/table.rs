@@ -1,4 +1,4 @@
-//! What a correction's file provides, and what is made of the table of corrections.
+//! Interface of a correction's file, and the table of corrections.
 
 use farnear_maths::clsf::DepthScale;
 use ndarray::ArrayViewMut2;
@@ -18,10 +18,10 @@ pub(super) trait Learned: Sized {
     /// Learns from checked patterns.
     fn learn(series: &Series<'_>, settings: &CdcSettings) -> Result<Self, CorrectionError>;
 
-    /// Checks what was loaded, and prepares it for maps of (height, width).
+    /// Checks loaded data and prepares it for maps of (height, width).
     fn prepare(&mut self, dim: (usize, usize)) -> Result<(), CorrectionError>;
 
-    /// Corrects a map in standard layout in place; what is beyond the scale becomes NaN.
+    /// Corrects a map in standard layout in place; values beyond the scale become NaN.
     fn apply(&self, depth_mm: ArrayViewMut2<f32>, scale: DepthScale);
 
     /// The bits of the coefficients for a board, in the order of its form; empty without one.
@@ -52,7 +52,7 @@ macro_rules! corrections {
                 match self { $(Self::$variant => $name,)+ }
             }
 
-            /// What it is, in a few words.
+            /// Description, in a few words.
             pub fn summary(self) -> &'static str {
                 match self { $(Self::$variant => $summary.trim_ascii(),)+ }
             }

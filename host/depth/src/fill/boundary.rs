@@ -20,7 +20,7 @@ pub fn trace_boundary(mask: ArrayView2<bool>, start: (usize, usize)) -> Vec<(usi
         let next = (y.checked_add_signed(dy)?, x.checked_add_signed(dx)?);
         mask.get(next).copied().unwrap_or(false).then_some(next)
     };
-    // Reading order: what lies left of the start is background, so the search begins there.
+    // Reading order: the pixel left of the start is background, so the search begins there.
     let mut boundary = vec![start];
     let mut pixel = start;
     let mut from = 0;

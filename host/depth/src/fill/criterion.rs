@@ -6,7 +6,7 @@
 //! text says too.
 //!
 //! The ratio varies with the texture, but with the blur as well: in the middle of the range both images are alike, and it
-//! vanishes whatever the surface. So the second is for comparison. Cost: a few additions a pixel.
+//! vanishes for every surface. So the second is for comparison. Cost: a few additions a pixel.
 
 use std::fmt;
 use std::str::FromStr;

@@ -18,10 +18,10 @@ const MAX_STEP_PX: usize = 4;
 /// Where samples are dense, px.
 const NEAR_PX: usize = 14;
 
-/// Neighbouring pixels share windows and kernels: so many count as one.
+/// Neighbouring pixels share windows and kernels: this many count as one.
 const PIXELS_PER_INDEPENDENT: f64 = 60.0;
 
-/// Number of places that stand for a boundary.
+/// Number of places that represent a boundary.
 const BORDER_POINTS: usize = 48;
 
 /// The regions of a map.

@@ -47,11 +47,11 @@ pub enum StackError {
         /// Largest.
         most: usize,
     },
-    /// A blur that is none.
+    /// An invalid blur.
     #[error("the images are to be blurred by {0} px: 0 to {MOST_SMOOTHING_PX} is possible")]
     Smoothing(f32),
-    /// A reach that is none.
-    #[error("places are to be mended within {0} px: 0 (not at all) or 1 to {MOST_GUIDED_PX} is possible")]
+    /// An invalid reach.
+    #[error("places are to be corrected within {0} px: 0 (off) or 1 to {MOST_GUIDED_PX} is possible")]
     Guided(f32),
     /// Positions that are not one for each image, or do not rise or fall.
     #[error(

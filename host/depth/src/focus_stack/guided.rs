@@ -141,7 +141,7 @@ mod tests {
 
     const SIZE: (usize, usize) = (40, 60);
 
-    /// Mended over 6 px in a stack of 12 images; all curves rise alike.
+    /// Corrected over 6 px in a stack of 12 images; all curves rise alike.
     fn mend(place: &Array2<f32>, sharp: &Array2<f32>, sharpness: &Array2<f32>) -> Array2<f32> {
         let rise = Array2::from_elem(SIZE, 0.5);
         let guide = Guide {

@@ -76,7 +76,7 @@ measures! {
     Contrast = "contrast";
     /// Magnitudes of the coefficients of a quadratic surface (CURV; Helmli & Scherer 2001).
     Curvature = "curvature";
-    /// Quotient of pixel and mean, whichever way it is above 1 (HELM; Helmli & Scherer 2001).
+    /// Quotient of pixel and mean, in the direction that is above 1 (HELM; Helmli & Scherer 2001).
     MeanQuotient = "mean-quotient";
     /// Largest less smallest grey value (HISR; Firestone et al. 1991).
     Range = "range";
@@ -84,7 +84,7 @@ measures! {
 
 /// A name that no measure has.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("`{0}` is no focus measure: expected one of {names}", names = names())]
+#[error("`{0}` is not a focus measure: expected one of {names}", names = names())]
 pub struct UnknownSharpness(String);
 
 fn names() -> String {

@@ -44,10 +44,10 @@ pub enum DesignError {
     /// The PSF is unusable.
     #[error(transparent)]
     Psf(#[from] PsfError),
-    /// The name is none of the known ones.
+    /// The name is unknown.
     #[error("unknown {what} `{name}`: use {known}")]
     UnknownName {
-        /// What was to be named.
+        /// The kind of name.
         what: &'static str,
         /// The text.
         name: String,

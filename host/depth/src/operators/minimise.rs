@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector, Dyn, Owned, U1, VecStorage};
 
 use super::DesignError;
 
-/// What is left at some taps, and how it changes with them.
+/// Residuals at some taps, with derivatives.
 pub(super) trait Misfit {
     /// The residuals, whose sum of squares is to be least.
     fn residuals(&self, taps: &[f64]) -> DVector<f64>;

@@ -1,4 +1,4 @@
-//! What operators are asked for: family and design by name, point-spread function, blur and size.
+//! Request for operators: family and design by name, point-spread function, blur and size.
 
 use std::str::FromStr;
 
@@ -41,7 +41,7 @@ impl FromStr for Design {
     }
 }
 
-/// What operators are asked for.
+/// Request for operators.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Request {
     /// Family; must fit the PSF.

@@ -45,7 +45,7 @@ impl Samples {
                     weight: weight.sqrt(),
                 })
             })
-            // Where both OTFs vanish there is no image.
+            // Where both OTFs vanish the image is empty.
             .filter(|sample| sample.normalised_ratio.is_finite())
             .collect();
         Self { size, basis, gp1: grid.iter().map(|p| gp1.response(p.u, p.v)).collect(), samples }

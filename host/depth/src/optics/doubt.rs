@@ -26,7 +26,7 @@ impl fmt::Display for Doubt {
 }
 
 impl Optics {
-    /// What is hardly right.
+    /// A value that is probably wrong.
     pub fn doubts(&self) -> Vec<Doubt> {
         let range = self.working_range();
         let span = (range.far_mm - range.near_mm) / range.far_mm * 100.0;

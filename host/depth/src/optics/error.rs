@@ -1,11 +1,11 @@
-//! What is wrong with a set of optics.
+//! Errors of a set of optics.
 
 use crate::psf::PsfError;
 
 /// OpenCV's order.
 const DISTORTION_NAMES: [&str; 8] = ["k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"];
 
-/// What is wrong with a set of optics.
+/// An error of a set of optics.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum OpticsError {
     /// The section that a z-stack taught.

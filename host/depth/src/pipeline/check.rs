@@ -1,4 +1,4 @@
-//! What is checked before and after a run: sizes, windows, operators that fit the optics, invalid, saturated and
+//! Checks before and after a run: sizes, windows, operators that fit the optics, invalid, saturated and
 //! constant images, a pair that looks swapped.
 
 use ndarray::{Array2, CowArray, Ix2};

@@ -222,7 +222,7 @@ impl Tile {
             sum_part,
         );
         if input.bad().is_some() {
-            // Holes are filled with the middle value; whatever they touch is taken out again later.
+            // Holes are filled with the middle value; pixels that they touch are removed later.
             for value in difference_part.iter_mut().chain(sum_part) {
                 if !value.is_finite() {
                     *value = 0.0;
@@ -231,7 +231,7 @@ impl Tile {
         }
         for x in (0..inside.start).chain(inside.end..full) {
             let column = reflect((left + x) as isize - self.halo as isize, image_width);
-            // Reflection leads beyond what was loaded only if the tile is narrower than its halo.
+            // Reflection exceeds the loaded rows only if the tile is narrower than its halo.
             [difference[x], sum[x]] = match (column + self.halo).checked_sub(left) {
                 Some(source) if inside.contains(&source) => [difference[source], sum[source]],
                 _ => input.normalised(row, column),

@@ -36,7 +36,7 @@ impl Job<'_> {
     }
 }
 
-/// Median of the values around (y, x) that are not NaN, with reflected borders; NaN if there is none.
+/// Median of the values around (y, x) that are not NaN, with reflected borders; NaN without any.
 pub(crate) fn median_at(image: &Array2<f32>, size: usize, (y, x): (usize, usize)) -> f32 {
     let (height, width) = image.dim();
     let r = (size / 2) as isize;

@@ -1,4 +1,4 @@
-//! Where both images show the same: what moved between the exposures, and pairs that are none.
+//! Where both images show the same: motion between the exposures, and images of different scenes.
 //!
 //! In the band that defocus leaves to both images (`band`) these are correlated by nearly 1 wherever they show
 //! the same surface, less what noise takes. A window in which they are not, although both have detail far above the noise, either
@@ -37,7 +37,7 @@ pub struct Agreement {
     pub correlation: Option<f64>,
     /// Part of the windows that have detail in both images.
     pub detailed: f64,
-    /// Pixels that show different things, (height, width) of the images; `None` where there are none.
+    /// Pixels that show different things, (height, width) of the images; `None` without any.
     pub moved: Option<Array2<bool>>,
     /// Pixels that show the same thing with more blur than a pair has.
     pub too_blurred: Option<Array2<bool>>,
@@ -115,7 +115,7 @@ fn coarse_correlation(pair: &Thinned) -> Array2<f32> {
     })
 }
 
-/// Mean product of `a` and `b` around each pixel, `b` moved by so many pixels down and to the right.
+/// Mean product of `a` and `b` around each pixel, `b` moved by this many pixels down and to the right.
 fn product_at(a: &Array2<f32>, b: &Array2<f32>, down: isize, right: isize) -> Array2<f32> {
     let (height, width) = a.dim();
     let inside = |i: usize, by: isize, n: usize| (i as isize + by).clamp(0, n as isize - 1) as usize;

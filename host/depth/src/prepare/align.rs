@@ -221,7 +221,7 @@ fn best_shift(level: &Level, start: Warp) -> Warp {
     let best = shifts
         .into_par_iter()
         .map(|shift| (correlation(level, &moved(shift)), shift))
-        // Equal ones: the smaller shift, whatever the order in which threads finish.
+        // Equal ones: the smaller shift, independent of the order in which threads finish.
         .max_by(|(a, [ax, ay]), (b, [bx, by])| {
             a.total_cmp(b)
                 .then_with(|| (bx * bx + by * by).cmp(&(ax * ax + ay * ay)))

@@ -23,12 +23,12 @@ const DARK_STRUCTURE: f64 = 0.02;
 /// Least and largest response of a good pixel.
 const RESPONSE: [f32; 2] = [0.5, 1.5];
 
-/// What is wrong with a camera's frames.
+/// An error of a camera's frames.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum CameraError {
     /// They are of another size than the images.
     #[error(
-        "the camera's frames are {width}x{height}, the images {image_width}x{image_height}: calibrate the camera as it is used"
+        "the camera's frames are {width}x{height}, the images {image_width}x{image_height}: calibrate the camera in the mode of the images"
     )]
     Size {
         /// Width of the frames.
@@ -99,7 +99,7 @@ fn check_exposure(kind: &'static str, number: usize, image: &Array2<f32>) -> Res
     let smooth = box_mean(image.view(), SMOOTHED_PX);
     let around = box_mean(smooth.view(), SURROUNDINGS_PX);
     let differences = || smooth.iter().zip(&around).map(|(value, around)| f64::from(value - around));
-    // Robust: single bad pixels and grains of dust are no scene.
+    // Robust: single bad pixels and grains of dust are not a scene.
     let mut sizes: Vec<f32> = differences().map(|difference| difference.abs() as f32).collect();
     let at = (0.9 * sizes.len().saturating_sub(1) as f64) as usize;
     let usual = if sizes.is_empty() { 0.0 } else { *sizes.select_nth_unstable_by(at, f32::total_cmp).1 };

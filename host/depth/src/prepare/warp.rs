@@ -186,7 +186,7 @@ fn sample(pixels: &[f32], (height, width): (usize, usize), [x, y]: [f64; 2], lan
                 *sum += weight * value;
             }
         }
-        // The two columns of padding may hold a pixel without a value, which is none of ours.
+        // The two columns of padding may hold a pixel without a value, which is not used.
         return columns[..TAPS].iter().zip(across).map(|(sum, weight)| sum * weight).sum();
     }
     let inside = |i: isize, n: usize| i.clamp(0, n as isize - 1) as usize;

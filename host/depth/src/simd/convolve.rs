@@ -30,7 +30,7 @@ impl Taps {
         self.size
     }
 
-    /// Forgets what was begun.
+    /// Resets the running sums.
     pub fn reset(&mut self) {
         self.pending.all_mut().fill(0.0);
     }

@@ -1,4 +1,4 @@
-//! Vectors of single-precision numbers: 16 lanes (AVX-512), 8 (AVX2) or 4 as plain arrays; 4 of NEON stand in `neon.rs`.
+//! Vectors of single-precision numbers: 16 lanes (AVX-512), 8 (AVX2) or 4 as plain arrays; 4 of NEON are in `neon.rs`.
 
 #[cfg(target_arch = "x86_64")]
 use std::arch::x86_64::*;

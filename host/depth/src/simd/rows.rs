@@ -5,7 +5,7 @@ use super::{Plane, dispatch};
 use crate::confidence;
 use crate::cubic::{LEAST_T, MAX_ALPHA, SLOPE_FLOOR, START, STEPS};
 
-/// Texture energy that stands for none: keeps divisions finite, far below any real one (images are normalised).
+/// Texture energy that counts as none: keeps divisions finite, far below any real one (images are normalised).
 const TINY: f32 = 1e-30;
 
 /// Pixels that are counted in one f32, which is exact up to 2^24.
@@ -101,7 +101,7 @@ impl WindowRow {
         Self { window, phase: 0, heads: Plane::new(4, width), tails: Plane::new(4 * window, width) }
     }
 
-    /// Forgets what was begun.
+    /// Resets the running sums.
     pub fn reset(&mut self) {
         self.phase = 0;
         self.heads.all_mut().fill(0.0);

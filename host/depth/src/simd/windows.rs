@@ -85,7 +85,7 @@ fn roots_generic<L: Lanes>(sums: CubicSums<'_>, floor: f32, found: Found<'_>) {
     }
 }
 
-/// What has been chosen so far along a row.
+/// Choice so far along a row.
 pub(crate) struct Choice<'a> {
     pub alpha: &'a mut [f32],
     pub variance: &'a mut [f32],
@@ -101,7 +101,7 @@ pub(crate) struct Choice<'a> {
 pub(crate) struct Weighing {
     /// Half width of a window's interval in standard deviations.
     pub gamma: f32,
-    /// What is added to the variance, because no window is exact.
+    /// Added to the variance, because no window is exact.
     pub floor: f32,
     /// Largest variance of a window that forbids anything.
     pub largest: f32,

@@ -233,14 +233,10 @@ fn what_is_no_stack_is_refused_and_nothing_is_written() {
     refuse(
         &[&stack, "--measure", "sharp"],
         2,
-        "`sharp` is no focus measure: expected one of modified-laplacian",
+        "`sharp` is not a focus measure: expected one of modified-laplacian",
     );
     refuse(&[&stack, "--window-px", "8"], 1, "the window is 8: an odd number from 3");
-    refuse(
-        &[&stack, "--guided-px", "0.5"],
-        1,
-        "mended within 0.5 px: 0 (not at all) or 1 to 100 is possible",
-    );
+    refuse(&[&stack, "--guided-px", "0.5"], 1, "corrected within 0.5 px: 0 (off) or 1 to 100 is possible");
     refuse(&["/absent"], 1, "/absent: no such folder or file");
     fs::write(
         format!("{stack}/5.png"),

@@ -1,7 +1,7 @@
 //! Blur over distance on both sides of focus, from spectra relative to the sharpest slice.
 //!
 //! With a Gaussian of variance s^2 the cross-spectrum falls as `exp(-w^2 (s^2 - s0^2) / 2)`; the slope of its logarithm over
-//! `w^2` is a variance whatever the profile is at low frequencies, where every OTF is a parabola. A pill-box of radius R has
+//! `w^2` is a variance for every profile at low frequencies, where every OTF is a parabola. A pill-box of radius R has
 //! `s = R / 2`.
 
 use serde::{Deserialize, Serialize};

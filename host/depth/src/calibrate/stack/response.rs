@@ -25,7 +25,7 @@ use crate::validity::model_error;
 const BLOCK_PX: usize = 48;
 /// Border that takes no part, px.
 const BORDER_PX: usize = 12;
-/// One of so many pixels is used, along both axes.
+/// One of this many pixels is used, along both axes.
 const THIN: usize = 5;
 /// True normalised depths that are learned; a little beyond the range.
 const LEARNED: f64 = 1.12;
@@ -83,7 +83,7 @@ pub(super) struct Sample {
     even: bool,
     /// Half of the field, and every other pair.
     part: [bool; 2],
-    /// Of the target as it is, not with coarser texture.
+    /// Of the original target, not with coarser texture.
     original: bool,
 }
 
@@ -123,13 +123,13 @@ struct Samples {
 struct Pair {
     far: usize,
     prepared: Prepared,
-    /// As it is, not smoothed.
+    /// Original, not smoothed.
     original: bool,
 }
 
 type Learned = (Optics, HeldOut, Vec<Trial>);
 
-/// What is calibrated, binned.
+/// Slices to calibrate, binned.
 pub(super) struct Target<'a> {
     pub slices: &'a [Array2<f32>],
     pub plane: &'a FocusPlane,
@@ -175,7 +175,7 @@ pub(super) fn learn(target: &Target<'_>) -> Result<Learned, StackError> {
         let Ok(samples) = target.measure(&pairs, &optics) else { return Ok(()) };
         for degree in DEGREES {
             let Some((judged, inside)) = judge(&samples, degree, Split::Blocks) else { continue };
-            // Holes count: what is not measured has no error.
+            // Holes count: unmeasured pixels have no error.
             let fill = inside * samples.of.len() as f64 / samples.looked_at.max(1) as f64;
             let of =
                 |original: bool| robust(judged.iter().filter(|j| j.original == original).map(|j| j.error));
