@@ -178,7 +178,7 @@ impl RigAccess<'_, '_> {
     }
 
     /// Makes the firmware execute `code`: copies it to free RAM and redirects the first function pointer that
-    /// `is_function` finds in the variable (address, length). Returns `false` where there is none.
+    /// `is_function` finds in the variable (address, length). Returns `false` without one.
     pub fn redirect_program(
         &mut self,
         (variable, length): (u64, u64),

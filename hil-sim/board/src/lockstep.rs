@@ -66,7 +66,7 @@ enum Work {
 }
 
 impl Work {
-    /// No wildcard: time would stand still for a new request that starts long work.
+    /// No wildcard: time would stop for a new request that starts long work.
     fn of(request: &Request) -> Self {
         match request {
             Request::Home { .. }

@@ -88,12 +88,12 @@ pub struct LightParts {
     pub flicker_hz: f64,
     /// What each of the board's light outputs adds when fully on.
     pub lamps: [f64; 2],
-    /// The scene has no texture of its own; the second output is a projector whose pattern is the scene's texture.
+    /// The scene is blank; the second output is a projector whose pattern is the scene's texture.
     pub blank_walls: bool,
 }
 
 impl LightParts {
-    /// Mean brightness of an exposure, with the mean of each light output: what falls on the texture, and what is even.
+    /// Mean brightness of an exposure, with the mean of each light output: textured and even light.
     pub fn brightness(&self, (begin_ns, end_ns): (u64, u64), outputs: [f64; 2]) -> (f64, f64) {
         let turn = |at_ns: u64| std::f64::consts::TAU * self.flicker_hz * 1e-9 * at_ns as f64;
         let (begin, end) = (turn(begin_ns), turn(end_ns));

@@ -185,7 +185,7 @@ mod tests {
             let sizes = sizes.iter().flat_map(|size| size.to_le_bytes()).collect::<Vec<u8>>();
             let bytes = [&MAGIC[..], &length.to_le_bytes(), text.as_bytes(), &sizes, &tail].concat();
             if let Ok(read) = PackedScene::read(&mut bytes.as_slice()) {
-                // A map of 0 x 3 is no map; bytes are compared because of NaN.
+                // A map of 0 x 3 is invalid; bytes are compared because of NaN.
                 let once = read.to_bytes().unwrap();
                 let twice = PackedScene::read(&mut once.as_slice()).unwrap().to_bytes().unwrap();
                 prop_assert_eq!((once, read.text), (twice, read_text(&bytes)));

@@ -1,4 +1,4 @@
-//! What all requests share: settings, rig, jobs, control, log, and the state that every browser is told.
+//! What all requests share: settings, rig, jobs, control, log, and the state that every browser receives.
 
 use std::{
     collections::VecDeque,
@@ -63,7 +63,7 @@ pub struct App {
     control: Mutex<ControlLock>,
     state: Mutex<State>,
     told: watch::Sender<Arc<str>>,
-    /// The newest live picture, as it is sent.
+    /// The newest live picture, encoded.
     pub pictures: watch::Sender<Bytes>,
     live: Mutex<Live>,
     log: Mutex<VecDeque<LogLine>>,
@@ -80,7 +80,7 @@ pub struct App {
     pub stops: Arc<Stops>,
 }
 
-/// What is to be seen live.
+/// Live settings.
 #[derive(Clone, Debug)]
 pub struct Live {
     pub mode: LiveMode,
@@ -88,7 +88,7 @@ pub struct Live {
     pub exposure: Micros,
     /// What the focus is measured by.
     pub measure: FocusMeasure,
-    /// Ends what is seen now.
+    /// Ends the present live view.
     pub cancel: Cancel,
 }
 
@@ -101,7 +101,7 @@ impl App {
     /// With nothing under way. Makes the session's folder and its optics where they are missing.
     ///
     /// # Errors
-    /// [`WorkflowError::Folder`], [`WorkflowError::Staging`], and optics that are none.
+    /// [`WorkflowError::Folder`], [`WorkflowError::Staging`], and invalid optics.
     pub fn new(settings: ServeSettings, guard: Guard) -> Result<Arc<Self>, WorkflowError> {
         let ServeSettings { rig, camera, session, optics, limits, .. } = settings;
         fs::create_dir_all(&session)
@@ -157,13 +157,13 @@ impl App {
         CameraSettings { exposure, ..lock(&self.camera).clone() }
     }
 
-    /// Changes what is set on the camera; what is seen now ends, and begins again with it.
+    /// Changes camera settings; the live view restarts with them.
     pub fn set_camera(&self, settings: Vec<Setting>) {
         lock(&self.camera).settings = settings;
         self.interrupt_live();
     }
 
-    /// Whether there is a camera though there is no rig: one looks through it.
+    /// Whether a camera is connected without a rig.
     pub fn has_camera_alone(&self) -> bool {
         self.address.is_none() && lock(&self.camera).address != CameraAddress::Emulated
     }
@@ -188,12 +188,12 @@ impl App {
         self.reconnect.swap(false, Ordering::Relaxed)
     }
 
-    /// What is to be seen live.
+    /// Live settings.
     pub fn live(&self) -> Live {
         lock(&self.live).clone()
     }
 
-    /// Changes what is to be seen live; what is seen now ends.
+    /// Changes the live settings; the present live view ends.
     pub fn set_live(&self, change: impl FnOnce(&mut Live)) {
         let mut live = lock(&self.live);
         change(&mut live);
@@ -207,7 +207,7 @@ impl App {
         });
     }
 
-    /// Ends what is seen now, so that a job begins; it goes on after the job.
+    /// Ends the live view for a job; it continues after the job.
     pub fn interrupt_live(&self) {
         let mut live = lock(&self.live);
         live.cancel.cancel();
@@ -231,7 +231,7 @@ impl App {
         }
     }
 
-    /// The state as it is now.
+    /// The present state.
     pub fn state(&self) -> State {
         lock(&self.state).clone()
     }
@@ -284,7 +284,7 @@ impl App {
         self.change(|state| state.live.recording = None);
     }
 
-    /// Ends the recording because of an error; what was recorded is kept.
+    /// Ends the recording because of an error; recorded pairs are kept.
     pub fn break_recording(&self, why: &str) {
         let name = self.state().live.recording.unwrap_or_default();
         let ended = format!("The recording {name} has ended: {why}; what was recorded before is kept");
@@ -320,7 +320,7 @@ impl App {
     /// Ends jobs and live depth, and stops the rig; does not wait for any of them.
     ///
     /// # Errors
-    /// [`WorkflowError::Client`] where the board does not answer: what the jobs hold is ended all the same.
+    /// [`WorkflowError::Client`] where the board does not answer: the jobs end nevertheless.
     pub fn stop(&self) -> Result<(), WorkflowError> {
         self.begin_stop().tell()
     }
@@ -346,13 +346,13 @@ impl App {
     /// Waits until the program ends.
     pub async fn ended(&self) {
         let mut ending = self.ending.subscribe();
-        let _ = ending.wait_for(|ending| *ending).await; // a sender that is gone has ended too
+        let _ = ending.wait_for(|ending| *ending).await; // a dropped sender has ended, too
     }
 
     /// Begins a job on the rig.
     ///
     /// # Errors
-    /// What is under way, in words.
+    /// The running work, in words.
     pub fn begin_on_rig(&self, task: Task) -> Result<u64, String> {
         let _ = self.take_stop_reason(); // of an earlier stop
         let begun = self.rig_jobs.begin(task, |job| self.change(|state| state.job = Some(job)));
@@ -365,7 +365,7 @@ impl App {
     /// Begins a computation.
     ///
     /// # Errors
-    /// What is under way, in words.
+    /// The running work, in words.
     pub fn begin_computing(&self, task: Task) -> Result<u64, String> {
         self.computing.begin(task, |job| self.change(|state| state.computation = Some(job)))
     }

@@ -72,7 +72,7 @@ mod tests {
 
     use super::*;
 
-    /// What a browser loads in all stays below what a slow line bears.
+    /// The size of everything that a browser loads suits a slow connection.
     #[test]
     fn the_page_is_small() {
         let bytes: usize = ASSETS.iter().map(|asset| asset.bytes.len()).sum();
@@ -91,7 +91,7 @@ mod tests {
         }
     }
 
-    /// All that is needed at once is asked for at once; only the surface in 3-D comes when somebody wants it.
+    /// Everything needed at the start is requested at the start; the 3-D surface loads on demand.
     #[test]
     fn every_module_that_is_needed_at_once_is_announced() {
         let page = ASSETS.iter().find(|asset| asset.path == "index.html").map(|asset| asset.bytes).unwrap();

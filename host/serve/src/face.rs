@@ -1,4 +1,4 @@
-//! The page as the face of a workflow: what it says goes into the state, what it asks waits there for an answer.
+//! The page as the face of a workflow: messages go into the state, prompts wait there for an answer.
 
 use std::{
     sync::Mutex,
@@ -23,9 +23,9 @@ const COUNT: Duration = Duration::from_millis(100);
 /// The face of one queue's job.
 pub struct Face<'a> {
     pub app: &'a App,
-    /// Where the job stands in it.
+    /// Position of the job in the state.
     pub place: Place,
-    /// When a count was told last.
+    /// Time of the last reported count.
     pub counted: Mutex<Option<Instant>>,
 }
 

@@ -1,4 +1,4 @@
-//! What goes wrong, as the page is told.
+//! Errors as the page receives them.
 
 use axum::{
     Json,
@@ -14,7 +14,7 @@ use serde::Serialize;
 /// Why a request was not carried out.
 #[derive(Clone, PartialEq, Eq, Debug, Serialize, JsonSchema)]
 pub struct Failure {
-    /// What went wrong, with the offending value and what was expected.
+    /// Message with the offending value and the expected ones.
     pub error: String,
     /// What to do on the page.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -34,7 +34,7 @@ impl Failure {
         Self { hint: Some(hint.into()), ..self }
     }
 
-    /// There is no such thing.
+    /// The resource does not exist.
     pub fn missing(what: &str) -> Self {
         Self::new(StatusCode::NOT_FOUND, format!("there is no {what}"))
     }

@@ -1,4 +1,4 @@
-//! Who may talk to this program: by default this computer's own browser, else whoever has the token.
+//! Who may talk to this program: by default this computer's own browser, else a holder of the token.
 //!
 //! A page from elsewhere that a browser shows can send requests to loopback too; so the names in `Host` and `Origin` are looked
 //! at. A name from the public DNS could be made to lead here, and is refused unless it was allowed.
@@ -94,7 +94,7 @@ impl Token {
     }
 }
 
-/// What is asked of every request.
+/// Checks of every request.
 #[derive(Debug, Default)]
 pub struct Guard {
     token: Option<Token>,
@@ -181,7 +181,7 @@ impl Guard {
         if name == "localhost" || address.is_some_and(|address| address.is_loopback()) {
             return true;
         }
-        // Beyond loopback: an address cannot be taken by somebody else's name, nor can a name without a dot.
+        // Beyond loopback: an address cannot be another host's name, nor can a name without a dot.
         let local = !name.contains('.') || name.ends_with(".local");
         self.token.is_some()
             && (address.is_some()

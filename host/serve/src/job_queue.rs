@@ -131,7 +131,7 @@ pub fn start(app: &Arc<App>) -> io::Result<Workers> {
     Ok(Workers(threads.into()))
 }
 
-/// Jobs on the rig, and what is seen live between them.
+/// Jobs on the rig, and live views between them.
 fn run_rig(app: &App, jobs: &Receiver<Begun>) {
     loop {
         let seen = app.live().mode != LiveMode::Off

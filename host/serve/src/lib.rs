@@ -1,7 +1,7 @@
 //! # farnear-serve
 //!
 //! The rig in a browser. A page of plain ES modules, embedded, talks to a typed HTTP and WebSocket interface that describes itself
-//! at `/openapi.json`; both only parse, show and ask: what is done lies in `farnear-workflows`.
+//! at `/openapi.json`; both only parse, show and ask: the tasks are in `farnear-workflows`.
 //!
 //! - [`app`]: what all requests share; [`job_queue`]: one job at a time on the rig, and one computation at a time;
 //!   [`live`]: images and depth between jobs; [`rig_watch`]: how the rig is, ten times a second.

@@ -28,7 +28,7 @@ use crate::{
 /// Weight of the newest frame in the shown rate.
 const NEWEST: f64 = 0.15;
 
-/// Looks until something else is wanted. What goes wrong is told, and nothing is looked at until somebody wants it again.
+/// Runs the live view until another one is selected. After an error it waits for a new selection.
 pub fn look(app: &App) {
     let live = app.live();
     // After `live` was read: a stop requested from now on ends this look.
@@ -51,7 +51,7 @@ pub fn look(app: &App) {
         }
         (LiveMode::Depth, Some(rig)) => look_at_depth(app, RigAddress::Open(rig), &context, &rate),
     };
-    // Something else may be wanted already: then the rig's word of the stop is no news, and must not end what comes next.
+    // Something else may be wanted already: then the rig's report of the stop must not end the next one.
     let cancelled = context.cancel.is_cancelled() || app.is_ending();
     match ended {
         Err(error) if !error.is_cancelled() && !cancelled => {
@@ -63,7 +63,7 @@ pub fn look(app: &App) {
     }
 }
 
-/// Nobody looks any more.
+/// No browser watches any more.
 fn enough(app: &App) -> Result<()> {
     if app.is_ending() || app.state().control.clients == 0 {
         return Err(WorkflowError::Cancelled { during: "watching".into() });

@@ -19,7 +19,7 @@ pub fn message(header: &impl Serialize, pixels: &[&[u8]]) -> Bytes {
     [&[&length[..], &header], pixels].concat().concat().into()
 }
 
-/// Widest picture of a person that is sent, px: it is looked at, not measured.
+/// Largest width of a picture of a person, px: for viewing only.
 const PERSON_WIDTH: usize = 320;
 
 /// A moment of a recognition: grey values, then the mask (1 = person), and the answer in the header.

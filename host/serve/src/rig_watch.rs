@@ -1,4 +1,4 @@
-//! How the rig is: connects to it, and asks ten times a second while somebody looks.
+//! State of the rig: connects, and polls ten times a second while a browser watches.
 
 use std::{
     io,
@@ -18,7 +18,7 @@ use crate::{
     view::{LiveMode, Phase},
 };
 
-/// From one question to the next while somebody looks.
+/// Poll interval while a browser watches.
 const OFTEN: Duration = Duration::from_millis(100);
 const SELDOM: Duration = Duration::from_secs(1);
 /// From one look at the end of the program to the next.
@@ -110,7 +110,7 @@ fn ask(app: &App, rig: &OpenRig) {
         }
         Err(error) => {
             lost(app, &error);
-            // A board that was reset or unplugged is met again; where it stands is known by nobody then.
+            // After a reset or reconnection the position is unknown.
             if rig.reopen().is_ok() {
                 app.note("rig: it answers again; home it before it moves");
                 resume_live(app);

@@ -85,7 +85,7 @@ pub fn service(app: &Arc<App>) -> Router {
         .with_state(Arc::clone(app))
 }
 
-/// Lets through what the guard allows, and says what a page may load.
+/// Lets through what the guard allows, and sets the page's content policy.
 async fn guarded(app: Arc<App>, access: Arc<Access>, request: Request, next: Next) -> Response {
     let headers = request.headers();
     let peer =
@@ -151,7 +151,7 @@ pub fn too_many() -> Response {
         .into_response()
 }
 
-/// A JSON body; what is wrong with it is said in JSON too.
+/// A JSON body; errors are JSON, too.
 pub struct Body<T>(pub T);
 
 impl<T: DeserializeOwned> FromRequest<Arc<App>> for Body<T> {

@@ -19,7 +19,7 @@ const LOOK: Duration = Duration::from_millis(50);
 /// Longest wait for requests that are under way at the end.
 const FAREWELL: Duration = Duration::from_secs(2);
 
-/// What is served, and to whom.
+/// Served directory and listeners.
 #[derive(Debug)]
 pub struct ServeSettings {
     /// The rig; without one the page shows captures.
@@ -56,7 +56,7 @@ pub enum ServeError {
     Workflow(#[from] WorkflowError),
 }
 
-/// Serves the page until `context` is cancelled; what moves is stopped then. `ready` is told the address as soon as it answers;
+/// Serves the page until `context` is cancelled; motion is stopped then. `ready` receives the address as soon as it answers;
 /// the rig is connected to meanwhile.
 pub fn serve(
     settings: ServeSettings,

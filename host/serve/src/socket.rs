@@ -22,7 +22,7 @@ const SILENCE: Duration = Duration::from_secs(5);
 /// Pictures on the way to a browser that has not said that it has seen them: one is looked at, one travels. More would wait in the line's
 /// buffers, and what is shown would be from seconds ago.
 const ON_THE_WAY: u32 = 2;
-/// A browser that says nothing of what it has seen gets a picture in this time.
+/// Interval of pictures for a browser that acknowledges nothing.
 const UNSEEN: Duration = Duration::from_secs(1);
 /// Why a job was stopped by [`run`].
 const DISCONNECTED: &str = "the browser that had control has disconnected";
@@ -79,7 +79,7 @@ async fn run(mut socket: WebSocket, app: Arc<App>, resumed: Option<String>) {
     }
 }
 
-/// Gives whether it was taken in time: a browser that takes nothing is gone.
+/// Returns whether it was accepted in time: a browser that accepts nothing has disconnected.
 async fn send(socket: &mut WebSocket, message: Message) -> bool {
     matches!(timeout(SILENCE, socket.send(message)).await, Ok(Ok(())))
 }

@@ -1,4 +1,4 @@
-//! A stop on its way to the board: nothing begins before it has arrived, for it must not end what was wanted after it.
+//! A stop on its way to the board: nothing begins before it has arrived, because it must not end later work.
 
 use std::sync::{Arc, Condvar, Mutex, PoisonError};
 

@@ -1,4 +1,4 @@
-//! What the page is told and tells: the types of the interface, with their JSON schemas.
+//! Messages of the page's interface, with their JSON schemas.
 
 use farnear_depth::focus_measure::FocusMeasure;
 use farnear_protocol::message::Axis;
@@ -56,7 +56,7 @@ pub struct RigState {
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Phase {
-    /// None was asked for.
+    /// No connection was requested.
     Absent,
     /// It is being connected to.
     Connecting,

@@ -1,4 +1,4 @@
-//! Many jobs from a manifest, on all cores: each done once, whatever stops the work in between.
+//! Many jobs from a manifest, on all cores: each done once, also after interruptions.
 //!
 //! A job is done when its result is whole and `batch.toml` beside it says that it was made from the same settings, the same bytes
 //! of input and by the same version of this program; a run leaves what is done alone. Results are made aside and renamed, so that
@@ -248,7 +248,7 @@ struct Work<'a> {
 }
 
 impl Work<'_> {
-    /// Does all jobs. Each runs on one thread, with whatever it computes in parallel: jobs fill the cores.
+    /// Does all jobs. Each runs on one thread, including its parallel parts: jobs fill the cores.
     fn on_all_cores(&self) -> Result<()> {
         let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
         let threads = if self.settings.jobs == 0 { cores } else { self.settings.jobs };
@@ -295,7 +295,7 @@ impl Work<'_> {
         Ok(None)
     }
 
-    /// Does a job and tells of it. An error is none of the job.
+    /// Runs a job and reports it. An error is not one of the job.
     fn do_one(&self, entry: Entry) -> Result<()> {
         let start = Instant::now();
         let Entry { number, line, job } = entry;
@@ -356,7 +356,7 @@ impl Work<'_> {
     }
 }
 
-/// Keeps what a job warns of; its steps and counts are nobody's business among thousands.
+/// Keeps a job's warnings; steps and counts are dropped.
 #[derive(Default)]
 struct Warnings(Mutex<Vec<String>>);
 

@@ -277,7 +277,7 @@ pub struct DepthFigures {
     pub width: usize,
     /// Pixels down.
     pub height: usize,
-    /// Median of the depths that there are; NaN where there are none.
+    /// Median of the depths; NaN without any.
     pub median_mm: f64,
     /// Part of the pixels with too little texture.
     pub low_texture_fraction: f64,
@@ -390,19 +390,19 @@ impl DepthRequest {
     }
 }
 
-/// What was read and checked.
+/// Checked inputs.
 struct Inputs {
     optics: Optics,
     pair: Pair,
     method: Prepared,
     correction: Option<Arc<Correction>>,
     camera: Option<Arc<CameraFrames>>,
-    /// What of the images is looked at, where it is not all.
+    /// Part of the images, if not all.
     cut: Option<Cut>,
     doubts: Vec<OpticsDoubt>,
 }
 
-/// What was computed.
+/// Computed maps.
 struct Computed {
     map: DepthMap,
     deviation: Option<(Array2<f32>, Uncertainty)>,
@@ -532,7 +532,7 @@ fn valid_fraction(map: &Array2<f32>) -> f64 {
     map.iter().filter(|depth| depth.is_finite()).count() as f64 / map.len() as f64
 }
 
-/// Corrects a map; what lies beyond the correction loses depth and confidence alike.
+/// Corrects a map; pixels beyond the correction lose depth and confidence.
 fn correct(depth: &mut DepthMap, reasons: &mut Array2<u8>, correction: &Correction) -> Result<()> {
     correction.apply_in_place(depth.depth_mm.view_mut())?;
     let pixels = depth.confidence.iter_mut().zip(&depth.depth_mm).zip(reasons);
@@ -547,7 +547,7 @@ fn correct(depth: &mut DepthMap, reasons: &mut Array2<u8>, correction: &Correcti
     Ok(())
 }
 
-/// Median of the values that there are, NaN where there are none.
+/// Median of the values; NaN without any.
 fn median(map: &Array2<f32>) -> f64 {
     let quantiles = Quantiles::new(map.view());
     quantiles.at(quantiles.finite() / 2).map_or(f64::NAN, f64::from)
@@ -588,7 +588,7 @@ mod tests {
         names
     }
 
-    /// Cancels as soon as anything is said.
+    /// Cancels at the first message.
     struct Impatient(Cancel);
 
     impl Progress for Impatient {

@@ -14,12 +14,12 @@ use serde::Serialize;
 
 use crate::{camera, context::Context, error::Result, simulator};
 
-/// What is looked at beside the computer itself.
+/// Options: checks besides the computer itself.
 #[derive(Clone, PartialEq, Eq, Debug, Default)]
 pub struct DoctorSettings {
-    /// A board that is asked for its firmware's version.
+    /// Board to ask for its firmware's version.
     pub port: Option<String>,
-    /// Folders that results are to go to, beside the current one.
+    /// Folders for results to check, besides the current one.
     pub folders: Vec<PathBuf>,
 }
 
@@ -32,7 +32,7 @@ pub enum Health {
     Missing,
 }
 
-/// One thing that was looked at.
+/// A check with its result.
 #[derive(Clone, PartialEq, Eq, Debug, Serialize)]
 pub struct Finding {
     pub what: String,
@@ -58,7 +58,7 @@ impl Finding {
     }
 }
 
-/// All that was looked at.
+/// All checks.
 #[derive(Clone, PartialEq, Eq, Debug, Serialize)]
 pub struct DoctorFigures {
     pub findings: Vec<Finding>,

@@ -55,20 +55,20 @@ pub enum WorkflowError {
     #[error("{} does not hold {expected}: {reason}", path.display())]
     File {
         path: PathBuf,
-        /// What was expected in it.
+        /// The expected contents.
         expected: &'static str,
         reason: String,
     },
     /// A file that cannot be read at all.
     #[error("cannot read {what} {}: {source}", path.display())]
     Read {
-        /// What it would have been: "the optics file".
+        /// Its meaning: "the optics file".
         what: &'static str,
         path: PathBuf,
         /// What the system says.
         source: std::io::Error,
     },
-    /// The user, or whoever speaks for them, gave the work up; a rig has been stopped.
+    /// The work was cancelled; a rig has been stopped.
     #[error("interrupted while {during}")]
     Cancelled { during: String },
     /// The sharpest image would lie where no lens puts one.
@@ -92,7 +92,7 @@ pub enum WorkflowError {
         /// Number of the alarm that is latched.
         alarm: Option<u32>,
     },
-    /// Lines that nobody takes any more.
+    /// The output is closed.
     #[error("what was found cannot be handed on: {source}")]
     Sink {
         /// What the system says.
@@ -105,7 +105,7 @@ pub enum WorkflowError {
         /// What the system says.
         source: std::io::Error,
     },
-    /// A question that nobody answered.
+    /// A prompt without an answer.
     #[error("nobody answers, the input has ended: {question}")]
     Unanswered { question: String },
     /// Nothing says what optics a pair was taken with.
@@ -126,7 +126,7 @@ pub enum WorkflowError {
     /// The same, about something.
     #[error("{about}: {source}")]
     About {
-        /// What it is about: a pair, a file, a step.
+        /// Its subject: a pair, a file, a step.
         about: String,
         source: Box<Self>,
     },

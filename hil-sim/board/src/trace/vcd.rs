@@ -185,7 +185,7 @@ impl Vcd {
         self.change(at_ns, "$comment touched $end".into());
     }
 
-    /// Writes what has changed since the last stop.
+    /// Writes the changes since the last stop.
     pub fn look(&mut self, now_ns: u64, plant: &Plant, wiring: &mut Wiring, shots: &[Shot]) {
         wiring.record_steps_once();
         for (edges, letter) in wiring.take_steps().into_iter().zip(['C', 'L']) {

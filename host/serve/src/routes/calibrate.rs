@@ -107,13 +107,13 @@ pub fn routes(api: Api) -> Api {
         .post::<SeriesRequest, Begun, _, _>(
             "/api/calibrate/series",
             For::Control,
-            "Captures flat targets at several distances; at a real rig somebody places them and answers.",
+            "Captures flat targets at several distances; at a real rig a person places them and answers.",
             series,
         )
         .post::<Nothing, Begun, _, _>(
             "/api/calibrate/series/forget",
             For::Control,
-            "Forgets the flat series and the correction, to begin anew.",
+            "Forgets the flat series and the correction, to start again.",
             forget,
         )
         .post::<CorrectionRequest, Begun, _, _>(
@@ -187,9 +187,9 @@ async fn series(
 ) -> Result<Json<Begun>, Failure> {
     require_control(&app, &headers)?;
     let open = connected(&app)?;
-    // Nobody can put a target before the emulated rig that is seen: one is started before each target instead.
+    // The scene of the visible emulated rig cannot be changed: one rig is started per target instead.
     let (rig, ask) = match &app.address {
-        // Nobody watches its stages, so time need not be a person's.
+        // Its stages are not visible, so time need not be paced.
         Some(RigAddress::Emulated(scenery)) => {
             (RigAddress::Emulated(Scenery { paced: false, ..scenery.clone() }), false)
         }

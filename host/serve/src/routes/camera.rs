@@ -26,7 +26,7 @@ use crate::{
     view::Begun,
 };
 
-/// What is set on the camera; what is not named stays.
+/// Camera settings; absent ones stay unchanged.
 #[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CameraRequest {

@@ -1,4 +1,4 @@
-//! Capturing, and what was captured.
+//! Capturing, and stored captures.
 
 use axum::{
     Json,
@@ -94,7 +94,7 @@ pub struct OneCapture {
     pub capture: Value,
 }
 
-/// What is searched for.
+/// Text to search for.
 #[derive(Deserialize)]
 pub struct Search {
     #[serde(default)]

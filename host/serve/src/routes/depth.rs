@@ -31,7 +31,7 @@ use crate::{
 /// Most points of a surface that a page turns: 4 MB, and some ten frames a second without a graphics card.
 const MESH_PIXELS: usize = 100_000;
 
-/// A depth request without its files, and where the map is kept.
+/// A depth request without its files, and the place of the map.
 #[derive(Deserialize)]
 pub struct CaptureDepthRequest {
     /// Whether the correction that the session has learned is applied.
@@ -90,7 +90,7 @@ pub struct Line {
     pub to: [usize; 2],
 }
 
-/// What was measured.
+/// Result of a measurement.
 #[derive(Serialize, JsonSchema)]
 pub struct Figures {
     /// The workflow's figures.

@@ -16,7 +16,7 @@ use crate::{
     transfer::{file_body, regular_file, zip_body},
 };
 
-/// What a report may load: what stands in it.
+/// Content policy of a report: its own contents only.
 const REPORT_POLICY: &str = "default-src 'none'; style-src 'unsafe-inline'; img-src data:";
 
 pub fn routes(api: Api) -> Api {

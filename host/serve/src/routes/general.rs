@@ -54,8 +54,8 @@ pub struct Login {
 }
 
 pub fn routes(api: Api) -> Api {
-    api.get::<view::State, _, _>("/api/state", "Everything that changes, as it is now.", state)
-        .get::<Log, _, _>("/api/log", "What was said, the oldest line first.", log)
+    api.get::<view::State, _, _>("/api/state", "The present state of everything that changes.", state)
+        .get::<Log, _, _>("/api/log", "Messages, the oldest first.", log)
         .get_bytes(
             "/api/socket",
             "A WebSocket: first a Hello with the client's secret, then the State at every change, and live pictures (u32 length of a JSON \

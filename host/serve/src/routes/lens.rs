@@ -76,7 +76,7 @@ async fn write(
     Body(given): Body<Optics>,
 ) -> Result<Json<Done>, Failure> {
     require_control(&app, &headers)?;
-    // Checked and completed: what does not fit is refused before the file changes.
+    // Checked and completed: invalid values are refused before the file changes.
     let checked = lens_table::calculate(&given.optics, Readings::default())?.optics;
     let text = toml::to_string(&checked).map_err(WorkflowError::from)?;
     write_file(&app.optics_file(), text.as_bytes()).map_err(WorkflowError::from)?;

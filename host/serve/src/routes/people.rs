@@ -42,11 +42,11 @@ const VIDEO_MAX_BYTES: u64 = 256 << 20;
 /// The model that comes with the program.
 const USUAL_MODEL: &str = "everyday";
 
-/// What is recognised.
+/// Source of the recognition.
 #[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RecogniseRequest {
-    /// A video that was sent; without it what the rig's camera sees, until somebody stops it.
+    /// An uploaded video; without it the rig's camera, until it is stopped.
     #[serde(default)]
     pub video: Option<String>,
 }
@@ -79,7 +79,7 @@ pub struct Standing {
     pub pixel_um: f64,
 }
 
-/// A video of somebody with a shadow.
+/// A video of a person with a shadow.
 #[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ShadowRequest {
@@ -105,7 +105,7 @@ pub struct People {
 pub struct Shadow {
     /// As `farnear sun --json` prints it.
     pub figures: Value,
-    /// Length of the shadow of somebody 1 m tall; absent where the sun is below the horizon.
+    /// Length of the shadow of a person 1 m tall; absent while the sun is below the horizon.
     pub length_per_height: Option<f64>,
     /// Where it falls, clockwise from north, degrees.
     pub direction_deg: f64,
@@ -126,7 +126,7 @@ pub fn routes(api: Api) -> Api {
         .post::<RecogniseRequest, Begun, _, _>(
             "/api/people/recognise",
             For::Control,
-            "Recognises what somebody does; the streaming answer comes by the socket.",
+            "Recognises a person's activity; the streaming answer comes by the socket.",
             recognise,
         )
         .post::<Sunlight, Shadow, _, _>(

@@ -25,7 +25,7 @@ use crate::{
 /// The record in the session's folder.
 const RECORD: &str = "quality.toml";
 
-/// What is measured.
+/// Options of the measurement.
 #[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct QualityRequest {

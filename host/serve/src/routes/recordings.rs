@@ -34,7 +34,7 @@ pub struct RecordRequest {
     pub on: bool,
 }
 
-/// What is played, and how.
+/// Recording to play, with options.
 #[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PlayRequest {
@@ -72,7 +72,7 @@ pub fn routes(api: Api) -> Api {
         .post::<PlayRequest, Begun, _, _>(
             "/api/recordings/play",
             For::Client,
-            "Plays a recording: depth is computed anew and comes by the socket as when it is live.",
+            "Plays a recording: depth is computed again and comes by the socket as live depth.",
             play,
         )
 }

@@ -1,4 +1,4 @@
-//! What moves the rig and looks through it.
+//! Motion of the rig, and its live view.
 
 use axum::{
     Json,
@@ -58,7 +58,7 @@ pub struct Target {
 pub struct Move {
     /// Each at most once.
     pub targets: Vec<Target>,
-    /// Whether to home first what is not homed.
+    /// Whether to home axes first that are not homed.
     #[serde(default)]
     pub home: bool,
 }
@@ -153,7 +153,7 @@ pub fn routes(api: Api) -> Api {
             checklist,
         )
         .post::<Nothing, Begun, _, _>("/api/rig/reset", For::Control, "Resets the board.", reset)
-        .post::<LiveRequest, Done, _, _>("/api/live", For::Control, "What is to be seen live, and how.", live)
+        .post::<LiveRequest, Done, _, _>("/api/live", For::Control, "Sets the live view.", live)
         .get::<Alarms, _, _>(
             "/api/rig/alarms",
             "The alarms that the board keeps, the last one first.",

@@ -114,7 +114,7 @@ fn what_cannot_be_is_refused_before_anything_moves() {
         ("/api/rig/move", r#"{"targets":[{"axis":"x","to_um":1}]}"#, "unknown variant"),
         ("/api/rig/move", r#"{"targets":"#, "EOF"),
         ("/api/live", r#"{"exposure_us":0}"#, "expected 1 to 1000000"),
-        ("/api/live", r#"{"measure":"sharp"}"#, "no focus measure"),
+        ("/api/live", r#"{"measure":"sharp"}"#, "not a focus measure"),
         ("/api/rig/focus", r#"{"range_mm":-1}"#, "range_mm -1"),
         ("/api/captures", r#"{"kind":"series","pairs":0}"#, "pairs 0"),
         ("/api/captures", r#"{"kind":"pair","name":"../x"}"#, "expected a name"),

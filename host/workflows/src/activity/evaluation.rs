@@ -39,11 +39,11 @@ const TIMINGS: usize = 3;
 pub struct EvaluationSettings {
     /// The samples that are recognised, TOML.
     pub samples: PathBuf,
-    /// What is learned from.
+    /// Training set.
     pub learn_from: LearnFrom,
-    /// How activities are told apart.
+    /// Features and classifier.
     pub method: Method,
-    /// What is done for clips from elsewhere.
+    /// Adaptation to clips from elsewhere.
     pub adaptation: Adaptation,
     /// Which views are recognised together; without it fused, or each by itself where clips differ in their views.
     pub views: Option<Views>,
@@ -51,7 +51,7 @@ pub struct EvaluationSettings {
     pub out: Option<PathBuf>,
 }
 
-/// What is learned from; never the subject that is recognised.
+/// Training set; never with the tested subject.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub enum LearnFrom {
     /// The other subjects, each left out in turn.

@@ -26,7 +26,7 @@ use crate::{
     silhouettes::{SilhouettesError, markers},
 };
 
-/// What is under way where the work is cancelled.
+/// Work that is cancelled.
 const DURING: &str = "drawing motion files";
 /// Ending of MATLAB files, which hold sets of joints.
 const MATLAB: &str = "mat";

@@ -314,7 +314,7 @@ fn figures(
     })
 }
 
-/// What is drawn of one of them.
+/// Drawing of one of them.
 fn shown(person: &PersonInFrame) -> Option<Shown> {
     let spans = person.top_left_bottom_right?;
     let crossing = person.flags.iter().any(|flag| flag.starts_with("crossing"));

@@ -32,9 +32,9 @@ pub(super) struct Place {
     is_file: bool,
 }
 
-/// What lies at a place.
+/// State of a place.
 pub(super) enum Found {
-    /// The result, made from what it would be made from now, with its figures.
+    /// The up-to-date result, with its figures.
     Done(Option<Value>),
     /// Nothing, or a result that was made from something else or is not whole.
     ToDo,
@@ -46,7 +46,7 @@ impl Place {
         Self { target, is_file }
     }
 
-    /// Looks at what is there.
+    /// Examines the place.
     ///
     /// # Errors
     /// [`BatchError::Foreign`] where something lies there that no batch made; [`BatchError::SharedOut`] where another job of this run,
@@ -64,7 +64,7 @@ impl Place {
             return Ok(Found::ToDo);
         }
         let empty = fs::read_dir(&self.target).is_ok_and(|mut entries| entries.next().is_none());
-        // A file with a record that cannot be read is a batch's all the same.
+        // A file with a record that cannot be read still belongs to a batch.
         if !self.target.exists() || empty || record.exists() {
             return Ok(Found::ToDo);
         }
@@ -122,7 +122,7 @@ impl Place {
 
     fn put(&self, aside: &Path, made: &Path, record: &str) -> io::Result<()> {
         if self.is_file {
-            // The old record goes first, so that it never stands beside a result that it is not of.
+            // The old record is removed first, so that it never accompanies another result.
             let (old, new) = (self.record(), aside.join("record"));
             fs::write(&new, record)?;
             if old.exists() {

@@ -105,7 +105,7 @@ impl Provenance {
         Ok(self)
     }
 
-    /// A record in a file; `None` where there is none, or another version's.
+    /// A record in a file; `None` if missing or of another version.
     pub fn read(file: &Path) -> Option<Self> {
         let text = fs::read_to_string(file).ok()?;
         toml::from_str(&text).ok().filter(|record: &Self| record.format == FORMAT)

@@ -124,7 +124,7 @@ pub struct PsfFigures {
     /// Standard error of k.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub standard_error_k: Option<f64>,
-    /// What is left of the images' energy when one is made from the other, 0 to 1.
+    /// Residual of the images' energy when one is predicted from the other, 0 to 1.
     pub residual: f64,
     /// What noise alone leaves.
     pub noise_residual: f64,

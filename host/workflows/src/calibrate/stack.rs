@@ -91,7 +91,7 @@ impl Request for CalibrateStackRequest {
     }
 }
 
-/// What was learned from a stack.
+/// Result of a stack's calibration.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct StackFigures {
     /// `good`, or what to change.

@@ -19,7 +19,7 @@ use crate::{error::Result, figures::rounded};
 /// Step in mm over which a correction's slope is taken: far above rounding, far below what a correction bends over.
 const SLOPE_STEP_MM: f32 = 0.5;
 
-/// Where the noise of the images is known from.
+/// Source of the images' noise.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum CameraNoise {
     /// From what the pair itself leaves unexplained.
@@ -42,7 +42,7 @@ pub enum CameraNoise {
 #[error("{reason}")]
 pub struct NoiseError {
     pub text: String,
-    /// What is wrong with it, and what was expected.
+    /// The fault and the expected values.
     pub reason: String,
 }
 
@@ -165,7 +165,7 @@ pub struct Source<'a> {
     pub judged: &'a Array2<f32>,
 }
 
-/// Standard deviation of `raw` (before `correction`), mm; NaN where there is no depth.
+/// Standard deviation of `raw` (before `correction`), mm; NaN without a depth.
 ///
 /// # Errors
 /// [`crate::WorkflowError::Depth`], [`crate::WorkflowError::Correction`].

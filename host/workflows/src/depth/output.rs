@@ -34,7 +34,7 @@ type Sink = BufWriter<File>;
 
 /// A file of results.
 struct Output {
-    /// The names by which it is asked for.
+    /// Its names.
     names: &'static [&'static str],
     file: &'static str,
     /// Writes it, piece by piece: with several megapixels a file can be larger than all maps together.
@@ -57,17 +57,17 @@ const OUTPUTS: &[Output] = &[
     Output { names: &["exr"], file: "depth.exr", write: |results, to| results.exr(to) },
 ];
 
-/// All files that a result can have beside its record.
+/// All files of a result besides its record.
 pub(crate) fn files() -> impl Iterator<Item = &'static str> {
     OUTPUTS.iter().map(|output| output.file)
 }
 
-/// The one that needs the image beside the maps.
+/// The output that needs the image in addition to the maps.
 const MESH: &str = "mesh";
-/// The one that is there only where it was asked for otherwise.
+/// The output that exists only with another option.
 const UNCERTAINTY: &str = "uncertainty.npy";
 
-/// What is written where nothing else is asked for.
+/// Default outputs.
 const USUAL: [&str; 5] = ["npy", "tiff", "png", "mesh", "view"];
 
 /// Which of the outputs are written.
@@ -133,7 +133,7 @@ pub(super) struct Results<'a> {
     settings: &'a DepthRequest,
     inputs: &'a Inputs,
     computed: &'a Computed,
-    /// How depth.png's codes stand for mm, where that is written.
+    /// Scale of depth.png's codes, mm, if it is written.
     scale: Option<Scale>,
     /// What made the map, as TOML.
     record: String,
@@ -210,7 +210,7 @@ impl<'a> Results<'a> {
         mesh::write(self.depth(), self.computed.image.view(), Lateral::Lens(projection), "mm", to)
     }
 
-    /// Depth as compositors expect it, `Z`, here in mm; what made it stands in the header.
+    /// Depth as compositors expect it, `Z`, here in mm; its origin is in the header.
     fn exr(&self, to: &mut Sink) -> io::Result<()> {
         let mut channels = vec![("Z", self.depth()), ("confidence", self.confidence())];
         channels.extend(self.deviation().map(|deviation| ("deviation", deviation)));

@@ -23,7 +23,7 @@ struct Record<'a> {
     /// Which outputs were written, where they are not the usual ones.
     #[serde(skip_serializing_if = "Option::is_none")]
     write: Option<String>,
-    /// How depth.png's codes stand for mm; code 0 = no value.
+    /// Scale of depth.png's codes, mm; code 0 = no value.
     #[serde(skip_serializing_if = "Option::is_none")]
     png: Option<Scale>,
     method: String,
@@ -31,7 +31,7 @@ struct Record<'a> {
     window: String,
     #[serde(skip_serializing_if = "Option::is_none")]
     correction: Option<String>,
-    /// What was asked for; what was done stands under `prepared`.
+    /// The request; results are in `prepared`.
     align: String,
     balance: String,
     /// How colour became grey, where not by the mean.
@@ -46,7 +46,7 @@ struct Record<'a> {
     #[serde(skip_serializing_if = "Option::is_none")]
     part: Option<Part>,
     settings: Settings,
-    /// What was found and done before depth.
+    /// Report of the preparation.
     prepared: Report,
     /// Why pixels have no depth: the numbers in reason.png, in words, and the part of the map.
     no_depth: &'a [Lost],
