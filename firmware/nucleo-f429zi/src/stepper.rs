@@ -269,7 +269,7 @@ impl<T: StepInstance> Stepper<T> {
             if outputs.abort_steps {
                 queue.waiting.clear();
                 queue.underrun = false;
-                // The running segment ends within a millisecond, which is no underrun.
+                // The running segment ends within a millisecond, which is not an underrun.
                 if let Some(running) = &mut queue.running {
                     running.last = true;
                 }

@@ -249,7 +249,7 @@ impl Rig {
     }
 
     /// One step for the host per tick: encodes an answer for [`Self::transmit`], or executes the next
-    /// request. `false` if there is none.
+    /// request. `false` without one.
     pub fn serve(&mut self, now: BoardMicros) -> bool {
         if self.session.has_answer() {
             self.session.put_answer();

@@ -1,7 +1,7 @@
 //! Times of the run time, of one convolution and of the operator designs, in milliseconds: minimum and median.
 //!
 //! Where the floating-point operations are known (`flop`: two for each tap of a kernel as if nothing were shared between taps;
-//! `executed_flop`: what is really done), `fma_peak` tells what the core could do: multiply-adds in registers.
+//! `executed_flop`: executed operations), `fma_peak` is the core's limit: multiply-adds in registers.
 //!
 //! `cargo bench -p farnear-depth [-- FILTER]`; with `FARNEAR_JSON=1` one JSON object per line. The images are random: only
 //! the time is of interest. Timings are not tests: nothing here can fail.

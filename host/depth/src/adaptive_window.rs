@@ -7,7 +7,7 @@
 //! - [`Window::Adaptive`] takes at each pixel the largest window whose value lies within two standard deviations of all smaller
 //!   ones' (the intersection of confidence intervals; Goldenshluger & Nemirovski 1997, Katkovnik 1999), so that planes are
 //!   smoothed over 21 px and steps stay where they are;
-//! - [`Window::Safe`] takes the smallest window that is certain enough, whatever lies next to it.
+//! - [`Window::Safe`] takes the smallest window that is certain enough, without comparison.
 //!
 //! The work is done in tiles (`rows`), so that memory does not grow with the image beyond its maps. Cost: five kernels of 7x7,
 //! five products, and 15 window sums and three cubics for three windows; see `docs/speed.md`.

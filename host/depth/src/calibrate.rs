@@ -190,7 +190,7 @@ pub struct CapturedPair<'a> {
 pub struct PsfFit {
     /// The PSF.
     pub psf: Psf,
-    /// What is left of the images' energy in the compared frequencies when one is made from the other, 0 to 1: noise,
+    /// Residual of the images' energy in the compared frequencies when one is predicted from the other, 0 to 1: noise,
     /// and what the model does not describe.
     pub residual: f64,
     /// What noise alone leaves, as far as the pairs tell.

@@ -324,7 +324,7 @@ mod tests {
         let filled = fill_low_texture(&mut map, texture.view(), 6);
         assert_eq!(filled.pixels, ring.iter().filter(|energy| **energy == 0.0).count() - 1);
         assert_eq!((map.depth_mm[(30, 30)], map.confidence[(30, 30)]), (950.0, 0.9));
-        assert_eq!(map.confidence[(2, 30)], 0.9, "little texture alone is no region");
+        assert_eq!(map.confidence[(2, 30)], 0.9, "little texture alone does not make a region");
     }
 
     /// Two discs that touch each other's rectangles: in the thesis' order the second sees the first one's filling.
@@ -347,7 +347,7 @@ mod tests {
             map.depth_mm.indexed_iter().map(error).fold(0.0, f32::max)
         };
         assert!(worst(&map, 0.0) < 2e-3, "{}", worst(&map, 0.0));
-        // A correction moves what was measured; what was filled follows.
+        // A correction moves measured depths; filled ones follow.
         ndarray::Zip::from(&mut map.depth_mm).and(&texture).for_each(|depth, energy| {
             *depth += if *energy == 0.0 { -77.0 } else { 3.0 };
         });

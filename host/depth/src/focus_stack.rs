@@ -45,7 +45,7 @@ pub const USUAL_RELIABILITY: f32 = 0.1;
 pub struct StackSettings {
     /// The focus measure.
     pub measure: Sharpness,
-    /// Standard deviation of the Gaussian by which the images are blurred first, px; 0 = not at all. What is finer is mostly
+    /// Standard deviation of the Gaussian by which the images are blurred first, px; 0 = not at all. Finer detail is mostly
     /// noise and rounding, which weak texture drowns in.
     pub smoothing_px: f32,
     /// Side of the window it is taken over, odd.

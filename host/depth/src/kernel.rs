@@ -44,10 +44,10 @@ pub fn sizes_in_words() -> String {
     format!("{} or {last}", rest.join(", "))
 }
 
-/// What is wrong with a kernel.
+/// An error of a kernel.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum KernelError {
-    /// The size is none of [`SIZES`].
+    /// The size is not in [`SIZES`].
     #[error("kernel size {0}: must be {sizes}", sizes = sizes_in_words())]
     Size(usize),
     /// The number of coefficients does not fit the size.
@@ -76,7 +76,7 @@ pub fn offsets(size: usize) -> impl Iterator<Item = (usize, usize)> {
     (0..=size / 2).flat_map(|dx| (0..=dx).map(move |dy| (dx, dy)))
 }
 
-/// How many of the kernel's taps the free coefficient at `(dx, dy)` stands for.
+/// How many of the kernel's taps the free coefficient at `(dx, dy)` covers.
 pub fn taps((dx, dy): (usize, usize)) -> f64 {
     match (dx, dy) {
         (0, 0) => 1.0,

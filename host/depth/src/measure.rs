@@ -21,7 +21,7 @@ use crate::validity::{LARGEST_ALPHA, Lost, Validity, ValiditySettings, assess};
 
 /// Where a pixel is put whose measured alpha lies outside the range before blur scaling is undone.
 const OUT_OF_RANGE_ALPHA: f64 = 1.2;
-/// Part of the pixels without depth for one reason from which it is said.
+/// Part of the pixels without depth for one reason above which it is reported.
 const WORTH_SAYING: f64 = 0.002;
 /// What the model leaves of the texture, mean squares, from which point spread function or blur are doubted.
 const DOUBTFUL: f64 = 3e-4;
@@ -47,7 +47,7 @@ pub enum DepthMethod<'a> {
     Baseline(baselines::Method),
 }
 
-/// How the whole way is gone.
+/// Settings of the whole measurement.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MeasureSettings {
     /// Geometry, brightness, the camera's limits.
@@ -71,10 +71,10 @@ impl Default for MeasureSettings {
     }
 }
 
-/// Why there is no depth.
+/// Why a depth map is impossible.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum MeasureError {
-    /// The pair is none.
+    /// The pair is invalid.
     #[error(transparent)]
     Prepare(#[from] PrepareError),
     /// It cannot be processed.
@@ -114,7 +114,7 @@ pub enum Finding {
     },
     /// The model leaves too much.
     Unexplained {
-        /// What is left of the texture beyond the noise, mean squares.
+        /// Texture beyond the noise, mean squares.
         left_over: f64,
         /// The point spread function that was assumed.
         psf: String,
@@ -172,7 +172,7 @@ pub struct Measurement {
     pub map: DepthMap,
     /// Reasons and standard deviations.
     pub validity: Validity,
-    /// What was done to the pair.
+    /// Report of the preparation.
     pub report: Report,
     /// What a user should know.
     pub findings: Vec<Finding>,
@@ -197,7 +197,7 @@ pub fn measure_pair_of_views(
     camera: Option<&CameraFrames>,
     settings: &MeasureSettings,
 ) -> Result<Measurement, MeasureError> {
-    // As they came: what is clipped everywhere is constant, and not full of holes.
+    // Unchanged: an image clipped everywhere is constant, and not full of holes.
     check_pair(far, near)?;
     let images = [far, near].map(|image| image.as_standard_layout().into_owned());
     measure_pair(images, optics, method, camera, settings)
@@ -339,7 +339,7 @@ pub fn binned(image: Array2<f32>, bin: usize) -> Array2<f32> {
 }
 
 /// Bringing the near image to the far one's size scales its blur circle too, by `1 / m`. Depth follows from the difference of the
-/// blurs' second moments, so that what is found is `((1 + alpha)^2 - (1 - alpha)^2 / m^2) / 4`; this solves it for alpha.
+/// blurs' second moments, so that the result is `((1 + alpha)^2 - (1 - alpha)^2 / m^2) / 4`; this solves it for alpha.
 fn undo_scaled_blur(depth_mm: &mut Array2<f32>, magnification: f64, optics: &Optics) {
     let r = magnification.powi(-2);
     if (r - 1.0).abs() < 1e-4 {

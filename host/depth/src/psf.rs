@@ -7,7 +7,7 @@
 //!   form and comes from a tabulated Hankel transform ([`crate::hankel`]). `p = 2` is the Gaussian, `p -> infinity`
 //!   the pill-box of radius `sigma`; for other `p`, `sigma` is a scale and not the standard deviation;
 //! - ring: an aperture whose middle is covered, the difference of two pill-boxes;
-//! - radial: whatever was measured or drawn ([`RadialPsf`]).
+//! - radial: any measured or drawn profile ([`RadialPsf`]).
 //!
 //! Cost: building an [`Otf`] is O(1), except for the generalised Gaussian (a few ms); an evaluation is O(1).
 

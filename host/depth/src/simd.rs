@@ -1,7 +1,7 @@
 //! The inner loops of the run time for the processor's vector unit.
 //!
 //! Each loop is written once over [`Lanes`](lanes::Lanes) and compiled for each unit: AVX-512, AVX2 with FMA, NEON on 64-bit ARM, and
-//! portable code of four lanes that any compiler turns into what it can. Which one runs is decided at run time
+//! portable code of four lanes for any compiler. Which one runs is decided at run time
 //! ([`Backend::best`]).
 //! All rows are *valid* convolutions: output column `x` comes from the input columns `x..x + 2r`, so every load of an
 //! output vector starts aligned and rows only get shorter. Rows are padded to [`Plane::PADDING`] beyond their content,

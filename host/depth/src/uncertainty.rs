@@ -9,7 +9,7 @@
 //!
 //! with `A_ij` the correlations of the filters `Q * Gm1`, `Q * Gp1`, `Q * Gp2`; the mixed terms with `Gm1` cancel between
 //! the two images. The double sum is a sum over the lags `d` of `A(d)` times the window sum of `p1(y) p1(y + d)`, all from the
-//! measured `p1`, whose own noise thereby counts as well. The final median averages a little more; see [`median_gain`].
+//! measured `p1`, whose own noise counts as well. The final median averages a little more; see [`median_gain`].
 //!
 //! Shot noise makes `s^2` a function of the brightness ([`Noise::Camera`]); where the camera is unknown it is estimated
 //! from what the windows' fits leave over ([`Noise::Estimated`]), which counts model errors as noise.

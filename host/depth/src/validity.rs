@@ -35,7 +35,7 @@ const SEARCH_PX: usize = 24;
 pub struct ValiditySettings {
     /// Confidence below which a depth is taken away.
     pub least_confidence: f32,
-    /// Whether regions without texture were filled; what was filled is kept.
+    /// Whether regions without texture were filled; filled pixels are kept.
     pub filled: bool,
 }
 

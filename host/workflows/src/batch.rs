@@ -1,6 +1,6 @@
 //! Many jobs from a manifest, on all cores: each done once, also after interruptions.
 //!
-//! A job is done when its result is whole and `batch.toml` beside it says that it was made from the same settings, the same bytes
+//! A job is done when its result is whole and `batch.toml` next to it records that it was made from the same settings, the same bytes
 //! of input and by the same version of this program; a run leaves what is done alone. Results are made aside and renamed, so that
 //! one that is there is whole. A job that fails does not stop the others. The manifest is read job by job: memory depends on the
 //! number of jobs at a time and not on that of all.

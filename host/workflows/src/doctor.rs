@@ -110,14 +110,14 @@ fn emulated_rig() -> Finding {
         return Finding::bad(
             Health::Optional,
             WHAT,
-            "farnear-sim is neither beside this program nor on the PATH",
+            "farnear-sim is neither next to this program nor on the PATH",
             remedy,
         );
     };
     if simulator::firmware_of(&program).is_file() {
         return Finding::ok(WHAT, program.display().to_string());
     }
-    let found = format!("{} without {} beside it", program.display(), simulator::FIRMWARE);
+    let found = format!("{} without {} next to it", program.display(), simulator::FIRMWARE);
     Finding::bad(
         Health::Missing,
         WHAT,
@@ -174,7 +174,7 @@ fn firmware(port: Option<&str>) -> Finding {
             }
         },
         Err(error) => {
-            let remedy = "docs/bring-up.md says how the board is connected and flashed";
+            let remedy = "docs/bring-up.md: how to connect and flash the board";
             Finding::bad(Health::Missing, WHAT, error.to_string(), remedy)
         }
     }

@@ -51,7 +51,7 @@ pub enum WorkflowError {
     /// A field of a request.
     #[error(transparent)]
     Request(#[from] crate::request::RequestError),
-    /// A file that does not hold what it should.
+    /// A file with invalid contents.
     #[error("{} does not hold {expected}: {reason}", path.display())]
     File {
         path: PathBuf,
@@ -93,7 +93,7 @@ pub enum WorkflowError {
         alarm: Option<u32>,
     },
     /// The output is closed.
-    #[error("what was found cannot be handed on: {source}")]
+    #[error("the result cannot be passed on: {source}")]
     Sink {
         /// What the system says.
         source: std::io::Error,
@@ -106,10 +106,10 @@ pub enum WorkflowError {
         source: std::io::Error,
     },
     /// A prompt without an answer.
-    #[error("nobody answers, the input has ended: {question}")]
+    #[error("no answer, the input has ended: {question}")]
     Unanswered { question: String },
-    /// Nothing says what optics a pair was taken with.
-    #[error("no optics: none were named, and neither capture.toml nor optics.toml lies beside {}", far.display())]
+    /// The optics of a pair are unknown.
+    #[error("no optics: none were named, and neither capture.toml nor optics.toml is next to {}", far.display())]
     NoOptics {
         /// The pair's far-focused image.
         far: PathBuf,
@@ -139,7 +139,7 @@ pub enum WorkflowError {
     /// A pair that gives no depth.
     #[error(transparent)]
     Depth(#[from] RunError),
-    /// Images that are no pair.
+    /// Images that do not form a pair.
     #[error(transparent)]
     Unpaired(PrepareError),
     /// A camera's dark and flat frames.
@@ -154,10 +154,10 @@ pub enum WorkflowError {
     /// Images that give no point spread function.
     #[error(transparent)]
     Calibration(#[from] CalibrationError),
-    /// Images that are no focus stack.
+    /// Images that do not form a focus stack.
     #[error(transparent)]
     Stack(#[from] StackError),
-    /// Files that are no focus stack.
+    /// Files that do not form a focus stack.
     #[error(transparent)]
     StackFiles(#[from] farnear_files::stack::StackError),
     /// Maps that cannot be compared.
@@ -293,7 +293,7 @@ impl WorkflowError {
         Self::Parameter { name, value: value.to_string(), expected: expected.into() }
     }
 
-    /// For `map_err`: a file that does not hold what it should.
+    /// For `map_err`: a file with invalid contents.
     pub fn file<E: std::fmt::Display>(path: &Path, expected: &'static str) -> impl FnOnce(E) -> Self {
         move |error| Self::File { path: path.into(), expected, reason: error.to_string() }
     }
@@ -331,9 +331,9 @@ impl WorkflowError {
     }
 }
 
-/// Says what an error is about.
+/// Adds the subject of an error.
 pub trait About<T> {
-    /// The same result, whose error names what it is about.
+    /// The same result, whose error names its subject.
     ///
     /// # Errors
     /// As before.

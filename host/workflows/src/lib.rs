@@ -16,7 +16,7 @@
 //!   [`sun`] stands; [`activity`]: what the person does.
 //! - [`inputs`], [`result_folder`]: hashes of what a result was made from; folders that hold the result of one run.
 //! - [`batch`]: a list of such jobs on all cores, to be gone on with after whatever stopped it.
-//! - [`doctor`]: whether this computer has what is needed.
+//! - [`doctor`]: checks of this computer.
 //! - [`context`], [`error`]: the way to the face and back.
 //!
 //! A face that keeps what it is told, and a stage that is moved; a scripted board stands behind the port here.

@@ -88,7 +88,7 @@ impl Measured {
         map_file::read(path)
     }
 
-    /// Where the pixel sees the object: to the right, up, away from the lens. `None` where there is no depth.
+    /// Where the pixel sees the object: to the right, up, away from the lens. `None` without a depth.
     pub fn point(&self, column: usize, row: usize) -> Option<[f64; 3]> {
         let z = f64::from(*self.depth.get((row, column))?);
         let [x, y] = self.lateral.beside_axis(self.depth.dim(), column, row, z);
@@ -107,7 +107,7 @@ impl Measured {
 }
 
 /// The point of the object that each pixel of a whole depth map (mm) sees, (height, width, 3) in mm as in the mesh: to the right, up, towards
-/// the viewer, from the lens; NaN where there is no depth.
+/// the viewer, from the lens; NaN without a depth.
 pub fn points_mm(depth_mm: ArrayView2<f32>, optics: &Optics) -> Array3<f32> {
     let dim = depth_mm.dim();
     let projection =

@@ -129,7 +129,7 @@ pub fn of_pair(named: Option<&Path>, far: &Path) -> Result<(Optics, Vec<OpticsDo
     Err(WorkflowError::NoOptics { far: far.into() })
 }
 
-/// The file that [`of_pair`] reads; `None` where there is none.
+/// The file that [`of_pair`] reads; `None` without one.
 pub(crate) fn file_of_pair(named: Option<&Path>, far: &Path) -> Option<PathBuf> {
     let folder = far.parent().unwrap_or(Path::new(""));
     let beside =

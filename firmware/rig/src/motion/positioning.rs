@@ -43,7 +43,7 @@ impl Positioning {
         Self { axis, target, settling: Settling::new(settle), started: now, waiting_since, patience }
     }
 
-    /// Continues while there is no alarm; returns the time from the start once settled. May be called again
+    /// Continues without an alarm; returns the time from the start once settled. May be called again
     /// while it stays settled.
     pub(crate) fn tick(&mut self, stage: &Stage, now: BoardMicros) -> Option<Result<Micros, Failure>> {
         if !stage.is_still(self.axis) {

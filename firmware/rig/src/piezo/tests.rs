@@ -105,7 +105,7 @@ fn it_is_called_at_rest_only_where_what_it_says_is_where_it_is() {
                 rests += 1;
                 let off = plant.position - f64::from(piezo.measured().0);
                 // Five standard deviations of the gauge, and the swing per tick within 100 nm of the target.
-                assert!(off.abs() < 120.0, "{off} nm beside what is told, to {target}");
+                assert!(off.abs() < 120.0, "{off} nm off the reported position, to {target}");
             }
         }
     }
@@ -140,7 +140,7 @@ fn stopped_on_its_way_it_is_called_at_rest_only_where_it_no_more_swings_through(
     // Five standard deviations of the gauge plus the remaining swing; 30 ms.
     assert!(
         worst < 50.0 && longest < 150,
-        "{worst} nm beside what is told, {longest} ticks until it is at rest"
+        "{worst} nm off the reported position, {longest} ticks until it is at rest"
     );
 }
 
@@ -261,7 +261,7 @@ fn a_piezo_whose_gauge_is_silent_is_not_called_at_rest() {
     step(&mut piezo, &mut plant, 100_000);
     assert!(!piezo.is_moving());
     piezo.sense(None);
-    assert!(piezo.is_moving(), "as long as the loop is closed nobody has seen it stand");
+    assert!(piezo.is_moving(), "it is not at rest while the loop is closed");
 }
 
 #[test]
@@ -429,7 +429,7 @@ fn what_the_calibration_knows_makes_the_way_cleaner() {
     };
     let (blind, knowing) = (swing(0, 0), swing(120_000, 15_000));
     // The plant's plays are wider than the model's, so a part remains for the observer.
-    assert!(knowing < 0.7 * blind, "{knowing} nm in place of {blind} nm beyond the target");
+    assert!(knowing < 0.7 * blind, "{knowing} nm instead of {blind} nm beyond the target");
 }
 
 #[test]
@@ -441,7 +441,7 @@ fn after_a_reset_it_is_led_down_from_where_it_stands() {
     let mut piezo = Piezo::new(Settings::DEFAULT.fine);
     // The converter does not answer immediately.
     piezo.sense(None);
-    assert_eq!(piezo.act(), None, "nothing is played while nobody knows");
+    assert_eq!(piezo.act(), None, "no output while the position is unknown");
     let mut lowest = f64::MAX;
     for _ in 0..2_000 {
         let gauge = plant.gauge();

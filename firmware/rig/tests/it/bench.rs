@@ -333,7 +333,7 @@ pub fn ends(kind: &EventKind, id: u32) -> bool {
 }
 
 impl Bench {
-    /// Reads an event through the link, which is clean here; `None` where there is no such event.
+    /// Reads an event through the link, which is clean here; `None` if it does not exist.
     pub fn rig_event(&mut self, number: u32) -> Option<EventKind> {
         let deaf = std::mem::replace(&mut self.deaf, false);
         let answer = self.ask(&Request::ReadEvent { number }).1;

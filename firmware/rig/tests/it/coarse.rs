@@ -154,7 +154,7 @@ fn a_stall_is_detected_and_invalidates_the_position() {
     bench.clear();
     let lost = RequestError::NotHomed { axis: Axis::SensorCoarse, state: PositionState::Lost };
     assert_eq!(bench.ask(&go(0)).1, Err(lost));
-    // Still blocked: homing says so, too. Freed: homing makes it known again, and the encoder was right all along.
+    // Still blocked: homing reports it, too. Freed: homing makes it known again, and the encoder was right all along.
     assert!(matches!(failure(&bench.work(&HOME)), Failure::Following { .. }));
     bench.clear();
     bench.hardware.coarse.faults = Faults::default();
@@ -197,7 +197,7 @@ fn a_driver_fault_takes_the_current_away_and_homing_tries_again() {
     assert!(!bench.tick().coarse.enable);
     assert_eq!(bench.status().coarse.state, PositionState::Lost);
     let remains = RequestError::AlarmRemains { alarm: Alarm::DriverFault { axis: Axis::SensorCoarse } };
-    assert_eq!(bench.ask(&Request::ClearAlarm { number: 1 }).1, Err(remains), "while the line says so");
+    assert_eq!(bench.ask(&Request::ClearAlarm { number: 1 }).1, Err(remains), "while the line is active");
     bench.hardware.coarse.faults = Faults::default();
     bench.run_ms(1);
     bench.clear();

@@ -293,7 +293,7 @@ fn a_link_rate_at_which_nobody_is_heard_is_left() {
     let (mut rig, mut fake) = (rig(), Fake::new(800.0));
     let mut control = Control::new(&mut rig);
     let at = asked_for_the_slow_rate(&mut control, &mut fake);
-    fake.hear(&[1, 2, 3, 0]); // noise is nobody
+    fake.hear(&[1, 2, 3, 0]); // noise is not a host
     run(&mut control, &mut fake, 5_000);
     assert_eq!(fake.rates[1..], [(at + u64::from(LINK_TRIAL.0), LinkRate::START)]);
 }

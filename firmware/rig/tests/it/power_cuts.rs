@@ -23,7 +23,7 @@ const KEYS: [SettingKey; 4] = [
 #[derive(Clone, PartialEq, Debug)]
 struct Known {
     settings: BTreeMap<SettingKey, i32>,
-    /// Numbers of the alarms that are latched; 0: whichever comes.
+    /// Numbers of the alarms that are latched; 0: the next one.
     alarms: Vec<u32>,
     homings: u32,
     shots: [Option<i32>; 3],

@@ -291,7 +291,7 @@ fn damaged_records_are_told_and_lost_ones_are_an_alarm() {
     bench.run_ms(10);
     bench.restart(1, ResetCause::PowerOn);
     bench.tick();
-    assert_eq!(bench.events.len(), 1, "it was mended: {:?}", bench.events);
+    assert_eq!(bench.events.len(), 1, "it was repaired: {:?}", bench.events);
     // Both copies.
     while let Some(at) = bench.memory.windows(4).position(|bytes| bytes == 5_000_000i32.to_le_bytes()) {
         bench.memory[at] ^= 0x10;

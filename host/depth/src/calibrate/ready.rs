@@ -6,9 +6,9 @@ use crate::optics::Optics;
 use crate::prepare::band::without_holes;
 use crate::prepare::{Align, Balance, PrepareError, PrepareSettings, Report, prepare_owned};
 
-/// The images `[far, near]` of a target as [`fit_psf`](super::fit_psf) should see them, and what was done. An image that shifts
+/// The images `[far, near]` of a target as [`fit_psf`](super::fit_psf) needs them, with a report. An image that shifts
 /// against the other takes from what both share, which a wider PSF would explain as well: 1 px makes a `k` of 0.516 from 0.458.
-/// What lies beyond an image's edge is set to the mean; windows take it away. Images that do not fit together or have missing
+/// Pixels beyond an image's edge are set to the mean; windows suppress them. Images that do not fit together or have missing
 /// pixels stay as they are, so that the fit names them.
 ///
 /// # Errors

@@ -2,7 +2,7 @@
 //!
 //! With `(h1, h2)` the OTF at both blur radii and `v` its direction, a ring of frequencies says of a parameter as much as the
 //! signal along `v` times `g^2`, `g = (h2 dh1 - h1 dh2) / (h1^2 + h2^2)`; what the fit leaves per coefficient is the noise.
-//! Covariances are `A^-1 B A^-1` of these (what is left may be more than noise, and noise times noise counts where the signal
+//! Covariances are `A^-1 B A^-1` of these (the residual may be more than noise, and noise times noise counts where the signal
 //! is weak), times how many coefficients under a Hann window vary together.
 
 use nalgebra::{DMatrix, DVector};
@@ -19,7 +19,7 @@ const QUIET_BAND: f64 = 1500.0;
 
 /// A ring as the fit sees it.
 pub(super) struct Seen {
-    /// `-h2, h1` over its length, times the images: what is left, squared and summed.
+    /// `-h2, h1` over its length, times the images: the residual, squared and summed.
     pub left: f64,
     /// The product of that with the signal along `v`.
     pub mixed: f64,

@@ -7,7 +7,7 @@
 //! fractional true depth, and `Uo = Ui - Uc + w`.
 //!
 //! Patterns are themselves noisy and would put their noise into every result, so they are smoothed (SD 8 px) and kept
-//! on a grid of 4 px, in whole micrometres: what is stored is exactly what is used.
+//! on a grid of 4 px, in whole micrometres: stored and used values are identical.
 //!
 //! Cost: M (2N + 1 + about 12) operations per pixel.
 

@@ -3,7 +3,7 @@
 //! `t - u = sum c(i, j, k) B_i(x) B_j(y) B_k(u)` with uniform knots, fitted by penalised least squares (P-splines; Eilers
 //! & Marx 1996): the second differences of neighbouring coefficients along each of the three axes cost as well, so that
 //! noise is not followed and what few samples say little about is bridged straight. Unlike one polynomial it bends where
-//! the lens bends, without oscillating elsewhere; unlike stored patterns it has no noise of its own, and 343 numbers
+//! the lens bends, without oscillating elsewhere; unlike stored patterns it adds no noise, and 343 numbers
 //! tell it whole.
 //!
 //! Beyond the patterns' depths the penalty makes it go on as a straight line in depth, up to the scale's ends; beyond

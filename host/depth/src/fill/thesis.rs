@@ -1,7 +1,7 @@
 //! Regions filled as in Li 2014, section 6.5: one after the other, each from the rectangle around it.
 //!
 //! All regions are set to no value first. Then each, in reading order of its first pixel, takes the values within the
-//! rectangle that covers it with one pixel to spare, among them what was filled before, and gets the polynomial
+//! rectangle that covers it with one pixel to spare, including earlier filled ones, and gets the polynomial
 //! `1, x, x^2, x^3, y, y^2, y^3` (eq. 6.16) of least squares. The thesis has no mixed terms, no weights and no wider margin.
 
 use nalgebra::{SMatrix, SVector};

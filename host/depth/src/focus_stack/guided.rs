@@ -14,7 +14,7 @@
 use ndarray::{Array2, ArrayView2, Axis, Zip};
 use rayon::prelude::*;
 
-/// The window's radius in its standard deviations; what is beyond has less than 6 % of the weight of the centre.
+/// The window's radius in its standard deviations; pixels beyond have less than 6 % of the weight of the centre.
 const RADIUS: f32 = 2.4;
 /// Places looked at along a standard deviation.
 const PLACES: f32 = 4.0;

@@ -186,7 +186,7 @@ fn neighbourhoods(image: ArrayView2<f32>, f: impl Fn(&Around) -> f32) -> Array2<
     result
 }
 
-/// The image moved up and left by so many rows and columns.
+/// The image moved up and left by this many rows and columns.
 fn moved(image: ArrayView2<f32>, [down, across]: [usize; 2]) -> Array2<f32> {
     let (height, width) = image.dim();
     Array2::from_shape_fn((height, width), |(y, x)| {

@@ -41,7 +41,7 @@ pub(super) fn tip(curve: &[f32], positions: &[f64], fit_points: usize) -> Tip {
     }
     let Some((tip, determination)) = fit.tip() else { return unreliable };
     let place = place_of(positions, positions[largest] + tip * unit);
-    // A tip beyond the neighbours is none of this curve's: of two peaks, or of noise.
+    // A maximum beyond the neighbours does not belong to this curve: two peaks, or noise.
     if (place - largest as f64).abs() > 1.5 || tip.abs() > 3.0 {
         return unreliable;
     }

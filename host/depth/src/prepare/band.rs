@@ -2,7 +2,7 @@
 //!
 //! Defocus takes the finest detail from one image and not from the other, by an amount that varies from place to place; lamp,
 //! aperture and vignetting change the brightness of one. So images are compared in a band of middle frequencies and divided
-//! by the root mean square of that band around each pixel: what is left is alike in both wherever they show the same.
+//! by the root mean square of that band around each pixel: the result is alike in both where they show the same.
 //! Point spread functions are symmetric and move nothing, so that a difference of blur draws no estimate to one side.
 
 use ndarray::{Array2, ArrayView2, Axis, CowArray, Ix2};
@@ -17,7 +17,7 @@ const STRENGTH_PX: usize = 15;
 /// Part of the image's mean strength that is added everywhere, so that noise is not made large where nothing is.
 const FLOOR: f32 = 0.1;
 
-/// An image of half the size: binomial weights, so that what the smaller grid cannot carry is gone.
+/// An image of half the size: binomial weights, which removes frequencies beyond the smaller grid.
 pub(crate) fn halved(image: ArrayView2<f32>) -> Array2<f32> {
     const WEIGHTS: [f32; 4] = [0.125, 0.375, 0.375, 0.125];
     let (height, width) = image.dim();
@@ -66,7 +66,7 @@ pub(crate) fn without_holes(image: ArrayView2<'_, f32>) -> CowArray<'_, f32, Ix2
     image.mapv(|v| if v.is_finite() { v } else { mean }).into()
 }
 
-/// The band of an image as it is: blurred by a binomial of five taps, less its mean over [`MEAN_PX`].
+/// The band of an unscaled image: blurred by a binomial of five taps, less its mean over [`MEAN_PX`].
 pub(crate) fn band(image: ArrayView2<f32>) -> Array2<f32> {
     let fine = binomial(image);
     let mut coarse = box_mean(fine.view(), MEAN_PX);

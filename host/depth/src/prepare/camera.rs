@@ -1,4 +1,4 @@
-//! A camera's own frames: what it says in the dark, how each pixel responds, and which pixels say nothing.
+//! A camera's own frames: dark signal, response of each pixel, and unusable pixels.
 //!
 //! `dark` is the mean of exposures with the lens covered, `flat` the response of each pixel to even light relative to the mean
 //! of what surrounds it: (light - dark) over its mean in a large window, so that the lamp's and the lens' slow falloff stays,
@@ -217,7 +217,7 @@ impl CameraFrames {
     }
 
     /// The image (values from 0 to 1) as a camera without these faults would have taken it, single bad pixels corrected from their
-    /// neighbours. A patch of them stays as it is: nothing is known of it.
+    /// neighbours. A patch of them is not changed.
     ///
     /// # Errors
     /// [`CameraError::Size`] for an image of another size.

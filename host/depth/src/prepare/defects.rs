@@ -1,7 +1,7 @@
 //! Pixels that do not say what the scene is: saturated, black, bad, not finite.
 //!
 //! A single one is replaced by the mean of its neighbours: among the hundreds of pixels that a depth rests on, its error
-//! counts no more than a little noise. A clipped highlight stays as it is: its value is a lower bound, and its neighbours are darker. A patch has no such neighbours and becomes a hole (NaN), which takes everything
+//! counts no more than a little noise. A clipped highlight is not changed: its value is a lower bound, and its neighbours are darker. A patch has no such neighbours and becomes a hole (NaN), which takes everything
 //! along that sees it.
 
 use ndarray::{Array2, ArrayView2};

@@ -12,7 +12,7 @@ const TAPS: usize = 6;
 /// Places between two pixels that have weights of their own: the nearest is off by 1/1024 px at most.
 const PHASES: usize = 512;
 
-/// `p' = matrix p + shift`: the place in the other image that shows what lies at `p`.
+/// `p' = matrix p + shift`: the position in the other image of the object at `p`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Warp {
     /// Row by row, for (x, y).

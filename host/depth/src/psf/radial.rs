@@ -17,7 +17,7 @@ pub const RINGS: usize = 48;
 /// Blur radii that a profile may reach to.
 const EXTENT_RANGE: [f64; 2] = [0.1, 8.0];
 
-/// Least parts of a pixel per ring when an image is gone through.
+/// Least parts of a pixel per ring when an image is sampled.
 const PARTS_PER_RING: f64 = 3.0;
 
 /// A round point spread function, ring by ring.
@@ -34,7 +34,7 @@ pub struct RadialPsf {
 pub struct Drawn {
     /// The profile.
     pub psf: RadialPsf,
-    /// Part of the image's energy (squares) that the mean over each circle does not explain: 0 for what is round.
+    /// Part of the image's energy (squares) that the mean over each circle does not explain: 0 for a round image.
     pub not_round: f64,
 }
 
@@ -56,7 +56,7 @@ impl RadialPsf {
         if total <= 0.0 {
             return Err(PsfError::Profile("no light at all".into()));
         }
-        // What is one already stays as it is, so that a stored profile comes back to the bit.
+        // A profile that is normalised stays unchanged, so that a stored one is restored to the bit.
         let scale = if (total - 1.0).abs() < 1e-6 { 1.0 } else { total.recip() };
         Ok(Self { extent, light: light.map(|light| (f64::from(light) * scale) as f32) })
     }
@@ -65,7 +65,7 @@ impl RadialPsf {
     /// what the blur radius (the aperture's own edge) has in the image, px; without it half the shorter side.
     ///
     /// # Errors
-    /// [`PsfError::Profile`] for an image without light or with values that are none, [`PsfError::Range`].
+    /// [`PsfError::Profile`] for an image without light or with invalid values, [`PsfError::Range`].
     pub fn from_image(image: ArrayView2<f32>, radius_px: Option<f64>) -> Result<Drawn, PsfError> {
         let (height, width) = image.dim();
         let radius_px = radius_px.unwrap_or(0.5 * height.min(width) as f64);

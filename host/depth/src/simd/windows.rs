@@ -142,7 +142,7 @@ fn choose_generic<L: Lanes>(
 }
 
 dispatch! {
-    /// Takes a larger window's value wherever what was chosen so far is less certain than asked for.
+    /// Takes a larger window's value where the present choice is less certain than required.
     fn choose_safe(alpha: &[f32], variance: &[f32], noise: &[f32], largest: f32, chosen: &mut [f32], of_chosen: &mut [f32]) =
         choose_safe_generic
 }

@@ -101,7 +101,7 @@ fn a_bad_job_does_not_stop_the_others() {
         ("do = 'magic'\nout = 'maps/b'", &["magic", "depth, focus-stack, correct"]),
         ("do = 'depth'\nwindo = 3\nout = 'maps/c'", &["windo", "window"]),
         ("do = 'depth'\nout = ", &["line"]),
-        ("do = 'depth'\nout = 'mine'", &["mine", "no batch made it"]),
+        ("do = 'depth'\nout = 'mine'", &["mine", "was not made by a batch"]),
         ("do = 'depth'\nwindow = 4\nout = 'maps/d'", &["window", "odd"]),
         // The first job's place.
         ("do = 'depth'\nwindow = 9\nout = 'maps/0'", &["another job", "maps/0"]),

@@ -53,7 +53,7 @@ pub enum BatchError {
     Field { name: String, value: String, reason: String },
     /// Something in the place of a result.
     #[error(
-        "{} exists already and no batch made it (there is no batch.toml): name another place or remove it", path.display()
+        "{} exists and was not made by a batch (batch.toml is missing): name another place or remove it", path.display()
     )]
     Foreign { path: PathBuf },
     /// Two jobs for one result.

@@ -19,7 +19,7 @@ use crate::{
 
 /// Version of the record.
 const FORMAT: u32 = 1;
-/// Files that several jobs read (optics, corrections, models) are summed once; each job has a few of its own besides.
+/// Files that several jobs read (optics, corrections, models) are hashed once; each job has a few more.
 const SUMS: usize = 64;
 
 /// What a job is made from, and what came of it.

@@ -47,7 +47,7 @@ pub struct LiveFigures {
 }
 
 /// Looks through a camera until time is up or it is cancelled, which is not an error, and gives figures from time to time. A while without a
-/// picture gives none, and is said. Gives the number of pictures.
+/// picture gives none, and is reported. Returns the number of pictures.
 pub fn live(
     settings: &LiveSettings,
     line: &mut dyn FnMut(&LiveFigures) -> std::io::Result<()>,

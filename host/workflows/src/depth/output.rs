@@ -76,7 +76,7 @@ pub struct Outputs(BTreeSet<&'static str>);
 
 /// A name that belongs to no output.
 #[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
-#[error("there is no output \"{name}\"; expected some of {}", Outputs::names().join(","))]
+#[error("unknown output \"{name}\"; expected some of {}", Outputs::names().join(","))]
 pub struct UnknownOutput {
     pub name: String,
 }
@@ -238,7 +238,7 @@ mod tests {
         let unknown = "npy,jpg".parse::<Outputs>().unwrap_err();
         assert_eq!(
             unknown.to_string(),
-            "there is no output \"jpg\"; expected some of npy,tiff,png,mesh,view,exr"
+            "unknown output \"jpg\"; expected some of npy,tiff,png,mesh,view,exr"
         );
         assert!("".parse::<Outputs>().is_err());
     }

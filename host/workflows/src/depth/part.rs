@@ -42,7 +42,7 @@ pub(super) struct Cut {
 
 impl Cut {
     /// Cuts a part with its surroundings out of a pair; without a number of pixels all of it is its surroundings, as where
-    /// a lens' distortion is to be taken out, which goes by the place in the whole image.
+    /// a lens' distortion is to be removed, which depends on the place in the whole image.
     pub fn out_of(pair: &mut Pair, wanted: Rectangle, around: Option<usize>) -> Result<Self> {
         let image @ (height, width) = pair.far.dim();
         wanted.check_within(image)?;

@@ -28,7 +28,7 @@ pub fn mesh(folder: &Path, points: usize) -> Result<Vec<u8>> {
     Ok(ply(depth.slice(window), grey.slice(window), lateral.thinned(step), &unit.to_string()))
 }
 
-/// The smallest step that leaves at most so many of `pixels`.
+/// The smallest step that leaves at most this many of `pixels`.
 fn step(pixels: usize, points: usize) -> usize {
     (1..).find(|step| pixels / (step * step) <= points.max(1)).unwrap_or(1)
 }

@@ -12,7 +12,7 @@ use crate::error::Result;
 const BINS: usize = 96;
 const NONE: Rgb<u8> = Rgb([150, 150, 152]);
 
-/// The value below which this part of the finite values lies; `None` where there are none.
+/// The value below which this part of the finite values lies; `None` without any.
 pub fn quantile(map: ArrayView2<f32>, part: f64) -> Option<f32> {
     let mut finite: Vec<f32> = map.iter().copied().filter(|value| value.is_finite()).collect();
     if finite.is_empty() {

@@ -75,7 +75,7 @@ pub struct QualityRecord {
     pub measurements: Vec<QualityFigures>,
 }
 
-/// Reads a record; empty where there is none.
+/// Reads a record; empty without one.
 ///
 /// # Errors
 /// [`WorkflowError::Read`], [`WorkflowError::File`].
@@ -196,7 +196,7 @@ fn spread(values: &[f64]) -> (f64, f64) {
     (mean, (squares / (count - 1.0)).sqrt())
 }
 
-/// The middle value; 0 where there is none.
+/// The middle value; 0 without any.
 fn median(mut values: Vec<f64>) -> f64 {
     if values.is_empty() {
         return 0.0;

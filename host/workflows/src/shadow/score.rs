@@ -29,7 +29,7 @@ pub struct ScoreSettings {
     /// The truth: a picture or a folder.
     pub truth: PathBuf,
     /// Masks before the removal: then only pixels that were in them count as removed. Where the truth holds no shadow at
-    /// all, what these have beside the person counts as shadow.
+    /// all, everything in these except the person counts as shadow.
     pub before: Option<PathBuf>,
 }
 
@@ -40,7 +40,7 @@ pub struct ScoreFigures {
     pub removed_percent: Option<f64>,
     /// Share of the person that went with it.
     pub wrongly_removed_percent: Option<f64>,
-    /// Intersection over union of what is left and the person.
+    /// Intersection over union of the result and the person.
     pub iou_percent: Option<f64>,
     pub frames: usize,
     /// Pixels of shadow in the truth.

@@ -27,7 +27,6 @@ pub const WITH: &str = "with-shadow";
 /// The folder of masks without it.
 pub const WITHOUT: &str = "without-shadow";
 
-/// What is cut out and how.
 #[derive(Clone, PartialEq, Debug)]
 pub struct VideoShadowSettings {
     pub video: PathBuf,

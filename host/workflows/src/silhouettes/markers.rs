@@ -124,7 +124,7 @@ pub struct MarkersFigures {
     pub warnings: Vec<String>,
 }
 
-/// `silhouettes.toml`: what was drawn, and one entry per doubtful frame.
+/// `silhouettes.toml`: the drawing's options, and one entry per doubtful frame.
 #[derive(Serialize)]
 struct Index<'a> {
     template: &'a str,
@@ -244,7 +244,7 @@ pub(crate) fn one_view(recording: &Recording, template: &Template) -> Vec<Track>
     if track.frames() == 0 { Vec::new() } else { vec![track] }
 }
 
-/// What was guessed about a recording, and what is strange about it.
+/// Guesses about a recording, and doubts.
 pub(crate) fn remarks(recording: &Recording) -> Vec<String> {
     recording.remarks().into_iter().chain(lying(recording)).collect()
 }

@@ -25,7 +25,7 @@ use crate::{context::Context, error::Result, figures::rounded};
 
 /// From one sign of progress to the next, frames.
 const PROGRESS_FRAMES: usize = 50;
-/// What is under way where the work is cancelled.
+/// Work that is cancelled.
 const DURING: &str = "making masks";
 
 /// What masks are made of, how, and where to.

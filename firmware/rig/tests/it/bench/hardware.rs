@@ -69,7 +69,7 @@ impl Hardware {
         }
     }
 
-    /// Where stage A is.
+    /// Position of stage A.
     pub fn position_um(&self) -> f64 {
         self.coarse.position_um()
     }

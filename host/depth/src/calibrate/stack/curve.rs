@@ -29,7 +29,7 @@ pub(super) struct Curve {
 }
 
 impl Curve {
-    /// `None` for too few samples, and where what is measured does not rise with the truth.
+    /// `None` for too few samples, and for values that do not rise with the truth.
     pub fn fit<'a>(samples: impl Iterator<Item = &'a Sample> + Clone, degree: usize) -> Option<Self> {
         let mut places: Vec<f64> = samples.clone().map(|s| s.measured).collect();
         if places.len() < 50 {
@@ -127,7 +127,7 @@ mod tests {
             let expected = 1.0 / (0.8 + 0.45 * truth * truth);
             assert!((slope - expected).abs() < 0.15 * expected, "{truth} {slope} {expected}");
         }
-        assert!(curve.at(bent(1.05)).is_none(), "beyond what was learned there is no depth");
+        assert!(curve.at(bent(1.05)).is_none(), "no depth beyond the learned range");
         let falling = samples(|t| -t, (0..400).map(|i| -1.0 + f64::from(i) / 200.0));
         assert_eq!(Curve::fit(falling.iter(), 3), None);
     }

@@ -1,7 +1,7 @@
 //! Which PSF, blur and response fit the target, learned on a part of it and judged on the rest.
 //!
 //! Choices are made on a checkerboard of blocks. The error is stated more strictly: a part is a half of the field in every other
-//! pair, judged by what was learned on the other half in the other pairs, at other places and other distances; and the target is judged
+//! pair, judged by the response of the other half in the other pairs, at other places and other distances; and the target is judged
 //! a second time with its texture made coarser, which no choice may depend on.
 
 use rayon::prelude::*;
@@ -181,7 +181,7 @@ pub(super) fn learn(target: &Target<'_>) -> Result<Learned, StackError> {
                 |original: bool| robust(judged.iter().filter(|j| j.original == original).map(|j| j.error));
             // A lens is right with any texture.
             let robust = (of(true) * of(false)).sqrt() * half_mm;
-            // The response makes up for a wrong blur, so that errors hardly tell: what was measured is preferred.
+            // The response makes up for a wrong blur, so that errors hardly tell: the measured blur is preferred.
             let unlikely = 1.0 + UNLIKELY * factor.ln().powi(2);
             let cost = unlikely * robust / fill.clamp(0.05, 1.0).powi(2);
             trials.push(Trial {
@@ -311,7 +311,7 @@ impl Target<'_> {
     }
 }
 
-/// Every sample judged by what was learned from the other ones. Depths beyond those that were learned are not judged. With the part of
+/// Every sample judged by the response of the other ones. Depths beyond their range are not judged. With the part of
 /// the judged ones that has a depth.
 fn judge(samples: &Samples, degree: usize, by: Split) -> Option<(Vec<Judged>, f64)> {
     let split = by == Split::Parts && samples.pairs >= PAIRS_TO_SPLIT;
@@ -393,7 +393,7 @@ fn finish(samples: &Samples, degree: usize, optics: &Optics, half_mm: f64) -> Op
     let mut left: Vec<f32> = judged.iter().map(|j| j.unexplained).collect();
     let middle = left.len() / 2;
     let median = f64::from(*left.select_nth_unstable_by(middle, f32::total_cmp).1);
-    // What is less than the model's error tells nothing of it.
+    // Values below the model's error carry no information about it.
     let usual = |residual: f64| median.max(TELLING * residual * residual).max(1e-9);
     let predicted = |j: &Judged, residual: f64| {
         let ratio = j.unexplained / usual(residual) as f32;

@@ -28,7 +28,7 @@ const MARGIN_PX: usize = 2;
 const CLOSED_MM: f64 = 126.0;
 const CLOSED_BETWEEN_THICK_PARTS_MM: f64 = 40.0;
 const UNIT: &str = "masks";
-/// What is under way where the work is cancelled.
+/// Work that is cancelled.
 const DURING: &str = "drawing silhouettes";
 
 /// What all views share.
@@ -38,7 +38,7 @@ pub struct Job<'a> {
     pub views: usize,
     /// The body's parts.
     pub template: &'a Template,
-    /// What is visible in each frame that is drawn.
+    /// Visible points of each drawn frame.
     pub frames: &'a [HashMap<&'a str, Point3>],
     /// The frames' names, by their numbers in the recording.
     pub names: &'a [String],

@@ -1,4 +1,4 @@
-//! Whoever cancels a workflow, from whatever thread, stops the rig.
+//! Cancelling a workflow, from any thread, stops the rig.
 
 use std::{
     thread,

@@ -1,4 +1,4 @@
-//! What is done with the rig once it is connected, and what is refused before.
+//! Tasks on a connected rig, and refusals before.
 
 use std::{thread, time::Duration};
 

@@ -77,7 +77,7 @@ fn feed(folder: &Path, board: &Peer, over: &AtomicBool) {
 
 type Job<'a> = Box<dyn Fn(RigAddress, usize, &Context<'_>) -> Result<()> + 'a>;
 
-/// What is looked at until two pictures or maps have come.
+/// Watches until two pictures or maps have come.
 fn until_two<T>(watch: impl FnOnce(&mut dyn FnMut(T) -> Result<()>) -> Result<()>) -> Result<()> {
     let mut count = 0;
     let ended = watch(&mut |_| {
