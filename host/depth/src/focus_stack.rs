@@ -438,7 +438,7 @@ mod tests {
         let blurred = StackSettings { smoothing_px: f32::NAN, ..usual };
         assert!(of(&[&image, &image, &image], &blurred).contains("blurred by NaN px: 0 to 10"));
         let narrow = StackSettings { guided_px: 0.5, ..usual };
-        assert!(of(&[&image, &image, &image], &narrow).contains("within 0.5 px: 0 (not at all) or 1 to 100"));
+        assert!(of(&[&image, &image, &image], &narrow).contains("within 0.5 px: 0 (off) or 1 to 100"));
         let wide = StackSettings { window_px: 33, ..usual };
         assert!(of(&[&image, &image, &image], &wide).contains("smaller than the window of 33"));
     }
