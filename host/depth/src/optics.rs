@@ -22,6 +22,7 @@ pub use distortion::{Distortion, DistortionSection};
 pub use doubt::Doubt;
 pub use error::OpticsError;
 pub use file::{FocusSection, LensSection, OpticsFile, SensorSection};
+pub(crate) use stage::interpolated;
 pub use stage::{RESPONSE_POINTS, Stage, unexplained};
 
 /// Image distance of an object at `object_mm`; the thin lens is its own inverse, so this also maps back.

@@ -34,7 +34,7 @@ impl Projection {
     }
 }
 
-/// Where pixels see the object beside the optical axis.
+/// Positions of pixels' object points relative to the optical axis.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub enum Lateral {
     /// Along rays through the front focus of a lens; depths are in mm.

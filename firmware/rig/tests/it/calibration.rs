@@ -144,7 +144,7 @@ fn stage_a_is_homed_only_where_it_is_known_how_far_the_piezo_holds_its_switch_aw
     assert!(
         matches!(bench.work(&home(Axis::SensorCoarse)), EventKind::Homed { shift, .. } if shift.0.abs() < 5_000)
     );
-    // One that was led down holds nothing away, whatever the last gauge reading.
+    // One that was led down holds nothing away, for any last gauge reading.
     bench.restart(2, ResetCause::Software);
     bench.run_ms(50);
     bench.hardware.faults.gauge = Some(None);

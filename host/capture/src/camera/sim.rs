@@ -43,7 +43,7 @@ pub struct SimCamera {
     /// Signals the end of the reader.
     ended: Receiver<()>,
     runs_freely: bool,
-    /// Image that came in place of an earlier one.
+    /// Image that replaces an earlier one.
     early: Option<Frame>,
     /// Last image since arming that belonged to an earlier exposure than the due one.
     passed: Option<u32>,

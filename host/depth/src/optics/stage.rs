@@ -57,15 +57,7 @@ impl Stage {
 
     /// True normalised depth and slope at a measured one; `None` outside the learned range.
     pub fn respond(&self, measured: f64) -> Option<[f64; 2]> {
-        let [low, high] = self.measured;
-        if !(low..=high).contains(&measured) {
-            return None;
-        }
-        let unit = (high - low) / (RESPONSE_POINTS - 1) as f64;
-        let place = (measured - low) / unit;
-        let index = (place as usize).min(RESPONSE_POINTS - 2);
-        let [a, b] = [self.response[index], self.response[index + 1]];
-        Some([a + (b - a) * (place - index as f64), (b - a) / unit])
+        interpolated(self.measured, &self.response, measured)
     }
 
     /// Why the section cannot be used, if it cannot.
@@ -92,6 +84,22 @@ impl Stage {
             && self.usual_unexplained.is_finite();
         (!positive).then_some("residual must be 0 to 2 and usual_unexplained above 0")
     }
+}
+
+/// Value and slope of a response at a measured depth; `None` outside the range of its points.
+pub(crate) fn interpolated(
+    [low, high]: [f64; 2],
+    response: &[f64; RESPONSE_POINTS],
+    measured: f64,
+) -> Option<[f64; 2]> {
+    if !(low..=high).contains(&measured) {
+        return None;
+    }
+    let unit = (high - low) / (RESPONSE_POINTS - 1) as f64;
+    let place = (measured - low) / unit;
+    let index = (place as usize).min(RESPONSE_POINTS - 2);
+    let [a, b] = [response[index], response[index + 1]];
+    Some([a + (b - a) * (place - index as f64), (b - a) / unit])
 }
 
 #[cfg(test)]

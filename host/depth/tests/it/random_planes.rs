@@ -51,7 +51,7 @@ fn random_planes_and_magnifications_give_no_confident_wrong_plateau() {
             let settings = MeasureSettings { prepare, window, ..MeasureSettings::default() };
             let Ok(found) = measure_pair_of_views(far.view(), near.view(), &optics, method, None, &settings)
             else {
-                continue; // Refused is no wrong depth.
+                continue; // A refused pair is not a wrong depth.
             };
             let wrong = found.map.depth_mm.indexed_iter().filter(|(at, found_mm)| {
                 let off = (**found_mm - depth as f32).abs();

@@ -158,17 +158,3 @@ fn median(values: &mut [f64]) -> Option<f64> {
     let middle = values.len() / 2;
     (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    #[ignore = "needs the real stacks in FARNEAR_DATA and takes a minute"]
-    fn prints_the_table() {
-        let data = std::path::PathBuf::from(std::env::var("FARNEAR_DATA").unwrap());
-        let mut page = Page::new(Path::new("."), "");
-        measure(&mut page, &data).unwrap();
-        println!("{}", page.text());
-    }
-}

@@ -6,7 +6,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::response::Sample;
-use crate::optics::RESPONSE_POINTS;
+use crate::optics::{RESPONSE_POINTS, interpolated};
 
 /// How far beyond the learned depths the response goes, in normalised depth.
 const BEYOND: f64 = 0.05;
@@ -60,15 +60,7 @@ impl Curve {
 
     /// True normalised depth and slope at a measured one; `None` outside the learned range.
     pub fn at(&self, measured: f64) -> Option<[f64; 2]> {
-        let [low, high] = self.measured;
-        if !(low..=high).contains(&measured) {
-            return None;
-        }
-        let unit = (high - low) / (RESPONSE_POINTS - 1) as f64;
-        let place = (measured - low) / unit;
-        let index = (place as usize).min(RESPONSE_POINTS - 2);
-        let [a, b] = [self.response[index], self.response[index + 1]];
-        Some([a + (b - a) * (place - index as f64), (b - a) / unit])
+        interpolated(self.measured, &self.response, measured)
     }
 }
 
