@@ -137,7 +137,7 @@ fn each_software_trigger_gives_a_frame_and_a_surplus_one_is_an_error() {
         );
         before = Some(number);
     }
-    camera.finish().unwrap();
+    camera.finish(Duration::ZERO).unwrap();
     let late = camera.image(&shot_at(12, begin), Duration::from_millis(50)).unwrap_err();
     assert!(matches!(late, CameraError::Late { trigger_number: 12, .. }), "{late:?}");
     // A strobe at another time belongs to another exposure.
@@ -148,7 +148,7 @@ fn each_software_trigger_gives_a_frame_and_a_surplus_one_is_an_error() {
     let until = Instant::now() + WAIT;
     camera.trigger(13, EXPOSURE).unwrap();
     let surplus = loop {
-        match camera.finish() {
+        match camera.finish(Duration::ZERO) {
             Ok(()) => assert!(Instant::now() < until, "no surplus frame"),
             Err(error) => break error,
         }
