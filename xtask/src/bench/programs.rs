@@ -29,7 +29,7 @@ const OPTICS: &str = "[lens]\nfocal_length_mm = 50.0\nf_number = 1.4\ntelecentri
 pub fn run(runs: usize) -> Result<String> {
     modules(&["numpy", "cv2"])?;
     step("farnear in release");
-    finish(&mut cargo(["build", "--release", "--locked", "--package", "farnear", "--ignore-rust-version"]))?;
+    finish(&mut cargo(["build", "--release", "--locked", "--package", "farnear"]))?;
     let farnear = target_folder().join("release/farnear");
     let folder = target_folder().join("bench-programs");
     fs::create_dir_all(&folder).with_context(|| format!("cannot create {}", folder.display()))?;
