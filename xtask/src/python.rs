@@ -19,7 +19,7 @@ use crate::{
 /// The package that only those compile who have Python.
 pub const PACKAGE: &str = "farnear-python";
 /// Packages that the tests need.
-const NEEDS: [&str; 7] = [
+const NEEDS: [&str; 10] = [
     "numpy>=1.23",
     "matplotlib>=3.6",
     "pytest>=7",
@@ -27,6 +27,9 @@ const NEEDS: [&str; 7] = [
     "useq-schema>=0.5",
     "mcap-ros2-support>=0.5",
     "mypy>=1.10",
+    "pyright[nodejs]>=1.1.380",
+    "trimesh>=4",
+    "xarray>=2023.1",
 ];
 /// Tells whether a Python is new enough and can make environments.
 const ABLE: &str = "import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 9))";
