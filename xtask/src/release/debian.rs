@@ -5,7 +5,6 @@
 
 use std::{
     fs,
-    os::unix::fs::symlink,
     path::{Path, PathBuf},
     process::Command,
 };
@@ -42,8 +41,8 @@ pub fn write(
     lay_programs(&programs, elves, &root.join(PROGRAMS))?;
     fs::create_dir_all(root.join("usr/bin")).context("cannot create usr/bin")?;
     for program in crate::host::PROGRAMS {
-        symlink(format!("../lib/farnear/{program}"), root.join("usr/bin").join(program))
-            .context("cannot make a link in usr/bin")?;
+        let link = root.join("usr/bin").join(program);
+        finish(Command::new("ln").arg("-s").arg(format!("../lib/farnear/{program}")).arg(link))?;
     }
     copy(&ROOT.join("packaging/60-farnear.rules"), &root.join("usr/lib/udev/rules.d"))?;
     let documents = root.join("usr/share/doc/farnear");
