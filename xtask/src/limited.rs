@@ -24,20 +24,23 @@ const LAST: Duration = Duration::from_secs(5);
 const LOOK: Duration = Duration::from_millis(20);
 
 /// What a program printed, and how it ended.
-pub struct Said {
+pub struct Output {
     pub text: String,
     /// Whether it ended by itself, with success.
     pub well: bool,
 }
 
 /// Runs a program; its errors are shown as they come, its output is printed when it has ended.
-pub fn run(command: &mut Command) -> Result<Said> {
+///
+/// # Errors
+/// A program that cannot be started.
+pub fn run(command: &mut Command) -> Result<Output> {
     let said = run_for(command, LIMIT)?;
     print!("\n{}\n{}", describe(command), said.text);
     Ok(said)
 }
 
-fn run_for(command: &mut Command, limit: Duration) -> Result<Said> {
+fn run_for(command: &mut Command, limit: Duration) -> Result<Output> {
     let named = describe(command);
     let child = command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn();
     let mut child = child.with_context(|| format!("cannot start {named}"))?;
@@ -63,7 +66,7 @@ fn run_for(command: &mut Command, limit: Duration) -> Result<Said> {
         Some(_) => {}
     }
     let text = text.lock().unwrap_or_else(PoisonError::into_inner);
-    Ok(Said { text: String::from_utf8_lossy(&text).into_owned(), well: well == Some(true) })
+    Ok(Output { text: String::from_utf8_lossy(&text).into_owned(), well: well == Some(true) })
 }
 
 /// Whether it ended well; `None` where it had to be killed.
@@ -99,7 +102,7 @@ mod tests {
 
     fn shell(script: &str, limit: Duration) -> (String, bool, Duration) {
         let begin = Instant::now();
-        let Said { text, well } = run_for(Command::new("sh").args(["-c", script]), limit).expect("a shell");
+        let Output { text, well } = run_for(Command::new("sh").args(["-c", script]), limit).expect("a shell");
         (text, well, begin.elapsed())
     }
 

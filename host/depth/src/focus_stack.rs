@@ -306,8 +306,8 @@ fn band(
         .collect()
 }
 
-/// The focus measure over windows that fade towards their rim: the mean over the window is taken twice, for a window with a hard
-/// rim puts a sharp detail's place on everything within its reach. NaN where a pixel that it depends on was not seen.
+/// The focus measure over windows that fade towards their border: the mean over the window is taken twice, for a window with a hard
+/// border puts a sharp detail's place on everything within its reach. NaN where a pixel that it depends on was not seen.
 fn measured_over_windows(image: ArrayView2<f32>, settings: &StackSettings) -> Array2<f32> {
     if image.iter().all(|value| value.is_finite()) {
         return measured_where_seen(image, settings);

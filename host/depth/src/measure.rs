@@ -94,8 +94,10 @@ pub enum MeasureError {
 /// What a user should know before trusting a map.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum Finding {
-    /// As the run time says it.
+    /// A warning of the run time.
     Run(String),
+    /// The run time found the images in the wrong order.
+    SwappedByScene(String),
     /// Pixels without depth.
     Lost(Lost),
     /// The near image is larger as by a lens that is not telecentric.
@@ -123,10 +125,17 @@ pub enum Finding {
     NothingSharp,
 }
 
+impl Finding {
+    /// Whether the images seem to be in the wrong order.
+    pub const fn is_swapped(&self) -> bool {
+        matches!(self, Self::SwappedByScene(_) | Self::SwappedByMagnification { .. })
+    }
+}
+
 impl fmt::Display for Finding {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Run(text) => f.write_str(text),
+            Self::Run(text) | Self::SwappedByScene(text) => f.write_str(text),
             Self::Lost(Lost { reason, fraction, .. }) => {
                 write!(f, "{:.1} % of the map have no depth: {}", 100.0 * fraction, reason.words())
             }
@@ -386,7 +395,10 @@ fn findings(map: &DepthMap, prepared: &Prepared, estimate: &Estimate, optics: &O
         .iter()
         // Holes are told by their reasons.
         .filter(|warning| !matches!(warning, Warning::NotFinite { .. } | Warning::Saturated { .. }))
-        .map(|warning| Finding::Run(warning.to_string()))
+        .map(|warning| match warning {
+            Warning::LooksSwapped(_) => Finding::SwappedByScene(warning.to_string()),
+            _ => Finding::Run(warning.to_string()),
+        })
         .collect();
     let report = &prepared.report;
     let of_optics = optics.magnification_ratio();

@@ -39,7 +39,7 @@ pub enum CompareError {
 /// Which pixels count.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct CompareSettings {
-    /// Width of the rim that does not count, px.
+    /// Width of the border that does not count, px.
     pub border_px: usize,
     /// Distance in px (row and column distance) that a pixel must exceed to a step of the true depth.
     pub away_from_edges_px: Option<usize>,
@@ -263,10 +263,10 @@ mod tests {
     #[test]
     fn border_mask_and_edges_restrict_what_counts() {
         let truth = Array2::from_shape_fn((40, 60), |(_, x)| if x < 30 { 900.0 } else { 910.0 });
-        // Wrong by 5 mm within 4 px of the step and on the rim.
+        // Wrong by 5 mm within 4 px of the step and on the border.
         let depth = Array2::from_shape_fn((40, 60), |(y, x)| {
-            let rim = y < 2 || x < 2 || y >= 38 || x >= 58;
-            truth[(y, x)] + if rim || x.abs_diff(30) <= 4 { 5.0 } else { 1.0 }
+            let border = y < 2 || x < 2 || y >= 38 || x >= 58;
+            truth[(y, x)] + if border || x.abs_diff(30) <= 4 { 5.0 } else { 1.0 }
         });
         let rmse = |border_px, away_from_edges_px| {
             let settings = CompareSettings { border_px, away_from_edges_px };

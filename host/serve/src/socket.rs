@@ -29,10 +29,10 @@ const DISCONNECTED: &str = "the browser that had control has disconnected";
 /// Longest message of a browser.
 const MESSAGE_MAX: usize = 4096;
 
-/// What a browser may say.
+/// A message of a browser.
 #[derive(Deserialize)]
 #[serde(tag = "type", rename_all = "lowercase", deny_unknown_fields)]
-enum Said {
+enum ClientMessage {
     Stop,
     /// A picture was taken in: the next one may come.
     Seen,
@@ -139,7 +139,7 @@ enum Heard {
 fn hear(said: Message, app: &Arc<App>) -> Heard {
     match said {
         Message::Text(text) => match serde_json::from_str(&text) {
-            Ok(Said::Stop) => {
+            Ok(ClientMessage::Stop) => {
                 app.note("stop");
                 let (app, stop) = (Arc::clone(app), app.begin_stop());
                 drop(tokio::task::spawn_blocking(move || {
@@ -149,7 +149,7 @@ fn hear(said: Message, app: &Arc<App>) -> Heard {
                 }));
                 Heard::Nothing
             }
-            Ok(Said::Seen) => Heard::Seen,
+            Ok(ClientMessage::Seen) => Heard::Seen,
             Err(error) => {
                 Heard::Wrong(format!("expected {{\"type\":\"stop\"}} or {{\"type\":\"seen\"}}: {error}"))
             }

@@ -13,7 +13,7 @@ use farnear_depth::{
     adaptive_window::Window,
     corrections::Correction,
     fill::{FillBy, LowTexture, refill_as_thesis},
-    measure::{MeasureSettings, binned, measure_pair},
+    measure::{Finding, MeasureSettings, binned, measure_pair},
     optics::{Optics, USABLE_BLUR_PX},
     pipeline::{DepthMap, Settings},
     prepare::{Align, Balance, CameraFrames, PrepareSettings, Report},
@@ -30,7 +30,7 @@ use crate::{
     error::{About, Result, WorkflowError},
     figures::rounded,
     measure::Rectangle,
-    optics,
+    optics::{self, OpticsDoubt},
     psf::PsfSource,
     request::{self, PathKind, Request},
 };
@@ -290,7 +290,7 @@ pub fn compute(settings: &DepthRequest, context: &Context<'_>) -> Result<DepthFi
     let start = Instant::now();
     let computed = inputs.compute(settings, context)?;
     let seconds = start.elapsed().as_secs_f64();
-    let warnings = pair::warnings(computed.findings.clone(), &settings.far, &settings.near);
+    let warnings = computed.findings.clone();
     for warning in &warnings {
         context.progress.warn(warning);
     }
@@ -395,8 +395,7 @@ struct Inputs {
     camera: Option<Arc<CameraFrames>>,
     /// What of the images is looked at, where it is not all.
     cut: Option<Cut>,
-    /// What there is to say of the optics.
-    doubts: Vec<String>,
+    doubts: Vec<OpticsDoubt>,
 }
 
 /// What was computed.
@@ -418,9 +417,8 @@ impl Inputs {
     fn read(settings: &DepthRequest, context: &Context<'_>) -> Result<Self> {
         let (optics, doubts) = optics::of_pair(settings.optics.as_deref(), &settings.far)?;
         let (optics, doubts) = match &settings.psf {
-            // What there is to doubt then is that there was none.
             Some(source) => {
-                let doubts = doubts.into_iter().filter(|doubt| !doubt.contains("[psf]")).collect();
+                let doubts = doubts.into_iter().filter(|doubt| *doubt != OpticsDoubt::NoPsf).collect();
                 (optics.with_psf(source.read(context)?), doubts)
             }
             None => (optics, doubts),
@@ -502,8 +500,11 @@ impl Inputs {
                 refill_as_thesis(&mut map);
             }
         }
-        let said = found.findings.iter().map(ToString::to_string);
-        let findings = self.doubts.iter().cloned().chain(said).collect();
+        let mut findings: Vec<String> = self.doubts.iter().map(ToString::to_string).collect();
+        findings.extend(found.findings.iter().map(ToString::to_string));
+        if !found.findings.iter().any(Finding::is_swapped) {
+            findings.extend(pair::swapped_by_names(&settings.far, &settings.near));
+        }
         let report = found.report;
         Ok(Computed { map, deviation, reasons, lost, image, report, window: real.window, findings })
     }

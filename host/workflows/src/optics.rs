@@ -4,13 +4,13 @@ mod expected;
 mod task;
 
 use std::{
-    fs,
+    fmt, fs,
     path::{Path, PathBuf},
 };
 
 use farnear_capture::record::{CAPTURE_FILE, read_record};
 use farnear_depth::{
-    optics::{Optics, OpticsFile},
+    optics::{Doubt, Optics, OpticsFile},
     psf::Psf,
 };
 
@@ -49,9 +49,9 @@ impl GivenOptics {
     }
 
     /// The optics, and what there is to say of them.
-    fn with_doubts(self) -> (Optics, Vec<String>) {
-        let said = doubts(&self.optics, self.table.contains_key("psf"));
-        (self.optics, said)
+    fn with_doubts(self) -> (Optics, Vec<OpticsDoubt>) {
+        let found = doubts(&self.optics, self.table.contains_key("psf"));
+        (self.optics, found)
     }
 
     /// As the emulated rig's lens takes them.
@@ -65,14 +65,29 @@ pub fn read(path: &Path) -> Result<Optics> {
     GivenOptics::read(path).map(|given| given.optics)
 }
 
-fn doubts(optics: &Optics, psf_is_given: bool) -> Vec<String> {
-    let mut said: Vec<String> = optics.doubts().iter().map(ToString::to_string).collect();
-    if !psf_is_given {
-        said.push(
-            "the optics name no [psf]: a pill-box is assumed, which may be wrong by millimetres; calibrate psf finds it".into(),
-        );
+/// A reason why optics may be wrong.
+#[derive(Clone, PartialEq, Debug)]
+pub enum OpticsDoubt {
+    /// A value that cameras hardly have.
+    Unusual(Doubt),
+    /// No point spread function is given.
+    NoPsf,
+}
+
+impl fmt::Display for OpticsDoubt {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Unusual(doubt) => doubt.fmt(f),
+            Self::NoPsf => f.write_str(
+                "the optics name no [psf]: a pill-box is assumed, which may be wrong by millimetres; calibrate psf finds it",
+            ),
+        }
     }
-    said
+}
+
+fn doubts(optics: &Optics, psf_is_given: bool) -> Vec<OpticsDoubt> {
+    let unusual = optics.doubts().into_iter().map(OpticsDoubt::Unusual);
+    unusual.chain((!psf_is_given).then_some(OpticsDoubt::NoPsf)).collect()
 }
 
 /// The optics of a pair: the file that is named, else what the far image's folder knows (`capture.toml` or
@@ -80,7 +95,7 @@ fn doubts(optics: &Optics, psf_is_given: bool) -> Vec<String> {
 ///
 /// # Errors
 /// As [`GivenOptics::read`]; [`WorkflowError::NoOptics`] where there is nothing.
-pub fn of_pair(named: Option<&Path>, far: &Path) -> Result<(Optics, Vec<String>)> {
+pub fn of_pair(named: Option<&Path>, far: &Path) -> Result<(Optics, Vec<OpticsDoubt>)> {
     if let Some(path) = named {
         return GivenOptics::read(path).map(|given| given.with_doubts());
     }

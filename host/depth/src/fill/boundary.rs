@@ -61,7 +61,7 @@ mod tests {
     }
 
     #[test]
-    fn a_square_has_its_rim() {
+    fn a_square_has_a_border() {
         let mask = mask(&[".....", ".###.", ".###.", ".###.", "....."]);
         let boundary = trace_boundary(mask.view(), start(&mask));
         assert_eq!(boundary, [(1, 1), (1, 2), (1, 3), (2, 3), (3, 3), (3, 2), (3, 1), (2, 1)]);

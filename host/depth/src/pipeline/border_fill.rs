@@ -80,7 +80,7 @@ mod tests {
     }
 
     #[test]
-    fn rim_pixels_take_the_nearest_whole_pixel() {
+    fn border_pixels_take_the_nearest_whole_pixel() {
         let mut map = map(20, 30);
         map.depth_mm[(0, 0)] = f32::NAN;
         fill(&mut map, 7);

@@ -34,8 +34,8 @@ const SETTLED_PX: f64 = 2e-3;
 const COARSELY_SETTLED_PX: f64 = 2e-2;
 /// Pixels of the band that vary together: its correlation area.
 const CORRELATED_PX: f64 = 12.0;
-/// Pixels of a level's rim that are not compared.
-const RIM_PX: usize = 3;
+/// Pixels of a level's border that are not compared.
+const BORDER_PX: usize = 3;
 
 /// What may differ between the images.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -194,11 +194,11 @@ fn levels(pair: &Thinned) -> Option<Vec<Level>> {
     }
 }
 
-/// The value of an image between its pixels; `None` in its rim and outside.
+/// The value of an image between its pixels; `None` in its border and outside.
 fn between(image: &Array2<f32>, [x, y]: [f64; 2]) -> Option<f32> {
     let (height, width) = image.dim();
-    let rim = RIM_PX as f64;
-    if !(x >= rim && y >= rim && x < (width - 1) as f64 - rim && y < (height - 1) as f64 - rim) {
+    let border = BORDER_PX as f64;
+    if !(x >= border && y >= border && x < (width - 1) as f64 - border && y < (height - 1) as f64 - border) {
         return None;
     }
     let (column, row) = (x as usize, y as usize);
@@ -235,8 +235,8 @@ fn correlation(level: &Level, warp: &Warp) -> f64 {
     let (height, width) = level.far.dim();
     let [mut product, mut of_far, mut of_near, mut count] = [0.0_f64; 4];
     let step = (level.far.len() / STEP_PX).max(1);
-    for y in (RIM_PX..height - RIM_PX).step_by(step) {
-        for x in RIM_PX..width - RIM_PX {
+    for y in (BORDER_PX..height - BORDER_PX).step_by(step) {
+        for x in BORDER_PX..width - BORDER_PX {
             if let Some(near) = between(&level.near, warp.at([x as f64, y as f64])) {
                 let [far, near] = [level.far[(y, x)], near].map(f64::from);
                 product += far * near;
@@ -350,7 +350,7 @@ fn jacobian<const N: usize>(
 fn sums<const N: usize>(level: &Level, warp: &Warp, scale: f64, centre: [f64; 2], unit: f64) -> Sums {
     let (height, width) = level.far.dim();
     let step = (level.far.len() / STEP_PX).max(1);
-    let rows: Vec<usize> = (RIM_PX..height - RIM_PX).step_by(step).collect();
+    let rows: Vec<usize> = (BORDER_PX..height - BORDER_PX).step_by(step).collect();
     let Some(far) = level.far.as_slice() else { return Sums::NONE };
     let of_scale = (2.4 * scale).recip() as f32;
     let of_rows = rows.par_chunks(16).map(|rows| {
@@ -381,9 +381,9 @@ fn sums_of_row<const N: usize>(
     let (mut right, mut squares, mut count) = ([NONE; N], NONE, 0_usize);
     let row_of_field = ((y as f64 - centre[1]) / unit) as f32;
     let [above, here, below] = [y - 1, y, y + 1].map(|y| &far[y * width..(y + 1) * width]);
-    for left in (RIM_PX..width - RIM_PX).step_by(SIDE_BY_SIDE) {
+    for left in (BORDER_PX..width - BORDER_PX).step_by(SIDE_BY_SIDE) {
         let (mut gx, mut gy, mut difference, mut present, mut column) = (NONE, NONE, NONE, NONE, NONE);
-        for i in 0..SIDE_BY_SIDE.min(width - RIM_PX - left) {
+        for i in 0..SIDE_BY_SIDE.min(width - BORDER_PX - left) {
             let x = left + i;
             if let Some(near) = between(&level.near, warp.at([x as f64, y as f64])) {
                 gx[i] = 0.5 * (here[x + 1] - here[x - 1]);

@@ -72,8 +72,8 @@ fn depth_mm(place: f64, first_mm: f64, focal_mm: f64) -> f64 {
 fn row(name: &str, depth: &Array2<f32>, truth: &Array2<f32>) -> Result<Vec<String>> {
     let away = rig::error(depth, truth, true)?;
     let everywhere = rig::error(depth, truth, false)?;
-    let rim = rig::BORDER_PX;
-    let middle = depth.slice(ndarray::s![rim..depth.nrows() - rim, rim..depth.ncols() - rim]);
+    let border = rig::BORDER_PX;
+    let middle = depth.slice(ndarray::s![border..depth.nrows() - border, border..depth.ncols() - border]);
     let empty = middle.iter().filter(|depth| depth.is_nan()).count() as f64 / middle.len() as f64;
     Ok(vec![
         name.into(),

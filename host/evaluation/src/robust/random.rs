@@ -27,6 +27,8 @@ struct Case {
     error_mm: f64,
     valid: f64,
     said: Vec<String>,
+    /// Whether there is no depth map.
+    refused: bool,
 }
 
 impl Case {
@@ -103,7 +105,7 @@ pub fn measure(page: &mut Page) -> Result<()> {
         part(&|case| case.error_mm < 0.75),
         part(&|case| case.error_mm > SILENT_MM),
         silent.len(),
-        part(&|case| case.said.iter().any(|said| said.starts_with("error"))),
+        part(&|case| case.refused),
         mm(median(cases.iter().map(|case| case.before_mm))),
         mm(median(cases.iter().map(|case| case.error_mm))),
     ));
@@ -149,5 +151,6 @@ fn case(seed: u64, operators: &Operators, optics: &Optics) -> Result<Case> {
         error_mm: outcome.error_mm,
         valid: outcome.valid,
         said: outcome.said,
+        refused: outcome.found.is_none(),
     })
 }

@@ -1,6 +1,6 @@
 //! What everybody in a recording does: people followed apart, a streaming answer for each, then one for all that was seen of each.
 
-use std::{path::PathBuf, time::Instant};
+use std::{fmt, path::PathBuf, time::Instant};
 
 use farnear_recognition::clip::Track;
 use farnear_recognition::live::{Live, joined};
@@ -12,6 +12,7 @@ use farnear_silhouettes::mask::{
     tracking::{Followed, Sight, Tracker, TrackingSettings},
 };
 use serde::Serialize;
+use serde_with::SerializeDisplay;
 
 use super::{
     annotated_video::{AnnotatedVideo, Shown},
@@ -64,14 +65,40 @@ pub struct PersonInFrame {
     pub confidence: f64,
     /// Outlier score: above 1 unknown; `None` where no silhouette has been seen.
     pub outlier_score: Option<f64>,
-    /// What is doubtful: `crossing:2`, `parted:2`, `perhaps-swapped:2`, `missed`, `cut-by-edge`.
+    /// What is doubtful.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub flags: Vec<String>,
+    pub flags: Vec<PersonFlag>,
+}
+
+/// Why the answer for a person in a frame is doubtful. Serialised as `crossing:2`, `missed`.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, SerializeDisplay)]
+pub enum PersonFlag {
+    /// Overlaps with this person.
+    Crossing(usize),
+    /// Has parted from this person after an overlap.
+    Parted(usize),
+    /// May have been exchanged with this person.
+    PerhapsSwapped(usize),
+    /// Not found in the frame.
+    Missed,
+    CutByEdge,
+}
+
+impl fmt::Display for PersonFlag {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Crossing(other) => write!(f, "crossing:{other}"),
+            Self::Parted(other) => write!(f, "parted:{other}"),
+            Self::PerhapsSwapped(other) => write!(f, "perhaps-swapped:{other}"),
+            Self::Missed => f.write_str("missed"),
+            Self::CutByEdge => Flag::CutByEdge.fmt(f),
+        }
+    }
 }
 
 /// Everybody in the recording.
 #[derive(Clone, PartialEq, Debug, Serialize)]
-pub struct EverybodyFigures {
+pub struct MultiPersonFigures {
     pub people: Vec<PersonFigures>,
     pub frames: usize,
     pub window: usize,
@@ -246,22 +273,22 @@ impl<'m> MultiPersonTracker<'m> {
                     let answer = somebody.live.push_described(vec![track])?;
                     somebody.answer = Some(restricted(answer, &self.among));
                 }
-                flags.extend(cut_by_edge.then(|| Flag::CutByEdge.to_string()));
+                flags.extend(cut_by_edge.then_some(PersonFlag::CutByEdge));
                 spans = Some(bounds);
             }
             Sight::Crossing { with, bounds } => {
                 somebody.crossing_frames += 1;
-                flags.extend(with.iter().map(|other| format!("crossing:{other}")));
+                flags.extend(with.iter().copied().map(PersonFlag::Crossing));
                 spans = Some(bounds);
             }
-            Sight::Missed => flags.push("missed".into()),
+            Sight::Missed => flags.push(PersonFlag::Missed),
         }
         for parting in parted {
             let other = parting.from;
             flags.push(if parting.ambiguous {
-                format!("perhaps-swapped:{other}")
+                PersonFlag::PerhapsSwapped(other)
             } else {
-                format!("parted:{other}")
+                PersonFlag::Parted(other)
             });
             if parting.ambiguous && !somebody.perhaps_swapped_with.contains(&other) {
                 somebody.perhaps_swapped_with.push(other);
@@ -282,7 +309,7 @@ impl<'m> MultiPersonTracker<'m> {
     ///
     /// # Errors
     /// A model that does not fit.
-    pub fn finish(self) -> Result<EverybodyFigures> {
+    pub fn finish(self) -> Result<MultiPersonFigures> {
         if let Some(annotated_video) = self.annotated_video {
             annotated_video.finish()?;
         }
@@ -292,7 +319,7 @@ impl<'m> MultiPersonTracker<'m> {
             .filter(|(_, somebody)| !somebody.tracks.is_empty())
             .map(|(person, somebody)| figures(model, among, person, somebody))
             .collect::<Result<Vec<PersonFigures>>>()?;
-        Ok(EverybodyFigures {
+        Ok(MultiPersonFigures {
             people,
             frames: self.count,
             window: self.window,
@@ -334,7 +361,7 @@ fn figures(
 /// What is drawn of one of them.
 fn shown(person: &PersonInFrame) -> Option<Shown> {
     let spans = person.top_left_bottom_right?;
-    let crossing = person.flags.iter().any(|flag| flag.starts_with("crossing"));
+    let crossing = person.flags.iter().any(|flag| matches!(flag, PersonFlag::Crossing(_)));
     let known = person.activity.is_some() && !crossing;
     let what = match &person.activity {
         _ if crossing => "crossing".to_owned(),

@@ -46,21 +46,18 @@ impl Pair {
     }
 }
 
-/// What there is to warn of: what the computation found, and names that contradict the order.
+/// A warning if the names of the files contradict their order.
 ///
 /// A scene inside the working range gives a plausible map also from a swapped pair, mirrored between far and near: only
-/// the names tell.
-pub fn warnings(found: Vec<String>, far: &Path, near: &Path) -> Vec<String> {
-    let mut warnings = found;
-    let seen_already = warnings.iter().any(|warning| warning.contains("looks swapped"));
-    if named_the_other_way_round(far, near) && !seen_already {
-        warnings.push(format!(
+/// the names show it.
+pub fn swapped_by_names(far: &Path, near: &Path) -> Option<String> {
+    named_the_other_way_round(far, near).then(|| {
+        format!(
             "the pair looks swapped by its names: {} was given as FAR and {} as NEAR",
             name_of(far),
             name_of(near)
-        ));
-    }
-    warnings
+        )
+    })
 }
 
 fn named_the_other_way_round(far: &Path, near: &Path) -> bool {

@@ -84,7 +84,7 @@ impl Sketch {
     }
 }
 
-/// Pixels of a surface with nothing else within [`EDGE_PX`], nor the picture's rim.
+/// Pixels of a surface with nothing else within [`EDGE_PX`], nor the picture's border.
 fn eroded(flat: &Array2<u8>, label: u8) -> Array2<bool> {
     let (height, width) = SIZE;
     // Sums over rectangles from the upper left corner make each window four look-ups.
@@ -95,8 +95,8 @@ fn eroded(flat: &Array2<u8>, label: u8) -> Array2<bool> {
     }
     let side = 2 * EDGE_PX + 1;
     Array2::from_shape_fn(SIZE, |(y, x)| {
-        let rim = 16;
-        if y < rim || x < rim || y + rim >= height || x + rim >= width {
+        let border = 16;
+        if y < border || x < border || y + border >= height || x + border >= width {
             return false;
         }
         let [top, left] = [y - EDGE_PX, x - EDGE_PX];

@@ -83,7 +83,7 @@ pub fn run(arguments: Arguments) -> Result<()> {
             window: arguments.window,
             annotated_video: arguments.video_out,
         };
-        return everybody(&model, &settings, arguments.json);
+        return multi_person(&model, &settings, arguments.json);
     }
     let settings = RecognitionSettings {
         views,
@@ -102,7 +102,7 @@ pub fn run(arguments: Arguments) -> Result<()> {
 }
 
 /// Everybody in one view, each apart.
-fn everybody(model: &Model, settings: &MultiPersonSettings, json: bool) -> Result<()> {
+fn multi_person(model: &Model, settings: &MultiPersonSettings, json: bool) -> Result<()> {
     let context = terminal::context()?;
     let mut work = MultiPersonTracker::begin(model, settings)?;
     while let Some(people) = work.next(&context)? {
