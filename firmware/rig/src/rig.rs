@@ -67,12 +67,12 @@ pub struct Rig {
     wrote: bool,
     /// The tick before was followed by a rest.
     rested: bool,
-    start_report: Option<StartReport>,
+    untold: Option<Untold>,
 }
 
-/// Found at the start and not reported yet.
+/// What there is to say at the start.
 #[derive(Clone, Copy, Debug)]
-struct StartReport {
+struct Untold {
     found: Option<[Found; RECORDS]>,
     in_motion: u8,
 }
@@ -131,7 +131,7 @@ impl Rig {
             supply_low: false,
             wrote: false,
             rested: false,
-            start_report: Some(StartReport { found: memory.map(record::find_all), in_motion }),
+            untold: Some(Untold { found: memory.map(record::find_all), in_motion }),
         }
     }
 
@@ -144,7 +144,7 @@ impl Rig {
         let contents = Contents {
             counters: self.counters(),
             // What moved is to stay there until its alarm is kept.
-            in_motion: self.start_report.map_or(self.in_motion, |start_report| start_report.in_motion),
+            in_motion: self.untold.map_or(self.in_motion, |untold| untold.in_motion),
             alarms: &self.alarms,
             values: &self.values,
             shots: &self.shots,
@@ -161,7 +161,7 @@ impl Rig {
 
     /// Says, before anything else is done, how the last boot ended and what the memory held.
     fn begin(&mut self, now: BoardMicros) {
-        let Some(StartReport { found, in_motion }) = self.start_report.take() else { return };
+        let Some(Untold { found, in_motion }) = self.untold.take() else { return };
         if found.is_none() && self.parts.memory {
             self.alarm(Alarm::MemoryMissing, now);
         }

@@ -7,10 +7,10 @@ use crate::{parts::Parts, scenario::Scenario};
 /// How virtual time passes.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum Pace {
-    /// Only as long as a caller asks for.
+    /// Only as long as it is told to.
     #[default]
-    OnRequest,
-    /// While an answer or an event is outstanding, and on request.
+    Told,
+    /// While the board owes an answer or an event, and when told to.
     Lockstep,
     /// With the wall clock, while the board is at work or has just been spoken to.
     Realtime,
@@ -48,7 +48,7 @@ impl Default for RigConfig {
             parts: Parts::default(),
             costs_by_kind: false,
             scenario: Scenario::default(),
-            pace: Pace::OnRequest,
+            pace: Pace::Told,
             memory: None,
             observe: false,
             trace: None,

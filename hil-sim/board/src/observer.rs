@@ -57,8 +57,8 @@ pub enum Seen {
         /// Where everything was then.
         truth: Truth,
     },
-    /// The board has reported an event.
-    Reported {
+    /// The board has told of an event.
+    Told {
         number: u32,
         boot: u32,
         event: Box<Event>,
@@ -164,7 +164,7 @@ fn read(packet: &Packet, truth: Truth) -> Option<(Option<Moment>, Seen)> {
                 EventKind::Alarm(_) => Some(Moment::Alarm),
                 _ => None,
             };
-            return Some((moment, Seen::Reported { number: id, boot, event: event.into(), truth }));
+            return Some((moment, Seen::Told { number: id, boot, event: event.into(), truth }));
         }
         Kind::Request | Kind::Log => return None,
     };

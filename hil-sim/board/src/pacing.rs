@@ -100,7 +100,7 @@ impl Pacing {
     pub fn may_pass(&mut self, now_ns: u64, at_work: bool) -> bool {
         self.is_told(now_ns)
             || match self.pace {
-                Pace::OnRequest => !self.settling.is_empty() && self.is_busy(now_ns, at_work),
+                Pace::Told => !self.settling.is_empty() && self.is_busy(now_ns, at_work),
                 Pace::Lockstep => self.is_busy(now_ns, at_work) && !self.lockstep.waits_for_host(),
                 Pace::Realtime => self.is_busy(now_ns, at_work) || self.spoken.elapsed() < AWAKE,
             }

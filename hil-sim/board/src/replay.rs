@@ -161,7 +161,7 @@ fn parse(text: &str) -> Result<(RigConfig, Script), String> {
     };
     let scenario = Scenario::parse(words(heading, scenario)?)?;
     let mut config = RigConfig::of(&scenario)?;
-    config.pace = if words(heading, pace)? == "paced" { Pace::Realtime } else { Pace::OnRequest };
+    config.pace = if words(heading, pace)? == "paced" { Pace::Realtime } else { Pace::Told };
     let (mut entries, mut at_ns) = (VecDeque::new(), 0);
     let first = heading.lines().count() + 2; // behind the line that ends the heading
     let lines: VecDeque<String> = body.lines().skip(1).map(Into::into).collect();

@@ -56,7 +56,7 @@ impl Case<'_> {
         for sight in self.sights {
             match &sight.seen {
                 Seen::Reset => clocks.push(u64::MAX),
-                Seen::Reported { event, .. } => {
+                Seen::Told { event, .. } => {
                     let offset = sight.at_ns.saturating_sub(event.time.0.saturating_mul(1000));
                     clocks.last_mut().into_iter().for_each(|least| *least = offset.min(*least));
                 }

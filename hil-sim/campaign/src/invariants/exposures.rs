@@ -43,7 +43,7 @@ pub fn exposure(case: &Case<'_>) -> Vec<Broken> {
                 taken.clear();
                 shots.clear();
             }
-            Seen::Reported { number, event, .. } => {
+            Seen::Told { number, event, .. } => {
                 let (record, deviation) = match &event.kind {
                     EventKind::ShotDone { shot, .. } => (shot, None),
                     EventKind::FrameTaken { shot, deviation, .. } => (shot, Some(deviation.0)),
@@ -89,7 +89,7 @@ fn is_excused(sights: &[Sight], shot: &Shot) -> bool {
     };
     sights.iter().filter(near).any(|sight| match &sight.seen {
         Seen::Reset | Seen::Powered(_) => true,
-        Seen::Reported { event, .. } => matches!(
+        Seen::Told { event, .. } => matches!(
             event.kind,
             EventKind::Failed { .. } | EventKind::FrameDropped { .. } | EventKind::Alarm(_)
         ),

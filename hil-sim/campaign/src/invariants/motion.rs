@@ -20,7 +20,7 @@ pub fn hard_stop(case: &Case<'_>) -> Vec<Broken> {
     let mut alarms = 0;
     for sight in case.sights {
         let truth = match &sight.seen {
-            Seen::Reported { event, truth, .. } => {
+            Seen::Told { event, truth, .. } => {
                 alarms += u64::from(matches!(event.kind, EventKind::Alarm(_)));
                 truth
             }
@@ -49,7 +49,7 @@ pub fn step_after_alarm(case: &Case<'_>) -> Vec<Broken> {
     let mut known = std::collections::BTreeSet::new();
     for sight in case.sights {
         match &sight.seen {
-            Seen::Reported { boot, event, .. } => match &event.kind {
+            Seen::Told { boot, event, .. } => match &event.kind {
                 EventKind::Alarm(record) if record.boot == *boot && known.insert(record.number) => {
                     let at_ns = clocks[life] + record.time.0 * 1000;
                     spans.push((at_ns.min(sight.at_ns), u64::MAX, record.number));
@@ -112,7 +112,7 @@ pub fn moves_unasked(case: &Case<'_>) -> Vec<Broken> {
             Seen::Answered { id, boot, answer, .. } if !matches!(**answer, Ok(Response::Accepted)) => {
                 close(&mut works, (*id, *boot), at_ns);
             }
-            Seen::Reported { boot, event, .. } => {
+            Seen::Told { boot, event, .. } => {
                 if let Some(request) = ended(&event.kind) {
                     close(&mut works, (request, *boot), at_ns + BRAKING_NS);
                 }

@@ -51,7 +51,7 @@ pub fn position(case: &Case<'_>) -> Vec<Broken> {
                 homed.extend(homes(&call.request).map(|axis| (*boot, axis.name())));
                 continue;
             }
-            Seen::Reported { event, truth, .. } => match &event.kind {
+            Seen::Told { event, truth, .. } => match &event.kind {
                 EventKind::MoveDone { axis, measured, .. } => {
                     off(case, *axis, measured.0, truth).map(|what| format!("a move is done, {what}"))
                 }

@@ -47,7 +47,7 @@ fn boots(case: &Case<'_>, lossy: bool) -> Vec<Broken> {
     for sight in case.sights {
         match &sight.seen {
             Seen::Reset | Seen::Powered(true) => resets += 1,
-            Seen::Reported { boot, event, .. } if matches!(event.kind, EventKind::Started { .. }) => {
+            Seen::Told { boot, event, .. } if matches!(event.kind, EventKind::Started { .. }) => {
                 // Told again, the same event has the same number; a new boot with an old number had no reset between.
                 let new = begun.insert((*boot, resets));
                 if new && *boot <= last && !lossy && !counters_lost {
@@ -65,7 +65,7 @@ fn boots(case: &Case<'_>, lossy: bool) -> Vec<Broken> {
 /// Whether the board told that a record was lost.
 fn loses(case: &Case<'_>, record: RecordName) -> bool {
     case.sights.iter().any(|sight| match &sight.seen {
-        Seen::Reported { event, .. } => {
+        Seen::Told { event, .. } => {
             matches!(&event.kind, EventKind::Alarm(told) if told.alarm == Alarm::RecordLost { record })
         }
         _ => false,
@@ -98,7 +98,7 @@ fn alarms(case: &Case<'_>) -> Vec<Broken> {
                     asked.insert((*boot, *id), number);
                 }
             }
-            Seen::Reported { event, .. } => match &event.kind {
+            Seen::Told { event, .. } => match &event.kind {
                 EventKind::Alarm(record) => {
                     latched.entry(record.number).or_insert((at_ns, *record));
                 }
@@ -145,7 +145,7 @@ fn settings(case: &Case<'_>) -> Vec<Broken> {
     let mut known: BTreeMap<SettingKey, Known> = BTreeMap::new();
     let mut asked: BTreeMap<(u32, u32), (SettingKey, Option<i32>)> = BTreeMap::new();
     let repaired = case.sights.iter().any(|sight| match &sight.seen {
-        Seen::Reported { event, .. } => {
+        Seen::Told { event, .. } => {
             matches!(event.kind, EventKind::RecordRepaired { record: RecordName::Settings, .. })
         }
         _ => false,

@@ -28,7 +28,7 @@ fn ends(case: &Case<'_>) -> Vec<Broken> {
     let mut ends: BTreeMap<(u32, u32), u32> = BTreeMap::new();
     let mut broken = Vec::new();
     for sight in case.sights {
-        let Seen::Reported { boot, event, number, .. } = &sight.seen else { continue };
+        let Seen::Told { boot, event, number, .. } = &sight.seen else { continue };
         let Some(request) = ended(&event.kind) else { continue };
         // The same event may be told again; another one with another number may not.
         let first = *ends.entry((*boot, request)).or_insert(*number);
@@ -90,7 +90,7 @@ fn exposures(case: &Case<'_>) -> Vec<Broken> {
                 runs.entry((*boot, *id)).or_insert(exposures);
             }
             Seen::Exposed(shot) if shot.id != FREE_RUNNING => taken += 1,
-            Seen::Reported { boot, number, event, .. } => {
+            Seen::Told { boot, number, event, .. } => {
                 if matches!(event.kind, EventKind::FrameDropped { reason: DropReason::NoStrobe, .. }) {
                     unseen.insert((*boot, *number));
                 }

@@ -23,7 +23,7 @@ fn asked(at_ms: u64, id: u32, request: Request) -> Sight {
 
 fn told(at_ms: u64, number: u32, kind: EventKind, truth: Truth) -> Sight {
     let event = Event { time: BoardMicros(at_ms * 1000), kind }.into();
-    Sight { at_ns: at_ms * MS, seen: Seen::Reported { number, boot: 1, event, truth } }
+    Sight { at_ns: at_ms * MS, seen: Seen::Told { number, boot: 1, event, truth } }
 }
 
 fn answered(at_ms: u64, id: u32, response: Response) -> Sight {
