@@ -327,7 +327,7 @@ impl DepthRequest {
     }
 
     /// Pixels per side that are averaged into one, and what there is to say of that.
-    fn bin_for(&self, optics: &Optics, doubts: &mut Vec<String>) -> usize {
+    fn bin_for(&self, optics: &Optics, doubts: &mut Vec<OpticsDoubt>) -> usize {
         let blur_px = optics.max_blur_px();
         let needed = (blur_px / USABLE_BLUR_PX).ceil().clamp(1.0, 16.0) as usize;
         if let Some(bin) = self.bin {
@@ -336,17 +336,9 @@ impl DepthRequest {
         if needed == 1 {
             return 1;
         }
-        let too_much =
-            format!("a largest blur of {blur_px:.1} px is more than the 2 to 4 px that can be used");
-        if optics.distortion().is_some() || optics.stage().is_some() || !self.may_bin() {
-            doubts
-                .push(format!("{too_much}: average {needed} x {needed} pixels of the images into one first"));
-            return 1;
-        }
-        doubts.push(format!(
-            "{too_much}: {needed} x {needed} pixels were averaged into one; bin 1 keeps all pixels"
-        ));
-        needed
+        let binned = optics.distortion().is_none() && optics.stage().is_none() && self.may_bin();
+        doubts.push(OpticsDoubt::TooMuchBlur { blur_px, bin: needed, binned });
+        if binned { needed } else { 1 }
     }
 
     /// Windows, filling and threads as the library takes them.

@@ -72,6 +72,14 @@ pub enum OpticsDoubt {
     Unusual(Doubt),
     /// No point spread function is given.
     NoPsf,
+    /// The largest blur is more than can be used.
+    TooMuchBlur {
+        blur_px: f64,
+        /// Side of the square of pixels to average into one.
+        bin: usize,
+        /// Whether they were averaged.
+        binned: bool,
+    },
 }
 
 impl fmt::Display for OpticsDoubt {
@@ -81,6 +89,13 @@ impl fmt::Display for OpticsDoubt {
             Self::NoPsf => f.write_str(
                 "the optics name no [psf]: a pill-box is assumed, which may be wrong by millimetres; calibrate psf finds it",
             ),
+            Self::TooMuchBlur { blur_px, bin, binned } => {
+                write!(f, "a largest blur of {blur_px:.1} px is more than the 2 to 4 px that can be used: ")?;
+                match binned {
+                    true => write!(f, "{bin} x {bin} pixels were averaged into one; bin 1 keeps all pixels"),
+                    false => write!(f, "average {bin} x {bin} pixels of the images into one first"),
+                }
+            }
         }
     }
 }

@@ -57,7 +57,8 @@ mod tests {
     }
 
     /// Options of `depth` that differ in Python, with the reason.
-    const DIFFERENT: [(&str, &str); 8] = [
+    const DIFFERENT: [(&str, &str); 9] = [
+        ("bin", "means of array blocks with numpy"),
         ("camera_frames", "Python corrects images with numpy before the call"),
         ("correction", "`Correction.apply` corrects the map"),
         ("out", "the map is returned"),
