@@ -118,9 +118,10 @@ fn message(error: &anyhow::Error) -> String {
 mod tests {
     use std::collections::{BTreeMap, BTreeSet};
 
-    use clap::CommandFactory;
+    use clap::{Args, CommandFactory};
 
     use super::*;
+    use crate::commands::rig::target::{CameraArguments, Target};
 
     /// Options of the command line only.
     const ONLY_HERE: [&str; 3] = ["json", "help", "version"];
@@ -128,6 +129,10 @@ mod tests {
     #[test]
     fn options_of_commands_are_the_fields_of_their_requests() {
         let command = Arguments::command();
+        let equipment = clap::Command::new("rig");
+        let equipment = CameraArguments::augment_args(Target::augment_args(equipment));
+        let equipment: BTreeSet<_> =
+            equipment.get_arguments().map(|option| option.get_id().to_string()).collect();
         for task in farnear_workflows::request::TASKS {
             let find = |command: &clap::Command, word: &str| command.find_subcommand(word).cloned();
             let found = task.name.split(' ').try_fold(command.clone(), |command, word| find(&command, word));
@@ -136,6 +141,7 @@ mod tests {
             let options: BTreeMap<_, _> = found
                 .get_arguments()
                 .filter(|option| !ONLY_HERE.contains(&option.get_id().as_str()))
+                .filter(|option| !equipment.contains(option.get_id().as_str()))
                 .map(|option| (option.get_id().to_string(), option))
                 .collect();
             let schema = (task.schema)();

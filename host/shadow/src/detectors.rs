@@ -15,6 +15,7 @@ pub mod large_region;
 pub mod physical;
 pub mod small_region;
 
+use std::fmt;
 use std::str::FromStr;
 
 pub use images::{Images, ImagesError};
@@ -98,6 +99,12 @@ impl Detector {
     "`{0}` is not a shadow detector; choose chromaticity, physical, geometry, small-region-texture or large-region-texture"
 )]
 pub struct UnknownMethod(pub String);
+
+impl fmt::Display for Method {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
 
 impl FromStr for Method {
     type Err = UnknownMethod;

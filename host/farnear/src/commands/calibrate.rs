@@ -1,11 +1,12 @@
 //! `farnear calibrate`: learns what the optics do from captured images and depth maps.
 
-mod camera;
-
 use anyhow::Result;
 use clap::{Args, Subcommand};
-use farnear_workflows::calibrate::{
-    correction::CalibrateCorrectionRequest, psf::CalibratePsfRequest, stack::CalibrateStackRequest,
+use farnear_workflows::{
+    calibrate::{
+        correction::CalibrateCorrectionRequest, psf::CalibratePsfRequest, stack::CalibrateStackRequest,
+    },
+    camera_frames::CalibrateCameraRequest,
 };
 
 use crate::run::Run;
@@ -25,7 +26,7 @@ enum What {
     Psf(Run<CalibratePsfRequest>),
     Correction(Run<CalibrateCorrectionRequest>),
     Stack(Run<CalibrateStackRequest>),
-    Camera(camera::Arguments),
+    Camera(Run<CalibrateCameraRequest>),
 }
 
 /// Runs the command.
@@ -34,6 +35,6 @@ pub fn run(arguments: Arguments) -> Result<()> {
         What::Psf(task) => task.run(),
         What::Correction(task) => task.run(),
         What::Stack(task) => task.run(),
-        What::Camera(arguments) => camera::run(arguments),
+        What::Camera(task) => task.run(),
     }
 }

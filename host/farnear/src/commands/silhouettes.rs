@@ -2,11 +2,12 @@
 
 mod bodies;
 mod markers;
-mod passages;
-mod video;
 
 use anyhow::Result;
 use clap::{Args, Subcommand};
+use farnear_workflows::silhouettes::{passages::PassagesRequest, video::SilhouettesVideoRequest};
+
+use crate::run::Run;
 
 /// Make silhouettes: masks of the person who moves in a video, or of a motion-capture recording from any view.
 #[derive(Args)]
@@ -21,8 +22,8 @@ enum Source {
     Skeletons(bodies::Skeletons),
     Synthetic(bodies::Synthetic),
     Markers(markers::Arguments),
-    Video(video::Arguments),
-    Passages(passages::Arguments),
+    Video(Run<SilhouettesVideoRequest>),
+    Passages(Run<PassagesRequest>),
 }
 
 /// Runs the command.
@@ -31,7 +32,7 @@ pub fn run(arguments: Arguments) -> Result<()> {
         Source::Skeletons(arguments) => bodies::skeletons(arguments),
         Source::Synthetic(arguments) => bodies::synthetic(arguments),
         Source::Markers(arguments) => markers::run(arguments),
-        Source::Video(arguments) => video::run(arguments),
-        Source::Passages(arguments) => passages::run(arguments),
+        Source::Video(task) => task.run(),
+        Source::Passages(task) => task.run(),
     }
 }

@@ -31,6 +31,17 @@ pub enum Learning {
     Never,
 }
 
+impl std::fmt::Display for Learning {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::OutsidePeople => f.write_str("outside-people"),
+            Self::Until(frames) => write!(f, "until:{frames}"),
+            Self::Always => f.write_str("always"),
+            Self::Never => f.write_str("never"),
+        }
+    }
+}
+
 impl std::str::FromStr for Learning {
     type Err = String;
 

@@ -8,7 +8,7 @@ use farnear_files::{
     video::{Video, VideoError},
 };
 use farnear_shadow::{CameraFile, Method};
-use farnear_silhouettes::{background, mask::extractor::Learning};
+use farnear_silhouettes::background;
 use serde::Serialize;
 
 use super::removal::{self, LightSource, RemovalFigures, RemovalSettings};
@@ -17,7 +17,7 @@ use crate::{
     error::{About, Result, WorkflowError},
     silhouettes::{
         frame_of,
-        video::{self, ShadowTreatment, VideoSettings},
+        video::{self, SilhouettesVideoRequest},
     },
     sun::Moment,
 };
@@ -71,17 +71,14 @@ pub fn remove_from_video(
     let file = settings.out.join("camera.toml");
     staging::write_file(&file, text.as_bytes())?;
     let (with, without) = (settings.out.join(WITH), settings.out.join(WITHOUT));
-    let masks = VideoSettings {
+    let masks = SilhouettesVideoRequest {
         video: settings.video.clone(),
         out: with.clone(),
         learn_first: true,
         learning_frames: 0,
         history_frames: background::Settings::default().history_frames,
-        learning: Learning::default(),
-        shadow: ShadowTreatment::Keep,
-        centred: false,
-        labels: None,
-        grey: false,
+        keep_shadow: true,
+        ..SilhouettesVideoRequest::default()
     };
     let made = video::extract(&masks, context)?;
     let removal = removal::remove_from_masks(

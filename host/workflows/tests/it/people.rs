@@ -9,7 +9,6 @@ use std::{
 
 use farnear_recognition::classifier::Family;
 use farnear_recognition::frames::Mode;
-use farnear_silhouettes::mask::extractor::Learning;
 use farnear_workflows::{
     Cancel, Context, Progress, Result, Unattended, WorkflowError,
     activity::{
@@ -20,7 +19,7 @@ use farnear_workflows::{
     silhouettes::{
         performances::Drawing,
         synthetic::{self, SyntheticSettings},
-        video::{self, ShadowTreatment, VideoSettings},
+        video::{self, SilhouettesVideoRequest},
     },
 };
 
@@ -161,17 +160,13 @@ fn a_video_is_not_begun_after_the_wish_to_stop() {
     let root = tempfile::tempdir().expect("a folder");
     let pictures = tempfile::tempdir().expect("a folder");
     fs::write(pictures.path().join("a.pgm"), b"P5 2 2 255\n\x00\x00\x00\x00").expect("a picture");
-    let settings = VideoSettings {
+    let settings = SilhouettesVideoRequest {
         video: pictures.path().into(),
         out: root.path().join("masks"),
-        learn_first: false,
         learning_frames: 0,
         history_frames: 10,
-        learning: Learning::default(),
-        shadow: ShadowTreatment::ByModel,
-        centred: false,
         labels: Some(root.path().join("labels")),
-        grey: false,
+        ..SilhouettesVideoRequest::default()
     };
     let listener = Listener::default();
     listener.cancel.cancel();

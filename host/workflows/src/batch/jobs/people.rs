@@ -3,8 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use farnear_files::staging::Staging;
+use farnear_shadow as shadow;
 use farnear_shadow::sun::{self, Place};
-use farnear_shadow::{self as shadow, detectors};
 use farnear_silhouettes::readers::recording::{Choices, Up};
 use farnear_silhouettes::silhouette::parts::Fill;
 use serde_json::Value;
@@ -18,43 +18,9 @@ use crate::{
     context::Context,
     error::Result,
     shadow::removal::{self, LightSource, RemovalSettings},
-    silhouettes::{
-        markers::{self, MarkersSettings},
-        video::{self, ShadowTreatment, VideoSettings},
-    },
+    silhouettes::markers::{self, MarkersSettings},
     sun::Moment,
 };
-
-pub(super) fn video(fields: &mut Fields) -> Result<Box<dyn Job>> {
-    let detector = fields.optional::<detectors::Method>("shadow_detector")?;
-    let settings = VideoSettings {
-        video: fields.path("video")?,
-        out: fields.path("out")?,
-        learn_first: fields.flag("learn_first")?,
-        learning_frames: fields.or("learning_frames", 10)?,
-        history_frames: fields.or("history_frames", 500)?,
-        learning: fields.optional("learning")?.unwrap_or_default(),
-        shadow: match (detector, fields.flag("keep_shadow")?) {
-            (Some(detector), true) => {
-                let reason = "keep_shadow excludes removing it; name one of them";
-                return Err(BatchError::field("shadow_detector", detector.name(), reason).into());
-            }
-            (Some(detector), false) => ShadowTreatment::Detector(detector),
-            (None, true) => ShadowTreatment::Keep,
-            (None, false) => ShadowTreatment::ByModel,
-        },
-        centred: fields.flag("centred")?,
-        labels: None,
-        grey: fields.flag("grey")?,
-    };
-    Ok(Box::new(Call {
-        inputs: vec![settings.video.clone()],
-        settings,
-        run: |settings, out, context| {
-            value(video::extract(&VideoSettings { out: out.into(), ..settings.clone() }, context)?)
-        },
-    }))
-}
 
 pub(super) fn markers(fields: &mut Fields) -> Result<Box<dyn Job>> {
     let template = fields.name_or_file("template")?.ok_or(BatchError::MissingField { name: "template" })?;
