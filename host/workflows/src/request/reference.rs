@@ -57,10 +57,11 @@ mod tests {
     }
 
     /// Options of `depth` that differ in Python, with the reason.
-    const DIFFERENT: [(&str, &str); 9] = [
+    const DIFFERENT: [(&str, &str); 10] = [
         ("bin", "means of array blocks with numpy"),
         ("camera_frames", "Python corrects images with numpy before the call"),
         ("correction", "`Correction.apply` corrects the map"),
+        ("grey", "an array has one channel"),
         ("out", "the map is returned"),
         ("psf", "part of `Optics`"),
         ("region", "slices of arrays"),

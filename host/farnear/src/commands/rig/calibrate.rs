@@ -20,6 +20,7 @@ pub struct Arguments {
 }
 
 #[derive(Subcommand)]
+#[expect(clippy::large_enum_variant, reason = "parsed once")]
 enum What {
     /// Measure the distance between a stage's two end switches. The stage is homed by it.
     #[command(after_help = "Example: farnear rig calibrate travel --port /dev/ttyACM0 --axis lens")]
@@ -46,7 +47,7 @@ enum What {
     /// stage is homed by it.
     #[command(after_help = "Example: farnear rig calibrate gauge --port /dev/ttyACM0 --json")]
     Gauge(Question),
-    Targets(Box<CameraRun<TargetSeriesRequest>>),
+    Targets(CameraRun<TargetSeriesRequest>),
     Fit(RigRun<FitRequest>),
 }
 
