@@ -28,7 +28,7 @@ use super::projection::{self, ImageShadow, ShadowError, Subject};
 use farnear_silhouettes::mask::Mask;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::{FRAC_PI_2, PI};
-use std::str::FromStr;
+use std::{fmt, str::FromStr};
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
@@ -38,6 +38,15 @@ pub enum Method {
     Hybrid,
     /// As in Li 2014.
     Thesis,
+}
+
+impl fmt::Display for Method {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Hybrid => "hybrid",
+            Self::Thesis => "thesis",
+        })
+    }
 }
 
 impl FromStr for Method {

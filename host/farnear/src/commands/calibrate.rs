@@ -1,7 +1,7 @@
 //! `farnear calibrate`: learns what the optics do from captured images and depth maps.
 
 use anyhow::Result;
-use clap::{Args, Subcommand};
+use clap::Subcommand;
 use farnear_workflows::{
     calibrate::{
         correction::CalibrateCorrectionRequest, psf::CalibratePsfRequest, stack::CalibrateStackRequest,
@@ -11,18 +11,8 @@ use farnear_workflows::{
 
 use crate::run::Run;
 
-/// Learn the point spread function, a correction of the lens's distortion, the camera's own frames, or a whole lens from a z-stack.
-#[derive(Args)]
-#[command(
-    after_help = "Example: farnear calibrate psf far.png near.png --optics optics.toml --model gaussian"
-)]
-pub struct Arguments {
-    #[command(subcommand)]
-    what: What,
-}
-
 #[derive(Subcommand)]
-enum What {
+pub enum What {
     Psf(Run<CalibratePsfRequest>),
     Correction(Run<CalibrateCorrectionRequest>),
     Stack(Run<CalibrateStackRequest>),
@@ -30,8 +20,8 @@ enum What {
 }
 
 /// Runs the command.
-pub fn run(arguments: Arguments) -> Result<()> {
-    match arguments.what {
+pub fn run(what: What) -> Result<()> {
+    match what {
         What::Psf(task) => task.run(),
         What::Correction(task) => task.run(),
         What::Stack(task) => task.run(),

@@ -1,6 +1,5 @@
 //! `farnear rig`: drives a rig, real or emulated.
 
-mod alarms;
 mod calibrate;
 mod log;
 mod motion;
@@ -12,7 +11,7 @@ use clap::{Args, Subcommand};
 use farnear_workflows::{
     Context,
     rig::{
-        AxisName, RigAddress, board, check::CheckRequest, continuous::ContinuousRequest,
+        AxisName, RigAddress, alarms, board, check::CheckRequest, continuous::ContinuousRequest,
         correct::BoardCorrectRequest, focus::FocusRequest, info, motion as moving, pair::CaptureRequest,
         sequence::SequenceRequest, sun::SunRequest,
     },
@@ -26,16 +25,8 @@ use crate::{
 };
 use target::Target;
 
-/// Drive a rig: home, move, focus, capture, calibrate, and everything else the board can do.
-#[derive(Args)]
-#[command(after_help = "Example: farnear rig capture --port sim --optics optics.toml --out pair1/")]
-pub struct Arguments {
-    #[command(subcommand)]
-    job: Job,
-}
-
 #[derive(Subcommand)]
-enum Job {
+pub enum Job {
     /// Print the board's identity, its limits and where it is.
     #[command(after_help = "Example: farnear rig info --port /dev/ttyACM0")]
     Info(Question),
@@ -58,11 +49,26 @@ enum Job {
     Capture(CameraRun<CaptureRequest>),
     Continuous(CameraRun<ContinuousRequest>),
     Sequence(CameraRun<SequenceRequest>),
-    Calibrate(calibrate::Arguments),
+    /// Measure the rig's mechanics, or drive a series of flat targets that teaches the depth correction.
+    #[command(
+        subcommand,
+        after_help = "Example: farnear rig calibrate backlash --port /dev/ttyACM0 --axis coarse"
+    )]
+    Calibrate(calibrate::What),
     Sun(RigRun<SunRequest>),
     Correct(RigRun<BoardCorrectRequest>),
-    Alarms(alarms::Arguments),
-    Settings(settings::Arguments),
+    /// List the last alarms, or clear the latched one by its number. While an alarm is latched nothing moves.
+    #[command(after_help = "Example: farnear rig alarms --port /dev/ttyACM0 --clear 3")]
+    Alarms {
+        #[command(flatten)]
+        question: Question,
+        /// Clear the latched alarm; refused while its cause is there.
+        #[arg(long, value_name = "NUMBER")]
+        clear: Option<u32>,
+    },
+    /// List, read or change the settings in the board's memory.
+    #[command(subcommand, after_help = "Example: farnear rig settings list --port /dev/ttyACM0")]
+    Settings(settings::Job),
     /// Print what the board has counted in its life.
     #[command(after_help = "Example: farnear rig counters --port /dev/ttyACM0 --json")]
     Counters(Question),
@@ -76,7 +82,7 @@ enum Job {
 // No doc comment: the help text is that of the command.
 #[allow(missing_docs)]
 #[derive(Args)]
-struct Question {
+pub struct Question {
     #[command(flatten)]
     target: Target,
     /// Print one JSON object.
@@ -94,8 +100,8 @@ impl Question {
 }
 
 /// Runs the command.
-pub fn run(arguments: Arguments) -> Result<()> {
-    match arguments.job {
+pub fn run(job: Job) -> Result<()> {
+    match job {
         Job::Info(question) => question.answer(info::info),
         Job::Home(arguments) => motion::home(arguments),
         Job::Move(arguments) => motion::go(arguments),
@@ -108,7 +114,9 @@ pub fn run(arguments: Arguments) -> Result<()> {
         Job::Calibrate(arguments) => calibrate::run(arguments),
         Job::Sun(task) => task.run(),
         Job::Correct(task) => task.run(),
-        Job::Alarms(arguments) => alarms::run(arguments),
+        Job::Alarms { question, clear } => {
+            question.answer(|rig, context| alarms::alarms(rig, clear, context))
+        }
         Job::Settings(arguments) => settings::run(arguments),
         Job::Counters(question) => question.answer(board::counters),
         Job::Reset(question) => question.answer(board::reset),

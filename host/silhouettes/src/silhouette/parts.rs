@@ -11,7 +11,7 @@ use super::view::{Canvas, View};
 use crate::mask::{Mask, bits::BitMask};
 use ndarray::s;
 use serde::{Deserialize, Serialize};
-use std::collections::HashMap;
+use std::{collections::HashMap, fmt, str::FromStr};
 
 /// Fill method of a part.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -21,6 +21,27 @@ pub enum Fill {
     Hull,
     /// All triplets, as in the thesis.
     Triplets,
+}
+
+impl fmt::Display for Fill {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Hull => "hull",
+            Self::Triplets => "triplets",
+        })
+    }
+}
+
+impl FromStr for Fill {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text {
+            "hull" => Ok(Self::Hull),
+            "triplets" => Ok(Self::Triplets),
+            other => Err(format!("`{other}` is not a fill: expected hull or triplets")),
+        }
+    }
 }
 
 /// A drawn frame.

@@ -16,7 +16,8 @@ use crate::{
     error::{Result, WorkflowError},
     focus_stack::FocusStackRequest,
     request::{Job, PathKind, Request, Task},
-    silhouettes::{passages::PassagesRequest, video::SilhouettesVideoRequest},
+    shadow::removal::ShadowRemoveRequest,
+    silhouettes::{markers::MarkersRequest, passages::PassagesRequest, video::SilhouettesVideoRequest},
 };
 
 pub(super) struct Kind {
@@ -33,8 +34,8 @@ const KINDS: &[Kind] = &[
     Kind::of::<CorrectRequest>(),
     Kind::of::<SilhouettesVideoRequest>(),
     Kind::of::<PassagesRequest>(),
-    Kind { name: "silhouettes-markers", makes_file: false, work: people::markers },
-    Kind { name: "shadow-remove", makes_file: false, work: people::shadow },
+    Kind::of::<MarkersRequest>(),
+    Kind::of::<ShadowRemoveRequest>(),
     Kind { name: "recognise", makes_file: false, work: people::recognise },
     Kind { name: "evaluate", makes_file: false, work: evaluate::work },
     Kind { name: "campaign", makes_file: false, work: campaign::work },

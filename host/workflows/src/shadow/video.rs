@@ -7,11 +7,11 @@ use farnear_files::{
     staging,
     video::{Video, VideoError},
 };
-use farnear_shadow::{CameraFile, Method};
+use farnear_shadow::CameraFile;
 use farnear_silhouettes::background;
 use serde::Serialize;
 
-use super::removal::{self, LightSource, RemovalFigures, RemovalSettings};
+use super::removal::{self, RemovalFigures, ShadowRemoveRequest};
 use crate::{
     context::Context,
     error::{About, Result, WorkflowError},
@@ -19,7 +19,6 @@ use crate::{
         frame_of,
         video::{self, SilhouettesVideoRequest},
     },
-    sun::Moment,
 };
 
 /// The folder of masks in which the shadow still is.
@@ -32,10 +31,12 @@ pub struct VideoShadowSettings {
     pub video: PathBuf,
     /// How the camera stands; the size of its pictures is the video's.
     pub camera: CameraFile,
-    /// Where, and when the video begins.
-    pub moment: Moment,
-    /// Frames per second, where the time is to pass.
-    pub rate_hz: Option<f64>,
+    /// Latitude in degrees, north positive.
+    pub lat: f64,
+    /// Longitude in degrees, east positive.
+    pub lon: f64,
+    /// Time of the video, RFC 3339.
+    pub time: String,
     pub out: PathBuf,
 }
 
@@ -82,13 +83,14 @@ pub fn remove_from_video(
     };
     let made = video::extract(&masks, context)?;
     let removal = removal::remove_from_masks(
-        &RemovalSettings {
+        &ShadowRemoveRequest {
             masks: with.clone(),
             camera: file,
-            light: LightSource::Sun { moment: settings.moment, rate_hz: settings.rate_hz },
-            method: Method::default(),
+            lat: Some(settings.lat),
+            lon: Some(settings.lon),
+            time: Some(settings.time.clone()),
             out: without,
-            stages: None,
+            ..ShadowRemoveRequest::default()
         },
         context,
     )?;

@@ -18,7 +18,7 @@ use farnear_workflows::{
     },
     silhouettes::{
         performances::Drawing,
-        synthetic::{self, SyntheticSettings},
+        synthetic::{self, SyntheticRequest},
         video::{self, SilhouettesVideoRequest},
     },
 };
@@ -67,8 +67,8 @@ impl Progress for Listener {
 }
 
 /// Three people at two activities, small.
-fn people(out: PathBuf) -> SyntheticSettings {
-    SyntheticSettings {
+fn people(out: PathBuf) -> SyntheticRequest {
+    SyntheticRequest {
         subjects: 3,
         activities: vec!["walk".into(), "dig".into()],
         rate_hz: 4.0,
@@ -179,12 +179,12 @@ fn parameters_that_cannot_be_are_refused_before_anything_is_done() {
     let settings = people(root.path().join("people"));
     let drawing = |views, mm_per_px| Drawing { views, mm_per_px, ..settings.drawing.clone() };
     for (wrong, expected) in [
-        (SyntheticSettings { subjects: 0, ..settings.clone() }, "subjects 0: expected 1 to 1000"),
-        (SyntheticSettings { rate_hz: 0.5, ..settings.clone() }, "frame rate 0.5: expected 1 to 240"),
-        (SyntheticSettings { drawing: drawing(73, 10.0), ..settings.clone() }, "views 73: expected 1 to 72"),
-        (SyntheticSettings { drawing: drawing(4, 0.0), ..settings.clone() }, "pixel size 0: expected 0.1"),
+        (SyntheticRequest { subjects: 0, ..settings.clone() }, "subjects 0: expected 1 to 1000"),
+        (SyntheticRequest { rate_hz: 0.5, ..settings.clone() }, "frame rate 0.5: expected 1 to 240"),
+        (SyntheticRequest { drawing: drawing(73, 10.0), ..settings.clone() }, "views 73: expected 1 to 72"),
+        (SyntheticRequest { drawing: drawing(4, 0.0), ..settings.clone() }, "pixel size 0: expected 0.1"),
         (
-            SyntheticSettings { activities: vec!["sing".into()], ..settings.clone() },
+            SyntheticRequest { activities: vec!["sing".into()], ..settings.clone() },
             "activity sing: expected walk",
         ),
     ] {

@@ -1,7 +1,7 @@
 //! `farnear rig calibrate`: the board measures its mechanics; a series of flat targets teaches the depth correction.
 
 use anyhow::{Result, bail};
-use clap::{Args, Subcommand};
+use clap::Subcommand;
 use farnear_protocol::message::{Axis, Routine};
 use farnear_workflows::rig::{correction_fit::FitRequest, mechanics, targets::TargetSeriesRequest};
 
@@ -11,17 +11,9 @@ use crate::{
     run::{CameraRun, RigRun},
 };
 
-/// Measure the rig's mechanics, or drive a series of flat targets that teaches the depth correction.
-#[derive(Args)]
-#[command(after_help = "Example: farnear rig calibrate backlash --port /dev/ttyACM0 --axis coarse")]
-pub struct Arguments {
-    #[command(subcommand)]
-    what: What,
-}
-
 #[derive(Subcommand)]
 #[expect(clippy::large_enum_variant, reason = "parsed once")]
-enum What {
+pub enum What {
     /// Measure the distance between a stage's two end switches. The stage is homed by it.
     #[command(after_help = "Example: farnear rig calibrate travel --port /dev/ttyACM0 --axis lens")]
     Travel {
@@ -52,11 +44,11 @@ enum What {
 }
 
 /// Runs the command.
-pub fn run(arguments: Arguments) -> Result<()> {
+pub fn run(what: What) -> Result<()> {
     let measure = |question: Question, routine| {
         question.answer(|rig, context| mechanics::measure(rig, routine, context))
     };
-    match arguments.what {
+    match what {
         What::Travel { axis, question } => measure(question, Routine::Travel { axis: stepper(axis)? }),
         What::Backlash { axis, question } => measure(question, Routine::Backlash { axis: stepper(axis)? }),
         What::Piezo(question) => measure(question, Routine::Piezo),
