@@ -173,7 +173,9 @@ mod tests {
             let options: BTreeMap<_, _> = found
                 .get_arguments()
                 .filter(|option| !ONLY_HERE.contains(&option.get_id().as_str()))
-                .filter(|option| !equipment.contains(option.get_id().as_str()))
+                .filter(|option| {
+                    !task.name.starts_with("rig ") || !equipment.contains(option.get_id().as_str())
+                })
                 .map(|option| (option.get_id().to_string(), option))
                 .collect();
             let schema = (task.schema)();

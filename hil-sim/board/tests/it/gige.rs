@@ -20,6 +20,8 @@ use crate::pty::{Program, capture};
 const PATIENCE: Duration = Duration::from_secs(600);
 /// Timeout before a packet is requested again.
 const GAP: Duration = Duration::from_millis(300);
+/// Frames of which a camera can send packets again.
+const FRAMES_RETAINED: usize = 8;
 const ACCESS_DENIED: u16 = 0x8006;
 
 struct Client {
@@ -134,6 +136,10 @@ impl Client {
         let mut bytes = [0; 2048];
         loop {
             assert!(Instant::now() < deadline, "no frame; begun are {:?}", self.begun.keys());
+            // The camera keeps few frames: packets of older ones cannot be sent again.
+            while self.begun.len() > FRAMES_RETAINED {
+                self.begun.pop_first();
+            }
             if let Some((&number, found)) = self.begun.first_key_value()
                 && found.are_all()
             {
@@ -295,7 +301,8 @@ fn every_free_running_client_of_a_paced_rig_gets_frames_immediately() {
         assert_eq!(client.write(ACQUISITION, START), 0);
         let begin = Instant::now();
         let frame = client.frame();
-        assert_eq!(frame.number, 1, "client {number}");
+        // Numbers restart for each client; a busy computer may lose the first frames.
+        assert!(frame.number < 50, "client {number}: {}", frame.number);
         // A picture takes a fraction of a second, hundreds of old ones a minute.
         assert!(begin.elapsed() < Duration::from_secs(20), "client {number} waited {:?}", begin.elapsed());
         // The rig goes on exposing while nobody reads, faster than it renders.

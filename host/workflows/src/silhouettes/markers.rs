@@ -274,6 +274,9 @@ pub fn draw(settings: &MarkersRequest, context: &Context<'_>) -> Result<MarkersF
     let warnings: Vec<String> =
         remarks(&recording).into_iter().map(|remark| format!("{name}: {remark}")).collect();
     warnings.iter().for_each(|warning| context.progress.warn(warning));
+    if !warnings.is_empty() {
+        context.info("--units and --up set the unit and the axis where a guess is wrong");
+    }
     let out = Staging::new_folder(&settings.out)?;
     let numbers = || (0..recording.frames.len()).step_by(settings.every);
     let frames: Vec<HashMap<&str, Point3>> = numbers().map(|n| recording.by_name(n)).collect();
