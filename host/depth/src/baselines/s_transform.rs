@@ -1,12 +1,11 @@
 //! Subbarao & Surya's S-transform method (STM), 1994.
 //!
-//! Where an image is a cubic polynomial, blur by any symmetric PSF of second moment `sigma^2` adds `sigma^2 / 4` times its
-//! Laplacian. So the same sharp image `f = g1 - (sigma1^2 / 4) lap(g1) = g2 - (sigma2^2 / 4) lap(g2)` gives
-//! `g1 - g2 = (sigma1^2 - sigma2^2) / 4 * lap(g)`, `lap(g)` the mean of the two Laplacians (equal for a cubic), solved by
-//! least squares over a window. To make the cubic hold, both images are smoothed first.
-//!
-//! Limits, by its nature: beyond the cubic the next term shrinks the result, by some percent at the ends of the range,
-//! and the division amplifies noise, since the Laplacian of a smoothed image is small. Cost: about 90 operations a pixel.
+//! Where an image is a cubic polynomial, blur by any symmetric PSF of second moment `sigma^2` adds `sigma^2 / 4` times
+//! its Laplacian. So the sharp image `f = g1 - (sigma1^2 / 4) lap(g1) = g2 - (sigma2^2 / 4) lap(g2)` gives `g1 - g2 =
+//! (sigma1^2 - sigma2^2) / 4 * lap(g)`, `lap(g)` the mean of the two Laplacians (equal for a cubic), solved by least
+//! squares over a window. Both images are smoothed first, so that the cubic holds. Limits: the next term shrinks the
+//! result by some percent at the ends of the range; division by the small Laplacian of a smoothed image amplifies
+//! noise. Cost: about 90 operations a pixel.
 
 use ndarray::{Array2, Zip};
 
@@ -40,7 +39,6 @@ pub(super) fn evidence(pair: &Pair, optics: &Optics, settings: &Settings) -> Evi
             if *texture > 0.0 {
                 let slope = cross / texture;
                 *alpha = scale * slope;
-                // Mean square of alpha about the window's.
                 *misfit = (scale * scale * (energy / texture - slope * slope)).max(0.0);
             }
         },

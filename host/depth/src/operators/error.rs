@@ -1,4 +1,4 @@
-//! Why operators could not be designed or read.
+//! Errors of operator design and stored operators.
 
 use super::{FORMAT, Family};
 use crate::kernel::KernelError;

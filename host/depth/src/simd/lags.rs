@@ -1,19 +1,17 @@
-//! Sums over a window's columns of the products of two rows at all horizontal lags, for the propagation of noise
-//! ([`crate::uncertainty`]). Plain loops along rows, which the compiler turns into vectors of the unit at hand.
-//!
-//! Cost per pixel and pair of rows: for each of the `2 w - 1` lags one product, up to `w - 1` additions and four
-//! multiply-adds.
+//! Window sums over columns of the products of two rows at all horizontal lags, for noise propagation
+//! ([`crate::uncertainty`]). Plain loops along rows, vectorised by the compiler. Cost per pixel and pair of rows: for
+//! each of the `2 w - 1` lags one product, up to `w - 1` additions and four multiply-adds.
 
 use super::dispatch;
 use super::lanes::Lanes;
 
-/// A horizontal lag and what its sum counts in each of the four results.
+/// A horizontal lag and its factors in the four results.
 pub(crate) type Lag = (isize, [f32; 4]);
 
 dispatch! {
-    /// For each lag the sums over those of `window` columns `i` for which `i + lag` is in the window too, of `upper[i]
-    /// lower[i + lag]`, times the lag's factors, are added to the four rows of `sums`. `upper` and `lower` are `window - 1`
-    /// longer than the sums, `work` is twice as long.
+    /// For each lag, adds to the four rows of `sums` the lag's factors times the sums of `upper[i] lower[i + lag]` over
+    /// those of `window` columns `i` with `i + lag` inside the window. `upper` and `lower` are `window - 1` longer than
+    /// the sums, `work` is twice as long.
     fn lagged_products(upper: &[f32], lower: &[f32], lags: &[Lag], window: usize, work: &mut [f32], sums: &mut [Vec<f32>; 4]) =
         lagged_generic
 }
