@@ -1,7 +1,5 @@
-//! The rig's numbers: each value that depends on the parts, with unit and reason.
-//!
-//! [`Settings::DEFAULT`] is the rig of `docs/rig.md`. [`Values`] are those that the host may change and the
-//! memory stores; [`Settings::with`] applies them.
+//! The rig's numbers: each value that depends on the parts, with unit and reason. [`Settings::DEFAULT`] is the rig of
+//! `docs/rig.md`. [`Values`] are those that the host may change and the memory stores; [`Settings::with`] applies them.
 
 mod table;
 
@@ -29,16 +27,13 @@ pub struct Settings {
     pub memory: bool,
 }
 
-/// Stepper, screw, encoder and switches.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct StepperSettings {
     pub min: Nanometres,
     pub max: Nanometres,
     /// STEP pulses/s.
     pub speed: u32,
-    /// STEP pulses/s.
     pub home_search_speed: u32,
-    /// STEP pulses/s.
     pub home_leave_speed: u32,
     /// Exact approach, STEP pulses/s.
     pub home_approach_speed: u32,
@@ -48,17 +43,12 @@ pub struct StepperSettings {
     pub acceleration: u32,
     /// STEP pulses/s3.
     pub jerk: u32,
-    /// STEP pulses/s2.
     pub home_acceleration: u32,
-    /// STEP pulses/s3.
     pub home_jerk: u32,
-    /// Longest search for the home switch.
     pub home_search: Nanometres,
-    /// Longest way out of the closed switch.
     pub home_leave: Nanometres,
     /// Distance from the opened switch to the start of the exact approach.
     pub home_clearance: Nanometres,
-    /// Longest exact approach.
     pub home_approach: Nanometres,
     /// Distance between closing and opening, by data sheet.
     pub home_hysteresis: Nanometres,
@@ -75,15 +65,13 @@ pub struct StepperSettings {
     pub settle_deadline: Micros,
     /// From enabling the driver to the first pulse.
     pub enable_delay: Micros,
-    /// Longest time without a finished segment.
     pub pulse_deadline: Micros,
 }
 
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct FineSettings {
-    /// Smallest position that the closed loop can hold.
+    /// Range of the closed loop.
     pub min: Nanometres,
-    /// Largest position that the closed loop can hold.
     pub max: Nanometres,
     /// Input shaper and control gains.
     pub gains: Gains,
@@ -94,7 +82,6 @@ pub struct FineSettings {
     pub dwell_min: Micros,
     /// Settling time from the start of the move, without dwell.
     pub settle_deadline: Micros,
-    /// Longest time without a plausible reading.
     pub gauge_deadline: Micros,
     /// Stroke per DAC code.
     pub gain_pm_per_code: u32,

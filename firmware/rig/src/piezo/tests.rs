@@ -6,7 +6,7 @@ use crate::piezo::plant::{NOMINAL, Part, Plant};
 use crate::settings::{Settings, Values};
 use farnear_protocol::message::SettingKey;
 
-/// Moves; returns the ticks until the plant stays within 50 nm, and its largest overshoot in nm.
+/// Returns the ticks until the plant stays within 50 nm, and its largest overshoot in nm.
 fn step(piezo: &mut Piezo, plant: &mut Plant, target: i32) -> (usize, f64) {
     let up = f64::from(target) > plant.at();
     piezo.go(Nanometres(target));

@@ -72,7 +72,7 @@ impl Rig {
         self.run(Some(Pace::new(period, exposures)), request, now)
     }
 
-    /// Runs the armed program; endless with a pace.
+    /// Endless with a pace.
     fn run(&mut self, pace: Option<Pace>, (request, silence): (u32, Micros), now: BoardMicros) -> Answer {
         self.may_move(silence)?;
         self.all_must_be_free()?;
@@ -89,7 +89,6 @@ impl Rig {
         Ok(Response::Accepted)
     }
 
-    /// Checks the first `count` shots for this number of rounds.
     pub(super) fn check_program(&self, count: u8, rounds: u8) -> Result<(), RequestError> {
         if count == 0 || usize::from(count) > SHOTS_MAX {
             return Err(RequestError::Shot { index: count, reason: ShotFault::Index });
