@@ -1,19 +1,15 @@
-//! Brown-out reset of the option bytes, which is off in a factory chip.
-//!
-//! Without it the chip runs outside its specification below 2.4 V with the memory enabled. Level 2 resets
-//! below 2.50 V (DS9405, table 22, typical): 0.5 V below the supply's detector, which leaves time to store an
-//! alarm.
-//!
-//! The firmware never programs the option bytes: programming erases their sector, and a supply failure then
-//! leaves read protection and PCROP on. Power-on with a bouncing plug is the worst time. See `docs/bring-up.md`
-//! for the debug probe.
+//! Brown-out reset of the option bytes, which is off in a factory chip. Without it the chip runs outside its
+//! specification below 2.4 V with the memory enabled. Level 2 resets below 2.50 V (DS9405, table 22, typical): 0.5 V
+//! below the supply's detector, which leaves time to store an alarm. The firmware never programs the option bytes:
+//! programming erases their sector, and a supply failure then leaves read protection and PCROP on. Power-on with a
+//! bouncing plug is the worst time. See `docs/bring-up.md` for the debug probe.
 
 use embassy_stm32::pac;
 
 /// Lowest sufficient level: BOR_LEV is 0 for level 3 and 1 for level 2 (RM0090, section 3.9.10).
 const LEVEL_2: u8 = 1;
 
-/// Whether it is on, at level 2 or 3.
+/// At level 2 or 3.
 pub fn has_brown_out_reset() -> bool {
     pac::FLASH.optcr().read().bor_lev() <= LEVEL_2
 }

@@ -1,7 +1,5 @@
 //! # farnear-count
-//!
-//! Counts the cycles of on-board routines with interrupts off. Built like the firmware for the emulated
-//! board, where an
+//! Counts the cycles of on-board routines with interrupts off. Built like the firmware for the emulated board, where an
 //! instruction takes one cycle; a real board adds flash wait states. `farnear-sim count` runs it and reads
 //! [`FARNEAR_COUNTS`].
 #![no_std]
@@ -125,7 +123,6 @@ fn fail() -> ! {
     }
 }
 
-/// Discards embassy's log.
 #[defmt::global_logger]
 struct Silence;
 

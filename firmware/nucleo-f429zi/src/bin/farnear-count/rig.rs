@@ -59,7 +59,7 @@ fn identity() -> Identity {
     }
 }
 
-/// Memory writes are not counted.
+/// Without memory writes.
 const WITHOUT_MEMORY: Settings = Settings { memory: false, ..Settings::DEFAULT };
 
 pub fn tick_at_rest() -> u32 {
@@ -155,7 +155,6 @@ impl Piezo {
     }
 }
 
-/// A rig with ideal hardware.
 struct Bench {
     rig: Rig,
     now: u64,
