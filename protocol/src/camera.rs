@@ -31,7 +31,7 @@ pub struct FrameHeader {
 }
 
 impl FrameHeader {
-    /// Serialises the header.
+    /// Header as bytes.
     pub fn to_bytes(&self) -> [u8; FRAME_HEADER] {
         let mut bytes = [0; FRAME_HEADER];
         bytes[0..4].copy_from_slice(&self.shot_id.to_le_bytes());

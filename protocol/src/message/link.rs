@@ -5,8 +5,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::units::Micros;
 
-/// Trial time of a new rate: without a valid request the board returns to the old one. Longer than four
-/// attempts of a host, 50 ms each.
+/// Trial time of a new rate: without a valid request the board returns to the old one. Longer than four attempts of a
+/// host, 50 ms each.
 pub const LINK_TRIAL: Micros = Micros(300_000);
 
 /// A link rate, 8N1. Each reset starts with [`LinkRate::START`].
