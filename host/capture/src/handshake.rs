@@ -10,18 +10,18 @@ use farnear_protocol::{
 
 use crate::{error::ClientError, link::Link, timing::Timing};
 
-/// Timeouts of hello, 3 s in total: the board may be starting, and may be emulated. The link's other rates
-/// are tried in between, because an earlier host may have changed it.
+/// Timeouts of hello, 3 s in total: the board may be starting, and may be emulated. The link's other rates are tried in
+/// between, because an earlier host may have changed it.
 const FIRST_MS: [u64; 4] = [50, 100, 200, 400];
 const OTHER_RATE_MS: [u64; 2] = [50, 50];
 const LAST_MS: [u64; 2] = [800, 1500];
 const DURING: &str = "asking the board who it is";
-/// Fixed session of an emulated board: a random one would change the run. Successive programs differ by their
-/// request ids.
+/// Fixed session of an emulated board: a random one would change the run. Successive programs differ by their request
+/// ids.
 const EMULATED_SESSION: u32 = 0x5eed_0001;
 
-/// Drains the line, identifies the board and selects a version. A known emulated board gets its long timeout:
-/// a repeated hello would change the run.
+/// Drains the line, identifies the board and selects a version. A known emulated board gets its long timeout: a
+/// repeated hello would change the run.
 pub(crate) fn shake_hands(link: &mut Link, known_emulated: bool) -> Result<(Hello, u8), ClientError> {
     link.drain(DURING)?;
     let millis = |waits: &[u64]| waits.iter().map(|ms| Duration::from_millis(*ms)).collect::<Vec<_>>();
@@ -62,7 +62,6 @@ fn say_hello(
     Err(silent.unwrap_or_else(|| ClientError::Nonsense { during: DURING.into(), answer: "no rate".into() }))
 }
 
-/// The earlier and the present failure.
 fn both(before: Option<ClientError>, now: ClientError) -> ClientError {
     match (before, now) {
         (
@@ -137,8 +136,8 @@ fn read_answer(packet: &Packet) -> Result<Hello, ClientError> {
     }
 }
 
-/// The newest common version. The schema key applies to the board's newest version, so it is compared only if
-/// equal to this program's.
+/// The newest common version. The schema key applies to the board's newest version, so it is compared only if equal to
+/// this program's.
 fn agree(hello: &Hello) -> Result<u8, ClientError> {
     let version = hello.protocol_current.min(PROTOCOL_CURRENT);
     if version < hello.protocol_min || version < PROTOCOL_MIN {

@@ -23,8 +23,8 @@ impl Client {
         self.expect_accepted(&Request::Stop, "stopping")
     }
 
-    /// Waits until all axes are at rest: steppers brake along their ramps after a stop.
-    /// Errors: [`ClientError`]; [`ClientError::Overdue`] after longer than any ramp.
+    /// Waits until all axes are at rest: steppers brake along their ramps after a stop. Returns
+    /// [`ClientError::Overdue`] after longer than any ramp.
     pub fn wait_until_it_stands(&self) -> Result<(), ClientError> {
         let allowed = self.timing().allowance(BRAKING);
         let until = std::time::Instant::now() + allowed;
@@ -40,20 +40,20 @@ impl Client {
         }
     }
 
-    /// Switches both light outputs for `time`, at most 60 s. They go off earlier after `Client::keep_alive` without a request.
+    /// Switches both light outputs for `time`, at most 60 s. They go off earlier after `Client::keep_alive` without a
+    /// request.
     pub fn set_lights(&self, levels: LightLevels, time: Micros) -> Result<(), ClientError> {
         let request = Request::SetLights { levels, time, silence: self.keep_alive() };
         self.expect_accepted(&request, "switching the light")
     }
 
-    /// Emergency stop: the last step comes within a millisecond, moving axes lose their position, and an
-    /// alarm is latched.
+    /// Emergency stop: the last step comes within a millisecond, moving axes lose their position, and an alarm is
+    /// latched.
     pub fn halt(&self) -> Result<(), ClientError> {
         self.expect_accepted(&Request::Halt, "halting")
     }
 
-    /// Resets the board and says hello again.
-    /// Errors: [`ClientError`]; [`ClientError::Overdue`] if it does not return.
+    /// Resets the board and says hello again. Returns [`ClientError::Overdue`] if it does not return.
     pub fn reboot(&mut self) -> Result<(), ClientError> {
         let before = self.hello().boot;
         match self.expect_accepted(&Request::Reboot, "rebooting") {
@@ -74,8 +74,7 @@ impl Client {
         }
     }
 
-    /// The alarm with this number; 0 = the last.
-    /// Errors: [`ClientError`]; `NoSuchAlarm` if it is not stored.
+    /// 0 = the last alarm.
     pub fn alarm(&self, number: u32) -> Result<AlarmRecord, ClientError> {
         let during = "reading an alarm";
         match self.request(&Request::ReadAlarm { number }, during)? {
@@ -105,8 +104,7 @@ impl Client {
         }
     }
 
-    /// Clears the latched alarm with this number.
-    /// Errors: [`ClientError`]; refused while its cause persists.
+    /// Rejected while its cause persists.
     pub fn clear_alarm(&self, number: u32) -> Result<(), ClientError> {
         self.expect_accepted(&Request::ClearAlarm { number }, &format!("clearing alarm {number}"))
     }
@@ -115,8 +113,7 @@ impl Client {
         self.setting_by(&Request::ReadSetting { key }, &format!("reading {}", key.name()))
     }
 
-    /// Changes a setting permanently. [`Client::reopen`] updates limits derived from it.
-    /// Errors: [`ClientError`]; refused out of range and during motion.
+    /// Permanent. [`Client::reopen`] updates limits derived from it. Rejected out of range and during motion.
     pub fn set_setting(&self, key: SettingKey, value: i32) -> Result<Setting, ClientError> {
         self.paces().clear();
         let during = format!("setting {} to {value}", key.name());
@@ -138,8 +135,7 @@ impl Client {
         }
     }
 
-    /// Sun and shadow calculated by the board.
-    /// Errors: [`ClientError`]; refused while a stepper moves.
+    /// Calculated by the board. Rejected while a stepper moves.
     pub fn sun(&self, query: &SunQuery) -> Result<SunAnswer, ClientError> {
         let during = "asking for the sun";
         match self.request(&Request::Sun(*query), during)? {

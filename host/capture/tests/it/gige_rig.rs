@@ -1,5 +1,5 @@
-//! GigE Vision end to end: the emulated board triggers, the camera answers through Aravis, and frames are
-//! compared with the rig's TCP endpoint.
+//! GigE Vision end to end: the emulated board triggers, the camera answers through Aravis, and frames are compared with
+//! the rig's TCP endpoint.
 
 use std::{
     io::{BufRead, BufReader},

@@ -40,14 +40,12 @@ pub fn connect(faults: Faults) -> (Client, Peer) {
     (client, peer)
 }
 
-/// Connection error with these faults and this change.
 pub fn connect_error(faults: Faults, change: impl FnOnce(&mut Board)) -> ClientError {
     let peer = Peer::new(faults);
     change(&mut peer.board());
     Client::connect(peer.connect(), "scripted").err().unwrap()
 }
 
-/// Arms and runs a program; `on_shot` receives each exposure.
 pub fn run_shots(
     client: &Client,
     shots: &[Shot],

@@ -62,7 +62,6 @@ pub struct V4lCamera {
 
 impl V4lCamera {
     /// Opens e.g. `/dev/video0` with its best format at the driver's size.
-    /// Errors: [`CameraError::Unusable`] with a remedy.
     pub fn open(path: &Path) -> Result<Self, CameraError> {
         check_path(path)?;
         let failed = |error: io::Error| refused(path, &error);
@@ -133,7 +132,7 @@ impl V4lCamera {
         Ok(())
     }
 
-    /// The next frame; `None` at the timeout.
+    /// `None` at the timeout.
     fn take(&mut self, wait: Duration) -> Result<Option<Frame>, CameraError> {
         let Some(stream) = &mut self.stream else { return Ok(None) };
         let failed = |error: io::Error| refused(&self.path, &error);
@@ -174,7 +173,6 @@ impl V4lCamera {
         Some((known.swap_remove(at), steps))
     }
 
-    /// The driver's controls; empty if one has a type on which the bindings panic.
     fn descriptions(&self) -> Vec<control::Description> {
         let device = std::panic::AssertUnwindSafe(&self.device);
         catch_unwind(|| device.query_controls()).ok().and_then(Result::ok).unwrap_or_default()
