@@ -114,7 +114,6 @@ impl Board {
         }
     }
 
-    /// Raises and latches an alarm.
     pub fn raise(&mut self, alarm: Alarm) -> u32 {
         let number = self.alarms.len() as u32 + 1;
         let record = AlarmRecord { number, boot: self.hello.boot, time: BoardMicros(self.time), alarm };
