@@ -4,7 +4,6 @@ use ndarray::{Array2, Zip};
 
 use crate::{camera::Image, expose::CaptureError};
 
-/// Bit limit of image files.
 const BITS_MAX: u32 = 16;
 
 #[derive(Clone, PartialEq, Debug)]
@@ -50,8 +49,8 @@ impl Average {
         Ok(())
     }
 
-    /// The mean, with one more bit per doubling up to 16; black and white keep their meaning. A single image is
-    /// returned unchanged.
+    /// The mean, with one more bit per doubling up to 16; black and white keep their meaning. One image stays
+    /// unchanged.
     pub fn finish(self) -> Image {
         if self.count == 1 {
             return self.first;

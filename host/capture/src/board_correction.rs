@@ -1,5 +1,5 @@
-//! Depth correction on the board: sends a correction and rows of a depth map, or flat targets for a fit on the board.
-//! Rows travel in pieces of [`CODES_MAX`] codes. A row of 640 pixels takes 19 requests, some 25 ms.
+//! Depth correction on the board: sends a correction and rows of a depth map, or flat targets for a fit on the board. A
+//! row of 640 pixels takes 19 requests of [`CODES_MAX`] codes, some 25 ms.
 
 use farnear_depth::corrections::{BoardCorrection, BoardForm, CorrectionError, Method};
 use farnear_maths::clsf::{DepthScale, Frame};
@@ -60,7 +60,7 @@ pub fn decode(codes: ArrayView2<i16>, scale: DepthScale) -> Array2<f32> {
 }
 
 impl Client {
-    /// Also opens it on the board.
+    /// Sends a correction and opens it on the board.
     pub fn send_correction(&self, correction: &BoardCorrection) -> Result<(), BoardCorrectionError> {
         let BoardCorrection { method, frame, scale, coefficients, .. } = correction;
         let during = "sending a depth correction";
@@ -95,7 +95,7 @@ impl Client {
         self.expect_accepted(&Request::StoreCorrection, "storing the depth correction")
     }
 
-    /// `progress` is called per row.
+    /// Corrects coded depths on the board; calls `progress` per row.
     pub fn correct_codes(
         &self,
         codes: ArrayView2<i16>,
@@ -128,8 +128,8 @@ impl Client {
         Ok(corrected)
     }
 
-    /// Fits a correction to every `step`th pixel and row of flat targets. Opens it on the board and returns its
-    /// coefficients; calls `progress` per row of each target.
+    /// Fits a correction to every `step`th pixel and row, opens it and returns its coefficients; calls `progress` per
+    /// row.
     pub fn fit_correction(
         &self,
         method: Method,

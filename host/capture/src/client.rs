@@ -28,11 +28,9 @@ use crate::{
     transport::{Place, Transport, with_rate},
 };
 
-/// Polling interval for interruptions while waiting for an answer.
 const INTERRUPT_POLL: Duration = Duration::from_millis(25);
 /// Time to wait for an answer after an interruption.
 const ANSWER_GRACE: Duration = Duration::from_millis(150);
-/// Retry interval for a restarting board.
 const NEXT_ATTEMPT: Duration = Duration::from_millis(50);
 
 #[derive(Clone)]
@@ -44,7 +42,7 @@ pub struct Client {
     light: Option<LightLevels>,
 }
 
-/// Its thread ends with the last handle.
+/// Channel to the port's thread, which ends with the last handle.
 struct Port {
     name: String,
     timing: Arc<Mutex<Timing>>,
@@ -72,8 +70,7 @@ impl Client {
         Self::start(serial(port), port, false, wanted)
     }
 
-    /// As [`Client::open`] for an emulated board: hello has the long timeout, because a repeat on a slow computer would
-    /// change the run.
+    /// As [`Client::open`] for an emulated board: hello has a long timeout, because a repeat would change the run.
     pub fn open_emulated(port: &str) -> Result<Self, ClientError> {
         Self::start(serial(port), port, true, None)
     }
@@ -116,8 +113,8 @@ impl Client {
         Ok(Self { port: Arc::new(port), session, interrupt: None, light: None })
     }
 
-    /// Light of every shot of this handle's programs during the exposure, if any. The board rejects it for shots that
-    /// it does not trigger.
+    /// Light of every shot of this handle's programs during the exposure; the board rejects it for shots it does not
+    /// trigger.
     pub fn set_light(&mut self, light: Option<LightLevels>) {
         self.light = light;
     }
@@ -126,8 +123,8 @@ impl Client {
         self.light
     }
 
-    /// Continues after a reset or unplugging; says hello if necessary. Axes are at rest and not homed. May be repeated
-    /// while the board is absent.
+    /// Continues after a reset or unplugging. Axes are at rest and not homed. May be repeated while the board is
+    /// absent.
     pub fn reopen(&mut self) -> Result<(), ClientError> {
         let (answer, joined) = sync_channel(1);
         self.command(Command::Join { known: self.session.number, answer }, "saying hello")?;
@@ -148,7 +145,7 @@ impl Client {
         }
     }
 
-    /// Cleared if they may have changed.
+    /// Cached speeds of the axes; cleared if they may have changed.
     pub(crate) fn paces(&self) -> MutexGuard<'_, Vec<(Axis, Pace)>> {
         self.port.paces.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -194,7 +191,6 @@ impl Client {
         (named != has).then(|| format!("the board that was on {named} has come back on {has}"))
     }
 
-    /// Port name as first opened.
     pub fn port(&self) -> &str {
         &self.port.name
     }
@@ -203,7 +199,7 @@ impl Client {
         *self.port.timing.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// For all handles; for tests or unusual lines.
+    /// Sets the timeouts of all handles, for tests or unusual lines.
     pub fn set_timing(&self, timing: Timing) {
         *self.port.timing.lock().unwrap_or_else(PoisonError::into_inner) = timing;
     }
@@ -250,7 +246,6 @@ impl Client {
                 Err(RecvTimeoutError::Disconnected) => return Err(self.ended(during)),
                 Err(RecvTimeoutError::Timeout) if stopping || !self.interrupted() => {}
                 Err(RecvTimeoutError::Timeout) => {
-                    // Work accepted later has no listener and is stopped by the port's owner.
                     if interrupted.get_or_insert_with(Instant::now).elapsed() >= ANSWER_GRACE {
                         return Err(ClientError::Interrupted { during: during.into() });
                     }

@@ -68,7 +68,7 @@ enum Reported {
     Dropped { number: u32, loss: Loss },
 }
 
-/// A continuous run; dropping it stops the rig. Unread images wait in the camera. If [`Self::outcome`] is called less
+/// A continuous run; dropping it stops the rig. Unread images wait in the camera; if [`Self::outcome`] is called less
 /// than once a period, some are lost and reported.
 pub struct Continuous<'c> {
     client: Client,
@@ -111,8 +111,7 @@ impl<'c> Continuous<'c> {
         Ok(self.reported.len())
     }
 
-    /// Result of the next frame; `None` after the last. Frames come in order without gaps. An error stops the rig and
-    /// ends the run.
+    /// Result of the next frame, in order without gaps; `None` after the last. An error stops the rig and ends the run.
     pub fn outcome(&mut self) -> Result<Option<Outcome>, CaptureError> {
         let outcome = self.try_outcome();
         if outcome.is_err() {
@@ -214,7 +213,6 @@ impl Drop for Continuous<'_> {
 /// Groups frames into cycles, e.g. far/near pairs; incomplete cycles are dropped.
 #[derive(Clone, Debug)]
 pub struct Cycles {
-    /// Program index and repeat of each exposure of a cycle.
     places: Vec<(u8, u16)>,
     taken: Vec<Frame>,
     broken: u32,
@@ -226,7 +224,7 @@ impl Cycles {
         Self { places: places.collect(), taken: Vec::new(), broken: 0 }
     }
 
-    /// Returns the cycle that it completes.
+    /// Adds a frame; returns the cycle that it completes.
     pub fn push(&mut self, frame: Frame) -> Option<Vec<Frame>> {
         let place = (frame.record.index, frame.record.repeat);
         if self.places.get(self.taken.len()) != Some(&place) {

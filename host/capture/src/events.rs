@@ -16,7 +16,6 @@ const AHEAD_MAX: u32 = 4096;
 #[derive(Default)]
 pub(crate) struct Events {
     pub boot: u32,
-    /// Number of the next event to deliver.
     pub due: u32,
     /// Arrived, not delivered.
     pub arrived: BTreeMap<u32, Event>,

@@ -15,7 +15,6 @@ use crate::{
     work::{Step, wrong_end},
 };
 
-/// Polling interval for interruptions while waiting for an image.
 const SLICE: Duration = Duration::from_millis(50);
 
 #[derive(Debug, thiserror::Error)]
@@ -26,7 +25,6 @@ pub enum CaptureError {
     Plan(#[from] PlanError),
     #[error(transparent)]
     Camera(#[from] CameraError),
-    /// One of several simultaneous cameras failed.
     #[error("camera {number} of {cameras}: {source}")]
     OneCamera { number: usize, cameras: usize, source: CameraError },
     #[error(
@@ -42,15 +40,14 @@ pub enum CaptureError {
     },
     #[error("the board reported {told} exposures, {asked} were requested")]
     Count { told: usize, asked: usize },
-    /// Shots with different trigger modes, which no camera supports.
     #[error(
         "shot {index} is triggered by {found}, the ones before by {first}; a program's shots must have one trigger"
     )]
     MixedTriggers { index: usize, found: &'static str, first: &'static str },
 }
 
-/// Runs a program; passes each exposure with its image to `on_image`, whose error stops the rig. Waits for each image
-/// at most `image_wait`.
+/// Runs a program; passes each exposure with its image to `on_image`, whose error stops the rig. Waits `image_wait` per
+/// image.
 pub fn expose<E: From<CaptureError> + From<ClientError>>(
     client: &Client,
     camera: &mut dyn Camera,
@@ -188,7 +185,7 @@ pub(crate) fn one_trigger(shots: &[Shot]) -> Result<(TriggerMode, Micros), Captu
     }
 }
 
-/// By encoders and gauge, mm.
+/// Sensor distance by encoders and gauge, mm.
 pub fn sensor_mm(record: &ShotRecord, limits: &Limits) -> f64 {
     sensor_distance_nm(limits.datum, |axis| record.measured(axis)) as f64 / 1e6
 }

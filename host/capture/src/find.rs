@@ -11,13 +11,13 @@ const ST: u16 = 0x0483;
 /// ST-LINKs with a serial port: V2-1 and V3, with and without disk and second port.
 const ST_LINKS: [u16; 7] = [0x374b, 0x374e, 0x374f, 0x3752, 0x3753, 0x3754, 0x3757];
 
-/// The port of the only ST-LINK (on every NUCLEO). Sends nothing, because other instruments would receive it. Returns
-/// [`PortError::NoBoard`], or [`PortError::SeveralBoards`] if ambiguous.
+/// The port of the only ST-LINK (on every NUCLEO). Sends nothing, because other instruments would receive it. Fails if
+/// there is none or several.
 pub fn board_port() -> Result<String, PortError> {
     only(&present())
 }
 
-/// Empty if unknown.
+/// Serial ports of this computer; empty if unknown.
 pub(crate) fn present() -> Vec<SerialPortInfo> {
     // On Linux the listing panics without this folder, as in some containers.
     if cfg!(target_os = "linux") && !Path::new("/sys/class/tty").is_dir() {

@@ -66,9 +66,8 @@ impl Default for FocusSettings {
 pub struct Focus {
     /// Sensor distance of best focus, where the sensor is now.
     pub sensor_mm: f64,
-    /// By encoder.
+    /// By encoder; `fine` by gauge.
     pub coarse: Nanometres,
-    /// By gauge.
     pub fine: Nanometres,
     pub places: usize,
     pub exposures: usize,
@@ -108,8 +107,7 @@ impl From<ClientError> for FocusSearchError {
     }
 }
 
-/// Leaves the sensor at the best focus near the present position. Both axes of stage A must be homed. `say` receives
-/// progress messages.
+/// Leaves the sensor at the best focus near its position. Both axes of stage A must be homed. `say` receives progress.
 pub fn find_focus(
     client: &Client,
     camera: &mut dyn Camera,
@@ -194,7 +192,6 @@ impl Search<'_> {
         }
     }
 
-    /// A shot with a wide settle tolerance.
     fn look(&self, axis: Axis, target: i32) -> Shot {
         self.shot(axis, target, Settle::of_search(axis))
     }
@@ -213,8 +210,8 @@ impl Search<'_> {
         Ok(taken)
     }
 
-    /// Moves the stepper until the focus is in the middle of the piezo's range. Returns the estimate and the number of
-    /// positions.
+    /// Moves the stepper until the focus is in the middle of the piezo's range. Returns the estimate and the positions
+    /// used.
     fn coarse(&mut self, start: f64, say: &mut dyn FnMut(&str)) -> Result<(f64, usize), FocusSearchError> {
         let reach = self.settings.range_mm * 1e6;
         let mut goal = None;

@@ -14,7 +14,7 @@ use crate::{
 };
 
 /// Takes a pair with one exposure (or several, averaged) at the far position: far image by the first camera, near image
-/// by the second, whose sensor is `further_mm` further away. `say` receives progress messages.
+/// by the second, whose sensor is `further_mm` further away.
 pub fn capture_behind_mirror(
     client: &Client,
     cameras: [&mut dyn Camera; 2],

@@ -20,8 +20,8 @@ const DURING: &str = "asking the board who it is";
 /// ids.
 const EMULATED_SESSION: u32 = 0x5eed_0001;
 
-/// Drains the line, identifies the board and selects a version. A known emulated board gets its long timeout: a
-/// repeated hello would change the run.
+/// Drains the line, identifies the board and selects a version. A repeated hello would change an emulated board's run,
+/// so that board gets its long timeout.
 pub(crate) fn shake_hands(link: &mut Link, known_emulated: bool) -> Result<(Hello, u8), ClientError> {
     link.drain(DURING)?;
     let millis = |waits: &[u64]| waits.iter().map(|ms| Duration::from_millis(*ms)).collect::<Vec<_>>();
@@ -103,7 +103,6 @@ pub(crate) fn open_session(link: &mut Link, (hello, version): (&Hello, u8)) -> R
     })
 }
 
-/// Unique session number; 0 is reserved.
 fn random_session() -> u32 {
     // Fallback without system random numbers: process id and time.
     let chance = getrandom::u32().unwrap_or_else(|_| {
@@ -136,8 +135,7 @@ fn read_answer(packet: &Packet) -> Result<Hello, ClientError> {
     }
 }
 
-/// The newest common version. The schema key applies to the board's newest version, so it is compared only if equal to
-/// this program's.
+/// The newest common version. The schema key is compared only if the board's newest version equals this program's.
 fn agree(hello: &Hello) -> Result<u8, ClientError> {
     let version = hello.protocol_current.min(PROTOCOL_CURRENT);
     if version < hello.protocol_min || version < PROTOCOL_MIN {

@@ -19,7 +19,6 @@ use crate::{error::ClientError, owner::nothing, transport::Transport};
 const QUIET: Duration = Duration::from_millis(5);
 /// Longest wait for silence.
 const QUIET_AT_MOST: Duration = Duration::from_millis(500);
-/// Shortest timeout for writing a frame.
 const SEND_AT_LEAST: Duration = Duration::from_millis(20);
 
 /// Drops input until the line is silent, or the timeout.
@@ -71,13 +70,12 @@ impl Link {
         }
     }
 
-    /// The ids follow the last one seen by the board.
+    /// Starts a session; ids follow the last one seen by the board.
     pub(crate) fn begin_session(&mut self, number: u32, last_id: u32) {
         self.session = number;
         self.next_id = last_id.wrapping_add(1);
     }
 
-    /// The next request reuses the last id.
     pub(crate) fn reuse_id(&mut self) {
         self.next_id = self.next_id.wrapping_sub(1).max(1);
     }

@@ -15,7 +15,7 @@ pub struct LogPart {
     pub bytes: Vec<u8>,
 }
 
-/// Ends with the last [`crate::Client`], or when the reader is thousands of items late.
+/// Stream of [`LogPart`]s. Ends with the last [`crate::Client`], or when the reader is thousands of items late.
 pub struct LogStream {
     parts: Receiver<LogPart>,
 }
@@ -26,7 +26,7 @@ impl LogStream {
         (sender, Self { parts })
     }
 
-    /// Waits at most `wait`; `Ok(None)` at the timeout.
+    /// The next part; `Ok(None)` after `wait`.
     pub fn next_within(&self, wait: Duration) -> Result<Option<LogPart>, LogEnded> {
         match self.parts.recv_timeout(wait) {
             Ok(part) => Ok(Some(part)),
@@ -52,7 +52,7 @@ impl Readers {
         self.0.is_empty()
     }
 
-    /// Closed or late readers are removed.
+    /// Sends to all readers; removes closed and late ones.
     pub(crate) fn tell(&mut self, part: &LogPart) {
         self.0.retain(|reader| match reader.try_send(part.clone()) {
             Ok(()) => true,

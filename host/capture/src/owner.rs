@@ -70,7 +70,6 @@ pub(crate) struct Question {
     pub listener: Option<Listener>,
 }
 
-/// Request id, and answer or refusal.
 pub(crate) type Answered = Result<(u32, Response), ClientError>;
 
 pub(crate) enum Command {
@@ -252,7 +251,6 @@ impl Owner {
         Ok(answers.map(|((id, packet), (_, during))| Ok((id, self.read(&packet, during)?))).collect())
     }
 
-    /// Answer in a frame.
     fn read(&mut self, packet: &Packet, during: &str) -> Result<Response, ClientError> {
         let unreadable = || ClientError::Nonsense {
             during: during.into(),
@@ -418,12 +416,10 @@ impl Owner {
     }
 }
 
-/// A required answer is missing.
 pub(crate) fn nothing(during: &str) -> ClientError {
     ClientError::Nonsense { during: during.into(), answer: "no answer".into() }
 }
 
-/// An answer that does not match the request.
 pub(crate) fn nonsense(during: &str, response: &Response) -> ClientError {
     ClientError::Nonsense { during: during.into(), answer: format!("{response:?}") }
 }

@@ -56,10 +56,9 @@ pub struct Taken {
 pub struct Pair {
     pub far: Taken,
     pub near: Taken,
-    /// Coarse stage during both.
     pub coarse: Moved,
-    /// Extra distance of the second sensor behind a half mirror ([`crate::half_mirror`]), with both images of one
-    /// exposure; `None`: one camera, two exposures.
+    /// Extra sensor distance of the second camera behind a half mirror ([`crate::half_mirror`]); `None`: one camera,
+    /// two exposures.
     pub further_mm: Option<f64>,
 }
 
@@ -78,7 +77,6 @@ impl Pair {
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Reach {
     pub coarse: Moved,
-    /// Far and near shot.
     pub shots: [Shot; 2],
 }
 

@@ -49,20 +49,18 @@ pub struct CaptureRecord {
 pub struct StageRecord {
     /// Sensor distance with all axes at 0.
     pub datum_mm: f64,
-    /// By encoder.
     #[serde(default)]
     pub lens_measured_um: f64,
     /// Coarse target of a pair.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub coarse_asked_um: Option<f64>,
-    /// By encoder.
     pub coarse_measured_um: f64,
     /// Board time of both moves and images of a pair, without exposures.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub moving_us: Option<u64>,
 }
 
-/// Times since the board's reset.
+/// One exposure. Times since the board's reset; positions by encoder and gauge.
 #[derive(Serialize, Deserialize, Clone, PartialEq, Debug)]
 pub struct ExposureRecord {
     pub image: String,
@@ -79,10 +77,8 @@ pub struct ExposureRecord {
     /// Piezo target in a pair.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub fine_asked_um: Option<f64>,
-    /// By gauge.
     pub fine_measured_um: f64,
     pub coarse_measured_um: f64,
-    /// By encoder, in a sequence.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub lens_measured_um: Option<f64>,
     /// In a sequence: `hardware`, `software` or `free-running`.
@@ -148,7 +144,6 @@ pub struct SimulationRecord {
 #[derive(Clone, PartialEq, Debug)]
 pub struct Circumstances {
     pub made_by: String,
-    /// Real hardware only.
     pub time: Option<String>,
     /// [`crate::camera::Camera::kind`].
     pub camera: &'static str,
@@ -180,7 +175,7 @@ pub fn record_of(pair: &Pair, client: &Client, circumstances: Circumstances) -> 
     record(client, circumstances, stage, exposure, &pair.far.image)
 }
 
-/// `None` without images.
+/// The record of a sequence; `None` without images.
 pub fn record_of_sequence(
     shots: &[SequenceShot],
     client: &Client,
@@ -278,12 +273,12 @@ pub fn begin_folder(folder: &Path) -> Result<Staging, RecordError> {
     Ok(Staging::new_folder(folder)?)
 }
 
-/// Publishes the folder.
+/// Writes pair and record, and publishes the folder.
 pub fn finish_folder(staged: Staging, pair: &Pair, record: &CaptureRecord) -> Result<(), RecordError> {
     finish_with(staged, [("far.png", &pair.far.image), ("near.png", &pair.near.image)], record)
 }
 
-/// Publishes the folder.
+/// Writes a sequence and its record, and publishes the folder.
 pub fn finish_sequence(
     staged: Staging,
     shots: &[SequenceShot],

@@ -10,11 +10,9 @@ use farnear_protocol::{
 
 use crate::{client::Client, error::ClientError, owner::nonsense};
 
-/// Timeout of a restarting board.
 const RESTART: Duration = Duration::from_secs(5);
 /// Longest braking time at the fastest settings.
 const BRAKING: Duration = Duration::from_secs(3);
-/// Polling interval for standstill.
 const LOOK: Duration = Duration::from_millis(10);
 
 impl Client {
@@ -23,8 +21,7 @@ impl Client {
         self.expect_accepted(&Request::Stop, "stopping")
     }
 
-    /// Waits until all axes are at rest: steppers brake along their ramps after a stop. Returns
-    /// [`ClientError::Overdue`] after longer than any ramp.
+    /// Waits for all axes to brake to rest. Returns [`ClientError::Overdue`] after longer than any ramp.
     pub fn wait_until_it_stands(&self) -> Result<(), ClientError> {
         let allowed = self.timing().allowance(BRAKING);
         let until = std::time::Instant::now() + allowed;
@@ -74,7 +71,7 @@ impl Client {
         }
     }
 
-    /// 0 = the last alarm.
+    /// Reads a stored alarm; 0 = the last.
     pub fn alarm(&self, number: u32) -> Result<AlarmRecord, ClientError> {
         let during = "reading an alarm";
         match self.request(&Request::ReadAlarm { number }, during)? {
@@ -104,7 +101,7 @@ impl Client {
         }
     }
 
-    /// Rejected while its cause persists.
+    /// Clears the latched alarm with this number; rejected while its cause persists.
     pub fn clear_alarm(&self, number: u32) -> Result<(), ClientError> {
         self.expect_accepted(&Request::ClearAlarm { number }, &format!("clearing alarm {number}"))
     }
@@ -113,7 +110,8 @@ impl Client {
         self.setting_by(&Request::ReadSetting { key }, &format!("reading {}", key.name()))
     }
 
-    /// Permanent. [`Client::reopen`] updates limits derived from it. Rejected out of range and during motion.
+    /// Changes a setting permanently. [`Client::reopen`] updates derived limits. Rejected out of range and during
+    /// motion.
     pub fn set_setting(&self, key: SettingKey, value: i32) -> Result<Setting, ClientError> {
         self.paces().clear();
         let during = format!("setting {} to {value}", key.name());
@@ -135,7 +133,7 @@ impl Client {
         }
     }
 
-    /// Calculated by the board. Rejected while a stepper moves.
+    /// Sun and shadow calculated by the board; rejected while a stepper moves.
     pub fn sun(&self, query: &SunQuery) -> Result<SunAnswer, ClientError> {
         let during = "asking for the sun";
         match self.request(&Request::Sun(*query), during)? {

@@ -29,9 +29,8 @@ use crate::camera::Image;
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct ShotDefaults {
     pub exposure: Micros,
-    /// `None`: as [`Settle::of_shot`].
+    /// `None`, also for the dwell: as [`Settle::of_shot`].
     pub settle_window: Option<Nanometres>,
-    /// `None`: as [`Settle::of_shot`].
     pub settle_dwell: Option<Micros>,
     pub repeat: u16,
     pub mode: TriggerMode,
@@ -152,13 +151,13 @@ impl Options {
     }
 }
 
-/// `None` if it exceeds the range.
+/// Micrometres to nanometres; `None` beyond the range.
 pub fn nanometres(position_um: f64) -> Option<Nanometres> {
     let nm = (position_um * 1e3).round();
     (nm.is_finite() && nm.abs() <= f64::from(i32::MAX)).then_some(Nanometres(nm as i32))
 }
 
-/// The board checks the shots when armed.
+/// Reads a program file; the board checks the shots when armed.
 pub fn read_program(text: &str) -> Result<Vec<Shot>, ProgramError> {
     let ProgramFile { exposure_us, settle_window_nm, settle_dwell_us, repeat, trigger, shot } =
         toml::from_str(text)?;

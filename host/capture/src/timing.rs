@@ -37,8 +37,8 @@ pub struct Timing {
     pub work_factor: u32,
     /// Margin of every timeout for work.
     pub work_slack: Duration,
-    /// Keep-alive timeout, board time: how long work continues after the host has died. The board asks after half of
-    /// it, and the host answers while the work is held.
+    /// Keep-alive timeout, board time: how long work continues after the host has died. The host answers at half of it
+    /// while the work is held.
     pub keep_alive: Duration,
 }
 
@@ -64,7 +64,6 @@ impl Timing {
         keep_alive: Duration::from_secs(10),
     };
 
-    /// Timeout for work with this board time.
     pub fn allowance(&self, work: Duration) -> Duration {
         work * self.work_factor + self.work_slack
     }
@@ -73,7 +72,6 @@ impl Timing {
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Pace {
     speed_nm_per_s: u64,
-    /// Time of the ramps beyond full-speed travel.
     ramps: Duration,
 }
 

@@ -14,7 +14,6 @@ pub trait Transport: Send {
     /// Waits at most `wait` for the first byte. `Ok(0)` is a timeout; an error means that the pipe is gone.
     fn receive(&mut self, buffer: &mut [u8], wait: Duration) -> io::Result<usize>;
 
-    /// Writes all bytes within `wait`.
     fn send(&mut self, bytes: &[u8], wait: Duration) -> io::Result<()>;
 
     fn discard_input(&mut self) -> io::Result<()>;
@@ -61,14 +60,13 @@ impl SerialTransport {
     }
 }
 
-/// Finds a board that reappears under another port name: by the serial number of its USB adapter, else by the name,
-/// else by the only unnumbered adapter of the same make. A link such as `/dev/serial/by-id` is a stable name. The
-/// caller must verify the board's identity.
+/// Finds a board that reappears under another port name: by its USB adapter's serial number, else by name, else by the
+/// only unnumbered adapter of that make. `/dev/serial/by-id` links are stable names. The caller must verify the
+/// identity.
 #[derive(Clone, Debug)]
 pub(crate) struct Place {
     name: String,
     adapter: Option<Adapter>,
-    /// Whether the board was connected before.
     known: bool,
 }
 

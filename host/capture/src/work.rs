@@ -25,7 +25,6 @@ use crate::{
     timing::{Pace, calibration_time, homing_time, move_time, program_time},
 };
 
-/// Polling interval for interruptions.
 const SLICE: Duration = Duration::from_millis(50);
 
 struct Plan {
@@ -67,18 +66,16 @@ pub enum Step {
 }
 
 impl Work {
-    /// Request id used by events.
     pub fn id(&self) -> u32 {
         self.id
     }
 
-    /// Arrival time of the last event.
     pub fn received(&self) -> Instant {
         self.received
     }
 
-    /// The next event, waiting at most `wait`; `None` at the timeout. Time between calls does not count against the
-    /// deadline. An error ends the work.
+    /// The next event; `None` after `wait`. Time between calls does not count against the deadline. An error ends the
+    /// work.
     pub fn step_within(&mut self, wait: Duration) -> Result<Option<Step>, ClientError> {
         let until = Instant::now() + wait;
         loop {
@@ -132,7 +129,7 @@ impl Work {
         }
     }
 
-    /// Returns the change of the encoder's zero.
+    /// Waits for the end of a homing; returns the change of the encoder's zero.
     pub fn homed(self) -> Result<Nanometres, ClientError> {
         let during = self.during.clone();
         match self.wait()? {
@@ -320,7 +317,7 @@ impl Client {
         only(self.start_homing(&[axis])?, "homing")
     }
 
-    /// Returns the change of the encoder's zero.
+    /// Homes an axis; returns the change of the encoder's zero.
     pub fn home(&self, axis: Axis) -> Result<Nanometres, ClientError> {
         self.start_home(axis)?.homed()
     }
@@ -361,8 +358,7 @@ impl Client {
         }
     }
 
-    /// Loads and arms a program, which the board checks. It stays armed. Returns [`ClientError::TooManyShots`] before
-    /// anything is loaded.
+    /// Loads and arms a program; it stays armed. Returns [`ClientError::TooManyShots`] before anything is loaded.
     pub fn arm(&self, shots: &[Shot]) -> Result<(), ClientError> {
         let max = self.hello().limits.shots_max;
         let Some(count) = u8::try_from(shots.len()).ok().filter(|count| *count <= max) else {

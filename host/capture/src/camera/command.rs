@@ -32,7 +32,6 @@ const QUEUE: usize = 16;
 /// Programs that cannot work usually end within this time.
 const EARLY_END: Duration = Duration::from_millis(300);
 const MESSAGES: usize = 400;
-/// Limit for damaged headers.
 const LONGEST_SIDE_PX: usize = 16_384;
 
 #[derive(Clone, PartialEq, Eq, Debug)]
@@ -142,18 +141,16 @@ pub struct CommandCamera {
     name: String,
     child: Child,
     frames: Receiver<Result<Arrived, String>>,
-    /// Bytes of an incomplete frame.
     partial: Arc<AtomicUsize>,
     raw: Option<Raw>,
     /// End of the program's standard error.
     messages: Arc<Mutex<String>>,
     pairing: Pairing,
-    /// Why no more frames come.
     ended: Option<String>,
 }
 
 impl CommandCamera {
-    /// Fails if it cannot start or ends immediately.
+    /// Starts the program. Fails if it cannot start or ends immediately.
     pub fn start(line: &CommandLine) -> Result<Self, CameraError> {
         let name = line.words[0].clone();
         let unusable = |reason: String| CameraError::Unusable { camera: format!("`{name}`"), reason };
@@ -185,7 +182,7 @@ impl CommandCamera {
         Ok(camera)
     }
 
-    /// `None` at the timeout.
+    /// The next picture; `None` at the timeout.
     fn take(&mut self, wait: Duration) -> Result<Option<Arrived>, CameraError> {
         if self.ended.is_none() {
             match self.frames.recv_timeout(wait) {

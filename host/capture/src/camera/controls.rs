@@ -7,13 +7,12 @@ pub enum Setting {
     ExposureUs(f64),
     /// Unit as in the camera's [`Control`].
     Gain(f64),
-    /// Unit as in the camera's [`Control`].
     BlackLevel(f64),
     /// Name as listed by the camera.
     PixelFormat(String),
     /// Column, row, width, height in pixels.
     Region([u32; 4]),
-    /// Name as listed by the camera.
+    /// Line as listed by the camera.
     TriggerSource(String),
 }
 
@@ -92,7 +91,7 @@ pub enum Range {
 }
 
 impl Range {
-    /// Always false for names.
+    /// Whether a number is in range; false for names.
     pub fn has(&self, value: f64) -> bool {
         matches!(self, Self::Number { min, max, .. } if (*min..=*max).contains(&value))
     }

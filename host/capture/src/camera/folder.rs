@@ -64,7 +64,6 @@ impl FolderCamera {
         Ok(())
     }
 
-    /// With modification time and size.
     fn pictures(&self) -> Result<Vec<(SystemTime, PathBuf, u64)>, CameraError> {
         let failed = |source| CameraError::Folder { folder: self.folder.clone(), source };
         let mut pictures = Vec::new();
@@ -84,8 +83,8 @@ impl FolderCamera {
         Ok(pictures)
     }
 
-    /// New image files, oldest first; equal times are ordered by number or name. Returns [`CameraError::Overwritten`]
-    /// for a rewritten file, [`CameraError::File`] for one picture in two formats.
+    /// New images, oldest first, then by number or name. Returns [`CameraError::Overwritten`] for a rewritten file,
+    /// [`CameraError::File`] for one picture in two formats.
     fn fresh(&self) -> Result<Vec<(SystemTime, PathBuf)>, CameraError> {
         let mut fresh = Vec::new();
         for (written, path, bytes) in self.pictures()? {
@@ -116,7 +115,7 @@ impl FolderCamera {
         Ok(fresh)
     }
 
-    /// `None` at the timeout.
+    /// The next image; `None` at the timeout.
     fn next(&mut self, wait: Duration) -> Result<Option<(Image, SystemTime, PathBuf)>, CameraError> {
         let until = Instant::now() + wait;
         loop {

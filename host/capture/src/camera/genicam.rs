@@ -1,5 +1,5 @@
-//! GigE Vision and USB3 Vision cameras through Aravis with GenICam SFNC feature names. Cargo feature `genicam`, because
-//! not every system has the library (Debian: `libaravis-dev`).
+//! GigE Vision and USB3 Vision cameras through Aravis with GenICam SFNC names. A cargo feature, `genicam`, because not
+//! every system has the library (Debian: `libaravis-dev`).
 
 mod settings;
 
@@ -28,7 +28,6 @@ use super::{
 use crate::describe::trigger_name;
 
 const BUFFERS: usize = 16;
-/// Default clock of a GigE Vision camera, ticks per second.
 const USUAL_TICKS: i64 = 1_000_000_000;
 const SOFTWARE: &str = "Software";
 
@@ -76,8 +75,8 @@ pub struct GenicamCamera {
 }
 
 impl GenicamCamera {
-    /// Opens the camera with this id from [`devices`], or the first one if empty. Fails if it is absent or held by
-    /// another program.
+    /// Opens a camera by its id from [`devices`], or the first one if empty. Fails if absent or held by another
+    /// program.
     pub fn open(id: &str) -> Result<Self, CameraError> {
         let found = devices();
         let there = |found: &[FoundCamera]| {
@@ -171,7 +170,6 @@ impl GenicamCamera {
         Ok(())
     }
 
-    /// Starts an empty stream.
     fn start(&mut self) -> Result<(), CameraError> {
         let stream = self.streaming().map_err(self.failed())?;
         self.stream = Some(stream);

@@ -271,7 +271,6 @@ mod tests {
         ShotRecord { settle: Micros(10_000), ..shot(trigger_number, strobe_us) }
     }
 
-    /// The picture arrived `arrived_ms` after arming, for an exposure reported at its end.
     fn arrive(pairing: &mut Pairing, shot: ShotRecord, arrived_ms: u64) -> Result<Belongs, CameraError> {
         let armed = pairing.armed.unwrap();
         let reported = armed

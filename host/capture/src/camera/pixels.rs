@@ -108,7 +108,7 @@ impl Layout {
         self.frame_bytes(stride.div_ceil(per_pixel), height)
     }
 
-    /// Fails for too few bytes.
+    /// Removes row padding. Fails for too few bytes.
     pub fn without_padding(
         self,
         bytes: &[u8],
@@ -131,8 +131,8 @@ impl Layout {
         Ok(rows.concat())
     }
 
-    /// Decodes a frame; surplus bytes are ignored. Fails for too few bytes, a value above the bit depth, a broken JPEG
-    /// or one of another size.
+    /// Decodes a frame; surplus bytes are ignored. Fails for too few bytes, a value above the bit depth, or a broken
+    /// JPEG or one of another size.
     pub fn decode(self, bytes: &[u8], width: usize, height: usize) -> Result<Image, BadFrame> {
         if self == Self::Jpeg {
             return jpeg(bytes, width, height);
@@ -208,7 +208,7 @@ fn jpeg(bytes: &[u8], width: usize, height: usize) -> Result<Image, BadFrame> {
     Ok(image)
 }
 
-/// Rejects floating-point pixels.
+/// Converts a picture file; rejects floating-point pixels.
 pub fn of_picture(picture: GreyImage) -> Result<Image, String> {
     let Samples::Integer(bits) = picture.samples else {
         return Err("a camera's image has integer pixels, this one has float".into());

@@ -30,7 +30,6 @@ const QUEUE: usize = 8;
 const BETWEEN_EXPOSURES_US: u32 = 15_000;
 /// Tolerance between strobe and reported exposure start.
 const SAME_MOMENT_US: u64 = 50;
-/// Exposure time of the live view.
 const WATCH_EXPOSURE: Micros = Micros(5_000);
 
 pub struct SimCamera {
@@ -61,7 +60,6 @@ struct Queue {
 #[derive(Default)]
 struct Waiting {
     frames: VecDeque<Result<Frame, CameraError>>,
-    /// One side has ended.
     closed: bool,
 }
 

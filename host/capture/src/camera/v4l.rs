@@ -112,7 +112,6 @@ fn group_of(_: &Path) -> Option<String> {
     None
 }
 
-/// Group name in the text of `/etc/group`.
 #[cfg_attr(not(unix), allow(dead_code))]
 fn group_name(groups: &str, number: u32) -> Option<String> {
     groups.lines().find_map(|line| {

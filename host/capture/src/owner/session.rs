@@ -16,7 +16,6 @@ use crate::{
     link_rate,
 };
 
-/// Reconnection interval.
 const RECONNECT: Duration = Duration::from_millis(500);
 
 #[derive(Clone)]
@@ -32,7 +31,6 @@ pub(crate) struct Session {
 #[derive(Clone, Debug)]
 pub(crate) enum Break {
     Gone(Arc<io::Error>),
-    /// Another host has opened a session.
     TakenOver,
     OtherBoard {
         was: [u8; 12],

@@ -95,7 +95,6 @@ impl V4lCamera {
         |error| refused(&self.path, &error)
     }
 
-    /// Sets a format; the driver chooses the size.
     fn choose(&mut self, name: [u8; 4], layout: Layout) -> Result<(), CameraError> {
         self.stream = None; // a format cannot change under a stream
         let mut format = self.device.format().map_err(self.failed())?;
@@ -132,7 +131,7 @@ impl V4lCamera {
         Ok(())
     }
 
-    /// `None` at the timeout.
+    /// The next frame; `None` at the timeout.
     fn take(&mut self, wait: Duration) -> Result<Option<Frame>, CameraError> {
         let Some(stream) = &mut self.stream else { return Ok(None) };
         let failed = |error: io::Error| refused(&self.path, &error);
