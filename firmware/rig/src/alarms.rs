@@ -72,7 +72,7 @@ impl Alarms {
         (0..latched).filter_map(|ago| self.kept[self.count.wrapping_sub(ago) as usize % RETAINED].as_ref())
     }
 
-    /// 0 = the last.
+    /// Reads a stored alarm; 0 = the last.
     pub(crate) fn read(&self, number: u32) -> Result<AlarmRecord, RequestError> {
         let number = if number == 0 { self.count } else { number };
         let kept = self.kept[number as usize % RETAINED].filter(|record| record.number == number);

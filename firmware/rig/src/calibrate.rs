@@ -1,5 +1,4 @@
-//! Calibration routines. Each occupies the whole rig. Results, except travel, become settings; the axis is homed at the
-//! end.
+//! Calibration routines. Each occupies the whole rig, stores its results except travel as settings, and homes the axis.
 
 mod backlash;
 mod gauge;

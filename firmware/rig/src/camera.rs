@@ -58,7 +58,6 @@ impl Camera {
         self.pending.is_none() && at >= self.ready_at
     }
 
-    /// Shortest time from one exposure to the next.
     pub(crate) const fn period(&self, exposure: Micros) -> Micros {
         Micros(exposure.0.saturating_add(self.settings.readout.0))
     }
@@ -88,7 +87,6 @@ impl Camera {
         self.pending = self.pending.filter(|pending| pending.awaited == Awaited::Triggered);
     }
 
-    /// Takes the exposure scheduled in this tick.
     pub(crate) const fn take_order(&mut self) -> Option<Trigger> {
         self.order.take()
     }

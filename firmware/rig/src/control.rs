@@ -82,12 +82,10 @@ pub trait Board {
 #[derive(Debug)]
 pub struct Control<'r> {
     rig: &'r mut Rig,
-    /// Already noted.
     dry: bool,
     reset_pending: Option<BoardMicros>,
     frames_before_log: u8,
     deferred: bool,
-    /// Ticks without activity.
     quiet_ticks: u32,
 }
 
@@ -166,8 +164,8 @@ impl<'r> Control<'r> {
         true
     }
 
-    /// Sends a part of the log; returns whether there was one. Early log waits for the first session, because a
-    /// connecting host drops older input.
+    /// Sends a part of the log; returns whether there was one. Waits for the first session: a connecting host drops
+    /// older input.
     fn speak_log(&mut self, board: &mut impl Board) -> bool {
         if !self.rig.has_session() {
             return false;

@@ -32,7 +32,7 @@ pub struct PiezoModel {
     pub observer: Poles,
 }
 
-/// In 2^-24.
+/// Controller gains in 2^-24.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Gains {
     /// Per tick, by rows.

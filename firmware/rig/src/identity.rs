@@ -9,15 +9,13 @@ pub struct Identity {
     /// At most 24 bytes (truncated).
     pub firmware: &'static str,
     pub unique_id: [u8; 12],
-    /// Boot number by retained RAM, not 0: one more than the last [`crate::Rig::boot`], or 1 after a power loss. A
-    /// valid memory overrides it.
+    /// Boot number by retained RAM, from 1: one more than the last [`crate::Rig::boot`]. A valid memory overrides it.
     pub boot: u32,
     /// Code retained by the piezo's DAC over the reset, if known.
     pub piezo_code: Option<u16>,
     pub reset_cause: ResetCause,
     /// The external clock is missing or stopped in the last boot; the internal one is used.
     pub own_clock: bool,
-    /// Emulated board, by the strap.
     pub emulated: bool,
     /// Cause in retained RAM of a self-stop; given once.
     pub last_words: Option<LastWords>,
@@ -26,6 +24,5 @@ pub struct Identity {
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum LastWords {
     Panic,
-    /// The stack reached its guard.
     StackOverflow,
 }

@@ -56,16 +56,13 @@ pub struct StepperState {
     /// STEP pulses since the reset, wrapping. Exact when `idle`; otherwise between finished segments and emitted
     /// pulses.
     pub pulses: u32,
-    /// No segment is active or queued.
     pub idle: bool,
     /// Underrun without [`Segment::last`]; cleared by [`MotorOutputs::abort_steps`].
     pub underrun: bool,
-    /// Segments that can be submitted in this tick.
     pub room: u8,
 }
 
 impl StepperState {
-    /// No pulses, all room.
     pub const IDLE: Self = Self { pulses: 0, idle: true, underrun: false, room: u8::MAX };
 }
 
@@ -118,7 +115,6 @@ pub struct Inputs {
     /// Open circuit (pressed, or a broken wire). STEP outputs are already cut.
     pub emergency_stop: bool,
     pub supply_low: bool,
-    /// The memory did not confirm the last write.
     pub memory_failed: bool,
     pub link_overflow: bool,
     /// Edges of the last ordered exposure, given once when complete.
@@ -157,7 +153,6 @@ pub struct Segment {
 
 #[derive(Clone, PartialEq, Eq, Debug, Default)]
 pub struct MotorOutputs {
-    /// Driver enabled (current in the coils).
     pub enable: bool,
     /// DIR level: sensor and lens move apart. Changes only while idle, at least one tick before the first segment.
     pub direction_away: bool,
@@ -178,7 +173,6 @@ pub struct MemoryWrite {
 pub struct Trigger {
     pub at: BoardMicros,
     pub length: Micros,
-    /// Flash within the pulse.
     pub flash: Option<ShotLight>,
 }
 

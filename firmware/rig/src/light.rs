@@ -8,7 +8,6 @@ use crate::motion::since;
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Lights {
     levels: LightLevels,
-    /// Time of the request.
     set: BoardMicros,
     time: Micros,
     silence: Micros,

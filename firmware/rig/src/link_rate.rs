@@ -76,7 +76,6 @@ mod tests {
         BoardMicros(u64::from(micros))
     }
 
-    /// A link changed to the slow rate at 1 ms, after three requests.
     fn changed() -> LinkSpeed {
         let mut speed = LinkSpeed::new();
         speed.ask(SLOW, at(0));

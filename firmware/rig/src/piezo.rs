@@ -68,7 +68,6 @@ struct Loop {
     state: State,
     reference_before: i32,
     trend: Trend,
-    /// Running mean of the absolute innovation.
     innovation: i32,
 }
 
@@ -115,7 +114,6 @@ pub(crate) struct Piezo {
     measured: Nanometres,
     gauge_missing_ticks: u32,
     failed: bool,
-    /// Open-loop sweep with gauge readings.
     driven: bool,
     near_ticks: u16,
     still_ticks: u16,
@@ -220,7 +218,6 @@ impl Piezo {
             || self.start != Start::Over
     }
 
-    /// Closes the loop if necessary.
     pub(crate) const fn go(&mut self, target: Nanometres) {
         self.target = target;
         self.closing = self.control.is_none();
@@ -260,7 +257,6 @@ impl Piezo {
         (self.closing, self.start) = (false, Start::Over);
     }
 
-    /// At the measured position.
     pub(crate) fn hold(&mut self) {
         (self.closing, self.driven) = (false, false);
         if self.control.is_some() && !self.arrived() {
@@ -313,7 +309,6 @@ impl Piezo {
         }
     }
 
-    /// First valid reading after a start.
     fn begin_to_relax(&mut self) {
         // A gauge that is off, or whose front end is dead, would make the DAC jump by as much.
         let (from, command) = match self.kept_code {
@@ -327,7 +322,6 @@ impl Piezo {
         };
     }
 
-    /// Lowers it with smooth ends.
     fn relax(&mut self) {
         let Start::Down { from, ticks } = &mut self.start else { return };
         *ticks += 1;

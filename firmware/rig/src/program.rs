@@ -23,7 +23,6 @@ use crate::settings::{SETTLE_DWELL_MAX, SETTLE_WINDOW_MAX, Settings};
 
 pub const SHOTS_MAX: usize = 64;
 
-/// Loaded shots, and number of armed ones.
 #[derive(Clone, Debug)]
 pub(crate) struct Shots {
     shots: [Option<Shot>; SHOTS_MAX],
@@ -142,7 +141,7 @@ pub(crate) enum Progress {
         number: u32,
     },
     Paused,
-    /// With the total number if it was the last.
+    /// Total number if it was the last.
     Taken {
         shot: ShotRecord,
         end: Option<u16>,
@@ -157,7 +156,7 @@ pub(crate) enum Progress {
         frame: u32,
         reason: DropReason,
     },
-    /// Whether by the axis.
+    /// The axis, if it failed.
     Failed {
         axis: Option<Axis>,
         reason: Failure,
@@ -205,7 +204,6 @@ impl Run {
         (self.index, self.repeat, &self.shot)
     }
 
-    /// Pauses after the current exposure.
     pub(crate) const fn pause(&mut self) {
         (self.pausing, self.resuming) = (true, false);
     }
@@ -214,7 +212,7 @@ impl Run {
         self.pausing && !self.resuming
     }
 
-    /// Settles again.
+    /// Resumes; settles again.
     pub(crate) fn resume(&mut self, stage: &mut Stage, settings: &Settings, now: BoardMicros) {
         match self.phase {
             Phase::Paused => self.set_off_anew(stage, settings, now),

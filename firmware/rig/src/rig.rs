@@ -78,8 +78,7 @@ struct Untold {
 const _: () = assert!(size_of::<Rig>() <= 36 * 1024);
 
 impl Rig {
-    /// The rig of `docs/rig.md` after a reset at `now`: 25 KiB, for static memory. `memory` is the FRAM's contents, if
-    /// it answers.
+    /// The rig of `docs/rig.md` after a reset at `now`: 25 KiB, for static memory. `memory` is the FRAM, if it answers.
     pub fn new(identity: Identity, memory: Option<&[u8; MEMORY_BYTES]>, now: BoardMicros) -> Self {
         Self::with_parts(identity, Settings::DEFAULT, memory, now)
     }
@@ -132,8 +131,8 @@ impl Rig {
         }
     }
 
-    /// Writes to do before sending or receiving; call until `None`. Otherwise a power loss after the boot number was
-    /// reported, but not stored, would repeat it.
+    /// Writes to do before sending or receiving, until `None`: a power loss would otherwise repeat a reported boot
+    /// number.
     pub fn keep_boot(&mut self) -> Option<MemoryWrite> {
         if !self.store.is_marked(RecordName::Counters) {
             return None;
@@ -211,7 +210,6 @@ impl Rig {
         &self.identity
     }
 
-    /// A loaded shot, for tests and tools.
     pub fn shot(&self, index: u8) -> Option<&farnear_protocol::message::Shot> {
         self.shots.get(index)
     }
@@ -220,7 +218,7 @@ impl Rig {
         self.boot
     }
 
-    /// Complete requests wait for [`Self::serve`].
+    /// Accepts a byte; complete requests wait for [`Self::serve`].
     pub fn receive(&mut self, byte: u8) {
         self.session.receive(byte);
     }
@@ -240,8 +238,8 @@ impl Rig {
         link.frames.wrapping_add(link.bad_frames)
     }
 
-    /// One step for the host per tick: encodes an answer for [`Self::transmit`], or executes the next request. `false`
-    /// without one.
+    /// One step for the host per tick: encodes an answer for [`Self::transmit`], or executes a request. `false` if
+    /// idle.
     pub fn serve(&mut self, now: BoardMicros) -> bool {
         if self.session.has_answer() {
             self.session.put_answer();
@@ -322,8 +320,7 @@ impl Rig {
         outputs
     }
 
-    /// Whether the next tick may follow after [`crate::io::REST_TICKS`]: nothing is active or pending, and all inputs
-    /// are steady.
+    /// Whether the next tick may follow after [`crate::io::REST_TICKS`]: nothing is active, and all inputs are steady.
     pub(crate) fn rest(&mut self) -> bool {
         let said = self.session.all_sent() && self.events.all_sent() && self.link_speed.is_settled();
         let idle = self.works.any().is_none() && self.reboot.is_none() && self.camera.is_idle();
@@ -433,7 +430,6 @@ impl Rig {
         Some(write)
     }
 
-    /// Lifetime counters.
     pub(crate) fn counters(&self) -> Counters {
         let base = &self.counters;
         Counters {

@@ -24,8 +24,7 @@ const BARE_CALL: usize = 5;
 pub const REMEMBERED: usize = 8;
 /// Answers that may wait for the UART: [`farnear_protocol::message::Hello::outstanding`].
 pub const OUTSTANDING: usize = 8;
-/// Rejections that may wait: 10 small requests arrive per millisecond in which as many rejections leave; several ticks'
-/// worth.
+/// Rejections that may wait, several ticks' worth: 10 small requests and as many rejections take a millisecond.
 const REFUSED: usize = 64;
 
 // A repeat of the oldest outstanding request must find its answer.
@@ -87,7 +86,6 @@ impl Session {
         self.counters
     }
 
-    /// Largest request id so far.
     pub(crate) const fn last_id(&self) -> u32 {
         self.ids.last()
     }
@@ -97,7 +95,7 @@ impl Session {
         self.heard
     }
 
-    /// Complete requests wait for [`Self::next_request`].
+    /// Accepts a byte; complete requests wait for [`Self::next_request`].
     pub(crate) fn receive(&mut self, byte: u8) {
         match self.decoder.push(byte) {
             None => {}
@@ -195,7 +193,7 @@ impl Session {
         }
     }
 
-    /// Sent by [`Self::put_answer`].
+    /// Answers a request; sent by [`Self::put_answer`].
     pub(crate) fn answer(&mut self, incoming: Incoming, answer: Result<Response, RequestError>) {
         self.done = Some((incoming, answer));
     }

@@ -31,17 +31,15 @@ pub struct Settings {
 pub struct StepperSettings {
     pub min: Nanometres,
     pub max: Nanometres,
-    /// STEP pulses/s.
+    /// Speeds are in STEP pulses/s, accelerations in STEP pulses/s2, jerks in STEP pulses/s3.
     pub speed: u32,
     pub home_search_speed: u32,
     pub home_leave_speed: u32,
-    /// Exact approach, STEP pulses/s.
+    /// Exact approach.
     pub home_approach_speed: u32,
-    /// Speed without ramp, STEP pulses/s.
+    /// Speed without ramp.
     pub start_speed: u32,
-    /// STEP pulses/s2.
     pub acceleration: u32,
-    /// STEP pulses/s3.
     pub jerk: u32,
     pub home_acceleration: u32,
     pub home_jerk: u32,
@@ -73,7 +71,6 @@ pub struct FineSettings {
     /// Range of the closed loop.
     pub min: Nanometres,
     pub max: Nanometres,
-    /// Input shaper and control gains.
     pub gains: Gains,
     /// Gains for a flexure with a second mode.
     pub gentle_gains: Gains,

@@ -12,7 +12,6 @@ use crate::motion::leg::{Leg, Until};
 use crate::motion::stage::Stage;
 use crate::settings::{Settings, StepperSettings};
 
-/// Measured reversals.
 const ROUNDS: usize = 5;
 /// Largest plausible backlash; also the setting's range.
 const MOST: i32 = 100_000;

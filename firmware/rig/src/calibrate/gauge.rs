@@ -56,7 +56,6 @@ pub(crate) struct GaugeScale {
     leg: Leg,
     ticks: u32,
     sum: i64,
-    /// Reading at the relaxed piezo.
     relaxed: i64,
     /// Contacts so far, and per position the sums of gauge and encoder positions.
     met: usize,

@@ -22,7 +22,6 @@ use crate::program::SHOTS_MAX;
 use crate::settings::KEYS;
 
 pub(crate) const BLOCK: usize = 32;
-/// 32-bit numbers per block.
 pub(crate) const VALUES: usize = BLOCK / 4;
 pub(crate) type Block = [u8; BLOCK];
 pub(crate) const RECORDS: usize = 5;
@@ -42,8 +41,8 @@ pub(crate) const ALL: [RecordName; RECORDS] = [
     RecordName::Correction,
 ];
 
-/// Alarms precede the counters, which also store the moving axes: alarms take these over at a start, and a power loss
-/// in between must not lose them.
+/// Alarms precede the counters, which also store the moving axes: alarms take these over at a start, before any power
+/// loss.
 pub(crate) const URGENCY: [RecordName; RECORDS] = [
     RecordName::Alarms,
     RecordName::Counters,
@@ -62,7 +61,7 @@ pub(crate) const fn index(record: RecordName) -> usize {
     }
 }
 
-/// Without header.
+/// Without the header.
 pub(crate) const fn blocks(record: RecordName) -> usize {
     match record {
         RecordName::Counters => 2,
@@ -73,7 +72,6 @@ pub(crate) const fn blocks(record: RecordName) -> usize {
     }
 }
 
-/// Address of copy 0 or 1.
 pub(crate) const fn address(record: RecordName, copy: usize) -> usize {
     let mut address = 0;
     let mut i = 0;
@@ -167,7 +165,6 @@ pub(crate) fn block(memory: &[u8; MEMORY_BYTES], record: RecordName, copy: usize
     at(memory, address(record, copy) + (1 + block) * BLOCK)
 }
 
-/// In a valid copy.
 pub(crate) fn values(memory: &[u8; MEMORY_BYTES], record: RecordName, copy: usize) -> usize {
     let [.., version, _, values] = *at(memory, address(record, copy)).first_chunk::<8>().unwrap_or(&[0; 8]);
     if version == 1 { SETTINGS_OF_VERSION_1 } else { usize::from(values) }

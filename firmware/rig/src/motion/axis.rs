@@ -70,7 +70,6 @@ pub(crate) struct Stepper {
     slack: u32,
     /// Counted pulses; relative to the reset until homed.
     position: i32,
-    /// Encoder reading at position 0.
     encoder_zero: i32,
     encoder: i32,
     pulses: Option<u32>,
@@ -260,7 +259,6 @@ impl Stepper {
         }
     }
 
-    /// Power was lost during motion.
     pub(crate) const fn was_interrupted(&mut self) {
         self.state = PositionState::Lost;
     }

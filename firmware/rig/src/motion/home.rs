@@ -54,8 +54,7 @@ impl Homing {
         Self { phase: Phase::Begin, leg: Leg::REST, closed: None, opened: 0, known_before: false }
     }
 
-    /// Continues while the axis has no fault; returns the shift of position 0 at the end. `carried`: displacement of
-    /// the switch's tab by the piezo, if known.
+    /// Returns the shift of position 0 at the end. `carried`: the piezo's displacement of the switch's tab, if known.
     pub(crate) fn tick(
         &mut self,
         axis: &mut Stepper,

@@ -73,7 +73,6 @@ impl Stage {
         }
     }
 
-    /// A stepper axis with its settings.
     pub(crate) const fn with_numbers<'s>(
         &mut self,
         axis: Axis,
@@ -93,8 +92,7 @@ impl Stage {
         }
     }
 
-    /// Displacement of the home switch's tab by the piezo (stage A's is on the sensor plate). `None` if unknown: homing
-    /// could not find position 0.
+    /// Displacement of stage A's switch tab by the piezo. `None` if unknown: homing could not find position 0.
     pub(crate) fn carried(&self, axis: Axis) -> Option<Nanometres> {
         match axis {
             Axis::SensorCoarse => self.fine.extension(),

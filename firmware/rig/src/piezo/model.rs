@@ -114,7 +114,6 @@ impl Lag {
         self.hysteresis(command, &self.moved(command)).saturating_add(self.creep)
     }
 
-    /// Advances a tick with this command.
     pub(crate) fn push(&mut self, command: i32) {
         self.plays = self.moved(command);
         for (crept, shift) in self.crept.iter_mut().zip(LAGS) {

@@ -73,7 +73,6 @@ impl Plant {
         Some(code.round().clamp(0.0, f64::from(GAUGE_CODE_MAX)) as u32)
     }
 
-    /// One control tick with this code, or none.
     pub(crate) fn tick(&mut self, code: Option<u16>) {
         let before = self.part.latency_us / 10;
         self.run(before);

@@ -60,7 +60,7 @@ impl Rig {
         }
     }
 
-    /// Of its current move.
+    /// Lowest position of the current move.
     pub(super) fn lowest(&self, axis: Axis) -> Nanometres {
         let Some(stepper) = self.stage.stepper(axis) else { return self.stage.fine.lowest() };
         let lowest = stepper.lowest();
@@ -80,8 +80,7 @@ impl Rig {
         Nanometres(lowest.0.saturating_sub(carried.0.max(0)))
     }
 
-    /// Distance of sensor and lens for a routine with all its axes at their extreme: each alone may pass while all
-    /// together violate it.
+    /// Distance for a routine with all its axes at their extreme: each alone may pass while all together violate it.
     pub(super) fn routine_must_not_come_close(&self, axes: &[Axis]) -> Result<(), RequestError> {
         let piezo_relaxes = axes.contains(&Axis::SensorFine);
         let extreme = |axis| {
@@ -121,7 +120,7 @@ impl Rig {
         self.must_be_apart(|other| if other == axis { lowest } else { self.lowest(other) })
     }
 
-    /// At these positions.
+    /// The smallest distance of sensor and lens at these positions.
     pub(super) fn must_be_apart(&self, position: impl Fn(Axis) -> Nanometres) -> Result<(), RequestError> {
         let min = self.settings.distance_min;
         let distance = sensor_distance_nm(self.settings.datum, position);

@@ -108,8 +108,8 @@ impl Stepper {
         (self.home_closed() && outside && self.purpose != Purpose::SeekHome).then_some(Failure::HomeSwitch)
     }
 
-    /// Encoder deviation from the possible motor positions, if too large. Not checked before the first motion, because
-    /// an unpowered motor may be moved.
+    /// Encoder deviation from the possible motor positions, if too large. Not before the first motion: an unpowered
+    /// motor may be moved.
     fn following_error(&self) -> Option<Nanometres> {
         if !self.enabled {
             return None;
