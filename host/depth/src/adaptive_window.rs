@@ -116,15 +116,14 @@ pub struct Estimate {
     pub deviation_mm: Array2<f32>,
     /// Mean square residual around the pixel relative to the noise: about 1 where the model holds.
     pub misfit: Array2<f32>,
-    /// Mean square residual beyond the noise over the whole image, relative to the texture that depth rests on: a few
-    /// thousandths where PSF and blur are right.
+    /// Mean square residual beyond the noise, relative to the texture: a few thousandths where PSF and blur are right.
     pub left_over: f64,
     /// The same mean square relative to noise alone.
     pub excess: f64,
 }
 
-/// Depth of an aligned pair of equal brightness; pixels without a value (NaN) are ignored. Returns [`RunError`] for
-/// images that differ in size, are too small, constant or entirely invalid, and for unusable windows.
+/// Depth of an aligned, balanced pair, ignoring NaN pixels. Returns [`RunError`] for images that differ in size, are
+/// too small, constant or invalid, and for unusable windows.
 pub fn estimate(
     far: ArrayView2<f32>,
     near: ArrayView2<f32>,
@@ -194,7 +193,6 @@ fn estimate_into(
     Ok(Estimate { depth_mm: Array2::zeros((0, 0)), deviation_mm, misfit, left_over, excess })
 }
 
-/// Rejects images that differ in size, are too small, entirely invalid or constant.
 pub(crate) fn check_pair(far: ArrayView2<f32>, near: ArrayView2<f32>) -> Result<(), RunError> {
     let (height, width) = far.dim();
     let (near_height, near_width) = near.dim();

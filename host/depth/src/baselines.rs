@@ -106,9 +106,8 @@ impl FromStr for Method {
     }
 }
 
-/// Depth of a pair by a baseline: `far` and `near` are (height, width) in any common scale. [`Method::Favaro`] learns
-/// its projectors first; keep a [`Favaro`] to do that once for many pairs. Returns [`BaselineError::Pair`] for images
-/// that differ in size, are too small, constant or entirely invalid.
+/// Depth of a pair by a baseline: `far` and `near` are (height, width) in any common scale. A [`Favaro`] saves learning
+/// for many pairs. Returns [`BaselineError::Pair`] for images that differ in size, are too small, constant or invalid.
 pub fn depth_from_pair(
     method: Method,
     far: ArrayView2<f32>,

@@ -243,8 +243,7 @@ impl PsfFit {
 }
 
 /// The PSF of `model` that turns the images of each pair into each other, jointly for all pairs. Returns
-/// [`CalibrationError`] for pairs without texture, of different size, or only in the middle of the range (these are
-/// left out).
+/// [`CalibrationError`] for pairs without texture, of different size, or only in the middle of the range.
 pub fn fit_psf(
     pairs: &[CapturedPair<'_>],
     optics: &Optics,
@@ -350,8 +349,8 @@ impl MeasuredPattern {
     }
 }
 
-/// Patterns of a series of flat targets; 20 to 30 through the working range suffice for any correction. Pixels below
-/// `least_confidence` are left out. Returns [`CalibrationError::FlatTarget`] for a target without a depth map.
+/// Patterns of flat targets; 20 to 30 through the working range suffice. Excludes pixels below `least_confidence`.
+/// Returns [`CalibrationError::FlatTarget`] for a target without a depth map.
 pub fn measure_patterns(
     targets: &[FlatTarget<'_>],
     operators: &Operators,

@@ -16,7 +16,6 @@ pub const LOW_TEXTURE: f32 = 0.05;
 /// Texture energy relative to its median below which it is rounding only: no depth.
 pub(crate) const NO_TEXTURE: f32 = 1e-7;
 
-/// Approximate number of pixels in the sample for the median.
 const SAMPLE: usize = 10_000;
 
 pub(crate) fn sample((height, width): (usize, usize)) -> SliceInfo<[SliceInfoElem; 2], Ix2, Ix2> {

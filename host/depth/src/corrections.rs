@@ -111,8 +111,8 @@ impl TryFrom<Stored> for Correction {
     }
 }
 
-/// Learns a correction from flat targets. Returns [`CorrectionError`] for fewer patterns than the terms need, different
-/// sizes, repeated or invalid depths, or a region with too few valid pixels.
+/// Learns a correction. Returns [`CorrectionError`] for too few patterns, different sizes, repeated or invalid depths,
+/// or a region with too few valid pixels.
 pub fn fit(
     method: Method,
     patterns: &[Pattern<'_>],
@@ -142,7 +142,6 @@ impl Correction {
     }
 
     /// Checks that this correction covers part of a working range; beyond its own range [`Self::apply`] gives no depth.
-    /// Returns [`CorrectionError::RangeMismatch`] otherwise.
     pub fn check_range(&self, range: &WorkingRange) -> Result<(), CorrectionError> {
         let (width, own) = (range.far_mm - range.near_mm, self.far_mm - self.near_mm);
         let shared = range.far_mm.min(self.far_mm) - range.near_mm.max(self.near_mm);
@@ -157,8 +156,8 @@ impl Correction {
         })
     }
 
-    /// The corrected depth map; NaN stays NaN, and depths beyond the correction's scale become NaN. Returns
-    /// [`CorrectionError::SizeMismatch`] for a map of another size.
+    /// The corrected map; NaN stays NaN, and depths beyond the scale become NaN. [`CorrectionError::SizeMismatch`] for
+    /// another size.
     pub fn apply(&self, depth_mm: ArrayView2<f32>) -> Result<Array2<f32>, CorrectionError> {
         let mut corrected = depth_mm.as_standard_layout().into_owned();
         self.apply_in_place(corrected.view_mut())?;
@@ -178,15 +177,14 @@ impl Correction {
     }
 
     /// As [`Self::apply`] with the board's fixed-point arithmetic: identical bits, within 0.005 mm of [`Self::apply`].
-    /// Returns [`CorrectionError::NotOnBoard`] for a method that the board lacks, [`CorrectionError::Board`] if a
-    /// coefficient or the size exceeds its number formats, or [`CorrectionError::SizeMismatch`].
+    /// Also returns [`CorrectionError::NotOnBoard`], or [`CorrectionError::Board`] for a coefficient or size beyond its
+    /// number formats.
     pub fn apply_as_board(&self, depth_mm: ArrayView2<f32>) -> Result<Array2<f32>, CorrectionError> {
         self.check_size(depth_mm.dim())?;
         self.for_board()?.apply(depth_mm)
     }
 
-    /// This correction in the board's number formats. Returns [`CorrectionError::NotOnBoard`] or
-    /// [`CorrectionError::Board`] as [`Self::apply_as_board`].
+    /// This correction in the board's number formats; errors as [`Self::apply_as_board`].
     pub fn for_board(&self) -> Result<BoardCorrection, CorrectionError> {
         let method = self.method();
         let form = method.board_form().ok_or(CorrectionError::NotOnBoard(method))?;

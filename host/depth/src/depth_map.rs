@@ -41,8 +41,8 @@ pub enum Warning {
         /// PSF of the optics.
         optics: Box<Psf>,
     },
-    /// The images seem to be swapped. Swapping only turns alpha into -alpha, so the evidence is scene knowledge; a
-    /// plane gives no warning.
+    /// The images seem to be swapped, judged by the scene, because swapping only turns alpha into -alpha; planes never
+    /// warn.
     LooksSwapped(SwapEvidence),
 }
 

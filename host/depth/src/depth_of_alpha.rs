@@ -19,7 +19,6 @@ impl DepthOfAlpha {
         Self::linear(optics, *operators.linearisation())
     }
 
-    /// For an alpha that passes through the polynomial first.
     pub(crate) fn linear(optics: &Optics, linearisation: Polynomial) -> Self {
         let [offset, slope] = optics.defocus_line_mm();
         let f = optics.focal_length_mm();

@@ -101,9 +101,8 @@ pub struct Filling {
     pub window_px: usize,
 }
 
-/// Replaces the depth where there is too little texture. `texture` is the energy of each pixel, (height, width) like
-/// the map, NaN for pixels to keep; `pair` are the far- and the near-focused image; `reach_px` is the reach of kernels
-/// and windows.
+/// Replaces the depth where there is too little texture. `texture` is the energy of each pixel, NaN for pixels to keep;
+/// `pair` are the far- and the near-focused image; `reach_px` is the reach of kernels and windows.
 ///
 /// # Panics
 /// If energy, images and map differ in size.

@@ -90,7 +90,6 @@ impl Job<'_> {
         }
     }
 
-    /// Convolves columns near the borders of the image.
     fn copied(&self, columns: Range<usize>, output: &mut [f32]) {
         let (radius, strip) = (self.radius(), columns.len());
         let full = strip + 2 * radius;

@@ -74,8 +74,8 @@ impl FocusMeasure {
         }
     }
 
-    /// The measure of an image of (height, width), any scale. Returns [`FocusError`] for images that are too small,
-    /// dark, or not finite everywhere.
+    /// The measure of an image, (height, width), any scale. Returns [`FocusError`] if it is too small, dark, or not
+    /// finite.
     pub fn of(self, image: ArrayView2<f32>) -> Result<f64, FocusError> {
         let (height, width) = image.dim();
         if height < SMALLEST_PX || width < SMALLEST_PX {
@@ -121,7 +121,6 @@ fn fft_sum(image: ArrayView2<f32>) -> f64 {
         .sum()
 }
 
-/// Mean over the 3x3 neighbourhoods of all inner pixels.
 fn mean_of_neighbourhoods(image: ArrayView2<f32>, f: impl Fn(&[[f32; 3]; 3]) -> f32) -> f64 {
     let image: Array2<f32> = image.as_standard_layout().into_owned();
     let (height, width) = image.dim();
@@ -152,9 +151,8 @@ fn modified_laplacian(image: ArrayView2<f32>) -> f64 {
     })
 }
 
-/// The peak of a measure between the steps of a sweep: the tip of the least-squares parabola through the largest value
-/// and up to two neighbours on either side. `None` for fewer than three places, a value that is not finite, or a
-/// largest value at an end of the sweep.
+/// The peak of a measure in a sweep: the tip of the least-squares parabola through the largest value and up to two
+/// neighbours on either side. `None` for fewer than three places, non-finite values, or a maximum at an end.
 pub fn peak(places: &[f64], values: &[f64]) -> Option<f64> {
     let count = places.len().min(values.len());
     if count < 3 || !values[..count].iter().chain(&places[..count]).all(|v| v.is_finite()) {

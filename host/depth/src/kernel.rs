@@ -7,8 +7,8 @@
 use ndarray::Array2;
 use serde::{Deserialize, Serialize};
 
-/// Declares the only list of operator sizes: [`SIZES`], and `with_size!`, which runs code with the size as a constant.
-/// (`$` is passed in because a nested macro cannot write its own.)
+/// Declares the only list of operator sizes, [`SIZES`], and `with_size!`. (Nested macros cannot write `$`, so it is
+/// passed in.)
 macro_rules! sizes {
     ($dollar:tt: $($size:literal)+) => {
         /// Allowed operator sizes.
@@ -125,8 +125,8 @@ impl From<Kernel> for RawKernel {
 }
 
 impl Kernel {
-    /// A kernel of `size` from the free coefficients `octant` in the order of [`offsets`]. Returns [`KernelError`] if
-    /// their number does not fit the size or one is not finite.
+    /// A kernel from the free coefficients `octant` in the order of [`offsets`]. [`KernelError`] for a wrong number or
+    /// non-finite ones.
     pub fn new(size: usize, octant: Vec<f64>) -> Result<Self, KernelError> {
         if !SIZES.contains(&size) {
             return Err(KernelError::Size(size));

@@ -199,7 +199,7 @@ pub fn measure_pair_of_views(
     measure_pair(images, optics, method, camera, settings)
 }
 
-/// As [`measure_pair_of_views`], consuming the images `[far, near]`. Peak memory: about 30 bytes a pixel, including the
+/// As [`measure_pair_of_views`], consuming the images `[far, near]`. Peak memory: about 30 bytes a pixel, with the
 /// images' eight.
 pub fn measure_pair(
     images: [Array2<f32>; 2],
@@ -301,8 +301,8 @@ pub(crate) fn measure(
     Ok((map, estimate))
 }
 
-/// Applies the stage's response to each depth and scales its deviation; depths outside the learned range are moved
-/// outside the working range, where validity drops them.
+/// Applies the stage's response and scales the deviation; unlearned depths move out of range, where validity drops
+/// them.
 fn respond(depth_mm: &mut Array2<f32>, deviation_mm: &mut Array2<f32>, stage: &Stage, optics: &Optics) {
     Zip::from(depth_mm).and(deviation_mm).par_for_each(|depth, deviation| {
         let measured = optics.alpha(f64::from(*depth));

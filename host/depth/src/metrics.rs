@@ -63,8 +63,8 @@ pub struct Comparison {
     pub pixels_without_truth: usize,
 }
 
-/// Compares `depth` with `truth`, both (height, width) in mm, where `mask` is true. Returns [`CompareError`] if sizes
-/// differ or no pixel is left.
+/// Compares `depth` with `truth`, (height, width) in mm, where `mask` is true. [`CompareError`] if sizes differ or no
+/// pixel is left.
 pub fn compare(
     depth: ArrayView2<f32>,
     truth: ArrayView2<f32>,
@@ -142,9 +142,8 @@ fn summarise(
     })
 }
 
-/// Marks pixels within `distance` rows and columns of a step of the true depth or of a hole. A step is a difference
-/// between neighbours of more than 2 % of the truth's range and at least four times the median difference, so that
-/// slants, cones and spheres have none.
+/// Marks pixels within `distance` rows and columns of a hole or a step of the true depth: neighbours that differ by
+/// more than 2 % of the range and four times the median difference, so that slants, cones and spheres have none.
 pub fn near_steps(truth: ArrayView2<f32>, distance: usize) -> Array2<bool> {
     let (height, width) = truth.dim();
     let truth = truth.mapv(|t| if is_depth(t) { t } else { f32::NAN });

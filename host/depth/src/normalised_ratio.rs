@@ -59,15 +59,14 @@ pub fn sum_and_difference(otf: &Otf, max_blur_px: f64, w: f64, alpha: f64) -> [f
     [near + far, near - far]
 }
 
-/// NIR at the radial frequency `w` (rad/px) and depth `alpha`. Unbounded near a common zero of both OTFs (pill-box
-/// only), not finite exactly there.
+/// NIR at the radial frequency `w` (rad/px) and depth `alpha`; not finite at a common zero of both OTFs (pill-box
+/// only).
 pub fn normalised_ratio(otf: &Otf, max_blur_px: f64, w: f64, alpha: f64) -> f64 {
     let [sum, difference] = sum_and_difference(otf, max_blur_px, w, alpha);
     difference / sum
 }
 
-/// Smallest slope of the NIR over alpha in [-1, 1] at the radial frequency `w`; not positive where a ratio has several
-/// depths.
+/// Smallest slope of the NIR over alpha in [-1, 1] at frequency `w`; not positive where a ratio has several depths.
 pub fn smallest_slope(otf: &Otf, max_blur_px: f64, w: f64) -> f64 {
     const STEPS: usize = 80;
     let at = |i: usize| normalised_ratio(otf, max_blur_px, w, -1.0 + 2.0 * i as f64 / STEPS as f64);
@@ -86,8 +85,7 @@ pub fn smallest_slope(otf: &Otf, max_blur_px: f64, w: f64) -> f64 {
     smallest
 }
 
-/// First radial frequency (rad/px, to 1e-6) at which the NIR does not rise over all alpha in [-1, 1]; infinite if there
-/// is none on the pixel grid.
+/// First radial frequency (rad/px, to 1e-6) at which the NIR does not rise over all alpha in [-1, 1]; infinite if none.
 pub fn first_non_monotonic(otf: &Otf, max_blur_px: f64) -> f64 {
     let falls = |w: f64| smallest_slope(otf, max_blur_px, w) <= 0.0;
     const STEPS: usize = 400;

@@ -114,8 +114,8 @@ impl Optics {
         Self { stage: Some(stage), ..self }
     }
 
-    /// Magnification of the near-focused relative to the far-focused image for a non-telecentric lens: the ratio of the
-    /// sensor distances.
+    /// Magnification of the near- relative to the far-focused image for a non-telecentric lens: the sensor distances'
+    /// ratio.
     pub fn magnification_ratio(&self) -> f64 {
         let range = self.working_range();
         range.sensor_near_mm / range.sensor_far_mm
@@ -165,8 +165,7 @@ impl Optics {
         (self.focal_length_mm * self.focal_length_mm / (depth_mm - self.focal_length_mm) - offset) / slope
     }
 
-    /// `[offset, slope]` of `w - F = offset + slope alpha` in mm. Without `w` it loses no digits in single precision:
-    /// depth is `F + F^2 / (w - F)`.
+    /// `[offset, slope]` of `w - F = offset + slope alpha` in mm, without cancellation: depth is `F + F^2 / (w - F)`.
     pub fn defocus_line_mm(&self) -> [f64; 2] {
         let e = self.half_travel_mm();
         let from_focal = self.focal_length_mm * self.focal_length_mm / (self.far_mm - self.focal_length_mm);
@@ -180,8 +179,7 @@ impl Optics {
         -self.focal_length_mm * self.focal_length_mm * slope / (w * w)
     }
 
-    /// Signed blur radii `[R1, R2]` in pixels of the far- and the near-focused image at `alpha`; linear beyond the
-    /// working range (an OTF takes the magnitude).
+    /// Signed blur radii `[R1, R2]` in pixels at `alpha`, linear beyond the working range (an OTF takes the magnitude).
     pub fn blur_px(&self, alpha: f64) -> [f64; 2] {
         [0.5 * (1.0 + alpha) * self.max_blur_px, 0.5 * (1.0 - alpha) * self.max_blur_px]
     }

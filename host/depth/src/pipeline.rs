@@ -153,10 +153,9 @@ impl Settings {
     }
 }
 
-/// Depth of one pair; for many pairs of one size a [`Processor`] is faster. `far` and `near` are (height, width) in any
-/// common scale. Returns [`RunError`] for sizes, windows, constant or entirely invalid images, and operators for
-/// another blur. Single invalid or saturated pixels give NaN depth and confidence 0 wherever they contribute, with a
-/// warning.
+/// Depth of one pair; a [`Processor`] is faster for many. `far` and `near` are (height, width) in any common scale.
+/// Returns [`RunError`] for sizes, windows, constant or invalid images, and operators for another blur. Single invalid
+/// or saturated pixels give NaN depth and confidence 0 wherever they contribute, with a warning.
 pub fn depth_from_pair(
     far: ArrayView2<f32>,
     near: ArrayView2<f32>,

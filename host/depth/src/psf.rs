@@ -22,8 +22,7 @@ use crate::hankel::HankelTable;
 
 pub use radial::{Drawn, RINGS, RadialPsf, RadialTable};
 
-/// Exponents of the generalised Gaussian: below, the tails reach over hundreds of pixels; above, it is a pill-box to
-/// three digits.
+/// Exponents of the generalised Gaussian: below, the tails are hundreds of pixels wide; above, it is nearly a pill-box.
 const P_RANGE: [f64; 2] = [0.5, 64.0];
 
 /// Blur constants; usual are 0.3 to 1.
@@ -163,8 +162,7 @@ impl From<Psf> for Parts {
 }
 
 impl Psf {
-    /// A PSF from its model's name and parameters. Returns [`PsfError`] for an unknown model, missing, surplus or
-    /// unusable parameters.
+    /// A PSF from its model's name and parameters. Returns [`PsfError`] for an unknown model or wrong parameters.
     pub fn from_parts(
         model: &str,
         p: Option<f64>,
@@ -239,8 +237,7 @@ impl Psf {
         self.otf_up_to(max_radius_px * std::f64::consts::SQRT_2 * std::f64::consts::PI)
     }
 
-    /// The OTF for products of blur radius and frequency up to `max_phase_rad`; larger ones are slower for the
-    /// generalised Gaussian.
+    /// The OTF for blur radius times frequency up to `max_phase_rad`; beyond, the generalised Gaussian is slower.
     pub fn otf_up_to(self, max_phase_rad: f64) -> Otf {
         match self {
             Self::PillBox => Otf::PillBox,

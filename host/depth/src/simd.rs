@@ -35,8 +35,8 @@ pub(crate) use windows::{
     sum_rows, without_noise,
 };
 
-/// Calls the generic function inside a function with the backend's instructions enabled, so that the whole loop is
-/// inlined and compiled with them.
+/// Calls the generic function inside one with the backend's instructions enabled, so that the loop is compiled with
+/// them.
 macro_rules! dispatch {
     ($(#[$attribute:meta])* fn $name:ident($($argument:ident: $type:ty),* $(,)?) $(-> $result:ty)? = $generic:ident) => {
         $(#[$attribute])*

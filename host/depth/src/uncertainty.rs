@@ -43,8 +43,7 @@ pub enum Noise {
 }
 
 impl Noise {
-    /// Noise of a camera with `full_well_e` electrons at the code `max_code` and a read noise of `read_noise_e`
-    /// electrons: shot noise, read noise and quantisation (1/12).
+    /// Shot noise, read noise and quantisation (1/12) of a camera with `full_well_e` electrons at the code `max_code`.
     pub fn camera(full_well_e: f64, read_noise_e: f64, max_code: f64) -> Self {
         let code_per_electron = max_code / full_well_e;
         Self::Camera {
@@ -54,8 +53,8 @@ impl Noise {
     }
 }
 
-/// Factor of the median over `size` x `size` pixels on the standard deviation. Its pixels share most windows and
-/// filters, so it is weak. Measured on planes of sand texture (7x7 operators, smoothing 7).
+/// Factor of a `size` x `size` median on the standard deviation, weak because its pixels share most windows. Measured
+/// on planes of sand texture (7x7 operators, smoothing 7).
 pub fn median_gain(size: usize) -> f64 {
     match size {
         1 => 1.0,
@@ -65,8 +64,7 @@ pub fn median_gain(size: usize) -> f64 {
     }
 }
 
-/// Standard deviation of each pixel's depth in mm, (height, width); NaN if unknown. Errors as
-/// [`crate::pipeline::depth_from_pair`].
+/// Standard deviation of depth, mm, (height, width); NaN if unknown. Errors as [`crate::pipeline::depth_from_pair`].
 pub fn standard_deviation_mm(
     far: ArrayView2<f32>,
     near: ArrayView2<f32>,

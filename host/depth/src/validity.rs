@@ -62,7 +62,7 @@ pub struct Lost {
 }
 
 /// Removes invalid depths from a map and sets each confidence to its probability. `estimate` must be of the same
-/// prepared pair; its deviations become the validity's.
+/// prepared pair.
 pub fn assess(
     map: &mut DepthMap,
     prepared: &Prepared,
@@ -183,8 +183,8 @@ impl Range {
     }
 }
 
-/// Probability of an error below three standard deviations: 0.997 for a normal error; less where the deviation is not
-/// small against the range or the residual exceeds noise.
+/// Probability of an error below three standard deviations: 0.997, less for deviations near the range or residuals
+/// above noise.
 fn probability(deviation_of_alpha: f32, misfit: f32) -> f32 {
     let noisy = (deviation_of_alpha / LARGEST_DEVIATION).powi(2);
     let unexplained = (misfit - 1.5).max(0.0);

@@ -42,8 +42,8 @@ impl Bank {
         }
     }
 
-    /// Variance of `alpha` for unit noise, in units of (residual's gain x energy / slope^2). Accounts for correlations
-    /// between neighbouring pixels; measured over planes at 8 bit.
+    /// Variance of `alpha` for unit noise, in (residual's gain x energy / slope^2), measured at 8 bit on planes:
+    /// includes correlations between neighbouring pixels.
     pub(super) fn variance_factor(&self) -> f32 {
         match self {
             Self::Whitened(_) => 1.15,
@@ -120,7 +120,6 @@ pub(super) enum Filters {
 }
 
 impl Filters {
-    /// For rows of at most `width` columns; the output holds `ring` rows.
     pub(super) fn new(bank: &Bank, ring: usize, width: usize) -> Self {
         let taps = |kernel: &Kernel| Taps::new(kernel, width);
         let plane = || Plane::new(ring, width);
@@ -150,8 +149,7 @@ impl Filters {
         }
     }
 
-    /// Filters `count` rows of the pair's difference and sum, from row `first` on, into the same output rows. Output
-    /// pixels correspond to the pixel [`Bank::reach_px`] further up and to the right.
+    /// Filters `count` rows of the pair's difference and sum from row `first` on, shifted by [`Bank::reach_px`].
     pub(super) fn feed(
         &mut self,
         backend: Backend,

@@ -16,7 +16,6 @@ use crate::simd::{self, Backend, Choice, CubicSums, Deviation, Found, MAX_ROWS, 
 const ROWS: usize = 256;
 /// Columns of a tile: as many as the cache holds.
 const COLUMNS: usize = 512;
-/// Rows and columns over which the misfit is averaged.
 const MISFIT_PX: [usize; 2] = [7, 21];
 /// Border in which filters and windows depend on reflections, which no model explains, px.
 const BORDER_PX: usize = 14;
@@ -33,7 +32,6 @@ const CERTAIN: f32 = 0.035;
 /// Variance that remains after a median of 1x1, 3x3, 5x5 and 7x7.
 const MEDIAN_GAIN: [f32; 4] = [1.0, 0.94, 0.85, 0.74];
 const RECOMPUTED: isize = 16;
-/// Rows of alpha and residual that wait for a median and a mean.
 const WAITING: usize = 8;
 
 /// Rows of a band for an image of this size: enough bands for all threads.
@@ -71,7 +69,6 @@ pub(super) struct Tile<'a> {
     difference: Plane,
     sum: Plane,
     filters: Filters,
-    /// For each window size.
     columns: Vec<Columns>,
     row: Row,
     alpha: Plane,
@@ -170,8 +167,8 @@ impl<'a> Tile<'a> {
         }
     }
 
-    /// Fills a band's rows of the maps, which begin at `top`. Returns sums over their pixels of the squared residual,
-    /// of its part due to noise, and of the squared texture.
+    /// Fills a band's rows of the maps, from `top` on. Returns sums of the squared residual, its noise, and the squared
+    /// texture.
     pub(super) fn band(&mut self, top: usize, maps: Maps<'_>) -> [f64; 3] {
         let Maps { mut depth_mm, mut deviation_mm, mut misfit } = maps;
         let (rows, width) = misfit.dim();
@@ -232,8 +229,8 @@ impl<'a> Tile<'a> {
         sums
     }
 
-    /// Pixels whose smallest window contains a pixel without a value; `None` without holes. Larger windows use mean
-    /// brightness for a hole, which is a seventh of their pixels.
+    /// Pixels whose smallest window contains a hole, if any; larger windows use mean brightness for a seventh of their
+    /// pixels.
     fn holes(&self, place: Place, halo: [usize; 2]) -> Option<Array2<bool>> {
         if self.job.scales.whole {
             return None;
@@ -332,7 +329,6 @@ impl<'a> Tile<'a> {
         }
     }
 
-    /// One row of windows of one size, and the choice among sizes.
     fn row(&mut self, index: usize, wide: usize) {
         let Self { job, row, radius, .. } = self;
         let Columns { side, sums } = &self.columns[index];

@@ -28,7 +28,6 @@ const ALPHAS: usize = 25;
 const REACH: f64 = 1.1;
 /// Design variance of the noise relative to the mean brightness: 9,000 electrons, read noise 12 electrons.
 const NOISE: f64 = 1.19e-4;
-/// Design contrast of the texture.
 const CONTRAST: f64 = 0.025;
 /// Weight of the nulled texture against the whiteness of the noise.
 const NULLING: f64 = 1.92e8;
@@ -39,7 +38,6 @@ const STEP: f64 = 1e-4;
 #[derive(Debug, Clone, PartialEq)]
 pub struct Whitened {
     pub(crate) residual: [Kernel; 4],
-    /// U0.
     pub(crate) matched: Kernel,
     /// `sum (R1 p) u` over `sum u^2` at alpha = 0, for the design's texture and noise.
     pub(crate) slope_in_energy: f64,
@@ -131,7 +129,6 @@ fn ridge(unknowns: usize) -> impl Iterator<Item = (Vec<f64>, f64)> {
     })
 }
 
-/// The response of a kernel at frequency 0 as a constraint on its taps.
 fn at_zero() -> Vec<f64> {
     kernel::basis_responses(SIZE, 0.0, 0.0)
 }

@@ -21,7 +21,6 @@ pub(super) struct Pair {
 
 pub(super) struct Evidence {
     pub alpha: Array2<f32>,
-    /// Texture energy.
     pub texture: Array2<f32>,
     /// Part of the evidence that contradicts the depth, 0 = none.
     pub misfit: Array2<f32>,
@@ -129,8 +128,7 @@ pub(super) enum Along {
     Columns,
 }
 
-/// `image` filtered along one direction by an odd number of taps (`taps[i]` weighs the pixel at `i - half`); borders
-/// are reflected without repeating the edge pixel.
+/// `image` filtered along one direction by an odd number of taps, centred; borders are reflected.
 pub(super) fn filter(image: &Array2<f32>, taps: &[f32], along: Along) -> Array2<f32> {
     let half = taps.len() / 2;
     let (height, width) = image.dim();

@@ -25,7 +25,6 @@ const PATCH_PX: usize = 7;
 
 const VECTOR: usize = 2 * PATCH_PX * PATCH_PX;
 
-/// Spacing of the vectors.
 const STEP_PX: usize = 3;
 
 /// How the projectors are learned.
@@ -33,8 +32,7 @@ const STEP_PX: usize = 3;
 pub struct FavaroSettings {
     /// Number of depths, evenly spaced in alpha a little beyond both foci; 9 to 129.
     pub depths: usize,
-    /// Dimensions of a depth's textures, the rest is null space; 10 to 90. 60 has the least error for every PSF: fewer
-    /// leave signal in the null space, more leave little of it.
+    /// Dimensions of a depth's textures, the rest is null space; 10 to 90. 60 has the least error for every PSF.
     pub rank: usize,
     /// Seed of the random textures.
     pub seed: u64,
@@ -52,13 +50,11 @@ pub struct Favaro {
     psf: Psf,
     max_blur_px: f64,
     alphas: Vec<f64>,
-    /// For each depth the directions of its textures, one per row.
     signals: Vec<DMatrix<f32>>,
 }
 
 impl Favaro {
-    /// Learns the projectors for a PSF and largest blur radius. Returns [`BaselineError::Setting`] or
-    /// [`BaselineError::NoDirections`].
+    /// Learns the projectors for a PSF and largest blur radius.
     pub fn learn(optics: &Optics, settings: &FavaroSettings) -> Result<Self, BaselineError> {
         let check = |name, value, least, most| {
             if (least..=most).contains(&value) {
@@ -76,8 +72,8 @@ impl Favaro {
         Ok(Self { psf: optics.psf(), max_blur_px: optics.max_blur_px(), alphas, signals })
     }
 
-    /// As [`super::depth_from_pair`] without learning again. Returns [`BaselineError::OtherOptics`] if the projectors
-    /// were learned for another blur, or [`BaselineError::Pair`].
+    /// As [`super::depth_from_pair`] without learning. Returns [`BaselineError::OtherOptics`] for projectors of another
+    /// blur.
     pub fn depth_from_pair(
         &self,
         far: ArrayView2<f32>,

@@ -75,7 +75,6 @@ fn local_energy(image: &Array2<f32>, across: i32, down: i32) -> Array2<f32> {
     &real * &real + &imaginary * &imaginary
 }
 
-/// Cosine and sine of a frequency under a Hann window.
 fn taps(index: i32) -> [Vec<f32>; 2] {
     let place = |i: usize| i as f64 - (WINDOW_PX / 2) as f64;
     let hann = |i: usize| 0.5 + 0.5 * (TAU * place(i) / (WINDOW_PX + 1) as f64).cos();

@@ -47,7 +47,6 @@ pub(super) fn evidence(pair: &Pair, optics: &Optics, settings: &Settings) -> Evi
     Evidence { alpha, texture, misfit, reach_px }
 }
 
-/// Taps of a Gaussian, sum 1, out to three SDs.
 fn gaussian(sd: f32) -> Vec<f32> {
     let half = (3.0 * sd).ceil() as i32;
     let taps: Vec<f32> = (-half..=half).map(|i| (-0.5 * (i as f32 / sd).powi(2)).exp()).collect();

@@ -43,12 +43,10 @@ pub struct OtfPoint {
 pub(super) struct Found {
     pub psf: RadialPsf,
     pub cost: f64,
-    /// Within the pairs' frequencies and blurs.
     pub otf: Vec<OtfPoint>,
     pub of_k: Option<f64>,
 }
 
-/// The hats and their transforms.
 struct Hats {
     extent: f64,
     light: Vec<[f64; RINGS]>,
@@ -89,7 +87,6 @@ impl Hats {
         RadialPsf::new(self.extent, &light).map_err(|error| CalibrationError::Profile(error.to_string()))
     }
 
-    /// Weights scaled to a total light of 1.
     fn normalised(&self, weights: [f64; HATS]) -> [f64; HATS] {
         let sum: f64 = weights.iter().zip(&self.total).map(|(weight, total)| weight * total).sum();
         weights.map(|weight| weight / sum)
@@ -169,8 +166,7 @@ pub(super) fn profile(observations: &[Observation]) -> Result<Found, Calibration
     Ok(Found { psf, cost: cost(&weights), otf, of_k })
 }
 
-/// Summed squared second differences of the weights as a quadratic form. The density is even in the radius, and 0
-/// beyond the last hat.
+/// Summed squared second differences of the weights, even in the radius and 0 beyond the last hat, as a quadratic form.
 fn bends() -> DMatrix<f64> {
     let mut form = DMatrix::zeros(HATS, HATS);
     for middle in 0..HATS {

@@ -6,11 +6,10 @@ use ndarray::{Array2, ArrayView2};
 
 use crate::fourier::{Complex64, transform};
 
-/// Smallest usable side.
 const SMALLEST_PX: usize = 32;
 
-/// Compared frequencies, rad/px. Below, lighting differs more than blur; above, a blurred image has little left and a
-/// sharp one has aliases.
+/// Compared frequencies, rad/px. Below, lighting differs more than blur; above, blurred images are empty and sharp ones
+/// have aliases.
 const BAND: [f64; 2] = [0.1, 2.0];
 
 const RINGS: usize = 128;

@@ -13,8 +13,8 @@ use crate::psf::{Otf, Psf};
 /// Coefficients that vary together under the square of a Hann window: `n sum w^4 / (sum w^2)^2 = 35/18` per axis.
 pub(super) const TOGETHER: f64 = (35.0 / 18.0) * (35.0 / 18.0);
 
-/// Coefficients of a band in the search for noise. Lighting, aliases and misregistration add to most bands, not to all;
-/// with this many, chance lowers the estimate by 5 %.
+/// Coefficients of a band in the search for noise: lighting, aliases and misregistration spare some bands, and chance
+/// lowers the estimate by only 5 %.
 const QUIET_BAND: f64 = 1500.0;
 
 pub(super) struct Seen {
@@ -67,8 +67,8 @@ pub(super) fn noise(observations: &[Observation]) -> f64 {
     if least.is_finite() { least } else { 0.0 }
 }
 
-/// Covariance of parameters: `at` gives for a blur radius and a frequency the OTF and its derivatives. `prior` is the
-/// inverse of a prior covariance.
+/// Covariance of parameters: `at` gives the OTF and its derivatives for a blur radius and a frequency; `prior` is an
+/// inverse.
 pub(super) fn covariance(
     observations: &[Observation],
     parameters: usize,

@@ -18,8 +18,7 @@ pub enum BoardForm {
     Full,
 }
 
-/// A correction in the board's number formats, as sent to a board. See
-/// [`Correction::apply_as_board`](super::Correction::apply_as_board).
+/// A correction as sent to a board; see [`Correction::apply_as_board`](super::Correction::apply_as_board).
 #[derive(Debug, Clone, PartialEq)]
 pub struct BoardCorrection {
     /// Name of the correction.
@@ -40,8 +39,8 @@ pub(super) fn frame((height, width): (usize, usize)) -> Result<Frame, Correction
 }
 
 impl BoardCorrection {
-    /// Corrects a depth map in mm, (height, width), as the board does. Returns [`CorrectionError::Board`] for
-    /// coefficients or rows that do not fit the frame.
+    /// Corrects a map in mm, (height, width), as the board does. [`CorrectionError::Board`] if coefficients or rows do
+    /// not fit.
     pub fn apply(&self, depth_mm: ArrayView2<f32>) -> Result<Array2<f32>, CorrectionError> {
         let (frame, width) = (self.frame, self.frame.width());
         match self.form {

@@ -68,7 +68,6 @@ pub(super) struct Cdc {
     expanded: Expanded,
 }
 
-/// The patterns in mm with a value per column and rows on the grid, for the hot loop.
 #[derive(Debug, Clone, PartialEq, Default)]
 struct Expanded {
     values: Vec<f32>,

@@ -16,7 +16,6 @@ use super::{CdcSettings, CorrectionError};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(super) struct ClsfBlend(Regions);
 
-/// Blending weight of each region at a pixel.
 fn weights(index: usize, length: usize) -> [f64; REGIONS] {
     let centre = |r: usize| (region(r, length).start + region(r, length).end - 1) as f64 / 2.0;
     let mut weights = [0.0; REGIONS];

@@ -68,8 +68,7 @@ impl Moments {
         }
     }
 
-    /// Adds the samples of one row, `(x, u, t, weight)` each. Powers of u are summed per row and power of x; powers of
-    /// y are multiplied in at the end.
+    /// Adds one row's samples, `(x, u, t, weight)` each; powers of y are multiplied in at the end.
     pub(super) fn add_row(&mut self, y: f64, samples: impl Iterator<Item = (f64, f64, f64, f64)>) {
         let mut matrix = [[0.0; MATRIX]; MATRIX];
         let mut right = [[0.0; RIGHT]; RIGHT];

@@ -126,7 +126,6 @@ impl Normal {
         self.weight += sample.weight;
     }
 
-    /// The coefficients; `None` if the samples do not determine them.
     fn solve(mut self, counts: [usize; 3]) -> Option<Vec<f64>> {
         self.matrix /= self.weight;
         self.right /= self.weight;
@@ -157,7 +156,6 @@ fn add_penalty(matrix: &mut DMatrix<f64>, counts: [usize; 3]) {
     }
 }
 
-/// Checks that every cell of the field has enough depths.
 fn check_field(samples: &[(usize, Sample)]) -> Result<(), CorrectionError> {
     let cell =
         |place: f64| ((0.5 * (place + 1.0) * FIELD_INTERVALS as f64) as usize).min(FIELD_INTERVALS - 1);

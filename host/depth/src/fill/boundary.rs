@@ -7,8 +7,7 @@ const NEIGHBOURS: [(isize, isize); 8] =
     [(0, -1), (-1, -1), (-1, 0), (-1, 1), (0, 1), (1, 1), (1, 0), (1, -1)];
 
 /// Clockwise outer boundary, (row, column), of the 8-connected region of `mask` whose first pixel in reading order is
-/// `start`. A pixel where the region is one pixel wide appears once per side. Ends by Jacob's criterion: the start
-/// entered as the first time. O(boundary).
+/// `start`. Parts one pixel wide appear once per side. Ends by Jacob's criterion. O(boundary).
 ///
 /// # Panics
 /// If `start` lies outside the mask or is not set.

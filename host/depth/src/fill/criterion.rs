@@ -81,7 +81,7 @@ impl From<LowTexture> for String {
 
 impl LowTexture {
     /// Pixels of low texture; false where the energy is NaN. `pair` are the far- and the near-focused image in any
-    /// common scale; `window_px` is the window's side.
+    /// common scale.
     pub(super) fn mask(
         self,
         texture: ArrayView2<f32>,

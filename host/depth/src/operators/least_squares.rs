@@ -4,12 +4,11 @@ use nalgebra::{DMatrix, DVector};
 
 use super::DesignError;
 
-/// Singular values below this part of the largest count as zero: a kernel with more taps than the grid resolves gets
-/// the smallest solution.
+/// Relative singular values that count as zero: kernels with more taps than the grid resolves get the smallest
+/// solution.
 const RELATIVE_RANK: f64 = 1e-12;
 
-/// Minimises `|matrix x - rhs|^2` by QR and a singular value decomposition of `R`. Returns [`DesignError::Singular`] if
-/// that does not converge or the solution is not finite.
+/// Minimises `|matrix x - rhs|^2` by QR and SVD. Returns [`DesignError::Singular`] without a finite solution.
 pub fn solve(matrix: DMatrix<f64>, rhs: DVector<f64>) -> Result<DVector<f64>, DesignError> {
     let unknowns = matrix.ncols();
     let qr = matrix.qr();

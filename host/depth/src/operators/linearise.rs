@@ -29,8 +29,7 @@ const REACH: f64 = 1.1;
 
 const SAMPLES: usize = 45;
 
-/// The polynomial for `[Gm1, Gp1, Gp2]` and their pre-filter. Returns [`DesignError::Singular`] if the operators find
-/// no alpha.
+/// The polynomial for `[Gm1, Gp1, Gp2]` and their pre-filter. Returns [`DesignError::Singular`] if they find no alpha.
 pub fn design(
     otf: &Otf,
     max_blur_px: f64,

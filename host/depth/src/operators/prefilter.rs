@@ -17,8 +17,7 @@ use crate::psf::Otf;
 /// Added to the target to make the weights (Li 2014, section 5.2.4).
 const WEIGHT_FLOOR: f64 = 0.05;
 
-/// The target response at each grid point, peak 1. Returns [`DesignError::NoDepthSignal`] if the NIR rises at no
-/// frequency.
+/// The target response at each grid point, peak 1. Returns [`DesignError::NoDepthSignal`] if the NIR never rises.
 pub fn target(otf: &Otf, max_blur_px: f64, grid: &[GridPoint]) -> Result<Vec<f64>, DesignError> {
     let limit = first_non_monotonic(otf, max_blur_px);
     let slopes: Vec<f64> = grid
@@ -32,8 +31,7 @@ pub fn target(otf: &Otf, max_blur_px: f64, grid: &[GridPoint]) -> Result<Vec<f64
     Ok(slopes.into_iter().map(|s| s / peak).collect())
 }
 
-/// The kernel of `size` nearest to `target` on `grid`, with response 0 at frequency 0. Returns [`DesignError`] if the
-/// least squares is singular.
+/// The kernel of `size` nearest to `target` on `grid`, with response 0 at frequency 0.
 pub fn fit(target: &[f64], grid: &[GridPoint], size: usize) -> Result<Kernel, DesignError> {
     let offsets: Vec<_> = kernel::offsets(size).collect();
     let free = &offsets[1..];

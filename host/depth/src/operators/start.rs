@@ -12,7 +12,7 @@ use super::DesignError;
 use crate::kernel::{self, Kernel};
 
 /// A kernel of `size` whose response at the radial frequency `w` (rad/px) is about `target(w)`. Returns
-/// [`DesignError::Start`] if the Parks-McClellan algorithm does not converge.
+/// [`DesignError::Start`] without convergence.
 pub fn kernel_of_radial_response(target: impl Fn(f64) -> f64, size: usize) -> Result<Kernel, DesignError> {
     mcclellan(&parks_mcclellan(target, size)?)
 }

@@ -33,8 +33,7 @@ fn depths() -> [f64; SAMPLES] {
     std::array::from_fn(|i| all[SAMPLES + 1 + i])
 }
 
-/// `[Gm1, Gp1, Gp2]` of `size` for the pre-filter's response. Returns [`DesignError`] if the start or the minimisation
-/// fails.
+/// `[Gm1, Gp1, Gp2]` of `size` for the pre-filter's response. Returns [`DesignError`] if start or minimisation fail.
 pub fn design(
     otf: &Otf,
     max_blur_px: f64,
@@ -55,7 +54,6 @@ pub fn design(
     Ok([gm1.scaled(scale), gp1.scaled(scale), gp2.scaled(scale)])
 }
 
-/// Initial `[Gm1, Gp1, Gp2]`.
 pub(super) fn starting_kernels(fit: &RatioFit, size: usize) -> Result<[Kernel; 3], DesignError> {
     // The cubic's coefficients at any frequency: linear between the table's, constant beyond.
     let at = |column: &[f64], w: f64| {

@@ -66,8 +66,8 @@ impl DepthError {
         [by_gm1, by_gp2, weight * misfit * inverse]
     }
 
-    /// For each point three rows `[by Gm1, by Gp2, residual]` instead of one per sample: the triangular factor of its
-    /// rows. A rotation of rows changes neither the sum of squares nor the normal equations.
+    /// For each point three rows `[by Gm1, by Gp2, residual]`, the triangular factor of its samples' rows: a rotation
+    /// changes neither the sum of squares nor the normal equations.
     fn compressed(&self, taps: &[f64]) -> impl Iterator<Item = (usize, [[f64; 3]; 3])> {
         self.samples.samples.chunk_by(|a, b| a.point == b.point).map(move |samples| {
             let mut columns = [(); 3].map(|()| Vec::with_capacity(samples.len()));

@@ -31,8 +31,7 @@ pub struct Distortion {
 }
 
 impl DistortionSection {
-    /// Checks the values. Returns [`OpticsError::CameraMatrix`], [`OpticsError::DistortionCount`] or
-    /// [`OpticsError::DistortionCoefficient`].
+    /// Checks the values; see the distortion variants of [`OpticsError`].
     pub fn check(&self) -> Result<Distortion, OpticsError> {
         let [[fx, skew, cx], [zero, fy, cy], last] = self.camera_matrix;
         let usable = [fx, fy].iter().all(|f| f.is_finite() && *f > 0.0) && cx.is_finite() && cy.is_finite();

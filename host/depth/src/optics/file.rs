@@ -49,9 +49,7 @@ pub struct FocusSection {
     pub near_mm: Option<f64>,
 }
 
-/// An optics file as written, before [`OpticsFile::check`] makes [`Optics`] of it.
-///
-/// `max_blur_px` and `near_mm` follow from each other: one suffices.
+/// An optics file as written, to be checked by [`OpticsFile::check`]. One of `max_blur_px` and `near_mm` suffices.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct OpticsFile {
@@ -73,8 +71,8 @@ pub struct OpticsFile {
 }
 
 impl OpticsFile {
-    /// Checks the values and derives the others. Returns an [`OpticsError`] with the offending value and, for
-    /// contradictions, the value that would agree.
+    /// Checks the values and derives the others. An [`OpticsError`] has the offending value, for contradictions also a
+    /// matching one.
     pub fn check(&self) -> Result<Optics, OpticsError> {
         let focal_length_mm = positive("lens", "focal_length_mm", self.lens.focal_length_mm, " of mm")?;
         let f_number = self.f_number(focal_length_mm)?;

@@ -29,8 +29,8 @@ pub struct Stage {
     pub usual_unexplained: f64,
 }
 
-/// Unexplained texture around a pixel, as a variance of normalised depth: `misfit` is the residual's mean square
-/// relative to the noise, `deviation` the standard deviation of normalised depth by noise.
+/// Unexplained texture as a variance of normalised depth: `misfit` is the residual's mean square relative to the noise,
+/// `deviation` the standard deviation of normalised depth by noise.
 pub fn unexplained(misfit: f32, deviation: f32) -> f32 {
     (misfit - 1.0).max(0.0) * deviation * deviation
 }

@@ -225,8 +225,8 @@ pub(crate) fn reach_px(operators: &Operators, settings: &Settings) -> usize {
 /// Confidence from which a pixel counts in the test for a swapped pair.
 const CONFIDENT: f32 = 0.7;
 
-/// Part of the working range by which each third must be farther than the one above for a warning. A ground that fills
-/// the image exceeds it; other scenes rarely rise twice in one direction.
+/// Part of the working range by which each third must be farther than the one above: grounds exceed it, other scenes
+/// rarely.
 const TILT: f64 = 0.12;
 
 /// Warnings about the result, from a thinned sample of its pixels.

@@ -19,8 +19,7 @@ use crate::simd::{self, CubicRow, Plane, Taps, WindowRow};
 /// Rows per stage and step.
 const BLOCK: usize = simd::SEVEN_BLOCK;
 
-/// Widest tile: its rows of all stages fit a second-level cache of 1 MB; narrower tiles would interrupt hardware
-/// prefetching more often.
+/// Widest tile: its rows fit a 1 MB second-level cache; narrower tiles would interrupt hardware prefetching more often.
 const MAX_TILE_PX: usize = 1024;
 
 /// Shortest band worth a thread: its halo of about 20 rows is computed twice.
@@ -38,9 +37,7 @@ pub(crate) struct Job<'a> {
 pub(crate) struct Maps<'a> {
     /// Depth in mm after the median.
     pub depth_mm: ArrayViewMut2<'a, f32>,
-    /// Texture energy c1.
     pub texture: ArrayViewMut2<'a, f32>,
-    /// Misfit relative to c1.
     pub misfit: ArrayViewMut2<'a, f32>,
 }
 

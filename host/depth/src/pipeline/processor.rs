@@ -13,7 +13,7 @@ use crate::optics::Optics;
 use crate::simd;
 
 /// Depth of successive pairs with the same operators, optics and settings. Allocates only when the image size changes.
-/// Memory: the map and one plane, 12 bytes per pixel, and less than 1 MB per thread.
+/// Memory: 12 bytes per pixel, and less than 1 MB per thread.
 #[derive(Debug)]
 pub struct Processor {
     operators: Operators,
@@ -114,7 +114,6 @@ impl Processor {
     }
 }
 
-/// Texture energy to confidence, depth without any to NaN.
 fn finish(map: &mut DepthMap, misfit: &Array2<f32>, backend: Backend, threads: usize) {
     let scale = confidence::texture_scale(map.confidence.view());
     let rows = map.confidence.nrows().div_ceil(threads);

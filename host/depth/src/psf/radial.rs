@@ -57,9 +57,9 @@ impl RadialPsf {
         Ok(Self { extent, light: light.map(|light| (f64::from(light) * scale) as f32) })
     }
 
-    /// The profile of an image of the PSF or aperture, black = no light, about its light's centroid. `radius_px` is the
-    /// blur radius (the aperture's edge) in the image, px; `None` takes half the shorter side. Returns
-    /// [`PsfError::Profile`] for an image without light or with invalid values, or [`PsfError::Range`].
+    /// The profile of an image of the PSF or aperture, black = no light, about its centroid. `radius_px` is the blur
+    /// radius (the aperture's edge) in the image; `None` takes half the shorter side. [`PsfError::Profile`] without
+    /// light or for invalid values.
     pub fn from_image(image: ArrayView2<f32>, radius_px: Option<f64>) -> Result<Drawn, PsfError> {
         let (height, width) = image.dim();
         let radius_px = radius_px.unwrap_or(0.5 * height.min(width) as f64);

@@ -19,7 +19,6 @@ pub(crate) struct Taps {
 }
 
 impl Taps {
-    /// For rows of `width` output columns.
     pub fn new(kernel: &Kernel, width: usize) -> Self {
         let octant = kernel.octant().iter().map(|c| *c as f32).collect();
         Self { size: kernel.size(), octant, pending: Plane::new(kernel.size() - 1, width) }
@@ -38,9 +37,9 @@ impl Taps {
 pub(crate) const MAX_ROWS: usize = 8;
 
 dispatch! {
-    /// Takes at most [`MAX_ROWS`] rows of `input`, each [`READ_BEYOND`] numbers longer than `width`; writes as many
-    /// rows of `width` columns to `output`, whose last vector may exceed the width. The output lags by `size - 1` rows:
-    /// discard the first ones after a reset.
+    /// Convolves at most [`MAX_ROWS`] rows of `input`, each [`READ_BEYOND`] numbers longer than `width`. The last
+    /// vector of an `output` row may exceed the width. The output lags by `size - 1` rows: discard the first ones after
+    /// a reset.
     fn convolve_rows(taps: &mut Taps, input: &[&[f32]], output: &mut [&mut [f32]], width: usize) = by_size
 }
 

@@ -9,9 +9,8 @@ use super::lanes::Lanes;
 pub(crate) type Lag = (isize, [f32; 4]);
 
 dispatch! {
-    /// For each lag, adds to the four rows of `sums` the lag's factors times the sums of `upper[i] lower[i + lag]` over
-    /// those of `window` columns `i` with `i + lag` inside the window. `upper` and `lower` are `window - 1` longer than
-    /// the sums, `work` is twice as long.
+    /// Adds to the four rows of `sums`, for each lag, its factors times the sums of `upper[i] lower[i + lag]` over the
+    /// window. `upper` and `lower` are `window - 1` longer than the sums, `work` is twice as long.
     fn lagged_products(upper: &[f32], lower: &[f32], lags: &[Lag], window: usize, work: &mut [f32], sums: &mut [Vec<f32>; 4]) =
         lagged_generic
 }

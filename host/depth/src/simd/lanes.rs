@@ -11,8 +11,8 @@ use std::arch::x86_64::*;
 pub(crate) trait Lanes: Copy {
     const N: usize;
 
-    /// Vectors to process together in a chain of dependent operations (1 or 2, measured on Zen 4): several hide latency
-    /// while registers suffice.
+    /// Vectors to interleave in a chain of dependent operations, to hide latency while registers suffice: 1 or 2,
+    /// measured on Zen 4.
     const INTERLEAVED: usize;
 
     /// # Safety
@@ -70,8 +70,7 @@ pub(crate) trait Lanes: Copy {
     fn inverse_root_estimate(self) -> Self;
     fn to_array(self) -> [f32; 16];
 
-    /// `1 / self` to the last bit or two for magnitudes from 1e-37 to 1e37: estimate and a Newton step, a third of a
-    /// division's cost.
+    /// `1 / self` to the last bits for 1e-37 to 1e37: estimate and a Newton step, a third of a division's cost.
     #[inline(always)]
     fn reciprocal(self) -> Self {
         let estimate = self.reciprocal_estimate();
@@ -97,7 +96,6 @@ pub(crate) struct Avx512(__m512);
 #[derive(Clone, Copy)]
 pub(crate) struct Avx2(__m256);
 
-/// Four lanes of portable code.
 #[derive(Clone, Copy)]
 pub(crate) struct Portable([f32; 4]);
 

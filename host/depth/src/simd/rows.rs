@@ -76,9 +76,8 @@ fn normalise_generic<L: Lanes>(
     }
 }
 
-/// Sums over the last `window` rows of the four products, without a running sum's drift. Rows form groups of `window`;
-/// a window is the tail of one group and the head of the next. Tails are summed once per group, heads on the way (van
-/// Herk's scheme for sums): three additions per product and row.
+/// Sums over the last `window` rows of the four products, without a running sum's drift: a window is the tail of one
+/// group of rows and the head of the next (van Herk's scheme). Three additions per product and row.
 #[derive(Debug, Clone)]
 pub(crate) struct WindowRow {
     window: usize,
@@ -102,8 +101,8 @@ impl WindowRow {
 }
 
 dispatch! {
-    /// Takes `rows` rows, from `first` on, of the inputs `m`, `p1`, `p2`; writes to rows `4 y ..` of `sums` the window
-    /// sums of `p1 p1`, `p1 p2`, `p1 m`, `m m` that end with row `y`.
+    /// Takes `rows` rows from `first` on; writes to rows `4 y ..` of `sums` the window sums of `p1 p1`, `p1 p2`, `p1
+    /// m`, `m m` that end with row `y`.
     fn vertical_sums(state: &mut WindowRow, inputs: [&Plane; 3], first: usize, sums: &mut Plane, rows: usize, width: usize) =
         vertical_generic
 }
@@ -179,8 +178,8 @@ fn vertical_generic<L: Lanes>(
 pub(crate) const SEVEN_BLOCK: usize = 8;
 
 dispatch! {
-    /// As [`vertical_sums`] for windows of seven rows, stateless: `inputs` are rings of 16 rows with new rows at `8
-    /// half ..` and the previous eight in the other half. Writes all eight rows of `sums`.
+    /// As [`vertical_sums`] for seven rows, stateless: `inputs` are rings of 16 rows, new at `8 half ..`, the previous
+    /// eight in the other half. Writes all eight rows of `sums`.
     fn vertical_sums_of_seven(inputs: [&Plane; 3], half: usize, sums: &mut Plane, width: usize) = seven_generic
 }
 
@@ -244,10 +243,9 @@ unsafe fn products<L: Lanes>(m: *const f32, p1: *const f32, p2: *const f32, offs
 
 /// Output of [`CubicRow::solve`]: rows with padding.
 pub(crate) struct CubicRow<'a> {
-    /// Before the median.
+    /// Before the median; the misfit is relative to c1.
     pub alpha: &'a mut [f32],
     pub texture: &'a mut [f32],
-    /// Relative to c1.
     pub misfit: &'a mut [f32],
 }
 
@@ -316,8 +314,7 @@ fn solve_generic<L: Lanes>(output: &mut CubicRow<'_>, sums: &Plane, y: usize, wi
     }
 }
 
-/// Window sums over seven columns: neighbouring lanes and vectors share sums of two, so that four additions make a sum
-/// of seven.
+/// Window sums over seven columns: neighbouring lanes share sums of two, so that four additions make a sum of seven.
 struct Channel<L> {
     row: *const f32,
     here: L,
@@ -399,8 +396,8 @@ fn root_and_misfit<L: Lanes>([c1, c3, c0, energy]: [L; 4]) -> [L; 2] {
 }
 
 dispatch! {
-    /// Texture to confidence in place ([`confidence::confidence`]); returns the numbers of low-texture pixels and of
-    /// pixels without confidence.
+    /// Texture to confidence in place ([`confidence::confidence`]); counts low-texture pixels and pixels without
+    /// confidence.
     fn confidence_row(texture: &mut [f32], misfit: &[f32], scale: f32) -> [usize; 2] = confidence_generic
 }
 

@@ -1,5 +1,5 @@
-//! One small pair through the run time and the adaptive windows: every vector unit must reproduce the numbers of AVX2
-//! below. To update them after a change of the mathematics, run the test and copy its output.
+//! One small pair through the run time and the adaptive windows: every vector unit must reproduce AVX2's numbers below.
+//! To update them, run the test and copy its output.
 
 use ndarray::Array2;
 

@@ -49,7 +49,6 @@ pub(crate) struct CubicSums<'a> {
     pub energy: &'a [f32],
 }
 
-/// Results of a window along a row.
 pub(crate) struct Found<'a> {
     pub alpha: &'a mut [f32],
     /// For noise of unit variance.
@@ -57,8 +56,8 @@ pub(crate) struct Found<'a> {
 }
 
 dispatch! {
-    /// Roots of `c0 + c1 a + c2 a^2 + c3 a^3` near `-c0 / c1`, with `c1` at least `floor` times the energy, and their
-    /// variance: energy over squared slope.
+    /// Roots of `c0 + c1 a + c2 a^2 + c3 a^3` near `-c0 / c1`, `c1` at least `floor` times the energy, and their
+    /// variance.
     fn roots(sums: CubicSums<'_>, floor: f32, found: Found<'_>) = roots_generic
 }
 
@@ -211,8 +210,7 @@ fn move_products_generic<L: Lanes>(gone: [&[f32]; 2], come: [&[f32]; 2], sums: &
 }
 
 dispatch! {
-    /// Increases variances for the part of the energy that is noise, `of_noise` times the noise; at least the part
-    /// `least` of the energy remains.
+    /// Increases variances for noise in the energy, `of_noise` times the noise; at least the part `least` remains.
     fn without_noise(energy: &[f32], noise: &[f32], of_noise_and_least: [f32; 2], variance: &mut [f32]) =
         without_noise_generic
 }
@@ -233,7 +231,6 @@ fn without_noise_generic<L: Lanes>(
     }
 }
 
-/// Reference of the residual.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Residual {
     /// Its mean square for noise of unit variance, a polynomial in alpha^2.
@@ -285,7 +282,6 @@ pub(crate) struct Deviation {
 }
 
 dispatch! {
-    /// Standard deviations of depth, mm.
     fn deviation_row(of: Deviation, alpha: &[f32], variance: &[f32], to: &mut [f32]) = deviation_generic
 }
 

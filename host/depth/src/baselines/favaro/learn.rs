@@ -71,7 +71,7 @@ fn render(spectrum: &Array2<Complex64>, otf: &Otf, radius_px: f64) -> Array2<f32
     transform(blurred).mapv(|value| (value.re / (SIDE_PX * SIDE_PX) as f64) as f32)
 }
 
-/// The directions of the largest singular values of the matrix of all vectors (eigenvectors of its Gram matrix).
+/// The largest singular directions of the matrix of all vectors (eigenvectors of its Gram matrix).
 fn directions(far: &Array2<f32>, near: &Array2<f32>, rank: usize) -> Option<DMatrix<f32>> {
     let places: Vec<usize> = (0..SIDE_PX - super::PATCH_PX).step_by(STRIDE_PX).collect();
     let mut vectors = DMatrix::<f32>::zeros(VECTOR, places.len() * places.len());

@@ -140,7 +140,6 @@ fn sum_windows(out: &mut [f32], padded: &[f32], window: usize) {
     }
 }
 
-/// The least residual of each column and its pattern.
 struct Nearest {
     residual: Vec<f32>,
     least: Vec<f32>,
@@ -210,9 +209,8 @@ fn cancel(
     }
 }
 
-/// Fractional index around the least residual, -1/2 to 1/2 (Li 2014, eqs. 6.5 to 6.10). The line through the least
-/// residual and its larger neighbour meets a line of opposite slope through the other neighbour. (At the first and the
-/// last pattern the index stays whole.)
+/// Fractional index around the least residual, -1/2 to 1/2 (Li 2014, eqs. 6.5 to 6.10): the line through it and its
+/// larger neighbour meets a line of opposite slope through the other one. Whole at the first and the last pattern.
 fn interpolate(before: f32, least: f32, after: f32) -> f32 {
     let (larger, smaller, toward_smaller) =
         if after >= before { (after, before, -1.0) } else { (before, after, 1.0) };

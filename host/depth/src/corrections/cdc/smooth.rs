@@ -1,6 +1,5 @@
-//! Smooths a pattern with a Gaussian and samples it on a grid. Along rows, then columns, a straight line is fitted
-//! under a Gaussian weight at each grid point (local linear regression); a weighted mean would bias slopes at the
-//! borders. Holes (NaN) have no weight.
+//! Smooths a pattern and samples it on a grid: along rows, then columns, a straight line is fitted under a Gaussian
+//! weight (local linear regression), because a weighted mean would bias slopes at the borders. Holes have no weight.
 
 use ndarray::{Array2, ArrayView2};
 
