@@ -1,8 +1,8 @@
 //! Hankel transform of the generalised Gaussian PSF, tabulated once per exponent.
 //!
 //! The PSF of unit scale is `h(r) = p^(1 - 2/p) / (2 pi Gamma(2/p)) exp(-r^p / p)` (Li 2014, eq. 5.16, with the
-//! normalisation of a radial function; the printed one and that of E.2 are for a separable PSF). Its transform `H(z) =
-//! 2 pi int r h(r) J0(z r) dr` depends on `z = sigma w` alone, so one table serves every blur and frequency.
+//! normalisation of a radial function; the printed one and that of E.2 are for a separable PSF). Its transform
+//! `H(z) = 2 pi int r h(r) J0(z r) dr` depends on `z = sigma w` alone, so one table serves every blur and frequency.
 //! Quadrature: 16-node Gauss-Legendre on panels refined towards `r = 0` (where `r^p` is not smooth for fractional `p`)
 //! and no longer than a period of `J0`; 6-point Lagrange interpolation. Error below 1e-8. Cost: some 100 to 1000
 //! entries times about 600 nodes, 2 to 10 ms.

@@ -1,8 +1,8 @@
 //! Convolution kernels with the eight-fold symmetry of a round lens, and their frequency responses.
 //!
 //! A kernel of odd size `2 r + 1` is given by the coefficients at `0 <= dy <= dx <= r`, row by row in `dx`: (0,0),
-//! (1,0), (1,1), (2,0), ... A 7x7 kernel has ten. Its response is real and zero-phase, `sum c(dx, dy) cos(u dx) cos(v
-//! dy)`; its sign matters, so magnitudes must not be taken. Cost: O(r^2) per response.
+//! (1,0), (1,1), (2,0), ... A 7x7 kernel has ten. Its response is real and zero-phase,
+//! `sum c(dx, dy) cos(u dx) cos(v dy)`; its sign matters, so magnitudes must not be taken. Cost: O(r^2) per response.
 
 use ndarray::Array2;
 use serde::{Deserialize, Serialize};

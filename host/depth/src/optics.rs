@@ -2,9 +2,9 @@
 //!
 //! The far-focused image is taken with the sensor at `s1`, the near-focused one at `s2 = s1 + 2e`. An object imaged at
 //! the distance `w` from the lens has the normalised depth `alpha` with `w = s1 + (1 + alpha) e`: -1 at the far focus,
-//! +1 at the near focus, rising as the object comes nearer. The blur radii are `R1 = (1 + alpha) e / (2 Fe)` and `R2 =
-//! (1 - alpha) e / (2 Fe)`, so `2e = 2 Fe Rmax` (Li 2014, eqs. 4.1, 4.3 and 5.11; the thin lens is `1/F = 1/u + 1/w`).
-//! Units: millimetres unless a name says otherwise; blur radii in pixels. Every function is O(1).
+//! +1 at the near focus, rising as the object comes nearer. The blur radii are `R1 = (1 + alpha) e / (2 Fe)` and
+//! `R2 = (1 - alpha) e / (2 Fe)`, so `2e = 2 Fe Rmax` (Li 2014, eqs. 4.1, 4.3 and 5.11; the thin lens is
+//! `1/F = 1/u + 1/w`). Units: millimetres unless a name says otherwise; blur radii in pixels. Every function is O(1).
 
 mod distortion;
 mod doubt;

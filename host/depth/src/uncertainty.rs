@@ -1,8 +1,8 @@
 //! Standard deviation of each pixel's depth, from the noise of the camera.
 //!
 //! The run time solves `sum p1 (m - p1 alpha - p2 alpha^3) = 0` over a window. Independent pixel noise `n` of variance
-//! `s^2` changes `m - p1 alpha - p2 alpha^3` by `r = K2 * n2 + K1 * n1`, where `K2 = Q * (Gm1 - alpha Gp1 - alpha^3
-//! Gp2)` and `K1` has the sign of `Gm1` changed. To first order
+//! `s^2` changes `m - p1 alpha - p2 alpha^3` by `r = K2 * n2 + K1 * n1`, where
+//! `K2 = Q * (Gm1 - alpha Gp1 - alpha^3 Gp2)` and `K1` has the sign of `Gm1` changed. To first order
 //!
 //! `var(alpha) = sum sum p1(y) p1(y') cov(r(y), r(y')) / (c1 + 3 c3 alpha^2)^2`, `cov(r(y), r(y + d)) = 2 s^2 (A_mm +
 //! alpha^2 A_11 + 2 alpha^4 A_12 + alpha^6 A_22)(d)`

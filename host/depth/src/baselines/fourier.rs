@@ -3,9 +3,9 @@
 //! In a window of nearly one depth `I1 / I2 = H1 / H2` (eq. C.5; C.4 prints H1 for H2). For a Gaussian PSF that is
 //! `ln(|I1| / |I2|) = -(sigma1^2 - sigma2^2) w^2 / 4` with the PSF's second moments (twice the variance of one
 //! coordinate): one equation per frequency, solved by energy-weighted least squares. C.1 turns the moments into depth;
-//! corrected it reads `sigma = k d s / 2 (1/F - 1/u - 1/s)` (`k` multiplies the blur radius; the printed form lacks `s
-//! / 2` and inverts `k`). Every pixel has its own Hann window of 21 px, transformed at twelve frequencies by separable
-//! filters. Cost: about 2000 operations a pixel.
+//! corrected it reads `sigma = k d s / 2 (1/F - 1/u - 1/s)` (`k` multiplies the blur radius; the printed form lacks
+//! `s / 2` and inverts `k`). Every pixel has its own Hann window of 21 px, transformed at twelve frequencies by
+//! separable filters. Cost: about 2000 operations a pixel.
 
 use std::f64::consts::TAU;
 

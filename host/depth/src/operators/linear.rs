@@ -2,9 +2,9 @@
 //!
 //! `min sum W mean_alpha (NIR Gm1 - alpha Gp1 - alpha^3 Gp2)^2 + 0.03 sum (m / sum m) (Gp1 - LOG)^2` over the taps of
 //! the three kernels. `W ~ m Q'^2 max(w, 0.19)^-2` (sum 1) is the power of a natural texture (amplitude 1/f) behind the
-//! pre-filter `Q'`. The second term fixes the common scale and spectral shape, which the first leaves free: `LOG = (w /
-//! wp)^2 exp(1 - (w / wp)^2)`, `wp = 0.4 pi` (W&N 1998's band-pass). Eq. 5.18 of Li 2014 as printed divides by Gm1
-//! (poles) and weights only the NIR with Q. Cost: 153 x 21 + 153 equations in 30 unknowns for 7x7, a few ms.
+//! pre-filter `Q'`. The second term fixes the common scale and spectral shape, which the first leaves free:
+//! `LOG = (w / wp)^2 exp(1 - (w / wp)^2)`, `wp = 0.4 pi` (W&N 1998's band-pass). Eq. 5.18 of Li 2014 as printed divides
+//! by Gm1 (poles) and weights only the NIR with Q. Cost: 153 x 21 + 153 equations in 30 unknowns for 7x7, a few ms.
 
 use nalgebra::{DMatrix, DVector};
 

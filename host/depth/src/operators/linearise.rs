@@ -1,11 +1,11 @@
 //! Removes the cubic's error: a polynomial that makes the estimated alpha proportional to the true one.
 //!
 //! No cubic fits the NIR over the whole range, so the run time's alpha has a smooth, odd error: up to 0.1 mm at the
-//! ends of the rig's range. For a texture of known spectrum `S^2` the window sums have the expectations `c1 = sum S^2
-//! Q^2 P^2 Gp1^2`, `c3 = sum S^2 Q^2 P^2 Gp1 Gp2`, `c0 = sum S^2 Q^2 P Gp1 D Gm1` with `P = H2 + H1`, `D = H2 - H1`,
-//! which give the estimate for each true alpha. An odd polynomial of degree 7 inverts it. The spectrum is 1/f power
-//! behind a square pixel, between sand (nearly white) and natural textures (1/f^2); for both it removes at least two
-//! thirds of the error. Cost: 153 x 45 OTF pairs, about 1 ms; at run time four multiply-adds per pixel.
+//! ends of the rig's range. For a texture of known spectrum `S^2` the window sums have the expectations
+//! `c1 = sum S^2 Q^2 P^2 Gp1^2`, `c3 = sum S^2 Q^2 P^2 Gp1 Gp2`, `c0 = sum S^2 Q^2 P Gp1 D Gm1` with `P = H2 + H1`,
+//! `D = H2 - H1`, which give the estimate for each true alpha. An odd polynomial of degree 7 inverts it. The spectrum
+//! is 1/f power behind a square pixel, between sand (nearly white) and natural textures (1/f^2); for both it removes at
+//! least two thirds of the error. Cost: 153 x 45 OTF pairs, about 1 ms; at run time four multiply-adds per pixel.
 
 use std::f64::consts::PI;
 

@@ -1,10 +1,10 @@
 //! The pre-filter Q of the rational operators (Li 2014, eq. 5.20).
 //!
 //! Target: at each frequency the smallest slope of the NIR over depth, clipped at 0, peak 1, and zero above the first
-//! non-monotonic frequency. It removes frequencies whose ratio carries little depth. Fit: the linear least squares `min
-//! sum m ((Q - Q') / Z)^2` with `Z = Q + 0.05` and the grid's multiplicities `m`. Expressing the centre tap through the
-//! others forces the response at frequency 0 to exactly 0. Without a pre-filter depth errors are 5 to 35 times larger.
-//! Cost: 153 equations in at most 27 unknowns, well below 1 ms.
+//! non-monotonic frequency. It removes frequencies whose ratio carries little depth. Fit: the linear least squares
+//! `min sum m ((Q - Q') / Z)^2` with `Z = Q + 0.05` and the grid's multiplicities `m`. Expressing the centre tap
+//! through the others forces the response at frequency 0 to exactly 0. Without a pre-filter depth errors are 5 to 35
+//! times larger. Cost: 153 equations in at most 27 unknowns, well below 1 ms.
 
 use nalgebra::{DMatrix, DVector};
 

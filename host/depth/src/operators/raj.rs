@@ -1,9 +1,9 @@
 //! The operators of Raj & Staunton (2012), by their procedure.
 //!
 //! They assume a pill-box and start from `Gp1`, the Laplacian-of-Gaussian band-pass, fitted to the kernel size. First a
-//! linear model, `NIR Gm1 = Gp1 alpha`, gives `Gm1`; then `Gp2` corrects its error, `NIR Gm1 - Gp1 alpha = Gp2
-//! alpha^3`. The pre-filter passes everything between 0 and the first non-monotonic frequency; frequencies of flat NIR
-//! stay in, which Li 2014 (section 5.2.4) improves on. Cost: some ms.
+//! linear model, `NIR Gm1 = Gp1 alpha`, gives `Gm1`; then `Gp2` corrects its error,
+//! `NIR Gm1 - Gp1 alpha = Gp2 alpha^3`. The pre-filter passes everything between 0 and the first non-monotonic
+//! frequency; frequencies of flat NIR stay in, which Li 2014 (section 5.2.4) improves on. Cost: some ms.
 
 use nalgebra::{DMatrix, DVector};
 

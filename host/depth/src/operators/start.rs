@@ -1,7 +1,8 @@
 //! Start of the non-linear designs: a kernel from six samples of a radial response. Li 2014, section 5.2.3: the
 //! samples, equally spaced from 0 to pi rad/px, form three straight bands. The Parks-McClellan algorithm makes them a
-//! one-dimensional filter; the McClellan transform makes that nearly round in two dimensions: `H(u, v) = sum a_n
-//! T_n(F)`, `F = (cos u + cos v + cos u cos v - 1) / 2`, `a_0 = h(0)`, `a_n = 2 h(n)`. Cost: microseconds.
+//! one-dimensional filter; the McClellan transform makes that nearly round in two dimensions:
+//! `H(u, v) = sum a_n T_n(F)`, `F = (cos u + cos v + cos u cos v - 1) / 2`, `a_0 = h(0)`, `a_n = 2 h(n)`. Cost:
+//! microseconds.
 
 use std::f64::consts::PI;
 

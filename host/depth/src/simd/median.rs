@@ -1,9 +1,9 @@
 //! Medians of square windows by minimum and maximum alone, and their depth.
 //!
 //! First the columns of the window's rows are sorted, once for all windows that share them. The values of one rank in a
-//! window's `n` sorted columns make a row. If the rows were sorted too, the value at (i, j) would have at least `(i +
-//! 1) (j + 1) - 1` values not above it and `(n - i) (n - j) - 1` not below: only a band along the diagonal can be the
-//! median, with as many values above as below (after Paeth 1990, generalised). Selection within each row finds the
+//! window's `n` sorted columns make a row. If the rows were sorted too, the value at (i, j) would have at least
+//! `(i + 1) (j + 1) - 1` values not above it and `(n - i) (n - j) - 1` not below: only a band along the diagonal can be
+//! the median, with as many values above as below (after Paeth 1990, generalised). Selection within each row finds the
 //! band; dropping pairs of extremes from its 13 values (5x5) or 29 (7x7) leaves the median. Cost per vector: 24 minima
 //! and maxima for 3x3, about 140 for 5x5, about 510 for 7x7.
 

@@ -101,8 +101,8 @@ impl WindowRow {
 }
 
 dispatch! {
-    /// Takes `rows` rows from `first` on; writes to rows `4 y ..` of `sums` the window sums of `p1 p1`, `p1 p2`, `p1
-    /// m`, `m m` that end with row `y`.
+    /// Takes `rows` rows from `first` on; writes to rows `4 y ..` of `sums` the window sums of `p1 p1`, `p1 p2`,
+    /// `p1 m`, `m m` that end with row `y`.
     fn vertical_sums(state: &mut WindowRow, inputs: [&Plane; 3], first: usize, sums: &mut Plane, rows: usize, width: usize) =
         vertical_generic
 }

@@ -134,7 +134,6 @@ fn every_focus_measure_peaks_at_best_focus() {
     }
 }
 
-/// A lens with elliptical distortion, tested at other depths.
 #[test]
 fn a_flat_series_teaches_a_correction() {
     let optics = rig("gaussian:k=0.4578");

@@ -96,7 +96,6 @@ impl Texture {
         self
     }
 
-    /// The far- and near-focused images of a plane at `alpha`, mean 1.
     pub fn pair(&self, psf: Psf, max_blur_px: f64, alpha: f64) -> [Array2<f32>; 2] {
         let otf = psf.otf_up_to(2.0 * std::f64::consts::SQRT_2 * PI * max_blur_px);
         [1.0 + alpha, 1.0 - alpha].map(|factor| {

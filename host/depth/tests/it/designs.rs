@@ -35,8 +35,7 @@ fn optics(psf: &str, max_blur_px: f64) -> Optics {
     file.check().unwrap()
 }
 
-/// 0.01 is 0.23 mm of the rig's 46 mm. The linear design is the most accurate; published procedures rely more on the
-/// cubic.
+/// 0.01 is 0.23 mm of the rig's 46 mm. The linear design is the most accurate.
 #[test]
 fn every_family_and_design_measures_depth() {
     for (family, how, psf, limit) in [

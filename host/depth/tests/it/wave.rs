@@ -67,7 +67,6 @@ fn calibrated(lens: &WaveLens) -> Result<StackLens, StackError> {
     calibrate_stack(&stack, &settings)
 }
 
-/// Results on other scenes.
 #[derive(Debug)]
 struct Judged {
     rms_mm: f64,
