@@ -16,8 +16,7 @@ const NAME_MAX: usize = 31;
 const FLOAT: i32 = 2;
 
 /// Encodes maps of one size as channels; NaN means no value. `texts` are header attributes: name (with namespace, e.g.
-/// `farnear:units`) and value. Fails for maps of different or zero size, and for empty, duplicate or longer names than
-/// 31 bytes.
+/// `farnear:units`) and value. Names must be unique, of 1 to 31 bytes.
 pub fn write(channels: &[(&str, ArrayView2<f32>)], texts: &[(&str, &str)]) -> Result<Vec<u8>, EncodeError> {
     let mut bytes = Vec::new();
     write_to(channels, texts, &mut bytes).map_err(EncodeError::of("an EXR"))?;

@@ -7,8 +7,8 @@
 //! | TIFF, BigTIFF | 1 to 16-bit and 32-bit integers, 16 to 64-bit float, grey and RGB, planar or not, strips or tiles |
 //!
 //! The content, not the name, selects the format. EXIF orientation is applied. Raw camera files, previews and other
-//! formats are rejected with a remedy. `file.tif#3` is page 3 (from 1) of a multi-page TIFF. Colour becomes `(R + G +
-//! B) / 3`, as in Li 2014, unless [`Grey`] differs; alpha is ignored.
+//! formats are rejected with a remedy. `file.tif#3` is page 3 (from 1) of a multi-page TIFF. Colour becomes
+//! `(R + G + B) / 3`, as in Li 2014, unless [`Grey`] differs; alpha is ignored.
 
 mod complete;
 mod decode;
@@ -160,8 +160,8 @@ pub fn file_and_page(path: &Path) -> (PathBuf, Option<usize>) {
     if path.exists() { (path.into(), None) } else { named().unwrap_or_else(|| (path.into(), None)) }
 }
 
-/// Reads an image file, or one page of it (`file.tif#3`). Fails if it is unreadable, broken, incomplete, neither grey
-/// nor RGB, or multi-page without a page number.
+/// Reads an image file or page (`file.tif#3`). Fails if broken, incomplete, not grey or RGB, or multi-page without a
+/// number.
 pub fn read_grey(path: &Path) -> Result<GreyImage, ImageError> {
     read_grey_with(path, &ReadSettings::default())
 }
@@ -172,8 +172,8 @@ pub fn read_grey_with(path: &Path, settings: &ReadSettings) -> Result<GreyImage,
     decoded.grey(settings).map_err(|reason| ImageError::Format { path, reason })
 }
 
-/// Reads with 8 bits per sample: grey, or RGB of shape (height, width, 3). 16-bit samples keep their upper half.
-/// Rejects float images, whose scale is unknown.
+/// Reads with 8 bits per sample: grey, or RGB (height, width, 3). 16-bit samples keep their upper half; floats are
+/// rejected.
 pub(crate) fn read_8_bit(path: &Path) -> Result<Samples8, ImageError> {
     let (decoded, path) = read_decoded(path)?;
     decoded.in_8_bits().map_err(|reason| ImageError::Format { path, reason })

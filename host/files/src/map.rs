@@ -60,7 +60,7 @@ pub enum Format {
 }
 
 impl Format {
-    /// `None` for another ending.
+    /// Format of a file name; `None` for another ending.
     pub fn of(path: &Path) -> Option<Self> {
         match path.extension()?.to_str()?.to_lowercase().as_str() {
             "npy" => Some(Self::Npy),

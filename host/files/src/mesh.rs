@@ -57,7 +57,7 @@ impl Lateral {
         }
     }
 
-    /// For a map of every `step`-th row and column.
+    /// The same for a map of every `step`-th row and column.
     #[must_use]
     pub fn thinned(self, step: usize) -> Self {
         let step = step as f64;
@@ -76,8 +76,7 @@ impl Lateral {
 /// No vertex.
 const NONE: u32 = u32::MAX;
 
-/// Writes the mesh of `depth`, coloured by `grey` (any scale), row by row: 12 MP are half a gigabyte. The header names
-/// the unit.
+/// Writes the mesh of `depth`, coloured by `grey` (any scale), row by row, as large maps exceed memory. Names the unit.
 pub fn write(
     depth: ArrayView2<f32>,
     grey: ArrayView2<f32>,

@@ -71,8 +71,8 @@ impl Staging {
         Self::begin(target.join(partial_name("files")), target.into(), made_target)
     }
 
-    /// Replaces an earlier result: files with these names that are not written now are removed. `record` describes the
-    /// result and is absent while files of two results are in the folder.
+    /// Replaces an earlier result: unwritten files of these names are removed. `record` describes the result and is
+    /// absent while files of two results are in the folder.
     pub fn replacing(mut self, record: &'static str, files: impl IntoIterator<Item = &'static str>) -> Self {
         self.replaced.extend(files);
         self.record = Some(record);
@@ -109,7 +109,6 @@ impl Staging {
         fs::write(&path, bytes).map_err(StagingError::at(&self.target.join(name)))
     }
 
-    /// Writes a file through `fill`.
     pub fn fill(
         &self,
         name: &str,
@@ -184,8 +183,7 @@ pub fn write_file(path: &Path, bytes: &[u8]) -> Result<(), StagingError> {
     })
 }
 
-/// Removes leftovers of killed programs. Active writers hold a lock that ends with them; folders that cannot be locked
-/// or removed stay.
+/// Removes leftovers of killed programs. Active writers hold a lock that ends with them; locked folders stay.
 fn sweep(folder: &Path) {
     for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
         let name = entry.file_name();

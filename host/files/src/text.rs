@@ -11,7 +11,7 @@ pub struct Writer {
 }
 
 impl Writer {
-    /// Fails if the built-in font is damaged.
+    /// Prepares text of this height.
     pub fn new(height_px: f32) -> Result<Self, EncodeError> {
         let font = FontRef::try_from_slice(dejavu::sans::regular()).map_err(EncodeError::of("text"))?;
         Ok(Self { font, scale: PxScale::from(height_px) })
@@ -26,7 +26,7 @@ impl Writer {
         text.chars().map(|letter| font.h_advance(font.glyph_id(letter))).sum::<f32>().ceil() as u32
     }
 
-    /// Upper left corner at (`left`, `top`), clipped at the picture.
+    /// Writes with the upper left corner at (`left`, `top`), clipped.
     pub fn write(&mut self, picture: &mut RgbImage, left: u32, top: u32, text: &str, ink: Rgb<u8>) {
         let font = self.font.as_scaled(self.scale);
         let mut x = left as f32;

@@ -178,7 +178,7 @@ impl Decoded {
         Ok(GreyImage { pixels, samples, colour: self.colours == 3, white_level })
     }
 
-    /// Without alpha.
+    /// Eight bits per sample, without alpha.
     pub(crate) fn in_8_bits(self) -> Result<Pixels, String> {
         let bytes = match self.values {
             Values::U8(values) => values,
@@ -263,8 +263,7 @@ fn greys<T: Copy + Into<f64>>(
     pixels.map(|p| (p[0].into() * r + p[1].into() * g + p[2].into() * b) as f32).collect()
 }
 
-/// Saturation code of a camera with fewer than 16 bits, if several pixels have it: 2^n - 1 in the lower bits, or
-/// shifted up. `None` without saturation.
+/// Saturation code of a camera with fewer than 16 bits, if several pixels have it: 2^n - 1, or shifted up.
 fn white_of_values(codes: &[u16]) -> Option<u16> {
     let (mut largest, mut used) = (0, 0);
     for code in codes {

@@ -55,7 +55,7 @@ impl Histogram {
         present.len() < 2 || present == [0, SHADOW]
     }
 
-    /// `None` for pictures that are not masks.
+    /// The levels of masks; `None` for other pictures.
     #[must_use]
     pub fn levels(&self) -> Option<Levels> {
         match self.present().as_slice() {
@@ -105,8 +105,8 @@ impl Default for Levels {
 }
 
 impl Levels {
-    /// The levels of a histogram known to be of masks; `first` is for messages. Returns [`MaskError::Levels`] if
-    /// nothing would be set despite several levels.
+    /// The levels of a histogram known to be of masks; `first` is for messages. [`MaskError::Levels`] if nothing would
+    /// be set.
     pub fn of_masks(histogram: &Histogram, first: &std::path::Path) -> Result<Self, MaskError> {
         if let Some(levels) = histogram.levels() {
             return Ok(levels);

@@ -12,7 +12,7 @@ pub struct Header {
 }
 
 impl Header {
-    /// The keys may be in any order.
+    /// Parses the keys in any order.
     pub fn parse(bytes: &[u8]) -> Result<Self, NpyError> {
         let mut text = Text { bytes, at: 0 };
         let (mut descr, mut fortran_order, mut shape) = (None, None, None);

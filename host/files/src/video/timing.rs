@@ -41,7 +41,7 @@ pub(super) struct Timing {
 }
 
 impl Timing {
-    /// Of the first video stream; `None` if ffmpeg cannot list them.
+    /// Times of the first video stream; `None` if ffmpeg cannot list them.
     pub fn of(path: &Path) -> Option<Self> {
         let listed = Command::new("ffmpeg")
             .args(["-nostdin", "-v", "error", "-i"])

@@ -122,7 +122,7 @@ impl<R: Read> Iterator for Y4m<R> {
     }
 }
 
-/// Horizontal and vertical; `None` without chroma.
+/// Pixels per chroma sample, horizontally and vertically; `None` without chroma.
 fn subsampling(colour_space: Colorspace) -> Option<(usize, usize)> {
     match colour_space {
         Colorspace::Cmono | Colorspace::Cmono12 => None,
