@@ -1,7 +1,7 @@
 //! Control gains of the piezo, computed at compile time from physical numbers.
 //!
-//! The piezo with the sensor is a lightly damped second-order system. With position `p`, scaled velocity `w = v /
-//! omega`, both in nm, and the commanded free stroke `u`:
+//! The piezo with the sensor is a lightly damped second-order system. With position `p`, scaled velocity
+//! `w = v / omega`, both in nm, and the commanded free stroke `u`:
 //! ```text
 //! d/dt [p]   [   0          omega     ] [p]   [  0  ]
 //!      [w] = [-omega  -2 zeta omega   ] [w] + [omega] (u + d)

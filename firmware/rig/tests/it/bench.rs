@@ -107,7 +107,6 @@ impl Bench {
         self.open_session();
     }
 
-    /// A board's writes before it sends anything.
     fn keep_boot(&mut self) {
         while let Some(write) = self.rig.keep_boot() {
             self.write(&write);
@@ -310,7 +309,6 @@ pub fn ends(kind: &EventKind, id: u32) -> bool {
 }
 
 impl Bench {
-    /// `None` if it does not exist.
     pub fn rig_event(&mut self, number: u32) -> Option<EventKind> {
         let deaf = std::mem::replace(&mut self.deaf, false);
         let answer = self.ask(&Request::ReadEvent { number }).1;

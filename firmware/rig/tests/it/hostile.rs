@@ -12,7 +12,6 @@ use farnear_protocol::{Micros, Nanometres, Request, Response};
 
 /// Hostile frames in a test run; `cargo xtask campaign` sends a million.
 const FRAMES: u64 = 20_000;
-/// Recorded frames that the attacker replays.
 const RECORDED: usize = 512;
 
 struct Enemy {
@@ -115,7 +114,6 @@ const fn is_long(request: &Request) -> bool {
     )
 }
 
-/// A host opens a session, sends some requests, and dies.
 fn killed_host(bench: &mut Bench, ledger: &mut Ledger, enemy: &mut Enemy) {
     ledger.session = 1 + enemy.below(u64::from(u32::MAX)) as u32;
     say(bench, ledger, enemy, &Request::OpenSession);

@@ -19,7 +19,6 @@ fn answer_to(bench: &mut Bench, bytes: &[u8]) -> Option<Answer> {
     bench.answers.pop().map(|(_, answer)| answer)
 }
 
-/// Requests in a given session.
 fn ask_in(bench: &mut Bench, session: u32, id: u32, request: &Request) -> Answer {
     let boot = if *request == Request::Hello { 0 } else { BOOT };
     answer_to(bench, &request_frame(id, boot, session, request)).expect("an answer")

@@ -29,12 +29,9 @@ pub struct Hardware {
     pub dac: u16,
     random: u64,
     exposure: Option<(BoardMicros, Micros, Option<ShotLight>)>,
-    /// Brightness of the light outputs, and whether the last tick ended a flash.
     pub lights: LightLevels,
     pub flash_cancelled: bool,
-    /// Rising edge and length of each trigger.
     pub triggers: Vec<(u64, Micros)>,
-    /// Piezo position at each trigger.
     pub piezo_at_trigger: Vec<f64>,
     /// Period and exposure of a free-running camera, us.
     pub free_running: Option<(u64, u64)>,

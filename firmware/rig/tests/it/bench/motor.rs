@@ -24,7 +24,6 @@ pub struct MotorFaults {
     /// Fixed state of the switch, for every position.
     pub home_switch: Option<bool>,
     pub far_switch: Option<bool>,
-    /// The driver's DIAG line.
     pub driver: bool,
 }
 
@@ -146,7 +145,6 @@ impl Motor {
         }
     }
 
-    /// Plays segments for some timer ticks.
     fn play(&mut self, ticks: u32, now_us: f64, cut: bool) {
         let mut left = ticks;
         while left > 0 {

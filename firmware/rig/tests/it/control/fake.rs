@@ -34,7 +34,6 @@ pub struct Fake {
     pub hardware: Hardware,
     pub now: u64,
     pub calls: Vec<Call>,
-    /// The board hangs after this many calls.
     pub hangs_after: Option<usize>,
     /// The emergency stop opens just before this call.
     pub opens_before: Option<Call>,
@@ -47,7 +46,6 @@ pub struct Fake {
     /// Ticks until the last frame has left.
     pub sending: usize,
     pub sent: Vec<Vec<u8>>,
-    /// Times and rates of link changes.
     pub rates: Vec<(u64, LinkRate)>,
     pub logs: VecDeque<Log>,
     log_number: u32,
@@ -96,7 +94,6 @@ impl Fake {
         self.received.extend(bytes);
     }
 
-    /// Waits for the next tick.
     pub fn pass(&mut self) {
         self.now += u64::from(TICK_US);
         self.sending = self.sending.saturating_sub(1);
