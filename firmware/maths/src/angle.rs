@@ -8,7 +8,6 @@ use core::f32::consts::PI;
 #[derive(Clone, Copy, PartialEq, Eq, Default, Debug)]
 pub struct BinaryAngle(u32);
 
-/// Radians per unit.
 const RADIANS: f32 = PI / 2_147_483_648.0;
 
 impl BinaryAngle {

@@ -21,8 +21,8 @@
 //! Positions and depths are Q1.31. A product keeps its upper 32 bits (one `SMMLA` on a Cortex-M4), so each Horner step
 //! removes a fraction bit: a third-order factor (`U^3`, `x U^2`, `x^2 y`, ...) has 26, second 25, first 24, constant
 //! and result 23. The range of an `i32` doubles per step: 32, 64, 128, 256. With coefficients below 4 and |x|, |y|, |U|
-//! <= 1 a partial sum is at most 4 times its number of terms: 4 of 32, 16 of 64, 40 of 128 and 80 of 256. A blend is a
-//! convex combination; the difference of two factors, multiplied by a weight, has one more fraction bit and at most
+//! at most 1 a partial sum is at most 4 times its number of terms: 4 of 32, 16 of 64, 40 of 128 and 80 of 256. A blend
+//! is a convex combination; the difference of two factors, multiplied by a weight, has one more fraction bit and at most
 //! twice the value. Truncation costs at most 16 units of 2^-23, a sixteenth of a Q1.15 unit.
 
 mod blend;
@@ -40,8 +40,7 @@ pub use frame::{Error, Frame};
 pub use full::{FULL_TERMS, Full, FullCoefficients};
 pub use regions::{REGION_TERMS, REGIONS, RegionCoefficients, Regions};
 
-/// Contents of a correction's scratch table. A caller that interrupts the correction between two rows stores it next to
-/// the table, which then need not be built again.
+/// Contents of a correction's scratch table; saved between two rows, it need not be rebuilt.
 #[derive(Clone, Copy, PartialEq, Eq, Default, Debug)]
 pub struct TableState(Option<(usize, usize)>);
 

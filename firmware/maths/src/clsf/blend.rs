@@ -13,16 +13,15 @@ use super::{
 
 const BANDS: usize = REGIONS + 1;
 
-/// Correction blended between region centres. Cost: [`crate::clsf`]; the table of each of four row bands takes about
-/// 245 instructions per column.
+/// Correction blended between region centres. Table cost: about 245 instructions per column and row band (four).
 #[derive(Debug)]
 pub struct Blend<'t> {
     coefficients: RegionCoefficients,
     frame: Frame,
     rows: [Band; BANDS],
     columns: [Band; BANDS],
-    /// Per column: terms in x for the upper region row, the lower's excess (one more fraction bit), and the weight of
-    /// the right region.
+    /// Per column: terms in x for the upper region row, the lower's excess (one more fraction bit), and the right
+    /// region's weight.
     table: &'t mut [i32],
     table_band: Option<(usize, usize)>,
 }
@@ -58,8 +57,7 @@ impl<'t> Blend<'t> {
         TableState(self.table_band)
     }
 
-    /// Corrects row `row` in place; in order the table is built only four times. Leaves the row untouched on
-    /// [`Error::NoSuchRow`] or [`Error::RowLength`].
+    /// Corrects row `row` in place; in order the table is built only four times. An error leaves the row untouched.
     pub fn correct_row(&mut self, row: u16, depths: &mut [i16]) -> Result<(), Error> {
         self.frame.check_row(row, depths.len())?;
         let Some(band) = self.rows.iter().find(|band| row < band.pixels.end) else {

@@ -22,7 +22,6 @@ const MOST_SAMPLES: u32 = 1 << 22;
 /// third of the image give 6e-3; three depths instead of four less than 1e-6.
 const LEAST_PIVOT: f64 = 3e-5;
 
-/// Sums of products of `N` terms.
 #[derive(Clone, Debug)]
 struct Sums<const N: usize> {
     /// Lower triangle with the diagonal.
@@ -137,9 +136,8 @@ impl RegionFit {
         Self { frame, sums: [const { [const { Sums::new() }; REGIONS] }; REGIONS] }
     }
 
-    /// Adds pixels of row `row` of a flat target at `truth`; depths are Q1.15 codes of one
-    /// [`DepthScale`](super::DepthScale), [`NO_VALUE`] is skipped. Fails with [`Error::NoSuchRow`],
-    /// [`Error::RowLength`] or [`Error::TooManySamples`].
+    /// Adds pixels of row `row` of a flat target at `truth`: Q1.15 codes of one [`DepthScale`](super::DepthScale),
+    /// skipping [`NO_VALUE`].
     pub fn add_row(&mut self, row: u16, columns: Columns, depths: &[i16], truth: i16) -> Result<(), Error> {
         columns.check(self.frame, row, depths.len())?;
         let (rows, across) = (self.frame.rows(), self.frame.columns());
@@ -154,8 +152,7 @@ impl RegionFit {
         Ok(())
     }
 
-    /// The coefficients. [`Error::Underdetermined`] means too few samples for a region's terms (fewer than four depths,
-    /// too few pixels); also fails with [`Error::CoefficientTooLarge`].
+    /// The coefficients. [`Error::Underdetermined`]: too few depths (below four) or pixels for a region's terms.
     pub fn solve(&self) -> Result<RegionCoefficients, Error> {
         let mut coefficients = RegionCoefficients::default();
         for (coefficients, sums) in coefficients.as_flattened_mut().iter_mut().zip(self.sums.as_flattened()) {

@@ -5,8 +5,7 @@ use super::Error;
 /// Code of a pixel without depth; a correction keeps it.
 pub const NO_VALUE: i16 = i16::MIN;
 
-/// Largest code of a depth. Values beyond the scale saturate to `i16::MAX` or [`NO_VALUE`], so neither end is a
-/// measurement.
+/// Largest code. Depths beyond the scale saturate to `i16::MAX` or [`NO_VALUE`]; neither end is a measurement.
 const LARGEST: f32 = 32766.0;
 
 /// Linear map between mm and normalised depth.
@@ -20,7 +19,7 @@ impl DepthScale {
     /// Factor on half the working range, so that a distorted depth still fits the scale.
     pub const MARGIN: f32 = 1.3;
 
-    /// The scale for a working range, its ends in mm in either order; [`Error::EmptyRange`] if they coincide or are not
+    /// The scale for a working range, its ends in mm in either order; [`Error::EmptyRange`] unless they differ and are
     /// finite.
     pub fn for_range(one_end_mm: f32, other_end_mm: f32) -> Result<Self, Error> {
         let half = (one_end_mm - other_end_mm) / 2.0;

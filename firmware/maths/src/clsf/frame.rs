@@ -126,7 +126,6 @@ struct Weights {
 }
 
 impl Band {
-    /// Whether only one region applies.
     pub(super) fn is_outer(&self) -> bool {
         self.before == self.after
     }

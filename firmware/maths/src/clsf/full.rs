@@ -64,7 +64,7 @@ impl<'t> Full<'t> {
         TableState(Some((0, 0)))
     }
 
-    /// Corrects row `row` in place. Leaves the row untouched on [`Error::NoSuchRow`] or [`Error::RowLength`].
+    /// Corrects row `row` in place; an error leaves it untouched.
     pub fn correct_row(&mut self, row: u16, depths: &mut [i16]) -> Result<(), Error> {
         self.frame.check_row(row, depths.len())?;
         let y = self.frame.rows().coordinate(row);

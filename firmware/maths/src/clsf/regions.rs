@@ -15,8 +15,7 @@ pub const REGION_TERMS: usize = 10;
 /// Coefficients as `[region row][region column][term]`.
 pub type RegionCoefficients = [[[Coefficient; REGION_TERMS]; REGIONS]; REGIONS];
 
-/// Correction per region. Cost per pixel: a cubic in `U` plus a table entry; per region row: about 50 instructions a
-/// column for the table.
+/// Correction per region. Cost: a cubic in `U` per pixel; about 50 instructions a column for each region row's table.
 #[derive(Debug)]
 pub struct Regions<'t> {
     coefficients: RegionCoefficients,
@@ -56,8 +55,7 @@ impl<'t> Regions<'t> {
         TableState(self.table_row.map(|row| (row, row)))
     }
 
-    /// Corrects row `row` in place; in order the table is built only three times. Leaves the row untouched on
-    /// [`Error::NoSuchRow`] or [`Error::RowLength`].
+    /// Corrects row `row` in place; in order the table is built only three times. An error leaves the row untouched.
     pub fn correct_row(&mut self, row: u16, depths: &mut [i16]) -> Result<(), Error> {
         self.frame.check_row(row, depths.len())?;
         let region_row = self.frame.rows().region_of(row);

@@ -7,8 +7,7 @@ use super::{
     format::{horner, step},
 };
 
-/// Factors of `U^3`, `U^2`, `U` and 1 as polynomials in the position along the row; index = power, each with one more
-/// fraction bit.
+/// Factors of `U^3`, `U^2`, `U` and 1 as polynomials in the position; index = power, each with one more fraction bit.
 pub(super) struct Factors<const CUBIC: usize, const SQUARE: usize, const LINEAR: usize, const CONSTANT: usize>
 {
     pub(super) cubic: [i32; CUBIC],
@@ -61,8 +60,8 @@ pub(super) fn linear_mixed(
     });
 }
 
-/// Factors as polynomials in the position, the table's first word. The second word is added to the factor of `U`, the
-/// third to the constant.
+/// Factors as polynomials in the table's first word; the second is added to the factor of `U`, the third to the
+/// constant.
 #[inline(never)]
 pub(super) fn polynomial(depths: &mut [i16], of_columns: &[[i32; 3]], factors: &Factors<1, 2, 2, 3>) {
     for_each_pixel(depths, of_columns, |depth, &[place, linear, constant]| {
@@ -76,8 +75,8 @@ pub(super) fn polynomial(depths: &mut [i16], of_columns: &[[i32; 3]], factors: &
     });
 }
 
-/// Four pixels per turn, written out because size optimisation does not unroll: counters are paid once, and offsets are
-/// part of the instructions.
+/// Four pixels per turn, because size optimisation does not unroll: counters are paid once, offsets are in the
+/// instructions.
 #[inline(always)]
 fn for_each_pixel<T>(depths: &mut [i16], of_columns: &[T], mut pixel: impl FnMut(&mut i16, &T)) {
     let (fours, rest) = depths.as_chunks_mut::<4>();

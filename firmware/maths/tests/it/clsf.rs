@@ -274,8 +274,7 @@ fn extreme() -> impl Strategy<Value = f64> {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
-    /// With overflow checks: coefficients at the edge of Q2.29 and extreme depths verify the stated ranges; results
-    /// agree with f64.
+    /// With overflow checks, coefficients at the edge of Q2.29 and extreme depths verify the stated ranges.
     #[test]
     fn nothing_overflows(
         c in prop::array::uniform3(prop::array::uniform3(prop::array::uniform10(extreme()))),
