@@ -49,7 +49,6 @@ pub struct Parts {
     pub board: Nucleo,
     /// Blinks while the loop runs.
     pub led: Peri<'static, PB0>,
-    /// By the strap.
     pub emulated: bool,
 }
 

@@ -245,7 +245,7 @@ impl CameraPort {
         });
     }
 
-    /// Also prevents one that has not begun.
+    /// Ends the flash, or prevents one that has not begun.
     pub fn cancel_flash(&mut self) {
         critical_section::with(|cs| {
             let mut strobe = EXPOSURE.borrow_ref_mut(cs);

@@ -41,7 +41,6 @@ static RECEIVED: [AtomicU8; RECEIVE_RING] = [const { AtomicU8::new(0) }; RECEIVE
 static TO_SEND: [AtomicU8; SEND_RING] = [const { AtomicU8::new(0) }; SEND_RING];
 
 pub struct Link {
-    /// Keeps pins and clock.
     _port: Uart<'static, Blocking>,
     taken: usize,
     /// Start of the data in [`TO_SEND`].
@@ -53,7 +52,7 @@ pub struct Link {
 }
 
 impl Link {
-    /// Also starts receiving.
+    /// Sets up the port and starts receiving.
     pub fn open(
         port: Peri<'static, USART3>,
         tx: Peri<'static, PD8>,
@@ -76,8 +75,7 @@ impl Link {
         Ok(Self { _port: port, taken: 0, sent: 0, handed_over: 0, written: 0 })
     }
 
-    /// Passes received bytes; `true` if the ring was full and bytes were lost. Call once per tick, also to continue
-    /// sending.
+    /// Passes received bytes; `true` if some were lost in a full ring. Call once per tick, also to continue sending.
     pub fn drain(&mut self, mut take: impl FnMut(u8)) -> bool {
         self.hand_over();
         let (end, lapped) = received();
@@ -98,7 +96,7 @@ impl Link {
         (self.sent + SEND_RING - self.written - 1) % SEND_RING > FRAME_MAX
     }
 
-    /// Dropped without [`Link::has_room`]; the host repeats its request.
+    /// Queues a frame; drops it without [`Link::has_room`], because the host repeats its request.
     pub fn send(&mut self, bytes: &[u8]) {
         if !self.has_room() {
             warn!("a frame was dropped: no room");

@@ -63,8 +63,7 @@ use crate::{
 /// From power-on to the FRAM's first answer (FM25V02, t_PU).
 const MEMORY_STARTS: Duration = Duration::from_micros(250);
 
-/// The rig with its memory's contents; a silent memory is removed. Separate from `main`, whose variables keep their
-/// place forever, and moved ones several.
+/// The rig with its memory's contents; a silent memory is removed. A separate function, to free its variables' stack.
 #[inline(never)]
 fn start(identity: Identity, fitted: &mut Option<Memory>) -> &'static mut Rig {
     static RIG: StaticCell<Rig> = StaticCell::new();
@@ -87,7 +86,7 @@ fn count_cycles() {
     }
 }
 
-/// A DAC8830 starts at 0 with its supply; after a supply dip the code is uncertain.
+/// Code of the piezo's DAC: a DAC8830 starts at 0 with its supply; after a supply dip the code is uncertain.
 fn kept_piezo_code(cause: ResetCause) -> Option<u16> {
     match cause {
         ResetCause::PowerOn => Some(0),

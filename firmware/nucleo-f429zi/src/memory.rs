@@ -20,12 +20,11 @@ const WRITE: u8 = 0x02;
 const READ: u8 = 0x03;
 const READ_ID: u8 = 0x9f;
 const READ_STATUS: u8 = 0x05;
-/// Status register bits that are always 0, except the second, which reports that a write is enabled (table 4). Without
-/// the chip they all read as ones.
+/// Status bits that read 0, except the second, write enabled (table 4); all read 1 without the chip.
 const STATUS_MASK: u8 = 0b0011_0011;
 const WRITE_ENABLED: u8 = 0b0000_0010;
-/// Manufacturer, family and density (table 6), after six continuation bytes. The last byte is the revision: 00 FM25V02,
-/// 08 FM25V02A.
+/// Manufacturer, family and density (table 6), after six continuation bytes; the revision follows (00 FM25V02, 08
+/// FM25V02A).
 const ID: [u8; 8] = [0x7f, 0x7f, 0x7f, 0x7f, 0x7f, 0x7f, 0xc2, 0x22];
 /// Attempts to read the name, or a piece equal twice in a row.
 const ATTEMPTS: usize = 4;
@@ -120,7 +119,7 @@ impl Memory {
         self.send(&[WRITE, high, low], &order.bytes);
     }
 
-    /// Without gaps. The HAL waits for each received byte, which takes twice as long.
+    /// Sends without gaps; the HAL waits for each received byte, which takes twice as long.
     fn send(&mut self, head: &[u8], bytes: &[u8]) {
         let spi = pac::SPI4;
         self.select.set_low();

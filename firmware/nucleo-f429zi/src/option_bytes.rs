@@ -9,7 +9,7 @@ use embassy_stm32::pac;
 /// Lowest sufficient level: BOR_LEV is 0 for level 3 and 1 for level 2 (RM0090, section 3.9.10).
 const LEVEL_2: u8 = 1;
 
-/// At level 2 or 3.
+/// Whether it is on, at level 2 or 3.
 pub fn has_brown_out_reset() -> bool {
     pac::FLASH.optcr().read().bor_lev() <= LEVEL_2
 }

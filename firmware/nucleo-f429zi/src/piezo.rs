@@ -39,8 +39,7 @@ const LOOK_CYCLES: u32 = 12;
 const BUSY_BIT: u32 = 1 << 31;
 /// Clocks after indicator and 18 bits.
 const TRAILING_BITS: u32 = 13;
-/// Control ticks (5 ms) after which the DAC's code is repeated: a loose contact or supply dip may have lost it, and a
-/// loop at the end of its range would not change it.
+/// Control ticks (5 ms) between repetitions of the DAC's code, which a loose contact or supply dip may have lost.
 const AGAIN_TICKS: u8 = 25;
 /// Converts two's complement to 0 = most negative.
 const SIGN_BIT: u32 = 1 << 17;
@@ -51,12 +50,11 @@ pub struct Piezo {
     convert: Output<'static>,
     code: Option<u16>,
     silent_ticks: u8,
-    /// In cycles.
+    /// Sampling time, cycles.
     sampled: u32,
 }
 
 impl Piezo {
-    /// The piezo is unchanged.
     pub fn new(
         spi: Peri<'static, SPI3>,
         clock: Peri<'static, PC10>,
@@ -77,7 +75,6 @@ impl Piezo {
         Self { _spi: spi, dac_select, convert, code: None, silent_ticks: 0, sampled: 0 }
     }
 
-    /// Returns the received word.
     fn exchange(&mut self, word: u16) -> u16 {
         pac::SPI3.dr().write(|w| w.set_dr(word));
         clock::wait_cycles(HALF_A_WORD_CYCLES);

@@ -21,7 +21,7 @@ pub use self::logger::take_log;
 #[unsafe(no_mangle)]
 static FARNEAR_LONGEST_TICK_CYCLES: AtomicU32 = AtomicU32::new(0);
 
-/// `true` if it is the longest so far.
+/// Records a tick's duration; `true` if it is the longest so far.
 pub fn note_tick(cycles: u32) -> bool {
     let longest = cycles > FARNEAR_LONGEST_TICK_CYCLES.load(Ordering::Relaxed);
     if longest {
@@ -30,7 +30,7 @@ pub fn note_tick(cycles: u32) -> bool {
     longest
 }
 
-/// The handler's state must be ready.
+/// Enables an interrupt; its handler's state must be ready.
 pub fn enable_interrupt(interrupt: Interrupt, priority: Priority) {
     interrupt.set_priority(priority);
     interrupt.unpend();
@@ -38,12 +38,12 @@ pub fn enable_interrupt(interrupt: Interrupt, priority: Priority) {
     unsafe { interrupt.enable() };
 }
 
-/// For an interrupt whose cause was cleared later.
+/// Clears a pending interrupt whose cause was cleared later.
 pub fn unpend(interrupt: Interrupt) {
     NVIC::unpend(interrupt);
 }
 
-/// Clears the flags (RM0090, RCC_CSR).
+/// Reads and clears the reset flags (RM0090, RCC_CSR).
 pub fn take_reset_cause() -> ResetCause {
     let flags = pac::RCC.csr().read();
     pac::RCC.csr().modify(|csr| csr.set_rmvf(true));

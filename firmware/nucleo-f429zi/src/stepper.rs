@@ -210,7 +210,6 @@ pub struct Stepper<T: StepInstance> {
 }
 
 impl<T: StepInstance> Stepper<T> {
-    /// Driver off.
     pub fn new(
         _timer: Peri<'static, T>,
         pins: DriverPins<impl TimerPin<T, Ch1>, impl Pin, impl Pin, impl Pin, impl BreakInputPin<T, BkIn1>>,

@@ -17,7 +17,7 @@ impl Supply {
         Self(())
     }
 
-    /// Too low for an orderly stop.
+    /// Whether the supply is too low for an orderly stop.
     pub fn is_low(&self) -> bool {
         pac::PWR.csr1().read().pvdo()
     }

@@ -34,8 +34,7 @@ fn panic(info: &PanicInfo<'_>) -> ! {
     SCB::sys_reset()
 }
 
-/// Clock security interrupt: the external clock has stopped and the internal 16 MHz is used. The motors' timers were
-/// broken with it.
+/// Clock security interrupt: the external clock has stopped, which broke the motors' timers; the internal one is used.
 // SAFETY: it never returns. Retained memory that was being written is rejected by `leave` and after the
 // reset.
 #[cortex_m_rt::exception]
@@ -45,8 +44,8 @@ unsafe fn NonMaskableInt() -> ! {
     SCB::sys_reset()
 }
 
-/// All faults (the configurable ones escalate). The stack may be full, so it is reset first; there is no return. `r0`
-/// is the faulting stack pointer, from cortex-m-rt's trampoline.
+/// All faults (the configurable ones escalate). The stack may be full, so it is reset first. `r0` is the faulting stack
+/// pointer, from cortex-m-rt's trampoline.
 // SAFETY: the name is cortex-m-rt's hook for this; there is no other.
 #[unsafe(naked)]
 #[unsafe(no_mangle)]

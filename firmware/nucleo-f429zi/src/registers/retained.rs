@@ -59,7 +59,6 @@ pub enum Last {
         status: u32,
     },
     StackOverflow,
-    /// The external clock stopped.
     ClockLost,
 }
 
@@ -125,8 +124,7 @@ fn write(boot: u32, last: [u32; 4]) {
     unsafe { RETAINED.0.get().cast::<[u32; WORDS]>().write_volatile(words) };
 }
 
-/// Boot number (one more than the last, or 1 after a power loss; never 0, "unknown" on the wire) and cause of the last
-/// stop, given once.
+/// Boot number (one more than the last, 1 after a power loss, never 0) and cause of the last stop, given once.
 pub fn take() -> (u32, Option<Last>) {
     critical_section::with(|_| {
         let Some([_, boot, a, b, c, d, ..]) = read() else {

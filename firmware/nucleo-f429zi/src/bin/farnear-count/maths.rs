@@ -14,7 +14,6 @@ use farnear_maths::{
 
 use crate::{cycles, fail};
 
-/// Pixels of a camera row.
 const WIDTH: usize = 640;
 const HEIGHT: u16 = 480;
 pub const PIXELS: u32 = WIDTH as u32;
@@ -33,7 +32,6 @@ impl Numbers {
         self.0
     }
 
-    /// Well inside the scale.
     fn code(&mut self) -> i16 {
         (self.next() >> 16) as i16 / 2
     }

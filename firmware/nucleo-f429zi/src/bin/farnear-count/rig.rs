@@ -139,7 +139,7 @@ impl Motor {
 /// A piezo with its 200 Hz resonance, damping 0.03; otherwise the rig would open its loop.
 #[derive(Default)]
 struct Piezo {
-    /// In nm.
+    /// Nanometres.
     position: f32,
     speed: f32,
 }
