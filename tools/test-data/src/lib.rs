@@ -36,8 +36,8 @@ pub fn declare_emulated_rig() {
     }
 }
 
-/// For build scripts: sets a configuration per program on the PATH. Tests use `#[cfg_attr(not(NAME), ignore = "needs
-/// PROGRAM")]`.
+/// For build scripts: sets a configuration per program on the PATH. Tests use
+/// `#[cfg_attr(not(NAME), ignore = "needs PROGRAM")]`.
 pub fn declare_programs() {
     println!("cargo::rerun-if-env-changed=PATH");
     for (name, program) in PROGRAMS {
