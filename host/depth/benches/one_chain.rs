@@ -1,7 +1,6 @@
 //! The run time for a small pair, repeated as often as requested: an emulator counts its instructions.
 //! `cargo xtask bench --arm` subtracts two counts to remove the start. The operators are stored
-//! (`farnear operators --psf pillbox`), because their design would take most of the counting. Arguments: vector unit,
-//! repetitions.
+//! (`farnear operators --psf pillbox`), because their design takes longer. Arguments: unit, repetitions.
 #![allow(clippy::unwrap_used, missing_docs)] // A benchmark may stop; it has no users.
 
 use std::hint::black_box;

@@ -1,8 +1,7 @@
 //! Minimum and median times of the run time, of one convolution and of the operator designs, in ms. Where the
 //! floating-point operations are known (`flop`: two per kernel tap as if taps shared nothing; `executed_flop`: executed
 //! operations), `fma_peak` is the core's limit: multiply-adds in registers. `cargo bench -p farnear-depth [-- FILTER]`;
-//! `FARNEAR_JSON=1` prints one JSON object per line. The images are random. Timings are not tests: nothing here can
-//! fail.
+//! `FARNEAR_JSON=1` prints one JSON object per line. The images are random; nothing here can fail.
 #![allow(clippy::unwrap_used, missing_docs)] // A benchmark may stop; it has no users.
 
 use std::hint::black_box;

@@ -4,8 +4,7 @@
 //! for noise. A window finds the root of `sum c_k alpha^k`, `c_k = sum rho_k u`, with the matched filter `u`. The
 //! variance follows from the noise, the filter's energy and the cubic's slope. Windows have one size or three:
 //! - [`Window::Adaptive`] takes the largest window whose value lies within two standard deviations of all smaller ones'
-//!   (intersection of confidence intervals; Goldenshluger & Nemirovski 1997, Katkovnik 1999). It smooths planes over 21
-//!   px and preserves steps.
+//!   (intersection of confidence intervals; Goldenshluger & Nemirovski 1997, Katkovnik 1999). It preserves steps.
 //! - [`Window::Safe`] takes the smallest window that is certain enough, without comparison.
 //!
 //! Work proceeds in tiles (`rows`), so that memory beyond the maps does not grow with the image. Cost: five 7x7

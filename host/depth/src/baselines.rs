@@ -9,8 +9,7 @@
 //! (Watanabe & Nayar and Raj & Staunton differ by their operators only: see [`crate::operators::Family`].) Each gives a
 //! [`DepthMap`] with the conventions of [`crate::pipeline::depth_from_pair`]; evidence is summed over
 //! [`Settings::smoothing_px`]. The first two use only the PSF's second moment, `sigma^2 = 2 k^2 R^2` for a Gaussian. In
-//! a telecentric pair the images' moments differ linearly with the normalised depth:
-//! `sigma1^2 - sigma2^2 = c Rmax^2 alpha`.
+//! a telecentric pair `sigma1^2 - sigma2^2 = c Rmax^2 alpha`.
 
 mod common;
 mod favaro;

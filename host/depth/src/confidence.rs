@@ -5,8 +5,7 @@
 //! difference image that its regression on `p1` leaves, `(sum m^2 - (sum p1 m)^2 / c1) / c1`: the mean square of the
 //! pixels' own alpha about the window's. Confidence is `c1 / (c1 + T) / (1 + misfit)`, `T = 0.05 median(c1)`: 1/2 for a
 //! perfect fit on the threshold. Li 2014's rule (eq. 6.15) compares the variance of the ratio with 0.0144 with an
-//! inverted inequality; it does not separate. Cost: O(1) per pixel; the median uses at most some 10,000 pixels on a
-//! regular grid.
+//! inverted inequality; it does not separate. Cost: O(1) per pixel; the median uses about 10,000 pixels.
 
 use ndarray::{Array2, ArrayView2, Ix2, SliceInfo, SliceInfoElem, Zip, s};
 

@@ -16,8 +16,7 @@
 //! over 1.3 times half the patterns' range ([`farnear_maths::clsf::DepthScale`]); beyond it the corrected depth is NaN,
 //! because a correction would extrapolate. A new correction is a file of this folder that implements `Learned`, and a
 //! line in the table below. Cost of [`Correction::apply_in_place`] on 640x480, one thread: 0.2 ms (`clsf`) to 0.4 ms
-//! (`two-step`), CDC (24 patterns, window 1) about 12 ms. Cost of [`fit`] from 24 patterns: 0.1 s (`clsf`) to 1.2 s
-//! (`cdc`).
+//! (`two-step`), CDC (24 patterns, window 1) about 12 ms. [`fit`] takes 0.1 to 1.2 s (`cdc`).
 
 mod board;
 mod cdc;
@@ -111,8 +110,8 @@ impl TryFrom<Stored> for Correction {
     }
 }
 
-/// Learns a correction. Returns [`CorrectionError`] for too few patterns, different sizes, repeated or invalid depths,
-/// or a region with too few valid pixels.
+/// Learns a correction. Returns [`CorrectionError`] for too few patterns, invalid or repeated depths, or too few valid
+/// pixels.
 pub fn fit(
     method: Method,
     patterns: &[Pattern<'_>],
@@ -156,8 +155,7 @@ impl Correction {
         })
     }
 
-    /// The corrected map; NaN stays NaN, and depths beyond the scale become NaN. [`CorrectionError::SizeMismatch`] for
-    /// another size.
+    /// The corrected map; NaN beyond the correction's scale. [`CorrectionError::SizeMismatch`] for another size.
     pub fn apply(&self, depth_mm: ArrayView2<f32>) -> Result<Array2<f32>, CorrectionError> {
         let mut corrected = depth_mm.as_standard_layout().into_owned();
         self.apply_in_place(corrected.view_mut())?;
@@ -177,8 +175,7 @@ impl Correction {
     }
 
     /// As [`Self::apply`] with the board's fixed-point arithmetic: identical bits, within 0.005 mm of [`Self::apply`].
-    /// Also returns [`CorrectionError::NotOnBoard`], or [`CorrectionError::Board`] for a coefficient or size beyond its
-    /// number formats.
+    /// Also fails with [`CorrectionError::NotOnBoard`] or [`CorrectionError::Board`] (number formats).
     pub fn apply_as_board(&self, depth_mm: ArrayView2<f32>) -> Result<Array2<f32>, CorrectionError> {
         self.check_size(depth_mm.dim())?;
         self.for_board()?.apply(depth_mm)

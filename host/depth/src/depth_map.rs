@@ -41,8 +41,7 @@ pub enum Warning {
         /// PSF of the optics.
         optics: Box<Psf>,
     },
-    /// The images seem to be swapped, judged by the scene, because swapping only turns alpha into -alpha; planes never
-    /// warn.
+    /// The images seem to be swapped, judged by the scene, because swapping only negates alpha; planes never warn.
     LooksSwapped(SwapEvidence),
 }
 

@@ -74,8 +74,7 @@ impl FocusMeasure {
         }
     }
 
-    /// The measure of an image, (height, width), any scale. Returns [`FocusError`] if it is too small, dark, or not
-    /// finite.
+    /// The measure of an image in any scale. Returns [`FocusError`] if it is too small, dark, or not finite.
     pub fn of(self, image: ArrayView2<f32>) -> Result<f64, FocusError> {
         let (height, width) = image.dim();
         if height < SMALLEST_PX || width < SMALLEST_PX {

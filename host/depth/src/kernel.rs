@@ -7,8 +7,7 @@
 use ndarray::Array2;
 use serde::{Deserialize, Serialize};
 
-/// Declares the only list of operator sizes, [`SIZES`], and `with_size!`. (Nested macros cannot write `$`, so it is
-/// passed in.)
+/// Declares the operator sizes, [`SIZES`], and `with_size!`. (`$` is passed in, because nested macros cannot write it.)
 macro_rules! sizes {
     ($dollar:tt: $($size:literal)+) => {
         /// Allowed operator sizes.
@@ -125,8 +124,7 @@ impl From<Kernel> for RawKernel {
 }
 
 impl Kernel {
-    /// A kernel from the free coefficients `octant` in the order of [`offsets`]. [`KernelError`] for a wrong number or
-    /// non-finite ones.
+    /// A kernel from the free coefficients `octant` in the order of [`offsets`]. [`KernelError`] if they do not fit.
     pub fn new(size: usize, octant: Vec<f64>) -> Result<Self, KernelError> {
         if !SIZES.contains(&size) {
             return Err(KernelError::Size(size));

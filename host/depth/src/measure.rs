@@ -183,8 +183,7 @@ pub struct Measurement {
     pub prepared: Prepared,
 }
 
-/// Depth of a pair in any common scale, (height, width), with [`prepare`](crate::prepare) and
-/// [`judge`](crate::validity).
+/// Depth of a pair in any common scale, with [`prepare`](crate::prepare) and [`judge`](crate::validity).
 pub fn measure_pair_of_views(
     far: ArrayView2<f32>,
     near: ArrayView2<f32>,
@@ -199,8 +198,7 @@ pub fn measure_pair_of_views(
     measure_pair(images, optics, method, camera, settings)
 }
 
-/// As [`measure_pair_of_views`], consuming the images `[far, near]`. Peak memory: about 30 bytes a pixel, with the
-/// images' eight.
+/// As [`measure_pair_of_views`], consuming the images `[far, near]`. Peak memory: 30 bytes a pixel, images included.
 pub fn measure_pair(
     images: [Array2<f32>; 2],
     optics: &Optics,
@@ -301,8 +299,7 @@ pub(crate) fn measure(
     Ok((map, estimate))
 }
 
-/// Applies the stage's response and scales the deviation; unlearned depths move out of range, where validity drops
-/// them.
+/// Applies the stage's response and scales the deviation; unlearned depths move out of the valid range.
 fn respond(depth_mm: &mut Array2<f32>, deviation_mm: &mut Array2<f32>, stage: &Stage, optics: &Optics) {
     Zip::from(depth_mm).and(deviation_mm).par_for_each(|depth, deviation| {
         let measured = optics.alpha(f64::from(*depth));

@@ -1,7 +1,6 @@
 //! Errors of a depth map against the truth. Pixels count if they lie `border_px` inside the map, the mask allows them,
 //! both depths are finite and, if requested, they lie more than `away_from_edges_px` from a step of the true depth.
-//! Depths in mm, NaN = no value. Cost: O(pixels); O(pixels x distance) with `away_from_edges_px`, which is not on a hot
-//! path.
+//! Depths in mm, NaN = no value. Cost: O(pixels); O(pixels x distance) with `away_from_edges_px` .
 
 use ndarray::{Array2, ArrayView2};
 use serde::{Deserialize, Serialize};
@@ -63,8 +62,7 @@ pub struct Comparison {
     pub pixels_without_truth: usize,
 }
 
-/// Compares `depth` with `truth`, (height, width) in mm, where `mask` is true. [`CompareError`] if sizes differ or no
-/// pixel is left.
+/// Compares `depth` with `truth`in mm, where `mask` is true. [`CompareError`] if sizes differ or no pixel is left.
 pub fn compare(
     depth: ArrayView2<f32>,
     truth: ArrayView2<f32>,

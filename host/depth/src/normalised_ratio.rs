@@ -2,9 +2,9 @@
 //!
 //! `NIR(w, alpha) = (H2 - H1) / (H2 + H1)` with `H1` the far-focused OTF (sign of Li 2014, eq. 1.7: `M = I2 - I1`; 1.5
 //! and 5.2 print the other one). It rises with alpha and is odd in it. Each frequency is fitted by
-//! `a1(w) alpha + a3(w) alpha^3` over alpha in [-1, 1]. Frequencies in rad/px. The grid is the 32x32 discrete Fourier
-//! transform reduced to the octant `0 <= v <= u <= 16` with multiplicities (153 points); alpha has 21 samples. Cost:
-//! 153 x 21 OTF pairs, about 1 ms.
+//! `a1(w) alpha + a3(w) alpha^3` over alpha in [-1, 1]. Frequencies in rad/px. The grid is the 32x32 DFT, reduced to
+//! the octant `0 <= v <= u <= 16` with multiplicities (153 points); alpha has 21 samples. Cost: 153 x 21 OTF pairs,
+//! about 1 ms.
 
 use std::f64::consts::PI;
 
@@ -59,8 +59,7 @@ pub fn sum_and_difference(otf: &Otf, max_blur_px: f64, w: f64, alpha: f64) -> [f
     [near + far, near - far]
 }
 
-/// NIR at the radial frequency `w` (rad/px) and depth `alpha`; not finite at a common zero of both OTFs (pill-box
-/// only).
+/// NIR at the radial frequency `w` (rad/px) and depth `alpha`; not finite at a common zero of both OTFs.
 pub fn normalised_ratio(otf: &Otf, max_blur_px: f64, w: f64, alpha: f64) -> f64 {
     let [sum, difference] = sum_and_difference(otf, max_blur_px, w, alpha);
     difference / sum

@@ -114,7 +114,7 @@ impl Optics {
         Self { stage: Some(stage), ..self }
     }
 
-    /// Magnification of the near- relative to the far-focused image for a non-telecentric lens: the sensor distances'
+    /// Magnification of the near- relative to the far-focused image without telecentricity: the sensor distances'
     /// ratio.
     pub fn magnification_ratio(&self) -> f64 {
         let range = self.working_range();

@@ -35,8 +35,7 @@ pub(crate) use windows::{
     sum_rows, without_noise,
 };
 
-/// Calls the generic function inside one with the backend's instructions enabled, so that the loop is compiled with
-/// them.
+/// Calls the generic function inside one with the backend's instructions enabled, so that it is compiled with them.
 macro_rules! dispatch {
     ($(#[$attribute:meta])* fn $name:ident($($argument:ident: $type:ty),* $(,)?) $(-> $result:ty)? = $generic:ident) => {
         $(#[$attribute])*

@@ -61,8 +61,7 @@ pub struct Lost {
     pub fraction: f64,
 }
 
-/// Removes invalid depths from a map and sets each confidence to its probability. `estimate` must be of the same
-/// prepared pair.
+/// Removes invalid depths from a map and sets each confidence to its probability. `estimate` is of the same pair.
 pub fn assess(
     map: &mut DepthMap,
     prepared: &Prepared,
@@ -183,8 +182,7 @@ impl Range {
     }
 }
 
-/// Probability of an error below three standard deviations: 0.997, less for deviations near the range or residuals
-/// above noise.
+/// Probability of an error below three standard deviations: 0.997, less for large deviations or residuals.
 fn probability(deviation_of_alpha: f32, misfit: f32) -> f32 {
     let noisy = (deviation_of_alpha / LARGEST_DEVIATION).powi(2);
     let unexplained = (misfit - 1.5).max(0.0);

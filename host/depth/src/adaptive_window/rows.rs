@@ -167,8 +167,7 @@ impl<'a> Tile<'a> {
         }
     }
 
-    /// Fills a band's rows of the maps, from `top` on. Returns sums of the squared residual, its noise, and the squared
-    /// texture.
+    /// Fills a band's rows of the maps, from `top` on. Returns sums of squared residual, noise and texture.
     pub(super) fn band(&mut self, top: usize, maps: Maps<'_>) -> [f64; 3] {
         let Maps { mut depth_mm, mut deviation_mm, mut misfit } = maps;
         let (rows, width) = misfit.dim();
@@ -229,8 +228,7 @@ impl<'a> Tile<'a> {
         sums
     }
 
-    /// Pixels whose smallest window contains a hole, if any; larger windows use mean brightness for a seventh of their
-    /// pixels.
+    /// Pixels whose smallest window contains a hole, if any; larger windows use mean brightness there.
     fn holes(&self, place: Place, halo: [usize; 2]) -> Option<Array2<bool>> {
         if self.job.scales.whole {
             return None;

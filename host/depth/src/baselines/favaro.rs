@@ -6,9 +6,9 @@
 //! space receives the least of the measured vector.
 //!
 //! Rendering uses this crate's OTFs; textures mix the spectra of sand and of a fractal. The vector's mean is subtracted
-//! (lighting). Vectors are taken every 3 px, residuals are summed over the smoothing window, and a parabola refines the
-//! least residual over depth. Cost: learning about 1 s; run time 98 x rank operations per depth and vector, about 1 s
-//! for 640x480.
+//! (lighting). Vectors are taken every 3 px, residuals summed over the window, and a parabola refines the least
+//! residual over depth. Cost: learning about 1 s; run time 98 x rank operations per depth and vector, about 1 s for
+//! 640x480.
 
 mod learn;
 
@@ -72,8 +72,7 @@ impl Favaro {
         Ok(Self { psf: optics.psf(), max_blur_px: optics.max_blur_px(), alphas, signals })
     }
 
-    /// As [`super::depth_from_pair`] without learning. Returns [`BaselineError::OtherOptics`] for projectors of another
-    /// blur.
+    /// As [`super::depth_from_pair`] without learning. Returns [`BaselineError::OtherOptics`] for another blur.
     pub fn depth_from_pair(
         &self,
         far: ArrayView2<f32>,

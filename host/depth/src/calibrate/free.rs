@@ -3,8 +3,7 @@
 //! The density of the light is a sum of [`HATS`] hats over the radius with weights of 0 or more; the OTF is linear in
 //! them. The cost is that of the models, `sum |H1 I2 - H2 I1|^2 / (H1^2 + H2^2)`, minimised by Newton steps with
 //! weights of at least 0 from the best Gaussian. A smoothness prior decides what the pairs do not: second differences
-//! of about [`BEND`] of the density's peak weigh as much as noise. Cost: 30 ms for a pair, mostly the table of the
-//! hats' transforms.
+//! of about [`BEND`] of the density's peak weigh as much as noise. Cost: 30 ms for a pair.
 
 use nalgebra::{DMatrix, DVector};
 

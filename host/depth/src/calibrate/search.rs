@@ -35,8 +35,7 @@ fn cost(observations: &[Observation], otf: &Otf, scale: f64) -> f64 {
     observations.iter().map(of_pair).sum()
 }
 
-/// Minimum of `f` on a geometric grid, refined by golden sections: place, value, and whether it is at an end of the
-/// grid.
+/// Minimum of `f` on a geometric grid, refined by golden sections: place, value, and whether it is at an end.
 fn minimise([low, high]: [f64; 2], trials: usize, f: impl Fn(f64) -> f64) -> (f64, f64, bool) {
     let ratio = (high / low).powf(1.0 / (trials - 1) as f64);
     let values: Vec<f64> = (0..trials).map(|i| f(low * ratio.powi(i as i32))).collect();

@@ -8,8 +8,7 @@ use crate::fourier::{Complex64, transform};
 
 const SMALLEST_PX: usize = 32;
 
-/// Compared frequencies, rad/px. Below, lighting differs more than blur; above, blurred images are empty and sharp ones
-/// have aliases.
+/// Compared frequencies, rad/px. Below, lighting differs more than blur; above, little is left but aliases.
 const BAND: [f64; 2] = [0.1, 2.0];
 
 const RINGS: usize = 128;

@@ -13,8 +13,7 @@ use crate::psf::{Otf, Psf};
 /// Coefficients that vary together under the square of a Hann window: `n sum w^4 / (sum w^2)^2 = 35/18` per axis.
 pub(super) const TOGETHER: f64 = (35.0 / 18.0) * (35.0 / 18.0);
 
-/// Coefficients of a band in the search for noise: lighting, aliases and misregistration spare some bands, and chance
-/// lowers the estimate by only 5 %.
+/// Coefficients of a band in the search for noise: some bands have no lighting or aliases. Chance lowers it by 5 %.
 const QUIET_BAND: f64 = 1500.0;
 
 pub(super) struct Seen {
@@ -50,8 +49,7 @@ pub(super) fn noise(observations: &[Observation]) -> f64 {
         let whole = bins.coefficients();
         let (mut left, mut count) = (0.0, 0.0);
         for ring in &bins.rings {
-            // The smaller eigenvalue of the ring's sums; the larger contains some of the noise, more with fewer
-            // coefficients.
+            // The smaller eigenvalue of the ring's sums; the larger contains some of the noise.
             let half = 0.5 * (ring.far - ring.near);
             let smaller = (0.5 * (ring.far + ring.near) - half.hypot(ring.cross)).max(0.0);
             let independent = (ring.count / TOGETHER).max(1.5);
@@ -67,8 +65,7 @@ pub(super) fn noise(observations: &[Observation]) -> f64 {
     if least.is_finite() { least } else { 0.0 }
 }
 
-/// Covariance of parameters: `at` gives the OTF and its derivatives for a blur radius and a frequency; `prior` is an
-/// inverse.
+/// Covariance of parameters: `at` gives the OTF and its derivatives for a radius and a frequency.
 pub(super) fn covariance(
     observations: &[Observation],
     parameters: usize,

@@ -39,8 +39,7 @@ pub(super) fn frame((height, width): (usize, usize)) -> Result<Frame, Correction
 }
 
 impl BoardCorrection {
-    /// Corrects a map in mm, (height, width), as the board does. [`CorrectionError::Board`] if coefficients or rows do
-    /// not fit.
+    /// Corrects a map in mm, (height, width), as the board does. [`CorrectionError::Board`] if rows do not fit.
     pub fn apply(&self, depth_mm: ArrayView2<f32>) -> Result<Array2<f32>, CorrectionError> {
         let (frame, width) = (self.frame, self.frame.width());
         match self.form {

@@ -4,9 +4,8 @@
 //! `r(v) = sum |Ui(x - i, y - j) - Uc(x - i, y - j, v)|` over a window of (2N + 1) x (2N + 1) (6.3, 6.4, 6.6, 6.7 and
 //! 6.10 print `Uo(x, y)` for the distorted depth `Ui` under the window). A V through the least residual and its two
 //! neighbours gives a fractional pattern index. The index gives a fractional pattern value and true depth, and
-//! `Uo = Ui - Uc + w`. Noise of the patterns would enter every result: they are smoothed (SD 8 px) and stored on a grid
-//! of 4 px in whole micrometres, so that stored and used values are identical. Cost: M (2N + 1 + about 12) operations
-//! per pixel.
+//! `Uo = Ui - Uc + w`. Noise of the patterns would enter every result: they are smoothed (SD 8 px) and kept on a grid
+//! of 4 px, in whole micrometres as in a file. Cost: M (2N + 1 + about 12) operations per pixel.
 
 mod scan;
 mod smooth;

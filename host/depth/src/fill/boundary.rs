@@ -36,8 +36,7 @@ pub fn trace_boundary(mask: ArrayView2<bool>, start: (usize, usize)) -> Vec<(usi
         first_move.get_or_insert((pixel, direction));
         boundary.push(next);
         pixel = next;
-        // The last background pixel as seen from the new pixel: straight moves turn back by two, diagonal ones by three
-        // eighths.
+        // The last background pixel from the new one: straight moves turn back two eighths, diagonal ones three.
         from = (direction + if direction % 2 == 0 { 6 } else { 5 }) % 8;
     }
 }

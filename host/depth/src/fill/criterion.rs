@@ -80,8 +80,7 @@ impl From<LowTexture> for String {
 }
 
 impl LowTexture {
-    /// Pixels of low texture; false where the energy is NaN. `pair` are the far- and the near-focused image in any
-    /// common scale.
+    /// Pixels of low texture; false where the energy is NaN. `pair`: far and near, any common scale.
     pub(super) fn mask(
         self,
         texture: ArrayView2<f32>,

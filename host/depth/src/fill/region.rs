@@ -31,8 +31,7 @@ pub(super) struct Regions {
 }
 
 impl Regions {
-    /// The regions of `low`, grown by at most `reach_px` where `texture` is low (NaN: in no region); touching regions
-    /// merge.
+    /// The regions of `low`, grown by up to `reach_px` over low `texture` (NaN: none); touching regions merge.
     pub fn find(low: Array2<bool>, texture: ArrayView2<f32>, reach_px: usize) -> Self {
         let scale = texture_scale(texture);
         let grown = (GROWN_TEXTURE * scale).max(f32::MIN_POSITIVE);

@@ -4,8 +4,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::DesignError;
 
-/// Relative singular values that count as zero: kernels with more taps than the grid resolves get the smallest
-/// solution.
+/// Relative singular values that count as zero: undetermined taps get the smallest solution.
 const RELATIVE_RANK: f64 = 1e-12;
 
 /// Minimises `|matrix x - rhs|^2` by QR and SVD. Returns [`DesignError::Singular`] without a finite solution.

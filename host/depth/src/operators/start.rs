@@ -12,8 +12,7 @@ use pm_remez::{BandSetting, linear, pm_parameters, pm_remez};
 use super::DesignError;
 use crate::kernel::{self, Kernel};
 
-/// A kernel of `size` whose response at the radial frequency `w` (rad/px) is about `target(w)`. Returns
-/// [`DesignError::Start`] without convergence.
+/// A kernel of `size` whose response at the radial frequency `w` (rad/px) is about `target(w)`.
 pub fn kernel_of_radial_response(target: impl Fn(f64) -> f64, size: usize) -> Result<Kernel, DesignError> {
     mcclellan(&parks_mcclellan(target, size)?)
 }

@@ -5,8 +5,7 @@
 //! zero-phase responses replace magnitudes, which would lose the sign of Gp2. Frequency 0, where NIR and Q are 0, is
 //! left out. Start: Gp1 = the Laplacian-of-Gaussian band-pass, `Gm1 = Gp1 / a1` and `Gp2 = a3 Gm1` from the NIR's cubic
 //! fit, the latter two by Parks-McClellan and McClellan ([`super::start`]). The kernels' common scale has no effect and
-//! is fixed afterwards; the common spectral shape stays near the start. Cost: 152 x 10 residuals in 30 unknowns for
-//! 7x7, some hundred iterations, 0.2 to 0.8 s.
+//! is fixed afterwards. Cost: 152 x 10 residuals in 30 unknowns for 7x7, some hundred iterations, 0.2 to 0.8 s.
 
 use levenberg_marquardt::LevenbergMarquardt;
 use nalgebra::{DMatrix, DVector};

@@ -3,8 +3,7 @@
 //! They assume a pill-box and start from `Gp1`, the Laplacian-of-Gaussian band-pass, fitted to the kernel size, with
 //! the pre-filter of [`raj`]. `Gm1` and `Gp2` minimise the depth error of a texture of amplitude 1/f by
 //! Levenberg-Marquardt: the residual `Gp1 alpha + Gp2 alpha^3 - NIR Gm1` over the slope `Gp1 + 3 Gp2 alpha^2`, weighted
-//! with the texture's and the filters' power. (The slope is regularised where the responses vanish.) Cost: 10 to 100
-//! ms.
+//! with the texture's and the filters' power. (Small slopes are regularised.) Cost: 10 to 100 ms.
 
 use levenberg_marquardt::LevenbergMarquardt;
 use nalgebra::{DMatrix, DVector};

@@ -2,7 +2,7 @@
 //! and `r^2 = x^2 + y^2` of the pinhole's pixel (u, v), the lens shows it at `x' = x g + 2 p1 x y + p2 (r^2 + 2 x^2)`,
 //! `y' = y g + p1 (r^2 + 2 y^2) + 2 p2 x y`, `g = (1 + k1 r^2 + k2 r^4 + k3 r^6) / (1 + k4 r^2 + k5 r^4 + k6 r^6)`
 //! (Brown 1966; OpenCV, calib3d). Coefficients are in the order of `cv2.calibrateCamera`: k1, k2, p1, p2, k3, k4, k5,
-//! k6. Pixel (0, 0) is the centre of the first.
+//! k6. Pixel centres are integers.
 
 use serde::{Deserialize, Serialize};
 

@@ -1,6 +1,5 @@
 //! `optics.toml` as written, and the check that turns it into [`Optics`]. The renderer (`hil-sim/scene`) parses the
-//! same files independently, so that its physics does not depend on this crate; a test compares numbers and messages of
-//! both.
+//! same files independently of this crate; a test compares numbers and messages.
 
 use serde::{Deserialize, Serialize};
 
@@ -71,8 +70,7 @@ pub struct OpticsFile {
 }
 
 impl OpticsFile {
-    /// Checks the values and derives the others. An [`OpticsError`] has the offending value, for contradictions also a
-    /// matching one.
+    /// Checks the values and derives the others. An [`OpticsError`] names the offending value.
     pub fn check(&self) -> Result<Optics, OpticsError> {
         let focal_length_mm = positive("lens", "focal_length_mm", self.lens.focal_length_mm, " of mm")?;
         let f_number = self.f_number(focal_length_mm)?;

@@ -1,5 +1,4 @@
-//! Checks before and after a run: sizes, windows, matching operators, invalid, saturated and constant images, a pair
-//! that looks swapped.
+//! Checks before and after a run: sizes, windows, operators, invalid, saturated, constant and swapped images.
 
 use ndarray::{Array2, CowArray, Ix2};
 use rayon::prelude::*;
@@ -225,8 +224,7 @@ pub(crate) fn reach_px(operators: &Operators, settings: &Settings) -> usize {
 /// Confidence from which a pixel counts in the test for a swapped pair.
 const CONFIDENT: f32 = 0.7;
 
-/// Part of the working range by which each third must be farther than the one above: grounds exceed it, other scenes
-/// rarely.
+/// Part of the working range by which each third must be farther than the one above: only grounds exceed it.
 const TILT: f64 = 0.12;
 
 /// Warnings about the result, from a thinned sample of its pixels.

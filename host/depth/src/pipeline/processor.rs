@@ -26,8 +26,7 @@ pub struct Processor {
 }
 
 impl Processor {
-    /// A processor for pairs taken with `optics`. Returns [`RunError`] for unusable windows or operators of another
-    /// blur.
+    /// A processor for `optics`. Returns [`RunError`] for unusable windows or operators of another blur.
     pub fn new(operators: &Operators, optics: &Optics, settings: &Settings) -> Result<Self, RunError> {
         check::check_settings(operators, optics, settings)?;
         let empty = || Array2::zeros((0, 0));

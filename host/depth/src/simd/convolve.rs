@@ -38,8 +38,7 @@ pub(crate) const MAX_ROWS: usize = 8;
 
 dispatch! {
     /// Convolves at most [`MAX_ROWS`] rows of `input`, each [`READ_BEYOND`] numbers longer than `width`. The last
-    /// vector of an `output` row may exceed the width. The output lags by `size - 1` rows: discard the first ones after
-    /// a reset.
+    /// vector of an `output` row may exceed the width. The output lags by `size - 1` rows, invalid after a reset.
     fn convolve_rows(taps: &mut Taps, input: &[&[f32]], output: &mut [&mut [f32]], width: usize) = by_size
 }
 

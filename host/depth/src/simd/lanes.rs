@@ -11,8 +11,7 @@ use std::arch::x86_64::*;
 pub(crate) trait Lanes: Copy {
     const N: usize;
 
-    /// Vectors to interleave in a chain of dependent operations, to hide latency while registers suffice: 1 or 2,
-    /// measured on Zen 4.
+    /// Vectors to interleave in a chain of dependent operations, to hide latency: 1 or 2, measured on Zen 4.
     const INTERLEAVED: usize;
 
     /// # Safety

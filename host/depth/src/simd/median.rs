@@ -12,8 +12,7 @@ use super::{Plane, dispatch};
 use crate::depth_of_alpha::DepthOfAlpha;
 
 dispatch! {
-    /// Median over `rows` and as many columns, and its depth in mm, for `width` columns. `sorted` is a work space of as
-    /// many rows.
+    /// Median over `rows` and as many columns, and its depth in mm, for `width` columns. `sorted` has as many rows.
     fn median_row(rows: &[&[f32]], sorted: &mut Plane, depth_of: DepthOfAlpha, output: &mut [f32], width: usize) =
         median_generic
 }
@@ -186,8 +185,7 @@ fn sort<L: Lanes, const SIDE: usize>(values: &mut [L; SIDE]) {
     }
 }
 
-/// Neither extreme of `n` values, at least half of all plus one, is the median: the next value replaces them, down to
-/// three.
+/// Neither extreme of `n` values, at least half of all plus one, is the median: later values replace both.
 macro_rules! forget {
     ($lanes:ident, $kept:ident, $rest:ident: $($n:literal)+) => {{
         let mut next = 0;

@@ -396,8 +396,7 @@ fn root_and_misfit<L: Lanes>([c1, c3, c0, energy]: [L; 4]) -> [L; 2] {
 }
 
 dispatch! {
-    /// Texture to confidence in place ([`confidence::confidence`]); counts low-texture pixels and pixels without
-    /// confidence.
+    /// Texture to confidence in place ([`confidence::confidence`]); counts pixels of low texture and none.
     fn confidence_row(texture: &mut [f32], misfit: &[f32], scale: f32) -> [usize; 2] = confidence_generic
 }
 

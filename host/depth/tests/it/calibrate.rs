@@ -176,8 +176,7 @@ fn a_flat_series_teaches_a_correction() {
     assert!(matches!(error, CalibrationError::FlatTarget { index: 0, .. }));
 }
 
-/// The largest error seen is 0.002, with standard errors of 0.0005 to 0.001; the rest is due to the renderer's pixels
-/// and aliases.
+/// The largest error seen is 0.002, with standard errors of 0.0005 to 0.001; the renderer's aliases add the rest.
 #[test]
 fn a_free_profile_has_the_otf_of_whatever_blurred_the_pairs() {
     let optics = rig("pillbox");

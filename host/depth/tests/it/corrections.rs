@@ -10,8 +10,7 @@ use rand_chacha::ChaCha8Rng;
 
 const PATTERNS: usize = 24;
 const HELD_OUT: usize = 9;
-/// Error of a noisy 8-bit pair with a Gaussian PSF, 7x7 smoothing and a 3x3 median: 0.6 mm over 46.2 mm of alpha -1 to
-/// 1.
+/// Error of a noisy 8-bit pair, Gaussian PSF, 7x7 smoothing, 3x3 median: 0.6 mm of 46.2 mm for alpha -1 to 1.
 const NOISE_ALPHA: f64 = 0.6 / 23.1;
 
 fn optics() -> Optics {

@@ -87,8 +87,7 @@ fn error(found: &Array2<f32>, pair: &Pair) -> (f64, f64) {
     ((squares / valid.len() as f64).sqrt(), valid.len() as f64 / errors.len() as f64)
 }
 
-/// The study's figures for the same windows: 0.60 to 0.65 mm for rational operators, at most 0.28 mm for adaptive
-/// windows.
+/// The study's figures: 0.60 to 0.65 mm for rational operators, at most 0.28 mm for adaptive ones.
 #[test]
 fn adaptive_windows_take_most_of_the_noise() {
     for (psf, limit) in [("pillbox", 0.30), (PSF, 0.30), ("generalised:p=1.8,k=0.4802", 0.32)] {

@@ -163,8 +163,7 @@ fn judged(lens: &WaveLens, found: &StackLens, sand: bool) -> Judged {
     }
 }
 
-/// Prints its figures, which are in docs/calibrate-stack.md. `FARNEAR_WAVE_LENSES=all` adds half a wave with
-/// astigmatism.
+/// Prints the figures of docs/calibrate-stack.md. `FARNEAR_WAVE_LENSES=all` adds half a wave with astigmatism.
 #[test]
 fn a_lens_by_wave_optics_is_calibrated_by_its_stack_and_measures_other_scenes_honestly() {
     // Spherical aberration and astigmatism, waves, and the largest RMSE relative to the bound: one response cannot
