@@ -1,7 +1,6 @@
 //! OpenEXR: maps as channels of one picture, in full precision, with texts in the header. One part, scan lines from the
 //! top, uncompressed 32-bit float (noise in the low bits hardly compresses). Layout: "OpenEXR File Layout",
-//! <https://openexr.com/en/latest/OpenEXRFileLayout.html>. The crate `exr` only reads it back in tests, because of its
-//! compile time.
+//! <https://openexr.com/en/latest/OpenEXRFileLayout.html>. Only tests use the crate `exr`, because of its compile time.
 
 use std::io::{self, Write};
 

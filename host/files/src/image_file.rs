@@ -160,8 +160,7 @@ pub fn file_and_page(path: &Path) -> (PathBuf, Option<usize>) {
     if path.exists() { (path.into(), None) } else { named().unwrap_or_else(|| (path.into(), None)) }
 }
 
-/// Reads an image file or page (`file.tif#3`). Fails if broken, incomplete, not grey or RGB, or multi-page without a
-/// number.
+/// Reads an image file or page (`file.tif#3`). Fails if broken, not grey or RGB, or multi-page without a number.
 pub fn read_grey(path: &Path) -> Result<GreyImage, ImageError> {
     read_grey_with(path, &ReadSettings::default())
 }
@@ -172,8 +171,7 @@ pub fn read_grey_with(path: &Path, settings: &ReadSettings) -> Result<GreyImage,
     decoded.grey(settings).map_err(|reason| ImageError::Format { path, reason })
 }
 
-/// Reads with 8 bits per sample: grey, or RGB (height, width, 3). 16-bit samples keep their upper half; floats are
-/// rejected.
+/// Reads with 8 bits per sample: grey, or RGB (height, width, 3). 16 bits keep their upper half; floats are rejected.
 pub(crate) fn read_8_bit(path: &Path) -> Result<Samples8, ImageError> {
     let (decoded, path) = read_decoded(path)?;
     decoded.in_8_bits().map_err(|reason| ImageError::Format { path, reason })

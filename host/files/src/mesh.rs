@@ -1,7 +1,6 @@
 //! Surface mesh as binary PLY for MeshLab, CloudCompare and Blender. The aperture is in the front focal plane, so the
 //! chief ray of an object point at distance z from the lens passes through the front focus: a pixel of pitch p sees p
-//! (z - F) / F of the object at any sensor position. x to the right, y up, z towards the viewer; all in the unit of the
-//! depths.
+//! (z - F) / F of the object at any sensor position. x to the right, y up, z towards the viewer, in the depths' unit.
 
 use std::io::{self, Write};
 

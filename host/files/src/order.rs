@@ -1,6 +1,5 @@
 //! Order of capture by the numbers in file names: `in9` before `in10`. Camera counters restart after 9999 (DCF): if the
-//! numbers form two dense groups at the ends of the range, the upper one comes first, unless the time stamps
-//! contradict.
+//! numbers form two dense groups at the ends of the range, the upper one comes first unless time stamps contradict.
 
 use std::{
     cmp::Ordering,

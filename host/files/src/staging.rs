@@ -48,8 +48,7 @@ pub struct Staging {
 }
 
 impl Staging {
-    /// Begins a new folder; creates its parents. Returns [`StagingError::Exists`] unless the target is missing or
-    /// empty.
+    /// Begins a new folder and its parents. Returns [`StagingError::Exists`] unless it is missing or empty.
     pub fn new_folder(target: &Path) -> Result<Self, StagingError> {
         let target: PathBuf = target.components().collect(); // without a slash at its end
         if occupied(&target) {

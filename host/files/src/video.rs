@@ -113,8 +113,7 @@ impl std::fmt::Debug for Video {
 }
 
 impl Video {
-    /// Opens a folder of pictures, a `.y4m` file, or any other file through ffmpeg. Later errors come with their
-    /// frames.
+    /// Opens a folder of pictures, a `.y4m` file, or any other file through ffmpeg. Frames report later errors.
     pub fn open(path: &Path) -> Result<Self, VideoError> {
         let metadata = path.metadata().map_err(|source| VideoError::io(path, source))?;
         let mut remark = None;

@@ -23,8 +23,7 @@ pub(crate) struct Page {
     pub directory: Directory,
 }
 
-/// Number of full-resolution images; 1 for other formats. Fails for an unreadable or raw file, or one with previews
-/// only.
+/// Number of full-resolution images; 1 for other formats. Fails for raw files and mere previews.
 pub fn page_count(path: &Path) -> Result<usize, ImageError> {
     let bytes = read_bytes(path)?;
     if !tiff_tags::is_tiff(&bytes) || complete::unsupported(&bytes).is_some() {
@@ -192,8 +191,7 @@ fn decode_page(bytes: &[u8], page: &Page) -> Result<Decoded, String> {
     Ok(Decoded { width, height, channels, colours, values, white_level })
 }
 
-/// Saturation code from the description (as written by farnear), or from the maximum sample value below 16
-/// bits.
+/// Saturation code from the description (as written by farnear), or the maximum sample value below 16 bits.
 fn camera_white(directory: &Directory) -> Option<u16> {
     let described = directory.description.as_deref().and_then(|text| {
         text.split_whitespace().find_map(|word| word.strip_prefix("white_level=")?.parse().ok())

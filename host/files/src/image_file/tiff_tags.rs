@@ -1,6 +1,5 @@
 //! TIFF directories without pixels: sizes, kinds and descriptions (TIFF 6.0, section 2; BigTIFF as in libtiff). The
-//! `tiff` crate rejects files whose first directory it cannot decode, such as raw files; error messages need their
-//! kind.
+//! `tiff` crate rejects files such as raw files, whose kind error messages need.
 
 const DIRECTORIES_MAX: usize = 100_000;
 const ENTRIES_MAX: u64 = 4096;

@@ -13,8 +13,8 @@ const LABELS: [u8; 6] = [0, 50, 85, 127, 170, 255];
 const SHADOW: u8 = 127;
 /// Surveyed pictures of a folder; more while they hold one level only.
 const SURVEYED: usize = 8;
-/// JPEG rings about edges: levels within this part of the range from black or white count as those, and at most one
-/// pixel in [`ONE_BETWEEN_IN`] may lie between.
+/// JPEG rings: levels this near to black or white (part of the range) count as those, all but one pixel in
+/// [`ONE_BETWEEN_IN`].
 const RINGING: f64 = 0.157;
 const ONE_BETWEEN_IN: u64 = 50;
 /// Two levels nearer than this with others between them are a picture, not a mask.
@@ -105,8 +105,7 @@ impl Default for Levels {
 }
 
 impl Levels {
-    /// The levels of a histogram known to be of masks; `first` is for messages. [`MaskError::Levels`] if nothing would
-    /// be set.
+    /// The levels of a masks' histogram; `first` is for messages. [`MaskError::Levels`] if nothing would be set.
     pub fn of_masks(histogram: &Histogram, first: &std::path::Path) -> Result<Self, MaskError> {
         if let Some(levels) = histogram.levels() {
             return Ok(levels);

@@ -2,8 +2,7 @@
 
 use crate::image_file::Page;
 
-/// Positions along the axis, um; `None` if not stated. Fails for channels or times in one file, or planes in other
-/// files.
+/// Positions along the axis, um; `None` if not stated. Fails for channels, times or planes in other files.
 pub(super) fn of(pages: &[Page]) -> Result<Option<Vec<f64>>, String> {
     let Some(first) = pages.first() else { return Ok(None) };
     let description = first.directory.description.as_deref().unwrap_or_default();

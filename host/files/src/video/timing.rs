@@ -1,6 +1,5 @@
 //! Frame times from ffmpeg's list of packets (without decoding), and the rate for reading. Browsers, phones and
-//! meetings record at no constant rate, and their files state 1000 frames a second or none: ffmpeg would fill a Y4M
-//! stream with repeated frames.
+//! meetings record at no constant rate, and their files state 1000 frames a second or none: ffmpeg would repeat frames.
 
 use std::{
     path::Path,

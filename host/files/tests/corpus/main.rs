@@ -13,8 +13,7 @@ use std::{
 use farnear_files::image_file::read_grey;
 use ndarray::Array2;
 
-/// Writes each image that Pillow reads as height, width (u32) and grey values (f32, full scale = 1); prints one line
-/// per file.
+/// Writes each image that Pillow reads as height, width (u32) and grey values (f32, full scale = 1), a line per file.
 const REFERENCE: &str = include_str!("reference.py");
 const ENDINGS: [&str; 9] = ["png", "tif", "tiff", "jpg", "jpeg", "bmp", "pgm", "ppm", "pnm"];
 /// Largest and mean difference: JPEG decoders round differently, others do not.
