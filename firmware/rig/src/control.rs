@@ -24,8 +24,7 @@ use crate::motion::since;
 pub use crate::notes::Note;
 
 const FRAMES_BEFORE_LOG: u8 = 8;
-/// Ticks without byte, frame or request before resting: 20 ms. More frequent requests are answered
-/// immediately.
+/// Ticks without byte, frame or request before resting: 20 ms. More frequent ones are answered immediately.
 pub const QUIET_TICKS: u32 = TICK_HZ / 50;
 /// Limit for the last frame before a reset: the longest takes 1.3 ms, and one may wait before it.
 pub const LAST_FRAME: Micros = Micros(10_000);
@@ -164,8 +163,7 @@ impl<'r> Control<'r> {
         true
     }
 
-    /// Sends a part of the log; returns whether there was one. Waits for the first session: a connecting host drops
-    /// older input.
+    /// Sends a part of the log, if any; not before the first session, because a connecting host drops older input.
     fn speak_log(&mut self, board: &mut impl Board) -> bool {
         if !self.rig.has_session() {
             return false;

@@ -53,8 +53,7 @@ pub const MEMORY_CHUNK: usize = 64;
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct StepperState {
-    /// STEP pulses since the reset, wrapping. Exact when `idle`; otherwise between finished segments and emitted
-    /// pulses.
+    /// STEP pulses since the reset, wrapping. Exact when `idle`, else up to the emitted pulses.
     pub pulses: u32,
     pub idle: bool,
     /// Underrun without [`Segment::last`]; cleared by [`MotorOutputs::abort_steps`].
@@ -182,8 +181,7 @@ pub struct Outputs {
     pub piezo_dac: Option<u16>,
     pub coarse: MotorOutputs,
     pub lens: MotorOutputs,
-    /// Report each untriggered exposure that begins from now on as [`Inputs::strobe`]. Never with `trigger` or a
-    /// pending triggered exposure.
+    /// Report each untriggered exposure that begins from now on as [`Inputs::strobe`]. Never with a triggered one.
     pub listen: bool,
     /// Brightness of the light outputs, except during a flash.
     pub lights: LightLevels,

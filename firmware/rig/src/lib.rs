@@ -29,7 +29,7 @@
 //!
 //! Goals: no input can cause a panic or exceed the limits; a position is valid only while steps and encoder agree; long
 //! work ends with exactly one terminal event; causes of a stop are named, latched and survive a power loss. Not a goal:
-//! link speed, as images do not use it.
+//! link speed.
 //!
 //! Cost in instructions, counted on the emulated board, of 33,600 per tick at 168 MHz: a tick 1,600 at rest, 2,900 with
 //! the piezo's loop closed, at most 7,100 with both steppers in their ramps; the last byte of a move request 9,900, the

@@ -42,9 +42,8 @@ const IDLE_TICKS: u16 = TICK_HZ as u16;
 /// rests (0.13 s). At a resonance with Q = 30 the loop gain is a half.
 const EASE_DISTURBANCE: u32 = 5;
 const EASE_DRIFT: u32 = 15;
-/// Mean innovation beyond which the piezo does not follow. The fast loop stays below 2 um, also with a resonance 25 %
-/// off, the gentle one below 11 um. A loop that excites a mode with a share of 2 % reaches 18 um within 0.1 s, with 5 %
-/// 60.
+/// Mean innovation beyond which the piezo does not follow. The fast loop stays below 2 um, also 25 % off resonance, the
+/// gentle one below 11 um. Exciting a mode with a share of 2 % reaches 18 um within 0.1 s, with 5 % 60.
 const INNOVATION_LIMIT: i32 = 15_000 << BITS;
 /// Averaging ticks of the innovation, as a shift: 3 ms.
 const INNOVATION_SHIFT: u32 = 4;

@@ -3,8 +3,7 @@
 //! Each shot: move, settle, expose, wait for the strobe, report; `repeat` exposures per position. The next move starts
 //! at the end of the exposure and overlaps read-out; the next exposure waits for the camera. At the trigger the
 //! position has been settled for the whole dwell, however long the camera took. A pause waits for the current exposure;
-//! a resumed program settles again. A continuous run cycles through the shots with a period, or as fast as possible,
-//! until stopped.
+//! a resumed program settles again. A continuous run repeats the shots with a period or as fast as possible.
 
 pub(crate) mod pace;
 

@@ -1,5 +1,4 @@
-//! Requests: checks and start. [`Rig::carry_out`] names every request without a wildcard, so that a new request must be
-//! handled here.
+//! Requests: checks and start. [`Rig::carry_out`] has no wildcard, so that a new request must be handled.
 
 mod checks;
 mod exposures;

@@ -131,8 +131,7 @@ impl Rig {
         }
     }
 
-    /// Writes to do before sending or receiving, until `None`: a power loss would otherwise repeat a reported boot
-    /// number.
+    /// Writes before sending or receiving, until `None`: a power loss could repeat a reported boot number.
     pub fn keep_boot(&mut self) -> Option<MemoryWrite> {
         if !self.store.is_marked(RecordName::Counters) {
             return None;
@@ -238,8 +237,7 @@ impl Rig {
         link.frames.wrapping_add(link.bad_frames)
     }
 
-    /// One step for the host per tick: encodes an answer for [`Self::transmit`], or executes a request. `false` if
-    /// idle.
+    /// A step for the host: encodes an answer for [`Self::transmit`], or executes a request. `false` if idle.
     pub fn serve(&mut self, now: BoardMicros) -> bool {
         if self.session.has_answer() {
             self.session.put_answer();

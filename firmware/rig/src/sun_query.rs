@@ -108,8 +108,7 @@ mod tests {
         }
     }
 
-    /// Reference values: the Astronomical Almanac's low-precision sun (0.01 deg) and a pinhole camera in f64,
-    /// independently.
+    /// Reference values: the Astronomical Almanac's low-precision sun (0.01 deg), a pinhole camera in f64.
     #[test]
     fn a_query_gives_what_an_independent_calculation_gives() {
         let sun = answer(&QUERY);

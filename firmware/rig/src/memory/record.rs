@@ -41,8 +41,7 @@ pub(crate) const ALL: [RecordName; RECORDS] = [
     RecordName::Correction,
 ];
 
-/// Alarms precede the counters, which also store the moving axes: alarms take these over at a start, before any power
-/// loss.
+/// Alarms precede the counters, which also store the moving axes: a start turns these into alarms first.
 pub(crate) const URGENCY: [RecordName; RECORDS] = [
     RecordName::Alarms,
     RecordName::Counters,

@@ -4,8 +4,7 @@
 //! top speed; the end mirrors this (seven-phase profile of L. Biagiotti and C. Melchiorri, "Trajectory Planning for
 //! Automatic Machines and Robots", 2008, sec. 3.4). One [`Curve`] gives time over distance for both ends. A segment of
 //! `n` pulses lasts exactly as long as the curve, so errors never accumulate. Short distances reduce top speed and
-//! bend. A stop lowers the top speed: the curve to the speed reached by bending down now equals the old one so far, and
-//! never needs more pulses than remain.
+//! bend. A stop lowers the top speed: the new curve equals the old one so far, and never needs more pulses than remain.
 //!
 //! Single precision: 0.004 pulses; the pulse count is integer. Cost on a Cortex-M4F: some 200 instructions per segment,
 //! 600 to plan (a bisection, no root).

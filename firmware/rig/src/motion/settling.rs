@@ -1,5 +1,4 @@
-//! Settled: within a window of the target for a dwell time without interruption. Cost: a comparison and an addition per
-//! tick, a division per dwell.
+//! Settled: within a window of the target for a dwell time without interruption. Cost: one division per dwell.
 
 use farnear_protocol::{Nanometres, Settle};
 

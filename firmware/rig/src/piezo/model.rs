@@ -1,8 +1,7 @@
 //! Calibrated piezo: stroke per code, hysteresis, creep. Hysteresis by Prandtl and Ishlinskii (K. Kuhnen, European J.
 //! Control 9, 2003, sec. 2): play operators of equal weight, half widths evenly up to a quarter of the stroke, and a
 //! linear share that closes the loop. Creep by first-order lags a decade apart. Each is an approximation with one
-//! measured figure; the observer learns the rest. Fixed point of the fine loop. Cost: 12 comparisons and 6
-//! multiplications a tick.
+//! measured figure; the observer learns the rest. Cost: 12 comparisons and 6 multiplications a tick.
 
 use farnear_protocol::Nanometres;
 

@@ -1,7 +1,7 @@
 //! The piezo's disturbance during a rest, when the observer does not run.
 
 /// Disturbance and drift. The observer's values follow the gauge's noise, so a rest uses means of 128 and 1,024 ticks,
-/// which lag a ramp by as many ticks of drift.
+/// which lag ramps.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Trend {
     /// With [`Self::BITS`] more.

@@ -110,8 +110,7 @@ impl Rig {
         Nanometres(target.0.saturating_sub(approach))
     }
 
-    /// Sensor and lens stay apart with an axis at its lowest and the others on their ways. Moving apart is always
-    /// permitted.
+    /// Sensor and lens stay apart with an axis at its lowest and the others moving. Moving apart is permitted.
     pub(super) fn must_not_come_close(&self, axis: Axis, lowest: Nanometres) -> Result<(), RequestError> {
         let homed = self.stage.state(axis) == PositionState::Homed;
         if homed && lowest >= self.stage.measured(axis) {

@@ -80,8 +80,7 @@ impl Rig {
         let Some(first) = self.shots.get(0).copied().filter(|_| count > 0) else {
             return Err(RequestError::Program { state: self.program_status().state });
         };
-        // Axes may have moved or lost their positions since arming. The second round starts where the first
-        // ends.
+        // Axes may have moved since arming. The second round starts where the first ends.
         self.check_program(count, if pace.is_some() { 2 } else { 1 })?;
         let first = (first, self.shots.light(0));
         let run = Run::start((count, first), pace, &mut self.stage, &self.settings, now);

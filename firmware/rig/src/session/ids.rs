@@ -1,6 +1,5 @@
 //! Request ids. Ids increase over a boot. A delayed request may arrive after later ones, so the last [`IDS`] ids are
-//! tracked (anti-replay window of IPsec, RFC 4303, section 3.4.3); older ones count as used. Cost: twelve bytes, a few
-//! operations per request.
+//! tracked (anti-replay window of IPsec, RFC 4303, section 3.4.3); older ones count as used. Cost: twelve bytes.
 
 use farnear_protocol::message::ID_STEP_MAX;
 

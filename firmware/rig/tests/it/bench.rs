@@ -1,6 +1,6 @@
 //! A rig on the bench: the behaviour under test, a small hardware model, and the host's end of the link. The model is
-//! as simple as the tests allow (a resonant piezo without hysteresis, a screw with play); the emulated board's plant is
-//! the thorough one.
+//! as simple as the tests allow (a resonant piezo without hysteresis, a screw with play); the emulated board's is
+//! thorough.
 
 pub mod hardware;
 pub mod motor;

@@ -53,8 +53,7 @@ fn the_backlash_is_found_kept_and_taken_out() {
         let end = bench.work(&calibrate(Routine::Backlash { axis }));
         let Calibration::Backlash { backlash, spread, .. } = result(&end) else { panic!("{end:?}") };
         let truth = PLAY as f64 * STEP_UM;
-        // The switch is read once in 200 us at a pulse a millisecond: half a step at each edge, and the encoder's
-        // count.
+        // The switch is read every 200 us at a pulse a millisecond: half a step at each edge, and a count.
         assert!((f64::from(backlash.0) / 1e3 - truth).abs() <= 0.35, "{backlash:?} for {truth} um");
         assert!(spread.0 <= 300, "{spread:?}");
         assert_eq!(setting(&mut bench, key), backlash.0);

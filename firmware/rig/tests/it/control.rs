@@ -104,8 +104,7 @@ fn whatever_hangs_in_a_tick_leaves_the_watchdog_hungry() {
     }
 }
 
-/// The circuit cuts the pulses in hardware: read too early, it would look closed when the step timer already shows a
-/// stop.
+/// The circuit cuts the pulses: read too early, it would look closed when the timer already shows a stop.
 #[test]
 fn a_circuit_that_opens_between_two_readings_is_not_told_as_a_late_step() {
     for moment in [Call::Receive, Call::Gauge, Call::Coarse, Call::Lens, Call::EmergencyStop, Call::Apply] {

@@ -1,5 +1,4 @@
-//! Any requests on hardware that fails at any moment, including power: nothing panics, everything ends once, and a
-//! repaired rig works again.
+//! Any requests on failing hardware and power: no panic, everything ends once, and a repaired rig works again.
 
 use crate::bench::motor::MotorFaults;
 use crate::bench::{self, Bench, SILENCE, ends, go, home};

@@ -1,5 +1,4 @@
-//! Mathematics over the link: identical bits to `farnear_maths` on the host, each request acts once, and none while a
-//! stepper moves.
+//! Mathematics over the link: the host's bits, each request acts once, and none while a stepper moves.
 
 use crate::bench::{self, Bench, go};
 use farnear_maths::clsf::{

@@ -1,5 +1,4 @@
-//! Power fails at any byte written to memory: confirmed state persists, a pending change is complete or absent, and
-//! nothing changes silently.
+//! Power fails at any written byte: confirmed state persists, and a pending change is complete or absent.
 
 use crate::bench::{Bench, home};
 use farnear_protocol::message::{

@@ -1,5 +1,4 @@
-//! A stepper axis on the bench: step timer, motor, screw with play, encoder on the motor's shaft, end switches on the
-//! stage.
+//! A stepper axis: step timer, motor, screw with play, encoder on the motor's shaft, end switches on the stage.
 
 use std::collections::VecDeque;
 
