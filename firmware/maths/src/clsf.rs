@@ -2,7 +2,7 @@
 //!
 //! Depth from defocus maps a flat target through a real lens to a bowl that depends on depth. CLSF corrects the
 //! distorted depth `U` at column `x` and row `y` by a third-order polynomial fitted to flat targets (Li 2014, eq.
-//! 6.11). Three forms:
+//! 6.11). Forms:
 //!
 //! | form | terms | seams | table words | instructions per pixel (640-pixel rows; with the tables) |
 //! |---|---|---|---|---|
@@ -22,8 +22,8 @@
 //! removes a fraction bit: a third-order factor (`U^3`, `x U^2`, `x^2 y`, ...) has 26, second 25, first 24, constant
 //! and result 23. The range of an `i32` doubles per step: 32, 64, 128, 256. With coefficients below 4 and |x|, |y|, |U|
 //! at most 1 a partial sum is at most 4 times its number of terms: 4 of 32, 16 of 64, 40 of 128 and 80 of 256. A blend
-//! is a convex combination; the difference of two factors, multiplied by a weight, has one more fraction bit and at most
-//! twice the value. Truncation costs at most 16 units of 2^-23, a sixteenth of a Q1.15 unit.
+//! is a convex combination; the difference of two factors, multiplied by a weight, has one more fraction bit and at
+//! most twice the value. Truncation costs at most 16 units of 2^-23, a sixteenth of a Q1.15 unit.
 
 mod blend;
 mod fit;

@@ -1,7 +1,7 @@
 //! The 3x3 regions blended bilinearly between their centres, without seams. Between two centres the factors of `U`,
 //! `U^2`, `U^3` and the terms in y are linear in the column's weight: one product each. The terms in x are not; a table
-//! holds their blend along x for both region rows, blended along y by one more product. Beyond the outer centres the
-//! outer regions apply alone.
+//! holds their blend along x for both region rows, blended along y by one more product. Beyond the outer centres one
+//! region applies.
 
 use super::{
     Coefficient, Error, Frame, REGION_TERMS, REGIONS, RegionCoefficients, TableState,
@@ -20,8 +20,7 @@ pub struct Blend<'t> {
     frame: Frame,
     rows: [Band; BANDS],
     columns: [Band; BANDS],
-    /// Per column: terms in x for the upper region row, the lower's excess (one more fraction bit), and the right
-    /// region's weight.
+    /// Per column: terms in x of the upper region row, the lower's excess (one more bit), and the right's weight.
     table: &'t mut [i32],
     table_band: Option<(usize, usize)>,
 }

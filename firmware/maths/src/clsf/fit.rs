@@ -136,8 +136,7 @@ impl RegionFit {
         Self { frame, sums: [const { [const { Sums::new() }; REGIONS] }; REGIONS] }
     }
 
-    /// Adds pixels of row `row` of a flat target at `truth`: Q1.15 codes of one [`DepthScale`](super::DepthScale),
-    /// skipping [`NO_VALUE`].
+    /// Adds pixels of a flat target at `truth`, codes of one [`DepthScale`](super::DepthScale), skipping [`NO_VALUE`].
     pub fn add_row(&mut self, row: u16, columns: Columns, depths: &[i16], truth: i16) -> Result<(), Error> {
         columns.check(self.frame, row, depths.len())?;
         let (rows, across) = (self.frame.rows(), self.frame.columns());

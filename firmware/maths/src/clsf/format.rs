@@ -19,8 +19,7 @@ impl DepthScale {
     /// Factor on half the working range, so that a distorted depth still fits the scale.
     pub const MARGIN: f32 = 1.3;
 
-    /// The scale for a working range, its ends in mm in either order; [`Error::EmptyRange`] unless they differ and are
-    /// finite.
+    /// The scale for a working range, ends in mm in either order; [`Error::EmptyRange`] unless finite and different.
     pub fn for_range(one_end_mm: f32, other_end_mm: f32) -> Result<Self, Error> {
         let half = (one_end_mm - other_end_mm) / 2.0;
         let half = if half < 0.0 { -half } else { half };
@@ -79,8 +78,7 @@ impl Coefficient {
         }
     }
 
-    /// The coefficient with these bits, e.g. from the board's memory; [`Error::CoefficientTooLarge`] for `i32::MIN`
-    /// (-4).
+    /// The coefficient with these bits; [`Error::CoefficientTooLarge`] for `i32::MIN` (-4).
     pub fn from_bits(bits: i32) -> Result<Self, Error> {
         if bits == i32::MIN { Err(Error::CoefficientTooLarge { value: -4.0 }) } else { Ok(Self(bits)) }
     }

@@ -60,8 +60,7 @@ pub(super) fn linear_mixed(
     });
 }
 
-/// Factors as polynomials in the table's first word; the second is added to the factor of `U`, the third to the
-/// constant.
+/// Factors as polynomials in the table's first word; the others add to the factor of `U` and the constant.
 #[inline(never)]
 pub(super) fn polynomial(depths: &mut [i16], of_columns: &[[i32; 3]], factors: &Factors<1, 2, 2, 3>) {
     for_each_pixel(depths, of_columns, |depth, &[place, linear, constant]| {
@@ -75,8 +74,7 @@ pub(super) fn polynomial(depths: &mut [i16], of_columns: &[[i32; 3]], factors: &
     });
 }
 
-/// Four pixels per turn, because size optimisation does not unroll: counters are paid once, offsets are in the
-/// instructions.
+/// Four pixels per turn, because size optimisation does not unroll: counters are paid once.
 #[inline(always)]
 fn for_each_pixel<T>(depths: &mut [i16], of_columns: &[T], mut pixel: impl FnMut(&mut i16, &T)) {
     let (fours, rest) = depths.as_chunks_mut::<4>();

@@ -4,8 +4,7 @@
 //! `D = u^2 rx^2 + Hc^2 ry^2`, for a subject on the optical axis; the general form has `t = u rx - X0 ry` instead of
 //! `u rx`. (Of Li 2014, eqs. 8.21 to 8.37: 8.24 needs the square of its sum, 8.27 counts the elevation twice, 8.36 and
 //! 8.37 lack covariances; printed, they are ten times too large.) `s_psi` follows from day, hour, latitude and
-//! longitude by the derivatives of the horizontal vector, `s_u` from `u = w v / wi`. The height of the subject does not
-//! enter beta.
+//! longitude by the derivatives of the horizontal vector, `s_u` from `u = w v / wi`. Beta is independent of `H`.
 
 use micromath::F32;
 
@@ -35,8 +34,7 @@ pub struct Deviations {
 }
 
 impl Deviations {
-    /// For a distance `u = w v / wi` from a head of width `w`, imaged as `wi` at `v` (Li 2014, eq. 8.17); value and SD
-    /// of each.
+    /// For a distance `u = w v / wi` from a head of width `w`, imaged as `wi` at `v` (Li 2014, eq. 8.17); each with SD.
     pub fn of_distance(w: (f32, f32), v: (f32, f32), wi: (f32, f32)) -> f32 {
         let u = w.0 * v.0 / wi.0;
         u * root(square(w.1 / w.0) + square(v.1 / v.0) + square(wi.1 / wi.0))
@@ -50,8 +48,7 @@ pub enum Reliability {
     FirstOrder,
     /// The shadow's end may lie next to or behind the camera: beta may jump, the deviation is too small.
     ShadowNearCamera,
-    /// The shadow may point to either side: beta folds at the mirror, the deviation is too large or too
-    /// small.
+    /// The shadow may point to either side: beta folds at the mirror, the deviation is wrong.
     EitherSide,
 }
 

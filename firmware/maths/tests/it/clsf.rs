@@ -100,8 +100,7 @@ fn realistic_regions(numbers: &mut Numbers) -> RegionReals {
     std::array::from_fn(|_| std::array::from_fn(|_| realistic_terms(numbers)))
 }
 
-/// Largest difference of `fixed` from `exact` in mm, over random depths whose exact result is inside the
-/// scale.
+/// Largest difference of `fixed` from `exact` in mm, over random depths inside the scale.
 fn largest_error_mm(
     (w, h): (usize, usize),
     rows: impl Iterator<Item = usize>,
@@ -176,8 +175,7 @@ fn fingerprint(codes: &[i16]) -> u64 {
     })
 }
 
-/// The board must give these bits. They may change only with a new firmware version, because stored results would
-/// differ.
+/// The board's bits: they may change only with a new firmware version, because stored results would differ.
 #[test]
 fn bits_are_frozen() {
     let mut numbers = Numbers(4);
