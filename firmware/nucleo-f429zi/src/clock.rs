@@ -13,8 +13,7 @@ pub const APB1_TIMER_HZ: u32 = 84_000_000;
 /// TIM1, TIM8.
 pub const APB2_TIMER_HZ: u32 = 168_000_000;
 
-/// Polls for the external clock, and 16 MHz cycles in between: 0.2 s in total. An ST-LINK's start-up time is
-/// unpublished.
+/// Polls for the external clock, and cycles in between: 0.2 s, as an ST-LINK's start-up time is unpublished.
 const LOOKS: u32 = 20_000;
 const BETWEEN_LOOKS: u32 = 160;
 
@@ -48,15 +47,14 @@ fn has_outer_clock() -> bool {
     comes
 }
 
-/// Returns whether the internal clock is used. Does not retry a clock `lost` in the last boot: a loose wire would reset
-/// forever.
+/// Returns whether the internal clock is used. A clock `lost` in the last boot is not tried, because it may reset
+/// again.
 pub fn start(lost: bool) -> (Peripherals, bool) {
     let own_clock = lost || !has_outer_clock();
     let peripherals = critical_section::with(|_| {
         let peripherals = embassy_stm32::init(clock_tree::config(own_clock));
         accelerate();
-        // embassy's update event while setting up TIM5 leaves a compare flag, whose handler would add half a
-        // period: 32 ms.
+        // embassy's update event while setting up TIM5 leaves a compare flag, whose handler would add 32 ms.
         pac::TIM5.sr().write(|sr| sr.0 = 0);
         registers::unpend(Interrupt::TIM5);
         peripherals
@@ -64,8 +62,7 @@ pub fn start(lost: bool) -> (Peripherals, bool) {
     (peripherals, own_clock)
 }
 
-/// Flash wait states at 168 MHz down to 2.4 V (RM0090, section 3.5.1), below brown-out level 2; five suffice above 2.7
-/// V.
+/// Flash wait states at 168 MHz down to 2.4 V (RM0090, section 3.5.1), below brown-out level 2.
 const LATENCY: embassy_stm32::pac::flash::vals::Latency = embassy_stm32::pac::flash::vals::Latency::WS6;
 
 /// Enables the flash accelerator (RM0090, section 3.5.2), which embassy disables: up to 1.9 times faster.

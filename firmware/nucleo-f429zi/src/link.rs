@@ -1,8 +1,7 @@
 //! Serial link: USART3 on the ST-LINK's virtual COM port, 8N1, 2 Mbaud or as requested, both directions by DMA. No
 //! interrupts: a circular transfer fills a ring that each tick empties; a second ring is sent piece by piece. The HAL's
 //! buffered port is not used: at the end of each frame its handler writes back the status register, and a byte received
-//! in between is lost, because a written zero clears RXNE (RM0090, USART_SR). That damaged one in 2,000 frames with
-//! traffic in both directions.
+//! in between is lost, because a written zero clears RXNE (RM0090, USART_SR). That damaged one in 2,000 frames.
 
 use core::sync::atomic::{AtomicU8, Ordering, fence};
 
@@ -27,8 +26,7 @@ use crate::clock::APB1_TIMER_HZ;
 const APB1_HZ: u32 = APB1_TIMER_HZ / 2;
 /// 5 ms of bytes, 25 control ticks.
 const RECEIVE_RING: usize = 1024;
-/// Three of the longest frames with leading delimiters, and a power of two, so that wrapping needs no
-/// division.
+/// Three of the longest frames with delimiters, and a power of two, so that wrapping needs no division.
 const SEND_RING: usize = 4 * FRAME_MAX;
 
 /// Streams and channel of USART3 on DMA1 (RM0090, table 42).

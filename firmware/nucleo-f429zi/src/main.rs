@@ -22,8 +22,8 @@
 //! | PD15 | GPIO, pull-down | strap: high only on the emulated board |
 //! | PB0 | GPIO | LED: blinks while the control loop runs |
 //!
-//! Interrupts: step timers' update and break above TIM2 (camera) above TIM5 (time); the link uses DMA only; the loop
-//! runs in thread mode below them.
+//! Interrupts: step timers' update and break above TIM2 (camera) above TIM5 (time); the link uses DMA only; the loop is
+//! in thread mode.
 #![no_std]
 #![no_main]
 

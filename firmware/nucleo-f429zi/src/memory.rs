@@ -23,8 +23,7 @@ const READ_STATUS: u8 = 0x05;
 /// Status bits that read 0, except the second, write enabled (table 4); all read 1 without the chip.
 const STATUS_MASK: u8 = 0b0011_0011;
 const WRITE_ENABLED: u8 = 0b0000_0010;
-/// Manufacturer, family and density (table 6), after six continuation bytes; the revision follows (00 FM25V02, 08
-/// FM25V02A).
+/// Manufacturer, family and density (table 6), after six continuation bytes; then the revision (08: FM25V02A).
 const ID: [u8; 8] = [0x7f, 0x7f, 0x7f, 0x7f, 0x7f, 0x7f, 0xc2, 0x22];
 /// Attempts to read the name, or a piece equal twice in a row.
 const ATTEMPTS: usize = 4;

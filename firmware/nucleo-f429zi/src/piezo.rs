@@ -9,8 +9,7 @@
 //!   mode 0. After the last bit the output is released and meaningless. The leading 0 distinguishes a converter from a
 //!   broken wire, as do codes at either end, which the rig rejects.
 //!
-//! A 16-bit word takes 1.5 us: the processor polls rarely, which leaves the bus free (and is most of an emulated tick's
-//! cost).
+//! A 16-bit word takes 1.5 us: rare polls leave the bus free (and are most of an emulated tick's cost).
 
 use cortex_m::peripheral::DWT;
 use embassy_stm32::{
@@ -94,8 +93,7 @@ impl Piezo {
         self.sampled = DWT::cycle_count();
     }
 
-    /// The last sample once converted: 0 to [`GAUGE_CODE_MAX`], `None` without an answering converter. Takes
-    /// 3.8 us.
+    /// The last sample, 0 to [`GAUGE_CODE_MAX`]; `None` if the converter is silent. Takes 3.8 us.
     pub fn gauge(&mut self) -> Option<u32> {
         clock::wait_cycles_since(self.sampled, CONVERSION_CYCLES);
         let word = u32::from(self.exchange(0)) << 16 | u32::from(self.exchange(0));

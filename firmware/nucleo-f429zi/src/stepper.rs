@@ -271,8 +271,7 @@ impl<T: StepInstance> Stepper<T> {
                     queue.underrun = true;
                 }
             }
-            // After a break nothing starts until the loop has read it: `emergency_stop` clears the flag, and
-            // the rig aborts.
+            // After a break nothing starts until the loop has read it (`emergency_stop`), and the rig aborts.
             if queue.broken {
                 queue.waiting.clear();
             }

@@ -1,5 +1,4 @@
-//! Exit from a panic, a fault or a lost clock: stores the cause in retained memory and resets, which stops the motors'
-//! timers first.
+//! Exit from a panic, a fault or a lost clock: retains the cause and resets, which stops the motors' timers first.
 
 use core::{arch::naked_asm, panic::PanicInfo};
 
@@ -44,8 +43,8 @@ unsafe fn NonMaskableInt() -> ! {
     SCB::sys_reset()
 }
 
-/// All faults (the configurable ones escalate). The stack may be full, so it is reset first. `r0` is the faulting stack
-/// pointer, from cortex-m-rt's trampoline.
+/// All faults (the configurable ones escalate). The stack may be full, so it is reset first. `r0` is the stack pointer
+/// from cortex-m-rt's trampoline.
 // SAFETY: the name is cortex-m-rt's hook for this; there is no other.
 #[unsafe(naked)]
 #[unsafe(no_mangle)]
