@@ -4,8 +4,7 @@
 //! ```text
 //! length u32 | shot_id u32 | exposure_us u64 | width u16 | height u16 | bits u8 | pixels u16 * width * height
 //! ```
-//! little-endian; `length` counts the bytes after itself. The client may send [`Control`] messages:
-//! `length u32 | postcard body`.
+//! little-endian; `length` counts the bytes after itself. Clients may send [`Control`]: `length u32 | postcard body`.
 
 use serde::{Deserialize, Serialize};
 

@@ -120,8 +120,7 @@ pub fn encode<T: Serialize>(header: Header, message: &T) -> Option<Encoded> {
     Some(wire)
 }
 
-/// Adds a leading delimiter, so that a damaged frame costs only itself. Both sides send it, neither requires
-/// it.
+/// Adds a leading delimiter, so that a damaged frame costs only itself. Optional; both sides send it.
 pub fn delimited(frame: &Encoded) -> Delimited {
     let mut bytes = Delimited::new();
     // There is room for the longest frame and one byte.
@@ -168,8 +167,8 @@ impl Decoder {
         Self { between: Vec::new(), overlong: false }
     }
 
-    /// Accepts one byte; at a delimiter returns the frame before it or its error. Empty frames are skipped, because
-    /// senders may flush garbage with a delimiter.
+    /// Accepts one byte; at a delimiter returns the frame before it or its error. Skips empty frames, which flush
+    /// garbage.
     pub fn push(&mut self, byte: u8) -> Option<Result<Packet, FrameError>> {
         if byte != 0 {
             self.overlong |= self.between.push(byte).is_err();

@@ -1,4 +1,4 @@
-//! The message tables: [`Request`]; [`Response`] and [`RequestError`]; [`EventKind`]. Their parts are in one file per
+//! The message tables: [`Request`]; [`Response`] and [`RequestError`]; [`EventKind`]. Parts are in one file per
 //! subject.
 //!
 //! Positions are [`Nanometres`], positive = sensor and lens apart (towards near focus), 0 = home switch; sensor

@@ -15,7 +15,7 @@ use crate::units::{Micros, Nanometres};
 #[derive(Serialize, Deserialize, Schema, Clone, PartialEq, Eq, Debug)]
 #[allow(missing_docs, reason = "names and types describe these fields")]
 pub enum Request {
-    /// Identify the board. Changes nothing, needs no session or new id, and may carry boot number 0 (unknown). Answer:
+    /// Identify the board. Needs no session or new id; boot number 0 (unknown) is valid. Answer:
     /// [`super::Response::Hello`].
     Hello,
     /// Read the board's state. Answer: [`super::Response::Status`].
@@ -46,7 +46,7 @@ pub enum Request {
         index: u8,
         shot: Shot,
     },
-    /// Run the armed program: move, settle, trigger and time-stamp each shot. It stays armed. Ends with
+    /// Run the armed program, which stays armed: move, settle, trigger and time-stamp each shot. Ends with
     /// [`super::EventKind::ProgramDone`].
     RunProgram {
         /// Silence deadline, see [`Request::Move`].
@@ -56,7 +56,7 @@ pub enum Request {
     ReadEvent { number: u32 },
     /// Stop everything, answer, then reset. The boot number changes, so a repeat is rejected.
     Reboot,
-    /// Emergency stop: the last STEP pulse comes within a millisecond, and a moving axis loses its position. Latches
+    /// Emergency stop: STEP pulses end within a millisecond; moving axes lose their position. Latches
     /// [`super::Alarm::Halt`].
     Halt,
     /// Check and arm shots 0 to `shots` - 1: all loaded, in range, axes homed.
