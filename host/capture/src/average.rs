@@ -49,8 +49,7 @@ impl Average {
         Ok(())
     }
 
-    /// The mean, with one more bit per doubling up to 16; black and white keep their meaning. One image stays
-    /// unchanged.
+    /// The mean, one more bit per doubling up to 16; black and white keep their meaning. One image is unchanged.
     pub fn finish(self) -> Image {
         if self.count == 1 {
             return self.first;

@@ -128,8 +128,7 @@ impl Client {
         Ok(corrected)
     }
 
-    /// Fits a correction to every `step`th pixel and row, opens it and returns its coefficients; calls `progress` per
-    /// row.
+    /// Fits, opens and returns a correction from every `step`th pixel and row; calls `progress` per row.
     pub fn fit_correction(
         &self,
         method: Method,

@@ -82,8 +82,7 @@ pub trait Camera {
     /// Kind of camera for a capture's record, without address or path.
     fn kind(&self) -> &'static str;
 
-    /// Prepares for exposures of this kind and drops earlier images. Free-running cameras use the exposure time until
-    /// re-armed.
+    /// Prepares for exposures of this kind and drops earlier images. Free-running ones keep the exposure.
     fn arm(&mut self, mode: TriggerMode, exposure: Micros) -> Result<(), CameraError>;
 
     /// Software trigger of one exposure.
@@ -92,8 +91,7 @@ pub trait Camera {
     /// Waits at most `wait` for the image of this exposure. Call in order; may be repeated after [`CameraError::Late`].
     fn image(&mut self, shot: &ShotRecord, wait: Duration) -> Result<Image, CameraError>;
 
-    /// Called per reported exposure before its image is fetched; `received` is the arrival time of the
-    /// report.
+    /// Called per reported exposure before its image is fetched; `received` is the report's arrival.
     fn reported(&mut self, _shot: &ShotRecord, _received: Instant) {}
 
     /// Time without a picture that ends a program.

@@ -113,8 +113,7 @@ impl Client {
         Ok(Self { port: Arc::new(port), session, interrupt: None, light: None })
     }
 
-    /// Light of every shot of this handle's programs during the exposure; the board rejects it for shots it does not
-    /// trigger.
+    /// Light during each exposure of this handle's programs; the board rejects it for shots that it does not trigger.
     pub fn set_light(&mut self, light: Option<LightLevels>) {
         self.light = light;
     }
@@ -123,8 +122,7 @@ impl Client {
         self.light
     }
 
-    /// Continues after a reset or unplugging. Axes are at rest and not homed. May be repeated while the board is
-    /// absent.
+    /// Continues after a reset or unplugging. Axes are at rest and not homed. May be repeated.
     pub fn reopen(&mut self) -> Result<(), ClientError> {
         let (answer, joined) = sync_channel(1);
         self.command(Command::Join { known: self.session.number, answer }, "saying hello")?;
@@ -204,8 +202,7 @@ impl Client {
         *self.port.timing.lock().unwrap_or_else(PoisonError::into_inner) = timing;
     }
 
-    /// Once this flag is set, waits for work stop the board and return [`ClientError::Interrupted`]. Later clones share
-    /// it.
+    /// Once this flag is set, waits for work stop the board and return [`ClientError::Interrupted`]. Clones share it.
     pub fn interrupt_by(&mut self, flag: Arc<AtomicBool>) {
         self.interrupt = Some(flag);
     }

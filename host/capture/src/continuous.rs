@@ -246,8 +246,7 @@ impl Cycles {
 
 impl Client {
     /// Repeats the armed program with this trigger period (0: as fast as possible) for `exposures` (0: until the work
-    /// is dropped). Events are [`EventKind::FrameTaken`] and [`EventKind::FrameDropped`]; lost ones show as missing
-    /// numbers.
+    /// is dropped). Events are [`EventKind::FrameTaken`] and [`EventKind::FrameDropped`]; lost ones leave gaps.
     pub fn start_continuous(
         &self,
         shots: &[Shot],

@@ -46,8 +46,7 @@ pub enum CaptureError {
     MixedTriggers { index: usize, found: &'static str, first: &'static str },
 }
 
-/// Runs a program; passes each exposure with its image to `on_image`, whose error stops the rig. Waits `image_wait` per
-/// image.
+/// Runs a program; passes each exposure with its image (within `image_wait`) to `on_image`, whose error stops the rig.
 pub fn expose<E: From<CaptureError> + From<ClientError>>(
     client: &Client,
     camera: &mut dyn Camera,
@@ -58,8 +57,7 @@ pub fn expose<E: From<CaptureError> + From<ClientError>>(
     expose_together(client, &mut [camera], shots, image_wait, |_, shot, image| on_image(shot, image))
 }
 
-/// As [`expose`] with several cameras on one trigger: `on_image` receives each camera's image with its index in
-/// `cameras`.
+/// As [`expose`] with several cameras on one trigger: `on_image` receives each image with its camera's index.
 pub fn expose_together<E: From<CaptureError> + From<ClientError>>(
     client: &Client,
     cameras: &mut [&mut dyn Camera],

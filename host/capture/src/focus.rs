@@ -210,8 +210,7 @@ impl Search<'_> {
         Ok(taken)
     }
 
-    /// Moves the stepper until the focus is in the middle of the piezo's range. Returns the estimate and the positions
-    /// used.
+    /// Moves the stepper until the focus is in mid-range of the piezo. Returns the estimate and the positions used.
     fn coarse(&mut self, start: f64, say: &mut dyn FnMut(&str)) -> Result<(f64, usize), FocusSearchError> {
         let reach = self.settings.range_mm * 1e6;
         let mut goal = None;

@@ -16,12 +16,11 @@ const FIRST_MS: [u64; 4] = [50, 100, 200, 400];
 const OTHER_RATE_MS: [u64; 2] = [50, 50];
 const LAST_MS: [u64; 2] = [800, 1500];
 const DURING: &str = "asking the board who it is";
-/// Fixed session of an emulated board: a random one would change the run. Successive programs differ by their request
-/// ids.
+/// Fixed session of an emulated board: a random one would change the run. Programs differ by request ids.
 const EMULATED_SESSION: u32 = 0x5eed_0001;
 
-/// Drains the line, identifies the board and selects a version. A repeated hello would change an emulated board's run,
-/// so that board gets its long timeout.
+/// Drains the line, identifies the board and selects a version. A repeated hello would change an emulated run: long
+/// timeout.
 pub(crate) fn shake_hands(link: &mut Link, known_emulated: bool) -> Result<(Hello, u8), ClientError> {
     link.drain(DURING)?;
     let millis = |waits: &[u64]| waits.iter().map(|ms| Duration::from_millis(*ms)).collect::<Vec<_>>();

@@ -57,8 +57,7 @@ pub struct Pair {
     pub far: Taken,
     pub near: Taken,
     pub coarse: Moved,
-    /// Extra sensor distance of the second camera behind a half mirror ([`crate::half_mirror`]); `None`: one camera,
-    /// two exposures.
+    /// Extra sensor distance of the second camera ([`crate::half_mirror`]); `None`: one camera, two exposures.
     pub further_mm: Option<f64>,
 }
 
@@ -80,8 +79,7 @@ pub struct Reach {
     pub shots: [Shot; 2],
 }
 
-/// Moves the coarse stage so that the piezo reaches both positions; homes if necessary. Checks limits before any
-/// motion.
+/// Moves the coarse stage so that the piezo reaches both positions; homes if necessary. Checks limits first.
 pub fn reach(
     client: &Client,
     sensor: &SensorPair,

@@ -1,6 +1,5 @@
 //! Capture folder: `far.png` and `near.png`, or the images of a sequence, and `capture.toml` with their settings. The
-//! folder is created atomically. An emulated rig's has no clock time, port or random number: equal scenes and seeds
-//! give equal bytes.
+//! folder is created atomically. An emulated rig's has no clock time, port or random number and is repeatable.
 
 use std::{collections::BTreeMap, path::Path};
 

@@ -37,15 +37,13 @@ impl Client {
         }
     }
 
-    /// Switches both light outputs for `time`, at most 60 s. They go off earlier after `Client::keep_alive` without a
-    /// request.
+    /// Switches both light outputs for `time`, at most 60 s. `Client::keep_alive` without a request ends it.
     pub fn set_lights(&self, levels: LightLevels, time: Micros) -> Result<(), ClientError> {
         let request = Request::SetLights { levels, time, silence: self.keep_alive() };
         self.expect_accepted(&request, "switching the light")
     }
 
-    /// Emergency stop: the last step comes within a millisecond, moving axes lose their position, and an alarm is
-    /// latched.
+    /// Emergency stop: steps end within a millisecond, moving axes lose their position. Latches an alarm.
     pub fn halt(&self) -> Result<(), ClientError> {
         self.expect_accepted(&Request::Halt, "halting")
     }
@@ -110,8 +108,7 @@ impl Client {
         self.setting_by(&Request::ReadSetting { key }, &format!("reading {}", key.name()))
     }
 
-    /// Changes a setting permanently. [`Client::reopen`] updates derived limits. Rejected out of range and during
-    /// motion.
+    /// Changes a setting permanently. [`Client::reopen`] updates derived limits. Rejected out of range or in motion.
     pub fn set_setting(&self, key: SettingKey, value: i32) -> Result<Setting, ClientError> {
         self.paces().clear();
         let during = format!("setting {} to {value}", key.name());

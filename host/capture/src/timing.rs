@@ -37,8 +37,7 @@ pub struct Timing {
     pub work_factor: u32,
     /// Margin of every timeout for work.
     pub work_slack: Duration,
-    /// Keep-alive timeout, board time: how long work continues after the host has died. The host answers at half of it
-    /// while the work is held.
+    /// Keep-alive timeout, board time: how long work continues after the host has died. The host answers at half of it.
     pub keep_alive: Duration,
 }
 

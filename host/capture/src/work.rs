@@ -74,8 +74,7 @@ impl Work {
         self.received
     }
 
-    /// The next event; `None` after `wait`. Time between calls does not count against the deadline. An error ends the
-    /// work.
+    /// The next event; `None` after `wait`. Only waiting counts for the deadline. An error ends the work.
     pub fn step_within(&mut self, wait: Duration) -> Result<Option<Step>, ClientError> {
         let until = Instant::now() + wait;
         loop {

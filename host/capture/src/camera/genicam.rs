@@ -75,8 +75,7 @@ pub struct GenicamCamera {
 }
 
 impl GenicamCamera {
-    /// Opens a camera by its id from [`devices`], or the first one if empty. Fails if absent or held by another
-    /// program.
+    /// Opens a camera by its id from [`devices`], or the first one if empty. Fails if absent or in use.
     pub fn open(id: &str) -> Result<Self, CameraError> {
         let found = devices();
         let there = |found: &[FoundCamera]| {
@@ -144,8 +143,7 @@ impl GenicamCamera {
     fn failed(&self) -> impl Fn(aravis::glib::Error) -> CameraError + '_ {
         move |error| {
             let silent = self.lost.load(Ordering::Relaxed) || error.matches(DeviceError::Timeout);
-            // For a silent camera Aravis also reports a missing channel or packets of 0 bytes, so the camera is queried
-            // again.
+            // Aravis also reports a missing channel or packets of 0 bytes for a silent camera, so query again.
             match silent || !self.answers() {
                 true => self.gone(),
                 false => unusable(&self.id, error.to_string()),

@@ -206,8 +206,7 @@ impl Pairing {
     }
 }
 
-/// Orders two files by their trailing number; four-digit counters wrap after 9999. `None` unless only the number
-/// differs.
+/// Orders two files by their trailing number; four-digit counters wrap after 9999. `None` if more differs.
 pub fn by_number(a: &Path, b: &Path) -> Option<Ordering> {
     let split = |path: &Path| {
         let stem = path.file_stem()?.to_str()?.to_owned();

@@ -131,8 +131,7 @@ impl Layout {
         Ok(rows.concat())
     }
 
-    /// Decodes a frame; surplus bytes are ignored. Fails for too few bytes, a value above the bit depth, or a broken
-    /// JPEG or one of another size.
+    /// Decodes a frame; surplus bytes are ignored. Fails for too few bytes, values above the bit depth, or a bad JPEG.
     pub fn decode(self, bytes: &[u8], width: usize, height: usize) -> Result<Image, BadFrame> {
         if self == Self::Jpeg {
             return jpeg(bytes, width, height);

@@ -1,5 +1,4 @@
-//! Video4Linux cameras: device list, formats and error messages. The device itself is in `device` (cargo feature
-//! `v4l2`).
+//! Video4Linux cameras: device list, formats and error messages. The device is in `device` (feature `v4l2`).
 
 #[cfg(all(feature = "v4l2", target_os = "linux"))]
 mod device;

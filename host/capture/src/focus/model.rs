@@ -4,8 +4,8 @@
 //! `s = k e / (2 Fe d)` at the distance `e` from focus (`d` = pixel pitch). The log ratio of two images' power is
 //! therefore linear in `w^2`, independent of texture: `ln(Pi / Pj) = -(k / (2 Fe d))^2 (ei^2 - ej^2) w^2`. With both
 //! positions known, the slope gives `e` (after Subbarao). For other PSFs it holds while blur is small against `1 / w`,
-//! so higher frequencies are excluded. A wrong `k` only changes the next step's length. Cost: one FFT of the image
-//! binned by two, and 30 operations a pixel.
+//! so higher frequencies are excluded. A wrong `k` only changes the next step's length. Cost: one FFT of the binned
+//! image.
 
 use farnear_depth::fourier::{Complex64, transform};
 use ndarray::Array2;

@@ -1,6 +1,5 @@
 //! GigE Vision over the real transport with Aravis' fake camera on loopback. The fake camera draws the frame number:
-//! the pixel in column x, row y of frame n is (x + y + n) mod 255 at 10 ms exposure without gain. Tests can therefore
-//! identify each frame.
+//! the pixel in column x, row y of frame n is (x + y + n) mod 255 at 10 ms exposure without gain.
 
 use std::{
     process::{Child, Command, Stdio},

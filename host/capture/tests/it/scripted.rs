@@ -9,8 +9,7 @@ use farnear_protocol::{
 };
 use farnear_scripted_board::{Board, Faults, Peer};
 
-/// Short timeouts for a board that answers immediately or never. The one for work tolerates scheduling
-/// delays.
+/// Short timeouts for a board that answers immediately or never. Work tolerates scheduling.
 pub const SHORT: Timing = Timing {
     reply: Duration::from_millis(20),
     retries: 3,
