@@ -1,5 +1,4 @@
-//! Work of the scripted board: homing, moves, programs, calibrations. All end immediately, unless a fault is
-//! configured.
+//! Work of the scripted board: homing, moves, programs, calibrations. All end immediately, faults aside.
 
 use farnear_protocol::{
     Request, RequestError, Response,

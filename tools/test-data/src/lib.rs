@@ -1,5 +1,4 @@
-//! Shared by tests: damaged texts ([`damaged`]), and optional resources: real data next to the repository, programs,
-//! and the emulated rig.
+//! Shared by tests: damaged texts ([`damaged`]), and optional resources: real data, programs, and the emulated rig.
 //!
 //! Tests without their resource count as skipped. The crate's build script calls [`declare`], which sets the
 //! configuration `shared_data`; the test has `#[cfg_attr(not(shared_data), ignore = "needs the real data beside the
