@@ -2,15 +2,13 @@
 //!
 //! ## PSF (Li 2014, sections 5.2.1 and 5.2.2)
 //! A flat, textured target is at the far focus: the far-focused image is sharp and the near-focused one blurred by the
-//! largest radius R; at the near focus it is the reverse. Trial PSFs blur the sharp image until it equals the other.
-//! This gives `k` (1-D search) or `p` and `k` (a search of `k` for each `p`).
-//!
-//! Two improvements over the printed method. First, radially binned spectra are compared, so that a trial costs a
-//! hundred OTF values instead of a convolution. Second, the squared difference is divided by `H1^2 + H2^2` (total least
-//! squares), because trial blur also blurs the sharp image's noise; otherwise a stronger blur always seems better.
-//! Neither image need be sharp: with blur radii R1 and R2 the cost is `sum |H1 I2 - H2 I1|^2 / (H1^2 + H2^2)`, so a
-//! target at any known depth except the middle suffices. Units: R in pixels, frequencies in rad/px. Cost: two FFTs a
-//! pair, then 10 ms (Gaussian) to 0.5 s (generalised).
+//! largest radius R; at the near focus it is the reverse. Trial PSFs blur the sharp image until it equals the other: a
+//! search of `k`, or of `k` for each `p`. Two improvements over the printed method: radially binned spectra are
+//! compared, so that a trial costs a hundred OTF values instead of a convolution; and the squared difference is divided
+//! by `H1^2 + H2^2` (total least squares), because trial blur also blurs the sharp image's noise, which favours
+//! stronger blur. With blur radii R1 and R2 the cost is `sum |H1 I2 - H2 I1|^2 / (H1^2 + H2^2)`: neither image need be
+//! sharp, and a target at any known depth except the middle suffices. Units: R in pixels, frequencies in rad/px. Cost:
+//! two FFTs a pair, then 10 ms (Gaussian) to 0.5 s (generalised).
 
 mod free;
 mod ready;

@@ -2,16 +2,14 @@
 //!
 //! A region begins with connected (8-neighbours) pixels whose texture energy is below
 //! [`LOW_TEXTURE`](crate::confidence::LOW_TEXTURE) times its median. It grows, as far as kernels and windows reach,
-//! over adjacent pixels below [`GROWN_TEXTURE`] times the median: these depend on the region's texture on one side
-//! only, and noise biases their depth towards the middle of the range. A cubic surface (Li 2014, eq. 6.16, plus the
-//! mixed terms it lacks) is fitted to the depths in a margin around the Moore-neighbour boundary and evaluated inside.
-//!
-//! The thesis takes a margin of one pixel. The margin's curvature decides how well the middle of a region is known, so
-//! here it is 1.5 times as wide as the region's radius, unless that contradicts the nearest surroundings (`surface`).
-//! The fit is robust (Huber's weights, times the texture energy, which is inverse to the variance) with no more terms
-//! than the margin supports. [`Filling`] selects criterion ([`LowTexture`]) and order ([`FillBy`]), including the
+//! over adjacent pixels below [`GROWN_TEXTURE`] times the median, because noise biases their depth towards the middle
+//! of the range. A cubic surface (Li 2014, eq. 6.16, plus the mixed terms it lacks) is fitted to the depths in a margin
+//! around the Moore-neighbour boundary. The thesis' margin is one pixel. Here it is 1.5 times as wide as the region's
+//! radius, unless that contradicts the nearest surroundings (`surface`), because the margin's curvature determines the
+//! middle. The fit is robust (Huber's weights, times the texture energy, which is inverse to the variance) with no more
+//! terms than the margin supports. [`Filling`] selects criterion ([`LowTexture`]) and order ([`FillBy`]), including the
 //! thesis' for comparison. A filled pixel gets [`FILLED_CONFIDENCE`]; a region without a usable margin stays NaN. Cost:
-//! O(pixels of regions and margins), 3 to 8 ms for 640x480.
+//! 3 to 8 ms for 640x480.
 
 mod boundary;
 mod criterion;

@@ -177,7 +177,6 @@ mod tests {
     use crate::operators::{Request, design};
     use crate::optics::OpticsFile;
 
-    /// Two different random images with a texture's spatial scale.
     fn random_pair(height: usize, width: usize) -> [Array2<f32>; 2] {
         let value = |y: usize, x: usize, seed: usize| {
             let mut h = (y * 7919 + x * 104_729 + seed * 1_299_709) as u64;
@@ -198,7 +197,6 @@ mod tests {
         toml::from_str::<OpticsFile>(text).unwrap().check().unwrap()
     }
 
-    /// All variants, odd sizes, several tiles and several bands against the plain stages.
     #[test]
     fn every_variant_agrees_with_the_plain_run_time() {
         let optics = optics();

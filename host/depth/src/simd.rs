@@ -122,7 +122,6 @@ pub(crate) struct Plane {
     rows: usize,
 }
 
-/// A cache line of 16 numbers: aligns the rows.
 #[derive(Debug, Clone, Copy)]
 #[repr(C, align(64))]
 struct Line([f32; 16]);

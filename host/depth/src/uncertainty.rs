@@ -4,16 +4,15 @@
 //! `s^2` changes `m - p1 alpha - p2 alpha^3` by `r = K2 * n2 + K1 * n1`, where
 //! `K2 = Q * (Gm1 - alpha Gp1 - alpha^3 Gp2)` and `K1` has the sign of `Gm1` changed. To first order
 //!
-//! `var(alpha) = sum sum p1(y) p1(y') cov(r(y), r(y')) / (c1 + 3 c3 alpha^2)^2`, `cov(r(y), r(y + d)) = 2 s^2 (A_mm +
-//! alpha^2 A_11 + 2 alpha^4 A_12 + alpha^6 A_22)(d)`
+//! `var(alpha) = sum sum p1(y) p1(y') cov(r(y), r(y')) / (c1 + 3 c3 alpha^2)^2`,
+//! `cov(r(y), r(y + d)) = 2 s^2 (A_mm + alpha^2 A_11 + 2 alpha^4 A_12 + alpha^6 A_22)(d)`
 //!
 //! with `A_ij` the correlations of the filters `Q * Gm1`, `Q * Gp1`, `Q * Gp2`; the mixed terms with `Gm1` cancel
-//! between the images. The double sum is a sum over lags `d` of `A(d)` times the window sum of `p1(y) p1(y + d)`, from
-//! the measured `p1` including its noise. The final median lowers the deviation further; see [`median_gain`]. Shot
-//! noise makes `s^2` a function of brightness ([`Noise::Camera`]). For an unknown camera it is estimated from the fits'
-//! residuals ([`Noise::Estimated`]), which counts model errors as noise. Cost: (2 w - 1)^2 / 2 lags, each a product,
-//! its sum over the window's columns and four multiply-adds per pixel; lags share sums over rows. About 30 ms for
-//! 640x480 and w = 7 on one core. Not part of the run time.
+//! between the images. The double sum is a sum over lags `d` of `A(d)` times the window sum of `p1(y) p1(y + d)`. The
+//! final median lowers the deviation further ([`median_gain`]). Shot noise makes `s^2` a function of brightness
+//! ([`Noise::Camera`]); for an unknown camera the fits' residuals give it ([`Noise::Estimated`]), with model errors.
+//! Cost: (2 w - 1)^2 / 2 lags of a product, a window sum and four multiply-adds per pixel, about 30 ms for 640x480 and
+//! w = 7 on one core.
 
 use ndarray::{Array2, ArrayView2, Zip, s};
 use serde::{Deserialize, Serialize};

@@ -25,7 +25,6 @@ const USUAL_LEFT_OVER: f32 = 3e-4;
 const FILLED_DEVIATION: f32 = 0.25;
 /// Mean square residual relative to the noise from which the model is invalid.
 const LARGEST_MISFIT: f32 = 60.0;
-/// Search distance for the reason of a hole, px.
 const SEARCH_PX: usize = 24;
 
 /// Settings of [`assess`].
@@ -189,7 +188,6 @@ fn probability(deviation_of_alpha: f32, misfit: f32) -> f32 {
     0.997 / ((1.0 + 0.3 * noisy) * (1.0 + 0.02 * unexplained))
 }
 
-/// Gives unexplained pixels without a depth the nearest reason.
 fn explain_holes(reasons: &mut Array2<u8>, map: &DepthMap) {
     let unexplained = |reasons: &Array2<u8>| {
         reasons

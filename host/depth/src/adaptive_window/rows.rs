@@ -34,7 +34,6 @@ const MEDIAN_GAIN: [f32; 4] = [1.0, 0.94, 0.85, 0.74];
 const RECOMPUTED: isize = 16;
 const WAITING: usize = 8;
 
-/// Rows of a band for an image of this size: enough bands for all threads.
 pub(super) fn rows((height, _): (usize, usize)) -> usize {
     let threads = rayon::current_num_threads().max(1);
     height.div_ceil(height.div_ceil(ROWS).next_multiple_of(threads)).max(32)
@@ -274,7 +273,6 @@ impl<'a> Tile<'a> {
         }
     }
 
-    /// Alpha, its variance and the noise of a row, counted from the first that the median needs.
     fn windows(&mut self, place: Place, row: usize, wide: usize, products: usize) {
         for index in 0..self.columns.len() {
             self.advance(place, index, row, products);
@@ -383,7 +381,6 @@ impl<'a> Tile<'a> {
         }
     }
 
-    /// Squared residual at a row's alpha, relative to noise alone.
     fn residual_row(&mut self, row: usize, wide: usize) {
         let Self { job, radius, ring, filters, sum, zeros, work, of_residual, .. } = self;
         let reach = job.bank.reach_px();

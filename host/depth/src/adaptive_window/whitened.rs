@@ -3,14 +3,14 @@
 //! With `m = I1 - I2` and `p = I1 + I2` (I1 far-focused) the residual of a depth is
 //! `r = R0 * m + alpha R1 * p + alpha^2 R2 * m + alpha^3 R3 * p`. A texture F gives `(A H1 - B H2) F` with
 //! `A = sum alpha^k R_k`, `B = sum (-alpha)^k R_k`. It vanishes at the true depth for `A : B = H2 : H1`; noise stays
-//! white with unit gain for `A^2 + B^2 = 1`. One linear least squares approximates both within 7x7 taps. A second one
+//! white with unit gain for `A^2 + B^2 = 1`. A linear least squares approximates both within 7x7 taps; a second one
 //! designs `U0`: `u = U0 * p` is the matched filter for the residual's change with depth, under the exact constraint
 //! that noise, which enters both, does not bias `sum r u`.
 //!
-//! The standard deviation of a window of side w is within 6 % of the bound for unknown texture (an independent study,
-//! `docs/accuracy.md`): `1 / (w sqrt J)`, `J = mean over frequencies of P D^2 / (s^2 (H1^2 + H2^2))`,
-//! `D = H1 H2' - H2 H1'`, P the texture's power, s^2 the noise's. Cost of [`Whitened::design`]: 153 x 25 points, 60
-//! unknowns, some ms; at run time five 7x7 kernels.
+//! A window of side w has a standard deviation within 6 % of the bound for unknown texture (`docs/accuracy.md`):
+//! `1 / (w sqrt J)`, `J = mean over frequencies of P D^2 / (s^2 (H1^2 + H2^2))`, `D = H1 H2' - H2 H1'`, P the texture's
+//! power, s^2 the noise's. Cost of [`Whitened::design`]: 153 x 25 points, 60 unknowns, some ms; at run time five 7x7
+//! kernels.
 
 use std::f64::consts::PI;
 
@@ -53,7 +53,6 @@ struct Sample {
     alpha: f64,
     h: [f64; 2],
     q: f64,
-    /// `H1 H2' - H2 H1'`.
     turn: f64,
 }
 
@@ -171,7 +170,6 @@ fn residual(points: &[Point], samples: &[[Sample; ALPHAS]]) -> Result<[Kernel; 4
     Ok(Kernel::several(SIZE, taps.as_slice())?)
 }
 
-/// U0: the matched filter of the residual's change with depth.
 fn matched(
     points: &[Point],
     samples: &[[Sample; ALPHAS]],

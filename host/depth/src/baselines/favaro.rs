@@ -1,14 +1,12 @@
 //! Favaro & Soatto's method (2005): projectors onto what a depth cannot show.
 //!
-//! The two 7x7 patches of a pair are a vector of 98 numbers. All textures at one depth fill only part of that space,
-//! because blur couples the patches; the rest is the depth's null space. Patches of random textures rendered at a depth
-//! give it: the directions of their singular value decomposition beyond the first ones. The depth is the one whose null
-//! space receives the least of the measured vector.
-//!
-//! Rendering uses this crate's OTFs; textures mix the spectra of sand and of a fractal. The vector's mean is subtracted
-//! (lighting). Vectors are taken every 3 px, residuals summed over the window, and a parabola refines the least
-//! residual over depth. Cost: learning about 1 s; run time 98 x rank operations per depth and vector, about 1 s for
-//! 640x480.
+//! The two 7x7 patches of a pair are a vector of 98 numbers. Blur couples the patches, so all textures at one depth
+//! fill only part of that space; the rest is the depth's null space. It follows from a singular value decomposition of
+//! patches of random textures rendered at the depth: the directions beyond the first ones. The depth is the one whose
+//! null space receives the least of the measured vector. Textures mix the spectra of sand and of a fractal. The
+//! vector's mean is subtracted (lighting). Vectors are taken every 3 px, residuals summed over the window, and a
+//! parabola refines the least residual. Cost: learning about 1 s; run time 98 x rank operations per depth and vector,
+//! about 1 s for 640x480.
 
 mod learn;
 
@@ -185,7 +183,6 @@ fn sum_windows(values: &Array3<f32>, reach: usize) -> Array3<f32> {
     along(&along(values, 0), 1)
 }
 
-/// Bilinear between grid points, constant beyond the outer ones.
 fn expand(grid: &Array2<f32>, dim: (usize, usize)) -> Array2<f32> {
     let place = |pixel: usize, points: usize| {
         let at = (pixel as f32 - (PATCH_PX / 2) as f32) / STEP_PX as f32;

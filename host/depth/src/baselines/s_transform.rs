@@ -1,11 +1,10 @@
 //! Subbarao & Surya's S-transform method (STM), 1994.
 //!
-//! Where an image is a cubic polynomial, blur by any symmetric PSF of second moment `sigma^2` adds `sigma^2 / 4` times
-//! its Laplacian. So the sharp image `f = g1 - (sigma1^2 / 4) lap(g1) = g2 - (sigma2^2 / 4) lap(g2)` gives
-//! `g1 - g2 = (sigma1^2 - sigma2^2) / 4 * lap(g)`, `lap(g)` the mean of the two Laplacians (equal for a cubic), solved
-//! by least squares over a window. Both images are smoothed first, so that the cubic holds. Limits: the next term
-//! shrinks the result by some percent at the ends of the range; division by the small Laplacian of a smoothed image
-//! amplifies noise. Cost: about 90 operations a pixel.
+//! Blur of a cubic polynomial by any symmetric PSF of second moment `sigma^2` adds `sigma^2 / 4` times its Laplacian.
+//! So the sharp image `f = g1 - (sigma1^2 / 4) lap(g1) = g2 - (sigma2^2 / 4) lap(g2)` gives
+//! `g1 - g2 = (sigma1^2 - sigma2^2) / 4 * lap(g)`, `lap(g)` the mean of the two Laplacians, solved by least squares
+//! over a window of smoothed images. Limits: higher terms shrink the result by some percent at the ends of the range;
+//! division by a small Laplacian amplifies noise. Cost: about 90 operations a pixel.
 
 use ndarray::{Array2, Zip};
 

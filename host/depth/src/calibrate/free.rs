@@ -196,7 +196,6 @@ fn step(hessian: &DMatrix<f64>, gradient: &DVector<f64>, weights: &[f64; HATS], 
     moved
 }
 
-/// Standard errors of the OTF at [`PLACES`] within reach, and of the width as a `k`.
 fn errors(
     observations: &[Observation],
     hats: &Hats,

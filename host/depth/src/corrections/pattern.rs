@@ -17,7 +17,6 @@ pub struct Pattern<'a> {
     pub true_mm: f64,
 }
 
-/// Patterns of one size from the farthest to the nearest.
 pub(super) struct Series<'a> {
     patterns: Vec<Pattern<'a>>,
     scale: DepthScale,

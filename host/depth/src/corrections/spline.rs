@@ -3,12 +3,10 @@
 //! `t - u = sum c(i, j, k) B_i(x) B_j(y) B_k(u)` with uniform knots, fitted by penalised least squares (P-splines;
 //! Eilers & Marx 1996): second differences of neighbouring coefficients along each axis are penalised, so that noise is
 //! not followed and sparse parts are bridged straight. Unlike one polynomial it follows the lens locally without
-//! oscillating elsewhere; unlike stored patterns it adds no noise; it has 343 coefficients.
-//!
-//! Beyond the patterns' depths the penalty continues it as a straight line in depth up to the scale's ends; beyond
-//! these there is no value. The field is not extrapolated: each of its cells needs samples at
-//! [`Learned::PATTERNS_NEEDED`] depths. Samples are means over small blocks. Noise is correlated over a smoothing
-//! window, so nothing is lost, and less noise in `u` flattens the fit of `t` to `u` less.
+//! oscillating elsewhere; unlike stored patterns it adds no noise. Beyond the patterns' depths the penalty continues it
+//! straight up to the scale's ends; beyond these the result is NaN. The field is not extrapolated: each cell needs
+//! samples at [`Learned::PATTERNS_NEEDED`] depths. Samples are means over small blocks: noise is correlated over a
+//! smoothing window, and less noise in `u` flattens the fit less. 343 coefficients.
 
 use farnear_maths::clsf::DepthScale;
 use nalgebra::{DMatrix, DVector};
@@ -67,7 +65,6 @@ struct Sample {
     weight: f64,
 }
 
-/// The blocks of all patterns that have any value, ordered by pattern.
 fn samples(series: &Series<'_>) -> Vec<(usize, Sample)> {
     let ((height, width), scale) = (series.dim(), series.scale());
     let side = (height.min(width) / BLOCKS).max(1);

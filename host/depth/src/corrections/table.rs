@@ -17,7 +17,6 @@ pub(super) trait Learned: Sized {
 
     fn learn(series: &Series<'_>, settings: &CdcSettings) -> Result<Self, CorrectionError>;
 
-    /// Checks loaded data and prepares it for maps of (height, width).
     fn prepare(&mut self, dim: (usize, usize)) -> Result<(), CorrectionError>;
 
     /// Corrects a map in standard layout in place; values beyond the scale become NaN.

@@ -6,7 +6,6 @@ use super::{GROWN_TEXTURE, Sample, trace_boundary};
 use crate::confidence::texture_scale;
 use crate::depth_map::DepthMap;
 
-/// Least and greatest width of a margin, px.
 const MARGIN_PX: [usize; 2] = [7, 112];
 
 /// Width of a margin for each pixel of its region's radius.

@@ -104,7 +104,6 @@ impl Surface {
         Some(Self { frame, coefficients, limits: [low - (high - low), high + (high - low)] })
     }
 
-    /// Robust standard deviation of the samples about the surface, mm.
     fn spread_mm(&self, samples: &[Sample]) -> f64 {
         deviation(samples.iter().map(|s| s.depth_mm - self.value(s.y, s.x)).collect())
     }

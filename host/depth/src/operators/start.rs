@@ -34,7 +34,6 @@ fn parks_mcclellan(target: impl Fn(f64) -> f64, size: usize) -> Result<Vec<f64>,
     Ok(design.impulse_response[size / 2..].to_vec())
 }
 
-/// The two-dimensional kernel of a symmetric filter given from its centre outwards.
 fn mcclellan(filter: &[f64]) -> Result<Kernel, DesignError> {
     let radius = filter.len() - 1;
     let size = 2 * radius + 1;

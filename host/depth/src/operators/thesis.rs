@@ -18,7 +18,6 @@ use crate::kernel::{self, Kernel};
 use crate::normalised_ratio::{ALPHA_SAMPLES, GridPoint, RatioFit, alphas, normalised_ratio};
 use crate::psf::Otf;
 
-/// Most evaluations per unknown.
 const PATIENCE: usize = 10;
 
 /// Relative change of cost and taps that ends it: depth errors no longer change in the third digit.

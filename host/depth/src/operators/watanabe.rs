@@ -18,7 +18,6 @@ use crate::psf::Otf;
 /// Slope (the band-pass has peak 1) below which it is regularised.
 const SLOPE_FLOOR: f64 = 0.05;
 
-/// Most evaluations per unknown.
 const PATIENCE: usize = 40;
 
 /// `[Gm1, Gp1, Gp2]` after Watanabe & Nayar. Returns [`DesignError`] if the start or the minimisation fails.

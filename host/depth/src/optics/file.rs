@@ -206,7 +206,6 @@ impl From<Optics> for OpticsFile {
 mod tests {
     use super::*;
 
-    /// Li 2014's rig (section 5.3); distances calculated by hand from the thin lens.
     const RIG: &str = "
         [lens]
         focal_length_mm = 50.0

@@ -59,7 +59,6 @@ impl Stage {
         interpolated(self.measured, &self.response, measured)
     }
 
-    /// Why the section is unusable, if it is.
     pub(super) fn problem(&self) -> Option<&'static str> {
         let finite = self.response.iter().chain(&self.measured).all(|v| v.is_finite() && v.abs() < 2.0);
         if !(1..=64).contains(&self.bin) {

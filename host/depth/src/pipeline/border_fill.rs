@@ -52,7 +52,6 @@ pub(crate) fn fill(map: &mut DepthMap, width_px: usize) {
     }
 }
 
-/// Copies a pixel's depth to another pixel that has one.
 fn take(depth: &mut f32, confidence: &mut f32, from_depth: f32, from_confidence: f32) {
     let has = !depth.is_nan();
     *confidence = if has { BORDER_CONFIDENCE * from_confidence } else { *confidence };

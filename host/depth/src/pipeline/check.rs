@@ -227,7 +227,6 @@ const CONFIDENT: f32 = 0.7;
 /// Part of the working range by which each third must be farther than the one above: only grounds exceed it.
 const TILT: f64 = 0.12;
 
-/// Warnings about the result, from a thinned sample of its pixels.
 pub(crate) fn after(map: &DepthMap, optics: &Optics) -> Option<Warning> {
     let [near_mm, far_mm] = [optics.depth_mm(1.1) as f32, optics.depth_mm(-1.1) as f32];
     let mut thirds: [Vec<f32>; 3] = Default::default();

@@ -16,7 +16,6 @@ use crate::depth_of_alpha::DepthOfAlpha;
 use crate::operators::Operators;
 use crate::simd::{self, CubicRow, Plane, Taps, WindowRow};
 
-/// Rows per stage and step.
 const BLOCK: usize = simd::SEVEN_BLOCK;
 
 /// Widest tile: its rows fit a 1 MB second-level cache; narrower tiles would interrupt hardware prefetching more often.
@@ -79,7 +78,6 @@ impl Job<'_> {
     }
 }
 
-/// The buffers of a tile.
 #[derive(Debug)]
 pub(crate) struct Tile {
     width: usize,
@@ -99,7 +97,6 @@ pub(crate) struct Tile {
     sums: Plane,
     alpha: Plane,
     scratch: Plane,
-    /// Sorted columns of the median's windows.
     sorted: Plane,
 }
 
@@ -189,7 +186,6 @@ impl Tile {
         }
     }
 
-    /// Normalises one image row with its halo.
     fn load_row(&mut self, job: &Job, image_row: isize, left: usize, width: usize, y: usize) {
         let input = job.input;
         let [image_height, image_width] = [input.height, input.width];

@@ -135,7 +135,6 @@ fn walk<L: Lanes, const SIZE: usize, const FOLDED: usize>(
     }
 }
 
-/// Index of the tap (a, b) among the free coefficients.
 #[inline(always)]
 const fn index(a: usize, b: usize) -> usize {
     let [long, short] = if a > b { [a, b] } else { [b, a] };

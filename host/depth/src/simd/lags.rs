@@ -58,7 +58,6 @@ fn lagged_generic<L: Lanes>(
     }
 }
 
-/// Adds the sums of `N` neighbours times the factors.
 #[inline(always)]
 fn add_sums<const N: usize>(values: &[f32], [f0, f1, f2, f3]: [f32; 4], sums: &mut [Vec<f32>; 4]) {
     let width = values.len() + 1 - N;

@@ -240,7 +240,6 @@ fn median_of_sorted<L: Lanes, const SIDE: usize>(ranks: &[[L; SIDE]; SIDE]) -> L
     }
 }
 
-/// Smallest of the first `N` to the front, largest to the back.
 #[inline(always)]
 fn extremes_to_ends<L: Lanes, const N: usize>(values: &mut [L; 16]) {
     for i in 0..N / 2 {
@@ -254,7 +253,6 @@ fn extremes_to_ends<L: Lanes, const N: usize>(values: &mut [L; 16]) {
     }
 }
 
-/// End of a sorted column.
 const LARGEST: bool = true;
 const SMALLEST: bool = false;
 
@@ -296,7 +294,6 @@ fn without<L: Lanes, const SIDE: usize, const DROP: usize, const END: bool>(
     }
 }
 
-/// Smallest first, largest last, others in any order.
 #[inline(always)]
 fn without_extremes<L: Lanes, const SIDE: usize>(values: &[L; SIDE]) -> [L; SIDE] {
     let mut values = *values;

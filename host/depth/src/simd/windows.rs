@@ -195,7 +195,6 @@ fn add_products_generic<L: Lanes>(a: &[f32], b: &[f32], sums: &mut [f32]) {
 }
 
 dispatch! {
-    /// Adds the products of the rows that enter the windows and subtracts those of the rows that leave.
     fn move_products(gone: [&[f32]; 2], come: [&[f32]; 2], sums: &mut [f32]) = move_products_generic
 }
 

@@ -9,10 +9,8 @@ use farnear_depth::pipeline::{RunError, Settings, Warning};
 use ndarray::{Array2, Axis, concatenate, s};
 
 const SIDE: usize = 128;
-/// Largest reach of the baselines' filters and windows.
 const BORDER: usize = 16;
 
-/// RMS error over planes through the range, mm.
 fn rmse_mm(method: Method, optics: &Optics, favaro: &Favaro, noise: bool) -> f64 {
     let alphas = [-1.0, -0.6, -0.2, 0.3, 0.7, 1.0];
     let squares = (0..).zip(alphas).map(|(seed, alpha)| {

@@ -35,7 +35,6 @@ pub fn normal(rng: &mut ChaCha8Rng) -> f64 {
     (-2.0 * a.ln()).sqrt() * (2.0 * PI * b).cos()
 }
 
-/// In-place two-dimensional transform of a square of side `n`, unscaled.
 fn transform(data: &mut [Complex64], n: usize, direction: FftDirection) {
     let fft = FftPlannerScalar::new().plan_fft(n, direction);
     for _ in 0..2 {

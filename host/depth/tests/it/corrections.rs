@@ -24,7 +24,6 @@ fn distorted(alpha: f64, x: f64, y: f64) -> f64 {
     alpha - 0.08 + 0.5 * (0.45 - 0.20 * alpha) * rho2
 }
 
-/// Sum over 2n + 1 along rows or columns, borders repeated.
 fn box_sum(map: &Array2<f64>, n: isize, (down, right): (isize, isize)) -> Array2<f64> {
     let (h, w) = map.dim();
     Array2::from_shape_fn((h, w), |(y, x)| {

@@ -10,7 +10,6 @@ use farnear_depth::pipeline::{Settings, depth_from_pair};
 use farnear_depth::psf::Psf;
 use ndarray::Array2;
 
-/// RMSE relative to half the working range over planes, without noise.
 fn relative_rmse(operators: &Operators, optics: &Optics) -> f64 {
     let texture = Texture::sand(128, 3);
     let alphas = [-0.95, -0.5, 0.3, 0.8];

@@ -17,7 +17,6 @@ fn optics() -> Optics {
     toml::from_str::<OpticsFile>(text).unwrap().check().unwrap()
 }
 
-/// An analytic texture: waves of all directions.
 fn scene([x, y]: [f64; 2]) -> f64 {
     let wave = |i: f64| {
         let (direction, frequency) = (2.4 * i, 0.25 + 0.011 * i);

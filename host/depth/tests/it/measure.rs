@@ -69,7 +69,6 @@ fn measure_with(pair: &Pair, optics: &Optics, window: Window) -> Result<Measurem
     measure_pair_of_views(far, near, optics, DepthMethod::Whitened, None, &settings(window))
 }
 
-/// RMS error in the middle, and the part of it with a depth.
 fn error(found: &Array2<f32>, pair: &Pair) -> (f64, f64) {
     let middle = ndarray::s![24..SIZE.1 - 24, 24..SIZE.0 - 24];
     let mut errors = &found.slice(middle) - &pair.truth.slice(middle);

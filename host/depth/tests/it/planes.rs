@@ -8,7 +8,6 @@ use farnear_depth::operators::Operators;
 use farnear_depth::pipeline::{Settings, depth_from_pair};
 use ndarray::Array2;
 
-/// RMSE in mm over planes through the working range, a texture each, without a border of 16 px.
 fn rmse_of_planes(psf: &str, noisy: bool) -> f64 {
     const PLANES: usize = 9;
     let optics = rig(psf);

@@ -15,7 +15,6 @@ const SIZE: (usize, usize) = (128, 96);
 const PSF: &str = "gaussian:k=0.4578";
 /// Combinations without `FARNEAR_RANDOM_PLANES`.
 const USUAL: u64 = 24;
-/// Confidence that counts as a statement.
 const CONFIDENT: f32 = 0.5;
 /// Negligible error even with a smaller predicted deviation, mm.
 const NEGLIGIBLE_MM: f32 = 1.5;

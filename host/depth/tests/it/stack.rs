@@ -42,7 +42,6 @@ fn measured(images: &[Array2<f32>], guided_px: f32, min_reliability: f32) -> Sta
     depth_from_stack(&views, &settings).expect("a stack")
 }
 
-/// Part of some columns whose place is the wall's.
 fn of_the_wall(map: &StackMap, columns: std::ops::Range<usize>) -> f64 {
     let places: Vec<f32> = map.place.slice(ndarray::s![8..72, columns]).iter().copied().collect();
     places.iter().filter(|place| (**place - WALL).abs() < 0.5).count() as f64 / places.len() as f64

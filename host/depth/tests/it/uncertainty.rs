@@ -7,7 +7,6 @@ use farnear_depth::pipeline::{Settings, depth_from_pair};
 use farnear_depth::uncertainty::{Noise, standard_deviation_mm};
 use ndarray::{Array2, s};
 
-/// RMS over inner pixels of the predicted and the measured standard deviation, mm.
 fn predicted_and_measured(psf: &str, alpha: f64, settings: &Settings, noise: Noise) -> [f64; 2] {
     const REPEATS: usize = 12;
     const SIDE_PX: usize = 96;

@@ -11,7 +11,6 @@ use farnear_depth::pipeline::Settings;
 use farnear_scene::wave::{WaveLens, random_texture};
 use ndarray::{Array2, s};
 
-/// Width and height, px.
 const SIZE: [usize; 2] = [208, 160];
 /// Defocus on the image side per step of the stage: 0.6 px of blur.
 const STEP_UM: f64 = 29.0;
@@ -70,7 +69,6 @@ fn calibrated(lens: &WaveLens) -> Result<StackLens, StackError> {
 #[derive(Debug)]
 struct Judged {
     rms_mm: f64,
-    /// RMS over the pairs of the bound for any estimator with windows of 21 px.
     bound_mm: f64,
     within_three: f64,
     scatter: f64,

@@ -20,7 +20,6 @@ pub(super) struct Patterns<'a> {
 }
 
 impl Patterns<'_> {
-    /// The grid rows around a map row, and the weight of the second.
     fn around(&self, pattern: usize, row: usize) -> (&[f32], &[f32], f32) {
         let point = row / self.grid_px;
         let part = (row % self.grid_px) as f32 / self.grid_px as f32;
@@ -179,7 +178,6 @@ impl Nearest {
     }
 }
 
-/// `Uo = Ui - Uc + w` along one row (eq. 6.2).
 fn cancel(
     depths: &mut [f32],
     nearest: &Nearest,

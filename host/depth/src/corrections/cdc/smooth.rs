@@ -3,7 +3,6 @@
 
 use ndarray::{Array2, ArrayView2};
 
-/// Reach of the weight, SDs.
 const REACH: f64 = 3.0;
 
 /// SD that bridges holes without smoothing.
