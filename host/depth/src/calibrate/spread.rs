@@ -13,7 +13,7 @@ use crate::psf::{Otf, Psf};
 /// Coefficients that vary together under the square of a Hann window: `n sum w^4 / (sum w^2)^2 = 35/18` per axis.
 pub(super) const TOGETHER: f64 = (35.0 / 18.0) * (35.0 / 18.0);
 
-/// Coefficients of a band in the search for noise: some bands have no lighting or aliases. Chance lowers it by 5 %.
+/// Coefficients of a band in the search for noise: some bands have no lighting or aliases. Chance lowers noise by 5 %.
 const QUIET_BAND: f64 = 1500.0;
 
 pub(super) struct Seen {

@@ -185,7 +185,7 @@ fn sort<L: Lanes, const SIDE: usize>(values: &mut [L; SIDE]) {
     }
 }
 
-/// Neither extreme of `n` values, at least half of all plus one, is the median: later values replace both.
+/// Neither extreme of `n` values, at least half of all plus one, is the median: one new value replaces both.
 macro_rules! forget {
     ($lanes:ident, $kept:ident, $rest:ident: $($n:literal)+) => {{
         let mut next = 0;

@@ -56,7 +56,7 @@ pub(crate) struct Found<'a> {
 }
 
 dispatch! {
-    /// Roots of `c0 + c1 a + c2 a^2 + c3 a^3` near `-c0 / c1`, `c1` limited by `floor`, and their variance.
+    /// Roots of `c0 + c1 a + c2 a^2 + c3 a^3` near `-c0 / c1`, `c1` at least `floor` energies, and their variance.
     fn roots(sums: CubicSums<'_>, floor: f32, found: Found<'_>) = roots_generic
 }
 

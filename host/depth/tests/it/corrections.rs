@@ -115,7 +115,7 @@ fn held_out_depths_come_out_flat() {
     }
 }
 
-/// Without noise, what is left at the seams is the method's own step.
+/// Without noise, the method's own step is left at the seams.
 #[test]
 fn blending_leaves_no_step_at_the_seams() {
     let series = Series::new((240, 320), 2);
