@@ -190,8 +190,8 @@ const PIEZO: PiezoModel = PiezoModel {
     resonance_hz: 200.0,
     damping: 0.03,
     tick_s: TICK_US as f64 * 1e-6,
-    // Gauge conversion, control law and DAC frame (40 us) plus the amplifier's lag (5 kHz, 32 us). 10 to 80 us besides
-    // work.
+    // Gauge conversion, control law and DAC frame (40 us) plus the amplifier's lag (5 kHz, 32 us). The first may take
+    // 10 to 80 us.
     latency_s: 80e-6,
     // As fast as the resonance, so that the command stays small, without overshoot.
     feedback: Poles { hz: 200.0, damping: 1.0 },
