@@ -65,7 +65,8 @@ pub fn start(lost: bool) -> (Peripherals, bool) {
 /// Flash wait states at 168 MHz down to 2.4 V (RM0090, section 3.5.1), below brown-out level 2.
 const LATENCY: embassy_stm32::pac::flash::vals::Latency = embassy_stm32::pac::flash::vals::Latency::WS6;
 
-/// Enables the flash accelerator (RM0090, section 3.5.2), which embassy disables: up to 1.9 times faster.
+/// Enables the flash accelerator (RM0090, section 3.5.2), which embassy disables; the program is up to 1.9 times
+/// faster.
 fn accelerate() {
     pac::FLASH.acr().modify(|acr| {
         acr.set_latency(LATENCY);
