@@ -119,7 +119,7 @@ pub enum RequestError {
     },
     /// The light cannot be set like this.
     Light {
-        /// Why.
+        /// The reason.
         reason: LightFault,
     },
 }
