@@ -11,7 +11,7 @@ use serialport::{ClearBuffer, SerialPort, SerialPortInfo, SerialPortType};
 use crate::{error::PortError, find};
 
 pub trait Transport: Send {
-    /// Waits at most `wait` for the first byte. `Ok(0)` is a timeout; an error means that the pipe is gone.
+    /// Waits at most `wait` for the first byte. `Ok(0)` is a timeout; an error means that the pipe has ended.
     fn receive(&mut self, buffer: &mut [u8], wait: Duration) -> io::Result<usize>;
 
     fn send(&mut self, bytes: &[u8], wait: Duration) -> io::Result<()>;

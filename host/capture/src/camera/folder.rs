@@ -21,7 +21,7 @@ use super::{
 use crate::describe::trigger_name;
 
 const POLL: Duration = Duration::from_millis(20);
-/// A file unchanged for this long that is no image is invalid.
+/// A non-image file is invalid after this time without a change.
 const QUIET: Duration = Duration::from_secs(2);
 const ENDINGS: [&str; 7] = ["png", "tif", "tiff", "jpg", "jpeg", "pgm", "ppm"];
 
