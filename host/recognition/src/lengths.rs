@@ -1,7 +1,5 @@
-//! Durations of activities.
-//!
-//! Log-normal state durations as in a hidden semi-Markov model (Yu, Artificial Intelligence 174, 2010). The
-//! spread is regularised by a prior worth some clips, so that a single clip does not give 0.
+//! Durations of activities: log-normal, as in a hidden semi-Markov model (Yu, Artificial Intelligence 174,
+//! 2010). The spread has a prior worth some clips, so that a single clip does not give 0.
 
 use super::clip::Clip;
 use serde::{Deserialize, Serialize};
@@ -26,7 +24,6 @@ impl Lengths {
         Self { mean_ln: (frames.max(1) as f32).ln(), spread: SPREAD }
     }
 
-    /// Lengths of each activity's clips.
     pub(super) fn of(clips: &[Clip], activities: &[String]) -> Vec<Self> {
         activities.iter().map(|activity| Self::of_activity(clips, activity)).collect()
     }
@@ -47,7 +44,6 @@ impl Lengths {
         0.5 * off * off + (self.spread / SPREAD).ln()
     }
 
-    /// Whether the values are valid.
     pub(super) fn is_sound(&self) -> bool {
         self.mean_ln.is_finite() && self.spread.is_finite() && self.spread > 0.0
     }

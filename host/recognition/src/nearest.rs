@@ -1,13 +1,12 @@
 //! Exact nearest pattern without comparing all.
 //!
-//! Patterns are projected on some dozen orthonormal directions. Distances there and the residual lengths
-//! bound the total distance from below, so only patterns with a smaller bound than the best distance are
-//! compared. O(patterns x directions) per query.
+//! Distances of projections on some dozen orthonormal directions, and the residual lengths, bound the
+//! distance from below. Only patterns with a bound below the best distance are compared. O(patterns x
+//! directions).
 
 use crate::embedding::squared_distance;
 use ndarray::{Array1, Array2, ArrayView1, ArrayView2, Axis};
 
-/// Directions of projection.
 const DIRECTIONS: usize = 64;
 /// Fewer patterns are compared directly.
 const WORTH_IT: usize = 256;

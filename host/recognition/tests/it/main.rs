@@ -3,7 +3,7 @@
 mod everyday;
 mod recognition;
 
-/// Number of property cases: few by default, more for fuzzing.
+/// Few by default, more for fuzzing.
 fn cases(usual: u32) -> u32 {
     std::env::var("PROPTEST_CASES").ok().and_then(|text| text.parse().ok()).unwrap_or(usual)
 }

@@ -1,7 +1,5 @@
-//! Gestures of arms and hands while the body stands.
-//!
-//! Hand positions are in arm lengths from the shoulder: mouth 0.3 inwards and 0.3 up, ear 0.1 inwards and
-//! 0.35 up (Winter's proportions). Times are those of unhurried adults with variation.
+//! Gestures of arms and hands of a standing person. Positions are in arm lengths from the shoulder: mouth 0.3
+//! inwards and 0.3 up, ear 0.1 inwards and 0.35 up (Winter's proportions).
 
 use super::moment::{Hand, Moment};
 use super::motion::{Maker, Motion};
@@ -14,7 +12,7 @@ pub fn ear(rng: &mut ChaCha8Rng) -> Hand {
         .elbow(rng.random_range(0.0..0.4))
 }
 
-/// End positions of a wave: with the forearm, or the whole arm at the side.
+/// With the forearm, or the whole arm at the side.
 fn wave_ends(maker: &mut Maker) -> (Hand, Hand) {
     let ahead = maker.draw(0.0, 0.55);
     if maker.chance(0.5) {
@@ -29,7 +27,6 @@ fn wave_ends(maker: &mut Maker) -> (Hand, Hand) {
     }
 }
 
-/// Waving with one hand or both.
 fn wave(maker: &mut Maker, hands: &[usize]) -> Motion {
     let (low, high) = wave_ends(maker);
     let with = |mut moment: Moment, hand: Hand| {
@@ -85,7 +82,7 @@ fn bring(maker: &mut Maker, hand: Hand, nod_deg: f64, hold: f64, back: bool) -> 
     if maker.chance(0.8) { maker.once(parts) } else { maker.gesture(parts) }
 }
 
-/// Duration of a hold, seconds; usually short.
+/// Seconds; usually short.
 fn hold(maker: &mut Maker) -> f64 {
     maker.draw(0.1_f64.ln(), 2.2_f64.ln()).exp()
 }
@@ -159,7 +156,6 @@ pub fn throw(maker: &mut Maker) -> Motion {
     maker.gesture(parts)
 }
 
-/// Hands that push or pull: one or both.
 fn both_or_one(maker: &mut Maker, both: f64) -> Vec<usize> {
     if maker.chance(both) { vec![0, 1] } else { vec![maker.main] }
 }

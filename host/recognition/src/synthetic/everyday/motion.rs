@@ -220,6 +220,6 @@ impl Motion {
     }
 }
 
-/// Smallest and largest number of frames of a clip.
+/// Fewest frames of a clip, and the most.
 const LEAST_FRAMES: usize = 6;
 const MOST_FRAMES: usize = 64;
