@@ -28,7 +28,6 @@ struct Client {
     number: u16,
     /// Incomplete frames by number: the next may begin before a resend completes the last.
     begun: BTreeMap<u16, Packets>,
-    /// Last returned frame.
     given: u16,
 }
 
@@ -69,7 +68,6 @@ impl Client {
         Self { control, stream, number: 0, begun: BTreeMap::new(), given: 0 }
     }
 
-    /// Takes control of the camera and receives its frames.
     fn controlling(camera: Ipv4Addr) -> Self {
         let mut client = Self::new(camera);
         let Ok(SocketAddr::V4(to)) = client.stream.local_addr() else { panic!("expected an IPv4 address") };
@@ -122,13 +120,12 @@ impl Client {
         String::from_utf8(text[..length as usize].to_vec()).expect("text")
     }
 
-    /// Drops packets in flight; the next acquisition restarts the numbers.
+    /// The next acquisition restarts the numbers.
     fn drain(&mut self) {
         while self.stream.recv(&mut [0; 2048]).is_ok() {}
         (self.begun, self.given) = (BTreeMap::new(), 0);
     }
 
-    /// The next complete frame; missing packets are requested again.
     fn frame(&mut self) -> Frame {
         let deadline = Instant::now() + PATIENCE;
         let mut bytes = [0; 2048];
