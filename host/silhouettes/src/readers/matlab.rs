@@ -1,8 +1,5 @@
-//! MATLAB 5 MAT-files (MathWorks, "MAT-File Format", rev. 2016): numeric and cell arrays, plain or
-//! zlib-compressed.
-//!
-//! Enough for skeleton data sets (a cell array of numeric arrays). f64 values in MATLAB's order (first index
-//! fastest). Other classes are skipped as [`Array::Other`].
+//! MATLAB 5 MAT-files (MathWorks, "MAT-File Format", rev. 2016), plain or zlib-compressed: numeric and cell
+//! arrays, as in skeleton data sets. f64 values, first index fastest; other classes become [`Array::Other`].
 
 use flate2::read::ZlibDecoder;
 use std::io::Read;
@@ -12,13 +9,10 @@ pub enum Array {
     /// First index fastest.
     Numeric {
         dimensions: Vec<usize>,
-        /// One value per element.
         values: Vec<f64>,
     },
-    /// First index fastest.
     Cell {
         dimensions: Vec<usize>,
-        /// One array per cell.
         cells: Vec<Array>,
     },
     /// Number of an unsupported class.
@@ -39,7 +33,6 @@ pub enum MatlabError {
     Invalid {
         what: &'static str,
         value: u64,
-        /// Offset in the (decompressed) element.
         at: usize,
     },
     #[error("damaged compressed data: {0}")]
@@ -57,7 +50,6 @@ const DEEPEST: usize = 16;
 const LARGEST_BYTES: u64 = 1 << 30;
 
 /// All named variables in file order.
-/// Errors: [`MatlabError`].
 pub fn read(bytes: &[u8]) -> Result<Vec<(String, Array)>, MatlabError> {
     const HEADER: usize = 128;
     let header = bytes.get(..HEADER).ok_or(MatlabError::Header("shorter than its 128-byte header"))?;
@@ -229,7 +221,6 @@ fn numbers(kind: u32, raw: &[u8], big_endian: bool, at: usize) -> Result<Vec<f64
 mod tests {
     use super::*;
 
-    /// Numeric matrix element, long form.
     fn numeric(name: &str, dimensions: &[i32], values: &[f64]) -> Vec<u8> {
         let mut body = Vec::new();
         let mut element = |kind: u32, data: &[u8]| {

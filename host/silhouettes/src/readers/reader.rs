@@ -2,7 +2,6 @@
 
 use super::recording::{Found, RecordingError};
 
-/// A file format and its reader.
 #[derive(Clone, Copy, Debug)]
 pub struct Reader {
     pub name: &'static str,
@@ -10,7 +9,6 @@ pub struct Reader {
     pub extensions: &'static [&'static str],
     /// Source and contents, for lists and help.
     pub about: &'static str,
-    /// Parses a file; damaged ones give errors, never a panic or an allocation beyond a fixed multiple of
-    /// their size.
+    /// Damaged files give errors, never a panic or an allocation beyond a fixed multiple of their size.
     pub read: fn(&[u8]) -> Result<Found, RecordingError>,
 }

@@ -1,6 +1,5 @@
-//! Fills convex shapes: hulls, triangles and capsules.
-//!
-//! A pixel is set if its centre is in the shape (edges included); cost: rows plus set pixels.
+//! Fills convex shapes. A pixel is set if its centre is in the shape (edges included). Linear in rows and set
+//! pixels.
 
 use crate::mask::Mask;
 
@@ -37,8 +36,8 @@ pub fn convex_hull(points: &[Point]) -> Vec<Point> {
     hull
 }
 
-/// Sets pixels with centres in the convex polygon (either orientation), clipped to the mask. One or two
-/// corners set the nearest pixels of that point or line.
+/// Fills a convex polygon (either orientation), clipped to the mask. One or two corners set the nearest
+/// pixels.
 pub fn fill_convex(mask: &mut Mask, polygon: &[Point]) {
     /// Tolerance, so that shared edges leave no seam.
     const EDGE_PX: f64 = 1e-9;
@@ -82,7 +81,6 @@ pub fn fill_convex(mask: &mut Mask, polygon: &[Point]) {
     }
 }
 
-/// Sets the pixels nearest to a line.
 pub fn draw_line(mask: &mut Mask, a: Point, b: Point) {
     let (height, width) = mask.dim();
     let steps = (b[0] - a[0]).abs().max((b[1] - a[1]).abs()).ceil();

@@ -1,4 +1,4 @@
-//! BVH through the public API: a synthetic walker, and damaged files that name the line.
+//! A synthetic walker, and damaged files that name the line.
 
 use crate::cases;
 use farnear_silhouettes::mask::{BoundingBox, area};
@@ -46,8 +46,8 @@ const TREE: [(&str, usize, [f64; 3]); 27] = [
     ("-", 7, [-1.5, 0.0, 0.0]),
 ];
 
-/// A person of about 1.65 m in CMU units (56.444 mm) with its joints, walking towards +z. Left is +x. Angles
-/// in the order Z, Y, X; limbs swing about x, negative forward.
+/// A person of about 1.65 m in CMU units (56.444 mm), walking towards +z, left +x. Angles in the order Z, Y,
+/// X; limbs swing about x, negative forward.
 fn walk(frames: usize) -> String {
     let mut text = "HIERARCHY\nROOT Hips\n{\n\tOFFSET 0 0 0\n\tCHANNELS 6 Xposition Yposition Zposition Zrotation Yrotation \
                     Xrotation \n"

@@ -1,11 +1,10 @@
-//! Kalman filter of position and velocity along one axis (Journal of Basic Engineering 82, 1960). Lengths in
-//! pixels, standard deviations in heights of the person.
+//! Kalman filter of position and velocity along one axis (Journal of Basic Engineering 82, 1960). Pixels;
+//! standard deviations in heights of the person.
 
-/// Standard deviations of a measured position, and of the velocity change per frame, in heights.
+/// Standard deviations of a measured position and of the velocity change per frame.
 const MEASURED: f64 = 0.04;
 const PACE: f64 = 0.012;
 
-/// Position and velocity along one axis with covariance.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Motion {
     /// Predicted position, px.
@@ -21,7 +20,6 @@ impl Motion {
         Self { at, pace: 0.0, covariance: [(MEASURED * height).powi(2), 0.0, (0.1 * height).powi(2)] }
     }
 
-    /// Predicts one frame ahead.
     pub fn predict(&mut self, height: f64) {
         self.at += self.pace;
         let [a, b, c] = self.covariance;
