@@ -1,6 +1,5 @@
-//! Background model per pixel: detects motion in video. Adaptive Gaussian mixture with an adaptive number of
-//! components (Z. Zivkovic, ICPR 2004; Z. Zivkovic and F. van der Heijden, Pattern Recognition Letters 27,
-//! 2006).
+//! Adaptive Gaussian mixture per pixel, which detects motion in video, with an adaptive number of components
+//! (Z. Zivkovic, ICPR 2004; Z. Zivkovic and F. van der Heijden, Pattern Recognition Letters 27, 2006).
 
 mod kernel;
 pub mod light;

@@ -69,7 +69,6 @@ impl BoundingBox {
         rows.max(columns)
     }
 
-    /// Whether the box touches an edge of an image of this (height, width).
     #[must_use]
     pub fn touches_edge(self, (height, width): (usize, usize)) -> bool {
         self.top == 0 || self.left == 0 || self.bottom == height || self.right == width

@@ -52,7 +52,6 @@ pub fn read(bytes: &[u8], extension: &str, choices: Choices) -> Result<Recording
     settled((reader.read)(bytes)?, choices)
 }
 
-/// Reads a folder of keypoint files, one frame each, in the given order.
 pub fn read_keypoint_files<'a>(
     files: impl IntoIterator<Item = &'a [u8]>,
     choices: Choices,
@@ -72,7 +71,6 @@ fn settled(found: Found, choices: Choices) -> Result<Recording, RecordingError> 
     }
 }
 
-/// All extensions, for messages: `.bvh, .c3d, ...`.
 pub fn extensions() -> String {
     let all = READERS.iter().flat_map(|reader| reader.extensions);
     all.map(|extension| format!(".{extension}")).collect::<Vec<_>>().join(", ")

@@ -24,7 +24,6 @@ use super::settings::Settings;
 /// Pixels per tile: the widest f32 vector (AVX-512).
 pub const TILE: usize = 16;
 
-/// Fields of a component before its channel means.
 const WEIGHT: usize = 0;
 const VARIANCE: usize = 1;
 const MEAN: usize = 2;
@@ -42,7 +41,6 @@ pub const fn mean_offset(channel: usize) -> usize {
     (MEAN + channel) * TILE
 }
 
-/// Values of a whole model.
 pub const fn state_len(tiles: usize, components: usize, channels: usize) -> usize {
     tiles * components * component_len(channels)
 }
@@ -52,7 +50,6 @@ pub struct Update<'a, const CHANNELS: usize> {
     /// Learning rate of this frame, 0 to 1.
     pub rate: f32,
     pub state: &'a mut [f32],
-    /// Components in use per tile.
     pub used: &'a mut [u8],
     pub pixels: &'a [u8],
     pub labels: &'a mut [u8],
@@ -161,7 +158,6 @@ impl<S: Simd> Constants<S> {
     }
 }
 
-/// Mixtures of one vector of pixels.
 struct Mixture<'a, S: Simd, const CHANNELS: usize> {
     simd: S,
     state: &'a mut [f32],
@@ -245,7 +241,6 @@ impl<S: Simd, const CHANNELS: usize> Mixture<'_, S, CHANNELS> {
     }
 
     /// Creates a component for each orphan sample, in the first empty place or instead of the lightest.
-    /// Returns components in use and total weight.
     #[inline(always)]
     fn found(
         &mut self,

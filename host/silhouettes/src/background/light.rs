@@ -11,7 +11,6 @@ const CHANGED: f32 = 25.0;
 /// Share of changed pixels that starts the search, and the largest share of it that may remain.
 const SUSPECT: f64 = 0.25;
 const EXPLAINED: f64 = 0.5;
-/// Plausible gains.
 const GAINS: std::ops::RangeInclusive<f32> = 0.2..=5.0;
 /// Backgrounds of less contrast give a gain only, grey levels.
 const CONTRAST: f32 = 15.0;
@@ -22,7 +21,6 @@ pub struct Light {
     tables: Vec<[u8; 256]>,
 }
 
-/// A frame in another light.
 pub enum Relit {
     Grey(Array2<u8>),
     Rgb(Array3<u8>),
@@ -38,7 +36,6 @@ impl Relit {
 }
 
 impl Light {
-    /// The light as it was, for `channels` channels.
     pub fn unchanged(channels: usize) -> Self {
         Self { tables: vec![std::array::from_fn(|level| level as u8); channels] }
     }
@@ -60,8 +57,7 @@ impl Light {
         })
     }
 
-    /// The new light, if one explains most of a changed picture. `pairs` holds levels of background and frame
-    /// per channel.
+    /// The new light, if one explains most of a changed picture, from levels of background and frame.
     pub fn changed(&self, pairs: &[Vec<[u8; 2]>]) -> Option<Self> {
         let before = self.changed_share(pairs);
         if before < SUSPECT {

@@ -96,8 +96,7 @@ pub struct BackgroundModel {
 }
 
 impl BackgroundModel {
-    /// An untrained model for frames of `size` (height, width) with 1 or 3 channels. Memory: 4 (2 + channels)
-    /// bytes per pixel and component.
+    /// An untrained model for 1 or 3 channels. Memory: 4 (2 + channels) bytes per pixel and component.
     pub fn new(size: (usize, usize), channels: usize, settings: Settings) -> Result<Self, BackgroundError> {
         settings.check()?;
         let (height, width) = size;
@@ -121,7 +120,6 @@ impl BackgroundModel {
         })
     }
 
-    /// An untrained model for frames like this one.
     pub fn like(frame: Frame<'_>, settings: Settings) -> Result<Self, BackgroundError> {
         Self::new(frame.size(), frame.channels(), settings)
     }
@@ -145,8 +143,7 @@ impl BackgroundModel {
         self.apply_outside(frame, rate, None)
     }
 
-    /// [`BackgroundModel::apply_at`] that learns nothing where `held` is set, nor within 15 pixels to its
-    /// sides.
+    /// Learns nothing where `held` is set, nor within 15 pixels to its sides.
     pub fn apply_outside(
         &mut self,
         frame: Frame<'_>,
@@ -276,8 +273,7 @@ impl BackgroundModel {
             as u8
     }
 
-    /// The empty scene: means of each pixel's heaviest component, (height, width, channels). 0 before the
-    /// first frame.
+    /// The empty scene: means of the heaviest components, (height, width, channels); first 0.
     #[must_use]
     pub fn background(&self) -> Array3<u8> {
         let (height, width) = self.size;

@@ -12,8 +12,7 @@ pub struct Settings {
     pub component_threshold: f32,
     /// Share of the data explained by background components, 1 - c_f (2006, equation 9).
     pub background_share: f32,
-    /// Weight removed from every component by the Dirichlet prior, c_T (2004, equation 14): its smallest
-    /// share of data.
+    /// Weight removed from every component by the Dirichlet prior, c_T (2004, equation 14).
     pub complexity_prior: f32,
     /// Squared grey levels.
     pub initial_variance: f32,
@@ -32,7 +31,6 @@ pub struct ShadowSettings {
 }
 
 impl Settings {
-    /// Capacity of the model's layout.
     pub const MAX_COMPONENTS: usize = 8;
 
     pub fn check(&self) -> Result<(), SettingsError> {

@@ -1,5 +1,4 @@
-//! Minimum-cost assignment by shortest augmenting paths (Kuhn 1955; Jonker and Volgenant, Computing 38,
-//! 1987).
+//! Minimum-cost assignment by shortest augmenting paths (Jonker and Volgenant, Computing 38, 1987).
 
 use ndarray::{Array2, ArrayView2};
 
@@ -97,7 +96,6 @@ mod tests {
     use ndarray::arr2;
     use proptest::prelude::*;
 
-    /// Number of pairs and their sum, by trying all.
     fn tried(costs: &Array2<f64>, limit: f64, row: usize, used: &mut Vec<bool>) -> (usize, f64) {
         if row == costs.nrows() {
             return (0, 0.0);

@@ -1,6 +1,5 @@
-//! Masks as bits, 64 pixels a word, for fast morphology (microseconds for 640x480). The structuring element
-//! is a square of side 2 r + 1. Pixels outside the image are unset for dilation and set for erosion. O(height
-//! width r / 64).
+//! Masks as bits, 64 pixels a word, for fast morphology. The structuring element is a square of side 2 r + 1;
+//! pixels outside the image are unset for dilation and set for erosion. O(height width r / 64).
 
 use ndarray::{Array2, ArrayView2};
 
@@ -82,7 +81,6 @@ impl BitMask {
         self
     }
 
-    /// Dilates by one pixel in all eight directions.
     fn grow(&mut self) {
         let step = self.row_words;
         if step == 0 {
@@ -111,7 +109,6 @@ impl BitMask {
     }
 }
 
-/// Clears the bits past the row's end.
 fn trim(row: &mut [u64], width: usize) {
     if let (Some(last), rest @ 1..) = (row.last_mut(), width % 64) {
         *last &= (1 << rest) - 1;

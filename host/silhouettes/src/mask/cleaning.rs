@@ -18,8 +18,7 @@ pub struct Cleaning {
 }
 
 impl Cleaning {
-    /// For people in images of (height, width): opening 1 px, closing height / 120, holes to 1/3000 of the
-    /// image.
+    /// For people: opening 1 px, closing height / 120, holes up to 1/3000 of the image.
     #[must_use]
     pub fn for_size((height, width): (usize, usize)) -> Self {
         Self {
@@ -29,7 +28,6 @@ impl Cleaning {
         }
     }
 
-    /// Cost: one pass each to pack, unpack and find holes.
     #[must_use]
     pub fn clean(&self, mask: ArrayView2<'_, bool>) -> Mask {
         let mut clean = if self.opening_radius_px == 0 && self.closing_radius_px == 0 {

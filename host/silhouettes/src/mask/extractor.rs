@@ -90,7 +90,6 @@ pub struct Extracted {
 
 #[derive(Clone, Debug, PartialEq)]
 pub struct Moving {
-    /// The cleaned mask, or the reason for its absence.
     pub mask: Result<Mask, Flag>,
     pub labels: Array2<Label>,
 }
@@ -108,15 +107,12 @@ pub struct Extractor {
 struct Sighted {
     people: Result<(Mask, Vec<Person>), Flag>,
     labels: Array2<Label>,
-    /// Shift by which the frame was moved back.
     shift: Shift,
 }
 
-/// Learning rate after a change of scene.
 const ANEW: f32 = 1.0 / 15.0;
 
 impl Extractor {
-    /// An untrained extractor for frames like this one.
     pub fn like(frame: Frame<'_>, settings: ExtractorSettings) -> Result<Self, BackgroundError> {
         Ok(Self {
             model: BackgroundModel::like(frame, settings.background.clone())?,
@@ -140,8 +136,7 @@ impl Extractor {
         learned
     }
 
-    /// Processes the next frame; shadow is not part of the subject. Fails for a frame of another size or kind
-    /// and leaves the extractor unchanged.
+    /// Processes the next frame. After an error the extractor is unchanged.
     pub fn extract(&mut self, frame: Frame<'_>) -> Result<Extracted, BackgroundError> {
         let Sighted { people, labels, shift } = self.sighted(frame)?;
         let mut subject = match people {
@@ -179,7 +174,6 @@ impl Extractor {
         self.changes_of_light
     }
 
-    /// Learning rate of the next frame.
     fn rate(&self) -> f32 {
         let seen = self.model.frames_seen();
         let learns = match self.settings.learning {

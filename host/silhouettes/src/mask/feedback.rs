@@ -1,5 +1,4 @@
-//! Feedback from people to the background, which must not learn them: a motionless person would become
-//! background within seconds.
+//! Feedback from people to the background, which would learn a motionless person within seconds.
 //!
 //! A region that entered over the picture's edge or walked is a person for as long as it exists. A region
 //! that appears and never moves is furniture, a change of light, or a hole left by a person who was part of
@@ -18,7 +17,6 @@ const STOPPED_FRAMES: u32 = 25;
 const OUTLINE_FRAMES: u32 = 50;
 /// Distance from the first place after which a region has walked, in heights.
 const WALKED: f64 = 0.2;
-/// Frames for which an undetected person is remembered.
 const REMEMBERED_FRAMES: u32 = 10;
 /// Margin around people that is not learned: picture height over this.
 const MARGIN: usize = 60;
@@ -57,7 +55,6 @@ impl Feedback {
         self.held.as_ref()
     }
 
-    /// Forgets all people after a change of scene.
     pub fn forget(&mut self) {
         self.tracks.clear();
         self.held = None;
@@ -125,14 +122,12 @@ impl Feedback {
         self.held = held.map(|mask| BitMask::pack(mask.view()).dilated(margin).unpack());
     }
 
-    /// Takes the track that overlaps most with a box.
     fn taken(&mut self, bounds: BoundingBox) -> Option<Track> {
         let best = (0..self.tracks.len()).max_by_key(|&index| shared(self.tracks[index].bounds, bounds))?;
         (shared(self.tracks[best].bounds, bounds) > 0).then(|| self.tracks.swap_remove(best))
     }
 }
 
-/// Overlap of two boxes, pixels.
 fn shared(a: BoundingBox, b: BoundingBox) -> usize {
     let rows = a.bottom.min(b.bottom).saturating_sub(a.top.max(b.top));
     rows * a.right.min(b.right).saturating_sub(a.left.max(b.left))

@@ -1,5 +1,4 @@
-//! People in a cleaned mask: nearby regions above one another (split by a belt or low contrast) are one
-//! person.
+//! People in a cleaned mask: stacked nearby regions (split by a belt or low contrast) are one person.
 
 use ndarray::ArrayView2;
 

@@ -21,7 +21,6 @@ pub struct Run {
 
 #[derive(Clone, Debug, PartialEq)]
 pub struct Region {
-    /// Pixels by rows.
     pub runs: Vec<Run>,
     pub area: usize,
     pub bounds: BoundingBox,
@@ -52,7 +51,6 @@ impl Region {
         (rows / self.area as f64, columns / self.area as f64)
     }
 
-    /// Sets or clears its pixels.
     pub fn paint(&self, mask: &mut Mask, value: bool) {
         for run in &self.runs {
             mask.slice_mut(ndarray::s![run.row, run.start..run.end]).fill(value);
@@ -60,7 +58,6 @@ impl Region {
     }
 }
 
-/// Regions of `mask` with this `value`, in order of their first pixels.
 #[must_use]
 pub fn regions(mask: ArrayView2<'_, bool>, value: bool, connectivity: Connectivity) -> Vec<Region> {
     let reach = usize::from(connectivity == Connectivity::Eight);

@@ -10,7 +10,6 @@ use super::{
     people::{Person, people},
 };
 
-/// Doubts about a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Flag {
     Empty,
@@ -57,9 +56,7 @@ impl Flag {
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SubjectSettings {
-    /// Smallest area of a person, pixels.
     pub smallest_person_px: usize,
-    /// Smallest area of a person's fragment, pixels.
     pub smallest_fragment_px: usize,
     /// Largest gap between stacked fragments of one person, pixels.
     pub widest_break_px: usize,
@@ -70,7 +67,6 @@ pub struct SubjectSettings {
 }
 
 impl SubjectSettings {
-    /// For images of this (height, width).
     #[must_use]
     pub fn for_size((height, width): (usize, usize)) -> Self {
         let pixels = height * width;

@@ -46,7 +46,6 @@ pub enum Sight {
     },
     /// In one blob with these people.
     Crossing { with: Vec<usize>, bounds: BoundingBox },
-    /// Not detected in this frame.
     Missed,
 }
 
@@ -55,7 +54,6 @@ pub struct Followed {
     /// Number from 1 in order of appearance.
     pub person: usize,
     pub sight: Sight,
-    /// Crossings that have just ended.
     pub parted: Vec<Parting>,
 }
 
@@ -76,7 +74,6 @@ const HEIGHT_SPREAD: f64 = 0.2;
 const HIDDEN: f64 = 0.4;
 /// A blob up to this multiple of a person's area may hold one person.
 const ONE_ALONE: f64 = 1.15;
-/// Adaptation rate of usual sizes.
 const FOLLOWING: f64 = 0.2;
 
 #[derive(Clone, Debug)]
@@ -192,8 +189,7 @@ impl Tracker {
         found
     }
 
-    /// The blob that each track shares: for a track without its own blob inside one, and for the blob's
-    /// owner.
+    /// The blob that each track shares: its own, or one around its prediction.
     fn shared(&self, blobs: &[Person], blob_of: &[Option<usize>]) -> Vec<Option<usize>> {
         let mut shared = vec![None; self.tracks.len()];
         for (index, track) in self.tracks.iter().enumerate() {
@@ -299,7 +295,6 @@ mod tests {
 
     const SIZE: (usize, usize) = (120, 320);
 
-    /// Boxes by left and top edges, 20 wide.
     fn frame(boxes: &[(f64, usize, usize)]) -> Mask {
         let mut mask = Mask::from_elem(SIZE, false);
         for &(left, top, height) in boxes {

@@ -1,6 +1,5 @@
-//! NPZ files of body motion (AMASS and others): joint positions, if the file has them. AMASS itself stores
-//! pose parameters of SMPL, SMPL-H and SMPL-X, which need the licensed body model; such files are rejected
-//! with the model's name.
+//! NPZ files of body motion (AMASS and others) with joint positions. AMASS itself stores pose parameters of
+//! SMPL, SMPL-H and SMPL-X, which need the licensed body model; such files are rejected.
 
 use super::{
     body,
@@ -104,7 +103,6 @@ pub fn read(bytes: &[u8]) -> Result<Found, RecordingError> {
     })
 }
 
-/// Reason for rejecting a file without positions.
 fn refused(arrays: &[Array]) -> RecordingError {
     let of = |name: &str| arrays.iter().find(|array| array.name == name);
     let text = |name: &str| of(name).map(|array| array.text.to_lowercase()).filter(|text| !text.is_empty());
@@ -131,7 +129,6 @@ fn refused(arrays: &[Array]) -> RecordingError {
     }
 }
 
-/// Decodes NumPy's format: floats, integers or text.
 fn array(name: &str, bytes: &[u8]) -> Result<Array, RecordingError> {
     let bad =
         |reason: &str| RecordingError::Kind { kind: "NPZ", reason: format!("array `{name}`: {reason}") };
@@ -205,7 +202,6 @@ mod tests {
         bytes
     }
 
-    /// An archive of stored entries; checksums are ignored.
     fn npz(entries: &[(&str, Vec<u8>)]) -> Vec<u8> {
         let (mut file, mut directory) = (Vec::new(), Vec::new());
         for (name, data) in entries {

@@ -3,17 +3,14 @@
 use super::recording::{Known, Source, Unit, Up};
 use crate::silhouette::capsule::Point3;
 
-/// Fewest points of a frame for a size check.
 const POINTS: usize = 4;
 /// Possible extents of a body with its props, mm; the file's unit is rejected beyond them.
 const POSSIBLE_MM: [f64; 2] = [100.0, 20_000.0];
 /// Extents that are not checked further, mm.
 const USUAL_MM: [f64; 2] = [400.0, 6000.0];
-/// Stature of an adult, mm.
 const ADULT_MM: f64 = 1700.0;
 
-/// Hides points at exactly the origin and counts them. A point inside the body in every frame is the origin
-/// of root-relative coordinates and stays.
+/// Hides and counts points at the origin. A point inside the body in every frame stays: a root.
 pub fn hide_zeros(frames: &mut [Vec<Option<Point3>>]) -> usize {
     let zero = |point: &Option<Point3>| *point == Some([0.0; 3]);
     let root = |m: usize, frames: &[Vec<Option<Point3>>]| {
@@ -33,7 +30,6 @@ pub fn hide_zeros(frames: &mut [Vec<Option<Point3>>]) -> usize {
     hidden
 }
 
-/// Whether the origin is strictly inside the box around the other points.
 fn inside(frame: &[Option<Point3>]) -> bool {
     (0..3).all(|k| {
         let values = || frame.iter().flatten().map(|p| p[k]);
@@ -41,8 +37,7 @@ fn inside(frame: &[Option<Point3>]) -> bool {
     })
 }
 
-/// The unit, or the one of mm, cm and m that fits an adult best if the body has no human size. Keeps the
-/// caller's.
+/// The unit, or the one of mm, cm and m that fits an adult best if a stated one gives no human size.
 pub fn plausible(unit: Known<Unit>, frames: &[Vec<Option<Point3>>]) -> Known<Unit> {
     let limits = match unit.source {
         Source::Format => USUAL_MM,

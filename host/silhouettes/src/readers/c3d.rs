@@ -48,7 +48,6 @@ impl File<'_> {
     }
 }
 
-/// Dimensions and data offset of a parameter.
 struct Parameter {
     element: i8,
     dimensions: Vec<usize>,
@@ -138,7 +137,6 @@ impl Layout {
         })
     }
 
-    /// Bytes per number and per frame.
     fn sizes(&self) -> (usize, usize) {
         let size = if self.scale < 0.0 { 4 } else { 2 };
         (size, size * (4 * self.points + self.analogue))
@@ -172,7 +170,6 @@ impl Layout {
         (frames, remarks)
     }
 
-    /// File unit.
     fn frames(&self, file: &File, frames: usize) -> Result<Vec<Vec<Option<Point3>>>, RecordingError> {
         let (size, stride) = self.sizes();
         let room = file.bytes.len().saturating_sub(self.data_at) / stride;
@@ -207,8 +204,7 @@ impl Layout {
     }
 }
 
-/// Frame counts in parameters: `TRIAL:ACTUAL_START_FIELD` to `ACTUAL_END_FIELD` (two words each, low first)
-/// and `POINT:FRAMES`.
+/// Parameters `TRIAL:ACTUAL_START_FIELD` to `ACTUAL_END_FIELD` (two words, low first) and `POINT:FRAMES`.
 fn declared_frames(file: &File, parameters: &HashMap<String, Parameter>) -> Vec<usize> {
     let word = |at: usize| file.word(at, "a parameter").ok().map(usize::from);
     let field = |name: &str| -> Option<usize> {
@@ -263,7 +259,6 @@ fn parameters(file: &File, start: usize) -> HashMap<String, Parameter> {
     found.into_iter().map(named).collect()
 }
 
-/// Rows of a character parameter, trimmed.
 fn text_rows(file: &File, parameter: Option<&Parameter>) -> Vec<String> {
     let Some(parameter) = parameter.filter(|p| p.element == -1) else { return Vec::new() };
     let width = parameter.dimensions.first().copied().unwrap_or(1).max(1);

@@ -1,8 +1,6 @@
 //! Keypoints of pose estimators as JSON: OpenPose, COCO and HALPE (AlphaPose, MMPose), MediaPipe. One view: x
-//! to the right and y down in the picture.
-//!
-//! People without numbers are followed by place. Lengths are guessed from the body: the longest trunk and
-//! legs in a frame are those of an adult.
+//! to the right and y down in the picture. People without numbers are followed by place. Lengths are guessed
+//! from the body: the longest trunk and legs in a frame are those of an adult.
 
 mod document;
 mod layouts;
@@ -35,7 +33,6 @@ const NORMALISED: f64 = 3.0;
 /// Aspect ratio if the file does not state it.
 const USUAL_ASPECT: f64 = 16.0 / 9.0;
 
-/// Fails for damaged JSON or a file without points.
 pub fn read(bytes: &[u8]) -> Result<Found, RecordingError> {
     found(vec![Document::parse(bytes)?])
 }
@@ -94,7 +91,6 @@ fn found(documents: Vec<Document>) -> Result<Found, RecordingError> {
     })
 }
 
-/// The picture's plane is x to the right and z up.
 fn in_space(points: &[Option<[f64; 2]>]) -> Vec<Option<Point3>> {
     // Not 0, 0, 0, which is a missing marker.
     points.iter().map(|point| point.map(|[x, y]| [x, 1e-9, -y])).collect()

@@ -39,17 +39,13 @@ pub enum MatlabError {
     Compression(String),
 }
 
-/// Data types of elements.
 const MI_MATRIX: u32 = 14;
 const MI_COMPRESSED: u32 = 15;
 const CELL_CLASS: u8 = 1;
 const NUMERIC_CLASSES: std::ops::RangeInclusive<u8> = 6..=15;
-/// Limit of nested cells.
 const DEEPEST: usize = 16;
-/// Limit of decompressed elements.
 const LARGEST_BYTES: u64 = 1 << 30;
 
-/// All named variables in file order.
 pub fn read(bytes: &[u8]) -> Result<Vec<(String, Array)>, MatlabError> {
     const HEADER: usize = 128;
     let header = bytes.get(..HEADER).ok_or(MatlabError::Header("shorter than its 128-byte header"))?;

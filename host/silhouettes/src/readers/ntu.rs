@@ -20,7 +20,6 @@ pub const READER: Reader = Reader {
 
 /// The sensor follows six bodies.
 const MOST_BODIES: usize = 6;
-/// Frame rate of the sensor.
 const RATE_HZ: f64 = 30.0;
 
 type Body = Vec<Option<Point3>>;

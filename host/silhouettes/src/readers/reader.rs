@@ -7,7 +7,6 @@ pub struct Reader {
     pub name: &'static str,
     /// Lower case, without the dot.
     pub extensions: &'static [&'static str],
-    /// Source and contents, for lists and help.
     pub about: &'static str,
     /// Damaged files give errors, never a panic or an allocation beyond a fixed multiple of their size.
     pub read: fn(&[u8]) -> Result<Found, RecordingError>,

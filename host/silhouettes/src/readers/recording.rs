@@ -1,6 +1,5 @@
-//! A recording of named points over time, the common form of all motion-capture files. A reader returns the
-//! file's own unit and axes with their source ([`Found`]); [`Found::settled`] converts to millimetres and z
-//! up.
+//! Recordings of named points over time, the common form of all motion-capture files. A reader returns the
+//! file's own unit and axes with their source ([`Found`]); [`Found::settled`] converts to mm and z up.
 
 use super::body;
 use crate::silhouette::{aliases, capsule::Point3};
@@ -9,15 +8,13 @@ use std::collections::HashMap;
 use std::fmt;
 use std::str::FromStr;
 
-/// A file's unit of length.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Unit {
     pub mm: f64,
 }
 
 impl Unit {
-    /// Named units: read name, millimetres, shown name. The last is the CMU library's, whose skeletons count
-    /// 1/0.45 inch.
+    /// Read name, millimetres, shown name. The last is the CMU library's, whose skeletons count 1/0.45 inch.
     pub const NAMED: [(&str, f64, &str); 5] = [
         ("mm", 1.0, "millimetres"),
         ("cm", 10.0, "centimetres"),
@@ -105,7 +102,6 @@ impl FromStr for Up {
     }
 }
 
-/// Source of a property of a recording.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Source {
     Caller,
@@ -113,7 +109,6 @@ pub enum Source {
     Format,
     /// The file states an unknown value.
     Unknown {
-        /// Text in the file.
         stated: String,
     },
     /// Not stated in the file.
@@ -124,7 +119,6 @@ pub enum Source {
     },
 }
 
-/// A property with its source.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Known<T> {
     pub value: T,
@@ -158,7 +152,6 @@ pub struct Found {
     pub rate_hz: f64,
     /// `frames[f][m]`: point m in frame f.
     pub frames: Vec<Vec<Option<Point3>>>,
-    /// Further people.
     pub others: Vec<Vec<Vec<Option<Point3>>>>,
     /// Seen from one side: points are in the plane of x and z.
     pub planar: bool,
@@ -177,8 +170,7 @@ impl Found {
         }
     }
 
-    /// Converts to millimetres with z up. Non-finite points and points at exactly 0, 0, 0 (a missing marker
-    /// in many exports) are hidden.
+    /// Converts to millimetres, z up. Hides non-finite points and 0, 0, 0 (missing in many exports).
     pub fn settled(mut self, choices: Choices) -> Recording {
         if let Some(number) = choices.person.and_then(|person| person.checked_sub(2))
             && number < self.others.len()

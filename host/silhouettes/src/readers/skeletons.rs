@@ -1,5 +1,4 @@
-//! Joints of skeleton data sets as capsules. World frame of [`crate::silhouette`]: x right, y away from the
-//! sensor, z up, millimetres.
+//! Joints of skeleton data sets as capsules: x right, y away from the sensor, z up, millimetres.
 
 use super::matlab::{self, Array, MatlabError};
 use crate::silhouette::capsule::{Capsule, Point3};
@@ -132,8 +131,7 @@ pub enum SkeletonError {
     Form { activity: usize, subject: usize, repetition: usize, found: Vec<usize>, joints: usize },
 }
 
-/// Reads a cell array `data{activity, subject, repetition}` of 3 x joints x frames arrays in a sensor's frame
-/// (x right, y up, z away); skips empty cells.
+/// Reads cells `data{activity, subject, repetition}` of 3 x joints x frames (x right, y up, z away).
 pub fn read_cells(bytes: &[u8], layout: &Layout) -> Result<Vec<SkeletonClip>, SkeletonError> {
     let variables = matlab::read(bytes)?;
     let found = variables.into_iter().find_map(|(name, array)| match array {

@@ -197,8 +197,7 @@ pub struct Aliases {
     pub remark: String,
 }
 
-/// Points that built-in templates know under other names; `None` if a template fits without aliases, or none
-/// does.
+/// `None` if a template fits without aliases, or none does.
 pub fn find(names: &[String]) -> Option<Aliases> {
     let templates = || Template::names().filter_map(|name| Template::named(name).ok());
     if templates().any(|template| template.check(names).is_ok()) {

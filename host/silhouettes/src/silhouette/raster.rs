@@ -1,5 +1,4 @@
-//! Fills convex shapes. A pixel is set if its centre is in the shape (edges included). Linear in rows and set
-//! pixels.
+//! Fills convex shapes: pixels with their centre in the shape, edges included.
 
 use crate::mask::Mask;
 
@@ -36,8 +35,7 @@ pub fn convex_hull(points: &[Point]) -> Vec<Point> {
     hull
 }
 
-/// Fills a convex polygon (either orientation), clipped to the mask. One or two corners set the nearest
-/// pixels.
+/// Either orientation, clipped to the mask. One or two corners set the nearest pixels.
 pub fn fill_convex(mask: &mut Mask, polygon: &[Point]) {
     /// Tolerance, so that shared edges leave no seam.
     const EDGE_PX: f64 = 1e-9;

@@ -117,8 +117,7 @@ impl Template {
         self.parts.iter().filter(there).count()
     }
 
-    /// Requires at least half of the template's markers, or enough for four parts in five (templates of
-    /// joints name more than any program records).
+    /// Requires half of the markers, or enough for four parts in five (templates name many joints).
     pub fn check(&self, names: &[String]) -> Result<(), TemplateError> {
         let (missing, of) = self.missing(names);
         if 2 * missing.len() > of && 5 * self.drawn(&missing) < 4 * self.parts.len() {

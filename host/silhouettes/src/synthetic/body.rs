@@ -1,6 +1,5 @@
-//! Synthetic person: a jointed body of capsules posed by angles. Proportions after Winter (Biomechanics and
-//! Motor Control of Human Movement, fig. 4.1). x to the person's right, y forward, z up, millimetres, origin
-//! on the ground between the feet.
+//! Synthetic person: a jointed body of capsules posed by angles (proportions: Winter, Biomechanics and Motor
+//! Control of Human Movement, fig. 4.1). x right, y forward, z up, mm, origin on the ground between the feet.
 
 use crate::silhouette::capsule::{Capsule, Point3};
 

@@ -14,8 +14,7 @@ use farnear_silhouettes::silhouette::{
 use proptest::prelude::*;
 use std::fmt::Write;
 
-/// Walker's joints below the hips: name, tree depth, offset, in file order. `-` closes a chain with an end
-/// site.
+/// Joints below the hips: name, tree depth, offset, in file order. `-` closes a chain with an end site.
 const TREE: [(&str, usize, [f64; 3]); 27] = [
     ("LHipJoint", 1, [0.0, 0.0, 0.0]),
     ("LeftUpLeg", 2, [1.7, -1.7, 0.4]),
@@ -46,8 +45,7 @@ const TREE: [(&str, usize, [f64; 3]); 27] = [
     ("-", 7, [-1.5, 0.0, 0.0]),
 ];
 
-/// A person of about 1.65 m in CMU units (56.444 mm), walking towards +z, left +x. Angles in the order Z, Y,
-/// X; limbs swing about x, negative forward.
+/// 1.65 m in CMU units (56.444 mm), towards +z, left +x. Angles Z, Y, X; limbs swing about x.
 fn walk(frames: usize) -> String {
     let mut text = "HIERARCHY\nROOT Hips\n{\n\tOFFSET 0 0 0\n\tCHANNELS 6 Xposition Yposition Zposition Zrotation Yrotation \
                     Xrotation \n"

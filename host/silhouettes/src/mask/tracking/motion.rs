@@ -1,7 +1,6 @@
-//! Kalman filter of position and velocity along one axis (Journal of Basic Engineering 82, 1960). Pixels;
-//! standard deviations in heights of the person.
+//! Kalman filter of position and velocity along one axis (Journal of Basic Engineering 82, 1960), in pixels.
 
-/// Standard deviations of a measured position and of the velocity change per frame.
+/// Standard deviations of a measured position and of the velocity change per frame, in heights.
 const MEASURED: f64 = 0.04;
 const PACE: f64 = 0.012;
 
@@ -14,7 +13,6 @@ pub(super) struct Motion {
 }
 
 impl Motion {
-    /// At a position with unknown velocity.
     pub fn new(at: f64, height: f64) -> Self {
         // Up to a tenth of a height per frame initially.
         Self { at, pace: 0.0, covariance: [(MEASURED * height).powi(2), 0.0, (0.1 * height).powi(2)] }

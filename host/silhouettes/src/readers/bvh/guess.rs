@@ -8,7 +8,6 @@ use super::kinematics::{Kinematics, at_rest};
 use super::parse::{Joint, Motion};
 use crate::silhouette::capsule::Point3;
 
-/// Range of a person's stature, metres.
 const STATURE_M: std::ops::RangeInclusive<f64> = 1.4..=2.1;
 /// Geometric mean of the range.
 const TYPICAL_M: f64 = 1.7;
@@ -45,7 +44,6 @@ impl Body {
         (!feet.is_empty()).then_some(Self { root, head, feet })
     }
 
-    /// From the feet to the head.
     fn upward(&self, places: &[Point3]) -> Point3 {
         let feet: Point3 = std::array::from_fn(|k| {
             self.feet.iter().map(|&foot| places[foot][k]).sum::<f64>() / self.feet.len() as f64
@@ -62,7 +60,6 @@ impl Body {
         0.0 < head && head < all
     }
 
-    /// From head to toe along the bones.
     fn stature(&self, joints: &[Joint]) -> f64 {
         let leg = self.feet.iter().map(|&foot| length(joints, foot)).fold(0.0, f64::max);
         length(joints, self.head) + leg

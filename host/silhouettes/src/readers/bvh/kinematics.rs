@@ -30,8 +30,8 @@ pub struct Kinematics<'a> {
 
 impl<'a> Kinematics<'a> {
     /// The first frame decides how position channels are meant: Biovision adds them to the offset, most
-    /// current writers store the whole translation. With offset o and first position p they replace the
-    /// offset if p is nearer to o than to 0.
+    /// current writers store the whole translation. They replace offset o if the first position is nearer to
+    /// o than to 0.
     pub fn new(motion: &'a Motion) -> Self {
         let mut replaces = Vec::with_capacity(motion.joints.len());
         let mut from = 0;

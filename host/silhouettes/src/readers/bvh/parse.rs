@@ -62,7 +62,6 @@ pub struct Motion {
     /// Parents first.
     pub joints: Vec<Joint>,
     pub frame_time_s: f64,
-    /// Values of all channels per frame.
     pub frames: Vec<Vec<f64>>,
 }
 
@@ -161,7 +160,6 @@ fn wrong(line: usize, reason: String) -> RecordingError {
     RecordingError::Line { line, reason }
 }
 
-/// Start of a possibly long text.
 fn short(text: &str) -> &str {
     const LONGEST: usize = 40;
     text.char_indices().nth(LONGEST).map_or(text, |(at, _)| &text[..at])
@@ -183,7 +181,6 @@ struct Cursor<'a> {
 }
 
 impl<'a> Cursor<'a> {
-    /// Skips white space; the counted line is that of the next word.
     fn skip(&mut self) {
         let trimmed = self.rest.trim_start();
         let skipped = &self.rest[..self.rest.len() - trimmed.len()];
@@ -259,7 +256,6 @@ impl<'a> Cursor<'a> {
         Ok(channels)
     }
 
-    /// Brackets of an end site with its offset.
     fn end_site(&mut self) -> Result<Point3, RecordingError> {
         self.expect("{")?;
         self.expect("OFFSET")?;
@@ -269,10 +265,8 @@ impl<'a> Cursor<'a> {
     }
 }
 
-/// Non-empty lines after MOTION with their numbers.
 struct Lines<'a> {
     lines: Box<dyn Iterator<Item = (usize, &'a str)> + 'a>,
-    /// Last line of the file.
     last: usize,
 }
 

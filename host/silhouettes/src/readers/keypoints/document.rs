@@ -1,6 +1,5 @@
 //! People in the JSON of pose estimators, in all common nestings: a frame per file (OpenPose), a list of
-//! people with their picture (COCO, AlphaPose), lists of frames (MMPose, MediaPipe), or frames by picture
-//! names.
+//! people with their picture (COCO, AlphaPose), lists of frames (MMPose, MediaPipe), or picture names.
 
 use std::collections::BTreeMap;
 
@@ -16,7 +15,6 @@ pub const LEAST_CONFIDENCE: f64 = 0.1;
 #[derive(Clone, Debug)]
 pub struct Person {
     pub points: Vec<Option<[f64; 2]>>,
-    /// Number in the file's own tracking.
     pub id: Option<i64>,
 }
 
@@ -26,15 +24,12 @@ pub struct Document {
     /// Width and height of the pictures, pixels.
     pub size: Option<[f64; 2]>,
     pub layout: Option<&'static Layout>,
-    /// Points below the least confidence.
     pub unsure: usize,
 }
 
-/// Keys of people and frames.
 const PEOPLE: [&str; 8] =
     ["people", "bodies", "instances", "persons", "poses", "predictions", "detections", "annotations"];
 const FRAMES: [&str; 6] = ["frames", "instance_info", "pose_frames", "results", "data", "root"];
-/// Keys of a person's points.
 const POINTS: [&str; 8] = [
     "pose_keypoints_2d",
     "keypoints",

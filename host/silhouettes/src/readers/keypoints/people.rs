@@ -4,7 +4,6 @@ use std::collections::BTreeMap;
 
 use super::{document::Person, layouts::NAMES};
 
-/// A person's points per frame.
 pub type Track = Vec<Vec<Option<[f64; 2]>>>;
 
 /// Limit of people, which bounds the memory.
@@ -26,7 +25,6 @@ struct Followed {
     seen: Vec<(usize, usize)>,
 }
 
-/// The people, longest seen and largest first, and their number.
 pub fn followed(frames: &[Vec<Person>]) -> (Vec<Track>, usize) {
     let mut all: Vec<Followed> = Vec::new();
     let mut of_id: BTreeMap<i64, usize> = BTreeMap::new();
