@@ -1,9 +1,6 @@
-//! Random textures.
-//!
-//! A Gaussian random field of a given spectrum with two samples per pixel, mean 1, standard deviation =
-//! contrast, clipped to 0.2..1.8. Its period exceeds the image by at least 64 px, so nothing repeats within
-//! an image and surfaces continue beyond it. Depends on seed and image size only. Cost: one FFT of the
-//! period, 0.1 s for 640 x 480.
+//! Random textures: a Gaussian random field of a given spectrum with two samples per pixel, mean 1, standard
+//! deviation = contrast, clipped to 0.2..1.8. Its period exceeds the image by at least 64 px, so nothing
+//! repeats. Depends on seed and image size only. Cost: one FFT of the period, 0.1 s for 640 x 480.
 
 use std::fmt;
 
@@ -17,7 +14,6 @@ use crate::fourier::{Fourier2, good_size};
 use crate::kernel::CELLS_PER_PIXEL;
 use crate::maps::Picture;
 
-/// Minimum excess of the period over the image.
 const MARGIN_PX: usize = 64;
 /// Range of the radiance; the mean is 1.
 const CLIP: (f32, f32) = (0.2, 1.8);
@@ -54,7 +50,6 @@ fn grain_amplitude(f: f32) -> f32 {
     libm::expf(-0.5 * z * z)
 }
 
-/// Spectrum of a random texture.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Spectrum {
     Sand,
