@@ -1,5 +1,4 @@
-//! The camera's features (GenICam SFNC) in one table, which defines registers, defaults, ranges and
-//! description nodes.
+//! The camera's features (GenICam SFNC) in one table: registers, defaults, ranges and description nodes.
 
 /// Type of a feature. Each has a 32-bit register.
 #[derive(Clone, PartialEq, Debug)]
@@ -9,7 +8,6 @@ pub enum Value {
         min: u32,
         max: u32,
     },
-    /// Fixed-point number.
     Number {
         min: u32,
         max: u32,
@@ -18,7 +16,6 @@ pub enum Value {
         unit: &'static str,
     },
     Choice(Vec<(&'static str, u32)>),
-    /// Value that triggers the command.
     Command(u32),
 }
 
@@ -28,7 +25,6 @@ pub struct Feature {
     pub category: &'static str,
     pub register: u32,
     pub value: Value,
-    /// Register value at power-on.
     pub initial: u32,
 }
 
@@ -64,7 +60,6 @@ pub const EXPOSURE_US: u32 = 0xA040;
 /// Factor, in hundredths.
 pub const GAIN: u32 = 0xA044;
 pub const BLACK_LEVEL: u32 = 0xA048;
-/// Whether frames have chunks.
 pub const CHUNK_MODE: u32 = 0xA04C;
 /// Chunk selected for [`CHUNK_ENABLE`].
 pub const CHUNK_SELECTOR: u32 = 0xA050;

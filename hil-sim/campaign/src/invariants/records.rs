@@ -20,7 +20,6 @@ fn broken(at_ns: u64, what: String) -> Broken {
 /// Possible values of a setting.
 #[derive(Default)]
 struct Known {
-    /// Stored value.
     kept: Option<i32>,
     /// Values confirmed since, with times.
     since: Vec<(u64, i32)>,
@@ -72,7 +71,7 @@ fn loses(case: &Case<'_>, record: RecordName) -> bool {
     })
 }
 
-/// When writing stopped before this reset: a hung board writes nothing.
+/// A hung board writes nothing.
 fn wrote_until_ns(case: &Case<'_>, reset_ns: u64) -> u64 {
     let before = case.sights.iter().take_while(|sight| sight.at_ns < reset_ns);
     before.fold(reset_ns, |until, sight| match &sight.seen {

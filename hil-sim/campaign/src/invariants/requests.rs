@@ -11,7 +11,6 @@ use farnear_sim::observer::Seen;
 
 type Answer = Result<Response, RequestError>;
 
-/// Property `acts-twice`.
 pub fn acts_twice(case: &Case<'_>) -> Vec<Broken> {
     let mut broken = ends(case);
     broken.extend(answers(case));

@@ -54,7 +54,6 @@ fn at(lens_um: f64) -> Truth {
     Truth { lens_um, ..Truth::default() }
 }
 
-/// Violated properties of a run.
 fn broken(scenario: &str, sights: &[Sight]) -> Vec<&'static str> {
     let scenario = Scenario::parse(scenario).expect("a scenario");
     let parts = Parts::default();
