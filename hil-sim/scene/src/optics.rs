@@ -39,24 +39,14 @@ pub enum OpticsError {
     #[error("{0}")]
     Syntax(String),
     #[error("[{section}] {name} = {value}: must be a positive, finite number{unit}")]
-    NotPositive {
-        section: &'static str,
-        name: &'static str,
-        value: f64,
-        unit: &'static str,
-    },
+    NotPositive { section: &'static str, name: &'static str, value: f64, unit: &'static str },
     #[error("[lens] needs aperture_mm or f_number")]
     NoAperture,
     #[error(
         "[lens] aperture_mm = {aperture_mm} and f_number = {f_number} disagree: with focal_length_mm = \
          {focal_length_mm} that aperture is f_number = {implied:.5}; give one of them"
     )]
-    ApertureDisagreement {
-        focal_length_mm: f64,
-        aperture_mm: f64,
-        f_number: f64,
-        implied: f64,
-    },
+    ApertureDisagreement { focal_length_mm: f64, aperture_mm: f64, f_number: f64, implied: f64 },
     #[error(
         "[focus] {name} = {distance_mm} is not beyond the focal length of {focal_length_mm} mm: no real image forms"
     )]
@@ -71,13 +61,7 @@ pub enum OpticsError {
         "[focus] max_blur_px = {given_px} and near_mm = {near_mm} disagree by {percent:.1} % (2 % allowed): \
          near_mm = {implied_near_mm:.2} would agree with that blur, max_blur_px = {implied_px:.4} with that distance"
     )]
-    Disagreement {
-        given_px: f64,
-        near_mm: f64,
-        percent: f64,
-        implied_px: f64,
-        implied_near_mm: f64,
-    },
+    Disagreement { given_px: f64, near_mm: f64, percent: f64, implied_px: f64, implied_near_mm: f64 },
     #[error("[psf] {0}")]
     Psf(#[from] PsfError),
 }

@@ -34,11 +34,7 @@ pub enum PackedSceneError {
     #[error("{found:?} begins no packed scene, expected {MAGIC:?}")]
     Magic { found: [u8; 8] },
     #[error("a packed scene's {what} has {found}, expected at most {most}")]
-    Size {
-        what: &'static str,
-        found: u64,
-        most: u64,
-    },
+    Size { what: &'static str, found: u64, most: u64 },
     #[error(transparent)]
     Scene(#[from] SceneError),
 }

@@ -7,8 +7,14 @@ use crate::plant::StageName;
 
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub enum When {
-    After { ms: f64 },
-    On { moment: Moment, nth: u32, delay_ms: f64 },
+    After {
+        ms: f64,
+    },
+    On {
+        moment: Moment,
+        nth: u32,
+        delay_ms: f64,
+    },
     /// Poisson process, drawn from the seed.
     Chance {
         per_s: f64,

@@ -70,10 +70,7 @@ pub enum EvaluationError {
         "an open set needs at least {fewest} clips of what is taught by either half of the subjects, without the activity that is left out, one half has {found}: \
          with fewer nothing can be called unknown at a stated share of false alarms; evaluate more people or clips"
     )]
-    OpenSetClips {
-        found: usize,
-        fewest: usize,
-    },
+    OpenSetClips { found: usize, fewest: usize },
     #[error(transparent)]
     Model(Box<crate::model::ModelError>),
     #[error(

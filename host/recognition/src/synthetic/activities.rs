@@ -43,11 +43,17 @@ struct Stretch {
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Kind {
     /// Straight walk; the upper body depends on prop or phone.
-    Walk { phone: bool },
+    Walk {
+        phone: bool,
+    },
     /// Walk around the centre.
-    Circle { phone: bool },
+    Circle {
+        phone: bool,
+    },
     /// Leaning forward and down with an arm: depth 0 to 1.
-    Reach { depth: f64 },
+    Reach {
+        depth: f64,
+    },
     Crouch,
     /// On tiptoe with both arms over a wall.
     PeerOver,

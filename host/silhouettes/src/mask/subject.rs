@@ -21,7 +21,9 @@ pub enum Flag {
     /// Part of the subject may be outside.
     CutByEdge,
     /// Parts of the subject resemble the background.
-    Fragments { count: usize },
+    Fragments {
+        count: usize,
+    },
     /// For a second or longer.
     StoppedMoving,
     /// The background is not learned yet.

@@ -45,7 +45,10 @@ pub enum Sight {
         before: Vec<Mask>,
     },
     /// In one blob with these people.
-    Crossing { with: Vec<usize>, bounds: BoundingBox },
+    Crossing {
+        with: Vec<usize>,
+        bounds: BoundingBox,
+    },
     Missed,
 }
 

@@ -30,11 +30,7 @@ pub enum MatlabError {
         at: usize,
     },
     #[error("{what} at byte {at} is {value}, which is not valid")]
-    Invalid {
-        what: &'static str,
-        value: u64,
-        at: usize,
-    },
+    Invalid { what: &'static str, value: u64, at: usize },
     #[error("damaged compressed data: {0}")]
     Compression(String),
 }

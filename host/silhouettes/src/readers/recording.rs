@@ -280,12 +280,7 @@ pub enum RecordingError {
         reason: String,
     },
     #[error("the {kind} file ends within {what}: {needed} bytes are needed, {found} are there")]
-    Truncated {
-        kind: &'static str,
-        what: &'static str,
-        needed: usize,
-        found: usize,
-    },
+    Truncated { kind: &'static str, what: &'static str, needed: usize, found: usize },
     /// Only a licensed body model converts pose parameters to joints.
     #[error(
         "it holds pose parameters of {model} (array `{array}`, {shape}) and no joint positions, which need the body model file \
