@@ -313,7 +313,7 @@ impl Driver {
         self.line.send(&bytes);
     }
 
-    /// Whether time passes only for a braking motor. Host bytes wait, as runs may not depend on its speed.
+    /// Whether time passes only for a braking motor. Host bytes wait until it stops.
     fn is_braking(&mut self, now_ns: u64) -> bool {
         self.pacing.is_lockstep()
             && self.wiring.is_stepping(now_ns)

@@ -20,7 +20,6 @@ use ndarray::{Array2, Array3, ArrayView1, s};
 const SIZE: (usize, usize) = (480, 640);
 const FRAMES: usize = 60;
 
-/// Xorshift (Marsaglia 2003).
 struct Noise(u64);
 
 impl Noise {

@@ -26,7 +26,6 @@ const GALLERY: usize = 1500;
 const LARGE: usize = 20_000;
 const NEIGHBOURHOOD: Neighbourhood = Neighbourhood::Nearest(12);
 
-/// Silhouette `i`: a person walking, leaning and reaching, from one of eight sides.
 fn silhouette(i: usize) -> Mask {
     let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(i as u64);
     let build = Build { height_mm: rng.random_range(1600.0..1900.0), ..Build::default() };

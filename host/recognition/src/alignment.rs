@@ -135,7 +135,6 @@ mod tests {
     use super::*;
     use rand::{Rng, SeedableRng};
 
-    /// Clips of three correlated numbers, optionally rotated and shifted.
     fn clips(other: bool) -> Vec<Array2<f32>> {
         let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(3);
         (0..40)

@@ -60,7 +60,6 @@ impl AuxiliaryModel {
         Ok(Self { recogniser, profiles, limits })
     }
 
-    /// Outlier score of a clip for the answered activity; above 1 is unknown.
     pub(super) fn outlier_score(&self, said: &Answer, answer: &Answer) -> f32 {
         let probabilities: Vec<f32> =
             answer.probabilities.iter().map(|(_, probability)| *probability).collect();

@@ -141,7 +141,6 @@ struct Candidate {
 }
 
 impl Problem<'_> {
-    /// The first ones without `compare`.
     fn best_of(
         &self,
         settings: &SpaceSettings,
@@ -189,7 +188,6 @@ impl Problem<'_> {
         })
     }
 
-    /// Right answers over folds of subjects.
     fn right(&self, gram: &Array2<f32>, kind: ClassifierKind) -> usize {
         (0..self.folds)
             .into_par_iter()

@@ -131,7 +131,6 @@ impl Codebook {
     }
 }
 
-/// Nearest centre of each frame and its squared distance.
 fn assigned(frames: ArrayView2<f32>, centres: &Array2<f32>) -> Vec<(usize, f32)> {
     let (lengths, norms) = (squared_norms(frames), squared_norms(centres.view()));
     let products = times_transposed(frames, centres.view());

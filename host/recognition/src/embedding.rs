@@ -1,8 +1,6 @@
-//! From silhouettes to points in few dimensions (Li 2014, section 9.3.1).
-//!
-//! [`descriptor`] describes a mask by 360 centroid distances; [`isomap`], [`landmark`] (large galleries) or
-//! [`pca`] lay out a gallery; [`rbf`] embeds new silhouettes. Matrices are row-major `Array2<f32>`, one
-//! sample per row. Uses the current rayon pool.
+//! From silhouettes to points in few dimensions (Li 2014, section 9.3.1): [`descriptor`] describes a mask,
+//! [`isomap`], [`landmark`] (large galleries) or [`pca`] lay out a gallery, [`rbf`] embeds new silhouettes.
+//! Matrices are row-major, one sample per row. Uses the current rayon pool.
 
 pub mod descriptor;
 pub mod geodesic;

@@ -4,7 +4,6 @@
 use super::clip::Clip;
 use serde::{Deserialize, Serialize};
 
-/// Prior spread of log length.
 const SPREAD: f32 = 0.6;
 /// Number of clips that the prior counts for.
 const PRIOR_CLIPS: f32 = 2.0;

@@ -19,7 +19,6 @@ pub struct Live<'a> {
     frames: VecDeque<Moment>,
 }
 
-/// Features of one frame: `[opinion][view]`, as [`Recogniser::opinions`].
 type Moment = Vec<Vec<Seen>>;
 
 /// A frame of a view, embedded; no row without a visible person.
@@ -70,7 +69,6 @@ impl<'a> Live<'a> {
         })
     }
 
-    /// `None` without a visible person in the window.
     fn answer(&self, opinion: usize) -> Option<Answer> {
         let Recogniser { space, settings, .. } = self.recogniser;
         let frames: Vec<&Vec<Seen>> = self.frames.iter().filter_map(|moment| moment.get(opinion)).collect();

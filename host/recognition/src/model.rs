@@ -77,8 +77,7 @@ pub struct Answer {
     pub confidence: f32,
     /// Probability of every activity.
     pub probabilities: Vec<(String, f32)>,
-    /// Distance from the training data relative to the activity's limit: above 1 is unknown. The distance is
-    /// the auxiliary model's, or the squared one to the nearest training pattern.
+    /// Distance from the training data over the activity's limit: above 1 is unknown.
     pub outlier_score: f32,
 }
 
@@ -168,9 +167,8 @@ fn with(boxes: bool) -> &'static str {
 }
 
 impl Recogniser {
-    /// Recognises one clip. A model of one view accepts any number of views and joins the answers of all that
-    /// see a person. An auxiliary model, if any, decides whether the clip is unknown. Fails for views that
-    /// the model does not accept, or cropped silhouettes where it needs full frames.
+    /// Recognises one clip. A model of one view joins the answers of all views that see a person. Fails for
+    /// views that the model does not accept, or cropped silhouettes where it needs full frames.
     pub fn recognise(&self, views: &[Track]) -> Result<Answer, ModelError> {
         self.check(views)?;
         let mut answers = self
@@ -237,7 +235,6 @@ impl Recogniser {
         }
     }
 
-    /// A model of cropped silhouettes uses shapes only.
     pub(super) fn pattern(&self, views: &[Track]) -> Result<Array1<f32>, ModelError> {
         if self.uses_boxes() || views.iter().all(|view| view.boxes.is_none()) {
             return pattern(&self.space, views, self.settings.sharpness);
@@ -246,9 +243,8 @@ impl Recogniser {
         pattern(&self.space, &shapes, self.settings.sharpness)
     }
 
-    /// The recogniser adapted to unlabelled clips from another camera, sensor or laboratory: its classifier
-    /// is retrained with its surest answers ([`super::self_training`]); unknown limits are unchanged. Fails
-    /// for clips that do not fit and with [`ModelError::Unlabelled`].
+    /// The recogniser adapted to unlabelled clips from another camera, sensor or laboratory
+    /// ([`super::self_training`]); unknown limits are unchanged. Fails for clips that do not fit.
     pub fn adapted(&self, clips: &[Vec<Track>], rounds: usize) -> Result<Self, ModelError> {
         if self.labels.is_empty() || self.labels.len() != self.patterns.nrows() {
             return Err(ModelError::Unlabelled);

@@ -26,13 +26,13 @@ use std::sync::Arc;
 
 /// Version of the file format.
 pub const FORMAT_VERSION: u32 = 6;
-/// Older versions: without lengths,
+/// Version without clip lengths.
 const LENGTHLESS_VERSION: u32 = 5;
-/// with an auxiliary model in every file,
+/// Version with an auxiliary model in every file.
 const SECOND_VERSION: u32 = 4;
-/// with one in none,
+/// Version without auxiliary models.
 const SINGLE_VERSION: u32 = 3;
-/// without the classes of patterns.
+/// Version without pattern classes.
 const UNLABELLED_VERSION: u32 = 2;
 const MAGIC: &[u8; 8] = b"farnearA";
 const HEADER: usize = 28;
@@ -68,7 +68,6 @@ enum SavedPattern {
     FeaturesOfMembers(Box<Features>),
 }
 
-/// Network with one member, as in older files.
 #[derive(Serialize, Deserialize)]
 struct OneMember {
     mean: Array1<f32>,
@@ -106,7 +105,6 @@ impl SavedPattern {
     }
 }
 
-/// File of the auxiliary recogniser, its profiles and limits.
 type SavedAuxiliary = (Vec<u8>, Array2<f32>, Limits);
 
 fn framed(version: u32, body: &[u8]) -> Vec<u8> {
@@ -247,7 +245,6 @@ fn checksum(body: &[u8]) -> u32 {
 }
 
 impl Recogniser {
-    /// Checks the sizes that recognition relies on.
     fn checked(self) -> Result<Self, ModelError> {
         let fits =
             |holds: bool, what: &'static str| if holds { Ok(()) } else { Err(ModelError::Parts(what)) };

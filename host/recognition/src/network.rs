@@ -30,7 +30,6 @@ impl Dense {
         inputs.dot(&self.weights) + &self.offsets
     }
 
-    /// Mean of several layers with their own inputs.
     fn mean_of(layers: &[Self]) -> Self {
         let share = 1.0 / layers.len().max(1) as f32;
         let weights: Vec<ArrayView2<f32>> = layers.iter().map(|layer| layer.weights.view()).collect();

@@ -6,12 +6,10 @@ use crate::embedding::EmbeddingError;
 use ndarray::{Array1, Array2};
 use rayon::prelude::*;
 
-/// `[clip][view]`.
 pub(crate) fn vectors_of(space: &Space, clips: &[&Clip]) -> Result<Vec<Vec<Array2<f32>>>, EmbeddingError> {
     clips.par_iter().map(|clip| clip.views.iter().map(|view| space.vectors(view)).collect()).collect()
 }
 
-/// `[clip][view]`.
 pub(crate) fn patterns_of(
     space: &Space,
     clips: &[Vec<Array2<f32>>],

@@ -4,8 +4,7 @@
 
 use ndarray::{Array1, Array2, ArrayView2, Axis};
 
-/// Residuals from `centres` (M x F) for frame vectors (frames x F) and soft assignments (frames x M): M x F
-/// numbers of unit length, zeros for an empty clip.
+/// M x F numbers of unit length from `centres` (M x F), frame vectors (frames x F) and soft assignments.
 pub fn residuals(
     centres: ArrayView2<f32>,
     frames: ArrayView2<f32>,

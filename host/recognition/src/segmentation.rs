@@ -50,12 +50,10 @@ struct Recording<'a> {
     groups: Vec<Vec<Embedded>>,
     among: &'a [String],
     typical: f32,
-    /// Grid spacing, frames.
     step: usize,
     worth: Worth,
 }
 
-/// `None` = unknown.
 struct Valued {
     worth: f32,
     activity: Option<String>,
@@ -231,7 +229,6 @@ mod tests {
 
     const ACTIVITIES: [&str; 3] = ["star", "stretch", "turn"];
 
-    /// A rotating outline with as many waves as the activity's number.
     fn track(activity: usize, frames: usize, rng: &mut ChaCha8Rng) -> Track {
         let phase = rng.random_range(0.0..6.0_f32);
         let descriptors = Array2::from_shape_fn((frames, ANGLES), |(frame, angle)| {

@@ -48,7 +48,6 @@ pub fn self_trained(
     classifier
 }
 
-/// Surest share of every class' answers: (row, class).
 fn surest(answers: &[(usize, f32)], classes: usize, share: f64) -> Vec<(usize, usize)> {
     let of_class = |class: usize| {
         let mut own: Vec<(f32, usize)> = answers

@@ -211,7 +211,6 @@ fn evenly(tracks: &[&Track], count: usize, width: usize) -> Array2<f32> {
 /// Larger galleries use landmarks.
 const LARGE: usize = 4000;
 
-/// Gallery layout, shared by spaces with different RBF maps, weights or patterns.
 #[derive(Debug)]
 struct Gallery {
     key: (Layout, usize, usize, usize),
@@ -322,12 +321,10 @@ struct Embedded {
     key: [f64; 2],
     map: Map,
     spread: f32,
-    /// `[clip][view]`, frames x dimensions.
     points: Vec<Vec<Array2<f32>>>,
 }
 
 impl Map {
-    /// Embedded frames of a track, in units of the spread.
     fn points(&self, track: &Track, spread: f32) -> Result<Array2<f32>, EmbeddingError> {
         let points = match self {
             Self::Rbf(rbf) => rbf.embed_all(track.descriptors.view())?,

@@ -46,7 +46,6 @@ impl Limits {
     }
 }
 
-/// `None` with too few distances.
 fn limit(mut distances: Vec<f32>, false_alarms: f32) -> Option<f32> {
     distances.retain(|distance| distance.is_finite());
     distances.sort_by(f32::total_cmp);

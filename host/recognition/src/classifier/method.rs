@@ -44,7 +44,6 @@ pub struct Fold<'a> {
     pub classes: usize,
 }
 
-/// The first of equals.
 pub(super) fn largest(values: &[f32]) -> usize {
     values.iter().enumerate().fold(0, |best, (k, v)| if *v > values[best] { k } else { best })
 }

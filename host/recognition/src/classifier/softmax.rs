@@ -59,7 +59,6 @@ impl Method for Softmax {
         format!("cost {cost}")
     }
 
-    /// `cost` weighs errors against the squared weights.
     fn train(patterns: ArrayView2<f32>, labels: &[usize], classes: usize, cost: f32) -> Self {
         let (signed, offsets) = dual(patterns.dot(&patterns.t()).view(), labels, classes, cost);
         Self { weights: signed.t().dot(&patterns), offsets }

@@ -63,7 +63,6 @@ impl Method for LinearSvc {
         format!("cost {c}")
     }
 
-    /// `c` weighs errors against the margin.
     fn train(patterns: ArrayView2<f32>, labels: &[usize], classes: usize, c: f32) -> Self {
         let gram = patterns.dot(&patterns.t());
         let rows: Vec<usize> = (0..patterns.nrows()).collect();

@@ -40,7 +40,6 @@ pub fn isomap(
 /// Residual over the largest eigenvalue: single precision, far below the graph's accuracy.
 const TOLERANCE: f64 = 1e-5;
 
-/// Classical multidimensional scaling of a symmetric distance matrix.
 pub(super) fn classical_scaling(
     distances: &Array2<f32>,
     dimensions: usize,
@@ -84,7 +83,6 @@ fn leading(distances: &Array2<f32>, dimensions: usize) -> Option<spectral::Pairs
     })
 }
 
-/// `-1/2 J D^2 J`, row-major.
 fn double_centred(distances: &Array2<f32>) -> Vec<f64> {
     let n = distances.nrows();
     let mut centred: Vec<f64> = distances.iter().map(|&d| f64::from(d).powi(2)).collect();

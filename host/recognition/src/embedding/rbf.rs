@@ -149,7 +149,6 @@ impl Rbf {
     }
 }
 
-/// Fixed-point sample in runs padded with zeros.
 fn quantised(sample: ArrayView1<f32>) -> impl Iterator<Item = [i16; RUN]> {
     let runs = sample.len().div_ceil(RUN);
     let values: Vec<i16> = sample.iter().map(|v| (v * SCALE).round() as i16).collect();

@@ -14,7 +14,6 @@ const SPARE: usize = 5;
 /// Limit of blocks before the dense solver.
 const MOST_BLOCKS: usize = 24;
 
-/// Descending eigenvalues with unit eigenvectors.
 pub(crate) type Pairs = (Vec<f64>, Vec<Vec<f64>>);
 
 /// The `wanted` largest positive eigenpairs of a symmetric row-major n x n matrix, descending, or fewer. Unit
@@ -139,7 +138,6 @@ fn signed(mut vector: Vec<f64>) -> Vec<f64> {
     vector
 }
 
-/// All eigenpairs by the dense solver; empty without convergence.
 pub(super) fn whole(view: MatRef<f64>) -> Vec<(f64, Vec<f64>)> {
     let Ok(eigen) = view.self_adjoint_eigen(Side::Lower) else { return Vec::new() };
     let values = eigen.S().column_vector();

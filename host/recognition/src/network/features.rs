@@ -37,7 +37,6 @@ impl Features {
     }
 }
 
-/// One row per clip.
 pub(crate) fn values(network: &Network, clips: &[Array2<f32>]) -> Array2<f32> {
     let rows: Vec<Array1<f32>> = clips.iter().map(|frames| network.pattern(frames.view())).collect();
     Array2::from_shape_fn((rows.len(), network.width()), |(i, k)| rows[i][k])

@@ -18,13 +18,12 @@ use crate::watch::Watch;
 use ndarray::{Array1, Array2, ArrayView2, Axis, concatenate};
 use rayon::prelude::*;
 
-/// Typical patterns per activity for outlier scores.
 const TYPICAL: usize = 24;
 
 impl Recogniser {
-    /// Trains a network on one-view clips and their mirrors. Confidence and unknown limits are calibrated on
-    /// `others`, clips of different people. Fails for fewer than two activities, clips without frames or with
-    /// several views, a gallery that cannot be laid out, and with [`EmbeddingError::Stopped`].
+    /// Trains a network on one-view clips and their mirrors, calibrated on `others`, clips of different
+    /// people. Fails for fewer than two activities, clips without frames or with several views, or a gallery
+    /// that cannot be laid out.
     pub fn train_network(
         clips: &[Clip],
         others: &[Clip],
@@ -83,7 +82,7 @@ impl Recogniser {
     }
 
     /// Softmax temperature (Guo et al., ICML 2017) and unknown limits from other people's clips, varied as in
-    /// training to be as different from the training data as real people.
+    /// training.
     fn calibrate(&mut self, others: &[Clip], taught: &NetworkSettings) -> Result<(), ModelError> {
         let known: Vec<(usize, &Clip)> = others
             .iter()

@@ -85,7 +85,6 @@ impl Learner {
         }
     }
 
-    /// One gradient step; returns the gradient of the inputs.
     fn step(
         &mut self,
         inputs: ArrayView2<f32>,
@@ -198,7 +197,6 @@ fn one_member(
 struct Scale {
     mean: Array1<f32>,
     spread: Array1<f32>,
-    /// Spread of the embedded points.
     points: Array1<f32>,
 }
 
@@ -301,7 +299,6 @@ fn to_neighbours(windows: ArrayView2<f32>, reach: usize) -> Array2<f32> {
     out
 }
 
-/// Gradient of the mean cross entropy with smoothed labels.
 fn cross_entropy(decision: &Array2<f32>, labels: impl Iterator<Item = usize>, smoothing: f32) -> Array2<f32> {
     let (n, classes) = decision.dim();
     let mut gradient = decision.clone();

@@ -45,7 +45,6 @@ impl Embedded {
         self.thinned(settings.keep, rng).shifted(spread, settings.shift, rng)
     }
 
-    /// Draws nothing if all frames stay.
     fn thinned(&self, least: f32, rng: &mut ChaCha8Rng) -> Self {
         if least >= 1.0 {
             return self.clone();

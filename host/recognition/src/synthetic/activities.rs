@@ -42,11 +42,9 @@ struct Stretch {
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Kind {
-    /// Straight walk; the upper body depends on prop or phone.
     Walk {
         phone: bool,
     },
-    /// Walk around the centre.
     Circle {
         phone: bool,
     },
@@ -129,7 +127,6 @@ fn swell(t: f64, share: f64) -> f64 {
     ease(t / share) * ease((1.0 - t) / share)
 }
 
-/// Pose at `t` (0 to 1) of a part.
 fn pose(stretch: &Stretch, t: f64, phase: f64, person: &Person) -> Pose {
     let moving = matches!(stretch.kind, Kind::Walk { .. } | Kind::Circle { .. });
     let mut pose =

@@ -18,7 +18,6 @@ const SHIPPED: [&[u8]; 4] = [
     include_bytes!("../../models/everyday-order-free-cut-out.fnm"),
 ];
 
-/// Very different activities.
 fn few(first: usize, people: usize) -> Vec<Clip> {
     let kept = ["walk", "jumping jack", "crouch", "lie down"];
     let mut clips = everyday::clips(first, people, Scaling::default());

@@ -77,7 +77,6 @@ fn unseen_people_are_recognised_and_neither_order_nor_speed_matters_much() {
     assert!(ordered > 0.75, "{ordered}");
 }
 
-/// Clips and a model trained on them, shared by all tests.
 fn trained() -> &'static (Vec<Clip>, Recogniser) {
     static TRAINED: OnceLock<(Vec<Clip>, Recogniser)> = OnceLock::new();
     TRAINED.get_or_init(|| {
@@ -157,7 +156,6 @@ fn live_answers_settle_on_what_is_done_and_windows_cover_a_recording() {
     assert_eq!((stretches[0].from, stretches.last().map(|s| s.to)), (0, Some(track[0].frames())));
 }
 
-/// Changes body bytes and corrects the checksum.
 fn tampered(bytes: &[u8], places: &[(usize, u8)]) -> Vec<u8> {
     const HEADER: usize = 28;
     let mut bytes = bytes.to_vec();

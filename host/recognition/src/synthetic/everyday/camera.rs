@@ -20,7 +20,6 @@ use std::collections::HashMap;
 pub struct Camera {
     view: View,
     distance_mm: f64,
-    /// Height of the target point.
     target_mm: f64,
     person_px: f64,
     segmentation: Segmentation,
@@ -137,7 +136,6 @@ impl Camera {
         self.filmed(&reach, stature_mm, drawn, scaling, rng)
     }
 
-    /// Frames drawn on a canvas for `reach`, cut by the border and segmented.
     fn filmed(
         &self,
         reach: &[Point],

@@ -21,7 +21,6 @@ pub struct Gait {
     run: f64,
     /// Scale of leg swings.
     stride: f64,
-    /// Permanent knee bend, as when sneaking.
     stoop_deg: f64,
     lean_deg: f64,
     nod_deg: f64,
@@ -35,7 +34,6 @@ pub struct Gait {
 }
 
 impl Gait {
-    /// Walking: strides of 0.75 to 1.1 Hz (Winter 1991, slightly widened).
     fn walk(rng: &mut ChaCha8Rng) -> Self {
         Self {
             run: 0.0,
@@ -151,7 +149,6 @@ impl Gait {
     }
 }
 
-/// Periodic Catmull-Rom interpolation.
 fn on(cycle: &Cycle, phase: f64) -> f64 {
     let x = phase.rem_euclid(1.0) * cycle.len() as f64;
     let (i, t) = (x.floor() as usize, x.fract());

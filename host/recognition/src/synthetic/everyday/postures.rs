@@ -4,7 +4,6 @@ use super::moment::{Hand, Moment};
 use super::motion::{Maker, Motion};
 use rand::Rng;
 
-/// Reaching to the ground with the back, the knees or both.
 fn down(maker: &mut Maker, hands: &[usize], deep: f64) -> Moment {
     // Share of the knees.
     let squat = maker.draw(0.0, 1.0);
