@@ -6,7 +6,7 @@ use crate::run::ROOT;
 
 /// A board's firmware is in `firmware/<name>`, its own cargo workspace, with the program `farnear-<name>`.
 pub struct Board {
-    /// As in hello.
+    /// Name in the hello answer.
     pub name: &'static str,
     pub flash_budget: u64,
     /// Limit of variables, bytes; the rest of the RAM is the stack.

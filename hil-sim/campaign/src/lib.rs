@@ -52,7 +52,6 @@ pub struct Campaign {
     /// End exclusive.
     pub seeds: std::ops::Range<u64>,
     pub shard: Shard,
-    /// Rigs in parallel.
     pub jobs: usize,
     /// `None`: next to the program.
     pub firmware: Option<PathBuf>,
@@ -175,7 +174,6 @@ pub fn run(campaign: &Campaign, mut progress: impl FnMut(u64, &Outcome)) -> Resu
     stopped.map_or(Ok(summary), Err)
 }
 
-/// Plays one seed; shrinks and writes a violating scenario.
 fn one(campaign: &Campaign, seed: u64) -> Result<(Outcome, Option<PathBuf>), SimError> {
     let scenario = draw(seed);
     let firmware = campaign.firmware.as_deref();

@@ -12,7 +12,7 @@ use crate::host_model::Outcome;
 /// Limit of runs; each takes seconds.
 const RUNS: u32 = 60;
 
-/// One part less each.
+/// All scenarios with one part removed.
 fn smaller(scenario: &Scenario) -> Vec<Scenario> {
     let mut found = Vec::new();
     let mut with = |change: &dyn Fn(&mut Scenario)| {

@@ -76,7 +76,6 @@ pub const MONO_8: u32 = 0x0108_0001;
 pub const MONO_12: u32 = 0x0110_0005;
 pub const MONO_16: u32 = 0x0110_0007;
 
-/// Pixel formats for a sensor of this many bits, native format first.
 fn formats(bits: u8) -> Vec<(&'static str, u32)> {
     match bits {
         ..=8 => vec![("Mono8", MONO_8)],
@@ -85,7 +84,6 @@ fn formats(bits: u8) -> Vec<(&'static str, u32)> {
     }
 }
 
-/// All features for a sensor of this width, height and bits.
 pub fn table((width, height): (u16, u16), bits: u8) -> Vec<Feature> {
     let (width, height) = (u32::from(width), u32::from(height));
     let formats = formats(bits);

@@ -34,10 +34,8 @@ use pace::Pace;
 const CONTROL_PORT: u16 = 3956;
 /// Interval of heartbeat checks.
 const LOOK: Duration = Duration::from_millis(100);
-/// Free running waits this long for rendering before time passes, so that slow computers do not send old
-/// pictures.
+/// Longest wait for rendering before time passes, so that slow computers do not send old pictures.
 const RENDERING: Duration = Duration::from_secs(20);
-/// Longest wall-clock wait for rig time.
 const PATIENCE: Duration = Duration::from_millis(500);
 
 #[derive(Clone, Debug)]
@@ -62,7 +60,6 @@ pub fn interface(text: &str) -> Result<Ipv4Addr, String> {
 
 #[derive(Clone, PartialEq, Debug)]
 pub struct Picture {
-    /// Start of the exposure.
     pub begin_ns: u64,
     pub header: FrameHeader,
     /// Rows of 16-bit values, little-endian.

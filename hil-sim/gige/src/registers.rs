@@ -29,11 +29,9 @@ pub const FIRE_TEST: u32 = 1 << 31;
 const DESCRIPTION: u32 = 0x0001_0000;
 /// Default packet size: Ethernet's.
 const USUAL_PACKET_BYTES: u32 = 1500;
-/// Default of the standard.
 const USUAL_HEARTBEAT_MS: u32 = 3000;
 /// Packet resend, register for a name, serial number.
 const CAPABILITIES: u32 = 1 << 2 | 1 << 1 | 1 | 1 << 30;
-/// Writable bootstrap registers with ranges.
 const WRITABLE: [(u32, u32, u32); 9] = [
     (PRIVILEGE, 0, u32::MAX),
     (HEARTBEAT_MS, 500, 600_000),

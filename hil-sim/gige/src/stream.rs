@@ -20,7 +20,6 @@ const CHUNK_VALUE_BYTES: u32 = 8;
 pub struct Frame {
     /// From 1 at the start of the acquisition.
     pub number: u64,
-    /// Start of the exposure.
     pub time_ns: u64,
     /// PFNC code.
     pub pixel_format: u32,

@@ -37,7 +37,6 @@ pub const LEVEL_RATIO: f32 = 0.02;
 pub const MAX_DIRECT_PX: usize = 15;
 
 pub(crate) struct Cells {
-    /// Cells beyond each border of the image, px.
     pub(crate) margin_px: usize,
     pub(crate) radiance: Array2<f32>,
     /// Signed blur radius in px, larger = farther; a plane's is uniform.
@@ -114,7 +113,6 @@ impl Cells {
         (slabs, Some(members))
     }
 
-    /// Light and cover of the chosen cells per pixel.
     fn scatter(
         &self,
         psf: &Psf,
@@ -289,7 +287,6 @@ fn distinct_values(blur: &Array2<f32>) -> Option<Vec<f32>> {
 struct Slab {
     /// Blur radii of the tabulated kernels, ascending, evenly spaced, px.
     radii_px: Vec<f32>,
-    /// Reach of the widest kernel.
     reach_px: usize,
     /// Whether the slab may leave pixels uncovered.
     needs_cover: bool,

@@ -31,7 +31,6 @@ impl Sums {
 
 pub(crate) struct Composite {
     light: Array2<f32>,
-    /// Share of the aperture that is still open.
     open: Array2<f32>,
 }
 

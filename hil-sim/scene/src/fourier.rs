@@ -39,7 +39,6 @@ impl Fourier2 {
     }
 }
 
-/// In cache-sized blocks.
 fn transpose(from: &[Complex32], to: &mut [Complex32], height: usize, width: usize) {
     const BLOCK: usize = 16;
     for row_block in (0..height).step_by(BLOCK) {

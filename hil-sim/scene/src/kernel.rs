@@ -142,7 +142,6 @@ fn spline_integral(t: f64) -> f64 {
     }
 }
 
-/// Integral of the splines at `(x, y)` over a disc around the origin.
 fn disc_weight(x: f64, y: f64, radius: f64) -> f64 {
     let nearest = (x.abs() - SPLINE_REACH).max(0.0).hypot((y.abs() - SPLINE_REACH).max(0.0));
     if nearest >= radius {
@@ -173,7 +172,6 @@ fn disc_weight(x: f64, y: f64, radius: f64) -> f64 {
         .sum()
 }
 
-/// Integral of the spline at `d` with a Gaussian of standard deviation `sigma`.
 fn gaussian_line_weight(d: f64, sigma: f64) -> f64 {
     // The spline is the third difference of a half parabola; its mean under the Gaussian, without the
     // quadratic polynomial that the difference removes.
@@ -186,7 +184,6 @@ fn gaussian_line_weight(d: f64, sigma: f64) -> f64 {
     (e - a) - 3.0 * (c - b)
 }
 
-/// Integral of the splines at `(x, y)` with a generalised Gaussian.
 fn profile_weight(x: f64, y: f64, profile: Profile) -> f64 {
     // Scale of the profile: the flanks of a large p are steeper than sigma.
     let smooth = profile.sigma / profile.p.max(1.0) > 0.8;

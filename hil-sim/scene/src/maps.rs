@@ -15,7 +15,6 @@ impl HeightMap {
         Ok(Self(depth_mm))
     }
 
-    /// mm; `x`, `y` in 0..1.
     pub(crate) fn depth_mm(&self, x: f64, y: f64) -> f64 {
         sample(&self.0, x, y)
     }

@@ -147,7 +147,6 @@ pub(crate) struct Profile {
 }
 
 impl Profile {
-    /// Factor of the exponential.
     pub(crate) fn peak(&self) -> f64 {
         self.p.powf(1.0 - 2.0 / self.p) / (2.0 * PI * self.sigma * self.sigma * libm::tgamma(2.0 / self.p))
     }

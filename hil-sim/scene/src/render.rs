@@ -260,7 +260,6 @@ fn cell_centre_px((row, column): (usize, usize), margin_px: usize) -> (f64, f64)
     (position(column), position(row))
 }
 
-/// Relative to the far setting's sensor distance, mm.
 fn image_field(
     scene: &Scene,
     lens: &Lens,

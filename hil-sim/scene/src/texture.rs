@@ -15,7 +15,6 @@ use crate::kernel::CELLS_PER_PIXEL;
 use crate::maps::Picture;
 
 const MARGIN_PX: usize = 64;
-/// Range of the radiance; the mean is 1.
 const CLIP: (f32, f32) = (0.2, 1.8);
 
 /// Texture of a surface.
@@ -39,12 +38,10 @@ impl fmt::Display for Texture {
     }
 }
 
-/// Unscaled amplitude of the fractal at `f` cycles per px.
 fn fractal_amplitude(f: f32) -> f32 {
     1.0 / f.max(1.0 / 64.0)
 }
 
-/// Amplitude of the blurred white noise at `f` cycles per px.
 fn grain_amplitude(f: f32) -> f32 {
     let z = std::f32::consts::TAU * f * 0.5;
     libm::expf(-0.5 * z * z)

@@ -113,7 +113,6 @@ impl WaveLens {
             .collect()
     }
 
-    /// The light of a cell on the pixels around it, wrapped.
     fn cell_kernel(&self, defocus_um: f64, height: usize, width: usize) -> Vec<Complex32> {
         let kernel = self.kernel(defocus_um);
         let spacing = FINE_PER_PIXEL / CELLS_PER_PIXEL;

@@ -127,8 +127,7 @@ impl Client {
         self.ends.push((request, end));
     }
 
-    /// `None` without an answer. After a reset it joins the new boot or session without repeating the
-    /// request.
+    /// `None` without an answer. After a reset it joins the new boot without repeating the request.
     pub fn ask(&mut self, request: &Request) -> Result<Option<(u32, Answer)>, SimError> {
         self.last_id += 1;
         let id = self.last_id;

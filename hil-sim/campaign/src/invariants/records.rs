@@ -17,7 +17,6 @@ fn broken(at_ns: u64, what: String) -> Broken {
     Broken { property: "records", at_ns, what }
 }
 
-/// Possible values of a setting.
 #[derive(Default)]
 struct Known {
     kept: Option<i32>,
@@ -61,7 +60,6 @@ fn boots(case: &Case<'_>, lossy: bool) -> Vec<Broken> {
     reported
 }
 
-/// Whether the board reported the loss of a record.
 fn loses(case: &Case<'_>, record: RecordName) -> bool {
     case.sights.iter().any(|sight| match &sight.seen {
         Seen::Reported { event, .. } => {

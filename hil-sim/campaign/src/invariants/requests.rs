@@ -22,7 +22,6 @@ fn twice(at_ns: u64, what: String) -> Broken {
     Broken { property: "acts-twice", at_ns, what }
 }
 
-/// One end per request.
 fn ends(case: &Case<'_>) -> Vec<Broken> {
     let mut ends: BTreeMap<(u32, u32), u32> = BTreeMap::new();
     let mut broken = Vec::new();

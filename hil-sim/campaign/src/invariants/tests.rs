@@ -160,7 +160,6 @@ fn detects_a_changed_setting() {
     assert_eq!((run(3, 10_500), run(3, 4)), (vec![], vec!["records"]));
 }
 
-/// Status of a board with nothing homed, armed or latched.
 fn status(made_ms: u64) -> Status {
     let axis = AxisStatus {
         state: PositionState::Unknown,
