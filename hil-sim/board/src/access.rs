@@ -70,7 +70,6 @@ impl RigAccess<'_, '_> {
         self.chip().drive_pin(at, pins(stage).diagnosis, Level::from(fault));
     }
 
-    /// Cuts or reconnects a chip's data lines.
     pub fn disconnect(&mut self, chip: SpiChip, cut: bool) {
         self.chip().disconnect(chip, cut);
     }
@@ -262,7 +261,6 @@ impl RigAccess<'_, '_> {
         self.wiring.camera_mut().expose(self.stop.at.0, exposure_us * 1000, id);
     }
 
-    /// Starts free running; period 0 stops it.
     pub fn run_camera_freely(&mut self, period_us: u64, exposure_us: u64) {
         self.wiring.camera_mut().run_freely(self.stop.at.0, period_us * 1000, exposure_us * 1000);
     }

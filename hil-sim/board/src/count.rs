@@ -52,7 +52,6 @@ fn place(elf: &object::File<'_>, name: &str) -> Option<(u64, u64)> {
     Some((found.address(), found.size()))
 }
 
-/// Runs the program until its last count is written.
 struct Counting {
     routines: u64,
     counts: u64,

@@ -70,7 +70,6 @@ pub struct Driver {
     last: Last,
     trace: Option<Trace>,
     script: Option<Script>,
-    /// When the requested time ends.
     looks_at_ns: Option<u64>,
     /// File and final contents of the memory.
     memory: Option<(PathBuf, Vec<u8>)>,

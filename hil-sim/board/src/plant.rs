@@ -124,7 +124,6 @@ impl Plant {
         self.piezo.set_dac(code);
     }
 
-    /// Gauge sample, 18 bit.
     pub fn sample_gauge(&mut self, now_ns: u64) -> u32 {
         self.advance(now_ns);
         let GaugeParts { gain, offset_um, noise_um } = self.gauge;

@@ -1,5 +1,5 @@
-//! The serial port that clients open: a pty. Forwards client bytes in whole frames, and bytes written
-//! together together: later ones would reach the board in another state.
+//! The serial port that clients open: a pty. Forwards client bytes in whole frames. Bytes written together
+//! stay together: later ones would reach the board in another state.
 
 use std::{
     io::{ErrorKind, Read, Write},

@@ -25,7 +25,6 @@ pub struct Motor {
     field: i64,
     rotor: f64,
     speed: f64,
-    /// Available share of the torque.
     torque: f64,
     blocked: bool,
     resting: bool,
@@ -112,7 +111,6 @@ impl Motor {
 mod tests {
     use super::*;
 
-    /// Ramps up to a rate and, if `brakes`, down again; 50 mm/s2.
     fn run(motor: &mut Motor, top: f64, seconds: f64, brakes: bool) {
         let (mut at_s, mut rate) = (motor.now_ns as f64 * 1e-9, 500.0);
         let brake_s = at_s + seconds;

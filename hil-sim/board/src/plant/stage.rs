@@ -111,7 +111,6 @@ impl Stage {
         self.home.update(self.screw.stage_um() + um);
     }
 
-    /// True position from the home edge.
     pub fn position_um(&self) -> f64 {
         self.screw.stage_um()
     }
@@ -167,7 +166,6 @@ impl Stage {
 mod tests {
     use super::*;
 
-    /// Steps at 4 kHz, 0.6 mm/s.
     struct Turned {
         stage: Stage,
         now_ns: u64,

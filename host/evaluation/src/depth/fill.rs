@@ -24,7 +24,7 @@ const CENTRE: (f64, f64) = (190.0, 420.0);
 const RADIUS_PX: f64 = 40.0;
 const SCENES: [&str; 4] = ["plane:905", "slant", "cone", "sphere"];
 const COLUMNS: usize = 5;
-/// Threshold of the ratio's variance between disc and texture; the thesis has another.
+/// Thresholds of the ratio's variance: between those of disc and texture, and the thesis'.
 const SUITED: f32 = 1e-4;
 const OF_THESIS: f32 = 0.0144;
 const REPEATS: u64 = 3;

@@ -86,7 +86,7 @@ impl Light {
     }
 }
 
-/// The table from frame to background levels: a line through the means of the darker and the lighter half.
+/// The table from frame to background levels: a line through the medians of the darker and the lighter half.
 fn fitted(pairs: &[[u8; 2]]) -> Option<[u8; 256]> {
     let mut sorted: Vec<[u8; 2]> =
         pairs.iter().copied().filter(|[_, level]| (3..=252).contains(level)).collect();

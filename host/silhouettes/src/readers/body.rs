@@ -37,7 +37,7 @@ fn inside(frame: &[Option<Point3>]) -> bool {
     })
 }
 
-/// The unit, or the one of mm, cm and m that fits an adult best if a stated one gives no human size.
+/// The unit, or the best fitting of mm, cm and m if the size is not human. Keeps the caller's unit.
 pub fn plausible(unit: Known<Unit>, frames: &[Vec<Option<Point3>>]) -> Known<Unit> {
     let limits = match unit.source {
         Source::Format => USUAL_MM,
