@@ -102,7 +102,7 @@ fn forget(shared: &Shared, gone: u64) {
     if let Some((_, stream)) = state.client.take_if(|(number, _)| *number == gone) {
         state.frames.clear();
         (shared.left)();
-        let _ = stream.shutdown(Shutdown::Both); // it may wait for this, to know that it is forgotten
+        let _ = stream.shutdown(Shutdown::Both); // a client may wait for this
         shared.changed.notify_all();
     }
 }

@@ -151,7 +151,7 @@ pub fn watch(
                 let dropped = shot.id == FREE_RUNNING && pictures.is_of_ended_run(number);
                 for (at, (imager, frames)) in cameras.iter_mut().enumerate() {
                     if dropped || !pictures.wants(at, number) {
-                        imager.exposures += 1; // the noise of those after it stays what it would be
+                        imager.exposures += 1; // later exposures keep their noise
                         continue;
                     }
                     match imager.picture(&shot) {

@@ -289,7 +289,7 @@ impl Parts {
             match (table.get_mut(&part), values) {
                 (Some(toml::Value::Table(known)), toml::Value::Table(values)) => known.extend(values),
                 (Some(_), _) => return Err(format!("{part} is a table: [{part}]")),
-                (None, values) => drop(table.insert(part, values)), // refused by its name below
+                (None, values) => drop(table.insert(part, values)), // rejected by name below
             }
         }
         let parts: Self = table.try_into().map_err(|error: toml::de::Error| error.to_string())?;

@@ -138,7 +138,7 @@ mod tests {
         for parts in [&[[1, 2, 0, 3, 4, 0].as_slice()][..], &[&[1, 2, 0, 3], &[4, 0]]] {
             for part in parts {
                 client.write_all(part).expect("room");
-                thread::sleep(LOOK / 10); // the operating system's pause within a write
+                thread::sleep(LOOK / 10); // the operating system may pause within a write
             }
             let bytes = commands.iter().find_map(|command| match command {
                 Command::Bytes(bytes) => Some(bytes),

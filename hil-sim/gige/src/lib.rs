@@ -136,7 +136,7 @@ fn discover(shouts: &UdpSocket, answers: &UdpSocket, device: &Shared) {
         let reachable =
             from.ip().is_loopback() == answers.local_addr().is_ok_and(|own| own.ip().is_loopback());
         if reachable && let Some(answer) = control::discovery(&bytes[..length], lock(device).registers()) {
-            let _ = answers.send_to(&answer, from); // who asked may have gone
+            let _ = answers.send_to(&answer, from); // the client may have disconnected
         }
     }
 }
@@ -167,7 +167,7 @@ fn obey(
                 carry_out(asked, ask, now);
             }
             if let Some(answer) = done.answer {
-                let _ = control.send_to(&answer, from); // who asked may have gone
+                let _ = control.send_to(&answer, from); // the client may have disconnected
             }
             if let Some(again) = done.again {
                 send(stream, &again, &mut pace);

@@ -93,7 +93,7 @@ impl NoisyLine {
                 while self.insert.strikes() {
                     carried.push(self.insert.noise.bits() as u8);
                     if self.rates.inserted >= 1.0 {
-                        break; // one a byte, not without end
+                        break; // at most one per byte
                     }
                 }
                 if !self.lose.strikes() {

@@ -63,7 +63,7 @@ pub struct Vcd {
 
 pub fn hex(bytes: &[u8]) -> String {
     bytes.iter().fold(String::with_capacity(2 * bytes.len()), |mut text, byte| {
-        let _ = write!(text, "{byte:02x}"); // a string takes everything
+        let _ = write!(text, "{byte:02x}"); // writing to a string cannot fail
         text
     })
 }
@@ -78,7 +78,7 @@ pub fn unhex(text: &str) -> Option<Vec<u8>> {
 fn heading(config: &RigConfig, firmware: u64) -> Result<String, SimError> {
     let scenario = Scenario {
         seed: Some(config.seed),
-        parts: toml::Table::try_from(&config.parts).unwrap_or_default(), // they came out of such a table
+        parts: toml::Table::try_from(&config.parts).unwrap_or_default(), // parsed from such a table
         ..config.scenario.clone()
     };
     let pace = if config.pace == Pace::Realtime { "paced" } else { "lockstep" };

@@ -144,7 +144,7 @@ impl Client {
                 Ok(length) => {
                     let id = u16::from_be_bytes([bytes[2], bytes[3]]);
                     if id <= self.given {
-                        continue; // asked for twice, and came twice
+                        continue; // requested and received twice
                     }
                     let frame = self.begun.entry(id).or_default();
                     let packet = u32::from_be_bytes([0, bytes[5], bytes[6], bytes[7]]);

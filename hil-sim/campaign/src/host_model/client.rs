@@ -143,7 +143,7 @@ impl Client {
                 self.answers.clear();
                 self.counts.answered += 1;
                 if matches!(answer, Err(RequestError::QueueFull { .. })) {
-                    break; // it was not looked at: again
+                    break; // not executed: repeat
                 }
                 if matches!(answer, Err(RequestError::Boot { .. } | RequestError::NotInSession)) {
                     self.join()?;
