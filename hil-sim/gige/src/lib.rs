@@ -205,7 +205,7 @@ fn show(pictures: &Receiver<Picture>, stream: &UdpSocket, device: &Shared) {
 fn send(stream: &UdpSocket, sending: &Sending, pace: &mut Pace) {
     for packet in &sending.packets {
         pace.hold(packet.len(), sending.gap);
-        let _ = stream.send_to(packet, sending.to); // the line tells of nothing that is lost
+        let _ = stream.send_to(packet, sending.to); // packets may be lost unnoticed
     }
 }
 

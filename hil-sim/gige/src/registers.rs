@@ -41,7 +41,7 @@ const WRITABLE: [(u32, u32, u32); 9] = [
     (STREAM_ADDRESS, 0, u32::MAX),
     (CHUNK_MODE, 0, 1),
     (CHUNK_SELECTOR, 0, CHUNKS.len() as u32 - 1),
-    (0x0D24, 0, u32::MAX), // configuration of the stream: nothing of it is here, and it reads as 0
+    (0x0D24, 0, u32::MAX), // stream configuration: not supported, reads as 0
 ];
 
 /// Status codes of the standard.

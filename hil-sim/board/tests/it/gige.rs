@@ -295,7 +295,7 @@ fn every_free_running_client_of_a_paced_rig_gets_frames_immediately() {
         assert_eq!(frame.number, 1, "client {number}");
         // A picture takes a fraction of a second, hundreds of old ones a minute.
         assert!(begin.elapsed() < Duration::from_secs(20), "client {number} waited {:?}", begin.elapsed());
-        // The rig goes on exposing while nobody reads, faster than it renders.
+        // The rig continues to expose without a reader, faster than it renders.
         std::thread::sleep(Duration::from_secs(2));
         assert_eq!(client.write(PRIVILEGE, 0), 0);
     }

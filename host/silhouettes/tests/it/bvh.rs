@@ -93,7 +93,7 @@ fn walk(frames: usize) -> String {
 fn a_walk_of_the_cmu_kind_makes_silhouettes_from_eight_views() {
     let text = walk(30);
     if let Ok(path) = std::env::var("FARNEAR_WRITE_BVH") {
-        std::fs::write(path, &text).expect("written"); // to look at it with the command line
+        std::fs::write(path, &text).expect("written"); // for the command line
     }
     let recording = readers::read(text.as_bytes(), "bvh", Choices::default()).expect("a BVH file");
     assert_eq!((recording.names.len(), recording.frames.len()), (28, 30));
