@@ -10,7 +10,6 @@ const FURTHER_MAX_UM: f64 = 10_000.0;
 
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub enum Further {
-    /// The distance between far and near focus.
     Near,
     Micrometres(f64),
 }

@@ -10,7 +10,6 @@ const CR1: u64 = TIM12;
 const CCER: u64 = TIM12 + 0x20;
 const ARR: u64 = TIM12 + 0x2c;
 const CCR: [u64; 2] = [TIM12 + 0x34, TIM12 + 0x38];
-/// Output enable of both channels in CCER.
 const ENABLED: [u64; 2] = [1, 1 << 4];
 /// Alternate function of TIM12 on its pins (DS9405, table 12).
 const FUNCTION: u8 = 9;

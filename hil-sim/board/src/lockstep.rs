@@ -27,7 +27,6 @@ pub struct Lockstep {
     to_board: Decoder,
     from_board: Decoder,
     asked: BTreeMap<u32, Asked>,
-    /// Accepted long work by id, with its timeout.
     running: BTreeMap<u32, u64>,
     /// Ended requests; a repeated answer to one starts nothing.
     ended: VecDeque<u32>,
@@ -136,7 +135,6 @@ impl Lockstep {
         !self.asked.is_empty()
     }
 
-    /// Whether time stands because the board waits for its host.
     pub fn waits_for_host(&self) -> bool {
         self.waits_for_host
     }

@@ -270,7 +270,6 @@ impl Link {
         Ok(Self(path.into()))
     }
 
-    /// Points the link to another port atomically.
     fn point(path: &Path, port: &str) -> Result<()> {
         let cannot = || format!("cannot point the link {} to {port}", path.display());
         let name = path.file_name().with_context(cannot)?.to_string_lossy();

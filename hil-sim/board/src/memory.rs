@@ -71,7 +71,7 @@ impl MemoryChip {
         self.fails_at = None;
     }
 
-    /// Resets the flag.
+    /// Whether the supply has failed since the last call.
     pub fn take_failure(&mut self) -> bool {
         self.failed && self.fails_at.take().is_some()
     }

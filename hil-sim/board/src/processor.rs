@@ -175,7 +175,6 @@ impl Metered {
         }
     }
 
-    /// Cycles of the instruction at `pc`, followed by `next`.
     fn cost(&mut self, pc: u64, next: u64) -> u64 {
         let Model::ByKind { program, flash, handlers, bus } = &mut self.model else { return 1 };
         let waited = std::mem::take(bus);

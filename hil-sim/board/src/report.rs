@@ -9,7 +9,6 @@ pub struct StageReport {
     pub lost_microsteps: f64,
     pub step_edges: u64,
     pub last_step_ns: u64,
-    /// STEP or DIR edges that violated the driver's timing.
     pub driver_violations: u64,
 }
 
@@ -26,7 +25,6 @@ pub struct Report {
     /// Largest tension of the piezo stack since power-on; 200 is its blocking force.
     pub piezo_pulled_um: f64,
     pub triggers: u32,
-    /// Triggers ignored by a busy camera.
     pub missed_triggers: u32,
     /// Bits flipped by the line, both directions.
     pub flipped_bits: u64,

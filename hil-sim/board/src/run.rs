@@ -99,7 +99,6 @@ impl ServedRig {
     }
 }
 
-/// `None` if that fails.
 fn another_port(
     to_board: Arc<OnceLock<Sender<Command>>>,
     renamed: impl Fn(&str) + Send + 'static,

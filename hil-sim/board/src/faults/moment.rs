@@ -9,7 +9,7 @@ pub enum Moment {
     MotionBegins,
     ExposureBegins,
     ExposureEnds,
-    /// After 5 ms without a write.
+    /// The first write after 5 ms without one.
     MemoryWrite,
     Request,
     Answer,

@@ -66,7 +66,6 @@ impl Schedule {
         self.entries.iter().flat_map(|entry| [entry.begins_ns, entry.ends_ns]).flatten().min()
     }
 
-    /// Whether no further fault can occur on its own.
     pub fn is_over(&self) -> bool {
         self.next_ns().is_none()
     }

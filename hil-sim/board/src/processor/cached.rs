@@ -22,7 +22,6 @@ static ENDED: Mutex<Vec<Waiting>> = Mutex::new(Vec::new());
 struct Waiting {
     program: u64,
     processor: Box<dyn Processor>,
-    /// State before the first instruction.
     fresh: Vec<u8>,
 }
 

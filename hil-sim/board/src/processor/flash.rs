@@ -15,7 +15,6 @@ const DATA_CACHE: u64 = 1 << 10;
 struct Lines(Vec<u64>);
 
 impl Lines {
-    /// Whether the line is cached; inserts it.
     fn take(&mut self, line: u64, most: usize) -> bool {
         let found = self.0.iter().position(|kept| *kept == line);
         if let Some(at) = found {
@@ -33,7 +32,6 @@ pub(super) struct FlashInterface {
     acr: u64,
     instructions: Lines,
     data: Lines,
-    /// Line read last.
     current: u64,
     /// Cycles spent in this line, available to the prefetch.
     spent: u64,

@@ -62,7 +62,6 @@ impl Instruction {
         self.may_branch()
     }
 
-    /// Address of the constant of a PC-relative load.
     pub(super) const fn literal(self, pc: u64) -> Option<u64> {
         let base = (pc + 4) & !3;
         match self.second {

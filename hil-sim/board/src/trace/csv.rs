@@ -30,7 +30,7 @@ impl Csv {
         Ok(Self { file, next_ns: 0, last: String::new(), failed: None })
     }
 
-    /// If one is due and something has moved.
+    /// Writes a row if one is due and something has moved.
     pub fn tick(&mut self, now_ns: u64, plant: &Plant, wiring: &Wiring) {
         if now_ns < self.next_ns {
             return;

@@ -20,7 +20,6 @@ use crate::{
 };
 
 const PERIOD_NS: u64 = 1_000_000;
-/// Signals: type, size, letter, name.
 const SIGNALS: [(&str, u32, char, &str); 11] = [
     ("real", 64, 'c', "coarse_um"),
     ("real", 64, 'l', "lens_um"),

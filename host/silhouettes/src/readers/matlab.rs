@@ -121,7 +121,6 @@ impl<'a> Cursor<'a> {
     }
 }
 
-/// Name and contents of a matrix element; `None` for an unset cell.
 fn matrix(mut cursor: Cursor, depth: usize) -> Result<Option<(String, Array)>, MatlabError> {
     if cursor.bytes.is_empty() {
         return Ok(None);

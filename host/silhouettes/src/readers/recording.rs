@@ -25,7 +25,6 @@ impl Unit {
 
     pub const MM: Self = Self { mm: 1.0 };
 
-    /// The unit of a short or long name.
     pub fn named(name: &str) -> Result<Self, RecordingError> {
         let name = name.trim().trim_matches('\0').to_ascii_lowercase();
         let short = match name.as_str() {
@@ -126,7 +125,6 @@ pub struct Known<T> {
 }
 
 impl<T> Known<T> {
-    /// The caller's value, if given.
     fn unless(self, named: Option<T>) -> Self {
         match named {
             Some(value) => Self { value, source: Source::Caller },
@@ -144,7 +142,6 @@ pub struct Choices {
     pub person: Option<usize>,
 }
 
-/// Contents of a file in its own unit and axes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Found {
     pub names: Vec<String>,
@@ -210,18 +207,14 @@ impl Found {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Recording {
     pub names: Vec<String>,
-    /// 0 if the file does not state it.
     pub rate_hz: f64,
-    /// `frames[f][m]`: point m in frame f, millimetres.
     pub frames: Vec<Vec<Option<Point3>>>,
     /// Seen from one side: points are in the plane of x and z, and no other view can be drawn.
     pub planar: bool,
     /// Names by which built-in templates know points.
     aliases: Vec<(usize, String)>,
-    /// The file's unit.
     pub unit: Known<Unit>,
     pub up: Known<Up>,
-    /// One sentence each.
     remarks: Vec<String>,
 }
 
@@ -268,11 +261,7 @@ impl Recording {
 pub enum RecordingError {
     /// No reader has this extension.
     #[error("no reader of motion capture knows files that end in `.{found}`: expected {known}")]
-    Extension {
-        found: String,
-        /// The known extensions.
-        known: String,
-    },
+    Extension { found: String, known: String },
     #[error("not a {kind} file: {reason}")]
     Kind {
         kind: &'static str,

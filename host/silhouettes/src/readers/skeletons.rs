@@ -8,7 +8,6 @@ pub struct Layout {
     pub joints: &'static [&'static str],
     /// Two joints and a radius in millimetres; equal joints make a ball.
     pub bones: &'static [(usize, usize, f64)],
-    /// Millimetres per unit of the file.
     pub unit_mm: f64,
 }
 

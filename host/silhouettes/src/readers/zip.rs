@@ -10,7 +10,6 @@ use super::recording::RecordingError;
 const LARGEST_RATIO: usize = 64;
 const SPARE_BYTES: usize = 1 << 20;
 
-/// Names and unpacked bytes of the entries that `wanted` accepts.
 pub fn entries(
     bytes: &[u8],
     wanted: impl Fn(&str) -> bool,

@@ -4,7 +4,6 @@
 
 use super::template::Template;
 
-/// A convention of names.
 struct Naming {
     about: &'static str,
     template: &'static str,
@@ -193,7 +192,6 @@ const SUFFIXES: [&str; 1] = ["study"];
 pub struct Aliases {
     /// Index of the recording's name, and the name in the template.
     pub names: Vec<(usize, String)>,
-    /// The match in words.
     pub remark: String,
 }
 

@@ -26,7 +26,6 @@ pub struct Part {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Template {
-    /// Name in errors.
     pub name: String,
     /// Drawn one over the other.
     #[serde(rename = "part")]
@@ -35,24 +34,18 @@ pub struct Template {
 
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum TemplateError {
-    /// Invalid TOML.
     #[error("template: {0}")]
     Syntax(String),
     #[error("no built-in template `{0}`: there are {names}; or name a TOML file", names = Template::names().collect::<Vec<_>>().join(", "))]
     Name(String),
     #[error("template: part `{part}` {reason}")]
-    Part {
-        part: String,
-        /// Reason.
-        reason: String,
-    },
+    Part { part: String, reason: String },
     #[error(
         "the recording lacks {} of the {of} markers of template `{template}` ({}); it has {}", .missing.len(), listed(.missing), listed(.present)
     )]
     UnknownMarkers {
         /// Markers of the template that the recording lacks.
         missing: Vec<String>,
-        /// Markers in the template.
         of: usize,
         template: String,
         /// Some markers of the recording.
@@ -60,7 +53,6 @@ pub enum TemplateError {
     },
 }
 
-/// The first few names, marked if there are more.
 fn listed(names: &[String]) -> String {
     const SHOWN: usize = 10;
     let more = if names.len() > SHOWN { ", ..." } else { "" };

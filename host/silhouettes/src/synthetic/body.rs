@@ -6,7 +6,6 @@ use crate::silhouette::capsule::{Capsule, Point3};
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Build {
     pub height_mm: f64,
-    /// Relative to the average (1.0).
     pub girth: f64,
     /// Shoulder and hip width relative to the average (1.0).
     pub breadth: f64,
@@ -33,7 +32,6 @@ pub struct Arm {
     /// Upper arm forward of the trunk's axis (hanging = 0, straight ahead = 90, up = 180).
     pub shoulder_deg: f64,
     pub spread_deg: f64,
-    /// Forearm forwards.
     pub elbow_deg: f64,
 }
 
@@ -53,7 +51,6 @@ pub struct Joints {
     pub pelvis: Point3,
     pub neck: Point3,
     pub head: Point3,
-    /// [left, right], as all pairs.
     pub hips: [Point3; 2],
     pub knees: [Point3; 2],
     pub ankles: [Point3; 2],

@@ -5,7 +5,6 @@ mod long_c3d;
 mod readers;
 mod standing;
 
-/// Few by default, more for fuzzing.
 fn cases(usual: u32) -> u32 {
     std::env::var("PROPTEST_CASES").ok().and_then(|text| text.parse().ok()).unwrap_or(usual)
 }

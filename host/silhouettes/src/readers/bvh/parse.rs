@@ -176,7 +176,6 @@ fn number(text: &str, line: usize, what: &str) -> Result<f64, RecordingError> {
 
 struct Cursor<'a> {
     rest: &'a str,
-    /// Line of the last word.
     line: usize,
 }
 

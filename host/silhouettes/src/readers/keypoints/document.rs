@@ -21,7 +21,6 @@ pub struct Person {
 #[derive(Debug, Default)]
 pub struct Document {
     pub frames: Vec<Vec<Person>>,
-    /// Width and height of the pictures, pixels.
     pub size: Option<[f64; 2]>,
     pub layout: Option<&'static Layout>,
     pub unsure: usize,
