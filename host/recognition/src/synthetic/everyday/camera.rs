@@ -16,6 +16,7 @@ use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 use std::collections::HashMap;
 
+/// A camera directed at a person.
 #[derive(Clone, Copy, Debug)]
 pub struct Camera {
     view: View,
