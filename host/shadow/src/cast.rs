@@ -66,7 +66,6 @@ pub fn explain(mask: &Mask, file: &CameraFile, light: Light) -> Result<Option<Ex
     Ok(best.filter(|found| found.unexplained <= UNEXPLAINED || file.subject.distance_m.is_some()))
 }
 
-/// Every `by`th pixel of a mask, with the matching camera.
 fn shrunk(mask: &Mask, camera: &Camera, by: usize) -> (Mask, Camera) {
     let (rows, columns) = (mask.nrows() / by, mask.ncols() / by);
     let small = Mask::from_shape_fn((rows, columns), |(y, x)| mask[[y * by + by / 2, x * by + by / 2]]);
@@ -213,7 +212,6 @@ impl Scene<'_> {
         }
     }
 
-    /// Draws the shadow of a run: an ellipse on the ground.
     fn throw(&self, (first, last): Run, row: Row, distance_m: f64, split: &mut Split) {
         const CORNERS: usize = 12;
         let half_m = 0.5 * (last + 1 - first) as f64 * row.pixel_m;

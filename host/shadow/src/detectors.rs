@@ -75,7 +75,6 @@ impl Detector {
         }
     }
 
-    /// Shadow pixels of the next frame's foreground.
     pub fn detect(&mut self, images: &Images<'_>) -> Mask {
         match self {
             Self::Chromaticity(settings) => chromaticity::detect(images, settings),

@@ -32,7 +32,6 @@ impl From<SunPosition> for Light {
 }
 
 impl Light {
-    /// Whether a person of this stature has a usable shadow.
     pub fn check(&self, height_m: f64, camera: &Camera) -> Result<(), ShadowError> {
         match self {
             Self::Sun(sun) => on_ground(*sun, height_m, camera).map(drop),
@@ -42,7 +41,7 @@ impl Light {
     }
 
     /// Ground position (right, ahead) of the shadow of a point (right, ahead, up), metres; `None` at or below
-    /// the ground, for too low a light, or without a light position.
+    /// the ground or for too low or unlocated a light.
     pub fn thrown_to(&self, [right_m, ahead_m, up_m]: [f64; 3], camera: &Camera) -> Option<[f64; 2]> {
         if up_m <= 0.0 {
             return None;

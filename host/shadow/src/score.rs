@@ -112,7 +112,6 @@ impl ShadowScore {
         self.wrongly_removed_percent().map(|wrong| 100.0 - wrong)
     }
 
-    /// Intersection over union of result and subject; `None` if both are empty.
     #[must_use]
     pub fn iou_percent(&self) -> Option<f64> {
         percent(self.intersection, self.union)

@@ -18,12 +18,10 @@ use serde::{Deserialize, Serialize};
 
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Uncertainty {
-    /// Sun azimuth psi.
     pub azimuth_rad: f64,
     pub elevation_rad: f64,
     pub distance_m: f64,
     pub tip_distance_m: f64,
-    /// Rotation angle beta.
     pub beta_rad: f64,
     /// False if the tip is within three standard deviations of the lens' plane: `beta_rad` is then invalid.
     pub first_order_holds: bool,
@@ -134,7 +132,6 @@ fn tip_variance(
         + shadow.rx_m.powi(2) * (azimuth_var + sd.azimuth_deg.to_radians().powi(2))
 }
 
-/// As in the module's formula.
 fn beta_variance(
     file: &CameraFile,
     shadow: GroundShadow,

@@ -10,7 +10,6 @@ use farnear_silhouettes::mask::Mask;
 pub struct Settings {
     /// Smallest value relative to the background.
     pub darkest: f32,
-    /// Largest value relative to the background.
     pub lightest: f32,
     /// Largest excess saturation over the background, 0 to 1.
     pub saturation: f32,

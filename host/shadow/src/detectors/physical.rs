@@ -16,7 +16,6 @@ use farnear_silhouettes::mask::Mask;
 pub struct Settings {
     /// Smallest proposed brightness relative to the background.
     pub darkest: f32,
-    /// Largest brightness relative to the background.
     pub lightest: f32,
     /// Largest angle between the frame's and the background's colour.
     pub cone_deg: f32,

@@ -16,7 +16,6 @@ use farnear_silhouettes::mask::{Mask, bits::BitMask};
 pub struct Settings {
     /// Smallest intensity of a candidate relative to the background.
     pub darkest: f32,
-    /// Largest intensity of a candidate relative to the background.
     pub lightest: f32,
     /// Largest distance relative to the background's length.
     pub distance: f32,

@@ -5,7 +5,6 @@ use serde::{Deserialize, Serialize};
 /// Declination and Greenwich hour angle; the latter grows westwards without wrapping.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Equatorial {
-    /// Above the celestial equator.
     pub declination_rad: f64,
     pub greenwich_hour_angle_rad: f64,
 }

@@ -20,7 +20,6 @@ pub enum Kind {
     /// Level camera, upright person, shadow sideways or towards the camera.
     Standard,
     Pitched,
-    /// Person bending by 40 to 80 degrees.
     Bending,
     /// Shadow behind the person (within 60 degrees of straight away).
     Behind,
@@ -31,7 +30,6 @@ pub struct Scene {
     pub body: Mask,
     /// Shadow on the ground, including hidden parts.
     pub shadow: Mask,
-    /// As a background model would find it.
     pub silhouette: Mask,
     pub camera: CameraFile,
     pub sun: SunPosition,

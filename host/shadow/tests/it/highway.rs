@@ -86,7 +86,6 @@ fn f1(colour: bool, settings: Settings) -> f64 {
     counts.f1()
 }
 
-/// Within 0.02 of OpenCV's F1.
 #[track_caller]
 fn agrees(colour: bool, shadow: bool, opencv: f64) {
     let mut settings = Settings::default();

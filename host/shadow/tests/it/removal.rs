@@ -134,7 +134,6 @@ fn file(case: &Case) -> CameraFile {
     .expect("valid")
 }
 
-/// Standard deviation of beta over `n` random inputs.
 fn monte_carlo_deg(case: &Case, model: Model, n: usize) -> f64 {
     let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(7);
     let mut normal = |sd: f64| -> f64 {

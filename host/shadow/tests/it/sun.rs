@@ -9,7 +9,6 @@ fn refraction_deg(elevation_deg: f64) -> f64 {
     1000.0 / 1010.0 * 283.0 / 283.0 * 1.02 / (60.0 * argument.to_radians().tan())
 }
 
-/// Smallest difference of two directions, degrees.
 fn turn_deg(a: f64, b: f64) -> f64 {
     (a - b + 180.0).rem_euclid(360.0) - 180.0
 }
