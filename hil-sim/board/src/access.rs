@@ -81,7 +81,7 @@ impl RigAccess<'_, '_> {
         self.chip().part().set_supply(millivolts);
     }
 
-    /// Off loses volatile memory.
+    /// Volatile memory is lost when the power goes off.
     pub fn set_power(&mut self, on: bool) {
         let at = self.stop.at;
         if on && !self.session.unpowered() {

@@ -20,7 +20,6 @@ pub struct LinkRates {
 }
 
 impl LinkRates {
-    /// After a reset.
     pub const fn new() -> Self {
         Self { board: LinkRate::START, next: None, host: None }
     }

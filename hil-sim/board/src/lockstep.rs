@@ -3,7 +3,7 @@
 //! waits for its host (keep-alive, camera trigger). A run therefore repeats to the byte.
 //!
 //! The decision uses only frames on the line. A lost request expires after a virtual timeout. A repeat of a
-//! request that is still being answered is dropped, because a slow host may time out while time stands.
+//! request that is still being answered is dropped, because a slow host may time out while time is stopped.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
@@ -12,9 +12,9 @@ use farnear_protocol::{
     frame::{Decoder, Kind, Packet},
 };
 
-/// The board answers within milliseconds.
+/// An unanswered request expires after this; the board answers within milliseconds.
 const ANSWER_NS: u64 = 60_000_000;
-/// Far above the longest program; in a continuous run it counts from the last frame.
+/// Limit of long work, above the longest program; in a continuous run it counts from the last frame.
 const WORK_NS: u64 = 600_000_000_000;
 /// From the answer to the new link rate: one control tick and a margin.
 const RATE_NS: u64 = 1_000_000;
@@ -30,7 +30,7 @@ pub struct Lockstep {
     running: BTreeMap<u32, u64>,
     /// Ended requests; a repeated answer to one starts nothing.
     ended: VecDeque<u32>,
-    /// Timeout of the start after a reset.
+    /// Virtual time at which the wait for a start after a reset ends.
     starting: Option<u64>,
     boots: BTreeSet<u32>,
     paused: Option<u32>,

@@ -173,7 +173,7 @@ impl Device {
                 let shot_id = SOFTWARE_SHOTS + self.triggers % SOFTWARE_SHOTS;
                 self.triggers += 1;
                 done.asks.push(Control::Expose { shot_id, exposure });
-                // An idle rig's time stands; this much passes.
+                // Time is stopped in an idle rig; this much passes.
                 done.asks
                     .push(Control::AdvanceMicros(u64::from(exposure.0.saturating_add(BETWEEN_EXPOSURES_US))));
             }

@@ -209,7 +209,7 @@ fn send(stream: &UdpSocket, sending: &Sending, pace: &mut Pace) {
     }
 }
 
-/// An idle rig's time stands; free running advances it by one picture at a time.
+/// Time is stopped in an idle rig; free running advances it by one picture at a time.
 fn run_freely(device: &Shared, ask: &impl Fn(Control)) {
     loop {
         let (period, frames) = {

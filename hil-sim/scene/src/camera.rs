@@ -181,7 +181,7 @@ impl Camera {
 mod tests {
     use super::*;
 
-    /// Electrons.
+    /// Mean and variance of a flat exposure, electrons.
     fn statistics(camera: &Camera, radiance: f32) -> (f64, f64) {
         let flat = Array2::from_elem((camera.height_px, camera.width_px), radiance);
         let e_per_code = camera.full_well_e / f64::from(camera.noise.max_code());

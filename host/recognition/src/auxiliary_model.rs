@@ -1,4 +1,4 @@
-//! An auxiliary model with many more activities, trained on synthetic people, separates untrained activities
+//! An auxiliary model with many more activities, trained on synthetic people, separates untrained ones
 //! better.
 //!
 //! An activity's profile is the normalised mean of the square roots of the auxiliary model's probabilities

@@ -67,8 +67,7 @@ impl Track {
         Self { descriptors, cells, boxes, empty_frames: masks.len() - kept.len() }
     }
 
-    /// Draws capsule bodies on one canvas (10 mm per pixel) and describes them; without a finite point,
-    /// empty.
+    /// Draws capsule bodies on one canvas (10 mm per pixel); the track is empty without a finite point.
     pub fn from_bodies(bodies: &[Vec<Capsule>], view: &View, scaling: Scaling) -> Self {
         const MM_PER_PX: f64 = 10.0;
         let reach: Vec<Point> = bodies.iter().flat_map(|body| extent(body, view)).collect();

@@ -41,7 +41,7 @@ impl Light {
     }
 
     /// Ground position (right, ahead) of the shadow of a point (right, ahead, up), metres; `None` at or below
-    /// the ground or for too low or unlocated a light.
+    /// the ground, for too low a light, or without a light position.
     pub fn thrown_to(&self, [right_m, ahead_m, up_m]: [f64; 3], camera: &Camera) -> Option<[f64; 2]> {
         if up_m <= 0.0 {
             return None;

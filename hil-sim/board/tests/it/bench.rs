@@ -159,7 +159,7 @@ impl Bench {
         receive.recv().expect("the rig runs")
     }
 
-    /// `part` of the name.
+    /// Address and length of a firmware variable, by a part of its name.
     pub fn variable(&mut self, part: &str) -> (u64, u64) {
         let found = symbols(|symbol| {
             let named =

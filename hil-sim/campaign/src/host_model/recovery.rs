@@ -19,7 +19,7 @@ const AWAY_UM: [(Axis, f64); 2] = [(Axis::SensorCoarse, 350.0), (Axis::Lens, 250
 /// A stage below this was driven there: beyond homing error (3.2 um) and braking behind the switch.
 const BELOW_NM: i32 = -10_000;
 
-/// Returns what fails.
+/// Reverts all faults and checks that the rig works; returns what fails.
 pub fn recover(client: &mut Client) -> Result<Option<String>, SimError> {
     client.rig.heal()?;
     client.wait_us(300_000)?;

@@ -1,9 +1,8 @@
-//! Centroid distance function: 360 distances from a silhouette's centroid to its outermost pixels (Li 2014,
-//! 9.3.1).
+//! Centroid distance function: 360 distances from a silhouette's centroid to its outermost pixels (Li 2014).
 //!
 //! The silhouette is scaled to 100 x 100 pixels. A ray per degree is marched inwards until it meets a set
-//! pixel, so no angle is empty and holes have no effect. Distances are in units of the frame's side: [0,
-//! 0.7072] for a central centroid. Angle 0 points right, anticlockwise. About 20 us per silhouette.
+//! pixel, so no angle is empty and holes have no effect (section 9.3.1). Distances are in units of the
+//! frame's side: [0, 0.7072] for a central centroid. Angle 0 points right, anticlockwise. About 20 us.
 //!
 //! The coarse silhouette counts set pixels per cell of that frame ("zoning": Trier, Jain and Taxt, Pattern
 //! Recognition 29, 1996). It describes the inside of the outermost contour.

@@ -28,8 +28,7 @@ pub(crate) fn leading(matrix: &[f64], n: usize, wanted: usize) -> Pairs {
     leading_of(n, wanted, 1e-8, apply).unwrap_or_else(|| positive(whole(view), wanted))
 }
 
-/// [`leading`] for an operator, to `tolerance` times the largest eigenvalue. `None` if small or not
-/// converged.
+/// [`leading`] for an operator, to `tolerance` times the largest eigenvalue; `None` if it does not converge.
 pub(super) fn leading_of(
     n: usize,
     wanted: usize,

@@ -1,6 +1,5 @@
 //! Open-set evaluation: rates of unknown answers for trained and untrained activities. Each activity in turn
-//! is left out of the training on half of the subjects; the other half performs all activities, and vice
-//! versa.
+//! is left out of the training on one half of the subjects; the other half performs all, and vice versa.
 
 use super::calibration::area_under_roc;
 use super::leave_one_out::EvaluationError;

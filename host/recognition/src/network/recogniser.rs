@@ -81,8 +81,7 @@ impl Recogniser {
         Ok(recogniser)
     }
 
-    /// Softmax temperature (Guo et al., ICML 2017) and unknown limits from other people's clips, varied as in
-    /// training.
+    /// Softmax temperature (Guo et al., ICML 2017) and unknown limits, from varied clips of other people.
     fn calibrate(&mut self, others: &[Clip], taught: &NetworkSettings) -> Result<(), ModelError> {
         let known: Vec<(usize, &Clip)> = others
             .iter()
