@@ -29,7 +29,6 @@ pub fn optics_named<'py>(name: &str, object: &Bound<'py, PyAny>) -> PyResult<PyR
     })
 }
 
-/// Values of (height, width).
 enum Values<'py> {
     Lent(PyReadonlyArray2<'py, f32>),
     Own(Array2<f32>),
@@ -117,7 +116,6 @@ impl<'py> FromPyObject<'_, 'py> for Mask {
     }
 }
 
-/// A two-dimensional array of dynamic type.
 struct Untyped<'py> {
     data: Bound<'py, PyAny>,
     masked: Option<PyReadonlyArray2<'py, bool>>,

@@ -40,7 +40,6 @@ impl<'py> FromPyObject<'_, 'py> for Fill {
     }
 }
 
-/// Fill settings, and the criterion of low texture.
 fn filling(fill: &Fill, low_texture: &str) -> PyResult<Settings> {
     let criterion: LowTexture = low_texture.parse().map_err(wrong)?;
     if fill.0.is_none() && criterion != LowTexture::default() {
