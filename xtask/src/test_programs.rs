@@ -126,15 +126,14 @@ fn look_again() -> Result<()> {
     let record = target_folder().join("at-hand");
     let now = farnear_test_data::at_hand();
     if fs::read_to_string(&record).is_ok_and(|before| before != now) {
-        for package in fs::read_dir(ROOT.join("host"))? {
-            let script = package?.path().join("build.rs");
-            if script.is_file() {
-                fs::File::options()
-                    .append(true)
-                    .open(&script)
-                    .and_then(|file| file.set_modified(SystemTime::now()))
-                    .with_context(|| format!("cannot touch {}", script.display()))?;
-            }
+        let packages = fs::read_dir(ROOT.join("host"))?.flatten().map(|package| package.path());
+        let scripts = packages.chain([ROOT.join("xtask")]).map(|package| package.join("build.rs"));
+        for script in scripts.filter(|script| script.is_file()) {
+            fs::File::options()
+                .append(true)
+                .open(&script)
+                .and_then(|file| file.set_modified(SystemTime::now()))
+                .with_context(|| format!("cannot touch {}", script.display()))?;
         }
     }
     fs::write(&record, now).with_context(|| format!("cannot write {}", record.display()))

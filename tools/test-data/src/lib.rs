@@ -12,7 +12,8 @@ use std::path::{Path, PathBuf};
 pub use damage::damaged;
 
 /// Programs started by tests: configuration and file name.
-const PROGRAMS: [(&str, &str); 2] = [("ffmpeg", "ffmpeg"), ("fake_gige_camera", "arv-fake-gv-camera-0.8")];
+const PROGRAMS: [(&str, &str); 3] =
+    [("ffmpeg", "ffmpeg"), ("fake_gige_camera", "arv-fake-gv-camera-0.8"), ("typos", "typos")];
 
 fn folder() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data")

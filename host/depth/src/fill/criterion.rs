@@ -131,7 +131,7 @@ mod tests {
         }
     }
 
-    /// A checkered half whose images differ by a tenth: the ratio is +-0.05 there and its variance 0.0025.
+    /// A chequered half whose images differ by a tenth: the ratio is +-0.05 there and its variance 0.0025.
     #[test]
     fn low_is_where_the_ratio_hardly_varies() {
         let checker = |(y, x): (usize, usize)| x >= 20 && (y + x) % 2 == 0;
