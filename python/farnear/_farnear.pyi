@@ -662,6 +662,97 @@ def calibrate_psf(
     'good'
     """
 
+class StackFit:
+    """Lens calibrated by `calibrate_stack`; errors are those on parts of the target that were left out of the fit.
+
+    Attributes
+    ----------
+    optics : Optics
+        The lens, for `depth`.
+    verdict : str
+        "good", or what to change.
+    pair_step : int
+        Slices from the far to the near image of a pair.
+    bin : int
+        Pixels per side that are averaged into one.
+    robust_mm, rms_mm, bias_mm : float
+        1.4826 times the median, root mean square and mean of the error, mm.
+    slope : float
+        Slope of measured over true depth.
+    fill : float
+        Part of the pixels with a depth, 0 to 1.
+    within_three : float
+        Part of the errors within three predicted standard deviations, 0 to 1.
+    """
+
+    @property
+    def optics(self) -> Optics:
+        """-"""
+    @property
+    def verdict(self) -> str:
+        """-"""
+    @property
+    def pair_step(self) -> int:
+        """-"""
+    @property
+    def bin(self) -> int:
+        """-"""
+    @property
+    def robust_mm(self) -> float:
+        """-"""
+    @property
+    def rms_mm(self) -> float:
+        """-"""
+    @property
+    def bias_mm(self) -> float:
+        """-"""
+    @property
+    def slope(self) -> float:
+        """-"""
+    @property
+    def fill(self) -> float:
+        """-"""
+    @property
+    def within_three(self) -> float:
+        """-"""
+
+def calibrate_stack(
+    images: Sequence[Image],
+    *,
+    step_mm: float,
+    pixel_um: float = 5.0,
+    far_mm: Optional[float] = None,
+    pair_step: Optional[int] = None,
+    bin: Optional[int] = None,
+) -> StackFit:
+    """Calibrate a lens from a z-stack of a flat, textured target, tilted or not, as `farnear calibrate stack` does.
+
+    Parameters
+    ----------
+    images : sequence of array (height, width)
+        Slices one stage step apart, the one with the farthest focus first.
+    step_mm : float
+        Distance between neighbouring slices, mm, or in any unit of the stage; all depths are in that unit then.
+    pixel_um : float
+        Pixel pitch, um; only the scale of point clouds depends on it.
+    far_mm : float, optional
+        Distance of the far-focused plane of a pair, mm; without it depth is relative.
+    pair_step : int, optional
+        Slices from the far to the near image of a pair; by default for a largest blur of 2 to 3 px.
+    bin : int, optional
+        Pixels per side that are averaged into one; by default chosen with `pair_step`.
+
+    Returns
+    -------
+    StackFit
+        With `optics`, `verdict` and errors in mm. Pairs are `images[i]` (far) and `images[i + pair_step]` (near), for `method="whitened"`.
+
+    Raises
+    ------
+    FarnearError
+        Too few slices, slices of two sizes, no focus, blur that is too small.
+    """
+
 def render(
     optics: Optics,
     scene: str = "staircase",

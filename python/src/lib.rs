@@ -4,6 +4,7 @@
 
 mod arrays;
 mod calibrate;
+mod calibrate_stack;
 mod corrections;
 mod depth;
 mod depth_map;
@@ -25,6 +26,8 @@ mod synthetic;
 mod _farnear {
     #[pymodule_export]
     use super::calibrate::{PsfFit, calibrate_psf};
+    #[pymodule_export]
+    use super::calibrate_stack::{StackFit, calibrate_stack};
     #[pymodule_export]
     use super::corrections::Correction;
     #[pymodule_export]

@@ -203,3 +203,25 @@ def test_pixels_from_the_white_level_on_are_saturated(optics, slant):
             farnear.depth(*codes, optics, white_level=white_level)
     with pytest.raises(farnear.FarnearError, match="uint8 or uint16"):
         farnear.depth(*(image.astype(np.float32) for image in codes), optics, white_level=4095)
+
+
+def test_a_lens_is_calibrated_from_a_stack_and_measures_its_pairs():
+    # A flat target; the radius of a Gaussian blur grows by 0.25 px per slice of 0.05 mm.
+    random = np.random.default_rng(1)
+    rows, columns = np.fft.fftfreq(240)[:, None], np.fft.rfftfreq(320)
+    squared = rows**2 + columns**2
+    texture = np.fft.rfft2(random.standard_normal((240, 320))) / (squared + 0.002) ** 0.5
+    texture *= 30 / np.std(np.fft.irfft2(texture, (240, 320)))
+    slices = []
+    for index in range(41):
+        sigma_px = 0.4 + 0.25 * abs(index - 20)
+        image = np.fft.irfft2(texture * np.exp(-2 * (np.pi * sigma_px) ** 2 * squared), (240, 320))
+        slices.append(np.clip(image + 128 + random.standard_normal((240, 320)), 0, 255).round().astype(np.uint8))
+    fit = farnear.calibrate_stack(slices, step_mm=0.05, far_mm=100)
+    assert fit.fill > 0.9 and abs(fit.slope - 1) < 0.1, fit
+    first = 20 - fit.pair_step // 2
+    found = farnear.depth(slices[first], slices[first + fit.pair_step], fit.optics, method="whitened")
+    # The target is in focus at slice 20: so many steps nearer than the far plane. Within a third of a step.
+    assert np.nanmedian(found.depth_mm) == pytest.approx(100 - 0.05 * (20 - first), abs=0.017)
+    with pytest.raises(farnear.FarnearError, match="2 slices"):
+        farnear.calibrate_stack(slices[:2], step_mm=0.1)

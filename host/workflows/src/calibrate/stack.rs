@@ -175,7 +175,6 @@ fn figures(
     let stage = optics.stage().copied().unwrap_or_else(|| Stage::identity(1, 1));
     let Stage { bin, pair_step, residual, .. } = stage;
     let range_mm = request.step_mm * pair_step as f64;
-    let learned = stage.response[RESPONSE_POINTS - 1] - stage.response[0];
     let middle = plane.at(0.5 * size.0 as f64, 0.5 * size.1 as f64) - 0.5 * pair_step as f64;
     let far = (middle.round().max(0.0) as usize).min(files.len().saturating_sub(pair_step + 1));
     let next = format!(
@@ -185,7 +184,7 @@ fn figures(
         request.out.display()
     );
     StackFigures {
-        verdict: verdict(found, learned),
+        verdict: verdict(found),
         next,
         slices: files.len(),
         pair_step,
@@ -196,7 +195,7 @@ fn figures(
         blur_per_slice_px: blur.per_slice_px.map(|blur| rounded(blur, 3)),
         blur: blur.points.iter().map(|p| [p.slices, p.radius_px].map(|value| rounded(value, 3))).collect(),
         blur_floor_px: stage.blur_floor_px,
-        learned_mm: rounded(0.5 * learned * range_mm, 6),
+        learned_mm: rounded(0.5 * learned(found) * range_mm, 6),
         robust_mm: rounded(held_out.robust_mm, 6),
         rms_mm: rounded(held_out.rms_mm, 6),
         bias_mm: rounded(held_out.bias_mm, 6),
@@ -209,8 +208,10 @@ fn figures(
     }
 }
 
-fn verdict(found: &StackLens, learned: f64) -> String {
+/// `good`, or what to change.
+pub fn verdict(found: &StackLens) -> String {
     let held_out = &found.held_out;
+    let learned = learned(found);
     if learned < LEARNED {
         return format!(
             "only {:.0} % of the range of a pair was learned, depths outside that part are left out: take more slices around the focus, \
@@ -238,6 +239,11 @@ fn verdict(found: &StackLens, learned: f64) -> String {
         );
     }
     "good".into()
+}
+
+/// Normalised depth, of 2, that the response spans.
+fn learned(found: &StackLens) -> f64 {
+    found.optics.stage().map_or(2.0, |stage| stage.response[RESPONSE_POINTS - 1] - stage.response[0])
 }
 
 /// The images of a folder by the last number in their names.

@@ -1,0 +1,114 @@
+//! A lens from a z-stack of a flat target.
+
+use farnear_depth::calibrate::stack::{self, StackSettings};
+use farnear_workflows::calibrate::stack::verdict;
+use pyo3::prelude::*;
+
+use crate::{
+    arrays::{Image, named},
+    errors::{FarnearError, wrong},
+    optics::Optics,
+};
+
+/// Lens calibrated by `calibrate_stack`; errors are those on parts of the target that were left out of the fit.
+///
+/// Attributes
+/// ----------
+/// optics : Optics
+///     The lens, for `depth`.
+/// verdict : str
+///     "good", or what to change.
+/// pair_step : int
+///     Slices from the far to the near image of a pair.
+/// bin : int
+///     Pixels per side that are averaged into one.
+/// robust_mm, rms_mm, bias_mm : float
+///     1.4826 times the median, root mean square and mean of the error, mm.
+/// slope : float
+///     Slope of measured over true depth.
+/// fill : float
+///     Part of the pixels with a depth, 0 to 1.
+/// within_three : float
+///     Part of the errors within three predicted standard deviations, 0 to 1.
+#[pyclass(frozen, get_all, module = "farnear")]
+pub struct StackFit {
+    optics: Optics,
+    verdict: String,
+    pair_step: usize,
+    bin: usize,
+    robust_mm: f64,
+    rms_mm: f64,
+    bias_mm: f64,
+    slope: f64,
+    fill: f64,
+    within_three: f64,
+}
+
+#[pymethods]
+impl StackFit {
+    fn __repr__(&self) -> String {
+        format!(
+            "StackFit(pairs {} slices apart, {:.4} mm RMS, {})",
+            self.pair_step, self.rms_mm, self.verdict
+        )
+    }
+}
+
+/// Calibrate a lens from a z-stack of a flat, textured target, tilted or not, as `farnear calibrate stack` does.
+///
+/// Parameters
+/// ----------
+/// images : sequence of array (height, width)
+///     Slices one stage step apart, the one with the farthest focus first.
+/// step_mm : float
+///     Distance between neighbouring slices, mm, or in any unit of the stage; all depths are in that unit then.
+/// pixel_um : float
+///     Pixel pitch, um; only the scale of point clouds depends on it.
+/// far_mm : float, optional
+///     Distance of the far-focused plane of a pair, mm; without it depth is relative.
+/// pair_step : int, optional
+///     Slices from the far to the near image of a pair; by default for a largest blur of 2 to 3 px.
+/// bin : int, optional
+///     Pixels per side that are averaged into one; by default chosen with `pair_step`.
+///
+/// Returns
+/// -------
+/// StackFit
+///     With `optics`, `verdict` and errors in mm. Pairs are `images[i]` (far) and `images[i + pair_step]` (near), for `method="whitened"`.
+///
+/// Raises
+/// ------
+/// FarnearError
+///     Too few slices, slices of two sizes, no focus, blur that is too small.
+#[pyfunction]
+#[pyo3(signature = (images, *, step_mm, pixel_um=5.0, far_mm=None, pair_step=None, bin=None))]
+pub fn calibrate_stack<'py>(
+    py: Python<'py>,
+    images: Vec<Bound<'py, PyAny>>,
+    step_mm: f64,
+    pixel_um: f64,
+    far_mm: Option<f64>,
+    pair_step: Option<usize>,
+    bin: Option<usize>,
+) -> PyResult<StackFit> {
+    let mut slices = Vec::with_capacity(images.len());
+    for (index, image) in images.iter().enumerate() {
+        slices.push(named::<Image<'py>>(&format!("images[{index}]"), image)?.view().to_owned());
+    }
+    let settings = StackSettings { step_mm, pixel_um, far_mm, pair_step, bin };
+    let found = py.detach(|| stack::calibrate_stack(&slices, &settings)).map_err(wrong)?;
+    let stage = found.optics.stage().ok_or_else(|| FarnearError::new_err("the stack gives no pairs"))?;
+    let held_out = &found.held_out;
+    Ok(StackFit {
+        verdict: verdict(&found),
+        pair_step: stage.pair_step,
+        bin: stage.bin,
+        robust_mm: held_out.robust_mm,
+        rms_mm: held_out.rms_mm,
+        bias_mm: held_out.bias_mm,
+        slope: held_out.slope,
+        fill: held_out.fill,
+        within_three: held_out.within_three,
+        optics: Optics(found.optics),
+    })
+}
