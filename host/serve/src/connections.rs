@@ -61,7 +61,8 @@ impl Default for Limits {
     }
 }
 
-/// [`WAITING`]: no request yet; [`SERVING`]: a request is being answered; [`IDLE`]: between requests; [`UPGRADED`]: a WebSocket, which has its own time-outs.
+/// [`WAITING`]: no request yet; [`SERVING`]: a request is being answered; [`IDLE`]: between requests; [`UPGRADED`]: a
+/// WebSocket, which has its own time-outs.
 const WAITING: u8 = 0;
 const IDLE: u8 = 1;
 const SERVING: u8 = 2;

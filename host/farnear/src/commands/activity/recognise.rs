@@ -63,7 +63,6 @@ enum Kind {
     Video,
 }
 
-/// Runs the command.
 pub fn run(arguments: Arguments) -> Result<()> {
     let mut model = Model::read(&arguments.model)?;
     if !arguments.adapt_to.is_empty() {
@@ -101,7 +100,6 @@ pub fn run(arguments: Arguments) -> Result<()> {
     report::print(&work.finish()?, true)
 }
 
-/// Everybody in one view, each apart.
 fn multi_person(model: &Model, settings: &MultiPersonSettings, json: bool) -> Result<()> {
     let context = terminal::context()?;
     let mut work = MultiPersonTracker::begin(model, settings)?;
@@ -113,7 +111,7 @@ fn multi_person(model: &Model, settings: &MultiPersonSettings, json: bool) -> Re
     report::print(&work.finish()?, true)
 }
 
-/// Kind of a view; a guess is reported.
+/// The kind of a view; reports a guess.
 fn kind(path: &Path, named: Option<Kind>) -> Result<ViewKind> {
     let kind = match named {
         Some(Kind::Masks) => return Ok(ViewKind::Masks),
