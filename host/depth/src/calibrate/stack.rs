@@ -52,43 +52,24 @@ pub struct StackSettings {
 
 /// Why a stack gives no lens.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "the messages name the fields")]
 pub enum StackError {
-    /// Too few slices.
     #[error("{0} slices: at least {FEWEST} are needed, from in front of the focus to behind it")]
     TooFew(usize),
-    /// Slices of different size.
     #[error("slice {index} has another size than the first one")]
-    Size {
-        /// From 1.
-        index: usize,
-    },
-    /// A number that makes no sense.
+    Size { index: usize },
     #[error("{name} = {value}: expected a positive number")]
-    NotPositive {
-        /// Name of the parameter.
-        name: &'static str,
-        /// Its value.
-        value: f64,
-    },
-    /// No plane in focus.
+    NotPositive { name: &'static str, value: f64 },
     #[error("{0}")]
     NoFocus(String),
-    /// No separation gives a usable blur.
     #[error(
         "no pair of slices has a largest blur of {low} to {high} px: it is {per_slice:.2} px per slice; use a {hint} step",
         low = USABLE_PX[0],
         high = USABLE_PX[1]
     )]
-    NoSeparation {
-        /// Blur radius per slice, px.
-        per_slice: f64,
-        /// finer or coarser.
-        hint: &'static str,
-    },
-    /// Nothing could be measured.
+    NoSeparation { per_slice: f64, hint: &'static str },
     #[error("no pair of slices {0} apart has its target within the range: take more slices around the focus")]
     NoPair(usize),
-    /// The optics that result.
     #[error(transparent)]
     Optics(#[from] crate::optics::OpticsError),
 }

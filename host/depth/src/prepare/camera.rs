@@ -25,68 +25,36 @@ const RESPONSE: [f32; 2] = [0.5, 1.5];
 
 /// An error of a camera's frames.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "the messages name the fields")]
 pub enum CameraError {
-    /// They are of another size than the images.
     #[error(
         "the camera's frames are {width}x{height}, the images {image_width}x{image_height}: calibrate the camera in the mode of the images"
     )]
-    Size {
-        /// Width of the frames.
-        width: usize,
-        /// Height of the frames.
-        height: usize,
-        /// Width of the images.
-        image_width: usize,
-        /// Height of the images.
-        image_height: usize,
-    },
-    /// No exposures of a kind.
+    Size { width: usize, height: usize, image_width: usize, image_height: usize },
     #[error("no {kind} exposures: give at least one")]
-    None {
-        /// Kind of frame.
-        kind: &'static str,
-    },
-    /// A flat exposure is saturated.
+    None { kind: &'static str },
     #[error(
         "{kind} exposure {number}: {percent:.1} % of its pixels are saturated; give evenly lit exposures at about half of full scale"
     )]
-    Saturated {
-        /// Flat or dark.
-        kind: &'static str,
-        /// Number of the image, from 1.
-        number: usize,
-        /// Part of the pixels at full scale, percent.
-        percent: f64,
-    },
-    /// An exposure shows something.
+    Saturated { kind: &'static str, number: usize, percent: f64 },
     #[error(
         "{kind} exposure {number} has structure: its brightness varies by {percent:.1} % over {SURROUNDINGS_PX} px, {expected}; is it a picture of the \
          scene? Give {advice}"
     )]
     Structured {
-        /// Flat or dark.
         kind: &'static str,
-        /// Number of the image, from 1.
         number: usize,
         /// Standard deviation of the smoothed brightness around its surroundings, percent of the mean (of full scale in the
         /// dark).
         percent: f64,
-        /// The usual range.
         expected: &'static str,
-        /// Remedy for the fault.
         advice: &'static str,
     },
-    /// The flat exposures are hardly brighter than the dark ones.
     #[error(
         "the flat exposures have a mean of {flat:.4}, the dark ones of {dark:.4}: give evenly lit exposures at about half of \
          full scale"
     )]
-    NoLight {
-        /// Mean of the flat exposures.
-        flat: f64,
-        /// Mean of the dark ones.
-        dark: f64,
-    },
+    NoLight { flat: f64, dark: f64 },
 }
 
 /// Rejects exposures that are saturated or show a scene.
