@@ -56,7 +56,7 @@ fn run_for(command: &mut Command, limit: Duration) -> Result<Output> {
     match well {
         None => eprintln!("not ended within {} s, and killed: {named}", limit.as_secs()),
         Some(_) if !ends.iter().all(|end| end.recv_timeout(LAST).is_ok()) => {
-            eprintln!("left a program behind that holds its output: {named}");
+            eprintln!("ended, but a child process still holds its output: {named}");
         }
         Some(_) => {}
     }

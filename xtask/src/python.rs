@@ -81,7 +81,7 @@ pub fn environment(folder: &Path, needs: &[&str]) -> Result<PathBuf, String> {
         return Ok(python);
     }
     if !succeeds(Command::new("python3").args(["-m", "venv", "--clear"]).arg(&venv)) {
-        return Err("python3 -m venv makes no environment; Debian's package is python3-venv".into());
+        return Err("python3 -m venv creates no environment; Debian's package is python3-venv".into());
     }
     eprintln!("fetching {}", needs.join(", "));
     let fetch = ["-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--only-binary", ":all:"];

@@ -140,12 +140,12 @@ pub enum ModelError {
     Checksum { found: u32, expected: u32 },
     #[error("the model's body cannot be read: {0}")]
     Body(String),
-    #[error("the model's parts do not belong together: {0}")]
+    #[error("the model's parts are inconsistent: {0}")]
     Parts(&'static str),
     #[error("the clip has {found} views{boxes}, the model was trained on {expected}{expected_boxes}", boxes = with(*.found_boxes), expected_boxes = with(*.expected_boxes))]
     Clip { found: usize, found_boxes: bool, expected: usize, expected_boxes: bool },
     #[error(
-        "the model keeps no training clips of its own to learn on with (those that come with the program do not, for learning on made them \
+        "the model contains no training clips, which adaptation needs (the shipped models contain none, because adaptation made them \
          worse): train one on labelled samples, with this model's features if they are few"
     )]
     Unlabelled,

@@ -100,7 +100,7 @@ fn cameras() -> Vec<&'static str> {
     let aravis = aravis.is_ok_and(|status| status.success());
     let features = [(aravis, "genicam", "libaravis-dev"), (has("clang"), "v4l2", "clang")];
     for (_, feature, package) in features.iter().filter(|(here, ..)| !here) {
-        eprintln!("the Debian package goes without {feature} cameras: {package} is missing");
+        eprintln!("the Debian package has no support for {feature} cameras: {package} is missing");
     }
     features.into_iter().filter(|(here, ..)| *here).map(|(_, feature, _)| feature).collect()
 }

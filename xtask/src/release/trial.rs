@@ -48,7 +48,7 @@ pub fn programs(release: &Release, target: &Target, left_out: &mut Vec<String>) 
             finish(inside("farnear").arg("doctor"))?;
             return finish(inside("farnear-sim").arg("--help"));
         }
-        left_out.push("an empty root: this user may not make one (unshare --map-root-user --root)".into());
+        left_out.push("an empty root: this user may not create one (unshare --map-root-user --root)".into());
         depth(&|| Command::new(folder.join("farnear")), &ROOT.join(OPTICS), &root.join("pair"))?;
         return captures(&folder, &root.join("capture"));
     };

@@ -260,7 +260,7 @@ impl Recording {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum RecordingError {
     /// No reader has this extension.
-    #[error("no reader of motion capture knows files that end in `.{found}`: expected {known}")]
+    #[error("no motion-capture format ends with `.{found}`: expected {known}")]
     Extension { found: String, known: String },
     #[error("not a {kind} file: {reason}")]
     Kind {

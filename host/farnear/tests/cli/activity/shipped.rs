@@ -200,5 +200,5 @@ fn a_shipped_network_and_unlabelled_clips_serve_where_samples_come_from_elsewher
     fails(&mut again, 1, &["film", "exists already"]);
     // Shipped models contain no clips.
     let mut shipped = farnear(&["activity", "recognise", &masks, "--model", "everyday", "--adapt-to"]);
-    fails(shipped.args(&unlabelled), 1, &["everyday", "no training clips of its own", "features"]);
+    fails(shipped.args(&unlabelled), 1, &["everyday", "contains no training clips", "features"]);
 }
