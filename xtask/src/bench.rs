@@ -355,7 +355,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_figure_is_said() {
+    fn rejects_rows_without_figures() {
         assert!(row("{\"name\": \"x\"}").is_err_and(|e| e.to_string().contains("not a bench's line")));
         assert!(peer("p.py", "{\"chain\": 3}").is_err_and(|e| e.to_string().contains("chain_ms")));
         assert!(peer("p.py", "Traceback").is_err());

@@ -101,7 +101,7 @@ mod tests {
     }
 
     #[test]
-    fn what_hangs_is_killed_and_what_it_said_is_kept() {
+    fn a_hanging_program_is_killed_and_its_output_kept() {
         let (text, well, took) = shell("echo begun; exec sleep 60", Duration::from_millis(300));
         assert_eq!((text.as_str(), well), ("begun\n", false));
         assert!(took < Duration::from_secs(30), "{took:?}");

@@ -206,7 +206,7 @@ mod tests {
     }
 
     #[test]
-    fn causes_are_said_once() {
+    fn causes_are_printed_once() {
         let inner = std::io::Error::other("Broken pipe");
         let said = anyhow::Error::new(inner).context("the port went away (Broken pipe)").context("capture");
         assert_eq!(message(&said), "capture: the port went away (Broken pipe)");

@@ -168,7 +168,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn times_are_said_in_words() {
+    fn durations_are_printed_in_words() {
         for (seconds, words) in [(40, "40 s"), (100, "2 min"), (5999, "100 min"), (12_000, "3 h 20 min")] {
             assert_eq!(in_words(seconds), words);
         }

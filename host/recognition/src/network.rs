@@ -198,7 +198,7 @@ mod tests {
     }
 
     #[test]
-    fn nobody_and_a_member_of_another_width_do_not_fit() {
+    fn an_empty_ensemble_and_a_member_of_another_width_are_rejected() {
         let (clips, labels) = clips();
         let settings = NetworkSettings { widths: [5, 6, 7], passes: 1, members: 2, ..Default::default() };
         let (whole, _) = train(&clips, &|clip| clip.points.clone(), &labels, 3, &settings, &Unwatched)

@@ -90,7 +90,7 @@ mod tests {
 
     /// The HTML preloads all modules needed at the start; the 3-D surface loads on demand.
     #[test]
-    fn every_module_that_is_needed_at_once_is_announced() {
+    fn modules_needed_at_the_start_are_preloaded() {
         let page = ASSETS.iter().find(|asset| asset.path == "index.html").map(|asset| asset.bytes).unwrap();
         let page = std::str::from_utf8(page).unwrap();
         for asset in ASSETS.iter().filter(|asset| asset.media == JS) {

@@ -56,7 +56,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_message_says_how_long_its_header_is() {
+    fn a_message_begins_with_the_length_of_its_header() {
         let bytes = message(&serde_json::json!({"width": 2}), &[&[7], &[8]]);
         assert_eq!(&bytes[..4], &12u32.to_le_bytes());
         assert_eq!(&bytes[4..16], b"{\"width\":2} ");

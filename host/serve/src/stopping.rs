@@ -50,7 +50,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_begins_waits_for_all_stops_before_it() {
+    fn jobs_wait_for_all_pending_stops() {
         let stops = Arc::new(Stops::default());
         stops.wait();
         let (first, second) = (stops.begin(None), stops.begin(None));

@@ -394,7 +394,7 @@ mod tests {
     }
 
     #[test]
-    fn failures_lie_beside_the_manifest() {
+    fn failures_are_written_next_to_the_manifest() {
         let settings = |shard: &str| BatchSettings {
             manifest: "a/pairs.toml".into(),
             jobs: 0,

@@ -52,7 +52,7 @@ mod tests {
     }
 
     #[test]
-    fn counts_rise_by_one_whoever_counts() {
+    fn counts_rise_by_one_from_any_thread() {
         let heard = Heard::default();
         let context = Context::new(&heard, &Unattended, Cancel::default());
         let counter = Counter::new(&context, "clips");

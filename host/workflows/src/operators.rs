@@ -189,7 +189,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_are_told_from_paths() {
+    fn names_are_distinguished_from_paths() {
         let known = named(Path::new("gro:linear")).unwrap().unwrap();
         assert_eq!(known, (Family::Gro, Design::Linear));
         assert_eq!(named(Path::new("gro")).unwrap().unwrap(), known);

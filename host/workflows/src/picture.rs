@@ -113,7 +113,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_unfit_is_said() {
+    fn unfit_pictures_give_warnings() {
         assert!(seen(8, |_, x| if x < 4 { 255 } else { 100 }).warnings[0].starts_with("8.3 % of the pixels"));
         let dark = seen(8, |_, x| (x % 2) as u16);
         assert!(dark.warnings[0].starts_with("dark"), "{:?}", dark.warnings);

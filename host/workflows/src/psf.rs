@@ -94,7 +94,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_and_files_are_told_apart() {
+    fn names_are_distinguished_from_files() {
         assert_eq!("pillbox".parse(), Ok(PsfSource::Named(Psf::PillBox)));
         assert_eq!("ring:inner=0.5".parse(), Ok(PsfSource::Named(Psf::Ring { inner: 0.5 })));
         let image = |file: &str, radius_px| Ok(PsfSource::Image { file: file.into(), radius_px });

@@ -182,7 +182,7 @@ fn look(piezo: &mut Piezo, plant: &mut Plant, seconds: u32) -> (f64, f64) {
 }
 
 #[test]
-fn at_ease_it_is_held_as_well_by_a_tenth_of_the_ticks_whatever_the_part_is_like() {
+fn settled_idle_holds_position_with_a_tenth_of_the_ticks_for_all_parts() {
     let worst = Part { hysteresis: 0.12, creep: 0.015, ..NOMINAL };
     let calibrated =
         FineSettings { hysteresis_ppm: 120_000, creep_ppm_per_decade: 15_000, ..Settings::DEFAULT.fine };
@@ -205,7 +205,7 @@ fn at_ease_it_is_held_as_well_by_a_tenth_of_the_ticks_whatever_the_part_is_like(
 }
 
 #[test]
-fn who_is_pushed_off_at_ease_is_led_back_by_all_ticks() {
+fn a_disturbance_in_settled_idle_is_corrected_with_all_ticks() {
     let mut piezo = Piezo::new(Settings::DEFAULT.fine);
     let mut plant = Plant::new(NOMINAL, 1);
     step(&mut piezo, &mut plant, 100_000);

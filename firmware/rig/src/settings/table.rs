@@ -208,7 +208,7 @@ mod tests {
     }
 
     #[test]
-    fn a_value_outside_its_range_changes_nothing_and_is_told_the_range() {
+    fn a_value_outside_its_range_is_rejected_with_the_range() {
         let mut values = Values::DEFAULT;
         let refused = values.set(SettingKey::CoarseMaxNm, 13_000_001);
         assert!(matches!(refused, Err(Setting { max: 13_000_000, min: 0, .. })), "{refused:?}");

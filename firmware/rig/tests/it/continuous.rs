@@ -95,7 +95,7 @@ fn without_a_period_it_is_as_fast_as_piezo_and_camera() {
 }
 
 #[test]
-fn a_frame_that_finds_nothing_ready_is_dropped_and_told_and_its_shot_comes_next() {
+fn a_dropped_frame_is_reported_and_its_shot_is_repeated() {
     let mut bench = Bench::new(700.0);
     pair(&mut bench);
     let id = bench.accepted(&run(PERIOD, 40));

@@ -59,7 +59,7 @@ fn the_piezo_moves_without_homing_and_settles_in_15_ms() {
 }
 
 #[test]
-fn a_pair_takes_at_most_60_ms_besides_its_exposures() {
+fn a_pair_takes_at_most_60_ms_plus_its_exposures() {
     let mut bench = Bench::homed();
     load(&mut bench, &[shot(FAR), shot(NEAR)]);
     for round in 0..5 {
@@ -238,7 +238,7 @@ fn stopping_the_piezo_keeps_it_where_it_is() {
 }
 
 #[test]
-fn a_host_that_triggers_the_camera_is_told_when() {
+fn a_software_trigger_is_requested_after_settling() {
     let mut bench = Bench::new(700.0);
     load(&mut bench, &[Shot { mode: TriggerMode::Software, exposure: Micros(3_000), ..shot(FAR) }]);
     bench.accepted(&Request::ArmProgram { shots: 1 });

@@ -269,7 +269,7 @@ fn settings_shots_and_counters_survive() {
 }
 
 #[test]
-fn damaged_records_are_told_and_lost_ones_are_an_alarm() {
+fn damaged_records_are_reported_and_lost_ones_raise_an_alarm() {
     let mut bench = Bench::new(700.0);
     for value in [5_000_000, 6_000_000] {
         assert!(bench.ask(&Request::WriteSetting { key: SettingKey::CoarseMaxNm, value }).1.is_ok());
@@ -390,7 +390,7 @@ fn a_lens_below_its_zero_comes_up_before_the_sensor_is_homed() {
 }
 
 #[test]
-fn an_encoder_that_is_just_not_wrong_enough_to_be_told_at_rest_does_not_keep_its_axis_from_homing() {
+fn an_encoder_error_below_the_limit_at_rest_does_not_prevent_homing() {
     // Campaign, seed 108681: an encoder slipped by 6 um, and its lag in motion became a fault.
     for microsteps in [38, -38] {
         let mut bench = Bench::both_homed();

@@ -244,7 +244,7 @@ mod tests {
     }
 
     #[test]
-    fn noise_does_not_bias_and_the_mean_says_nothing() {
+    fn noise_does_not_bias_and_the_mean_has_no_effect() {
         for psf in [Psf::PillBox, Psf::Gaussian { k: 0.4578 }, Psf::Generalised { p: 1.8, k: 0.4802 }] {
             let found = Whitened::for_psf(psf, 2.703, 0.0).unwrap();
             let [_, r1, _, r3] = &found.residual;

@@ -103,7 +103,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn single_pixels_are_mended_and_patches_become_holes() {
+    fn single_pixels_are_replaced_and_patches_become_holes() {
         let mut image = Array2::from_shape_fn((30, 40), |(y, x)| 0.2 + 0.01 * (y + x) as f32);
         image[(10, 10)] = 1.0;
         image.slice_mut(ndarray::s![20..26, 20..26]).fill(1.0);

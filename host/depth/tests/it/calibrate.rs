@@ -247,7 +247,7 @@ fn standard_errors_are_those_of_repetition() {
 }
 
 #[test]
-fn a_shift_and_another_psf_are_told_from_noise() {
+fn a_shift_and_another_psf_are_distinguished_from_noise() {
     let optics = rig("pillbox");
     let fit = |[far, near]: &[Array2<f32>; 2], model| {
         let pair = CapturedPair { far: far.view(), near: near.view(), alpha: None };

@@ -141,7 +141,7 @@ fn a_good_pair_goes_through_untouched() {
 
 /// Aims of the measured page: 0.75 mm on 640x480; smaller images determine gain and geometry less well.
 #[test]
-fn geometry_and_brightness_are_mended() {
+fn geometry_and_brightness_are_corrected() {
     let view = |shift: f64, magnification, rotation_deg| View {
         shift_px: [shift, -0.5 * shift],
         magnification,
@@ -290,7 +290,7 @@ fn nothing_is_confident_outside_the_range() {
 }
 
 #[test]
-fn a_wrong_point_spread_function_is_said() {
+fn a_wrong_psf_is_reported() {
     let pair = plain("staircase", 9);
     for (psf, said) in
         [(PSF, false), ("gaussian:k=0.5036", true), ("pillbox", true), ("generalised:p=1.8,k=0.4802", true)]

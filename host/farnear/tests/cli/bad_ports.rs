@@ -82,7 +82,7 @@ impl Line {
 }
 
 #[test]
-fn a_busy_port_is_told_from_an_absent_one() {
+fn busy_and_absent_ports_have_different_errors() {
     let line = Line::new();
     let held = serialport::new(line.name(), 115_200).open_native().expect("a free port");
     capture_fails(&line.name(), &["is busy", &line.name(), "end that program"]);
@@ -90,13 +90,13 @@ fn a_busy_port_is_told_from_an_absent_one() {
 }
 
 #[test]
-fn a_port_on_which_nobody_answers_is_named() {
+fn a_silent_port_is_named_in_the_error() {
     let line = Line::new();
     capture_fails(&line.name(), &["no answer", &line.name(), "nothing at all came", "powered"]);
 }
 
 #[test]
-fn noise_without_a_board_behind_it_is_told_from_silence() {
+fn noise_and_silence_have_different_errors() {
     let mut line = Line::new();
     let name = line.name();
     std::thread::spawn(move || {
@@ -129,7 +129,7 @@ fn board_of_the_future(mut line: Line) {
 }
 
 #[test]
-fn a_board_of_another_protocol_version_is_told_with_both_versions() {
+fn another_protocol_version_is_reported_with_both_versions() {
     let line = Line::new();
     let name = line.name();
     std::thread::spawn(move || board_of_the_future(line));

@@ -110,7 +110,7 @@ fn a_free_profile_is_found_and_used() {
 
 /// The part of a shift common to both images is not blur: alignment removes it, or a warning reports it.
 #[test]
-fn a_shifted_pair_is_aligned_or_told() {
+fn a_shifted_pair_is_aligned_or_reported() {
     let bench = Bench::new();
     bench.render("plane:933", "8bit", "far");
     let near = image_file::read_grey(&bench.0.path().join("far/near.png")).unwrap().pixels;

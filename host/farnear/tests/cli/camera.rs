@@ -61,7 +61,7 @@ fn looking_gives_a_line_at_a_time() {
 }
 
 #[test]
-fn what_is_wrong_with_a_camera_is_said_and_nothing_is_left() {
+fn camera_errors_are_reported_and_leave_no_files() {
     let folder = Folder::new();
     let out = folder.text("out");
     for (camera, code, phrase) in [

@@ -120,7 +120,7 @@ fn two_captures_with_one_seed_are_the_same_to_the_byte_and_give_the_depth() {
 #[test]
 #[cfg(target_os = "linux")]
 #[cfg_attr(not(emulated_rig), ignore = "needs farnear-sim: cargo xtask test")]
-fn a_capture_on_a_full_disk_is_said_and_leaves_nothing() {
+fn a_capture_on_a_full_disk_fails_and_leaves_no_files() {
     let folder = Folder::new();
     let pair = folder.text("pair");
     let mut command = assert_cmd::Command::new("sh");

@@ -72,7 +72,7 @@ fn camera_of(shot_id: u32) -> (String, JoinHandle<()>) {
 
 #[test]
 #[cfg_attr(not(emulated_rig), ignore = "needs farnear-sim: cargo xtask test")]
-fn a_picture_of_another_trigger_is_told_with_both_numbers() {
+fn an_image_of_another_trigger_is_rejected_with_both_numbers() {
     let folder = Folder::new();
     // The board's first exposure is 0: a later one, and one from before the counter wrapped.
     for (came, phrases) in [
@@ -89,7 +89,7 @@ fn a_picture_of_another_trigger_is_told_with_both_numbers() {
 }
 
 #[test]
-fn a_rig_without_a_second_camera_is_told_what_to_do() {
+fn a_missing_second_camera_is_reported_with_a_remedy() {
     let folder = Folder::new();
     let out = folder.text("out");
     let port = ["--port", "/dev/none", "--out", &out];

@@ -26,7 +26,7 @@ fn a_proposal_measures_within_the_error_it_promises() {
 }
 
 #[test]
-fn too_much_blur_is_said_with_what_to_change() {
+fn too_much_blur_is_reported_with_a_remedy() {
     let folder = Folder::new();
     let ordinary = "[lens]\nfocal_length_mm = 50.0\nf_number = 2.0\n[sensor]\npixel_um = 3.9\n[focus]\nfar_mm = 5000.0\nnear_mm = 1000.0\n";
     let file = folder.file("camera.toml", ordinary);

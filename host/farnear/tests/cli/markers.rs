@@ -180,7 +180,7 @@ fn skeleton() -> String {
 }
 
 #[test]
-fn a_skeleton_of_joints_is_drawn_and_what_was_guessed_is_said() {
+fn a_skeleton_is_drawn_and_guesses_are_reported() {
     let folder = Folder::new();
     let (file, out) = (folder.file("walk.bvh", skeleton()), folder.text("masks"));
     let arguments = ["silhouettes", "markers", &file, "--template", "bvh", "--views", "4"];
@@ -273,7 +273,7 @@ fn real_recordings_fit_built_in_templates() {
 }
 
 #[test]
-fn masks_are_cut_into_passages_where_numbers_leap_and_nobody_is_seen() {
+fn masks_are_split_at_number_gaps_and_frames_without_a_person() {
     let folder = Folder::new();
     let masks = folder.text("masks");
     fs::create_dir(&masks).expect("a folder");

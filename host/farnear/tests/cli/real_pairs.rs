@@ -17,7 +17,7 @@ fn write(folder: &Folder, name: &str, pixels: &Array2<f32>) -> String {
 }
 
 #[test]
-fn brightness_and_place_are_mended_and_said() {
+fn brightness_and_position_are_corrected_and_reported() {
     let folder = Folder::new();
     render(&folder, "plane:905", "pair");
     let far = folder.text("pair/far.png");
@@ -49,7 +49,7 @@ fn brightness_and_place_are_mended_and_said() {
 }
 
 #[test]
-fn a_missing_psf_and_other_units_are_said() {
+fn a_missing_psf_and_other_units_are_reported() {
     let folder = Folder::new();
     render(&folder, "plane:905", "one");
     let [far, near] = ["one/far.png", "one/near.png"].map(|name| folder.text(name));

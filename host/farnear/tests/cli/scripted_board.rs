@@ -44,7 +44,7 @@ fn a_board_behind_a_port_is_driven_by_one_program_after_the_other() {
 }
 
 #[test]
-fn an_alarm_is_told_listed_and_cleared_by_its_number() {
+fn an_alarm_is_reported_listed_and_cleared_by_number() {
     let (port, peer) = plug_in(Faults::default());
     let rig = |arguments: &[&str]| {
         let mut command = farnear(&["rig"]);
@@ -132,7 +132,7 @@ fn a_camera_without_images_is_waited_for_no_longer_than_asked_and_the_rig_stops(
 }
 
 #[test]
-fn another_message_table_under_the_same_version_is_told_with_both_keys() {
+fn another_schema_key_is_reported_with_both_keys() {
     let (port, peer) = plug_in(Faults::default());
     peer.board().hello.schema_key = 0xabc;
     capture_fails(&port, &["message tables differ", "0000000000000abc", "flash the firmware"]);

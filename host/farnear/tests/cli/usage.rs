@@ -204,7 +204,7 @@ fn completions_name_the_commands() {
 /// A closed stdout causes a message, not a panic.
 #[cfg(target_os = "linux")]
 #[test]
-fn a_stdout_that_takes_nothing_is_a_failure() {
+fn a_closed_stdout_is_a_failure() {
     for arguments in [vec!["optics", "--optics", rig_optics()], vec!["completions", "bash"]] {
         let full = File::options().write(true).open("/dev/full").expect("Linux has /dev/full");
         let child = std::process::Command::new(env!("CARGO_BIN_EXE_farnear"))

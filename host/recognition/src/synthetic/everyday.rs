@@ -170,7 +170,7 @@ mod tests {
     use std::collections::BTreeSet;
 
     #[test]
-    fn everybody_does_everything_on_the_ground_and_in_view() {
+    fn every_person_and_activity_is_on_the_ground_and_in_view() {
         let names: BTreeSet<_> = ACTIVITIES.iter().map(|(name, _)| name).collect();
         assert_eq!(names.len(), ACTIVITIES.len());
         for (activity, (name, _)) in ACTIVITIES.iter().enumerate() {

@@ -77,7 +77,7 @@ fn depth_is_computed_measured_compared_and_taken_along() {
 }
 
 #[test]
-fn notes_are_kept_and_searched_and_broken_captures_are_said() {
+fn notes_are_stored_and_searched_and_broken_captures_reported() {
     let served = Served::captures_only();
     put(&served, "pair-001", 0);
     put(&served, "pair-002", 1);
@@ -144,10 +144,10 @@ fn names(folder: &Path) -> Vec<String> {
 
 /// The file size limit (8 or 16 kB, by shell) is above the size of the images and below that of the maps.
 #[test]
-fn a_disk_that_takes_no_more_fails_the_job_and_leaves_nothing_half_written() {
+fn a_full_disk_fails_the_job_and_leaves_no_partial_files() {
     const WITHIN: &str = "FARNEAR_TEST_SMALL_FILES";
     if std::env::var_os(WITHIN).is_none() {
-        let script = r#"trap "" XFSZ; ulimit -f 16; exec "$0" --exact captures::a_disk_that_takes_no_more_fails_the_job_and_leaves_nothing_half_written"#;
+        let script = r#"trap "" XFSZ; ulimit -f 16; exec "$0" --exact captures::a_full_disk_fails_the_job_and_leaves_no_partial_files"#;
         let program = std::env::current_exe().unwrap();
         let ended = Command::new("sh").args(["-c", script]).arg(program).env(WITHIN, "1").output().unwrap();
         assert!(ended.status.success(), "{}", String::from_utf8_lossy(&ended.stdout));
@@ -170,7 +170,7 @@ fn a_disk_that_takes_no_more_fails_the_job_and_leaves_nothing_half_written() {
 }
 
 #[test]
-fn what_another_program_does_to_the_session_is_seen_and_said() {
+fn changes_of_the_session_by_other_programs_are_reported() {
     let served = Served::captures_only();
     let socket = Socket::open(&served);
     let listed = || served.get("/api/captures").json()["captures"].as_array().unwrap().len();

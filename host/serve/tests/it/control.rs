@@ -133,7 +133,7 @@ fn what_cannot_be_is_refused_before_anything_moves() {
 }
 
 #[test]
-fn a_rig_that_is_not_there_is_said_and_can_be_tried_again() {
+fn a_missing_rig_is_reported_and_can_be_retried() {
     let rig = farnear_workflows::rig::RigAddress::Port("/dev/farnear-no-such-port".into());
     let served = Served::start(Some(rig), None, |_| farnear_serve::Listen::Loopback { port: 0 });
     let state = served.state_when(|state| state["rig"]["phase"] == "lost");

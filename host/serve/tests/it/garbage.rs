@@ -87,7 +87,7 @@ fn ten_thousand_malformed_messages_change_nothing() {
 }
 
 #[test]
-fn a_connection_that_says_nothing_holds_nobody_up() {
+fn a_silent_connection_delays_no_other() {
     let served = Served::captures_only();
     let silent: Vec<_> = (0..50).map(|_| TcpStream::connect(&served.address).unwrap()).collect();
     let mut half = TcpStream::connect(&served.address).unwrap();

@@ -111,7 +111,7 @@ mod tests {
     }
 
     #[test]
-    fn first_and_second_sensors_are_told_by_their_joints() {
+    fn first_and_second_sensors_are_distinguished_by_their_joints() {
         let first = read(format!("1 {}\n2 {}\n", line(20), line(20)).as_bytes()).expect("joints");
         assert_eq!(
             (first.frames.len(), first.names.len(), first.names[2].as_str()),

@@ -273,7 +273,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_recording_is_cut_where_nobody_is_there_for_a_while() {
+    fn a_recording_is_split_at_long_gaps_without_a_person() {
         let mut seen = vec![false; 400];
         seen[3..40].fill(true);
         seen[20..25].fill(false);

@@ -135,7 +135,7 @@ mod tests {
     const OPTICS: &str = "[lens]\nfocal_length_mm = 50.0\naperture_mm = 12.8\n[sensor]\npixel_um = 7.4\n[focus]\nfar_mm = 933.0\n";
 
     #[test]
-    fn a_distance_that_does_not_fit_is_said_with_the_one_that_does() {
+    fn a_wrong_distance_is_reported_with_the_right_one() {
         let read = |focus: &str| {
             let optics =
                 GivenOptics::parse(&format!("{OPTICS}{focus}"), Path::new("optics.toml")).expect("good");

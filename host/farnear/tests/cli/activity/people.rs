@@ -100,7 +100,7 @@ fn two_people_side_by_side_get_an_answer_each() {
 }
 
 #[test]
-fn people_who_cross_are_said_to_and_what_cannot_be_followed_is_refused() {
+fn crossings_are_reported_and_untrackable_videos_rejected() {
     let folder = Folder::new();
     let post = GrayImage::from_pixel(24, 90, Luma([255]));
     let frames: Vec<GrayImage> = (0..50)

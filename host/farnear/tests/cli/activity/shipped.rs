@@ -114,7 +114,7 @@ fn an_unknown_answer_says_why() {
 /// Silhouettes of two people who walk through the picture, eight times, by a background model from video.
 #[test]
 #[cfg_attr(not(shared_data), ignore = "needs the real data next to the repository")]
-fn somebody_walking_before_a_real_camera_is_said_to_walk() {
+fn walking_in_front_of_a_real_camera_is_recognised() {
     let folder = Folder::new();
     let mut walking = 0;
     let mut passages = 0;

@@ -156,7 +156,7 @@ pub fn machine() -> String {
 }
 
 #[test]
-fn numbers_are_told_from_words() {
+fn numbers_are_distinguished_from_words() {
     let (numbers, rest) = numbers_and_rest("[p1]\nk = -4.5e-3, x2 = 7. -b M3,4");
     assert_eq!(numbers, [-4.5e-3, 7.0, 4.0]);
     assert_eq!(rest, "[p1]\nk = #, x2 = # -b M3,#");

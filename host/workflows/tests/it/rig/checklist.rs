@@ -89,7 +89,7 @@ fn a_failure_ends_the_list_where_the_next_step_would_rest_on_it() {
 }
 
 #[test]
-fn a_latched_alarm_is_told_and_nothing_goes_on() {
+fn a_latched_alarm_is_reported_and_ends_the_checklist() {
     let (port, board) = plug_in(Faults::default());
     board.board().raise(Alarm::SupplyLow);
     let (list, _) = go_through(board, port, true, false);
