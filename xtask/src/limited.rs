@@ -30,9 +30,9 @@ pub struct Output {
 
 /// Errors are shown immediately, output at the end.
 pub fn run(command: &mut Command) -> Result<Output> {
-    let said = run_for(command, LIMIT)?;
-    print!("\n{}\n{}", describe(command), said.text);
-    Ok(said)
+    let finished = run_for(command, LIMIT)?;
+    print!("\n{}\n{}", describe(command), finished.text);
+    Ok(finished)
 }
 
 fn run_for(command: &mut Command, limit: Duration) -> Result<Output> {

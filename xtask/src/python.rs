@@ -43,7 +43,7 @@ pub fn run(elf: &Path) -> Result<Counts> {
     };
     let built = target_folder().join("debug");
     lay_out(&folder.join("package/farnear"), &built)?;
-    let said = limited::run(
+    let ended = limited::run(
         Command::new(python)
             .args(["-m", "pytest", "-q", "-p", "farnear.pytest_plugin", "-p", "no:cacheprovider"])
             // Report where a test hangs.
@@ -57,12 +57,12 @@ pub fn run(elf: &Path) -> Result<Counts> {
             .env("FARNEAR_SIM", built.join("farnear-sim"))
             .env("FARNEAR_FIRMWARE", elf),
     )?;
-    let text = said.text;
+    let text = ended.text;
     Ok(Counts {
         passed: count(&text, "passed"),
         failed: count(&text, "failed") + count(&text, "error") + count(&text, "errors"),
         skipped: count(&text, "skipped"),
-        ended_well: said.well,
+        ended_well: ended.well,
     })
 }
 

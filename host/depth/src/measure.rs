@@ -22,7 +22,7 @@ use crate::validity::{LARGEST_ALPHA, Lost, Validity, ValiditySettings, assess};
 /// Alpha of a pixel measured out of range before blur scaling is undone.
 const OUT_OF_RANGE_ALPHA: f64 = 1.2;
 /// Part of the pixels lost for one reason above which it is reported.
-const WORTH_SAYING: f64 = 0.002;
+const LEAST_REPORTED: f64 = 0.002;
 /// Unexplained texture, mean squares, from which PSF or blur are doubted.
 const DOUBTFUL: f64 = 3e-4;
 /// The same relative to the noise, which is known to some percent.
@@ -223,7 +223,7 @@ pub fn measure_pair(
     let judging = ValiditySettings { least_confidence: settings.least_confidence, filled: settings.run.fill };
     let validity = assess(&mut map, &prepared, estimate, optics, &judging);
     let lost =
-        validity.lost.iter().filter(|lost| lost.fraction > WORTH_SAYING && lost.reason != Reason::Unsure);
+        validity.lost.iter().filter(|lost| lost.fraction > LEAST_REPORTED && lost.reason != Reason::Unsure);
     findings.extend(lost.copied().map(Finding::Lost));
     if validity.valid_fraction < TELLING {
         // With nearly no depth, the residual carries no information on the lens.

@@ -208,8 +208,8 @@ mod tests {
     #[test]
     fn causes_are_printed_once() {
         let inner = std::io::Error::other("Broken pipe");
-        let said = anyhow::Error::new(inner).context("the port went away (Broken pipe)").context("capture");
-        assert_eq!(message(&said), "capture: the port went away (Broken pipe)");
+        let error = anyhow::Error::new(inner).context("the port went away (Broken pipe)").context("capture");
+        assert_eq!(message(&error), "capture: the port went away (Broken pipe)");
         let unsaid = anyhow::anyhow!("No such file").context("cannot read x");
         assert_eq!(message(&unsaid), "cannot read x: No such file");
     }

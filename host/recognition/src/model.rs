@@ -77,7 +77,7 @@ pub struct Answer {
 }
 
 impl Answer {
-    pub(super) fn nobody(activities: &[String]) -> Self {
+    pub(super) fn without_person(activities: &[String]) -> Self {
         let probabilities = activities.iter().map(|activity| (activity.clone(), 0.0)).collect();
         Self { activity: None, confidence: 0.0, probabilities, outlier_score: f32::INFINITY }
     }
@@ -172,7 +172,7 @@ impl Recogniser {
             .map(|group| Ok(self.answer(self.pattern(group)?.view())))
             .collect::<Result<Vec<Answer>, ModelError>>()?;
         let answer = match answers.len() {
-            0 => return Ok(Answer::nobody(&self.activities)),
+            0 => return Ok(Answer::without_person(&self.activities)),
             1 => answers.swap_remove(0),
             _ => Answer::joint(&answers),
         };

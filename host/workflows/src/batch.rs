@@ -269,11 +269,11 @@ impl Work<'_> {
     fn until_the_end(&self) -> Result<()> {
         while !self.cancel.is_cancelled() && !self.stop.is_cancelled() {
             let next = self.next();
-            let told = next.and_then(|entry| match entry {
+            let done = next.and_then(|entry| match entry {
                 Some(entry) => self.do_one(entry).map(|()| true),
                 None => Ok(false),
             });
-            match told {
+            match done {
                 Ok(true) => {}
                 Ok(false) => return Ok(()),
                 Err(error) => {

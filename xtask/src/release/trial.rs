@@ -136,8 +136,8 @@ fn depth(farnear: &dyn Fn() -> Command, optics: &Path, pair: &Path) -> Result<()
 fn captures(programs: &Path, out: &Path) -> Result<()> {
     let mut capture = Command::new(programs.join("farnear"));
     capture.args(["rig", "capture", "--port", "sim", "--scene", "staircase", "--json", "--optics"]);
-    let told = output(capture.arg(ROOT.join(OPTICS)).arg("--out").arg(out))?;
-    println!("a pair by the emulated rig in {} ms of its time", crate::demo::figure(&told, "pair_ms")?);
+    let report = output(capture.arg(ROOT.join(OPTICS)).arg("--out").arg(out))?;
+    println!("a pair by the emulated rig in {} ms of its time", crate::demo::figure(&report, "pair_ms")?);
     Ok(())
 }
 

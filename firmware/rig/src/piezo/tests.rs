@@ -123,17 +123,17 @@ fn stopped_on_its_way_it_is_called_at_rest_only_where_it_no_more_swings_through(
         let mut plant = Plant::new(Part { hysteresis: 0.12, creep: 0.015, ..NOMINAL }, stop as u64);
         step(&mut piezo, &mut plant, 20_000);
         piezo.go(Nanometres(176_270));
-        let (mut told, mut moved) = ([None; 700], 0);
-        for tick in 0..told.len() {
+        let (mut reported, mut moved) = ([None; 700], 0);
+        for tick in 0..reported.len() {
             piezo.sense(plant.gauge());
             if tick == stop {
                 piezo.hold();
             }
             plant.tick(piezo.act());
-            told[tick] = (tick > stop && !piezo.is_moving()).then_some(f64::from(piezo.measured().0));
+            reported[tick] = (tick > stop && !piezo.is_moving()).then_some(f64::from(piezo.measured().0));
             moved += usize::from(tick > stop && piezo.is_moving());
-            let answered = tick.checked_sub(ANSWER_TICKS).and_then(|at| told[at]);
-            worst = answered.map_or(worst, |told| worst.max((plant.position - told).abs()));
+            let answered = tick.checked_sub(ANSWER_TICKS).and_then(|at| reported[at]);
+            worst = answered.map_or(worst, |reported| worst.max((plant.position - reported).abs()));
         }
         longest = longest.max(moved);
     }

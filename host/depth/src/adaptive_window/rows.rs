@@ -26,7 +26,7 @@ const LEAST_EVIDENCE: f32 = 0.02;
 /// Smallest standard deviation of a window, in alpha.
 const FLOOR: f32 = 0.002;
 /// Standard deviation of alpha from which a window excludes nothing.
-const SAYS_NOTHING: f32 = 0.045;
+const UNINFORMATIVE: f32 = 0.045;
 /// Standard deviation of alpha that is certain enough for [`Window::Safe`].
 const CERTAIN: f32 = 0.035;
 /// Variance that remains after a median of 1x1, 3x3, 5x5 and 7x7.
@@ -368,7 +368,7 @@ impl<'a> Tile<'a> {
                 let weighing = Weighing {
                     gamma: GAMMA * factor.sqrt(),
                     floor: (FLOOR * FLOOR + tolerance * tolerance) / factor,
-                    largest: (SAYS_NOTHING * SAYS_NOTHING + tolerance * tolerance) / factor,
+                    largest: (UNINFORMATIVE * UNINFORMATIVE + tolerance * tolerance) / factor,
                 };
                 let choice = Choice { alpha: chosen, variance: of_chosen, low, high, open };
                 simd::choose(backend, alpha, variance, noise, weighing, choice);

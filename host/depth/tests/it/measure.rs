@@ -292,12 +292,12 @@ fn nothing_is_confident_outside_the_range() {
 #[test]
 fn a_wrong_psf_is_reported() {
     let pair = plain("staircase", 9);
-    for (psf, said) in
+    for (psf, reported) in
         [(PSF, false), ("gaussian:k=0.5036", true), ("pillbox", true), ("generalised:p=1.8,k=0.4802", true)]
     {
         let found = measure(&pair, psf, Window::Adaptive).unwrap();
         println!("{psf}: {:e} {:.3} {:?}", found.left_over, found.excess, found.findings);
-        if !said {
+        if !reported {
             assert!(
                 !found.findings.iter().any(|f| f.to_string().contains("unexplained")),
                 "{psf}: {:?}",

@@ -92,7 +92,7 @@ pub fn run(arguments: Arguments) -> Result<()> {
     let settings =
         BatchSettings { manifest, jobs, shard, verify, failures, summary, dry_run, allow_failures };
     let line =
-        |told: &JobReport| report::print(told, true).map_err(|error| io::Error::other(format!("{error:#}")));
+        |job: &JobReport| report::print(job, true).map_err(|error| io::Error::other(format!("{error:#}")));
     batch::run(&settings, &terminal::long_work()?, &line)?;
     Ok(())
 }

@@ -66,14 +66,14 @@ fn a_pair_given_the_wrong_way_round_is_told() {
     render(&folder, "slant", "pair");
     let [far, near] = ["pair/far.png", "pair/near.png"].map(|name| folder.text(name));
     let swapped = ["depth", &near, &far, "--optics", rig_optics()];
-    let (_, said) = succeeds(farnear(&swapped).args(["--out", &folder.text("a")]));
+    let (_, stderr) = succeeds(farnear(&swapped).args(["--out", &folder.text("a")]));
     assert!(
-        said.contains("warning: the pair looks swapped") && said.contains("near.png was given as FAR"),
-        "{said}"
+        stderr.contains("warning: the pair looks swapped") && stderr.contains("near.png was given as FAR"),
+        "{stderr}"
     );
     let right = ["depth", &far, &near, "--optics", rig_optics()];
-    let (_, said) = succeeds(farnear(&right).args(["--out", &folder.text("b")]));
-    assert!(!said.contains("swapped"), "{said}");
+    let (_, stderr) = succeeds(farnear(&right).args(["--out", &folder.text("b")]));
+    assert!(!stderr.contains("swapped"), "{stderr}");
 }
 
 #[test]

@@ -10,7 +10,7 @@ use assert_cmd::Command as Assert;
 use farnear_files::image_file::read_grey;
 use serde_json::Value;
 
-use crate::common::{Folder, SIM, beside, fails, farnear, rig_optics, succeeds};
+use crate::common::{Folder, SIM, built, fails, farnear, rig_optics, succeeds};
 
 /// A copy of the program alone in a folder, with an empty PATH.
 fn alone(folder: &Folder) -> Assert {
@@ -37,7 +37,7 @@ fn a_missing_simulator_is_named_with_what_to_do() {
 #[cfg_attr(not(emulated_rig), ignore = "needs farnear-sim: cargo xtask test")]
 fn a_missing_or_broken_firmware_is_named_with_what_to_do() {
     let folder = Folder::new();
-    fs::copy(beside(SIM), folder.path(SIM)).expect("a copy");
+    fs::copy(built(SIM), folder.path(SIM)).expect("a copy");
     let mut command = alone(&folder);
     let elf = "farnear-nucleo-f429zi.elf";
     fails(&mut command, 1, &["no firmware at", elf, "cargo xtask firmware", "--firmware"]);
@@ -56,10 +56,10 @@ fn a_missing_or_broken_firmware_is_named_with_what_to_do() {
 fn what_the_simulator_refuses_is_passed_on() {
     let folder = Folder::new();
     let typo = folder.file("faults.toml", "bit_eror_rate = 0.1");
-    let said = ["bit_eror_rate", "farnear-sim ended at once"];
-    fails(farnear(&["rig", "info", "--port", "sim"]).args(["--faults", &typo]), 1, &said);
-    let said = ["no firmware at", "none.elf", "farnear-sim ended at once"];
-    fails(farnear(&["rig", "info", "--port", "sim"]).args(["--firmware", "none.elf"]), 1, &said);
+    let messages = ["bit_eror_rate", "farnear-sim ended at once"];
+    fails(farnear(&["rig", "info", "--port", "sim"]).args(["--faults", &typo]), 1, &messages);
+    let messages = ["no firmware at", "none.elf", "farnear-sim ended at once"];
+    fails(farnear(&["rig", "info", "--port", "sim"]).args(["--firmware", "none.elf"]), 1, &messages);
 }
 
 fn capture(folder: &Folder, faults: Option<&str>, out: &str) -> Assert {
@@ -107,7 +107,7 @@ impl Drop for Reaped {
 #[cfg_attr(not(emulated_rig), ignore = "needs farnear-sim: cargo xtask test")]
 fn a_simulator_that_is_killed_ends_the_capture_without_a_trace() {
     let folder = Folder::new();
-    let mut command = Command::new(beside(SIM));
+    let mut command = Command::new(built(SIM));
     command.args(["run", "--optics", rig_optics()]).stdin(Stdio::piped()).stdout(Stdio::piped());
     let mut simulator = Reaped(command.spawn().expect("farnear-sim starts"));
     let output = simulator.0.stdout.take().expect("its output");
@@ -119,11 +119,11 @@ fn a_simulator_that_is_killed_ends_the_capture_without_a_trace() {
     command.args(["rig", "capture", "--port", &text("port"), "--camera", &text("camera")]);
     command.args(["--optics", rig_optics(), "--out", &folder.text("out")]).stderr(Stdio::piped());
     let mut program = Reaped(command.spawn().expect("farnear starts"));
-    let mut said = BufReader::new(program.0.stderr.take().expect("its messages"));
-    wait_for(&mut said, "homing");
+    let mut messages = BufReader::new(program.0.stderr.take().expect("its messages"));
+    wait_for(&mut messages, "homing");
     simulator.0.kill().expect("it was running");
     let mut rest = String::new();
-    said.read_to_string(&mut rest).expect("text");
+    messages.read_to_string(&mut rest).expect("text");
     let status = program.0.wait().expect("it ends");
     assert_eq!(status.code(), Some(1), "{rest}");
     assert!(rest.contains("went away while") && rest.contains(&text("port")), "{rest}");
@@ -147,7 +147,7 @@ fn a_bad_line_changes_nothing_or_fails_cleanly() {
 
     let before = folder.listing();
     let output = capture(&folder, Some("bit_error_rate = 1e-4"), "noisy").output().expect("it starts");
-    let said = String::from_utf8_lossy(&output.stderr);
+    let messages = String::from_utf8_lossy(&output.stderr);
     match output.status.code() {
         Some(0) => {
             // Retries take time, in which the piezo drifts by some nanometres within its window.
@@ -159,9 +159,9 @@ fn a_bad_line_changes_nothing_or_fails_cleanly() {
             }
         }
         Some(1) => {
-            assert!(said.contains("farnear: "), "{said}");
+            assert!(messages.contains("farnear: "), "{messages}");
             assert_eq!(folder.listing(), before);
         }
-        other => panic!("{other:?}: {said}"),
+        other => panic!("{other:?}: {messages}"),
     }
 }

@@ -111,10 +111,10 @@ fn a_bad_job_does_not_stop_the_others() {
     // One after the other, so that the order of the two jobs with one folder is known.
     let output = farnear(&["batch", &manifest, "--jobs", "1"]).output().expect("the program starts");
     assert_eq!(output.status.code(), Some(1));
-    let said = lines(&output.stdout);
-    assert_eq!(said.len(), 9);
-    assert!(said[..2].iter().all(|line| line["state"] == "done"), "{said:?}");
-    for (line, (job, phrases)) in said[2..].iter().zip(wrong) {
+    let reports = lines(&output.stdout);
+    assert_eq!(reports.len(), 9);
+    assert!(reports[..2].iter().all(|line| line["state"] == "done"), "{reports:?}");
+    for (line, (job, phrases)) in reports[2..].iter().zip(wrong) {
         let error = line["error"].as_str().expect("a message");
         assert!(
             line["state"] == "failed" && phrases.iter().all(|phrase| error.contains(phrase)),
@@ -122,7 +122,7 @@ fn a_bad_job_does_not_stop_the_others() {
         );
     }
     let kept = fs::read(folder.path("pairs.failures.jsonl")).expect("failures");
-    assert_eq!(lines(&kept), said[2..], "kept apart with their messages");
+    assert_eq!(lines(&kept), reports[2..], "kept apart with their messages");
     assert_eq!(files(&folder.path("mine")).len(), 1);
     assert!(!folder.listing().iter().any(|name| name.contains("partial")), "{:?}", folder.listing());
 
@@ -306,8 +306,8 @@ fn methods_and_models_are_evaluated_as_jobs() {
         assert_eq!(output.status.code(), Some(1));
         lines(&output.stdout)
     };
-    let said = run();
-    for (line, phrase) in said[2..].iter().zip(["leave_one_subject_out", "NAME IN THE SAMPLES"]) {
+    let reports = run();
+    for (line, phrase) in reports[2..].iter().zip(["leave_one_subject_out", "NAME IN THE SAMPLES"]) {
         assert!(line["error"].as_str().expect("a message").contains(phrase), "{line}");
     }
     let samples = folder.text("people/samples.toml");

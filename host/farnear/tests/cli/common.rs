@@ -67,14 +67,14 @@ fn list(folder: &Path, before: &str, names: &mut Vec<String>) {
 #[track_caller]
 pub fn fails(command: &mut Command, code: i32, phrases: &[&str]) -> String {
     let output = command.output().expect("the program starts");
-    let said = String::from_utf8(output.stderr).expect("messages are UTF-8");
-    assert_eq!(output.status.code(), Some(code), "{said}");
+    let stderr = String::from_utf8(output.stderr).expect("messages are UTF-8");
+    assert_eq!(output.status.code(), Some(code), "{stderr}");
     for phrase in phrases {
-        assert!(said.contains(phrase), "{phrase:?} is not in: {said}");
+        assert!(stderr.contains(phrase), "{phrase:?} is not in: {stderr}");
     }
-    assert!(!said.contains("panicked") && !said.contains("backtrace"), "{said}");
+    assert!(!stderr.contains("panicked") && !stderr.contains("backtrace"), "{stderr}");
     assert_eq!(String::from_utf8_lossy(&output.stdout), "", "figures of a failure");
-    said
+    stderr
 }
 
 /// Runs a program that succeeds; returns its stdout and stderr.
@@ -112,6 +112,6 @@ pub fn render(folder: &Folder, scene: &str, name: &str) {
 pub const SIM: &str = "farnear-sim";
 
 /// A file in the folder of the built programs.
-pub fn beside(name: &str) -> PathBuf {
+pub fn built(name: &str) -> PathBuf {
     Path::new(env!("CARGO_BIN_EXE_farnear")).with_file_name(name)
 }

@@ -18,8 +18,8 @@ fn info_says_who_is_there_and_that_it_is_emulated() {
     assert_eq!((&info["emulated"], &info["protocol"], &info["boot"]), (&true.into(), &3.into(), &1.into()));
     assert_eq!(info["board"], "nucleo-f429zi");
     assert_eq!(info["coarse"]["state"], "unknown");
-    let (_, said) = succeeds(&mut on_the_rig(&["info"]));
-    assert!(said.contains("starting the emulated rig") && said.contains("no hardware"), "{said}");
+    let (_, stderr) = succeeds(&mut on_the_rig(&["info"]));
+    assert!(stderr.contains("starting the emulated rig") && stderr.contains("no hardware"), "{stderr}");
 }
 
 #[test]

@@ -191,7 +191,7 @@ fn the_checklist_passes_and_the_mechanics_are_measured() {
 #[cfg_attr(not(emulated_rig), ignore = "needs farnear-sim: cargo xtask test")]
 fn the_firmwares_log_is_decoded_with_its_elf() {
     let elf = std::env::var_os("FARNEAR_FIRMWARE")
-        .map_or_else(|| crate::common::beside("farnear-nucleo-f429zi.elf"), Into::into);
+        .map_or_else(|| crate::common::built("farnear-nucleo-f429zi.elf"), Into::into);
     let elf = elf.to_str().expect("a plain path");
     let (text, _) = succeeds(&mut on_the_rig(&["log", "--elf", elf, "--reset", "--seconds", "4"]));
     assert!(text.contains("boot 2, emulated: true"), "{text}");
@@ -210,21 +210,25 @@ fn campaigns_are_jobs_of_a_batch() {
         let output = farnear(&["batch", &manifest]).output().expect("the program starts");
         assert_eq!(output.status.code(), Some(1), "the third has no number of seeds");
         let text = String::from_utf8(output.stdout).expect("UTF-8");
-        let mut said: Vec<(u64, String)> = text
+        let mut states: Vec<(u64, String)> = text
             .lines()
             .map(|line| {
                 let line: serde_json::Value = serde_json::from_str(line).expect(line);
                 (line["job"].as_u64().expect("a number"), line["state"].as_str().expect("a state").into())
             })
             .collect();
-        said.sort();
-        said.into_iter().map(|(_, state)| state).collect::<Vec<_>>()
+        states.sort();
+        states.into_iter().map(|(_, state)| state).collect::<Vec<_>>()
     };
     assert_eq!(run(), ["done", "done", "failed"]);
     for place in ["one", "two"] {
-        let told = std::fs::read(folder.path(&format!("{place}/campaign.json"))).expect("figures");
-        let told: serde_json::Value = serde_json::from_slice(&told).expect("JSON");
-        assert_eq!((&told["scenarios"], &told["broken"]), (&1.into(), &serde_json::json!([])), "{told}");
+        let summary = std::fs::read(folder.path(&format!("{place}/campaign.json"))).expect("figures");
+        let summary: serde_json::Value = serde_json::from_slice(&summary).expect("JSON");
+        assert_eq!(
+            (&summary["scenarios"], &summary["broken"]),
+            (&1.into(), &serde_json::json!([])),
+            "{summary}"
+        );
     }
     assert_eq!(run(), ["already", "already", "failed"]);
 }

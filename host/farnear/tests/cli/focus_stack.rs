@@ -115,8 +115,8 @@ fn stage_positions_are_any_numbers_in_um() {
     let region = figures(&mut farnear(&["measure", "region", &out, "--region", "8,8,24,40", "--json"]));
     assert!((number(&region, "mean_um") + 1.0).abs() < 0.5 && region["unit"] == "um", "{region}");
     assert!(region["plane"]["tilt_deg"].is_null() && region["mean_mm"].is_null(), "{region}");
-    let (said, _) = succeeds(&mut farnear(&["measure", "profile", &out, "--from", "8,9", "--to", "70,9"]));
-    assert!(said.contains("depth_um = ") && !said.contains("_mm"), "{said}");
+    let (stdout, _) = succeeds(&mut farnear(&["measure", "profile", &out, "--from", "8,9", "--to", "70,9"]));
+    assert!(stdout.contains("depth_um = ") && !stdout.contains("_mm"), "{stdout}");
     // A reference of the same unit, and one in millimetres.
     let same = figures(&mut farnear(&["compare", &out, &format!("{out}/depth.npy"), "--json"]));
     assert_eq!((number(&same, "rmse_um"), number(&same, "missing_fraction")), (0.0, 0.0));

@@ -30,10 +30,10 @@ fn too_much_blur_is_reported_with_a_remedy() {
     let folder = Folder::new();
     let ordinary = "[lens]\nfocal_length_mm = 50.0\nf_number = 2.0\n[sensor]\npixel_um = 3.9\n[focus]\nfar_mm = 5000.0\nnear_mm = 1000.0\n";
     let file = folder.file("camera.toml", ordinary);
-    let (said, _) = succeeds(&mut farnear(&["optics", "--optics", &file]));
+    let (stdout, _) = succeeds(&mut farnear(&["optics", "--optics", &file]));
     assert!(
-        said.contains("max_blur_px = 136.") && said.contains("usable is 2 to 4 px: bin 50 x 50"),
-        "{said}"
+        stdout.contains("max_blur_px = 136.") && stdout.contains("usable is 2 to 4 px: bin 50 x 50"),
+        "{stdout}"
     );
     fails(
         &mut farnear(&["optics", "--distance-mm", "300", "--range-mm", "400"]),

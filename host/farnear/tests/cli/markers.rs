@@ -184,13 +184,14 @@ fn a_skeleton_is_drawn_and_guesses_are_reported() {
     let folder = Folder::new();
     let (file, out) = (folder.file("walk.bvh", skeleton()), folder.text("masks"));
     let arguments = ["silhouettes", "markers", &file, "--template", "bvh", "--views", "4"];
-    let (figures, said) = succeeds(farnear(&arguments).args(["--mm-per-px", "10", "--out", &out, "--json"]));
+    let (figures, stderr) =
+        succeeds(farnear(&arguments).args(["--mm-per-px", "10", "--out", &out, "--json"]));
     let figures: serde_json::Value = serde_json::from_str(&figures).expect("JSON");
     assert_eq!((number(&figures, "silhouettes"), number(&figures, "flagged_frames")), (12.0, 0.0));
     for phrase in
         ["warning: ", "walk.bvh: lengths are taken as units of 56.444 mm", "y is taken as up", "--units"]
     {
-        assert!(said.contains(phrase), "{phrase:?} is not in: {said}");
+        assert!(stderr.contains(phrase), "{phrase:?} is not in: {stderr}");
     }
     assert_eq!(figures["warnings"].as_array().map(Vec::len), Some(2), "{figures}");
     let size = |name: &str| {
@@ -211,8 +212,8 @@ fn a_skeleton_is_drawn_and_guesses_are_reported() {
     // A given scale produces no question and no message.
     let metric = folder.text("metric");
     let named = ["--units", "cm", "--up", "y", "--mm-per-px", "10", "--out", &metric, "--json"];
-    let (figures, said) = succeeds(farnear(&arguments).args(named));
-    assert!(!said.contains("taken as") && !figures.contains("warnings"), "{said} {figures}");
+    let (figures, stderr) = succeeds(farnear(&arguments).args(named));
+    assert!(!stderr.contains("taken as") && !figures.contains("warnings"), "{stderr} {figures}");
     let (small, _) = size("metric/view1/frame_000001.png");
     assert!(small < 0.3 * height, "{small} {height}: centimetres are smaller");
 }

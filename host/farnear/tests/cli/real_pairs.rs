@@ -55,13 +55,13 @@ fn a_missing_psf_and_other_units_are_reported() {
     let [far, near] = ["one/far.png", "one/near.png"].map(|name| folder.text(name));
     let text = fs::read_to_string(rig_optics()).expect("the optics");
     let bare = folder.file("bare.toml", text.split("[psf]").next().expect("a beginning"));
-    let (_, said) =
+    let (_, stderr) =
         succeeds(&mut farnear(&["depth", &far, &near, "--optics", &bare, "--out", &folder.text("a")]));
-    assert!(said.contains("no [psf]") && said.contains("pill-box"), "{said}");
+    assert!(stderr.contains("no [psf]") && stderr.contains("pill-box"), "{stderr}");
     let metres = folder.file("metres.toml", text.replace("pixel_um = 7.4", "pixel_um = 0.0074"));
-    let (_, said) =
+    let (_, stderr) =
         succeeds(&mut farnear(&["depth", &far, &near, "--optics", &metres, "--out", &folder.text("b")]));
-    assert!(said.contains("pixel_um is 0.0074") && said.contains("another unit"), "{said}");
+    assert!(stderr.contains("pixel_um is 0.0074") && stderr.contains("another unit"), "{stderr}");
 }
 
 #[test]
@@ -154,8 +154,8 @@ fn an_aperture_is_given_as_a_picture() {
     let bar = Array2::from_shape_fn((64, 64), |(y, _)| f32::from(y.abs_diff(32) < 5));
     let bar = write(&folder, "bar.png", &bar);
     let command = ["depth", &far, &near, "--optics", rig_optics(), "--psf", &bar, "--out", &folder.text("d")];
-    let (_, said) = succeeds(&mut farnear(&command));
-    assert!(said.contains("are not round"), "{said}");
+    let (_, stderr) = succeeds(&mut farnear(&command));
+    assert!(stderr.contains("are not round"), "{stderr}");
     let command =
         ["depth", &far, &near, "--optics", rig_optics(), "--psf", "airy", "--out", &folder.text("e")];
     fails(&mut farnear(&command), 2, &["unknown PSF \"airy\"", "FILE.png"]);
@@ -196,7 +196,7 @@ fn a_region_is_what_the_whole_map_has_there() {
         let command =
             ["depth", &far, &near, "--optics", rig_optics(), "--region", region, "--out", &folder.text("x")];
         let output = farnear(&command).output().expect("a program");
-        let said = String::from_utf8_lossy(&output.stderr).into_owned();
-        assert!(!output.status.success() && said.contains(phrase), "{said}");
+        let stderr = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(!output.status.success() && stderr.contains(phrase), "{stderr}");
     }
 }

@@ -86,9 +86,9 @@ fn a_direction_measured_in_the_picture_does_what_the_sun_does() {
     let remove = ["shadow", "remove", &masks, "--camera", &camera, "--json", "--out"];
     let place = ["--lat", "10", "--lon", "0", "--time", &time];
     let sun = figures(farnear(&remove).arg(&by_sun).args(place));
-    let told = std::fs::read_to_string(folder.path("sun/shadow.toml")).expect("an index");
-    let told: toml::Table = told.parse().expect("TOML");
-    let direction = told["frame"][0]["shadow_direction_deg"].to_string();
+    let index = std::fs::read_to_string(folder.path("sun/shadow.toml")).expect("an index");
+    let index: toml::Table = index.parse().expect("TOML");
+    let direction = index["frame"][0]["shadow_direction_deg"].to_string();
     let hand = figures(farnear(&remove).arg(&by_hand).args(["--shadow-direction", &direction]));
     let [sun_percent, hand_percent] = [&sun, &hand].map(|found| number(found, "removed_percent"));
     // A known sun gives a fit of the whole shadow, a direction alone a cut by angles: here 16.3 and 14.7 %.
@@ -117,11 +117,11 @@ fn a_lamp_throws_shadows_where_it_hangs_high_enough() {
     let found = figures(farnear(&remove).args(["--lamp", "-3,6,3"]));
     // The shadow is 1,250 of 12,050 pixels; most of them are removed.
     assert!(number(&found, "removed_percent") > 5.0, "{found}");
-    let told = std::fs::read_to_string(folder.path("out/shadow.toml")).expect("an index");
-    let told: toml::Table = told.parse().expect("TOML");
-    assert_eq!(told["frame"][0]["distance_m"].as_float(), Some(6.0));
+    let index = std::fs::read_to_string(folder.path("out/shadow.toml")).expect("an index");
+    let index: toml::Table = index.parse().expect("TOML");
+    assert_eq!(index["frame"][0]["distance_m"].as_float(), Some(6.0));
     // The lamp is as far away as the person: the shadow lies across the picture.
-    assert_eq!(told["frame"][0]["shadow_direction_deg"].as_float().map(f64::abs), Some(0.0));
+    assert_eq!(index["frame"][0]["shadow_direction_deg"].as_float().map(f64::abs), Some(0.0));
 }
 
 const CAMERA: &str = "[camera]\nheight_m = 1.5\nazimuth_deg = 0\nfocal_length_mm = 4.0\npixel_um = 6.0\n";

@@ -214,9 +214,9 @@ fn a_closed_stdout_is_a_failure() {
             .spawn()
             .expect("the program starts");
         let output = child.wait_with_output().expect("it ends");
-        let said = String::from_utf8_lossy(&output.stderr);
-        assert_eq!(output.status.code(), Some(1), "{said}");
-        assert!(said.contains("cannot write to the standard output"), "{said}");
+        let stderr = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(1), "{stderr}");
+        assert!(stderr.contains("cannot write to the standard output"), "{stderr}");
     }
 }
 

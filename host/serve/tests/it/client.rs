@@ -231,14 +231,14 @@ impl Socket {
         }
         assert!(headers.starts_with(b"HTTP/1.1 101"), "{}", String::from_utf8_lossy(&headers));
         let mut socket = Self { stream, client: 0, secret: String::new() };
-        let hello = socket.told("hello");
+        let hello = socket.receive("hello");
         socket.client = hello["hello"]["client"].as_u64().unwrap();
         socket.secret = hello["hello"]["secret"].as_str().unwrap().into();
         socket
     }
 
     /// The next text message of this type.
-    pub fn told(&mut self, kind: &str) -> Value {
+    pub fn receive(&mut self, kind: &str) -> Value {
         loop {
             let (opcode, payload) = self.frame().unwrap();
             if opcode == 1 {

@@ -66,11 +66,11 @@ fn ten_thousand_malformed_messages_change_nothing() {
         assert!(answer.is_empty() || answer.starts_with(b"HTTP/1."), "{bytes:?}: {answer:?}");
         assert!(!answer.starts_with(b"HTTP/1.1 500"), "{}", String::from_utf8_lossy(&answer));
     }
-    let said = r#"{"type":"stop"}"#;
+    let stop = r#"{"type":"stop"}"#;
     for _ in 0..SOCKET / 60 {
         let mut socket = Socket::open(&served);
         for _ in 0..60 {
-            let payload = if dice.below(2) == 0 { dice.bytes(100) } else { dice.spoiled(said) };
+            let payload = if dice.below(2) == 0 { dice.bytes(100) } else { dice.spoiled(stop) };
             socket.say([1, 2, 9, 10][dice.below(4)], &payload);
         }
     }

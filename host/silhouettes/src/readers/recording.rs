@@ -335,10 +335,10 @@ mod tests {
             "what the format fixes is not a guess"
         );
         assert_eq!(by_itself.frames[2], vec![None], "what overflows is hidden");
-        let told =
+        let given =
             found([1.0, 2.0, 3.0]).settled(Choices { unit: Some(Unit::MM), up: Some(Up::X), person: None });
-        assert_eq!(told.frames[0], vec![Some([2.0, 3.0, 1.0])]);
-        assert_eq!((told.unit.source.clone(), told.remarks().len()), (Source::Caller, 0));
+        assert_eq!(given.frames[0], vec![Some([2.0, 3.0, 1.0])]);
+        assert_eq!((given.unit.source.clone(), given.remarks().len()), (Source::Caller, 0));
     }
 
     #[test]

@@ -65,15 +65,15 @@ impl<'a> Tally<'a> {
             }
         }
         (self.on_job)(report).map_err(|source| WorkflowError::Sink { source })?;
-        let told = inner.figures.jobs;
+        let finished = inner.figures.jobs;
         if report.state == State::Done {
             let now = Instant::now();
             let own = std::time::Duration::from_secs_f64(report.seconds.max(0.0));
             let since = *inner.working_since.get_or_insert_with(|| now.checked_sub(own).unwrap_or(now));
             let each = now.duration_since(since).div_f64(inner.figures.done as f64);
-            self.context.progress.time_left(each.mul_f64(self.total.saturating_sub(told) as f64));
+            self.context.progress.time_left(each.mul_f64(self.total.saturating_sub(finished) as f64));
         }
-        self.context.progress.advance("jobs", told, Some(self.total));
+        self.context.progress.advance("jobs", finished, Some(self.total));
         Ok(())
     }
 

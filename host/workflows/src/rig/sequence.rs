@@ -167,7 +167,7 @@ pub fn run(settings: &SequenceRequest, context: &Context<'_>) -> Result<Sequence
         None => (USUAL_PSF, toml::Table::new()),
     };
     let record = record_of_sequence(&taken, &rig.rig.client, rig.circumstances(psf, table))
-        .ok_or(CaptureError::Count { told: 0, asked: shots.len() })?;
+        .ok_or(CaptureError::Count { reported: 0, asked: shots.len() })?;
     finish_sequence(folder, &taken, &record)?;
     context.info(&format!("wrote {}", settings.out.display()));
     Ok(figures(&shots, &taken))

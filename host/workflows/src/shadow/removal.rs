@@ -410,7 +410,7 @@ impl Work<'_> {
                     flags.push(Flag::Empty.to_string());
                 }
                 if let Some(stages) = &mut self.stages {
-                    stages.nobody(&file, mask)?;
+                    stages.without_person(&file, mask)?;
                 }
                 return Ok((mask.clone(), Entry { file, flags, cut: None }));
             }

@@ -63,7 +63,7 @@ impl Stages {
     }
 
     /// A mask without a person.
-    pub fn nobody(&mut self, file: &str, mask: &Mask) -> Result<()> {
+    pub fn without_person(&mut self, file: &str, mask: &Mask) -> Result<()> {
         let frame = Frame::of([0, 0, mask.nrows(), mask.ncols()]);
         let panel = frame.panel(|y, x| if mask[[y, x]] { SEEN } else { DARK });
         self.write(file, &[(vec!["mask: no person".into()], panel)])
@@ -91,14 +91,14 @@ impl Stages {
         ));
         if let Some(found) = explained {
             let caption = format!("{:.1} % unexplained", 100.0 * found.unexplained);
-            let told = |y, x| match (stage.mask[[y, x]], found.body[[y, x]], found.thrown[[y, x]]) {
+            let colour = |y, x| match (stage.mask[[y, x]], found.body[[y, x]], found.thrown[[y, x]]) {
                 (_, true, _) => KEPT,
                 (true, _, true) => THROWN,
                 (true, ..) => GONE,
                 (.., true) => UNSEEN,
                 _ => DARK,
             };
-            panels.push((vec!["body and its shadow".into(), caption], frame.panel(told)));
+            panels.push((vec!["body and its shadow".into(), caption], frame.panel(colour)));
         }
         let cut = |y, x| match (stage.mask[[y, x]], stage.clean[[y, x]]) {
             (_, true) => KEPT,

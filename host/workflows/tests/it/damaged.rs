@@ -79,13 +79,13 @@ fn done(list: &Path) -> usize {
         dry_run: false,
         allow_failures: false,
     };
-    let told = std::sync::atomic::AtomicUsize::new(0);
+    let warnings = std::sync::atomic::AtomicUsize::new(0);
     let on_job = |_: &JobReport| {
-        told.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
+        warnings.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
         Ok(())
     };
     let _ = batch::run(&settings, &Context::unattended(), &on_job);
-    told.into_inner()
+    warnings.into_inner()
 }
 
 fn config(usual: u32) -> ProptestConfig {
@@ -127,12 +127,12 @@ proptest! {
     ) {
         for (name, text) in [("jobs.toml", JOBS), ("jobs.csv", JOBS_CSV)] {
             let text = damaged(text, &words, lost);
-            let told = FOLDER.with_borrow(|root| {
+            let warnings = FOLDER.with_borrow(|root| {
                 let list = root.path().join(name);
                 fs::write(&list, &text).expect("a file");
                 done(&list)
             });
-            prop_assert!(told <= text.lines().count(), "{told} of\n{text}");
+            prop_assert!(warnings <= text.lines().count(), "{warnings} of\n{text}");
         }
     }
 }

@@ -148,9 +148,9 @@ fn training_and_evaluation_are_counted_and_stop_in_the_middle() {
     let watched = Listener::default();
     evaluation::evaluate(&searched, &watched.context()).expect("evaluated");
     let heard = watched.heard();
-    let told = heard.iter().position(|what| what.starts_with("left ")).expect("time left");
-    assert_eq!(heard[told + 1], "0/Some(3) folds", "{heard:?}");
-    assert!(heard[told] != "left 0.000", "{heard:?}");
+    let first = heard.iter().position(|what| what.starts_with("left ")).expect("time left");
+    assert_eq!(heard[first + 1], "0/Some(3) folds", "{heard:?}");
+    assert!(heard[first] != "left 0.000", "{heard:?}");
     let last = heard.iter().rposition(|what| what.starts_with("left ")).expect("time left");
     assert_eq!(heard[last..last + 2], ["left 0.000", "3/Some(3) folds"], "{heard:?}");
 }

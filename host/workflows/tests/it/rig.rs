@@ -20,7 +20,7 @@ use farnear_workflows::{
 /// A face that keeps what it is told, and answers nothing but Enter.
 #[derive(Default)]
 struct Face {
-    said: Mutex<Vec<String>>,
+    messages: Mutex<Vec<String>>,
 }
 
 impl Face {
@@ -29,13 +29,13 @@ impl Face {
     }
 
     fn heard(&self, phrase: &str) -> bool {
-        self.said.lock().unwrap().iter().any(|said| said.contains(phrase))
+        self.messages.lock().unwrap().iter().any(|messages| messages.contains(phrase))
     }
 }
 
 impl Progress for Face {
     fn info(&self, what: &str) {
-        self.said.lock().unwrap().push(what.into());
+        self.messages.lock().unwrap().push(what.into());
     }
 }
 

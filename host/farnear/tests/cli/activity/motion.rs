@@ -55,8 +55,8 @@ fn motion_files_teach_and_become_samples() {
     let out = folder.text("eve");
     let draw =
         ["silhouettes", "markers", &eve, "--views", "4", "--mm-per-px", "15", "--samples", "raise arms"];
-    let (_, said) = succeeds(farnear(&draw).args(["--out", &out]));
-    assert!(said.contains("`kinect` fits best"), "{said}");
+    let (_, stderr) = succeeds(farnear(&draw).args(["--out", &out]));
+    assert!(stderr.contains("`kinect` fits best"), "{stderr}");
     let samples = folder.text("eve/samples.toml");
     let judged = figures(&mut farnear(&["activity", "evaluate", &samples, "--model", &model, "--json"]));
     assert_eq!((number(&judged, "answers"), number(&judged, "accuracy")), (4.0, 1.0), "{judged}");
