@@ -10,6 +10,7 @@ pub mod judging;
 pub mod method;
 pub mod motion;
 pub mod multi_person;
+pub mod recognise;
 pub mod recognition;
 pub mod samples;
 pub mod sets;

@@ -190,6 +190,7 @@ pub const TASKS: &[Task] = &[
     Task::of::<crate::silhouettes::markers::MarkersRequest>(),
     Task::of::<crate::silhouettes::skeletons::SkeletonsRequest>(),
     Task::of::<crate::silhouettes::synthetic::SyntheticRequest>(),
+    Task::of::<crate::activity::recognise::RecogniseRequest>(),
     Task::of::<crate::shadow::removal::ShadowRemoveRequest>(),
     Task::of::<crate::shadow::score::ShadowScoreRequest>(),
     Task::of::<crate::rig::pair::CaptureRequest>(),

@@ -19,6 +19,7 @@ use super::{
         AnswerSummary, PersonFigures, PersonFlag, PersonInFrame, of_segments, outlier_score, parts,
         restricted, rounded_probability,
     },
+    recognise::RecogniseRequest,
     recognition::Model,
     views::{Frames, View},
 };
@@ -28,18 +29,6 @@ use crate::{
     figures::rounded,
     parameters::at_least,
 };
-
-#[derive(Clone, PartialEq, Eq, Debug)]
-pub struct MultiPersonSettings {
-    /// Masks of full frames, or a video.
-    pub view: View,
-    /// The only activities that can be; empty for all that the model knows.
-    pub among: Vec<String>,
-    /// Frames of the streaming answer; without it as many as a training clip had.
-    pub window: Option<usize>,
-    /// A new folder for the frames with everybody's streaming answer drawn on them.
-    pub annotated_video: Option<PathBuf>,
-}
 
 /// Everybody in a frame.
 #[derive(Clone, PartialEq, Debug, Serialize)]
@@ -113,10 +102,10 @@ impl<'m> MultiPersonTracker<'m> {
     ///
     /// # Errors
     /// [`MultiPersonError`], a view that cannot be opened.
-    pub fn begin(model: &'m Model, settings: &MultiPersonSettings) -> Result<Self> {
-        model.check_known(&settings.among)?;
-        if settings.view.is_cut_out()? {
-            return Err(MultiPersonError::CutOut { path: settings.view.path.clone() }.into());
+    pub(super) fn begin(model: &'m Model, view: &View, request: &RecogniseRequest) -> Result<Self> {
+        model.check_known(&request.among)?;
+        if view.is_cut_out()? {
+            return Err(MultiPersonError::CutOut { path: view.path.clone() }.into());
         }
         let recogniser = model.recogniser(true);
         if recogniser.views != 1 {
@@ -124,25 +113,22 @@ impl<'m> MultiPersonTracker<'m> {
                 MultiPersonError::Views { model: model.path().into(), views: recogniser.views }.into()
             );
         }
-        if let Some(window) = settings.window {
+        if let Some(window) = request.window {
             at_least("window", window, 1, "frames")?;
         }
-        let frames = Frames::open(&settings.view)?;
+        let frames = Frames::open(view)?;
         Ok(Self {
             remarks: model
                 .expectation()
                 .into_iter()
-                .chain(super::views::remarks(
-                    std::slice::from_ref(&settings.view),
-                    std::slice::from_ref(&frames),
-                ))
+                .chain(super::views::remarks(std::slice::from_ref(view), std::slice::from_ref(&frames)))
                 .collect(),
             frames,
             tracker: None,
-            window: settings.window.unwrap_or(recogniser.typical_frames).max(1),
-            among: settings.among.clone(),
+            window: request.window.unwrap_or(recogniser.typical_frames).max(1),
+            among: request.among.clone(),
             people: Vec::new(),
-            annotated_video: settings.annotated_video.as_deref().map(AnnotatedVideo::begin).transpose()?,
+            annotated_video: request.video_out.as_deref().map(AnnotatedVideo::begin).transpose()?,
             count: 0,
             empty_frames: 0,
             flagged_frames: 0,

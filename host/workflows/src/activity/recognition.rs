@@ -20,6 +20,7 @@ use super::{
         AnswerSummary, Part, PersonFigures, PersonInFrame, only_in_frame, only_person, outlier_score,
         restricted, rounded_probability, stretches,
     },
+    recognise::RecogniseRequest,
     samples::{SCALING, are_full_frames},
     shipped::Shipped,
     views::{Frames, Seen, View},
@@ -126,18 +127,6 @@ impl Model {
     }
 }
 
-#[derive(Clone, PartialEq, Eq, Debug)]
-pub struct RecognitionSettings {
-    /// As many views as the model fuses, in its order; any number for a model of one view.
-    pub views: Vec<View>,
-    /// The only activities that can be; empty for all that the model knows.
-    pub among: Vec<String>,
-    /// Frames of the streaming answer and of windows over a long recording; without it as many as a training clip had.
-    pub window: Option<usize>,
-    /// A new folder for the first view's frames with the streaming answer drawn on them.
-    pub annotated_video: Option<PathBuf>,
-}
-
 /// More or other views than the model's.
 #[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
 #[error("{}: the model fuses {expected} views, {found} were given", model.display())]
@@ -213,30 +202,30 @@ impl<'m> Recognition<'m> {
     ///
     /// # Errors
     /// [`ViewsError`], views that cannot be opened.
-    pub fn begin(model: &'m Model, settings: &RecognitionSettings) -> Result<Self> {
+    pub(super) fn begin(model: &'m Model, views: &[View], request: &RecogniseRequest) -> Result<Self> {
         let path = &model.path;
         let expectation = model.expectation();
-        model.check_known(&settings.among)?;
-        let first = settings.views.first().map(View::is_cut_out).transpose()?;
+        model.check_known(&request.among)?;
+        let first = views.first().map(View::is_cut_out).transpose()?;
         let model = model.recogniser(first != Some(true));
-        let (expected, found) = (model.views, settings.views.len());
+        let (expected, found) = (model.views, views.len());
         if found != expected && (expected > 1 || found == 0) {
             return Err(ViewsError { model: path.clone(), expected, found }.into());
         }
-        if let Some(window) = settings.window {
+        if let Some(window) = request.window {
             at_least("window", window, 1, "frames")?;
         }
-        let views = settings.views.iter().map(Frames::open).collect::<Result<Vec<Frames>>>()?;
-        let window = settings.window.unwrap_or(model.typical_frames).max(1);
-        let remarks = expectation.into_iter().chain(super::views::remarks(&settings.views, &views)).collect();
+        let frames = views.iter().map(Frames::open).collect::<Result<Vec<Frames>>>()?;
+        let window = request.window.unwrap_or(model.typical_frames).max(1);
+        let remarks = expectation.into_iter().chain(super::views::remarks(views, &frames)).collect();
         Ok(Self {
             live: Live::new(model, window, true),
-            among: settings.among.clone(),
-            annotated_video: settings.annotated_video.as_deref().map(AnnotatedVideo::begin).transpose()?,
+            among: request.among.clone(),
+            annotated_video: request.video_out.as_deref().map(AnnotatedVideo::begin).transpose()?,
             tracks: vec![Vec::new(); views.len()],
             remarks,
             model,
-            views,
+            views: frames,
             window,
             frames: 0,
             flagged_frames: 0,

@@ -1,6 +1,10 @@
 //! Where the masks of a view come from: a folder of them, or a video.
 
-use std::path::{Path, PathBuf};
+use std::{
+    fmt,
+    path::{Path, PathBuf},
+    str::FromStr,
+};
 
 use farnear_files::{
     masks::{
@@ -25,6 +29,27 @@ pub enum ViewKind {
     Masks,
     /// A video, from which masks are made first.
     Video,
+}
+
+impl fmt::Display for ViewKind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Masks => "masks",
+            Self::Video => "video",
+        })
+    }
+}
+
+impl FromStr for ViewKind {
+    type Err = String;
+
+    fn from_str(text: &str) -> std::result::Result<Self, String> {
+        match text {
+            "masks" => Ok(Self::Masks),
+            "video" => Ok(Self::Video),
+            other => Err(format!("`{other}` is not a kind of view: expected masks or video")),
+        }
+    }
 }
 
 impl ViewKind {

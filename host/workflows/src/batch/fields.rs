@@ -99,14 +99,6 @@ impl Fields {
         parts.map(str::trim).filter(|part| !part.is_empty()).map(Into::into).collect()
     }
 
-    /// A list of paths, in CSV separated by `;`.
-    pub fn paths(&mut self, name: &'static str) -> Result<Vec<PathBuf>, BatchError> {
-        if !self.values.contains_key(name) {
-            return Err(BatchError::MissingField { name });
-        }
-        Ok(self.texts(name).into_iter().map(|part| self.base.join(part)).collect())
-    }
-
     /// A path that must be there, relative to the manifest.
     pub fn path(&mut self, name: &'static str) -> Result<PathBuf, BatchError> {
         let text = self.text(name)?;
@@ -199,10 +191,7 @@ mod tests {
         assert!(fields.flag("fill").expect("well"));
         assert!(!fields.flag("centred").expect("well"));
         assert_eq!(fields.or("median", 3_usize).expect("well"), 3);
-        assert_eq!(
-            fields.paths("views").expect("well"),
-            ["/base/x", "/base/y", "/base/z"].map(PathBuf::from)
-        );
+        assert_eq!(fields.texts("views"), ["x", "y", "z"]);
         assert_eq!(fields.text("time").expect("well"), "2014-06-23T11:30:00Z");
         assert!(matches!(fields.text("near"), Err(BatchError::MissingField { name: "near" })));
         let error = fields.all_taken().expect_err("smooth").to_string();

@@ -2,7 +2,6 @@
 
 mod campaign;
 mod evaluate;
-mod people;
 
 use std::path::{Path, PathBuf};
 
@@ -10,6 +9,7 @@ use serde_json::Value;
 
 use super::{BatchError, fields::Fields};
 use crate::{
+    activity::recognise::RecogniseRequest,
     context::Context,
     correct::CorrectRequest,
     depth::DepthRequest,
@@ -36,7 +36,7 @@ const KINDS: &[Kind] = &[
     Kind::of::<PassagesRequest>(),
     Kind::of::<MarkersRequest>(),
     Kind::of::<ShadowRemoveRequest>(),
-    Kind { name: "recognise", makes_file: false, work: people::recognise },
+    Kind::of::<RecogniseRequest>(),
     Kind { name: "evaluate", makes_file: false, work: evaluate::work },
     Kind { name: "campaign", makes_file: false, work: campaign::work },
 ];

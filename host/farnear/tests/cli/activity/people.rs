@@ -124,7 +124,7 @@ fn people_who_cross_are_said_to_and_what_cannot_be_followed_is_refused() {
         assert_eq!(person["silhouettes"].as_u64().map(|seen| seen + crossing), Some(50), "{person}");
     }
     let two = ["activity", "recognise", &path, &path, "--as", "masks", "--model", "everyday", "--people"];
-    fails(&mut farnear(&two), 1, &["one view, 2 were given"]);
+    fails(&mut farnear(&two), 2, &["number of views 2", "one view"]);
     let small = written(&folder, "small", &[GrayImage::from_pixel(100, 100, Luma([255]))]);
     let cut_out = ["activity", "recognise", &small, "--as", "masks", "--model", "everyday", "--people"];
     fails(&mut farnear(&cut_out), 1, &["cut out at 100x100", "full frames"]);
