@@ -1,4 +1,4 @@
-//! Parameters that must lie within limits.
+//! Checks parameters against limits.
 
 use std::{fmt::Display, ops::RangeInclusive};
 

@@ -1,4 +1,4 @@
-//! What can be measured in a map, as requests.
+//! Measurement requests.
 
 use std::path::PathBuf;
 
@@ -142,7 +142,7 @@ impl Request for MeasureDifferenceRequest {
     }
 }
 
-/// Column and row of a pixel.
+/// Column and row.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct Pixel(pub [usize; 2]);
 

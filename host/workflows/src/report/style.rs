@@ -1,4 +1,4 @@
-//! How a report looks, on a screen and on paper.
+//! Style sheet for screen and print.
 
 pub const STYLE: &str = "\
 :root{color-scheme:light}\

@@ -1,5 +1,3 @@
-//! Recognition of activities.
-
 use std::path::{Path, PathBuf};
 
 use farnear_files::staging::Staging;
@@ -38,12 +36,12 @@ pub(super) fn recognise(fields: &mut Fields) -> Result<Box<dyn Job>> {
     };
     fields.path("out")?;
     let mut inputs = settings.views.clone();
-    // One that comes with the program is the program's version.
+    // A shipped model is covered by the program's version.
     inputs.extend(Model::file(&settings.model).map(Path::to_path_buf));
     Ok(Box::new(Call { inputs, settings, run: recognised }))
 }
 
-/// Writes `answers.jsonl`, an answer a frame, and `recognition.json`, that for the whole.
+/// Writes `answers.jsonl` with an answer per frame, and `recognition.json` with the overall answer.
 fn recognised(settings: &Recognising, out: &Path, context: &Context<'_>) -> Result<Value> {
     let model = context.cache.model(&settings.model)?;
     let view = |path: &PathBuf| -> Result<View> {
@@ -65,7 +63,7 @@ fn recognised(settings: &Recognising, out: &Path, context: &Context<'_>) -> Resu
     }
     let figures = value(work.finish()?)?;
     let mut kept = figures.clone();
-    // Another number each time; the same recording is to give the same file.
+    // Differs from run to run; equal recordings must give equal files.
     kept.as_object_mut().map(|kept| kept.remove("seconds_per_frame"));
     let staged = Staging::new_folder(out)?;
     staged.write("answers.jsonl", answers.as_bytes())?;
