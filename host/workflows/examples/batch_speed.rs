@@ -1,8 +1,5 @@
-//! Compares a batch with a plain loop over the same workflow: processor time per pair and peak memory. `cargo
-//! run --release --example batch_speed -- [PAIRS] [FOLDER]`; figures in docs/batch.md.
-//!
-//! The loop uses the library on one thread with shared operators and the same files. It writes no hashes,
-//! `batch.toml` or job lines.
+//! Compares a batch with a plain loop (one thread, shared operators, no records): processor time per pair and
+//! peak memory. `cargo run --release --example batch_speed -- [PAIRS] [FOLDER]`; figures in docs/batch.md.
 
 use std::{
     error::Error,

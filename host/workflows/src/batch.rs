@@ -1,8 +1,7 @@
 //! Runs the jobs of a manifest on all cores, each once, also after interruptions.
 //!
-//! A job is done if its result is complete and the `batch.toml` next to it lists the same settings, input
-//! hashes and program version. Results are written to a temporary place and renamed. Memory does not grow
-//! with the manifest.
+//! A job is done if its result is complete and `batch.toml` lists the same settings, input hashes and program
+//! version. Results are moved into place when complete. Memory does not grow with the manifest.
 
 mod error;
 mod fields;
@@ -45,7 +44,6 @@ use crate::{
     figures::rounded,
 };
 
-/// Most warnings reported per job.
 const WARNINGS_MAX: usize = 20;
 
 #[derive(Clone, PartialEq, Eq, Debug)]
@@ -53,7 +51,6 @@ pub struct BatchSettings {
     pub manifest: PathBuf,
     /// Parallel jobs, one core each; 0 = number of cores.
     pub jobs: usize,
-    /// The jobs of this run.
     pub shard: Shard,
     /// Verify finished results by hash, not only by file length.
     pub verify: bool,
@@ -61,7 +58,6 @@ pub struct BatchSettings {
     pub failures: Option<PathBuf>,
     /// CSV table of the shard's jobs with their figures.
     pub summary: Option<PathBuf>,
-    /// Report what would be done without doing it.
     pub dry_run: bool,
     /// Return success even if jobs failed.
     pub allow_failures: bool,
@@ -123,7 +119,6 @@ pub enum State {
 pub struct JobReport {
     /// From 1.
     pub job: usize,
-    /// Line of the manifest where it begins.
     pub line: usize,
     #[serde(rename = "do")]
     pub kind: String,
@@ -145,7 +140,6 @@ pub struct BatchFigures {
     pub jobs: usize,
     pub done: usize,
     pub already: usize,
-    /// Pending, in a dry run.
     #[serde(skip_serializing_if = "is_zero")]
     pub todo: usize,
     pub failed: usize,
@@ -209,7 +203,6 @@ pub fn run(
     Ok(figures)
 }
 
-/// Default file of failures.
 fn failures_file(settings: &BatchSettings) -> PathBuf {
     let mut name = settings.manifest.file_stem().unwrap_or_default().to_os_string();
     let Shard { index, of } = settings.shard;
@@ -314,7 +307,6 @@ impl Work<'_> {
         self.tally.tell(&JobReport { job: number, line, kind, out, state, seconds, figures, warnings, error })
     }
 
-    /// Removes the previous result of a failed job.
     fn discard(&self, kind: &str, out: Option<&str>) {
         let (Ok(kind), Some(out)) = (jobs::kind(kind), out) else { return };
         // If removal fails, the job's own error most likely has the same cause.

@@ -96,16 +96,13 @@ fn genicam() -> Vec<Found> {
     Vec::new()
 }
 
-/// A camera with its initial settings.
 #[derive(Clone, PartialEq, Debug)]
 pub struct CameraChoice {
     pub address: CameraAddress,
-    /// Controls to set, in this order.
     pub settings: Vec<Setting>,
 }
 
 impl CameraChoice {
-    /// Opens the camera and applies the settings.
     pub fn open(&self) -> Result<Box<dyn Camera>> {
         let Some(mut camera) = self.address.open()? else {
             let expected =
@@ -134,7 +131,6 @@ pub struct ShowFigures {
     pub controls: Vec<ControlFigures>,
 }
 
-/// Lists a camera's controls after applying the settings.
 pub fn show(choice: &CameraChoice) -> Result<ShowFigures> {
     let mut camera = choice.open()?;
     Ok(ShowFigures { kind: camera.kind(), controls: controls_of(camera.as_mut())? })

@@ -1,5 +1,3 @@
-//! Wall-clock time, for records of real captures.
-
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use chrono::{DateTime, SecondsFormat};

@@ -1,7 +1,5 @@
-//! Progress, prompts and cancellation for workflows.
-//!
-//! A workflow does not use the terminal, the keyboard or signals. Its caller (command line, page, batch,
-//! Python) passes a [`Context`].
+//! Progress, prompts and cancellation for workflows. A workflow does not use the terminal, the keyboard or
+//! signals. Its caller passes a [`Context`].
 
 use std::{
     sync::{
@@ -58,13 +56,11 @@ impl Cancel {
         }
     }
 
-    /// The flag, for the rig's client.
     pub fn flag(&self) -> Arc<AtomicBool> {
         Arc::clone(&self.0)
     }
 }
 
-/// A workflow's environment.
 #[derive(Clone)]
 pub struct Context<'a> {
     pub progress: &'a dyn Progress,

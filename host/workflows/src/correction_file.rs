@@ -9,7 +9,6 @@ use crate::{
     text_file,
 };
 
-/// Contents of the file, for [`WorkflowError::File`].
 pub const KIND: &str = "a saved correction";
 
 pub fn read(path: &Path) -> Result<Correction> {

@@ -387,7 +387,6 @@ struct Inputs {
     method: Prepared,
     correction: Option<Arc<Correction>>,
     camera: Option<Arc<CameraFrames>>,
-    /// Part of the images, if not all.
     cut: Option<Cut>,
     doubts: Vec<OpticsDoubt>,
 }
@@ -395,11 +394,9 @@ struct Inputs {
 struct Computed {
     map: DepthMap,
     deviation: Option<(Array2<f32>, Uncertainty)>,
-    /// Why each pixel has no depth.
     reasons: Array2<u8>,
     /// Number of pixels without depth, by reason.
     lost: Vec<Lost>,
-    /// The measured far image if an output shows it, else empty.
     image: Array2<f32>,
     report: Report,
     window: Window,

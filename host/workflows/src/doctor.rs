@@ -1,5 +1,4 @@
-//! Checks this computer (processor, folders, emulated rig, ports, cameras, firmware) and suggests remedies.
-//! Opens no port unless one is named; moves nothing.
+//! Checks this computer and suggests remedies. Opens no port unless one is named; moves nothing.
 
 mod folders;
 mod ports;
@@ -34,7 +33,6 @@ pub struct Finding {
     pub what: String,
     pub health: Health,
     pub found: String,
-    /// Empty if none is needed.
     #[serde(skip_serializing_if = "String::is_empty")]
     pub remedy: String,
 }
@@ -60,14 +58,12 @@ pub struct DoctorFigures {
 }
 
 impl DoctorFigures {
-    /// Number of missing requirements.
     pub fn missing(&self) -> usize {
         self.findings.iter().filter(|finding| finding.health == Health::Missing).count()
     }
 }
 
-/// Runs all checks. Takes some milliseconds, with a port as long as the board's answer. Problems are
-/// findings, not errors.
+/// Takes some milliseconds, with a port as long as the board's answer. Problems are findings, not errors.
 pub fn examine(settings: &DoctorSettings, context: &Context<'_>) -> Result<DoctorFigures> {
     let mut findings = vec![processor()];
     findings.extend(folders::findings(&settings.folders));

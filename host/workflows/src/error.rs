@@ -79,11 +79,7 @@ pub enum WorkflowError {
     #[error("{} and {}: {reason}", far.display(), near.display())]
     Pair { far: PathBuf, near: PathBuf, reason: String },
     #[error("{about}: {source}")]
-    About {
-        /// Subject: a pair, a file, a step.
-        about: String,
-        source: Box<Self>,
-    },
+    About { about: String, source: Box<Self> },
     #[error(transparent)]
     Optics(#[from] OpticsError),
     #[error(transparent)]
@@ -214,7 +210,6 @@ impl WorkflowError {
         move |error| Self::File { path: path.into(), expected, reason: error.to_string() }
     }
 
-    /// For `map_err`: an unreadable file.
     pub fn read(what: &'static str, path: &Path) -> impl FnOnce(std::io::Error) -> Self {
         move |source| Self::Read { what, path: path.into(), source }
     }

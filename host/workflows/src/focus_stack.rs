@@ -257,9 +257,7 @@ struct Record<'a> {
     white_level: Option<u32>,
     images: &'a [String],
     left_out: &'a [String],
-    /// Focus positions, in the unit.
     positions: &'a [f64],
-    /// The distortion removed.
     distortion: Option<DistortionSection>,
     /// Side of a pixel at the object, from the stack's metadata.
     object_pixel_um: Option<f64>,
@@ -373,8 +371,8 @@ fn read(
     Ok(read.into_iter().map(|image| relative(image).pixels).collect())
 }
 
-/// Removes the lens' distortion from all images. Pixels without data, the same in all images, keep their
-/// values and are set in the mask.
+/// Removes the lens' distortion. Pixels without data (the same in all images) keep their values; the mask
+/// marks them.
 fn straighten(images: &mut [Array2<f32>], distortion: &Distortion) -> Array2<bool> {
     let mut unseen = Array2::from_elem((0, 0), false);
     for image in images {

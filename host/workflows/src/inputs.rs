@@ -26,14 +26,12 @@ pub struct HashedFile {
     pub sha256: String,
 }
 
-/// Hashes the inputs of a result in `out`. A folder means all of its files; a TIFF page (`stack.tif#3`) means
-/// its file.
+/// Hashes inputs of a result in `out`: all files of a folder; the file of a TIFF page (`stack.tif#3`).
 pub(crate) fn hashed(inputs: &[PathBuf], out: &Path) -> Result<Vec<HashedFile>> {
     let place = batch::final_place(out);
     files(inputs)?.iter().map(|file| hash(file, &relative(file, &place))).collect()
 }
 
-/// Files of these paths and folders, without duplicates.
 pub(crate) fn files(inputs: &[PathBuf]) -> Result<Vec<PathBuf>> {
     let mut files: Vec<PathBuf> = Vec::new();
     for input in inputs {
@@ -48,7 +46,6 @@ pub(crate) fn files(inputs: &[PathBuf]) -> Result<Vec<PathBuf>> {
     Ok(files)
 }
 
-/// All files below a folder, sorted by name.
 pub(crate) fn files_below(folder: &Path) -> Result<Vec<PathBuf>> {
     let entries = fs::read_dir(folder).and_then(Iterator::collect::<io::Result<Vec<_>>>);
     let entries = entries.map_err(WorkflowError::read("the folder", folder))?;
@@ -65,7 +62,6 @@ pub(crate) fn files_below(folder: &Path) -> Result<Vec<PathBuf>> {
     Ok(files)
 }
 
-/// Hashes a file; `name` is used in the list.
 pub(crate) fn hash(file: &Path, name: &str) -> Result<HashedFile> {
     let mut hasher = Sha256::new();
     let mut opened = File::open(file).map_err(WorkflowError::read("the input", file))?;
@@ -86,7 +82,7 @@ pub(crate) fn hash(file: &Path, name: &str) -> Result<HashedFile> {
     Ok(HashedFile { file: name.into(), bytes, sha256 })
 }
 
-/// Path relative to a folder, with `/` on all systems; the whole path without a common root.
+/// With `/` on all systems; the whole path without a common root.
 fn relative(file: &Path, folder: &Path) -> String {
     let complete = |path: &Path| {
         let path = std::path::absolute(path).unwrap_or_else(|_| path.into());

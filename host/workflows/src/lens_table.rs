@@ -13,7 +13,6 @@ use crate::{
 
 /// Travel per turn of the thesis' micrometer: readings are split into half-millimetres and the rest.
 const MAJOR_MM: f64 = 0.5;
-/// Depths in the blur table.
 const SAMPLES: usize = 33;
 
 #[derive(Clone, Copy, PartialEq, Debug, Default, Serialize, Deserialize)]
@@ -25,7 +24,6 @@ pub struct Readings {
     pub near_mm: Option<f64>,
 }
 
-/// A micrometer reading.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 pub struct Reading {
     pub mm: f64,
@@ -48,7 +46,6 @@ pub struct LensFigures {
     pub f_number: f64,
     pub aperture_mm: f64,
     pub max_blur_px: f64,
-    /// Near to far end of the range.
     pub depth_range_mm: f64,
     /// Depth change for a blur change of 0.1 px at mid-range.
     pub depth_per_tenth_px_mm: f64,
@@ -60,13 +57,10 @@ pub struct LensFigures {
     /// m2, given or calculated from m1.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub reading_near: Option<Reading>,
-    /// From far to near.
     pub blur: Vec<Blur>,
-    /// The complete optics.
     pub optics: OpticsFile,
 }
 
-/// Calculates all figures in negligible time.
 pub fn calculate(file: &OpticsFile, readings: Readings) -> Result<LensFigures> {
     let mut file = file.clone();
     for (name, value) in [("m1", readings.far_mm), ("m2", readings.near_mm)] {

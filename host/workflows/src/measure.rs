@@ -47,7 +47,6 @@ pub struct Measured {
     pub lateral: Lateral,
 }
 
-/// In pixels.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Rectangle {
@@ -101,8 +100,7 @@ impl Measured {
     }
 }
 
-/// Object points of a depth map (mm), (height, width, 3) in mm as in the mesh: right, up, towards the viewer,
-/// from the lens; NaN without a depth.
+/// Object points of a depth map, (height, width, 3) in mm as in the mesh: right, up, towards the viewer.
 pub fn points_mm(depth_mm: ArrayView2<f32>, optics: &Optics) -> Array3<f32> {
     let dim = depth_mm.dim();
     let projection =
@@ -118,7 +116,7 @@ pub fn points_mm(depth_mm: ArrayView2<f32>, optics: &Optics) -> Array3<f32> {
 }
 
 impl Rectangle {
-    /// Fails unless it is inside an image of (height, width).
+    /// Fails outside an image of (height, width).
     pub fn check_within(&self, (height, width): (usize, usize)) -> Result<()> {
         let at = self;
         let fits = |begin: usize, size: usize, all: usize| {

@@ -1,8 +1,7 @@
 //! Designed operators in the user's cache folder.
 //!
-//! An entry belongs to a request and a build of this program, so it equals a new design bit for bit. A
-//! damaged or different entry is replaced; without write access nothing is cached. Reading takes well below 1
-//! ms, a design a few ms, at most 1 s.
+//! An entry belongs to a request and a build of this program, so it equals a new design bit for bit. Damaged
+//! entries are replaced. Reading takes well below 1 ms, a design a few ms, at most 1 s.
 
 use std::{
     env, fs,
@@ -19,7 +18,6 @@ const LAYOUT: u32 = 1;
 /// Most entries; the oldest are removed. Each is 12 kB.
 const ENTRIES_MAX: usize = 64;
 
-/// Operators from the cache, or designed and stored.
 pub fn operators(request: &Request) -> Result<Operators, DesignError> {
     let (Some(folder), Some(build)) = (folder(), build()) else { return operators::design(request) };
     cached(&folder.join("farnear").join("operators"), &build, request)

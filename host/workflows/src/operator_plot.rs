@@ -31,7 +31,6 @@ pub enum Format {
 }
 
 impl Format {
-    /// By file extension.
     pub fn of(file: &Path) -> Result<Self> {
         match file.extension().unwrap_or_default().to_string_lossy().to_lowercase().as_str() {
             "svg" => Ok(Self::Svg),
@@ -41,7 +40,6 @@ impl Format {
     }
 }
 
-/// Draws `operators`; returns the contents of a file.
 pub fn plot(operators: &Operators, format: Format) -> Result<Vec<u8>> {
     register_font("sans-serif", FontStyle::Normal, dejavu::sans::regular())
         .map_err(|_| EncodeError::of("a plot")("the built-in font is damaged"))?;
@@ -142,8 +140,7 @@ fn frequencies() -> impl Iterator<Item = f64> {
     (0..=STEPS).map(|i| PI * i as f64 / STEPS as f64)
 }
 
-/// Corner in which a legend of this many lines covers the fewest points (coordinates from 0 to 1); preferably
-/// the lower right.
+/// Corner in which a legend covers the fewest points (coordinates from 0 to 1); preferably the lower right.
 fn free_corner(points: Vec<[f64; 2]>, lines: usize) -> SeriesLabelPosition {
     // Slightly more than the legend's share of a chart.
     let (width, height) = (0.3, 0.06 + 0.055 * lines as f64);

@@ -26,7 +26,6 @@ use crate::{
     request::{PathKind, Request},
 };
 
-/// Contents of a file of operators, for [`WorkflowError::File`].
 pub const KIND: &str = "saved operators";
 
 /// Design rational operators and report how well they fit.
@@ -107,7 +106,6 @@ pub struct OperatorFigures {
     pub seconds: f64,
 }
 
-/// Designs operators, and saves and plots them if requested.
 pub fn design(settings: &OperatorRequest, context: &Context<'_>) -> Result<OperatorFigures> {
     let plot = match &settings.plot {
         Some(file) => Some((file, Format::of(file)?)),
@@ -145,8 +143,7 @@ pub fn design(settings: &OperatorRequest, context: &Context<'_>) -> Result<Opera
     })
 }
 
-/// Finds the operators `asked`: `family:design` or `family` (`gro:linear`, `gro`), or a file saved by
-/// `farnear operators`. Default operators without a name.
+/// `asked` is `family:design`, a family alone (`gro:linear`, `gro`), or a file saved by `farnear operators`.
 pub fn find(asked: Option<&Path>, optics: &Optics) -> Result<Operators> {
     let default = operators::Request::for_optics(optics);
     let Some(asked) = asked else { return Ok(cache::operators(&default)?) };

@@ -26,7 +26,6 @@ use crate::{
 pub struct GivenOptics {
     pub path: PathBuf,
     pub optics: Optics,
-    /// As written, for records.
     pub table: toml::Table,
 }
 
@@ -47,7 +46,6 @@ impl GivenOptics {
         (self.optics, found)
     }
 
-    /// Path and point spread function for the emulated rig's lens.
     pub fn for_emulation(&self) -> (&Path, Psf) {
         (&self.path, self.optics.psf())
     }
@@ -57,18 +55,15 @@ pub fn read(path: &Path) -> Result<Optics> {
     GivenOptics::read(path).map(|given| given.optics)
 }
 
-/// Reason to doubt optics.
 #[derive(Clone, PartialEq, Debug)]
 pub enum OpticsDoubt {
     /// An implausible camera value.
     Unusual(Doubt),
     NoPsf,
-    /// The largest blur exceeds the operators' limit.
     TooMuchBlur {
         blur_px: f64,
         /// Side of the square of pixels to average.
         bin: usize,
-        /// Whether this was applied.
         binned: bool,
     },
 }
@@ -96,8 +91,7 @@ fn doubts(optics: &Optics, psf_is_given: bool) -> Vec<OpticsDoubt> {
     unusual.chain((!psf_is_given).then_some(OpticsDoubt::NoPsf)).collect()
 }
 
-/// Optics of a pair, with doubts: the named file, else `capture.toml` or `optics.toml` in the far image's
-/// folder.
+/// From the named file, else `capture.toml` or `optics.toml` in the far image's folder.
 pub fn of_pair(named: Option<&Path>, far: &Path) -> Result<(Optics, Vec<OpticsDoubt>)> {
     if let Some(path) = named {
         return GivenOptics::read(path).map(|given| given.with_doubts());
@@ -114,7 +108,7 @@ pub fn of_pair(named: Option<&Path>, far: &Path) -> Result<(Optics, Vec<OpticsDo
     Err(WorkflowError::NoOptics { far: far.into() })
 }
 
-/// The file read by [`of_pair`]; `None` without one.
+/// `None` if [`of_pair`] reads no file.
 pub(crate) fn file_of_pair(named: Option<&Path>, far: &Path) -> Option<PathBuf> {
     let folder = far.parent().unwrap_or(Path::new(""));
     let beside =

@@ -1,5 +1,3 @@
-//! Checks parameters against limits.
-
 use std::{fmt::Display, ops::RangeInclusive};
 
 use crate::error::{Result, WorkflowError};

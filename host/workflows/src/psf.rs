@@ -16,7 +16,6 @@ const NOT_ROUND: f64 = 0.1;
 #[derive(Clone, PartialEq, Debug)]
 pub enum PsfSource {
     Named(Psf),
-    /// An image of the point spread function or of the aperture.
     Image {
         /// PNG, TIFF, JPEG, PGM or .npy.
         file: PathBuf,
@@ -64,8 +63,7 @@ impl std::fmt::Display for PsfSource {
 }
 
 impl PsfSource {
-    /// Reads the point spread function. An image is averaged over the angle, with a warning for a large
-    /// deviation.
+    /// Averages an image over the angle, with a warning for a large deviation.
     pub fn read(&self, context: &Context<'_>) -> Result<Psf> {
         let (file, radius_px) = match self {
             Self::Named(psf) => return Ok(*psf),

@@ -1,5 +1,4 @@
-//! Report of a capture or a result as a self-contained page: images, figures, provenance. Images and style
-//! are embedded.
+//! Report of a capture or a result as a self-contained page.
 
 mod kinds;
 mod page;
@@ -60,14 +59,13 @@ pub struct ReportFigures {
     pub bytes: usize,
 }
 
-/// Writes the page atomically.
 pub fn write(request: &ReportRequest) -> Result<ReportFigures> {
     let page = html(&request.folder)?;
     write_file(&request.out, page.as_bytes())?;
     Ok(ReportFigures { pictures: page.matches("<figure").count(), bytes: page.len() })
 }
 
-/// The page of a capture or a result. Fails for a folder without files of farnear.
+/// Fails for a folder without files of farnear.
 pub fn html(folder: &Path) -> Result<String> {
     let has = |name: &str| folder.join(name).is_file();
     if has(CAPTURE_FILE) {

@@ -1,7 +1,5 @@
-//! Request structs, one per task, shared by the command line, the page, batch and Python.
-//!
-//! Fields are the command's options, the page's JSON, a batch job's fields and Python's keywords. Doc
-//! comments are the help text; [`Default`] holds the defaults.
+//! Request structs, one per task, shared by the command line, the page, batch and Python. Doc comments are
+//! the help text; [`Default`] holds the defaults.
 
 pub mod reference;
 
@@ -33,7 +31,6 @@ pub trait Request:
         Ok(())
     }
 
-    /// Runs the task, after [`Self::check`].
     fn run(&self, context: &Context<'_>) -> Result<Self::Figures>;
 
     /// Error for a complete result, for instance a failed comparison. Figures are printed before it.
@@ -55,7 +52,6 @@ pub trait CameraRequest: RigRequest {
     fn set_camera(&mut self, camera: CameraSettings);
 }
 
-/// Files and folders named as inputs.
 pub fn inputs<R: Request>(request: &R) -> Vec<PathBuf> {
     let is_input = |(kind, path): &(PathKind, PathBuf)| match kind {
         PathKind::Input => true,
@@ -65,7 +61,6 @@ pub fn inputs<R: Request>(request: &R) -> Vec<PathBuf> {
     paths_of(request).into_iter().filter(is_input).map(|(_, path)| path).collect()
 }
 
-/// Meaning of a path field.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum PathKind {
     Input,
@@ -79,7 +74,6 @@ pub enum PathKind {
 #[derive(Clone, Copy, Debug)]
 pub enum Paths<'a> {
     RelativeTo(&'a Path),
-    /// The caller sets them.
     Refused,
 }
 
@@ -142,7 +136,6 @@ pub fn schema_without_paths<R: Request>() -> Value {
     schema
 }
 
-/// All tasks with a request.
 pub const TASKS: &[Task] = &[
     Task::of::<crate::depth::DepthRequest>(),
     Task::of::<crate::focus_stack::FocusStackRequest>(),
@@ -222,7 +215,6 @@ impl Task {
 pub trait Job: Send {
     fn inputs(&self) -> Vec<PathBuf>;
 
-    /// Runs the task with its result at `out`.
     fn run(&self, out: &Path, context: &Context<'_>) -> Result<Value>;
 }
 
@@ -264,7 +256,6 @@ fn paths_of<R: Request>(request: &R) -> Vec<(PathKind, PathBuf)> {
     found
 }
 
-/// The part of a value that can be a path.
 fn file_part(text: &str, kind: PathKind) -> &str {
     match kind {
         PathKind::InputOrName => text.split(',').next().unwrap_or(text),
@@ -294,7 +285,6 @@ fn property<'a>(schema: &'a Value, name: &str) -> Option<&'a Value> {
     schema.get("properties")?.get(name)
 }
 
-/// Whether a property accepts a JSON type.
 fn accepts(property: &Value, kind: &str, schema: &Value) -> bool {
     if let Some(target) = property.get("$ref").and_then(Value::as_str) {
         let target = target.trim_start_matches('#');

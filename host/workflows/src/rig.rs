@@ -1,5 +1,3 @@
-//! A rig, real or emulated: connection and tasks, one file per task.
-
 pub mod alarms;
 mod axis;
 pub mod board;
@@ -49,7 +47,6 @@ pub enum RigAddress {
     Port(String),
     /// Emulated: `farnear-sim` is started for it and ends with it.
     Emulated(Scenery),
-    /// An open connection.
     Open(OpenRig),
 }
 

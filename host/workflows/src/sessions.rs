@@ -1,5 +1,5 @@
-//! Stored captures of a session and their notes. A capture is a folder with `capture.toml`
-//! ([`farnear_capture::record`]) and an optional `note.toml`.
+//! Stored captures of a session: folders with `capture.toml` ([`farnear_capture::record`]) and an optional
+//! `note.toml`.
 
 use std::{
     fs,
@@ -16,7 +16,6 @@ use crate::{
 };
 
 const NOTE_FILE: &str = "note.toml";
-/// Most bytes of a note.
 const NOTE_MAX: usize = 64 * 1024;
 /// Prefix of folders with another map of a capture.
 const VARIANT: &str = "variant-";
@@ -63,14 +62,12 @@ pub struct Capture {
     pub height: usize,
     pub bits: u8,
     pub exposure_us: u32,
-    /// Emulated scene, if any.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub scene: Option<String>,
     /// The optics file as given.
     pub optics: toml::Table,
     pub has_depth: bool,
     pub note: Note,
-    /// Why the folder cannot be read.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub broken: Option<String>,
 }
@@ -133,7 +130,6 @@ fn check_regular(folder: &Path) -> Result<()> {
     odd.map_err(failed)
 }
 
-/// Folder of another map of a capture.
 pub fn variant_of(capture: &Path, variant: &str) -> Result<PathBuf> {
     let letters = variant.chars().all(|c| c.is_ascii_alphanumeric() || c == '-');
     if variant.is_empty() || !letters || variant.len() > 60 {
@@ -273,7 +269,6 @@ fn matches(folder: &Path, capture: &Capture, search: &str) -> bool {
     search.to_lowercase().split_whitespace().all(|word| all.contains(word))
 }
 
-/// Empty if there is none.
 pub fn read_note(folder: &Path) -> Result<Note> {
     let path = folder.join(NOTE_FILE);
     match text_file::read(&path) {

@@ -31,12 +31,7 @@ pub enum SilhouettesError {
     #[error("the template {name}: {source}")]
     Template { name: String, source: TemplateError },
     #[error("{}: {source}{}", path.display(), fitting(*.fits))]
-    Unfit {
-        path: PathBuf,
-        source: TemplateError,
-        /// Built-in template that fits.
-        fits: Option<&'static str>,
-    },
+    Unfit { path: PathBuf, source: TemplateError, fits: Option<&'static str> },
     #[error("{}: the recording holds no frame", path.display())]
     NoFrames { path: PathBuf },
     #[error("{}: no frame has a visible marker, so there is nothing to draw", path.display())]
@@ -45,13 +40,7 @@ pub enum SilhouettesError {
         "{what} reaches from {low_mm:.0} to {high_mm:.0} mm, which is not a picture at {mm_per_px} mm per pixel; the \
          unit may be wrong"
     )]
-    TooLarge {
-        what: String,
-        /// Smallest coordinate in the picture.
-        low_mm: f64,
-        high_mm: f64,
-        mm_per_px: f64,
-    },
+    TooLarge { what: String, low_mm: f64, high_mm: f64, mm_per_px: f64 },
     #[error("{}: no person in {least} successive frames", path.display())]
     NoPassage { path: PathBuf, least: usize },
     #[error("no performance to draw")]
@@ -65,7 +54,6 @@ fn fitting(template: Option<&str>) -> String {
 }
 
 impl SilhouettesError {
-    /// Error for points that exceed the picture.
     fn too_large(what: &str, points_mm: &[[f64; 2]], mm_per_px: f64) -> Self {
         let finite = || points_mm.iter().flatten().copied().filter(|v| v.is_finite());
         Self::TooLarge {
@@ -77,7 +65,6 @@ impl SilhouettesError {
     }
 }
 
-/// Converts a video frame for the background model.
 pub(crate) fn frame_of(pixels: &Pixels) -> Frame<'_> {
     match pixels {
         Pixels::Grey(pixels) => Frame::Grey(pixels.view()),

@@ -31,7 +31,6 @@ pub(super) struct Shown {
     /// First row, first column, one past the last row and column.
     pub spans: [usize; 4],
     pub text: String,
-    /// Whether the answer is an activity.
     pub known: bool,
 }
 
@@ -40,8 +39,6 @@ impl AnnotatedVideo {
         Ok(Self { out: Staging::new_folder(folder)?, writer: Writer::new(TEXT_PX)?, frames: 0 })
     }
 
-    /// Draws the picture (or the mask), the person's outline, the answer and the next most probable
-    /// activities.
     pub fn draw(&mut self, picture: Option<&Pixels>, mask: &Mask, answer: &Answer) -> Result<()> {
         let seen = with_outline(picture, mask);
         let line = self.writer.height();
@@ -65,7 +62,6 @@ impl AnnotatedVideo {
         self.write(&page)
     }
 
-    /// Draws a frame with a box and the answer for each person.
     pub fn draw_people(&mut self, picture: Option<&Pixels>, mask: &Mask, people: &[Shown]) -> Result<()> {
         let mut page = with_outline(picture, mask);
         let times = page.height() / mask.nrows().max(1) as u32;
@@ -103,7 +99,6 @@ impl AnnotatedVideo {
     }
 }
 
-/// The picture, enlarged if small, with the mask's outline.
 fn with_outline(picture: Option<&Pixels>, mask: &Mask) -> RgbImage {
     let (height, width) = mask.dim();
     let level = |y: usize, x: usize| match picture {

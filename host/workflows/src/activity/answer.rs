@@ -19,7 +19,6 @@ pub struct AnswerSummary {
     pub confidence: f64,
     /// Above 1 the activity is unknown. `None` without a person.
     pub outlier_score: Option<f64>,
-    /// Why the activity is unknown.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub reason: Option<String>,
     pub probabilities: Vec<Probability>,
@@ -44,13 +43,11 @@ pub struct PersonInFrame {
 /// Why the answer for a person in a frame is doubtful. Serialised as `crossing:2`, `missed`, `cut-by-edge`.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, SerializeDisplay)]
 pub enum PersonFlag {
-    /// Overlaps with this person.
     Crossing(usize),
     /// Separated from this person after an overlap.
     Parted(usize),
     /// May have been exchanged with this person.
     PerhapsSwapped(usize),
-    /// Not found in the frame.
     Missed,
     Mask(Flag),
 }
@@ -73,9 +70,7 @@ pub struct PersonFigures {
     pub person: usize,
     pub from: usize,
     pub to: usize,
-    /// Frames with a silhouette.
     pub silhouettes: usize,
-    /// Frames in one blob with others.
     pub crossing_frames: usize,
     pub perhaps_swapped_with: Vec<usize>,
     #[serde(flatten)]
@@ -115,8 +110,7 @@ impl AnswerSummary {
     }
 }
 
-/// Converts ranges of visible frames to ranges of the recording; `numbers` are the frames with a person,
-/// `frames` the frame count.
+/// Converts ranges of visible frames to ranges of the recording; `numbers` are the frames with a person.
 pub(super) fn parts<'a>(
     stretches: impl IntoIterator<Item = (usize, usize, &'a Option<String>, f32)>,
     numbers: &[usize],
@@ -178,7 +172,6 @@ pub(super) fn stretches(
     Ok((in_windows, in_segments))
 }
 
-/// The only person of a recording; `None` if it is empty.
 pub(super) fn only_person(
     seen: &[bool],
     answer: &AnswerSummary,
@@ -198,7 +191,6 @@ pub(super) fn only_person(
     })
 }
 
-/// The only person of a frame; `None` if the mask is empty.
 pub(super) fn only_in_frame(mask: &Mask, answer: &Answer, flags: &[Flag]) -> Option<PersonInFrame> {
     let b = BoundingBox::of(mask.view())?;
     Some(PersonInFrame {
@@ -211,7 +203,6 @@ pub(super) fn only_in_frame(mask: &Mask, answer: &Answer, flags: &[Flag]) -> Opt
     })
 }
 
-/// Converts segments for [`parts`].
 pub(super) fn of_segments(
     segments: &[Segment],
 ) -> impl Iterator<Item = (usize, usize, &Option<String>, f32)> {
@@ -231,7 +222,6 @@ pub(super) fn restricted(answer: Answer, among: &[String]) -> Answer {
     if among.is_empty() { answer } else { answer.among(among) }
 }
 
-/// Why an answer is unknown; `None` if it is known.
 fn unknown_because(answer: &Answer, frames: usize) -> Option<String> {
     if answer.activity.is_some() {
         return None;

@@ -37,19 +37,16 @@ const TIMINGS: usize = 3;
 
 #[derive(Clone, PartialEq, Debug)]
 pub struct EvaluationSettings {
-    /// Samples to recognise, TOML.
     pub samples: PathBuf,
     pub learn_from: LearnFrom,
     pub method: Method,
     pub adaptation: Adaptation,
-    /// Views that are recognised together. By default fused, or each separately if clips differ in their
-    /// views.
+    /// Views recognised together. By default fused, or each separately if clips differ in their views.
     pub views: Option<Views>,
-    /// A new folder for confusion.png, confusion.md and evaluation.toml (the settings of every fold).
+    /// For confusion.png, confusion.md and evaluation.toml (the settings of every fold).
     pub out: Option<PathBuf>,
 }
 
-/// Training set; never with the tested subject.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub enum LearnFrom {
     /// The other subjects, each left out in turn.
@@ -190,7 +187,6 @@ pub fn open_set(samples: &Path, method: &Method, context: &Context<'_>) -> Resul
 struct Clips {
     views: Views,
     test: Vec<Clip>,
-    /// The training set, if separate.
     train: Option<Vec<Clip>>,
 }
 
@@ -213,7 +209,6 @@ impl Clips {
     }
 }
 
-/// Rejects evaluations with meaningless answers.
 fn check_subjects(settings: &EvaluationSettings, subjects: &[String], learned: &[Clip]) -> Result<()> {
     match &settings.learn_from {
         LearnFrom::OtherSubjects if subjects.len() < 3 => {

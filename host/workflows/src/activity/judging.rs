@@ -30,19 +30,18 @@ pub struct JudgingSettings {
     pub fused: bool,
     /// Reason for opening a blind set; without it a blind set is rejected.
     pub open_blind: Option<String>,
-    /// A new folder for confusion.png, confusion.md and wrong.csv.
+    /// For confusion.png, confusion.md and wrong.csv.
     pub out: Option<PathBuf>,
 }
 
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct JudgingFigures {
-    /// Answers for clips of known activities.
+    /// For clips of known activities.
     pub answers: u32,
     /// Share of correct answers among all activities of the model.
     pub accuracy: f64,
     /// Wilson interval, 95 %.
     pub confidence_interval: [f64; 2],
-    /// Share of correct answers among the samples' activities.
     pub accuracy_among: f64,
     pub confidence_interval_among: [f64; 2],
     /// Expected calibration error, 0 to 1.
@@ -124,7 +123,6 @@ pub fn judge(model: &Model, settings: &JudgingSettings, context: &Context<'_>) -
     Ok(figures)
 }
 
-/// Answers for all clips, each view separately unless fused.
 pub(super) fn answers<'a>(
     recogniser: &Recogniser,
     clips: &'a [Clip],

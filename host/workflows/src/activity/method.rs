@@ -23,8 +23,7 @@ pub struct Adaptation {
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Method {
     pub pattern: Pattern,
-    /// Choose the settings by cross-validation over the training subjects instead of using the defaults
-    /// (faster).
+    /// By cross-validation over the training subjects, instead of using the defaults (faster).
     pub search: bool,
 }
 
@@ -37,8 +36,8 @@ pub enum Pattern {
     },
     /// Features from the network of a shipped model.
     Features { model: &'static Shipped, classifier: Family },
-    /// Embedded pattern learning (EPL) as in the thesis: 0/1 grids over a 3-D Isomap embedding with k nearest
-    /// neighbours, order-free.
+    /// Embedded pattern learning (EPL) as in the thesis: 0/1 grids over a 3-D Isomap embedding, order-free
+    /// kNN.
     Thesis,
 }
 
@@ -68,7 +67,6 @@ impl Method {
         Ok(if self.search { experiment } else { experiment.fixed() })
     }
 
-    /// Name in figures.
     pub fn name(&self) -> &'static str {
         match self.pattern {
             Pattern::Thesis => "thesis",

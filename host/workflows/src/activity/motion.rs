@@ -27,7 +27,6 @@ use crate::{
 };
 
 const DURING: &str = "drawing motion files";
-/// MATLAB files hold sets of joints.
 const MATLAB: &str = "mat";
 
 #[derive(Clone, PartialEq, Eq, Debug)]
@@ -63,8 +62,7 @@ impl FromStr for MotionFile {
 #[derive(Clone, PartialEq, Debug)]
 pub struct MotionSettings {
     pub files: Vec<MotionFile>,
-    /// Template that makes bodies from points: a built-in name or a TOML file. Default: the best fitting
-    /// built-in one.
+    /// A built-in template or a TOML file. Default: the best fitting built-in one.
     pub template: Option<String>,
     /// Unit and upward axis, to override the file.
     pub choices: Choices,
@@ -116,7 +114,6 @@ pub fn clips(settings: &MotionSettings, context: &Context<'_>) -> Result<Vec<Cli
     Ok(all)
 }
 
-/// A clip per camera.
 fn seen(recorded: &Recorded, cameras: usize, seed: u64) -> Vec<Clip> {
     let tracks: Vec<Track> = match &recorded.joints {
         Joints::Set(clip, layout) => {

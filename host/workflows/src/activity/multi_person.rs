@@ -37,7 +37,6 @@ pub struct MultiPersonSettings {
     pub among: Vec<String>,
     /// Frames of the streaming answer. Default: the length of a training clip.
     pub window: Option<usize>,
-    /// A new folder for the frames with the streaming answers drawn on them.
     pub annotated_video: Option<PathBuf>,
 }
 
@@ -46,7 +45,6 @@ pub struct FrameOfPeople {
     /// From 1.
     pub frame: usize,
     pub name: String,
-    /// Tracked people, by number.
     pub people: Vec<PersonInFrame>,
     /// Why the frame is not searched for people.
     #[serde(skip_serializing_if = "Vec::is_empty")]
@@ -57,7 +55,6 @@ pub struct FrameOfPeople {
 pub struct MultiPersonFigures {
     pub people: Vec<PersonFigures>,
     pub frames: usize,
-    /// Frames without a tracked person.
     pub empty_frames: usize,
     pub flagged_frames: usize,
     pub window: usize,
@@ -238,7 +235,6 @@ impl<'m> MultiPersonTracker<'m> {
         })
     }
 
-    /// Answers for the whole recording.
     pub fn finish(self) -> Result<MultiPersonFigures> {
         if let Some(annotated_video) = self.annotated_video {
             annotated_video.finish()?;

@@ -35,7 +35,6 @@ use crate::{
 pub struct Model {
     path: PathBuf,
     recogniser: Recogniser,
-    /// For cut-out silhouettes, if `recogniser` is not for them.
     cut_out: Option<Recogniser>,
 }
 
@@ -93,7 +92,6 @@ impl Model {
         })
     }
 
-    /// The recogniser for this kind of masks.
     pub fn recogniser(&self, full_frames: bool) -> &Recogniser {
         self.cut_out.as_ref().filter(|_| !full_frames).unwrap_or(&self.recogniser)
     }
@@ -106,7 +104,6 @@ impl Model {
         &self.recogniser.activities
     }
 
-    /// Checks that the model knows these activities.
     pub(super) fn check_known(&self, activities: &[String]) -> Result<()> {
         let Some(unknown) = activities.iter().find(|name| !self.activities().contains(name)) else {
             return Ok(());
@@ -124,7 +121,6 @@ pub struct RecognitionSettings {
     pub among: Vec<String>,
     /// Frames of the streaming answer and of the windows. Default: the length of a training clip.
     pub window: Option<usize>,
-    /// A new folder for the first view's frames with the streaming answer drawn on them.
     pub annotated_video: Option<PathBuf>,
 }
 
@@ -162,7 +158,6 @@ pub struct RecognitionFigures {
     /// One person, or none in an empty recording.
     pub people: Vec<PersonFigures>,
     pub frames: usize,
-    /// Empty masks of all views.
     pub empty_frames: usize,
     pub flagged_frames: usize,
     pub window: usize,
@@ -266,7 +261,6 @@ impl<'m> Recognition<'m> {
         }))
     }
 
-    /// Answers for the whole recording and its windows.
     pub fn finish(self) -> Result<RecognitionFigures> {
         let whole: Vec<Track> = self.tracks.iter().map(|parts| joined(parts.iter())).collect();
         let answer = restricted(self.model.recognise(&whole)?, &self.among);

@@ -1,7 +1,6 @@
 //! Reads SAMPLES.toml (folders of masks with subject, activity and view) into described clips.
 //!
-//! Samples with the same `clip` name are views of one clip. Without names, the n-th samples of each view form
-//! a clip.
+//! Views with the same `clip` name form a clip. Without names, the n-th samples of each view do.
 
 use std::{
     collections::{BTreeMap, BTreeSet, HashMap},
@@ -23,7 +22,6 @@ use crate::{
     error::{About, Result, WorkflowError},
 };
 
-/// Scaling of all masks before they are described.
 pub const SCALING: Scaling = Scaling::KeepAspect;
 
 #[derive(Deserialize)]
@@ -97,7 +95,6 @@ pub struct Samples {
     pub empty_frames: usize,
     /// Whether masks are full frames, so that motion of the bounding box counts.
     pub full_frames: bool,
-    /// Folders of the first clip, one per view, for timing.
     pub folders: Vec<PathBuf>,
 }
 
@@ -127,20 +124,17 @@ fn listed(path: &Path) -> Result<File> {
 }
 
 impl Samples {
-    /// Folders of masks in a file of samples.
     pub fn folders(path: &Path) -> Result<Vec<PathBuf>> {
         let base = path.parent().unwrap_or(Path::new(""));
         Ok(listed(path)?.samples.iter().map(|sample| base.join(&sample.masks)).collect())
     }
 
-    /// Reads a file of samples and describes its masks. Fails for a mix of full frames and cut-out
-    /// silhouettes.
+    /// Reads and describes the masks. Fails for a mix of full frames and cut-out silhouettes.
     pub fn read(path: &Path, context: &Context<'_>) -> Result<Self> {
         Self::read_opened(path, None, context)
     }
 
-    /// As [`Self::read`]. With a reason, also reads a blind set and records this in `openings.csv` next to
-    /// the file.
+    /// With a reason, also reads a blind set and records this in `openings.csv` next to the file.
     pub fn read_opened(path: &Path, reason: Option<&str>, context: &Context<'_>) -> Result<Self> {
         let base = path.parent().unwrap_or(Path::new(""));
         let file = listed(path)?;
@@ -213,7 +207,6 @@ impl Samples {
     }
 }
 
-/// The error for two folders of different kinds.
 fn kinds(one: &Path, other: &Path, one_is_full: bool) -> SamplesError {
     let (full, cut_out) = if one_is_full { (one, other) } else { (other, one) };
     SamplesError::Kinds { full: full.into(), cut_out: cut_out.into() }
@@ -234,7 +227,6 @@ fn described(folder: &Path, context: &Context<'_>) -> Result<(Track, bool)> {
     Ok((track, full))
 }
 
-/// Clips in order of appearance, and their common views.
 fn grouped<'a>(
     samples: impl Iterator<Item = (&'a Sample, Track)>,
 ) -> Result<(Vec<Clip>, Option<Vec<u32>>), SamplesError> {
@@ -277,7 +269,6 @@ fn grouped<'a>(
     Ok((clips.into_iter().map(clip).collect(), common))
 }
 
-/// Folders of the first clip, in the order of its views.
 fn first_folders(samples: &[Sample], folders: &[PathBuf], count: usize) -> Vec<PathBuf> {
     let Some(first) = samples.first() else { return Vec::new() };
     let mut found: BTreeMap<u32, &PathBuf> = BTreeMap::new();

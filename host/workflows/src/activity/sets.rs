@@ -1,7 +1,6 @@
 //! Leave-one-set-out: evaluates a finished model, and thresholds from the other sets, on each set.
 //!
-//! A blind set (`blind = "why"`) is opened for a release only, with a reason. Every opening is recorded in
-//! `openings.csv` next to it.
+//! A blind set (`blind = "why"`) needs a reason, which is recorded in `openings.csv` next to it.
 
 use std::path::{Path, PathBuf};
 
@@ -72,7 +71,6 @@ struct Measured {
     reliability: Reliability,
 }
 
-/// Evaluates a model on every set, with a limit for unknown activities from the others.
 pub fn leave_one_set_out(
     model: &Model,
     settings: &SetsSettings,

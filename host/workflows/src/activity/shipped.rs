@@ -17,7 +17,6 @@ use crate::{context::Context, error::Result, figures::rounded, parameters::withi
 #[derive(PartialEq)]
 pub struct Shipped {
     pub name: &'static str,
-    /// One line.
     pub about: &'static str,
     /// Figures of a blind set, if measured.
     new_set: Option<NewSet>,
@@ -65,8 +64,7 @@ pub const MODELS: &[Shipped] = &[
     },
 ];
 
-/// The recogniser that supplies the outlier score for a trained model: the sequence model, which detects
-/// unknown activities better.
+/// The sequence model, which supplies the outlier score for trained models.
 pub fn auxiliary_model(full_frames: bool) -> Result<Recogniser> {
     let [full, cut_out] = MODELS[0].recognisers()?;
     Ok(if full_frames { full } else { cut_out })
@@ -114,7 +112,6 @@ pub struct ModelFigures {
     pub bytes: usize,
     /// Share of known clips called unknown, on synthetic people as in training.
     pub false_alarms_on_synthetic_people: f64,
-    /// Figures of a blind set.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub on_a_new_set: Option<NewSet>,
     pub activities: Vec<String>,
@@ -141,20 +138,17 @@ pub fn list() -> Result<Vec<ModelFigures>> {
 pub const PEOPLE: usize = 3000;
 pub const PASSES: usize = 6;
 
-/// Training of models from synthetic people.
 #[derive(Clone, PartialEq, Debug)]
 pub struct SyntheticTraining {
     /// Training subjects, each with all activities once, 20 to 5000.
     pub people: usize,
     /// 1 to 200.
     pub passes: usize,
-    /// A new folder for the models.
     pub out: PathBuf,
 }
 
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct SyntheticTrainingFigures {
-    /// Training clips without their mirror images.
     pub clips: usize,
     /// Clips of other people for calibration.
     pub calibration_clips: usize,
@@ -166,7 +160,6 @@ pub struct SyntheticTrainingFigures {
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct MadeModel {
     pub file: String,
-    /// Share of correct answers on the calibration clips.
     pub accuracy: f64,
     pub bytes: usize,
 }
@@ -184,11 +177,10 @@ const FILES: [(&str, Mode, bool); 4] = [
 ];
 /// Frames before and after a frame in the sequence network's input: together 0.2 s to 1 s.
 const REACH: usize = 2;
-/// Least share of a clip's frames in a training step, if order does not count. With order it gained less than
-/// random variation (see the data sheet).
+/// Least share of a clip's frames in a training step without order (with order no gain, see the data sheet).
 const KEEP: f32 = 0.6;
-/// Standard deviation of the offset of a whole clip in a training step if order counts, in standard
-/// deviations of each component. It improves calibration.
+/// Standard deviation of a whole clip's offset in a training step with order, to improve calibration. In
+/// standard deviations of each component.
 const SHIFT: f32 = 0.2;
 /// Networks in a model's ensemble.
 const MEMBERS: usize = 2;

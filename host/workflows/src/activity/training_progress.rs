@@ -13,7 +13,6 @@ use crate::{
     error::{Result, WorkflowError},
 };
 
-/// Counts the feature spaces tried in training.
 pub(super) struct Training<'a>(Counter<'a>);
 
 impl<'a> Training<'a> {
@@ -114,7 +113,6 @@ impl Watch for Passes<'_> {
     }
 }
 
-/// The result, or an error if cancelled.
 pub(super) fn outcome<T, E: Into<WorkflowError>>(
     result: std::result::Result<T, E>,
     context: &Context<'_>,

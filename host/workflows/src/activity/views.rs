@@ -58,7 +58,6 @@ pub struct View {
 }
 
 impl View {
-    /// Whether it holds silhouettes cut out at 100x100.
     pub(super) fn is_cut_out(&self) -> Result<bool> {
         if self.kind == ViewKind::Video {
             return Ok(false);
@@ -96,7 +95,6 @@ pub(super) enum Frames {
     Video { video: Box<Video>, extractor: Option<Box<Extractor>> },
 }
 
-/// Properties of the first mask that others must have.
 pub(super) struct First {
     name: String,
     size: (usize, usize),
@@ -115,7 +113,6 @@ impl Frames {
         })
     }
 
-    /// Note on how the view is read.
     pub fn remark(&self) -> Option<&String> {
         match self {
             Self::Masks { levels, .. } => levels.remark.as_ref(),
@@ -159,7 +156,6 @@ impl Frames {
     }
 }
 
-/// Notes on how views are read, each with the view's path.
 pub(super) fn remarks(views: &[View], frames: &[Frames]) -> Vec<String> {
     let remark = |(view, frames): (&View, &Frames)| {
         frames.remark().map(|remark| format!("{}: {remark}", view.path.display()))

@@ -16,7 +16,6 @@ use super::BatchError;
 pub(super) struct Fields {
     values: BTreeMap<String, Vec<String>>,
     taken: BTreeSet<&'static str>,
-    /// Base of relative paths.
     base: PathBuf,
 }
 
@@ -30,7 +29,6 @@ impl Fields {
         self.values.insert(name.trim().replace('-', "_"), values);
     }
 
-    /// Fields of a TOML table.
     pub fn of_table(table: &toml::Table, base: &Path) -> Result<Self, BatchError> {
         let mut fields = Self::new(base);
         for (name, value) in table {
@@ -97,7 +95,6 @@ impl Fields {
         parts.map(str::trim).filter(|part| !part.is_empty()).map(Into::into).collect()
     }
 
-    /// A list of paths, in CSV separated by `;`.
     pub fn paths(&mut self, name: &'static str) -> Result<Vec<PathBuf>, BatchError> {
         if !self.values.contains_key(name) {
             return Err(BatchError::MissingField { name });
@@ -139,7 +136,6 @@ impl Fields {
         }
     }
 
-    /// A value or its default.
     pub fn or<T: FromStr<Err: Display>>(&mut self, name: &'static str, usual: T) -> Result<T, BatchError> {
         Ok(self.optional(name)?.unwrap_or(usual))
     }

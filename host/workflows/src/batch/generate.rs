@@ -31,8 +31,8 @@ impl FromStr for Pattern {
     }
 }
 
-/// Writes a CSV manifest with a job of `kind` per file that matches the first pattern, sorted by name.
-/// Returns the number of jobs. Patterns are relative to the manifest's folder.
+/// Writes a CSV manifest with a job of `kind` per matching file, sorted by name; returns their number.
+/// Patterns are relative to the manifest's folder.
 pub fn generate(manifest: &Path, kind: &str, fields: &[Pattern]) -> Result<usize> {
     jobs::kind(kind)?;
     let pattern = |reason: String| BatchError::Pattern(reason);

@@ -1,5 +1,4 @@
-//! Kinds of jobs. A new kind is a line in the table and a function that builds a workflow's settings from
-//! fields.
+//! Kinds of jobs: a line in the table and a function that builds a workflow's settings from fields.
 
 mod campaign;
 mod evaluate;
@@ -23,7 +22,6 @@ use crate::{
 
 pub(super) struct Kind {
     pub name: &'static str,
-    /// Whether the result is one file, not a folder.
     pub makes_file: bool,
     pub work: fn(&mut Fields) -> Result<Box<dyn Job>>,
 }
@@ -73,7 +71,6 @@ pub(super) fn is_kind(name: &str) -> bool {
     KINDS.iter().any(|kind| kind.is_named(name))
 }
 
-/// In the table's order.
 pub(super) fn names() -> Vec<String> {
     KINDS.iter().map(|kind| kind.name.replace(' ', "-")).collect()
 }

@@ -15,12 +15,10 @@ use super::{BatchError, fields::Fields};
 /// Most bytes of a job, so that memory does not depend on the file.
 const JOB_BYTES_MAX: u64 = 1 << 20;
 const JOB: &str = "[[job]]";
-/// Field with the name of the task.
 pub(super) const KIND: &str = "do";
 
 pub(super) struct Entry {
     pub number: usize,
-    /// Line where it begins.
     pub line: usize,
     /// Task and remaining fields, or why they cannot be read.
     pub job: Result<(String, Fields), BatchError>,
@@ -128,7 +126,6 @@ impl Manifest {
     }
 }
 
-/// Separates the task's name from the other fields.
 fn split(mut fields: Fields) -> Result<(String, Fields), BatchError> {
     let kind = fields.text(KIND)?;
     fields.remove(KIND);
@@ -241,7 +238,6 @@ fn wrong_csv(path: &Path, error: &csv::Error) -> BatchError {
 mod tests {
     use super::*;
 
-    /// Line number of a job with its task and fields, or its error.
     type Found = (usize, Result<(String, Fields), String>);
 
     fn all(name: &str, text: &str) -> Vec<Found> {

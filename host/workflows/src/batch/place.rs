@@ -1,5 +1,4 @@
-//! Place of a job's result: written to a temporary place, moved when complete. Never replaces files that no
-//! batch wrote.
+//! Place of a job's result, moved there when complete. Never replaces files that no batch wrote.
 
 use std::{
     ffi::OsString,
@@ -16,7 +15,6 @@ use crate::error::Result;
 
 /// Provenance in a result folder; suffix of the provenance of a result file.
 pub(crate) const RECORD: &str = "batch.toml";
-/// Suffix of the temporary folder.
 const ASIDE: &str = ".batch-partial";
 
 /// The final folder of a result, if `out` is a batch's temporary place.
@@ -28,7 +26,6 @@ pub(crate) fn final_place(out: &Path) -> PathBuf {
 
 pub(super) struct Place {
     target: PathBuf,
-    /// Whether the result is a file, not a folder.
     is_file: bool,
 }
 
@@ -67,8 +64,7 @@ impl Place {
         Err(BatchError::Foreign { path: self.target.clone() }.into())
     }
 
-    /// Runs `make` with a temporary place and moves the result to its final place. First removes remains of
-    /// an interrupted run.
+    /// Runs `make` with a temporary place and moves its result. First removes remains of an interrupted run.
     pub fn fill(&self, wanted: Provenance, make: impl FnOnce(&Path) -> Result<Value>) -> Result<Value> {
         let name = self.target.file_name().unwrap_or_default();
         let aside = self.beside(".", ASIDE);
@@ -138,7 +134,6 @@ impl Place {
         if self.is_file { self.beside("", &format!(".{RECORD}")) } else { self.target.join(RECORD) }
     }
 
-    /// Base of the record's paths.
     fn root(&self) -> &Path {
         if self.is_file { self.target.parent().unwrap_or(Path::new("")) } else { &self.target }
     }

@@ -48,7 +48,6 @@ impl Default for Sums {
 }
 
 impl Sums {
-    /// Hashes of files, including those in folders.
     pub fn of(&self, paths: &[PathBuf], base: &Path) -> Result<Vec<HashedFile>> {
         let files = inputs::files(paths)?;
         let sum = |file: &PathBuf| {
@@ -87,7 +86,6 @@ impl Provenance {
         Self { figures: figures.to_string(), ..self }
     }
 
-    /// Adds the file or folder at `result`.
     pub fn with_output(mut self, result: &Path) -> Result<Self> {
         let files = if result.is_dir() { inputs::files_below(result)? } else { vec![result.to_path_buf()] };
         let root = if result.is_dir() { result } else { result.parent().unwrap_or(Path::new("")) };

@@ -6,7 +6,6 @@ use serde_json::Value;
 
 use super::JobReport;
 
-/// Columns of every job.
 const FIXED: [&str; 6] = ["job", "line", "do", "out", "state", "error"];
 
 #[derive(Default)]

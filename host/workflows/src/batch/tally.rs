@@ -25,7 +25,6 @@ pub(super) struct Tally<'a> {
 #[derive(Default)]
 struct Inner {
     figures: BatchFigures,
-    /// Created at the first failure.
     file: Option<File>,
     /// Start of the first job that was not already finished.
     working_since: Option<Instant>,

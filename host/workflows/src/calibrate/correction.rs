@@ -84,9 +84,7 @@ impl Request for CalibrateCorrectionRequest {
 pub struct CorrectionFigures {
     pub method: String,
     pub patterns: usize,
-    /// Farthest depth of the targets.
     pub far_mm: f64,
-    /// Nearest depth of the targets.
     pub near_mm: f64,
     /// Error of the maps before correction.
     pub rmse_before_mm: f64,
@@ -129,14 +127,12 @@ struct Entry {
     true_mm: f64,
 }
 
-/// Reads the maps and true depths (mm) of a list of `[[pattern]]` with `depth = FILE` (relative to the list)
-/// and `true_mm = MM`.
+/// Reads the maps and true depths (mm) of `[[pattern]]` entries: `depth = FILE` (relative), `true_mm = MM`.
 pub fn read(list: &Path) -> Result<Vec<(Array2<f32>, f64)>> {
     let folder = list.parent().unwrap_or(Path::new(""));
     self::list(list)?.into_iter().map(|(depth, mm)| Ok((map::read(&folder.join(depth))?, mm))).collect()
 }
 
-/// Files and true depths (mm) of a list of patterns.
 pub fn list(list: &Path) -> Result<Vec<(PathBuf, f64)>> {
     const EXPECTED: &str = "a list of [[pattern]] with depth = FILE and true_mm = MM";
     let text = fs::read_to_string(list).map_err(WorkflowError::read("the list of patterns", list))?;

@@ -1,5 +1,4 @@
-//! Fits a point spread function to pairs of a flat, textured target: k of a Gaussian, p and k of a
-//! generalised one, or a radial profile.
+//! Fits a point spread function to pairs of a flat, textured target.
 
 use std::path::PathBuf;
 
@@ -129,7 +128,6 @@ pub struct PsfFigures {
     pub verdict: String,
     /// Assumed distance of the target; the first of several.
     pub target_mm: f64,
-    /// Distances of several targets.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub targets_mm: Vec<f64>,
     /// Displacement of each near image, if any.
@@ -192,7 +190,6 @@ pub fn fit(settings: &CalibratePsfRequest, context: &Context<'_>) -> Result<PsfF
     })
 }
 
-/// Reason to doubt a calibration.
 fn doubt(found: &PsfFit, model: Model) -> Option<String> {
     let width = found.width();
     match found.verdict() {

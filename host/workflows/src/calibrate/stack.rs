@@ -104,20 +104,15 @@ pub struct StackFigures {
     pub psf: String,
     /// Largest blur radius, binned px.
     pub max_blur_px: f64,
-    /// Working range of a pair.
     pub range_mm: f64,
     /// Blur radius per slice before and behind the focus, unbinned px.
     pub blur_per_slice_px: [f64; 2],
-    /// For every slice: distance from the focus (slices) and blur radius in excess of the sharpest slice's
-    /// (unbinned px).
+    /// Per slice: distance from the focus (slices), blur radius above the sharpest slice's (unbinned px).
     pub blur: Vec<[f64; 2]>,
     /// Least blur radius, binned px.
     pub blur_floor_px: f64,
-    /// Learned part of the range.
     pub learned_mm: f64,
-    /// `1.4826 x` median of
-    /// error
-    /// on held-out parts of the target.
+    /// `1.4826 x` median of |error| on held-out parts of the target.
     pub robust_mm: f64,
     /// On held-out parts, as the following.
     pub rms_mm: f64,
@@ -136,7 +131,6 @@ pub struct StackFigures {
     pub pairs: usize,
 }
 
-/// Calibrates and saves the lens.
 pub fn calibrate(request: &CalibrateStackRequest, context: &Context<'_>) -> Result<StackFigures> {
     let mut files = files(&request.folder)?;
     if request.near_first {

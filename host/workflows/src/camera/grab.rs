@@ -20,14 +20,12 @@ use crate::{
 };
 
 pub const GRAB_FILE: &str = "grab.toml";
-/// Longest single wait, so that cancelling takes effect soon.
 const SLICE: Duration = Duration::from_millis(200);
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum PictureFormat {
     /// Values of more than 8 bits are shifted to 16.
     Png,
-    /// Unchanged values.
     Tiff,
 }
 
@@ -47,8 +45,7 @@ pub struct GrabFigures {
     pub height: usize,
     /// Significant bits.
     pub bits: u8,
-    /// Images counted by the camera but not stored: lost, or too fast for this computer. `None` if the camera
-    /// does not count.
+    /// Images counted by the camera (if it counts) but not stored: lost, or too fast for this computer.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub passed_over: Option<u64>,
 }

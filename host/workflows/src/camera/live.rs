@@ -14,14 +14,12 @@ use crate::{
     figures::rounded,
 };
 
-/// Longest single wait, so that cancelling takes effect soon.
 const SLICE: Duration = Duration::from_millis(100);
 
 #[derive(Clone, PartialEq, Debug)]
 pub struct LiveSettings {
     pub camera: CameraChoice,
     pub measure: FocusMeasure,
-    /// Interval between reports.
     pub every: Duration,
     /// End after this time; without it, when cancelled.
     pub seconds: Option<f64>,
@@ -30,7 +28,6 @@ pub struct LiveSettings {
 /// Figures of the last image of an interval.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct LiveFigures {
-    /// Images received and measured.
     pub frames_per_s: f64,
     /// `None` for a dark image or one smaller than 8x8 px.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -43,8 +40,8 @@ pub struct LiveFigures {
     pub bits: u8,
 }
 
-/// Reports figures at intervals until time is up or cancelled, which is not an error. Warns about an interval
-/// without images. Returns the number of images.
+/// Reports figures at intervals until time is up or cancelled (not an error); returns the number of images.
+/// Warns about an interval without images.
 pub fn live(
     settings: &LiveSettings,
     line: &mut dyn FnMut(&LiveFigures) -> std::io::Result<()>,

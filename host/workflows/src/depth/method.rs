@@ -15,7 +15,6 @@ pub enum Method {
     RationalOperators,
     /// `whitened`: operators with a white residual.
     Whitened,
-    /// Published methods.
     Baseline(baselines::Method),
 }
 
@@ -49,7 +48,6 @@ impl fmt::Display for Method {
     }
 }
 
-/// A method with its data.
 pub enum Prepared {
     RationalOperators(Arc<Operators>),
     /// Its kernels are designed for the optics.
@@ -89,7 +87,6 @@ impl Prepared {
         }
     }
 
-    /// Converts to the library's type.
     pub fn as_real(&self) -> DepthMethod<'_> {
         match self {
             Self::RationalOperators(operators) => DepthMethod::Rational(operators),

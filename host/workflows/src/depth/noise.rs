@@ -21,7 +21,6 @@ const SLOPE_STEP_MM: f32 = 0.5;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum CameraNoise {
-    /// Estimated from the pair's residual.
     Estimated,
     Camera {
         /// Electrons from black to the largest code (float images: to the value 1).
@@ -137,7 +136,6 @@ impl CameraNoise {
 
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct Uncertainty {
-    /// Source of the noise.
     pub noise: String,
     /// Over pixels with a value.
     pub median_sd_mm: f64,
@@ -145,10 +143,8 @@ pub struct Uncertainty {
     pub p95_sd_mm: f64,
 }
 
-/// Inputs of the standard deviation.
 pub struct Source<'a> {
     pub samples: Samples,
-    /// The measured pair.
     pub prepared: &'a Prepared,
     /// Single-window rational operators used for the depth, if any.
     pub operators: Option<&'a Operators>,

@@ -53,7 +53,6 @@ const OUTPUTS: &[Output] = &[
     Output { names: &["exr"], file: "depth.exr", write: |results, to| results.exr(to) },
 ];
 
-/// All files of a result except its record.
 pub(crate) fn files() -> impl Iterator<Item = &'static str> {
     OUTPUTS.iter().map(|output| output.file)
 }
@@ -66,7 +65,6 @@ const UNCERTAINTY: &str = "uncertainty.npy";
 /// Default outputs.
 const USUAL: [&str; 5] = ["npy", "tiff", "png", "mesh", "view"];
 
-/// Outputs to write.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Outputs(BTreeSet<&'static str>);
 
@@ -88,7 +86,6 @@ impl Outputs {
         names
     }
 
-    /// Whether an output shows the image.
     pub(super) fn show_image(&self) -> bool {
         self.0.contains(MESH)
     }
@@ -107,7 +104,6 @@ impl Default for Outputs {
 impl FromStr for Outputs {
     type Err = UnknownOutput;
 
-    /// Parses a list such as `npy,exr`.
     fn from_str(text: &str) -> Result<Self, UnknownOutput> {
         let known = |name: &str| {
             let found = Self::names().into_iter().find(|known| *known == name.trim());
@@ -130,7 +126,6 @@ pub(super) struct Results<'a> {
     computed: &'a Computed,
     /// Scale of depth.png's codes, mm, if written.
     scale: Option<Scale>,
-    /// Provenance, TOML.
     record: String,
 }
 

@@ -44,8 +44,7 @@ impl Pair {
     }
 }
 
-/// Warns if the file names contradict their order. A swapped pair gives a plausible but mirrored map, so only
-/// the names can show it.
+/// Warns if the file names contradict their order, because a swapped pair gives a plausible mirrored map.
 pub fn swapped_by_names(far: &Path, near: &Path) -> Option<String> {
     named_the_other_way_round(far, near).then(|| {
         format!(
@@ -64,7 +63,6 @@ fn named_the_other_way_round(far: &Path, near: &Path) -> bool {
     says(far, "near", "far") && says(near, "far", "near")
 }
 
-/// File name without folders, for records.
 pub fn name_of(path: &Path) -> String {
     path.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }

@@ -31,7 +31,6 @@ impl Part {
     }
 }
 
-/// The part to read, and the part of it to keep.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(super) struct Cut {
     wanted: Rectangle,
@@ -40,8 +39,8 @@ pub(super) struct Cut {
 }
 
 impl Cut {
-    /// Cuts a part with a margin out of a pair. Without `around` keeps the whole images, for instance because
-    /// distortion depends on the position.
+    /// Cuts a part with a margin. Without `around` keeps the whole images: distortion depends on the
+    /// position.
     pub fn out_of(pair: &mut Pair, wanted: Rectangle, around: Option<usize>) -> Result<Self> {
         let image @ (height, width) = pair.far.dim();
         wanted.check_within(image)?;
@@ -61,7 +60,6 @@ impl Cut {
         Ok(cut)
     }
 
-    /// A camera's frames of the same part.
     pub fn frames(&self, frames: &CameraFrames) -> Result<CameraFrames> {
         let (height, width) = frames.dark().dim();
         if (height, width) != self.image {

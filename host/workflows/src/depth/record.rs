@@ -19,7 +19,6 @@ struct Record<'a> {
     near: String,
     units: &'static str,
     warnings: &'a [String],
-    /// Written outputs, if not the default.
     #[serde(skip_serializing_if = "Option::is_none")]
     write: Option<String>,
     /// Scale of depth.png's codes, mm; code 0 = no value.

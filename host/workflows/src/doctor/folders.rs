@@ -1,5 +1,3 @@
-//! Checks folders for writing.
-
 use std::{
     env, fs,
     path::{Path, PathBuf},
@@ -8,7 +6,6 @@ use std::{
 use super::{Finding, Health};
 use crate::operator_cache;
 
-/// Checks the current, named and cache folders.
 pub(super) fn findings(named: &[PathBuf]) -> Vec<Finding> {
     let mut findings = vec![env::current_dir().map_or_else(
         |error| {

@@ -1,5 +1,3 @@
-//! Serial ports and access rights.
-
 use farnear_capture::transport::ports;
 
 use super::{Finding, Health};
@@ -57,8 +55,8 @@ struct Rights {
     group: u32,
 }
 
-/// Whether the user of this `/proc/self/status` may read and write; `None` if unknown. Does not open the
-/// port, because this resets some boards.
+/// Whether this user (`/proc/self/status`) may read and write; `None` if unknown. Opening would reset some
+/// boards.
 #[cfg(unix)]
 fn may_open(rights: &Rights, status: &str) -> Option<bool> {
     let numbers = |name: &str| -> Option<Vec<u32>> {

@@ -1,8 +1,8 @@
-//! Detects and omits frames of a stack that show another scene, are rotated or shaken.
+//! Omits frames of a stack that show another scene, are rotated or shaken.
 //!
 //! Each image is correlated with the nearest good one in the band that defocus keeps in both. A correlation
-//! far below the median shows another scene. A shaken frame correlates, but is less sharp than both
-//! neighbours almost everywhere, unlike any change of focus.
+//! far below the median shows another scene. A shaken frame is less sharp than both neighbours almost
+//! everywhere, unlike any change of focus.
 
 use farnear_depth::{
     focus_measure::FocusMeasure,
@@ -19,10 +19,9 @@ use crate::{context::Context, error::Result};
 const FOREIGN: f64 = 0.5;
 /// Median correlation below which links are not reliable: no texture, or steps too wide.
 const TELLING: f64 = 0.4;
-/// Blocks per side for comparing sharpness.
 const BLOCKS: usize = 6;
-/// Least sharpness of a block relative to its less sharp neighbour, and share of blocks below it in a shaken
-/// frame.
+/// Sharpness of a block relative to its less sharp neighbour, and share of blocks, below which a frame is
+/// shaken.
 const SHAKEN: f64 = 0.75;
 const SHAKEN_BLOCKS: f64 = 0.75;
 
@@ -77,9 +76,7 @@ pub(super) fn check(images: &[Array2<f32>], model: Option<Model>, context: &Cont
 
 struct Chain {
     warps: Vec<Warp>,
-    /// Frames that do not fit, with their correlation.
     foreign: Vec<(usize, f64)>,
-    /// Median correlation of the links.
     usual: f64,
 }
 
@@ -182,7 +179,6 @@ mod tests {
 
     const COUNT: usize = 11;
 
-    /// A scene of two layers, with a texture blurred to varying extent.
     fn stack() -> Vec<Array2<f32>> {
         let texture = scene(1);
         (0..COUNT)

@@ -18,7 +18,6 @@ use crate::{
 pub(super) enum Axis {
     /// Distance from lens to object. Sensor distance is linear in its reciprocal.
     ObjectMm,
-    /// Stage position.
     StageUm,
     /// Image number, from 1.
     Number,
@@ -27,9 +26,7 @@ pub(super) enum Axis {
 pub(super) struct Listed {
     pub images: Vec<PathBuf>,
     pub axis: Axis,
-    /// On the axis.
     pub positions: Vec<f64>,
-    /// Files with the optics and positions.
     pub described_by: Vec<PathBuf>,
     pub optics: Option<Optics>,
     /// Side of a pixel at the object, from the file's metadata.
@@ -85,7 +82,6 @@ pub(super) fn of(request: &FocusStackRequest) -> Result<Listed> {
     Ok(Listed { images, axis, positions, described_by, optics, object_pixel_um, remarks: listed.remarks })
 }
 
-/// The lens, if any file describes it. Invalid optics are an error.
 fn lens(request: &FocusStackRequest) -> Result<Option<Optics>> {
     // A far image's path gives the folder; any name in it works.
     let found = optics::of_pair(request.optics.as_deref(), &request.stack.join("stack.png"));
@@ -148,7 +144,6 @@ impl Listed {
         depth_at(place, self.axis, &self.even_positions())
     }
 
-    /// Removes images by index.
     pub(super) fn without(&mut self, left_out: &[usize]) {
         for index in left_out.iter().rev() {
             self.images.remove(*index);
@@ -157,8 +152,7 @@ impl Listed {
     }
 }
 
-/// Coordinates for [`farnear_depth::focus_stack::depth_from_positions`], for images focused at these
-/// distances or evenly spaced.
+/// Coordinates for [`farnear_depth::focus_stack::depth_from_positions`]; evenly spaced without distances.
 pub fn even_positions(count: usize, focused_at_mm: Option<&[f64]>) -> Vec<f64> {
     match focused_at_mm {
         Some(mm) => mm.iter().map(|mm| Axis::ObjectMm.even(*mm)).collect(),
@@ -166,7 +160,7 @@ pub fn even_positions(count: usize, focused_at_mm: Option<&[f64]>) -> Vec<f64> {
     }
 }
 
-/// Depth at each position in a stack: mm if the distances are known, else the image number from 1.
+/// In mm if the distances are known, else the image number from 1.
 pub fn depth_of_places(place: &Array2<f32>, count: usize, focused_at_mm: Option<&[f64]>) -> Array2<f32> {
     let axis = if focused_at_mm.is_some() { Axis::ObjectMm } else { Axis::Number };
     depth_at(place, axis, &even_positions(count, focused_at_mm))

@@ -12,7 +12,6 @@ use crate::error::WorkflowError;
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct DifferenceFigures {
     pub unit: Unit,
-    /// Pixels with a depth in both maps.
     pub pixels: usize,
     /// Mean of second minus first; `None` without pixels, as the next two.
     pub mean: Option<f64>,
@@ -32,8 +31,8 @@ impl Serialize for DifferenceFigures {
     }
 }
 
-/// The second map minus the first (NaN without a value) and its figures. Both are result folders or map files
-/// of equal size and unit.
+/// The second map minus the first, NaN without a value. Both are result folders or map files of equal size
+/// and unit.
 pub fn difference(first: &Path, second: &Path) -> crate::Result<(Array2<f32>, DifferenceFigures)> {
     let [first, second] = [read_map(first)?, read_map(second)?];
     let unit = shared_unit("difference", &first, &second)?;

@@ -22,7 +22,6 @@ use crate::{
     result_folder::{DEPTH_RECORD, STACK_RECORD},
 };
 
-/// Used part of `depth.toml`.
 #[derive(Deserialize)]
 struct DepthRecord {
     optics: Optics,
@@ -30,7 +29,6 @@ struct DepthRecord {
     png: Option<Scale>,
 }
 
-/// Used part of `stack.toml`.
 #[derive(Deserialize)]
 struct StackRecord {
     unit: Unit,
@@ -51,7 +49,6 @@ pub(crate) struct MapFile {
     pub unit: Option<Unit>,
 }
 
-/// Reads a map file, or the map of a result folder.
 pub(crate) fn read_map(path: &Path) -> Result<MapFile> {
     let (file, folder) = file_and_folder(path);
     let record = record_of(&folder)?;
@@ -87,7 +84,7 @@ fn lens(optics: &Optics, part: Option<Part>) -> Lateral {
     })
 }
 
-/// The map's file and folder; in a folder the first of depth.npy, depth.tiff and depth.png.
+/// In a folder the first of depth.npy, depth.tiff and depth.png.
 fn file_and_folder(path: &Path) -> (PathBuf, PathBuf) {
     if !path.is_dir() {
         return (path.into(), path.parent().unwrap_or(Path::new("")).into());

@@ -20,8 +20,7 @@ pub struct Plane {
     pub peak_to_valley_mm: f64,
 }
 
-/// A plane in a map of any unit; the lengths of [`Plane`] are in that unit. Without a pixel size, slopes are
-/// per pixel and there is no tilt.
+/// A plane in a map of any unit. Without a pixel size, slopes are per pixel and there is no tilt.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct PlaneFigures {
     pub unit: Unit,

@@ -11,7 +11,6 @@ pub struct ProfilePoint {
     /// Distance from the start of the profile.
     pub at_px: f64,
     pub depth: Option<f64>,
-    /// If computed.
     pub deviation: Option<f64>,
 }
 

@@ -16,12 +16,10 @@ pub struct RegionFigures {
     pub fill_rate: f64,
     /// `None` without any depth, as the next five.
     pub mean: Option<f64>,
-    /// Standard error of the mean from block means, because neighbouring depths share windows. `None` with
-    /// fewer than four blocks.
+    /// From block means, because neighbouring depths share windows. `None` with fewer than four blocks.
     pub standard_error: Option<f64>,
     pub median: Option<f64>,
     pub standard_deviation: Option<f64>,
-    /// Smallest and largest.
     pub range: Option<[f64; 2]>,
     /// Root mean square of the predicted deviations.
     pub predicted_deviation: Option<f64>,
@@ -48,7 +46,6 @@ impl Serialize for RegionFigures {
     }
 }
 
-/// Figures of a region inside the map.
 pub fn region(map: &Measured, at: Rectangle) -> crate::Result<RegionFigures> {
     map.check(&at)?;
     let Rectangle { x, y, width, height } = at;

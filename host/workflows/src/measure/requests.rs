@@ -1,5 +1,3 @@
-//! Measurement requests.
-
 use std::path::PathBuf;
 
 use schemars::JsonSchema;

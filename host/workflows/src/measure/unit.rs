@@ -8,7 +8,6 @@ use serde::{Deserialize, Serialize, ser::SerializeMap};
 pub enum Unit {
     #[default]
     Mm,
-    /// Stage positions.
     Um,
     /// Image numbers in a stack, from 1.
     Image,
@@ -25,8 +24,7 @@ impl std::fmt::Display for Unit {
 }
 
 impl Unit {
-    /// Whether a value is a depth. Stage positions may have any sign; otherwise 0, negative values, NaN and
-    /// infinity are holes.
+    /// Positions may have any sign; otherwise 0, negative values, NaN and infinity are holes.
     pub fn is_depth(self, value: f32) -> bool {
         if self == Self::Um { value.is_finite() } else { is_depth(value) }
     }
@@ -56,12 +54,10 @@ impl<M: SerializeMap> Entries<M> {
         self.to.serialize_entry(name, value)
     }
 
-    /// A length along the axis, if any.
     pub fn length(&mut self, name: &str, value: Option<impl Serialize>) -> Result<(), M::Error> {
         value.map_or(Ok(()), |value| self.field(&format!("{name}_{}", self.unit.suffix()), &value))
     }
 
-    /// A change of depth per pixel, if any.
     pub fn per_pixel(&mut self, name: &str, value: Option<f64>) -> Result<(), M::Error> {
         value.map_or(Ok(()), |value| self.field(&format!("{name}_{}_per_px", self.unit.suffix()), &value))
     }

@@ -10,13 +10,11 @@ use serde::Serialize;
 
 /// Per axis.
 const FREQUENCIES: usize = 64;
-/// Depths averaged over.
 const DEPTHS: usize = 9;
 /// Variance of a pixel's noise / mean squared: 8 bit, 9,000 electrons, read noise of 12 electrons.
 const NOISE_VARIANCE: f64 = 1.19e-4;
-/// Default windows of both methods and their error / bound. Measured: 1.07 and 1.08 on rendered planes; 1.1
-/// to 1.4 and 1.3 to 1.5 on slants through the whole range with four proposed lenses. The larger values are
-/// used.
+/// Default windows and error / bound. Measured: 1.07 and 1.08 on rendered planes; 1.1 to 1.4 and 1.3 to 1.5
+/// on slants through the whole range with four proposed lenses. The larger values are used.
 const RATIONAL: Reached = Reached { window_px: 7.0, above_bound: 1.37 };
 const WHITENED: Reached = Reached { window_px: 21.0, above_bound: 1.5 };
 
@@ -34,8 +32,8 @@ pub struct ExpectedError {
     pub whitened_mm: f64,
 }
 
-/// Expected error for a texture with standard deviation / mean = `contrast`, with `binning` x `binning`
-/// sensor pixels per image pixel.
+/// For a texture with standard deviation / mean = `contrast`, and `binning` x `binning` sensor pixels per
+/// pixel.
 pub fn expected_error(optics: &Optics, contrast: f64, binning: usize) -> ExpectedError {
     let otf = optics.psf().otf(1.1 * optics.max_blur_px());
     let noise = NOISE_VARIANCE / (binning * binning) as f64;
@@ -61,8 +59,7 @@ pub fn expected_error(optics: &Optics, contrast: f64, binning: usize) -> Expecte
     ExpectedError { ro_mm: of(&RATIONAL), whitened_mm: of(&WHITENED) }
 }
 
-/// Radial frequencies (rad/px) and their share of the texture's variance: a 1/w spectrum sampled by square
-/// pixels.
+/// Radial frequencies (rad/px) and share of the texture's variance: a 1/w spectrum sampled by square pixels.
 fn spectrum(contrast: f64) -> Vec<(f64, f64)> {
     let axis = |index: usize| {
         let signed = index as f64 - if index > FREQUENCIES / 2 { FREQUENCIES as f64 } else { 0.0 };

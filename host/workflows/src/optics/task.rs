@@ -1,5 +1,4 @@
-//! `farnear optics`: what a pair with given optics can measure, and optics for a given distance, range and
-//! error.
+//! What a pair with given optics can measure, and optics for a given distance, range and error.
 
 use std::path::PathBuf;
 
@@ -23,10 +22,8 @@ use crate::{
 /// Limit of the operators' blur radius, px, and its target.
 const USABLE_BLUR_PX: [f64; 2] = [2.0, 4.0];
 const BEST_BLUR_PX: f64 = 2.7;
-/// Common lenses.
 const FOCAL_LENGTHS_MM: [f64; 14] =
     [8.0, 12.0, 16.0, 25.0, 35.0, 50.0, 75.0, 85.0, 100.0, 135.0, 150.0, 180.0, 200.0, 300.0];
-/// Full stops of common lenses.
 const STOPS: [f64; 6] = [1.4, 2.0, 2.8, 4.0, 5.6, 8.0];
 const BINNINGS: [usize; 4] = [1, 2, 4, 8];
 /// Closest focus of these lenses, in focal lengths.
@@ -160,14 +157,11 @@ pub struct OpticsFigures {
     /// Exposures to average for the accepted error.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub averaged_exposures: Option<usize>,
-    /// Largest blur radius in the range.
     pub max_blur_px: f64,
-    /// Limit of valid depths.
     pub farthest_usable_mm: f64,
     pub nearest_usable_mm: f64,
     /// Side of a pixel at the object at mid-range.
     pub pixel_at_object_mm: f64,
-    /// What to change.
     pub advice: Vec<String>,
     /// From noise, root mean square.
     pub expected_error_ro_mm: f64,
@@ -246,14 +240,12 @@ fn advice(optics: &Optics) -> Vec<String> {
     advice
 }
 
-/// Near focus distance for a given blur, with the other optics unchanged.
 fn of_blur(optics: &Optics, blur_px: f64) -> Option<f64> {
     let mut file = OpticsFile::from(*optics);
     file.focus = FocusSection { max_blur_px: Some(blur_px), near_mm: None, ..file.focus };
     file.check().ok().map(|optics| optics.working_range().near_mm)
 }
 
-/// Proposes optics for a given distance, range and error.
 fn propose(request: &OpticsRequest) -> Result<(Optics, OpticsFigures)> {
     let (distance, range) = (request.distance_mm.unwrap_or(f64::NAN), request.range_mm.unwrap_or(f64::NAN));
     let accepted = request.error_mm.unwrap_or(f64::INFINITY);

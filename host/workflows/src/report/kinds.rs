@@ -1,5 +1,3 @@
-//! Contents of the page by kind of folder.
-
 use std::{fmt::Write as _, fs, path::Path};
 
 use super::{
@@ -14,7 +12,6 @@ use crate::{
 
 /// Most pictures shown: a result can have thousands of masks.
 const PICTURES_MAX: usize = 12;
-/// Extensions of records and tables.
 const TEXTS: [&str; 5] = ["toml", "json", "jsonl", "csv", "md"];
 /// Records that identify a farnear result.
 const RECORDS: [&str; 8] = [
@@ -28,7 +25,6 @@ const RECORDS: [&str; 8] = [
     "batch.toml",
 ];
 
-/// Page of a capture, with depth if available.
 pub(super) fn capture(folder: &Path) -> Result<String> {
     let capture = sessions::read(folder)?;
     let mut page = begun(&capture.name, &subtitle(&capture));
@@ -54,7 +50,6 @@ pub(super) fn capture(folder: &Path) -> Result<String> {
     Ok(page.end())
 }
 
-/// Page of a depth map or a focus stack.
 pub(super) fn depth_result(folder: &Path) -> Result<String> {
     let (record, kind) = if folder.join(DEPTH_RECORD).is_file() {
         (DEPTH_RECORD, "depth from a far- and a near-focused image")
@@ -69,7 +64,6 @@ pub(super) fn depth_result(folder: &Path) -> Result<String> {
     Ok(page.end())
 }
 
-/// Page of any other result: pictures, records and tables.
 pub(super) fn other(folder: &Path) -> Result<String> {
     let entries = fs::read_dir(folder).and_then(Iterator::collect::<std::io::Result<Vec<_>>>);
     let entries = entries.map_err(WorkflowError::read("the folder", folder))?;

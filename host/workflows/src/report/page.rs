@@ -8,7 +8,6 @@ use crate::{
     measure::{PlaneFigures, RegionFigures},
 };
 
-/// Most characters of a text file.
 const TEXT_MAX: usize = 20_000;
 
 pub(super) struct Page(pub String);
@@ -56,7 +55,6 @@ impl Page {
         self.0.push_str("</table>");
     }
 
-    /// A text file of the folder, truncated if long.
     pub fn text(&mut self, heading: &str, text: &str) {
         let end = text.char_indices().nth(TEXT_MAX).map_or(text.len(), |(at, _)| at);
         let cut = if end < text.len() { "\n..." } else { "" };

@@ -1,5 +1,3 @@
-//! Lists and clears alarms.
-
 use farnear_capture::describe::alarm_text;
 use serde::Serialize;
 

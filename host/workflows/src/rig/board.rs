@@ -1,5 +1,3 @@
-//! Reads the board's counters and restarts it.
-
 use farnear_capture::describe::{alarm_text, cause_name};
 use serde::Serialize;
 
@@ -13,7 +11,6 @@ pub struct CounterFigures {
     pub alarms: u32,
     pub triggers: u64,
     pub coarse_steps: u64,
-    /// Steps of the lens stage.
     pub lens_steps: u64,
     pub homings: u32,
     /// Records with one bad copy.
@@ -22,9 +19,7 @@ pub struct CounterFigures {
 
 #[derive(Clone, PartialEq, Eq, Debug, Serialize)]
 pub struct ResetFigures {
-    /// Boot number before the reset.
     pub boot_before: u32,
-    /// Boot number after the reset.
     pub boot: u32,
     /// Reset cause reported by the board.
     pub cause: &'static str,

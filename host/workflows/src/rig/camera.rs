@@ -26,7 +26,6 @@ use crate::{
 
 #[derive(Clone, PartialEq, Eq, Debug, Default)]
 pub enum CameraAddress {
-    /// The emulated rig's camera.
     #[default]
     Emulated,
     /// Camera of a running `farnear-sim`, HOST:PORT.
@@ -39,7 +38,6 @@ pub enum CameraAddress {
     Genicam(String),
 }
 
-/// Formats of an address.
 pub const ADDRESSES: &str = "sim, HOST:PORT, folder:DIR, command:\"PROGRAM ...\", v4l:DEVICE or genicam:ID";
 
 impl FromStr for CameraAddress {
@@ -111,11 +109,9 @@ fn not_built(kind: &str, address: impl std::fmt::Display, feature: &str) -> Work
 pub struct CameraSettings {
     pub address: CameraAddress,
     pub exposure: Micros,
-    /// Longest wait for an image.
     pub image_wait: Duration,
     /// Controls to set before any motion, in this order; never the exposure.
     pub settings: Vec<Setting>,
-    /// Light outputs of the board during each exposure.
     pub light: Option<LightLevels>,
 }
 
@@ -149,7 +145,6 @@ pub struct EarlyCamera {
     settings: CameraSettings,
 }
 
-/// Reason why the emulated camera needs the emulated rig.
 const OF_THE_EMULATED_RIG: &str = "it belongs to the emulated rig";
 
 impl CameraSettings {
@@ -241,7 +236,6 @@ pub struct EquippedRig {
 }
 
 impl EquippedRig {
-    /// Checks an exposure against the limits of board and camera.
     fn check_exposure(&mut self, exposure: Micros) -> Result<()> {
         check_exposure(&self.rig.client, exposure).map_err(CaptureError::from)?;
         let asked = f64::from(exposure.0);

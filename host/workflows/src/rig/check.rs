@@ -1,7 +1,6 @@
-//! Bring-up checklist: steps in order, each with a verdict and details.
+//! Bring-up checklist. Prompts the user before each manual step and measures the rest.
 //!
-//! Prompts the user before each manual step and measures the rest. An emulated rig skips manual steps; their
-//! detail names the later step that covers the same fault.
+//! An emulated rig skips manual steps; their detail names the later step that covers the same fault.
 
 mod actuation;
 mod moving;
@@ -28,7 +27,6 @@ struct Step {
 
 /// Related steps. A phase with a failure is the last one.
 struct Phase {
-    /// Whether motors move.
     moves: bool,
     /// Whether the first failure ends the phase, because each step depends on the one before.
     in_turn: bool,
@@ -171,20 +169,17 @@ impl Checklist {
     }
 }
 
-/// Verdict and detail of a step.
 type Found = Result<(Verdict, String)>;
 
 struct Checkup<'a> {
     equipped: EquippedRig,
     settings: &'a CheckRequest,
     context: &'a Context<'a>,
-    /// Whether a user can press switches.
     actuation: bool,
     outcomes: Vec<Outcome>,
 }
 
-/// Runs the checklist. Fails for a missing camera or rig and when cancelled. Any other error is a failed
-/// step.
+/// Fails for a missing camera or rig and when cancelled. Any other error is a failed step.
 pub fn check(settings: &CheckRequest, context: &Context<'_>) -> Result<Checklist> {
     let equipped = settings.camera.connect(&settings.rig, None, context)?;
     let actuation = !settings.no_actuation && !equipped.rig.client.hello().emulated;
@@ -242,7 +237,6 @@ impl Checkup<'_> {
         self.context.info(&format!("   {what}"));
     }
 
-    /// Waits until the user confirms the manual step.
     fn ask(&self, what: &str) -> Result<()> {
         self.answer(&format!("   {what}, then press Enter: ")).map(|_| ())
     }

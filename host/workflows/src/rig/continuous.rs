@@ -1,5 +1,4 @@
-//! Continuous capture: far and near images, or a cycle of shots, at a pace kept by the board, until the end
-//! or cancellation.
+//! Continuous capture: pairs, or a cycle of shots, at a pace kept by the board.
 
 mod figures;
 mod folder;
@@ -134,8 +133,7 @@ struct Ready {
     pair: Option<(GivenOptics, SensorPair, Reach)>,
 }
 
-/// Captures until the end. Cancelling is not an error: the figures cover the frames taken. Checks everything
-/// before any motion.
+/// Cancelling is not an error: the figures cover the frames taken. Checks everything before any motion.
 pub fn run(settings: &ContinuousRequest, context: &Context<'_>) -> Result<ContinuousFigures> {
     let pace = settings.pace()?;
     let (program, optics) = match (&settings.program, &settings.optics) {

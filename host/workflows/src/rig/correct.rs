@@ -75,14 +75,12 @@ pub struct BoardCorrectFigures {
     pub height: usize,
     /// Positive = farther.
     pub mean_change_mm: f64,
-    /// Pixels that differ in their bits from this computer's calculation.
     pub different_pixels: usize,
     pub rows_per_second: f64,
     #[serde(skip)]
     pub first_difference: Option<PixelDifference>,
 }
 
-/// A pixel for which board and host calculate different depths.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct PixelDifference {
     pub row: usize,
@@ -140,7 +138,6 @@ pub fn correct(settings: &BoardCorrectRequest, context: &Context<'_>) -> Result<
     })
 }
 
-/// Returns the number of pixels with different bits, and the first one.
 fn compare(board: &Array2<f32>, host: &Array2<f32>) -> (usize, Option<PixelDifference>) {
     let mut different =
         board.indexed_iter().zip(host).filter(|((_, board), host)| board.to_bits() != host.to_bits()).map(

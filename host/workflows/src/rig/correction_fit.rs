@@ -95,7 +95,6 @@ impl RigRequest for FitRequest {
 pub struct FitFigures {
     pub method: String,
     pub targets: usize,
-    /// Pixels taken from all maps.
     pub samples: usize,
     pub coefficients: usize,
     /// Coefficients that differ from this computer's.

@@ -113,7 +113,6 @@ pub struct FocusFigures {
     pub m2_mm: f64,
     /// Far end of the working range: the target's distance.
     pub far_mm: f64,
-    /// Near end of the working range.
     pub near_mm: f64,
     /// Offset of the normalised depth.
     pub alpha0_mm: f64,
@@ -121,7 +120,6 @@ pub struct FocusFigures {
     pub coarse_um: f64,
     pub fine_um: f64,
     pub board_ms: f64,
-    /// Stepper positions measured.
     pub places: usize,
     pub exposures: usize,
 }

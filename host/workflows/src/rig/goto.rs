@@ -17,7 +17,6 @@ use crate::{context::Context, error::Result, optics::GivenOptics};
 pub enum Focus {
     /// Sharp at the far end of the working range.
     Far,
-    /// Sharp at its near end.
     Near,
 }
 
@@ -35,8 +34,7 @@ pub struct GotoFigures {
     pub fine_um: f64,
 }
 
-/// Homes if needed, moves the coarse stage so that the piezo reaches both focus positions, and moves the
-/// piezo.
+/// Homes if needed. Moves the coarse stage so that the piezo reaches both foci, then the piezo.
 pub fn goto(settings: &GotoSettings, context: &Context<'_>) -> Result<GotoFigures> {
     let optics = GivenOptics::read(&settings.optics)?;
     let range = optics.optics.working_range();

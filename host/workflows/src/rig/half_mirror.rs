@@ -22,15 +22,13 @@ use crate::{
     parameters::within,
 };
 
-/// Limits of the distance between both sensors along the optical axis, um: a thousandth of a piezo's travel,
-/// and far more than any lens needs.
+/// Distance between both sensors along the optical axis, um: a thousandth of a piezo's travel to far more
+/// than any lens needs.
 const FURTHER_UM: std::ops::RangeInclusive<f64> = 0.1..=10_000.0;
-/// Relative difference from the distance of the optics above which a warning is given. Depth is off by about
-/// the same share of the working range.
+/// Relative difference from the optics' distance that gives a warning: depth is off by about the same share.
 const UNLIKE: f64 = 0.005;
 
-/// Captures a pair in one exposure: homes if needed, moves the stage to the far focus, triggers both cameras.
-/// Checks everything before any motion.
+/// Homes if needed, moves to the far focus, triggers both cameras. Checks everything before any motion.
 pub(super) fn capture(settings: &CaptureRequest, context: &Context<'_>) -> Result<PairFigures> {
     let CaptureRequest { camera, average: averaged, out, .. } = settings;
     let optics = GivenOptics::read(&settings.optics)?;
@@ -110,7 +108,6 @@ fn second_address(settings: &CaptureRequest) -> Result<CameraAddress> {
     }
 }
 
-/// Warning if the sensors' distance does not match the optics.
 fn doubt(optics: &Optics, sensor: &SensorPair, further_um: f64) -> Option<String> {
     let asked_um = (sensor.near_mm - sensor.far_mm) * 1e3;
     if (further_um / asked_um - 1.0).abs() <= UNLIKE {

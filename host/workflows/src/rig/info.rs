@@ -1,5 +1,3 @@
-//! Identification, limits and positions of the board.
-
 use farnear_capture::describe::{alarm_text, cause_name, program_name, state_name, um};
 use farnear_protocol::message::AxisStatus;
 use serde::Serialize;

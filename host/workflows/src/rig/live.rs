@@ -18,7 +18,6 @@ use crate::{
     error::{Result, WorkflowError},
 };
 
-/// Approximate length of a program.
 const PROGRAM: Duration = Duration::from_millis(250);
 /// Consecutive programs without their first image after which the live image fails.
 const LOST_MAX: u32 = 8;

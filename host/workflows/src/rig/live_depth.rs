@@ -38,8 +38,7 @@ pub struct LiveDepth<'a> {
     pub latency_ms: f64,
 }
 
-/// Passes each pair with its depth to `on_depth` until it or the context stops. Homes if needed. Stops the
-/// rig before returning.
+/// Passes each pair to `on_depth` until it or the context stops. Homes if needed; stops the rig at the end.
 pub fn watch(
     settings: &LiveDepthSettings,
     context: &Context<'_>,

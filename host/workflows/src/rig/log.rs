@@ -15,11 +15,9 @@ use crate::{
     error::{Result, WorkflowError},
 };
 
-/// Longest single wait, so that cancelling takes effect soon.
 const SLICE: Duration = Duration::from_millis(100);
 /// Interval between requests if the board's time stops without them.
 const NUDGE: Duration = Duration::from_millis(20);
-/// Expected contents of the ELF file.
 const TEXTS: &str = "the texts of the firmware's log";
 
 #[derive(Clone, PartialEq, Debug)]
@@ -29,7 +27,6 @@ pub struct LogSettings {
     pub elf: Option<PathBuf>,
     /// End after this time; without it, when cancelled.
     pub seconds: Option<f64>,
-    /// Whether to reset the board first, to log its start.
     pub reset: bool,
 }
 
@@ -43,8 +40,7 @@ impl<F: FnMut(&str) -> io::Result<()>> LogSink for F {
     }
 }
 
-/// Follows the log until the time is up or it is cancelled, which is not an error. Returns the number of
-/// lines.
+/// Ends when the time is up or when cancelled (not an error). Returns the number of lines.
 pub fn follow(settings: &LogSettings, sink: &mut dyn LogSink, context: &Context<'_>) -> Result<usize> {
     let table = settings.elf.as_deref().map(read_table).transpose()?;
     if let Some(seconds) = settings.seconds.filter(|seconds| !(0.0..1e9).contains(seconds)) {

@@ -12,7 +12,6 @@ use crate::{context::Context, error::Result};
 pub enum MechanicsFigures {
     /// Distance between a stage's end switches.
     Travel { axis: &'static str, travel_um: f64 },
-    /// Backlash of a screw.
     Backlash {
         axis: &'static str,
         /// Mean over the reversals measured.
@@ -38,8 +37,8 @@ pub enum MechanicsFigures {
     },
 }
 
-/// Runs a measurement; backlash and piezo figures are stored as settings. Measuring travel homes the stage;
-/// measuring backlash homes it first.
+/// Backlash and piezo figures are stored as settings. Measuring travel homes the stage; measuring backlash
+/// homes it first.
 pub fn measure(rig: &RigAddress, routine: Routine, context: &Context<'_>) -> Result<MechanicsFigures> {
     let rig = Rig::connect(rig, None, context)?;
     if matches!(routine, Routine::Backlash { .. }) {

@@ -1,5 +1,3 @@
-//! Homing, moving, stopping.
-
 use farnear_capture::{
     describe::um,
     ready::{ensure_homed, steppers},
@@ -47,7 +45,6 @@ pub enum MoveFigures {
     All { moved: Vec<MovedAxis> },
 }
 
-/// Converts a position to its wire unit. `name` is the parameter's.
 pub fn nanometres(name: &'static str, position_um: f64) -> Result<Nanometres> {
     sequence::nanometres(position_um).ok_or_else(|| {
         let expected = "expected a position of -2147483 to 2147483 um";

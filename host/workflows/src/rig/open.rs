@@ -65,7 +65,6 @@ impl OpenRig {
         self.0.emulation.is_some()
     }
 
-    /// Scene and options of the emulated rig.
     pub fn scenery(&self) -> Option<&Scenery> {
         self.0.emulation.as_ref().map(|(_, scenery)| scenery)
     }
@@ -74,7 +73,6 @@ impl OpenRig {
         self.0.client.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// A handle for a job that `context` can cancel.
     pub(super) fn connect(&self, context: &Context<'_>) -> Rig {
         let mut client = self.client().clone();
         client.interrupt_by(context.cancel.flag());

@@ -1,5 +1,3 @@
-//! Captures a far- and a near-focused image into a capture folder.
-
 use std::path::PathBuf;
 
 use farnear_capture::{
@@ -131,7 +129,6 @@ pub struct PairFigures {
     pub near_settle_ms: f64,
     /// Measured sensor distance (encoder and gauge) at the far exposure.
     pub sensor_far_mm: f64,
-    /// Measured sensor distance at the near exposure.
     pub sensor_near_mm: f64,
     pub width: usize,
     pub height: usize,
@@ -153,8 +150,8 @@ impl From<&Pair> for PairFigures {
     }
 }
 
-/// Captures a pair: homes if needed, moves the stage, exposes both images by piezo. The folder appears when
-/// it is complete. Checks everything before any motion.
+/// Homes if needed, exposes both images by piezo. The folder appears when it is complete. Checks everything
+/// before any motion.
 pub fn capture(settings: &CaptureRequest, context: &Context<'_>) -> Result<PairFigures> {
     if settings.half_mirror {
         return half_mirror::capture(settings, context);
@@ -188,8 +185,7 @@ pub fn capture_seen(
     Ok(PairFigures::from(&pair))
 }
 
-/// Removes the camera's faults, in 16 bits. Unsaturated pixels stay below white; pixels darker than the dark
-/// frame are black.
+/// In 16 bits: unsaturated pixels stay below white; pixels darker than the dark frame are black.
 fn corrected(image: &Image, frames: &CameraFrames) -> Result<Image> {
     const WHITE: f32 = 65_535.0;
     let white = ((1_u32 << image.bits.min(16)) - 1) as u16;
@@ -202,7 +198,6 @@ fn corrected(image: &Image, frames: &CameraFrames) -> Result<Image> {
     Ok(Image { pixels, bits: 16 })
 }
 
-/// Captures a pair with an open rig and camera.
 pub fn take(
     equipped: &mut EquippedRig,
     optics: &GivenOptics,

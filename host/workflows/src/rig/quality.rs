@@ -1,5 +1,4 @@
-//! Depth quality from pairs of a flat target. Each measurement is a line in a record, to follow a rig over
-//! weeks.
+//! Depth quality from pairs of a flat target, recorded to follow a rig over weeks.
 
 use std::{
     io::ErrorKind,
@@ -40,7 +39,6 @@ pub struct QualitySettings {
     pub optics: PathBuf,
     pub pairs: usize,
     pub true_mm: Option<f64>,
-    /// File that the figures are appended to.
     pub record: PathBuf,
 }
 
@@ -61,7 +59,6 @@ pub struct QualityFigures {
     pub temporal_noise_mm: f64,
     /// Median of the standard deviations predicted for the first pair.
     pub predicted_noise_mm: f64,
-    /// Mean depth minus true distance.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub accuracy_mm: Option<f64>,
 }
@@ -123,7 +120,6 @@ pub fn measure(settings: &QualitySettings, context: &Context<'_>) -> Result<Qual
     Ok(found)
 }
 
-/// Figures of the middle of the maps.
 fn figures(
     maps: &[Array2<f32>],
     predicted: Option<&Array2<f32>>,

@@ -42,7 +42,6 @@ const OPTICS_MAX: u32 = 1 << 20;
 const PIXELS_MAX: usize = 1 << 26;
 /// Pairs read before they are due.
 const AHEAD: usize = 2;
-/// Polling interval for cancellation.
 const LOOK: Duration = Duration::from_millis(20);
 
 #[derive(Clone, PartialEq, Debug, Serialize)]
@@ -58,11 +57,9 @@ pub struct PlayFigures {
     pub maps_per_second: f64,
     /// Median, from a pair's grey values to its map, by the host's clock.
     pub latency_ms: f64,
-    /// Recorded time.
     pub seconds: f64,
 }
 
-/// A recording in progress. An unfinished one is removed when dropped.
 pub struct Recorder {
     file: File,
     /// Length of the header and complete pairs.

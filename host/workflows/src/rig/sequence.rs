@@ -139,8 +139,7 @@ pub struct SequenceFigures {
     pub largest_error_um: f64,
 }
 
-/// Runs a program and writes its images. The folder appears when it is complete. Checks everything before any
-/// motion.
+/// The folder appears when it is complete. Checks everything before any motion.
 pub fn run(settings: &SequenceRequest, context: &Context<'_>) -> Result<SequenceFigures> {
     if settings.runs == 0 {
         return Err(WorkflowError::parameter("runs", 0, "it takes no images, expected 1 or more"));

@@ -1,5 +1,3 @@
-//! Settings stored by the board.
-
 use farnear_protocol::message::{Setting, SettingKey};
 use serde::Serialize;
 

@@ -108,19 +108,16 @@ pub struct BoardSunFigures {
     pub shadow: Option<&'static str>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub beta_deg: Option<f32>,
-    /// Standard deviation of the angle.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sigma_beta_deg: Option<f32>,
     /// Whether the shadow is on the other side.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mirrored: Option<bool>,
-    /// On the ground.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub shadow_length_m: Option<f32>,
     pub same_bits: bool,
     #[serde(skip)]
     pub board: SunAnswer,
-    /// The host's answer.
     #[serde(skip)]
     pub host: SunAnswer,
 }
@@ -134,7 +131,6 @@ impl BoardSunFigures {
     }
 }
 
-/// Requests the answer from the board, and calculates the same here.
 pub fn sun(settings: &SunRequest, context: &Context<'_>) -> Result<BoardSunFigures> {
     let query = query(settings)?;
     let rig = Rig::connect(&settings.rig, None, context)?;

@@ -31,9 +31,7 @@ use crate::{
     text_file,
 };
 
-/// Name of the list.
 const LIST: &str = "PATTERNS.toml";
-/// Default number of targets.
 const USUAL_TARGETS: usize = 24;
 
 /// Capture a flat target at known distances, compute the depth maps, and list them for `farnear calibrate correction`.
@@ -99,7 +97,6 @@ impl CameraRequest for TargetSeriesRequest {
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct TargetFigures {
     pub targets: usize,
-    /// Captured in this run.
     pub captured: usize,
     /// Root-mean-square error before correction, of the maps captured in this run.
     pub rmse_mm: f64,
@@ -118,9 +115,8 @@ struct Entry {
     true_mm: f64,
 }
 
-/// Captures a flat target at each distance, computes the depth maps and lists them. The same folder resumes
-/// an interrupted series. A real rig stays connected; an emulated one restarts per target. Checks everything
-/// before any motion.
+/// Computes and lists the depth maps. The same folder resumes an interrupted series. A real rig stays
+/// connected; an emulated one restarts per target. Checks everything before any motion.
 pub fn capture(settings: &TargetSeriesRequest, context: &Context<'_>) -> Result<TargetFigures> {
     let optics = GivenOptics::read(&settings.optics)?;
     let operators = operators::find(None, &optics.optics)?;
@@ -171,13 +167,11 @@ struct Series<'a> {
 }
 
 impl Series<'_> {
-    /// The emulated rig in front of a flat target.
     fn emulated_before(&self, true_mm: f64) -> Result<EquippedRig> {
         let address = self.settings.rig.with_scene(format!("plane:{true_mm}"))?;
         self.settings.camera.connect(&address, Some(self.optics.for_emulation()), self.context)
     }
 
-    /// Prompts for the target at a distance.
     fn place(&self, number: usize, count: usize, true_mm: f64) -> Result<()> {
         let place = format!(
             "place the flat target {true_mm} mm before the lens ({} of {count}), square to it",
@@ -207,7 +201,6 @@ impl Series<'_> {
     }
 }
 
-/// Mean square error of depth maps over all pixels.
 #[derive(Default)]
 struct MeanSquare {
     sum: f64,

@@ -1,5 +1,4 @@
-//! Removes a person's shadow from masks, given the camera's pose and the sun, a lamp, or a measured shadow
-//! direction.
+//! Removes a person's shadow from masks, given the camera's pose and the light or shadow direction.
 
 use std::{
     fs,
@@ -34,7 +33,6 @@ use crate::{
 
 pub const CAMERA_FILE: &str = "the camera file";
 
-/// Share of the silhouette above which a cut is doubtful.
 const MUCH: f64 = 0.6;
 
 /// Remove a person's shadow from masks, from the pose of the camera and the place of the sun, of a lamp, or a measured direction.
@@ -143,7 +141,6 @@ impl Request for ShadowRemoveRequest {
 #[derive(Clone, Copy, PartialEq, Debug)]
 enum LightSource {
     Sun {
-        /// Place of the camera and time of the first mask.
         moment: Moment,
         /// Masks per second, 0.001 to 1e6; without it all masks have the same time.
         rate_hz: Option<f64>,
@@ -160,7 +157,6 @@ pub struct RemovalFigures {
     pub frames: usize,
     pub cut: usize,
     pub flagged: usize,
-    /// Masks without a subject.
     pub empty: usize,
     /// At the first mask. This and the next two are for the sun only.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -212,8 +208,7 @@ struct Cut {
     unexplained_percent: Option<f64>,
 }
 
-/// Removes the shadow from all masks and writes them with `shadow.toml`, which flags doubtful masks. Writes nothing on
-/// failure.
+/// Also writes `shadow.toml`, which flags doubtful masks. Writes nothing on failure.
 pub fn remove_from_masks(request: &ShadowRemoveRequest, context: &Context<'_>) -> Result<RemovalFigures> {
     let start = Instant::now();
     request.check()?;
@@ -372,7 +367,6 @@ fn camera(path: &Path) -> Result<CameraFile> {
     CameraFile::parse(&text).about(|| path.display().to_string())
 }
 
-/// State carried from frame to frame.
 struct Work<'a> {
     light: LightSource,
     method: Method,

@@ -60,9 +60,7 @@ impl Request for ShadowScoreRequest {
 /// Sums over all frames; `None` if there is nothing to count.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct ScoreFigures {
-    /// Share of the shadow that was removed.
     pub removed_percent: Option<f64>,
-    /// Share of the person that was removed.
     pub wrongly_removed_percent: Option<f64>,
     /// Intersection over union of result and person.
     pub iou_percent: Option<f64>,
@@ -124,7 +122,6 @@ pub fn score(settings: &ShadowScoreRequest, context: &Context<'_>) -> Result<Sco
     })
 }
 
-/// Finds masks by the name of their truth.
 struct Partners {
     path: PathBuf,
     levels: Levels,

@@ -29,7 +29,6 @@ const GAP_PX: u32 = 8;
 /// Stages are enlarged by whole numbers to at least this height, for the caption.
 const LEAST_HEIGHT_PX: usize = 240;
 const LEAST_WIDTH_PX: u32 = 210;
-/// Margin around silhouette and expected shadow.
 const MARGIN_PX: usize = 12;
 
 #[derive(Clone, Copy)]
@@ -65,7 +64,6 @@ impl Stages {
         self.write(file, &[(vec!["mask: no person".into()], panel)])
     }
 
-    /// Draws all stages of a cut side by side.
     pub fn draw(&mut self, file: &str, stage: Stage<'_>) -> Result<()> {
         let explained = match stage.method {
             Method::Thesis => None,
@@ -106,7 +104,6 @@ impl Stages {
         self.write(file, &panels)
     }
 
-    /// Writes panels in a row, each below its caption.
     fn write(&mut self, file: &str, panels: &[(Vec<String>, RgbImage)]) -> Result<()> {
         let line = self.writer.height();
         let lines = panels.iter().map(|(caption, _)| caption.len()).max().unwrap_or(0) as u32;
@@ -194,7 +191,6 @@ fn expected(stage: Stage<'_>, frame: &Frame) -> RgbImage {
     panel
 }
 
-/// The part of the masks that is drawn, and its scale.
 struct Frame {
     top: usize,
     left: usize,
@@ -204,7 +200,6 @@ struct Frame {
 }
 
 impl Frame {
-    /// Silhouette and expected shadow with a margin, inside the mask.
     fn about(stage: Stage<'_>) -> Self {
         let (rows, columns) = stage.mask.dim();
         let mut spans = [0, 0, rows, columns];

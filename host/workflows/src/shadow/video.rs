@@ -1,5 +1,4 @@
-//! Removes the shadow of a person in the sun from a video: masks with and without shadow, and the camera
-//! file, in one folder.
+//! Removes the shadow of a person in the sun from a video.
 
 use std::{fs, path::PathBuf};
 
@@ -89,7 +88,6 @@ pub fn remove_from_video(
     Ok(VideoShadowFigures { silhouettes: made.silhouettes, samples: samples(&with)?, removal })
 }
 
-/// Names of some non-empty masks.
 fn samples(folder: &std::path::Path) -> Result<Vec<String>> {
     let masks = farnear_files::masks::read_all(folder)?.named;
     let seen: Vec<&String> = masks

@@ -208,7 +208,6 @@ impl MarkersRequest {
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct MarkersFigures {
     pub views: usize,
-    /// Frames drawn per view.
     pub frames: usize,
     pub silhouettes: usize,
     pub flagged_frames: usize,
@@ -229,7 +228,6 @@ struct Index<'a> {
     mm_per_px: f64,
     elevation_deg: f64,
     view_directions_deg: Vec<f64>,
-    /// Template parts for which the recording has no marker.
     parts_not_recorded: &'a [String],
     #[serde(skip_serializing_if = "<[String]>::is_empty")]
     guessed: &'a [String],
@@ -244,8 +242,8 @@ struct Flagged<'a> {
     flags: &'a [String],
 }
 
-/// Draws the folders `view1`, `view2`, ... with a mask per frame, and `silhouettes.toml`. The masks of a view
-/// share one canvas, so the subject moves as in a camera's picture. Writes nothing on failure.
+/// Draws `view1`, `view2`, ... with a mask per frame, and `silhouettes.toml`. A view's masks share one
+/// canvas, so the subject moves as in a camera's picture. Writes nothing on failure.
 pub fn draw(settings: &MarkersRequest, context: &Context<'_>) -> Result<MarkersFigures> {
     settings.check()?;
     let start = Instant::now();
@@ -324,7 +322,6 @@ pub(crate) fn one_view(recording: &Recording, template: &Template) -> Vec<Track>
     /// Coarse enough for any training, fine enough for hands.
     const MM_PER_PX: f64 = 10.0;
     const MARGIN_PX: usize = 2;
-    /// Largest gap at joints that is closed.
     const GAP_PX: usize = 4;
     let frames: Vec<HashMap<&str, Point3>> =
         (0..recording.frames.len()).map(|n| recording.by_name(n)).collect();
@@ -339,7 +336,6 @@ pub(crate) fn one_view(recording: &Recording, template: &Template) -> Vec<Track>
     if track.frames() == 0 { Vec::new() } else { vec![track] }
 }
 
-/// Assumptions and doubts about a recording.
 pub(crate) fn remarks(recording: &Recording) -> Vec<String> {
     recording.remarks().into_iter().chain(lying(recording)).collect()
 }
@@ -373,7 +369,6 @@ fn hidden_percent(recording: &Recording) -> f64 {
     100.0 * hidden as f64 / all.max(1) as f64
 }
 
-/// Reads a built-in template or a file.
 pub(crate) fn template(name: &str) -> Result<Template> {
     let path = Path::new(name);
     let wrong = |source| SilhouettesError::Template { name: name.into(), source };
@@ -418,8 +413,7 @@ fn keypoint_files(folder: &Path) -> Result<Vec<PathBuf>> {
     }
 }
 
-/// Built-in template with the largest share of its markers in the recording; of equals the one with more
-/// markers. Fails if no template has half of its markers in the recording.
+/// Prefers the largest share of its markers in the recording, then more markers. Fails below one half.
 pub(crate) fn best_template(recording: &Recording, path: &Path) -> Result<Template> {
     let mut ranked: Vec<(f64, usize, Template)> = Template::names()
         .filter_map(|name| Template::named(name).ok())

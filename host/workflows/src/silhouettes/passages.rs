@@ -82,7 +82,6 @@ pub struct PassagesFigures {
     pub masks: usize,
     pub passages: usize,
     pub frames: usize,
-    /// Passages too short to write.
     pub too_short: usize,
     pub seconds: f64,
 }

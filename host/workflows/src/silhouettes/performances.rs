@@ -66,8 +66,7 @@ pub struct PerformancesFigures {
     pub seconds: f64,
 }
 
-/// Draws all performances and lists them in `samples.toml`. The first view is at `first_view_deg`; each has a
-/// folder.
+/// Draws all performances and lists them in `samples.toml`. The first view is at `first_view_deg`.
 pub(super) fn write(
     performances: &[Performance],
     first_view_deg: f64,

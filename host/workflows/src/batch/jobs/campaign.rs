@@ -16,10 +16,8 @@ use crate::{
     simulator::{self, SimulatorError},
 };
 
-/// Polling interval for cancellation.
 const LOOK: Duration = Duration::from_millis(50);
 const PROGRAM: &str = "farnear-campaign";
-/// Figures next to the failing scenarios.
 const FIGURES: &str = "campaign.json";
 
 struct Seeds {

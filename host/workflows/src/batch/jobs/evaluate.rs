@@ -75,7 +75,6 @@ pub(super) fn work(fields: &mut Fields) -> Result<Box<dyn Job>> {
     }))
 }
 
-/// A file of samples and the masks listed in it.
 fn masks_of(samples: &Path) -> Result<Vec<PathBuf>> {
     let mut inputs = vec![samples.to_path_buf()];
     inputs.extend(Samples::folders(samples)?);

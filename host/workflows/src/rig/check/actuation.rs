@@ -1,5 +1,3 @@
-//! Manual steps: switches, emergency stop, turning a motor's shaft.
-
 use std::time::{Duration, Instant};
 
 use farnear_capture::{
@@ -11,9 +9,7 @@ use farnear_protocol::message::{Alarm, Status};
 use super::{Checkup, Found, failed, passed, passed_over};
 use crate::error::Result;
 
-/// Time for the user to press or turn something.
 const PATIENCE: Duration = Duration::from_secs(60);
-/// Polling interval.
 const LOOK: Duration = Duration::from_millis(20);
 /// Least rotation of a motor's shaft: a tenth of a turn of a 0.5 mm screw.
 const TURNED_UM: f64 = 50.0;

@@ -7,7 +7,6 @@ use farnear_protocol::message::SettingKey;
 
 use super::{Checkup, Found, failed, passed, passed_over};
 
-/// Requests per test of the line.
 const QUESTIONS: usize = 200;
 /// Most attempts. One fast attempt shows that the line is good and this computer was late.
 const ROUNDS: usize = 3;

@@ -13,11 +13,9 @@ use crate::figures::rounded;
 pub struct ContinuousFigures {
     /// Exposures with an image.
     pub exposures: usize,
-    /// Complete cycles, such as pairs.
     pub cycles: usize,
-    /// Board time from the first to the last exposure.
     pub board_s: f64,
-    /// Exposures per second of board time.
+    /// By board time.
     pub rate_hz: f64,
     /// Frames without an exposure because the position had not settled.
     pub dropped_not_settled: usize,
@@ -25,9 +23,7 @@ pub struct ContinuousFigures {
     pub dropped_camera_busy: usize,
     /// Frames without an exposure because the camera did not respond to its trigger.
     pub dropped_no_strobe: usize,
-    /// Frames with a lost event.
     pub lost_events: usize,
-    /// Exposures without an image.
     pub lost_images: usize,
     /// Exposures during which the measured position left the settle window.
     pub exposures_outside_window: usize,
@@ -43,9 +39,7 @@ pub struct Tally {
     period: Micros,
     windows_nm: Vec<i32>,
     counted: ContinuousFigures,
-    /// Number and trigger time of the first exposure.
     first: Option<(u32, u64)>,
-    /// Number and trigger time of the last exposure.
     last: Option<(u32, u64)>,
     intervals_us: (u64, u64),
 }

@@ -1,5 +1,4 @@
-//! Result folder of a continuous capture: a capture folder per pair or an image per exposure, and
-//! `frames.csv` with a row per frame.
+//! A capture folder per pair or an image per exposure, and `frames.csv` with a row per frame.
 
 use std::{
     fmt::Write,

@@ -31,7 +31,6 @@ pub struct Job<'a> {
     pub settings: &'a MarkersRequest,
     pub views: usize,
     pub template: &'a Template,
-    /// Visible points of each frame.
     pub frames: &'a [HashMap<&'a str, Point3>],
     /// Frame names, by their numbers in the recording.
     pub names: &'a [String],

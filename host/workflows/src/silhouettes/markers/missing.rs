@@ -14,7 +14,6 @@ pub struct MissingParts {
 }
 
 impl MissingParts {
-    /// Compares a template with the recorded points and those visible in each frame.
     pub fn of(template: &Template, recording: &Recording, frames: &[HashMap<&str, Point3>]) -> Self {
         let short = |name: &str| name.rsplit_once(':').map_or(name, |(_, short)| short).to_owned();
         let names = recording.known_names();
@@ -35,7 +34,6 @@ impl MissingParts {
         }
     }
 
-    /// Doubtful frames, by name.
     pub fn flagged<'a>(&'a self, names: &'a [String]) -> Vec<Flagged<'a>> {
         let all = names.iter().zip(&self.per_frame);
         all.filter(|(_, flags)| !flags.is_empty()).map(|(frame, flags)| Flagged { frame, flags }).collect()
