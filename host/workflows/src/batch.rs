@@ -109,6 +109,7 @@ impl Shard {
 #[serde(rename_all = "lowercase")]
 pub enum State {
     Done,
+    /// Done by an earlier run.
     Already,
     /// Pending, in a dry run.
     Todo,

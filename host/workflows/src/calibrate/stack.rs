@@ -114,7 +114,7 @@ pub struct StackFigures {
     pub learned_mm: f64,
     /// `1.4826 x` median of |error| on held-out parts of the target.
     pub robust_mm: f64,
-    /// On held-out parts, as the following.
+    /// On held-out parts, as the next five.
     pub rms_mm: f64,
     /// Mean error.
     pub bias_mm: f64,

@@ -1,8 +1,8 @@
 //! Depth error from noise alone, for planned optics.
 //!
-//! For a texture of known power spectrum P and noise variance s^2 in both images (each divided by its mean),
-//! an estimator over w x w pixels satisfies `SD(alpha) >= 1 / (w sqrt(J))` with `J = mean over frequencies of
-//! P D^2 / (s^2 (H1^2 + H2^2))` and `D = H1 dH2/dalpha - H2 dH1/dalpha`, for transfer functions H1 and H2.
+//! For a texture of power spectrum P and noise variance s^2 in both images (each divided by its mean), no
+//! estimator over w x w pixels is below `SD(alpha) = 1 / (w sqrt(J))`. With the transfer functions H1 and H2:
+//! `J = mean over frequencies of P D^2 / (s^2 (H1^2 + H2^2))`, `D = H1 dH2/dalpha - H2 dH1/dalpha`.
 //! Depth follows with `dz/dalpha`. The methods' excess over this bound was measured on rendered planes.
 
 use farnear_depth::optics::Optics;

@@ -19,7 +19,7 @@ use crate::{
     request::{PathKind, Request},
 };
 
-/// Limit of the operators' blur radius, px, and its target.
+/// Usable range of the largest blur radius, px, and its target.
 const USABLE_BLUR_PX: [f64; 2] = [2.0, 4.0];
 const BEST_BLUR_PX: f64 = 2.7;
 const FOCAL_LENGTHS_MM: [f64; 14] =
