@@ -1,4 +1,4 @@
-//! Depth from focus: images at different focus, to a depth map and an image that is sharp everywhere.
+//! Depth from focus: a depth map and an all-in-focus image from images at different focus.
 
 mod frames;
 mod positions;
@@ -199,7 +199,6 @@ impl FocusStackRequest {
     }
 }
 
-/// Registration of a stack's images.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct StackAlign(pub Option<Model>);
 
@@ -230,21 +229,18 @@ impl FromStr for StackAlign {
 
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct FocusStackFigures {
-    /// Images that were used.
     pub images: usize,
-    /// Files that were left out.
     pub left_out: Vec<String>,
-    /// Unit of depth: `mm`, `um` (positions of a stage), or `image` where the positions are not known.
+    /// Unit of depth: `mm`, `um` (stage positions), or `image` if the positions are unknown.
     pub unit: &'static str,
-    /// Part of the pixels with a value.
+    /// Share of pixels with a value.
     pub known: f64,
     pub median: Option<f64>,
-    /// Farthest that a pixel was moved, px.
+    /// Largest displacement of a pixel.
     pub moved_px: f64,
     pub warnings: Vec<String>,
 }
 
-/// Contents of `stack.toml`.
 #[derive(Serialize)]
 struct Record<'a> {
     made_by: &'static str,
@@ -261,25 +257,18 @@ struct Record<'a> {
     white_level: Option<u32>,
     images: &'a [String],
     left_out: &'a [String],
-    /// Where the images are focused, in the unit.
     positions: &'a [f64],
-    /// The distortion that was removed.
     distortion: Option<DistortionSection>,
-    /// Side of a pixel at the object, from the metadata of the stack.
+    /// Side of a pixel at the object, from the stack's metadata.
     object_pixel_um: Option<f64>,
     optics: Option<Optics>,
-    /// The files that the map was made from.
     input: Vec<HashedFile>,
 }
 
-/// Part of the pixels below which a stack shows too little.
+/// Least share of pixels with a value, below which a warning is given.
 const LITTLE: f64 = 0.5;
 
-/// Measures a stack and writes the results.
-///
-/// # Errors
-/// Images that cannot be read or are no stack; positions that are not as many as the images; a folder that exists already;
-/// [`WorkflowError::Cancelled`].
+/// Measures a stack and writes the results to a new folder.
 pub fn focus_stack(request: &FocusStackRequest, context: &Context<'_>) -> Result<FocusStackFigures> {
     request.check()?;
     let staging = result_folder::stack(&request.out, &request.stack)?;
@@ -382,8 +371,8 @@ fn read(
     Ok(read.into_iter().map(|image| relative(image).pixels).collect())
 }
 
-/// Removes the lens' distortion from all images. Where it showed nothing, which is the same in all, they keep their own pixels, and
-/// the mask marks these.
+/// Removes the lens' distortion. Pixels without data (the same in all images) keep their values; the mask
+/// marks them.
 fn straighten(images: &mut [Array2<f32>], distortion: &Distortion) -> Array2<bool> {
     let mut unseen = Array2::from_elem((0, 0), false);
     for image in images {
@@ -399,10 +388,7 @@ fn straighten(images: &mut [Array2<f32>], distortion: &Distortion) -> Array2<boo
     unseen
 }
 
-/// Aligns the images of a stack, NaN where they do not show the scene; returns the farthest distance that a pixel was moved, px.
-///
-/// # Errors
-/// Those of a context that cancels.
+/// Aligns a stack, with NaN for pixels without data. Returns the largest displacement, px.
 pub fn aligned_stack(images: &mut [Array2<f32>], model: Model) -> Result<f64> {
     let frames = frames::check(images, Some(model), &Context::unattended())?;
     Ok(frames::moved(images, &frames.warps))

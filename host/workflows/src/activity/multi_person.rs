@@ -1,4 +1,4 @@
-//! What everybody in a recording does: people followed apart, a streaming answer for each, then one for all that was seen of each.
+//! Recognises several people in a recording: tracks them and answers for each.
 
 use std::{path::PathBuf, time::Instant};
 
@@ -30,43 +30,34 @@ use crate::{
     parameters::at_least,
 };
 
-/// Everybody in a frame.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct FrameOfPeople {
-    /// Number of the frame, from 1.
+    /// From 1.
     pub frame: usize,
     pub name: String,
-    /// Those who are followed, by their numbers.
     pub people: Vec<PersonInFrame>,
     /// Why the frame is not searched for people.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub flags: Vec<String>,
 }
 
-/// Everybody in the recording.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct MultiPersonFigures {
     pub people: Vec<PersonFigures>,
     pub frames: usize,
-    /// Frames in which no person is followed.
     pub empty_frames: usize,
-    /// Frames with something doubtful.
     pub flagged_frames: usize,
     pub window: usize,
-    /// From a file to everybody's part of a streaming answer.
+    /// From the file to the streaming answers for all people.
     pub seconds_per_frame: f64,
-    /// What a user should know about how the view was read.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub remarks: Vec<String>,
 }
 
-/// Silhouettes at 100x100 or several views, where one view of full frames is needed.
 #[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
 pub enum MultiPersonError {
-    /// Cut-out silhouettes hold one person each.
     #[error("{}: these are silhouettes cut out at 100x100, which hold one person each; several are looked for in full frames", path.display())]
     CutOut { path: PathBuf },
-    /// A model that fuses views.
     #[error("{}: the model fuses {views} views; several people are recognised by a model of one view", model.display())]
     Views { model: PathBuf, views: usize },
 }
@@ -75,13 +66,13 @@ struct Somebody<'m> {
     live: Live<'m>,
     answer: Option<Answer>,
     tracks: Vec<Track>,
-    /// Numbers of the frames of the tracks, from 1.
+    /// Frame numbers of the tracks, from 1.
     numbers: Vec<usize>,
     crossing_frames: usize,
     perhaps_swapped_with: Vec<usize>,
 }
 
-/// A recognition under way: [`Self::next`] until there are no more frames, then [`Self::finish`].
+/// Call [`Self::next`] until it returns `None`, then [`Self::finish`].
 pub struct MultiPersonTracker<'m> {
     model: &'m Recogniser,
     frames: Frames,
@@ -98,10 +89,6 @@ pub struct MultiPersonTracker<'m> {
 }
 
 impl<'m> MultiPersonTracker<'m> {
-    /// Opens the view.
-    ///
-    /// # Errors
-    /// [`MultiPersonError`], a view that cannot be opened.
     pub(super) fn begin(model: &'m Model, view: &View, request: &RecogniseRequest) -> Result<Self> {
         model.check_known(&request.among)?;
         if view.is_cut_out()? {
@@ -137,10 +124,7 @@ impl<'m> MultiPersonTracker<'m> {
         })
     }
 
-    /// Takes the next frame and answers for everybody in it; `None` where there is none.
-    ///
-    /// # Errors
-    /// Frames that cannot be read, [`crate::WorkflowError::Cancelled`].
+    /// Answers for everyone in the next frame; `None` at the end.
     pub fn next(&mut self, context: &Context<'_>) -> Result<Option<FrameOfPeople>> {
         context.cancel.check("recognising")?;
         if self.count == 0 {
@@ -178,7 +162,6 @@ impl<'m> MultiPersonTracker<'m> {
         }))
     }
 
-    /// The streaming answer for one of them.
     fn answered(
         &mut self,
         followed: Followed,
@@ -239,10 +222,6 @@ impl<'m> MultiPersonTracker<'m> {
         })
     }
 
-    /// Answers for all that was seen of everybody.
-    ///
-    /// # Errors
-    /// A model that does not fit.
     pub fn finish(self) -> Result<MultiPersonFigures> {
         if let Some(annotated_video) = self.annotated_video {
             annotated_video.finish()?;
@@ -300,7 +279,6 @@ fn figures(
     })
 }
 
-/// Drawing of one of them.
 fn shown(person: &PersonInFrame) -> Option<Shown> {
     let spans = person.top_left_bottom_right?;
     let crossing = person.flags.iter().any(|flag| matches!(flag, PersonFlag::Crossing(_)));

@@ -1,8 +1,8 @@
-//! Whether the images of a stack show one scene: frames that show another, are turned or shaken are found and left out.
+//! Omits frames of a stack that show another scene, are rotated or shaken.
 //!
-//! Each image is compared with the nearest good one. Neighbours in a stack correlate highly in the band that defocus leaves to both,
-//! so a frame whose correlation is far below the usual one shows something else. A shaken frame correlates, but it is less
-//! sharp than both of its neighbours almost everywhere, which no change of focus makes.
+//! Each image is correlated with the nearest good one in the band that defocus keeps in both. A correlation
+//! far below the median shows another scene. A shaken frame is less sharp than both neighbours almost
+//! everywhere, unlike any change of focus.
 
 use farnear_depth::{
     focus_measure::FocusMeasure,
@@ -15,34 +15,34 @@ use ndarray::{Array2, ArrayView2, s};
 
 use crate::{context::Context, error::Result};
 
-/// Correlation, as part of the median of all links, below which a frame is foreign.
+/// Correlation relative to the median of all links, below which a frame is foreign.
 const FOREIGN: f64 = 0.5;
-/// Median correlation below which no link tells anything: images without texture, or steps too wide.
+/// Median correlation below which links are not reliable: no texture, or steps too wide.
 const TELLING: f64 = 0.4;
-/// Blocks across and down in which sharpness is compared.
 const BLOCKS: usize = 6;
-/// Part of the sharpness of the less sharp neighbour below which a block is shaken, and part of the blocks that must be.
+/// Sharpness of a block relative to its less sharp neighbour, and share of blocks, below which a frame is
+/// shaken.
 const SHAKEN: f64 = 0.75;
 const SHAKEN_BLOCKS: f64 = 0.75;
 
 pub(super) struct Frames {
-    /// How each image lies on the reference; identity without alignment.
+    /// Warp of each image onto the reference; identity without alignment.
     pub warps: Vec<Warp>,
-    /// Images that are not used, with the reason, in order.
+    /// Omitted images with the reason, in order.
     pub left_out: Vec<(usize, String)>,
 }
 
-/// Compares and, with a model, aligns the frames.
+/// Compares the frames and, with a model, aligns them.
 pub(super) fn check(images: &[Array2<f32>], model: Option<Model>, context: &Context<'_>) -> Result<Frames> {
     let count = images.len();
     let same_size = images.windows(2).all(|two| two[0].dim() == two[1].dim());
     let mut frames = Frames { warps: vec![Warp::IDENTITY; count], left_out: Vec::new() };
-    // Stacks that are too short or of mixed sizes are refused by the measure.
+    // The measurement rejects short stacks and mixed sizes.
     if count < 3 || !same_size {
         return Ok(frames);
     }
     let shaken = shaken(images);
-    // From the middle outwards; the links of a foreign start correlate least.
+    // From the middle outwards; links of a foreign start correlate least.
     let middle = count / 2;
     let mut starts: Vec<usize> = (0..count).filter(|index| !shaken.contains(index)).collect();
     starts.sort_by_key(|index| index.abs_diff(middle));
@@ -55,7 +55,7 @@ pub(super) fn check(images: &[Array2<f32>], model: Option<Model>, context: &Cont
     }
     let Some(chain) = best else { return Ok(frames) };
     frames.warps = chain.warps;
-    // More than half: it is not the frames that are wrong.
+    // With more than half foreign, the frames are not at fault.
     if chain.foreign.len() * 2 < count {
         for (index, correlation) in chain.foreign {
             let reason = format!(
@@ -76,13 +76,11 @@ pub(super) fn check(images: &[Array2<f32>], model: Option<Model>, context: &Cont
 
 struct Chain {
     warps: Vec<Warp>,
-    /// Frames that do not fit, with their correlation.
     foreign: Vec<(usize, f64)>,
-    /// Median correlation of the links.
     usual: f64,
 }
 
-/// Links each image to the nearest good one on the way to the start.
+/// Links each image to the nearest good one towards the start.
 fn chain(
     images: &[Array2<f32>],
     start: usize,
@@ -108,7 +106,7 @@ fn chain(
     let mut links: Vec<(usize, f64)> = Vec::new();
     let (up, down): (Vec<usize>, Vec<usize>) = ((start + 1..count).collect(), (0..start).rev().collect());
     let mut done = 0;
-    // The usual correlation so far decides whether a frame is good enough to link the next one to.
+    // The median so far decides whether a frame is good enough for the next link.
     for direction in [up, down] {
         let mut nearer = start;
         for index in direction {
@@ -136,7 +134,7 @@ fn median(links: &[(usize, f64)]) -> f64 {
     values.get(values.len() / 2).copied().unwrap_or(0.0)
 }
 
-/// Frames that are less sharp than both neighbours almost everywhere.
+/// Frames less sharp than both neighbours almost everywhere.
 fn shaken(images: &[Array2<f32>]) -> Vec<usize> {
     let sharpness: Vec<Vec<f64>> = images.iter().map(|image| of_blocks(image.view())).collect();
     (1..images.len().saturating_sub(1))
@@ -160,7 +158,7 @@ fn of_blocks(image: ArrayView2<f32>) -> Vec<f64> {
     measured.collect::<Option<Vec<f64>>>().unwrap_or_default()
 }
 
-/// Lays the images on the reference, NaN where they do not show it, and gives the farthest way of a pixel.
+/// Warps the images onto the reference, with NaN for missing pixels; returns the largest displacement.
 pub(super) fn moved(images: &mut [Array2<f32>], warps: &[Warp]) -> f64 {
     let mut farthest = 0.0_f64;
     for (image, warp) in images.iter_mut().zip(warps).filter(|(_, warp)| **warp != Warp::IDENTITY) {
@@ -181,7 +179,6 @@ mod tests {
 
     const COUNT: usize = 11;
 
-    /// A scene of two layers that a stack focuses through, by blurring a texture more or less.
     fn stack() -> Vec<Array2<f32>> {
         let texture = scene(1);
         (0..COUNT)
@@ -226,7 +223,7 @@ mod tests {
     fn finds_a_foreign_or_turned_frame_at_any_place() {
         for at in [0, 4, COUNT / 2, COUNT - 1] {
             for model in [None, Some(Model::Similarity)] {
-                // One good neighbour may be left out as well: its link leads over the bad frame.
+                // A good neighbour may also be omitted, because its link passes the bad frame.
                 let found = |images: &[Array2<f32>], what: &str| {
                     let found = left_out(images, model);
                     assert!(found.contains(&at), "{what} {at}, {model:?}: {found:?}");
