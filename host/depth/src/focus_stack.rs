@@ -1,13 +1,12 @@
-//! Depth from focus: of a stack of images, where each place is sharpest.
+//! Depth from focus: where each pixel of a stack of images is sharpest.
 //!
-//! For each pixel the sharpness over the stack (a focus measure, [`Sharpness`]) makes a curve whose tip is sought: a Gaussian through
-//! the points around the largest, fitted by least squares with the weights of Guo (A simple algorithm for fitting a Gaussian
-//! function, IEEE Signal Processing Magazine 28, 2011): log-sharpness as a parabola, each point weighing its sharpness squared, so
-//! that the noise of the tails has no say. Three points, as is usual (Nayar & Nakagawa 1994), have two to three times the
-//! error of eleven.
+//! The sharpness of a pixel over the stack (a focus measure, [`Sharpness`]) is a curve. Its peak is a Gaussian through the
+//! points around the maximum, fitted by least squares with the weights of Guo (A simple algorithm for fitting a Gaussian
+//! function, IEEE Signal Processing Magazine 28, 2011): log-sharpness as a parabola, weighted by the squared sharpness, so
+//! that the noise of the tails has little weight. Three points (Nayar & Nakagawa 1994) have two to three times the error of
+//! eleven.
 //!
-//! Unlike a pair, a stack needs neither point spread function nor aperture and has no limits but its ends. It takes as many images
-//! as the range is long.
+//! A stack needs neither point spread function nor aperture. Its range is that of its images.
 //!
 //! Cost: the focus measure for each image, and about 40 operations per pixel and image; memory: the stack, and as much again
 //! for the rows at work (a fraction).
@@ -45,12 +44,11 @@ pub const USUAL_RELIABILITY: f32 = 0.1;
 pub struct StackSettings {
     /// The focus measure.
     pub measure: Sharpness,
-    /// Standard deviation of the Gaussian by which the images are blurred first, px; 0 = not at all. Finer detail is mostly
-    /// noise and rounding, which weak texture drowns in.
+    /// Standard deviation of the Gaussian blur before the measure, px; 0 = none. Finer detail is mostly noise and rounding.
     pub smoothing_px: f32,
-    /// Side of the window it is taken over, odd.
+    /// Side of the measure's window, odd.
     pub window_px: usize,
-    /// Points of the curve that the tip is fitted to, at most; odd.
+    /// Most points of the curve for the fit of its tip; odd.
     pub fit_points: usize,
     /// Side of the median over the places found, odd; 1 = none.
     pub median_px: usize,
@@ -76,15 +74,15 @@ impl Default for StackSettings {
     }
 }
 
-/// What a stack says of each pixel; all maps are (height, width).
+/// Maps of a stack, (height, width).
 #[derive(Debug, Clone)]
 pub struct StackMap {
     /// The image in which it would be sharpest, from 0, between images as a fraction; NaN = unreliable.
     pub place: Array2<f32>,
-    /// How far the curve rises above its own middle, times how well the tip is fitted (the determination of the fit): 0 to 1. 0
-    /// where the largest value stands at an end of the stack, for the tip may lie outside.
+    /// Height of the curve above its mean, times the fit's coefficient of determination: 0 to 1. 0 where the maximum is at an
+    /// end of the stack, because the tip may be outside.
     pub reliability: Array2<f32>,
-    /// Each pixel as where it is sharpest.
+    /// Each pixel from its sharpest image.
     pub all_in_focus: Array2<f32>,
 }
 
@@ -106,9 +104,8 @@ pub fn depth_from_stack(
 }
 
 /// [`depth_from_stack`] of images at uneven positions along the axis, strictly rising or falling, in any unit: the tip is fitted
-/// over these. Places stay numbers of images. Pixels that are not finite were not seen in that image: places come from the images
-/// that saw a pixel and what the measure takes around it, and have no value where these are fewer than half, or where
-/// the sharpest has no neighbour that saw it.
+/// over these. Places stay numbers of images. A pixel that is not finite was not seen in that image. A place has no value
+/// if fewer than half of the images saw the pixel and its surroundings, or if no neighbour of the sharpest image did.
 ///
 /// # Errors
 /// [`StackError`], without [`StackError::NotFinite`].

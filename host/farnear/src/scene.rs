@@ -18,7 +18,7 @@ use anyhow::{Context, Result, bail};
 use farnear_files::{image_file::read_grey, map};
 use farnear_scene::{PackedScene, Scene, SceneError, SceneFile};
 
-/// A scene as an argument names it.
+/// A scene argument.
 #[derive(Clone, Debug)]
 pub enum SceneArgument {
     /// `cone`, `plane:900,contrast=0.3`, ...
@@ -29,7 +29,7 @@ pub enum SceneArgument {
 impl FromStr for SceneArgument {
     type Err = SceneError;
 
-    /// What ends with `.toml` or exists is a file, everything else a name.
+    /// A text that ends with `.toml` or exists is a file, any other a name.
     fn from_str(text: &str) -> Result<Self, SceneError> {
         let path = Path::new(text);
         let ending = path.extension().unwrap_or_default();

@@ -1,13 +1,12 @@
 //! Places of a stack, corrected along the edges of the sharp image.
 //!
-//! Where a surface shows little, the window over which sharpness is taken reaches to a stronger detail next to it: things grow by the
-//! window and by their own blur, mostly over a dull background. The image that is sharp everywhere still shows where they end. So each
-//! place becomes the weighted median of those around it (Ma et al., Constant time weighted median filtering for stereo matching and
-//! beyond, ICCV 2013). Near ones and equally bright ones count more. Each counts by the inverse of its own sharpness, for strong detail puts
-//! its place on weak surroundings, never the other way round; and by how far its curve rises above its mean, for what shows nothing at
-//! all has nothing to say.
+//! Window and blur enlarge a textured object in front of a dull surface; the sharp image still has its edges. Each place
+//! becomes the weighted median of its surroundings (Ma et al., Constant time weighted median filtering for stereo matching
+//! and beyond, ICCV 2013). Near and equally bright places weigh more. A weight falls with the sharpness, because strong
+//! detail spreads over weak surroundings. It rises with the curve's height above its mean, because a place without texture
+//! has no information.
 //!
-//! Places that the median confirms keep their own value, so that smooth surfaces lose nothing of their accuracy.
+//! Places that the median confirms keep their own value, so that smooth surfaces keep their accuracy.
 //!
 //! Cost: about 200 places for each pixel, for any window, and a histogram of 8 bins for each image of the stack.
 
@@ -16,15 +15,15 @@ use rayon::prelude::*;
 
 /// The window's radius in its standard deviations; pixels beyond have less than 6 % of the weight of the centre.
 const RADIUS: f32 = 2.4;
-/// Places looked at along a standard deviation.
+/// Sampled places per standard deviation.
 const PLACES: f32 = 4.0;
-/// Standard deviation of the brightness that counts as equal, as a part of the image's own. From 0.1 to 0.5 little changes.
+/// Standard deviation of the brightness weight, relative to the image's. From 0.1 to 0.5 little changes.
 const EQUAL: f32 = 0.25;
-/// Sharpness, as a part of the image's median, that is added to every place's: below it all is noise and counts alike.
+/// Added to every sharpness, relative to the image's median: noise below it weighs equally.
 const NOISE: f32 = 0.2;
 /// Bins of the histogram for each image of the stack.
 const BINS: f32 = 8.0;
-/// A place that is not farther than this from the median, in images, is confirmed by it.
+/// Largest distance from the median, in images, at which a place is confirmed.
 const CONFIRMED: f32 = 1.0;
 /// Steps of the table of weights over the brightness, and of its end in standard deviations.
 const STEPS: f32 = 16.0;

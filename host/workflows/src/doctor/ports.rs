@@ -22,7 +22,7 @@ fn of_port(port: &str) -> Finding {
                 Some(false) => {
                     let group = group_name(found.gid());
                     let remedy = format!(
-                        "`sudo usermod -aG {group} \"$USER\"`, then log out and in; or a udev rule (docs/rig.md)"
+                        "`sudo usermod -aG {group} \"$USER\"`, then log out and in; or a udev rule (docs/bring-up.md)"
                     );
                     Finding::bad(
                         Health::Missing,
