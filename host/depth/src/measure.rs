@@ -72,20 +72,16 @@ impl Default for MeasureSettings {
 
 /// Why there is no depth map.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "the messages name the fields")]
 pub enum MeasureError {
-    /// The pair is invalid.
     #[error(transparent)]
     Prepare(#[from] PrepareError),
-    /// It cannot be processed.
     #[error(transparent)]
     Run(#[from] RunError),
-    /// A method to compare with.
     #[error(transparent)]
     Baseline(#[from] BaselineError),
-    /// A lens learned from a z-stack needs the operators it was learned with.
     #[error("the optics were learned by calibrate stack for method whitened: use --method whitened")]
     LearnedForWhitened,
-    /// No operators for these optics.
     #[error(transparent)]
     Design(#[from] DesignError),
 }

@@ -1,6 +1,6 @@
 //! Scenes by name or from a scene file with its maps.
 //!
-//! A scene file is TOML; files that it names lie relative to it:
+//! A scene file is TOML; paths in it are relative to its folder:
 //! ```toml
 //! depth = "bust.npy"      # depths in mm (.npy or float TIFF), stretched over the image; or: scene = "cone"
 //! texture = "bricks.png"  # any picture that `farnear depth` reads; or: "sand" (also without the line), "fractal"
@@ -41,7 +41,6 @@ impl FromStr for SceneArgument {
 }
 
 impl SceneArgument {
-    /// The scene, with its maps.
     pub fn read(self) -> Result<Scene> {
         match self {
             Self::Named(scene) => Ok(*scene),
@@ -52,7 +51,7 @@ impl SceneArgument {
     }
 }
 
-/// Data of a scene that the emulated rig needs besides its name: a scene file with its maps, checked.
+/// Data of a scene file with its maps, checked; `None` if the emulated rig needs only the scene's name.
 pub fn packed(scene: Option<&str>) -> Result<Option<Arc<[u8]>>> {
     let Some(SceneArgument::File(path)) = scene.map(str::parse).transpose()? else { return Ok(None) };
     let packed = || {

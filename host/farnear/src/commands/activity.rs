@@ -17,7 +17,6 @@ pub enum Job {
     Models(models::Arguments),
 }
 
-/// Runs the command.
 pub fn run(job: Job) -> Result<()> {
     match job {
         Job::Train(arguments) => train::run(arguments),

@@ -8,15 +8,15 @@ use ndarray::{Array2, s};
 use crate::common::{Folder, fails, farnear, figures, number, rig_optics, succeeds};
 
 const IMAGES: usize = 9;
-/// Where the left and the right half are sharpest, counted from 0.
+/// Sharpest images of the left and the right half, counted from 0.
 const SHARPEST: [f32; 2] = [3.0, 5.5];
 
-/// A stack whose texture fades with the distance from where its half is sharpest, as blur makes it; named 1.png to 9.png.
+/// A stack whose texture fades with the distance from its half's sharpest image, like blur; named 1.png to 9.png.
 fn stack(folder: &Folder) -> String {
     stack_at(folder, &[0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0], SHARPEST)
 }
 
-/// The same with a place for each image, of which both halves have one where they are sharpest; in mean steps.
+/// The same with a position for each image, in mean steps; `sharpest` are positions.
 fn stack_at(folder: &Folder, places: &[f32; IMAGES], sharpest: [f32; 2]) -> String {
     let path = folder.text("stack");
     fs::create_dir(&path).expect("a folder");
@@ -59,7 +59,7 @@ fn each_half_lies_where_it_is_sharpest() {
     assert!(contrast(s![8..52, 8..32]) > 0.2 && contrast(s![8..52, 48..72]) > 0.2);
 }
 
-/// What a barrel-shaped lens showed nothing of has no depth; everything else keeps its place.
+/// Areas outside the view of a barrel-shaped lens have no depth; everything else keeps its position.
 #[test]
 fn a_lens_that_bends_lines_is_straightened() {
     let folder = Folder::new();
@@ -117,7 +117,7 @@ fn stage_positions_are_any_numbers_in_um() {
     assert!(region["plane"]["tilt_deg"].is_null() && region["mean_mm"].is_null(), "{region}");
     let (said, _) = succeeds(&mut farnear(&["measure", "profile", &out, "--from", "8,9", "--to", "70,9"]));
     assert!(said.contains("depth_um = ") && !said.contains("_mm"), "{said}");
-    // A truth of the same unit, and one in millimetres.
+    // A reference of the same unit, and one in millimetres.
     let same = figures(&mut farnear(&["compare", &out, &format!("{out}/depth.npy"), "--json"]));
     assert_eq!((number(&same, "rmse_um"), number(&same, "missing_fraction")), (0.0, 0.0));
     let page = folder.text("page.html");

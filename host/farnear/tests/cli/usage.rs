@@ -201,7 +201,7 @@ fn completions_name_the_commands() {
     }
 }
 
-/// A reader that has gone is a failure with a message, not a panic.
+/// A closed stdout causes a message, not a panic.
 #[cfg(target_os = "linux")]
 #[test]
 fn a_stdout_that_takes_nothing_is_a_failure() {

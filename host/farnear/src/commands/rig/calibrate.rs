@@ -1,4 +1,4 @@
-//! `farnear rig calibrate`: the board measures its mechanics; a series of flat targets teaches the depth correction.
+//! `farnear rig calibrate`: the board's mechanics, and a depth correction from flat targets.
 
 use anyhow::{Result, bail};
 use clap::Subcommand;
@@ -42,7 +42,6 @@ pub enum What {
     Fit(RigRun<FitRequest>),
 }
 
-/// Runs the command.
 pub fn run(what: What) -> Result<()> {
     let measure = |question: Question, routine| {
         question.answer(|rig, context| mechanics::measure(rig, routine, context))
