@@ -147,8 +147,8 @@ pub struct DepthRequest {
     /// Threads; 0 = all cores.
     #[cfg_attr(feature = "clap", arg(long, default_value_t = Self::default().threads))]
     pub threads: usize,
-    /// Outputs, comma separated: npy, tiff, png, mesh, view and exr (depth.exr: OpenEXR with depth Z in mm, confidence, standard
-    /// deviation).
+    /// Outputs, comma separated: npy, tiff, png, mesh, glb (mesh.glb: the surface as glTF, in metres), view and exr (depth.exr: OpenEXR
+    /// with depth Z in mm, confidence, standard deviation).
     #[cfg_attr(feature = "clap", arg(long, value_name = "LIST", default_value_t))]
     #[serde_as(as = "DisplayFromStr")]
     pub write: Outputs,

@@ -10,7 +10,7 @@ use std::{
 };
 
 use farnear_files::{
-    exr,
+    exr, glb,
     image_file::{png_to, png8_to},
     map::{self, Scale},
     mesh::{self, Lateral, Projection},
@@ -49,6 +49,7 @@ const OUTPUTS: &[Output] = &[
     Output { names: &["npy", "tiff", "png"], file: "reason.png", write: |results, to| results.reasons(to) },
     Output { names: &["npy", "tiff", "png"], file: UNCERTAINTY, write: |results, to| results.uncertainty(to) },
     Output { names: &[MESH], file: "mesh.ply", write: |results, to| results.mesh(to) },
+    Output { names: &[GLB], file: "mesh.glb", write: |results, to| results.glb(to) },
     Output { names: &["view"], file: "view.png", write: |results, to| results.view(to) },
     Output { names: &["exr"], file: "depth.exr", write: |results, to| results.exr(to) },
 ];
@@ -57,8 +58,9 @@ pub(crate) fn files() -> impl Iterator<Item = &'static str> {
     OUTPUTS.iter().map(|output| output.file)
 }
 
-/// Output that also needs the image.
+/// Outputs that also need the image.
 const MESH: &str = "mesh";
+const GLB: &str = "glb";
 /// Output that depends on another option.
 const UNCERTAINTY: &str = "uncertainty.npy";
 
@@ -87,7 +89,7 @@ impl Outputs {
     }
 
     pub(super) fn show_image(&self) -> bool {
-        self.0.contains(MESH)
+        [MESH, GLB].iter().any(|name| self.0.contains(name))
     }
 
     fn outputs(&self) -> impl Iterator<Item = &'static Output> {
@@ -187,14 +189,21 @@ impl<'a> Results<'a> {
         to.write_all(&view::view_png(self.depth(), self.confidence()).map_err(io::Error::other)?)
     }
 
-    fn mesh(&self, to: &mut Sink) -> io::Result<()> {
+    fn projection(&self) -> Projection {
         let optics = &self.inputs.optics;
-        let projection = Projection {
+        Projection {
             focal_length_mm: optics.focal_length_mm(),
             pixel_um: optics.pixel_um(),
             axis_px: self.inputs.cut.map(|cut| cut.part().axis_px()),
-        };
-        mesh::write(self.depth(), self.computed.image.view(), Lateral::Lens(projection), "mm", to)
+        }
+    }
+
+    fn mesh(&self, to: &mut Sink) -> io::Result<()> {
+        mesh::write(self.depth(), self.computed.image.view(), Lateral::Lens(self.projection()), "mm", to)
+    }
+
+    fn glb(&self, to: &mut Sink) -> io::Result<()> {
+        glb::write(self.depth(), self.computed.image.view(), self.projection(), to)
     }
 
     /// Depth channel `Z` as used by compositors, here in mm; its origin is in the header.
@@ -225,7 +234,7 @@ mod tests {
         let unknown = "npy,jpg".parse::<Outputs>().unwrap_err();
         assert_eq!(
             unknown.to_string(),
-            "unknown output \"jpg\"; expected some of npy,tiff,png,mesh,view,exr"
+            "unknown output \"jpg\"; expected some of npy,tiff,png,mesh,glb,view,exr"
         );
         assert!("".parse::<Outputs>().is_err());
     }
