@@ -1,4 +1,4 @@
-//! What an invalid pixel takes part in, taken out of a finished map.
+//! Removes the effect of invalid pixels from a finished map.
 
 use ndarray::{Array2, Zip};
 
@@ -8,7 +8,7 @@ use crate::border::reflect;
 use crate::metrics::dilate_square;
 
 impl Job<'_> {
-    /// Takes the pixels out that an invalid one takes part in, and takes the medians next to them over the rest.
+    /// Removes the pixels that depend on an invalid one, and recomputes the medians next to them from the rest.
     pub fn repair(&self, map: &mut DepthMap, invalid: &Array2<bool>) {
         let size = map.depth_mm.dim();
         let settings = Settings { median_px: 1, ..*self.settings };
@@ -29,14 +29,14 @@ impl Job<'_> {
                 map.depth_mm[at] = f32::NAN;
                 map.confidence[at] = 0.0;
             } else if map.confidence[at] > 0.0 {
-                // Depth falls with alpha, so that the median of depths is the depth of the median.
+                // Depth falls with alpha, so the median of depths is the depth of the median.
                 map.depth_mm[at] = median_at(&raw, self.settings.median_px, at);
             }
         }
     }
 }
 
-/// Median of the values around (y, x) that are not NaN, with reflected borders; NaN without any.
+/// Median of the values around (y, x) without NaN, with reflected borders; NaN without any.
 pub(crate) fn median_at(image: &Array2<f32>, size: usize, (y, x): (usize, usize)) -> f32 {
     let (height, width) = image.dim();
     let r = (size / 2) as isize;
