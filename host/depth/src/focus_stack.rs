@@ -86,8 +86,8 @@ impl Default for StackSettings {
 pub struct StackMap {
     /// The image in which it would be sharpest, from 0, between images as a fraction; NaN = unreliable.
     pub place: Array2<f32>,
-    /// How far the curve rises above its own middle, times how well the tip is fitted (the determination of the fit): 0 to 1. 0
-    /// where the largest value stands at an end of the stack, for the tip may lie outside.
+    /// How far the curve rises above its own middle, times how well the tip is fitted (the determination of the fit), times how far
+    /// its tip is above noise of one code: 0 to 1. 0 where the largest value is at an end of the stack: the tip may lie outside.
     pub reliability: Array2<f32>,
     /// Each pixel as where it is sharpest.
     pub all_in_focus: Array2<f32>,
@@ -166,6 +166,7 @@ fn curves<S: Slices + ?Sized>(
     band: usize,
 ) -> Result<Curves, S::Error> {
     let (height, width) = images.dim(0);
+    let floor = noise_floor(images.code_step(), settings);
     let [mut place, mut reliability, mut sharpness, mut rise] =
         std::array::from_fn(|_| Array2::zeros((height, width)));
     for top in (0..height).step_by(band) {
@@ -187,7 +188,8 @@ fn curves<S: Slices + ?Sized>(
             for x in 0..width {
                 curve.iter_mut().zip(&measured).for_each(|(value, map)| *value = map[(y, x)]);
                 let tip = tip(&curve, positions, settings.fit_points);
-                let values = [tip.place, tip.reliability, tip.sharpness, tip.rise];
+                let above_floor = if floor < tip.sharpness { 1.0 - floor / tip.sharpness } else { 0.0 };
+                let values = [tip.place, tip.reliability * above_floor, tip.sharpness, tip.rise];
                 maps.iter_mut().zip(values).for_each(|(map, value)| map[x] = value);
             }
         });
@@ -260,6 +262,23 @@ fn measured_rows<S: Slices + ?Sized>(
     let seen = images.rows(index, from..(rows.end + reach).min(images.dim(index).0))?;
     let measured = measured_over_windows(seen.view(), settings);
     Ok(measured.slice(s![rows.start - from..rows.end - from, ..]).to_owned())
+}
+
+/// Sharpness of noise of one code: rounding and the blocks of JPEG reach it where an image shows nothing.
+fn noise_floor(code_step: f32, settings: &StackSettings) -> f32 {
+    if code_step <= 0.0 {
+        return 0.0;
+    }
+    // Uniform noise has the standard deviation of its range / sqrt(12).
+    let range = code_step * 12.0_f32.sqrt();
+    let side = settings.window_px.max(64);
+    let noise = Array2::from_shape_fn((side, side), |(y, x)| {
+        // Mixed as in Fibonacci hashing, twice: neighbours are as good as independent.
+        let mixed = ((y * side + x + 1) as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+        let mixed = (mixed ^ (mixed >> 29)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        0.5 + range * ((mixed >> 40) as f32 / (1 << 24) as f32 - 0.5)
+    });
+    measured_where_seen(noise.view(), settings).mean().unwrap_or(0.0)
 }
 
 /// The focus measure over windows that fade towards their border: the mean over the window is taken twice, for a window with a hard

@@ -12,6 +12,7 @@
 
 mod complete;
 mod decode;
+pub(crate) mod metadata;
 mod tiff_file;
 pub(crate) mod tiff_tags;
 mod write;

@@ -23,6 +23,11 @@ pub trait Slices: Sync {
     /// Those of reading.
     fn rows(&self, index: usize, rows: Range<usize>) -> Result<CowArray<'_, f32, Ix2>, Self::Error>;
 
+    /// Step between the codes of the images, in their scale; 0 = not known.
+    fn code_step(&self) -> f32 {
+        0.0
+    }
+
     /// Called after each band of rows, with the rows that are measured and all there are.
     ///
     /// # Errors

@@ -17,7 +17,7 @@ use farnear_depth::{
     },
 };
 use farnear_files::{
-    image_file::{Grey, ReadSettings, SharedWhiteLevel},
+    image_file::{Grey, ReadSettings, Samples, SharedWhiteLevel},
     stack,
     staging::{Staging, StagingError},
 };
@@ -37,6 +37,8 @@ pub(super) struct Images<'a> {
     images: Vec<(u64, (usize, usize))>,
     /// Pixels are divided by it.
     white_level: f32,
+    /// Step between the codes of the coarsest image, before the division.
+    code_step: f32,
     context: &'a Context<'a>,
 }
 
@@ -59,6 +61,7 @@ impl<'a> Images<'a> {
             folder: request.out.clone(),
             images: Vec::with_capacity(paths.len()),
             white_level: 1.0,
+            code_step: 0.0,
             context,
         };
         let (mut end, mut colour, mut white) = (0, false, SharedWhiteLevel::default());
@@ -69,6 +72,9 @@ impl<'a> Images<'a> {
             context.progress.advance("images", index + 1, Some(paths.len()));
             colour |= image.colour;
             white.add(&image);
+            if let Samples::Integer(bits) = image.samples {
+                read.code_step = read.code_step.max(1.0 / (2_f32.powi(bits.into()) - 1.0));
+            }
             read.images.push((end, image.pixels.dim()));
             read.write(index, image.pixels.view())?;
             end += (PIXEL * image.pixels.len()) as u64;
@@ -153,6 +159,10 @@ impl Slices for Images<'_> {
             image.mapv_inplace(|value| value / self.white_level);
         }
         Ok(image.into())
+    }
+
+    fn code_step(&self) -> f32 {
+        self.code_step / self.white_level
     }
 
     fn measured(&self, rows: usize, of: usize) -> Result<()> {
