@@ -35,16 +35,14 @@ pub(super) struct Guide<'a> {
     pub sharp: ArrayView2<'a, f32>,
     /// How sharp each place is.
     pub sharpness: ArrayView2<'a, f32>,
-    /// How far its curve rises above its mean, 0 to 1.
-    pub rise: ArrayView2<'a, f32>,
     /// Standard deviation of the window, px, above 0.
     pub reach_px: f32,
     /// Images in the stack: places are from 0 to one less.
     pub images: usize,
 }
 
-/// The places (finite) corrected along the guide's edges.
-pub(super) fn mended(place: ArrayView2<f32>, guide: &Guide<'_>) -> Array2<f32> {
+/// The places (finite) corrected along the guide's edges; `rise` is how far each one's curve rises above its mean, 0 to 1.
+pub(super) fn mended(place: ArrayView2<f32>, rise: Array2<f32>, guide: &Guide<'_>) -> Array2<f32> {
     let (height, width) = place.dim();
     let offsets = offsets(guide.reach_px);
     // Equally dark images have no edges to keep to: everything is equally bright then.
@@ -52,9 +50,10 @@ pub(super) fn mended(place: ArrayView2<f32>, guide: &Guide<'_>) -> Array2<f32> {
     let table: Vec<f32> =
         (0..=(END * STEPS) as usize).map(|step| (-0.5 * (step as f32 / STEPS).powi(2)).exp()).collect();
     let noise = (NOISE * middle(guide.sharpness)).max(f32::MIN_POSITIVE);
-    let says = Zip::from(guide.sharpness)
-        .and(guide.rise)
-        .map_collect(|sharpness, rise| rise * noise / (sharpness + noise));
+    let mut says = rise;
+    Zip::from(&mut says)
+        .and(guide.sharpness)
+        .for_each(|says, sharpness| *says = *says * noise / (sharpness + noise));
     let bins = guide.images * BINS as usize + 1;
     let mut result = Array2::zeros((height, width));
     result.axis_iter_mut(Axis(0)).into_par_iter().enumerate().for_each(|(y, mut row)| {
@@ -143,14 +142,8 @@ mod tests {
     /// Corrected over 6 px in a stack of 12 images; all curves rise alike.
     fn mend(place: &Array2<f32>, sharp: &Array2<f32>, sharpness: &Array2<f32>) -> Array2<f32> {
         let rise = Array2::from_elem(SIZE, 0.5);
-        let guide = Guide {
-            sharp: sharp.view(),
-            sharpness: sharpness.view(),
-            rise: rise.view(),
-            reach_px: 6.0,
-            images: 12,
-        };
-        mended(place.view(), &guide)
+        let guide = Guide { sharp: sharp.view(), sharpness: sharpness.view(), reach_px: 6.0, images: 12 };
+        mended(place.view(), rise, &guide)
     }
 
     #[test]
@@ -178,13 +171,7 @@ mod tests {
     fn an_image_without_brightness_and_curves_without_a_tip_leave_all_as_it_is() {
         let place = Array2::from_shape_fn(SIZE, |(y, x)| ((x * 7 + y * 5) % 12) as f32);
         let [dark, flat] = [Array2::zeros(SIZE), Array2::<f32>::zeros(SIZE)];
-        let guide = Guide {
-            sharp: dark.view(),
-            sharpness: flat.view(),
-            rise: flat.view(),
-            reach_px: 6.0,
-            images: 12,
-        };
-        assert_eq!(mended(place.view(), &guide), place);
+        let guide = Guide { sharp: dark.view(), sharpness: flat.view(), reach_px: 6.0, images: 12 };
+        assert_eq!(mended(place.view(), flat.clone(), &guide), place);
     }
 }
