@@ -22,7 +22,7 @@ use crate::validity::{LARGEST_ALPHA, Lost, Validity, ValiditySettings, assess};
 /// Alpha of a pixel measured out of range before blur scaling is undone.
 const OUT_OF_RANGE_ALPHA: f64 = 1.2;
 /// Part of the pixels lost for one reason above which it is reported.
-const LEAST_REPORTED: f64 = 0.002;
+const LEAST_REPORTED: f64 = 0.01;
 /// Unexplained texture, mean squares, from which PSF or blur are doubted.
 const DOUBTFUL: f64 = 3e-4;
 /// The same relative to the noise, which is known to some percent.

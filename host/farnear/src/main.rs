@@ -15,7 +15,10 @@ mod terminal;
 
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand};
+use clap::{
+    CommandFactory, Parser, Subcommand,
+    error::{ContextKind, ContextValue, ErrorKind},
+};
 use farnear_workflows::{
     WorkflowError, compare::CompareRequest, correct::CorrectRequest, depth::DepthRequest,
     focus_stack::FocusStackRequest, operators::OperatorRequest, optics::OpticsRequest, report::ReportRequest,
@@ -98,7 +101,7 @@ enum Command {
 }
 
 fn main() -> ExitCode {
-    let result = match Arguments::parse().command {
+    let result = match parse().command {
         Command::Optics(task) => task.run(),
         Command::Operators(task) => task.run(),
         Command::Depth(task) => task.run(),
@@ -136,6 +139,34 @@ fn main() -> ExitCode {
     }
 }
 
+/// Parses the command line; an optional value that lacks its `=` gets a tip.
+fn parse() -> Arguments {
+    Arguments::try_parse().unwrap_or_else(|mut error| {
+        let words: Vec<String> = std::env::args().skip(1).collect();
+        if error.kind() == ErrorKind::UnknownArgument
+            && let Some(tip) = without_equals(&words)
+        {
+            error.insert(ContextKind::Suggested, ContextValue::StyledStrs(vec![tip.into()]));
+        }
+        error.exit()
+    })
+}
+
+/// Tip for the first option whose value must follow `=` and that is followed by a space.
+fn without_equals(words: &[String]) -> Option<String> {
+    let mut command = Arguments::command();
+    for word in words {
+        let Some(found) = command.find_subcommand(word) else { break };
+        command = found.clone();
+    }
+    words.windows(2).find_map(|two| {
+        let (flag, value) = (two[0].strip_prefix("--")?, &two[1]);
+        let option = command.get_arguments().find(|option| option.get_long() == Some(flag))?;
+        let optional = option.is_require_equals_set() && !value.starts_with('-');
+        optional.then(|| format!("the value of --{flag} follows an equals sign: --{flag}={value}"))
+    })
+}
+
 /// An error and its causes in one line, without causes that the error's message already contains.
 fn message(error: &anyhow::Error) -> String {
     error.chain().map(ToString::to_string).fold(String::new(), |message, cause| match message {
@@ -149,7 +180,7 @@ fn message(error: &anyhow::Error) -> String {
 mod tests {
     use std::collections::{BTreeMap, BTreeSet};
 
-    use clap::{Args, CommandFactory};
+    use clap::Args;
 
     use super::*;
     use crate::commands::rig::target::{CameraArguments, Target};

@@ -17,6 +17,14 @@ impl std::fmt::Display for Usage {
 
 impl std::error::Error for Usage {}
 
+/// Prints one line of JSON.
+pub fn line<T: Serialize>(figures: &T) -> std::io::Result<()> {
+    let text = serde_json::to_string(figures)? + "\n";
+    let mut stdout = std::io::stdout();
+    stdout.write_all(text.as_bytes())?;
+    stdout.flush()
+}
+
 pub fn print<T: Serialize>(figures: &T, json: bool) -> Result<()> {
     let text = if json { serde_json::to_string(figures)? + "\n" } else { toml::to_string(figures)? };
     to_stdout(text.as_bytes())

@@ -75,7 +75,103 @@ impl Lateral {
 /// No vertex.
 const NONE: u32 = u32::MAX;
 
-/// Writes the mesh of `depth`, coloured by `grey` (any scale), row by row, as large maps exceed memory. Names the unit.
+/// Surface through a depth map, coloured by an image of any scale. Written row by row, as large maps exceed memory.
+pub(crate) struct Surface<'a> {
+    depth: ArrayView2<'a, f32>,
+    grey: ArrayView2<'a, f32>,
+    lateral: Lateral,
+    /// Largest depth step within a triangle.
+    step: f32,
+    brightest: f32,
+}
+
+impl<'a> Surface<'a> {
+    pub(crate) fn new(depth: ArrayView2<'a, f32>, grey: ArrayView2<'a, f32>, lateral: Lateral) -> Self {
+        let finite = || depth.iter().copied().filter(|value| value.is_finite());
+        let (low, high) = finite().fold((f32::MAX, f32::MIN), |(low, high), z| (low.min(z), high.max(z)));
+        let brightest = grey.iter().copied().filter(|value| value.is_finite()).fold(1e-9, f32::max);
+        Self { depth, grey, lateral, step: (high - low) * STEP, brightest }
+    }
+
+    /// Numbers of vertices and faces.
+    pub(crate) fn count(&self) -> (usize, usize) {
+        let (height, width) = self.depth.dim();
+        let mut marks = vec![0; width];
+        let (mut vertices, mut faces) = (0, 0);
+        for row in 0..height {
+            vertices += self.depth.row(row).iter().map(|z| u32::from(z.is_finite())).sum::<u32>() as usize;
+            if row > 0 {
+                mark_faces(self.depth, row, self.step, &mut marks);
+                faces +=
+                    marks.iter().map(|mark| u32::from(mark & 1) + u32::from(mark >> 1)).sum::<u32>() as usize;
+            }
+        }
+        (vertices, faces)
+    }
+
+    /// Positions and shades of a row's vertices.
+    pub(crate) fn vertices(&self, row: usize) -> impl Iterator<Item = ([f32; 3], u8)> {
+        let line = self.depth.row(row).into_iter().zip(self.grey.row(row)).enumerate();
+        line.filter(|(_, (z, _))| z.is_finite()).map(move |(column, (&z, grey))| {
+            let [x, y] = self.lateral.beside_axis(self.depth.dim(), column, row, f64::from(z));
+            let shade = (255.0 * (grey / self.brightest).clamp(0.0, 1.0) + 0.5) as u8;
+            ([x as f32, y as f32, -z], shade)
+        })
+    }
+
+    /// Writes what `vertex` appends for each vertex, row by row.
+    pub(crate) fn write_vertices(
+        &self,
+        to: &mut impl Write,
+        vertex: impl Fn(&mut Vec<u8>, [f32; 3], u8),
+    ) -> io::Result<()> {
+        let mut bytes = Vec::new();
+        for row in 0..self.depth.nrows() {
+            bytes.clear();
+            self.vertices(row).for_each(|(position, shade)| vertex(&mut bytes, position, shade));
+            to.write_all(&bytes)?;
+        }
+        Ok(())
+    }
+
+    /// Writes what `face` appends for the corners of each face, anticlockwise for the viewer.
+    pub(crate) fn write_faces(
+        &self,
+        to: &mut impl Write,
+        face: impl Fn(&mut Vec<u8>, [u32; 3]),
+    ) -> io::Result<()> {
+        let (height, width) = self.depth.dim();
+        // Vertices are numbered in order, so two rows of numbers suffice.
+        let mut next = 0;
+        let mut numbers = [vec![NONE; width], vec![NONE; width]];
+        let (mut marks, mut bytes) = (vec![0; width], Vec::new());
+        for row in 0..height {
+            numbers.swap(0, 1);
+            for (number, z) in numbers[1].iter_mut().zip(self.depth.row(row)) {
+                *number = if z.is_finite() { next } else { NONE };
+                next += u32::from(z.is_finite());
+            }
+            if row == 0 {
+                continue;
+            }
+            mark_faces(self.depth, row, self.step, &mut marks);
+            bytes.clear();
+            let [upper, lower] = &numbers;
+            for ((mark, upper), lower) in marks.iter().zip(upper.windows(2)).zip(lower.windows(2)) {
+                if mark & 1 != 0 {
+                    face(&mut bytes, [upper[0], lower[0], upper[1]]);
+                }
+                if mark & 2 != 0 {
+                    face(&mut bytes, [upper[1], lower[0], lower[1]]);
+                }
+            }
+            to.write_all(&bytes)?;
+        }
+        Ok(())
+    }
+}
+
+/// Writes the mesh of `depth`, coloured by `grey` (any scale). Names the unit.
 pub fn write(
     depth: ArrayView2<f32>,
     grey: ArrayView2<f32>,
@@ -83,22 +179,8 @@ pub fn write(
     unit: &str,
     to: &mut impl Write,
 ) -> io::Result<()> {
-    let (height, width) = depth.dim();
-    let finite = || depth.iter().copied().filter(|value| value.is_finite());
-    let (low, high) = finite().fold((f32::MAX, f32::MIN), |(low, high), z| (low.min(z), high.max(z)));
-    let step = (high - low) * STEP;
-    let brightest = grey.iter().copied().filter(|value| value.is_finite()).fold(1e-9, f32::max);
-
-    let mut marks = vec![0; width];
-    let (mut vertices, mut faces) = (0, 0);
-    for row in 0..height {
-        vertices += depth.row(row).iter().map(|z| u32::from(z.is_finite())).sum::<u32>() as usize;
-        if row > 0 {
-            mark_faces(depth, row, step, &mut marks);
-            faces +=
-                marks.iter().map(|mark| u32::from(mark & 1) + u32::from(mark >> 1)).sum::<u32>() as usize;
-        }
-    }
+    let surface = Surface::new(depth, grey, lateral);
+    let (vertices, faces) = surface.count();
     write!(
         to,
         "ply\nformat binary_little_endian 1.0\ncomment depth map in {unit}\nelement vertex {vertices}\n\
@@ -106,59 +188,20 @@ pub fn write(
          property uchar red\nproperty uchar green\nproperty uchar blue\n\
          element face {faces}\nproperty list uchar uint vertex_indices\nend_header\n"
     )?;
-    // Whole rows, for large writes.
-    let mut bytes = Vec::with_capacity(2 * FACE_BYTES * width);
-    for row in 0..height {
-        bytes.clear();
-        let line = depth.row(row).into_iter().zip(grey.row(row)).enumerate();
-        for (column, (&z, grey)) in line.filter(|(_, (z, _))| z.is_finite()) {
-            let [x, y] = lateral.beside_axis((height, width), column, row, f64::from(z));
-            let shade = (255.0 * (grey / brightest).clamp(0.0, 1.0) + 0.5) as u8;
-            let mut vertex = [shade; VERTEX_BYTES];
-            for (place, value) in vertex.chunks_exact_mut(4).zip([x as f32, y as f32, -z]) {
-                place.copy_from_slice(&value.to_le_bytes());
-            }
-            bytes.extend_from_slice(&vertex);
+    surface.write_vertices(to, |bytes, position, shade| {
+        let mut vertex = [shade; 15];
+        for (place, value) in vertex.chunks_exact_mut(4).zip(position) {
+            place.copy_from_slice(&value.to_le_bytes());
         }
-        to.write_all(&bytes)?;
-    }
-    // Vertices are numbered in order, so two rows of numbers suffice.
-    let mut next = 0;
-    let mut numbers = [vec![NONE; width], vec![NONE; width]];
-    for row in 0..height {
-        numbers.swap(0, 1);
-        for (number, z) in numbers[1].iter_mut().zip(depth.row(row)) {
-            *number = if z.is_finite() { next } else { NONE };
-            next += u32::from(z.is_finite());
+        bytes.extend_from_slice(&vertex);
+    })?;
+    surface.write_faces(to, |bytes, corners| {
+        let mut face = [3_u8; 13];
+        for (place, number) in face[1..].chunks_exact_mut(4).zip(corners) {
+            place.copy_from_slice(&number.to_le_bytes());
         }
-        if row == 0 {
-            continue;
-        }
-        mark_faces(depth, row, step, &mut marks);
-        bytes.clear();
-        let [upper, lower] = &numbers;
-        for ((mark, upper), lower) in marks.iter().zip(upper.windows(2)).zip(lower.windows(2)) {
-            if mark & 1 != 0 {
-                bytes.extend_from_slice(&face([upper[0], lower[0], upper[1]]));
-            }
-            if mark & 2 != 0 {
-                bytes.extend_from_slice(&face([upper[1], lower[0], lower[1]]));
-            }
-        }
-        to.write_all(&bytes)?;
-    }
-    Ok(())
-}
-
-const VERTEX_BYTES: usize = 15;
-const FACE_BYTES: usize = 13;
-
-fn face(corners: [u32; 3]) -> [u8; FACE_BYTES] {
-    let mut face = [3_u8; FACE_BYTES];
-    for (place, number) in face[1..].chunks_exact_mut(4).zip(corners) {
-        place.copy_from_slice(&number.to_le_bytes());
-    }
-    face
+        bytes.extend_from_slice(&face);
+    })
 }
 
 /// [`write()`] into memory, for thinned maps.

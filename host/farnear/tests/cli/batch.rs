@@ -248,8 +248,8 @@ fn each_kind_gives_what_its_command_gives() {
          silhouettes-video,,,,,video,,,,b/video,,,true,true,,,,,,,\n\
          silhouettes-markers,,,,walk.csv,,,2,,b/markers,,,,,suit.toml,,,,,,\n\
          shadow-remove,,,,,,masks,,,b/clean,,,,,,camera.toml,52.38,-1.56,2014-06-23T11:30:00Z,,\n\
-         recognise,,,,,,,people/p01-dig-1/view1,,b/answer,,,,,,,,,,model.fnm,\n\
-         recognise,,,,,,,people/p01-dig-1/view1,,b/shipped,,,,,,,,,,everyday,dig;kick\n",
+         activity-recognise,,,,,,,people/p01-dig-1/view1,,b/answer,,,,,,,,,,model.fnm,\n\
+         activity-recognise,,,,,,,people/p01-dig-1/view1,,b/shipped,,,,,,,,,,everyday,dig;kick\n",
     );
     assert_eq!(states(&["batch", &manifest]), ["done"; 7]);
     assert_eq!(states(&["batch", &manifest]), ["already"; 7]);

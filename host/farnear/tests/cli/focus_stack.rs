@@ -201,6 +201,36 @@ fn a_folder_of_tiff_is_a_stack_and_mixed_formats_are_refused() {
     );
 }
 
+/// A wall far beyond the focus shows rounding only, which has no depth.
+#[test]
+fn a_background_that_is_never_sharp_has_no_depth() {
+    let folder = Folder::new();
+    let (path, out) = (folder.text("stack"), folder.text("out"));
+    fs::create_dir(&path).expect("a folder");
+    for number in 0..IMAGES {
+        let pixels = Array2::from_shape_fn((60, 160), |(y, x)| {
+            let texture =
+                |seed: usize| ((x * 7919 + y * 104_729 + x * y * 31 + seed) % 97) as f32 / 97.0 - 0.5;
+            let away = number as f32 - 4.0;
+            match x < 60 {
+                true => (128.0 + 200.0 * texture(0) * (-0.06 * away * away).exp()) as u16,
+                // A slope of brightness, sensor noise below one code.
+                false => (90.3 + 0.02 * x as f32 + 0.6 * texture(13 * number)) as u16,
+            }
+        });
+        let png = image_file::encode_png(pixels.view(), 8).expect("a picture");
+        fs::write(format!("{path}/{}.png", number + 1), png).expect("a file");
+    }
+    succeeds(&mut farnear(&["focus-stack", &path, "--out", &out]));
+    let depth = read(&out);
+    let known = |columns: std::ops::Range<usize>| {
+        let part = depth.slice(s![.., columns]);
+        part.iter().filter(|depth| depth.is_finite()).count() as f64 / part.len() as f64
+    };
+    assert!(known(4..50) > 0.99, "{}", known(4..50));
+    assert!(known(90..156) < 0.01, "{}", known(90..156));
+}
+
 #[test]
 fn a_moving_camera_is_followed() {
     let folder = Folder::new();

@@ -31,9 +31,10 @@ fn a_map_is_written_as_asked() {
     ];
     depth("usual", &[]);
     assert_eq!(written(&folder, "usual"), usual);
-    depth("all", &["--write", "npy,tiff,png,mesh,view,exr"]);
+    depth("all", &["--write", "npy,tiff,png,mesh,glb,view,exr"]);
     let all = written(&folder, "all");
-    assert_eq!(all.len(), usual.len() + 1);
+    assert_eq!(all.len(), usual.len() + 2);
+    assert!(std::fs::read(folder.path("all/mesh.glb")).unwrap().starts_with(b"glTF"));
     for name in usual.iter().filter(|name| **name != "depth.toml") {
         let bytes = |out: &str| std::fs::read(folder.path(&format!("{out}/{name}"))).unwrap();
         assert!(bytes("usual") == bytes("all"), "{name}");
@@ -47,7 +48,7 @@ fn a_map_is_written_as_asked() {
     assert!(record("some").contains("write = \"tiff,mesh\"") && !record("some").contains("[png]"));
     assert!(!record("usual").contains("write = ") && record("usual").contains("[png]"));
     let unknown = ["depth", &far, &near, "--optics", rig_optics(), "--write", "npy,jpg"];
-    fails(&mut farnear(&unknown), 2, &["jpg", "npy,tiff,png,mesh,view,exr"]);
+    fails(&mut farnear(&unknown), 2, &["jpg", "npy,tiff,png,mesh,glb,view,exr"]);
 }
 
 #[test]
@@ -60,7 +61,7 @@ fn a_folder_holds_the_files_of_one_run_with_hashes_of_its_inputs() {
         let [far, near] = ["far.png", "near.png"].map(|name| folder.text(&format!("{pair}/{name}")));
         succeeds(farnear(&["depth", &far, &near, "--optics", rig_optics(), "--out", &out]).args(more));
     };
-    depth("cone", &["--uncertainty", "--write", "npy,tiff,png,mesh,view,exr"]);
+    depth("cone", &["--uncertainty", "--write", "npy,tiff,png,mesh,glb,view,exr"]);
     folder.file("out/notes.txt", "mine");
     depth("slant", &["--write", "npy"]);
     let left = ["confidence.npy", "depth.npy", "depth.toml", "notes.txt", "reason.png"];
