@@ -127,7 +127,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_written_is_found_again() {
+    fn a_written_table_is_read_back() {
         let counted = Counted::parse("8655\t640\tpixel\tCLSF, ten terms").expect("a line");
         assert_eq!(on_page(&page(&[counted]), "CLSF, ten terms"), Some(8655.0));
     }

@@ -108,7 +108,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_left_behind_is_not_waited_for() {
+    fn a_leftover_child_process_is_not_awaited() {
         let (text, well, took) = shell("sleep 60 & echo done", Duration::from_secs(50));
         assert_eq!((text.as_str(), well), ("done\n", true));
         assert!(took < Duration::from_secs(30), "{took:?}");

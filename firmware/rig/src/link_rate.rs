@@ -107,7 +107,7 @@ mod tests {
     }
 
     #[test]
-    fn the_rate_that_is_there_is_no_change() {
+    fn requesting_the_current_rate_changes_nothing() {
         let mut speed = LinkSpeed::new();
         speed.ask(LinkRate::START, at(0));
         assert_eq!(speed.due(at(200), 0, || true), None);

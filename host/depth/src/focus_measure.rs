@@ -209,7 +209,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_judged_says_so() {
+    fn unusable_images_are_rejected_with_a_reason() {
         let measure = FocusMeasure::Tenengrad;
         assert_eq!("tenengrad".parse::<FocusMeasure>().unwrap(), measure);
         assert!("sharpness".parse::<FocusMeasure>().is_err());

@@ -409,7 +409,7 @@ mod tests {
     }
 
     #[test]
-    fn what_rises_to_an_end_or_nowhere_is_unreliable() {
+    fn curves_with_a_maximum_at_an_end_or_without_one_are_unreliable() {
         let rising: Vec<f32> = (1..12).map(|i| i as f32).collect();
         let at_the_end = tip(&rising, &even(11), 11);
         assert_eq!((at_the_end.place, at_the_end.reliability), (10.0, 0.0));
@@ -473,7 +473,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_stack_is_refused_with_the_number_of_the_image() {
+    fn invalid_stacks_are_rejected_with_the_image_number() {
         let image = Array2::from_elem((32, 40), 0.5_f32);
         let other = Array2::from_elem((32, 41), 0.5_f32);
         let mut broken = image.clone();

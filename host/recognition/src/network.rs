@@ -167,7 +167,7 @@ mod tests {
     }
 
     #[test]
-    fn members_stand_side_by_side_and_decide_by_their_mean() {
+    fn members_are_concatenated_and_averaged() {
         let (clips, labels) = clips();
         let trained = |members: usize, seed: u64| {
             let settings = NetworkSettings {

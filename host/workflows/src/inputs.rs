@@ -120,7 +120,7 @@ mod tests {
     }
 
     #[test]
-    fn folders_and_pages_stand_for_their_files() {
+    fn folders_and_pages_represent_their_files() {
         let folder = tempfile::tempdir().expect("a folder");
         for name in ["b.tif", "camera/dark.npy"] {
             let path = folder.path().join(name);

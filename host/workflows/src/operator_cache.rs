@@ -119,7 +119,7 @@ mod tests {
     }
 
     #[test]
-    fn what_comes_from_the_cache_is_what_was_designed() {
+    fn cached_operators_equal_designed_ones() {
         let folder = tempfile::tempdir().unwrap();
         // The last bit of the number matters.
         let request = request(2.0 + f64::EPSILON * 2.0);
@@ -141,7 +141,7 @@ mod tests {
     }
 
     #[test]
-    fn broken_entries_are_written_anew() {
+    fn broken_entries_are_rewritten() {
         let folder = tempfile::tempdir().unwrap();
         let request = request(2.0);
         let designed = cached(folder.path(), "a", &request).unwrap();

@@ -57,7 +57,7 @@ fn far_to_near_is_inside_50_nm_within_15_ms_whatever_the_part_is_like() {
 }
 
 #[test]
-fn a_second_mode_is_left_alone_where_the_setting_says_that_there_is_one() {
+fn a_second_mode_by_the_setting_is_not_excited() {
     let mut values = Values::DEFAULT;
     values.set(SettingKey::PiezoHysteresisPpm, 120_000).expect("in range");
     values.set(SettingKey::PiezoCreepPpmPerDecade, 15_000).expect("in range");
@@ -90,7 +90,7 @@ fn a_second_mode_is_left_alone_where_the_setting_says_that_there_is_one() {
 }
 
 #[test]
-fn it_is_called_at_rest_only_where_what_it_says_is_where_it_is() {
+fn rest_is_reported_only_with_a_correct_position() {
     // Found by the campaign: the set-point had arrived while the piezo still moved a micrometre per
     // millisecond.
     let mut piezo = Piezo::new(Settings::DEFAULT.fine);
@@ -335,7 +335,7 @@ fn a_piezo_that_follows_is_far_from_one_that_does_not() {
 }
 
 #[test]
-fn a_single_wrong_reading_is_no_piezo_that_does_not_follow() {
+fn a_single_wrong_reading_is_not_a_piezo_fault() {
     for jump in [-90_000, 100_000] {
         let mut piezo = Piezo::new(Settings::DEFAULT.fine);
         let mut plant = Plant::new(Part { hysteresis: 0.12, ..NOMINAL }, 7);
@@ -412,7 +412,7 @@ fn any_way_settles_in_time() {
 }
 
 #[test]
-fn what_the_calibration_knows_makes_the_way_cleaner() {
+fn calibration_improves_the_trajectory() {
     let part = Part { hysteresis: 0.12, creep: 0.015, ..NOMINAL };
     let swing = |hysteresis_ppm, creep_ppm_per_decade| {
         let mut piezo =
@@ -433,7 +433,7 @@ fn what_the_calibration_knows_makes_the_way_cleaner() {
 }
 
 #[test]
-fn after_a_reset_it_is_led_down_from_where_it_stands() {
+fn after_a_reset_it_ramps_down_from_its_position() {
     let mut plant = Plant::new(NOMINAL, 5);
     for _ in 0..5_000 {
         plant.tick(Some(51_000));

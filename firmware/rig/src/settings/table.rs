@@ -219,7 +219,7 @@ mod tests {
     }
 
     #[test]
-    fn what_the_memory_holds_beyond_its_range_becomes_the_default() {
+    fn stored_values_out_of_range_become_the_default() {
         let mut raw = *Values::DEFAULT.raw();
         (raw[0], raw[2]) = (i32::MIN, 1_000);
         let values = Values::restored(raw);

@@ -146,7 +146,7 @@ fn one_missing_strobe_costs_a_frame_and_a_dead_camera_the_run() {
 }
 
 #[test]
-fn it_goes_on_until_it_is_stopped_and_a_pause_begins_the_pace_anew() {
+fn a_run_continues_until_stopped_and_a_pause_restarts_the_period() {
     let mut bench = Bench::new(700.0);
     pair(&mut bench);
     let id = bench.accepted(&run(PERIOD, 0));

@@ -94,7 +94,7 @@ fn a_stage_is_homed_by_way_of_the_loop_and_each_tick_feeds_the_watchdog() {
 }
 
 #[test]
-fn whatever_hangs_in_a_tick_leaves_the_watchdog_hungry() {
+fn a_hanging_tick_does_not_feed_the_watchdog() {
     for (place, call) in TICK.iter().enumerate().filter(|(_, call)| **call != Call::FeedWatchdog) {
         let (mut rig, mut fake) = (rig(), Fake::new(800.0));
         fake.logs.push_back(log());

@@ -26,7 +26,7 @@ fn alarms(bench: &Bench) -> Vec<AlarmRecord> {
 }
 
 #[test]
-fn both_steppers_and_the_piezo_move_at_once() {
+fn both_steppers_and_the_piezo_move_simultaneously() {
     let mut bench = Bench::both_homed();
     let [coarse, fine, lens] = all_moving(&mut bench);
     let status = bench.status();
@@ -438,7 +438,7 @@ fn a_rotor_that_stood_between_two_poles_falls_to_one_of_them_as_homing_begins() 
 }
 
 #[test]
-fn a_board_without_memory_works_and_says_so() {
+fn a_board_without_memory_works_and_reports_it() {
     let mut bench = Bench::new(700.0);
     bench.rig = farnear_rig::Rig::new(*bench.rig.identity(), None, farnear_protocol::BoardMicros(0));
     bench.open_session();
@@ -450,7 +450,7 @@ fn a_board_without_memory_works_and_says_so() {
 }
 
 #[test]
-fn a_board_on_its_own_clock_works_and_says_so_once() {
+fn a_board_on_its_internal_clock_works_and_reports_it_once() {
     let mut bench = Bench::new(700.0);
     let identity = Identity { own_clock: true, ..*bench.rig.identity() };
     bench.rig = farnear_rig::Rig::new(identity, Some(&[0; MEMORY_BYTES]), farnear_protocol::BoardMicros(0));

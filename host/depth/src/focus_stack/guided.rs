@@ -147,7 +147,7 @@ mod tests {
     }
 
     #[test]
-    fn what_grew_over_a_dull_background_ends_at_the_edge_of_the_sharp_image() {
+    fn objects_on_a_dull_background_end_at_the_edge_of_the_sharp_image() {
         // The bright thing ends at column 30, its place at column 36.
         let across = |ends: usize, left: f32, right: f32| {
             Array2::from_shape_fn(SIZE, |(_, x)| if x < ends { left } else { right })

@@ -284,7 +284,7 @@ mod tests {
     }
 
     #[test]
-    fn what_moved_and_what_is_missing_have_no_say() {
+    fn motion_and_missing_pixels_have_no_influence() {
         let [far, mut near] = pair(|_, _| 0.9);
         near.slice_mut(ndarray::s![60..100, 80..130]).fill(0.2);
         near.slice_mut(ndarray::s![.., 0..9]).fill(f32::NAN);

@@ -208,7 +208,7 @@ fn different_scenes_are_refused() {
 }
 
 #[test]
-fn what_moved_has_no_depth() {
+fn moved_pixels_have_no_depth() {
     let (still, moved) = (
         plain("plane:905", 5),
         pair("plane:905", PSF, Noise::EightBit, &lens(), View { shift_px: [3.0, 0.0], ..View::default() }, 5),
@@ -308,7 +308,7 @@ fn a_wrong_psf_is_reported() {
 }
 
 #[test]
-fn what_is_asked_for_is_done() {
+fn requested_corrections_are_applied() {
     let pair = plain("plane:905", 10);
     let optics = rig(PSF);
     let operators = Operators::for_optics(&optics).unwrap();
@@ -371,7 +371,7 @@ fn claimed(found: &Measurement) -> [f32; 2] {
 
 /// One pair of a plane cannot reveal a wrong width; a wrong shape leaves a residual, which must count.
 #[test]
-fn what_the_model_leaves_unexplained_widens_the_deviation_and_lowers_the_confidence() {
+fn misfit_widens_the_deviation_and_lowers_the_confidence() {
     let pair = pair("plane:925", "pillbox", Noise::EightBit, &lens(), View::default(), 90);
     let [right, wrong] =
         ["pillbox", "gaussian:k=0.7"].map(|psf| measure(&pair, psf, Window::Adaptive).unwrap());

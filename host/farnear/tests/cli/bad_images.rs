@@ -61,7 +61,7 @@ fn images_without_texture_or_too_small_have_no_depth() {
 }
 
 #[test]
-fn a_pair_given_the_wrong_way_round_is_told() {
+fn a_swapped_pair_is_reported() {
     let folder = Folder::new();
     render(&folder, "slant", "pair");
     let [far, near] = ["pair/far.png", "pair/near.png"].map(|name| folder.text(name));
@@ -77,7 +77,7 @@ fn a_pair_given_the_wrong_way_round_is_told() {
 }
 
 #[test]
-fn maps_that_are_none_are_named() {
+fn invalid_maps_are_named_in_the_error() {
     let folder = Folder::new();
     render(&folder, "slant", "pair");
     let truth = folder.text("pair/truth.npy");

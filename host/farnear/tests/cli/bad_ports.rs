@@ -58,7 +58,7 @@ fn the_environment_names_the_port_where_no_flag_does() {
 }
 
 #[test]
-fn a_file_and_a_folder_are_no_ports() {
+fn files_and_folders_are_rejected_as_ports() {
     capture_fails(rig_optics(), &["rig.toml is not a serial port"]);
     capture_fails(env!("CARGO_TARGET_TMPDIR"), &["is not a serial port"]);
 }
@@ -139,7 +139,7 @@ fn another_protocol_version_is_reported_with_both_versions() {
 }
 
 #[test]
-fn a_camera_that_is_none_is_named_before_anything_moves() {
+fn an_invalid_camera_is_reported_before_any_motion() {
     let folder = Folder::new();
     let out = folder.text("out");
     for (camera, code, phrases) in [

@@ -53,7 +53,7 @@ fn a_missing_or_broken_firmware_is_named_with_what_to_do() {
 
 #[test]
 #[cfg_attr(not(emulated_rig), ignore = "needs farnear-sim: cargo xtask test")]
-fn what_the_simulator_refuses_is_passed_on() {
+fn errors_of_the_simulator_are_forwarded() {
     let folder = Folder::new();
     let typo = folder.file("faults.toml", "bit_eror_rate = 0.1");
     let messages = ["bit_eror_rate", "farnear-sim ended at once"];

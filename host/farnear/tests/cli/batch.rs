@@ -57,7 +57,7 @@ fn pairs(folder: &Folder, jobs: usize) -> String {
 }
 
 #[test]
-fn what_was_killed_goes_on_and_ends_as_if_it_had_not_been() {
+fn a_killed_batch_resumes_with_the_same_result() {
     const JOBS: usize = 24;
     let [whole, killed] = [Folder::new(), Folder::new()];
     let manifests = [&whole, &killed].map(|folder| pairs(folder, JOBS));
@@ -132,7 +132,7 @@ fn a_bad_job_does_not_stop_the_others() {
 }
 
 #[test]
-fn what_has_changed_is_done_again_and_nothing_else() {
+fn only_changed_jobs_run_again() {
     let folder = Folder::new();
     let manifest = pairs(&folder, 2);
     let again = || states(&["batch", &manifest]);
@@ -329,7 +329,7 @@ fn methods_and_models_are_evaluated_as_jobs() {
 }
 
 #[test]
-fn a_manifest_that_is_none_is_refused_before_anything_is_done() {
+fn an_invalid_manifest_is_rejected_before_any_job() {
     let folder = Folder::new();
     let manifest = folder.file("list.txt", "");
     fails(&mut farnear(&["batch", &manifest]), 1, &["list.txt", ".toml or .csv"]);

@@ -3,7 +3,7 @@
 use crate::common::{Folder, built, farnear};
 
 #[test]
-fn each_line_says_how_it_is_and_what_to_do() {
+fn each_line_has_a_state_and_a_remedy() {
     let folder = Folder::new();
     let gone = folder.text("gone");
     let output = farnear(&["doctor", &gone, "--port", "/dev/does-not-exist"])

@@ -12,7 +12,7 @@ fn on_the_rig(arguments: &[&str]) -> assert_cmd::Command {
 
 #[test]
 #[cfg_attr(not(emulated_rig), ignore = "needs farnear-sim: cargo xtask test")]
-fn info_says_who_is_there_and_that_it_is_emulated() {
+fn info_identifies_the_emulated_board() {
     let mut command = on_the_rig(&["info", "--json"]);
     let info = figures(&mut command);
     assert_eq!((&info["emulated"], &info["protocol"], &info["boot"]), (&true.into(), &3.into(), &1.into()));

@@ -250,7 +250,7 @@ fn a_moving_camera_is_followed() {
 }
 
 #[test]
-fn what_is_no_stack_is_refused_and_nothing_is_written() {
+fn invalid_stacks_are_rejected_without_output() {
     let folder = Folder::new();
     let (stack, out) = (stack(&folder), folder.text("out"));
     let refuse = |arguments: &[&str], code, phrase: &str| {

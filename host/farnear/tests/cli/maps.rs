@@ -132,7 +132,7 @@ fn write_as(grey: &image::GrayImage, path: &Path, ending: &str) {
 
 #[cfg(target_os = "linux")]
 #[test]
-fn names_that_are_no_text_are_fine() {
+fn file_names_that_are_not_utf8_are_accepted() {
     use std::os::unix::ffi::OsStrExt;
     let folder = Folder::new();
     let name = folder.path("").join(std::ffi::OsStr::from_bytes(b"pa\xffir"));

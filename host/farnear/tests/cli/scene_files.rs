@@ -51,7 +51,7 @@ fn a_height_map_and_a_picture_are_rendered_and_found_again() {
 }
 
 #[test]
-fn a_named_scene_may_stand_in_a_file() {
+fn a_scene_file_accepts_a_named_scene() {
     let folder = Folder::new();
     let scene = folder.file("scene.toml", "scene = \"plane:905\"\ntexture = \"fractal\"\ncontrast = 0.3\n");
     let [a, b] = ["a", "b"].map(|name| folder.text(name));

@@ -87,7 +87,7 @@ fn settings_and_counters_are_read_and_changed() {
 }
 
 #[test]
-fn a_checklist_without_hands_stops_at_what_fails() {
+fn an_unattended_checklist_stops_at_a_failure() {
     let (port, peer) = plug_in(Faults::default());
     peer.board().hello.firmware = env!("CARGO_PKG_VERSION").try_into().expect("a short version");
     // Longer time-outs: on a busy machine this program answers later than a real board.

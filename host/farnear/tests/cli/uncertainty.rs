@@ -40,7 +40,7 @@ fn the_predicted_deviation_is_that_of_the_errors() {
 }
 
 #[test]
-fn what_has_no_deviation_says_so() {
+fn maps_without_deviation_are_reported() {
     let folder = Folder::new();
     render(&folder, "slant", "pair");
     let [far, near, map] = ["pair/far.png", "pair/near.png", "map"].map(|name| folder.text(name));

@@ -99,7 +99,7 @@ fn anybody_may_stop_and_it_does_not_wait_for_the_job() {
 }
 
 #[test]
-fn what_cannot_be_is_refused_before_anything_moves() {
+fn impossible_requests_are_rejected_before_any_motion() {
     let served = Served::with_board(Faults::default());
     served.ready();
     let holder = Socket::open(&served);

@@ -325,7 +325,7 @@ mod tests {
     }
 
     #[test]
-    fn recordings_come_in_millimetres_with_z_up_unless_the_caller_knows_better() {
+    fn recordings_are_converted_to_millimetres_and_z_up_unless_the_caller_decides() {
         let by_itself = found([1.0, 2.0, 3.0]).settled(Choices::default());
         assert_eq!(by_itself.frames[0], vec![Some([10.0, -30.0, 20.0])]);
         assert_eq!(by_itself.by_name(0)["HEAD"], by_itself.by_name(0)["Nick:HEAD"]);
@@ -342,7 +342,7 @@ mod tests {
     }
 
     #[test]
-    fn turning_up_keeps_hands_apart() {
+    fn conversion_to_z_up_stays_right_handed() {
         // A right-handed frame stays one: x cross y is z, for every upward axis.
         for up in [Up::X, Up::Y, Up::Z] {
             let [x, y, z] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(|p| up.to_z(p));
@@ -362,7 +362,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_text_is_named_with_its_line() {
+    fn binary_data_is_reported_with_the_line() {
         assert_eq!(text(b"\xef\xbb\xbfabc"), Ok("abc".into()));
         assert_eq!(text(b"M\xfcller"), Ok("M\u{fc}ller".into()));
         let error = text(b"one\ntwo\n\xff\x00").expect_err("not text");

@@ -289,7 +289,7 @@ mod tests {
     }
 
     #[test]
-    fn a_job_that_is_none_does_not_hide_the_others() {
+    fn an_invalid_job_does_not_hide_the_others() {
         let found =
             all("a.toml", "[[job]]\ndo = 'depth'\nfar = \n[[job]]\nfar = 'x'\n[[job]]\ndo = 'correct'\n");
         let error = found[0].1.as_ref().expect_err("no value");
@@ -301,7 +301,7 @@ mod tests {
     }
 
     #[test]
-    fn a_manifest_that_is_none_is_refused() {
+    fn an_invalid_manifest_is_rejected() {
         let folder = tempfile::tempdir().expect("a folder");
         for (name, text, phrase) in [
             ("a.txt", "", ".toml or .csv"),

@@ -162,7 +162,7 @@ mod tests {
     }
 
     #[test]
-    fn a_file_that_is_written_anew_is_summed_anew() {
+    fn a_rewritten_file_gets_a_new_checksum() {
         let folder = tempfile::tempdir().expect("a folder");
         let file = folder.path().join("optics.toml");
         let sums = Sums::default();

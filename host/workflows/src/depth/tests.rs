@@ -59,7 +59,7 @@ fn a_cancelled_map_leaves_nothing_behind() {
 }
 
 #[test]
-fn what_a_method_has_no_use_for_is_bad_usage() {
+fn options_without_effect_on_a_method_are_bad_usage() {
     let folder = tempfile::tempdir().unwrap();
     let other = Method::Baseline(farnear_depth::baselines::Method::Subbarao);
     let settings = DepthRequest { method: other, ..settings(folder.path()) };

@@ -111,7 +111,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_off_the_plane_is_measured() {
+    fn deviations_from_the_plane_are_measured() {
         let plane = fit(&grid(|x, y| 900.0 + if (x + y) as i64 % 2 == 0 { 1.0 } else { -1.0 })).unwrap();
         assert!(
             (plane.rms_mm - 1.0).abs() < 0.01 && (plane.peak_to_valley_mm - 2.0).abs() < 0.05,

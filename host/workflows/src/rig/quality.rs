@@ -215,7 +215,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_there_lowers_the_fill_rate_and_without_depth_there_is_no_quality() {
+    fn missing_pixels_lower_the_fill_rate_and_a_map_without_depth_has_no_quality() {
         let mut some = maps(0.0);
         some[0].slice_mut(s![.., ..30]).fill(f32::NAN);
         let found = figures(&some, None, PROJECTION, None).unwrap();

@@ -90,7 +90,7 @@ fn a_finished_model_is_judged_and_its_mistakes_are_listed() {
 }
 
 #[test]
-fn an_unknown_answer_says_why() {
+fn an_unknown_answer_has_a_reason() {
     let folder = Folder::new();
     let masks = folder.text("nobody");
     fs::create_dir(&masks).expect("a folder");

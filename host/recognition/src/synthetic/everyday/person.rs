@@ -177,7 +177,7 @@ mod tests {
     use rand::SeedableRng;
 
     #[test]
-    fn arms_keep_their_length_and_hands_get_where_they_can() {
+    fn arms_keep_their_length_and_hands_reach_as_far_as_possible() {
         let mut rng = ChaCha8Rng::seed_from_u64(1);
         for _ in 0..50 {
             let person = Person::drawn(&mut rng);

@@ -359,7 +359,7 @@ mod tests {
     }
 
     #[test]
-    fn errors_name_the_line_what_stands_there_and_what_was_expected() {
+    fn errors_name_the_line_its_content_and_the_expectation() {
         refused("HIERARCHY", "TREE", "line 1: found `TREE`, expected `HIERARCHY`");
         refused("ROOT Bip01 Hips", "ROOT", "line 2: found nothing, expected the root's name");
         refused("ROOT", "JOINT", "line 2: found `JOINT`, expected ROOT");

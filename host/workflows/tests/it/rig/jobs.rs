@@ -33,7 +33,7 @@ fn moves_home_first_where_asked_to_and_say_so() {
 }
 
 #[test]
-fn what_cannot_be_is_refused_before_the_port_is_looked_at() {
+fn impossible_requests_are_rejected_before_the_port_is_opened() {
     let rig = RigAddress::Port("/dev/farnear-no-such-port".into());
     let context = Context::unattended();
     let targets = vec![(Axis::SensorFine, f64::NAN)];
