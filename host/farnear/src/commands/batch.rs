@@ -1,5 +1,3 @@
-//! `farnear batch`: the jobs of a manifest on all cores.
-
 use std::{io, path::PathBuf};
 
 use anyhow::Result;

@@ -1,5 +1,3 @@
-//! `farnear calibrate`: optics and corrections from captured images and depth maps.
-
 use anyhow::Result;
 use clap::Subcommand;
 use farnear_workflows::{

@@ -1,5 +1,3 @@
-//! `farnear camera`: cameras without a rig.
-
 use std::{io::Write, path::PathBuf, time::Duration};
 
 use anyhow::Result;

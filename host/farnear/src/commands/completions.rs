@@ -1,5 +1,3 @@
-//! `farnear completions`: completions for a shell.
-
 use anyhow::Result;
 use clap::{Args, CommandFactory};
 use clap_complete::Shell;

@@ -1,5 +1,3 @@
-//! `farnear doctor`: checks this computer for what farnear needs.
-
 use std::path::PathBuf;
 
 use anyhow::{Result, bail};

@@ -1,5 +1,3 @@
-//! `farnear man`: manual pages.
-
 use std::path::PathBuf;
 
 use anyhow::Result;

@@ -1,5 +1,3 @@
-//! `farnear measure`: figures of a depth map, with their deviation.
-
 use anyhow::Result;
 use clap::Subcommand;
 use farnear_workflows::measure::{

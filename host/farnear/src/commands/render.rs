@@ -1,5 +1,3 @@
-//! `farnear render`: a simulated pair of a known scene, with the true depth.
-
 use std::path::PathBuf;
 
 use anyhow::Result;

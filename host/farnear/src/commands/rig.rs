@@ -1,5 +1,3 @@
-//! `farnear rig`: drives a rig, real or emulated.
-
 mod calibrate;
 mod log;
 mod motion;

@@ -1,5 +1,3 @@
-//! `farnear serve`: the page.
-
 use std::{net::SocketAddr, path::PathBuf, time::Duration};
 
 use anyhow::{Result, bail};

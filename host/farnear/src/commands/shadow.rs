@@ -1,5 +1,3 @@
-//! `farnear shadow`: shadows in masks of a person.
-
 use anyhow::Result;
 use clap::Subcommand;
 use farnear_workflows::shadow::{removal::ShadowRemoveRequest, score::ShadowScoreRequest};

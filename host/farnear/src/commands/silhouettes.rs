@@ -1,5 +1,3 @@
-//! `farnear silhouettes`: masks of a person.
-
 use anyhow::Result;
 use clap::Subcommand;
 use farnear_workflows::silhouettes::{

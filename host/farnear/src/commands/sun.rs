@@ -1,5 +1,3 @@
-//! `farnear sun`: the sun's position at a place and time.
-
 use anyhow::Result;
 use chrono::{DateTime, Utc};
 use clap::Args;

@@ -4,7 +4,6 @@ use std::fs;
 
 use crate::common::{Folder, fails, farnear, render, rig_optics, succeeds};
 
-/// Depth of two files fails with these phrases and leaves no file.
 #[track_caller]
 fn depth_fails(folder: &Folder, far: &str, near: &str, phrases: &[&str]) {
     let before = folder.listing();

@@ -13,7 +13,6 @@ use serialport::{SerialPort, TTYPort};
 
 use crate::common::{Folder, fails, farnear, rig_optics};
 
-/// A capture with this port fails and leaves no file.
 #[track_caller]
 fn capture_fails(port: &str, phrases: &[&str]) {
     let folder = Folder::new();

@@ -83,7 +83,6 @@ fn a_port_that_goes_away_ends_the_capture_without_a_trace() {
     }
 }
 
-/// The first line of output that contains `phrase`.
 fn wait_for(output: &mut impl BufRead, phrase: &str) -> String {
     let mut line = String::new();
     while !line.contains(phrase) {
@@ -93,7 +92,6 @@ fn wait_for(output: &mut impl BufRead, phrase: &str) -> String {
     line
 }
 
-/// Kills the child even if the test fails.
 struct Reaped(Child);
 
 impl Drop for Reaped {

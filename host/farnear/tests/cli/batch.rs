@@ -21,14 +21,12 @@ fn lines(stdout: &[u8]) -> Vec<Value> {
     lines
 }
 
-/// The states of all jobs of a run that succeeds.
 #[track_caller]
 fn states(arguments: &[&str]) -> Vec<String> {
     let (stdout, _) = succeeds(&mut farnear(arguments));
     lines(stdout.as_bytes()).iter().map(|line| line["state"].as_str().expect("a state").into()).collect()
 }
 
-/// Every file below a folder with its bytes.
 fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
     let mut found = BTreeMap::new();
     for entry in fs::read_dir(folder).expect("a folder") {

@@ -131,7 +131,6 @@ fn a_shifted_pair_is_aligned_or_reported() {
     );
 }
 
-/// The criterion and order of filling of the thesis, after a correction, too.
 #[test]
 fn filling_as_in_the_thesis_is_selectable() {
     let bench = Bench::new();

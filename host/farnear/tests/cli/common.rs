@@ -31,7 +31,6 @@ impl Folder {
         self.0.path().join(name)
     }
 
-    /// A path as an argument.
     pub fn text(&self, name: &str) -> String {
         self.path(name).to_str().expect("temporary folders have plain names").into()
     }

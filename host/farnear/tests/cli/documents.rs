@@ -4,7 +4,6 @@ use std::{fs, path::PathBuf};
 
 use crate::common::{farnear, succeeds};
 
-/// Every page for users.
 fn pages() -> Vec<PathBuf> {
     let root = PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."));
     let docs = fs::read_dir(root.join("docs")).expect("docs/ is there").flatten().map(|entry| entry.path());

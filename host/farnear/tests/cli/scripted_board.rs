@@ -6,7 +6,6 @@ use farnear_scripted_board::{Faults, plug_in};
 
 use crate::common::{Folder, fails, farnear, figures, number, rig_optics, succeeds};
 
-/// A capture with this port fails and leaves no file.
 #[track_caller]
 fn capture_fails(port: &str, phrases: &[&str]) {
     let folder = Folder::new();

@@ -79,7 +79,6 @@ fn figures(command: &mut Command) -> serde_json::Value {
     serde_json::from_slice(&output.stdout).unwrap()
 }
 
-/// The command fails with exit code 1 and `expected`, and leaves no folder at `out`.
 #[track_caller]
 fn fails(command: &mut Command, out: &Path, expected: &[&str]) {
     let output = command.output().unwrap();

@@ -9,7 +9,6 @@ fn read(folder: &Folder, name: &str) -> Array2<f32> {
     map::read(&folder.path(name)).expect("a map")
 }
 
-/// The errors of a noisy plane agree with the predicted deviation.
 #[test]
 fn the_predicted_deviation_is_that_of_the_errors() {
     let folder = Folder::new();

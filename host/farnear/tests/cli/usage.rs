@@ -4,7 +4,6 @@ use std::{fs, fs::File, process::Stdio};
 
 use crate::common::{Folder, fails, farnear, figures, rig_optics, succeeds};
 
-/// Every command and its subcommands.
 const COMMANDS: &[&[&str]] = &[
     &["optics"],
     &["operators"],
@@ -205,7 +204,6 @@ fn completions_name_the_commands() {
     }
 }
 
-/// A closed stdout causes a message, not a panic.
 #[cfg(target_os = "linux")]
 #[test]
 fn a_closed_stdout_is_a_failure() {

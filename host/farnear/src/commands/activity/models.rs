@@ -1,5 +1,3 @@
-//! `farnear activity models`: recognisers that come with the program.
-
 use anyhow::Result;
 use clap::Args;
 use farnear_workflows::activity::shipped;

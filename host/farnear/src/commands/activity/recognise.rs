@@ -1,5 +1,3 @@
-//! `farnear activity recognise`: a line per frame, then the answer for the whole.
-
 use anyhow::Result;
 use clap::Args;
 use farnear_workflows::activity::recognise::RecogniseRequest;

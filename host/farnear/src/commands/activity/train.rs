@@ -1,5 +1,3 @@
-//! `farnear activity train`: samples, or synthetic people, to a model.
-
 use std::path::PathBuf;
 
 use anyhow::Result;

@@ -1,5 +1,3 @@
-//! `farnear rig calibrate`: the board's mechanics, and a depth correction from flat targets.
-
 use anyhow::{Result, bail};
 use clap::Subcommand;
 use farnear_protocol::message::{Axis, Routine};

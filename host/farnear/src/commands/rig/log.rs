@@ -1,5 +1,3 @@
-//! `farnear rig log`: the firmware's log.
-
 use std::{io::Write, path::PathBuf};
 
 use anyhow::Result;

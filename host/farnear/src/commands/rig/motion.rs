@@ -1,5 +1,3 @@
-//! `farnear rig home | move`.
-
 use anyhow::{Result, bail};
 use clap::Args;
 use farnear_protocol::message::Axis;

@@ -1,5 +1,3 @@
-//! `farnear rig settings`: the settings in the board's memory.
-
 use anyhow::Result;
 use clap::Subcommand;
 use farnear_workflows::rig::settings;

@@ -6,7 +6,6 @@ use farnear_files::map;
 use image::GenericImageView;
 use serde::{Deserialize, Serialize};
 
-/// Number of values recorded per file.
 const VALUES: usize = 9;
 /// Relative and absolute tolerance between kinds of processors: hundredths of a millimetre in maps, a grey level or a
 /// plotted pixel in pictures.
@@ -93,7 +92,6 @@ fn of_picture(bytes: &[u8]) -> (String, Vec<f64>) {
     (form, some_of(&values))
 }
 
-/// The mean, and values from the whole file.
 fn some_of(values: &[f64]) -> Vec<f64> {
     let Some(last) = values.len().checked_sub(1) else { return Vec::new() };
     let mean = values.iter().sum::<f64>() / values.len() as f64;

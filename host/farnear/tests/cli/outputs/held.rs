@@ -10,7 +10,6 @@ use crate::common::{Folder, farnear, rig_optics};
 
 /// Replaces `SMALL` in a command: a picture that renders fast.
 const SMALL: &str = "--optics rig.toml --width 96 --height 72";
-/// Figures that differ from run to run.
 const TIMES: [&str; 4] = ["seconds", "seconds_per_frame", "cut_ms_per_frame", "rows_per_second"];
 /// Relative and absolute tolerance for numbers in text between kinds of processors.
 const TEXT_TOLERANCE: [f64; 2] = [2e-3, 2e-3];
@@ -131,7 +130,6 @@ fn contents(folder: &Folder) -> BTreeMap<String, u64> {
     names.filter_map(|name| Some((name.clone(), hash(&fs::read(folder.path(&name)).ok()?)))).collect()
 }
 
-/// The text with `_` for wall-clock times.
 fn without_times(text: &str) -> String {
     let mut text = text.to_owned();
     for key in TIMES {
@@ -147,7 +145,6 @@ fn without_times(text: &str) -> String {
 }
 
 impl Step {
-    /// Adds the differences from the recording.
     fn compare(&self, recorded: &Self, same_kind: bool, differences: &mut Vec<String>) {
         let mut differ = |what: &str, recorded: &dyn std::fmt::Debug, found: &dyn std::fmt::Debug| {
             differences.push(format!("`{}`: {what} was {recorded:?} and is {found:?}", self.command));
