@@ -17,7 +17,6 @@ mod fast;
 mod processor;
 #[cfg(test)]
 mod reference;
-mod repair;
 
 use ndarray::ArrayView2;
 use serde::{Deserialize, Serialize};
@@ -233,6 +232,7 @@ mod tests {
                         input: &input,
                         operators: &operators,
                         settings: &settings,
+                        invalid: None,
                         depth_of,
                         backend,
                     }
