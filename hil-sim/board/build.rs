@@ -1,5 +1,4 @@
-//! Sets `pyserial` where Python has that package, so that the Python client's test runs; it counts as skipped
-//! elsewhere.
+//! Sets `pyserial` where Python has that package; elsewhere the Python client's test is skipped.
 
 use std::process::Command;
 

@@ -1,4 +1,4 @@
-//! Tells the tests whether a corpus of images is there: `FARNEAR_IMAGE_CORPUS` names folders.
+//! Sets a cfg for tests if `FARNEAR_IMAGE_CORPUS` names folders with images.
 
 fn main() {
     println!("cargo::rustc-check-cfg=cfg(image_corpus)");

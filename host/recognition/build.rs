@@ -1,4 +1,4 @@
-//! Tells whether the real data that some tests need lie next to the repository.
+//! Sets a cfg if the real data that some tests need is next to the repository.
 
 fn main() {
     farnear_test_data::declare();

@@ -4,8 +4,7 @@
 //! ```text
 //! length u32 | shot_id u32 | exposure_us u64 | width u16 | height u16 | bits u8 | pixels u16 * width * height
 //! ```
-//! little-endian; `length` counts the bytes after itself. The client may send [`Control`] messages:
-//! `length u32 | postcard body`.
+//! little-endian; `length` counts the bytes after itself. Clients may send [`Control`]: `length u32 | postcard body`.
 
 use serde::{Deserialize, Serialize};
 
@@ -31,7 +30,7 @@ pub struct FrameHeader {
 }
 
 impl FrameHeader {
-    /// Serialises the header.
+    /// Header as bytes.
     pub fn to_bytes(&self) -> [u8; FRAME_HEADER] {
         let mut bytes = [0; FRAME_HEADER];
         bytes[0..4].copy_from_slice(&self.shot_id.to_le_bytes());

@@ -3,12 +3,9 @@
 //! ```text
 //! COBS( version u8 | kind u8 | id u32 | boot u32 | postcard body | CRC-32 ) 0x00
 //! ```
-//! Little-endian. The CRC is CRC-32/ISO-HDLC over all bytes before it. A frame has at most [`FRAME_MAX`]
-//! bytes with its
-//! delimiter. Header and CRC are the same in every protocol version, so that a board can reject other
-//! versions.
-//!
-//! Cost: one pass each for COBS and CRC; no allocation.
+//! Little-endian. The CRC is CRC-32/ISO-HDLC over all bytes before it. A frame has at most [`FRAME_MAX`] bytes with its
+//! delimiter. Header and CRC are the same in every protocol version, so that a board can reject other versions. Cost:
+//! one pass each for COBS and CRC; no allocation.
 
 use crc::{CRC_32_ISO_HDLC, Crc, Table};
 use heapless::Vec;
@@ -123,8 +120,7 @@ pub fn encode<T: Serialize>(header: Header, message: &T) -> Option<Encoded> {
     Some(wire)
 }
 
-/// Adds a leading delimiter, so that a damaged frame costs only itself. Both sides send it, neither requires
-/// it.
+/// Adds a leading delimiter, so that a damaged frame costs only itself. Optional; both sides send it.
 pub fn delimited(frame: &Encoded) -> Delimited {
     let mut bytes = Delimited::new();
     // There is room for the longest frame and one byte.
@@ -171,8 +167,8 @@ impl Decoder {
         Self { between: Vec::new(), overlong: false }
     }
 
-    /// Accepts one byte; at a delimiter returns the frame before it or its error. Empty frames are skipped,
-    /// because senders may flush garbage with a delimiter.
+    /// Accepts one byte; at a delimiter returns the frame before it or its error. Skips empty frames, which flush
+    /// garbage.
     pub fn push(&mut self, byte: u8) -> Option<Result<Packet, FrameError>> {
         if byte != 0 {
             self.overlong |= self.between.push(byte).is_err();

@@ -1,16 +1,14 @@
-//! The message tables: [`Request`]; [`Response`] and [`RequestError`]; [`EventKind`]. Their parts are in one
-//! file per subject.
+//! The message tables: [`Request`]; [`Response`] and [`RequestError`]; [`EventKind`]. Parts are in one file per
+//! subject.
 //!
-//! Positions are [`Nanometres`], positive = sensor and lens apart (towards near focus), 0 = home switch;
-//! sensor distance = datum + coarse + fine + lens ([`sensor_distance_nm`]). Set-points are absolute, so a
-//! repeated request asks for nothing new. Times are [`BoardMicros`], durations [`Micros`].
+//! Positions are [`Nanometres`], positive = sensor and lens apart (towards near focus), 0 = home switch; sensor
+//! distance = datum + coarse + fine + lens ([`sensor_distance_nm`]). Set-points are absolute, so a repeated request has
+//! no new effect. Times are [`BoardMicros`], durations [`Micros`]. Variants and messages may be appended; any other
+//! change is a new protocol version. `tests/it/frozen_wire` freezes the bytes of version 3.
 //!
 //! [`BoardMicros`]: crate::BoardMicros
 //! [`Micros`]: crate::Micros
 //! [`Nanometres`]: crate::Nanometres
-//!
-//! Variants and messages may be appended; any other change is a new protocol version. `tests/it/frozen_wire`
-//! freezes the bytes of version 3.
 
 mod alarm;
 mod answer;

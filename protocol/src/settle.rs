@@ -1,7 +1,5 @@
-//! Settle criteria for board and host.
-//!
-//! A wider window or shorter dwell trades accuracy for time. Each purpose is a multiple of a move's window,
-//! so the piezo's window is changed in one place.
+//! Settle criteria for board and host. A wider window or shorter dwell trades accuracy for time. Each purpose is a
+//! multiple of a move's window, so the piezo's window is changed in one place.
 
 use crate::message::Axis;
 use crate::units::{Micros, Nanometres};

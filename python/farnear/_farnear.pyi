@@ -298,6 +298,7 @@ def depth(
     align: Literal["auto", "none", "optics", "shift", "similarity", "affine"] = "auto",
     balance: Literal["auto", "none", "gain", "local"] = "auto",
     min_confidence: float = 0.0,
+    white_level: Optional[int] = None,
     threads: int = 1,
 ) -> DepthMap:
     """Depth map of a far- and a near-focused image, as `farnear depth` computes it.
@@ -305,7 +306,7 @@ def depth(
     Parameters
     ----------
     far, near : array (height, width)
-        Grey images of one size and one kind, at least 16x16 px. In `uint8` and `uint16` the largest value is a saturated pixel;
+        Grey images of one size and one kind, at least 16x16 px. In `uint8` and `uint16` values from `white_level` on are saturated;
         other integers and floating point numbers have any common scale. `float32` is not copied. Masked pixels of a masked array
         have no depth.
     optics : Optics
@@ -328,6 +329,8 @@ def depth(
         Equalisation of brightness.
     min_confidence : float
         Least confidence of a depth, 0 to 1.
+    white_level : int, optional
+        Code of a saturated pixel in `uint8` and `uint16`, e.g. 4095 for 12 bits; by default the largest of the type.
     threads : int
         Threads; 0 = one per core.
 

@@ -29,7 +29,6 @@ pub fn optics_named<'py>(name: &str, object: &Bound<'py, PyAny>) -> PyResult<PyR
     })
 }
 
-/// Values of (height, width).
 enum Values<'py> {
     Lent(PyReadonlyArray2<'py, f32>),
     Own(Array2<f32>),
@@ -46,7 +45,7 @@ impl Values<'_> {
 
 pub struct Image<'py> {
     values: Values<'py>,
-    scaled: bool,
+    full_scale: Option<f32>,
 }
 
 impl Image<'_> {
@@ -55,9 +54,9 @@ impl Image<'_> {
         self.values.view()
     }
 
-    /// Whether values are camera codes over the full range, so that the largest is saturated.
-    pub fn is_scaled(&self) -> bool {
-        self.scaled
+    /// Largest code of `uint8` and `uint16`, whose values are scaled by it.
+    pub fn full_scale(&self) -> Option<f32> {
+        self.full_scale
     }
 }
 
@@ -76,7 +75,7 @@ impl<'py> FromPyObject<'_, 'py> for Image<'py> {
         if let Some(full) = full {
             values = Values::Own(values.view().mapv(|code| code / full));
         }
-        Ok(Self { values, scaled: full.is_some() })
+        Ok(Self { values, full_scale: full })
     }
 }
 
@@ -117,7 +116,6 @@ impl<'py> FromPyObject<'_, 'py> for Mask {
     }
 }
 
-/// A two-dimensional array of dynamic type.
 struct Untyped<'py> {
     data: Bound<'py, PyAny>,
     masked: Option<PyReadonlyArray2<'py, bool>>,

@@ -40,7 +40,6 @@ impl<'py> FromPyObject<'_, 'py> for Fill {
     }
 }
 
-/// Fill settings, and the criterion of low texture.
 fn filling(fill: &Fill, low_texture: &str) -> PyResult<Settings> {
     let criterion: LowTexture = low_texture.parse().map_err(wrong)?;
     if fill.0.is_none() && criterion != LowTexture::default() {
@@ -62,7 +61,7 @@ fn filling(fill: &Fill, low_texture: &str) -> PyResult<Settings> {
 /// Parameters
 /// ----------
 /// far, near : array (height, width)
-///     Grey images of one size and one kind, at least 16x16 px. In `uint8` and `uint16` the largest value is a saturated pixel;
+///     Grey images of one size and one kind, at least 16x16 px. In `uint8` and `uint16` values from `white_level` on are saturated;
 ///     other integers and floating point numbers have any common scale. `float32` is not copied. Masked pixels of a masked array
 ///     have no depth.
 /// optics : Optics
@@ -85,6 +84,8 @@ fn filling(fill: &Fill, low_texture: &str) -> PyResult<Settings> {
 ///     Equalisation of brightness.
 /// min_confidence : float
 ///     Least confidence of a depth, 0 to 1.
+/// white_level : int, optional
+///     Code of a saturated pixel in `uint8` and `uint16`, e.g. 4095 for 12 bits; by default the largest of the type.
 /// threads : int
 ///     Threads; 0 = one per core.
 ///
@@ -110,7 +111,7 @@ fn filling(fill: &Fill, low_texture: &str) -> PyResult<Settings> {
 /// (120, 160)
 #[pyfunction]
 #[pyo3(signature = (far, near, optics, *, operators=None, method="ro", window=None, median_px=3, fill=Fill(None), low_texture="energy", align="auto",
-                    balance="auto", min_confidence=0.0, threads=1))]
+                    balance="auto", min_confidence=0.0, white_level=None, threads=1))]
 #[allow(clippy::too_many_arguments)] // keywords in Python
 pub fn depth(
     py: Python<'_>,
@@ -126,6 +127,7 @@ pub fn depth(
     align: &str,
     balance: &str,
     min_confidence: f32,
+    white_level: Option<u32>,
     threads: usize,
 ) -> PyResult<DepthMap> {
     let (far, near): (Image<'_>, Image<'_>) = (named("far", far)?, named("near", near)?);
@@ -133,7 +135,7 @@ pub fn depth(
     if !(0.0..=1.0).contains(&min_confidence) {
         return Err(FarnearError::new_err(format!("min_confidence is {min_confidence}; expected 0 to 1")));
     }
-    if far.is_scaled() != near.is_scaled() {
+    if far.full_scale().is_some() != near.full_scale().is_some() {
         let message = "one of far and near holds uint8 or uint16 and the other does not: give both alike, or their scales differ";
         return Err(FarnearError::new_err(message));
     }
@@ -161,7 +163,7 @@ pub fn depth(
         prepare: PrepareSettings {
             align: align.parse::<Align>().map_err(wrong)?,
             balance: balance.parse::<Balance>().map_err(wrong)?,
-            limits: far.is_scaled().then_some([0.0, 1.0]),
+            limits: limits(&far, white_level)?,
             ..PrepareSettings::default()
         },
         window,
@@ -172,6 +174,19 @@ pub fn depth(
     let found =
         py.detach(|| measure_pair_of_views(far, near, &optics.0, method, None, &settings)).map_err(wrong)?;
     Ok(DepthMap::of(py, found, optics))
+}
+
+/// Black and white of camera codes, scaled as the image is.
+fn limits(image: &Image<'_>, white_level: Option<u32>) -> PyResult<Option<[f32; 2]>> {
+    match (image.full_scale(), white_level) {
+        (Some(full), Some(white)) if white == 0 || white as f32 > full => {
+            Err(FarnearError::new_err(format!("white_level is {white}; expected 1 to {full}")))
+        }
+        (Some(full), Some(white)) => Ok(Some([0.0, white as f32 / full])),
+        (Some(_), None) => Ok(Some([0.0, 1.0])),
+        (None, Some(_)) => Err(FarnearError::new_err("white_level needs images of uint8 or uint16")),
+        (None, None) => Ok(None),
+    }
 }
 
 /// Depth of pair after pair with fixed settings: no alignment, no validation; some ms for 640x480.

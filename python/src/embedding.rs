@@ -30,7 +30,7 @@ pub fn isomap<'py>(
     ))
 }
 
-/// What makes a map: centres, weights, gamma, ridge, condition.
+/// Centres, weights, gamma, ridge, condition.
 type Parts<'py> = (Bound<'py, PyArray2<f32>>, Bound<'py, PyArray2<f32>>, f32, f64, f64);
 
 /// Gaussian radial basis functions on all samples (n, features), solved with a ridge for targets (n, d).

@@ -21,12 +21,12 @@ pub fn wrong(error: impl Error) -> PyErr {
     FarnearError::new_err(message(&error))
 }
 
-/// The same as a `RigError`.
+/// As a `RigError`.
 pub fn rig(error: impl Error) -> PyErr {
     RigError::new_err(message(&error))
 }
 
-/// A typed error often says its cause itself; that is not said twice.
+/// Omits a cause that the error's own text includes.
 fn message(error: &dyn Error) -> String {
     let mut message = error.to_string();
     let mut next = error.source();

@@ -182,7 +182,6 @@ impl RigClient {
     }
 }
 
-/// An error outside Python.
 struct Failed(String);
 
 impl<E: std::error::Error> From<E> for Failed {
@@ -192,7 +191,7 @@ impl<E: std::error::Error> From<E> for Failed {
 }
 
 impl RigClient {
-    /// Runs `work` in a thread while this one polls for interruptions; an interruption stops the rig first.
+    /// Runs `work` in a thread and polls for interruptions; an interruption first stops the rig.
     fn interruptibly<T: Send>(
         &self,
         py: Python<'_>,

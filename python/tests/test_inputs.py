@@ -187,3 +187,19 @@ def test_maps_go_to_xarray_and_come_from_it(found, optics, slant):
     assert data["depth"].attrs["units"] == "mm" and data["depth"].dims == ("row", "column")
     again = farnear.depth(xarray.DataArray(slant[0]), xarray.DataArray(slant[1]), optics)
     assert np.array_equal(again.depth_mm, found.depth_mm, equal_nan=True)
+
+
+def test_pixels_from_the_white_level_on_are_saturated(optics, slant):
+    far, near, _ = slant
+    codes = [np.clip(np.rint(image * 3000), 0, 4095).astype(np.uint16) for image in (far / far.max(), near / near.max())]
+    clipped = (slice(100, 140), slice(50, 90))
+    for image in codes:
+        image[clipped] = 4095
+    found = farnear.depth(*codes, optics, white_level=4095)
+    saturated = [code for code, words in farnear.DepthMap.reason_words.items() if "saturated" in words]
+    assert np.isin(found.reasons[105:135, 55:85], saturated).all()
+    for white_level in (0, 70_000):
+        with pytest.raises(farnear.FarnearError, match="expected 1 to 65535"):
+            farnear.depth(*codes, optics, white_level=white_level)
+    with pytest.raises(farnear.FarnearError, match="uint8 or uint16"):
+        farnear.depth(*(image.astype(np.float32) for image in codes), optics, white_level=4095)

@@ -1,4 +1,4 @@
-//! The run time's vectors on 64-bit ARM (NEON): their tests under qemu, where it, a linker and the target are there.
+//! Tests of the run time's vectors on 64-bit ARM (NEON) under qemu, if the tools are installed.
 
 use std::{fs, path::Path, process::Command};
 
@@ -9,18 +9,16 @@ use crate::{
     test_programs::{self, Total},
 };
 
-/// The target of a Raspberry Pi or a Jetson with a 64-bit system.
 pub const TARGET: &str = "aarch64-unknown-linux-gnu";
-/// Debian's cross compiler, which brings the C library that programs for the target are linked with and run with.
+/// Debian's cross compiler, which brings the C library.
 const LINKER: &str = "aarch64-linux-gnu-gcc";
 const SYSROOT: &str = "/usr/aarch64-linux-gnu";
-/// Runs the target's programs.
 pub const QEMU: &str = "qemu-aarch64";
 
-/// The modules of host/depth whose tests reach the vectors.
+/// Modules of host/depth whose tests use the vectors.
 const MODULES: [&str; 4] = ["simd", "filter", "pipeline", "adaptive_window"];
 
-/// Runs the tests and adds them to the total, or reports the missing tools and counts them as skipped.
+/// Counts the tests as skipped if tools are missing.
 pub fn run(total: &mut Total) -> Result<()> {
     if let Some(missing) = missing() {
         eprintln!("skipped: the vectors of 64-bit ARM ({missing})");
@@ -35,7 +33,7 @@ pub fn run(total: &mut Total) -> Result<()> {
     Ok(())
 }
 
-/// What there is not, and what brings it.
+/// The missing tool and how to install it.
 pub fn missing() -> Option<&'static str> {
     if !has(QEMU) {
         Some("qemu-aarch64 is missing; Debian's package is qemu-user")
@@ -48,32 +46,28 @@ pub fn missing() -> Option<&'static str> {
     }
 }
 
-/// Tells cargo how to link and to run programs of the target.
 pub fn for_target(command: &mut Command) -> &mut Command {
     command
         .env("CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_LINKER", LINKER)
         .env("CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_RUNNER", emulator().join(" "))
 }
 
-/// The words with which a call of the target's programs begins.
 pub fn emulator() -> [&'static str; 3] {
     [QEMU, "-L", SYSROOT]
 }
 
-/// Whether the cross compiler is there and finds the C library's start files, which another package brings.
+/// Whether the cross compiler finds the C library's start files, which are in another package.
 fn links() -> bool {
     let found = Command::new(LINKER).arg("-print-file-name=crti.o").output();
     found.is_ok_and(|found| Path::new(String::from_utf8_lossy(&found.stdout).trim()).is_absolute())
 }
 
-/// How many tests a module of host/depth has, those below it included.
 fn tests_of(module: &str) -> Result<u32> {
     let file = ROOT.join(format!("host/depth/src/{module}.rs"));
     let below = file.with_extension("");
     Ok(written(&file)? + if below.is_dir() { written(&below)? } else { 0 })
 }
 
-/// Number of tests in a file, or in the files of a folder.
 fn written(place: &Path) -> Result<u32> {
     let seen = || format!("cannot read {}", place.display());
     if place.is_dir() {

@@ -1,8 +1,8 @@
-//! Times of the mathematics in release, and their ratios to what an OpenCV user would run, on one machine in one go.
+//! Times of the mathematics in release, and ratios to OpenCV on the same machine.
 //!
-//! The peers are scripts that belong to the project or that the user names. They are only ever run with what the
-//! machine's own `python3` has; nothing is installed. A peer runs once before and once after our own benches and its
-//! better time counts, so that a machine that slows down in between does not flatter us.
+//! Peers are scripts of the project or of the user. They run with the machine's own `python3`; nothing is
+//! installed. A peer runs before and after our benches and its better time counts, in case the machine slows
+//! down.
 
 mod arm;
 mod people;
@@ -21,9 +21,7 @@ use serde_json::Value;
 
 use crate::run::{ROOT, cargo, output, step, target_folder};
 
-/// The project's own peer.
 const PEER_SCRIPT: &str = "host/depth/benches/peer_opencv.py";
-/// Size of the images that ours and the peer's chain run on.
 const SIZE: (usize, usize) = (640, 480);
 
 #[derive(Args)]
@@ -61,18 +59,16 @@ enum Half {
     People,
 }
 
-/// One line of our benches.
 struct Row {
     name: String,
     backend: String,
     threads: u64,
     min_ms: f64,
     median_ms: f64,
-    /// Floating-point operations as if nothing were shared between the taps of a kernel, and those really done.
+    /// Floating-point operations without sharing between a kernel's taps, and those executed.
     flop: Option<[f64; 2]>,
 }
 
-/// A peer's times: minimum and median of each.
 struct Peer {
     name: String,
     version: String,
@@ -80,7 +76,6 @@ struct Peer {
     convolution_ms: Option<[f64; 2]>,
 }
 
-/// Runs the benches and prints the figures.
 pub fn run(arguments: &Arguments) -> Result<()> {
     if arguments.arm {
         return arm::renew(arguments.write);
@@ -126,7 +121,6 @@ fn write(file: &Path, text: &str) -> Result<()> {
     Ok(())
 }
 
-/// Times of host/depth as tables.
 fn depth(peers: bool, mut scripts: Vec<PathBuf>) -> Result<String> {
     if peers {
         scripts.insert(0, ROOT.join(PEER_SCRIPT));
@@ -151,7 +145,6 @@ fn depth(peers: bool, mut scripts: Vec<PathBuf>) -> Result<String> {
     Ok(tables(&rows, &peers))
 }
 
-/// Fails with the missing parts unless python3 and these modules are installed.
 fn modules(names: &[&str]) -> Result<()> {
     let advice = "the peers need python3 with numpy, opencv-python-headless, scipy and scikit-learn; without them run \
                   `cargo xtask bench`";
@@ -167,7 +160,7 @@ fn modules(names: &[&str]) -> Result<()> {
     Ok(())
 }
 
-/// A far and a near image of noise as PGM files, the same on each run.
+/// Far and near image of noise as PGM files, equal in each run.
 fn random_pair() -> Result<[PathBuf; 2]> {
     let folder = target_folder().join("peers");
     fs::create_dir_all(&folder).with_context(|| format!("cannot make {}", folder.display()))?;
@@ -216,7 +209,6 @@ fn better(a: Peer, b: Peer) -> Peer {
     }
 }
 
-/// The figures among what a bench printed.
 fn rows(text: &str) -> Result<Vec<Row>> {
     text.lines().filter(|line| line.starts_with('{')).map(row).collect()
 }
@@ -236,7 +228,6 @@ fn row(line: &str) -> Result<Row> {
     read().with_context(|| format!("not a bench's line: {line}"))
 }
 
-/// The figures as Markdown tables, ratios last.
 fn tables(rows: &[Row], peers: &[Peer]) -> String {
     let mut text =
         String::from("| what | vector unit | threads | min ms | median ms |\n|---|---|--:|--:|--:|\n");
@@ -273,7 +264,7 @@ fn tables(rows: &[Row], peers: &[Peer]) -> String {
     text
 }
 
-/// The core's peak and what else has its operations counted, as parts of it; by minima.
+/// The core's peak and the shares of other rows with counted operations, by minima.
 fn shares_of_peak(rows: &[Row]) -> String {
     let mut text = String::new();
     for row in rows {

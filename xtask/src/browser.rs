@@ -1,4 +1,4 @@
-//! The tests of the page in a real browser, where Node, its packages and a Chromium are there.
+//! Tests of the page in a real browser, if Node, its packages and a Chromium are installed.
 
 use std::{
     path::{Path, PathBuf},
@@ -12,7 +12,7 @@ use crate::{
     run::{ROOT, target_folder},
 };
 
-/// Places of a Chromium besides the one that `CHROMIUM` names.
+/// Used if `CHROMIUM` is not set.
 const BROWSERS: [&str; 3] = ["/usr/bin/chromium", "/usr/bin/chromium-browser", "/usr/bin/google-chrome"];
 
 #[derive(Default)]
@@ -20,11 +20,10 @@ pub struct Counts {
     pub passed: u32,
     pub failed: u32,
     pub skipped: u32,
-    /// Whether the runner ended well.
     pub ended_well: bool,
 }
 
-/// Runs them with the built programs, or reports the missing tools and counts them as skipped.
+/// Counts the tests as skipped if tools are missing.
 pub fn run() -> Result<Counts> {
     let folder = &ROOT.join("host/serve/tests-browser");
     if let Some(missing) = missing(folder) {
@@ -67,12 +66,12 @@ fn missing(folder: &Path) -> Option<&'static str> {
     }
 }
 
-/// Number of tests in the file; those in the loop over sizes and schemes count once.
+/// Tests in the file; those in the loop over sizes and schemes count once.
 fn written(text: &str) -> u32 {
     text.lines().filter(|line| line.trim_start().starts_with("test(")).count() as u32
 }
 
-/// The number after "# pass " in the runner's last lines.
+/// The number after "# pass " in the runner's output.
 fn number(text: &str, name: &str) -> u32 {
     let line =
         text.lines().rev().find_map(|line| line.strip_prefix("# ")?.strip_prefix(name)?.strip_prefix(' '));

@@ -1,5 +1,5 @@
-//! Campaigns on the emulated board: random scenarios by their seeds, judged and made small; and the long tests, those of
-//! `hil-sim/board/tests/it` with more of everything.
+//! Campaigns on the emulated board: seeded random scenarios, and the long versions of
+//! `hil-sim/board/tests/it`.
 
 use std::path::{Path, PathBuf};
 
@@ -50,7 +50,7 @@ pub struct Arguments {
 
 pub fn run(arguments: &Arguments) -> Result<()> {
     let elf = firmware::build()?;
-    // If both fail the scenarios' table is still printed.
+    // Print the scenarios' table even if both fail.
     let scenarios = scenarios(arguments, &elf);
     if arguments.shard.is_some() || arguments.scenarios_only {
         return scenarios;
@@ -59,7 +59,6 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     scenarios
 }
 
-/// Plays the scenarios of the seeds.
 fn scenarios(arguments: &Arguments, elf: &Path) -> Result<()> {
     step(&format!("campaign, {} scenarios", arguments.seeds));
     let mut command = cargo(["run", "--locked", "--package", "farnear-campaign", "--", "run"]);
@@ -73,7 +72,7 @@ fn scenarios(arguments: &Arguments, elf: &Path) -> Result<()> {
     finish(&mut command)
 }
 
-/// The long tests, once per rig, and those without the emulator.
+/// Once per rig, and those without the emulator.
 fn long_tests(arguments: &Arguments, elf: &Path) -> Result<()> {
     for seed in 1..=arguments.rigs {
         step(&format!("campaign, rig {seed}"));

@@ -1,4 +1,4 @@
-//! The whole rig without hardware: build, capture on the emulated board, compute depth, compare with the truth.
+//! The whole rig without hardware: build, capture on the emulated board, compute and check depth.
 
 use std::{fs, panic::resume_unwind, path::Path, process::Command, thread};
 
@@ -10,17 +10,16 @@ use crate::{
     thumb::Way,
 };
 
-/// The demo's scene: the noisy 8-bit staircase under a Gaussian point spread function.
+/// The noisy 8-bit staircase under a Gaussian point spread function.
 const SCENE: [&str; 8] =
     ["--scene", "staircase", "--psf", "gaussian:k=0.4578", "--noise", "8bit", "--seed", "1"];
-/// Pixels next to a depth step, where a window sees two depths, that the figure leaves out.
+/// Excluded distance from a depth step, where a window covers two depths.
 const AWAY_FROM_EDGES_PX: &str = "8";
 
-/// Runs the demo; ends with its one line of figures.
 pub fn run() -> Result<()> {
     let way = Way::find()?;
     step("firmware and host programs, side by side (the first build takes some minutes)");
-    // Neither has work for all cores from its beginning to its end.
+    // Neither uses all cores throughout.
     let (elf, programs) = thread::scope(|scope| {
         let firmware = scope.spawn(|| firmware::build_emulated(way));
         let programs = host::build_silently();
@@ -47,7 +46,7 @@ pub fn run() -> Result<()> {
 
     step("depth from the pair");
     let (far, near) = (path("far.png"), path("near.png"));
-    // A wider median than the default: the images are noisy 8-bit ones.
+    // A wider median than the default, for noisy 8-bit images.
     let depth = ["depth", &far, &near, "--optics", optics, "--median-px", "5", "--out", &path(""), "--json"];
     output(&mut farnear(&depth))?;
 
@@ -68,7 +67,6 @@ pub fn run() -> Result<()> {
     Ok(())
 }
 
-/// The number behind a key of a flat JSON object.
 pub fn figure<'a>(json: &'a str, key: &str) -> Result<&'a str> {
     let quoted = format!("\"{key}\":");
     let after = json.split_once(&quoted).with_context(|| format!("no {key} in {json}"))?.1;

@@ -1,4 +1,4 @@
-//! Measures the accuracy and writes docs/accuracy.md and its sisters, by the program in host/evaluation.
+//! Runs host/evaluation, which writes docs/accuracy.md and related pages.
 
 use std::path::PathBuf;
 

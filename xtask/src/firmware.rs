@@ -1,5 +1,5 @@
-//! Builds the firmware of every board and copies the ELFs next to the host programs, where `farnear-sim` looks for the one
-//! that it emulates.
+//! Builds the firmware of every board and copies the ELFs next to the host programs, where `farnear-sim`
+//! expects its own.
 
 use std::{fs, path::PathBuf};
 
@@ -12,7 +12,7 @@ use crate::{
     thumb::{TARGET, Way},
 };
 
-/// The program that counts the instructions of the on-board routines, built alongside.
+/// Counts the instructions of the on-board routines.
 const COUNTER: &str = "farnear-count";
 
 fn built(board: &Board, program: &str) -> Result<PathBuf> {
@@ -23,11 +23,9 @@ fn built(board: &Board, program: &str) -> Result<PathBuf> {
     Ok(elf)
 }
 
-/// What of a board's workspace is built.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Selection {
     All,
-    /// The firmware alone, which is quicker.
     Firmware,
 }
 
@@ -50,23 +48,21 @@ fn build_board(board: &Board, way: Way, selection: Selection) -> Result<PathBuf>
     Ok(elf)
 }
 
-/// The counting program's ELF, after a build.
 pub fn counter() -> Result<PathBuf> {
     built(EMULATED, COUNTER)
 }
 
-/// Builds the firmware of all boards; gives the path of the ELF that is emulated.
+/// Returns the emulated board's ELF.
 pub fn build() -> Result<PathBuf> {
     step("firmware");
     build_with(Way::find()?)
 }
 
-/// Builds what the emulated board runs, and nothing else.
+/// Only what the emulated board runs.
 pub fn build_emulated(way: Way) -> Result<PathBuf> {
     build_board(EMULATED, way, Selection::Firmware)
 }
 
-/// Builds the firmware in a way that was found before.
 pub fn build_with(way: Way) -> Result<PathBuf> {
     let elf = build_board(EMULATED, way, Selection::All)?;
     for board in BOARDS.iter().filter(|board| board.name != EMULATED.name) {

@@ -1,7 +1,5 @@
-//! Property tests for longer: the same tests, more cases, seeds 1, 2, 3 ... until the time is over.
-//!
-//! A case that fails is stored by proptest in a `proptest-regressions` file next to its test; commit that file, and the
-//! case runs first in every later test run.
+//! Property tests with more cases: seeds 1, 2, 3 ... until the time is over. proptest stores a failing case
+//! in a `proptest-regressions` file next to its test; commit it, and the case runs first in later test runs.
 
 use std::time::{Duration, Instant};
 
@@ -9,7 +7,7 @@ use anyhow::Result;
 
 use crate::run::{cargo, finish, step};
 
-/// Crates whose tests read what others send: frames, requests, files.
+/// Crates whose tests parse foreign data: frames, requests, files.
 const CRATES: [&str; 9] = [
     "farnear-protocol",
     "farnear-rig",
@@ -21,10 +19,9 @@ const CRATES: [&str; 9] = [
     "farnear-files",
     "farnear-workflows",
 ];
-/// Cases per property and round.
+/// Per property and round.
 const CASES: &str = "20000";
 
-/// Runs rounds until `seconds` are over; at least one.
 pub fn run(seconds: u64) -> Result<()> {
     let until = Instant::now() + Duration::from_secs(seconds);
     for round in 1u64.. {

@@ -1,5 +1,3 @@
-//! Installs the programs where the shell finds them.
-
 use std::{fs, path::PathBuf};
 
 use anyhow::{Context, Result};
@@ -18,7 +16,7 @@ pub fn run() -> Result<()> {
     fs::create_dir_all(&bin).with_context(|| format!("cannot create {}", bin.display()))?;
     let programs = host::PROGRAMS.map(String::from);
     for name in programs.into_iter().chain(BOARDS.iter().map(|board| format!("{}.elf", board.program()))) {
-        // Aside first: a program that runs cannot be overwritten, but it can be replaced.
+        // A running program can be replaced but not overwritten.
         let (aside, place) = (bin.join(format!(".{name}.new")), bin.join(&name));
         fs::copy(built.join(&name), &aside)
             .and_then(|_| fs::rename(&aside, &place))

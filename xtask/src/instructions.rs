@@ -1,5 +1,5 @@
-//! The table of instructions in `docs/instructions.md`: written from a count on the emulated board, and checked against
-//! one, so that a routine that has become slower is seen.
+//! Table of instructions in `docs/instructions.md`, written from a count on the emulated board or compared
+//! with one, to detect slower routines.
 
 use std::{fmt::Write, process::Command};
 
@@ -10,15 +10,13 @@ use crate::{
     run::{ROOT, output, step},
 };
 
-/// Where the table lies.
 const PAGE: &str = "docs/instructions.md";
-/// A count may differ from the page by this share: two compilers that build the firmware (Rust 1.95 and Debian's 1.96) differ
-/// by up to 17 %.
+/// Relative tolerance: Rust 1.95 and Debian's 1.96 differ by up to 17 %.
 const TOLERANCE: f64 = 0.20;
-/// And by this much: short routines change by whole instructions.
+/// Absolute tolerance: short routines change by whole instructions.
 const SLACK: f64 = 4.0;
-/// What a routine may cost per unit on any compiler: rows are corrected as fast as they come, and all of a control tick fits
-/// between two ticks.
+/// Limits per unit on any compiler: rows are corrected at the camera's rate, and a control tick fits its
+/// period.
 const CEILINGS: [(&str, f64); 5] = [
     ("CLSF, ten terms in 3x3 regions", 16.0),
     ("CLSF, blended", 24.0),
@@ -28,7 +26,6 @@ const CEILINGS: [(&str, f64); 5] = [
 ];
 const MHZ: f64 = 168.0;
 
-/// A line of the count: what `farnear-sim count` prints.
 struct Counted {
     routine: String,
     unit: String,
@@ -80,13 +77,11 @@ fn page(counts: &[Counted]) -> String {
     page
 }
 
-/// The figure of a routine on the page.
 fn on_page(page: &str, routine: &str) -> Option<f64> {
     let row = page.lines().find(|line| line.starts_with(&format!("| {routine} |")))?;
     row.split('|').nth(4)?.trim().parse().ok()
 }
 
-/// Counts, and writes the page or compares with it.
 pub fn run(write: bool) -> Result<()> {
     let counts = count()?;
     let path = ROOT.join(PAGE);

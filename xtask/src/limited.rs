@@ -1,5 +1,5 @@
-//! Running a program of tests to its end, but not for ever: a test that hangs must not hide what the others found, nor may a program
-//! that it left behind, which still holds the output.
+//! Runs a test program with a time limit: a test that hangs, or a program that it left with the output open,
+//! must not hide other results.
 
 use std::{
     io::{self, Read, Write},
@@ -16,21 +16,19 @@ use anyhow::{Context, Result};
 
 use crate::run::describe;
 
-/// The longest takes seven minutes on two cores with as much again in parallel.
+/// The longest takes seven minutes on two busy cores.
 const LIMIT: Duration = Duration::from_secs(20 * 60);
-/// How long the last of an output may take after a program's end.
+/// Time for the last output after a program's end.
 const LAST: Duration = Duration::from_secs(5);
-/// From one look to the next.
 const LOOK: Duration = Duration::from_millis(20);
 
-/// What a program printed, and how it ended.
 pub struct Output {
     pub text: String,
-    /// Whether it ended by itself, with success.
+    /// Ended without being killed, with success.
     pub well: bool,
 }
 
-/// Runs a program; its errors are shown as they come, its output is printed when it has ended.
+/// Errors are shown immediately, output at the end.
 pub fn run(command: &mut Command) -> Result<Output> {
     let said = run_for(command, LIMIT)?;
     print!("\n{}\n{}", describe(command), said.text);
@@ -66,7 +64,7 @@ fn run_for(command: &mut Command, limit: Duration) -> Result<Output> {
     Ok(Output { text: String::from_utf8_lossy(&text).into_owned(), well: well == Some(true) })
 }
 
-/// Whether it ended well; `None` where it had to be killed.
+/// `None` if it had to be killed.
 fn ends_well(child: &mut Child, limit: Duration) -> io::Result<Option<bool>> {
     let begin = Instant::now();
     while begin.elapsed() < limit {
@@ -80,7 +78,6 @@ fn ends_well(child: &mut Child, limit: Duration) -> io::Result<Option<bool>> {
     Ok(None)
 }
 
-/// Passes the output to `take` and reports the end.
 fn read(mut from: impl Read + Send + 'static, mut take: impl FnMut(&[u8]) + Send + 'static) -> Receiver<()> {
     let (end, ended) = channel();
     thread::spawn(move || {

@@ -1,6 +1,5 @@
-//! `cargo xtask`: set-up, demo, tests and measurements of this repository, with nothing but a Rust toolchain.
-//!
-//! One file per job. Each step is announced, and each failure names the next command to type.
+//! `cargo xtask`: set-up, demo, tests and measurements, with a Rust toolchain only. One file per job. Each
+//! step is announced; each failure names the next command to type.
 
 mod arm;
 mod bench;
@@ -91,7 +90,7 @@ fn main() -> ExitCode {
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,
-        // Not returned from main: with RUST_BACKTRACE set that buries the message under a backtrace.
+        // Not returned from main: RUST_BACKTRACE would add a backtrace to the message.
         Err(error) => {
             eprintln!("\nxtask: {error:#}");
             ExitCode::FAILURE

@@ -1,5 +1,5 @@
-//! The tests of the Python package, where there is a Python with what they need: the module is built as everything else is, laid
-//! next to the package's own files, and run by pytest in a virtual environment.
+//! Tests of the Python package: builds the module, copies it next to the package's files and runs pytest in a
+//! virtual environment.
 
 use std::{
     fs,
@@ -16,9 +16,8 @@ use crate::{
     test_programs,
 };
 
-/// The package that only those compile who have Python.
+/// Compiled only if Python is available.
 pub const PACKAGE: &str = "farnear-python";
-/// Packages that the tests need.
 const NEEDS: [&str; 7] = [
     "numpy>=1.23",
     "matplotlib>=3.6",
@@ -28,10 +27,10 @@ const NEEDS: [&str; 7] = [
     "mcap-ros2-support>=0.5",
     "mypy>=1.10",
 ];
-/// Tells whether a Python is new enough and can make environments.
+/// Checks version and virtual environments.
 const ABLE: &str = "import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 9))";
 
-/// Runs them with the module from [`build`], or reports the missing tools and counts them as skipped.
+/// Counts the tests as skipped if tools are missing.
 pub fn run(elf: &Path) -> Result<Counts> {
     let tests = ROOT.join("python/tests");
     let folder = target_folder().join("python-tests");
@@ -51,7 +50,7 @@ pub fn run(elf: &Path) -> Result<Counts> {
             .args(["-o", "faulthandler_timeout=300", "--rootdir"])
             .arg(&tests)
             .arg(&tests)
-            // Not the repository's: its folder of the package has no module in it.
+            // The repository's package folder has no module.
             .current_dir(&folder)
             .env("PYTHONPATH", folder.join("package"))
             .env("PYTHONDONTWRITEBYTECODE", "1")
@@ -67,7 +66,7 @@ pub fn run(elf: &Path) -> Result<Counts> {
     })
 }
 
-/// The Python of an environment with all packages, created if missing; otherwise the reason.
+/// The Python of an environment with all packages, created if missing; else the reason.
 pub fn environment(folder: &Path, needs: &[&str]) -> Result<PathBuf, String> {
     if !able() {
         return Err(
@@ -93,8 +92,8 @@ pub fn environment(folder: &Path, needs: &[&str]) -> Result<PathBuf, String> {
     Ok(python)
 }
 
-/// Builds the module and the programs that its tests run, in one call, so that all share what is compiled already; does nothing
-/// where no Python is able to run the tests.
+/// Builds the module and the tests' programs in one call, to compile shared crates once; does nothing without
+/// Python.
 pub fn build(elf: &Path) -> Result<()> {
     if !able() {
         return Ok(());
@@ -102,17 +101,15 @@ pub fn build(elf: &Path) -> Result<()> {
     let packages = [PACKAGE, "farnear", "farnear-sim"].map(|name| ["--package", name]);
     let mut command = cargo(["build", "--locked"]);
     command.args(packages.as_flattened());
-    // A module is not linked with Python, and one for every version asks none of them.
+    // An extension for every Python version is neither linked with Python nor asks one.
     command.env("PYO3_BUILD_EXTENSION_MODULE", "1").env("PYO3_NO_PYTHON", "1");
     finish(test_programs::environment(&mut command, elf))
 }
 
-/// Whether there is a Python that can run the tests, once it has what they need.
 fn able() -> bool {
     succeeds(Command::new("python3").args(["-c", ABLE]))
 }
 
-/// The installed package.
 fn lay_out(package: &Path, built: &Path) -> Result<()> {
     fs::create_dir_all(package).with_context(|| format!("cannot make {}", package.display()))?;
     for entry in fs::read_dir(ROOT.join("python/farnear")).context("the package is not there")? {
@@ -128,7 +125,6 @@ fn lay_out(package: &Path, built: &Path) -> Result<()> {
     Ok(())
 }
 
-/// Number of tests in the files; one that runs for several values counts once.
 fn written(tests: &Path) -> Result<u32> {
     let mut count = 0;
     for entry in fs::read_dir(tests).context("the package's tests are not there")? {

@@ -1,8 +1,6 @@
-//! What a release hands out, made by one command and tried where nothing else is: programs that need no library, for two kinds of
-//! processor; Debian packages; the Python package's wheel; the firmware; what is in them, under which licences; checksums.
-//!
-//! Two runs from the same commit on the same toolchain give the same bytes, wherever the repository lies: archives carry the
-//! commit's time, programs no path of this machine.
+//! Release files, each tried in an empty root: static programs for two processors, Debian packages, the
+//! Python wheel, the firmware, contents with licences, checksums. Two runs from the same commit and toolchain
+//! give the same bytes: archives carry the commit's time, programs no path of this machine.
 
 mod archive;
 mod debian;
@@ -33,19 +31,15 @@ pub struct Arguments {
     out: PathBuf,
 }
 
-/// What all parts of a release share.
 struct Release {
-    /// Of all crates of the workspace.
+    /// Of all crates.
     version: String,
-    /// Seconds since 1970 of the commit: the time that files in archives carry.
+    /// Commit time, seconds since 1970, of files in archives.
     epoch: String,
-    /// Where the finished files go.
     out: PathBuf,
-    /// Where parts are put together.
     work: PathBuf,
 }
 
-/// Makes and tries all of them.
 pub fn run(arguments: &Arguments) -> Result<()> {
     let out = ROOT.join(&arguments.out);
     let work = out.join("work");
@@ -113,12 +107,11 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     Ok(())
 }
 
-/// Files for every platform besides the programs.
 struct Extras {
     man: PathBuf,
     /// `farnear.bash`, `farnear.zsh`, `farnear.fish`.
     completions: PathBuf,
-    /// Licences of everything inside.
+    /// Licences of all contents.
     notices: PathBuf,
 }
 
@@ -137,7 +130,6 @@ impl Extras {
     }
 }
 
-/// Copies a file into a folder under its own name.
 fn copy(file: &Path, folder: &Path) -> Result<()> {
     let name = file.file_name().with_context(|| format!("{} has no name", file.display()))?;
     fs::create_dir_all(folder).with_context(|| format!("cannot create {}", folder.display()))?;
@@ -146,20 +138,18 @@ fn copy(file: &Path, folder: &Path) -> Result<()> {
     Ok(())
 }
 
-/// Copies the programs and the boards' firmware, which the emulated board expects next to it, into a folder.
 fn lay_programs(programs: &Path, elves: &[PathBuf], folder: &Path) -> Result<()> {
     let built = crate::host::PROGRAMS.map(|name| programs.join(name));
     built.iter().chain(elves).try_for_each(|file| copy(file, folder))
 }
 
-/// Copies what a first user reads, and the optics of a rig to begin with.
 fn lay_documents(folder: &Path) -> Result<()> {
     ["README.md", "CHANGELOG.md"].iter().try_for_each(|page| copy(&ROOT.join(page), folder))?;
     fs::copy(ROOT.join("examples/rig.toml"), folder.join("optics.toml")).context("cannot copy the optics")?;
     Ok(())
 }
 
-/// `SHA256SUMS`, which `sha256sum --check` reads; prints it with sizes.
+/// Writes `SHA256SUMS` for `sha256sum --check`; prints it with sizes.
 fn checksums(out: &Path) -> Result<()> {
     let mut names = Vec::new();
     for entry in fs::read_dir(out).with_context(|| format!("cannot read {}", out.display()))? {

@@ -1,4 +1,4 @@
-//! Starting other programs: where the repository is, which flags its cargo calls need, clear failures.
+//! Runs other programs, with the flags for cargo calls in this repository.
 
 use std::{
     ffi::OsStr,
@@ -10,15 +10,13 @@ use std::{
 
 use anyhow::{Context, Result, bail};
 
-/// The repository's root.
 pub static ROOT: LazyLock<PathBuf> = LazyLock::new(|| {
     Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().nth(1).unwrap_or(Path::new(".")).into()
 });
 
-/// The oldest compiler for which the emulator's crates need no `--ignore-rust-version` (rigless says 1.98).
+/// Oldest compiler for the emulator's crates without `--ignore-rust-version` (rigless requires 1.98).
 const EMULATOR_RUST_MINOR: u32 = 98;
 
-/// The folder into which cargo builds the host programs.
 pub fn target_folder() -> PathBuf {
     match std::env::var_os("CARGO_TARGET_DIR") {
         Some(folder) => ROOT.join(folder),
@@ -26,8 +24,8 @@ pub fn target_folder() -> PathBuf {
     }
 }
 
-/// A cargo call in the root workspace. For calls that compile, the flag that lets the emulator build on
-/// an older compiler is added where the compiler is older; no cargo configuration key can do that.
+/// A cargo call in the root workspace, with the flag that lets older compilers build the emulator; no cargo
+/// configuration key can do that.
 pub fn cargo<S: AsRef<OsStr>>(arguments: impl IntoIterator<Item = S>) -> Command {
     let mut command = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
     let mut arguments = arguments.into_iter();
@@ -49,14 +47,13 @@ fn host_rust_minor() -> Option<u32> {
     text.split_whitespace().nth(1)?.split('.').nth(1)?.parse().ok()
 }
 
-/// Announces a step and prints the time so far.
 pub fn step(what: &str) {
     static START: LazyLock<Instant> = LazyLock::new(Instant::now);
     let seconds = START.elapsed().as_secs();
     eprintln!("\n== {}:{:02} {what}", seconds / 60, seconds % 60);
 }
 
-/// Runs a program to its end; fails unless it succeeds.
+/// Fails unless the program succeeds.
 pub fn finish(command: &mut Command) -> Result<()> {
     let status = command.status().with_context(|| format!("cannot start {}", describe(command)))?;
     if !status.success() {
@@ -65,7 +62,6 @@ pub fn finish(command: &mut Command) -> Result<()> {
     Ok(())
 }
 
-/// Runs a program to its end and returns its output; fails unless it succeeds.
 pub fn output(command: &mut Command) -> Result<String> {
     command.stderr(Stdio::inherit());
     let output = command.output().with_context(|| format!("cannot start {}", describe(command)))?;
@@ -75,7 +71,7 @@ pub fn output(command: &mut Command) -> Result<String> {
     String::from_utf8(output.stdout).with_context(|| format!("{} printed no text", describe(command)))
 }
 
-/// Whether a program can be started and ends well; it prints nothing.
+/// Whether a program succeeds; prints nothing.
 pub fn succeeds(command: &mut Command) -> bool {
     command
         .stdin(Stdio::null())
@@ -85,12 +81,11 @@ pub fn succeeds(command: &mut Command) -> bool {
         .is_ok_and(|status| status.success())
 }
 
-/// Whether there is a program of that name.
 pub fn has(program: &str) -> bool {
     succeeds(Command::new(program).arg("--version"))
 }
 
-/// Whether Rust's toolchain on the PATH has the libraries of a target.
+/// Whether the toolchain on the PATH has a target's libraries.
 pub fn has_target(triple: &str) -> bool {
     let folder = Command::new("rustc").args(["--print", "target-libdir", "--target", triple]).output();
     folder.is_ok_and(|found| {

@@ -1,5 +1,5 @@
-//! The documents as a site: pages, the root's files and every command's help, laid out by `docs/site/stage.py` and built by a generator
-//! that is fetched into a virtual environment.
+//! The documents as a site: `docs/site/stage.py` lays out pages and help texts, a generator in a virtual
+//! environment builds it.
 
 use std::{fs, process::Command};
 
@@ -10,10 +10,8 @@ use crate::{
     run::{ROOT, finish, step, target_folder},
 };
 
-/// The generator, and what makes MathML of formulas.
 const NEEDS: [&str; 2] = ["zensical==0.0.73", "latex2mathml>=3.77"];
 
-/// Builds the site and prints where it is.
 pub fn run() -> Result<()> {
     let built = host::build()?;
     step("the site");

@@ -1,4 +1,4 @@
-//! The flash and static RAM of a board's firmware against the board's budgets.
+//! Flash and static RAM of the firmware compared with the board's budgets.
 
 use std::{fs, path::Path};
 
@@ -7,15 +7,13 @@ use object::{Object, ObjectSection, SectionFlags, SectionKind, elf};
 
 use crate::boards::Board;
 
-/// Bytes an image takes on the chip.
 pub struct Sizes {
-    /// Vectors, code, constants and the initial values of variables.
+    /// Vectors, code, constants and initial values of variables.
     pub flash: u64,
-    /// Variables, zeroed, initialised or retained.
+    /// Variables: zeroed, initialised or retained.
     pub ram: u64,
 }
 
-/// Reads the sizes from an ELF.
 pub fn measure(elf: &Path) -> Result<Sizes> {
     let bytes = fs::read(elf).with_context(|| format!("cannot read {}", elf.display()))?;
     let file =
@@ -37,7 +35,7 @@ pub fn measure(elf: &Path) -> Result<Sizes> {
     Ok(sizes)
 }
 
-/// Prints the sizes of a board's ELF; fails where a budget is exceeded.
+/// Prints the sizes; fails above a budget.
 pub fn check(elf: &Path) -> Result<()> {
     let board =
         Board::of(elf).with_context(|| format!("{} is not the program of any board", elf.display()))?;

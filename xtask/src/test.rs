@@ -1,4 +1,4 @@
-//! Everything CI runs, in the order in which a mistake shows soonest.
+//! Everything CI runs, fastest detection of mistakes first.
 
 use std::{panic::resume_unwind, process::Stdio, thread, time::Instant};
 
@@ -23,7 +23,6 @@ pub struct Arguments {
     all: bool,
 }
 
-/// Runs all checks; ends with one line that sums up the tests.
 pub fn run(arguments: &Arguments) -> Result<()> {
     let start = Instant::now();
     step("format");
@@ -53,13 +52,13 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     finish(cargo(["doc", "--no-deps", "--quiet"]).args(workspace).env("RUSTDOCFLAGS", "--deny warnings"))?;
 
     step("compiling the tests on the host and on the emulated board");
-    // Everything is built before anything runs: a cargo call during the tests could replace their programs.
+    // Build before running: a cargo call during the tests could replace their programs.
     let programs = Programs::build(&elf)?;
     python::build(&elf)?;
     step(
         "two lanes side by side: the tests' programs; the page in a browser, the vectors of 64-bit ARM, the Python package",
     );
-    // Each waits for other things than the processor half of its time. What a program says is printed when it ends.
+    // Each spends half of its time waiting. Output is printed at the end.
     let beside = || -> Result<Total> {
         let mut total = Total { well: true, ..Total::default() };
         add(&mut total, &browser::run()?);
@@ -88,7 +87,6 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     Ok(())
 }
 
-/// Adds what another runner has counted.
 fn add(total: &mut Total, counts: &Counts) {
     total.passed += counts.passed;
     total.failed += counts.failed;

@@ -1,5 +1,5 @@
-//! The workspace's test programs: built by one call of cargo, run one after another, and not run again while nothing they
-//! depend on has changed since they passed. The emulated board's tests take minutes, and most changes do not reach them.
+//! The workspace's test programs: built by one cargo call, run in turn, and skipped if nothing they depend on
+//! has changed since they passed.
 
 use std::{
     collections::hash_map::DefaultHasher,
@@ -19,22 +19,20 @@ use crate::{
     run::{ROOT, cargo, finish, output, target_folder},
 };
 
-/// Packages whose tests run the programs or the firmware; those of the others depend on their own code and files alone.
+/// Packages whose tests run the programs or the firmware; others depend on their own files only.
 const RUN_PROGRAMS: [&str; 3] = ["farnear", "farnear-sim", "farnear-campaign"];
-/// The package whose tests look at the whole repository.
+/// Its tests read the whole repository.
 const SEES_EVERYTHING: &str = "xtask";
-/// Where the real data are looked for, from the repository's root; see `tools/test-data`.
+/// Relative to the repository's root; see `tools/test-data`.
 const REAL_DATA: &str = "../shared/data";
 
-/// What came of all tests.
 #[derive(Default)]
 pub struct Total {
     pub passed: u32,
     pub failed: u32,
     pub ignored: u32,
-    /// Of the passed, those that were not run again.
+    /// Passed earlier and not run again.
     pub unchanged: u32,
-    /// Whether every program ended well.
     pub well: bool,
 }
 
@@ -42,26 +40,23 @@ struct Program {
     package: String,
     name: String,
     executable: PathBuf,
-    /// The package's, where cargo runs it.
     folder: PathBuf,
 }
 
-/// All of them, compiled.
 pub struct Programs {
     tests: Vec<Program>,
-    /// Programs that some of them run.
     others: Vec<PathBuf>,
 }
 
 impl Programs {
-    /// Runs them, those that are unchanged since they passed only where `all` are wanted.
+    /// Runs unchanged programs only with `all`.
     pub fn run(&self, elf: &Path, all: bool) -> Result<Total> {
         let mut total = Total { well: true, ..Total::default() };
         let passed = target_folder().join("passed-tests");
         fs::create_dir_all(&passed).with_context(|| format!("cannot create {}", passed.display()))?;
         for test in &self.tests {
             let stamp = passed.join(test.executable.file_name().unwrap_or(test.name.as_ref()));
-            // Without git the list of files is unknown: every program runs.
+            // Without git every program runs.
             let depends_on =
                 dependencies(test, &self.others, elf).ok().filter(|_| test.package != SEES_EVERYTHING);
             let before = fs::read_to_string(&stamp).ok().filter(|_| !all);
@@ -125,27 +120,26 @@ impl Programs {
     }
 }
 
-/// Has the build scripts that ask for data and programs look again where these have come or gone since the last tests: they watch
-/// nothing that was missing.
+/// Touches build scripts that look for data and programs if these appeared or disappeared: cargo does not
+/// watch missing files.
 fn look_again() -> Result<()> {
     let record = target_folder().join("at-hand");
     let now = farnear_test_data::at_hand();
     if fs::read_to_string(&record).is_ok_and(|before| before != now) {
-        for package in fs::read_dir(ROOT.join("host"))? {
-            let script = package?.path().join("build.rs");
-            if script.is_file() {
-                fs::File::options()
-                    .append(true)
-                    .open(&script)
-                    .and_then(|file| file.set_modified(SystemTime::now()))
-                    .with_context(|| format!("cannot touch {}", script.display()))?;
-            }
+        let packages = fs::read_dir(ROOT.join("host"))?.flatten().map(|package| package.path());
+        let scripts = packages.chain([ROOT.join("xtask")]).map(|package| package.join("build.rs"));
+        for script in scripts.filter(|script| script.is_file()) {
+            fs::File::options()
+                .append(true)
+                .open(&script)
+                .and_then(|file| file.set_modified(SystemTime::now()))
+                .with_context(|| format!("cannot touch {}", script.display()))?;
         }
     }
     fs::write(&record, now).with_context(|| format!("cannot write {}", record.display()))
 }
 
-/// Passes the firmware's path to cargo or a test program. Another path makes cargo recompile the crates that read it.
+/// Passes the firmware's path. Another path makes cargo recompile the crates that read it.
 pub fn environment<'a>(command: &'a mut Command, elf: &Path) -> &'a mut Command {
     command
         .env("FARNEAR_FIRMWARE", elf)
@@ -153,7 +147,7 @@ pub fn environment<'a>(command: &'a mut Command, elf: &Path) -> &'a mut Command 
         .env("CARGO_TARGET_DIR", target_folder())
 }
 
-/// A text that changes with anything the program's result can depend on.
+/// Text that changes with everything that the result depends on.
 fn dependencies(test: &Program, programs: &[PathBuf], elf: &Path) -> Result<String> {
     let mut hasher = DefaultHasher::new();
     hash_file(&test.executable, &mut hasher)?;
@@ -177,7 +171,7 @@ fn dependencies(test: &Program, programs: &[PathBuf], elf: &Path) -> Result<Stri
     Ok(format!("{:016x} ", hasher.finish()))
 }
 
-/// What git knows, or would take, below a folder.
+/// Files below a folder that git tracks or would add.
 fn files(folder: &Path) -> Result<Vec<String>> {
     let mut git = Command::new("git");
     git.args(["ls-files", "--cached", "--others", "--exclude-standard", "--full-name", "--"]).arg(folder);
@@ -196,7 +190,7 @@ fn hash_file(path: &Path, hasher: &mut DefaultHasher) -> Result<()> {
     }
 }
 
-/// Names, lengths and times of the files below a folder that may be missing.
+/// Names, lengths and times of the files; the folder may be missing.
 fn listing(folder: &Path, hasher: &mut DefaultHasher) {
     let mut entries: Vec<_> = fs::read_dir(folder).into_iter().flatten().flatten().collect();
     entries.sort_by_key(fs::DirEntry::file_name);
@@ -210,7 +204,7 @@ fn listing(folder: &Path, hasher: &mut DefaultHasher) {
     }
 }
 
-/// Runs tests to their end and adds what they said; gives the summary if all passed.
+/// Adds the results of a test run; returns the summary if all passed.
 pub fn watch(command: &mut Command, total: &mut Total) -> Result<Option<String>> {
     let said = limited::run(command)?;
     let mut result = None;
@@ -225,7 +219,6 @@ pub fn watch(command: &mut Command, total: &mut Total) -> Result<Option<String>>
 }
 
 impl Total {
-    /// Adds those of another lane.
     pub fn add(&mut self, other: &Self) {
         self.passed += other.passed;
         self.failed += other.failed;

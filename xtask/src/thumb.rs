@@ -1,8 +1,5 @@
-//! A toolchain for the board: `thumbv7em-none-eabihf`.
-//!
-//! Three ways, the first that works is taken and named: the target is installed; `rustup target add` can fetch
-//! it; Debian's Rust (with the sources of `core`) builds it. The last is for networks that reach a Debian
-//! mirror but not Rust's servers.
+//! A toolchain for `thumbv7em-none-eabihf`: the first of an installed target, `rustup target add`, and
+//! Debian's Rust with the sources of `core` (for networks that reach a Debian mirror but not Rust's servers).
 
 use std::{
     fmt,
@@ -17,17 +14,16 @@ use crate::run::{finish, has, has_target, output, step, succeeds};
 
 pub const TARGET: &str = "thumbv7em-none-eabihf";
 
-/// Debian's packages that build the target: compiler, cargo, sources of `core`, clippy.
+/// Compiler, cargo, sources of `core`, clippy.
 const DEBIAN_PACKAGES: [&str; 4] = ["rustc-web", "cargo-web", "rust-web-src", "rust-web-clippy"];
 const DEBIAN_CARGO: &str = "/usr/bin/cargo";
 const DEBIAN_RUSTC: &str = "/usr/bin/rustc";
 
-/// How the firmware is built on this machine.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub enum Way {
-    /// With the toolchain that builds the host programs, which has the target.
+    /// The toolchain of the host programs, with the target.
     Installed,
-    /// With Debian's toolchain, which builds `core` from its sources.
+    /// Debian's toolchain, which builds `core` from its sources.
     Debian,
 }
 
@@ -41,7 +37,7 @@ impl fmt::Display for Way {
 }
 
 impl Way {
-    /// Finds the way, installing missing parts if possible.
+    /// Installs missing parts if possible.
     pub fn find() -> Result<Self> {
         let way = Self::find_quietly()?;
         eprintln!("{TARGET}: {way}");
@@ -63,14 +59,13 @@ impl Way {
         );
     }
 
-    /// A cargo call for the firmware workspace in `folder`.
     pub fn cargo(self, folder: &Path, job: &str) -> Command {
         let mut command = match self {
             Self::Installed => Command::new("cargo"),
             Self::Debian => Command::new(DEBIAN_CARGO),
         };
         command.arg(job).args(["--target", TARGET]).current_dir(folder);
-        // What cargo set for this program is not meant for another toolchain's cargo.
+        // Cargo's variables for this program do not suit another toolchain.
         for name in ["CARGO", "RUSTC", "RUSTFLAGS", "CARGO_TARGET_DIR", "CARGO_ENCODED_RUSTFLAGS"] {
             command.env_remove(name);
         }
@@ -90,7 +85,6 @@ impl Way {
         command
     }
 
-    /// Whether clippy can check the firmware here.
     pub fn has_clippy(self) -> bool {
         match self {
             Self::Installed => true,
@@ -99,7 +93,7 @@ impl Way {
     }
 }
 
-/// `rustup target add`, given up after two minutes: a closed network may hang instead of refusing.
+/// Gives up after two minutes: a closed network may hang.
 fn rustup_adds_target() -> bool {
     if !has("rustup") {
         return false;
@@ -116,7 +110,7 @@ fn rustup_adds_target() -> bool {
             _ => break,
         }
     }
-    // Either fails harmlessly where the child has ended already.
+    // Fails harmlessly if the child has ended.
     let _ = child.kill();
     let _ = child.wait();
     eprintln!("rustup cannot fetch the target here; trying Debian's packages");
@@ -133,7 +127,7 @@ fn debian_ready() -> bool {
     Path::new(DEBIAN_CARGO).exists() && sources.exists() && linker().is_some()
 }
 
-/// Installs Debian's packages as root, or with a sudo that asks nothing.
+/// As root, or with a sudo that asks nothing.
 fn apt_installs() -> bool {
     if !has("apt-get") {
         return false;
@@ -152,14 +146,14 @@ fn apt_installs() -> bool {
     step(&format!("apt-get install {}", DEBIAN_PACKAGES.join(" ")));
     let install: Vec<&str> =
         ["install", "--yes", "--no-install-recommends"].into_iter().chain(DEBIAN_PACKAGES).collect();
-    // An old package list may still serve, so a failing update does not end the attempt.
+    // An old package list may suffice, so a failing update is no error.
     if let Err(error) = apt(&["update", "--quiet"]) {
         eprintln!("{error:#}");
     }
     apt(&install).inspect_err(|error| eprintln!("{error:#}")).is_ok()
 }
 
-/// A linker for ELF files: the one inside the host toolchain, or LLVM's on the PATH.
+/// An ELF linker: inside the host toolchain, or LLVM's on the PATH.
 fn linker() -> Option<PathBuf> {
     let libdir = output(Command::new("rustc").args(["--print", "target-libdir"])).ok()?;
     let bundled = Path::new(libdir.trim()).parent()?.join("bin/rust-lld");

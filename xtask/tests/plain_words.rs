@@ -1,11 +1,12 @@
 //! Documents, comments and messages use plain words. A short list of phrases is counted per set of files; a set's ceiling may
-//! only be lowered.
+//! only be lowered. `typos` checks the spelling; `_typos.toml` has the names that are none of its words.
 
 #![allow(clippy::unwrap_used)] // an unreadable file must fail the test
 
 use std::{
     fs,
     path::{Path, PathBuf},
+    process::Command,
 };
 
 /// Phrases with a plainer equivalent: "nobody" is mostly "no client", "beside" is "next to", "is told" is "receives".
@@ -117,4 +118,13 @@ fn documents_comments_and_messages_use_plain_words() {
         }
     }
     assert!(failures.is_empty(), "{}", failures.join("\n"));
+}
+
+#[test]
+#[cfg_attr(not(typos), ignore = "needs typos: pip install typos")]
+fn spelling_is_british_and_correct() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
+    let run = Command::new("typos").args(["--format", "brief"]).current_dir(root).output().unwrap();
+    let (found, errors) = (String::from_utf8_lossy(&run.stdout), String::from_utf8_lossy(&run.stderr));
+    assert!(run.status.success(), "correct these, or add a name to _typos.toml:\n{found}{errors}");
 }

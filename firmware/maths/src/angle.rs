@@ -1,8 +1,6 @@
-//! Angles as 32-bit binary fractions of a turn; sine and cosine in single precision.
-//!
-//! A binary angle wraps by itself and resolves 8.4e-8 deg after any number of turns; an `f32` of 25 years in
-//! days has an error of 3.6 deg. Only exactly rounded single-precision operations are used, so all processors
-//! give the same bits.
+//! Angles as 32-bit binary fractions of a turn; sine and cosine in single precision. A binary angle wraps automatically
+//! and resolves 8.4e-8 deg after any number of turns; an `f32` of 25 years in days has an error of 3.6 deg. Only
+//! exactly rounded single-precision operations are used, so all processors give the same bits.
 
 use core::f32::consts::PI;
 
@@ -10,7 +8,6 @@ use core::f32::consts::PI;
 #[derive(Clone, Copy, PartialEq, Eq, Default, Debug)]
 pub struct BinaryAngle(u32);
 
-/// Radians per unit.
 const RADIANS: f32 = PI / 2_147_483_648.0;
 
 impl BinaryAngle {

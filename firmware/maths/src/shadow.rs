@@ -1,18 +1,15 @@
 //! Shadow of a standing person in a level camera's image, with its standard deviation.
 //!
-//! On the ground the shadow is `s (-east, -north) / hypot(east, north)`, `s = H / tan(elevation)`; in the
-//! camera's frame (x right, y forward; the camera looks `azimuth` anticlockwise from north) `(rx, ry)`. Its
-//! end is imaged `mx`, `my` from the feet (Li 2014, eqs. 8.15 and 8.18, the latter corrected for the lateral
-//! offset `X0`):
+//! On the ground the shadow is `s (-east, -north) / hypot(east, north)`, `s = H / tan(elevation)`; in the camera's
+//! frame (x right, y forward; the camera looks `azimuth` anticlockwise from north) `(rx, ry)`. Its end is imaged `mx`,
+//! `my` from the feet (Li 2014, eqs. 8.15 and 8.18, the latter corrected for the lateral offset `X0`):
 //!
 //! `mx = v ((X0 + rx) / (u + ry) - X0 / u)`, `my = Hc v (1 / (u + ry) - 1 / u)`,
 //!
-//! so `tan(eta) = my / mx = -Hc ry / (u rx - X0 ry)`. The silhouette is rotated by `beta = 3 pi / 4 - eta /
-//! 2` (8.20), between 90 and 180 deg, after mirroring if `mx < 0`.
-//!
-//! The standard deviation is first order ([`Shadow::deviation`]); the result reports where that fails, near
-//! the camera or the fold of the mirror. Cost: 950 instructions on a Cortex-M4F, sun included, and 1,160 for
-//! the deviation.
+//! so `tan(eta) = my / mx = -Hc ry / (u rx - X0 ry)`. The silhouette is rotated by `beta = 3 pi / 4 - eta / 2` (8.20),
+//! between 90 and 180 deg, after mirroring if `mx < 0`. The standard deviation is first order ([`Shadow::deviation`]);
+//! the result reports where that fails, near the camera or the fold of the mirror. Cost: 950 instructions on a
+//! Cortex-M4F, sun included, and 1,160 for the deviation.
 
 mod deviation;
 
@@ -89,8 +86,7 @@ pub struct Shadow {
 }
 
 impl Shadow {
-    /// The shadow of a subject.
-    /// Errors: [`Error::SunTooLow`], [`Error::SunOverhead`], [`Error::Senseless`].
+    /// The shadow of a subject. Fails with [`Error::SunTooLow`], [`Error::SunOverhead`] or [`Error::Senseless`].
     pub fn of(sun: &Sun, geometry: &Geometry) -> Result<Self, Error> {
         for (what, value_m) in [
             ("camera height", geometry.camera_height_m),
@@ -129,12 +125,10 @@ impl Shadow {
         Ok(Self { eta_deg, beta_deg, mirrored, length_m, end_distance_m, right_m, forward_m })
     }
 
-    /// The shadow at a moment (Unix time, UT) and place.
-    /// Errors: as [`Self::of`].
+    /// The shadow at a moment (Unix time, UT) and place, as [`Self::of`].
     pub fn at(unix_seconds: i64, place: &Place, geometry: &Geometry) -> Result<Self, Error> {
         Self::of(&Sun::at(unix_seconds, place), geometry)
     }
 }
 
-/// Radians per degree.
 const RADIAN: f32 = PI / 180.0;

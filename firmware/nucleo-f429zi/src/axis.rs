@@ -12,8 +12,7 @@ use crate::{
     stepper::{StepInstance, Stepper},
 };
 
-/// End switches, normally closed to ground with a pull-up: a broken wire reads as actuated and stops the
-/// axis.
+/// Normally closed to ground with a pull-up: a broken wire reads as actuated and stops the axis.
 pub struct Switches {
     home: Input<'static>,
     far: Input<'static>,
@@ -42,7 +41,6 @@ impl<S: StepInstance, E: GeneralInstance4Channel> Axis<S, E> {
         }
     }
 
-    /// Applies the outputs of one tick.
     pub fn apply(&mut self, outputs: &MotorOutputs) {
         self.stepper.apply(outputs);
     }

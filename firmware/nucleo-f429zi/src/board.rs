@@ -31,7 +31,6 @@ use crate::{
 /// Watchdog timeout without a tick (LSI is 17 to 47 kHz, so 68 to 188 ms).
 const WATCHDOG_US: u32 = 100_000;
 
-/// Hardware of the control loop.
 pub struct Nucleo {
     coarse: Axis<TIM1, TIM4>,
     lens: Axis<TIM8, TIM3>,
@@ -50,13 +49,11 @@ pub struct Parts {
     pub board: Nucleo,
     /// Blinks while the loop runs.
     pub led: Peri<'static, PB0>,
-    /// Emulated board, by the strap.
     pub emulated: bool,
 }
 
 impl Nucleo {
-    /// Drivers off, trigger low, watchdog stopped. Fails if the serial port cannot be set up. One long
-    /// function because it is a table of pins.
+    /// Drivers off, trigger low, watchdog stopped. One long function because it is a table of pins.
     pub fn set_up(p: Peripherals) -> Result<Parts, ConfigError> {
         let emulated = Input::new(p.PD15, Pull::Down).is_high();
         let link = Link::open(p.USART3, p.PD8, p.PD9)?;
@@ -85,7 +82,6 @@ impl Nucleo {
         Ok(Parts { board, led: p.PB0, emulated })
     }
 
-    /// Starts the watchdog.
     pub fn wake_watchdog(&mut self) {
         self.watchdog.unleash();
     }

@@ -1,8 +1,7 @@
-//! Camera trigger and exposure-active signal (strobe) on TIM2, which counts board microseconds.
-//!
-//! Trigger: channel 3, PB10. Both edges are compare matches, exact to the microsecond; the interrupt only
-//! prepares the next. Flash: channels 1 and 2 without pins, whose compare interrupts switch the light and stamp it.
-//! Strobe: channel 4, PB11, captured in hardware after a trigger or while listening.
+//! Camera trigger and exposure-active signal (strobe) on TIM2, which counts board microseconds. Trigger: channel 3,
+//! PB10. Both edges are compare matches, exact to the microsecond; the interrupt only prepares the next. Flash:
+//! channels 1 and 2 without pins, whose compare interrupts switch the light and stamp it. Strobe: channel 4, PB11,
+//! captured in hardware after a trigger or while listening.
 
 use core::cell::RefCell;
 
@@ -31,7 +30,6 @@ use crate::{
 /// Channels 1 to 4 in the register arrays, which start at 0.
 const FLASH_ON: usize = 0;
 const FLASH_OFF: usize = 1;
-/// Array indices of channels 3 and 4.
 const TRIGGER: usize = 2;
 const STROBE: usize = 3;
 /// From the order to the rising edge: time to set up the compare match.
@@ -39,7 +37,7 @@ const LEAD_US: u32 = 10;
 /// The comparator would miss a closer edge.
 const MARGIN_US: u32 = 1;
 
-/// Edges of an exposure, TIM2 stamps.
+/// TIM2 stamps.
 #[derive(Clone, Copy)]
 struct Exposure {
     length_us: u32,
@@ -50,7 +48,6 @@ struct Exposure {
     flash: Option<Flash>,
 }
 
-/// A flash and when it began and ended.
 #[derive(Clone, Copy)]
 struct Flash {
     light: ShotLight,
@@ -58,7 +55,6 @@ struct Flash {
     off: Option<u32>,
 }
 
-/// Use of the strobe input.
 #[derive(Clone, Copy)]
 enum Strobe {
     Ignored,
@@ -111,7 +107,7 @@ fn TIM2() {
     });
 }
 
-/// Prepares the falling edge after the rising one; then done.
+/// Prepares the falling edge after the rising one.
 fn trigger_edge(exposure: Option<&mut Exposure>) {
     let timer = pac::TIM2;
     let Some(exposure) = exposure else { return };
@@ -175,7 +171,7 @@ pub struct CameraPort {
 }
 
 impl CameraPort {
-    /// Sets TIM2 to board time and configures both pins; trigger low.
+    /// Sets TIM2 to board time; trigger low.
     pub fn new(
         _timer: Peri<'static, TIM2>,
         trigger: Peri<'static, PB10>,
@@ -249,7 +245,7 @@ impl CameraPort {
         });
     }
 
-    /// Ends the flash that is in progress; one that has not begun does not come.
+    /// Ends the flash, or prevents one that has not begun.
     pub fn cancel_flash(&mut self) {
         critical_section::with(|cs| {
             let mut strobe = EXPOSURE.borrow_ref_mut(cs);
@@ -269,7 +265,6 @@ impl CameraPort {
         });
     }
 
-    /// Starts or stops measuring untriggered exposures.
     pub fn listen(&mut self, listen: bool) {
         critical_section::with(|cs| {
             let mut strobe = EXPOSURE.borrow_ref_mut(cs);

@@ -13,8 +13,7 @@ pub const APB1_TIMER_HZ: u32 = 84_000_000;
 /// TIM1, TIM8.
 pub const APB2_TIMER_HZ: u32 = 168_000_000;
 
-/// Polls for the external clock, and internal 16 MHz cycles in between: 0.2 s in total. The start-up time of
-/// an ST-LINK's clock is unpublished (not checked).
+/// Polls for the external clock, and cycles in between: 0.2 s, as an ST-LINK's start-up time is unpublished.
 const LOOKS: u32 = 20_000;
 const BETWEEN_LOOKS: u32 = 160;
 
@@ -34,8 +33,8 @@ pub fn wait_cycles_since(start: u32, cycles: u32) {
     }
 }
 
-/// Whether the external clock starts. embassy would wait forever, with the watchdog stopped. From here on a
-/// failing clock breaks the motors' timers and resets the board (RM0090, section 6.2.7).
+/// embassy would wait forever for a missing external clock, with the watchdog stopped. From here on a failing clock
+/// breaks the motors' timers and resets the board (RM0090, section 6.2.7).
 fn has_outer_clock() -> bool {
     // HSEBYP requires HSEON = 0 (section 6.3.1).
     pac::RCC.cr().modify(|cr| cr.set_hsebyp(true));
@@ -48,15 +47,14 @@ fn has_outer_clock() -> bool {
     comes
 }
 
-/// Starts clocks and time driver; returns whether the internal clock is used. A clock `lost` in the last boot
-/// is not tried: a loose wire would reset the board repeatedly.
+/// Returns whether the internal clock is used. A clock `lost` in the last boot is not tried, because it may reset
+/// again.
 pub fn start(lost: bool) -> (Peripherals, bool) {
     let own_clock = lost || !has_outer_clock();
     let peripherals = critical_section::with(|_| {
         let peripherals = embassy_stm32::init(clock_tree::config(own_clock));
         accelerate();
-        // embassy's update event while setting up TIM5 leaves a compare flag, whose handler would add half a
-        // period: 32 ms.
+        // embassy's update event while setting up TIM5 leaves a compare flag, whose handler would add 32 ms.
         pac::TIM5.sr().write(|sr| sr.0 = 0);
         registers::unpend(Interrupt::TIM5);
         peripherals
@@ -64,12 +62,11 @@ pub fn start(lost: bool) -> (Peripherals, bool) {
     (peripherals, own_clock)
 }
 
-/// Flash wait states at 168 MHz down to 2.4 V (RM0090, section 3.5.1), below brown-out level 2. Five suffice
-/// above 2.7 V only.
+/// Flash wait states at 168 MHz down to 2.4 V (RM0090, section 3.5.1), below brown-out level 2.
 const LATENCY: embassy_stm32::pac::flash::vals::Latency = embassy_stm32::pac::flash::vals::Latency::WS6;
 
-/// Enables the flash accelerator (RM0090, section 3.5.2), which embassy disables by writing the whole
-/// register; without it the program is up to 1.9 times slower.
+/// Enables the flash accelerator (RM0090, section 3.5.2), which embassy disables; the program is up to 1.9 times
+/// faster.
 fn accelerate() {
     pac::FLASH.acr().modify(|acr| {
         acr.set_latency(LATENCY);

@@ -1,5 +1,4 @@
-//! Clocks: 8 MHz HSE from the ST-LINK or the internal 16 MHz; the PLL gives 168 MHz. Timers: APB1 84 MHz,
-//! APB2 168 MHz.
+//! Clocks: 8 MHz HSE from the ST-LINK or the internal 16 MHz; the PLL gives 168 MHz. Timers: APB1 84 MHz, APB2 168 MHz.
 
 use embassy_stm32::{
     Config,
@@ -9,7 +8,6 @@ use embassy_stm32::{
     time::Hertz,
 };
 
-/// Configuration for embassy.
 pub fn config(own_clock: bool) -> Config {
     let mut config = Config::default();
     let prediv = if own_clock {

@@ -1,5 +1,4 @@
-//! Timing of the control loop: a tick every 200 us, 2 ms at rest, its duration, and a LED. The tick itself is
-//! [`farnear_rig::control`].
+//! Timing of the control loop ([`farnear_rig::control`]): a tick every 200 us, 2 ms at rest, its duration, and a LED.
 
 use cortex_m::peripheral::DWT;
 use defmt::warn;
@@ -17,7 +16,6 @@ use farnear_rig::{
 
 use crate::{board::Nucleo, clock::SYSCLK_HZ, registers};
 
-/// Ticks per half period of the LED.
 const BLINK: u32 = TICK_HZ / 2;
 /// Longer ticks are logged: three quarters of the period.
 const LONG_TICK_CYCLES: u32 = SYSCLK_HZ / 1_000_000 * TICK_US * 3 / 4;

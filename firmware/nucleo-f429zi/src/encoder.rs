@@ -1,5 +1,5 @@
-//! Incremental encoder: the 16-bit timer counts all four edges and is extended here. Must be read once per
-//! 32,767 counts (0.6 s at 6.25 mm/s; the loop reads every 200 us).
+//! Incremental encoder: the 16-bit timer counts all four edges and is extended here. Must be read once per 32,767
+//! counts (0.6 s at 6.25 mm/s; the loop reads every 200 us).
 
 use embassy_stm32::{
     Peri,
@@ -17,7 +17,6 @@ pub struct Encoder<T: GeneralInstance4Channel> {
 }
 
 impl<T: GeneralInstance4Channel> Encoder<T> {
-    /// Starts counting at 0.
     pub fn new(
         timer: Peri<'static, T>,
         a: Peri<'static, impl TimerPin<T, Ch1>>,

@@ -1,7 +1,5 @@
-//! Two outputs for a lamp, a flash or a projector: TIM12, channels 1 and 2, PB14 and PB15, pulse width modulation of 21 kHz.
-//!
-//! A flash is switched by the compare interrupts of the camera's timer ([`crate::camera`]); here is what the outputs do
-//! outside it.
+//! Two outputs for a lamp, a flash or a projector: TIM12, channels 1 and 2, PB14 and PB15, PWM of 21 kHz. The camera's
+//! timer ([`crate::camera`]) switches a flash; this module sets the outputs outside it.
 
 use core::cell::Cell;
 
@@ -19,10 +17,10 @@ use farnear_protocol::message::{LIGHT_LEVEL_MAX, LightLevels};
 /// 84 MHz by 4 by 1000: 21 kHz, which no exposure of 1 ms resolves (5 % of a period).
 const PRESCALER: u16 = 4 - 1;
 
-/// What [`LightPort::set`] asked for, and whether a flash overrides it.
+/// Levels from [`LightPort::set`], and whether a flash overrides them.
 static STEADY: Mutex<Cell<(LightLevels, bool)>> = Mutex::new(Cell::new((LightLevels::OFF, false)));
 
-/// Brightness from now on. The counter restarts, so that a period begins with its bright part.
+/// Restarts the counter, so that a period begins with its bright part.
 fn put(levels: LightLevels) {
     let timer = pac::TIM12;
     timer.ccr(0).write(|w| w.set_ccr(levels.first));
@@ -30,7 +28,6 @@ fn put(levels: LightLevels) {
     timer.egr().write(|w| w.set_ug(true));
 }
 
-/// A flash begins.
 pub fn begin_flash(levels: LightLevels) {
     critical_section::with(|cs| {
         let steady = STEADY.borrow(cs);
@@ -39,7 +36,6 @@ pub fn begin_flash(levels: LightLevels) {
     });
 }
 
-/// A flash ends.
 pub fn end_flash() {
     critical_section::with(|cs| {
         let steady = STEADY.borrow(cs);
@@ -48,14 +44,12 @@ pub fn end_flash() {
     });
 }
 
-/// Both outputs.
 pub struct LightPort {
     _first: PwmPin<'static, TIM12, Ch1>,
     _second: PwmPin<'static, TIM12, Ch2>,
 }
 
 impl LightPort {
-    /// Sets both up, off.
     pub fn new(
         _timer: Peri<'static, TIM12>,
         first: Peri<'static, PB14>,
@@ -81,7 +75,6 @@ impl LightPort {
         }
     }
 
-    /// Brightness outside flashes.
     pub fn set(&mut self, levels: LightLevels) {
         critical_section::with(|cs| {
             let steady = STEADY.borrow(cs);

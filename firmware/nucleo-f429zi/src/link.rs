@@ -1,10 +1,7 @@
-//! Serial link: USART3 on the ST-LINK's virtual COM port, 8N1, 2 Mbaud or as requested, both directions by
-//! DMA.
-//!
-//! No interrupts: a circular transfer fills a ring that each tick empties; a second ring is sent piece by
-//! piece. The HAL's buffered port is not used: at the end of each frame its handler writes back the status
-//! register, and a byte received in between is lost, because a written zero clears RXNE (RM0090, USART_SR).
-//! That damaged one in 2,000 frames with traffic in both directions.
+//! Serial link: USART3 on the ST-LINK's virtual COM port, 8N1, 2 Mbaud or as requested, both directions by DMA. No
+//! interrupts: a circular transfer fills a ring that each tick empties; a second ring is sent piece by piece. The HAL's
+//! buffered port is not used: at the end of each frame its handler writes back the status register, and a byte received
+//! in between is lost, because a written zero clears RXNE (RM0090, USART_SR). That damaged one in 2,000 frames.
 
 use core::sync::atomic::{AtomicU8, Ordering, fence};
 
@@ -29,8 +26,7 @@ use crate::clock::APB1_TIMER_HZ;
 const APB1_HZ: u32 = APB1_TIMER_HZ / 2;
 /// 5 ms of bytes, 25 control ticks.
 const RECEIVE_RING: usize = 1024;
-/// Three of the longest frames with leading delimiters, and a power of two, so that wrapping needs no
-/// division.
+/// Three of the longest frames with delimiters, and a power of two, so that wrapping needs no division.
 const SEND_RING: usize = 4 * FRAME_MAX;
 
 /// Streams and channel of USART3 on DMA1 (RM0090, table 42).
@@ -43,11 +39,9 @@ static RECEIVED: [AtomicU8; RECEIVE_RING] = [const { AtomicU8::new(0) }; RECEIVE
 static TO_SEND: [AtomicU8; SEND_RING] = [const { AtomicU8::new(0) }; SEND_RING];
 
 pub struct Link {
-    /// Keeps pins and clock.
     _port: Uart<'static, Blocking>,
-    /// Next byte of [`RECEIVED`] to take.
     taken: usize,
-    /// First used place of [`TO_SEND`].
+    /// Start of the data in [`TO_SEND`].
     sent: usize,
     /// End of the current transfer in [`TO_SEND`].
     handed_over: usize,
@@ -79,8 +73,7 @@ impl Link {
         Ok(Self { _port: port, taken: 0, sent: 0, handed_over: 0, written: 0 })
     }
 
-    /// Passes received bytes; `true` if the ring was full and bytes were lost. Once per tick, also to
-    /// continue sending.
+    /// Passes received bytes; `true` if some were lost in a full ring. Call once per tick, also to continue sending.
     pub fn drain(&mut self, mut take: impl FnMut(u8)) -> bool {
         self.hand_over();
         let (end, lapped) = received();
@@ -96,13 +89,12 @@ impl Link {
         full
     }
 
-    /// Room for another frame.
     pub const fn has_room(&self) -> bool {
         // One place stays free to distinguish full from empty.
         (self.sent + SEND_RING - self.written - 1) % SEND_RING > FRAME_MAX
     }
 
-    /// Queues a frame with its delimiters. Dropped without [`Link::has_room`]; the host repeats its request.
+    /// Queues a frame; drops it without [`Link::has_room`], because the host repeats its request.
     pub fn send(&mut self, bytes: &[u8]) {
         if !self.has_room() {
             warn!("a frame was dropped: no room");
@@ -115,15 +107,14 @@ impl Link {
         self.hand_over();
     }
 
-    /// Changes the rate while nothing is sent. The divider gives exactly 2,000,000 baud and 913,043 for
-    /// 921,600: 0.9 % off, of 3 % permitted for both ends (RM0090, tolerance of the receiver).
+    /// Call while nothing is sent. The divider gives exactly 2,000,000 baud and 913,043 for 921,600: 0.9 % off, of 3 %
+    /// permitted for both ends (RM0090, tolerance of the receiver).
     pub fn set_rate(&mut self, rate: LinkRate) {
         let baud = rate.baud();
         // Sixteen samples per bit: the register counts sixteenths of the divider.
         pac::USART3.brr().write(|w| w.0 = (APB1_HZ + baud / 2) / baud);
     }
 
-    /// Everything has left the board.
     pub fn is_idle(&self) -> bool {
         self.handed_over == self.written && !is_running(SEND_STREAM) && pac::USART3.sr().read().tc()
     }
@@ -148,7 +139,6 @@ impl Link {
     }
 }
 
-/// Starts a stream between the data register and bytes.
 fn start(stream: usize, bytes: &'static [AtomicU8], set: impl FnOnce(&mut Cr)) {
     clear(stream);
     let registers = pac::DMA1.st(stream);

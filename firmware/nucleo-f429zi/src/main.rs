@@ -1,7 +1,6 @@
 //! # farnear-nucleo-f429zi
 //!
-//! Firmware of a NUCLEO-F429ZI. Behaviour is in `farnear-rig`; here are clocks, pins and registers. One file
-//! per driver;
+//! Firmware of a NUCLEO-F429ZI: clocks, pins and registers; behaviour is in `farnear-rig`. One file per driver;
 //! [`board`] combines them, and [`control`] ticks 5000 times a second, 500 times at rest.
 //!
 //! | pin | function | signal |
@@ -23,9 +22,8 @@
 //! | PD15 | GPIO, pull-down | strap: high only on the emulated board |
 //! | PB0 | GPIO | LED: blinks while the control loop runs |
 //!
-//! Interrupts: step timers' update and break above TIM2 (camera) above TIM5 (time); the link uses DMA only;
-//! the loop runs in
-//! thread mode below them.
+//! Interrupts: step timers' update and break above TIM2 (camera) above TIM5 (time); the link uses DMA only; the loop is
+//! in thread mode.
 #![no_std]
 #![no_main]
 
@@ -65,8 +63,7 @@ use crate::{
 /// From power-on to the FRAM's first answer (FM25V02, t_PU).
 const MEMORY_STARTS: Duration = Duration::from_micros(250);
 
-/// The rig with its memory's contents; a silent memory is removed. Separate from `main`, whose variables keep
-/// their place forever, and moved ones several.
+/// The rig with its memory's contents; a silent memory is removed. A separate function, to free its variables' stack.
 #[inline(never)]
 fn start(identity: Identity, fitted: &mut Option<Memory>) -> &'static mut Rig {
     static RIG: StaticCell<Rig> = StaticCell::new();
@@ -82,7 +79,6 @@ fn start(identity: Identity, fitted: &mut Option<Memory>) -> &'static mut Rig {
     rig
 }
 
-/// Enables the cycle counter, used for waits and the control loop.
 fn count_cycles() {
     if let Some(mut core) = cortex_m::Peripherals::take() {
         core.DCB.enable_trace();
@@ -90,7 +86,7 @@ fn count_cycles() {
     }
 }
 
-/// The code that the piezo's DAC has. A DAC8830 starts at 0 with its supply; after a dip of the supply it may have either.
+/// Code of the piezo's DAC: a DAC8830 starts at 0 with its supply; after a supply dip the code is uncertain.
 fn kept_piezo_code(cause: ResetCause) -> Option<u16> {
     match cause {
         ResetCause::PowerOn => Some(0),
@@ -99,7 +95,6 @@ fn kept_piezo_code(cause: ResetCause) -> Option<u16> {
     }
 }
 
-/// Logs why the last boot ended.
 fn tell_of(last: Option<Last>) {
     match last {
         Some(Last::Panic { file, line }) => error!("panicked at {}:{}", file.unwrap_or("?"), line),

@@ -1,8 +1,6 @@
-//! FRAM: Cypress FM25V02 (document 001-84494) or FM25V02A (001-90865), 32 KiB on SPI4, mode 0. Writes at bus
-//! speed without pages or busy time: 64 bytes take 26 us.
-//!
-//! Reads are repeated until two agree, and the name is queried several times: a flipped bit on the bus while
-//! plugs bounce must not lose a record or the memory.
+//! FRAM: Cypress FM25V02 (document 001-84494) or FM25V02A (001-90865), 32 KiB on SPI4, mode 0. Writes at bus speed
+//! without pages or busy time: 64 bytes take 26 us. Reads are repeated until two agree, and the name is queried several
+//! times: a flipped bit on the bus while plugs bounce must not lose a record or the memory.
 
 use embassy_stm32::{
     Peri,
@@ -22,16 +20,13 @@ const WRITE: u8 = 0x02;
 const READ: u8 = 0x03;
 const READ_ID: u8 = 0x9f;
 const READ_STATUS: u8 = 0x05;
-/// Of the status register: these bits are always 0, except the second, which reports that a write is enabled (table 4). Without
-/// the chip they all read as ones.
+/// Status bits that read 0, except the second, write enabled (table 4); all read 1 without the chip.
 const STATUS_MASK: u8 = 0b0011_0011;
 const WRITE_ENABLED: u8 = 0b0000_0010;
-/// Manufacturer, family and density (table 6), after six continuation bytes. The last byte is the revision:
-/// 00 FM25V02, 08 FM25V02A.
+/// Manufacturer, family and density (table 6), after six continuation bytes; then the revision (08: FM25V02A).
 const ID: [u8; 8] = [0x7f, 0x7f, 0x7f, 0x7f, 0x7f, 0x7f, 0xc2, 0x22];
 /// Attempts to read the name, or a piece equal twice in a row.
 const ATTEMPTS: usize = 4;
-/// Bytes per read.
 const PIECE: usize = 256;
 
 pub struct Memory {
@@ -123,7 +118,7 @@ impl Memory {
         self.send(&[WRITE, high, low], &order.bytes);
     }
 
-    /// Sends bytes without gaps. The HAL waits for each received byte, which takes twice as long.
+    /// Sends without gaps; the HAL waits for each received byte, which takes twice as long.
     fn send(&mut self, head: &[u8], bytes: &[u8]) {
         let spi = pac::SPI4;
         self.select.set_low();

@@ -1,22 +1,15 @@
 //! The piezo's DAC and the strain gauge's converter on SPI3.
 //!
-//! - DAC: TI DAC8830 (SLAS449): 16 bit, +-1 LSB, SPI mode 0 up to 50 MHz, 16-bit frame, updated when its
-//!   select rises; starts
-//!   at code 0, the relaxed piezo. Select PD0.
-//! - Converter: Analog Devices AD7691 (18 bit, 250 kS/s, 0.75 LSB noise), three-wire CS mode with busy
-//!   indicator. The rising
-//!   edge of CNV (PD1) samples; CNV is high for at least 50 ns (the related AD7685 needs 10 ns) and low again
-//!   before the
-//!   shortest conversion (0.5 us) ends, which no interrupt may delay. After the longest (3.7 us at 3.3 V) the
-//!   output, until
-//!   then released and pulled up, is low; each clock gives a bit, two's complement, MSB first, SPI mode 0.
-//!   After the last bit
-//!   the output is released and meaningless. The leading 0 distinguishes a converter from a broken wire, as
-//!   do codes at
-//!   either end, which the rig rejects.
+//! - DAC: TI DAC8830 (SLAS449): 16 bit, +-1 LSB, SPI mode 0 up to 50 MHz, 16-bit frame, updated when its select rises;
+//!   starts at code 0, the relaxed piezo. Select PD0.
+//! - Converter: Analog Devices AD7691 (18 bit, 250 kS/s, 0.75 LSB noise), three-wire CS mode with busy indicator. The
+//!   rising edge of CNV (PD1) samples; CNV is high for at least 50 ns (the related AD7685 needs 10 ns) and low again
+//!   before the shortest conversion (0.5 us) ends, which no interrupt may delay. After the longest (3.7 us at 3.3 V)
+//!   the output, until then released and pulled up, is low; each clock gives a bit, two's complement, MSB first, SPI
+//!   mode 0. After the last bit the output is released and meaningless. The leading 0 distinguishes a converter from a
+//!   broken wire, as do codes at either end, which the rig rejects.
 //!
-//! A 16-bit word takes 1.5 us: the processor polls rarely, which leaves the bus free (and is most of an
-//! emulated tick's cost).
+//! A 16-bit word takes 1.5 us: rare polls leave the bus free (and are most of an emulated tick's cost).
 
 use cortex_m::peripheral::DWT;
 use embassy_stm32::{
@@ -40,14 +33,12 @@ const CONVERSION_CYCLES: u32 = 622;
 const PULSE_CYCLES: u32 = 10;
 /// Half of a word's 256 cycles.
 const HALF_A_WORD_CYCLES: u32 = 128;
-/// Polling interval for the word's end.
 const LOOK_CYCLES: u32 = 12;
 /// Busy indicator, first of the 32 bits.
 const BUSY_BIT: u32 = 1 << 31;
 /// Clocks after indicator and 18 bits.
 const TRAILING_BITS: u32 = 13;
-/// Control ticks (5 ms) after which the DAC's code is repeated: a loose contact or supply dip may have lost
-/// it, and a loop at the end of its range would not change it.
+/// Control ticks (5 ms) between repetitions of the DAC's code, which a loose contact or supply dip may have lost.
 const AGAIN_TICKS: u8 = 25;
 /// Converts two's complement to 0 = most negative.
 const SIGN_BIT: u32 = 1 << 17;
@@ -57,14 +48,12 @@ pub struct Piezo {
     dac_select: Output<'static>,
     convert: Output<'static>,
     code: Option<u16>,
-    /// Control ticks since the DAC was written.
     silent_ticks: u8,
     /// Sampling time, cycles.
     sampled: u32,
 }
 
 impl Piezo {
-    /// Sets up SPI3 and the selects; the piezo is unchanged.
     pub fn new(
         spi: Peri<'static, SPI3>,
         clock: Peri<'static, PC10>,
@@ -85,7 +74,6 @@ impl Piezo {
         Self { _spi: spi, dac_select, convert, code: None, silent_ticks: 0, sampled: 0 }
     }
 
-    /// Sends a word and returns the received one.
     fn exchange(&mut self, word: u16) -> u16 {
         pac::SPI3.dr().write(|w| w.set_dr(word));
         clock::wait_cycles(HALF_A_WORD_CYCLES);
@@ -105,8 +93,7 @@ impl Piezo {
         self.sampled = DWT::cycle_count();
     }
 
-    /// The last sample once converted: 0 to [`GAUGE_CODE_MAX`], `None` without an answering converter. Takes
-    /// 3.8 us.
+    /// The last sample, 0 to [`GAUGE_CODE_MAX`]; `None` if the converter is silent. Takes 3.8 us.
     pub fn gauge(&mut self) -> Option<u32> {
         clock::wait_cycles_since(self.sampled, CONVERSION_CYCLES);
         let word = u32::from(self.exchange(0)) << 16 | u32::from(self.exchange(0));

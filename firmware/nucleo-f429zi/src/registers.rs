@@ -1,5 +1,4 @@
-//! All `unsafe` code of the firmware: interrupt enables, retained memory, fault exit, log encoder, and
-//! symbols for debuggers.
+//! All `unsafe` code of the firmware: interrupt enables, retained memory, fault exit, log encoder, debugger symbols.
 #![allow(unsafe_code)]
 
 mod faults;
@@ -17,8 +16,7 @@ use farnear_protocol::message::ResetCause;
 
 pub use self::logger::take_log;
 
-/// Cycles of the longest control tick since the reset, with interrupts; read by debuggers and the emulated
-/// board's tests.
+/// Cycles of the longest control tick since the reset, with interrupts; for debuggers and the emulated board's tests.
 // SAFETY: no other symbol has this name.
 #[unsafe(no_mangle)]
 static FARNEAR_LONGEST_TICK_CYCLES: AtomicU32 = AtomicU32::new(0);
@@ -32,7 +30,7 @@ pub fn note_tick(cycles: u32) -> bool {
     longest
 }
 
-/// Enables an interrupt. Its handler's state must be ready.
+/// Enables an interrupt; its handler's state must be ready.
 pub fn enable_interrupt(interrupt: Interrupt, priority: Priority) {
     interrupt.set_priority(priority);
     interrupt.unpend();
@@ -45,7 +43,7 @@ pub fn unpend(interrupt: Interrupt) {
     NVIC::unpend(interrupt);
 }
 
-/// Cause of the reset; clears the flags (RM0090, RCC_CSR).
+/// Reads and clears the reset flags (RM0090, RCC_CSR).
 pub fn take_reset_cause() -> ResetCause {
     let flags = pac::RCC.csr().read();
     pac::RCC.csr().modify(|csr| csr.set_rmvf(true));

@@ -1,14 +1,11 @@
 //! Exact numbers of STEP pulses from an advanced timer: TIM1 for stage A, TIM8 for stage B.
 //!
-//! One-pulse mode: the timer plays one [`Segment`] from its repetition counter and stops at the update event,
-//! so a late interrupt never adds a pulse. The update interrupt, the highest priority, loads the next segment
-//! and restarts the timer in well under a microsecond, which the pulse spacing (at least 25 us) absorbs. STEP
-//! is low for the first half of a period.
-//!
-//! The emergency stop is on the break input: hardware takes STEP low immediately, then the break interrupt
-//! clears the queue. Pulses of the interrupted segment are not counted; the position is lost anyway.
-//!
-//! DIR, EN and DIAG are the driver's other lines (TMC2209 class: EN active low, DIAG active high).
+//! One-pulse mode: the timer plays one [`Segment`] from its repetition counter and stops at the update event, so a late
+//! interrupt never adds a pulse. The update interrupt, the highest priority, loads the next segment and restarts the
+//! timer in well under a microsecond, which the pulse spacing (at least 25 us) absorbs. STEP is low for the first half
+//! of a period. The emergency stop is on the break input: hardware takes STEP low immediately, then the break interrupt
+//! clears the queue. Pulses of the interrupted segment are not counted; the position is lost anyway. DIR, EN and DIAG
+//! are the driver's other lines (TMC2209 class: EN active low, DIAG active high).
 
 use core::cell::RefCell;
 
@@ -44,7 +41,6 @@ struct Queue {
     broken: bool,
 }
 
-/// A step timer with its queue.
 pub struct StepTimer {
     registers: TimAdv,
     queue: Mutex<RefCell<Queue>>,
@@ -76,7 +72,6 @@ fn TIM8_BRK_TIM12() {
 }
 
 pub trait StepInstance: AdvancedInstance4Channel {
-    /// Registers and queue.
     fn steps() -> &'static StepTimer;
 }
 
@@ -131,7 +126,6 @@ impl StepTimer {
         critical_section::with(|cs| work(&mut self.queue.borrow_ref_mut(cs)))
     }
 
-    /// Starts the next segment on a stopped timer.
     fn start_next(&self, queue: &mut Queue) {
         queue.running = queue.waiting.pop_front();
         let Some(segment) = queue.running else { return };
@@ -159,7 +153,6 @@ impl StepTimer {
         timer.cr1().modify(|w| w.set_cen(true));
     }
 
-    /// A segment has ended.
     fn updated(&self) {
         self.registers.sr().write(|w| {
             // Flags are cleared by writing 0; ones have no effect.
@@ -203,7 +196,6 @@ where
     pub direction: Peri<'static, D>,
     pub enable: Peri<'static, E>,
     pub diagnosis: Peri<'static, G>,
-    /// Break input for the emergency stop.
     pub stop: Peri<'static, B>,
 }
 
@@ -218,7 +210,6 @@ pub struct Stepper<T: StepInstance> {
 }
 
 impl<T: StepInstance> Stepper<T> {
-    /// Driver off.
     pub fn new(
         _timer: Peri<'static, T>,
         pins: DriverPins<impl TimerPin<T, Ch1>, impl Pin, impl Pin, impl Pin, impl BreakInputPin<T, BkIn1>>,
@@ -257,7 +248,6 @@ impl<T: StepInstance> Stepper<T> {
         broke || self.stop.is_high()
     }
 
-    /// Applies the outputs of one tick.
     pub fn apply(&mut self, outputs: &MotorOutputs) {
         let wanted = (outputs.direction_away, outputs.enable);
         if core::mem::replace(&mut self.away_enabled, wanted) != wanted {
@@ -281,8 +271,7 @@ impl<T: StepInstance> Stepper<T> {
                     queue.underrun = true;
                 }
             }
-            // After a break nothing starts until the loop has read it: `emergency_stop` clears the flag, and
-            // the rig aborts.
+            // After a break nothing starts until the loop has read it (`emergency_stop`), and the rig aborts.
             if queue.broken {
                 queue.waiting.clear();
             }

@@ -2,14 +2,13 @@
 
 use embassy_stm32::pac;
 
-/// Level 7, the highest: low below 3.03 V, released above 3.14 V (DS9405, table 22, typical). Brown-out level
-/// 2 follows at 2.50 V; `docs/rig.md` has the capacitor that provides time for a record.
+/// Level 7, the highest: low below 3.03 V, released above 3.14 V (DS9405, table 22, typical). Brown-out level 2 follows
+/// at 2.50 V; `docs/rig.md` has the capacitor that provides time for a record.
 const LEVEL: u8 = 7;
 
 pub struct Supply(());
 
 impl Supply {
-    /// Enables the detector; clocks are up.
     pub fn new() -> Self {
         pac::PWR.cr1().modify(|w| {
             w.set_pls(LEVEL);
@@ -18,7 +17,7 @@ impl Supply {
         Self(())
     }
 
-    /// Too low for an orderly stop.
+    /// Whether the supply is too low for an orderly stop.
     pub fn is_low(&self) -> bool {
         pac::PWR.csr1().read().pvdo()
     }

@@ -1,8 +1,6 @@
-//! Alarms: latched, numbered over the board's life, stored, cleared one by one by number.
-//!
-//! Further alarms are latched behind the first; the host reads the oldest first, usually the cause. A cause
-//! that is already latched raises no second alarm. The last eight are stored, always including those not
-//! cleared; with eight latched, no more are.
+//! Alarms: latched, numbered over the board's life, stored, cleared one by one by number. Further alarms are latched
+//! behind the first; the host reads the oldest first, usually the cause. A latched cause raises no second alarm. The
+//! last eight are stored, always including uncleared ones; with eight latched, no more are.
 
 use farnear_protocol::BoardMicros;
 use farnear_protocol::message::{Alarm, AlarmRecord, Axis, Failure, RequestError};
@@ -11,9 +9,7 @@ pub(crate) const RETAINED: usize = 8;
 
 #[derive(Clone, PartialEq, Debug)]
 pub(crate) struct Alarms {
-    /// Number of the last alarm.
     count: u32,
-    /// Number of latched ones.
     latched: u8,
     /// Alarm `n` is at index `n % RETAINED`.
     kept: [Option<AlarmRecord>; RETAINED],
@@ -40,7 +36,6 @@ impl Alarms {
         alarms
     }
 
-    /// Number of the last alarm, 0 = none.
     pub(crate) const fn count(&self) -> u32 {
         self.count
     }
@@ -53,7 +48,6 @@ impl Alarms {
         &self.kept
     }
 
-    /// Oldest latched alarm.
     pub(crate) fn latched(&self) -> Option<&AlarmRecord> {
         let oldest = self.count.checked_sub(u32::from(self.latched.checked_sub(1)?))?;
         self.kept[oldest as usize % RETAINED].as_ref()
@@ -78,7 +72,7 @@ impl Alarms {
         (0..latched).filter_map(|ago| self.kept[self.count.wrapping_sub(ago) as usize % RETAINED].as_ref())
     }
 
-    /// A stored alarm; 0 = the last.
+    /// Reads a stored alarm; 0 = the last.
     pub(crate) fn read(&self, number: u32) -> Result<AlarmRecord, RequestError> {
         let number = if number == 0 { self.count } else { number };
         let kept = self.kept[number as usize % RETAINED].filter(|record| record.number == number);

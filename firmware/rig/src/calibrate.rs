@@ -1,6 +1,4 @@
-//! Calibration routines.
-//!
-//! Each occupies the whole rig. Results, except travel, become settings; the axis is homed at the end.
+//! Calibration routines. Each occupies the whole rig, stores its results except travel as settings, and homes the axis.
 
 mod backlash;
 mod gauge;
@@ -27,11 +25,9 @@ pub(crate) enum Calibrating {
     Gauge(GaugeScale),
 }
 
-/// Result of a routine's tick.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Step {
     On,
-    /// Continue with this setting.
     Set(SettingKey, i32),
     Done(Calibration),
     Failed(Axis, Failure),

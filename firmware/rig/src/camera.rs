@@ -1,14 +1,9 @@
 //! When the camera may be exposed, and the meaning of its strobe.
 //!
-//! Read-out overlaps the next move, but the next trigger waits for [`CameraSettings::readout`] after the
-//! exposure. Its end is known from the strobe, before that estimated from pulse length and the longest
-//! permitted latency.
-//!
-//! A strobe shorter than the pulse has lost its beginning (loose contact) and counts as missing, because its
-//! time would be wrong.
-//!
-//! For exposures not triggered by the board (host, free running) the first one that begins after listening
-//! started counts.
+//! Read-out overlaps the next move, but the next trigger waits for [`CameraSettings::readout`] after the exposure. Its
+//! end is known from the strobe, before that estimated from pulse length and the longest permitted latency. A strobe
+//! shorter than the pulse has lost its beginning (loose contact) and counts as missing. For exposures not triggered by
+//! the board (host, free running) the first one that begins after listening started counts.
 
 use farnear_protocol::message::ShotLight;
 use farnear_protocol::{BoardMicros, Micros};
@@ -19,16 +14,13 @@ use crate::settings::CameraSettings;
 /// Permitted shortening of the strobe: cameras count exposure in lines of some 10 us.
 const SHORTER_US: u64 = 100;
 
-/// Source of the awaited exposure.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Awaited {
-    /// The board's pulse.
     Triggered,
     /// Free running or by the host, from this time on.
     Since(BoardMicros),
 }
 
-/// An exposure with unknown edges.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 struct Pending {
     number: u32,
@@ -66,7 +58,6 @@ impl Camera {
         self.pending.is_none() && at >= self.ready_at
     }
 
-    /// Shortest time from one exposure to the next.
     pub(crate) const fn period(&self, exposure: Micros) -> Micros {
         Micros(exposure.0.saturating_add(self.settings.readout.0))
     }
@@ -80,7 +71,6 @@ impl Camera {
         self.expect(BoardMicros(end), Awaited::Triggered, shortest_us)
     }
 
-    /// Listens for an exposure from now on; returns its number.
     pub(crate) fn listen(&mut self, now: BoardMicros) -> u32 {
         let deadline = BoardMicros(now.0 + u64::from(self.settings.patience.0));
         self.expect(deadline, Awaited::Since(now), 0)
@@ -93,17 +83,14 @@ impl Camera {
         number
     }
 
-    /// Stops listening.
     pub(crate) fn give_up(&mut self) {
         self.pending = self.pending.filter(|pending| pending.awaited == Awaited::Triggered);
     }
 
-    /// Takes the exposure scheduled in this tick.
     pub(crate) const fn take_order(&mut self) -> Option<Trigger> {
         self.order.take()
     }
 
-    /// No exposure is scheduled or awaited.
     pub(crate) const fn is_idle(&self) -> bool {
         self.pending.is_none() && self.order.is_none()
     }
@@ -139,7 +126,7 @@ impl Camera {
         }
     }
 
-    /// Edges of an exposure in the tick of their arrival; an error at the deadline.
+    /// In the tick of the edges' arrival; an error at the deadline.
     pub(crate) fn result(&self, number: u32) -> Option<Result<ExposureEdges, NoAnswer>> {
         match self.edges {
             Some((of, edges)) if of == number => Some(Ok(edges)),

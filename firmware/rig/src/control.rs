@@ -1,27 +1,18 @@
 //! The control loop of all boards.
 //!
-//! A board implements [`Board`] and calls [`Control::tick`] [`crate::io::TICK_HZ`] times a second. Order
-//! within a tick:
-//!
-//! 1. The gauge is sampled first, so that samples are evenly spaced; the converter is read at the end of step
-//!    2.
-//! 2. Bytes from the link go to the rig, then the hardware is read. The emergency stop is read after the step
-//!    timers: its
-//!    circuit stops them in hardware, and opening between both reads must not look like an underrun.
+//! A board implements [`Board`] and calls [`Control::tick`] [`crate::io::TICK_HZ`] times a second. Order within a tick:
+//! 1. The gauge is sampled first for even spacing; the converter is read at the end of step 2.
+//! 2. Bytes from the link go to the rig, then the hardware is read. The emergency stop is read after the step timers:
+//!    its circuit stops them in hardware, and opening between both reads must not look like an underrun.
 //! 3. The rig decides, and its outputs are applied. A stop request waits only for earlier requests.
-//! 4. One thing is done for the host, as a tick has time for one besides two motors and the piezo: send a
-//!    frame (answers and
-//!    events, then the log, which continuous requests cannot block forever), encode an answer, or execute a
-//!    request. It is
-//!    deferred in ticks with a memory write or a completed frame.
+//! 4. One task for the host, for which a tick has time besides two motors and the piezo: send a frame (answers and
+//!    events, then the log, which continuous requests cannot block forever), encode an answer, or execute a request. It
+//!    is deferred in ticks with a memory write or a completed frame.
 //! 5. The watchdog is fed last, so that any hang leaves it unfed.
 //!
-//! An idle rig without requests for [`QUIET_TICKS`] executes only every [`REST_TICKS`]th tick, so that the
-//! processor does not
-//! warm the optics. A byte, switch, alarm or step off the piezo's target ends this.
-//!
-//! A reset ordered by the rig waits for the current frame, at most [`LAST_FRAME`]; nothing else is done
-//! meanwhile.
+//! An idle rig without requests for [`QUIET_TICKS`] executes only every [`REST_TICKS`]th tick, so that the processor
+//! does not warm the optics. A byte, switch, alarm or step off the piezo's target ends this. A reset ordered by the rig
+//! waits for the current frame, at most [`LAST_FRAME`]; nothing else is done meanwhile.
 
 use farnear_protocol::frame::{Header, Kind, delimited, encode};
 use farnear_protocol::message::LinkRate;
@@ -32,44 +23,37 @@ use crate::io::{ExposureEdges, Inputs, MotorInputs, Outputs, REST_TICKS, StrobeE
 use crate::motion::since;
 pub use crate::notes::Note;
 
-/// Answers and events before the log gets a turn.
 const FRAMES_BEFORE_LOG: u8 = 8;
-/// Ticks without byte, frame or request before resting: 20 ms. More frequent requests are answered
-/// immediately.
+/// Ticks without byte, frame or request before resting: 20 ms. More frequent ones are answered immediately.
 pub const QUIET_TICKS: u32 = TICK_HZ / 50;
 /// Limit for the last frame before a reset: the longest takes 1.3 ms, and one may wait before it.
 pub const LAST_FRAME: Micros = Micros(10_000);
 
-/// Hardware of a board. Each method returns immediately.
+/// Hardware of a board. No method blocks.
 pub trait Board {
     fn now(&mut self) -> BoardMicros;
 
     /// Passes received bytes; returns `true` if some may have been lost.
     fn receive(&mut self, take: impl FnMut(u8)) -> bool;
 
-    /// Starts a gauge conversion.
     fn sample_gauge(&mut self);
 
-    /// Result of the conversion, once done: [`Inputs::gauge_code`].
     fn gauge(&mut self) -> Option<u32>;
 
     fn coarse(&mut self) -> MotorInputs;
 
     fn lens(&mut self) -> MotorInputs;
 
-    /// Whether the emergency stop is or was open since the last call.
+    /// Whether the circuit is or was open since the last call.
     fn emergency_stop(&mut self) -> bool;
 
-    /// Whether the supply is too low for an orderly stop.
     fn supply_low(&mut self) -> bool;
 
-    /// [`Inputs::memory_failed`].
     fn memory_failed(&mut self) -> bool;
 
-    /// [`Inputs::exposure`], with stamps before `now`.
+    /// With stamps before `now`, like [`Self::strobe`].
     fn exposure(&mut self, now: BoardMicros) -> Option<ExposureEdges>;
 
-    /// [`Inputs::strobe`], with stamps before `now`.
     fn strobe(&mut self, now: BoardMicros) -> Option<StrobeEdges>;
 
     /// Applies the outputs in order of their fields, except the reset.
@@ -80,7 +64,6 @@ pub trait Board {
     /// Sends a frame, delimiters included ([`farnear_protocol::frame::Delimited`]); requires room.
     fn send(&mut self, bytes: &[u8]);
 
-    /// Whether the last bit has left.
     fn all_sent(&self) -> bool;
 
     fn set_link_rate(&mut self, rate: LinkRate);
@@ -88,7 +71,6 @@ pub trait Board {
     /// The next part of the log and its number.
     fn take_log(&mut self) -> Option<(u32, Log)>;
 
-    /// Writes to the log.
     fn note(&mut self, note: Note);
 
     fn feed_watchdog(&mut self);
@@ -96,19 +78,13 @@ pub trait Board {
     fn reset(&mut self);
 }
 
-/// State of the loop.
 #[derive(Debug)]
 pub struct Control<'r> {
     rig: &'r mut Rig,
-    /// A STEP queue underran, already noted.
     dry: bool,
-    /// Time at which a reset was ordered.
     reset_pending: Option<BoardMicros>,
-    /// Frames since the log's last turn.
     frames_before_log: u8,
-    /// The host's turn was deferred in the last tick.
     deferred: bool,
-    /// Ticks without activity.
     quiet_ticks: u32,
 }
 
@@ -187,8 +163,7 @@ impl<'r> Control<'r> {
         true
     }
 
-    /// Sends a part of the log; returns whether there was one. Early log waits for the first session, because
-    /// a connecting host drops older input.
+    /// Sends a part of the log, if any; not before the first session, because a connecting host drops older input.
     fn speak_log(&mut self, board: &mut impl Board) -> bool {
         if !self.rig.has_session() {
             return false;

@@ -1,10 +1,7 @@
-//! Depth correction over the link: rows in and out, and the fit of coefficients.
-//!
-//! One correction is open, one is stored. The mathematics is `farnear_maths::clsf`; here are coefficients, a
-//! row, and scratch memory for either a correction's table or a fit's sums.
-//!
-//! RAM: 15 KiB. Cost: 9,000 to 15,000 instructions for a row of 640 pixels, up to 160,000 more for the first
-//! row of a region, 730,000 for a solution. Therefore refused while a stepper moves.
+//! Depth correction over the link: rows in and out, and the fit of coefficients. One correction is open, one is stored.
+//! The mathematics is `farnear_maths::clsf`; this module has coefficients, a row, and scratch memory for a correction's
+//! table or a fit's sums. RAM: 15 KiB. Cost: 9,000 to 15,000 instructions for a row of 640 pixels, up to 160,000 more
+//! for the first row of a region, 730,000 for a solution. Therefore rejected while a stepper moves.
 
 use farnear_maths::clsf::{
     Blend, Coefficient, Columns, Error, FULL_TERMS, Frame, Full, FullFit, REGION_TERMS, REGIONS,
@@ -15,11 +12,10 @@ use farnear_protocol::message::{
 };
 
 pub const ROW_PIXELS_MAX: u16 = 1024;
-/// Coefficients of the largest form.
+/// Of the largest form.
 pub(crate) const COEFFICIENTS: usize = REGIONS * REGIONS * REGION_TERMS;
 const TABLE_WORDS: usize = Full::table_words(ROW_PIXELS_MAX);
 
-/// Form and coefficients of a correction.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub(crate) struct StoredCorrection {
     info: CorrectionInfo,
@@ -27,7 +23,6 @@ pub(crate) struct StoredCorrection {
 }
 
 impl StoredCorrection {
-    /// Restores a stored correction; `None` if invalid.
     pub(crate) fn restored(info: CorrectionInfo, bits: [i32; COEFFICIENTS]) -> Option<Self> {
         frame(&info).ok()?;
         Some(Self { info, bits })
@@ -37,7 +32,6 @@ impl StoredCorrection {
         &self.info
     }
 
-    /// Coefficients of the largest form.
     pub(crate) const fn bits(&self) -> &[i32; COEFFICIENTS] {
         &self.bits
     }
@@ -80,7 +74,6 @@ impl StoredCorrection {
     }
 }
 
-/// A frame whose rows fit the buffer.
 fn frame(info: &CorrectionInfo) -> Result<Frame, CorrectionFault> {
     match Frame::new(info.width, info.height) {
         Ok(frame) if info.width <= ROW_PIXELS_MAX => Ok(frame),
@@ -88,7 +81,6 @@ fn frame(info: &CorrectionInfo) -> Result<Frame, CorrectionFault> {
     }
 }
 
-/// Use of the scratch memory.
 #[derive(Clone, Debug)]
 #[expect(clippy::large_enum_variant, reason = "one place for all, there is no heap to put the large one on")]
 enum Scratch {
@@ -98,7 +90,6 @@ enum Scratch {
     FullFit(FullFit),
 }
 
-/// Open and stored correction.
 #[derive(Clone, Debug)]
 pub(crate) struct Correction {
     stored: Option<StoredCorrection>,
@@ -108,7 +99,7 @@ pub(crate) struct Correction {
 }
 
 impl Correction {
-    /// None open. Inlined, so that its 15 KiB are built in place.
+    /// Inlined, so that its 15 KiB are built in place.
     #[inline(always)]
     pub(crate) const fn new(stored: Option<StoredCorrection>) -> Self {
         Self { stored, open: None, row: [0; ROW_PIXELS_MAX as usize], scratch: Scratch::Empty }
@@ -128,7 +119,6 @@ impl Correction {
         Ok(())
     }
 
-    /// Opens the stored correction.
     pub(crate) fn load(&mut self) -> Result<CorrectionInfo, CorrectionFault> {
         let stored = self.stored.as_ref().ok_or(CorrectionFault::None)?;
         self.open = Some(stored.clone());
@@ -136,7 +126,7 @@ impl Correction {
         Ok(stored.info)
     }
 
-    /// Stores the open correction; the caller marks the record.
+    /// The caller marks the record.
     pub(crate) fn store(&mut self) -> Result<(), CorrectionFault> {
         self.stored = Some(self.open.clone().ok_or(CorrectionFault::None)?);
         Ok(())

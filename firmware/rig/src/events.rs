@@ -1,7 +1,5 @@
-//! Numbered events, sent once, the last ones stored for repetition.
-//!
-//! One ring serves `ReadEvent` and as transmit queue: an event overwritten before it was sent is skipped,
-//! which the host detects as a gap. RAM: about 1.5 KiB.
+//! Numbered events, sent once, the last ones stored for repetition. One ring serves `ReadEvent` and as transmit queue:
+//! an event overwritten before it was sent is skipped, which the host detects as a gap. RAM: about 1.5 KiB.
 
 use farnear_protocol::BoardMicros;
 use farnear_protocol::message::{Event, EventKind};
@@ -24,7 +22,6 @@ impl Events {
         self.next
     }
 
-    /// Oldest stored event.
     pub(crate) const fn oldest(&self) -> u32 {
         self.next.saturating_sub(RETAINED)
     }

@@ -1,48 +1,41 @@
 //! Control gains of the piezo, computed at compile time from physical numbers.
 //!
-//! The piezo with the sensor is a lightly damped second-order system. With position `p`, scaled velocity `w =
-//! v / omega`, both
-//! in nm, and the commanded free stroke `u`:
+//! The piezo with the sensor is a lightly damped second-order system. With position `p`, scaled velocity
+//! `w = v / omega`, both in nm, and the commanded free stroke `u`:
 //! ```text
 //! d/dt [p]   [   0          omega     ] [p]   [  0  ]
 //!      [w] = [-omega  -2 zeta omega   ] [w] + [omega] (u + d)
 //! ```
-//! `d` is the effect of hysteresis and creep. Sampled with a zero-order hold at the control tick (Franklin,
-//! Powell, Workman
-//! 1998, "Digital Control of Dynamic Systems", ch. 4) this gives
+//! `d` is the effect of hysteresis and creep. Sampled with a zero-order hold at the control tick (Franklin, Powell,
+//! Workman 1998, "Digital Control of Dynamic Systems", ch. 4) this gives
 //! - the input shaper: two zero-vibration stages (Singer and Seering 1990) on the tick grid, together a ZVD;
-//! - a current observer for `p`, `w`, `d` and the drift of `d` (ibid. section 8.2), which acts as integral
-//!   control: the
-//!   estimated disturbance is subtracted from the command;
+//! - a current observer for `p`, `w`, `d` and the drift of `d` (ibid. section 8.2), whose estimated disturbance is
+//!   subtracted from the command as integral control;
 //! - state feedback that damps the resonance; both by Ackermann's formula.
 //!
 //! Gains are integers in 2^-24. Nothing here runs on the board.
 
 use crate::matrix::{Matrix, add_scaled, apply, exponential, identity, product, solve};
 
-/// Fraction bits of a gain.
 pub(crate) const GAIN_BITS: u32 = 24;
 
-/// Physical numbers of the piezo.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct PiezoModel {
     /// First resonance with the sensor board mounted.
     pub resonance_hz: f64,
     pub damping: f64,
-    /// Control period.
     pub tick_s: f64,
     /// From the gauge sample to the DAC's effect; less than a tick.
     pub latency_s: f64,
-    /// Poles of the state feedback.
     pub feedback: Poles,
     /// Poles of the observer: two equal pairs.
     pub observer: Poles,
 }
 
-/// Factors of the piezo's control loop, in 2^-24.
+/// Controller gains in 2^-24.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Gains {
-    /// State transition per tick, by rows.
+    /// Per tick, by rows.
     pub(crate) transition: [[i32; 2]; 2],
     /// Effect of the command after the latency.
     pub(crate) input: [i32; 2],
@@ -55,17 +48,13 @@ pub struct Gains {
     pub(crate) shaper: ShaperGains,
 }
 
-/// A zero-vibration stage: `out[k] = now x[k] + early x[k - half] + late x[k - half - 1]`; the weights sum to
-/// 1.
+/// A zero-vibration stage: `out[k] = now x[k] + early x[k - half] + late x[k - half - 1]`; the weights sum to 1.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct ShaperGains {
     /// Whole ticks in half a resonance period.
     pub(crate) half: usize,
-    /// Weight of the present sample.
     pub(crate) now: i32,
-    /// Weight of the sample `half` ticks ago.
     pub(crate) early: i32,
-    /// Weight of the sample `half + 1` ticks ago.
     pub(crate) late: i32,
 }
 
@@ -143,9 +132,8 @@ const fn characteristic<const N: usize>(a: &Matrix<N>, poles: Poles, tick_s: f64
     add_scaled(&add_scaled(&product(a, a), a, -trace), &identity::<N>(), determinant)
 }
 
-/// Weights without residual vibration: `now + early M^-half + late M^-(half + 1) = 0` for the free motion `M`
-/// per tick, and `now + early + late = 1`. Each `M^-n` is `x + y F` (Cayley and Hamilton), which gives three
-/// linear equations.
+/// Weights without residual vibration: `now + early M^-half + late M^-(half + 1) = 0` for the free motion `M` per tick,
+/// and `now + early + late = 1`. Each `M^-n` is `x + y F` (Cayley and Hamilton), which gives three linear equations.
 const fn shaper(model: &PiezoModel) -> ShaperGains {
     let half = (0.5 / (model.resonance_hz * model.tick_s)) as usize;
     let motion = continuous(model.resonance_hz, model.damping);

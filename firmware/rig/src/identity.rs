@@ -2,7 +2,6 @@
 
 use farnear_protocol::message::ResetCause;
 
-/// Identity of binary and chip.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Identity {
     /// Board name, at most 24 bytes (truncated), e.g. `nucleo-f429zi`.
@@ -10,25 +9,20 @@ pub struct Identity {
     /// At most 24 bytes (truncated).
     pub firmware: &'static str,
     pub unique_id: [u8; 12],
-    /// Boot number by retained RAM, not 0: one more than the last [`crate::Rig::boot`], or 1 after a power
-    /// loss. A valid memory overrides it.
+    /// Boot number by retained RAM, from 1: one more than the last [`crate::Rig::boot`]. A valid memory overrides it.
     pub boot: u32,
-    /// Code that the piezo's DAC has kept over the reset; `None` where it is not known.
+    /// Code retained by the piezo's DAC over the reset, if known.
     pub piezo_code: Option<u16>,
     pub reset_cause: ResetCause,
     /// The external clock is missing or stopped in the last boot; the internal one is used.
     pub own_clock: bool,
-    /// Emulated board, by the strap.
     pub emulated: bool,
-    /// Cause written to retained RAM before a self-stop; given once.
+    /// Cause in retained RAM of a self-stop; given once.
     pub last_words: Option<LastWords>,
 }
 
-/// Why the firmware stopped itself in the last boot.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum LastWords {
-    /// Panic or hard fault.
     Panic,
-    /// The stack reached its guard.
     StackOverflow,
 }

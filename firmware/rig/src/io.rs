@@ -1,28 +1,19 @@
 //! Interface between behaviour and board: inputs and outputs per control tick.
 //!
-//! The board binary moves bytes and registers; all decisions are on this side. [`crate::control`] connects
-//! both: hardware to
-//! [`Inputs`], [`crate::Rig::tick`], [`Outputs`] to the hardware immediately.
-//!
-//! Inputs reflect the outputs of the previous tick: submitted segments count as queued, so
-//! [`StepperState::idle`] is false,
-//! and an abort has emptied the queue. Ticks that catch up may follow each other immediately; the piezo's
-//! loop skips those.
+//! The board binary moves bytes and registers; all decisions are on this side. [`crate::control`] connects both:
+//! hardware to [`Inputs`], [`crate::Rig::tick`], [`Outputs`] to the hardware immediately. Inputs reflect the outputs of
+//! the previous tick: submitted segments count as queued, so [`StepperState::idle`] is false, and an abort has emptied
+//! the queue. Ticks that catch up may follow each other immediately; the piezo's loop skips those.
 //!
 //! # Step pulses
-//! A [`Segment`] is a number of equally spaced pulses. An advanced timer plays one from its repetition
-//! counter (8 bit: 256
-//! pulses) while the next waits in the preload registers; one-pulse mode is on when none waits. Segments last
-//! at most
-//! [`SEGMENT_MAX_TICKS`] (1 ms), so clearing the queue stops the motor within a millisecond with an exact
-//! count.
+//! A [`Segment`] is a number of equally spaced pulses. An advanced timer plays one from its repetition counter (8 bit:
+//! 256 pulses) while the next waits in the preload registers; one-pulse mode is on when none waits. Segments last at
+//! most [`SEGMENT_MAX_TICKS`] (1 ms), so clearing the queue stops the motor within a millisecond with an exact count.
 //!
 //! # Memory
 //! At start the binary reads the first [`MEMORY_BYTES`] of the FRAM for [`crate::Rig::new`]; later it writes
-//! [`Outputs::memory`], at most [`MEMORY_CHUNK`] bytes per tick, before the next tick. The rig relies on
-//! this: the mark that
-//! an axis moves is stored before the first STEP pulse. The binary keeps [`crate::Rig::boot`] in retained
-//! RAM.
+//! [`Outputs::memory`], at most [`MEMORY_CHUNK`] bytes per tick, before the next tick. The rig relies on this: the mark
+//! that an axis moves is stored before the first STEP pulse. The binary keeps [`crate::Rig::boot`] in retained RAM.
 
 use farnear_protocol::message::{LightLevels, ShotLight};
 use farnear_protocol::{BoardMicros, Micros};
@@ -31,7 +22,7 @@ use heapless::Vec;
 /// Control rate. 5 kHz gives 25 samples per period of the piezo's 200 Hz resonance.
 pub const TICK_HZ: u32 = 5_000;
 pub const TICK_US: u32 = 1_000_000 / TICK_HZ;
-/// Ticks per executed tick at rest: 2 ms, in which the link receives less than half of a board's ring buffer.
+/// Ticks per executed tick at rest: 2 ms, in which the link fills less than half of a board's ring buffer.
 pub const REST_TICKS: u32 = 10;
 
 /// Step timer clock: 168 MHz / 4, so that 1 ms fits 16 bits and 40 kHz is exactly 1050 ticks.
@@ -45,15 +36,14 @@ pub const SEGMENTS_PER_TICK: usize = 4;
 /// Both encoders: 0.5 mm screw, 4000 counts per turn.
 pub const ENCODER_NM_PER_COUNT: i32 = 125;
 
-/// 16-bit DAC. Code 0 = 0 V.
+/// Code 0 = 0 V.
 pub const DAC_CODE_MAX: u16 = u16::MAX;
 /// Free stroke at [`DAC_CODE_MAX`]: 3.05 nm per code.
 pub const DAC_FULL_SCALE_NM: i32 = 200_000;
 
-/// 18-bit converter of the strain gauge.
 pub const GAUGE_CODE_MAX: u32 = (1 << 18) - 1;
-/// Gauge code at the relaxed piezo (0 nm); 1 nm per code. The range of -10.000 to +252.143 um includes the
-/// stroke and drift; codes 0 and [`GAUGE_CODE_MAX`] mean saturated or disconnected.
+/// Gauge code at the relaxed piezo (0 nm); 1 nm per code. The range of -10.000 to +252.143 um includes the stroke and
+/// drift; codes 0 and [`GAUGE_CODE_MAX`] mean saturated or disconnected.
 pub const GAUGE_CODE_ZERO: u32 = 10_000;
 
 /// Used bytes of the memory, from address 0.
@@ -61,56 +51,44 @@ pub const MEMORY_BYTES: usize = 8 * 1024;
 /// Largest write per tick: 30 us of SPI.
 pub const MEMORY_CHUNK: usize = 64;
 
-/// State of a step timer.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct StepperState {
-    /// STEP pulses since the reset, wrapping. Exact when `idle`; otherwise between finished segments and
-    /// emitted pulses.
+    /// STEP pulses since the reset, wrapping. Exact when `idle`, else up to the emitted pulses.
     pub pulses: u32,
-    /// No segment is active or queued.
     pub idle: bool,
-    /// Underrun after a segment without [`Segment::last`]. Cleared by [`MotorOutputs::abort_steps`].
+    /// Underrun without [`Segment::last`]; cleared by [`MotorOutputs::abort_steps`].
     pub underrun: bool,
-    /// Segments that can be submitted in this tick.
     pub room: u8,
 }
 
 impl StepperState {
-    /// No pulses, all room.
     pub const IDLE: Self = Self { pulses: 0, idle: true, underrun: false, room: u8::MAX };
 }
 
-/// Edges of an exposure, board time.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct ExposureEdges {
-    /// Rising edge of the trigger output.
+    /// Board time; rising edge of the trigger output.
     pub trigger: BoardMicros,
-    /// Rising edge of the exposure signal.
     pub strobe_start: BoardMicros,
     pub strobe_end: BoardMicros,
-    /// Start and end of the flash, where the order had one.
+    /// Start and end, board time.
     pub flash: Option<[BoardMicros; 2]>,
 }
 
-/// An exposure without trigger of the board.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct StrobeEdges {
-    /// Rising edge of the exposure signal.
+    /// Board time.
     pub start: BoardMicros,
     pub end: BoardMicros,
 }
 
-/// Inputs of a stepper axis.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct MotorInputs {
-    /// Encoder since the reset, [`ENCODER_NM_PER_COUNT`] each, extended beyond 16 bits; increases when sensor
-    /// and lens move apart.
+    /// Since the reset, [`ENCODER_NM_PER_COUNT`] each, beyond 16 bits; rises when sensor and lens move apart.
     pub encoder_counts: i32,
-    /// Closed.
+    /// True when closed, like `far_switch`.
     pub home_switch: bool,
-    /// Closed.
     pub far_switch: bool,
-    /// DIAG line of the driver.
     pub driver_fault: bool,
     pub stepper: StepperState,
 }
@@ -126,7 +104,6 @@ impl MotorInputs {
     };
 }
 
-/// Inputs of a control tick.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Inputs {
     pub now: BoardMicros,
@@ -136,11 +113,8 @@ pub struct Inputs {
     pub gauge_code: Option<u32>,
     /// Open circuit (pressed, or a broken wire). STEP outputs are already cut.
     pub emergency_stop: bool,
-    /// Supply too low for an orderly stop.
     pub supply_low: bool,
-    /// The memory did not confirm the last write.
     pub memory_failed: bool,
-    /// Link bytes were lost since the last tick.
     pub link_overflow: bool,
     /// Edges of the last ordered exposure, given once when complete.
     pub exposure: Option<ExposureEdges>,
@@ -171,25 +145,19 @@ impl Inputs {
 pub struct Segment {
     /// 1 to [`SEGMENT_MAX_PULSES`].
     pub pulses: u16,
-    /// STEP period in ticks of [`STEP_TIMER_HZ`]; the last pulse also has a full period, so that segments
-    /// join smoothly.
+    /// In ticks of [`STEP_TIMER_HZ`]; the last pulse also has a full period, so that segments join smoothly.
     pub period_ticks: u16,
-    /// The motor stops after this segment: an empty queue is not an underrun.
     pub last: bool,
 }
 
-/// Outputs for a stepper.
 #[derive(Clone, PartialEq, Eq, Debug, Default)]
 pub struct MotorOutputs {
-    /// Driver enabled (current in the coils).
     pub enable: bool,
-    /// DIR level: sensor and lens move apart. Changes only while idle, at least one tick before the first
-    /// segment.
+    /// DIR level: sensor and lens move apart. Changes only while idle, at least one tick before the first segment.
     pub direction_away: bool,
-    /// Clear the queue and stop with the running segment; clears [`StepperState::underrun`]. Never with new
-    /// `segments`. Also ordered before a resting motor starts.
+    /// Clear the queue and stop with the running segment; clears [`StepperState::underrun`]. Never with new `segments`.
+    /// Also ordered before a resting motor starts.
     pub abort_steps: bool,
-    /// New segments to append, at most [`StepperState::room`].
     pub segments: Vec<Segment, SEGMENTS_PER_TICK>,
 }
 
@@ -202,30 +170,24 @@ pub struct MemoryWrite {
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Trigger {
-    /// Rising edge, exact to the microsecond, at most a few ticks ahead; immediately if past.
     pub at: BoardMicros,
     pub length: Micros,
-    /// Flash within the pulse.
     pub flash: Option<ShotLight>,
 }
 
-/// Outputs of a control tick.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Outputs {
     /// `None`: unchanged.
     pub piezo_dac: Option<u16>,
     pub coarse: MotorOutputs,
     pub lens: MotorOutputs,
-    /// Report each untriggered exposure that begins from now on as [`Inputs::strobe`]. Never with `trigger`
-    /// or a pending triggered exposure.
+    /// Report each untriggered exposure that begins from now on as [`Inputs::strobe`]. Never with a triggered one.
     pub listen: bool,
     /// Brightness of the light outputs, except during a flash.
     pub lights: LightLevels,
     /// End the flash that is in progress or ordered, now.
     pub cancel_flash: bool,
-    /// Give a trigger pulse and capture its edges.
     pub trigger: Option<Trigger>,
     pub memory: Option<MemoryWrite>,
-    /// Reset the microcontroller; answers have left.
     pub reset: bool,
 }

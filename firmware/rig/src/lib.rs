@@ -1,10 +1,8 @@
 //! # farnear-rig
 //!
-//! Behaviour of the board without its hardware: `no_std`, no allocator, time as an argument, so all of it is
-//! tested on the
-//! host. [`Rig`] is the whole; [`io`] its interface to the hardware, [`control`] the loop that transfers
-//! inputs, outputs and
-//! bytes 5000 times a second. A board implements only [`control::Board`].
+//! Behaviour of the board without its hardware: `no_std`, no allocator, time as an argument, so all of it is tested on
+//! the host. [`Rig`] is the whole; [`io`] its interface to the hardware, [`control`] the loop that transfers inputs,
+//! outputs and bytes 5000 times a second. A board implements only [`control::Board`].
 //!
 //! ```text
 //! control    a board's loop: read, decide, apply, send, feed the watchdog
@@ -29,21 +27,15 @@
 //!       '- shaper, gains, matrix    gains from physical numbers at compile time
 //! ```
 //!
-//! Goals: no input can cause a panic or exceed the limits; a position is valid only while steps and encoder
-//! agree; long work
-//! ends with exactly one terminal event; causes of a stop are named, latched and survive a power loss. Not a
-//! goal: link speed,
-//! as images do not use it.
+//! Goals: no input can cause a panic or exceed the limits; a position is valid only while steps and encoder agree; long
+//! work ends with exactly one terminal event; causes of a stop are named, latched and survive a power loss. Not a goal:
+//! link speed.
 //!
-//! Cost in instructions, counted on the emulated board: a tick 1,600 at rest, 2,900 with the piezo's loop
-//! closed, at most
-//! 7,100 with both steppers in their ramps, of 33,600 per tick at 168 MHz; the last byte of a move request
-//! 9,900, the start
-//! 46,000. Mathematics may exceed a tick (a row of 640 pixels 15,000, a fit 731,000) and is refused during
-//! motion. RAM: 25
-//! KiB, 12 of them scratch memory for depth correction. Stack: 10 KiB for a request, 19 KiB for the start.
-//! Ramps and shadow
-//! use single precision, only the fit double.
+//! Cost in instructions, counted on the emulated board, of 33,600 per tick at 168 MHz: a tick 1,600 at rest, 2,900 with
+//! the piezo's loop closed, at most 7,100 with both steppers in their ramps; the last byte of a move request 9,900, the
+//! start 46,000. Mathematics may exceed a tick (a row of 640 pixels 15,000, a fit 731,000) and is rejected during
+//! motion. RAM: 25 KiB, 12 of them scratch memory for depth correction. Stack: 10 KiB for a request, 19 KiB for the
+//! start. Ramps and shadow use single precision, only the fit double.
 #![no_std]
 
 #[cfg(test)]

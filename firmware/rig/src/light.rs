@@ -1,4 +1,4 @@
-//! Lamp, flash and projector: how bright both outputs are, and when they go off without a request.
+//! Lamp, flash and projector: brightness, and switch-off without requests.
 
 use farnear_protocol::message::{LIGHT_TIME_MAX, LightFault, LightLevels, Shot, ShotLight, TriggerMode};
 use farnear_protocol::{BoardMicros, Micros};
@@ -8,7 +8,6 @@ use crate::motion::since;
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Lights {
     levels: LightLevels,
-    /// When the levels were requested, and how long they may last.
     set: BoardMicros,
     time: Micros,
     silence: Micros,
@@ -21,7 +20,7 @@ impl Lights {
         Self { levels: LightLevels::OFF, set: BoardMicros(0), time, silence, cancel_flash: false }
     }
 
-    /// Switches the outputs. The caller has checked `silence`.
+    /// The caller has checked `silence`.
     pub(crate) fn set(
         &mut self,
         levels: LightLevels,
@@ -38,7 +37,7 @@ impl Lights {
         Ok(())
     }
 
-    /// Switches both off and cancels a flash.
+    /// Also cancels a flash.
     pub(crate) const fn off(&mut self) {
         (self.levels, self.cancel_flash) = (LightLevels::OFF, true);
     }
@@ -59,7 +58,6 @@ impl Lights {
     }
 }
 
-/// Whether a shot can have this flash.
 pub(crate) fn check(light: &ShotLight, shot: &Shot) -> Result<(), LightFault> {
     if !light.levels.is_valid() {
         Err(LightFault::Level)

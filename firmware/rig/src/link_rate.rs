@@ -1,6 +1,4 @@
-//! Link rate changes with fallback.
-//!
-//! The answer leaves at the old rate. The new one is then on trial: the first valid request confirms it;
+//! Link rate changes with fallback. The answer leaves at the old rate. The first valid request confirms the new one;
 //! without one within [`LINK_TRIAL`] the old rate returns.
 
 use farnear_protocol::message::{LINK_TRIAL, LinkRate};
@@ -14,7 +12,6 @@ const ANSWER_LEAVES: Micros = Micros(20_000);
 #[derive(Clone, Copy, Debug)]
 enum Change {
     None,
-    /// Requested; the answer leaves first.
     Asked {
         to: LinkRate,
         at: BoardMicros,
@@ -38,7 +35,6 @@ impl LinkSpeed {
         Self { now: LinkRate::START, change: Change::None }
     }
 
-    /// No change is pending.
     pub(crate) const fn is_settled(&self) -> bool {
         matches!(self.change, Change::None)
     }
@@ -48,8 +44,7 @@ impl LinkSpeed {
         self.change = if to == self.now { Change::None } else { Change::Asked { to, at } };
     }
 
-    /// The new rate, when it changes. `said`: nothing sent at the old one is in transit; `requests`: valid
-    /// ones so far.
+    /// The new rate, when it changes. `said`: nothing is in transit at the old one; `requests`: valid ones so far.
     pub(crate) fn due(
         &mut self,
         now: BoardMicros,
@@ -81,7 +76,6 @@ mod tests {
         BoardMicros(u64::from(micros))
     }
 
-    /// A link changed to the slow rate at 1 ms, after three requests.
     fn changed() -> LinkSpeed {
         let mut speed = LinkSpeed::new();
         speed.ask(SLOW, at(0));

@@ -1,7 +1,5 @@
-//! Small square f64 matrices in `const` functions, for the gain design at compile time; no floating point
-//! reaches the board. A product or solution costs n^3 multiplications.
+//! Small square f64 matrices in `const` functions for the gain design; no floating point reaches the board.
 
-/// Square matrix by rows.
 pub(crate) type Matrix<const N: usize> = [[f64; N]; N];
 
 pub(crate) const fn identity<const N: usize>() -> Matrix<N> {
@@ -62,7 +60,7 @@ pub(crate) const fn exponential<const N: usize>(a: &Matrix<N>) -> Matrix<N> {
     sum
 }
 
-/// Solves `a x = b` by Gaussian elimination with pivoting. `a` must be regular.
+/// Solves `a x = b`, `a` regular, by Gaussian elimination with pivoting.
 pub(crate) const fn solve<const N: usize>(a: &Matrix<N>, b: &[f64; N]) -> [f64; N] {
     let (mut a, mut x) = (*a, *b);
     let mut column = 0;

@@ -1,7 +1,5 @@
-//! Non-volatile records in two copies each.
-//!
-//! [`record`]: addresses, format, and selection of the valid copy; [`store`]: writes a few bytes per tick,
-//! always over the older copy; [`contents`]: conversion of values to blocks.
+//! Non-volatile records in two copies each: format ([`record`]), incremental writes over the older copy ([`store`]),
+//! conversion of values to blocks ([`contents`]).
 
 pub(crate) mod contents;
 pub(crate) mod record;

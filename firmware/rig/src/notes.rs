@@ -1,7 +1,5 @@
-//! Entries of the board's log: changes, refusals, alarms.
-//!
-//! The host gets all of it by answers, events and status; the log is for later analysis, or times without a
-//! host.
+//! Entries of the board's log: changes, rejections, alarms. The host gets all of it by answers, events and status; the
+//! log is for later analysis and times without a host.
 
 use farnear_protocol::BoardMicros;
 use farnear_protocol::message::{AlarmRecord, Axis, LinkRate, PositionState, RequestError};
@@ -13,11 +11,10 @@ const WAITING: usize = 8;
 #[derive(Clone, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Note {
-    /// A STEP queue underran; noted once until it recovers.
+    /// Noted once until it recovers.
     StepQueueDry {
         time: BoardMicros,
     },
-    /// The host requested a reset.
     Reset,
     Alarm(AlarmRecord),
     AlarmCleared {
@@ -27,7 +24,6 @@ pub enum Note {
         request: u32,
         error: RequestError,
     },
-    /// An axis' position state changed.
     Position {
         axis: Axis,
         state: PositionState,
@@ -41,12 +37,10 @@ pub enum Note {
 #[derive(Clone, Debug)]
 pub(crate) struct Notes {
     waiting: Deque<Note, WAITING>,
-    /// Last known position states.
     states: [PositionState; Axis::ALL.len()],
 }
 
 impl Notes {
-    /// After a reset.
     pub(crate) const fn new() -> Self {
         // The piezo's gauge is absolute.
         let states = [PositionState::Unknown, PositionState::Homed, PositionState::Unknown];
@@ -57,7 +51,6 @@ impl Notes {
         let _ = self.waiting.push_back(note); // without room it is left out
     }
 
-    /// Notes changed position states.
     pub(crate) fn look(&mut self, state: impl Fn(Axis) -> PositionState) {
         for (axis, known) in Axis::ALL.into_iter().zip(&mut self.states) {
             let state = state(axis);

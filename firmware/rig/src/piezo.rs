@@ -1,22 +1,19 @@
 //! The fine axis: piezo, strain gauge and control loop.
 //!
-//! Each tick the gauge corrects an observer of position, velocity and disturbance. The command is the shaped
-//! set-point minus the estimated disturbance (hysteresis, creep, gauge offset: integral action) minus state
-//! feedback on the deviation from the undisturbed model, which damps residual vibration. Equations:
-//! [`crate::gains`].
+//! Each tick the gauge corrects an observer of position, velocity and disturbance. The command is the shaped set-point
+//! minus the estimated disturbance (hysteresis, creep, gauge offset: integral action) minus state feedback on the
+//! deviation from the undisturbed model, which damps residual vibration. Equations: [`crate::gains`]. Calibrated
+//! hysteresis and creep are subtracted in advance ([`model`]); the observer learns the rest.
 //!
-//! Calibrated hysteresis and creep are subtracted in advance ([`model`]); the observer learns the rest.
+//! Until its first move the piezo stays relaxed (code 0) with the loop open. The DAC keeps its code over a reset, so
+//! the piezo may be anywhere. Retained memory has the code, 0 after power-on; without it nothing is output until the
+//! gauge has given the position. Then the piezo is lowered smoothly, because a stack released suddenly swings into
+//! tension. If the gauge fails or the piezo does not follow, the command is held and the loop opens until the next
+//! move, before a loop that excites an unknown flexure mode can damage the stack.
 //!
-//! Until its first move the piezo stays relaxed (code 0) with the loop open. The DAC keeps its code over a
-//! reset, so the piezo may be anywhere. Retained memory has the code, 0 after power-on; without it nothing is
-//! output until the gauge has given the position. Then the piezo is lowered smoothly, because a stack released at once swings
-//! into tension. If the gauge fails or the piezo does not follow, the command is held and the loop opens until
-//! the next move. A loop that excites an unknown mode of the flexure is thus opened before the stack is torn apart.
-//!
-//! A piezo at its target for a second is idle: only creep moves it, so rare ticks suffice. The resonance
-//! model assumes control ticks, so after a rest the gauge corrects only disturbance and drift, slowly.
-//!
-//! Fixed point: nm in 2^-10, gains in 2^-24, sums in i64, saturating. Cost: about 35 multiplications a tick.
+//! A piezo at its target for a second is idle: only creep moves it, so rare ticks suffice. The resonance model assumes
+//! control ticks, so after a rest the gauge corrects only disturbance and drift, slowly. Fixed point: nm in 2^-10,
+//! gains in 2^-24, sums in i64, saturating. Cost: about 35 multiplications a tick.
 
 mod model;
 mod trend;
@@ -32,8 +29,8 @@ use crate::shaper::Shaper;
 
 /// At rest within this distance of the target ...
 const AT_REST: Nanometres = Nanometres(100);
-/// ... and within this swing about the recent middle: half the stated error minus the gauge's noise, because
-/// a reported position may have swung to the other side when it arrives.
+/// ... and within this swing about the recent middle: half the stated error minus the gauge's noise, because a reported
+/// position may have swung to the other side when it arrives.
 const SWING: i32 = 45 << BITS;
 /// Averaging ticks of the middle, as a shift: two thirds of a resonance period, of which a quarter remains.
 const MIDDLE_SHIFT: u32 = 4;
@@ -41,13 +38,12 @@ const MIDDLE_SHIFT: u32 = 4;
 const NEAR_TICKS: u16 = 25;
 /// Ticks near the target until idle.
 const IDLE_TICKS: u16 = TICK_HZ as u16;
-/// Shares, as shifts, of the error after a rest that go to disturbance and drift: critically damped, time
-/// constant 64 rests (0.13 s). At a resonance with Q = 30 the loop gain is a half.
+/// Shares, as shifts, of the error after a rest that go to disturbance and drift: critically damped, time constant 64
+/// rests (0.13 s). At a resonance with Q = 30 the loop gain is a half.
 const EASE_DISTURBANCE: u32 = 5;
 const EASE_DRIFT: u32 = 15;
-/// Mean innovation beyond which the piezo does not follow. The fast loop stays below 2 um, also with a
-/// resonance 25 % off, the gentle one below 11 um. A loop that excites a mode with a share of 2 % reaches 18
-/// um within 0.1 s, with 5 % 60.
+/// Mean innovation beyond which the piezo does not follow. The fast loop stays below 2 um, also 25 % off resonance, the
+/// gentle one below 11 um. Exciting a mode with a share of 2 % reaches 18 um within 0.1 s, with 5 % 60.
 const INNOVATION_LIMIT: i32 = 15_000 << BITS;
 /// Averaging ticks of the innovation, as a shift: 3 ms.
 const INNOVATION_SHIFT: u32 = 4;
@@ -66,14 +62,11 @@ type State = [i32; 4];
 #[derive(Clone, Debug)]
 struct Loop {
     shaper: Shaper,
-    /// Undisturbed model: position and scaled velocity.
     model: [i32; 2],
     /// Prediction for this tick, corrected by the gauge.
     state: State,
-    /// Shaped set-point of the last tick.
     reference_before: i32,
     trend: Trend,
-    /// Running mean of the absolute innovation.
     innovation: i32,
 }
 
@@ -92,7 +85,6 @@ impl Loop {
     }
 }
 
-/// Relaxation after a start.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Start {
     /// The gauge has not given the position.
@@ -109,9 +101,7 @@ pub(crate) struct Piezo {
     scale: Scale,
     gauge: GaugeScale,
     start: Start,
-    /// Code that the DAC has kept over the reset.
     kept_code: Option<u16>,
-    /// Calibrated hysteresis and creep.
     lag: Lag,
     control: Option<Loop>,
     /// A move was ordered: close the loop at the next valid reading.
@@ -123,11 +113,8 @@ pub(crate) struct Piezo {
     measured: Nanometres,
     gauge_missing_ticks: u32,
     failed: bool,
-    /// Open-loop sweep with gauge readings.
     driven: bool,
-    /// Ticks near the target.
     near_ticks: u16,
-    /// Last ticks of these with little swing.
     still_ticks: u16,
     /// Middle of the swing, nm in 2^-10.
     middle: i32,
@@ -160,12 +147,11 @@ impl Piezo {
         }
     }
 
-    /// The DAC has kept this code over the reset.
     pub(crate) const fn start_at(&mut self, code: Option<u16>) {
         self.kept_code = code;
     }
 
-    /// Sets the interval to the next control tick, in ticks.
+    /// Interval to the next control tick, in ticks.
     pub(crate) const fn after(&mut self, ticks: u32) {
         self.passed = ticks;
     }
@@ -190,7 +176,6 @@ impl Piezo {
         (self.played() == Some(0)).then_some(Nanometres(0))
     }
 
-    /// Last target.
     pub(crate) const fn target(&self) -> Nanometres {
         self.target
     }
@@ -199,7 +184,6 @@ impl Piezo {
         self.gauge_missing_ticks == 0
     }
 
-    /// Nothing may move.
     pub(crate) const fn apply(&mut self, settings: FineSettings) {
         self.settings = settings;
         self.scale = Scale::new(settings.gain_pm_per_code);
@@ -207,7 +191,6 @@ impl Piezo {
         self.lag = self.lag.with(settings.hysteresis_ppm, settings.creep_ppm_per_decade);
     }
 
-    /// Lowest position of the current move.
     pub(crate) fn lowest(&self) -> Nanometres {
         if self.control.is_some() || self.closing { self.measured.min(self.target) } else { self.measured }
     }
@@ -228,14 +211,12 @@ impl Piezo {
         !self.closing && self.control.as_ref().is_none_or(|control| control.shaper.arrived(shaper))
     }
 
-    /// The set-point moves, the loop has not settled, or it is being lowered after a start.
     pub(crate) fn is_moving(&self) -> bool {
         !self.arrived()
             || self.control.is_some() && self.still_ticks < NEAR_TICKS
             || self.start != Start::Over
     }
 
-    /// Closes the loop if necessary.
     pub(crate) const fn go(&mut self, target: Nanometres) {
         self.target = target;
         self.closing = self.control.is_none();
@@ -275,7 +256,6 @@ impl Piezo {
         (self.closing, self.start) = (false, Start::Over);
     }
 
-    /// Holds the measured position.
     pub(crate) fn hold(&mut self) {
         (self.closing, self.driven) = (false, false);
         if self.control.is_some() && !self.arrived() {
@@ -283,7 +263,6 @@ impl Piezo {
         }
     }
 
-    /// Reads the gauge and corrects the observer.
     pub(crate) fn sense(&mut self, gauge_code: Option<u32>) {
         let Some(code) = gauge_code.filter(|code| (1..GAUGE_CODE_MAX).contains(code)) else {
             self.gauge_missing_ticks = self.gauge_missing_ticks.saturating_add(1);
@@ -329,7 +308,6 @@ impl Piezo {
         }
     }
 
-    /// First valid reading after a start.
     fn begin_to_relax(&mut self) {
         // A gauge that is off, or whose front end is dead, would make the DAC jump by as much.
         let (from, command) = match self.kept_code {
@@ -343,7 +321,6 @@ impl Piezo {
         };
     }
 
-    /// Lowers it with smooth ends.
     fn relax(&mut self) {
         let Start::Down { from, ticks } = &mut self.start else { return };
         *ticks += 1;

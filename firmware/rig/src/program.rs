@@ -1,11 +1,9 @@
 //! Exposure program of up to 64 shots, and its execution.
 //!
-//! Each shot: move, settle, expose, wait for the strobe, report; `repeat` exposures per position. The next
-//! move starts at the end of the exposure and overlaps read-out; the next exposure waits for the camera. At
-//! the trigger the position has been settled for the whole dwell, however long the camera took.
-//!
-//! A pause waits for the current exposure; a resumed program settles again. A continuous run cycles through
-//! the shots with a period, or as fast as possible, until stopped.
+//! Each shot: move, settle, expose, wait for the strobe, report; `repeat` exposures per position. The next move starts
+//! at the end of the exposure and overlaps read-out; the next exposure waits for the camera. At the trigger the
+//! position has been settled for the whole dwell, however long the camera took. A pause waits for the current exposure;
+//! a resumed program settles again. A continuous run repeats the shots with a period or as fast as possible.
 
 pub(crate) mod pace;
 
@@ -24,11 +22,10 @@ use crate::settings::{SETTLE_DWELL_MAX, SETTLE_WINDOW_MAX, Settings};
 
 pub const SHOTS_MAX: usize = 64;
 
-/// Loaded shots, and number of armed ones.
 #[derive(Clone, Debug)]
 pub(crate) struct Shots {
     shots: [Option<Shot>; SHOTS_MAX],
-    /// Flashes of the shots; not kept without power.
+    /// Not kept without power.
     lights: [Option<ShotLight>; SHOTS_MAX],
     armed: u8,
 }
@@ -38,7 +35,7 @@ impl Shots {
         Self { shots: [None; SHOTS_MAX], lights: [None; SHOTS_MAX], armed: 0 }
     }
 
-    /// Loads a shot; the caller checks the axis' limits.
+    /// The caller checks the axis' limits.
     pub(crate) fn load(&mut self, index: u8, shot: Shot, settings: &Settings) -> Result<(), ShotFault> {
         let place = self.shots.get_mut(usize::from(index)).ok_or(ShotFault::Index)?;
         let camera = &settings.camera;
@@ -59,7 +56,7 @@ impl Shots {
         Ok(())
     }
 
-    /// Restores a stored shot; one that the settings no longer permit is dropped.
+    /// A stored shot that the settings no longer permit is dropped.
     pub(crate) fn restore(&mut self, index: usize, shot: Shot, settings: &Settings) {
         let (min, max) = settings.limits(shot.axis);
         if (min..=max).contains(&shot.target) {
@@ -67,17 +64,16 @@ impl Shots {
         }
     }
 
-    /// Arms the first `shots`, which were checked; 0 disarms.
+    /// Arms the first `shots`, already checked; 0 disarms.
     pub(crate) const fn arm(&mut self, shots: u8) {
         self.armed = shots;
     }
 
-    /// 0 = none.
     pub(crate) const fn armed(&self) -> u8 {
         self.armed
     }
 
-    /// Gives a shot a flash, or none; the caller has checked it.
+    /// The caller has checked it.
     pub(crate) fn set_light(&mut self, index: u8, light: Option<ShotLight>) {
         if let Some(place) = self.lights.get_mut(usize::from(index)) {
             *place = light;
@@ -93,7 +89,6 @@ impl Shots {
     }
 }
 
-/// Axis positions at an exposure.
 #[derive(Clone, Copy, Debug)]
 struct Places {
     coarse: Nanometres,
@@ -111,7 +106,6 @@ enum Phase {
     Paused,
 }
 
-/// A flash as it was.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Flash {
     pub(crate) trigger_number: u32,
@@ -125,7 +119,7 @@ pub(crate) struct Run {
     index: u8,
     shot: Shot,
     light: Option<ShotLight>,
-    /// Flash of the exposure that was just taken.
+    /// Of the latest exposure.
     flash: Option<Flash>,
     repeat: u16,
     exposures: u16,
@@ -139,33 +133,29 @@ pub(crate) struct Run {
     resuming: bool,
 }
 
-/// Result of a program's tick.
 #[derive(Debug)]
 pub(crate) enum Progress {
     On,
-    /// Settled; the host triggers this exposure number.
     Ready {
         number: u32,
     },
     Paused,
-    /// Exposure complete; total number if it was the last.
+    /// Total number if it was the last.
     Taken {
         shot: ShotRecord,
         end: Option<u16>,
     },
-    /// Exposure of a continuous run complete; totals if it was the last.
     Frame {
         frame: u32,
         deviation: Nanometres,
         shot: ShotRecord,
         end: Option<(u32, u32)>,
     },
-    /// A period without exposure.
     Dropped {
         frame: u32,
         reason: DropReason,
     },
-    /// Failed; whether by the axis.
+    /// The axis, if it failed.
     Failed {
         axis: Option<Axis>,
         reason: Failure,
@@ -198,7 +188,7 @@ impl Run {
         }
     }
 
-    /// Flash of the exposure that was just taken; given once.
+    /// Flash of the latest exposure; given once.
     pub(crate) const fn take_flash(&mut self) -> Option<Flash> {
         self.flash.take()
     }
@@ -209,17 +199,14 @@ impl Run {
         ProgramStatus { state, shots: self.shots, index: self.index, exposures: self.exposures }
     }
 
-    /// Current shot and its repeat.
     pub(crate) const fn shot(&self) -> (u8, u16, &Shot) {
         (self.index, self.repeat, &self.shot)
     }
 
-    /// Pauses after the current exposure.
     pub(crate) const fn pause(&mut self) {
         (self.pausing, self.resuming) = (true, false);
     }
 
-    /// Paused or about to be.
     pub(crate) const fn is_pausing(&self) -> bool {
         self.pausing && !self.resuming
     }

@@ -9,7 +9,6 @@ use crate::rig::Rig;
 use crate::work::{AxisWork, WholeWork};
 
 impl Rig {
-    /// Advances all work by a tick.
     pub(crate) fn advance(&mut self, now: BoardMicros) {
         for axis in Axis::ALL {
             self.advance_axis(axis, now);
@@ -95,7 +94,6 @@ impl Rig {
         }
     }
 
-    /// Advances a program; returns its end or failure.
     fn advance_program(
         &mut self,
         run: &mut Run,

@@ -94,7 +94,6 @@ impl Rig {
     }
 }
 
-/// Truncates a text to its capacity.
 fn cut<const N: usize>(text: &str) -> String<N> {
     let mut out = String::new();
     for character in text.chars() {

@@ -1,6 +1,4 @@
-//! Requests: checks and start.
-//!
-//! [`Rig::carry_out`] names every request without a wildcard, so that a new request must be handled here.
+//! Requests: checks and start. [`Rig::carry_out`] has no wildcard, so that a new request must be handled.
 
 mod checks;
 mod exposures;
@@ -22,7 +20,6 @@ use crate::sun_query;
 type Answer = Result<Response, RequestError>;
 
 impl Rig {
-    /// Executes or starts a request.
     pub(crate) fn carry_out(&mut self, incoming: &Incoming, now: BoardMicros) -> Answer {
         let id = incoming.id;
         match &incoming.request {
@@ -100,7 +97,7 @@ impl Rig {
         Response::Accepted
     }
 
-    /// Depth correction, refused during motion: it may exceed a tick.
+    /// Rejected during motion, because it may exceed a tick.
     fn correction(&mut self) -> Result<&mut Correction, RequestError> {
         self.must_stand()?;
         Ok(&mut self.correction)
@@ -115,12 +112,10 @@ impl Rig {
     }
 }
 
-/// Answer with a result.
 fn answer<T>(found: Result<T, CorrectionFault>, response: impl FnOnce(T) -> Response) -> Answer {
     found.map(response).map_err(RequestError::Correction)
 }
 
-/// Answer without a result.
 fn accepted(done: Result<(), CorrectionFault>) -> Answer {
     answer(done, |()| Response::Accepted)
 }

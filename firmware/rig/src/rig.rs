@@ -26,7 +26,6 @@ use crate::settings::{Settings, Values};
 use crate::silence::{Silence, Verdict};
 use crate::work::Works;
 
-/// A requested reboot.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Reboot {
     pub(crate) request: u32,
@@ -35,12 +34,11 @@ pub(crate) struct Reboot {
     pub(crate) quiet_since: Option<BoardMicros>,
 }
 
-/// Behaviour of the board without its hardware.
 #[derive(Clone, Debug)]
 pub struct Rig {
     pub(crate) identity: Identity,
     pub(crate) boot: u32,
-    /// Settings of the parts, values by key, and all numbers combined.
+    /// Settings of the parts, values by key, and both combined.
     pub(crate) parts: Settings,
     pub(crate) values: Values,
     pub(crate) settings: Settings,
@@ -65,14 +63,11 @@ pub struct Rig {
     in_motion_stored: u8,
     pub(crate) emergency_stop: bool,
     pub(crate) supply_low: bool,
-    /// Memory was written in the last tick.
     wrote: bool,
-    /// A rest followed the last tick.
     rested: bool,
     untold: Option<Untold>,
 }
 
-/// Reports pending from the start.
 #[derive(Clone, Copy, Debug)]
 struct Untold {
     found: Option<[Found; RECORDS]>,
@@ -83,13 +78,11 @@ struct Untold {
 const _: () = assert!(size_of::<Rig>() <= 36 * 1024);
 
 impl Rig {
-    /// The rig of `docs/rig.md` after a reset at `now`: 25 KiB, for static memory. `memory` is the FRAM's
-    /// contents, if it answers.
+    /// The rig of `docs/rig.md` after a reset at `now`: 25 KiB, for static memory. `memory` is the FRAM, if it answers.
     pub fn new(identity: Identity, memory: Option<&[u8; MEMORY_BYTES]>, now: BoardMicros) -> Self {
         Self::with_parts(identity, Settings::DEFAULT, memory, now)
     }
 
-    /// A rig with other parts.
     pub fn with_parts(
         identity: Identity,
         parts: Settings,
@@ -138,8 +131,7 @@ impl Rig {
         }
     }
 
-    /// Writes that a board must do before it sends or receives; call until `None`. Otherwise a power loss
-    /// after the boot number was reported, but not stored, would repeat it.
+    /// Writes before sending or receiving, until `None`: a power loss could repeat a reported boot number.
     pub fn keep_boot(&mut self) -> Option<MemoryWrite> {
         if !self.store.is_marked(RecordName::Counters) {
             return None;
@@ -176,7 +168,6 @@ impl Rig {
         self.tell_of_last_boot(in_motion, now);
     }
 
-    /// Reports a damaged record.
     fn tell_of_record(&mut self, record: RecordName, found: Found, now: BoardMicros) {
         match found {
             Found::Good { sequence, repaired: true, .. } => {
@@ -218,7 +209,6 @@ impl Rig {
         &self.identity
     }
 
-    /// A loaded shot, for tests and tools.
     pub fn shot(&self, index: u8) -> Option<&farnear_protocol::message::Shot> {
         self.shots.get(index)
     }
@@ -227,7 +217,7 @@ impl Rig {
         self.boot
     }
 
-    /// Accepts a byte from the link. Complete requests wait for [`Self::serve`].
+    /// Accepts a byte; complete requests wait for [`Self::serve`].
     pub fn receive(&mut self, byte: u8) {
         self.session.receive(byte);
     }
@@ -237,19 +227,17 @@ impl Rig {
         self.session.has_work()
     }
 
-    /// A stop request waits for [`Self::serve`].
     pub(crate) fn stop_waits(&self) -> bool {
         self.session.stop_waits()
     }
 
-    /// Frames completed, valid or not; wraps.
+    /// Valid or not; wraps.
     pub(crate) const fn frames_received(&self) -> u32 {
         let link = self.session.counters();
         link.frames.wrapping_add(link.bad_frames)
     }
 
-    /// One step for the host per tick: encodes an answer for [`Self::transmit`], or executes the next
-    /// request. `false` without one.
+    /// A step for the host: encodes an answer for [`Self::transmit`], or executes a request. `false` if idle.
     pub fn serve(&mut self, now: BoardMicros) -> bool {
         if self.session.has_answer() {
             self.session.put_answer();
@@ -330,8 +318,7 @@ impl Rig {
         outputs
     }
 
-    /// Whether the next tick may follow after [`crate::io::REST_TICKS`]: nothing is active or pending, and
-    /// all inputs are steady.
+    /// Whether the next tick may follow after [`crate::io::REST_TICKS`]: nothing is active, and all inputs are steady.
     pub(crate) fn rest(&mut self) -> bool {
         let said = self.session.all_sent() && self.events.all_sent() && self.link_speed.is_settled();
         let idle = self.works.any().is_none() && self.reboot.is_none() && self.camera.is_idle();
@@ -340,7 +327,6 @@ impl Rig {
         self.rested
     }
 
-    /// Checks the board's inputs for alarms.
     fn watch_inputs(&mut self, inputs: &Inputs) {
         let now = inputs.now;
         if inputs.emergency_stop {
@@ -357,7 +343,6 @@ impl Rig {
         }
     }
 
-    /// Checks axes and host for alarms.
     fn watch(&mut self, now: BoardMicros) {
         for axis in Axis::ALL {
             let fault = self.stage.stepper_mut(axis).and_then(|stepper| stepper.take_fault());
@@ -418,7 +403,6 @@ impl Rig {
         }
     }
 
-    /// The next memory write.
     fn write(&mut self) -> Option<MemoryWrite> {
         // A tick has time for a write or the host, in turns; with a sinking supply only the write counts.
         let said = self.session.all_sent() && self.events.all_sent();
@@ -444,7 +428,6 @@ impl Rig {
         Some(write)
     }
 
-    /// Lifetime counters.
     pub(crate) fn counters(&self) -> Counters {
         let base = &self.counters;
         Counters {

@@ -1,16 +1,13 @@
 //! Link session: bytes to requests, answers to frames.
 //!
-//! A request acts once. Ids increase over the boot (`ids`); the last [`REMEMBERED`] requests are stored with
-//! their answers. An equal repeat is answered from memory, another request with the same id and older ids are
-//! refused. A request names its session; other than the open one is refused, so only the latest host is
-//! served. Hello belongs to none and changes nothing.
+//! A request acts once. Ids increase over the boot (`ids`); the last [`REMEMBERED`] requests are stored with their
+//! answers. An equal repeat is answered from memory; another request with the same id and older ids are rejected. A
+//! request names its session; only the open one is accepted, so only the latest host is served. Hello belongs to none
+//! and changes nothing. Steps, one per tick: a frame arrives; it is checked and executed; its answer is encoded; that
+//! is sent.
 //!
-//! Steps, one per tick: a frame arrives; it is checked and executed; its answer is encoded; that is sent.
-//!
-//! Answers have their own queue, so bursts of events cannot displace them. With the promised number of frames
-//! and answers pending, requests are refused with `QueueFull`, for which only ids are queued. Longer bursts
-//! are counted.
-//!
+//! Answers have their own queue, so bursts of events cannot displace them. With the promised number of frames and
+//! answers pending, requests are rejected with `QueueFull`, for which only ids are queued. Longer bursts are counted.
 //! RAM: about 8 KiB, mostly stored answers.
 
 mod ids;
@@ -24,12 +21,10 @@ use self::ids::Ids;
 
 /// Size of a [`Call`] without fields: session and request number.
 const BARE_CALL: usize = 5;
-/// Stored answers.
 pub const REMEMBERED: usize = 8;
 /// Answers that may wait for the UART: [`farnear_protocol::message::Hello::outstanding`].
 pub const OUTSTANDING: usize = 8;
-/// Refusals that may wait: 10 small requests arrive per millisecond in which as many refusals leave; several
-/// ticks' worth.
+/// Rejections that may wait, several ticks' worth: 10 small requests and as many rejections take a millisecond.
 const REFUSED: usize = 64;
 
 // A repeat of the oldest outstanding request must find its answer.
@@ -42,7 +37,6 @@ struct Answered {
     reply: Encoded,
 }
 
-/// A request to execute and answer with [`Session::answer`].
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub(crate) struct Incoming {
     pub(crate) id: u32,
@@ -56,7 +50,6 @@ pub(crate) struct Session {
     /// Open session, or [`NO_SESSION`].
     number: u32,
     ids: Ids,
-    /// Complete, unchecked requests.
     frames: Deque<Packet, OUTSTANDING>,
     /// An executed request with its unencoded answer.
     done: Option<(Incoming, Result<Response, RequestError>)>,
@@ -64,7 +57,6 @@ pub(crate) struct Session {
     waiting: Deque<Encoded, OUTSTANDING>,
     refused: Deque<u32, REFUSED>,
     counters: LinkCounters,
-    /// Requests of the open session, including repeats.
     heard: u32,
 }
 
@@ -94,7 +86,6 @@ impl Session {
         self.counters
     }
 
-    /// Largest request id so far.
     pub(crate) const fn last_id(&self) -> u32 {
         self.ids.last()
     }
@@ -126,8 +117,7 @@ impl Session {
         !self.frames.is_empty()
     }
 
-    /// Whether a stop request waits. It has no fields, so only the shortest frames are checked, at little
-    /// cost.
+    /// Whether a stop request waits. It has no fields, so only the shortest frames are checked, at little cost.
     pub(crate) fn stop_waits(&self) -> bool {
         let short = self.frames.iter().filter(|packet| packet.body.len() == BARE_CALL);
         short
@@ -135,8 +125,7 @@ impl Session {
             .any(|call: Call| matches!(call.request, Request::Stop | Request::Halt))
     }
 
-    /// Checks the next request; returns it if new and for this boot and session. Room for its answer or
-    /// refusal is guaranteed.
+    /// Checks the next request; returns it if new and for this boot and session. Guarantees room for its answer.
     pub(crate) fn next_request(&mut self) -> Option<Incoming> {
         let packet = self.frames.pop_front()?;
         let id = packet.header.id;
@@ -191,7 +180,6 @@ impl Session {
         Ok(None)
     }
 
-    /// Repeats the stored answer.
     fn repeat(&mut self, id: u32, request: &Request) -> Result<(), RequestError> {
         match self.answered.iter().find(|answered| answered.id == id) {
             Some(answered) if answered.request == *request => {
@@ -218,7 +206,6 @@ impl Session {
         self.done.is_some()
     }
 
-    /// Encodes and stores the answer.
     pub(crate) fn put_answer(&mut self) {
         let Some((incoming, answer)) = self.done.take() else { return };
         let reply = match &answer {
@@ -237,7 +224,6 @@ impl Session {
         let _ = self.answered.push_back(Answered { id: incoming.id, request: incoming.request, reply });
     }
 
-    /// Header of a frame of this boot.
     pub(crate) const fn header(&self, kind: Kind, id: u32) -> Header {
         Header { version: PROTOCOL_CURRENT, kind, id, boot: self.boot }
     }

@@ -1,7 +1,5 @@
-//! The rig's numbers: each value that depends on the parts, with unit and reason.
-//!
-//! [`Settings::DEFAULT`] is the rig of `docs/rig.md`. [`Values`] are those that the host may change and the
-//! memory stores; [`Settings::with`] applies them.
+//! The rig's numbers: each value that depends on the parts, with unit and reason. [`Settings::DEFAULT`] is the rig of
+//! `docs/rig.md`. [`Values`] are those that the host may change and the memory stores; [`Settings::with`] applies them.
 
 mod table;
 
@@ -29,36 +27,26 @@ pub struct Settings {
     pub memory: bool,
 }
 
-/// Stepper, screw, encoder and switches.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct StepperSettings {
     pub min: Nanometres,
     pub max: Nanometres,
-    /// STEP pulses/s.
+    /// Speeds are in STEP pulses/s, accelerations in STEP pulses/s2, jerks in STEP pulses/s3.
     pub speed: u32,
-    /// STEP pulses/s.
     pub home_search_speed: u32,
-    /// STEP pulses/s.
     pub home_leave_speed: u32,
-    /// Exact approach, STEP pulses/s.
+    /// Exact approach.
     pub home_approach_speed: u32,
-    /// Speed without ramp, STEP pulses/s.
+    /// Speed without ramp.
     pub start_speed: u32,
-    /// STEP pulses/s2.
     pub acceleration: u32,
-    /// STEP pulses/s3.
     pub jerk: u32,
-    /// STEP pulses/s2.
     pub home_acceleration: u32,
-    /// STEP pulses/s3.
     pub home_jerk: u32,
-    /// Longest search for the home switch.
     pub home_search: Nanometres,
-    /// Longest way out of the closed switch.
     pub home_leave: Nanometres,
     /// Distance from the opened switch to the start of the exact approach.
     pub home_clearance: Nanometres,
-    /// Longest exact approach.
     pub home_approach: Nanometres,
     /// Distance between closing and opening, by data sheet.
     pub home_hysteresis: Nanometres,
@@ -75,17 +63,14 @@ pub struct StepperSettings {
     pub settle_deadline: Micros,
     /// From enabling the driver to the first pulse.
     pub enable_delay: Micros,
-    /// Longest time without a finished segment.
     pub pulse_deadline: Micros,
 }
 
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct FineSettings {
-    /// Smallest position that the closed loop can hold.
+    /// Range of the closed loop.
     pub min: Nanometres,
-    /// Largest position that the closed loop can hold.
     pub max: Nanometres,
-    /// Input shaper and control gains.
     pub gains: Gains,
     /// Gains for a flexure with a second mode.
     pub gentle_gains: Gains,
@@ -94,7 +79,6 @@ pub struct FineSettings {
     pub dwell_min: Micros,
     /// Settling time from the start of the move, without dwell.
     pub settle_deadline: Micros,
-    /// Longest time without a plausible reading.
     pub gauge_deadline: Micros,
     /// Stroke per DAC code.
     pub gain_pm_per_code: u32,
@@ -206,8 +190,8 @@ const PIEZO: PiezoModel = PiezoModel {
     resonance_hz: 200.0,
     damping: 0.03,
     tick_s: TICK_US as f64 * 1e-6,
-    // Gauge conversion, control law and DAC frame (40 us) plus the amplifier's lag (5 kHz, 32 us). 10 to 80
-    // us besides the amplifier all work.
+    // Gauge conversion, control law and DAC frame (40 us) plus the amplifier's lag (5 kHz, 32 us). The first may take
+    // 10 to 80 us.
     latency_s: 80e-6,
     // As fast as the resonance, so that the command stays small, without overshoot.
     feedback: Poles { hz: 200.0, damping: 1.0 },

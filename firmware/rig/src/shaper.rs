@@ -1,11 +1,8 @@
-//! Input shaping: a step becomes three smaller ones without residual vibration.
-//!
-//! Two equal zero-vibration stages in series (N. Singer, W. Seering, "Preshaping command inputs to reduce
-//! system vibration", J. Dyn. Sys. 1990) form a ZVD shaper: the residual grows with the square of the
-//! resonance error (5 % off: 0.6 %). Weights are exact on the tick grid ([`crate::gains`]). A step takes one
-//! resonance period (26 ticks of 0.2 ms at 200 Hz).
-//!
-//! Cost: six multiplications a tick, 256 bytes.
+//! Input shaping: a step becomes three smaller ones without residual vibration. Two equal zero-vibration stages in
+//! series (N. Singer, W. Seering, "Preshaping command inputs to reduce system vibration", J. Dyn. Sys. 1990) form a ZVD
+//! shaper: the residual grows with the square of the resonance error (5 % off: 0.6 %). Weights are exact on the tick
+//! grid ([`crate::gains`]). A step takes one resonance period (26 ticks of 0.2 ms at 200 Hz). Cost: six
+//! multiplications.
 
 use crate::gains::{GAIN_BITS, ShaperGains};
 
@@ -14,7 +11,6 @@ const HALF_MAX: usize = 31;
 
 #[derive(Clone, Debug)]
 struct Stage {
-    /// Ring of the last inputs.
     past: [i32; HALF_MAX + 1],
     newest: usize,
 }

@@ -1,13 +1,10 @@
-//! Supervision of the host's silence.
-//!
-//! Each request with motion has a silence deadline; the shortest active one counts. Half-way the host is
-//! reminded once. Any request of the open session restarts the time; other hosts do not.
+//! Supervision of the host's silence. Each request with motion has a silence deadline; the shortest active one counts.
+//! Half-way the host is reminded once. Any request of the open session restarts the time; other hosts do not.
 
 use farnear_protocol::{BoardMicros, Micros};
 
 use crate::motion::since;
 
-/// Time of the host's last request.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Silence {
     heard: BoardMicros,
@@ -28,17 +25,15 @@ impl Silence {
         Self { heard: now, reminded: false }
     }
 
-    /// Notes a request of the open session's host.
     pub(crate) const fn hear(&mut self, now: BoardMicros) {
         *self = Self::new(now);
     }
 
-    /// Time since the last request of the open session.
     pub(crate) fn time(&self, now: BoardMicros) -> Micros {
         since(self.heard, now)
     }
 
-    /// Checks the time with the active request of the shortest deadline.
+    /// `shortest` is the active request of the shortest deadline.
     pub(crate) fn check(&mut self, now: BoardMicros, shortest: Option<(u32, Micros)>) -> Verdict {
         let Some((request, allowed)) = shortest else { return Verdict::Fine };
         let silent = since(self.heard, now);

@@ -2,8 +2,7 @@
 
 use farnear_protocol::BoardMicros;
 
-/// The time with these lower 32 bits within 35 minutes of `now`, before or after: an edge may come after
-/// `now` was read.
+/// The time with these lower 32 bits within 35 minutes of `now`, before or after, as an edge may follow it.
 pub const fn extend(stamp: u32, now: BoardMicros) -> BoardMicros {
     let ahead = stamp.wrapping_sub(now.0 as u32) as i32;
     BoardMicros(now.0.saturating_add_signed(ahead as i64))

@@ -1,8 +1,5 @@
-//! Sun and shadow: converts the message's integers for `farnear_maths` and the answer back.
-//!
-//! The only definition of those integers; the host calls it too, to compare with the board bit by bit
-//! (`docs/decisions/0009-sun-query.md`).
-//!
+//! Sun and shadow: converts the message's integers for `farnear_maths` and the answer back. The only definition of
+//! those integers; the host calls it too, to compare with the board bit by bit (`docs/decisions/0009-sun-query.md`).
 //! Cost: 550 instructions for the sun, 250 for its angles, 400 for the shadow, 1,160 for its deviation.
 
 use farnear_maths::angle::BinaryAngle;
@@ -111,8 +108,7 @@ mod tests {
         }
     }
 
-    /// Every integer has its unit. Reference values: the Astronomical Almanac's low-precision sun (0.01 deg)
-    /// and a pinhole camera in double precision, by an independent program.
+    /// Reference values: the Astronomical Almanac's low-precision sun (0.01 deg), a pinhole camera in f64.
     #[test]
     fn a_query_gives_what_an_independent_calculation_gives() {
         let sun = answer(&QUERY);

@@ -1,7 +1,5 @@
-//! Long work per axis or for the whole rig, and its end.
-//!
-//! A program or calibration occupies all axes. Work that fails or is stopped ends with its terminal event
-//! once its motion has stopped.
+//! Long work per axis or for the whole rig, and its end. A program or calibration occupies all axes. Work that fails or
+//! is stopped ends with its terminal event once its motion has stopped.
 
 use farnear_protocol::message::{Axis, Failure};
 use farnear_protocol::{Micros, Nanometres};
@@ -11,11 +9,9 @@ use crate::motion::home::Homing;
 use crate::motion::positioning::Positioning;
 use crate::program::Run;
 
-/// Work and its request.
 #[derive(Clone, Debug)]
 pub(crate) struct Active<W> {
     pub(crate) request: u32,
-    /// Permitted silence of the host.
     pub(crate) silence: Micros,
     pub(crate) work: W,
 }
@@ -35,7 +31,7 @@ pub(crate) enum AxisWork {
 pub(crate) enum WholeWork {
     Program(Run),
     Calibration(Calibrating),
-    /// Ends with this once everything is at rest.
+    /// As [`AxisWork::Ending`], once everything is at rest.
     Ending {
         axis: Option<Axis>,
         reason: Failure,
@@ -57,13 +53,11 @@ impl Works {
         &mut self.axes[axis as usize]
     }
 
-    /// Active request of an axis.
     pub(crate) fn request_on(&self, axis: Axis) -> Option<u32> {
         let own = self.axes[axis as usize].as_ref().map(|active| active.request);
         own.or(self.whole.as_ref().map(|active| active.request))
     }
 
-    /// Any active request.
     pub(crate) fn any(&self) -> Option<u32> {
         Axis::ALL.into_iter().find_map(|axis| self.request_on(axis))
     }

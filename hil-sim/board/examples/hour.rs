@@ -1,7 +1,7 @@
-//! One hour of board time with a far/near pair every ten seconds: measures run time and memory.
+//! Measures run time and memory of one hour of board time with a far/near pair every ten seconds.
 //!
-//! `cargo run --release --ignore-rust-version -p farnear-sim --example hour [PAIRS]` (after `cargo xtask
-//! firmware`). Linux only, because of the memory figure.
+//! `cargo run --release --ignore-rust-version -p farnear-sim --example hour [PAIRS]` after `cargo xtask
+//! firmware`; Linux only, because of the memory figure.
 
 mod common;
 
@@ -18,7 +18,6 @@ use farnear_sim::{EmulatedRig, RigConfig, cpu_time::cpu_time, imager::Imager};
 
 const SESSION: u32 = 1;
 const SILENCE: Micros = Micros(60_000_000);
-/// Interval between pairs.
 const EVERY_NS: u64 = 10_000_000_000;
 
 struct Host {
@@ -37,7 +36,6 @@ impl Host {
         Ok(())
     }
 
-    /// Number of completed two-exposure programs.
     fn programs(&mut self) -> Result<u32> {
         let mut ended = 0;
         for packet in self.rig.take_frames() {
@@ -51,7 +49,6 @@ impl Host {
     }
 }
 
-/// Memory of this process, MiB.
 fn memory_mib() -> Result<f64> {
     let status = std::fs::read_to_string("/proc/self/status")?;
     let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:")).context("no VmRSS")?;

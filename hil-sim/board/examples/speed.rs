@@ -1,8 +1,7 @@
-//! Speed of the emulated rig in board seconds per CPU second: idle, two motors moving, capturing, and idle
-//! with the piezo held. "Cold" includes the translation of the firmware.
+//! Speed of the emulated rig in board seconds per CPU second (other load hardly affects it); Linux only.
+//! "Cold" includes the translation of the firmware.
 //!
-//! `cargo run --release --ignore-rust-version -p farnear-sim --example speed` (after `cargo xtask firmware`).
-//! CPU time is used because other load hardly affects it; Linux only.
+//! `cargo run --release --ignore-rust-version -p farnear-sim --example speed` after `cargo xtask firmware`.
 
 mod common;
 
@@ -31,7 +30,6 @@ impl Host {
         self.rig.send(&frame.unwrap_or_default())
     }
 
-    /// Runs `work` and prints its speed.
     fn measure(
         &mut self,
         what: &str,

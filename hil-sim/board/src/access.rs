@@ -18,8 +18,7 @@ use crate::{
     wiring::Wiring,
 };
 
-/// Supply during a dip that only the brown-out reset detects: below the specified range, above the power-down
-/// reset (1.7 V).
+/// Only the brown-out reset detects this dip: below the specified range, above the power-down reset (1.7 V).
 const DIP_MV: u32 = 2_000;
 /// Pattern with which cortex-m-rt paints the stack.
 const STACK_PAINT: u64 = 0xcccc_cccc;
@@ -57,7 +56,7 @@ impl RigAccess<'_, '_> {
         self.session.reset_by_pin(self.stop.at, self.stop.instruction_count, self.host);
     }
 
-    /// Opens the emergency stop's circuit (`pressed`), or closes it.
+    /// `pressed` opens the circuit.
     pub fn set_emergency_stop(&mut self, pressed: bool) {
         let at = self.stop.at;
         for stage in [StageName::Sensor, StageName::Lens] {
@@ -66,18 +65,15 @@ impl RigAccess<'_, '_> {
         self.chip().join_breaks(at);
     }
 
-    /// Sets or clears the stepper driver's fault signal DIAG.
     pub fn set_driver_fault(&mut self, stage: StageName, fault: bool) {
         let at = self.stop.at;
         self.chip().drive_pin(at, pins(stage).diagnosis, Level::from(fault));
     }
 
-    /// Cuts or reconnects a chip's data lines.
     pub fn disconnect(&mut self, chip: SpiChip, cut: bool) {
         self.chip().disconnect(chip, cut);
     }
 
-    /// Sets the supply. Below the option bytes' level the chip resets.
     pub fn set_supply_mv(&mut self, millivolts: u32) {
         if self.chip().dips(millivolts) {
             self.press_reset();
@@ -85,7 +81,7 @@ impl RigAccess<'_, '_> {
         self.chip().part().set_supply(millivolts);
     }
 
-    /// Switches the power. Volatile memory is lost when it goes off.
+    /// Volatile memory is lost when the power goes off.
     pub fn set_power(&mut self, on: bool) {
         let at = self.stop.at;
         if on && !self.session.unpowered() {
@@ -97,7 +93,6 @@ impl RigAccess<'_, '_> {
         }
     }
 
-    /// Stops or restarts the ST-LINK's clock.
     pub fn set_outer_clock(&mut self, there: bool) {
         let at = self.stop.at;
         self.chip().set_outer_clock(at, there);
@@ -110,7 +105,6 @@ impl RigAccess<'_, '_> {
         }
     }
 
-    /// Replaces the FRAM by another make, or removes it.
     pub fn set_memory_make(&mut self, make: MemoryMake) {
         if let Some(memory) = self.chip().memory() {
             memory.set_make(make);
@@ -124,24 +118,20 @@ impl RigAccess<'_, '_> {
         }
     }
 
-    /// Gauge conversions that were read without a busy indicator.
     pub fn conversions_without_indicator(&mut self) -> u64 {
         self.chip().gauge_converter().map_or(0, |converter| converter.without_indicator())
     }
 
-    /// CNV pulses that were too short for the gauge's converter.
     pub fn short_conversion_pulses(&mut self) -> u64 {
         self.chip().gauge_converter().map_or(0, |converter| converter.short_pulses())
     }
 
-    /// Fails the power after the firmware has written this many more bytes to the FRAM.
     pub fn fail_power_after_memory_bytes(&mut self, bytes: u64) {
         if let Some(memory) = self.chip().memory() {
             memory.fail_after(bytes);
         }
     }
 
-    /// Cancels the pending power failure.
     pub fn keep_power(&mut self) {
         if let Some(memory) = self.chip().memory() {
             memory.keep_supply();
@@ -172,13 +162,12 @@ impl RigAccess<'_, '_> {
         Memory::read(self.host, address, Width::W32).ok().map(|word| word as u32)
     }
 
-    /// Writes a word of volatile memory as a stray pointer would.
     pub fn write_word(&mut self, address: u64, value: u32) {
         let _ = Memory::write(self.host, address, Width::W32, u64::from(value));
     }
 
-    /// Makes the firmware execute `code`: copies it to free RAM and redirects the first function pointer that
-    /// `is_function` finds in the variable (address, length). Returns `false` without one.
+    /// Copies `code` to free RAM and redirects to it the first function pointer that `is_function` finds in
+    /// the variable (address, length). Returns `false` without one.
     pub fn redirect_program(
         &mut self,
         (variable, length): (u64, u64),
@@ -211,7 +200,7 @@ impl RigAccess<'_, '_> {
         self.wiring.lights().levels()
     }
 
-    /// Changes of their brightness since the last call, in virtual nanoseconds; the first call begins to record.
+    /// Brightness changes since the last call, virtual nanoseconds; the first call starts the recording.
     pub fn take_light_changes(&mut self) -> Vec<(u64, [f64; 2])> {
         self.wiring.lights().take_changes()
     }
@@ -225,19 +214,16 @@ impl RigAccess<'_, '_> {
         self.wiring.take_steps()
     }
 
-    /// Faults of the serial line in both directions.
     pub fn lines(&mut self) -> &mut Lines {
         self.lines
     }
 
-    /// Sends this many random bytes to the board.
     pub fn send_noise(&mut self, bytes: usize) {
         let mut noise = Noise::new(self.stop.at.0, "noise on the line");
         let bytes: Vec<u8> = (0..bytes).map(|_| noise.bits() as u8).collect();
         self.line.send(&bytes);
     }
 
-    /// Framing errors per million bytes that the board receives.
     pub fn set_framing_errors(&mut self, per_million: u32) {
         let seed = self.stop.at.0;
         self.chip().set_framing_errors(per_million, seed);
@@ -258,12 +244,10 @@ impl RigAccess<'_, '_> {
         self.wiring.set_glitches_per_s(self.stop.at.0, stage, per_s);
     }
 
-    /// Makes the camera ignore triggers.
     pub fn set_camera_ignores_triggers(&mut self, ignores: bool) {
         self.wiring.camera_mut().set_ignores_triggers(ignores);
     }
 
-    /// Extra read-out time per frame.
     pub fn set_camera_delay_ns(&mut self, delay_ns: u64) {
         self.wiring.camera_mut().set_delay_ns(delay_ns);
     }
@@ -273,12 +257,10 @@ impl RigAccess<'_, '_> {
         self.wiring.cut_strobe(&mut self.session.board_mut().chip, at, cut);
     }
 
-    /// Software trigger with this image id.
     pub fn expose(&mut self, exposure_us: u64, id: u32) {
         self.wiring.camera_mut().expose(self.stop.at.0, exposure_us * 1000, id);
     }
 
-    /// Starts free running; period 0 stops it.
     pub fn run_camera_freely(&mut self, period_us: u64, exposure_us: u64) {
         self.wiring.camera_mut().run_freely(self.stop.at.0, period_us * 1000, exposure_us * 1000);
     }

@@ -7,7 +7,7 @@ pub struct Adapter {
 }
 
 impl Adapter {
-    /// Accepts bytes; returns those that are due.
+    /// Returns the bytes that are due.
     pub fn pass(&mut self, bytes: Vec<u8>, now_ns: u64, latency_ns: u64) -> Vec<u8> {
         if self.kept.is_empty() {
             self.until_ns = now_ns + latency_ns;

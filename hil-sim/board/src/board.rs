@@ -1,7 +1,5 @@
-//! The emulated board: STM32F427, 8 MHz clock, two chips on SPI3, FRAM on SPI4, link on USART3, and the
-//! external pin levels.
-//!
-//! The firmware targets the STM32F429ZI, which is the F427 plus a display controller (same manual, RM0090).
+//! The emulated board: STM32F427, 8 MHz clock, two chips on SPI3, FRAM on SPI4, link on USART3, external pin
+//! levels. The firmware targets the STM32F429ZI: the F427 with a display controller (same manual, RM0090).
 
 use std::{
     collections::BTreeMap,
@@ -44,13 +42,11 @@ use crate::{
 /// SYSCLK; also the emulator's instructions per second, because [`Metered`] counts cycles.
 const SYSCLK_HZ: u64 = 168_000_000;
 const HSE_HZ: u64 = 8_000_000;
-/// Nominal supply, millivolts.
 pub const SUPPLY_MV: u32 = 3300;
 /// Address of the unique id (RM0090, section 39.1).
 const UNIQUE_ID_AT: u64 = 0x1FFF_7A10;
 
-/// RCC_CSR after resets that the emulator does not model (RM0090, section 6.3.21): power-on sets PORRSTF,
-/// PINRSTF and BORRSTF; brown-out sets the last two.
+/// RCC_CSR after resets that the emulator lacks (RM0090, 6.3.21): power-on also sets PORRSTF, brown-out not.
 const CSR_POWER_ON: u64 = 0x0e00_0000;
 const CSR_BROWN_OUT: u64 = 0x0600_0000;
 
@@ -58,19 +54,16 @@ const CSR_BROWN_OUT: u64 = 0x0600_0000;
 const SPI3: usize = 2;
 const SPI4: usize = 3;
 const USART3: usize = 2;
-/// TIM2 in the table of general timers.
 pub const TIM2: usize = 0;
 pub const TIM3: usize = 1;
 pub const TIM4: usize = 2;
-/// TIM1 in the table of advanced timers.
 pub const TIM1: usize = 0;
 pub const TIM8: usize = 1;
 
 /// Volatile memory, start and length: SRAM1 to 3, then CCM.
 pub const RAM: [(u64, u64); 2] = [(0x2000_0000, 192 << 10), (0x1000_0000, 64 << 10)];
 
-/// Unmapped range below the SRAM: the bus returns an error (RM0090, section 2.3), which is where a stack
-/// overflow ends. The emulator would ignore the access.
+/// Unmapped range below the SRAM, where a stack overflow ends: a bus error, which the emulator lacks.
 pub const NOTHING: std::ops::Range<u64> = 0x1fff_c010..0x2000_0000;
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -102,13 +95,11 @@ impl PinName {
 pub struct StagePins {
     /// STEP with its advanced timer and alternate function.
     pub step: (PinName, usize, u8),
-    /// DIR; high moves sensor and lens apart.
     pub direction: PinName,
     pub enable: PinName,
     pub diagnosis: PinName,
     /// Encoder A and B with the general timer that counts them (alternate function 2).
     pub encoder: ([PinName; 2], usize),
-    /// Home switch; high = open = actuated.
     pub home: PinName,
     pub far: PinName,
     /// Break input of the STEP timer for the emergency stop, with its alternate function.
@@ -146,12 +137,10 @@ pub const fn pins(stage: StageName) -> &'static StagePins {
 
 pub const TRIGGER: PinName = PinName::new(b'B', 10);
 pub const STROBE: PinName = PinName::new(b'B', 11);
-/// Light outputs.
 pub const LIGHTS: [PinName; 2] = [PinName::new(b'B', 14), PinName::new(b'B', 15)];
 /// Strap that marks an emulated board.
 const STRAP: PinName = PinName::new(b'D', 15);
 
-/// The chip and its external pin levels, which survive a reset.
 pub struct Chip {
     part: Stm32f427,
     pins: BTreeMap<PinName, Level>,
@@ -205,8 +194,7 @@ impl Chip {
         port.level(name.pin(), registers)
     }
 
-    /// Copies the emergency stop's level to the timers' break inputs, where the firmware has selected that
-    /// alternate function.
+    /// Copies the emergency stop's level to the timers' break inputs that the firmware has selected.
     pub fn join_breaks(&mut self, at: VirtualNanos) {
         for stage in [StageName::Sensor, StageName::Lens] {
             let StagePins { stop: (pin, function), step: (_, timer, _), .. } = *pins(stage);
@@ -220,15 +208,13 @@ impl Chip {
         }
     }
 
-    /// Framing errors per million received bytes; `seed` selects which.
     pub fn set_framing_errors(&mut self, per_million: u32, seed: u64) {
         let errors = self.part.usart[USART3].errors_mut();
         errors.framing = rigless::chip::uart::Rate { name: "framing", per_million };
         errors.seed = seed;
     }
 
-    /// Stops or restarts the ST-LINK's HSE clock. With clock security the firmware is notified; without it
-    /// the chip halts until the next power cycle.
+    /// Stops or restarts the HSE clock. Without clock security the chip halts until the next power cycle.
     pub fn set_outer_clock(&mut self, at: VirtualNanos, there: bool) {
         if !self.clock.set(there) || there {
             return;
@@ -257,7 +243,7 @@ impl Chip {
         });
     }
 
-    /// Dips the supply; returns whether the chip resets. A chip without brown-out reset keeps running.
+    /// Returns whether the chip resets; without brown-out reset it keeps running.
     pub fn dips(&mut self, millivolts: u32) -> bool {
         if millivolts >= self.supply.reset_mv(self.brown_out) {
             return false;
@@ -280,7 +266,6 @@ impl Chip {
         self.part.spi[SPI4].chip_mut::<MemoryChip>(0)
     }
 
-    /// Cuts or reconnects a chip's data lines.
     pub fn disconnect(&mut self, chip: SpiChip, cut: bool) {
         let (interface, nth) = match chip {
             SpiChip::Dac => (SPI3, 0),
@@ -359,7 +344,7 @@ pub struct RigBoard {
 }
 
 impl RigBoard {
-    /// Builds the board; `seed` sets its unique id, `program` is the fingerprint of the firmware.
+    /// `seed` sets the unique id, `program` is the fingerprint of the firmware.
     pub fn new(
         plant: &SharedPlant,
         line: Line,

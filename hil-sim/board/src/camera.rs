@@ -1,8 +1,8 @@
 //! Camera timing from trigger edges to strobe, exposure and frame.
 //!
-//! A global-shutter camera in trigger-width mode: exposure starts 20 us (2 us jitter) after the rising edge
-//! and lasts while the trigger is high. Read-out takes 10 ms, during which triggers are ignored. Software
-//! triggers start 1 ms after the command; free running exposes once per period.
+//! Global shutter, trigger-width mode: exposure starts 20 us (2 us jitter) after the rising edge and lasts
+//! while the trigger is high. Triggers are ignored during the read-out of 10 ms. Software triggers start 1 ms
+//! after the command; free running exposes once per period.
 
 use std::collections::BTreeMap;
 
@@ -10,9 +10,7 @@ use farnear_protocol::camera::FREE_RUNNING;
 
 use crate::plant::Noise;
 
-/// Delay from trigger edge to exposure.
 const LATENCY_NS: f64 = 20_000.0;
-/// Standard deviation of the latency.
 const JITTER_NS: f64 = 2_000.0;
 const READOUT_NS: u64 = 10_000_000;
 /// Delay from a host command to the exposure: USB and camera firmware.
@@ -20,7 +18,6 @@ const COMMAND_NS: u64 = 1_000_000;
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Edge {
-    /// Exposure starts for this image id.
     Begin(u32),
     End,
 }
@@ -42,7 +39,6 @@ pub struct Camera {
     triggers: u32,
     missed: u32,
     ignores: bool,
-    /// Extra read-out time.
     delay_ns: u64,
 }
 
@@ -155,7 +151,6 @@ impl Camera {
         self.missed
     }
 
-    /// Makes the camera ignore triggers.
     pub fn set_ignores_triggers(&mut self, ignores: bool) {
         self.ignores = ignores;
     }
@@ -164,12 +159,10 @@ impl Camera {
         self.delay_ns = delay_ns;
     }
 
-    /// Whether an exposure is active or scheduled.
     pub fn is_exposing(&self) -> bool {
         self.armed || !self.coming.is_empty()
     }
 
-    /// Resets the trigger count.
     pub fn board_reset(&mut self) {
         self.triggers = 0;
     }

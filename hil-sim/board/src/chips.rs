@@ -9,7 +9,6 @@ use rigless::{
 
 use crate::{parts::ConverterParts, plant::Plant};
 
-/// The plant, shared by chips and wiring on the emulator's thread.
 pub type SharedPlant = Arc<Mutex<Plant>>;
 
 /// Runs `work` on the plant. Poison is ignored: a panic elsewhere does not invalidate the state.
@@ -97,17 +96,16 @@ impl GaugeConverter {
         }
     }
 
-    /// Conversions read without a busy indicator, because CNV stayed high too long.
+    /// Conversions without a busy indicator, because CNV stayed high too long.
     pub fn without_indicator(&self) -> u64 {
         self.without_indicator
     }
 
-    /// CNV pulses below the converter's minimum.
     pub fn short_pulses(&self) -> u64 {
         self.short_pulses
     }
 
-    /// Cuts the data line (the pull-up holds it high), or reconnects it.
+    /// The pull-up holds a cut line high.
     pub const fn cut(&mut self, cut: bool) {
         self.cut = cut;
     }
@@ -168,7 +166,6 @@ mod tests {
     use super::*;
     use crate::parts::Parts;
 
-    /// The 32 bits read for a result.
     fn read(result: u32, (low_ns, read_ns): (u64, u64)) -> u32 {
         let parts = Parts::default();
         let plant = SharedPlant::new(Plant::new(1, &parts, None).into());

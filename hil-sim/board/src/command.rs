@@ -4,10 +4,8 @@ use std::sync::{Arc, mpsc::Sender};
 
 use crate::{access::RigAccess, observer::Sight, pictures::Pictures, report::Report, wiring::Shot};
 
-/// Work for a rig between two instructions.
 pub type Work = Box<dyn FnOnce(&mut RigAccess<'_, '_>) + Send>;
 
-/// Requests of the camera's host.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum CameraOrder {
     Expose {
@@ -45,9 +43,7 @@ pub enum Command {
     Access(Work),
     /// Counts as activity of the rig's host.
     Camera(CameraOrder),
-    /// Reverts the scenario's faults and cancels the rest.
     Heal,
-    /// Returns the observations since the last call.
     Sights {
         done: Sender<Vec<Sight>>,
     },
@@ -57,14 +53,12 @@ pub enum Command {
 /// Replaces the port and returns the sender for its bytes; `None` where that fails.
 pub type AnotherPort = Box<dyn FnMut() -> Option<Sender<Vec<u8>>> + Send>;
 
-/// Destinations of the rig's outputs.
 pub struct Outlets {
     /// Bytes for the host; dropped when the port closes.
     pub bytes: Option<Sender<Vec<u8>>>,
     /// Simulates an adapter that reappears under a new name; `None` without a port.
     pub another_port: Option<AnotherPort>,
-    /// Completed exposures.
     pub shots: Sender<Shot>,
-    /// Picture queue, where pictures are rendered on another thread.
+    /// `None` renders on the same thread.
     pub pictures: Option<Arc<Pictures>>,
 }

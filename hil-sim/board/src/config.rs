@@ -27,17 +27,14 @@ pub struct RigConfig {
     /// Faults. Seed, parts and host steps are applied by the caller ([`RigConfig::of`]).
     pub scenario: Scenario,
     pub pace: Pace,
-    /// File of the board's memory, loaded at power-on and saved at the end; created if missing. `None`: blank
-    /// memory, not saved.
+    /// File of the board's memory, created if missing, saved at the end; `None`: blank memory, not saved.
     pub memory: Option<PathBuf>,
     /// Records line, plant and faults for a campaign's invariants.
     pub observe: bool,
-    /// CSV or VCD file for the plant's true state.
     pub trace: Option<PathBuf>,
 }
 
 impl Default for RigConfig {
-    /// Seed 1, standard parts, no faults, [`Pace::OnRequest`].
     fn default() -> Self {
         Self {
             firmware: None,
@@ -55,7 +52,6 @@ impl Default for RigConfig {
 
 impl RigConfig {
     /// The rig of a scenario with its seed (default 1) and parts, in [`Pace::OnRequest`].
-    /// Errors: an invalid number of its parts.
     pub fn of(scenario: &Scenario) -> Result<Self, String> {
         Ok(Self {
             seed: scenario.seed.unwrap_or(1),

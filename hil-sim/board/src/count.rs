@@ -1,6 +1,5 @@
-//! Instruction counts of the on-board routines, measured by the firmware `farnear-count`. One instruction
-//! takes one cycle here, so the counts repeat exactly. Flash wait states, branches and divisions make a real
-//! board slower: times from these counts are lower bounds.
+//! Instruction counts of the on-board routines, measured by the firmware `farnear-count`, at one cycle per
+//! instruction. Flash wait states, branches and divisions make a real board slower: times are lower bounds.
 
 use std::path::Path;
 
@@ -27,7 +26,6 @@ use crate::{
 /// Symbols of the routine table and the counts.
 const ROUTINES: &str = "FARNEAR_ROUTINES";
 const COUNTS: &str = "FARNEAR_COUNTS";
-/// Bytes per routine description and per count.
 const ROUTINE_BYTES: u64 = 24;
 const COUNT_BYTES: u64 = 4;
 /// Longer than all routines together.
@@ -35,15 +33,11 @@ const PATIENCE_NS: u64 = 10_000_000_000;
 /// Polling interval.
 const LOOK_NS: u64 = 1_000_000;
 
-/// Measured cost of a routine.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Count {
     pub routine: String,
-    /// Unit of work, e.g. pixel.
     pub unit: String,
-    /// Units of work in the run.
     pub units: u32,
-    /// Instructions of the whole run.
     pub instructions: u32,
 }
 
@@ -58,7 +52,6 @@ fn place(elf: &object::File<'_>, name: &str) -> Option<(u64, u64)> {
     Some((found.address(), found.size()))
 }
 
-/// Runs the program until its last count is written.
 struct Counting {
     routines: u64,
     counts: u64,
@@ -112,8 +105,7 @@ impl emulator::Driver<RigBoard> for Counting {
     }
 }
 
-/// Runs the counting program.
-/// Errors: [`SimError::Firmware`] if the file is another program or does not end.
+/// Fails if the file is another program or does not end.
 pub fn count(path: &Path) -> Result<Vec<Count>, SimError> {
     let unusable = |reason: String| SimError::Firmware { path: path.into(), reason };
     let bytes = std::fs::read(path).map_err(|error| unusable(error.to_string()))?;

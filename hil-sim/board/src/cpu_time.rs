@@ -1,5 +1,3 @@
-//! Processor time for measurements.
-
 use std::{fs, time::Duration};
 
 /// CPU time of all threads of this process, resolution 10 ms. Linux only, 0 elsewhere.

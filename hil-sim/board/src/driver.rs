@@ -1,5 +1,4 @@
-//! Connects the emulator to the plant and the outside: runs whenever the firmware touches a pin and whenever
-//! the emulator stops.
+//! Connects the emulator to the plant: runs when the firmware touches a pin and when the emulator stops.
 
 mod scenario;
 
@@ -43,10 +42,8 @@ use crate::{
 /// SPI4's registers: the memory's supply may fail in the middle of a write.
 const SPI4: std::ops::Range<u64> = 0x4001_3400..0x4001_3800;
 
-/// Polling interval for fetched pictures.
 const PICTURE: Duration = Duration::from_millis(2);
 
-/// State at the previous stop.
 #[derive(Debug, Default)]
 struct Last {
     /// STEP edges of both motors, and the time of the last one.
@@ -68,14 +65,11 @@ pub struct Driver {
     rates: LinkRates,
     scenario: Scenario,
     parts: Parts,
-    /// Pending faults.
     schedule: Schedule,
     observer: Observer,
     last: Last,
     trace: Option<Trace>,
-    /// Recorded run to replay.
     script: Option<Script>,
-    /// When the requested time ends.
     looks_at_ns: Option<u64>,
     /// File and final contents of the memory.
     memory: Option<(PathBuf, Vec<u8>)>,
@@ -133,8 +127,7 @@ impl Driver {
         }
     }
 
-    /// Writes the remaining outputs.
-    /// Errors: the first error of the run.
+    /// Writes the remaining outputs; returns the first error of the run.
     pub fn finish(self) -> Result<(), SimError> {
         self.trace.map_or(Ok(()), Trace::finish)?;
         if let Some((path, contents)) = self.memory.filter(|(_, contents)| !contents.is_empty()) {
@@ -175,7 +168,6 @@ impl Driver {
         }
     }
 
-    /// Brings everything outside the chip to `now_ns`.
     fn exchange(&mut self, now_ns: u64) {
         let mut bytes = self.line.take();
         self.pacing.lockstep.received(&bytes, now_ns);
@@ -292,7 +284,6 @@ impl Driver {
         }
     }
 
-    /// Sends the held bytes, unless a requested advance is active.
     fn send_held(&mut self, now_ns: u64) {
         if self.held.is_empty() || self.pacing.is_advancing(now_ns) || self.is_braking(now_ns) {
             return;
@@ -321,8 +312,7 @@ impl Driver {
         self.line.send(&bytes);
     }
 
-    /// Whether time passes only for a motor that still brakes. Host bytes wait until it stops: otherwise runs
-    /// would depend on the host's speed.
+    /// Whether time passes only for a braking motor. Host bytes wait until it stops.
     fn is_braking(&mut self, now_ns: u64) -> bool {
         self.pacing.is_lockstep()
             && self.wiring.is_stepping(now_ns)
@@ -339,7 +329,6 @@ impl Driver {
         look_ns
     }
 
-    /// Whether an exposure or a fault is pending.
     fn has_pending(&self) -> bool {
         self.wiring.next_ns().is_some() || !self.schedule.is_over() || self.scenario.unplug_after_ms.is_some()
     }
@@ -366,12 +355,11 @@ impl Driver {
         self.pacing.lockstep.reset(at.0);
     }
 
-    /// Whether time stops because pictures are waiting. Requests are still answered.
+    /// Whether time stops for waiting pictures. Requests are still answered.
     fn stands_for_pictures(&mut self, now_ns: u64) -> bool {
         !self.pacing.is_advancing(now_ns) && !self.pacing.lockstep.is_asked() && self.patience.is_asked()
     }
 
-    /// Executes commands until time may pass; `false` ends the run.
     fn serve(&mut self, session: &mut Session<RigBoard>, stop: Stop, host: &mut dyn Host) -> bool {
         let now_ns = stop.at.0;
         loop {

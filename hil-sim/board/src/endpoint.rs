@@ -1,7 +1,5 @@
-//! Camera endpoint: sends frames and receives control messages on loopback TCP.
-//!
-//! Accepts one client; others receive [`IN_USE`]. The newest 32 frames wait for a client; two wait for a slow
-//! one. Each frame is sent once; frames left over by a client are dropped.
+//! Camera endpoint: sends frames and receives control messages on loopback TCP. Accepts one client; others
+//! receive [`IN_USE`]. Each frame is sent once; frames left by a client are dropped.
 
 use std::{
     collections::VecDeque,
@@ -44,9 +42,7 @@ fn lock(shared: &Shared) -> std::sync::MutexGuard<'_, State> {
     shared.state.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Opens the endpoint on a free port. `frames` go to the client, its messages to `control`; `left` is
-/// notified when it disconnects.
-/// Errors: [`SimError::Io`] if no loopback port or thread is available.
+/// Opens a free loopback port. `frames` go to the client, its messages to `control`; then calls `left`.
 pub fn open(
     frames: Receiver<Vec<u8>>,
     control: impl Fn(Control) + Send + Clone + 'static,
@@ -101,13 +97,12 @@ fn refuse(mut stream: TcpStream) {
     let _ = stream.shutdown(Shutdown::Both);
 }
 
-/// Removes a client that has disconnected, unless another one has replaced it.
 fn forget(shared: &Shared, gone: u64) {
     let mut state = lock(shared);
     if let Some((_, stream)) = state.client.take_if(|(number, _)| *number == gone) {
         state.frames.clear();
         (shared.left)();
-        let _ = stream.shutdown(Shutdown::Both); // it may wait for this, to know that it is forgotten
+        let _ = stream.shutdown(Shutdown::Both); // a client may wait for this
         shared.changed.notify_all();
     }
 }

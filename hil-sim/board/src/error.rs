@@ -1,5 +1,3 @@
-//! Errors of the emulated rig.
-
 use std::path::PathBuf;
 
 use thiserror::Error;
@@ -25,15 +23,12 @@ pub enum SimError {
     Replay { path: PathBuf, reason: String },
     #[error("the emulator stopped: {0}")]
     Emulator(String),
-    /// The emulator has ended.
     #[error("the emulated board has stopped")]
     Stopped,
-    /// Error of a file, the pty or the camera endpoint.
     #[error("{what}: {source}")]
     Io { what: String, source: std::io::Error },
     #[error("cannot make a pty: {0}")]
     Port(#[from] serialport::Error),
-    /// Scene, lens or camera cannot produce a picture.
     #[error("the camera cannot render: {0}")]
     Scene(String),
     #[error(transparent)]

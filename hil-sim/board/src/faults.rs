@@ -1,7 +1,5 @@
-//! Table of fault kinds, each with its action and its repair. A scenario ([`crate::scenario`]) sets the
-//! times; `docs/hil.md` describes each kind.
-//!
-//! A new kind is a constant in a file of this module, a line in [`KINDS`] and a row in `docs/hil.md`.
+//! Table of fault kinds with action and repair. A scenario ([`crate::scenario`]) sets the times. A new kind
+//! is a constant in this module, a line in [`KINDS`] and a row in `docs/hil.md`.
 
 pub mod chips;
 mod happening;
@@ -24,7 +22,6 @@ pub use self::{
 };
 use crate::access::RigAccess;
 
-/// Applies or reverts a fault.
 pub type Deed = fn(&mut RigAccess<'_, '_>, &Happening);
 
 #[derive(Clone, Copy)]
@@ -110,7 +107,6 @@ impl<'de> Deserialize<'de> for Kind {
 }
 
 impl Due {
-    /// Applies or reverts the fault.
     pub fn happen(&self, rig: &mut RigAccess<'_, '_>) {
         let Self { happening, reverts } = self;
         match (reverts, happening.what.revert) {

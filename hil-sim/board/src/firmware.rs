@@ -1,5 +1,3 @@
-//! Location of the firmware's ELF.
-
 use std::{
     fs::File,
     io::{ErrorKind, Read},
@@ -9,7 +7,6 @@ use std::{
 use crate::error::SimError;
 
 pub const FILE_NAME: &str = "farnear-nucleo-f429zi.elf";
-/// Environment variable with the ELF's path, for tests.
 pub const VARIABLE: &str = "FARNEAR_FIRMWARE";
 const ELF_MAGIC: [u8; 4] = *b"\x7fELF";
 
@@ -19,10 +16,7 @@ pub fn fingerprint(elf: &[u8]) -> u64 {
     elf.iter().fold(0xcbf2_9ce4_8422_2325, hash)
 }
 
-/// ELF path: `named`, else `FARNEAR_FIRMWARE`, else next to the running program (for tests: one folder above
-/// `deps`).
-/// Errors: [`SimError::NoFirmware`] with the expected place; [`SimError::Firmware`] if the file is not an
-/// ELF.
+/// ELF path: `named`, else `FARNEAR_FIRMWARE`, else next to the running program (for tests, above `deps`).
 pub fn find(named: Option<&Path>) -> Result<PathBuf, SimError> {
     let path = match (named, std::env::var_os(VARIABLE)) {
         (Some(path), _) => path.to_path_buf(),

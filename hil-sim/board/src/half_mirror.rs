@@ -8,10 +8,8 @@ use farnear_scene::Lens;
 /// Largest sensor distance; far above the range of useful focus settings.
 const FURTHER_MAX_UM: f64 = 10_000.0;
 
-/// Extra distance of the second sensor from the lens.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub enum Further {
-    /// The distance between far and near focus.
     Near,
     Micrometres(f64),
 }
@@ -30,7 +28,6 @@ impl FromStr for Further {
 }
 
 impl Further {
-    /// Distance in mm behind this lens.
     pub fn mm(self, lens: &Lens) -> f64 {
         match self {
             Self::Near => lens.sensor_near_mm - lens.sensor_far_mm,

@@ -1,5 +1,4 @@
-//! Renders each exposure at the sensor's true position, on its own thread. The emulator waits only while many
-//! pictures are due ([`crate::pictures`]).
+//! Renders each exposure at the sensor's true position, on its own thread.
 
 use std::{
     sync::{
@@ -25,10 +24,8 @@ use crate::{
 /// A picture with its capture time, for cameras that stamp frames by their own clock.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Picture {
-    /// Start of the exposure.
     pub begin_ns: u64,
     pub header: FrameHeader,
-    /// Encoded for the endpoint.
     frame: Vec<u8>,
 }
 
@@ -47,25 +44,22 @@ impl Picture {
     }
 }
 
-/// Separates the second camera's noise from the first's and from rigs with nearby seeds.
+/// Separates the second camera's noise from the first's and from nearby seeds.
 const OF_THE_SECOND: u64 = 0x5ec0_0d00_0000_0000;
 
 pub struct Imager {
     renderer: Renderer,
     camera: Camera,
     view: View,
-    /// Scene motion, px/s right and down.
     speed_px_per_s: [f64; 2],
     light: Option<LightParts>,
-    /// Extra sensor distance from the lens.
     further_mm: f64,
     mirrored: bool,
     exposures: u32,
 }
 
 impl Imager {
-    /// `seed` sets texture and noise.
-    /// Errors: [`SimError::Scene`] if scene, lens or camera cannot produce a picture.
+    /// `seed` sets texture and noise. Fails if scene, lens or camera cannot produce a picture.
     pub fn new(scene: &Scene, lens: &Lens, psf: &Psf, camera: Camera, seed: u64) -> Result<Self, SimError> {
         let renderer = Renderer::new(scene, lens, psf, &camera, seed)
             .map_err(|error| SimError::Scene(error.to_string()))?;
@@ -88,7 +82,7 @@ impl Imager {
         })
     }
 
-    /// The second camera behind a half mirror: sensor further away, its own noise and hot pixels.
+    /// The second camera behind a half mirror: its own distance, noise and hot pixels.
     #[must_use]
     pub fn as_second(self, further_mm: f64, mirror: &HalfMirrorParts, seed: u64) -> Self {
         let view = mirror.second_view();
@@ -96,14 +90,12 @@ impl Imager {
         Self { renderer, view, further_mm, mirrored: mirror.second_mirrored, ..self }
     }
 
-    /// Moves the scene across the image from power-on. Motion blur is not modelled; less than a pixel per
-    /// exposure is exact.
+    /// Moves the scene from power-on, without motion blur (exact below a pixel per exposure).
     #[must_use]
     pub fn moving(self, speed_px_per_s: [f64; 2]) -> Self {
         Self { speed_px_per_s, ..self }
     }
 
-    /// The same under this light instead of a steady one.
     #[must_use]
     pub fn lit_by(self, light: LightParts) -> Self {
         Self { light: Some(light), ..self }
@@ -145,9 +137,7 @@ impl Imager {
     }
 }
 
-/// Renders exposures until the channel closes, one per camera and client. `gige` gets all pictures of the
-/// first camera.
-/// Errors: [`SimError::Io`] if no thread can be started.
+/// Renders exposures until the channel closes. `gige` gets all pictures of the first camera.
 pub fn watch(
     mut cameras: Vec<(Imager, SyncSender<Vec<u8>>)>,
     shots: Receiver<Shot>,
@@ -161,7 +151,7 @@ pub fn watch(
                 let dropped = shot.id == FREE_RUNNING && pictures.is_of_ended_run(number);
                 for (at, (imager, frames)) in cameras.iter_mut().enumerate() {
                     if dropped || !pictures.wants(at, number) {
-                        imager.exposures += 1; // the noise of those after it stays what it would be
+                        imager.exposures += 1; // later exposures keep their noise
                         continue;
                     }
                     match imager.picture(&shot) {

@@ -1,25 +1,20 @@
-//! # farnear-sim
-//!
-//! The rig without hardware: the unmodified firmware ELF on an emulated STM32, with a plant of two motorised
-//! stages, a piezo, encoders, end switches and a camera. The firmware measures through its registers;
-//! the true state is in [`plant`] and visible to tests only.
+//! The rig without hardware: the unmodified firmware ELF on an emulated STM32, with two motorised stages, a
+//! piezo, encoders, end switches and a camera. The firmware measures through its registers; the true state is
+//! in [`plant`].
 //!
 //! - [`parts`]: properties of the parts (`parts.toml`); [`processor`]: instruction costs.
-//! - [`rig`]: the rig in this process, for tests; [`config`], [`command`], [`report`]: its configuration,
-//!   commands and state.
-//! - [`run`](mod@run): the program: a pty ([`port`]) and a camera [`endpoint`], or a GigE Vision camera
-//!   ([`farnear_gige`]).
-//! - [`board`], [`chips`], [`memory`], [`memory_file`], [`serial`], [`wiring`]: the emulated board and its
-//!   wires.
+//! - [`rig`]: the rig in this process, for tests, with [`config`], [`command`] and [`report`].
+//! - [`run`](mod@run): the program with a pty ([`port`]), a camera [`endpoint`] and a [`farnear_gige`]
+//!   camera.
+//! - [`board`], [`chips`], [`memory`], [`memory_file`], [`serial`], [`wiring`]: the emulated board.
 //! - [`camera`], [`imager`], [`half_mirror`]: exposure timing, images, and the second camera.
 //! - [`driver`]: the emulator's stops; [`pacing`], [`lockstep`]: when virtual time passes.
 //! - [`mod@count`]: instruction counts of on-board routines.
 //! - [`faults`]: faults from a file; [`access`]: faults from a test; [`trace`]: recordings.
 //!
-//! # Time
-//! Virtual time is counted in nanoseconds and is independent of the wall clock. In lockstep it passes only
-//! while the board has something outstanding. The same requests then give the same bytes on any machine,
-//! if they are sent while time stands; a request during a move arrives at a time that depends on the host.
+//! Virtual time is in nanoseconds, independent of the wall clock. In lockstep it passes only while the board
+//! has something outstanding. The same requests then give the same bytes on any machine, unless sent during a
+//! move.
 
 pub mod access;
 mod adapter;

@@ -1,41 +1,35 @@
-//! Lamp and flash on the board's light outputs: how bright they are, by the registers of the timer that dims them. The
-//! emulator has no model of TIM12, so its register file alone tells the duty cycle; a lamp follows it without delay.
+//! Brightness of lamp and flash, from TIM12's register file; the emulator has no model of TIM12.
 
 use rigless::{mcu::Operate, soc::Width, time::VirtualNanos};
 
 use crate::board::{Chip, LIGHTS};
 
-/// TIM12 (RM0090, section 2.3), and its registers (section 19.5).
+/// RM0090, section 2.3; registers: section 19.5.
 const TIM12: u64 = 0x4000_1800;
 const CR1: u64 = TIM12;
 const CCER: u64 = TIM12 + 0x20;
 const ARR: u64 = TIM12 + 0x2c;
 const CCR: [u64; 2] = [TIM12 + 0x34, TIM12 + 0x38];
-/// Output enable of both channels in CCER.
 const ENABLED: [u64; 2] = [1, 1 << 4];
 /// Alternate function of TIM12 on its pins (DS9405, table 12).
 const FUNCTION: u8 = 9;
 
-/// Both outputs, brightness from 0 to 1.
 #[derive(Debug, Default)]
 pub struct Lights {
     levels: [f64; 2],
     since_ns: u64,
     /// Brightness times nanoseconds until `since_ns`.
     sum_ns: [f64; 2],
-    /// Sum when the exposure in progress began.
+    /// Sum at the start of the current exposure.
     begun_ns: [f64; 2],
-    /// Changes while someone records them: when, and to what.
     changes: Option<Vec<(u64, [f64; 2])>>,
 }
 
 impl Lights {
-    /// Whether a write to this address can change the light.
     pub fn watches(address: u64) -> bool {
         (TIM12..TIM12 + 0x400).contains(&address)
     }
 
-    /// A register of the timer was written.
     pub fn look(&mut self, chip: &mut Chip, at: VirtualNanos) {
         let mut read = |address| Operate::peek(chip, at, address, Width::W32).unwrap_or(0);
         let runs = read(CR1) & 1 != 0;
@@ -83,7 +77,7 @@ impl Lights {
         self.levels
     }
 
-    /// The changes since the last call, in virtual nanoseconds; the first call begins to record them.
+    /// Virtual nanoseconds; the first call starts the recording.
     pub fn take_changes(&mut self) -> Vec<(u64, [f64; 2])> {
         self.changes.replace(Vec::new()).unwrap_or_default()
     }

@@ -1,7 +1,5 @@
-//! Baud rates of both ends of the line.
-//!
-//! With different rates the receiver reads wrong bytes. Here each byte is replaced by a fixed other one, so
-//! that runs repeat; the duration is that of the board's rate.
+//! Baud rates of both ends of the line. With different rates the receiver reads wrong bytes: each byte is
+//! replaced by a fixed other one, so that runs repeat.
 
 use std::ops::Range;
 
@@ -22,17 +20,15 @@ pub struct LinkRates {
 }
 
 impl LinkRates {
-    /// After a reset, with no rate set by the host.
     pub const fn new() -> Self {
         Self { board: LinkRate::START, next: None, host: None }
     }
 
-    /// Whether a write to `address` changes the board's rate.
     pub fn watches(address: u64) -> bool {
         BRR.contains(&address)
     }
 
-    /// The board has written its divider; takes effect in [`LinkRates::settle`].
+    /// Takes effect in [`LinkRates::settle`].
     pub fn divide(&mut self, divider: u32) {
         let baud = APB1_HZ / divider.max(1);
         let near = |rate: &LinkRate| baud.abs_diff(rate.baud()) < rate.baud() / TOLERANCE;
@@ -48,12 +44,11 @@ impl LinkRates {
         (self.board, self.next) = (LinkRate::START, None);
     }
 
-    /// Sets the host's rate. An unsupported rate is ignored: a program on a pseudo-terminal need not set one.
+    /// Ignores an unsupported rate: a program on a pseudo-terminal need not set one.
     pub fn set_host(&mut self, baud: u32) {
         self.host = LinkRate::of(baud);
     }
 
-    /// Corrupts bytes in transit if the rates differ.
     pub fn carry(&self, bytes: &mut [u8]) {
         if self.host.is_some_and(|host| host != self.board) {
             for byte in bytes {

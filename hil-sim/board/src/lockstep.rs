@@ -1,11 +1,9 @@
-//! Decides when virtual time may pass in lockstep.
-//!
-//! Time passes only while the board has something outstanding: an answer, the terminal event of long work,
-//! its first event after a reset, or a motor that still brakes. It also stops while the board waits for its
-//! host (keep-alive, camera trigger). A run therefore repeats to the byte.
+//! Decides when virtual time may pass in lockstep: only while the board has an answer, the terminal event of
+//! long work or its first event after a reset outstanding, or a motor brakes. Time also stops while the board
+//! waits for its host (keep-alive, camera trigger). A run therefore repeats to the byte.
 //!
 //! The decision uses only frames on the line. A lost request expires after a virtual timeout. A repeat of a
-//! request that is still being answered is dropped, because a slow host may time out while time stands.
+//! request that is still being answered is dropped, because a slow host may time out while time is stopped.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
@@ -14,14 +12,12 @@ use farnear_protocol::{
     frame::{Decoder, Kind, Packet},
 };
 
-/// An unanswered request expires after this time (the board answers within milliseconds).
+/// An unanswered request expires after this; the board answers within milliseconds.
 const ANSWER_NS: u64 = 60_000_000;
-/// Timeout for a terminal event, far above the longest program. In a continuous run it counts from the last
-/// frame.
+/// Limit of long work, above the longest program; in a continuous run it counts from the last frame.
 const WORK_NS: u64 = 600_000_000_000;
 /// From the answer to the new link rate: one control tick and a margin.
 const RATE_NS: u64 = 1_000_000;
-/// Timeout for the started event after a reset.
 pub const BOOT_NS: u64 = 2_000_000_000;
 /// Remembered ended requests; more than the board remembers answers.
 const ENDED: usize = 256;
@@ -30,18 +26,15 @@ const ENDED: usize = 256;
 pub struct Lockstep {
     to_board: Decoder,
     from_board: Decoder,
-    /// Unanswered requests by id.
     asked: BTreeMap<u32, Asked>,
-    /// Accepted long work by id, with its timeout.
     running: BTreeMap<u32, u64>,
     /// Ended requests; a repeated answer to one starts nothing.
     ended: VecDeque<u32>,
-    /// Timeout of the start after a reset.
+    /// Virtual time at which the wait for a start after a reset ends.
     starting: Option<u64>,
     boots: BTreeSet<u32>,
-    /// Program paused between two exposures.
     paused: Option<u32>,
-    /// The board has sent a message that its host must answer.
+    /// The board expects an answer of its host.
     waits_for_host: bool,
 }
 
@@ -52,13 +45,11 @@ struct Asked {
     body: Vec<u8>,
 }
 
-/// What an accepted request leaves running.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Work {
     Done,
     /// Ends with a terminal event.
     Long,
-    /// Continues a paused program.
     Resume,
     Reset,
     /// Changes the link rate once the answer has left.
@@ -140,12 +131,10 @@ impl Lockstep {
         self.waits_for_host = false;
     }
 
-    /// Whether a request is unanswered.
     pub fn is_asked(&self) -> bool {
         !self.asked.is_empty()
     }
 
-    /// Whether time stands because the board waits for its host.
     pub fn waits_for_host(&self) -> bool {
         self.waits_for_host
     }
@@ -231,7 +220,6 @@ impl Lockstep {
         self.ended.push_back(ended);
     }
 
-    /// The board was reset, for any reason.
     pub fn reset(&mut self, now_ns: u64) {
         self.running.clear();
         self.asked.clear();
@@ -242,7 +230,6 @@ impl Lockstep {
         self.starting.get_or_insert(now_ns + BOOT_NS);
     }
 
-    /// Whether the board has something outstanding.
     pub fn is_busy(&mut self, now_ns: u64) -> bool {
         self.asked.retain(|_, asked| asked.until_ns > now_ns);
         self.running.retain(|_, until| *until > now_ns);

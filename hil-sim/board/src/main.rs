@@ -159,7 +159,7 @@ fn play_again(trace: &Path, firmware: Option<&Path>) -> Result<()> {
     Ok(())
 }
 
-/// Prints instructions, units, unit and name per routine, separated by tabs.
+/// Tab-separated: instructions, units, unit, name.
 fn count(elf: &Path) -> Result<()> {
     let mut stdout = std::io::stdout();
     for count in farnear_sim::count::count(elf)? {
@@ -168,7 +168,7 @@ fn count(elf: &Path) -> Result<()> {
     Ok(())
 }
 
-/// Configuration of the rig. The command line overrides the scenario.
+/// The command line overrides the scenario.
 fn config(run: &Run) -> Result<RigConfig> {
     let scenario = run.scenario.as_deref().map(Scenario::read).transpose()?.unwrap_or_default();
     let own = scenario.parts().map_err(anyhow::Error::msg)?;
@@ -257,11 +257,10 @@ fn serve(run: &Run) -> Result<()> {
     Ok(())
 }
 
-/// Link to the pty, removed on drop.
 struct Link(PathBuf);
 
 impl Link {
-    /// Creates the link. A dangling link of a killed rig is replaced; other files are kept.
+    /// Replaces a dangling link of a killed rig; keeps other files.
     fn new(path: &Path, port: &str) -> Result<Self> {
         if path.is_symlink() && !path.exists() {
             std::fs::remove_file(path).with_context(|| format!("cannot replace {}", path.display()))?;
@@ -271,7 +270,6 @@ impl Link {
         Ok(Self(path.into()))
     }
 
-    /// Points the link to another port atomically.
     fn point(path: &Path, port: &str) -> Result<()> {
         let cannot = || format!("cannot point the link {} to {port}", path.display());
         let name = path.file_name().with_context(cannot)?.to_string_lossy();
@@ -287,7 +285,6 @@ impl Drop for Link {
     }
 }
 
-/// Whether standard input is a pipe rather than a terminal or /dev/null.
 fn stdin_is_a_pipe() -> bool {
     let stdin = std::io::stdin();
     let Ok(handle) = stdin.as_fd().try_clone_to_owned() else { return false };

@@ -1,5 +1,4 @@
-//! The board's FRAM (Cypress FM25V02 or FM25V02A) with its faults: supply failure during a write, flipped
-//! bits, replaced or missing chip.
+//! The board's FRAM (Cypress FM25V02 or FM25V02A) with its faults.
 
 use rigless::{
     chip::{
@@ -13,13 +12,11 @@ use rigless::{
 
 use crate::parts::MemoryMake;
 
-/// Write opcode; two address bytes follow.
+/// Two address bytes follow.
 const WRITE: u32 = 0x02;
 const READ: u32 = 0x03;
-/// Opcode of the identification.
 const READ_ID: u32 = 0x9f;
 
-/// The chip behind its select line.
 #[derive(Debug)]
 pub struct MemoryChip {
     chip: Fm25v02,
@@ -35,7 +32,6 @@ pub struct MemoryChip {
 }
 
 impl MemoryChip {
-    /// A new chip, all zero.
     pub fn new(make: MemoryMake) -> Self {
         Self {
             chip: Fm25v02::new(),
@@ -62,22 +58,20 @@ impl MemoryChip {
         self.chip.stored()
     }
 
-    /// Bytes written since power-on.
     pub fn written(&self) -> u64 {
         self.written
     }
 
-    /// Fails the supply after this many more bytes; the last one is still stored.
+    /// The last byte is still stored.
     pub fn fail_after(&mut self, bytes: u64) {
         self.fails_at = Some(self.written + bytes);
     }
 
-    /// Cancels the supply failure.
     pub fn keep_supply(&mut self) {
         self.fails_at = None;
     }
 
-    /// Whether the supply has just failed; resets the flag.
+    /// Whether the supply has failed since the last call.
     pub fn take_failure(&mut self) -> bool {
         self.failed && self.fails_at.take().is_some()
     }

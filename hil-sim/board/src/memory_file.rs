@@ -12,7 +12,6 @@ fn failed(what: &str, path: &Path) -> impl FnOnce(std::io::Error) -> SimError {
 }
 
 /// Contents at the end of the last run; `None` without a file.
-/// Errors: [`SimError::Memory`] for a wrong size, [`SimError::Io`] if it cannot be read.
 pub fn read(path: &Path) -> Result<Option<Box<[u8; SIZE]>>, SimError> {
     let bytes = match fs::read(path) {
         Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),
@@ -23,7 +22,6 @@ pub fn read(path: &Path) -> Result<Option<Box<[u8; SIZE]>>, SimError> {
     contents.map(Some).map_err(|_| SimError::Memory { path: path.into(), length, expected: SIZE })
 }
 
-/// Writes atomically through a temporary file.
 pub fn write(path: &Path, contents: &[u8]) -> Result<(), SimError> {
     let aside = path.with_added_extension(format!("partial-{}", std::process::id()));
     let written = fs::write(&aside, contents).and_then(|()| fs::rename(&aside, path));

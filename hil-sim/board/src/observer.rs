@@ -1,5 +1,4 @@
-//! Records a run for the invariants of a campaign (`farnear-campaign`): frames on the line before its faults,
-//! the true mechanics, STEP bursts, exposures, resets and faults.
+//! Records a run for the invariants of a campaign; frames are recorded before line faults.
 
 use farnear_protocol::{
     Call, Event, EventKind, RequestError, Response,
@@ -12,15 +11,13 @@ use crate::{
     wiring::{Burst, Shot},
 };
 
-/// True positions of the mechanics.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub struct Truth {
     /// Sensor stage, from its true home edge.
     pub coarse_um: f64,
-    /// Lens stage, likewise.
     pub lens_um: f64,
     pub piezo_um: f64,
-    /// Microsteps against a hard stop so far: sensor stage, lens stage.
+    /// Microsteps against a hard stop, per stage.
     pub pressed: [u64; 2],
 }
 
@@ -38,10 +35,8 @@ impl Truth {
 
 #[derive(Clone, PartialEq, Debug)]
 pub enum Seen {
-    /// A valid request was sent to the board.
     Asked {
         id: u32,
-        /// Boot number of the request.
         boot: u32,
         call: Call,
     },
@@ -56,16 +51,13 @@ pub enum Seen {
         number: u32,
         boot: u32,
         event: Box<Event>,
-        /// Positions at that time.
         truth: Truth,
     },
     /// A burst of STEP pulses that ended 20 ms ago.
     Stepped(Burst),
     Exposed(Shot),
     Reset,
-    /// Power switched on or off.
     Powered(bool),
-    /// A fault started or was reverted.
     Happened {
         what: &'static str,
         reverts: bool,
@@ -74,7 +66,6 @@ pub enum Seen {
     Healed,
 }
 
-/// An observation with its time.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Sight {
     pub at_ns: u64,
@@ -90,7 +81,7 @@ pub struct Observer {
 }
 
 impl Observer {
-    /// `keeps`: record observations; else only report moments.
+    /// `keeps` records observations; otherwise only moments are reported.
     pub fn new(keeps: bool) -> Self {
         Self { keeps, ..Self::default() }
     }
@@ -134,13 +125,12 @@ impl Observer {
         moments
     }
 
-    /// The board was reset: its unfinished frame is dropped.
+    /// Drops the unfinished frame.
     pub fn reset(&mut self) {
         self.from_board = Decoder::new();
     }
 }
 
-/// Moment and observation of a frame from the board.
 fn read(packet: &Packet, truth: Truth) -> Option<(Option<Moment>, Seen)> {
     let (id, boot) = (packet.header.id, packet.header.boot);
     let answer = match packet.header.kind {

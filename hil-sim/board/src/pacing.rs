@@ -9,12 +9,10 @@ use crate::{command::Command, config::Pace, lockstep::Lockstep, report::Report};
 
 /// Virtual time between two checks of line and commands.
 const QUANTUM_NS: u64 = 100_000;
-/// The same in real time.
 const REALTIME_QUANTUM_NS: u64 = 1_000_000;
 /// Wall-clock timeout for a host that the board waits for.
 const HOST_PATIENCE: Duration = Duration::from_secs(1);
-/// In real time the clock keeps running this long after activity of a host. An idle rig then uses no
-/// processor time.
+/// In real time the clock runs this long after activity, so that an idle rig uses no processor time.
 const AWAKE: Duration = Duration::from_millis(200);
 /// A machine that is this late restarts the pace from now.
 const BEHIND: Duration = Duration::from_millis(100);
@@ -22,15 +20,11 @@ const BEHIND: Duration = Duration::from_millis(100);
 pub struct Pacing {
     pace: Pace,
     pub lockstep: Lockstep,
-    /// End of the requested advance.
     advance_until_ns: u64,
-    /// Callers that wait for this time.
     advancing: Vec<Sender<Report>>,
-    /// Callers that wait for an idle board.
     settling: Vec<Sender<Report>>,
     /// Wall-clock time and the matching virtual time.
     wall: Option<(Instant, u64)>,
-    /// Wall-clock time of the last activity.
     last_activity: Instant,
 }
 
@@ -51,7 +45,6 @@ impl Pacing {
         self.pace == Pace::Realtime
     }
 
-    /// Notes activity of a host.
     pub fn note_activity(&mut self) {
         self.last_activity = Instant::now();
     }
@@ -60,28 +53,24 @@ impl Pacing {
         self.pace == Pace::Lockstep
     }
 
-    /// Lets `nanos` pass, then notifies `done`.
     pub fn advance(&mut self, now_ns: u64, nanos: u64, done: Sender<Report>) {
         self.advance_until_ns = self.advance_until_ns.max(now_ns.saturating_add(nanos));
         self.advancing.push(done);
     }
 
-    /// Runs until the board is idle, then notifies `done`.
     pub fn settle(&mut self, done: Sender<Report>) {
         self.settling.push(done);
     }
 
-    /// Whether a requested advance is active.
     pub fn is_advancing(&self, now_ns: u64) -> bool {
         now_ns < self.advance_until_ns
     }
 
-    /// Whether the board is busy. `at_work`: bytes are in transit or a motor moves.
+    /// `at_work`: bytes are in transit or a motor moves.
     fn is_busy(&mut self, now_ns: u64, at_work: bool) -> bool {
         self.lockstep.is_busy(now_ns) || at_work
     }
 
-    /// Callers whose wait ends now.
     pub fn take_waiting(&mut self, now_ns: u64, at_work: bool) -> Vec<Sender<Report>> {
         let mut waiting = Vec::new();
         if !self.is_advancing(now_ns) {
@@ -102,7 +91,6 @@ impl Pacing {
             }
     }
 
-    /// Waits for a command while time stands; `None` once the host has timed out.
     pub fn wait(&mut self, commands: &Receiver<Command>) -> Option<Command> {
         // When time continues, the pace restarts from then.
         self.wall = None;
@@ -142,12 +130,10 @@ impl Pacing {
         }
     }
 
-    /// Default interval to the next stop.
     pub fn quantum_ns(&self) -> u64 {
         if self.is_realtime() { REALTIME_QUANTUM_NS } else { QUANTUM_NS }
     }
 
-    /// Time of the next check.
     pub fn next_look_ns(&self, now_ns: u64) -> u64 {
         let until = now_ns + self.quantum_ns();
         if self.is_advancing(now_ns) { until.min(self.advance_until_ns) } else { until }

@@ -1,6 +1,4 @@
-//! Properties of the emulated parts (`parts.toml`, with sources).
-//!
-//! A file in the same form overrides the values that it contains.
+//! Properties of the emulated parts (`parts.toml`, with sources). A file of the same form overrides values.
 
 use std::path::Path;
 
@@ -10,7 +8,6 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::SimError;
 
-/// The default rig.
 const STANDARD: &str = include_str!("../parts.toml");
 
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
@@ -24,12 +21,10 @@ pub struct Parts {
     pub supply: SupplyParts,
     pub switches: SwitchParts,
     pub driver: DriverParts,
-    /// Lens, light and sensor, except blur and noise.
     pub imaging: ImagingParts,
     pub half_mirror: HalfMirrorParts,
 }
 
-/// The half mirror and the second camera.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct HalfMirrorParts {
@@ -44,13 +39,11 @@ pub struct HalfMirrorParts {
 }
 
 impl HalfMirrorParts {
-    /// View of the second camera relative to the first.
     pub fn second_view(&self) -> View {
         View { shift_px: self.second_shift_px, rotation_deg: self.second_rotation_deg, ..View::default() }
     }
 }
 
-/// Lens, light and sensor, except blur and noise.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ImagingParts {
@@ -77,7 +70,6 @@ pub struct ImagingParts {
     pub light: LightParts,
 }
 
-/// What lights the scene.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct LightParts {
@@ -86,14 +78,14 @@ pub struct LightParts {
     /// Share of the room's light that flickers, and how often a second.
     pub flicker: f64,
     pub flicker_hz: f64,
-    /// What each of the board's light outputs adds when fully on.
+    /// Brightness that each light output adds when fully on.
     pub lamps: [f64; 2],
-    /// The scene is blank; the second output is a projector whose pattern is the scene's texture.
+    /// The scene is blank; the second output projects the scene's texture.
     pub blank_walls: bool,
 }
 
 impl LightParts {
-    /// Mean brightness of an exposure, with the mean of each light output: textured and even light.
+    /// Mean brightness of an exposure from the outputs' means: textured and even light.
     pub fn brightness(&self, (begin_ns, end_ns): (u64, u64), outputs: [f64; 2]) -> (f64, f64) {
         let turn = |at_ns: u64| std::f64::consts::TAU * self.flicker_hz * 1e-9 * at_ns as f64;
         let (begin, end) = (turn(begin_ns), turn(end_ns));
@@ -132,13 +124,11 @@ impl ImagingParts {
 #[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ProcessorParts {
-    /// Average cycles per instruction.
     pub cycles_per_instruction: f64,
     /// Factor while the flash accelerator is not fully on.
     pub without_accelerator: f64,
 }
 
-/// The gauge's converter and its data line.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ConverterParts {
@@ -190,7 +180,6 @@ pub enum MemoryMake {
 }
 
 impl MemoryMake {
-    /// Bytes of its identification.
     pub const fn name(self) -> [u8; 9] {
         match self {
             Self::Fm25v02 => DEVICE_ID,
@@ -200,7 +189,6 @@ impl MemoryMake {
     }
 }
 
-/// The chip's supply supervision.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SupplyParts {
@@ -212,7 +200,6 @@ pub struct SupplyParts {
     pub power_down_mv: u32,
 }
 
-/// Brown-out reset levels.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum BrownOut {
@@ -261,9 +248,7 @@ pub struct PiezoParts {
 #[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SwitchParts {
-    /// Bounce time of a contact.
     pub bounce_us: u64,
-    /// Mean changes while it bounces.
     pub bounces_per_ms: f64,
     /// Length of a false opening.
     pub glitch_us: u64,
@@ -271,7 +256,6 @@ pub struct SwitchParts {
     pub glitches_per_s: f64,
 }
 
-/// The motors' driver chips.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct DriverParts {
@@ -292,14 +276,12 @@ impl Default for Parts {
 
 impl Parts {
     /// Reads a file with the values that differ from the default.
-    /// Errors: [`SimError::Parts`] for an unreadable file, invalid TOML or a value out of range.
     pub fn read(path: &Path) -> Result<Self, SimError> {
         let wrong = |reason: String| SimError::Parts { path: path.into(), reason };
         let text = std::fs::read_to_string(path).map_err(|error| wrong(error.to_string()))?;
         Self::parse(&text).map_err(wrong)
     }
 
-    /// The default rig with these changes.
     pub(crate) fn parse(text: &str) -> Result<Self, String> {
         let mut table: toml::Table = toml::from_str(STANDARD).map_err(|error| error.to_string())?;
         let other: toml::Table = toml::from_str(text).map_err(|error| error.to_string())?;
@@ -307,7 +289,7 @@ impl Parts {
             match (table.get_mut(&part), values) {
                 (Some(toml::Value::Table(known)), toml::Value::Table(values)) => known.extend(values),
                 (Some(_), _) => return Err(format!("{part} is a table: [{part}]")),
-                (None, values) => drop(table.insert(part, values)), // refused by its name below
+                (None, values) => drop(table.insert(part, values)), // rejected by name below
             }
         }
         let parts: Self = table.try_into().map_err(|error: toml::de::Error| error.to_string())?;

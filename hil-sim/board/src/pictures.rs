@@ -8,7 +8,6 @@ use std::{
     time::{Duration, Instant},
 };
 
-/// Pictures that may wait.
 const WAITING_MAX: usize = 8;
 /// Wall-clock timeout without a transfer; after it no client is assumed.
 const PATIENCE: Duration = Duration::from_secs(1);
@@ -23,7 +22,7 @@ pub struct Pictures {
     done: AtomicUsize,
     /// First wanted exposure per camera; earlier ones are dropped.
     wanted_from: [AtomicUsize; CAMERAS_MAX],
-    /// The free run that exposed those before this one has ended.
+    /// The free run of earlier exposures has ended.
     free_run_from: AtomicUsize,
 }
 
@@ -32,7 +31,6 @@ impl Pictures {
         self.exposed.fetch_add(1, Ordering::Relaxed);
     }
 
-    /// A picture was transferred or dropped.
     pub fn finish(&self) {
         self.done.fetch_add(1, Ordering::Relaxed);
     }
@@ -44,7 +42,7 @@ impl Pictures {
         }
     }
 
-    /// Drops the pictures of a free run that has ended: rendering them would keep the next client waiting.
+    /// Drops the pictures of an ended free run, which would delay the next client.
     fn end_free_run(&self) {
         self.free_run_from.store(self.exposed.load(Ordering::Relaxed), Ordering::Relaxed);
     }
@@ -54,7 +52,7 @@ impl Pictures {
         number < self.free_run_from.load(Ordering::Relaxed)
     }
 
-    /// Whether anybody wants this camera's picture of this exposure, both counted from 0.
+    /// Both counted from 0.
     pub fn wants(&self, camera: usize, number: usize) -> bool {
         self.wanted_from.get(camera).is_none_or(|wanted_from| number >= wanted_from.load(Ordering::Relaxed))
     }
@@ -85,14 +83,12 @@ impl Patience {
         }
     }
 
-    /// The camera runs freely no more.
     pub fn end_free_run(&self) {
         if let Some(pictures) = &self.pictures {
             pictures.end_free_run();
         }
     }
 
-    /// Whether time is to stand.
     pub fn is_asked(&mut self) -> bool {
         let Some(pictures) = &self.pictures else { return false };
         let count = pictures.waiting();

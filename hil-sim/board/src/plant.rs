@@ -1,8 +1,7 @@
 //! The mechanics: true positions, as opposed to what the firmware measures.
 //!
-//! Lengths are micrometres in a stage's frame: 0 = true home edge, positive = sensor and lens apart. Times
-//! are virtual nanoseconds. The plant advances on request only; the request times affect nothing but
-//! rounding, and lockstep fixes them.
+//! Micrometres in a stage's frame: 0 = true home edge, positive = sensor and lens apart. Virtual nanoseconds.
+//! The plant advances on request only; the request times affect only rounding, and lockstep fixes them.
 
 mod contact;
 mod motor;
@@ -20,21 +19,17 @@ pub use stage::{Stage, StageName};
 
 use crate::parts::{GaugeParts, Parts};
 
-/// Distance from principal plane to sensor with all axes at 0, millimetres. The rig is assembled to it; the
-/// firmware has the same value.
+/// Distance from principal plane to sensor with all axes at 0, as assembled; the firmware has the same value.
 pub const DATUM_MM: f64 = 47.0;
 /// Converter code at the relaxed piezo; 1 nm per code (data sheet of the gauge amplifier).
 const GAUGE_CODE_ZERO: f64 = 10_000.0;
 const GAUGE_CODE_MAX: f64 = 262_143.0;
 
-/// Sensor position during an exposure.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct ExposureTruth {
     /// Mean distance from the principal plane.
     pub sensor_mm: f64,
-    /// Mean position of the sensor stage.
     pub coarse_um: f64,
-    /// Mean position of the lens stage.
     pub lens_um: f64,
     pub piezo_um: f64,
     pub piezo_min_um: f64,
@@ -51,7 +46,6 @@ struct Exposing {
     piezo_max_um: f64,
 }
 
-/// Gauge zero drift.
 #[derive(Clone, Copy, Debug, Default)]
 struct Drift {
     since_ns: u64,
@@ -77,8 +71,7 @@ pub struct Plant {
 }
 
 impl Plant {
-    /// The mechanics at power-on; `seed` sets the screw errors and, without `start_um`, the positions of
-    /// sensor and lens stage.
+    /// `seed` sets the screw errors and, without `start_um`, the positions of sensor and lens stage.
     pub fn new(seed: u64, parts: &Parts, start_um: Option<[f64; 2]>) -> Self {
         Self {
             now_ns: 0,
@@ -131,7 +124,6 @@ impl Plant {
         self.piezo.set_dac(code);
     }
 
-    /// Gauge sample, 18 bit.
     pub fn sample_gauge(&mut self, now_ns: u64) -> u32 {
         self.advance(now_ns);
         let GaugeParts { gain, offset_um, noise_um } = self.gauge;
@@ -160,7 +152,6 @@ impl Plant {
         });
     }
 
-    /// Ends the exposure; `None` if there was none.
     pub fn end_exposure(&mut self, now_ns: u64) -> Option<ExposureTruth> {
         self.advance(now_ns);
         let sums = self.exposing.take()?;
@@ -185,7 +176,6 @@ impl Plant {
         }
     }
 
-    /// A stage, for fault injection.
     pub fn stage_mut(&mut self, name: StageName) -> &mut Stage {
         match name {
             StageName::Sensor => &mut self.sensor_stage,

@@ -1,7 +1,5 @@
-//! The serial port that clients open: a pty.
-//!
-//! Client bytes are forwarded in whole frames, however the operating system splits them. Bytes written
-//! together stay together, because later ones would reach the board in another state.
+//! The serial port that clients open: a pty. Forwards client bytes in whole frames. Bytes written together
+//! stay together: later ones would reach the board in another state.
 
 use std::{
     io::{ErrorKind, Read, Write},
@@ -19,15 +17,13 @@ use serialport::{SerialPort, TTYPort};
 
 use crate::{command::Command, error::SimError};
 
-/// Read timeout: interval of checks for an unplugged port, and how long whole frames wait for the rest of one
-/// behind them.
+/// Read timeout: interval of checks for an unplugged port, and of whole frames waiting for an incomplete one.
 const LOOK: Duration = Duration::from_millis(20);
 /// A client that reads nothing for this long loses bytes, as on a real line.
 const PATIENCE: Duration = Duration::from_millis(500);
 
-/// Opens a pty and returns its name. `to_client` goes out; whole frames and changed baud rates go to
-/// `from_client`, which returns whether it accepts more. The port closes when `to_client` ends.
-/// Errors: [`SimError::Port`] without a pty, [`SimError::Io`] if no thread can be started.
+/// Opens a pty and returns its name. Whole frames and changed baud rates go to `from_client`, which returns
+/// whether it accepts more. The port closes when `to_client` ends.
 pub fn open(
     to_client: Receiver<Vec<u8>>,
     from_client: impl Fn(Command) -> bool + Send + 'static,
@@ -88,23 +84,18 @@ fn read(port: &mut TTYPort, unplugged: &AtomicBool, from_client: &impl Fn(Comman
     }
 }
 
-/// Limit for noise without a delimiter; the rest up to the next delimiter is dropped, as by an adapter with a
-/// full buffer. It cannot be part of a frame, and 1 MB would block the line for five seconds.
+/// Limit for noise without a delimiter; drops the rest. 1 MB would block the line for five seconds.
 const NOISE_MAX: usize = 4096;
 
-/// Cuts a byte stream into frames with their delimiters, and garbage into pieces.
-///
-/// A single delimiter, which hosts send to end a broken frame, is joined to the next frame. On its own it
-/// would let a host-dependent amount of time pass before that frame.
+/// Cuts a byte stream into frames with their delimiters, and garbage into pieces. A single delimiter, which
+/// ends a broken frame, is joined to the next frame: on its own it would let a host-dependent time pass.
 #[derive(Debug, Default)]
 pub struct FrameCutter {
     piece: Vec<u8>,
-    /// Bytes since the last delimiter.
     run: usize,
 }
 
 impl FrameCutter {
-    /// Frames completed by these bytes.
     pub fn cut(&mut self, bytes: &[u8]) -> Vec<Vec<u8>> {
         let mut frames = Vec::new();
         for byte in bytes {
@@ -147,7 +138,7 @@ mod tests {
         for parts in [&[[1, 2, 0, 3, 4, 0].as_slice()][..], &[&[1, 2, 0, 3], &[4, 0]]] {
             for part in parts {
                 client.write_all(part).expect("room");
-                thread::sleep(LOOK / 10); // the operating system's pause within a write
+                thread::sleep(LOOK / 10); // the operating system may pause within a write
             }
             let bytes = commands.iter().find_map(|command| match command {
                 Command::Bytes(bytes) => Some(bytes),

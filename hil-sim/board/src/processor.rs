@@ -1,16 +1,10 @@
-//! Instruction costs: the emulator retires one instruction per cycle, a real processor does not.
+//! Instruction costs: the emulator retires one instruction per cycle, a real processor does not. [`Metered`]
+//! wraps the emulator's processor and counts cycles, so that timers and plant run as on a real processor.
 //!
-//! [`Metered`] sits between the emulator's run loop and its processor and counts cycles instead of
-//! instructions. The
-//! firmware's cycle counter, its timers and the plant then run as on a real processor.
-//!
-//! - Average: [`ProcessorParts::cycles_per_instruction`] cycles, and more while the flash accelerator is not
-//!   fully on
-//!   (writes to FLASH_ACR are watched). No run-time cost.
-//! - By kind: cycles per kind from the Cortex-M4 manual (`kinds`), fetches with wait states, instruction
-//!   cache and
-//!   prefetch (`flash`), and bus cycles of peripheral registers. Single-steps, about 100 times slower; for
-//!   measurements.
+//! - Average: [`ProcessorParts::cycles_per_instruction`], more while the flash accelerator is not fully on
+//!   (watches FLASH_ACR). No run-time cost.
+//! - By kind: Cortex-M4 manual (`kinds`), fetches with wait states and caches (`flash`), and bus cycles of
+//!   peripheral registers. Single-steps: about 100 times slower.
 
 mod cached;
 mod flash;
@@ -43,19 +37,17 @@ const FRACTION: u32 = 16;
 const FLASH_ACR: u64 = 0x4002_3c00;
 const LATENCY: u64 = 0xf;
 const ACCELERATOR: u64 = 0x700;
-/// Start of the program.
 const FLASH: u64 = 0x0800_0000;
 const FLASH_BYTES: u64 = 2 << 20;
 
 #[derive(Clone, PartialEq, Debug)]
 pub enum Costs {
     Average(ProcessorParts),
-    /// By kind, for these bytes at the start of the flash.
     ByKind(Vec<u8>),
 }
 
 impl Costs {
-    /// By kind, for an ELF; `None` if it has no flash segment.
+    /// `None` if the ELF has no flash segment.
     pub fn by_kind(elf: &[u8]) -> Option<Self> {
         let elf = object::File::parse(elf).ok()?;
         let mut program = Vec::new();
@@ -71,25 +63,21 @@ impl Costs {
     }
 }
 
-/// Flash offset of a segment.
 fn physical(segment: &object::Segment<'_, '_>) -> Option<usize> {
     let from = segment.address().checked_sub(FLASH)?;
     (from + segment.size() <= FLASH_BYTES).then_some(usize::try_from(from).ok()?)
 }
 
-/// Converts instructions to cycles.
 #[derive(Clone, Copy, Debug)]
 struct Meter {
     /// Instructions included in `cycles`.
     counted: u64,
     /// Cycles with [`FRACTION`] fraction bits.
     cycles: u64,
-    /// Cycles per further instruction.
     each: u64,
 }
 
 impl Meter {
-    /// Cycles after this many instructions.
     fn at(&self, instructions: u64) -> u64 {
         (self.cycles + instructions.saturating_sub(self.counted) * self.each) >> FRACTION
     }
@@ -111,7 +99,6 @@ fn fixed(cycles: f64) -> u64 {
     libm::round(cycles * f64::from(1 << FRACTION)) as u64
 }
 
-/// The emulator's processor, counted in cycles.
 #[derive(Debug)]
 pub struct Metered {
     inner: Translated,
@@ -127,7 +114,6 @@ enum Model {
 }
 
 impl Model {
-    /// Average cycles per instruction.
     fn each(&self) -> u64 {
         match self {
             Self::Average { parts, acr } => {
@@ -139,7 +125,6 @@ impl Model {
         }
     }
 
-    /// FLASH_ACR was written.
     fn set_acr(&mut self, value: u64) {
         match self {
             Self::Average { acr, .. } => *acr = value,
@@ -150,7 +135,6 @@ impl Model {
 
 impl Metered {
     /// Wraps a new processor, or one left by an earlier rig with the same program.
-    /// Errors: errors of `make`.
     pub fn new(
         program: u64,
         make: impl Fn() -> Result<Box<dyn Processor>, Error>,
@@ -191,7 +175,6 @@ impl Metered {
         }
     }
 
-    /// Cycles of the instruction at `pc`, followed by `next`.
     fn cost(&mut self, pc: u64, next: u64) -> u64 {
         let Model::ByKind { program, flash, handlers, bus } = &mut self.model else { return 1 };
         let waited = std::mem::take(bus);

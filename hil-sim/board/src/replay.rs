@@ -1,5 +1,4 @@
-//! Replays a run from its VCD trace with the same rig, bytes and faults, and compares the result line by
-//! line.
+//! Replays a run from its VCD trace with the same rig, bytes and faults, and compares line by line.
 
 use std::{collections::VecDeque, path::Path};
 
@@ -14,7 +13,6 @@ use crate::{
     trace::vcd::{END_OF_HEADING, MADE_OF, name_of, unhex},
 };
 
-/// A recorded action.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub enum Entry {
     Sent(Vec<u8>),
@@ -22,7 +20,6 @@ pub enum Entry {
     Healed,
     /// The emulator stopped because a requested time ended.
     Looked {
-        /// Requested time; the stop follows the instruction that crosses it.
         asked_ns: u64,
     },
 }
@@ -39,7 +36,6 @@ pub struct Departure {
     pub now: Option<String>,
 }
 
-/// Compares the lines of two runs.
 #[derive(Clone, Debug, Default)]
 pub struct Comparer {
     lines: VecDeque<String>,
@@ -49,7 +45,6 @@ pub struct Comparer {
 }
 
 impl Comparer {
-    /// Compares the next line.
     pub fn hold(&mut self, line: &str) {
         let recorded = self.lines.pop_front();
         self.line += 1;
@@ -68,7 +63,6 @@ impl Comparer {
         }
     }
 
-    /// Whether the runs differ.
     pub fn departs(&self) -> bool {
         self.first().is_some()
     }
@@ -85,11 +79,9 @@ impl Comparer {
     }
 }
 
-/// Recorded actions of a trace.
 #[derive(Debug)]
 pub struct Script {
     pub firmware: u64,
-    /// Memory contents at power-on.
     pub memory: Option<Box<[u8; SIZE]>>,
     pub comparer: Comparer,
     entries: VecDeque<(u64, Entry)>,
@@ -97,7 +89,6 @@ pub struct Script {
 }
 
 impl Script {
-    /// The next action that is due.
     pub fn take_due(&mut self, now_ns: u64) -> Option<Entry> {
         let (_, entry) = self.entries.pop_front_if(|(at_ns, _)| *at_ns <= now_ns)?;
         Some(entry)
@@ -116,7 +107,6 @@ fn words<'a>(heading: &'a str, prefix: &str) -> Result<&'a str, String> {
     text.ok_or_else(|| format!("it has no line \"{prefix}...\": a VCD that farnear-sim wrote is expected"))
 }
 
-/// Parses a comment of the body.
 fn comment(text: &str) -> Result<Option<Entry>, String> {
     let words: Vec<&str> = text.split(' ').collect();
     let number = |place: usize| words.get(place).and_then(|word| word.parse::<u64>().ok());
@@ -138,7 +128,6 @@ fn comment(text: &str) -> Result<Option<Entry>, String> {
     Ok(order.map(Entry::Ordered))
 }
 
-/// Parses a trace: configuration and actions.
 fn parse(text: &str) -> Result<(RigConfig, Script), String> {
     let (heading, body) = text
         .split_once(END_OF_HEADING)
@@ -179,9 +168,7 @@ fn parse(text: &str) -> Result<(RigConfig, Script), String> {
     Ok((config, Script { firmware, memory, comparer, entries, end_ns: at_ns }))
 }
 
-/// Replays a run; returns its length in virtual ns and the first difference.
-/// Errors: [`SimError::Replay`] for an invalid trace or another firmware; else as
-/// [`crate::EmulatedRig::new`].
+/// Returns the length in virtual ns and the first difference.
 pub fn replay(path: &Path, firmware: Option<&Path>) -> Result<(u64, Option<Departure>), SimError> {
     let wrong = |reason: String| SimError::Replay { path: path.into(), reason };
     let text = std::fs::read_to_string(path).map_err(|error| wrong(error.to_string()))?;

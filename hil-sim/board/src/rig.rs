@@ -1,8 +1,5 @@
-//! The emulated rig in this process: firmware, board, plant and time.
-//!
-//! The emulator has its own thread; a call returns when its request is done. [`EmulatedRig::advance_us`] and
-//! [`EmulatedRig::settle`] let time pass. In [`crate::Pace::Lockstep`] and [`crate::Pace::Realtime`] it also
-//! passes on its own terms.
+//! The emulated rig in this process: firmware, board, plant and time. The emulator has its own thread; a call
+//! returns when its request is done. [`EmulatedRig::advance_us`] and [`EmulatedRig::settle`] let time pass.
 
 use std::{
     sync::mpsc::{self, Receiver, Sender},
@@ -39,7 +36,6 @@ use crate::{
     wiring::{Shot, Wiring},
 };
 
-/// A running rig; ends when dropped.
 pub struct EmulatedRig {
     commands: Sender<Command>,
     thread: Option<JoinHandle<Result<(), SimError>>>,
@@ -50,7 +46,6 @@ pub struct EmulatedRig {
 
 impl EmulatedRig {
     /// Builds the rig and runs the firmware to its first idle moment.
-    /// Errors: [`SimError`] if the firmware is missing or does not start, or a file cannot be written.
     pub fn new(config: &RigConfig) -> Result<Self, SimError> {
         let (bytes_out, bytes) = mpsc::channel();
         let (shots_out, shots) = mpsc::channel();
@@ -60,18 +55,17 @@ impl EmulatedRig {
         Ok(Self { commands, thread: Some(thread), bytes, shots, decoder: Decoder::new() })
     }
 
-    /// Sends bytes to the board; they travel when time passes.
+    /// The bytes travel when time passes.
     pub fn send(&mut self, bytes: &[u8]) -> Result<(), SimError> {
         self.commands.send(Command::Bytes(bytes.to_vec())).map_err(|_| SimError::Stopped)
     }
 
-    /// Sets the host's baud rate; bytes pass only if the board has the same.
+    /// Bytes pass only if the board has the same rate.
     pub fn set_host_rate(&mut self, baud: u32) -> Result<(), SimError> {
         self.commands.send(Command::HostRate(baud)).map_err(|_| SimError::Stopped)
     }
 
-    /// Advances virtual time.
-    /// Errors: [`SimError::Stopped`] if the emulation has ended or failed.
+    /// Fails with [`SimError::Stopped`] if the emulation has ended.
     pub fn advance_us(&mut self, micros: u64) -> Result<Report, SimError> {
         self.ask(|done| Command::Advance { nanos: micros * 1000, done })
     }
@@ -81,7 +75,6 @@ impl EmulatedRig {
         self.ask(|done| Command::Settle { done })
     }
 
-    /// Reverts the scenario's faults and cancels the rest.
     pub fn heal(&mut self) -> Result<(), SimError> {
         self.commands.send(Command::Heal).map_err(|_| SimError::Stopped)
     }
@@ -97,7 +90,6 @@ impl EmulatedRig {
         self.advance_us(0)
     }
 
-    /// Runs `work` on the rig between two instructions.
     pub fn access(
         &mut self,
         work: impl FnOnce(&mut RigAccess<'_, '_>) + Send + 'static,
@@ -115,19 +107,16 @@ impl EmulatedRig {
         self.bytes.try_iter().flatten().collect()
     }
 
-    /// Valid frames from the board; bad ones are dropped.
     pub fn take_frames(&mut self) -> Vec<Packet> {
         let bytes = self.take_bytes();
         bytes.into_iter().filter_map(|byte| self.decoder.push(byte)?.ok()).collect()
     }
 
-    /// Completed exposures.
     pub fn take_shots(&mut self) -> Vec<Shot> {
         self.shots.try_iter().collect()
     }
 
-    /// Ends the rig.
-    /// Errors: the error that ended it earlier.
+    /// Returns the error that ended the rig earlier.
     pub fn stop(mut self) -> Result<(), SimError> {
         self.end()
     }
@@ -149,7 +138,7 @@ impl Drop for EmulatedRig {
 
 type Launched = (Sender<Command>, JoinHandle<Result<(), SimError>>);
 
-/// Starts the rig's thread and the board up to its first idle moment. A `script` is replayed to its end.
+/// Starts the rig's thread and the board up to its first idle moment; replays a `script` to its end.
 pub fn launch(config: &RigConfig, outlets: Outlets, script: Option<Script>) -> Result<Launched, SimError> {
     let script_given = script.is_some();
     let path = firmware::find(config.firmware.as_deref())?;

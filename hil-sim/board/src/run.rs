@@ -31,17 +31,14 @@ pub struct ServedRig {
     pub port: String,
     pub camera: SocketAddr,
     pub second_camera: Option<SocketAddr>,
-    /// Identification of the GigE Vision camera.
     pub gige: Option<String>,
     commands: Sender<Command>,
     thread: JoinHandle<Result<(), SimError>>,
 }
 
 impl ServedRig {
-    /// Starts the rig with its port and camera. `second` is a camera behind a half mirror; `gige` serves the
-    /// first camera over GigE Vision, too.
-    ///
-    /// `renamed` receives the new name when a scenario renames the pty.
+    /// Starts the rig with its port and camera. `second` is a camera behind a half mirror; `gige` also serves
+    /// the first camera. `renamed` receives the new name when a scenario renames the pty.
     pub fn start(
         config: &RigConfig,
         first: Imager,
@@ -89,7 +86,6 @@ impl ServedRig {
         Ok(Self { port, camera, second_camera, gige, commands, thread })
     }
 
-    /// Returns a function that ends the rig.
     pub fn stopper(&self) -> impl Fn() + Send + 'static {
         let commands = self.commands.clone();
         move || {
@@ -97,14 +93,12 @@ impl ServedRig {
         }
     }
 
-    /// Waits for the end of the rig.
-    /// Errors: the error that ended it, unless requested.
+    /// Waits for the end of the rig; returns its error unless the end was requested.
     pub fn wait(self) -> Result<(), SimError> {
         self.thread.join().unwrap_or_else(|_| Err(SimError::Emulator("it panicked".into())))
     }
 }
 
-/// Opens a pty with another name; `None` if that fails.
 fn another_port(
     to_board: Arc<OnceLock<Sender<Command>>>,
     renamed: impl Fn(&str) + Send + 'static,
@@ -118,7 +112,6 @@ fn another_port(
     })
 }
 
-/// Forwards requests of the camera's host.
 fn asker(commands: &Sender<Command>) -> impl Fn(Control) + Send + Clone + 'static {
     let commands = commands.clone();
     move |asked| {
@@ -139,7 +132,6 @@ fn asker(commands: &Sender<Command>) -> impl Fn(Control) + Send + Clone + 'stati
     }
 }
 
-/// The rig's time in ns.
 fn clock(commands: &Sender<Command>) -> impl Fn() -> u64 + Send + 'static {
     let commands = commands.clone();
     move || {

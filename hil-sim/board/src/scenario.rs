@@ -1,6 +1,4 @@
-//! A scenario: the rig, its faults, and its host's requests. `farnear-sim run --scenario` executes this TOML
-//! file, campaigns
-//! write it; `docs/hil.md` describes each field.
+//! A scenario: the rig, its faults and its host's requests as TOML; `docs/hil.md` describes each field.
 //!
 //! ```toml
 //! seed = 7                   # mechanics and random faults; --seed overrides it
@@ -58,7 +56,6 @@ pub struct Scenario {
     /// Virtual time after the board's start at which the port closes.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub unplug_after_ms: Option<u64>,
-    /// Differences from the default parts.
     #[serde(skip_serializing_if = "toml::Table::is_empty")]
     pub parts: toml::Table,
     #[serde(skip_serializing_if = "Vec::is_empty")]
@@ -73,17 +70,14 @@ fn is_zero(rate: &f64) -> bool {
 }
 
 impl Scenario {
-    /// Reads a file.
-    /// Errors: [`SimError::Scenario`] if it cannot be read, is invalid TOML or has a value out of range, with
-    /// line, field and range.
+    /// Errors have line, field and range.
     pub fn read(path: &Path) -> Result<Self, SimError> {
         let wrong = |reason: String| SimError::Scenario { path: path.into(), reason };
         let text = std::fs::read_to_string(path).map_err(|error| wrong(error.to_string()))?;
         Self::parse(&text).map_err(wrong)
     }
 
-    /// Parses the text.
-    /// Errors: Description of the first error.
+    /// Returns a description of the first error.
     pub fn parse(text: &str) -> Result<Self, String> {
         let scenario: Self = toml::from_str(text).map_err(|error| error.to_string())?;
         // TOML gives no position for numbers next to tables; their line is searched.
@@ -112,8 +106,7 @@ impl Scenario {
             .unwrap_or_else(|error| unreachable!("a scenario that TOML cannot express: {error}"))
     }
 
-    /// The rig's parts.
-    /// Errors: the invalid number and its range.
+    /// The error names the invalid number and its range.
     pub fn parts(&self) -> Result<Parts, String> {
         Parts::parse(&self.parts.to_string())
     }

@@ -17,7 +17,6 @@ struct Queues {
     from_board: Vec<u8>,
 }
 
-/// Shared handle of the line.
 #[derive(Clone, Debug, Default)]
 pub struct Line(Arc<Mutex<Queues>>);
 
@@ -26,7 +25,6 @@ impl Line {
         work(&mut self.0.lock().unwrap_or_else(PoisonError::into_inner))
     }
 
-    /// Sends bytes to the board at its baud rate.
     pub fn send(&self, bytes: &[u8]) {
         self.with(|queues| queues.to_board.extend(bytes));
     }

@@ -1,5 +1,4 @@
-//! File with the plant's true state: CSV for tables, VCD for waveform viewers and [`crate::replay`]. The file
-//! ending selects the format.
+//! File with the plant's true state: CSV for tables, VCD for waveform viewers and [`crate::replay`].
 
 mod csv;
 pub mod vcd;
@@ -30,7 +29,6 @@ impl Trace {
         Csv::create(path).map(Self::Csv)
     }
 
-    /// Records the state at a stop of the emulator.
     pub fn look(&mut self, now_ns: u64, plant: &Plant, wiring: &mut Wiring, shots: &[Shot]) {
         match self {
             Self::Csv(csv) => {
@@ -49,8 +47,6 @@ impl Trace {
         }
     }
 
-    /// Flushes the file.
-    /// Errors: the first write error.
     pub fn finish(self) -> Result<(), SimError> {
         match self {
             Self::Csv(csv) => csv.finish(),

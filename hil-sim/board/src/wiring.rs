@@ -16,36 +16,29 @@ use crate::{
     plant::{Contact, ExposureTruth, Noise, StageName},
 };
 
-/// Alternate functions of TIM2, and of TIM3 and TIM4 (DS9405, table 12). A pin not switched to its timer is
-/// disconnected from it.
+/// Alternate functions of TIM2, and of TIM3 and TIM4 (DS9405, table 12); other pins are disconnected.
 const TIM2_FUNCTION: u8 = 1;
 const ENCODER_FUNCTION: u8 = 2;
 /// TIM2's counter: lower 32 bits of the firmware's microseconds.
 const TIM2_CNT: u64 = 0x4000_0024;
 /// Registers that affect watched pins: TIM2, TIM1 and TIM8, port F.
 const WATCHED: [std::ops::Range<u64>; 3] = [0x4000_0000..0x4000_0400, 0x4001_0000..0x4001_0800, DRIVER_PORT];
-/// Port F: DIR and EN of both drivers.
 const DRIVER_PORT: std::ops::Range<u64> = 0x4002_1400..0x4002_1800;
 
 /// Standstill time. The first step of the slowest permitted ramp comes after 10 ms.
 const STANDS_NS: u64 = 20_000_000;
 
-/// An exposure with its true timing.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Shot {
     /// Trigger number since the board's reset, from 0, or the id given by the camera's host.
     pub id: u32,
-    /// Start in the board's microseconds.
     pub board_us: u64,
-    /// Start.
     pub begin_ns: u64,
     pub end_ns: u64,
     pub truth: ExposureTruth,
-    /// Mean brightness of both light outputs during the exposure, 0 to 1.
     pub light: [f64; 2],
 }
 
-/// Consecutive STEP pulses of one motor.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Burst {
     pub stage: StageName,
@@ -69,7 +62,6 @@ struct StageWires {
     burst: Option<Burst>,
     step_edges: u64,
     last_step_ns: u64,
-    /// Times of STEP edges, while recording.
     record: Option<Vec<u64>>,
 }
 
@@ -90,7 +82,6 @@ fn channel(number: u8) -> Channel {
     Channel::new(number).unwrap_or_else(|| unreachable!("timers have channels 1 to 4"))
 }
 
-/// Timing of a driver chip's inputs.
 #[derive(Debug)]
 struct DriverWires {
     parts: DriverParts,
@@ -103,7 +94,6 @@ struct DriverWires {
 }
 
 impl DriverWires {
-    /// Updates EN and DIR.
     fn look(&mut self, chip: &mut Chip, name: StageName, (at_ns, last_step_ns): (u64, u64)) {
         let enabled = chip.level(pins(name).enable) == Level::Low;
         if enabled != self.enabled_ns.is_some() {
@@ -118,7 +108,7 @@ impl DriverWires {
         }
     }
 
-    /// Whether the driver accepts a STEP edge; records timing violations.
+    /// Whether the driver accepts the edge; records timing violations.
     fn step(&mut self, at_ns: u64) -> bool {
         let Some(enabled_ns) = self.enabled_ns else { return false };
         let too_early = at_ns.saturating_sub(self.direction_ns) < self.parts.direction_setup_ns;
@@ -165,7 +155,7 @@ impl StageWires {
         }
     }
 
-    /// Reads STEP, and DIR and EN after a write to them.
+    /// Reads STEP, and after a write DIR and EN.
     fn look(&mut self, plant: &SharedPlant, chip: &mut Chip, at: VirtualNanos, driver_written: bool) {
         if driver_written {
             self.driver.look(chip, self.name, (at.0, self.last_step_ns));
@@ -197,7 +187,6 @@ impl StageWires {
         self.put(plant, chip, at);
     }
 
-    /// Updates encoder and switches from the stage.
     fn put(&mut self, plant: &SharedPlant, chip: &mut Chip, at: VirtualNanos) {
         let (counts, home, far) = with_plant(plant, |plant| {
             let stage = plant.stage(self.name);
@@ -258,7 +247,6 @@ impl Wiring {
         wiring
     }
 
-    /// Whether a write to `address` may move a watched pin.
     pub fn watches(address: u64) -> bool {
         Lights::watches(address) || WATCHED.iter().any(|range| range.contains(&address))
     }
@@ -315,13 +303,12 @@ impl Wiring {
         self.put_strobe(chip, at);
     }
 
-    /// Time of the next camera or switch event.
     pub fn next_ns(&self) -> Option<u64> {
         let switches_ns = self.stages.iter().map(|stage| stage.due_ns).min();
         self.camera.next_ns().into_iter().chain(switches_ns).min().filter(|at| *at < u64::MAX)
     }
 
-    /// Violations of the driver's timing: STEP too soon after DIR or enable, DIR too soon after STEP.
+    /// STEP too soon after DIR or enable, DIR too soon after STEP.
     pub fn driver_violations(&self, name: StageName) -> u64 {
         self.stage(name).driver.violations
     }
@@ -357,17 +344,15 @@ impl Wiring {
         self.stages.iter_mut().filter_map(|stage| stage.burst.take_if(ended)).collect()
     }
 
-    /// Start of the current exposure.
     pub fn begun_ns(&self) -> Option<u64> {
         self.begun.map(|(_, _, at_ns)| at_ns)
     }
 
-    /// Exposures started since power-on.
     pub fn exposures_begun(&self) -> u64 {
         self.exposures_begun
     }
 
-    /// Cuts the strobe's wire (its resistor holds it low), or reconnects it.
+    /// A resistor holds a cut wire low.
     pub fn cut_strobe(&mut self, chip: &mut Chip, at: VirtualNanos, cut: bool) {
         self.strobe_cut = cut;
         self.put_strobe(chip, at);
@@ -414,7 +399,7 @@ impl Wiring {
         self.stages.iter_mut().for_each(|stage| stage.record = Some(Vec::new()));
     }
 
-    /// Takes the edges of stages A and B, in virtual nanoseconds; recording continues.
+    /// Stages A and B, virtual nanoseconds; recording continues.
     pub fn take_steps(&mut self) -> [Vec<u64>; 2] {
         self.stages.each_mut().map(|stage| stage.record.as_mut().map(std::mem::take).unwrap_or_default())
     }
@@ -444,7 +429,6 @@ impl Wiring {
     }
 }
 
-/// Level of a timer's pin; low unless the pin is switched to the timer.
 fn is_high(
     chip: &mut Chip,
     name: PinName,

@@ -11,13 +11,11 @@ use farnear_sim::{
     },
 };
 
-/// Kinds that only revert another one; that happens by its duration.
+/// Kinds that only revert another one; a duration does this.
 const TAKES_BACK: [&str; 5] =
     ["emergency-stop-released", "power-return", "supply-normal", "driver-fine", "motor-free"];
-/// Kinds that are not drawn. No board can detect gauge drift, so its reported position would be wrong; and a
-/// scenario with its own host has no port to rename.
+/// Not drawn: no board can detect gauge drift, and a scenario with its own host has no port to rename.
 const LEFT_OUT: [&str; 2] = ["gauge-drifts", "link-renamed"];
-/// End of the records in the memory, plus a margin.
 const RECORDS_END: u64 = 8_192;
 
 fn below(noise: &mut Noise, end: u64) -> u64 {
@@ -32,7 +30,6 @@ fn one_of<T: Copy>(noise: &mut Noise, list: &[T]) -> T {
     list[below(noise, list.len() as u64) as usize]
 }
 
-/// Log-uniform between two limits.
 fn over_orders(noise: &mut Noise, low: f64, high: f64) -> f64 {
     low * libm::pow(high / low, noise.uniform())
 }

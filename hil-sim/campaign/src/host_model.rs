@@ -1,5 +1,5 @@
-//! A well-behaved host that executes a scenario on a rig in this process, then reverts all faults and checks
-//! that the rig works. It repeats unanswered requests, says hello to each new boot and answers keep-alives.
+//! A well-behaved host that executes a scenario, then reverts all faults and checks that the rig works. It
+//! repeats unanswered requests, says hello to each new boot and answers keep-alives.
 
 mod client;
 mod recovery;
@@ -24,7 +24,6 @@ use crate::invariants::{Broken, Case, check};
 /// Permitted silence during motion.
 const SILENCE: Micros = Micros(2_000_000);
 
-/// Result of a scenario.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub struct Outcome {
     pub broken: Vec<Broken>,
@@ -40,7 +39,6 @@ pub struct Outcome {
 }
 
 /// Plays a scenario from power-on to its end and checks the invariants.
-/// Errors: [`SimError`] if the rig cannot start or stops.
 pub fn play(scenario: &Scenario, config: &RigConfig) -> Result<Outcome, SimError> {
     let config = RigConfig { observe: true, ..config.clone() };
     let mut client = Client::new(EmulatedRig::new(&config)?);

@@ -11,8 +11,7 @@
 //! | `records` | settings, alarms and boot numbers survive everything, or their loss is reported |
 //! | `works-after` | without faults the alarms can be cleared, and the rig homes, moves and captures |
 //!
-//! A new property is a file of this module with a function over all observations, a line in [`check`], and a
-//! row above.
+//! A new property is a file of this module, a line in [`check`] and a row above.
 
 mod exposures;
 mod motion;
@@ -26,7 +25,6 @@ use farnear_sim::{
     scenario::Scenario,
 };
 
-/// A violated property.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Broken {
     pub property: &'static str,
@@ -34,7 +32,6 @@ pub struct Broken {
     pub what: String,
 }
 
-/// A run and its rig.
 #[derive(Clone, Copy, Debug)]
 pub struct Case<'a> {
     pub scenario: &'a Scenario,
@@ -43,13 +40,12 @@ pub struct Case<'a> {
 }
 
 impl Case<'_> {
-    /// Whether the scenario has a fault of these kinds.
     fn has(&self, kinds: &[&str]) -> bool {
         self.scenario.happens.iter().any(|happening| kinds.contains(&happening.what.name))
     }
 
-    /// Per board life (reset to reset): virtual time minus board time, as the smallest event delay. Boot
-    /// numbers cannot serve as keys, because a board with dead memory restarts at 1.
+    /// Per board life: virtual time minus board time, as the smallest event delay. Boot numbers cannot be
+    /// keys: a board with dead memory restarts at 1.
     fn clocks(&self) -> Vec<u64> {
         let mut clocks = vec![u64::MAX];
         for sight in self.sights {
@@ -66,7 +62,7 @@ impl Case<'_> {
     }
 }
 
-/// All violations, ordered by time.
+/// Ordered by time.
 pub fn check(case: &Case<'_>) -> Vec<Broken> {
     let checks = [
         motion::hard_stop,

@@ -1,11 +1,5 @@
-//! # farnear-campaign
-//!
-//! Seeded fault campaigns on the emulated board: draws scenarios, plays them on all cores, checks the
-//! invariants and
-//! shrinks the scenarios that violate one.
-//!
-//! - [`host_model`]: a protocol client that executes a scenario's steps.
-//! - [`invariants`]: the properties that must hold in every run.
+//! Seeded fault campaigns on the emulated board: draws scenarios, plays them on all cores with a protocol
+//! client ([`host_model`]), checks [`invariants`] and shrinks the scenarios that violate one.
 
 mod draw;
 pub mod host_model;
@@ -31,7 +25,7 @@ use farnear_sim::{RigConfig, Scenario, SimError};
 use host_model::{Outcome, play};
 use invariants::Broken;
 
-/// A part of a campaign's seeds: part `index` of `count`.
+/// Part `index` of `count` of the seeds.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Shard {
     pub index: u64,
@@ -55,10 +49,9 @@ impl FromStr for Shard {
 
 #[derive(Clone, Debug)]
 pub struct Campaign {
-    /// Seeds, end exclusive.
+    /// End exclusive.
     pub seeds: std::ops::Range<u64>,
     pub shard: Shard,
-    /// Rigs in parallel.
     pub jobs: usize,
     /// `None`: next to the program.
     pub firmware: Option<PathBuf>,
@@ -66,7 +59,6 @@ pub struct Campaign {
     pub out: PathBuf,
 }
 
-/// Result of a campaign.
 #[derive(Clone, Default, Debug)]
 pub struct Summary {
     pub played: u64,
@@ -139,15 +131,13 @@ impl Summary {
 }
 
 /// Plays a scenario with its own seed and parts.
-/// Errors: [`SimError`] if the rig cannot start or its parts are invalid.
 pub fn play_alone(scenario: &Scenario, firmware: Option<&Path>) -> Result<Outcome, SimError> {
     let config =
         RigConfig::of(scenario).map_err(|reason| SimError::Scenario { path: "scenario".into(), reason })?;
     play(scenario, &RigConfig { firmware: firmware.map(Into::into), ..config })
 }
 
-/// Runs a campaign. `progress` is called for each scenario when it ends.
-/// Errors: [`SimError`] if a rig cannot start or a file cannot be written. Violations are not errors.
+/// `progress` is called when a scenario ends. Violations are not errors.
 pub fn run(campaign: &Campaign, mut progress: impl FnMut(u64, &Outcome)) -> Result<Summary, SimError> {
     let Shard { index, count } = campaign.shard;
     let seeds: Vec<u64> = campaign.seeds.clone().filter(|seed| seed % count == index - 1).collect();
@@ -184,7 +174,6 @@ pub fn run(campaign: &Campaign, mut progress: impl FnMut(u64, &Outcome)) -> Resu
     stopped.map_or(Ok(summary), Err)
 }
 
-/// Plays one seed; shrinks and writes a violating scenario.
 fn one(campaign: &Campaign, seed: u64) -> Result<(Outcome, Option<PathBuf>), SimError> {
     let scenario = draw(seed);
     let firmware = campaign.firmware.as_deref();

@@ -1,5 +1,3 @@
-//! `farnear-campaign`: fault campaigns on the emulated board.
-
 use std::{
     io::Write,
     path::{Path, PathBuf},

@@ -1,5 +1,5 @@
-//! Shrinks a scenario that violates a property: removes parts one after the other while the same property is
-//! violated (Zeller & Hildebrandt, IEEE Trans. Software Engineering 28, 2002, simplest form).
+//! Shrinks a scenario: removes parts in turn while it violates the same property (simplest form of Zeller &
+//! Hildebrandt, IEEE Trans. Software Engineering 28, 2002).
 
 use farnear_sim::{
     SimError,
@@ -12,7 +12,7 @@ use crate::host_model::Outcome;
 /// Limit of runs; each takes seconds.
 const RUNS: u32 = 60;
 
-/// All scenarios with one part less.
+/// All scenarios with one part removed.
 fn smaller(scenario: &Scenario) -> Vec<Scenario> {
     let mut found = Vec::new();
     let mut with = |change: &dyn Fn(&mut Scenario)| {
@@ -55,8 +55,7 @@ fn simpler(when: When) -> When {
     }
 }
 
-/// Shrinks a scenario that violates `property`; `play` runs one.
-/// Errors: errors of `play`.
+/// `play` runs a scenario.
 pub fn shrink(
     scenario: &Scenario,
     property: &str,

@@ -21,11 +21,9 @@ const WRITE_REGISTERS: u16 = 0x0082;
 const READ_MEMORY: u16 = 0x0084;
 const WRITE_MEMORY: u16 = 0x0086;
 
-/// Request of a client.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub enum Ask {
     Discovery,
-    /// Resend packets of a frame.
     Resend {
         /// 16-bit frame id.
         frame: u16,
@@ -40,7 +38,6 @@ pub enum Ask {
 
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Command {
-    /// The request, or the refusal of an invalid one.
     pub ask: Result<Ask, Refusal>,
     wants_answer: bool,
     code: u16,

@@ -8,7 +8,6 @@ pub const MODEL: &str = "emulated";
 pub const VENDOR: &str = "farnear";
 /// Chunk ids: timestamp and frame id.
 pub const CHUNKS: [(&str, u32); 2] = [("Timestamp", 0xFA00_0001), ("FrameID", 0xFA00_0002)];
-/// Ticks per second of the camera's clock.
 pub const TICKS_PER_SECOND: u32 = 1_000_000_000;
 
 pub fn description(features: &[Feature]) -> String {

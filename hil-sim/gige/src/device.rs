@@ -32,7 +32,6 @@ use crate::{
 
 /// Frames kept for resends.
 const FRAMES_RETAINED: usize = 8;
-/// Largest UDP packet.
 const PACKET_BYTES_MAX: usize = 65_507;
 /// Mask of the packet size in its register.
 const PACKET_BYTES: u32 = 0xFFFF;
@@ -41,7 +40,6 @@ pub(super) const BETWEEN_EXPOSURES_US: u32 = 15_000;
 /// First id of software-triggered pictures, far from the board's numbers.
 const SOFTWARE_SHOTS: u32 = 0x4000_0000;
 
-/// Result of a control packet.
 #[derive(Default)]
 pub struct Done {
     pub answer: Option<Vec<u8>>,
@@ -97,7 +95,6 @@ impl Device {
         &self.registers
     }
 
-    /// Frames since the start of the acquisition.
     pub fn frames(&self) -> u64 {
         self.frames
     }
@@ -176,7 +173,7 @@ impl Device {
                 let shot_id = SOFTWARE_SHOTS + self.triggers % SOFTWARE_SHOTS;
                 self.triggers += 1;
                 done.asks.push(Control::Expose { shot_id, exposure });
-                // An idle rig's time stands; this much passes.
+                // Time is stopped in an idle rig; this much passes.
                 done.asks
                     .push(Control::AdvanceMicros(u64::from(exposure.0.saturating_add(BETWEEN_EXPOSURES_US))));
             }
@@ -209,7 +206,6 @@ impl Device {
         Some(Control::FreeRun { period: period.unwrap_or(Micros(0)), exposure })
     }
 
-    /// Ends the control of the client.
     fn release(&mut self) -> Option<Control> {
         self.controller = None;
         self.acquires_since_ns = None;
@@ -233,8 +229,7 @@ impl Device {
         asked.clamp(HEADERS_BYTES + 64, PACKET_BYTES_MAX)
     }
 
-    /// A picture as packets; `None` without an acquisition, if exposed before it began, or with another
-    /// trigger source.
+    /// `None` without an acquisition, if exposed before it began, or with another trigger source.
     pub fn frame(&mut self, picture: &Picture) -> Option<Sending> {
         let since_ns = self.acquires_since_ns?;
         let free = picture.header.shot_id == FREE_RUNNING;
@@ -263,13 +258,13 @@ impl Device {
         self.sending(sent)
     }
 
-    /// Addresses packets to the client; `None` before it has set the destination.
+    /// `None` before the client has set the destination.
     fn sending(&self, packets: Vec<Vec<u8>>) -> Option<Sending> {
         let gap = Duration::from_nanos(u64::from(self.registers.get(PACKET_DELAY_NS)));
         self.registers.destination().map(|to| Sending { to, packets, gap })
     }
 
-    /// Packets of a frame that can be resent; some of them are lost again.
+    /// Some of the packets are lost again.
     fn again(&mut self, frame: u16, first: u32, last: u32) -> Option<Sending> {
         let (_, packets) = self.sent_frames.iter().find(|(number, _)| *number == frame)?;
         let (first, last) = (first as usize, (last as usize).min(packets.len().saturating_sub(1)));

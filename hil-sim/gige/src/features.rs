@@ -1,5 +1,4 @@
-//! The camera's features (GenICam SFNC) in one table, which defines registers, defaults, ranges and
-//! description nodes.
+//! The camera's features (GenICam SFNC) in one table: registers, defaults, ranges and description nodes.
 
 /// Type of a feature. Each has a 32-bit register.
 #[derive(Clone, PartialEq, Debug)]
@@ -9,7 +8,6 @@ pub enum Value {
         min: u32,
         max: u32,
     },
-    /// Fixed-point number.
     Number {
         min: u32,
         max: u32,
@@ -18,7 +16,6 @@ pub enum Value {
         unit: &'static str,
     },
     Choice(Vec<(&'static str, u32)>),
-    /// Value that triggers the command.
     Command(u32),
 }
 
@@ -28,7 +25,6 @@ pub struct Feature {
     pub category: &'static str,
     pub register: u32,
     pub value: Value,
-    /// Register value at power-on.
     pub initial: u32,
 }
 
@@ -64,7 +60,6 @@ pub const EXPOSURE_US: u32 = 0xA040;
 /// Factor, in hundredths.
 pub const GAIN: u32 = 0xA044;
 pub const BLACK_LEVEL: u32 = 0xA048;
-/// Whether frames have chunks.
 pub const CHUNK_MODE: u32 = 0xA04C;
 /// Chunk selected for [`CHUNK_ENABLE`].
 pub const CHUNK_SELECTOR: u32 = 0xA050;
@@ -81,7 +76,6 @@ pub const MONO_8: u32 = 0x0108_0001;
 pub const MONO_12: u32 = 0x0110_0005;
 pub const MONO_16: u32 = 0x0110_0007;
 
-/// Pixel formats for a sensor of this many bits, native format first.
 fn formats(bits: u8) -> Vec<(&'static str, u32)> {
     match bits {
         ..=8 => vec![("Mono8", MONO_8)],
@@ -90,7 +84,6 @@ fn formats(bits: u8) -> Vec<(&'static str, u32)> {
     }
 }
 
-/// All features for a sensor of this width, height and bits.
 pub fn table((width, height): (u16, u16), bits: u8) -> Vec<Feature> {
     let (width, height) = (u32::from(width), u32::from(height));
     let formats = formats(bits);

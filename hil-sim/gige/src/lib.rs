@@ -1,24 +1,13 @@
-//! # farnear-gige
-//!
-//! A GigE Vision server for the emulated camera: clients can test the whole path from trigger to depth
-//! without a camera.
-//!
-//! Written from public protocol descriptions (packet layouts and register addresses as in Aravis' headers).
-//! Aravis' own fake
-//! camera cannot be triggered by a line, stamps frames by the wall clock, and takes pictures from a C
-//! callback only. Here:
+//! GigE Vision server for the emulated camera, to test the path from trigger to depth without a camera.
+//! Written from public protocol descriptions (as in Aravis' headers). Unlike Aravis' fake camera:
 //!
 //! - the hardware trigger is the emulated board's trigger line; software triggers and free running work, too;
 //! - frames are stamped in rig time, in leader and chunks, and counted from the start of the acquisition;
 //! - lost packets are resent on request, and can be lost on purpose;
-//! - gain (a factor), black level, region and pixel format are applied after the converter, as in digital
-//!   cameras.
+//! - gain (a factor), black level, region and pixel format are applied after the converter.
 //!
-//! [`control`]: control channel (GVCP, UDP port 3956); [`registers`]: readable and writable memory;
-//! [`features`]: table of
-//! registers and GenICam nodes for the [`description`]; [`stream`]: frames as packets (GVSP); [`pace`]:
-//! packet timing;
-//! [`device`]: the camera's state.
+//! [`control`]: control channel (GVCP, UDP port 3956); [`registers`]: memory; [`features`]: registers and
+//! GenICam nodes for the [`description`]; [`stream`]: frames as packets (GVSP); [`pace`]: packet timing.
 
 pub mod control;
 pub mod description;
@@ -45,27 +34,21 @@ use pace::Pace;
 const CONTROL_PORT: u16 = 3956;
 /// Interval of heartbeat checks.
 const LOOK: Duration = Duration::from_millis(100);
-/// A free-running camera waits this long for rendering before time passes; otherwise slow computers would
-/// send outdated pictures.
+/// Longest wait for rendering before time passes, so that slow computers do not send old pictures.
 const RENDERING: Duration = Duration::from_secs(20);
-/// Longest wall-clock wait for rig time.
 const PATIENCE: Duration = Duration::from_millis(500);
 
 #[derive(Clone, Debug)]
 pub struct GigeConfig {
-    /// Address of its network interface.
     pub address: Ipv4Addr,
     /// Seed of the serial number and of packet loss.
     pub seed: u64,
-    /// Lost packets per 1000.
     pub lost_per_thousand: u32,
-    /// Width and height of the sensor.
     pub sensor_px: (u16, u16),
     pub bits: u8,
 }
 
 /// Parses `lo` or an IPv4 address of this computer.
-/// Errors: a message for anything else.
 pub fn interface(text: &str) -> Result<Ipv4Addr, String> {
     match text {
         "lo" => Ok(Ipv4Addr::LOCALHOST),
@@ -77,14 +60,12 @@ pub fn interface(text: &str) -> Result<Ipv4Addr, String> {
 
 #[derive(Clone, PartialEq, Debug)]
 pub struct Picture {
-    /// Start of the exposure.
     pub begin_ns: u64,
     pub header: FrameHeader,
     /// Rows of 16-bit values, little-endian.
     pub pixels: Vec<u8>,
 }
 
-/// Sockets or threads cannot be opened.
 #[derive(Debug, Error)]
 #[error("{what}: {source}")]
 pub struct OpenError {
@@ -99,8 +80,7 @@ fn lock(device: &Shared) -> MutexGuard<'_, Device> {
 }
 
 /// Opens the camera and returns its identification. `pictures` go to the controlling client, requests of its
-/// host to `ask`; `now` returns rig time in ns.
-/// Errors: [`OpenError`] if the address is not local or the port is taken.
+/// host to `ask`; `now` returns rig time in ns. Fails if the address is not local or the port is taken.
 pub fn open(
     config: &GigeConfig,
     pictures: Receiver<Picture>,
@@ -156,12 +136,11 @@ fn discover(shouts: &UdpSocket, answers: &UdpSocket, device: &Shared) {
         let reachable =
             from.ip().is_loopback() == answers.local_addr().is_ok_and(|own| own.ip().is_loopback());
         if reachable && let Some(answer) = control::discovery(&bytes[..length], lock(device).registers()) {
-            let _ = answers.send_to(&answer, from); // who asked may have gone
+            let _ = answers.send_to(&answer, from); // the client may have disconnected
         }
     }
 }
 
-/// Serves the control channel.
 fn obey(
     control: &UdpSocket,
     stream: &UdpSocket,
@@ -188,7 +167,7 @@ fn obey(
                 carry_out(asked, ask, now);
             }
             if let Some(answer) = done.answer {
-                let _ = control.send_to(&answer, from); // who asked may have gone
+                let _ = control.send_to(&answer, from); // the client may have disconnected
             }
             if let Some(again) = done.again {
                 send(stream, &again, &mut pace);
@@ -197,8 +176,7 @@ fn obey(
     }
 }
 
-/// Forwards to the rig. After free running ends, waits for the last exposure, so that the next trigger is
-/// accepted.
+/// After free running ends, waits for the last exposure, so that the next trigger is accepted.
 fn carry_out(asked: Control, ask: &impl Fn(Control), now: &impl Fn() -> u64) {
     let ends = match asked {
         Control::FreeRun { period, exposure } if period.0 == 0 => Some(exposure),
@@ -214,7 +192,6 @@ fn carry_out(asked: Control, ask: &impl Fn(Control), now: &impl Fn() -> u64) {
     }
 }
 
-/// Sends pictures as frames during an acquisition.
 fn show(pictures: &Receiver<Picture>, stream: &UdpSocket, device: &Shared) {
     let mut pace = Pace::new(Instant::now());
     for picture in pictures {
@@ -228,11 +205,11 @@ fn show(pictures: &Receiver<Picture>, stream: &UdpSocket, device: &Shared) {
 fn send(stream: &UdpSocket, sending: &Sending, pace: &mut Pace) {
     for packet in &sending.packets {
         pace.hold(packet.len(), sending.gap);
-        let _ = stream.send_to(packet, sending.to); // the line tells of nothing that is lost
+        let _ = stream.send_to(packet, sending.to); // packets may be lost unnoticed
     }
 }
 
-/// An idle rig's time stands; free running advances it by one picture at a time.
+/// Time is stopped in an idle rig; free running advances it by one picture at a time.
 fn run_freely(device: &Shared, ask: &impl Fn(Control)) {
     loop {
         let (period, frames) = {

@@ -5,15 +5,13 @@ use std::{
     time::{Duration, Instant},
 };
 
-/// Default rate: half a gigabit. A receiver's usual 208 KiB buffer (half of it overhead) then lasts some 4
-/// ms, and a picture of 640x480 px at 12 bits takes 10 ms.
+/// Half a gigabit: a receiver's usual 208 KiB buffer (half of it overhead) lasts 4 ms, a picture takes 10 ms.
 const BYTES_PER_SECOND: u64 = 60_000_000;
 /// Burst permitted after a pause.
 const AT_ONCE: Duration = Duration::from_micros(300);
 /// Shorter sleeps take about as long; waits are accumulated.
 const SHORTEST_SLEEP: Duration = Duration::from_micros(100);
 
-/// Schedule of packets: each is due when the previous one has left the line.
 #[derive(Clone, Copy, Debug)]
 pub struct Pace {
     due: Instant,

@@ -16,15 +16,12 @@ pub const PRIVILEGE: u32 = 0x0A00;
 /// Exclusive access, or control with read access for others.
 pub const PRIVILEGE_CONTROL: u32 = 0b11;
 pub const HEARTBEAT_MS: u32 = 0x0938;
-/// Destination port of frames.
 pub const STREAM_PORT: u32 = 0x0D00;
 /// Packet size including IP and UDP headers, with flags.
 pub const PACKET_SIZE: u32 = 0x0D04;
 /// Minimum gap of packets, in clock ticks, which are ns.
 pub const PACKET_DELAY_NS: u32 = 0x0D08;
-/// Destination address of frames.
 pub const STREAM_ADDRESS: u32 = 0x0D18;
-/// Size of the discovery answer.
 pub const DISCOVERY_BYTES: usize = 0xF8;
 /// Flag: send one test packet of this size.
 pub const FIRE_TEST: u32 = 1 << 31;
@@ -32,11 +29,9 @@ pub const FIRE_TEST: u32 = 1 << 31;
 const DESCRIPTION: u32 = 0x0001_0000;
 /// Default packet size: Ethernet's.
 const USUAL_PACKET_BYTES: u32 = 1500;
-/// Default of the standard.
 const USUAL_HEARTBEAT_MS: u32 = 3000;
 /// Packet resend, register for a name, serial number.
 const CAPABILITIES: u32 = 1 << 2 | 1 << 1 | 1 | 1 << 30;
-/// Writable bootstrap registers with ranges.
 const WRITABLE: [(u32, u32, u32); 9] = [
     (PRIVILEGE, 0, u32::MAX),
     (HEARTBEAT_MS, 500, 600_000),
@@ -46,7 +41,7 @@ const WRITABLE: [(u32, u32, u32); 9] = [
     (STREAM_ADDRESS, 0, u32::MAX),
     (CHUNK_MODE, 0, 1),
     (CHUNK_SELECTOR, 0, CHUNKS.len() as u32 - 1),
-    (0x0D24, 0, u32::MAX), // configuration of the stream: nothing of it is here, and it reads as 0
+    (0x0D24, 0, u32::MAX), // stream configuration: not supported, reads as 0
 ];
 
 /// Status codes of the standard.
@@ -125,14 +120,12 @@ impl Registers {
         format!("{}-{}-{}", text(0x48, 32), text(0x68, 32), text(0xD8, 16))
     }
 
-    /// Value of a camera register; 0 outside of it.
     pub fn get(&self, register: u32) -> u32 {
         let at = register as usize;
         let bytes = self.bytes.get(at..at + 4).and_then(|bytes| bytes.try_into().ok());
         bytes.map_or(0, u32::from_be_bytes)
     }
 
-    /// Sets a camera register without access check.
     pub fn put(&mut self, register: u32, value: u32) {
         let at = register as usize;
         if let Some(bytes) = self.bytes.get_mut(at..at + 4) {
@@ -140,8 +133,7 @@ impl Registers {
         }
     }
 
-    /// Bytes from an address.
-    /// Errors: [`Refusal`] if they are not all in the memory.
+    /// Fails unless all bytes are in the memory.
     pub fn read(&self, address: u32, length: usize) -> Result<&[u8], Refusal> {
         if !address.is_multiple_of(4) || !length.is_multiple_of(4) {
             return Err(Refusal::BadAlignment);
@@ -150,8 +142,7 @@ impl Registers {
         self.bytes.get(address as usize..end).ok_or(Refusal::InvalidAddress)
     }
 
-    /// Writes a register on behalf of a client.
-    /// Errors: [`Refusal`]; values are never clamped silently.
+    /// Values are never clamped silently.
     pub fn write(&mut self, register: u32, value: u32) -> Result<(), Refusal> {
         if !register.is_multiple_of(4) {
             return Err(Refusal::BadAlignment);
@@ -194,7 +185,6 @@ impl Registers {
         if may_write { Ok(false) } else { Err(Refusal::WriteProtect) }
     }
 
-    /// Updates registers derived from others.
     fn settle(&mut self) {
         let pixel = if self.get(PIXEL_FORMAT) == MONO_8 { 1 } else { 2 };
         let image = self.get(WIDTH) * self.get(HEIGHT) * pixel;
@@ -211,7 +201,7 @@ impl Registers {
         })
     }
 
-    /// Destination of frames; `None` until set.
+    /// `None` until set.
     pub fn destination(&self) -> Option<std::net::SocketAddr> {
         let port = u16::try_from(self.get(STREAM_PORT)).ok().filter(|port| *port > 0)?;
         Some((Ipv4Addr::from_bits(self.get(STREAM_ADDRESS)), port).into())

@@ -9,25 +9,21 @@ pub const UDP_HEADERS_BYTES: usize = 20 + 8;
 const LEADER: u32 = 1;
 const TRAILER: u32 = 2;
 const PAYLOAD: u32 = 3;
-/// Payload type image; with this flag chunks follow.
 const IMAGE: u16 = 1;
 const WITH_CHUNKS: u16 = 0x4000;
 const IMAGE_CHUNK: u32 = 0xFA00_0000;
 /// Chunk id and length.
 const CHUNK_TRAILER_BYTES: u32 = 8;
-/// Timestamp and frame id.
 const CHUNK_VALUE_BYTES: u32 = 8;
 
 #[derive(Clone, PartialEq, Debug)]
 pub struct Frame {
     /// From 1 at the start of the acquisition.
     pub number: u64,
-    /// Start of the exposure.
     pub time_ns: u64,
     /// PFNC code.
     pub pixel_format: u32,
     pub size_px: (u32, u32),
-    /// First column and row.
     pub offset_px: (u32, u32),
     pub pixels: Vec<u8>,
     /// Enabled chunks, if any.

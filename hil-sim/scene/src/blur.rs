@@ -1,35 +1,21 @@
-//! The blurred scene on the sensor: each texture cell spreads by its own blur, nearer surfaces hide farther
-//! ones.
-//!
-//! # Method
+//! The blurred scene on the sensor: each texture cell spreads by its own blur, nearer surfaces hide others.
 //!
 //! *Scatter.* Each texture sample (one per cell of half a pixel) adds light to the surrounding pixels with
-//! the weights of the
-//! [kernel](crate::kernel) of its blur radius. For one plane this is the exact convolution.
+//! the weights of its blur's [kernel](crate::kernel). For one plane this is the exact convolution.
 //!
 //! *Occlusion.* Cells are grouped into slabs of signed blur, nearest first. A slab gives each pixel light `L`
-//! and cover `C`
-//! (the same sum with radiance 1). Front to back, a pixel adds `L` until its aperture is full; the slab that
-//! overfills it
-//! contributes its mean `L / C` to the remaining part. Uniform radiance therefore looks uniform on any shape,
-//! and a sharp near
-//! edge stays sharp before a blurred background. Within the blur radius of a depth step this is an
-//! approximation: for a step
-//! over the whole working range 1.5 % RMS and at most 8 % off (white noise of contrast 0.2). Elsewhere it
-//! agrees with ray
-//! casting to 1e-4 (planes) and 6e-4 (slopes), the ray caster's own error (`tests/exact.rs`).
+//! and cover `C` (the same sum with radiance 1). Front to back, a pixel adds `L` until its aperture is full;
+//! the slab that overfills it contributes its mean `L / C` to the rest. Uniform radiance therefore looks
+//! uniform on any shape, and a sharp near edge stays sharp before a blurred background. Within the blur
+//! radius of a depth step over the whole working range the error is 1.5 % RMS and at most 8 % (white noise of
+//! contrast 0.2). Elsewhere it is 1e-4 for planes and 6e-4 for slopes (`tests/it/exact.rs`).
 //!
 //! *Levels.* Up to [`MAX_EXACT_LEVELS`] depths have a slab with its exact kernel each. A continuous surface
-//! has slabs of
-//! [`SLAB_PX`] blur. Their kernels are tabulated every [`LEVEL_PX`] and interpolated in the square of the
-//! radius, which keeps
-//! the second moment exact.
+//! has slabs of [`SLAB_PX`] blur with kernels tabulated every [`LEVEL_PX`], interpolated in the square of the
+//! radius, which keeps the second moment exact.
 //!
-//! # Cost
-//! Cells times kernel pixels, twice (light and cover; a plane needs one): 20 to 300 ms for 640 x 480 at 2.7
-//! px. Kernels wider
-//! than [`MAX_DIRECT_PX`] use one FFT slab with levels spaced by [`LEVEL_RATIO`] of the radius: up to a
-//! second.
+//! *Cost.* Cells times kernel pixels, twice (light and cover): 20 to 300 ms for 640 x 480 at 2.7 px. Kernels
+//! wider than [`MAX_DIRECT_PX`] use an FFT slab with levels spaced by [`LEVEL_RATIO`]: up to a second.
 
 use ndarray::Array2;
 use rustfft::num_complex::Complex32;
@@ -45,28 +31,23 @@ pub const MAX_EXACT_LEVELS: usize = 32;
 pub const SLAB_PX: f32 = 0.25;
 /// Spacing of tabulated kernels, px of blur radius.
 pub const LEVEL_PX: f32 = 0.05;
-/// Spacing of tabulated kernels relative to the radius, where that is wider than [`LEVEL_PX`].
+/// Spacing of tabulated kernels relative to the radius, if wider than [`LEVEL_PX`].
 pub const LEVEL_RATIO: f32 = 0.02;
 /// Widest kernel that is scattered directly, px from its centre.
 pub const MAX_DIRECT_PX: usize = 15;
 
-/// Cells of a scene around an image.
 pub(crate) struct Cells {
-    /// Cells beyond each border of the image, px.
     pub(crate) margin_px: usize,
-    /// Radiance, rows and columns of cells.
     pub(crate) radiance: Array2<f32>,
     /// Signed blur radius in px, larger = farther; a plane's is uniform.
     pub(crate) blur_px: Blur,
 }
 
-/// Signed blur radius, px.
 pub(crate) enum Blur {
     Uniform(f32),
     Varying(Array2<f32>),
 }
 
-/// Reach of the kernel of `psf` at the blur radius `blur_px`, px.
 pub(crate) fn kernel_reach_px(psf: &Psf, blur_px: f32) -> usize {
     CellKernel::reach(psf, f64::from(blur_px.abs())).div_ceil(CELLS_PER_PIXEL)
 }
@@ -132,7 +113,6 @@ impl Cells {
         (slabs, Some(members))
     }
 
-    /// Light and cover of the chosen cells per pixel.
     fn scatter(
         &self,
         psf: &Psf,
@@ -251,7 +231,6 @@ impl Cells {
     }
 }
 
-/// Adds `amount` times the kernel to the pixels starting at `target`.
 #[inline(always)]
 fn add_kernel<const LANES: usize>(target: &mut [f32], stride: usize, kernel: &[[f32; LANES]], amount: f32) {
     for (row, weights) in target.chunks_mut(stride).zip(kernel) {
@@ -280,14 +259,12 @@ fn pixel_kernels<const LANES: usize>(psf: &Psf, radius_px: f32, reach_px: usize)
     })
 }
 
-/// Blur radii from `least` to `widest`, px.
 fn levels(least: f32, widest: f32) -> Vec<f32> {
     let spacing = LEVEL_PX.max(LEVEL_RATIO * widest);
     let count = ((widest - least) / spacing).ceil().max(1.0);
     (0..=count as usize).map(|index| least + (widest - least) * index as f32 / count).collect()
 }
 
-/// The values of `blur` in ascending order, if there are at most [`MAX_EXACT_LEVELS`].
 fn distinct_values(blur: &Array2<f32>) -> Option<Vec<f32>> {
     let mut values: Vec<f32> = Vec::new();
     let mut last = f32::NAN;
@@ -307,11 +284,9 @@ fn distinct_values(blur: &Array2<f32>) -> Option<Vec<f32>> {
     Some(values)
 }
 
-/// Cells of similar blur.
 struct Slab {
     /// Blur radii of the tabulated kernels, ascending, evenly spaced, px.
     radii_px: Vec<f32>,
-    /// Reach of the widest kernel.
     reach_px: usize,
     /// Whether the slab may leave pixels uncovered.
     needs_cover: bool,

@@ -1,8 +1,6 @@
-//! From irradiance to codes: size, electrons and quantisation.
-//!
-//! A pixel of mean radiance collects `exposure_level` of the full well. Each pixel draws Poisson shot noise
-//! and normal read noise, is limited to 0..full well and rounded to codes, the largest being the full well
-//! (Janesick, Photon Transfer, 2007, ch. 3). Costs about 0.1 us a pixel.
+//! From irradiance to codes: size, electrons and quantisation. A pixel of mean radiance collects
+//! `exposure_level` of the full well. Each pixel draws Poisson shot noise and normal read noise, is limited
+//! to 0..full well and rounded to codes (Janesick, Photon Transfer, 2007, ch. 3).
 
 use std::fmt;
 use std::str::FromStr;
@@ -104,7 +102,6 @@ pub struct Camera {
 }
 
 impl Default for Camera {
-    /// 640 x 480 px, 8 bit, with noise.
     fn default() -> Self {
         Self::new(640, 480, Noise::EightBit)
     }
@@ -128,7 +125,6 @@ impl Camera {
         }
     }
 
-    /// Errors: [`CameraError`] for an invalid size or number.
     pub(crate) fn check(&self) -> Result<(), CameraError> {
         let sides = 1..=Self::MAX_SIDE_PX;
         if !sides.contains(&self.width_px) || !sides.contains(&self.height_px) {
@@ -152,8 +148,7 @@ impl Camera {
     }
 
     /// Codes of one exposure of `radiance` (blurred scene, mean 1). The noise depends on `seed` and
-    /// `exposure_number` only. The camera must be valid, as checked by
-    /// [`Renderer::new`](crate::Renderer::new).
+    /// `exposure_number` only. The camera must be valid ([`Renderer::new`](crate::Renderer::new) checks it).
     #[must_use]
     pub fn expose(&self, radiance: ArrayView2<'_, f32>, seed: u64, exposure_number: u32) -> Array2<u16> {
         let max_code = f64::from(self.noise.max_code());

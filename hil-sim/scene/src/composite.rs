@@ -2,7 +2,6 @@
 
 use ndarray::Array2;
 
-/// Light and cover per pixel, with a border for light outside the image.
 pub(crate) struct Sums {
     pub(crate) light: Vec<f32>,
     /// Empty if the slab covers everything.
@@ -32,7 +31,6 @@ impl Sums {
 
 pub(crate) struct Composite {
     light: Array2<f32>,
-    /// Share of the aperture that is still open.
     open: Array2<f32>,
 }
 

@@ -1,7 +1,5 @@
-//! Shading and hot pixels of a real lens, lamp and sensor; none by default.
-//!
-//! Shading scales each pixel's light; then hot pixels add electrons, the same ones in every exposure of a
-//! seed. Costs about 5 ns a pixel.
+//! Shading and hot pixels of a real lens, lamp and sensor; none by default. Shading scales each pixel's
+//! light; then hot pixels add electrons, the same ones in every exposure of a seed.
 
 use ndarray::Array2;
 use rand::{RngCore, SeedableRng};
@@ -26,7 +24,6 @@ pub struct Defects {
 }
 
 impl Defects {
-    /// Errors: [`CameraError::Unusable`] for an invalid number.
     pub(crate) fn check(&self) -> Result<(), CameraError> {
         let [across, down] = self.uneven_light;
         let ranges = [
@@ -61,7 +58,7 @@ impl Defects {
         }
     }
 
-    /// Electrons added to each pixel, row by row; `None` without hot pixels.
+    /// Electrons per pixel; `None` without hot pixels.
     pub(crate) fn hot_e(&self, (height, width): (usize, usize), seed: u64) -> Option<Array2<f64>> {
         if self.hot_pixel_share <= 0.0 || self.hot_pixel_e <= 0.0 {
             return None;

@@ -1,7 +1,5 @@
-//! Two-dimensional FFTs on row-major arrays.
-//!
-//! Uses rustfft's scalar planner: vector planners round differently per CPU, and a seed must give the same
-//! image everywhere.
+//! Two-dimensional FFTs on row-major arrays, by rustfft's scalar planner: vector planners round differently
+//! per CPU, and a seed must give the same image everywhere.
 
 use rustfft::FftPlannerScalar;
 use rustfft::num_complex::Complex32;
@@ -19,14 +17,14 @@ impl Fourier2 {
         Self { height, width, planner: FftPlannerScalar::new(), scratch }
     }
 
-    /// Forward transform, unscaled.
+    /// Unscaled.
     pub(crate) fn forward(&mut self, data: &mut [Complex32]) {
         let (rows, columns) =
             (self.planner.plan_fft_forward(self.width), self.planner.plan_fft_forward(self.height));
         self.run(data, &*rows, &*columns);
     }
 
-    /// Inverse transform, unscaled: a round trip multiplies by `height * width`.
+    /// Unscaled: a round trip multiplies by `height * width`.
     pub(crate) fn inverse(&mut self, data: &mut [Complex32]) {
         let (rows, columns) =
             (self.planner.plan_fft_inverse(self.width), self.planner.plan_fft_inverse(self.height));
@@ -41,7 +39,6 @@ impl Fourier2 {
     }
 }
 
-/// Transposes `from` (`height` rows) into `to` in cache-sized blocks.
 fn transpose(from: &[Complex32], to: &mut [Complex32], height: usize, width: usize) {
     const BLOCK: usize = 16;
     for row_block in (0..height).step_by(BLOCK) {

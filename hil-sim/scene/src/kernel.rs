@@ -1,27 +1,21 @@
 //! PSFs integrated over texture cells and pixels.
 //!
 //! A texture sample is the centre of a square cell of half a pixel, with bilinear radiance in between. Cells
-//! of constant
-//! radiance would alias in phase with the pixels and make focused images up to 10 % too crisp, a depth error
-//! of 0.5 mm at the
-//! ends of the working range.
+//! of constant radiance would alias and make focused images up to 10 % too crisp, a depth error of 0.5 mm at
+//! the ends of the working range.
 //!
 //! Lengths are in cells. A sample of radiance 1 gives the cell at offset `d` the mean
 //! `V(d) = integral psf(x, y) B(x - d_x) B(y - d_y) dx dy` with the quadratic B-spline `B` (the triangle of
-//! linear
-//! interpolation averaged over the cell). A pixel is the mean of its four cells. The weights are exact for
-//! this model.
+//! linear interpolation averaged over the cell). A pixel is the mean of its four cells.
 //!
-//! * Pill-box: the inner integral over y is a polynomial in the disc's height; the outer one over `x = R sin
-//!   t` is split at
-//!   each kink and integrated by Gauss-Legendre to rounding.
+//! * Pill-box: the inner integral over y is a polynomial in the disc's height; the outer one over
+//!   `x = R sin t` is split at each kink and integrated by Gauss-Legendre to rounding.
 //! * Gaussian: closed form in the error function.
 //! * Generalised Gaussian: Gauss-Legendre over the smooth parts; near the centre, with its cusp for `p < 2`,
-//!   a mixture of
-//!   discs, `f(r) = integral of -f'(R) [r < R] dR`.
+//!   a mixture of discs, `f(r) = integral of -f'(R) [r < R] dR`.
 //!
-//! Tails below `exp(-12)` of the peak are cut and the kernel is normalised to 1.
-//! Cost: 10 us (pill-box, 2.7 px) to 1 ms (generalised) a kernel, growing with the square of the radius.
+//! Tails below `exp(-12)` of the peak are cut and the kernel is normalised to 1. Cost: 10 us (pill-box, 2.7
+//! px) to 1 ms (generalised) a kernel, growing with the square of the radius.
 
 use std::f64::consts::{FRAC_1_SQRT_2, PI};
 
@@ -35,7 +29,6 @@ pub const CELLS_PER_PIXEL: usize = 2;
 const TAIL_EXPONENT: f64 = 12.0;
 /// Half the width of the quadratic B-spline, cells.
 const SPLINE_REACH: f64 = 1.5;
-/// Knots of the spline.
 const KNOTS: [f64; 4] = [-1.5, -0.5, 0.5, 1.5];
 /// Blur radius in cells below which the PSF is a point: the kernels differ by less than 1e-6.
 const POINT_RADIUS: f64 = 1e-6;
@@ -91,7 +84,7 @@ impl CellKernel {
         (extent + SPLINE_REACH).ceil() as usize - 1
     }
 
-    /// Mirrors the octant `0 <= y <= x`: every PSF here is radially symmetric.
+    /// Mirrors the octant `0 <= y <= x`, as every PSF here is radially symmetric.
     fn from_octant(radius: usize, weight: impl Fn(usize, usize) -> f64) -> Self {
         let side = 2 * radius + 1;
         let mut weights = vec![0.0; side * side];
@@ -133,7 +126,6 @@ impl CellKernel {
     }
 }
 
-/// Quadratic B-spline.
 fn spline(t: f64) -> f64 {
     let t = t.abs();
     if t < 0.5 { 0.75 - t * t } else { 0.5 * (SPLINE_REACH - t).max(0.0).powi(2) }
@@ -150,7 +142,6 @@ fn spline_integral(t: f64) -> f64 {
     }
 }
 
-/// Integral of the splines at `(x, y)` over a disc around the origin.
 fn disc_weight(x: f64, y: f64, radius: f64) -> f64 {
     let nearest = (x.abs() - SPLINE_REACH).max(0.0).hypot((y.abs() - SPLINE_REACH).max(0.0));
     if nearest >= radius {
@@ -181,7 +172,6 @@ fn disc_weight(x: f64, y: f64, radius: f64) -> f64 {
         .sum()
 }
 
-/// Integral of the spline at `d` with a Gaussian of standard deviation `sigma`.
 fn gaussian_line_weight(d: f64, sigma: f64) -> f64 {
     // The spline is the third difference of a half parabola; its mean under the Gaussian, without the
     // quadratic polynomial that the difference removes.
@@ -194,7 +184,6 @@ fn gaussian_line_weight(d: f64, sigma: f64) -> f64 {
     (e - a) - 3.0 * (c - b)
 }
 
-/// Integral of the splines at `(x, y)` with a generalised Gaussian.
 fn profile_weight(x: f64, y: f64, profile: Profile) -> f64 {
     // Scale of the profile: the flanks of a large p are steeper than sigma.
     let smooth = profile.sigma / profile.p.max(1.0) > 0.8;

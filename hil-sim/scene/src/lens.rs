@@ -1,9 +1,8 @@
 //! The image-side telecentric thin lens: blur of an object distance at a sensor position.
 //!
 //! Distances in mm from the lens: `u` on the object side, `w` and `s` on the image side. `1/F = 1/u + 1/w`;
-//! the blur radius is `|s - w(u)| D / 2F`. The telecentric aperture in the front focal plane gives each cone
-//! of light the half-angle of the f-number `F/D`, so the magnification is independent of `s` (Watanabe &
-//! Nayar 1997).
+//! the blur radius is `|s - w(u)| D / 2F`. The telecentric aperture in the front focal plane makes the
+//! magnification independent of `s` (Watanabe & Nayar 1997).
 
 use thiserror::Error;
 
@@ -29,8 +28,7 @@ pub struct Lens {
     pub sensor_near_mm: f64,
     /// Field dependence of the focus; `None`: flat field.
     pub distortion: Option<EllipticalDistortion>,
-    /// Image-side telecentric: moving the sensor keeps the magnification; otherwise the image grows with its
-    /// distance.
+    /// Whether moving the sensor keeps the magnification; otherwise the image grows with its distance.
     pub telecentric: bool,
 }
 
@@ -49,8 +47,7 @@ pub enum LensError {
 }
 
 impl Lens {
-    /// The lens of an `optics.toml`, without distortion.
-    /// Errors: [`LensError::Unusable`] for numbers that [`OpticsFile::parse`] rejects.
+    /// The lens of an `optics.toml`, without distortion. Fails for invalid numbers.
     pub fn from_optics(optics: &OpticsFile) -> Result<Self, LensError> {
         let positive = [
             ("focal_length_mm", optics.focal_length_mm),
@@ -90,8 +87,7 @@ impl Lens {
         Self { distortion: Some(distortion), ..self }
     }
 
-    /// Image distance of an on-axis object, mm.
-    /// Errors: [`LensError::NoImage`] unless the object is beyond the focal length.
+    /// Image distance of an on-axis object, mm; fails at or inside the focal length.
     pub fn image_distance_mm(&self, object_mm: f64) -> Result<f64, LensError> {
         if object_mm.is_finite() && object_mm > self.focal_length_mm {
             Ok(image_distance_mm(self.focal_length_mm, object_mm))
@@ -108,8 +104,7 @@ impl Lens {
         self.sensor_far_mm + (1.0 + distortion.apply(alpha, x, y)) * half_travel_mm
     }
 
-    /// Signed blur radius on the sensor, px: positive behind the image (object beyond the focused plane),
-    /// else negative.
+    /// Signed blur radius on the sensor, px: positive for objects beyond the focused plane.
     #[must_use]
     pub fn signed_blur_px(&self, sensor_distance_mm: f64, image_mm: f64) -> f64 {
         (sensor_distance_mm - image_mm) * self.aperture_mm / (2.0 * self.focal_length_mm * self.pixel_mm)
@@ -118,9 +113,9 @@ impl Lens {
 
 /// Elliptical field dependence of the focus of simple telecentric lenses (Li 2014, ch. 6).
 ///
-/// With the normalised depth `alpha` (-1 at far focus, +1 at near focus) and `x`, `y` in 0..1 over the image:
-/// `alpha_eff = alpha + offset + 0.5 (curvature + slope alpha) rho2`, `rho2 = ((x - centre_x) / radius_x)^2 +
-/// ((y - centre_y) / radius_y)^2`.
+/// Normalised depth `alpha` (-1 at far focus, +1 at near focus), `x`, `y` in 0..1 over the image:
+/// `alpha_eff = alpha + offset + 0.5 (curvature + slope alpha) rho2`,
+/// `rho2 = ((x - centre_x) / radius_x)^2 + ((y - centre_y) / radius_y)^2`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct EllipticalDistortion {
     /// Uniform shift of alpha.

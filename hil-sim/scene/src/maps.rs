@@ -9,14 +9,12 @@ use crate::scene_error::SceneError;
 pub struct HeightMap(Array2<f32>);
 
 impl HeightMap {
-    /// Accepts depths in mm.
-    /// Errors: [`SceneError::Empty`] and [`SceneError::MapValue`].
+    /// Accepts depths in mm; fails for an empty map or invalid values.
     pub fn new(depth_mm: Array2<f32>) -> Result<Self, SceneError> {
         check("depth", &depth_mm, "a finite depth in mm above 0", |value| value > 0.0)?;
         Ok(Self(depth_mm))
     }
 
-    /// Depth at the relative image position `x`, `y` (0..1), mm.
     pub(crate) fn depth_mm(&self, x: f64, y: f64) -> f64 {
         sample(&self.0, x, y)
     }
@@ -27,8 +25,7 @@ impl HeightMap {
 pub struct Picture(Array2<f32>);
 
 impl Picture {
-    /// Accepts radiances >= 0 in any unit.
-    /// Errors: [`SceneError::Empty`], [`SceneError::MapValue`] and [`SceneError::Black`].
+    /// Accepts radiances >= 0 in any unit; fails for an empty, invalid or black picture.
     pub fn new(mut radiance: Array2<f32>) -> Result<Self, SceneError> {
         check("texture", &radiance, "a finite radiance of 0 or more", |value| value >= 0.0)?;
         let mean = radiance.iter().map(|&value| f64::from(value)).sum::<f64>() / radiance.len() as f64;
@@ -39,7 +36,6 @@ impl Picture {
         Ok(Self(radiance))
     }
 
-    /// Radiance at the relative image position `x`, `y` (0..1).
     pub(crate) fn radiance(&self, x: f64, y: f64) -> f64 {
         sample(&self.0, x, y)
     }
@@ -61,7 +57,6 @@ fn check(
     }
 }
 
-/// Bilinear sample at relative `x`, `y`, mirrored outside.
 fn sample(map: &Array2<f32>, x: f64, y: f64) -> f64 {
     let (height, width) = map.dim();
     let taps = |position: f64, size: usize| {

@@ -1,8 +1,6 @@
-//! `optics.toml`: lens, pixel and the two focus settings of a rig.
-//!
-//! Lengths in mm, pixel pitch in um, largest blur in px. Near focus and largest blur determine each other (Li
-//! 2014, eq. 4.3): between the settings the sensor moves by twice the f-number times the blur radius that
-//! each gives on the other's plane.
+//! `optics.toml`: lens, pixel and the two focus settings of a rig. Lengths in mm, pixel pitch in um, largest
+//! blur in px. Near focus and largest blur determine each other (Li 2014, eq. 4.3): between the settings the
+//! sensor moves by twice the f-number times the blur radius that each gives on the other's plane.
 
 use serde::Deserialize;
 use thiserror::Error;
@@ -34,36 +32,21 @@ pub struct OpticsFile {
     pub telecentric: Option<bool>,
 }
 
-/// Why an `optics.toml` was rejected.
-///
-/// The messages equal those of the depth crate's reader, which a test there checks. Two independent readers
-/// expose wrong formulas; one wording serves the user.
+/// Why an `optics.toml` was rejected. The messages equal those of the depth crate's reader (tested there).
 #[derive(Debug, Clone, PartialEq, Error)]
 #[expect(missing_docs, reason = "the messages name the fields")]
 pub enum OpticsError {
     #[error("{0}")]
     Syntax(String),
     #[error("[{section}] {name} = {value}: must be a positive, finite number{unit}")]
-    NotPositive {
-        section: &'static str,
-        name: &'static str,
-        value: f64,
-        /// Unit as the message ends, such as ` of mm`.
-        unit: &'static str,
-    },
+    NotPositive { section: &'static str, name: &'static str, value: f64, unit: &'static str },
     #[error("[lens] needs aperture_mm or f_number")]
     NoAperture,
     #[error(
         "[lens] aperture_mm = {aperture_mm} and f_number = {f_number} disagree: with focal_length_mm = \
          {focal_length_mm} that aperture is f_number = {implied:.5}; give one of them"
     )]
-    ApertureDisagreement {
-        focal_length_mm: f64,
-        aperture_mm: f64,
-        f_number: f64,
-        /// The f-number of that aperture.
-        implied: f64,
-    },
+    ApertureDisagreement { focal_length_mm: f64, aperture_mm: f64, f_number: f64, implied: f64 },
     #[error(
         "[focus] {name} = {distance_mm} is not beyond the focal length of {focal_length_mm} mm: no real image forms"
     )]
@@ -78,24 +61,13 @@ pub enum OpticsError {
         "[focus] max_blur_px = {given_px} and near_mm = {near_mm} disagree by {percent:.1} % (2 % allowed): \
          near_mm = {implied_near_mm:.2} would agree with that blur, max_blur_px = {implied_px:.4} with that distance"
     )]
-    Disagreement {
-        given_px: f64,
-        near_mm: f64,
-        /// Relative difference of the blur radii in percent.
-        percent: f64,
-        /// Blur implied by `near_mm`.
-        implied_px: f64,
-        /// Near focus implied by `max_blur_px`.
-        implied_near_mm: f64,
-    },
+    Disagreement { given_px: f64, near_mm: f64, percent: f64, implied_px: f64, implied_near_mm: f64 },
     #[error("[psf] {0}")]
     Psf(#[from] PsfError),
 }
 
 impl OpticsFile {
-    /// Parses an `optics.toml`. Of `near_mm` and `max_blur_px` the blur takes precedence; of `aperture_mm`
-    /// and `f_number` the latter.
-    /// Errors: [`OpticsError`] with key, value and expectation.
+    /// Parses an `optics.toml`. `max_blur_px` takes precedence over `near_mm`, `f_number` over `aperture_mm`.
     pub fn parse(text: &str) -> Result<Self, OpticsError> {
         let raw: RawFile =
             toml::from_str(text).map_err(|error| OpticsError::Syntax(error.to_string().trim_end().into()))?;
@@ -117,7 +89,6 @@ impl OpticsFile {
     }
 }
 
-/// Sensor travel from far to near focus.
 struct Travel {
     focal_length_mm: f64,
     sensor_far_mm: f64,
@@ -137,7 +108,6 @@ impl Travel {
 }
 
 impl RawLens {
-    /// Aperture diameter, mm.
     fn aperture(&self, focal_length_mm: f64) -> Result<f64, OpticsError> {
         let given = self.aperture_mm.map(|a| positive("lens", "aperture_mm", a, " of mm")).transpose()?;
         let f_number = self.f_number.map(|f| positive("lens", "f_number", f, "")).transpose()?;
@@ -162,7 +132,6 @@ impl RawLens {
 }
 
 impl RawFocus {
-    /// Near focus in mm and largest blur in px.
     fn range(&self, travel: &Travel) -> Result<(f64, f64), OpticsError> {
         let given_px = self.max_blur_px.map(|r| positive("focus", "max_blur_px", r, " of px")).transpose()?;
         let near_mm = self.near_mm.map(|u| positive("focus", "near_mm", u, " of mm")).transpose()?;

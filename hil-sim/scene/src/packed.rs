@@ -1,9 +1,6 @@
-//! A scene with its maps as bytes, for programs that open no map files: `farnear` writes it to `farnear-sim
-//! run --scene -`.
-//!
+//! A scene with its maps as bytes, for programs that open no map files (`farnear-sim run --scene -`).
 //! Little-endian: `FNSCENE1`, length of the scene text in bytes (u32), the text, then depth map (mm) and
-//! texture, each as height and width (u32) and values (f32) row by row; 0 x 0 means none. Later bytes are not
-//! read.
+//! texture, each as height and width (u32) and values (f32) by rows; 0 x 0 means none. Reads no later bytes.
 
 use std::io::{self, Read};
 
@@ -37,19 +34,13 @@ pub enum PackedSceneError {
     #[error("{found:?} begins no packed scene, expected {MAGIC:?}")]
     Magic { found: [u8; 8] },
     #[error("a packed scene's {what} has {found}, expected at most {most}")]
-    Size {
-        /// `text` or `map`.
-        what: &'static str,
-        found: u64,
-        most: u64,
-    },
+    Size { what: &'static str, found: u64, most: u64 },
     #[error(transparent)]
     Scene(#[from] SceneError),
 }
 
 impl PackedScene {
-    /// Serialises the scene.
-    /// Errors: [`PackedSceneError::Size`].
+    /// Serialises the scene; fails for maps that are too large.
     pub fn to_bytes(&self) -> Result<Vec<u8>, PackedSceneError> {
         let mut bytes = MAGIC.to_vec();
         bytes.extend(bounded("text", self.text.len() as u64, LONGEST_TEXT as u64)?.to_le_bytes());
@@ -65,7 +56,6 @@ impl PackedScene {
     }
 
     /// Reads exactly one scene from `source`.
-    /// Errors: [`PackedSceneError::Read`], [`PackedSceneError::Magic`], [`PackedSceneError::Size`].
     pub fn read(source: &mut impl Read) -> Result<Self, PackedSceneError> {
         let mut found = [0; 8];
         source.read_exact(&mut found)?;
@@ -80,7 +70,6 @@ impl PackedScene {
     }
 
     /// Parses text and maps.
-    /// Errors: [`PackedSceneError::Scene`].
     pub fn into_scene(self) -> Result<Scene, PackedSceneError> {
         Ok(SceneFile::parse(&self.text)?.into_scene(self.depth_mm, self.texture)?)
     }
@@ -170,7 +159,6 @@ mod tests {
         }
     }
 
-    /// The text, found by the layout above.
     fn read_text(bytes: &[u8]) -> String {
         let length = u32::from_le_bytes(bytes[8..12].try_into().unwrap()) as usize;
         String::from_utf8(bytes[12..12 + length].to_vec()).unwrap()

@@ -2,11 +2,9 @@
 //!
 //! * Pill-box: constant over the disc of radius `R`, the image of a round aperture.
 //! * Gaussian: standard deviation `sigma = k R` in each direction.
-//! * Generalised Gaussian: `f(r) = p^(1 - 2/p) / (2 pi sigma^2 Gamma(2/p)) exp(-(r / sigma)^p / p)`, `sigma =
-//!   k R`
-//!   (Claxton & Staunton 2008, normalised in the plane; Li 2014, eq. 5.16 normalises on the line). `p = 2` is
-//!   the Gaussian;
-//!   for other `p` sigma is a scale, not the standard deviation.
+//! * Generalised Gaussian: `f(r) = p^(1 - 2/p) / (2 pi sigma^2 Gamma(2/p)) exp(-(r / sigma)^p / p)`,
+//!   `sigma = k R` (Claxton & Staunton 2008, normalised in the plane; Li 2014, eq. 5.16 normalises on the
+//!   line). `p = 2` is the Gaussian; for other `p` sigma is a scale, not the standard deviation.
 //! * Ring: constant between the radii `inner R` and `R`, the image of a round aperture with a covered centre.
 
 use std::f64::consts::PI;
@@ -61,8 +59,7 @@ pub enum PsfError {
 }
 
 impl Psf {
-    /// A PSF from the keys of `[psf]` in `optics.toml`.
-    /// Errors: [`PsfError`] for an unknown model or a missing, surplus or invalid parameter.
+    /// A PSF from `[psf]` in `optics.toml`; fails for an unknown model or wrong parameters.
     pub fn from_parts(
         model: &str,
         p: Option<f64>,
@@ -143,7 +140,6 @@ impl Psf {
     }
 }
 
-/// Generalised Gaussian of a given scale.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Profile {
     pub(crate) p: f64,
@@ -151,7 +147,6 @@ pub(crate) struct Profile {
 }
 
 impl Profile {
-    /// Factor of the exponential.
     pub(crate) fn peak(&self) -> f64 {
         self.p.powf(1.0 - 2.0 / self.p) / (2.0 * PI * self.sigma * self.sigma * libm::tgamma(2.0 / self.p))
     }

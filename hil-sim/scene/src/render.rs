@@ -26,10 +26,8 @@ pub enum RenderError {
     Camera(#[from] CameraError),
     #[error(transparent)]
     Lens(#[from] LensError),
-    /// Sensor distance not finite or not positive.
     #[error("sensor at {sensor_distance_mm} mm from the lens, expected a finite distance above 0")]
     Sensor { sensor_distance_mm: f64 },
-    /// Blur radius above the limit.
     #[error(
         "the sensor at {sensor_distance_mm} mm blurs the scene over a radius of {blur_px:.0} px, at most {limit_px} px is \
          rendered; focus lies between {far_mm:.3} and {near_mm:.3} mm"
@@ -38,10 +36,8 @@ pub enum RenderError {
 }
 
 /// Renders one exposure: codes of shape (height, width), 0 to [`Noise::max_code`](crate::Noise::max_code).
-///
-/// `sensor_distance_mm` is measured from the lens. The texture depends on `seed`, the noise on `seed` and
-/// `exposure_number`. For many exposures of a scene keep a [`Renderer`].
-/// Errors: [`RenderError`] for a lens, scene, camera or position without an image.
+/// Texture depends on `seed`, noise on `seed` and `exposure_number`; `sensor_distance_mm` is from the lens.
+/// For many exposures keep a [`Renderer`]. Fails for a lens, scene, camera or position without an image.
 pub fn render(
     scene: &Scene,
     lens: &Lens,
@@ -54,9 +50,7 @@ pub fn render(
     Renderer::new(scene, lens, psf, camera, seed)?.expose(sensor_distance_mm, exposure_number)
 }
 
-/// Renders without noise, quantisation and full well: shape (height, width), as a fraction of the full well
-/// ([`Camera::exposure_level`] on average).
-/// Errors: as [`render`].
+/// Renders without noise, quantisation and full well, as a fraction of the full well; fails as [`render`].
 pub fn render_f32(
     scene: &Scene,
     lens: &Lens,
@@ -106,8 +100,7 @@ enum Surface {
 }
 
 impl Renderer {
-    /// Creates the texture; checks that all of the scene has an image.
-    /// Errors: as [`render`].
+    /// Creates the texture; fails as [`render`] unless all of the scene has an image.
     pub fn new(
         scene: &Scene,
         lens: &Lens,
@@ -166,18 +159,13 @@ impl Renderer {
         View { magnification: self.view.magnification * grown, ..self.view }
     }
 
-    /// One exposure: codes of shape (height, width).
-    /// Errors: [`RenderError::Sensor`] and [`RenderError::Blur`].
+    /// One exposure: codes of shape (height, width). Fails for a sensor position without an image.
     pub fn expose(&self, sensor_distance_mm: f64, exposure_number: u32) -> Result<Array2<u16>, RenderError> {
         let radiance = self.radiance(sensor_distance_mm)?;
         Ok(self.camera.expose(radiance.view(), self.seed, exposure_number))
     }
 
-    /// As [`Renderer::expose`], under light of this brightness: `textured` times the scene's texture, and `even` on top of it, which
-    /// a blank wall reflects. With 1 and 0 the same as [`Renderer::expose`].
-    ///
-    /// # Errors
-    /// As [`Renderer::expose`].
+    /// [`Renderer::expose`] with light: `textured` times the texture plus `even`, as from a blank wall.
     pub fn expose_lit(
         &self,
         sensor_distance_mm: f64,
@@ -191,8 +179,7 @@ impl Renderer {
         Ok(self.camera.expose(radiance.view(), self.seed, exposure_number))
     }
 
-    /// Mean radiance of each pixel, shape (height, width); the scene's mean is 1.
-    /// Errors: as [`Renderer::expose`].
+    /// Mean radiance per pixel, shape (height, width), scene mean 1; fails as [`Renderer::expose`].
     pub fn radiance(&self, sensor_distance_mm: f64) -> Result<Array2<f32>, RenderError> {
         if !(sensor_distance_mm.is_finite() && sensor_distance_mm > 0.0) {
             return Err(RenderError::Sensor { sensor_distance_mm });
@@ -233,7 +220,6 @@ impl Renderer {
         Ok(Cells { margin_px, radiance: self.cell_radiance(margin_px, &view), blur_px }.blurred(&self.psf))
     }
 
-    /// Radiance of the cells, including `margin_px`.
     fn cell_radiance(&self, margin_px: usize, view: &View) -> Array2<f32> {
         let size = cell_grid(&self.camera, margin_px);
         match &self.texture {
@@ -264,19 +250,16 @@ impl Renderer {
     }
 }
 
-/// Rows and columns of cells, including `margin_px`.
 fn cell_grid(camera: &Camera, margin_px: usize) -> (usize, usize) {
     let cells = |pixels: usize| (pixels + 2 * margin_px) * CELLS_PER_PIXEL;
     (cells(camera.height_px), cells(camera.width_px))
 }
 
-/// Image position of a cell's centre.
 fn cell_centre_px((row, column): (usize, usize), margin_px: usize) -> (f64, f64) {
     let position = |index: usize| (index as f64 + 0.5) / CELLS_PER_PIXEL as f64 - margin_px as f64;
     (position(column), position(row))
 }
 
-/// Image distance of each cell relative to the far setting's sensor distance, mm.
 fn image_field(
     scene: &Scene,
     lens: &Lens,

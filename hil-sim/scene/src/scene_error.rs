@@ -13,30 +13,13 @@ pub enum SceneError {
     #[error("scene: {name} = {value}, expected {expected}")]
     Value { name: &'static str, value: String, expected: &'static str },
     #[error("scene: the {what} map is {height} x {width}, expected at least 1 x 1")]
-    Empty {
-        /// `depth` or `texture`.
-        what: &'static str,
-        height: usize,
-        width: usize,
-    },
+    Empty { what: &'static str, height: usize, width: usize },
     #[error("scene: the texture map is black")]
     Black,
     #[error("scene file: {0}")]
     Syntax(String),
-    /// Scene file and given maps do not match.
     #[error("scene file: {what} map {found}")]
-    Maps {
-        /// `depth` or `texture`.
-        what: &'static str,
-        found: &'static str,
-    },
+    Maps { what: &'static str, found: &'static str },
     #[error("scene: the {what} map holds {value} at row {row}, column {column}, expected {expected}")]
-    MapValue {
-        /// `depth` or `texture`.
-        what: &'static str,
-        value: f32,
-        row: usize,
-        column: usize,
-        expected: &'static str,
-    },
+    MapValue { what: &'static str, value: f32, row: usize, column: usize, expected: &'static str },
 }

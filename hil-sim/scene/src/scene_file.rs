@@ -1,4 +1,4 @@
-//! Scene files, whose maps are separate files.
+//! Scene files, whose maps are separate files:
 //!
 //! ```toml
 //! depth = "bust.npy"      # depths in mm; or: scene = "cone"
@@ -37,8 +37,7 @@ struct Raw {
 }
 
 impl SceneFile {
-    /// Parses a scene file.
-    /// Errors: [`SceneError`] with key and expectation.
+    /// Parses a scene file; errors have key and expectation.
     pub fn parse(text: &str) -> Result<Self, SceneError> {
         let raw: Raw =
             toml::from_str(text).map_err(|error| SceneError::Syntax(error.to_string().trim_end().into()))?;
@@ -67,9 +66,7 @@ impl SceneFile {
         Ok(Self { depth: raw.depth, texture, scene, random, contrast: raw.contrast })
     }
 
-    /// Combines the scene with the maps of [`SceneFile::depth`] (mm) and [`SceneFile::texture`] (any
-    /// radiance).
-    /// Errors: [`SceneError`] for a missing, surplus or invalid map.
+    /// Combines the scene with its maps, depth in mm; fails for a missing, surplus or invalid map.
     pub fn into_scene(
         self,
         depth_mm: Option<Array2<f32>>,

@@ -7,7 +7,6 @@ use crate::scene::{Scene, Shape};
 use crate::scene_error::SceneError;
 use crate::texture::Texture;
 
-/// Default number of levels of a staircase.
 const DEFAULT_STEPS: usize = 8;
 
 impl FromStr for Scene {
@@ -81,7 +80,7 @@ impl FromStr for Texture {
 }
 
 impl fmt::Display for Scene {
-    /// Text that parses to this scene; height maps and pictures print their kind only.
+    /// The result parses to this scene; height maps and pictures print their kind only.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match &self.shape {
             Shape::Plane { depth_mm } => write!(f, "plane:{depth_mm}")?,

@@ -1,9 +1,6 @@
-//! Random textures.
-//!
-//! A Gaussian random field of a given spectrum with two samples per pixel, mean 1, standard deviation =
-//! contrast, clipped to 0.2..1.8. Its period exceeds the image by at least 64 px, so nothing repeats within
-//! an image and surfaces continue beyond it. Depends on seed and image size only. Cost: one FFT of the
-//! period, 0.1 s for 640 x 480.
+//! Random textures: a Gaussian random field of a given spectrum with two samples per pixel, mean 1, standard
+//! deviation = contrast, clipped to 0.2..1.8. Its period exceeds the image by at least 64 px, so nothing
+//! repeats. Depends on seed and image size only. Cost: one FFT of the period, 0.1 s for 640 x 480.
 
 use std::fmt;
 
@@ -17,9 +14,7 @@ use crate::fourier::{Fourier2, good_size};
 use crate::kernel::CELLS_PER_PIXEL;
 use crate::maps::Picture;
 
-/// Minimum excess of the period over the image.
 const MARGIN_PX: usize = 64;
-/// Range of the radiance; the mean is 1.
 const CLIP: (f32, f32) = (0.2, 1.8);
 
 /// Texture of a surface.
@@ -43,18 +38,15 @@ impl fmt::Display for Texture {
     }
 }
 
-/// Unscaled amplitude of the fractal at `f` cycles per px.
 fn fractal_amplitude(f: f32) -> f32 {
     1.0 / f.max(1.0 / 64.0)
 }
 
-/// Amplitude of the blurred white noise at `f` cycles per px.
 fn grain_amplitude(f: f32) -> f32 {
     let z = std::f32::consts::TAU * f * 0.5;
     libm::expf(-0.5 * z * z)
 }
 
-/// Spectrum of a random texture.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Spectrum {
     Sand,

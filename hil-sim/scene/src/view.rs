@@ -20,7 +20,6 @@ impl Default for View {
 }
 
 impl View {
-    /// The view over an image of this size, px.
     pub(crate) fn placed(&self, width: f64, height: f64) -> Placed {
         let (sin, cos) = self.rotation_deg.to_radians().sin_cos();
         Placed { view: *self, middle: (0.5 * width, 0.5 * height), sin, cos }
@@ -35,7 +34,6 @@ pub(crate) struct Placed {
 }
 
 impl Placed {
-    /// Scene position at an image position.
     pub(crate) fn scene_px(&self, (x_px, y_px): (f64, f64)) -> (f64, f64) {
         if self.view == View::default() {
             return (x_px, y_px);
@@ -47,8 +45,7 @@ impl Placed {
     }
 }
 
-/// Interpolates a periodic field with a four-lobe Lanczos kernel; its error is far below the camera's noise,
-/// because textures have little power at the cell frequency.
+/// Interpolates a periodic field with a four-lobe Lanczos kernel; its error is far below the camera's noise.
 pub(crate) fn periodic(field: &Array2<f32>, x: f64, y: f64) -> f32 {
     const LOBES: isize = 4;
     let sinc = |x: f64| {

@@ -1,11 +1,9 @@
-//! A lens by wave optics: what an aberrated lens of finite aperture makes of a textured surface.
+//! A lens by wave optics: aberrations and diffraction of a finite aperture.
 //!
-//! The amplitude on the sensor is the Fourier transform of the pupil, whose phase holds defocus, spherical aberration and
-//! astigmatism; intensity is its square, summed over the wavelengths of the light (Goodman, Introduction to Fourier Optics, ch. 6).
-//! Diffraction, the halo on one side of focus and the least blur in focus follow from it. It uses none of the point spread functions
-//! of [`psf`](crate::psf).
-//!
-//! A surface of varying defocus is a mixture, pixel by pixel, of images with the defocus of two neighbouring levels.
+//! The amplitude on the sensor is the Fourier transform of the pupil, whose phase holds defocus, spherical
+//! aberration and astigmatism; intensity is its square, summed over the wavelengths (Goodman, Introduction to
+//! Fourier Optics, ch. 6). It uses none of the point spread functions of [`psf`](crate::psf). A surface of
+//! varying defocus is a mixture, pixel by pixel, of images at two neighbouring levels.
 
 use ndarray::Array2;
 use rustfft::num_complex::Complex32;
@@ -14,15 +12,13 @@ use crate::fourier::Fourier2;
 use crate::kernel::CELLS_PER_PIXEL;
 use crate::texture::Spectrum;
 
-/// Samples per pixel of the intensity.
 const FINE_PER_PIXEL: usize = 8;
-/// Side of the window of the intensity, px: blur radii up to a quarter of it are free of wrapping.
+/// Side of the intensity's window, px: blur radii up to a quarter of it do not wrap.
 const WINDOW_PX: usize = 32;
-/// Side of the transform of the pupil.
 const SIDE: usize = FINE_PER_PIXEL * WINDOW_PX;
-/// Samples per pixel and axis that decide which part of a pupil's sample lies inside.
+/// Samples per pixel and axis that decide which part of a pupil sample is inside.
 const PUPIL_PARTS: usize = 4;
-/// Difference in geometric blur radius between the levels of a tilted surface, px.
+/// Step of the geometric blur radius between levels, px.
 const LEVEL_PX: f64 = 0.1;
 
 /// A lens and its light.
@@ -32,7 +28,7 @@ pub struct WaveLens {
     pub f_number: f64,
     /// Pixel pitch, um; the fill factor is 1.
     pub pixel_um: f64,
-    /// Wavelengths, um, and their parts of the light.
+    /// Wavelengths, um, with their shares of the light.
     pub light: Vec<[f64; 2]>,
     /// Spherical aberration at the edge of the pupil, waves of the first wavelength (Seidel W040).
     pub spherical_waves: f64,
@@ -40,7 +36,7 @@ pub struct WaveLens {
     pub astigmatism_waves: f64,
 }
 
-/// One period of a random texture, cells of half a pixel: mean 1, SD = `contrast`. Even `sand` (or else `fractal`).
+/// One period of a random texture, cells of half a pixel: mean 1, SD = `contrast`; `sand` or fractal.
 #[must_use]
 pub fn random_texture(
     sand: bool,
@@ -60,8 +56,8 @@ impl WaveLens {
         defocus_um.abs() / (2.0 * self.f_number * self.pixel_um)
     }
 
-    /// The image of `cells` (one period, cells of half a pixel, even sides): `defocus_um` is the distance from the sensor to the
-    /// paraxial image of the surface, per row and column. As large as the period.
+    /// The image of `cells` (one period, cells of half a pixel, even sides). `defocus_um` is the distance
+    /// from the sensor to the paraxial image of the surface, per row and column. As large as the period.
     #[must_use]
     pub fn image(&self, cells: &Array2<f32>, defocus_um: &dyn Fn(usize, usize) -> f64) -> Array2<f32> {
         let (height, width) = cells.dim();
@@ -92,7 +88,7 @@ impl WaveLens {
         image
     }
 
-    /// Transfer from the surface to the image of pixels at each of `cycles` per pixel along x and y.
+    /// Transfer from surface to pixels at each of `cycles` per pixel along x and y.
     #[must_use]
     pub fn transfer(&self, defocus_um: f64, cycles: &[[f64; 2]]) -> Vec<f64> {
         let kernel = self.kernel(defocus_um);
@@ -117,7 +113,6 @@ impl WaveLens {
             .collect()
     }
 
-    /// The light of a cell on pixels around it, wrapped, at the places of the cells of a period.
     fn cell_kernel(&self, defocus_um: f64, height: usize, width: usize) -> Vec<Complex32> {
         let kernel = self.kernel(defocus_um);
         let spacing = FINE_PER_PIXEL / CELLS_PER_PIXEL;
@@ -136,7 +131,7 @@ impl WaveLens {
         data
     }
 
-    /// Intensity of a cell (half a pixel) averaged over a pixel, around the middle of the array, sum 1.
+    /// Intensity of a cell averaged over a pixel, centred in the array, sum 1.
     fn kernel(&self, defocus_um: f64) -> Array2<f32> {
         let mut fourier = Fourier2::new(SIDE, SIDE);
         let mut sum = vec![Complex32::default(); SIDE * SIDE];
@@ -217,7 +212,7 @@ mod tests {
         }
     }
 
-    /// The transfer function of a perfect lens in focus is known in closed form, and so is a square pixel's.
+    /// The transfer functions of a perfect lens in focus and of a square pixel have closed forms.
     #[test]
     fn a_perfect_lens_in_focus_has_the_transfer_of_diffraction() {
         let lens = lens(0.0);
@@ -233,7 +228,7 @@ mod tests {
         }
     }
 
-    /// Far from focus geometry is left: a disc of radius z / 2N has the second moment R^2 / 2.
+    /// Far from focus the image is a disc of radius z / 2N with second moment R^2 / 2.
     #[test]
     fn defocus_blurs_by_the_geometric_radius() {
         let lens = lens(0.0);

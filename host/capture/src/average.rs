@@ -4,14 +4,12 @@ use ndarray::{Array2, Zip};
 
 use crate::{camera::Image, expose::CaptureError};
 
-/// Bit limit of image files.
 const BITS_MAX: u32 = 16;
 
-/// Sum of images of equal size and bit depth.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Average {
     first: Image,
-    /// Sum of codes; 65,535 16-bit images fit.
+    /// 65,535 16-bit images fit.
     sum: Array2<u32>,
     /// Pixels saturated in any image: their mean would be too dark.
     saturated: Array2<bool>,
@@ -26,8 +24,7 @@ impl Average {
         Self { first: image, sum, saturated, count: 1 }
     }
 
-    /// Adds an image.
-    /// Errors: [`CaptureError::Unlike`] for another size or bit depth.
+    /// Fails for another size or bit depth.
     pub fn add(&mut self, image: &Image) -> Result<(), CaptureError> {
         let ((far_height, far_width), (near_height, near_width)) = (self.sum.dim(), image.pixels.dim());
         let (far_bits, near_bits) = (self.first.bits, image.bits);
@@ -52,8 +49,7 @@ impl Average {
         Ok(())
     }
 
-    /// The mean, with one more bit per doubling up to 16; black and white keep their meaning. A single image
-    /// is returned unchanged.
+    /// The mean, one more bit per doubling up to 16; black and white keep their meaning. One image is unchanged.
     pub fn finish(self) -> Image {
         if self.count == 1 {
             return self.first;

@@ -1,7 +1,5 @@
-//! Depth correction on the board: sends a correction and rows of a depth map, or flat targets for a fit on
-//! the board.
-//!
-//! Rows travel in pieces of [`CODES_MAX`] codes. A row of 640 pixels takes 19 requests, some 25 ms.
+//! Depth correction on the board: sends a correction and rows of a depth map, or flat targets for a fit on the board. A
+//! row of 640 pixels takes 19 requests of [`CODES_MAX`] codes, some 25 ms.
 
 use farnear_depth::corrections::{BoardCorrection, BoardForm, CorrectionError, Method};
 use farnear_maths::clsf::{DepthScale, Frame};
@@ -29,10 +27,9 @@ pub enum BoardCorrectionError {
     Interrupted { row: u16 },
 }
 
-/// Flat target for a fit on the board.
 #[derive(Clone, Debug)]
 pub struct CodedTarget {
-    /// Depth codes, (height, width).
+    /// (height, width).
     pub codes: Array2<i16>,
     /// Code of the true depth.
     pub truth: i16,
@@ -54,12 +51,10 @@ fn info(method: Method, frame: Frame, scale: DepthScale) -> Result<CorrectionInf
     })
 }
 
-/// Encodes depths in mm.
 pub fn encode(depth_mm: ArrayView2<f32>, scale: DepthScale) -> Array2<i16> {
     depth_mm.mapv(|depth| scale.encode(depth))
 }
 
-/// Decodes to depths in mm.
 pub fn decode(codes: ArrayView2<i16>, scale: DepthScale) -> Array2<f32> {
     codes.mapv(|code| scale.decode(code))
 }
@@ -96,12 +91,11 @@ impl Client {
         Ok(coefficients)
     }
 
-    /// Stores the open correction permanently.
     pub fn store_correction(&self) -> Result<(), ClientError> {
         self.expect_accepted(&Request::StoreCorrection, "storing the depth correction")
     }
 
-    /// Corrects the codes of a depth map on the board; calls `progress` per row.
+    /// Corrects coded depths on the board; calls `progress` per row.
     pub fn correct_codes(
         &self,
         codes: ArrayView2<i16>,
@@ -134,8 +128,7 @@ impl Client {
         Ok(corrected)
     }
 
-    /// Fits a correction to every `step`th pixel and row of flat targets. Opens it on the board and returns
-    /// its coefficients; calls `progress` per row of each target.
+    /// Fits, opens and returns a correction from every `step`th pixel and row; calls `progress` per row.
     pub fn fit_correction(
         &self,
         method: Method,

@@ -31,10 +31,9 @@ pub use sim::SimCamera;
 #[cfg(all(feature = "v4l2", target_os = "linux"))]
 pub use v4l::V4lCamera;
 
-/// An image of a camera.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Image {
-    /// Shape (height, width); values in 0..2^bits.
+    /// (height, width); values in 0..2^bits.
     pub pixels: Array2<u16>,
     /// Significant bits, 8 to 16.
     pub bits: u8,
@@ -47,12 +46,11 @@ impl Image {
         self.pixels.mapv(|code| f32::from(code) / largest)
     }
 
-    /// Codes as floats.
     pub fn codes(&self) -> Array2<f32> {
         self.pixels.mapv(f32::from)
     }
 
-    /// Histogram over all codes; values above the largest code count as it.
+    /// Histogram over all codes; larger values count as the largest code.
     pub fn counts(&self) -> Vec<u32> {
         let largest = (1usize << self.bits.clamp(1, 16)) - 1;
         let mut counts = vec![0; largest + 1];
@@ -62,7 +60,7 @@ impl Image {
         counts
     }
 
-    /// Upper eight bits of each pixel, row by row.
+    /// Upper eight bits, row by row.
     pub fn eight_bits(&self) -> Vec<u8> {
         let (bits, pixels) = (self.bits, self.pixels.iter());
         if bits >= 8 {
@@ -84,19 +82,16 @@ pub trait Camera {
     /// Kind of camera for a capture's record, without address or path.
     fn kind(&self) -> &'static str;
 
-    /// Prepares for exposures of this kind; earlier images are dropped. A free-running camera uses this
-    /// exposure time until armed again.
+    /// Prepares for exposures of this kind and drops earlier images. Free-running ones keep the exposure.
     fn arm(&mut self, mode: TriggerMode, exposure: Micros) -> Result<(), CameraError>;
 
     /// Software trigger of one exposure.
     fn trigger(&mut self, trigger_number: u32, exposure: Micros) -> Result<(), CameraError>;
 
-    /// The image of this exposure, waiting at most `wait`. Called in order of exposures; may be repeated
-    /// after [`CameraError::Late`].
+    /// Waits at most `wait` for the image of this exposure. Call in order; may be repeated after [`CameraError::Late`].
     fn image(&mut self, shot: &ShotRecord, wait: Duration) -> Result<Image, CameraError>;
 
-    /// Called per reported exposure before its image is fetched; `received` is the arrival time of the
-    /// report.
+    /// Called per reported exposure before its image is fetched; `received` is the report's arrival.
     fn reported(&mut self, _shot: &ShotRecord, _received: Instant) {}
 
     /// Time without a picture that ends a program.
@@ -104,8 +99,8 @@ pub trait Camera {
         Duration::ZERO
     }
 
-    /// Called after a program's last image until [`Self::quiet_time`] has passed: waits at most `wait` for a
-    /// surplus picture. Any surplus makes the pairing of the whole program uncertain.
+    /// Waits at most `wait` after a program's last image, called until [`Self::quiet_time`] has passed: a surplus
+    /// picture makes the pairing of the whole program uncertain.
     fn finish(&mut self, _wait: Duration) -> Result<(), CameraError> {
         Ok(())
     }
@@ -115,7 +110,7 @@ pub trait Camera {
         Ok(Vec::new())
     }
 
-    /// Changes a setting permanently; values out of range are refused, not clamped.
+    /// Changes a setting permanently; values out of range are rejected, not clamped.
     fn set(&mut self, setting: &Setting) -> Result<(), CameraError> {
         let expected = format!("a camera of the kind `{}` has nothing to set", self.kind());
         Err(CameraError::Setting { name: setting.name(), value: setting.value(), expected })
@@ -127,8 +122,7 @@ pub trait Camera {
         Err(CameraError::Unusable { camera: self.kind().into(), reason })
     }
 
-    /// The newest unread picture since [`Self::watch`], waiting at most `wait`; `None` at the timeout. An
-    /// error if no more can come.
+    /// The newest unread picture since [`Self::watch`]; `None` after `wait`. Fails if no more can come.
     fn newest(&mut self, _wait: Duration) -> Result<Option<Frame>, CameraError> {
         Ok(None)
     }
@@ -154,7 +148,6 @@ pub enum CameraError {
     Folder { folder: PathBuf, source: std::io::Error },
     #[error("{} cannot be used: {reason}", path.display())]
     File { path: PathBuf, reason: String },
-    /// Camera and board contradict each other about an exposure.
     #[error(
         "the picture for exposure {wanted} cannot be distinguished from others ({camera}): {reason}; does the camera take one picture \
          for each trigger, and is its strobe wired to the board?"
@@ -173,14 +166,12 @@ pub enum CameraError {
         ffmpeg_hint(camera)
     )]
     Stale { camera: String, wanted: u32, early: Duration },
-    /// Two exposures with equal pixels.
     #[error(
         "the pictures for exposures {earlier} and {wanted} are identical ({camera}): one of them is a copy; each trigger must \
          give one picture of its own{}",
         ffmpeg_hint(camera)
     )]
     Doubled { camera: String, earlier: u32, wanted: u32 },
-    /// A picture older than its predecessor.
     #[error(
         "{} was taken before the picture of the exposure before it: pictures arrive in another order than they were taken; \
          let them be transferred one after the other",

@@ -1,11 +1,9 @@
 //! Handle of a board: requests, and streams of events and logs.
 //!
-//! A request is repeated byte for byte until its answer comes; the board acts once per id. Handles can be
-//! cloned and used from any thread; one thread owns the port and sends requests in sequence.
-//!
-//! A handle belongs to one session. After a reset or unplugging each request fails with
-//! [`ClientError::Reset`] or [`ClientError::Gone`] until [`Client::reopen`], because the rig may have lost
-//! its position. See `docs/protocol.md`.
+//! A request is repeated byte for byte until its answer comes; the board acts once per id. Handles can be cloned and
+//! used from any thread; one thread owns the port and sends requests in sequence. A handle belongs to one session.
+//! After a reset or unplugging each request fails with [`ClientError::Reset`] or [`ClientError::Gone`] until
+//! [`Client::reopen`], because the rig may have lost its position. See `docs/protocol.md`.
 
 use std::{
     sync::{
@@ -30,14 +28,11 @@ use crate::{
     transport::{Place, Transport, with_rate},
 };
 
-/// Polling interval for interruptions while waiting for an answer.
 const INTERRUPT_POLL: Duration = Duration::from_millis(25);
 /// Time to wait for an answer after an interruption.
 const ANSWER_GRACE: Duration = Duration::from_millis(150);
-/// Retry interval for a restarting board.
 const NEXT_ATTEMPT: Duration = Duration::from_millis(50);
 
-/// Handle of a board.
 #[derive(Clone)]
 pub struct Client {
     port: Arc<Port>,
@@ -51,7 +46,6 @@ pub struct Client {
 struct Port {
     name: String,
     timing: Arc<Mutex<Timing>>,
-    /// Requested link rate.
     wanted: Option<LinkRate>,
     /// Cached speeds of the axes.
     paces: Mutex<Vec<(Axis, Pace)>>,
@@ -69,22 +63,19 @@ impl Drop for Port {
 }
 
 impl Client {
-    /// Opens a serial port and says hello. An unplugged board is reconnected when it returns.
-    /// `/dev/ttyACM0@921600` requests a link rate; without it on both ends the link keeps its rate, see
-    /// [`Client::link_note`].
+    /// Opens a serial port and says hello. An unplugged board is reconnected when it returns. `/dev/ttyACM0@921600`
+    /// requests a link rate; without it on both ends the link keeps its rate, see [`Client::link_note`].
     pub fn open(port: &str) -> Result<Self, ClientError> {
         let (port, wanted) = with_rate(port)?;
         Self::start(serial(port), port, false, wanted)
     }
 
-    /// As [`Client::open`] for an emulated board: hello has the long timeout, because a repeat on a slow
-    /// computer would change the run.
+    /// As [`Client::open`] for an emulated board: hello has a long timeout, because a repeat would change the run.
     pub fn open_emulated(port: &str) -> Result<Self, ClientError> {
         Self::start(serial(port), port, true, None)
     }
 
     /// Says hello over `connect`, initially and after the line broke. `port` is its name in messages.
-    /// Errors: [`ClientError`] if nothing opens or answers, or without a common protocol version.
     pub fn connect(connect: Connect, port: &str) -> Result<Self, ClientError> {
         Self::start(connect, port, false, None)
     }
@@ -122,8 +113,7 @@ impl Client {
         Ok(Self { port: Arc::new(port), session, interrupt: None, light: None })
     }
 
-    /// Gives every shot of the programs that this handle arms this light, from the start of its exposure to the end; `None` for no
-    /// light. The board refuses it for shots that it does not trigger.
+    /// Light during each exposure of this handle's programs; the board rejects it for shots that it does not trigger.
     pub fn set_light(&mut self, light: Option<LightLevels>) {
         self.light = light;
     }
@@ -132,8 +122,7 @@ impl Client {
         self.light
     }
 
-    /// Continues after a reset or unplugging; says hello if necessary. Axes are at rest and not homed.
-    /// Errors: [`ClientError`] if the board is absent; may be repeated.
+    /// Continues after a reset or unplugging. Axes are at rest and not homed. May be repeated.
     pub fn reopen(&mut self) -> Result<(), ClientError> {
         let (answer, joined) = sync_channel(1);
         self.command(Command::Join { known: self.session.number, answer }, "saying hello")?;
@@ -143,7 +132,6 @@ impl Client {
     }
 
     /// As [`Client::reopen`], repeated for at most `allowed`.
-    /// Errors: the last error at the timeout.
     pub fn reopen_within(&mut self, allowed: Duration) -> Result<(), ClientError> {
         let until = Instant::now() + allowed;
         loop {
@@ -164,7 +152,6 @@ impl Client {
         &self.session.hello
     }
 
-    /// Protocol version of this session.
     pub fn protocol(&self) -> u8 {
         self.session.version
     }
@@ -180,7 +167,6 @@ impl Client {
         })
     }
 
-    /// Link rate of this session.
     pub fn link_rate(&self) -> LinkRate {
         self.session.rate
     }
@@ -203,7 +189,6 @@ impl Client {
         (named != has).then(|| format!("the board that was on {named} has come back on {has}"))
     }
 
-    /// Port name as first opened.
     pub fn port(&self) -> &str {
         &self.port.name
     }
@@ -212,13 +197,12 @@ impl Client {
         *self.port.timing.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Changes the timeouts of all handles, for tests or unusual lines.
+    /// Sets the timeouts of all handles, for tests or unusual lines.
     pub fn set_timing(&self, timing: Timing) {
         *self.port.timing.lock().unwrap_or_else(PoisonError::into_inner) = timing;
     }
 
-    /// Once this flag is set, waits for work stop the board and return [`ClientError::Interrupted`]. Later
-    /// clones share it.
+    /// Once this flag is set, waits for work stop the board and return [`ClientError::Interrupted`]. Clones share it.
     pub fn interrupt_by(&mut self, flag: Arc<AtomicBool>) {
         self.interrupt = Some(flag);
     }
@@ -227,8 +211,7 @@ impl Client {
         self.interrupt.as_ref().is_some_and(|flag| flag.load(Ordering::Relaxed))
     }
 
-    /// Sends a request until it is answered; `during` describes it, e.g. "homing". Returns the id that events
-    /// refer to.
+    /// Sends a request until it is answered; `during` describes it, e.g. "homing". Returns the id that events refer to.
     pub fn request(&self, request: &Request, during: &str) -> Result<(u32, Response), ClientError> {
         self.ask(request, during, None)
     }
@@ -260,7 +243,6 @@ impl Client {
                 Err(RecvTimeoutError::Disconnected) => return Err(self.ended(during)),
                 Err(RecvTimeoutError::Timeout) if stopping || !self.interrupted() => {}
                 Err(RecvTimeoutError::Timeout) => {
-                    // Work accepted later has no listener and is stopped by the port's owner.
                     if interrupted.get_or_insert_with(Instant::now).elapsed() >= ANSWER_GRACE {
                         return Err(ClientError::Interrupted { during: during.into() });
                     }
@@ -286,7 +268,6 @@ impl Client {
     }
 
     /// The board's log from now on: its defmt stream, to be decoded with the firmware's ELF.
-    /// Errors: [`ClientError::Gone`] if the port's thread has ended.
     pub fn logs(&self) -> Result<LogStream, ClientError> {
         let (sender, stream) = LogStream::new();
         self.command(Command::Logs(sender), "listening")?;

@@ -1,8 +1,6 @@
-//! Continuous capture: cycles of shots (far, near, ...) with an image each, for a number of exposures or
-//! until stopped.
-//!
-//! The board numbers its frames without gaps and reports dropped ones. Losses on the way are reported, too: a
-//! missing event by its number, a missing image as such. No image is assigned to another exposure.
+//! Continuous capture: cycles of shots (far, near, ...) with an image each, for a number of exposures or until stopped.
+//! The board numbers its frames without gaps and reports dropped ones. Losses on the way are reported, too: a missing
+//! event by its number, a missing image as such. No image is assigned to another exposure.
 
 use std::{
     collections::VecDeque,
@@ -26,18 +24,17 @@ use crate::{
 /// Missing images in a row that end the run.
 const UNDELIVERED_MAX: u32 = 8;
 
-/// Period and number of exposures.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Pace {
-    /// Trigger period; 0 = as fast as possible.
+    /// 0 = as fast as possible.
     pub period: Micros,
-    /// Number of exposures; 0 = until stopped.
+    /// 0 = until stopped.
     pub exposures: u32,
 }
 
 #[derive(Clone, PartialEq, Debug)]
 pub struct Frame {
-    /// Period number, from 0.
+    /// From 0.
     pub number: u32,
     /// Largest deviation from the target between trigger and end of exposure.
     pub deviation: Nanometres,
@@ -45,40 +42,34 @@ pub struct Frame {
     pub image: Image,
 }
 
-/// Why a frame or its image is missing.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub enum Loss {
     Board(DropReason),
     /// The event was lost and the board has forgotten it.
     EventLost,
-    /// The image did not arrive.
     Image {
         trigger_number: u32,
         reason: String,
     },
 }
 
-/// Result of a period.
 #[derive(Clone, PartialEq, Debug)]
 pub enum Outcome {
     Taken(Box<Frame>),
     Dropped {
-        /// Period number, from 0.
+        /// From 0.
         number: u32,
         loss: Loss,
     },
 }
 
-/// A reported exposure whose image is pending.
 enum Reported {
     Taken { number: u32, deviation: Nanometres, record: ShotRecord },
     Dropped { number: u32, loss: Loss },
 }
 
-/// A continuous run; dropping it stops the rig.
-///
-/// Unread images wait in the camera. If [`Self::outcome`] is called less than once a period, some are lost
-/// and reported.
+/// A continuous run; dropping it stops the rig. Unread images wait in the camera; if [`Self::outcome`] is called less
+/// than once a period, some are lost and reported.
 pub struct Continuous<'c> {
     client: Client,
     camera: &'c mut dyn Camera,
@@ -120,8 +111,7 @@ impl<'c> Continuous<'c> {
         Ok(self.reported.len())
     }
 
-    /// Result of the next frame; `None` after the last. Frames come in order without gaps.
-    /// Errors: [`CaptureError`]; the rig is stopped and the run has ended.
+    /// Result of the next frame, in order without gaps; `None` after the last. An error stops the rig and ends the run.
     pub fn outcome(&mut self) -> Result<Option<Outcome>, CaptureError> {
         let outcome = self.try_outcome();
         if outcome.is_err() {
@@ -179,7 +169,6 @@ impl<'c> Continuous<'c> {
         Ok(())
     }
 
-    /// Reports all frames before `frame` as lost.
     fn miss_until(&mut self, frame: u32) {
         while (frame.wrapping_sub(self.next) as i32) > 0 {
             self.reported.push_back(Reported::Dropped { number: self.next, loss: Loss::EventLost });
@@ -224,7 +213,6 @@ impl Drop for Continuous<'_> {
 /// Groups frames into cycles, e.g. far/near pairs; incomplete cycles are dropped.
 #[derive(Clone, Debug)]
 pub struct Cycles {
-    /// Program index and repeat of each exposure of a cycle.
     places: Vec<(u8, u16)>,
     taken: Vec<Frame>,
     broken: u32,
@@ -257,9 +245,8 @@ impl Cycles {
 }
 
 impl Client {
-    /// Repeats the armed program with this trigger period (0: as fast as possible) for `exposures` (0: until
-    /// the work is dropped). Events are [`EventKind::FrameTaken`] and [`EventKind::FrameDropped`]; lost ones
-    /// show as missing numbers.
+    /// Repeats the armed program with this trigger period (0: as fast as possible) for `exposures` (0: until the work
+    /// is dropped). Events are [`EventKind::FrameTaken`] and [`EventKind::FrameDropped`]; lost ones leave gaps.
     pub fn start_continuous(
         &self,
         shots: &[Shot],

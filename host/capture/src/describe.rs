@@ -11,7 +11,6 @@ use farnear_protocol::{
 pub use alarm::{alarm_text, failure_text};
 pub use refusal::refusal_text;
 
-/// Position in micrometres.
 pub fn um(position: Nanometres) -> f64 {
     f64::from(position.0) / 1000.0
 }

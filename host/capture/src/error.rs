@@ -63,13 +63,11 @@ pub enum ClientError {
          stopped by the board's keep-alive timeout"
     )]
     Gone { port: String, during: String, source: Arc<std::io::Error> },
-    /// Another host has opened a session; this one's work was stopped.
     #[error(
         "another program took over the board on {port} while {during}; any motion has stopped; end that program, or \
          connect again"
     )]
     TakenOver { port: String, during: String },
-    /// Another board has been connected.
     #[error(
         "another board is on {port} now (unique id {}) than before ({}): nothing was asked of it; plug the first one in again, or \
          start this program anew for the other",

@@ -13,18 +13,16 @@ use crate::error::ClientError;
 /// Limit for event numbers ahead of the next one; a board stores fewer.
 const AHEAD_MAX: u32 = 4096;
 
-/// Events of one boot, in order.
 #[derive(Default)]
 pub(crate) struct Events {
     pub boot: u32,
-    /// Number of the next event to deliver.
     pub due: u32,
     /// Arrived, not delivered.
     pub arrived: BTreeMap<u32, Event>,
 }
 
 impl Events {
-    /// Stores a new event. An event of another boot means a reset.
+    /// An event of another boot means a reset.
     pub(crate) fn take(&mut self, packet: &Packet, during: &str) -> Result<(), ClientError> {
         let event = packet.message::<Event>();
         if packet.header.boot != self.boot {

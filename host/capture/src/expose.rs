@@ -15,7 +15,6 @@ use crate::{
     work::{Step, wrong_end},
 };
 
-/// Polling interval for interruptions while waiting for an image.
 const SLICE: Duration = Duration::from_millis(50);
 
 #[derive(Debug, thiserror::Error)]
@@ -26,7 +25,6 @@ pub enum CaptureError {
     Plan(#[from] PlanError),
     #[error(transparent)]
     Camera(#[from] CameraError),
-    /// One of several simultaneous cameras failed.
     #[error("camera {number} of {cameras}: {source}")]
     OneCamera { number: usize, cameras: usize, source: CameraError },
     #[error(
@@ -42,16 +40,13 @@ pub enum CaptureError {
     },
     #[error("the board reported {told} exposures, {asked} were requested")]
     Count { told: usize, asked: usize },
-    /// Shots with different trigger modes, which no camera supports.
     #[error(
         "shot {index} is triggered by {found}, the ones before by {first}; a program's shots must have one trigger"
     )]
     MixedTriggers { index: usize, found: &'static str, first: &'static str },
 }
 
-/// Runs a program; passes each exposure with its image to `on_image`, whose error stops the rig. Waits for
-/// each image at most `image_wait`.
-/// Errors: [`CaptureError`], or that of `on_image`.
+/// Runs a program; passes each exposure with its image (within `image_wait`) to `on_image`, whose error stops the rig.
 pub fn expose<E: From<CaptureError> + From<ClientError>>(
     client: &Client,
     camera: &mut dyn Camera,
@@ -62,9 +57,7 @@ pub fn expose<E: From<CaptureError> + From<ClientError>>(
     expose_together(client, &mut [camera], shots, image_wait, |_, shot, image| on_image(shot, image))
 }
 
-/// As [`expose`] with several cameras on one trigger: `on_image` receives each camera's image with its index
-/// in `cameras`.
-/// Errors: as [`expose`]; [`CaptureError::OneCamera`] names the camera.
+/// As [`expose`] with several cameras on one trigger: `on_image` receives each image with its camera's index.
 pub fn expose_together<E: From<CaptureError> + From<ClientError>>(
     client: &Client,
     cameras: &mut [&mut dyn Camera],
@@ -164,12 +157,10 @@ fn expect_no_more(client: &Client, camera: &mut dyn Camera) -> Result<(), Captur
     }
 }
 
-/// Checks exposures against the board's limits.
 pub fn check_exposures(client: &Client, shots: &[Shot]) -> Result<(), PlanError> {
     shots.iter().try_for_each(|shot| check_exposure(client, shot.exposure))
 }
 
-/// Checks an exposure against the board's limits.
 pub fn check_exposure(client: &Client, asked: Micros) -> Result<(), PlanError> {
     let limits = &client.hello().limits;
     let (min, max) = (limits.exposure_min, limits.exposure_max);
@@ -192,12 +183,11 @@ pub(crate) fn one_trigger(shots: &[Shot]) -> Result<(TriggerMode, Micros), Captu
     }
 }
 
-/// Distance of sensor and principal plane by encoders and gauge, mm.
+/// Sensor distance by encoders and gauge, mm.
 pub fn sensor_mm(record: &ShotRecord, limits: &Limits) -> f64 {
     sensor_distance_nm(limits.datum, |axis| record.measured(axis)) as f64 / 1e6
 }
 
-/// The image of an exposure; interruptions end the wait.
 pub(crate) fn wait_for_image(
     client: &Client,
     camera: &mut dyn Camera,

@@ -1,11 +1,9 @@
 //! Finds the sensor distance of best focus.
 //!
-//! *Coarse*: at each stepper position three images up to 190 um apart are taken by piezo. Their spectra give
-//! side and distance of the focus (`model`), so the stepper moves there directly. *Fine*: a piezo sweep
-//! around the estimate; the result is the tip of a parabola through the largest measures
-//! ([`farnear_depth::focus_measure::peak`]).
-//!
-//! Positions are sums of coarse and fine position in nanometres unless named otherwise.
+//! *Coarse*: at each stepper position three images up to 190 um apart are taken by piezo. Their spectra give side and
+//! distance of the focus (`model`), so the stepper moves there directly. *Fine*: a piezo sweep around the estimate; the
+//! result is the tip of a parabola through the largest measures ([`farnear_depth::focus_measure::peak`]). Positions are
+//! sums of coarse and fine position in nanometres unless named otherwise.
 
 mod model;
 
@@ -33,14 +31,12 @@ use crate::{
 };
 use model::{Spectrum, estimate};
 
-/// Limit of stepper positions.
 const PLACES_MAX: usize = 8;
 /// The estimate suffices for the fine sweep within this distance of the centre.
 const GOOD_NM: f64 = 45_000.0;
 /// Steps of the fine sweep on either side, and their size.
 const FINE_STEPS: i32 = 4;
 const FINE_STEP_NM: i32 = 14_000;
-/// Limit of sweeps if the peak lies outside.
 const SWEEPS_MAX: usize = 3;
 
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -70,11 +66,9 @@ impl Default for FocusSettings {
 pub struct Focus {
     /// Sensor distance of best focus, where the sensor is now.
     pub sensor_mm: f64,
-    /// By encoder.
+    /// By encoder; `fine` by gauge.
     pub coarse: Nanometres,
-    /// By gauge.
     pub fine: Nanometres,
-    /// Stepper positions used.
     pub places: usize,
     pub exposures: usize,
     /// Board time.
@@ -113,8 +107,7 @@ impl From<ClientError> for FocusSearchError {
     }
 }
 
-/// Finds the best focus near the present position and leaves the sensor there. Both axes of stage A must be
-/// homed. `say` receives progress messages.
+/// Leaves the sensor at the best focus near its position. Both axes of stage A must be homed. `say` receives progress.
 pub fn find_focus(
     client: &Client,
     camera: &mut dyn Camera,
@@ -170,7 +163,6 @@ impl Search<'_> {
         (self.limits.fine_min.0 + self.limits.fine_max.0) / 2
     }
 
-    /// Piezo position for a total position.
     fn fine_at(&self, position: f64) -> Nanometres {
         let fine = position - f64::from(self.coarse.0);
         Nanometres(
@@ -200,12 +192,10 @@ impl Search<'_> {
         }
     }
 
-    /// A shot with a wide settle tolerance.
     fn look(&self, axis: Axis, target: i32) -> Shot {
         self.shot(axis, target, Settle::of_search(axis))
     }
 
-    /// Takes the shots; returns each with its evaluated region.
     fn take(&mut self, shots: &[Shot]) -> Result<Vec<(ShotRecord, Array2<f32>)>, FocusSearchError> {
         let mut taken = Vec::new();
         let (wait, region) = (self.settings.image_wait, self.settings.region);
@@ -220,8 +210,7 @@ impl Search<'_> {
         Ok(taken)
     }
 
-    /// Moves the stepper until the focus is in the middle of the piezo's range. Returns the estimate and the
-    /// number of positions.
+    /// Moves the stepper until the focus is in mid-range of the piezo. Returns the estimate and the positions used.
     fn coarse(&mut self, start: f64, say: &mut dyn FnMut(&str)) -> Result<(f64, usize), FocusSearchError> {
         let reach = self.settings.range_mm * 1e6;
         let mut goal = None;
@@ -324,7 +313,6 @@ impl Search<'_> {
     }
 }
 
-/// Evaluated region as floats.
 fn cut(image: &Image, region: Option<[usize; 4]>) -> Result<Array2<f32>, FocusSearchError> {
     let (height, width) = image.pixels.dim();
     let [column, row, region_width, region_height] = region.unwrap_or([0, 0, width, height]);

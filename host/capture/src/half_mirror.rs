@@ -1,5 +1,5 @@
-//! A pair behind a half mirror: two cameras, the second sensor further from the lens. One trigger gives both
-//! images without motion in between (Li 2014, sections 5.5 and 10.2).
+//! A pair behind a half mirror: two cameras, the second sensor further from the lens. One trigger gives both images
+//! without motion in between (Li 2014, sections 5.5 and 10.2).
 
 use farnear_protocol::message::{Shot, ShotRecord};
 
@@ -13,9 +13,8 @@ use crate::{
     plan::SensorPair,
 };
 
-/// Takes a pair with one exposure (or several, averaged) at the far position: far image by the first camera,
-/// near image by the second, whose sensor is `further_mm` further away. `say` receives progress messages.
-/// Errors: [`CaptureError`]; [`CaptureError::OneCamera`] for a picture of another trigger.
+/// Takes a pair with one exposure (or several, averaged) at the far position: far image by the first camera, near image
+/// by the second, whose sensor is `further_mm` further away.
 pub fn capture_behind_mirror(
     client: &Client,
     cameras: [&mut dyn Camera; 2],

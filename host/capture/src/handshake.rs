@@ -10,18 +10,17 @@ use farnear_protocol::{
 
 use crate::{error::ClientError, link::Link, timing::Timing};
 
-/// Timeouts of hello, 3 s in total: the board may be starting, and may be emulated. The link's other rates
-/// are tried in between, because an earlier host may have changed it.
+/// Timeouts of hello, 3 s in total: the board may be starting, and may be emulated. The link's other rates are tried in
+/// between, because an earlier host may have changed it.
 const FIRST_MS: [u64; 4] = [50, 100, 200, 400];
 const OTHER_RATE_MS: [u64; 2] = [50, 50];
 const LAST_MS: [u64; 2] = [800, 1500];
 const DURING: &str = "asking the board who it is";
-/// Fixed session of an emulated board: a random one would change the run. Successive programs differ by their
-/// request ids.
+/// Fixed session of an emulated board: a random one would change the run. Programs differ by request ids.
 const EMULATED_SESSION: u32 = 0x5eed_0001;
 
-/// Drains the line, identifies the board and selects a version. A known emulated board gets its long timeout:
-/// a repeated hello would change the run.
+/// Drains the line, identifies the board and selects a version. A repeated hello would change an emulated run: long
+/// timeout.
 pub(crate) fn shake_hands(link: &mut Link, known_emulated: bool) -> Result<(Hello, u8), ClientError> {
     link.drain(DURING)?;
     let millis = |waits: &[u64]| waits.iter().map(|ms| Duration::from_millis(*ms)).collect::<Vec<_>>();
@@ -62,7 +61,6 @@ fn say_hello(
     Err(silent.unwrap_or_else(|| ClientError::Nonsense { during: DURING.into(), answer: "no rate".into() }))
 }
 
-/// The earlier and the present failure.
 fn both(before: Option<ClientError>, now: ClientError) -> ClientError {
     match (before, now) {
         (
@@ -104,7 +102,6 @@ pub(crate) fn open_session(link: &mut Link, (hello, version): (&Hello, u8)) -> R
     })
 }
 
-/// Unique session number; 0 is reserved.
 fn random_session() -> u32 {
     // Fallback without system random numbers: process id and time.
     let chance = getrandom::u32().unwrap_or_else(|_| {
@@ -137,8 +134,7 @@ fn read_answer(packet: &Packet) -> Result<Hello, ClientError> {
     }
 }
 
-/// The newest common version. The schema key applies to the board's newest version, so it is compared only if
-/// equal to this program's.
+/// The newest common version. The schema key is compared only if the board's newest version equals this program's.
 fn agree(hello: &Hello) -> Result<u8, ClientError> {
     let version = hello.protocol_current.min(PROTOCOL_CURRENT);
     if version < hello.protocol_min || version < PROTOCOL_MIN {

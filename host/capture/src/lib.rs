@@ -2,19 +2,16 @@
 //!
 //! Controls the rig and takes pictures with it; blocking, no async runtime.
 //!
-//! - [`transport`], [`client`], [`work`], [`log_stream`]: serial port, board handles, long work, and the
-//!   board's log.
+//! - [`transport`], [`client`], [`work`], [`log_stream`]: serial port, board handles, long work, and the board's log.
 //! - [`camera`]: image sources.
 //! - [`ready`], [`plan`], [`pair`], [`record`]: homing, positions of a pair, its capture, and its folder.
 //! - [`half_mirror`]: a pair of one exposure, by two cameras.
 //! - [`expose`], [`focus`], [`sequence`]: programs with a camera: focus search, focus stacks, program files.
 //! - [`continuous`]: endless cycles of shots for live depth.
 //! - [`board_correction`]: depth correction by the board's mathematics.
-//! - [`timing`]: timeouts and their reasons.
-//! - [`error`], [`describe`]: errors in words.
+//! - [`timing`], [`error`], [`describe`]: timeouts and their reasons, errors in words.
 //!
 //! [`Client::open`] opens a serial port; this example uses a scripted board.
-//!
 //! ```
 //! use farnear_capture::{Client, ClientError};
 //! use farnear_protocol::{Nanometres, message::Axis};

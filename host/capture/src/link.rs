@@ -1,7 +1,5 @@
-//! Requests and answers: frames over a [`Transport`], with repeats.
-//!
-//! The caller chooses boot and version and interprets events; the link keeps session and request ids
-//! ([`Link::begin_session`]).
+//! Requests and answers: frames over a [`Transport`], with repeats. The caller chooses boot and version and interprets
+//! events; the link keeps session and request ids ([`Link::begin_session`]).
 
 use std::{
     io::{self, ErrorKind},
@@ -21,7 +19,6 @@ use crate::{error::ClientError, owner::nothing, transport::Transport};
 const QUIET: Duration = Duration::from_millis(5);
 /// Longest wait for silence.
 const QUIET_AT_MOST: Duration = Duration::from_millis(500);
-/// Shortest timeout for writing a frame.
 const SEND_AT_LEAST: Duration = Duration::from_millis(20);
 
 /// Drops input until the line is silent, or the timeout.
@@ -36,7 +33,6 @@ fn is_queue_full(packet: &Packet) -> bool {
     matches!(packet.message(), Some(RequestError::QueueFull { .. }))
 }
 
-/// A pending request.
 struct Asked {
     id: u32,
     /// Identical for each repeat.
@@ -44,7 +40,6 @@ struct Asked {
     answer: Option<Packet>,
 }
 
-/// A transport with framing, request ids and repeats.
 pub(crate) struct Link {
     /// `None` while unplugged.
     transport: Option<Box<dyn Transport>>,
@@ -52,7 +47,6 @@ pub(crate) struct Link {
     rate: LinkRate,
     decoder: Decoder,
     buffer: [u8; 512],
-    /// Undecoded bytes of `buffer`.
     unread: std::ops::Range<usize>,
     session: u32,
     next_id: u32,
@@ -76,13 +70,12 @@ impl Link {
         }
     }
 
-    /// Starts a session whose ids follow the last one seen by the board.
+    /// Starts a session; ids follow the last one seen by the board.
     pub(crate) fn begin_session(&mut self, number: u32, last_id: u32) {
         self.session = number;
         self.next_id = last_id.wrapping_add(1);
     }
 
-    /// The next request reuses the last id.
     pub(crate) fn reuse_id(&mut self) {
         self.next_id = self.next_id.wrapping_sub(1).max(1);
     }
@@ -102,7 +95,6 @@ impl Link {
         self.rate
     }
 
-    /// Changes the rate of this end.
     pub(crate) fn set_rate(&mut self, rate: LinkRate, during: &str) -> Result<(), ClientError> {
         if rate == self.rate {
             return Ok(());
@@ -138,7 +130,6 @@ impl Link {
         &self.port
     }
 
-    /// As [`Link::ask_all`] with one request.
     pub(crate) fn ask(
         &mut self,
         address: (u8, u32),
@@ -151,7 +142,6 @@ impl Link {
         answers.into_iter().next().ok_or_else(|| nothing(during))
     }
 
-    /// A request with the next id.
     fn number(
         &mut self,
         (version, boot): (u8, u32),
@@ -168,8 +158,8 @@ impl Link {
         Ok(Asked { id, bytes: delimited(&frame), answer: None })
     }
 
-    /// Sends requests, limited to the board's outstanding ones, each at most `waits.len()` times. Returns id
-    /// and answer per request; events and log frames go to `on_other`.
+    /// Sends requests, limited to the board's outstanding ones, each at most `waits.len()` times. Returns id and answer
+    /// per request; events and log frames go to `on_other`.
     pub(crate) fn ask_all(
         &mut self,
         address: (u8, u32),

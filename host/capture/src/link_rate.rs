@@ -17,9 +17,7 @@ const CHANGE: Duration = Duration::from_millis(20);
 const LOOKS: u32 = 20;
 const LOOK: Duration = Duration::from_millis(100);
 
-/// Changes the link to the requested rate. Keeps the old rate if the request is unknown or the board does not
-/// answer at the new one; see [`Link::rate`].
-/// Errors: [`ClientError`] if the board no longer answers, or refuses.
+/// Changes the link rate. Keeps the old rate if the request is unknown or the board is silent at the new one.
 pub(crate) fn change(
     link: &mut Link,
     address: (u8, u32),

@@ -10,16 +10,12 @@ const BACKLOG: usize = 4096;
 
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct LogPart {
-    /// Running number in this boot.
     pub number: u32,
-    /// Missing parts before this one.
     pub missing: u32,
-    /// Bytes of the defmt stream.
     pub bytes: Vec<u8>,
 }
 
-/// Stream of [`LogPart`]s. Ends with the last [`crate::Client`], or when the reader is thousands of items
-/// late.
+/// Stream of [`LogPart`]s. Ends with the last [`crate::Client`], or when the reader is thousands of items late.
 pub struct LogStream {
     parts: Receiver<LogPart>,
 }
@@ -30,7 +26,7 @@ impl LogStream {
         (sender, Self { parts })
     }
 
-    /// The next part, waiting at most `wait`; `Ok(None)` at the timeout.
+    /// The next part; `Ok(None)` after `wait`.
     pub fn next_within(&self, wait: Duration) -> Result<Option<LogPart>, LogEnded> {
         match self.parts.recv_timeout(wait) {
             Ok(part) => Ok(Some(part)),
@@ -56,7 +52,7 @@ impl Readers {
         self.0.is_empty()
     }
 
-    /// Sends to all readers; closed or late ones are removed.
+    /// Sends to all readers; removes closed and late ones.
     pub(crate) fn tell(&mut self, part: &LogPart) {
         self.0.retain(|reader| match reader.try_send(part.clone()) {
             Ok(()) => true,

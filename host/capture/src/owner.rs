@@ -1,9 +1,7 @@
-//! Thread that owns a port: sends requests, receives frames and distributes them.
-//!
-//! Handles ([`crate::Client`]) send commands over a channel. The thread delivers events in order without
-//! gaps, answers keep-alives ([`EventKind::StillThere`]) while the work is held, and says hello after a reset
-//! or unplugging. A new hello starts a new *session*: older handles and work fail, because the rig may have
-//! lost its position.
+//! Thread that owns a port: sends requests, receives frames and distributes them. Handles ([`crate::Client`]) send
+//! commands over a channel. The thread delivers events in order without gaps, answers keep-alives
+//! ([`EventKind::StillThere`]) while the work is held, and says hello after a reset or unplugging. A new hello starts a
+//! new *session*: older handles and work fail, because the rig may have lost its position.
 
 mod session;
 
@@ -47,7 +45,6 @@ const UNANSWERED_POLLS: u32 = 2;
 /// Longest read between two commands.
 const GLANCE: Duration = Duration::from_millis(1);
 
-/// Messages to running work.
 pub(crate) enum Message {
     Event(EventKind, Instant),
     Broken(Break),
@@ -59,7 +56,6 @@ pub(crate) enum Message {
     NoEnd,
 }
 
-/// Receiver of messages about work.
 pub(crate) struct Listener {
     pub messages: Sender<Message>,
     /// Dropped with the work.
@@ -68,18 +64,14 @@ pub(crate) struct Listener {
     pub bears_loss: bool,
 }
 
-/// A request with its description.
 pub(crate) struct Question {
     pub request: Request,
     pub during: String,
-    /// For long work.
     pub listener: Option<Listener>,
 }
 
-/// Request id, and answer or refusal.
 pub(crate) type Answered = Result<(u32, Response), ClientError>;
 
-/// Commands of the handles.
 pub(crate) enum Command {
     Ask {
         session: u32,
@@ -97,14 +89,12 @@ pub(crate) enum Command {
 pub(crate) struct Owner {
     link: Link,
     connect: Connect,
-    /// Requested link rate.
     wanted: Option<LinkRate>,
     inbox: Receiver<Command>,
     timing: Arc<Mutex<Timing>>,
     session: Session,
     /// Set without a session.
     broken: Option<Break>,
-    /// End of the previous session.
     last_break: Option<Break>,
     next_attempt: Instant,
     events: Events,
@@ -113,12 +103,10 @@ pub(crate) struct Owner {
     next_log: Option<u32>,
     still_there: bool,
     last_heard: Instant,
-    /// Unanswered polls in a row.
     unanswered: u32,
 }
 
 impl Owner {
-    /// Opens the line and says hello.
     pub(crate) fn start(
         mut connect: Connect,
         port: &str,
@@ -172,7 +160,6 @@ impl Owner {
         self.session.clone()
     }
 
-    /// Runs until the last handle is dropped.
     pub(crate) fn run(mut self) {
         loop {
             let awaited = !self.works.is_empty() || !self.logs.is_empty();
@@ -209,7 +196,6 @@ impl Owner {
         }
     }
 
-    /// Answers of several requests, or one error.
     fn ask_for(&mut self, session: u32, questions: Vec<Question>) -> Vec<Answered> {
         if let Some(broken) = self.break_of(session) {
             let port = self.link.port();
@@ -237,7 +223,6 @@ impl Owner {
         answered
     }
 
-    /// Sends a request until it is answered.
     fn ask(&mut self, request: &Request, during: &str) -> Answered {
         let answered = self.ask_all(&[(request, during)])?;
         answered.into_iter().next().unwrap_or_else(|| Err(nothing(during)))
@@ -266,7 +251,6 @@ impl Owner {
         Ok(answers.map(|((id, packet), (_, during))| Ok((id, self.read(&packet, during)?))).collect())
     }
 
-    /// Answer in a frame.
     fn read(&mut self, packet: &Packet, during: &str) -> Result<Response, ClientError> {
         let unreadable = || ClientError::Nonsense {
             during: during.into(),
@@ -298,7 +282,6 @@ impl Owner {
         }
     }
 
-    /// Reads unsolicited frames.
     fn glance(&mut self) {
         loop {
             match self.link.receive(Instant::now() + GLANCE, "listening") {
@@ -372,7 +355,6 @@ impl Owner {
         }
     }
 
-    /// Requests the next event, which did not arrive.
     fn fetch_due_event(&mut self) {
         let number = self.events.due;
         match self.ask(&Request::ReadEvent { number }, "reading an event that got lost") {
@@ -434,12 +416,10 @@ impl Owner {
     }
 }
 
-/// A required answer is missing.
 pub(crate) fn nothing(during: &str) -> ClientError {
     ClientError::Nonsense { during: during.into(), answer: "no answer".into() }
 }
 
-/// An answer that does not match the request.
 pub(crate) fn nonsense(during: &str, response: &Response) -> ClientError {
     ClientError::Nonsense { during: during.into(), answer: format!("{response:?}") }
 }

@@ -21,11 +21,9 @@ use crate::{
 
 pub use crate::expose::CaptureError;
 
-/// Settings of the exposures.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Exposures {
     pub exposure: Micros,
-    /// Settle criterion before the trigger.
     pub settle: Settle,
     /// Longest wait for an image after its exposure was reported.
     pub image_wait: Duration,
@@ -49,7 +47,7 @@ pub struct Taken {
     pub image: Image,
     /// Sensor distance by the optics.
     pub sensor_asked_mm: f64,
-    /// Sensor distance by encoder and gauge at the trigger.
+    /// By encoder and gauge at the trigger.
     pub sensor_measured_mm: f64,
     pub record: ShotRecord,
 }
@@ -58,10 +56,8 @@ pub struct Taken {
 pub struct Pair {
     pub far: Taken,
     pub near: Taken,
-    /// Coarse stage during both.
     pub coarse: Moved,
-    /// Extra distance of the second sensor behind a half mirror ([`crate::half_mirror`]), with both images of
-    /// one exposure; `None`: one camera, two exposures.
+    /// Extra sensor distance of the second camera ([`crate::half_mirror`]); `None`: one camera, two exposures.
     pub further_mm: Option<f64>,
 }
 
@@ -80,12 +76,10 @@ impl Pair {
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Reach {
     pub coarse: Moved,
-    /// Far and near shot.
     pub shots: [Shot; 2],
 }
 
-/// Moves the coarse stage so that the piezo reaches both positions; homes if necessary.
-/// Errors: [`CaptureError`]; limits are checked before any motion.
+/// Moves the coarse stage so that the piezo reaches both positions; homes if necessary. Checks limits first.
 pub fn reach(
     client: &Client,
     sensor: &SensorPair,
@@ -160,7 +154,6 @@ pub fn pair_of(
     Ok(Pair { far, near, coarse, further_mm: None })
 }
 
-/// Checks size and bit depth.
 fn alike(far: &Image, near: &Image) -> Result<(), CaptureError> {
     let ((far_height, far_width), (near_height, near_width)) = (far.pixels.dim(), near.pixels.dim());
     let (far_bits, near_bits) = (far.bits, near.bits);

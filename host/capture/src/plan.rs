@@ -1,8 +1,6 @@
-//! Axis positions for a pair.
-//!
-//! `sensor distance = datum + coarse + fine + lens`. The lens stage is not moved; datum plus lens is the
-//! *base*, the distance with stage A at 0. The coarse stage centres both distances in the piezo's range; the
-//! piezo corrects its error and switches between them in milliseconds. Nanometres unless named otherwise.
+//! Axis positions for a pair: `sensor distance = datum + coarse + fine + lens`, nanometres unless named otherwise. The
+//! lens stage is not moved; datum plus lens is the *base*, the distance with stage A at 0. The coarse stage centres
+//! both distances in the piezo's range; the piezo corrects its error and switches between them in milliseconds.
 
 use farnear_protocol::{
     message::Limits,
@@ -45,7 +43,7 @@ fn um(nm: impl Into<i64>) -> f64 {
     nm.into() as f64 / 1e3
 }
 
-/// Coarse position for a pair: the whole step that centres it in the piezo's range.
+/// The whole step that centres the pair in the piezo's range.
 pub fn coarse_for(pair: &SensorPair, base_nm: i64, limits: &Limits) -> Result<Nanometres, PlanError> {
     let (fine_min, fine_max) = (i64::from(limits.fine_min.0), i64::from(limits.fine_max.0));
     let (coarse_min, coarse_max) = (i64::from(limits.coarse_min.0), i64::from(limits.coarse_max.0));

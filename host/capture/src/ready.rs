@@ -11,12 +11,11 @@ use crate::{
     error::ClientError,
 };
 
-/// Fitted axes with a home switch.
 pub fn steppers(capabilities: &Capabilities) -> Vec<Axis> {
     [Axis::SensorCoarse, Axis::Lens].into_iter().filter(|axis| capabilities.has(*axis)).collect()
 }
 
-/// Homes all axes that are not homed, simultaneously.
+/// Homes all unhomed axes simultaneously.
 pub fn ensure_homed(client: &Client, say: &mut dyn FnMut(&str)) -> Result<(), ClientError> {
     let status = client.status()?;
     let mut axes = steppers(&client.hello().capabilities);

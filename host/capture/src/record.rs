@@ -1,8 +1,5 @@
-//! Capture folder: `far.png` and `near.png`, or the images of a sequence, and `capture.toml` with their
-//! settings.
-//!
-//! The folder is created atomically. An emulated rig's has no clock time, port or random number: equal scenes
-//! and seeds give equal bytes.
+//! Capture folder: `far.png` and `near.png`, or the images of a sequence, and `capture.toml` with their settings. The
+//! folder is created atomically. An emulated rig's has no clock time, port or random number and is repeatable.
 
 use std::{collections::BTreeMap, path::Path};
 
@@ -29,7 +26,6 @@ const FORMAT: u32 = 2;
 #[derive(Serialize, Deserialize, Clone, PartialEq, Debug)]
 pub struct CaptureRecord {
     pub format: u32,
-    /// Program and version.
     pub made_by: String,
     /// RFC 3339; real hardware only.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -44,7 +40,6 @@ pub struct CaptureRecord {
     pub board: BoardRecord,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub simulation: Option<SimulationRecord>,
-    /// Contents of the optics file.
     #[serde(default, skip_serializing_if = "toml::Table::is_empty")]
     pub optics: toml::Table,
 }
@@ -53,20 +48,18 @@ pub struct CaptureRecord {
 pub struct StageRecord {
     /// Sensor distance with all axes at 0.
     pub datum_mm: f64,
-    /// By encoder.
     #[serde(default)]
     pub lens_measured_um: f64,
     /// Coarse target of a pair.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub coarse_asked_um: Option<f64>,
-    /// By encoder.
     pub coarse_measured_um: f64,
     /// Board time of both moves and images of a pair, without exposures.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub moving_us: Option<u64>,
 }
 
-/// One exposure. Times since the board's reset.
+/// One exposure. Times since the board's reset; positions by encoder and gauge.
 #[derive(Serialize, Deserialize, Clone, PartialEq, Debug)]
 pub struct ExposureRecord {
     pub image: String,
@@ -83,11 +76,8 @@ pub struct ExposureRecord {
     /// Piezo target in a pair.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub fine_asked_um: Option<f64>,
-    /// By gauge.
     pub fine_measured_um: f64,
-    /// By encoder.
     pub coarse_measured_um: f64,
-    /// By encoder, in a sequence.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub lens_measured_um: Option<f64>,
     /// In a sequence: `hardware`, `software` or `free-running`.
@@ -110,13 +100,11 @@ pub struct CameraRecord {
     pub height: usize,
     /// Camera bits; 9 to 15 are shifted up to 16 in the files.
     pub bits: u8,
-    /// Averaged exposures per image, if several.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub averaged: Option<u16>,
     /// Whether dark and flat frames were applied.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub corrected: bool,
-    /// Camera settings.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub settings: BTreeMap<String, String>,
 }
@@ -137,7 +125,6 @@ pub struct BoardRecord {
     pub name: String,
     pub firmware: String,
     pub protocol: u8,
-    /// Key of the message table.
     pub schema_key: String,
     pub unique_id: String,
     pub boot: u32,
@@ -145,7 +132,6 @@ pub struct BoardRecord {
     pub emulated: bool,
 }
 
-/// Settings of `farnear-sim`.
 #[derive(Serialize, Deserialize, Clone, PartialEq, Eq, Debug)]
 pub struct SimulationRecord {
     pub scene: String,
@@ -154,17 +140,13 @@ pub struct SimulationRecord {
     pub seed: u64,
 }
 
-/// Further contents of the record.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Circumstances {
-    /// Program and version.
     pub made_by: String,
-    /// Real hardware only.
     pub time: Option<String>,
     /// [`crate::camera::Camera::kind`].
     pub camera: &'static str,
     pub simulation: Option<SimulationRecord>,
-    /// Contents of the optics file, or empty.
     pub optics: toml::Table,
 }
 
@@ -192,7 +174,7 @@ pub fn record_of(pair: &Pair, client: &Client, circumstances: Circumstances) -> 
     record(client, circumstances, stage, exposure, &pair.far.image)
 }
 
-/// `None` without images.
+/// The record of a sequence; `None` without images.
 pub fn record_of_sequence(
     shots: &[SequenceShot],
     client: &Client,
@@ -317,7 +299,6 @@ fn finish_with<'a>(
     Ok(staged.finish()?)
 }
 
-/// Reads the record of a folder, if it has one.
 pub fn read_record(folder: &Path) -> Result<Option<CaptureRecord>, RecordError> {
     let path = folder.join(CAPTURE_FILE);
     let failed = |reason: String| RecordError::Read { path: path.display().to_string(), reason };

@@ -10,11 +10,9 @@ use farnear_protocol::{
 
 use crate::{client::Client, error::ClientError, owner::nonsense};
 
-/// Timeout of a restarting board.
 const RESTART: Duration = Duration::from_secs(5);
 /// Longest braking time at the fastest settings.
 const BRAKING: Duration = Duration::from_secs(3);
-/// Polling interval for standstill.
 const LOOK: Duration = Duration::from_millis(10);
 
 impl Client {
@@ -23,8 +21,7 @@ impl Client {
         self.expect_accepted(&Request::Stop, "stopping")
     }
 
-    /// Waits until all axes are at rest: steppers brake along their ramps after a stop.
-    /// Errors: [`ClientError`]; [`ClientError::Overdue`] after longer than any ramp.
+    /// Waits for all axes to brake to rest. Returns [`ClientError::Overdue`] after longer than any ramp.
     pub fn wait_until_it_stands(&self) -> Result<(), ClientError> {
         let allowed = self.timing().allowance(BRAKING);
         let until = std::time::Instant::now() + allowed;
@@ -40,20 +37,18 @@ impl Client {
         }
     }
 
-    /// Switches both light outputs for `time`, at most 60 s. They go off earlier after `Client::keep_alive` without a request.
+    /// Switches both light outputs for `time`, at most 60 s. `Client::keep_alive` without a request ends it.
     pub fn set_lights(&self, levels: LightLevels, time: Micros) -> Result<(), ClientError> {
         let request = Request::SetLights { levels, time, silence: self.keep_alive() };
         self.expect_accepted(&request, "switching the light")
     }
 
-    /// Emergency stop: the last step comes within a millisecond, moving axes lose their position, and an
-    /// alarm is latched.
+    /// Emergency stop: steps end within a millisecond, moving axes lose their position. Latches an alarm.
     pub fn halt(&self) -> Result<(), ClientError> {
         self.expect_accepted(&Request::Halt, "halting")
     }
 
-    /// Resets the board and says hello again.
-    /// Errors: [`ClientError`]; [`ClientError::Overdue`] if it does not return.
+    /// Resets the board and says hello again. Returns [`ClientError::Overdue`] if it does not return.
     pub fn reboot(&mut self) -> Result<(), ClientError> {
         let before = self.hello().boot;
         match self.expect_accepted(&Request::Reboot, "rebooting") {
@@ -74,8 +69,7 @@ impl Client {
         }
     }
 
-    /// The alarm with this number; 0 = the last.
-    /// Errors: [`ClientError`]; `NoSuchAlarm` if it is not stored.
+    /// Reads a stored alarm; 0 = the last.
     pub fn alarm(&self, number: u32) -> Result<AlarmRecord, ClientError> {
         let during = "reading an alarm";
         match self.request(&Request::ReadAlarm { number }, during)? {
@@ -105,8 +99,7 @@ impl Client {
         }
     }
 
-    /// Clears the latched alarm with this number.
-    /// Errors: [`ClientError`]; refused while its cause persists.
+    /// Clears the latched alarm with this number; rejected while its cause persists.
     pub fn clear_alarm(&self, number: u32) -> Result<(), ClientError> {
         self.expect_accepted(&Request::ClearAlarm { number }, &format!("clearing alarm {number}"))
     }
@@ -115,8 +108,7 @@ impl Client {
         self.setting_by(&Request::ReadSetting { key }, &format!("reading {}", key.name()))
     }
 
-    /// Changes a setting permanently. [`Client::reopen`] updates limits derived from it.
-    /// Errors: [`ClientError`]; refused out of range and during motion.
+    /// Changes a setting permanently. [`Client::reopen`] updates derived limits. Rejected out of range or in motion.
     pub fn set_setting(&self, key: SettingKey, value: i32) -> Result<Setting, ClientError> {
         self.paces().clear();
         let during = format!("setting {} to {value}", key.name());
@@ -138,8 +130,7 @@ impl Client {
         }
     }
 
-    /// Sun and shadow calculated by the board.
-    /// Errors: [`ClientError`]; refused while a stepper moves.
+    /// Sun and shadow calculated by the board; rejected while a stepper moves.
     pub fn sun(&self, query: &SunQuery) -> Result<SunAnswer, ClientError> {
         let during = "asking for the sun";
         match self.request(&Request::Sun(*query), during)? {

@@ -26,15 +26,12 @@ use serde::{Deserialize, Deserializer, de::Error};
 
 use crate::camera::Image;
 
-/// Defaults of shots.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct ShotDefaults {
     pub exposure: Micros,
-    /// `None`: that of [`Settle::of_shot`].
+    /// `None`, also for the dwell: as [`Settle::of_shot`].
     pub settle_window: Option<Nanometres>,
-    /// `None`: that of [`Settle::of_shot`].
     pub settle_dwell: Option<Micros>,
-    /// Exposures per position.
     pub repeat: u16,
     pub mode: TriggerMode,
 }
@@ -114,7 +111,6 @@ struct ShotEntry {
     trigger: Option<Trigger>,
 }
 
-/// Options of a shot.
 struct Options {
     exposure_us: Option<u32>,
     settle_window_nm: Option<i32>,
@@ -155,13 +151,13 @@ impl Options {
     }
 }
 
-/// Position in nm, if representable.
+/// Micrometres to nanometres; `None` beyond the range.
 pub fn nanometres(position_um: f64) -> Option<Nanometres> {
     let nm = (position_um * 1e3).round();
     (nm.is_finite() && nm.abs() <= f64::from(i32::MAX)).then_some(Nanometres(nm as i32))
 }
 
-/// Shots of a program file; the board checks them when armed.
+/// Reads a program file; the board checks the shots when armed.
 pub fn read_program(text: &str) -> Result<Vec<Shot>, ProgramError> {
     let ProgramFile { exposure_us, settle_window_nm, settle_dwell_us, repeat, trigger, shot } =
         toml::from_str(text)?;

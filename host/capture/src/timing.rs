@@ -1,8 +1,6 @@
-//! Timeouts, and durations of work.
-//!
-//! A real board answers within 50 ms. An emulated one takes as long as the host needs for its instructions,
-//! so its timeouts are generous. The host sends nothing on its own initiative while it waits for one, because
-//! requests at wall-clock times would make the run unrepeatable.
+//! Timeouts, and durations of work. A real board answers within 50 ms. An emulated one takes as long as the host needs
+//! for its instructions, so its timeouts are generous. The host sends nothing on its own initiative while it waits for
+//! one, because requests at wall-clock times would make the run unrepeatable.
 
 use std::time::Duration;
 
@@ -28,12 +26,10 @@ const BACKLASH_NM: u64 = 200_000;
 /// Above the board's timeout for an exposure that it does not trigger.
 const FOREIGN_TRIGGER: Duration = Duration::from_secs(10);
 
-/// Timeouts of a session.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Timing {
     /// Timeout of an answer before the repeat.
     pub reply: Duration,
-    /// Number of repeats.
     pub retries: u32,
     /// Silence after which lost events are queried.
     pub poll: Duration,
@@ -41,8 +37,7 @@ pub struct Timing {
     pub work_factor: u32,
     /// Margin of every timeout for work.
     pub work_slack: Duration,
-    /// Keep-alive timeout, board time: how long work continues after the host has died. The board asks after
-    /// half of it, and the host answers while the work is held.
+    /// Keep-alive timeout, board time: how long work continues after the host has died. The host answers at half of it.
     pub keep_alive: Duration,
 }
 
@@ -68,17 +63,14 @@ impl Timing {
         keep_alive: Duration::from_secs(10),
     };
 
-    /// Timeout for work with this board time.
     pub fn allowance(&self, work: Duration) -> Duration {
         work * self.work_factor + self.work_slack
     }
 }
 
-/// Speed of an axis by the board's settings.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Pace {
     speed_nm_per_s: u64,
-    /// Time of the ramps beyond full-speed travel.
     ramps: Duration,
 }
 
@@ -86,8 +78,7 @@ impl Pace {
     /// Piezo: travel time is negligible.
     pub const AT_ONCE: Self = Self { speed_nm_per_s: u64::MAX, ramps: Duration::ZERO };
 
-    /// Reads the speed of an axis with `setting`.
-    /// Errors: those of `setting`.
+    /// Reads the settings with `setting`.
     pub fn of<E>(axis: Axis, mut setting: impl FnMut(SettingKey) -> Result<i32, E>) -> Result<Self, E> {
         let Some(StepperKeys { speed, acceleration, jerk, .. }) = StepperKeys::of(axis) else {
             return Ok(Self::AT_ONCE);
@@ -99,7 +90,6 @@ impl Pace {
         Ok(Self { speed_nm_per_s: speed as u64, ramps: Duration::from_secs_f64(ramp_s) })
     }
 
-    /// Longest time for a distance.
     fn time(self, distance_nm: u64) -> Duration {
         let micros = u128::from(distance_nm) * 1_000_000 / u128::from(self.speed_nm_per_s.max(1));
         // An eighth more for its clock and for segments that round up.
@@ -107,7 +97,7 @@ impl Pace {
         way + self.ramps
     }
 
-    /// The same, limited to a speed.
+    /// Limited to a speed.
     fn at_most(self, nm_per_s: u64) -> Self {
         Self { speed_nm_per_s: self.speed_nm_per_s.min(nm_per_s), ..self }
     }

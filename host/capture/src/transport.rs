@@ -1,6 +1,4 @@
-//! Byte pipes to a board: the trait [`Transport`] and its serial port.
-//!
-//! Every operation has a timeout.
+//! Byte pipes to a board: the trait [`Transport`] and its serial port. Every operation has a timeout.
 
 use std::{
     io,
@@ -13,14 +11,11 @@ use serialport::{ClearBuffer, SerialPort, SerialPortInfo, SerialPortType};
 use crate::{error::PortError, find};
 
 pub trait Transport: Send {
-    /// Reads at most `buffer.len()` bytes, waiting at most `wait` for the first. `Ok(0)` is a timeout; an
-    /// error means that the pipe is gone.
+    /// Waits at most `wait` for the first byte. `Ok(0)` is a timeout; an error means that the pipe has ended.
     fn receive(&mut self, buffer: &mut [u8], wait: Duration) -> io::Result<usize>;
 
-    /// Writes all bytes within `wait`.
     fn send(&mut self, bytes: &[u8], wait: Duration) -> io::Result<()>;
 
-    /// Drops unread input.
     fn discard_input(&mut self) -> io::Result<()>;
 
     /// Changes the baud rate; ignored by pipes without one.
@@ -65,18 +60,16 @@ impl SerialTransport {
     }
 }
 
-/// Finds a board that reappears under another port name: by the serial number of its USB adapter, else by the
-/// name, else by the only unnumbered adapter of the same make. A link such as `/dev/serial/by-id` is a stable
-/// name. The caller must verify the board's identity.
+/// Finds a board that reappears under another port name: by its USB adapter's serial number, else by name, else by the
+/// only unnumbered adapter of that make. `/dev/serial/by-id` links are stable names. The caller must verify the
+/// identity.
 #[derive(Clone, Debug)]
 pub(crate) struct Place {
     name: String,
     adapter: Option<Adapter>,
-    /// Whether the board was connected before.
     known: bool,
 }
 
-/// USB adapter.
 #[derive(Clone, PartialEq, Eq, Debug)]
 struct Adapter {
     maker: u16,
@@ -98,7 +91,7 @@ impl Place {
         Self { name: name.into(), adapter: None, known: false }
     }
 
-    /// Opens the port and remembers its adapter.
+    /// Remembers the port's adapter.
     pub(crate) fn open(&mut self) -> Result<SerialTransport, PortError> {
         let present = find::present();
         let name = self.find(&present).unwrap_or(&self.name).to_owned();
@@ -148,7 +141,6 @@ fn refuse_what_is_no_port(_: &str) -> Result<(), PortError> {
 }
 
 /// Separates port and link rate: `/dev/ttyACM0@921600`. An existing file name has no rate.
-/// Errors: [`PortError::Rate`] for an unsupported rate.
 pub(crate) fn with_rate(given: &str) -> Result<(&str, Option<LinkRate>), PortError> {
     let is_number = |rate: &str| !rate.is_empty() && rate.bytes().all(|byte| byte.is_ascii_digit());
     let parts = given.rsplit_once('@').filter(|(_, rate)| is_number(rate));

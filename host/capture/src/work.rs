@@ -1,9 +1,7 @@
-//! Long work: homing, moves, exposure programs and calibrations, from the request to the final event.
-//!
-//! While a [`Work`] is held, keep-alives are answered. Dropping it before its end stops the rig; if the
-//! program dies, the board stops at its deadline ([`crate::Timing::keep_alive`]). Each wait has a deadline
-//! ([`crate::timing`]). At the deadline and on interruption the board is stopped before the error is
-//! returned.
+//! Long work: homing, moves, exposure programs and calibrations, from the request to the final event. While a [`Work`]
+//! is held, keep-alives are answered. Dropping it before its end stops the rig; if the program dies, the board stops at
+//! its deadline ([`crate::Timing::keep_alive`]). Each wait has a deadline ([`crate::timing`]). At the deadline and on
+//! interruption the board is stopped before the error is returned.
 
 use std::{
     sync::{
@@ -27,10 +25,8 @@ use crate::{
     timing::{Pace, calibration_time, homing_time, move_time, program_time},
 };
 
-/// Polling interval for interruptions.
 const SLICE: Duration = Duration::from_millis(50);
 
-/// Long work to start.
 struct Plan {
     request: Request,
     /// Longest time of a healthy board.
@@ -45,7 +41,6 @@ pub struct Moved {
     pub measured: Nanometres,
 }
 
-/// Accepted long work.
 pub struct Work {
     client: Client,
     id: u32,
@@ -71,19 +66,15 @@ pub enum Step {
 }
 
 impl Work {
-    /// Request id used by events.
     pub fn id(&self) -> u32 {
         self.id
     }
 
-    /// Arrival time of the last event.
     pub fn received(&self) -> Instant {
         self.received
     }
 
-    /// The next event, waiting at most `wait`; `None` at the timeout. Time between calls does not count
-    /// against the deadline.
-    /// Errors: [`ClientError`]; the work has ended.
+    /// The next event; `None` after `wait`. Only waiting counts for the deadline. An error ends the work.
     pub fn step_within(&mut self, wait: Duration) -> Result<Option<Step>, ClientError> {
         let until = Instant::now() + wait;
         loop {
@@ -112,8 +103,7 @@ impl Work {
         }
     }
 
-    /// The next event; only the work's deadline applies.
-    /// Errors: [`ClientError`]; the work has ended.
+    /// The next event; only the work's deadline applies. An error ends the work.
     pub fn step(&mut self) -> Result<Step, ClientError> {
         loop {
             if let Some(step) = self.step_within(Duration::from_secs(3600))? {
@@ -138,7 +128,7 @@ impl Work {
         }
     }
 
-    /// Waits for the end of a homing. Returns the change of the encoder's zero.
+    /// Waits for the end of a homing; returns the change of the encoder's zero.
     pub fn homed(self) -> Result<Nanometres, ClientError> {
         let during = self.during.clone();
         match self.wait()? {
@@ -310,7 +300,7 @@ impl Client {
         Ok(pace)
     }
 
-    /// Starts homing axes simultaneously.
+    /// Homes the axes simultaneously.
     pub fn start_homing(&self, axes: &[Axis]) -> Result<Vec<Work>, ClientError> {
         let plan = |axis: &Axis| {
             Ok(Plan {
@@ -326,12 +316,12 @@ impl Client {
         only(self.start_homing(&[axis])?, "homing")
     }
 
-    /// Homes an axis. Returns the change of the encoder's zero.
+    /// Homes an axis; returns the change of the encoder's zero.
     pub fn home(&self, axis: Axis) -> Result<Nanometres, ClientError> {
         self.start_home(axis)?.homed()
     }
 
-    /// Starts moving axes to absolute positions simultaneously.
+    /// Moves the axes to absolute positions simultaneously.
     pub fn start_moves(&self, targets: &[(Axis, Nanometres)]) -> Result<Vec<Work>, ClientError> {
         let status = self.status()?;
         let plan = |&(axis, target): &(Axis, Nanometres)| {
@@ -352,7 +342,6 @@ impl Client {
         self.start_move(axis, target)?.moved()
     }
 
-    /// Runs a calibration routine.
     pub fn calibrate(&self, routine: Routine) -> Result<Calibration, ClientError> {
         let during = format!("measuring the {}", routine_name(routine));
         let axis = match routine {
@@ -368,8 +357,7 @@ impl Client {
         }
     }
 
-    /// Loads and arms a program, which the board checks. It stays armed.
-    /// Errors: [`ClientError`]; [`ClientError::TooManyShots`] before anything is loaded.
+    /// Loads and arms a program; it stays armed. Returns [`ClientError::TooManyShots`] before anything is loaded.
     pub fn arm(&self, shots: &[Shot]) -> Result<(), ClientError> {
         let max = self.hello().limits.shots_max;
         let Some(count) = u8::try_from(shots.len()).ok().filter(|count| *count <= max) else {
@@ -394,7 +382,6 @@ impl Client {
         self.start_work(&Request::RunProgram { silence: self.keep_alive() }, work, during)
     }
 
-    /// Longest time of the armed program.
     pub(crate) fn program_time(&self, shots: &[Shot]) -> Result<Duration, ClientError> {
         let status = self.status()?;
         if status.program.state == ProgramState::Idle {
@@ -409,9 +396,8 @@ impl Client {
         Ok(program_time(shots, &status, &paces))
     }
 
-    /// Arms and runs a program. `on_event` receives [`EventKind::ShotDone`] and [`EventKind::ShotReady`]
-    /// immediately; its error stops the board and is returned. Returns the number of exposures.
-    /// Errors: [`ClientError`], and those of `on_event`.
+    /// Arms and runs a program. `on_event` receives [`EventKind::ShotDone`] and [`EventKind::ShotReady`] immediately;
+    /// its error stops the board and is returned. Returns the number of exposures.
     pub fn run_program<E: From<ClientError>>(
         &self,
         shots: &[Shot],

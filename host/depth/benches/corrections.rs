@@ -1,8 +1,6 @@
-//! Times of corrections, calibration, focus measures and baselines on 640x480, one thread, in milliseconds: minimum and
-//! median.
-//!
-//! `cargo bench -p farnear-depth --bench corrections [-- FILTER]`; with `FARNEAR_JSON=1` one JSON object per line. The
-//! images are random: only the time is of interest. Timings are not tests: nothing here can fail.
+//! Minimum and median times of corrections, calibration, focus measures and baselines on 640x480, one thread, in ms.
+//! `cargo bench -p farnear-depth --bench corrections [-- FILTER]`; `FARNEAR_JSON=1` prints one JSON object per line.
+//! The images are random. Timings are not tests: nothing here can fail.
 #![allow(clippy::unwrap_used, missing_docs)] // A benchmark may stop; it has no users.
 
 use std::hint::black_box;
@@ -43,7 +41,6 @@ fn random(low: f32, high: f32, seed: u64) -> Array2<f32> {
     Array2::from_shape_simple_fn(DIM, || rng.random_range(low..high))
 }
 
-/// Minimum and median of `runs` runs in ms, after two to warm up.
 fn time<T>(runs: usize, mut run: impl FnMut() -> T) -> [f64; 2] {
     let mut ms: Vec<f64> = (0..runs + 2)
         .map(|_| {

@@ -1,8 +1,6 @@
-//! The run time for a small pair, as often as asked for, and nothing else: what an emulator counts the instructions of.
-//! `cargo xtask bench --arm` subtracts two counts, so that the start falls out. The operators were stored by `farnear operators --psf
-//! pillbox`, for their design would take most of the counting.
-//!
-//! Arguments: vector unit, times.
+//! The run time for a small pair, repeated as often as requested: an emulator counts its instructions.
+//! `cargo xtask bench --arm` subtracts two counts to remove the start. The operators are stored
+//! (`farnear operators --psf pillbox`), because their design takes longer. Arguments: unit, repetitions.
 #![allow(clippy::unwrap_used, missing_docs)] // A benchmark may stop; it has no users.
 
 use std::hint::black_box;
@@ -12,7 +10,7 @@ use farnear_depth::optics::{FocusSection, LensSection, OpticsFile, SensorSection
 use farnear_depth::pipeline::{Backend, Processor, Settings};
 use ndarray::Array2;
 
-/// Small, for every instruction of it is written down by the emulator; its rims count, so that a large pair takes rather less per pixel.
+/// Small, because the emulator logs every instruction. Borders count too: a large pair takes less per pixel.
 const SIZE: (usize, usize) = (96, 128);
 
 fn main() {

@@ -1,7 +1,7 @@
-//! Registration of pairs given as files, with its processor time: what `peer_ecc.py` compares with OpenCV's ECC.
+//! Registration of pairs from files, with its processor time; `peer_ecc.py` compares it with OpenCV's ECC.
 //!
-//! Arguments: WIDTH HEIGHT TIMES FAR NEAR [FAR NEAR ...], images of 32-bit floats, row by row. One JSON object per pair. On one
-//! thread; the processor time is the least of TIMES runs, as Linux counts it for all threads.
+//! Arguments: WIDTH HEIGHT TIMES FAR NEAR [FAR NEAR ...], images of 32-bit floats, row by row. Prints one JSON object
+//! per pair. One thread; the processor time is the minimum of TIMES runs, as Linux counts it for all threads.
 #![allow(clippy::unwrap_used, missing_docs)] // A benchmark may stop; it has no users.
 
 use std::fs;
@@ -11,7 +11,6 @@ use farnear_depth::prepare::align::{Model, estimate};
 use farnear_depth::prepare::warp::Warp;
 use ndarray::Array2;
 
-/// Processor time of all threads of this program in ms.
 fn cpu_ms() -> f64 {
     let of_task = |entry: std::io::Result<fs::DirEntry>| -> f64 {
         let text = fs::read_to_string(entry.unwrap().path().join("schedstat")).unwrap();

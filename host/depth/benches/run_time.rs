@@ -1,10 +1,7 @@
-//! Times of the run time, of one convolution and of the operator designs, in milliseconds: minimum and median.
-//!
-//! Where the floating-point operations are known (`flop`: two for each tap of a kernel as if nothing were shared between taps;
-//! `executed_flop`: executed operations), `fma_peak` is the core's limit: multiply-adds in registers.
-//!
-//! `cargo bench -p farnear-depth [-- FILTER]`; with `FARNEAR_JSON=1` one JSON object per line. The images are random: only
-//! the time is of interest. Timings are not tests: nothing here can fail.
+//! Minimum and median times of the run time, of one convolution and of the operator designs, in ms. Where the
+//! floating-point operations are known (`flop`: two per kernel tap as if taps shared nothing; `executed_flop`: executed
+//! operations), `fma_peak` is the core's limit: multiply-adds in registers. `cargo bench -p farnear-depth [-- FILTER]`;
+//! `FARNEAR_JSON=1` prints one JSON object per line. The images are random; nothing here can fail.
 #![allow(clippy::unwrap_used, missing_docs)] // A benchmark may stop; it has no users.
 
 use std::hint::black_box;
@@ -46,7 +43,6 @@ fn random_image(height: usize, width: usize, seed: u64) -> Array2<f32> {
     Array2::from_shape_simple_fn((height, width), || rng.random_range(0.0..200.0_f32))
 }
 
-/// Minimum and median of `runs` runs in ms, after two to warm up.
 fn time<T>(runs: usize, mut run: impl FnMut() -> T) -> [f64; 2] {
     let mut ms: Vec<f64> = (0..runs + 2)
         .map(|_| {
@@ -60,7 +56,7 @@ fn time<T>(runs: usize, mut run: impl FnMut() -> T) -> [f64; 2] {
     [ms[0], ms[ms.len() / 2]]
 }
 
-/// Floating-point operations of a run, and those left once what is shared is done once.
+/// Floating-point operations of a run, and those executed when shared work is done once.
 struct Flop {
     plain: f64,
     executed: f64,
@@ -84,8 +80,7 @@ fn report(name: &str, backend: Option<Backend>, threads: usize, [min, median]: [
     }
 }
 
-/// Time per pair when as many chains of one thread each as there are threads run at the same time: nothing is shared, so
-/// this is what the machine gives to several threads.
+/// Time per pair with one independent single-threaded chain per thread: the machine's multi-thread limit.
 fn side_by_side(threads: usize, rounds: usize, chain: impl Fn(&mut dyn FnMut()) + Sync) -> [f64; 2] {
     const PAIRS: usize = 3;
     let barrier = std::sync::Barrier::new(threads);
@@ -97,7 +92,6 @@ fn side_by_side(threads: usize, rounds: usize, chain: impl Fn(&mut dyn FnMut()) 
                 let mut start = Instant::now();
                 chain(&mut || {
                     if pairs % PAIRS == 0 {
-                        // The slowest ends a round; the last one records it.
                         if barrier.wait().is_leader() && pairs > PAIRS {
                             let ms = 1e3 * start.elapsed().as_secs_f64();
                             times.lock().unwrap().push(ms / (PAIRS * threads) as f64);

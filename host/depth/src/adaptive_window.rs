@@ -1,16 +1,14 @@
-//! Depth by windows of one or several sizes, with its standard deviation and how well the model explains the pair.
+//! Depth by windows of one or several sizes, with its standard deviation and the model's misfit.
 //!
-//! [`Bank`] filters a pair so that `rho0 + alpha rho1 + alpha^2 rho2 + alpha^3 rho3` vanishes at the true depth, but for noise. A
-//! window finds the root of `sum c_k alpha^k`, `c_k = sum rho_k u`, u being the matched filter, whose variance follows from
-//! the noise, the filter's energy and the cubic's slope. Windows are of one size, or of three:
-//!
-//! - [`Window::Adaptive`] takes at each pixel the largest window whose value lies within two standard deviations of all smaller
-//!   ones' (the intersection of confidence intervals; Goldenshluger & Nemirovski 1997, Katkovnik 1999), so that planes are
-//!   smoothed over 21 px and steps stay where they are;
+//! [`Bank`] filters a pair so that `rho0 + alpha rho1 + alpha^2 rho2 + alpha^3 rho3` vanishes at the true depth, except
+//! for noise. A window finds the root of `sum c_k alpha^k`, `c_k = sum rho_k u`, with the matched filter `u`. The
+//! variance follows from the noise, the filter's energy and the cubic's slope. Windows have one size or three:
+//! - [`Window::Adaptive`] takes the largest window whose value lies within two standard deviations of all smaller ones'
+//!   (intersection of confidence intervals; Goldenshluger & Nemirovski 1997, Katkovnik 1999). It preserves steps.
 //! - [`Window::Safe`] takes the smallest window that is certain enough, without comparison.
 //!
-//! The work is done in tiles (`rows`), so that memory does not grow with the image beyond its maps. Cost: five kernels of 7x7,
-//! five products, and 15 window sums and three cubics for three windows; see `docs/speed.md`.
+//! Work proceeds in tiles (`rows`), so that memory beyond the maps does not grow with the image. Cost: five 7x7
+//! kernels, five products, and 15 window sums and three cubics for three windows; see `docs/speed.md`.
 
 mod bank;
 mod rows;
@@ -35,14 +33,14 @@ pub use bank::Bank;
 
 /// Sides of the windows that [`Window::Adaptive`] chooses from, px.
 pub const ADAPTIVE_PX: [usize; 3] = [7, 13, 21];
-/// Sides of those that [`Window::Safe`] chooses from.
+/// Sides of the windows that [`Window::Safe`] chooses from, px.
 pub const SAFE_PX: [usize; 3] = [9, 13, 21];
 
-/// Over how many pixels evidence is summed.
+/// Window over which evidence is summed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(into = "String", try_from = "String")]
 pub enum Window {
-    /// A square of one side everywhere, px: odd.
+    /// One square everywhere; odd side, px.
     Fixed(usize),
     /// The largest of [`ADAPTIVE_PX`] that nothing contradicts.
     Adaptive,
@@ -50,7 +48,7 @@ pub enum Window {
     Safe,
 }
 
-/// A text that names no window.
+/// Unknown window name.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("expected adaptive, safe or an odd number of pixels from 1 to {MAX_SMOOTHING_PX}")]
 pub struct UnknownWindow;
@@ -104,30 +102,27 @@ pub struct WindowSettings {
     pub median_px: usize,
     /// The noise of the images.
     pub noise: PairNoise,
-    /// Vector unit; the fastest that the processor has if none is named.
+    /// Vector unit; `None` uses the fastest available.
     pub backend: Option<Backend>,
 }
 
-/// What windows find, each (height, width).
+/// Maps of (height, width).
 #[derive(Debug, Clone)]
 pub struct Estimate {
-    /// Depth in mm; NaN where the filters saw a pixel without a value.
+    /// Depth, mm; NaN where a filter reaches a pixel without a value.
     pub depth_mm: Array2<f32>,
-    /// Its standard deviation in mm for the noise of the settings.
+    /// Standard deviation of depth, mm, for the noise of the settings.
     pub deviation_mm: Array2<f32>,
-    /// Mean square of what the model leaves around the pixel, relative to the noise: about 1 where the model holds.
+    /// Mean square residual around the pixel relative to the noise: about 1 where the model holds.
     pub misfit: Array2<f32>,
-    /// What the model leaves beyond the noise, over the whole image and relative to the texture that depth rests on, mean
-    /// squares: a few thousandths where point spread function and blur are right.
+    /// Mean square residual beyond the noise, relative to the texture: a few thousandths where PSF and blur are right.
     pub left_over: f64,
-    /// The same mean square relative to what noise alone would leave.
+    /// The same mean square relative to noise alone.
     pub excess: f64,
 }
 
-/// Depth of a pair that lies on each other and is of one brightness; pixels without a value (NaN) take no part.
-///
-/// # Errors
-/// [`RunError`] for images that differ in size, are too small, constant or wholly invalid, and for unusable windows.
+/// Depth of an aligned, balanced pair, ignoring NaN pixels. Returns [`RunError`] for images that differ in size, are
+/// too small, constant or invalid, and for unusable windows.
 pub fn estimate(
     far: ArrayView2<f32>,
     near: ArrayView2<f32>,
@@ -140,7 +135,7 @@ pub fn estimate(
     Ok(Estimate { depth_mm, ..estimate })
 }
 
-/// The same with an empty map of depth: what another method's depth is judged by needs none, and a map is large.
+/// [`estimate`] with an empty depth map: other methods' validity needs no depth, and a map is large.
 pub(crate) fn estimate_without_depth(
     far: ArrayView2<f32>,
     near: ArrayView2<f32>,
@@ -189,7 +184,6 @@ fn estimate_into(
             },
         )
         .collect();
-    // In the bands' order, so that the sum does not depend on how threads share them.
     let [left, noise, texture] =
         of_bands.into_iter().fold([0.0; 3], |a, b| [a[0] + b[0], a[1] + b[1], a[2] + b[2]]);
     let left_over = if texture > 0.0 { (left - noise) / texture } else { f64::NAN };
@@ -198,7 +192,6 @@ fn estimate_into(
     Ok(Estimate { depth_mm: Array2::zeros((0, 0)), deviation_mm, misfit, left_over, excess })
 }
 
-/// Refuses images that differ in size, are too small, wholly invalid or constant.
 pub(crate) fn check_pair(far: ArrayView2<f32>, near: ArrayView2<f32>) -> Result<(), RunError> {
     let (height, width) = far.dim();
     let (near_height, near_width) = near.dim();

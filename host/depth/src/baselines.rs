@@ -1,4 +1,4 @@
-//! Other people's methods for the same pair, to compare with.
+//! Published methods for the same pair, for comparison.
 //!
 //! | method | what | reference |
 //! |---|---|---|
@@ -6,13 +6,10 @@
 //! | [`Method::SubbaraoFourier`] | ratio of local spectra | Subbarao 1988; Li 2014, appendix C |
 //! | [`Method::Favaro`] | projectors on the null space of each depth, learned from rendered patches | Favaro & Soatto 2005 |
 //!
-//! (Watanabe & Nayar and Raj & Staunton differ from this project's method by their operators only: see
-//! [`crate::operators::Family`].) Each gives a [`DepthMap`] with the same meaning of depth, confidence and holes as
-//! [`crate::pipeline::depth_from_pair`]; [`Settings::smoothing_px`] is the window over which evidence is summed.
-//!
-//! The first two know of the PSF only its second moment, `sigma^2 = 2 k^2 R^2` for a Gaussian. With the blur radii of a
-//! telecentric pair the difference of the two images' moments is linear in the normalised depth:
-//! `sigma1^2 - sigma2^2 = c Rmax^2 alpha`.
+//! (Watanabe & Nayar and Raj & Staunton differ by their operators only: see [`crate::operators::Family`].) Each gives a
+//! [`DepthMap`] with the conventions of [`crate::pipeline::depth_from_pair`]; evidence is summed over
+//! [`Settings::smoothing_px`]. The first two use only the PSF's second moment, `sigma^2 = 2 k^2 R^2` for a Gaussian. In
+//! a telecentric pair `sigma1^2 - sigma2^2 = c Rmax^2 alpha`.
 
 mod common;
 mod favaro;
@@ -51,7 +48,7 @@ pub enum BaselineError {
     /// The images cannot be used.
     #[error(transparent)]
     Pair(#[from] RunError),
-    /// Favaro's settings make no sense.
+    /// Invalid settings of Favaro's method.
     #[error("{name} = {value}: must lie between {least} and {most}")]
     Setting {
         /// Name of the parameter.
@@ -108,11 +105,8 @@ impl FromStr for Method {
     }
 }
 
-/// Depth of a pair by a baseline: `far` and `near` are the far- and near-focused images, (height, width), any common
-/// scale. [`Method::Favaro`] learns its projectors first; keep a [`Favaro`] to do that once for many pairs.
-///
-/// # Errors
-/// [`BaselineError::Pair`] for images that differ in size, are too small, constant or wholly invalid.
+/// Depth of a pair by a baseline: `far` and `near` are (height, width) in any common scale. A [`Favaro`] saves learning
+/// for many pairs. Returns [`BaselineError::Pair`] for images that differ in size, are too small, constant or invalid.
 pub fn depth_from_pair(
     method: Method,
     far: ArrayView2<f32>,

@@ -1,17 +1,14 @@
-//! Calibration on captured images: the PSF's parameters, and the series of flat targets that corrections learn from.
+//! Calibration on captured images: PSF parameters, and series of flat targets for corrections.
 //!
 //! ## PSF (Li 2014, sections 5.2.1 and 5.2.2)
-//! A flat, textured target stands at the far focus: the far-focused image is sharp and the near-focused one blurred by
-//! the largest radius R; at the near focus it is the other way round. Blurring the sharp image by trial PSFs until it
-//! equals the other gives `k` (1-D search) or `p` and `k` (a 1-D search of `k` for each `p`).
-//!
-//! Two things are done better than printed. The comparison is made on radially binned spectra, so that a trial costs a
-//! hundred OTF values and not a convolution. And the squared difference is divided by `H1^2 + H2^2`, because the sharp
-//! image's own noise is blurred along with it: without that (total least squares) a stronger trial blur always looks
-//! a little better than it is. In this form neither image need be sharp: with blur radii R1 and R2 the cost is
-//! `sum |H1 I2 - H2 I1|^2 / (H1^2 + H2^2)`, so a target at any known depth but the middle will do.
-//!
-//! Units: R in pixels, frequencies in rad/px. Cost: two FFTs a pair, then 10 ms (Gaussian) to 0.5 s (generalised).
+//! A flat, textured target is at the far focus: the far-focused image is sharp and the near-focused one blurred by the
+//! largest radius R; at the near focus it is the reverse. Trial PSFs blur the sharp image until it equals the other: a
+//! search of `k`, or of `k` for each `p`. Two improvements over the printed method: radially binned spectra are
+//! compared, so that a trial costs a hundred OTF values instead of a convolution; and the squared difference is divided
+//! by `H1^2 + H2^2` (total least squares), because trial blur also blurs the sharp image's noise, which favours
+//! stronger blur. With blur radii R1 and R2 the cost is `sum |H1 I2 - H2 I1|^2 / (H1^2 + H2^2)`: neither image need be
+//! sharp, and a target at any known depth except the middle suffices. Units: R in pixels, frequencies in rad/px. Cost:
+//! two FFTs a pair, then 10 ms (Gaussian) to 0.5 s (generalised).
 
 mod free;
 mod ready;
@@ -36,19 +33,19 @@ pub use free::OtfPoint;
 pub use ready::made_ready;
 pub(crate) use spectra::SpectrumError;
 
-/// Closer to the middle of the range than this both images are blurred alike and say nothing of the PSF.
+/// Nearer to the middle of the range both images are blurred alike and carry no information on the PSF.
 const LEAST_ALPHA: f64 = 0.2;
 
-/// The sharper image must have this many times the other's energy for the target to stand at its focus.
+/// Least energy ratio of the sharper image to the other for a target at its focus.
 const SHARPER: f64 = 1.1;
 
 /// Residual relative to the noise above which a PSF does not explain the pairs.
 const EXCESS: f64 = 1.3;
 
-/// What may be left besides, part of the images' energy: of images without noise it is what aliases leave.
+/// Residual allowed besides, as part of the images' energy: aliases leave it without noise.
 const NEGLIGIBLE: f64 = 5e-4;
 
-/// Relative standard error of the width from which it is open: 1 % too wide costs 0.3 mm on the thesis' rig.
+/// Relative standard error of the width from which it counts as undetermined: 1 % costs 0.3 mm on the thesis' rig.
 pub const LOOSE: f64 = 0.01;
 
 /// Which PSF is calibrated.
@@ -123,7 +120,7 @@ pub enum CalibrationError {
         index: usize,
         /// `far` or `near`.
         which: &'static str,
-        /// Description of the fault.
+        /// The reason.
         reason: SpectrumError,
     },
     /// The target is where the pair carries no information.
@@ -133,7 +130,7 @@ pub enum CalibrationError {
     MiddleOfRange {
         /// Index of the pair.
         index: usize,
-        /// Where the target stands.
+        /// Depth of the target.
         alpha: f64,
     },
     /// Neither image is clearly the sharper one.
@@ -147,7 +144,7 @@ pub enum CalibrationError {
         /// Energy of the far image over that of the near one.
         ratio: f64,
     },
-    /// The best parameter is the search's limit.
+    /// The best parameter is at the limit of the search.
     #[error(
         "the best {parameter} is {value}, the end of the search: the images do not show the blur that the optics promise; \
          check max_blur_px, the order of the images and where the target stands"
@@ -180,8 +177,7 @@ pub struct CapturedPair<'a> {
     pub far: ArrayView2<'a, f32>,
     /// Near-focused image.
     pub near: ArrayView2<'a, f32>,
-    /// Normalised depth of the target ([`Optics::alpha`]); where it is not known, the target is taken to stand at the
-    /// focus of the sharper image.
+    /// Normalised depth of the target ([`Optics::alpha`]); `None` assumes the focus of the sharper image.
     pub alpha: Option<f64>,
 }
 
@@ -190,28 +186,27 @@ pub struct CapturedPair<'a> {
 pub struct PsfFit {
     /// The PSF.
     pub psf: Psf,
-    /// Residual of the images' energy in the compared frequencies when one is predicted from the other, 0 to 1: noise,
-    /// and what the model does not describe.
+    /// Residual of the images' energy in the compared frequencies, 0 to 1: noise and model error.
     pub residual: f64,
-    /// What noise alone leaves, as far as the pairs tell.
+    /// Residual due to noise alone, as estimated from the pairs.
     pub noise: f64,
     /// Standard error of `p`, where the PSF has one and the pairs determine it.
     pub standard_error_p: Option<f64>,
-    /// Standard error of `k`; of a free PSF that of its width as a `k`, the root of half its second moment.
+    /// Standard error of `k`; of a free PSF, that of the root of half its second moment.
     pub standard_error_k: Option<f64>,
-    /// The OTF of a free PSF, as far as the pairs reach; else empty.
+    /// The OTF of a free PSF within the pairs' reach; else empty.
     pub otf: Vec<OtfPoint>,
-    /// Where the target of each pair stands or was found to stand.
+    /// Depth of each pair's target, given or found.
     pub alphas: Vec<f64>,
 }
 
-/// What a calibration is worth.
+/// Quality of a calibration.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Verdict {
     /// The PSF explains the pairs and is well determined.
     Good,
-    /// It explains them, and they leave its width open by more than [`LOOSE`].
+    /// It explains them, but the width is undetermined by more than [`LOOSE`].
     Loose,
     /// It leaves more than noise.
     Unexplained,
@@ -228,12 +223,12 @@ impl fmt::Display for Verdict {
 }
 
 impl PsfFit {
-    /// The width as a `k`: that of a Gaussian with the same second moment.
+    /// The width as a `k`: that of a Gaussian of the same second moment.
     pub fn width(&self) -> f64 {
         (0.5 * self.psf.second_moment()).sqrt()
     }
 
-    /// What the calibration is worth.
+    /// Quality of the calibration.
     pub fn verdict(&self) -> Verdict {
         if self.residual > EXCESS * self.noise + NEGLIGIBLE {
             Verdict::Unexplained
@@ -245,10 +240,8 @@ impl PsfFit {
     }
 }
 
-/// The PSF of `model` that turns the images of the pairs into each other, jointly for all pairs.
-///
-/// # Errors
-/// [`CalibrationError`]: pairs without texture, of different size, or only of targets in the middle of the range, which are left out.
+/// The PSF of `model` that turns the images of each pair into each other, jointly for all pairs. Returns
+/// [`CalibrationError`] for pairs without texture, of different size, or only in the middle of the range.
 pub fn fit_psf(
     pairs: &[CapturedPair<'_>],
     optics: &Optics,
@@ -277,7 +270,7 @@ pub fn fit_psf(
         let bins = spectra::Bins::new(&far, &near);
         let alpha = match pair.alpha {
             Some(alpha) if alpha.abs() < LEAST_ALPHA => {
-                // Blurred alike, the images say nothing of the blur: a series that passes through the middle is found from the rest.
+                // Pairs in the middle are blurred alike and carry no information: the rest of the series decides.
                 silent.get_or_insert(CalibrationError::MiddleOfRange { index, alpha });
                 alphas.push(alpha);
                 continue;
@@ -318,7 +311,7 @@ pub fn fit_psf(
     Ok(PsfFit {
         psf,
         residual: cost / energy,
-        // Bands of few coefficients may tell of more than is left.
+        // Bands of few coefficients may overestimate it.
         noise: (spread::noise(&observations) * coefficients).min(cost) / energy,
         standard_error_p: of_parameters.as_ref().filter(|errors| errors.len() == 2).map(|errors| errors[0]),
         standard_error_k: of_width.or(of_parameters.and_then(|errors| errors.last().copied())),
@@ -334,7 +327,7 @@ pub struct FlatTarget<'a> {
     pub far: ArrayView2<'a, f32>,
     /// Near-focused image.
     pub near: ArrayView2<'a, f32>,
-    /// Depth at which it stands, mm.
+    /// Depth of the target, mm.
     pub true_mm: f64,
 }
 
@@ -343,22 +336,19 @@ pub struct FlatTarget<'a> {
 pub struct MeasuredPattern {
     /// Depth, mm, (height, width); NaN where the confidence is below the limit.
     pub depth_mm: Array2<f32>,
-    /// Depth at which the target stood, mm.
+    /// Depth of the target, mm.
     pub true_mm: f64,
 }
 
 impl MeasuredPattern {
-    /// As [`crate::corrections::fit`] takes it.
+    /// As input of [`crate::corrections::fit`].
     pub fn as_pattern(&self) -> Pattern<'_> {
         Pattern { depth_mm: self.depth_mm.view(), true_mm: self.true_mm }
     }
 }
 
-/// The patterns of a series of flat targets; 20 to 30 of them through the working range teach any correction. Pixels
-/// below `least_confidence` are left out, so that they teach nothing.
-///
-/// # Errors
-/// [`CalibrationError::FlatTarget`] names the target that gave no depth map.
+/// Patterns of flat targets; 20 to 30 through the working range suffice. Excludes pixels below `least_confidence`.
+/// Returns [`CalibrationError::FlatTarget`] for a target without a depth map.
 pub fn measure_patterns(
     targets: &[FlatTarget<'_>],
     operators: &Operators,

@@ -1,34 +1,30 @@
 //! Confidence of each pixel, and which pixels have too little texture.
 //!
-//! Two things make a depth doubtful: too little texture energy `c1` (window sum of `p1^2`) compared with the rest of
-//! the image, and a window that the model does not explain (noise, a depth step, saturation). The misfit is the part
-//! of the difference image that its regression on `p1` leaves over, `(sum m^2 - (sum p1 m)^2 / c1) / c1`: the mean
-//! square of the pixels' own alpha about the window's. Confidence is `c1 / (c1 + T) / (1 + misfit)` with the
-//! threshold `T = 0.05 median(c1)`: 1/2 for a pixel on the threshold that fits perfectly. Li 2014's rule (eq. 6.15)
-//! compares the variance of the ratio with 0.0144 and has its inequality inverted; it does not separate.
-//!
-//! Cost: O(1) per pixel; the median is taken over at most some 10,000 pixels on a regular grid.
+//! Two things make a depth doubtful: a low texture energy `c1` (window sum of `p1^2`) compared with the rest of the
+//! image, and a window that the model does not explain (noise, a depth step, saturation). The misfit is the part of the
+//! difference image that its regression on `p1` leaves, `(sum m^2 - (sum p1 m)^2 / c1) / c1`: the mean square of the
+//! pixels' own alpha about the window's. Confidence is `c1 / (c1 + T) / (1 + misfit)`, `T = 0.05 median(c1)`: 1/2 for a
+//! perfect fit on the threshold. Li 2014's rule (eq. 6.15) compares the variance of the ratio with 0.0144 with an
+//! inverted inequality; it does not separate. Cost: O(1) per pixel; the median uses about 10,000 pixels.
 
 use ndarray::{Array2, ArrayView2, Ix2, SliceInfo, SliceInfoElem, Zip, s};
 
 /// Texture energy relative to its median below which a pixel counts as low texture.
 pub const LOW_TEXTURE: f32 = 0.05;
 
-/// Texture energy relative to its median below which it is nothing but rounding: no depth.
+/// Texture energy relative to its median below which it is rounding only: no depth.
 pub(crate) const NO_TEXTURE: f32 = 1e-7;
 
-/// The sample for the median is thinned to about this number of pixels.
 const SAMPLE: usize = 10_000;
 
-/// A regular grid of about [`SAMPLE`] pixels of a map of this size (of all pixels of a small one).
 pub(crate) fn sample((height, width): (usize, usize)) -> SliceInfo<[SliceInfoElem; 2], Ix2, Ix2> {
     let step = (((height * width) as f64 / SAMPLE as f64).sqrt() as usize).max(1);
     s![step / 2..;step, step / 2..;step]
 }
 
-/// Median texture energy of the pixels that have any, by which texture is measured; 0 without any.
+/// Median energy of the pixels with texture, the unit of texture energy; 0 without any.
 pub fn texture_scale(texture: ArrayView2<f32>) -> f32 {
-    // The bits of positive numbers are ordered as they are, and faster to compare.
+    // Positive floats are ordered like their bits, which compare faster.
     let mut values: Vec<u32> =
         texture.slice(sample(texture.dim())).iter().filter(|t| **t > 0.0).map(|t| t.to_bits()).collect();
     if values.is_empty() {
@@ -38,7 +34,7 @@ pub fn texture_scale(texture: ArrayView2<f32>) -> f32 {
     f32::from_bits(*values.select_nth_unstable(middle).1)
 }
 
-/// Confidence of a pixel with the texture energy `texture` and the relative misfit `misfit`; 0 without texture.
+/// Confidence of a pixel with texture energy `texture` and relative misfit `misfit`; 0 without texture.
 #[inline(always)]
 pub fn confidence(texture: f32, misfit: f32, scale: f32) -> f32 {
     if texture > NO_TEXTURE * scale {
@@ -48,7 +44,6 @@ pub fn confidence(texture: f32, misfit: f32, scale: f32) -> f32 {
     }
 }
 
-/// Marks pixels whose texture says nothing, for they are invalid.
 pub(crate) fn withhold(texture: &mut Array2<f32>, invalid: &Array2<bool>) {
     Zip::from(texture).and(invalid).for_each(|texture, invalid| {
         if *invalid {

@@ -1,7 +1,7 @@
 //! Corrections of the depth-variant elliptical distortion, learned from depth maps of flat targets.
 //!
-//! A flat target comes out as a bowl whose height depends on the depth itself (Li 2014, sections 5.3 and 6.2). A
-//! series of such targets at known depths, [`Pattern`]s, teaches one of these corrections:
+//! A flat target appears as a bowl whose height depends on the depth (Li 2014, sections 5.3 and 6.2). A series of
+//! targets at known depths, [`Pattern`]s, teaches one of these corrections:
 //!
 //! | method | what | reference |
 //! |---|---|---|
@@ -12,14 +12,11 @@
 //! | [`Method::TwoStep`] | offset by a first polynomial, its distortion by a second | eqs. 5.21, 5.22 |
 //! | [`Method::Spline`] | smooth surface over field and depth: tensor-product cubic B-spline, penalised; seamless | Eilers & Marx 1996 |
 //!
-//! Depths are mm, maps (height, width), NaN = no value. `x` and `y` run from -1 to 1 over the map and depth is
-//! normalised over 1.3 times half the range of the patterns ([`farnear_maths::clsf::DepthScale`]). Beyond that scale a
-//! correction would extrapolate, so there the corrected depth is NaN.
-//!
-//! Another correction is a file of this folder that provides the trait `Learned`, and its line in the table below.
-//!
-//! Cost of [`Correction::apply_in_place`] on 640x480, one thread: 0.2 ms (`clsf`) to 0.4 ms (`two-step`), CDC (24
-//! patterns, window 1) about 12 ms. Cost of [`fit`] from 24 patterns: 0.1 s (`clsf`) to 1.2 s (`cdc`).
+//! Depths are mm, maps (height, width), NaN = no value. `x` and `y` run from -1 to 1 over the map. Depth is normalised
+//! over 1.3 times half the patterns' range ([`farnear_maths::clsf::DepthScale`]); beyond it the corrected depth is NaN,
+//! because a correction would extrapolate. A new correction is a file of this folder that implements `Learned`, and a
+//! line in the table below. Cost of [`Correction::apply_in_place`] on 640x480, one thread: 0.2 ms (`clsf`) to 0.4 ms
+//! (`two-step`), CDC (24 patterns, window 1) about 12 ms. [`fit`] takes 0.1 to 1.2 s (`cdc`).
 
 mod board;
 mod cdc;
@@ -48,10 +45,10 @@ pub use cdc::CdcSettings;
 pub use error::CorrectionError;
 pub use pattern::Pattern;
 
-/// Version of the stored form; other versions are refused.
+/// Version of the stored form; other versions are rejected.
 pub const FORMAT: u32 = 1;
 
-/// Least part of the working range that the patterns' range must share with it.
+/// Least part of the working range that the patterns must cover.
 const SHARED_RANGE: f64 = 0.25;
 
 // All corrections: what it is in a few words; variant, name, and what learns it.
@@ -82,7 +79,6 @@ pub struct Correction {
     map: Map,
 }
 
-/// The stored form of a [`Correction`].
 #[derive(Serialize, Deserialize)]
 struct Stored {
     format: u32,
@@ -114,11 +110,8 @@ impl TryFrom<Stored> for Correction {
     }
 }
 
-/// Learns a correction from flat targets.
-///
-/// # Errors
-/// [`CorrectionError`]: fewer patterns than the terms need, patterns of different size, depths that repeat or make no
-/// sense, a region with too few valid pixels.
+/// Learns a correction. Returns [`CorrectionError`] for too few patterns, invalid or repeated depths, or too few valid
+/// pixels.
 pub fn fit(
     method: Method,
     patterns: &[Pattern<'_>],
@@ -132,7 +125,7 @@ pub fn fit(
 }
 
 impl Correction {
-    /// Which correction this is.
+    /// The method of this correction.
     pub fn method(&self) -> Method {
         self.map.method()
     }
@@ -147,10 +140,7 @@ impl Correction {
         (self.far_mm, self.near_mm)
     }
 
-    /// Checks that this correction was made for a part of a working range. Beyond its own range [`Self::apply`] gives no depth.
-    ///
-    /// # Errors
-    /// [`CorrectionError::RangeMismatch`].
+    /// Checks that this correction covers part of a working range; beyond its own range [`Self::apply`] gives no depth.
     pub fn check_range(&self, range: &WorkingRange) -> Result<(), CorrectionError> {
         let (width, own) = (range.far_mm - range.near_mm, self.far_mm - self.near_mm);
         let shared = range.far_mm.min(self.far_mm) - range.near_mm.max(self.near_mm);
@@ -165,20 +155,14 @@ impl Correction {
         })
     }
 
-    /// The corrected depth map. NaN stays NaN; depths beyond the correction's scale become NaN.
-    ///
-    /// # Errors
-    /// [`CorrectionError::SizeMismatch`] for a map of another size.
+    /// The corrected map; NaN beyond the correction's scale. [`CorrectionError::SizeMismatch`] for another size.
     pub fn apply(&self, depth_mm: ArrayView2<f32>) -> Result<Array2<f32>, CorrectionError> {
         let mut corrected = depth_mm.as_standard_layout().into_owned();
         self.apply_in_place(corrected.view_mut())?;
         Ok(corrected)
     }
 
-    /// As [`Self::apply`], without a second map.
-    ///
-    /// # Errors
-    /// [`CorrectionError::SizeMismatch`] for a map of another size; it is then untouched.
+    /// As [`Self::apply`], without a second map. A map of another size is left unchanged.
     pub fn apply_in_place(&self, mut depth_mm: ArrayViewMut2<f32>) -> Result<(), CorrectionError> {
         self.check_size(depth_mm.dim())?;
         if !depth_mm.is_standard_layout() {
@@ -190,21 +174,14 @@ impl Correction {
         Ok(())
     }
 
-    /// As [`Self::apply`] with the board's fixed-point arithmetic, bit for bit what the board returns (within 0.005 mm
-    /// of [`Self::apply`]).
-    ///
-    /// # Errors
-    /// [`CorrectionError::NotOnBoard`] for a method that the board does not know, [`CorrectionError::Board`] where a
-    /// coefficient or the size does not fit its number formats, [`CorrectionError::SizeMismatch`].
+    /// As [`Self::apply`] with the board's fixed-point arithmetic: identical bits, within 0.005 mm of [`Self::apply`].
+    /// Also fails with [`CorrectionError::NotOnBoard`] or [`CorrectionError::Board`] (number formats).
     pub fn apply_as_board(&self, depth_mm: ArrayView2<f32>) -> Result<Array2<f32>, CorrectionError> {
         self.check_size(depth_mm.dim())?;
         self.for_board()?.apply(depth_mm)
     }
 
-    /// This correction in the board's number formats.
-    ///
-    /// # Errors
-    /// [`CorrectionError::NotOnBoard`], [`CorrectionError::Board`] as for [`Self::apply_as_board`].
+    /// This correction in the board's number formats; errors as [`Self::apply_as_board`].
     pub fn for_board(&self) -> Result<BoardCorrection, CorrectionError> {
         let method = self.method();
         let form = method.board_form().ok_or(CorrectionError::NotOnBoard(method))?;

@@ -1,30 +1,27 @@
 //! The cubic `c1 alpha + c3 alpha^3 = c0` on the branch through 0.
 //!
-//! For `c3 < 0` the branch ends at the turning point `sqrt(c1 / (-3 c3))`, where the left side is largest: a larger
-//! `c0` has no solution there and gets the turning point. Everything is clamped to [`MAX_ALPHA`].
-//!
-//! The cubic is odd, so it is solved for `q = |c0| / c1`. With `r = c3 / c1` and `t = r q^2` the root is `q g(t)`, where
-//! `g + t g^3 = 1`: one function of one variable, which a quotient of two quadratics gives to 1 % ([`START`]). Two
-//! steps of Newton from there reach 1e-6 for `|alpha| <= 1.1` and `-0.2 <= r <= 0.8`; near the turning point, where the
-//! slope vanishes, the slope is kept above 2 % of `c1`.
+//! For `c3 < 0` the branch ends at the turning point `sqrt(c1 / (-3 c3))`; a larger `c0` has no solution and returns
+//! the turning point. Everything is clamped to [`MAX_ALPHA`]. The cubic is odd, so it is solved for `q = |c0| / c1`.
+//! With `r = c3 / c1` and `t = r q^2` the root is `q g(t)`, `g + t g^3 = 1`: one function of one variable, which a
+//! quotient of two quadratics approximates to 1 % ([`START`]). Two Newton steps reach 1e-6 for `|alpha| <= 1.1` and
+//! `-0.2 <= r <= 0.8`. Near the turning point, where the slope vanishes, it is kept above 2 % of `c1`.
 
-/// The largest |alpha| that is reported; a little beyond the working range, where the cubic still holds.
+/// The largest |alpha| reported; a little beyond the working range, where the cubic still holds.
 pub const MAX_ALPHA: f32 = 1.2;
 
-/// Newton steps after the start.
 pub(crate) const STEPS: usize = 2;
 
-/// The start `q (1 + a1 t + a2 t^2) / (1 + b1 t + b2 t^2)` as `[a1, a2, b1, b2]`: least largest error of Newton's next step
-/// for `|alpha| <= 1.1` and `-0.25 <= r <= 0.8` (iteratively reweighted least squares on a grid).
+/// The start `q (1 + a1 t + a2 t^2) / (1 + b1 t + b2 t^2)` as `[a1, a2, b1, b2]`: least largest error after Newton's
+/// next step for `|alpha| <= 1.1` and `-0.25 <= r <= 0.8` (iteratively reweighted least squares on a grid).
 pub(crate) const START: [f32; 4] = [6.001_283, 2.430_091, 6.880_628, 6.063_041];
 
-/// The least `t` that has a root: there alpha is the turning point.
+/// Least `t` with a root; alpha is the turning point there.
 pub(crate) const LEAST_T: f32 = -4.0 / 27.0;
 
-/// The slope of the cubic, relative to `c1`, below which Newton's step is shortened.
+/// Slope, relative to `c1`, below which Newton's step is shortened.
 pub(crate) const SLOPE_FLOOR: f32 = 0.02;
 
-/// The root in plain numbers, also the reference of the vectorised one; `c1` must be positive.
+/// The root in scalar code, reference of the vectorised one; `c1` must be positive.
 pub(crate) fn root(c0: f32, c1: f32, c3: f32) -> f32 {
     let ratio = (c0 / c1).abs();
     let cubic = c3 / c1;

@@ -13,25 +13,25 @@ pub struct DepthMap {
     pub depth_mm: Array2<f32>,
     /// Confidence, 0 (none) to 1; 0 exactly where the depth is NaN.
     pub confidence: Array2<f32>,
-    /// Pixels whose depth was interpolated from their surroundings; `None` without any.
+    /// Pixels interpolated from their surroundings; `None` without any.
     pub filled: Option<Array2<bool>>,
-    /// Part of the pixels whose texture energy is below [`LOW_TEXTURE`](crate::confidence::LOW_TEXTURE) times its median.
+    /// Part of the pixels with texture energy below [`LOW_TEXTURE`](crate::confidence::LOW_TEXTURE) times the median.
     pub low_texture_fraction: f64,
-    /// What a user should know before trusting the map.
+    /// Caveats of the map.
     pub warnings: Vec<Warning>,
 }
 
-/// What a user should know before trusting a map.
+/// Caveat of a map.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Warning {
     /// Pixels are NaN or infinite.
     NotFinite {
-        /// Number of pixels that are so in at least one image.
+        /// Number of pixels affected in at least one image.
         pixels: usize,
     },
-    /// Pixels share the largest value of the pair in flat patches: they are saturated.
+    /// Flat patches share the pair's largest value: saturated.
     Saturated {
-        /// Part of the pixels that are so in at least one image.
+        /// Part of the pixels affected in at least one image.
         fraction: f64,
     },
     /// The operators were designed for another PSF than the optics have.
@@ -41,15 +41,14 @@ pub enum Warning {
         /// PSF of the optics.
         optics: Box<Psf>,
     },
-    /// The far image seems to be the near one. Exchanging the images turns alpha into -alpha and nothing else, so only what
-    /// is known of scenes can tell; a scene that says nothing, as a plane, draws no warning.
+    /// The images seem to be swapped, judged by the scene, because swapping only negates alpha; planes never warn.
     LooksSwapped(SwapEvidence),
 }
 
-/// What speaks for a swapped pair.
+/// Evidence for a swapped pair.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum SwapEvidence {
-    /// Depth rises from the upper through the middle to the lower third of the image; grounds and tables do the opposite.
+    /// Depth rises from the upper through the middle to the lower third; grounds and tables do the opposite.
     LowerPartFarther {
         /// Difference of the median depths, mm.
         difference_mm: f64,

@@ -1,10 +1,10 @@
-//! Normalised depth to mm, as the run time needs it.
+//! Normalised depth to mm for the run time.
 
 use crate::operators::Operators;
 use crate::operators::linearise::Polynomial;
 use crate::optics::Optics;
 
-/// The cubic's alpha to mm in single precision without cancellation.
+/// Alpha to mm in single precision without cancellation.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct DepthOfAlpha {
     focal_length_mm: f32,
@@ -19,7 +19,6 @@ impl DepthOfAlpha {
         Self::linear(optics, *operators.linearisation())
     }
 
-    /// For an alpha that goes through the polynomial first.
     pub(crate) fn linear(optics: &Optics, linearisation: Polynomial) -> Self {
         let [offset, slope] = optics.defocus_line_mm();
         let f = optics.focal_length_mm();
@@ -32,7 +31,6 @@ impl DepthOfAlpha {
         }
     }
 
-    /// Coefficients of the polynomial that alpha goes through first.
     pub(crate) fn linearisation(self) -> [f32; 4] {
         self.linearisation
     }

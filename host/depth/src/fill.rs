@@ -1,22 +1,15 @@
-//! Fills regions of low texture from what surrounds them.
+//! Fills regions of low texture from their surroundings.
 //!
-//! Depth from defocus says nothing where the surface has no texture. A region begins with connected (8-neighbours) pixels
-//! whose texture energy is below [`LOW_TEXTURE`](crate::confidence::LOW_TEXTURE) times its median, and grows over the
-//! pixels around them that have less than [`GROWN_TEXTURE`] times the median, as far as kernels and windows reach: these see
-//! the region's texture on one side only, and noise, which adds to the energy but not to the depth's evidence, draws their
-//! depth towards the middle of the range. A cubic surface (Li 2014, eq. 6.16, with the mixed terms that it lacks: without
-//! them what lies obliquely is not followed) is fitted to the depths in a margin around the Moore-neighbour boundary and
-//! evaluated inside.
-//!
-//! The thesis takes a margin of one pixel. How well a surface is known in the middle of a region is decided by how much
-//! its margin tells of the curvature, so here it is 1.5 times as wide as the region's own radius, unless that contradicts
-//! what lies next to the region (`surface`). The fit is robust (Huber's weights, times the texture energy, to which the variance of
-//! the depth is inverse) and has no more terms than the margin supports.
-//!
-//! For comparison there is the thesis' own way, criterion ([`LowTexture`]) and order ([`FillBy`]) each for itself ([`Filling`]).
-//!
-//! A filled pixel gets [`FILLED_CONFIDENCE`]; a region without a usable margin keeps NaN. Cost: O(pixels of the regions and
-//! their margins), 3 to 8 ms for 640x480.
+//! A region begins with connected (8-neighbours) pixels whose texture energy is below
+//! [`LOW_TEXTURE`](crate::confidence::LOW_TEXTURE) times its median. It grows, as far as kernels and windows reach,
+//! over adjacent pixels below [`GROWN_TEXTURE`] times the median, because noise biases their depth towards the middle
+//! of the range. A cubic surface (Li 2014, eq. 6.16, plus the mixed terms it lacks) is fitted to the depths in a margin
+//! around the Moore-neighbour boundary. The thesis' margin is one pixel. Here it is 1.5 times as wide as the region's
+//! radius, unless that contradicts the nearest surroundings (`surface`), because the margin's curvature determines the
+//! middle. The fit is robust (Huber's weights, times the texture energy, which is inverse to the variance) with no more
+//! terms than the margin supports. [`Filling`] selects criterion ([`LowTexture`]) and order ([`FillBy`]), including the
+//! thesis' for comparison. A filled pixel gets [`FILLED_CONFIDENCE`]; a region without a usable margin stays NaN. Cost:
+//! 3 to 8 ms for 640x480.
 
 mod boundary;
 mod criterion;
@@ -37,31 +30,31 @@ use crate::depth_map::DepthMap;
 use region::Regions;
 use surface::Surface;
 
-/// Texture energy relative to its median below which a pixel next to a region belongs to it.
+/// Texture energy relative to its median below which a region grows over a pixel.
 pub const GROWN_TEXTURE: f32 = 0.7;
 
-/// Confidence of a filled pixel: less than any that was measured on enough texture.
+/// Confidence of a filled pixel: lower than any measured on enough texture.
 pub const FILLED_CONFIDENCE: f32 = 0.2;
 
-/// Report of the work.
+/// Counts of a filling.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Filled {
     /// Number of regions that were filled.
     pub regions: usize,
     /// Number of pixels that were filled.
     pub pixels: usize,
-    /// Number of pixels that could not be filled and are NaN now.
+    /// Number of pixels that could not be filled and are NaN.
     pub left_empty: usize,
 }
 
-/// In which order regions are filled, and from what.
+/// Order and surroundings of the filling.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum FillBy {
-    /// `surface`: each grown as far as kernels reach, from a wide margin, none from another one's filling.
+    /// `surface`: each region grown to the kernels' reach, from a wide margin, independent of other fillings.
     #[default]
     Surface,
-    /// `thesis`: one after the other, each from the rectangle around it, with the earlier filled ones.
+    /// `thesis`: sequentially, each from the rectangle around it, including earlier fillings.
     Thesis,
 }
 
@@ -81,7 +74,7 @@ impl fmt::Display for FillBy {
     }
 }
 
-/// A text that belongs to no way of filling.
+/// Unknown filling name.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("`{0}` is not a way to fill: use surface or thesis")]
 pub struct UnknownFilling(String);
@@ -98,17 +91,16 @@ impl FromStr for FillBy {
 /// Selection and method of filling.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Filling {
-    /// What counts as low texture.
+    /// Criterion of low texture.
     pub low_texture: LowTexture,
-    /// In which order it is filled, and from what.
+    /// Order and surroundings.
     pub by: FillBy,
-    /// Side of the window of criteria that take one, px; odd, at least 3 is used.
+    /// Side of the criterion's window, px; odd, at least 3 is used.
     pub window_px: usize,
 }
 
-/// Replaces the depth where there is too little texture. `texture` is the energy of each pixel, (height, width) like the map,
-/// NaN for pixels that shall stay as they are; `pair` are the far- and the near-focused image; `reach_px` is how far kernels and
-/// windows reach.
+/// Replaces the depth where there is too little texture. `texture` is the energy of each pixel, NaN for pixels to keep;
+/// `pair` are the far- and the near-focused image; `reach_px` is the reach of kernels and windows.
 ///
 /// # Panics
 /// If energy, images and map differ in size.
@@ -126,7 +118,7 @@ pub fn fill(
     }
 }
 
-/// [`fill`] by the energy and by surfaces, which need no images.
+/// [`fill`] by energy and surfaces, which needs no images.
 ///
 /// # Panics
 /// If energy and map differ in size.
@@ -135,8 +127,7 @@ pub fn fill_low_texture(map: &mut DepthMap, texture: ArrayView2<f32>, reach_px: 
     fill_by_surfaces(map, texture, low, reach_px)
 }
 
-/// Fills the same pixels again in a map that was changed since, in the thesis' order: there, a map is corrected first and filled
-/// last.
+/// Fills the same pixels again after a correction, in the thesis' order, which corrects first and fills last.
 pub fn refill_as_thesis(map: &mut DepthMap) -> Filled {
     match map.filled.take() {
         Some(filled) => fill_as_thesis(map, filled),
@@ -144,7 +135,6 @@ pub fn refill_as_thesis(map: &mut DepthMap) -> Filled {
     }
 }
 
-/// Records that a pixel was filled.
 fn mark(map: &mut DepthMap, at: (usize, usize)) {
     map.confidence[at] = FILLED_CONFIDENCE;
     let size = map.depth_mm.dim();
@@ -168,7 +158,6 @@ fn fill_as_thesis(map: &mut DepthMap, low: Array2<bool>) -> Filled {
     filled
 }
 
-// The measured depths of all regions are removed before any surroundings are examined.
 fn empty(map: &mut DepthMap, regions: &Regions) {
     for at in regions.pixels() {
         map.depth_mm[at] = f32::NAN;
@@ -199,7 +188,7 @@ fn fill_by_surfaces(
             None => filled.left_empty += region.len(),
         }
     }
-    // Written at the end, so that no region is fitted to another one's filling.
+    // Written at the end, so that regions do not use each other's filling.
     for (at, depth_mm) in results {
         map.depth_mm[at] = depth_mm;
         mark(map, at);
@@ -207,7 +196,6 @@ fn fill_by_surfaces(
     filled
 }
 
-/// A pixel of a margin.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Sample {
     pub y: f64,
@@ -217,7 +205,6 @@ pub(crate) struct Sample {
     pub weight: f64,
     /// Number of independent measurements it represents.
     pub independent: f64,
-    /// Distance to the region, px.
     pub distance_px: usize,
 }
 
@@ -237,13 +224,11 @@ mod tests {
         }
     }
 
-    /// Energy 1, and none in a disc.
     fn disc(size: (usize, usize), (cy, cx): (f32, f32), radius: f32) -> Array2<f32> {
         let inside = |(y, x)| (y as f32 - cy).hypot(x as f32 - cx) <= radius;
         Array2::from_shape_fn(size, |at| if inside(at) { 0.0 } else { 1.0 })
     }
 
-    /// Numbers from -1 to 1.
     fn noise() -> impl FnMut() -> f32 {
         let mut state = 7_u32;
         move || {
@@ -267,7 +252,6 @@ mod tests {
         assert_eq!(filled.pixels, texture.iter().filter(|energy| **energy == 0.0).count());
         for ((y, x), depth) in map.depth_mm.indexed_iter() {
             let error = (depth - surface(y as f32, x as f32)).abs();
-            // The corner is extrapolated, the disc interpolated.
             assert!(error < if x < 15 { 0.2 } else { 0.01 }, "({x}, {y}): {error}");
             let confidence = if texture[(y, x)] == 0.0 { FILLED_CONFIDENCE } else { 0.9 };
             assert_eq!(map.confidence[(y, x)], confidence);
@@ -280,7 +264,6 @@ mod tests {
         let mut map = map_of(|y, x| 900.0 + 0.05 * x - 0.02 * y, size);
         let mut noise = noise();
         map.depth_mm.mapv_inplace(|d| d + noise());
-        // A twentieth of the pixels far off.
         map.depth_mm.mapv_inplace(|d| if noise() > 0.9 { d + 30.0 } else { d });
         let texture = disc(size, (60.0, 60.0), 25.0);
         fill_low_texture(&mut map, texture.view(), 9);
@@ -290,7 +273,7 @@ mod tests {
         }
     }
 
-    /// A wall begins 12 px next to the region: the margin must not take it for the region's own surface.
+    /// A wall begins 12 px next to the region: the margin must exclude it.
     #[test]
     fn a_step_in_a_wide_margin_is_left_out() {
         let size = (140, 160);
@@ -327,7 +310,7 @@ mod tests {
         assert_eq!(map.confidence[(2, 30)], 0.9, "little texture alone does not make a region");
     }
 
-    /// Two discs that touch each other's rectangles: in the thesis' order the second sees the first one's filling.
+    /// Two discs that touch each other's rectangles: in the thesis' order the second uses the first one's filling.
     #[test]
     fn the_thesis_order_fills_one_after_the_other_and_again_after_a_change() {
         let size = (60, 90);
@@ -347,7 +330,6 @@ mod tests {
             map.depth_mm.indexed_iter().map(error).fold(0.0, f32::max)
         };
         assert!(worst(&map, 0.0) < 2e-3, "{}", worst(&map, 0.0));
-        // A correction moves measured depths; filled ones follow.
         ndarray::Zip::from(&mut map.depth_mm).and(&texture).for_each(|depth, energy| {
             *depth += if *energy == 0.0 { -77.0 } else { 3.0 };
         });
@@ -367,7 +349,6 @@ mod tests {
     fn a_map_without_texture_stays_empty() {
         let mut map = map_of(|_, _| 900.0, (20, 20));
         let mut texture = Array2::zeros((20, 20));
-        // One pixel gives the median.
         texture[(10, 10)] = 1.0;
         let filled = fill_low_texture(&mut map, texture.view(), 9);
         assert_eq!(filled, Filled { regions: 0, pixels: 0, left_empty: 399 });

@@ -1,10 +1,7 @@
-//! Convolution of a whole image with an eight-fold symmetric kernel.
-//!
-//! Borders are reflected without repeating the edge pixel. The middle of the image is read and written in place; only
-//! columns near the left and right border go through a copy that has the reflected ones next to it.
-//!
-//! Cost for 7x7: 16 multiply-adds and 10 additions per pixel (see `simd::convolve`), about 0.13 ms for 640x480 on one
-//! core with AVX-512.
+//! Convolution of a whole image with an eight-fold symmetric kernel. Borders are reflected without repeating the edge
+//! pixel. The middle of the image is processed in place; only columns near the left and right border use a copy with
+//! the reflected ones. Cost for 7x7: 16 multiply-adds and 10 additions per pixel (see `simd::convolve`), 0.13 ms for
+//! 640x480 with AVX-512.
 
 use std::ops::Range;
 
@@ -14,10 +11,9 @@ use crate::border::reflect;
 use crate::kernel::Kernel;
 use crate::simd::{self, Backend, Plane, Taps};
 
-/// Rows that are convolved at a time.
 const BLOCK: usize = simd::MAX_ROWS;
 
-/// Columns at the left border that go through a copy: one cache line, more than any radius.
+/// Columns at the left border that use a copy: one cache line, more than any radius.
 const LEFT: usize = 16;
 
 /// Writes the convolution of `image` with `kernel` to `output`; both are (height, width).
@@ -52,7 +48,7 @@ struct Job<'a> {
 impl Job<'_> {
     fn run(&self, output: &mut [f32]) {
         let radius = self.radius();
-        // Of the columns that may be read directly, those that fill vectors of any width.
+        // Directly readable columns, in multiples of any vector width.
         let middle = (self.width + radius).saturating_sub(LEFT + simd::READ_BEYOND) / 16 * 16;
         if middle == 0 {
             self.copied(0..self.width, output);
@@ -67,7 +63,6 @@ impl Job<'_> {
         self.kernel.size() / 2
     }
 
-    /// The image's row for each row that goes in.
     fn source_row(&self, y: usize) -> &[f32] {
         let row = reflect(y as isize - self.radius() as isize, self.height);
         &self.pixels[row * self.width..(row + 1) * self.width]
@@ -77,7 +72,6 @@ impl Job<'_> {
     fn direct(&self, columns: Range<usize>, output: &mut [f32]) {
         let (radius, width) = (self.radius(), columns.len());
         let mut taps = Taps::new(self.kernel, width);
-        // The first rows that come out are unfinished.
         let mut early = Plane::new(2 * radius, width);
         let stride = early.stride();
         let mut early = early.all_mut().chunks_exact_mut(stride);
@@ -96,13 +90,12 @@ impl Job<'_> {
         }
     }
 
-    /// Convolves columns near the borders of the image.
     fn copied(&self, columns: Range<usize>, output: &mut [f32]) {
         let (radius, strip) = (self.radius(), columns.len());
         let full = strip + 2 * radius;
         let [mut input, mut result] = [full, strip].map(|width| Plane::new(BLOCK, width));
         let mut taps = Taps::new(self.kernel, strip);
-        // Columns of the image among those needed, and their place in the copy.
+        // Needed columns within the image, and their place in the copy.
         let inside = columns.start.saturating_sub(radius)..(columns.end + radius).min(self.width);
         let at = inside.start + radius - columns.start..inside.end + radius - columns.start;
         let inputs = self.height + 2 * radius;

@@ -1,4 +1,4 @@
-//! Focus measures: one number per image that is largest when the image is sharpest.
+//! Focus measures: one number per image, largest for the sharpest image.
 //!
 //! | measure | what | cost |
 //! |---|---|---|
@@ -6,12 +6,10 @@
 //! | [`FocusMeasure::Tenengrad`] | mean squared Sobel gradient (Krotkov 1987) | 16 operations a pixel |
 //! | [`FocusMeasure::ModifiedLaplacian`] | mean magnitude of both second differences (Nayar & Nakagawa 1994) | 8 |
 //!
-//! The sum of eq. 4.5 runs over the first quarter of rows and columns of the spectrum. With the zero frequency in the
-//! middle, as is usual for a displayed spectrum, these are the frequencies from pi/2 to pi rad/px in both directions,
-//! "the high-frequency components" of its text; the FFT's own order would give the lowest.
-//!
-//! The last two are divided by the (squared) mean of the image, so that a flickering lamp does not look like focus;
-//! the first is as printed. The best focus between the steps of a sweep is the tip of a parabola, [`peak`].
+//! Eq. 4.5 sums the first quarter of the spectrum's rows and columns. With the zero frequency in the middle, as in a
+//! displayed spectrum, these are pi/2 to pi rad/px in both directions, "the high-frequency components" of its text; FFT
+//! order would give the lowest. The last two are divided by the image's (squared) mean, so that a flickering lamp does
+//! not look like focus. [`peak`] interpolates the best focus of a sweep by a parabola.
 
 use std::fmt;
 use std::str::FromStr;
@@ -21,7 +19,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::fourier::{Complex64, transform};
 
-/// Smallest side of an image that can be judged.
+/// Smallest side of a usable image.
 const SMALLEST_PX: usize = 8;
 
 /// Name of the measure.
@@ -76,10 +74,7 @@ impl FocusMeasure {
         }
     }
 
-    /// The measure of an image of (height, width), any scale.
-    ///
-    /// # Errors
-    /// [`FocusError`] for images that are too small, dark, or not finite everywhere.
+    /// The measure of an image in any scale. Returns [`FocusError`] if it is too small, dark, or not finite.
     pub fn of(self, image: ArrayView2<f32>) -> Result<f64, FocusError> {
         let (height, width) = image.dim();
         if height < SMALLEST_PX || width < SMALLEST_PX {
@@ -125,7 +120,6 @@ fn fft_sum(image: ArrayView2<f32>) -> f64 {
         .sum()
 }
 
-/// Sum over the 3x3 neighbourhoods of all inner pixels, divided by their number.
 fn mean_of_neighbourhoods(image: ArrayView2<f32>, f: impl Fn(&[[f32; 3]; 3]) -> f32) -> f64 {
     let image: Array2<f32> = image.as_standard_layout().into_owned();
     let (height, width) = image.dim();
@@ -156,9 +150,8 @@ fn modified_laplacian(image: ArrayView2<f32>) -> f64 {
     })
 }
 
-/// The place between the steps of a sweep where a measure peaks: the tip of the least-squares parabola through the
-/// largest value and up to two neighbours on either side. None where there are fewer than three places, a value is not
-/// finite, or the largest value stands at an end of the sweep (the peak may lie outside).
+/// The peak of a measure in a sweep: the tip of the least-squares parabola through the largest value and up to two
+/// neighbours on either side. `None` for fewer than three places, non-finite values, or a maximum at an end.
 pub fn peak(places: &[f64], values: &[f64]) -> Option<f64> {
     let count = places.len().min(values.len());
     if count < 3 || !values[..count].iter().chain(&places[..count]).all(|v| v.is_finite()) {
@@ -170,7 +163,7 @@ pub fn peak(places: &[f64], values: &[f64]) -> Option<f64> {
     }
     let reach = 2.min(largest).min(count - 1 - largest);
     let window = largest - reach..=largest + reach;
-    // Least squares of v = a + b t + c t^2 with t from the largest, by the normal equations of three unknowns.
+    // Least squares of v = a + b t + c t^2, t from the largest value.
     let unit = (places[largest + 1] - places[largest - 1]) / 2.0;
     let mut matrix = nalgebra::Matrix3::zeros();
     let mut right = nalgebra::Vector3::zeros();

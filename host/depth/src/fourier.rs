@@ -1,13 +1,10 @@
-//! The two-dimensional Fourier transform, in one place and without vectors of one processor: the same bits everywhere, and the compiler, which makes
-//! the code for each number type again where it is first used, takes 15 s less.
+//! The Fourier transform in one place without vector units: identical bits everywhere, and compilation takes 15 s less.
 
 use ndarray::Array2;
 use rustfft::FftPlannerScalar;
 pub use rustfft::num_complex::Complex64;
 
-/// Two-dimensional discrete Fourier transform, not normalised; as fast where sides have small prime factors as any.
-///
-/// Cost: 10 ms for 640x480 pixels.
+/// Two-dimensional DFT, not normalised; fastest for sides with small prime factors. Cost: 10 ms for 640x480 pixels.
 pub fn transform(image: Array2<Complex64>) -> Array2<Complex64> {
     let mut planner = FftPlannerScalar::new();
     let mut rows = |image: Array2<Complex64>| {

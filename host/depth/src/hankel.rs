@@ -1,12 +1,10 @@
 //! Hankel transform of the generalised Gaussian PSF, tabulated once per exponent.
 //!
 //! The PSF of unit scale is `h(r) = p^(1 - 2/p) / (2 pi Gamma(2/p)) exp(-r^p / p)` (Li 2014, eq. 5.16, with the
-//! normalisation of a radial function: the printed one and that of E.2 belong to a separable PSF). Its transform
+//! normalisation of a radial function; the printed one and that of E.2 are for a separable PSF). Its transform
 //! `H(z) = 2 pi int r h(r) J0(z r) dr` depends on `z = sigma w` alone, so one table serves every blur and frequency.
-//!
-//! Quadrature: Gauss-Legendre with 16 nodes on panels that are refined towards `r = 0` (where `r^p` is not smooth
-//! for fractional `p`) and no longer than a period of `J0`; interpolation: 6-point Lagrange. Error below 1e-8.
-//! Cost: some 100 to 1000 entries times about 600 nodes, 2 to 10 ms.
+//! Quadrature: 16-node Gauss-Legendre on panels refined towards `r = 0` (where `r^p` is not smooth for fractional `p`)
+//! and no longer than a period of `J0`; 6-point Lagrange interpolation. Error below 1e-8. Cost: 2 to 10 ms.
 
 /// Nodes and weights of the 16-point Gauss-Legendre rule on [-1, 1], positive half (Abramowitz & Stegun, table 25.4).
 const GAUSS_LEGENDRE: [[f64; 2]; 8] = [
@@ -20,7 +18,7 @@ const GAUSS_LEGENDRE: [[f64; 2]; 8] = [
     [0.989_400_934_991_649_9, 0.027_152_459_411_754_095],
 ];
 
-/// Exponent at which the PSF's tail is cut: `exp(-40)` is below double precision.
+/// Exponent that cuts the PSF's tail: `exp(-40)` is below double precision.
 const TAIL: f64 = 40.0;
 
 /// `H(z)` on a regular grid.
@@ -84,7 +82,7 @@ impl HankelTable {
         if i + 4 > self.values.len() {
             return self.quadrature.transform(z);
         }
-        // The six entries around x; H is even in z, so indices below 0 mirror.
+        // The six entries around x; H is even in z, so negative indices mirror.
         let f = x - i as f64;
         let value = |offset: isize| self.values[(i as isize + offset).unsigned_abs()];
         let mut sum = 0.0;

@@ -1,23 +1,19 @@
 //! Convolution kernels with the eight-fold symmetry of a round lens, and their frequency responses.
 //!
-//! A kernel of odd size `2 r + 1` is given by the coefficients at `0 <= dy <= dx <= r`, row by row in `dx`:
-//! (0,0), (1,0), (1,1), (2,0), ... A 7x7 kernel has ten. Such a kernel has a real, zero-phase response
-//! `sum c(dx, dy) cos(u dx) cos(v dy)`, so its sign carries meaning and magnitudes must not be taken.
-//!
-//! Cost: a response is O(r^2).
+//! A kernel of odd size `2 r + 1` is given by the coefficients at `0 <= dy <= dx <= r`, row by row in `dx`: (0,0),
+//! (1,0), (1,1), (2,0), ... A 7x7 kernel has ten. Its response is real and zero-phase,
+//! `sum c(dx, dy) cos(u dx) cos(v dy)`; its sign matters, so magnitudes must not be taken. Cost: O(r^2) per response.
 
 use ndarray::Array2;
 use serde::{Deserialize, Serialize};
 
-/// Declares the sizes that operators may have, the only list of them: [`SIZES`], and `with_size!`, which runs code with the
-/// size as a constant. (`$` is handed in because a macro in a macro cannot write its own.)
+/// Declares the operator sizes, [`SIZES`], and `with_size!`. (`$` is passed in, because nested macros cannot write it.)
 macro_rules! sizes {
     ($dollar:tt: $($size:literal)+) => {
-        /// Sizes that the operators may have.
+        /// Allowed operator sizes.
         pub const SIZES: [usize; [$($size),+].len()] = [$($size),+];
 
-        /// `with_size!(value, SIZE => expression)`: the expression with the constant `SIZE` equal to `value`, which must be
-        /// one of [`SIZES`].
+        /// `with_size!(value, SIZE => expression)`: the expression with `SIZE` as a constant, one of [`SIZES`].
         macro_rules! with_size {
             ($dollar value:expr, $dollar constant:ident => $dollar expression:expr) => {
                 match $dollar value {
@@ -25,7 +21,6 @@ macro_rules! sizes {
                         const $dollar constant: usize = $size;
                         $dollar expression
                     })+
-                    // `Kernel` has no other size.
                     other => unreachable!("kernel size {other}"),
                 }
             };
@@ -71,12 +66,12 @@ pub const fn free_coefficients(size: usize) -> usize {
     side * (side + 1) / 2
 }
 
-/// The offsets `(dx, dy)`, `dy <= dx`, of the free coefficients in their order.
+/// Offsets `(dx, dy)`, `dy <= dx`, of the free coefficients in order.
 pub fn offsets(size: usize) -> impl Iterator<Item = (usize, usize)> {
     (0..=size / 2).flat_map(|dx| (0..=dx).map(move |dy| (dx, dy)))
 }
 
-/// How many of the kernel's taps the free coefficient at `(dx, dy)` covers.
+/// Number of taps that share the free coefficient at `(dx, dy)`.
 pub fn taps((dx, dy): (usize, usize)) -> f64 {
     match (dx, dy) {
         (0, 0) => 1.0,
@@ -86,7 +81,7 @@ pub fn taps((dx, dy): (usize, usize)) -> f64 {
     }
 }
 
-/// Response at `(u, v)` in rad/px of the kernel whose only free coefficient, at `(dx, dy)`, is 1.
+/// Response at `(u, v)`, rad/px, of the kernel whose only free coefficient, at `(dx, dy)`, is 1.
 pub fn basis_response((dx, dy): (usize, usize), u: f64, v: f64) -> f64 {
     let [dx_f, dy_f] = [dx as f64, dy as f64];
     let one = |a: f64, b: f64| (u * a).cos() * (v * b).cos();
@@ -95,7 +90,7 @@ pub fn basis_response((dx, dy): (usize, usize), u: f64, v: f64) -> f64 {
     both * mirrored(dx) * mirrored(dy)
 }
 
-/// [`basis_response`] of every free coefficient of a kernel of `size`, in their order.
+/// [`basis_response`] of every free coefficient of a kernel of `size`, in order.
 pub fn basis_responses(size: usize, u: f64, v: f64) -> Vec<f64> {
     offsets(size).map(|offset| basis_response(offset, u, v)).collect()
 }
@@ -108,7 +103,6 @@ pub struct Kernel {
     octant: Vec<f64>,
 }
 
-/// A kernel as stored.
 #[derive(Serialize, Deserialize)]
 struct RawKernel {
     size: usize,
@@ -130,10 +124,7 @@ impl From<Kernel> for RawKernel {
 }
 
 impl Kernel {
-    /// A kernel of `size` with the free coefficients `octant` in the order of [`offsets`].
-    ///
-    /// # Errors
-    /// [`KernelError`] when size and number do not fit or a coefficient is not finite.
+    /// A kernel from the free coefficients `octant` in the order of [`offsets`]. [`KernelError`] if they do not fit.
     pub fn new(size: usize, octant: Vec<f64>) -> Result<Self, KernelError> {
         if !SIZES.contains(&size) {
             return Err(KernelError::Size(size));
@@ -148,10 +139,7 @@ impl Kernel {
         }
     }
 
-    /// `N` kernels of `size` from their free coefficients, one kernel after the other.
-    ///
-    /// # Errors
-    /// As [`Self::new`].
+    /// `N` kernels of `size` from consecutive free coefficients; errors as [`Self::new`].
     pub fn several<const N: usize>(size: usize, octants: &[f64]) -> Result<[Self; N], KernelError> {
         let (n, found) = (free_coefficients(size), octants.len());
         if found != N * n {

@@ -1,4 +1,4 @@
-//! The whole way of a pair from a real camera: prepared, measured, judged.
+//! Depth of a pair from a real camera: preparation, measurement, validity.
 
 use std::fmt;
 
@@ -19,24 +19,23 @@ use crate::psf::Psf;
 use crate::reason::Reason;
 use crate::validity::{LARGEST_ALPHA, Lost, Validity, ValiditySettings, assess};
 
-/// Where a pixel is put whose measured alpha lies outside the range before blur scaling is undone.
+/// Alpha of a pixel measured out of range before blur scaling is undone.
 const OUT_OF_RANGE_ALPHA: f64 = 1.2;
-/// Part of the pixels without depth for one reason above which it is reported.
+/// Part of the pixels lost for one reason above which it is reported.
 const WORTH_SAYING: f64 = 0.002;
-/// What the model leaves of the texture, mean squares, from which point spread function or blur are doubted.
+/// Unexplained texture, mean squares, from which PSF or blur are doubted.
 const DOUBTFUL: f64 = 3e-4;
-/// The same relative to the noise: the noise itself is known to some percent.
+/// The same relative to the noise, which is known to some percent.
 const EXCESSIVE: f64 = 1.025;
 /// Least part of the image with detail for that doubt.
 const TELLING: f64 = 0.2;
 
-/// Standard deviation of rational operators relative to that of operators with a white residual, at equal windows: 1.05 to 1.16 were
-/// measured.
+/// Standard deviation of rational operators relative to white-residual ones in equal windows; measured 1.05 to 1.16.
 const RATIONAL_OVER_WHITENED: f32 = 1.12;
-/// The same of methods to compare with, Subbarao's; Favaro's is below 1.
+/// The same for baselines: Subbarao's; Favaro's is below 1.
 const BASELINE_OVER_WHITENED: f32 = 2.5;
 
-/// By what depth is found.
+/// Depth method.
 #[derive(Debug, Clone, Copy)]
 pub enum DepthMethod<'a> {
     /// Rational operators.
@@ -52,11 +51,11 @@ pub enum DepthMethod<'a> {
 pub struct MeasureSettings {
     /// Geometry, brightness, the camera's limits.
     pub prepare: PrepareSettings,
-    /// Over how many pixels evidence is summed.
+    /// Window over which evidence is summed.
     pub window: Window,
-    /// Median, filling and threads; its smoothing is not looked at.
+    /// Median, filling and threads; `smoothing_px` is ignored.
     pub run: Settings,
-    /// Confidence below which a depth is taken away.
+    /// Confidence below which a depth is removed.
     pub least_confidence: f32,
 }
 
@@ -71,7 +70,7 @@ impl Default for MeasureSettings {
     }
 }
 
-/// Why a depth map is impossible.
+/// Why there is no depth map.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum MeasureError {
     /// The pair is invalid.
@@ -83,7 +82,7 @@ pub enum MeasureError {
     /// A method to compare with.
     #[error(transparent)]
     Baseline(#[from] BaselineError),
-    /// A lens learned from a z-stack, measured by other operators than those it was learned with.
+    /// A lens learned from a z-stack needs the operators it was learned with.
     #[error("the optics were learned by calibrate stack for method whitened: use --method whitened")]
     LearnedForWhitened,
     /// No operators for these optics.
@@ -91,7 +90,7 @@ pub enum MeasureError {
     Design(#[from] DesignError),
 }
 
-/// What a user should know before trusting a map.
+/// Caveat of a map.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum Finding {
     /// A warning of the run time.
@@ -100,14 +99,14 @@ pub enum Finding {
     SwappedByScene(String),
     /// Pixels without depth.
     Lost(Lost),
-    /// The near image is larger as by a lens that is not telecentric.
+    /// The near image is larger: the lens is not telecentric.
     NotTelecentric {
         /// Its measured size relative to the far image.
         magnification: f64,
-        /// What follows from the optics.
+        /// The value that follows from the optics.
         of_optics: f64,
     },
-    /// The near image is smaller by as much as it would have to be larger.
+    /// The near image is smaller by as much as it should be larger.
     SwappedByMagnification {
         /// Its measured size relative to the far image.
         magnification: f64,
@@ -165,10 +164,10 @@ impl fmt::Display for Finding {
     }
 }
 
-/// Depth of a real pair with all that is known of it.
+/// Depth of a real pair with its quality.
 #[derive(Debug, Clone)]
 pub struct Measurement {
-    /// Depth and confidence: the probability that the depth is off by less than three of its standard deviations.
+    /// Depth and confidence: the probability of an error below three standard deviations.
     pub map: DepthMap,
     /// Reasons and standard deviations.
     pub validity: Validity,
@@ -176,7 +175,7 @@ pub struct Measurement {
     pub report: Report,
     /// What a user should know.
     pub findings: Vec<Finding>,
-    /// What the model leaves of the texture beyond the noise, mean squares ([`Estimate::left_over`]).
+    /// Unexplained texture beyond the noise, mean squares ([`Estimate::left_over`]).
     pub left_over: f64,
     /// The same relative to the noise ([`Estimate::excess`]).
     pub excess: f64,
@@ -184,11 +183,7 @@ pub struct Measurement {
     pub prepared: Prepared,
 }
 
-/// Depth of a pair of any common scale, (height, width), with everything that [`prepare`](crate::prepare) and
-/// [`judge`](crate::validity) do.
-///
-/// # Errors
-/// [`MeasureError`].
+/// Depth of a pair in any common scale, with [`prepare`](crate::prepare) and [`judge`](crate::validity).
 pub fn measure_pair_of_views(
     far: ArrayView2<f32>,
     near: ArrayView2<f32>,
@@ -197,17 +192,13 @@ pub fn measure_pair_of_views(
     camera: Option<&CameraFrames>,
     settings: &MeasureSettings,
 ) -> Result<Measurement, MeasureError> {
-    // Unchanged: an image clipped everywhere is constant, and not full of holes.
+    // Checked before preparation: a fully clipped image is constant, not full of holes.
     check_pair(far, near)?;
     let images = [far, near].map(|image| image.as_standard_layout().into_owned());
     measure_pair(images, optics, method, camera, settings)
 }
 
-/// As [`measure_pair_of_views`], of the images `[far, near]` themselves. Memory: some 30 bytes a pixel at its peak, the images'
-/// eight included.
-///
-/// # Errors
-/// [`MeasureError`].
+/// As [`measure_pair_of_views`], consuming the images `[far, near]`. Peak memory: 30 bytes a pixel, images included.
 pub fn measure_pair(
     images: [Array2<f32>; 2],
     optics: &Optics,
@@ -222,7 +213,7 @@ pub fn measure_pair(
     let mut prepare = settings.prepare;
     let images = match optics.stage() {
         Some(stage) => {
-            // The residual of a learned response is compared with the usual one instead.
+            // A learned response compares the residual with its own usual one instead.
             prepare.trust = true;
             images.map(|image| binned(image, stage.bin))
         }
@@ -239,7 +230,7 @@ pub fn measure_pair(
         validity.lost.iter().filter(|lost| lost.fraction > WORTH_SAYING && lost.reason != Reason::Unsure);
     findings.extend(lost.copied().map(Finding::Lost));
     if validity.valid_fraction < TELLING {
-        // Where nearly nothing has a depth, what the model leaves says nothing of the lens.
+        // With nearly no depth, the residual carries no information on the lens.
         findings.retain(|finding| !matches!(finding, Finding::Unexplained { .. }));
     }
     map.warnings.clear();
@@ -260,10 +251,10 @@ pub(crate) fn measure(
         noise: prepared.noise,
         backend: settings.run.backend,
     };
-    // Every method is judged by the white residual, whose deviation is known best.
+    // The white residual judges every method, because its deviation is known best.
     let white = Bank::whitened(optics)?;
     let run = |side: usize| Settings { smoothing_px: side, ..settings.run };
-    // The map first: what it is judged by needs no depth of its own, and maps are large.
+    // The map first: validity needs no depth of its own, and maps are large.
     let (map, mut judging) = match (method, settings.window) {
         (DepthMethod::Whitened, _) => {
             let mut judging = estimate(far, near, &white, optics, &of_windows)?;
@@ -308,8 +299,7 @@ pub(crate) fn measure(
     Ok((map, estimate))
 }
 
-/// Puts each depth where the stage's response says, and scales its deviation; depths outside the learned range are put
-/// outside the working range, where validity drops them.
+/// Applies the stage's response and scales the deviation; unlearned depths move out of the valid range.
 fn respond(depth_mm: &mut Array2<f32>, deviation_mm: &mut Array2<f32>, stage: &Stage, optics: &Optics) {
     Zip::from(depth_mm).and(deviation_mm).par_for_each(|depth, deviation| {
         let measured = optics.alpha(f64::from(*depth));
@@ -338,8 +328,8 @@ pub fn binned(image: Array2<f32>, bin: usize) -> Array2<f32> {
     })
 }
 
-/// Bringing the near image to the far one's size scales its blur circle too, by `1 / m`. Depth follows from the difference of the
-/// blurs' second moments, so that the result is `((1 + alpha)^2 - (1 - alpha)^2 / m^2) / 4`; this solves it for alpha.
+/// Scaling the near image to the far one's size scales its blur circle by `1 / m`. Depth follows from the difference of
+/// the second moments, so the result is `((1 + alpha)^2 - (1 - alpha)^2 / m^2) / 4`; solves it for alpha.
 fn undo_scaled_blur(depth_mm: &mut Array2<f32>, magnification: f64, optics: &Optics) {
     let r = magnification.powi(-2);
     if (r - 1.0).abs() < 1e-4 {
@@ -348,7 +338,7 @@ fn undo_scaled_blur(depth_mm: &mut Array2<f32>, magnification: f64, optics: &Opt
     // (1 - r) alpha^2 + 2 (1 + r) alpha + (1 - r) - 4 found = 0, on the branch that stays finite for r = 1.
     let alpha_of = |found: f64| {
         if found.abs() >= LARGEST_ALPHA {
-            // Clamped or saturated: no statement beyond "outside the range", which the range test must still see.
+            // Clamped or saturated: means "outside the range", which the range test must detect.
             return found.signum() * OUT_OF_RANGE_ALPHA;
         }
         let (b, c) = (1.0 + r, (1.0 - r) - 4.0 * found);
@@ -364,7 +354,6 @@ fn undo_scaled_blur(depth_mm: &mut Array2<f32>, magnification: f64, optics: &Opt
     });
 }
 
-/// A map of what windows found.
 fn of_estimate(
     depth_mm: Array2<f32>,
     deviation_mm: &Array2<f32>,
@@ -374,7 +363,7 @@ fn of_estimate(
     settings: &MeasureSettings,
 ) -> DepthMap {
     let unit = (0.05 * optics.depth_per_alpha_mm(0.0).abs()) as f32;
-    // Evidence: the variance's reciprocal, which is what texture energy is to the run time.
+    // Evidence is the reciprocal variance, like texture energy in the run time.
     let mut confidence: Array2<f32> = deviation_mm.mapv(|deviation| (unit / deviation).powi(2));
     let evidence = settings.run.fill.then(|| confidence.clone());
     confidence.mapv_inplace(|evidence| if evidence.is_finite() { evidence / (1.0 + evidence) } else { 0.0 });
@@ -393,7 +382,6 @@ fn findings(map: &DepthMap, prepared: &Prepared, estimate: &Estimate, optics: &O
     let mut findings: Vec<Finding> = map
         .warnings
         .iter()
-        // Holes have reasons.
         .filter(|warning| !matches!(warning, Warning::NotFinite { .. } | Warning::Saturated { .. }))
         .map(|warning| match warning {
             Warning::LooksSwapped(_) => Finding::SwappedByScene(warning.to_string()),
@@ -414,7 +402,7 @@ fn findings(map: &DepthMap, prepared: &Prepared, estimate: &Estimate, optics: &O
     if report.detailed_fraction < 0.01 {
         findings.push(Finding::NothingSharp);
     } else if report.detailed_fraction > TELLING
-        // A lens of calibrate stack has what its model leaves in every deviation.
+        // A lens of calibrate stack has its model error in every deviation.
         && optics.stage().is_none()
         && estimate.left_over > DOUBTFUL
         && estimate.excess > EXCESSIVE

@@ -1,15 +1,11 @@
-//! How near a depth map comes to the truth.
-//!
-//! Only pixels count that lie `border_px` inside the map, that the mask allows, that have a finite depth in both maps
-//! and, if asked, that lie more than `away_from_edges_px` from a step of the true depth. Depths in mm, NaN = no value.
-//!
-//! Cost: O(pixels); O(pixels x distance) with `away_from_edges_px` (separable running maxima would be faster, but this
-//! is not on any hot path).
+//! Errors of a depth map against the truth. Pixels count if they lie `border_px` inside the map, the mask allows them,
+//! both depths are finite and, if requested, they lie more than `away_from_edges_px` from a step of the true depth.
+//! Depths in mm, NaN = no value. Cost: O(pixels); O(pixels x distance) with `away_from_edges_px` .
 
 use ndarray::{Array2, ArrayView2};
 use serde::{Deserialize, Serialize};
 
-/// A true depth difference between neighbours above this part of the whole range of the truth is a step.
+/// Difference of neighbouring true depths that is a step, as part of the truth's range.
 const STEP: f32 = 0.02;
 
 /// Why two maps cannot be compared.
@@ -36,12 +32,12 @@ pub enum CompareError {
     NothingToCompare(usize),
 }
 
-/// Which pixels count.
+/// Selection of pixels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct CompareSettings {
     /// Width of the border that does not count, px.
     pub border_px: usize,
-    /// Distance in px (row and column distance) that a pixel must exceed to a step of the true depth.
+    /// Least distance, px (rows and columns), from a step of the true depth.
     pub away_from_edges_px: Option<usize>,
 }
 
@@ -60,16 +56,13 @@ pub struct Comparison {
     pub rmse_percent_of_depth: f64,
     /// Number of pixels compared.
     pub pixels: usize,
-    /// Part of the pixels that counted by border, mask and edges but had no depth.
+    /// Part of the selected pixels without a depth.
     pub missing_fraction: f64,
-    /// Pixels that did not count because the truth has a hole there (0, negative or NaN).
+    /// Pixels excluded because the truth has a hole (0, negative or NaN).
     pub pixels_without_truth: usize,
 }
 
-/// Compares `depth` with `truth`, both (height, width) in mm; `mask`, where given, allows the pixels that are true.
-///
-/// # Errors
-/// [`CompareError`] if sizes differ or no pixel is left.
+/// Compares `depth` with `truth`in mm, where `mask` is true. [`CompareError`] if sizes differ or no pixel is left.
 pub fn compare(
     depth: ArrayView2<f32>,
     truth: ArrayView2<f32>,
@@ -113,7 +106,7 @@ pub fn compare(
     summarise(errors, &relative, [asked, without_truth]).ok_or(CompareError::NothingToCompare(height * width))
 }
 
-/// Whether a value is a depth; 0, negative values, NaN and infinity are holes in depth maps of many sources.
+/// Whether a value is a depth; 0, negative values, NaN and infinity are holes in many sources.
 pub fn is_depth(value_mm: f32) -> bool {
     value_mm.is_finite() && value_mm > 0.0
 }
@@ -147,10 +140,8 @@ fn summarise(
     })
 }
 
-/// Marks the pixels that lie within `distance` rows and columns of a step of the true depth, or of a hole in it.
-///
-/// A step is a difference between neighbours of more than 2 % of the whole range of the truth, and no less than four
-/// times the median difference, so that a slant, a cone or a sphere has none.
+/// Marks pixels within `distance` rows and columns of a hole or a step of the true depth: neighbours that differ by
+/// more than 2 % of the range and four times the median difference, so that slants, cones and spheres have none.
 pub fn near_steps(truth: ArrayView2<f32>, distance: usize) -> Array2<bool> {
     let (height, width) = truth.dim();
     let truth = truth.mapv(|t| if is_depth(t) { t } else { f32::NAN });
@@ -173,7 +164,6 @@ pub fn near_steps(truth: ArrayView2<f32>, distance: usize) -> Array2<bool> {
     for (at, _) in truth.indexed_iter() {
         for next in neighbours(at) {
             let step = difference(at, next);
-            // A hole next to a value is a step.
             if truth[at].is_nan() != truth[next].is_nan() || step > threshold {
                 steps[at] = true;
                 steps[next] = true;
@@ -183,7 +173,6 @@ pub fn near_steps(truth: ArrayView2<f32>, distance: usize) -> Array2<bool> {
     dilate_square(&steps, distance)
 }
 
-/// Spreads true values by `distance` rows and columns.
 pub(crate) fn dilate_square(mask: &Array2<bool>, distance: usize) -> Array2<bool> {
     let (height, width) = mask.dim();
     let mut along = mask.clone();

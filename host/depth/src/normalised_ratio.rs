@@ -1,11 +1,9 @@
 //! The normalised image ratio (NIR), its cubic fit over depth, and the frequency grid of the operator design.
 //!
-//! `NIR(w, alpha) = (H2 - H1) / (H2 + H1)` with `H1` the far-focused OTF (Li 2014, eq. 1.7's sign: `M = I2 - I1`; the
-//! printed 1.5 and 5.2 have the other one). It rises with alpha and is odd in it; for each frequency it is fitted by
-//! `a1(w) alpha + a3(w) alpha^3` over alpha in [-1, 1]. Frequencies in rad/px.
-//!
-//! The grid is the 32x32 discrete Fourier transform, of which eight-fold symmetry leaves the octant `0 <= v <= u <=
-//! 16` with multiplicities (153 points); alpha has 21 samples. Cost: 153 x 21 OTF pairs, about 1 ms.
+//! `NIR(w, alpha) = (H2 - H1) / (H2 + H1)` with `H1` the far-focused OTF (sign of Li 2014, eq. 1.7: `M = I2 - I1`; 1.5
+//! and 5.2 print the other one). It rises with alpha and is odd in it. Each frequency is fitted by
+//! `a1(w) alpha + a3(w) alpha^3` over alpha in [-1, 1]. Frequencies in rad/px. The grid is the 32x32 DFT, reduced to
+//! the octant `0 <= v <= u <= 16` with multiplicities (153 points)and 21 depths. Cost: 153 x 21 OTF pairs, about 1 ms.
 
 use std::f64::consts::PI;
 
@@ -37,7 +35,7 @@ pub struct GridPoint {
     pub multiplicity: f64,
 }
 
-/// The octant of the [`GRID`], the point of frequency 0 first.
+/// The octant of the [`GRID`], frequency 0 first.
 pub fn octant() -> Vec<GridPoint> {
     let half = GRID / 2;
     // 0 and the Nyquist frequency are their own mirror images.
@@ -60,19 +58,17 @@ pub fn sum_and_difference(otf: &Otf, max_blur_px: f64, w: f64, alpha: f64) -> [f
     [near + far, near - far]
 }
 
-/// NIR at the radial frequency `w` (rad/px) and depth `alpha`. Near a common zero of both OTFs (pill-box only) it is
-/// unbounded; exactly there the result is not finite.
+/// NIR at the radial frequency `w` (rad/px) and depth `alpha`; not finite at a common zero of both OTFs.
 pub fn normalised_ratio(otf: &Otf, max_blur_px: f64, w: f64, alpha: f64) -> f64 {
     let [sum, difference] = sum_and_difference(otf, max_blur_px, w, alpha);
     difference / sum
 }
 
-/// Smallest slope of the NIR over alpha in [-1, 1], at the radial frequency `w`: where it is not positive, a ratio
-/// represents more than one depth.
+/// Smallest slope of the NIR over alpha in [-1, 1] at frequency `w`; not positive where a ratio has several depths.
 pub fn smallest_slope(otf: &Otf, max_blur_px: f64, w: f64) -> f64 {
     const STEPS: usize = 80;
     let at = |i: usize| normalised_ratio(otf, max_blur_px, w, -1.0 + 2.0 * i as f64 / STEPS as f64);
-    // NIR is odd in alpha, so half the range suffices; a value that is not finite counts as no slope.
+    // NIR is odd in alpha, so half the range suffices; a non-finite value counts as no slope.
     let mut previous = at(STEPS / 2);
     let mut smallest = f64::INFINITY;
     for i in STEPS / 2 + 1..=STEPS {
@@ -87,8 +83,7 @@ pub fn smallest_slope(otf: &Otf, max_blur_px: f64, w: f64) -> f64 {
     smallest
 }
 
-/// The first radial frequency (rad/px) at which the NIR stops rising over the whole of alpha in [-1, 1]; infinite if
-/// it never does on the pixel grid. Found to 1e-6 rad/px.
+/// First radial frequency (rad/px, to 1e-6) at which the NIR does not rise over all alpha in [-1, 1]; infinite if none.
 pub fn first_non_monotonic(otf: &Otf, max_blur_px: f64) -> f64 {
     let falls = |w: f64| smallest_slope(otf, max_blur_px, w) <= 0.0;
     const STEPS: usize = 400;
@@ -145,7 +140,7 @@ impl RatioFit {
     }
 }
 
-/// `[a1, a3, rms]` of the least-squares fit at one frequency: two normal equations, even moments of alpha.
+/// `[a1, a3, rms]` at one frequency: two normal equations, even moments of alpha.
 fn fit_cubic(otf: &Otf, max_blur_px: f64, w: f64) -> [f64; 3] {
     let samples = alphas().map(|a| (a, normalised_ratio(otf, max_blur_px, w, a)));
     let moment = |n: i32| samples.iter().map(|(a, _)| a.powi(n)).sum::<f64>();
@@ -202,7 +197,7 @@ mod tests {
     #[test]
     fn only_the_pill_box_has_a_non_monotonic_frequency() {
         let limit = first_non_monotonic(&Psf::PillBox.otf(RMAX), RMAX);
-        // Below the first zero of the OTF of the largest blur plus its first minimum (z = 5.136), above the zero.
+        // Above the first zero of the largest blur's OTF and below its first minimum (z = 5.136).
         assert!(limit * RMAX > 3.8 && limit * RMAX < 5.2, "{limit}");
         assert_eq!(first_non_monotonic(&Psf::Gaussian { k: 0.3 }.otf(RMAX), RMAX), f64::INFINITY);
     }

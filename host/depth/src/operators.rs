@@ -1,11 +1,9 @@
 //! Rational operators: the four kernels that turn a defocused pair into depth, and their design.
 //!
 //! At run time `M = Q * (I2 - I1)`, `P = Q * (I2 + I1)` and `Gm1 * M = (Gp1 * P) alpha + (Gp2 * P) alpha^3` (W&N 1998;
-//! Li 2014, eqs. 1.6 to 1.9). Gm1 is a low-pass, Gp1 the band-pass of the Laplacian of a Gaussian. The kernels follow
-//! from the point-spread function and the largest blur radius in pixels alone, so one set serves every lens that
-//! shares them.
-//!
-//! Frequencies are in rad/px. Cost of [`design`]: some ms for [`Design::Linear`], below a second otherwise.
+//! Li 2014, eqs. 1.6 to 1.9). Gm1 is a low-pass, Gp1 the band-pass of the Laplacian of a Gaussian. The kernels depend
+//! only on the PSF and the largest blur radius in pixels, so one set serves every lens that shares them. Frequencies
+//! are in rad/px. Cost of [`design`]: some ms for [`Design::Linear`], below a second otherwise.
 
 mod error;
 mod family;
@@ -34,7 +32,7 @@ pub use error::DesignError;
 pub use family::{Design, Family};
 pub use request::Request;
 
-/// Version of the stored form; other versions are refused.
+/// Version of the stored form; other versions are rejected.
 pub const FORMAT: u32 = 1;
 
 /// A designed set of operators.
@@ -52,10 +50,7 @@ pub struct Operators {
     normalised_ratio: RatioFit,
 }
 
-/// Designs operators.
-///
-/// # Errors
-/// [`DesignError`] if the request contradicts itself or no usable operators exist for it.
+/// Designs operators. Returns [`DesignError`] if the request contradicts itself or has no usable operators.
 pub fn design(request: &Request) -> Result<Operators, DesignError> {
     request.check()?;
     let Request { family, design, psf, max_blur_px, kernel_size } = *request;
@@ -77,7 +72,6 @@ pub fn design(request: &Request) -> Result<Operators, DesignError> {
         (Family::Ro | Family::Gro | Family::Ggro, Design::Linear) => {
             linearise::design(&otf, max_blur_px, &q, [&gm1, &gp1, &gp2], &grid)?
         }
-        // As published.
         _ => linearise::IDENTITY,
     };
     let procedure = match family {
@@ -99,10 +93,7 @@ pub fn design(request: &Request) -> Result<Operators, DesignError> {
 }
 
 impl Operators {
-    /// The default operators of some optics.
-    ///
-    /// # Errors
-    /// As [`design`].
+    /// The default operators for given optics; errors as [`design`].
     pub fn for_optics(optics: &Optics) -> Result<Self, DesignError> {
         design(&Request::for_optics(optics))
     }
@@ -117,7 +108,7 @@ impl Operators {
         &self.request
     }
 
-    /// Largest blur radius Rmax in pixels that they were designed for.
+    /// Largest blur radius Rmax in pixels of the design.
     pub fn max_blur_px(&self) -> f64 {
         self.request.max_blur_px
     }
@@ -147,7 +138,7 @@ impl Operators {
         &self.gp2
     }
 
-    /// Coefficients of the odd polynomial (alpha, alpha^3, alpha^5, alpha^7) from the alpha found to the true one.
+    /// Odd polynomial (alpha, alpha^3, alpha^5, alpha^7) from the estimated to the true alpha.
     pub fn linearisation(&self) -> &Polynomial {
         &self.linearisation
     }
@@ -157,7 +148,7 @@ impl Operators {
         &self.normalised_ratio
     }
 
-    /// Root-mean-square misfit of the cubic to the NIR over the frequencies below the first non-monotonic one.
+    /// RMS misfit of the cubic to the NIR below the first non-monotonic frequency.
     pub fn nir_rms(&self) -> f64 {
         self.nir_rms
     }

@@ -1,12 +1,10 @@
 //! Telecentric thin-lens geometry of a depth-from-defocus pair whose *sensor* moves.
 //!
-//! The far-focused image is taken with the sensor at `s1`, the near-focused one at `s2 = s1 + 2e`. An object whose
-//! image lies at the distance `w` from the lens has the normalised depth `alpha` with `w = s1 + (1 + alpha) e`: it
-//! is -1 at the far focus, +1 at the near focus, and rises as the object comes nearer. The blur radii are
-//! `R1 = (1 + alpha) e / (2 Fe)` and `R2 = (1 - alpha) e / (2 Fe)`, so `2e = 2 Fe Rmax` (Li 2014, eqs. 4.1, 4.3 and
-//! 5.11; the thin lens is `1/F = 1/u + 1/w`).
-//!
-//! Units: millimetres unless a name says otherwise; blur radii in pixels. Every function is O(1).
+//! The far-focused image is taken with the sensor at `s1`, the near-focused one at `s2 = s1 + 2e`. An object imaged at
+//! the distance `w` from the lens has the normalised depth `alpha` with `w = s1 + (1 + alpha) e`: -1 at the far focus,
+//! +1 at the near focus, rising as the object comes nearer. The blur radii are `R1 = (1 + alpha) e / (2 Fe)` and
+//! `R2 = (1 - alpha) e / (2 Fe)`, so `2e = 2 Fe Rmax` (Li 2014, eqs. 4.1, 4.3 and 5.11; the thin lens is
+//! `1/F = 1/u + 1/w`). Units: millimetres unless a name says otherwise; blur radii in pixels. Every function is O(1).
 
 mod distortion;
 mod doubt;
@@ -30,7 +28,7 @@ fn image_mm(focal_length_mm: f64, object_mm: f64) -> f64 {
     focal_length_mm + focal_length_mm * focal_length_mm / (object_mm - focal_length_mm)
 }
 
-/// Checked optics of a pair: made by [`OpticsFile::check`], therefore always consistent.
+/// Checked, consistent optics of a pair, made by [`OpticsFile::check`].
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "OpticsFile", into = "OpticsFile")]
 pub struct Optics {
@@ -45,7 +43,7 @@ pub struct Optics {
     stage: Option<Stage>,
 }
 
-/// The distances between which a pair measures depth, and the sensor positions for them.
+/// The range of distances of a pair, and the sensor positions for them.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct WorkingRange {
     /// Object distance of the far focus (alpha = -1).
@@ -58,11 +56,11 @@ pub struct WorkingRange {
     pub sensor_near_mm: f64,
     /// Sensor travel between the two images, 2e.
     pub sensor_travel_mm: f64,
-    /// Object distance of alpha = 0, which is not the middle of the range in millimetres.
+    /// Object distance of alpha = 0, not the middle of the range in millimetres.
     pub alpha0_mm: f64,
 }
 
-/// Largest blur radius that operators of 7x7 taps can use, px: at 6 px most of a scene has no depth.
+/// Largest blur radius that 7x7 operators can use, px: at 6 px most of a scene has no depth.
 pub const USABLE_BLUR_PX: f64 = 4.5;
 
 impl Optics {
@@ -106,7 +104,7 @@ impl Optics {
         self.distortion
     }
 
-    /// What a z-stack taught, where the optics come from one.
+    /// The response learned from a z-stack, if any.
     pub fn stage(&self) -> Option<&Stage> {
         self.stage.as_ref()
     }
@@ -116,8 +114,8 @@ impl Optics {
         Self { stage: Some(stage), ..self }
     }
 
-    /// By how much a lens that is not telecentric magnifies the near-focused image more than the far-focused one: the
-    /// ratio of the sensor's distances.
+    /// Magnification of the near- relative to the far-focused image without telecentricity: the sensor distances'
+    /// ratio.
     pub fn magnification_ratio(&self) -> f64 {
         let range = self.working_range();
         range.sensor_near_mm / range.sensor_far_mm
@@ -128,13 +126,12 @@ impl Optics {
         Self { psf, ..self }
     }
 
-    /// The same optics for images of which `bin` x `bin` pixels were averaged into one.
+    /// The same optics for images with `bin` x `bin` pixels averaged into one.
     pub fn binned(self, bin: usize) -> Self {
         let bin = bin.max(1) as f64;
         Self { pixel_um: self.pixel_um * bin, max_blur_px: self.max_blur_px / bin, ..self }
     }
 
-    /// Half the sensor travel, e, in mm.
     fn half_travel_mm(&self) -> f64 {
         self.f_number * self.max_blur_px * self.pixel_um * 1e-3
     }
@@ -168,8 +165,7 @@ impl Optics {
         (self.focal_length_mm * self.focal_length_mm / (depth_mm - self.focal_length_mm) - offset) / slope
     }
 
-    /// `[offset, slope]` of `w - F = offset + slope alpha` in mm. The form without `w` itself loses no digits in
-    /// single precision: depth is `F + F^2 / (w - F)`.
+    /// `[offset, slope]` of `w - F = offset + slope alpha` in mm, without cancellation: depth is `F + F^2 / (w - F)`.
     pub fn defocus_line_mm(&self) -> [f64; 2] {
         let e = self.half_travel_mm();
         let from_focal = self.focal_length_mm * self.focal_length_mm / (self.far_mm - self.focal_length_mm);
@@ -183,8 +179,7 @@ impl Optics {
         -self.focal_length_mm * self.focal_length_mm * slope / (w * w)
     }
 
-    /// Blur radii `[R1, R2]` in pixels of the far- and the near-focused image at `alpha`; signed, so that a value
-    /// beyond the working range stays linear (an OTF takes the magnitude).
+    /// Signed blur radii `[R1, R2]` in pixels at `alpha`, linear beyond the working range (an OTF takes the magnitude).
     pub fn blur_px(&self, alpha: f64) -> [f64; 2] {
         [0.5 * (1.0 + alpha) * self.max_blur_px, 0.5 * (1.0 - alpha) * self.max_blur_px]
     }
@@ -194,7 +189,7 @@ impl Optics {
 mod tests {
     use super::*;
 
-    /// Li 2014's rig (section 5.3); the distances were worked out by hand from the thin lens.
+    /// Li 2014's rig (section 5.3); distances calculated by hand from the thin lens.
     const RIG: &str = "
         [lens]
         focal_length_mm = 50.0

@@ -1,13 +1,12 @@
 //! Run time: a defocused pair and operators to a depth map with its confidence.
 //!
-//! [`depth_from_pair`] does one pair, a [`Processor`] one after the other.
-//!
+//! [`depth_from_pair`] processes one pair, a [`Processor`] many.
 //! 1. `M = Q * (I2 - I1)`, `P = Q * (I2 + I1)`; `m = Gm1 * M`, `p1 = Gp1 * P`, `p2 = Gp2 * P` (Li 2014, eqs. 1.7 to
 //!    1.9), borders reflected without repeating the edge pixel.
-//! 2. Coefficient smoothing: window sums of the cross products `p1 p1`, `p1 p2`, `p1 m` (and `m m` for the residual).
+//! 2. Coefficient smoothing: window sums of `p1 p1`, `p1 p2`, `p1 m` (and `m m` for the residual).
 //! 3. `c1 alpha + c3 alpha^3 = c0` solved on the branch through 0 (`crate::cubic`), median, alpha to mm.
-//! 4. The border, where the operators reach beyond the images, takes the depth of the nearest pixel inside (`border_fill`).
-//! 5. Confidence in [0, 1] from the texture energy `c1` and the residual of the window's fit ([`crate::confidence`]).
+//! 4. The border, where the operators reach beyond the images, takes the nearest inner depth (`border_fill`).
+//! 5. Confidence in [0, 1] from texture energy `c1` and the fit's residual ([`crate::confidence`]).
 //!
 //! Images may have any common gain and offset: they are normalised first. `I1` is the far-focused image.
 
@@ -32,7 +31,7 @@ pub(crate) use border_fill::fill as fill_border;
 pub(crate) use check::{after as warnings_after, check, check_windows};
 pub use processor::Processor;
 
-/// Smallest width and height that can be processed: below, the operators see little but reflections.
+/// Smallest processable width and height: below, the operators use mostly reflections.
 pub const MIN_SIDE_PX: usize = 16;
 
 /// Largest smoothing window.
@@ -107,17 +106,17 @@ pub struct Settings {
     pub smoothing_px: usize,
     /// Side of the median window over alpha: 1 (none), 3, 5 or 7.
     pub median_px: usize,
-    /// Whether regions of low texture are filled from what surrounds them ([`crate::fill`]).
+    /// Whether regions of low texture are filled ([`crate::fill`]).
     pub fill: bool,
     /// Selection of the holes to fill.
     #[serde(skip_serializing_if = "is_usual")]
     pub low_texture: LowTexture,
-    /// In which order it is filled, and from what.
+    /// Order and surroundings of the filling.
     #[serde(skip_serializing_if = "is_usual")]
     pub fill_by: FillBy,
     /// Number of threads; 0 = as many as the machine has.
     pub threads: usize,
-    /// Vector unit; the fastest that the processor has if none is named.
+    /// Vector unit; `None` uses the fastest available.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub backend: Option<Backend>,
 }
@@ -136,18 +135,15 @@ impl Default for Settings {
     }
 }
 
-/// Whether a setting need not be written.
 fn is_usual<T: Default + PartialEq>(setting: &T) -> bool {
     *setting == T::default()
 }
 
 impl Settings {
-    /// As [`crate::fill::fill`] takes it.
     pub(crate) fn filling(&self) -> Filling {
         Filling { low_texture: self.low_texture, by: self.fill_by, window_px: self.smoothing_px }
     }
 
-    /// Number of threads that are used.
     pub(crate) fn thread_count(&self) -> usize {
         match self.threads {
             0 => rayon::current_num_threads(),
@@ -156,11 +152,9 @@ impl Settings {
     }
 }
 
-/// Depth of one pair; for many pairs of one size a [`Processor`] keeps its buffers and is faster. `far` and `near` are the far- and near-focused images, (height, width), of any common scale.
-///
-/// # Errors
-/// [`RunError`]: sizes, windows, constant or wholly invalid images, operators for another blur. Single invalid or
-/// saturated pixels are not an error: depth is NaN and confidence 0 wherever they take part, with a warning.
+/// Depth of one pair; a [`Processor`] is faster for many. `far` and `near` are (height, width) in any common scale.
+/// Returns [`RunError`] for sizes, windows, constant or invalid images, and operators for another blur. Single invalid
+/// or saturated pixels give NaN depth and confidence 0 wherever they contribute, with a warning.
 pub fn depth_from_pair(
     far: ArrayView2<f32>,
     near: ArrayView2<f32>,
@@ -182,7 +176,6 @@ mod tests {
     use crate::operators::{Request, design};
     use crate::optics::OpticsFile;
 
-    /// Two different random images whose spatial scale is that of a texture.
     fn random_pair(height: usize, width: usize) -> [Array2<f32>; 2] {
         let value = |y: usize, x: usize, seed: usize| {
             let mut h = (y * 7919 + x * 104_729 + seed * 1_299_709) as u64;
@@ -203,7 +196,6 @@ mod tests {
         toml::from_str::<OpticsFile>(text).unwrap().check().unwrap()
     }
 
-    /// All variants, odd sizes, tiles wider than one and several bands against the plain stages.
     #[test]
     fn every_variant_agrees_with_the_plain_run_time() {
         let optics = optics();

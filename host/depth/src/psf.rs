@@ -1,15 +1,15 @@
-//! Point-spread functions of a defocused lens and their optical transfer functions (OTFs).
+//! Point-spread functions (PSFs) of a defocused lens and their optical transfer functions (OTFs).
 //!
 //! With `R` the radius of the blur circle in pixels and `w` the radial frequency in rad/px:
 //! - pill-box: `2 J1(z) / z`, `z = R w` (Li 2014, eq. 1.4);
 //! - Gaussian: `exp(-(k R w)^2 / 2)`, `sigma = k R` (eqs. 5.9 to 5.11; the printed 5.12 lacks a factor 1/2 in sigma);
-//! - generalised Gaussian: the radial PSF `exp(-(r / sigma)^p / p)` (eq. 5.16 made radial), whose OTF has no closed
-//!   form and comes from a tabulated Hankel transform ([`crate::hankel`]). `p = 2` is the Gaussian, `p -> infinity`
-//!   the pill-box of radius `sigma`; for other `p`, `sigma` is a scale and not the standard deviation;
-//! - ring: an aperture whose middle is covered, the difference of two pill-boxes;
+//! - generalised Gaussian: the radial PSF `exp(-(r / sigma)^p / p)` (eq. 5.16 made radial), whose OTF comes from a
+//!   tabulated Hankel transform ([`crate::hankel`]). `p = 2` is the Gaussian, `p -> infinity` the pill-box of radius
+//!   `sigma`; otherwise `sigma` is a scale, not the standard deviation;
+//! - ring: an aperture with a covered centre, the difference of two pill-boxes;
 //! - radial: any measured or drawn profile ([`RadialPsf`]).
 //!
-//! Cost: building an [`Otf`] is O(1), except for the generalised Gaussian (a few ms); an evaluation is O(1).
+//! Cost: O(1), except building the [`Otf`] of a generalised Gaussian (a few ms).
 
 mod radial;
 
@@ -22,14 +22,13 @@ use crate::hankel::HankelTable;
 
 pub use radial::{Drawn, RINGS, RadialPsf, RadialTable};
 
-/// Exponents of the generalised Gaussian: below, the tails reach over hundreds of pixels; above, it is a pill-box to three
-/// digits.
+/// Exponents of the generalised Gaussian: below, the tails are hundreds of pixels wide; above, it is nearly a pill-box.
 const P_RANGE: [f64; 2] = [0.5, 64.0];
 
-/// Blur constants: usual are 0.3 to 1.
+/// Blur constants; usual are 0.3 to 1.
 const K_RANGE: [f64; 2] = [0.01, 10.0];
 
-/// Inner radii of a ring: above, no light is left.
+/// Inner radii of a ring; above, no light is left.
 const INNER_RANGE: [f64; 2] = [0.0, 0.99];
 
 /// An error of a point-spread function's text or parameters.
@@ -94,7 +93,7 @@ pub enum Psf {
         /// Blur constant k.
         k: f64,
     },
-    /// Uniform ring: an aperture whose middle is covered.
+    /// Uniform ring: an aperture with a covered centre.
     Ring {
         /// Inner radius in blur radii.
         inner: f64,
@@ -103,7 +102,6 @@ pub enum Psf {
     Radial(RadialPsf),
 }
 
-/// A PSF as stored.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Parts {
@@ -164,10 +162,7 @@ impl From<Psf> for Parts {
 }
 
 impl Psf {
-    /// A PSF from the name of its model and its parameters.
-    ///
-    /// # Errors
-    /// [`PsfError`] for an unknown model, missing, surplus or unusable parameters.
+    /// A PSF from its model's name and parameters. Returns [`PsfError`] for an unknown model or wrong parameters.
     pub fn from_parts(
         model: &str,
         p: Option<f64>,
@@ -208,10 +203,7 @@ impl Psf {
         }
     }
 
-    /// The PSF itself if its parameters are usable.
-    ///
-    /// # Errors
-    /// [`PsfError::Range`].
+    /// The PSF itself, or [`PsfError::Range`] if its parameters are unusable.
     pub fn checked(self) -> Result<Self, PsfError> {
         match self {
             Self::PillBox => {}
@@ -221,13 +213,13 @@ impl Psf {
                 check_range("k", k, K_RANGE)?;
             }
             Self::Ring { inner } => check_range("inner", inner, INNER_RANGE)?,
-            // Checked when it was made.
+            // Checked at construction.
             Self::Radial(_) => {}
         }
         Ok(self)
     }
 
-    /// Mean square distance from its middle, in squared blur radii; along one axis it is half of that.
+    /// Mean square distance from the centre, in squared blur radii; half of that along one axis.
     pub fn second_moment(self) -> f64 {
         match self {
             Self::PillBox => 0.5,
@@ -240,13 +232,12 @@ impl Psf {
         }
     }
 
-    /// The OTF for blur radii up to `max_radius_px` and every frequency a pixel grid carries (up to `sqrt(2) pi`).
+    /// The OTF for blur radii up to `max_radius_px` and all frequencies of a pixel grid (up to `sqrt(2) pi`).
     pub fn otf(self, max_radius_px: f64) -> Otf {
         self.otf_up_to(max_radius_px * std::f64::consts::SQRT_2 * std::f64::consts::PI)
     }
 
-    /// The OTF for products of blur radius and frequency up to `max_phase_rad`. Larger ones are computed too, only
-    /// slower for the generalised Gaussian.
+    /// The OTF for blur radius times frequency up to `max_phase_rad`; beyond, the generalised Gaussian is slower.
     pub fn otf_up_to(self, max_phase_rad: f64) -> Otf {
         match self {
             Self::PillBox => Otf::PillBox,
@@ -313,7 +304,7 @@ impl FromStr for Psf {
     }
 }
 
-/// An optical transfer function, ready to be evaluated.
+/// An optical transfer function.
 #[derive(Debug, Clone)]
 pub enum Otf {
     /// `2 J1(z) / z`.
@@ -339,13 +330,12 @@ pub enum Otf {
     Radial(RadialTable),
 }
 
-/// `2 J1(z) / z`.
 fn disc(z: f64) -> f64 {
     if z < 1e-4 { 1.0 - z * z / 8.0 } else { 2.0 * libm::j1(z) / z }
 }
 
 impl Otf {
-    /// Response at the blur radius `radius_px` (its magnitude counts) and the radial frequency `w` in rad/px.
+    /// Response at the blur radius `radius_px` (magnitude) and the radial frequency `w` in rad/px.
     pub fn at(&self, radius_px: f64, w: f64) -> f64 {
         let z = (radius_px * w).abs();
         match self {

@@ -7,15 +7,15 @@ use serde::{Deserialize, Serialize};
 #[serde(rename_all = "kebab-case")]
 #[repr(u8)]
 pub enum Reason {
-    /// A pixel that is as bright as the camera can say.
+    /// At the camera's white level.
     Saturated = 1,
-    /// A patch that is as dark as the camera can say.
+    /// A patch at the camera's black level.
     Dark = 2,
     /// Too little texture above the noise.
     NoTexture = 3,
     /// Beyond the working range.
     OutOfRange = 4,
-    /// Seen in one of the images only.
+    /// Visible in one of the images only.
     Edge = 5,
     /// Moved between the exposures.
     Moved = 6,
@@ -27,12 +27,12 @@ pub enum Reason {
     NotFinite = 9,
     /// Confidence below the requested one.
     Unsure = 10,
-    /// Beyond what a correction was taught.
+    /// Beyond the range of a correction.
     BeyondCorrection = 11,
 }
 
 impl Reason {
-    /// All of them, in the order of their numbers.
+    /// All reasons, in the order of their numbers.
     pub const ALL: [Self; 11] = [
         Self::Saturated,
         Self::Dark,
@@ -47,12 +47,12 @@ impl Reason {
         Self::BeyondCorrection,
     ];
 
-    /// Its number; 0 is a pixel with a depth.
+    /// Its number; 0 means that the pixel has a depth.
     pub fn code(self) -> u8 {
         self as u8
     }
 
-    /// In words.
+    /// Description.
     pub fn words(self) -> &'static str {
         match self {
             Self::Saturated => "saturated",

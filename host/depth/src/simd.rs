@@ -1,13 +1,10 @@
-//! The inner loops of the run time for the processor's vector unit.
+//! Inner loops of the run time for the processor's vector unit.
 //!
-//! Each loop is written once over [`Lanes`](lanes::Lanes) and compiled for each unit: AVX-512, AVX2 with FMA, NEON on 64-bit ARM, and
-//! portable code of four lanes for any compiler. Which one runs is decided at run time
-//! ([`Backend::best`]).
-//! All rows are *valid* convolutions: output column `x` comes from the input columns `x..x + 2r`, so every load of an
-//! output vector starts aligned and rows only get shorter. Rows are padded to [`Plane::PADDING`] beyond their content,
-//! because a vector may read past the last useful column.
-//!
-//! Rounding differs between the variants in the last bits only (fused or separate multiply-add).
+//! Each loop is written once over [`Lanes`](lanes::Lanes) and compiled for AVX-512, AVX2 with FMA, NEON on 64-bit ARM,
+//! and portable four-lane code; [`Backend::best`] selects at run time. All rows are *valid* convolutions: output column
+//! `x` comes from the input columns `x..x + 2r`, so every load of an output vector starts aligned and rows only get
+//! shorter. Rows are padded by [`Plane::PADDING`], because a vector may read past the last useful column. Variants
+//! differ by rounding in the last bits (fused or separate multiply-add).
 #![allow(unsafe_code)] // std::arch intrinsics and unchecked loads; each block states why it is sound.
 #![allow(clippy::needless_range_loop)] // Indexed loops on purpose: see `Lanes` on closures.
 
@@ -38,8 +35,7 @@ pub(crate) use windows::{
     sum_of_squares, sum_rows, without_noise,
 };
 
-/// Calls the generic function for the backend inside a function that has the backend's instructions enabled, so that
-/// the whole loop is inlined and compiled with them.
+/// Calls the generic function inside one with the backend's instructions enabled, so that it is compiled with them.
 macro_rules! dispatch {
     ($(#[$attribute:meta])* fn $name:ident($($argument:ident: $type:ty),* $(,)?) $(-> $result:ty)? = $generic:ident) => {
         $(#[$attribute])*
@@ -60,7 +56,7 @@ macro_rules! dispatch {
                 crate::simd::Backend::Avx512 => unsafe { avx512($($argument),*) },
                 #[cfg(target_arch = "x86_64")]
                 crate::simd::Backend::Avx2 => unsafe { avx2($($argument),*) },
-                // The target promises NEON to all of its code: nothing to enable, nothing to detect.
+                // The target guarantees NEON: nothing to enable or detect.
                 #[cfg(all(target_arch = "aarch64", target_feature = "neon"))]
                 crate::simd::Backend::Neon => $generic::<crate::simd::neon::Neon>($($argument),*),
                 _ => $generic::<crate::simd::lanes::Portable>($($argument),*),
@@ -85,12 +81,12 @@ pub enum Backend {
 }
 
 impl Backend {
-    /// The fastest that this processor has.
+    /// The fastest available.
     pub fn best() -> Self {
         Self::available()[0]
     }
 
-    /// All that this processor has, the fastest first.
+    /// All available, the fastest first.
     pub fn available() -> Vec<Self> {
         [Self::Avx512, Self::Avx2, Self::Neon, Self::Portable]
             .into_iter()
@@ -112,7 +108,7 @@ impl Backend {
         }
     }
 
-    /// Itself where the processor has it, else portable code. Detection is cached by the standard library.
+    /// The backend if available, else portable code. The standard library caches detection.
     fn checked(self) -> Self {
         if self.is_available() { self } else { Self::Portable }
     }
@@ -126,50 +122,44 @@ pub(crate) struct Plane {
     rows: usize,
 }
 
-/// A cache line of 16 numbers: gives the rows their alignment.
 #[derive(Debug, Clone, Copy)]
 #[repr(C, align(64))]
 struct Line([f32; 16]);
 
 impl Plane {
-    /// Numbers beyond the asked width that may be read and written in each row.
+    /// Readable and writable numbers beyond the requested width of each row.
     pub const PADDING: usize = 80;
 
-    /// Zeros of `rows` x `width`.
     pub fn new(rows: usize, width: usize) -> Self {
         let stride = (width + Self::PADDING).next_multiple_of(16);
         Self { storage: vec![Line([0.0; 16]); rows * stride / 16], stride, rows }
     }
 
-    /// Number of rows.
     pub fn rows(&self) -> usize {
         self.rows
     }
 
-    /// Numbers in a row, padding included.
+    /// Numbers in a row, including padding.
     pub fn stride(&self) -> usize {
         self.stride
     }
 
-    /// All rows after each other.
     pub fn all(&self) -> &[f32] {
         // SAFETY: `Line` is a transparent-in-effect array of 16 f32 without padding (size 64, alignment 64), and the
         // vector holds exactly rows * stride numbers.
         unsafe { std::slice::from_raw_parts(self.storage.as_ptr().cast(), self.rows * self.stride) }
     }
 
-    /// All rows after each other, to write.
     pub fn all_mut(&mut self) -> &mut [f32] {
         // SAFETY: as in `all`; the borrow is exclusive.
         unsafe { std::slice::from_raw_parts_mut(self.storage.as_mut_ptr().cast(), self.rows * self.stride) }
     }
 
-    /// A row with its padding.
+    /// With its padding.
     pub fn row(&self, y: usize) -> &[f32] {
         &self.all()[y * self.stride..(y + 1) * self.stride]
     }
 
-    /// A row with its padding, to write.
     pub fn row_mut(&mut self, y: usize) -> &mut [f32] {
         let stride = self.stride;
         &mut self.all_mut()[y * stride..(y + 1) * stride]

@@ -1,21 +1,18 @@
 //! Standard deviation of each pixel's depth, from the noise of the camera.
 //!
-//! The run time solves `sum p1 (m - p1 alpha - p2 alpha^3) = 0` over a window. Noise `n` of the two images, independent from
-//! pixel to pixel with the variance `s^2`, changes `m - p1 alpha - p2 alpha^3` by `r = K2 * n2 + K1 * n1`, where
-//! `K2 = Q * (Gm1 - alpha Gp1 - alpha^3 Gp2)` and `K1` has the sign of `Gm1` changed. So to first order
+//! The run time solves `sum p1 (m - p1 alpha - p2 alpha^3) = 0` over a window. Independent pixel noise `n` of variance
+//! `s^2` changes `m - p1 alpha - p2 alpha^3` by `r = K2 * n2 + K1 * n1`, where
+//! `K2 = Q * (Gm1 - alpha Gp1 - alpha^3 Gp2)` and `K1` has the sign of `Gm1` changed. To first order
 //!
 //! `var(alpha) = sum sum p1(y) p1(y') cov(r(y), r(y')) / (c1 + 3 c3 alpha^2)^2`,
 //! `cov(r(y), r(y + d)) = 2 s^2 (A_mm + alpha^2 A_11 + 2 alpha^4 A_12 + alpha^6 A_22)(d)`
 //!
-//! with `A_ij` the correlations of the filters `Q * Gm1`, `Q * Gp1`, `Q * Gp2`; the mixed terms with `Gm1` cancel between
-//! the two images. The double sum is a sum over the lags `d` of `A(d)` times the window sum of `p1(y) p1(y + d)`, all from the
-//! measured `p1`, whose own noise counts as well. The final median averages a little more; see [`median_gain`].
-//!
-//! Shot noise makes `s^2` a function of the brightness ([`Noise::Camera`]); where the camera is unknown it is estimated
-//! from what the windows' fits leave over ([`Noise::Estimated`]), which counts model errors as noise.
-//!
-//! Cost: (2 w - 1)^2 / 2 lags, each a product, its sum over the window's columns and four multiply-adds per pixel; sums over the
-//! window's rows are shared between lags. About 30 ms for 640x480 and w = 7 on one core. Not part of the run time.
+//! with `A_ij` the correlations of the filters `Q * Gm1`, `Q * Gp1`, `Q * Gp2`; the mixed terms with `Gm1` cancel
+//! between the images. The double sum is a sum over lags `d` of `A(d)` times the window sum of `p1(y) p1(y + d)`. The
+//! final median lowers the deviation further ([`median_gain`]). Shot noise makes `s^2` a function of brightness
+//! ([`Noise::Camera`]); for an unknown camera the fits' residuals give it ([`Noise::Estimated`]), with model errors.
+//! Cost: (2 w - 1)^2 / 2 lags of a product, a window sum and four multiply-adds per pixel, about 30 ms for 640x480 and
+//! w = 7 on one core.
 
 use ndarray::{Array2, ArrayView2, Zip, s};
 use serde::{Deserialize, Serialize};
@@ -45,8 +42,7 @@ pub enum Noise {
 }
 
 impl Noise {
-    /// Noise of a camera with a full well of `full_well_e` electrons at the code `max_code` and a read noise of
-    /// `read_noise_e` electrons: shot noise, read noise and quantisation (1/12).
+    /// Shot noise, read noise and quantisation (1/12) of a camera with `full_well_e` electrons at the code `max_code`.
     pub fn camera(full_well_e: f64, read_noise_e: f64, max_code: f64) -> Self {
         let code_per_electron = max_code / full_well_e;
         Self::Camera {
@@ -56,8 +52,8 @@ impl Noise {
     }
 }
 
-/// By how much the median over `size` x `size` pixels lowers the standard deviation: its pixels share most of their windows
-/// and filters, so far less than for independent ones. Measured on planes of sand texture (7x7 operators, smoothing 7).
+/// Factor of a `size` x `size` median on the standard deviation, weak because its pixels share most windows. Measured
+/// on planes of sand texture (7x7 operators, smoothing 7).
 pub fn median_gain(size: usize) -> f64 {
     match size {
         1 => 1.0,
@@ -67,10 +63,7 @@ pub fn median_gain(size: usize) -> f64 {
     }
 }
 
-/// Standard deviation of the depth of each pixel in mm, (height, width); NaN where nothing is known.
-///
-/// # Errors
-/// As [`crate::pipeline::depth_from_pair`] for images that cannot be processed.
+/// Standard deviation of depth, mm, (height, width); NaN if unknown. Errors as [`crate::pipeline::depth_from_pair`].
 pub fn standard_deviation_mm(
     far: ArrayView2<f32>,
     near: ArrayView2<f32>,
@@ -79,7 +72,7 @@ pub fn standard_deviation_mm(
     settings: &Settings,
     noise: Noise,
 ) -> Result<Array2<f32>, RunError> {
-    // The run's own checks; its depth is of no use here, because alpha is needed before median and border.
+    // The run's checks; its depth is unused, because alpha is needed before median and border.
     Processor::new(operators, optics, settings)?.run(far, near)?;
     let backend = settings.backend.unwrap_or_else(Backend::best);
     let filtered = |image: &Array2<f32>, kernel: &Kernel| {
@@ -118,15 +111,14 @@ pub fn standard_deviation_mm(
     Ok(deviation)
 }
 
-/// `x_mm + alpha^2 x_11 + 2 alpha^4 x_12 + alpha^6 x_22`.
 fn with_alpha([mm, p11, p12, p22]: [f64; 4], alpha: f64) -> f64 {
     let square = alpha * alpha;
     mm + square * (p11 + square * (2.0 * p12 + square * p22))
 }
 
-/// Correlations `[A_mm, A_11, A_12, A_22]` of the filters for each lag of the window's half plane.
+/// `[A_mm, A_11, A_12, A_22]` of the filters for each lag of the window's half plane.
 struct Correlations {
-    /// Lags (dy, dx) with dy > 0 or dy = 0 and dx >= 0; the other half is their mirror image.
+    /// Lags (dy, dx) with dy > 0 or dy = 0 and dx >= 0; the other half mirrors them.
     lags: Vec<([isize; 2], [f64; 4])>,
 }
 
@@ -155,7 +147,6 @@ impl Correlations {
         Self { lags }
     }
 
-    /// At lag 0: the variance of `r` per `2 s^2`.
     fn at_zero(&self) -> [f64; 4] {
         self.lags[0].1
     }
@@ -171,20 +162,18 @@ fn full_convolution(a: &Kernel, b: &Kernel) -> Array2<f64> {
     })
 }
 
-/// For each pixel the sums over the window of `p1(y) p1(y + d)` times the correlations at `d`, over all lags.
+/// Per pixel: window sums of `p1(y) p1(y + d)` times the correlations at `d`, over all lags.
 struct Spread([Array2<f32>; 4]);
 
 impl Spread {
-    /// Pixel by pixel, row after row.
     fn values(&self) -> impl Iterator<Item = [f64; 4]> {
         let [mm, p11, p12, p22] = &self.0;
         mm.iter().zip(p11).zip(p12).zip(p22).map(|(((a, b), c), d)| [*a, *b, *c, *d].map(f64::from))
     }
 }
 
-/// A pair of rows `dy` apart takes part in the windows that hold both. Of the rows of a window with its lower end at `top +
-/// 2 r` the row `top` has all pairs with `dy` up to the last row: so while `dy` grows, its sums are completed for one
-/// window after the other.
+/// A pair of rows `dy` apart contributes to the windows that hold both. In the window with lower end `top + 2 r`, the
+/// row `top` has all pairs with `dy` up to the last row. So as `dy` grows, one window after another is completed.
 fn lagged_sums(p1: &Array2<f32>, correlations: &Correlations, window: usize, backend: Backend) -> Spread {
     let (height, width) = p1.dim();
     let border = (window / 2) as isize;
@@ -219,7 +208,6 @@ fn lagged_sums(p1: &Array2<f32>, correlations: &Correlations, window: usize, bac
     Spread(spread)
 }
 
-/// Sums over the window around each pixel; borders reflected.
 fn window_sums(image: &Array2<f32>, window: usize) -> Array2<f32> {
     let (height, width) = image.dim();
     let r = (window / 2) as isize;
@@ -242,7 +230,6 @@ fn window_sums(image: &Array2<f32>, window: usize) -> Array2<f32> {
     sums
 }
 
-/// Variance of each pixel's noise, in the images' units.
 fn pixel_variance(
     noise: Noise,
     [far, near]: [ArrayView2<f32>; 2],
@@ -253,10 +240,10 @@ fn pixel_variance(
 ) -> Array2<f64> {
     match noise {
         Noise::Camera { constant, per_unit } => {
-            // Both images have one brightness around a pixel; its average over the window is what the noise follows.
+            // Both images are equally bright around a pixel; the noise follows the window's mean.
             let area = (2 * window * window) as f64;
             let brightness = window_sums(&(&far + &near), window);
-            // Below a camera's black level, where there is read noise only, the line would fall below 0.
+            // Below the black level, with read noise only, the line would fall below 0.
             let least = (0.01 * per_unit * per_unit).max(f64::MIN_POSITIVE);
             brightness.mapv(|b| (constant + per_unit * f64::from(b) / area).max(least))
         }

@@ -1,9 +1,7 @@
-//! What can be known of each depth: whether there is one, why not, how far it may be off and how sure that is.
-//!
-//! A depth is taken away where it lies beyond the working range (there the model ends: the found depth stays near the
-//! range's end however far the surface is), where its standard deviation is so large that noise alone may have made it,
-//! and where the model leaves far more than noise. What is left has a standard deviation, widened by what the model leaves,
-//! and a confidence: the probability that the depth is off by less than three of these.
+//! Validity of each depth: whether there is one, why not, its standard deviation and confidence. A depth is removed
+//! beyond the working range (where the estimate stays near the range's end), where its standard deviation is so large
+//! that noise may have made it, and where the model leaves far more than noise. The others get a standard deviation
+//! widened by the residual, and a confidence: the probability of an error below three of these.
 
 use ndarray::{Array2, ArrayView1, Axis, Zip};
 use rayon::prelude::*;
@@ -17,25 +15,24 @@ use crate::prepare::Prepared;
 use crate::reason::Reason;
 use crate::simd::{self, Backend, Believed};
 
-/// Largest |alpha| that is believed: a tenth beyond either focus the operators still hold to 1 mm.
+/// Largest valid |alpha|: a tenth beyond either focus the operators are accurate to 1 mm.
 pub const LARGEST_ALPHA: f64 = 1.1;
-/// Standard deviation of alpha from which noise alone may have made a depth.
+/// Standard deviation of alpha from which noise may have made a depth.
 const LARGEST_DEVIATION: f32 = 0.12;
-/// Systematic error of alpha per root of the texture's part that the model leaves unexplained: a residual that is all depth has 1.
+/// Systematic error of alpha per root of the unexplained part of the texture: a residual that is all depth has 1.
 const MODEL_ERROR: f32 = 1.0;
-/// Mean square that right models leave (`Estimate::left_over`).
+/// Mean square residual of right models (`Estimate::left_over`).
 const USUAL_LEFT_OVER: f32 = 3e-4;
-/// Standard deviation of alpha of a filled pixel: more than of any that is measured.
+/// Standard deviation of alpha of a filled pixel: larger than any measured one.
 const FILLED_DEVIATION: f32 = 0.25;
-/// Mean square of what the model leaves, relative to the noise, from which it does not hold.
+/// Mean square residual relative to the noise from which the model is invalid.
 const LARGEST_MISFIT: f32 = 60.0;
-/// How far around a hole the reason for it is looked for, px.
 const SEARCH_PX: usize = 24;
 
-/// What a pair is judged by.
+/// Settings of [`assess`].
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct ValiditySettings {
-    /// Confidence below which a depth is taken away.
+    /// Confidence below which a depth is removed.
     pub least_confidence: f32,
     /// Whether regions without texture were filled; filled pixels are kept.
     pub filled: bool,
@@ -44,11 +41,11 @@ pub struct ValiditySettings {
 /// Validity of each pixel.
 #[derive(Debug, Clone)]
 pub struct Validity {
-    /// For each pixel the code of the [`Reason`] why it has no depth, 0 where it has one.
+    /// Code of the [`Reason`] for each pixel without a depth, else 0.
     pub reasons: Array2<u8>,
     /// Standard deviation of each depth, mm; NaN without a depth.
     pub deviation_mm: Array2<f32>,
-    /// How many pixels have no depth, by reason.
+    /// Pixels without a depth, by reason.
     pub lost: Vec<Lost>,
     /// Part of the pixels that have a depth.
     pub valid_fraction: f64,
@@ -65,8 +62,7 @@ pub struct Lost {
     pub fraction: f64,
 }
 
-/// Judges a map: takes depths away that cannot be believed, sets each confidence to its probability. `estimate` is of the same
-/// prepared pair; its deviations become the validity's.
+/// Removes invalid depths from a map and sets each confidence to its probability. `estimate` is of the same pair.
 pub fn assess(
     map: &mut DepthMap,
     prepared: &Prepared,
@@ -138,13 +134,12 @@ pub fn assess(
     Validity { reasons, deviation_mm, lost, valid_fraction: valid as f64 / (size.0 * size.1) as f64 }
 }
 
-/// Standard deviation of normalised depth by the model's error, where it leaves `ratio` times as much as on the target that it was
-/// learned from.
+/// Standard deviation of normalised depth by model error, for a residual `ratio` times the learned target's.
 pub(crate) fn model_error(residual: f32, ratio: f32) -> f32 {
     residual * ratio.max(1.0).sqrt()
 }
 
-/// How many pixels have no depth, by reason, from the map of reasons.
+/// Pixels without a depth by reason, from the map of reasons.
 pub fn lost_pixels(reasons: &Array2<u8>) -> Vec<Lost> {
     let total = reasons.len() as f64;
     let mut counts = [0_usize; 256];
@@ -174,7 +169,6 @@ fn range(optics: &Optics) -> Believed {
     }
 }
 
-/// Gives pixels without depth, of which nothing says why, the reason of what lies nearest.
 fn explain_holes(reasons: &mut Array2<u8>, map: &DepthMap) {
     let unexplained = |(y, row): (usize, ArrayView1<f32>)| {
         let codes = reasons.row(y);
@@ -188,7 +182,7 @@ fn explain_holes(reasons: &mut Array2<u8>, map: &DepthMap) {
     if left.is_empty() {
         return;
     }
-    // Reasons that make holes around them, before the judge's own.
+    // Reasons that make holes around them, checked first.
     let spreading = [
         Reason::Saturated,
         Reason::Dark,

@@ -6,14 +6,12 @@ use plotters::{prelude::*, style::register_font as register};
 use crate::panels;
 
 const SIZE: (u32, u32) = (860, 380);
-/// The legend stands to the right of the axes.
 const LEGEND_PX: i32 = 270;
 
-/// Height of one of several charts in a picture, and of the legend below them.
 const SMALL_PX: (u32, u32) = (300, 240);
 const LEGEND_BELOW_PX: u32 = 30;
 
-/// Colours that also the colour-blind tell apart: the eight of Okabe & Ito (2008), with grey for their yellow, and two darker ones.
+/// Colours for the colour-blind: Okabe & Ito (2008), with grey for their yellow, and two darker ones.
 const COLOURS: [RGBColor; 10] = [
     RGBColor(0, 114, 178),
     RGBColor(213, 94, 0),
@@ -27,18 +25,16 @@ const COLOURS: [RGBColor; 10] = [
     RGBColor(90, 0, 130),
 ];
 
-/// Colour of the curve `index` of `count`: its own while there are few, else a shade from dark to light, for many
-/// curves are a family.
+/// Few curves have their own colours, many a shade from dark to light: they are a family.
 fn colour(index: usize, count: usize) -> RGBColor {
     if count <= COLOURS.len() {
         return COLOURS[index];
     }
-    // The last tenth of the scale is too light to be seen on white.
+    // The last tenth of the scale is too light on white.
     let colorous::Color { r, g, b } = colorous::VIRIDIS.eval_rational(9 * index, 10 * count);
     RGBColor(r, g, b)
 }
 
-/// Makes the font of all text known to plotters.
 pub fn register_font() -> Result<()> {
     register("sans-serif", FontStyle::Normal, dejavu::sans::regular())
         .map_err(|_| anyhow!("the built-in font is damaged"))
@@ -46,19 +42,16 @@ pub fn register_font() -> Result<()> {
 
 #[derive(Clone)]
 pub struct Curve {
-    /// Its name in the legend.
     pub name: String,
     pub points: Vec<(f64, f64)>,
 }
 
-/// One of several charts in a picture.
 pub struct Plot {
     pub title: String,
-    /// What the horizontal and the vertical axis are.
     pub labels: [&'static str; 2],
-    /// Curves; more than ten are shaded from dark to light.
+    /// More than ten are shaded from dark to light.
     pub curves: Vec<Curve>,
-    /// Ends of the vertical axis; without them from 0 to the largest value.
+    /// Range of the vertical axis; by default 0 to the largest value.
     pub vertical: Option<[f64; 2]>,
 }
 
@@ -73,7 +66,7 @@ impl Plot {
     }
 }
 
-/// A chart of `curves`; the vertical axis starts at 0. The bytes of a PNG.
+/// The vertical axis starts at 0; returns a PNG.
 pub fn lines(title: &str, x_label: &'static str, y_label: &'static str, curves: &[Curve]) -> Result<Vec<u8>> {
     let plot =
         Plot { title: title.into(), labels: [x_label, y_label], curves: curves.to_vec(), vertical: None };
@@ -90,7 +83,7 @@ pub fn lines(title: &str, x_label: &'static str, y_label: &'static str, curves: 
     })
 }
 
-/// Charts in rows of `columns`, with the names of the first one's curves below, where they have names. The bytes of a PNG.
+/// Charts in rows of `columns`, with the legend of the first below; returns a PNG.
 pub fn grid(columns: usize, plots: &[Plot]) -> Result<Vec<u8>> {
     let rows = plots.len().div_ceil(columns);
     let named: Vec<&Curve> =
@@ -126,7 +119,6 @@ fn draw_to_png(size: (u32, u32), title: &str, draw: impl FnOnce(&Area<'_>) -> Dr
     panels::encode(&buffer, size)
 }
 
-/// The axes and curves of a plot; sizes of title and labels in px.
 fn draw(area: &Area<'_>, plot: &Plot, (title, label): (i32, i32)) -> Drawn {
     let [left, right, bottom, top] = plot.ends();
     let mut chart = ChartBuilder::on(area)

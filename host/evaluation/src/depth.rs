@@ -1,4 +1,4 @@
-//! The parts of the accuracy pages, in their order.
+//! Parts of the accuracy pages, in their order.
 
 mod calibration;
 mod coded;
@@ -20,10 +20,8 @@ use anyhow::Result;
 
 use crate::page::Page;
 
-/// A part's name and what measures it.
 type Part = (&'static str, fn(&mut Page) -> Result<()>);
 
-/// The parts that need nothing but the renderer.
 pub const RENDERED: [Part; 12] = [
     ("planes", planes::measure),
     ("shapes", shapes::measure),
@@ -39,7 +37,6 @@ pub const RENDERED: [Part; 12] = [
     ("focus", focus::measure),
 ];
 
-/// What a reader must know before the first figure.
 pub const INTRODUCTION: &str = "# Accuracy
 
 Written by `cargo xtask evaluate`; two runs on one kind of processor write the same bytes. All depths and errors are in mm.

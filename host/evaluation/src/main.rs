@@ -1,15 +1,11 @@
-//! # farnear-evaluation
+//! Measures the accuracy of depth maps and writes `docs/accuracy.md`, `docs/accuracy-real.md` ([`depth`]),
+//! `docs/activity.md` ([`people`]), `docs/robustness.md` ([`robust`]) and `docs/thesis.md` ([`thesis`]), with
+//! their pictures.
 //!
-//! Measures how near depth maps come to the truth and writes `docs/accuracy.md` with its pictures: rendered scenes under
-//! every point spread function and noise, wrong point spread functions, corrections of the elliptical distortion on
-//! depths that taught nothing, calibration. Where real pairs and focal stacks are at hand their figures go to
-//! `docs/accuracy-real.md`. What [`people`] measures - activities recognised, shadows taken off, the sun - goes to
-//! `docs/activity.md`; what a disturbed pair comes to ([`robust`]) to `docs/robustness.md`; Li's thesis redone ([`thesis`]) to
-//! `docs/thesis.md`.
-//!
-//! Everything is seeded and no clock enters, except for the thesis' table of times, so that two runs on one kind of processor write the same bytes.
-//! One part per file in [`depth`]; [`rig`] renders and compares, [`sweep`] does so for several operators, [`page`] writes Markdown, [`chart`] and [`panels`]
-//! draw. It takes a few minutes on four cores; run it by `cargo xtask evaluate`.
+//! Everything is seeded; apart from the thesis' table of times, two runs on one kind of processor write the
+//! same bytes. [`rig`] renders and compares, [`sweep`] does so for several operators, [`page`] writes
+//! Markdown, [`chart`] and [`panels`] draw. Takes a few minutes on four cores; run it by
+//! `cargo xtask evaluate`.
 
 mod chart;
 mod depth;
@@ -46,7 +42,7 @@ struct Arguments {
     page: Vec<String>,
 }
 
-/// The pages by the names of `--page`; `real` is the page of the part `real`.
+/// Names of `--page`; `real` is the page of the part `real`.
 const PAGES: [&str; 5] = ["accuracy", "robustness", "activity", "thesis", "real"];
 
 fn main() -> ExitCode {
@@ -152,7 +148,6 @@ fn run(arguments: &Arguments) -> Result<()> {
     finish(page, arguments, "accuracy-real.md")
 }
 
-/// Writes the page, or prints it if only parts were selected.
 fn finish(page: Page, arguments: &Arguments, name: &str) -> Result<()> {
     if !arguments.only.is_empty() {
         print!("{}", page.text());

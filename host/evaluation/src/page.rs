@@ -1,5 +1,3 @@
-//! A page of Markdown and the pictures on it.
-
 use std::{
     fs,
     path::{Path, PathBuf},
@@ -7,14 +5,13 @@ use std::{
 
 use anyhow::{Context, Result};
 
-/// A page being written.
 pub struct Page {
     images: PathBuf,
     text: String,
 }
 
 impl Page {
-    /// A page that begins with `introduction` and whose pictures go to the folder `images`.
+    /// Pictures go to the folder `images`.
     pub fn new(images: &Path, introduction: &str) -> Self {
         Self { images: images.to_path_buf(), text: format!("{}\n", introduction.trim_end()) }
     }
@@ -23,17 +20,14 @@ impl Page {
         &self.text
     }
 
-    /// A heading of the second level.
     pub fn heading(&mut self, heading: &str) {
         self.text.push_str(&format!("\n## {heading}\n"));
     }
 
-    /// A heading of the third level.
     pub fn subheading(&mut self, heading: &str) {
         self.text.push_str(&format!("\n### {heading}\n"));
     }
 
-    /// Verbatim Markdown, such as a table from another module.
     pub fn block(&mut self, markdown: &str) {
         self.text.push_str(&format!("\n{}\n", markdown.trim_end()));
     }
@@ -42,7 +36,7 @@ impl Page {
         self.text.push_str(&format!("\n{}\n", text.trim()));
     }
 
-    /// A table; all columns but the first `left` are numbers and aligned to the right.
+    /// All columns but the first `left` are numbers, aligned to the right.
     pub fn table<H: AsRef<str>>(&mut self, left: usize, head: &[H], rows: &[Vec<String>]) {
         let line = |cells: &mut dyn Iterator<Item = &str>| {
             let cells: Vec<&str> = cells.collect();
@@ -57,7 +51,6 @@ impl Page {
         }
     }
 
-    /// A picture: file name, PNG bytes and caption.
     pub fn picture(&mut self, name: &str, png: &[u8], caption: &str) -> Result<()> {
         let path = self.images.join(name);
         fs::write(&path, png).with_context(|| format!("cannot write {}", path.display()))?;
@@ -65,7 +58,6 @@ impl Page {
         Ok(())
     }
 
-    /// Writes the page aside and renames it.
     pub fn write(self, path: &Path) -> Result<()> {
         let aside = path.with_extension("md.part");
         let about = || format!("cannot write {}", path.display());
@@ -76,7 +68,7 @@ impl Page {
     }
 }
 
-/// A number of mm as the tables show it: three decimals, or a dash for a missing value.
+/// Three decimals, or a dash for a missing value.
 pub fn mm(value: f64) -> String {
     if value.is_finite() { format!("{value:.3}") } else { "-".into() }
 }

@@ -1,33 +1,29 @@
-//! Maps side by side as a small PNG: depths from near (warm) to far (cold), errors from too near (blue) to too far (red).
+//! Maps in a row as a small PNG: depths near (warm) to far (cold), errors too near (blue) to too far (red).
 
 use anyhow::{Result, anyhow, bail};
 use colorous::Gradient;
 use ndarray::{Array2, ArrayView2, s};
 use plotters::prelude::*;
 
-/// Maps are shown at a third of their size, by means over 3x3 pixels.
 const SHRINK: usize = 3;
 const MARGIN: usize = 10;
 const TITLE: usize = 26;
-/// Colours of a map; few, so that the picture stays small.
+/// Few colours keep the picture small.
 const LEVELS: usize = 40;
 const NO_VALUE: [u8; 3] = [150, 150, 152];
 
 pub struct Panel<'a> {
     pub title: String,
-    /// The map, (height, width).
     pub map: ArrayView2<'a, f32>,
     pub scale: Scale,
 }
 
-/// How values become colours.
 #[derive(Clone, Copy)]
 pub enum Scale {
-    /// Depths in mm between these two.
+    /// Range in mm.
     Depth([f32; 2]),
-    /// Errors in mm up to this one on either side.
+    /// Largest magnitude, mm.
     Error(f32),
-    /// Grey levels from 0 to this one.
     Grey(f32),
 }
 
@@ -47,12 +43,11 @@ impl Scale {
     }
 }
 
-/// The panels in one row, as the bytes of a PNG.
 pub fn row(panels: &[Panel<'_>]) -> Result<Vec<u8>> {
     grid(panels.len(), panels)
 }
 
-/// Panels of one size in rows of `across`, as the bytes of a PNG.
+/// Panels of one size in rows of `across`; returns a PNG.
 pub fn grid(across: usize, panels: &[Panel<'_>]) -> Result<Vec<u8>> {
     let Some(first) = panels.first() else { bail!("a picture without panels") };
     let (rows, columns) = (first.map.nrows() / SHRINK, first.map.ncols() / SHRINK);
@@ -92,7 +87,7 @@ fn titles(
     Ok(())
 }
 
-/// Means over 3x3 pixels of those that have a value.
+/// Means over the valid ones of 3x3 pixels.
 fn shrunk(map: ArrayView2<f32>) -> Array2<f32> {
     Array2::from_shape_fn((map.nrows() / SHRINK, map.ncols() / SHRINK), |(row, column)| {
         let block = map.slice(s![SHRINK * row..SHRINK * (row + 1), SHRINK * column..SHRINK * (column + 1)]);
@@ -102,7 +97,7 @@ fn shrunk(map: ArrayView2<f32>) -> Array2<f32> {
     })
 }
 
-/// RGB pixels as a PNG with a palette where 256 colours are enough (greys are rounded to 16), else as they are.
+/// RGB as a PNG, with a palette if 256 colours suffice (greys are rounded to 16).
 pub fn encode(rgb: &[u8], (width, height): (u32, u32)) -> Result<Vec<u8>> {
     let mut palette: Vec<[u8; 3]> = Vec::new();
     let mut indices = Vec::with_capacity(rgb.len() / 3);

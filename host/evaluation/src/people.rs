@@ -1,4 +1,4 @@
-//! The parts of `docs/activity.md`: people's shadows, silhouettes and activities, like Li 2014, chapters 8 and 9.
+//! Parts of `docs/activity.md`: shadows, silhouettes and activities, as in Li 2014, chapters 8 and 9.
 
 mod between;
 mod bodies;
@@ -24,10 +24,8 @@ use anyhow::Result;
 use crate::page::Page;
 use data::Data;
 
-/// A part's name and what measures it.
 type Part = (&'static str, fn(&mut Page, &Data) -> Result<()>);
 
-/// In the order of the page.
 pub const PARTS: [Part; 12] = [
     ("synthetic-people", |page, _| recognition::measure(page)),
     ("utkinect", |page, data| recognition::measure_real(page, data, sets::utkinect, "UTKinect")),
@@ -43,7 +41,6 @@ pub const PARTS: [Part; 12] = [
     ("sun", sun::measure),
 ];
 
-/// What a reader must know before the first figure.
 pub const INTRODUCTION: &str = "# Shadows and activities
 
 Written by `cargo xtask evaluate`; seeds are fixed and no clock enters, so that two runs on one kind of processor write the same bytes. Sets that are not part of this

@@ -11,38 +11,30 @@ use farnear_depth::{
 use farnear_scene::{Camera, EllipticalDistortion, Lens, Noise, Renderer, Scene, truth};
 use ndarray::Array2;
 
-/// Focal length of the lens.
 pub const FOCAL_LENGTH_MM: f64 = 50.0;
-/// Li 2014, section 4.3: 50 mm lens at 933 mm, 2.703 px of blur at most, near focus at 886.81 mm.
+/// Li 2014, section 4.3: far focus 933 mm, near focus 886.81 mm, at most 2.703 px of blur.
 const OPTICS: &str = "[lens]\nfocal_length_mm = 50.0\naperture_mm = 12.8\n[sensor]\npixel_um = 7.4\n\
                       [focus]\nfar_mm = 933.0\nmax_blur_px = 2.703\n";
-/// (width, height) in px.
 const SIZE: (usize, usize) = (640, 480);
-/// Rim that is not compared: there windows and operators see reflections.
+/// Excluded border, where windows and operators see reflections.
 pub const BORDER_PX: usize = 16;
-/// Pixels at most this far from a depth step are not compared on a staircase.
 const AWAY_FROM_EDGES_PX: usize = 8;
 
-/// The point spread functions of every table, and how the tables call them.
 pub const PSFS: [(&str, &str); 3] = [
     ("pill-box", "pillbox"),
     ("Gaussian, k 0.4578", "gaussian:k=0.4578"),
     ("generalised Gaussian, p 1.8, k 0.4802", "generalised:p=1.8,k=0.4802"),
 ];
 
-/// What the camera does to the light.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub enum Exposure {
-    /// Nothing: the light itself, in floating point.
+    /// Noiseless floating point.
     Clean,
-    /// Shot and read noise, 8 bit.
     EightBit,
-    /// Shot and read noise, 12 bit.
     TwelveBit,
 }
 
 impl Exposure {
-    /// All of them in the order of the tables.
     pub const ALL: [Self; 3] = [Self::Clean, Self::EightBit, Self::TwelveBit];
 
     pub fn name(self) -> &'static str {
@@ -62,27 +54,24 @@ impl Exposure {
     }
 }
 
-/// A rendered pair and the depth it was rendered from.
 pub struct Pair {
     pub far: Array2<f32>,
     pub near: Array2<f32>,
-    /// True depth in mm.
     pub truth: Array2<f32>,
 }
 
-/// The optics with a point spread function.
 pub fn optics(psf: &str) -> Result<Optics> {
     let file: OpticsFile = toml::from_str(OPTICS).context("the evaluation's optics")?;
     Ok(file.check()?.with_psf(psf.parse::<Psf>()?))
 }
 
-/// The lens, perfect or with the elliptical distortion.
+/// Perfect or with the elliptical distortion.
 pub fn lens(distorted: bool) -> Result<Lens> {
     let lens = Lens::from_optics(&farnear_scene::OpticsFile::parse(OPTICS)?)?;
     Ok(if distorted { lens.with_distortion(EllipticalDistortion::default()) } else { lens })
 }
 
-/// Renders a pair; the seed decides texture and noise.
+/// `seed` sets texture and noise.
 pub fn render(scene: &Scene, lens: &Lens, psf: &str, exposure: Exposure, seed: u64) -> Result<Pair> {
     let camera = Camera::new(SIZE.0, SIZE.1, exposure.noise());
     let renderer = Renderer::new(scene, lens, &psf.parse()?, &camera, seed)?;
@@ -99,7 +88,7 @@ pub fn render(scene: &Scene, lens: &Lens, psf: &str, exposure: Exposure, seed: u
     })
 }
 
-/// Renders a stack with the sensor at each of these distances, 8 bit, values from 0 to 1, and its truth.
+/// 8 bit, values 0 to 1, with its truth.
 pub fn stack(
     scene: &Scene,
     lens: &Lens,
@@ -118,7 +107,7 @@ pub fn stack(
     Ok((images, truth(scene, lens, &camera)))
 }
 
-/// Depths from far to near focus: `count` of them, the first and last `margin` of a step inside the range.
+/// `count` depths from far to near focus, `margin` of a step inside the range.
 pub fn depths(count: usize, margin: f64) -> Result<Vec<f64>> {
     let range = optics("pillbox")?.working_range();
     let steps = (count - 1) as f64 + 2.0 * margin;
@@ -127,24 +116,23 @@ pub fn depths(count: usize, margin: f64) -> Result<Vec<f64>> {
         .collect())
 }
 
-/// A plane of sand across the axis.
+/// Sand, perpendicular to the axis.
 pub fn plane(depth_mm: f64) -> Result<Scene> {
     Ok(format!("plane:{depth_mm}").parse()?)
 }
 
-/// Depth by rational operators with the settings of all tables: smoothing 7, median 3.
+/// Rational operators with the settings of all tables: smoothing 7, median 3.
 pub fn depth(pair: &Pair, operators: &Operators, optics: &Optics) -> Result<Array2<f32>> {
     Ok(depth_from_pair(pair.far.view(), pair.near.view(), operators, optics, &Settings::default())?.depth_mm)
 }
 
-/// Compares a map with the truth, the rim left out.
 pub fn error(map: &Array2<f32>, truth: &Array2<f32>, away_from_edges: bool) -> Result<Comparison> {
     let away_from_edges_px = away_from_edges.then_some(AWAY_FROM_EDGES_PX);
     let settings = CompareSettings { border_px: BORDER_PX, away_from_edges_px };
     Ok(compare(map.view(), truth.view(), None, &settings)?)
 }
 
-/// Root mean square over several maps, each weighted by its pixels.
+/// RMS over several maps, weighted by pixels.
 pub fn pooled_mm<'a>(comparisons: impl IntoIterator<Item = &'a Comparison>) -> f64 {
     let (mut squares, mut pixels) = (0.0, 0.0);
     for comparison in comparisons {

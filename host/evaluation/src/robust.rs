@@ -1,4 +1,4 @@
-//! What real cameras do to a pair, one disturbance at a time and by chance many at once: the page `docs/robustness.md`.
+//! Camera effects on a pair, alone and combined at random: the page `docs/robustness.md`.
 
 pub mod disturb;
 mod planes;
@@ -10,10 +10,8 @@ use anyhow::Result;
 
 use crate::page::Page;
 
-/// A part's name and what measures it.
 type Part = (&'static str, fn(&mut Page) -> Result<()>);
 
-/// The parts of the page.
 pub const PARTS: [Part; 4] = [
     ("disturbances", table::measure),
     ("outside", planes::measure),
@@ -21,7 +19,6 @@ pub const PARTS: [Part; 4] = [
     ("registration", registration::measure),
 ];
 
-/// What a reader must know before the first figure.
 pub const INTRODUCTION: &str = "# Robustness
 
 Written by `cargo xtask evaluate`; two runs on one kind of processor write the same bytes. All depths and errors are in mm.

@@ -1,4 +1,4 @@
-//! The same planes by several operators: what the tables over sizes, designs and wrong point spread functions share.
+//! The same planes by several operators.
 
 use anyhow::Result;
 use farnear_depth::{operators::Operators, optics::Optics};
@@ -9,8 +9,8 @@ use crate::{
     rig::{self, Exposure},
 };
 
-/// RMSE in mm over planes from far to near focus, `[clean, 8-bit]` for each of the operators. Each plane has its texture and
-/// noise and is rendered once for all operators.
+/// RMSE in mm over planes from far to near focus, `[clean, 8-bit]` per operator. Each plane has its own
+/// texture and noise and is rendered once.
 pub fn planes(psf: &str, count: usize, seed: u64, by: &[(Operators, Optics)]) -> Result<Vec<[f64; 2]>> {
     let (depths, lens) = (rig::depths(count, 0.0)?, rig::lens(false)?);
     let mut found = vec![[f64::NAN; 2]; by.len()];

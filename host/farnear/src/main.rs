@@ -52,18 +52,50 @@ enum Command {
     Operators(Run<OperatorRequest>),
     Depth(Run<DepthRequest>),
     FocusStack(Run<FocusStackRequest>),
-    Calibrate(commands::calibrate::Arguments),
-    Camera(commands::camera::Arguments),
+    /// Learn the point spread function, a correction of the lens's distortion, the camera's own frames, or a whole lens from a z-stack.
+    #[command(
+        subcommand,
+        after_help = "Example: farnear calibrate psf far.png near.png --optics optics.toml --model gaussian"
+    )]
+    Calibrate(commands::calibrate::What),
+    /// Cameras without a rig: which there are, what can be set, pictures to keep and to look at (docs/cameras.md).
+    #[command(subcommand, after_help = "Example: farnear camera list")]
+    Camera(commands::camera::Job),
     Correct(Run<CorrectRequest>),
     Compare(Run<CompareRequest>),
     Render(commands::render::Arguments),
-    Rig(commands::rig::Arguments),
+    /// Drive a rig: home, move, focus, capture, calibrate, and everything else the board can do.
+    #[command(
+        subcommand,
+        after_help = "Example: farnear rig capture --port sim --optics optics.toml --out pair1/"
+    )]
+    Rig(commands::rig::Job),
     Sun(commands::sun::Arguments),
-    Shadow(commands::shadow::Arguments),
-    Silhouettes(commands::silhouettes::Arguments),
-    Activity(commands::activity::Arguments),
+    /// Remove a person's shadow from masks by the place of the sun, and score the result.
+    #[command(subcommand, after_help = "Example: farnear shadow score masks/ truth/ --json")]
+    Shadow(commands::shadow::Job),
+    /// Make silhouettes: masks of the person who moves in a video, or of a motion-capture recording from any view.
+    #[command(
+        subcommand,
+        after_help = "Example: farnear silhouettes video walk.y4m --out masks/ --learn-first"
+    )]
+    Silhouettes(commands::silhouettes::Source),
+    /// Recognise what people do from their silhouettes: train a model, use it, evaluate the method.
+    #[command(
+        subcommand,
+        after_help = "Example: farnear activity recognise masks/ --model everyday\n\
+                        \x20        farnear activity train samples.toml --out model.fnm\n\
+                        \x20        farnear activity recognise masks/ --model model.fnm"
+    )]
+    Activity(commands::activity::Job),
     Batch(commands::batch::Arguments),
-    Measure(commands::measure::Arguments),
+    /// Measure in a depth map: a region, the plane through it, a profile, the difference to another.
+    #[command(
+        subcommand,
+        after_help = "Example: farnear measure region pair1/ --region 100,80,60,40 --json\n\
+                        \x20        farnear measure profile pair1/ --from 0,240 --to 639,240 --json"
+    )]
+    Measure(commands::measure::What),
     Target(Run<TargetRequest>),
     Report(Run<ReportRequest>),
     Serve(commands::serve::Arguments),
@@ -124,9 +156,10 @@ fn message(error: &anyhow::Error) -> String {
 mod tests {
     use std::collections::{BTreeMap, BTreeSet};
 
-    use clap::CommandFactory;
+    use clap::{Args, CommandFactory};
 
     use super::*;
+    use crate::commands::rig::target::{CameraArguments, Target};
 
     /// Options of the command line only.
     const ONLY_HERE: [&str; 3] = ["json", "help", "version"];
@@ -134,6 +167,10 @@ mod tests {
     #[test]
     fn options_of_commands_are_the_fields_of_their_requests() {
         let command = Arguments::command();
+        let equipment = clap::Command::new("rig");
+        let equipment = CameraArguments::augment_args(Target::augment_args(equipment));
+        let equipment: BTreeSet<_> =
+            equipment.get_arguments().map(|option| option.get_id().to_string()).collect();
         for task in farnear_workflows::request::TASKS {
             let find = |command: &clap::Command, word: &str| command.find_subcommand(word).cloned();
             let found = task.name.split(' ').try_fold(command.clone(), |command, word| find(&command, word));
@@ -142,6 +179,9 @@ mod tests {
             let options: BTreeMap<_, _> = found
                 .get_arguments()
                 .filter(|option| !ONLY_HERE.contains(&option.get_id().as_str()))
+                .filter(|option| {
+                    !task.name.starts_with("rig ") || !equipment.contains(option.get_id().as_str())
+                })
                 .map(|option| (option.get_id().to_string(), option))
                 .collect();
             let schema = (task.schema)();

@@ -2,11 +2,14 @@
 
 use anyhow::Result;
 use clap::Args;
-use farnear_workflows::request::Request;
+use farnear_workflows::request::{CameraRequest, Request, RigRequest};
 
-use crate::{report, terminal};
+use crate::{
+    commands::rig::target::{CameraArguments, Target},
+    report, terminal,
+};
 
-// No doc comment: the help text of the command is that of the request.
+// No doc comments: the help text of a command is that of its request.
 #[allow(missing_docs)]
 #[derive(Args)]
 pub struct Run<R: Request + Args> {
@@ -20,7 +23,57 @@ pub struct Run<R: Request + Args> {
 impl<R: Request + Args> Run<R> {
     /// Checks and runs the request.
     pub fn run(self) -> Result<()> {
-        self.request.check()?;
-        report::print(&self.request.run(&terminal::counting(self.json)?)?, self.json)
+        let Self { request, json } = self;
+        request.check()?;
+        let figures = request.run(&terminal::counting(json)?)?;
+        report::print(&figures, json)?;
+        Ok(R::verdict(&figures)?)
+    }
+}
+
+/// A task of a rig.
+#[allow(missing_docs)]
+#[derive(Args)]
+pub struct RigRun<R: RigRequest + Args> {
+    #[command(flatten)]
+    target: Target,
+    #[command(flatten)]
+    task: Run<R>,
+}
+
+impl<R: RigRequest + Args> RigRun<R> {
+    /// Runs the request on the rig.
+    ///
+    /// # Errors
+    /// Those of the task.
+    pub fn run(self) -> Result<()> {
+        let Self { target, mut task } = self;
+        task.request.set_rig(target.address()?);
+        task.run()
+    }
+}
+
+/// A task of a rig with a camera.
+#[allow(missing_docs)]
+#[derive(Args)]
+pub struct CameraRun<R: CameraRequest + Args> {
+    #[command(flatten)]
+    target: Target,
+    #[command(flatten)]
+    camera: CameraArguments,
+    #[command(flatten)]
+    task: Run<R>,
+}
+
+impl<R: CameraRequest + Args> CameraRun<R> {
+    /// Runs the request on the rig with the camera.
+    ///
+    /// # Errors
+    /// Those of the task.
+    pub fn run(self) -> Result<()> {
+        let Self { target, camera, mut task } = self;
+        task.request.set_rig(target.address()?);
+        task.request.set_camera(camera.settings()?);
+        task.run()
     }
 }

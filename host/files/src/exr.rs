@@ -1,8 +1,6 @@
-//! OpenEXR: maps as channels of one picture, in full precision, with texts in the header.
-//!
-//! One part, scan lines from the top, uncompressed 32-bit float (noise in the low bits of measured depths
-//! hardly compresses). Layout: "OpenEXR File Layout", <https://openexr.com/en/latest/OpenEXRFileLayout.html>.
-//! The crate `exr` is used only to read it back in tests, because of its compile time.
+//! OpenEXR: maps as channels of one picture, in full precision, with texts in the header. One part, scan lines from the
+//! top, uncompressed 32-bit float (noise in the low bits hardly compresses). Layout: "OpenEXR File Layout",
+//! <https://openexr.com/en/latest/OpenEXRFileLayout.html>. Only tests use the crate `exr`, because of its compile time.
 
 use std::io::{self, Write};
 
@@ -13,14 +11,11 @@ use crate::EncodeError;
 const MAGIC: [u8; 4] = [0x76, 0x2f, 0x31, 0x01];
 /// Version 2: one part, scan lines, short names.
 const VERSION: i32 = 2;
-/// Longest channel or attribute name.
 const NAME_MAX: usize = 31;
-/// Pixel type code of 32-bit float.
 const FLOAT: i32 = 2;
 
-/// Encodes maps of one size as channels; NaN means no value. `texts` are header attributes: name (with
-/// namespace, e.g. `farnear:units`) and value.
-/// Errors: maps of different or zero size; empty, duplicate or longer names than 31 bytes.
+/// Encodes maps of one size as channels; NaN means no value. `texts` are header attributes: name (with namespace, e.g.
+/// `farnear:units`) and value. Names must be unique, of 1 to 31 bytes.
 pub fn write(channels: &[(&str, ArrayView2<f32>)], texts: &[(&str, &str)]) -> Result<Vec<u8>, EncodeError> {
     let mut bytes = Vec::new();
     write_to(channels, texts, &mut bytes).map_err(EncodeError::of("an EXR"))?;
@@ -28,7 +23,6 @@ pub fn write(channels: &[(&str, ArrayView2<f32>)], texts: &[(&str, &str)]) -> Re
 }
 
 /// [`write()`] into a file, row by row.
-/// Errors: as [`write()`], and I/O errors.
 pub fn write_to(
     channels: &[(&str, ArrayView2<f32>)],
     texts: &[(&str, &str)],
@@ -76,7 +70,6 @@ pub fn write_to(
     Ok(())
 }
 
-/// Everything before the table of row offsets.
 fn header(channels: &[(&str, ArrayView2<f32>)], texts: &[(&str, &str)], columns: i32, rows: i32) -> Vec<u8> {
     let integers = |values: &[i32]| values.iter().flat_map(|value| value.to_le_bytes()).collect::<Vec<u8>>();
     let window = integers(&[0, 0, columns - 1, rows - 1]);

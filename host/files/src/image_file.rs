@@ -6,11 +6,9 @@
 //! | JPEG | complete files only (`zune-jpeg`, strict mode) |
 //! | TIFF, BigTIFF | 1 to 16-bit and 32-bit integers, 16 to 64-bit float, grey and RGB, planar or not, strips or tiles |
 //!
-//! The content, not the name, selects the format. EXIF orientation is applied. Raw camera files, previews and
-//! other formats are
-//! refused with a remedy. `file.tif#3` is page 3 (from 1) of a multi-page TIFF.
-//!
-//! Colour becomes `(R + G + B) / 3`, as in Li 2014, unless [`Grey`] differs; alpha is ignored.
+//! The content, not the name, selects the format. EXIF orientation is applied. Raw camera files, previews and other
+//! formats are rejected with a remedy. `file.tif#3` is page 3 (from 1) of a multi-page TIFF. Colour becomes
+//! `(R + G + B) / 3`, as in Li 2014, unless [`Grey`] differs; alpha is ignored.
 
 mod complete;
 mod decode;
@@ -32,12 +30,10 @@ pub(crate) use tiff_file::{Page, pages};
 pub(crate) use write::encode_to;
 pub use write::{encode_png, encode_tiff, png_to, png8_to};
 
-/// Floating-point grey image.
 #[derive(Clone, PartialEq, Debug)]
 pub struct GreyImage {
-    /// Shape (height, width). Integers are divided by their full scale (0..=1); floats are unchanged.
+    /// (height, width). Integers are divided by their full scale (0..=1); floats are unchanged.
     pub pixels: Array2<f32>,
-    /// Sample format of the file.
     pub samples: Samples,
     pub colour: bool,
     /// Saturation value, if known to be below full scale (12 bits in 16).
@@ -71,7 +67,6 @@ pub fn shared_white_level<'a>(images: impl Iterator<Item = &'a GreyImage> + Clon
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Samples {
-    /// Unsigned integers of this many bits.
     Integer(u8),
     Float,
 }
@@ -85,11 +80,9 @@ impl std::fmt::Display for Samples {
     }
 }
 
-/// Conversion of colour to grey.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Grey {
-    /// (R + G + B) / 3.
     #[default]
     Mean,
     /// 0.299 R + 0.587 G + 0.114 B (ITU-R BT.601).
@@ -101,7 +94,6 @@ pub enum Grey {
 }
 
 impl Grey {
-    /// Weights of red, green and blue.
     fn weights(self) -> [f64; 3] {
         match self {
             Self::Mean => [1.0 / 3.0; 3],
@@ -112,7 +104,6 @@ impl Grey {
         }
     }
 
-    /// Command-line name.
     pub fn name(self) -> &'static str {
         match self {
             Self::Mean => "mean",
@@ -169,23 +160,18 @@ pub fn file_and_page(path: &Path) -> (PathBuf, Option<usize>) {
     if path.exists() { (path.into(), None) } else { named().unwrap_or_else(|| (path.into(), None)) }
 }
 
-/// Reads an image file, or one page of it (`file.tif#3`).
-/// Errors: [`ImageError`] if unreadable, broken, incomplete, neither grey nor RGB, or multi-page without a
-/// page number.
+/// Reads an image file or page (`file.tif#3`). Fails if broken, not grey or RGB, or multi-page without a number.
 pub fn read_grey(path: &Path) -> Result<GreyImage, ImageError> {
     read_grey_with(path, &ReadSettings::default())
 }
 
 /// [`read_grey`] with settings.
-/// Errors: as [`read_grey`].
 pub fn read_grey_with(path: &Path, settings: &ReadSettings) -> Result<GreyImage, ImageError> {
     let (decoded, path) = read_decoded(path)?;
     decoded.grey(settings).map_err(|reason| ImageError::Format { path, reason })
 }
 
-/// Reads with 8 bits per sample: grey, or RGB of shape (height, width, 3). 16-bit samples keep their upper
-/// half.
-/// Errors: as [`read_grey`]; float images, whose scale is unknown.
+/// Reads with 8 bits per sample: grey, or RGB (height, width, 3). 16 bits keep their upper half; floats are rejected.
 pub(crate) fn read_8_bit(path: &Path) -> Result<Samples8, ImageError> {
     let (decoded, path) = read_decoded(path)?;
     decoded.in_8_bits().map_err(|reason| ImageError::Format { path, reason })
@@ -206,7 +192,6 @@ pub(crate) fn read_bytes(path: &Path) -> Result<Vec<u8>, ImageError> {
     Ok(bytes)
 }
 
-/// Decodes an image file; the error is a message.
 pub fn decode_grey(bytes: &[u8]) -> Result<GreyImage, String> {
     decode(bytes, None)?.grey(&ReadSettings::default())
 }

@@ -1,14 +1,12 @@
 //! # farnear-files
 //!
-//! File formats of farnear: pictures, maps, masks, meshes and video, and atomic output.
+//! File formats of farnear, and atomic output.
 //!
-//! - [`image_file`]: images as grey values; [`map`]: depths in `.npy` and float TIFF; [`masks`]: silhouettes
-//!   as pictures;
-//!   [`mesh`]: surfaces as PLY; [`video`]: frames.
+//! - [`image_file`]: images as grey values; [`map`]: depths in `.npy` and float TIFF; [`masks`]: silhouettes as
+//!   pictures; [`mesh`]: surfaces as PLY; [`video`]: frames.
 //! - [`stack`]: focus stacks in a folder or multi-page TIFF; [`order`]: order of capture.
 //! - [`npy`], [`exr`]: own implementations where a crate is not worth its compile time.
-//! - [`view`]: depth map as a colour picture; [`text`]: text on a picture.
-//! - [`staging`]: atomic files and folders.
+//! - [`view`]: depth map as a colour picture; [`text`]: text on a picture; [`staging`]: atomic files and folders.
 //!
 //! ```
 //! use farnear_files::{map, npy, staging};

@@ -32,8 +32,6 @@ pub enum MapError {
     Integers { path: PathBuf, samples: image_file::Samples },
 }
 
-/// Reads `.npy` with f32 or f64, or a TIFF.
-/// Errors: [`MapError`].
 pub fn read(path: &Path) -> Result<Array2<f32>, MapError> {
     let bytes = std::fs::read(path).map_err(|source| MapError::Read { path: path.into(), source })?;
     if bytes.is_empty() {
@@ -51,21 +49,18 @@ pub fn read(path: &Path) -> Result<Array2<f32>, MapError> {
 }
 
 /// Reads a mask: set where not black.
-/// Errors: [`ImageError`].
 pub fn read_mask(path: &Path) -> Result<Array2<bool>, ImageError> {
     Ok(image_file::read_grey(path)?.pixels.mapv(|value| value > 0.0))
 }
 
-/// Format by file ending.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Format {
     Npy,
-    /// Float `.tiff` or `.tif`.
     Tiff,
 }
 
 impl Format {
-    /// `None` for another ending.
+    /// Format of a file name; `None` for another ending.
     pub fn of(path: &Path) -> Option<Self> {
         match path.extension()?.to_str()?.to_lowercase().as_str() {
             "npy" => Some(Self::Npy),
@@ -74,7 +69,6 @@ impl Format {
         }
     }
 
-    /// Errors: of the encoder.
     pub fn encode(self, map: ArrayView2<f32>) -> Result<Vec<u8>, EncodeError> {
         match self {
             Self::Npy => Ok(npy::write(map)),
@@ -83,8 +77,6 @@ impl Format {
     }
 }
 
-/// Encodes a float TIFF.
-/// Errors: of the encoder.
 pub fn tiff(map: ArrayView2<f32>) -> Result<Vec<u8>, EncodeError> {
     let mut bytes = Cursor::new(Vec::new());
     tiff_to(map, &mut bytes).map_err(EncodeError::of("a TIFF"))?;
@@ -92,7 +84,6 @@ pub fn tiff(map: ArrayView2<f32>) -> Result<Vec<u8>, EncodeError> {
 }
 
 /// [`tiff()`] into a file, without a copy in memory.
-/// Errors: of the system or the encoder.
 pub fn tiff_to(map: ArrayView2<f32>, to: &mut (impl Write + Seek)) -> io::Result<()> {
     let (height, width) = map.dim();
     let standard = map.as_standard_layout();
@@ -105,16 +96,14 @@ pub fn tiff_to(map: ArrayView2<f32>, to: &mut (impl Write + Seek)) -> io::Result
         })
 }
 
-/// How the codes of a 16-bit depth image stand for mm: `mm = offset_mm + scale_mm * code`, 0 = no value.
+/// Codes of a 16-bit depth image: `mm = offset_mm + scale_mm * code`, 0 = no value.
 #[derive(Clone, Copy, Debug, serde::Serialize, serde::Deserialize)]
 pub struct Scale {
-    /// Depth of code 0, which means "no value".
+    /// Depth of code 0.
     pub offset_mm: f64,
-    /// Depth step per code.
     pub scale_mm: f64,
 }
 
-/// Scale that spans the map's range.
 pub fn scale(map: ArrayView2<f32>) -> Scale {
     let finite = || map.iter().copied().filter(|value| value.is_finite());
     let low = finite().fold(f32::INFINITY, f32::min);
@@ -128,7 +117,7 @@ pub fn scale(map: ArrayView2<f32>) -> Scale {
 }
 
 pub fn codes(map: ArrayView2<f32>, Scale { offset_mm, scale_mm }: Scale) -> Array2<u16> {
-    // Positive codes: adding a half and truncating rounds to nearest.
+    // Positive: adding a half and truncating rounds to nearest.
     let code = |value: f32| ((f64::from(value) - offset_mm) / scale_mm + 0.5) as u16;
     map.mapv(|value| if value.is_finite() { code(value) } else { 0 })
 }

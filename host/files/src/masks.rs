@@ -16,7 +16,7 @@ use crate::{
     video::{Pixels, VideoError, pictures},
 };
 
-/// Shape (height, width); true = set.
+/// (height, width); true = set.
 pub type Mask = Array2<bool>;
 
 #[derive(Debug, thiserror::Error)]
@@ -33,7 +33,7 @@ pub enum MaskError {
         column: usize,
         row: usize,
     },
-    /// Several dark levels, of which none is known to be the person.
+    /// Several dark levels, none known to be the person.
     #[error(
         "{}: grey levels {levels:?} and none from 128 on; masks have two levels, or 0, 127 and 255", path.display()
     )]
@@ -45,15 +45,13 @@ pub enum MaskError {
     )]
     Size {
         path: PathBuf,
-        /// Height and width.
+        /// (height, width), as `expected`.
         found: (usize, usize),
         first: String,
-        /// Height and width.
         expected: (usize, usize),
     },
 }
 
-/// A mask with its frame name.
 pub struct Named {
     /// File name without extension.
     pub name: String,
@@ -61,7 +59,6 @@ pub struct Named {
 }
 
 /// The pictures of a folder in natural order, or the one picture.
-/// Errors: neither, or a folder without pictures.
 pub fn listed(path: &Path) -> Result<Vec<PathBuf>, MaskError> {
     if path.is_dir() {
         return Ok(pictures::list(path)?);
@@ -73,7 +70,6 @@ pub fn listed(path: &Path) -> Result<Vec<PathBuf>, MaskError> {
 }
 
 /// Grey levels of a picture; coloured ones must have equal channels.
-/// Errors: unreadable or coloured pictures.
 pub fn grey(path: &Path) -> Result<Array2<u8>, MaskError> {
     match pictures::read(path)? {
         Pixels::Grey(levels) => Ok(levels),
@@ -88,32 +84,24 @@ pub fn grey(path: &Path) -> Result<Array2<u8>, MaskError> {
     }
 }
 
-/// The mask in a picture.
-///
-/// # Errors
-/// See [`grey`].
+/// Reads the mask in a picture, as [`grey`].
 pub fn read(path: &Path, levels: &Levels) -> Result<Mask, MaskError> {
     Ok(grey(path)?.mapv(|level| level >= levels.set_from))
 }
 
-/// The levels of masks in these pictures.
-///
-/// # Errors
-/// See [`grey`] and [`Levels::of_masks`].
+/// The levels of masks in these pictures ([`Levels::of_masks`]).
 pub fn levels_of(files: &[PathBuf]) -> Result<Levels, MaskError> {
     let Some(first) = files.first() else { return Ok(Levels::default()) };
     Levels::of_masks(&Levels::survey(files)?, first)
 }
 
-/// All masks of a folder.
 pub struct Masks {
     pub named: Vec<Named>,
-    /// What a user should know about their grey levels.
+    /// Notice to the user about the grey levels.
     pub remark: Option<String>,
 }
 
 impl Masks {
-    /// The masks without their names.
     #[must_use]
     pub fn pixels(self) -> Vec<Mask> {
         self.named.into_iter().map(|named| named.mask).collect()
@@ -121,9 +109,6 @@ impl Masks {
 }
 
 /// All masks of a folder (or one picture), in natural order; they must have one size.
-///
-/// # Errors
-/// See [`grey`], [`listed`] and [`Levels::of_masks`]; a mask of another size than the first.
 pub fn read_all(path: &Path) -> Result<Masks, MaskError> {
     let mut all: Vec<(String, Array2<u8>)> = Vec::new();
     let mut histogram = Histogram::default();
@@ -147,14 +132,12 @@ pub fn read_all(path: &Path) -> Result<Masks, MaskError> {
     Ok(Masks { named: all.into_iter().map(named).collect(), remark: levels.remark.clone() })
 }
 
-/// Mask as PNG: 255 = set.
-/// Errors: of the encoder.
+/// PNG with 255 = set.
 pub fn png(mask: &Mask) -> Result<Vec<u8>, EncodeError> {
     encoded(mask, |&set| if set { 255 } else { 0 })
 }
 
 /// Grey PNG with `level` per pixel.
-/// Errors: of the encoder.
 pub fn encoded<T>(pixels: &Array2<T>, level: impl Fn(&T) -> u8) -> Result<Vec<u8>, EncodeError> {
     let (height, width) = pixels.dim();
     let levels = |x: u32, y: u32| Luma([level(&pixels[[y as usize, x as usize]])]);

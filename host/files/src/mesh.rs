@@ -1,17 +1,14 @@
-//! Surface mesh as binary PLY for MeshLab, CloudCompare and Blender.
-//!
-//! The aperture stands in the front focal plane, so the chief ray of an object point at distance z from the lens goes
-//! through the front focus: a pixel of pitch p sees p (z - F) / F of the object, wherever the sensor stands. x to the
-//! right, y up, z towards the viewer; all in the unit of the depths.
+//! Surface mesh as binary PLY for MeshLab, CloudCompare and Blender. The aperture is in the front focal plane, so the
+//! chief ray of an object point at distance z from the lens passes through the front focus: a pixel of pitch p sees p
+//! (z - F) / F of the object at any sensor position. x to the right, y up, z towards the viewer, in the depths' unit.
 
 use std::io::{self, Write};
 
 use ndarray::ArrayView2;
 
-/// Depth step between surfaces, share of the map's range.
+/// Depth step between surfaces, part of the map's range.
 const STEP: f32 = 0.1;
 
-/// Optics that define a pixel's ray.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Projection {
     pub focal_length_mm: f64,
@@ -21,12 +18,11 @@ pub struct Projection {
 }
 
 impl Projection {
-    /// Column and row of the optical axis in a map of (height, width).
     pub fn axis_in(&self, (height, width): (usize, usize)) -> [f64; 2] {
         self.axis_px.unwrap_or([width, height].map(|n| 0.5 * (n as f64 - 1.0)))
     }
 
-    /// Distance of the object seen by a pixel at depth `z` from the optical axis: right and up, mm.
+    /// Position of a pixel's object at depth `z` relative to the optical axis: right and up, mm.
     pub fn beside_axis_mm(&self, dim: (usize, usize), column: usize, row: usize, z: f64) -> [f64; 2] {
         let axis = self.axis_in(dim);
         let scale = self.pixel_um * 1e-3 * (z / self.focal_length_mm - 1.0);
@@ -37,17 +33,16 @@ impl Projection {
 /// Positions of pixels' object points relative to the optical axis.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub enum Lateral {
-    /// Along rays through the front focus of a lens; depths are in mm.
+    /// Along rays through the lens' front focus; depths are in mm.
     Lens(Projection),
-    /// Each pixel has this side at the object, in the unit of the depths.
+    /// Side of a pixel at the object, in the unit of the depths.
     Pixel(f64),
-    /// Not known: positions are in pixels.
+    /// Positions are in pixels.
     Unknown,
 }
 
 impl Lateral {
-    /// Where a pixel of a map of size `dim` sees the object at depth `z`, to the right and up: in the unit of the depths, or in
-    /// pixels where it is not known.
+    /// Position of a pixel's object at depth `z`, right and up, in the unit of the depths, or in pixels if unknown.
     pub fn beside_axis(&self, dim: (usize, usize), column: usize, row: usize, z: f64) -> [f64; 2] {
         let even = |side: f64| {
             let (height, width) = dim;
@@ -61,7 +56,7 @@ impl Lateral {
         }
     }
 
-    /// The same for a map of which every `step`-th row and column is left.
+    /// The same for a map of every `step`-th row and column.
     #[must_use]
     pub fn thinned(self, step: usize) -> Self {
         let step = step as f64;
@@ -77,14 +72,10 @@ impl Lateral {
     }
 }
 
-/// Number of a place without a vertex.
+/// No vertex.
 const NONE: u32 = u32::MAX;
 
-/// The mesh of `depth`, coloured by `grey` (any scale), row by row into a file: 12 MP are half a gigabyte, which no memory
-/// is to hold. The header names the unit.
-///
-/// # Errors
-/// What the system says.
+/// Writes the mesh of `depth`, coloured by `grey` (any scale), row by row, as large maps exceed memory. Names the unit.
 pub fn write(
     depth: ArrayView2<f32>,
     grey: ArrayView2<f32>,
@@ -115,7 +106,7 @@ pub fn write(
          property uchar red\nproperty uchar green\nproperty uchar blue\n\
          element face {faces}\nproperty list uchar uint vertex_indices\nend_header\n"
     )?;
-    // Whole rows, so that the file is written in large pieces.
+    // Whole rows, for large writes.
     let mut bytes = Vec::with_capacity(2 * FACE_BYTES * width);
     for row in 0..height {
         bytes.clear();
@@ -159,7 +150,6 @@ pub fn write(
     Ok(())
 }
 
-/// Bytes per vertex and face.
 const VERTEX_BYTES: usize = 15;
 const FACE_BYTES: usize = 13;
 
@@ -171,15 +161,15 @@ fn face(corners: [u32; 3]) -> [u8; FACE_BYTES] {
     face
 }
 
-/// The same as bytes, for what is thinned first.
+/// [`write()`] into memory, for thinned maps.
 pub fn ply(depth: ArrayView2<f32>, grey: ArrayView2<f32>, lateral: Lateral, unit: &str) -> Vec<u8> {
     let mut bytes = Vec::new();
     write(depth, grey, lateral, unit, &mut bytes).unwrap_or_else(|_| unreachable!("memory takes all bytes"));
     bytes
 }
 
-/// Triangles between the previous row and this one, right of each column: 1 = upper, lower, upper right; 2 =
-/// upper right, lower, lower right; 3 = both.
+/// Triangles between the previous row and this one, right of each column: 1 = upper, lower, upper right; 2 = upper
+/// right, lower, lower right; 3 = both.
 fn mark_faces(depth_mm: ArrayView2<f32>, row: usize, step: f32, marks: &mut [u8]) {
     let (upper, lower) = (depth_mm.row(row - 1), depth_mm.row(row));
     marks.fill(0);

@@ -1,9 +1,7 @@
-//! `.npy`, NumPy's array format, for maps: two axes of f32 or f64.
-//!
-//! A file has `\x93NUMPY`, the version (two bytes), the header length (two bytes in version 1, four in 2 and
-//! 3, little-endian), the header (a Python dictionary padded with blanks, ending with a line feed) and the
-//! values (NumPy Enhancement Proposal 1). Reads both byte and axis orders; writes little-endian f32 by rows.
-//! Reasons for an own implementation: `docs/decisions/0011-npy.md`.
+//! `.npy`, NumPy's array format (NumPy Enhancement Proposal 1), for maps: two axes of f32 or f64. A file has
+//! `\x93NUMPY`, the version (two bytes), the header length (little-endian; two bytes in version 1, four in 2 and 3),
+//! the header (a Python dictionary padded with blanks and a line feed) and the values. Reads both byte and axis orders;
+//! writes little-endian f32 by rows. Reasons for an own implementation: `docs/decisions/0011-npy.md`.
 
 mod header;
 
@@ -28,7 +26,6 @@ pub enum NpyError {
     Version { major: u8, minor: u8 },
     #[error("it breaks off in the header")]
     Cut,
-    /// Invalid dictionary.
     #[error("byte {at} of its header should be {expected}")]
     Header {
         /// Offset in the header.
@@ -54,7 +51,6 @@ pub enum NpyError {
 }
 
 /// Reads an array of (height, width); f64 is rounded to f32. Uses no more memory than the file's size.
-/// Errors: [`NpyError`].
 pub fn read(bytes: &[u8]) -> Result<Array2<f32>, NpyError> {
     let (header, values) = split(bytes)?;
     let Header { descr, fortran_order, shape } = Header::parse(header)?;
@@ -75,7 +71,6 @@ pub fn read(bytes: &[u8]) -> Result<Array2<f32>, NpyError> {
     Array2::from_shape_vec((height, width), numbers).map_err(|_| size())
 }
 
-/// Splits header and values.
 fn split(bytes: &[u8]) -> Result<(&[u8], &[u8]), NpyError> {
     let rest = bytes.strip_prefix(MAGIC).ok_or(NpyError::Magic)?;
     let (&[major, minor], rest) = rest.split_first_chunk().ok_or(NpyError::Cut)?;
@@ -93,7 +88,6 @@ fn split(bytes: &[u8]) -> Result<(&[u8], &[u8]), NpyError> {
     rest.split_at_checked(length).ok_or(NpyError::Cut)
 }
 
-/// `None` for a truncated number.
 fn numbers<const SIZE: usize>(values: &[u8], number: fn([u8; SIZE]) -> f32) -> Option<Vec<f32>> {
     let (whole, cut) = values.as_chunks();
     cut.is_empty().then(|| whole.iter().map(|bytes| number(*bytes)).collect())
@@ -115,7 +109,6 @@ pub fn write(map: ArrayView2<f32>) -> Vec<u8> {
 }
 
 /// [`write()`] into a file by rows.
-/// Errors: I/O errors.
 pub fn write_to(map: ArrayView2<f32>, to: &mut impl Write) -> io::Result<()> {
     to.write_all(&header(map.dim()))?;
     // Four bytes per value, which the compiler turns into a copy.
@@ -127,7 +120,6 @@ pub fn write_to(map: ArrayView2<f32>, to: &mut impl Write) -> io::Result<()> {
     Ok(())
 }
 
-/// Everything before the values.
 fn header((height, width): (usize, usize)) -> Vec<u8> {
     let header = format!("{{'descr': '<f4', 'fortran_order': False, 'shape': ({height}, {width})}}");
     // At least one blank, then the line feed. Two numbers never exceed 65,535 bytes.
@@ -149,7 +141,6 @@ mod tests {
     use ndarray::array;
     use proptest::prelude::*;
 
-    /// An unpadded file of this version.
     fn file(version: u8, header: &str, values: &[u8]) -> Vec<u8> {
         let mut bytes = [MAGIC, &[version, 0]].concat();
         match version {
@@ -243,7 +234,6 @@ mod tests {
             prop_assert_eq!(back.mapv(f32::to_bits), map.mapv(f32::to_bits));
         }
 
-        /// Any bytes give an error or a map no larger than the input.
         #[test]
         fn survives_any_bytes(
             version in 0..4u8,

@@ -1,8 +1,5 @@
-//! Order of capture by the numbers in file names.
-//!
-//! Text compares by letters, digits by value: `in9` before `in10`. Camera counters restart after 9999 (DCF):
-//! if the numbers form two dense groups at the ends of the range, the upper one comes first, unless the time
-//! stamps contradict.
+//! Order of capture by the numbers in file names: `in9` before `in10`. Camera counters restart after 9999 (DCF): if the
+//! numbers form two dense groups at the ends of the range, the upper one comes first unless time stamps contradict.
 
 use std::{
     cmp::Ordering,
@@ -10,7 +7,6 @@ use std::{
     time::SystemTime,
 };
 
-/// Sorts files by number, across a counter restart.
 pub fn sort(paths: &mut [PathBuf]) {
     paths.sort_by(|a, b| natural(&stem(a), &stem(b)));
     if let Some(first) = roll_over(paths) {

@@ -5,7 +5,6 @@ use ndarray::ArrayView2;
 /// Histogram bins by the upper half of the ordered key.
 const BINS: usize = 1 << 16;
 
-/// Histogram of the finite values.
 pub struct Quantiles<'a> {
     map: ArrayView2<'a, f32>,
     counts: Vec<u32>,
@@ -32,7 +31,6 @@ impl<'a> Quantiles<'a> {
         Self { map, counts, finite }
     }
 
-    /// Number of finite values.
     pub fn finite(&self) -> usize {
         self.finite
     }
@@ -51,7 +49,6 @@ impl<'a> Quantiles<'a> {
     }
 }
 
-/// Bin of a rank, and the number of values before it.
 fn place(counts: &[u32], rank: usize) -> Option<(usize, usize)> {
     let mut before = 0;
     for (bin, count) in counts.iter().enumerate() {

@@ -1,7 +1,6 @@
-//! Focus stacks: files of a folder, or pages of a TIFF with positions.
-//!
-//! Positions come from the ImageJ description (`spacing`, `unit`), OME-XML (`PositionZ` of each plane, else `PhysicalSizeZ`) or
-//! Micro-Manager's page tag (`ZPositionUm`). The side of a pixel comes from OME-XML (`PhysicalSizeX`) or the resolution of an ImageJ file.
+//! Focus stacks: files of a folder, or pages of a TIFF with positions. Positions come from the ImageJ description
+//! (`spacing`, `unit`), OME-XML (`PositionZ` of each plane, else `PhysicalSizeZ`) or Micro-Manager's page tag
+//! (`ZPositionUm`); the pixel size from OME-XML (`PhysicalSizeX`) or an ImageJ file's resolution.
 
 mod positions;
 
@@ -20,11 +19,10 @@ use crate::{
 pub struct Stack {
     /// Pages are `file.tif#3`.
     pub images: Vec<PathBuf>,
-    /// Focus positions from metadata.
     pub positions_um: Option<Vec<f64>>,
-    /// Side of a pixel at the object, um, from the file's metadata.
+    /// Side of a pixel at the object, from metadata.
     pub object_pixel_um: Option<f64>,
-    /// What a person should know of the order.
+    /// Notices to the user about the order.
     pub remarks: Vec<String>,
 }
 
@@ -42,16 +40,13 @@ pub enum StackError {
         /// Counts per format.
         found: String,
     },
-    /// Two equal images.
     #[error("{} and {} hold the same image; move one of them away", first.display(), second.display())]
     Twice { first: PathBuf, second: PathBuf },
-    /// Planes that are not a focus series.
     #[error("{}: {reason}", path.display())]
     Planes { path: PathBuf, reason: String },
 }
 
 /// Lists a folder with images of one format, or a multi-page TIFF.
-/// Errors: [`StackError`], except [`StackError::Twice`].
 pub fn list(path: &Path) -> Result<Stack, StackError> {
     if path.is_dir() { folder(path) } else { file(path) }
 }
@@ -106,8 +101,7 @@ fn file(path: &Path) -> Result<Stack, StackError> {
     })
 }
 
-/// Reads the images in order; `each` is called with each index first and may stop.
-/// Errors: [`StackError::Image`], [`StackError::Twice`] for two equal images; errors of `each`.
+/// Reads the images in order; `each` is called with each index first and may stop. Two equal images are an error.
 pub fn read<E: From<StackError>>(
     images: &[PathBuf],
     settings: &ReadSettings,

@@ -30,7 +30,6 @@ const JUST_BEGUN: Duration = Duration::from_secs(10);
 /// Limit of leftover folders of one name, before the user must check.
 const LEFT_BEHIND_MAX: u32 = 100;
 
-/// Write buffer.
 const BUFFER_BYTES: usize = 1 << 18;
 
 /// A folder that appears under its name once complete. Dropping it earlier removes everything.
@@ -42,15 +41,14 @@ pub struct Staging {
     target: PathBuf,
     /// Whether the target folder was created for these files.
     made_target: bool,
-    /// Files of an earlier result, of which those that are not written again are removed.
+    /// Files of an earlier result; those not written again are removed.
     replaced: Vec<&'static str>,
-    /// The file that describes the others: removed first and put in place last.
+    /// The file that describes the others: removed first, published last.
     record: Option<&'static str>,
 }
 
 impl Staging {
-    /// Begins a new folder; creates its parents.
-    /// Errors: [`StagingError::Exists`] unless the target is missing or an empty folder.
+    /// Begins a new folder and its parents. Returns [`StagingError::Exists`] unless it is missing or empty.
     pub fn new_folder(target: &Path) -> Result<Self, StagingError> {
         let target: PathBuf = target.components().collect(); // without a slash at its end
         if occupied(&target) {
@@ -65,16 +63,15 @@ impl Staging {
         Self::begin(parent.join(partial_name(&name)), target, false)
     }
 
-    /// Begins a set of files for a folder, which is created if missing. Files of equal names are replaced,
-    /// others stay.
+    /// Begins a set of files for a folder, created if missing. Files of equal names are replaced, others stay.
     pub fn into_folder(target: &Path) -> Result<Self, StagingError> {
         let made_target = !target.exists();
         fs::create_dir_all(target).map_err(StagingError::at(target))?;
         Self::begin(target.join(partial_name("files")), target.into(), made_target)
     }
 
-    /// Replaces an earlier result in the folder: files with these names that are not written now are removed. `record`
-    /// describes the result: while files of two results are in the folder, it is absent.
+    /// Replaces an earlier result: unwritten files of these names are removed. `record` describes the result and is
+    /// absent while files of two results are in the folder.
     pub fn replacing(mut self, record: &'static str, files: impl IntoIterator<Item = &'static str>) -> Self {
         self.replaced.extend(files);
         self.record = Some(record);
@@ -97,7 +94,6 @@ impl Staging {
         Ok(Self { folder: free, _in_use: in_use, target, made_target, replaced, record })
     }
 
-    /// Temporary path of a file.
     pub fn path(&self, name: &str) -> PathBuf {
         self.folder.join(name)
     }
@@ -112,8 +108,6 @@ impl Staging {
         fs::write(&path, bytes).map_err(StagingError::at(&self.target.join(name)))
     }
 
-    /// Writes a file through `fill`.
-    /// Errors: [`StagingError::Io`] of `fill` or the system.
     pub fn fill(
         &self,
         name: &str,
@@ -188,8 +182,7 @@ pub fn write_file(path: &Path, bytes: &[u8]) -> Result<(), StagingError> {
     })
 }
 
-/// Removes leftovers of killed programs. Active writers hold a lock that ends with them; where folders cannot
-/// be locked or removed, everything stays.
+/// Removes leftovers of killed programs. Active writers hold a lock that ends with them; locked folders stay.
 fn sweep(folder: &Path) {
     for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
         let name = entry.file_name();

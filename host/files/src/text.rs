@@ -11,25 +11,22 @@ pub struct Writer {
 }
 
 impl Writer {
-    /// Text of this height.
-    /// Errors: a damaged built-in font.
+    /// Prepares text of this height.
     pub fn new(height_px: f32) -> Result<Self, EncodeError> {
         let font = FontRef::try_from_slice(dejavu::sans::regular()).map_err(EncodeError::of("text"))?;
         Ok(Self { font, scale: PxScale::from(height_px) })
     }
 
-    /// Line height, px.
     pub fn height(&self) -> u32 {
         self.font.as_scaled(self.scale).height().ceil() as u32
     }
 
-    /// Text width, px.
     pub fn width(&self, text: &str) -> u32 {
         let font = self.font.as_scaled(self.scale);
         text.chars().map(|letter| font.h_advance(font.glyph_id(letter))).sum::<f32>().ceil() as u32
     }
 
-    /// Writes with the upper left corner at (`left`, `top`), clipped at the picture.
+    /// Writes with the upper left corner at (`left`, `top`), clipped.
     pub fn write(&mut self, picture: &mut RgbImage, left: u32, top: u32, text: &str, ink: Rgb<u8>) {
         let font = self.font.as_scaled(self.scale);
         let mut x = left as f32;

@@ -1,7 +1,5 @@
-//! Video frames from a folder of pictures, a Y4M file, or any file through an installed ffmpeg.
-//!
-//! All frames have one size and are all grey or all RGB, 8 bits per sample; other frames are errors. Nothing
-//! is read ahead, so a video may exceed memory.
+//! Video frames from a folder of pictures, a Y4M file, or any file through an installed ffmpeg. All frames must have
+//! one size and be all grey or all RGB, 8 bits per sample. Nothing is read ahead, so a video may exceed memory.
 
 mod ffmpeg;
 pub mod pictures;
@@ -22,12 +20,11 @@ pub struct VideoFrame {
     pub pixels: Pixels,
 }
 
-/// Samples of 8 bits.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Pixels {
-    /// Shape (height, width).
+    /// (height, width).
     Grey(Array2<u8>),
-    /// RGB, shape (height, width, 3).
+    /// (height, width, 3).
     Rgb(Array3<u8>),
 }
 
@@ -43,12 +40,10 @@ impl Pixels {
     }
 }
 
-/// Common properties of all frames.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Kind {
     pub width: usize,
     pub height: usize,
-    /// RGB rather than grey.
     pub colour: bool,
 }
 
@@ -107,7 +102,7 @@ pub struct Video {
     frames: Frames,
     first: Option<Kind>,
     ended: bool,
-    /// What a user should know about how it is read.
+    /// Notice to the user about how it is read.
     pub remark: Option<String>,
 }
 
@@ -118,8 +113,7 @@ impl std::fmt::Debug for Video {
 }
 
 impl Video {
-    /// Opens a folder of pictures, a `.y4m` file, or any other file through ffmpeg.
-    /// Errors: [`VideoError`] if nothing can be read; later errors come with their frames.
+    /// Opens a folder of pictures, a `.y4m` file, or any other file through ffmpeg. Frames report later errors.
     pub fn open(path: &Path) -> Result<Self, VideoError> {
         let metadata = path.metadata().map_err(|source| VideoError::io(path, source))?;
         let mut remark = None;
@@ -162,7 +156,6 @@ impl Iterator for Video {
     }
 }
 
-/// Frame name by number, from 1.
 fn numbered(number: usize) -> String {
     format!("frame_{number:06}")
 }
@@ -216,7 +209,7 @@ mod tests {
         assert!(error.to_string().contains("a.png"), "{error}");
     }
 
-    /// Frames that ffmpeg wrote with the times of `filter`, read back; `None` without ffmpeg or its encoder.
+    /// Frames written by ffmpeg with the times of `filter`, read back; `None` without ffmpeg or its encoder.
     fn through_ffmpeg(filter: &str) -> Option<(usize, Option<String>)> {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("recorded.webm");

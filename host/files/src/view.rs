@@ -1,5 +1,4 @@
-//! `view.png`: depth map as a colour picture: near is warm, far is cold, grey has no value, with a scale bar
-//! in mm.
+//! `view.png`: depth map as a colour picture: near is warm, far is cold, grey has no value; scale bar in mm.
 
 use image::{Rgb, RgbImage};
 use ndarray::ArrayView2;
@@ -8,7 +7,7 @@ use crate::{EncodeError, image_file::encode_to, quantiles::Quantiles, text::Writ
 
 /// Small maps are enlarged by an integer factor to at least this height.
 const MIN_HEIGHT_PX: usize = 320;
-/// Share of outliers on either side that do not affect the colours.
+/// Part of outliers on either side that do not affect the colours.
 const OUTLIERS: f64 = 0.005;
 const MARGIN_PX: u32 = 24;
 const BAR_PX: u32 = 22;
@@ -18,10 +17,10 @@ const NO_VALUE: Rgb<u8> = Rgb([150, 150, 152]);
 
 /// Confidence with full colour.
 const CONFIDENT: f32 = 0.5;
-/// Share of colour at confidence 0.
+/// Part of colour at confidence 0.
 const FAINTEST: f32 = 0.15;
 
-/// Picture of a depth map in mm as PNG. `confidence` (0 to 1, same shape) reduces the colour.
+/// PNG of a depth map in mm. `confidence` (0 to 1, same shape) reduces the colour.
 pub fn view_png(depth_mm: ArrayView2<f32>, confidence: ArrayView2<f32>) -> Result<Vec<u8>, EncodeError> {
     view_png_in("mm", depth_mm, confidence)
 }
@@ -116,7 +115,7 @@ impl Colours {
     }
 }
 
-/// Depth range of the colours; `None` without values.
+/// `None` without values.
 struct Range(Option<(f32, f32)>);
 
 impl Range {

@@ -1,10 +1,8 @@
-//! Frames per second of the background model, of frame to centred silhouette, and of frame to embedded point;
-//! one thread, 640x480, grey and colour: `cargo bench -p farnear-recognition --bench background`.
-//! `FARNEAR_JSON=1` prints one JSON line per figure.
+//! Frame rates of the background model, frame to silhouette and frame to embedded point; one thread, 640x480.
 //!
-//! Scene: textured background with sensor noise, a tenth of the pixels flickering (foliage), three moving
-//! discs: one to five components per pixel, as in real video. The highway sequence of ChangeDetection.net,
-//! doubled to 640x480, is timed if present.
+//! Scene: textured background with noise, a tenth of the pixels flickering (foliage), three moving discs. The
+//! highway sequence of ChangeDetection.net, doubled to 640x480, is timed if present. `FARNEAR_JSON=1` prints
+//! JSON.
 
 use std::{fs, hint::black_box, time::Instant};
 
@@ -20,10 +18,8 @@ use farnear_silhouettes::mask::{
 use ndarray::{Array2, Array3, ArrayView1, s};
 
 const SIZE: (usize, usize) = (480, 640);
-/// Frames before the sequence repeats.
 const FRAMES: usize = 60;
 
-/// Fast repeatable noise (xorshift, Marsaglia 2003).
 struct Noise(u64);
 
 impl Noise {
@@ -96,7 +92,6 @@ fn milliseconds(mut frame: impl FnMut(usize)) -> [f64; 2] {
     [passes[0], passes[2]]
 }
 
-/// An RBF map over 1500 centres; its values do not affect the time.
 fn map() -> Rbf {
     let mut noise = Noise(11);
     let mut uniform = || (noise.next() >> 40) as f32 / (1 << 24) as f32;

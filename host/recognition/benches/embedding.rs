@@ -1,9 +1,7 @@
-//! Times from silhouettes to points, and of shadow removal: `cargo bench -p farnear-recognition --bench
-//! embedding`.
+//! Times from silhouettes to points: `cargo bench -p farnear-recognition --bench embedding`.
 //!
 //! The gallery is 1500 seeded synthetic silhouettes. `-- --features FILE.npy` only writes its descriptors (N
-//! x 360), for comparison with other implementations. `FARNEAR_JSON=1` prints one JSON line per figure.
-//! `landmark_20000` runs first, so the printed peak memory is its own (with the gallery).
+//! x 360). `FARNEAR_JSON=1` prints JSON lines. `landmark_20000` runs first, so the peak memory is its own.
 
 use std::{hint::black_box, io::Write, time::Instant};
 
@@ -28,7 +26,6 @@ const GALLERY: usize = 1500;
 const LARGE: usize = 20_000;
 const NEIGHBOURHOOD: Neighbourhood = Neighbourhood::Nearest(12);
 
-/// Silhouette `i`: a person walking, leaning and reaching, from one of eight sides.
 fn silhouette(i: usize) -> Mask {
     let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(i as u64);
     let build = Build { height_mm: rng.random_range(1600.0..1900.0), ..Build::default() };
@@ -55,7 +52,7 @@ fn described(masks: &[Mask]) -> Array2<f32> {
     all
 }
 
-/// Runs `work` `repeats` times in a pool of this many threads and prints the times of one of its `per` parts.
+/// Runs `work` `repeats` times with `threads` threads and prints the times of one of its `per` parts.
 fn time<T: Send>(
     name: &str,
     threads: usize,
@@ -85,7 +82,6 @@ fn time<T: Send>(
     })
 }
 
-/// Peak resident memory of this process, MiB, if known.
 fn peak_mib() -> Option<f64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;

@@ -1,16 +1,15 @@
-//! Domain adaptation for clips from other cameras, sensors or bodies than the training clips: unlabelled clips tell
-//! how their frames differ.
+//! Domain adaptation for clips from other cameras, sensors or bodies than the training clips, without labels.
 //!
-//! Frame vectors of the target are moved so that their mean, their spread or their whole covariance over all of its clips are those of the
-//! training clips: adaptive statistics (Li et al., Pattern Recognition 80, 2018) or correlation alignment (CORAL; Sun et al., AAAI 2016;
-//! here the target goes to the source, so that a trained model stays as it is). No label is looked at. It rests on both
-//! sides doing about the same in about the same shares: one clip alone is not enough.
+//! Frame vectors of the target are moved so that their mean, spread or covariance over all clips equal those
+//! of the training clips: adaptive statistics (Li et al., Pattern Recognition 80, 2018) or CORAL (Sun et al.,
+//! AAAI 2016). Here the target moves to the source, so a trained model is unchanged. Both sides must contain
+//! similar activities in similar proportions; one clip is not enough.
 
 use crate::embedding::spectral;
 use ndarray::{Array1, Array2, Axis};
 use serde::{Deserialize, Serialize};
 
-/// Matched statistics of the target.
+/// Statistics of the target that are matched.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Alignment {
@@ -43,13 +42,12 @@ impl std::str::FromStr for Alignment {
 pub struct Statistics {
     /// Mean per number of a frame.
     pub mean: Array1<f32>,
-    /// Covariance, numbers x numbers.
+    /// Covariance (numbers x numbers).
     pub covariance: Array2<f32>,
 }
 
 /// Ridge on variances, relative to their mean, so that constant directions are unchanged.
 const RIDGE: f32 = 0.1;
-/// Largest change of a spread.
 const MOST: f32 = 4.0;
 
 impl Statistics {
@@ -116,7 +114,6 @@ fn ridged(covariance: &Array2<f32>) -> Array2<f32> {
     covariance + &(Array2::<f32>::eye(width) * ridge.max(1e-9))
 }
 
-/// Power of a symmetric positive definite matrix.
 fn power(matrix: &Array2<f32>, exponent: f64) -> Array2<f32> {
     let width = matrix.nrows();
     let flat: Vec<f64> = matrix.iter().map(|v| f64::from(*v)).collect();
@@ -138,7 +135,6 @@ mod tests {
     use super::*;
     use rand::{Rng, SeedableRng};
 
-    /// Clips of three correlated numbers, optionally rotated and shifted.
     fn clips(other: bool) -> Vec<Array2<f32>> {
         let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(3);
         (0..40)

@@ -1,10 +1,9 @@
-//! An auxiliary model: another recogniser's answer for a clip, compared with its answers for the training clips of the activity.
+//! An auxiliary model with many more activities, trained on synthetic people, separates untrained ones
+//! better.
 //!
-//! Untrained activities often lie among the trained ones. A recogniser with many more activities, taught on
-//! synthetic people, separates them better: it need not know the activity, only describe clips consistently.
-//! An activity's profile is the normalised mean of the square roots of its probabilities over the training
-//! clips; the distance of a clip is the Bhattacharyya distance, -ln of the scalar product (Kailath, IEEE
-//! Trans. Communication Technology 15, 1967). Background clips: Hendrycks et al., ICLR 2019.
+//! An activity's profile is the normalised mean of the square roots of the auxiliary model's probabilities
+//! over the training clips. A clip's distance is the Bhattacharyya distance, -ln of the scalar product
+//! (Kailath, IEEE Trans. Communication Technology 15, 1967). Background clips: Hendrycks et al., ICLR 2019.
 
 use super::classifier::largest;
 use super::clip::Clip;
@@ -17,7 +16,7 @@ use std::sync::Arc;
 /// Another recogniser with its answers for the trained activities.
 #[derive(Clone, Debug, PartialEq)]
 pub struct AuxiliaryModel {
-    /// Recogniser that describes clips.
+    /// Describes clips.
     pub recogniser: Arc<Recogniser>,
     /// Trained x auxiliary activities: square roots, rows of length 1.
     pub profiles: Array2<f32>,
@@ -26,9 +25,8 @@ pub struct AuxiliaryModel {
 }
 
 impl AuxiliaryModel {
-    /// Asks another recogniser about clips of this many classes. The limits are the conformal rule's for people who taught nothing: every
-    /// clip is compared with other subjects' profile of its class (with a single subject, with that of the other clips), so that what is
-    /// answered rightly is called unknown no more often than stated; a wrong answer oftener, and rightly.
+    /// Profiles and conformal limits from the training clips. Each clip is compared with other subjects'
+    /// profile of its class, or with that of a single subject's other clips.
     pub(super) fn learned(
         recogniser: Arc<Recogniser>,
         clips: &[Clip],
@@ -62,7 +60,6 @@ impl AuxiliaryModel {
         Ok(Self { recogniser, profiles, limits })
     }
 
-    /// Outlier score of a clip for the answered activity; above 1 is unknown.
     pub(super) fn outlier_score(&self, said: &Answer, answer: &Answer) -> f32 {
         let probabilities: Vec<f32> =
             answer.probabilities.iter().map(|(_, probability)| *probability).collect();
@@ -70,7 +67,6 @@ impl AuxiliaryModel {
         self.limits.score(class, distance(roots_of(said).view(), self.profiles.row(class)))
     }
 
-    /// Whether all sizes match a recogniser of these activities.
     pub(super) fn fits(&self, classes: usize, boxes: bool) -> bool {
         self.recogniser.second.is_none()
             && self.recogniser.views == 1
@@ -80,7 +76,7 @@ impl AuxiliaryModel {
     }
 }
 
-/// Square roots of what a recogniser says of a clip; `None` without a visible person.
+/// `None` without a visible person.
 fn roots(recogniser: &Recogniser, clip: &Clip) -> Result<Option<Array1<f32>>, ModelError> {
     let said = recogniser.recognise(&clip.views)?;
     Ok(said.outlier_score.is_finite().then(|| roots_of(&said)))
@@ -95,7 +91,7 @@ fn to_unit_length(sum: Array1<f32>) -> Array1<f32> {
     if length > 0.0 { sum / length } else { sum }
 }
 
-/// Bhattacharyya distance of square roots of probabilities, with a finite maximum.
+/// Bhattacharyya distance of square roots of probabilities, limited to a finite maximum.
 fn distance(said: ArrayView1<f32>, profile: ArrayView1<f32>) -> f32 {
     -said.dot(&profile).clamp(1e-9, 1.0).ln()
 }

@@ -1,7 +1,7 @@
 //! Cross-validation over training subjects.
 //!
-//! Spaces are learned once from all training clips (unsupervised); classifiers are trained and tested over
-//! folds of subjects on the Gram matrix. O(spaces x (clips^2 P + folds clips^2)), mostly for the spaces.
+//! Spaces are learned once from all training clips (unsupervised). Classifiers are trained and tested over
+//! folds of subjects on the Gram matrix. O(spaces x (clips^2 P + folds clips^2)).
 
 use super::classifier::ClassifierKind;
 use super::classifier::method::Fold;
@@ -78,10 +78,9 @@ pub fn names<'a>(all: impl Iterator<Item = &'a String>) -> Vec<String> {
     all.cloned().collect::<BTreeSet<_>>().into_iter().collect()
 }
 
-/// Selects space, sharpness and classifier for clips with equal views; labels index `classes`. With fewer
-/// than two subjects the first values are taken. Answers of all arrangements count together, because one
-/// choice for all has more trials.
-/// Errors: a space that cannot be learned; [`EmbeddingError::Stopped`].
+/// Selects space, sharpness and classifier for clips with equal views; labels index `classes`. Uses the first
+/// values for fewer than two subjects. One choice serves all arrangements: their answers count together.
+/// Fails if a space cannot be learned, or with [`EmbeddingError::Stopped`].
 pub fn choose(
     clips: &[&Clip],
     classes: &[String],
@@ -142,7 +141,6 @@ struct Candidate {
 }
 
 impl Problem<'_> {
-    /// Best sharpness and classifier in a space; the first ones without `compare`.
     fn best_of(
         &self,
         settings: &SpaceSettings,
@@ -190,7 +188,6 @@ impl Problem<'_> {
         })
     }
 
-    /// Right answers of a classifier over folds of subjects, from the Gram matrix.
     fn right(&self, gram: &Array2<f32>, kind: ClassifierKind) -> usize {
         (0..self.folds)
             .into_par_iter()

@@ -1,7 +1,6 @@
 //! Classifiers with probabilities per class.
 //!
-//! A classifier is a file of this module that implements [`Method`], and a line in the table below, which
-//! also serves training, cross-validation, model files and `--classifier`.
+//! To add one, implement [`Method`] in a file of this module and add a line to the table below.
 
 pub mod method;
 pub mod neighbours;
@@ -65,7 +64,6 @@ macro_rules! classifiers {
                 }
             }
 
-            /// Right answers over a fold of cross-validation.
             pub(super) fn right(self, fold: &Fold) -> usize {
                 let answers = match self {
                     $(Self::$name(parameter) => <$trained as Method>::answers(fold, parameter),)+
@@ -96,7 +94,7 @@ macro_rules! classifiers {
                 }
             }
 
-            /// Whether it is one for patterns of this many numbers and so many classes; a model file may hold anything.
+            /// Whether sizes match, as a model file may hold anything.
             pub(super) fn fits(&self, width: usize, classes: usize) -> bool {
                 match self {
                     $(Self::$name(trained) => trained.fits(width, classes),)+
@@ -148,7 +146,6 @@ mod tests {
     use ndarray::Array2;
     use rand::{Rng, SeedableRng};
 
-    /// Every classifier, with its first parameter, on three clouds.
     #[test]
     fn all_tell_separable_classes_apart_trained_and_over_folds() {
         let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(9);

@@ -22,8 +22,7 @@ pub struct Track {
     pub descriptors: Array2<f32>,
     /// Coarse silhouettes, one frame per row.
     pub cells: Array2<u8>,
-    /// Height, width, centroid x and y in pixels per frame; `None` for cropped silhouettes, which have no
-    /// motion.
+    /// Height, width, centroid x and y in pixels per frame; `None` for cropped silhouettes.
     pub boxes: Option<Array2<f32>>,
     /// Number of skipped empty masks.
     pub empty_frames: usize,
@@ -41,8 +40,7 @@ pub struct Clip {
 }
 
 impl Track {
-    /// Describes the masks of a clip. With `full_frames` they are whole camera frames, so that the box's
-    /// motion is kept.
+    /// Describes the masks of a clip. With `full_frames` they are camera frames and the box's motion is kept.
     pub fn from_masks(masks: &[Mask], scaling: Scaling, full_frames: bool) -> Self {
         let found: Vec<Option<(CentroidDistance, CoarseSilhouette, [f32; BOX_NUMBERS])>> = masks
             .par_iter()
@@ -69,8 +67,7 @@ impl Track {
         Self { descriptors, cells, boxes, empty_frames: masks.len() - kept.len() }
     }
 
-    /// Draws capsule bodies on one canvas (10 mm per pixel), so that the box's motion is kept, and describes
-    /// them. Bodies without a finite point give an empty track.
+    /// Draws capsule bodies on one canvas (10 mm per pixel); the track is empty without a finite point.
     pub fn from_bodies(bodies: &[Vec<Capsule>], view: &View, scaling: Scaling) -> Self {
         const MM_PER_PX: f64 = 10.0;
         let reach: Vec<Point> = bodies.iter().flat_map(|body| extent(body, view)).collect();
@@ -86,8 +83,8 @@ impl Track {
         self.descriptors.nrows()
     }
 
-    /// Input of principal components with `row` numbers: centroid distances and, with more room, the coarse
-    /// silhouette, weighted to vary equally over everyday activities.
+    /// Input of principal components: centroid distances and, if `row` has room, the coarse silhouette,
+    /// weighted to vary equally over everyday activities.
     pub(super) fn seen(&self, frame: usize, row: ArrayViewMut1<f32>) {
         const WEIGHT: f32 = 0.35 / CELL_PIXELS as f32;
         let (mut distances, mut cells) = row.split_at(Axis(0), ANGLES);
@@ -97,7 +94,7 @@ impl Track {
         }
     }
 
-    /// Mirrored track: angle a becomes 180 - a, columns and x are reversed.
+    /// Mirrored track: angle a becomes 180 - a; columns and x are reversed.
     pub fn mirrored(&self) -> Self {
         let angles: Vec<usize> = (0..ANGLES).map(|a| (ANGLES + ANGLES / 2 - a) % ANGLES).collect();
         let cells: Vec<usize> = (0..CELLS)
@@ -128,22 +125,20 @@ impl Track {
 }
 
 impl Clip {
-    /// Mirrored performance. With views at equal steps, the first from the front, view v becomes the mirror
-    /// of view n - v.
+    /// Mirrored performance. Views are at equal steps from the front: view v becomes the mirror of n - v.
     pub fn mirrored(&self) -> Self {
         let n = self.views.len();
         let views = (0..n).map(|v| self.views[(n - v) % n].mirrored()).collect();
         Self { subject: self.subject.clone(), activity: self.activity.clone(), views }
     }
 
-    /// Selects frames of all views by a function of their number.
+    /// Selects frames of all views; `choose` maps a track's length to frame indices.
     pub fn select(&self, choose: impl Fn(usize) -> Vec<usize>) -> Self {
         let views = self.views.iter().map(|view| view.select(&choose(view.frames()))).collect();
         Self { subject: self.subject.clone(), activity: self.activity.clone(), views }
     }
 
-    /// The performance cut into windows of `length` frames, half overlapping, for a recogniser of un-segmented recordings; a
-    /// shorter clip stays whole. Views of unequal length are cut to the shortest.
+    /// Windows of `length` frames, half overlapping; a shorter clip is one. Cuts views to the shortest.
     pub fn windows(&self, length: usize) -> Vec<Self> {
         let length = length.max(1);
         let frames = self.views.iter().map(Track::frames).min().unwrap_or(0);

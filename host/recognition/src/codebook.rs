@@ -1,10 +1,10 @@
 //! A clip's pattern over a codebook of typical frames.
 //!
-//! Typical frames are k-means centres of the training frames (instead of the thesis' grid, whose cells grow with the power of the
-//! dimensions). Each frame is assigned softly, to all centres by a Gaussian of its distance; the assignments are averaged over the clip and
-//! square-rooted, which makes the straight product of two patterns the Bhattacharyya coefficient. The average does not know the
-//! order of frames. An ordered pattern adds the same over the clip's halves and thirds. A second, smaller codebook may add its
-//! [`super::residuals`].
+//! Typical frames are k-means centres of the training frames; the cells of the thesis' grid grow with the
+//! power of the dimensions. Each frame is assigned softly, to all centres by a Gaussian of its distance. The
+//! mean assignment is square-rooted, so that the scalar product of two patterns is the Bhattacharyya
+//! coefficient. It is independent of the order of frames. An ordered pattern adds the same over the clip's
+//! halves and thirds. A second, smaller codebook may add its [`super::residuals`].
 
 use super::frames::Mode;
 use super::residuals::residuals;
@@ -25,9 +25,7 @@ pub struct Codebook {
     pub residual: Option<Box<Codebook>>,
 }
 
-/// Limit of clustered frames.
 const MOST_FRAMES: usize = 8000;
-/// Iterations of Lloyd's algorithm.
 const ROUNDS: usize = 12;
 
 impl Codebook {
@@ -85,8 +83,7 @@ impl Codebook {
         self.centres.nrows().checked_mul(segments(mode).len())?.checked_add(residual)
     }
 
-    /// Soft assignments (frames x M) with row sums of 1. `sharpness` scales the exponent (1 = spread of the
-    /// training frames).
+    /// Soft assignments (frames x M) with row sums of 1. `sharpness` 1 is the spread of the training frames.
     pub fn soft_assignments(&self, frames: ArrayView2<f32>, sharpness: f32) -> Array2<f32> {
         // |f - c|^2 without |f|^2, which cancels in the normalisation.
         let norms = squared_norms(self.centres.view());
@@ -134,7 +131,6 @@ impl Codebook {
     }
 }
 
-/// Nearest centre of each frame and its squared distance.
 fn assigned(frames: ArrayView2<f32>, centres: &Array2<f32>) -> Vec<(usize, f32)> {
     let (lengths, norms) = (squared_norms(frames), squared_norms(centres.view()));
     let products = times_transposed(frames, centres.view());
@@ -164,7 +160,6 @@ fn squared(a: ArrayView1<f32>, b: ArrayView1<f32>) -> f32 {
     a.iter().zip(b).map(|(p, q)| (p - q) * (p - q)).sum()
 }
 
-/// Stacks the rows of matrices.
 pub(crate) fn stacked<'a>(parts: impl Iterator<Item = ArrayView2<'a, f32>>) -> Array2<f32> {
     let parts: Vec<_> = parts.collect();
     ndarray::concatenate(Axis(0), &parts).unwrap_or_else(|_| Array2::zeros((0, 0)))

@@ -1,9 +1,6 @@
-//! From silhouettes to points in few dimensions (Li 2014, section 9.3.1).
-//!
-//! A mask becomes 360 centroid distances ([`descriptor`]); a gallery of them is laid out by [`isomap`],
-//! [`landmark`] Isomap (large galleries) or [`pca`]; [`rbf`] embeds new silhouettes.
-//!
-//! Matrices are row-major `Array2<f32>`, one sample per row. Uses the current rayon pool.
+//! From silhouettes to points in few dimensions (Li 2014, section 9.3.1): [`descriptor`] describes a mask,
+//! [`isomap`], [`landmark`] (large galleries) or [`pca`] lay out a gallery, [`rbf`] embeds new silhouettes.
+//! Matrices are row-major, one sample per row. Uses the current rayon pool.
 
 pub mod descriptor;
 pub mod geodesic;
@@ -56,7 +53,6 @@ pub enum EmbeddingError {
     },
 }
 
-/// Sizes and first members of a graph's parts, for the error text.
 fn describe(components: &[Vec<usize>]) -> String {
     const SHOWN: usize = 4;
     let mut text: Vec<String> = components
@@ -75,7 +71,6 @@ fn describe(components: &[Vec<usize>]) -> String {
     text.join("; ")
 }
 
-/// Checks that all rows are finite and sufficient in number.
 fn check(samples: ArrayView2<f32>, needed: usize) -> Result<(), EmbeddingError> {
     if samples.nrows() < needed {
         return Err(EmbeddingError::TooFewSamples { found: samples.nrows(), needed });
@@ -106,7 +101,6 @@ pub(crate) fn times_transposed(a: ArrayView2<f32>, b: ArrayView2<f32>) -> Array2
     product
 }
 
-/// Squared Euclidean norm of every row.
 pub(crate) fn squared_norms(samples: ArrayView2<f32>) -> Vec<f32> {
     samples.rows().into_iter().map(|row| row.iter().map(|v| v * v).sum()).collect()
 }

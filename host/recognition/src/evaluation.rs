@@ -1,5 +1,4 @@
-//! Evaluation: leave-one-subject-out with parameters chosen inside the training subjects, confusion matrices
-//! with intervals, calibration.
+//! Leave-one-subject-out evaluation, confusion matrices with intervals, calibration.
 
 pub mod calibration;
 pub mod confusion;

@@ -1,8 +1,7 @@
 //! Parameters chosen by cross-validation, and their candidates.
 //!
-//! A sweep: each parameter in turn takes each of its values, the best is kept. Accuracy is that of inner
-//! folds over the training subjects. Values are spaced by meaning (factors of two or three around equal
-//! weight), not by results on any set.
+//! Each parameter in turn takes each of its values and the best is kept, by the accuracy of inner folds over
+//! the training subjects. Values are factors of two or three around equal weight, not tuned to any set.
 
 use super::alignment::Alignment;
 use super::classifier::{ClassifierKind, Family};

@@ -1,11 +1,10 @@
-//! Features of one frame of a clip: its embedded point, its box relative to the clip, and (ordered mode) how both move.
+//! Features of one frame of a clip.
 //!
 //! - Point: embedded coordinates in standard deviations of the first dimension.
 //! - Relative point: minus the clip's mean, which removes the person's build.
-//! - Box: height and width over the clip's largest height, centroid relative to the clip's mean in the same
-//!   unit, which the
-//!   100 x 100 normalisation removes. Independent of the order of frames.
-//! - Motion: central difference over two frames, relative to the clip's RMS, so it is independent of speed.
+//! - Box: height and width over the clip's largest height; centroid relative to the clip's mean in the same
+//!   unit.
+//! - Motion (ordered mode): central difference over two frames, over the clip's RMS, so independent of speed.
 
 use super::clip::BOX_NUMBERS;
 use ndarray::{Array2, ArrayView2, Axis, s};
@@ -50,7 +49,6 @@ impl Default for Weights {
     }
 }
 
-/// Frames before and after for motion.
 const REACH: usize = 2;
 
 /// Frame vectors (frames x F) from embedded points (frames x D, over the gallery's spread) and boxes.

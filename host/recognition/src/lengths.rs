@@ -1,12 +1,9 @@
-//! Durations of activities.
-//!
-//! Log-normal state durations as in a hidden semi-Markov model (Yu, Artificial Intelligence 174, 2010). The
-//! spread is regularised by a prior worth some clips, so that a single clip does not give 0.
+//! Durations of activities: log-normal, as in a hidden semi-Markov model (Yu, Artificial Intelligence 174,
+//! 2010). The spread has a prior worth some clips, so that a single clip does not give 0.
 
 use super::clip::Clip;
 use serde::{Deserialize, Serialize};
 
-/// Prior spread of log length.
 const SPREAD: f32 = 0.6;
 /// Number of clips that the prior counts for.
 const PRIOR_CLIPS: f32 = 2.0;
@@ -26,7 +23,6 @@ impl Lengths {
         Self { mean_ln: (frames.max(1) as f32).ln(), spread: SPREAD }
     }
 
-    /// Lengths of each activity's clips.
     pub(super) fn of(clips: &[Clip], activities: &[String]) -> Vec<Self> {
         activities.iter().map(|activity| Self::of_activity(clips, activity)).collect()
     }
@@ -47,7 +43,6 @@ impl Lengths {
         0.5 * off * off + (self.spread / SPREAD).ln()
     }
 
-    /// Whether the values are valid.
     pub(super) fn is_sound(&self) -> bool {
         self.mean_ln.is_finite() && self.spread.is_finite() && self.spread > 0.0
     }

@@ -1,14 +1,14 @@
-//! Activities from silhouettes: descriptors, Isomap and the RBF map, patterns of embedded frames, classifiers, models, unknown activities,
-//! and their evaluation (Li 2014, chapter 9, which calls it embedded pattern learning, EPL). No input or output.
+//! Activities from silhouettes (Li 2014, chapter 9: embedded pattern learning, EPL). No input or output.
 //!
-//! [`clip`] describes the masks of a clip, [`space`] embeds them and makes a pattern ([`codebook`], the thesis' [`occupancy`] grid, or a
-//! [`network`]), a [`classifier`] answers, [`unknown`] rejects what was not trained; [`alignment`] and [`self_training`] adapt to clips of
-//! another camera. [`choice`] finds the settings of an [`experiment`] by cross-validation, [`training`] makes the [`model`], [`live`]
-//! uses it frame by frame, [`segmentation`] in un-segmented recordings. [`evaluation`] measures, [`synthetic`] makes seeded clips.
+//! [`clip`] describes masks, [`space`] embeds them and makes a pattern ([`codebook`], the thesis'
+//! [`occupancy`] grid, or a [`network`]), a [`classifier`] answers, [`unknown`] rejects untrained activities.
+//! [`alignment`] and [`self_training`] adapt to another camera. [`choice`] finds the settings of an
+//! [`experiment`] by cross-validation, [`training`] makes the [`model`], [`live`] uses it frame by frame,
+//! [`segmentation`] on un-segmented recordings. [`evaluation`] measures, [`synthetic`] makes seeded clips.
 //!
 //! # From markers to an activity
-//! A recording's points are turned to a view, filled part by part and described by 360 centroid distances and a coarse silhouette; clips of such
-//! silhouettes train a recogniser, which then answers for one that it has not seen.
+//! A recording's points are turned to a view, filled part by part and described; such clips train a
+//! recogniser, which then answers for an unseen one.
 //!
 //! ```
 //! use farnear_recognition::clip::{Clip, Track};

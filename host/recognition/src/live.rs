@@ -8,7 +8,7 @@ use farnear_silhouettes::mask::Mask;
 use ndarray::{Array1, Array2, Axis, concatenate};
 use std::collections::VecDeque;
 
-/// Keeps the last frames of every view. Each frame is embedded once and the nearest pattern found by an
+/// Keeps the last frames of every view. Each frame is embedded once and the nearest pattern comes from an
 /// index, so a frame costs one window's pattern.
 #[derive(Debug)]
 pub struct Live<'a> {
@@ -19,7 +19,6 @@ pub struct Live<'a> {
     frames: VecDeque<Moment>,
 }
 
-/// Features of one frame: `[opinion][view]`, as [`Recogniser::opinions`].
 type Moment = Vec<Vec<Seen>>;
 
 /// A frame of a view, embedded; no row without a visible person.
@@ -36,9 +35,8 @@ impl<'a> Live<'a> {
         Self { recogniser, nearest, window: window.max(1), full_frames, frames: VecDeque::new() }
     }
 
-    /// Takes the masks of one moment, one per view, and answers for the window that ends with it. Empty masks are left out, so a moment
-    /// without anybody changes nothing but pushes old frames out.
-    /// Errors: Another number of views than the model's.
+    /// Takes the masks of one moment, one per view, and answers for the window that ends with it. Empty masks
+    /// only push old frames out. Fails if the number of views is not the model's.
     pub fn push(&mut self, masks: &[Mask]) -> Result<Answer, ModelError> {
         let scaling = self.recogniser.settings.scaling;
         let moment =
@@ -46,8 +44,7 @@ impl<'a> Live<'a> {
         self.push_described(moment.collect())
     }
 
-    /// As [`Self::push`], for masks that are described already: one track of a single frame per view.
-    /// Errors: Another number of views than the model's.
+    /// [`Self::push`] for described masks: one track of a single frame per view.
     pub fn push_described(&mut self, moment: Vec<Track>) -> Result<Answer, ModelError> {
         self.recogniser.check(&moment)?;
         let boxed = self.recogniser.uses_boxes();
@@ -72,7 +69,6 @@ impl<'a> Live<'a> {
         })
     }
 
-    /// The answer of one opinion for the window; `None` without a visible person in it.
     fn answer(&self, opinion: usize) -> Option<Answer> {
         let Recogniser { space, settings, .. } = self.recogniser;
         let frames: Vec<&Vec<Seen>> = self.frames.iter().filter_map(|moment| moment.get(opinion)).collect();
@@ -169,8 +165,7 @@ pub struct Stretch {
     pub answer: Answer,
 }
 
-/// Recognises a long recording window by window: `length` frames every `step`. The last window is shorter if it has to be.
-/// Errors: Another number of views than the model's.
+/// Recognises windows of `length` frames every `step`. Fails if the number of views is not the model's.
 pub fn windows(
     recogniser: &Recogniser,
     views: &[Track],

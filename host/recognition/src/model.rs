@@ -77,13 +77,11 @@ pub struct Answer {
     pub confidence: f32,
     /// Probability of every activity.
     pub probabilities: Vec<(String, f32)>,
-    /// Distance from the training data relative to the limit of the activity: above 1 is unknown. The
-    /// distance is the auxiliary model's, or the squared one to the nearest training pattern.
+    /// Distance from the training data over the activity's limit: above 1 is unknown.
     pub outlier_score: f32,
 }
 
 impl Answer {
-    /// The answer without a visible person.
     pub(super) fn nobody(activities: &[String]) -> Self {
         let probabilities = activities.iter().map(|activity| (activity.clone(), 0.0)).collect();
         Self { activity: None, confidence: 0.0, probabilities, outlier_score: f32::INFINITY }
@@ -169,12 +167,8 @@ fn with(boxes: bool) -> &'static str {
 }
 
 impl Recogniser {
-    /// Recognises one clip.
-    ///
-    /// A model of one view takes any number of views: the answers of all that see a person count together. Whether the clip is unknown
-    /// says the auxiliary model, where the model has one.
-    /// Errors: a clip with other views than the model's, or with cut-out silhouettes where the model knows
-    /// full frames.
+    /// Recognises one clip. A model of one view joins the answers of all views that see a person. Fails for
+    /// views that the model does not accept, or cropped silhouettes where it needs full frames.
     pub fn recognise(&self, views: &[Track]) -> Result<Answer, ModelError> {
         self.check(views)?;
         let mut answers = self
@@ -192,7 +186,6 @@ impl Recogniser {
         Ok(Answer::of(answer.probabilities, outlier_score))
     }
 
-    /// Checks that views match the model.
     pub(super) fn check(&self, views: &[Track]) -> Result<(), ModelError> {
         let boxes = self.uses_boxes();
         let found_boxes = views.iter().all(|view| view.boxes.is_some());
@@ -208,31 +201,28 @@ impl Recogniser {
         Ok(())
     }
 
-    /// The views of which each group has its own answer, those that see a person.
+    /// Views with an answer of their own; those without a person are omitted.
     pub(super) fn groups(&self, views: &[Track]) -> Vec<Vec<Track>> {
         let mut groups = self.opinions(views);
         groups.retain(|group| group.iter().any(|view| view.frames() > 0));
         groups
     }
 
-    /// The views of which each group has its own answer: all of them together, or for a model of one view each, a network's with
-    /// its mirror.
+    /// [`Self::groups`], and for a network each view's mirror.
     pub(super) fn opinions(&self, views: &[Track]) -> Vec<Vec<Track>> {
         if self.views > 1 {
             return vec![views.to_vec()];
         }
-        // A network was taught mirrors too, so the mirror's answer counts as a second opinion.
+        // A network is trained on mirrors too, so the mirror's answer counts as well.
         let mirrors = matches!(self.space.pattern, Pattern::Network(_) | Pattern::Features(_));
         let both = |view: &Track| std::iter::once(view.clone()).chain(mirrors.then(|| view.mirrored()));
         views.iter().flat_map(both).map(|view| vec![view]).collect()
     }
 
-    /// Answer for a pattern.
     pub(super) fn answer(&self, pattern: ArrayView1<f32>) -> Answer {
         self.answer_by(pattern, self.distance(pattern))
     }
 
-    /// Answer for a pattern with a known squared distance to the nearest training pattern.
     pub(super) fn answer_by(&self, pattern: ArrayView1<f32>, squared_distance: f32) -> Answer {
         let probabilities = self.classifier.probabilities(pattern);
         let (best, confidence) = largest(&probabilities);
@@ -245,7 +235,6 @@ impl Recogniser {
         }
     }
 
-    /// Pattern of matching views. A model of cropped silhouettes uses shapes only.
     pub(super) fn pattern(&self, views: &[Track]) -> Result<Array1<f32>, ModelError> {
         if self.uses_boxes() || views.iter().all(|view| view.boxes.is_none()) {
             return pattern(&self.space, views, self.settings.sharpness);
@@ -254,9 +243,8 @@ impl Recogniser {
         pattern(&self.space, &shapes, self.settings.sharpness)
     }
 
-    /// The same recogniser for clips from elsewhere (another camera, sensor, laboratory), of which none is labelled: its classifier is trained on
-    /// with its surest answers for them ([`super::self_training`]). What counts as unknown stays.
-    /// Errors: Clips that do not fit; [`ModelError::Unlabelled`].
+    /// The recogniser adapted to unlabelled clips from another camera, sensor or laboratory
+    /// ([`super::self_training`]); unknown limits are unchanged. Fails for clips that do not fit.
     pub fn adapted(&self, clips: &[Vec<Track>], rounds: usize) -> Result<Self, ModelError> {
         if self.labels.is_empty() || self.labels.len() != self.patterns.nrows() {
             return Err(ModelError::Unlabelled);
@@ -277,7 +265,6 @@ impl Recogniser {
         })
     }
 
-    /// Squared distance of a pattern to the nearest training pattern.
     pub(super) fn distance(&self, pattern: ArrayView1<f32>) -> f32 {
         nearest(self.patterns.rows().into_iter(), pattern)
     }
@@ -298,7 +285,6 @@ impl Recogniser {
     }
 }
 
-/// Concatenated patterns of all views.
 pub(super) fn pattern(space: &Space, views: &[Track], sharpness: f32) -> Result<Array1<f32>, ModelError> {
     let patterns: Result<Vec<Array1<f32>>, EmbeddingError> =
         views.iter().map(|view| Ok(space.pattern_of(space.vectors(view)?.view(), sharpness))).collect();
@@ -306,7 +292,6 @@ pub(super) fn pattern(space: &Space, views: &[Track], sharpness: f32) -> Result<
     Ok(joined(&patterns, &(0..patterns.len()).collect::<Vec<_>>()))
 }
 
-/// Squared distance to the nearest of some patterns.
 pub(super) fn nearest<'a>(
     patterns: impl Iterator<Item = ArrayView1<'a, f32>>,
     query: ArrayView1<f32>,
@@ -314,7 +299,6 @@ pub(super) fn nearest<'a>(
     patterns.map(|row| squared_between(row, query)).fold(f32::INFINITY, f32::min)
 }
 
-/// Squared distance of two patterns.
 fn squared_between(a: ArrayView1<f32>, b: ArrayView1<f32>) -> f32 {
     match (a.as_slice(), b.as_slice()) {
         (Some(a), Some(b)) => squared_distance(a, b),

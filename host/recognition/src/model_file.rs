@@ -1,9 +1,7 @@
-//! Model files with version and checksum.
-//!
-//! 8 bytes `farnearA`, format version (u32), descriptor version (u32), body length (u64), CRC-32 of the body
-//! (u32), little-endian; then the body (postcard), pattern classes, an optional auxiliary model, and clip
-//! lengths. Older versions, which end earlier, are read too. Anything invalid is rejected by name; decoded
-//! parts are checked against each other, so a crafted file cannot cause a panic.
+//! Model files: 8 bytes `farnearA`, format version (u32), descriptor version (u32), body length (u64), CRC-32
+//! of the body (u32), little-endian; then the body (postcard), pattern classes, an optional auxiliary model,
+//! and clip lengths. Older versions end earlier and are accepted. Decoded parts are checked against each
+//! other, so a crafted file cannot cause a panic.
 
 use super::auxiliary_model::AuxiliaryModel;
 use super::classifier::Classifier;
@@ -28,18 +26,17 @@ use std::sync::Arc;
 
 /// Version of the file format.
 pub const FORMAT_VERSION: u32 = 6;
-/// Older versions: without lengths,
+/// Version without clip lengths.
 const LENGTHLESS_VERSION: u32 = 5;
-/// with an auxiliary model in every file,
+/// Version with an auxiliary model in every file.
 const SECOND_VERSION: u32 = 4;
-/// with one in none,
+/// Version without auxiliary models.
 const SINGLE_VERSION: u32 = 3;
-/// without the classes of patterns.
+/// Version without pattern classes.
 const UNLABELLED_VERSION: u32 = 2;
 const MAGIC: &[u8; 8] = b"farnearA";
 const HEADER: usize = 28;
 
-/// Body of a file.
 #[derive(Serialize, Deserialize)]
 struct Body {
     settings: RecogniserSettings,
@@ -71,7 +68,6 @@ enum SavedPattern {
     FeaturesOfMembers(Box<Features>),
 }
 
-/// Network with one member, as in older files.
 #[derive(Serialize, Deserialize)]
 struct OneMember {
     mean: Array1<f32>,
@@ -109,10 +105,8 @@ impl SavedPattern {
     }
 }
 
-/// File of the auxiliary recogniser, its profiles and limits.
 type SavedAuxiliary = (Vec<u8>, Array2<f32>, Limits);
 
-/// Header and body.
 fn framed(version: u32, body: &[u8]) -> Vec<u8> {
     let mut bytes = Vec::with_capacity(HEADER + body.len());
     bytes.extend(MAGIC);
@@ -125,8 +119,7 @@ fn framed(version: u32, body: &[u8]) -> Vec<u8> {
 }
 
 impl Recogniser {
-    /// The model as a file's bytes.
-    /// Errors: [`ModelError::Body`] if it cannot be encoded.
+    /// Encodes the model; fails with [`ModelError::Body`].
     pub fn to_bytes(&self) -> Result<Vec<u8>, ModelError> {
         let saved = |second: &AuxiliaryModel| -> Result<SavedAuxiliary, ModelError> {
             Ok((second.recogniser.to_bytes()?, second.profiles.clone(), second.limits.clone()))
@@ -165,13 +158,12 @@ impl Recogniser {
         }
     }
 
-    /// A model from a file's bytes.
-    /// Errors: Anything that is not a whole, undamaged model of this version and this descriptor.
+    /// Decodes a whole, undamaged model of a known format and this descriptor version.
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, ModelError> {
         Self::read(bytes, true)
     }
 
-    /// A model; an auxiliary one has no auxiliary model, which bounds the nesting.
+    /// An auxiliary model has no auxiliary model, which bounds the nesting.
     fn read(bytes: &[u8], may_have_second: bool) -> Result<Self, ModelError> {
         let header = bytes.get(..HEADER).ok_or(ModelError::NotAModel("shorter than its header"))?;
         if &header[..8] != MAGIC {
@@ -248,13 +240,11 @@ impl Recogniser {
     }
 }
 
-/// CRC-32 as in zip files.
 fn checksum(body: &[u8]) -> u32 {
     crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC).checksum(body)
 }
 
 impl Recogniser {
-    /// Checks the sizes that recognition relies on.
     fn checked(self) -> Result<Self, ModelError> {
         let fits =
             |holds: bool, what: &'static str| if holds { Ok(()) } else { Err(ModelError::Parts(what)) };
@@ -331,7 +321,6 @@ mod tests {
     use crate::synthetic::everyday;
     use crate::watch::Unwatched;
 
-    /// A small model of two activities.
     fn model(members: usize) -> Recogniser {
         let clips = |first: usize, people: usize| {
             let mut clips = everyday::clips(first, people, Scaling::default());
@@ -345,7 +334,6 @@ mod tests {
             .expect("trained")
     }
 
-    /// A model's file in an older version.
     fn written_before(model: &Recogniser, version: u32) -> Vec<u8> {
         let mut body = model.body();
         // In version 3 a network was its mean, spread and three layers without a count.

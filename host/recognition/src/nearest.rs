@@ -1,17 +1,15 @@
 //! Exact nearest pattern without comparing all.
 //!
-//! Patterns are projected on some dozen orthonormal directions. Distances there and the residual lengths
-//! bound the total distance from below, so only patterns with a smaller bound than the best distance are
-//! compared. O(patterns x directions) per query.
+//! Distances of projections on some dozen orthonormal directions, and the residual lengths, bound the
+//! distance from below. Only patterns with a bound below the best distance are compared. O(patterns x
+//! directions).
 
 use crate::embedding::squared_distance;
 use ndarray::{Array1, Array2, ArrayView1, ArrayView2, Axis};
 
-/// Directions of projection.
 const DIRECTIONS: usize = 64;
 /// Fewer patterns are compared directly.
 const WORTH_IT: usize = 256;
-/// Tolerance of the f32 bounds.
 const ROUNDING: f32 = 1e-4;
 
 /// Patterns (rows) with their projections.
@@ -20,9 +18,7 @@ pub struct Nearest<'a> {
     patterns: ArrayView2<'a, f32>,
     /// Orthonormal rows of pattern width; empty for few patterns.
     directions: Array2<f32>,
-    /// Patterns x directions.
     projected: Array2<f32>,
-    /// Residual length of each pattern.
     outside: Vec<f32>,
 }
 
@@ -77,7 +73,6 @@ impl<'a> Nearest<'a> {
     }
 }
 
-/// Residual length of a row with coordinates `inside`.
 fn rest(row: ArrayView1<f32>, inside: ArrayView1<f32>) -> f32 {
     (row.iter().map(|v| v * v).sum::<f32>() - inside.dot(&inside)).max(0.0).sqrt()
 }

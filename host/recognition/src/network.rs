@@ -1,14 +1,11 @@
 //! A small network over a clip's frames: two layers per frame, mean and maximum over the clip, a third layer
-//! (deep sets: Zaheer et al., NeurIPS 2017; Qi et al., CVPR 2017).
+//! (deep sets: Zaheer et al., NeurIPS 2017; Qi et al., CVPR 2017). The third layer's output is the pattern.
 //!
-//! Mean and maximum ignore the order. Order enters by the frames' motion ([`super::frames`]) and, if it
-//! counts, by a second layer that also sees neighbouring frames, zero beyond the clip (convolution over time;
-//! Waibel et al., IEEE TASSP 37, 1989); its size gives their number. The third layer's output is the pattern.
-//! Supervised, so it needs tens of thousands of clips, e.g. of synthetic people. O(frames x (F x 64 + 5 x 64
-//! x 128)) per clip and member.
-//!
-//! Several members with different initial weights are better calibrated and more accurate together
-//! (Lakshminarayanan et al., NeurIPS 2017). Their outputs are concatenated.
+//! Mean and maximum ignore the order. Order enters by the frames' motion ([`super::frames`]) and by a second
+//! layer that sees neighbouring frames, zero beyond the clip (Waibel et al., IEEE TASSP 37, 1989). Training
+//! is supervised and needs tens of thousands of clips, e.g. of synthetic people. O(frames x (F x 64 + 5 x 64
+//! x 128)) per clip and member. The outputs of several members are concatenated, which is better calibrated
+//! and more accurate (Lakshminarayanan et al., NeurIPS 2017).
 
 pub mod features;
 pub mod recogniser;
@@ -33,7 +30,6 @@ impl Dense {
         inputs.dot(&self.weights) + &self.offsets
     }
 
-    /// Mean of several layers with their own inputs.
     fn mean_of(layers: &[Self]) -> Self {
         let share = 1.0 / layers.len().max(1) as f32;
         let weights: Vec<ArrayView2<f32>> = layers.iter().map(|layer| layer.weights.view()).collect();
@@ -44,7 +40,6 @@ impl Dense {
         }
     }
 
-    /// Whether sizes are inputs x outputs.
     fn is(&self, inputs: usize, outputs: usize) -> bool {
         self.weights.dim() == (inputs, outputs) && self.offsets.len() == outputs
     }
@@ -64,13 +59,12 @@ pub struct Network {
 /// Two layers per frame, one per clip.
 pub type Layers = [Dense; 3];
 
-/// Rectifier: negative values become zero.
 fn rectified(mut values: Array2<f32>) -> Array2<f32> {
     values.mapv_inplace(|v| v.max(0.0));
     values
 }
 
-/// Every row with `reach` before and behind it side by side; zeros beyond the ends.
+/// Each row with its `reach` neighbours on both sides; zeros beyond the ends.
 fn with_neighbours(rows: ArrayView2<f32>, reach: usize) -> Array2<f32> {
     let (n, width) = rows.dim();
     let mut out = Array2::zeros((n, (2 * reach + 1) * width));
@@ -84,7 +78,6 @@ fn with_neighbours(rows: ArrayView2<f32>, reach: usize) -> Array2<f32> {
     out
 }
 
-/// Mean and maximum of the rows, concatenated.
 fn pooled(rows: ArrayView2<f32>) -> Array1<f32> {
     let (n, width) = rows.dim();
     let mut out = Array1::zeros(2 * width);
@@ -128,12 +121,10 @@ impl Network {
     }
 }
 
-/// Outputs of a member.
 fn width([_, _, third]: &Layers) -> usize {
     third.offsets.len()
 }
 
-/// Outputs of a member for the scaled frames of a clip.
 fn values(member: &Layers, inputs: ArrayView2<f32>) -> Array1<f32> {
     let [first, second, third] = member;
     let hidden = rectified(first.apply(inputs));
@@ -147,7 +138,6 @@ fn reach([first, second, _]: &Layers) -> usize {
     second.weights.nrows() / first.offsets.len().max(1) / 2
 }
 
-/// Whether a member's sizes match frame vectors of `inputs` numbers.
 fn layers_fit(member: &Layers, inputs: usize) -> bool {
     let [first, second, third] = member;
     let (a, b, c) = (first.offsets.len(), second.offsets.len(), third.offsets.len());
@@ -155,7 +145,6 @@ fn layers_fit(member: &Layers, inputs: usize) -> bool {
     first.is(inputs, a) && second.is(neighbours * a, b) && third.is(2 * b, c)
 }
 
-/// Rows of a matrix from `from` to `to`.
 fn rows(matrix: &Array2<f32>, from: usize, to: usize) -> ArrayView2<'_, f32> {
     matrix.slice(s![from..to, ..])
 }

@@ -1,13 +1,10 @@
-//! Residuals of soft assignments: mean direction and distance of a clip's frames from typical frames.
-//!
-//! Vectors of locally aggregated descriptors (Jégou et al., CVPR 2010): mean difference from some dozen
-//! typical frames, weighted by the assignment, with signed square roots and unit length (Jégou et al., PAMI
-//! 34, 2012). Independent of the order. O(frames x centres x F) per clip.
+//! Residuals of soft assignments: vectors of locally aggregated descriptors (Jégou et al., CVPR 2010). Mean
+//! difference of a clip's frames from typical frames, weighted by the assignment, with signed square roots
+//! and unit length (Jégou et al., PAMI 34, 2012). Independent of the order. O(frames x centres x F).
 
 use ndarray::{Array1, Array2, ArrayView2, Axis};
 
-/// Residuals from `centres` (M x F) for frame vectors (frames x F) and soft assignments (frames x M): M x F
-/// numbers of unit length, zeros for an empty clip.
+/// M x F numbers of unit length from `centres` (M x F), frame vectors (frames x F) and soft assignments.
 pub fn residuals(
     centres: ArrayView2<f32>,
     frames: ArrayView2<f32>,
@@ -37,7 +34,6 @@ mod tests {
     use super::*;
     use ndarray::array;
 
-    /// Residuals from two typical frames.
     fn of(frames: ArrayView2<f32>, sharpness: f32) -> Array1<f32> {
         let centres = array![[0.0_f32, 0.0], [10.0, 0.0]];
         let book = Codebook { centres, spread: 1.0, residual: None };

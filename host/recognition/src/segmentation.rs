@@ -1,10 +1,9 @@
-//! Un-segmented recordings: where one activity ends and the next begins.
+//! Segmentation of recordings by a hidden semi-Markov model (Yu, Artificial Intelligence 174, 2010).
 //!
-//! A hidden semi-Markov model (Yu, Artificial Intelligence 174, 2010) with the durations of each activity's
-//! clips. The score of a segment from frame a to b is `(b - a) (ln p(a, b) - strange * outlier(a, b)) -
-//! change - unlikely(b - a)`: probability, outlier score, cost of a change, and duration ([`Lengths`]), for
-//! the best activity. Dynamic programming over a grid of borders finds the best sequence; borders are then
-//! refined frame by frame. O(frames / step x lengths) answers; frames are embedded once.
+//! The score of a segment from frame a to b is `(b - a) (ln p(a, b) - strange * outlier(a, b)) - change -
+//! unlikely(b - a)` for the best activity. Dynamic programming over a grid of borders finds the best
+//! sequence; borders are then refined frame by frame. O(frames / step x lengths) answers; frames are embedded
+//! once.
 
 use super::clip::Track;
 use super::lengths::Lengths;
@@ -33,35 +32,28 @@ impl Default for Worth {
     }
 }
 
-/// Borders are looked for at this many places in a typical clip first.
+/// Grid borders per typical clip.
 const PLACES: usize = 12;
-/// Limit of grid borders.
 const MOST_PLACES: usize = 1500;
 /// Ratio of successive lengths.
 const LONGER: f32 = 1.15;
-/// Smallest segment.
 const LEAST: usize = 4;
 
-/// A view, embedded once.
 struct Embedded {
     points: Array2<f32>,
     boxes: Option<Array2<f32>>,
 }
 
-/// A recording that can be asked for segments.
 struct Recording<'a> {
     recogniser: &'a Recogniser,
     nearest: Nearest<'a>,
-    /// As [`Recogniser::groups`].
     groups: Vec<Vec<Embedded>>,
     among: &'a [String],
     typical: f32,
-    /// Grid spacing, frames.
     step: usize,
     worth: Worth,
 }
 
-/// Score of a part with its best activity, `None` = unknown.
 struct Valued {
     worth: f32,
     activity: Option<String>,
@@ -112,9 +104,8 @@ impl Recording<'_> {
     }
 }
 
-/// Cuts a recording into segments of one activity each, of all that the model knows or `among` some; neighbours with the same activity
-/// become one. Frames are counted as in the tracks.
-/// Errors: Views that do not fit the model.
+/// Cuts a recording into segments of one activity each, optionally restricted to `among`. Frames are counted
+/// as in the tracks. Fails if the views do not fit the model.
 pub fn segmented(
     recogniser: &Recogniser,
     views: &[Track],
@@ -143,7 +134,7 @@ pub fn segmented(
     Ok(merged(&recording, &borders))
 }
 
-/// Borders of the best sequence on the grid; first 0, last the number of frames.
+/// First 0, last the number of frames.
 fn best_borders(recording: &Recording, frames: usize) -> Vec<usize> {
     let step = recording.step;
     let places: Vec<usize> = (0..frames).step_by(step).chain([frames]).collect();
@@ -238,7 +229,6 @@ mod tests {
 
     const ACTIVITIES: [&str; 3] = ["star", "stretch", "turn"];
 
-    /// A rotating outline with as many waves as the activity's number.
     fn track(activity: usize, frames: usize, rng: &mut ChaCha8Rng) -> Track {
         let phase = rng.random_range(0.0..6.0_f32);
         let descriptors = Array2::from_shape_fn((frames, ANGLES), |(frame, angle)| {

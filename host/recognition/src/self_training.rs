@@ -1,7 +1,6 @@
-//! Self-training on unlabelled clips: the classifier is retrained with its surest answers as labels
-//! (Yarowsky, ACL 1995; equal shares per class: Zou et al., ECCV 2018).
-//!
-//! For clips from another camera, sensor or laboratory. Requires mostly correct first answers.
+//! Self-training on unlabelled clips from another camera, sensor or laboratory: the classifier is retrained
+//! with its surest answers as labels (Yarowsky, ACL 1995; equal shares per class: Zou et al., ECCV 2018).
+//! Requires mostly correct first answers.
 
 use super::classifier::{Classifier, ClassifierKind, largest};
 use ndarray::{Array2, ArrayView2, Axis, concatenate};
@@ -49,7 +48,6 @@ pub fn self_trained(
     classifier
 }
 
-/// Surest share of every class' answers: (row, class).
 fn surest(answers: &[(usize, f32)], classes: usize, share: f64) -> Vec<(usize, usize)> {
     let of_class = |class: usize| {
         let mut own: Vec<(f32, usize)> = answers

@@ -38,15 +38,15 @@ pub enum PatternKind {
     Thesis(Vec<usize>),
     /// Square-rooted mean soft assignments to a codebook of this size.
     Codebook(usize),
-    /// What a network gives that has learned the activities' names; made by [`Recogniser::train_network`](super::model::Recogniser). Its
-    /// principal components see coarse silhouettes next to centroid distances.
+    /// Output of a network ([`Recogniser::train_network`](super::model::Recogniser)); its principal
+    /// components see coarse silhouettes as well as centroid distances.
     Network,
 }
 
 /// Settings before patterns exist.
 ///
-/// The default uses twenty principal components, which need no connected neighbour graph.
-/// [`SpaceSettings::thesis`] uses Isomap. Report accuracies for settings chosen on other subjects
+/// The default uses twenty principal components, which need no connected neighbour graph; [`Self::thesis`]
+/// uses Isomap. Report accuracies for settings chosen on other subjects
 /// ([`super::experiment::Experiment::searched`]), not for these defaults.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SpaceSettings {
@@ -141,20 +141,17 @@ pub struct Space {
 }
 
 impl Space {
-    /// Learns from the training clips, all of their views together.
-    /// Errors: Too few silhouettes, or a gallery that cannot be laid out.
+    /// Learns from all views of the clips. Fails for too few silhouettes or an impossible layout.
     pub fn train(clips: &[&Clip], settings: &SpaceSettings) -> Result<Self, EmbeddingError> {
         Galleries::default().space(clips, settings).map(|(space, _)| space)
     }
 
-    /// Embeds the frames of a track: frames x D, over the gallery's spread.
-    /// Errors: Descriptors of another length.
+    /// Embedded frames of a track: frames x D, over the gallery's spread.
     pub fn points(&self, track: &Track) -> Result<Array2<f32>, EmbeddingError> {
         self.map.points(track, self.spread)
     }
 
-    /// Frame vectors of a track: what the codebook sees.
-    /// Errors: Descriptors of another length.
+    /// Frame vectors of a track, the codebook's input. Fails for another descriptor length.
     pub fn vectors(&self, track: &Track) -> Result<Array2<f32>, EmbeddingError> {
         let points = self.points(track)?;
         Ok(self.vectors_of(points.view(), track.boxes.as_ref().map(|boxes| boxes.view())))
@@ -174,8 +171,7 @@ impl Space {
         }
     }
 
-    /// The same space with its network's values as features, by their statistics over clips; other spaces as they are.
-    /// Errors: Descriptors of another length.
+    /// The space with its network's output, normalised over `clips`, as features; other spaces are unchanged.
     pub fn with_features(&self, clips: &[&Clip]) -> Result<Self, EmbeddingError> {
         let network = match &self.pattern {
             Pattern::Network(network) => network,
@@ -199,7 +195,6 @@ impl Space {
     }
 }
 
-/// At most `count` evenly spaced frames of all tracks, with `width` numbers.
 fn evenly(tracks: &[&Track], count: usize, width: usize) -> Array2<f32> {
     let frames: Vec<(&Track, usize)> =
         tracks.iter().flat_map(|track| (0..track.frames()).map(|frame| (*track, frame))).collect();
@@ -216,7 +211,6 @@ fn evenly(tracks: &[&Track], count: usize, width: usize) -> Array2<f32> {
 /// Larger galleries use landmarks.
 const LARGE: usize = 4000;
 
-/// Gallery layout, shared by spaces with different RBF maps, weights or patterns.
 #[derive(Debug)]
 struct Gallery {
     key: (Layout, usize, usize, usize),
@@ -226,7 +220,6 @@ struct Gallery {
     neighbours: usize,
 }
 
-/// Frame vectors of clips, `[clip][view]`.
 type FrameVectors = Vec<Vec<Array2<f32>>>;
 
 /// Cached galleries of one set of clips, and their embedded frames.
@@ -237,8 +230,8 @@ pub struct Galleries {
 }
 
 impl Galleries {
-    /// The space of `settings` for the clips, all of their views together, and its frame vectors of them, `[clip][view]`; always ask with the same clips.
-    /// Errors: Too few silhouettes, or a gallery that cannot be laid out.
+    /// The space of `settings` for all views of the clips, and their frame vectors `[clip][view]`. All calls
+    /// must pass the same clips. Fails for too few silhouettes or a gallery that cannot be laid out.
     pub fn space(
         &mut self,
         clips: &[&Clip],
@@ -306,7 +299,6 @@ impl Galleries {
         Ok(self.embedded.len() - 1)
     }
 
-    /// Index of the gallery of these settings.
     fn gallery(&mut self, clips: &[&Clip], settings: &SpaceSettings) -> Result<usize, EmbeddingError> {
         // Codebooks use distances only: coarse silhouettes improve known sets slightly (fused, 0 to 3 points
         // on two public sets), but worsen others (by up to 15).
@@ -322,21 +314,17 @@ impl Galleries {
     }
 }
 
-/// Clips embedded by a map.
 #[derive(Debug)]
 struct Embedded {
-    /// Index of the gallery.
     gallery: usize,
     /// Coefficient and ridge of an RBF map.
     key: [f64; 2],
     map: Map,
     spread: f32,
-    /// `[clip][view]`, frames x dimensions.
     points: Vec<Vec<Array2<f32>>>,
 }
 
 impl Map {
-    /// Embedded frames of a track, in units of the spread.
     fn points(&self, track: &Track, spread: f32) -> Result<Array2<f32>, EmbeddingError> {
         let points = match self {
             Self::Rbf(rbf) => rbf.embed_all(track.descriptors.view())?,
@@ -377,7 +365,6 @@ impl Gallery {
         Ok(Self { key, samples, coordinates, pca: None, neighbours })
     }
 
-    /// Standard deviation of the first dimension.
     fn spread(&self) -> f32 {
         let first = self.coordinates.column(0);
         let count = first.len().max(1) as f32;
@@ -385,7 +372,6 @@ impl Gallery {
         (first.iter().map(|v| (v - mean).powi(2)).sum::<f32>() / count).sqrt().max(1e-6)
     }
 
-    /// Embedding of new silhouettes.
     fn map(&self, settings: &SpaceSettings) -> Result<Map, EmbeddingError> {
         if let Some(pca) = &self.pca {
             return Ok(Map::Pca(pca.clone()));

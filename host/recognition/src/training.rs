@@ -16,8 +16,7 @@ use ndarray::Array2;
 use rayon::prelude::*;
 
 impl Recogniser {
-    /// Trains on clips that all have the same views, with settings as they are.
-    /// Errors: Fewer than two activities, clips with other views, a gallery that cannot be laid out.
+    /// Trains with fixed settings. Fails for fewer than two activities or unequal views.
     pub fn train(clips: &[Clip], settings: &RecogniserSettings) -> Result<Self, ModelError> {
         let experiment = Experiment {
             space: settings.space.clone(),
@@ -35,9 +34,8 @@ impl Recogniser {
             .map(|(recogniser, _)| recogniser)
     }
 
-    /// Trains with settings chosen by cross-validation over the clips' subjects; gives the accuracy over the folds next to it (0 to
-    /// 1, of the chosen settings and so a little too good), `None` where nothing was compared: one subject, or one of everything.
-    /// Errors: as [`Self::train`], and where `watch` stops it.
+    /// Trains with settings chosen by cross-validation over the subjects. Also returns the accuracy over the
+    /// folds (slightly optimistic), `None` without alternatives or with one subject. `watch` may stop it.
     pub fn train_searched(
         clips: &[Clip],
         experiment: &Experiment,
@@ -97,7 +95,6 @@ impl Recogniser {
     }
 }
 
-/// Number of views, and whether they have box motion.
 fn shape(clip: &Clip) -> (usize, bool) {
     (clip.views.len(), clip.views.iter().all(|view| view.boxes.is_some()))
 }
@@ -110,8 +107,8 @@ fn fits(clip: &Clip, expected: usize, expected_boxes: bool) -> Result<(), ModelE
     Err(ModelError::Clip { found, found_boxes, expected, expected_boxes })
 }
 
-/// What counts as unknown: every clip is compared with all other subjects' patterns, as a new person would be; with a single subject,
-/// with their other clips. `clips` are followed by their mirrors, if those train too, and `patterns` are in the same order.
+/// Unknown limits: every clip is compared with all other subjects' patterns, or with a single subject's other
+/// clips. Mirrors, if trained on, follow `clips`; `patterns` are in the same order.
 fn limits(
     clips: &[&Clip],
     labels: &[usize],

@@ -1,9 +1,8 @@
 //! Unknown activities by the conformal rule (Vovk et al., Algorithmic Learning in a Random World, 2005).
 //!
-//! A clip is unknown if its distance exceeds the k-th of n calibration distances of people not used for
-//! training, k = ceil((n + 1) (1 - share)): a new person of the same population is wrongly called unknown
-//! with at most that probability, for any distribution. Applied per answered activity (Mondrian) with enough
-//! clips; the others share a limit.
+//! A clip is unknown if its distance exceeds the k-th of n calibration distances of other people, k =
+//! ceil((n + 1) (1 - share)). A new person of the same population is wrongly called unknown with at most that
+//! probability. Each activity with enough clips has its own limit (Mondrian); the others share one.
 
 use serde::{Deserialize, Serialize};
 
@@ -47,14 +46,13 @@ impl Limits {
     }
 }
 
-/// Conformal limit; `None` with too few distances.
 fn limit(mut distances: Vec<f32>, false_alarms: f32) -> Option<f32> {
     distances.retain(|distance| distance.is_finite());
     distances.sort_by(f32::total_cmp);
     distances.get(place(distances.len(), false_alarms).checked_sub(1)?).copied()
 }
 
-/// Which of this many distances, the smallest first and counted from 1, is the limit.
+/// Rank of the limit, from 1.
 fn place(distances: usize, false_alarms: f32) -> usize {
     ((distances + 1) as f64 * (1.0 - f64::from(false_alarms))).ceil() as usize
 }

@@ -1,18 +1,17 @@
-//! Progress and cancellation of training and evaluation, which may take minutes.
+//! Progress and cancellation of training and evaluation.
 
 /// Progress callbacks and cancellation, called from several threads.
 pub trait Watch: Sync {
-    /// An evaluation of this many folds begins, each of which tries about so many spaces.
+    /// An evaluation of this many folds begins; each tries about `_spaces` spaces.
     fn folds_begin(&self, _folds: usize, _spaces: usize) {}
 
-    /// One more space was learned and tried; the total is known only at the end.
+    /// A space was learned and tried; the total is known only at the end.
     fn space_tried(&self) {}
 
-    /// One more fold of an evaluation is done, of this many.
+    /// One of this many folds is done.
     fn fold_done(&self, _folds: usize) {}
 
-    /// Whether to stop. The work ends with [`crate::embedding::EmbeddingError::Stopped`] before the next
-    /// space.
+    /// Whether to stop before the next space, with [`crate::embedding::EmbeddingError::Stopped`].
     fn is_stopped(&self) -> bool {
         false
     }

@@ -377,6 +377,7 @@ fn beginning(address: Option<&RigAddress>, camera: &CameraSettings, live: &Live)
             phase: if address.is_some() { Phase::Connecting } else { Phase::Absent },
             name: match address {
                 Some(RigAddress::Port(port)) => Some(port.clone()),
+                Some(RigAddress::Attached) => Some("the board".into()),
                 Some(RigAddress::Emulated(_)) => Some("the emulated rig".into()),
                 Some(RigAddress::Open(open)) => Some(open.name().into()),
                 None => None,

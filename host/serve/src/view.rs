@@ -1,7 +1,6 @@
 //! Messages of the page's interface, with their JSON schemas.
 
 use farnear_depth::focus_measure::FocusMeasure;
-use farnear_protocol::message::Axis;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -168,28 +167,6 @@ pub struct Hello {
     pub secret: String,
     /// Version of this program.
     pub version: String,
-}
-
-/// An axis by its name.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, Deserialize, JsonSchema)]
-#[serde(rename_all = "lowercase")]
-pub enum AxisName {
-    /// Stage A's stepper.
-    Coarse,
-    /// Piezo of stage A.
-    Fine,
-    /// Stepper of stage B.
-    Lens,
-}
-
-impl From<AxisName> for Axis {
-    fn from(name: AxisName) -> Self {
-        match name {
-            AxisName::Coarse => Self::SensorCoarse,
-            AxisName::Fine => Self::SensorFine,
-            AxisName::Lens => Self::Lens,
-        }
-    }
 }
 
 /// That a job was begun.

@@ -35,11 +35,9 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Camera {
-    /// Lens above the ground.
     pub height_m: f64,
     /// Viewing direction, anticlockwise from north (Li 2014, eq. 8.12).
     pub azimuth_deg: f64,
-    /// Downwards positive.
     #[serde(default)]
     pub pitch_deg: f64,
     /// Also the image distance v, as subjects are far.
@@ -49,7 +47,6 @@ pub struct Camera {
     pub width_px: usize,
     #[serde(default = "default_height")]
     pub height_px: usize,
-    /// Optical axis in the image; default: centre.
     #[serde(default)]
     pub principal_point_px: Option<[f64; 2]>,
 }
@@ -61,7 +58,6 @@ fn default_height() -> usize {
     480
 }
 
-/// Prior knowledge of the subject.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct SubjectPrior {
@@ -83,7 +79,6 @@ impl Default for SubjectPrior {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct StandardDeviations {
-    /// Day of the year.
     pub day: f64,
     pub time_h: f64,
     pub latitude_deg: f64,
@@ -93,7 +88,6 @@ pub struct StandardDeviations {
     pub azimuth_deg: f64,
     pub head_width_m: f64,
     pub head_width_px: f64,
-    /// Image distance v.
     pub image_distance_um: f64,
 }
 
@@ -133,15 +127,13 @@ pub enum CameraError {
 }
 
 impl CameraFile {
-    /// Parses and checks a camera file.
-    /// Errors: TOML errors, unknown keys, numbers out of range.
+    /// Fails for invalid TOML, unknown keys and numbers out of range.
     pub fn parse(text: &str) -> Result<Self, CameraError> {
         let file: Self = toml::from_str(text).map_err(|error| CameraError::Syntax(error.to_string()))?;
         file.check()?;
         Ok(file)
     }
 
-    /// Errors: the first number out of range.
     pub fn check(&self) -> Result<(), CameraError> {
         let c = &self.camera;
         let within = |name, value: f64, low: f64, high: f64, expected| {
@@ -187,7 +179,6 @@ impl Camera {
         1e3 * self.focal_length_mm / self.pixel_um
     }
 
-    /// Optical axis in the image, px.
     pub fn principal_point(&self) -> [f64; 2] {
         self.principal_point_px
             .unwrap_or([0.5 * (self.width_px as f64 - 1.0), 0.5 * (self.height_px as f64 - 1.0)])

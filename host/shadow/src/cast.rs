@@ -1,15 +1,10 @@
-//! Splits a silhouette into a body and its cast shadow, for `hybrid` with a known light position.
+//! Splits a silhouette into body and cast shadow, for `hybrid` with a known light position.
 //!
 //! The body is in an upright plane at the subject's distance, as deep as wide, up to 0.17 of the stature.
-//! Rows are read from the head down: each run of pixels casts an ellipse of its width on the ground. Pixels
-//! inside the shadow cast so far are shadow, unless they continue the body of the row above. Below the feet
-//! there is no body; near the ground only legs.
-//!
-//! The only unknown is the subject's distance: a wrong one casts a shadow that does not match. All distances
-//! with the feet in the silhouette are tried on a reduced copy. No head is measured and no image direction is
-//! used, so bent people and pitched cameras work.
-//!
-//! Cost: O(tries x pixels of the copy); some milliseconds for 640 x 480.
+//! From the head down, each run of pixels casts an ellipse of its width on the ground. Pixels inside the
+//! shadow cast so far are shadow, unless they continue the body of the row above. Below the feet there is no
+//! body; near the ground only legs. The only unknown, the subject's distance, is searched on a reduced copy.
+//! Bent people and pitched cameras work. Some milliseconds for 640 x 480.
 
 use super::camera::{Camera, CameraFile};
 use super::light::Light;
@@ -31,28 +26,23 @@ const THIGHS: [f64; 2] = [0.23, 0.46];
 const BELOW: f64 = 0.028;
 /// Next to shadow a body narrows by a pixel on either side per this many rows.
 const NARROWS: usize = 3;
-/// Range of the silhouette's height relative to the subject's stature: bending lowers it, hair and raised
-/// hands increase it.
+/// Height of the silhouette / stature: bending lowers it, hair and raised hands increase it.
 const STATURES: [f64; 2] = [0.35, 1.2];
-/// Rows of the reduced copy.
 const TRIED_ROWS: usize = 45;
 /// Largest unexplained share of silhouette and shadow.
 const UNEXPLAINED: f64 = 0.4;
 
-/// Result of a split.
 #[derive(Clone, Debug)]
 pub struct Explanation {
     pub body: Mask,
     /// Cast shadow, including hidden parts and parts outside the silhouette.
     pub thrown: Mask,
     pub subject: Subject,
-    /// Pixels explained by neither body nor shadow, plus shadow outside the silhouette, relative to the
-    /// silhouette.
+    /// Pixels explained by neither, plus shadow outside the silhouette, relative to the silhouette.
     pub unexplained: f64,
 }
 
-/// Splits the silhouette; `None` without a light position, or if no distance explains enough.
-/// Errors: a light without a usable shadow.
+/// `None` without a light position, or if no distance explains enough. Fails without a usable shadow.
 pub fn explain(mask: &Mask, file: &CameraFile, light: Light) -> Result<Option<Explanation>, ShadowError> {
     let Some(bounds) = BoundingBox::of(mask.view()) else { return Err(ShadowError::EmptyMask) };
     if matches!(light, Light::Direction { .. }) {
@@ -76,7 +66,6 @@ pub fn explain(mask: &Mask, file: &CameraFile, light: Light) -> Result<Option<Ex
     Ok(best.filter(|found| found.unexplained <= UNEXPLAINED || file.subject.distance_m.is_some()))
 }
 
-/// Every `by`th pixel of a mask, with the matching camera.
 fn shrunk(mask: &Mask, camera: &Camera, by: usize) -> (Mask, Camera) {
     let (rows, columns) = (mask.nrows() / by, mask.ncols() / by);
     let small = Mask::from_shape_fn((rows, columns), |(y, x)| mask[[y * by + by / 2, x * by + by / 2]]);
@@ -101,10 +90,8 @@ struct Scene<'a> {
     stature_m: f64,
 }
 
-/// First and last column of a run of body pixels.
 type Run = (usize, usize);
 
-/// A row of the body's upright plane.
 #[derive(Clone, Copy)]
 struct Row {
     up_m: f64,
@@ -119,7 +106,6 @@ impl Row {
     }
 }
 
-/// Accumulated from the head down.
 struct Split {
     body: Mask,
     thrown: Mask,
@@ -192,7 +178,6 @@ impl Scene<'_> {
         })
     }
 
-    /// Classifies a row's pixels; returns the body's runs.
     fn read(&self, y: usize, row: Row, above: &[Run], split: &mut Split, runs: &mut Vec<Run>) {
         let height = row.up_m / self.stature_m;
         let middle_m = (split.thigh_pixels > 0).then(|| split.thighs_m / split.thigh_pixels as f64);
@@ -227,7 +212,6 @@ impl Scene<'_> {
         }
     }
 
-    /// Draws the shadow of a run: an ellipse on the ground.
     fn throw(&self, (first, last): Run, row: Row, distance_m: f64, split: &mut Split) {
         const CORNERS: usize = 12;
         let half_m = 0.5 * (last + 1 - first) as f64 * row.pixel_m;

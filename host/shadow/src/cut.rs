@@ -1,24 +1,16 @@
 //! Removes the shadow from a silhouette: `thesis` (Li 2014, section 8.2.4) and `hybrid`, the default.
 //!
 //! - `thesis`: run-point cut at angles within beta plus or minus its standard deviation, at most 10 degrees
-//!   apart; the longest
-//!   run wins. Shadows straight down are cut by length. Removes much, with a good part of the person if legs
-//!   break the run.
+//!   apart; the longest run wins. Shadows straight down are cut by length. Removes a good part of the person
+//!   if legs break the run.
 //! - `hybrid`: with a known light position the silhouette is split into body and cast shadow
-//!   ([`super::cast`]); for sideways
-//!   shadows the run-point cut over +-3 degrees removes the rest. Without a split, or with a measured
-//!   direction, only angles
-//!   are used: sideways shadows (|sin eta| < 0.45) get the run-point cut over +-3 degrees, or a half-plane
-//!   through the feet
-//!   if that would remove more than 60 %; others get the half-plane. Its edge is the bisector of body and
-//!   shadow; for a
-//!   shadow pointing away only a person-wide strip of ground is cut. Shadows behind the person need colour:
-//!   such frames are
-//!   flagged.
+//!   ([`super::cast`]); for sideways shadows a run-point cut over +-3 degrees removes the rest. Otherwise
+//!   sideways shadows (|sin eta| < 0.45) get this cut, or a half-plane through the feet if it would remove
+//!   more than 60 %; others get the half-plane, whose edge is the bisector of body and shadow. For a shadow
+//!   pointing away only a person-wide strip of ground is cut. Frames with shadows behind the person are
+//!   flagged: they need colour.
 //!
-//! Angles are evaluated on the outline ([`super::envelope`]): a fraction of a millisecond for 640 x 480; a
-//! split takes some
-//! milliseconds.
+//! Angles are evaluated on the outline ([`super::envelope`]): a fraction of a millisecond for 640 x 480.
 
 use super::camera::CameraFile;
 use super::cast;
@@ -28,7 +20,7 @@ use super::projection::{self, ImageShadow, ShadowError, Subject};
 use farnear_silhouettes::mask::Mask;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::{FRAC_PI_2, PI};
-use std::str::FromStr;
+use std::{fmt, str::FromStr};
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
@@ -36,8 +28,16 @@ pub enum Method {
     /// Body and cast shadow, else by angles.
     #[default]
     Hybrid,
-    /// As in Li 2014.
     Thesis,
+}
+
+impl fmt::Display for Method {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Hybrid => "hybrid",
+            Self::Thesis => "thesis",
+        })
+    }
 }
 
 impl FromStr for Method {
@@ -51,31 +51,25 @@ impl FromStr for Method {
     }
 }
 
-/// How a silhouette was cut, and its reliability.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CutReport {
-    /// Cut angle (thesis' beta).
     pub beta_rad: f64,
     /// Share of the silhouette, 0 to 1.
     pub removed_fraction: f64,
     /// Half-plane through the feet instead of the run point.
     pub half_plane: bool,
-    /// Position of the straight edge, px: pixels with `x cos beta - y sin beta` below it were cut, x from the
-    /// right in mirrored pictures; `None` if the split alone decided.
+    /// Pixels with `x cos beta - y sin beta` below it were cut, px, x from the right in mirrored pictures.
     pub edge_px: Option<f64>,
     /// Share not explained by body and shadow, 0 to 1; `None` for a cut by angles.
     pub unexplained: Option<f64>,
     pub shadow: ImageShadow,
-    /// Estimated from the silhouette.
     pub subject: Subject,
     /// False if more than half was removed or the shadow points away: check the frame.
     pub trustworthy: bool,
 }
 
-/// Straight edge of a cut.
 struct Edge {
     beta_rad: f64,
-    /// [`CutReport::edge_px`].
     limit: Option<f32>,
     half_plane: bool,
 }
@@ -86,7 +80,6 @@ pub const SIDEWAYS: f64 = 0.45;
 const GRADIENT_WINDOW: usize = 9;
 
 /// Distance and offset of the subject, from its head's width and row.
-/// Errors: an empty mask, or one of another shape than the camera's.
 pub fn subject_of(mask: &Mask, file: &CameraFile) -> Result<Subject, ShadowError> {
     let outline = checked_outline(mask, file)?;
     Ok(estimate_subject(mask, &outline, file))
@@ -101,12 +94,9 @@ fn checked_outline(mask: &Mask, file: &CameraFile) -> Result<Outline, ShadowErro
     Outline::new(mask).ok_or(ShadowError::EmptyMask)
 }
 
-/// Removes the shadow of the single subject in `mask`, with known camera and light.
-///
-/// `beta_sd_rad` is the standard deviation of the cutting angle ([`super::uncertainty`]), used by `thesis`
-/// only.
-/// Errors: an empty mask or one of another shape; a sun below [`projection::LOWEST_SUN_DEG`], a lamp below
-/// the head.
+/// Removes the shadow of the single subject in `mask`. `beta_sd_rad` is the standard deviation of the cutting
+/// angle ([`super::uncertainty`]), used by `thesis` only. Fails for an empty mask or another shape, a sun
+/// below [`projection::LOWEST_SUN_DEG`], or a lamp below the head.
 pub fn remove(
     mask: &Mask,
     file: &CameraFile,
@@ -215,8 +205,7 @@ fn thesis(mask: &Mask, out: &mut Mask, outline: &Outline, shadow: &ImageShadow, 
     Edge { beta_rad, limit: Some(limit), half_plane: false }
 }
 
-/// Angle of the longest run of negative slope, and its end. Beta is in [pi/2, pi] (8.20); ties take the angle
-/// nearest to the middle.
+/// Angle of the longest run of negative slope, and its end. Beta is in [pi/2, pi] (8.20).
 fn longest_run(
     outline: &Outline,
     flip: Option<f32>,
@@ -232,13 +221,11 @@ fn longest_run(
     from_middle.map(|(_, &(beta, (_, limit)))| (beta, limit))
 }
 
-/// The angle and up to 3 degrees around it.
 fn degrees_about(beta_rad: f64) -> impl Iterator<Item = f64> {
     (-3..=3).map(move |i| beta_rad + f64::from(i).to_radians())
 }
 
-/// Clears pixels beyond the run point of a sideways shadow and returns the edge; `None` for other shadows, or
-/// if more than 60 % would go.
+/// Clears pixels beyond the run point of a sideways shadow; `None` for others, or if more than 60 % would go.
 fn clear_sideways(mask: &Mask, out: &mut Mask, outline: &Outline, shadow: &ImageShadow) -> Option<Edge> {
     if shadow.eta_rad.sin().abs() >= SIDEWAYS {
         return None;
@@ -253,8 +240,7 @@ fn clear_sideways(mask: &Mask, out: &mut Mask, outline: &Outline, shadow: &Image
     Some(Edge { beta_rad, limit: Some(limit), half_plane: false })
 }
 
-/// Removes all but the body, and for a sideways shadow also pixels beyond the run point, as both look alike
-/// near the feet.
+/// Removes all but the body; near the feet of a sideways shadow also beyond the run point.
 fn explained_cut(
     mask: &Mask,
     out: &mut Mask,
@@ -268,7 +254,6 @@ fn explained_cut(
     edge
 }
 
-/// The default method without a split.
 fn hybrid(mask: &Mask, out: &mut Mask, outline: &Outline, shadow: &ImageShadow) -> Edge {
     if let Some(edge) = clear_sideways(mask, out, outline, shadow) {
         return edge;
@@ -280,8 +265,7 @@ fn hybrid(mask: &Mask, out: &mut Mask, outline: &Outline, shadow: &ImageShadow) 
     edge
 }
 
-/// For a shadow pointing away the half-plane also removes part of the upper body. The shadow covers a
-/// person-wide strip from feet to tip; pixels removed outside it are restored.
+/// Restores pixels outside the strip from feet to tip: the half-plane also removes part of the upper body.
 fn give_back_the_body(mask: &Mask, out: &mut Mask, outline: &Outline, shadow: &ImageShadow) {
     /// Of the stature: a person with arms and stride.
     const HALF_WIDTH: f64 = 0.17;
@@ -303,7 +287,6 @@ fn give_back_the_body(mask: &Mask, out: &mut Mask, outline: &Outline, shadow: &I
     }
 }
 
-/// Clears the shadow's side of the bisector through the feet.
 fn half_plane(mask: &Mask, out: &mut Mask, shadow: &ImageShadow) -> Edge {
     let (sin, cos) = shadow.beta_rad.sin_cos();
     let x = if shadow.mirrored { mask.ncols() as f64 - 1.0 - shadow.foot_px[0] } else { shadow.foot_px[0] };
@@ -316,7 +299,6 @@ fn half_plane(mask: &Mask, out: &mut Mask, shadow: &ImageShadow) -> Edge {
 mod tests {
     use super::*;
 
-    /// A body of 20 x 60 px, and its shadow as a bar in this direction from its feet.
     fn cut_of_shadow_at(eta_rad: f64) -> Edge {
         let (foot, length) = ([60.0, 90.0], 40.0);
         let (sin, cos) = eta_rad.sin_cos();

@@ -1,12 +1,9 @@
 //! Image-based shadow detectors: which foreground pixels are shadow.
 //!
-//! The five that Li 2014 (tables 8.1 and 8.2) compares with, selected and described by Sanin, Sanderson and
-//! Lovell, "Shadow detection: a survey and comparative evaluation of recent methods", Pattern Recognition 45
-//! (2012), 1684-1695. Each follows its own paper, named in its module; thresholds are this project's. All
-//! need colour and the empty scene ([`farnear_silhouettes::background::BackgroundModel::background`]).
-//!
-//! Known limits from the survey: chromaticity fails on grey clothes, geometry on shadows under the body's own
-//! columns, texture on smooth ground.
+//! The five that Li 2014 (tables 8.1 and 8.2) compares with, described by Sanin, Sanderson and Lovell,
+//! "Shadow detection: a survey and comparative evaluation of recent methods", Pattern Recognition 45 (2012).
+//! Thresholds are this project's. All need colour and the empty scene. Known limits: chromaticity fails on
+//! grey clothes, geometry on shadows under the body's own columns, texture on smooth ground.
 
 pub mod chromaticity;
 pub mod geometry;
@@ -15,6 +12,7 @@ pub mod large_region;
 pub mod physical;
 pub mod small_region;
 
+use std::fmt;
 use std::str::FromStr;
 
 pub use images::{Images, ImagesError};
@@ -45,7 +43,6 @@ impl Method {
         Self::LargeRegionTexture,
     ];
 
-    /// Name for [`FromStr`].
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -58,11 +55,9 @@ impl Method {
     }
 }
 
-/// A detector with default settings, for a sequence of frames.
 #[derive(Clone, Debug)]
 pub enum Detector {
     Chromaticity(chromaticity::Settings),
-    /// Learns from frame to frame.
     Physical(physical::Physical),
     Geometry(geometry::Settings),
     SmallRegionTexture(small_region::Settings),
@@ -81,7 +76,6 @@ impl Detector {
         }
     }
 
-    /// Shadow pixels of the next frame's foreground, shape (height, width).
     pub fn detect(&mut self, images: &Images<'_>) -> Mask {
         match self {
             Self::Chromaticity(settings) => chromaticity::detect(images, settings),
@@ -98,6 +92,12 @@ impl Detector {
     "`{0}` is not a shadow detector; choose chromaticity, physical, geometry, small-region-texture or large-region-texture"
 )]
 pub struct UnknownMethod(pub String);
+
+impl fmt::Display for Method {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
 
 impl FromStr for Method {
     type Err = UnknownMethod;

@@ -1,8 +1,7 @@
-//! Silhouettes along a rotated axis, without image rotation.
+//! Silhouettes along a rotated axis, without image rotation or resampling loss.
 //!
-//! The thesis rotates the silhouette for each angle. Only the lower edge of each column and the pixels left
-//! of a column are needed, which follow from `x' = x cos b - y sin b`, `y' = x sin b + y cos b` (Li 2014, eq.
-//! 8.38). An angle costs one pass over the outline (some thousand points), without resampling loss.
+//! Only the lower edge of each column and the pixels left of a column are needed. They follow from `x' = x
+//! cos b - y sin b`, `y' = x sin b + y cos b` (Li 2014, eq. 8.38) in one pass over the outline per angle.
 
 use farnear_silhouettes::mask::Mask;
 use ndarray::ArrayView2;
@@ -10,9 +9,7 @@ use ndarray::ArrayView2;
 /// Outline pixels (set, next to an unset 4-neighbour or the border) and row extents.
 #[derive(Clone, Debug)]
 pub struct Outline {
-    /// (x, y) of the outline's pixels.
     pub points: Vec<[f32; 2]>,
-    /// Number of set pixels.
     pub area: usize,
     /// (top, bottom, left, right) of the set pixels.
     pub bounds: (usize, usize, usize, usize),
@@ -51,8 +48,7 @@ impl Outline {
         bounds.map(|bounds| Self { points, area, bounds })
     }
 
-    /// Lower edge after a rotation by `angle_rad`: largest y' per column x', and the x' of column 0. Empty
-    /// columns repeat their left neighbour.
+    /// Largest y' per column x' (empty columns repeat their left neighbour), and the x' of column 0.
     pub fn lower_edge(&self, angle_rad: f32, flip_width: Option<f32>) -> LowerEdge {
         let (sin, cos) = angle_rad.sin_cos();
         let turn = |p: &[f32; 2]| {
@@ -83,14 +79,12 @@ impl Outline {
 
 #[derive(Clone, Debug)]
 pub struct LowerEdge {
-    /// Largest y' (y down) per column.
     pub edge: Vec<f32>,
     pub origin: f32,
 }
 
 impl LowerEdge {
-    /// Rotation point of Li 2014, section 8.2.4: the end of the longest run of negative slope, smoothed over
-    /// `window` columns. Returns the run's length in columns and the x' of its end.
+    /// Length and x' of the end of the longest run of negative slope, smoothed (Li 2014, section 8.2.4).
     pub fn rotation_point(&self, window: usize) -> (usize, f32) {
         let n = self.edge.len();
         let (mut best, mut run) = ((0_usize, self.origin), 0_usize);

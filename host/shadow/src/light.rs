@@ -1,5 +1,4 @@
-//! Light source: sun, lamp at a known position, or a shadow direction measured in the picture (Li 2014,
-//! section 9.2).
+//! Light source: sun, lamp, or a shadow direction measured in the picture (Li 2014, section 9.2).
 
 use super::{
     camera::Camera,
@@ -21,11 +20,8 @@ pub enum Light {
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lamp {
-    /// To the camera's right.
     pub right_m: f64,
-    /// Along the viewing direction.
     pub ahead_m: f64,
-    /// Above the ground.
     pub up_m: f64,
 }
 
@@ -36,8 +32,6 @@ impl From<SunPosition> for Light {
 }
 
 impl Light {
-    /// Whether a person of this stature has a usable shadow.
-    /// Errors: [`ShadowError::SunTooLow`], [`ShadowError::LampTooLow`].
     pub fn check(&self, height_m: f64, camera: &Camera) -> Result<(), ShadowError> {
         match self {
             Self::Sun(sun) => on_ground(*sun, height_m, camera).map(drop),
@@ -46,7 +40,7 @@ impl Light {
         }
     }
 
-    /// Ground position (right, ahead) of the shadow of a point (metres: right, ahead, up); `None` at or below
+    /// Ground position (right, ahead) of the shadow of a point (right, ahead, up), metres; `None` at or below
     /// the ground, for too low a light, or without a light position.
     pub fn thrown_to(&self, [right_m, ahead_m, up_m]: [f64; 3], camera: &Camera) -> Option<[f64; 2]> {
         if up_m <= 0.0 {
@@ -62,8 +56,7 @@ impl Light {
     }
 
     /// The subject's shadow in the image. For a known direction only, `length_px` gives the length from foot
-    /// and direction.
-    /// Errors: as [`Light::check`]; a subject not in front of the lens.
+    /// and direction. Fails as [`Light::check`], and for a subject not in front of the lens.
     pub fn shadow_of(
         &self,
         subject: Subject,
@@ -90,8 +83,8 @@ impl Lamp {
         Err(ShadowError::LampTooLow { up_m: self.up_m, least_m: ABOVE_HEAD * height_m })
     }
 
-    /// The ray over the head reaches the ground beyond the feet by their distance from the lamp's foot times
-    /// `H / (up - H)`.
+    /// The ray over the head meets the ground beyond the feet by their distance from the lamp
+    /// times `H / (up - H)`.
     fn on_ground(&self, subject: Subject) -> Result<GroundShadow, ShadowError> {
         self.check(subject.height_m)?;
         let stretch = subject.height_m / (self.up_m - subject.height_m);

@@ -31,10 +31,8 @@ pub enum ShadowError {
     Distance { distance_m: f64 },
 }
 
-/// Shadow on the ground in the camera's frame.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct GroundShadow {
-    /// To the camera's right.
     pub rx_m: f64,
     /// Along the viewing direction (positive = away from the camera).
     pub ry_m: f64,
@@ -42,14 +40,12 @@ pub struct GroundShadow {
     pub length_m: f64,
 }
 
-/// Position of the subject.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Subject {
     /// Distance u from the lens along the ground.
     pub distance_m: f64,
     /// Offset X0 to the right of the optical axis.
     pub offset_m: f64,
-    /// Stature H of (8.14).
     pub height_m: f64,
 }
 
@@ -62,19 +58,16 @@ pub struct ImageShadow {
     pub m_px: [f64; 2],
     /// Direction from +x towards +y (down): eta of eq. 8.20 by atan2.
     pub eta_rad: f64,
-    /// Rotation of the silhouette (mirrored if m_x <= 0) that points the bisector of body and shadow down: `3
-    /// pi / 4 - eta / 2`, in [pi/2, pi].
+    /// Rotation of the silhouette (mirrored if m_x <= 0) that points the bisector down: `3 pi / 4 - eta / 2`.
     pub beta_rad: f64,
     /// m_x <= 0: mirrored before the rotation.
     pub mirrored: bool,
-    /// Stature in the image (8.14).
     pub height_px: f64,
     /// Shortened at the near image border (8.19).
     pub shortened: bool,
 }
 
-/// Shadow of a person on level ground.
-/// Errors: a sun below [`LOWEST_SUN_DEG`].
+/// Shadow of a person on level ground; fails for a sun below [`LOWEST_SUN_DEG`].
 pub fn on_ground(sun: SunPosition, height_m: f64, camera: &Camera) -> Result<GroundShadow, ShadowError> {
     if sun.elevation_deg.is_nan() || sun.elevation_deg < LOWEST_SUN_DEG {
         return Err(ShadowError::SunTooLow { elevation_deg: sun.elevation_deg });
@@ -85,8 +78,7 @@ pub fn on_ground(sun: SunPosition, height_m: f64, camera: &Camera) -> Result<Gro
     Ok(GroundShadow { rx_m: length_m * direction.cos(), ry_m: length_m * direction.sin(), length_m })
 }
 
-/// Projects foot and tip into the image.
-/// Errors: a subject not in front of the lens.
+/// Projects foot and tip; fails for a subject not in front of the lens.
 pub fn in_image(shadow: GroundShadow, subject: Subject, camera: &Camera) -> Result<ImageShadow, ShadowError> {
     let (foot_px, height_px) = foot_and_height(subject, camera)?;
     // The lowest image row limits the visible ground; a nearer tip is shortened along the shadow (8.19).
@@ -105,8 +97,7 @@ pub fn in_image(shadow: GroundShadow, subject: Subject, camera: &Camera) -> Resu
 }
 
 /// Shadow with a known image direction, radians from right towards down; `length_px` gives its length from
-/// the foot.
-/// Errors: a subject not in front of the lens.
+/// the foot. Fails for a subject not in front of the lens.
 pub fn of_direction(
     eta_rad: f64,
     subject: Subject,
@@ -120,7 +111,6 @@ pub fn of_direction(
     Ok(ImageShadow::new(foot_px, [length * cos, length * sin], height_px, false))
 }
 
-/// Foot position and height in the image.
 fn foot_and_height(subject: Subject, camera: &Camera) -> Result<([f64; 2], f64), ShadowError> {
     let seen = |up_m| {
         let point = [subject.offset_m, subject.distance_m, up_m];
@@ -145,7 +135,7 @@ impl ImageShadow {
     }
 }
 
-/// Rotation angle beta (8.20) of a shadow (m_x, m_y), mirrored to the right: in [pi/2, pi].
+/// Angle beta (8.20) of a shadow (m_x, m_y), mirrored to the right: in [pi/2, pi].
 pub fn rotation_angle(m_px: [f64; 2]) -> f64 {
     let eta = m_px[1].atan2(m_px[0].abs());
     (3.0 * FRAC_PI_4 - 0.5 * eta).clamp(FRAC_PI_2, 2.0 * FRAC_PI_2)
@@ -156,8 +146,8 @@ pub fn distance_from_head_m(file: &CameraFile, head_width_px: f64) -> f64 {
     file.subject.head_width_m * file.camera.focal_px() / head_width_px
 }
 
-/// Distance by the head's row: a level camera at height Hc sees the head of stature H `f (H - Hc) / u` above
-/// the horizon. `None` if both heights are nearly equal.
+/// Distance by the head's row: a level camera at height Hc sees the head `f (H - Hc) / u` above the horizon.
+/// `None` if both heights are nearly equal.
 pub fn distance_from_head_row_m(file: &CameraFile, top_row_px: f64) -> Option<f64> {
     let camera = &file.camera;
     let above_m = file.subject.height_m - camera.height_m;
@@ -183,8 +173,7 @@ mod tests {
 
     #[test]
     fn shadows_point_away_from_the_sun() {
-        // Sun in the south-west, camera looking north: the shadow is to the right and away (Li 2014, fig.
-        // 8.1).
+        // Sun in the south-west, camera looking north: shadow to the right and away (Li 2014, fig. 8.1).
         let sun = SunPosition { elevation_deg: 45.0, azimuth_deg: 225.0 };
         let shadow = on_ground(sun, 2.0, &camera(0.0)).expect("sun is up");
         assert!((shadow.length_m - 2.0).abs() < 1e-12);

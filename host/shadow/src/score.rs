@@ -1,20 +1,14 @@
-//! Quality of shadow removal in pixels, compared with ground truth.
-//!
-//! Figures of Li 2014 (tables 8.1 and 8.2) and of Sanin, Sanderson and Lovell, "Shadow detection: a survey
-//! and comparative
-//! evaluation of recent methods", Pattern Recognition 45 (2012), 1684-1695:
+//! Quality of shadow removal in pixels, compared with ground truth: figures of Li 2014 (tables 8.1 and 8.2)
+//! and of Sanin, Sanderson and Lovell, Pattern Recognition 45 (2012).
 //!
 //! | figure | definition |
 //! |---|---|
 //! | shadow removed, % | removed shadow pixels of all shadow pixels (table 8.1; the survey's detection rate) |
 //! | wrongly removed, % | removed subject pixels of all subject pixels (table 8.2; 100 minus the survey's discrimination rate) |
 //! | intersection over union, % | of the result and the true subject |
-//!
-//! Cost: one pass over the pixels of a frame.
 
 use ndarray::{ArrayView2, Zip};
 
-/// Ground truth of a pixel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Truth {
     Background,
@@ -25,8 +19,8 @@ pub enum Truth {
 }
 
 impl Truth {
-    /// ChangeDetection.net grey values: 0 static, 50 shadow, 85 outside the region of interest, 170 unknown,
-    /// 255 moving. 127, the shadow value of many background models, is shadow too. `None` for others.
+    /// ChangeDetection.net: 0 static, 50 shadow, 85 outside the region of interest, 170 unknown, 255 moving;
+    /// also 127, the shadow of many background models. `None` for others.
     #[must_use]
     pub fn from_grey(value: u8) -> Option<Self> {
         match value {
@@ -43,13 +37,10 @@ impl Truth {
 #[error("the {what} is {}x{} pixels but the ground truth is {}x{}; they must be the same frame", .found.1, .found.0, .expected.1, .expected.0)]
 pub struct ShapeError {
     pub what: &'static str,
-    /// Shape (height, width).
     pub found: (usize, usize),
-    /// Shape (height, width).
     pub expected: (usize, usize),
 }
 
-/// Pixel counts over any number of frames.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ShadowScore {
     /// True shadow pixels (in the mask before removal, if given).
@@ -58,16 +49,13 @@ pub struct ShadowScore {
     /// True subject pixels (in the mask before removal, if given).
     pub subject_pixels: u64,
     pub subject_removed: u64,
-    /// Pixels of the result in the true subject.
     pub intersection: u64,
-    /// Pixels of the result or the true subject.
     pub union: u64,
 }
 
 impl ShadowScore {
-    /// Adds a frame with the masks before and after removal, all of shape (height, width). Without `before`
-    /// all true pixels count as present, so pixels missed by the background model count as removed.
-    /// Errors: [`ShapeError`].
+    /// Adds a frame with the masks before and after removal. Without `before` all true pixels count as
+    /// present, so pixels missed by the background model count as removed.
     pub fn add(
         &mut self,
         before: Option<ArrayView2<'_, bool>>,
@@ -108,13 +96,11 @@ impl ShadowScore {
         self.union += u64::from(after || truth == Truth::Subject);
     }
 
-    /// Share of shadow removed; `None` without shadow.
     #[must_use]
     pub fn removed_percent(&self) -> Option<f64> {
         percent(self.shadow_removed, self.shadow_pixels)
     }
 
-    /// Share of subject removed; `None` without a subject.
     #[must_use]
     pub fn wrongly_removed_percent(&self) -> Option<f64> {
         percent(self.subject_removed, self.subject_pixels)
@@ -126,7 +112,6 @@ impl ShadowScore {
         self.wrongly_removed_percent().map(|wrong| 100.0 - wrong)
     }
 
-    /// Intersection over union of result and subject; `None` if both are empty.
     #[must_use]
     pub fn iou_percent(&self) -> Option<f64> {
         percent(self.intersection, self.union)

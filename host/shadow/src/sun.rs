@@ -1,13 +1,12 @@
 //! Sun position for a place and time: topocentric elevation and azimuth without refraction.
 //!
 //! Closed forms give declination and Greenwich hour angle ([`Equatorial`]); one vector form converts them
-//! without branch or division, safe at noon, pole and zenith:
-//!
-//! `U = sin d sin L + cos d cos L cos h`, `E = -cos d sin h`, `N = sin d cos L - cos d sin L cos h`,
-//! elevation `atan2(U, hypot(E, N))`, azimuth `atan2(E, N)` clockwise from north.
+//! without branch or division, safe at noon, pole and zenith: `U = sin d sin L + cos d cos L cos h`, `E =
+//! -cos d sin h`, `N = sin d cos L - cos d sin L cos h`, elevation `atan2(U, hypot(E, N))`, azimuth `atan2(E,
+//! N)` clockwise from north.
 //!
 //! Largest differences from NREL's SPA, sun up, 1910 to 2210: PSA+ 0.0097 deg elevation and 0.045 deg
-//! azimuth; Almanac 0.0122 and 0.081; thesis 1.03 and 10.7. Cost: below a microsecond, SPA a few.
+//! azimuth; Almanac 0.0122 and 0.081; thesis 1.03 and 10.7.
 
 mod almanac;
 mod angles;
@@ -56,8 +55,7 @@ impl FromStr for Model {
     }
 }
 
-/// Elevation and azimuth (neglects UT1 - UTC, below 0.9 s or 0.004 deg).
-/// Errors: latitude or longitude out of range, or a time outside SPA.
+/// Elevation and azimuth; neglects UT1 - UTC (0.004 deg). Fails for an invalid place or a time outside SPA.
 pub fn position(time: DateTime<Utc>, place: Place, model: Model) -> Result<SunPosition, SunError> {
     let place = Place::new(place.latitude_deg, place.longitude_deg)?;
     if model == Model::Spa {
@@ -73,8 +71,7 @@ pub fn position(time: DateTime<Utc>, place: Place, model: Model) -> Result<SunPo
     })
 }
 
-/// Declination and Greenwich hour angle in closed form; for SPA those of PSA+ (within 0.01 deg), used for
-/// derivatives only.
+/// Declination and Greenwich hour angle; for SPA those of PSA+ (within 0.01 deg), for derivatives only.
 pub fn equatorial(time: DateTime<Utc>, model: Model) -> Equatorial {
     match model {
         Model::Psa | Model::Spa => psa::equatorial(time),

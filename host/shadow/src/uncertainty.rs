@@ -7,8 +7,8 @@
 //! `s_beta^2 = 1/4 [ (Hc u s^2 / D)^2 (s_psi^2 + s_alpha^2) + (A B / (u D))^2 s_u^2 + (B r_y / D)^2 s_Hc^2
 //! ]`, `s_u^2 = (v / w_i)^2 s_w^2 + (w / w_i)^2 s_v^2 + (u / w_i)^2 s_wi^2`.
 //!
-//! Stature and image distance cancel (except in u). Agrees with Monte Carlo to 2 %, unless the shadow's tip
-//! nears the camera: then [`Uncertainty::first_order_holds`] is false and the value is invalid.
+//! Agrees with Monte Carlo to 2 %, unless the shadow's tip nears the camera
+//! ([`Uncertainty::first_order_holds`]).
 
 use super::camera::CameraFile;
 use super::projection::{GroundShadow, ShadowError, Subject, on_ground};
@@ -16,21 +16,14 @@ use crate::sun::{self, Equatorial, Model, Place, SunError};
 use chrono::{DateTime, TimeDelta, Utc};
 use serde::{Deserialize, Serialize};
 
-/// Standard deviations of the results.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Uncertainty {
-    /// Sun azimuth psi.
     pub azimuth_rad: f64,
-    /// Sun elevation theta.
     pub elevation_rad: f64,
-    /// Subject distance u.
     pub distance_m: f64,
-    /// Distance of the shadow's tip, u + r_y.
     pub tip_distance_m: f64,
-    /// Rotation angle beta.
     pub beta_rad: f64,
-    /// False if the tip is within three standard deviations of the lens' plane, a pole of the projection:
-    /// `beta_rad` is then invalid.
+    /// False if the tip is within three standard deviations of the lens' plane: `beta_rad` is then invalid.
     pub first_order_holds: bool,
 }
 
@@ -42,7 +35,6 @@ pub enum UncertaintyError {
     Shadow(#[from] ShadowError),
 }
 
-/// Partial derivatives of azimuth and elevation by declination, hour angle and latitude (radians).
 #[derive(Clone, Copy, Debug)]
 struct HorizonPartials {
     azimuth: [f64; 3],
@@ -64,7 +56,7 @@ fn horizon_partials(declination: f64, hour_angle: f64, latitude: f64) -> Horizon
     }
 }
 
-/// Change of declination and hour angle (radians) per day at the same time of day, by central difference.
+/// Change of declination and hour angle (radians) per day at the same time of day.
 fn per_day(time: DateTime<Utc>, model: Model) -> [f64; 2] {
     let at = |days| -> Equatorial { sun::equatorial(time + TimeDelta::days(days), model) };
     let (before, after) = (at(-1), at(1));
@@ -74,8 +66,7 @@ fn per_day(time: DateTime<Utc>, model: Model) -> [f64; 2] {
     [0.5 * (after.declination_rad - before.declination_rad), 0.5 * hour_angle]
 }
 
-/// Propagates the camera file's standard deviations to beta.
-/// Errors: an invalid place, or a sun too low.
+/// Propagates the camera file's standard deviations to beta. Fails for an invalid place or too low a sun.
 pub fn propagate(
     file: &CameraFile,
     time: DateTime<Utc>,
@@ -115,7 +106,6 @@ pub fn propagate(
     })
 }
 
-/// Variance of u from the head's width (8.17).
 fn distance_variance(file: &CameraFile, distance_m: f64) -> f64 {
     let (camera, sd) = (&file.camera, &file.standard_deviations);
     let v_m = 1e-3 * camera.focal_length_mm;
@@ -142,7 +132,6 @@ fn tip_variance(
         + shadow.rx_m.powi(2) * (azimuth_var + sd.azimuth_deg.to_radians().powi(2))
 }
 
-/// Variance of beta, as in the module's formula.
 fn beta_variance(
     file: &CameraFile,
     shadow: GroundShadow,

@@ -1,9 +1,5 @@
-//! Background model per pixel: detects motion in video.
-//!
-//! Adaptive Gaussian mixture with an adaptive number of components: Z. Zivkovic, "Improved adaptive Gaussian
-//! mixture model for background subtraction", ICPR 2004, and Z. Zivkovic and F. van der Heijden, "Efficient
-//! adaptive density estimation per image pixel for the task of background subtraction", Pattern Recognition
-//! Letters 27 (2006), 773-780.
+//! Adaptive Gaussian mixture per pixel, which detects motion in video, with an adaptive number of components
+//! (Z. Zivkovic, ICPR 2004; Z. Zivkovic and F. van der Heijden, Pattern Recognition Letters 27, 2006).
 
 mod kernel;
 pub mod light;

@@ -1,6 +1,4 @@
-//! Binary masks of moving people.
-//!
-//! An `Array2<bool>` of shape (height, width), row 0 at the top, `true` for the subject. Coordinates are
+//! Binary masks of moving people: (height, width), row 0 at the top, `true` for the subject. Coordinates are
 //! pixels with centres at (row + 0.5, column + 0.5).
 
 pub mod assignment;
@@ -16,7 +14,6 @@ pub mod tracking;
 
 use ndarray::{Array2, ArrayView2};
 
-/// Shape (height, width), `true` for the subject.
 pub type Mask = Array2<bool>;
 
 /// Smallest upright rectangle, half open, px.
@@ -26,7 +23,6 @@ pub struct BoundingBox {
     pub left: usize,
     /// One past the last row.
     pub bottom: usize,
-    /// One past the last column.
     pub right: usize,
 }
 
@@ -44,7 +40,6 @@ impl BoundingBox {
         found
     }
 
-    /// Smallest box that holds both.
     #[must_use]
     pub fn union(self, other: Self) -> Self {
         Self {
@@ -74,14 +69,12 @@ impl BoundingBox {
         rows.max(columns)
     }
 
-    /// Whether the box touches an edge of an image of this (height, width).
     #[must_use]
     pub fn touches_edge(self, (height, width): (usize, usize)) -> bool {
         self.top == 0 || self.left == 0 || self.bottom == height || self.right == width
     }
 }
 
-/// Number of set pixels.
 #[must_use]
 pub fn area(mask: ArrayView2<'_, bool>) -> usize {
     mask.iter().filter(|&&set| set).count()

@@ -1,8 +1,8 @@
-//! Readers of what others' instruments write: bytes in, arrays out. Damaged files give errors that say where; none makes a
-//! reader panic or ask for more memory than a fixed multiple of the file.
+//! Readers of motion capture and keypoints: bytes in, arrays out. Damaged files give errors with their
+//! position; no reader panics or allocates more than a fixed multiple of the file.
 //!
-//! Motion capture goes through one table, [`READERS`]: a further format is a file next to the others with a `READER` in it, and a
-//! line in the table. [`read`] chooses by a file's ending and gives millimetres with z up:
+//! [`READERS`] lists the formats; a new one is a file with a `READER` and a line in the table. [`read`]
+//! selects by file extension and returns millimetres with z up:
 //!
 //! ```
 //! use farnear_silhouettes::readers::{self, recording::Choices};
@@ -12,7 +12,7 @@
 //! # Ok::<(), farnear_silhouettes::readers::recording::RecordingError>(())
 //! ```
 //!
-//! Data sets of body joints come as MATLAB files ([`skeletons`]).
+//! MATLAB files hold data sets of body joints ([`skeletons`]).
 
 mod amass;
 mod body;
@@ -32,7 +32,6 @@ mod zip;
 use reader::Reader;
 use recording::{Choices, Found, Recording, RecordingError, Source};
 
-/// All formats of motion capture.
 pub const READERS: [Reader; 8] = [
     bvh::READER,
     c3d::READER,
@@ -44,9 +43,8 @@ pub const READERS: [Reader; 8] = [
     trc::READER,
 ];
 
-/// Reads a recording with the reader of its file's ending (any case, without the dot). What the caller names in `choices` goes before what the
-/// file says or suggests; guesses are in [`Recording::remarks`].
-/// Errors: [`RecordingError::Extension`] for an ending that no reader has, and the errors of the reader.
+/// Reads a recording by file extension (any case, without the dot). `choices` overrides what the file states
+/// or suggests; guesses are in [`Recording::remarks`].
 pub fn read(bytes: &[u8], extension: &str, choices: Choices) -> Result<Recording, RecordingError> {
     let ending = extension.to_lowercase();
     let reader = READERS.iter().find(|reader| reader.extensions.contains(&ending.as_str()));
@@ -54,10 +52,6 @@ pub fn read(bytes: &[u8], extension: &str, choices: Choices) -> Result<Recording
     settled((reader.read)(bytes)?, choices)
 }
 
-/// Reads a folder of keypoint files, a frame each, in the order in which they are given.
-///
-/// # Errors
-/// As [`read`].
 pub fn read_keypoint_files<'a>(
     files: impl IntoIterator<Item = &'a [u8]>,
     choices: Choices,
@@ -77,7 +71,6 @@ fn settled(found: Found, choices: Choices) -> Result<Recording, RecordingError> 
     }
 }
 
-/// The endings of all readers, for messages: `.bvh, .c3d, ...`.
 pub fn extensions() -> String {
     let all = READERS.iter().flat_map(|reader| reader.extensions);
     all.map(|extension| format!(".{extension}")).collect::<Vec<_>>().join(", ")

@@ -9,26 +9,52 @@ use farnear_files::{
     staging::Staging,
 };
 use ndarray::Array2;
-use serde::Serialize;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
 use crate::{
     context::Context,
     error::{Result, WorkflowError},
     figures::rounded,
+    request::{PathKind, Request},
 };
 
 const DARK: &str = "dark.npy";
 const RESPONSE: &str = "response.npy";
 const BAD: &str = "bad.png";
 
-/// What the frames are learned from, and where they go.
-#[derive(Clone, PartialEq, Debug)]
-pub struct CameraSettings {
-    /// Exposures with the lens covered; none: black is taken for 0.
-    pub dark: Vec<PathBuf>,
-    /// Exposures of even light, at about half of full scale.
+/// Learn a camera's dark frame, the response of its pixels and its bad ones, for `farnear depth --camera-frames`.
+#[derive(Clone, PartialEq, Debug, Default, Serialize, Deserialize, JsonSchema)]
+#[cfg_attr(feature = "clap", derive(clap::Args))]
+#[cfg_attr(
+    feature = "clap",
+    command(
+        after_help = "Example: farnear calibrate camera --flat flat1.png flat2.png --dark dark1.png dark2.png --out camera/"
+    )
+)]
+#[serde(default)]
+pub struct CalibrateCameraRequest {
+    /// Exposures of even light at about half of full scale, out of focus. Several, because their noise stays.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "FILE", num_args = 1.., required = true))]
     pub flat: Vec<PathBuf>,
+    /// Exposures with the lens covered [default: black is 0].
+    #[cfg_attr(feature = "clap", arg(long, value_name = "FILE", num_args = 1..))]
+    pub dark: Vec<PathBuf>,
+    /// The folder for dark.npy, response.npy and bad.png.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "DIR"))]
     pub out: PathBuf,
+}
+
+impl Request for CalibrateCameraRequest {
+    const NAME: &'static str = "calibrate camera";
+    const REQUIRED: &'static [&'static str] = &["flat", "out"];
+    const PATHS: &'static [(&'static str, PathKind)] =
+        &[("flat", PathKind::Input), ("dark", PathKind::Input), ("out", PathKind::OutputFolder)];
+    type Figures = CameraFigures;
+
+    fn run(&self, context: &Context<'_>) -> Result<CameraFigures> {
+        calibrate(self, context)
+    }
 }
 
 /// What there is to say of a camera.
@@ -45,7 +71,10 @@ pub struct CameraFigures {
 }
 
 /// Learns a camera's frames and writes them: all files or none.
-pub fn calibrate(settings: &CameraSettings, context: &Context<'_>) -> Result<CameraFigures> {
+///
+/// # Errors
+/// Images; [`WorkflowError::CameraFrames`]; files.
+pub fn calibrate(settings: &CalibrateCameraRequest, context: &Context<'_>) -> Result<CameraFigures> {
     let read = |files: &[PathBuf]| -> Result<Vec<Array2<f32>>> {
         files
             .iter()

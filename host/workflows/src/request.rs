@@ -14,6 +14,7 @@ use serde_json::{Map, Value};
 use crate::{
     context::Context,
     error::{Result, WorkflowError},
+    rig::{RigAddress, camera::CameraSettings},
 };
 
 /// A task that a user can run, with everything that it needs to know.
@@ -40,10 +41,28 @@ pub trait Request:
     /// Depends on the task.
     fn run(&self, context: &Context<'_>) -> Result<Self::Figures>;
 
+    /// The error that a complete result amounts to: figures are printed before it.
+    ///
+    /// # Errors
+    /// A comparison or a step that failed.
+    fn verdict(_: &Self::Figures) -> Result<()> {
+        Ok(())
+    }
+
     /// Files and folders that the result depends on.
     fn inputs(&self) -> Vec<PathBuf> {
         inputs(self)
     }
+}
+
+/// A task of a rig. Its caller decides which one.
+pub trait RigRequest: Request {
+    fn set_rig(&mut self, rig: RigAddress);
+}
+
+/// A task of a rig with a camera.
+pub trait CameraRequest: RigRequest {
+    fn set_camera(&mut self, camera: CameraSettings);
 }
 
 /// Files and folders that a request names as inputs.
@@ -165,6 +184,23 @@ pub const TASKS: &[Task] = &[
     Task::of::<crate::compare::CompareRequest>(),
     Task::of::<crate::report::ReportRequest>(),
     Task::of::<crate::optics::OpticsRequest>(),
+    Task::of::<crate::camera_frames::CalibrateCameraRequest>(),
+    Task::of::<crate::silhouettes::video::SilhouettesVideoRequest>(),
+    Task::of::<crate::silhouettes::passages::PassagesRequest>(),
+    Task::of::<crate::silhouettes::markers::MarkersRequest>(),
+    Task::of::<crate::silhouettes::skeletons::SkeletonsRequest>(),
+    Task::of::<crate::silhouettes::synthetic::SyntheticRequest>(),
+    Task::of::<crate::shadow::removal::ShadowRemoveRequest>(),
+    Task::of::<crate::shadow::score::ShadowScoreRequest>(),
+    Task::of::<crate::rig::pair::CaptureRequest>(),
+    Task::of::<crate::rig::focus::FocusRequest>(),
+    Task::of::<crate::rig::sequence::SequenceRequest>(),
+    Task::of::<crate::rig::continuous::ContinuousRequest>(),
+    Task::of::<crate::rig::targets::TargetSeriesRequest>(),
+    Task::of::<crate::rig::correction_fit::FitRequest>(),
+    Task::of::<crate::rig::correct::BoardCorrectRequest>(),
+    Task::of::<crate::rig::sun::SunRequest>(),
+    Task::of::<crate::rig::check::CheckRequest>(),
 ];
 
 /// Reads a job from its fields; paths are relative to the folder.

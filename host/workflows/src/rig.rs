@@ -9,6 +9,7 @@
 //!   [`goto`]: to the far or the near focus; [`quality`]: how good depth is.
 
 pub mod alarms;
+mod axis;
 pub mod board;
 pub mod camera;
 pub mod check;
@@ -44,10 +45,14 @@ use crate::{
     error::{Result, WorkflowError},
     simulator::{Scenery, Simulator},
 };
+pub use axis::AxisName;
 use open::OpenRig;
 
-#[derive(Clone, PartialEq, Debug)]
+#[derive(Clone, PartialEq, Debug, Default)]
 pub enum RigAddress {
+    /// The only board that is plugged in.
+    #[default]
+    Attached,
     /// Behind a serial port, e.g. `/dev/ttyACM0`.
     Port(String),
     /// Emulated: `farnear-sim` is started for it, and ends with it.
@@ -57,11 +62,6 @@ pub enum RigAddress {
 }
 
 impl RigAddress {
-    /// The only board that is plugged in, without a named port.
-    pub fn found() -> Result<Self> {
-        Ok(Self::Port(find::board_port().map_err(ClientError::Port)?))
-    }
-
     /// Whether the rig is the emulated one that is started for this.
     pub fn is_emulated(&self) -> bool {
         matches!(self, Self::Emulated(_))
@@ -71,6 +71,7 @@ impl RigAddress {
     pub fn with_scene(&self, scene: String) -> Result<Self> {
         match self {
             Self::Emulated(scenery) => Ok(Self::Emulated(scenery.with_scene(scene))),
+            Self::Attached => Err(WorkflowError::parameter("scene", scene, "a board has a world of its own")),
             Self::Port(port) => {
                 Err(WorkflowError::parameter("scene", scene, format!("the scene of {port} cannot be set")))
             }
@@ -98,6 +99,10 @@ impl Rig {
         context: &Context<'_>,
     ) -> Result<Self> {
         let (mut client, emulation) = match address {
+            RigAddress::Attached => {
+                let port = find::board_port().map_err(ClientError::Port)?;
+                (Client::open(&port)?, None)
+            }
             RigAddress::Port(port) => (Client::open(port)?, None),
             RigAddress::Open(open) => return Ok(open.connect(context)),
             RigAddress::Emulated(scenery) => {

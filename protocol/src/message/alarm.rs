@@ -1,5 +1,5 @@
-//! Alarms stop the rig. An alarm is latched in memory, survives resets and blocks all motion until the host
-//! clears it by number, so that only a reported alarm can be cleared.
+//! Alarms stop the rig. An alarm is latched in memory, survives resets and blocks all motion until the host clears it
+//! by number, so that only a reported alarm can be cleared.
 
 use postcard_schema::Schema;
 use serde::{Deserialize, Serialize};
@@ -68,7 +68,6 @@ pub enum Alarm {
     RecordLost { record: RecordName },
     /// No answer from the memory: nothing survives a power loss.
     MemoryMissing,
-    /// The external clock is missing or has stopped (which resets the board). The internal clock changes
-    /// times and speeds by a few per cent.
+    /// The external clock is missing or has stopped (which resets the board). Times are a few per cent off.
     ClockLost,
 }

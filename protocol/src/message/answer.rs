@@ -36,7 +36,7 @@ pub enum Response {
     Row(Codes),
 }
 
-/// Why a request was refused. Nothing has changed.
+/// Why a request was rejected. Nothing has changed.
 #[derive(Serialize, Deserialize, Schema, Clone, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[allow(missing_docs, reason = "names and types describe these fields")]
@@ -119,7 +119,7 @@ pub enum RequestError {
     },
     /// The light cannot be set like this.
     Light {
-        /// Why.
+        /// The reason.
         reason: LightFault,
     },
 }

@@ -38,8 +38,7 @@ impl Axis {
     }
 }
 
-/// Distance from the lens' principal plane to the sensor, nm: the datum plus all axes with
-/// [`Axis::is_in_distance`].
+/// Distance from the lens' principal plane to the sensor, nm: the datum plus all axes with [`Axis::is_in_distance`].
 pub fn sensor_distance_nm(datum: Nanometres, mut position: impl FnMut(Axis) -> Nanometres) -> i64 {
     let parts = Axis::ALL.into_iter().filter(|axis| axis.is_in_distance());
     i64::from(datum.0) + parts.map(|axis| i64::from(position(axis).0)).sum::<i64>()

@@ -199,7 +199,7 @@ pub struct LinkCounters {
     pub bad_frames: u32,
     /// Repeated requests, answered from memory.
     pub repeated: u32,
-    /// Requests refused for a wrong session or an old id.
+    /// Requests rejected for a wrong session or an old id.
     pub stale: u32,
     /// Requests without room, with or without [`super::RequestError::QueueFull`].
     pub overflowed: u32,

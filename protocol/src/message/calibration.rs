@@ -12,8 +12,7 @@ use crate::units::Nanometres;
 pub enum Routine {
     /// Travel between home and far switch; homes the axis.
     Travel { axis: Axis },
-    /// Backlash of the screw: motor travel at a reversal until the stage follows, measured at its home
-    /// switch.
+    /// Backlash of the screw: motor travel at a reversal until the stage follows, at its home switch.
     Backlash { axis: Axis },
     /// Gain and hysteresis of the piezo: open-loop sweep.
     Piezo,

@@ -12,8 +12,7 @@ pub const ID_STEP_MAX: u32 = 65_536;
 /// A request with its session.
 #[derive(Serialize, Deserialize, Clone, PartialEq, Eq, Debug)]
 pub struct Call {
-    /// Number of [`Request::OpenSession`], or [`NO_SESSION`]. Always four bytes, little-endian, so that a
-    /// frame's duration on the wire does not depend on it.
+    /// Number of [`Request::OpenSession`], or [`NO_SESSION`]. Always four bytes, little-endian, for equal durations.
     #[serde(with = "postcard::fixint::le")]
     pub session: u32,
     /// The request itself.

@@ -97,8 +97,7 @@ pub enum EventKind {
         request: u32,
         /// Period number, from 0; each period has one event.
         frame: u32,
-        /// Largest deviation from the target between trigger and end of exposure. Beyond the shot's settle
-        /// window the sensor moved.
+        /// Largest deviation from the target during the exposure; beyond the shot's settle window the sensor moved.
         deviation: Nanometres,
         shot: ShotRecord,
     },

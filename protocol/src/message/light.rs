@@ -10,8 +10,7 @@ pub const LIGHT_LEVEL_MAX: u16 = 1_000;
 /// Longest time for which the outputs stay on without another [`super::Request::SetLights`].
 pub const LIGHT_TIME_MAX: Micros = Micros(60_000_000);
 
-/// Brightness of both outputs in thousandths: the duty cycle of a pulse width modulation of 21 kHz. 0 is off, 1000 on
-/// without a gap.
+/// Brightness of both outputs in thousandths: the duty cycle of a 21 kHz PWM. 0 is off, 1000 on without a gap.
 #[derive(Serialize, Deserialize, Schema, Clone, Copy, PartialEq, Eq, Debug, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct LightLevels {
@@ -39,7 +38,7 @@ impl LightLevels {
 /// A flash within an exposure.
 #[derive(Serialize, Deserialize, Schema, Clone, Copy, PartialEq, Eq, Debug)]
 pub struct ShotLight {
-    /// Brightness during the flash; before and after it the outputs have what [`super::Request::SetLights`] asked for.
+    /// Brightness during the flash; otherwise that of [`super::Request::SetLights`].
     pub levels: LightLevels,
     /// From the rising edge of the trigger to the start of the flash.
     pub delay: Micros,

@@ -5,8 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::units::Micros;
 
-/// Trial time of a new rate: without a valid request the board returns to the old one. Longer than four
-/// attempts of a host, 50 ms each.
+/// Trial time of a new rate; without a valid request the old one returns. Exceeds a host's four attempts of 50 ms.
 pub const LINK_TRIAL: Micros = Micros(300_000);
 
 /// A link rate, 8N1. Each reset starts with [`LinkRate::START`].

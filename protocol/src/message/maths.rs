@@ -1,7 +1,6 @@
-//! Mathematics on the board: depth correction by rows, its fit, and sun and shadow.
-//!
-//! Depths are Q1.15 codes of `farnear-maths` (`DepthScale`), coefficients its Q2.29 bits. Requests carry
-//! integers, so that a repeat is equal; answers carry the board's `f32` bit for bit.
+//! Mathematics on the board: depth correction by rows, its fit, and sun and shadow. Depths are Q1.15 codes of
+//! `farnear-maths` (`DepthScale`), coefficients its Q2.29 bits. Requests carry integers, answers the board's `f32`
+//! bits.
 
 use heapless::Vec;
 use postcard_schema::Schema;
@@ -53,7 +52,7 @@ pub struct CorrectionInfo {
     pub half_span_um: i32,
 }
 
-/// Why a correction request was refused.
+/// Why a correction request was rejected.
 #[derive(Serialize, Deserialize, Schema, Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum CorrectionFault {

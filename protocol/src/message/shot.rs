@@ -25,7 +25,7 @@ pub struct Shot {
     pub mode: TriggerMode,
 }
 
-/// Why a shot was refused.
+/// Why a shot was rejected.
 #[derive(Serialize, Deserialize, Schema, Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum ShotFault {
@@ -102,8 +102,7 @@ pub enum DropReason {
 pub enum TriggerMode {
     /// The board sends a pulse as long as the exposure.
     Hardware,
-    /// The host triggers the camera after [`super::EventKind::ShotReady`]; the camera's exposure signal ends
-    /// the shot.
+    /// The host triggers the camera after [`super::EventKind::ShotReady`]; the camera's exposure signal ends the shot.
     Software,
     /// Free-running camera; the shot is the first exposure that begins after settling.
     FreeRunning,

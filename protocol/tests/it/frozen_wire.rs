@@ -1,9 +1,7 @@
-//! The bytes of protocol version 3: every message and every variant.
-//!
-//! Do not change an expectation: different bytes are another protocol. Either the change is a mistake, or
-//! `PROTOCOL_CURRENT` grows and a new folder freezes the new version. Messages may be appended. The first
-//! frame was also assembled by hand from `docs/protocol.md` (see `by_hand`), with an independent CRC
-//! (Python's `zlib.crc32`).
+//! The bytes of protocol version 3: every message and every variant. Do not change an expectation: different bytes are
+//! another protocol. Either the change is a mistake, or `PROTOCOL_CURRENT` grows and a new folder freezes the new
+//! version. Messages may be appended. The first frame was also assembled by hand from `docs/protocol.md` (see
+//! `by_hand`), with an independent CRC (Python's `zlib.crc32`).
 
 pub mod answers;
 mod events;
@@ -33,8 +31,8 @@ fn check(found: &[String], frozen: &[&str]) {
     assert_eq!(found.len(), frozen.len(), "freeze these:\n\"{}\",", found.join("\",\n\""));
 }
 
-/// Checks that `table` has every variant of an enum in order: the first byte is the variant's index
-/// (neighbours may repeat a variant), and the next index does not decode.
+/// Checks that `table` has every variant of an enum in order: the first byte is the variant's index (neighbours may
+/// repeat a variant), and the next index does not decode.
 #[track_caller]
 fn lists_every_variant<T: Serialize + DeserializeOwned>(table: &[T]) {
     let mut buffer = [0; 512];

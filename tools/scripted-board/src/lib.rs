@@ -1,8 +1,7 @@
-//! A scripted board with configurable faults of line and board, for tests and examples.
-//!
-//! It follows the protocol (an id acts once, events are numbered and can be read again), so tests see how the
-//! client handles a fault. Work ends immediately. The line is in memory ([`Peer::connect`]) or, on Linux, a
-//! pseudo-terminal (`plug_in`). For realistic behaviour use `farnear-sim`.
+//! A scripted board with configurable faults of line and board, for tests and examples. It follows the protocol (an id
+//! acts once, events are numbered and can be read again), so tests see how the client handles a fault. Work ends
+//! immediately. The line is in memory ([`Peer::connect`]) or, on Linux, a pseudo-terminal (`plug_in`). `farnear-sim` is
+//! realistic.
 
 #![allow(clippy::unwrap_used)] // panics fail the test
 
@@ -37,12 +36,10 @@ pub use port::plug_in;
 
 #[derive(Default, Clone)]
 pub struct Faults {
-    /// Requests to lose.
     pub lose_requests: u32,
-    /// Answers to lose.
     pub lose_answers: u32,
     pub duplicate_answers: bool,
-    /// Event numbers to lose.
+    /// Numbers of the events to lose.
     pub lose_events: Vec<u32>,
     /// Bytes before each frame of the board.
     pub garbage: Vec<u8>,
@@ -73,11 +70,10 @@ pub struct Faults {
     pub no_rate: Option<LinkRate>,
 }
 
-/// State of the board.
 pub struct Board {
     pub hello: Hello,
     pub faults: Faults,
-    /// Clock since the reset, us.
+    /// Since the reset, us.
     pub time: u64,
     pub coarse: Nanometres,
     pub fine: Nanometres,
@@ -90,9 +86,7 @@ pub struct Board {
     pub halts: u32,
     /// Keep-alive timeouts of the requests.
     pub keep_alives: Vec<Micros>,
-    /// Loaded shots by index.
     pub program: Vec<Option<Shot>>,
-    /// Number of armed shots.
     pub armed: u8,
     /// All events since power-on.
     pub events: Vec<Event>,
@@ -102,20 +96,17 @@ pub struct Board {
     pub latched: bool,
     /// Changed settings by name.
     pub settings: BTreeMap<&'static str, i32>,
-    /// Home and far switch of the coarse axis.
     pub switches: [bool; 2],
-    /// Home and far switch of the lens stage.
     pub lens_switches: [bool; 2],
     pub emergency_stop: bool,
     pub counters: Counters,
     /// Status requests that answered [`EventKind::StillThere`].
     pub still_there: u32,
-    /// Connections open at the host's end.
     pub connections: usize,
     /// Line broken: nothing arrives or can be opened.
     pub gone: bool,
     active: Option<(u32, Request)>,
-    /// Remaining status requests before it stands still.
+    /// Remaining status requests until rest.
     pub braking: u32,
     asking: u32,
     logs: u32,
@@ -123,7 +114,6 @@ pub struct Board {
     pub rate: LinkRate,
     trial: Option<(LinkRate, Instant)>,
     host_rate: LinkRate,
-    /// Id of the open session.
     pub session: u32,
     remembered: BTreeMap<u32, Vec<u8>>,
     decoder: Decoder,
@@ -227,7 +217,6 @@ impl Peer {
         })))
     }
 
-    /// Opens connections to this board.
     pub fn connect(&self) -> farnear_capture::Connect {
         let peer = self.clone();
         Box::new(move || {
@@ -247,8 +236,7 @@ impl Peer {
         Connection(self.clone())
     }
 
-    /// Locks the board.
-    /// Panics: if the lock is poisoned.
+    /// Panics if the lock is poisoned.
     pub fn board(&self) -> MutexGuard<'_, Board> {
         self.0.lock().unwrap()
     }
@@ -305,8 +293,7 @@ impl Board {
         self.send(&frame);
     }
 
-    /// Whether both ends have a rate that the adapter passes. An unconfirmed rate is abandoned after its
-    /// trial.
+    /// Whether both ends have a rate that the adapter passes. An unconfirmed rate is abandoned after its trial.
     fn hears_the_host(&mut self) -> bool {
         if let Some((back, _)) = self.trial.filter(|(_, until)| Instant::now() >= *until) {
             (self.rate, self.trial) = (back, None);
@@ -318,14 +305,12 @@ impl Board {
         hears
     }
 
-    /// Changes the rate on trial.
     fn change_rate(&mut self, rate: LinkRate) {
         let until = Instant::now() + Duration::from_micros(u64::from(LINK_TRIAL.0));
         self.trial = Some((self.rate, until));
         self.rate = rate;
     }
 
-    /// Sends a frame after the configured garbage.
     fn send(&mut self, frame: &[u8]) {
         self.out.extend(&self.faults.garbage);
         self.out.extend(frame);
@@ -346,12 +331,11 @@ impl Board {
         }
     }
 
-    /// Sends an event.
     pub fn say(&mut self, kind: EventKind) {
         self.event(kind);
     }
 
-    /// Position near the target, with an error like a screw's.
+    /// Near the target, with an error like a screw's.
     fn place(&mut self, axis: Axis, target: Nanometres) {
         match axis {
             Axis::SensorCoarse => self.coarse = Nanometres(target.0 + 375),
@@ -368,7 +352,7 @@ impl Board {
         }
     }
 
-    /// Restarts the board with the next boot number.
+    /// Increments the boot number.
     pub fn reset(&mut self, cause: ResetCause) {
         self.hello.boot += 1;
         (self.rate, self.trial) = (LinkRate::START, None);
@@ -389,8 +373,6 @@ impl Board {
         }
     }
 
-    /// Writes to the log.
-    /// Panics: if it does not fit a frame.
     pub fn log(&mut self, bytes: &[u8]) {
         let log = Log { bytes: bytes.try_into().unwrap() };
         let number = self.logs;
@@ -398,7 +380,6 @@ impl Board {
         self.put(Kind::Log, number, &log);
     }
 
-    /// Loses a piece of the log.
     pub fn lose_log(&mut self) {
         self.logs += 1;
     }

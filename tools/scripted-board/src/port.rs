@@ -12,9 +12,7 @@ use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
 
 use crate::{Faults, Peer};
 
-/// Puts a scripted board behind a pseudo-terminal; returns the port's name. The port closes when
-/// [`crate::Board::gone`] is set.
-/// Panics: without pseudo-terminals.
+/// Puts a scripted board behind a pseudo-terminal; returns its name. [`crate::Board::gone`] closes the port.
 pub fn plug_in(faults: Faults) -> (String, Peer) {
     // Not serialport's pair: programs started by tests would inherit its ends and keep the line open.
     let far_end = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY | OpenptFlags::CLOEXEC).expect("a pty");

@@ -1,5 +1,4 @@
-//! Work of the scripted board: homing, moves, programs, calibrations. All end immediately, unless a fault is
-//! configured.
+//! Work of the scripted board: homing, moves, programs, calibrations. All end immediately, faults aside.
 
 use farnear_protocol::{
     Request, RequestError, Response,
@@ -114,7 +113,6 @@ impl Board {
         }
     }
 
-    /// Raises and latches an alarm.
     pub fn raise(&mut self, alarm: Alarm) -> u32 {
         let number = self.alarms.len() as u32 + 1;
         let record = AlarmRecord { number, boot: self.hello.boot, time: BoardMicros(self.time), alarm };

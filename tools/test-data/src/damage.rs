@@ -1,6 +1,5 @@
 //! Damaged texts for tests of parsers. Random bytes fail in the first line; these reach further.
 
-/// Words that parsers may mishandle.
 const WORDS: [&str; 21] = [
     "",
     "-1",
@@ -25,8 +24,7 @@ const WORDS: [&str; 21] = [
     "é",
 ];
 
-/// Replaces the words at these places by others (indices wrap around), and optionally cuts the text after a
-/// word.
+/// Replaces the words at these places by others (indices wrap around), and optionally cuts the text after a word.
 pub fn damaged(text: &str, words: &[(usize, usize)], lost: Option<usize>) -> String {
     let mut split: Vec<&str> = text.split_inclusive([' ', '\t', '\n', ',', '"']).collect();
     let count = split.len().max(1);

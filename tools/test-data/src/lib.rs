@@ -1,12 +1,9 @@
-//! Shared by tests: damaged texts ([`damaged`]), and optional resources: real data next to the repository,
-//! programs, and the emulated rig.
+//! Shared by tests: damaged texts ([`damaged`]), and optional resources: real data, programs, and the emulated rig.
 //!
 //! Tests without their resource count as skipped. The crate's build script calls [`declare`], which sets the
-//! configuration `shared_data`; the test has `#[cfg_attr(not(shared_data), ignore = "needs the real data
-//! beside the repository")]` and uses [`path`].
-//!
-//! Build scripts watch only files that exist: cargo treats missing ones as changed and would rebuild the
-//! crate each time. `cargo xtask test` reruns them when [`at_hand`] changes.
+//! configuration `shared_data`; the test has `#[cfg_attr(not(shared_data), ignore = "needs the real data beside the
+//! repository")]` and uses [`path`]. Build scripts watch only files that exist: cargo treats missing ones as changed
+//! and would rebuild the crate each time. `cargo xtask test` reruns them when [`at_hand`] changes.
 
 mod damage;
 
@@ -15,7 +12,8 @@ use std::path::{Path, PathBuf};
 pub use damage::damaged;
 
 /// Programs started by tests: configuration and file name.
-const PROGRAMS: [(&str, &str); 2] = [("ffmpeg", "ffmpeg"), ("fake_gige_camera", "arv-fake-gv-camera-0.8")];
+const PROGRAMS: [(&str, &str); 3] =
+    [("ffmpeg", "ffmpeg"), ("fake_gige_camera", "arv-fake-gv-camera-0.8"), ("typos", "typos")];
 
 fn folder() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data")
@@ -27,9 +25,9 @@ pub fn declare() {
     found("shared_data", data());
 }
 
-/// For build scripts: sets `emulated_rig` if `FARNEAR_REQUIRE_SIM=1`, which `cargo xtask test` sets after
-/// building `farnear-sim` and its firmware. Tests use `#[cfg_attr(not(emulated_rig), ignore = "needs
-/// farnear-sim: cargo xtask test")]`.
+/// For build scripts: sets `emulated_rig` if `FARNEAR_REQUIRE_SIM=1`, which `cargo xtask test` sets after building
+/// `farnear-sim` and its firmware. Tests use `#[cfg_attr(not(emulated_rig), ignore = "needs farnear-sim: cargo xtask
+/// test")]`.
 pub fn declare_emulated_rig() {
     println!("cargo::rustc-check-cfg=cfg(emulated_rig)");
     println!("cargo::rerun-if-env-changed=FARNEAR_REQUIRE_SIM");
@@ -38,8 +36,8 @@ pub fn declare_emulated_rig() {
     }
 }
 
-/// For build scripts: sets a configuration per program on the PATH. Tests use `#[cfg_attr(not(NAME), ignore =
-/// "needs PROGRAM")]`.
+/// For build scripts: sets a configuration per program on the PATH. Tests use
+/// `#[cfg_attr(not(NAME), ignore = "needs PROGRAM")]`.
 pub fn declare_programs() {
     println!("cargo::rerun-if-env-changed=PATH");
     for (name, program) in PROGRAMS {

@@ -1,6 +1,5 @@
-//! Instructions per pixel of the run time on 64-bit ARM, compared with x86-64: counted by qemu, which lists each one.
-//!
-//! Times cannot be had from an emulator; instructions can, and they tell whether the vectors are used.
+//! Instructions per pixel of the run time on 64-bit ARM and x86-64, counted by qemu. An emulator gives no
+//! times, but instructions show whether the vectors are used.
 
 use std::{
     fmt::Write as _,
@@ -18,14 +17,13 @@ use crate::{
     run::{cargo, output, step},
 };
 
-/// How the section begins on the page.
 const HEADING: &str = "## On 64-bit ARM\n";
-/// Pixels of the pair in `one_chain`.
+/// Of the pair in `one_chain`.
 const PIXELS: u64 = 96 * 128;
 /// The first chain allocates its buffers; the figure is the difference to this many.
 const TIMES: u64 = 2;
 
-/// Counts, prints, and puts the section at the end of the page where that is wanted.
+/// With `write`, replaces the section at the end of the page.
 pub fn renew(write: bool) -> Result<()> {
     let section = count_all()?;
     println!("\n{section}");
@@ -37,7 +35,7 @@ pub fn renew(write: bool) -> Result<()> {
     Ok(())
 }
 
-/// The section at the end of the present page; empty if missing.
+/// The page's present section; empty if missing.
 pub fn kept() -> Result<String> {
     let page = page()?;
     Ok(page.find(HEADING).map_or(String::new(), |start| page[start..].to_owned()))
@@ -48,7 +46,6 @@ fn page() -> Result<String> {
     fs::read_to_string(&file).with_context(|| format!("cannot read {}", file.display()))
 }
 
-/// Counts for the vector units that qemu has, as a section of the page.
 fn count_all() -> Result<String> {
     if let Some(missing) = arm::missing() {
         bail!("instructions on 64-bit ARM cannot be counted: {missing}");
@@ -75,7 +72,7 @@ fn count_all() -> Result<String> {
     Ok(text)
 }
 
-/// Builds the bench for a target, or for this machine, as `cargo xtask demo` builds the programs.
+/// `None`: this machine.
 fn build(target: Option<&str>) -> Result<PathBuf> {
     let mut command = cargo(["build", "--locked", "--package", "farnear-depth"]);
     command.args(["--bench", "one_chain", "--message-format", "json-render-diagnostics"]);
@@ -91,7 +88,6 @@ fn build(target: Option<&str>) -> Result<PathBuf> {
         .context("cargo built no one_chain")
 }
 
-/// Instructions of a program from its start to its end.
 fn count(emulator: &[&str; 3], program: &Path, arguments: &[String]) -> Result<u64> {
     let [name, options @ ..] = emulator;
     let help = output(Command::new(name).arg("-help"))?;

@@ -1,6 +1,5 @@
-//! Times of host/recognition: from video and masks to embedded points, compared with Isomap and the RBF map of scikit-learn.
-//!
-//! The peer runs on the same 1500 descriptors, which our bench writes, once before and once after our benches.
+//! Times of host/recognition from video and masks to embedded points, compared with scikit-learn's Isomap and
+//! an RBF map on the same 1500 descriptors.
 
 use std::{
     fmt::Write as _,
@@ -14,7 +13,6 @@ use serde_json::Value;
 use super::{Row, modules, rows};
 use crate::run::{ROOT, cargo, finish, output, step, target_folder};
 
-/// The project's own peer.
 const PEER_SCRIPT: &str = "host/recognition/benches/peer_isomap.py";
 /// Names of a compared figure: ours and the peer's.
 const COMPARED: [(&str, &str); 3] = [
@@ -23,7 +21,7 @@ const COMPARED: [(&str, &str); 3] = [
     ("embedding_of_a_frame", "embedding_ms"),
 ];
 
-/// Minimum and median of a peer's times, milliseconds, in the order of [`COMPARED`].
+/// Minimum and median, milliseconds, in the order of [`COMPARED`].
 #[derive(Debug, PartialEq)]
 struct Peer {
     name: String,
@@ -31,7 +29,6 @@ struct Peer {
     times_ms: [[f64; 2]; 3],
 }
 
-/// Runs the benches, and the peers if asked for; the section of the page.
 pub fn run(peers: bool, more: &[PathBuf]) -> Result<String> {
     let mut scripts: Vec<PathBuf> = more.to_vec();
     if peers {
@@ -80,7 +77,7 @@ fn time_peer(script: &Path, features: &Path) -> Result<Peer> {
     peer(&name, &text).with_context(|| format!("{} printed no figures", script.display()))
 }
 
-/// A peer's figures: `isomap_ms: {min, median}` and so on, or single numbers `isomap_s`, `rbf_train_s`, `embed_us`.
+/// `isomap_ms: {min, median}` and so on, or single numbers `isomap_s`, `rbf_train_s`, `embed_us`.
 fn peer(name: &str, text: &str) -> Result<Peer> {
     let line = text.lines().rev().find(|line| line.starts_with('{')).context("no line is a JSON object")?;
     let json: Value = serde_json::from_str(line).with_context(|| format!("not JSON: {line}"))?;
@@ -106,10 +103,9 @@ fn better(a: Peer, b: Peer) -> Peer {
     Peer { times_ms, ..a }
 }
 
-/// Takes too long for a bench: the processor time of `farnear activity evaluate`, as the shell's `time` gave it.
+/// Too slow for a bench: processor time by the shell's `time`.
 const NESTED_SEARCH: &str = "A whole nested search (`farnear activity evaluate --leave-one-subject-out`, everything chosen again for each left-out subject) on 287 synthetic clips in four views, 5 subjects, 11 activities, 54,192 frames, takes 69 s of processor time order-free and 91 s ordered with views fused, 130 s ordered with every view by itself, 39 s by the thesis' method (November 2026, measured on the side, not with this table).";
 
-/// The section of the page: our times, the peers', the ratios.
 fn section(rows: &[Row], peers: &[Peer]) -> String {
     let mut text = String::from(
         "## People\n\nFrom masks to points: 1500 synthetic silhouettes of some 220 x 120 pixels, 360 numbers each, 12 neighbours, 3 dimensions \

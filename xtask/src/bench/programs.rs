@@ -1,4 +1,4 @@
-//! Whole programs compared with a numpy + OpenCV script: CPU seconds, wall time and memory from two image files to written results.
+//! Whole programs compared with a numpy + OpenCV script: CPU seconds, wall time and memory.
 
 use std::{
     fmt::Write as _,
@@ -16,16 +16,15 @@ use crate::run::{ROOT, cargo, finish, step, target_folder};
 
 const TIMER: &str = "host/depth/benches/time_programs.py";
 const PEER: &str = "host/depth/benches/program_opencv.py";
-/// Width and height; 0.3, 2, 12 and 45 megapixels.
+/// 0.3, 2, 12 and 45 megapixels.
 const SIZES: [[usize; 2]; 4] = [[640, 480], [1600, 1200], [4000, 3000], [8192, 5464]];
-/// A larger image is a mosaic of this one, mirrored at its edges: rendering takes longer than all that is timed.
+/// Larger images are mosaics of this one, mirrored at its edges, because rendering is slow.
 const TILE: [usize; 2] = [1600, 1200];
-/// Pixels by which the near image of a shifted pair is displaced.
+/// Displacement of a shifted pair's near image.
 const SHIFT: [usize; 2] = [3, 2];
 const OPTICS: &str = "[lens]\nfocal_length_mm = 50.0\nf_number = 1.4\ntelecentric = true\n\n[sensor]\npixel_um = 7.4\n\n\
      [focus]\nfar_mm = 933.0\nmax_blur_px = 2.703\n\n[psf]\nmodel = \"gaussian\"\nk = 0.4578\n";
 
-/// Times all sizes and returns the page.
 pub fn run(runs: usize) -> Result<String> {
     modules(&["numpy", "cv2"])?;
     step("farnear in release");
@@ -72,7 +71,6 @@ pub fn run(runs: usize) -> Result<String> {
     Ok(page(&labels, &figures, runs))
 }
 
-/// Far and near image of a size, written once.
 fn pair(folder: &Path, tile: &Path, size: [usize; 2], shift: [usize; 2]) -> Result<[PathBuf; 2]> {
     const SCRIPT: &str = "import sys, cv2, numpy as np\n\
         tile, far, near, width, height, x, y = sys.argv[1:]; width, height, x, y = map(int, (width, height, x, y))\n\

@@ -1,4 +1,4 @@
-//! The programs with what belongs to them as one `.tar.gz`: unpack anywhere and run.
+//! The programs as one `.tar.gz`: unpack anywhere and run.
 
 use std::{
     fs,
@@ -46,11 +46,11 @@ pub fn write(
             .arg(&release.work)
             .arg(&name),
     )?;
-    // Without the name and the time of the file that was compressed.
+    // Without name and time of the compressed file.
     finish(Command::new("gzip").args(["--best", "--no-name", "--force"]).arg(&archive))
 }
 
-/// Name of the archive without its ending, and of the folder in it.
+/// Name of the archive without extension, and of its folder.
 pub fn name(release: &Release, target: &Target) -> String {
     format!("farnear-{}-{}-linux", release.version, target.processor)
 }

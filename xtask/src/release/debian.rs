@@ -1,7 +1,5 @@
-//! Debian packages, put together by `dpkg-deb`.
-//!
-//! The one for this machine's own processor is built against the system's libraries, with every kind of camera for which the
-//! libraries are here, and asks for them; the other holds the programs that need no library.
+//! Debian packages, built by `dpkg-deb`. The one for this machine's processor uses the system's libraries
+//! with all available cameras and depends on them; the other has static programs.
 
 use std::{
     fs,
@@ -18,10 +16,10 @@ use super::{
 };
 use crate::run::{ROOT, cargo, finish, has, output, step, target_folder};
 
-/// Where the programs lie; `/usr/bin` points there, since the emulated board expects its firmware next to it.
+/// `/usr/bin` points here, because the emulated board expects its firmware next to it.
 const PROGRAMS: &str = "usr/lib/farnear";
 
-/// Writes the package; returns its path, or the missing tool.
+/// Returns the path, or the missing tool.
 pub fn write(
     release: &Release,
     target: &Target,
@@ -81,7 +79,7 @@ pub fn write(
         .replace("{architecture}", target.debian)
         .replace("{kilobytes}", kilobytes.split_whitespace().next().unwrap_or("0"))
         .replace("{depends}", &depends);
-    // A package that needs nothing has no such line.
+    // A package without dependencies has no such line.
     let control = control.replace("Depends: \n", "");
     fs::create_dir_all(root.join("DEBIAN")).context("cannot create DEBIAN")?;
     fs::write(root.join("DEBIAN/control"), control).context("cannot write the control file")?;
@@ -97,7 +95,6 @@ pub fn write(
     Ok(Ok(package))
 }
 
-/// The kinds of camera whose libraries are here, as cargo features.
 fn cameras() -> Vec<&'static str> {
     let aravis = Command::new("pkg-config").args(["--exists", "aravis-0.8 >= 0.8.25"]).status();
     let aravis = aravis.is_ok_and(|status| status.success());
@@ -108,7 +105,7 @@ fn cameras() -> Vec<&'static str> {
     features.into_iter().filter(|(here, ..)| *here).map(|(_, feature, _)| feature).collect()
 }
 
-/// The programs with these cameras, and the packages that they need.
+/// Folder of the programs, and the packages that they need.
 fn with_cameras(release: &Release, kinds: &[&str]) -> Result<(PathBuf, String)> {
     step(&format!("programs with cameras: {}", kinds.join(", ")));
     let folder = target_folder().join("release-cameras");

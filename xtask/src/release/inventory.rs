@@ -1,6 +1,5 @@
-//! Contents of a release: a bill of materials (CycloneDX) and all licences, from cargo's metadata.
-//!
-//! An unknown licence stops the release: [`ACCEPTED`] is what the project's own licence may be joined with.
+//! Contents of a release: a bill of materials (CycloneDX) and all licences, from cargo's metadata. A licence
+//! outside [`ACCEPTED`] stops the release.
 
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -19,14 +18,11 @@ use crate::{
     run::{ROOT, cargo, output},
 };
 
-/// Name of the list for machines.
 const LIST: &str = "farnear.cdx.json";
-/// Name of the licences' texts.
 const NOTICES: &str = "THIRD-PARTY.txt";
-/// What the vendored parts of the page are, and under which licence.
 const PAGE: &str = "host/serve/page/vendor/LICENSES.txt";
-/// Licences, one of which each dependency must offer. All allow handing programs out in binary form; MPL-2.0 asks that the
-/// files under it can be had as source, which crates.io does.
+/// Each dependency must offer one of these. All allow binary distribution; MPL-2.0 requires available
+/// sources, which crates.io provides.
 const ACCEPTED: [&str; 9] = [
     "MIT",
     "Apache-2.0",
@@ -39,7 +35,6 @@ const ACCEPTED: [&str; 9] = [
     "Zlib",
 ];
 
-/// One dependency that ends in a program.
 struct Part {
     name: String,
     version: String,
@@ -47,7 +42,6 @@ struct Part {
     folder: PathBuf,
 }
 
-/// Writes both; gives the licences' path.
 pub fn write(release: &Release) -> Result<PathBuf> {
     let mut parts = BTreeMap::new();
     parts_of(&ROOT, &crate::host::PROGRAMS, &mut parts)?;
@@ -87,7 +81,7 @@ fn described(part: &Part) -> String {
     format!("{} {} ({})", part.name, part.version, part.licence)
 }
 
-/// All that the packages `roots` of a workspace are linked from, on Linux; not what only builds or tests them.
+/// Packages linked into `roots` on Linux, without build and test dependencies.
 fn parts_of(workspace: &Path, roots: &[&str], parts: &mut BTreeMap<(String, String), Part>) -> Result<()> {
     let mut call = if workspace == *ROOT { cargo(["metadata"]) } else { Command::new("cargo") };
     if workspace != *ROOT {
@@ -110,13 +104,13 @@ fn parts_of(workspace: &Path, roots: &[&str], parts: &mut BTreeMap<(String, Stri
             continue;
         }
         for dependency in nodes.get(id).into_iter().flat_map(|node| list(&node["deps"])) {
-            // The kind of a dependency that is linked is null.
+            // A linked dependency has kind null.
             if list(&dependency["dep_kinds"]).any(|kind| kind["kind"].is_null() && linux(&kind["target"])) {
                 open.extend(dependency["pkg"].as_str());
             }
         }
         let package = packages.get(id).with_context(|| format!("cargo metadata lacks {id}"))?;
-        // A package without a source is the project's own.
+        // The project's own packages have no source.
         if package["source"].is_null() {
             continue;
         }
@@ -133,7 +127,7 @@ fn parts_of(workspace: &Path, roots: &[&str], parts: &mut BTreeMap<(String, Stri
     Ok(())
 }
 
-/// Whether a dependency that is tied to a platform can be part of a program for Linux; a doubtful one counts as part.
+/// Whether a dependency may be part of a program for Linux; yes in doubt.
 fn linux(platform: &Value) -> bool {
     platform.as_str().is_none_or(|platform| {
         !["windows", "macos", "apple", "wasm", "hermit", "wasi"].iter().any(|other| platform.contains(other))
@@ -145,12 +139,12 @@ fn list(value: &Value) -> impl Iterator<Item = &Value> {
     value.as_array().into_iter().flatten()
 }
 
-/// A licence as SPDX writes it; older manifests put a stroke for OR.
+/// As SPDX; older manifests use a stroke for OR.
 fn expression(licence: &str) -> String {
     licence.split('/').map(str::trim).collect::<Vec<_>>().join(" OR ")
 }
 
-/// Whether each part of an AND offers something accepted. Manifests nest no deeper than one pair of brackets.
+/// Whether each part of an AND offers an accepted licence. Manifests nest at most one pair of brackets.
 fn accepted(licence: &str) -> bool {
     !licence.is_empty()
         && expression(licence).split(" AND ").all(|choice| {
@@ -158,7 +152,7 @@ fn accepted(licence: &str) -> bool {
         })
 }
 
-/// The texts that come with the parts, each once, under the names of those that carry it.
+/// Each licence text once, with the names of its parts.
 fn texts<'a>(parts: impl Iterator<Item = &'a Part>) -> Result<String> {
     let mut bearers: BTreeMap<String, Vec<String>> = BTreeMap::new();
     let mut bare = Vec::new();

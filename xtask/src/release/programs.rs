@@ -1,4 +1,4 @@
-//! Programs that need no library: linked with musl by the linker that comes with Rust, so that no cross compiler is needed.
+//! Static programs: linked with musl by Rust's own linker, without a cross compiler.
 
 use std::{path::PathBuf, process::Command};
 
@@ -7,12 +7,11 @@ use anyhow::Result;
 use super::Release;
 use crate::run::{ROOT, cargo, finish, has, has_target, step, target_folder};
 
-/// What programs are built for.
 pub struct Target {
     pub triple: &'static str,
-    /// The processor, as archives name it.
+    /// As in archive names.
     pub processor: &'static str,
-    /// The same as Debian names it.
+    /// As in Debian.
     pub debian: &'static str,
 }
 
@@ -23,12 +22,11 @@ pub const TARGETS: [Target; 2] = [
 ];
 
 impl Target {
-    /// Whether this machine runs its programs without help.
     pub fn runs_here(&self) -> bool {
         self.processor == std::env::consts::ARCH
     }
 
-    /// The command with which this machine runs its programs, or the missing tool.
+    /// Command that runs its programs here, or the missing tool.
     pub fn runner(&self) -> Result<Option<String>, String> {
         if self.runs_here() {
             return Ok(None);
@@ -40,7 +38,7 @@ impl Target {
     }
 }
 
-/// Builds both programs; returns their folder, or the missing tool.
+/// Returns the programs' folder, or the missing tool.
 pub fn build(release: &Release, target: &Target) -> Result<Result<PathBuf, String>> {
     step(&format!("programs for {}", target.triple));
     if !(has_target(target.triple) || rustup_adds(target.triple)) {
@@ -67,7 +65,7 @@ pub fn build(release: &Release, target: &Target) -> Result<Result<PathBuf, Strin
     Ok(Ok(target_folder().join(target.triple).join("release")))
 }
 
-/// Compiler flags that keep this machine's folders out of programs.
+/// Compiler flags that remove this machine's paths from programs.
 pub fn without_paths() -> Vec<String> {
     let home = std::env::var_os("CARGO_HOME")
         .map(PathBuf::from)

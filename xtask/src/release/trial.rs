@@ -1,4 +1,4 @@
-//! Each file of a release installed where nothing else is, and used: a pair is rendered and its depth compared with the truth.
+//! Tries each file of a release in an empty root: renders a pair and compares its depth with the truth.
 
 use std::{
     fs,
@@ -14,12 +14,11 @@ use crate::{
     run::{ROOT, finish, output, step},
 };
 
-/// Most that the depth of the tried pair may be off, in mm: the staircase of eight bits is known to 0.67.
+/// Limit of the depth error, mm: the 8-bit staircase has 0.67.
 const MOST_OFF_MM: f64 = 0.8;
-/// The optics of the tried pair.
 const OPTICS: &str = "examples/rig.toml";
 
-/// Unpacks an archive into an empty root and runs its programs there.
+/// Unpacks an archive into an empty root and runs its programs.
 pub fn programs(release: &Release, target: &Target, left_out: &mut Vec<String>) -> Result<()> {
     let runner = match target.runner() {
         Ok(runner) => runner,
@@ -35,7 +34,7 @@ pub fn programs(release: &Release, target: &Target, left_out: &mut Vec<String>) 
     finish(Command::new("tar").arg("--extract").arg("--file").arg(packed).arg("--directory").arg(&root))?;
     let folder = root.join(&name);
     let Some(runner) = runner else {
-        // In an empty root: no library, no shell, no /proc. Without the right to change the root, in the normal file system.
+        // Empty root: no library, shell or /proc. The normal file system if chroot is not permitted.
         let inside = |program: &str| {
             let mut command = Command::new("unshare");
             command.args(["--map-root-user", "--root"]).arg(&root).arg(format!("/{name}/{program}"));
@@ -45,7 +44,7 @@ pub fn programs(release: &Release, target: &Target, left_out: &mut Vec<String>) 
             let optics = PathBuf::from("/optics.toml");
             fs::copy(ROOT.join(OPTICS), root.join("optics.toml")).context("cannot copy the optics")?;
             depth(&|| inside("farnear"), &optics, Path::new("/pair"))?;
-            // `doctor` reports everything as missing and must not fail for that reason.
+            // `doctor` reports everything as missing but must not fail.
             finish(inside("farnear").arg("doctor"))?;
             return finish(inside("farnear-sim").arg("--help"));
         }
@@ -68,7 +67,7 @@ pub fn package(release: &Release, target: &Target, package: &Path, left_out: &mu
     let database = root.join("var/lib/dpkg");
     fs::create_dir_all(database.join("info")).context("cannot create dpkg's folder")?;
     fs::write(database.join("status"), "").context("cannot write dpkg's status")?;
-    // Its dependencies are the system's; the run shows whether they are present.
+    // Dependencies are the system's; the run shows whether they are present.
     let mut install = Command::new("dpkg");
     install
         .arg(format!("--root={}", root.display()))
@@ -97,7 +96,6 @@ pub fn package(release: &Release, target: &Target, package: &Path, left_out: &mu
     if target.runs_here() { captures(&programs, &root.join("capture")) } else { Ok(()) }
 }
 
-/// Installs the wheel into a fresh environment and computes a depth map in Python.
 pub fn wheel(release: &Release, wheel: &Path, left_out: &mut Vec<String>) -> Result<()> {
     step(&format!("{}, installed into a fresh environment", wheel.display()));
     let needs = [wheel.to_string_lossy()];
@@ -113,7 +111,6 @@ pub fn wheel(release: &Release, wheel: &Path, left_out: &mut Vec<String>) -> Res
     }
 }
 
-/// Renders a pair, computes its depth and holds it to the truth.
 fn depth(farnear: &dyn Fn() -> Command, optics: &Path, pair: &Path) -> Result<()> {
     let run = |arguments: &[&str], paths: &[&Path]| {
         let mut command = farnear();
@@ -136,7 +133,6 @@ fn depth(farnear: &dyn Fn() -> Command, optics: &Path, pair: &Path) -> Result<()
     Ok(())
 }
 
-/// A pair by the emulated rig with the packaged firmware.
 fn captures(programs: &Path, out: &Path) -> Result<()> {
     let mut capture = Command::new(programs.join("farnear"));
     capture.args(["rig", "capture", "--port", "sim", "--scene", "staircase", "--json", "--optics"]);

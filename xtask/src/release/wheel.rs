@@ -1,4 +1,4 @@
-//! The Python package as a wheel, built by maturin in a virtual environment.
+//! The Python wheel, built by maturin in a virtual environment.
 
 use std::{fs, path::PathBuf, process::Command};
 
@@ -12,7 +12,7 @@ use crate::{
 
 const NEEDS: [&str; 1] = ["maturin>=1.9,<2"];
 
-/// Builds the wheel; returns its path, or the missing tool.
+/// Returns the path, or the missing tool.
 pub fn write(release: &Release) -> Result<Result<PathBuf, String>> {
     let python = match python::environment(&target_folder().join("wheel"), &NEEDS) {
         Ok(python) => python,

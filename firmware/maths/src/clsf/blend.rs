@@ -1,8 +1,7 @@
-//! The 3x3 regions blended bilinearly between their centres, without seams.
-//!
-//! Between two centres the factors of `U`, `U^2`, `U^3` and the terms in y are linear in the column's weight:
-//! one product each. The terms in x are not; a table holds their blend along x for both region rows, blended
-//! along y by one more product. Beyond the outer centres the outer regions apply alone.
+//! The 3x3 regions blended bilinearly between their centres, without seams. Between two centres the factors of `U`,
+//! `U^2`, `U^3` and the terms in y are linear in the column's weight: one product each. The terms in x are not; a table
+//! holds their blend along x for both region rows, blended along y by one more product. Beyond the outer centres one
+//! region applies.
 
 use super::{
     Coefficient, Error, Frame, REGION_TERMS, REGIONS, RegionCoefficients, TableState,
@@ -14,16 +13,14 @@ use super::{
 
 const BANDS: usize = REGIONS + 1;
 
-/// Correction blended between region centres. Cost: [`crate::clsf`]; the table of each of four row bands
-/// takes about 245 instructions per column.
+/// Correction blended between region centres. Table cost: about 245 instructions per column and row band (four).
 #[derive(Debug)]
 pub struct Blend<'t> {
     coefficients: RegionCoefficients,
     frame: Frame,
     rows: [Band; BANDS],
     columns: [Band; BANDS],
-    /// Per column: terms in x for the upper region row, the lower's excess (one more fraction bit), and the
-    /// weight of the right region.
+    /// Per column: terms in x of the upper region row, the lower's excess (one more bit), and the right's weight.
     table: &'t mut [i32],
     table_band: Option<(usize, usize)>,
 }
@@ -34,8 +31,7 @@ impl<'t> Blend<'t> {
         3 * width as usize
     }
 
-    /// A correction for `frame`; `table` is scratch memory of at least [`Self::table_words`].
-    /// Errors: [`Error::TableTooSmall`].
+    /// `table` is scratch memory of at least [`Self::table_words`]; fails with [`Error::TableTooSmall`].
     pub fn new(coefficients: RegionCoefficients, frame: Frame, table: &'t mut [i32]) -> Result<Self, Error> {
         let (given, needed) = (table.len(), Self::table_words(frame.width()));
         let table = table.get_mut(..needed).ok_or(Error::TableTooSmall { given, needed })?;
@@ -43,8 +39,7 @@ impl<'t> Blend<'t> {
         Ok(Self { coefficients, frame, rows, columns, table, table_band: None })
     }
 
-    /// Continues with a table that a correction with the same coefficients and frame has left in this state.
-    /// Errors: [`Error::TableTooSmall`].
+    /// Continues with a table in this state of a correction with the same coefficients and frame.
     pub fn resume(
         coefficients: RegionCoefficients,
         frame: Frame,
@@ -61,8 +56,7 @@ impl<'t> Blend<'t> {
         TableState(self.table_band)
     }
 
-    /// Corrects row `row` in place; rows may come in any order, but in order the table is built only four times.
-    /// Errors: [`Error::NoSuchRow`], [`Error::RowLength`]; the row is then untouched.
+    /// Corrects row `row` in place; in order the table is built only four times. An error leaves the row untouched.
     pub fn correct_row(&mut self, row: u16, depths: &mut [i16]) -> Result<(), Error> {
         self.frame.check_row(row, depths.len())?;
         let Some(band) = self.rows.iter().find(|band| row < band.pixels.end) else {
@@ -155,8 +149,8 @@ impl AtRow {
         }
     }
 
-    /// Polynomials in the weight of `other`. The difference is doubled, because the product loses a fraction
-    /// bit; it stays below 2 * 8 * 2^26, 2 * 8 * 2^25, 2 * 8 * 2^24 and 2 * 24 * 2^23.
+    /// Polynomials in the weight of `other`. The difference is doubled, because the product loses a fraction bit; it
+    /// stays below 2 * 8 * 2^26, 2 * 8 * 2^25, 2 * 8 * 2^24 and 2 * 24 * 2^23.
     fn toward(&self, other: &Self) -> Factors<2, 2, 2, 2> {
         let pair = |from: i32, to: i32| [from, 2 * (to - from)];
         Factors {

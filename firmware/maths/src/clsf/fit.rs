@@ -1,12 +1,10 @@
 //! Streaming fit of CLSF's coefficients to rows of flat targets.
 //!
-//! Normal equations are integer sums: a term (a product of powers of x, y and U) is rounded to 20 fraction
-//! bits, a product has 40, and 2^22 of them fit an `i64`. The order of rows has no effect. Only the final
-//! Cholesky solution uses double precision, in software on the board.
-//!
-//! A subsample suffices: every eighth pixel of every eighth row of 24 targets at 640x480 is 115,200 samples.
-//! Cost on a Cortex-M4F: 620 instructions a sample for ten terms, 1,900 for twenty; 730,000 (all regions) and
-//! 460,000 to solve. Memory: 8 KiB for all regions, 3.4 KiB for the full form.
+//! Normal equations are integer sums: a term (a product of powers of x, y and U) is rounded to 20 fraction bits, a
+//! product has 40, and 2^22 of them fit an `i64`. The order of rows has no effect. Only the final Cholesky solution
+//! uses double precision, in software on the board. A subsample suffices: every eighth pixel of every eighth row of 24
+//! targets at 640x480 is 115,200 samples. Cost on a Cortex-M4F: 620 instructions a sample for ten terms, 1,900 for
+//! twenty; 730,000 (all regions) and 460,000 to solve. Memory: 8 KiB for all regions, 3.4 KiB for the full form.
 
 use nalgebra::{SMatrix, SVector};
 
@@ -15,17 +13,15 @@ use super::{
     RegionCoefficients,
 };
 
-/// Fraction bits of a term.
 const TERM_BITS: u32 = 20;
 
 /// Capacity of the sums, samples.
 const MOST_SAMPLES: u32 = 1 << 22;
 
-/// Smaller pivots of the normalised matrix are rounding: the samples do not determine the terms. Third powers
-/// on a third of the image give 6e-3; three depths instead of four less than 1e-6.
+/// Smaller pivots of the normalised matrix are rounding: the samples do not determine the terms. Third powers on a
+/// third of the image give 6e-3; three depths instead of four less than 1e-6.
 const LEAST_PIVOT: f64 = 3e-5;
 
-/// Sums of products of `N` terms.
 #[derive(Clone, Debug)]
 struct Sums<const N: usize> {
     /// Lower triangle with the diagonal.
@@ -81,12 +77,10 @@ fn narrow(q31: i32) -> i32 {
     (q31 >> (31 - TERM_BITS - 1)).wrapping_add(1) >> 1
 }
 
-/// The product of two terms, rounded.
 fn times(a: i32, b: i32) -> i32 {
     ((i64::from(a) * i64::from(b) + (1 << (TERM_BITS - 1))) >> TERM_BITS) as i32
 }
 
-/// 1, v, v^2, v^3.
 fn powers(q31: i32) -> [i32; 4] {
     let v = narrow(q31);
     let square = times(v, v);
@@ -142,9 +136,7 @@ impl RegionFit {
         Self { frame, sums: [const { [const { Sums::new() }; REGIONS] }; REGIONS] }
     }
 
-    /// Adds pixels of row `row` of a flat target at `truth`; depths are Q1.15 codes of one
-    /// [`DepthScale`](super::DepthScale), [`NO_VALUE`] is passed over.
-    /// Errors: [`Error::NoSuchRow`], [`Error::RowLength`], [`Error::TooManySamples`].
+    /// Adds pixels of a flat target at `truth`, codes of one [`DepthScale`](super::DepthScale), skipping [`NO_VALUE`].
     pub fn add_row(&mut self, row: u16, columns: Columns, depths: &[i16], truth: i16) -> Result<(), Error> {
         columns.check(self.frame, row, depths.len())?;
         let (rows, across) = (self.frame.rows(), self.frame.columns());
@@ -159,9 +151,7 @@ impl RegionFit {
         Ok(())
     }
 
-    /// The coefficients.
-    /// Errors: [`Error::Underdetermined`] where a region's samples do not determine its terms (fewer than
-    /// four depths, too few pixels), [`Error::CoefficientTooLarge`].
+    /// The coefficients. [`Error::Underdetermined`]: too few depths (below four) or pixels for a region's terms.
     pub fn solve(&self) -> Result<RegionCoefficients, Error> {
         let mut coefficients = RegionCoefficients::default();
         for (coefficients, sums) in coefficients.as_flattened_mut().iter_mut().zip(self.sums.as_flattened()) {
@@ -185,7 +175,6 @@ impl FullFit {
     }
 
     /// As [`RegionFit::add_row`].
-    /// Errors: [`Error::NoSuchRow`], [`Error::RowLength`], [`Error::TooManySamples`].
     pub fn add_row(&mut self, row: u16, columns: Columns, depths: &[i16], truth: i16) -> Result<(), Error> {
         columns.check(self.frame, row, depths.len())?;
         let y = powers(self.frame.rows().coordinate(row));
@@ -221,8 +210,7 @@ impl FullFit {
         Ok(())
     }
 
-    /// The coefficients.
-    /// Errors: [`Error::Underdetermined`], [`Error::CoefficientTooLarge`].
+    /// As [`RegionFit::solve`].
     pub fn solve(&self) -> Result<FullCoefficients, Error> {
         self.sums.solve()
     }

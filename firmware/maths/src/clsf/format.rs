@@ -5,8 +5,7 @@ use super::Error;
 /// Code of a pixel without depth; a correction keeps it.
 pub const NO_VALUE: i16 = i16::MIN;
 
-/// Largest code of a depth. Values beyond the scale saturate to `i16::MAX` or [`NO_VALUE`], so neither end is
-/// taken for a measurement.
+/// Largest code. Depths beyond the scale saturate to `i16::MAX` or [`NO_VALUE`]; neither end is a measurement.
 const LARGEST: f32 = 32766.0;
 
 /// Linear map between mm and normalised depth.
@@ -20,8 +19,7 @@ impl DepthScale {
     /// Factor on half the working range, so that a distorted depth still fits the scale.
     pub const MARGIN: f32 = 1.3;
 
-    /// The scale for a working range, its ends in mm in either order.
-    /// Errors: [`Error::EmptyRange`] where the ends coincide or are not finite.
+    /// The scale for a working range, ends in mm in either order; [`Error::EmptyRange`] unless finite and different.
     pub fn for_range(one_end_mm: f32, other_end_mm: f32) -> Result<Self, Error> {
         let half = (one_end_mm - other_end_mm) / 2.0;
         let half = if half < 0.0 { -half } else { half };
@@ -69,8 +67,7 @@ impl Coefficient {
     const FRACTION_BITS: u32 = 29;
     const SCALE: f64 = (1_u32 << Self::FRACTION_BITS) as f64;
 
-    /// The coefficient nearest to a value.
-    /// Errors: [`Error::CoefficientTooLarge`] where the magnitude is not below 4 (NaN included).
+    /// The nearest coefficient; [`Error::CoefficientTooLarge`] unless the magnitude is below 4.
     pub fn from_f64(value: f64) -> Result<Self, Error> {
         let scaled = value * Self::SCALE;
         let rounded = if scaled < 0.0 { scaled - 0.5 } else { scaled + 0.5 };
@@ -81,8 +78,7 @@ impl Coefficient {
         }
     }
 
-    /// The coefficient with these bits, for example from the board's memory; every pattern but `i32::MIN` is one.
-    /// Errors: [`Error::CoefficientTooLarge`] for `i32::MIN`, which would be -4.
+    /// The coefficient with these bits; [`Error::CoefficientTooLarge`] for `i32::MIN` (-4).
     pub fn from_bits(bits: i32) -> Result<Self, Error> {
         if bits == i32::MIN { Err(Error::CoefficientTooLarge { value: -4.0 }) } else { Ok(Self(bits)) }
     }
@@ -103,15 +99,11 @@ impl Coefficient {
     }
 }
 
-/// Fraction bits of the factor of `U^3`; each Horner step removes one.
+/// Fraction bits of the factors of `U^3`, `U^2`, `U` and of the constant and the result: each Horner step removes one.
 pub(super) const CUBIC_BITS: u32 = 26;
-/// Fraction bits of the factor of `U^2`.
 pub(super) const SQUARE_BITS: u32 = CUBIC_BITS - 1;
-/// Fraction bits of the factor of `U`.
 pub(super) const LINEAR_BITS: u32 = CUBIC_BITS - 2;
-/// Fraction bits of the constant and the result.
 pub(super) const CONSTANT_BITS: u32 = CUBIC_BITS - 3;
-/// Shift from the result to Q1.15.
 const RESULT_SHIFT: u32 = CONSTANT_BITS - 15;
 /// Half a Q1.15 unit, added to the constant so that truncation rounds.
 pub(super) const HALF_UNIT: i32 = 1 << (RESULT_SHIFT - 1);

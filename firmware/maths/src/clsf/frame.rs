@@ -17,8 +17,7 @@ impl Frame {
     /// Largest side: the last of 8192 columns is accurate to 4e-6.
     pub const LARGEST: u16 = 8192;
 
-    /// A frame of `width` by `height` pixels.
-    /// Errors: [`Error::FrameSize`] outside [`Self::SMALLEST`] to [`Self::LARGEST`].
+    /// A frame of `width` by `height` pixels, each [`Self::SMALLEST`] to [`Self::LARGEST`], else [`Error::FrameSize`].
     pub fn new(width: u16, height: u16) -> Result<Self, Error> {
         let fits = |length| (Self::SMALLEST..=Self::LARGEST).contains(&length);
         if fits(width) && fits(height) {
@@ -57,7 +56,6 @@ impl Frame {
     }
 }
 
-/// One direction of the image.
 #[derive(Clone, Copy)]
 pub(super) struct Axis {
     length: u16,
@@ -113,7 +111,6 @@ impl Axis {
 /// Part of an axis with the same two regions.
 #[derive(Clone, Debug)]
 pub(super) struct Band {
-    /// Which pixels.
     pub(super) pixels: Range<u16>,
     /// Region with full weight at the start...
     pub(super) before: usize,
@@ -129,7 +126,6 @@ struct Weights {
 }
 
 impl Band {
-    /// Whether only one region applies.
     pub(super) fn is_outer(&self) -> bool {
         self.before == self.after
     }

@@ -1,8 +1,6 @@
-//! One polynomial with all twenty third-order terms in x, y and U.
-//!
-//! Seamless, with the cross terms that ten terms lack (a bowl that changes with `U` is `U x^2`). In a given
-//! row the factor of each power of `U` is a polynomial in x, evaluated by Horner's rule: seven products a
-//! pixel.
+//! One polynomial with all twenty third-order terms in x, y and U. Seamless, with the cross terms that ten terms lack
+//! (a bowl that changes with `U` is `U x^2`). In a given row the factor of each power of `U` is a polynomial in x,
+//! evaluated by Horner's rule: seven products a pixel.
 
 use super::{
     Coefficient, Error, Frame, TableState,
@@ -10,8 +8,8 @@ use super::{
     row::{Factors, polynomial},
 };
 
-/// Terms of the full polynomial, in this order: 1, x, x^2, x^3, y, xy, x^2 y, y^2, x y^2, y^3, U, xU, x^2 U,
-/// yU, xyU, y^2 U, U^2, xU^2, yU^2, U^3.
+/// Terms in this order: 1, x, x^2, x^3, y, xy, x^2 y, y^2, x y^2, y^3, U, xU, x^2 U, yU, xyU, y^2 U, U^2, xU^2, yU^2,
+/// U^3.
 pub const FULL_TERMS: usize = 20;
 
 /// Coefficients in the order of [`FULL_TERMS`].
@@ -32,8 +30,7 @@ impl<'t> Full<'t> {
         3 * width as usize
     }
 
-    /// A correction for `frame`; `table` is scratch memory of at least [`Self::table_words`].
-    /// Errors: [`Error::TableTooSmall`].
+    /// `table` is scratch memory of at least [`Self::table_words`]; fails with [`Error::TableTooSmall`].
     pub fn new(coefficients: FullCoefficients, frame: Frame, table: &'t mut [i32]) -> Result<Self, Error> {
         let (given, needed) = (table.len(), Self::table_words(frame.width()));
         let table = table.get_mut(..needed).ok_or(Error::TableTooSmall { given, needed })?;
@@ -47,8 +44,7 @@ impl<'t> Full<'t> {
         Ok(Self { coefficients, frame, table })
     }
 
-    /// Continues with a table that a correction with the same coefficients and frame has left in this state.
-    /// Errors: [`Error::TableTooSmall`].
+    /// Continues with a table in this state of a correction with the same coefficients and frame.
     pub fn resume(
         coefficients: FullCoefficients,
         frame: Frame,
@@ -68,8 +64,7 @@ impl<'t> Full<'t> {
         TableState(Some((0, 0)))
     }
 
-    /// Corrects row `row` in place; rows may come in any order.
-    /// Errors: [`Error::NoSuchRow`], [`Error::RowLength`]; the row is then untouched.
+    /// Corrects row `row` in place; an error leaves it untouched.
     pub fn correct_row(&mut self, row: u16, depths: &mut [i16]) -> Result<(), Error> {
         self.frame.check_row(row, depths.len())?;
         let y = self.frame.rows().coordinate(row);

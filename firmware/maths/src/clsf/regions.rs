@@ -15,8 +15,7 @@ pub const REGION_TERMS: usize = 10;
 /// Coefficients as `[region row][region column][term]`.
 pub type RegionCoefficients = [[[Coefficient; REGION_TERMS]; REGIONS]; REGIONS];
 
-/// Correction per region. Cost per pixel: a cubic in `U` plus a table entry; per region row: about 50
-/// instructions a column for the table.
+/// Correction per region. Cost: a cubic in `U` per pixel; about 50 instructions a column for each region row's table.
 #[derive(Debug)]
 pub struct Regions<'t> {
     coefficients: RegionCoefficients,
@@ -32,16 +31,14 @@ impl<'t> Regions<'t> {
         width as usize
     }
 
-    /// A correction for `frame`; `table` is scratch memory of at least [`Self::table_words`].
-    /// Errors: [`Error::TableTooSmall`].
+    /// `table` is scratch memory of at least [`Self::table_words`]; fails with [`Error::TableTooSmall`].
     pub fn new(coefficients: RegionCoefficients, frame: Frame, table: &'t mut [i32]) -> Result<Self, Error> {
         let (given, needed) = (table.len(), Self::table_words(frame.width()));
         let table = table.get_mut(..needed).ok_or(Error::TableTooSmall { given, needed })?;
         Ok(Self { coefficients, frame, table, table_row: None })
     }
 
-    /// Continues with a table that a correction with the same coefficients and frame has left in this state.
-    /// Errors: [`Error::TableTooSmall`].
+    /// Continues with a table in this state of a correction with the same coefficients and frame.
     pub fn resume(
         coefficients: RegionCoefficients,
         frame: Frame,
@@ -58,8 +55,7 @@ impl<'t> Regions<'t> {
         TableState(self.table_row.map(|row| (row, row)))
     }
 
-    /// Corrects row `row` in place; rows may come in any order, but in order the table is built only three times.
-    /// Errors: [`Error::NoSuchRow`], [`Error::RowLength`]; the row is then untouched.
+    /// Corrects row `row` in place; in order the table is built only three times. An error leaves the row untouched.
     pub fn correct_row(&mut self, row: u16, depths: &mut [i16]) -> Result<(), Error> {
         self.frame.check_row(row, depths.len())?;
         let region_row = self.frame.rows().region_of(row);

@@ -1,15 +1,13 @@
-//! Inner loops: the cubic in `U` with three kinds of factors along the row.
-//!
-//! Each loop is one pass with few values: a Cortex-M4 has 13 registers and needs a load for each value
-//! beyond. Positions come from a table too, because a running sum needs two registers more.
+//! Inner loops: the cubic in `U` with three kinds of factors along the row. Each loop is one pass with few values: a
+//! Cortex-M4 has 13 registers and needs a load for each value beyond. Positions come from a table too, because a
+//! running sum needs two registers more.
 
 use super::{
     NO_VALUE,
     format::{horner, step},
 };
 
-/// Factors of `U^3`, `U^2`, `U` and 1 as polynomials in the position along the row; index = power, each with
-/// one more fraction bit.
+/// Factors of `U^3`, `U^2`, `U` and 1 as polynomials in the position; index = power, each with one more fraction bit.
 pub(super) struct Factors<const CUBIC: usize, const SQUARE: usize, const LINEAR: usize, const CONSTANT: usize>
 {
     pub(super) cubic: [i32; CUBIC],
@@ -62,8 +60,7 @@ pub(super) fn linear_mixed(
     });
 }
 
-/// Factors as polynomials in the position, the table's first word. The second word is added to the factor of
-/// `U`, the third to the constant.
+/// Factors as polynomials in the table's first word; the others add to the factor of `U` and the constant.
 #[inline(never)]
 pub(super) fn polynomial(depths: &mut [i16], of_columns: &[[i32; 3]], factors: &Factors<1, 2, 2, 3>) {
     for_each_pixel(depths, of_columns, |depth, &[place, linear, constant]| {
@@ -77,8 +74,7 @@ pub(super) fn polynomial(depths: &mut [i16], of_columns: &[[i32; 3]], factors: &
     });
 }
 
-/// Four pixels per turn, written out because size optimisation does not unroll: counters are paid once, and
-/// offsets are part of the instructions.
+/// Four pixels per turn, because size optimisation does not unroll: counters are paid once.
 #[inline(always)]
 fn for_each_pixel<T>(depths: &mut [i16], of_columns: &[T], mut pixel: impl FnMut(&mut i16, &T)) {
     let (fours, rest) = depths.as_chunks_mut::<4>();

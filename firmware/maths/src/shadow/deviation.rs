@@ -3,8 +3,8 @@
 //! `s_beta^2 = 1/4 [(Hc u s^2 / D)^2 (s_psi^2 + s_alpha^2) + (Hc rx ry / D)^2 s_u^2 + (u rx ry / D)^2 s_Hc^2]` with
 //! `D = u^2 rx^2 + Hc^2 ry^2`, for a subject on the optical axis; the general form has `t = u rx - X0 ry` instead of
 //! `u rx`. (Of Li 2014, eqs. 8.21 to 8.37: 8.24 needs the square of its sum, 8.27 counts the elevation twice, 8.36 and
-//! 8.37 lack covariances; printed, they are ten times too large.) `s_psi` follows from day, hour, latitude and longitude
-//! by the derivatives of the horizontal vector, `s_u` from `u = w v / wi`. The height of the subject does not enter beta.
+//! 8.37 lack covariances; printed, they are ten times too large.) `s_psi` follows from day, hour, latitude and
+//! longitude by the derivatives of the horizontal vector, `s_u` from `u = w v / wi`. Beta is independent of `H`.
 
 use micromath::F32;
 
@@ -34,8 +34,7 @@ pub struct Deviations {
 }
 
 impl Deviations {
-    /// For a distance estimated by `u = w v / wi` from a head of width `w`, imaged as `wi` at image distance
-    /// `v` (Li 2014, eq. 8.17); each a value and its standard deviation in one unit.
+    /// For a distance `u = w v / wi` from a head of width `w`, imaged as `wi` at `v` (Li 2014, eq. 8.17); each with SD.
     pub fn of_distance(w: (f32, f32), v: (f32, f32), wi: (f32, f32)) -> f32 {
         let u = w.0 * v.0 / wi.0;
         u * root(square(w.1 / w.0) + square(v.1 / v.0) + square(wi.1 / wi.0))
@@ -49,8 +48,7 @@ pub enum Reliability {
     FirstOrder,
     /// The shadow's end may lie next to or behind the camera: beta may jump, the deviation is too small.
     ShadowNearCamera,
-    /// The shadow may point to either side: beta folds at the mirror, the deviation is too large or too
-    /// small.
+    /// The shadow may point to either side: beta folds at the mirror, the deviation is wrong.
     EitherSide,
 }
 
@@ -153,8 +151,8 @@ fn square(x: f32) -> f32 {
     x * x
 }
 
-/// Square root, 0 to 0.2 % too large: micromath's (up to 6.1 % too large) after one step of Heron's method.
-/// Sufficient for values known to a few percent (`docs/decisions/0010-micromath.md`). The root of 0 is 4e-20.
+/// Square root, 0 to 0.2 % too large: micromath's (up to 6.1 % off) after one step of Heron's method, sufficient for
+/// values known to a few percent (`docs/decisions/0010-micromath.md`). The root of 0 is 4e-20.
 fn root(x: f32) -> f32 {
     let F32(near) = F32(x).sqrt();
     0.5 * (near + x / near)
@@ -164,7 +162,6 @@ fn root(x: f32) -> f32 {
 mod tests {
     use super::*;
 
-    /// All mantissas of two octaves; others repeat.
     #[test]
     fn the_root_is_at_most_two_thousandths_too_large() {
         let (mut raw, mut least, mut most) = (0.0_f64, f64::MAX, 0.0_f64);
@@ -187,7 +184,6 @@ mod tests {
         assert!((root(1e30) / 1e15 - 1.0).abs() < 0.002);
     }
 
-    /// Integers and exactly rounded operations on every processor.
     #[test]
     fn bits_are_frozen() {
         let bits = [0.5_f32, 2.0, 3.0, 1e-6, 12_345.0].map(|x| root(x).to_bits());

@@ -30,7 +30,6 @@ pub fn twenty_terms(c: &[f64; FULL_TERMS], x: f64, y: f64, u: f64) -> f64 {
     c.iter().zip(of_xy.iter().chain(&of_u).chain(&of_u2)).map(|(c, power)| c * power).sum()
 }
 
-/// Start of a region, px.
 fn region_start(region: usize, length: usize) -> usize {
     length * region / REGIONS
 }
@@ -43,7 +42,6 @@ fn centre(region: usize, length: usize) -> f64 {
     (region_start(region, length) + region_start(region + 1, length) - 1) as f64 / 2.0
 }
 
-/// Weight of each region at a pixel.
 fn weights(index: usize, length: usize) -> [f64; REGIONS] {
     let place = index as f64;
     std::array::from_fn(|region| {
@@ -102,8 +100,7 @@ fn realistic_regions(numbers: &mut Numbers) -> RegionReals {
     std::array::from_fn(|_| std::array::from_fn(|_| realistic_terms(numbers)))
 }
 
-/// Largest difference of `fixed` from `exact` in mm, over random depths whose exact result is inside the
-/// scale.
+/// Largest difference of `fixed` from `exact` in mm, over random depths inside the scale.
 fn largest_error_mm(
     (w, h): (usize, usize),
     rows: impl Iterator<Item = usize>,
@@ -172,15 +169,13 @@ fn full_agrees_with_f64() {
     assert!(error < TOLERANCE_MM, "{error} mm");
 }
 
-/// FNV-1a over the codes.
 fn fingerprint(codes: &[i16]) -> u64 {
     codes.iter().flat_map(|code| code.to_le_bytes()).fold(0xcbf2_9ce4_8422_2325, |hash, byte| {
         (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3)
     })
 }
 
-/// The board must give these bits. They may change only with a new firmware version, because stored results
-/// would differ.
+/// The board's bits: they may change only with a new firmware version, because stored results would differ.
 #[test]
 fn bits_are_frozen() {
     let mut numbers = Numbers(4);
@@ -277,8 +272,7 @@ fn extreme() -> impl Strategy<Value = f64> {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
-    /// With overflow checks: coefficients at the edge of Q2.29 and extreme depths verify the stated ranges;
-    /// results agree with f64.
+    /// With overflow checks, coefficients at the edge of Q2.29 and extreme depths verify the stated ranges.
     #[test]
     fn nothing_overflows(
         c in prop::array::uniform3(prop::array::uniform3(prop::array::uniform10(extreme()))),

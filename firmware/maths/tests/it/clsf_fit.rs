@@ -6,8 +6,7 @@ use farnear_maths::clsf::{
 
 use crate::clsf::{Numbers, RegionReals, coordinate, regions_f64, twenty_terms};
 
-/// Flat targets through a known inverse: `truth = polynomial(x, y, U)` for every sample up to rounding. `U`
-/// is found by bisection.
+/// Flat targets through a known inverse, by bisection: `truth = polynomial(x, y, U)` for every sample up to rounding.
 fn target_row(
     (w, h): (usize, usize),
     row: usize,

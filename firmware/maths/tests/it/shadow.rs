@@ -9,7 +9,6 @@ use proptest::prelude::*;
 
 use crate::sun::{TOLERANCE_DEG, days_since_epoch, place, sun_f64, unix_seconds};
 
-/// A case of error propagation.
 struct Case {
     name: &'static str,
     day: i64,
@@ -277,7 +276,6 @@ fn no_angle_without_a_shadow() {
 }
 
 proptest! {
-    /// No panic, and angles in range, for any time, place and camera.
     #[test]
     fn angles_stay_in_their_ranges(
         time in any::<i64>(), latitude in -900_000_000..=900_000_000_i32, longitude in any::<i32>(),

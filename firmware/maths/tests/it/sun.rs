@@ -5,7 +5,6 @@ use std::f64::consts::{PI, TAU};
 use farnear_maths::angle::BinaryAngle;
 use farnear_maths::sun::{Place, Sun};
 
-/// Tolerance of single precision.
 pub const TOLERANCE_DEG: f64 = 0.01;
 
 /// East, north, up by PSA+ (Blanco et al. 2020) in f64, time in days since 2000-01-01 12:00 UT.
@@ -110,8 +109,8 @@ fn sun_agrees_with_f64_over_a_century_and_the_globe() {
     assert!(azimuth_error < TOLERANCE_DEG / 5.0, "{azimuth_error}");
 }
 
-/// Example of NREL's report on SPA (Reda & Andreas, TP-560-34302, table A5.1): elevation without refraction
-/// 39.872046 deg, azimuth 194.340241 deg. PSA+ is within 0.007 and 0.05 deg.
+/// Example of NREL's report on SPA (Reda & Andreas, TP-560-34302, table A5.1): elevation without refraction 39.872046
+/// deg, azimuth 194.340241 deg. PSA+ is within 0.007 and 0.05 deg.
 #[test]
 fn sun_agrees_with_the_example_of_spa() {
     let time = unix_seconds(2003, 10, 17, 19 * 3600 + 30 * 60 + 30);
@@ -120,7 +119,6 @@ fn sun_agrees_with_the_example_of_spa() {
     assert!((sun.azimuth_deg() - 194.34024).abs() < 0.05, "{}", sun.azimuth_deg());
 }
 
-/// NREL's reference values, if present.
 #[test]
 fn sun_agrees_with_the_values_of_spa() {
     let file = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/data/sun/spa_c_reference.csv");

@@ -1,5 +1,4 @@
-//! Exit from a panic, a fault or a lost clock: stores the cause in retained memory and resets. The reset
-//! stops the motors' timers first.
+//! Exit from a panic, a fault or a lost clock: retains the cause and resets, which stops the motors' timers first.
 
 use core::{arch::naked_asm, panic::PanicInfo};
 
@@ -10,8 +9,8 @@ use super::retained::{Last, leave};
 /// Stack limit, see `memory.x`: a fault with the stack pointer near or below it is an overflow.
 const STACK_LOWEST: u32 = 0x2000_0000;
 const STACK_MARGIN: u32 = 128;
-/// The bus returns errors below the stack, down to the option bytes (RM0090, section 2.3). These 16 KiB
-/// exceed any frame of the running program (10 KiB); the start's (29 KiB) is built on an empty stack.
+/// The bus returns errors below the stack, down to the option bytes (RM0090, section 2.3). These 16 KiB exceed any
+/// frame of the running program (10 KiB); the start's (29 KiB) is built on an empty stack.
 const NOTHING: core::ops::Range<u32> = 0x1fff_c010..STACK_LOWEST;
 /// Words of an exception frame before the program counter.
 const FRAME_PC: u32 = 6;
@@ -20,7 +19,6 @@ const STACKING_FAILED: u32 = 1 << 12;
 const ADDRESS_VALID: u32 = 1 << 15;
 /// B3.2.18.
 const BFAR: *const u32 = 0xe000_ed38 as *const u32;
-/// Configurable fault status register.
 const CFSR: *const u32 = 0xe000_ed28 as *const u32;
 
 #[panic_handler]
@@ -35,8 +33,7 @@ fn panic(info: &PanicInfo<'_>) -> ! {
     SCB::sys_reset()
 }
 
-/// Clock security interrupt: the external clock has stopped and the internal 16 MHz is used. The motors'
-/// timers were broken with it.
+/// Clock security interrupt: the external clock has stopped, which broke the motors' timers; the internal one is used.
 // SAFETY: it never returns. Retained memory that was being written is rejected by `leave` and after the
 // reset.
 #[cortex_m_rt::exception]
@@ -46,8 +43,8 @@ unsafe fn NonMaskableInt() -> ! {
     SCB::sys_reset()
 }
 
-/// All faults (the configurable ones escalate). The stack may be full, so it is reset first; there is no
-/// return. `r0` is the faulting stack pointer, from cortex-m-rt's trampoline.
+/// All faults (the configurable ones escalate). The stack may be full, so it is reset first. `r0` is the stack pointer
+/// from cortex-m-rt's trampoline.
 // SAFETY: the name is cortex-m-rt's hook for this; there is no other.
 #[unsafe(naked)]
 #[unsafe(no_mangle)]

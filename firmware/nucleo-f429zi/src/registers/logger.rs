@@ -1,8 +1,6 @@
-//! defmt log into a ring, which the control loop sends over the link.
-//!
-//! Lines that do not fit are dropped as a whole, and a frame number is skipped. Encoding takes some hundred
-//! instructions with interrupts off, so motor handlers never log. Output is copied in short pieces: a
-//! received byte may wait 5 us, a motor step less.
+//! defmt log into a ring, which the control loop sends over the link. Lines that do not fit are dropped as a whole, and
+//! a frame number is skipped. Encoding takes some hundred instructions with interrupts off, so motor handlers never
+//! log. Output is copied in short pieces: a received byte may wait 5 us, a motor step less.
 
 use core::cell::{RefCell, UnsafeCell};
 
@@ -18,10 +16,8 @@ const PIECE: usize = 16;
 
 struct Ring {
     bytes: Deque<u8, RING>,
-    /// Start of the current line.
     line: usize,
     dropping: bool,
-    /// Number of the next frame.
     number: u32,
 }
 

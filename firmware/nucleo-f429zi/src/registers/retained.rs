@@ -32,14 +32,12 @@ unsafe impl Sync for PiezoCode {}
 #[unsafe(link_section = ".uninit.piezo_code")]
 static PIEZO_CODE: PiezoCode = PiezoCode(UnsafeCell::new(MaybeUninit::uninit()));
 
-/// Keeps the code that the piezo's DAC is about to get.
 pub fn keep_piezo_code(code: u16) {
     let word = u32::from(code) | u32::from(!code) << 16;
     // SAFETY: the place is valid, aligned static memory; see `PiezoCode`.
     unsafe { PIEZO_CODE.0.get().cast::<u32>().write_volatile(word) };
 }
 
-/// The code that the DAC had last; `None` where memory has none.
 pub fn piezo_code() -> Option<u16> {
     // SAFETY: as above; any bits are a valid u32.
     let word = unsafe { PIEZO_CODE.0.get().cast::<u32>().read_volatile() };
@@ -47,7 +45,6 @@ pub fn piezo_code() -> Option<u16> {
     (code == !complement).then_some(code)
 }
 
-/// Why the program stopped itself.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub enum Last {
     Panic {
@@ -62,7 +59,6 @@ pub enum Last {
         status: u32,
     },
     StackOverflow,
-    /// The external clock stopped.
     ClockLost,
 }
 
@@ -128,8 +124,7 @@ fn write(boot: u32, last: [u32; 4]) {
     unsafe { RETAINED.0.get().cast::<[u32; WORDS]>().write_volatile(words) };
 }
 
-/// Boot number (one more than the last, or 1 after a power loss; never 0, "unknown" on the wire) and cause of
-/// the last stop, given once.
+/// Boot number (one more than the last, 1 after a power loss, never 0) and cause of the last stop, given once.
 pub fn take() -> (u32, Option<Last>) {
     critical_section::with(|_| {
         let Some([_, boot, a, b, c, d, ..]) = read() else {

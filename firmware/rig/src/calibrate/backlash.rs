@@ -1,8 +1,6 @@
-//! Backlash of a screw, measured at the home switch, which the stage actuates.
-//!
-//! The switch closes going down and opens a known distance higher going up; additional motor travel is the
-//! play. Each round closes and opens it once, a pulse per millisecond, with positions by encoder. The axis is
-//! then homed again, because position 0 depends on the backlash.
+//! Backlash of a screw, measured at the home switch, which the stage actuates. The switch closes going down and opens a
+//! known distance higher going up; additional motor travel is the play. Each round closes and opens it once, a pulse
+//! per millisecond, with positions by encoder. Position 0 depends on the backlash, so the axis is homed again.
 
 use farnear_protocol::Nanometres;
 use farnear_protocol::message::{Axis, Calibration, Failure, StepperKeys};
@@ -14,7 +12,6 @@ use crate::motion::leg::{Leg, Until};
 use crate::motion::stage::Stage;
 use crate::settings::{Settings, StepperSettings};
 
-/// Measured reversals.
 const ROUNDS: usize = 5;
 /// Largest plausible backlash; also the setting's range.
 const MOST: i32 = 100_000;
@@ -22,11 +19,9 @@ const MOST: i32 = 100_000;
 #[derive(Clone, Debug)]
 enum Phase {
     Home(Homing),
-    /// Up, well off the switch.
     Clear,
-    /// Down until it closes.
     Close,
-    /// Further than the play may be wide.
+    /// Further than any play.
     Pass {
         closed: Nanometres,
     },
@@ -91,7 +86,6 @@ impl Backlash {
         Step::On
     }
 
-    /// Result as a setting.
     fn found(&self, settings: &StepperSettings) -> Step {
         let backlash = self.mean(settings);
         match StepperKeys::of(self.axis) {

@@ -1,17 +1,12 @@
 //! Gain and zero of the strain gauge, compared with the encoder.
 //!
-//! The tab of stage A's home switch is on the sensor plate, which the piezo moves. The switch is therefore
-//! met at a screw
-//! position that depends on the piezo, and the encoder measures the difference:
-//!
+//! The tab of stage A's home switch is on the sensor plate, which the piezo moves. The screw position of the contact
+//! therefore depends on the piezo, and the encoder measures the difference:
 //! 1. The relaxed piezo's reading is the zero.
-//! 2. After homing the switch is met from above with the piezo alternately low and high, a pulse per
-//!    millisecond.
-//! 3. Encoder distance over gauge distance is the gain. The stage is homed again, because the piezo's share
-//!    has changed.
+//! 2. After homing the switch is met from above with the piezo alternately low and high, a pulse per millisecond.
+//! 3. Encoder distance over gauge distance is the gain. The stage is homed again, because the piezo's share changed.
 //!
-//! Remaining error: the switch's repeatability and the screw's error within a third of a turn, together 0.3
-//! %.
+//! Remaining error: switch repeatability and screw error within a third of a turn, together 0.3 %.
 
 use farnear_protocol::Nanometres;
 use farnear_protocol::message::{Axis, Calibration, Failure, SettingKey};
@@ -28,7 +23,6 @@ use crate::settings::{Settings, StepperSettings};
 
 /// Piezo positions for the two contacts, by gauge.
 const PLACES: [Nanometres; 2] = [Nanometres(20_000), Nanometres(180_000)];
-/// Contacts per position.
 const ROUNDS: usize = 4;
 /// Start of the exact approach above the switch: more than the gauge's error.
 const NEAR_NM: i32 = 30_000;
@@ -44,17 +38,13 @@ const OFFSET_NM: core::ops::RangeInclusive<i64> = -9_000..=9_000;
 #[derive(Clone, Debug)]
 enum Phase {
     Begin,
-    /// The piezo moves down from a code.
     Lower(u16),
     Rest,
     Home(Homing),
-    /// The stage moves up, clear of any piezo position.
     Lift,
-    /// The piezo moves to its position.
     Place,
     Near,
     Approach,
-    /// The piezo moves down after all contacts.
     LowerAgain(u16),
     Tell(u8),
     HomeAgain(Homing),
@@ -66,7 +56,6 @@ pub(crate) struct GaugeScale {
     leg: Leg,
     ticks: u32,
     sum: i64,
-    /// Reading at the relaxed piezo.
     relaxed: i64,
     /// Contacts so far, and per position the sums of gauge and encoder positions.
     met: usize,
@@ -158,7 +147,6 @@ impl GaugeScale {
         Step::On
     }
 
-    /// Piezo position for the next contact.
     const fn target(&self) -> Nanometres {
         PLACES[self.met % 2]
     }
@@ -186,7 +174,7 @@ impl GaugeScale {
         (self.ticks >= wait).then_some(self.sum / i64::from(MEAN))
     }
 
-    /// Gain and zero as settings; `None` if implausible.
+    /// `None` if implausible.
     fn evaluate(&self, settings: &Settings) -> Option<(i32, i32)> {
         let by_gauge = self.gauge[1] - self.gauge[0];
         // A higher piezo position meets the switch at a lower stage position.

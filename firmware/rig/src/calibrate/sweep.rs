@@ -1,9 +1,8 @@
 //! Gain, hysteresis and creep of the piezo: open-loop sweep and a step.
 //!
 //! 1. Down to code 0, then up and down once, so that the loop does not depend on the history.
-//! 2. Up and down again, 0.5 s each, read at sixteen positions: the stroke gives the gain, the largest
-//!    difference the loop's
-//!    width. Smooth ends do not excite the resonance; creep adds less than a tenth to the width.
+//! 2. Up and down again, 0.5 s each, read at sixteen positions: the stroke gives the gain, the largest difference the
+//!    loop's width. Smooth ends do not excite the resonance; creep adds less than a tenth to the width.
 //! 3. Rest, then up to half the range; positions 0.15 and 1.5 s later give a decade of creep.
 
 use farnear_protocol::message::{Axis, Calibration, Failure, SettingKey};
@@ -12,7 +11,6 @@ use super::Step;
 use crate::io::{DAC_CODE_MAX, TICK_HZ};
 use crate::piezo::Piezo;
 
-/// Ticks per sweep.
 const SWEEP: u32 = TICK_HZ / 2;
 /// Ticks of rest, and of the step.
 const REST: u32 = TICK_HZ;
@@ -24,7 +22,6 @@ const MEAN: u32 = 50;
 const PLACES: usize = 16;
 const HALF: u16 = DAC_CODE_MAX / 2;
 
-/// Phase and its ticks.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Phase {
     /// From the present code.
@@ -52,7 +49,6 @@ pub(crate) struct Sweep {
     late: i32,
 }
 
-/// Results as settings.
 struct Found {
     gain_pm_per_code: i32,
     hysteresis_ppm: i32,
@@ -160,7 +156,6 @@ pub(super) fn ramp(piezo: &mut Piezo, ticks: u32, over: u32, from: u16, to: u16)
     at == over
 }
 
-/// Reads the position at each of the measured codes.
 fn read(places: &mut [i32; PLACES + 1], ticks: u32, position: i32) {
     let (place, rest) = (ticks as usize * PLACES / SWEEP as usize, ticks as usize * PLACES % SWEEP as usize);
     if ticks == 1 {
@@ -176,7 +171,6 @@ mod tests {
     use crate::piezo::plant::{NOMINAL, Part, Plant};
     use crate::settings::Settings;
 
-    /// Runs the routine on a part; returns its settings and its end.
     fn run(part: Part, seed: u64) -> (std::vec::Vec<(SettingKey, i32)>, Step) {
         let (mut piezo, mut plant) = (Piezo::new(Settings::DEFAULT.fine), Plant::new(part, seed));
         let (mut sweep, mut settings) = (Sweep::new(), std::vec::Vec::new());

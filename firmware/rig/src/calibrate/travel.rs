@@ -1,6 +1,4 @@
-//! Travel of a stepper axis between home and far switch.
-//!
-//! After homing the far switch is found in the same way: fast, then exactly from below.
+//! Travel of a stepper axis between home and far switch, which is found like the home switch: fast, then exactly.
 
 use farnear_protocol::Nanometres;
 use farnear_protocol::message::{Axis, Calibration, Failure};

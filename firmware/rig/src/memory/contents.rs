@@ -1,6 +1,4 @@
-//! Contents of the records.
-//!
-//! Little-endian numbers at fixed places; shots and alarms in postcard, one per block, as on the wire.
+//! Contents of the records: little-endian numbers at fixed places; shots and alarms in postcard, one per block.
 
 use farnear_protocol::message::{AlarmRecord, CorrectionForm, CorrectionInfo, Counters, RecordName, Shot};
 use serde::{Serialize, de::DeserializeOwned};
@@ -60,7 +58,6 @@ impl Contents<'_> {
     }
 }
 
-/// All readable contents.
 #[derive(Debug)]
 pub(crate) struct Restored {
     pub(crate) counters: Counters,
@@ -72,7 +69,6 @@ pub(crate) struct Restored {
 }
 
 impl Restored {
-    /// Contents of a new board.
     pub(crate) fn nothing() -> Self {
         Self {
             counters: Counters::default(),
@@ -84,7 +80,7 @@ impl Restored {
         }
     }
 
-    /// Reads the memory; `parts` are the settings that are not stored.
+    /// `parts` are the settings that are not stored.
     pub(crate) fn from(memory: &[u8; MEMORY_BYTES], parts: &Settings) -> Self {
         let mut restored = Self::nothing();
         let copy = |record| match record::find(memory, record) {
@@ -138,7 +134,7 @@ impl Restored {
     }
 }
 
-/// A block of a correction: the first has its form, the others coefficients.
+/// The first block has the form, the others coefficients.
 fn correction(kept: &StoredCorrection, index: usize) -> Block {
     let Some(index) = index.checked_sub(1) else {
         let CorrectionInfo { form, width, height, centre_um, half_span_um } = *kept.info();
@@ -172,7 +168,7 @@ fn kept_correction(block: impl Fn(usize) -> Block) -> Option<StoredCorrection> {
     StoredCorrection::restored(info, bits)
 }
 
-/// Eight values of a list; 0 beyond its end.
+/// Eight values; 0 beyond the list's end.
 fn values(list: &[i32], index: usize) -> Block {
     let mut block = [0; BLOCK];
     for (bytes, value) in block.chunks_exact_mut(4).zip(list.iter().skip(index * VALUES)) {
@@ -181,7 +177,7 @@ fn values(list: &[i32], index: usize) -> Block {
     block
 }
 
-/// A number in a block; 0 beyond its end.
+/// 0 beyond the block's end.
 fn u32_at(block: &Block, at: usize) -> u32 {
     block.get(at..at + 4).and_then(|bytes| bytes.try_into().ok()).map_or(0, u32::from_le_bytes)
 }
@@ -190,7 +186,7 @@ fn u64_at(block: &Block, at: usize) -> u64 {
     block.get(at..at + 8).and_then(|bytes| bytes.try_into().ok()).map_or(0, u64::from_le_bytes)
 }
 
-/// A message in a block: length, then bytes; length 0 = none.
+/// Length, then a message; length 0 = none.
 fn item<T: Serialize>(item: Option<&T>) -> Block {
     let mut block = [0; BLOCK];
     let (length, bytes) = block.split_at_mut(1);

@@ -4,20 +4,14 @@
 //! ```text
 //! header: magic "fnR1" | record u8 | version u8 | blocks u8 | values u8 | sequence u32 | CRC-32 | 0...
 //! ```
-//! The CRC (ISO-HDLC) covers the header's first twelve bytes and all blocks. Each record has two adjacent
-//! copies at a fixed
-//! address. The copy with the newer sequence number is valid; the other is overwritten, its header last, so a
-//! torn write leaves
-//! a wrong CRC and an intact older copy. The first write of a record writes both copies.
+//! The CRC (ISO-HDLC) covers the header's first twelve bytes and all blocks. Each record has two adjacent copies at a
+//! fixed address. The copy with the newer sequence number is valid; the other is overwritten, its header last, so a
+//! torn write leaves a wrong CRC and an intact older copy. The first write of a record writes both copies.
 //!
-//! Older versions are read as they were defined, and the next write uses the present one, over the other
-//! copy: a firmware
-//! change loses nothing, even with a power loss. A new version may change the meaning of blocks but not their
-//! place; a record
-//! that outgrows its place moves behind all others. Version 2 added the number of values, so that newer
-//! settings get their
-//! default instead of the 0 behind the list. A copy of an unknown version (older firmware restored) is
-//! invalid.
+//! Older versions are read as defined then, and the next write uses the present one, over the other copy: a firmware
+//! change loses nothing, even with a power loss. A new version may change the meaning of blocks but not their place; a
+//! record that outgrows its place moves behind all others. Version 2 added the number of values, so that newer settings
+//! get their default instead of 0. A copy of an unknown version (older firmware restored) is invalid.
 
 use crc::{CRC_32_ISO_HDLC, Crc, Digest, Table};
 use farnear_protocol::message::RecordName;
@@ -28,21 +22,17 @@ use crate::program::SHOTS_MAX;
 use crate::settings::KEYS;
 
 pub(crate) const BLOCK: usize = 32;
-/// 32-bit numbers per block.
 pub(crate) const VALUES: usize = BLOCK / 4;
 pub(crate) type Block = [u8; BLOCK];
 pub(crate) const RECORDS: usize = 5;
-/// Version of the contents; older ones are read too.
+/// Older versions are read too.
 const VERSION: u8 = 2;
-/// Settings in a record of version 1.
 const SETTINGS_OF_VERSION_1: usize = 25;
 const MAGIC: [u8; 4] = *b"fnR1";
-/// Header bytes covered by the CRC.
 const COVERED: usize = 12;
 
 static CRC: Crc<u32, Table<1>> = Crc::<u32, Table<1>>::new(&CRC_32_ISO_HDLC);
 
-/// All records by address.
 pub(crate) const ALL: [RecordName; RECORDS] = [
     RecordName::Counters,
     RecordName::Alarms,
@@ -51,8 +41,7 @@ pub(crate) const ALL: [RecordName; RECORDS] = [
     RecordName::Correction,
 ];
 
-/// All records by urgency. Alarms precede the counters, which also store the moving axes: alarms take these
-/// over at a start, and a power loss in between must not lose them.
+/// Alarms precede the counters, which also store the moving axes: a start turns these into alarms first.
 pub(crate) const URGENCY: [RecordName; RECORDS] = [
     RecordName::Alarms,
     RecordName::Counters,
@@ -61,7 +50,6 @@ pub(crate) const URGENCY: [RecordName; RECORDS] = [
     RecordName::Correction,
 ];
 
-/// Index in [`ALL`].
 pub(crate) const fn index(record: RecordName) -> usize {
     match record {
         RecordName::Counters => 0,
@@ -72,7 +60,7 @@ pub(crate) const fn index(record: RecordName) -> usize {
     }
 }
 
-/// Blocks without header.
+/// Without the header.
 pub(crate) const fn blocks(record: RecordName) -> usize {
     match record {
         RecordName::Counters => 2,
@@ -83,7 +71,6 @@ pub(crate) const fn blocks(record: RecordName) -> usize {
     }
 }
 
-/// Address of copy 0 or 1.
 pub(crate) const fn address(record: RecordName, copy: usize) -> usize {
     let mut address = 0;
     let mut i = 0;
@@ -110,7 +97,6 @@ impl Checksum {
         self.0.update(block);
     }
 
-    /// The header with its CRC.
     pub(crate) fn finish(self, mut header: Block) -> Block {
         header[COVERED..COVERED + 4].copy_from_slice(&self.0.finalize().to_le_bytes());
         header
@@ -123,7 +109,6 @@ impl core::fmt::Debug for Checksum {
     }
 }
 
-/// Header without CRC.
 pub(crate) fn header(record: RecordName, sequence: u32) -> Block {
     let mut header = [0; BLOCK];
     header[..4].copy_from_slice(&MAGIC);
@@ -136,7 +121,6 @@ pub(crate) fn header(record: RecordName, sequence: u32) -> Block {
     header
 }
 
-/// Contents of a copy's place.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Copy {
     Blank,
@@ -144,7 +128,6 @@ enum Copy {
     Bad,
 }
 
-/// Search result of a record.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Found {
     /// Never written: defaults.
@@ -158,7 +141,6 @@ pub(crate) enum Found {
     Lost,
 }
 
-/// Finds the valid copy of a record.
 pub(crate) fn find(memory: &[u8; MEMORY_BYTES], record: RecordName) -> Found {
     match [look(memory, record, 0), look(memory, record, 1)] {
         [Copy::Good { sequence: first }, Copy::Good { sequence: second }] => {
@@ -174,7 +156,6 @@ pub(crate) fn find(memory: &[u8; MEMORY_BYTES], record: RecordName) -> Found {
     }
 }
 
-/// All records in order of [`ALL`].
 pub(crate) fn find_all(memory: &[u8; MEMORY_BYTES]) -> [Found; RECORDS] {
     ALL.map(|record| find(memory, record))
 }
@@ -183,7 +164,6 @@ pub(crate) fn block(memory: &[u8; MEMORY_BYTES], record: RecordName, copy: usize
     at(memory, address(record, copy) + (1 + block) * BLOCK)
 }
 
-/// Number of values in a valid copy.
 pub(crate) fn values(memory: &[u8; MEMORY_BYTES], record: RecordName, copy: usize) -> usize {
     let [.., version, _, values] = *at(memory, address(record, copy)).first_chunk::<8>().unwrap_or(&[0; 8]);
     if version == 1 { SETTINGS_OF_VERSION_1 } else { usize::from(values) }

@@ -1,8 +1,6 @@
-//! Writes records, one chunk per tick.
-//!
-//! The most urgent marked record is written over its older copy, blocks first, header last. A change during
-//! the write restarts it, so that no copy mixes two states. Cost: two blocks and their CRC, some 700
-//! instructions per tick.
+//! Writes records, one chunk per tick. The most urgent marked record is written over its older copy, blocks first,
+//! header last. A change during the write restarts it, so that no copy mixes two states. Cost: 700 instructions per
+//! tick.
 
 use farnear_protocol::message::RecordName;
 use heapless::Vec;
@@ -10,7 +8,6 @@ use heapless::Vec;
 use crate::io::{MEMORY_BYTES, MEMORY_CHUNK, MemoryWrite};
 use crate::memory::record::{self, ALL, BLOCK, Block, Checksum, Found, RECORDS, URGENCY};
 
-/// The next write of a record.
 #[derive(Clone, Copy, Debug)]
 struct Slot {
     sequence: u32,
@@ -57,7 +54,6 @@ impl Store {
         self.fitted
     }
 
-    /// Schedules a write.
     pub(crate) fn mark(&mut self, record: RecordName) {
         if self.fitted {
             self.slots[record::index(record)].changed = true;

@@ -1,14 +1,12 @@
 //! A stepper axis: feeds the step timer, counts, and checks encoder, switches and driver ([`watch`]).
 //!
-//! The position is the timer's pulse count, continuously compared with the encoder. The count may lag by the
-//! running segment (1 ms at full speed is 40 pulses), so the encoder must be between the counted pulses and
-//! the segment's end, within [`StepperSettings::following`].
+//! The position is the timer's pulse count, continuously compared with the encoder. The count may lag by the running
+//! segment (1 ms at full speed is 40 pulses), so the encoder must be between the counted pulses and the segment's end,
+//! within [`StepperSettings::following`]. [`Stepper::stop`] brakes along the ramp and keeps the position;
+//! [`Stepper::abort`] takes at most 1 ms and loses it. A motion ends when the timer is idle.
 //!
-//! [`Stepper::stop`] brakes along the ramp and keeps the position; [`Stepper::abort`] takes at most 1 ms and
-//! loses it. A motion ends when the timer is idle.
-//!
-//! Because of the screw's play moves end from below: if the flanks do not touch on that side, the motor first
-//! moves back by more than the play. The position is that with touching flanks.
+//! Because of the screw's play moves end from below: if the flanks do not touch on that side, the motor first moves
+//! back by more than the play. The position is that with touching flanks.
 
 mod watch;
 
@@ -25,11 +23,10 @@ use crate::settings::StepperSettings;
 /// Segments queued in the board plus the running one.
 const OUTSTANDING: usize = 6;
 
-/// Motion planned per control tick: two control ticks, so that the queue grows, and no more, because planning
-/// several segments takes long.
+/// Motion planned per control tick: two control ticks so that the queue grows; planning more takes too long.
 const PLANNED_TICKS: u32 = STEP_TIMER_HZ / TICK_HZ * 2;
 
-/// Purpose of a motion: its jerk and acceleration, and the switch that may close.
+/// Selects jerk, acceleration, and the switch that may close.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Purpose {
     /// A move: only the home switch near position 0 may close.
@@ -50,7 +47,6 @@ enum Motion {
         ramp: Ramp,
         quiet_ticks: u32,
     },
-    /// Queue cleared; waits for the running segment.
     Aborting {
         ticks: u32,
     },
@@ -74,7 +70,6 @@ pub(crate) struct Stepper {
     slack: u32,
     /// Counted pulses; relative to the reset until homed.
     position: i32,
-    /// Encoder reading at position 0.
     encoder_zero: i32,
     encoder: i32,
     pulses: Option<u32>,
@@ -131,7 +126,6 @@ impl Stepper {
         self.home_switch.is_steady()
     }
 
-    /// Position of the last change of the home or far switch.
     pub(crate) const fn changed(&self, far: bool) -> Place {
         if far { self.far_switch.changed() } else { self.home_switch.changed() }
     }
@@ -148,22 +142,18 @@ impl Stepper {
         self.state
     }
 
-    /// Counted pulses.
     pub(crate) const fn position(&self) -> i32 {
         self.position
     }
 
-    /// By encoder.
     pub(crate) const fn measured(&self) -> Nanometres {
         steps::encoder_to_nanometres(self.encoder.wrapping_sub(self.encoder_zero))
     }
 
-    /// Last target.
     pub(crate) const fn target(&self) -> Nanometres {
         self.target
     }
 
-    /// Pulses since the reset.
     pub(crate) const fn total_pulses(&self) -> u64 {
         self.total_pulses
     }
@@ -173,12 +163,11 @@ impl Stepper {
         matches!(self.motion, Motion::Still)
     }
 
-    /// At rest with steady switches.
     pub(crate) const fn is_settled_idle(&self) -> bool {
         self.is_still() && self.home_switch.is_steady() && self.far_switch.is_steady()
     }
 
-    /// Cause of the last early end; given once.
+    /// Given once.
     pub(crate) const fn take_fault(&mut self) -> Option<Failure> {
         self.fault.take()
     }
@@ -199,7 +188,6 @@ impl Stepper {
         if backlash.0 == 0 { Nanometres(0) } else { Nanometres(backlash.0 + approach_margin.0) }
     }
 
-    /// Moves at the normal speed. The caller has checked limits and state.
     pub(crate) fn go(&mut self, target: Nanometres) {
         self.target = target;
         self.go_from_below(steps::to_steps(target), self.settings.speed, Purpose::Move);
@@ -258,8 +246,7 @@ impl Stepper {
         }
     }
 
-    /// Stops within a millisecond. A moving axis loses its position, because a motor stopped from full speed
-    /// may slip.
+    /// Stops within a millisecond. A moving axis loses its position, because a motor stopped from full speed may slip.
     pub(crate) fn abort(&mut self) {
         self.then = None;
         match self.motion {
@@ -272,7 +259,6 @@ impl Stepper {
         }
     }
 
-    /// Power was lost during motion.
     pub(crate) const fn was_interrupted(&mut self) {
         self.state = PositionState::Lost;
     }
@@ -309,23 +295,21 @@ impl Stepper {
         Nanometres(settings.min.0.min(0).saturating_sub(way.0))
     }
 
-    /// Uses the encoder's position: homing starts where steps and encoder may disagree.
+    /// Homing starts where steps and encoder may disagree.
     pub(crate) const fn follow_encoder(&mut self) {
         self.position = steps::to_steps(self.measured());
     }
 
-    /// Follows the encoder also while the first pulses release a rotor between two poles, e.g. after a jam:
-    /// it snaps by half a torque period, 32 pulses, and overshoots. A blocked motor is therefore detected
-    /// that many pulses later.
+    /// Follows the encoder also while the first pulses release a rotor between two poles, e.g. after a jam: it snaps by
+    /// half a torque period, 32 pulses, and overshoots. A blocked motor is detected that many pulses later.
     pub(crate) const fn begin_to_home(&mut self) {
         self.follow_encoder();
         self.falling = 32;
     }
 
-    /// Makes the home switch's edge, met going down at `edge` (counted pulses), position 0; returns the
-    /// change of the encoder's zero. The axis is at rest. From below, the motor is higher by the backlash at
-    /// the same stage position. The switch detects what the axis carries, `carried` further away; otherwise
-    /// it would have been met there.
+    /// Makes the home switch's edge, met going down at `edge` (counted pulses), position 0; returns the change of the
+    /// encoder's zero. The axis is at rest. From below, the motor is higher by the backlash at the same stage position.
+    /// The switch detects a tab that the piezo holds `carried` further away.
     pub(crate) const fn set_home(&mut self, edge: i32, carried: Nanometres) -> Nanometres {
         let farther = self.settings.backlash.0.saturating_add(carried.0);
         let zero = edge.wrapping_add(steps::to_steps(Nanometres(farther)));
@@ -339,7 +323,6 @@ impl Stepper {
         shift
     }
 
-    /// Commands the board and feeds the timer.
     pub(crate) fn act(&mut self, stepper: &StepperState, outputs: &mut MotorOutputs) {
         outputs.enable = self.enabled;
         self.enabled_ticks = if self.enabled { self.enabled_ticks.saturating_add(1) } else { 0 };

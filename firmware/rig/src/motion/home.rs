@@ -2,17 +2,12 @@
 //!
 //! 1. Search towards the switch, braking when it closes; skipped if already closed.
 //! 2. Leave until it opens, then a little further.
-//! 3. Approach, a pulse per millisecond, until it closes again; this edge, corrected for backlash and the
-//!    piezo's
-//!    displacement of the tab, becomes position 0. Requires an open switch.
-//!
-//!    The switch must close where it first closed, and open where its hysteresis predicts: other edges
-//!    indicate a broken wire
-//!    or a dead contact.
+//! 3. Approach, a pulse per millisecond, until it closes again; this edge, corrected for backlash and the piezo's
+//!    displacement of the tab, becomes position 0. The switch must close where it first closed and open where its
+//!    hysteresis predicts: other edges indicate a broken wire or a dead contact.
 //! 4. Return to position 0 from below, like every move.
 //!
-//! The approach always has the same side and speed, so that hysteresis and delay cancel; the switch's
-//! repeatability remains.
+//! The approach always has the same side and speed, so that hysteresis and delay cancel; repeatability remains.
 
 use farnear_protocol::Nanometres;
 use farnear_protocol::message::{Failure, PositionState};
@@ -38,7 +33,7 @@ const REPEATS: i32 = 5_000;
 /// Delay of the closing edge in the fast search: 5 ms of bounce at 4 mm/s, and 0.6 ms of filtering.
 const SEARCH_LATE: i32 = 25_000;
 
-/// Whether pulse `upper` is above pulse `lower` by at most `most` (nm).
+/// `most` is in nm.
 fn is_above(lower: i32, upper: i32, most: i32) -> bool {
     let apart = steps::to_nanometres(upper.saturating_sub(lower)).0;
     (-REPEATS..=most).contains(&apart)
@@ -48,22 +43,18 @@ fn is_above(lower: i32, upper: i32, most: i32) -> bool {
 pub(crate) struct Homing {
     phase: Phase,
     leg: Leg,
-    /// Pulse of the first closing.
     closed: Option<i32>,
-    /// Pulse of the opening.
     opened: i32,
     /// The position was known before, so the shift is meaningful.
     known_before: bool,
 }
 
 impl Homing {
-    /// Starts with the next tick.
     pub(crate) const fn new() -> Self {
         Self { phase: Phase::Begin, leg: Leg::REST, closed: None, opened: 0, known_before: false }
     }
 
-    /// Continues while the axis has no fault; returns the shift of position 0 at the end. `carried`:
-    /// displacement of the switch's tab by the piezo, if known.
+    /// Returns the shift of position 0 at the end. `carried`: the piezo's displacement of the switch's tab, if known.
     pub(crate) fn tick(
         &mut self,
         axis: &mut Stepper,

@@ -6,7 +6,6 @@ use crate::motion::axis::{Purpose, Stepper};
 use crate::motion::steps;
 use crate::motion::switch::Place;
 
-/// Early end of a leg.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Until {
     Arrival,
@@ -23,7 +22,6 @@ pub(crate) struct Leg {
 }
 
 impl Leg {
-    /// No travel: over once the axis is at rest.
     pub(crate) const REST: Self = Self { until: Until::Arrival, edge: None };
 
     /// Starts a travel of `way_nm` (positive = away from the home switch) at a speed.
@@ -52,7 +50,6 @@ impl Leg {
         axis.is_still()
     }
 
-    /// Position of the edge; `None` if the travel ended without it.
     pub(crate) const fn edge(&self) -> Option<Place> {
         self.edge
     }

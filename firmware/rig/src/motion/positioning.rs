@@ -43,8 +43,7 @@ impl Positioning {
         Self { axis, target, settling: Settling::new(settle), started: now, waiting_since, patience }
     }
 
-    /// Continues without an alarm; returns the time from the start once settled. May be called again
-    /// while it stays settled.
+    /// Continues without an alarm; returns the time from the start once settled, repeatedly while it stays settled.
     pub(crate) fn tick(&mut self, stage: &Stage, now: BoardMicros) -> Option<Result<Micros, Failure>> {
         if !stage.is_still(self.axis) {
             return None;
@@ -70,7 +69,6 @@ impl Positioning {
         Nanometres(self.target.0.saturating_sub(stage.measured(self.axis).0))
     }
 
-    /// Distance from the target.
     pub(crate) fn deviation(&self, stage: &Stage) -> Nanometres {
         Nanometres(self.error(stage).0.saturating_abs())
     }

@@ -1,22 +1,19 @@
 //! Jerk-limited ramp: splits a distance in STEP pulses into segments of equal pulses.
 //!
-//! The speed rises from the start speed with limited jerk (bend), constant acceleration (straight), and a
-//! bend into the top speed; the end mirrors this (seven-phase profile of L. Biagiotti and C. Melchiorri,
-//! "Trajectory Planning for Automatic Machines and Robots", 2008, sec. 3.4). One [`Curve`] gives time as a
-//! function of distance for both ends. A segment of `n` pulses lasts exactly as long as the curve, so errors
-//! never accumulate. Short distances reduce top speed and bend.
+//! The speed rises from the start speed with limited jerk (bend), constant acceleration (straight), and a bend into the
+//! top speed; the end mirrors this (seven-phase profile of L. Biagiotti and C. Melchiorri, "Trajectory Planning for
+//! Automatic Machines and Robots", 2008, sec. 3.4). One [`Curve`] gives time over distance for both ends. A segment of
+//! `n` pulses lasts exactly as long as the curve, so errors never accumulate. Short distances reduce top speed and
+//! bend. A stop lowers the top speed: the new curve equals the old one so far, and never needs more pulses than remain.
 //!
-//! A stop lowers the top speed: the curve to the speed reached by bending down now equals the old one so far.
-//! It never needs more pulses than remain.
-//!
-//! Single precision: 0.004 pulses; the pulse count is integer. Cost on a Cortex-M4F: some 200 instructions
-//! per segment, 600 to plan (a bisection, no root).
+//! Single precision: 0.004 pulses; the pulse count is integer. Cost on a Cortex-M4F: some 200 instructions per segment,
+//! 600 to plan (a bisection, no root).
 
 use crate::io::{SEGMENT_MAX_PULSES, SEGMENT_MAX_TICKS, STEP_TIMER_HZ, Segment};
 
 /// Slightly below the maximum, so that a rounded period still fits.
 const SEGMENT_S: f32 = 0.95e-3;
-/// Slowest speed with a pulse per segment.
+/// With a pulse per segment.
 const SLOWEST: u32 = STEP_TIMER_HZ / SEGMENT_MAX_TICKS;
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -25,12 +22,10 @@ pub(crate) struct RampLimits {
     pub(crate) start_speed: u32,
     /// Pulses/s; at least `start_speed`.
     pub(crate) speed: u32,
-    /// Pulses/s2.
     pub(crate) acceleration: u32,
     pub(crate) jerk: u32,
 }
 
-/// Speed from rest to the top as a function of time, and its integral.
 #[derive(Clone, Copy, PartialEq, Debug)]
 struct Curve {
     start: f32,
@@ -129,14 +124,12 @@ pub(crate) fn braking(limits: &RampLimits) -> u32 {
     ceil(Curve::fit(limits, u32::MAX).way)
 }
 
-/// Progressive plan of a distance.
 #[derive(Clone, Debug)]
 pub(crate) struct Ramp {
     curve: Curve,
     speed: u32,
     total: u32,
     planned: u32,
-    /// Pulses of rise and fall.
     rise: u32,
     fall: u32,
     /// Position on the curve: time from rest while rising, to rest while falling.
@@ -248,7 +241,6 @@ fn ends(curve: &Curve, pulses: u32) -> (u32, u32) {
     (way.min(pulses - pulses / 2), way.min(pulses / 2))
 }
 
-/// Rounds up; saturates.
 fn ceil(value: f32) -> u32 {
     let whole = value as u32;
     if (whole as f32) < value { whole.saturating_add(1) } else { whole }

@@ -1,5 +1,4 @@
-//! Settled: measured within a window of the target for a dwell time without interruption. Cost: a comparison
-//! and an addition per tick, a division per dwell.
+//! Settled: within a window of the target for a dwell time without interruption. Cost: one division per dwell.
 
 use farnear_protocol::{Nanometres, Settle};
 
@@ -10,7 +9,7 @@ pub(crate) struct Settling {
     window: Nanometres,
     dwell_ticks: u32,
     inside_ticks: u32,
-    /// Sum over the current dwell, and its length.
+    /// Sum and length of the current dwell.
     sum: i64,
     summed: u32,
     mean: Nanometres,
@@ -32,7 +31,6 @@ impl Settling {
         }
     }
 
-    /// Adds the error of this tick, and a position to average.
     pub(crate) fn push(&mut self, error: Nanometres, position: Nanometres) {
         if error.0.saturating_abs() > self.window.0 {
             return self.interrupt();
@@ -57,7 +55,6 @@ impl Settling {
         self.settled
     }
 
-    /// Mean position over the last dwell.
     pub(crate) const fn mean(&self) -> Nanometres {
         self.mean
     }

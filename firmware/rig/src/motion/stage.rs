@@ -1,5 +1,3 @@
-//! Both stages: two steppers and a piezo.
-
 use farnear_protocol::message::{Axis, AxisStatus, PositionState};
 use farnear_protocol::{BoardMicros, Nanometres};
 
@@ -39,7 +37,7 @@ impl Stage {
         self.fine.apply(settings.fine);
     }
 
-    /// Reads the board; `rested`: after a rest.
+    /// `rested`: after a rest.
     pub(crate) fn sense(&mut self, inputs: &Inputs, rested: bool) {
         self.coarse.sense(&inputs.coarse);
         self.lens.sense(&inputs.lens);
@@ -59,7 +57,6 @@ impl Stage {
         outputs.piezo_dac = if self.on_time { self.fine.act() } else { self.fine.played() };
     }
 
-    /// A stepper axis; `None` for the piezo.
     pub(crate) const fn stepper(&self, axis: Axis) -> Option<&Stepper> {
         match axis {
             Axis::SensorCoarse => Some(&self.coarse),
@@ -76,7 +73,6 @@ impl Stage {
         }
     }
 
-    /// A stepper axis with its settings.
     pub(crate) const fn with_numbers<'s>(
         &mut self,
         axis: Axis,
@@ -89,7 +85,6 @@ impl Stage {
         }
     }
 
-    /// By encoder or gauge.
     pub(crate) const fn measured(&self, axis: Axis) -> Nanometres {
         match self.stepper(axis) {
             Some(stepper) => stepper.measured(),
@@ -97,8 +92,7 @@ impl Stage {
         }
     }
 
-    /// Displacement of the home switch's tab by the piezo (stage A's is on the sensor plate). `None` if
-    /// unknown: homing could not find position 0.
+    /// Displacement of stage A's switch tab by the piezo. `None` if unknown: homing could not find position 0.
     pub(crate) fn carried(&self, axis: Axis) -> Option<Nanometres> {
         match axis {
             Axis::SensorCoarse => self.fine.extension(),

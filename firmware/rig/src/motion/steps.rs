@@ -1,15 +1,12 @@
-//! Conversion of positions between nanometres and STEP pulses in exact integers.
-//!
-//! A pulse is 156.25 nm = 625 / 4 nm. Absolute positions are converted, so rounding never accumulates.
-//! Nearest, halves away from zero.
+//! Exact conversion of positions between nanometres and STEP pulses of 156.25 nm = 625 / 4 nm. Absolute positions are
+//! converted, so rounding (to nearest, halves away from zero) never accumulates.
 
 use farnear_protocol::Nanometres;
 
 use crate::io::ENCODER_NM_PER_COUNT;
 use crate::settings::STEP_PM;
 
-/// Four pulses: an integer, so that one direction divides by 4 and the other fits 32 bits. 64-bit divisions
-/// take 100 instructions and more.
+/// Four pulses: an integer, so that one direction divides by 4 and the other avoids slow 64-bit divisions.
 const FOUR_STEPS_NM: i32 = 625;
 const _: () = assert!(STEP_PM as i64 * 4 == FOUR_STEPS_NM as i64 * 1_000);
 

@@ -1,7 +1,5 @@
-//! An end switch with a filter.
-//!
-//! Contacts bounce for most of a millisecond and pick up chopper noise: [`SAMPLES`] equal samples in a row
-//! change the state, at the position of the first.
+//! An end switch with a filter. Contacts bounce for most of a millisecond and pick up chopper noise: [`SAMPLES`] equal
+//! samples in a row change the state, at the position of the first.
 
 use farnear_protocol::Nanometres;
 
@@ -32,7 +30,6 @@ impl Switch {
         Self { closed: false, seen: false, opposite: 0, began: nowhere, changed: nowhere }
     }
 
-    /// Adds a sample at position `at`.
     pub(crate) fn sample(&mut self, says: bool, at: Place) {
         if !self.seen {
             (self.seen, self.closed) = (true, says);
@@ -59,7 +56,6 @@ impl Switch {
         self.opposite == 0
     }
 
-    /// Position of the last change.
     pub(crate) const fn changed(&self) -> Place {
         self.changed
     }

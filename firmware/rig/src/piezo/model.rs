@@ -1,11 +1,7 @@
-//! Calibrated piezo: stroke per code, hysteresis, creep.
-//!
-//! Hysteresis by Prandtl and Ishlinskii (K. Kuhnen, European J. Control 9, 2003, sec. 2): play operators of
-//! equal weight, half widths evenly up to a quarter of the stroke, and a linear share that closes the loop.
-//! Creep by first-order lags a decade apart. Each is an approximation with one measured figure; the observer
-//! learns the rest.
-//!
-//! Fixed point of the fine loop. Cost: 12 comparisons and 6 multiplications a tick.
+//! Calibrated piezo: stroke per code, hysteresis, creep. Hysteresis by Prandtl and Ishlinskii (K. Kuhnen, European J.
+//! Control 9, 2003, sec. 2): play operators of equal weight, half widths evenly up to a quarter of the stroke, and a
+//! linear share that closes the loop. Creep by first-order lags a decade apart. Each is an approximation with one
+//! measured figure; the observer learns the rest. Cost: 12 comparisons and 6 multiplications a tick.
 
 use farnear_protocol::Nanometres;
 
@@ -15,7 +11,6 @@ use crate::io::{DAC_CODE_MAX, DAC_FULL_SCALE_NM};
 /// Stroke that the model's figures refer to.
 const STROKE: i32 = DAC_FULL_SCALE_NM << BITS;
 const PLAYS: usize = 6;
-/// Half width of play `i`.
 const fn half_width(i: usize) -> i32 {
     STROKE / 4 / PLAYS as i32 * (i as i32 + 1)
 }
@@ -26,7 +21,6 @@ const LAGS: [u32; 3] = [9, 12, 16];
 /// Additional fraction bits of a lag.
 const LAG_BITS: u32 = 16;
 
-/// Conversion of gauge readings to positions.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct GaugeScale {
     offset: i32,
@@ -45,7 +39,6 @@ impl GaugeScale {
     }
 }
 
-/// Conversion between codes and commanded stroke.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct Scale {
     /// Codes per unit of command, times 2^32.
@@ -106,7 +99,6 @@ impl Lag {
         Self { play_weight, creep_weight, plays, crept: [0; LAGS.len()], creep: 0, offset: 0 }
     }
 
-    /// The same state with other figures.
     pub(crate) const fn with(&self, hysteresis_ppm: u32, creep_ppm_per_decade: u32) -> Self {
         let [play_weight, creep_weight] = weights(hysteresis_ppm, creep_ppm_per_decade);
         Self { play_weight, creep_weight, ..*self }
@@ -116,13 +108,11 @@ impl Lag {
         self.offset
     }
 
-    /// Lag after this command.
     pub(crate) fn ahead(&self, command: i32) -> i32 {
         let command = command.clamp(0, STROKE); // no other can be played
         self.hysteresis(command, &self.moved(command)).saturating_add(self.creep)
     }
 
-    /// Advances a tick with this command.
     pub(crate) fn push(&mut self, command: i32) {
         self.plays = self.moved(command);
         for (crept, shift) in self.crept.iter_mut().zip(LAGS) {
@@ -148,8 +138,8 @@ impl Lag {
     }
 }
 
-/// In mid-stroke all plays are used up, half a width below the line through the ends upwards and above it
-/// downwards: the loop's width is the sum of all plays times their weight.
+/// In mid-stroke all plays are used up, half a width below the line through the ends upwards and above it downwards:
+/// the loop's width is the sum of all plays times their weight.
 const fn weights(hysteresis_ppm: u32, creep_ppm_per_decade: u32) -> [i64; 2] {
     let play = ((hysteresis_ppm as i64) << 40) / 1_000_000 / (2 * HALF_WIDTHS);
     let creep = ((creep_ppm_per_decade as i64) << 24) / 1_000_000;

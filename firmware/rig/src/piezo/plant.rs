@@ -2,7 +2,6 @@
 
 use crate::io::{GAUGE_CODE_MAX, GAUGE_CODE_ZERO};
 
-/// Properties of a piezo.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Part {
     pub(crate) resonance_hz: f64,
@@ -19,7 +18,6 @@ pub(crate) struct Part {
 pub(crate) const NOMINAL: Part =
     Part { resonance_hz: 200.0, hysteresis: 0.0, creep: 0.0, latency_us: 40, second: (700.0, 0.0) };
 
-/// Stepped at 10 us.
 pub(crate) struct Plant {
     part: Part,
     /// Prandtl-Ishlinskii play operators: half widths and states, nm.
@@ -75,7 +73,6 @@ impl Plant {
         Some(code.round().clamp(0.0, f64::from(GAUGE_CODE_MAX)) as u32)
     }
 
-    /// One control tick with this code, or none.
     pub(crate) fn tick(&mut self, code: Option<u16>) {
         let before = self.part.latency_us / 10;
         self.run(before);

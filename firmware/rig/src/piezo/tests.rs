@@ -6,7 +6,7 @@ use crate::piezo::plant::{NOMINAL, Part, Plant};
 use crate::settings::{Settings, Values};
 use farnear_protocol::message::SettingKey;
 
-/// Moves; returns the ticks until the plant stays within 50 nm, and its largest overshoot in nm.
+/// Returns the ticks until the plant stays within 50 nm, and its largest overshoot in nm.
 fn step(piezo: &mut Piezo, plant: &mut Plant, target: i32) -> (usize, f64) {
     let up = f64::from(target) > plant.at();
     piezo.go(Nanometres(target));
@@ -39,7 +39,7 @@ fn far_to_near_is_inside_50_nm_within_15_ms_whatever_the_part_is_like() {
     ];
     let blind = Settings::DEFAULT.fine;
     let calibrated = FineSettings { hysteresis_ppm: 120_000, creep_ppm_per_decade: 15_000, ..blind };
-    // All errors at once are too much for an uncalibrated piezo: 16 ms.
+    // All errors together are too much for an uncalibrated piezo: 16 ms.
     let worst = Part { resonance_hz: 190.0, hysteresis: 0.12, creep: 0.015, ..NOMINAL };
     for (part, settings) in parts.map(|part| (part, blind)).into_iter().chain([(worst, calibrated)]) {
         for seed in 1..4 {

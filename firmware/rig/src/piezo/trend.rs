@@ -1,7 +1,7 @@
 //! The piezo's disturbance during a rest, when the observer does not run.
 
-/// Disturbance and drift. The observer's own values follow the gauge's noise, so a rest uses two means of 128
-/// and 1,024 ticks, which lag a ramp by as many ticks of drift.
+/// Disturbance and drift. The observer's values follow the gauge's noise, so a rest uses means of 128 and 1,024 ticks,
+/// which lag ramps.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Trend {
     /// With [`Self::BITS`] more.
@@ -14,7 +14,6 @@ impl Trend {
     const SHORT: u32 = 7;
     const LONG: u32 = 10;
 
-    /// Disturbance and drift per tick, with [`Self::BITS`] more.
     pub(super) const fn new(disturbance: i64, drift: i64) -> Self {
         Self { short: disturbance - (drift << Self::SHORT), long: disturbance - (drift << Self::LONG) }
     }

@@ -1,8 +1,6 @@
-//! Timing of a continuous run: due times and counts.
-//!
-//! Frame k is due a whole number of periods after the first, so delays never accumulate. Triggers are ordered
-//! a tick ahead and rise by compare match, exact to the microsecond. If position or camera are not ready, the
-//! period passes and the same shot is due next.
+//! Timing of a continuous run: due times and counts. Frame k is due a whole number of periods after the first, so
+//! delays never accumulate. Triggers are ordered a tick ahead and rise by compare match, exact to the microsecond. If
+//! position or camera are not ready, the period passes and the same shot is due next.
 
 use farnear_protocol::{BoardMicros, Micros};
 
@@ -17,11 +15,10 @@ const UNANSWERED_MAX: u8 = 3;
 pub(crate) struct Pace {
     /// 0 = as fast as possible.
     period: Micros,
-    /// Number of exposures; 0 = endless.
+    /// 0 = endless.
     wanted: u32,
     taken: u32,
     dropped: u32,
-    /// Next frame.
     frame: u32,
     /// A frame and its time, the reference of all others.
     begin: Option<(u32, BoardMicros)>,
@@ -50,7 +47,6 @@ impl Pace {
         self.begin.is_some()
     }
 
-    /// Schedules the next frame at this time; returns its number.
     pub(crate) fn take(&mut self, due: BoardMicros) -> u32 {
         if self.period.0 > 0 {
             self.begin.get_or_insert((self.frame, due));
@@ -58,7 +54,6 @@ impl Pace {
         self.pass()
     }
 
-    /// Skips the next frame; returns its number.
     pub(crate) const fn drop_frame(&mut self) -> u32 {
         self.dropped = self.dropped.saturating_add(1);
         self.pass()
@@ -77,14 +72,13 @@ impl Pace {
         (self.taken == self.wanted).then_some((self.taken, self.dropped))
     }
 
-    /// A trigger was not answered: drops its frame. Returns whether to continue.
+    /// Drops the frame of an unanswered trigger. Returns whether to continue.
     pub(crate) const fn unanswered(&mut self) -> bool {
         self.dropped = self.dropped.saturating_add(1);
         self.unanswered += 1; // at most to its limit, which ends the run
         self.unanswered < UNANSWERED_MAX
     }
 
-    /// Restarts the timing after a pause.
     pub(crate) const fn begin_anew(&mut self) {
         self.begin = None;
     }

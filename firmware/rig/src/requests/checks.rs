@@ -60,7 +60,7 @@ impl Rig {
         }
     }
 
-    /// Lowest position of an axis' current move.
+    /// Lowest position of the current move.
     pub(super) fn lowest(&self, axis: Axis) -> Nanometres {
         let Some(stepper) = self.stage.stepper(axis) else { return self.stage.fine.lowest() };
         let lowest = stepper.lowest();
@@ -80,8 +80,7 @@ impl Rig {
         Nanometres(lowest.0.saturating_sub(carried.0.max(0)))
     }
 
-    /// Checks the distance of sensor and lens for a routine with all its axes at their extreme: each alone
-    /// may pass while all together violate it.
+    /// Distance for a routine with all its axes at their extreme: each alone may pass while all together violate it.
     pub(super) fn routine_must_not_come_close(&self, axes: &[Axis]) -> Result<(), RequestError> {
         let piezo_relaxes = axes.contains(&Axis::SensorFine);
         let extreme = |axis| {
@@ -106,14 +105,12 @@ impl Rig {
         self.with_approach(axis, target).min(self.stage.measured(axis))
     }
 
-    /// Lowest position with an approach from below.
     pub(super) fn with_approach(&self, axis: Axis, target: Nanometres) -> Nanometres {
         let approach = self.stage.stepper(axis).map_or(0, |stepper| stepper.approach().0);
         Nanometres(target.0.saturating_sub(approach))
     }
 
-    /// Sensor and lens stay apart with an axis at its lowest and the others on their ways. Moving apart is
-    /// always permitted.
+    /// Sensor and lens stay apart with an axis at its lowest and the others moving. Moving apart is permitted.
     pub(super) fn must_not_come_close(&self, axis: Axis, lowest: Nanometres) -> Result<(), RequestError> {
         let homed = self.stage.state(axis) == PositionState::Homed;
         if homed && lowest >= self.stage.measured(axis) {
@@ -122,7 +119,7 @@ impl Rig {
         self.must_be_apart(|other| if other == axis { lowest } else { self.lowest(other) })
     }
 
-    /// Smallest distance of sensor and lens at these positions.
+    /// The smallest distance of sensor and lens at these positions.
     pub(super) fn must_be_apart(&self, position: impl Fn(Axis) -> Nanometres) -> Result<(), RequestError> {
         let min = self.settings.distance_min;
         let distance = sensor_distance_nm(self.settings.datum, position);

@@ -72,7 +72,7 @@ impl Rig {
         self.run(Some(Pace::new(period, exposures)), request, now)
     }
 
-    /// Runs the armed program; endless with a pace.
+    /// Endless with a pace.
     fn run(&mut self, pace: Option<Pace>, (request, silence): (u32, Micros), now: BoardMicros) -> Answer {
         self.may_move(silence)?;
         self.all_must_be_free()?;
@@ -80,8 +80,7 @@ impl Rig {
         let Some(first) = self.shots.get(0).copied().filter(|_| count > 0) else {
             return Err(RequestError::Program { state: self.program_status().state });
         };
-        // Axes may have moved or lost their positions since arming. The second round starts where the first
-        // ends.
+        // Axes may have moved since arming. The second round starts where the first ends.
         self.check_program(count, if pace.is_some() { 2 } else { 1 })?;
         let first = (first, self.shots.light(0));
         let run = Run::start((count, first), pace, &mut self.stage, &self.settings, now);
@@ -89,7 +88,6 @@ impl Rig {
         Ok(Response::Accepted)
     }
 
-    /// Checks the first `count` shots for this number of rounds.
     pub(super) fn check_program(&self, count: u8, rounds: u8) -> Result<(), RequestError> {
         if count == 0 || usize::from(count) > SHOTS_MAX {
             return Err(RequestError::Shot { index: count, reason: ShotFault::Index });

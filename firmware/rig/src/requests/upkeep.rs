@@ -38,7 +38,6 @@ impl Rig {
         Ok(Response::Setting(self.values.setting(key)))
     }
 
-    /// Applies and stores changed settings.
     pub(crate) fn apply_settings(&mut self) {
         self.settings = self.parts.with(&self.values);
         self.stage.apply(&self.settings);

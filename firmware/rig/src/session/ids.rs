@@ -1,12 +1,8 @@
-//! Request ids.
-//!
-//! Ids increase over a boot. A delayed request may arrive after later ones, so the last [`IDS`] ids are
-//! tracked (anti-replay window of IPsec, RFC 4303, section 3.4.3); older ones count as used. Cost: twelve
-//! bytes, a few operations per request.
+//! Request ids. Ids increase over a boot. A delayed request may arrive after later ones, so the last [`IDS`] ids are
+//! tracked (anti-replay window of IPsec, RFC 4303, section 3.4.3); older ones count as used. Cost: twelve bytes.
 
 use farnear_protocol::message::ID_STEP_MAX;
 
-/// Tracked ids.
 pub(super) const IDS: u32 = u64::BITS;
 
 #[derive(Clone, Copy, Debug)]
@@ -36,7 +32,6 @@ impl Ids {
         }
     }
 
-    /// Marks a new id as used.
     pub(super) fn take(&mut self, id: u32) {
         if id > self.last {
             self.used = self.used.checked_shl(id - self.last).unwrap_or(0) | 1;
@@ -46,7 +41,7 @@ impl Ids {
         }
     }
 
-    /// Starts a session with this id: lower ones belong to earlier sessions.
+    /// Lower ids belong to earlier sessions.
     pub(super) fn begin(&mut self, id: u32) {
         *self = Self { last: id.max(self.last), used: u64::MAX };
     }

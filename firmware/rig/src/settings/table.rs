@@ -12,7 +12,6 @@ pub(crate) const KEYS: usize = SettingKey::ALL.len();
 pub struct Values([i32; KEYS]);
 
 impl Values {
-    /// Factory defaults.
     pub const DEFAULT: Self = {
         let mut values = [0; KEYS];
         let mut i = 0;
@@ -40,8 +39,7 @@ impl Values {
         Setting { key, value: self.get(key), default, min, max }
     }
 
-    /// Changes a setting.
-    /// Errors: the setting with its range.
+    /// Changes a setting, or returns it with its range if `value` is outside.
     pub fn set(&mut self, key: SettingKey, value: i32) -> Result<(), Setting> {
         let setting = self.setting(key);
         if !(setting.min..=setting.max).contains(&value) {
@@ -74,7 +72,6 @@ impl Values {
     }
 }
 
-/// Keys of an axis' position limits.
 const fn limit_keys(axis: Axis) -> (SettingKey, SettingKey) {
     match StepperKeys::of(axis) {
         Some(StepperKeys { min, max, .. }) => (min, max),
@@ -125,13 +122,11 @@ const fn range(key: SettingKey) -> (i32, i32, i32) {
 
 /// The micrometers' travel; the far switches sit beyond it.
 const TRAVEL_NM: i32 = 13_000_000;
-/// 5 um at each end of the 200 um stroke are reserved for the loop: hysteresis and creep move the ends, and a
-/// saturated amplifier cannot damp the resonance.
+/// 5 um at each end of the stroke are the loop's: hysteresis and creep move the ends, and saturation prevents damping.
 const FINE_MIN_NM: i32 = 5_000;
 const FINE_MAX_NM: i32 = 195_000;
 
 impl Settings {
-    /// Applies the settings' values.
     pub const fn with(mut self, values: &Values) -> Self {
         self.datum = Nanometres(values.get(SettingKey::DatumNm));
         self.distance_min = Nanometres(values.get(SettingKey::DistanceMinNm));

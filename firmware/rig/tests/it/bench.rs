@@ -1,7 +1,6 @@
-//! A rig on the bench: the behaviour under test, a small model of its hardware, and a host's end of the link.
-//!
-//! The hardware model is as simple as the tests allow (a resonant piezo without hysteresis, a screw with play); the
-//! emulated board's plant is the thorough one.
+//! A rig on the bench: the behaviour under test, a small hardware model, and the host's end of the link. The model is
+//! as simple as the tests allow (a resonant piezo without hysteresis, a screw with play); the emulated board's is
+//! thorough.
 
 pub mod hardware;
 pub mod motor;
@@ -15,26 +14,21 @@ use farnear_protocol::{
 use farnear_rig::io::{MEMORY_BYTES, MemoryWrite, Outputs, TICK_US};
 use farnear_rig::{Identity, Rig};
 
-/// Boot number of the bench.
 pub const BOOT: u32 = 7;
 
-/// The session that the bench opens.
 pub const SESSION: u32 = 0x5e55_1001;
 
-/// Silence that the bench's requests allow: longer than any of its work.
+/// Longer than any of the bench's work.
 pub const SILENCE: Micros = Micros(60_000_000);
 
-/// A move.
 pub fn go(axis: Axis, nm: i32) -> Request {
     Request::Move { axis, target: Nanometres(nm), silence: SILENCE }
 }
 
-/// A homing.
 pub fn home(axis: Axis) -> Request {
     Request::Home { axis, silence: SILENCE }
 }
 
-/// What a piece of work failed with.
 pub fn failure(end: &EventKind) -> Failure {
     match end {
         EventKind::Failed { reason, .. } => *reason,
@@ -42,10 +36,8 @@ pub fn failure(end: &EventKind) -> Failure {
     }
 }
 
-/// What a request was answered.
 pub type Answer = Result<Response, RequestError>;
 
-/// The rig, its hardware and its host.
 pub struct Bench {
     pub rig: Rig,
     pub hardware: Hardware,
@@ -54,28 +46,25 @@ pub struct Bench {
     /// The next write to the FRAM ends after this many bytes; whether one has.
     pub tear: Option<usize>,
     pub torn: bool,
-    /// The power goes when this many more bytes have been written to the FRAM; nothing is written after that.
+    /// Power fails when this many more bytes have been written to the FRAM.
     pub cut_after: Option<usize>,
     pub now: u64,
     pub next_id: u32,
     decoder: Decoder,
-    /// Answers in the order they came.
     pub answers: Vec<(u32, Answer)>,
-    /// Events in the order they came.
     pub events: Vec<(u32, Event)>,
-    /// When the rig asked for its reset.
     pub reset_at: Option<u64>,
-    /// Frames are left in the rig while this is set.
+    /// Leave frames in the rig.
     pub deaf: bool,
 }
 
 impl Bench {
-    /// A rig whose stage A stands at `position_um` from its home switch, with a blank memory.
+    /// Stage A at `position_um` from its home switch, with a blank memory.
     pub fn new(position_um: f64) -> Self {
         Self::with_memory(position_um, Box::new([0; MEMORY_BYTES]))
     }
 
-    /// A rig whose memory holds something.
+    /// As [`Self::new`] with memory contents.
     pub fn with_memory(position_um: f64, memory: Box<[u8; MEMORY_BYTES]>) -> Self {
         let rig = Rig::new(identity(BOOT, ResetCause::Pin), Some(&memory), BoardMicros(0));
         let mut bench = Self {
@@ -107,7 +96,7 @@ impl Bench {
         assert_eq!(self.answers.pop(), Some((id, Ok(Response::Accepted))));
     }
 
-    /// The power goes and comes: `boot` is what retained RAM proposes, 1 where it lost that.
+    /// Power cycle: `boot` is the number in retained RAM, 1 if lost.
     pub fn restart(&mut self, boot: u32, cause: ResetCause) {
         self.hardware.power_off();
         self.rig = Rig::new(identity(boot, cause), Some(&self.memory), BoardMicros(0));
@@ -118,14 +107,12 @@ impl Bench {
         self.open_session();
     }
 
-    /// Writes what a board writes before it says anything.
     fn keep_boot(&mut self) {
         while let Some(write) = self.rig.keep_boot() {
             self.write(&write);
         }
     }
 
-    /// Writes to the FRAM, as long as there is power.
     fn write(&mut self, write: &MemoryWrite) {
         let at = usize::from(write.address);
         let written = self.tear.take().map_or(write.bytes.len(), |bytes| bytes.min(write.bytes.len()));
@@ -141,7 +128,6 @@ impl Bench {
         self.memory[at..at + written].copy_from_slice(&write.bytes[..written]);
     }
 
-    /// Stage A homed and ready.
     pub fn homed() -> Self {
         let mut bench = Self::new(800.0);
         let end = bench.work(&home(Axis::SensorCoarse));
@@ -149,7 +135,6 @@ impl Bench {
         bench
     }
 
-    /// Both stages homed and ready.
     pub fn both_homed() -> Self {
         let mut bench = Self::homed();
         let end = bench.work(&home(Axis::Lens));
@@ -157,12 +142,10 @@ impl Bench {
         bench
     }
 
-    /// The alarm that is latched.
     pub fn alarm(&mut self) -> Option<Alarm> {
         self.status().alarm.map(|record| record.alarm)
     }
 
-    /// Clears the latched alarm.
     pub fn clear(&mut self) {
         let number = self.status().alarm.expect("an alarm is latched").number;
         self.accepted(&Request::ClearAlarm { number });
@@ -185,7 +168,7 @@ impl Bench {
         outputs
     }
 
-    /// A calculation takes some ticks; then they are made up for, 5 us apart.
+    /// Ticks delayed by a calculation follow 5 us apart.
     pub fn catch_up(&mut self, ticks: u64) {
         for _ in 0..ticks {
             self.hardware.swing();
@@ -204,7 +187,6 @@ impl Bench {
         }
     }
 
-    /// Takes the rig's frames.
     pub fn collect(&mut self) {
         while let Some(frame) = self.rig.transmit() {
             for byte in frame {
@@ -230,7 +212,6 @@ impl Bench {
         }
     }
 
-    /// Puts bytes on the line.
     pub fn send_bytes(&mut self, bytes: &[u8]) {
         for byte in bytes {
             self.rig.receive(*byte);
@@ -238,13 +219,12 @@ impl Bench {
         }
     }
 
-    /// Sends a request under an id, as it is made for `boot`.
+    /// `boot` is the request's boot number.
     pub fn send_as(&mut self, id: u32, boot: u32, request: &Request) {
         self.send_bytes(&request_frame(id, boot, SESSION, request));
         self.next_id = self.next_id.max(id + 1);
     }
 
-    /// Asks, and gives the id and the answer.
     pub fn ask(&mut self, request: &Request) -> (u32, Answer) {
         let id = self.next_id;
         (id, self.ask_as(id, self.boot, request))
@@ -259,7 +239,6 @@ impl Bench {
         answer
     }
 
-    /// Asks for something that must be accepted; gives its id.
     pub fn accepted(&mut self, request: &Request) -> u32 {
         let (id, answer) = self.ask(request);
         assert_eq!(answer, Ok(Response::Accepted), "{request:?}");
@@ -280,7 +259,7 @@ impl Bench {
         }
     }
 
-    /// Ticks until long work has ended; gives its terminal event.
+    /// Ticks until long work has ended; returns its terminal event.
     pub fn end_of(&mut self, id: u32) -> EventKind {
         for _ in 0..30 * 5_000 {
             if let Some(end) = self.events.iter().map(|(_, event)| &event.kind).find(|kind| ends(kind, id)) {
@@ -291,20 +270,18 @@ impl Bench {
         panic!("request {id} did not end within 30 s; events: {:?}", self.events);
     }
 
-    /// Asks for long work and waits for its end.
+    /// Requests long work and waits for its end.
     pub fn work(&mut self, request: &Request) -> EventKind {
         let id = self.accepted(request);
         self.end_of(id)
     }
 }
 
-/// The frame of a request.
 pub fn request_frame(id: u32, boot: u32, session: u32, request: &Request) -> Encoded {
     let header = Header { version: PROTOCOL_CURRENT, kind: Kind::Request, id, boot };
     frame::encode(header, &Call { session, request: request.clone() }).expect("every request fits")
 }
 
-/// Who the bench's board is.
 pub fn identity(boot: u32, reset_cause: ResetCause) -> Identity {
     Identity {
         board: "bench",
@@ -319,7 +296,6 @@ pub fn identity(boot: u32, reset_cause: ResetCause) -> Identity {
     }
 }
 
-/// Whether an event is the terminal event of a request.
 pub fn ends(kind: &EventKind, id: u32) -> bool {
     match kind {
         EventKind::Homed { request, .. }
@@ -333,7 +309,6 @@ pub fn ends(kind: &EventKind, id: u32) -> bool {
 }
 
 impl Bench {
-    /// Reads an event through the link, which is clean here; `None` if it does not exist.
     pub fn rig_event(&mut self, number: u32) -> Option<EventKind> {
         let deaf = std::mem::replace(&mut self.deaf, false);
         let answer = self.ask(&Request::ReadEvent { number }).1;

@@ -1,4 +1,4 @@
-//! The calibration routines through the rig's public face.
+//! The calibration routines through the public interface.
 
 use crate::bench::motor::{FAR_SWITCH_UM, PLAY, STEP_UM};
 use crate::bench::{self, Bench, SILENCE, failure, go, home};
@@ -53,7 +53,7 @@ fn the_backlash_is_found_kept_and_taken_out() {
         let end = bench.work(&calibrate(Routine::Backlash { axis }));
         let Calibration::Backlash { backlash, spread, .. } = result(&end) else { panic!("{end:?}") };
         let truth = PLAY as f64 * STEP_UM;
-        // The switch is read once in 200 us at a pulse a millisecond: half a step at each edge, and the encoder's count.
+        // The switch is read every 200 us at a pulse a millisecond: half a step at each edge, and a count.
         assert!((f64::from(backlash.0) / 1e3 - truth).abs() <= 0.35, "{backlash:?} for {truth} um");
         assert!(spread.0 <= 300, "{spread:?}");
         assert_eq!(setting(&mut bench, key), backlash.0);
@@ -132,7 +132,7 @@ fn a_dead_gauge_ends_the_sweep_and_a_missing_switch_the_travel() {
 
 #[test]
 fn stage_a_is_homed_only_where_it_is_known_how_far_the_piezo_holds_its_switch_away() {
-    // Found by the campaign: a gauge that died while the piezo was led down was believed, and position 0 lay 59 um off.
+    // Found by the campaign: a gauge that failed while the piezo was lowered was used, and position 0 was off by 59 um.
     let mut bench = Bench::homed();
     bench.work(&go(Axis::SensorFine, 100_000));
     bench.hardware.faults.gauge = Some(None);
@@ -144,7 +144,7 @@ fn stage_a_is_homed_only_where_it_is_known_how_far_the_piezo_holds_its_switch_aw
     assert!(
         matches!(bench.work(&home(Axis::SensorCoarse)), EventKind::Homed { shift, .. } if shift.0.abs() < 5_000)
     );
-    // One that was led down holds nothing away, for any last gauge reading.
+    // A lowered piezo displaces nothing, for any last gauge reading.
     bench.restart(2, ResetCause::Software);
     bench.run_ms(50);
     bench.hardware.faults.gauge = Some(None);

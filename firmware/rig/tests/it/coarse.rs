@@ -1,4 +1,4 @@
-//! The stepper axes through the rig's public face: homing, moves, stops, and everything that can go wrong.
+//! Stepper axes through the public interface: homing, moves, stops and faults.
 
 use crate::bench::motor::MotorFaults as Faults;
 use crate::bench::{self, Bench, SILENCE, failure};
@@ -103,7 +103,7 @@ fn a_stop_brakes_and_the_position_is_still_known() {
         let edges = bench.hardware.coarse.edges;
         bench.run_ms(20);
         assert_eq!(bench.hardware.coarse.edges, edges, "still after the terminal event");
-        // A move after a stop just works, and lands exactly.
+        // A move after a stop is exact.
         let end = bench.work(&go(100_000));
         assert!(matches!(end, EventKind::MoveDone { .. }), "{end:?}");
         assert!((bench.hardware.position_um() - 100.0).abs() < 0.5, "{}", bench.hardware.position_um());
@@ -126,7 +126,7 @@ fn a_second_work_is_refused_while_the_first_runs() {
     assert!(matches!(bench.end_of(request), EventKind::MoveDone { .. }));
 }
 
-/// Breaks the hardware 100 ms into a move; gives the failure, the time until the last edge after it, the bench.
+/// Breaks the hardware 100 ms into a move; returns the failure, the time to the last edge, and the bench.
 fn break_in_motion(faults: Faults) -> (Failure, f64, Bench) {
     let mut bench = Bench::homed();
     let id = bench.accepted(&go(9_000_000));
@@ -154,7 +154,7 @@ fn a_stall_is_detected_and_invalidates_the_position() {
     bench.clear();
     let lost = RequestError::NotHomed { axis: Axis::SensorCoarse, state: PositionState::Lost };
     assert_eq!(bench.ask(&go(0)).1, Err(lost));
-    // Still blocked: homing reports it, too. Freed: homing makes it known again, and the encoder was right all along.
+    // Still blocked: homing reports it too. Freed: homing succeeds, and the encoder was right.
     assert!(matches!(failure(&bench.work(&HOME)), Failure::Following { .. }));
     bench.clear();
     bench.hardware.coarse.faults = Faults::default();
@@ -238,8 +238,7 @@ fn switches_that_do_not_work_end_the_homing() {
     assert_eq!(bench.status().coarse.state, PositionState::Unknown);
 }
 
-/// How a homing from `start_um` ends. `says` gets where the stage was a millisecond ago and is, and gives what the switch says instead
-/// of the truth.
+/// End of a homing from `start_um`. `says` maps the stage's positions a millisecond ago and now to the switch's state.
 fn home_with(start_um: f64, mut says: impl FnMut(f64, f64) -> Option<bool>) -> (EventKind, Bench) {
     let mut bench = Bench::new(start_um);
     let id = bench.accepted(&HOME);

@@ -1,4 +1,4 @@
-//! Continuous capture through the rig's public interface: period, dropped frames, and the end.
+//! Continuous capture through the public interface: period, dropped frames, and the end.
 
 use crate::bench::{Bench, SILENCE, go};
 use farnear_protocol::message::{
@@ -40,7 +40,7 @@ const fn run(period: u64, exposures: u32) -> Request {
     Request::RunContinuously { period: Micros(period as u32), exposures, silence: SILENCE }
 }
 
-/// What became of each frame, which must follow each other without a gap.
+/// Result of each frame, numbered without a gap.
 fn frames(bench: &Bench) -> Vec<Result<(Nanometres, ShotRecord), DropReason>> {
     let mut found = Vec::new();
     for (_, event) in &bench.events {
@@ -179,7 +179,7 @@ fn a_pace_faster_than_the_camera_and_a_cycle_that_ends_too_close_are_refused() {
     pair(&mut bench);
     let min = Micros(EXPOSURE + 10_500);
     assert_eq!(bench.ask(&run(15_499, 0)).1, Err(RequestError::Period { min }));
-    // Each shot is possible once; in the second round the coarse stage would come down on the lens.
+    // Each shot is possible once; in the second round the coarse stage would hit the lens.
     let key = SettingKey::DistanceMinNm;
     assert!(matches!(
         bench.ask(&Request::WriteSetting { key, value: 47_500_000 }).1,

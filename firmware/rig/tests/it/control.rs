@@ -17,7 +17,7 @@ use farnear_rig::settings::Settings;
 use self::fake::{Call, Fake};
 use crate::bench::{self, BOOT};
 
-/// All that happens in a tick in which there is an event and a line of the log to send.
+/// All calls of a tick with an event and a line of the log to send.
 const TICK: [Call; 13] = [
     Call::SampleGauge,
     Call::Receive,
@@ -61,7 +61,7 @@ fn run(control: &mut Control<'_>, fake: &mut Fake, ticks: usize) {
     }
 }
 
-/// A tick, and the time until the next; gives it in ticks.
+/// Returns the time until the next tick, in ticks.
 fn tick(control: &mut Control<'_>, fake: &mut Fake) -> u32 {
     let due = control.tick(fake);
     (0..due).for_each(|_| fake.pass());
@@ -104,8 +104,7 @@ fn whatever_hangs_in_a_tick_leaves_the_watchdog_hungry() {
     }
 }
 
-/// The circuit cuts the pulses by itself. Read too early it would still look closed in the tick in which a step timer
-/// shows that it stands.
+/// The circuit cuts the pulses: read too early, it would look closed when the timer already shows a stop.
 #[test]
 fn a_circuit_that_opens_between_two_readings_is_not_told_as_a_late_step() {
     for moment in [Call::Receive, Call::Gauge, Call::Coarse, Call::Lens, Call::EmergencyStop, Call::Apply] {
@@ -147,7 +146,7 @@ fn a_rig_at_rest_is_looked_at_rarely_until_somebody_speaks_or_something_moves() 
     assert!(awake(&mut control, &mut fake) >= quiet);
     run(&mut control, &mut fake, 9);
     assert!((0..100).all(|_| tick(&mut control, &mut fake) == REST_TICKS));
-    // Noise is not a request, but who makes it may be about to speak.
+    // Noise is not a request, but its sender may be about to send one.
     fake.hear(&[1, 0]);
     assert!(awake(&mut control, &mut fake) >= quiet);
     // A request is answered without another rest.
@@ -225,8 +224,7 @@ fn a_host_that_asks_without_a_pause_gets_the_log_too() {
     assert!(packets(&fake).iter().any(|packet| packet.header.kind == Kind::Log));
 }
 
-/// Runs a board that is asked to reboot and whose last frame takes its time; gives the microseconds from the order to
-/// the reset.
+/// Reboots a board whose last frame takes this long; returns the microseconds from order to reset.
 fn reset_after(ticks_until_sent: usize) -> u64 {
     let (mut rig, mut fake) = (rig(), Fake::new(800.0));
     let mut control = Control::new(&mut rig);
@@ -259,7 +257,7 @@ fn a_reset_does_not_wait_for_ever() {
     assert_eq!(reset_after(usize::MAX), u64::from(LAST_FRAME.0));
 }
 
-/// A board whose host has asked for the slow rate; the last frame takes three ticks on the wire.
+/// The last frame takes three ticks on the wire.
 fn asked_for_the_slow_rate(control: &mut Control<'_>, fake: &mut Fake) -> u64 {
     fake.ask(&Request::SetLinkRate { rate: LinkRate::Baud921600 });
     while fake.rates.is_empty() {

@@ -1,5 +1,4 @@
-//! Any sequence of requests on hardware that breaks at any moment, power included: nothing panics, everything ends
-//! once, and a repaired rig can always be brought back to work.
+//! Any requests on failing hardware and power: no panic, everything ends once, and a repaired rig works again.
 
 use crate::bench::motor::MotorFaults;
 use crate::bench::{self, Bench, SILENCE, ends, go, home};
@@ -10,15 +9,11 @@ use farnear_protocol::{BoardMicros, Request, RequestError};
 use farnear_rig::{Identity, Rig};
 use proptest::prelude::*;
 
-/// What happens to the rig.
 #[derive(Clone, Debug)]
 enum Deed {
     Ask(Request),
-    /// Breaks something, or repairs it.
     Break(Fault, bool),
-    /// The power goes and comes.
     PowerCycle,
-    /// The motor is turned by hand.
     Push(i64),
 }
 
@@ -109,7 +104,7 @@ proptest! {
         for _ in 0..ticks {
             bench.tick();
         }
-        // Then the next write is torn, or none comes for a while.
+        // The next write is torn, or none comes for a while.
         bench.tear = Some(tear);
         for _ in 0..20 {
             bench.tick();
@@ -140,12 +135,12 @@ proptest! {
     }
 }
 
-/// Every axis can be homed and moved, and is where it says.
+/// Every axis can be homed and moved, with the right position.
 fn works_again(bench: &mut Bench) -> Result<(), TestCaseError> {
     for axis in [Axis::SensorCoarse, Axis::Lens] {
         let mut end = bench.work(&home(axis));
         if matches!(end, EventKind::Failed { reason: Failure::Following { .. }, .. }) {
-            // Pushed just so far at rest that the next step was too much. That is known now.
+            // A push at rest within tolerance can make the next step fail. That is reported now.
             bench.clear();
             end = bench.work(&home(axis));
         }
@@ -179,7 +174,7 @@ proptest! {
                     if let (true, Some(alarm)) = (long, latched) {
                         let number = alarm.number;
                         let refused = matches!(&answer, Err(RequestError::Alarm { number: of, .. }) if *of == number);
-                        // What can never be is refused as that.
+                        // Impossible requests are rejected as such.
                         prop_assert!(refused || matches!(
                             answer, Err(RequestError::CannotHome { .. } | RequestError::NoSuchRoutine)), "{:?}", answer);
                     }
@@ -196,7 +191,7 @@ proptest! {
             }
             bench.run_ms(pause_ms);
         }
-        // Repaired, stopped, cleared, homed: it works, and says where it is.
+        // Repaired, stopped, cleared, homed: it works with the right position.
         bench.hardware.faults = bench::hardware::Faults::default();
         (bench.hardware.coarse.faults, bench.hardware.lens.faults) = (MotorFaults::default(), MotorFaults::default());
         bench.accepted(&Request::Stop);

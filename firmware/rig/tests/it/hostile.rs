@@ -1,5 +1,5 @@
-//! A hostile link: recorded frames again and again, bursts, noise, other hosts that come and are killed, resets in between.
-//! Nothing acts twice, nothing is reported that was not done, and the next honest host works at once.
+//! A hostile link: recorded frames, bursts, noise, other hosts that connect and die, resets. Nothing acts twice,
+//! nothing is reported that was not done, and the next honest host works immediately.
 
 use std::collections::BTreeMap;
 
@@ -12,7 +12,6 @@ use farnear_protocol::{Micros, Nanometres, Request, Response};
 
 /// Hostile frames in a test run; `cargo xtask campaign` sends a million.
 const FRAMES: u64 = 20_000;
-/// Frames that the enemy has recorded and sends again.
 const RECORDED: usize = 512;
 
 struct Enemy {
@@ -29,7 +28,7 @@ impl Enemy {
         (self.random.wrapping_mul(0x2545_f491_4f6c_dd1d) >> 16) % end
     }
 
-    /// Hears what an honest host, or one that is killed later, says.
+    /// Records frames of honest hosts and of hosts killed later.
     fn record(&mut self, frame: &Encoded) {
         if self.recorded.len() < RECORDED {
             self.recorded.push(frame.clone());
@@ -58,18 +57,17 @@ impl Enemy {
     }
 }
 
-/// Valid requests by id, with their results.
 struct Ledger {
     session: u32,
-    /// Long work that was accepted: how often its end was reported.
+    /// Accepted long work: number of reported ends.
     ends: BTreeMap<u32, u32>,
-    /// The piezo's last place and the setting's last value.
+    /// The piezo's last position and the setting's last value.
     fine: i32,
     speed: i32,
     alarms: u32,
 }
 
-/// Each kind of request that does something, and one of those that only ask.
+/// Each kind of request that changes something, and one that only reads.
 fn request(ledger: &mut Ledger, enemy: &mut Enemy) -> Request {
     let silence = Micros(500_000);
     match enemy.below(15) {
@@ -116,7 +114,6 @@ const fn is_long(request: &Request) -> bool {
     )
 }
 
-/// A host opens a session, asks for some things, and is killed: says nothing more.
 fn killed_host(bench: &mut Bench, ledger: &mut Ledger, enemy: &mut Enemy) {
     ledger.session = 1 + enemy.below(u64::from(u32::MAX)) as u32;
     say(bench, ledger, enemy, &Request::OpenSession);
@@ -135,7 +132,7 @@ fn killed_host(bench: &mut Bench, ledger: &mut Ledger, enemy: &mut Enemy) {
     }
 }
 
-/// Says something in the open session, as long as there is an answer; gives its id and whether it was accepted.
+/// Requests in the open session until there is an answer; returns the id and whether it was accepted.
 fn say(bench: &mut Bench, ledger: &Ledger, enemy: &mut Enemy, request: &Request) -> (u32, bool) {
     let id = last_id(bench) + 1;
     let frame = request_frame(id, bench.rig.boot(), ledger.session, request);
@@ -152,7 +149,7 @@ fn say(bench: &mut Bench, ledger: &Ledger, enemy: &mut Enemy, request: &Request)
     panic!("no answer to {request:?}: {:?}", bench.answers);
 }
 
-/// What the board says of its last id; a delimiter in front ends what the enemy has left on the line.
+/// The board's last id; a leading delimiter ends the attacker's remainder on the line.
 fn last_id(bench: &mut Bench) -> u32 {
     for _ in 0..4 {
         bench.answers.clear();
@@ -166,7 +163,6 @@ fn last_id(bench: &mut Bench) -> u32 {
     panic!("no hello: {:?}", bench.answers);
 }
 
-/// Compares the reports with the requests.
 fn settle_accounts(bench: &mut Bench, ledger: &mut Ledger) {
     for (_, event) in bench.events.drain(..) {
         match event.kind {
@@ -202,11 +198,11 @@ fn settle_accounts(bench: &mut Bench, ledger: &mut Ledger) {
     }
 }
 
-/// An honest host comes, and everything is as the last accepted host left it.
+/// An honest host finds the state of the last accepted host.
 fn honest_host(bench: &mut Bench, ledger: &mut Ledger, enemy: &mut Enemy) {
     ledger.session = SESSION;
     assert!(say(bench, ledger, enemy, &Request::OpenSession).1, "a session is opened at once");
-    // Both stages may have been interrupted by a reset: an alarm each, one behind the other.
+    // A reset may have interrupted both stages: an alarm each.
     while let Some(alarm) = status(bench, ledger, enemy).alarm {
         let cleared = say(bench, ledger, enemy, &Request::ClearAlarm { number: alarm.number });
         assert!(cleared.1, "{alarm:?}");
@@ -222,7 +218,7 @@ fn honest_host(bench: &mut Bench, ledger: &mut Ledger, enemy: &mut Enemy) {
     assert!(accepted, "it works at once: {said:?}");
     ledger.fine = target.0;
     ledger.ends.insert(id, 0);
-    // The enemy continues meanwhile.
+    // The attack continues meanwhile.
     for _ in 0..40 {
         enemy.replay(bench, 2);
         for _ in 0..5 {
@@ -281,7 +277,7 @@ fn nothing_acts_twice_however_hostile_the_link() {
                 bench.run_ms(50);
                 settle_accounts(&mut bench, &mut ledger);
                 bench.restart(boot, ResetCause::Pin);
-                // The piezo falls back with a jump, and its gauge leaves its range until it has swung out.
+                // The piezo drops, and its gauge leaves its range until the swing ends.
                 bench.run_ms(300);
                 ledger.ends.clear();
                 resets += 1;
@@ -289,7 +285,7 @@ fn nothing_acts_twice_however_hostile_the_link() {
         }
         settle_accounts(&mut bench, &mut ledger);
         if ledger.ends.len() > 400 {
-            // The requesting host is long gone; a motion that still ran would have been reported.
+            // The requesting host is gone; a running motion would have been reported.
             let last = ledger.ends.keys().next_back().copied().unwrap_or(0);
             ledger.ends.retain(|id, _| id + 200 > last);
         }

@@ -1,4 +1,4 @@
-//! Lamp and flash through the rig's public face.
+//! Lamp and flash through the public interface.
 
 use crate::bench::{Bench, SILENCE};
 use farnear_protocol::message::{
@@ -31,7 +31,6 @@ fn flash(index: u8, light: ShotLight) -> Request {
     Request::SetShotLight { index, light: Some(light) }
 }
 
-/// A bench with both lights on.
 fn lit() -> Bench {
     let mut bench = Bench::new(700.0);
     bench.accepted(&lights(ON, LIGHT_TIME_MAX, SILENCE));

@@ -1,4 +1,4 @@
-//! The link through the rig's public interface: sessions, repeated requests, memory of answers.
+//! The link through the public interface: sessions, repeated requests, stored answers.
 
 use crate::bench::{self, BOOT, Bench, SESSION};
 use farnear_protocol::frame::{self, Header, Kind};
@@ -132,7 +132,7 @@ fn a_host_that_does_not_listen_loses_events_but_no_answers() {
     }
     bench.deaf = false;
     bench.run_ms(1);
-    // As many as were promised are answered; then as many refusals as wait; what came later was counted.
+    // The promised number is answered; then as many rejections wait; later ones are counted.
     let full = Err(RequestError::QueueFull { outstanding: outstanding as u8 });
     let ids: Vec<u32> = bench.answers.iter().map(|(id, _)| *id).collect();
     assert_eq!(ids, (first..first + outstanding + 64).collect::<Vec<_>>());
@@ -224,7 +224,7 @@ proptest! {
             }
             prop_assert!(answered, "request {}", id);
             bench.run_ms(15);
-            // Exactly one terminal event, and it is this request's, though many frames came twice.
+            // Exactly one terminal event, of this request, though many frames arrived twice.
             bench.deaf = false;
             bench.collect();
             bench.deaf = true;

@@ -1,4 +1,4 @@
-//! The rig through its public face, on a bench that models its hardware; one program for all of it.
+//! The rig through its public interface, on a bench that models its hardware, in one program.
 
 mod bench;
 mod calibration;

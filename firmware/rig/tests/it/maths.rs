@@ -1,5 +1,4 @@
-//! Mathematics over the link: the same bits as `farnear_maths` gives on the host, each request acts once, and nothing of it
-//! while a stepper moves.
+//! Mathematics over the link: the host's bits, each request acts once, and none while a stepper moves.
 
 use crate::bench::{self, Bench, go};
 use farnear_maths::clsf::{
@@ -63,7 +62,6 @@ fn correct(bench: &mut Bench, row: u16, codes: &[i16]) -> Vec<i16> {
     out
 }
 
-/// The host's own answer.
 fn reference(form: CorrectionForm, bits: &[i32], row: u16, codes: &[i16]) -> Vec<i16> {
     let frame = Frame::new(WIDTH, HEIGHT).expect("a good size");
     let coefficient = |index: usize| Coefficient::from_bits(bits[index]).expect("not i32::MIN");

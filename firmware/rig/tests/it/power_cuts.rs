@@ -1,5 +1,4 @@
-//! The power goes at any byte that is written to the memory: what was confirmed before is there afterwards, what was under way is
-//! wholly there or not at all, and nothing is silently another.
+//! Power fails at any written byte: confirmed state persists, and a pending change is complete or absent.
 
 use crate::bench::{Bench, home};
 use farnear_protocol::message::{
@@ -11,7 +10,7 @@ use std::collections::BTreeMap;
 
 /// Cuts; `cargo xtask campaign` makes ten thousand.
 const CUTS: u32 = 400;
-/// Settings that are written, whose ranges have room.
+/// Written settings, whose ranges have room.
 const KEYS: [SettingKey; 4] = [
     SettingKey::CameraReadoutUs,
     SettingKey::DatumNm,
@@ -19,11 +18,10 @@ const KEYS: [SettingKey; 4] = [
     SettingKey::CoarseBacklashNm,
 ];
 
-/// What a host may rely on.
 #[derive(Clone, PartialEq, Debug)]
 struct Known {
     settings: BTreeMap<SettingKey, i32>,
-    /// Numbers of the alarms that are latched; 0: the next one.
+    /// Numbers of the latched alarms; 0: the next one.
     alarms: Vec<u32>,
     homings: u32,
     shots: [Option<i32>; 3],
@@ -33,7 +31,7 @@ struct Known {
 struct Random(u64);
 
 impl Random {
-    /// Marsaglia's xorshift (2003), enough to choose.
+    /// Marsaglia's xorshift (2003).
     fn below(&mut self, end: u64) -> u64 {
         self.0 ^= self.0 << 13;
         self.0 ^= self.0 >> 7;
@@ -79,7 +77,7 @@ fn change(bench: &mut Bench, random: &mut Random, before: &Known) -> Known {
             after.alarms.remove(0);
         }
         5 => {
-            // The program is kept when it is armed, or loaded: whichever, the shot is there or it is not.
+            // The program is stored when armed or loaded: the shot is there or not.
             let (index, target) = (random.below(3) as u8, 20_000 + random.below(100_000) as i32);
             bench.accepted(&Request::LoadShot { index, shot: shot(target) });
             after.shots[usize::from(index)] = Some(target);
@@ -108,7 +106,6 @@ fn change(bench: &mut Bench, random: &mut Random, before: &Known) -> Known {
     after
 }
 
-/// What the board knows now.
 fn found(bench: &mut Bench) -> Known {
     let settings = KEYS
         .map(|key| match bench.ask(&Request::ReadSetting { key }).1 {
@@ -150,7 +147,7 @@ fn whenever_the_power_goes_what_was_confirmed_is_there_and_nothing_is_silently_a
     let mut known = found(&mut bench);
     let mut boot = bench.hello().boot;
     for cut in 0..cuts {
-        // Mostly within what the change writes (a hundred bytes to two thousand); sometimes within the next start's own writes.
+        // Mostly within the change's writes (a hundred bytes to two thousand); sometimes within the next start's.
         let at_start = random.below(5) == 0;
         let most = if at_start { 500 } else { [150, 400, 2_300][random.below(3) as usize] };
         let bytes = 1 + random.below(most) as usize;
@@ -158,7 +155,7 @@ fn whenever_the_power_goes_what_was_confirmed_is_there_and_nothing_is_silently_a
             bench.cut_after = Some(bytes);
             start(&mut bench);
             if !bench.torn {
-                // It has told its number.
+                // It has reported its number.
                 let told = bench.rig.boot();
                 assert!(told > boot, "boot {told} after boot {boot}");
                 boot = told;
@@ -189,7 +186,7 @@ fn whenever_the_power_goes_what_was_confirmed_is_there_and_nothing_is_silently_a
             if told {
                 expected.alarms.push(0);
             }
-            // A homing that was cut off was not counted, or was.
+            // An interrupted homing counts or does not.
             expected.homings = if moves { now.homings } else { expected.homings };
             fits(&now, &expected)
         };
@@ -209,7 +206,6 @@ fn whenever_the_power_goes_what_was_confirmed_is_there_and_nothing_is_silently_a
     assert!(old * 10 > cuts && early * 20 > cuts, "the cuts hit nothing: {old} {early}");
 }
 
-/// Power comes on; ids begin again.
 fn start(bench: &mut Bench) {
     bench.next_id = 1;
     bench.restart(1, ResetCause::PowerOn);
@@ -222,7 +218,6 @@ fn alarm((_, event): &(u32, farnear_protocol::Event)) -> Option<Alarm> {
     }
 }
 
-/// Everything that has to be alike.
 fn fits(now: &Known, expected: &Known) -> bool {
     now.settings == expected.settings
         && now.alarms.len() == expected.alarms.len()

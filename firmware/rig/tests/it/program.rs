@@ -1,4 +1,4 @@
-//! The fine axis and the exposure program through the rig's public face.
+//! The fine axis and the exposure program through the public interface.
 
 use crate::bench::{self, Bench, SILENCE};
 use farnear_protocol::message::{
@@ -320,7 +320,7 @@ fn a_pause_waits_for_the_exposure_and_a_resumed_program_settles_anew() {
     let edges = bench.hardware.coarse.edges;
     bench.run_ms(100);
     assert_eq!(bench.hardware.coarse.edges, edges, "it stands");
-    // Also on the way, and as often as one likes.
+    // Also on the way, and repeatedly.
     bench.accepted(&Request::ResumeProgram);
     bench.run_ms(200);
     bench.accepted(&Request::PauseProgram);
@@ -353,7 +353,7 @@ fn a_program_that_goes_on_while_it_still_brakes_comes_to_its_place() {
 
 #[test]
 fn a_pause_and_its_end_between_two_shots_move_to_the_next_place() {
-    // The pause comes while the first exposure is under way, its end in each of the ticks about the exposure's.
+    // The pause comes during the first exposure, its end in each of the ticks around the exposure's.
     for ticks in 0..60 {
         let mut bench = Bench::new(700.0);
         load(&mut bench, &[Shot { exposure: Micros(1_000), ..shot(FAR) }, shot(NEAR)]);

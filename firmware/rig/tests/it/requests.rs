@@ -91,7 +91,6 @@ fn maths() -> impl Strategy<Value = Request> {
     ]
 }
 
-/// Any request, sensible or not.
 fn requests() -> impl Strategy<Value = Request> {
     prop_oneof![
         1 => Just(Request::Hello),
@@ -159,7 +158,7 @@ proptest! {
         let status = bench.status();
         prop_assert_eq!([status.coarse.request, status.fine.request, status.lens.request], [None; 3]);
         for motor in [&bench.hardware.coarse, &bench.hardware.lens] {
-            // 0.5 mm of over-travel belong to the search for a switch; moves stay inside 0 to 13 mm.
+            // 0.5 mm of over-travel are for the switch search; moves stay inside 0 to 13 mm.
             prop_assert!(motor.leftmost >= -3_200, "{}", motor.leftmost);
             prop_assert!(motor.rightmost <= ((bench::motor::FAR_SWITCH_UM + 500.0) / bench::motor::STEP_UM) as i64);
             prop_assert!(motor.closest_edges_us > 24.9);

@@ -1,4 +1,4 @@
-//! What stops the rig: emergency stop, halt, the host's silence, supply, the link; and what survives the reset.
+//! Causes of a stop (emergency stop, halt, silence, supply, link), and what survives the reset.
 
 use crate::bench::{self, Answer, Bench, failure, go, home};
 use farnear_protocol::message::{
@@ -7,7 +7,7 @@ use farnear_protocol::message::{
 use farnear_protocol::{Micros, Nanometres, Request, RequestError, Response};
 use farnear_rig::{Identity, io::MEMORY_BYTES};
 
-/// Both stages in full motion and the piezo on its way; gives their requests.
+/// Both stages and the piezo in motion; returns their requests.
 fn all_moving(bench: &mut Bench) -> [u32; 3] {
     let coarse = bench.accepted(&go(Axis::SensorCoarse, 9_000_000));
     let lens = bench.accepted(&go(Axis::Lens, 8_000_000));
@@ -130,7 +130,7 @@ fn a_silent_host_is_reminded_and_then_everything_stops() {
     let reminders = times(|kind| matches!(kind, EventKind::StillThere { .. }));
     assert!(matches!(reminders[..], [at] if (149_000..151_000).contains(&at)), "{reminders:?}");
     assert_eq!(alarms(&bench)[0].alarm, Alarm::HostSilence { request: id });
-    // A host that answers the reminders moves as far as it likes.
+    // A host that answers the reminders is not limited.
     bench.clear();
     bench.work(&home(Axis::SensorCoarse));
     let id = bench.accepted(&request);
@@ -152,7 +152,7 @@ fn sensor_and_lens_are_kept_apart() {
     let min = 51_000_000;
     let answer = bench.ask(&Request::WriteSetting { key: SettingKey::DistanceMinNm, value: min }).1;
     assert!(matches!(answer, Ok(Response::Setting(setting)) if setting.value == min), "{answer:?}");
-    // 47 + 3 + 3 mm, and a way that goes 6 um lower to come from below.
+    // 47 + 3 + 3 mm, and an approach from 6 um below.
     let lens = bench.accepted(&go(Axis::Lens, 1_500_000));
     let refused = bench.ask(&go(Axis::SensorCoarse, 2_000_000)).1;
     let Err(RequestError::TooClose { distance, min: Nanometres(51_000_000) }) = refused else {
@@ -163,7 +163,7 @@ fn sensor_and_lens_are_kept_apart() {
     assert!(matches!(bench.work(&go(Axis::SensorCoarse, 2_600_000)), EventKind::MoveDone { .. }));
     assert!(matches!(bench.ask(&go(Axis::SensorCoarse, 2_500_000)).1, Err(RequestError::TooClose { .. })));
     assert!(matches!(bench.ask(&home(Axis::Lens)).1, Err(RequestError::TooClose { .. })));
-    // Apart is always allowed, also where they are too close already.
+    // Moving apart is always allowed, also when too close.
     bench
         .ask(&Request::WriteSetting { key: SettingKey::DistanceMinNm, value: 60_000_000 })
         .1
@@ -350,14 +350,14 @@ fn homing_and_the_piezos_routines_are_kept_apart_as_far_as_they_go() {
 
 #[test]
 fn the_distance_limit_holds_with_every_axis_of_a_routine_at_its_extreme() {
-    // Each axis alone stays outside the limit; both together pass it by 0.1 mm.
+    // Each axis alone stays outside the limit; together they pass it by 0.1 mm.
     let mut bench = Bench::both_homed();
     bench.work(&go(Axis::SensorFine, 195_000));
     let setting = Request::WriteSetting { key: SettingKey::DistanceMinNm, value: 46_900_000 };
     bench.ask(&setting).1.expect("in range");
     let refused = bench.ask(&Request::Calibrate { routine: Routine::Gauge, silence: bench::SILENCE }).1;
     assert!(matches!(refused, Err(RequestError::TooClose { .. })), "{refused:?}");
-    // The piezo carries the tab of the switch: homing goes lower by as much as the piezo is extended.
+    // The piezo carries the switch's tab: homing goes lower by its extension.
     let refused = bench.ask(&home(Axis::SensorCoarse)).1;
     assert!(matches!(refused, Err(RequestError::TooClose { .. })), "{refused:?}");
     let allowed = bench.ask(&Request::Calibrate { routine: Routine::Piezo, silence: bench::SILENCE }).1;
@@ -366,7 +366,7 @@ fn the_distance_limit_holds_with_every_axis_of_a_routine_at_its_extreme() {
 
 #[test]
 fn a_lens_below_its_zero_comes_up_before_the_sensor_is_homed() {
-    // Campaign, seed 106916: a dead switch let the lens run below its zero, farther than homing goes.
+    // Campaign, seed 106916: a dead switch let the lens run below its zero, farther than homing does.
     let mut bench = Bench::both_homed();
     let setting = Request::WriteSetting { key: SettingKey::DistanceMinNm, value: 46_450_000 };
     bench.ask(&setting).1.expect("in range");
@@ -391,7 +391,7 @@ fn a_lens_below_its_zero_comes_up_before_the_sensor_is_homed() {
 
 #[test]
 fn an_encoder_that_is_just_not_wrong_enough_to_be_told_at_rest_does_not_keep_its_axis_from_homing() {
-    // Campaign, seed 108681: an encoder slipped by 6 um, and its lag in motion made a fault of it.
+    // Campaign, seed 108681: an encoder slipped by 6 um, and its lag in motion became a fault.
     for microsteps in [38, -38] {
         let mut bench = Bench::both_homed();
         bench.hardware.lens.turn(microsteps);
@@ -399,13 +399,13 @@ fn an_encoder_that_is_just_not_wrong_enough_to_be_told_at_rest_does_not_keep_its
         assert_eq!(bench.alarm(), None, "5.9 um are within what is allowed");
         let end = bench.work(&home(Axis::Lens));
         assert!(matches!(end, EventKind::Homed { .. }), "{microsteps}: {end:?}");
-        // The edge is found to a pulse, as ever.
+        // The edge is found to a pulse.
         let off_um = bench.hardware.lens.position_um();
         assert!(off_um.abs() < 0.4, "{microsteps}: {off_um} um");
     }
 }
 
-/// The lens' rotor falls by this many microsteps with the first pulse of a request; returns the end.
+/// The lens' rotor snaps by this many microsteps with the first pulse of a request; returns the end.
 fn falls(bench: &mut Bench, request: &Request, microsteps: i64) -> EventKind {
     let id = bench.accepted(request);
     let edges = bench.hardware.lens.edges;
@@ -418,15 +418,15 @@ fn falls(bench: &mut Bench, request: &Request, microsteps: i64) -> EventKind {
 
 #[test]
 fn a_rotor_that_stood_between_two_poles_falls_to_one_of_them_as_homing_begins() {
-    // Campaign, seed 117365: a jam was freed and left it there, and it fell by 5 um and swung on to more than 6.
+    // Campaign, seed 117365: a rotor freed from a jam snapped by 5 um and swung on beyond 6.
     for microsteps in [42, -42] {
         let mut bench = Bench::both_homed();
         let end = falls(&mut bench, &home(Axis::Lens), microsteps);
         assert!(matches!(end, EventKind::Homed { .. }), "{microsteps}: {end:?}");
-        // The edge is found to a pulse, as ever.
+        // The edge is found to a pulse.
         let off_um = bench.hardware.lens.position_um();
         assert!(off_um.abs() < 0.4, "{microsteps}: {off_um} um");
-        // A homing that came to nothing leaves no other motion that freedom.
+        // A failed homing gives other motions no such tolerance.
         bench.accepted(&home(Axis::Lens));
         bench.ask(&Request::Stop).1.expect("always");
         bench.run_ms(20);
@@ -478,6 +478,6 @@ fn a_slow_rig_homes_slowly_and_a_fast_one_fast_again() {
         assert!(matches!(end, EventKind::Homed { .. }), "{end:?}");
         times.push((bench.now - start) / 100_000);
     }
-    // The driver is switched on, and tuned for 0.14 s, once.
+    // The driver is enabled and tuned for 0.14 s, once.
     assert!(times[1] > 2 * times[0] && times[2].abs_diff(times[0]) <= 2, "{times:?} tenths of a second");
 }

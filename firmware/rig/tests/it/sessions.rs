@@ -1,18 +1,17 @@
-//! Sessions: whose requests count, what becomes of the work of a host that went, and that nothing old acts again.
+//! Sessions: which requests count, the work of a host that left, and no replayed actions.
 
 use crate::bench::{self, Answer, BOOT, Bench, SESSION, request_frame};
 use farnear_protocol::frame::{self, Header, Kind};
 use farnear_protocol::message::{Alarm, Axis, EventKind, Failure, ID_STEP_MAX, NO_SESSION};
 use farnear_protocol::{Call, Micros, Nanometres, Request, RequestError, Response};
 
-/// The session of a second host.
 const OTHER: u32 = 0x00c0_ffee;
 
 fn fine(nm: i32) -> Request {
     bench::go(Axis::SensorFine, nm)
 }
 
-/// Answer to these bytes, within a tick; `None` without one.
+/// Within a tick; `None` without one.
 fn answer_to(bench: &mut Bench, bytes: &[u8]) -> Option<Answer> {
     bench.answers.clear();
     bench.send_bytes(bytes);
@@ -20,7 +19,6 @@ fn answer_to(bench: &mut Bench, bytes: &[u8]) -> Option<Answer> {
     bench.answers.pop().map(|(_, answer)| answer)
 }
 
-/// Asks in a session of one's own choice.
 fn ask_in(bench: &mut Bench, session: u32, id: u32, request: &Request) -> Answer {
     let boot = if *request == Request::Hello { 0 } else { BOOT };
     answer_to(bench, &request_frame(id, boot, session, request)).expect("an answer")
@@ -29,7 +27,7 @@ fn ask_in(bench: &mut Bench, session: u32, id: u32, request: &Request) -> Answer
 #[test]
 fn the_version_before_is_refused_with_both_versions_named() {
     let mut bench = Bench::new(0.0);
-    // Hello as version 2 had it: the body is the request alone.
+    // Hello of version 2: the body is the request alone.
     let header = Header { version: 2, kind: Kind::Request, id: 7, boot: 0 };
     let bytes = frame::encode(header, &Request::Hello).expect("it fits");
     let answer = answer_to(&mut bench, &bytes);
@@ -64,7 +62,7 @@ fn opening_a_session_ends_what_the_one_before_had_begun() {
     let edges = bench.hardware.coarse.edges;
     bench.run_ms(30);
     assert_eq!(bench.hardware.coarse.edges, edges, "it stands");
-    // The position is known still, and the new host may move at once.
+    // The position is still known, and the new host may move immediately.
     let id = first + 2;
     let moved = ask_in(&mut bench, OTHER, id, &bench::go(Axis::SensorCoarse, 1_000_000));
     assert_eq!(moved, Ok(Response::Accepted));
@@ -80,7 +78,7 @@ fn another_hosts_frames_do_not_keep_abandoned_work_alive() {
         bench.accepted(&Request::Move { axis: Axis::SensorCoarse, target: Nanometres(9_000_000), silence });
     for _ in 0..30 {
         bench.run_ms(10);
-        // A second program, and a replay of what the first said before.
+        // A second program, and a replay of the first host's requests.
         let _ = ask_in(&mut bench, OTHER, 4_000, &Request::Status);
         let _ = ask_in(&mut bench, NO_SESSION, 4_001, &Request::Hello);
         let _ = ask_in(&mut bench, SESSION, 1, &Request::Status);

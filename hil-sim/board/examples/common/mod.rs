@@ -1,5 +1,3 @@
-//! Exposures of the examples.
-
 use farnear_protocol::{
     Micros, Nanometres,
     message::{Axis, Shot, TriggerMode},

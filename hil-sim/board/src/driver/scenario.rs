@@ -17,11 +17,9 @@ use crate::{
 
 /// A step after this pause starts a new motion.
 const MOTION_GAP_NS: u64 = 20_000_000;
-/// A write after this pause starts a new write.
 const WRITE_GAP_NS: u64 = 5_000_000;
 
 impl Driver {
-    /// Replays a trace to its end and compares the results with it.
     pub fn follow(&mut self, mut script: Script) {
         let comparer = std::mem::take(&mut script.comparer);
         self.trace = Some(Trace::Vcd(Box::new(Vcd::compare(comparer))));
@@ -79,7 +77,7 @@ impl Driver {
         }
     }
 
-    /// Replaces the port. The new one is opened first, because it would get the old name otherwise.
+    /// The new port is opened first, because it would get the old name otherwise.
     fn rename_port(&mut self) {
         if let Some(open) = &mut self.outlets.another_port {
             self.outlets.bytes = open();

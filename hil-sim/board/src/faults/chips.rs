@@ -3,7 +3,6 @@
 use super::{Kind, Takes};
 use crate::board::SpiChip;
 
-/// The piezo amplifier's chips stop answering.
 pub const PIEZO_DEAD: Kind = Kind {
     name: "piezo-dead",
     takes: Takes::NOTHING,
@@ -16,7 +15,6 @@ pub const PIEZO_DEAD: Kind = Kind {
         rig.disconnect(SpiChip::Gauge, false);
     }),
 };
-/// The gauge's converter stops answering.
 pub const GAUGE_DEAD: Kind = Kind {
     name: "gauge-dead",
     takes: Takes::NOTHING,
@@ -36,7 +34,6 @@ pub const GAUGE_DRIFTS: Kind = Kind {
         rig.plant(|plant| plant.drift_gauge(now_ns, 0.0));
     }),
 };
-/// The piezo's DAC ignores commands and holds its output.
 pub const DAC_DEAD: Kind = Kind {
     name: "dac-dead",
     takes: Takes::NOTHING,
@@ -56,7 +53,6 @@ pub const MEMORY_BIT_FLIPS: Kind = Kind {
     },
     revert: None,
 };
-/// The FRAM stops answering.
 pub const MEMORY_DEAD: Kind = Kind {
     name: "memory-dead",
     takes: Takes::NOTHING,
@@ -70,14 +66,12 @@ pub const MEMORY_MISREAD: Kind = Kind {
     happen: |rig, at| rig.spoil_memory_answers(1, at.amount as u32), // the range fits
     revert: Some(|rig, _| rig.spoil_memory_answers(0, 0)),
 };
-/// The camera ignores triggers.
 pub const CAMERA_DEAF: Kind = Kind {
     name: "camera-deaf",
     takes: Takes::NOTHING,
     happen: |rig, _| rig.set_camera_ignores_triggers(true),
     revert: Some(|rig, _| rig.set_camera_ignores_triggers(false)),
 };
-/// Strobe wire cut: the board does not see exposures.
 pub const STROBE_DEAD: Kind = Kind {
     name: "strobe-dead",
     takes: Takes::NOTHING,

@@ -5,37 +5,36 @@ use serde::{Deserialize, Serialize};
 use super::{Kind, Moment};
 use crate::plant::StageName;
 
-/// Trigger time of a fault.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub enum When {
-    /// Virtual time after power-on.
-    After { ms: f64 },
-    /// After the n-th occurrence of a moment.
-    On { moment: Moment, nth: u32, delay_ms: f64 },
-    /// Random times (Poisson process, drawn from the seed).
+    After {
+        ms: f64,
+    },
+    On {
+        moment: Moment,
+        nth: u32,
+        delay_ms: f64,
+    },
+    /// Poisson process, drawn from the seed.
     Chance {
-        /// Mean rate, 1/s.
         per_s: f64,
     },
 }
 
-/// A scheduled fault with its target.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
 #[serde(try_from = "Row", into = "Row")]
 pub struct Happening {
     pub when: When,
     pub what: Kind,
-    /// Duration in ms; `None`: never reverted.
+    /// `None`: never reverted.
     pub for_ms: Option<f64>,
     pub stage: StageName,
-    /// Amount in the unit of the kind.
+    /// In the unit of the kind.
     pub amount: f64,
     pub address: u16,
-    /// Bit at this address, 0 to 7.
     pub bit: u8,
 }
 
-/// A table `[[happens]]`.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Row {
@@ -107,7 +106,6 @@ impl Row {
         }
     }
 
-    /// A field that this kind does not use.
     fn superfluous(&self) -> Option<&'static str> {
         let Takes { stage, amount, place } = self.what.takes;
         let fields = [
@@ -176,7 +174,6 @@ impl From<Happening> for Row {
     }
 }
 
-/// Fields that a kind uses.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub struct Takes {
     pub stage: bool,
@@ -184,22 +181,18 @@ pub struct Takes {
     pub place: bool,
 }
 
-/// Range of `amount`.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Amount {
     pub min: f64,
     pub max: f64,
-    /// Default.
     pub usual: f64,
 }
 
 impl Takes {
     pub const NOTHING: Self = Self { stage: false, amount: None, place: false };
     pub const STAGE: Self = Self { stage: true, ..Self::NOTHING };
-    /// Memory address and bit.
     pub const PLACE: Self = Self { place: true, ..Self::NOTHING };
 
-    /// Range and default of the amount.
     pub const fn amount(min: f64, max: f64, usual: f64) -> Self {
         Self { amount: Some(Amount { min, max, usual }), ..Self::NOTHING }
     }

@@ -2,7 +2,6 @@
 
 use crate::plant::Noise;
 
-/// Fault probabilities of a line.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub struct Rates {
     /// Per bit.
@@ -19,7 +18,6 @@ pub struct Rates {
 struct Chance {
     rate: f64,
     noise: Noise,
-    /// Trials until the next hit.
     gap: u64,
 }
 
@@ -30,7 +28,6 @@ impl Chance {
         chance
     }
 
-    /// Sets the probability and draws a new gap.
     fn set_rate(&mut self, rate: f64) {
         if rate != self.rate {
             self.rate = rate;
@@ -38,7 +35,6 @@ impl Chance {
         }
     }
 
-    /// Geometric gap length.
     fn draw(&mut self) -> u64 {
         if self.rate <= 0.0 {
             return u64::MAX;
@@ -48,7 +44,6 @@ impl Chance {
         if good.is_finite() { good as u64 } else { 0 }
     }
 
-    /// Whether the next trial hits.
     fn strikes(&mut self) -> bool {
         if self.gap == 0 {
             self.gap = self.draw();
@@ -87,7 +82,6 @@ impl NoisyLine {
         self.insert.set_rate(self.rates.inserted);
     }
 
-    /// Applies the faults to these bytes.
     pub fn carry(&mut self, bytes: &mut Vec<u8>) {
         if self.rates.cut {
             bytes.clear();
@@ -99,7 +93,7 @@ impl NoisyLine {
                 while self.insert.strikes() {
                     carried.push(self.insert.noise.bits() as u8);
                     if self.rates.inserted >= 1.0 {
-                        break; // one a byte, not without end
+                        break; // at most one per byte
                     }
                 }
                 if !self.lose.strikes() {
@@ -129,12 +123,11 @@ pub struct Lines {
     pub to_host: NoisyLine,
     /// Latency of the host's adapter, counted from the first byte.
     pub latency_ns: u64,
-    /// Whether the adapter shall reappear under another name.
+    /// The adapter reappears under another name.
     pub renamed: bool,
 }
 
 impl Lines {
-    /// Lines with this bit error rate.
     pub fn new(rate: f64, seed: u64) -> Self {
         Self {
             to_board: NoisyLine::new(rate, seed, "line to the board"),
@@ -144,7 +137,6 @@ impl Lines {
         }
     }
 
-    /// Applies `change` to both directions.
     pub fn each(&mut self, change: impl Fn(&mut NoisyLine)) {
         change(&mut self.to_board);
         change(&mut self.to_host);

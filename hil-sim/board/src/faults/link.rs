@@ -20,21 +20,19 @@ pub const LINK_INSERTS_BYTES: Kind = Kind {
     happen: |rig, at| rig.lines().each(|line| line.set_rates(|rates| rates.inserted = at.amount)),
     revert: Some(|rig, _| rig.lines().each(|line| line.set_rates(|rates| rates.inserted = 0.0))),
 };
-/// Adapter latency from board to host, as with USB adapters.
+/// From board to host, as with USB adapters.
 pub const LINK_LATENCY: Kind = Kind {
     name: "link-latency",
     takes: Takes::amount(0.0, 100.0, 16.0),
     happen: |rig, at| rig.lines().latency_ns = (at.amount * 1e6) as u64,
     revert: Some(|rig, _| rig.lines().latency_ns = 0),
 };
-/// No bytes pass.
 pub const LINK_CUT: Kind = Kind {
     name: "link-cut",
     takes: Takes::NOTHING,
     happen: |rig, _| rig.lines().each(|line| line.set_rates(|rates| rates.cut = true)),
     revert: Some(|rig, _| rig.lines().each(|line| line.set_rates(|rates| rates.cut = false))),
 };
-/// Burst of random bytes to the board.
 pub const LINK_NOISE: Kind = Kind {
     name: "link-noise",
     takes: Takes::amount(1.0, 100_000.0, 300.0),

@@ -8,11 +8,9 @@ pub enum Moment {
     /// First step of a motor after standstill.
     MotionBegins,
     ExposureBegins,
-    /// Exposure ends, read-out begins.
     ExposureEnds,
-    /// The board writes its memory after 5 ms without a write.
+    /// The first write after 5 ms without one.
     MemoryWrite,
-    /// A request is sent to the board.
     Request,
     Answer,
     Started,

@@ -2,7 +2,6 @@
 
 use super::{Kind, Takes};
 
-/// Emergency stop pressed or its wire broken.
 pub const EMERGENCY_STOP: Kind = Kind {
     name: "emergency-stop",
     takes: Takes::NOTHING,
@@ -21,7 +20,6 @@ pub const DRIVER_FAULT: Kind = Kind {
     happen: |rig, at| rig.set_driver_fault(at.stage, true),
     revert: Some(|rig, at| rig.set_driver_fault(at.stage, false)),
 };
-/// The driver clears its fault.
 pub const DRIVER_FINE: Kind = Kind {
     name: "driver-fine",
     takes: Takes::STAGE,
@@ -35,7 +33,6 @@ pub const DRIVER_RESETS: Kind = Kind {
     happen: |rig, at| rig.plant(|plant| plant.stage_mut(at.stage).reset_sequencer()),
     revert: None,
 };
-/// The rotor is blocked.
 pub const MOTOR_STALLS: Kind = Kind {
     name: "motor-stalls",
     takes: Takes::STAGE,
@@ -48,14 +45,12 @@ pub const MOTOR_FREE: Kind = Kind {
     happen: |rig, at| rig.plant(|plant| plant.stage_mut(at.stage).set_stalled(false)),
     revert: None,
 };
-/// Reduced torque.
 pub const MOTOR_WEAK: Kind = Kind {
     name: "motor-weak",
     takes: Takes::stage_and_amount(0.0, 1.0, 0.2),
     happen: |rig, at| rig.plant(|plant| plant.stage_mut(at.stage).set_torque(at.amount)),
     revert: Some(|rig, at| rig.plant(|plant| plant.stage_mut(at.stage).set_torque(1.0))),
 };
-/// The encoder gains or loses counts.
 pub const ENCODER_SLIPS: Kind = Kind {
     name: "encoder-slips",
     takes: Takes::stage_and_amount(-4_000.0, 4_000.0, 100.0),
@@ -83,14 +78,12 @@ pub const HOME_SWITCH_BROKEN: Kind = Kind {
     happen: |rig, at| rig.plant(|plant| plant.stage_mut(at.stage).set_stuck_home(Some(true))),
     revert: Some(|rig, at| rig.plant(|plant| plant.stage_mut(at.stage).set_stuck_home(None))),
 };
-/// Far switch wire broken: reads actuated.
 pub const FAR_SWITCH_BROKEN: Kind = Kind {
     name: "far-switch-broken",
     takes: Takes::STAGE,
     happen: |rig, at| rig.plant(|plant| plant.stage_mut(at.stage).set_stuck_far(Some(true))),
     revert: Some(|rig, at| rig.plant(|plant| plant.stage_mut(at.stage).set_stuck_far(None))),
 };
-/// Chopper noise in the switch wires, events per second.
 pub const SWITCH_NOISE: Kind = Kind {
     name: "switch-noise",
     takes: Takes::stage_and_amount(0.0, 10_000.0, 200.0),

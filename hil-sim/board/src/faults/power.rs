@@ -10,7 +10,6 @@ const TIM5_CR1: u64 = 0x4000_0c00;
 
 pub const RESET_BUTTON: Kind =
     Kind { name: "reset-button", takes: Takes::NOTHING, happen: |rig, _| rig.press_reset(), revert: None };
-/// Power off; volatile memory is lost.
 pub const POWER_LOSS: Kind = Kind {
     name: "power-loss",
     takes: Takes::NOTHING,
@@ -19,7 +18,7 @@ pub const POWER_LOSS: Kind = Kind {
 };
 pub const POWER_RETURN: Kind =
     Kind { name: "power-return", takes: Takes::NOTHING, happen: |rig, _| rig.set_power(true), revert: None };
-/// Power off after `amount` more bytes written to memory.
+/// After `amount` more bytes written to memory.
 pub const POWER_LOSS_IN_A_WRITE: Kind = Kind {
     name: "power-loss-in-a-write",
     takes: Takes::amount(1.0, 100_000.0, 20.0),
@@ -29,7 +28,6 @@ pub const POWER_LOSS_IN_A_WRITE: Kind = Kind {
         rig.set_power(true);
     }),
 };
-/// Supply dip that only the brown-out reset detects.
 pub const BROWN_OUT: Kind =
     Kind { name: "brown-out", takes: Takes::NOTHING, happen: |rig, _| rig.brown_out(), revert: None };
 pub const SUPPLY_LOW: Kind = Kind {
@@ -51,7 +49,6 @@ pub const FIRMWARE_HANGS: Kind = Kind {
     happen: |rig, _| rig.write_register(TIM5_CR1, 0),
     revert: None,
 };
-/// The ST-LINK's clock stops.
 pub const CLOCK_DEAD: Kind = Kind {
     name: "clock-dead",
     takes: Takes::NOTHING,

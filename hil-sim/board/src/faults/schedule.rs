@@ -1,28 +1,22 @@
-//! Schedule of a scenario's faults.
-
 use super::{Happening, Moment, When};
 use crate::plant::Noise;
 
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Due {
     pub happening: Happening,
-    /// Reverts the fault instead of starting it.
     pub reverts: bool,
 }
 
-/// A fault of the file with its next event.
 #[derive(Debug)]
 struct Entry {
     happening: Happening,
     noise: Noise,
-    /// Occurrences of its moment so far.
     seen: u32,
     begins_ns: Option<u64>,
     ends_ns: Option<u64>,
 }
 
 impl Entry {
-    /// Draws the next random time.
     fn draw(&mut self, now_ns: u64) {
         if let When::Chance { per_s } = self.happening.when {
             let wait_s = -libm::log(1.0 - self.noise.uniform()) / per_s;
@@ -72,7 +66,6 @@ impl Schedule {
         self.entries.iter().flat_map(|entry| [entry.begins_ns, entry.ends_ns]).flatten().min()
     }
 
-    /// Whether no further fault can occur on its own.
     pub fn is_over(&self) -> bool {
         self.next_ns().is_none()
     }

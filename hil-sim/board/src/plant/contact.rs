@@ -27,7 +27,6 @@ impl Contact {
         contact
     }
 
-    /// Random time to the next event at this mean rate.
     fn wait_ns(&mut self, per_s: f64) -> u64 {
         // 1 - u is never 0. At rate 0 the event never occurs.
         let wait_s = -libm::log(1.0 - self.noise.between(0.0, 1.0)) / per_s;

@@ -1,13 +1,11 @@
 //! A stepper motor with its driver: the field steps exactly, the rotor follows as far as its torque allows.
 //!
-//! Lengths are microsteps (3200 per turn). The torque is a sine of field minus rotor with a period of four
-//! full steps (64 microsteps): `J x'' = T(x') sin(2 pi (field - x) / 64) - D x' - friction` (Acarnley,
-//! Stepping Motors, 4th ed. 2002, ch. 4). A rotor that cannot follow loses whole periods, 10 um with a 0.5 mm
-//! screw, as real motors do.
+//! Lengths are microsteps (3200 per turn). `J x'' = T(x') sin(2 pi (field - x) / 64) - D x' - friction`
+//! (Acarnley, Stepping Motors, 4th ed. 2002, ch. 4). A rotor that cannot follow loses whole periods (four
+//! full steps), 10 um with a 0.5 mm screw.
 //!
-//! Values of a NEMA 17 motor: 0.4 N m holding torque, 54 g cm2 plus the same for coupling and screw, 10 mN m
-//! friction of bearings and nut. Torque falls with speed, so the motor stalls at about 11 mm/s.
-//! [`Motor::STEP_NS`] is 1/200 of the rotor's period of 4 ms.
+//! NEMA 17: 0.4 N m holding torque, 54 g cm2 plus the same for coupling and screw, 10 mN m friction. Torque
+//! falls with speed: stall at about 11 mm/s. [`Motor::STEP_NS`] is 1/200 of the rotor's period of 4 ms.
 
 pub const MICROSTEPS_PER_TURN: f64 = 3200.0;
 /// Microsteps per torque period: four full steps.
@@ -24,18 +22,15 @@ const HALF_TORQUE_SPEED: f64 = 60_000.0;
 #[derive(Debug)]
 pub struct Motor {
     now_ns: u64,
-    /// Position of the driver's sequencer.
     field: i64,
     rotor: f64,
     speed: f64,
-    /// Available share of the torque.
     torque: f64,
     blocked: bool,
     resting: bool,
 }
 
 impl Motor {
-    /// Longest solver step.
     pub const STEP_NS: u64 = 20_000;
 
     pub fn new(microsteps: i64) -> Self {
@@ -55,12 +50,10 @@ impl Motor {
         self.resting = false;
     }
 
-    /// Rotor position, microsteps.
     pub fn rotor(&self) -> f64 {
         self.rotor
     }
 
-    /// Commanded position, microsteps.
     pub fn field(&self) -> i64 {
         self.field
     }
@@ -71,7 +64,6 @@ impl Motor {
         self.resting = false;
     }
 
-    /// Restarts the sequencer at the nearest full period.
     pub fn reset_sequencer(&mut self) {
         let period = PERIOD as i64;
         self.field = (self.field + period / 2).div_euclid(period) * period;
@@ -119,7 +111,6 @@ impl Motor {
 mod tests {
     use super::*;
 
-    /// Ramps up to a rate and, if `brakes`, down again; 50 mm/s2.
     fn run(motor: &mut Motor, top: f64, seconds: f64, brakes: bool) {
         let (mut at_s, mut rate) = (motor.now_ns as f64 * 1e-9, 500.0);
         let brake_s = at_s + seconds;

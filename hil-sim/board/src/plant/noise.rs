@@ -5,7 +5,6 @@ use rand_chacha::{
     rand_core::{RngCore, SeedableRng},
 };
 
-/// Random numbers for one purpose.
 #[derive(Clone, Debug)]
 pub struct Noise(ChaCha8Rng);
 

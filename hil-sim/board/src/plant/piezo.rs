@@ -2,12 +2,10 @@
 //!
 //! - Amplifier: first order, 5 kHz.
 //! - Hysteresis: Prandtl & Ishlinskii, ten play operators (Kuhnen, European J. Control 9, 2003, sec. 2); the
-//!   full
-//!   loop is 12 % of the stroke wide, closed at both ends.
+//!   full loop is 12 % of the stroke wide, closed at both ends.
 //! - Creep: 1.5 % of the stroke per decade from 0.1 s to 1000 s, four first-order lags.
 //! - Flexure: second order, 200 Hz, damping 0.03; optional second mode (`parts.toml`).
-//! - Tension: inertia may pull the stack, which tolerates little tension. The maximum is recorded; nothing
-//!   breaks.
+//! - Tension: inertia may pull the stack, which tolerates little. The maximum is recorded; nothing breaks.
 //!
 //! Solved exactly over steps of [`Piezo::STEP_NS`] with a constant drive: 0.2 us of host time per step.
 
@@ -40,7 +38,6 @@ pub struct Piezo {
     full_step: Propagator,
 }
 
-/// State of a flexure mode.
 #[derive(Clone, Copy, Debug, Default)]
 struct Mode {
     position_um: f64,
@@ -55,7 +52,6 @@ impl Mode {
     }
 }
 
-/// Propagation of an oscillator over one step: factors of deviation and velocity.
 #[derive(Clone, Copy, Debug)]
 struct Oscillation {
     xx: f64,
@@ -80,7 +76,6 @@ impl Oscillation {
     }
 }
 
-/// Propagation of both modes and the first-order lags over one step.
 #[derive(Clone, Copy, Debug)]
 struct Propagator {
     first: Oscillation,
@@ -118,7 +113,6 @@ fn play_weight() -> f64 {
 }
 
 impl Piezo {
-    /// Longest solver step.
     pub const STEP_NS: u64 = 20_000;
 
     pub fn new(parts: PiezoParts) -> Self {
@@ -150,8 +144,7 @@ impl Piezo {
         position_um + self.parts.second_mode_share * (self.second.position_um - position_um)
     }
 
-    /// Largest tension so far as elongation, micrometres; relative to the full stroke it is the share of the
-    /// blocking force.
+    /// Largest tension so far as elongation; divided by the stroke it is the share of the blocking force.
     pub fn pulled_um(&self) -> f64 {
         self.pulled_um
     }

@@ -1,17 +1,13 @@
 //! The micrometer screw between rotor and stage: pitch, errors, backlash.
 //!
-//! 0.5 mm pitch, 13 mm travel. Errors as in Mitutoyo's 148 series (catalogue accuracy +-2 um over the
-//! travel): a slow lead error and a periodic one per turn, drawn from the seed, together below 2 um. 1 um of
-//! sensor position is about 0.3 mm of depth. The pair's distance comes from the piezo, whose gauge measures
-//! the true position, so the screw shifts both exposures alike: a bias of up to 0.6 mm, no noise.
-//!
-//! After a reversal the stage rests until the nut's play is used up.
+//! 0.5 mm pitch, 13 mm travel. A slow lead error and a periodic one per turn, drawn from the seed, together
+//! below 2 um (Mitutoyo's 148 series: +-2 um over the travel). 1 um of sensor position is about 0.3 mm of
+//! depth. The pair's distance comes from the gauged piezo, so the screw shifts both exposures alike: a bias
+//! of up to 0.6 mm. After a reversal the stage rests until the nut's play is used up.
 
 use super::{Noise, motor::MICROSTEPS_PER_TURN};
 
-/// Travel between the end switches.
 pub const TRAVEL_UM: f64 = 13_000.0;
-/// Pitch per turn.
 const PITCH_UM: f64 = 500.0;
 pub const MICROSTEP_UM: f64 = PITCH_UM / MICROSTEPS_PER_TURN;
 /// Play of the nut, flank to flank.
@@ -63,7 +59,6 @@ impl Screw {
         turns * PITCH_UM + self.lead.um(turns * PITCH_UM / TRAVEL_UM) + self.turn.um(turns)
     }
 
-    /// Moves the stage as far as a flank pushes it.
     pub fn turn(&mut self, rotor: f64) {
         let nut_um = self.nut_um(rotor);
         let half_um = 0.5 * self.backlash_um;
@@ -74,7 +69,6 @@ impl Screw {
         self.stage_um
     }
 
-    /// Sets the nut's play, as wear would.
     pub fn set_backlash_um(&mut self, um: f64) {
         self.backlash_um = um.max(0.0);
     }

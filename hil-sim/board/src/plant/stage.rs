@@ -1,8 +1,7 @@
 //! A motorised stage: motor, screw, encoder on the motor's shaft, end switches at the stage.
 //!
-//! Micrometres from the true home edge, positive = sensor and lens apart. The encoder measures the rotor, so
-//! it misses screw errors and play. The switches detect the stage; stage A's home switch detects the sensor
-//! plate on the piezo, so the gauge can be checked against the encoder.
+//! Micrometres from the true home edge, positive = sensor and lens apart. The encoder misses screw errors and
+//! play. Stage A's home switch detects the sensor plate on the piezo, so the gauge can be checked.
 
 use super::{
     Noise,
@@ -13,25 +12,22 @@ use super::{
 const COUNTS_PER_TURN: f64 = 4000.0;
 /// Distance from a switch to the rubber end stop, where the motor stalls.
 const END_STOP_UM: f64 = 700.0;
-/// Rotor position at the lower end stop, microsteps.
 const LOWEST: f64 = -END_STOP_UM / MICROSTEP_UM;
 const HIGHEST: f64 = (TRAVEL_UM + END_STOP_UM) / MICROSTEP_UM;
 const FAR_SWITCH_UM: f64 = TRAVEL_UM + 150.0;
 /// Repeatability of the home switch, standard deviation in micrometres.
 const HOME_SD_UM: f64 = 0.3;
-/// Hysteresis of the home switch (precision switches such as Baumer My-Com have micrometres; snap-action ones
-/// 0.1 mm).
+/// Hysteresis: precision switches (Baumer My-Com) have micrometres, snap-action ones 0.1 mm.
 const HOME_DIFFERENTIAL_UM: f64 = 2.0;
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum StageName {
-    /// Stage A with sensor and piezo.
     Sensor,
     Lens,
 }
 
-/// A switch with limited repeatability.
+/// Each closing draws another position.
 #[derive(Debug)]
 struct HomeSwitch {
     noise: Noise,
@@ -40,7 +36,6 @@ struct HomeSwitch {
 }
 
 impl HomeSwitch {
-    /// Each closing draws another position.
     fn update(&mut self, um: f64) {
         if !self.closed && um <= self.offset_um {
             self.closed = true;
@@ -60,7 +55,6 @@ pub struct Stage {
     carried_um: f64,
     stuck_home: Option<bool>,
     stuck_far: Option<bool>,
-    /// Microsteps against a hard stop.
     pressed: u64,
 }
 
@@ -91,7 +85,6 @@ impl Stage {
         }
     }
 
-    /// A STEP pulse while the driver is on.
     pub fn step(&mut self, away: bool) {
         let rotor = self.motor.rotor();
         self.pressed += u64::from(if away { rotor >= HIGHEST } else { rotor <= LOWEST });
@@ -103,7 +96,6 @@ impl Stage {
         self.pressed
     }
 
-    /// Advances to `now_ns`.
     pub fn advance(&mut self, now_ns: u64) {
         let Self { motor, screw, home, carried_um, .. } = self;
         motor.advance(now_ns, |rotor| {
@@ -114,13 +106,11 @@ impl Stage {
         });
     }
 
-    /// Sets the piezo's position.
     pub fn set_carried_um(&mut self, um: f64) {
         self.carried_um = um;
         self.home.update(self.screw.stage_um() + um);
     }
 
-    /// True position from the home edge.
     pub fn position_um(&self) -> f64 {
         self.screw.stage_um()
     }
@@ -130,7 +120,6 @@ impl Stage {
         self.motor.field()
     }
 
-    /// Commanded minus actual rotor position, microsteps.
     pub fn lost_microsteps(&self) -> f64 {
         self.motor.field() as f64 - self.motor.rotor()
     }
@@ -151,7 +140,6 @@ impl Stage {
         self.motor.set_blocked(stalled);
     }
 
-    /// Available torque (0 to 1).
     pub fn set_torque(&mut self, share: f64) {
         self.motor.set_torque(share);
     }
@@ -160,7 +148,6 @@ impl Stage {
         self.screw.set_backlash_um(um);
     }
 
-    /// Restarts the driver's sequencer at the nearest full period.
     pub fn reset_sequencer(&mut self) {
         self.motor.reset_sequencer();
     }
@@ -170,7 +157,6 @@ impl Stage {
         self.stuck_far = says;
     }
 
-    /// Sticks the home switch at this level, or repairs it.
     pub fn set_stuck_home(&mut self, says: Option<bool>) {
         self.stuck_home = says;
     }
@@ -180,7 +166,6 @@ impl Stage {
 mod tests {
     use super::*;
 
-    /// Steps at 4 kHz, 0.6 mm/s.
     struct Turned {
         stage: Stage,
         now_ns: u64,

@@ -1,9 +1,8 @@
 //! Translations that survive a reset and a rig.
 //!
-//! The emulator translates firmware instructions on first use and drops them at each reset and rig, which is
-//! more than half of a short scenario's CPU time. Here an idle twin computes the reset state, and a processor
-//! is reused by the next rig with the same program. Behaviour does not depend on translations, so runs stay
-//! identical to the bit.
+//! The emulator drops the translated instructions at each reset and rig: more than half of a short scenario's
+//! CPU time. Here an idle twin computes the reset state, and the next rig with the same program reuses the
+//! processor. Behaviour does not depend on translations, so runs stay identical to the bit.
 
 use std::{
     collections::BTreeSet,
@@ -18,13 +17,11 @@ use crate::board::RAM;
 /// Each cached processor holds some ten megabytes.
 const WAITING: usize = 8;
 
-/// Processors of ended rigs.
 static ENDED: Mutex<Vec<Waiting>> = Mutex::new(Vec::new());
 
 struct Waiting {
     program: u64,
     processor: Box<dyn Processor>,
-    /// State before the first instruction.
     fresh: Vec<u8>,
 }
 
@@ -43,7 +40,6 @@ pub struct Translated {
 
 impl Translated {
     /// A processor for this program, before its first instruction.
-    /// Errors: errors of `make`.
     pub fn new(program: u64, make: impl Fn() -> Result<Box<dyn Processor>, Error>) -> Result<Self, Error> {
         let twin = Some(make()?);
         let (running, fresh) = match take(program) {
@@ -71,7 +67,6 @@ impl Translated {
         self.running.take_reset_request(); // drops a request from before the reset
     }
 
-    /// As [`Processor::ask`].
     pub fn ask(&mut self, queued: Queued) {
         match queued {
             Queued::Route(address) => drop(self.routed.insert(address)),

@@ -1,8 +1,7 @@
 //! Fetch delays: flash wait states and the accelerator (RM0090, section 3.5.2).
 //!
 //! The flash delivers 16 bytes after its wait states. Buffers: the current line, 64 lines of instruction
-//! cache, 8 of data cache, and a prefetch of the next line. The real replacement policy is unpublished; here
-//! the oldest line is replaced.
+//! cache, 8 of data cache, prefetch of the next line. Replaces the oldest line (unpublished).
 
 /// Bytes per line; lines of the instruction and data cache.
 const LINE: u64 = 16;
@@ -12,12 +11,10 @@ const PREFETCH: u64 = 1 << 8;
 const INSTRUCTION_CACHE: u64 = 1 << 9;
 const DATA_CACHE: u64 = 1 << 10;
 
-/// Cached lines, oldest first.
 #[derive(Debug, Default)]
 struct Lines(Vec<u64>);
 
 impl Lines {
-    /// Whether the line is cached; inserts it.
     fn take(&mut self, line: u64, most: usize) -> bool {
         let found = self.0.iter().position(|kept| *kept == line);
         if let Some(at) = found {
@@ -35,7 +32,6 @@ pub(super) struct FlashInterface {
     acr: u64,
     instructions: Lines,
     data: Lines,
-    /// Line read last.
     current: u64,
     /// Cycles spent in this line, available to the prefetch.
     spent: u64,
@@ -73,7 +69,6 @@ impl FlashInterface {
         self.wait_states().saturating_sub(ahead)
     }
 
-    /// Wait cycles for a constant in the flash.
     pub(super) fn read(&mut self, address: u64) -> u64 {
         let kept = self.acr & DATA_CACHE != 0 && self.data.take(address / LINE, DATA_LINES);
         if kept { 0 } else { self.wait_states() }

@@ -1,8 +1,5 @@
 //! Cycles per instruction kind without wait states: Cortex-M4 manual (DDI 0439), table 3-1 and section 3.3.3;
-//! floating point: table 7-1.
-//!
-//! Upper values where the manual gives a range: a load takes 2 even in a row, a division 12, a pipeline
-//! refill 2. Encodings: ARMv7-M (DDI 0403), chapter A5.
+//! floating point: table 7-1. Upper values of ranges. Encodings: ARMv7-M (DDI 0403), chapter A5.
 
 /// Pipeline refill (manual: 1 to 3).
 const REFILL: u64 = 2;
@@ -12,12 +9,11 @@ pub(super) const EXCEPTION_RETURN: u64 = 10;
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) struct Instruction {
     first: u16,
-    /// Second half of a 32-bit instruction.
     second: Option<u16>,
 }
 
-/// Wait cycles of a peripheral register: a bridge takes two bus cycles, APB1 runs at 1/4 and APB2 at 1/2 of
-/// the clock; AHB has one (RM0090, section 2.1; sums not checked).
+/// Wait cycles: a bridge takes two bus cycles, APB1 runs at 1/4 and APB2 at 1/2 of the clock; AHB has one
+/// (RM0090, section 2.1; sums not checked).
 pub(super) const fn bus_cycles(address: u64) -> u64 {
     match address {
         0x4000_0000..0x4001_0000 => 8,
@@ -39,7 +35,6 @@ impl Instruction {
         if self.second.is_some() { 4 } else { 2 }
     }
 
-    /// Whether the next instruction may be elsewhere.
     pub(super) const fn may_branch(self) -> bool {
         let first = self.first;
         match self.second {
@@ -63,12 +58,10 @@ impl Instruction {
         }
     }
 
-    /// Whether it may return from an interrupt handler.
     pub(super) const fn may_return(self) -> bool {
         self.may_branch()
     }
 
-    /// Address of the constant of a PC-relative load.
     pub(super) const fn literal(self, pc: u64) -> Option<u64> {
         let base = (pc + 4) & !3;
         match self.second {
@@ -130,8 +123,7 @@ const fn long(first: u16, second: u16) -> u64 {
     }
 }
 
-/// VLDR and VSTR 2 (double 3), several 1 + N, division and root 14, fused and chained 3, moves and the rest
-/// 1.
+/// VLDR and VSTR 2 (double 3), several 1 + N, division and root 14, fused and chained 3, other 1.
 const fn floating(first: u16, second: u16) -> u64 {
     if first & 0xfe00 == 0xec00 {
         let words = (second & 0xff) as u64;

@@ -1,4 +1,4 @@
-//! Failure of the ST-LINK's HSE clock beyond the emulator's model: HSE never becomes ready, and the clock
+//! Failure of the ST-LINK's HSE clock, which the emulator lacks: HSE never becomes ready, and the clock
 //! security system raises its non-maskable interrupt (RM0090, section 6.2.7).
 
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -16,7 +16,6 @@ const HSERDY: u64 = 1 << 17;
 const ICSR: u64 = 0xe000_ed04;
 const NMIPENDSET: u64 = 1 << 31;
 
-/// The clock, shared by chip and processor.
 #[derive(Default, Debug)]
 pub struct OuterClock {
     dead: AtomicBool,
@@ -24,7 +23,7 @@ pub struct OuterClock {
 }
 
 impl OuterClock {
-    /// Sets the clock; returns whether it changed.
+    /// Returns whether the clock changed.
     pub fn set(&self, there: bool) -> bool {
         self.dead.swap(!there, Ordering::Relaxed) == there
     }
@@ -39,14 +38,12 @@ impl OuterClock {
         self.failure.store(false, Ordering::Relaxed);
     }
 
-    /// Raises a pending interrupt before the next instruction.
     pub fn interrupt(&self, processor: &mut dyn Processor, now: VirtualNanos) {
         if self.failure.swap(false, Ordering::Relaxed) {
             processor.debugger_access(Some(NMIPENDSET), ICSR, Width::W32, now);
         }
     }
 
-    /// Value read from a chip register.
     pub fn seen(&self, access: &Access, value: u64) -> u64 {
         let asks = access.address == RCC_CR && access.kind == AccessKind::Read;
         if asks && self.dead.load(Ordering::Relaxed) { value & !HSERDY } else { value }

@@ -5,7 +5,6 @@ use serde::{Deserialize, Serialize};
 
 #[derive(Clone, PartialEq, Debug)]
 pub enum Deed {
-    /// Homes one axis, or both steppers simultaneously.
     Home(Option<Axis>),
     Move {
         axis: Axis,
@@ -13,7 +12,6 @@ pub enum Deed {
     },
     /// Loads, arms and runs a piezo program with one shot per position.
     Expose(Program),
-    /// Repeats the program.
     Continuous {
         program: Program,
         /// Trigger period; 0: as fast as possible.
@@ -42,7 +40,6 @@ pub enum Deed {
     },
 }
 
-/// Piezo exposures.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Program {
     pub at_um: Vec<f64>,
@@ -55,7 +52,7 @@ pub struct Program {
 #[serde(try_from = "Row", into = "Row")]
 pub struct Step {
     pub deed: Deed,
-    /// Continue after this time even if the step has not ended; `None`: wait for its end.
+    /// Continues after this time even if the step has not ended; `None`: waits for its end.
     pub goes_on_after_ms: Option<f64>,
 }
 
@@ -78,7 +75,6 @@ enum Verb {
     Wait,
 }
 
-/// A table `[[host]]`.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Row {
@@ -125,7 +121,6 @@ impl Row {
         }
     }
 
-    /// Fields present in the file.
     fn given(&self) -> Vec<&'static str> {
         let fields = [
             ("axis", self.axis.is_some()),
@@ -142,7 +137,6 @@ impl Row {
         fields.into_iter().filter_map(|(name, there)| there.then_some(name)).collect()
     }
 
-    /// Rejects other fields.
     fn only(&self, allowed: &[&str]) -> Result<(), String> {
         let verb = toml::Value::try_from(self.does).ok();
         let verb = verb.as_ref().and_then(toml::Value::as_str).unwrap_or_default();

@@ -1,6 +1,4 @@
-//! The plant's true state as CSV: `time_us,event,coarse_um,lens_um,piezo_um,dac,step_edges,triggers`.
-//!
-//! One `tick` row per millisecond with motion, one `shot` row per exposure with its mean positions.
+//! The plant's true state as CSV: a `tick` row per millisecond with motion, a `shot` row per exposure.
 
 use std::{
     fs::File,
@@ -14,7 +12,6 @@ use crate::{
     wiring::Wiring,
 };
 
-/// Sampling period, virtual time.
 const PERIOD_NS: u64 = 1_000_000;
 
 pub struct Csv {
@@ -73,8 +70,6 @@ impl Csv {
         }
     }
 
-    /// Flushes the file.
-    /// Errors: the first write error.
     pub fn finish(mut self) -> Result<(), SimError> {
         let result = self.failed.take().map_or_else(|| self.file.flush(), Err);
         result.map_err(|source| SimError::Io { what: "cannot write the trace".into(), source })

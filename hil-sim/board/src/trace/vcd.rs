@@ -1,8 +1,6 @@
-//! A run as a value change dump: positions, pulses, exposures, line bytes, faults; comments hold all that a
-//! replay needs.
-//!
-//! Times are virtual nanoseconds. STEP pulses and exposures have exact times, positions are sampled each
-//! millisecond with motion, bytes and faults at stops of the emulator (at least every 0.1 ms).
+//! A run as a value change dump: positions, pulses, exposures, line bytes, faults; comments hold what a
+//! replay needs. STEP pulses and exposures have exact times; positions are sampled each millisecond with
+//! motion, bytes and faults at stops of the emulator (at least every 0.1 ms).
 
 use std::{
     fmt::Write as _,
@@ -21,9 +19,7 @@ use crate::{
     wiring::{Shot, Wiring},
 };
 
-/// Sampling period of positions, virtual time.
 const PERIOD_NS: u64 = 1_000_000;
-/// Signals: type, size, letter, name.
 const SIGNALS: [(&str, u32, char, &str); 11] = [
     ("real", 64, 'c', "coarse_um"),
     ("real", 64, 'l', "lens_um"),
@@ -37,9 +33,7 @@ const SIGNALS: [(&str, u32, char, &str); 11] = [
     ("string", 1, 'i', "to_board"),
     ("string", 1, 'o', "to_host"),
 ];
-/// Fault events by name.
 const HAPPENS: (&str, u32, char, &str) = ("string", 1, 'h', "happens");
-/// Last line of the heading.
 pub const END_OF_HEADING: &str = "$enddefinitions $end";
 /// Prefixes of the heading's lines with the rig's configuration.
 pub const MADE_OF: [&str; 4] =
@@ -52,7 +46,6 @@ pub fn name_of(letter: char) -> &'static str {
 
 enum Sink {
     File(BufWriter<File>),
-    /// Compares lines with those of another run.
     Compare(Comparer),
 }
 
@@ -60,18 +53,16 @@ pub struct Vcd {
     sink: Sink,
     /// Changes since the last stop: time and line.
     changes: Vec<(u64, String)>,
-    /// Time of the last line.
     at_ns: Option<u64>,
     next_ns: u64,
     last: [String; 4],
-    /// Whether the start of the current exposure is written.
     exposing: bool,
     failed: Option<std::io::Error>,
 }
 
 pub fn hex(bytes: &[u8]) -> String {
     bytes.iter().fold(String::with_capacity(2 * bytes.len()), |mut text, byte| {
-        let _ = write!(text, "{byte:02x}"); // a string takes everything
+        let _ = write!(text, "{byte:02x}"); // writing to a string cannot fail
         text
     })
 }
@@ -86,7 +77,7 @@ pub fn unhex(text: &str) -> Option<Vec<u8>> {
 fn heading(config: &RigConfig, firmware: u64) -> Result<String, SimError> {
     let scenario = Scenario {
         seed: Some(config.seed),
-        parts: toml::Table::try_from(&config.parts).unwrap_or_default(), // they came out of such a table
+        parts: toml::Table::try_from(&config.parts).unwrap_or_default(), // parsed from such a table
         ..config.scenario.clone()
     };
     let pace = if config.pace == Pace::Realtime { "paced" } else { "lockstep" };
@@ -131,7 +122,6 @@ impl Vcd {
         Ok(Self::with(Sink::File(file)))
     }
 
-    /// Compares with another run instead of writing.
     pub fn compare(with: Comparer) -> Self {
         Self::with(Sink::Compare(with))
     }
@@ -150,18 +140,16 @@ impl Vcd {
         }
     }
 
-    /// A fault starts or is reverted.
     pub fn happened(&mut self, at_ns: u64, what: &str, reverts: bool) {
         let back = if reverts { "/" } else { "" };
         self.change(at_ns, format!("s{back}{what} h"));
     }
 
-    /// The chip was reset, or its power changed.
     pub fn reset(&mut self, at_ns: u64, powered: Option<bool>) {
         self.change(at_ns, powered.map_or("1r".into(), |on| format!("{}w", u8::from(on))));
     }
 
-    /// Records a stop requested by a caller; it follows the instruction that crosses `asked_ns`.
+    /// The stop follows the instruction that crosses `asked_ns`.
     pub fn looked(&mut self, at_ns: u64, asked_ns: u64) {
         self.change(at_ns, format!("$comment look {asked_ns} $end"));
     }
@@ -185,7 +173,6 @@ impl Vcd {
         self.change(at_ns, "$comment touched $end".into());
     }
 
-    /// Writes the changes since the last stop.
     pub fn look(&mut self, now_ns: u64, plant: &Plant, wiring: &mut Wiring, shots: &[Shot]) {
         wiring.record_steps_once();
         for (edges, letter) in wiring.take_steps().into_iter().zip(['C', 'L']) {
@@ -240,13 +227,10 @@ impl Vcd {
         }
     }
 
-    /// Whether the compared runs differ.
     pub fn departs(&self) -> bool {
         matches!(&self.sink, Sink::Compare(comparer) if comparer.departs())
     }
 
-    /// Flushes the file.
-    /// Errors: the first write error.
     pub fn finish(mut self) -> Result<(), SimError> {
         self.flush();
         let result = match (self.failed.take(), &mut self.sink) {

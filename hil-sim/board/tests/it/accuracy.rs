@@ -22,7 +22,6 @@ fn truth_um(report: &Report, axis: Axis) -> f64 {
     }
 }
 
-/// Random moves; returns the errors in micrometres.
 fn errors_um(bench: &mut Bench, axis: Axis, (low_um, high_um): (f64, f64), moves: u32) -> Vec<f64> {
     let mut noise = Noise::new(amount("FARNEAR_SEED", 1), "test of accuracy");
     let once = |_| {

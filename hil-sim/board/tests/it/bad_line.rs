@@ -1,4 +1,4 @@
-//! With one flipped bit in ten thousand each request is answered correctly or fails, and none acts twice.
+//! At a bit error rate of 1e-4 each request is answered correctly or fails, and none acts twice.
 
 use crate::bench::{Bench, SILENCE, fine_shot};
 use farnear_protocol::{EventKind, Request, Response};

@@ -13,13 +13,11 @@ pub const SILENCE: Micros = Micros(60_000_000);
 
 pub const SESSION: u32 = 0x1234_5678;
 
-/// A rig and a host that numbers its requests.
 pub struct Bench {
     pub rig: EmulatedRig,
     pub boot: u32,
     next: u32,
     pub events: Vec<Event>,
-    /// Bytes of the board's log.
     pub log: Vec<u8>,
 }
 
@@ -72,7 +70,6 @@ impl Bench {
         self.next = self.next.max(id);
     }
 
-    /// Sends a request without letting time pass; returns its id.
     pub fn send(&mut self, request: &Request) -> u32 {
         self.next += 1;
         let id = self.next;
@@ -100,8 +97,7 @@ impl Bench {
         answers
     }
 
-    /// Sends a request and waits for the answer with up to three repeats. Hosts wait 50 ms; 10 ms suffice
-    /// here, because the board answers within 2 ms.
+    /// Waits for the answer with up to three repeats. Hosts wait 50 ms; the board answers within 2 ms.
     pub fn try_ask(&mut self, request: &Request) -> Option<Answer> {
         let id = self.send(request);
         for attempt in 0..4 {
@@ -118,12 +114,12 @@ impl Bench {
         None
     }
 
-    /// As [`Bench::try_ask`], but panics without an answer.
+    /// [`Bench::try_ask`] that panics without an answer.
     pub fn ask(&mut self, request: &Request) -> Answer {
         self.try_ask(request).unwrap_or_else(|| panic!("no answer to {request:?}"))
     }
 
-    /// Runs long work to its end; returns the terminal event.
+    /// Returns the terminal event of long work.
     pub fn carry_out(&mut self, request: &Request) -> EventKind {
         assert_eq!(self.ask(request), Ok(Response::Accepted), "{request:?}");
         self.settle()
@@ -237,12 +233,10 @@ pub fn fine_shot(target_nm: i32, exposure_us: u32, window_nm: i32, dwell_us: u32
     }
 }
 
-/// Size of a test: the environment variable (set by `cargo xtask campaign`), else this default.
 pub fn amount<T: std::str::FromStr>(variable: &str, else_this: T) -> T {
     std::env::var(variable).ok().and_then(|text| text.parse().ok()).unwrap_or(else_this)
 }
 
-/// Address and length of matching firmware symbols.
 pub fn symbols(wanted: impl Fn(&Symbol<'_, '_>) -> bool) -> Vec<(u64, u64)> {
     let elf = farnear_sim::firmware::find(None).expect("a firmware");
     let bytes = std::fs::read(elf).expect("readable");

@@ -1,5 +1,3 @@
-//! The board's calibration finds the plant's properties.
-
 use crate::bench::{Bench, SILENCE};
 use farnear_protocol::{
     EventKind, Nanometres, Request, Response,

@@ -62,7 +62,6 @@ fn run(bench: &mut Bench, period_us: u64, exposures: u32) -> Ran {
     Ran { frames, dropped, end: end.expect("it ended"), truths_nm, digest: hasher.finish() }
 }
 
-/// Prints the result and checks the specification.
 fn hold(name: &str, ran: &Ran, exposures: u32) {
     let [first, last] = [ran.frames[0], ran.frames[ran.frames.len() - 1]].map(|(_, _, shot)| shot.trigger.0);
     let seconds = (last - first) as f64 / 1e6;

@@ -22,7 +22,6 @@ struct Fuzz {
     noise: Noise,
     boot: u32,
     id: u32,
-    /// Earlier frames, which may be repeated.
     said: Vec<Vec<u8>>,
 }
 

@@ -1,4 +1,4 @@
-//! Lamp and flash on the emulated board: what the outputs do, by the timer's registers.
+//! Lamp and flash on the emulated board, by the timer's registers.
 
 use farnear_protocol::{
     EventKind, Micros, Request,

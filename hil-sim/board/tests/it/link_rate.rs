@@ -1,4 +1,4 @@
-//! Change of the link rate on both ends, fallback to the old rate, and a slow adapter.
+//! Change of the link rate, fallback to the old rate, and a slow adapter.
 
 use farnear_protocol::{
     Request, Response,

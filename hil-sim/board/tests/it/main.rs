@@ -1,4 +1,4 @@
-//! The emulated board: firmware, plant and program. One test binary, linked once.
+//! One test binary, linked once.
 
 mod accuracy;
 mod bad_line;

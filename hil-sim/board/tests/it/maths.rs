@@ -89,7 +89,6 @@ impl Here {
     }
 }
 
-/// Asks both and returns the common answer.
 fn both(bench: &mut Bench, here: &mut Here, request: &Request) -> Response {
     let (there, here) = (bench.ask(request), here.ask(request));
     assert_eq!(there, here, "{request:?}");

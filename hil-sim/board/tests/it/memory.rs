@@ -16,7 +16,6 @@ fn read(bench: &mut Bench) -> i32 {
     }
 }
 
-/// Writes a setting and waits until it is stored.
 fn write(bench: &mut Bench, value: i32) {
     let answer = bench.ask(&Request::WriteSetting { key: KEY, value });
     assert!(matches!(answer, Ok(Response::Setting(setting)) if setting.value == value), "{answer:?}");
@@ -58,7 +57,6 @@ fn repaired(bench: &Bench) -> Vec<RecordName> {
         .collect()
 }
 
-/// Addresses at which two contents differ.
 fn changed(before: &[u8], after: &[u8]) -> Vec<usize> {
     (0..before.len()).filter(|&i| before[i] != after[i]).collect()
 }

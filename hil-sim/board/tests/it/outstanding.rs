@@ -1,4 +1,4 @@
-//! The maximum number of outstanding requests: each is answered once, without lost frames on a good line.
+//! The maximum number of outstanding requests is answered, each once.
 
 use crate::bench::{Bench, amount, request_frame};
 use farnear_protocol::{Request, Response};

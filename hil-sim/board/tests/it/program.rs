@@ -16,7 +16,6 @@ fn load_pair(bench: &mut Bench) {
     bench.arm(&[FAR, Nanometres(FAR.0 + TRAVEL_NM)].map(|at| fine_shot(at.0, EXPOSURE.0, WINDOW.0, 2_000)));
 }
 
-/// Runs the pair; returns its records.
 fn run_pair(bench: &mut Bench) -> Vec<ShotRecord> {
     let before = bench.events.len();
     let end = bench.run();

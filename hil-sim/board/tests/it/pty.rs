@@ -92,7 +92,6 @@ impl Client {
         client
     }
 
-    /// The next frame accepted by `wanted`.
     fn wait<T>(&mut self, wanted: impl Fn(&farnear_protocol::frame::Packet) -> Option<T>) -> T {
         let deadline = Instant::now() + PATIENCE;
         let mut bytes = [0; 256];
@@ -173,7 +172,6 @@ pub fn capture(program: &Program) -> Vec<(FrameHeader, Vec<u8>)> {
     frames_at(&program.camera)
 }
 
-/// Two queued frames of an endpoint.
 fn frames_at(address: &str) -> Vec<(FrameHeader, Vec<u8>)> {
     let mut camera = TcpStream::connect(address).expect("the endpoint is open");
     camera.set_read_timeout(Some(PATIENCE)).expect("a timeout");

@@ -5,7 +5,6 @@ use farnear_protocol::{Nanometres, message::Axis};
 use farnear_scene::{Camera, Lens, Noise, OpticsFile, Scene, standard};
 use farnear_sim::{config::RigConfig, imager::Imager};
 
-/// Homes, moves, captures a pair; returns trace, events and pictures.
 fn session(seed: u64) -> (String, String, Vec<Vec<u8>>) {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let trace = folder.path().join("trace.csv");

@@ -1,5 +1,4 @@
-//! Resets: each reports its cause and the next boot number. Requests for an earlier boot are ignored, and
-//! severe causes latch an alarm until it is cleared.
+//! Each reset reports its cause and boot number, ignores older requests and latches an alarm if severe.
 
 use std::collections::HashSet;
 
@@ -48,7 +47,7 @@ fn distinguishes_the_reset_button_from_a_request() {
     assert_eq!(bench.alarm(), None, "it stood still");
 }
 
-/// After the reset an alarm is latched that survives further resets and is cleared only by its number.
+/// The alarm survives further resets and is cleared only by its number.
 fn leaves_an_alarm(
     happen: impl FnOnce(&mut RigAccess<'_, '_>) + Send + 'static,
     cause: ResetCause,
@@ -99,7 +98,6 @@ fn reports_a_brown_out() {
     leaves_an_alarm(|rig| rig.brown_out(), ResetCause::BrownOut, Alarm::BrownOut);
 }
 
-/// Executes this code as a stray function pointer would.
 fn astray(code: &'static [u16], alarm: Alarm) {
     let mut bench = Bench::new(1);
     let resets = bench.report().resets;

@@ -1,5 +1,3 @@
-//! Hello, homing, moves and their failures.
-
 use crate::bench::{Bench, SILENCE, go};
 use farnear_protocol::{
     EventKind, Nanometres, Request, RequestError,

@@ -364,7 +364,6 @@ fn cycles_by_kind_agree_with_the_average_cost() {
     assert!((1.3..2.2).contains(&ratio), "{by_kind} cycles by kind, {one_each} at one an instruction");
 }
 
-/// Homes a stage and captures one frame.
 fn works(bench: &mut Bench) {
     bench.home_axis(Axis::Lens);
     bench.arm(&[fine_shot(50_000, 1_000, 1_000, 200)]);

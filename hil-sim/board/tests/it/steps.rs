@@ -13,11 +13,9 @@ const MOVES: u32 = 1_000;
 const RIGS: u32 = 2;
 /// One period of STEP at 40 kHz.
 const PERIOD_NS: u64 = 25_000;
-/// Between segments an interrupt of the highest priority restarts the timer, in the worst case after the
-/// other axis.
+/// Between segments an interrupt restarts the timer, at worst after the other axis.
 const RESTART_NS: u64 = 1_500;
 
-/// Random moves with an exact number of steps on the pin.
 fn random_moves(seed: u64, moves: u32) {
     let mut bench = Bench::new(seed);
     bench.home();

@@ -28,7 +28,6 @@ pub enum Ended {
     Gone,
 }
 
-/// Statistics of the host.
 #[derive(Clone, Copy, Default)]
 pub struct Counts {
     pub answered: u64,
@@ -78,7 +77,6 @@ impl Client {
             .unwrap_or_default()
     }
 
-    /// Advances time and collects frames.
     fn pass(&mut self, micros: u64) -> Result<(), SimError> {
         self.rig.advance_us(micros)?;
         for packet in self.rig.take_frames() {
@@ -129,8 +127,7 @@ impl Client {
         self.ends.push((request, end));
     }
 
-    /// Sends with repeats; `None` without an answer. After a reset it joins the new boot or session without
-    /// repeating the request.
+    /// `None` without an answer. After a reset it joins the new boot without repeating the request.
     pub fn ask(&mut self, request: &Request) -> Result<Option<(u32, Answer)>, SimError> {
         self.last_id += 1;
         let id = self.last_id;
@@ -146,7 +143,7 @@ impl Client {
                 self.answers.clear();
                 self.counts.answered += 1;
                 if matches!(answer, Err(RequestError::QueueFull { .. })) {
-                    break; // it was not looked at: again
+                    break; // not executed: repeat
                 }
                 if matches!(answer, Err(RequestError::Boot { .. } | RequestError::NotInSession)) {
                     self.join()?;
@@ -160,7 +157,7 @@ impl Client {
         Ok(None)
     }
 
-    /// Says hello and opens a session; returns whether the board answers.
+    /// Returns whether the board answers.
     pub fn join(&mut self) -> Result<bool, SimError> {
         let Some((_, Ok(Response::Hello(hello)))) = self.ask(&Request::Hello)? else { return Ok(false) };
         self.boot = hello.boot;
@@ -188,7 +185,6 @@ impl Client {
         })
     }
 
-    /// Waits and answers keep-alives.
     pub fn wait_us(&mut self, micros: u64) -> Result<(), SimError> {
         let mut left_us = micros;
         while left_us > 0 {
@@ -207,7 +203,6 @@ impl Client {
         Some(self.ends.swap_remove(place).1)
     }
 
-    /// Waits until all of this work has ended.
     pub fn wait_for_ends(&mut self, ids: &[u32]) -> Result<Vec<Ended>, SimError> {
         let mut ends: Vec<Option<Ended>> = vec![None; ids.len()];
         let mut waited_us = 0;

@@ -14,11 +14,9 @@ use farnear_sim::{SimError, scenario::host::Program};
 
 /// Timeout of a repaired board: the watchdog takes 0.2 s, a start 0.1 s.
 const ANSWERS_US: u64 = 3_000_000;
-/// Target of both stages, micrometres.
 const AWAY_UM: [(Axis, f64); 2] = [(Axis::SensorCoarse, 350.0), (Axis::Lens, 250.0)];
 
-/// A stage below this was driven there: beyond a homed one's error (3.2 um), less than homing brakes behind
-/// its switch.
+/// A stage below this was driven there: beyond homing error (3.2 um) and braking behind the switch.
 const BELOW_NM: i32 = -10_000;
 
 /// Reverts all faults and checks that the rig works; returns what fails.
@@ -48,7 +46,6 @@ pub fn recover(client: &mut Client) -> Result<Option<String>, SimError> {
     works(client)
 }
 
-/// Clears latched alarms; returns one that cannot be cleared.
 pub fn clear_alarms(client: &mut Client) -> Result<Option<String>, SimError> {
     for _ in 0..24 {
         let Some(status) = client.status()? else { return Ok(Some("no status comes".into())) };
@@ -62,7 +59,6 @@ pub fn clear_alarms(client: &mut Client) -> Result<Option<String>, SimError> {
     Ok(latched.map(|latched| format!("alarm {} cannot be cleared: {:?}", latched.number, latched.alarm)))
 }
 
-/// Homes, moves and captures; returns what fails.
 fn works(client: &mut Client) -> Result<Option<String>, SimError> {
     let home = |axis| Request::Home { axis, silence: SILENCE };
     let Some(status) = client.status()? else { return Ok(Some("no status comes before homing".into())) };

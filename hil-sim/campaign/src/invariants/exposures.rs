@@ -85,7 +85,6 @@ pub fn exposure(case: &Case<'_>) -> Vec<Broken> {
     found
 }
 
-/// Whether an event reported the end of the run or a missed exposure.
 fn is_excused(sights: &[Sight], shot: &Shot) -> bool {
     let near = |sight: &&Sight| {
         sight.at_ns + TOLD_NS > shot.begin_ns && sight.at_ns < shot.end_ns + TOLD_NS + 500_000_000

@@ -5,16 +5,13 @@ use farnear_protocol::{EventKind, Request, Response};
 use super::{Broken, Case};
 use farnear_sim::observer::Seen;
 
-/// Microsteps against a hard stop until a stall ends the motion: 38 for 6 um of following error, 26 for the
-/// running segment at homing speed, and one rotor period.
+/// Microsteps against a hard stop until a stall: 38 (6 um following error), 26 (segment), one rotor period.
 const PRESSED_MAX: u64 = 150;
-/// From an alarm to the last STEP: running segment 1 ms, tick 0.2 ms, uncertainty of the board's clock 0.5
-/// ms.
+/// From an alarm to the last STEP: running segment 1 ms, tick 0.2 ms, board clock 0.5 ms.
 const LAST_STEP_NS: u64 = 2_000_000;
 /// A stop brakes along the ramp after the terminal event.
 const BRAKING_NS: u64 = 400_000_000;
 
-/// Property `hard-stop`.
 pub fn hard_stop(case: &Case<'_>) -> Vec<Broken> {
     let dead = case.has(&["home-switch-dead"]);
     let mut alarms = 0;
@@ -40,7 +37,6 @@ pub fn hard_stop(case: &Case<'_>) -> Vec<Broken> {
     Vec::new()
 }
 
-/// Property `step-after-alarm`.
 pub fn step_after_alarm(case: &Case<'_>) -> Vec<Broken> {
     let clocks = case.clocks();
     let mut life = 0;
@@ -96,7 +92,6 @@ struct Work {
     until_ns: u64,
 }
 
-/// Property `moves-unasked`.
 pub fn moves_unasked(case: &Case<'_>) -> Vec<Broken> {
     let mut works: Vec<Work> = Vec::new();
     for sight in case.sights {

@@ -93,7 +93,6 @@ fn homes(request: &Request) -> Option<Axis> {
     }
 }
 
-/// Position error, if it is too large.
 fn off(case: &Case<'_>, axis: Axis, measured_nm: i32, truth: &Truth) -> Option<String> {
     let (measured_um, true_um) = (1e-3 * f64::from(measured_nm), truly_um(truth, axis));
     let stated_um = stated_um(case, axis, true_um);

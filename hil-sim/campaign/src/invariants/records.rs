@@ -17,10 +17,8 @@ fn broken(at_ns: u64, what: String) -> Broken {
     Broken { property: "records", at_ns, what }
 }
 
-/// Possible values of a setting.
 #[derive(Default)]
 struct Known {
-    /// Stored value.
     kept: Option<i32>,
     /// Values confirmed since, with times.
     since: Vec<(u64, i32)>,
@@ -62,7 +60,6 @@ fn boots(case: &Case<'_>, lossy: bool) -> Vec<Broken> {
     reported
 }
 
-/// Whether the board reported the loss of a record.
 fn loses(case: &Case<'_>, record: RecordName) -> bool {
     case.sights.iter().any(|sight| match &sight.seen {
         Seen::Reported { event, .. } => {
@@ -72,7 +69,7 @@ fn loses(case: &Case<'_>, record: RecordName) -> bool {
     })
 }
 
-/// When writing stopped before this reset: a hung board writes nothing.
+/// A hung board writes nothing.
 fn wrote_until_ns(case: &Case<'_>, reset_ns: u64) -> u64 {
     let before = case.sights.iter().take_while(|sight| sight.at_ns < reset_ns);
     before.fold(reset_ns, |until, sight| match &sight.seen {

@@ -11,7 +11,6 @@ use farnear_sim::observer::Seen;
 
 type Answer = Result<Response, RequestError>;
 
-/// Property `acts-twice`.
 pub fn acts_twice(case: &Case<'_>) -> Vec<Broken> {
     let mut broken = ends(case);
     broken.extend(answers(case));
@@ -23,7 +22,6 @@ fn twice(at_ns: u64, what: String) -> Broken {
     Broken { property: "acts-twice", at_ns, what }
 }
 
-/// One end per request.
 fn ends(case: &Case<'_>) -> Vec<Broken> {
     let mut ends: BTreeMap<(u32, u32), u32> = BTreeMap::new();
     let mut broken = Vec::new();

@@ -54,7 +54,6 @@ fn at(lens_um: f64) -> Truth {
     Truth { lens_um, ..Truth::default() }
 }
 
-/// Violated properties of a run.
 fn broken(scenario: &str, sights: &[Sight]) -> Vec<&'static str> {
     let scenario = Scenario::parse(scenario).expect("a scenario");
     let parts = Parts::default();
@@ -161,7 +160,6 @@ fn detects_a_changed_setting() {
     assert_eq!((run(3, 10_500), run(3, 4)), (vec![], vec!["records"]));
 }
 
-/// Status of a board with nothing homed, armed or latched.
 fn status(made_ms: u64) -> Status {
     let axis = AxisStatus {
         state: PositionState::Unknown,

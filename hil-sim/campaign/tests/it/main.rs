@@ -1,4 +1,2 @@
-//! Scenarios and traces on the emulated board, played by the host model.
-
 mod replay;
 mod scenarios;

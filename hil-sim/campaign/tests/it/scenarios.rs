@@ -1,5 +1,4 @@
-//! Scenarios that once violated a property, and some that show the file format: every property holds in each
-//! of them.
+//! Scenarios that once violated a property, or show the file format: every property holds.
 
 use std::{fs, path::PathBuf, process::Command, sync::Mutex};
 

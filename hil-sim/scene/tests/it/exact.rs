@@ -1,7 +1,5 @@
-//! The renderer compared with independent ray casting.
-//!
-//! Differences are relative to the mean radiance; one 8-bit code is 8.7e-3. The ray caster's own error is
-//! 1e-4 RMS on planes and 3 to 6e-4 on slopes; smaller bounds would only measure that.
+//! The renderer compared with independent ray casting. Differences are relative to the mean radiance; one
+//! 8-bit code is 8.7e-3. The ray caster's own error is 1e-4 RMS on planes and 3 to 6e-4 on slopes.
 
 #![allow(clippy::unwrap_used, reason = "a test's helpers fail by panicking, as the tests do")]
 
@@ -19,7 +17,7 @@ fn thesis_lens() -> Lens {
     Lens::from_optics(&OpticsFile::parse(text).unwrap()).unwrap()
 }
 
-/// White noise per cell, the hardest texture: mean 1, SD 0.2, uncorrelated.
+/// The hardest texture: mean 1, SD 0.2, uncorrelated.
 fn noise(camera: &Camera) -> Array2<f32> {
     let mut random = ChaCha8Rng::seed_from_u64(5);
     let half_width = 0.2 * 3f32.sqrt();
@@ -40,7 +38,6 @@ struct Check<'a> {
 }
 
 impl Check<'_> {
-    /// RMS and largest difference from the ray caster over these pixels.
     fn difference(&self, pixels: &[(usize, usize)], rays: u32) -> (f64, f64) {
         let Self { lens, camera, sensor_mm, .. } = *self;
         let texture = noise(camera);

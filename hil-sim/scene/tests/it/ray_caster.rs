@@ -1,9 +1,8 @@
 //! Slow exact renderer: traces rays from a pixel through the aperture to the first surface.
 //!
-//! A telecentric lens maps the aperture point `a` (unit disc) and the sensor point `p` to a ray that passes
-//! the image position `p + b a` at the signed blur radius `b`. It hits a height field at the first `b`, from
-//! near to far, with `b >= b_surface(p + b a)`, and takes the texture's radiance there. No convolution,
-//! kernel, slab or interpolation of the crate is used.
+//! A telecentric lens maps the aperture point `a` (unit disc) and the sensor point `p` to a ray through the
+//! image position `p + b a` at the signed blur radius `b`. It hits a height field at the first `b`, from near
+//! to far, with `b >= b_surface(p + b a)`. Uses no convolution, kernel, slab or interpolation of the crate.
 
 use farnear_scene::{Lens, Psf, Scene};
 use ndarray::Array2;
@@ -19,7 +18,6 @@ pub struct RayCaster<'a> {
     pub radial_quantiles: Vec<f64>,
 }
 
-/// Radii of evenly spaced quantiles of the PSF for a blur radius of 1.
 pub fn radial_quantiles(psf: &Psf) -> Vec<f64> {
     let (steps, limit) = (400_000, 12.0);
     let dr = limit / f64::from(steps);

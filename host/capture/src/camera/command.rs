@@ -1,9 +1,7 @@
-//! A program as a camera. It writes pictures to standard output, as YUV4MPEG2 (Y4M) or as raw frames of a
-//! given size and format: `ffmpeg`, `rpicam-vid`, vendor tools.
-//!
-//! The program runs while the camera is open. It must give one picture per trigger (external-trigger mode).
-//! Its pictures have neither number nor time, so only their order identifies them, and a surplus or missing
-//! one fails the whole program of exposures.
+//! A program as a camera: `ffmpeg`, `rpicam-vid` or vendor tools that write pictures to standard output, as YUV4MPEG2
+//! (Y4M) or as raw frames of a given size and format. The program runs while the camera is open and must give one
+//! picture per trigger (external-trigger mode). Its pictures have neither number nor time, so only their order
+//! identifies them, and a surplus or missing one fails the whole program of exposures.
 
 use std::{
     io::{BufRead, BufReader, Read},
@@ -33,9 +31,7 @@ use crate::describe::trigger_name;
 const QUEUE: usize = 16;
 /// Programs that cannot work usually end within this time.
 const EARLY_END: Duration = Duration::from_millis(300);
-/// Kept bytes of the program's messages.
 const MESSAGES: usize = 400;
-/// Limit for damaged headers.
 const LONGEST_SIDE_PX: usize = 16_384;
 
 #[derive(Clone, PartialEq, Eq, Debug)]
@@ -84,7 +80,6 @@ impl Raw {
         layout.decode(&bytes, width, height)
     }
 
-    /// Usual cause of surplus bytes.
     fn padding_hint(self) -> String {
         let Self { width, height, layout, .. } = self;
         let row = layout.row_bytes(width).unwrap_or(width);
@@ -102,7 +97,6 @@ impl Raw {
 
 /// Row padding of the Raspberry Pi's programs and many others.
 const PADDING: usize = 64;
-/// Syntax of raw frames.
 const RAW_FORMAT: &str = "WIDTHxHEIGHT[/STRIDE]:FORMAT:PROGRAM";
 
 impl FromStr for CommandLine {
@@ -141,26 +135,22 @@ impl FromStr for CommandLine {
     }
 }
 
-/// A picture with its arrival time.
 type Arrived = (Image, Instant);
 
 pub struct CommandCamera {
     name: String,
     child: Child,
     frames: Receiver<Result<Arrived, String>>,
-    /// Bytes of an incomplete frame.
     partial: Arc<AtomicUsize>,
     raw: Option<Raw>,
     /// End of the program's standard error.
     messages: Arc<Mutex<String>>,
     pairing: Pairing,
-    /// Why no more frames come.
     ended: Option<String>,
 }
 
 impl CommandCamera {
-    /// Starts the program.
-    /// Errors: [`CameraError::Unusable`] if it cannot start or ends immediately.
+    /// Starts the program. Fails if it cannot start or ends immediately.
     pub fn start(line: &CommandLine) -> Result<Self, CameraError> {
         let name = line.words[0].clone();
         let unusable = |reason: String| CameraError::Unusable { camera: format!("`{name}`"), reason };
@@ -208,8 +198,8 @@ impl CommandCamera {
     /// Why no more frames come, with exit status and messages.
     fn failed(&mut self) -> CameraError {
         let mut reason = self.ended.clone().unwrap_or_default();
-        // The program usually ends shortly after its output and explains why. The message thread holds an
-        // `Arc` until then.
+        // The program usually ends shortly after its output and explains why. The message thread holds an `Arc` until
+        // then.
         let until = Instant::now() + EARLY_END;
         let status = loop {
             let status = self.child.try_wait().ok().flatten();
@@ -229,7 +219,6 @@ impl CommandCamera {
         CameraError::Unusable { camera: format!("`{}`", self.name), reason }
     }
 
-    /// Drops queued pictures.
     fn drain(&mut self) -> Result<(), CameraError> {
         while self.take(Duration::ZERO)?.is_some() {}
         Ok(())

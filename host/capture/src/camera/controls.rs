@@ -7,17 +7,15 @@ pub enum Setting {
     ExposureUs(f64),
     /// Unit as in the camera's [`Control`].
     Gain(f64),
-    /// Unit as in the camera's [`Control`].
     BlackLevel(f64),
     /// Name as listed by the camera.
     PixelFormat(String),
-    /// Region of the sensor: column, row, width, height in pixels.
+    /// Column, row, width, height in pixels.
     Region([u32; 4]),
-    /// Input line as listed by the camera.
+    /// Line as listed by the camera.
     TriggerSource(String),
 }
 
-/// Names in the user interface.
 const NAMES: [&str; 6] = ["exposure_us", "gain", "black_level", "pixel_format", "region", "trigger_source"];
 
 impl Setting {
@@ -32,7 +30,6 @@ impl Setting {
         }
     }
 
-    /// Value as the user writes it.
     pub fn value(&self) -> String {
         match self {
             Self::ExposureUs(value) | Self::Gain(value) | Self::BlackLevel(value) => value.to_string(),
@@ -84,7 +81,6 @@ pub struct Control {
 #[derive(Clone, PartialEq, Debug)]
 pub enum Range {
     Fixed,
-    /// Closed interval.
     Number {
         min: f64,
         max: f64,
@@ -95,7 +91,7 @@ pub enum Range {
 }
 
 impl Range {
-    /// Whether a number is in range; always false for names.
+    /// Whether a number is in range; false for names.
     pub fn has(&self, value: f64) -> bool {
         matches!(self, Self::Number { min, max, .. } if (*min..=*max).contains(&value))
     }

@@ -1,5 +1,4 @@
-//! A folder as a camera: a vendor program, `gphoto2 --capture-tethered` or a phone stores one image file per
-//! trigger.
+//! A folder as a camera: a vendor program, `gphoto2 --capture-tethered` or a phone stores one image file per trigger.
 
 use std::{
     collections::BTreeMap,
@@ -22,11 +21,11 @@ use super::{
 use crate::describe::trigger_name;
 
 const POLL: Duration = Duration::from_millis(20);
-/// A file unchanged for this long that is no image is invalid.
+/// A non-image file is invalid after this time without a change.
 const QUIET: Duration = Duration::from_secs(2);
 const ENDINGS: [&str; 7] = ["png", "tif", "tiff", "jpg", "jpeg", "pgm", "ppm"];
 
-/// New image files of a folder, in order of writing.
+/// Uses new image files in order of writing.
 #[derive(Debug)]
 pub struct FolderCamera {
     folder: PathBuf,
@@ -36,7 +35,6 @@ pub struct FolderCamera {
     pairing: Pairing,
 }
 
-/// A file that was already used.
 #[derive(Clone, Debug)]
 struct Used {
     written: SystemTime,
@@ -46,7 +44,6 @@ struct Used {
 }
 
 impl FolderCamera {
-    /// Watches an existing folder.
     pub fn watch(folder: &Path) -> Result<Self, CameraError> {
         let mut camera = Self {
             folder: folder.into(),
@@ -67,7 +64,6 @@ impl FolderCamera {
         Ok(())
     }
 
-    /// Image files with modification time and size.
     fn pictures(&self) -> Result<Vec<(SystemTime, PathBuf, u64)>, CameraError> {
         let failed = |source| CameraError::Folder { folder: self.folder.clone(), source };
         let mut pictures = Vec::new();
@@ -87,9 +83,8 @@ impl FolderCamera {
         Ok(pictures)
     }
 
-    /// New image files, oldest first; equal times are ordered by number or name.
-    /// Errors: [`CameraError::Overwritten`] for a rewritten file, [`CameraError::File`] for one picture in
-    /// two formats.
+    /// New images, oldest first, then by number or name. Returns [`CameraError::Overwritten`] for a rewritten file,
+    /// [`CameraError::File`] for one picture in two formats.
     fn fresh(&self) -> Result<Vec<(SystemTime, PathBuf)>, CameraError> {
         let mut fresh = Vec::new();
         for (written, path, bytes) in self.pictures()? {
@@ -120,7 +115,7 @@ impl FolderCamera {
         Ok(fresh)
     }
 
-    /// The next image with file and time; `None` at the timeout.
+    /// The next image; `None` at the timeout.
     fn next(&mut self, wait: Duration) -> Result<Option<(Image, SystemTime, PathBuf)>, CameraError> {
         let until = Instant::now() + wait;
         loop {

@@ -1,5 +1,5 @@
-//! GigE Vision and USB3 Vision cameras through Aravis with GenICam SFNC feature names. Cargo feature
-//! `genicam`, because not every system has the library (Debian: `libaravis-dev`).
+//! GigE Vision and USB3 Vision cameras through Aravis with GenICam SFNC names. A cargo feature, `genicam`, because not
+//! every system has the library (Debian: `libaravis-dev`).
 
 mod settings;
 
@@ -27,16 +27,12 @@ use super::{
 };
 use crate::describe::trigger_name;
 
-/// Frame buffers of the library.
 const BUFFERS: usize = 16;
-/// Default clock of a GigE Vision camera, ticks per second.
 const USUAL_TICKS: i64 = 1_000_000_000;
-/// Trigger source of software triggers.
 const SOFTWARE: &str = "Software";
 
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct FoundCamera {
-    /// Identifier for opening.
     pub id: String,
     /// Vendor, model and transport.
     pub about: String,
@@ -79,8 +75,7 @@ pub struct GenicamCamera {
 }
 
 impl GenicamCamera {
-    /// Opens the camera with this id from [`devices`], or the first one if empty.
-    /// Errors: [`CameraError::Unusable`] if absent or held by another program.
+    /// Opens a camera by its id from [`devices`], or the first one if empty. Fails if absent or in use.
     pub fn open(id: &str) -> Result<Self, CameraError> {
         let found = devices();
         let there = |found: &[FoundCamera]| {
@@ -148,8 +143,7 @@ impl GenicamCamera {
     fn failed(&self) -> impl Fn(aravis::glib::Error) -> CameraError + '_ {
         move |error| {
             let silent = self.lost.load(Ordering::Relaxed) || error.matches(DeviceError::Timeout);
-            // For a silent camera Aravis also reports a missing channel or packets of 0 bytes, so the camera
-            // is queried again.
+            // Aravis also reports a missing channel or packets of 0 bytes for a silent camera, so query again.
             match silent || !self.answers() {
                 true => self.gone(),
                 false => unusable(&self.id, error.to_string()),
@@ -174,7 +168,6 @@ impl GenicamCamera {
         Ok(())
     }
 
-    /// Starts an empty stream.
     fn start(&mut self) -> Result<(), CameraError> {
         let stream = self.streaming().map_err(self.failed())?;
         self.stream = Some(stream);
@@ -193,7 +186,6 @@ impl GenicamCamera {
         Ok(stream)
     }
 
-    /// Trigger line.
     fn line(&self) -> Result<String, CameraError> {
         if let Some(source) = &self.trigger_source {
             return Ok(source.clone());
@@ -204,7 +196,6 @@ impl GenicamCamera {
             .ok_or_else(|| unusable(&self.id, "it has no input line for a trigger".into()))
     }
 
-    /// The next frame; `None` at the timeout.
     fn take(&mut self, wait: Duration) -> Result<Option<Frame>, CameraError> {
         let Some(stream) = &self.stream else { return Ok(None) };
         let micros = u64::try_from(wait.as_micros()).unwrap_or(u64::MAX).max(1);
@@ -259,7 +250,6 @@ impl GenicamCamera {
     }
 }
 
-/// Description of lost packets.
 fn packets(stream: &Stream) -> String {
     stream.downcast_ref::<GvStream>().map_or_else(String::new, |stream| {
         let (resent, missing) = stream.statistics();

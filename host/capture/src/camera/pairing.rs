@@ -1,10 +1,9 @@
 //! Pairs frames with exposures.
 //!
-//! One set of rules for all cameras, based on frame count, time stamps, arrival, file time and pixels.
-//! Between arming and the end of a program the n-th frame belongs to the n-th trigger. The camera's count
-//! must advance with the board's trigger number, and its time stamps with the strobe. Contradictions are
-//! errors, never guesses. A surplus or missing frame is found at the end of the program at the latest
-//! ([`super::Camera::finish`]).
+//! One set of rules for all cameras, based on frame count, time stamps, arrival, file time and pixels. Between arming
+//! and the end of a program the n-th frame belongs to the n-th trigger. The camera's count must advance with the
+//! board's trigger number, and its time stamps with the strobe. Contradictions are errors, never guesses. A surplus or
+//! missing frame is found at the end of the program at the latest ([`super::Camera::finish`]).
 
 use std::{
     cmp::Ordering,
@@ -16,8 +15,7 @@ use farnear_protocol::message::ShotRecord;
 
 use super::{CameraError, Image};
 
-/// Jitter of stamps against the strobe: GigE Vision a microsecond, Video4Linux an interrupt or some lines of
-/// read-out.
+/// Jitter of stamps against the strobe: GigE Vision a microsecond, Video4Linux an interrupt or some lines of read-out.
 const JITTER: Duration = Duration::from_millis(2);
 /// Delay until a picture from a pipe is stamped; it never counts as earlier.
 const ARRIVAL_JITTER: Duration = Duration::from_millis(10);
@@ -36,7 +34,6 @@ pub struct Stamp {
     pub time: Option<Duration>,
 }
 
-/// Known properties of a picture.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub struct Evidence {
     pub stamp: Stamp,
@@ -70,14 +67,12 @@ pub fn content(image: &Image) -> Option<u64> {
 pub enum Belongs {
     Earlier,
     Here,
-    /// Of a later trigger: number of skipped ones.
+    /// Number of skipped triggers.
     Later(u64),
 }
 
-/// Frames since arming.
 #[derive(Clone, Debug)]
 pub struct Pairing {
-    /// Last pair.
     last: Option<(Evidence, ShotRecord)>,
     jitter: Duration,
     armed: Option<Instant>,
@@ -110,13 +105,11 @@ impl Pairing {
         }
     }
 
-    /// Restarts after arming.
     pub fn begin(&mut self) {
         *self = Self::with_jitter(self.jitter);
         self.armed = Some(Instant::now());
     }
 
-    /// Accepts the board's report of an exposure.
     pub fn reported(&mut self, shot: &ShotRecord, received: Instant) {
         if self.begin_us.is_none() {
             self.begin_us = Some(shot.trigger.0.saturating_sub(u64::from(shot.settle.0)));
@@ -126,21 +119,20 @@ impl Pairing {
         self.in_real_time &= over.is_some_and(|over| over <= received);
     }
 
-    /// Earliest local time of a board time in us: the program began after arming.
+    /// The program began after arming.
     fn at_least(&self, board_us: u64) -> Option<Instant> {
         let since_us = board_us.saturating_sub(self.begin_us?);
         let drift_us = since_us.saturating_mul(DRIFT_PPM) / 1_000_000;
         Some(self.armed? + Duration::from_micros(since_us - drift_us))
     }
 
-    /// Quiet time after the program: its longest interval.
     pub fn quiet_time(&self) -> Duration {
         self.longest.max(QUIET)
     }
 
-    /// Checks the next frame against the pending exposure. `camera` is for messages.
-    /// Errors: [`CameraError::Mispaired`] if count and time contradict each other; [`CameraError::Doubled`],
-    /// [`CameraError::Reordered`], [`CameraError::Stale`] for an impossible picture.
+    /// Checks the next frame against the pending exposure. `camera` is for messages. Returns [`CameraError::Mispaired`]
+    /// if count and time contradict each other; [`CameraError::Doubled`], [`CameraError::Reordered`],
+    /// [`CameraError::Stale`] for an impossible picture.
     pub fn judge(
         &mut self,
         camera: &str,
@@ -214,8 +206,7 @@ impl Pairing {
     }
 }
 
-/// Orders two files by their trailing number; four-digit counters wrap after 9999. `None` unless only the
-/// number differs.
+/// Orders two files by their trailing number; four-digit counters wrap after 9999. `None` if more differs.
 pub fn by_number(a: &Path, b: &Path) -> Option<Ordering> {
     let split = |path: &Path| {
         let stem = path.file_stem()?.to_str()?.to_owned();
@@ -279,7 +270,6 @@ mod tests {
         ShotRecord { settle: Micros(10_000), ..shot(trigger_number, strobe_us) }
     }
 
-    /// Checks a picture that arrived `arrived_ms` after arming, for an exposure reported at its end.
     fn arrive(pairing: &mut Pairing, shot: ShotRecord, arrived_ms: u64) -> Result<Belongs, CameraError> {
         let armed = pairing.armed.unwrap();
         let reported = armed
@@ -408,7 +398,7 @@ mod tests {
     }
 
     proptest! {
-        // Lost frames never shift later ones, and no received frame is refused.
+        // Also, no received frame is rejected.
         #[test]
         fn lost_frames_never_shift_the_others(
             lost in prop::collection::vec(prop::bool::weighted(0.1), 2..300),

@@ -1,7 +1,5 @@
-//! Converts camera pixels to 16-bit grey values.
-//!
-//! Names as in Video4Linux and ffmpeg, and GenICam's PFNC for machine vision. YUV gives its luma, MJPEG the
-//! mean of the colours, as for picture files. Cost: one pass.
+//! Converts camera pixels to 16-bit grey values. Names as in Video4Linux and ffmpeg, and GenICam's PFNC for machine
+//! vision. YUV gives its luma, MJPEG the mean of the colours, as for picture files. Cost: one pass.
 
 use std::{fmt, str::FromStr};
 
@@ -10,7 +8,6 @@ use ndarray::Array2;
 
 use super::Image;
 
-/// Pixel layout of a frame.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Layout {
     /// One byte per pixel (GREY, gray, Mono8), or the luma of planar YUV.
@@ -33,7 +30,7 @@ pub enum Layout {
     Jpeg,
 }
 
-/// Names of raw layouts, as in ffmpeg's `-pix_fmt`.
+/// As in ffmpeg's `-pix_fmt`.
 const RAW_NAMES: [(&str, Layout); 8] = [
     ("gray", Layout::Grey8 { colour_twelfths: 0 }),
     ("gray10le", Layout::Grey16 { bits: 10 }),
@@ -58,7 +55,6 @@ impl FromStr for Layout {
     }
 }
 
-/// Bytes that do not match the announced size and layout.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct BadFrame(pub String);
 
@@ -69,7 +65,7 @@ impl fmt::Display for BadFrame {
 }
 
 impl Layout {
-    /// Significant bits; 8 for a JPEG.
+    /// 8 for a JPEG.
     pub fn bits(self) -> u8 {
         match self {
             Self::Grey16 { bits } => bits,
@@ -112,8 +108,7 @@ impl Layout {
         self.frame_bytes(stride.div_ceil(per_pixel), height)
     }
 
-    /// Removes the padding of rows of `stride` bytes.
-    /// Errors: [`BadFrame`] for too few bytes.
+    /// Removes row padding. Fails for too few bytes.
     pub fn without_padding(
         self,
         bytes: &[u8],
@@ -136,9 +131,7 @@ impl Layout {
         Ok(rows.concat())
     }
 
-    /// Decodes a frame; surplus bytes are ignored.
-    /// Errors: [`BadFrame`] for too few bytes, a value above the bit depth, a broken JPEG or one of another
-    /// size.
+    /// Decodes a frame; surplus bytes are ignored. Fails for too few bytes, values above the bit depth, or a bad JPEG.
     pub fn decode(self, bytes: &[u8], width: usize, height: usize) -> Result<Image, BadFrame> {
         if self == Self::Jpeg {
             return jpeg(bytes, width, height);
@@ -214,8 +207,7 @@ fn jpeg(bytes: &[u8], width: usize, height: usize) -> Result<Image, BadFrame> {
     Ok(image)
 }
 
-/// Converts a picture file.
-/// Errors: a message for floating-point pixels.
+/// Converts a picture file; rejects floating-point pixels.
 pub fn of_picture(picture: GreyImage) -> Result<Image, String> {
     let Samples::Integer(bits) = picture.samples else {
         return Err("a camera's image has integer pixels, this one has float".into());

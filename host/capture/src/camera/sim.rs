@@ -30,17 +30,14 @@ const QUEUE: usize = 8;
 const BETWEEN_EXPOSURES_US: u32 = 15_000;
 /// Tolerance between strobe and reported exposure start.
 const SAME_MOMENT_US: u64 = 50;
-/// Exposure time of the live view.
 const WATCH_EXPOSURE: Micros = Micros(5_000);
 
-/// Connection to the camera endpoint of `farnear-sim`.
 pub struct SimCamera {
     address: String,
     stream: TcpStream,
     queue: Arc<Queue>,
     // Reads continuously, so that the simulator is not blocked while the host waits for events.
     reader: Option<JoinHandle<()>>,
-    /// Signals the end of the reader.
     ended: Receiver<()>,
     runs_freely: bool,
     /// Image that replaces an earlier one.
@@ -54,7 +51,6 @@ struct Frame {
     pixels: Vec<u16>,
 }
 
-/// Queue between reader and consumer.
 #[derive(Default)]
 struct Queue {
     frames: Mutex<Waiting>,
@@ -64,7 +60,6 @@ struct Queue {
 #[derive(Default)]
 struct Waiting {
     frames: VecDeque<Result<Frame, CameraError>>,
-    /// One side has ended.
     closed: bool,
 }
 
@@ -73,8 +68,7 @@ impl Queue {
         self.frames.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Adds an image, waiting for room; free-running images replace the oldest instead. Returns whether there
-    /// is a consumer.
+    /// Waits for room; free-running images replace the oldest instead. Returns whether there is a consumer.
     fn push(&self, frame: Result<Frame, CameraError>) -> bool {
         let mut waiting = self.lock();
         while waiting.frames.len() >= QUEUE && !waiting.closed {
@@ -91,7 +85,7 @@ impl Queue {
         !waiting.closed
     }
 
-    /// The next image; `None` at the timeout, an error if no more can come.
+    /// `None` at the timeout, an error if no more can come.
     fn pop(&self, until: Instant) -> Result<Option<Result<Frame, CameraError>>, ()> {
         let mut waiting = self.lock();
         loop {
@@ -117,7 +111,6 @@ impl Queue {
 }
 
 impl SimCamera {
-    /// Connects to `host:port`.
     pub fn connect(address: &str) -> Result<Self, CameraError> {
         let failed = |reason: String| CameraError::Connect { address: address.into(), reason };
         let resolved = address.to_socket_addrs().map_err(|error| failed(error.to_string()))?.next();
@@ -154,7 +147,6 @@ impl SimCamera {
         })
     }
 
-    /// Advances the simulator's virtual time while it is idle.
     pub fn advance(&mut self, micros: u64) -> Result<(), CameraError> {
         self.control(&Control::AdvanceMicros(micros))
     }
@@ -247,7 +239,7 @@ impl Camera for SimCamera {
     }
 
     fn newest(&mut self, wait: Duration) -> Result<Option<Picture>, CameraError> {
-        // Idle virtual time stands; advance it by one picture.
+        // Idle virtual time does not advance; advance it by one picture.
         self.advance(u64::from(WATCH_EXPOSURE.0 + BETWEEN_EXPOSURES_US))?;
         let frame = match self.queue.pop(Instant::now() + wait) {
             Ok(Some(frame)) => frame?,

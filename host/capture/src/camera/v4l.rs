@@ -1,5 +1,4 @@
-//! Video4Linux cameras: device list, formats and error messages. The device itself is in `device` (cargo
-//! feature `v4l2`).
+//! Video4Linux cameras: device list, formats and error messages. The device is in `device` (feature `v4l2`).
 
 #[cfg(all(feature = "v4l2", target_os = "linux"))]
 mod device;
@@ -16,7 +15,6 @@ use super::{CameraError, pixels::Layout};
 
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct FoundDevice {
-    /// E.g. `/dev/video0`.
     pub path: PathBuf,
     /// Driver's name; empty if unknown.
     pub name: String,
@@ -52,7 +50,6 @@ pub const FORMATS: [([u8; 4], Layout); 6] = [
 ];
 
 /// The device's best format: most bits, then least processed.
-/// Errors: [`CameraError::Unusable`] with the offered formats.
 pub fn best_format(device: &Path, offered: &[[u8; 4]]) -> Result<([u8; 4], Layout), CameraError> {
     FORMATS.into_iter().find(|(name, _)| offered.contains(name)).ok_or_else(|| {
         let text = |name: &[u8; 4]| String::from_utf8_lossy(name).trim().to_owned();
@@ -64,7 +61,6 @@ pub fn best_format(device: &Path, offered: &[[u8; 4]]) -> Result<([u8; 4], Layou
 }
 
 /// Checks a device file without opening it, for a clear error.
-/// Errors: [`CameraError::Unusable`] if absent or not a device.
 pub fn check_path(device: &Path) -> Result<(), CameraError> {
     let metadata = fs::metadata(device).map_err(|error| refused(device, &error))?;
     #[cfg(unix)]
@@ -104,7 +100,6 @@ fn unusable(device: &Path, reason: String) -> CameraError {
     CameraError::Unusable { camera: device.display().to_string(), reason }
 }
 
-/// Group of a file.
 #[cfg(unix)]
 fn group_of(path: &Path) -> Option<String> {
     let number = std::os::unix::fs::MetadataExt::gid(&fs::metadata(path).ok()?);
@@ -116,7 +111,6 @@ fn group_of(_: &Path) -> Option<String> {
     None
 }
 
-/// Group name in the text of `/etc/group`.
 #[cfg_attr(not(unix), allow(dead_code))]
 fn group_name(groups: &str, number: u32) -> Option<String> {
     groups.lines().find_map(|line| {

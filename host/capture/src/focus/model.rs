@@ -1,13 +1,11 @@
 //! Focus position from the spectra of three blurred images.
 //!
-//! Blur of standard deviation `s` pixels multiplies the power at frequency `w` by `exp(-s^2 w^2)`, with `s =
-//! k e / (2 Fe d)` at the distance `e` from focus (`d` = pixel pitch). The log ratio of two images' power is
-//! therefore linear in `w^2`, independent of texture: `ln(Pi / Pj) = -(k / (2 Fe d))^2 (ei^2 - ej^2) w^2`.
-//! With both positions known, the slope gives `e` (after Subbarao). For other PSFs it holds while blur is
-//! small against `1 / w`, so higher frequencies are excluded. A wrong `k` only changes the next step's
-//! length.
-//!
-//! Cost: one FFT of the image binned by two, and 30 operations a pixel.
+//! Blur of standard deviation `s` pixels multiplies the power at frequency `w` by `exp(-s^2 w^2)`, with
+//! `s = k e / (2 Fe d)` at the distance `e` from focus (`d` = pixel pitch). The log ratio of two images' power is
+//! therefore linear in `w^2`, independent of texture: `ln(Pi / Pj) = -(k / (2 Fe d))^2 (ei^2 - ej^2) w^2`. With both
+//! positions known, the slope gives `e` (after Subbarao). For other PSFs it holds while blur is small against `1 / w`,
+//! so higher frequencies are excluded. A wrong `k` only changes the next step's length. Cost: one FFT of the binned
+//! image.
 
 use farnear_depth::fourier::{Complex64, transform};
 use ndarray::Array2;
@@ -25,23 +23,21 @@ const SMALL_RATIO: f64 = 1.0;
 /// Rings that contain only noise in a blurred image.
 const NOISE_RINGS: usize = 8;
 
-/// Power spectrum of an image, averaged over rings.
 #[derive(Clone, PartialEq, Debug)]
 pub(super) struct Spectrum {
-    /// Position of the image, nm.
+    /// Position, nm.
     pub place: f64,
     power: [f64; RINGS],
-    /// Frequencies per ring.
     count: [f64; RINGS],
 }
 
-/// Frequency of a ring, rad per original pixel.
+/// Rad per original pixel.
 fn frequency(ring: usize) -> f64 {
     (ring as f64 + 0.5) / RINGS as f64 * std::f64::consts::PI / BIN as f64
 }
 
 impl Spectrum {
-    /// Spectrum of an image of at least 16 x 16 px.
+    /// At least 16 x 16 px.
     pub(super) fn of(image: &Array2<f32>, place: f64) -> Self {
         let mut binned = super::binned(image, BIN);
         let (height, width) = binned.dim();
@@ -73,8 +69,7 @@ impl Spectrum {
     }
 }
 
-/// Focus position in nm; `None` for noise only or equal positions. `blur_per_nm`: blur SD in px per nm of
-/// defocus.
+/// Focus position in nm; `None` for noise only or equal positions. `blur_per_nm`: blur SD in px per nm of defocus.
 pub(super) fn estimate(images: &[Spectrum], blur_per_nm: f64) -> Option<f64> {
     let noise = images.iter().map(Spectrum::noise).fold(f64::INFINITY, f64::min);
     let (mut sum, mut weights) = (0.0, 0.0);
@@ -116,7 +111,6 @@ fn slope(one: &Spectrum, other: &Spectrum, noise: f64) -> Option<f64> {
 mod tests {
     use super::*;
 
-    /// Waves of many directions and lengths, blurred by a Gaussian of `blur_px`.
     fn texture(blur_px: f64) -> Array2<f32> {
         let waves: Vec<(f64, f64, f64)> = (1..120)
             .map(|i| {

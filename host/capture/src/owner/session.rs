@@ -16,10 +16,8 @@ use crate::{
     link_rate,
 };
 
-/// Reconnection interval.
 const RECONNECT: Duration = Duration::from_millis(500);
 
-/// A board between two hellos.
 #[derive(Clone)]
 pub(crate) struct Session {
     /// Session count of this owner.
@@ -27,15 +25,12 @@ pub(crate) struct Session {
     pub hello: Arc<Hello>,
     pub version: u8,
     pub rate: LinkRate,
-    /// Port name in this session.
     pub port: Arc<str>,
 }
 
-/// Cause of a session's end.
 #[derive(Clone, Debug)]
 pub(crate) enum Break {
     Gone(Arc<io::Error>),
-    /// Another host has opened a session.
     TakenOver,
     OtherBoard {
         was: [u8; 12],
@@ -54,7 +49,6 @@ pub(crate) enum Break {
 }
 
 impl Break {
-    /// Whether the port must be reopened.
     fn has_no_line(&self) -> bool {
         matches!(self, Self::Gone(_) | Self::OtherBoard { .. })
     }
@@ -83,7 +77,6 @@ impl Owner {
         self.last_break.clone().filter(|_| session != self.session.number)
     }
 
-    /// Ends the session if the error does.
     pub(super) fn break_off(&mut self, error: &ClientError) {
         let broken = match error {
             ClientError::Gone { source, .. } => Break::Gone(Arc::clone(source)),
@@ -187,7 +180,6 @@ impl Owner {
         self.join_events()
     }
 
-    /// Starts event delivery.
     pub(super) fn join_events(&mut self) -> Result<(), ClientError> {
         let due = self.status("reading the status")?.next_event;
         self.events.due = due;

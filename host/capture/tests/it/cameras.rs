@@ -69,7 +69,7 @@ fn reads_new_images_in_order_and_waits_for_incomplete_ones() {
     assert!(late.to_string().contains("exposure 7"), "{late}");
 }
 
-/// Endpoint that sends images with these shot ids and disconnects.
+/// Sends images with these shot ids and disconnects.
 fn endpoint(shots: &'static [u32], trailing: &'static [u8]) -> String {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let address = listener.local_addr().unwrap().to_string();

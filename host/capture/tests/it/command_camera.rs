@@ -23,7 +23,7 @@ fn script(text: &str) -> Result<CommandCamera, CameraError> {
     start(&format!("sh -c \"{text}\""))
 }
 
-/// Opens the camera, waits for an image, and returns the error.
+/// Waits for an image.
 fn failure(camera: Result<CommandCamera, CameraError>) -> String {
     let failed = |mut camera: CommandCamera| camera.image(&shot(1), WAIT).map(|_| ());
     camera.and_then(failed).unwrap_err().to_string()

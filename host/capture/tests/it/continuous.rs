@@ -20,7 +20,7 @@ use crate::scripted::{SHOT, connect};
 const WAIT: Duration = Duration::from_millis(20);
 const PAIR: [Shot; 2] = [SHOT, Shot { target: Nanometres(150_000), ..SHOT }];
 
-/// A camera whose pictures contain their trigger number, with configured losses.
+/// Its pictures contain their trigger number, with configured losses.
 #[derive(Default)]
 struct Losing {
     lost: Vec<u32>,
@@ -45,7 +45,6 @@ impl Camera for Losing {
     }
 }
 
-/// Runs; returns picture or loss per frame.
 fn run(faults: Faults, mut camera: Losing, exposures: u32) -> Result<Vec<Result<u16, Loss>>, CaptureError> {
     let (client, _peer) = connect(faults);
     let pace = Pace { period: Micros(40_000), exposures };

@@ -1,7 +1,5 @@
-//! GigE Vision over the real transport with Aravis' fake camera on loopback.
-//!
-//! The fake camera draws the frame number: the pixel in column x, row y of frame n is (x + y + n) mod 255 at
-//! 10 ms exposure without gain. Tests can therefore identify each frame.
+//! GigE Vision over the real transport with Aravis' fake camera on loopback. The fake camera draws the frame number:
+//! the pixel in column x, row y of frame n is (x + y + n) mod 255 at 10 ms exposure without gain.
 
 use std::{
     process::{Child, Command, Stdio},
@@ -23,7 +21,6 @@ use super::cameras::shot;
 const WAIT: Duration = Duration::from_secs(20);
 /// Exposure for full contrast.
 const EXPOSURE: Micros = Micros(10_000);
-/// Modulus of the numbers.
 const NUMBERS: u64 = 255;
 /// Scheduling delay: the fake camera stamps frames in its own process.
 const SCHEDULING: Duration = Duration::from_secs(15);
@@ -48,7 +45,6 @@ impl Fake {
         Self { child, _alone: alone }
     }
 
-    /// Opens it once it answers.
     fn open(&self) -> GenicamCamera {
         let until = Instant::now() + WAIT;
         loop {
@@ -72,7 +68,6 @@ impl Drop for Fake {
     }
 }
 
-/// Number drawn into a frame, modulo [`NUMBERS`].
 fn drawn(pixels: &ndarray::Array2<u16>) -> u64 {
     u64::from(pixels[[0, 0]])
 }

@@ -1,5 +1,4 @@
-//! GigE Vision end to end: the emulated board triggers, the camera answers through Aravis, and frames are
-//! compared with the rig's TCP endpoint.
+//! GigE Vision end to end: the emulated board triggers, Aravis receives, and the TCP endpoint has equal frames.
 
 use std::{
     io::{BufRead, BufReader},

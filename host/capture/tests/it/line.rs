@@ -130,8 +130,7 @@ fn distinguishes_a_noisy_line_from_a_dead_one() {
 
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
-    /// Garbage with a final delimiter costs nothing; otherwise the next frame is lost and its request
-    /// repeated behind a flushing delimiter.
+    /// Garbage with a final delimiter costs nothing; otherwise the next frame is lost and repeated.
     #[test]
     fn survives_garbage_on_the_line(garbage in proptest::collection::vec(any::<u8>(), 0..600)) {
         let mut delimited = garbage;

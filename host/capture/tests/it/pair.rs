@@ -23,7 +23,6 @@ use ndarray::Array2;
 
 const SENSOR: SensorPair = SensorPair { far_mm: 52.8313, near_mm: 52.9875 };
 
-/// A camera with this answer per exposure.
 struct Answering(fn(&ShotRecord) -> Result<Image, CameraError>);
 
 impl Camera for Answering {
@@ -41,12 +40,10 @@ impl Camera for Answering {
     }
 }
 
-/// Pictures contain their trigger number.
 fn numbered() -> Answering {
     Answering(|shot| Ok(Image { pixels: Array2::from_elem((3, 4), shot.trigger_number as u16), bits: 8 }))
 }
 
-/// Returns the picture of the next trigger.
 fn one_ahead() -> Answering {
     Answering(|shot| Err(CameraError::Skipped { wanted: shot.trigger_number, came: shot.trigger_number + 1 }))
 }

@@ -9,8 +9,7 @@ use farnear_protocol::{
 };
 use farnear_scripted_board::{Board, Faults, Peer};
 
-/// Short timeouts for a board that answers immediately or never. The one for work tolerates scheduling
-/// delays.
+/// Short timeouts for a board that answers immediately or never. Work tolerates scheduling.
 pub const SHORT: Timing = Timing {
     reply: Duration::from_millis(20),
     retries: 3,
@@ -40,14 +39,12 @@ pub fn connect(faults: Faults) -> (Client, Peer) {
     (client, peer)
 }
 
-/// Connection error with these faults and this change.
 pub fn connect_error(faults: Faults, change: impl FnOnce(&mut Board)) -> ClientError {
     let peer = Peer::new(faults);
     change(&mut peer.board());
     Client::connect(peer.connect(), "scripted").err().unwrap()
 }
 
-/// Arms and runs a program; `on_shot` receives each exposure.
 pub fn run_shots(
     client: &Client,
     shots: &[Shot],

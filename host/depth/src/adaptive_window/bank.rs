@@ -1,4 +1,4 @@
-//! The filters in front of the windows: the residual's four parts and the matched filter, for either kind of operators.
+//! Filters before the windows: the residual's four parts and the matched filter, for either kind of operators.
 
 use super::whitened::Whitened;
 use crate::depth_of_alpha::DepthOfAlpha;
@@ -7,7 +7,7 @@ use crate::operators::{DesignError, Operators, linearise};
 use crate::optics::Optics;
 use crate::simd::{self, Backend, MAX_ROWS, Plane, Taps};
 
-/// A set of filters.
+/// Filter bank.
 #[derive(Debug, Clone)]
 pub enum Bank {
     /// White residual.
@@ -17,20 +17,16 @@ pub enum Bank {
 }
 
 impl Bank {
-    /// The filters with a white residual for some optics.
-    ///
-    /// # Errors
-    /// [`DesignError`] for a point spread function that gives none.
+    /// The bank with a white residual. Returns [`DesignError`] for a PSF that allows none.
     pub fn whitened(optics: &Optics) -> Result<Self, DesignError> {
         Ok(Self::Whitened(Box::new(Whitened::design(optics)?)))
     }
 
-    /// Rational operators as they are.
+    /// The bank of rational operators.
     pub fn rational(operators: &Operators) -> Self {
         Self::Rational(Box::new(operators.clone()))
     }
 
-    /// How far a filtered pixel sees.
     pub(crate) fn reach_px(&self) -> usize {
         match self {
             Self::Whitened(_) => super::whitened::SIZE / 2,
@@ -46,8 +42,8 @@ impl Bank {
         }
     }
 
-    /// Variance of `alpha` for noise of unit variance, in units of (residual's gain x energy / slope^2): what correlations between
-    /// neighbouring pixels make of it, as measured over planes at 8 bit.
+    /// Variance of `alpha` for unit noise, in (residual's gain x energy / slope^2), measured at 8 bit on planes:
+    /// includes correlations between neighbouring pixels.
     pub(super) fn variance_factor(&self) -> f32 {
         match self {
             Self::Whitened(_) => 1.15,
@@ -56,7 +52,7 @@ impl Bank {
         }
     }
 
-    /// The same as windows are weighed against each other.
+    /// As [`Self::variance_factor`], for weighing windows against each other.
     pub(super) fn weighing_factor(&self) -> f32 {
         match self {
             Self::Whitened(_) => 0.87,
@@ -78,11 +74,10 @@ impl Bank {
     /// Mean square of the residual at `alpha` for noise of unit variance.
     pub(super) fn residual_gain(&self) -> [f32; 4] {
         match self {
-            // A^2 + B^2 = 1 is what they are designed for; the difference is below 10 % over the range.
+            // The design aims at A^2 + B^2 = 1; the difference is below 10 % over the range.
             Self::Whitened(filters) => {
                 let energy = |a: &Kernel, b: &Kernel| 2.0 * product(a, b) as f32;
                 let [r0, r1, r2, r3] = &filters.residual;
-                // Odd powers of alpha cancel between the images.
                 [
                     energy(r0, r0),
                     energy(r1, r1) + 2.0 * energy(r0, r2),
@@ -99,7 +94,6 @@ impl Bank {
         }
     }
 
-    /// Alpha to depth.
     pub(super) fn depth_of(&self, optics: &Optics) -> DepthOfAlpha {
         match self {
             Self::Whitened(_) => DepthOfAlpha::linear(optics, linearise::IDENTITY),
@@ -108,30 +102,24 @@ impl Bank {
     }
 }
 
-/// The filters at work on rows that come in blocks, and what they make of them: c0 to c3 are window sums of `rho[k] u`.
+/// Working filters for rows that arrive in blocks; c0 to c3 are window sums of `rho[k] u`.
 pub(super) enum Filters {
     /// R0 to R3 and U0.
     Whitened {
-        /// One for each, with the rows that it has begun.
+        /// One each, with its unfinished rows.
         taps: Box<[Taps; 5]>,
-        /// Their output.
         rho: Box<[Plane; 5]>,
     },
     /// Pre-filters of difference and sum, then Gm1, Gp1 and Gp2.
     Rational {
-        /// Of the difference and of the sum.
         prefilters: Box<[Taps; 2]>,
-        /// Their output.
         filtered: Box<[Plane; 2]>,
-        /// The operators.
         taps: Box<[Taps; 3]>,
-        /// Their output.
         rho: Box<[Plane; 3]>,
     },
 }
 
 impl Filters {
-    /// For rows of at most `width` columns; `ring` rows of output are there at a time.
     pub(super) fn new(bank: &Bank, ring: usize, width: usize) -> Self {
         let taps = |kernel: &Kernel| Taps::new(kernel, width);
         let plane = || Plane::new(ring, width);
@@ -152,7 +140,6 @@ impl Filters {
         }
     }
 
-    /// Forgets the rows before.
     pub(super) fn reset(&mut self) {
         match self {
             Self::Whitened { taps, .. } => taps.iter_mut().for_each(Taps::reset),
@@ -162,8 +149,7 @@ impl Filters {
         }
     }
 
-    /// Filters `count` rows of `columns` columns of the pair's difference and sum, from row `first` on, into the same rows of the
-    /// output. These are of the pixel [`Bank::reach_px`] further up and to the right.
+    /// Filters `count` rows of the pair's difference and sum from row `first` on, shifted by [`Bank::reach_px`].
     pub(super) fn feed(
         &mut self,
         backend: Backend,
@@ -207,7 +193,6 @@ impl Filters {
         }
     }
 
-    /// The residual's parts; `None` is 0 everywhere.
     pub(super) fn rho(&self) -> [Option<&Plane>; 4] {
         match self {
             Self::Whitened { rho, .. } => [Some(&rho[0]), Some(&rho[1]), Some(&rho[2]), Some(&rho[3])],
@@ -215,7 +200,6 @@ impl Filters {
         }
     }
 
-    /// The matched filter's output.
     pub(super) fn matched(&self) -> &Plane {
         match self {
             Self::Whitened { rho, .. } => &rho[4],
@@ -224,12 +208,10 @@ impl Filters {
     }
 }
 
-/// Sum of the products of two kernels' taps.
 fn product(a: &Kernel, b: &Kernel) -> f64 {
     a.to_array().iter().zip(&b.to_array()).map(|(a, b)| a * b).sum()
 }
 
-/// The same behind a pre-filter.
 fn filtered_product(filter: &Kernel, a: &Kernel, b: &Kernel) -> f64 {
     let r = (filter.size() + a.size()) as isize / 2;
     let at = |kernel: &Kernel, y: isize, x: isize| -> f64 {

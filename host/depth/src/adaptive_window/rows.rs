@@ -1,8 +1,6 @@
-//! One tile: a stripe of a band of rows, whose rows stream through filters, window sums, roots, the choice among windows and the
-//! median. Each row's filtered values stay in rings of as many rows as the windows see, so that they are read from the cache.
-//!
-//! Beyond the image's borders the pair is reflected. Filters and windows are symmetric, so that everything that follows is
-//! reflected too, and no later stage has to know of borders.
+//! One tile: rows stream through filters, window sums, roots, the choice among windows and the median. Filtered rows
+//! stay in rings as long as windows need them, so that they are read from the cache. Beyond its borders the pair is
+//! reflected. Filters and windows are symmetric, so later stages need no border handling.
 
 use ndarray::{Array2, ArrayView2, ArrayViewMut2, s};
 
@@ -14,43 +12,37 @@ use crate::depth_of_alpha::DepthOfAlpha;
 use crate::optics::Optics;
 use crate::simd::{self, Backend, Choice, CubicSums, Deviation, Found, MAX_ROWS, Plane, Residual, Weighing};
 
-/// Rows of a band: its halo of some 20 rows on either side is computed twice.
+/// Rows of a band: its halo of about 20 rows on either side is computed twice.
 const ROWS: usize = 256;
-/// Columns of a tile, for the same reason as many as the cache lets be.
+/// Columns of a tile: as many as the cache holds.
 const COLUMNS: usize = 512;
-/// Rows and columns over which the misfit is averaged.
 const MISFIT_PX: [usize; 2] = [7, 21];
-/// Rim in which filters and windows see reflections, which no model explains, px.
+/// Border in which filters and windows depend on reflections, which no model explains, px.
 const BORDER_PX: usize = 14;
-/// How far windows must agree, in standard deviations.
+/// Required agreement of windows, in standard deviations.
 const GAMMA: f32 = 2.0;
-/// Part of the energy that counts as evidence at least.
+/// Least part of the energy that counts as evidence.
 const LEAST_EVIDENCE: f32 = 0.02;
-/// What no window is exacter than, in alpha.
+/// Smallest standard deviation of a window, in alpha.
 const FLOOR: f32 = 0.002;
-/// Standard deviation of alpha from which a window forbids nothing.
+/// Standard deviation of alpha from which a window excludes nothing.
 const SAYS_NOTHING: f32 = 0.045;
 /// Standard deviation of alpha that is certain enough for [`Window::Safe`].
 const CERTAIN: f32 = 0.035;
-/// What the median of 3x3 leaves of the variance, and wider ones.
+/// Variance that remains after a median of 1x1, 3x3, 5x5 and 7x7.
 const MEDIAN_GAIN: [f32; 4] = [1.0, 0.94, 0.85, 0.74];
-/// Rows after which window sums are recomputed, so that rounding errors do not accumulate.
 const RECOMPUTED: isize = 16;
-/// Rows of alpha and of the residual that are waiting for a median and a mean.
 const WAITING: usize = 8;
 
-/// Rows of a band for an image of this size: enough bands for all threads.
 pub(super) fn rows((height, _): (usize, usize)) -> usize {
     let threads = rayon::current_num_threads().max(1);
     height.div_ceil(height.div_ceil(ROWS).next_multiple_of(threads)).max(32)
 }
 
-/// Columns of a tile of an image of this width.
 fn columns(width: usize) -> usize {
     width.div_ceil(width.div_ceil(COLUMNS))
 }
 
-/// What all tiles of a pair have in common.
 pub(super) struct Job<'a> {
     pub far: ArrayView2<'a, f32>,
     pub near: ArrayView2<'a, f32>,
@@ -61,28 +53,21 @@ pub(super) struct Job<'a> {
     pub backend: Backend,
 }
 
-/// A band's rows of the maps; without depth where only the others are used.
 pub(super) struct Maps<'a> {
     pub depth_mm: Option<ArrayViewMut2<'a, f32>>,
     pub deviation_mm: ArrayViewMut2<'a, f32>,
     pub misfit: ArrayViewMut2<'a, f32>,
 }
 
-/// The buffers of a tile, used for one after the other.
 pub(super) struct Tile<'a> {
     job: &'a Job<'a>,
     sides: Vec<usize>,
-    /// Rows and columns around the tile whose alpha median and misfit see.
     around: [usize; 2],
-    /// Half the largest window.
     radius: usize,
-    /// Rows of the rings.
     ring: usize,
-    /// Difference and sum of the pair, made dimensionless.
     difference: Plane,
     sum: Plane,
     filters: Filters,
-    /// Of each size of window.
     columns: Vec<Columns>,
     row: Row,
     alpha: Plane,
@@ -95,17 +80,15 @@ pub(super) struct Tile<'a> {
     of_residual: Residual,
 }
 
-/// Sums over a window's rows of `rho_k u`, `u u` and the pair's brightness, for each column.
+/// Column sums over a window's rows of `rho_k u`, `u u` and the pair's brightness.
 struct Columns {
     side: usize,
     sums: Plane,
 }
 
-/// Rows of `Columns::sums`.
 const ENERGY: usize = 4;
 const BRIGHTNESS: usize = 5;
 
-/// What a row of windows has in the making.
 struct Row {
     work: Vec<f32>,
     sums: [Vec<f32>; 5],
@@ -115,7 +98,6 @@ struct Row {
     chosen: [Vec<f32>; 5],
 }
 
-/// Where a tile lies, and where it is in its work.
 #[derive(Clone, Copy)]
 struct Place {
     top: usize,
@@ -135,7 +117,7 @@ impl<'a> Tile<'a> {
         let median = job.settings.median_px / 2;
         let around = [median.max(MISFIT_PX[0] / 2), median.max(MISFIT_PX[1] / 2)];
         let reach = job.bank.reach_px();
-        // What a window sees, the row that it leaves, the pixels in the middle of its filters, and a block of new rows.
+        // Window, the row that leaves it, the pixels in the middle of its filters, and a block of new rows.
         let ring = (2 * radius + 2 + reach + MAX_ROWS).next_multiple_of(MAX_ROWS);
         let wide = columns(job.far.ncols()) + 2 * around[1];
         let (products, input) = (wide + 2 * radius, wide + 2 * radius + 2 * reach);
@@ -184,8 +166,7 @@ impl<'a> Tile<'a> {
         }
     }
 
-    /// Fills a band's rows of the maps, which begin at `top`. Gives the sums over their pixels of the residual's square, of what
-    /// noise leaves of it, and of the texture's.
+    /// Fills a band's rows of the maps, from `top` on. Returns sums of squared residual, noise and texture.
     pub(super) fn band(&mut self, top: usize, maps: Maps<'_>) -> [f64; 3] {
         let Maps { mut depth_mm, mut deviation_mm, mut misfit } = maps;
         let (rows, width) = misfit.dim();
@@ -246,8 +227,7 @@ impl<'a> Tile<'a> {
         sums
     }
 
-    /// The tile's pixels whose smallest window sees a pixel without a value: larger ones that contain a hole see it as mean
-    /// brightness, a seventh of their pixels. `None` without holes.
+    /// Pixels whose smallest window contains a hole, if any; larger windows use mean brightness there.
     fn holes(&self, place: Place, halo: [usize; 2]) -> Option<Array2<bool>> {
         if self.job.scales.whole {
             return None;
@@ -280,7 +260,7 @@ impl<'a> Tile<'a> {
         })
     }
 
-    /// Loads a row of the image into a row of the rings, from column `left` on; both may lie beyond the image.
+    /// Loads an image row into a ring row from column `left` on; both may lie beyond the image.
     fn load(&mut self, to: usize, row: isize, left: isize, columns: usize) {
         let Job { far, near, scales, backend, .. } = self.job;
         let (height, width) = far.dim();
@@ -306,7 +286,6 @@ impl<'a> Tile<'a> {
         }
     }
 
-    /// Alpha, its variance and the noise of a row, counted from the first that the median sees.
     fn windows(&mut self, place: Place, row: usize, wide: usize, products: usize) {
         for index in 0..self.columns.len() {
             self.advance(place, index, row, products);
@@ -317,14 +296,13 @@ impl<'a> Tile<'a> {
         variance[..wide].iter_mut().zip(&self.row.noise).for_each(|(v, noise)| *v *= noise);
     }
 
-    /// Moves windows to the next row.
     fn advance(&mut self, place: Place, index: usize, row: usize, products: usize) {
         let Self { job, radius, ring, filters, columns, sum, .. } = self;
         let backend = job.backend;
         let Columns { side, sums } = &mut columns[index];
         let (half, reach) = (*side / 2, job.bank.reach_px());
         let image_row = (place.top + row) as isize - self.around[0] as isize;
-        // Rows of the rings: a filtered row lies `2 reach` below the first pixel that it saw, and `reach` below the middle.
+        // Ring rows: a filtered row lies `2 reach` below its first input pixel and `reach` below the middle.
         let filtered = |d: isize| (row as isize + *radius as isize + d + 2 * reach as isize) as usize % *ring;
         let bright = |d: isize| (row as isize + *radius as isize + d + reach as isize) as usize % *ring;
         let with_brightness = job.scales.noise[1] > 0.0;
@@ -360,7 +338,6 @@ impl<'a> Tile<'a> {
         }
     }
 
-    /// One row of windows of one size, and what of it is chosen.
     fn row(&mut self, index: usize, wide: usize) {
         let Self { job, row, radius, .. } = self;
         let Columns { side, sums } = &self.columns[index];
@@ -385,7 +362,6 @@ impl<'a> Tile<'a> {
         let (alpha, variance) = (&mut row.alpha[..wide], &mut row.variance[..wide]);
         let found = Found { alpha: &mut *alpha, variance: &mut *variance };
         simd::roots(backend, CubicSums { c: [c0, c1, c2, c3], energy }, bank.least_slope(), found);
-        // Energy of noise is not evidence.
         let of_noise = bank.noise_energy() * (side * side) as f32;
         simd::without_noise(backend, energy, noise, [of_noise, LEAST_EVIDENCE], variance);
         let [chosen, of_chosen, low, high, open] = row.chosen.each_mut().map(|values| &mut values[..wide]);
@@ -400,7 +376,7 @@ impl<'a> Tile<'a> {
             Window::Fixed(_) => {}
             Window::Adaptive => {
                 let factor = bank.weighing_factor();
-                // Windows that differ by the model's own error see no step.
+                // Differences within the model's own error are no step.
                 let tolerance = job.optics.stage().map_or(0.0, |stage| stage.window_tolerance as f32);
                 let weighing = Weighing {
                     gamma: GAMMA * factor.sqrt(),
@@ -418,7 +394,6 @@ impl<'a> Tile<'a> {
         }
     }
 
-    /// Square of the residual at a row's alpha, relative to what noise alone leaves.
     fn residual_row(&mut self, row: usize, wide: usize) {
         let Self { job, radius, ring, filters, sum, zeros, work, of_residual, .. } = self;
         let reach = job.bank.reach_px();
@@ -435,7 +410,6 @@ impl<'a> Tile<'a> {
         simd::residual_row(job.backend, *of_residual, rho, sum, alpha, to);
     }
 
-    /// The standard deviation of a row of the tile's own, and its part of the sums.
     fn own_row(
         &mut self,
         place: Place,
@@ -479,7 +453,6 @@ impl<'a> Tile<'a> {
         }
     }
 
-    /// The rows of depth and misfit that are complete once `row` is.
     fn finish(&mut self, place: Place, row: usize, wide: usize, maps: &mut Maps<'_>) {
         let [above, beside] = self.around;
         let backend = self.job.backend;

@@ -1,18 +1,16 @@
-//! The units in which a pair is filtered: its mean brightness, and its noise relative to it.
+//! The units of filtering: a pair's mean brightness, and its noise relative to it.
 
 use ndarray::{ArrayView1, ArrayView2};
 use rayon::prelude::*;
 
 use crate::prepare::noise::PairNoise;
 
-/// What makes pixels dimensionless: their mean, and the noise in its units.
 pub(super) struct Scales {
     pub mean: f32,
     pub gain: f32,
     /// Variance of a pixel of brightness b (in means): `constant + per_unit b`.
     pub noise: [f32; 2],
     pub least_noise: f32,
-    /// Whether every pixel has a value.
     pub whole: bool,
 }
 
@@ -23,7 +21,6 @@ impl Scales {
             .map(|y| [far.row(y), near.row(y)].map(moments))
             .map(|[a, b]| [a[0] + b[0], a[1] + b[1], a[2] + b[2]])
             .collect();
-        // In order, so that the sums do not depend on how threads share the rows.
         let [sum, squares, count] =
             of_rows.into_iter().fold([0.0; 3], |a, b| [a[0] + b[0], a[1] + b[1], a[2] + b[2]]);
         let whole = count as usize == 2 * far.len();
@@ -45,9 +42,8 @@ impl Scales {
     }
 }
 
-/// Sum, sum of squares and number of a row's finite values.
 fn moments(row: ArrayView1<f32>) -> [f64; 3] {
-    // Sums side by side, which the compiler makes vectors of.
+    // Independent sums, so that the compiler vectorises them.
     const SIDE_BY_SIDE: usize = 8;
     let (mut sums, mut squares) = ([0.0_f64; SIDE_BY_SIDE], [0.0_f64; SIDE_BY_SIDE]);
     let values = row.as_slice().unwrap_or_default();

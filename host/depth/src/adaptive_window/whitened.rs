@@ -1,17 +1,16 @@
-//! Operators whose residual is white: no pre-filter, five kernels side by side.
+//! Operators whose residual is white: no pre-filter, five parallel kernels.
 //!
 //! With `m = I1 - I2` and `p = I1 + I2` (I1 far-focused) the residual of a depth is
 //! `r = R0 * m + alpha R1 * p + alpha^2 R2 * m + alpha^3 R3 * p`. A texture F gives `(A H1 - B H2) F` with
-//! `A = sum alpha^k R_k`, `B = sum (-alpha)^k R_k`: it vanishes at the true depth for `A : B = H2 : H1`, and noise stays white
-//! and of unit gain for `A^2 + B^2 = 1`. One linear least squares brings both about as far as 7x7 taps can; a second one
-//! designs `U0`, whose output `u = U0 * p` is the matched filter for the residual's change with depth, under the exact
-//! constraint that noise, which enters both, does not bias `sum r u`.
+//! `A = sum alpha^k R_k`, `B = sum (-alpha)^k R_k`. It vanishes at the true depth for `A : B = H2 : H1`; noise stays
+//! white with unit gain for `A^2 + B^2 = 1`. A linear least squares approximates both within 7x7 taps; a second one
+//! designs `U0`: `u = U0 * p` is the matched filter for the residual's change with depth, under the exact constraint
+//! that noise, which enters both, does not bias `sum r u`.
 //!
-//! A window of side w then finds depth with a standard deviation within 6 % of what any estimator can that does not know the
-//! texture: `1 / (w sqrt J)`, `J = mean over frequencies of P D^2 / (s^2 (H1^2 + H2^2))`, `D = H1 H2' - H2 H1'`, P the
-//! texture's power, s^2 the noise's, as an independent study showed; see `docs/accuracy.md`.
-//!
-//! Cost of [`Whitened::design`]: 153 x 25 points, 60 unknowns, some ms; at run time five kernels of 7x7.
+//! A window of side w has a standard deviation within 6 % of the bound for unknown texture (`docs/accuracy.md`):
+//! `1 / (w sqrt J)`, `J = mean over frequencies of P D^2 / (s^2 (H1^2 + H2^2))`, `D = H1 H2' - H2 H1'`, P the texture's
+//! power, s^2 the noise's. Cost of [`Whitened::design`]: 153 x 25 points, 60 unknowns, some ms; at run time five 7x7
+//! kernels.
 
 use std::f64::consts::PI;
 
@@ -23,55 +22,42 @@ use crate::operators::{DesignError, least_squares};
 use crate::optics::Optics;
 use crate::psf::{Otf, Psf};
 
-/// Width and height of the kernels.
 pub(crate) const SIZE: usize = 7;
-/// Depths that the design looks at, -1.1 to 1.1.
+/// Depths sampled by the design, -1.1 to 1.1.
 const ALPHAS: usize = 25;
 const REACH: f64 = 1.1;
-/// Variance of the noise that is designed for, relative to the mean brightness: 9,000 electrons, 12 of them read noise.
+/// Design variance of the noise relative to the mean brightness: 9,000 electrons, read noise 12 electrons.
 const NOISE: f64 = 1.19e-4;
-/// Contrast of the texture that is designed for.
 const CONTRAST: f64 = 0.025;
 /// Weight of the nulled texture against the whiteness of the noise.
 const NULLING: f64 = 1.92e8;
 const RIDGE: f64 = 1e-6;
-/// Step of alpha for derivatives of the transfer functions.
 const STEP: f64 = 1e-4;
 
-/// The five kernels for some optics.
+/// The five kernels for given optics.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Whitened {
-    /// R0 to R3.
     pub(crate) residual: [Kernel; 4],
-    /// U0.
     pub(crate) matched: Kernel,
-    /// What `sum (R1 p) u` is in `sum u^2` at alpha = 0, for the texture and noise that were designed for.
+    /// `sum (R1 p) u` over `sum u^2` at alpha = 0, for the design's texture and noise.
     pub(crate) slope_in_energy: f64,
 }
 
-/// A grid point with the power of the texture there.
 struct Point {
     at: GridPoint,
     power: f64,
     basis: Vec<f64>,
 }
 
-/// What a point has at a depth.
 struct Sample {
     alpha: f64,
-    /// H1, H2.
     h: [f64; 2],
-    /// `H1^2 + H2^2`.
     q: f64,
-    /// `H1 H2' - H2 H1'`.
     turn: f64,
 }
 
 impl Whitened {
-    /// Designs the kernels.
-    ///
-    /// # Errors
-    /// [`DesignError`] if a least squares is singular or the point spread function is none.
+    /// Designs the kernels. Returns [`DesignError`] if a least squares is singular or the PSF is invalid.
     pub fn design(optics: &Optics) -> Result<Self, DesignError> {
         let floor_px = optics.stage().map_or(0.0, |stage| stage.blur_floor_px);
         Self::for_psf(optics.psf(), optics.max_blur_px(), floor_px)
@@ -125,7 +111,6 @@ fn constrained(rows: &[(Vec<f64>, f64)], constraints: &[Vec<f64>]) -> Result<DVe
     let square = DMatrix::from_fn(unknowns, unknowns, |i, j| constraints.get(i).map_or(0.0, |c| c[j]));
     let svd = square.svd(false, true);
     let directions = svd.v_t.ok_or(singular)?;
-    // The directions that no constraint sees.
     let least = 1e-9 * svd.singular_values.max();
     let free: Vec<usize> = (0..unknowns).filter(|i| svd.singular_values[*i] <= least).collect();
     let space = DMatrix::from_fn(unknowns, free.len(), |i, j| directions[(free[j], i)]);
@@ -134,7 +119,7 @@ fn constrained(rows: &[(Vec<f64>, f64)], constraints: &[Vec<f64>]) -> Result<DVe
     Ok(space * least_squares::solve(matrix, right)?)
 }
 
-/// One unit row per unknown, so that what nothing decides stays small.
+/// One unit row per unknown: keeps undetermined unknowns small.
 fn ridge(unknowns: usize) -> impl Iterator<Item = (Vec<f64>, f64)> {
     (0..unknowns).map(move |i| {
         let mut row = vec![0.0; unknowns];
@@ -143,7 +128,6 @@ fn ridge(unknowns: usize) -> impl Iterator<Item = (Vec<f64>, f64)> {
     })
 }
 
-/// The response of a kernel at frequency 0 as a constraint on its taps.
 fn at_zero() -> Vec<f64> {
     kernel::basis_responses(SIZE, 0.0, 0.0)
 }
@@ -174,7 +158,7 @@ fn residual(points: &[Point], samples: &[[Sample; ALPHAS]]) -> Result<[Kernel; 4
         }
     }
     rows.extend(ridge(4 * n));
-    // R1 and R3 see the sum, whose mean says nothing.
+    // R1 and R3 act on the sum, whose mean carries no depth.
     let constraints: Vec<Vec<f64>> = [1, 3]
         .map(|k| {
             let mut all = vec![0.0; 4 * n];
@@ -186,7 +170,6 @@ fn residual(points: &[Point], samples: &[[Sample; ALPHAS]]) -> Result<[Kernel; 4
     Ok(Kernel::several(SIZE, taps.as_slice())?)
 }
 
-/// U0: the matched filter of the residual's change with depth.
 fn matched(
     points: &[Point],
     samples: &[[Sample; ALPHAS]],
@@ -241,7 +224,6 @@ fn slope_in_energy(
 mod tests {
     use super::*;
 
-    /// The taps that an independent study printed for the Gaussian.
     #[test]
     fn the_taps_are_those_of_the_study() {
         let found = Whitened::for_psf(Psf::Gaussian { k: 0.4578 }, 2.703, 0.0).unwrap();

@@ -1,4 +1,4 @@
-//! What the baselines share: checking and normalising a pair, separable filters, and turning their evidence into a map.
+//! Shared by the baselines: check and normalisation of a pair, separable filters, maps from evidence.
 
 use ndarray::{Array2, ArrayView2, CowArray, Ix2, Zip};
 
@@ -15,20 +15,16 @@ use crate::pipeline::{
 pub(super) struct Pair {
     pub far: Array2<f32>,
     pub near: Array2<f32>,
-    /// Pixels that are not finite or saturated.
     holes: Option<Array2<bool>>,
     warnings: Vec<Warning>,
 }
 
-/// What a method found out, each (height, width).
 pub(super) struct Evidence {
-    /// Normalised depth; NaN without a depth.
     pub alpha: Array2<f32>,
-    /// Energy of the texture that it rests on.
     pub texture: Array2<f32>,
-    /// Part of the evidence that contradicts it, 0 = none.
+    /// Part of the evidence that contradicts the depth, 0 = none.
     pub misfit: Array2<f32>,
-    /// Pixels that a result depends on in each direction.
+    /// Radius of the input of a result.
     pub reach_px: usize,
 }
 
@@ -68,7 +64,6 @@ impl Pair {
         Ok(Self { far, near, holes, warnings })
     }
 
-    /// The depth map of the evidence.
     pub(super) fn finish(&self, evidence: Evidence, optics: &Optics, settings: &Settings) -> DepthMap {
         let Evidence { alpha, mut texture, misfit, reach_px } = evidence;
         let mut alpha = alpha;
@@ -98,7 +93,6 @@ impl Pair {
         let warnings = self.warnings.clone();
         let mut map = DepthMap { depth_mm, confidence: values, filled: None, low_texture_fraction, warnings };
         if let Some(energy) = energy {
-            // The mean back on: ratios are of light.
             let pair = [&self.far, &self.near].map(|image| image.mapv(|value| 1.0 + value));
             let pair = pair.each_ref().map(|image| image.view());
             fill::fill(&mut map, energy.view(), pair, reach_px, settings.filling());
@@ -108,7 +102,6 @@ impl Pair {
     }
 }
 
-/// Median over a window of `side` pixels, of the values that are there; a hole stays a hole.
 fn median(map: &Array2<f32>, side: usize) -> Array2<f32> {
     let (height, width) = map.dim();
     let reach = side / 2;
@@ -129,15 +122,13 @@ fn median(map: &Array2<f32>, side: usize) -> Array2<f32> {
     })
 }
 
-/// Which way a filter runs.
 #[derive(Clone, Copy)]
 pub(super) enum Along {
     Rows,
     Columns,
 }
 
-/// `image` filtered along one direction by an odd number of taps (`taps[i]` weighs the pixel at `i - half`); borders are
-/// reflected without repeating the edge pixel.
+/// `image` filtered along one direction by an odd number of taps, centred; borders are reflected.
 pub(super) fn filter(image: &Array2<f32>, taps: &[f32], along: Along) -> Array2<f32> {
     let half = taps.len() / 2;
     let (height, width) = image.dim();
@@ -170,12 +161,10 @@ pub(super) fn filter(image: &Array2<f32>, taps: &[f32], along: Along) -> Array2<
     out
 }
 
-/// Along both directions.
 pub(super) fn filter_both(image: &Array2<f32>, along_rows: &[f32], along_columns: &[f32]) -> Array2<f32> {
     filter(&filter(image, along_rows, Along::Rows), along_columns, Along::Columns)
 }
 
-/// Sums over a square window of `side` pixels.
 pub(super) fn window_sum(image: &Array2<f32>, side: usize) -> Array2<f32> {
     let taps = vec![1.0; side];
     filter_both(image, &taps, &taps)

@@ -1,14 +1,12 @@
 //! Favaro & Soatto's method (2005): projectors onto what a depth cannot show.
 //!
-//! The two 7x7 patches of a pair, one above the other, are a vector of 98 numbers. All textures at one depth fill only
-//! part of that space, because blur ties the two patches together; the rest is the depth's null space. It is learned:
-//! patches of random textures are rendered at the depth, and the directions of a singular value decomposition beyond
-//! the first ones span it. A measured vector has the depth into whose null space the least of it falls.
-//!
-//! Rendering is by this crate's OTFs, textures have the spectrum of sand and of a fractal mixed. The vector's mean is
-//! taken off (lighting), vectors are taken every 3 px, their residuals summed over the smoothing window, and the
-//! least residual over depth is refined by a parabola. Cost: learning about 1 s; run time 98 x rank operations per
-//! depth and vector, about 1 s for 640x480.
+//! The two 7x7 patches of a pair are a vector of 98 numbers. Blur couples the patches, so all textures at one depth
+//! fill only part of that space; the rest is the depth's null space. It follows from a singular value decomposition of
+//! patches of random textures rendered at the depth: the directions beyond the first ones. The depth is the one whose
+//! null space receives the least of the measured vector. Textures mix the spectra of sand and of a fractal. The
+//! vector's mean is subtracted (lighting). Vectors are taken every 3 px, residuals summed over the window, and a
+//! parabola refines the least residual. Cost: learning about 1 s; run time 98 x rank operations per depth and vector,
+//! about 1 s for 640x480.
 
 mod learn;
 
@@ -21,22 +19,18 @@ use crate::optics::Optics;
 use crate::pipeline::{DepthMap, MAX_ALPHA, Settings};
 use crate::psf::Psf;
 
-/// Side of a patch.
 const PATCH_PX: usize = 7;
 
-/// Numbers of a vector: two patches.
 const VECTOR: usize = 2 * PATCH_PX * PATCH_PX;
 
-/// Distance of the vectors.
 const STEP_PX: usize = 3;
 
 /// How the projectors are learned.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct FavaroSettings {
-    /// Number of depths, evenly spaced in alpha over the range a little beyond both foci; 9 to 129.
+    /// Number of depths, evenly spaced in alpha a little beyond both foci; 9 to 129.
     pub depths: usize,
-    /// Dimensions that a depth's textures are taken to fill; the other directions are its null space; 10 to 90. With
-    /// 60 the error is least for every PSF: fewer leave signal in the null space, more leave little null space.
+    /// Dimensions of a depth's textures, the rest is null space; 10 to 90. 60 has the least error for every PSF.
     pub rank: usize,
     /// Seed of the random textures.
     pub seed: u64,
@@ -54,15 +48,11 @@ pub struct Favaro {
     psf: Psf,
     max_blur_px: f64,
     alphas: Vec<f64>,
-    /// For each depth the directions that its textures fill, one per row.
     signals: Vec<DMatrix<f32>>,
 }
 
 impl Favaro {
-    /// Learns the projectors for optics (their PSF and largest blur radius).
-    ///
-    /// # Errors
-    /// [`BaselineError::Setting`], [`BaselineError::NoDirections`].
+    /// Learns the projectors for a PSF and largest blur radius.
     pub fn learn(optics: &Optics, settings: &FavaroSettings) -> Result<Self, BaselineError> {
         let check = |name, value, least, most| {
             if (least..=most).contains(&value) {
@@ -80,10 +70,7 @@ impl Favaro {
         Ok(Self { psf: optics.psf(), max_blur_px: optics.max_blur_px(), alphas, signals })
     }
 
-    /// Depth of a pair; as [`super::depth_from_pair`] without learning again.
-    ///
-    /// # Errors
-    /// [`BaselineError::OtherOptics`] where the projectors were learned for another blur, [`BaselineError::Pair`].
+    /// As [`super::depth_from_pair`] without learning. Returns [`BaselineError::OtherOptics`] for another blur.
     pub fn depth_from_pair(
         &self,
         far: ArrayView2<f32>,
@@ -107,7 +94,7 @@ impl Favaro {
         let (height, width) = pair.far.dim();
         let points = |length: usize| (length - PATCH_PX) / STEP_PX + 1;
         let (rows, columns) = (points(height), points(width));
-        // Residual of each depth, and the vector's energy in the last place.
+        // Residual of each depth, then the vector's energy.
         let mut residuals = Array3::<f32>::zeros((rows, columns, self.alphas.len() + 1));
         let mut vectors = DMatrix::<f32>::zeros(VECTOR, columns);
         for (row, mut residuals) in residuals.axis_iter_mut(Axis(0)).enumerate() {
@@ -139,7 +126,6 @@ impl Favaro {
         }
     }
 
-    /// The depth of the least residual; the last value is the vector's energy.
     fn least(&self, values: &[f32]) -> Found {
         let (residuals, energy) = values.split_at(self.alphas.len());
         let energy = energy[0];
@@ -156,7 +142,7 @@ impl Favaro {
                 alpha += step * (0.5 * (before - after) / curvature).clamp(-0.5, 0.5);
             }
         }
-        // How little the best depth stands out from the average one: 0 for a perfect fit.
+        // Contrast of the best depth with the average one: 0 for a perfect fit.
         let mean = residuals.iter().sum::<f32>() / residuals.len() as f32;
         let misfit = residuals[best] / (mean - residuals[best]).max(1e-12 * energy);
         Found { alpha: alpha as f32, energy, misfit }
@@ -169,7 +155,6 @@ struct Found {
     misfit: f32,
 }
 
-/// The two patches at a place, less their common mean.
 fn fill(vector: &mut [f32], far: &Array2<f32>, near: &Array2<f32>, (row, column): (usize, usize)) {
     let mut next = 0;
     for image in [far, near] {
@@ -184,7 +169,6 @@ fn fill(vector: &mut [f32], far: &Array2<f32>, near: &Array2<f32>, (row, column)
     vector.iter_mut().for_each(|value| *value -= mean);
 }
 
-/// Sums over (2 reach + 1) x (2 reach + 1) grid points; fewer at the borders.
 fn sum_windows(values: &Array3<f32>, reach: usize) -> Array3<f32> {
     let along = |values: &Array3<f32>, axis: usize| {
         let length = values.len_of(Axis(axis));
@@ -199,7 +183,6 @@ fn sum_windows(values: &Array3<f32>, reach: usize) -> Array3<f32> {
     along(&along(values, 0), 1)
 }
 
-/// Bilinear between grid points, constant beyond the outer ones.
 fn expand(grid: &Array2<f32>, dim: (usize, usize)) -> Array2<f32> {
     let place = |pixel: usize, points: usize| {
         let at = (pixel as f32 - (PATCH_PX / 2) as f32) / STEP_PX as f32;

@@ -1,13 +1,11 @@
 //! Subbarao's method in the Fourier domain (1988; Li 2014, appendix C).
 //!
-//! In a window that is nearly at one depth `I1 / I2 = H1 / H2` (eq. C.5; C.4 is printed with H1 where H2 is meant). For
-//! a Gaussian PSF that is `ln(|I1| / |I2|) = -(sigma1^2 - sigma2^2) w^2 / 4` with the PSF's second moments (twice the
-//! variance of one coordinate), one equation per frequency, solved by least squares weighted with the energy. The moments give the depth by
-//! C.1, which reads `sigma = k d s / 2 (1/F - 1/u - 1/s)` put right (`k` multiplies the blur radius; the printed form
-//! lacks `s / 2` and has `k` the wrong way up).
-//!
-//! Every pixel gets its own window: the discrete Fourier transform of a Hann window of 21 px, at twelve frequencies,
-//! computed as separable filters. Cost: about 2000 operations a pixel.
+//! In a window of nearly one depth `I1 / I2 = H1 / H2` (eq. C.5; C.4 prints H1 for H2). For a Gaussian PSF that is
+//! `ln(|I1| / |I2|) = -(sigma1^2 - sigma2^2) w^2 / 4` with the PSF's second moments (twice the variance of one
+//! coordinate): one equation per frequency, solved by energy-weighted least squares. C.1 turns the moments into depth;
+//! corrected it reads `sigma = k d s / 2 (1/F - 1/u - 1/s)` (`k` multiplies the blur radius; the printed form lacks
+//! `s / 2` and inverts `k`). Every pixel has its own Hann window of 21 px, transformed at twelve frequencies by
+//! separable filters. Cost: about 2000 operations a pixel.
 
 use std::f64::consts::TAU;
 
@@ -17,17 +15,16 @@ use super::common::{Along, Evidence, Pair, filter, window_sum};
 use crate::optics::Optics;
 use crate::pipeline::Settings;
 
-/// Side of the window, px.
 const WINDOW_PX: usize = 21;
 
-/// Indices of the frequencies (columns, rows) in units of 2 pi / 21 rad/px. The Hann window hides a mean from all but the
-/// first; the upper limit of 1.2 rad/px is where the stronger blur leaves a quarter.
+/// Frequencies (columns, rows) in units of 2 pi / 21 rad/px. The Hann window hides a mean from all but the first; at
+/// the upper limit, 1.2 rad/px, the stronger blur leaves a quarter.
 const FREQUENCIES: [(i32, i32); 12] =
     [(2, 0), (0, 2), (2, 2), (2, -2), (3, 0), (0, 3), (3, 2), (2, 3), (3, -2), (-2, 3), (4, 0), (0, 4)];
 
 pub(super) fn evidence(pair: &Pair, optics: &Optics, settings: &Settings) -> Evidence {
     let dim = pair.far.dim();
-    // Sums over frequencies of weight * x^2, weight * x * y and weight * y^2 with x = -w^2 / 4, y = ln(|I1| / |I2|).
+    // Sums over frequencies of weight * x^2, weight * x * y and weight * y^2; x = -w^2 / 4, y = ln(|I1| / |I2|).
     let zeros = || Array2::<f32>::zeros(dim);
     let (mut xx, mut xy, mut yy) = (zeros(), zeros(), zeros());
     let mut texture = Array2::<f32>::zeros(dim);
@@ -40,7 +37,7 @@ pub(super) fn evidence(pair: &Pair, optics: &Optics, settings: &Settings) -> Evi
         Zip::from(&mut xx).and(&mut xy).and(&mut yy).and(&far).and(&near).for_each(
             |xx, xy, yy, far, near| {
                 if *far > 0.0 && *near > 0.0 {
-                    // The variance of a logarithm is inverse to the energy, of the weaker image foremost.
+                    // The variance of a logarithm is inverse to the energy, mainly of the weaker image.
                     let weight = far * near / (far + near);
                     let y = 0.5 * (far / near).ln();
                     *xx += weight * x * x;
@@ -67,7 +64,6 @@ pub(super) fn evidence(pair: &Pair, optics: &Optics, settings: &Settings) -> Evi
     Evidence { alpha, texture, misfit, reach_px: WINDOW_PX / 2 + settings.smoothing_px / 2 }
 }
 
-/// `|I(w)|^2` of the window around each pixel.
 fn local_energy(image: &Array2<f32>, across: i32, down: i32) -> Array2<f32> {
     let [cos_x, sin_x] = taps(across);
     let [cos_y, sin_y] = taps(down);
@@ -79,7 +75,6 @@ fn local_energy(image: &Array2<f32>, across: i32, down: i32) -> Array2<f32> {
     &real * &real + &imaginary * &imaginary
 }
 
-/// Cosine and sine of a frequency under a Hann window.
 fn taps(index: i32) -> [Vec<f32>; 2] {
     let place = |i: usize| i as f64 - (WINDOW_PX / 2) as f64;
     let hann = |i: usize| 0.5 + 0.5 * (TAU * place(i) / (WINDOW_PX + 1) as f64).cos();

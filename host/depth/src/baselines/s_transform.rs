@@ -1,12 +1,10 @@
 //! Subbarao & Surya's S-transform method (STM), 1994.
 //!
-//! Where an image is a cubic polynomial, blur by any symmetric PSF of second moment `sigma^2` adds `sigma^2 / 4` times its
-//! Laplacian. So the same sharp image `f = g1 - (sigma1^2 / 4) lap(g1) = g2 - (sigma2^2 / 4) lap(g2)` gives
-//! `g1 - g2 = (sigma1^2 - sigma2^2) / 4 * lap(g)`, `lap(g)` the mean of the two Laplacians (equal for a cubic), solved by
-//! least squares over a window. To make the cubic hold, both images are smoothed first.
-//!
-//! Limits, by its nature: beyond the cubic the next term shrinks the result, by some percent at the ends of the range,
-//! and the division amplifies noise, since the Laplacian of a smoothed image is small. Cost: about 90 operations a pixel.
+//! Blur of a cubic polynomial by any symmetric PSF of second moment `sigma^2` adds `sigma^2 / 4` times its Laplacian.
+//! So the sharp image `f = g1 - (sigma1^2 / 4) lap(g1) = g2 - (sigma2^2 / 4) lap(g2)` gives
+//! `g1 - g2 = (sigma1^2 - sigma2^2) / 4 * lap(g)`, `lap(g)` the mean of the two Laplacians, solved by least squares
+//! over a window of smoothed images. Limits: higher terms shrink the result by some percent at the ends of the range;
+//! division by a small Laplacian amplifies noise. Cost: about 90 operations a pixel.
 
 use ndarray::{Array2, Zip};
 
@@ -40,7 +38,6 @@ pub(super) fn evidence(pair: &Pair, optics: &Optics, settings: &Settings) -> Evi
             if *texture > 0.0 {
                 let slope = cross / texture;
                 *alpha = scale * slope;
-                // Mean square of alpha about the window's.
                 *misfit = (scale * scale * (energy / texture - slope * slope)).max(0.0);
             }
         },
@@ -49,7 +46,6 @@ pub(super) fn evidence(pair: &Pair, optics: &Optics, settings: &Settings) -> Evi
     Evidence { alpha, texture, misfit, reach_px }
 }
 
-/// Taps of a Gaussian, sum 1, out to three SDs.
 fn gaussian(sd: f32) -> Vec<f32> {
     let half = (3.0 * sd).ceil() as i32;
     let taps: Vec<f32> = (-half..=half).map(|i| (-0.5 * (i as f32 / sd).powi(2)).exp()).collect();

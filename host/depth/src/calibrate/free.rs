@@ -1,11 +1,9 @@
-//! Any round point spread function: how its light is spread over radii, and with that its OTF over frequency times blur.
+//! Any round PSF: its light over the radius, and its OTF over frequency times blur.
 //!
-//! The density of the light is a sum of [`HATS`] hats over the radius with weights of 0 or more; the OTF is linear in these. The
-//! cost is that of the models, `sum |H1 I2 - H2 I1|^2 / (H1^2 + H2^2)`; Newton steps with the weights kept at 0 or above, from
-//! the best Gaussian on. What pairs say nothing of is left to smoothness: second differences of the density, of about
-//! [`BEND`] of its peak, weigh as much as noise does.
-//!
-//! Cost: 30 ms for a pair, most of it the table of the hats' transforms.
+//! The density of the light is a sum of [`HATS`] hats over the radius with weights of 0 or more; the OTF is linear in
+//! them. The cost is that of the models, `sum |H1 I2 - H2 I1|^2 / (H1^2 + H2^2)`, minimised by Newton steps with
+//! weights of at least 0 from the best Gaussian. A smoothness prior decides what the pairs do not: second differences
+//! of about [`BEND`] of the density's peak weigh as much as noise. Cost: 30 ms for a pair.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -14,22 +12,20 @@ use super::spread::{TOGETHER, covariance, noise, seen, turn};
 use super::{CalibrationError, search};
 use crate::psf::{Otf, Psf, RINGS, RadialPsf};
 
-/// Hats over the radius.
 const HATS: usize = 16;
 
-/// The outermost radius in `k` of the best Gaussian: beyond, it has 1e-4 of its light.
+/// The outermost radius in `k` of the best Gaussian, which has 1e-4 of its light beyond.
 const EXTENT_IN_K: f64 = 4.2;
 
-/// Limits of that: less has no profile to speak of, more none that defocus made.
+/// Limits of that: less has no profile, more is not due to defocus.
 const EXTENT: [f64; 2] = [1.2, 4.0];
 
-/// Second differences of the density that are nothing special, relative to its peak.
+/// Usual second differences of the density, relative to its peak.
 const BEND: f64 = 0.3;
 
-/// Newton steps at most.
 const STEPS: usize = 60;
 
-/// Places of the table of the OTF, in radians of frequency times blur radius.
+/// Places of the OTF table, in radians of frequency times blur radius.
 const PLACES: [f64; 10] = [0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 3.5, 4.0, 4.5, 5.0];
 
 /// A place of a measured OTF.
@@ -43,20 +39,15 @@ pub struct OtfPoint {
     pub standard_error: f64,
 }
 
-/// Result of the calculation.
 pub(super) struct Found {
     pub psf: RadialPsf,
     pub cost: f64,
-    /// As far as the pairs' frequencies and blurs reach.
     pub otf: Vec<OtfPoint>,
-    /// Standard error of the profile's width as a `k`.
     pub of_k: Option<f64>,
 }
 
-/// The hats and their transforms.
 struct Hats {
     extent: f64,
-    /// Light in each ring, for each hat of height 1.
     light: Vec<[f64; RINGS]>,
     total: Vec<f64>,
     otfs: Vec<Otf>,
@@ -84,7 +75,6 @@ impl Hats {
         Ok(Self { extent, light, total, otfs })
     }
 
-    /// The OTF at one place for each hat, times its light.
     fn at(&self, radius_px: f64, frequency: f64) -> [f64; HATS] {
         std::array::from_fn(|hat| self.total[hat] * self.otfs[hat].at(radius_px, frequency))
     }
@@ -96,14 +86,12 @@ impl Hats {
         RadialPsf::new(self.extent, &light).map_err(|error| CalibrationError::Profile(error.to_string()))
     }
 
-    /// Weights with a light of 1 altogether.
     fn normalised(&self, weights: [f64; HATS]) -> [f64; HATS] {
         let sum: f64 = weights.iter().zip(&self.total).map(|(weight, total)| weight * total).sum();
         weights.map(|weight| weight / sum)
     }
 }
 
-/// Rings with the hats' OTF at both blur radii.
 struct Row<'a> {
     ring: &'a super::spectra::Ring,
     hats: [[f64; HATS]; 2],
@@ -115,7 +103,6 @@ impl Row<'_> {
     }
 }
 
-/// The profile, from the best Gaussian on.
 pub(super) fn profile(observations: &[Observation]) -> Result<Found, CalibrationError> {
     let (k, _) = search::gaussian(observations)?;
     let extent = (EXTENT_IN_K * k).clamp(EXTENT[0], EXTENT[1]);
@@ -135,7 +122,7 @@ pub(super) fn profile(observations: &[Observation]) -> Result<Found, Calibration
     let width = extent / HATS as f64;
     let mut weights =
         hats.normalised(std::array::from_fn(|hat| (-0.5 * (hat as f64 * width / k).powi(2)).exp()));
-    // How much a bend weighs is relative to the Gaussian's peak, which is about that of any other PSF as wide.
+    // Relative to the Gaussian's peak, which is about that of any PSF of equal width.
     let prior = bends() * (weights[0] * BEND).powi(-2);
     let bends = &prior * (TOGETHER * noise(observations).max(1e-12 * cost(&weights)));
     let total = |weights: &[f64; HATS]| {
@@ -154,7 +141,7 @@ pub(super) fn profile(observations: &[Observation]) -> Result<Found, Calibration
             hessian += &turn * turn.transpose() * (seen.signal - seen.left).max(0.0);
             gradient += turn * seen.mixed;
         }
-        // Damped until a step leads down.
+        // Damped until a step lowers the cost.
         let mut better = None;
         while better.is_none() && damping < 1e9 {
             let trial = hats.normalised(step(&hessian, &gradient, &weights, damping));
@@ -178,8 +165,7 @@ pub(super) fn profile(observations: &[Observation]) -> Result<Found, Calibration
     Ok(Found { psf, cost: cost(&weights), otf, of_k })
 }
 
-/// Sums of squared second differences of the weights as a quadratic form. The density is even in the radius, and 0 beyond the last
-/// hat.
+/// Summed squared second differences of the weights, even in the radius and 0 beyond the last hat, as a quadratic form.
 fn bends() -> DMatrix<f64> {
     let mut form = DMatrix::zeros(HATS, HATS);
     for middle in 0..HATS {
@@ -194,7 +180,7 @@ fn bends() -> DMatrix<f64> {
     form
 }
 
-/// The weights, 0 or more, of the least of the quadratic model, by going through them one by one.
+/// Minimum of the quadratic model over weights of 0 or more, by coordinate descent.
 fn step(hessian: &DMatrix<f64>, gradient: &DVector<f64>, weights: &[f64; HATS], damping: f64) -> [f64; HATS] {
     const ROUNDS: usize = 300;
     let mut moved = *weights;
@@ -210,7 +196,6 @@ fn step(hessian: &DMatrix<f64>, gradient: &DVector<f64>, weights: &[f64; HATS], 
     moved
 }
 
-/// Standard errors: of the OTF at [`PLACES`] within reach, and of the width as a `k`.
 fn errors(
     observations: &[Observation],
     hats: &Hats,
@@ -220,7 +205,7 @@ fn errors(
     psf: RadialPsf,
 ) -> (Vec<OtfPoint>, Option<f64>) {
     let of_all = Psf::Radial(psf).otf_up_to(reach);
-    // The light is 1 altogether: a weight that grows takes from the others what it gives.
+    // The total light is 1: a weight that grows reduces the others.
     let by_weights = |radius_px: f64, frequency: f64| -> (f64, Vec<f64>) {
         let values = hats.at(radius_px, frequency);
         let h: f64 = values.iter().zip(weights).map(|(value, weight)| value * weight).sum();

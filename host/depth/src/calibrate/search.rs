@@ -12,12 +12,11 @@ const P: [f64; 2] = [0.5, 64.0];
 /// Trials of `k` before the refinement, in equal ratios (8 %).
 const TRIALS: usize = 48;
 
-/// The search for `p` starts here (Li 2014, section 5.2.2) and goes up in steps of 6 %, which near p = 1.8 is the 0.1 of
-/// the thesis.
+/// Start of the search for `p` (Li 2014, section 5.2.2), in steps of 6 %: the thesis' 0.1 near p = 1.8.
 const FIRST_P: f64 = 1.0;
 const P_RATIO: f64 = 1.06;
 
-/// A pair's rings and the blur radii of its images in px.
+/// A pair's rings and its images' blur radii, px.
 pub(super) type Observation = (Bins, [f64; 2]);
 
 /// `sum |H1 I2 - H2 I1|^2 / (H1^2 + H2^2)`; `scale` multiplies the blur radii.
@@ -36,8 +35,7 @@ fn cost(observations: &[Observation], otf: &Otf, scale: f64) -> f64 {
     observations.iter().map(of_pair).sum()
 }
 
-/// Least value of `f` on a geometric grid and then by golden sections of the logarithm: place, value, and whether the
-/// least lies at an end of the grid.
+/// Minimum of `f` on a geometric grid, refined by golden sections: place, value, and whether it is at an end.
 fn minimise([low, high]: [f64; 2], trials: usize, f: impl Fn(f64) -> f64) -> (f64, f64, bool) {
     let ratio = (high / low).powf(1.0 / (trials - 1) as f64);
     let values: Vec<f64> = (0..trials).map(|i| f(low * ratio.powi(i as i32))).collect();
@@ -47,7 +45,6 @@ fn minimise([low, high]: [f64; 2], trials: usize, f: impl Fn(f64) -> f64) -> (f6
     (place, value, least == 0 || least == trials - 1)
 }
 
-/// Golden sections of the logarithm of the place, to a ratio of 1e-7.
 fn golden([low, high]: [f64; 2], f: impl Fn(f64) -> f64) -> (f64, f64) {
     let part = 0.5 * (5.0_f64.sqrt() - 1.0);
     let (mut a, mut b) = (low.ln(), high.ln());
@@ -68,7 +65,6 @@ fn golden([low, high]: [f64; 2], f: impl Fn(f64) -> f64) -> (f64, f64) {
     if fc < fd { (c.exp(), fc) } else { (d.exp(), fd) }
 }
 
-/// `k` of a Gaussian, and the cost.
 pub(super) fn gaussian(observations: &[Observation]) -> Result<(f64, f64), CalibrationError> {
     let (k, value, at_end) = minimise(K, TRIALS, |k| cost(observations, &Otf::Gaussian { k }, 1.0));
     if at_end {
@@ -77,7 +73,6 @@ pub(super) fn gaussian(observations: &[Observation]) -> Result<(f64, f64), Calib
     Ok((k, value))
 }
 
-/// `p` and `k` of a generalised Gaussian, and the cost.
 pub(super) fn generalised(observations: &[Observation]) -> Result<(Psf, f64), CalibrationError> {
     let radii = observations.iter().flat_map(|(_, radii)| radii.iter().map(|r| r.abs()));
     let largest_px = radii.fold(0.0, f64::max);
@@ -90,7 +85,7 @@ pub(super) fn generalised(observations: &[Observation]) -> Result<(Psf, f64), Ca
     };
     let (mut best_p, mut best) = (FIRST_P, best_k(FIRST_P).1);
     for ratio in [P_RATIO, 1.0 / P_RATIO] {
-        // Past the minimum the cost rises; five steps in a row make sure that it is not a ripple.
+        // Five rising steps in a row exclude a ripple.
         let (mut p, mut rising) = (FIRST_P, 0);
         while rising < 5 && (P[0]..=P[1]).contains(&(p * ratio)) {
             p *= ratio;
@@ -113,7 +108,6 @@ pub(super) fn generalised(observations: &[Observation]) -> Result<(Psf, f64), Ca
     Ok((Psf::Generalised { p, k }, value))
 }
 
-/// The minimum of the parabola in `ln p` through the best grid point and its neighbours.
 fn parabola(best: f64, f: impl Fn(f64) -> f64) -> f64 {
     let [before, here, after] = [best / P_RATIO, best, best * P_RATIO].map(f);
     let curvature = before - 2.0 * here + after;

@@ -6,14 +6,11 @@ use ndarray::{Array2, ArrayView2};
 
 use crate::fourier::{Complex64, transform};
 
-/// Smallest side that has enough frequencies.
 const SMALLEST_PX: usize = 32;
 
-/// Frequencies that are compared, rad/px. Below, lighting differs more than blur does; above, little is left of a blurred
-/// image, and a sharp one has aliases.
+/// Compared frequencies, rad/px. Below, lighting differs more than blur; above, little is left but aliases.
 const BAND: [f64; 2] = [0.1, 2.0];
 
-/// Rings in the band.
 const RINGS: usize = 128;
 
 /// Why an image has no usable spectrum.
@@ -40,7 +37,7 @@ pub enum SpectrumError {
     Constant,
 }
 
-/// The spectrum of an image divided by its mean, the mean taken off, under a Hann window.
+/// Spectrum of an image divided by its mean, minus 1, under a Hann window.
 pub(super) fn windowed(image: ArrayView2<f32>) -> Result<Array2<Complex64>, SpectrumError> {
     let (height, width) = image.dim();
     if height < SMALLEST_PX || width < SMALLEST_PX {
@@ -69,22 +66,15 @@ pub(super) fn windowed(image: ArrayView2<f32>) -> Result<Array2<Complex64>, Spec
     })))
 }
 
-/// Sums over one ring of frequencies.
 #[derive(Clone, Copy, Default)]
 pub(super) struct Ring {
-    /// Mean frequency, rad/px.
     pub frequency: f64,
-    /// `|I1|^2`.
     pub far: f64,
-    /// `|I2|^2`.
     pub near: f64,
-    /// `Re(I1 conj(I2))`.
     pub cross: f64,
-    /// Number of coefficients that were summed.
     pub count: f64,
 }
 
-/// The rings of a pair.
 pub(super) struct Bins {
     pub rings: Vec<Ring>,
 }
@@ -117,17 +107,14 @@ impl Bins {
         Self { rings }
     }
 
-    /// Energy of the far image over that of the near one.
     pub(super) fn energy_ratio(&self) -> f64 {
         self.rings.iter().map(|r| r.far).sum::<f64>() / self.rings.iter().map(|r| r.near).sum::<f64>()
     }
 
-    /// Number of coefficients of an image.
     pub(super) fn coefficients(&self) -> f64 {
         self.rings.iter().map(|ring| ring.count).sum()
     }
 
-    /// Energy of both.
     pub(super) fn energy(&self) -> f64 {
         self.rings.iter().map(|r| r.far + r.near).sum()
     }

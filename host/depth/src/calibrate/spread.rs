@@ -1,23 +1,21 @@
-//! How well a point spread function is known, and whether it explains the pairs.
+//! Standard errors of a PSF, and whether it explains the pairs.
 //!
-//! With `(h1, h2)` the OTF at both blur radii and `v` its direction, a ring of frequencies says of a parameter as much as the
-//! signal along `v` times `g^2`, `g = (h2 dh1 - h1 dh2) / (h1^2 + h2^2)`; what the fit leaves per coefficient is the noise.
-//! Covariances are `A^-1 B A^-1` of these (the residual may be more than noise, and noise times noise counts where the signal
-//! is weak), times how many coefficients under a Hann window vary together.
+//! `(h1, h2)` is the OTF at both blur radii and `v` its direction. A ring's information on a parameter is the signal
+//! along `v` times `g^2`, `g = (h2 dh1 - h1 dh2) / (h1^2 + h2^2)`; the residual per coefficient is the noise.
+//! Covariances are `A^-1 B A^-1` of these (the residual may exceed noise, and noise times noise counts where the signal
+//! is weak), times the number of coefficients that vary together under a Hann window.
 
 use nalgebra::{DMatrix, DVector};
 
 use super::search::Observation;
 use crate::psf::{Otf, Psf};
 
-/// Coefficients that vary together under the square of a Hann window: `n sum w^4 / (sum w^2)^2 = 35/18` along each axis.
+/// Coefficients that vary together under the square of a Hann window: `n sum w^4 / (sum w^2)^2 = 35/18` per axis.
 pub(super) const TOGETHER: f64 = (35.0 / 18.0) * (35.0 / 18.0);
 
-/// Coefficients of a band in which noise is looked for. Lighting, aliases and misplaced images add to most bands, not to all; and
-/// with this many chance takes little off: 5 %.
+/// Coefficients of a band in the search for noise: some bands have no lighting or aliases. Chance lowers noise by 5 %.
 const QUIET_BAND: f64 = 1500.0;
 
-/// A ring as the fit sees it.
 pub(super) struct Seen {
     /// `-h2, h1` over its length, times the images: the residual, squared and summed.
     pub left: f64,
@@ -25,11 +23,9 @@ pub(super) struct Seen {
     pub mixed: f64,
     /// The signal along `v`, squared and summed, noise included.
     pub signal: f64,
-    /// Number of coefficients.
     pub count: f64,
 }
 
-/// What an OTF with the values `[h1, h2]` makes of a ring's sums.
 pub(super) fn seen(ring: &super::spectra::Ring, [h1, h2]: [f64; 2]) -> Seen {
     let norm = (h1 * h1 + h2 * h2).max(1e-12);
     let (far, near, cross) = (ring.far / norm, ring.near / norm, ring.cross / norm);
@@ -41,25 +37,25 @@ pub(super) fn seen(ring: &super::spectra::Ring, [h1, h2]: [f64; 2]) -> Seen {
     }
 }
 
-/// How the direction `(-h2, h1)` turns with a parameter whose derivatives are `[d1, d2]`.
+/// Derivative of the direction `(-h2, h1)` by a parameter with the OTF derivatives `[d1, d2]`.
 pub(super) fn turn([h1, h2]: [f64; 2], [d1, d2]: [f64; 2]) -> f64 {
     (h2 * d1 - h1 * d2) / (h1 * h1 + h2 * h2).max(1e-12)
 }
 
-/// Noise of a coefficient, mean square: what no round PSF explains, in the band where that is least.
+/// Mean square noise of a coefficient: the least over bands of what no round PSF explains.
 pub(super) fn noise(observations: &[Observation]) -> f64 {
     let mut least = f64::INFINITY;
     for (bins, _) in observations {
         let whole = bins.coefficients();
         let (mut left, mut count) = (0.0, 0.0);
         for ring in &bins.rings {
-            // The smaller eigenvalue of the ring's sums; the larger takes some of the noise, the more the fewer there are.
+            // The smaller eigenvalue of the ring's sums; the larger contains some of the noise.
             let half = 0.5 * (ring.far - ring.near);
             let smaller = (0.5 * (ring.far + ring.near) - half.hypot(ring.cross)).max(0.0);
             let independent = (ring.count / TOGETHER).max(1.5);
             left += smaller * independent / (independent - 1.0);
             count += ring.count;
-            // A band that is left over at the end says too little.
+            // A last band of too few coefficients is ignored.
             if count >= QUIET_BAND.min(0.5 * whole) {
                 least = least.min(left / count);
                 (left, count) = (0.0, 0.0);
@@ -69,8 +65,7 @@ pub(super) fn noise(observations: &[Observation]) -> f64 {
     if least.is_finite() { least } else { 0.0 }
 }
 
-/// Covariance of parameters: `at` gives for a blur radius and a frequency the OTF and its derivatives by each. `prior` is what is
-/// known of them before, as the inverse of a covariance.
+/// Covariance of parameters: `at` gives the OTF and its derivatives for a radius and a frequency.
 pub(super) fn covariance(
     observations: &[Observation],
     parameters: usize,
@@ -108,7 +103,6 @@ pub(super) fn covariance(
 /// Standard errors of a model's parameters, `k` or `p` and `k`; none for PSFs without.
 pub(super) fn of_parameters(observations: &[Observation], psf: Psf) -> Option<Vec<f64>> {
     const STEP: f64 = 1e-3;
-    // Each parameter's step, and the PSF with it.
     let more = |value: f64| value * (1.0 + STEP);
     let others = match psf {
         Psf::Gaussian { k } => vec![(STEP * k, Psf::Gaussian { k: more(k) })],

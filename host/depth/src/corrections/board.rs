@@ -18,8 +18,7 @@ pub enum BoardForm {
     Full,
 }
 
-/// A correction in the board's number formats: what is sent to a board so that it corrects like
-/// [`Correction::apply_as_board`](super::Correction::apply_as_board).
+/// A correction as sent to a board; see [`Correction::apply_as_board`](super::Correction::apply_as_board).
 #[derive(Debug, Clone, PartialEq)]
 pub struct BoardCorrection {
     /// Name of the correction.
@@ -30,21 +29,17 @@ pub struct BoardCorrection {
     pub frame: Frame,
     /// The codes of depths.
     pub scale: DepthScale,
-    /// Q2.29 bits: 3x3 regions of ten terms each, row by row, or twenty terms.
+    /// Q2.29 bits: 3x3 regions of ten terms, row by row, or twenty terms.
     pub coefficients: Vec<i32>,
 }
 
-/// The board's frame for a map of (height, width).
 pub(super) fn frame((height, width): (usize, usize)) -> Result<Frame, CorrectionError> {
     let side = |length: usize| u16::try_from(length).unwrap_or(u16::MAX);
     Ok(Frame::new(side(width), side(height))?)
 }
 
 impl BoardCorrection {
-    /// Corrects a depth map in mm, (height, width), as the board does.
-    ///
-    /// # Errors
-    /// [`CorrectionError::Board`] for coefficients or rows that do not fit the frame.
+    /// Corrects a map in mm, (height, width), as the board does. [`CorrectionError::Board`] if rows do not fit.
     pub fn apply(&self, depth_mm: ArrayView2<f32>) -> Result<Array2<f32>, CorrectionError> {
         let (frame, width) = (self.frame, self.frame.width());
         match self.form {
@@ -66,7 +61,6 @@ impl BoardCorrection {
         }
     }
 
-    /// The coefficients, as many as a form has.
     fn numbers<const N: usize>(&self) -> Result<[Coefficient; N], CorrectionError> {
         let found = self.coefficients.len();
         let wrong = || CorrectionError::Damaged(format!("{found} coefficients where {N} are needed"));
@@ -85,7 +79,6 @@ impl BoardCorrection {
         Ok(regions)
     }
 
-    /// Encodes, corrects and decodes row after row.
     fn rows(
         &self,
         depth_mm: ArrayView2<f32>,

@@ -1,15 +1,11 @@
 //! Correction by distortion cancellation (CDC; Li 2014, section 6.3, eqs. 6.2 to 6.10).
 //!
 //! Every pixel is compared with the stored patterns: the residual of pattern `v` is
-//! `r(v) = sum |Ui(x - i, y - j) - Uc(x - i, y - j, v)|` over a window of (2N + 1) x (2N + 1) (the printed 6.3, 6.4, 6.6,
-//! 6.7 and 6.10 read `Uo(x, y)` where the distorted depth `Ui` under the window is meant). The least residual and its
-//! two neighbours give a fractional pattern index (a V through them), the index a fractional pattern value and a
-//! fractional true depth, and `Uo = Ui - Uc + w`.
-//!
-//! Patterns are themselves noisy and would put their noise into every result, so they are smoothed (SD 8 px) and kept
-//! on a grid of 4 px, in whole micrometres: stored and used values are identical.
-//!
-//! Cost: M (2N + 1 + about 12) operations per pixel.
+//! `r(v) = sum |Ui(x - i, y - j) - Uc(x - i, y - j, v)|` over a window of (2N + 1) x (2N + 1) (6.3, 6.4, 6.6, 6.7 and
+//! 6.10 print `Uo(x, y)` for the distorted depth `Ui` under the window). A V through the least residual and its two
+//! neighbours gives a fractional pattern index. The index gives a fractional pattern value and true depth, and
+//! `Uo = Ui - Uc + w`. Noise of the patterns would enter every result: they are smoothed (SD 8 px) and kept on a grid
+//! of 4 px, in whole micrometres as in a file. Cost: M (2N + 1 + about 12) operations per pixel.
 
 mod scan;
 mod smooth;
@@ -25,10 +21,9 @@ use super::table::Learned;
 /// Widest window: beyond, the "local" residual spans a tenth of a 640x480 map.
 const MAX_WINDOW: usize = 24;
 
-/// Strongest smoothing of the patterns, px.
 const MAX_SMOOTHING_PX: f64 = 64.0;
 
-/// How CDC works; used when it is learned.
+/// Settings of learning CDC.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct CdcSettings {
@@ -56,13 +51,12 @@ impl CdcSettings {
         Ok(())
     }
 
-    /// Pixels from one grid point to the next: a Gaussian is smooth over half its SD.
+    /// Grid spacing, px: a Gaussian is smooth over half its SD.
     fn grid_px(&self) -> usize {
         (self.smoothing_px / 2.0).clamp(1.0, 4.0) as usize
     }
 }
 
-/// The patterns, farthest first.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(super) struct Cdc {
     window: usize,
@@ -74,7 +68,6 @@ pub(super) struct Cdc {
     expanded: Expanded,
 }
 
-/// The patterns in mm with a value per column, rows still on the grid: what the hot loop reads.
 #[derive(Debug, Clone, PartialEq, Default)]
 struct Expanded {
     values: Vec<f32>,
@@ -83,7 +76,6 @@ struct Expanded {
 }
 
 impl Learned for Cdc {
-    // One pattern and a neighbour on either side.
     const PATTERNS_NEEDED: usize = 3;
 
     fn learn(series: &Series<'_>, settings: &CdcSettings) -> Result<Self, CorrectionError> {

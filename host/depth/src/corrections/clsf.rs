@@ -1,4 +1,4 @@
-//! A polynomial of ten terms in each of 3x3 regions (Li 2014, eq. 6.11). It steps at the regions' borders.
+//! A polynomial of ten terms in each of 3x3 regions (Li 2014, eq. 6.11), with steps at the regions' borders.
 
 use farnear_maths::clsf::{DepthScale, REGIONS};
 use ndarray::ArrayViewMut2;
@@ -10,17 +10,15 @@ use super::regions::{Factors, Regions, in_mm, region, x_terms, y_terms};
 use super::table::Learned;
 use super::{CdcSettings, CorrectionError};
 
-/// One fit per region, from the samples inside it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(super) struct Clsf(Regions);
 
-/// Whether `index` lies in each region, as weights.
 fn membership(index: usize, length: usize) -> [f64; REGIONS] {
     std::array::from_fn(|r| if region(r, length).contains(&index) { 1.0 } else { 0.0 })
 }
 
 impl Learned for Clsf {
-    // 1, U, U^2 and U^3 cannot be distinguished by fewer.
+    // Fewer cannot distinguish 1, U, U^2 and U^3.
     const PATTERNS_NEEDED: usize = 4;
     const BOARD_FORM: Option<BoardForm> = Some(BoardForm::Regions);
 
@@ -58,7 +56,6 @@ impl Learned for Clsf {
     }
 }
 
-/// The hot loop of `clsf`; vectorised by the compiler.
 fn uniform(depths: &mut [f32], of_columns: &[f32], of_row: f32, f: Factors, scale: DepthScale) {
     let (centre, span) = (scale.centre_mm(), scale.half_span_mm());
     for (depth, of_column) in depths.iter_mut().zip(of_columns) {

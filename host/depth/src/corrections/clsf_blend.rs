@@ -1,4 +1,4 @@
-//! The polynomials of 3x3 regions, blended bilinearly between the regions' centres: no steps (Li 2014, section 6.4).
+//! Polynomials of 3x3 regions blended bilinearly between the regions' centres: no steps (Li 2014, section 6.4).
 
 use std::ops::Range;
 
@@ -12,12 +12,10 @@ use super::regions::{Factors, Regions, in_mm, region, support, x_terms, y_terms}
 use super::table::Learned;
 use super::{CdcSettings, CorrectionError};
 
-/// One fit per region, from the samples up to the neighbouring centres, each with the weight that the region has there
-/// when it is blended: what a region's polynomial is used for is what it is fitted to.
+/// One fit per region, from the samples up to the neighbouring centres with their blending weights.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(super) struct ClsfBlend(Regions);
 
-/// The weight of each region at a pixel when neighbours are blended between their centres.
 fn weights(index: usize, length: usize) -> [f64; REGIONS] {
     let centre = |r: usize| (region(r, length).start + region(r, length).end - 1) as f64 / 2.0;
     let mut weights = [0.0; REGIONS];
@@ -34,7 +32,6 @@ fn weights(index: usize, length: usize) -> [f64; REGIONS] {
 }
 
 impl Learned for ClsfBlend {
-    // As for `clsf`.
     const PATTERNS_NEEDED: usize = 4;
     const BOARD_FORM: Option<BoardForm> = Some(BoardForm::Blend);
 
@@ -84,7 +81,6 @@ impl Learned for ClsfBlend {
     }
 }
 
-/// Columns on which the same two regions mix, and the weight of the right one.
 struct Span {
     columns: Range<usize>,
     left: usize,
@@ -97,7 +93,7 @@ fn spans(width: usize) -> Vec<Span> {
     (0..REGIONS - 1)
         .map(|left| {
             let right = left + 1;
-            // The first span begins, the last one ends with the part where one region holds alone.
+            // The first span begins and the last ends where a single region applies.
             let start = if left == 0 { 0 } else { support(&of_columns, right).start };
             let end = if right == REGIONS - 1 { width } else { support(&of_columns, right + 1).start };
             let of_right = (start..end).map(|column| of_columns[column][right] as f32).collect();
@@ -106,7 +102,6 @@ fn spans(width: usize) -> Vec<Span> {
         .collect()
 }
 
-/// [`Factors`] and the terms in y, blended along y.
 #[derive(Clone, Copy)]
 struct Blended {
     factors: Factors,
@@ -121,7 +116,6 @@ impl Blended {
     }
 }
 
-/// The hot loop of `clsf-blend`.
 fn mixed(
     depths: &mut [f32],
     [upper, lower]: [&[f32]; 2],

@@ -1,7 +1,6 @@
-//! One polynomial with all twenty terms of third order in x, y and depth.
-//!
-//! The ten terms of CLSF lack the cross terms (a bowl whose height changes with depth is `x^2 U`), which the regions
-//! only partly make up for. With them one set of coefficients does for the whole map, without seams.
+//! One polynomial with all twenty terms of third order in x, y and depth. CLSF's ten terms lack the cross terms (a bowl
+//! whose height changes with depth is `x^2 U`), which the regions only partly replace. With them one set of
+//! coefficients covers the whole map without seams.
 
 use farnear_maths::clsf::{Coefficient, DepthScale, FULL_TERMS};
 use ndarray::ArrayViewMut2;
@@ -13,14 +12,13 @@ use super::pattern::{Series, coordinate, inside, normalise};
 use super::table::Learned;
 use super::{CdcSettings, CorrectionError};
 
-/// The coefficients in the order of [`FULL_TERMS`].
+/// In the order of [`FULL_TERMS`].
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(super) struct ClsfFull {
     terms: [f64; FULL_TERMS],
 }
 
 impl Learned for ClsfFull {
-    // As for `clsf`.
     const PATTERNS_NEEDED: usize = 4;
     const BOARD_FORM: Option<BoardForm> = Some(BoardForm::Full);
 
@@ -68,7 +66,7 @@ impl Learned for ClsfFull {
     }
 }
 
-/// What multiplies the powers of `d` (mm from the scale's centre) along one row, as polynomials in x, in mm.
+/// Factors of the powers of `d` (mm from the scale's centre) along one row, as polynomials in x, in mm.
 struct AlongRow {
     constant: [f32; 4],
     linear: [f32; 3],
@@ -92,7 +90,6 @@ impl AlongRow {
         }
     }
 
-    /// The hot loop; vectorised by the compiler.
     fn correct(&self, depths: &mut [f32], x: &[f32], scale: DepthScale) {
         let (centre, span) = (scale.centre_mm(), scale.half_span_mm());
         let Self { constant: c, linear: l, square: s, cubic } = self;

@@ -1,4 +1,4 @@
-//! What can be wrong with patterns, a stored correction, or the map to be corrected.
+//! Errors of patterns, stored corrections and maps.
 
 use super::{FORMAT, Method};
 

@@ -1,13 +1,12 @@
-//! Sums of products of powers, from which the normal equations of any third-order polynomial are read off.
+//! Sums of products of powers, which give the normal equations of any third-order polynomial.
 //!
 //! The normal matrix of a polynomial in x, y and u contains only sums of `x^a y^b u^c` with `a + b + c <= 6`, and the
-//! right side sums of `x^a y^b u^c t` with `a + b + c <= 3`. Collecting them once per sample costs less than the
-//! outer product of 20 terms, and the same sums serve every choice of terms. Everything is f64: with |x|, |y| <= 1
-//! the condition number of a region's matrix stays below 1e9, which leaves seven digits.
+//! right side sums of `x^a y^b u^c t` with `a + b + c <= 3`. Collecting them once costs less than the outer product of
+//! 20 terms and serves every choice of terms. Everything is f64: with |x|, |y| <= 1 a region's condition number is
+//! below 1e9.
 
 use nalgebra::{DMatrix, DVector};
 
-/// Powers of x, y and u in one term.
 pub(super) type Powers = [usize; 3];
 
 /// The ten terms of a region (Li 2014, eq. 6.11): 1, x, x^2, x^3, y, y^2, y^3, u, u^2, u^3.
@@ -51,7 +50,6 @@ pub(super) const TWENTY: [Powers; 20] = [
 const MATRIX: usize = 7;
 const RIGHT: usize = 4;
 
-/// The sums.
 #[derive(Clone)]
 pub(super) struct Moments {
     matrix: [[[f64; MATRIX]; MATRIX]; MATRIX],
@@ -70,8 +68,7 @@ impl Moments {
         }
     }
 
-    /// Adds the samples of one row: `(x, u, t, weight)` each. The powers of u are summed per row and power of x, the powers of
-    /// y multiplied in at the end.
+    /// Adds one row's samples, `(x, u, t, weight)` each; powers of y are multiplied in at the end.
     pub(super) fn add_row(&mut self, y: f64, samples: impl Iterator<Item = (f64, f64, f64, f64)>) {
         let mut matrix = [[0.0; MATRIX]; MATRIX];
         let mut right = [[0.0; RIGHT]; RIGHT];
@@ -108,7 +105,7 @@ impl Moments {
         self.samples
     }
 
-    /// The least-squares coefficients of `terms`; none where the samples do not determine them.
+    /// Least-squares coefficients of `terms`; `None` if the samples do not determine them.
     pub(super) fn solve<const N: usize>(&self, terms: &[Powers; N]) -> Option<[f64; N]> {
         if self.samples < N {
             return None;
@@ -120,7 +117,7 @@ impl Moments {
             let [a, b, c] = terms[i];
             self.right[a][b][c] / n
         });
-        // A matrix that is singular up to rounding has no Cholesky factor or one with a vanishing pivot.
+        // A matrix singular up to rounding has no Cholesky factor or a vanishing pivot.
         let factor = matrix.cholesky()?;
         let smallest = factor.l_dirty().diagonal().min();
         if smallest < 1e-7 {
@@ -131,7 +128,6 @@ impl Moments {
     }
 }
 
-/// Adds `sums[c] y^b` to `totals[b][c]`; entries of too high an order are never read.
 fn add_power_of_y<const N: usize>(totals: &mut [[f64; N]; N], sums: &[f64; N], y: f64) {
     let mut of_y = 1.0;
     for totals in totals {
@@ -168,7 +164,7 @@ mod tests {
     #[test]
     fn too_little_to_go_by_is_no_solution() {
         let mut moments = Moments::new();
-        // Three depths cannot tell u^3 from the rest.
+        // Three depths cannot determine u^3.
         for row in 0..9 {
             let y = row as f64 / 4.0 - 1.0;
             moments.add_row(

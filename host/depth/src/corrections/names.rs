@@ -1,4 +1,4 @@
-//! The corrections by name, as the command line and messages write them.
+//! The corrections by name, for the command line and messages.
 
 use std::fmt;
 use std::str::FromStr;

@@ -5,10 +5,10 @@ use ndarray::ArrayView2;
 
 use super::{CorrectionError, Method};
 
-/// Smallest side of a map that can be corrected: a few pixels per region.
+/// Smallest side of a correctable map: a few pixels per region.
 const SMALLEST_PX: usize = 12;
 
-/// The depth map of a flat target and the depth at which the target stood.
+/// Depth map and true depth of a flat target.
 #[derive(Debug, Clone, Copy)]
 pub struct Pattern<'a> {
     /// Measured depth, mm, (height, width), NaN = no value.
@@ -17,7 +17,6 @@ pub struct Pattern<'a> {
     pub true_mm: f64,
 }
 
-/// Patterns of one size from the farthest to the nearest.
 pub(super) struct Series<'a> {
     patterns: Vec<Pattern<'a>>,
     scale: DepthScale,
@@ -60,7 +59,6 @@ impl<'a> Series<'a> {
         self.patterns[0].depth_mm.dim()
     }
 
-    /// Depths of the farthest and the nearest.
     pub(super) fn range_mm(&self) -> (f64, f64) {
         (self.patterns[0].true_mm, self.patterns[self.patterns.len() - 1].true_mm)
     }
@@ -74,17 +72,15 @@ pub(super) fn scale(far_mm: f64, near_mm: f64) -> Result<DepthScale, CorrectionE
     Ok(DepthScale::for_range(far_mm as f32, near_mm as f32)?)
 }
 
-/// Depth in mm to normalised depth in f64, on the same scale as the board's.
 pub(super) fn normalise(scale: DepthScale, depth_mm: f64) -> f64 {
     (depth_mm - f64::from(scale.centre_mm())) / f64::from(scale.half_span_mm())
 }
 
-/// Normalised coordinate of a pixel: -1 at the first, +1 at the last.
 pub(super) fn coordinate(index: usize, length: usize) -> f64 {
     2.0 * index as f64 / (length as f64 - 1.0) - 1.0
 }
 
-/// The corrected depth, or NaN where it or the raw one (`d` from the centre) lies beyond the scale.
+/// The corrected depth; NaN where it or the raw one (`d` from the centre) lies beyond the scale.
 #[inline(always)]
 pub(super) fn inside(d: f32, corrected: f32, centre: f32, span: f32) -> f32 {
     // Not `&&`: no branch, and NaN compares false.

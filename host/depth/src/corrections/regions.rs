@@ -1,4 +1,4 @@
-//! Ten-term polynomials in 3x3 regions: what `clsf` and `clsf-blend` share (Li 2014, eq. 6.11).
+//! Ten-term polynomials in 3x3 regions, shared by `clsf` and `clsf-blend` (Li 2014, eq. 6.11).
 
 use std::ops::Range;
 
@@ -15,14 +15,13 @@ pub(super) struct Regions {
     pub terms: [[[f64; REGION_TERMS]; REGIONS]; REGIONS],
 }
 
-/// Each pixel of an axis belongs to one region; the same split as on the board.
+/// Pixels of a region along an axis; the same split as on the board.
 pub(super) fn region(region: usize, length: usize) -> Range<usize> {
     length * region / REGIONS..length * (region + 1) / REGIONS
 }
 
 impl Regions {
-    /// One fit per region, each to the samples with the weight that the region has at their column and row (index,
-    /// length).
+    /// One fit per region, with the region's weight at each column and row (index, length).
     pub fn fit(
         series: &Series<'_>,
         weights: fn(usize, usize) -> [f64; REGIONS],
@@ -69,14 +68,12 @@ impl Regions {
         Err(CorrectionError::Damaged("a coefficient of a region is not finite".to_owned()))
     }
 
-    /// The bits of the coefficients as the board stores them.
     pub fn quantised(&self) -> Result<Vec<i32>, CorrectionError> {
         let terms = self.terms.as_flattened().as_flattened();
         terms.iter().map(|term| Ok(Coefficient::from_f64(*term)?.to_bits())).collect()
     }
 }
 
-/// The columns in which region `j` has any weight.
 pub(super) fn support(of_columns: &[[f64; REGIONS]], j: usize) -> Range<usize> {
     let start = of_columns.iter().position(|w| w[j] > 0.0).unwrap_or(0);
     let end = of_columns.iter().rposition(|w| w[j] > 0.0).map_or(0, |last| last + 1);

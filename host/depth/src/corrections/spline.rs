@@ -1,17 +1,12 @@
-//! A smooth surface over field and depth: the correction of a measured depth, as a tensor-product cubic B-spline.
+//! Correction of a measured depth by a smooth surface over field and depth: a tensor-product cubic B-spline.
 //!
-//! `t - u = sum c(i, j, k) B_i(x) B_j(y) B_k(u)` with uniform knots, fitted by penalised least squares (P-splines; Eilers
-//! & Marx 1996): the second differences of neighbouring coefficients along each of the three axes cost as well, so that
-//! noise is not followed and what few samples say little about is bridged straight. Unlike one polynomial it bends where
-//! the lens bends, without oscillating elsewhere; unlike stored patterns it adds no noise, and 343 numbers
-//! tell it whole.
-//!
-//! Beyond the patterns' depths the penalty makes it go on as a straight line in depth, up to the scale's ends; beyond
-//! these there is no value, as with every correction. Each of the field's cells must have been seen at
-//! [`Learned::PATTERNS_NEEDED`] depths: the field is not extrapolated.
-//!
-//! Samples are means over small blocks: the noise of depth maps is alike over a smoothing window, so that nothing is lost,
-//! and the noise in `u`, which flattens every fit of `t` to `u`, becomes less.
+//! `t - u = sum c(i, j, k) B_i(x) B_j(y) B_k(u)` with uniform knots, fitted by penalised least squares (P-splines;
+//! Eilers & Marx 1996): second differences of neighbouring coefficients along each axis are penalised, so that noise is
+//! not followed and sparse parts are bridged straight. Unlike one polynomial it follows the lens locally without
+//! oscillating elsewhere; unlike stored patterns it adds no noise. Beyond the patterns' depths the penalty continues it
+//! straight up to the scale's ends; beyond these the result is NaN. The field is not extrapolated: each cell needs
+//! samples at [`Learned::PATTERNS_NEEDED`] depths. Samples are means over small blocks: noise is correlated over a
+//! smoothing window, and less noise in `u` flattens the fit less. 343 coefficients.
 
 use farnear_maths::clsf::DepthScale;
 use nalgebra::{DMatrix, DVector};
@@ -22,17 +17,16 @@ use super::pattern::{Series, coordinate, inside, normalise};
 use super::table::Learned;
 use super::{CdcSettings, CorrectionError};
 
-/// Intervals between knots along a side of the field, and along depth.
+/// Knot intervals along a side of the field, and along depth.
 const FIELD_INTERVALS: usize = 4;
 const DEPTH_INTERVALS: usize = 4;
 
 /// Weight of the squared second differences against the mean squared error of the samples.
 const PENALTY: f64 = 1e-4;
 
-/// Blocks along the shorter side of a map.
 const BLOCKS: usize = 60;
 
-/// Numbers of coefficients along an axis that are taken from a file.
+/// Accepted numbers of coefficients along an axis of a file.
 const COUNTS: std::ops::RangeInclusive<usize> = 4..=67;
 
 /// The coefficients `[row][column][depth]`, in units of half the depth scale.
@@ -44,14 +38,14 @@ pub(super) struct Spline {
     coefficients: Vec<f64>,
 }
 
-/// The cubic B-splines that are not zero at a place: the index of the first, and the values of all four.
+/// The cubic B-splines that are not zero at a place: index of the first, and all four values.
 #[derive(Clone, Copy)]
 struct Basis<T> {
     first: usize,
     values: [T; 4],
 }
 
-/// Of `count` splines on uniform knots over -1 to 1.
+/// Basis of `count` splines on uniform knots over -1 to 1.
 fn basis(place: f64, count: usize) -> Basis<f64> {
     let intervals = count - 3;
     let position = 0.5 * (place + 1.0) * intervals as f64;
@@ -62,7 +56,7 @@ fn basis(place: f64, count: usize) -> Basis<f64> {
     Basis { first, values: values.map(|value| value / 6.0) }
 }
 
-/// Data of a block of a pattern: place, measured depth, correction, and number of pixels.
+/// A block of a pattern: place, measured depth, correction, and number of pixels.
 struct Sample {
     y: f64,
     x: f64,
@@ -71,7 +65,6 @@ struct Sample {
     weight: f64,
 }
 
-/// The blocks of all patterns that have any value, pattern after pattern.
 fn samples(series: &Series<'_>) -> Vec<(usize, Sample)> {
     let ((height, width), scale) = (series.dim(), series.scale());
     let side = (height.min(width) / BLOCKS).max(1);
@@ -90,7 +83,7 @@ fn samples(series: &Series<'_>) -> Vec<(usize, Sample)> {
                     weight += 1.0;
                 }
                 let [y, x, u] = [y, x, u].map(|sum| sum / weight);
-                // Values beyond the scale stay without a value when corrected.
+                // Values beyond the scale are NaN when corrected.
                 if u.abs() <= 1.0 {
                     samples.push((index, Sample { y, x, u, add: truth - u, weight }));
                 }
@@ -100,7 +93,6 @@ fn samples(series: &Series<'_>) -> Vec<(usize, Sample)> {
     samples
 }
 
-/// Sums of the normal equations.
 struct Normal {
     matrix: DMatrix<f64>,
     right: DVector<f64>,
@@ -124,7 +116,6 @@ impl Normal {
             let weighted = sample.weight * value;
             self.right[*column] += weighted * sample.add;
             let mut of_column = self.matrix.column_mut(*column);
-            // Indices rise, so that these are the lower triangle.
             for (row, value) in &terms[at..] {
                 of_column[*row] += weighted * value;
             }
@@ -132,7 +123,6 @@ impl Normal {
         self.weight += sample.weight;
     }
 
-    /// The coefficients; none where the samples do not determine them.
     fn solve(mut self, counts: [usize; 3]) -> Option<Vec<f64>> {
         self.matrix /= self.weight;
         self.right /= self.weight;
@@ -144,7 +134,6 @@ impl Normal {
     }
 }
 
-/// Adds the squared second differences along each axis to the lower triangle.
 fn add_penalty(matrix: &mut DMatrix<f64>, counts: [usize; 3]) {
     let [rows, columns, depths] = counts;
     let strides = [columns * depths, depths, 1];
@@ -164,7 +153,6 @@ fn add_penalty(matrix: &mut DMatrix<f64>, counts: [usize; 3]) {
     }
 }
 
-/// That every cell of the field was seen at enough depths.
 fn check_field(samples: &[(usize, Sample)]) -> Result<(), CorrectionError> {
     let cell =
         |place: f64| ((0.5 * (place + 1.0) * FIELD_INTERVALS as f64) as usize).min(FIELD_INTERVALS - 1);
@@ -172,7 +160,6 @@ fn check_field(samples: &[(usize, Sample)]) -> Result<(), CorrectionError> {
     for (pattern, sample) in samples {
         let (pixels, patterns, last) = &mut seen[cell(sample.y) * FIELD_INTERVALS + cell(sample.x)];
         *pixels += sample.weight as usize;
-        // Samples come pattern after pattern.
         *patterns += usize::from(last != pattern);
         *last = *pattern;
     }
@@ -188,7 +175,7 @@ fn check_field(samples: &[(usize, Sample)]) -> Result<(), CorrectionError> {
 }
 
 impl Learned for Spline {
-    // As for `clsf`: where depths are bridged straight, that many tell a bend from noise.
+    // As for `clsf`: where depths are bridged straight, so many distinguish a bend from noise.
     const PATTERNS_NEEDED: usize = 4;
 
     fn learn(series: &Series<'_>, _: &CdcSettings) -> Result<Self, CorrectionError> {
@@ -249,7 +236,7 @@ impl Learned for Spline {
     }
 }
 
-/// The hot loop. `along_row` are the coefficients in mm of one row of the map, `[column][depth]`.
+/// The hot loop. `along_row` are the coefficients of one map row in mm, `[column][depth]`.
 fn correct_row(
     depths: &mut [f32],
     of_columns: &[Basis<f32>],
@@ -263,7 +250,7 @@ fn correct_row(
     for (depth, of_column) in depths.iter_mut().zip(of_columns) {
         let d = *depth - centre;
         let position = (d + span) * per_mm;
-        // A depth that is not finite or beyond the scale ends as NaN below, for every interval.
+        // A depth that is not finite or beyond the scale becomes NaN below, for every interval.
         let first = (position as usize).min(intervals - 1);
         let t = position - first as f32;
         let (square, cube, rest) = (t * t, t * t * t, 1.0 - t);
@@ -299,7 +286,7 @@ mod tests {
                 let sum: f64 = (0..count).map(|index| value(place, index)).sum();
                 assert!((sum - 1.0).abs() < 1e-12, "{place}: {sum}");
             }
-            // Value and slope go on through every inner knot.
+            // Value and slope are continuous at every inner knot.
             for knot in 1..count - 3 {
                 let at = 2.0 * knot as f64 / (count - 3) as f64 - 1.0;
                 for index in 0..count {

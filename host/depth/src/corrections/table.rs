@@ -1,4 +1,4 @@
-//! Interface of a correction's file, and the table of corrections.
+//! The trait of a correction, and the table of corrections.
 
 use farnear_maths::clsf::DepthScale;
 use ndarray::ArrayViewMut2;
@@ -7,30 +7,28 @@ use super::board::BoardForm;
 use super::pattern::Series;
 use super::{CdcSettings, CorrectionError};
 
-/// A correction that was learned. Its fields are its stored form.
+/// A learned correction. Its fields are its stored form.
 pub(super) trait Learned: Sized {
-    /// The least number of patterns, at different depths, that can teach it.
+    /// Least number of patterns at different depths.
     const PATTERNS_NEEDED: usize;
 
-    /// How a board computes it; none where only this computer can.
+    /// The board's method; `None` if it has none.
     const BOARD_FORM: Option<BoardForm> = None;
 
-    /// Learns from checked patterns.
     fn learn(series: &Series<'_>, settings: &CdcSettings) -> Result<Self, CorrectionError>;
 
-    /// Checks loaded data and prepares it for maps of (height, width).
     fn prepare(&mut self, dim: (usize, usize)) -> Result<(), CorrectionError>;
 
     /// Corrects a map in standard layout in place; values beyond the scale become NaN.
     fn apply(&self, depth_mm: ArrayViewMut2<f32>, scale: DepthScale);
 
-    /// The bits of the coefficients for a board, in the order of its form; empty without one.
+    /// Bits of the coefficients in the order of the board's form; empty without one.
     fn quantised(&self) -> Result<Vec<i32>, CorrectionError> {
         Ok(Vec::new())
     }
 }
 
-/// Makes [`Method`](super::Method), the names, and the stored form `Map` of the table of corrections.
+/// Generates [`Method`](super::Method), the names, and the stored form `Map`.
 macro_rules! corrections {
     ($(#[doc = $summary:literal] $variant:ident = $name:literal: $learned:ty,)+) => {
         /// Name of the correction.
@@ -57,18 +55,17 @@ macro_rules! corrections {
                 match self { $(Self::$variant => $summary.trim_ascii(),)+ }
             }
 
-            /// The least number of patterns, at different depths, that can teach it.
+            /// Least number of patterns at different depths.
             pub fn patterns_needed(self) -> usize {
                 match self { $(Self::$variant => <$learned>::PATTERNS_NEEDED,)+ }
             }
 
-            /// How a board computes it; none where only this computer can.
+            /// The board's method; `None` if it has none.
             pub fn board_form(self) -> Option<BoardForm> {
                 match self { $(Self::$variant => <$learned>::BOARD_FORM,)+ }
             }
         }
 
-        /// The part of a correction that differs from method to method.
         #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
         #[serde(tag = "method")]
         enum Map {

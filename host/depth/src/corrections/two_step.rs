@@ -1,8 +1,8 @@
-//! The two-step correction (Li 2014, section 5.3), kept for comparison.
+//! The two-step correction (Li 2014, section 5.3), for comparison.
 //!
 //! A first fit gives the true depth from place and raw depth, `T = f(x, y, Uraw)` (eq. 5.21), a second one the raw
 //! depth from place and true depth, `Uc = g(x, y, T)` (eq. 5.22). The corrected depth is `Uraw - Uc + T`. Errors of the
-//! first fit go through the second, which is why one fit (CLSF) does better.
+//! first fit enter the second, which is why one fit (CLSF) does better.
 
 use farnear_maths::clsf::DepthScale;
 use ndarray::ArrayViewMut2;
@@ -13,7 +13,6 @@ use super::pattern::{Series, coordinate, normalise};
 use super::table::Learned;
 use super::{CdcSettings, CorrectionError};
 
-/// Ten coefficients for each step, in the order of [`TEN`].
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(super) struct TwoStep {
     true_of_raw: [f64; 10],
@@ -21,7 +20,6 @@ pub(super) struct TwoStep {
 }
 
 impl Learned for TwoStep {
-    // As for `clsf`.
     const PATTERNS_NEEDED: usize = 4;
 
     fn learn(series: &Series<'_>, _: &CdcSettings) -> Result<Self, CorrectionError> {
@@ -88,7 +86,6 @@ impl Learned for TwoStep {
     }
 }
 
-/// `c0 + c1 v + c2 v^2 + c3 v^3`.
 fn cubic(c: [f64; 4], v: f64) -> f64 {
     c[0] + v * (c[1] + v * (c[2] + v * c[3]))
 }

@@ -2,14 +2,12 @@
 
 use ndarray::ArrayView2;
 
-/// The eight neighbours clockwise (rows grow downwards), from the left one on.
+/// Clockwise from the left (rows grow downwards).
 const NEIGHBOURS: [(isize, isize); 8] =
     [(0, -1), (-1, -1), (-1, 0), (-1, 1), (0, 1), (1, 1), (1, 0), (1, -1)];
 
-/// The outer boundary, clockwise, of the 8-connected region of `mask` whose first pixel in reading order is `start`.
-///
-/// Pixels (row, column); a pixel where the region is one pixel wide is visited once per side. Jacob's criterion ends the
-/// walk: the start entered again from where it was entered first. O(boundary).
+/// Clockwise outer boundary, (row, column), of the 8-connected region of `mask` whose first pixel in reading order is
+/// `start`. Parts one pixel wide appear once per side. Ends by Jacob's criterion. O(boundary).
 ///
 /// # Panics
 /// If `start` lies outside the mask or is not set.
@@ -20,7 +18,7 @@ pub fn trace_boundary(mask: ArrayView2<bool>, start: (usize, usize)) -> Vec<(usi
         let next = (y.checked_add_signed(dy)?, x.checked_add_signed(dx)?);
         mask.get(next).copied().unwrap_or(false).then_some(next)
     };
-    // Reading order: the pixel left of the start is background, so the search begins there.
+    // In reading order the pixel left of the start is background, so the search begins there.
     let mut boundary = vec![start];
     let mut pixel = start;
     let mut from = 0;
@@ -29,19 +27,16 @@ pub fn trace_boundary(mask: ArrayView2<bool>, start: (usize, usize)) -> Vec<(usi
         let Some((direction, next)) =
             (0..8).map(|i| (from + i) % 8).find_map(|direction| Some((direction, step(pixel, direction)?)))
         else {
-            // A single pixel.
             return boundary;
         };
         if first_move == Some((pixel, direction)) {
-            // The start and the first step are repeated at the end.
             boundary.pop();
             return boundary;
         }
         first_move.get_or_insert((pixel, direction));
         boundary.push(next);
         pixel = next;
-        // The background pixel looked at last, as seen from the new pixel: straight moves turn back by two, diagonal
-        // ones by three eighths.
+        // The last background pixel from the new one: straight moves turn back two eighths, diagonal ones three.
         from = (direction + if direction % 2 == 0 { 6 } else { 5 }) % 8;
     }
 }
@@ -75,7 +70,7 @@ mod tests {
         assert_eq!(trace_boundary(line.view(), (0, 0)), [(0, 0), (0, 1), (0, 2), (0, 1)]);
     }
 
-    /// Every pixel of the boundary has a 4-neighbour outside, and every such pixel of a region without holes is visited.
+    /// Every boundary pixel has a 4-neighbour outside, and every such pixel of a region without holes is visited.
     #[test]
     fn the_boundary_is_that_of_the_definition() {
         for shape in [

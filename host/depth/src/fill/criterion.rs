@@ -1,12 +1,9 @@
 //! Which pixels have too little texture.
 //!
-//! Two criteria: the energy of the texture that depth rests on, and Li 2014's, the variance of the ratio
-//! `R = (I1 - I2) / (I1 + I2)` (eq. 6.12) over a window (eqs. 6.13 and 6.14) against a threshold that the thesis sets to
-//! 0.0144. Its inequality (eq. 6.15) is printed the other way round: low texture is where the variance is *below*, as its
-//! text says too.
-//!
-//! The ratio varies with the texture, but with the blur as well: in the middle of the range both images are alike, and it
-//! vanishes for every surface. So the second is for comparison. Cost: a few additions a pixel.
+//! Two criteria: the texture energy, and Li 2014's, the variance of the ratio `R = (I1 - I2) / (I1 + I2)` (eq. 6.12)
+//! over a window (eqs. 6.13 and 6.14) against a threshold of 0.0144. Its inequality (eq. 6.15) is printed inverted: low
+//! texture is where the variance is *below*, as its text states. The ratio also varies with blur and vanishes for every
+//! surface in the middle of the range, so the second is for comparison only. Cost: a few additions a pixel.
 
 use std::fmt;
 use std::str::FromStr;
@@ -20,11 +17,11 @@ use crate::prepare::band::box_mean;
 /// The thesis' threshold: a standard deviation of 0.12.
 const OF_THESIS: f32 = 0.0144;
 
-/// By what a pixel counts as one of low texture.
+/// Criterion of low texture.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(try_from = "String", into = "String")]
 pub enum LowTexture {
-    /// `energy`: the texture's energy is below [`LOW_TEXTURE`] times its median.
+    /// `energy`: texture energy below [`LOW_TEXTURE`] times its median.
     #[default]
     Energy,
     /// `variance` or `variance:0.0144`: the ratio's variance over a window is below this.
@@ -34,7 +31,7 @@ pub enum LowTexture {
     },
 }
 
-/// A text that belongs to no criterion.
+/// Unknown criterion.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error(
     "`{0}` is not a criterion of low texture: use energy, or variance:T where the variance of the ratio of the images, 0 to 1, is below \
@@ -83,8 +80,7 @@ impl From<LowTexture> for String {
 }
 
 impl LowTexture {
-    /// The pixels of low texture; none where the energy is NaN. `pair` are the far- and the near-focused image in any common
-    /// scale, `window_px` the side of the window.
+    /// Pixels of low texture; false where the energy is NaN. `pair`: far and near, any common scale.
     pub(super) fn mask(
         self,
         texture: ArrayView2<f32>,
@@ -93,7 +89,7 @@ impl LowTexture {
     ) -> Array2<bool> {
         match self {
             Self::Energy => {
-                // Without any texture at all everything is low; the comparison must hold for 0, too.
+                // Without any texture everything is low: the comparison must hold for 0.
                 let low = (LOW_TEXTURE * texture_scale(texture)).max(f32::MIN_POSITIVE);
                 texture.mapv(|energy| energy < low)
             }
@@ -107,7 +103,7 @@ impl LowTexture {
     }
 }
 
-/// Variance of the ratio over square windows. A pixel without light or value counts as even.
+/// Variance of the ratio over square windows; a pixel without light or value counts as even.
 fn variance_of_ratio([far, near]: [ArrayView2<f32>; 2], window_px: usize) -> Array2<f32> {
     let ratio = Zip::from(far).and(near).map_collect(|far, near| {
         let ratio = (far - near) / (far + near);
@@ -135,7 +131,7 @@ mod tests {
         }
     }
 
-    /// A checkered half whose two images differ by a tenth: the ratio is +-0.05 there and its variance 0.0025.
+    /// A chequered half whose images differ by a tenth: the ratio is +-0.05 there and its variance 0.0025.
     #[test]
     fn low_is_where_the_ratio_hardly_varies() {
         let checker = |(y, x): (usize, usize)| x >= 20 && (y + x) % 2 == 0;

@@ -6,36 +6,31 @@ use super::{GROWN_TEXTURE, Sample, trace_boundary};
 use crate::confidence::texture_scale;
 use crate::depth_map::DepthMap;
 
-/// Least and greatest width of a margin, px.
 const MARGIN_PX: [usize; 2] = [7, 112];
 
 /// Width of a margin for each pixel of its region's radius.
 const WIDTH_PER_RADIUS: f64 = 1.5;
 
-/// Widest distance of samples, px; twice that beyond [`NEAR_PX`] from the region.
+/// Largest spacing of samples, px; twice that beyond [`NEAR_PX`] from the region.
 const MAX_STEP_PX: usize = 4;
 
-/// Where samples are dense, px.
+/// Distance up to which samples are dense, px.
 const NEAR_PX: usize = 14;
 
-/// Neighbouring pixels share windows and kernels: this many count as one.
+/// Neighbouring pixels share windows and kernels: so many count as one.
 const PIXELS_PER_INDEPENDENT: f64 = 60.0;
 
-/// Number of places that represent a boundary.
 const BORDER_POINTS: usize = 48;
 
-/// The regions of a map.
 pub(super) struct Regions {
-    /// The pixels of all regions.
     mask: Array2<bool>,
     regions: Vec<Vec<(usize, usize)>>,
-    /// Texture energy by which weights are measured.
+    /// Texture energy, the unit of weights.
     scale: f32,
 }
 
 impl Regions {
-    /// The regions of `low`, grown by at most `reach_px` where there is little `texture` (NaN: belongs to none); two that meet
-    /// are one.
+    /// The regions of `low`, grown by up to `reach_px` over low `texture` (NaN: none); touching regions merge.
     pub fn find(low: Array2<bool>, texture: ArrayView2<f32>, reach_px: usize) -> Self {
         let scale = texture_scale(texture);
         let grown = (GROWN_TEXTURE * scale).max(f32::MIN_POSITIVE);
@@ -57,7 +52,7 @@ impl Regions {
         Self::of(mask, scale)
     }
 
-    /// The regions of a mask as they are, in reading order of their first pixels.
+    /// The regions of a mask, unchanged, in reading order of their first pixels.
     pub fn of(mask: Array2<bool>, scale: f32) -> Self {
         let mut taken = Array2::from_elem(mask.dim(), false);
         let mut regions = Vec::new();
@@ -69,23 +64,20 @@ impl Regions {
         Self { mask, regions, scale }
     }
 
-    /// Number of regions.
     pub fn count(&self) -> usize {
         self.regions.len()
     }
 
-    /// The pixels of a region; the first is its first in reading order.
+    /// The pixels of a region, the first in reading order first.
     pub fn region(&self, index: usize) -> &[(usize, usize)] {
         &self.regions[index]
     }
 
-    /// The pixels of all regions.
     pub fn pixels(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
         self.regions.iter().flatten().copied()
     }
 
-    /// Measured pixels around a region and on islands in it, nearest first, on a grid that is denser near the
-    /// region.
+    /// Measured pixels around a region and on its islands, nearest first, on a grid that is denser near the region.
     pub fn margin(&self, index: usize, map: &DepthMap, texture: ArrayView2<f32>) -> Vec<Sample> {
         let (height, width) = texture.dim();
         let region = &self.regions[index];
@@ -109,7 +101,6 @@ impl Regions {
                 }
                 let depth_mm = f64::from(map.depth_mm[(y, x)]);
                 let confidence = map.confidence[(y, x)];
-                // No depth: in this region, in another one, or invalid.
                 if !depth_mm.is_finite() || self.mask[(y, x)] || confidence <= 0.0 {
                     continue;
                 }
@@ -136,7 +127,7 @@ impl Regions {
         samples
     }
 
-    /// About [`BORDER_POINTS`] places (row, column) on a region's outer boundary and on those of its islands.
+    /// About [`BORDER_POINTS`] places (row, column) on a region's outer boundary and those of its islands.
     fn border(&self, index: usize) -> Vec<[f32; 2]> {
         let region = &self.regions[index];
         let mut border = trace_boundary(self.mask.view(), region[0]);
@@ -145,14 +136,13 @@ impl Regions {
             let inner = y > 0 && x > 0 && y + 1 < self.mask.nrows() && x + 1 < self.mask.ncols();
             inner && [(y - 1, x), (y + 1, x), (y, x - 1), (y, x + 1)].iter().any(|at| !self.mask[*at])
         };
-        // The outer boundary comes twice, which does no harm.
+        // The outer boundary appears twice, which is harmless.
         border.extend(region.iter().filter(|at| islands(at)));
         let step = border.len().div_ceil(BORDER_POINTS);
         border.into_iter().step_by(step).map(|(y, x)| [y as f32, x as f32]).collect()
     }
 }
 
-/// The up to eight neighbours of a pixel.
 fn neighbours(
     (y, x): (usize, usize),
     (height, width): (usize, usize),
@@ -162,7 +152,6 @@ fn neighbours(
         .filter(move |at| *at != (y, x))
 }
 
-/// The pixels connected with `start`, which are marked in `taken`.
 fn connected(mask: ArrayView2<bool>, start: (usize, usize), taken: &mut Array2<bool>) -> Vec<(usize, usize)> {
     let mut pixels = vec![start];
     taken[start] = true;

@@ -1,39 +1,34 @@
-//! The surface that is fitted to a margin: a polynomial of up to third order, from as wide a margin as agrees with it.
+//! The surface fitted to a margin: a polynomial of up to third order, from the widest margin that agrees with it.
 //!
-//! Wide margins hold more samples and tell curvature from noise: in the middle of a disc of radius R the standard deviation of
-//! a quadratic surface is about eight times less with a margin as wide as R than with one of R / 4. But the farther away,
-//! the less a cubic follows the surface, and other surfaces come in. So the margin is widened by factors of three as long as
-//! the wider fit explains the nearest samples as well as the fit to the nearest did (their robust spread grows by no more
-//! than [`TOLERANCE`]).
+//! Wide margins give more samples and separate curvature from noise: in the middle of a disc of radius R the standard
+//! deviation of a quadratic surface is about eight times less with a margin of R than of R / 4. But far away a cubic
+//! follows the surface less, and other surfaces appear. So the margin is widened by factors of three while the wider
+//! fit explains the nearest samples as well as their own fit (robust spread within [`TOLERANCE`]).
 
 use nalgebra::{SMatrix, SVector};
 
 use super::Sample;
 
-/// Fewest samples for any fit.
 const MIN_SAMPLES: usize = 12;
 
 /// Huber's constant: residuals beyond this many robust standard deviations lose weight.
 const HUBER: f64 = 1.345;
 
-/// Rounds of reweighting.
 const ROUNDS: usize = 3;
 
-/// Width of the narrowest margin that a fit is compared on, px.
+/// Width of the narrowest margin for comparison, px.
 const NARROW_PX: usize = 7;
 
-/// By how much the spread of the nearest samples may grow when the margin is widened.
+/// Largest growth of the nearest samples' spread when the margin is widened.
 const TOLERANCE: f64 = 1.25;
 
-/// A fitted surface.
 pub(super) struct Surface {
     frame: Frame,
     coefficients: Vec<f64>,
-    /// Depths of the margin, beyond which the surface is not trusted by more than their spread.
+    /// Depths of the margin; the surface may exceed them by their spread.
     limits: [f64; 2],
 }
 
-/// Coordinates within [-1, 1].
 #[derive(Clone, Copy)]
 struct Frame {
     centre: [f64; 2],
@@ -56,7 +51,7 @@ impl Frame {
 }
 
 impl Surface {
-    /// Fits the samples, which come nearest first; none if there are too few.
+    /// Fits the samples, nearest first; `None` if there are too few.
     pub fn fit(samples: &[Sample]) -> Option<Self> {
         let within = |width_px: usize| &samples[..samples.partition_point(|s| s.distance_px <= width_px)];
         let widest = samples.last()?.distance_px;
@@ -66,7 +61,7 @@ impl Surface {
             if let Some(surface) = Self::fit_all(within(width_px)) {
                 let spread = surface.spread_mm(within(NARROW_PX));
                 match &best {
-                    // Nothing nearer than 1 um is distinguished.
+                    // Spreads below 1 um are equal.
                     Some((_, narrow)) if spread > TOLERANCE * narrow.max(1e-3) => break,
                     Some((_, narrow)) => best = Some((surface, narrow.max(1e-3))),
                     None => best = Some((surface, spread)),
@@ -80,7 +75,7 @@ impl Surface {
         best.map(|(surface, _)| surface)
     }
 
-    /// Fits all of the samples with as many terms as they support: plane, quadratic or cubic.
+    /// Fits all samples with as many terms as they support: plane, quadratic or cubic.
     fn fit_all(samples: &[Sample]) -> Option<Self> {
         if samples.len() < MIN_SAMPLES {
             return None;
@@ -98,7 +93,6 @@ impl Surface {
             .flatten()
             .map(|(coefficients, variance)| {
                 let count = coefficients.len();
-                // Bayesian information criterion.
                 let information =
                     independent * variance.max(1e-12).ln() + count as f64 * independent.ln().max(1.0);
                 (information, coefficients)
@@ -110,7 +104,6 @@ impl Surface {
         Some(Self { frame, coefficients, limits: [low - (high - low), high + (high - low)] })
     }
 
-    /// Robust standard deviation of the samples about the surface, mm.
     fn spread_mm(&self, samples: &[Sample]) -> f64 {
         deviation(samples.iter().map(|s| s.depth_mm - self.value(s.y, s.x)).collect())
     }
@@ -119,13 +112,12 @@ impl Surface {
         self.frame.terms(y, x).iter().zip(&self.coefficients).map(|(t, c)| t * c).sum()
     }
 
-    /// Depth at a pixel, mm.
     pub fn depth_mm(&self, y: usize, x: usize) -> f32 {
         self.value(y as f64, x as f64).clamp(self.limits[0], self.limits[1]) as f32
     }
 }
 
-/// The median absolute deviation from 0 as the standard deviation of a normal distribution, which is 1.4826 of it.
+/// Standard deviation of a normal distribution from the median absolute deviation (factor 1.4826).
 fn deviation(mut residuals: Vec<f64>) -> f64 {
     residuals.iter_mut().for_each(|r| *r = r.abs());
     let middle = residuals.len() / 2;
@@ -135,8 +127,7 @@ fn deviation(mut residuals: Vec<f64>) -> f64 {
     1.4826 * *residuals.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
-/// Coefficients of the first `N` terms and the robust variance of the residuals; none if the samples do not determine
-/// them.
+/// First `N` coefficients and the robust residual variance; `None` if the samples do not determine them.
 fn fit_robustly<const N: usize>(rows: &[[f64; 10]], samples: &[Sample]) -> Option<(Vec<f64>, f64)> {
     let rows = || rows.iter().map(|row| *row.first_chunk::<N>().unwrap_or(&[0.0; N]));
     let mut weights: Vec<f64> = samples.iter().map(|s| s.weight).collect();
@@ -151,11 +142,11 @@ fn fit_robustly<const N: usize>(rows: &[[f64; 10]], samples: &[Sample]) -> Optio
                 normal[i].iter_mut().zip(&row).for_each(|(sum, term)| *sum += weighted * term);
             }
         }
-        // A hair of ridge: coordinates are within [-1, 1], so this is far below any real term.
+        // A small ridge: coordinates are within [-1, 1], so it is far below any real term.
         (0..N).for_each(|i| normal[i][i] *= 1.0 + 1e-10);
         let normal = SMatrix::<f64, N, N>::from_fn(|i, j| normal[i][j]);
         let coefficients = normal.cholesky()?.solve(&SVector::from(rhs));
-        // Residuals of samples that weigh less are larger: measured by what each should be.
+        // Residuals of samples with less weight are larger: scale each by its expectation.
         let outlying: Vec<f64> = rows()
             .zip(samples)
             .map(|(row, s)| {

@@ -1,16 +1,14 @@
-//! Regions filled as in Li 2014, section 6.5: one after the other, each from the rectangle around it.
-//!
-//! All regions are set to no value first. Then each, in reading order of its first pixel, takes the values within the
-//! rectangle that covers it with one pixel to spare, including earlier filled ones, and gets the polynomial
-//! `1, x, x^2, x^3, y, y^2, y^3` (eq. 6.16) of least squares. The thesis has no mixed terms, no weights and no wider margin.
+//! Regions filled as in Li 2014, section 6.5: one after the other, each from the rectangle around it. All regions are
+//! cleared first. Then each, in reading order of its first pixel, fits the polynomial `1, x, x^2, x^3, y, y^2, y^3`
+//! (eq. 6.16) by least squares to the values within its bounding rectangle plus one pixel, including earlier fillings.
+//! The thesis has no mixed terms, no weights and no wider margin.
 
 use nalgebra::{SMatrix, SVector};
 use ndarray::Array2;
 
-/// Number of terms.
 const TERMS: usize = 7;
 
-/// Fills the region's pixels of `depth_mm`, which are NaN; whether there was enough to fit to.
+/// Fills the region's NaN pixels of `depth_mm`; false if there were too few values.
 pub(super) fn fill_region(depth_mm: &mut Array2<f32>, region: &[(usize, usize)]) -> bool {
     let (height, width) = depth_mm.dim();
     let range = |of: fn(&(usize, usize)) -> usize, length: usize| {
@@ -47,7 +45,7 @@ pub(super) fn fill_region(depth_mm: &mut Array2<f32>, region: &[(usize, usize)])
         normal += row * row.transpose();
         rhs += row * (depth - mean);
     }
-    // A hair of ridge: where the rectangle is two pixels wide its powers depend on each other.
+    // A small ridge: in a rectangle two pixels wide the powers depend on each other.
     for i in 0..TERMS {
         normal[(i, i)] += 1e-9 * samples.len() as f64;
     }
@@ -82,7 +80,7 @@ mod tests {
         }
     }
 
-    /// A region that fills the map but for a corner: six values do not give seven terms.
+    /// A region that fills the map except a corner: six values do not determine seven terms.
     #[test]
     fn too_little_around_leaves_a_region_empty() {
         let mut map = Array2::from_elem((8, 8), f32::NAN);

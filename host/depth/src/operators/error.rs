@@ -1,4 +1,4 @@
-//! Why operators could not be designed or read.
+//! Errors of operator design and stored operators.
 
 use super::{FORMAT, Family};
 use crate::kernel::KernelError;
@@ -7,7 +7,7 @@ use crate::psf::{Psf, PsfError};
 /// Why operators could not be designed or read.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum DesignError {
-    /// The blur radius is outside what the kernels can serve.
+    /// The blur radius is outside the range of the kernels.
     #[error("largest blur radius {0} px: operators can be designed for 0.3 to 12 px")]
     MaxBlur(f64),
     /// The family does not go with the PSF.

@@ -1,4 +1,4 @@
-//! The families of operators and the procedures of their design, by name.
+//! Operator families and design procedures, by name.
 
 use std::fmt;
 
@@ -14,7 +14,7 @@ pub enum Family {
     Watanabe,
     /// Raj & Staunton 2012, pill-box, by their procedure ([`raj`](super::raj)) for every [`Design`].
     Raj,
-    /// Rational operators by the procedures of Li 2014 for the pill-box, a ring and any measured PSF.
+    /// Rational operators by the procedures of Li 2014, for the pill-box, a ring and any measured PSF.
     Ro,
     /// Gaussian rational operators (Li 2014, section 5.2.1).
     Gro,
@@ -26,7 +26,7 @@ impl Family {
     /// All families.
     pub const ALL: [Self; 5] = [Self::Watanabe, Self::Raj, Self::Ro, Self::Gro, Self::Ggro];
 
-    /// The family that a PSF gets if none is requested.
+    /// The default family of a PSF.
     pub fn of(psf: Psf) -> Self {
         match psf {
             Psf::PillBox | Psf::Ring { .. } | Psf::Radial(_) => Self::Ro,
@@ -52,14 +52,14 @@ impl fmt::Display for Family {
     }
 }
 
-/// How the kernels of the families `ro`, `gro` and `ggro` are fitted to the NIR.
+/// Design of the families `ro`, `gro` and `ggro`: fit of the kernels to the NIR.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Design {
-    /// One linear least squares ([`linear`](super::linear)): the most accurate, and milliseconds.
+    /// One linear least squares ([`linear`](super::linear)): the most accurate; milliseconds.
     #[default]
     Linear,
-    /// Levenberg-Marquardt on eq. 5.18 of Li 2014, put right ([`thesis`](super::thesis)).
+    /// Levenberg-Marquardt on the corrected eq. 5.18 of Li 2014 ([`thesis`](super::thesis)).
     Thesis,
 }
 

@@ -4,14 +4,10 @@ use nalgebra::{DMatrix, DVector};
 
 use super::DesignError;
 
-/// Singular values below this part of the largest count as zero, so that a kernel with more taps than the grid can
-/// tell apart gets the smallest solution rather than a wild one.
+/// Relative singular values that count as zero: undetermined taps get the smallest solution.
 const RELATIVE_RANK: f64 = 1e-12;
 
-/// The `x` that minimises `|matrix x - rhs|^2`, by a QR decomposition and a singular value decomposition of `R`.
-///
-/// # Errors
-/// [`DesignError::Singular`] if the decomposition does not converge or the solution is not finite.
+/// Minimises `|matrix x - rhs|^2` by QR and SVD. Returns [`DesignError::Singular`] without a finite solution.
 pub fn solve(matrix: DMatrix<f64>, rhs: DVector<f64>) -> Result<DVector<f64>, DesignError> {
     let unknowns = matrix.ncols();
     let qr = matrix.qr();

@@ -1,12 +1,10 @@
 //! The `linear` design: all three rational operators from one linear least squares.
 //!
 //! `min sum W mean_alpha (NIR Gm1 - alpha Gp1 - alpha^3 Gp2)^2 + 0.03 sum (m / sum m) (Gp1 - LOG)^2` over the taps of
-//! the three kernels. `W ~ m Q'^2 max(w, 0.19)^-2` (sum 1) is the power that a natural texture (amplitude 1/f) has
-//! behind the pre-filter `Q'`. The second term fixes the common scale and spectral shape of the three kernels, which
-//! the first leaves open: `LOG = (w / wp)^2 exp(1 - (w / wp)^2)`, `wp = 0.4 pi` (W&N 1998's band-pass).
-//! Eq. 5.18 of Li 2014 as printed divides by Gm1 (poles) and weights only the NIR with Q.
-//!
-//! Cost: 153 x 21 + 153 equations in 30 unknowns for 7x7, a few ms.
+//! the three kernels. `W ~ m Q'^2 max(w, 0.19)^-2` (sum 1) is the power of a natural texture (amplitude 1/f) behind the
+//! pre-filter `Q'`. The second term fixes the common scale and spectral shape, which the first leaves free:
+//! `LOG = (w / wp)^2 exp(1 - (w / wp)^2)`, `wp = 0.4 pi` (W&N 1998's band-pass). Eq. 5.18 of Li 2014 as printed divides
+//! by Gm1 (poles) and weights only the NIR with Q. Cost: 153 x 21 + 153 equations in 30 unknowns for 7x7, a few ms.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -16,13 +14,13 @@ use crate::kernel::{self, Kernel};
 use crate::normalised_ratio::{GRID, GridPoint, alphas, sum_and_difference};
 use crate::psf::Otf;
 
-/// Weight of the pull of Gp1 towards the band-pass.
+/// Weight of the second term.
 const BAND_PASS_WEIGHT: f64 = 0.03;
 
 /// Peak frequency of the band-pass in rad/px.
 pub const BAND_PASS_PEAK: f64 = 0.4 * std::f64::consts::PI;
 
-/// Frequency below which textures are taken as white, rad/px: the grid's first.
+/// Frequency below which textures count as white, rad/px: the grid's first.
 const TEXTURE_FLOOR: f64 = 2.0 * std::f64::consts::PI / GRID as f64 * 0.97;
 
 /// The Laplacian-of-Gaussian band-pass with peak 1 at [`BAND_PASS_PEAK`].
@@ -41,10 +39,7 @@ pub fn weights(prefilter: &Kernel, grid: &[GridPoint]) -> Vec<f64> {
     raw.into_iter().map(|w| w / total).collect()
 }
 
-/// `[Gm1, Gp1, Gp2]` of `size` for the pre-filter's response.
-///
-/// # Errors
-/// [`DesignError`] if the least squares is singular.
+/// `[Gm1, Gp1, Gp2]` of `size` for the pre-filter's response. Returns [`DesignError`] if the least squares is singular.
 pub fn design(
     otf: &Otf,
     max_blur_px: f64,
@@ -63,7 +58,7 @@ pub fn design(
             let [sum, difference] = sum_and_difference(otf, max_blur_px, p.w, alpha);
             let normalised_ratio = difference / sum;
             if !normalised_ratio.is_finite() {
-                // Both OTFs vanish: no image carries this frequency at this depth.
+                // Both OTFs vanish: no image has this frequency at this depth.
                 continue;
             }
             let scale = (weight / samples.len() as f64).sqrt();

@@ -1,13 +1,11 @@
-//! What the cubic leaves: a polynomial that makes the estimated alpha proportional to the true one.
+//! Removes the cubic's error: a polynomial that makes the estimated alpha proportional to the true one.
 //!
-//! No cubic has the shape of the NIR over the whole range, so the run time's alpha is off by a smooth, odd function of
-//! depth: up to 0.1 mm at the ends of the rig's range. For a texture of a known spectrum `S^2` the run time's window
-//! sums have the expectations `c1 = sum S^2 Q^2 P^2 Gp1^2`, `c3 = sum S^2 Q^2 P^2 Gp1 Gp2`, `c0 = sum S^2 Q^2 P Gp1 D Gm1`
-//! with `P = H2 + H1`, `D = H2 - H1`, and thus the alpha that it finds for each true one. An odd polynomial of degree 7
-//! maps it back. It is computed for a spectrum of power 1/f behind a square pixel, between sand (nearly white) and
-//! natural textures (1/f^2); for either of these it takes away two thirds of the error or more.
-//!
-//! Cost: 153 x 45 OTF pairs, about 1 ms; at run time four multiply-adds per pixel.
+//! No cubic fits the NIR over the whole range, so the run time's alpha has a smooth, odd error: up to 0.1 mm at the
+//! ends of the rig's range. For a texture of known spectrum `S^2` the window sums have the expectations
+//! `c1 = sum S^2 Q^2 P^2 Gp1^2`, `c3 = sum S^2 Q^2 P^2 Gp1 Gp2`, `c0 = sum S^2 Q^2 P Gp1 D Gm1` with `P = H2 + H1`,
+//! `D = H2 - H1`, which give the estimate for each true alpha. An odd polynomial of degree 7 inverts it. The spectrum
+//! is 1/f power behind a square pixel, between sand (nearly white) and natural textures (1/f^2); for both it removes at
+//! least two thirds of the error. Cost: 153 x 45 OTF pairs, about 1 ms; at run time four multiply-adds per pixel.
 
 use std::f64::consts::PI;
 
@@ -23,19 +21,15 @@ use crate::psf::Otf;
 /// Coefficients of alpha, alpha^3, alpha^5, alpha^7.
 pub type Polynomial = [f64; 4];
 
-/// The polynomial that changes nothing.
+/// The identity.
 pub const IDENTITY: Polynomial = [1.0, 0.0, 0.0, 0.0];
 
 /// Largest alpha of the fit: a little beyond the working range.
 const REACH: f64 = 1.1;
 
-/// Samples of alpha in the fit.
 const SAMPLES: usize = 45;
 
-/// The polynomial for `[Gm1, Gp1, Gp2]` and their pre-filter.
-///
-/// # Errors
-/// [`DesignError::Singular`] if the operators find no alpha at all.
+/// The polynomial for `[Gm1, Gp1, Gp2]` and their pre-filter. Returns [`DesignError::Singular`] if they find no alpha.
 pub fn design(
     otf: &Otf,
     max_blur_px: f64,
@@ -78,7 +72,7 @@ pub fn design(
     Ok([solution[0], solution[1], solution[2], solution[3]])
 }
 
-/// Root of `alpha + cubic alpha^3 = ratio` as the run time finds it; none beyond the turning point.
+/// Root of `alpha + cubic alpha^3 = ratio` as in the run time; `None` beyond the turning point.
 fn root(ratio: f64, cubic: f64) -> Option<f64> {
     let limit = (1.0 / (3.0 * (-cubic).max(1e-6))).sqrt().min(f64::from(MAX_ALPHA));
     let mut alpha = ratio.abs().min(limit);

@@ -1,23 +1,19 @@
-//! Levenberg-Marquardt over the taps of several kernels after each other.
+//! Levenberg-Marquardt over the concatenated taps of several kernels.
 
 use levenberg_marquardt::{LeastSquaresProblem, LevenbergMarquardt};
 use nalgebra::{DMatrix, DVector, Dyn, Owned, U1, VecStorage};
 
 use super::DesignError;
 
-/// Residuals at some taps, with derivatives.
+/// Residuals at given taps, with derivatives.
 pub(super) trait Misfit {
-    /// The residuals, whose sum of squares is to be least.
     fn residuals(&self, taps: &[f64]) -> DVector<f64>;
 
-    /// Their derivatives: a row for each residual, a column for each tap.
+    /// A row for each residual, a column for each tap.
     fn jacobian(&self, taps: &[f64]) -> DMatrix<f64>;
 }
 
-/// The taps of the least squares near `start`.
-///
-/// # Errors
-/// [`DesignError::Minimisation`] if the search does not come to an end.
+/// The least-squares taps near `start`. Returns [`DesignError::Minimisation`] without convergence.
 pub(super) fn minimise(
     misfit: impl Misfit,
     start: Vec<f64>,
@@ -30,7 +26,6 @@ pub(super) fn minimise(
     Ok(problem.taps.as_slice().to_vec())
 }
 
-/// A misfit at its current taps.
 struct Problem<M> {
     misfit: M,
     taps: DVector<f64>,

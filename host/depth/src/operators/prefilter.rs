@@ -1,12 +1,10 @@
 //! The pre-filter Q of the rational operators (Li 2014, eq. 5.20).
 //!
-//! Target: at each frequency the smallest slope of the NIR over depth, clipped at 0, the peak scaled to 1, and zero
-//! above the first non-monotonic frequency: frequencies whose ratio says little or nothing about depth are removed.
-//! Fit: `min sum m ((Q - Q') / Z)^2` with `Z = Q + 0.05` and the multiplicities `m` of the grid. That is a linear least
-//! squares. The response at frequency 0 is forced to exactly 0 by expressing the centre tap through the others.
-//! Without a pre-filter depth errors are 5 to 35 times larger.
-//!
-//! Cost: 153 equations in at most 27 unknowns, well below 1 ms.
+//! Target: at each frequency the smallest slope of the NIR over depth, clipped at 0, peak 1, and zero above the first
+//! non-monotonic frequency. It removes frequencies whose ratio carries little depth. Fit: the linear least squares
+//! `min sum m ((Q - Q') / Z)^2` with `Z = Q + 0.05` and the grid's multiplicities `m`. Expressing the centre tap
+//! through the others forces the response at frequency 0 to exactly 0. Without a pre-filter depth errors are 5 to 35
+//! times larger. Cost: 153 equations in at most 27 unknowns, well below 1 ms.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -19,10 +17,7 @@ use crate::psf::Otf;
 /// Added to the target to make the weights (Li 2014, section 5.2.4).
 const WEIGHT_FLOOR: f64 = 0.05;
 
-/// The target response at each grid point, peak 1.
-///
-/// # Errors
-/// [`DesignError::NoDepthSignal`] if the NIR rises at no frequency of the grid.
+/// The target response at each grid point, peak 1. Returns [`DesignError::NoDepthSignal`] if the NIR never rises.
 pub fn target(otf: &Otf, max_blur_px: f64, grid: &[GridPoint]) -> Result<Vec<f64>, DesignError> {
     let limit = first_non_monotonic(otf, max_blur_px);
     let slopes: Vec<f64> = grid
@@ -36,10 +31,7 @@ pub fn target(otf: &Otf, max_blur_px: f64, grid: &[GridPoint]) -> Result<Vec<f64
     Ok(slopes.into_iter().map(|s| s / peak).collect())
 }
 
-/// The kernel of `size` whose response comes nearest to `target` on `grid`, with no response at frequency 0.
-///
-/// # Errors
-/// [`DesignError`] if the least squares is singular.
+/// The kernel of `size` nearest to `target` on `grid`, with response 0 at frequency 0.
 pub fn fit(target: &[f64], grid: &[GridPoint], size: usize) -> Result<Kernel, DesignError> {
     let offsets: Vec<_> = kernel::offsets(size).collect();
     let free = &offsets[1..];

@@ -1,11 +1,9 @@
 //! The operators of Raj & Staunton (2012), by their procedure.
 //!
-//! They assume a pill-box and start from `Gp1`, the Laplacian-of-Gaussian band-pass, fitted to the kernel size. Two linear
-//! steps follow. First a linear model, `NIR Gm1 = Gp1 alpha`, gives `Gm1`; then `Gp2` corrects the error that it leaves,
+//! They assume a pill-box and start from `Gp1`, the Laplacian-of-Gaussian band-pass, fitted to the kernel size. First a
+//! linear model, `NIR Gm1 = Gp1 alpha`, gives `Gm1`; then `Gp2` corrects its error,
 //! `NIR Gm1 - Gp1 alpha = Gp2 alpha^3`. The pre-filter passes everything between 0 and the first non-monotonic
-//! frequency alike; frequencies whose NIR is merely flat stay in, which is what Li 2014 (section 5.2.4) improves on.
-//!
-//! Cost: some ms.
+//! frequency; frequencies of flat NIR stay in, which Li 2014 (section 5.2.4) improves on. Cost: some ms.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -23,7 +21,6 @@ pub fn prefilter_target(otf: &Otf, max_blur_px: f64, grid: &[GridPoint]) -> Vec<
     grid.iter().map(|p| if p.w > 0.0 && p.w < limit { 1.0 } else { 0.0 }).collect()
 }
 
-/// The kernel of `size` nearest to the band-pass on the grid.
 fn fit_band_pass(grid: &[GridPoint], size: usize) -> Result<Kernel, DesignError> {
     let offsets: Vec<_> = kernel::offsets(size).collect();
     let matrix = DMatrix::from_fn(grid.len(), offsets.len(), |i, j| {
@@ -33,10 +30,7 @@ fn fit_band_pass(grid: &[GridPoint], size: usize) -> Result<Kernel, DesignError>
     Ok(Kernel::new(size, solve(matrix, rhs)?.as_slice().to_vec())?)
 }
 
-/// `[Gm1, Gp1, Gp2]` after Raj & Staunton.
-///
-/// # Errors
-/// [`DesignError`] if a least squares is singular.
+/// `[Gm1, Gp1, Gp2]` after Raj & Staunton. Returns [`DesignError`] if a least squares is singular.
 pub fn design(
     otf: &Otf,
     max_blur_px: f64,

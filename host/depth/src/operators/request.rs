@@ -1,4 +1,4 @@
-//! Request for operators: family and design by name, point-spread function, blur and size.
+//! Request for operators: family, design, PSF, blur and size.
 
 use std::str::FromStr;
 
@@ -9,8 +9,7 @@ use crate::kernel::{KernelError, SIZES};
 use crate::optics::Optics;
 use crate::psf::Psf;
 
-/// Blur radii that can be designed for: below a third of a pixel the images do not differ, above 12 the kernels are
-/// far too small for the blur.
+/// Supported blur radii: below a third of a pixel the images do not differ; above 12 px the blur exceeds the kernels.
 const MAX_BLUR_PX: [f64; 2] = [0.3, 12.0];
 
 impl FromStr for Family {
@@ -57,7 +56,7 @@ pub struct Request {
 }
 
 impl Request {
-    /// The default operators for some optics: the PSF's own family, linear design, 7x7.
+    /// The default operators for given optics: the PSF's own family, linear design, 7x7.
     pub fn for_optics(optics: &Optics) -> Self {
         let psf = optics.psf();
         Self {

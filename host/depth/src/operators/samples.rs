@@ -1,4 +1,4 @@
-//! What the published procedures fit to: the NIR at each grid point and depth, with weights.
+//! Fit data of the published procedures: the NIR at each grid point and depth, with weights.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -9,7 +9,7 @@ use crate::kernel::{self, Kernel};
 use crate::normalised_ratio::{GridPoint, alphas, normalised_ratio};
 use crate::psf::Otf;
 
-/// One grid point and depth: what both procedures are made of.
+/// One grid point and depth.
 pub(super) struct Sample {
     /// Index of the point's basis responses.
     pub point: usize,
@@ -21,9 +21,7 @@ pub(super) struct Sample {
 
 pub(super) struct Samples {
     size: usize,
-    /// Responses of the taps at each point.
     pub basis: Vec<Vec<f64>>,
-    /// Response of the fitted Gp1 at each point.
     pub gp1: Vec<f64>,
     pub samples: Vec<Sample>,
 }

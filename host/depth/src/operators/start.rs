@@ -1,11 +1,8 @@
-//! Where the non-linear designs start: a kernel from six samples of a radial response.
-//!
-//! Li 2014, section 5.2.3: six samples of the response at equally spaced frequencies from 0 to pi rad/px are read as three
-//! bands with a straight line each, from which the Parks-McClellan algorithm makes a one-dimensional filter; the
-//! McClellan transform turns it into a nearly round two-dimensional one:
-//! `H(u, v) = sum a_n T_n(F)`, `F = (cos u + cos v + cos u cos v - 1) / 2`, `a_0 = h(0)`, `a_n = 2 h(n)`.
-//!
-//! Cost: microseconds.
+//! Start of the non-linear designs: a kernel from six samples of a radial response. Li 2014, section 5.2.3: the
+//! samples, equally spaced from 0 to pi rad/px, form three straight bands. The Parks-McClellan algorithm makes them a
+//! one-dimensional filter; the McClellan transform makes that nearly round in two dimensions:
+//! `H(u, v) = sum a_n T_n(F)`, `F = (cos u + cos v + cos u cos v - 1) / 2`, `a_0 = h(0)`, `a_n = 2 h(n)`. Cost:
+//! microseconds.
 
 use std::f64::consts::PI;
 
@@ -16,9 +13,6 @@ use super::DesignError;
 use crate::kernel::{self, Kernel};
 
 /// A kernel of `size` whose response at the radial frequency `w` (rad/px) is about `target(w)`.
-///
-/// # Errors
-/// [`DesignError::Start`] if the Parks-McClellan algorithm does not converge.
 pub fn kernel_of_radial_response(target: impl Fn(f64) -> f64, size: usize) -> Result<Kernel, DesignError> {
     mcclellan(&parks_mcclellan(target, size)?)
 }
@@ -26,7 +20,7 @@ pub fn kernel_of_radial_response(target: impl Fn(f64) -> f64, size: usize) -> Re
 /// The one-dimensional filter `h(0), h(1), ...` from its centre outwards.
 fn parks_mcclellan(target: impl Fn(f64) -> f64, size: usize) -> Result<Vec<f64>, DesignError> {
     let failed = |error: pm_remez::error::Error| DesignError::Start(error.to_string());
-    // Frequencies in cycles per pixel, as the algorithm has them.
+    // Frequencies in cycles per pixel, as the algorithm expects.
     let samples: [(f64, f64); 6] = std::array::from_fn(|i| (0.1 * i as f64, target(0.2 * PI * i as f64)));
     let bands = [0, 2, 4]
         .map(|i| {
@@ -40,7 +34,6 @@ fn parks_mcclellan(target: impl Fn(f64) -> f64, size: usize) -> Result<Vec<f64>,
     Ok(design.impulse_response[size / 2..].to_vec())
 }
 
-/// The two-dimensional kernel of a one-dimensional symmetric filter given from its centre outwards.
 fn mcclellan(filter: &[f64]) -> Result<Kernel, DesignError> {
     let radius = filter.len() - 1;
     let size = 2 * radius + 1;
@@ -65,7 +58,6 @@ fn mcclellan(filter: &[f64]) -> Result<Kernel, DesignError> {
     Ok(Kernel::new(size, octant)?)
 }
 
-/// Convolution with the 3x3 taps of F; what would leave the array has no use.
 fn convolve_with_shape(image: &Array2<f64>, shape: impl Fn(usize, usize) -> f64) -> Array2<f64> {
     let (size, radius) = (image.nrows(), image.nrows() / 2);
     Array2::from_shape_fn((size, size), |(y, x)| {

@@ -1,4 +1,4 @@
-//! Operators as stored: read and checked, written.
+//! Stored operators: reading, checks and writing.
 
 use serde::{Deserialize, Serialize};
 
@@ -8,7 +8,6 @@ use crate::kernel::Kernel;
 use crate::normalised_ratio::RatioFit;
 use crate::psf::Psf;
 
-/// Operators as stored.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct RawOperators {

@@ -1,15 +1,11 @@
 //! The `thesis` design: all three rational operators by Levenberg-Marquardt (Li 2014, eqs. 5.18 and 5.19).
 //!
-//! `min sum m Q'^2 (NIR - (Gp1 alpha + Gp2 alpha^3) / Gm1)^2` over the taps of the three kernels. The printed 5.18 weights
-//! only the NIR with the pre-filter, although it cancels at run time; here Q weights the whole residual. Signed
-//! zero-phase responses are fitted instead of magnitudes, which would lose the sign of Gp2. Frequency 0, where the NIR
-//! vanishes and Q is 0, is left out.
-//!
-//! Start: Gp1 = the Laplacian-of-Gaussian band-pass, `Gm1 = Gp1 / a1` and `Gp2 = a3 Gm1` from the cubic fit of the NIR,
-//! the latter two by Parks-McClellan and McClellan ([`super::start`]). The common scale of the kernels is a direction in
-//! which nothing changes; it is fixed afterwards. The common spectral shape stays near the start.
-//!
-//! Cost: 152 x 10 residuals in 30 unknowns for 7x7, some hundred iterations, 0.2 to 0.8 s.
+//! `min sum m Q'^2 (NIR - (Gp1 alpha + Gp2 alpha^3) / Gm1)^2` over the taps of the three kernels. The printed 5.18
+//! weights only the NIR with the pre-filter, although it cancels at run time; here Q weights the whole residual. Signed
+//! zero-phase responses replace magnitudes, which would lose the sign of Gp2. Frequency 0, where NIR and Q are 0, is
+//! left out. Start: Gp1 = the Laplacian-of-Gaussian band-pass, `Gm1 = Gp1 / a1` and `Gp2 = a3 Gm1` from the NIR's cubic
+//! fit, the latter two by Parks-McClellan and McClellan ([`super::start`]). The kernels' common scale has no effect and
+//! is fixed afterwards. Cost: 152 x 10 residuals in 30 unknowns for 7x7, some hundred iterations, 0.2 to 0.8 s.
 
 use levenberg_marquardt::LevenbergMarquardt;
 use nalgebra::{DMatrix, DVector};
@@ -22,25 +18,20 @@ use crate::kernel::{self, Kernel};
 use crate::normalised_ratio::{ALPHA_SAMPLES, GridPoint, RatioFit, alphas, normalised_ratio};
 use crate::psf::Otf;
 
-/// Evaluations per unknown after which the minimisation ends where it is.
 const PATIENCE: usize = 10;
 
-/// Relative change of the cost and of the taps below which it ends: depth errors no longer change in the third digit.
+/// Relative change of cost and taps that ends it: depth errors no longer change in the third digit.
 const TOLERANCE: f64 = 1e-6;
 
-/// Samples of alpha above 0: the residual is odd in alpha, so those below 0 would only double every square.
+/// Samples of alpha above 0: the residual is odd in alpha.
 const SAMPLES: usize = ALPHA_SAMPLES / 2;
 
-/// The samples of alpha above 0.
 fn depths() -> [f64; SAMPLES] {
     let all = alphas();
     std::array::from_fn(|i| all[SAMPLES + 1 + i])
 }
 
-/// `[Gm1, Gp1, Gp2]` of `size` for the pre-filter's response.
-///
-/// # Errors
-/// [`DesignError`] if the start or the minimisation fails.
+/// `[Gm1, Gp1, Gp2]` of `size` for the pre-filter's response. Returns [`DesignError`] if start or minimisation fail.
 pub fn design(
     otf: &Otf,
     max_blur_px: f64,
@@ -53,7 +44,7 @@ pub fn design(
     let misfit = RatioError::new(otf, max_blur_px, prefilter, grid, size);
     let search = LevenbergMarquardt::new().with_tol(TOLERANCE).with_patience(PATIENCE);
     let [gm1, gp1, gp2] = Kernel::several(size, &minimise(misfit, start, &search)?)?;
-    // The scale means nothing: give Gp1 the band-pass's peak.
+    // The scale is arbitrary: give Gp1 the band-pass's peak.
     let peak = (0..=64)
         .map(|i| gp1.response(std::f64::consts::PI * f64::from(i) / 64.0, 0.0).abs())
         .fold(0.0, f64::max);
@@ -61,7 +52,6 @@ pub fn design(
     Ok([gm1.scaled(scale), gp1.scaled(scale), gp2.scaled(scale)])
 }
 
-/// `[Gm1, Gp1, Gp2]` to start from.
 pub(super) fn starting_kernels(fit: &RatioFit, size: usize) -> Result<[Kernel; 3], DesignError> {
     // The cubic's coefficients at any frequency: linear between the table's, constant beyond.
     let at = |column: &[f64], w: f64| {
@@ -86,11 +76,10 @@ pub(super) fn starting_kernels(fit: &RatioFit, size: usize) -> Result<[Kernel; 3
     ])
 }
 
-/// `NIR - (Gp1 alpha + Gp2 alpha^3) / Gm1` at each point and depth, weighted; taps of Gm1, Gp1, Gp2 after each other.
+/// Weighted `NIR - (Gp1 alpha + Gp2 alpha^3) / Gm1` at each point and depth; taps of Gm1, Gp1, Gp2 in sequence.
 struct RatioError {
     /// Responses of the taps at each point, and the point's weight.
     points: Vec<(Vec<f64>, f64)>,
-    /// NIR at each point and alpha.
     normalised_ratio: Vec<[f64; SAMPLES]>,
 }
 
@@ -109,7 +98,6 @@ impl RatioError {
     }
 }
 
-/// `[Gm1, Gp1, Gp2]` at the point where the taps' own responses are `basis`.
 fn responses(basis: &[f64], taps: &[f64]) -> [f64; 3] {
     let n = basis.len();
     [0, 1, 2].map(|i| basis.iter().zip(&taps[i * n..(i + 1) * n]).map(|(b, t)| b * t).sum())

@@ -1,12 +1,9 @@
 //! The operators of Watanabe & Nayar (1998), by their procedure.
 //!
-//! They assume a pill-box and start from `Gp1`, the Laplacian-of-Gaussian band-pass, fitted to the kernel size, with the
-//! same pre-filter as [`raj`]. `Gm1` and `Gp2` minimise the depth error of a texture of amplitude 1/f by
-//! Levenberg-Marquardt: the residual `Gp1 alpha + Gp2 alpha^3 - NIR Gm1` over the slope `Gp1 + 3 Gp2 alpha^2` that turns it
-//! into depth, weighted with the texture's and the filters' power. (The slope is regularised where the kernels' responses
-//! vanish.)
-//!
-//! Cost: 10 to 100 ms.
+//! They assume a pill-box and start from `Gp1`, the Laplacian-of-Gaussian band-pass, fitted to the kernel size, with
+//! the pre-filter of [`raj`]. `Gm1` and `Gp2` minimise the depth error of a texture of amplitude 1/f by
+//! Levenberg-Marquardt: the residual `Gp1 alpha + Gp2 alpha^3 - NIR Gm1` over the slope `Gp1 + 3 Gp2 alpha^2`, weighted
+//! with the texture's and the filters' power. (Small slopes are regularised.) Cost: 10 to 100 ms.
 
 use levenberg_marquardt::LevenbergMarquardt;
 use nalgebra::{DMatrix, DVector};
@@ -21,13 +18,9 @@ use crate::psf::Otf;
 /// Slope (the band-pass has peak 1) below which it is regularised.
 const SLOPE_FLOOR: f64 = 0.05;
 
-/// Evaluations per unknown after which the minimisation ends where it is.
 const PATIENCE: usize = 40;
 
-/// `[Gm1, Gp1, Gp2]` after Watanabe & Nayar.
-///
-/// # Errors
-/// [`DesignError`] if the start or the minimisation fails.
+/// `[Gm1, Gp1, Gp2]` after Watanabe & Nayar. Returns [`DesignError`] if the start or the minimisation fails.
 pub fn design(
     otf: &Otf,
     max_blur_px: f64,
@@ -44,7 +37,7 @@ pub fn design(
     Ok([gm1, gp1, gp2])
 }
 
-/// Watanabe & Nayar's residuals at taps of Gm1 and Gp2 after each other.
+/// Residuals for the concatenated taps of Gm1 and Gp2.
 struct DepthError {
     samples: Samples,
 }
@@ -61,7 +54,7 @@ impl DepthError {
         [misfit, slope / divisor, (SLOPE_FLOOR * SLOPE_FLOOR - slope * slope) / (divisor * divisor)]
     }
 
-    /// The residual of a sample and its derivatives by the responses of Gm1 and Gp2 at the sample's point.
+    /// The residual of a sample and its derivatives by the responses of Gm1 and Gp2.
     fn row(&self, taps: &[f64], sample: &Sample) -> [f64; 3] {
         let [misfit, inverse, derivative] = self.parts(taps, sample);
         let weight = sample.weight * self.samples.gp1[sample.point];
@@ -71,8 +64,8 @@ impl DepthError {
         [by_gm1, by_gp2, weight * misfit * inverse]
     }
 
-    /// For each point three rows `[by Gm1, by Gp2, residual]` instead of one per sample: the triangular factor of the
-    /// point's rows. A rotation of the rows changes neither the sum of squares nor the normal equations.
+    /// For each point three rows `[by Gm1, by Gp2, residual]`, the triangular factor of its samples' rows: a rotation
+    /// changes neither the sum of squares nor the normal equations.
     fn compressed(&self, taps: &[f64]) -> impl Iterator<Item = (usize, [[f64; 3]; 3])> {
         self.samples.samples.chunk_by(|a, b| a.point == b.point).map(move |samples| {
             let mut columns = [(); 3].map(|()| Vec::with_capacity(samples.len()));
@@ -146,7 +139,6 @@ mod tests {
         let taps = [gm1.octant(), gp2.octant()].concat();
         let misfit = DepthError { samples };
         let start = misfit.residuals(&taps).norm_squared();
-        // The gradient of half the sum of squares, which does not depend on how the rows are compressed.
         let gradient = misfit.jacobian(&taps).transpose() * misfit.residuals(&taps);
         let of_samples = |taps: &[f64]| -> f64 {
             misfit.samples.samples.iter().map(|s| 0.5 * misfit.row(taps, s)[2].powi(2)).sum()

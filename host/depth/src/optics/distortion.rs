@@ -1,16 +1,14 @@
-//! Lens distortion by OpenCV's model: where on the sensor a point lies that a pinhole would show elsewhere.
-//!
-//! With `x = (u - cx) / fx`, `y = (v - cy) / fy` and `r^2 = x^2 + y^2` of the pinhole's pixel (u, v), the lens shows it at
-//! `x' = x g + 2 p1 x y + p2 (r^2 + 2 x^2)`, `y' = y g + p1 (r^2 + 2 y^2) + 2 p2 x y`,
-//! `g = (1 + k1 r^2 + k2 r^4 + k3 r^6) / (1 + k4 r^2 + k5 r^4 + k6 r^6)` (Brown 1966; OpenCV, calib3d). The numbers are those
-//! that `cv2.calibrateCamera` returns, in its order: k1, k2, p1, p2, k3, k4, k5, k6. Pixels count from (0, 0), the centre of the
-//! first.
+//! Lens distortion by OpenCV's model: from pinhole to sensor positions. With `x = (u - cx) / fx`, `y = (v - cy) / fy`
+//! and `r^2 = x^2 + y^2` of the pinhole's pixel (u, v), the lens shows it at `x' = x g + 2 p1 x y + p2 (r^2 + 2 x^2)`,
+//! `y' = y g + p1 (r^2 + 2 y^2) + 2 p2 x y`, `g = (1 + k1 r^2 + k2 r^4 + k3 r^6) / (1 + k4 r^2 + k5 r^4 + k6 r^6)`
+//! (Brown 1966; OpenCV, calib3d). Coefficients are in the order of `cv2.calibrateCamera`: k1, k2, p1, p2, k3, k4, k5,
+//! k6. Pixel centres are integers.
 
 use serde::{Deserialize, Serialize};
 
 use super::OpticsError;
 
-/// How many coefficients OpenCV gives; its models of 12 and 14 (thin prism, tilted sensor) are not known here.
+/// OpenCV's supported coefficient counts; its models of 12 and 14 (thin prism, tilted sensor) are not.
 const COUNTS: [usize; 3] = [4, 5, 8];
 
 /// `[distortion]` of an optics file.
@@ -33,10 +31,7 @@ pub struct Distortion {
 }
 
 impl DistortionSection {
-    /// Checks the values.
-    ///
-    /// # Errors
-    /// [`OpticsError::CameraMatrix`], [`OpticsError::DistortionCount`] or [`OpticsError::DistortionCoefficient`].
+    /// Checks the values; see the distortion variants of [`OpticsError`].
     pub fn check(&self) -> Result<Distortion, OpticsError> {
         let [[fx, skew, cx], [zero, fy, cy], last] = self.camera_matrix;
         let usable = [fx, fy].iter().all(|f| f.is_finite() && *f > 0.0) && cx.is_finite() && cy.is_finite();
@@ -57,7 +52,7 @@ impl DistortionSection {
 }
 
 impl Distortion {
-    /// Where the lens shows what a pinhole would show at the pixel `[u, v]`.
+    /// Sensor position of the pinhole's pixel `[u, v]`.
     pub fn distorted(&self, [u, v]: [f64; 2]) -> [f64; 2] {
         let [[fx, fy], [cx, cy]] = [self.focal_px, self.centre_px];
         let [k1, k2, p1, p2, k3, k4, k5, k6] = self.coefficients;
@@ -92,7 +87,7 @@ mod tests {
         }
     }
 
-    /// What `cv2.projectPoints` (OpenCV 5.0.0) gives for the corners' rays.
+    /// Output of `cv2.projectPoints` (OpenCV 5.0.0) for the corners' rays.
     #[test]
     fn points_lie_where_opencv_projects_them() {
         const FROM: [[f64; 2]; 5] =
@@ -133,7 +128,6 @@ mod tests {
             let distortion = section(coefficients).check().unwrap();
             for (from, to) in FROM.into_iter().zip(expected) {
                 let [x, y] = distortion.distorted(from);
-                // Both calculate in double precision.
                 assert!((x - to[0]).abs() < 1e-9 && (y - to[1]).abs() < 1e-9, "{from:?}: ({x}, {y}) {to:?}");
             }
             assert_eq!(DistortionSection::from(distortion), section(coefficients));

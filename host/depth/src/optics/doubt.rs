@@ -1,17 +1,15 @@
-//! Optics that can be, but hardly are: most likely a number in another unit.
+//! Possible but unlikely optics: most likely a number in another unit.
 
 use std::fmt;
 
 use super::Optics;
 
-/// A value far from what cameras have.
+/// A value far outside the usual range of cameras.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Doubt {
-    /// Description of the value.
     what: &'static str,
     value: f64,
     unit: &'static str,
-    /// The usual range.
     usual: [f64; 2],
 }
 
@@ -26,7 +24,7 @@ impl fmt::Display for Doubt {
 }
 
 impl Optics {
-    /// A value that is probably wrong.
+    /// Values that are probably wrong.
     pub fn doubts(&self) -> Vec<Doubt> {
         let range = self.working_range();
         let span = (range.far_mm - range.near_mm) / range.far_mm * 100.0;

@@ -2,7 +2,6 @@
 
 use crate::psf::PsfError;
 
-/// OpenCV's order.
 const DISTORTION_NAMES: [&str; 8] = ["k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"];
 
 /// An error of a set of optics.

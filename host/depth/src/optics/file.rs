@@ -1,14 +1,12 @@
-//! `optics.toml`: what a user writes, and the check that makes [`Optics`] of it.
-//!
-//! The renderer (`hil-sim/scene`) reads the same files with its own parser, so that neither's physics leans on the
-//! other's; a test of this crate holds both to the same numbers and the same messages.
+//! `optics.toml` as written, and the check that turns it into [`Optics`]. The renderer (`hil-sim/scene`) parses the
+//! same files independently of this crate; a test compares numbers and messages.
 
 use serde::{Deserialize, Serialize};
 
 use super::{DistortionSection, Optics, OpticsError, Stage, image_mm};
 use crate::psf::Psf;
 
-/// The largest relative difference between a given blur radius and the one that `near_mm` leads to.
+/// Largest relative difference between a given blur radius and the one that follows from `near_mm`.
 const AGREEMENT: f64 = 0.02;
 
 /// `[lens]` of an optics file.
@@ -50,9 +48,7 @@ pub struct FocusSection {
     pub near_mm: Option<f64>,
 }
 
-/// An optics file as written, before [`OpticsFile::check`] makes [`Optics`] of it.
-///
-/// `max_blur_px` and `near_mm` follow from each other: one suffices.
+/// An optics file as written, to be checked by [`OpticsFile::check`]. One of `max_blur_px` and `near_mm` suffices.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct OpticsFile {
@@ -74,10 +70,7 @@ pub struct OpticsFile {
 }
 
 impl OpticsFile {
-    /// Checks the values and completes what follows from them.
-    ///
-    /// # Errors
-    /// An [`OpticsError`] that names the offending value and, for contradictions, the value that would agree.
+    /// Checks the values and derives the others. An [`OpticsError`] names the offending value.
     pub fn check(&self) -> Result<Optics, OpticsError> {
         let focal_length_mm = positive("lens", "focal_length_mm", self.lens.focal_length_mm, " of mm")?;
         let f_number = self.f_number(focal_length_mm)?;
@@ -213,7 +206,6 @@ impl From<Optics> for OpticsFile {
 mod tests {
     use super::*;
 
-    /// Li 2014's rig (section 5.3); the distances were worked out by hand from the thin lens.
     const RIG: &str = "
         [lens]
         focal_length_mm = 50.0

@@ -1,5 +1,4 @@
-//! What a z-stack of a flat target adds to the optics: binning, the response from measured to true normalised depth, and the
-//! error that the model leaves.
+//! Results of a z-stack of a flat target in the optics: binning, response, and model error.
 
 use serde::{Deserialize, Serialize};
 
@@ -10,34 +9,34 @@ pub const RESPONSE_POINTS: usize = 17;
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Stage {
-    /// Pixels per side of the camera's image that are averaged into one; `pixel_um` and `max_blur_px` are those of the result.
+    /// Pixels per side averaged into one; `pixel_um` and `max_blur_px` are those of the result.
     pub bin: usize,
-    /// Slices from the far to the near image of the pairs that were learned from.
+    /// Slices from the far to the near image of the learned pairs.
     pub pair_step: usize,
-    /// Least and largest measured normalised depth that was learned.
+    /// Least and largest learned measured normalised depth.
     pub measured: [f64; 2],
     /// True normalised depth at evenly spaced measured ones, rising.
     pub response: [f64; RESPONSE_POINTS],
     /// Least blur radius of the lens (diffraction, aberration), binned px: radii are `sqrt(geometric^2 + floor^2)`.
     #[serde(default)]
     pub blur_floor_px: f64,
-    /// Difference of normalised depth by which windows of several sizes may differ without a step in the scene.
+    /// Tolerance of normalised depth between windows of several sizes.
     #[serde(default)]
     pub window_tolerance: f64,
-    /// Standard deviation of the normalised depth beyond what noise explains, on held-out parts of the target.
+    /// Standard deviation of normalised depth beyond noise, on held-out parts of the target.
     pub residual: f64,
     /// Median over the target of [`unexplained`].
     pub usual_unexplained: f64,
 }
 
-/// What the model leaves of the texture around a pixel, as a variance of normalised depth: `misfit` is its mean square relative
-/// to the noise, `deviation` the standard deviation of normalised depth by noise.
+/// Unexplained texture as a variance of normalised depth: `misfit` is the residual's mean square relative to the noise,
+/// `deviation` the standard deviation of normalised depth by noise.
 pub fn unexplained(misfit: f32, deviation: f32) -> f32 {
     (misfit - 1.0).max(0.0) * deviation * deviation
 }
 
 impl Stage {
-    /// A stage that changes nothing, to learn from.
+    /// A neutral stage, to learn from.
     pub fn identity(bin: usize, pair_step: usize) -> Self {
         let measured = [-1.19, 1.19];
         let response = std::array::from_fn(|i| {
@@ -60,7 +59,6 @@ impl Stage {
         interpolated(self.measured, &self.response, measured)
     }
 
-    /// Why the section cannot be used, if it cannot.
     pub(super) fn problem(&self) -> Option<&'static str> {
         let finite = self.response.iter().chain(&self.measured).all(|v| v.is_finite() && v.abs() < 2.0);
         if !(1..=64).contains(&self.bin) {

@@ -1,16 +1,12 @@
-//! The border of a map, where the kernels reach beyond the images.
-//!
-//! Reflecting an image at its border supposes that the scene continues as its own mirror image. The blur knows better:
-//! it mixed in what really lies beyond, by another amount in each of the two images, and depth within one kernel size of
+//! The border of a map, where the kernels reach beyond the images. Reflection assumes that the scene continues as its
+//! mirror image. But blur mixed in the real scene beyond, differently in each image: depth within one kernel size of
 //! the border is off by millimetres even without noise. So border pixels take the depth of the nearest pixel whose
-//! operators (pre-filter and kernel, half a kernel size each) saw nothing but image, at [`BORDER_CONFIDENCE`] of its
-//! confidence. Pixels without a depth stay without.
-//!
-//! Cost: the border's pixels once.
+//! operators (pre-filter and kernel, half a kernel size each) see only the image, at [`BORDER_CONFIDENCE`] of its
+//! confidence. Pixels without a depth stay without. Cost: the border's pixels once.
 
 use crate::depth_map::DepthMap;
 
-/// How far a value is trusted that belongs to a neighbour.
+/// Confidence factor of a neighbour's value.
 const BORDER_CONFIDENCE: f32 = 0.5;
 
 /// Fills the border of `width_px` pixels; at most to the middle of a small map.
@@ -21,7 +17,7 @@ pub(crate) fn fill(map: &mut DepthMap, width_px: usize) {
     else {
         unreachable!("maps are made in standard layout");
     };
-    // Top and bottom first: the rows they copy from are then still untouched.
+    // Top and bottom first: the rows they copy from are still unmodified.
     let (first, last) = (border(height), height - 1 - border(height));
     let (left, right) = (border(width), width - 1 - border(width));
     let inner = left..right + 1;
@@ -37,7 +33,7 @@ pub(crate) fn fill(map: &mut DepthMap, width_px: usize) {
             let from = x.clamp(left, right);
             take(&mut depths[x], &mut confidences[x], from_depths[from], from_confidences[from]);
         }
-        // Slices of one length, so that the loop is done in vectors.
+        // Slices of equal length, so that the compiler vectorises the loop.
         let to = depths[inner.clone()].iter_mut().zip(&mut confidences[inner.clone()]);
         let from = from_depths[inner.clone()].iter().zip(&from_confidences[inner.clone()]);
         for ((depth, confidence), (from_depth, from_confidence)) in to.zip(from) {
@@ -56,7 +52,6 @@ pub(crate) fn fill(map: &mut DepthMap, width_px: usize) {
     }
 }
 
-/// Gives a pixel that has a depth that of another one.
 fn take(depth: &mut f32, confidence: &mut f32, from_depth: f32, from_confidence: f32) {
     let has = !depth.is_nan();
     *confidence = if has { BORDER_CONFIDENCE * from_confidence } else { *confidence };

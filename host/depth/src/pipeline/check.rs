@@ -1,5 +1,4 @@
-//! Checks before and after a run: sizes, windows, operators that fit the optics, invalid, saturated and
-//! constant images, a pair that looks swapped.
+//! Checks before and after a run: sizes, windows, operators, invalid, saturated, constant and swapped images.
 
 use ndarray::{Array2, CowArray, Ix2};
 use rayon::prelude::*;
@@ -13,18 +12,17 @@ use crate::simd::{self, Extremes};
 /// Largest relative difference between the operators' and the optics' blur radius.
 const BLUR_TOLERANCE: f64 = 0.02;
 
-/// Part of saturated pixels in an image from which it is reported.
+/// Part of saturated pixels that is reported.
 const SATURATED: f64 = 0.002;
 
-/// A pair that can be processed: pixels in rows after each other.
+/// A checked pair, in consecutive rows.
 pub(crate) struct Input<'a> {
     pub far: &'a [f32],
     pub near: &'a [f32],
     pub width: usize,
     pub height: usize,
-    /// Subtracted from every pixel.
     pub offset: f32,
-    /// Then multiplied with every pixel.
+    /// Applied after the offset.
     pub gain: f32,
     /// Pixels that are not finite or saturated, if any.
     bad: Option<Array2<bool>>,
@@ -32,7 +30,6 @@ pub(crate) struct Input<'a> {
     saturated: usize,
 }
 
-/// Checks windows.
 pub(crate) fn check_windows(settings: &Settings) -> Result<(), RunError> {
     for (what, size, largest) in
         [("smoothing", settings.smoothing_px, MAX_SMOOTHING_PX), ("median", settings.median_px, 7)]
@@ -44,7 +41,6 @@ pub(crate) fn check_windows(settings: &Settings) -> Result<(), RunError> {
     Ok(())
 }
 
-/// Checks windows and that the operators fit the optics.
 pub(crate) fn check_settings(
     operators: &Operators,
     optics: &Optics,
@@ -59,7 +55,6 @@ pub(crate) fn check_settings(
     Ok(())
 }
 
-/// Checks a pair of contiguous images and finds its range.
 pub(crate) fn check<'a>(
     far: &'a CowArray<'_, f32, Ix2>,
     near: &'a CowArray<'_, f32, Ix2>,
@@ -80,7 +75,6 @@ pub(crate) fn check<'a>(
     scan(far, near, width, backend, threads)
 }
 
-/// Smallest and largest finite value of the pixels.
 fn range(pixels: &[f32], backend: Backend) -> Extremes {
     let mut range = simd::extremes(backend, pixels);
     if !range.finite {
@@ -91,10 +85,9 @@ fn range(pixels: &[f32], backend: Backend) -> Extremes {
     range
 }
 
-/// Rows whose range is found together: enough pixels to make the start and the end of the loop cheap.
+/// Rows whose range is found together: amortises the loop's start and end.
 const RANGE_ROWS: usize = 8;
 
-/// The ranges of both images for each [`RANGE_ROWS`] rows.
 fn ranges(images: [&[f32]; 2], width: usize, backend: Backend, threads: usize) -> Vec<[Extremes; 2]> {
     let block = RANGE_ROWS * width;
     let of_blocks = |(far, near)| [range(far, backend), range(near, backend)];
@@ -152,7 +145,7 @@ fn scan<'a>(
     Ok(Input { far, near, width, height, offset: 0.5 * low + 0.5 * high, gain, bad, not_finite, saturated })
 }
 
-/// The pixels of flat patches (2x2 and more) at the largest value, if there are so many that it cannot be chance.
+/// Pixels of flat patches (2x2 and more) at the largest value, if too many for chance.
 fn saturated(
     images: [&[f32]; 2],
     of_blocks: &[[Extremes; 2]],
@@ -161,7 +154,7 @@ fn saturated(
 ) -> Option<Array2<bool>> {
     let pixels = images[0].len();
     let enough = (SATURATED * pixels as f64).max(4.0) as usize;
-    // Only blocks that reach the largest value can have such pixels; in 32 bits the loop is done in vectors.
+    // Only blocks that reach the largest value have such pixels; 32-bit sums vectorise.
     let at_top = |pixels: &[f32]| pixels.iter().map(|v| u32::from(*v >= high)).sum::<u32>() as usize;
     let mut count = 0;
     for (image, pixels_of_image) in images.into_iter().enumerate() {
@@ -186,7 +179,6 @@ fn saturated(
 }
 
 impl Input<'_> {
-    /// Warnings about the pixels.
     pub(crate) fn pixel_warnings(&self) -> Vec<Warning> {
         let mut warnings = Vec::new();
         if self.not_finite > 0 {
@@ -198,7 +190,6 @@ impl Input<'_> {
         warnings
     }
 
-    /// Warnings about the input.
     pub(crate) fn warnings(&self, operators: &Operators, optics: &Optics) -> Vec<Warning> {
         let mut warnings = self.pixel_warnings();
         let psf = operators.request().psf;
@@ -208,38 +199,35 @@ impl Input<'_> {
         warnings
     }
 
-    /// The pixels that are not finite or saturated, if there are any.
     pub(crate) fn bad(&self) -> Option<&Array2<bool>> {
         self.bad.as_ref()
     }
 
-    /// `[I2 - I1, I2 + I1]` of one pixel, normalised; 0 where it is not finite.
+    /// Normalised `[I2 - I1, I2 + I1]` of one pixel; 0 where it is not finite.
     pub(crate) fn normalised(&self, y: usize, x: usize) -> [f32; 2] {
         let [far, near] = [self.far, self.near].map(|image| image[y * self.width + x]);
         let pair = [(near - far) * self.gain, ((near - self.offset) + (far - self.offset)) * self.gain];
         if pair.iter().all(|v| v.is_finite()) { pair } else { [0.0; 2] }
     }
 
-    /// The pixels whose depth a bad pixel takes part in, if there are any.
+    /// Pixels whose depth depends on a bad pixel, if any.
     pub(crate) fn invalid(&self, operators: &Operators, settings: &Settings) -> Option<Array2<bool>> {
         let reach = reach_px(operators, settings);
         self.bad().map(|bad| crate::metrics::dilate_square(bad, reach))
     }
 }
 
-/// How far the evidence of a pixel reaches: pre-filter, operator and smoothing window.
+/// Reach of a pixel's evidence: pre-filter, operator and smoothing window.
 pub(crate) fn reach_px(operators: &Operators, settings: &Settings) -> usize {
     2 * (operators.kernel_size() / 2) + settings.smoothing_px / 2
 }
 
-/// Confidence from which a pixel has a say in whether the pair looks swapped.
+/// Confidence from which a pixel counts in the test for a swapped pair.
 const CONFIDENT: f32 = 0.7;
 
-/// Part of the working range by which each third must lie farther away than the one above it to draw a warning. Of a ground
-/// that fills the image this is usual; scenes without a ground rarely rise twice in the same direction.
+/// Part of the working range by which each third must be farther than the one above: only grounds exceed it.
 const TILT: f64 = 0.12;
 
-/// Warnings about the result, from a thinned sample of its pixels.
 pub(crate) fn after(map: &DepthMap, optics: &Optics) -> Option<Warning> {
     let [near_mm, far_mm] = [optics.depth_mm(1.1) as f32, optics.depth_mm(-1.1) as f32];
     let mut thirds: [Vec<f32>; 3] = Default::default();
@@ -249,11 +237,10 @@ pub(crate) fn after(map: &DepthMap, optics: &Optics) -> Option<Warning> {
     for (y, (depths, confidences)) in depths.rows().into_iter().zip(confidences.rows()).enumerate() {
         let trusted =
             depths.iter().zip(confidences).filter(|(_, c)| **c > CONFIDENT).map(|(depth, _)| *depth);
-        // Outside the working range depth saturates, and its order says nothing.
+        // Outside the working range depth saturates and its order is meaningless.
         thirds[3 * y / height].extend(trusted.filter(|depth| (near_mm..=far_mm).contains(depth)));
     }
     let total: usize = thirds.iter().map(Vec::len).sum();
-    // Each third needs enough pixels for its median.
     if thirds.iter().any(|third| third.len() < total / 6 + 10) {
         return None;
     }

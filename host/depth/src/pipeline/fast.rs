@@ -1,12 +1,10 @@
-//! The run time as a stream of rows: every stage takes a few rows from the one before while they are in the cache.
+//! The run time as a stream of rows: each stage takes a few rows from the previous one while they are cached.
 //!
-//! A tile (all rows of a band, at most [`MAX_TILE_PX`] columns) needs `halo` pixels around it; beyond the image the
-//! input is reflected there, which with symmetric kernels is the same as reflecting at every stage. Rows go in blocks of
-//! [`BLOCK`] through normalisation, pre-filter, the three operators, the window sums and the cubic; each stage keeps what
-//! it still needs, so nothing is computed twice within a tile. Next to the three maps a tile holds about 100 rows: less
-//! than 1 MB for any image size.
-//!
-//! Bands are independent: threads share nothing but the input.
+//! A tile (all rows of a band, at most [`MAX_TILE_PX`] columns) needs `halo` pixels around it. Beyond the image the
+//! input is reflected, which with symmetric kernels equals reflection at every stage. Rows pass in blocks of [`BLOCK`]
+//! through normalisation, pre-filter, the three operators, the window sums and the cubic; each stage keeps what it
+//! still needs, so nothing is computed twice within a tile. A tile holds about 100 rows besides the maps: less than 1
+//! MB for any image size. Bands are independent: threads share only the input.
 
 use ndarray::{Array2, ArrayViewMut2, Axis, s};
 use rayon::prelude::*;
@@ -19,17 +17,14 @@ use crate::metrics::spread;
 use crate::operators::Operators;
 use crate::simd::{self, CubicRow, Plane, Taps, WindowRow};
 
-/// Rows that go through a stage at a time.
 const BLOCK: usize = simd::SEVEN_BLOCK;
 
-/// Widest tile: its rows of all stages fit a second-level cache of 1 MB; narrower ones would break the images' rows, and thereby
-/// the processor's reading ahead, more often.
+/// Widest tile: its rows fit a 1 MB second-level cache; narrower tiles would interrupt hardware prefetching more often.
 const MAX_TILE_PX: usize = 1024;
 
-/// Shortest band worth a thread: its halo of some 20 rows is computed twice.
+/// Shortest band worth a thread: its halo of about 20 rows is computed twice.
 const MIN_BAND_PX: usize = 48;
 
-/// What every tile needs to know.
 pub(crate) struct Job<'a> {
     pub input: &'a Input<'a>,
     pub operators: &'a Operators,
@@ -40,18 +35,16 @@ pub(crate) struct Job<'a> {
     pub backend: Backend,
 }
 
-/// The maps that tiles write, (height, width).
+/// (height, width).
 pub(crate) struct Maps<'a> {
     /// Depth in mm after the median.
     pub depth_mm: ArrayViewMut2<'a, f32>,
-    /// Texture energy c1.
     pub texture: ArrayViewMut2<'a, f32>,
-    /// Misfit relative to c1.
     pub misfit: ArrayViewMut2<'a, f32>,
 }
 
 impl Job<'_> {
-    /// Fills the maps, on as many threads as the settings ask for; `tiles` keeps the buffers for the next pair.
+    /// Fills the maps with as many threads as the settings request; `tiles` keeps the buffers for the next pair.
     pub fn run(&self, tiles: &mut Vec<Tile>, maps: Maps<'_>) {
         let (height, width) = maps.depth_mm.dim();
         let bands = self.settings.thread_count().min(height / MIN_BAND_PX).max(1);
@@ -88,12 +81,10 @@ impl Job<'_> {
     }
 }
 
-/// The buffers of a tile.
 #[derive(Debug)]
 pub(crate) struct Tile {
-    /// Largest width of a tile.
     width: usize,
-    /// Pixels around the tile that take part.
+    /// Pixels around the tile that contribute.
     halo: usize,
     radius: usize,
     smoothing: usize,
@@ -109,7 +100,6 @@ pub(crate) struct Tile {
     sums: Plane,
     alpha: Plane,
     scratch: Plane,
-    /// Sorted columns of the median's windows.
     sorted: Plane,
 }
 
@@ -152,11 +142,10 @@ impl Tile {
         self.window.reset();
         let backend = job.backend;
         let inputs = height + 2 * self.halo;
-        // Columns left after each stage.
         let filtered = width + 2 * (self.halo - self.radius);
         let operated = filtered - 2 * self.radius;
         let solved = operated - (self.smoothing - 1);
-        // Rows that go in before the first complete alpha comes out.
+        // Rows before the first complete alpha.
         let lag = 4 * self.radius + self.smoothing - 1;
         for begin in (0..inputs).step_by(BLOCK) {
             let rows = BLOCK.min(inputs - begin);
@@ -172,7 +161,7 @@ impl Tile {
             let [difference, sum] = &self.filtered;
             let [gm1, gp1, gp2] = &mut self.operators;
             let [p1, p2] = &mut self.p;
-            // The sums over seven rows need the block before: it stays in the other half of the ring.
+            // Sums over seven rows need the previous block: it stays in the other half of the ring.
             let half = begin / BLOCK % 2;
             let first = half * BLOCK;
             simd::convolve(backend, gm1, difference, &mut self.m, first, rows, operated);
@@ -203,7 +192,6 @@ impl Tile {
         }
     }
 
-    /// Normalises one row of the image with its halo.
     fn load_row(&mut self, job: &Job, image_row: isize, left: usize, width: usize, y: usize) {
         let input = job.input;
         let [image_height, image_width] = [input.height, input.width];
@@ -212,7 +200,6 @@ impl Tile {
             [input.far, input.near].map(|image| &image[row * image_width..(row + 1) * image_width]);
         let [difference, sum] = [self.difference.row_mut(y), self.sum.row_mut(y)];
         let full = width + 2 * self.halo;
-        // Columns of the image that the halo covers, and where they go.
         let from = left.saturating_sub(self.halo);
         let to = (left + width + self.halo).min(image_width);
         let at = from + self.halo - left;
@@ -228,7 +215,7 @@ impl Tile {
             sum_part,
         );
         if input.bad().is_some() {
-            // Holes are filled with the middle value; pixels that they touch are removed later.
+            // Holes get the middle value; pixels that depend on them are removed later.
             for value in difference_part.iter_mut().chain(sum_part) {
                 if !value.is_finite() {
                     *value = 0.0;
@@ -245,7 +232,7 @@ impl Tile {
         }
     }
 
-    /// Solves the cubic for one row of sums and finishes the row of the maps that thereby becomes complete.
+    /// Solves the cubic for one row of sums and finishes the map row that it completes.
     fn finish_row(&mut self, job: &Job, row: usize, y: usize, solved: usize, maps: &mut Maps<'_>) {
         let (height, width) = maps.depth_mm.dim();
         let stride = self.scratch.stride();

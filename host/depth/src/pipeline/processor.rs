@@ -1,4 +1,4 @@
-//! A run time that keeps its buffers from pair to pair.
+//! A run time that keeps its buffers between pairs.
 
 use ndarray::{Array2, ArrayView2, Zip};
 use rayon::prelude::*;
@@ -12,10 +12,8 @@ use crate::operators::Operators;
 use crate::optics::Optics;
 use crate::simd;
 
-/// Depth of pair after pair with the same operators, optics and settings. Images may change their size; as long as
-/// they do not, nothing is allocated.
-///
-/// Memory: the map and one more plane, 12 bytes per pixel, and less than 1 MB per thread.
+/// Depth of successive pairs with the same operators, optics and settings. Allocates only when the image size changes.
+/// Memory: 12 bytes per pixel, and less than 1 MB per thread.
 #[derive(Debug)]
 pub struct Processor {
     operators: Operators,
@@ -28,10 +26,7 @@ pub struct Processor {
 }
 
 impl Processor {
-    /// A processor for pairs taken with `optics`.
-    ///
-    /// # Errors
-    /// [`RunError`] for unusable windows and for operators that were designed for another blur.
+    /// A processor for `optics`. Returns [`RunError`] for unusable windows or operators of another blur.
     pub fn new(operators: &Operators, optics: &Optics, settings: &Settings) -> Result<Self, RunError> {
         check::check_settings(operators, optics, settings)?;
         let empty = || Array2::zeros((0, 0));
@@ -52,13 +47,10 @@ impl Processor {
         })
     }
 
-    /// Depth of a pair, as [`super::depth_from_pair`].
-    ///
-    /// # Errors
-    /// As [`super::depth_from_pair`]; the map of the pair before is lost then.
+    /// Depth of a pair, as [`super::depth_from_pair`]. An error discards the previous map.
     pub fn run(&mut self, far: ArrayView2<f32>, near: ArrayView2<f32>) -> Result<&DepthMap, RunError> {
         if self.settings.thread_count() > 1 {
-            // From within the pool: each of the parallel stages would otherwise have to wake it again.
+            // From within the pool: otherwise each parallel stage would wake it again.
             rayon::scope(|_| self.run_here(far, near))?;
         } else {
             self.run_here(far, near)?;
@@ -123,13 +115,12 @@ impl Processor {
         &self.map
     }
 
-    /// The map of the last pair, without the processor.
+    /// The map of the last pair, dropping the processor.
     pub fn into_map(self) -> DepthMap {
         self.map
     }
 }
 
-/// Texture energy to confidence, depth without any to NaN.
 fn finish(map: &mut DepthMap, misfit: &Array2<f32>, backend: Backend, threads: usize) {
     let scale = confidence::texture_scale(map.confidence.view());
     let rows = map.confidence.nrows().div_ceil(threads);

@@ -1,4 +1,4 @@
-//! The whole run time written plainly, stage by stage over whole images: the reference of the fast one.
+//! The run time stage by stage over whole images: reference of the fast one.
 
 use ndarray::{Array2, ArrayView2};
 
@@ -9,17 +9,13 @@ use crate::cubic;
 use crate::kernel::Kernel;
 use crate::operators::Operators;
 
-/// Maps before they become depth and confidence.
 pub(crate) struct Maps {
-    /// Normalised depth after the median.
     pub alpha: Array2<f32>,
-    /// Texture energy c1.
     pub texture: Array2<f32>,
-    /// Misfit of the window relative to c1.
     pub misfit: Array2<f32>,
 }
 
-/// Convolution (the kernels are symmetric) with reflected borders.
+/// The kernels are symmetric; borders are reflected.
 pub(crate) fn convolve(image: ArrayView2<f32>, kernel: &Kernel) -> Array2<f32> {
     let (height, width) = image.dim();
     let r = (kernel.size() / 2) as isize;
@@ -48,7 +44,6 @@ pub(crate) fn box_sum(image: &Array2<f32>, size: usize) -> Array2<f32> {
     })
 }
 
-/// Alpha, texture and misfit of a checked pair.
 pub(crate) fn maps(input: &Input, operators: &Operators, settings: &Settings) -> Maps {
     let size = (input.height, input.width);
     let [difference, sum] = [0, 1].map(|i| Array2::from_shape_fn(size, |(y, x)| input.normalised(y, x)[i]));

@@ -1,11 +1,10 @@
-//! A point spread function that was measured or drawn: how its light is spread over rings around its middle.
+//! A measured or drawn PSF: its light in rings around its centre.
 //!
-//! An image of the PSF (a point of light far out of focus) or of the aperture itself becomes [`RINGS`] rings of even width, each
-//! with its part of the light. The profile grows with the blur radius, as geometric optics has it, so one image serves every
-//! depth. Within a ring the light is taken to be even: the OTF is exactly that of a sum of rings.
-//!
-//! The kernels have eight-fold symmetry, and a lens turns its PSF by half a turn from one side of the focus to the other; what
-//! is not round is averaged over the circle, and [`RadialPsf::from_image`] says how much of it there is.
+//! An image of the PSF (a point of light far out of focus) or of the aperture becomes [`RINGS`] rings of equal width,
+//! each with its part of the light. The profile scales with the blur radius (geometric optics), so one image serves
+//! every depth. Light within a ring is uniform: the OTF is exactly that of a sum of rings. Kernels have eight-fold
+//! symmetry, and a lens rotates its PSF by half a turn across the focus, so non-round parts are averaged over the
+//! circle; [`RadialPsf::from_image`] reports how large they are.
 
 use ndarray::ArrayView2;
 
@@ -14,10 +13,10 @@ use super::PsfError;
 /// Rings of a profile.
 pub const RINGS: usize = 48;
 
-/// Blur radii that a profile may reach to.
+/// Allowed outer radii in blur radii.
 const EXTENT_RANGE: [f64; 2] = [0.1, 8.0];
 
-/// Least parts of a pixel per ring when an image is sampled.
+/// Least parts of a pixel per ring when sampling an image.
 const PARTS_PER_RING: f64 = 3.0;
 
 /// A round point spread function, ring by ring.
@@ -29,21 +28,18 @@ pub struct RadialPsf {
     light: [f32; RINGS],
 }
 
-/// A profile of an image, and how well it is one.
+/// A profile of an image, and its quality.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Drawn {
     /// The profile.
     pub psf: RadialPsf,
-    /// Part of the image's energy (squares) that the mean over each circle does not explain: 0 for a round image.
+    /// Part of the image's energy (squares) outside the circular mean: 0 for a round image.
     pub not_round: f64,
 }
 
 impl RadialPsf {
-    /// A profile that reaches to `extent` blur radii; `light` of each ring in any unit.
-    ///
-    /// # Errors
-    /// [`PsfError::Profile`] for another number of rings, for light that is negative or none at all;
-    /// [`PsfError::Range`] for the extent.
+    /// A profile of `extent` blur radii; `light` of each ring in any unit. Returns [`PsfError::Profile`] for another
+    /// number of rings, or negative or no light; [`PsfError::Range`] for the extent.
     pub fn new(extent: f64, light: &[f32]) -> Result<Self, PsfError> {
         super::check_range("extent", extent, EXTENT_RANGE)?;
         let light: [f32; RINGS] = light
@@ -56,16 +52,14 @@ impl RadialPsf {
         if total <= 0.0 {
             return Err(PsfError::Profile("no light at all".into()));
         }
-        // A profile that is normalised stays unchanged, so that a stored one is restored to the bit.
+        // A normalised profile stays unchanged, so that a stored one is restored exactly.
         let scale = if (total - 1.0).abs() < 1e-6 { 1.0 } else { total.recip() };
         Ok(Self { extent, light: light.map(|light| (f64::from(light) * scale) as f32) })
     }
 
-    /// The profile of an image of the PSF or of the aperture, black = no light, about the middle of its light. `radius_px` is
-    /// what the blur radius (the aperture's own edge) has in the image, px; without it half the shorter side.
-    ///
-    /// # Errors
-    /// [`PsfError::Profile`] for an image without light or with invalid values, [`PsfError::Range`].
+    /// The profile of an image of the PSF or aperture, black = no light, about its centroid. `radius_px` is the blur
+    /// radius (the aperture's edge) in the image; `None` takes half the shorter side. [`PsfError::Profile`] without
+    /// light.
     pub fn from_image(image: ArrayView2<f32>, radius_px: Option<f64>) -> Result<Drawn, PsfError> {
         let (height, width) = image.dim();
         let radius_px = radius_px.unwrap_or(0.5 * height.min(width) as f64);
@@ -86,7 +80,7 @@ impl RadialPsf {
         let farthest = lit().map(|((y, x), _)| away(y as f64, x as f64)).fold(0.0, f64::max) + 0.5;
         let extent = (farthest / radius_px).clamp(EXTENT_RANGE[0], EXTENT_RANGE[1]);
         let ring_px = extent * radius_px / RINGS as f64;
-        // A ring may be narrower than a pixel: each pixel is cut into parts.
+        // A ring may be narrower than a pixel: each pixel is split.
         let parts = (PARTS_PER_RING / ring_px).ceil().clamp(1.0, 24.0) as usize;
         let share = 1.0 / (parts * parts) as f64;
         let mut sums = vec![[0.0_f64; 3]; RINGS];
@@ -103,7 +97,7 @@ impl RadialPsf {
         let mean = |[n, sum, _]: &[f64; 3]| if *n > 0.0 { sum / n } else { 0.0 };
         let energy: f64 = sums.iter().map(|ring| ring[2]).sum();
         let round: f64 = sums.iter().map(|ring| ring[0] * mean(ring).powi(2)).sum();
-        // The ring's own area and not the parts that fell into it: an image may end before its corners do.
+        // The ring's own area, not the parts inside it: an image may end before its corners.
         let light: Vec<f32> =
             sums.iter().enumerate().map(|(i, ring)| (mean(ring) * (2 * i + 1) as f64) as f32).collect();
         Ok(Drawn { psf: Self::new(extent, &light)?, not_round: (1.0 - round / energy).max(0.0) })
@@ -135,7 +129,7 @@ impl RadialPsf {
             return 1.0 - 0.25 * z * z * self.second_moment();
         }
         let width = self.extent / RINGS as f64;
-        // r J1(z r): what a disc of radius r has, up to 2 / z.
+        // r J1(z r): the transform of a disc of radius r, up to 2 / z.
         let disc = |i: usize| i as f64 * width * libm::j1(z * i as f64 * width);
         let (mut sum, mut inner) = (0.0, 0.0);
         for (i, light) in self.light.iter().enumerate() {
@@ -158,14 +152,14 @@ pub struct RadialTable {
 
 impl RadialTable {
     pub(super) fn new(psf: RadialPsf, max_z: f64) -> Self {
-        // Between entries a parabola: its error is a thousandth of (step x extent)^3.
+        // Parabolas between entries: the error is a thousandth of (step x extent)^3.
         let step = 0.02 / psf.extent.max(1.0);
         let entries = (max_z / step).ceil() as usize + 3;
         let values = (0..entries).map(|i| psf.transform(step * i as f64)).collect();
         Self { psf, step, values }
     }
 
-    /// At `z` of 0 or more; beyond the table it is computed.
+    /// `z` must be 0 or more; beyond the table it is computed.
     pub(super) fn at(&self, z: f64) -> f64 {
         let x = z / self.step;
         let i = (x + 0.5) as usize;

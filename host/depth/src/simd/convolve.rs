@@ -1,16 +1,16 @@
-//! Convolution with an eight-fold symmetric kernel, a stream of row blocks in, a stream of row blocks out.
+//! Convolution with an eight-fold symmetric kernel, from a stream of row blocks to a stream of row blocks.
 //!
-//! A vector of columns is walked downwards. The columns left and right of the centre share their taps, so each input
-//! row is first folded to `r + 1` vectors; each of the `r + 1` distinct kernel rows then costs `r + 1` multiply-adds,
-//! and its sum goes to the two output rows above and below that share it. The `2 r + 1` pending output rows stay in
-//! registers; between blocks the unfinished ones wait in `pending`, so nothing is computed twice. For 7x7 that is 16
-//! multiply-adds and 10 additions per pixel instead of 49 multiply-adds: the cost of a rank-2 separable kernel, but exact.
+//! A vector of columns moves downwards. Columns left and right of the centre share their taps, so each input row is
+//! first folded to `r + 1` vectors. Each of the `r + 1` distinct kernel rows then costs `r + 1` multiply-adds, and its
+//! sum goes to both output rows that share it. The `2 r + 1` unfinished output rows stay in registers, and in `pending`
+//! between blocks, so nothing is computed twice. For 7x7 that is 16 multiply-adds and 10 additions per pixel instead of
+//! 49 multiply-adds: the cost of a rank-2 separable kernel, but exact.
 
 use super::lanes::Lanes;
 use super::{Plane, dispatch};
 use crate::kernel::{Kernel, LARGEST_SIZE, free_coefficients, with_size};
 
-/// A kernel's free coefficients, ready for the loop, and the rows that wait for more input.
+/// A kernel's free coefficients for the loop, and the unfinished rows.
 #[derive(Debug, Clone)]
 pub(crate) struct Taps {
     size: usize,
@@ -19,34 +19,30 @@ pub(crate) struct Taps {
 }
 
 impl Taps {
-    /// For rows of `width` output columns.
     pub fn new(kernel: &Kernel, width: usize) -> Self {
         let octant = kernel.octant().iter().map(|c| *c as f32).collect();
         Self { size: kernel.size(), octant, pending: Plane::new(kernel.size() - 1, width) }
     }
 
-    /// The kernel's side.
     pub fn size(&self) -> usize {
         self.size
     }
 
-    /// Resets the running sums.
     pub fn reset(&mut self) {
         self.pending.all_mut().fill(0.0);
     }
 }
 
-/// Most rows that are fed at a time.
+/// Most rows per call.
 pub(crate) const MAX_ROWS: usize = 8;
 
 dispatch! {
-    /// Feeds rows of `input`, at most [`MAX_ROWS`]; writes as many rows of `width` columns to `output`, whose last vector may
-    /// reach beyond the width. The output lags behind by `size - 1` rows: the first ones after a reset are unfinished and
-    /// to be dropped. Input rows must be [`READ_BEYOND`] numbers longer than the width.
+    /// Convolves at most [`MAX_ROWS`] rows of `input`, each [`READ_BEYOND`] numbers longer than `width`. The last
+    /// vector of an `output` row may exceed the width. The output lags by `size - 1` rows, invalid after a reset.
     fn convolve_rows(taps: &mut Taps, input: &[&[f32]], output: &mut [&mut [f32]], width: usize) = by_size
 }
 
-/// Numbers beyond the width that are read in each row: 32 from the start of its last vector on.
+/// Numbers read beyond the width of each row: 32 from the start of its last vector.
 pub(crate) const READ_BEYOND: usize = 31;
 
 /// As [`convolve_rows`] for the first `rows` rows of `input`, to rows of `output` from `first` on.
@@ -73,7 +69,6 @@ pub(crate) fn convolve(
 #[inline(always)]
 fn by_size<L: Lanes>(taps: &mut Taps, input: &[&[f32]], output: &mut [&mut [f32]], width: usize) {
     assert!(input.len() <= MAX_ROWS && output.len() == input.len() && taps.pending.rows() + 1 == taps.size);
-    // Vectors start at multiples of N below `width`.
     let vectors = width.next_multiple_of(L::N);
     assert!(input.iter().all(|row| width + READ_BEYOND <= row.len() && vectors - L::N + 32 <= row.len()));
     assert!(output.iter().all(|row| vectors <= row.len()) && vectors <= taps.pending.stride());
@@ -107,8 +102,8 @@ fn walk<L: Lanes, const SIZE: usize, const FOLDED: usize>(
         // of input and N in each row of output and of `pending`, which has SIZE - 1 rows.
         unsafe {
             let pending = pending_base.add(x);
-            // The first output row that is not finished comes first. A row of input is added to all of them, which at
-            // the same time moves them up; two arrays, because a shift within one would keep it out of registers.
+            // The first unfinished output row comes first. Each input row is added to all of them and moves them up;
+            // two arrays, because a shift within one would prevent registers.
             let mut sums = [L::splat(0.0); SIZE];
             for i in 0..SIZE - 1 {
                 sums[i] = L::load(pending.add(i * pending_stride));
@@ -140,7 +135,6 @@ fn walk<L: Lanes, const SIZE: usize, const FOLDED: usize>(
     }
 }
 
-/// Place of the tap (a, b) among the free coefficients.
 #[inline(always)]
 const fn index(a: usize, b: usize) -> usize {
     let [long, short] = if a > b { [a, b] } else { [b, a] };

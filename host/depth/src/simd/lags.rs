@@ -1,19 +1,16 @@
-//! Sums over a window's columns of the products of two rows at all horizontal lags, for the propagation of noise
-//! ([`crate::uncertainty`]). Plain loops along rows, which the compiler turns into vectors of the unit at hand.
-//!
-//! Cost per pixel and pair of rows: for each of the `2 w - 1` lags one product, up to `w - 1` additions and four
-//! multiply-adds.
+//! Window sums over columns of the products of two rows at all horizontal lags, for noise propagation
+//! ([`crate::uncertainty`]). Plain loops along rows, vectorised by the compiler. Cost per pixel and pair of rows: for
+//! each of the `2 w - 1` lags one product, up to `w - 1` additions and four multiply-adds.
 
 use super::dispatch;
 use super::lanes::Lanes;
 
-/// A horizontal lag and what its sum counts in each of the four results.
+/// A horizontal lag and its factors in the four results.
 pub(crate) type Lag = (isize, [f32; 4]);
 
 dispatch! {
-    /// For each lag the sums over those of `window` columns `i` for which `i + lag` is in the window too, of `upper[i]
-    /// lower[i + lag]`, times the lag's factors, are added to the four rows of `sums`. `upper` and `lower` are `window - 1`
-    /// longer than the sums, `work` is twice as long.
+    /// Adds to the four rows of `sums`, for each lag, its factors times the sums of `upper[i] lower[i + lag]` over the
+    /// window. `upper` and `lower` are `window - 1` longer than the sums, `work` is twice as long.
     fn lagged_products(upper: &[f32], lower: &[f32], lags: &[Lag], window: usize, work: &mut [f32], sums: &mut [Vec<f32>; 4]) =
         lagged_generic
 }
@@ -61,7 +58,6 @@ fn lagged_generic<L: Lanes>(
     }
 }
 
-/// Adds the sums of `N` neighbours times the factors.
 #[inline(always)]
 fn add_sums<const N: usize>(values: &[f32], [f0, f1, f2, f3]: [f32; 4], sums: &mut [Vec<f32>; 4]) {
     let width = values.len() + 1 - N;

@@ -1,21 +1,17 @@
-//! Vectors of single-precision numbers: 16 lanes (AVX-512), 8 (AVX2) or 4 as plain arrays; 4 of NEON are in `neon.rs`.
+//! Vectors of single-precision numbers: 16 lanes (AVX-512), 8 (AVX2) or 4 as plain arrays; NEON is in `neon.rs`.
 
 #[cfg(target_arch = "x86_64")]
 use std::arch::x86_64::*;
 
 /// A vector of [`Lanes::N`] numbers.
 ///
-/// Functions over lanes must use loops rather than closures: a closure is its own function, which is compiled
-/// without the instructions of the function around it.
-///
-/// The methods that take pointers are unsafe in what they read; all others are, for the x86 types, only to be called
-/// from functions that are inlined into one with the instructions enabled, which `dispatch!` sees to.
+/// Functions over lanes must use loops, not closures: a closure is compiled without the instructions of its enclosing
+/// function. Pointer methods are unsafe because of their reads and writes. On x86 the others may be called only from
+/// functions inlined into one with the instructions enabled, which `dispatch!` ensures.
 pub(crate) trait Lanes: Copy {
-    /// Number of lanes.
     const N: usize;
 
-    /// How many vectors at a time a chain of dependent operations is worth: with more than one, each fills the gaps of the
-    /// other, as long as the registers suffice. 1 or 2, as measured on Zen 4.
+    /// Vectors to interleave in a chain of dependent operations, to hide latency: 1 or 2, measured on Zen 4.
     const INTERLEAVED: usize;
 
     /// # Safety
@@ -40,7 +36,7 @@ pub(crate) trait Lanes: Copy {
         vectors
     }
 
-    /// The vector at `p + K` next to `here` at `p` and `next` at `p + N`, from memory or from these, whichever is cheaper.
+    /// The vector at `p + K`, from memory or from `here` at `p` and `next` at `p + N`, whichever is cheaper.
     ///
     /// # Safety
     /// `K + N` numbers must be readable at `p`; `K` is at most 10.
@@ -56,15 +52,14 @@ pub(crate) trait Lanes: Copy {
     fn mul(self, other: Self) -> Self;
     fn min(self, other: Self) -> Self;
     fn max(self, other: Self) -> Self;
-    /// `self * factor + summand`, fused where the processor can.
+    /// `self * factor + summand`, fused where possible.
     fn mul_add(self, factor: Self, summand: Self) -> Self;
-    /// `summand - self * factor`, fused where the processor can.
+    /// `summand - self * factor`, fused where possible.
     fn neg_mul_add(self, factor: Self, summand: Self) -> Self;
     /// The last `N - K` lanes, followed by the first `K` of `next`; `K` is from 1 to 4.
     fn after<const K: i32>(self, next: Self) -> Self;
-    /// Magnitude.
     fn abs(self) -> Self;
-    /// `self`, which must not be negative, with the sign of `other`.
+    /// `self`, not negative, with the sign of `other`.
     fn with_sign_of(self, other: Self) -> Self;
     /// 1 in the lanes where `self < other`, 0 in the others.
     fn one_where_less(self, other: Self) -> Self;
@@ -72,11 +67,9 @@ pub(crate) trait Lanes: Copy {
     fn reciprocal_estimate(self) -> Self;
     /// `1 / sqrt(self)` to 12 bits or better.
     fn inverse_root_estimate(self) -> Self;
-    /// The numbers.
     fn to_array(self) -> [f32; 16];
 
-    /// `1 / self` to the last bit or two: the estimate and a Newton step, at a third of the cost of a division. Finite for
-    /// magnitudes from 1e-37 to 1e37.
+    /// `1 / self` to the last bits for 1e-37 to 1e37: estimate and a Newton step, a third of a division's cost.
     #[inline(always)]
     fn reciprocal(self) -> Self {
         let estimate = self.reciprocal_estimate();
@@ -84,7 +77,7 @@ pub(crate) trait Lanes: Copy {
         error.mul_add(estimate, estimate)
     }
 
-    /// `1 / sqrt(self)` to single precision: the estimate and a Newton step.
+    /// `1 / sqrt(self)` to single precision: estimate and a Newton step.
     #[inline(always)]
     fn inverse_root(self) -> Self {
         let y = self.inverse_root_estimate();
@@ -94,22 +87,19 @@ pub(crate) trait Lanes: Copy {
     }
 }
 
-/// Sixteen lanes of AVX-512.
 #[cfg(target_arch = "x86_64")]
 #[derive(Clone, Copy)]
 pub(crate) struct Avx512(__m512);
 
-/// Eight lanes of AVX2.
 #[cfg(target_arch = "x86_64")]
 #[derive(Clone, Copy)]
 pub(crate) struct Avx2(__m256);
 
-/// Four lanes of portable code: what every 64-bit processor has.
 #[derive(Clone, Copy)]
 pub(crate) struct Portable([f32; 4]);
 
-// SAFETY of the intrinsics without pointers: they only need their instruction set, and every caller is inlined into a
-// function that enables it after it was detected (`dispatch!`).
+// SAFETY of the intrinsics without pointers: they only need their instruction set; every caller is inlined into a
+// function that enables it after detection (`dispatch!`).
 #[cfg(target_arch = "x86_64")]
 impl Lanes for Avx512 {
     const N: usize = 16;
@@ -127,7 +117,7 @@ impl Lanes for Avx512 {
         unsafe { _mm512_storeu_ps(p, self.0) }
     }
 
-    /// Two loads and shifts between them: an unaligned load of a whole cache line costs two accesses.
+    /// Two loads and shifts: an unaligned load of a whole cache line costs two accesses.
     #[inline(always)]
     unsafe fn taps<const T: usize>(p: *const f32) -> [Self; T] {
         // SAFETY: the caller promises 32 readable numbers at p.
@@ -379,7 +369,7 @@ impl Lanes for Portable {
     }
     #[inline(always)]
     fn mul_add(self, factor: Self, summand: Self) -> Self {
-        // Not fused: without the instruction a fused one is a slow library call.
+        // Not fused: without the instruction, fusing is a slow library call.
         self.mul(factor).add(summand)
     }
     #[inline(always)]

@@ -1,20 +1,18 @@
 //! Medians of square windows by minimum and maximum alone, and their depth.
 //!
-//! First the columns of the window's rows are sorted, once for all windows that share them. Of a window's `n` sorted
-//! columns the values of one rank make a row; if the rows were sorted too, the value at (i, j) would have at least
-//! `(i + 1) (j + 1) - 1` values not above it and `(n - i) (n - j) - 1` not below, so that all but a band along the
-//! diagonal cannot be the median, as many above it as below (after Paeth 1990, generalised). The band is found by
-//! selection within each row; of its 13 values (5x5) or 29 (7x7) the median remains when extremes are forgotten in pairs.
-//!
-//! Cost per vector: 24 minima and maxima for 3x3, about 140 for 5x5, about 510 for 7x7.
+//! First the columns of the window's rows are sorted, once for all windows that share them. The values of one rank in a
+//! window's `n` sorted columns make a row. If the rows were sorted too, the value at (i, j) would have at least
+//! `(i + 1) (j + 1) - 1` values not above it and `(n - i) (n - j) - 1` not below: only a band along the diagonal can be
+//! the median, with as many values above as below (after Paeth 1990, generalised). Selection within each row finds the
+//! band; dropping pairs of extremes from its 13 values (5x5) or 29 (7x7) leaves the median. Cost per vector: 24 minima
+//! and maxima for 3x3, about 140 for 5x5, about 510 for 7x7.
 
 use super::lanes::Lanes;
 use super::{Plane, dispatch};
 use crate::depth_of_alpha::DepthOfAlpha;
 
 dispatch! {
-    /// Median over `rows` (as many as the window is wide) and as many columns, and its depth in mm, for `width` columns.
-    /// `sorted` has as many rows to work in.
+    /// Median over `rows` and as many columns, and its depth in mm, for `width` columns. `sorted` has as many rows.
     fn median_row(rows: &[&[f32]], sorted: &mut Plane, depth_of: DepthOfAlpha, output: &mut [f32], width: usize) =
         median_generic
 }
@@ -40,7 +38,7 @@ fn median_generic<L: Lanes>(
         3 => medians::<L, 3>(rows, sorted, depth_of, output, width),
         5 => medians::<L, 5>(rows, sorted, depth_of, output, width),
         7 => medians::<L, 7>(rows, sorted, depth_of, output, width),
-        // `check` lets no other window through.
+        // `check` rejects other windows.
         n => unreachable!("median window {n}"),
     }
 }
@@ -83,7 +81,7 @@ fn medians<L: Lanes, const SIDE: usize>(
     }
 }
 
-/// The vectors that start at `p`, `p + 1`, ...
+/// The vectors at `p`, `p + 1`, ...
 ///
 /// # Safety
 /// `2 N` numbers must be readable at `p`.
@@ -107,7 +105,6 @@ unsafe fn neighbours<L: Lanes, const COUNT: usize>(p: *const f32) -> [L; COUNT] 
     }
 }
 
-/// Alpha to mm, the constants in registers.
 struct ToDepth<L> {
     linearisation: [L; 4],
     focal: L,
@@ -188,14 +185,13 @@ fn sort<L: Lanes, const SIDE: usize>(values: &mut [L; SIDE]) {
     }
 }
 
-/// Of any `n` values, where `n` is half of all and one or two more, neither the smallest nor the largest can be the median:
-/// they make room for the next one, until three are left.
+/// Neither extreme of `n` values, at least half of all plus one, is the median: one new value replaces both.
 macro_rules! forget {
     ($lanes:ident, $kept:ident, $rest:ident: $($n:literal)+) => {{
         let mut next = 0;
         $(
             extremes_to_ends::<$lanes, $n>(&mut $kept);
-            // The new value replaces the smallest; the largest is forgotten by counting one less.
+            // The new value replaces the smallest; counting one less drops the largest.
             if $n > 3 {
                 $kept[0] = $rest[next];
                 next += 1;
@@ -205,7 +201,7 @@ macro_rules! forget {
         $kept[1]
     }};
 }
-/// Median of a window whose columns are sorted; `ranks[i]` are the columns' values of rank `i`.
+/// Median of a window with sorted columns; `ranks[i]` are the columns' values of rank `i`.
 #[inline(always)]
 fn median_of_sorted<L: Lanes, const SIDE: usize>(ranks: &[[L; SIDE]; SIDE]) -> L {
     let mut kept = [L::splat(0.0); 16];
@@ -218,7 +214,7 @@ fn median_of_sorted<L: Lanes, const SIDE: usize>(ranks: &[[L; SIDE]; SIDE]) -> L
             middle_of_three(low, middle, high)
         }
         5 => {
-            // By rank 2, 3, 3, 3, 2 of the band: 8 to begin with, 5 to come.
+            // By rank 2, 3, 3, 3, 2 of the band: initially 8, then 5 more.
             keep::<L, SIDE, 2, LARGEST>(&ranks[0], &mut kept, 0);
             keep::<L, SIDE, 2, SMALLEST>(&ranks[4], &mut kept, 2);
             without::<L, SIDE, 2, SMALLEST>(&ranks[1], &mut kept, 4);
@@ -229,7 +225,7 @@ fn median_of_sorted<L: Lanes, const SIDE: usize>(ranks: &[[L; SIDE]; SIDE]) -> L
             forget!(L, kept, rest: 8 7 6 5 4 3)
         }
         _ => {
-            // By rank 3, 4, 5, 5, 5, 4, 3 of the band: 16 to begin with, 13 to come.
+            // By rank 3, 4, 5, 5, 5, 4, 3 of the band: initially 16, then 13 more.
             keep::<L, SIDE, 3, LARGEST>(&ranks[0], &mut kept, 0);
             keep::<L, SIDE, 3, SMALLEST>(&ranks[6], &mut kept, 3);
             without::<L, SIDE, 3, SMALLEST>(&ranks[1], &mut kept, 6);
@@ -244,7 +240,6 @@ fn median_of_sorted<L: Lanes, const SIDE: usize>(ranks: &[[L; SIDE]; SIDE]) -> L
     }
 }
 
-/// Smallest of the first `N` to the front, largest to their back.
 #[inline(always)]
 fn extremes_to_ends<L: Lanes, const N: usize>(values: &mut [L; 16]) {
     for i in 0..N / 2 {
@@ -258,11 +253,10 @@ fn extremes_to_ends<L: Lanes, const N: usize>(values: &mut [L; 16]) {
     }
 }
 
-/// Which end of a sorted column is kept or dropped.
 const LARGEST: bool = true;
 const SMALLEST: bool = false;
 
-/// Writes the `KEEP` largest, or smallest, to `output` from `at` on, by insertion.
+/// Writes the `KEEP` largest or smallest to `output` from `at` on, by insertion.
 #[inline(always)]
 fn keep<L: Lanes, const SIDE: usize, const KEEP: usize, const END: bool>(
     values: &[L; SIDE],
@@ -282,7 +276,7 @@ fn keep<L: Lanes, const SIDE: usize, const KEEP: usize, const END: bool>(
     }
 }
 
-/// Writes all but the `DROP` smallest, or largest, to `output` from `at` on.
+/// Writes all but the `DROP` smallest or largest to `output` from `at` on.
 #[inline(always)]
 fn without<L: Lanes, const SIDE: usize, const DROP: usize, const END: bool>(
     values: &[L; SIDE],
@@ -300,7 +294,6 @@ fn without<L: Lanes, const SIDE: usize, const DROP: usize, const END: bool>(
     }
 }
 
-/// Smallest first, largest last, the others between them in any order.
 #[inline(always)]
 fn without_extremes<L: Lanes, const SIDE: usize>(values: &[L; SIDE]) -> [L; SIDE] {
     let mut values = *values;
@@ -326,7 +319,6 @@ mod tests {
     use super::super::lanes::Portable;
     use super::*;
 
-    /// The median of a window of `SIDE` rows against sorting, for values with many ties.
     fn medians_are_those_of_sorting<const SIDE: usize>() {
         let mut state = 1_u64;
         let mut random = || {

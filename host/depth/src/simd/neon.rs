@@ -1,20 +1,17 @@
-//! Four lanes of NEON: what every 64-bit ARM processor has (Raspberry Pi, Jetson, Apple's).
-//!
-//! Nothing is detected while the program runs: the module is compiled only where the target promises the unit to all of its
-//! code.
+//! Four lanes of NEON, which every 64-bit ARM processor has (Raspberry Pi, Jetson, Apple's). No detection at run time:
+//! compiled only where the target guarantees the unit.
 
 use std::arch::aarch64::*;
 
 use super::lanes::Lanes;
 
-/// Four lanes of NEON.
 #[derive(Clone, Copy)]
 pub(crate) struct Neon(float32x4_t);
 
-// SAFETY of the intrinsics without pointers: they only need their instruction set, which the target promises (above).
+// SAFETY of the intrinsics without pointers: they only need their instruction set, which the target guarantees.
 impl Lanes for Neon {
     const N: usize = 4;
-    /// Not measured: no such processor is at hand. There are 32 registers, twice as many as with AVX2.
+    /// Not measured for lack of hardware. There are 32 registers, twice as many as with AVX2.
     const INTERLEAVED: usize = 2;
 
     #[inline(always)]
@@ -45,7 +42,7 @@ impl Lanes for Neon {
     fn mul(self, other: Self) -> Self {
         Self(unsafe { vmulq_f32(self.0, other.0) })
     }
-    /// Of a number and NaN the number, so that a NaN does not stay as it would with `vminq_f32`.
+    /// Of a number and NaN the number; `vminq_f32` would return NaN.
     #[inline(always)]
     fn min(self, other: Self) -> Self {
         Self(unsafe { vminnmq_f32(self.0, other.0) })
@@ -97,7 +94,7 @@ impl Lanes for Neon {
             vmulq_f32(estimate, vrecpsq_f32(self.0, estimate))
         })
     }
-    /// As for the reciprocal. The square of the estimate comes first: of 0 it is infinite, and the step knows that product.
+    /// As for the reciprocal. The square of the estimate comes first: it is infinite for 0, which the step handles.
     #[inline(always)]
     fn inverse_root_estimate(self) -> Self {
         Self(unsafe {

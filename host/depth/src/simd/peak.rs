@@ -1,4 +1,4 @@
-//! Multiply-adds that never leave the registers: the most a core can do, by which benchmarks measure the rest.
+//! Multiply-adds in registers only: a core's limit, the reference of the benchmarks.
 
 use std::hint::black_box;
 
@@ -6,13 +6,12 @@ use super::dispatch;
 use super::lanes::Lanes;
 use crate::simd::Backend;
 
-/// Sums that grow side by side: more than the latency of a multiply-add times the number of units on any processor known,
-/// and few enough for 16 registers.
+/// Independent sums: more than latency times units on any known processor, few enough for 16 registers.
 const SUMS: usize = 12;
 
 impl Backend {
-    /// Does independent multiply-adds in registers, `rounds` times a few dozen to a few hundred, and returns the number of
-    /// floating-point operations, two for each multiply-add and lane. (Portable code multiplies and adds separately.)
+    /// Does independent multiply-adds in registers; returns their floating-point operations, two per lane and
+    /// multiply-add.
     pub fn multiply_adds(self, rounds: u32) -> u64 {
         let [factor, summand] = black_box([0.999_f32, 0.001]);
         black_box(chains(self, rounds, factor, summand))
@@ -28,7 +27,7 @@ fn chains_generic<L: Lanes>(rounds: u32, factor: f32, summand: f32) -> u64 {
     let [factor, summand] = [L::splat(factor), L::splat(summand)];
     let mut sums = [summand; SUMS];
     for i in 1..SUMS {
-        // Different ones, or the compiler would compute a single chain.
+        // Different starts, or the compiler would compute a single chain.
         sums[i] = sums[i - 1].add(summand);
     }
     for _ in 0..rounds {

@@ -1,4 +1,4 @@
-//! The loops of the run time other than convolution: one row, or one block of rows, at a time.
+//! The run time's loops besides convolution, for one row or one block of rows.
 
 use super::lanes::Lanes;
 use super::{Plane, dispatch};
@@ -8,28 +8,24 @@ use crate::cubic::{LEAST_T, MAX_ALPHA, SLOPE_FLOOR, START, STEPS};
 /// Texture energy that counts as none: keeps divisions finite, far below any real one (images are normalised).
 const TINY: f32 = 1e-30;
 
-/// Pixels that are counted in one f32, which is exact up to 2^24.
+/// Pixels counted in one f32, which is exact up to 2^24.
 const COUNTED_PX: usize = 1 << 22;
 
-/// Smallest and largest value of a row, and whether all are finite.
+/// Smallest and largest value of a row; meaningless unless all are `finite`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Extremes {
-    /// Smallest value; meaningless unless all are finite.
     pub low: f32,
-    /// Largest value; meaningless unless all are finite.
     pub high: f32,
-    /// Whether no value is NaN or infinite.
     pub finite: bool,
 }
 
 dispatch! {
-    /// Smallest and largest of `values`.
     fn extremes(values: &[f32]) -> Extremes = extremes_generic
 }
 
 #[inline(always)]
 fn extremes_generic<L: Lanes>(values: &[f32]) -> Extremes {
-    // Four of each, so that none waits for itself.
+    // Four of each, to hide latency.
     let [mut low, mut high] = [[L::splat(f32::INFINITY); 4], [L::splat(f32::NEG_INFINITY); 4]];
     let mut poison = [L::splat(0.0); 4];
     let whole = values.len() / (4 * L::N) * 4 * L::N;
@@ -80,28 +76,23 @@ fn normalise_generic<L: Lanes>(
     }
 }
 
-/// Sums over the last `window` rows of the four products, without the drift of a running sum.
-///
-/// Rows come in groups of `window`. A window is the tail of one group and the head of the next: tails are summed
-/// once per group, heads on the way (van Herk's scheme for sums). Three additions per product and row.
+/// Sums over the last `window` rows of the four products, without a running sum's drift: a window is the tail of one
+/// group of rows and the head of the next (van Herk's scheme). Three additions per product and row.
 #[derive(Debug, Clone)]
 pub(crate) struct WindowRow {
     window: usize,
-    /// Position of the next row in its group.
     phase: usize,
-    /// Four sums over the head of the running group.
+    /// Four sums over the head of the current group.
     heads: Plane,
-    /// For each row of a group four tails of the last group, or four products of the running one.
+    /// Per row of a group: four tails of the last group, or four products of the current one.
     tails: Plane,
 }
 
 impl WindowRow {
-    /// For windows of `window` rows of `width` columns.
     pub fn new(window: usize, width: usize) -> Self {
         Self { window, phase: 0, heads: Plane::new(4, width), tails: Plane::new(4 * window, width) }
     }
 
-    /// Resets the running sums.
     pub fn reset(&mut self) {
         self.phase = 0;
         self.heads.all_mut().fill(0.0);
@@ -110,7 +101,7 @@ impl WindowRow {
 }
 
 dispatch! {
-    /// Feeds `rows` rows, from `first` on, of the inputs `m`, `p1`, `p2`; writes to rows `4 y ..` of `sums` the window sums of `p1 p1`, `p1 p2`,
+    /// Takes `rows` rows from `first` on; writes to rows `4 y ..` of `sums` the window sums of `p1 p1`, `p1 p2`,
     /// `p1 m`, `m m` that end with row `y`.
     fn vertical_sums(state: &mut WindowRow, inputs: [&Plane; 3], first: usize, sums: &mut Plane, rows: usize, width: usize) =
         vertical_generic
@@ -183,12 +174,12 @@ fn vertical_generic<L: Lanes>(
     state.phase = (state.phase + rows) % window;
 }
 
-/// Rows that [`vertical_sums_of_seven`] does at a time.
+/// Rows per call of [`vertical_sums_of_seven`].
 pub(crate) const SEVEN_BLOCK: usize = 8;
 
 dispatch! {
-    /// As [`vertical_sums`] for windows of seven rows, without any state: `inputs` are rings of 16 rows whose rows `8 half
-    /// ..` are new and whose other half holds the eight rows before. All eight rows of `sums` are written.
+    /// As [`vertical_sums`] for seven rows, stateless: `inputs` are rings of 16 rows, new at `8 half ..`, the previous
+    /// eight in the other half. Writes all eight rows of `sums`.
     fn vertical_sums_of_seven(inputs: [&Plane; 3], half: usize, sums: &mut Plane, width: usize) = seven_generic
 }
 
@@ -250,18 +241,16 @@ unsafe fn products<L: Lanes>(m: *const f32, p1: *const f32, p2: *const f32, offs
     [p1.mul(p1), p1.mul(p2), p1.mul(m), m.mul(m)]
 }
 
-/// What [`CubicRow::solve`] writes: rows with padding.
+/// Output of [`CubicRow::solve`]: rows with padding.
 pub(crate) struct CubicRow<'a> {
-    /// Normalised depth before the median.
+    /// Before the median; the misfit is relative to c1.
     pub alpha: &'a mut [f32],
-    /// Texture energy c1.
     pub texture: &'a mut [f32],
-    /// Misfit relative to c1.
     pub misfit: &'a mut [f32],
 }
 
 impl CubicRow<'_> {
-    /// Sums the four rows `4 y ..` of `sums` over `window` columns and solves the cubic for `width` columns.
+    /// Sums rows `4 y ..` of `sums` over `window` columns and solves the cubic for `width` columns.
     pub fn solve(
         &mut self,
         backend: crate::simd::Backend,
@@ -325,13 +314,12 @@ fn solve_generic<L: Lanes>(output: &mut CubicRow<'_>, sums: &Plane, y: usize, wi
     }
 }
 
-/// Window sums over seven columns, vector after vector: sums of two are shared between neighbouring lanes and vectors,
-/// so that four additions make a sum of seven.
+/// Window sums over seven columns: neighbouring lanes share sums of two, so that four additions make a sum of seven.
 struct Channel<L> {
     row: *const f32,
     here: L,
     next: L,
-    /// Each lane of `here` plus the one after.
+    /// Each lane of `here` plus the next.
     pairs: L,
 }
 
@@ -347,7 +335,7 @@ impl<L: Lanes> Channel<L> {
         }
     }
 
-    /// The sums that begin in the vector at `x`; `x` must grow by `N` from call to call, from 0.
+    /// The sums that begin in the vector at `x`; `x` must grow by `N` per call, from 0.
     ///
     /// # Safety
     /// 3 N + 1 numbers must be readable at `x`.
@@ -380,7 +368,7 @@ unsafe fn sum_of<L: Lanes>(p: *const f32, window: usize) -> L {
     }
 }
 
-/// The cubic's root ([`crate::cubic`], in vectors) and the misfit ([`confidence`]).
+/// The cubic's root ([`crate::cubic`], vectorised) and the misfit ([`confidence`]).
 #[inline(always)]
 fn root_and_misfit<L: Lanes>([c1, c3, c0, energy]: [L; 4]) -> [L; 2] {
     let [one, three] = [L::splat(1.0), L::splat(3.0)];
@@ -398,7 +386,7 @@ fn root_and_misfit<L: Lanes>([c1, c3, c0, energy]: [L; 4]) -> [L; 2] {
     let mut alpha = ratio.mul(above).mul(below.reciprocal_estimate());
     for _ in 0..STEPS {
         let square = alpha.mul(alpha);
-        // As here: the value that the divisor's estimate scales is exact.
+        // Likewise: the value that the estimate scales is exact.
         let slope = three_cubic.mul_add(square, one).max(L::splat(SLOPE_FLOOR));
         let value = cubic.mul(square).mul_add(alpha, alpha.sub(ratio));
         alpha = value.neg_mul_add(slope.reciprocal_estimate(), alpha);
@@ -408,8 +396,7 @@ fn root_and_misfit<L: Lanes>([c1, c3, c0, energy]: [L; 4]) -> [L; 2] {
 }
 
 dispatch! {
-    /// Texture to confidence in place ([`confidence::confidence`]); returns the numbers of low-texture pixels and of pixels
-    /// without any confidence.
+    /// Texture to confidence in place ([`confidence::confidence`]); counts pixels of low texture and none.
     fn confidence_row(texture: &mut [f32], misfit: &[f32], scale: f32) -> [usize; 2] = confidence_generic
 }
 
@@ -479,7 +466,7 @@ mod tests {
         }
     }
 
-    /// 17 million pixels in one row of work, as two threads have of a 34 MP image.
+    /// 17 million pixels in one row, as two threads have of a 34 MP image.
     #[test]
     fn counts_are_exact_beyond_what_one_float_can_count() {
         let misfit = vec![0.0; (1 << 24) + 1001];

@@ -1,7 +1,5 @@
-//! One small pair through the whole run time and the adaptive windows: every vector unit on every processor must give what
-//! AVX2 gave when the numbers below were written down.
-//!
-//! To write them down again, after a change of the mathematics, run the test and copy what it prints.
+//! One small pair through the run time and the adaptive windows: every vector unit must reproduce AVX2's numbers below.
+//! To update them, run the test and copy its output.
 
 use ndarray::Array2;
 
@@ -12,7 +10,7 @@ use crate::optics::{Optics, OpticsFile};
 use crate::pipeline::{Settings, depth_from_pair};
 use crate::prepare::noise::PairNoise;
 
-/// Depth in mm and confidence by the operators, and depth in mm by adaptive windows, at every place of [`places`].
+/// Depth in mm and confidence by the operators, and depth in mm by adaptive windows, at [`places`].
 const BY_AVX2: [[f32; 3]; 12] = [
     [911.0976, 0.47497717, 911.06824],
     [911.0176, 0.9499145, 911.0145],
@@ -28,9 +26,9 @@ const BY_AVX2: [[f32; 3]; 12] = [
     [911.1162, 0.48269677, 911.0288],
 ];
 
-/// mm: the depth is a 32-bit number near 900, which ends at 6e-5 mm; through all steps some ten of these.
+/// Depth is a 32-bit number near 900 with a resolution of 6e-5 mm; the steps add some ten of these.
 const DEPTH_TOLERANCE_MM: f32 = 2e-3;
-/// Of confidences, which lie between 0 and 1.
+/// Confidences are between 0 and 1.
 const CONFIDENCE_TOLERANCE: f32 = 2e-5;
 
 const SIZE: (usize, usize) = (61, 83);
@@ -39,7 +37,7 @@ fn places() -> impl Iterator<Item = (usize, usize)> {
     (0..BY_AVX2.len()).map(|i| (2 + 5 * i, 1 + (i * 37) % 81))
 }
 
-/// A texture, and the same blurred by three taps each way: as of a plane beyond the middle.
+/// A texture, and the same blurred by three taps each way: a plane beyond the middle.
 fn pair() -> [Array2<f32>; 2] {
     let value = |y: usize, x: usize| {
         let mut h = (y * 7919 + x * 104_729 + 1) as u64;

@@ -1,19 +1,17 @@
-//! Rows of the estimator with windows of several sizes: sums along rows, the cubic's root with its slope, and which window
-//! counts. Plain loops along rows, which the compiler turns into vectors of the unit at hand.
+//! Rows of the estimator with several window sizes: sums along rows, the cubic's root with its slope, and the choice of
+//! window. Plain loops along rows, vectorised by the compiler.
 
 use super::dispatch;
 use super::lanes::Lanes;
 use crate::reason::Reason;
 
-/// Largest |alpha| that is found.
 const LARGEST_ALPHA: f32 = 1.2;
 /// Slope of the cubic, relative to c1, below which Newton's step is shortened.
 const SLOPE_FLOOR: f32 = 0.05;
-/// Newton steps.
 const STEPS: usize = 3;
 
 dispatch! {
-    /// Sums over `window` columns: `values` has `window - 1` more than `sums`; `work` has room for twice as many.
+    /// Sums over `window` columns: `values` is `window - 1` longer than `sums`; `work` has twice the size.
     fn row_sums(values: &[f32], window: usize, work: &mut [f32], sums: &mut [f32]) = row_sums_generic
 }
 
@@ -46,22 +44,20 @@ fn row_sums_generic<L: Lanes>(values: &[f32], window: usize, work: &mut [f32], s
     }
 }
 
-/// Sums of a window along a row: the cubic's coefficients c0 to c3, and the energy of the matched filter.
+/// Window sums along a row: the cubic's coefficients c0 to c3, and the matched filter's energy.
 pub(crate) struct CubicSums<'a> {
     pub c: [&'a [f32]; 4],
     pub energy: &'a [f32],
 }
 
-/// What a window finds along a row.
 pub(crate) struct Found<'a> {
     pub alpha: &'a mut [f32],
-    /// Variance of alpha for noise of unit variance.
+    /// For noise of unit variance.
     pub variance: &'a mut [f32],
 }
 
 dispatch! {
-    /// Roots of `c0 + c1 a + c2 a^2 + c3 a^3` near `-c0 / c1`, with `c1` at least `floor` times the energy, and their variance:
-    /// the energy over the square of the slope.
+    /// Roots of `c0 + c1 a + c2 a^2 + c3 a^3` near `-c0 / c1`, `c1` at least `floor` energies, and their variance.
     fn roots(sums: CubicSums<'_>, floor: f32, found: Found<'_>) = roots_generic
 }
 
@@ -86,31 +82,28 @@ fn roots_generic<L: Lanes>(sums: CubicSums<'_>, floor: f32, found: Found<'_>) {
     }
 }
 
-/// Choice so far along a row.
 pub(crate) struct Choice<'a> {
     pub alpha: &'a mut [f32],
     pub variance: &'a mut [f32],
-    /// The values that all windows so far allow.
+    /// The values allowed by all windows so far.
     pub low: &'a mut [f32],
     pub high: &'a mut [f32],
     /// 1 while they intersect.
     pub open: &'a mut [f32],
 }
 
-/// How windows are weighed.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Weighing {
     /// Half width of a window's interval in standard deviations.
     pub gamma: f32,
     /// Added to the variance, because no window is exact.
     pub floor: f32,
-    /// Largest variance of a window that forbids anything.
+    /// Largest variance of a window that excludes values.
     pub largest: f32,
 }
 
 dispatch! {
-    /// Takes a larger window's value wherever it lies within what all smaller ones allow. `noise` is the variance by
-    /// which a window's own is multiplied.
+    /// Takes a larger window's value where all smaller ones allow it. `noise` multiplies a window's own variance.
     fn choose(alpha: &[f32], variance: &[f32], noise: &[f32], weighing: Weighing, choice: Choice<'_>) = choose_generic
 }
 
@@ -143,7 +136,7 @@ fn choose_generic<L: Lanes>(
 }
 
 dispatch! {
-    /// Takes a larger window's value where the present choice is less certain than required.
+    /// Takes a larger window's value where the present one is less certain than required.
     fn choose_safe(alpha: &[f32], variance: &[f32], noise: &[f32], largest: f32, chosen: &mut [f32], of_chosen: &mut [f32]) =
         choose_safe_generic
 }
@@ -168,7 +161,7 @@ fn choose_safe_generic<L: Lanes>(
 }
 
 dispatch! {
-    /// Difference and sum of a pair's row, less its mean and multiplied by the gain; 0 where a pixel has no value.
+    /// Difference and sum of a pair's row, minus the mean and times the gain; 0 where a pixel has no value.
     fn dimensionless_row(far: &[f32], near: &[f32], mean_and_gain: [f32; 2], to: [&mut [f32]; 2]) = dimensionless_generic
 }
 
@@ -190,7 +183,6 @@ fn dimensionless_generic<L: Lanes>(
 }
 
 dispatch! {
-    /// Adds the products of two rows.
     fn add_products(a: &[f32], b: &[f32], sums: &mut [f32]) = add_products_generic
 }
 
@@ -204,7 +196,6 @@ fn add_products_generic<L: Lanes>(a: &[f32], b: &[f32], sums: &mut [f32]) {
 }
 
 dispatch! {
-    /// Adds the products of the rows that come into the windows and subtracts those of the rows that go.
     fn move_products(gone: [&[f32]; 2], come: [&[f32]; 2], sums: &mut [f32]) = move_products_generic
 }
 
@@ -218,8 +209,7 @@ fn move_products_generic<L: Lanes>(gone: [&[f32]; 2], come: [&[f32]; 2], sums: &
 }
 
 dispatch! {
-    /// Widens variances by the part of the energy that is noise: `of_noise` times the noise, of which at least the part `least` of
-    /// the energy is left.
+    /// Increases variances for noise in the energy, `of_noise` times the noise; at least the part `least` remains.
     fn without_noise(energy: &[f32], noise: &[f32], of_noise_and_least: [f32; 2], variance: &mut [f32]) =
         without_noise_generic
 }
@@ -240,19 +230,18 @@ fn without_noise_generic<L: Lanes>(
     }
 }
 
-/// What the residual is compared with.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Residual {
     /// Its mean square for noise of unit variance, a polynomial in alpha^2.
     pub gain: [f32; 4],
-    /// Variance of the noise of a pixel of brightness b: `constant + per_unit b`.
+    /// Noise variance of a pixel of brightness b: `constant + per_unit b`.
     pub noise: [f32; 2],
-    /// And its least.
+    /// Lower limit of it.
     pub least_noise: f32,
 }
 
 dispatch! {
-    /// Square of the residual relative to that of noise, the square itself, and that of noise; `sum` is of the pair's brightness.
+    /// Squared residual relative to noise, the square itself, and that of noise; `sum` is of the pair's brightness.
     fn residual_row(of: Residual, rho: [&[f32]; 4], sum: &[f32], alpha: &[f32], to: [&mut [f32]; 3]) = residual_generic
 }
 
@@ -279,10 +268,9 @@ fn residual_generic<L: Lanes>(
     }
 }
 
-/// What turns a variance of alpha into a standard deviation of depth.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Deviation {
-    /// A factor of the variance.
+    /// Factor of the variance.
     pub gain: f32,
     /// The residual's mean square for noise of unit variance, a polynomial in alpha^2.
     pub of_residual: [f32; 4],
@@ -293,7 +281,6 @@ pub(crate) struct Deviation {
 }
 
 dispatch! {
-    /// Standard deviations of depth, mm.
     fn deviation_row(of: Deviation, alpha: &[f32], variance: &[f32], to: &mut [f32]) = deviation_generic
 }
 
@@ -309,7 +296,6 @@ fn deviation_generic<L: Lanes>(of: Deviation, alpha: &[f32], variance: &[f32], t
     }
 }
 
-/// `g0 + g1 x + g2 x^2 + g3 x^3`.
 #[inline(always)]
 fn polynomial(gain: [f32; 4], x: f32) -> f32 {
     ((gain[3] * x + gain[2]) * x + gain[1]) * x + gain[0]
@@ -383,7 +369,6 @@ fn probability(deviation: f32, misfit: f32) -> f32 {
 }
 
 dispatch! {
-    /// Sums of seven rows.
     fn sum_rows(rows: [&[f32]; 7], sums: &mut [f32]) = sum_rows_generic
 }
 
@@ -396,12 +381,10 @@ fn sum_rows_generic<L: Lanes>(rows: [&[f32]; 7], sums: &mut [f32]) {
     }
 }
 
-/// Sum of a row, of eight sums side by side.
 pub(crate) fn sum(values: &[f32]) -> f64 {
     sum_of(values, |value| value)
 }
 
-/// Sum of a row's squares.
 pub(crate) fn sum_of_squares(values: &[f32]) -> f64 {
     sum_of(values, |value| value * value)
 }

@@ -1,4 +1,4 @@
-//! Baselines on planes rendered in the Fourier domain, and on input that they must refuse or mark.
+//! Baselines on planes rendered in the Fourier domain, and on invalid input.
 #![allow(clippy::unwrap_used)] // Helpers of tests may fail like tests.
 
 use crate::common::{Texture, eight_bit, rig};
@@ -9,10 +9,8 @@ use farnear_depth::pipeline::{RunError, Settings, Warning};
 use ndarray::{Array2, Axis, concatenate, s};
 
 const SIDE: usize = 128;
-/// Filters and windows of the baselines reach at most this far.
 const BORDER: usize = 16;
 
-/// Root-mean-square error over planes through the range, mm.
 fn rmse_mm(method: Method, optics: &Optics, favaro: &Favaro, noise: bool) -> f64 {
     let alphas = [-1.0, -0.6, -0.2, 0.3, 0.7, 1.0];
     let squares = (0..).zip(alphas).map(|(seed, alpha)| {
@@ -33,8 +31,8 @@ fn rmse_mm(method: Method, optics: &Optics, favaro: &Favaro, noise: bool) -> f64
     (squares.sum::<f64>() / alphas.len() as f64).sqrt()
 }
 
-/// Limits are about 1.3 times what was measured. The two methods of Subbarao know only the PSF's second moment, hence their
-/// error without noise; for Gaussians the Fourier form would be exact but for its short window.
+/// Limits are about 1.3 times the measured values. Subbarao's methods use only the PSF's second moment, hence their
+/// error without noise; for Gaussians the Fourier form is limited by its short window.
 #[test]
 fn planes_come_out_at_their_depths() {
     for (psf, [moment, ratio, projector], [noisy_moment, noisy_ratio, noisy_projector]) in [
@@ -93,13 +91,11 @@ fn holes_and_blank_regions_are_marked() {
         let (blank, textured) = (map.confidence[(94, 94)], map.confidence[(40, 94)]);
         assert!(blank < 0.1 * textured, "{method}: {blank} {textured}");
         assert!(map.low_texture_fraction > 0.02, "{method}: {}", map.low_texture_fraction);
-        // Away from the holes and the blank region the depth holds.
         let depth = map.depth_mm[(48, 40)];
         assert!((f64::from(depth) - optics.depth_mm(0.4)).abs() < 2.5, "{method}: {depth}");
     }
 }
 
-/// What `pipeline::depth_from_pair` tells about a pair the baselines tell too, and they fill as it does.
 #[test]
 fn checks_and_filling_are_those_of_the_rational_operators() {
     let optics = rig("gaussian:k=0.4578");
@@ -121,7 +117,7 @@ fn checks_and_filling_are_those_of_the_rational_operators() {
         let depth = f64::from(map.depth_mm[(42, 42)]);
         assert!((depth - optics.depth_mm(0.4)).abs() < 2.5, "{method}: {depth}");
     }
-    // The lower half is nearer; given the wrong way round it is farther.
+    // The lower half is nearer; swapped, it is farther.
     let texture = Texture::sand(SIDE, 3);
     let [[far, near], [lower_far, lower_near]] =
         [-0.7, 0.7].map(|alpha| texture.pair(optics.psf(), optics.max_blur_px(), alpha));

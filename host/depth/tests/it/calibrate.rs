@@ -1,4 +1,4 @@
-//! PSF calibration and focus measures on images from the renderer, which shares no formula with this crate.
+//! PSF calibration and focus measures on images of the renderer, which shares no formula with this crate.
 #![allow(clippy::unwrap_used)] // Helpers of tests may fail like tests.
 
 use crate::common::rig;
@@ -16,7 +16,6 @@ use ndarray::Array2;
 
 const OPTICS: &str = "[lens]\nfocal_length_mm = 50.0\naperture_mm = 12.8\n[sensor]\npixel_um = 7.4\n[focus]\nfar_mm = 933.0\nmax_blur_px = 2.703\n";
 
-/// Far- and near-focused image of a plane.
 fn pair(depth_mm: f64, psf: &str, camera: &scene::Camera, seed: u64) -> [Array2<f32>; 2] {
     let lens = scene::Lens::from_optics(&scene::OpticsFile::parse(OPTICS).unwrap()).unwrap();
     let plane: scene::Scene = format!("plane:{depth_mm}").parse().unwrap();
@@ -66,7 +65,6 @@ fn psf_is_recovered_from_noisy_pairs() {
     }
 }
 
-/// Neither image need be sharp where the target's depth is known.
 #[test]
 fn a_target_off_the_foci_will_do_when_its_depth_is_given() {
     let optics = rig("pillbox");
@@ -76,9 +74,9 @@ fn a_target_off_the_foci_will_do_when_its_depth_is_given() {
     let of = |alpha| CapturedPair { far: far.view(), near: near.view(), alpha };
     let found = fit_psf(&[of(Some(alpha))], &optics, Model::Gaussian).unwrap();
     let Psf::Gaussian { k } = found.psf else { panic!("{}", found.psf) };
-    // A quarter of the pixels and a smaller difference of blur than at a focus.
+    // A quarter of the pixels and less difference of blur than at a focus.
     assert!((k - 0.4578).abs() < 0.004, "{k}");
-    // Taken for a target at the far focus, the pair shows less blur than it should.
+    // Assumed at the far focus, the pair shows too little blur.
     let Psf::Gaussian { k } = fit_psf(&[of(None)], &optics, Model::Gaussian).unwrap().psf else { panic!() };
     assert!(k < 0.42, "{k}");
 }
@@ -116,7 +114,7 @@ fn every_focus_measure_peaks_at_best_focus() {
     let psf: scene::Psf = "gaussian:k=0.4578".parse().unwrap();
     let renderer = scene::Renderer::new(&plane, &lens, &psf, &eight_bit(160, 120), 5).unwrap();
     let best_mm = lens.image_distance_mm(900.0).unwrap();
-    // The sweep does not stand on the best focus: its steps are 10 um and it is off by 3.7 um.
+    // The sweep misses the best focus by 3.7 um; its steps are 10 um.
     let places: Vec<f64> = (0..21).map(|i| 10.0 * f64::from(i - 10) - 3.7).collect();
     let images: Vec<_> = (0..)
         .zip(&places)
@@ -129,14 +127,13 @@ fn every_focus_measure_peaks_at_best_focus() {
         println!("{measure}: peak {found_um:+.2} um, best over 104 um out of focus {contrast:.2}");
         assert!(found_um.abs() < 2.0, "{measure}: {found_um} um");
         assert!(contrast > 1.3, "{measure}: {contrast}");
-        // One hill: from the best place the measure falls on either side, up to its noise.
+        // One hill: the measure falls on either side, up to its noise.
         for side in [&values[..=10], &values[10..].iter().rev().copied().collect::<Vec<_>>()] {
             assert!(side.windows(2).all(|pair| pair[1] > pair[0] * 0.99), "{measure}: {side:?}");
         }
     }
 }
 
-/// From images of flat targets to a correction: a lens with elliptical distortion, and depths that were not used.
 #[test]
 fn a_flat_series_teaches_a_correction() {
     let optics = rig("gaussian:k=0.4578");
@@ -179,8 +176,7 @@ fn a_flat_series_teaches_a_correction() {
     assert!(matches!(error, CalibrationError::FlatTarget { index: 0, .. }));
 }
 
-/// A free profile has the OTF of whatever blurred the pairs. Off by 0.002 at most was seen, with standard errors of 0.0005 to
-/// 0.001; the rest is what the renderer's pixels and aliases do.
+/// The largest error seen is 0.002, with standard errors of 0.0005 to 0.001; the renderer's aliases add the rest.
 #[test]
 fn a_free_profile_has_the_otf_of_whatever_blurred_the_pairs() {
     let optics = rig("pillbox");
@@ -215,7 +211,7 @@ fn a_free_profile_has_the_otf_of_whatever_blurred_the_pairs() {
     }
 }
 
-/// The spread of eight repetitions is known to 27 %, and other pixels than a ring's mean are weighed: within a factor of two.
+/// Eight repetitions give the spread to 27 %, and pixels are weighted differently: within a factor of two.
 #[test]
 fn standard_errors_are_those_of_repetition() {
     let optics = rig("pillbox");
@@ -270,7 +266,7 @@ fn a_shift_and_another_psf_are_told_from_noise() {
         assert_eq!(found.verdict(), Verdict::Good, "{model}");
         assert!((found.width() - 0.4578).abs() < 0.002, "{model}: {}", found.width());
     }
-    // A picture with few frequencies: chance is not taken for a lack of the model.
+    // With few frequencies chance must not count as model error.
     for seed in 0..4 {
         let small = pair(933.0, "gaussian:k=0.4578", &eight_bit(96, 72), seed);
         let found = fit(&small, Model::Gaussian);
@@ -281,7 +277,7 @@ fn a_shift_and_another_psf_are_told_from_noise() {
     assert_eq!(fit(&pair, Model::Gaussian).verdict(), Verdict::Unexplained);
     assert_ne!(fit(&pair, Model::Generalised).verdict(), Verdict::Unexplained);
     assert_eq!(fit(&pair, Model::Free).verdict(), Verdict::Good);
-    // Nothing is touched that the fit has to name.
+    // Unchanged, so that the fit reports it.
     let hole = [straight[0].clone(), straight[0].mapv(|_| f32::NAN)];
     assert!(made_ready(hole, &optics, Align::Auto).unwrap().0[1][(0, 0)].is_nan());
 }

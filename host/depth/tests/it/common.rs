@@ -1,7 +1,6 @@
-//! Textured planes rendered in the Fourier domain, independent of the spatial renderer of `hil-sim/scene`.
-//!
-//! A square texture with two samples per pixel (white noise blurred by a Gaussian of SD 0.5 px plus 30 % of 1/f noise,
-//! mean 1, contrast 0.2) is multiplied by the OTF and by the pixel's own, then sampled at the pixels.
+//! Textured planes rendered in the Fourier domain, independent of `hil-sim/scene`. A square texture with two samples
+//! per pixel (white noise blurred by a Gaussian of SD 0.5 px plus 30 % of 1/f noise, mean 1, contrast 0.2) is
+//! multiplied by the OTF and the pixel's own, then sampled at the pixels.
 #![allow(dead_code, clippy::unwrap_used)] // Each test file uses its part; helpers of tests may fail like tests.
 
 use std::f64::consts::PI;
@@ -31,13 +30,11 @@ pub fn rig(psf: &str) -> Optics {
     file.check().unwrap()
 }
 
-/// A normally distributed number (Box-Muller).
 pub fn normal(rng: &mut ChaCha8Rng) -> f64 {
     let [a, b]: [f64; 2] = [1.0 - rng.random::<f64>(), rng.random()];
     (-2.0 * a.ln()).sqrt() * (2.0 * PI * b).cos()
 }
 
-/// Two-dimensional transform instead of a square of side `n`, unscaled.
 fn transform(data: &mut [Complex64], n: usize, direction: FftDirection) {
     let fft = FftPlannerScalar::new().plan_fft(n, direction);
     for _ in 0..2 {
@@ -50,14 +47,13 @@ fn transform(data: &mut [Complex64], n: usize, direction: FftDirection) {
     }
 }
 
-/// A texture's spectrum, ready to be blurred.
 pub struct Texture {
     side_px: usize,
     spectrum: Vec<Complex64>,
 }
 
 impl Texture {
-    /// A texture of `side_px` x `side_px` pixels that repeats at its borders.
+    /// A texture of `side_px` x `side_px` pixels, periodic at its borders.
     pub fn sand(side_px: usize, seed: u64) -> Self {
         let n = 2 * side_px;
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
@@ -84,7 +80,7 @@ impl Texture {
         Self { side_px, spectrum }
     }
 
-    /// The same texture with a disc of even brightness in its middle.
+    /// The texture with a disc of uniform brightness in its middle.
     pub fn with_even_disc(mut self, radius_px: f64) -> Self {
         let n = 2 * self.side_px;
         transform(&mut self.spectrum, n, FftDirection::Inverse);
@@ -99,7 +95,6 @@ impl Texture {
         self
     }
 
-    /// The far- and near-focused images of a plane at `alpha`, mean 1.
     pub fn pair(&self, psf: Psf, max_blur_px: f64, alpha: f64) -> [Array2<f32>; 2] {
         let otf = psf.otf_up_to(2.0 * std::f64::consts::SQRT_2 * PI * max_blur_px);
         [1.0 + alpha, 1.0 - alpha].map(|factor| {
@@ -118,13 +113,13 @@ impl Texture {
     }
 }
 
-/// Frequency in cycles per pixel of the bin `i` of `n` at two samples per pixel.
+/// Cycles per pixel of bin `i` of `n` at two samples per pixel.
 fn frequency(i: usize, n: usize) -> f64 {
     let signed = if i > n / 2 { i as f64 - n as f64 } else { i as f64 };
     2.0 * signed / n as f64
 }
 
-/// The image (mean 1) as the camera delivers it in 8 bits.
+/// The image (mean 1) quantised to 8 bits.
 pub fn eight_bit(image: &Array2<f32>, seed: u64) -> Array2<f32> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let [full_well, level, read] = [20_000.0, 0.45, 12.0];

@@ -1,5 +1,4 @@
-//! Corrections of the elliptical distortion, through the public face: learned from a noisy series of flat targets,
-//! judged on other depths.
+//! Corrections learned from a noisy series of flat targets, tested at other depths.
 #![allow(clippy::unwrap_used)] // Helpers of tests may fail like tests.
 
 use farnear_depth::corrections::{CdcSettings, Correction, CorrectionError, Method, Pattern, fit};
@@ -11,7 +10,7 @@ use rand_chacha::ChaCha8Rng;
 
 const PATTERNS: usize = 24;
 const HELD_OUT: usize = 9;
-/// Error of a noisy 8-bit pair with a Gaussian PSF, 7x7 smoothing and a 3x3 median: 0.6 mm over 46.2 mm of alpha -1 to 1.
+/// Error of a noisy 8-bit pair, Gaussian PSF, 7x7 smoothing, 3x3 median: 0.6 mm of 46.2 mm for alpha -1 to 1.
 const NOISE_ALPHA: f64 = 0.6 / 23.1;
 
 fn optics() -> Optics {
@@ -19,13 +18,12 @@ fn optics() -> Optics {
     toml::from_str::<OpticsFile>(text).unwrap().check().unwrap()
 }
 
-/// Bowl around (0.65, 0.6) that is deeper at the far end, as in Li 2014, fig. 6.1; x and y in [0, 1].
+/// Bowl around (0.65, 0.6), deeper at the far end, as in Li 2014, fig. 6.1; x and y in [0, 1].
 fn distorted(alpha: f64, x: f64, y: f64) -> f64 {
     let rho2 = ((x - 0.65) / 0.75).powi(2) + ((y - 0.6) / 0.6).powi(2);
     alpha - 0.08 + 0.5 * (0.45 - 0.20 * alpha) * rho2
 }
 
-/// Sum over a window of 2n + 1 along rows or columns, borders repeated.
 fn box_sum(map: &Array2<f64>, n: isize, (down, right): (isize, isize)) -> Array2<f64> {
     let (h, w) = map.dim();
     Array2::from_shape_fn((h, w), |(y, x)| {
@@ -38,9 +36,9 @@ fn box_sum(map: &Array2<f64>, n: isize, (down, right): (isize, isize)) -> Array2
     })
 }
 
-/// Noise of SD 1 with the correlation that smoothing over 7x7 and then 3x3 pixels leaves.
+/// Noise of SD 1 with the correlation of 7x7 and 3x3 smoothing.
 fn noise(dim: (usize, usize), rng: &mut ChaCha8Rng) -> Array2<f64> {
-    // Uniform numbers: the sums over 441 of them below are normal.
+    // Uniform numbers: sums over 441 of them are normal.
     let mut map = Array2::from_shape_fn(dim, |_| rng.random::<f64>() - 0.5);
     for n in [3, 1] {
         map = box_sum(&box_sum(&map, n, (0, 1)), n, (1, 0));
@@ -49,7 +47,6 @@ fn noise(dim: (usize, usize), rng: &mut ChaCha8Rng) -> Array2<f64> {
     map / sd
 }
 
-/// The measured depth map of a flat target at `true_mm`.
 fn target(optics: &Optics, true_mm: f64, dim: (usize, usize), rng: &mut ChaCha8Rng) -> Array2<f32> {
     let (h, w) = dim;
     let noise = noise(dim, rng);
@@ -118,7 +115,7 @@ fn held_out_depths_come_out_flat() {
     }
 }
 
-/// Without noise what is left at the borders between regions is the step that the method makes.
+/// Without noise, the method's own step is left at the seams.
 #[test]
 fn blending_leaves_no_step_at_the_seams() {
     let series = Series::new((240, 320), 2);
@@ -132,7 +129,7 @@ fn blending_leaves_no_step_at_the_seams() {
                 optics.depth_mm(distorted(optics.alpha(true_mm), x, y)) as f32
             });
             let corrected = correction.apply(raw.view()).unwrap();
-            // Regions end at a third and two thirds; also look at the centres, where the blend changes its pair.
+            // Regions end at a third and two thirds; at the centres the blend changes its pair.
             for column in [53, 106, 160, 213, 266] {
                 for row in 0..240 {
                     largest = largest.max((corrected[(row, column)] - corrected[(row, column - 1)]).abs());
@@ -177,7 +174,7 @@ fn the_board_agrees_to_five_micrometres() {
     }
 }
 
-/// The board fits with integers, on a subsample: what it finds corrects as well as what the host finds.
+/// The board fits with integers on a subsample: equally good as the host's fit.
 #[test]
 fn the_boards_own_fit_is_as_good() {
     use farnear_maths::clsf::{Columns, DepthScale, Frame, Full, FullFit, RegionFit, Regions};
@@ -265,7 +262,6 @@ fn holes_stay_holes_and_nothing_is_invented_beyond_the_scale() {
             assert!(corrected[place].is_nan(), "{method} {place:?}: {}", corrected[place]);
         }
         assert!(corrected.slice(ndarray::s![20.., ..]).iter().all(|depth| depth.is_finite()), "{method}");
-        // Another memory layout is the same map.
         let mut turned = map.t().to_owned();
         correction.apply_in_place(turned.view_mut().reversed_axes()).unwrap();
         assert!(

@@ -1,4 +1,4 @@
-//! Every family, design, kernel size, blur and PSF gives usable operators, and they survive being stored.
+//! Every family, design, kernel size, blur and PSF gives usable operators, also after storage.
 #![allow(clippy::unwrap_used)] // Helpers of tests may fail like tests.
 
 use crate::common::{Texture, rig};
@@ -10,7 +10,6 @@ use farnear_depth::pipeline::{Settings, depth_from_pair};
 use farnear_depth::psf::Psf;
 use ndarray::Array2;
 
-/// RMSE relative to half the working range over planes through it, without noise.
 fn relative_rmse(operators: &Operators, optics: &Optics) -> f64 {
     let texture = Texture::sand(128, 3);
     let alphas = [-0.95, -0.5, 0.3, 0.8];
@@ -29,15 +28,13 @@ fn relative_rmse(operators: &Operators, optics: &Optics) -> f64 {
     (squares / alphas.len() as f64).sqrt()
 }
 
-/// The rig with another blur and PSF.
 fn optics(psf: &str, max_blur_px: f64) -> Optics {
     let mut file = OpticsFile::from(rig(psf));
     file.focus.max_blur_px = Some(max_blur_px);
     file.check().unwrap()
 }
 
-/// Limits: 0.01 is 0.23 mm of the rig's 46 mm. The linear design is the most accurate, the published procedures
-/// leave more to the cubic.
+/// 0.01 is 0.23 mm of the rig's 46 mm. The linear design is the most accurate.
 #[test]
 fn every_family_and_design_measures_depth() {
     for (family, how, psf, limit) in [

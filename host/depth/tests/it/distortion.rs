@@ -1,4 +1,4 @@
-//! A lens that bends lines: taken out of both images, and a shift between them still found.
+//! Lens distortion is corrected in both images, and a shift between them is still found.
 #![allow(clippy::unwrap_used)] // Helpers of tests may fail like tests.
 
 use farnear_depth::optics::{Distortion, Optics, OpticsFile};
@@ -6,7 +6,7 @@ use farnear_depth::prepare::{PrepareSettings, prepare};
 use ndarray::Array2;
 
 const SIZE: (usize, usize) = (160, 200);
-/// Shift of the near image as a lens without distortion would show it, px.
+/// Shift of the near image without distortion, px.
 const SHIFT: [f64; 2] = [0.6, -0.4];
 
 fn optics() -> Optics {
@@ -17,7 +17,6 @@ fn optics() -> Optics {
     toml::from_str::<OpticsFile>(text).unwrap().check().unwrap()
 }
 
-/// A texture that is known at every place: waves of all directions.
 fn scene([x, y]: [f64; 2]) -> f64 {
     let wave = |i: f64| {
         let (direction, frequency) = (2.4 * i, 0.25 + 0.011 * i);
@@ -26,7 +25,7 @@ fn scene([x, y]: [f64; 2]) -> f64 {
     (0..60).map(|i| wave(f64::from(i))).sum::<f64>() + 0.5
 }
 
-/// Where a lens without distortion would show what this one shows at a pixel: the model inverted by repetition.
+/// Position without distortion: the model inverted by iteration.
 fn straight(distortion: &Distortion, pixel: [f64; 2]) -> [f64; 2] {
     let mut place = pixel;
     for _ in 0..20 {
@@ -59,7 +58,7 @@ fn a_distorted_and_shifted_pair_is_straight_and_aligned() {
             squares += (f64::from(image[(y, x)]) - scene([x as f64, y as f64])).powi(2);
         }
         let rms = (squares / middle().count() as f64).sqrt();
-        // The texture's own is 0.16. Interpolation and the alignment's last hundredths of a pixel leave about a hundredth of it.
+        // The texture's own is 0.16. Interpolation and alignment error leave about a hundredth of it.
         assert!(rms < 0.004, "{rms}");
     }
 }

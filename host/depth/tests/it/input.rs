@@ -1,4 +1,4 @@
-//! What input is refused, what is marked as invalid, and what must not matter.
+//! Rejected input, invalid pixels, and irrelevant differences.
 
 #![allow(clippy::unwrap_used)] // Helpers of tests may fail like tests.
 

@@ -1,4 +1,4 @@
-//! Behaviour of the crate through its public face, in one program, because each would be linked on its own.
+//! Public behaviour of the crate, in one program to link once.
 
 mod baselines;
 mod calibrate;

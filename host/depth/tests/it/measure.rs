@@ -1,4 +1,4 @@
-//! Pairs as an ordinary camera takes them: aligned, balanced, judged.
+//! Pairs of an ordinary camera: alignment, brightness, validity.
 #![allow(clippy::unwrap_used)] // Helpers of tests may fail like tests.
 
 use crate::common::rig;
@@ -17,7 +17,6 @@ use ndarray::Array2;
 const SIZE: (usize, usize) = (320, 240);
 const PSF: &str = "gaussian:k=0.4578";
 
-/// A pair with its truth, values 0 to 1.
 struct Pair {
     far: Array2<f32>,
     near: Array2<f32>,
@@ -70,11 +69,10 @@ fn measure_with(pair: &Pair, optics: &Optics, window: Window) -> Result<Measurem
     measure_pair_of_views(far, near, optics, DepthMethod::Whitened, None, &settings(window))
 }
 
-/// Root mean square error in the middle, and the part of it that has a depth.
 fn error(found: &Array2<f32>, pair: &Pair) -> (f64, f64) {
     let middle = ndarray::s![24..SIZE.1 - 24, 24..SIZE.0 - 24];
     let mut errors = &found.slice(middle) - &pair.truth.slice(middle);
-    // Nine pixels on either side of a step see two depths.
+    // Nine pixels on either side of a step contain two depths.
     let truth = pair.truth.slice(middle);
     for ((y, x), error) in errors.indexed_iter_mut() {
         let near = x.saturating_sub(9)..(x + 10).min(truth.ncols());
@@ -88,7 +86,7 @@ fn error(found: &Array2<f32>, pair: &Pair) -> (f64, f64) {
     ((squares / valid.len() as f64).sqrt(), valid.len() as f64 / errors.len() as f64)
 }
 
-/// The study's figures for the same windows: 0.60 to 0.65 mm for rational operators, 0.28 mm and less for adaptive windows.
+/// The study's figures: 0.60 to 0.65 mm for rational operators, at most 0.28 mm for adaptive ones.
 #[test]
 fn adaptive_windows_take_most_of_the_noise() {
     for (psf, limit) in [("pillbox", 0.30), (PSF, 0.30), ("generalised:p=1.8,k=0.4802", 0.32)] {
@@ -141,7 +139,7 @@ fn a_good_pair_goes_through_untouched() {
     }
 }
 
-/// Aims of the measured page for these: 0.75 mm on 640x480; smaller images know their gain and geometry a little less well.
+/// Aims of the measured page: 0.75 mm on 640x480; smaller images determine gain and geometry less well.
 #[test]
 fn geometry_and_brightness_are_mended() {
     let view = |shift: f64, magnification, rotation_deg| View {
@@ -190,7 +188,7 @@ fn a_lens_that_is_not_telecentric_is_noticed() {
     println!("{:?} {:?}", found.findings, found.report);
     assert!(found.findings.iter().any(|f| f.to_string().contains("not telecentric")), "{:?}", found.findings);
     let swapped = Pair { far: pair.near, near: pair.far, truth: pair.truth };
-    // Only for a lens that is stated not to be telecentric: other lenses breathe for other reasons.
+    // Only for an explicitly non-telecentric lens: other lenses breathe for other reasons.
     let mut file = farnear_depth::optics::OpticsFile::from(rig(PSF));
     file.lens.telecentric = Some(false);
     let found = measure_with(&swapped, &file.check().unwrap(), Window::Fixed(7)).unwrap();
@@ -225,7 +223,7 @@ fn what_moved_has_no_depth() {
     assert!(marked > 80 * 100 * 8 / 10 && mm < 0.9 && valid > 0.6, "{mm} {valid} {marked}");
 }
 
-/// A blur of 8 px turns the sign of fine detail in one of the images; nothing moves.
+/// A blur of 8 px inverts fine detail in one image; nothing moves.
 #[test]
 fn too_much_blur_is_not_called_motion() {
     let optics = rig("pillbox");
@@ -256,7 +254,7 @@ fn single_saturated_pixels_are_lost_alone() {
     assert!(mm < 0.75 && valid > 0.99, "{mm} {valid}");
 }
 
-/// Probability of a confident depth that is off by more than three of its deviations: below 1 %.
+/// Probability of a confident depth off by more than three deviations: below 1 %.
 #[test]
 fn nothing_is_confident_outside_the_range() {
     for (seed, depth) in
@@ -329,7 +327,7 @@ fn what_is_asked_for_is_done() {
     );
 }
 
-/// Part of the depths that are off by more than three of their own deviations (and by more than rounding).
+/// Part of the depths off by more than three of their deviations (and by more than rounding).
 fn beyond_three(found: &Measurement, pair: &Pair) -> [f64; 3] {
     let [mut wrong, mut valid, mut squares] = [0.0; 3];
     for (at, depth) in found.map.depth_mm.indexed_iter().filter(|(_, d)| d.is_finite()) {
@@ -364,7 +362,6 @@ fn a_shrunken_near_image_makes_no_confident_plateau_outside_the_range() {
     }
 }
 
-/// Median deviation (mm) and mean confidence.
 fn claimed(found: &Measurement) -> [f32; 2] {
     let mut deviations: Vec<f32> =
         found.validity.deviation_mm.iter().copied().filter(|d| d.is_finite()).collect();
@@ -372,7 +369,7 @@ fn claimed(found: &Measurement) -> [f32; 2] {
     [deviations[deviations.len() / 2], found.map.confidence.mean().unwrap()]
 }
 
-/// A wrong width alone cannot be seen in one pair of a plane; a wrong shape leaves a residual, which must count.
+/// One pair of a plane cannot reveal a wrong width; a wrong shape leaves a residual, which must count.
 #[test]
 fn what_the_model_leaves_unexplained_widens_the_deviation_and_lowers_the_confidence() {
     let pair = pair("plane:925", "pillbox", Noise::EightBit, &lens(), View::default(), 90);

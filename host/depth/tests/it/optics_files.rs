@@ -1,5 +1,5 @@
-//! `optics.toml` is read here and by the renderer, each with its own formulas: both must take the same files for the same
-//! numbers, and refuse the same ones in the same words.
+//! This crate and the renderer read `optics.toml` with their own formulas: both must accept the same files for the same
+//! numbers and reject the same ones with the same messages.
 #![allow(clippy::unwrap_used)] // Helpers of tests may fail like tests.
 
 use farnear_depth::optics::{Optics, OpticsFile};
@@ -37,7 +37,7 @@ fn good_files_mean_the_same() {
             (range.far_mm, there.far_mm),
             (range.near_mm, there.near_mm),
         ] {
-            // Two ways through the thin lens differ by rounding, magnified by distances over differences.
+            // Two evaluations of the thin lens differ by rounding, magnified by distances over differences.
             assert!((a / b - 1.0).abs() < 1e-9, "{a} {b} for {text}");
         }
     }
@@ -65,7 +65,7 @@ fn bad_files_are_refused_in_the_same_words() {
     }
 }
 
-/// Syntax and PSF come by different ways (the place in the file is told here), but with the same facts.
+/// Syntax and PSF errors differ in wording (this one gives the place in the file), but not in facts.
 #[test]
 fn both_tell_the_facts_of_what_cannot_be_read() {
     for (text, fact) in [

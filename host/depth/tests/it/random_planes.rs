@@ -1,4 +1,4 @@
-//! Random planes in and out of the range, with near images of another size: no confident wrong depth.
+//! Random planes in and out of the range, with resized near images: no confident wrong depth.
 #![allow(clippy::unwrap_used)] // Helpers of tests may fail like tests.
 
 use crate::common::rig;
@@ -15,12 +15,11 @@ const SIZE: (usize, usize) = (128, 96);
 const PSF: &str = "gaussian:k=0.4578";
 /// Combinations without `FARNEAR_RANDOM_PLANES`.
 const USUAL: u64 = 24;
-/// Confidence from which a depth is a statement.
 const CONFIDENT: f32 = 0.5;
-/// Error that does not matter even where the predicted deviation is smaller, mm.
+/// Negligible error even with a smaller predicted deviation, mm.
 const NEGLIGIBLE_MM: f32 = 1.5;
 
-/// `FARNEAR_RANDOM_PLANES=1000` is the campaign.
+/// Set `FARNEAR_RANDOM_PLANES=1000` for the campaign.
 #[test]
 fn random_planes_and_magnifications_give_no_confident_wrong_plateau() {
     let count = std::env::var("FARNEAR_RANDOM_PLANES").map_or(USUAL, |text| text.parse().unwrap());

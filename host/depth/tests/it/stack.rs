@@ -1,15 +1,15 @@
-//! Depth from focus where a bright, rich thing stands before a dull wall with a blank disc.
+//! Depth from focus with a bright, textured object before a dull wall with a blank disc.
 
 use farnear_depth::focus_stack::{StackMap, StackSettings, depth_from_stack};
 use ndarray::{Array2, ArrayView2};
 
 const IMAGES: usize = 12;
 const SIZE: (usize, usize) = (80, 160);
-/// The thing ends at this column.
+/// The object ends at this column.
 const EDGE: usize = 60;
 const THING: f32 = 3.0;
 const WALL: f32 = 8.0;
-/// Row, column and radius of the disc; its middle lies beyond the reach of what measures sharpness.
+/// Row, column and radius of the disc; its middle is beyond the measure's reach.
 const DISC: [usize; 3] = [40, 115, 14];
 
 fn in_disc(y: usize, x: usize) -> bool {
@@ -17,7 +17,7 @@ fn in_disc(y: usize, x: usize) -> bool {
     y.abs_diff(row).pow(2) + x.abs_diff(column).pow(2) <= radius * radius
 }
 
-/// Texture fades with the distance from where it is sharpest, as blur makes it; every image has its own noise.
+/// Texture fades with the distance from its sharpest image, as by blur; every image has its own noise.
 fn stack() -> Vec<Array2<f32>> {
     let image = |number: usize| {
         Array2::from_shape_fn(SIZE, |(y, x)| {
@@ -42,7 +42,6 @@ fn measured(images: &[Array2<f32>], guided_px: f32, min_reliability: f32) -> Sta
     depth_from_stack(&views, &settings).expect("a stack")
 }
 
-/// Part of some columns whose place is the wall's.
 fn of_the_wall(map: &StackMap, columns: std::ops::Range<usize>) -> f64 {
     let places: Vec<f32> = map.place.slice(ndarray::s![8..72, columns]).iter().copied().collect();
     places.iter().filter(|place| (**place - WALL).abs() < 0.5).count() as f64 / places.len() as f64
@@ -52,12 +51,12 @@ fn of_the_wall(map: &StackMap, columns: std::ops::Range<usize>) -> f64 {
 fn a_thing_does_not_grow_over_the_dull_wall_behind_it() {
     let images = stack();
     let [plain, guided] = [0.0, 10.0].map(|reach| measured(&images, reach, 0.0));
-    // Without correcting the thing reaches to column 65, where the median over places begins to mix both.
+    // Uncorrected, the object reaches to column 65, where the median begins to mix places.
     let strip = EDGE..EDGE + 5;
     assert!(of_the_wall(&plain, strip.clone()) < 0.5, "{}", of_the_wall(&plain, strip));
     assert!(of_the_wall(&guided, strip.clone()) > 0.95, "{}", of_the_wall(&guided, strip));
     assert_eq!(of_the_wall(&guided, 8..EDGE - 1), 0.0, "the thing keeps its own");
-    // What the edge does not reach stays to the bit.
+    // Beyond the edge's reach everything is bit-identical.
     let away = ndarray::s![8..72, 8..EDGE - 16];
     assert_eq!(plain.place.slice(away), guided.place.slice(away));
     assert_eq!(plain.reliability, guided.reliability, "mending makes nothing more reliable");

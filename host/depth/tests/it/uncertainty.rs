@@ -1,4 +1,4 @@
-//! Predicted against measured standard deviation over repeated noisy images of textured planes.
+//! Predicted and measured standard deviation over repeated noisy images of textured planes.
 #![allow(clippy::unwrap_used)] // Helpers of tests may fail like tests.
 
 use crate::common::{Texture, eight_bit, rig};
@@ -7,7 +7,6 @@ use farnear_depth::pipeline::{Settings, depth_from_pair};
 use farnear_depth::uncertainty::{Noise, standard_deviation_mm};
 use ndarray::{Array2, s};
 
-/// Root mean squares over the inner pixels of the predicted and the measured standard deviation, mm.
 fn predicted_and_measured(psf: &str, alpha: f64, settings: &Settings, noise: Noise) -> [f64; 2] {
     const REPEATS: usize = 12;
     const SIDE_PX: usize = 96;

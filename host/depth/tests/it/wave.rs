@@ -1,4 +1,4 @@
-//! A lens by wave optics, which no model of this crate contains, calibrated by its z-stack and judged on other scenes.
+//! A wave-optics lens, which no model of this crate contains, calibrated by its z-stack and tested on other scenes.
 #![allow(clippy::unwrap_used)] // Helpers of tests may fail like tests.
 
 use std::f64::consts::PI;
@@ -11,7 +11,6 @@ use farnear_depth::pipeline::Settings;
 use farnear_scene::wave::{WaveLens, random_texture};
 use ndarray::{Array2, s};
 
-/// Width and height, px.
 const SIZE: [usize; 2] = [208, 160];
 /// Defocus on the image side per step of the stage: 0.6 px of blur.
 const STEP_UM: f64 = 29.0;
@@ -26,7 +25,7 @@ fn lens(spherical_waves: f64, astigmatism_waves: f64) -> WaveLens {
     WaveLens { f_number: 4.0, pixel_um: 6.0, light, spherical_waves, astigmatism_waves }
 }
 
-/// A plane: the slice in focus in the middle, and its change over the width and the height.
+/// The slice in focus in the middle, and its change over width and height.
 #[derive(Clone, Copy)]
 struct Plane([f64; 3]);
 
@@ -37,7 +36,7 @@ impl Plane {
     }
 }
 
-/// The slice `index` of a target, 8 bit, values 0 to 1. `best_um` is the defocus of the sharpest image.
+/// Slice `index` of a target, 8 bit, values 0 to 1. `best_um` is the defocus of the sharpest image.
 fn slice(
     lens: &WaveLens,
     cells: &Array2<f32>,
@@ -67,11 +66,9 @@ fn calibrated(lens: &WaveLens) -> Result<StackLens, StackError> {
     calibrate_stack(&stack, &settings)
 }
 
-/// What other scenes show.
 #[derive(Debug)]
 struct Judged {
     rms_mm: f64,
-    /// Root mean square over the pairs of what no estimator with windows of 21 px can be below.
     bound_mm: f64,
     within_three: f64,
     scatter: f64,
@@ -131,7 +128,6 @@ fn judged(lens: &WaveLens, found: &StackLens, sand: bool) -> Judged {
     let [mut squares, mut relative, mut within, mut valid, mut all] = [0.0; 5];
     let mut bounds = Vec::new();
     for (number, alpha) in [-0.6, -0.2, 0.15, 0.55_f64].into_iter().enumerate() {
-        // The slice in focus that has this normalised depth for the pair (4, 4 + step).
         let middle = 4.0 + 0.5 * (1.0 + alpha) * step as f64 - zero;
         let plane = Plane([middle, -0.4, 0.5]);
         let cells = random_texture(sand, SIZE[0], SIZE[1], CONTRAST, 50 + number as u64);
@@ -165,11 +161,11 @@ fn judged(lens: &WaveLens, found: &StackLens, sand: bool) -> Judged {
     }
 }
 
-/// Figures reached are printed and are in docs/calibrate-stack.md. `FARNEAR_WAVE_LENSES=all` adds half a wave with astigmatism.
+/// Prints the figures of docs/calibrate-stack.md. `FARNEAR_WAVE_LENSES=all` adds half a wave with astigmatism.
 #[test]
 fn a_lens_by_wave_optics_is_calibrated_by_its_stack_and_measures_other_scenes_honestly() {
-    // Spherical aberration and astigmatism, waves, and the largest RMSE relative to the bound: one response cannot make up for sides of
-    // focus that differ, and the deviation must say so.
+    // Spherical aberration and astigmatism, waves, and the largest RMSE relative to the bound: one response cannot
+    // compensate sides of focus that differ, and the deviation must reflect it.
     let mut lenses = vec![(0.0, 0.0, 1.5), (1.0, 0.0, 5.0)];
     if std::env::var("FARNEAR_WAVE_LENSES").is_ok_and(|text| text == "all") {
         lenses.push((0.5, 0.15, 5.0));

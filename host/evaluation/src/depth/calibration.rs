@@ -1,4 +1,4 @@
-//! How well the point spread function is found from noisy pairs, like Li 2014, sections 5.2.1 and 5.2.2.
+//! Accuracy of point spread functions from noisy pairs, as in Li 2014, sections 5.2.1 and 5.2.2.
 
 use anyhow::Result;
 use farnear_depth::{

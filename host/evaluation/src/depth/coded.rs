@@ -1,4 +1,4 @@
-//! A coded aperture: operators from an image of it.
+//! Coded aperture: operators from an image of it.
 
 use anyhow::Result;
 use farnear_depth::{
@@ -15,10 +15,9 @@ use crate::{
 
 const SEED: u64 = 1_700;
 const PLANES: usize = 8;
-/// Side of the image, px.
 const IMAGE_PX: usize = 128;
 
-/// An image of a round aperture whose middle is covered up to `inner` of its radius: 255 where light comes through.
+/// Round aperture covered up to `inner` of its radius; 255 is open.
 fn aperture(inner: f64) -> Array2<f32> {
     let middle = 0.5 * (IMAGE_PX as f64 - 1.0);
     Array2::from_shape_fn((IMAGE_PX, IMAGE_PX), |(y, x)| {

@@ -1,4 +1,4 @@
-//! Corrections of the elliptical distortion, judged on depths that taught them nothing, like Li 2014, fig. 6.4 and table 5.2.
+//! Corrections of the elliptical distortion, measured on unseen depths (Li 2014, fig. 6.4, table 5.2).
 
 use anyhow::{Context, Result};
 use farnear_depth::{
@@ -21,7 +21,7 @@ const PATTERNS: usize = 24;
 const HELD_OUT: usize = 9;
 const SEED: u64 = 400;
 const PSF: &str = "gaussian:k=0.4578";
-/// Regions of the 3x3 methods end here; what a row jumps by at these columns is their step.
+/// Borders of the 3x3 methods' regions.
 const SEAMS: [usize; 2] = [213, 426];
 
 struct Plane {
@@ -29,7 +29,6 @@ struct Plane {
     depth_mm: Array2<f32>,
 }
 
-/// How a correction did on one plane.
 struct PlaneError {
     true_mm: f64,
     rmse_mm: f64,
@@ -78,7 +77,6 @@ pub fn measure(page: &mut Page) -> Result<()> {
     errors_of_the_middle_plane(page, &judge[HELD_OUT / 2], &corrections)
 }
 
-/// Every correction, and CDC also by patterns as measured.
 fn learned(planes: &[Plane]) -> Result<Vec<(String, Correction)>> {
     let patterns: Vec<Pattern<'_>> =
         planes.iter().map(|p| Pattern { depth_mm: p.depth_mm.view(), true_mm: p.true_mm }).collect();
@@ -93,7 +91,6 @@ fn learned(planes: &[Plane]) -> Result<Vec<(String, Correction)>> {
         .collect()
 }
 
-/// Pictures of the errors before and after two of the corrections.
 fn errors_of_the_middle_plane(
     page: &mut Page,
     plane: &Plane,
@@ -114,7 +111,6 @@ fn errors_of_the_middle_plane(
     page.picture("accuracy-distortion.png", &panels::row(&panels)?, &caption)
 }
 
-/// Renders and measures planes seen through the distorted lens.
 fn planes(depths: &[f64], seed: u64) -> Result<Vec<Plane>> {
     let optics = rig::optics(PSF)?;
     let operators = Operators::for_optics(&optics)?;
@@ -126,7 +122,7 @@ fn planes(depths: &[f64], seed: u64) -> Result<Vec<Plane>> {
     depths.par_iter().enumerate().map(one).collect()
 }
 
-/// The map with the rendered distortion taken back, pixel by pixel.
+/// The map without the rendered distortion.
 fn undone(map: &Array2<f32>, optics: &Optics) -> Array2<f32> {
     let lens = EllipticalDistortion::default();
     let (height, width) = map.dim();
@@ -148,7 +144,7 @@ fn errors(planes: &[Plane]) -> Result<Vec<PlaneError>> {
     planes.iter().map(one).collect()
 }
 
-/// Root mean square and largest of the mean jumps across the vertical borders of the regions, mm.
+/// RMS and largest mean jump across the vertical borders of the regions, mm.
 fn steps(planes: &[Plane]) -> [f64; 2] {
     let mut steps = Vec::new();
     for Plane { depth_mm: map, .. } in planes {

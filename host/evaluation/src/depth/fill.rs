@@ -1,4 +1,4 @@
-//! A textureless disc on a textured surface, filled from what surrounds it.
+//! A textureless disc on a textured surface, filled from its surroundings.
 
 use anyhow::Result;
 use farnear_depth::{
@@ -23,9 +23,8 @@ const TEXTURE: (usize, usize) = (1280, 960);
 const CENTRE: (f64, f64) = (190.0, 420.0);
 const RADIUS_PX: f64 = 40.0;
 const SCENES: [&str; 4] = ["plane:905", "slant", "cone", "sphere"];
-/// Ways of filling, and without.
 const COLUMNS: usize = 5;
-/// A threshold of the variance of the ratio that lies between that of the disc and of the texture, and the thesis' own.
+/// Thresholds of the ratio's variance: between those of disc and texture, and the thesis'.
 const SUITED: f32 = 1e-4;
 const OF_THESIS: f32 = 0.0144;
 const REPEATS: u64 = 3;
@@ -79,11 +78,10 @@ pub fn measure(page: &mut Page) -> Result<()> {
     Ok(())
 }
 
-/// Sand at two samples per pixel, flat inside the disc.
 fn sand_with_disc(repeat: u64) -> Result<Picture> {
     let lens = rig::lens(false)?;
     let camera = Camera::new(TEXTURE.0, TEXTURE.1, Noise::None);
-    // At its focus the surface is imaged sharply.
+    // In focus the surface is sharp.
     let scene = rig::plane(lens.far_mm)?;
     let renderer = Renderer::new(&scene, &lens, &"pillbox".parse()?, &camera, SEED + repeat)?;
     let mut sand = renderer.radiance(lens.sensor_far_mm)?;
@@ -99,8 +97,8 @@ fn distance_px(row: f64, column: f64) -> f64 {
     (row - CENTRE.0).hypot(column - CENTRE.1)
 }
 
-/// RMSE inside the disc in mm and the part of the map that was filled: without filling, filled, as the thesis by the energy, by its
-/// criterion with either threshold.
+/// RMSE inside the disc in mm and the filled share: without filling, filled, and by the thesis' criterion
+/// with either threshold.
 fn one(
     psf: &str,
     scene: &str,
@@ -121,7 +119,7 @@ fn one(
         let filled = map.filled.iter().flatten().filter(|filled| **filled).count();
         let settings = CompareSettings::default();
         let error = compare(map.depth_mm.view(), pair.truth.view(), Some(disc.view()), &settings);
-        // Nothing inside has a depth: there is no error to state.
+        // Without a depth inside there is no error.
         Ok((error.map_or(f64::NAN, |error| error.rmse_mm), filled as f64 / disc.len() as f64))
     };
     let (energy, surface, thesis) = (LowTexture::Energy, FillBy::Surface, FillBy::Thesis);

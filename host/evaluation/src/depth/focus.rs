@@ -14,7 +14,6 @@ use crate::{
 
 const SEED: u64 = 1_800;
 const PSF: &str = "gaussian:k=0.4578";
-/// Images, and the sensor's travel from one to the next; their middle is the pair's.
 const IMAGES: usize = 21;
 const STEP_MM: f64 = 0.015;
 const WINDOWS_PX: [usize; 4] = [7, 9, 15, 21];
@@ -63,7 +62,7 @@ pub fn measure(page: &mut Page) -> Result<()> {
     Ok(())
 }
 
-/// Distance at which the lens is sharp for a place in the stack, by the thin lens.
+/// In-focus distance at a place in the stack, by the thin lens.
 fn depth_mm(place: f64, first_mm: f64, focal_mm: f64) -> f64 {
     let sensor_mm = first_mm + STEP_MM * place;
     focal_mm * sensor_mm / (sensor_mm - focal_mm)

@@ -1,4 +1,4 @@
-//! What larger operators buy, the question with which Li 2014 ends.
+//! Gain of larger operators, the open question of Li 2014.
 
 use anyhow::Result;
 use farnear_depth::{

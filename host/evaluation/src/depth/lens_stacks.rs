@@ -1,4 +1,4 @@
-//! Z-stacks of real lenses: a lens learned on the left half of the target by `calibrate stack`, judged on the right half.
+//! Z-stacks of real lenses, learned on the target's left half by `calibrate stack`, measured on the right.
 
 use std::path::Path;
 
@@ -15,9 +15,9 @@ use ndarray::{Array2, s};
 
 use crate::page::Page;
 
-/// Binning of the stored slices, slices between the images of a pair, and the robust error of the look-up curve there, mm.
+/// Binning of the slices, slices between the images of a pair, and the look-up curve's robust error, mm.
 const SETTINGS: [(usize, usize, f64); 4] = [(1, 2, 0.0089), (1, 3, 0.0105), (2, 4, 0.0122), (2, 6, 0.0184)];
-/// Border that is not judged, binned px.
+/// Excluded border, binned px.
 const BORDER_PX: usize = 8;
 
 struct Truth {
@@ -31,13 +31,12 @@ struct Plane {
     c: f64,
 }
 
-/// What the right half shows.
 struct Judged {
     robust_mm: f64,
     rms_mm: f64,
     fill: f64,
     within_three: f64,
-    /// Root mean square of error over predicted SD.
+    /// RMS of error over predicted SD.
     scatter: f64,
 }
 

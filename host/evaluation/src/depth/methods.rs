@@ -22,7 +22,6 @@ const SEED: u64 = 600;
 const SCENES: [&str; 2] = ["staircase", "cone"];
 const EXPOSURES: [Exposure; 2] = [Exposure::Clean, Exposure::EightBit];
 
-/// What one lens needs: rational operators and projectors, made once.
 struct Prepared {
     optics: Optics,
     operators: Operators,
@@ -39,7 +38,6 @@ impl Prepared {
         })
     }
 
-    /// Depth by rational operators (`None`) or by a baseline.
     fn depth(&self, method: Option<Method>, pair: &Pair, settings: &Settings) -> Result<Array2<f32>> {
         let (far, near) = (pair.far.view(), pair.near.view());
         Ok(match method {
@@ -92,7 +90,7 @@ pub fn measure(page: &mut Page) -> Result<()> {
     noise_against_support(page)
 }
 
-/// Errors `[exposure][scene][method]` of scenes with a seed each, 8 px around steps left out where asked for.
+/// Errors `[exposure][scene][method]`, optionally without 8 px around steps.
 fn errors(
     psf: &str,
     scenes: &[(Scene, u64, bool)],
@@ -115,7 +113,7 @@ fn errors(
     Ok([clean?, noisy?])
 }
 
-/// Rational operators and Favaro's method with the same windows: noise falls with support, whosever it is.
+/// With equal windows, to separate noise from support.
 fn noise_against_support(page: &mut Page) -> Result<()> {
     const PSF: &str = "gaussian:k=0.4578";
     const WINDOWS_PX: [usize; 4] = [7, 11, 15, 21];

@@ -1,4 +1,4 @@
-//! Operators designed for another point spread function than the lens has, like Li 2014, table 5.1.
+//! Operators designed for another point spread function than the lens', as in Li 2014, table 5.1.
 
 use anyhow::Result;
 use farnear_depth::operators::Operators;
@@ -11,7 +11,6 @@ use crate::{
 
 const PLANES: usize = 8;
 const SEED: u64 = 200;
-/// A Gaussian that is a tenth too wide besides the three.
 const WIDE: (&str, &str) = ("Gaussian, k 0.5036 (10 % too wide)", "gaussian:k=0.5036");
 
 pub fn measure(page: &mut Page) -> Result<()> {

@@ -1,4 +1,4 @@
-//! Planes through the working range, like Li 2014, fig. 5.4.
+//! Planes through the working range, as in Li 2014, fig. 5.4.
 
 use anyhow::Result;
 use farnear_depth::{metrics::Comparison, operators::Operators};

@@ -16,13 +16,11 @@ use crate::{
     panels::{self, Panel, Scale},
 };
 
-/// What a reader must know before the first figure.
 pub const INTRODUCTION: &str = "# Accuracy on real scenes
 
 Written by `cargo xtask evaluate` where the data are available; they are not part of this repository. Accuracy with known truth is in
 [accuracy.md](accuracy.md).";
 
-/// Measures the available scenes.
 pub fn measure(page: &mut Page, data: &Path) -> Result<()> {
     let breakfast = data.join("breakfast");
     if breakfast.is_dir() {
@@ -33,8 +31,8 @@ pub fn measure(page: &mut Page, data: &Path) -> Result<()> {
     Ok(())
 }
 
-/// The four surfaces of the breakfast table: name, rows, columns and the median depth that an independent implementation with the same
-/// PSF, design and windows gives, mm.
+/// Surfaces of the breakfast table: name, rows, columns, and the median depth of an independent
+/// implementation, mm.
 const SURFACES: [(&str, [usize; 2], [usize; 2], f64); 4] = [
     ("wall", [20, 130], [30, 600], 741.0),
     ("toast", [230, 400], [70, 200], 635.0),
@@ -85,7 +83,7 @@ fn grey_panel<'a>(title: &str, image: &'a Array2<f32>) -> Panel<'a> {
     Panel { title: title.into(), map: image.view(), scale: Scale::Grey(high) }
 }
 
-/// Median, standard deviation and the part without a value.
+/// Median, standard deviation and share without a value.
 fn spread(region: ArrayView2<f32>) -> (f64, f64, f64) {
     let mut values: Vec<f64> = region.iter().filter(|v| v.is_finite()).map(|v| f64::from(*v)).collect();
     if values.is_empty() {

@@ -1,4 +1,4 @@
-//! Surfaces whose depth varies over the image: staircase, slant, cone and sphere.
+//! Surfaces of varying depth: staircase, slant, cone and sphere.
 
 use anyhow::Result;
 use farnear_depth::operators::Operators;

@@ -1,4 +1,4 @@
-//! Focal stacks with unknown optics: order of depths from two slices, and from depth from focus over all slices.
+//! Focal stacks with unknown optics: order of depths from two slices, and depth from focus over all slices.
 
 use std::path::{Path, PathBuf};
 
@@ -17,9 +17,8 @@ use rayon::prelude::*;
 use crate::{page::Page, rig};
 
 const STACK: usize = 30;
-/// Slices of the stack between which the working range lies, the far one first: the stacks run from near to far.
+/// Slices at the ends of the working range, the far one first; the stacks run from near to far.
 const SLICES: [usize; 2] = [23, 8];
-/// Pixels are judged whose confidence is at least this.
 const LEAST_CONFIDENCE: f32 = 0.5;
 /// Optics are unknown; wide windows bridge their mismatch.
 const SETTINGS: Settings = Settings {
@@ -115,7 +114,6 @@ fn measure_hci(page: &mut Page, folder: &Path) -> Result<()> {
     Ok(())
 }
 
-/// A scene and its figures, in the table's order.
 struct Scene {
     name: String,
     figures: [f64; 7],
@@ -127,7 +125,6 @@ fn row(name: &str, figures: [f64; 7]) -> Vec<String> {
     std::iter::once(name.to_owned()).chain(texts).collect()
 }
 
-/// Depth from focus, every pixel with a value.
 fn from_focus(slices: impl Iterator<Item = PathBuf>, settings: &StackSettings) -> Result<StackMap> {
     let images: Vec<Array2<f32>> = slices.map(|path| Ok(read_grey(&path)?.pixels)).collect::<Result<_>>()?;
     let views: Vec<_> = images.iter().map(|image| image.view()).collect();
@@ -152,15 +149,12 @@ fn measure_phone(page: &mut Page, folder: &Path) -> Result<()> {
     Ok(())
 }
 
-/// How a pair's depth agrees with a given one.
 struct Judged {
     rank: f64,
-    /// Part of the pixels that was judged.
     part: f64,
     confident: Array2<bool>,
 }
 
-/// Rank correlation of two maps over some pixels.
 fn rank_over(pixels: &Array2<bool>, a: &Array2<f32>, b: &Array2<f32>) -> f64 {
     let both = a.iter().zip(b).zip(pixels).filter(|(_, judged)| **judged);
     rank_correlation(&both.map(|((a, b), _)| (*a, *b)).collect::<Vec<_>>())
@@ -183,7 +177,6 @@ fn judge(far: &Path, near: &Path, given: &Array2<f32>) -> Result<Judged> {
     Ok(Judged { rank, part: count as f64 / given.len() as f64, confident })
 }
 
-/// The first map of a MATLAB file.
 fn matlab_depth(path: &Path) -> Result<Array2<f32>> {
     let bytes = std::fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
     let arrays = matlab::read(&bytes).with_context(|| format!("{}", path.display()))?;

@@ -15,12 +15,11 @@ use crate::{
     rig::{self, PSFS},
 };
 
-/// Noisy pairs of one texture.
 const PAIRS: u32 = 16;
 const SIZE: (usize, usize) = (240, 200);
 const RIM: usize = 20;
 const SEED: u64 = 800;
-/// Places in the working range: 0 is far focus, 1 near focus.
+/// Positions in the working range: 0 is far focus, 1 near focus.
 const PLACES: [f64; 3] = [0.15, 0.5, 0.85];
 
 pub fn measure(page: &mut Page) -> Result<()> {
@@ -52,7 +51,6 @@ pub fn measure(page: &mut Page) -> Result<()> {
     Ok(())
 }
 
-/// Depth, predicted and measured standard deviation, mm.
 fn one(psf: &str, noise: CameraNoise, place: f64) -> Result<(f64, f64, f64)> {
     let optics = rig::optics(psf)?;
     let operators = Operators::for_optics(&optics)?;

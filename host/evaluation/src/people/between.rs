@@ -1,4 +1,4 @@
-//! From one set to another: trained on one laboratory's clips, tested on another's.
+//! Trained on one laboratory's clips, tested on another's.
 
 use anyhow::{Context, Result};
 use farnear_recognition::alignment::Alignment;
@@ -16,7 +16,7 @@ use farnear_recognition::watch::Unwatched;
 use super::{data::Data, sets};
 use crate::page::Page;
 
-/// Names that sets have for one activity.
+/// Equal activities with different names.
 const SAME: [(&str, &str); 6] = [
     ("wave hands", "wave"),
     ("clap hands", "clap"),
@@ -25,7 +25,7 @@ const SAME: [(&str, &str); 6] = [
     ("bend", "bow"),
     ("jack", "jumping jack"),
 ];
-/// UTKinect waves with both hands, which the strips tell from one: names where the two are distinguished.
+/// UTKinect waves with both hands; other names distinguish one and two.
 const BOTH_HANDS: (&str, &str) = ("wave hands", "wave two hands");
 
 struct Pair {
@@ -33,12 +33,10 @@ struct Pair {
     activities: Vec<&'static str>,
     train: Vec<Clip>,
     test: Vec<Clip>,
-    /// Test clips that are independent.
     clips: usize,
     asked: [&'static str; 2],
 }
 
-/// A way to serve clips from elsewhere.
 struct Way {
     name: &'static str,
     features: bool,
@@ -140,7 +138,6 @@ fn pairs(utkinect: &[Clip], florence: &[Clip], strips: &[Clip]) -> Vec<Pair> {
     ]
 }
 
-/// The clips of some activities, by the names that the sets share.
 fn common(clips: &[Clip], activities: &[&str], same: &[(&str, &str)]) -> Vec<Clip> {
     let named = clips.iter().map(|clip| {
         let found = same.iter().find(|(own, _)| *own == clip.activity);
@@ -150,7 +147,6 @@ fn common(clips: &[Clip], activities: &[&str], same: &[(&str, &str)]) -> Vec<Cli
     named.filter(|clip| activities.contains(&clip.activity.as_str())).collect()
 }
 
-/// Every view as its own clip.
 fn apart(clips: &[Clip]) -> Vec<Clip> {
     clips
         .iter()
@@ -162,7 +158,7 @@ fn accuracy(pair: &Pair, mode: Mode, cut_out: bool, network: &[u8], way: &Way) -
     let kept = |clips: &[Clip], mark: &str| -> Vec<Clip> {
         let mut clips = clips.to_vec();
         for clip in &mut clips {
-            // Subjects of different sets are different people, even with equal names.
+            // Subjects of different sets are different people.
             clip.subject = format!("{mark} {}", clip.subject);
             if cut_out {
                 clip.views.iter_mut().for_each(|view| view.boxes = None);

@@ -1,4 +1,5 @@
-//! Pictures of the thesis' chapter 7 once more: silhouettes from markers (fig. 7.6) and of ten activities from eight sides (fig. 7.10).
+//! The thesis' chapter 7 redone: silhouettes from markers (fig. 7.6) and activities from eight sides (fig.
+//! 7.10).
 
 use anyhow::{Context, Result};
 use farnear_recognition::synthetic::activities::{ACTIVITIES, performance};
@@ -19,12 +20,9 @@ use crate::{
 };
 
 const VIEWS: usize = 8;
-/// A recording of CMU's 41 markers.
 const RECORDING: &str = "mocap/cmu_02_05.c3d";
-/// A picture of fig. 7.6, before the panels' shrinking.
 const SIZE: [usize; 2] = [570, 420];
 const MM_PER_PX: f64 = 3.6;
-/// Gaps at joints that the thesis closes, millimetres.
 const CLOSED_MM: f64 = 126.0;
 
 pub fn measure(page: &mut Page, data: &Data) -> Result<()> {
@@ -54,7 +52,7 @@ fn picture(
     page.picture(name, &panels::grid(across, &shown)?, about)
 }
 
-/// Fig. 7.6: markers, projected hulls of the body's parts, silhouettes, from four sides.
+/// Fig. 7.6: markers, projected hulls, silhouettes, from four sides.
 fn from_markers(page: &mut Page, data: &Data) -> Result<()> {
     let Some(bytes) = data.bytes(RECORDING)? else {
         page.paragraph("Fig. 7.6 is skipped: no recording of markers is at hand.");
@@ -96,7 +94,6 @@ fn from_markers(page: &mut Page, data: &Data) -> Result<()> {
     Ok(())
 }
 
-/// Fig. 7.10: a posture of each activity from eight sides, cut out and scaled.
 fn from_eight_sides(page: &mut Page) -> Result<()> {
     const SIDE_PX: usize = 200;
     let mut maps = Vec::new();

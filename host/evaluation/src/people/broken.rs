@@ -1,5 +1,5 @@
-//! Really broken silhouettes: two people of the KTH set walking, as a background model cut them out, recognised after training
-//! learned from synthetic people only.
+//! Broken silhouettes of two walking people of the KTH set, recognised after training on synthetic people
+//! only.
 
 use anyhow::{Context, Result};
 use farnear_recognition::clip::{Clip, Track};
@@ -21,18 +21,15 @@ use super::{
 };
 use crate::page::Page;
 
-/// Frames per second of the set's video.
 const VIDEO_HZ: f64 = 25.0;
-/// Fewer frames in a row are not a passage.
+/// Fewer consecutive frames are not a passage.
 const LEAST_FRAMES: usize = 20;
 /// Fewer pixels are not a person.
 const LEAST_PX: usize = 200;
-/// Synthetic people that teach, and views of each.
+/// Synthetic people for training, and views of each.
 const TEACHERS: [usize; 2] = [8, 8];
-/// Closing that a cleaner mask has had, pixels.
 const CLOSING_PX: usize = 3;
 
-/// One walk through the picture.
 struct Passage {
     person: String,
     masks: Vec<Mask>,
@@ -87,7 +84,7 @@ pub fn measure(page: &mut Page, data: &Data) -> Result<()> {
     Ok(())
 }
 
-/// The passages as clips of `walk`, one view each; none where the set is not at hand.
+/// Passages as one-view clips of `walk`; empty without the set.
 pub fn walking(data: &Data) -> Result<Vec<Clip>> {
     let Some(folder) = data.path("kth_walk") else { return Ok(Vec::new()) };
     let mut clips = Vec::new();
@@ -103,7 +100,6 @@ pub fn walking(data: &Data) -> Result<Vec<Clip>> {
     Ok(clips)
 }
 
-/// Passages: runs of frames with consecutive numbers.
 fn read(folder: &std::path::Path, person: &str) -> Result<Vec<Passage>> {
     let files = numbered_files(folder)?;
     let masks: Vec<(u64, Mask)> = files
@@ -136,7 +132,7 @@ fn read(folder: &std::path::Path, person: &str) -> Result<Vec<Passage>> {
 }
 
 fn row(name: &str, mode: Mode, passages: &[Passage]) -> Result<Vec<String>> {
-    // The views of a performance become performances of their own: the video has one view, from no known side.
+    // Views become performances: the video has one view from an unknown side.
     let people: Vec<Clip> = clips(TEACHERS[0], TEACHERS[1], RATE_HZ, Scaling::default())
         .into_iter()
         .flat_map(|clip| {
@@ -155,7 +151,7 @@ fn row(name: &str, mode: Mode, passages: &[Passage]) -> Result<Vec<String>> {
     let recogniser = Recogniser::train(&people, &settings)?;
     let (mut walk, mut walk_or_bag, mut unknown) = (0, 0, 0);
     for passage in passages {
-        // As many frames a second as the clips that were learned from.
+        // Frame rate of the training clips.
         let step = VIDEO_HZ / RATE_HZ;
         let frames = (passage.masks.len() as f64 / step) as usize;
         let masks: Vec<Mask> =

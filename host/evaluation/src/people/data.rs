@@ -1,26 +1,23 @@
-//! Where real data lie, if they are there.
+//! Optional real data.
 
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
 
-/// The folder with real data, which may not exist.
+/// The folder may not exist.
 pub struct Data(pub PathBuf);
 
 impl Data {
-    /// A file or folder in it, where it is there.
     pub fn path(&self, name: &str) -> Option<PathBuf> {
         Some(self.0.join(name)).filter(|path| path.exists())
     }
 
-    /// The bytes of a file, where it is there.
     pub fn bytes(&self, name: &str) -> Result<Option<Vec<u8>>> {
         let read =
             |path: &Path| std::fs::read(path).with_context(|| format!("cannot read {}", path.display()));
         self.path(name).map(|path| read(&path)).transpose()
     }
 
-    /// The text of a file, where it is there.
     pub fn text(&self, name: &str) -> Result<Option<String>> {
         self.bytes(name)?
             .map(|bytes| String::from_utf8(bytes).with_context(|| format!("{name} is not text")))
@@ -28,7 +25,6 @@ impl Data {
     }
 }
 
-/// The files of a folder in the order of the numbers in their names.
 pub fn numbered_files(folder: &Path) -> Result<Vec<(u64, PathBuf)>> {
     let mut files = Vec::new();
     for entry in std::fs::read_dir(folder).with_context(|| format!("cannot read {}", folder.display()))? {

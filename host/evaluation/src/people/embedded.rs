@@ -1,5 +1,5 @@
-//! Pictures of the thesis' embedding once more: the embedded gallery (fig. 9.3), what of it six activities visit (fig. 9.5), and the spatial objects that
-//! are made of it (fig. 9.6).
+//! The thesis' embedding redone: the gallery (fig. 9.3), its use by six activities (fig. 9.5), and the
+//! spatial objects (fig. 9.6).
 
 use anyhow::{Context, Result};
 use farnear_recognition::clip::{Clip, Track};
@@ -18,17 +18,14 @@ use crate::{
 };
 
 const VIEWS: usize = 8;
-/// Members per dimension of the spatial objects.
 const MEMBERS: usize = 20;
 const SHOWN: [&str; 6] = ["walk", "drop", "crouch", "bag", "shoot", "dig"];
 const BLACK: f32 = 0.0;
 const GREY: f32 = 0.72;
 const WHITE: f32 = 1.0;
 
-/// All silhouettes in the first two dimensions of the embedding.
 struct Embedded {
     points: Array2<f32>,
-    /// Which activity each is of.
     activities: Vec<usize>,
     masks: Vec<Mask>,
 }
@@ -70,7 +67,6 @@ pub fn measure(page: &mut Page) -> Result<()> {
     Ok(())
 }
 
-/// The thesis' remarks on the figures, and our findings.
 fn said(page: &mut Page, embedded: &Embedded, objects: &[Vec<bool>]) {
     let cells = |object: &[bool]| object.iter().filter(|visited| **visited).count();
     let all = cells(&visited(embedded, None));
@@ -138,7 +134,6 @@ fn embedded() -> Result<Embedded> {
 }
 
 impl Embedded {
-    /// Where the silhouettes lie in a picture of this many rows and columns, [row, column].
     fn places(&self, [rows, columns]: [usize; 2]) -> Vec<[usize; 2]> {
         const MARGIN: f32 = 0.06;
         let place = |value: f32, k: usize, length: usize| {
@@ -172,7 +167,7 @@ fn dots(size: [usize; 2], places: &[[usize; 2]], level: f32) -> Array2<f32> {
     map
 }
 
-/// Fig. 9.3: all dots, and in every field of a coarse grid the silhouette that lies nearest to its middle.
+/// Fig. 9.3: all dots, and the silhouette nearest to the centre of each field of a coarse grid.
 fn gallery(embedded: &Embedded) -> Array2<f32> {
     const SIZE: [usize; 2] = [1500, 2100];
     const FIELDS: [usize; 2] = [8, 11];
@@ -199,10 +194,9 @@ fn gallery(embedded: &Embedded) -> Array2<f32> {
     map
 }
 
-/// Rows and columns of a picture of figs. 9.5 and 9.6, before the panels' shrinking.
 const SMALL: [usize; 2] = [420, 480];
 
-/// Fig. 9.5: an activity's silhouettes among all.
+/// Fig. 9.5.
 fn pattern(embedded: &Embedded, activity: usize) -> Array2<f32> {
     let places = embedded.places(SMALL);
     let mut map = dots(SMALL, &places, GREY);
@@ -212,7 +206,6 @@ fn pattern(embedded: &Embedded, activity: usize) -> Array2<f32> {
     map
 }
 
-/// The cells that an activity visits, or all of them.
 fn visited(embedded: &Embedded, activity: Option<usize>) -> Vec<bool> {
     let grid = OccupancyGrid::new(embedded.points.view(), &[MEMBERS; 2]);
     let of = |own: &usize| activity.is_none_or(|activity| *own == activity);
@@ -221,12 +214,12 @@ fn visited(embedded: &Embedded, activity: Option<usize>) -> Vec<bool> {
     grid.pattern(embedded.points.select(Axis(0), &rows).view()).iter().map(|cell| *cell > 0.0).collect()
 }
 
-/// Fig. 9.6: visited cells among all silhouettes.
+/// Fig. 9.6.
 fn object(embedded: &Embedded, cells: &[bool]) -> Array2<f32> {
     let places = embedded.places(SMALL);
     let mut map = dots(SMALL, &places, GREY);
     let grid = OccupancyGrid::new(embedded.points.view(), &[MEMBERS; 2]);
-    // The cells of the outermost places say where the grid lies in the picture.
+    // The outermost cells locate the grid in the picture.
     let span = |k: usize| {
         let along = places.iter().map(|place| place[k]);
         (along.clone().min().unwrap_or(0), along.max().unwrap_or(0))

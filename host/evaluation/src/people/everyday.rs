@@ -1,4 +1,4 @@
-//! The recognisers that come with the program, on sets of which they have never seen anything.
+//! The shipped recognisers on sets that they were not trained on.
 
 use std::sync::Arc;
 
@@ -32,7 +32,6 @@ const MODELS: [(&str, &str, &[u8]); 4] = [
     ("order-free", "100x100", include_bytes!("../../../recognition/models/everyday-order-free-cut-out.fnm")),
 ];
 
-/// What the sets call an activity, and the models.
 const SAME: [(&str, &str); 7] = [
     ("wave hands", "wave two hands"),
     ("clap hands", "clap"),
@@ -43,7 +42,6 @@ const SAME: [(&str, &str); 7] = [
     ("tight lace", "tie laces"),
 ];
 
-/// An answer and the truth, in the model's labels.
 struct Judged {
     truth: String,
     answer: Answer,
@@ -134,24 +132,21 @@ pub fn measure(page: &mut Page, data: &Data) -> Result<()> {
     Ok(())
 }
 
-/// The auxiliary model next to a trained model, from `everyday` and the left-out activity.
 type Second = fn(&Recogniser, &str) -> Option<Recogniser>;
 
-/// The ways in which clips are strange.
 const BY: [(&str, Second); 3] = [
     ("auxiliary model", |everyday, _| Some(everyday.clone())),
     ("model without this class", |everyday, left_out| Some(without(everyday, called(left_out)))),
     ("nearest clip", |_, _| None),
 ];
 
-/// `everyday` for full frames or cut-out silhouettes, as clips are.
 fn auxiliary_model(clips: &[Clip]) -> Result<Recogniser> {
     let cut_out = clips.iter().flat_map(|clip| &clip.views).any(|view| view.boxes.is_none());
     let (_, _, bytes) = MODELS[usize::from(cut_out)];
     Recogniser::from_bytes(bytes).context("a model that comes with the program")
 }
 
-/// A model that has never heard of an activity: the others share its probability.
+/// The model without an activity; the others share its probability.
 fn without(model: &Recogniser, activity: &str) -> Recogniser {
     let mut model = model.clone();
     let kept: Vec<usize> = (0..model.activities.len()).filter(|k| model.activities[*k] != activity).collect();
@@ -164,7 +159,6 @@ fn without(model: &Recogniser, activity: &str) -> Recogniser {
     model
 }
 
-/// What the models call an activity of a set.
 fn called(activity: &str) -> &str {
     SAME.iter().find(|(own, _)| *own == activity).map_or(activity, |(_, known)| known)
 }
@@ -173,7 +167,6 @@ fn activities(clips: &[Clip]) -> Vec<String> {
     names(clips.iter().map(|clip| &clip.activity))
 }
 
-/// The answers of a model to clips, each view by itself and all together.
 fn judged(model: &Recogniser, clips: &[Clip]) -> Result<(Vec<Judged>, Vec<Judged>)> {
     let shapes =
         |view: &Track| Track { boxes: view.boxes.clone().filter(|_| model.uses_boxes()), ..view.clone() };
@@ -192,7 +185,6 @@ fn judged(model: &Recogniser, clips: &[Clip]) -> Result<(Vec<Judged>, Vec<Judged
     Ok((each.into_iter().flatten().collect(), fused))
 }
 
-/// The activities of a set that a model knows.
 fn common(model: &Recogniser, judged: &[Judged]) -> Vec<String> {
     let known = |activity: &&String| judged.iter().any(|judged| judged.truth == **activity);
     model.activities.iter().filter(known).cloned().collect()
@@ -219,7 +211,7 @@ fn row(model: &Recogniser, names: [&str; 3], clips: &[Clip]) -> Result<Vec<Strin
     let unknown = each.iter().filter(|judged| judged.answer.outlier_score > 1.0).count();
     let share = |count: usize, of: usize| format!("{:.1}", 100.0 * count as f64 / of.max(1) as f64);
     let with_interval = |confusion: &Confusion| {
-        // Views of a clip are not independent: as many trials as clips.
+        // Views are not independent: as many trials as clips.
         let (low, high) =
             wilson((confusion.accuracy() * clips.len() as f64).round() as u32, clips.len() as u32, 1.96);
         format!("{:.1} ({:.1} to {:.1})", 100.0 * confusion.accuracy(), 100.0 * low, 100.0 * high)

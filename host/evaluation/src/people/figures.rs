@@ -1,4 +1,4 @@
-//! Pictures of the thesis' chapters 8 and 9 once more: figs. 8.6 and 9.2.
+//! The thesis' figs. 8.6 and 9.2 redone.
 
 use anyhow::{Context, Result};
 use farnear_recognition::embedding::descriptor::{Scaling, centroid_distance};
@@ -20,12 +20,10 @@ use crate::{
     panels::{self, Panel, Scale},
 };
 
-/// Grey levels of person, shadow and background.
 const PERSON: f32 = 0.0;
 const SHADOW: f32 = 0.6;
 const NEITHER: f32 = 1.0;
 
-/// A part of a scene's picture of that size about its silhouette.
 fn cut_out(map: &Array2<f32>, scene: &Scene, size: [usize; 2]) -> Array2<f32> {
     let bounds = BoundingBox::of(scene.silhouette.view());
     let [middle_y, middle_x] = bounds.map_or([0; 2], |b| [(b.top + b.bottom) / 2, (b.left + b.right) / 2]);
@@ -36,7 +34,6 @@ fn cut_out(map: &Array2<f32>, scene: &Scene, size: [usize; 2]) -> Array2<f32> {
     })
 }
 
-/// Rows and columns that hold every scene's silhouette, with a margin; all of a figure are as large.
 fn size_of(scenes: &[Scene]) -> [usize; 2] {
     const MARGIN: usize = 12;
     let bounds = scenes.iter().filter_map(|scene| BoundingBox::of(scene.silhouette.view()));
@@ -47,7 +44,7 @@ fn of_mask(mask: &Mask) -> Array2<f32> {
     mask.mapv(|set| if set { PERSON } else { NEITHER })
 }
 
-/// Fig. 8.6: shadow off by every method, scene by scene.
+/// Fig. 8.6: every method, scene by scene.
 pub fn shadows_off(page: &mut Page, scenes: u64) -> Result<()> {
     let mut maps: Vec<(String, Array2<f32>)> = Vec::new();
     let drawn: Vec<Scene> = (0..scenes).map(|seed| scene(Kind::Standard, seed)).collect();
@@ -84,7 +81,7 @@ pub fn shadows_off(page: &mut Page, scenes: u64) -> Result<()> {
     )
 }
 
-/// Fig. 9.2: centroid distances of whole and of broken silhouettes.
+/// Fig. 9.2: whole and broken silhouettes.
 pub fn centroid_distances(page: &mut Page) -> Result<()> {
     let mut plots = Vec::new();
     let mut differences = Vec::new();

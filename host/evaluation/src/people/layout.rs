@@ -1,5 +1,5 @@
-//! How many dimensions silhouettes need: residual variance of Isomap compared with principal components, and landmark Isomap
-//! compared with the whole; like Li 2014, section 9.3.1.
+//! Residual variance over dimensions of Isomap, landmark Isomap and principal components (Li 2014, section
+//! 9.3.1).
 
 use anyhow::Result;
 use farnear_recognition::embedding::{
@@ -14,7 +14,6 @@ use crate::{
     page::Page,
 };
 
-/// Silhouettes laid out.
 const GALLERY: usize = 1500;
 const PEOPLE: usize = 6;
 const NEIGHBOURS: usize = 12;
@@ -37,7 +36,7 @@ pub fn measure(page: &mut Page) -> Result<()> {
     let gallery = all.select(Axis(0), &rows);
 
     let layouts = layouts(gallery.view())?;
-    // Landmarks are only in the table: their curves overlap.
+    // Landmarks are only in the table, because their curves overlap.
     let curves: Vec<Curve> = layouts[..layouts.len() - LANDMARKS.len()]
         .iter()
         .map(|(name, values)| Curve {
@@ -62,7 +61,6 @@ pub fn measure(page: &mut Page) -> Result<()> {
     Ok(())
 }
 
-/// The layouts' names and residual variances over dimensions, those by landmarks last.
 fn layouts(gallery: ArrayView2<f32>) -> Result<Vec<(String, Vec<f64>)>> {
     let whole = isomap(gallery, Neighbourhood::Nearest(NEIGHBOURS), DIMENSIONS)?;
     let principal = Pca::fit(gallery, DIMENSIONS)?.transform(gallery)?;
@@ -80,7 +78,6 @@ fn layouts(gallery: ArrayView2<f32>) -> Result<Vec<(String, Vec<f64>)>> {
     Ok(found)
 }
 
-/// Straight distances of all rows.
 fn distances(rows: ArrayView2<f32>) -> Array2<f32> {
     let n = rows.nrows();
     let values: Vec<f32> = (0..n * n)
@@ -93,7 +90,7 @@ fn distances(rows: ArrayView2<f32>) -> Array2<f32> {
     Array2::from_shape_vec((n, n), values).unwrap_or_default()
 }
 
-/// Residual variance of the first 1, 2, ... columns of `coordinates` against `distances`.
+/// Residual variance of the first 1, 2, ... columns.
 fn residuals(coordinates: ArrayView2<f32>, distances: &Array2<f32>) -> Vec<f64> {
     let (n, dimensions) = coordinates.dim();
     (1..=dimensions)

@@ -14,7 +14,6 @@ const NAMES_PX: i32 = 118;
 const TITLE_PX: i32 = 30;
 const MARGIN_PX: i32 = 14;
 
-/// The matrices side by side, each under its title; the bytes of a PNG.
 pub fn pictures(matrices: &[(&str, &Confusion)]) -> Result<Vec<u8>> {
     let side = |confusion: &Confusion| NAMES_PX + CELL_PX * confusion.classes.len() as i32;
     let widths: Vec<i32> = matrices.iter().map(|(_, confusion)| side(confusion) + MARGIN_PX).collect();
@@ -72,7 +71,7 @@ fn draw(
     Ok(())
 }
 
-/// Blue for right answers, orange for wrong ones, in eight steps so that the picture stays small.
+/// Blue for right, orange for wrong answers, in eight steps to keep the picture small.
 fn shade(share: f64, right: bool) -> RGBColor {
     let full = if right { [0.0, 114.0, 178.0] } else { [213.0, 94.0, 0.0] };
     let level = if share > 0.0 { (8.0 * share).ceil() / 8.0 } else { 0.0 };

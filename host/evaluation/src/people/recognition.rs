@@ -1,4 +1,5 @@
-//! Leave-one-subject-out on every set: accuracies with intervals, chosen parameters, confusion matrices; like Li 2014, tables 9.1 to 9.3.
+//! Leave-one-subject-out on every set: accuracies, parameters, confusion matrices (Li 2014, tables 9.1 to
+//! 9.3).
 
 use std::collections::BTreeMap;
 
@@ -20,13 +21,12 @@ use super::{
 };
 use crate::page::Page;
 
-/// Sharpness of the codebook's soft assignments; twice the training frames' spread, the middle of the usual values.
+/// Twice the training frames' spread, the middle of the usual values.
 const SHARPNESS: f32 = 2.0;
 
-/// Silhouettes in the gallery: a radial basis map costs as much per frame as there are.
+/// The cost of a radial basis map per frame grows with the gallery.
 const GALLERY: usize = 600;
 
-/// The methods that are reported apart.
 pub const METHODS: [Method; 5] = [
     Method { name: "thesis", classifier: "k-NN", kind: Kind::Thesis },
     Method { name: "order-free", classifier: "k-NN", kind: Kind::Neighbours(Mode::OrderFree) },
@@ -68,7 +68,7 @@ impl Method {
             }
         };
         let space = SpaceSettings { gallery: GALLERY, ..experiment.space };
-        // One sharpness for all: it moves little and would triple the time.
+        // One sharpness: it has little effect and would triple the time.
         Experiment {
             space,
             mirror: experiment.mirror && set.mirror,
@@ -99,7 +99,6 @@ pub fn measure(page: &mut Page) -> Result<()> {
     measure_set(page, &sets::synthetic()).context("synthetic people")
 }
 
-/// The same on a set of real people, where it is at hand.
 pub fn measure_real(page: &mut Page, data: &Data, read: Read, name: &str) -> Result<()> {
     match read(data).with_context(|| name.to_owned())? {
         Some(set) => measure_set(page, &set).with_context(|| name.to_owned()),
@@ -165,21 +164,18 @@ fn measure_set(page: &mut Page, set: &Set) -> Result<()> {
     Ok(())
 }
 
-/// An accuracy in per cent and its interval.
 fn accuracy(confusion: &Confusion, set: &Set) -> String {
     let (low, high) = interval(confusion, set);
     format!("{:.1} ({:.1} to {:.1})", 100.0 * confusion.accuracy(), 100.0 * low, 100.0 * high)
 }
 
-/// Wilson's interval for as many trials as there are independent clips.
 fn interval(confusion: &Confusion, set: &Set) -> (f64, f64) {
-    // A set that holds its mirrors has every performance twice.
+    // A set with its mirrors has every performance twice.
     let trials = set.clips.len() / if set.mirror { 1 } else { 2 };
     let right = (confusion.accuracy() * trials as f64).round();
     wilson(right as u32, trials as u32, 1.96)
 }
 
-/// How often each value was chosen for fused views.
 fn chosen(choices: &[Choice], views: usize) -> String {
     let wanted = if views > 1 { Views::Fused } else { Views::Each };
     let choices: Vec<&Choice> = choices.iter().filter(|choice| choice.views == wanted).collect();

@@ -1,7 +1,6 @@
-//! What shuffled frames, other speeds and bad masks cost, on synthetic people, and the first two on measured joints as well.
-//!
-//! Per left-out subject one recogniser is trained on the others' clean clips and answers every changed copy of the left-out
-//! subject's clips; settings are the defaults, as in a user's hands.
+//! Effect of shuffled frames, other speeds and bad masks on synthetic people; the first two also on measured
+//! joints. Per left-out subject a recogniser trained on the others' clean clips answers every changed copy,
+//! with default settings.
 
 use std::collections::BTreeSet;
 
@@ -25,15 +24,13 @@ use super::{
 };
 use crate::page::Page;
 
-/// Millimetres per pixel of the drawn silhouettes.
 const MM_PER_PX: f64 = 10.0;
 
-/// What happens to the left-out subject's clips.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Change {
     Nothing,
     Shuffled,
-    /// Frames per second against the training's.
+    /// Frame rate relative to training.
     Rate(f64),
     Masks(&'static [Damage]),
 }
@@ -72,7 +69,7 @@ pub fn measure(page: &mut Page, data: &Data) -> Result<()> {
     table(page, &RESAMPLED.map(|(name, _)| name), |views| resampled(views).to_vec())
 }
 
-/// A row per change, both modes in one and in all views; `sets` gives the changed clips, unchanged ones first.
+/// A row per change, both modes in one and in all views; the first of `sets` is unchanged.
 fn table(page: &mut Page, names: &[&str], sets: impl Fn(usize) -> Vec<Vec<Clip>>) -> Result<()> {
     let mut head = vec!["left-out clips".to_owned()];
     let mut columns: Vec<Vec<Confusion>> = Vec::new();
@@ -102,10 +99,9 @@ fn table(page: &mut Page, names: &[&str], sets: impl Fn(usize) -> Vec<Vec<Clip>>
     Ok(())
 }
 
-/// Which frames of how many are shown, in which order.
+/// Maps a number of frames to the selected ones.
 type Resampled = fn(usize) -> Vec<usize>;
 
-/// Changes that need no masks.
 const RESAMPLED: [(&str, Resampled); 4] = [
     ("as they are", |frames| (0..frames).collect()),
     ("frames shuffled", |frames| {
@@ -117,14 +113,13 @@ const RESAMPLED: [(&str, Resampled); 4] = [
     ("double speed", |frames| (0..frames).step_by(2).collect()),
 ];
 
-/// A clip's first views, resampled.
 fn of_views(clip: &Clip, views: usize, resampled: Resampled) -> Clip {
     let mut clip = clip.select(resampled);
     clip.views.truncate(views);
     clip
 }
 
-/// One matrix per set of changed clips; training is on the first, which is unchanged.
+/// One matrix per set; training is on the first.
 fn accuracies(mode: Mode, sets: &[Vec<Clip>]) -> Result<Vec<Confusion>> {
     let settings = RecogniserSettings {
         space: SpaceSettings { mode, ..SpaceSettings::default() },
@@ -165,7 +160,6 @@ fn subject(number: usize) -> String {
     format!("p{number:02}")
 }
 
-/// All people's clips with a change, from the first `views` of [`VIEWS`] views.
 fn clips(change: Change, views: usize) -> Vec<Clip> {
     let rate_hz = if let Change::Rate(factor) = change { factor * RATE_HZ } else { RATE_HZ };
     (0..PEOPLE * ACTIVITIES.len())
@@ -178,7 +172,7 @@ fn clips(change: Change, views: usize) -> Vec<Clip> {
                 order.shuffle(&mut ChaCha8Rng::seed_from_u64(index as u64));
             }
             let views = views_round(VIEWS, 0.0).into_iter().take(views).enumerate().map(|(v, view)| {
-                // As the clean clips are seen: obliquely to the path.
+                // Obliquely to the path, as for clean clips.
                 let view = View { gamma_deg: view.gamma_deg + 45.0, ..view };
                 let reach: Vec<_> = bodies.iter().flat_map(|body| extent(body, &view)).collect();
                 let Some(canvas) = Canvas::fitting(&reach, MM_PER_PX, 2) else {

@@ -1,4 +1,4 @@
-//! The sets of clips that recognition is measured on.
+//! Sets of clips for recognition.
 
 use anyhow::Result;
 use farnear_recognition::clip::{Clip, Track};
@@ -11,10 +11,9 @@ use super::{
     skeletons, strips,
 };
 
-/// Synthetic people, and frames per second of their clips.
+/// Synthetic people, and their clips' frame rate.
 pub const PEOPLE: usize = 21;
 pub const RATE_HZ: f64 = 8.0;
-/// Views of sets that are drawn from bodies.
 pub const VIEWS: usize = 4;
 
 pub struct Set {
@@ -22,16 +21,15 @@ pub struct Set {
     pub short: &'static str,
     pub about: &'static str,
     pub clips: Vec<Clip>,
-    /// Whether mirrors of training clips train too; a set that holds its mirrors needs none.
+    /// Whether to train on mirrors; false for sets with mirrors.
     pub mirror: bool,
-    /// Asked for, per cent: order-free in one view and fused, ordered in one view and fused.
+    /// Required accuracy, per cent: order-free in one view and fused, ordered in one view and fused.
     pub asked: [Option<f64>; 4],
 }
 
-/// Reads a set, where it is at hand.
 pub type Read = fn(&Data) -> Result<Option<Set>>;
 
-/// Ten activities from joints that a depth sensor measured.
+/// Ten activities from a depth sensor's joints.
 pub fn utkinect(data: &Data) -> Result<Option<Set>> {
     let Some(bytes) = data.bytes("skeletons/UTKinect_Skeletons.mat")? else { return Ok(None) };
     Ok(Some(Set {
@@ -45,7 +43,6 @@ pub fn utkinect(data: &Data) -> Result<Option<Set>> {
     }))
 }
 
-/// Nine activities likewise.
 pub fn florence(data: &Data) -> Result<Option<Set>> {
     let Some(bytes) = data.bytes("skeletons/Florence_3D_Action_Skeletons.mat")? else { return Ok(None) };
     Ok(Some(Set {
@@ -58,7 +55,6 @@ pub fn florence(data: &Data) -> Result<Option<Set>> {
     }))
 }
 
-/// 21 people at the activities of table 7.1.
 pub fn synthetic() -> Set {
     Set {
         name: "Synthetic people",
@@ -71,9 +67,8 @@ pub fn synthetic() -> Set {
     }
 }
 
-/// Folders of the strips and their activities.
 const WEIZMANN: [(&str, &str); 4] = [("0", "wave one"), ("1", "wave two"), ("3", "jack"), ("4", "bend")];
-/// Strips of one subject, mirrors too, have numbers that share this quotient.
+/// Strips of one subject share this quotient of their numbers.
 const STRIPS_PER_SUBJECT: u64 = 8;
 
 /// Four actions from video.

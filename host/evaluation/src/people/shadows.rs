@@ -1,5 +1,5 @@
-//! Shadows off: seeded scenes with known truth for the geometric cutters, made pictures and the highway sequence for
-//! the detectors that look at colour and texture; like Li 2014, tables 8.1 and 8.2.
+//! Shadow removal: seeded scenes for the geometric cutters, coloured scenes and the highway sequence for the
+//! detectors (Li 2014, tables 8.1 and 8.2).
 
 use anyhow::{Context, Result, ensure};
 use farnear_shadow::Method as Cutter;
@@ -20,9 +20,8 @@ use super::data::{Data, numbered_files};
 use crate::page::Page;
 
 const SCENES: u64 = 100;
-/// Scenes for the detectors, which need colour pictures.
 const MADE_SCENES: u64 = 40;
-/// How far the given direction of the shadow may be off, radians.
+/// Uncertainty of the given shadow direction.
 const BETA_SD_RAD: f64 = 0.05;
 const KINDS: [(&str, Kind); 4] = [
     ("level camera, upright, shadow sideways or towards the camera", Kind::Standard),
@@ -108,7 +107,6 @@ fn pooled(kind: Kind, cutter: Cutter, seeds: std::ops::Range<u64>) -> Result<Sha
     }))
 }
 
-/// Every detector and cutter on the first scenes one by one, by name.
 pub fn per_scene(scenes: u64) -> Result<Vec<(String, Vec<ShadowScore>)>> {
     let mut found = Vec::new();
     for method in Method::ALL {
@@ -122,7 +120,6 @@ pub fn per_scene(scenes: u64) -> Result<Vec<(String, Vec<ShadowScore>)>> {
     Ok(found)
 }
 
-/// The score of one detector over coloured scenes; the foreground given to it is body and shadow.
 fn detected(kind: Kind, method: Method, seeds: std::ops::Range<u64>) -> Result<ShadowScore> {
     let mut total = ShadowScore::default();
     let mut detector = Detector::new(method);
@@ -139,7 +136,7 @@ fn detected(kind: Kind, method: Method, seeds: std::ops::Range<u64>) -> Result<S
     Ok(total)
 }
 
-/// Label 255 against truth 255 of the background model, and the detectors on its foreground.
+/// Label 255 of the background model against truth 255, and the detectors on its foreground.
 fn highway(page: &mut Page, folder: &Path) -> Result<()> {
     let mut detectors = Method::ALL.map(|method| (method, Detector::new(method), ShadowScore::default()));
     let mut plain = ShadowScore::default();
@@ -156,7 +153,7 @@ fn highway(page: &mut Page, folder: &Path) -> Result<()> {
         let labels = ready(&mut learner, frame, without)?.apply(frame)?;
         let told = ready(&mut separate, frame, Settings::default())?.apply(frame)?;
         let truth_path = folder.join(format!("groundtruth/gt{number:06}.png"));
-        // The sequence's own rule: the first 469 frames only teach.
+        // The first 469 frames are for learning only.
         if number < 470 || !truth_path.exists() {
             continue;
         }
@@ -209,7 +206,7 @@ fn ready<'a>(
 }
 
 fn open(path: &Path) -> Result<DynamicImage> {
-    // Some files carry the ending of another format: go by their bytes.
+    // Some files have another format's extension.
     let reader = image::ImageReader::open(path).with_context(|| format!("cannot read {}", path.display()))?;
     reader.with_guessed_format()?.decode().with_context(|| format!("cannot decode {}", path.display()))
 }

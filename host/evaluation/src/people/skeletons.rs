@@ -1,4 +1,4 @@
-//! Clips of skeleton data sets: joints dressed with capsules, drawn from views round the subject, described.
+//! Clips of skeleton data sets: joints dressed with capsules, drawn and described.
 
 use farnear_recognition::clip::{Clip, Track};
 use farnear_recognition::embedding::descriptor::Scaling;
@@ -9,17 +9,15 @@ use farnear_silhouettes::readers::skeletons::{
 use farnear_silhouettes::silhouette::{capsule::Capsule, view::views_round};
 use rayon::prelude::*;
 
-/// The clips of UTKinect-Action3D (a MAT-file's bytes) in `views` views.
 pub fn utkinect(bytes: &[u8], views: usize, scaling: Scaling) -> Result<Vec<Clip>, SkeletonError> {
     Ok(from_skeletons(&read_cells(bytes, &KINECT_20)?, &KINECT_20, &UTKINECT_ACTIVITIES, views, scaling))
 }
 
-/// The clips of Florence 3D Actions (a MAT-file's bytes) in `views` views.
 pub fn florence(bytes: &[u8], views: usize, scaling: Scaling) -> Result<Vec<Clip>, SkeletonError> {
     Ok(from_skeletons(&read_cells(bytes, &FLORENCE_15)?, &FLORENCE_15, &FLORENCE_ACTIVITIES, views, scaling))
 }
 
-/// Draws and describes skeleton clips from `views` views at equal steps, the first from the sensor's side.
+/// Views at equal steps, the first from the sensor's side.
 fn from_skeletons(
     clips: &[SkeletonClip],
     layout: &Layout,

@@ -1,8 +1,8 @@
-//! Silhouettes from strips of 64x64 frames before a plain wall, where the person hardly moves from the spot.
+//! Silhouettes from strips of 64x64 frames before a plain wall, where the person hardly moves and would
+//! become background.
 //!
-//! The usual background model would take a standing body for background. Here the wall is known instead: per row it has the
-//! colours of the columns at the left and right edge over the whole strip, as one Gaussian; pixels far from it are the person. Moving
-//! pixels need less evidence.
+//! The wall's colours in a row are those of the columns at both edges over the whole strip, as one Gaussian;
+//! pixels far from it are the person. Moving pixels need less evidence.
 
 use anyhow::{Context, Result, ensure};
 use farnear_silhouettes::mask::{
@@ -13,23 +13,21 @@ use farnear_silhouettes::mask::{
 use image::RgbImage;
 use std::path::Path;
 
-/// Side of a frame, pixels.
 pub const SIDE: usize = 64;
-/// Columns at either edge that show the wall.
+/// Columns of wall at either edge.
 const WALL_COLUMNS: usize = 9;
-/// Rows above and below that teach a row's wall.
+/// Rows above and below that a row's wall is learned from.
 const REACH_ROWS: usize = 6;
-/// Samples this far from the row's median (largest channel, grey levels) are an arm before the wall.
+/// Samples this far from the row's median (largest channel, grey levels) are an arm in front of the wall.
 const NOT_WALL: f64 = 45.0;
-/// Variance of the camera, grey levels squared, added to the wall's.
 const CAMERA_VARIANCE: f64 = 6.0;
-/// Standard deviations from the wall beyond which a pixel is the person's.
+/// Smallest distance of the person from the wall, standard deviations.
 const FAR: f64 = 4.0;
-/// The same for pixels that differ from their median over time by more than [`MOVING`] (Euclidean, grey levels).
+/// For pixels that differ from their temporal median by more than [`MOVING`] (Euclidean, grey levels).
 const FAR_MOVING: f64 = 2.5;
 const MOVING: f64 = 40.0;
 
-/// The frames of a strip, side by side in the file; its file ending is ignored.
+/// Frames in a row; the file extension is ignored.
 pub fn read(path: &Path) -> Result<Vec<RgbImage>> {
     let reader = image::ImageReader::open(path).with_context(|| format!("cannot read {}", path.display()))?;
     let strip = reader
@@ -51,7 +49,6 @@ pub fn read(path: &Path) -> Result<Vec<RgbImage>> {
 
 type Colour = [f64; 3];
 
-/// A row's wall: mean and inverse covariance.
 struct Wall {
     mean: Colour,
     inverse: [Colour; 3],
@@ -72,7 +69,6 @@ impl Wall {
         Self { mean, inverse: inverse(&covariance) }
     }
 
-    /// Mahalanobis distance.
     fn distance(&self, colour: Colour) -> f64 {
         let off: Colour = std::array::from_fn(|k| colour[k] - self.mean[k]);
         let square: f64 =
@@ -81,7 +77,6 @@ impl Wall {
     }
 }
 
-/// Inverse of a symmetric positive matrix by cofactors.
 fn inverse(m: &[Colour; 3]) -> [Colour; 3] {
     let cofactor = |i: usize, j: usize| {
         let (a, b, c, d) = ((i + 1) % 3, (i + 2) % 3, (j + 1) % 3, (j + 2) % 3);
@@ -96,7 +91,6 @@ fn median(mut values: Vec<f64>) -> f64 {
     values.get(values.len() / 2).copied().unwrap_or(0.0)
 }
 
-/// The person's mask in every frame of a strip.
 pub fn masks(frames: &[RgbImage]) -> Vec<Mask> {
     let colour =
         |n: usize, y: usize, x: usize| -> Colour { frames[n].get_pixel(x as u32, y as u32).0.map(f64::from) };
@@ -129,7 +123,6 @@ pub fn masks(frames: &[RgbImage]) -> Vec<Mask> {
         .collect()
 }
 
-/// The largest region of a mask alone.
 fn largest(mask: Mask) -> Mask {
     let mut alone = Mask::default(mask.dim());
     let found = regions(mask.view(), true, Connectivity::Eight);
@@ -146,7 +139,7 @@ mod tests {
 
     #[test]
     fn a_dark_body_and_its_waving_arm_are_told_from_a_blotchy_wall() {
-        // A body that never moves and an arm that is up in every other frame; the wall varies by +-8 grey levels.
+        // A motionless body with an arm raised in every other frame; the wall varies by +-8 grey levels.
         let arm = |n: usize, y: usize, x: usize| {
             n.is_multiple_of(2) && (20..24).contains(&y) && (36..50).contains(&x)
         };

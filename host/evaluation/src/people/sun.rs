@@ -1,4 +1,4 @@
-//! Where the sun is: every formula against NREL's published values and against SPA, the board's fixed point too.
+//! Sun position: every formula and the board's fixed point against NREL's published values and SPA.
 
 use anyhow::{Context, Result};
 use chrono::{DateTime, TimeDelta, Utc};
@@ -8,9 +8,9 @@ use farnear_shadow::sun::{Model, Place, SunPosition, parse_time, position};
 use super::data::Data;
 use crate::page::Page;
 
-/// Below this apparent elevation refraction decides whether the sun is up at all.
+/// Below this apparent elevation refraction decides whether the sun is up.
 const UP_DEG: f64 = 0.6;
-/// Places of the comparison with SPA: latitude, longitude (degrees, east positive).
+/// Latitude, longitude (degrees, east positive).
 const PLACES: [[f64; 2]; 12] = [
     [52.38, -1.56],
     [1.0, 103.8],
@@ -25,7 +25,7 @@ const PLACES: [[f64; 2]; 12] = [
     [78.2, 15.6],
     [30.0, 31.2],
 ];
-/// From 2014-01-01 on, 30.3 hours apart, so that hours and seasons are walked through: until the end of 2039.
+/// 30.3 hours per step cover all hours and seasons from 2014 to 2039.
 const STEP_S: i64 = 109_080;
 const STEPS: i64 = 7514;
 
@@ -63,7 +63,6 @@ impl Formula {
     }
 }
 
-/// Largest and root mean square difference in elevation and azimuth, degrees.
 #[derive(Default)]
 struct Differences {
     count: u32,
@@ -86,13 +85,12 @@ impl Differences {
     }
 }
 
-/// Refraction as SPA adds it (Reda and Andreas 2004, eq. 42) at 1000 hPa and 10 deg C for a true elevation, degrees.
+/// SPA's refraction (Reda and Andreas 2004, eq. 42) at 1000 hPa and 10 deg C for a true elevation, degrees.
 fn refraction_deg(elevation_deg: f64) -> f64 {
     let argument = elevation_deg + 10.3 / (elevation_deg + 5.11);
     1000.0 / 1010.0 * 1.02 / (60.0 * argument.to_radians().tan())
 }
 
-/// Smallest difference of two directions, degrees.
 fn turn_deg(a: f64, b: f64) -> f64 {
     (a - b + 180.0).rem_euclid(360.0) - 180.0
 }

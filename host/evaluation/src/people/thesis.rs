@@ -1,4 +1,4 @@
-//! Chapters 7 to 9 of the thesis once more: its tables compared with ours on the available data.
+//! Chapters 7 to 9 of the thesis redone: its tables compared with ours.
 
 use anyhow::{Context, Result};
 use farnear_recognition::classifier::ClassifierKind;
@@ -19,7 +19,7 @@ use super::{
 };
 use crate::page::Page;
 
-/// Li 2014, tables 8.1 and 8.2: method, removed and wrongly removed of five scenes and in the mean.
+/// Li 2014, tables 8.1 and 8.2: method, removed and wrongly removed of five scenes and their mean.
 const THESIS_SHADOWS: [(&str, [f64; 6], [f64; 6]); 6] = [
     ("chromaticity", [38.5, 37.2, 38.5, 24.7, 30.1, 33.8], [41.8, 51.4, 52.6, 41.0, 39.2, 45.2]),
     ("physical", [10.5, 28.0, 25.8, 31.4, 24.3, 24.0], [6.3, 12.5, 14.2, 6.4, 7.0, 9.3]),
@@ -29,7 +29,7 @@ const THESIS_SHADOWS: [(&str, [f64; 6], [f64; 6]); 6] = [
     ("thesis", [68.6, 63.8, 48.1, 88.1, 85.9, 70.9], [0.7, 1.9, 3.2, 2.7, 4.1, 2.5]),
 ];
 const SCENES: u64 = 5;
-/// Li 2014, diagonals of tables 9.1 to 9.3, in the activities' own order there.
+/// Diagonals of tables 9.1 to 9.3, in their order.
 const TABLE_9_1: [(&str, f64); 10] = [
     ("walk", 88.8),
     ("drop", 60.2),
@@ -45,7 +45,7 @@ const TABLE_9_1: [(&str, f64); 10] = [
 const TABLE_9_2_WALK: f64 = 73.3;
 const TABLE_9_3: [(&str, f64); 4] =
     [("bend", 100.0), ("jack", 91.7), ("wave one", 100.0), ("wave two", 100.0)];
-/// Synthetic people of table 9.1: the search over wide ranges takes its time.
+/// Few people: the search over wide ranges is slow.
 const PEOPLE: usize = 9;
 
 pub fn measure(page: &mut Page, data: &Data) -> Result<()> {
@@ -69,7 +69,6 @@ pub fn measure(page: &mut Page, data: &Data) -> Result<()> {
     Ok(())
 }
 
-/// Tables 8.1 and 8.2: shadow removed, and subject wrongly removed, scene by scene.
 fn tables_8(page: &mut Page) -> Result<()> {
     page.heading("Tables 8.1 and 8.2: shadow off, scene by scene");
     page.paragraph(&format!(
@@ -109,7 +108,7 @@ fn tables_8(page: &mut Page) -> Result<()> {
     Ok(())
 }
 
-/// The thesis' method with parameter ranges wider than the thesis': K of N - 1 (principal components), gamma, grids, neighbours.
+/// The thesis' method with wider parameter ranges (K of N - 1: principal components).
 fn tuned(gammas: &[f32]) -> Experiment {
     let grid = |bins: [usize; 3]| PatternKind::Thesis(bins.to_vec());
     let plain = Experiment::thesis();
@@ -133,7 +132,6 @@ fn tuned(gammas: &[f32]) -> Experiment {
 
 const GAMMAS: [f32; 5] = [0.03, 0.3, 1.0, 3.0, 10.0];
 
-/// Per activity the share of right answers, and over all.
 fn shares(confusion: &Confusion) -> Vec<(String, f64)> {
     let row = |(name, counts): (&String, &Vec<u32>)| {
         let all: u32 = counts.iter().sum();
@@ -143,7 +141,6 @@ fn shares(confusion: &Confusion) -> Vec<(String, f64)> {
     confusion.classes.iter().zip(&confusion.counts).map(row).collect()
 }
 
-/// A set by the thesis' method tuned and by ours, one view, compared with numbers of the thesis.
 fn compared(page: &mut Page, set: &Set, thesis: &[(&str, f64)], thesis_mean: f64) -> Result<()> {
     let ours = |mode| Experiment {
         mirror: set.mirror,

@@ -1,4 +1,4 @@
-//! Un-segmented recordings: clips of one person one after the other, cut again by the recogniser.
+//! Un-segmented recordings: concatenated clips of one person, segmented by the recogniser.
 
 use anyhow::Result;
 use farnear_recognition::choice::names;
@@ -14,18 +14,16 @@ use rayon::prelude::*;
 use super::{data::Data, sets};
 use crate::page::Page;
 
-/// A person's recording: its views, and where each activity begins.
 struct Recording {
     views: Vec<Track>,
     truth: Vec<(usize, String)>,
 }
 
-/// Segmentation results of recordings.
 #[derive(Default)]
 struct Found {
     frames: usize,
     right: usize,
-    /// How far the nearest found border is from every true one, frames.
+    /// Distance of the nearest found border from each true one, frames.
     off: Vec<usize>,
     segments: usize,
     clips: usize,
@@ -78,7 +76,7 @@ pub fn measure(page: &mut Page, data: &Data) -> Result<()> {
     Ok(())
 }
 
-/// One person's recording by windows and by the semi-Markov model, taught by the others.
+/// Recording of one person by windows and by the semi-Markov model, trained on the others.
 fn of_person(clips: &[Clip], person: &str, mirror: bool) -> Result<[Found; 2]> {
     let (own, others): (Vec<Clip>, Vec<Clip>) =
         clips.iter().cloned().partition(|clip| clip.subject == person);
@@ -93,7 +91,6 @@ fn of_person(clips: &[Clip], person: &str, mirror: bool) -> Result<[Found; 2]> {
 }
 
 impl Recording {
-    /// The first clip of every activity, in their order.
     fn of(clips: &[Clip]) -> Self {
         let mut taken: Vec<&Clip> = Vec::new();
         for clip in clips {
@@ -152,7 +149,7 @@ impl Recording {
     }
 }
 
-/// Moves a clip's centroids so that the first lies where the last clip ended.
+/// Moves a clip's centroids to begin where the last clip ended.
 fn lead_on(boxes: &mut Array2<f32>, [x, y]: [f32; 2]) {
     let first = boxes.index_axis(Axis(0), 0).to_owned();
     boxes.column_mut(2).mapv_inplace(|v| v + x - first[2]);

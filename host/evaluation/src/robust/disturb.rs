@@ -1,4 +1,4 @@
-//! A pair as an ordinary camera takes it, and depth with and without what farnear does about it.
+//! A pair of an ordinary camera, and depth with and without farnear's corrections.
 
 use std::io::Cursor;
 
@@ -19,37 +19,30 @@ use rand_chacha::ChaCha8Rng;
 
 use crate::rig;
 
-/// The lens' own point spread function.
 pub const PSF: &str = "gaussian:k=0.4578";
-/// Pixels of the rim that do not count.
 const RIM_PX: usize = 16;
-/// Nor those so near to a step.
 const STEP_PX: usize = 9;
 
-/// What differs from a good pair.
+/// Differences from a good pair.
 #[derive(Clone, Debug)]
 pub struct Disturbance {
-    /// Brightness of the near image.
     pub gain: f64,
-    /// Part of the light that the near image lacks in its corners.
+    /// Light lost in the near image's corners.
     pub vignetting: f64,
-    /// How the near image lies.
     pub view: View,
     /// Whether the magnification is independent of the sensor's position.
     pub telecentric: bool,
-    /// By how much an object of a seventh of the image moved, px.
+    /// Displacement of an object of a seventh of the image.
     pub moved_px: f64,
     /// Standard deviation of the pixels' response.
     pub response: f64,
-    /// Quality of JPEG, if that is what the camera writes.
+    /// JPEG quality; `None`: uncompressed.
     pub jpeg: Option<u8>,
-    /// Isolated pixels that are saturated in both images.
+    /// Isolated pixels saturated in both images.
     pub hot: usize,
-    /// Exposure, 1 = 45 % of the full well.
+    /// 1 = 45 % of the full well.
     pub exposure: f64,
-    /// Whether the second image shows another scene.
     pub unrelated: bool,
-    /// Whether the images are exchanged.
     pub exchanged: bool,
 }
 
@@ -71,16 +64,15 @@ impl Default for Disturbance {
     }
 }
 
-/// A disturbed pair, its values 0 to 1 as from files.
+/// Values 0 to 1 as from files.
 pub struct Taken {
     pub far: Array2<f32>,
     pub near: Array2<f32>,
     pub truth: Array2<f32>,
-    /// The pixels' response, if it is uneven.
+    /// `None`: even.
     pub response: Option<Array2<f32>>,
 }
 
-/// Takes a pair of (width, height).
 pub fn take(scene: &Scene, size: (usize, usize), disturbance: &Disturbance, seed: u64) -> Result<Taken> {
     let lens = Lens { telecentric: disturbance.telecentric, ..rig::lens(false)? };
     let psf = PSF.parse()?;
@@ -139,7 +131,6 @@ fn shade(image: &mut Array2<f32>, disturbance: &Disturbance) {
     }
 }
 
-/// What a JPEG file keeps of an image.
 fn jpeg(image: &Array2<f32>, quality: u8) -> Result<Array2<f32>> {
     let (height, width) = image.dim();
     let bytes: Vec<u8> = image.iter().map(|v| (v * 255.0).round() as u8).collect();
@@ -156,29 +147,26 @@ fn jpeg(image: &Array2<f32>, quality: u8) -> Result<Array2<f32>> {
     Ok(Array2::from_shape_fn((height, width), value))
 }
 
-/// The two ways that are compared.
 pub const WAYS: [(&str, Window); 2] =
     [("ro, window 7", Window::Fixed(7)), ("whitened, adaptive", Window::Adaptive)];
 
 pub struct Outcome {
-    /// Root mean square error over the pixels that have a depth, mm.
+    /// RMSE over pixels with a depth.
     pub error_mm: f64,
-    /// Part of the pixels that have one.
+    /// Share of pixels with a depth.
     pub valid: f64,
     pub said: Vec<String>,
-    /// Depth with its uncertainty, if measured.
     pub found: Option<Measurement>,
 }
 
 impl Taken {
-    /// The run time alone, mm; `None` where it refuses the pair.
+    /// Run time without corrections, mm; NaN if it rejects the pair.
     pub fn plain(&self, operators: &Operators, optics: &Optics) -> f64 {
         let settings = Settings { threads: 1, ..Settings::default() };
         let map = depth_from_pair(self.far.view(), self.near.view(), operators, optics, &settings);
         map.map_or(f64::NAN, |map| self.error(&map.depth_mm).0)
     }
 
-    /// By one of the [`WAYS`].
     pub fn measure(
         &self,
         way: usize,
@@ -202,7 +190,6 @@ impl Taken {
         }
     }
 
-    /// Root mean square error and the part of the pixels with a depth, without rim and steps.
     pub fn error(&self, depth: &Array2<f32>) -> (f64, f64) {
         let (mut squares, mut valid, mut all) = (0.0, 0.0, 0.0_f64);
         for at in self.counted() {
@@ -216,7 +203,6 @@ impl Taken {
         ((squares / valid).sqrt(), valid / all)
     }
 
-    /// The pixels that count.
     pub fn counted(&self) -> impl Iterator<Item = (usize, usize)> {
         let (height, width) = self.truth.dim();
         let row = height / 2;

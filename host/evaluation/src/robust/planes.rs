@@ -1,4 +1,4 @@
-//! Planes from far before to far beyond the working range: pixels out of range must be flagged.
+//! Planes from before to beyond the working range: pixels out of range must be flagged.
 
 use anyhow::Result;
 use farnear_depth::operators::Operators;
@@ -16,7 +16,6 @@ const DEPTHS_MM: [f64; 26] = [
     300.0, 400.0, 500.0, 600.0, 700.0, 800.0, 830.0, 850.0, 870.0, 880.0, 884.0, 887.0, 900.0, 910.0, 920.0,
     932.5, 936.0, 940.0, 950.0, 970.0, 1000.0, 1100.0, 1300.0, 1500.0, 3000.0, 5000.0,
 ];
-/// Confidence from which a depth counts as confident.
 const CONFIDENT: f32 = 0.5;
 
 pub fn measure(page: &mut Page) -> Result<()> {

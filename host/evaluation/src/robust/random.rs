@@ -1,4 +1,4 @@
-//! Many disturbances at once, by chance.
+//! Random combinations of disturbances.
 
 use anyhow::Result;
 use farnear_depth::{operators::Operators, optics::Optics};
@@ -16,10 +16,9 @@ use crate::{
 const COMBINATIONS: u64 = 1000;
 const SEED: u64 = 5000;
 const SIZE: (usize, usize) = (256, 192);
-/// An error that must not be silent, mm.
+/// Errors above this must be flagged.
 const SILENT_MM: f64 = 1.5;
 
-/// What a combination came to, by the second way.
 struct Case {
     seed: u64,
     text: String,
@@ -27,7 +26,6 @@ struct Case {
     error_mm: f64,
     valid: f64,
     said: Vec<String>,
-    /// Whether there is no depth map.
     refused: bool,
 }
 
@@ -38,7 +36,7 @@ impl Case {
     }
 }
 
-/// A disturbance of each kind with a probability of a third.
+/// Each kind with a probability of a third.
 fn draw(seed: u64) -> (Disturbance, String) {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let mut parts = Vec::new();

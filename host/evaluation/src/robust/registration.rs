@@ -1,10 +1,10 @@
-//! Our registration compared with OpenCV's ECC: figures of a script, which is run by hand because it needs OpenCV.
+//! Our registration compared with OpenCV's ECC, from a script that is run manually because it needs OpenCV.
 
 use anyhow::Result;
 
 use crate::page::Page;
 
-/// What `host/depth/benches/peer_ecc.py` printed.
+/// Output of `host/depth/benches/peer_ecc.py`.
 const TABLE: &str = include_str!("registration.md");
 
 pub fn measure(page: &mut Page) -> Result<()> {

@@ -15,12 +15,11 @@ use crate::{
 const SEED: u64 = 900;
 const SIZE: (usize, usize) = (640, 480);
 
-/// A row: its name, what disturbs, whether the camera was calibrated, and a wrong description of the optics.
+/// Name, disturbance, whether the camera was calibrated, and an error of the optics file.
 struct Row {
     name: &'static str,
     disturbance: Disturbance,
     calibrated: bool,
-    /// What the optics file says instead of the truth.
     told: Option<(&'static str, f64)>,
 }
 
@@ -100,7 +99,7 @@ fn one(row: &Row) -> Result<Vec<String>> {
     match row.told {
         Some(("k", value)) => put("psf", "k", value),
         Some(("max_blur_px", value)) => put("focus", "max_blur_px", value),
-        // The near focus is kept: a wider aperture then means more blur.
+        // With the near focus unchanged a wider aperture means more blur.
         Some((_, factor)) => {
             put("focus", "max_blur_px", optics.max_blur_px() * factor);
             put("lens", "f_number", optics.f_number() / factor);
@@ -113,7 +112,7 @@ fn one(row: &Row) -> Result<Vec<String>> {
     let operators = Operators::for_optics(&optics)?;
     let camera = match (&taken.response, row.calibrated) {
         (Some(response), true) => {
-            // Sixteen even exposures of this camera have a noise of 0.3 %.
+            // Sixteen even exposures have a noise of 0.3 %.
             Some(CameraFrames::learn(&[Array2::zeros(response.dim())], &[response.mapv(|r| 0.5 * r)])?)
         }
         _ => None,

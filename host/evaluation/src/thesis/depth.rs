@@ -15,7 +15,7 @@ use crate::{
 };
 use bench::Bench;
 
-/// The lens' own point spread function: what the thesis measured on its rig (section 5.4).
+/// The lens' point spread function, as measured in the thesis (section 5.4).
 const LENS_PSF: &str = "generalised:p=1.8,k=0.4802";
 
 pub fn measure(page: &mut Page) -> Result<()> {
@@ -46,7 +46,6 @@ pub fn measure(page: &mut Page) -> Result<()> {
     Ok(())
 }
 
-/// Distances of the rig, sections 4.3 and 5.4.
 fn rig_of_chapter_4(page: &mut Page) -> Result<()> {
     page.subheading("The rig (sections 4.3 and 5.4)");
     let optics = rig::optics(LENS_PSF)?;
@@ -88,7 +87,7 @@ fn normalised_ratio(page: &mut Page) -> Result<()> {
     let (mut plots, mut rows) = (Vec::new(), Vec::new());
     for (name, psf) in models {
         let otf = psf.otf(blur_px);
-        // The 16 frequencies of a 32-point transform up to half the Nyquist frequency's double, as in section 5.2.3.
+        // Frequencies of a 32-point transform, as in section 5.2.3.
         let curves = (1..=16).map(|i| std::f64::consts::PI * f64::from(i) / 16.0).map(|w| {
             let alphas = (0..=80).map(|j| -1.0 + f64::from(j) / 40.0);
             let points = alphas.map(|alpha| (alpha, ratio(&otf, blur_px, w, alpha)));

@@ -7,20 +7,10 @@ mod recognise;
 mod train;
 
 use anyhow::Result;
-use clap::{Args, Subcommand};
-
-/// Recognise what people do from their silhouettes: train a model, use it, evaluate the method.
-#[derive(Args)]
-#[command(after_help = "Example: farnear activity recognise masks/ --model everyday\n\
-                        \x20        farnear activity train samples.toml --out model.fnm\n\
-                        \x20        farnear activity recognise masks/ --model model.fnm")]
-pub struct Arguments {
-    #[command(subcommand)]
-    job: Job,
-}
+use clap::Subcommand;
 
 #[derive(Subcommand)]
-enum Job {
+pub enum Job {
     Train(train::Arguments),
     Recognise(recognise::Arguments),
     Evaluate(evaluate::Arguments),
@@ -28,8 +18,8 @@ enum Job {
 }
 
 /// Runs the command.
-pub fn run(arguments: Arguments) -> Result<()> {
-    match arguments.job {
+pub fn run(job: Job) -> Result<()> {
+    match job {
         Job::Train(arguments) => train::run(arguments),
         Job::Recognise(arguments) => recognise::run(arguments),
         Job::Evaluate(arguments) => evaluate::run(arguments),

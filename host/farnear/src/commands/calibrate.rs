@@ -1,39 +1,30 @@
 //! `farnear calibrate`: learns what the optics do from captured images and depth maps.
 
-mod camera;
-
 use anyhow::Result;
-use clap::{Args, Subcommand};
-use farnear_workflows::calibrate::{
-    correction::CalibrateCorrectionRequest, psf::CalibratePsfRequest, stack::CalibrateStackRequest,
+use clap::Subcommand;
+use farnear_workflows::{
+    calibrate::{
+        correction::CalibrateCorrectionRequest, psf::CalibratePsfRequest, stack::CalibrateStackRequest,
+    },
+    camera_frames::CalibrateCameraRequest,
 };
 
 use crate::run::Run;
 
-/// Learn the point spread function, a correction of the lens's distortion, the camera's own frames, or a whole lens from a z-stack.
-#[derive(Args)]
-#[command(
-    after_help = "Example: farnear calibrate psf far.png near.png --optics optics.toml --model gaussian"
-)]
-pub struct Arguments {
-    #[command(subcommand)]
-    what: What,
-}
-
 #[derive(Subcommand)]
-enum What {
+pub enum What {
     Psf(Run<CalibratePsfRequest>),
     Correction(Run<CalibrateCorrectionRequest>),
     Stack(Run<CalibrateStackRequest>),
-    Camera(camera::Arguments),
+    Camera(Run<CalibrateCameraRequest>),
 }
 
 /// Runs the command.
-pub fn run(arguments: Arguments) -> Result<()> {
-    match arguments.what {
+pub fn run(what: What) -> Result<()> {
+    match what {
         What::Psf(task) => task.run(),
         What::Correction(task) => task.run(),
         What::Stack(task) => task.run(),
-        What::Camera(arguments) => camera::run(arguments),
+        What::Camera(task) => task.run(),
     }
 }

@@ -14,16 +14,8 @@ use farnear_workflows::camera::{
 
 use crate::{report, terminal};
 
-/// Cameras without a rig: which there are, what can be set, pictures to keep and to look at (docs/cameras.md).
-#[derive(Args)]
-#[command(after_help = "Example: farnear camera list")]
-pub struct Arguments {
-    #[command(subcommand)]
-    job: Job,
-}
-
 #[derive(Subcommand)]
-enum Job {
+pub enum Job {
     List(ListArguments),
     Show(ShowArguments),
     Grab(GrabArguments),
@@ -33,7 +25,7 @@ enum Job {
 /// List the cameras that are found, and the kinds that there can be.
 #[derive(Args)]
 #[command(after_help = "Example: farnear camera list --json")]
-struct ListArguments {
+pub struct ListArguments {
     /// Print one JSON object.
     #[arg(long)]
     json: bool,
@@ -59,7 +51,7 @@ impl Choice {
 /// Show what can be set at a camera, its value and its range. What --set sets stays set where the camera keeps it.
 #[derive(Args)]
 #[command(after_help = "Example: farnear camera show --camera genicam:Aravis-Fake-GV01 --set gain=3")]
-struct ShowArguments {
+pub struct ShowArguments {
     #[command(flatten)]
     choice: Choice,
     /// Print one JSON object.
@@ -78,7 +70,7 @@ enum Format {
 /// Keep pictures of a camera that runs freely. The folder appears when everything is in it.
 #[derive(Args)]
 #[command(after_help = "Example: farnear camera grab --camera v4l:/dev/video0 --frames 10 --out pictures/")]
-struct GrabArguments {
+pub struct GrabArguments {
     #[command(flatten)]
     choice: Choice,
     /// How many pictures.
@@ -103,7 +95,7 @@ struct GrabArguments {
 #[command(
     after_help = "Example: farnear camera live --camera \"command:ffmpeg -v error -re -f lavfi -i testsrc -pix_fmt gray -f yuv4mpegpipe -\""
 )]
-struct LiveArguments {
+pub struct LiveArguments {
     #[command(flatten)]
     choice: Choice,
     /// Focus value: fft-sum, tenengrad or modified-laplacian.
@@ -121,8 +113,8 @@ struct LiveArguments {
 }
 
 /// Runs the command.
-pub fn run(arguments: Arguments) -> Result<()> {
-    match arguments.job {
+pub fn run(job: Job) -> Result<()> {
+    match job {
         Job::List(arguments) => report::print(&camera::list(), arguments.json),
         Job::Show(arguments) => report::print(&camera::show(&arguments.choice.parsed()?)?, arguments.json),
         Job::Grab(arguments) => grab(&arguments),

@@ -1,98 +1,126 @@
 //! `farnear rig`: drives a rig, real or emulated.
 
-mod alarms;
-mod board;
 mod calibrate;
-mod capture;
-mod check;
-mod continuous;
-mod correct;
-mod focus;
-mod info;
 mod log;
 mod motion;
-mod sequence;
 mod settings;
-mod sun;
-mod target;
+pub mod target;
 
 use anyhow::Result;
-use clap::{Args, Subcommand, ValueEnum};
-use farnear_protocol::message::Axis;
+use clap::{Args, Subcommand};
+use farnear_workflows::{
+    Context,
+    rig::{
+        AxisName, RigAddress, alarms, board, check::CheckRequest, continuous::ContinuousRequest,
+        correct::BoardCorrectRequest, focus::FocusRequest, info, motion as moving, pair::CaptureRequest,
+        sequence::SequenceRequest, sun::SunRequest,
+    },
+};
+use serde::Serialize;
 
-use target::{CameraArguments, Target};
-
-/// Drive a rig: home, move, focus, capture, calibrate, and everything else the board can do.
-#[derive(Args)]
-#[command(after_help = "Example: farnear rig capture --port sim --optics optics.toml --out pair1/")]
-pub struct Arguments {
-    #[command(subcommand)]
-    job: Job,
-}
+use crate::{
+    report,
+    run::{CameraRun, RigRun},
+    terminal,
+};
+use target::Target;
 
 #[derive(Subcommand)]
-enum Job {
-    Info(info::Arguments),
+pub enum Job {
+    /// Print the board's identity, its limits and where it is.
+    #[command(after_help = "Example: farnear rig info --port /dev/ttyACM0")]
+    Info(Question),
     Home(motion::HomeArguments),
     Move(motion::MoveArguments),
-    Stop(motion::StopArguments),
-    Halt(motion::HaltArguments),
-    Focus(focus::Arguments),
-    Capture(capture::Arguments),
-    Continuous(continuous::Arguments),
-    Sequence(sequence::Arguments),
-    Calibrate(calibrate::Arguments),
-    Sun(sun::Arguments),
-    Correct(correct::Arguments),
-    Alarms(alarms::Arguments),
-    Settings(settings::Arguments),
-    Counters(board::CountersArguments),
-    Reset(board::ResetArguments),
+    /// Stop all motion along the ramps and end a running program; positions stay known.
+    #[command(after_help = "Example: farnear rig stop --port /dev/ttyACM0")]
+    Stop {
+        #[command(flatten)]
+        target: Target,
+    },
+    /// Emergency stop: the last step comes within a millisecond; what moved has lost its position, and the alarm has to be
+    /// cleared (farnear rig alarms).
+    #[command(after_help = "Example: farnear rig halt --port /dev/ttyACM0")]
+    Halt {
+        #[command(flatten)]
+        target: Target,
+    },
+    Focus(CameraRun<FocusRequest>),
+    Capture(CameraRun<CaptureRequest>),
+    Continuous(CameraRun<ContinuousRequest>),
+    Sequence(CameraRun<SequenceRequest>),
+    /// Measure the rig's mechanics, or drive a series of flat targets that teaches the depth correction.
+    #[command(
+        subcommand,
+        after_help = "Example: farnear rig calibrate backlash --port /dev/ttyACM0 --axis coarse"
+    )]
+    Calibrate(calibrate::What),
+    Sun(RigRun<SunRequest>),
+    Correct(RigRun<BoardCorrectRequest>),
+    /// List the last alarms, or clear the latched one by its number. While an alarm is latched nothing moves.
+    #[command(after_help = "Example: farnear rig alarms --port /dev/ttyACM0 --clear 3")]
+    Alarms {
+        #[command(flatten)]
+        question: Question,
+        /// Clear the latched alarm; refused while its cause is there.
+        #[arg(long, value_name = "NUMBER")]
+        clear: Option<u32>,
+    },
+    /// List, read or change the settings in the board's memory.
+    #[command(subcommand, after_help = "Example: farnear rig settings list --port /dev/ttyACM0")]
+    Settings(settings::Job),
+    /// Print what the board has counted in its life.
+    #[command(after_help = "Example: farnear rig counters --port /dev/ttyACM0 --json")]
+    Counters(Question),
+    /// Reset the board; the stages have to be homed again afterwards.
+    #[command(after_help = "Example: farnear rig reset --port /dev/ttyACM0")]
+    Reset(Question),
     Log(log::Arguments),
-    Check(check::Arguments),
+    Check(CameraRun<CheckRequest>),
 }
 
-/// Runs the command.
-pub fn run(arguments: Arguments) -> Result<()> {
-    match arguments.job {
-        Job::Info(arguments) => info::run(arguments),
-        Job::Home(arguments) => motion::home(arguments),
-        Job::Move(arguments) => motion::go(arguments),
-        Job::Stop(arguments) => motion::stop(arguments),
-        Job::Halt(arguments) => motion::halt(arguments),
-        Job::Focus(arguments) => focus::run(arguments),
-        Job::Capture(arguments) => capture::run(arguments),
-        Job::Continuous(arguments) => continuous::run(arguments),
-        Job::Sequence(arguments) => sequence::run(arguments),
-        Job::Calibrate(arguments) => calibrate::run(arguments),
-        Job::Sun(arguments) => sun::run(arguments),
-        Job::Correct(arguments) => correct::run(arguments),
-        Job::Alarms(arguments) => alarms::run(arguments),
-        Job::Settings(arguments) => settings::run(arguments),
-        Job::Counters(arguments) => board::counters(arguments),
-        Job::Reset(arguments) => board::reset(arguments),
-        Job::Log(arguments) => log::run(arguments),
-        Job::Check(arguments) => check::run(arguments),
+// No doc comment: the help text is that of the command.
+#[allow(missing_docs)]
+#[derive(Args)]
+pub struct Question {
+    #[command(flatten)]
+    target: Target,
+    /// Print one JSON object.
+    #[arg(long)]
+    json: bool,
+}
+
+impl Question {
+    fn answer<T: Serialize>(
+        &self,
+        ask: impl FnOnce(&RigAddress, &Context<'_>) -> farnear_workflows::Result<T>,
+    ) -> Result<()> {
+        report::print(&ask(&self.target.address()?, &terminal::context()?)?, self.json)
     }
 }
 
-/// An axis as users name it.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, ValueEnum)]
-enum AxisName {
-    /// Stage A's stepper and screw.
-    Coarse,
-    /// Stage A's piezo.
-    Fine,
-    /// Stage B's stepper and screw, which carry the lens.
-    Lens,
-}
-
-impl AxisName {
-    fn axis(self) -> Axis {
-        match self {
-            Self::Coarse => Axis::SensorCoarse,
-            Self::Fine => Axis::SensorFine,
-            Self::Lens => Axis::Lens,
+/// Runs the command.
+pub fn run(job: Job) -> Result<()> {
+    match job {
+        Job::Info(question) => question.answer(info::info),
+        Job::Home(arguments) => motion::home(arguments),
+        Job::Move(arguments) => motion::go(arguments),
+        Job::Stop { target } => Ok(moving::stop(&target.address()?, &terminal::context()?)?),
+        Job::Halt { target } => Ok(moving::halt(&target.address()?, &terminal::context()?)?),
+        Job::Focus(task) => task.run(),
+        Job::Capture(task) => task.run(),
+        Job::Continuous(task) => task.run(),
+        Job::Sequence(task) => task.run(),
+        Job::Calibrate(arguments) => calibrate::run(arguments),
+        Job::Sun(task) => task.run(),
+        Job::Correct(task) => task.run(),
+        Job::Alarms { question, clear } => {
+            question.answer(|rig, context| alarms::alarms(rig, clear, context))
         }
+        Job::Settings(arguments) => settings::run(arguments),
+        Job::Counters(question) => question.answer(board::counters),
+        Job::Reset(question) => question.answer(board::reset),
+        Job::Log(arguments) => log::run(arguments),
+        Job::Check(task) => task.run(),
     }
 }

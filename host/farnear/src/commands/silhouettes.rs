@@ -1,37 +1,30 @@
 //! `farnear silhouettes`: masks of a person.
 
-mod bodies;
-mod markers;
-mod passages;
-mod video;
-
 use anyhow::Result;
-use clap::{Args, Subcommand};
+use clap::Subcommand;
+use farnear_workflows::silhouettes::{
+    markers::MarkersRequest, passages::PassagesRequest, skeletons::SkeletonsRequest,
+    synthetic::SyntheticRequest, video::SilhouettesVideoRequest,
+};
 
-/// Make silhouettes: masks of the person who moves in a video, or of a motion-capture recording from any view.
-#[derive(Args)]
-#[command(after_help = "Example: farnear silhouettes video walk.y4m --out masks/ --learn-first")]
-pub struct Arguments {
-    #[command(subcommand)]
-    source: Source,
-}
+use crate::run::Run;
 
 #[derive(Subcommand)]
-enum Source {
-    Skeletons(bodies::Skeletons),
-    Synthetic(bodies::Synthetic),
-    Markers(markers::Arguments),
-    Video(video::Arguments),
-    Passages(passages::Arguments),
+pub enum Source {
+    Skeletons(Run<SkeletonsRequest>),
+    Synthetic(Run<SyntheticRequest>),
+    Markers(Box<Run<MarkersRequest>>),
+    Video(Run<SilhouettesVideoRequest>),
+    Passages(Run<PassagesRequest>),
 }
 
 /// Runs the command.
-pub fn run(arguments: Arguments) -> Result<()> {
-    match arguments.source {
-        Source::Skeletons(arguments) => bodies::skeletons(arguments),
-        Source::Synthetic(arguments) => bodies::synthetic(arguments),
-        Source::Markers(arguments) => markers::run(arguments),
-        Source::Video(arguments) => video::run(arguments),
-        Source::Passages(arguments) => passages::run(arguments),
+pub fn run(source: Source) -> Result<()> {
+    match source {
+        Source::Skeletons(task) => task.run(),
+        Source::Synthetic(task) => task.run(),
+        Source::Markers(task) => task.run(),
+        Source::Video(task) => task.run(),
+        Source::Passages(task) => task.run(),
     }
 }

@@ -105,13 +105,13 @@ fn a_lamp_throws_shadows_where_it_hangs_high_enough() {
     let camera = folder.file("camera.toml", format!("{CAMERA}[subject]\ndistance_m = 6.0\n"));
     let [masks, out] = ["masks", "out"].map(|name| folder.text(name));
     let remove = ["shadow", "remove", &masks, "--camera", &camera, "--out", &out, "--json"];
-    fails(&mut farnear(&remove), 2, &["--lat", "required"]);
+    fails(&mut farnear(&remove), 2, &["light none", "lat, lon and time", "lamp"]);
     fails(farnear(&remove).args(["--lamp", "-3,6"]), 2, &["RIGHT,AHEAD,UP"]);
     fails(farnear(&remove).args(["--lamp", "-3,6,1.8"]), 1, &["the lamp hangs 1.8 m above the ground"]);
     fails(
         farnear(&remove).args(["--lamp", "-3,6,3", "--shadow-direction", "10"]),
         2,
-        &["--lamp", "cannot be used"],
+        &["lamp and shadow_direction", "expected one of"],
     );
     fails(farnear(&remove).args(["--shadow-direction", "200"]), 2, &["200", "-180"]);
     let found = figures(farnear(&remove).args(["--lamp", "-3,6,3"]));

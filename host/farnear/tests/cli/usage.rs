@@ -162,7 +162,7 @@ fn bad_usage_ends_with_2() {
         ),
         (vec!["rig", "settings", "get", "speed", "--port", "x"], vec!["setting speed", "datum_nm"]),
         (vec!["rig", "calibrate", "backlash", "--port", "x", "--axis", "fine"], vec!["fine", "piezo"]),
-        (vec!["rig", "sequence", "--port", "sim", "--out", "x"], vec!["--program FILE", "--steps"]),
+        (vec!["rig", "sequence", "--port", "sim", "--out", "x"], vec!["expected a program", "steps"]),
         (vec!["rig", "sequence", "--port", "sim", "--out", "x", "--steps", "3"], vec!["--axis"]),
         (vec!["rig", "focus", "--port", "sim", "--optics", optics, "--region", "1,2"], vec!["--region"]),
         (

@@ -1,6 +1,5 @@
 //! Checks for truncated files and unsupported formats.
 
-/// Remedy for raw files.
 pub(super) const RAW: &str = "it is a camera's raw file: develop it to a 16-bit TIFF, linear and without sharpening (with `dcraw -4 -T`, \
                               RawTherapee or darktable), and give that";
 

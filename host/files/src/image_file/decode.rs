@@ -17,7 +17,7 @@ pub(crate) type Samples8 = Pixels;
 /// Largest expansion of a compressed byte (deflate: 1032), with a margin for small files.
 const EXPANSION: u64 = 1100;
 const SMALL_BYTES: u64 = 64 << 20;
-/// Bit depths searched for a saturated camera in 16-bit samples.
+/// Bit depths in the search for a saturated camera in 16-bit samples.
 const CAMERA_BITS: std::ops::RangeInclusive<u32> = 8..=15;
 /// Pixels at the largest code that make it the white level.
 const SATURATED_PX: usize = 4;
@@ -30,7 +30,6 @@ pub(crate) enum Values {
     F32(Vec<f32>),
 }
 
-/// Rows of pixels with `channels` samples each.
 pub(crate) struct Decoded {
     pub width: usize,
     pub height: usize,
@@ -42,7 +41,6 @@ pub(crate) struct Decoded {
     pub white_level: Option<u16>,
 }
 
-/// Largest decoded size of a file of this length.
 pub(super) fn most_bytes(file: usize) -> u64 {
     SMALL_BYTES.max((file as u64).saturating_mul(EXPANSION))
 }
@@ -94,7 +92,7 @@ fn jpeg(bytes: &[u8]) -> Result<(Decoded, u8), String> {
     Ok((decoded, orientation.map_or(1, image::metadata::Orientation::to_exif)))
 }
 
-/// Whether the decoder reads on when the data continue before the end marker: then they ended early.
+/// Whether the decoder reads on when the data continue before the end marker, i.e. they ended early.
 fn needs_more(bytes: &[u8], values: &[u8], options: DecoderOptions, to: ColorSpace) -> bool {
     const FURTHER: [u8; 64] = [0xa6; 64];
     let Some(end) = bytes.windows(2).rposition(|two| two == [0xff, 0xd9]) else { return true };
@@ -180,7 +178,7 @@ impl Decoded {
         Ok(GreyImage { pixels, samples, colour: self.colours == 3, white_level })
     }
 
-    /// 8 bits per sample without alpha.
+    /// Eight bits per sample, without alpha.
     pub(crate) fn in_8_bits(self) -> Result<Pixels, String> {
         let bytes = match self.values {
             Values::U8(values) => values,
@@ -244,7 +242,6 @@ fn turn<T: Copy>(values: &mut Vec<T>, (height, width): (usize, usize), channels:
     *values = turned;
 }
 
-/// Weighted mean of the colours, divided by full scale.
 fn greys<T: Copy + Into<f64>>(
     samples: &[T],
     (channels, colours): (usize, usize),
@@ -269,8 +266,7 @@ fn greys<T: Copy + Into<f64>>(
     pixels.map(|p| (p[0].into() * r + p[1].into() * g + p[2].into() * b) as f32).collect()
 }
 
-/// Saturation code of a camera with fewer than 16 bits, if several pixels have it: 2^n - 1 in the lower bits,
-/// or in the upper bits with zeros below. `None` without saturation.
+/// Saturation code of a camera with fewer than 16 bits, if several pixels have it: 2^n - 1, or shifted up.
 fn white_of_values(codes: &[u16]) -> Option<u16> {
     let (mut largest, mut used) = (0, 0);
     for code in codes {

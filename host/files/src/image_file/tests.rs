@@ -75,7 +75,6 @@ fn names_files_that_are_not_images() {
 }
 
 proptest! {
-    /// Random data after a magic number gives an image or an error.
     #[test]
     fn broken_files_do_not_panic(kind in 0..5usize, tail in proptest::collection::vec(any::<u8>(), 0..200)) {
         let heads: [&[u8]; 5] = [b"\x89PNG\r\n\x1a\n", b"\xff\xd8\xff\xe0", b"II*\0", b"MM\0*", b"P5 "];
@@ -83,7 +82,6 @@ proptest! {
         let _ = decode_grey(&bytes);
     }
 
-    /// Damaged or truncated pictures, which pass their first lines, are read or refused.
     #[test]
     fn damaged_pictures_are_read_or_refused(
         which in any::<Index>(),
@@ -103,7 +101,6 @@ proptest! {
     }
 }
 
-/// One picture of each supported kind, 7 x 5 px.
 static PICTURES: LazyLock<Vec<Vec<u8>>> = LazyLock::new(|| {
     use image::{ImageFormat, Luma, Rgb, RgbImage, codecs::jpeg::JpegEncoder};
     use tiff::encoder::{Compression, colortype};

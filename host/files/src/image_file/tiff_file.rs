@@ -14,19 +14,16 @@ use super::{
     tiff_tags::{self, Directory},
 };
 
-/// Photometric interpretations of raw files: colour filter array and linear raw (TIFF/EP, DNG).
+/// Colour filter array and linear raw (TIFF/EP, DNG).
 const RAW_PHOTOMETRIC: [u64; 2] = [32803, 34892];
 
-/// A full-resolution image of a TIFF file.
 #[derive(Debug, Clone)]
 pub(crate) struct Page {
-    /// Index among all images of the file, from 0.
     pub index: usize,
     pub directory: Directory,
 }
 
-/// Number of full-resolution images; 1 for other formats.
-/// Errors: [`ImageError`] for an unreadable or raw file, or one with previews only.
+/// Number of full-resolution images; 1 for other formats. Fails for raw files and mere previews.
 pub fn page_count(path: &Path) -> Result<usize, ImageError> {
     let bytes = read_bytes(path)?;
     if !tiff_tags::is_tiff(&bytes) || complete::unsupported(&bytes).is_some() {
@@ -35,8 +32,7 @@ pub fn page_count(path: &Path) -> Result<usize, ImageError> {
     pages(&bytes).map(|pages| pages.len()).map_err(|reason| ImageError::Format { path: path.into(), reason })
 }
 
-/// Full-resolution images.
-/// Errors: a message for raw files, or previews only.
+/// Full-resolution images. Fails for raw files, or previews only.
 pub(crate) fn pages(bytes: &[u8]) -> Result<Vec<Page>, String> {
     let directories = tiff_tags::directories(bytes)?;
     let Some(first) = directories.first() else { return Err("it holds no image".into()) };
@@ -195,8 +191,7 @@ fn decode_page(bytes: &[u8], page: &Page) -> Result<Decoded, String> {
     Ok(Decoded { width, height, channels, colours, values, white_level })
 }
 
-/// Saturation code from the description (as written by farnear), or from the maximum sample value below 16
-/// bits.
+/// Saturation code from the description (as written by farnear), or the maximum sample value below 16 bits.
 fn camera_white(directory: &Directory) -> Option<u16> {
     let described = directory.description.as_deref().and_then(|text| {
         text.split_whitespace().find_map(|word| word.strip_prefix("white_level=")?.parse().ok())
@@ -207,7 +202,6 @@ fn camera_white(directory: &Directory) -> Option<u16> {
     described.or(of_bits)
 }
 
-/// Converts planes to interleaved pixels.
 fn interleaved<T: Copy>(values: Vec<T>, planes: usize) -> Vec<T> {
     if planes == 1 {
         return values;
@@ -219,7 +213,7 @@ fn interleaved<T: Copy>(values: Vec<T>, planes: usize) -> Vec<T> {
         .collect()
 }
 
-/// Unpacks samples of 1, 2 or 4 bits, MSB first, with byte-aligned rows, to 8 bits.
+/// Unpacks samples of 1, 2 or 4 bits, MSB first, with byte-aligned rows.
 fn unpacked(bytes: &[u8], width: usize, height: usize, bits: u8) -> Result<Vec<u8>, String> {
     let per_byte = usize::from(8 / bits);
     let row_bytes = width.div_ceil(per_byte);

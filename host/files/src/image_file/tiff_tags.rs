@@ -1,7 +1,5 @@
-//! TIFF directories without pixels: sizes, kinds and descriptions.
-//!
-//! The `tiff` crate refuses files whose first directory it cannot decode, such as raw files; error messages
-//! need their kind. TIFF 6.0, section 2; BigTIFF as in libtiff's design.
+//! TIFF directories without pixels: sizes, kinds and descriptions (TIFF 6.0, section 2; BigTIFF as in libtiff). The
+//! `tiff` crate rejects files such as raw files, whose kind error messages need.
 
 const DIRECTORIES_MAX: usize = 100_000;
 const ENTRIES_MAX: u64 = 4096;
@@ -20,7 +18,6 @@ pub(crate) struct Directory {
     pub photometric: u64,
     /// Tag 266: 2 = the lowest bit of a byte comes first.
     pub fill_order: u64,
-    /// Tag 284: 2 = a plane for each channel.
     pub planar: u64,
     /// Tag 322.
     pub tile_width: Option<u64>,
@@ -31,11 +28,9 @@ pub(crate) struct Directory {
     pub compression: u64,
     pub strip_offset: u64,
     pub strips: u64,
-    /// Tag 282: pixels per unit along a row.
     pub x_resolution: Option<f64>,
     /// Tag 281.
     pub max_sample_value: Option<u64>,
-    /// Tag 338 of the first extra sample: 1 or 2 = alpha.
     pub extra_samples: Option<u64>,
     pub description: Option<String>,
     pub make: Option<String>,
@@ -44,7 +39,6 @@ pub(crate) struct Directory {
     pub is_dng: bool,
     /// Width and height of the images in tag 330.
     pub sub_images: Vec<(u64, u64)>,
-    /// Tag 51123: JSON of Micro-Manager.
     pub micro_manager: Option<String>,
 }
 
@@ -58,13 +52,11 @@ impl Directory {
     }
 }
 
-/// Whether the data starts as TIFF or BigTIFF.
 pub(crate) fn is_tiff(bytes: &[u8]) -> bool {
     [b"II*\0", b"MM\0*", b"II+\0", b"MM\0+"].iter().any(|magic| bytes.starts_with(*magic))
 }
 
-/// All directories in file order.
-/// Errors: a message for a directory beyond the end, or an endless chain.
+/// All directories in file order. Fails for a directory beyond the end, or an endless chain.
 pub(crate) fn directories(bytes: &[u8]) -> Result<Vec<Directory>, String> {
     let file = File::new(bytes)?;
     let mut at = file.first;

@@ -1,5 +1,3 @@
-//! Image encoders.
-
 use std::io::{self, Cursor, Write};
 
 use image::{
@@ -17,16 +15,14 @@ use tiff::{
 
 use crate::EncodeError;
 
-/// Encodes a camera picture as grey PNG: 8 bits unchanged, 9 to 16 bits shifted to full 16-bit scale so that
-/// viewers show the right brightness; chunk sBIT has the bit depth.
-/// Errors: of the encoder.
+/// Encodes a camera picture as grey PNG: 8 bits unchanged, 9 to 16 bits shifted to full 16-bit scale so that viewers
+/// show the right brightness; chunk sBIT has the bit depth.
 pub fn encode_png(pixels: ArrayView2<u16>, bits: u8) -> Result<Vec<u8>, EncodeError> {
     let mut png = Vec::new();
     png_to(pixels, bits, &mut png)?;
     Ok(png)
 }
 
-/// Signature and IHDR.
 const HEADER_BYTES: usize = 8 + 25;
 
 /// Inserts a chunk sBIT after a PNG's header.
@@ -65,7 +61,6 @@ fn crc32(bytes: &[u8]) -> u32 {
 }
 
 /// [`encode_png`] into a file.
-/// Errors: of the system or the encoder.
 pub fn png_to(pixels: ArrayView2<u16>, bits: u8, to: &mut impl Write) -> Result<(), EncodeError> {
     if bits <= 8 {
         return png8_to(pixels.mapv(|value| value.min(255) as u8).view(), to);
@@ -77,15 +72,12 @@ pub fn png_to(pixels: ArrayView2<u16>, bits: u8, to: &mut impl Write) -> Result<
     encode_to(samples.as_flattened(), pixels.dim(), ExtendedColorType::L16, to)
 }
 
-/// Writes an 8-bit grey PNG.
-/// Errors: of the system or the encoder.
 pub fn png8_to(pixels: ArrayView2<u8>, to: &mut impl Write) -> Result<(), EncodeError> {
     let samples: Vec<u8> = pixels.iter().copied().collect();
     encode_to(&samples, pixels.dim(), ExtendedColorType::L8, to)
 }
 
-/// A single filter for all rows: trying all five takes three quarters of the time and saves few percent of a
-/// noisy image.
+/// A single filter for all rows: trying all five takes three quarters of the time and saves few percent.
 pub(crate) fn encode_to(
     samples: &[u8],
     (height, width): (usize, usize),
@@ -98,7 +90,6 @@ pub(crate) fn encode_to(
 }
 
 /// Encodes a grey TIFF of 8 or 16 bits with unchanged values and the white level in its description.
-/// Errors: of the encoder.
 pub fn encode_tiff(pixels: ArrayView2<u16>, bits: u8) -> Result<Vec<u8>, EncodeError> {
     let (height, width) = pixels.dim();
     let (width, height) = (width as u32, height as u32);

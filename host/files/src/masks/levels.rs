@@ -1,5 +1,5 @@
-//! Which grey level of a folder of masks is the person: 0 and 255, any two others (0 and 1, say), or a background model's labels
-//! (0, 127 and 255 of OpenCV; 0, 50, 85, 170 and 255 of ChangeDetection.net).
+//! The person's grey level in a folder of masks: 0 and 255, any two others, or a background model's labels (0, 127 and
+//! 255 of OpenCV; 0, 50, 85, 170 and 255 of ChangeDetection.net).
 
 use std::path::PathBuf;
 
@@ -7,28 +7,28 @@ use ndarray::Array2;
 
 use super::{MaskError, grey};
 
-/// Levels that label more than a person: shadow, not judged, unknown.
+/// Levels that label more than a person: shadow, not evaluated, unknown.
 const LABELS: [u8; 6] = [0, 50, 85, 127, 170, 255];
-/// OpenCV's shadow: with 0 alone it does not show the person's level.
+/// OpenCV's shadow: with 0 alone it does not identify the person's level.
 const SHADOW: u8 = 127;
-/// Pictures of a folder that are surveyed; more of them while they hold one level only.
+/// Surveyed pictures of a folder; more while they hold one level only.
 const SURVEYED: usize = 8;
-/// JPEG leaves ringing about edges: levels within this share of the range from black or white count as those, and at most one
-/// pixel in [`ONE_BETWEEN_IN`] may lie between.
+/// JPEG rings: levels this near to black or white (part of the range) count as those; at most one pixel in
+/// [`ONE_BETWEEN_IN`] may lie between.
 const RINGING: f64 = 0.157;
 const ONE_BETWEEN_IN: u64 = 50;
-/// Two levels that differ by less, with others between them, are a picture and not a mask.
+/// Two levels nearer than this with others between them are a picture, not a mask.
 const LEAST_GAP: u8 = 40;
 
-/// From which grey level on a pixel of a mask is set.
+/// Threshold of a mask's grey levels.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Levels {
     pub set_from: u8,
-    /// What a user should know about the levels; `None` for black and white.
+    /// Notice to the user about the levels; `None` for black and white.
     pub remark: Option<String>,
 }
 
-/// How often each grey level occurs in pictures.
+/// Count of each grey level.
 #[derive(Clone, Debug)]
 pub struct Histogram([u64; 256]);
 
@@ -39,7 +39,6 @@ impl Default for Histogram {
 }
 
 impl Histogram {
-    /// Adds a picture.
     pub fn add(&mut self, picture: &Array2<u8>) {
         for &level in picture {
             self.0[usize::from(level)] += 1;
@@ -50,13 +49,13 @@ impl Histogram {
         (0..=u8::MAX).filter(|&level| self.0[usize::from(level)] > 0).collect()
     }
 
-    /// Whether other pictures of the folder may hold the level of the person.
+    /// Whether other pictures of the folder may hold the person's level.
     fn undecided(&self) -> bool {
         let present = self.present();
         present.len() < 2 || present == [0, SHADOW]
     }
 
-    /// The levels of masks; `None` for pictures that are not masks.
+    /// The levels of masks; `None` for other pictures.
     #[must_use]
     pub fn levels(&self) -> Option<Levels> {
         match self.present().as_slice() {
@@ -100,17 +99,13 @@ fn listed(levels: &[u8]) -> String {
 }
 
 impl Default for Levels {
-    /// Black and white.
     fn default() -> Self {
         Self { set_from: 128, remark: None }
     }
 }
 
 impl Levels {
-    /// The levels of a histogram that the caller says is one of masks; `first` is for messages.
-    ///
-    /// # Errors
-    /// [`MaskError::Levels`] where nothing would be set although there are several levels.
+    /// The levels of a masks' histogram; `first` is for messages. [`MaskError::Levels`] if nothing would be set.
     pub fn of_masks(histogram: &Histogram, first: &std::path::Path) -> Result<Self, MaskError> {
         if let Some(levels) = histogram.levels() {
             return Ok(levels);
@@ -123,10 +118,7 @@ impl Levels {
         Ok(Self { set_from: 128, remark: Some(remark) })
     }
 
-    /// Looks at pictures all over a folder until the person's level is among them.
-    ///
-    /// # Errors
-    /// Pictures that cannot be read or are in colour.
+    /// Reads pictures throughout a folder until the person's level is among them.
     pub fn survey(files: &[PathBuf]) -> Result<Histogram, MaskError> {
         let mut histogram = Histogram::default();
         let step = files.len().div_ceil(SURVEYED).max(1);

@@ -12,7 +12,7 @@ pub struct Header {
 }
 
 impl Header {
-    /// Parses `descr`, `fortran_order` and `shape` in any order.
+    /// Parses the keys in any order.
     pub fn parse(bytes: &[u8]) -> Result<Self, NpyError> {
         let mut text = Text { bytes, at: 0 };
         let (mut descr, mut fortran_order, mut shape) = (None, None, None);
@@ -44,7 +44,6 @@ impl Header {
     }
 }
 
-/// Text and position.
 struct Text<'a> {
     bytes: &'a [u8],
     at: usize,
@@ -93,7 +92,6 @@ impl<'a> Text<'a> {
         Ok(truth)
     }
 
-    /// Tuple of integers.
     fn lengths(&mut self) -> Result<Vec<usize>, NpyError> {
         self.must(b'(', "(")?;
         let mut lengths = Vec::new();

@@ -2,8 +2,7 @@
 
 use crate::image_file::Page;
 
-/// Positions along the axis, um; `None` if not stated.
-/// Errors: a message for channels or times in one file, or planes in other files.
+/// Positions along the axis, um; `None` if not stated. Fails for channels, times or planes in other files.
 pub(super) fn of(pages: &[Page]) -> Result<Option<Vec<f64>>, String> {
     let Some(first) = pages.first() else { return Ok(None) };
     let description = first.directory.description.as_deref().unwrap_or_default();
@@ -18,7 +17,7 @@ pub(super) fn of(pages: &[Page]) -> Result<Option<Vec<f64>>, String> {
     Ok(of_pages.collect::<Option<Vec<f64>>>().filter(|all| all.len() > 1 && distinct(all)))
 }
 
-/// Side of a pixel at the object, um; `None` where the file says nothing of it.
+/// Side of a pixel at the object; `None` if not stated.
 pub(super) fn object_pixel_um(pages: &[Page]) -> Option<f64> {
     let directory = &pages.first()?.directory;
     let description = directory.description.as_deref()?;

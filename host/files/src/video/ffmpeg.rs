@@ -12,7 +12,7 @@ use super::{VideoError, VideoFrame, timing::Timing, y4m::Y4m};
 /// Characters of ffmpeg's messages quoted in errors.
 const QUOTED_CHARS: usize = 400;
 
-/// Frames of an ffmpeg process, which ends with this value.
+/// Frames of an ffmpeg process; dropping it ends the process.
 struct Ffmpeg {
     path: PathBuf,
     child: Child,
@@ -20,7 +20,6 @@ struct Ffmpeg {
     frames: Option<Y4m<BufReader<ChildStdout>>>,
 }
 
-/// Starts ffmpeg on a file, whose frames come at a constant rate.
 pub(super) fn open(
     path: &Path,
     timing: Option<&Timing>,
@@ -43,7 +42,6 @@ pub(super) fn open(
     let complaint = child.stderr.take().map(|mut stderr| {
         std::thread::spawn(move || {
             let mut bytes = Vec::new();
-            // Quotes what could be read.
             let _ = stderr.read_to_end(&mut bytes);
             String::from_utf8_lossy(&bytes).into_owned()
         })

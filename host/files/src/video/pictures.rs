@@ -15,7 +15,6 @@ use crate::{
 pub const EXTENSIONS: [&str; 8] = ["png", "tif", "tiff", "jpg", "jpeg", "bmp", "pgm", "ppm"];
 
 /// Pictures of a folder in natural order.
-/// Errors: [`VideoError::Io`] for an unreadable folder, [`VideoError::NoPictures`].
 pub fn list(folder: &Path) -> Result<Vec<PathBuf>, VideoError> {
     let entries = fs::read_dir(folder).map_err(|source| VideoError::io(folder, source))?;
     let mut paths = Vec::new();
@@ -46,7 +45,6 @@ pub(super) fn open(
 }
 
 /// Samples of a picture: grey or RGB; 16-bit samples keep their upper half.
-/// Errors: [`VideoError`] for an unreadable file.
 pub fn read(path: &Path) -> Result<Pixels, VideoError> {
     image_file::read_8_bit(path).map_err(|error| match error {
         ImageError::Read { path, source } => VideoError::io(&path, source),

@@ -1,16 +1,14 @@
-//! The times of a video's frames, from ffmpeg's list of packets (nothing is decoded), and the rate at which it is read.
-//!
-//! Recordings of browsers, phones and meetings have no constant rate, and their files promise 1000 frames a second or none: ffmpeg would
-//! fill a Y4M stream to that rate with repeated frames.
+//! Frame times from ffmpeg's list of packets (without decoding), and the rate for reading. Browsers, phones and
+//! meetings record at no constant rate, and their files state 1000 frames a second or none: ffmpeg would repeat frames.
 
 use std::{
     path::Path,
     process::{Command, Stdio},
 };
 
-/// Intervals this far from the usual one, relative to it, are irregular. Millisecond time stamps of 60 frames/s are off by 6 %.
+/// Relative deviation of an irregular interval. Millisecond time stamps of 60 frames/s are off by 6 %.
 const IRREGULAR: f64 = 0.25;
-/// Rates that cameras have, frames per second.
+/// Usual camera rates, frames per second.
 const USUAL_HZ: [f64; 13] = [
     5.0,
     10.0,
@@ -26,17 +24,15 @@ const USUAL_HZ: [f64; 13] = [
     60_000.0 / 1001.0,
     60.0,
 ];
-/// A measured rate this near to a usual one is that, relative.
+/// Relative tolerance for a usual rate.
 const NEAR: f64 = 0.0004;
-/// The same where stamps are irregular, so that the rate is an estimate.
+/// The same with irregular time stamps, where the rate is an estimate.
 const ROUGHLY_NEAR: f64 = 0.04;
 
-/// The times of a video's frames.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Timing {
     /// Nominal frames per second.
     pub rate_hz: f64,
-    /// Whether all intervals are alike.
     pub regular: bool,
     frames: usize,
     seconds: f64,
@@ -44,7 +40,7 @@ pub(super) struct Timing {
 }
 
 impl Timing {
-    /// The times of the first video stream; `None` where ffmpeg cannot list them.
+    /// Times of the first video stream; `None` if ffmpeg cannot list them.
     pub fn of(path: &Path) -> Option<Self> {
         let listed = Command::new("ffmpeg")
             .args(["-nostdin", "-v", "error", "-i"])
@@ -74,11 +70,11 @@ impl Timing {
         let measured = count as f64 / sum;
         let near = if regular { NEAR } else { ROUGHLY_NEAR };
         let off = |rate: &f64| (rate / measured - 1.0).abs();
-        // An irregular rate is not known to a thousandth.
+        // An irregular rate has no accuracy of a thousandth.
         let candidates = USUAL_HZ.into_iter().filter(|rate| regular || rate.fract() == 0.0);
         let nearest = candidates.min_by(|a, b| off(a).total_cmp(&off(b)));
         let seconds = intervals.iter().sum();
-        // Millisecond stamps of a short recording resolve rates no better than this.
+        // Resolution of millisecond stamps in a short recording.
         let resolution = 0.001 / seconds;
         Some(Self {
             rate_hz: nearest.filter(|rate| off(rate) <= near.max(resolution)).unwrap_or(measured),
@@ -89,7 +85,7 @@ impl Timing {
         })
     }
 
-    /// What makes ffmpeg give every frame once, or, where the intervals differ, frames at the nominal rate by their time stamps.
+    /// Arguments that give every frame once or, for irregular intervals, frames at the nominal rate by time stamp.
     pub fn arguments(&self) -> [String; 4] {
         let rate = self.rate_hz;
         let filter = match self.regular {
@@ -99,7 +95,7 @@ impl Timing {
         ["-vf".into(), filter, "-r".into(), format!("{rate:.6}")]
     }
 
-    /// What a user should know about irregular times.
+    /// Notice to the user about irregular times.
     pub fn remark(&self) -> Option<String> {
         let read = (self.seconds * self.rate_hz).round() as usize + 1;
         (!self.regular).then(|| {

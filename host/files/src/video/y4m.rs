@@ -1,5 +1,5 @@
-//! YUV4MPEG2 streams (8 to 12 bits, 4:2:0, 4:2:2, 4:4:4, grey) to 8-bit RGB by ITU-R BT.601, section 2.5.1;
-//! studio range unless `XCOLORRANGE=FULL`. Nearest chroma sample.
+//! YUV4MPEG2 streams (8 to 12 bits, 4:2:0, 4:2:2, 4:4:4, grey) to 8-bit RGB by ITU-R BT.601, section 2.5.1; studio
+//! range unless `XCOLORRANGE=FULL`. Nearest chroma sample.
 
 use std::{
     cell::Cell,
@@ -39,7 +39,6 @@ pub(super) struct Y4m<R: Read> {
 }
 
 impl<R: Read> Y4m<R> {
-    /// Reads the header; `path` is for messages.
     pub(super) fn new(path: &Path, reader: R) -> Result<Self, VideoError> {
         let bytes = Rc::new(Cell::new(0));
         let header = |reason: String| VideoError::Y4m { path: path.into(), frame: 0, reason };

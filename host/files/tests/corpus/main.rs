@@ -1,7 +1,6 @@
-//! Test images of other decoders: nothing crashes, and pixels that are read are those that Pillow reads.
-//!
-//! `FARNEAR_IMAGE_CORPUS` names folders (separated as in PATH), such as `Tests/images` of Pillow's source archive;
-//! `FARNEAR_PYTHON` a Python with Pillow and numpy (`python3` by default). Images that both refuse, or only one reads, are counted.
+//! Test images of other decoders: nothing crashes, and pixels equal Pillow's. `FARNEAR_IMAGE_CORPUS` names folders
+//! (separated as in PATH), such as `Tests/images` of Pillow's source archive; `FARNEAR_PYTHON` a Python with Pillow and
+//! numpy (`python3` by default). Images that both reject, or only one reads, are counted.
 
 use std::{
     collections::BTreeMap,
@@ -14,14 +13,14 @@ use std::{
 use farnear_files::image_file::read_grey;
 use ndarray::Array2;
 
-/// Writes each image that Pillow reads as height, width (u32) and grey values (f32, full scale = 1); one line for each file.
+/// Writes each image that Pillow reads as height, width (u32) and grey values (f32, full scale = 1), a line per file.
 const REFERENCE: &str = include_str!("reference.py");
 const ENDINGS: [&str; 9] = ["png", "tif", "tiff", "jpg", "jpeg", "bmp", "pgm", "ppm", "pnm"];
 /// Largest and mean difference: JPEG decoders round differently, others do not.
 const EXACT: [f32; 2] = [1.1 / 255.0, 0.6 / 255.0]; // Pillow reduces 16-bit colour to 8 bits
-/// Below this number of pixels the rounding of a JPEG does not average out.
+/// Fewer pixels do not average the rounding of a JPEG.
 const TINY: usize = 256;
-/// Files that both read, differently, with the reason.
+/// Files that both read differently, with the reason.
 const KNOWN: [(&str, &str); 7] = [
     ("rletrns.bmp", "pixels that the file leaves out are undefined"),
     ("mmap_error.bmp", "the pixels begin within the palette, which is broken"),
@@ -96,7 +95,6 @@ fn collect(folder: &Path, into: &mut Vec<PathBuf>) {
     }
 }
 
-/// What Pillow reads of each file.
 fn references(files: &[PathBuf]) -> Vec<Option<Array2<f32>>> {
     let folder = tempfile::tempdir().expect("a folder");
     let [script, list] = ["reference.py", "list.txt"].map(|name| folder.path().join(name));
@@ -120,7 +118,6 @@ fn references(files: &[PathBuf]) -> Vec<Option<Array2<f32>>> {
     (0..files.len()).map(read).collect()
 }
 
-/// How the pixels differ; none where they do not.
 fn difference(found: &Array2<f32>, reference: &Array2<f32>, file: &Path) -> Option<String> {
     if found.dim() != reference.dim() {
         return Some(format!("{:?} instead of {:?} rows and columns", found.dim(), reference.dim()));

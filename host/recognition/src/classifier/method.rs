@@ -21,8 +21,8 @@ pub trait Method: Sized {
     /// Probabilities per class with sum 1.
     fn probabilities(&self, pattern: ArrayView1<f32>) -> Vec<f32>;
 
-    /// Trains on a fold's kept clips and answers for the held ones in order. Products make an answer cost the
-    /// number of clips rather than the pattern length, and are shared by all folds and parameters.
+    /// Trains on a fold's kept clips and answers for the held ones in order. Works on the Gram matrix, so
+    /// that an answer costs the number of clips, not the pattern length.
     fn answers(fold: &Fold, parameter: Self::Parameter) -> Vec<usize>;
 
     /// Whether sizes match, so that [`Method::probabilities`] cannot panic.
@@ -44,7 +44,6 @@ pub struct Fold<'a> {
     pub classes: usize,
 }
 
-/// Index of the largest value, the first of equals.
 pub(super) fn largest(values: &[f32]) -> usize {
     values.iter().enumerate().fold(0, |best, (k, v)| if *v > values[best] { k } else { best })
 }

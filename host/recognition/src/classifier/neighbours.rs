@@ -55,8 +55,7 @@ impl Method for Neighbours {
     }
 }
 
-/// Votes of the `k` smallest (squared distance, class), each 1 plus a small bonus for nearness, so that ties
-/// go to the nearer class.
+/// Votes of the `k` smallest (squared distance, class): 1 each, plus a small bonus that decides ties.
 fn vote(mut distances: Vec<(f32, usize)>, classes: usize, k: usize) -> Vec<f32> {
     distances.sort_by(|a, b| a.0.total_cmp(&b.0));
     let mut votes = vec![0.0; classes];

@@ -1,6 +1,4 @@
-//! Multinomial logistic regression: softmax of a linear value per class.
-//!
-//! Gradient descent with Nesterov's momentum on the Gram matrix, regularised by the squared weights.
+//! Multinomial logistic regression by Nesterov's gradient descent on the Gram matrix, with a squared penalty.
 
 use super::method::{Fold, Method, largest};
 use ndarray::{Array1, Array2, ArrayView1, ArrayView2, Axis};
@@ -15,7 +13,6 @@ pub struct Softmax {
     pub offsets: Array1<f32>,
 }
 
-/// Number of gradient steps.
 const STEPS: usize = 300;
 
 /// Dual weights per sample and class, and the offsets.
@@ -62,7 +59,6 @@ impl Method for Softmax {
         format!("cost {cost}")
     }
 
-    /// `cost` weighs errors against the squared weights.
     fn train(patterns: ArrayView2<f32>, labels: &[usize], classes: usize, cost: f32) -> Self {
         let (signed, offsets) = dual(patterns.dot(&patterns.t()).view(), labels, classes, cost);
         Self { weights: signed.t().dot(&patterns), offsets }

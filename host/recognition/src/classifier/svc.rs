@@ -1,8 +1,5 @@
-//! Linear support vector classifier, one against the rest, by dual coordinate descent (Hsieh et al., ICML
-//! 2008, squared hinge loss).
-//!
-//! Clips are few and patterns long, so the descent runs on the patterns' Gram matrix: a step costs as many operations as
-//! there are clips, independent of the patterns' length, and cross-validation folds share one Gram matrix.
+//! Linear support vector classifier, one against the rest, by dual coordinate descent with squared hinge loss
+//! (Hsieh et al., ICML 2008). Runs on the Gram matrix, because clips are few and patterns long.
 
 use super::method::{Fold, Method, largest};
 use ndarray::{Array1, Array2, ArrayView1, ArrayView2};
@@ -18,24 +15,19 @@ pub struct LinearSvc {
     pub offsets: Array1<f32>,
 }
 
-/// Limit of passes over the samples.
 const PASSES: usize = 200;
-/// Convergence limit of the projected gradient.
 const TOLERANCE: f32 = 0.02;
 
-/// A classifier in terms of its training samples.
 struct DualSvc<'a> {
     /// Rows of the Gram matrix used for training.
     rows: &'a [usize],
     /// Per class: multiplier times sign of each row.
     signed: Vec<Vec<f32>>,
-    /// Offset per class.
     offsets: Vec<f32>,
 }
 
 impl<'a> DualSvc<'a> {
-    /// Trains on rows of a Gram matrix (`labels` of all rows, below `classes`); `c` weighs errors against the
-    /// margin.
+    /// `labels` of all rows, below `classes`; `c` weighs errors against the margin.
     fn train(gram: ArrayView2<f32>, rows: &'a [usize], labels: &[usize], classes: usize, c: f32) -> Self {
         let part = Array2::from_shape_fn((rows.len(), rows.len()), |(i, j)| gram[[rows[i], rows[j]]]);
         let own: Vec<usize> = rows.iter().map(|&row| labels[row]).collect();
@@ -44,7 +36,6 @@ impl<'a> DualSvc<'a> {
         Self { rows, signed, offsets }
     }
 
-    /// Decision values for a row of the Gram matrix.
     fn decide(&self, gram_row: ArrayView1<f32>) -> Vec<f32> {
         self.signed
             .iter()
@@ -72,7 +63,6 @@ impl Method for LinearSvc {
         format!("cost {c}")
     }
 
-    /// `c` weighs errors against the margin.
     fn train(patterns: ArrayView2<f32>, labels: &[usize], classes: usize, c: f32) -> Self {
         let gram = patterns.dot(&patterns.t());
         let rows: Vec<usize> = (0..patterns.nrows()).collect();
@@ -81,7 +71,6 @@ impl Method for LinearSvc {
         Self { weights: signed.dot(&patterns), offsets: dual.offsets.into() }
     }
 
-    /// Softmax of the decision values.
     fn probabilities(&self, pattern: ArrayView1<f32>) -> Vec<f32> {
         /// Decision values are about -1 to 1; a margin of one becomes odds of twenty.
         const SLOPE: f32 = 3.0;

@@ -1,13 +1,11 @@
-//! Centroid distance function: 360 distances from a silhouette's centroid to its outermost pixels (Li 2014,
-//! section 9.3.1).
+//! Centroid distance function: 360 distances from a silhouette's centroid to its outermost pixels (Li 2014).
 //!
 //! The silhouette is scaled to 100 x 100 pixels. A ray per degree is marched inwards until it meets a set
-//! pixel, so that no angle is empty, and holes inside the contour have no effect. Distances are in units of
-//! the frame's side: [0, 0.7072] for a central centroid. Angle 0 points right, anticlockwise. About 20 us per
-//! silhouette.
+//! pixel, so no angle is empty and holes have no effect (section 9.3.1). Distances are in units of the
+//! frame's side: [0, 0.7072] for a central centroid. Angle 0 points right, anticlockwise. About 20 us.
 //!
-//! Next to it the silhouette itself, coarsely: set pixels in each cell of that frame ("zoning": Trier, Jain and Taxt, Pattern Recognition 29,
-//! 1996). It describes the inside of the outermost contour: an arm before the body's side, the gap under a raised hand.
+//! The coarse silhouette counts set pixels per cell of that frame ("zoning": Trier, Jain and Taxt, Pattern
+//! Recognition 29, 1996). It describes the inside of the outermost contour.
 
 use farnear_silhouettes::mask::BoundingBox;
 use ndarray::ArrayView2;
@@ -22,7 +20,6 @@ pub const SIDE: usize = 100;
 pub const CELLS_ACROSS: usize = 20;
 /// Cells of the coarse silhouette.
 pub const CELLS: usize = CELLS_ACROSS * CELLS_ACROSS;
-/// Side of a cell.
 const CELL_SIDE: usize = SIDE / CELLS_ACROSS;
 /// Pixels of a cell.
 pub const CELL_PIXELS: usize = CELL_SIDE * CELL_SIDE;
@@ -53,20 +50,17 @@ pub type CoarseSilhouette = [u8; CELLS];
 
 /// March step; half of it bounds the error.
 const STEP_PX: f64 = 0.5;
-/// Padding of the frame, so that a ray may start outside.
 const MARGIN: usize = 2;
 const PADDED: usize = SIDE + 2 * MARGIN;
 
-/// The centroid distance of the subject in a mask of any size.
-/// Errors: [`EmptyMask`].
+/// The centroid distance of the subject in a mask of any size; fails for an empty mask.
 pub fn centroid_distance(mask: ArrayView2<bool>, scaling: Scaling) -> Result<CentroidDistance, EmptyMask> {
     let bounds = BoundingBox::of(mask).ok_or(EmptyMask)?;
     let (frame, inner) = normalise(mask, bounds, scaling);
     Ok(march(&frame, inner))
 }
 
-/// The centroid distance and the coarse silhouette of the subject in a mask of any size, and its bounds.
-/// Errors: [`EmptyMask`].
+/// Centroid distance, coarse silhouette and bounds of the subject in a mask; fails for an empty mask.
 pub fn described(
     mask: ArrayView2<bool>,
     scaling: Scaling,
@@ -76,7 +70,6 @@ pub fn described(
     Ok((march(&frame, inner), coarse(&frame), bounds))
 }
 
-/// Set pixels per cell of the padded frame.
 fn coarse(frame: &[bool]) -> CoarseSilhouette {
     let mut cells = [0_u8; CELLS];
     for y in 0..SIDE {
@@ -117,7 +110,6 @@ fn normalise(mask: ArrayView2<bool>, bounds: BoundingBox, scaling: Scaling) -> (
     (frame, BoundingBox { top, left, bottom: top + rows, right: left + columns })
 }
 
-/// Centroid of the set pixels; pixel centres are integers.
 fn centroid(frame: &[bool]) -> (f64, f64) {
     let (mut count, mut sum_x, mut sum_y) = (0_u64, 0_u64, 0_u64);
     for (y, row) in frame.chunks_exact(PADDED).enumerate() {
@@ -133,9 +125,7 @@ fn centroid(frame: &[bool]) -> (f64, f64) {
     (sum_x as f64 / count.max(1) as f64, sum_y as f64 / count.max(1) as f64)
 }
 
-/// Marches all rays over the padded frame.
 fn march(frame: &[bool], inner: BoundingBox) -> CentroidDistance {
-    /// Fraction bits of the position.
     const FRACTION: u32 = 16;
     let (cx, cy) = centroid(frame);
     let scale = f64::from(1_u32 << FRACTION);
@@ -193,7 +183,6 @@ mod tests {
     use super::*;
     use farnear_silhouettes::mask::Mask;
 
-    /// Largest difference from a known curve, in units of the side.
     fn worst(mask: &Mask, scaling: Scaling, known: impl Fn(f64) -> f64) -> f64 {
         let found = centroid_distance(mask.view(), scaling).expect("not empty");
         (0..ANGLES).map(|a| (f64::from(found[a]) - known((a as f64).to_radians())).abs()).fold(0.0, f64::max)

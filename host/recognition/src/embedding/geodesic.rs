@@ -1,9 +1,8 @@
 //! Shortest paths in the neighbour graph.
 //!
-//! [`dijkstra`] uses a binary heap for one source. [`all_pairs`] and [`from_sources`] relax the graph for
-//! sixteen sources at a time (Bellman-Ford label correction, sweeping nodes forwards and backwards along the
-//! data), so an edge costs one vector operation for sixteen sources; a few sweeps suffice. N = 1500, K = 12:
-//! a few tens of milliseconds on one thread instead of 150 with heaps.
+//! [`dijkstra`] uses a binary heap for one source. [`all_pairs`] and [`from_sources`] relax sixteen sources
+//! at a time (Bellman-Ford label correction, sweeping nodes forwards and backwards along the data), so an
+//! edge costs one vector operation. N = 1500, K = 12: tens of milliseconds on one thread, 150 with heaps.
 
 use super::neighbours::Graph;
 use ndarray::Array2;
@@ -11,7 +10,6 @@ use rayon::prelude::*;
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
-/// Sources relaxed together.
 const LANES: usize = 16;
 
 #[derive(PartialEq)]
@@ -61,7 +59,7 @@ pub fn from_sources(graph: &Graph, sources: &[usize]) -> Array2<f32> {
     let arch = pulp::Arch::new();
     let mut all = Array2::<f32>::zeros((sources.len(), n));
     if let Some(rows) = all.as_slice_mut() {
-        // Sources that lie together have paths alike, so that a node settled in one lane is seldom visited for another.
+        // Nearby sources have similar paths, so few nodes are revisited for a single lane.
         let mut rank = vec![0_u32; n];
         for (place, &node) in (0..).zip(&order) {
             rank[node as usize] = place;
@@ -86,7 +84,7 @@ pub fn from_sources(graph: &Graph, sources: &[usize]) -> Array2<f32> {
     all
 }
 
-/// Sweeps forth and back until nothing changes. A node is visited only if one of its neighbours has changed since.
+/// Sweeps forth and back until nothing changes. Visits a node only after a change of a neighbour.
 #[inline(always)]
 fn relax(graph: &Graph, order: &[u32], sources: &[usize], distance: &mut [[f32; LANES]]) {
     let mut stale = vec![false; distance.len()];

@@ -1,8 +1,7 @@
 //! Isomap (Tenenbaum, de Silva, Langford, Science 290, 2000): classical scaling of geodesic distances.
 //!
 //! Coordinates are the leading eigenvectors of `B = -1/2 J D^2 J` times the square roots of their
-//! eigenvalues. With K = N - 1 (the thesis' choice, [`Neighbourhood::Nearest`]) the result is exactly PCA;
-//! Isomap needs a small K. O(N^2 (d + K)) time, 8 N^2 bytes.
+//! eigenvalues. K = N - 1 (the thesis' choice) is exactly PCA. O(N^2 (d + K)) time, 8 N^2 bytes.
 
 use super::geodesic::all_pairs;
 use super::neighbours::{Graph, Neighbourhood};
@@ -23,9 +22,8 @@ pub struct Isomap {
     pub geodesics: Array2<f32>,
 }
 
-/// Lays out `samples` (N x d) in `dimensions` dimensions.
-/// Errors: Too few or non-finite samples, a neighbour graph that falls apart (its parts are named), fewer
-/// positive eigenvalues than dimensions.
+/// Lays out `samples` (N x d) in `dimensions` dimensions. Fails for too few or non-finite samples, a
+/// disconnected graph, or fewer positive eigenvalues than dimensions.
 pub fn isomap(
     samples: ArrayView2<f32>,
     neighbourhood: Neighbourhood,
@@ -42,7 +40,6 @@ pub fn isomap(
 /// Residual over the largest eigenvalue: single precision, far below the graph's accuracy.
 const TOLERANCE: f64 = 1e-5;
 
-/// Classical multidimensional scaling of a symmetric distance matrix.
 pub(super) fn classical_scaling(
     distances: &Array2<f32>,
     dimensions: usize,
@@ -60,8 +57,7 @@ pub(super) fn classical_scaling(
     Ok((coordinates, values))
 }
 
-/// Leading pairs of `-1/2 J D^2 J` without forming it: squared distances stay in single precision, half the
-/// memory traffic, and J only subtracts means.
+/// Leading pairs of `-1/2 J D^2 J` without forming it, in single precision for less memory traffic.
 fn leading(distances: &Array2<f32>, dimensions: usize) -> Option<spectral::Pairs> {
     let n = distances.nrows();
     let mut squared = vec![0.0_f32; n * n];
@@ -87,7 +83,6 @@ fn leading(distances: &Array2<f32>, dimensions: usize) -> Option<spectral::Pairs
     })
 }
 
-/// `-1/2 J D^2 J`, row-major.
 fn double_centred(distances: &Array2<f32>) -> Vec<f64> {
     let n = distances.nrows();
     let mut centred: Vec<f64> = distances.iter().map(|&d| f64::from(d).powi(2)).collect();
@@ -107,7 +102,6 @@ mod tests {
     use super::*;
     use rand::{Rng, SeedableRng};
 
-    /// Swiss roll points with their true (unrolled) coordinates.
     fn swiss_roll(n: usize) -> (Array2<f32>, Vec<[f64; 2]>) {
         let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(5);
         let flat: Vec<[f64; 2]> =
@@ -121,7 +115,6 @@ mod tests {
         (rolled, flat.into_iter().map(|[t, height]| [arc(t), height]).collect())
     }
 
-    /// Squared Pearson correlation of `sqrt(squared)` and `distances`.
     fn squared_correlation(squared: &Array2<f32>, distances: &Array2<f32>) -> f64 {
         let (mut n, mut sx, mut sy, mut sxx, mut syy, mut sxy) = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
         for (&square, &distance) in squared.iter().zip(distances) {

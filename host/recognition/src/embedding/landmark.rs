@@ -1,8 +1,8 @@
 //! Landmark Isomap (de Silva and Tenenbaum, NIPS 15, 2003) for large galleries: scales the paths from some
 //! landmarks and places other samples by their distances to them.
 //!
-//! Landmarks are chosen by farthest-point steps over the path lengths, so they cover the data. Memory is L N floats instead of
-//! N^2; 20,000 samples of 360 numbers take seconds, most of it the neighbour search.
+//! Landmarks are chosen by farthest-point steps over the path lengths, so they cover the data. Memory is L N
+//! floats instead of N^2; 20,000 samples of 360 numbers take seconds, mostly for the neighbour search.
 
 use super::geodesic::{dijkstra, from_sources};
 use super::isomap::classical_scaling;
@@ -22,8 +22,7 @@ pub struct LandmarkIsomap {
     pub eigenvalues: Vec<f64>,
 }
 
-/// Lays out `samples` (N x d) by `landmarks` landmarks.
-/// Errors: as [`super::isomap::isomap`], and fewer landmarks than dimensions + 2.
+/// Fails as [`super::isomap::isomap`] does, and for fewer landmarks than dimensions + 2.
 pub fn landmark_isomap(
     samples: ArrayView2<f32>,
     neighbourhood: Neighbourhood,

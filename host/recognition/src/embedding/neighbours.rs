@@ -1,7 +1,6 @@
-//! Neighbour graph: K nearest or within a radius, symmetric, in compressed sparse rows.
-//!
-//! Squared distances come in blocks from one matrix product (`|a|^2 + |b|^2 - 2 a.b`); edges are recomputed
-//! from the samples to avoid cancellation. O(N^2 d) flops, O(N K) memory.
+//! Neighbour graph: K nearest or within a radius, symmetric, in compressed sparse rows. O(N^2 d) flops, O(N
+//! K) memory. Edges are recomputed from the samples to avoid the cancellation of the blockwise matrix
+//! product.
 
 use super::{EmbeddingError, squared_distance, squared_norms, times_transposed};
 use ndarray::{ArrayView2, s};
@@ -38,12 +37,10 @@ pub struct Graph {
     pub lengths: Vec<f32>,
 }
 
-/// Rows of the distance matrix per block.
 const BLOCK: usize = 256;
 
 impl Graph {
-    /// The graph of a sample matrix (N x d).
-    /// Errors: No neighbours asked for.
+    /// The graph of a sample matrix (N x d); fails if no neighbours are requested.
     pub fn new(samples: ArrayView2<f32>, neighbourhood: Neighbourhood) -> Result<Self, EmbeddingError> {
         let n = samples.nrows();
         if let Neighbourhood::Nearest(k) = neighbourhood
@@ -142,8 +139,7 @@ impl Graph {
         components
     }
 
-    /// Ok for a connected graph.
-    /// Errors: [`EmbeddingError::Disconnected`] with the parts by name.
+    /// Returns [`EmbeddingError::Disconnected`] with the parts unless the graph is connected.
     pub fn connected(&self, neighbourhood: Neighbourhood) -> Result<(), EmbeddingError> {
         let components = self.components();
         if components.len() <= 1 {

@@ -15,8 +15,7 @@ pub struct Pca {
 }
 
 impl Pca {
-    /// Fits `dimensions` directions to `samples` (N x d). O(N d^2 + d^3).
-    /// Errors: Too few or non-finite samples, fewer directions with variance than asked for.
+    /// Fits to `samples` (N x d), O(N d^2 + d^3). Fails for too few or non-finite samples or no variance.
     pub fn fit(samples: ArrayView2<f32>, dimensions: usize) -> Result<Self, EmbeddingError> {
         check(samples, 2)?;
         let mean = samples.mean_axis(Axis(0)).unwrap_or_else(|| Array1::zeros(samples.ncols()));
@@ -32,8 +31,7 @@ impl Pca {
         Ok(Self { mean, directions, variances })
     }
 
-    /// Coordinates of samples (N x d) along the directions (N x D).
-    /// Errors: Samples of another width.
+    /// Coordinates of samples (N x d) along the directions (N x D); fails for another width.
     pub fn transform(&self, samples: ArrayView2<f32>) -> Result<Array2<f32>, EmbeddingError> {
         if samples.ncols() != self.mean.len() {
             return Err(EmbeddingError::Shape {

@@ -1,10 +1,8 @@
-//! Embedding of new silhouettes by Gaussian radial basis functions on the gallery, with a ridge (Li 2014, eq.
-//! 9.3 to 9.7).
+//! Embedding of new silhouettes by Gaussian radial basis functions with a ridge (Li 2014, eq. 9.3 to 9.7).
 //!
-//! `y = sum_m w_m exp(-gamma |x - c_m|^2)`, `W = (B + ridge I)^-1 Y`. gamma depends on the descriptor's
-//! units: 0.03 to 0.1 for centroid distances in [0, 0.7] (the thesis' 1e-4 is for pixels). Training is O(N^3
-//! / 3). Embedding is one pass over the centres in 16-bit fixed point (1500 x 360 fit a cache): some 15 us,
-//! error far below 1e-3.
+//! `y = sum_m w_m exp(-gamma |x - c_m|^2)`, `W = (B + ridge I)^-1 Y`. gamma is 0.03 to 0.1 for centroid
+//! distances in [0, 0.7] (the thesis' 1e-4 is for pixels). Training is O(N^3 / 3). Embedding is one pass over
+//! the centres in 16-bit fixed point: about 15 us for 1500 x 360, error far below 1e-3.
 
 use super::{EmbeddingError, check, squared_distance, squared_norms, times_transposed};
 use faer::linalg::solvers::Solve;
@@ -12,8 +10,7 @@ use faer::{Mat, Side};
 use ndarray::{Array1, Array2, ArrayView1, ArrayView2};
 use rayon::prelude::*;
 
-/// Fixed-point scale and largest value (no centroid distance in a unit frame exceeds its diagonal): squares
-/// of a run of [`RUN`] differences fit an i32 (64 x (3990 x 1.45)^2 < 2^31).
+/// Fixed-point scale. Squares of a run of [`RUN`] differences fit an i32 (64 x (3990 x 1.45)^2 < 2^31).
 const SCALE: f32 = 3990.0;
 const LARGEST: f32 = 1.45;
 /// Differences summed as integers before conversion to float.
@@ -39,8 +36,7 @@ pub struct Rbf {
 }
 
 impl Rbf {
-    /// Learns the map from `samples` (N x d) to `coordinates` (N x D).
-    /// Errors: Shapes that differ, non-finite samples, a singular system.
+    /// Learns `samples` (N x d) to `coordinates` (N x D); fails for non-finite samples or a singular system.
     pub fn train(
         samples: ArrayView2<f32>,
         coordinates: ArrayView2<f32>,
@@ -89,8 +85,7 @@ impl Rbf {
         self.weights.ncols()
     }
 
-    /// Embeds one sample (d) to D coordinates.
-    /// Errors: a sample of another width.
+    /// Embeds one sample (d) to D coordinates; fails for another width.
     pub fn embed(&self, sample: ArrayView1<f32>) -> Result<Array1<f32>, EmbeddingError> {
         if sample.len() != self.centres.ncols() {
             return Err(EmbeddingError::Shape {
@@ -114,8 +109,7 @@ impl Rbf {
         Ok(out)
     }
 
-    /// Embeds many samples (N x d) to N x D coordinates, over the current rayon pool.
-    /// Errors: Samples of another width.
+    /// Embeds samples (N x d) to N x D coordinates on the current rayon pool; fails for another width.
     pub fn embed_all(&self, samples: ArrayView2<f32>) -> Result<Array2<f32>, EmbeddingError> {
         let rows: Result<Vec<Array1<f32>>, EmbeddingError> =
             samples.outer_iter().into_par_iter().map(|row| self.embed(row)).collect();
@@ -155,14 +149,12 @@ impl Rbf {
     }
 }
 
-/// Fixed-point sample in runs padded with zeros.
 fn quantised(sample: ArrayView1<f32>) -> impl Iterator<Item = [i16; RUN]> {
     let runs = sample.len().div_ceil(RUN);
     let values: Vec<i16> = sample.iter().map(|v| (v * SCALE).round() as i16).collect();
     (0..runs).map(move |r| std::array::from_fn(|k| values.get(r * RUN + k).copied().unwrap_or(0)))
 }
 
-/// Sum of squared differences of one run.
 #[inline(always)]
 fn run_of_squares(a: &[i16; RUN], b: &[i16; RUN]) -> i32 {
     let mut sum = 0;
@@ -187,7 +179,6 @@ fn dot(a: &[f32], b: &[f32]) -> f32 {
     sums.iter().sum::<f32>() + tail
 }
 
-/// `exp(-gamma |a - b|^2)` of all pairs.
 fn kernel(samples: ArrayView2<f32>, gamma: f32) -> Array2<f32> {
     let norms = squared_norms(samples);
     let mut kernel = times_transposed(samples, samples);
@@ -204,8 +195,7 @@ fn kernel(samples: ArrayView2<f32>, gamma: f32) -> Array2<f32> {
     kernel
 }
 
-/// `exp(-x)` for x >= 0 within 2e-5 relative, vectorisable: 2^(-x log2 e) from exponent bits and a
-/// polynomial.
+/// `exp(-x)` for x >= 0 within 2e-5 relative, vectorisable: 2^(-x log2 e) from exponent bits and a series.
 #[inline(always)]
 pub(crate) fn exp_negative(x: f32) -> f32 {
     // Cut at 2^-125, below which results are denormal.
@@ -220,7 +210,6 @@ pub(crate) fn exp_negative(x: f32) -> f32 {
     f32::from_bits(((whole as i32 + 127) as u32) << 23) * polynomial
 }
 
-/// Largest eigenvalue of a positive map by power iteration, within some per cent.
 fn largest(n: usize, apply: impl Fn(&Mat<f64>) -> Mat<f64>) -> f64 {
     let mut v = Mat::<f64>::from_fn(n, 1, |i, _| 1.0 + 0.5 * ((i as f64) * 0.618_034).fract());
     let mut value = 0.0;

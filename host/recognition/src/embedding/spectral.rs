@@ -2,8 +2,7 @@
 //!
 //! A block is repeatedly multiplied by the matrix and orthogonalised twice against all previous ones; the
 //! projected matrix gives the pairs (Golub and Van Loan, Matrix Computations, section 10.3.6). A block costs
-//! one pass over the matrix for any number of vectors; about eight suffice for a gallery of 1500. Otherwise
-//! the dense solver is used.
+//! one pass over the matrix; about eight suffice for a gallery of 1500. Falls back to the dense solver.
 
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, MatRef, Par, Side};
@@ -15,10 +14,9 @@ const SPARE: usize = 5;
 /// Limit of blocks before the dense solver.
 const MOST_BLOCKS: usize = 24;
 
-/// Descending eigenvalues with unit eigenvectors.
 pub(crate) type Pairs = (Vec<f64>, Vec<Vec<f64>>);
 
-/// The `wanted` largest POSITIVE eigenpairs of a symmetric row-major n x n matrix, descending, or fewer. Unit
+/// The `wanted` largest positive eigenpairs of a symmetric row-major n x n matrix, descending, or fewer. Unit
 /// eigenvectors as rows, largest entry positive for repeatability.
 pub(crate) fn leading(matrix: &[f64], n: usize, wanted: usize) -> Pairs {
     let view = MatRef::from_row_major_slice(matrix, n, n);
@@ -30,8 +28,7 @@ pub(crate) fn leading(matrix: &[f64], n: usize, wanted: usize) -> Pairs {
     leading_of(n, wanted, 1e-8, apply).unwrap_or_else(|| positive(whole(view), wanted))
 }
 
-/// [`leading`] for an operator on blocks of vectors; converged below `tolerance` times the largest
-/// eigenvalue. `None` for small operators, or without convergence.
+/// [`leading`] for an operator, to `tolerance` times the largest eigenvalue; `None` if it does not converge.
 pub(super) fn leading_of(
     n: usize,
     wanted: usize,
@@ -117,7 +114,6 @@ fn product_of(a: MatRef<f64>, b: MatRef<f64>) -> Mat<f64> {
     product
 }
 
-/// Joins the columns of both.
 fn beside(a: &Mat<f64>, b: &Mat<f64>) -> Mat<f64> {
     let mut both = Mat::<f64>::zeros(b.nrows(), a.ncols() + b.ncols());
     both.as_mut().subcols_mut(0, a.ncols()).copy_from(a);
@@ -125,7 +121,6 @@ fn beside(a: &Mat<f64>, b: &Mat<f64>) -> Mat<f64> {
     both
 }
 
-/// The `wanted` largest positive pairs, descending.
 pub(super) fn positive(mut pairs: Vec<(f64, Vec<f64>)>, wanted: usize) -> Pairs {
     let largest = pairs.iter().fold(0.0_f64, |m, pair| m.max(pair.0.abs()));
     pairs.retain(|pair| pair.0 > 1e-10 * largest);
@@ -134,7 +129,6 @@ pub(super) fn positive(mut pairs: Vec<(f64, Vec<f64>)>, wanted: usize) -> Pairs 
     pairs.into_iter().map(|(value, vector)| (value, signed(vector))).unzip()
 }
 
-/// Sign with a positive largest entry.
 fn signed(mut vector: Vec<f64>) -> Vec<f64> {
     let peak = vector.iter().fold(0.0_f64, |peak, v| if v.abs() > peak.abs() + 1e-12 { *v } else { peak });
     if peak < 0.0 {
@@ -143,7 +137,6 @@ fn signed(mut vector: Vec<f64>) -> Vec<f64> {
     vector
 }
 
-/// All eigenpairs by the dense solver; empty without convergence.
 pub(super) fn whole(view: MatRef<f64>) -> Vec<(f64, Vec<f64>)> {
     let Ok(eigen) = view.self_adjoint_eigen(Side::Lower) else { return Vec::new() };
     let values = eigen.S().column_vector();

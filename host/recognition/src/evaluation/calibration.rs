@@ -1,6 +1,5 @@
 //! Calibration of confidences, and separation of known from unknown by a score.
 
-/// Bins of confidence.
 const BINS: usize = 15;
 
 /// Reliability diagram: confidences and right answers in bins of equal width.
@@ -23,8 +22,7 @@ impl Reliability {
         filled.map(|&(n, sum, right)| (sum / f64::from(n), f64::from(right) / f64::from(n), n)).collect()
     }
 
-    /// Expected calibration error (Naeini et al., AAAI 2015): mean difference of a bin's confidence and share
-    /// of right answers; 0 without answers.
+    /// Expected calibration error (Naeini et al., AAAI 2015); 0 without answers.
     pub fn expected_error(&self) -> f64 {
         let curve = self.curve();
         let all: u32 = curve.iter().map(|(.., n)| n).sum();
@@ -33,8 +31,8 @@ impl Reliability {
     }
 }
 
-/// Area under the ROC curve: probability that a stranger scores higher than a known clip, ties counting half
-/// (Mann and Whitney 1947). NaN if either is empty. O(n log n).
+/// Area under the ROC curve: probability that an unknown clip scores higher than a known one; ties count half
+/// (Mann and Whitney 1947). NaN if either is empty.
 pub fn area_under_roc(known: &[f32], strange: &[f32]) -> f64 {
     let mut all: Vec<(f32, bool)> =
         known.iter().map(|v| (*v, false)).chain(strange.iter().map(|v| (*v, true))).collect();

@@ -1,8 +1,7 @@
 //! Leave-one-subject-out evaluation.
 //!
-//! Per subject: the space is learned from the other subjects' clips; its parameters, sharpness and classifier
-//! are chosen by cross-validation over those ([`crate::choice`]); the classifier is trained on all of them;
-//! the left-out clips are recognised once and influence nothing.
+//! Space, sharpness and classifier are chosen by cross-validation over the other subjects ([`crate::choice`])
+//! and trained on all of these. The left-out clips are recognised once and influence nothing.
 
 use super::confusion::Confusion;
 use crate::alignment::{Alignment, Statistics};
@@ -71,11 +70,7 @@ pub enum EvaluationError {
         "an open set needs at least {fewest} clips of what is taught by either half of the subjects, without the activity that is left out, one half has {found}: \
          with fewer nothing can be called unknown at a stated share of false alarms; evaluate more people or clips"
     )]
-    OpenSetClips {
-        /// Clips that would be trained.
-        found: usize,
-        fewest: usize,
-    },
+    OpenSetClips { found: usize, fewest: usize },
     #[error(transparent)]
     Model(Box<crate::model::ModelError>),
     #[error(
@@ -86,9 +81,8 @@ pub enum EvaluationError {
     Embedding(#[from] EmbeddingError),
 }
 
-/// Runs the experiment over all subjects. `change` alters the left-out subject's clips before they are recognised (speed, shuffling,
-/// damage); training is never altered.
-/// Errors: See [`EvaluationError`].
+/// Runs the experiment over all subjects. `change` alters the left-out subject's clips before recognition
+/// (speed, shuffling, damage), never the training.
 pub fn leave_one_subject_out(
     clips: &[Clip],
     experiment: &Experiment,
@@ -102,10 +96,9 @@ pub fn leave_one_subject_out(
     train_on_others(clips, &changed, experiment, &[Views::Each, Views::Fused], &Unwatched)
 }
 
-/// Recognises the clips of every subject of `test`, trained on the clips of all OTHER subjects of `train` (which may be the same
-/// people: clean clips for damaged ones, say). Only the asked arrangements of views are computed; others stay empty.
-/// `watch` hears of every fold, and may stop the work.
-/// Errors: See [`EvaluationError`].
+/// Recognises the clips of every subject of `test`, trained on the other subjects of `train` (which may hold
+/// the same people, e.g. clean clips for damaged ones). Other than the given arrangements of views stay
+/// empty. `watch` receives every fold and may stop the work.
 pub fn train_on_others(
     train: &[Clip],
     test: &[Clip],
@@ -222,7 +215,6 @@ fn one_fold(
     Ok(outcome)
 }
 
-/// Aligned frame vectors `[clip][view]`.
 fn aligned(
     align: Alignment,
     seen: Vec<Vec<Array2<f32>>>,

@@ -1,7 +1,5 @@
-//! Activities outside the training set: are they called unknown, and known ones not?
-//!
-//! Each activity in turn is left out of the training on half of the subjects; the other half performs all
-//! activities, and vice versa.
+//! Open-set evaluation: rates of unknown answers for trained and untrained activities. Each activity in turn
+//! is left out of the training on one half of the subjects; the other half performs all, and vice versa.
 
 use super::calibration::area_under_roc;
 use super::leave_one_out::EvaluationError;
@@ -18,7 +16,7 @@ use serde::Serialize;
 /// Separation of unknown from known clips.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct OpenSet {
-    /// The activity left out of training; in a mean over all of them, `None`.
+    /// Activity left out of training; `None` for the mean over all.
     pub left_out: Option<String>,
     /// Clips of trained activities.
     pub known: usize,
@@ -32,16 +30,14 @@ pub struct OpenSet {
     pub auroc: f64,
 }
 
-/// Outlier scores of a round.
 #[derive(Default)]
 struct Scores {
     known: Vec<f32>,
     strange: Vec<f32>,
 }
 
-/// Leaves every activity out in turn; `experiment` is told which. An experiment's first settings are taken; all views are fused. Gives a
-/// row per activity and their mean last.
-/// Errors: Fewer than 4 subjects or 3 activities, too few clips for a limit; see [`EvaluationError`].
+/// Leaves every activity out in turn, with the first settings of `experiment` and fused views. Returns a row
+/// per activity and their mean last. Fails for fewer than 4 subjects or 3 activities, or too few clips.
 pub fn open_set(
     clips: &[Clip],
     experiment: impl Fn(&str) -> Experiment + Sync,
@@ -93,7 +89,6 @@ pub fn open_set(
     Ok(rows)
 }
 
-/// Converts model errors.
 fn of_model(error: ModelError) -> EvaluationError {
     match error {
         ModelError::Embedding(error) => error.into(),

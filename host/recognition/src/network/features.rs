@@ -1,5 +1,4 @@
-//! Network outputs as features for another classifier, normalised by mean and spread over the training clips,
-//! so that a classifier's cost is comparable.
+//! Network outputs, normalised over the training clips, as features for another classifier.
 
 use super::Network;
 use ndarray::{Array1, Array2, ArrayView2, Axis};
@@ -38,7 +37,6 @@ impl Features {
     }
 }
 
-/// Network outputs for clips, one per row.
 pub(crate) fn values(network: &Network, clips: &[Array2<f32>]) -> Array2<f32> {
     let rows: Vec<Array1<f32>> = clips.iter().map(|frames| network.pattern(frames.view())).collect();
     Array2::from_shape_fn((rows.len(), network.width()), |(i, k)| rows[i][k])

@@ -18,14 +18,12 @@ use crate::watch::Watch;
 use ndarray::{Array1, Array2, ArrayView2, Axis, concatenate};
 use rayon::prelude::*;
 
-/// Typical patterns per activity for outlier scores.
 const TYPICAL: usize = 24;
 
 impl Recogniser {
-    /// Trains a network on clips in one view each, and on their mirrors; how sure its answers are and what counts as unknown is found
-    /// on `others`: clips of people who are not among the first.
-    /// Errors: Fewer than two activities, clips without frames or with several views, a gallery that cannot
-    /// be laid out, [`EmbeddingError::Stopped`].
+    /// Trains a network on one-view clips and their mirrors, calibrated on `others`, clips of different
+    /// people. Fails for fewer than two activities, clips without frames or with several views, or a gallery
+    /// that cannot be laid out.
     pub fn train_network(
         clips: &[Clip],
         others: &[Clip],
@@ -83,8 +81,7 @@ impl Recogniser {
         Ok(recogniser)
     }
 
-    /// Softmax temperature (Guo et al., ICML 2017) and unknown limits from other people's clips, varied as in
-    /// training: unvaried they would be more similar to the training data than real people.
+    /// Softmax temperature (Guo et al., ICML 2017) and unknown limits, from varied clips of other people.
     fn calibrate(&mut self, others: &[Clip], taught: &NetworkSettings) -> Result<(), ModelError> {
         let known: Vec<(usize, &Clip)> = others
             .iter()
@@ -115,18 +112,15 @@ impl Recogniser {
     }
 }
 
-/// Embeds a clip's frames.
 fn embedded(space: &Space, clip: &Clip) -> Result<Embedded, ModelError> {
     let view = only_view(clip)?;
     Ok(Embedded { points: space.points(view)?, boxes: view.boxes.clone() })
 }
 
-/// Frame vectors of a clip.
 fn vectors(space: &Space, clip: &Embedded) -> Array2<f32> {
     space.vectors_of(clip.points.view(), clip.boxes.as_ref().map(|boxes| boxes.view()))
 }
 
-/// The view of a one-view clip.
 fn only_view(clip: &Clip) -> Result<&Track, ModelError> {
     match clip.views.as_slice() {
         [view] if view.frames() > 0 => Ok(view),
@@ -158,7 +152,6 @@ fn best_slope(decisions: &[Vec<f32>], labels: &[usize]) -> f32 {
     (0.5 * (low + high)).exp()
 }
 
-/// Centres of every activity's patterns (k-means).
 fn typical(patterns: &[Array1<f32>], labels: &[usize], classes: usize) -> Array2<f32> {
     let centres: Vec<Array2<f32>> = (0..classes)
         .into_par_iter()

@@ -24,8 +24,7 @@ pub struct NetworkSettings {
     pub rate: f32,
     /// Weight decay, times the learning rate.
     pub decay: f32,
-    /// Least share of a clip's frames that a step sees: each clip draws its share between this and all again, 1 for all. Motion is taken between
-    /// those that are left.
+    /// Least share of a clip's frames in a step, drawn up to 1. Motion is between the remaining frames.
     pub keep: f32,
     /// Random offset per component, constant over a clip, in spreads of the component.
     pub shift: f32,
@@ -61,13 +60,11 @@ impl Default for NetworkSettings {
     }
 }
 
-/// First and second moments of a parameter's gradient.
 struct Moments {
     first: Vec<f32>,
     second: Vec<f32>,
 }
 
-/// A layer with its gradients' moments.
 struct Learner {
     layer: Dense,
     weights: Moments,
@@ -88,7 +85,6 @@ impl Learner {
         }
     }
 
-    /// One gradient step; returns the gradient of the inputs.
     fn step(
         &mut self,
         inputs: ArrayView2<f32>,
@@ -105,7 +101,6 @@ impl Learner {
     }
 }
 
-/// A step of Adam.
 #[derive(Clone, Copy)]
 struct Step {
     number: i32,
@@ -135,8 +130,8 @@ impl Step {
 /// Frame vectors (frames x F) of an embedded clip.
 pub type Vectors<'a> = &'a (dyn Fn(&Embedded) -> Array2<f32> + Sync);
 
-/// Trains on non-empty clips with their frame vectors and labels below `classes`; returns the network and the
-/// mean of the members' linear output layers. `watch` may stop it (`None`) and is called per pass and member.
+/// Trains on non-empty clips with labels below `classes`; returns the network and the mean of the members'
+/// linear output layers. `watch` is called per pass and member; `None` stops.
 pub fn train(
     clips: &[Embedded],
     vectors: Vectors<'_>,
@@ -160,7 +155,6 @@ pub fn train(
     Some((Network { mean: scale.mean, spread: scale.spread, members }, Dense::mean_of(&last)))
 }
 
-/// Trains a member.
 fn one_member(
     clips: &[Embedded],
     vectors: Vectors<'_>,
@@ -203,7 +197,6 @@ fn one_member(
 struct Scale {
     mean: Array1<f32>,
     spread: Array1<f32>,
-    /// Spread of the embedded points.
     points: Array1<f32>,
 }
 
@@ -227,7 +220,6 @@ impl Scale {
     }
 }
 
-/// One step on a batch.
 fn one_step(
     learners: &mut [Learner; 4],
     clips: &[Array2<f32>],
@@ -307,7 +299,6 @@ fn to_neighbours(windows: ArrayView2<f32>, reach: usize) -> Array2<f32> {
     out
 }
 
-/// Gradient of the mean cross entropy with smoothed labels.
 fn cross_entropy(decision: &Array2<f32>, labels: impl Iterator<Item = usize>, smoothing: f32) -> Array2<f32> {
     let (n, classes) = decision.dim();
     let mut gradient = decision.clone();
@@ -321,7 +312,6 @@ fn cross_entropy(decision: &Array2<f32>, labels: impl Iterator<Item = usize>, sm
     gradient / n as f32
 }
 
-/// Gradient of the rectifier.
 fn only_above_zero(gradient: &mut Array2<f32>, values: &Array2<f32>) {
     gradient.zip_mut_with(values, |gradient, &value| {
         if value <= 0.0 {
@@ -337,7 +327,6 @@ mod tests {
     use std::collections::BTreeSet;
     use std::sync::Mutex;
 
-    /// Trains on clips whose frame vectors are their points.
     fn trained(
         clips: &[Array2<f32>],
         labels: &[usize],

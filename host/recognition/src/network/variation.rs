@@ -1,8 +1,5 @@
-//! Augmentation of training clips: random frames are dropped, with motion between the remaining ones (slow or
-//! irregular cameras), and whole clips are shifted (build, clothes, tracker).
-//!
-//! Synthetic people have even frame rates and exact shapes; domain randomisation (Tobin et al., IROS 2017)
-//! reduces the dependence on these.
+//! Augmentation: drops random frames (irregular cameras) and shifts whole clips (build, clothes, tracker),
+//! because synthetic people have even frame rates and exact shapes (Tobin et al., IROS 2017).
 
 use super::training::NetworkSettings;
 use ndarray::{Array1, Array2, Axis};
@@ -19,17 +16,15 @@ pub struct Embedded {
     pub boxes: Option<Array2<f32>>,
 }
 
-/// Smallest number of remaining frames.
 const FEWEST: usize = 6;
 
-/// Clips as a step of the training sees them, drawn with its own seed.
+/// Clips as a training step sees them, drawn with its own seed.
 pub(super) fn varied(clips: &[Embedded], settings: &NetworkSettings) -> Vec<Embedded> {
     let mut rng = ChaCha8Rng::seed_from_u64(settings.seed);
     let spread = spread(clips);
     clips.iter().map(|clip| clip.varied(settings, &spread, &mut rng)).collect()
 }
 
-/// Spread of each component over all frames.
 pub(super) fn spread(clips: &[Embedded]) -> Array1<f32> {
     let frames: usize = clips.iter().map(|clip| clip.points.nrows()).sum();
     let n = frames.max(1) as f32;
@@ -41,7 +36,6 @@ pub(super) fn spread(clips: &[Embedded]) -> Array1<f32> {
 }
 
 impl Embedded {
-    /// Augmented clip; `spread` as returned by [`spread`].
     pub(super) fn varied(
         &self,
         settings: &NetworkSettings,
@@ -51,7 +45,6 @@ impl Embedded {
         self.thinned(settings.keep, rng).shifted(spread, settings.shift, rng)
     }
 
-    /// Keeps each frame with a probability drawn between `least` and 1. Draws nothing if all stay.
     fn thinned(&self, least: f32, rng: &mut ChaCha8Rng) -> Self {
         if least >= 1.0 {
             return self.clone();
@@ -71,8 +64,7 @@ impl Embedded {
         }
     }
 
-    /// The clip with its own offset on each component, the same in all frames, drawn with `shift` times the component's
-    /// `spread`.
+    /// Adds an offset per component, equal in all frames, drawn with `shift` times the component's `spread`.
     fn shifted(mut self, spread: &Array1<f32>, shift: f32, rng: &mut ChaCha8Rng) -> Self {
         if shift > 0.0 {
             let offsets: Array1<f32> =

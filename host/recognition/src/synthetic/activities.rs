@@ -1,8 +1,7 @@
 //! Synthetic people performing the ten activities of Li 2014, table 7.1, as capsules.
 //!
-//! Every subject has a build and habits (stature, girth, stride, bending, tempo, handedness); performances
-//! vary around these. Positions, directions and counts follow the table: most activities begin and end with
-//! walking, which makes them similar.
+//! Every subject has a build and habits; performances vary around these. Positions, directions and counts
+//! follow the table: most activities begin and end with walking, which makes them similar.
 
 use crate::clip::{Clip, Track};
 use crate::embedding::descriptor::Scaling;
@@ -16,7 +15,6 @@ use rayon::prelude::*;
 pub const ACTIVITIES: [&str; 10] =
     ["walk", "drop", "crouch", "peer", "mobile", "place", "bag", "shoot", "gun", "dig"];
 
-/// Build and habits of a person.
 #[derive(Clone, Copy, Debug)]
 struct Person {
     build: Build,
@@ -26,7 +24,6 @@ struct Person {
     left_handed: bool,
 }
 
-/// A hand-held object.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Prop {
     None,
@@ -36,7 +33,6 @@ enum Prop {
     LongGun,
 }
 
-/// Part of a performance.
 #[derive(Clone, Copy, Debug)]
 struct Stretch {
     seconds: f64,
@@ -46,25 +42,24 @@ struct Stretch {
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Kind {
-    /// Straight walk; the upper body depends on prop or phone.
-    Walk { phone: bool },
-    /// Walk around the centre.
-    Circle { phone: bool },
+    Walk {
+        phone: bool,
+    },
+    Circle {
+        phone: bool,
+    },
     /// Leaning forward and down with an arm: depth 0 to 1.
-    Reach { depth: f64 },
-    /// Kneeling down and getting up.
+    Reach {
+        depth: f64,
+    },
     Crouch,
     /// On tiptoe with both arms over a wall.
     PeerOver,
-    /// Raising a gun and firing.
     Aim,
-    /// Digging strokes.
     Dig,
-    /// Lifting the bag over an edge and dropping it.
     DropBag,
 }
 
-/// Parts of an activity.
 fn script(activity: usize, person: &Person, rng: &mut ChaCha8Rng) -> Vec<Stretch> {
     let mut vary = |seconds: f64| seconds * person.tempo * rng.random_range(0.85..1.18);
     let plain = Kind::Walk { phone: false };
@@ -132,7 +127,6 @@ fn swell(t: f64, share: f64) -> f64 {
     ease(t / share) * ease((1.0 - t) / share)
 }
 
-/// Pose at `t` (0 to 1) of a part.
 fn pose(stretch: &Stretch, t: f64, phase: f64, person: &Person) -> Pose {
     let moving = matches!(stretch.kind, Kind::Walk { .. } | Kind::Circle { .. });
     let mut pose =
@@ -155,10 +149,8 @@ fn pose(stretch: &Stretch, t: f64, phase: f64, person: &Person) -> Pose {
     pose
 }
 
-/// Main and other arm.
 type Hands = (usize, usize);
 
-/// Arms for the prop.
 fn carry(pose: &mut Pose, prop: Prop, (main, other): Hands) {
     match prop {
         Prop::Bag => pose.arms[main] = Arm { shoulder_deg: 8.0, spread_deg: 14.0, elbow_deg: 12.0 },

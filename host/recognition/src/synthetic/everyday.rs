@@ -1,11 +1,10 @@
-//! Everyday activities of synthetic people, as training data without recordings, for any camera, cut and
-//! segmentation.
+//! Everyday activities of synthetic people, as training data without recordings. Seeded.
 //!
 //! Bodies follow published anthropometry ([`person`]), gait published joint angles ([`gait`]), hands
-//! minimum-jerk paths ([`gestures`], [`postures`]); amplitude, tempo, handedness, stance and cut vary
-//! ([`motion`]), as do camera and segmentation ([`camera`]). Spreads were chosen after viewing public sets:
-//! clothes, damage and image borders; proportions, tracker errors, hand positions and clip limits as in the
-//! joints of UTKinect and Florence. Seeded.
+//! minimum-jerk paths ([`gestures`], [`postures`]); [`motion`] varies amplitude, tempo and cut, [`camera`]
+//! the view and the masks. Spreads of clothes, damage and image borders were chosen after viewing public
+//! sets. Proportions, tracker errors, hand positions and clip limits follow the joints of UTKinect and
+//! Florence.
 
 pub mod camera;
 pub mod gait;
@@ -29,7 +28,6 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, Normal};
 use rayon::prelude::*;
 
-/// Name of an activity and its generator.
 type Activity = (&'static str, fn(&mut Maker) -> Motion);
 
 /// All everyday activities by name.
@@ -111,11 +109,9 @@ fn placed(person: &Person, moments: &[Moment], going: bool) -> Vec<Joints> {
     joints
 }
 
-/// Joint coordinates of a body.
 const COORDINATES: usize = 51;
 
-/// Errors of joint trackers: none for half of the clips, else millimetres per frame and centimetres of
-/// constant or slow drift.
+/// Errors of joint trackers: none for half of the clips, else millimetres per frame and centimetres of drift.
 fn tremble(joints: &mut [Joints], rng: &mut ChaCha8Rng) {
     if rng.random_bool(0.5) {
         return;

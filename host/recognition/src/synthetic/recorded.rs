@@ -1,8 +1,5 @@
-//! Training clips from recorded motion with synthetic cameras and segmentation ([`super::everyday`]), so that
-//! few recordings cover many views.
-//!
-//! A recording is seen from sides around it. Frame rate, cut, clothes, camera and damage of each clip are
-//! random, from a seed.
+//! Training clips from recorded motion with synthetic cameras and segmentation ([`super::everyday`]). A
+//! recording is seen from several sides; frame rate, cut, clothes, camera and damage are random, from a seed.
 
 use super::everyday::camera::Camera;
 use crate::clip::Track;
@@ -25,9 +22,7 @@ pub enum Bodies<'a> {
     Parts(Vec<HashMap<&'a str, Point3>>, Template),
 }
 
-/// Default frame rate.
 const USUAL_HZ: f64 = 30.0;
-/// Smallest and largest number of frames of a clip.
 const FRAMES: [usize; 2] = [6, 64];
 /// Longer recordings are cut to a piece; shorter ones lose a little at both ends.
 const LONG_S: f64 = 6.0;
@@ -62,7 +57,6 @@ pub fn tracks(bodies: &Bodies, rate_hz: f64, count: usize, seed: u64, scaling: S
         .collect()
 }
 
-/// The frames of a clip out of a recording of this many.
 fn cut(frames: usize, rate_hz: f64, rng: &mut ChaCha8Rng) -> Vec<usize> {
     let recorded_hz = if rate_hz > 0.0 { rate_hz } else { USUAL_HZ };
     let seconds = frames as f64 / recorded_hz;
@@ -92,7 +86,6 @@ impl Bodies<'_> {
         }
     }
 
-    /// Drops frames without points.
     fn drop_empty(&mut self) {
         match self {
             Self::Capsules(frames) => frames.retain(|body| body.iter().any(Capsule::is_finite)),
@@ -110,7 +103,6 @@ impl Bodies<'_> {
         }
     }
 
-    /// Smallest and largest coordinates per frame.
     fn extents(&self) -> Vec<[Point3; 2]> {
         let of = |points: &mut dyn Iterator<Item = Point3>| {
             points.filter(|p| p.iter().all(|v| v.is_finite())).fold(
@@ -129,8 +121,7 @@ impl Bodies<'_> {
         }
     }
 
-    /// Moves the ground to 0 and the middle of the path to the origin; returns the person's size (largest
-    /// extent, 90th percentile of frames). `None` without points.
+    /// Moves the ground to 0 and the path's middle to the origin; returns the 90th percentile of the extent.
     fn set_down(&mut self) -> Option<f64> {
         let extents = self.extents();
         let rank = |mut values: Vec<f64>, share: f64| {
@@ -160,7 +151,6 @@ impl Bodies<'_> {
         }
     }
 
-    /// Clothed: thickness as a factor.
     fn dressed(mut self, thickness: f64) -> Self {
         match &mut self {
             Self::Capsules(frames) => frames.iter_mut().flatten().for_each(|c| c.radius_mm *= thickness),
@@ -187,7 +177,6 @@ impl Bodies<'_> {
 mod tests {
     use super::*;
 
-    /// A post with an arm that rises, 3 m off the origin and 1 m above the ground.
     fn capsules(frames: usize) -> Vec<Vec<Capsule>> {
         let at = |x: f64, z: f64| [3000.0 + x, 500.0, 1000.0 + z];
         (0..frames)

@@ -18,7 +18,6 @@ const SHIPPED: [&[u8]; 4] = [
     include_bytes!("../../models/everyday-order-free-cut-out.fnm"),
 ];
 
-/// Clips of a few very different activities.
 fn few(first: usize, people: usize) -> Vec<Clip> {
     let kept = ["walk", "jumping jack", "crouch", "lie down"];
     let mut clips = everyday::clips(first, people, Scaling::default());
@@ -46,8 +45,7 @@ fn a_network_learns_from_synthetic_people_survives_a_file_and_takes_any_number_o
     assert!(found >= 24, "{found} of {}", others.len());
     let back = Recogniser::from_bytes(&model.to_bytes().expect("encoded")).expect("decoded");
     assert_eq!(back, model);
-    // Two views of one performance: the joint answer is at least as sure where they agree, and an empty view
-    // changes nothing.
+    // The joint answer is at least as sure where the views agree; an empty view changes nothing.
     let view = others[0].views[0].clone();
     let one = model.recognise(std::slice::from_ref(&view)).expect("fits");
     let two = model.recognise(&[view.clone(), view.clone()]).expect("fits");
@@ -103,7 +101,6 @@ fn the_shipped_models_are_small_and_know_people_they_never_saw() {
     }
 }
 
-/// An experiment with the shipped model next to it.
 fn with_auxiliary_model() -> Experiment {
     let other = Recogniser::from_bytes(SHIPPED[0]).expect("whole");
     let space =
@@ -111,7 +108,6 @@ fn with_auxiliary_model() -> Experiment {
     Experiment { second: Some(Arc::new(other)), ..Experiment::codebook(space).fixed() }
 }
 
-/// A model with auxiliary, trained without an activity.
 fn taught_without(left_out: &str, mut clips: Vec<Clip>) -> Recogniser {
     clips.retain(|clip| clip.activity != left_out);
     let trained = Recogniser::train_searched(&clips, &with_auxiliary_model(), Scaling::default(), &Unwatched);

@@ -1,9 +1,6 @@
-//! Public API tests in one binary.
-
 mod everyday;
 mod recognition;
 
-/// Number of property cases: few by default, more for fuzzing.
 fn cases(usual: u32) -> u32 {
     std::env::var("PROPTEST_CASES").ok().and_then(|text| text.parse().ok()).unwrap_or(usual)
 }

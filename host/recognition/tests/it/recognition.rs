@@ -20,7 +20,6 @@ use proptest::prelude::*;
 use proptest::test_runner::TestRunner;
 use std::sync::{Arc, OnceLock};
 
-/// A small, quickly trained space.
 fn small(mode: Mode) -> SpaceSettings {
     SpaceSettings { gallery: 500, pattern: PatternKind::Codebook(80), mode, ..SpaceSettings::default() }
 }
@@ -33,8 +32,7 @@ fn experiment(mode: Mode) -> Experiment {
     }
 }
 
-/// Right answers for the clips and several changes of them, leaving out every subject once; one training
-/// serves all changes.
+/// Right answers per change, leaving out every subject once; one training serves all changes.
 fn right(people: &[Clip], mode: Mode, changes: &[fn(&Clip) -> Clip]) -> Vec<f64> {
     let settings = RecogniserSettings { space: small(mode), ..RecogniserSettings::default() };
     let mut right = vec![0_u32; changes.len()];
@@ -79,7 +77,6 @@ fn unseen_people_are_recognised_and_neither_order_nor_speed_matters_much() {
     assert!(ordered > 0.75, "{ordered}");
 }
 
-/// Clips and a model trained on them, shared by all tests.
 fn trained() -> &'static (Vec<Clip>, Recogniser) {
     static TRAINED: OnceLock<(Vec<Clip>, Recogniser)> = OnceLock::new();
     TRAINED.get_or_init(|| {
@@ -159,7 +156,6 @@ fn live_answers_settle_on_what_is_done_and_windows_cover_a_recording() {
     assert_eq!((stretches[0].from, stretches.last().map(|s| s.to)), (0, Some(track[0].frames())));
 }
 
-/// A model with changed body bytes and a valid checksum.
 fn tampered(bytes: &[u8], places: &[(usize, u8)]) -> Vec<u8> {
     const HEADER: usize = 28;
     let mut bytes = bytes.to_vec();

@@ -19,7 +19,7 @@ use farnear_workflows::{
     },
     rig::{
         RigAddress,
-        targets::{self, TargetSettings},
+        targets::{self, TargetSeriesRequest},
     },
     sessions,
     simulator::Scenery,
@@ -195,12 +195,12 @@ async fn series(
         }
         _ => (RigAddress::Open(open), true),
     };
-    let settings = TargetSettings {
+    let settings = TargetSeriesRequest {
         rig,
         camera: app.camera(),
         optics: app.optics_file(),
-        distances_mm,
-        ask,
+        distances: distances_mm,
+        no_prompt: !ask,
         out: app.session.join(SERIES),
     };
     let work = move |_: &App, context: &Context<'_>| figures(targets::capture(&settings, context)?);

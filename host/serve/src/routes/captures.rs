@@ -5,13 +5,12 @@ use axum::{
     extract::{Path, Query, State},
     http::{HeaderMap, StatusCode},
 };
-use farnear_protocol::message::Axis;
 use farnear_workflows::{
     Context,
     rig::{
-        RigAddress,
-        pair::{self, PairSettings},
-        sequence::{self, Program, SequenceSettings},
+        AxisName, RigAddress,
+        pair::{self, CaptureRequest as PairRequest},
+        sequence::{self, SequenceRequest},
         series::{self, SeriesSettings},
     },
     sessions::{self, Note},
@@ -28,7 +27,7 @@ use crate::{
     failure::Failure,
     job_queue::Task,
     routes::rig::{begin, connected, figures},
-    view::{AxisName, Begun, DONE, Done, Nothing},
+    view::{Begun, DONE, Done, Nothing},
 };
 
 /// Most images of a stack.
@@ -230,7 +229,14 @@ async fn capture(
                 Some(name) => sessions::new_capture(&app.session, &name)?,
                 None => free("pair", 1)?.remove(0),
             };
-            let settings = PairSettings { rig, camera, optics, averaged, frames: None, out: out.clone() };
+            let settings = PairRequest {
+                rig,
+                camera,
+                optics,
+                average: averaged,
+                out: out.clone(),
+                ..PairRequest::default()
+            };
             let capture = name_of(&out);
             let work = move |app: &App, context: &Context<'_>| {
                 let captured = pair::capture_seen(&settings, context, |pair| {
@@ -264,9 +270,17 @@ async fn capture(
             };
             let at_um = fine_um.clamp(limit("fine_min_um", fine_um), limit("fine_max_um", fine_um));
             let out = free("still", 1)?.remove(0);
-            let program = Program::Stack { axis: Axis::SensorFine, from_um: at_um, to_um: at_um, steps: 1 };
-            let settings =
-                SequenceSettings { rig, camera, program, runs: 1, optics: Some(optics), out: out.clone() };
+            let settings = SequenceRequest {
+                rig,
+                camera,
+                axis: Some(AxisName::Fine),
+                from: Some(at_um),
+                to: Some(at_um),
+                steps: Some(1),
+                optics: Some(optics),
+                out: out.clone(),
+                ..SequenceRequest::default()
+            };
             let work = move |app: &App, context: &Context<'_>| {
                 kept(app, figures(sequence::run(&settings, context)?))
             };
@@ -280,9 +294,17 @@ async fn capture(
                 ));
             }
             let out = free("stack", 1)?.remove(0);
-            let program = Program::Stack { axis: axis.into(), from_um, to_um, steps };
-            let settings =
-                SequenceSettings { rig, camera, program, runs: 1, optics: Some(optics), out: out.clone() };
+            let settings = SequenceRequest {
+                rig,
+                camera,
+                axis: Some(axis),
+                from: Some(from_um),
+                to: Some(to_um),
+                steps: Some(steps),
+                optics: Some(optics),
+                out: out.clone(),
+                ..SequenceRequest::default()
+            };
             let work = move |app: &App, context: &Context<'_>| {
                 kept(app, figures(sequence::run(&settings, context)?))
             };

@@ -246,6 +246,7 @@ async fn shadow(
 ) -> Result<Json<Removing>, Failure> {
     require_client(&app, &headers)?;
     let video = video_of(&app, &request.video)?;
+    moment(&request.sun)?;
     let out = sessions::free_names(&folder(&app), "shadow", 1)?.remove(0);
     let name = out.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let Standing { height_m, azimuth_deg, pitch_deg, focal_length_mm, pixel_um } = request.camera;
@@ -266,8 +267,9 @@ async fn shadow(
             subject: camera::SubjectPrior::default(),
             standard_deviations: camera::StandardDeviations::default(),
         },
-        moment: moment(&request.sun)?,
-        rate_hz: None,
+        lat: request.sun.latitude_deg,
+        lon: request.sun.longitude_deg,
+        time: request.sun.time,
         out,
     };
     let work = move |_: &App, context: &Context<'_>| figures(video::remove_from_video(&settings, context)?);

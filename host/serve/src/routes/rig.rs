@@ -8,10 +8,11 @@ use axum::{
 use farnear_protocol::{Micros, message::Axis};
 use farnear_workflows::{
     Context, WorkflowError,
+    measure::Rectangle,
     rig::{
-        RigAddress, alarms, board,
-        check::{self, CheckSettings},
-        focus::{self, FocusSettings},
+        AxisName, RigAddress, alarms, board,
+        check::{self, CheckRequest},
+        focus::{self, FocusRequest},
         goto::{self, GotoSettings},
         motion::{self, MoveSettings},
         open::OpenRig,
@@ -27,7 +28,7 @@ use crate::{
     app::App,
     failure::Failure,
     job_queue::Task,
-    view::{AxisName, Begun, DONE, Done, LiveMode, Nothing},
+    view::{Begun, DONE, Done, LiveMode, Nothing},
 };
 
 /// Longest exposure that is taken live, us.
@@ -276,14 +277,14 @@ async fn seek(
         let error = format!("range_mm {}: expected more than 0 and at most 10 mm", request.range_mm);
         return Err(Failure::new(StatusCode::BAD_REQUEST, error));
     }
-    let settings = FocusSettings {
+    let settings = FocusRequest {
         rig,
         camera: app.camera(),
         optics: app.optics_file(),
         start_mm: None,
         range_mm: request.range_mm,
         measure: request.measure.as_deref().map_or(Ok(app.live().measure), measure)?,
-        region: request.region,
+        region: request.region.map(|[x, y, width, height]| Rectangle { x, y, width, height }),
     };
     let work = move |_: &App, context: &Context<'_>| figures(focus::focus(&settings, context)?);
     begin(&app, Task { kind: "focus", title: "Find the focus".into(), work: Box::new(work) })
@@ -296,9 +297,8 @@ async fn checklist(
 ) -> Result<Json<Begun>, Failure> {
     require_control(&app, &headers)?;
     let rig = connected(&app)?;
-    let actuation = !rig.is_emulated();
     let settings =
-        CheckSettings { rig: RigAddress::Open(rig), camera: app.camera(), resting_only: false, actuation };
+        CheckRequest { rig: RigAddress::Open(rig), camera: app.camera(), ..CheckRequest::default() };
     let work = move |_: &App, context: &Context<'_>| figures(check::check(&settings, context)?);
     begin(&app, Task { kind: "check", title: "Bring-up checklist".into(), work: Box::new(work) })
 }

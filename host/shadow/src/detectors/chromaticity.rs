@@ -1,8 +1,5 @@
-//! Chromaticity: in shadow the value drops while hue and saturation stay.
-//!
-//! R. Cucchiara, C. Grana, M. Piccardi and A. Prati, "Detecting moving objects, ghosts, and shadows in video
-//! streams", IEEE PAMI 25 (2003), 1337-1342, equation 5; differences are averaged over a window as in Sanin
-//! et al. 2012. Cost: a few operations per foreground and window pixel.
+//! Chromaticity: in shadow the value drops while hue and saturation stay (Cucchiara, Grana, Piccardi and
+//! Prati, IEEE PAMI 25, 2003, equation 5); differences are averaged over a window as in Sanin et al. 2012.
 
 use ndarray::Array2;
 
@@ -13,15 +10,12 @@ use farnear_silhouettes::mask::Mask;
 pub struct Settings {
     /// Smallest value relative to the background.
     pub darkest: f32,
-    /// Largest value relative to the background.
     pub lightest: f32,
     /// Largest excess saturation over the background, 0 to 1.
     pub saturation: f32,
-    /// Largest hue difference.
     pub hue_deg: f32,
     /// Below this saturation (0 to 1) hue is noise and ignored.
     pub least_saturation: f32,
-    /// Radius of the square averaging window.
     pub window_radius_px: usize,
 }
 

@@ -1,19 +1,16 @@
-//! Geometry: a standing body is upright, its shadow is on one side; needs no colour.
+//! Geometry: a standing body is upright, its shadow is on one side; needs no colour (Hsieh, Hu, Chang and
+//! Chen, "Shadow elimination for effective moving object detection by Gaussian shadow modeling", Image and
+//! Vision Computing 21, 2003).
 //!
-//! J.-W. Hsieh, W.-F. Hu, C.-J. Chang and Y.-S. Chen, "Shadow elimination for effective moving object
-//! detection by
-//! Gaussian shadow modeling", Image and Vision Computing 21 (2003), 505-516. Per region: the tallest columns
-//! are the body;
-//! the lower part that leans out on the heavier side is the first guess. Its centre, orientation and grey
-//! level define a
-//! Gaussian; pixels that fit are shadow:
+//! Per region: the tallest columns are the body; the lower part that leans out on the heavier side is the
+//! first guess. Its centre, orientation and grey level define a Gaussian; pixels that fit are shadow:
 //!
 //! ```text
 //! exp(-(s^2 / (w sd_s)^2 + t^2 / (w sd_t)^2 + (g - mean_g)^2 / (w sd_g)^2) / 2) >= threshold
 //! ```
 //!
-//! with s and t along and across the guess. Shadows under or behind the body's own columns are missed. Cost:
-//! linear.
+//! with s and t along and across the guess. Misses shadows under or behind the body's own columns. Linear
+//! cost.
 
 use ndarray::Array2;
 
@@ -29,11 +26,9 @@ pub struct Settings {
     pub body_share: f32,
     /// Lower share of the body's height used by the guess.
     pub lower_share: f32,
-    /// Widening w of the Gaussian.
     pub widening: f32,
     /// Threshold of the Gaussian, 1 at its centre.
     pub threshold: f32,
-    /// Smaller regions are skipped, px.
     pub smallest_region_px: usize,
 }
 
@@ -58,7 +53,6 @@ pub fn detect(images: &Images<'_>, settings: &Settings) -> Mask {
     found
 }
 
-/// Position of a region's body.
 struct Split {
     /// First and one past the last body column.
     body: (usize, usize),
@@ -107,7 +101,6 @@ impl Split {
         row >= self.first_row && if self.right { column >= self.body.1 } else { column < self.body.0 }
     }
 
-    /// Fits the Gaussian and marks matching pixels.
     fn mark(&self, region: &Region, grey: &Array2<f32>, settings: &Settings, found: &mut Mask) {
         let pixels =
             || region.runs.iter().flat_map(|run| (run.start..run.end).map(|column| (run.row, column)));
@@ -128,7 +121,6 @@ impl Split {
     }
 }
 
-/// Sums over (column, row, grey level).
 #[derive(Default)]
 struct Moments {
     count: f64,
@@ -138,7 +130,6 @@ struct Moments {
 
 struct Gaussian {
     mean: [f64; 3],
-    /// Direction of the long axis.
     along: [f64; 2],
     /// Widened standard deviations: along, across, grey level.
     sd: [f64; 3],

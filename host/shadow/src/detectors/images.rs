@@ -1,8 +1,7 @@
-//! Inputs of all detectors (frame, empty scene, foreground), and shared colour and gradient measures.
+//! Inputs of all detectors, and shared colour and gradient measures.
 
 use ndarray::{Array2, ArrayView2, ArrayView3};
 
-/// Frame, background and foreground mask of one size.
 #[derive(Clone, Copy, Debug)]
 pub struct Images<'a> {
     /// RGB, shape (height, width, 3).
@@ -25,7 +24,6 @@ pub struct ImagesError {
 }
 
 impl<'a> Images<'a> {
-    /// Errors: [`ImagesError`] for different shapes.
     pub fn new(
         frame: ArrayView3<'a, u8>,
         background: ArrayView3<'a, u8>,
@@ -42,13 +40,11 @@ impl<'a> Images<'a> {
         Ok(Self { frame, background, foreground })
     }
 
-    /// Height and width.
     #[must_use]
     pub fn size(&self) -> (usize, usize) {
         self.foreground.dim()
     }
 
-    /// Foreground pixels for which `test` holds.
     pub(super) fn foreground_where(&self, mut test: impl FnMut((usize, usize)) -> bool) -> Array2<bool> {
         let mut mask = Array2::from_elem(self.size(), false);
         for (at, &set) in self.foreground.indexed_iter() {
@@ -86,7 +82,6 @@ pub(super) fn hsv([r, g, b]: [f32; 3]) -> [f32; 3] {
     [hue, if high == 0.0 { 0.0 } else { span / high }, high / 255.0]
 }
 
-/// Angle between two hues, 0 to 180 degrees.
 pub(super) fn hue_difference(a: f32, b: f32) -> f32 {
     let difference = (a - b).abs();
     difference.min(360.0 - difference)

@@ -1,18 +1,14 @@
-//! Large-region texture: over a region, gradients keep their direction in shadow.
-//!
-//! A. Sanin, C. Sanderson and B. C. Lovell, "Improved shadow removal for robust person tracking in
-//! surveillance
-//! scenarios", ICPR 2010. Candidates pass a loose chromaticity test; edges missing in the background split
-//! them into regions.
-//! Over a region's n pixels with sufficient gradient,
+//! Large-region texture: over a region, gradients keep their direction in shadow (Sanin, Sanderson and
+//! Lovell, "Improved shadow removal for robust person tracking in surveillance scenarios", ICPR 2010).
+//! Candidates pass a loose chromaticity test; edges missing in the background split them into regions. Over a
+//! region's n pixels with sufficient gradient,
 //!
 //! ```text
 //! c = (1 / n) sum H(largest angle - angle between the frame's and the background's gradient)
 //! ```
 //!
 //! and the region is shadow if c reaches a threshold (H is the unit step). With too few such pixels colour
-//! alone decides.
-//! Cost: linear in pixels.
+//! alone decides. Linear cost.
 
 use ndarray::Array2;
 
@@ -28,7 +24,6 @@ use farnear_silhouettes::mask::{
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
-    /// Loose test of the candidates.
     pub candidates: chromaticity::Settings,
     /// Smallest compared gradient, grey levels per pixel, in frame or background.
     pub least_gradient: f32,
@@ -38,7 +33,6 @@ pub struct Settings {
     pub least_share: f32,
     /// Excess gradient over the shaded background that splits regions, grey levels per pixel.
     pub edge_gradient: f32,
-    /// Smallest number of gradients for a decision.
     pub fewest_gradients: usize,
 }
 
@@ -106,7 +100,6 @@ mod tests {
     use super::*;
     use ndarray::{Array3, s};
 
-    /// Paving of varying brightness, equal in all channels.
     fn paving(row: usize, column: usize) -> f32 {
         120.0 + 25.0 * ((row as f32 * 0.9).sin() + (column as f32 * 0.7).cos())
     }

@@ -1,14 +1,11 @@
-//! Physical: a shadow removes the direct light's share of the illumination, which is equal on all matt
-//! surfaces and can be learnt.
+//! Physical: a shadow removes the direct light's share, which is equal on all matt surfaces and can be learnt
+//! (Huang and Chen, "Moving cast shadow detection using physics-based features", CVPR 2009).
 //!
-//! J.-B. Huang and C.-S. Chen, "Moving cast shadow detection using physics-based features", CVPR 2009. With
-//! direct light d, ambient light a and reflectance b, a lit pixel is b (d + a) and a shaded one b a, so `g =
-//! (background - frame) / background = d / (d + a)` per channel. Its direction is `theta = atan2(g_green,
-//! g_red)` and `phi = acos(g_blue / |g|)`. A weak detector (darker, within a cone around the background's
-//! colour) proposes pixels. Their angles feed a Gaussian mixture with a confidence that drops at new
-//! gradients. A proposed pixel near a heavy component is shadow.
-//!
-//! Cost: a few trigonometric functions per proposed pixel.
+//! With direct light d, ambient light a and reflectance b, a lit pixel is b (d + a) and a shaded one b a, so
+//! `g = (background - frame) / background = d / (d + a)` per channel. Its direction is
+//! `theta = atan2(g_green, g_red)` and `phi = acos(g_blue / |g|)`. A weak detector (darker, within a cone
+//! around the background's colour) proposes pixels. Their angles feed a Gaussian mixture with a confidence
+//! that drops at new gradients. A proposed pixel near a heavy component is shadow.
 
 use ndarray::Array2;
 
@@ -19,7 +16,6 @@ use farnear_silhouettes::mask::Mask;
 pub struct Settings {
     /// Smallest proposed brightness relative to the background.
     pub darkest: f32,
-    /// Largest brightness relative to the background.
     pub lightest: f32,
     /// Largest angle between the frame's and the background's colour.
     pub cone_deg: f32,
@@ -68,7 +64,6 @@ impl Component {
     }
 }
 
-/// The detector with the learnt light.
 #[derive(Clone, Debug)]
 pub struct Physical {
     settings: Settings,
@@ -81,7 +76,6 @@ impl Physical {
         Self { settings, mixture: Vec::new() }
     }
 
-    /// Learns from the next frame, then returns its shadow pixels.
     pub fn detect(&mut self, images: &Images<'_>) -> Mask {
         let (frame, background) = (intensity(images.frame), intensity(images.background));
         let (frame_slope, background_slope) = (gradient(&frame), gradient(&background));
@@ -105,7 +99,6 @@ impl Physical {
         images.foreground_where(|at| proposed[at].is_some_and(|angles| self.is_shadow(angles)))
     }
 
-    /// Darker than the background and of similar colour.
     fn weakly_shadow(&self, frame: [f32; 3], background: [f32; 3]) -> bool {
         let dot = |a: [f32; 3], b: [f32; 3]| a.iter().zip(b).map(|(x, y)| x * y).sum::<f32>();
         let (along, length) = (dot(frame, background), dot(background, background));
@@ -187,7 +180,6 @@ fn direction(frame: [f32; 3], background: [f32; 3]) -> [f32; 2] {
     [lost[1].atan2(lost[0]), (lost[2] / norm).clamp(-1.0, 1.0).acos()]
 }
 
-/// Confidence-weighted median of one angle; a robust start of the first component.
 fn weighted_median(samples: &[([f32; 2], f32)], axis: usize) -> f32 {
     let mut sorted: Vec<(f32, f32)> =
         samples.iter().map(|&(angles, weight)| (angles[axis], weight)).collect();

@@ -1,13 +1,11 @@
-//! Small-region texture: in shadow the texture around a pixel stays and only its gain drops.
+//! Small-region texture: in shadow the texture around a pixel stays and only its gain drops (Leone and
+//! Distante, "Shadow detection for moving objects based on texture analysis", Pattern Recognition 40, 2007).
 //!
-//! A. Leone and C. Distante, "Shadow detection for moving objects based on texture analysis", Pattern
-//! Recognition 40 (2007), 1222-1233. For each darker foreground pixel, frame and background are projected on
-//! Gabor functions (two wavelengths, four orientations, even and odd) and divided by their local mean. If the
-//! squared distance, averaged over a small region and without the noise, is small relative to the
-//! background's squared length, the region is shadow. Windows have the Gabor functions' Gaussian weight and
-//! include foreground pixels only, because a shadow's edge is not texture.
-//!
-//! Cost: window area times 16 functions, twice, per candidate: about 2600 multiplications.
+//! For each darker foreground pixel, frame and background are projected on Gabor functions (two wavelengths,
+//! four orientations, even and odd) and divided by their local mean. If the squared distance, averaged over a
+//! small region and without the noise, is small relative to the background's squared length, the region is
+//! shadow. Windows have the functions' Gaussian weight and include foreground pixels only, because a shadow's
+//! edge is not texture. About 2600 multiplications per candidate.
 
 use ndarray::{Array2, ArrayView2};
 
@@ -18,7 +16,6 @@ use farnear_silhouettes::mask::{Mask, bits::BitMask};
 pub struct Settings {
     /// Smallest intensity of a candidate relative to the background.
     pub darkest: f32,
-    /// Largest intensity of a candidate relative to the background.
     pub lightest: f32,
     /// Largest distance relative to the background's length.
     pub distance: f32,
@@ -26,7 +23,6 @@ pub struct Settings {
     pub smooth: f32,
     /// Camera noise, standard deviation in grey levels (mean of three channels).
     pub noise_sd: f32,
-    /// Radius of the square region for averaging.
     pub region_radius_px: usize,
 }
 
@@ -41,7 +37,6 @@ const SIDE: usize = 2 * RADIUS + 1;
 const WAVELENGTHS_PX: [f32; 2] = [4.0, 8.0];
 const ORIENTATIONS: usize = 4;
 const FUNCTIONS: usize = WAVELENGTHS_PX.len() * ORIENTATIONS * 2;
-/// Standard deviation of the Gaussian window.
 const SD_PX: f32 = 2.0;
 
 type Window = [[f32; SIDE]; SIDE];

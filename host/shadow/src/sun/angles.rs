@@ -1,20 +1,16 @@
-//! Equatorial and horizontal direction of the sun, and their conversion.
+//! Equatorial and horizontal direction of the sun.
 
 use serde::{Deserialize, Serialize};
 
 /// Declination and Greenwich hour angle; the latter grows westwards without wrapping.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Equatorial {
-    /// Above the celestial equator.
     pub declination_rad: f64,
-    /// Hour angle at longitude zero.
     pub greenwich_hour_angle_rad: f64,
 }
 
-/// Sun direction from the ground without refraction.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SunPosition {
-    /// Above the horizon.
     pub elevation_deg: f64,
     /// Clockwise from north, 0 to 360.
     pub azimuth_deg: f64,

@@ -1,5 +1,3 @@
-//! Observer position, and errors of the sun position.
-
 use serde::{Deserialize, Serialize};
 
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -14,7 +12,6 @@ pub enum SunError {
     UnknownModel(String),
     #[error("`{text}` is not an RFC 3339 time such as 2014-06-23T11:30:00Z: {reason}")]
     Time { text: String, reason: String },
-    /// SPA is undefined for this time or place.
     #[error("SPA: {0}")]
     Spa(String),
 }
@@ -28,7 +25,6 @@ pub struct Place {
 }
 
 impl Place {
-    /// Errors: latitude outside ±90, longitude outside -180 to 360 degrees.
     pub fn new(latitude_deg: f64, longitude_deg: f64) -> Result<Self, SunError> {
         if !(-90.0..=90.0).contains(&latitude_deg) {
             return Err(SunError::Latitude(latitude_deg));

@@ -1,9 +1,8 @@
-//! Li 2014, eq. 8.3 to 8.8, with corrected units.
+//! Li 2014, eq. 8.3 to 8.8, with corrected units, to reproduce the thesis: up to 1.03 deg of elevation and
+//! 10.7 deg of azimuth off SPA. UTC, longitude east, day 1 = 1 January.
 //!
 //! The printed formulas take the standard meridian in radians per hour instead of 15 degrees per hour (8.7),
-//! swap latitude and longitude near 8.3, and omit the equation of time's unit (minutes). Here: UTC, longitude
-//! east, day 1 = 1 January. Up to 1.03 deg of elevation and 10.7 deg of azimuth off SPA; kept to reproduce
-//! the thesis.
+//! swap latitude and longitude near 8.3, and omit the equation of time's unit (minutes).
 
 use super::angles::Equatorial;
 use super::clock::hours_of_day;
@@ -15,7 +14,7 @@ pub(super) fn equatorial(time: DateTime<Utc>) -> Equatorial {
     equatorial_at(f64::from(time.ordinal()), hours_of_day(time))
 }
 
-/// For a fractional day of the year and hours UT, for error propagation over the day.
+/// Fractional day of the year and hours UT, for error propagation over the day.
 pub(crate) fn equatorial_at(day_of_year: f64, hours_ut: f64) -> Equatorial {
     let year_angle = TAU / 365.0 * (day_of_year - 81.0);
     let declination_rad = (23.45_f64.to_radians().sin() * year_angle.sin()).asin();

@@ -1,8 +1,6 @@
-//! Synthetic colour pictures with known shadow, for scoring detectors.
-//!
-//! Colours a scene's masks ([`super::scene`]): speckled paving under a warm sun and a blue sky, shadow with
-//! sky light only (soft edge), patterned shirt and plain trousers, camera noise. Shares nothing with the
-//! detectors' models except that light is additive.
+//! Synthetic colour pictures with known shadow, for scoring detectors: a scene's masks ([`super::scene`])
+//! with speckled paving under warm sun and blue sky, soft shadow edge, patterned shirt and plain trousers,
+//! camera noise. Shares with the detectors' models only that light is additive.
 
 use ndarray::{Array2, Array3, ArrayView2};
 use rand::{Rng, SeedableRng};
@@ -12,7 +10,6 @@ use crate::score::Truth;
 
 #[derive(Clone, Debug)]
 pub struct Pictures {
-    /// Person and shadow, shape (height, width, 3).
     pub frame: Array3<u8>,
     /// Without person, noise averaged out as by a background model.
     pub background: Array3<u8>,
@@ -24,7 +21,7 @@ const SKY: [f32; 3] = [0.38, 0.42, 0.50];
 /// Standard deviation in grey levels.
 const NOISE_SD: f32 = 2.0;
 
-/// Colours a scene of shape (height, width); equal truth and seed give equal pictures.
+/// Equal truth and seed give equal pictures.
 #[must_use]
 pub fn colour_in(truth: ArrayView2<'_, Truth>, seed: u64) -> Pictures {
     let (height, width) = truth.dim();
@@ -83,19 +80,16 @@ fn soft_light(truth: ArrayView2<'_, Truth>) -> Array2<f32> {
     })
 }
 
-/// Row between shirt and trousers: the middle of the subject.
 fn waist_row(truth: ArrayView2<'_, Truth>) -> usize {
     let rows = truth.indexed_iter().filter(|&(_, &what)| what == Truth::Subject).map(|((row, _), _)| row);
     let (top, bottom) = rows.fold((usize::MAX, 0), |(top, bottom), row| (top.min(row), bottom.max(row)));
     if top == usize::MAX { 0 } else { (top + bottom) / 2 }
 }
 
-/// Roughly Gaussian, variance 1: sum of twelve uniform numbers.
 fn gaussian(rng: &mut ChaCha8Rng) -> f32 {
     (0..12).map(|_| rng.random::<f32>()).sum::<f32>() - 6.0
 }
 
-/// Noise of about unit variance with a grain of `grain_px`.
 fn smooth_noise(rng: &mut ChaCha8Rng, (height, width): (usize, usize), grain_px: usize) -> Array2<f32> {
     let coarse = Array2::from_shape_fn((height / grain_px + 2, width / grain_px + 2), |_| gaussian(rng));
     Array2::from_shape_fn((height, width), |(row, column)| {

@@ -1,8 +1,6 @@
-//! Seeded scenes: a walking person on level ground under the sun, with true body and shadow.
-//!
-//! Body: image of each capsule. Shadow: outlines of each capsule's end spheres along the sun's rays on the
-//! ground, convex hull per capsule, projected. Independent of [`crate::projection`], so that errors there
-//! show.
+//! Seeded scenes: a walking person on level ground under the sun, with true body and shadow. Each capsule's
+//! image is body; the hull of its end spheres' outlines along the rays is shadow. Independent of
+//! [`crate::projection`], so that errors there show.
 
 use crate::camera::{Camera, CameraFile, StandardDeviations, SubjectPrior};
 use crate::score::Truth;
@@ -17,14 +15,11 @@ use ndarray::Array2;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-/// Difficulty of a scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     /// Level camera, upright person, shadow sideways or towards the camera.
     Standard,
-    /// Camera pitched down by 5 to 15 degrees.
     Pitched,
-    /// Person bending by 40 to 80 degrees.
     Bending,
     /// Shadow behind the person (within 60 degrees of straight away).
     Behind,
@@ -35,7 +30,6 @@ pub struct Scene {
     pub body: Mask,
     /// Shadow on the ground, including hidden parts.
     pub shadow: Mask,
-    /// Union, as a background model would find it.
     pub silhouette: Mask,
     pub camera: CameraFile,
     pub sun: SunPosition,
@@ -45,7 +39,6 @@ pub struct Scene {
 }
 
 impl Scene {
-    /// Per pixel: subject before shadow before background.
     pub fn truth(&self) -> Array2<Truth> {
         Array2::from_shape_fn(self.body.dim(), |i| match (self.body[i], self.shadow[i]) {
             (true, _) => Truth::Subject,
@@ -117,8 +110,7 @@ fn draw(kind: Kind, rng: &mut ChaCha8Rng) -> Scene {
     Scene { body, shadow, silhouette, camera, sun, stands_at_m: at, height_m: stature }
 }
 
-/// Renders capsules (mm, camera's ground frame) with the shadow along `direction_deg` from the camera's
-/// right.
+/// Renders capsules (mm, camera's ground frame); `direction_deg` is from the camera's right.
 pub fn render(capsules: &[Capsule], camera: &Camera, direction_deg: f64, elevation_deg: f64) -> (Mask, Mask) {
     const RING: usize = 20;
     let shape = (camera.height_px, camera.width_px);

@@ -1,5 +1,4 @@
-//! The five detectors on synthetic scenes. Floors are some points below the results, so that retuning is
-//! possible and a failure shows.
+//! The five detectors on synthetic scenes. Floors are some points below the results.
 
 use farnear_shadow::detectors::{Detector, Images, Method};
 use farnear_shadow::score::ShadowScore;
@@ -10,7 +9,6 @@ use farnear_shadow::synthetic::{
 use ndarray::Array2;
 use std::sync::OnceLock;
 
-/// Ten coloured scenes, shared by all tests.
 fn scenes() -> &'static [(Scene, Pictures)] {
     static SCENES: OnceLock<Vec<(Scene, Pictures)>> = OnceLock::new();
     SCENES.get_or_init(|| {
@@ -37,7 +35,6 @@ fn score(method: Method) -> ShadowScore {
     total
 }
 
-/// At least `removed` % of the shadow and at most `wrongly` % of the subject go.
 #[track_caller]
 fn reaches(method: Method, removed: f64, wrongly: f64) {
     let score = score(method);

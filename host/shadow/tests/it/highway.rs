@@ -1,9 +1,8 @@
 //! Background model and shadow detectors on the highway sequence of ChangeDetection.net (Goyette et al.
 //! 2012).
 //!
-//! Reference: OpenCV 5.0.0's `createBackgroundSubtractorMOG2()` with default settings (equal to ours) on the
-//! same frames and with the same score: label 255 against truth 255, truth 85 and 170 excluded, frames 470
-//! onwards (temporal region of interest).
+//! Reference: OpenCV 5.0.0's `createBackgroundSubtractorMOG2()` with default settings (equal to ours) and the
+//! same score: label 255 against truth 255, truth 85 and 170 excluded, frames 470 onwards.
 
 #![allow(clippy::unwrap_used)] // helpers of tests: data that cannot be read must stop the test
 
@@ -20,7 +19,6 @@ struct Shot {
     truth: Option<GrayImage>,
 }
 
-/// The frames in order, read once.
 fn shots() -> &'static [Shot] {
     static SHOTS: OnceLock<Vec<Shot>> = OnceLock::new();
     SHOTS.get_or_init(|| {
@@ -88,7 +86,6 @@ fn f1(colour: bool, settings: Settings) -> f64 {
     counts.f1()
 }
 
-/// Within 0.02 of OpenCV's F1.
 #[track_caller]
 fn agrees(colour: bool, shadow: bool, opencv: f64) {
     let mut settings = Settings::default();
@@ -123,8 +120,7 @@ fn grey_without_shadow_agrees_with_opencv() {
     agrees(false, false, 0.1715);
 }
 
-/// Detection and discrimination rates (Sanin et al. 2012) on the background model's foreground. Without
-/// labelled shadow only the discrimination rate is available.
+/// Rates of Sanin et al. 2012 on the background model's foreground. The sequence has no labelled shadow.
 #[test]
 #[cfg_attr(not(shared_data), ignore = "needs the real data next to the repository")]
 fn detectors_keep_most_of_what_moves() {

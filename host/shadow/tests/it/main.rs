@@ -1,12 +1,9 @@
-//! Public API tests in one binary.
-
 mod damaged;
 mod detectors;
 mod highway;
 mod removal;
 mod sun;
 
-/// Number of property cases: few by default, more for fuzzing.
 fn cases(usual: u32) -> u32 {
     std::env::var("PROPTEST_CASES").ok().and_then(|text| text.parse().ok()).unwrap_or(usual)
 }

@@ -118,7 +118,7 @@ fn rejects_invalid_input_by_name() {
     ));
 }
 
-/// A Monte Carlo case: day, hours, latitude, longitude, camera azimuth, distance, camera height.
+/// Day, hours, latitude, longitude, camera azimuth, distance, camera height.
 type Case = [f64; 7];
 
 fn at(day: f64, hours: f64) -> DateTime<Utc> {
@@ -134,7 +134,6 @@ fn file(case: &Case) -> CameraFile {
     .expect("valid")
 }
 
-/// Standard deviation of beta in degrees over `n` random inputs.
 fn monte_carlo_deg(case: &Case, model: Model, n: usize) -> f64 {
     let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(7);
     let mut normal = |sd: f64| -> f64 {

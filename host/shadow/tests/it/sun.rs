@@ -3,13 +3,12 @@
 use chrono::{DateTime, TimeDelta, Utc};
 use farnear_shadow::sun::{Model, Place, parse_time, position};
 
-/// Refraction of SPA (Reda and Andreas 2004, eq. 42) at 1000 hPa and 10 deg C for a true elevation, degrees.
+/// SPA's refraction (Reda and Andreas 2004, eq. 42) at 1000 hPa and 10 deg C for a true elevation, degrees.
 fn refraction_deg(elevation_deg: f64) -> f64 {
     let argument = elevation_deg + 10.3 / (elevation_deg + 5.11);
     1000.0 / 1010.0 * 283.0 / 283.0 * 1.02 / (60.0 * argument.to_radians().tan())
 }
 
-/// Smallest difference of two directions, degrees.
 fn turn_deg(a: f64, b: f64) -> f64 {
     (a - b + 180.0).rem_euclid(360.0) - 180.0
 }

@@ -1,10 +1,8 @@
 //! Mixture update of one frame with the processor's vectors (selected at run time by `pulp`; one pixel at a
-//! time without AVX2
-//! or NEON).
+//! time without AVX2 or NEON).
 //!
 //! The recursive equations of Zivkovic 2004 (equations 4 to 6 with the prior of 14) and Zivkovic and van der
-//! Heijden 2006
-//! (equations 4 to 9), for isotropic components; o is 1 for the component that owns the sample:
+//! Heijden 2006 (equations 4 to 9), for isotropic components; o is 1 for the component that owns the sample:
 //!
 //! ```text
 //! weight   += rate (o - weight) - rate c_T       discarded at 0, then normalised to sum 1
@@ -12,19 +10,10 @@
 //! variance += o (rate / weight) (|x - mean|^2 - variance)
 //! ```
 //!
-//! The owner is the heaviest component within `component_threshold`. Components stay sorted by weight with
-//! one pass of
-//! neighbour exchanges, because at most one has grown.
-//!
-//! # Layout
-//! Pixels come in tiles of [`TILE`]; a tile of a component holds weight, variance and channel means for 16
-//! pixels. Tiles of a
-//! component are adjacent, and each tile stores the number of components in use, so unused memory is never
-//! touched.
-//!
-//! # Cost
-//! Pixels times components in use; about 10 floating-point operations per component and channel, one division
-//! per component.
+//! The owner is the heaviest component within `component_threshold`. One pass of neighbour exchanges keeps
+//! components sorted by weight, because at most one has grown. A tile of a component holds weight, variance
+//! and channel means of [`TILE`] pixels; unused components are never touched. About 10 floating-point
+//! operations and one division per pixel, component in use and channel.
 
 use std::array::from_fn;
 
@@ -35,44 +24,36 @@ use super::settings::Settings;
 /// Pixels per tile: the widest f32 vector (AVX-512).
 pub const TILE: usize = 16;
 
-/// Fields of a component before its channel means.
 const WEIGHT: usize = 0;
 const VARIANCE: usize = 1;
 const MEAN: usize = 2;
 
-/// Label codes of the kernel.
 pub const BACKGROUND: u8 = 0;
 pub const SHADOW: u8 = 1;
 pub const FOREGROUND: u8 = 2;
 
-/// Values per component and tile.
 pub const fn component_len(channels: usize) -> usize {
     (MEAN + channels) * TILE
 }
 
-/// Offset of a channel's means in a component of a tile.
+/// Offset of a channel's means within a component.
 pub const fn mean_offset(channel: usize) -> usize {
     (MEAN + channel) * TILE
 }
 
-/// Values of a whole model.
 pub const fn state_len(tiles: usize, components: usize, channels: usize) -> usize {
     tiles * components * component_len(channels)
 }
 
-/// One frame's update of all tiles.
 pub struct Update<'a, const CHANNELS: usize> {
     pub settings: &'a Settings,
     /// Learning rate of this frame, 0 to 1.
     pub rate: f32,
-    /// Model of [`state_len`] values.
     pub state: &'a mut [f32],
-    /// Components in use per tile.
     pub used: &'a mut [u8],
-    /// Interleaved samples by rows.
     pub pixels: &'a [u8],
     pub labels: &'a mut [u8],
-    /// Tiles that are labelled and learn nothing; none where it is empty.
+    /// Tiles that are labelled and learn nothing; may be empty.
     pub held: &'a [bool],
 }
 
@@ -177,13 +158,10 @@ impl<S: Simd> Constants<S> {
     }
 }
 
-/// Mixtures of one vector of pixels.
 struct Mixture<'a, S: Simd, const CHANNELS: usize> {
     simd: S,
     state: &'a mut [f32],
-    /// Offset of the first component's weights.
     first: usize,
-    /// Distance between components.
     stride: usize,
 }
 
@@ -263,7 +241,6 @@ impl<S: Simd, const CHANNELS: usize> Mixture<'_, S, CHANNELS> {
     }
 
     /// Creates a component for each orphan sample, in the first empty place or instead of the lightest.
-    /// Returns components in use and total weight.
     #[inline(always)]
     fn found(
         &mut self,
@@ -323,8 +300,8 @@ impl<S: Simd, const CHANNELS: usize> Mixture<'_, S, CHANNELS> {
     }
 
     /// Samples that are a darker copy of a background component: with a the projection on the mean's line,
-    /// darkest <= a <= 1 and the rest |a mean - x|^2 within background_threshold a^2 variance. Brightness and
-    /// chromaticity distortion test, "statistical non-parametric" in Prati et al. (PAMI 25, 2003, 918-923).
+    /// darkest <= a <= 1 and the rest |a mean - x|^2 within background_threshold a^2 variance ("statistical
+    /// non-parametric" in Prati et al., PAMI 25, 2003).
     #[inline(always)]
     fn shadow(&self, c: &Constants<S>, darkest: S::f32s, used: usize, x: [S::f32s; CHANNELS]) -> S::m32s {
         let simd = self.simd;

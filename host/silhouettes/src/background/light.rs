@@ -1,29 +1,26 @@
-//! Sudden changes of the light or of the camera's exposure: one gain and one offset per channel, estimated from the background, bring the frame
-//! back to the old light.
+//! Sudden changes of light or exposure: one gain and one offset per channel, estimated from the background.
 
 use ndarray::{Array2, Array3};
 
 use super::Frame;
 
-/// From one pixel that is compared to the next, both ways.
+/// Distance between compared pixels, both ways.
 pub const STEP_PX: usize = 8;
-/// A level this far from the background's has changed.
+/// Grey levels from the background's.
 const CHANGED: f32 = 25.0;
-/// Share of changed pixels from which a change of light is looked for, and what a change of light must leave of it.
+/// Share of changed pixels that starts the search, and the largest share of it that may remain.
 const SUSPECT: f64 = 0.25;
 const EXPLAINED: f64 = 0.5;
-/// Plausible gains.
 const GAINS: std::ops::RangeInclusive<f32> = 0.2..=5.0;
-/// Backgrounds of less contrast than this give a gain only, grey levels.
+/// Backgrounds of less contrast give a gain only, grey levels.
 const CONTRAST: f32 = 15.0;
 
-/// Levels in the light of the background, a table per channel.
+/// Levels in the background's light, a table per channel.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Light {
     tables: Vec<[u8; 256]>,
 }
 
-/// A frame in another light.
 pub enum Relit {
     Grey(Array2<u8>),
     Rgb(Array3<u8>),
@@ -39,12 +36,11 @@ impl Relit {
 }
 
 impl Light {
-    /// The light as it was, for `channels` channels.
     pub fn unchanged(channels: usize) -> Self {
         Self { tables: vec![std::array::from_fn(|level| level as u8); channels] }
     }
 
-    /// A frame in the background's light; `None` where the light is as it was.
+    /// A frame in the background's light; `None` if it is unchanged.
     pub fn relit(&self, frame: Frame<'_>) -> Option<Relit> {
         if *self == Self::unchanged(self.tables.len()) {
             return None;
@@ -61,8 +57,7 @@ impl Light {
         })
     }
 
-    /// The new light, where most of a changed picture is explained by one. `pairs` holds the background's and the frame's levels of compared
-    /// pixels, channel by channel.
+    /// The new light, if one explains most of a changed picture, from levels of background and frame.
     pub fn changed(&self, pairs: &[Vec<[u8; 2]>]) -> Option<Self> {
         let before = self.changed_share(pairs);
         if before < SUSPECT {
@@ -71,7 +66,7 @@ impl Light {
         let tables = pairs.iter().map(|pairs| fitted(pairs)).collect::<Option<Vec<[u8; 256]>>>()?;
         let fitted = Self { tables };
         let unchanged = Self::unchanged(self.tables.len());
-        // Light that is switched back is as it was, exactly.
+        // Light that is switched back is exactly the old one.
         let best = [unchanged, fitted].into_iter().min_by(|a, b| {
             let slack = |light: &Self| light.changed_share(pairs);
             slack(a).total_cmp(&(slack(b) + 0.02))
@@ -79,7 +74,6 @@ impl Light {
         (best.changed_share(pairs) <= EXPLAINED * before).then_some(best)
     }
 
-    /// Share of compared pixels that have changed in this light, 0 to 1.
     fn changed_share(&self, pairs: &[Vec<[u8; 2]>]) -> f64 {
         let count = pairs.first().map_or(0, Vec::len);
         let off = |pixel: usize| {
@@ -92,7 +86,7 @@ impl Light {
     }
 }
 
-/// The table that takes levels of the frame to the background's: a line through the middles of the darker and of the lighter half.
+/// The table from frame to background levels: a line through the medians of the darker and the lighter half.
 fn fitted(pairs: &[[u8; 2]]) -> Option<[u8; 256]> {
     let mut sorted: Vec<[u8; 2]> =
         pairs.iter().copied().filter(|[_, level]| (3..=252).contains(level)).collect();

@@ -9,7 +9,6 @@ use super::{
     shake::{self, Shift},
 };
 
-/// A video frame of 8-bit samples.
 #[derive(Clone, Copy, Debug)]
 pub enum Frame<'a> {
     /// Shape (height, width).
@@ -36,15 +35,12 @@ impl Frame<'_> {
     }
 }
 
-/// Class of a pixel.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Label {
-    /// Explained by the background components.
     #[default]
     Background,
     /// A darker copy of the background (only with [`Settings::shadow`]).
     Shadow,
-    /// Not part of the scene.
     Foreground,
 }
 
@@ -100,9 +96,7 @@ pub struct BackgroundModel {
 }
 
 impl BackgroundModel {
-    /// An untrained model for frames of `size` (height, width) with 1 or 3 channels. Memory: 4 (2 + channels)
-    /// bytes per pixel and component.
-    /// Errors: [`BackgroundError`] for invalid settings, an empty size, or another number of channels.
+    /// An untrained model for 1 or 3 channels. Memory: 4 (2 + channels) bytes per pixel and component.
     pub fn new(size: (usize, usize), channels: usize, settings: Settings) -> Result<Self, BackgroundError> {
         settings.check()?;
         let (height, width) = size;
@@ -126,14 +120,12 @@ impl BackgroundModel {
         })
     }
 
-    /// A model for frames like this one, which is not learnt.
     pub fn like(frame: Frame<'_>, settings: Settings) -> Result<Self, BackgroundError> {
         Self::new(frame.size(), frame.channels(), settings)
     }
 
     /// Learns the next frame and labels its pixels. The learning rate is 1 / (2 n) for frame n >= 2, then 1 /
-    /// history. All of the first frame is foreground.
-    /// Errors: [`BackgroundError::Changed`] for a frame of another size or kind.
+    /// history. All of the first frame is foreground. Fails for a frame of another size or kind.
     pub fn apply(&mut self, frame: Frame<'_>) -> Result<Array2<Label>, BackgroundError> {
         self.apply_at(frame, self.usual_rate())
     }
@@ -151,7 +143,7 @@ impl BackgroundModel {
         self.apply_outside(frame, rate, None)
     }
 
-    /// As [`BackgroundModel::apply_at`]; nothing is learned where `held`, of the frame's shape, is set, nor within 15 pixels to its sides.
+    /// Learns nothing where `held` is set, nor within 15 pixels to its sides.
     pub fn apply_outside(
         &mut self,
         frame: Frame<'_>,
@@ -208,25 +200,22 @@ impl BackgroundModel {
         });
     }
 
-    /// (height, width) of its frames.
     #[must_use]
     pub fn size(&self) -> (usize, usize) {
         self.size
     }
 
-    /// Channels of its frames.
     #[must_use]
     pub fn channels(&self) -> usize {
         self.channels
     }
 
-    /// Frames taken in so far.
     #[must_use]
     pub fn frames_seen(&self) -> u32 {
         self.frames_seen
     }
 
-    /// Levels of the background and of a frame of the model's kind, every `step` pixels both ways, channel by channel.
+    /// Levels of background and frame every `step` pixels both ways, per channel.
     #[must_use]
     pub fn compared(&self, frame: Frame<'_>, step: usize) -> Vec<Vec<[u8; 2]>> {
         let (height, width) = self.size;
@@ -245,7 +234,7 @@ impl BackgroundModel {
         pairs
     }
 
-    /// By how many whole pixels the frame is shifted against the background: 0 where no shift explains it clearly better.
+    /// Shift of the frame against the background, whole pixels; 0 unless a shift explains it clearly better.
     #[must_use]
     pub fn shift(&self, frame: Frame<'_>, step: usize) -> Shift {
         let (height, width) = self.size;
@@ -284,8 +273,7 @@ impl BackgroundModel {
             as u8
     }
 
-    /// The mean of each pixel's heaviest component, shape (height, width, channels): the empty scene as far as it is
-    /// known. All 0 before the first frame.
+    /// The empty scene: means of the heaviest components, (height, width, channels); first 0.
     #[must_use]
     pub fn background(&self) -> Array3<u8> {
         let (height, width) = self.size;
@@ -294,7 +282,7 @@ impl BackgroundModel {
         })
     }
 
-    /// Components per pixel, shape (height, width).
+    /// Components per pixel, (height, width).
     #[must_use]
     pub fn components(&self) -> Array2<u8> {
         let (_, width) = self.size;
@@ -316,7 +304,6 @@ fn split(pixel: usize) -> (usize, usize) {
 mod tests {
     use super::*;
 
-    /// Textured frames with noise and a temporary block.
     fn frame(number: usize, (height, width): (usize, usize)) -> Array3<u8> {
         Array3::from_shape_fn((height, width, 3), |(row, column, channel)| {
             let hash = (number * 7919 + row * 104_729 + column * 1_299_709 + channel * 15_485_863) % 1009;

@@ -1,6 +1,5 @@
-//! Settings of the background model.
+//! Settings of the background model. Grey levels from 0 to 255.
 
-/// Settings of the Gaussian mixture. Grey levels from 0 to 255.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Settings {
     /// History T; the learning rate is 1 / T after T frames.
@@ -9,12 +8,11 @@ pub struct Settings {
     pub max_components: usize,
     /// Squared Mahalanobis distance of background.
     pub background_threshold: f32,
-    /// Squared Mahalanobis distance of a component; larger ones create a new component.
+    /// Squared Mahalanobis distance of a component; beyond it a new one is created.
     pub component_threshold: f32,
     /// Share of the data explained by background components, 1 - c_f (2006, equation 9).
     pub background_share: f32,
-    /// Weight removed from every component by the Dirichlet prior, c_T (2004, equation 14): the smallest
-    /// share of data of a component.
+    /// Weight removed from every component by the Dirichlet prior, c_T (2004, equation 14).
     pub complexity_prior: f32,
     /// Squared grey levels.
     pub initial_variance: f32,
@@ -33,10 +31,8 @@ pub struct ShadowSettings {
 }
 
 impl Settings {
-    /// Capacity of the model's layout.
     pub const MAX_COMPONENTS: usize = 8;
 
-    /// Errors: [`SettingsError`] with the first invalid setting, its value and range.
     pub fn check(&self) -> Result<(), SettingsError> {
         let require = |holds: bool, name: &'static str, value: f32, must: &'static str| {
             if holds { Ok(()) } else { Err(SettingsError { name, value, must }) }
@@ -80,8 +76,7 @@ impl Settings {
 }
 
 impl Default for Settings {
-    /// The papers' values (c_T 0.05, c_f 0.1, three and four standard deviations) and commonly used
-    /// variances.
+    /// The papers' values (c_T 0.05, c_f 0.1, three and four standard deviations) and common variances.
     fn default() -> Self {
         Self {
             history_frames: 500,

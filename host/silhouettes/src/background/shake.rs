@@ -1,23 +1,23 @@
-//! A camera that shakes: whole pixels by which a frame is shifted against the background.
+//! Camera shake: whole pixels by which a frame is shifted against the background.
 
 use ndarray::{Array, Array2, ArrayBase, Axis, Data, Dimension, Ix2, Ix3, RemoveAxis};
 
 use super::Frame;
 use super::light::Relit;
 
-/// Widest shift that is looked for, pixels.
+/// Largest shift, pixels.
 pub const REACH_PX: isize = 6;
-/// Mean difference below which a frame lies well on the background, grey levels.
+/// Mean difference of an unshifted frame, grey levels.
 pub const STILL: f32 = 6.0;
-/// A shift must leave at most this part of the difference.
+/// A shift must reduce the difference to this share.
 pub const BETTER: f32 = 0.7;
-/// Differences count up to this, so that a person does not decide.
+/// Limit of a difference, so that a person does not decide.
 pub const MOST: f32 = 40.0;
 
 /// Rows down and columns to the right.
 pub type Shift = (isize, isize);
 
-/// A frame moved back by its shift; its edge is repeated.
+/// Moves a frame back by its shift; repeats its edge.
 pub fn moved_back(frame: Frame<'_>, shift: Shift) -> Relit {
     match frame {
         Frame::Grey(pixels) => Relit::Grey(moved::<_, Ix2>(&pixels, shift)),
@@ -25,7 +25,6 @@ pub fn moved_back(frame: Frame<'_>, shift: Shift) -> Relit {
     }
 }
 
-/// Every pixel takes the value at its place plus the shift.
 fn moved<S, D>(pixels: &ArrayBase<S, D>, (down, right): Shift) -> Array<u8, D>
 where
     S: Data<Elem = u8>,
@@ -38,7 +37,7 @@ where
     rows.select(Axis(1), &from(pixels.shape()[1], right))
 }
 
-/// A mask or labels in the frame's own place; pixels from outside are `empty`.
+/// Moves a mask or labels to the frame's own place; pixels from outside are `empty`.
 pub fn moved_forth<T: Copy>(mask: &Array2<T>, (down, right): Shift, empty: T) -> Array2<T> {
     let (height, width) = mask.dim();
     Array2::from_shape_fn((height, width), |(row, column)| {

@@ -1,15 +1,14 @@
-//! Minimum-cost assignment by shortest augmenting paths (Kuhn 1955; Jonker and Volgenant, Computing 38,
-//! 1987).
+//! Minimum-cost assignment by shortest augmenting paths (Jonker and Volgenant, Computing 38, 1987).
 
 use ndarray::{Array2, ArrayView2};
 
-/// The column of every row, where a row has one: of all ways to pair rows and columns at costs below `limit`, the one with the most pairs and, among
-/// those, the least sum. Costs that are not finite or not below the limit cannot be paired. O(n^3) for the larger side n.
+/// The column of every row. Of all ways to pair rows and columns at costs below `limit`, returns one with the
+/// most pairs and, among those, the least sum. O(n^3) for the larger side n.
 #[must_use]
 pub fn assigned(costs: ArrayView2<'_, f64>, limit: f64) -> Vec<Option<usize>> {
     let (rows, columns) = costs.dim();
     let n = rows.max(columns);
-    // Square, and so that any pair that cannot be is worse than all that can be together.
+    // Square; an impossible pair costs more than all possible ones together.
     let impossible = (limit.abs() + 1.0) * (n + 1) as f64;
     let square = Array2::from_shape_fn((n, n), |(row, column)| match costs.get((row, column)) {
         Some(cost) if *cost < limit => cost.max(0.0),
@@ -31,7 +30,7 @@ pub fn assigned(costs: ArrayView2<'_, f64>, limit: f64) -> Vec<Option<usize>> {
     column_of
 }
 
-/// Gives `row` a column along the cheapest path of pairs that change.
+/// Gives `row` a column along the cheapest path of changed pairs.
 fn augment(
     costs: &Array2<f64>,
     row: usize,
@@ -43,7 +42,7 @@ fn augment(
     let mut least = vec![f64::INFINITY; n];
     let mut from: Vec<Option<usize>> = vec![None; n];
     let mut done = vec![false; n];
-    // The column whose row is examined, none for the new row.
+    // The column whose row is examined; none for the new row.
     let mut at: Option<usize> = None;
     let end = loop {
         let here = at.and_then(|column| row_of[column]).unwrap_or(row);
@@ -97,7 +96,6 @@ mod tests {
     use ndarray::arr2;
     use proptest::prelude::*;
 
-    /// Pairs and their sum of the best way, by trying all.
     fn tried(costs: &Array2<f64>, limit: f64, row: usize, used: &mut Vec<bool>) -> (usize, f64) {
         if row == costs.nrows() {
             return (0, 0.0);

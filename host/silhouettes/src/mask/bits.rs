@@ -1,12 +1,9 @@
-//! Masks as bits, 64 pixels a word, for morphology: erosion and dilation of 640x480 pixels in microseconds where
-//! distance transforms over bytes take milliseconds (of the five that a frame may take in all).
-//!
-//! The structuring element is a square of side 2 r + 1. Pixels outside the image change nothing: they are unset for
-//! dilation and set for erosion. Cost: O(height width r / 64).
+//! Masks as bits, 64 pixels a word, for fast morphology. The structuring element is a square of side 2 r + 1;
+//! pixels outside the image are unset for dilation and set for erosion. O(height width r / 64).
 
 use ndarray::{Array2, ArrayView2};
 
-/// A mask with one bit per pixel; each row begins on a word.
+/// Each row begins on a word.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct BitMask {
     height: usize,
@@ -16,7 +13,6 @@ pub struct BitMask {
 }
 
 impl BitMask {
-    /// Packs a mask of shape (height, width).
     #[must_use]
     pub fn pack(mask: ArrayView2<'_, bool>) -> Self {
         let (height, width) = mask.dim();
@@ -36,7 +32,6 @@ impl BitMask {
         Self { height, width, row_words, words }
     }
 
-    /// The mask of shape (height, width).
     #[must_use]
     pub fn unpack(&self) -> Array2<bool> {
         let mut mask = Array2::from_elem((self.height, self.width), false);
@@ -50,7 +45,6 @@ impl BitMask {
         mask
     }
 
-    /// Dilated by a square of side 2 `radius_px` + 1.
     #[must_use]
     pub fn dilated(mut self, radius_px: usize) -> Self {
         for _ in 0..radius_px.min(self.width.max(self.height)) {
@@ -59,25 +53,23 @@ impl BitMask {
         self
     }
 
-    /// Eroded by a square of side 2 `radius_px` + 1.
     #[must_use]
     pub fn eroded(self, radius_px: usize) -> Self {
         self.inverted().dilated(radius_px).inverted()
     }
 
-    /// Removes parts thinner than 2 `radius_px` + 1: eroded, then dilated.
+    /// Removes parts thinner than 2 `radius_px` + 1.
     #[must_use]
     pub fn opened(self, radius_px: usize) -> Self {
         self.eroded(radius_px).dilated(radius_px)
     }
 
-    /// With gaps narrower than 2 `radius_px` + 1 bridged: dilated, then eroded.
+    /// Bridges gaps narrower than 2 `radius_px` + 1.
     #[must_use]
     pub fn closed(self, radius_px: usize) -> Self {
         self.dilated(radius_px).eroded(radius_px)
     }
 
-    /// Set where it was not.
     #[must_use]
     pub fn inverted(mut self) -> Self {
         if self.row_words > 0 {
@@ -89,7 +81,6 @@ impl BitMask {
         self
     }
 
-    /// One pixel wider in all eight directions.
     fn grow(&mut self) {
         let step = self.row_words;
         if step == 0 {
@@ -105,7 +96,7 @@ impl BitMask {
             }
             trim(row, self.width);
         }
-        // Rows from above as they were, not as they have become.
+        // Original rows from above.
         let mut above = vec![0; step];
         for start in (0..self.words.len()).step_by(step) {
             for (at, above) in above.iter_mut().enumerate() {
@@ -118,7 +109,6 @@ impl BitMask {
     }
 }
 
-/// Clears the bits past the row's end.
 fn trim(row: &mut [u64], width: usize) {
     if let (Some(last), rest @ 1..) = (row.last_mut(), width % 64) {
         *last &= (1 << rest) - 1;
@@ -130,7 +120,6 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// The definition: the maximum over the square.
     fn dilated_plainly(mask: &Array2<bool>, radius: usize) -> Array2<bool> {
         Array2::from_shape_fn(mask.dim(), |(row, column)| {
             mask.indexed_iter()
@@ -169,7 +158,7 @@ mod tests {
             let (opened, closed) = (bits.clone().opened(radius).unpack(), bits.clone().closed(radius).unpack());
             prop_assert!(opened.iter().zip(&mask).all(|(&after, &before)| before || !after));
             prop_assert!(closed.iter().zip(&mask).all(|(&after, &before)| after || !before));
-            // Idempotent, as Serra's definitions are.
+            // Idempotent, as in Serra's definitions.
             prop_assert_eq!(bits.clone().opened(radius).opened(radius).unpack(), opened);
             prop_assert_eq!(bits.closed(radius).closed(radius).unpack(), closed);
         }

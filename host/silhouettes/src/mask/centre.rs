@@ -7,10 +7,8 @@ use super::{BoundingBox, Mask};
 /// Side of the thesis' silhouettes.
 pub const SIDE_PX: usize = 100;
 
-/// The mask's bounding box scaled, its aspect kept, until the longer side fills a square of `side_px`, and centred in it.
-/// A pixel is set where at least half of it is covered. `None` for an empty mask: there is nothing to centre. Cost:
-/// linear in the bounding box's pixels.
-///
+/// The mask's bounding box scaled with its aspect to fill a square of `side_px`, and centred. A pixel is set
+/// if at least half of it is covered. `None` for an empty mask. Linear in the box's pixels.
 #[must_use]
 pub fn centred(mask: ArrayView2<'_, bool>, side_px: usize) -> Option<Mask> {
     let bounds = BoundingBox::of(mask)?;

@@ -8,20 +8,17 @@ use super::{
     regions::{Connectivity, regions},
 };
 
-/// Radii are those of squares of side 2 r + 1 pixels; 0 skips a step.
+/// Radii of squares of side 2 r + 1 pixels; 0 skips a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Cleaning {
-    /// Thinner parts than 2 r + 1 pixels are removed.
     pub opening_radius_px: usize,
-    /// Gaps narrower than 2 r + 1 pixels are closed.
     pub closing_radius_px: usize,
     /// Largest filled hole; larger ones, as between arm and trunk, belong to the shape.
     pub largest_hole_px: usize,
 }
 
 impl Cleaning {
-    /// For people in images of this (height, width): opening 1 px, closing about 1/120 of the height, holes
-    /// up to 1/3000 of the image.
+    /// For people: opening 1 px, closing height / 120, holes up to 1/3000 of the image.
     #[must_use]
     pub fn for_size((height, width): (usize, usize)) -> Self {
         Self {
@@ -31,7 +28,6 @@ impl Cleaning {
         }
     }
 
-    /// Cleaned mask of shape (height, width). Cost: one pass each to pack, unpack and find holes.
     #[must_use]
     pub fn clean(&self, mask: ArrayView2<'_, bool>) -> Mask {
         let mut clean = if self.opening_radius_px == 0 && self.closing_radius_px == 0 {

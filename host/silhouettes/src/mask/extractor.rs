@@ -1,6 +1,5 @@
-//! From a video's frames to silhouettes: background model, cleaning and choice of the subject in one.
-//!
-//! Cost at 640x480: about 2 ms a frame on one thread, most of it the background model.
+//! From video frames to silhouettes: background model, cleaning and choice of the subject. About 2 ms a frame
+//! of 640x480 on one thread, mostly for the background model.
 
 use ndarray::Array2;
 
@@ -17,18 +16,29 @@ use crate::background::{
     shake::{self, Shift},
 };
 
-/// Which frames and pixels teach the background.
+/// Frames and pixels that the background learns from.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Learning {
-    /// All frames, but not where people are.
+    /// All frames, except where people are.
     #[default]
     OutsidePeople,
-    /// The same for this many frames; nothing is learned after them.
+    /// [`Self::OutsidePeople`] for this many frames.
     Until(u32),
-    /// All frames everywhere: a person who stands becomes background within seconds.
+    /// All frames everywhere: a standing person becomes background within seconds.
     Always,
-    /// Nothing after the frames that only teach the background.
+    /// Only the initial learning frames.
     Never,
+}
+
+impl std::fmt::Display for Learning {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::OutsidePeople => f.write_str("outside-people"),
+            Self::Until(frames) => write!(f, "until:{frames}"),
+            Self::Always => f.write_str("always"),
+            Self::Never => f.write_str("never"),
+        }
+    }
 }
 
 impl std::str::FromStr for Learning {
@@ -51,25 +61,20 @@ impl std::str::FromStr for Learning {
     }
 }
 
-/// Settings of the whole way from frame to silhouette.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ExtractorSettings {
-    /// The background model.
     pub background: Settings,
-    /// Cleaning of its mask.
     pub cleaning: Cleaning,
-    /// Choice of the subject.
     pub subject: SubjectSettings,
-    /// Frames at the beginning that only teach the background and are flagged as learning.
+    /// Initial frames that are only learned, and flagged.
     pub learning_frames: u32,
-    /// Moving share of the picture, 0 to 1, from which the frame is flagged as a changed scene.
+    /// Moving share of the picture, 0 to 1, above which the scene counts as changed.
     pub scene_change_share: f64,
     pub learning: Learning,
 }
 
 impl ExtractorSettings {
-    /// Settings for people in frames like this one. In grey frames shadow and subject are not distinguished: without
-    /// colour every darker copy of the background passes for shadow, dark clothes too.
+    /// Settings for people in frames like this one. Grey frames do not distinguish shadow from dark clothes.
     #[must_use]
     pub fn for_frame(frame: Frame<'_>) -> Self {
         let size = frame.size();
@@ -90,22 +95,16 @@ impl ExtractorSettings {
 
 #[derive(Clone, Debug, PartialEq)]
 pub struct Extracted {
-    /// The subject's mask, its bounds and doubts about them.
     pub subject: Subject,
-    /// The background model's answer before cleaning.
     pub labels: Array2<Label>,
 }
 
-/// All that moves in a frame.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Moving {
-    /// The cleaned mask, or the reason for its absence.
     pub mask: Result<Mask, Flag>,
-    /// The background model's answer before cleaning.
     pub labels: Array2<Label>,
 }
 
-/// Turns a video's frames into silhouettes one by one.
 pub struct Extractor {
     settings: ExtractorSettings,
     model: BackgroundModel,
@@ -119,16 +118,12 @@ pub struct Extractor {
 struct Sighted {
     people: Result<(Mask, Vec<Person>), Flag>,
     labels: Array2<Label>,
-    /// By how much the frame was moved back.
     shift: Shift,
 }
 
-/// Learning rate after the scene has changed.
 const ANEW: f32 = 1.0 / 15.0;
 
 impl Extractor {
-    /// An extractor for frames like this one, which is not taken in yet.
-    /// Errors: [`BackgroundError`] for an empty frame or settings that make no sense.
     pub fn like(frame: Frame<'_>, settings: ExtractorSettings) -> Result<Self, BackgroundError> {
         Ok(Self {
             model: BackgroundModel::like(frame, settings.background.clone())?,
@@ -140,10 +135,8 @@ impl Extractor {
         })
     }
 
-    /// Teaches the background a frame without asking where the subject is; people in it are left out if [`Learning`] leaves them out.
-    ///
-    /// # Errors
-    /// [`BackgroundError::Changed`] for a frame of another size or kind; the extractor is as before.
+    /// Learns a frame without choosing a subject; people are excluded if [`Learning`] says so. Fails for a
+    /// frame of another size or kind and leaves the extractor unchanged.
     pub fn learn(&mut self, frame: Frame<'_>) -> Result<(), BackgroundError> {
         let usual = self.settings.learning;
         if usual != Learning::Always {
@@ -154,8 +147,7 @@ impl Extractor {
         learned
     }
 
-    /// Takes in the next frame. Pixels that the background model calls shadow are not the subject's.
-    /// Errors: [`BackgroundError::Changed`] for a frame of another size or kind; the extractor is as before.
+    /// Processes the next frame. After an error the extractor is unchanged.
     pub fn extract(&mut self, frame: Frame<'_>) -> Result<Extracted, BackgroundError> {
         let Sighted { people, labels, shift } = self.sighted(frame)?;
         let mut subject = match people {
@@ -175,7 +167,7 @@ impl Extractor {
         Ok(Extracted { subject, labels })
     }
 
-    /// As [`Self::extract`], for all moving regions instead of one subject.
+    /// [`Self::extract`] for all moving regions.
     pub fn moving(&mut self, frame: Frame<'_>) -> Result<Moving, BackgroundError> {
         let Sighted { people, labels, shift } = self.sighted(frame)?;
         let moving = Moving { mask: people.map(|(mask, _)| mask), labels };
@@ -188,13 +180,11 @@ impl Extractor {
         })
     }
 
-    /// How often the light of the whole scene has changed suddenly.
     #[must_use]
     pub fn changes_of_light(&self) -> usize {
         self.changes_of_light
     }
 
-    /// The rate at which the next frame teaches.
     fn rate(&self) -> f32 {
         let seen = self.model.frames_seen();
         let learns = match self.settings.learning {
@@ -258,7 +248,6 @@ impl Extractor {
         Ok(Sighted { people: Ok((mask, people)), labels, shift })
     }
 
-    /// The background model, for its picture of the empty scene.
     #[must_use]
     pub fn background(&self) -> &BackgroundModel {
         &self.model

@@ -1,29 +1,28 @@
-//! Feedback from people to the background, which must not learn them: a motionless person would become background within seconds.
+//! Feedback from people to the background, which would learn a motionless person within seconds.
 //!
-//! A region that entered over the picture's edge or walked is a person for as long as it exists. A region that appears and never moves is furniture,
-//! a change of light, or a hole left by a person who was part of the background; those are learned. The outline of a hole is
-//! sharper in the background than in the frame.
+//! A region that entered over the picture's edge or walked is a person for as long as it exists. A region
+//! that appears and never moves is furniture, a change of light, or a hole left by a person who was part of
+//! the background; it is learned. The outline of a hole is sharper in the background than in the frame.
 
 use ndarray::ArrayView3;
 
 use super::{BoundingBox, Mask, bits::BitMask, people::Person};
 use crate::background::Frame;
 
-/// Steps from frame to frame that count as standing, as parts of the person's height.
+/// Largest step per frame of a standing person, in heights.
 const STANDING: f64 = 0.02;
 /// Frames of standing after which a person has stopped moving.
 const STOPPED_FRAMES: u32 = 25;
-/// From one look at a standing region's outline to the next, frames.
+/// Frames between two checks of a standing region's outline.
 const OUTLINE_FRAMES: u32 = 50;
-/// A region has walked when its middle is this far from where it appeared, as a part of its height.
+/// Distance from the first place after which a region has walked, in heights.
 const WALKED: f64 = 0.2;
-/// Frames for which a person who is not seen is remembered.
 const REMEMBERED_FRAMES: u32 = 10;
-/// The background keeps away from people by this part of the picture's height.
+/// Margin around people that is not learned: picture height over this.
 const MARGIN: usize = 60;
-/// An outline this many times as sharp in the background as in the frame is a hole.
+/// Ratio of the outline's sharpness in background and frame above which a region is a hole.
 const HOLE: f64 = 1.3;
-/// From the outline to where its two sides are compared, pixels.
+/// Distance of the compared sides from the outline.
 const ASIDE_PX: isize = 3;
 
 #[derive(Clone, Debug)]
@@ -36,7 +35,7 @@ struct Track {
     unseen_frames: u32,
 }
 
-/// Follows regions and says where nothing is learned.
+/// Follows regions and decides where nothing is learned.
 #[derive(Clone, Debug)]
 pub struct Feedback {
     size: (usize, usize),
@@ -45,25 +44,22 @@ pub struct Feedback {
 }
 
 impl Feedback {
-    /// For frames of this (height, width).
     #[must_use]
     pub fn new(size: (usize, usize)) -> Self {
         Self { size, tracks: Vec::new(), held: None }
     }
 
-    /// Pixels that the next frame must not teach; `None` without people.
+    /// Pixels excluded from learning in the next frame; `None` without people.
     #[must_use]
     pub fn held(&self) -> Option<&Mask> {
         self.held.as_ref()
     }
 
-    /// Forgets everybody: the scene has changed.
     pub fn forget(&mut self) {
         self.tracks.clear();
         self.held = None;
     }
 
-    /// Whether the person in this box has stopped moving.
     #[must_use]
     pub fn stopped(&self, bounds: BoundingBox) -> bool {
         let track = self.tracks.iter().max_by_key(|track| shared(track.bounds, bounds));
@@ -72,7 +68,7 @@ impl Feedback {
         })
     }
 
-    /// Takes the people of a frame; `background` gives the empty scene, for the comparison of outlines.
+    /// Adds the people of a frame; `background` is the empty scene for the comparison of outlines.
     pub fn follow(
         &mut self,
         people: &[Person],
@@ -114,7 +110,7 @@ impl Feedback {
             }
             tracks.push(track);
         }
-        // People who are missed for a moment keep their last place.
+        // Briefly undetected people keep their last place.
         for mut track in self.tracks.drain(..) {
             track.unseen_frames += 1;
             if track.unseen_frames <= REMEMBERED_FRAMES && track.walked {
@@ -126,14 +122,12 @@ impl Feedback {
         self.held = held.map(|mask| BitMask::pack(mask.view()).dilated(margin).unpack());
     }
 
-    /// The track that shares most with a box, which no other person has then.
     fn taken(&mut self, bounds: BoundingBox) -> Option<Track> {
         let best = (0..self.tracks.len()).max_by_key(|&index| shared(self.tracks[index].bounds, bounds))?;
         (shared(self.tracks[best].bounds, bounds) > 0).then(|| self.tracks.swap_remove(best))
     }
 }
 
-/// Pixels that two boxes share.
 fn shared(a: BoundingBox, b: BoundingBox) -> usize {
     let rows = a.bottom.min(b.bottom).saturating_sub(a.top.max(b.top));
     rows * a.right.min(b.right).saturating_sub(a.left.max(b.left))

@@ -1,5 +1,4 @@
-//! People in a cleaned mask: nearby regions above one another are one person (split by a belt or low
-//! contrast).
+//! People in a cleaned mask: stacked nearby regions (split by a belt or low contrast) are one person.
 
 use ndarray::ArrayView2;
 
@@ -12,10 +11,8 @@ use super::{
 /// Fragments of one person, or of several that occlude each other.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Person {
-    /// Connected regions.
     pub fragments: Vec<Region>,
     pub area: usize,
-    /// Smallest box that holds them.
     pub bounds: BoundingBox,
 }
 
@@ -32,7 +29,6 @@ impl Person {
         mean
     }
 
-    /// Mask of this person, shape (height, width).
     #[must_use]
     pub fn mask(&self, size: (usize, usize)) -> Mask {
         let mut mask = Mask::from_elem(size, false);
@@ -41,7 +37,7 @@ impl Person {
     }
 }
 
-/// Groups of fragments of a person's size, unordered. Cost: as [`regions`], then quadratic in fragments.
+/// Groups of fragments of a person's size, unordered. Quadratic in fragments.
 #[must_use]
 pub fn people(mask: ArrayView2<'_, bool>, settings: &SubjectSettings) -> Vec<Person> {
     let mut people: Vec<Person> = Vec::new();

@@ -1,8 +1,5 @@
-//! Connected regions by runs: each row's runs are joined with overlapping runs of the row above (union-find),
-//! after He, Chao and Suzuki, "A run-based two-scan labeling algorithm", IEEE Transactions on Image
-//! Processing 17 (2008), 749-756.
-//!
-//! Cost: linear in pixels, nearly linear in runs.
+//! Connected regions by runs, joined with overlapping runs of the row above by union-find (He, Chao and
+//! Suzuki, IEEE Transactions on Image Processing 17, 2008). Linear in pixels, nearly linear in runs.
 
 use ndarray::ArrayView2;
 
@@ -19,16 +16,13 @@ pub enum Connectivity {
 pub struct Run {
     pub row: usize,
     pub start: usize,
-    /// One past the last column.
     pub end: usize,
 }
 
 #[derive(Clone, Debug, PartialEq)]
 pub struct Region {
-    /// Pixels by rows.
     pub runs: Vec<Run>,
     pub area: usize,
-    /// Smallest box that holds them.
     pub bounds: BoundingBox,
 }
 
@@ -57,7 +51,6 @@ impl Region {
         (rows / self.area as f64, columns / self.area as f64)
     }
 
-    /// Sets or clears its pixels.
     pub fn paint(&self, mask: &mut Mask, value: bool) {
         for run in &self.runs {
             mask.slice_mut(ndarray::s![run.row, run.start..run.end]).fill(value);
@@ -65,7 +58,6 @@ impl Region {
     }
 }
 
-/// Connected regions of `mask` with this `value`, in order of their first pixels.
 #[must_use]
 pub fn regions(mask: ArrayView2<'_, bool>, value: bool, connectivity: Connectivity) -> Vec<Region> {
     let reach = usize::from(connectivity == Connectivity::Eight);
@@ -134,7 +126,6 @@ mod tests {
     use ndarray::{Array2, arr2};
     use proptest::prelude::*;
 
-    /// Region numbers by flood fill.
     fn flooded(mask: &Array2<bool>, connectivity: Connectivity) -> Array2<usize> {
         let (height, width) = mask.dim();
         let mut labels = Array2::zeros(mask.dim());

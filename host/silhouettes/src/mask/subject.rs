@@ -1,7 +1,5 @@
-//! The subject among the regions of a cleaned mask, and doubts about the frame.
-//!
-//! The subject is the person ([`super::people`]) nearest to the last one, or the largest where there is no last. Whatever is doubtful is
-//! flagged; a frame without a person gives an empty mask, never a guess.
+//! The subject among the regions of a cleaned mask: the person nearest to the last one, or the largest
+//! without a last one. Doubts are flagged; a frame without a person gives an empty mask.
 
 use std::fmt;
 
@@ -12,27 +10,26 @@ use super::{
     people::{Person, people},
 };
 
-/// Doubts about a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Flag {
-    /// No person is in the frame.
     Empty,
-    /// More than one person is; the mask holds one of them.
+    /// The mask holds one of them.
     SeveralPeople {
-        /// Number of regions of a person's size.
+        /// Regions of a person's size.
         count: usize,
     },
-    /// The subject reaches the picture's edge: part of it may be outside.
+    /// Part of the subject may be outside.
     CutByEdge,
-    /// The subject is in several pieces: parts of it look like the background.
-    Fragments { count: usize },
-    /// The subject has stood still for a second or longer.
+    /// Parts of the subject resemble the background.
+    Fragments {
+        count: usize,
+    },
+    /// For a second or longer.
     StoppedMoving,
-    /// The background is not known yet.
+    /// The background is not learned yet.
     Learning,
-    /// More of the picture moves than a person does: the light or the camera changed.
+    /// More moves than a person: the light or the camera changed.
     SceneChanged {
-        /// Moving pixels in per cent of the picture.
         moving_percent: u8,
     },
 }
@@ -52,30 +49,26 @@ impl fmt::Display for Flag {
 }
 
 impl Flag {
-    /// Whether the frame's mask is not a silhouette of one person and must not be used as one.
+    /// Whether the frame's mask must not be used as a silhouette of one person.
     #[must_use]
     pub fn spoils(self) -> bool {
         !matches!(self, Self::CutByEdge | Self::Fragments { .. } | Self::StoppedMoving)
     }
 }
 
-/// How the subject is chosen.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SubjectSettings {
-    /// The least area of a person, pixels.
     pub smallest_person_px: usize,
-    /// The least area of a fragment that may belong to a person, pixels.
     pub smallest_fragment_px: usize,
-    /// Fragments at most this far from each other, one above the other, are one person, pixels.
+    /// Largest gap between stacked fragments of one person, pixels.
     pub widest_break_px: usize,
-    /// A second person counts from this share of the largest's area, 0 to 1.
+    /// A second person counts from this share of the largest's area.
     pub rival_share: f64,
-    /// The frames without a person after which the last place is forgotten.
+    /// Frames without a person after which the last place is forgotten.
     pub forget_after_frames: u32,
 }
 
 impl SubjectSettings {
-    /// Settings for images of this (height, width).
     #[must_use]
     pub fn for_size((height, width): (usize, usize)) -> Self {
         let pixels = height * width;
@@ -89,18 +82,17 @@ impl SubjectSettings {
     }
 }
 
-/// The subject of one frame.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Subject {
-    /// Its pixels in the full frame, shape (height, width); all unset without a person.
+    /// Full frame; all unset without a person.
     pub mask: Mask,
-    /// Its bounding box; `None` without a person.
+    /// `None` without a person.
     pub bounds: Option<BoundingBox>,
-    /// Doubts; empty for a reliable frame.
+    /// Empty for a reliable frame.
     pub flags: Vec<Flag>,
 }
 
-/// Chooses the subject frame by frame and remembers where it was.
+/// Chooses the subject frame by frame and remembers its place.
 #[derive(Clone, Debug)]
 pub struct SubjectChooser {
     settings: SubjectSettings,
@@ -109,18 +101,17 @@ pub struct SubjectChooser {
 }
 
 impl SubjectChooser {
-    /// A chooser before the first person.
     #[must_use]
     pub fn new(settings: SubjectSettings) -> Self {
         Self { settings, last: None, absent_frames: 0 }
     }
 
-    /// The subject of the next frame, from its cleaned mask of shape (height, width).
+    /// The subject of the next frame's cleaned mask.
     pub fn choose(&mut self, mask: ArrayView2<'_, bool>) -> Subject {
         self.among(people(mask, &self.settings), mask.dim())
     }
 
-    /// As [`Self::choose`], among the people of a mask of this (height, width).
+    /// [`Self::choose`] among the people of a mask of this (height, width).
     pub fn among(&mut self, mut people: Vec<Person>, size: (usize, usize)) -> Subject {
         let largest = people.iter().map(|person| person.area).max().unwrap_or(0);
         people.retain(|person| person.area as f64 >= self.settings.rival_share * largest as f64);
@@ -199,7 +190,7 @@ mod tests {
         let both = chooser.choose(people(&[[60, 44, 140, 74], [40, 200, 160, 250]]).view());
         assert_eq!(both.flags, [Flag::SeveralPeople { count: 2 }]);
         assert_eq!(both.mask, people(&[[60, 44, 140, 74]]));
-        // Without a past the larger one is taken, but flagged.
+        // Without a last place the larger one is chosen and flagged.
         let fresh = super::tests::chooser().choose(people(&[[60, 44, 140, 74], [40, 200, 160, 250]]).view());
         assert_eq!(fresh.mask, people(&[[40, 200, 160, 250]]));
         assert!(fresh.flags[0].spoils());

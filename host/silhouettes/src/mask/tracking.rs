@@ -1,10 +1,9 @@
 //! Tracking of several people.
 //!
 //! Each person has a constant-velocity Kalman filter. Blobs of the mask ([`super::people`]) are assigned at
-//! minimum cost ([`super::assignment`]): distance from the prediction in standard deviations, and height
-//! change. People who occlude each other share a blob, so none has a silhouette and all are reported as
-//! crossing. After separation they are identified by their motion; if the swap is nearly as likely, the
-//! crossing is ambiguous.
+//! minimum cost ([`super::assignment`]): distance from the prediction and height change, in standard
+//! deviations. People who share a blob are reported as crossing, without silhouettes. After separation they
+//! are identified by their motion; the crossing is ambiguous if the swap is nearly as likely.
 
 mod motion;
 
@@ -20,7 +19,6 @@ use motion::Motion;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TrackingSettings {
-    /// Criteria of a person.
     pub subject: SubjectSettings,
     /// Frames before a new person is reported; earlier it may be a speck.
     pub confirmed_after_frames: usize,
@@ -29,19 +27,16 @@ pub struct TrackingSettings {
 }
 
 impl TrackingSettings {
-    /// Settings for images of this (height, width).
     #[must_use]
     pub fn for_size(size: (usize, usize)) -> Self {
         Self { subject: SubjectSettings::for_size(size), confirmed_after_frames: 3, gone_after_frames: 12 }
     }
 }
 
-/// Detection of a person in a frame.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Sight {
     /// An independent silhouette.
     Alone {
-        /// Full-frame mask.
         mask: Mask,
         bounds: BoundingBox,
         /// Touches the image's edge; part of it may be outside.
@@ -50,8 +45,10 @@ pub enum Sight {
         before: Vec<Mask>,
     },
     /// In one blob with these people.
-    Crossing { with: Vec<usize>, bounds: BoundingBox },
-    /// Not detected in this frame.
+    Crossing {
+        with: Vec<usize>,
+        bounds: BoundingBox,
+    },
     Missed,
 }
 
@@ -60,11 +57,9 @@ pub struct Followed {
     /// Number from 1 in order of appearance.
     pub person: usize,
     pub sight: Sight,
-    /// Crossings that have just ended.
     pub parted: Vec<Parting>,
 }
 
-/// End of a crossing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Parting {
     pub from: usize,
@@ -82,7 +77,6 @@ const HEIGHT_SPREAD: f64 = 0.2;
 const HIDDEN: f64 = 0.4;
 /// A blob up to this multiple of a person's area may hold one person.
 const ONE_ALONE: f64 = 1.15;
-/// Adaptation rate of usual sizes.
 const FOLLOWING: f64 = 0.2;
 
 #[derive(Clone, Debug)]
@@ -161,7 +155,7 @@ impl Tracker {
         Self { settings, tracks: Vec::new(), people: 0 }
     }
 
-    /// All people in the next frame's cleaned mask of shape (height, width), without those who have left.
+    /// All people in the next frame's cleaned mask, without those who have left.
     pub fn follow(&mut self, mask: ArrayView2<'_, bool>) -> Vec<Followed> {
         let size = mask.dim();
         let blobs = people(mask, &self.settings.subject);
@@ -198,8 +192,7 @@ impl Tracker {
         found
     }
 
-    /// The blob that each track shares: for a track without its own blob that is predicted inside one, and
-    /// for the blob's owner.
+    /// The blob that each track shares: its own, or one around its prediction.
     fn shared(&self, blobs: &[Person], blob_of: &[Option<usize>]) -> Vec<Option<usize>> {
         let mut shared = vec![None; self.tracks.len()];
         for (index, track) in self.tracks.iter().enumerate() {
@@ -228,7 +221,6 @@ impl Tracker {
         shared
     }
 
-    /// Crossings that end in this frame.
     fn partings(
         &mut self,
         costs: &Array2<f64>,
@@ -256,7 +248,7 @@ impl Tracker {
         partings
     }
 
-    /// Detection of a track in its blob, with others and possibly occluded; updates the track.
+    /// Updates the track; it may share its blob or be occluded.
     fn sight(
         &mut self,
         index: usize,
@@ -306,7 +298,6 @@ mod tests {
 
     const SIZE: (usize, usize) = (120, 320);
 
-    /// Boxes by left and top edges, 20 wide with the given height.
     fn frame(boxes: &[(f64, usize, usize)]) -> Mask {
         let mut mask = Mask::from_elem(SIZE, false);
         for &(left, top, height) in boxes {

@@ -1,7 +1,5 @@
-//! NPZ files of body motion (AMASS and others): joint positions where the file has them.
-//!
-//! AMASS itself stores pose parameters of the body models SMPL, SMPL-H and SMPL-X. Joint positions follow from them only with the body model's
-//! file, whose licence forbids passing it on; such files are refused with the name of the model.
+//! NPZ files of body motion (AMASS and others) with joint positions. AMASS itself stores pose parameters of
+//! SMPL, SMPL-H and SMPL-X, which need the licensed body model; such files are rejected.
 
 use super::{
     body,
@@ -11,7 +9,6 @@ use super::{
 };
 use crate::silhouette::capsule::Point3;
 
-/// The entry of [`super::READERS`].
 pub const READER: Reader = Reader {
     name: "NPZ",
     extensions: &["npz"],
@@ -19,11 +16,11 @@ pub const READER: Reader = Reader {
     read,
 };
 
-/// Names under which programs store joint positions.
+/// Array names of joint positions.
 const POSITIONS: [&str; 8] =
     ["joints", "Jtr", "jtr", "joints3d", "joints_3d", "keypoints3d", "joint_positions", "positions"];
 const RATES: [&str; 4] = ["mocap_framerate", "mocap_frame_rate", "fps", "framerate"];
-/// The body joints of all SMPL models, in their order; hands and face follow.
+/// Body joints of all SMPL models in order; hands and face follow.
 const SMPL: [&str; 22] = [
     "pelvis",
     "left_hip",
@@ -51,7 +48,6 @@ const SMPL: [&str; 22] = [
 const HEAD: usize = 15;
 const FEET: [usize; 2] = [10, 11];
 
-/// An array of an NPZ file.
 struct Array {
     name: String,
     shape: Vec<usize>,
@@ -60,10 +56,7 @@ struct Array {
     text: String,
 }
 
-/// Reads joint positions.
-///
-/// # Errors
-/// [`RecordingError::BodyModel`] for pose parameters without positions, [`RecordingError::Kind`] for anything else.
+/// Fails with [`RecordingError::BodyModel`] for pose parameters without positions.
 pub fn read(bytes: &[u8]) -> Result<Found, RecordingError> {
     let arrays = zip::entries(bytes, |name| name.ends_with(".npy"))?
         .iter()
@@ -110,7 +103,6 @@ pub fn read(bytes: &[u8]) -> Result<Found, RecordingError> {
     })
 }
 
-/// Why a file without positions is refused.
 fn refused(arrays: &[Array]) -> RecordingError {
     let of = |name: &str| arrays.iter().find(|array| array.name == name);
     let text = |name: &str| of(name).map(|array| array.text.to_lowercase()).filter(|text| !text.is_empty());
@@ -137,7 +129,6 @@ fn refused(arrays: &[Array]) -> RecordingError {
     }
 }
 
-/// An array in NumPy's format: floats, integers or text.
 fn array(name: &str, bytes: &[u8]) -> Result<Array, RecordingError> {
     let bad =
         |reason: &str| RecordingError::Kind { kind: "NPZ", reason: format!("array `{name}`: {reason}") };
@@ -184,7 +175,7 @@ fn array(name: &str, bytes: &[u8]) -> Result<Array, RecordingError> {
         _ if letter.starts_with('S') => {
             found.text = data.iter().map(|&c| char::from(c)).filter(|c| *c != '\0').collect();
         }
-        // Objects and the like are not needed.
+        // Objects are not needed.
         _ => {}
     }
     let expected = found.shape.iter().fold(1_usize, |product, &length| product.saturating_mul(length));
@@ -211,7 +202,6 @@ mod tests {
         bytes
     }
 
-    /// An archive of entries that are not packed; checksums are not looked at.
     fn npz(entries: &[(&str, Vec<u8>)]) -> Vec<u8> {
         let (mut file, mut directory) = (Vec::new(), Vec::new());
         for (name, data) in entries {

@@ -1,19 +1,16 @@
-//! Common parts of all formats of body recordings: missing points written as zeros, and a plausible size.
+//! Common parts of all body recordings: missing points written as zeros, and a plausible size.
 
 use super::recording::{Known, Source, Unit, Up};
 use crate::silhouette::capsule::Point3;
 
-/// Points of a frame without which it has no size that could be checked.
 const POINTS: usize = 4;
-/// Extents of a body with its props, millimetres: beyond these it cannot be a person, even if the file states so.
+/// Possible extents of a body with its props, mm; the file's unit is rejected beyond them.
 const POSSIBLE_MM: [f64; 2] = [100.0, 20_000.0];
-/// Extents that need no second look, millimetres.
+/// Extents that are not checked further, mm.
 const USUAL_MM: [f64; 2] = [400.0, 6000.0];
-/// Height of a standing adult, millimetres.
 const ADULT_MM: f64 = 1700.0;
 
-/// Hides points at exactly the origin and counts them. A point that is there in every frame, inside the body, is the origin of
-/// root-relative coordinates and is kept.
+/// Hides and counts points at the origin. A point inside the body in every frame stays: a root.
 pub fn hide_zeros(frames: &mut [Vec<Option<Point3>>]) -> usize {
     let zero = |point: &Option<Point3>| *point == Some([0.0; 3]);
     let root = |m: usize, frames: &[Vec<Option<Point3>>]| {
@@ -33,7 +30,6 @@ pub fn hide_zeros(frames: &mut [Vec<Option<Point3>>]) -> usize {
     hidden
 }
 
-/// Whether the origin lies strictly inside the box about the other points of a frame.
 fn inside(frame: &[Option<Point3>]) -> bool {
     (0..3).all(|k| {
         let values = || frame.iter().flatten().map(|p| p[k]);
@@ -41,7 +37,7 @@ fn inside(frame: &[Option<Point3>]) -> bool {
     })
 }
 
-/// The unit, or another where a body would have no human size in it: the one of mm, cm and m that fits an adult best. What the caller names is kept.
+/// The unit, or the best fitting of mm, cm and m if the size is not human. Keeps the caller's unit.
 pub fn plausible(unit: Known<Unit>, frames: &[Vec<Option<Point3>>]) -> Known<Unit> {
     let limits = match unit.source {
         Source::Format => USUAL_MM,
@@ -65,7 +61,7 @@ pub fn plausible(unit: Known<Unit>, frames: &[Vec<Option<Point3>>]) -> Known<Uni
     Known { value: Unit { mm: best }, source: Source::Guess { reason, sure: off(best) < 0.7 } }
 }
 
-/// The axis along which the head lies above the feet on average; `usual` without a head or feet.
+/// The axis along which the head is above the feet on average; `usual` without a head or feet.
 pub fn upright(frames: &[Vec<Option<Point3>>], head: usize, feet: &[usize], usual: Up) -> Known<Up> {
     let mut upward = [0.0; 3];
     for frame in frames {
@@ -85,7 +81,7 @@ pub fn upright(frames: &[Vec<Option<Point3>>], head: usize, feet: &[usize], usua
     Known { value, source: Source::Guess { reason, sure: part >= 0.8 } }
 }
 
-/// The median over frames of the largest extent along an axis, file units; `None` where no frame has enough points.
+/// Median over frames of the largest extent, file units; `None` if no frame has enough points.
 fn median_extent(frames: &[Vec<Option<Point3>>]) -> Option<f64> {
     let extent = |frame: &Vec<Option<Point3>>| -> Option<f64> {
         let points: Vec<Point3> =

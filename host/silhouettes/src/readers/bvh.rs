@@ -1,8 +1,7 @@
 //! BVH motion capture: a skeleton and joint angles, converted to joint positions.
 //!
 //! [`parse`] reads the text, [`kinematics`] computes positions, [`guess`] estimates the unit and the up axis,
-//! which BVH files do not state. Each joint and end site becomes a named point, visible in every frame. Cost:
-//! linear in the file.
+//! which BVH files do not state. Each joint and end site becomes a named point. Linear in the file.
 
 pub mod guess;
 pub mod kinematics;
@@ -12,7 +11,6 @@ use super::reader::Reader;
 use super::recording::{Found, RecordingError, text};
 use kinematics::Kinematics;
 
-/// Entry of [`super::READERS`].
 pub const READER: Reader = Reader {
     name: "BVH",
     extensions: &["bvh"],
@@ -20,7 +18,6 @@ pub const READER: Reader = Reader {
     read,
 };
 
-/// Errors: [`RecordingError::Line`] with what was found and expected.
 pub fn read(bytes: &[u8]) -> Result<Found, RecordingError> {
     let motion = parse::parse(&text(bytes)?)?;
     let kinematics = Kinematics::new(&motion);

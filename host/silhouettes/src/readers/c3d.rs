@@ -1,17 +1,13 @@
-//! C3D motion capture (c3d.org user guide): 3-D points of every frame.
-//!
-//! Integer and floating-point data; Intel, DEC and SGI numbers. Analogue samples are skipped. A negative
-//! residual means hidden. Damaged files cause neither panics nor allocations beyond their size.
+//! C3D motion capture (c3d.org user guide): 3-D points of every frame, integer and floating-point, Intel, DEC
+//! and SGI. Analogue samples are skipped; a negative residual means hidden.
 
 use super::reader::Reader;
 use super::recording::{Found, Known, RecordingError, Source, Unit, Up};
 use crate::silhouette::capsule::Point3;
 use std::collections::HashMap;
 
-/// Block size of the format.
 const BLOCK: usize = 512;
 
-/// Number format.
 #[derive(Clone, Copy, PartialEq)]
 enum Processor {
     Intel,
@@ -52,19 +48,16 @@ impl File<'_> {
     }
 }
 
-/// Dimensions and data offset of a parameter.
 struct Parameter {
     element: i8,
     dimensions: Vec<usize>,
     at: usize,
 }
 
-/// Entry of [`super::READERS`].
 pub const READER: Reader =
     Reader { name: "C3D", extensions: &["c3d"], about: "Vicon and most other systems, z up", read };
 
 /// Reads the points. The axes are not stated; nearly all files have z up.
-/// Errors: [`RecordingError`], also for a file without points.
 pub fn read(bytes: &[u8]) -> Result<Found, RecordingError> {
     let (file, parameters_at) = opened(bytes)?;
     let parameters = parameters(&file, parameters_at + 4);
@@ -116,7 +109,6 @@ fn opened(bytes: &[u8]) -> Result<(File<'_>, usize), RecordingError> {
     Ok((file, parameters_at))
 }
 
-/// Frame layout from the header.
 struct Layout {
     points: usize,
     /// Values per frame other than points.
@@ -145,7 +137,6 @@ impl Layout {
         })
     }
 
-    /// Bytes per number and per frame.
     fn sizes(&self) -> (usize, usize) {
         let size = if self.scale < 0.0 { 4 } else { 2 };
         (size, size * (4 * self.points + self.analogue))
@@ -179,7 +170,6 @@ impl Layout {
         (frames, remarks)
     }
 
-    /// Points of the first `frames` frames, file unit.
     fn frames(&self, file: &File, frames: usize) -> Result<Vec<Vec<Option<Point3>>>, RecordingError> {
         let (size, stride) = self.sizes();
         let room = file.bytes.len().saturating_sub(self.data_at) / stride;
@@ -197,7 +187,7 @@ impl Layout {
         (0..frames).map(frame).collect()
     }
 
-    /// Point at an offset: coordinates and residual, negative if hidden.
+    /// Coordinates and residual, negative if hidden.
     fn point(&self, file: &File, at: usize) -> Result<Option<Point3>, RecordingError> {
         let mut values = [0.0_f64; 4];
         for (k, value) in values.iter_mut().enumerate() {
@@ -214,8 +204,7 @@ impl Layout {
     }
 }
 
-/// Frame counts in parameters: `TRIAL:ACTUAL_START_FIELD` to `ACTUAL_END_FIELD` (two words each, low first)
-/// and `POINT:FRAMES`.
+/// Parameters `TRIAL:ACTUAL_START_FIELD` to `ACTUAL_END_FIELD` (two words, low first) and `POINT:FRAMES`.
 fn declared_frames(file: &File, parameters: &HashMap<String, Parameter>) -> Vec<usize> {
     let word = |at: usize| file.word(at, "a parameter").ok().map(usize::from);
     let field = |name: &str| -> Option<usize> {
@@ -270,7 +259,6 @@ fn parameters(file: &File, start: usize) -> HashMap<String, Parameter> {
     found.into_iter().map(named).collect()
 }
 
-/// Rows of a character parameter, trimmed.
 fn text_rows(file: &File, parameter: Option<&Parameter>) -> Vec<String> {
     let Some(parameter) = parameter.filter(|p| p.element == -1) else { return Vec::new() };
     let width = parameter.dimensions.first().copied().unwrap_or(1).max(1);

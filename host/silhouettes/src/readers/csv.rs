@@ -1,10 +1,10 @@
-//! Markers as CSV: a header `frame,NAME_x,NAME_y,NAME_z,...` (or `NAME:x`, `NAME.X`), one frame per row, millimetres, empty = hidden.
+//! Markers as CSV: a header `frame,NAME_x,NAME_y,NAME_z,...` (or `NAME:x`, `NAME.X`), one frame per row,
+//! millimetres, empty = hidden.
 
 use super::reader::Reader;
 use super::recording::{Found, Known, RecordingError, Source, Unit, Up, text};
 use super::trc::point;
 
-/// Entry of [`super::READERS`].
 pub const READER: Reader = Reader {
     name: "CSV",
     extensions: &["csv"],
@@ -12,8 +12,7 @@ pub const READER: Reader = Reader {
     read,
 };
 
-/// Leading columns without a coordinate suffix (frame number, time) are ignored.
-/// Errors: incomplete x, y, z of a marker, rows of another length, invalid numbers, with their line.
+/// Ignores leading columns without a coordinate suffix (frame number, time). Errors have their line.
 pub fn read(bytes: &[u8]) -> Result<Found, RecordingError> {
     let text = text(bytes)?;
     let mut lines =

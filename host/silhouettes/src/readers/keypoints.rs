@@ -1,8 +1,6 @@
-//! Keypoints of pose estimators as JSON: OpenPose, COCO and HALPE (AlphaPose, MMPose), MediaPipe. They are seen from one camera: x to the right
-//! and y down in its picture, so that their recordings have one view.
-//!
-//! Estimators that give people no numbers are followed from frame to frame by place. Lengths are guessed from the body: the trunk and
-//! the legs, at their longest in a frame, are those of an adult.
+//! Keypoints of pose estimators as JSON: OpenPose, COCO and HALPE (AlphaPose, MMPose), MediaPipe. One view: x
+//! to the right and y down in the picture. People without numbers are followed by place. Lengths are guessed
+//! from the body: the longest trunk and legs in a frame are those of an adult.
 
 mod document;
 mod layouts;
@@ -16,7 +14,6 @@ use crate::silhouette::capsule::Point3;
 use document::{Document, LEAST_CONFIDENCE};
 use layouts::NAMES;
 
-/// The entry of [`super::READERS`].
 pub const READER: Reader = Reader {
     name: "keypoints",
     extensions: &["json"],
@@ -24,30 +21,23 @@ pub const READER: Reader = Reader {
     read,
 };
 
-/// Lengths of an adult, millimetres: the ends as places among [`NAMES`].
+/// Lengths of an adult, mm; ends are indices of [`NAMES`].
 const BONES_MM: [([usize; 2], f64); 4] =
     [([16, 18], 420.0), ([17, 19], 420.0), ([18, 20], 420.0), ([19, 21], 420.0)];
 const TRUNK_MM: f64 = 500.0;
 const NECK: usize = 6;
 const SHOULDERS: [usize; 2] = [8, 9];
 const HIPS: [usize; 2] = [16, 17];
-/// Coordinates up to this are parts of the picture's sides, not pixels; points may lie outside of it.
+/// Coordinates up to this are shares of the picture's sides, not pixels; points may be outside.
 const NORMALISED: f64 = 3.0;
-/// The picture's shape where the file does not state it.
+/// Aspect ratio if the file does not state it.
 const USUAL_ASPECT: f64 = 16.0 / 9.0;
 
-/// Reads a JSON file.
-///
-/// # Errors
-/// [`RecordingError`] for JSON that is damaged or holds no person's points.
 pub fn read(bytes: &[u8]) -> Result<Found, RecordingError> {
     found(vec![Document::parse(bytes)?])
 }
 
-/// Reads a folder of JSON files, a frame each, in their order.
-///
-/// # Errors
-/// As [`read`].
+/// Reads a folder of JSON files, one frame each, in order.
 pub fn read_files<'a>(files: impl IntoIterator<Item = &'a [u8]>) -> Result<Found, RecordingError> {
     found(files.into_iter().map(Document::parse).collect::<Result<Vec<Document>, RecordingError>>()?)
 }
@@ -101,7 +91,6 @@ fn found(documents: Vec<Document>) -> Result<Found, RecordingError> {
     })
 }
 
-/// The picture's plane is x to the right and z up.
 fn in_space(points: &[Option<[f64; 2]>]) -> Vec<Option<Point3>> {
     // Not 0, 0, 0, which is a missing marker.
     points.iter().map(|point| point.map(|[x, y]| [x, 1e-9, -y])).collect()
@@ -118,7 +107,7 @@ fn add_neck(points: &mut [Option<[f64; 2]>]) {
     }
 }
 
-/// Millimetres per unit of the file, so that trunk and legs are an adult's.
+/// Millimetres per unit of the file, for an adult's trunk and legs.
 fn unit(frames: &[Vec<Option<[f64; 2]>>]) -> Known<Unit> {
     let distance = |a: [f64; 2], b: [f64; 2]| (a[0] - b[0]).hypot(a[1] - b[1]);
     let per_mm = |points: &Vec<Option<[f64; 2]>>| -> Option<f64> {
@@ -127,7 +116,7 @@ fn unit(frames: &[Vec<Option<[f64; 2]>>]) -> Known<Unit> {
         let bones = BONES_MM
             .iter()
             .filter_map(|([a, b], mm)| Some(distance((*points.get(*a)?)?, (*points.get(*b)?)?) / mm));
-        // What points towards the camera is shortened, never lengthened.
+        // Bones towards the camera are shortened, never lengthened.
         trunk.into_iter().chain(bones).max_by(f64::total_cmp).filter(|scale| *scale > 0.0)
     };
     let mut scales: Vec<f64> = frames.iter().filter_map(per_mm).collect();
@@ -139,7 +128,7 @@ fn unit(frames: &[Vec<Option<[f64; 2]>>]) -> Known<Unit> {
         }
         None => (5.0, "for neither trunk nor legs are seen".into(), false),
     };
-    // Six digits say as much as can be known.
+    // More than six digits are not known.
     let mm = format!("{mm:.5e}").parse().unwrap_or(mm);
     Known { value: Unit { mm }, source: Source::Guess { reason, sure } }
 }

@@ -1,11 +1,9 @@
 //! Kinect joints as text, one frame per line: 20 joints of the first or 25 of the second generation, x, y, z
-//! in metres (x across, y up, z away from the sensor), with or without a frame number (as UTKinect's
-//! `joints_s01_e01.txt`).
+//! in metres (x across, y up, z away), with or without a frame number (as in UTKinect).
 
 use super::reader::Reader;
 use super::recording::{Found, Known, RecordingError, Source, Unit, Up, text};
 
-/// Entry of [`super::READERS`].
 pub const READER: Reader = Reader {
     name: "Kinect joints",
     extensions: &["txt"],
@@ -13,7 +11,7 @@ pub const READER: Reader = Reader {
     read,
 };
 
-/// Joints of the second generation; the first 20 have the order of the first generation.
+/// Joints of the second generation; the first 20 are those of the first.
 pub const JOINTS_25: [&str; 25] = [
     "hip centre",
     "spine",
@@ -44,7 +42,6 @@ pub const JOINTS_25: [&str; 25] = [
 
 const RATE_HZ: f64 = 30.0;
 
-/// Errors: [`RecordingError::Line`] with what was found and expected.
 pub fn read(bytes: &[u8]) -> Result<Found, RecordingError> {
     let mut frames = Vec::new();
     let mut joints = None;

@@ -1,8 +1,5 @@
-//! MATLAB 5 MAT-files (MathWorks, "MAT-File Format", rev. 2016): numeric and cell arrays, plain or
-//! zlib-compressed.
-//!
-//! Enough for skeleton data sets (a cell array of numeric arrays). f64 values in MATLAB's order (first index
-//! fastest). Other classes are skipped as [`Array::Other`].
+//! MATLAB 5 MAT-files (MathWorks, "MAT-File Format", rev. 2016), plain or zlib-compressed: numeric and cell
+//! arrays, as in skeleton data sets. f64 values, first index fastest; other classes become [`Array::Other`].
 
 use flate2::read::ZlibDecoder;
 use std::io::Read;
@@ -12,13 +9,10 @@ pub enum Array {
     /// First index fastest.
     Numeric {
         dimensions: Vec<usize>,
-        /// One value per element.
         values: Vec<f64>,
     },
-    /// First index fastest.
     Cell {
         dimensions: Vec<usize>,
-        /// One array per cell.
         cells: Vec<Array>,
     },
     /// Number of an unsupported class.
@@ -36,28 +30,18 @@ pub enum MatlabError {
         at: usize,
     },
     #[error("{what} at byte {at} is {value}, which is not valid")]
-    Invalid {
-        what: &'static str,
-        value: u64,
-        /// Offset in the (decompressed) element.
-        at: usize,
-    },
+    Invalid { what: &'static str, value: u64, at: usize },
     #[error("damaged compressed data: {0}")]
     Compression(String),
 }
 
-/// Data types of elements.
 const MI_MATRIX: u32 = 14;
 const MI_COMPRESSED: u32 = 15;
 const CELL_CLASS: u8 = 1;
 const NUMERIC_CLASSES: std::ops::RangeInclusive<u8> = 6..=15;
-/// Limit of nested cells.
 const DEEPEST: usize = 16;
-/// Limit of decompressed elements.
 const LARGEST_BYTES: u64 = 1 << 30;
 
-/// All named variables in file order.
-/// Errors: [`MatlabError`].
 pub fn read(bytes: &[u8]) -> Result<Vec<(String, Array)>, MatlabError> {
     const HEADER: usize = 128;
     let header = bytes.get(..HEADER).ok_or(MatlabError::Header("shorter than its 128-byte header"))?;
@@ -137,7 +121,6 @@ impl<'a> Cursor<'a> {
     }
 }
 
-/// Name and contents of a matrix element; `None` for an unset cell.
 fn matrix(mut cursor: Cursor, depth: usize) -> Result<Option<(String, Array)>, MatlabError> {
     if cursor.bytes.is_empty() {
         return Ok(None);
@@ -229,7 +212,6 @@ fn numbers(kind: u32, raw: &[u8], big_endian: bool, at: usize) -> Result<Vec<f64
 mod tests {
     use super::*;
 
-    /// Numeric matrix element, long form.
     fn numeric(name: &str, dimensions: &[i32], values: &[f64]) -> Vec<u8> {
         let mut body = Vec::new();
         let mut element = |kind: u32, data: &[u8]| {

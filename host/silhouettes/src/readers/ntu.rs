@@ -1,9 +1,9 @@
 //! NTU RGB+D skeleton files (Shahroudy et al., CVPR 2016): 25 joints of a second Kinect, as text.
 //!
-//! The number of frames; per frame the number of bodies; per body a line about it (its id first), the number of joints and a line per
-//! joint: x, y, z in metres (x across, y up, z away from the sensor), eight further numbers, and last whether the joint was tracked (0: it
-//! was not). Of several bodies that are present for at least half as long as the longest, the one whose joints vary most in position is taken:
-//! the sensor also reports chairs as bodies, and their joints only jitter.
+//! The number of frames; per frame the number of bodies; per body a line (its id first), the number of joints
+//! and a line per joint: x, y, z in metres (x across, y up, z away), eight further numbers, and whether it
+//! was tracked. Of several bodies present for at least half as long as the longest, the one whose joints vary
+//! most is used: the sensor also reports chairs as bodies, and their joints only jitter.
 
 use super::kinect::JOINTS_25;
 use super::reader::Reader;
@@ -11,7 +11,6 @@ use super::recording::{Found, Known, RecordingError, Source, Unit, Up, text};
 use crate::silhouette::capsule::Point3;
 use std::collections::BTreeMap;
 
-/// The entry of [`super::READERS`].
 pub const READER: Reader = Reader {
     name: "NTU RGB+D",
     extensions: &["skeleton"],
@@ -19,15 +18,12 @@ pub const READER: Reader = Reader {
     read,
 };
 
-/// Bodies that are kept: the sensor follows six.
+/// The sensor follows six bodies.
 const MOST_BODIES: usize = 6;
-/// Frames per second of the sensor.
 const RATE_HZ: f64 = 30.0;
 
 type Body = Vec<Option<Point3>>;
 
-/// Reads a skeleton file.
-/// Errors: [`RecordingError::Line`]: what stands there and what was expected.
 pub fn read(bytes: &[u8]) -> Result<Found, RecordingError> {
     let content = text(bytes)?;
     let mut lines = Lines { lines: content.lines(), at: 0 };
@@ -78,7 +74,7 @@ pub fn read(bytes: &[u8]) -> Result<Found, RecordingError> {
     })
 }
 
-/// Variance of the joints' positions over time, summed over joints, file units squared.
+/// Variance of joint positions over time, summed over joints, file units squared.
 fn variance(body: &[(usize, Body)]) -> f64 {
     let joints = body.first().map_or(0, |(_, joints)| joints.len());
     let of = |joint: usize, axis: usize| {
@@ -97,7 +93,6 @@ struct Lines<'a> {
 }
 
 impl<'a> Lines<'a> {
-    /// The next line that is not empty.
     fn next(&mut self, what: &str) -> Result<&'a str, RecordingError> {
         loop {
             self.at += 1;
@@ -114,14 +109,14 @@ impl<'a> Lines<'a> {
     }
 
     fn count(&mut self, what: &str) -> Result<usize, RecordingError> {
-        /// More frames, bodies or joints are no skeleton file; nothing is made room for before its lines are there but frames.
+        /// Limit of frames, bodies and joints of a skeleton file; memory is reserved for frames only.
         const MOST: usize = 1_000_000;
         let line = self.next(what)?;
         let found = line.parse::<usize>().ok().filter(|count| *count <= MOST);
         found.ok_or_else(|| self.wrong(&format!("`{}`, expected {what}", shortened(line))))
     }
 
-    /// A joint; `None` where it was not tracked.
+    /// `None` if not tracked.
     fn joint(&mut self) -> Result<Option<Point3>, RecordingError> {
         let line = self.next("a joint")?;
         let wrong = || self.wrong(&format!("`{}`, expected the numbers of a joint", shortened(line)));
@@ -144,7 +139,7 @@ fn shortened(line: &str) -> String {
 mod tests {
     use super::*;
 
-    /// A file of two frames: a passer-by in the first, somebody in both, whose left hand was not tracked.
+    /// Two frames: a passer-by in the first, another person in both, whose left hand was not tracked.
     fn file() -> String {
         let body = |id: &str, x: f64| {
             let joints: String = (0..25)
@@ -184,7 +179,7 @@ mod tests {
         };
         let mut text = String::from("20\n");
         for frame in 0..20 {
-            // The chair jitters from frame to frame; the actor walks a metre and is lost for three frames.
+            // The chair jitters; the actor walks a metre and is lost for three frames.
             let chair = body("1", 2.0 + 0.02 * f64::from(frame % 2));
             text += &if frame < 3 {
                 format!("1\n{chair}")

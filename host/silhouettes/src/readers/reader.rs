@@ -2,15 +2,12 @@
 
 use super::recording::{Found, RecordingError};
 
-/// A file format and its reader.
 #[derive(Clone, Copy, Debug)]
 pub struct Reader {
     pub name: &'static str,
     /// Lower case, without the dot.
     pub extensions: &'static [&'static str],
-    /// Source and contents, for lists and help.
     pub about: &'static str,
-    /// Parses a file; damaged ones give errors, never a panic or an allocation beyond a fixed multiple of
-    /// their size.
+    /// Damaged files give errors, never a panic or an allocation beyond a fixed multiple of their size.
     pub read: fn(&[u8]) -> Result<Found, RecordingError>,
 }

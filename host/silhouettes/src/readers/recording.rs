@@ -1,7 +1,5 @@
-//! A recording of named points over time: the common form of all motion-capture files, and what a reader makes of its file.
-//!
-//! A reader gives what the file holds in the file's own unit and axes ([`Found`]), each with where it is known from;
-//! [`Found::settled`] turns that to millimetres and z up, or to the caller's values.
+//! Recordings of named points over time, the common form of all motion-capture files. A reader returns the
+//! file's own unit and axes with their source ([`Found`]); [`Found::settled`] converts to mm and z up.
 
 use super::body;
 use crate::silhouette::{aliases, capsule::Point3};
@@ -10,16 +8,13 @@ use std::collections::HashMap;
 use std::fmt;
 use std::str::FromStr;
 
-/// A length of one in a file.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Unit {
-    /// Its length, millimetres.
     pub mm: f64,
 }
 
 impl Unit {
-    /// The units that have a name: what is read, millimetres, what is shown. The last is the CMU library's, whose skeletons
-    /// count 1/0.45 inch; its BVH conversions kept that.
+    /// Read name, millimetres, shown name. The last is the CMU library's, whose skeletons count 1/0.45 inch.
     pub const NAMED: [(&str, f64, &str); 5] = [
         ("mm", 1.0, "millimetres"),
         ("cm", 10.0, "centimetres"),
@@ -28,11 +23,8 @@ impl Unit {
         ("cmu", 25.4 / 0.45, "units of 56.444 mm (1/0.45 inch, the CMU library's)"),
     ];
 
-    /// Millimetres themselves.
     pub const MM: Self = Self { mm: 1.0 };
 
-    /// The unit of a name, as files write it: short or written out.
-    /// Errors: [`RecordingError::Unit`] for any other name.
     pub fn named(name: &str) -> Result<Self, RecordingError> {
         let name = name.trim().trim_matches('\0').to_ascii_lowercase();
         let short = match name.as_str() {
@@ -59,7 +51,7 @@ impl fmt::Display for Unit {
 impl FromStr for Unit {
     type Err = RecordingError;
 
-    /// The unit of a name (see [`Unit::named`]), or of a positive number of millimetres.
+    /// A name ([`Unit::named`]) or a positive number of millimetres.
     fn from_str(text: &str) -> Result<Self, RecordingError> {
         Self::named(text).or_else(|unknown| match text.trim().parse::<f64>() {
             Ok(mm) if mm.is_finite() && mm > 0.0 => Ok(Self { mm }),
@@ -68,7 +60,6 @@ impl FromStr for Unit {
     }
 }
 
-/// The axis of a file that points up.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Up {
     X,
@@ -77,7 +68,7 @@ pub enum Up {
 }
 
 impl Up {
-    /// A point of the file with this axis up, turned (never mirrored) to z up.
+    /// Rotates (never mirrors) a point with this axis up to z up.
     pub fn to_z(self, [x, y, z]: Point3) -> Point3 {
         match self {
             Self::X => [y, z, x],
@@ -110,36 +101,30 @@ impl FromStr for Up {
     }
 }
 
-/// Where something about a recording is known from.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Source {
     Caller,
     File,
-    /// Files of this format have it so.
     Format,
-    /// The file states something that this program does not know.
+    /// The file states an unknown value.
     Unknown {
-        /// The file's words.
         stated: String,
     },
-    /// Nothing states it: it was guessed.
+    /// Not stated in the file.
     Guess {
         reason: String,
-        /// Whether the guess stands clear of the other possibilities.
+        /// Whether the alternatives are clearly worse.
         sure: bool,
     },
 }
 
-/// Something about a recording, and where it is known from.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Known<T> {
     pub value: T,
-    /// Where it is known from.
     pub source: Source,
 }
 
 impl<T> Known<T> {
-    /// The caller's value instead of this one, if given.
     fn unless(self, named: Option<T>) -> Self {
         match named {
             Some(value) => Self { value, source: Source::Caller },
@@ -148,37 +133,33 @@ impl<T> Known<T> {
     }
 }
 
-/// What the caller knows better than the file.
+/// Values that override the file's.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Choices {
     pub unit: Option<Unit>,
-    /// The axis that points up.
     pub up: Option<Up>,
-    /// Which of several people, from 1: without it the one whom the reader takes for the actor.
+    /// Which of several people, from 1; `None` selects the actor.
     pub person: Option<usize>,
 }
 
-/// What a file holds, in its own unit and axes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Found {
     pub names: Vec<String>,
-    /// Frames per second, 0 if the file does not say.
+    /// 0 if the file does not state it.
     pub rate_hz: f64,
     /// `frames[f][m]`: point m in frame f.
     pub frames: Vec<Vec<Option<Point3>>>,
-    /// The same of further people.
     pub others: Vec<Vec<Vec<Option<Point3>>>>,
-    /// Seen from one side only: points lie in the plane of x and z.
+    /// Seen from one side: points are in the plane of x and z.
     pub planar: bool,
     pub unit: Known<Unit>,
-    /// The axis that points up.
     pub up: Known<Up>,
-    /// What a user should know about how the file was read, one sentence each.
+    /// Information for users about the reading, one sentence each.
     pub remarks: Vec<String>,
 }
 
 impl Found {
-    /// The unit that the file states, which may be one that this program does not know: then the caller has to name it.
+    /// The caller has to name a unit that is not known.
     pub(super) fn stated_unit(stated: &str) -> Known<Unit> {
         match Unit::named(stated) {
             Ok(value) => Known { value, source: Source::File },
@@ -186,8 +167,7 @@ impl Found {
         }
     }
 
-    /// The recording in millimetres with z up. Points that are not finite count as hidden, and points at exactly 0, 0, 0, which is how
-    /// many programs export a missing marker.
+    /// Converts to millimetres, z up. Hides non-finite points and 0, 0, 0 (missing in many exports).
     pub fn settled(mut self, choices: Choices) -> Recording {
         if let Some(number) = choices.person.and_then(|person| person.checked_sub(2))
             && number < self.others.len()
@@ -223,29 +203,23 @@ impl Found {
     }
 }
 
-/// Named points (markers or joints) over time, `None` where one was hidden: millimetres, z up.
+/// Named points (markers or joints) over time, `None` = hidden: millimetres, z up.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Recording {
     pub names: Vec<String>,
-    /// Frames per second, 0 if the file does not say.
     pub rate_hz: f64,
-    /// `frames[f][m]`: point m in frame f, millimetres.
     pub frames: Vec<Vec<Option<Point3>>>,
-    /// Seen from one side only: points lie in the plane of x and z, and no other view can be drawn.
+    /// Seen from one side: points are in the plane of x and z, and no other view can be drawn.
     pub planar: bool,
-    /// Other names of points, by which built-in templates know them.
+    /// Names by which built-in templates know points.
     aliases: Vec<(usize, String)>,
-    /// The file's unit of length.
     pub unit: Known<Unit>,
-    /// The file's axis that points up.
     pub up: Known<Up>,
-    /// What the reader reports about the file, one sentence each.
     remarks: Vec<String>,
 }
 
 impl Recording {
-    /// Positions of a frame by name, hidden points left out. Names are given without a prefix (`Nick:LASI` is `LASI`)
-    /// as well as whole.
+    /// Positions of a frame without hidden points, by name with and without a prefix (`Nick:LASI`, `LASI`).
     pub fn by_name(&self, frame: usize) -> HashMap<&str, Point3> {
         let mut found = HashMap::new();
         for (name, point) in self.names.iter().zip(self.frames.get(frame).into_iter().flatten()) {
@@ -264,12 +238,12 @@ impl Recording {
         found
     }
 
-    /// The names of all points, with those by which built-in templates know them.
+    /// Names of all points, with those of built-in templates.
     pub fn known_names(&self) -> Vec<String> {
         self.names.iter().chain(self.aliases.iter().map(|(_, alias)| alias)).cloned().collect()
     }
 
-    /// Guesses about the file, one sentence each, to be shown: the caller can override them.
+    /// Guesses about the file, one sentence each; the caller can override them.
     pub fn remarks(&self) -> Vec<String> {
         let remark = |what: String, source: &Source| match source {
             Source::Guess { reason, sure } => {
@@ -283,33 +257,20 @@ impl Recording {
     }
 }
 
-/// Why a recording could not be read.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum RecordingError {
-    /// No reader knows files with this ending.
+    /// No reader has this extension.
     #[error("no reader of motion capture knows files that end in `.{found}`: expected {known}")]
-    Extension {
-        found: String,
-        /// The endings that are known.
-        known: String,
-    },
-    /// Not a file of this kind.
+    Extension { found: String, known: String },
     #[error("not a {kind} file: {reason}")]
     Kind {
-        /// The format that was expected.
         kind: &'static str,
-        /// What the file has in place of what such a file has.
+        /// Found and expected contents.
         reason: String,
     },
     #[error("the {kind} file ends within {what}: {needed} bytes are needed, {found} are there")]
-    Truncated {
-        kind: &'static str,
-        what: &'static str,
-        /// Bytes up to the end of the incomplete part.
-        needed: usize,
-        found: usize,
-    },
-    /// Pose parameters, from which only a licensed body model makes joints.
+    Truncated { kind: &'static str, what: &'static str, needed: usize, found: usize },
+    /// Only a licensed body model converts pose parameters to joints.
     #[error(
         "it holds pose parameters of {model} (array `{array}`, {shape}) and no joint positions, which need the body model file \
          {file}; write the joints that it gives to an array `joints` of frames x joints x 3"
@@ -317,11 +278,10 @@ pub enum RecordingError {
     BodyModel { array: String, shape: String, model: &'static str, file: String },
     #[error("no person {wanted}: {found} are in the file")]
     Person { wanted: usize, found: usize },
-    /// A line that cannot be read.
     #[error("line {line}: {reason}")]
     Line {
         line: usize,
-        /// What stands there and what was expected.
+        /// Found and expected contents.
         reason: String,
     },
     #[error(
@@ -330,8 +290,7 @@ pub enum RecordingError {
     Unit(String),
 }
 
-/// The text of a file without a byte-order mark. Bytes that are not UTF-8 are read as Latin-1, which older programs write.
-/// Errors: Bytes that are neither, with the line of the first of them.
+/// Text without a byte-order mark; Latin-1 if it is not UTF-8. Errors have the line of the first other byte.
 pub(super) fn text(bytes: &[u8]) -> Result<Cow<'_, str>, RecordingError> {
     let control = |byte: &u8| byte.is_ascii_control() && !byte.is_ascii_whitespace();
     match std::str::from_utf8(bytes) {

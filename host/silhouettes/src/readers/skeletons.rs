@@ -1,18 +1,13 @@
-//! Joints of skeleton data sets as capsules.
-//!
-//! Clips use the world frame of [`crate::silhouette`]: x right, y away from the sensor, z up, millimetres.
+//! Joints of skeleton data sets as capsules: x right, y away from the sensor, z up, millimetres.
 
 use super::matlab::{self, Array, MatlabError};
 use crate::silhouette::capsule::{Capsule, Point3};
 
-/// Joints and bone thickness.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Layout {
-    /// Names in file order.
     pub joints: &'static [&'static str],
     /// Two joints and a radius in millimetres; equal joints make a ball.
     pub bones: &'static [(usize, usize, f64)],
-    /// Millimetres per unit of the file.
     pub unit_mm: f64,
 }
 
@@ -112,7 +107,6 @@ pub const UTKINECT_ACTIVITIES: [&str; 10] =
 pub const FLORENCE_ACTIVITIES: [&str; 9] =
     ["wave", "drink", "answer phone", "clap", "tight lace", "sit down", "stand up", "read watch", "bow"];
 
-/// One performance of an activity.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SkeletonClip {
     /// First index of the cell array, from 0.
@@ -136,9 +130,7 @@ pub enum SkeletonError {
     Form { activity: usize, subject: usize, repetition: usize, found: Vec<usize>, joints: usize },
 }
 
-/// Reads a cell array `data{activity, subject, repetition}` of 3 x joints x frames arrays in a sensor's frame
-/// (x right, y up, z away); empty cells are skipped.
-/// Errors: [`SkeletonError`].
+/// Reads cells `data{activity, subject, repetition}` of 3 x joints x frames (x right, y up, z away).
 pub fn read_cells(bytes: &[u8], layout: &Layout) -> Result<Vec<SkeletonClip>, SkeletonError> {
     let variables = matlab::read(bytes)?;
     let found = variables.into_iter().find_map(|(name, array)| match array {
@@ -176,7 +168,6 @@ pub fn read_cells(bytes: &[u8], layout: &Layout) -> Result<Vec<SkeletonClip>, Sk
     Ok(clips)
 }
 
-/// Capsules of a frame's joints.
 pub fn dress(joints: &[Point3], layout: &Layout) -> Vec<Capsule> {
     layout
         .bones

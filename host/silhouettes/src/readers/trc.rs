@@ -4,12 +4,10 @@ use super::reader::Reader;
 use super::recording::{Found, Known, RecordingError, Source, Up, text};
 use crate::silhouette::capsule::Point3;
 
-/// Entry of [`super::READERS`].
 pub const READER: Reader =
     Reader { name: "TRC", extensions: &["trc"], about: "Motion Analysis and OpenSim markers, y up", read };
 
-/// Most files, such as OpenSim's, have y up.
-/// Errors: missing header lines, unknown units, rows of another length, invalid numbers, with their line.
+/// Most files, such as OpenSim's, have y up. Errors have their line.
 pub fn read(bytes: &[u8]) -> Result<Found, RecordingError> {
     let text = text(bytes)?;
     let lines: Vec<&str> = text.lines().collect();
@@ -84,8 +82,7 @@ pub fn read(bytes: &[u8]) -> Result<Found, RecordingError> {
     Ok(Found { names, rate_hz, frames, others: Vec::new(), planar: false, unit, up, remarks })
 }
 
-/// Frames of the lines after the header: number, time, then x, y, z of the markers in these columns; missing
-/// cells at the end are hidden.
+/// Rows after the header: number, time, then x, y, z in these columns; missing cells at the end are hidden.
 fn rows(lines: &[&str], places: &[usize]) -> Result<Vec<Vec<Option<Point3>>>, RecordingError> {
     let mut frames = Vec::new();
     for (index, row) in lines.iter().enumerate().skip(5) {

@@ -1,4 +1,4 @@
-//! The entries of a ZIP archive (what NumPy's `.npz` files are): stored or deflated, no encryption, no parts of over 4 GiB.
+//! ZIP archives such as NumPy's `.npz`: stored or deflated, without encryption, below 4 GiB.
 
 use std::io::Read;
 
@@ -6,14 +6,10 @@ use flate2::read::DeflateDecoder;
 
 use super::recording::RecordingError;
 
-/// An archive may be this many times as large unpacked, so that a small file cannot ask for all memory.
+/// Limit of the unpacked size relative to the archive's.
 const LARGEST_RATIO: usize = 64;
 const SPARE_BYTES: usize = 1 << 20;
 
-/// Names and unpacked bytes of the entries that `wanted` accepts.
-///
-/// # Errors
-/// [`RecordingError::Kind`] for other files, [`RecordingError::Truncated`] for one that was cut short.
 pub fn entries(
     bytes: &[u8],
     wanted: impl Fn(&str) -> bool,

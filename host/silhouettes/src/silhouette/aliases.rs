@@ -1,10 +1,9 @@
-//! Other names of the points of built-in templates: programs name the same joints after the joint, the segment that begins there or
-//! the side first or last. A naming is one convention; where two conventions clash (`LeftShoulder` is the collar bone for one program and the
-//! shoulder joint for another), the one that explains more of a recording's names is used as a whole.
+//! Other names of the points of built-in templates, which programs name after the joint, the segment that
+//! begins there or the side. Conventions clash (`LeftShoulder` is the collar bone or the shoulder joint), so
+//! the one that explains most of a recording's names is used for all.
 
 use super::template::Template;
 
-/// A convention of names for the points of a template.
 struct Naming {
     about: &'static str,
     template: &'static str,
@@ -185,20 +184,18 @@ const NAMINGS: [Naming; 4] = [
     },
 ];
 
-/// What programs put before or after the names of one body's points.
+/// Text before or after the names of one body's points.
 const PREFIXES: [&str; 4] = ["mixamorig", "bip001", "bip01", "skeleton"];
 const SUFFIXES: [&str; 1] = ["study"];
 
-/// Names of a recording that are known under other names.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Aliases {
-    /// Place among the recording's names, and the name in the template.
+    /// Index of the recording's name, and the name in the template.
     pub names: Vec<(usize, String)>,
-    /// The match in words, for the user.
     pub remark: String,
 }
 
-/// The points that built-in templates know under other names; nothing where a template fits without aliases, or none does.
+/// `None` if a template fits without aliases, or none does.
 pub fn find(names: &[String]) -> Option<Aliases> {
     let templates = || Template::names().filter_map(|name| Template::named(name).ok());
     if templates().any(|template| template.check(names).is_ok()) {
@@ -224,12 +221,12 @@ pub fn find(names: &[String]) -> Option<Aliases> {
         let namings = NAMINGS.iter().filter(|naming| naming.template == template.name);
         std::iter::once(None).chain(namings.map(Some)).filter_map(table).collect()
     };
-    // Of equals the first.
+    // The first of equals.
     let all: Vec<Aliases> = templates().flat_map(|template| of(&template)).collect();
     all.into_iter().rev().max_by_key(|aliases| aliases.names.len())
 }
 
-/// Each point of the template once, with the first of the recording's names that means it.
+/// Each point of the template once, with the first matching name.
 fn matched(simple: &[String], template: &Template, naming: Option<&Naming>) -> Vec<(usize, String)> {
     let mut found: Vec<(usize, String)> = Vec::new();
     let markers: Vec<&String> = template.parts.iter().flat_map(|part| &part.markers).collect();
@@ -259,7 +256,7 @@ fn matched(simple: &[String], template: &Template, naming: Option<&Naming>) -> V
     found
 }
 
-/// Small letters and digits only, without a subject's name before it.
+/// Lower-case letters and digits, without a subject's name.
 fn simplified(name: &str) -> String {
     let own = name.rsplit_once(':').map_or(name, |(_, own)| own);
     let mut simple: String =

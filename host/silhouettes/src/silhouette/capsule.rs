@@ -1,5 +1,3 @@
-//! Capsules: cylinders with round ends around bones.
-
 /// Millimetres.
 pub type Point3 = [f64; 3];
 

@@ -1,8 +1,7 @@
 //! Silhouettes by parts: the markers of each body part, projected and filled (Li 2014, section 7.2.2).
 //!
-//! The thesis fills all triplets of a part's markers, so that hidden markers leave no hole. Their union is
-//! the convex hull, which is much faster; tests compare both. Gaps between rigid parts are filled by
-//! [`close`] (21 pixels at 167 pixels per metre in the thesis).
+//! The thesis fills all triplets of a part's markers. Their union is the convex hull, which is faster; tests
+//! compare both. [`close`] fills gaps between rigid parts (21 pixels at 167 pixels per metre in the thesis).
 
 use super::capsule::Point3;
 use super::raster::{Point, convex_hull, fill_convex, fill_discs_hull};
@@ -11,9 +10,8 @@ use super::view::{Canvas, View};
 use crate::mask::{Mask, bits::BitMask};
 use ndarray::s;
 use serde::{Deserialize, Serialize};
-use std::collections::HashMap;
+use std::{collections::HashMap, fmt, str::FromStr};
 
-/// Fill method of a part.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Fill {
@@ -23,7 +21,27 @@ pub enum Fill {
     Triplets,
 }
 
-/// A drawn frame.
+impl fmt::Display for Fill {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Hull => "hull",
+            Self::Triplets => "triplets",
+        })
+    }
+}
+
+impl FromStr for Fill {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text {
+            "hull" => Ok(Self::Hull),
+            "triplets" => Ok(Self::Triplets),
+            other => Err(format!("`{other}` is not a fill: expected hull or triplets")),
+        }
+    }
+}
+
 #[derive(Clone, Debug, PartialEq)]
 pub struct PartsSilhouette {
     pub mask: Mask,
@@ -31,7 +49,7 @@ pub struct PartsSilhouette {
     pub missing_parts: Vec<String>,
 }
 
-/// Visible template markers of frames in a view, for [`Canvas::fitting`], with the parts' thickness.
+/// Visible template markers of frames in a view, with the parts' thickness, for [`Canvas::fitting`].
 pub fn extent(frames: &[HashMap<&str, Point3>], template: &Template, view: &View) -> Vec<Point> {
     let mut points = Vec::new();
     for (frame, part) in frames.iter().flat_map(|frame| template.parts.iter().map(move |part| (frame, part)))
@@ -94,7 +112,7 @@ fn fill_triplets(mask: &mut Mask, points: &[Point]) {
     }
 }
 
-/// Morphological closing by a square of `size_px` pixels (odd): fills narrower gaps, keeps the outline.
+/// Morphological closing by a square of `size_px` pixels (odd).
 pub fn close(mask: &Mask, size_px: usize) -> Mask {
     let half = size_px / 2;
     if half == 0 {

@@ -1,6 +1,4 @@
-//! Fills convex shapes: hulls, triangles and capsules.
-//!
-//! A pixel is set if its centre is in the shape (edges included); cost: rows plus set pixels.
+//! Fills convex shapes: pixels with their centre in the shape, edges included.
 
 use crate::mask::Mask;
 
@@ -37,8 +35,7 @@ pub fn convex_hull(points: &[Point]) -> Vec<Point> {
     hull
 }
 
-/// Sets pixels with centres in the convex polygon (either orientation), clipped to the mask. One or two
-/// corners set the nearest pixels of that point or line.
+/// Either orientation, clipped to the mask. One or two corners set the nearest pixels.
 pub fn fill_convex(mask: &mut Mask, polygon: &[Point]) {
     /// Tolerance, so that shared edges leave no seam.
     const EDGE_PX: f64 = 1e-9;
@@ -82,7 +79,6 @@ pub fn fill_convex(mask: &mut Mask, polygon: &[Point]) {
     }
 }
 
-/// Sets the pixels nearest to a line.
 pub fn draw_line(mask: &mut Mask, a: Point, b: Point) {
     let (height, width) = mask.dim();
     let steps = (b[0] - a[0]).abs().max((b[1] - a[1]).abs()).ceil();

@@ -1,11 +1,11 @@
-//! Thins a gallery to the least similar silhouettes (Li 2014, eq. 7.3 and 7.4).
+//! Thins a gallery to the least similar silhouettes.
 
 use crate::mask::Mask;
 use rayon::prelude::*;
 
-/// Selects silhouettes (Li 2014, eq. 7.3 and 7.4): of the two most similar one is removed (alternately the
-/// first and the second), until `keep` remain. The printed method removes only the row; here the column too,
-/// otherwise it could be removed again. Returns ascending indices. O(N^2 P / 64).
+/// Removes one of the two most similar silhouettes, alternately the first and the second, until `keep` remain
+/// (Li 2014, eq. 7.3 and 7.4). The printed method removes only the row; here the column too, otherwise it
+/// could be removed again. Returns ascending indices. O(N^2 P / 64).
 pub fn remove_redundant(masks: &[Mask], keep: usize) -> Vec<usize> {
     let n = masks.len();
     let packed: Vec<Vec<u64>> = masks

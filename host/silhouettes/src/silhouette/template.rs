@@ -1,4 +1,4 @@
-//! Marker templates: which markers make which rigid part of the body or prop (Li 2014, section 7.2.1), as TOML.
+//! Marker templates as TOML: the markers of each rigid part of body or prop (Li 2014, section 7.2.1).
 //!
 //! ```toml
 //! name = "my suit"
@@ -8,66 +8,51 @@
 //! thickness_mm = 90.0     # optional: grows the part by so much all round, for suits with few markers
 //! ```
 //!
-//! Left and right limbs are parts of their own. Markers may belong to several parts, which closes joints.
+//! Left and right limbs are separate parts. Markers may belong to several parts, which closes joints.
 
 use serde::{Deserialize, Serialize};
 
-/// A rigid part.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Part {
-    /// Its name, by which flags and errors call it.
+    /// Name in flags and errors.
     pub name: String,
     pub markers: Vec<String>,
-    /// Grown by this many millimetres all round.
+    /// Radius by which the part is grown.
     #[serde(default)]
     pub thickness_mm: f64,
 }
 
-/// All parts of a body and its props.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Template {
-    /// Its name, for errors.
     pub name: String,
-    /// The parts, drawn one over the other.
+    /// Drawn one over the other.
     #[serde(rename = "part")]
     pub parts: Vec<Part>,
 }
 
-/// A fault of a template.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum TemplateError {
-    /// Not the TOML that is expected.
     #[error("template: {0}")]
     Syntax(String),
-    /// No such built-in template.
     #[error("no built-in template `{0}`: there are {names}; or name a TOML file", names = Template::names().collect::<Vec<_>>().join(", "))]
     Name(String),
-    /// A part that cannot be drawn.
     #[error("template: part `{part}` {reason}")]
-    Part {
-        part: String,
-        /// What keeps it from being drawn.
-        reason: String,
-    },
-    /// The recording lacks markers.
+    Part { part: String, reason: String },
     #[error(
         "the recording lacks {} of the {of} markers of template `{template}` ({}); it has {}", .missing.len(), listed(.missing), listed(.present)
     )]
     UnknownMarkers {
         /// Markers of the template that the recording lacks.
         missing: Vec<String>,
-        /// Markers in the template.
         of: usize,
-        /// Name of the template.
         template: String,
         /// Some markers of the recording.
         present: Vec<String>,
     },
 }
 
-/// The first few names, with a sign that there are more.
 fn listed(names: &[String]) -> String {
     const SHOWN: usize = 10;
     let more = if names.len() > SHOWN { ", ..." } else { "" };
@@ -75,8 +60,7 @@ fn listed(names: &[String]) -> String {
 }
 
 impl Template {
-    /// Reads and checks a template.
-    /// Errors: TOML errors, empty or doubled parts, negative thickness.
+    /// Fails for invalid TOML, empty or duplicate parts, negative thickness.
     pub fn parse(text: &str) -> Result<Self, TemplateError> {
         let template: Self =
             toml::from_str(text).map_err(|error| TemplateError::Syntax(error.to_string()))?;
@@ -98,13 +82,12 @@ impl Template {
         Ok(template)
     }
 
-    /// How many of the template's markers a recording has, and how many there are.
+    /// Markers of the template in a recording, and their total.
     pub fn coverage(&self, names: &[String]) -> (usize, usize) {
         let (missing, of) = self.missing(names);
         (of - missing.len(), of)
     }
 
-    /// Markers that a recording lacks, and how many the template has.
     fn missing(&self, names: &[String]) -> (Vec<String>, usize) {
         let has = |marker: &str| {
             names
@@ -117,7 +100,7 @@ impl Template {
         (all.iter().filter(|marker| !has(marker)).map(|m| (*m).clone()).collect(), all.len())
     }
 
-    /// Parts that can be drawn: at least two of their markers are there, or one where a thickness makes a disc of it.
+    /// Parts that can be drawn: at least two markers, or one and a thickness.
     fn drawn(&self, missing: &[String]) -> usize {
         let there = |part: &&Part| {
             let present = part.markers.iter().filter(|marker| !missing.contains(marker)).count();
@@ -126,8 +109,7 @@ impl Template {
         self.parts.iter().filter(there).count()
     }
 
-    /// Checks that a recording's markers fit: at least half of the template's must be there by name (a suit may lack a few), or enough for
-    /// four parts in five (templates of joints name more than any program records).
+    /// Requires half of the markers, or enough for four parts in five (templates name many joints).
     pub fn check(&self, names: &[String]) -> Result<(), TemplateError> {
         let (missing, of) = self.missing(names);
         if 2 * missing.len() > of && 5 * self.drawn(&missing) < 4 * self.parts.len() {
@@ -141,8 +123,7 @@ impl Template {
         Ok(())
     }
 
-    /// A built-in template: one of [`Template::BUILT_IN`].
-    /// Errors: [`TemplateError::Name`] for any other name.
+    /// One of [`Template::BUILT_IN`].
     pub fn named(name: &str) -> Result<Self, TemplateError> {
         match Self::BUILT_IN.iter().find(|(known, _)| *known == name) {
             Some((_, text)) => Self::parse(text),
@@ -150,9 +131,8 @@ impl Template {
         }
     }
 
-    /// The built-in templates, by name, as TOML: Plug-in Gait (and CMU 41), Vicon's 53 markers, OpenCap's laboratory markers, the
-    /// suit and props of Li 2014, the joints of BVH skeletons and of a Kinect, keypoints of pose estimators. Their files lie in the crate's `templates` folder, to be copied and
-    /// changed.
+    /// Built-in templates by name, as TOML: Plug-in Gait (and CMU 41), Vicon's 53 markers, OpenCap, Li 2014,
+    /// BVH skeletons, Kinect joints, keypoints of pose estimators.
     pub const BUILT_IN: [(&str, &str); 7] = [
         ("plug-in-gait", include_str!("../../templates/plug-in-gait.toml")),
         ("vicon-53", include_str!("../../templates/vicon-53.toml")),
@@ -163,7 +143,6 @@ impl Template {
         ("keypoints", include_str!("../../templates/keypoints.toml")),
     ];
 
-    /// The names of the built-in templates.
     pub fn names() -> impl Iterator<Item = &'static str> {
         Self::BUILT_IN.iter().map(|(name, _)| *name)
     }

@@ -36,7 +36,6 @@ impl View {
         product(&product(&rx, &ry), &rz)
     }
 
-    /// (x, z) of a rotated point, millimetres.
     pub fn project(&self, point: Point3) -> Point {
         project(&self.matrix(), point)
     }
@@ -52,7 +51,6 @@ pub(super) fn project(matrix: &[[f64; 3]; 3], p: Point3) -> Point {
     [along(&matrix[0]), along(&matrix[2])]
 }
 
-/// Size, scale and centre of a picture.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Canvas {
     pub height_px: usize,
@@ -63,7 +61,6 @@ pub struct Canvas {
     pub middle_mm: Point,
 }
 
-/// Largest side of a picture.
 const LARGEST_PX: usize = 8192;
 
 impl Canvas {
@@ -98,7 +95,7 @@ impl Canvas {
     }
 }
 
-/// Bounding points of capsules in a view, for [`Canvas::fitting`].
+/// Bounding points of capsules, for [`Canvas::fitting`].
 pub fn extent(capsules: &[Capsule], view: &View) -> Vec<Point> {
     let matrix = view.matrix();
     let mut points = Vec::with_capacity(4 * capsules.len());
@@ -112,7 +109,7 @@ pub fn extent(capsules: &[Capsule], view: &View) -> Vec<Point> {
     points
 }
 
-/// Silhouette of capsules in a view; skips capsules with non-finite numbers (missing joints).
+/// Skips capsules with non-finite numbers (missing joints).
 pub fn draw(capsules: &[Capsule], view: &View, canvas: &Canvas) -> Mask {
     let matrix = view.matrix();
     let mut mask = canvas.blank();

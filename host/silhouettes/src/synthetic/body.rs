@@ -1,14 +1,11 @@
-//! Synthetic person: a jointed body of capsules posed by angles.
-//!
-//! Proportions after Winter (Biomechanics and Motor Control of Human Movement, fig. 4.1). Frame: x to the
-//! person's right, y forward, z up, millimetres, origin on the ground between the feet's mean position.
+//! Synthetic person: a jointed body of capsules posed by angles (proportions: Winter, Biomechanics and Motor
+//! Control of Human Movement, fig. 4.1). x right, y forward, z up, mm, origin on the ground between the feet.
 
 use crate::silhouette::capsule::{Capsule, Point3};
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Build {
     pub height_mm: f64,
-    /// Relative to the average (1.0).
     pub girth: f64,
     /// Shoulder and hip width relative to the average (1.0).
     pub breadth: f64,
@@ -35,7 +32,6 @@ pub struct Arm {
     /// Upper arm forward of the trunk's axis (hanging = 0, straight ahead = 90, up = 180).
     pub shoulder_deg: f64,
     pub spread_deg: f64,
-    /// Forearm forwards.
     pub elbow_deg: f64,
 }
 
@@ -55,7 +51,6 @@ pub struct Joints {
     pub pelvis: Point3,
     pub neck: Point3,
     pub head: Point3,
-    /// [left, right], as all pairs.
     pub hips: [Point3; 2],
     pub knees: [Point3; 2],
     pub ankles: [Point3; 2],

@@ -1,4 +1,4 @@
-//! Seeded damage to silhouettes as by bad segmentation: missing heads and limbs, holes, ragged outlines.
+//! Seeded damage to silhouettes as by bad segmentation.
 
 use crate::mask::{BoundingBox, Mask, bits::BitMask};
 use rand::{Rng, SeedableRng};

@@ -1,5 +1,4 @@
-//! The background model on sequences with known truth, and compared with a direct transcription of the
-//! equations.
+//! The background model on sequences with known truth, and compared with a transcription of the equations.
 
 use farnear_silhouettes::background::{BackgroundError, BackgroundModel, Frame, Label, Settings};
 use ndarray::{Array2, Array3};

@@ -1,4 +1,4 @@
-//! BVH through the public API: a synthetic walker, and damaged files that name the line.
+//! A synthetic walker, and damaged files that name the line.
 
 use crate::cases;
 use farnear_silhouettes::mask::{BoundingBox, area};
@@ -14,8 +14,7 @@ use farnear_silhouettes::silhouette::{
 use proptest::prelude::*;
 use std::fmt::Write;
 
-/// Walker's joints below the hips: name, tree depth, offset, in file order. `-` closes a chain with an end
-/// site.
+/// Joints below the hips: name, tree depth, offset, in file order. `-` closes a chain with an end site.
 const TREE: [(&str, usize, [f64; 3]); 27] = [
     ("LHipJoint", 1, [0.0, 0.0, 0.0]),
     ("LeftUpLeg", 2, [1.7, -1.7, 0.4]),
@@ -46,8 +45,7 @@ const TREE: [(&str, usize, [f64; 3]); 27] = [
     ("-", 7, [-1.5, 0.0, 0.0]),
 ];
 
-/// A person of about 1.65 m in CMU units (56.444 mm) with its joints, walking towards +z. Left is +x. Angles
-/// in the order Z, Y, X; limbs swing about x, negative forward.
+/// 1.65 m in CMU units (56.444 mm), towards +z, left +x. Angles Z, Y, X; limbs swing about x.
 fn walk(frames: usize) -> String {
     let mut text = "HIERARCHY\nROOT Hips\n{\n\tOFFSET 0 0 0\n\tCHANNELS 6 Xposition Yposition Zposition Zrotation Yrotation \
                     Xrotation \n"
@@ -95,7 +93,7 @@ fn walk(frames: usize) -> String {
 fn a_walk_of_the_cmu_kind_makes_silhouettes_from_eight_views() {
     let text = walk(30);
     if let Ok(path) = std::env::var("FARNEAR_WRITE_BVH") {
-        std::fs::write(path, &text).expect("written"); // to look at it with the command line
+        std::fs::write(path, &text).expect("written"); // for the command line
     }
     let recording = readers::read(text.as_bytes(), "bvh", Choices::default()).expect("a BVH file");
     assert_eq!((recording.names.len(), recording.frames.len()), (28, 30));

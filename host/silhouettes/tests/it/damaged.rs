@@ -1,4 +1,4 @@
-//! Files of every kind with damaged words, to reach beyond the first line; accepted results are used.
+//! Files of every kind with damaged words, to reach beyond the first line.
 
 use crate::cases;
 use farnear_silhouettes::readers::{self, c3d, csv, kinect, matlab, ntu, recording::Choices, trc};
@@ -52,7 +52,7 @@ proptest! {
         let _ = trc::read(hurt(TRC).as_bytes());
         let _ = csv::read(hurt(CSV).as_bytes());
         let _ = Template::parse(&hurt(TEMPLATE));
-        // Whatever is read is also turned upright and its units guessed.
+        // Accepted data are also turned upright and their units guessed.
         for (text, ending) in [(TRC.to_owned(), "trc"), (CSV.to_owned(), "csv"), (ntu_file(), "skeleton"), (kinect_file(), "txt"), (keypoints(), "json")] {
             let _ = readers::read(hurt(&text).as_bytes(), ending, Choices::default());
         }

@@ -1,11 +1,11 @@
-//! C3D files made here: recordings beyond 65,535 frames, trimmed headers, and unknown units.
+//! Recordings beyond 65,535 frames, trimmed headers, and unknown units.
 
 use farnear_silhouettes::readers::{
     self,
     recording::{Choices, Recording, RecordingError, Unit},
 };
 
-/// A file of one marker that moves by 1 unit a frame.
+/// One marker that moves by 1 unit a frame.
 struct Made {
     frames: usize,
     /// First and last frame by the header.

@@ -1,5 +1,3 @@
-//! Public API tests in one binary.
-
 mod background;
 mod bvh;
 mod damaged;
@@ -7,7 +5,6 @@ mod long_c3d;
 mod readers;
 mod standing;
 
-/// Number of property cases: few by default, more for fuzzing.
 fn cases(usual: u32) -> u32 {
     std::env::var("PROPTEST_CASES").ok().and_then(|text| text.parse().ok()).unwrap_or(usual)
 }

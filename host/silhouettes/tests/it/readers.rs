@@ -154,7 +154,7 @@ fn unknown_markers_are_named() {
     assert!(Template::parse("name = 'x'\n[[part]]\nname = 'head'\nmarkers = []\n").is_err());
 }
 
-/// A complete small C3D file: one marker, two float frames, label and unit.
+/// One marker, two float frames, label and unit.
 fn small_c3d() -> Vec<u8> {
     let mut bytes = vec![0_u8; 4 * 512];
     bytes[..2].copy_from_slice(&[2, 0x50]);
@@ -189,7 +189,6 @@ fn a_small_c3d_file_is_read_as_written() {
 }
 
 const TRC: &str = "PathFileType\t4\t(X/Y/Z)\tx.trc\nDataRate\tNumMarkers\tUnits\n100\t2\tm\nFrame#\tTime\tA\t\t\tB\n\t\tX1\tY1\tZ1\tX2\tY2\tZ2\n\n1\t0\t0.1\t0.2\t0.3\t\t\t\n2\t0.01\t1\t2\t3\t4\t5\t6\n";
-/// A header with more frames than present means truncation.
 #[test]
 fn a_trc_file_cut_short_is_refused_with_both_numbers() {
     let promising = |frames: &str| {
@@ -203,7 +202,6 @@ fn a_trc_file_cut_short_is_refused_with_both_numbers() {
     assert!(error.contains("139") && error.contains("ends after 2") && error.contains("line 3"), "{error}");
 }
 
-/// Two people in two frames.
 fn ntu_skeleton() -> String {
     let joints = "0.1 0.9 3.2 1 2 3 4 0 0 0 1 2\n".repeat(25);
     let person = |id: u32| format!("{id} 0 1 1 0 0 0 0.1 0.2 2\n25\n{joints}");

@@ -1,4 +1,4 @@
-//! A recording of a room's camera: empty for a while, then a person enters and stands while a light is switched.
+//! A room's camera: empty for a while, then a person enters and stands while a light is switched.
 
 use farnear_silhouettes::background::Frame;
 use farnear_silhouettes::mask::{
@@ -10,13 +10,13 @@ use ndarray::Array3;
 
 const SIZE: (usize, usize) = (120, 160);
 
-/// Reproducible noise of about two grey levels.
+/// About two grey levels.
 fn noise(frame: usize, row: usize, column: usize) -> f32 {
     let hash = (frame * 7919 + row * 104_729 + column * 1_299_709).wrapping_mul(2_654_435_761) >> 16;
     (hash % 7) as f32 - 3.0
 }
 
-/// Where the person is: absent, entering from the left, standing in the middle, leaving to the right.
+/// Absent, entering from the left, standing in the middle, leaving to the right.
 fn place(frame: usize) -> Option<usize> {
     match frame {
         0..150 => None,
@@ -27,7 +27,6 @@ fn place(frame: usize) -> Option<usize> {
     }
 }
 
-/// Head, trunk and legs.
 fn person(frame: usize) -> Mask {
     Mask::from_shape_fn(SIZE, |(row, column)| {
         let Some(middle) = place(frame) else { return false };
@@ -41,7 +40,7 @@ fn person(frame: usize) -> Mask {
     })
 }
 
-/// The picture, its light dimmed to 60 % in frames 300 to 399.
+/// The light is dimmed to 60 % in frames 300 to 399.
 fn picture(frame: usize) -> Array3<u8> {
     let person = person(frame);
     let light = if (300..400).contains(&frame) { 0.6 } else { 1.0 };
@@ -60,7 +59,7 @@ fn iou(a: &Mask, b: &Mask) -> f64 {
 }
 
 struct Seen {
-    /// Person frames, and those of them with a mask of IoU 0.7 or better.
+    /// Frames with a person, and those with a mask of IoU 0.7 or better.
     person: usize,
     masked: usize,
     /// Frames without a person that have a mask.
@@ -137,7 +136,7 @@ fn learns_an_object_that_appears_without_walking() {
 
 #[test]
 fn a_shaking_camera_is_registered() {
-    // The picture without its rim, moved by up to 3 pixels either way.
+    // Without the border, moved by up to 3 pixels either way.
     let shaken = |frame: usize| {
         let (down, right) = if frame < 60 { (3, 3) } else { (frame * 5 % 7, frame * 3 % 7) };
         let cut = ndarray::s![down..SIZE.0 - 6 + down, right..SIZE.1 - 6 + right, ..];

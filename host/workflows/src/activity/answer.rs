@@ -1,13 +1,14 @@
 //! Answer for a recording or for one of the people in it, as all faces give it.
 
-use std::ops::Range;
+use std::{fmt, ops::Range};
 
 use farnear_recognition::clip::Track;
 use farnear_recognition::live::{Segment, joined, windows};
 use farnear_recognition::model::{Answer, Recogniser};
 use farnear_recognition::segmentation::{Worth, segmented};
-use farnear_silhouettes::mask::{BoundingBox, Mask};
+use farnear_silhouettes::mask::{BoundingBox, Mask, subject::Flag};
 use serde::Serialize;
+use serde_with::SerializeDisplay;
 
 use crate::{error::Result, figures::rounded};
 
@@ -41,9 +42,34 @@ pub struct PersonInFrame {
     pub confidence: f64,
     /// Outlier score: above 1 unknown; `None` where no silhouette has been seen.
     pub outlier_score: Option<f64>,
-    /// Doubts: `crossing:2`, `parted:2`, `perhaps-swapped:2`, `missed`, `cut-by-edge`.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub flags: Vec<String>,
+    pub flags: Vec<PersonFlag>,
+}
+
+/// Why the answer for a person in a frame is doubtful. Serialised as `crossing:2`, `missed`, `cut-by-edge`.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, SerializeDisplay)]
+pub enum PersonFlag {
+    /// Overlaps with this person.
+    Crossing(usize),
+    /// Has parted from this person after an overlap.
+    Parted(usize),
+    /// May have been exchanged with this person.
+    PerhapsSwapped(usize),
+    /// Not found in the frame.
+    Missed,
+    Mask(Flag),
+}
+
+impl fmt::Display for PersonFlag {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Crossing(other) => write!(f, "crossing:{other}"),
+            Self::Parted(other) => write!(f, "parted:{other}"),
+            Self::PerhapsSwapped(other) => write!(f, "perhaps-swapped:{other}"),
+            Self::Missed => f.write_str("missed"),
+            Self::Mask(flag) => flag.fmt(f),
+        }
+    }
 }
 
 /// What one person did in a recording: the same for a clip, a stream and several people.
@@ -184,7 +210,7 @@ pub(super) fn only_person(
 }
 
 /// The only person of a frame; `None` where the mask is empty.
-pub(super) fn only_in_frame(mask: &Mask, answer: &Answer, flags: &[String]) -> Option<PersonInFrame> {
+pub(super) fn only_in_frame(mask: &Mask, answer: &Answer, flags: &[Flag]) -> Option<PersonInFrame> {
     let b = BoundingBox::of(mask.view())?;
     Some(PersonInFrame {
         person: 1,
@@ -192,7 +218,7 @@ pub(super) fn only_in_frame(mask: &Mask, answer: &Answer, flags: &[String]) -> O
         activity: answer.activity.clone(),
         confidence: rounded_probability(answer.confidence),
         outlier_score: outlier_score(answer),
-        flags: flags.to_vec(),
+        flags: flags.iter().copied().map(PersonFlag::Mask).collect(),
     })
 }
 

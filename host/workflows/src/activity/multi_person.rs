@@ -16,8 +16,8 @@ use serde::Serialize;
 use super::{
     annotated_video::{AnnotatedVideo, Shown},
     answer::{
-        AnswerSummary, PersonFigures, PersonInFrame, of_segments, outlier_score, parts, restricted,
-        rounded_probability,
+        AnswerSummary, PersonFigures, PersonFlag, PersonInFrame, of_segments, outlier_score, parts,
+        restricted, rounded_probability,
     },
     recognition::Model,
     views::{Frames, View},
@@ -56,7 +56,7 @@ pub struct FrameOfPeople {
 
 /// Everybody in the recording.
 #[derive(Clone, PartialEq, Debug, Serialize)]
-pub struct EverybodyFigures {
+pub struct MultiPersonFigures {
     pub people: Vec<PersonFigures>,
     pub frames: usize,
     /// Frames in which no person is followed.
@@ -221,22 +221,22 @@ impl<'m> MultiPersonTracker<'m> {
                     let answer = somebody.live.push_described(vec![track])?;
                     somebody.answer = Some(restricted(answer, &self.among));
                 }
-                flags.extend(cut_by_edge.then(|| Flag::CutByEdge.to_string()));
+                flags.extend(cut_by_edge.then_some(PersonFlag::Mask(Flag::CutByEdge)));
                 spans = Some(bounds);
             }
             Sight::Crossing { with, bounds } => {
                 somebody.crossing_frames += 1;
-                flags.extend(with.iter().map(|other| format!("crossing:{other}")));
+                flags.extend(with.iter().copied().map(PersonFlag::Crossing));
                 spans = Some(bounds);
             }
-            Sight::Missed => flags.push("missed".into()),
+            Sight::Missed => flags.push(PersonFlag::Missed),
         }
         for parting in parted {
             let other = parting.from;
             flags.push(if parting.ambiguous {
-                format!("perhaps-swapped:{other}")
+                PersonFlag::PerhapsSwapped(other)
             } else {
-                format!("parted:{other}")
+                PersonFlag::Parted(other)
             });
             if parting.ambiguous && !somebody.perhaps_swapped_with.contains(&other) {
                 somebody.perhaps_swapped_with.push(other);
@@ -257,7 +257,7 @@ impl<'m> MultiPersonTracker<'m> {
     ///
     /// # Errors
     /// A model that does not fit.
-    pub fn finish(self) -> Result<EverybodyFigures> {
+    pub fn finish(self) -> Result<MultiPersonFigures> {
         if let Some(annotated_video) = self.annotated_video {
             annotated_video.finish()?;
         }
@@ -267,7 +267,7 @@ impl<'m> MultiPersonTracker<'m> {
             .filter(|(_, somebody)| !somebody.tracks.is_empty())
             .map(|(person, somebody)| figures(model, among, window, person, somebody))
             .collect::<Result<Vec<PersonFigures>>>()?;
-        Ok(EverybodyFigures {
+        Ok(MultiPersonFigures {
             people,
             frames: self.count,
             empty_frames: self.empty_frames,
@@ -317,7 +317,7 @@ fn figures(
 /// Drawing of one of them.
 fn shown(person: &PersonInFrame) -> Option<Shown> {
     let spans = person.top_left_bottom_right?;
-    let crossing = person.flags.iter().any(|flag| flag.starts_with("crossing"));
+    let crossing = person.flags.iter().any(|flag| matches!(flag, PersonFlag::Crossing(_)));
     let known = person.activity.is_some() && !crossing;
     let what = match &person.activity {
         _ if crossing => "crossing".to_owned(),

@@ -274,8 +274,7 @@ impl<'m> Recognition<'m> {
         if let (Some(annotated_video), Some(first)) = (&mut self.annotated_video, moment.first()) {
             annotated_video.draw(first.picture.as_ref(), &first.mask, &answer)?;
         }
-        let flags: Vec<String> =
-            moment.iter().flat_map(|seen| seen.flags.iter().map(Flag::to_string)).collect();
+        let flags: Vec<Flag> = moment.iter().flat_map(|seen| seen.flags.iter().copied()).collect();
         self.flagged_frames += usize::from(!flags.is_empty());
         let only = moment.first().and_then(|first| only_in_frame(&first.mask, &answer, &flags));
         Ok(Some(FrameAnswer {
@@ -285,7 +284,7 @@ impl<'m> Recognition<'m> {
             confidence: rounded_probability(answer.confidence),
             outlier_score: outlier_score(&answer),
             activity: answer.activity,
-            flags,
+            flags: flags.iter().map(Flag::to_string).collect(),
         }))
     }
 

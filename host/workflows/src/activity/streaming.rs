@@ -105,15 +105,14 @@ impl<'m> StreamingRecogniser<'m> {
         self.tracks.push(track.clone());
         let answer = self.live.push_described(vec![track])?;
         self.seconds += start.elapsed().as_secs_f64();
-        let flags: Vec<String> = found.flags.iter().map(Flag::to_string).collect();
         let running = RunningAnswer {
             frame: self.tracks.len(),
             outlier_score: outlier_score(&answer),
-            people: only_in_frame(&found.mask, &answer, &flags).into_iter().collect(),
+            people: only_in_frame(&found.mask, &answer, &found.flags).into_iter().collect(),
             confidence: rounded_probability(answer.confidence),
             best: best(&answer),
             activity: answer.activity,
-            flags,
+            flags: found.flags.iter().map(Flag::to_string).collect(),
         };
         Ok((found.mask, running))
     }

@@ -16,6 +16,8 @@ use crate::{
     error::{Result, WorkflowError},
     focus_stack::FocusStackRequest,
     request::{Job, PathKind, Request, Task},
+    shadow::removal::ShadowRemoveRequest,
+    silhouettes::{markers::MarkersRequest, passages::PassagesRequest, video::SilhouettesVideoRequest},
 };
 
 pub(super) struct Kind {
@@ -30,9 +32,10 @@ const KINDS: &[Kind] = &[
     Kind::of::<DepthRequest>(),
     Kind::of::<FocusStackRequest>(),
     Kind::of::<CorrectRequest>(),
-    Kind { name: "silhouettes-video", makes_file: false, work: people::video },
-    Kind { name: "silhouettes-markers", makes_file: false, work: people::markers },
-    Kind { name: "shadow-remove", makes_file: false, work: people::shadow },
+    Kind::of::<SilhouettesVideoRequest>(),
+    Kind::of::<PassagesRequest>(),
+    Kind::of::<MarkersRequest>(),
+    Kind::of::<ShadowRemoveRequest>(),
     Kind { name: "recognise", makes_file: false, work: people::recognise },
     Kind { name: "evaluate", makes_file: false, work: evaluate::work },
     Kind { name: "campaign", makes_file: false, work: campaign::work },
@@ -52,21 +55,28 @@ impl Kind {
     }
 }
 
+impl Kind {
+    /// The words of a command may be joined by hyphens: `silhouettes-video`.
+    fn is_named(&self, name: &str) -> bool {
+        self.name.replace(' ', "-") == name.replace(' ', "-")
+    }
+}
+
 /// The kind of this name.
 pub(super) fn kind(name: &str) -> Result<&'static Kind, BatchError> {
     KINDS
         .iter()
-        .find(|kind| kind.name == name)
+        .find(|kind| kind.is_named(name))
         .ok_or_else(|| BatchError::UnknownKind { name: name.into(), known: names().join(", ") })
 }
 
 pub(super) fn is_kind(name: &str) -> bool {
-    KINDS.iter().any(|kind| kind.name == name)
+    KINDS.iter().any(|kind| kind.is_named(name))
 }
 
 /// All names, in the table's order.
-pub(super) fn names() -> Vec<&'static str> {
-    KINDS.iter().map(|kind| kind.name).collect()
+pub(super) fn names() -> Vec<String> {
+    KINDS.iter().map(|kind| kind.name.replace(' ', "-")).collect()
 }
 
 /// A workflow described by its settings and inputs.

@@ -39,7 +39,7 @@ fn section(page: &mut String, task: &Task) {
 
 #[cfg(test)]
 mod tests {
-    use std::{fs, path::Path};
+    use std::{collections::BTreeMap, fs, path::Path};
 
     use super::*;
 
@@ -54,5 +54,48 @@ mod tests {
             found == page(),
             "docs/options.md is out of date: FARNEAR_WRITE_OPTIONS=1 cargo test -p farnear-workflows --lib reference"
         );
+    }
+
+    /// Options of `depth` that differ in Python, with the reason.
+    const DIFFERENT: [(&str, &str); 10] = [
+        ("bin", "means of array blocks with numpy"),
+        ("camera_frames", "Python corrects images with numpy before the call"),
+        ("correction", "`Correction.apply` corrects the map"),
+        ("grey", "an array has one channel"),
+        ("out", "the map is returned"),
+        ("psf", "part of `Optics`"),
+        ("region", "slices of arrays"),
+        ("uncertainty", "always in `DepthMap`"),
+        ("write", "the map is returned"),
+        ("threads", "1 in Python, where callers run several at a time"),
+    ];
+
+    #[test]
+    fn keywords_of_python_are_the_options_of_depth() {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../python/farnear/_farnear.pyi");
+        let stub = fs::read_to_string(path).expect("the stub");
+        let (_, rest) = stub.split_once("\ndef depth(\n").expect("depth");
+        let (parameters, _) = rest.split_once("\n)").expect("its parameters");
+        let parameters: BTreeMap<&str, Option<&str>> = parameters
+            .lines()
+            .filter_map(|line| line.trim().trim_end_matches(',').split_once(": "))
+            .map(|(name, rest)| (name, rest.rsplit_once(" = ").map(|(_, default)| default)))
+            .collect();
+        let schema = crate::request::schema::<crate::depth::DepthRequest>();
+        let fields = schema["properties"].as_object().expect("a struct");
+        let known = |name: &str| DIFFERENT.iter().any(|(known, _)| *known == name);
+        for name in fields.keys().filter(|name| !known(name)) {
+            assert!(parameters.contains_key(name.as_str()), "Python's depth has no keyword {name}");
+        }
+        for (name, default) in parameters.into_iter().filter(|(name, _)| !known(name)) {
+            let field = fields.get(name).unwrap_or_else(|| panic!("`farnear depth` has no option {name}"));
+            let same = match (default, &field["default"]) {
+                (None, _) | (Some("None" | "False"), Value::Null) => true,
+                (Some(default), Value::String(text)) => default.trim_matches('"') == text,
+                (Some(default), Value::Number(number)) => default.parse().ok() == number.as_f64(),
+                _ => false,
+            };
+            assert!(same, "{name}: {default:?} in Python, {} elsewhere", field["default"]);
+        }
     }
 }

@@ -138,6 +138,18 @@ pub fn parse_light(text: &str) -> std::result::Result<LightLevels, String> {
     Ok(LightLevels { first: level(first)?, second: level(second)? })
 }
 
+impl Default for CameraSettings {
+    fn default() -> Self {
+        Self {
+            address: CameraAddress::Emulated,
+            exposure: Micros(5_000),
+            image_wait: Duration::from_secs(30),
+            settings: Vec::new(),
+            light: None,
+        }
+    }
+}
+
 /// A camera that does not hang on the emulated rig, opened before the rig: one that is not there is known before anything
 /// moves.
 pub struct EarlyCamera {
@@ -166,6 +178,7 @@ impl CameraSettings {
             (CameraAddress::Emulated, RigAddress::Open(open)) if !open.is_emulated() => {
                 Some(open.name().to_owned())
             }
+            (CameraAddress::Emulated, RigAddress::Attached) => Some("a board".into()),
             (CameraAddress::Emulated, RigAddress::Port(port)) => Some(port.to_string()),
             _ => None,
         };

@@ -8,7 +8,8 @@ mod moving;
 mod resting;
 
 use farnear_capture::Client;
-use serde::Serialize;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
 use super::{
     RigAddress,
@@ -17,6 +18,7 @@ use super::{
 use crate::{
     context::Context,
     error::{Result, WorkflowError},
+    request::{CameraRequest, PathKind, Request, RigRequest},
 };
 
 /// A step.
@@ -71,14 +73,58 @@ const PHASES: [Phase; 3] = [
     },
 ];
 
-#[derive(Clone, PartialEq, Debug)]
-pub struct CheckSettings {
+/// Walk through the bring-up of a rig: link, identity, memory, switches, emergency stop, encoders, first move, homing, piezo, camera.
+///
+/// The order is that of docs/bring-up.md: the first half is done with the motors disconnected. Exits with 1 if a step failed.
+#[derive(Clone, PartialEq, Debug, Default, Serialize, Deserialize, JsonSchema)]
+#[cfg_attr(feature = "clap", derive(clap::Args))]
+#[cfg_attr(
+    feature = "clap",
+    command(after_help = "Example: farnear rig check --port /dev/ttyACM0 --camera folder:incoming/")
+)]
+#[serde(default)]
+pub struct CheckRequest {
+    /// Set by the caller.
+    #[serde(skip)]
+    #[cfg_attr(feature = "clap", arg(skip))]
     pub rig: RigAddress,
+    /// Set by the caller.
+    #[serde(skip)]
+    #[cfg_attr(feature = "clap", arg(skip))]
     pub camera: CameraSettings,
     /// Only the steps with the motors disconnected: nothing moves.
+    #[cfg_attr(feature = "clap", arg(long))]
     pub resting_only: bool,
-    /// Include the steps that a person actuates; never on an emulated rig.
-    pub actuation: bool,
+    /// Skip the steps that a person actuates (switches, shafts). An emulated rig never has them.
+    #[cfg_attr(feature = "clap", arg(long))]
+    pub no_actuation: bool,
+}
+
+impl Request for CheckRequest {
+    const NAME: &'static str = "rig check";
+    const REQUIRED: &'static [&'static str] = &[];
+    const PATHS: &'static [(&'static str, PathKind)] = &[];
+    type Figures = Checklist;
+
+    fn run(&self, context: &Context<'_>) -> Result<Checklist> {
+        check(self, context)
+    }
+
+    fn verdict(figures: &Checklist) -> Result<()> {
+        figures.check()
+    }
+}
+
+impl RigRequest for CheckRequest {
+    fn set_rig(&mut self, rig: RigAddress) {
+        self.rig = rig;
+    }
+}
+
+impl CameraRequest for CheckRequest {
+    fn set_camera(&mut self, camera: CameraSettings) {
+        self.camera = camera;
+    }
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize)]
@@ -140,7 +186,7 @@ type Found = Result<(Verdict, String)>;
 /// The rig while it is checked.
 struct Checkup<'a> {
     equipped: EquippedRig,
-    settings: &'a CheckSettings,
+    settings: &'a CheckRequest,
     context: &'a Context<'a>,
     /// Whether a person can press switches.
     actuation: bool,
@@ -151,9 +197,9 @@ struct Checkup<'a> {
 ///
 /// # Errors
 /// Camera and rig that are not there, and cancelling. Any other error is the failure of its step.
-pub fn check(settings: &CheckSettings, context: &Context<'_>) -> Result<Checklist> {
+pub fn check(settings: &CheckRequest, context: &Context<'_>) -> Result<Checklist> {
     let equipped = settings.camera.connect(&settings.rig, None, context)?;
-    let actuation = settings.actuation && !equipped.rig.client.hello().emulated;
+    let actuation = !settings.no_actuation && !equipped.rig.client.hello().emulated;
     let mut checkup = Checkup { equipped, settings, context, actuation, outcomes: Vec::new() };
     for phase in PHASES.iter().filter(|phase| !(settings.resting_only && phase.moves)) {
         if !checkup.go_through(phase)? {

@@ -15,6 +15,8 @@ use farnear_capture::{
     sequence::read_program,
 };
 use farnear_protocol::{Micros, message::Shot};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
 use self::{figures::Tally, folder::Folder};
 use super::{
@@ -25,6 +27,7 @@ use crate::{
     context::Context,
     error::{About, Result, WorkflowError},
     optics::GivenOptics,
+    request::{CameraRequest, PathKind, Request, RigRequest},
 };
 
 pub use figures::ContinuousFigures;
@@ -32,44 +35,79 @@ pub use figures::ContinuousFigures;
 /// Fastest and slowest pace, exposures a second: beyond it the request's 32-bit microseconds, and any camera, end.
 const RATES_HZ: std::ops::RangeInclusive<f64> = 0.001..=10_000.0;
 
-/// Repeated exposures.
-#[derive(Clone, PartialEq, Debug)]
-pub enum Cycle {
-    /// Far and near focus of these optics.
-    Pair {
-        optics: PathBuf,
-    },
-    Program {
-        path: PathBuf,
-    },
-}
-
-/// When it is enough; the user may end it at any time.
-#[derive(Clone, Copy, PartialEq, Debug)]
-pub enum Enough {
-    /// On request of the user.
-    Never,
-    /// After this many exposures.
-    Exposures(u32),
-    /// After this many seconds of the board's time, from the first exposure.
-    Seconds(f64),
-}
-
-#[derive(Clone, PartialEq, Debug)]
-pub struct ContinuousSettings {
+/// Capture far, near, far, near ... (or any cycle of shots) until the limit or Ctrl-C: home if needed, move the stage near, and let
+/// the board hold the pace.
+///
+/// Prints the exposures per second, what was dropped and why, and the error of the pace. With --out each pair is a capture folder
+/// (pair-00000, pair-00001, ...) that `farnear depth` takes; frames.csv has a row for each frame.
+#[derive(Clone, PartialEq, Debug, Default, Serialize, Deserialize, JsonSchema)]
+#[cfg_attr(feature = "clap", derive(clap::Args))]
+#[cfg_attr(
+    feature = "clap",
+    command(
+        after_help = "Example: farnear rig continuous --port sim --optics optics.toml --rate 30 --for 10 --out run/"
+    )
+)]
+#[serde(default)]
+pub struct ContinuousRequest {
+    /// Set by the caller.
+    #[serde(skip)]
+    #[cfg_attr(feature = "clap", arg(skip))]
     pub rig: RigAddress,
+    /// Set by the caller.
+    #[serde(skip)]
+    #[cfg_attr(feature = "clap", arg(skip))]
     pub camera: CameraSettings,
-    pub cycle: Cycle,
-    /// Exposures a second; `None` = as fast as position and camera allow.
-    pub rate_hz: Option<f64>,
-    pub enough: Enough,
-    /// The new folder, where images are kept.
+    /// The optics file: far and near focus in turn.
+    #[cfg_attr(
+        feature = "clap",
+        arg(long, value_name = "FILE", required_unless_present = "program", conflicts_with = "program")
+    )]
+    pub optics: Option<PathBuf>,
+    /// A cycle of up to 64 shots instead, a program as `farnear rig sequence` takes it.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "FILE"))]
+    pub program: Option<PathBuf>,
+    /// Exposures per second, each at its microsecond [default: as fast as position and camera allow, about 50].
+    #[cfg_attr(feature = "clap", arg(long, value_name = "HZ"))]
+    pub rate: Option<f64>,
+    /// End after so many seconds of the board's time.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "S", conflicts_with = "frames"))]
+    pub r#for: Option<f64>,
+    /// End after so many exposures.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "N"))]
+    pub frames: Option<u32>,
+    /// Keep the images in this new folder.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "DIR"))]
     pub out: Option<PathBuf>,
 }
 
-impl ContinuousSettings {
+impl Request for ContinuousRequest {
+    const NAME: &'static str = "rig continuous";
+    const REQUIRED: &'static [&'static str] = &[];
+    const PATHS: &'static [(&'static str, PathKind)] =
+        &[("optics", PathKind::Input), ("program", PathKind::Input), ("out", PathKind::OutputFolder)];
+    type Figures = ContinuousFigures;
+
+    fn run(&self, context: &Context<'_>) -> Result<ContinuousFigures> {
+        run(self, context)
+    }
+}
+
+impl RigRequest for ContinuousRequest {
+    fn set_rig(&mut self, rig: RigAddress) {
+        self.rig = rig;
+    }
+}
+
+impl CameraRequest for ContinuousRequest {
+    fn set_camera(&mut self, camera: CameraSettings) {
+        self.camera = camera;
+    }
+}
+
+impl ContinuousRequest {
     fn pace(&self) -> Result<Pace> {
-        let period = match self.rate_hz {
+        let period = match self.rate {
             None => Micros(0),
             Some(rate) if RATES_HZ.contains(&rate) => Micros((1e6 / rate).round() as u32),
             Some(rate) => {
@@ -80,16 +118,13 @@ impl ContinuousSettings {
                 ));
             }
         };
-        let exposures = match self.enough {
-            Enough::Exposures(0) => {
-                return Err(WorkflowError::parameter("frames", 0, "it takes no images, expected 1 or more"));
-            }
-            Enough::Exposures(exposures) => exposures,
-            Enough::Seconds(seconds) if !(seconds > 0.0 && seconds.is_finite()) => {
-                return Err(WorkflowError::parameter("for", seconds, "expected a number of seconds above 0"));
-            }
-            Enough::Seconds(_) | Enough::Never => 0,
-        };
+        if self.frames == Some(0) {
+            return Err(WorkflowError::parameter("frames", 0, "it takes no images, expected 1 or more"));
+        }
+        if let Some(seconds) = self.r#for.filter(|seconds| !(*seconds > 0.0 && seconds.is_finite())) {
+            return Err(WorkflowError::parameter("for", seconds, "expected a number of seconds above 0"));
+        }
+        let exposures = self.frames.unwrap_or(0);
         Ok(Pace { period, exposures })
     }
 }
@@ -100,12 +135,18 @@ struct Ready {
     pair: Option<(GivenOptics, SensorPair, Reach)>,
 }
 
-/// Captures until the end condition. Cancelling ends it in order: the figures cover the exposures until then.
-pub fn run(settings: &ContinuousSettings, context: &Context<'_>) -> Result<ContinuousFigures> {
+/// Captures until it is enough. Whoever cancels it ends it in order: the figures are those of what was taken until then.
+///
+/// # Errors
+/// Parameters, program or optics, folder, camera, rig: in this order, so that nothing moves in vain.
+pub fn run(settings: &ContinuousRequest, context: &Context<'_>) -> Result<ContinuousFigures> {
     let pace = settings.pace()?;
-    let (program, optics) = match &settings.cycle {
-        Cycle::Pair { optics } => (None, Some(GivenOptics::read(optics)?)),
-        Cycle::Program { path } => {
+    let (program, optics) = match (&settings.program, &settings.optics) {
+        (None, None) => {
+            return Err(WorkflowError::parameter("optics", "none", "expected optics or a program"));
+        }
+        (None, Some(optics)) => (None, Some(GivenOptics::read(optics)?)),
+        (Some(path), _) => {
             let text = fs::read_to_string(path).map_err(WorkflowError::read("the program", path))?;
             (Some(read_program(&text).about(|| format!("the program {}", path.display()))?), None)
         }
@@ -132,7 +173,7 @@ fn make_ready(
     equipped: &EquippedRig,
     program: Option<Vec<Shot>>,
     optics: Option<GivenOptics>,
-    settings: &ContinuousSettings,
+    settings: &ContinuousRequest,
     context: &Context<'_>,
 ) -> Result<Ready> {
     let (client, say) = (&equipped.rig.client, &mut |what: &str| context.info(what));
@@ -152,7 +193,7 @@ fn make_ready(
 fn capture(
     equipped: &mut EquippedRig,
     ready: &Ready,
-    (settings, pace): (&ContinuousSettings, Pace),
+    (settings, pace): (&ContinuousRequest, Pace),
     tally: &mut Tally,
     mut folder: Option<&mut Folder>,
     context: &Context<'_>,
@@ -167,7 +208,7 @@ fn capture(
     let mut cycles = Cycles::of(&ready.shots);
     while let Some(outcome) = stream.outcome()? {
         context.cancel.check("capturing continuously")?;
-        if let (Enough::Seconds(seconds), Outcome::Taken(frame)) = (settings.enough, &outcome)
+        if let (Some(seconds), Outcome::Taken(frame)) = (settings.r#for, &outcome)
             && tally.seconds_at(frame) >= seconds
         {
             return Ok(());
@@ -205,37 +246,29 @@ impl Tally {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::rig::camera::CameraAddress;
 
     #[test]
-    fn paces_that_cannot_be_are_refused() {
-        let settings = |rate_hz, enough| ContinuousSettings {
-            rig: RigAddress::Port("none".into()),
-            camera: CameraSettings {
-                address: CameraAddress::Emulated,
-                exposure: Micros(5_000),
-                image_wait: std::time::Duration::from_secs(1),
-                settings: Vec::new(),
-                light: None,
-            },
-            cycle: Cycle::Program { path: "none".into() },
-            rate_hz,
-            enough,
-            out: None,
+    fn rejects_impossible_paces() {
+        let settings = |rate, frames, r#for| ContinuousRequest {
+            program: Some("none".into()),
+            rate,
+            frames,
+            r#for,
+            ..Default::default()
         };
-        for (rate_hz, enough) in [
-            (Some(0.0), Enough::Never),
-            (Some(f64::NAN), Enough::Never),
-            (Some(1e9), Enough::Never),
-            (None, Enough::Exposures(0)),
-            (None, Enough::Seconds(-1.0)),
+        for (rate, frames, seconds) in [
+            (Some(0.0), None, None),
+            (Some(f64::NAN), None, None),
+            (Some(1e9), None, None),
+            (None, Some(0), None),
+            (None, None, Some(-1.0)),
         ] {
             assert!(
-                settings(rate_hz, enough).pace().is_err_and(|error| error.is_usage()),
-                "{rate_hz:?} {enough:?}"
+                settings(rate, frames, seconds).pace().is_err_and(|error| error.is_usage()),
+                "{rate:?} {frames:?} {seconds:?}"
             );
         }
-        let pace = settings(Some(30.0), Enough::Exposures(7)).pace().unwrap();
+        let pace = settings(Some(30.0), Some(7), None).pace().unwrap();
         assert_eq!(pace, Pace { period: Micros(33_333), exposures: 7 });
     }
 }

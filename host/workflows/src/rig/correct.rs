@@ -5,7 +5,8 @@ use std::{path::PathBuf, time::Instant};
 use farnear_capture::board_correction::{decode, encode};
 use farnear_files::{map, staging};
 use ndarray::Array2;
-use serde::Serialize;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
 use super::{Rig, RigAddress};
 use crate::{
@@ -14,19 +15,57 @@ use crate::{
     correction_file,
     error::{Result, WorkflowError},
     figures::rounded,
+    request::{PathKind, Request, RigRequest},
 };
 
-#[derive(Clone, PartialEq, Debug)]
-pub struct BoardCorrectSettings {
+/// Let the board correct a depth map, row by row over the link, and compare its bits with this computer's.
+#[derive(Clone, PartialEq, Debug, Default, Serialize, Deserialize, JsonSchema)]
+#[cfg_attr(feature = "clap", derive(clap::Args))]
+#[cfg_attr(
+    feature = "clap",
+    command(
+        after_help = "Example: farnear rig correct depth.npy --port sim --correction correction.toml --out corrected.npy"
+    )
+)]
+#[serde(default)]
+pub struct BoardCorrectRequest {
+    /// Set by the caller.
+    #[serde(skip)]
+    #[cfg_attr(feature = "clap", arg(skip))]
     pub rig: RigAddress,
-    /// The depth map in mm, `.npy` or float TIFF.
+    /// The depth map in mm, .npy or float .tiff.
     pub depth: PathBuf,
-    /// The file of the correction: clsf, clsf-blend or clsf-full.
+    /// The correction, as `farnear calibrate correction` saves it: clsf, clsf-blend or clsf-full.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "FILE"))]
     pub correction: PathBuf,
-    /// Where the corrected map goes: `.npy` or `.tiff`.
+    /// The corrected map: .npy or .tiff.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "DEPTH"))]
     pub out: PathBuf,
-    /// Whether the board keeps the correction in its memory.
+    /// Keep the correction in the board's memory.
+    #[cfg_attr(feature = "clap", arg(long))]
     pub store: bool,
+}
+
+impl Request for BoardCorrectRequest {
+    const NAME: &'static str = "rig correct";
+    const REQUIRED: &'static [&'static str] = &["depth", "correction", "out"];
+    const PATHS: &'static [(&'static str, PathKind)] =
+        &[("depth", PathKind::Input), ("correction", PathKind::Input), ("out", PathKind::OutputFile)];
+    type Figures = BoardCorrectFigures;
+
+    fn run(&self, context: &Context<'_>) -> Result<BoardCorrectFigures> {
+        correct(self, context)
+    }
+
+    fn verdict(figures: &BoardCorrectFigures) -> Result<()> {
+        figures.check()
+    }
+}
+
+impl RigRequest for BoardCorrectRequest {
+    fn set_rig(&mut self, rig: RigAddress) {
+        self.rig = rig;
+    }
 }
 
 /// What the correction did.
@@ -70,7 +109,11 @@ impl BoardCorrectFigures {
 }
 
 /// Lets the board correct a map.
-pub fn correct(settings: &BoardCorrectSettings, context: &Context<'_>) -> Result<BoardCorrectFigures> {
+///
+/// # Errors
+/// [`WorkflowError::Parameter`] for a place with another ending; correction and map that cannot be read or do not belong
+/// together; the rig.
+pub fn correct(settings: &BoardCorrectRequest, context: &Context<'_>) -> Result<BoardCorrectFigures> {
     let format = format_of(&settings.out)?;
     let correction = correction_file::read(&settings.correction)?;
     let depth = map::read(&settings.depth)?;

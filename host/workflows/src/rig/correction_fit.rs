@@ -6,26 +6,89 @@ use farnear_capture::board_correction::{CodedTarget, encode};
 use farnear_depth::corrections::{CorrectionError, Method};
 use farnear_maths::clsf::{Columns, DepthScale, Error, Frame, FullFit, RegionFit};
 use ndarray::Array2;
-use serde::Serialize;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use serde_with::{DisplayFromStr, serde_as};
 
 use super::{Rig, RigAddress};
 use crate::{
     calibrate::correction,
     context::Context,
     error::{Result, WorkflowError},
+    parameters::within,
+    request::{PathKind, Request, RigRequest},
 };
 
-#[derive(Clone, PartialEq, Debug)]
-pub struct FitSettings {
+/// Let the board fit a depth correction to flat targets, and keep it in its memory.
+///
+/// The depth maps of PATTERNS.toml are sent row by row; the coefficients are compared bit for bit with the same calculation here.
+#[serde_as]
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize, JsonSchema)]
+#[cfg_attr(feature = "clap", derive(clap::Args))]
+#[cfg_attr(
+    feature = "clap",
+    command(
+        after_help = "Example: farnear rig calibrate fit series/PATTERNS.toml --port sim --method clsf-full --step 16 --store"
+    )
+)]
+#[serde(default)]
+pub struct FitRequest {
+    /// Set by the caller.
+    #[serde(skip)]
+    #[cfg_attr(feature = "clap", arg(skip))]
     pub rig: RigAddress,
-    /// The list of depth maps; see [`correction::read`].
+    /// The list of depth maps, as `farnear rig calibrate targets` writes it.
     pub patterns: PathBuf,
-    /// Which correction; the board knows [`Method::board_names`].
+    /// Method: clsf (3x3 regions), clsf-blend (3x3 regions without steps) or clsf-full (one polynomial).
+    #[cfg_attr(feature = "clap", arg(long))]
+    #[serde_as(as = "DisplayFromStr")]
     pub method: Method,
-    /// Step in columns and rows between the pixels used.
+    /// Take every Nth pixel of every Nth row only: 1 to 256.
+    #[cfg_attr(
+        feature = "clap",
+        arg(long, value_name = "PX", default_value_t = Self::default().step, value_parser = clap::value_parser!(u16).range(1..=256))
+    )]
     pub step: u16,
-    /// Whether the board keeps the correction in its memory, if its bits are right.
+    /// Keep the correction in the board's memory.
+    #[cfg_attr(feature = "clap", arg(long))]
     pub store: bool,
+}
+
+impl Default for FitRequest {
+    fn default() -> Self {
+        Self {
+            rig: RigAddress::default(),
+            patterns: PathBuf::new(),
+            method: Method::Clsf,
+            step: 8,
+            store: false,
+        }
+    }
+}
+
+impl Request for FitRequest {
+    const NAME: &'static str = "rig calibrate fit";
+    const REQUIRED: &'static [&'static str] = &["patterns", "method"];
+    const PATHS: &'static [(&'static str, PathKind)] = &[("patterns", PathKind::Input)];
+    type Figures = FitFigures;
+
+    fn check(&self) -> Result<()> {
+        within("step", self.step, &(1..=256), "px")
+    }
+
+    fn run(&self, context: &Context<'_>) -> Result<FitFigures> {
+        fit(self, context)
+    }
+
+    fn verdict(figures: &FitFigures) -> Result<()> {
+        figures.check()
+    }
+}
+
+impl RigRequest for FitRequest {
+    fn set_rig(&mut self, rig: RigAddress) {
+        self.rig = rig;
+    }
 }
 
 /// What there is to say of a fit.
@@ -53,7 +116,10 @@ impl FitFigures {
 }
 
 /// Sends the maps row by row, lets the board fit, and compares its coefficients with the same calculation here.
-pub fn fit(settings: &FitSettings, context: &Context<'_>) -> Result<FitFigures> {
+///
+/// # Errors
+/// The method, the list and its maps, the rig.
+pub fn fit(settings: &FitRequest, context: &Context<'_>) -> Result<FitFigures> {
     if settings.method.board_form().is_none() {
         let expected = format!("the board fits {}", Method::board_names());
         return Err(WorkflowError::parameter("method", settings.method, expected));
@@ -74,7 +140,7 @@ pub fn fit(settings: &FitSettings, context: &Context<'_>) -> Result<FitFigures> 
             context.info(&format!("{row} of {rows} rows"));
         }
     };
-    let FitSettings { method, step, store, .. } = *settings;
+    let FitRequest { method, step, store, .. } = *settings;
     let found = rig.client.fit_correction(method, frame, scale, &targets, step, say_row)?;
     let expected = on_host(method, frame, &targets, step).map_err(CorrectionError::from)?;
     let different = found.iter().zip(&expected).filter(|(a, b)| a != b).count();

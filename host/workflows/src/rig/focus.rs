@@ -13,29 +13,97 @@ use farnear_depth::{
     optics::{Optics, OpticsFile},
 };
 use farnear_protocol::{Nanometres, message::Axis};
-use serde::Serialize;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use serde_with::{DisplayFromStr, serde_as};
 
 use super::{RigAddress, camera::CameraSettings, motion::nanometres};
 use crate::{
     context::Context,
     error::{Result, WorkflowError},
     figures::rounded,
+    measure::Rectangle,
     optics::GivenOptics,
+    request::{CameraRequest, PathKind, Request, RigRequest},
 };
 
-#[derive(Clone, PartialEq, Debug)]
-pub struct FocusSettings {
+/// Find the sensor distance at which a target is sharpest (m1), and the working range that begins there.
+///
+/// Put the target at the far end of the working range. The second distance follows from the optics: m2 = m1 + 2 Fe Rmax (Li 2014,
+/// eqs. 4.3 and 4.4).
+#[serde_as]
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize, JsonSchema)]
+#[cfg_attr(feature = "clap", derive(clap::Args))]
+#[cfg_attr(
+    feature = "clap",
+    command(
+        after_help = "Example: farnear rig focus --port sim --scene plane:900 --optics optics.toml --json"
+    )
+)]
+#[serde(default)]
+pub struct FocusRequest {
+    /// Set by the caller.
+    #[serde(skip)]
+    #[cfg_attr(feature = "clap", arg(skip))]
     pub rig: RigAddress,
+    /// Set by the caller.
+    #[serde(skip)]
+    #[cfg_attr(feature = "clap", arg(skip))]
     pub camera: CameraSettings,
-    /// The optics file; its far focus is where the search begins, unless told otherwise.
+    /// The optics file; the search begins at its far focus.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "FILE"))]
     pub optics: PathBuf,
-    /// Begin at this sensor distance; without it, where the stage stands, or at the optics' far focus if it had to be homed.
+    /// Begin at this sensor distance [default: the place of the stage, or the optics' far focus if it had to be homed].
+    #[cfg_attr(feature = "clap", arg(long, value_name = "MM"))]
     pub start_mm: Option<f64>,
-    /// How far the focus may be from the start.
+    /// Largest distance of the focus from the start.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "MM", default_value_t = Self::default().range_mm))]
     pub range_mm: f64,
+    /// Focus measure: tenengrad, modified-laplacian or fft-sum.
+    #[cfg_attr(feature = "clap", arg(long, default_value_t = Self::default().measure))]
+    #[serde_as(as = "DisplayFromStr")]
     pub measure: FocusMeasure,
-    /// Part of the image to measure: column, row, width, height, px. All of it by default.
-    pub region: Option<[usize; 4]>,
+    /// The part of the image that counts: column, row, width and height in pixels.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "X,Y,W,H"))]
+    #[serde_as(as = "Option<DisplayFromStr>")]
+    pub region: Option<Rectangle>,
+}
+
+impl Default for FocusRequest {
+    fn default() -> Self {
+        Self {
+            rig: RigAddress::default(),
+            camera: CameraSettings::default(),
+            optics: PathBuf::new(),
+            start_mm: None,
+            range_mm: 1.0,
+            measure: FocusMeasure::Tenengrad,
+            region: None,
+        }
+    }
+}
+
+impl Request for FocusRequest {
+    const NAME: &'static str = "rig focus";
+    const REQUIRED: &'static [&'static str] = &["optics"];
+    const PATHS: &'static [(&'static str, PathKind)] = &[("optics", PathKind::Input)];
+    type Figures = FocusFigures;
+
+    fn run(&self, context: &Context<'_>) -> Result<FocusFigures> {
+        focus(self, context)
+    }
+}
+
+impl RigRequest for FocusRequest {
+    fn set_rig(&mut self, rig: RigAddress) {
+        self.rig = rig;
+    }
+}
+
+impl CameraRequest for FocusRequest {
+    fn set_camera(&mut self, camera: CameraSettings) {
+        self.camera = camera;
+    }
 }
 
 /// The best focus, and the working range of optics whose far focus lies there.
@@ -65,7 +133,10 @@ pub struct FocusFigures {
 }
 
 /// Finds the best focus of the target before the rig and leaves the sensor there.
-pub fn focus(settings: &FocusSettings, context: &Context<'_>) -> Result<FocusFigures> {
+///
+/// # Errors
+/// Optics, parameters, camera, rig; [`WorkflowError::Focus`] where there is none.
+pub fn focus(settings: &FocusRequest, context: &Context<'_>) -> Result<FocusFigures> {
     let given = GivenOptics::read(&settings.optics)?;
     let optics = &given.optics;
     if !(settings.range_mm > 0.0 && settings.range_mm.is_finite()) {
@@ -83,7 +154,7 @@ pub fn focus(settings: &FocusSettings, context: &Context<'_>) -> Result<FocusFig
         range_mm: settings.range_mm,
         exposure: settings.camera.exposure,
         image_wait: settings.camera.image_wait,
-        region: settings.region,
+        region: settings.region.map(|at| [at.x, at.y, at.width, at.height]),
     };
     let found = find_focus(client, rig.camera.as_mut(), optics, &search, &mut |what| context.info(what))?;
     figures(given.optics, &found)

@@ -13,7 +13,7 @@ use ndarray::Axis;
 use super::{
     RigAddress,
     camera::{ADDRESSES, CameraAddress, CameraSettings},
-    pair::{AVERAGED_MAX, PairFigures, PairSettings, noted},
+    pair::{AVERAGED_MAX, CaptureRequest, PairFigures, noted},
 };
 use crate::{
     context::Context,
@@ -27,33 +27,24 @@ const FURTHER_UM: std::ops::RangeInclusive<f64> = 0.1..=10_000.0;
 /// Relative difference from the distance of the optics above which a warning is given: depth is off by about as much of the working range.
 const UNLIKE: f64 = 0.005;
 
-#[derive(Clone, Debug)]
-pub struct HalfMirrorSettings {
-    /// Rig, first camera (which takes the far image), optics, folder. The camera's exposure, wait and settings are both cameras'.
-    pub pair: PairSettings,
-    /// The camera that takes the near image; without it the emulated rig's second.
-    pub second: Option<CameraAddress>,
-    /// How much further from the lens its sensor stands; without it as far as the optics ask for.
-    pub further_um: Option<f64>,
-    /// Whether its picture is to be turned round, left to right: the reflected path shows it mirrored.
-    pub mirrored: bool,
-}
-
 /// Captures a pair of one exposure: homes where needed, brings the stage to the far place, exposes both cameras by one trigger.
-pub fn capture(settings: &HalfMirrorSettings, context: &Context<'_>) -> Result<PairFigures> {
-    let HalfMirrorSettings { pair: PairSettings { camera, averaged, out, .. }, .. } = settings;
-    let optics = GivenOptics::read(&settings.pair.optics)?;
+///
+/// # Errors
+/// Optics, parameters, folder, cameras, rig: in this order, so that nothing moves where the result could not be kept.
+pub(super) fn capture(settings: &CaptureRequest, context: &Context<'_>) -> Result<PairFigures> {
+    let CaptureRequest { camera, average: averaged, out, .. } = settings;
+    let optics = GivenOptics::read(&settings.optics)?;
     within("average", *averaged, &(1..=AVERAGED_MAX), "exposures")?;
     let range = optics.optics.working_range();
     let sensor = SensorPair { far_mm: range.sensor_far_mm, near_mm: range.sensor_near_mm };
-    let further_um = settings.further_um.unwrap_or((sensor.near_mm - sensor.far_mm) * 1e3);
+    let further_um = settings.second_further_um.unwrap_or((sensor.near_mm - sensor.far_mm) * 1e3);
     within("second-further-um", further_um, &FURTHER_UM, "um")?;
     let second = CameraSettings { address: second_address(settings)?, ..camera.clone() };
     if let Some(doubt) = doubt(&optics.optics, &sensor, further_um) {
         context.progress.warn(&doubt);
     }
     let folder = begin_folder(out)?;
-    let address = match &settings.pair.rig {
+    let address = match &settings.rig {
         RigAddress::Emulated(scenery) => {
             let mut scenery = scenery.clone();
             scenery.half_mirror_um = Some(further_um);
@@ -74,14 +65,14 @@ pub fn capture(settings: &HalfMirrorSettings, context: &Context<'_>) -> Result<P
     let say = &mut |what: &str| context.info(what);
     let client = &equipped.rig.client;
     let mut pair = capture_behind_mirror(client, cameras, &sensor, further_um * 1e-3, &exposures, say)?;
-    if settings.mirrored {
+    if settings.second_mirrored {
         pair.near.image.pixels.invert_axis(Axis(1));
     }
     let mut record = noted(&pair, &equipped, &optics, camera, *averaged);
     record.half_mirror = Some(HalfMirrorRecord {
         second_camera: second.kind().into(),
         second_further_um: further_um,
-        second_mirrored: settings.mirrored,
+        second_mirrored: settings.second_mirrored,
     });
     finish_folder(folder, &pair, &record)?;
     context.info(&format!("wrote {}", out.display()));
@@ -89,8 +80,9 @@ pub fn capture(settings: &HalfMirrorSettings, context: &Context<'_>) -> Result<P
 }
 
 /// The second camera's address, where the rig has one.
-fn second_address(settings: &HalfMirrorSettings) -> Result<CameraAddress> {
-    let PairSettings { rig, camera, frames, .. } = &settings.pair;
+fn second_address(settings: &CaptureRequest) -> Result<CameraAddress> {
+    let CaptureRequest { rig, camera, camera_frames: frames, .. } = settings;
+    let named: Option<CameraAddress> = settings.second_camera.as_deref().map(str::parse).transpose()?;
     let second =
         |value: &str, expected: String| Err(WorkflowError::parameter("second-camera", value, expected));
     if let Some(frames) = frames {
@@ -98,7 +90,7 @@ fn second_address(settings: &HalfMirrorSettings) -> Result<CameraAddress> {
             "the dark and flat frames of one camera are not the other's: leave them out".to_string();
         return Err(WorkflowError::parameter("camera-frames", frames.display(), expected));
     }
-    match &settings.second {
+    match &named {
         Some(CameraAddress::Emulated) | None
             if camera.address != CameraAddress::Emulated || !rig.is_emulated() =>
         {

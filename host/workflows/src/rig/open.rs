@@ -50,6 +50,7 @@ impl OpenRig {
         let Rig { client, emulation } = Rig::connect(address, Some(optics.for_emulation()), context)?;
         let name = match address {
             RigAddress::Port(port) => port.clone(),
+            RigAddress::Attached => "the board".into(),
             RigAddress::Emulated(_) | RigAddress::Open(_) => "the emulated rig".into(),
         };
         Ok(Self(Arc::new(Held { name, client: Mutex::new(client), emulation })))

@@ -10,25 +10,112 @@ use farnear_capture::{
 };
 use farnear_depth::prepare::CameraFrames;
 use ndarray::Zip;
-use serde::Serialize;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
+use super::half_mirror;
 use super::{
     RigAddress,
     camera::{CameraSettings, EquippedRig},
 };
-use crate::{camera_frames, context::Context, error::Result, optics::GivenOptics, parameters::within};
+use crate::{
+    camera_frames,
+    context::Context,
+    error::Result,
+    optics::GivenOptics,
+    parameters::within,
+    request::{CameraRequest, PathKind, Request, RigRequest},
+};
 
-#[derive(Clone, Debug)]
-pub struct PairSettings {
+/// Capture a far- and a near-focused image: home if needed, move the stage near, expose both by piezo.
+///
+/// The folder appears when it is complete: far.png, near.png and capture.toml.
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize, JsonSchema)]
+#[cfg_attr(feature = "clap", derive(clap::Args))]
+#[cfg_attr(
+    feature = "clap",
+    command(after_help = "\
+Example: farnear rig capture --port /dev/ttyACM0 --camera folder:incoming/ --optics optics.toml --out pair1/
+         farnear rig capture --port /dev/ttyACM0 --camera genicam: --set gain=2 --average 8 --optics optics.toml --out pair2/
+         farnear rig capture --port /dev/ttyACM0 --camera genicam:A --half-mirror --second-camera genicam:B --optics optics.toml --out pair3/")
+)]
+#[serde(default)]
+pub struct CaptureRequest {
+    /// Set by the caller.
+    #[serde(skip)]
+    #[cfg_attr(feature = "clap", arg(skip))]
     pub rig: RigAddress,
+    /// Set by the caller.
+    #[serde(skip)]
+    #[cfg_attr(feature = "clap", arg(skip))]
     pub camera: CameraSettings,
+    /// The optics file.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "FILE"))]
     pub optics: PathBuf,
-    /// Exposures of each image, which are averaged: 1 to [`AVERAGED_MAX`].
-    pub averaged: u16,
-    /// The folder of the camera's dark and flat frames ([`crate::camera_frames`]), which are taken off the images.
-    pub frames: Option<PathBuf>,
+    /// Take each image as the mean of so many exposures (1 to 256): noise falls with the root of their number.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "N", default_value_t = Self::default().average))]
+    pub average: u16,
+    /// Subtract the camera's dark and flat frames from both images: a folder of `farnear calibrate camera`. Do not give it to
+    /// `farnear depth` again.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "DIR"))]
+    pub camera_frames: Option<PathBuf>,
+    /// Take both images by one exposure: a half mirror is behind the lens, and a second camera in its other path takes the near
+    /// image (docs/rig.md). The stage goes to the far place. The emulated rig has a half mirror then.
+    #[cfg_attr(feature = "clap", arg(long))]
+    pub half_mirror: bool,
+    /// The second camera, named as the first; exposure, wait and --set are those of both.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "CAMERA", requires = "half_mirror"))]
+    pub second_camera: Option<String>,
+    /// Distance of the second camera's sensor from the lens less that of the first, in micrometres [default: as the optics need].
+    #[cfg_attr(feature = "clap", arg(long, value_name = "UM", requires = "half_mirror"))]
+    pub second_further_um: Option<f64>,
+    /// Mirror the second camera's picture, left to right: it is in the reflected path and does not do so itself (ReverseX).
+    #[cfg_attr(feature = "clap", arg(long, requires = "half_mirror"))]
+    pub second_mirrored: bool,
     /// The new capture folder.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "DIR"))]
     pub out: PathBuf,
+}
+
+impl Default for CaptureRequest {
+    fn default() -> Self {
+        Self {
+            rig: RigAddress::default(),
+            camera: CameraSettings::default(),
+            optics: PathBuf::new(),
+            average: 1,
+            camera_frames: None,
+            half_mirror: false,
+            second_camera: None,
+            second_further_um: None,
+            second_mirrored: false,
+            out: PathBuf::new(),
+        }
+    }
+}
+
+impl Request for CaptureRequest {
+    const NAME: &'static str = "rig capture";
+    const REQUIRED: &'static [&'static str] = &["optics", "out"];
+    const PATHS: &'static [(&'static str, PathKind)] =
+        &[("optics", PathKind::Input), ("camera_frames", PathKind::Input), ("out", PathKind::OutputFolder)];
+    type Figures = PairFigures;
+
+    fn run(&self, context: &Context<'_>) -> Result<PairFigures> {
+        capture(self, context)
+    }
+}
+
+impl RigRequest for CaptureRequest {
+    fn set_rig(&mut self, rig: RigAddress) {
+        self.rig = rig;
+    }
+}
+
+impl CameraRequest for CaptureRequest {
+    fn set_camera(&mut self, camera: CameraSettings) {
+        self.camera = camera;
+    }
 }
 
 /// Most exposures that are averaged: beyond, drift counts more than noise.
@@ -69,23 +156,29 @@ impl From<&Pair> for PairFigures {
 
 /// Captures a pair: homes where needed, brings the stage near, exposes both by piezo. The folder appears when everything
 /// is in it: far.png, near.png and capture.toml.
-pub fn capture(settings: &PairSettings, context: &Context<'_>) -> Result<PairFigures> {
+///
+/// # Errors
+/// Optics, folder, camera, rig: in this order, so that nothing moves where the result could not be kept.
+pub fn capture(settings: &CaptureRequest, context: &Context<'_>) -> Result<PairFigures> {
+    if settings.half_mirror {
+        return half_mirror::capture(settings, context);
+    }
     capture_seen(settings, context, |_| ())
 }
 
 /// The same; `on_pair` receives the pair before anything is written.
 pub fn capture_seen(
-    settings: &PairSettings,
+    settings: &CaptureRequest,
     context: &Context<'_>,
     on_pair: impl FnOnce(&Pair),
 ) -> Result<PairFigures> {
     let optics = GivenOptics::read(&settings.optics)?;
-    within("average", settings.averaged, &(1..=AVERAGED_MAX), "exposures")?;
-    let frames = settings.frames.as_deref().map(camera_frames::read).transpose()?;
+    within("average", settings.average, &(1..=AVERAGED_MAX), "exposures")?;
+    let frames = settings.camera_frames.as_deref().map(camera_frames::read).transpose()?;
     let folder = begin_folder(&settings.out)?;
     let mut rig = settings.camera.connect(&settings.rig, Some(optics.for_emulation()), context)?;
     let (mut pair, mut record) =
-        take_averaged(&mut rig, &optics, &settings.camera, settings.averaged, context)?;
+        take_averaged(&mut rig, &optics, &settings.camera, settings.average, context)?;
     if let Some(frames) = &frames {
         for taken in [&mut pair.far, &mut pair.near] {
             taken.image = corrected(&taken.image, frames)?;

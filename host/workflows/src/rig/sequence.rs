@@ -8,14 +8,12 @@ use farnear_capture::{
     record::{begin_folder, finish_sequence, record_of_sequence},
     sequence::{SequenceShot, ShotDefaults, image_name, read_program},
 };
-use farnear_protocol::{
-    Micros,
-    message::{Axis, Shot},
-};
-use serde::Serialize;
+use farnear_protocol::message::Shot;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
 use super::{
-    RigAddress,
+    AxisName, RigAddress,
     camera::{CameraSettings, EquippedRig},
     motion::nanometres,
 };
@@ -23,32 +21,110 @@ use crate::{
     context::Context,
     error::{About, Result, WorkflowError},
     optics::GivenOptics,
+    request::{CameraRequest, PathKind, Request, RigRequest},
     simulator::USUAL_PSF,
 };
 
-#[derive(Clone, PartialEq, Debug)]
-pub enum Program {
-    File(PathBuf),
-    Stack {
-        /// The axis that goes through it.
-        axis: Axis,
-        from_um: f64,
-        to_um: f64,
-        steps: usize,
-    },
-}
+/// Run an exposure program on the board: shots from a file, or a focus stack. Write the images and capture.toml with the position
+/// asked and measured, trigger and strobe times of each shot.
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize, JsonSchema)]
+#[cfg_attr(feature = "clap", derive(clap::Args))]
+#[cfg_attr(
+    feature = "clap",
+    command(after_help = "\
+PROGRAM.toml:
+  exposure_us = 5000            # also: settle_window_nm, settle_dwell_us, repeat, trigger
+  [[shot]]
+  axis = \"fine\"                 # coarse, fine, lens
+  to_um = 20.0
+  [[shot]]
+  axis = \"fine\"
+  to_um = 170.0
+  trigger = \"hardware\"          # hardware, software, free-running; the same for all shots
 
-#[derive(Clone, PartialEq, Debug)]
-pub struct SequenceSettings {
+Example: farnear rig sequence --port sim --axis fine --from 20 --to 180 --steps 9 --out stack/")
+)]
+#[serde(default)]
+pub struct SequenceRequest {
+    /// Set by the caller.
+    #[serde(skip)]
+    #[cfg_attr(feature = "clap", arg(skip))]
     pub rig: RigAddress,
-    /// Its camera; the exposure is that of a stack, a file has its own.
+    /// Set by the caller; the exposure is that of a stack, a file has its own.
+    #[serde(skip)]
+    #[cfg_attr(feature = "clap", arg(skip))]
     pub camera: CameraSettings,
-    pub program: Program,
-    /// How often the armed program runs; the images of all runs are kept.
+    /// The program.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "FILE", conflicts_with_all = ["from", "to", "steps", "axis"]))]
+    pub program: Option<PathBuf>,
+    /// The axis of a focus stack.
+    #[cfg_attr(feature = "clap", arg(long, requires = "steps"))]
+    pub axis: Option<AxisName>,
+    /// First position of the stack, um.
+    #[cfg_attr(
+        feature = "clap",
+        arg(long, value_name = "UM", allow_negative_numbers = true, requires = "steps")
+    )]
+    pub from: Option<f64>,
+    /// Last position of the stack, um.
+    #[cfg_attr(
+        feature = "clap",
+        arg(long, value_name = "UM", allow_negative_numbers = true, requires = "steps")
+    )]
+    pub to: Option<f64>,
+    /// Positions of the stack.
+    #[cfg_attr(feature = "clap", arg(long, requires_all = ["axis", "from", "to"]))]
+    pub steps: Option<usize>,
+    /// Run the armed program so often; the images of all runs are kept.
+    #[cfg_attr(feature = "clap", arg(long, default_value_t = Self::default().runs))]
     pub runs: usize,
     /// The optics file: for the record, and for what the emulated rig sees.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "FILE"))]
     pub optics: Option<PathBuf>,
+    /// The new folder.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "DIR"))]
     pub out: PathBuf,
+}
+
+impl Default for SequenceRequest {
+    fn default() -> Self {
+        Self {
+            rig: RigAddress::default(),
+            camera: CameraSettings::default(),
+            program: None,
+            axis: None,
+            from: None,
+            to: None,
+            steps: None,
+            runs: 1,
+            optics: None,
+            out: PathBuf::new(),
+        }
+    }
+}
+
+impl Request for SequenceRequest {
+    const NAME: &'static str = "rig sequence";
+    const REQUIRED: &'static [&'static str] = &["out"];
+    const PATHS: &'static [(&'static str, PathKind)] =
+        &[("program", PathKind::Input), ("optics", PathKind::Input), ("out", PathKind::OutputFolder)];
+    type Figures = SequenceFigures;
+
+    fn run(&self, context: &Context<'_>) -> Result<SequenceFigures> {
+        run(self, context)
+    }
+}
+
+impl RigRequest for SequenceRequest {
+    fn set_rig(&mut self, rig: RigAddress) {
+        self.rig = rig;
+    }
+}
+
+impl CameraRequest for SequenceRequest {
+    fn set_camera(&mut self, camera: CameraSettings) {
+        self.camera = camera;
+    }
 }
 
 /// What there is to say of a sequence.
@@ -66,11 +142,14 @@ pub struct SequenceFigures {
 }
 
 /// Runs a program and writes its images. The folder appears when everything is in it.
-pub fn run(settings: &SequenceSettings, context: &Context<'_>) -> Result<SequenceFigures> {
+///
+/// # Errors
+/// Parameters, program, optics, folder, camera, rig: in this order.
+pub fn run(settings: &SequenceRequest, context: &Context<'_>) -> Result<SequenceFigures> {
     if settings.runs == 0 {
         return Err(WorkflowError::parameter("runs", 0, "it takes no images, expected 1 or more"));
     }
-    let shots = shots(&settings.program, settings.camera.exposure)?;
+    let shots = settings.shots()?;
     let optics = settings.optics.as_deref().map(GivenOptics::read).transpose()?;
     let folder = begin_folder(&settings.out)?;
     let lens = optics.as_ref().map(GivenOptics::for_emulation);
@@ -98,7 +177,7 @@ pub fn run(settings: &SequenceSettings, context: &Context<'_>) -> Result<Sequenc
 fn run_once(
     rig: &mut EquippedRig,
     shots: &[Shot],
-    settings: &SequenceSettings,
+    settings: &SequenceRequest,
     name: impl Fn(String) -> String,
     taken: &mut Vec<SequenceShot>,
 ) -> Result<(), CaptureError> {
@@ -112,19 +191,23 @@ fn run_once(
     })
 }
 
-fn shots(program: &Program, exposure: Micros) -> Result<Vec<Shot>> {
-    match program {
-        Program::File(path) => {
+impl SequenceRequest {
+    fn shots(&self) -> Result<Vec<Shot>> {
+        if let Some(path) = &self.program {
             let text = fs::read_to_string(path).map_err(WorkflowError::read("the program", path))?;
-            read_program(&text).about(|| format!("the program {}", path.display()))
+            return read_program(&text).about(|| format!("the program {}", path.display()));
         }
-        Program::Stack { steps: 0, .. } => {
-            Err(WorkflowError::parameter("steps", 0, "it takes no images, expected 1 or more"))
+        let (Some(axis), Some(from), Some(to), Some(steps)) = (self.axis, self.from, self.to, self.steps)
+        else {
+            let expected = "expected a program, or axis, from, to and steps";
+            return Err(WorkflowError::parameter("program", "none", expected));
+        };
+        if steps == 0 {
+            return Err(WorkflowError::parameter("steps", 0, "it takes no images, expected 1 or more"));
         }
-        Program::Stack { axis, from_um, to_um, steps } => {
-            let (from, to) = (nanometres("from", *from_um)?, nanometres("to", *to_um)?);
-            Ok(ShotDefaults { exposure, ..ShotDefaults::default() }.stack(*axis, from, to, *steps))
-        }
+        let (from, to) = (nanometres("from", from)?, nanometres("to", to)?);
+        let defaults = ShotDefaults { exposure: self.camera.exposure, ..ShotDefaults::default() };
+        Ok(defaults.stack(axis.into(), from, to, steps))
     }
 }
 

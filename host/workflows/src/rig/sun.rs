@@ -1,41 +1,98 @@
 //! The board's answer where the sun is and how a person's shadow lies, and the same calculation on this computer.
 
-use chrono::{DateTime, Utc};
+use chrono::DateTime;
 use farnear_protocol::message::{
     QueryDeviations, ShadowAnswer, ShadowQuery, ShadowReliability, SunAnswer, SunQuery,
 };
-use serde::Serialize;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
 use super::{Rig, RigAddress};
 use crate::{
     context::Context,
     error::{Result, WorkflowError},
+    request::{PathKind, Request, RigRequest},
 };
 
-#[derive(Clone, PartialEq, Debug)]
-pub struct SunSettings {
+/// Ask the board where the sun is and how a person's shadow lies, and compare its answer with this computer's.
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize, JsonSchema)]
+#[cfg_attr(feature = "clap", derive(clap::Args))]
+#[cfg_attr(
+    feature = "clap",
+    command(
+        after_help = "Example: farnear rig sun --port sim --lat 52.38 --lon -1.56 --time 2012-07-17T12:00:00Z --azimuth 135"
+    )
+)]
+#[serde(default)]
+pub struct SunRequest {
+    /// Set by the caller.
+    #[serde(skip)]
+    #[cfg_attr(feature = "clap", arg(skip))]
     pub rig: RigAddress,
     /// Latitude in degrees, north positive.
-    pub latitude_deg: f64,
+    #[cfg_attr(feature = "clap", arg(long, value_name = "DEG", allow_negative_numbers = true))]
+    pub lat: f64,
     /// Longitude in degrees, east positive.
-    pub longitude_deg: f64,
-    pub time: DateTime<Utc>,
-    pub shadow: Option<Person>,
+    #[cfg_attr(feature = "clap", arg(long, value_name = "DEG", allow_negative_numbers = true))]
+    pub lon: f64,
+    /// The time, RFC 3339.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "RFC3339"))]
+    pub time: String,
+    /// Camera azimuth, ANTICLOCKWISE from north: with it the board computes a shadow.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "DEG", allow_negative_numbers = true))]
+    pub azimuth: Option<f64>,
+    /// Height of the lens above the ground.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "M", default_value_t = Self::default().camera_height))]
+    pub camera_height: f64,
+    /// Distance of the person along the optical axis.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "M", default_value_t = Self::default().distance))]
+    pub distance: f64,
+    /// Distance of the person from the optical axis, right positive.
+    #[cfg_attr(
+        feature = "clap",
+        arg(long, value_name = "M", default_value_t = Self::default().lateral, allow_negative_numbers = true)
+    )]
+    pub lateral: f64,
+    /// Height of the person.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "M", default_value_t = Self::default().height))]
+    pub height: f64,
 }
 
-/// A person before the camera.
-#[derive(Clone, Copy, PartialEq, Debug)]
-pub struct Person {
-    /// Where the camera looks, ANTICLOCKWISE from north.
-    pub camera_azimuth_deg: f64,
-    /// Height of the lens above the ground.
-    pub camera_height_m: f64,
-    /// Distance of the person along the optical axis.
-    pub distance_m: f64,
-    /// Distance of the person from the optical axis, right positive.
-    pub lateral_m: f64,
-    /// Height of the person.
-    pub height_m: f64,
+impl Default for SunRequest {
+    fn default() -> Self {
+        Self {
+            rig: RigAddress::default(),
+            lat: 0.0,
+            lon: 0.0,
+            time: String::new(),
+            azimuth: None,
+            camera_height: 1.5,
+            distance: 8.0,
+            lateral: 0.0,
+            height: 1.75,
+        }
+    }
+}
+
+impl Request for SunRequest {
+    const NAME: &'static str = "rig sun";
+    const REQUIRED: &'static [&'static str] = &["lat", "lon", "time"];
+    const PATHS: &'static [(&'static str, PathKind)] = &[];
+    type Figures = BoardSunFigures;
+
+    fn run(&self, context: &Context<'_>) -> Result<BoardSunFigures> {
+        sun(self, context)
+    }
+
+    fn verdict(figures: &BoardSunFigures) -> Result<()> {
+        figures.check()
+    }
+}
+
+impl RigRequest for SunRequest {
+    fn set_rig(&mut self, rig: RigAddress) {
+        self.rig = rig;
+    }
 }
 
 /// Where the sun is and how the shadow lies.
@@ -81,7 +138,10 @@ impl BoardSunFigures {
 }
 
 /// Asks the board, and calculates the same here.
-pub fn sun(settings: &SunSettings, context: &Context<'_>) -> Result<BoardSunFigures> {
+///
+/// # Errors
+/// [`WorkflowError::Parameter`] for places and lengths that cannot be, the rig.
+pub fn sun(settings: &SunRequest, context: &Context<'_>) -> Result<BoardSunFigures> {
     let query = query(settings)?;
     let rig = Rig::connect(&settings.rig, None, context)?;
     let board = rig.client.sun(&query)?;
@@ -119,21 +179,25 @@ fn shadow_name(shadow: ShadowAnswer) -> &'static str {
     }
 }
 
-fn query(settings: &SunSettings) -> Result<SunQuery> {
-    let shadow = settings.shadow.map(|person| -> Result<ShadowQuery> {
+fn query(settings: &SunRequest) -> Result<SunQuery> {
+    let time = DateTime::parse_from_rfc3339(&settings.time).map_err(|_| {
+        let expected = "expected an RFC 3339 time such as 2012-07-17T12:00:00Z";
+        WorkflowError::parameter("time", format!("`{}`", settings.time), expected)
+    })?;
+    let shadow = settings.azimuth.map(|azimuth_deg| -> Result<ShadowQuery> {
         Ok(ShadowQuery {
-            azimuth_e7: degrees_e7("azimuth", person.camera_azimuth_deg, 180.0)?,
-            camera_height_mm: length_mm("camera-height", person.camera_height_m)?,
-            distance_mm: length_mm("distance", person.distance_m)?,
-            lateral_mm: millimetres("lateral", person.lateral_m)?,
-            height_mm: length_mm("height", person.height_m)?,
+            azimuth_e7: degrees_e7("azimuth", azimuth_deg, 180.0)?,
+            camera_height_mm: length_mm("camera-height", settings.camera_height)?,
+            distance_mm: length_mm("distance", settings.distance)?,
+            lateral_mm: millimetres("lateral", settings.lateral)?,
+            height_mm: length_mm("height", settings.height)?,
             deviations: USUAL,
         })
     });
     Ok(SunQuery {
-        unix_seconds: settings.time.timestamp(),
-        latitude_e7: degrees_e7("lat", settings.latitude_deg, 90.0)?,
-        longitude_e7: degrees_e7("lon", settings.longitude_deg, 180.0)?,
+        unix_seconds: time.timestamp(),
+        latitude_e7: degrees_e7("lat", settings.lat, 90.0)?,
+        longitude_e7: degrees_e7("lon", settings.lon, 180.0)?,
         shadow: shadow.transpose()?,
     })
 }
@@ -191,29 +255,23 @@ fn bits(answer: &SunAnswer) -> [u32; 7] {
 mod tests {
     use super::*;
 
-    fn settings(latitude_deg: f64, shadow: Option<Person>) -> SunSettings {
-        let time = DateTime::from_timestamp(1_342_526_400, 0).unwrap();
-        let rig = RigAddress::Port("none".into());
-        SunSettings { rig, latitude_deg, longitude_deg: -1.56, time, shadow }
+    fn settings(lat: f64) -> SunRequest {
+        SunRequest { lat, lon: -1.56, time: "2012-07-17T12:00:00Z".into(), ..SunRequest::default() }
     }
 
     #[test]
-    fn places_and_lengths_are_checked_before_the_board_is_asked() {
-        let person = Person {
-            camera_azimuth_deg: 135.0,
-            camera_height_m: 1.5,
-            distance_m: 8.0,
-            lateral_m: -0.5,
-            height_m: 1.75,
-        };
-        let asked = query(&settings(52.38, Some(person))).unwrap();
+    fn places_times_and_lengths_are_checked_before_the_board_is_asked() {
+        let person = SunRequest { azimuth: Some(135.0), lateral: -0.5, ..settings(52.38) };
+        let asked = query(&person).unwrap();
         assert_eq!((asked.latitude_e7, asked.longitude_e7), (523_800_000, -15_600_000));
+        assert_eq!((asked.unix_seconds, query(&settings(0.0)).unwrap().shadow), (1_342_526_400, None));
         assert_eq!(asked.shadow.map(|shadow| shadow.lateral_mm), Some(-500));
         for (settings, name) in [
-            (settings(91.0, None), "lat 91"),
-            (settings(f64::NAN, None), "lat NaN"),
-            (settings(0.0, Some(Person { height_m: -1.0, ..person })), "height -1"),
-            (settings(0.0, Some(Person { lateral_m: 1e9, ..person })), "lateral 1000000000"),
+            (settings(91.0), "lat 91"),
+            (settings(f64::NAN), "lat NaN"),
+            (SunRequest { time: "noon".into(), ..settings(0.0) }, "time `noon`"),
+            (SunRequest { height: -1.0, ..person.clone() }, "height -1"),
+            (SunRequest { lateral: 1e9, ..person }, "lateral 1000000000"),
         ] {
             let error = query(&settings).unwrap_err();
             assert!(error.is_usage() && error.to_string().starts_with(name), "{error}");

@@ -14,6 +14,7 @@ use farnear_depth::{
 };
 use farnear_files::{npy, staging};
 use ndarray::Array2;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::{
@@ -27,6 +28,7 @@ use crate::{
     figures::rounded,
     operators,
     optics::GivenOptics,
+    request::{CameraRequest, PathKind, Request, RigRequest},
     text_file,
 };
 
@@ -35,17 +37,64 @@ const LIST: &str = "PATTERNS.toml";
 /// Targets of a series where none are named.
 const USUAL_TARGETS: usize = 24;
 
-#[derive(Clone, PartialEq, Debug)]
-pub struct TargetSettings {
+/// Capture a flat target at known distances, compute the depth maps, and list them for `farnear calibrate correction`.
+///
+/// Asks for the target to be placed at each distance. An interrupted series continues if it is started again with the same folder. The
+/// emulated rig places its target automatically.
+#[derive(Clone, PartialEq, Debug, Default, Serialize, Deserialize, JsonSchema)]
+#[cfg_attr(feature = "clap", derive(clap::Args))]
+#[cfg_attr(
+    feature = "clap",
+    command(
+        after_help = "Example: farnear rig calibrate targets --port sim --optics optics.toml --distances 890,900,910,920,930 --out series/"
+    )
+)]
+#[serde(default)]
+pub struct TargetSeriesRequest {
+    /// Set by the caller.
+    #[serde(skip)]
+    #[cfg_attr(feature = "clap", arg(skip))]
     pub rig: RigAddress,
+    /// Set by the caller.
+    #[serde(skip)]
+    #[cfg_attr(feature = "clap", arg(skip))]
     pub camera: CameraSettings,
+    /// The optics file.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "FILE"))]
     pub optics: PathBuf,
-    /// Distances of the target from the lens; by default 24 through the working range.
-    pub distances_mm: Vec<f64>,
-    /// Whether a person places the target and is prompted; otherwise it moves automatically.
-    pub ask: bool,
+    /// Distances of the target from the lens in mm [default: 24 through the working range].
+    #[cfg_attr(feature = "clap", arg(long, value_name = "MM,...", value_delimiter = ','))]
+    pub distances: Vec<f64>,
+    /// Do not wait for Enter: the target moves automatically, or the distances do not matter.
+    #[cfg_attr(feature = "clap", arg(long))]
+    pub no_prompt: bool,
     /// Folder of the series.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "DIR"))]
     pub out: PathBuf,
+}
+
+impl Request for TargetSeriesRequest {
+    const NAME: &'static str = "rig calibrate targets";
+    const REQUIRED: &'static [&'static str] = &["optics", "out"];
+    const PATHS: &'static [(&'static str, PathKind)] =
+        &[("optics", PathKind::Input), ("out", PathKind::OutputFolder)];
+    type Figures = TargetFigures;
+
+    fn run(&self, context: &Context<'_>) -> Result<TargetFigures> {
+        capture(self, context)
+    }
+}
+
+impl RigRequest for TargetSeriesRequest {
+    fn set_rig(&mut self, rig: RigAddress) {
+        self.rig = rig;
+    }
+}
+
+impl CameraRequest for TargetSeriesRequest {
+    fn set_camera(&mut self, camera: CameraSettings) {
+        self.camera = camera;
+    }
 }
 
 /// What there is to say of a series.
@@ -75,10 +124,13 @@ struct Entry {
 /// Captures a flat target at each distance, computes the depth maps and lists them. A series that was broken off continues
 /// where it stood when it is started again with the same folder. A real rig stays connected, an emulated one is started
 /// before each target.
-pub fn capture(settings: &TargetSettings, context: &Context<'_>) -> Result<TargetFigures> {
+///
+/// # Errors
+/// Optics, distances, camera, folder, rig, in this order; [`WorkflowError::Unanswered`] where nobody places the target.
+pub fn capture(settings: &TargetSeriesRequest, context: &Context<'_>) -> Result<TargetFigures> {
     let optics = GivenOptics::read(&settings.optics)?;
     let operators = operators::find(None, &optics.optics)?;
-    let distances_mm = distances(&settings.distances_mm, &optics.optics)?;
+    let distances_mm = distances(&settings.distances, &optics.optics)?;
     let early = settings.camera.open_early(&settings.rig)?;
     fs::create_dir_all(&settings.out)
         .map_err(|source| WorkflowError::Folder { folder: settings.out.clone(), source })?;
@@ -118,7 +170,7 @@ pub fn capture(settings: &TargetSettings, context: &Context<'_>) -> Result<Targe
 }
 
 struct Series<'a> {
-    settings: &'a TargetSettings,
+    settings: &'a TargetSeriesRequest,
     optics: &'a GivenOptics,
     operators: &'a Operators,
     context: &'a Context<'a>,
@@ -137,7 +189,7 @@ impl Series<'_> {
             "place the flat target {true_mm} mm before the lens ({} of {count}), square to it",
             number + 1
         );
-        if !self.settings.ask {
+        if self.settings.no_prompt {
             self.context.info(&place);
             return Ok(());
         }

@@ -17,7 +17,8 @@ use farnear_silhouettes::mask::{
     Mask,
     subject::{Flag, SubjectChooser, SubjectSettings},
 };
-use serde::Serialize;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
 use super::stages::{Stage, Stages};
 use crate::{
@@ -26,6 +27,7 @@ use crate::{
     error::{About, Result, WorkflowError},
     figures::rounded,
     parameters::within,
+    request::{PathKind, Request},
     sun::Moment,
 };
 
@@ -35,27 +37,114 @@ pub const CAMERA_FILE: &str = "the camera file";
 /// Above this share of a silhouette removed the cut is doubted, 0 to 1.
 const MUCH: f64 = 0.6;
 
-/// What shadow is taken off, and where to.
-#[derive(Clone, PartialEq, Debug)]
-pub struct RemovalSettings {
+/// Remove a person's shadow from masks, from the pose of the camera and the place of the sun, of a lamp, or a measured direction.
+///
+/// The camera file has the camera's pose:
+///
+///     [camera]
+///     height_m = 0.8              # lens above the ground
+///     azimuth_deg = 140.0         # viewing direction, anticlockwise from north
+///     pitch_deg = 0.0             # downwards positive
+///     focal_length_mm = 4.0
+///     pixel_um = 6.0
+///     width_px = 640
+///     height_px = 480
+///
+/// and, in tables `subject` (height_m = 1.75, head_width_m = 0.17; optionally distance_m) and `standard_deviations`, values other
+/// than the defaults. `shadow.toml` next to the masks flags doubtful frames: no person or several, the shadow behind the person or
+/// cut off by the lower edge of the picture, much removed, an uncertain angle.
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize, JsonSchema)]
+#[cfg_attr(feature = "clap", derive(clap::Args))]
+#[cfg_attr(
+    feature = "clap",
+    command(
+        verbatim_doc_comment,
+        after_help = "Example: farnear shadow remove masks/ --camera camera.toml --time 2014-06-23T11:30:00Z --lat 52.38 \
+                      --lon -1.56 --out clean/"
+    )
+)]
+#[serde(default)]
+pub struct ShadowRemoveRequest {
     /// Masks of a person with their shadow: a folder of pictures or one picture, full frames.
     pub masks: PathBuf,
-    /// How the camera stands, TOML.
+    /// Pose of the camera, TOML.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "FILE"))]
     pub camera: PathBuf,
-    pub light: LightSource,
-    /// How shadow is cut off.
+    /// Latitude in degrees, north positive; with --lon and --time the light is the sun.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "DEG", allow_negative_numbers = true))]
+    pub lat: Option<f64>,
+    /// Longitude in degrees, east positive.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "DEG", allow_negative_numbers = true))]
+    pub lon: Option<f64>,
+    /// Time with its zone (RFC 3339), such as 2014-06-23T12:30:00+01:00.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "RFC3339"))]
+    pub time: Option<String>,
+    /// A lamp instead of the sun: its place in metres to the right, ahead and up from the ground below the lens.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "RIGHT,AHEAD,UP", allow_hyphen_values = true))]
+    pub lamp: Option<String>,
+    /// Direction of the shadow measured in the picture instead, in degrees from right (0) towards down (90).
+    #[cfg_attr(feature = "clap", arg(long, value_name = "DEG", allow_negative_numbers = true))]
+    pub shadow_direction: Option<f64>,
+    /// Masks per second: `--time` is that of the first mask, and the sun moves.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "HZ"))]
+    pub rate_hz: Option<f64>,
+    /// hybrid, or thesis (as printed in Li 2014).
+    #[cfg_attr(feature = "clap", arg(long, default_value_t = Self::default().method))]
+    #[schemars(with = "String")]
     pub method: Method,
-    /// The new folder for the masks without shadow.
+    /// Folder for the masks without shadow; must not exist or be empty.
+    #[cfg_attr(feature = "clap", arg(long))]
     pub out: PathBuf,
-    /// A new folder for a picture of each cut, next to `out`.
+    /// Folder for a picture of each cut: the mask, its lower edge along the turned axis, the expected shadow and its
+    /// uncertainty, body and shadow, and the removed part; must not exist or be empty.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "DIR"))]
     pub stages: Option<PathBuf>,
 }
 
-/// What throws the shadow.
+impl Default for ShadowRemoveRequest {
+    fn default() -> Self {
+        Self {
+            masks: PathBuf::new(),
+            camera: PathBuf::new(),
+            lat: None,
+            lon: None,
+            time: None,
+            lamp: None,
+            shadow_direction: None,
+            rate_hz: None,
+            method: Method::default(),
+            out: PathBuf::new(),
+            stages: None,
+        }
+    }
+}
+
+impl Request for ShadowRemoveRequest {
+    const NAME: &'static str = "shadow remove";
+    const REQUIRED: &'static [&'static str] = &["masks", "camera", "out"];
+    const PATHS: &'static [(&'static str, PathKind)] = &[
+        ("masks", PathKind::Input),
+        ("camera", PathKind::Input),
+        ("out", PathKind::OutputFolder),
+        ("stages", PathKind::OutputFolder),
+    ];
+    type Figures = RemovalFigures;
+
+    fn check(&self) -> Result<()> {
+        self.light()?.check()?;
+        self.check_folders()
+    }
+
+    fn run(&self, context: &Context<'_>) -> Result<RemovalFigures> {
+        remove_from_masks(self, context)
+    }
+}
+
+/// Light that casts the shadow.
 #[derive(Clone, Copy, PartialEq, Debug)]
-pub enum LightSource {
+enum LightSource {
     Sun {
-        /// Where the camera stands, and the first mask's time.
+        /// Place of the camera and time of the first mask.
         moment: Moment,
         /// Masks per second, 0.001 to a million; without it all have one time.
         rate_hz: Option<f64>,
@@ -135,12 +224,12 @@ struct Cut {
 /// # Errors
 /// Missing or wrong camera files and masks, a sun too low for shadows, masks that cannot be written; then the new folder is
 /// not there.
-pub fn remove_from_masks(settings: &RemovalSettings, context: &Context<'_>) -> Result<RemovalFigures> {
+pub fn remove_from_masks(request: &ShadowRemoveRequest, context: &Context<'_>) -> Result<RemovalFigures> {
     let start = Instant::now();
-    settings.light.check()?;
-    settings.check_folders()?;
-    let camera = camera(&settings.camera)?;
-    let (light, _) = settings.light.at(0)?;
+    request.check()?;
+    let camera = camera(&request.camera)?;
+    let source = request.light()?;
+    let (light, _) = source.at(0)?;
     // Before any mask is read: without a usable light there is nothing to do.
     light.check(camera.subject.height_m, &camera.camera)?;
     let sun = sun_of(light, &camera);
@@ -149,13 +238,20 @@ pub fn remove_from_masks(settings: &RemovalSettings, context: &Context<'_>) -> R
             "the camera looks into the sun (elevation {elevation_deg:.1} deg): expect glare in the masks and shadows that come straight at it"
         ));
     }
-    let masks::Masks { named: all, remark } = masks::read_all(&settings.masks)?;
+    let masks::Masks { named: all, remark } = masks::read_all(&request.masks)?;
     if let Some(remark) = remark {
-        context.progress.warn(&format!("{}: {remark}", settings.masks.display()));
+        context.progress.warn(&format!("{}: {remark}", request.masks.display()));
     }
-    let out = Staging::new_folder(&settings.out)?;
-    let stages = settings.stages.as_deref().map(Stages::begin).transpose()?;
-    let mut work = Work { settings, camera: &camera, chooser: None, stages, cut_seconds: 0.0 };
+    let out = Staging::new_folder(&request.out)?;
+    let stages = request.stages.as_deref().map(Stages::begin).transpose()?;
+    let mut work = Work {
+        light: source,
+        method: request.method,
+        camera: &camera,
+        chooser: None,
+        stages,
+        cut_seconds: 0.0,
+    };
     let mut index = Index { sun, frame: Vec::with_capacity(all.len()) };
     let counter = Counter::new(context, "masks");
     for (number, named) in all.iter().enumerate() {
@@ -168,8 +264,8 @@ pub fn remove_from_masks(settings: &RemovalSettings, context: &Context<'_>) -> R
     }
     out.write("shadow.toml", toml::to_string(&index)?.as_bytes())?;
     out.finish()?;
-    context.info(&format!("wrote {}", settings.out.display()));
-    if let (Some(stages), Some(folder)) = (work.stages.take(), &settings.stages) {
+    context.info(&format!("wrote {}", request.out.display()));
+    if let (Some(stages), Some(folder)) = (work.stages.take(), &request.stages) {
         stages.finish()?;
         context.info(&format!("wrote {}", folder.display()));
     }
@@ -190,10 +286,8 @@ pub fn remove_from_masks(settings: &RemovalSettings, context: &Context<'_>) -> R
     })
 }
 
-/// A lamp's place, `RIGHT,AHEAD,UP` in metres from the ground below the lens.
-///
-/// # Errors
-pub fn parse_lamp(text: &str) -> Result<Lamp, String> {
+/// Place of a lamp, `RIGHT,AHEAD,UP` in metres from the ground below the lens.
+fn parse_lamp(text: &str) -> Result<Lamp, String> {
     let numbers: Vec<f64> = text.split(',').filter_map(|part| part.trim().parse().ok()).collect();
     let [right_m, ahead_m, up_m] = numbers[..] else {
         return Err(
@@ -212,8 +306,34 @@ fn sun_of(light: Light, camera: &CameraFile) -> Option<Sun> {
     })
 }
 
-impl RemovalSettings {
-    /// Of two new folders none may lie in the other: each appears at once, when it is whole.
+impl ShadowRemoveRequest {
+    fn light(&self) -> Result<LightSource> {
+        let given = [
+            ("lat, lon and time", self.lat.is_some() || self.lon.is_some() || self.time.is_some()),
+            ("lamp", self.lamp.is_some()),
+            ("shadow_direction", self.shadow_direction.is_some()),
+        ];
+        let names: Vec<&str> = given.iter().filter_map(|(name, given)| given.then_some(*name)).collect();
+        let expected = "expected one of: lat, lon and time (the sun), lamp, shadow_direction";
+        let wrong = |names: &str| WorkflowError::parameter("light", names, expected);
+        if let (Some(rate_hz), false) = (self.rate_hz, names == ["lat, lon and time"]) {
+            let expected = "it moves the sun: expected lat, lon and time";
+            return Err(WorkflowError::parameter("rate_hz", rate_hz, expected));
+        }
+        match (names.as_slice(), self.lat, self.lon, &self.time, &self.lamp, self.shadow_direction) {
+            ([_], Some(lat), Some(lon), Some(time), ..) => {
+                Ok(LightSource::Sun { moment: Moment::new(lat, lon, time)?, rate_hz: self.rate_hz })
+            }
+            ([_], .., Some(lamp), _) => parse_lamp(lamp)
+                .map(LightSource::Lamp)
+                .map_err(|expected| WorkflowError::parameter("lamp", lamp, expected)),
+            ([_], .., Some(degrees)) => Ok(LightSource::Direction { degrees }),
+            ([], ..) => Err(wrong("none")),
+            (names, ..) => Err(wrong(&names.join(" and "))),
+        }
+    }
+
+    /// Neither of the two new folders may contain the other, because each appears when it is complete.
     fn check_folders(&self) -> Result<()> {
         let Some(stages) = &self.stages else { return Ok(()) };
         if stages.starts_with(&self.out) || self.out.starts_with(stages) {
@@ -264,7 +384,8 @@ fn camera(path: &Path) -> Result<CameraFile> {
 
 /// State carried from frame to frame.
 struct Work<'a> {
-    settings: &'a RemovalSettings,
+    light: LightSource,
+    method: Method,
     camera: &'a CameraFile,
     chooser: Option<SubjectChooser>,
     stages: Option<Stages>,
@@ -280,7 +401,7 @@ impl Work<'_> {
         let several = chosen.flags.iter().any(|flag| matches!(flag, Flag::SeveralPeople { .. }));
         // With several people in it, what is cut for one would be cut off the others.
         let mask = if several { &chosen.mask } else { mask };
-        let (light, moment) = self.settings.light.at(number)?;
+        let (light, moment) = self.light.at(number)?;
         let start = Instant::now();
         let subject = match subject_of(mask, self.camera) {
             Ok(subject) => subject,
@@ -301,10 +422,10 @@ impl Work<'_> {
             None => None,
         };
         let sd_rad = sure.map_or(0.0, |sure| sure.beta_rad);
-        let (clean, cut) = remove(mask, self.camera, light, sd_rad, self.settings.method)?;
+        let (clean, cut) = remove(mask, self.camera, light, sd_rad, self.method)?;
         self.cut_seconds += start.elapsed().as_secs_f64();
         if let Some(stages) = &mut self.stages {
-            let (camera, method) = (self.camera, self.settings.method);
+            let (camera, method) = (self.camera, self.method);
             let stage =
                 Stage { mask, clean: &clean, camera, light, method, report: &cut, sure: sure.as_ref() };
             stages.draw(&file, stage)?;

@@ -13,24 +13,48 @@ use farnear_files::{
 };
 use farnear_shadow::score::{ShadowScore, Truth};
 use ndarray::{Array2, Zip};
-use serde::Serialize;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
 use crate::{
     context::Context,
     error::{About, Result},
     figures::rounded,
+    request::{PathKind, Request},
 };
 
-#[derive(Clone, PartialEq, Eq, Debug)]
-pub struct ScoreSettings {
-    /// Masks after the removal: a picture or a folder. Frames of two folders belong together by name, else by the number
-    /// that their names end in.
+/// Scores shadow removal against a ground truth, over one mask or a folder of them.
+///
+/// Truth pictures are grey: 0 background, 50 (or 127) shadow, 255 person, 85 and 170 not judged. Masks are set from 128 on.
+/// Frames of two folders belong together by name, else by the number that their names end in.
+#[derive(Clone, Default, PartialEq, Eq, Debug, Serialize, Deserialize, JsonSchema)]
+#[cfg_attr(feature = "clap", derive(clap::Args))]
+#[cfg_attr(
+    feature = "clap",
+    command(after_help = "Example: farnear shadow score masks/ truth/ --before raw-masks/ --json")
+)]
+#[serde(default)]
+pub struct ShadowScoreRequest {
+    /// Masks after the removal: a picture or a folder.
     pub masks: PathBuf,
     /// The truth: a picture or a folder.
     pub truth: PathBuf,
-    /// Masks before the removal: then only pixels that were in them count as removed. Where the truth holds no shadow at
-    /// all, everything in these except the person counts as shadow.
+    /// Masks before the removal. Then only pixels that were in them count as removed; without, all shadow that is not in
+    /// the masks does. If the truth has no shadow, everything in these masks except the person counts as shadow.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "MASKS"))]
     pub before: Option<PathBuf>,
+}
+
+impl Request for ShadowScoreRequest {
+    const NAME: &'static str = "shadow score";
+    const REQUIRED: &'static [&'static str] = &["masks", "truth"];
+    const PATHS: &'static [(&'static str, PathKind)] =
+        &[("masks", PathKind::Input), ("truth", PathKind::Input), ("before", PathKind::Input)];
+    type Figures = ScoreFigures;
+
+    fn run(&self, context: &Context<'_>) -> Result<ScoreFigures> {
+        score(self, context)
+    }
 }
 
 /// The figures, summed over all frames; without a value where there is nothing to count.
@@ -92,7 +116,7 @@ pub enum ScoreError {
 ///
 /// # Errors
 /// Where pictures cannot be read, do not belong together or differ in size, or the truth holds a level without a meaning.
-pub fn score(settings: &ScoreSettings, context: &Context<'_>) -> Result<ScoreFigures> {
+pub fn score(settings: &ShadowScoreRequest, context: &Context<'_>) -> Result<ScoreFigures> {
     let truths = listed(&settings.truth)?;
     let masks = Partners::new(&settings.masks, truths.len())?;
     let before = settings.before.as_deref().map(|path| Partners::new(path, truths.len())).transpose()?;

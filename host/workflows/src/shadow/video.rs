@@ -7,19 +7,18 @@ use farnear_files::{
     staging,
     video::{Video, VideoError},
 };
-use farnear_shadow::{CameraFile, Method};
-use farnear_silhouettes::{background, mask::extractor::Learning};
+use farnear_shadow::CameraFile;
+use farnear_silhouettes::background;
 use serde::Serialize;
 
-use super::removal::{self, LightSource, RemovalFigures, RemovalSettings};
+use super::removal::{self, RemovalFigures, ShadowRemoveRequest};
 use crate::{
     context::Context,
     error::{About, Result, WorkflowError},
     silhouettes::{
         frame_of,
-        video::{self, ShadowTreatment, VideoSettings},
+        video::{self, SilhouettesVideoRequest},
     },
-    sun::Moment,
 };
 
 /// The folder of masks in which the shadow still is.
@@ -32,10 +31,12 @@ pub struct VideoShadowSettings {
     pub video: PathBuf,
     /// How the camera stands; the size of its pictures is the video's.
     pub camera: CameraFile,
-    /// Where, and when the video begins.
-    pub moment: Moment,
-    /// Frames per second, where the time is to pass.
-    pub rate_hz: Option<f64>,
+    /// Latitude in degrees, north positive.
+    pub lat: f64,
+    /// Longitude in degrees, east positive.
+    pub lon: f64,
+    /// Time of the video, RFC 3339.
+    pub time: String,
     pub out: PathBuf,
 }
 
@@ -71,27 +72,25 @@ pub fn remove_from_video(
     let file = settings.out.join("camera.toml");
     staging::write_file(&file, text.as_bytes())?;
     let (with, without) = (settings.out.join(WITH), settings.out.join(WITHOUT));
-    let masks = VideoSettings {
+    let masks = SilhouettesVideoRequest {
         video: settings.video.clone(),
         out: with.clone(),
         learn_first: true,
         learning_frames: 0,
         history_frames: background::Settings::default().history_frames,
-        learning: Learning::default(),
-        shadow: ShadowTreatment::Keep,
-        centred: false,
-        labels: None,
-        grey: false,
+        keep_shadow: true,
+        ..SilhouettesVideoRequest::default()
     };
     let made = video::extract(&masks, context)?;
     let removal = removal::remove_from_masks(
-        &RemovalSettings {
+        &ShadowRemoveRequest {
             masks: with.clone(),
             camera: file,
-            light: LightSource::Sun { moment: settings.moment, rate_hz: settings.rate_hz },
-            method: Method::default(),
+            lat: Some(settings.lat),
+            lon: Some(settings.lon),
+            time: Some(settings.time.clone()),
             out: without,
-            stages: None,
+            ..ShadowRemoveRequest::default()
         },
         context,
     )?;

@@ -17,7 +17,7 @@ use farnear_recognition::clip::Track;
 use farnear_silhouettes::mask::Mask;
 use farnear_silhouettes::readers::{
     self,
-    recording::{Choices, Recording},
+    recording::{Choices, Recording, Unit, Up},
 };
 use farnear_silhouettes::silhouette::{
     capsule::Point3,
@@ -25,7 +25,9 @@ use farnear_silhouettes::silhouette::{
     template::Template,
     view::{Canvas, View, views_round},
 };
-use serde::Serialize;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use serde_with::{DisplayFromStr, serde_as};
 
 use self::{drawing::Job, missing::MissingParts};
 use super::{MM_PER_PX, SilhouettesError, VIEWS, performances::samples_entry};
@@ -35,48 +37,122 @@ use crate::{
     error::{Result, WorkflowError},
     figures::rounded,
     parameters::{at_least, within},
+    request::{PathKind, Request},
 };
 
-#[derive(Clone, Debug)]
-pub struct MarkersSettings {
-    /// The recording; its ending determines the format.
+/// Silhouettes of a motion-capture recording (C3D, TRC, CSV, BVH, NTU or Kinect joints, keypoints) from views at equal steps round
+/// the subject.
+///
+/// A template says which markers make which part of the body; parts are filled and the gaps between them closed. Every view
+/// gets a folder `view1`, `view2`, ... of masks, one PNG per frame, all on one canvas so that the subject moves in it as in a
+/// camera's picture. `silhouettes.toml` flags frames in which a part had no visible marker.
+#[serde_as]
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize, JsonSchema)]
+#[cfg_attr(feature = "clap", derive(clap::Args))]
+#[cfg_attr(
+    feature = "clap",
+    command(
+        after_help = "Example: farnear silhouettes markers walk.c3d --template plug-in-gait --views 8 --out masks/"
+    )
+)]
+#[serde(default)]
+pub struct MarkersRequest {
+    /// The recording: .c3d, .trc, .bvh, .skeleton (NTU RGB+D), .txt (20 or 25 Kinect joints a line), .csv with columns NAME_x,
+    /// NAME_y, NAME_z in mm, .npz with joint positions of an SMPL body, or 2-D keypoints: .json of OpenPose, COCO, HALPE or
+    /// MediaPipe, or a folder of such files, a frame each. Keypoints have one view.
     pub file: PathBuf,
-    /// Unit and upward axis, to override the file.
-    pub choices: Choices,
-    /// A built-in template's name, or a TOML file; without it the built-in one that fits best.
+    /// plug-in-gait (also CMU's 41 markers), vicon-53, opencap, thesis, bvh, kinect, keypoints, or a TOML file of `[[part]] name,
+    /// markers, thickness_mm` [default: the one of these that fits best, which is reported].
+    #[cfg_attr(feature = "clap", arg(long, value_name = "NAME|FILE"))]
     pub template: Option<String>,
+    /// Folder for the masks; must not exist or be empty.
+    #[cfg_attr(feature = "clap", arg(long))]
     pub out: PathBuf,
     /// Views at equal steps round the subject, 1 to 72.
+    #[cfg_attr(feature = "clap", arg(long, default_value_t = Self::default().views))]
     pub views: usize,
     /// Direction of the first view, degrees round the vertical.
+    #[cfg_attr(
+        feature = "clap",
+        arg(long, default_value_t = Self::default().first_view_deg, allow_negative_numbers = true)
+    )]
     pub first_view_deg: f64,
-    /// From how high the views look down, -90 to 90 degrees.
+    /// Angle from which the views look down, -90 to 90 degrees.
+    #[cfg_attr(
+        feature = "clap",
+        arg(long, default_value_t = Self::default().elevation_deg, allow_negative_numbers = true)
+    )]
     pub elevation_deg: f64,
-    /// Scale, mm per px, 0.1 to 1000.
+    /// Millimetres per pixel, 0.1 to 1000 (6 is the thesis' 167 pixels per metre).
+    #[cfg_attr(feature = "clap", arg(long, default_value_t = Self::default().mm_per_px))]
     pub mm_per_px: f64,
-    /// Gaps at joints up to this width are closed, 0 to 1000 mm; without it 126 as in the thesis, or 40 where the template's
-    /// parts have a thickness, which fills joints by itself.
+    /// Close gaps at joints up to this width, 0 to 1000 millimetres [default: 126 as in the thesis, 40 where the parts of the
+    /// template have a thickness, which fills joints].
+    #[cfg_attr(feature = "clap", arg(long, value_name = "MM"))]
     pub close_mm: Option<f64>,
-    /// How parts are filled.
+    /// Fill the convex hull of a part (hull), or all triplets of its markers as in the thesis (triplets: the same picture, slower).
+    #[cfg_attr(feature = "clap", arg(long, default_value_t = Self::default().fill))]
+    #[schemars(with = "String")]
     pub fill: Fill,
-    /// Take every so-many-th frame.
+    /// Use every nth frame.
+    #[cfg_attr(feature = "clap", arg(long, default_value_t = Self::default().every))]
     pub every: usize,
-    /// Masks of 100x100 pixels with the subject centred, instead of full frames.
+    /// Axis of the file that points up: x, y or z [default: y in TRC files, found from the body in BVH files, else z].
+    #[cfg_attr(feature = "clap", arg(long))]
+    #[serde_as(as = "Option<DisplayFromStr>")]
+    pub up: Option<Up>,
+    /// Unit of length: mm, cm, m, in, cmu (56.444 mm) or a number of millimetres, where the file states none (BVH) or a wrong one.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "UNIT"))]
+    #[serde_as(as = "Option<DisplayFromStr>")]
+    pub units: Option<Unit>,
+    /// Person in a file with several, from 1 [default: the one who moves or is visible most].
+    #[cfg_attr(feature = "clap", arg(long, value_name = "NUMBER"))]
+    pub person: Option<usize>,
+    /// Write masks of 100x100 pixels with the subject centred, instead of full frames.
+    #[cfg_attr(feature = "clap", arg(long))]
     pub centred: bool,
-    /// Keep only this many silhouettes of all views, the least alike (Li 2014, eq. 7.3), at 100x100 pixels.
+    /// Keep only this many silhouettes, the least alike of all views (Li 2014, eq. 7.3), at 100x100 pixels: a gallery without order.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "COUNT"))]
     pub keep: Option<usize>,
-    /// Write `samples.toml` too, for training and evaluation: who does what.
-    pub samples: Option<Performer>,
+    /// Also write samples.toml for `farnear activity`, with this activity.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "ACTIVITY"))]
+    pub samples: Option<String>,
+    /// Name of the person in samples.toml [default: the name of the file].
+    #[cfg_attr(feature = "clap", arg(long, value_name = "NAME"))]
+    pub subject: Option<String>,
 }
 
-/// Who does what in a recording.
-#[derive(Clone, PartialEq, Eq, Debug)]
-pub struct Performer {
-    pub subject: String,
-    pub activity: String,
+impl Default for MarkersRequest {
+    fn default() -> Self {
+        Self {
+            file: PathBuf::new(),
+            template: None,
+            out: PathBuf::new(),
+            views: 8,
+            first_view_deg: 0.0,
+            elevation_deg: 0.0,
+            mm_per_px: 6.0,
+            close_mm: None,
+            fill: Fill::default(),
+            every: 1,
+            up: None,
+            units: None,
+            person: None,
+            centred: false,
+            keep: None,
+            samples: None,
+            subject: None,
+        }
+    }
 }
 
-impl MarkersSettings {
+impl Request for MarkersRequest {
+    const NAME: &'static str = "silhouettes markers";
+    const REQUIRED: &'static [&'static str] = &["file", "out"];
+    const PATHS: &'static [(&'static str, PathKind)] =
+        &[("file", PathKind::Input), ("template", PathKind::InputOrName), ("out", PathKind::OutputFolder)];
+    type Figures = MarkersFigures;
+
     fn check(&self) -> Result<()> {
         within("views", self.views, &VIEWS, "")?;
         within("elevation", self.elevation_deg, &(-90.0..=90.0), "deg")?;
@@ -86,10 +162,37 @@ impl MarkersSettings {
         }
         at_least("kept silhouettes", self.keep.unwrap_or(1), 1, "pictures")?;
         if let (Some(keep), Some(_)) = (self.keep, &self.samples) {
-            let expected = "no gallery where samples are asked for: its frames are not in order";
+            let expected = "a gallery has no order: expected no samples with it";
             return Err(WorkflowError::parameter("kept silhouettes", keep, expected));
         }
+        if let (Some(subject), None) = (&self.subject, &self.samples) {
+            let expected = "it is written to samples.toml: expected samples with it";
+            return Err(WorkflowError::parameter("subject", subject, expected));
+        }
         at_least("step between frames", self.every, 1, "frames")
+    }
+
+    fn run(&self, context: &Context<'_>) -> Result<MarkersFigures> {
+        draw(self, context)
+    }
+}
+
+/// Who does what in a recording.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct Performer {
+    pub subject: String,
+    pub activity: String,
+}
+
+impl MarkersRequest {
+    fn choices(&self) -> Choices {
+        Choices { unit: self.units, up: self.up, person: self.person }
+    }
+
+    fn performer(&self) -> Option<Performer> {
+        let stem = || self.file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        let subject = self.subject.clone().unwrap_or_else(stem);
+        self.samples.clone().map(|activity| Performer { activity, subject })
     }
 
     /// A recording from one side has one view, as its camera saw it.
@@ -154,10 +257,10 @@ struct Flagged<'a> {
 /// # Errors
 /// Files that cannot be read or do not fit the template, a subject larger than a picture may be, masks that cannot be
 /// written; then the new folder is not there.
-pub fn draw(settings: &MarkersSettings, context: &Context<'_>) -> Result<MarkersFigures> {
+pub fn draw(settings: &MarkersRequest, context: &Context<'_>) -> Result<MarkersFigures> {
     settings.check()?;
     let start = Instant::now();
-    let recording = recording(&settings.file, settings.choices)?;
+    let recording = recording(&settings.file, settings.choices())?;
     // The name alone: records must not depend on the folder.
     let name = settings.file.file_name().unwrap_or_default().display();
     let template = match &settings.template {
@@ -171,6 +274,9 @@ pub fn draw(settings: &MarkersSettings, context: &Context<'_>) -> Result<Markers
     let warnings: Vec<String> =
         remarks(&recording).into_iter().map(|remark| format!("{name}: {remark}")).collect();
     warnings.iter().for_each(|warning| context.progress.warn(warning));
+    if !warnings.is_empty() {
+        context.info("--units and --up set the unit and the axis where a guess is wrong");
+    }
     let out = Staging::new_folder(&settings.out)?;
     let numbers = || (0..recording.frames.len()).step_by(settings.every);
     let frames: Vec<HashMap<&str, Point3>> = numbers().map(|n| recording.by_name(n)).collect();
@@ -203,7 +309,7 @@ pub fn draw(settings: &MarkersSettings, context: &Context<'_>) -> Result<Markers
         flagged: missing.flagged(&names),
     };
     out.write("silhouettes.toml", toml::to_string(&index)?.as_bytes())?;
-    if let Some(performer) = &settings.samples {
+    if let Some(performer) = &settings.performer() {
         let clip = settings.file.file_stem().unwrap_or_default().to_string_lossy();
         let rows =
             (1..=views.len()).map(|view| samples_entry(&format!("view{view}"), performer, view, &clip));

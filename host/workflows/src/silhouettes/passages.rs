@@ -7,23 +7,74 @@ use farnear_files::{
     staging::Staging,
 };
 use farnear_silhouettes::mask::{Mask, area};
-use serde::Serialize;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
 use super::{SilhouettesError, markers::Performer, performances::samples_entry};
-use crate::{context::Context, counter::Counter, error::Result, figures::rounded, parameters::at_least};
+use crate::{
+    context::Context,
+    counter::Counter,
+    error::Result,
+    figures::rounded,
+    parameters::at_least,
+    request::{PathKind, Request},
+};
 
-#[derive(Clone, PartialEq, Debug)]
-pub struct PassagesSettings {
-    /// The folder of masks, in the order of their names.
+/// Cut a folder of masks into passages: where the numbers in their names leap, and where no person is visible.
+///
+/// Writes a folder of masks for every passage and `samples.toml` for `farnear activity`.
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize, JsonSchema)]
+#[cfg_attr(feature = "clap", derive(clap::Args))]
+#[cfg_attr(
+    feature = "clap",
+    command(
+        after_help = "Example: farnear silhouettes passages kth/person01 --activity walk --subject person01 --out passages/"
+    )
+)]
+#[serde(default)]
+pub struct PassagesRequest {
+    /// The folder of masks: pictures of black and white, JPEG too.
     pub masks: PathBuf,
-    /// The new folder: `passage1`, `passage2`, ... and `samples.toml`.
+    /// The activity in all of them.
+    #[cfg_attr(feature = "clap", arg(long))]
+    pub activity: String,
+    /// The person.
+    #[cfg_attr(feature = "clap", arg(long))]
+    pub subject: String,
+    /// Folder for the passages and samples.toml; must not exist or be empty.
+    #[cfg_attr(feature = "clap", arg(long))]
     pub out: PathBuf,
-    /// Who does what in all of them.
-    pub performer: Performer,
-    /// Shorter passages are left out, frames.
+    /// Leave out shorter passages, frames.
+    #[cfg_attr(feature = "clap", arg(long, default_value_t = Self::default().least_frames))]
     pub least_frames: usize,
-    /// Smallest person, px.
+    /// Ignore fewer pixels.
+    #[cfg_attr(feature = "clap", arg(long, default_value_t = Self::default().least_px))]
     pub least_px: usize,
+}
+
+impl Default for PassagesRequest {
+    fn default() -> Self {
+        Self {
+            masks: PathBuf::new(),
+            activity: String::new(),
+            subject: String::new(),
+            out: PathBuf::new(),
+            least_frames: 20,
+            least_px: 200,
+        }
+    }
+}
+
+impl Request for PassagesRequest {
+    const NAME: &'static str = "silhouettes passages";
+    const REQUIRED: &'static [&'static str] = &["masks", "activity", "subject", "out"];
+    const PATHS: &'static [(&'static str, PathKind)] =
+        &[("masks", PathKind::Input), ("out", PathKind::OutputFolder)];
+    type Figures = PassagesFigures;
+
+    fn run(&self, context: &Context<'_>) -> Result<PassagesFigures> {
+        cut(self, context)
+    }
 }
 
 #[derive(Clone, PartialEq, Debug, Serialize)]
@@ -36,16 +87,17 @@ pub struct PassagesFigures {
     pub seconds: f64,
 }
 
-/// A mask on its way into a passage.
-type Kept = (String, Mask);
+/// A mask with its name.
+type NamedMask = (String, Mask);
 
 /// Cuts at gaps in the numbers of the masks' names, and at frames without a person.
 ///
 /// # Errors
 /// Masks that cannot be read, no passage of enough frames, a folder that cannot be written.
-pub fn cut(settings: &PassagesSettings, context: &Context<'_>) -> Result<PassagesFigures> {
+pub fn cut(settings: &PassagesRequest, context: &Context<'_>) -> Result<PassagesFigures> {
     at_least("frames of a passage", settings.least_frames, 2, "frames")?;
     let start = Instant::now();
+    let performer = Performer { subject: settings.subject.clone(), activity: settings.activity.clone() };
     let out = Staging::new_folder(&settings.out)?;
     let files = masks::listed(&settings.masks)?;
     let levels = masks::levels_of(&files)?;
@@ -54,9 +106,9 @@ pub fn cut(settings: &PassagesSettings, context: &Context<'_>) -> Result<Passage
     }
     let counter = Counter::new(context, "masks");
     let (mut passages, mut too_short) = (Vec::new(), 0);
-    let mut passage: Vec<Kept> = Vec::new();
+    let mut passage: Vec<NamedMask> = Vec::new();
     let (mut last, mut size) = (None, None);
-    let mut end = |passage: &mut Vec<Kept>| {
+    let mut end = |passage: &mut Vec<NamedMask>| {
         let whole = std::mem::take(passage);
         if whole.len() >= settings.least_frames {
             passages.push(whole);
@@ -100,7 +152,7 @@ pub fn cut(settings: &PassagesSettings, context: &Context<'_>) -> Result<Passage
         for (name, mask) in passage {
             out.write(&format!("{folder}/{name}.png"), &masks::png(mask)?)?;
         }
-        samples += &samples_entry(&folder, &settings.performer, 1, &folder);
+        samples += &samples_entry(&folder, &performer, 1, &folder);
     }
     out.write("samples.toml", samples.as_bytes())?;
     out.finish()?;

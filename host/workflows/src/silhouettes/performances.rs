@@ -12,7 +12,8 @@ use farnear_silhouettes::silhouette::{
     view::{Canvas, View, draw, extent, views_round},
 };
 use rayon::prelude::*;
-use serde::Serialize;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
 use super::{MM_PER_PX, SilhouettesError, VIEWS, markers::Performer};
 use crate::{context::Context, counter::Counter, error::Result, figures::rounded, parameters::within};
@@ -22,15 +23,26 @@ const DURING: &str = "drawing performances";
 /// Pixels kept free round a body.
 const MARGIN_PX: usize = 2;
 
-/// How bodies are drawn and where to.
-#[derive(Clone, PartialEq, Debug)]
+// No doc comment: it would replace the help of the commands.
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize, JsonSchema)]
+#[cfg_attr(feature = "clap", derive(clap::Args))]
+#[serde(default)]
 pub struct Drawing {
     /// Views at equal steps round the subject, 1 to 72.
+    #[cfg_attr(feature = "clap", arg(long, default_value_t = Self::default().views))]
     pub views: usize,
-    /// Scale, mm per px, 0.1 to 1000.
+    /// Millimetres per pixel, 0.1 to 1000.
+    #[cfg_attr(feature = "clap", arg(long, default_value_t = Self::default().mm_per_px))]
     pub mm_per_px: f64,
-    /// The new folder of masks and samples.toml.
+    /// Folder for masks and samples.toml; must not exist or be empty.
+    #[cfg_attr(feature = "clap", arg(long))]
     pub out: PathBuf,
+}
+
+impl Default for Drawing {
+    fn default() -> Self {
+        Self { views: 4, mm_per_px: 10.0, out: PathBuf::new() }
+    }
 }
 
 impl Drawing {

@@ -1,10 +1,13 @@
 //! Silhouettes of a data set that has body joints only: joints are dressed with capsules and drawn from views all round.
 
-use std::{fs, path::PathBuf};
+use std::{fmt, fs, path::PathBuf, str::FromStr};
 
 use farnear_silhouettes::readers::skeletons::{
     FLORENCE_15, FLORENCE_ACTIVITIES, KINECT_20, Layout, UTKINECT_ACTIVITIES, dress, read_cells,
 };
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use serde_with::{DisplayFromStr, serde_as};
 
 use super::{
     SilhouettesError,
@@ -13,25 +16,79 @@ use super::{
 use crate::{
     context::Context,
     error::{Result, WorkflowError},
+    request::{PathKind, Request},
 };
 
-#[derive(Clone, PartialEq, Debug)]
-pub struct SkeletonsSettings {
+/// Silhouettes of a data set that has body joints only: joints are dressed with capsules and drawn from views all round.
+///
+/// Writes a folder of masks for every performance and view, and `samples.toml` for `farnear activity`.
+#[serde_as]
+#[derive(Clone, Default, PartialEq, Debug, Serialize, Deserialize, JsonSchema)]
+#[cfg_attr(feature = "clap", derive(clap::Args))]
+#[cfg_attr(
+    feature = "clap",
+    command(
+        after_help = "Example: farnear silhouettes skeletons UTKinect_Skeletons.mat --set utkinect --out people/"
+    )
+)]
+#[serde(default)]
+pub struct SkeletonsRequest {
     /// The joints, a MATLAB 5 file of cells.
     pub file: PathBuf,
-    /// Which data set it is.
+    /// Data set: utkinect (UTKinect-Action3D, 20 joints of a Kinect) or florence (Florence 3D Actions, 15 joints).
+    #[cfg_attr(feature = "clap", arg(long))]
+    #[serde_as(as = "DisplayFromStr")]
     pub set: SkeletonSet,
-    /// How bodies are drawn.
+    #[cfg_attr(feature = "clap", command(flatten))]
+    #[serde(flatten)]
     pub drawing: Drawing,
 }
 
+impl Request for SkeletonsRequest {
+    const NAME: &'static str = "silhouettes skeletons";
+    const REQUIRED: &'static [&'static str] = &["file", "set", "out"];
+    const PATHS: &'static [(&'static str, PathKind)] =
+        &[("file", PathKind::Input), ("out", PathKind::OutputFolder)];
+    type Figures = PerformancesFigures;
+
+    fn check(&self) -> Result<()> {
+        self.drawing.check()
+    }
+
+    fn run(&self, context: &Context<'_>) -> Result<PerformancesFigures> {
+        draw(self, context)
+    }
+}
+
 /// A public data set of body joints.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[derive(Clone, Copy, Default, PartialEq, Eq, Debug)]
 pub enum SkeletonSet {
     /// UTKinect-Action3D: 20 joints of a Kinect.
+    #[default]
     UtKinect,
     /// Florence 3D Actions: 15 joints.
     Florence,
+}
+
+impl fmt::Display for SkeletonSet {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::UtKinect => "utkinect",
+            Self::Florence => "florence",
+        })
+    }
+}
+
+impl FromStr for SkeletonSet {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text {
+            "utkinect" => Ok(Self::UtKinect),
+            "florence" => Ok(Self::Florence),
+            other => Err(format!("`{other}` is not a data set: expected utkinect or florence")),
+        }
+    }
 }
 
 impl SkeletonSet {
@@ -44,7 +101,7 @@ impl SkeletonSet {
 }
 
 /// Draws all performances of a set.
-pub fn draw(settings: &SkeletonsSettings, context: &Context<'_>) -> Result<PerformancesFigures> {
+pub fn draw(settings: &SkeletonsRequest, context: &Context<'_>) -> Result<PerformancesFigures> {
     settings.drawing.check()?;
     let path = &settings.file;
     let bytes = fs::read(path).map_err(WorkflowError::read("the skeletons", path))?;

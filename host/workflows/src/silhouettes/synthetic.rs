@@ -1,35 +1,72 @@
 //! Silhouettes of seeded synthetic people at the ten activities of Li 2014, table 7.1.
 
 use farnear_recognition::synthetic::activities::{ACTIVITIES, performance};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
 use super::performances::{self, Drawing, Performance, PerformancesFigures};
 use crate::{
     context::Context,
     error::{Result, WorkflowError},
     parameters::within,
+    request::{PathKind, Request},
 };
 
 /// Starting obliquely, so that no view looks exactly along the path.
 const FIRST_VIEW_DEG: f64 = 45.0;
 
-/// Who is drawn doing what, how, and where to.
-#[derive(Clone, PartialEq, Debug)]
-pub struct SyntheticSettings {
+/// Silhouettes of seeded synthetic people at the ten activities of Li 2014, table 7.1.
+///
+/// Writes a folder of masks for every performance and view, and `samples.toml` for `farnear activity`: something to try everything
+/// with.
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize, JsonSchema)]
+#[cfg_attr(feature = "clap", derive(clap::Args))]
+#[cfg_attr(
+    feature = "clap",
+    command(after_help = "Example: farnear silhouettes synthetic --subjects 6 --out people/")
+)]
+#[serde(default)]
+pub struct SyntheticRequest {
     /// People, each with a build and habits of their own, 1 to 1000.
+    #[cfg_attr(feature = "clap", arg(long, default_value_t = Self::default().subjects))]
     pub subjects: usize,
-    /// Names of the activities; all by default.
+    /// Only these activities: walk, drop, crouch, peer, mobile, place, bag, shoot, gun, dig.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "NAME", value_delimiter = ','))]
     pub activities: Vec<String>,
     /// Frames per second, 1 to 240.
+    #[cfg_attr(feature = "clap", arg(long, default_value_t = Self::default().rate_hz))]
     pub rate_hz: f64,
-    /// How bodies are drawn.
+    #[cfg_attr(feature = "clap", command(flatten))]
+    #[serde(flatten)]
     pub drawing: Drawing,
 }
 
+impl Default for SyntheticRequest {
+    fn default() -> Self {
+        Self { subjects: 6, activities: Vec::new(), rate_hz: 8.0, drawing: Drawing::default() }
+    }
+}
+
+impl Request for SyntheticRequest {
+    const NAME: &'static str = "silhouettes synthetic";
+    const REQUIRED: &'static [&'static str] = &["out"];
+    const PATHS: &'static [(&'static str, PathKind)] = &[("out", PathKind::OutputFolder)];
+    type Figures = PerformancesFigures;
+
+    fn check(&self) -> Result<()> {
+        within("subjects", self.subjects, &(1..=1000), "")?;
+        within("frame rate", self.rate_hz, &(1.0..=240.0), "frames per second")?;
+        self.drawing.check()
+    }
+
+    fn run(&self, context: &Context<'_>) -> Result<PerformancesFigures> {
+        draw(self, context)
+    }
+}
+
 /// Draws every person at every activity.
-pub fn draw(settings: &SyntheticSettings, context: &Context<'_>) -> Result<PerformancesFigures> {
-    within("subjects", settings.subjects, &(1..=1000), "")?;
-    within("frame rate", settings.rate_hz, &(1.0..=240.0), "frames per second")?;
-    settings.drawing.check()?;
+pub fn draw(settings: &SyntheticRequest, context: &Context<'_>) -> Result<PerformancesFigures> {
+    settings.check()?;
     let activities: Vec<usize> = match settings.activities.as_slice() {
         [] => (0..ACTIVITIES.len()).collect(),
         names => names.iter().map(|name| number_of(name)).collect::<Result<_>>()?,

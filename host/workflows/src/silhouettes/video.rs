@@ -18,51 +18,113 @@ use farnear_silhouettes::mask::{
     subject::Flag,
 };
 use ndarray::{Array3, Axis};
-use serde::Serialize;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use serde_with::{DisplayFromStr, serde_as};
 
 use super::{SilhouettesError, cut_out, frame_of};
-use crate::{context::Context, error::Result, figures::rounded};
+use crate::{
+    context::Context,
+    error::{Result, WorkflowError},
+    figures::rounded,
+    request::{PathKind, Request},
+};
 
 /// From one sign of progress to the next, frames.
 const PROGRESS_FRAMES: usize = 50;
 /// Work that is cancelled.
 const DURING: &str = "making masks";
 
-/// What masks are made of, how, and where to.
-#[derive(Clone, Debug)]
-pub struct VideoSettings {
-    /// A folder of pictures, a Y4M file, or what an installed ffmpeg reads.
+/// Masks of the person who moves in a video, one PNG per frame (255 = person).
+///
+/// A background model learns static pixels; moving regions are cleaned and the person chosen. Frames without a person, with
+/// several people, of a changed scene, with a person in pieces or standing still, or from before the background is known are
+/// flagged in `silhouettes.toml` next to the masks; without a recognisable person the mask is empty.
+#[serde_as]
+#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize, JsonSchema)]
+#[cfg_attr(feature = "clap", derive(clap::Args))]
+#[cfg_attr(
+    feature = "clap",
+    command(after_help = "Example: farnear silhouettes video walk.y4m --out masks/ --learn-first")
+)]
+#[serde(default)]
+pub struct SilhouettesVideoRequest {
+    /// A folder of pictures, a .y4m file, or any video if ffmpeg is installed.
     pub video: PathBuf,
-    /// The new folder of masks.
+    /// Folder for the masks; must not exist or be empty.
+    #[cfg_attr(feature = "clap", arg(long))]
     pub out: PathBuf,
-    /// Watch the whole video once to learn the background before masks are made.
+    /// Watch the whole video once to learn the background before the masks are made; no frame is lost to learning.
+    #[cfg_attr(feature = "clap", arg(long))]
     pub learn_first: bool,
     /// Frames at the beginning that only teach the background.
+    #[cfg_attr(feature = "clap", arg(long, default_value_t = Self::default().learning_frames))]
     pub learning_frames: u32,
     /// Frames that the background model remembers.
+    #[cfg_attr(feature = "clap", arg(long, default_value_t = Self::default().history_frames))]
     pub history_frames: u32,
-    /// Which frames and pixels teach the background.
+    /// Which frames and pixels teach the background: outside-people (all frames, but not people), until:FRAMES (the same, then
+    /// nothing), always (a person who stops becomes background within seconds) or never (only --learn-first or --learning-frames).
+    #[cfg_attr(feature = "clap", arg(long, value_name = "WHEN", default_value_t = Self::default().learning))]
+    #[serde_as(as = "DisplayFromStr")]
     pub learning: Learning,
-    /// What becomes of the person's shadow.
-    pub shadow: ShadowTreatment,
-    /// Masks of 100x100 pixels with the person centred, instead of full frames.
+    /// Count pixels that are only darker than the background as the person, not as shadow.
+    #[cfg_attr(feature = "clap", arg(long))]
+    pub keep_shadow: bool,
+    /// Remove shadow with an image-based detector instead of the background model's own test (colour only): chromaticity, physical,
+    /// geometry, small-region-texture or large-region-texture.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "METHOD", conflicts_with = "keep_shadow"))]
+    #[serde_as(as = "Option<DisplayFromStr>")]
+    pub shadow_detector: Option<Method>,
+    /// Write masks of 100x100 pixels with the person centred, instead of full frames.
+    #[cfg_attr(feature = "clap", arg(long))]
     pub centred: bool,
-    /// A new folder for the background model's labels before cleaning: 0 background, 127 shadow, 255 foreground.
+    /// Also write the background model's own labels here, before cleaning: 0 background, 127 shadow, 255 foreground.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "DIR"))]
     pub labels: Option<PathBuf>,
     /// Average colour to grey first.
+    #[cfg_attr(feature = "clap", arg(long))]
     pub grey: bool,
 }
 
-/// What becomes of a person's shadow.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
-pub enum ShadowTreatment {
-    /// The background model tells it by colour; in grey it stays.
-    #[default]
-    ByModel,
-    /// Count pixels that are only darker than the background as the person.
-    Keep,
-    /// An image-based detector takes it off; colour only.
-    Detector(Method),
+impl Default for SilhouettesVideoRequest {
+    fn default() -> Self {
+        Self {
+            video: PathBuf::new(),
+            out: PathBuf::new(),
+            learn_first: false,
+            learning_frames: 10,
+            history_frames: 500,
+            learning: Learning::default(),
+            keep_shadow: false,
+            shadow_detector: None,
+            centred: false,
+            labels: None,
+            grey: false,
+        }
+    }
+}
+
+impl Request for SilhouettesVideoRequest {
+    const NAME: &'static str = "silhouettes video";
+    const REQUIRED: &'static [&'static str] = &["video", "out"];
+    const PATHS: &'static [(&'static str, PathKind)] =
+        &[("video", PathKind::Input), ("out", PathKind::OutputFolder), ("labels", PathKind::OutputFolder)];
+    type Figures = VideoFigures;
+
+    fn check(&self) -> Result<()> {
+        match self.shadow_detector.filter(|_| self.keep_shadow) {
+            None => Ok(()),
+            Some(detector) => {
+                let expected = "keep_shadow leaves the shadow in place: expected one of the two";
+                Err(WorkflowError::parameter("shadow_detector", detector, expected))
+            }
+        }
+    }
+
+    fn run(&self, context: &Context<'_>) -> Result<VideoFigures> {
+        extract(self, context)
+    }
 }
 
 /// How many frames were what.
@@ -131,7 +193,7 @@ struct Entry {
 ///
 /// # Errors
 /// Where the video cannot be read, its frames differ, or the masks cannot be written; then the new folder is not there.
-pub fn extract(settings: &VideoSettings, context: &Context<'_>) -> Result<VideoFigures> {
+pub fn extract(settings: &SilhouettesVideoRequest, context: &Context<'_>) -> Result<VideoFigures> {
     let out = Staging::new_folder(&settings.out)?;
     let labels = settings.labels.as_deref().map(Staging::new_folder).transpose()?;
     let mut video = Video::open(&settings.video)?;
@@ -221,20 +283,19 @@ struct Work {
 }
 
 impl Work {
-    fn new(first: &VideoFrame, asked: &VideoSettings) -> Result<Self> {
+    fn new(first: &VideoFrame, asked: &SilhouettesVideoRequest) -> Result<Self> {
         let frame = frame_of(&first.pixels);
         let mut settings = ExtractorSettings::for_frame(frame);
         settings.learning_frames = asked.learning_frames;
         settings.background.history_frames = asked.history_frames;
-        settings.learning = asked.learning;
-        if asked.shadow != ShadowTreatment::ByModel {
+        if asked.keep_shadow || asked.shadow_detector.is_some() {
             settings.background.shadow = None;
         }
-        let detector = match (asked.shadow, &first.pixels) {
-            (ShadowTreatment::Detector(method), Pixels::Grey(_)) => {
+        let detector = match (asked.shadow_detector, &first.pixels) {
+            (Some(method), Pixels::Grey(_)) => {
                 return Err(SilhouettesError::NeedsColour { method }.into());
             }
-            (ShadowTreatment::Detector(method), Pixels::Rgb(_)) => Some(Detector::new(method)),
+            (Some(method), Pixels::Rgb(_)) => Some(Detector::new(method)),
             _ => None,
         };
         Ok(Self { extractor: Extractor::like(frame, settings)?, detector })

@@ -9,7 +9,6 @@ use std::{
 
 use farnear_recognition::classifier::Family;
 use farnear_recognition::frames::Mode;
-use farnear_silhouettes::mask::extractor::Learning;
 use farnear_workflows::{
     Cancel, Context, Progress, Result, Unattended, WorkflowError,
     activity::{
@@ -19,8 +18,8 @@ use farnear_workflows::{
     },
     silhouettes::{
         performances::Drawing,
-        synthetic::{self, SyntheticSettings},
-        video::{self, ShadowTreatment, VideoSettings},
+        synthetic::{self, SyntheticRequest},
+        video::{self, SilhouettesVideoRequest},
     },
 };
 
@@ -68,8 +67,8 @@ impl Progress for Listener {
 }
 
 /// Three people at two activities, small.
-fn people(out: PathBuf) -> SyntheticSettings {
-    SyntheticSettings {
+fn people(out: PathBuf) -> SyntheticRequest {
+    SyntheticRequest {
         subjects: 3,
         activities: vec!["walk".into(), "dig".into()],
         rate_hz: 4.0,
@@ -161,17 +160,13 @@ fn a_video_is_not_begun_after_the_wish_to_stop() {
     let root = tempfile::tempdir().expect("a folder");
     let pictures = tempfile::tempdir().expect("a folder");
     fs::write(pictures.path().join("a.pgm"), b"P5 2 2 255\n\x00\x00\x00\x00").expect("a picture");
-    let settings = VideoSettings {
+    let settings = SilhouettesVideoRequest {
         video: pictures.path().into(),
         out: root.path().join("masks"),
-        learn_first: false,
         learning_frames: 0,
         history_frames: 10,
-        learning: Learning::default(),
-        shadow: ShadowTreatment::ByModel,
-        centred: false,
         labels: Some(root.path().join("labels")),
-        grey: false,
+        ..SilhouettesVideoRequest::default()
     };
     let listener = Listener::default();
     listener.cancel.cancel();
@@ -184,12 +179,12 @@ fn parameters_that_cannot_be_are_refused_before_anything_is_done() {
     let settings = people(root.path().join("people"));
     let drawing = |views, mm_per_px| Drawing { views, mm_per_px, ..settings.drawing.clone() };
     for (wrong, expected) in [
-        (SyntheticSettings { subjects: 0, ..settings.clone() }, "subjects 0: expected 1 to 1000"),
-        (SyntheticSettings { rate_hz: 0.5, ..settings.clone() }, "frame rate 0.5: expected 1 to 240"),
-        (SyntheticSettings { drawing: drawing(73, 10.0), ..settings.clone() }, "views 73: expected 1 to 72"),
-        (SyntheticSettings { drawing: drawing(4, 0.0), ..settings.clone() }, "pixel size 0: expected 0.1"),
+        (SyntheticRequest { subjects: 0, ..settings.clone() }, "subjects 0: expected 1 to 1000"),
+        (SyntheticRequest { rate_hz: 0.5, ..settings.clone() }, "frame rate 0.5: expected 1 to 240"),
+        (SyntheticRequest { drawing: drawing(73, 10.0), ..settings.clone() }, "views 73: expected 1 to 72"),
+        (SyntheticRequest { drawing: drawing(4, 0.0), ..settings.clone() }, "pixel size 0: expected 0.1"),
         (
-            SyntheticSettings { activities: vec!["sing".into()], ..settings.clone() },
+            SyntheticRequest { activities: vec!["sing".into()], ..settings.clone() },
             "activity sing: expected walk",
         ),
     ] {

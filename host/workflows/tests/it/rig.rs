@@ -10,7 +10,11 @@ use std::{path::Path, sync::Mutex, time::Duration};
 use farnear_protocol::Micros;
 use farnear_workflows::{
     Cancel, Context, Progress, Questions, Result,
-    rig::camera::{CameraAddress, CameraSettings},
+    rig::{
+        AxisName,
+        camera::{CameraAddress, CameraSettings},
+        sequence::SequenceRequest,
+    },
 };
 
 /// A face that keeps what it is told, and answers nothing but Enter.
@@ -56,4 +60,15 @@ fn camera(folder: &Path) -> CameraSettings {
 /// The optics of the rig in docs/, which the scripted board can reach.
 fn optics() -> std::path::PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/rig.toml")
+}
+
+/// A focus stack of three images.
+fn stack() -> SequenceRequest {
+    SequenceRequest {
+        axis: Some(AxisName::Fine),
+        from: Some(20.0),
+        to: Some(180.0),
+        steps: Some(3),
+        ..SequenceRequest::default()
+    }
 }

@@ -2,11 +2,11 @@
 
 use std::{fs, path::Path};
 
-use farnear_shadow::{Lamp, Method};
+use farnear_shadow::Method;
 use farnear_silhouettes::mask::Mask;
 use farnear_workflows::{
     Context, WorkflowError,
-    shadow::removal::{LightSource, RemovalSettings, remove_from_masks},
+    shadow::removal::{ShadowRemoveRequest, remove_from_masks},
 };
 use image::{GrayImage, Luma, RgbImage};
 
@@ -23,7 +23,7 @@ fn person(y: usize, x: usize) -> bool {
     (180..360).contains(&y) && (290..350).contains(&x)
 }
 
-fn settings(folder: &Path) -> RemovalSettings {
+fn settings(folder: &Path) -> ShadowRemoveRequest {
     let shadow = |y: usize, x: usize| (355..365).contains(&y) && (320..460).contains(&x);
     save(
         &folder.join("masks/a1.png"),
@@ -31,13 +31,13 @@ fn settings(folder: &Path) -> RemovalSettings {
     );
     save(&folder.join("masks/a2.png"), &Mask::default((480, 640)));
     fs::write(folder.join("camera.toml"), CAMERA).expect("a file");
-    RemovalSettings {
+    ShadowRemoveRequest {
         masks: folder.join("masks"),
         camera: folder.join("camera.toml"),
-        light: LightSource::Lamp(Lamp { right_m: -3.0, ahead_m: 6.0, up_m: 3.0 }),
-        method: Method::Hybrid,
+        lamp: Some("-3,6,3".into()),
         out: folder.join("out"),
         stages: Some(folder.join("stages")),
+        ..ShadowRemoveRequest::default()
     }
 }
 
@@ -73,7 +73,7 @@ fn every_mask_has_a_picture_of_its_stages() {
     assert!(panels_of(&explained) >= 5 && nobody.width() < 700, "{} {}", explained.width(), nobody.width());
 
     // The printed method has no explanation: a panel less, of the same mask.
-    let printed = RemovalSettings {
+    let printed = ShadowRemoveRequest {
         method: Method::Thesis,
         out: root.path().join("printed"),
         stages: Some(root.path().join("printed-stages")),
@@ -82,7 +82,7 @@ fn every_mask_has_a_picture_of_its_stages() {
     remove_from_masks(&printed, &Context::unattended()).expect("cut");
     assert!(read("printed-stages/a1.png").width() < explained.width());
 
-    let inside = RemovalSettings {
+    let inside = ShadowRemoveRequest {
         out: root.path().join("more"),
         stages: Some(root.path().join("more/stages")),
         ..hybrid

@@ -1,9 +1,6 @@
 //! # farnear-count
-//!
-//! Counts the cycles of on-board routines with interrupts off. Built like the firmware for the emulated
-//! board, where an
-//! instruction takes one cycle; a real board adds flash wait states. `farnear-sim count` runs it and reads
-//! [`FARNEAR_COUNTS`].
+//! Counts the cycles of on-board routines with interrupts off. Built like the firmware for the emulated board, where an
+//! instruction takes one cycle(a real board has wait states). `farnear-sim count` runs it and reads [`FARNEAR_COUNTS`].
 #![no_std]
 #![no_main]
 #![allow(unsafe_code, reason = "the names of two statics, by which the emulated board's side finds them")]
@@ -125,7 +122,6 @@ fn fail() -> ! {
     }
 }
 
-/// Discards embassy's log.
 #[defmt::global_logger]
 struct Silence;
 

@@ -14,16 +14,14 @@ use farnear_maths::{
 
 use crate::{cycles, fail};
 
-/// Pixels of a camera row.
 const WIDTH: usize = 640;
 const HEIGHT: u16 = 480;
 pub const PIXELS: u32 = WIDTH as u32;
 /// A row inside a region, so that tables exist already.
 pub const FIRST_ROW: u16 = 100;
-/// Pixels per row of a fit.
 pub const SAMPLES: u32 = 80;
 
-/// Repeatable numbers (Marsaglia, xorshift, 2003).
+/// Marsaglia's xorshift, 2003.
 struct Numbers(u32);
 
 impl Numbers {
@@ -34,7 +32,6 @@ impl Numbers {
         self.0
     }
 
-    /// Well inside the scale.
     fn code(&mut self) -> i16 {
         (self.next() >> 16) as i16 / 2
     }

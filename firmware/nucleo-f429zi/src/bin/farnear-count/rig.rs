@@ -59,7 +59,7 @@ fn identity() -> Identity {
     }
 }
 
-/// Memory writes are not counted.
+/// Without memory writes.
 const WITHOUT_MEMORY: Settings = Settings { memory: false, ..Settings::DEFAULT };
 
 pub fn tick_at_rest() -> u32 {
@@ -139,7 +139,7 @@ impl Motor {
 /// A piezo with its 200 Hz resonance, damping 0.03; otherwise the rig would open its loop.
 #[derive(Default)]
 struct Piezo {
-    /// In nm.
+    /// Nanometres.
     position: f32,
     speed: f32,
 }
@@ -155,7 +155,6 @@ impl Piezo {
     }
 }
 
-/// A rig with ideal hardware.
 struct Bench {
     rig: Rig,
     now: u64,

@@ -12,7 +12,6 @@ fn blank() -> Memory {
     Box::new([0; MEMORY_BYTES])
 }
 
-/// Blocks of a record in state `version`.
 fn state(version: u8) -> impl Fn(RecordName, usize) -> Block {
     move |record, index| {
         let mut block = [version; BLOCK];
@@ -22,7 +21,6 @@ fn state(version: u8) -> impl Fn(RecordName, usize) -> Block {
     }
 }
 
-/// All writes of a record.
 fn writes(store: &mut Store, record: RecordName, version: u8) -> List<MemoryWrite> {
     store.mark(record);
     let mut writes = List::new();
@@ -41,7 +39,7 @@ fn apply(memory: &mut Memory, writes: &[MemoryWrite]) {
     }
 }
 
-/// Version that is read back, and whether a damaged copy was found.
+/// The version read back, and whether a damaged copy was found.
 fn read(memory: &Memory, record: RecordName) -> Option<(u8, bool)> {
     match record::find(memory, record) {
         Found::Good { copy, repaired, .. } => {

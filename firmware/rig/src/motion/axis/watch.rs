@@ -9,7 +9,6 @@ use crate::motion::steps;
 use crate::motion::switch::Place;
 
 impl Stepper {
-    /// Reads the board; detects faults.
     pub(crate) fn sense(&mut self, inputs: &MotorInputs) {
         self.encoder = inputs.encoder_counts;
         self.driver_fault = inputs.driver_fault;
@@ -65,7 +64,6 @@ impl Stepper {
         new > 0
     }
 
-    /// All pulses were planned, played and counted.
     fn has_ended(&self, stepper: &StepperState) -> bool {
         matches!(&self.motion, Motion::Stepping { ramp, .. } if ramp.remaining() == 0)
             && self.outstanding.is_empty()
@@ -110,8 +108,8 @@ impl Stepper {
         (self.home_closed() && outside && self.purpose != Purpose::SeekHome).then_some(Failure::HomeSwitch)
     }
 
-    /// Encoder deviation from the possible motor positions, if too large. Not checked before the first
-    /// motion, because an unpowered motor may be moved.
+    /// Encoder deviation from the possible motor positions, if too large. Not before the first motion: an unpowered
+    /// motor may be moved.
     fn following_error(&self) -> Option<Nanometres> {
         if !self.enabled {
             return None;
@@ -126,7 +124,6 @@ impl Stepper {
         (error.saturating_abs() > self.settings.following.0).then_some(Nanometres(error))
     }
 
-    /// Aborts the motion.
     fn fail(&mut self, fault: Failure) {
         // If steps and encoder may disagree, the position is also lost at rest.
         if matches!(fault, Failure::Following { .. } | Failure::DriverFault | Failure::StepUnderrun) {

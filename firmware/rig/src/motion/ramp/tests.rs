@@ -8,7 +8,6 @@ use proptest::prelude::*;
 const LIMITS: RampLimits =
     RampLimits { start_speed: 1_000, speed: 40_000, acceleration: 320_000, jerk: 10_240_000 };
 
-/// A played segment: end, duration, total pulses, speed.
 #[derive(Clone, Copy, Debug)]
 struct Played {
     end_s: f64,
@@ -45,7 +44,7 @@ fn play(mut ramp: Ramp, limits: RampLimits, stop_after: Option<usize>) -> Vec<Pl
     played
 }
 
-/// Mean speeds of neighbours are reached between their middles; whole ticks change a speed by up to v^2 /
+/// Neighbouring segments' mean speeds are reached between their middles; whole ticks change a speed by up to v^2 /
 /// timer clock. First and last segment have the start speed and the gain of their own length.
 fn accelerations(played: &[Played], limits: RampLimits) {
     let rounding = |speed: f64| 1.0 + speed * speed / f64::from(STEP_TIMER_HZ);
@@ -121,7 +120,6 @@ fn limits() -> impl Strategy<Value = RampLimits> {
     )
 }
 
-/// Limits as applied by the ramp.
 fn effective(limits: RampLimits) -> RampLimits {
     let start_speed = limits.start_speed.max(1_000);
     RampLimits { start_speed, speed: limits.speed.max(start_speed), ..limits }

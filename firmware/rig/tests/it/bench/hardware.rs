@@ -1,4 +1,4 @@
-//! A model of the rig's hardware: two stepper axes, piezo, gauge, camera, the safety inputs. And its faults.
+//! A model of the rig's hardware with faults: two stepper axes, piezo, gauge, camera, safety inputs.
 
 use farnear_protocol::message::{LightLevels, ShotLight};
 use farnear_protocol::{BoardMicros, Micros};
@@ -8,20 +8,15 @@ use farnear_rig::io::{
 
 use super::motor::Motor;
 
-/// What can be wrong next to the motors.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub struct Faults {
     /// Fixed answer of the gauge, for every position.
     pub gauge: Option<Option<u32>>,
-    /// The piezo does not move.
     pub piezo_dead: bool,
-    /// The camera does not answer.
     pub no_strobe: bool,
-    /// The emergency-stop circuit is open.
     pub emergency_stop: bool,
     pub supply_low: bool,
     pub link_overflow: bool,
-    /// The memory confirms no write.
     pub memory_failed: bool,
 }
 
@@ -34,16 +29,13 @@ pub struct Hardware {
     pub dac: u16,
     random: u64,
     exposure: Option<(BoardMicros, Micros, Option<ShotLight>)>,
-    /// Brightness of the light outputs, and whether the last tick ended a flash.
     pub lights: LightLevels,
     pub flash_cancelled: bool,
-    /// Rising edges of the trigger: when, and how long.
     pub triggers: Vec<(u64, Micros)>,
-    /// Where the piezo was at each trigger.
     pub piezo_at_trigger: Vec<f64>,
-    /// A camera that runs freely: period and exposure, us.
+    /// Period and exposure of a free-running camera, us.
     pub free_running: Option<(u64, u64)>,
-    /// An exposure that the host makes: start and end.
+    /// Start and end of an exposure by the host.
     pub exposed_by_host: Option<(u64, u64)>,
     listened_since: Option<u64>,
 }
@@ -69,19 +61,17 @@ impl Hardware {
         }
     }
 
-    /// Position of stage A.
     pub fn position_um(&self) -> f64 {
         self.coarse.position_um()
     }
 
-    /// The power goes: mechanics stay, everything else forgets.
+    /// The mechanics keep their positions.
     pub fn power_off(&mut self) {
         self.coarse.power_off();
         self.lens.power_off();
         (self.dac, self.exposure, self.listened_since) = (0, None, None);
     }
 
-    /// What the board reads now.
     pub fn inputs(&mut self, now: BoardMicros) -> Inputs {
         Inputs {
             now,
@@ -97,7 +87,6 @@ impl Hardware {
         }
     }
 
-    /// The gauge's code.
     pub fn gauge(&mut self) -> Option<u32> {
         let code = (self.piezo_nm + self.noise() + f64::from(GAUGE_CODE_ZERO)).round();
         self.faults.gauge.unwrap_or(Some(code as u32))
@@ -117,7 +106,7 @@ impl Hardware {
         (!self.faults.no_strobe).then_some(ExposureEdges { trigger, strobe_start, strobe_end, flash })
     }
 
-    /// An exposure without a trigger that ended in the last tick and began while the board listened.
+    /// An untriggered exposure that ended in the last tick and began while the board listened.
     pub fn strobe(&self, BoardMicros(now): BoardMicros) -> Option<StrobeEdges> {
         let since = self.listened_since.filter(|_| !self.faults.no_strobe)?;
         let last_of = |(period, length): (u64, u64)| {
@@ -129,14 +118,13 @@ impl Hardware {
             .then_some(StrobeEdges { start: BoardMicros(start), end: BoardMicros(end) })
     }
 
-    /// The emergency stop's circuit opens.
     pub fn open_circuit(&mut self) {
         self.faults.emergency_stop = true;
         self.coarse.cut();
         self.lens.cut();
     }
 
-    /// Carries the outputs out and lets a control tick pass.
+    /// Executes the outputs for a control tick.
     pub fn run(&mut self, outputs: &Outputs, now: u64) {
         self.coarse.run(&outputs.coarse, now, self.faults.emergency_stop);
         self.lens.run(&outputs.lens, now, self.faults.emergency_stop);
@@ -158,7 +146,7 @@ impl Hardware {
         self.swing();
     }
 
-    /// The piezo: 200 Hz, damping 0.03, by steps of 10 us.
+    /// 200 Hz, damping 0.03, in steps of 10 us.
     pub fn swing(&mut self) {
         if self.faults.piezo_dead {
             return;

@@ -1,43 +1,35 @@
-//! A stepper axis on the bench: step timer, motor, screw with play, encoder on the motor's shaft, end switches on the stage.
+//! A stepper axis: step timer, motor, screw with play, encoder on the motor's shaft, end switches on the stage.
 
 use std::collections::VecDeque;
 
 use farnear_rig::io::{MotorInputs, MotorOutputs, STEP_TIMER_HZ, Segment, StepperState, TICK_US};
 
-/// Length of the board's segment queue.
 const QUEUE: usize = 4;
-/// A microstep.
 pub const STEP_UM: f64 = 0.15625;
-/// The far switch closes here.
 pub const FAR_SWITCH_UM: f64 = 13_150.0;
-/// Way between closing and opening of the home switch.
+/// Distance between closing and opening.
 pub const HOME_HYSTERESIS_UM: f64 = 2.0;
-/// The screw's play in microsteps: 4.06 um.
+/// Microsteps: 4.06 um.
 pub const PLAY: i64 = 26;
 
-/// What can be wrong with it.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub struct MotorFaults {
-    /// Pulses do not move the motor.
     pub stalled: bool,
-    /// The step timer does not run.
     pub timer_dead: bool,
-    /// The step timer gives one pulse more per segment.
+    /// One pulse more per segment.
     pub extra_pulse: bool,
-    /// The board loses what waits behind the running segment.
+    /// The board loses the segments behind the running one.
     pub queue_lost: bool,
     /// Fixed state of the switch, for every position.
     pub home_switch: Option<bool>,
-    /// Fixed state of the switch, for every position.
     pub far_switch: Option<bool>,
-    /// The driver's DIAG line.
     pub driver: bool,
 }
 
 pub struct Motor {
     pub faults: MotorFaults,
     queue: VecDeque<Segment>,
-    /// The running segment, timer ticks into it, pulses given of it.
+    /// Running segment, timer ticks and pulses of it.
     running: Option<(Segment, u32, u16)>,
     counted: u32,
     underrun: bool,
@@ -45,7 +37,7 @@ pub struct Motor {
     pub edges: u64,
     pub last_edge_us: f64,
     pub closest_edges_us: f64,
-    /// The motor, and the stage that it carries along at the ends of the play; microsteps from the home switch.
+    /// The motor, and the stage that it moves at the ends of the play; microsteps from the home switch.
     pub microsteps: i64,
     pub stage: i64,
     pub leftmost: i64,
@@ -83,18 +75,18 @@ impl Motor {
         self.stage as f64 * STEP_UM
     }
 
-    /// The power goes: the timer and the driver stop, the mechanics stay.
+    /// Timer and driver stop, the mechanics stay.
     pub fn power_off(&mut self) {
         self.queue.clear();
         (self.running, self.enabled, self.underrun) = (None, false, false);
     }
 
-    /// What the board reads; `carried_um`: how far a piezo on the stage holds the home switch's tab away.
+    /// `carried_um`: displacement of the home switch's tab by a piezo on the stage.
     pub fn inputs(&mut self, carried_um: f64) -> MotorInputs {
         let um = self.position_um();
         self.home_closed = um + carried_um <= if self.home_closed { HOME_HYSTERESIS_UM } else { 0.0 };
         MotorInputs {
-            // The encoder's own zero is anywhere.
+            // The encoder's zero is arbitrary.
             encoder_counts: (self.microsteps * 5).div_euclid(4) as i32 + 12_345,
             home_switch: self.faults.home_switch.unwrap_or(self.home_closed),
             far_switch: self.faults.far_switch.unwrap_or(um >= FAR_SWITCH_UM),
@@ -108,7 +100,7 @@ impl Motor {
         }
     }
 
-    /// Carries the outputs out and lets a control tick pass; `cut` = the emergency stop has cut the STEP line.
+    /// Executes the outputs for a control tick; `cut`: the emergency stop has cut the STEP line.
     pub fn run(&mut self, outputs: &MotorOutputs, now: u64, cut: bool) {
         let idle = self.running.is_none() && self.queue.is_empty();
         // Segments that wait for a dead timer move nothing.
@@ -142,7 +134,7 @@ impl Motor {
         }
     }
 
-    /// The break input stops the timer, which looks like a queue that ran dry.
+    /// The break input stops the timer, which looks like an underrun.
     pub fn cut(&mut self) {
         if !self.was_cut {
             self.underrun |= !self.queue.is_empty() || self.running.is_some();
@@ -152,7 +144,6 @@ impl Motor {
         }
     }
 
-    /// Plays segments for some timer ticks.
     fn play(&mut self, ticks: u32, now_us: f64, cut: bool) {
         let mut left = ticks;
         while left > 0 {
@@ -197,7 +188,6 @@ impl Motor {
         }
     }
 
-    /// Turns the motor by some microsteps, by a pulse or by force.
     pub fn turn(&mut self, microsteps: i64) {
         self.microsteps += microsteps;
         self.stage = self.stage.clamp(self.microsteps - PLAY, self.microsteps);

@@ -33,23 +33,19 @@ pub enum Call {
 pub struct Fake {
     pub hardware: Hardware,
     pub now: u64,
-    /// Everything the loop did, in order.
     pub calls: Vec<Call>,
-    /// The board hangs after this many calls.
     pub hangs_after: Option<usize>,
-    /// The emergency stop's circuit opens just before this is done.
+    /// The emergency stop opens just before this call.
     pub opens_before: Option<Call>,
-    /// A step timer reports an underrun.
     pub dry: bool,
     received: VecDeque<u8>,
     next_id: u32,
-    /// Frames that fit the link in a tick, and those that were sent in this one.
+    /// Frames that fit the link in a tick, and those sent in this one.
     pub room: usize,
     taken: usize,
     /// Ticks until the last frame has left.
     pub sending: usize,
     pub sent: Vec<Vec<u8>>,
-    /// When the link was given another rate, and which.
     pub rates: Vec<(u64, LinkRate)>,
     pub logs: VecDeque<Log>,
     log_number: u32,
@@ -60,7 +56,7 @@ pub struct Fake {
 }
 
 impl Fake {
-    /// A board whose stage A stands at `position_um` from its home switch.
+    /// Stage A at `position_um` from its home switch.
     pub fn new(position_um: f64) -> Self {
         Self {
             hardware: Hardware::new(position_um),
@@ -85,7 +81,6 @@ impl Fake {
         }
     }
 
-    /// Puts a request on the line.
     pub fn ask(&mut self, request: &Request) {
         if self.next_id == 1 {
             self.received.extend(request_frame(1, BOOT, SESSION, &Request::OpenSession));
@@ -95,12 +90,10 @@ impl Fake {
         self.next_id += 1;
     }
 
-    /// Puts bytes on the line.
     pub fn hear(&mut self, bytes: &[u8]) {
         self.received.extend(bytes);
     }
 
-    /// Time passes until the next tick.
     pub fn pass(&mut self) {
         self.now += u64::from(TICK_US);
         self.sending = self.sending.saturating_sub(1);

@@ -68,7 +68,7 @@ impl Processor for Noting {
     }
 }
 
-/// A processor for this program, and the calls of all processors made for it.
+/// Also returns the calls of all processors made for the program.
 fn rig(program: u64) -> (Translated, Arc<Mutex<Vec<String>>>) {
     let notes: Arc<Mutex<Vec<String>>> = Arc::default();
     let of_each = Arc::clone(&notes);

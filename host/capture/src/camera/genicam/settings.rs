@@ -34,7 +34,6 @@ impl GenicamCamera {
         set.map_err(self.failed())
     }
 
-    /// Range of a number, if available.
     pub(super) fn range(&self, setting: &Setting) -> Option<Range> {
         let camera = &self.camera;
         let (bounds, unit) = match setting {

@@ -62,7 +62,6 @@ pub struct V4lCamera {
 
 impl V4lCamera {
     /// Opens e.g. `/dev/video0` with its best format at the driver's size.
-    /// Errors: [`CameraError::Unusable`] with a remedy.
     pub fn open(path: &Path) -> Result<Self, CameraError> {
         check_path(path)?;
         let failed = |error: io::Error| refused(path, &error);
@@ -96,7 +95,6 @@ impl V4lCamera {
         |error| refused(&self.path, &error)
     }
 
-    /// Sets a format; the driver chooses the size.
     fn choose(&mut self, name: [u8; 4], layout: Layout) -> Result<(), CameraError> {
         self.stream = None; // a format cannot change under a stream
         let mut format = self.device.format().map_err(self.failed())?;
@@ -174,7 +172,6 @@ impl V4lCamera {
         Some((known.swap_remove(at), steps))
     }
 
-    /// The driver's controls; empty if one has a type on which the bindings panic.
     fn descriptions(&self) -> Vec<control::Description> {
         let device = std::panic::AssertUnwindSafe(&self.device);
         catch_unwind(|| device.query_controls()).ok().and_then(Result::ok).unwrap_or_default()

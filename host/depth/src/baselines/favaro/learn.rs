@@ -1,4 +1,4 @@
-//! Learning: random textures, rendered at a depth, cut into vectors, decomposed.
+//! Learning: random textures are rendered at a depth, cut into vectors and decomposed.
 
 use std::f64::consts::PI;
 
@@ -14,10 +14,8 @@ use crate::psf::Otf;
 /// Side of a rendered texture (it repeats at its borders).
 const SIDE_PX: usize = 128;
 
-/// Distance of the vectors that are cut from it.
 const STRIDE_PX: usize = 2;
 
-/// The first `rank` directions of the textures at each depth, one per row.
 pub(super) fn signals(
     optics: &Optics,
     alphas: &[f64],
@@ -34,7 +32,6 @@ pub(super) fn signals(
         .collect()
 }
 
-/// Radial frequency of a bin, rad/px.
 fn frequency(row: usize, column: usize) -> f64 {
     let signed =
         |index: usize| if 2 * index > SIDE_PX { index as f64 - SIDE_PX as f64 } else { index as f64 };
@@ -65,17 +62,16 @@ fn spectrum(seed: u64) -> Array2<Complex64> {
     spectrum
 }
 
-/// The texture under a blur.
 fn render(spectrum: &Array2<Complex64>, otf: &Otf, radius_px: f64) -> Array2<f32> {
     let mut blurred = spectrum.clone();
     for ((row, column), value) in blurred.indexed_iter_mut() {
         *value *= otf.at(radius_px, frequency(row, column));
     }
-    // The spectrum of a real image transforms back by a forward transform up to a reflection, the same for all images.
+    // A forward transform of a real image's spectrum gives the image reflected, alike for all images.
     transform(blurred).mapv(|value| (value.re / (SIDE_PX * SIDE_PX) as f64) as f32)
 }
 
-/// The directions of the largest singular values of the matrix of all vectors (eigenvectors of its Gram matrix).
+/// The largest singular directions of the matrix of all vectors (eigenvectors of its Gram matrix).
 fn directions(far: &Array2<f32>, near: &Array2<f32>, rank: usize) -> Option<DMatrix<f32>> {
     let places: Vec<usize> = (0..SIDE_PX - super::PATCH_PX).step_by(STRIDE_PX).collect();
     let mut vectors = DMatrix::<f32>::zeros(VECTOR, places.len() * places.len());

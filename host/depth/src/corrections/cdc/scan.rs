@@ -1,16 +1,15 @@
-//! The search for the pattern that fits best, row after row.
+//! Row-by-row search for the pattern that fits best.
 //!
-//! Row sums of `|Ui - Uc|` over the window's width, and the patterns' values, are kept for the last 2N + 1 rows of every
-//! pattern (2 M (2N + 1) rows of floats: 370 KiB for M = 24, N = 1 and 640 columns, which stays in the cache); the sums'
-//! sum over rows is the residual. The loops over M run along rows without branches, so that the compiler vectorises
-//! them; the neighbours' residuals are summed again afterwards, once per pixel.
+//! Row sums of `|Ui - Uc|` over the window's width, and the patterns' values, are stored for the last 2N + 1 rows of
+//! every pattern (2 M (2N + 1) rows of floats: 370 KiB for M = 24, N = 1 and 640 columns, which fits the cache); their
+//! sum over rows is the residual. The loops over M have no branches, so that the compiler vectorises them along rows.
+//! The neighbours' residuals are summed again afterwards, once per pixel.
 
 use farnear_maths::clsf::DepthScale;
 use ndarray::ArrayViewMut2;
 
 use crate::corrections::pattern::inside;
 
-/// The patterns as the search reads them.
 pub(super) struct Patterns<'a> {
     /// mm, `[pattern][row of the grid][column]`.
     pub values: &'a [f32],
@@ -21,7 +20,6 @@ pub(super) struct Patterns<'a> {
 }
 
 impl Patterns<'_> {
-    /// The rows of the grid around a row of the map, and the weight of the second.
     fn around(&self, pattern: usize, row: usize) -> (&[f32], &[f32], f32) {
         let point = row / self.grid_px;
         let part = (row % self.grid_px) as f32 / self.grid_px as f32;
@@ -33,7 +31,6 @@ impl Patterns<'_> {
     }
 }
 
-/// Corrects a map in place.
 pub(super) fn correct(
     mut depth_mm: ArrayViewMut2<f32>,
     patterns: &Patterns<'_>,
@@ -69,7 +66,7 @@ pub(super) fn correct(
     }
 }
 
-/// The patterns' values and the row sums of the last rows, `[slot][pattern][column]`.
+/// `[slot][pattern][column]`.
 struct Ring {
     slots: usize,
     patterns: usize,
@@ -103,13 +100,12 @@ impl Ring {
         self.values[self.start(slot, pattern) + column]
     }
 
-    /// The residual of a pattern at a pixel.
     fn residual(&self, pattern: usize, column: usize) -> f32 {
         (0..self.slots).map(|slot| self.sums[self.start(slot, pattern) + column]).sum()
     }
 }
 
-/// `|depth - pattern|`, and the pattern's values; 0 for a hole, which counts alike for all patterns.
+/// `|depth - pattern|`, and the pattern's values; a hole gives 0 for all patterns.
 fn absolute_differences(
     out: &mut [f32],
     values: &mut [f32],
@@ -143,7 +139,6 @@ fn sum_windows(out: &mut [f32], padded: &[f32], window: usize) {
     }
 }
 
-/// The least residual of each column and the pattern it belongs to.
 struct Nearest {
     residual: Vec<f32>,
     least: Vec<f32>,
@@ -183,7 +178,6 @@ impl Nearest {
     }
 }
 
-/// `Uo = Ui - Uc + w` along one row (eq. 6.2).
 fn cancel(
     depths: &mut [f32],
     nearest: &Nearest,
@@ -213,9 +207,8 @@ fn cancel(
     }
 }
 
-/// From the index of the least residual to the fractional index, -1/2 to 1/2 (Li 2014, eqs. 6.5 to 6.10): the line
-/// through the least residual and its larger neighbour, and a line of the opposite slope through the other
-/// neighbour, meet there. (The first and the last pattern lack a neighbour; there the index stays whole.)
+/// Fractional index around the least residual, -1/2 to 1/2 (Li 2014, eqs. 6.5 to 6.10): the line through it and its
+/// larger neighbour meets a line of opposite slope through the other one. Whole at the first and the last pattern.
 fn interpolate(before: f32, least: f32, after: f32) -> f32 {
     let (larger, smaller, toward_smaller) =
         if after >= before { (after, before, -1.0) } else { (before, after, 1.0) };
@@ -227,8 +220,7 @@ fn interpolate(before: f32, least: f32, after: f32) -> f32 {
 mod tests {
     use super::*;
 
-    /// The example of Li 2014, fig. 6.2: residuals 3.2, 2.1 and 5.7 at indices 3, 4 and 5, pattern values 810 at 3 and
-    /// 816 at 4.
+    /// Li 2014, fig. 6.2: residuals 3.2, 2.1 and 5.7 at indices 3, 4 and 5, pattern values 810 at 3 and 816 at 4.
     #[test]
     fn worked_example() {
         let index = 4.0 + interpolate(3.2, 2.1, 5.7);
@@ -241,7 +233,6 @@ mod tests {
     fn interpolation_is_symmetric() {
         assert_eq!(interpolate(5.7, 2.1, 3.2), -interpolate(3.2, 2.1, 5.7));
         assert_eq!(interpolate(2.0, 2.0, 2.0), 0.0);
-        // A V whose tip lies half-way has two equal lowest residuals.
         assert_eq!(interpolate(1.0, 1.0, 3.0), -0.5);
     }
 }

@@ -1,18 +1,13 @@
-//! Smoothing a pattern with a Gaussian and sampling it on a grid.
-//!
-//! Along rows, then along columns, a straight line is fitted under a Gaussian weight at each grid point (local linear
-//! regression). A plain weighted mean would pull a slope towards its inside at the borders; a line does not. Holes
-//! (NaN) have no weight.
+//! Smooths a pattern and samples it on a grid: along rows, then columns, a straight line is fitted under a Gaussian
+//! weight (local linear regression), because a weighted mean would bias slopes at the borders. Holes have no weight.
 
 use ndarray::{Array2, ArrayView2};
 
-/// The weight reaches this many SDs.
 const REACH: f64 = 3.0;
 
-/// SD with which holes are bridged where no smoothing is requested.
+/// SD that bridges holes without smoothing.
 const BRIDGE_PX: f64 = 2.0;
 
-/// Grid points on a side: the last lies on or behind the last pixel.
 pub(super) fn grid_points(length: usize, grid_px: usize) -> usize {
     (length - 1).div_ceil(grid_px) + 1
 }
@@ -41,7 +36,7 @@ pub(super) fn on_grid(depth_mm: ArrayView2<f32>, sd_px: f64, grid_px: usize) -> 
     smoothed
 }
 
-/// The line fitted to `values` under a Gaussian weight around `at`, at `at` (which may lie behind the last value).
+/// The line fitted to `values` under a Gaussian weight around `at`, evaluated at `at` (may exceed the last index).
 fn local_line(values: &[f64], at: usize, sd_px: f64) -> f64 {
     let here = values.get(at).copied().unwrap_or(f64::NAN);
     if sd_px == 0.0 && here.is_finite() {
@@ -89,7 +84,6 @@ mod tests {
             assert_eq!(smoothed.dim(), (grid_points(50, grid_px), grid_points(63, grid_px)));
             for ((row, column), value) in smoothed.indexed_iter() {
                 let expected = plane((row * grid_px) as f64, (column * grid_px) as f64);
-                // Depths are f32: 6e-5 mm.
                 assert!((value - expected).abs() < 2e-4, "{row} {column}: {value} {expected}");
             }
         }
@@ -97,7 +91,7 @@ mod tests {
 
     #[test]
     fn noise_shrinks_as_theory_says() {
-        // White noise of SD 1 under a Gaussian of SD s keeps 1 / (2 s sqrt(pi)) of it; a pseudo-random sign will do.
+        // White noise of SD 1 under a Gaussian of SD s keeps 1 / (2 s sqrt(pi)); a pseudo-random sign suffices.
         let mut state = 1_u32;
         let noise = Array2::from_shape_fn((200, 200), |_| {
             state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);

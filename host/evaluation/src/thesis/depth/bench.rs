@@ -1,4 +1,4 @@
-//! The imperfect lens and the methods that look through it, each with what calibration told it.
+//! The imperfect lens and the calibrated methods.
 
 use anyhow::Result;
 use farnear_depth::{
@@ -19,11 +19,10 @@ use crate::{
 };
 
 const SEED: u64 = 5_200;
-/// Where the focus is best, px: the centre of the ellipses, and half the size of the evaluated region around it.
+/// Best focus, px: the centre of the ellipses, and half the size of the evaluated region.
 const CENTRE: (usize, usize) = (288, 416);
 const HALF_PX: usize = 128;
 
-/// A method of chapters 5 and 6.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Method {
     /// Raj & Staunton's rational operators, pill-box.
@@ -32,7 +31,7 @@ pub enum Method {
     Gro,
     /// Generalised Gaussian rational operators by the thesis' design.
     Ggro,
-    /// The same by this project's linear design.
+    /// With this project's linear design.
     GgroLinear,
     Subbarao,
     /// Null-space projectors.
@@ -55,14 +54,13 @@ impl Method {
     }
 }
 
-/// The lens, and what each method needs.
 pub struct Bench {
     pub lens: Lens,
-    /// What k was found, with its residual.
+    /// Fitted k, with its residual.
     gaussian: (Psf, f64),
-    /// What p and k were found, with their residual.
+    /// Fitted p and k, with their residual.
     generalised: (Psf, f64),
-    /// The same where the focus is best.
+    /// Fitted at the best focus.
     at_centre: [(Psf, f64); 2],
     operators: Vec<(Method, Operators, Optics)>,
     optics: Optics,
@@ -70,7 +68,6 @@ pub struct Bench {
 }
 
 impl Bench {
-    /// Calibrates through the lens, then designs and learns.
     pub fn new() -> Result<Self> {
         let lens = rig::lens(true)?;
         let pairs = [lens.far_mm, lens.near_mm]
@@ -103,12 +100,10 @@ impl Bench {
         Ok(Self { lens, gaussian, generalised, at_centre, operators, optics, favaro })
     }
 
-    /// An 8-bit pair through the lens.
     pub fn render(&self, scene: &Scene, seed: u64) -> Result<Pair> {
         rig::render(scene, &self.lens, LENS_PSF, Exposure::EightBit, seed)
     }
 
-    /// Depth in mm by a method.
     pub fn depth(&self, method: Method, pair: &Pair, median_px: usize) -> Result<Array2<f32>> {
         let settings = Settings { median_px, ..Settings::default() };
         let (far, near): (ArrayView2<f32>, ArrayView2<f32>) = (pair.far.view(), pair.near.view());
@@ -127,7 +122,6 @@ impl Bench {
         Ok(map.depth_mm)
     }
 
-    /// What calibration found.
     pub fn describe(&self, page: &mut Page) -> Result<()> {
         page.subheading("Calibration of the point spread function (sections 5.2.1 and 5.2.2)");
         let row = |what: &str, [gaussian, generalised]: [(Psf, f64); 2], li: [&str; 3]| {
@@ -154,7 +148,6 @@ impl Bench {
     }
 }
 
-/// PSF of both models, with their residuals, from a part of each image.
 fn calibrated(pairs: &[Pair], part: impl Fn(&Array2<f32>) -> Array2<f32>) -> Result<[(Psf, f64); 2]> {
     let optics = rig::optics("pillbox")?;
     let parts: Vec<[Array2<f32>; 2]> = pairs.iter().map(|pair| [part(&pair.far), part(&pair.near)]).collect();

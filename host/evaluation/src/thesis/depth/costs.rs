@@ -1,4 +1,4 @@
-//! Section 6.6.4: what the corrections cost, compared with depth itself.
+//! Section 6.6.4: cost of the corrections, compared with depth.
 
 use std::time::Instant;
 
@@ -18,10 +18,9 @@ use crate::{page::Page, rig};
 
 /// (height, width) of the thesis' maps: one depth for 7x7 pixels.
 const SMALL: (usize, usize) = (63, 86);
-/// The least of this many times counts: other work on the machine only adds.
+/// The minimum counts, because other load only adds.
 const TIMES: usize = 15;
 
-/// Times in ms, least of [`TIMES`].
 fn least_ms<T>(mut work: impl FnMut() -> T) -> f64 {
     let once = || {
         let start = Instant::now();
@@ -31,7 +30,6 @@ fn least_ms<T>(mut work: impl FnMut() -> T) -> f64 {
     std::iter::repeat_with(once).take(TIMES).fold(f64::INFINITY, f64::min)
 }
 
-/// A map at one depth for 7x7 pixels.
 fn patches(map: &Array2<f32>) -> Array2<f32> {
     map.slice(s![14..14 + 7 * SMALL.0 as isize; 7, 14..14 + 7 * SMALL.1 as isize; 7]).to_owned()
 }
@@ -82,7 +80,7 @@ pub fn measure(page: &mut Page, bench: &Bench, planes: &Planes) -> Result<()> {
     Ok(())
 }
 
-/// Time to fill a disc without texture, of an eighth of the height.
+/// Time to fill a textureless disc of an eighth of the height.
 fn filling(map: &Array2<f32>) -> f64 {
     let (height, width) = map.dim();
     let radius = height as f64 / 8.0;

@@ -13,37 +13,34 @@ use crate::{
     rig,
 };
 
-/// Flat surfaces that teach, as many as in the thesis.
+/// Learned surfaces, as many as in the thesis.
 const PATTERNS: usize = 24;
-/// Others that are judged.
+/// Measured surfaces.
 const JUDGED: usize = 12;
 const SEED: u64 = 5_400;
-/// The methods of fig. 6.4; "Li" is GGRO.
+/// Methods of fig. 6.4; "Li" is GGRO.
 const OF_CHAPTER_6: [Method; 4] = [Method::Subbarao, Method::Favaro, Method::Raj, Method::Ggro];
 
-/// A quantity plotted over depth, and its measurement on a flat target.
 type Figure = (&'static str, fn(&Flat) -> f64);
 
-/// A flat surface as every method measures it, in the order of [`Method::ALL`].
+/// A flat surface by every method, in the order of [`Method::ALL`].
 struct Plane {
     true_mm: f64,
     maps: Vec<Array2<f32>>,
 }
 
-/// All flat surfaces and what they teach.
 pub struct Planes {
     learn: Vec<Plane>,
     judge: Vec<Plane>,
     corrections: Vec<(Method, Taught, Correction)>,
 }
 
-/// Training data of a method.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Taught {
     TwoStep,
-    /// Cancellation by patterns as measured, eqs. 6.2 to 6.10.
+    /// Cancellation by measured patterns, eqs. 6.2 to 6.10.
     CdcRaw,
-    /// The same by smoothed patterns.
+    /// By smoothed patterns.
     Cdc,
     Clsf,
     /// One seamless polynomial with mixed terms.
@@ -65,7 +62,6 @@ impl Taught {
     }
 }
 
-/// What a method makes of a flat surface.
 #[derive(Clone, Copy)]
 pub struct Flat {
     pub mean_mm: f64,
@@ -74,7 +70,7 @@ pub struct Flat {
 }
 
 impl Flat {
-    /// Of the pixels that have a depth and that `counts` allows.
+    /// Of the pixels with a depth that `counts` accepts.
     pub fn of(map: &Array2<f32>, true_mm: f64, counts: impl Fn((usize, usize)) -> bool) -> Self {
         let (mut n, mut sum, mut squares) = (0.0, 0.0, 0.0);
         for (at, depth) in map.indexed_iter() {
@@ -94,11 +90,10 @@ impl Flat {
     }
 }
 
-/// The rim that no table counts.
+/// Excluded border.
 const RIM_PX: usize = 16;
 
 impl Planes {
-    /// Renders and measures all of them, and learns every correction for every method.
     pub fn measure(bench: &Bench) -> Result<Self> {
         let learn = measured(bench, &rig::depths(PATTERNS, 0.0)?, SEED)?;
         let judge = measured(bench, &rig::depths(JUDGED, 0.25)?, SEED + PATTERNS as u64)?;
@@ -123,7 +118,6 @@ impl Planes {
         Ok(Self { learn, judge, corrections })
     }
 
-    /// A map of a method, corrected where asked for.
     pub fn corrected(
         &self,
         method: Method,
@@ -136,13 +130,11 @@ impl Planes {
         Ok(correction.apply(map.view())?)
     }
 
-    /// Maps of a method from the planes that teach, with their true depths.
     pub fn patterns(&self, method: Method) -> impl Iterator<Item = (f64, &Array2<f32>)> {
         let index = place(method);
         self.learn.iter().map(move |plane| (plane.true_mm, &plane.maps[index]))
     }
 
-    /// What a method makes of the judged planes.
     fn judged(&self, method: Method, taught: Option<Taught>) -> Result<Vec<(f64, Flat)>> {
         let of = |plane: &Plane| {
             let map = self.corrected(method, taught, &plane.maps[place(method)])?;
@@ -286,7 +278,7 @@ pub fn depth_dependence(page: &mut Page, planes: &Planes) -> Result<()> {
     let [far, near] = [planes.learn.first(), planes.learn.last()].map(|plane| plane.context("no planes"));
     let (far, near) = (far?, near?);
     let cancelled = |of: &Array2<f32>, by: &Plane| of - &by.maps[index] + by.true_mm as f32;
-    // The judged planes next to the ends, so that a pattern is not taken off itself.
+    // Measured planes at the ends, so that no pattern is subtracted from itself.
     let [seen_far, seen_near] =
         [planes.judge.first(), planes.judge.last()].map(|plane| plane.context("no planes"));
     let mut maps = Vec::new();
@@ -312,7 +304,7 @@ pub fn depth_dependence(page: &mut Page, planes: &Planes) -> Result<()> {
         &panels::grid(3, &panels)?,
         "Subbarao's method, fig. 6.1: a far and a near surface as measured, with its own pattern subtracted, and with the other's",
     )?;
-    // Noise of single pixels is many times the bowl: its size is judged by means over 40 x 40 px.
+    // Means over 40 x 40 px: single pixels are much noisier than the bowl.
     let bowl = |map: &Array2<f32>, true_mm: f64| {
         let blocks = map.exact_chunks((40, 40)).into_iter().map(|block| {
             let values = block.iter().filter(|v| v.is_finite());

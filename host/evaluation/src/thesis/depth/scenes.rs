@@ -1,4 +1,4 @@
-//! Tables 5.1 and 5.2: flat surfaces of four scenes; figs. 6.7 and 6.8: two of them before and after correction.
+//! Tables 5.1 and 5.2: flat surfaces of four scenes; figs. 6.7 and 6.8: two before and after correction.
 
 use anyhow::Result;
 use ndarray::Array2;
@@ -18,7 +18,7 @@ use crate::{
 
 const SEED: u64 = 5_500;
 
-/// A line of the tables, with the thesis' figures for SC, TP, HD and CD.
+/// With the thesis' figures for SC, TP, HD and CD.
 struct Line {
     name: &'static str,
     method: Method,
@@ -75,14 +75,12 @@ const LINES: [Line; 8] = [
     },
 ];
 
-/// A scene with its pair and what the methods of chapter 6 make of it.
 pub struct Seen {
     name: &'static str,
     pair: Pair,
     maps: Vec<(Method, &'static str, Array2<f32>)>,
 }
 
-/// Writes both tables, and gives the scenes for the pictures.
 pub fn measure(page: &mut Page, bench: &Bench, planes: &Planes) -> Result<Vec<Seen>> {
     page.subheading("Flat surfaces of four scenes (tables 5.1 and 5.2)");
     let scenes = shapes::all()?;

@@ -1,5 +1,5 @@
-//! The thesis' four test scenes as height maps, with their flat surfaces marked. Their photographs (fig. 5.5) show what they are and
-//! not how large: distances and sizes are ours, within the working range.
+//! The thesis' four test scenes as height maps with marked flat surfaces. Their sizes are not published (fig.
+//! 5.5 shows photographs); ours are within the working range.
 
 use anyhow::Result;
 use farnear_scene::{HeightMap, Picture, Scene, Shape, Texture};
@@ -7,25 +7,20 @@ use ndarray::Array2;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-/// (height, width) of the maps, a value per pixel.
 const SIZE: (usize, usize) = (480, 640);
-/// Pixels of a flat surface this near to its edge are excluded: windows reach over the edge.
+/// Windows reach over edges: excluded distance from an edge.
 const EDGE_PX: usize = 9;
-/// Contrast of sandpaper, and of skin.
+/// Sandpaper, and skin.
 const CONTRAST: [f32; 2] = [0.2, 0.05];
 
 pub struct TestScene {
-    /// The thesis' abbreviation.
     pub name: &'static str,
     pub about: &'static str,
     pub scene: Scene,
-    /// Depth of each flat surface and where it counts.
     pub flats: Vec<(f64, Array2<bool>)>,
-    /// Side of the median, px.
     pub median_px: usize,
 }
 
-/// Draws a scene: depths, and which flat surface a pixel belongs to.
 struct Sketch {
     depth_mm: Array2<f32>,
     flat: Array2<u8>,
@@ -33,7 +28,6 @@ struct Sketch {
 }
 
 impl Sketch {
-    /// Begins with a flat background.
     fn new(background_mm: f64) -> Self {
         Self {
             depth_mm: Array2::from_elem(SIZE, background_mm as f32),
@@ -42,14 +36,12 @@ impl Sketch {
         }
     }
 
-    /// A flat surface where `inside` (x, y) holds.
     fn flat(&mut self, depth_mm: f64, inside: impl Fn(f64, f64) -> bool) {
         self.depths.push(depth_mm);
         let label = self.depths.len() as u8;
         self.draw(label, |x, y| inside(x, y).then_some(depth_mm));
     }
 
-    /// Any other surface, where `depth` gives one.
     fn shape(&mut self, depth: impl Fn(f64, f64) -> Option<f64>) {
         self.draw(0, depth);
     }
@@ -63,7 +55,7 @@ impl Sketch {
         }
     }
 
-    /// An upright cylinder towards the camera.
+    /// Upright cylinder towards the camera.
     fn column(&mut self, x0: f64, [top, bottom]: [f64; 2], radius: f64, [rim_mm, front_mm]: [f64; 2]) {
         self.shape(move |x, y| {
             let across = (x - x0) / radius;
@@ -84,10 +76,10 @@ impl Sketch {
     }
 }
 
-/// Pixels of a surface with nothing else within [`EDGE_PX`], nor the picture's border.
+/// Pixels with the same surface within [`EDGE_PX`].
 fn eroded(flat: &Array2<u8>, label: u8) -> Array2<bool> {
     let (height, width) = SIZE;
-    // Sums over rectangles from the upper left corner make each window four look-ups.
+    // Integral image: four look-ups per window.
     let mut sums = Array2::<u32>::zeros((height + 1, width + 1));
     for ((y, x), found) in flat.indexed_iter() {
         sums[(y + 1, x + 1)] =
@@ -106,7 +98,6 @@ fn eroded(flat: &Array2<u8>, label: u8) -> Array2<bool> {
     })
 }
 
-/// All four, in the order of table 5.1.
 pub fn all() -> Result<[TestScene; 4]> {
     Ok([staircase_and_cone()?, temple()?, hand()?, depression()?])
 }
@@ -172,7 +163,7 @@ fn depression() -> Result<TestScene> {
     sketch.finish("CD", "a block with a conical depression, on a ledge")
 }
 
-/// Grain at two samples per pixel: white noise blurred by a binomial of SD 1 sample, less of it on skin.
+/// Grain at two samples per pixel: white noise blurred by a binomial of SD 1 sample, less on skin.
 fn paint(skin: &Array2<bool>) -> Array2<f32> {
     let (height, width) = (2 * SIZE.0, 2 * SIZE.1);
     let mut random = ChaCha8Rng::seed_from_u64(55);

@@ -1,7 +1,8 @@
-//! `farnear rig home | move | stop | halt`.
+//! `farnear rig home | move`.
 
 use anyhow::{Result, bail};
 use clap::Args;
+use farnear_protocol::message::Axis;
 use farnear_workflows::rig::motion::{self, MoveSettings};
 
 use super::{AxisName, Target};
@@ -46,26 +47,9 @@ pub struct MoveArguments {
     json: bool,
 }
 
-/// Stop all motion along the ramps and end a running program; positions stay known.
-#[derive(Args)]
-#[command(after_help = "Example: farnear rig stop --port /dev/ttyACM0")]
-pub struct StopArguments {
-    #[command(flatten)]
-    target: Target,
-}
-
-/// Emergency stop: the last step comes within a millisecond; what moved has lost its position, and the alarm has to be
-/// cleared (farnear rig alarms).
-#[derive(Args)]
-#[command(after_help = "Example: farnear rig halt --port /dev/ttyACM0")]
-pub struct HaltArguments {
-    #[command(flatten)]
-    target: Target,
-}
-
 /// Runs `home`.
 pub fn home(arguments: HomeArguments) -> Result<()> {
-    let axes: Vec<_> = arguments.axis.iter().map(|name| name.axis()).collect();
+    let axes: Vec<_> = arguments.axis.iter().map(|name| Axis::from(*name)).collect();
     let address = arguments.target.address()?;
     report::print(&motion::home(&address, &axes, &terminal::context()?)?, arguments.json)
 }
@@ -80,19 +64,9 @@ pub fn go(arguments: MoveArguments) -> Result<()> {
     if let Some(twice) =
         axes.iter().enumerate().find_map(|(at, axis)| axes[..at].contains(axis).then_some(axis))
     {
-        bail!(Usage(format!("--axis {} is given twice", twice.axis().name())));
+        bail!(Usage(format!("--axis {} is given twice", Axis::from(*twice).name())));
     }
-    let targets = axes.iter().map(|name| name.axis()).zip(to_um).collect();
+    let targets = axes.iter().map(|name| Axis::from(*name)).zip(to_um).collect();
     let settings = MoveSettings { rig: target.address()?, targets, home };
     report::print(&motion::move_to(&settings, &terminal::context()?)?, json)
-}
-
-/// Runs `stop`.
-pub fn stop(arguments: StopArguments) -> Result<()> {
-    Ok(motion::stop(&arguments.target.address()?, &terminal::context()?)?)
-}
-
-/// Runs `halt`.
-pub fn halt(arguments: HaltArguments) -> Result<()> {
-    Ok(motion::halt(&arguments.target.address()?, &terminal::context()?)?)
 }

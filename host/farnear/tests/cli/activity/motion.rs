@@ -60,7 +60,11 @@ fn motion_files_teach_and_become_samples() {
     let samples = folder.text("eve/samples.toml");
     let judged = figures(&mut farnear(&["activity", "evaluate", &samples, "--model", &model, "--json"]));
     assert_eq!((number(&judged, "answers"), number(&judged, "accuracy")), (4.0, 1.0), "{judged}");
-    fails(farnear(&draw).args(["--out", &folder.text("no"), "--keep", "3"]), 2, &["--samples", "--keep"]);
+    fails(
+        farnear(&draw).args(["--out", &folder.text("no"), "--keep", "3"]),
+        2,
+        &["kept silhouettes 3", "no samples"],
+    );
 
     let nameless = folder.text("ann-up.txt");
     fails(&mut train(std::slice::from_ref(&nameless), &[]), 1, &["ann-up.txt", "ACTIVITY=FILE"]);

@@ -10,7 +10,7 @@ pub(super) struct Layout {
 
 pub(super) const CLASSIC: Layout = Layout { little: true, big: false };
 
-/// A page with tags (number, values) and strips; types follow from the values.
+/// Tags (number, values) and strips; types follow from the values.
 #[derive(Clone, Default)]
 pub(super) struct Page {
     pub shorts: Vec<(u16, Vec<u16>)>,
@@ -105,7 +105,6 @@ pub(super) fn tiff(layout: Layout, pages: &[Page]) -> Vec<u8> {
     file
 }
 
-/// Grey ramp, brighter to the right.
 pub(super) fn jpeg(width: u32, height: u32) -> Vec<u8> {
     let image = image::GrayImage::from_fn(width, height, |x, y| {
         image::Luma([(200 * x / width + (x * 7 + y * 13) % 11) as u8])
@@ -115,7 +114,6 @@ pub(super) fn jpeg(width: u32, height: u32) -> Vec<u8> {
     bytes
 }
 
-/// [`jpeg`] with an EXIF orientation.
 pub(super) fn jpeg_turned(width: u32, height: u32, orientation: u8) -> Vec<u8> {
     let jpeg = jpeg(width, height);
     let mut exif = b"Exif\0\0MM\0*\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0".to_vec();

@@ -122,7 +122,6 @@ fn rotates_a_jpeg_by_its_orientation() {
     let plain = decode_grey(&jpeg(48, 32)).unwrap().pixels;
     let turned = decode_grey(&jpeg_turned(48, 32, 6)).unwrap().pixels;
     assert_eq!(turned.dim(), (48, 32));
-    // Right is down.
     assert_eq!(turned[(40, 10)], plain[(31 - 10, 40)]);
     assert_eq!(decode_grey(&jpeg_turned(48, 32, 1)).unwrap().pixels, plain);
 }

@@ -21,17 +21,13 @@ use std::collections::HashMap;
 pub struct Camera {
     view: View,
     distance_mm: f64,
-    /// Height of the target point.
     target_mm: f64,
-    /// Pixels of a standing person.
     person_px: f64,
-    /// Quality of the masks.
     segmentation: Segmentation,
     /// Shares of the standing person cut off by the image border: below, and at a side.
     cut: [f64; 2],
 }
 
-/// Segmentation damage of a clip.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Segmentation {
     Clean,
@@ -90,7 +86,6 @@ impl Camera {
         ([scale * x, 0.0, scale * z], scale)
     }
 
-    /// Image of a body: capsules in the target plane, magnified by distance.
     fn image(&self, body: &[Capsule]) -> Vec<Capsule> {
         let matrix = self.view.matrix();
         body.iter()
@@ -116,7 +111,7 @@ impl Camera {
         self.filmed(&reach, stature_mm, drawn, scaling, rng)
     }
 
-    /// The same of a person in a suit whose points a template makes a body of; gaps between parts up to `gap_mm` are closed.
+    /// [`Self::track`] for the parts of a suit; closes gaps between parts up to `gap_mm`.
     pub fn track_of_parts(
         &self,
         frames: &[HashMap<&str, Point3>],
@@ -142,7 +137,6 @@ impl Camera {
         self.filmed(&reach, stature_mm, drawn, scaling, rng)
     }
 
-    /// Frames drawn on a canvas for `reach`, cut by the border and segmented.
     fn filmed(
         &self,
         reach: &[Point],

@@ -1,7 +1,5 @@
-//! Gait from published joint angles, with spreads in amplitude, tempo and arms.
-//!
-//! Walking: Winter (The Biomechanics and Motor Control of Human Gait, 1991, natural cadence); running:
-//! Novacheck (Gait and Posture 7, 1998); angles at every tenth of the cycle from heel contact.
+//! Gait from published joint angles, with spreads in amplitude, tempo and arms. Walking: Winter (The
+//! Biomechanics and Motor Control of Human Gait, 1991); running: Novacheck (Gait and Posture 7, 1998).
 
 use super::moment::{Hand, Moment};
 use farnear_silhouettes::synthetic::body::Leg;
@@ -23,11 +21,9 @@ pub struct Gait {
     run: f64,
     /// Scale of leg swings.
     stride: f64,
-    /// Permanent knee bend, as when sneaking.
     stoop_deg: f64,
     lean_deg: f64,
     nod_deg: f64,
-    /// Arm swing.
     swing_deg: f64,
     elbow_deg: f64,
     out: f64,
@@ -38,7 +34,6 @@ pub struct Gait {
 }
 
 impl Gait {
-    /// Walking: strides of 0.75 to 1.1 Hz (Winter 1991, slightly widened).
     fn walk(rng: &mut ChaCha8Rng) -> Self {
         Self {
             run: 0.0,
@@ -111,14 +106,12 @@ impl Gait {
         }
     }
 
-    /// Walking with a bag in one hand.
     fn bag(rng: &mut ChaCha8Rng, main: usize) -> Self {
         let mut gait = Self::walk(rng);
         gait.held[main] = Some(Hand::at(rng.random_range(0.1..0.25), rng.random_range(-0.05..0.1), -0.97));
         gait
     }
 
-    /// Walking with a phone at the ear.
     fn phone(rng: &mut ChaCha8Rng, main: usize) -> Self {
         let mut gait = Self::walk(rng);
         gait.held[main] = Some(super::gestures::ear(rng));
@@ -156,7 +149,6 @@ impl Gait {
     }
 }
 
-/// Periodic Catmull-Rom interpolation of a cycle.
 fn on(cycle: &Cycle, phase: f64) -> f64 {
     let x = phase.rem_euclid(1.0) * cycle.len() as f64;
     let (i, t) = (x.floor() as usize, x.fract());

@@ -1,7 +1,5 @@
-//! Gestures of arms and hands while the body stands.
-//!
-//! Hand positions are in arm lengths from the shoulder: mouth 0.3 inwards and 0.3 up, ear 0.1 inwards and
-//! 0.35 up (Winter's proportions). Times are those of unhurried adults with variation.
+//! Gestures of arms and hands of a standing person. Positions are in arm lengths from the shoulder: mouth 0.3
+//! inwards and 0.3 up, ear 0.1 inwards and 0.35 up (Winter's proportions).
 
 use super::moment::{Hand, Moment};
 use super::motion::{Maker, Motion};
@@ -14,7 +12,6 @@ pub fn ear(rng: &mut ChaCha8Rng) -> Hand {
         .elbow(rng.random_range(0.0..0.4))
 }
 
-/// End positions of a wave: with the forearm, or the whole arm at the side.
 fn wave_ends(maker: &mut Maker) -> (Hand, Hand) {
     let ahead = maker.draw(0.0, 0.55);
     if maker.chance(0.5) {
@@ -29,7 +26,6 @@ fn wave_ends(maker: &mut Maker) -> (Hand, Hand) {
     }
 }
 
-/// Waving with one hand or both.
 fn wave(maker: &mut Maker, hands: &[usize]) -> Motion {
     let (low, high) = wave_ends(maker);
     let with = |mut moment: Moment, hand: Hand| {
@@ -85,7 +81,6 @@ fn bring(maker: &mut Maker, hand: Hand, nod_deg: f64, hold: f64, back: bool) -> 
     if maker.chance(0.8) { maker.once(parts) } else { maker.gesture(parts) }
 }
 
-/// Duration of a hold, seconds; usually short.
 fn hold(maker: &mut Maker) -> f64 {
     maker.draw(0.1_f64.ln(), 2.2_f64.ln()).exp()
 }
@@ -159,13 +154,12 @@ pub fn throw(maker: &mut Maker) -> Motion {
     maker.gesture(parts)
 }
 
-/// Hands that push or pull: one or both.
 fn both_or_one(maker: &mut Maker, both: f64) -> Vec<usize> {
     if maker.chance(both) { vec![0, 1] } else { vec![maker.main] }
 }
 
-/// Near and far hand positions for pushing and pulling (chest or waist, and stretched ahead), and the
-/// shoulders' turn for one hand. Relative to turned shoulders, ahead is outwards.
+/// Near and far hand positions (chest or waist, and ahead), and the shoulders' turn for one hand. Relative to
+/// turned shoulders, ahead is outwards.
 fn near_and_far(maker: &mut Maker, single: bool) -> (Hand, Hand, f64) {
     let up = maker.draw(-0.35, 0.25);
     let turn = if single { maker.draw(0.0, 40.0) } else { 0.0 };

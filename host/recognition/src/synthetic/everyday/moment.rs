@@ -46,7 +46,7 @@ impl Hand {
     }
 
     /// Interpolates between the straight line (`arc` 0) and the arc around the shoulder (1); real hands
-    /// follow neither, because arms rotate about joints (Atkeson and Hollerbach, J. Neurosci. 5, 1985).
+    /// follow neither (Atkeson and Hollerbach, J. Neurosci. 5, 1985).
     fn on_the_way(self, to: Self, s: f64, arc: f64) -> Self {
         let straight = Self {
             out: mixed(self.out, to.out, s),
@@ -73,7 +73,6 @@ impl Hand {
         }
     }
 
-    /// Distance from the shoulder.
     fn reach(self) -> f64 {
         (self.out * self.out + self.ahead * self.ahead + self.up * self.up).sqrt()
     }
@@ -107,7 +106,6 @@ pub struct Moment {
     pub arc: f64,
 }
 
-/// Interpolation from `a` to `b`, `s` from 0 to 1.
 fn mixed(a: f64, b: f64, s: f64) -> f64 {
     a + (b - a) * s
 }
@@ -202,8 +200,7 @@ pub fn duration(keys: &Keys) -> f64 {
     keys.iter().map(|(seconds, _)| seconds).sum()
 }
 
-/// State `t` seconds into a motion from its first key, with minimum jerk between keys (Flash and Hogan, J.
-/// Neurosci. 5, 1985).
+/// State `t` seconds into a motion, with minimum jerk (Flash and Hogan, J. Neurosci. 5, 1985).
 pub fn at(keys: &Keys, t: f64) -> Moment {
     let Some((_, first)) = keys.first() else { return Moment::standing() };
     let (mut from, mut gone) = (first, keys[0].0);

@@ -42,7 +42,6 @@ pub struct Maker<'r> {
     pub main: usize,
     /// Stance while nothing happens.
     pub rest: Moment,
-    /// Scale of all times.
     tempo: f64,
 }
 
@@ -177,7 +176,6 @@ impl Motion {
 }
 
 impl Motion {
-    /// Start and end of a clip, seconds.
     fn cut(&self, rng: &mut ChaCha8Rng) -> (f64, f64) {
         match self {
             Self::Gait(gait) => {
@@ -220,6 +218,6 @@ impl Motion {
     }
 }
 
-/// Smallest and largest number of frames of a clip.
+/// Fewest frames of a clip, and the most.
 const LEAST_FRAMES: usize = 6;
 const MOST_FRAMES: usize = 64;

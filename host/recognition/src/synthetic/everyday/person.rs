@@ -11,13 +11,9 @@ use rand_chacha::ChaCha8Rng;
 pub struct Person {
     /// Body proportions.
     pub build: Build,
-    /// Trunk, with clothes.
     trunk: f64,
-    /// Arms.
     arms: f64,
-    /// Legs.
     legs: f64,
-    /// Head with hair or hat.
     head: f64,
     /// Arm length; trackers and short sleeves end at the wrist.
     reach: f64,
@@ -30,9 +26,9 @@ pub struct Person {
 }
 
 impl Person {
-    /// A person. Stature after the spread of grown-ups (mean 1.70 m, SD 0.10 m; NCD-RisC, eLife 5, 2016), breadths and lengths of limbs
-    /// with the coefficients of variation of Gordon et al. (ANSUR, 1989), 4 to 6 %, and down to the shorter trunks and arms that trackers of
-    /// joints measure (trunk and arm 0.48 and 0.67 of a leg, where Winter has 0.59 and 0.79); clothes are guessed wide.
+    /// A random person. Stature: mean 1.70 m, SD 0.10 m (NCD-RisC, eLife 5, 2016). Limbs vary by 4 to 6 %
+    /// (Gordon et al., ANSUR, 1989), down to the shorter trunks and arms of joint trackers (0.48 and 0.67 of
+    /// a leg; Winter: 0.59 and 0.79). Clothes are guessed.
     pub fn drawn(rng: &mut ChaCha8Rng) -> Self {
         let girth = rng.random_range(0.85..1.12);
         Self {
@@ -172,7 +168,6 @@ fn cross(a: Point3, b: Point3) -> Point3 {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
-/// Rotation about a unit axis through `about` (Rodrigues).
 fn turned_about(p: Point3, about: Point3, axis: Point3, angle: f64) -> Point3 {
     let (v, (s, c)) = (difference(p, about), angle.sin_cos());
     let (beside, along) = (cross(axis, v), dot(axis, v));

@@ -4,7 +4,6 @@ use super::moment::{Hand, Moment};
 use super::motion::{Maker, Motion};
 use rand::Rng;
 
-/// Reaching to the ground with the back, the knees or both.
 fn down(maker: &mut Maker, hands: &[usize], deep: f64) -> Moment {
     // Share of the knees.
     let squat = maker.draw(0.0, 1.0);
@@ -29,7 +28,7 @@ fn down(maker: &mut Maker, hands: &[usize], deep: f64) -> Moment {
     moment
 }
 
-/// Distance from the thing on the ground before and after, of stature: most make a step.
+/// Distance from the object on the ground before and after, in statures: most make a step.
 fn steps(maker: &mut Maker) -> (f64, f64) {
     if maker.chance(0.4) {
         return (0.0, 0.0);
@@ -37,7 +36,6 @@ fn steps(maker: &mut Maker) -> (f64, f64) {
     (-maker.draw(0.0, 0.3), maker.draw(-0.25, 0.25))
 }
 
-/// Holding a picked-up object before the body.
 fn held(maker: &mut Maker, hands: &[usize]) -> Moment {
     let mut moment = maker.rest;
     let place = maker.near(Hand::at(-0.1, 0.4, -0.5), 0.2);
@@ -161,7 +159,6 @@ pub fn crouch(maker: &mut Maker) -> Motion {
     maker.once(parts)
 }
 
-/// Sitting on a chair, and the approach with the trunk ahead.
 fn seated(maker: &mut Maker) -> (Moment, Moment) {
     let knee = maker.draw(60.0, 112.0);
     let hip = knee + maker.draw(-20.0, 10.0);

@@ -1,11 +1,9 @@
-//! Kalman filter of position and velocity along one axis (Journal of Basic Engineering 82, 1960). Lengths in
-//! pixels, standard deviations in heights of the person.
+//! Kalman filter of position and velocity along one axis (Journal of Basic Engineering 82, 1960), in pixels.
 
-/// Standard deviations of a measured position, and of the velocity change per frame, in heights.
+/// Standard deviations of a measured position and of the velocity change per frame, in heights.
 const MEASURED: f64 = 0.04;
 const PACE: f64 = 0.012;
 
-/// Position and velocity along one axis with covariance.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Motion {
     /// Predicted position, px.
@@ -15,13 +13,11 @@ pub(super) struct Motion {
 }
 
 impl Motion {
-    /// At a position with unknown velocity.
     pub fn new(at: f64, height: f64) -> Self {
         // Up to a tenth of a height per frame initially.
         Self { at, pace: 0.0, covariance: [(MEASURED * height).powi(2), 0.0, (0.1 * height).powi(2)] }
     }
 
-    /// Predicts one frame ahead.
     pub fn predict(&mut self, height: f64) {
         self.at += self.pace;
         let [a, b, c] = self.covariance;

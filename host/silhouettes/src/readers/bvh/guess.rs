@@ -1,24 +1,21 @@
-//! Estimates the unit and up axis of a BVH file from the body.
+//! Estimates the unit and up axis of a BVH file from the joints `head` and `foot`, `ankle` or `toe`.
 //!
-//! Joints are identified by name: `head`; `foot`, `ankle` or `toe`. Some writers keep all bones along one
-//! axis, so that the rest pose folds head and feet to one side of the hips; then the frames give the up axis.
-//! Lengths along bones are valid in every pose.
+//! Some writers keep all bones along one axis, so that the rest pose folds head and feet to one side of the
+//! hips; then the frames give the up axis. Lengths along bones are valid in every pose.
 
 use super::super::recording::{Known, Source, Unit, Up};
 use super::kinematics::{Kinematics, at_rest};
 use super::parse::{Joint, Motion};
 use crate::silhouette::capsule::Point3;
 
-/// Range of a person's stature, metres.
 const STATURE_M: std::ops::RangeInclusive<f64> = 1.4..=2.1;
-/// Geometric mean of it.
+/// Geometric mean of the range.
 const TYPICAL_M: f64 = 1.7;
 /// Share of the feet-to-head vector along an axis for a sure up axis.
 const UPRIGHT: f64 = 0.8;
 /// Frames sampled for the up axis.
 const FRAMES_ASKED: usize = 100;
 
-/// Joints that measure a body.
 struct Body {
     root: usize,
     head: usize,
@@ -47,7 +44,6 @@ impl Body {
         (!feet.is_empty()).then_some(Self { root, head, feet })
     }
 
-    /// From the feet to the head.
     fn upward(&self, places: &[Point3]) -> Point3 {
         let feet: Point3 = std::array::from_fn(|k| {
             self.feet.iter().map(|&foot| places[foot][k]).sum::<f64>() / self.feet.len() as f64
@@ -64,7 +60,6 @@ impl Body {
         0.0 < head && head < all
     }
 
-    /// From head to toe along the bones.
     fn stature(&self, joints: &[Joint]) -> f64 {
         let leg = self.feet.iter().map(|&foot| length(joints, foot)).fold(0.0, f64::max);
         length(joints, self.head) + leg
@@ -81,7 +76,6 @@ fn length(joints: &[Joint], mut joint: usize) -> f64 {
     sum
 }
 
-/// The unit that gives a human size.
 pub fn unit(joints: &[Joint]) -> Known<Unit> {
     let (size, what) = match Body::of(joints) {
         Some(body) => (body.stature(joints), "from head to toe along the bones"),
@@ -114,7 +108,6 @@ fn extent(joints: &[Joint]) -> f64 {
     (0..3).map(along).fold(0.0, f64::max)
 }
 
-/// The axis along which the head is above the feet.
 pub fn up(motion: &Motion, kinematics: &Kinematics) -> Known<Up> {
     let Some(body) = Body::of(&motion.joints) else {
         let reason = "for BVH files mostly have it so, and no joint is named head or foot to tell by".into();

@@ -21,7 +21,6 @@ pub fn at_rest(joints: &[Joint]) -> Vec<Point3> {
     places
 }
 
-/// Joint positions of frames.
 #[derive(Clone, Debug)]
 pub struct Kinematics<'a> {
     joints: &'a [Joint],
@@ -30,10 +29,9 @@ pub struct Kinematics<'a> {
 }
 
 impl<'a> Kinematics<'a> {
-    /// The first frame decides how position channels are meant.
-    ///
-    /// Biovision's description adds them to the offset; most current writers store the whole translation.
-    /// With offset o and first position p they replace the offset if p is nearer to o than to 0.
+    /// The first frame decides how position channels are meant: Biovision adds them to the offset, most
+    /// current writers store the whole translation. They replace offset o if the first position is nearer to
+    /// o than to 0.
     pub fn new(motion: &'a Motion) -> Self {
         let mut replaces = Vec::with_capacity(motion.joints.len());
         let mut from = 0;
@@ -52,7 +50,7 @@ impl<'a> Kinematics<'a> {
         Self { joints: &motion.joints, replaces }
     }
 
-    /// Joint positions of a frame with one value per channel; file units and axes.
+    /// File units and axes.
     pub fn places(&self, frame: &[f64]) -> Vec<Point3> {
         let mut values = frame.iter().copied();
         let mut places: Vec<Point3> = Vec::with_capacity(self.joints.len());
@@ -111,28 +109,27 @@ mod tests {
         }
     }
 
-    /// By hand. Quarter turns: Rx(90) takes (x, y, z) to (x, -z, y), Ry(90) to (z, y, -x), Rz(90) to (-y, x, z).
-    ///
-    /// ZXY with Z = 90, X = 90, Y = 0, root at (10, 20, 30). Root's turn is Rz Rx.
+    /// Quarter turns: Rx(90) takes (x, y, z) to (x, -z, y), Ry(90) to (z, y, -x), Rz(90) to (-y, x, z).
+    /// Z = 90, X = 90, Y = 0, root at (10, 20, 30): the root's rotation is Rz Rx.
     /// Arm: Rx (1, 2, 0) = (1, 0, 2); Rz of that = (0, 1, 2); the arm is at (10, 21, 32).
-    /// The arm turns by Y = 90 only: Ry (0, 0, 3) = (3, 0, 0); Rx = (3, 0, 0); Rz = (0, 3, 0); the hand is at (10, 24, 32).
+    /// Hand (Y = 90): Ry (0, 0, 3) = (3, 0, 0); Rx = (3, 0, 0); Rz = (0, 3, 0); it is at (10, 24, 32).
     #[test]
     fn zxy_as_worked_out_by_hand() {
         let found = places("Zrotation Xrotation Yrotation", "10 20 30 90 90 0 0 0 90");
         are(&found, &[[10.0, 20.0, 30.0], [10.0, 21.0, 32.0], [10.0, 24.0, 32.0]]);
     }
 
-    /// The same angles about the same axes listed as X, Y, Z: the root's turn is Rx Rz (Y = 0).
+    /// The same angles in the order X, Y, Z: the root's rotation is Rx Rz (Y = 0).
     /// Arm: Rz (1, 2, 0) = (-2, 1, 0); Rx of that = (-2, 0, 1); the arm is at (8, 20, 31).
-    /// The arm by Y = 90: Ry (0, 0, 3) = (3, 0, 0); Rz = (0, 3, 0); Rx = (0, 0, 3); the hand is at (8, 20, 34).
+    /// Hand (Y = 90): Ry (0, 0, 3) = (3, 0, 0); Rz = (0, 3, 0); Rx = (0, 0, 3); it is at (8, 20, 34).
     #[test]
     fn xyz_as_worked_out_by_hand() {
         let found = places("Xrotation Yrotation Zrotation", "10 20 30 90 0 90 0 90 0");
         are(&found, &[[10.0, 20.0, 30.0], [8.0, 20.0, 31.0], [8.0, 20.0, 34.0]]);
     }
 
-    /// ZYX with angles that are no quarter turns, root Z = 30 deg, Y = 0, X = 0, arm Z = 60, Y = 30, X = 0. Turns about z add: the
-    /// hand's offset (0, 0, 3) is turned by Ry(30) to (1.5, 0, 3 cos 30), then by Rz(90) to (0, 1.5, 3 cos 30).
+    /// Root Z = 30 deg, arm Z = 60, Y = 30. Rotations about z add: the hand's offset (0, 0, 3) is rotated by
+    /// Ry(30) to (1.5, 0, 3 cos 30), then by Rz(90) to (0, 1.5, 3 cos 30).
     /// Arm: Rz(30) (1, 2, 0) = (cos 30 - 1, 0.5 + 2 cos 30, 0).
     #[test]
     fn zyx_as_worked_out_by_hand() {

@@ -22,13 +22,12 @@
 //! 9.4 17.9 -17.3 0 0 0 0 0 -21
 //! ```
 //!
-//! Key words in any case; white space and line breaks as one likes up to `MOTION`. Names run to the end of their line, so that they
-//! may hold blanks (`Bip01 L Foot`) and colons (`mixamorig:Hips`).
+//! Keywords in any case; free white space and line breaks up to `MOTION`. Names extend to the end of their
+//! line, so they may hold blanks (`Bip01 L Foot`) and colons (`mixamorig:Hips`).
 
 use super::super::recording::RecordingError;
 use crate::silhouette::capsule::Point3;
 
-/// Meaning of a value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Channel {
     /// Along this axis (0 to 2), file unit.
@@ -37,7 +36,6 @@ pub enum Channel {
     Rotation(usize),
 }
 
-/// Channels by name.
 const CHANNELS: [(&str, Channel); 6] = [
     ("Xposition", Channel::Position(0)),
     ("Yposition", Channel::Position(1)),
@@ -47,35 +45,30 @@ const CHANNELS: [(&str, Channel); 6] = [
     ("Zrotation", Channel::Rotation(2)),
 ];
 
-/// A joint or end site.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Joint {
     /// End sites have their joint's name with `_End`.
     pub name: String,
-    /// Parent, earlier in the list; `None` for roots.
+    /// Earlier in the list; `None` for roots.
     pub parent: Option<usize>,
-    /// Offset from the parent at rest, file unit.
+    /// At rest, file unit.
     pub offset: Point3,
-    /// Channels in file order.
+    /// In file order.
     pub channels: Vec<Channel>,
 }
 
-/// Contents of a file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Motion {
-    /// Joints and end sites, parents first.
+    /// Parents first.
     pub joints: Vec<Joint>,
-    /// Frame interval.
     pub frame_time_s: f64,
-    /// Values of all channels per frame.
     pub frames: Vec<Vec<f64>>,
 }
 
-/// Limit of points per byte of text. A joint with three channels takes at least six bytes per frame and has
-/// at most one end site, so real files are far below; without it a few bytes could request any memory.
+/// Limit of points per byte of text; without it a few bytes could request any memory. A joint with three
+/// channels takes at least six bytes per frame, so real files are far below.
 const POINTS_PER_BYTE: usize = 4;
 
-/// Errors: [`RecordingError::Line`] with what was found and expected.
 pub fn parse(text: &str) -> Result<Motion, RecordingError> {
     let mut cursor = Cursor { rest: text, line: 1 };
     cursor.expect("HIERARCHY")?;
@@ -99,8 +92,7 @@ pub fn parse(text: &str) -> Result<Motion, RecordingError> {
     Ok(Motion { joints, frame_time_s, frames })
 }
 
-/// Joints up to the word MOTION. One loop with an arm per word and its errors, because splitting would spread
-/// the bracket handling.
+/// Joints up to the word MOTION. One loop with an arm per word: splitting would spread the bracket handling.
 fn hierarchy(cursor: &mut Cursor) -> Result<Vec<Joint>, RecordingError> {
     let mut joints: Vec<Joint> = Vec::new();
     // Open joints, and whether each has had its OFFSET.
@@ -168,7 +160,6 @@ fn wrong(line: usize, reason: String) -> RecordingError {
     RecordingError::Line { line, reason }
 }
 
-/// Start of a possibly long text.
 fn short(text: &str) -> &str {
     const LONGEST: usize = 40;
     text.char_indices().nth(LONGEST).map_or(text, |(at, _)| &text[..at])
@@ -183,15 +174,12 @@ fn number(text: &str, line: usize, what: &str) -> Result<f64, RecordingError> {
     value.ok_or_else(|| wrong(line, format!("found `{}`, expected a number: {what}", short(text))))
 }
 
-/// Reading position.
 struct Cursor<'a> {
     rest: &'a str,
-    /// Line of the last word.
     line: usize,
 }
 
 impl<'a> Cursor<'a> {
-    /// Skips white space; the counted line is that of the next word.
     fn skip(&mut self) {
         let trimmed = self.rest.trim_start();
         let skipped = &self.rest[..self.rest.len() - trimmed.len()];
@@ -219,7 +207,6 @@ impl<'a> Cursor<'a> {
         }
     }
 
-    /// Text up to the end of the line or the bracket.
     fn name(&mut self, what: &str) -> Result<String, RecordingError> {
         let length = self.rest.find(['\n', '{', '}']).unwrap_or(self.rest.len());
         let (name, rest) = self.rest.split_at(length);
@@ -268,7 +255,6 @@ impl<'a> Cursor<'a> {
         Ok(channels)
     }
 
-    /// Brackets of an end site with its offset.
     fn end_site(&mut self) -> Result<Point3, RecordingError> {
         self.expect("{")?;
         self.expect("OFFSET")?;
@@ -278,10 +264,8 @@ impl<'a> Cursor<'a> {
     }
 }
 
-/// Non-empty lines after MOTION with their numbers.
 struct Lines<'a> {
     lines: Box<dyn Iterator<Item = (usize, &'a str)> + 'a>,
-    /// Last line of the file.
     last: usize,
 }
 

@@ -1,5 +1,5 @@
-//! People in the JSON of pose estimators, in all common nestings: a frame a file (OpenPose), a list of people with the picture they are in
-//! (COCO, AlphaPose), lists of frames (MMPose, MediaPipe), or frames by the pictures' names.
+//! People in the JSON of pose estimators, in all common nestings: a frame per file (OpenPose), a list of
+//! people with their picture (COCO, AlphaPose), lists of frames (MMPose, MediaPipe), or picture names.
 
 use std::collections::BTreeMap;
 
@@ -8,33 +8,27 @@ use serde_json::{Map, Value};
 use super::layouts::{Layout, NAMES};
 use crate::readers::recording::RecordingError;
 
-/// Points less sure than this are treated as missing.
+/// Points of less confidence are missing.
 pub const LEAST_CONFIDENCE: f64 = 0.1;
 
-/// A person in a frame: x to the right and y down, by [`NAMES`].
+/// x to the right and y down, by [`NAMES`].
 #[derive(Clone, Debug)]
 pub struct Person {
     pub points: Vec<Option<[f64; 2]>>,
-    /// Its number in the file's own tracking.
     pub id: Option<i64>,
 }
 
-/// What a document holds.
 #[derive(Debug, Default)]
 pub struct Document {
     pub frames: Vec<Vec<Person>>,
-    /// Width and height of the pictures, pixels.
     pub size: Option<[f64; 2]>,
     pub layout: Option<&'static Layout>,
-    /// Points below the least confidence.
     pub unsure: usize,
 }
 
-/// Keys under which a frame keeps its people, and a document its frames.
 const PEOPLE: [&str; 8] =
     ["people", "bodies", "instances", "persons", "poses", "predictions", "detections", "annotations"];
 const FRAMES: [&str; 6] = ["frames", "instance_info", "pose_frames", "results", "data", "root"];
-/// Keys under which a person keeps its points.
 const POINTS: [&str; 8] = [
     "pose_keypoints_2d",
     "keypoints",
@@ -48,10 +42,6 @@ const POINTS: [&str; 8] = [
 const CONFIDENCES: [&str; 3] = ["keypoint_scores", "keypoints_scores", "keypoint_confidences"];
 
 impl Document {
-    /// Reads one JSON document.
-    ///
-    /// # Errors
-    /// JSON that is damaged or holds no person's points.
     pub fn parse(bytes: &[u8]) -> Result<Self, RecordingError> {
         let value: Value = serde_json::from_slice(bytes).map_err(|error| RecordingError::Line {
             line: error.line(),
@@ -81,7 +71,7 @@ impl Document {
                     self.frames.push(frame);
                     return;
                 }
-                // Frames by the names of their pictures.
+                // Frames by picture names.
                 let mut named: Vec<(&String, &Value)> = map
                     .iter()
                     .filter(|(_, frame)| frame.as_object().is_some_and(is_frame) || frame.is_array())
@@ -97,7 +87,7 @@ impl Document {
     }
 
     fn frames_of(&mut self, items: &[Value]) {
-        // The points of one person alone, or people of one frame.
+        // The points of one person, or people of one frame.
         if let Some(person) = self.points_of(items, None) {
             self.frames.push(vec![Person { points: person, id: None }]);
             return;
@@ -108,7 +98,7 @@ impl Document {
         }
     }
 
-    /// People with the pictures that they are in; pictures without people between them are empty frames.
+    /// Pictures between them without people are empty frames.
     fn by_picture(&mut self, items: &[Value], pictures: &[Value]) {
         let mut frames: BTreeMap<(String, u64, String), Vec<Person>> = BTreeMap::new();
         let mut names: BTreeMap<String, String> = BTreeMap::new();
@@ -126,7 +116,7 @@ impl Document {
             let person = self.person(item);
             frames.entry(key).or_default().extend(person);
         }
-        /// Gaps are filled where they lengthen the recording at most by this factor.
+        /// Gaps are filled if the recording grows at most by this factor.
         const LONGEST: u64 = 10;
         let numbers: Vec<u64> = frames.keys().map(|(_, number, _)| *number).collect();
         let step =
@@ -146,7 +136,6 @@ impl Document {
         }
     }
 
-    /// The people of a frame.
     fn frame(&mut self, value: &Value) -> Vec<Person> {
         let people = match value {
             Value::Object(map) => PEOPLE.iter().find_map(|key| map.get(*key)).unwrap_or(value),
@@ -190,7 +179,7 @@ impl Document {
         self.points_of(value.as_array()?, confidences)
     }
 
-    /// Points in any of the forms x, y, c, ... in one list, lists of two to four numbers, or objects with x and y.
+    /// Points as x, y, c, ... in one list, lists of two to four numbers, or objects with x and y.
     fn points_of(&mut self, items: &[Value], confidences: Option<&[Value]>) -> Option<Vec<Option<[f64; 2]>>> {
         let number = |value: &Value| value.as_f64().unwrap_or(0.0);
         let flat = items.first()?.is_number();
@@ -238,7 +227,7 @@ impl Document {
     }
 }
 
-/// The confidence after x and y; of MediaPipe the third number is a depth.
+/// The value after x and y; MediaPipe's third number is a depth.
 fn confidence(numbers: &[Value], layout: &Layout) -> f64 {
     let depth = layout.count == 33;
     let sure = match numbers.len() {
@@ -249,12 +238,10 @@ fn confidence(numbers: &[Value], layout: &Layout) -> f64 {
     sure.and_then(Value::as_f64).unwrap_or(1.0)
 }
 
-/// Whether a document's object is a frame itself.
 fn is_frame(map: &Map<String, Value>) -> bool {
     PEOPLE.iter().chain(&POINTS).any(|key| map.contains_key(*key))
 }
 
-/// The picture that a person is in.
 fn picture_of(item: &Value) -> Option<String> {
     match item.get("image_id").or_else(|| item.get("frame_id")).or_else(|| item.get("image_name"))? {
         Value::String(name) => Some(name.clone()),
@@ -264,7 +251,7 @@ fn picture_of(item: &Value) -> Option<String> {
     .filter(|_| item.get("instances").is_none())
 }
 
-/// Names in the order of their last number.
+/// Sort key of names: by their last number.
 fn order(name: &str) -> (String, u64, String) {
     let stem = name.rsplit_once('.').map_or(name, |(stem, _)| stem);
     let end = stem.rfind(|c: char| c.is_ascii_digit()).map_or(0, |at| at + 1);
@@ -281,7 +268,6 @@ fn first_number(value: &Value) -> Option<f64> {
     }
 }
 
-/// The pictures' size where the document states it.
 fn size(value: &Value) -> Option<[f64; 2]> {
     let map = value.as_object()?;
     let of = |map: &Map<String, Value>| {

@@ -1,10 +1,10 @@
-//! The orders in which pose estimators write their points: one table, a line per layout.
+//! Point orders of pose estimators: one table, a line per layout.
 
-/// A layout of points; their number identifies it.
+/// A layout, identified by its number of points.
 #[derive(Debug, PartialEq)]
 pub struct Layout {
     pub name: &'static str,
-    /// Points of a person in the file; those after `points` (face, hands) are not needed.
+    /// Points of a person in the file; those after `points` (face, hands) are ignored.
     pub count: usize,
     /// Short names, see [`full_name`]; empty for points that are not drawn.
     pub points: &'static [&'static str],
@@ -198,7 +198,7 @@ const MEDIAPIPE_33: [&str; 33] = [
     "right big toe",
 ];
 
-/// The names of the template `keypoints`, in the order in which readers give points.
+/// Names of the template `keypoints`, in the readers' order.
 pub const NAMES: [&str; 28] = [
     "nose",
     "left eye",
@@ -231,12 +231,10 @@ pub const NAMES: [&str; 28] = [
 ];
 
 impl Layout {
-    /// The layout with this number of points.
     pub fn of(count: usize) -> Option<&'static Self> {
         LAYOUTS.iter().find(|layout| layout.count == count)
     }
 
-    /// Place of each point among [`NAMES`].
     pub fn places(&self) -> impl Iterator<Item = Option<usize>> {
         self.points.iter().map(|short| NAMES.iter().position(|name| *name == full_name(short)))
     }

@@ -1,19 +1,18 @@
-//! People followed through frames: by the file's own numbers, else by place.
+//! Follows people through frames by the file's own numbers, else by place.
 
 use std::collections::BTreeMap;
 
 use super::{document::Person, layouts::NAMES};
 
-/// A person's points in every frame.
 pub type Track = Vec<Vec<Option<[f64; 2]>>>;
 
-/// People who are kept: bounds the memory for a crowd.
+/// Limit of people, which bounds the memory.
 const MOST: usize = 16;
-/// Frames without a person after which the next one in that place is another person.
+/// After this many frames without a person, the next one in that place is another person.
 const FORGOTTEN_AFTER: usize = 30;
-/// Steps from frame to frame, as parts of the body's height.
+/// Largest step per frame, in body heights.
 const WIDEST_STEP: f64 = 0.5;
-/// People seen for less than this part of the time of the one seen most are passers-by or false detections.
+/// People seen for a smaller share than the one seen most are passers-by or false detections.
 const LEAST_SHARE: f64 = 0.1;
 
 struct Followed {
@@ -22,11 +21,10 @@ struct Followed {
     centre: [f64; 2],
     height: f64,
     heights: f64,
-    /// Frame and place in it.
+    /// Frame and index in it.
     seen: Vec<(usize, usize)>,
 }
 
-/// The people, the one seen most and largest first, and how many there are.
 pub fn followed(frames: &[Vec<Person>]) -> (Vec<Track>, usize) {
     let mut all: Vec<Followed> = Vec::new();
     let mut of_id: BTreeMap<i64, usize> = BTreeMap::new();
@@ -98,7 +96,7 @@ fn begun(id: Option<i64>, centre: [f64; 2], height: f64) -> Followed {
 }
 
 fn add(track: &mut Followed, frame: usize, place: usize, centre: [f64; 2], height: f64) {
-    // One number twice in a frame: the first is kept.
+    // A number that occurs twice in a frame: the first counts.
     if track.seen.last().is_some_and(|(last, _)| *last == frame) {
         return;
     }
@@ -107,7 +105,7 @@ fn add(track: &mut Followed, frame: usize, place: usize, centre: [f64; 2], heigh
     track.seen.push((frame, place));
 }
 
-/// The middle and the longer side of the box about a person's points; `None` with fewer than four.
+/// Centre and longer side of the box around a person's points; `None` with fewer than four.
 fn extent(person: &Person) -> Option<([f64; 2], f64)> {
     let points: Vec<[f64; 2]> = person.points.iter().flatten().copied().collect();
     let side = |k: usize| {

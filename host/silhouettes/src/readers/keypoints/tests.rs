@@ -2,7 +2,7 @@ use super::super::{read, recording::Choices};
 use super::*;
 use layouts::{LAYOUTS, Layout};
 
-/// A person upright at x, 170 pixels tall, in a layout's order: 1 px is 10 mm.
+/// An upright person at x, 170 pixels tall: 1 px is 10 mm.
 fn person(layout: &Layout, x: f64) -> Vec<[f64; 3]> {
     let place = |name: &str| -> [f64; 2] {
         let side = if name.starts_with("left") { 1.0 } else { -1.0 };

@@ -1,12 +1,8 @@
-//! Silhouettes, shadow and activities.
+//! Recognition of activities.
 
 use std::path::{Path, PathBuf};
 
 use farnear_files::staging::Staging;
-use farnear_shadow::sun::{self, Place};
-use farnear_shadow::{self as shadow, detectors};
-use farnear_silhouettes::readers::recording::{Choices, Up};
-use farnear_silhouettes::silhouette::parts::Fill;
 use serde_json::Value;
 
 use super::{BatchError, Call, Fields, Job, value};
@@ -17,131 +13,7 @@ use crate::{
     },
     context::Context,
     error::Result,
-    shadow::removal::{self, LightSource, RemovalSettings},
-    silhouettes::{
-        markers::{self, MarkersSettings},
-        video::{self, ShadowTreatment, VideoSettings},
-    },
-    sun::Moment,
 };
-
-pub(super) fn video(fields: &mut Fields) -> Result<Box<dyn Job>> {
-    let detector = fields.optional::<detectors::Method>("shadow_detector")?;
-    let settings = VideoSettings {
-        video: fields.path("video")?,
-        out: fields.path("out")?,
-        learn_first: fields.flag("learn_first")?,
-        learning_frames: fields.or("learning_frames", 10)?,
-        history_frames: fields.or("history_frames", 500)?,
-        learning: fields.optional("learning")?.unwrap_or_default(),
-        shadow: match (detector, fields.flag("keep_shadow")?) {
-            (Some(detector), true) => {
-                let reason = "keep_shadow excludes removing it; name one of them";
-                return Err(BatchError::field("shadow_detector", detector.name(), reason).into());
-            }
-            (Some(detector), false) => ShadowTreatment::Detector(detector),
-            (None, true) => ShadowTreatment::Keep,
-            (None, false) => ShadowTreatment::ByModel,
-        },
-        centred: fields.flag("centred")?,
-        labels: None,
-        grey: fields.flag("grey")?,
-    };
-    Ok(Box::new(Call {
-        inputs: vec![settings.video.clone()],
-        settings,
-        run: |settings, out, context| {
-            value(video::extract(&VideoSettings { out: out.into(), ..settings.clone() }, context)?)
-        },
-    }))
-}
-
-pub(super) fn markers(fields: &mut Fields) -> Result<Box<dyn Job>> {
-    let template = fields.name_or_file("template")?.ok_or(BatchError::MissingField { name: "template" })?;
-    let settings = MarkersSettings {
-        file: fields.path("file")?,
-        choices: Choices {
-            unit: fields.optional("units")?,
-            up: up(fields)?,
-            person: fields.optional("person")?,
-        },
-        template: Some(template.display().to_string()),
-        out: fields.path("out")?,
-        views: fields.or("views", 8)?,
-        first_view_deg: fields.or("first_view_deg", 0.0)?,
-        elevation_deg: fields.or("elevation_deg", 0.0)?,
-        mm_per_px: fields.or("mm_per_px", 6.0)?,
-        close_mm: fields.optional("close_mm")?,
-        fill: match fields.optional_text("fill")?.as_deref() {
-            None | Some("hull") => Fill::Hull,
-            Some("triplets") => Fill::Triplets,
-            Some(other) => return Err(BatchError::field("fill", other, "expected hull or triplets").into()),
-        },
-        every: fields.or("every", 1)?,
-        centred: fields.flag("centred")?,
-        keep: fields.optional("keep")?,
-        samples: None,
-    };
-    let mut inputs = vec![settings.file.clone()];
-    inputs.extend(template.is_file().then_some(template));
-    Ok(Box::new(Call {
-        inputs,
-        settings,
-        run: |settings, out, context| {
-            value(markers::draw(&MarkersSettings { out: out.into(), ..settings.clone() }, context)?)
-        },
-    }))
-}
-
-fn up(fields: &mut Fields) -> Result<Option<Up>, BatchError> {
-    match fields.optional_text("up")?.as_deref() {
-        None => Ok(None),
-        Some("x") => Ok(Some(Up::X)),
-        Some("y") => Ok(Some(Up::Y)),
-        Some("z") => Ok(Some(Up::Z)),
-        Some(other) => Err(BatchError::field("up", other, "expected x, y or z")),
-    }
-}
-
-pub(super) fn shadow(fields: &mut Fields) -> Result<Box<dyn Job>> {
-    let light = light(fields)?;
-    let settings = RemovalSettings {
-        masks: fields.path("masks")?,
-        camera: fields.path("camera")?,
-        light,
-        method: fields.or("method", shadow::Method::default())?,
-        out: fields.path("out")?,
-        stages: None, // a job makes the one folder that is written down as its result
-    };
-    Ok(Box::new(Call {
-        inputs: vec![settings.masks.clone(), settings.camera.clone()],
-        settings,
-        run: |settings, out, context| {
-            value(removal::remove_from_masks(
-                &RemovalSettings { out: out.into(), ..settings.clone() },
-                context,
-            )?)
-        },
-    }))
-}
-
-/// `lamp`, `shadow_direction`, or the sun's `lat`, `lon` and `time`.
-fn light(fields: &mut Fields) -> Result<LightSource> {
-    if let Some(lamp) = fields.optional_text("lamp")? {
-        let lamp =
-            removal::parse_lamp(&lamp).map_err(|expected| BatchError::field("lamp", &lamp, expected))?;
-        return Ok(LightSource::Lamp(lamp));
-    }
-    if let Some(degrees) = fields.optional("shadow_direction")? {
-        return Ok(LightSource::Direction { degrees });
-    }
-    let degrees = |fields: &mut Fields, name| -> Result<f64> {
-        Ok(fields.optional(name)?.ok_or(BatchError::MissingField { name })?)
-    };
-    let place = Place::new(degrees(fields, "lat")?, degrees(fields, "lon")?)?;
-    let moment = Moment { place, time: sun::parse_time(&fields.text("time")?)? };
-    Ok(LightSource::Sun { moment, rate_hz: fields.optional("rate_hz")? })
-}
 
 struct Recognising {
     model: PathBuf,

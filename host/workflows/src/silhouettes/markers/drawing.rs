@@ -18,7 +18,7 @@ use rayon::prelude::*;
 
 use super::{
     super::{SilhouettesError, cut_out},
-    MarkersSettings,
+    MarkersRequest,
 };
 use crate::{context::Context, counter::Counter, error::Result};
 
@@ -33,7 +33,7 @@ const DURING: &str = "drawing silhouettes";
 
 /// What all views share.
 pub struct Job<'a> {
-    pub settings: &'a MarkersSettings,
+    pub settings: &'a MarkersRequest,
     /// How many views are drawn.
     pub views: usize,
     /// The body's parts.

@@ -5,28 +5,27 @@ use std::{
     time::{Duration, Instant},
 };
 
-use farnear_depth::focus_measure::FocusMeasure;
 use farnear_protocol::message::{Axis, Routine};
 use farnear_scripted_board::{Faults, Peer, plug_in};
 use farnear_workflows::{
     Context, Result, WorkflowError,
     rig::{
         RigAddress,
-        check::{self, CheckSettings},
-        continuous::{self, ContinuousSettings, Cycle, Enough},
-        focus::{self, FocusSettings},
+        check::{self, CheckRequest},
+        continuous::{self, ContinuousRequest},
+        focus::{self, FocusRequest},
         live,
         live_depth::{self, LiveDepthSettings},
         mechanics,
         motion::{self, MoveSettings},
-        pair::{self, PairSettings},
-        sequence::{self, Program, SequenceSettings},
+        pair::{self, CaptureRequest},
+        sequence::{self, SequenceRequest},
         series::{self, SeriesSettings},
-        targets::{self, TargetSettings},
+        targets::{self, TargetSeriesRequest},
     },
 };
 
-use super::{Face, camera, optics};
+use super::{Face, camera, optics, stack};
 
 /// Longest time from cancelling to the end of the workflow, with a board that answers and stops immediately.
 const STOPPED_WITHIN: Duration = Duration::from_millis(300);
@@ -88,57 +87,40 @@ fn every_workflow_that_moves_stops_the_rig() {
         (
             "pair",
             Box::new(|rig, context| {
-                let settings = PairSettings {
-                    rig,
-                    camera: camera(path),
-                    optics: optics(),
-                    averaged: 1,
-                    frames: None,
-                    out: out(),
-                };
+                let (camera, optics, out) = (camera(path), optics(), out());
+                let settings = CaptureRequest { rig, camera, optics, out, ..Default::default() };
                 pair::capture(&settings, context).map(drop)
             }),
         ),
         (
             "sequence",
             Box::new(|rig, context| {
-                let program =
-                    Program::Stack { axis: Axis::SensorFine, from_um: 20.0, to_um: 180.0, steps: 3 };
-                let (camera, out) = (camera(path), out());
-                let settings = SequenceSettings { rig, camera, program, runs: 1, optics: None, out };
+                let settings = SequenceRequest { rig, camera: camera(path), out: out(), ..stack() };
                 sequence::run(&settings, context).map(drop)
             }),
         ),
         (
             "focus",
             Box::new(|rig, context| {
-                let settings = FocusSettings {
-                    rig,
-                    camera: camera(path),
-                    optics: optics(),
-                    start_mm: None,
-                    range_mm: 1.0,
-                    measure: FocusMeasure::Tenengrad,
-                    region: None,
-                };
+                let settings =
+                    FocusRequest { rig, camera: camera(path), optics: optics(), ..Default::default() };
                 focus::focus(&settings, context).map(drop)
             }),
         ),
         (
             "targets",
             Box::new(|rig, context| {
-                let (camera, distances_mm) = (camera(path), vec![900.0]);
-                let optics = optics();
-                let settings = TargetSettings { rig, camera, optics, distances_mm, ask: true, out: out() };
+                let (camera, distances, no_prompt) = (camera(path), vec![900.0], false);
+                let (optics, out) = (optics(), out());
+                let settings = TargetSeriesRequest { rig, camera, optics, distances, no_prompt, out };
                 targets::capture(&settings, context).map(drop)
             }),
         ),
         (
             "continuous",
             Box::new(|rig, context| {
-                let (camera, cycle) = (camera(path), Cycle::Pair { optics: optics() });
-                let enough = Enough::Never;
-                let settings = ContinuousSettings { rig, camera, cycle, rate_hz: None, enough, out: None };
+                let (camera, optics) = (camera(path), Some(optics()));
+                let settings = ContinuousRequest { rig, camera, optics, ..Default::default() };
                 continuous::run(&settings, context).map(drop)
             }),
         ),
@@ -191,8 +173,8 @@ fn a_camera_that_gives_nothing_is_waited_for_no_longer() {
         };
         let (error, board) = cancelled(&Faults::default(), exposed, |rig, context| {
             let out = path.join("out");
-            let settings =
-                PairSettings { rig, camera: camera(path), optics: optics(), averaged: 1, frames: None, out };
+            let (camera, optics) = (camera(path), optics());
+            let settings = CaptureRequest { rig, camera, optics, out, ..Default::default() };
             pair::capture(&settings, context).map(drop)
         });
         assert_eq!(board.board().stops, 1);
@@ -220,7 +202,7 @@ fn hands_that_do_not_come_are_waited_for_no_longer() {
             context.cancel.cancel();
         });
         let rig = RigAddress::Port(port);
-        let settings = CheckSettings { rig, camera: camera(path), resting_only: false, actuation: true };
+        let settings = CheckRequest { rig, camera: camera(path), ..Default::default() };
         let error = check::check(&settings, &context).unwrap_err();
         assert!(matches!(&error, WorkflowError::Cancelled { .. }), "{error}");
     });

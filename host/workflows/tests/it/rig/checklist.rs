@@ -6,7 +6,7 @@ use farnear_workflows::{
     Cancel, Context, Progress, Questions, Result, WorkflowError,
     rig::{
         RigAddress,
-        check::{self, CheckSettings, Checklist, Verdict},
+        check::{self, CheckRequest, Checklist, Verdict},
     },
 };
 
@@ -50,7 +50,7 @@ fn go_through(board: Peer, port: String, hands: bool, resting_only: bool) -> (Ch
     let person = Person { board, face: Face::default() };
     let context = Context::new(&person, &person, Cancel::default());
     let rig = RigAddress::Port(port);
-    let settings = CheckSettings { rig, camera: camera(images.path()), resting_only, actuation: hands };
+    let settings = CheckRequest { rig, camera: camera(images.path()), resting_only, no_actuation: !hands };
     let list = check::check(&settings, &context).unwrap();
     (list, person)
 }

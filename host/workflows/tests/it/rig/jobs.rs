@@ -11,7 +11,7 @@ use farnear_workflows::{
         log::{self, LogSettings},
         mechanics::{self, MechanicsFigures},
         motion::{self, MoveFigures, MoveSettings},
-        pair::{self, PairSettings},
+        pair::{self, CaptureRequest},
         settings,
     },
 };
@@ -46,11 +46,9 @@ fn what_cannot_be_is_refused_before_the_port_is_looked_at() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("out");
     let camera = camera(&folder.path().join("absent"));
-    let error = pair::capture(
-        &PairSettings { rig, camera, optics: optics(), averaged: 1, frames: None, out },
-        &context,
-    )
-    .unwrap_err();
+    let error =
+        pair::capture(&CaptureRequest { rig, camera, optics: optics(), out, ..Default::default() }, &context)
+            .unwrap_err();
     assert!(matches!(error, WorkflowError::Camera(_)), "{error}");
     assert_eq!(folder.path().read_dir().unwrap().count(), 0);
 }

@@ -7,31 +7,30 @@ use std::{
     time::{Duration, Instant},
 };
 
-use farnear_depth::{focus_measure::FocusMeasure, pipeline};
 use farnear_files::image_file::encode_png;
-use farnear_protocol::message::{Axis, EventKind, Routine, ShotRecord};
+use farnear_protocol::message::{EventKind, Routine, ShotRecord};
 use farnear_scripted_board::{Faults, Peer, plug_in};
 use farnear_workflows::{
     Context, Result, WorkflowError,
     optics::GivenOptics,
     rig::{
         RigAddress,
-        check::{self, CheckSettings},
-        continuous::{self, ContinuousSettings, Cycle, Enough},
-        focus::{self, FocusSettings},
+        check::{self, CheckRequest},
+        continuous::{self, ContinuousRequest},
+        focus::{self, FocusRequest},
         live,
         live_depth::{self, LiveDepthSettings},
         mechanics, motion,
         open::OpenRig,
-        pair::{self, PairSettings},
-        sequence::{self, Program, SequenceSettings},
+        pair::{self, CaptureRequest},
+        sequence::{self, SequenceRequest},
         series::{self, SeriesSettings},
-        targets::{self, TargetSettings},
+        targets::{self, TargetSeriesRequest},
     },
 };
 use ndarray::Array2;
 
-use super::{Face, camera, optics};
+use super::{Face, camera, optics, stack};
 
 /// What a second run may take longer than the first on a crowded computer. Each needless wait for the board is 5 s or more.
 const LEEWAY: Duration = Duration::from_secs(2);
@@ -104,7 +103,8 @@ fn a_second_run_takes_no_longer_than_the_first() {
             "capture",
             Box::new(|rig, run, context| {
                 let (camera, out) = (camera(), out("pair", run));
-                let settings = PairSettings { rig, camera, optics: optics(), averaged: 1, frames: None, out };
+                let optics = optics();
+                let settings = CaptureRequest { rig, camera, optics, out, ..Default::default() };
                 pair::capture(&settings, context).map(drop)
             }),
         ),
@@ -119,24 +119,21 @@ fn a_second_run_takes_no_longer_than_the_first() {
         (
             "sequence",
             Box::new(|rig, run, context| {
-                let program =
-                    Program::Stack { axis: Axis::SensorFine, from_um: 20.0, to_um: 180.0, steps: 3 };
                 let (camera, out) = (camera(), out("sequence", run));
-                let settings = SequenceSettings { rig, camera, program, runs: 1, optics: None, out };
+                let settings = SequenceRequest { rig, camera, out, ..stack() };
                 sequence::run(&settings, context).map(drop)
             }),
         ),
         (
             "focus",
             Box::new(|rig, _, context| {
-                let settings = FocusSettings {
+                let settings = FocusRequest {
                     rig,
                     camera: camera(),
                     optics: optics(),
                     start_mm: Some(52.9),
                     range_mm: 0.3,
-                    measure: FocusMeasure::Tenengrad,
-                    region: None,
+                    ..Default::default()
                 };
                 focus::focus(&settings, context).map(drop)
             }),
@@ -145,8 +142,8 @@ fn a_second_run_takes_no_longer_than_the_first() {
             "continuous",
             Box::new(|rig, run, context| {
                 let (camera, out) = (camera(), Some(out("continuous", run)));
-                let (cycle, enough) = (Cycle::Pair { optics: optics() }, Enough::Exposures(4));
-                let settings = ContinuousSettings { rig, camera, cycle, rate_hz: None, enough, out };
+                let (optics, frames) = (Some(optics()), Some(4));
+                let settings = ContinuousRequest { rig, camera, optics, frames, out, ..Default::default() };
                 continuous::run(&settings, context).map(drop)
             }),
         ),
@@ -160,7 +157,7 @@ fn a_second_run_takes_no_longer_than_the_first() {
         (
             "live depth",
             Box::new(|rig, _, context| {
-                let computation = pipeline::Settings::default();
+                let computation = farnear_depth::pipeline::Settings::default();
                 let settings = LiveDepthSettings { rig, camera: camera(), optics: optics(), computation };
                 until_two(|seen| live_depth::watch(&settings, context, |depth| seen(depth.pair_ms)))
             }),
@@ -168,8 +165,9 @@ fn a_second_run_takes_no_longer_than_the_first() {
         (
             "targets",
             Box::new(|rig, run, context| {
-                let (camera, distances_mm, out) = (camera(), vec![900.0], out("targets", run));
-                let settings = TargetSettings { rig, camera, optics: optics(), distances_mm, ask: true, out };
+                let (camera, optics, out) = (camera(), optics(), out("targets", run));
+                let (distances, no_prompt) = (vec![900.0], false);
+                let settings = TargetSeriesRequest { rig, camera, optics, distances, no_prompt, out };
                 targets::capture(&settings, context).map(drop)
             }),
         ),
@@ -180,7 +178,7 @@ fn a_second_run_takes_no_longer_than_the_first() {
         (
             "check",
             Box::new(|rig, _, context| {
-                let settings = CheckSettings { rig, camera: camera(), resting_only: true, actuation: false };
+                let settings = CheckRequest { rig, camera: camera(), resting_only: true, no_actuation: true };
                 check::check(&settings, context).map(drop)
             }),
         ),

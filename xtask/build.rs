@@ -1,0 +1,3 @@
+fn main() {
+    farnear_test_data::declare_programs();
+}
