@@ -4,7 +4,8 @@
 
 use std::io::{self, Write};
 
-use ndarray::ArrayView2;
+use ndarray::{Array2, ArrayView2, ArrayViewMut1, Axis};
+use rayon::prelude::*;
 
 /// Depth step between surfaces, part of the map's range.
 const STEP: f32 = 0.1;
@@ -72,8 +73,8 @@ impl Lateral {
     }
 }
 
-/// No vertex.
-const NONE: u32 = u32::MAX;
+/// Rows that are encoded together, on all threads.
+const ROWS: usize = 64;
 
 /// Writes the mesh of `depth`, coloured by `grey` (any scale), row by row, as large maps exceed memory. Names the unit.
 pub fn write(
@@ -89,16 +90,17 @@ pub fn write(
     let step = (high - low) * STEP;
     let brightest = grey.iter().copied().filter(|value| value.is_finite()).fold(1e-9, f32::max);
 
-    let mut marks = vec![0; width];
-    let (mut vertices, mut faces) = (0, 0);
-    for row in 0..height {
-        vertices += depth.row(row).iter().map(|z| u32::from(z.is_finite())).sum::<u32>() as usize;
+    let mut marks = Array2::<u8>::zeros((height, width));
+    let of_rows = marks.axis_iter_mut(Axis(0)).into_par_iter().enumerate().map(|(row, mut marks)| {
         if row > 0 {
             mark_faces(depth, row, step, &mut marks);
-            faces +=
-                marks.iter().map(|mark| u32::from(mark & 1) + u32::from(mark >> 1)).sum::<u32>() as usize;
         }
-    }
+        let vertices: u32 = depth.row(row).iter().map(|z| u32::from(z.is_finite())).sum();
+        let faces: u32 = marks.iter().map(|mark| u32::from(mark & 1) + u32::from(mark >> 1)).sum();
+        [vertices, faces]
+    });
+    let counts: Vec<[u32; 2]> = of_rows.collect();
+    let [vertices, faces] = [0, 1].map(|of| counts.iter().map(|count| count[of] as usize).sum::<usize>());
     write!(
         to,
         "ply\nformat binary_little_endian 1.0\ncomment depth map in {unit}\nelement vertex {vertices}\n\
@@ -106,60 +108,66 @@ pub fn write(
          property uchar red\nproperty uchar green\nproperty uchar blue\n\
          element face {faces}\nproperty list uchar uint vertex_indices\nend_header\n"
     )?;
-    // Whole rows, for large writes.
-    let mut bytes = Vec::with_capacity(2 * FACE_BYTES * width);
-    for row in 0..height {
-        bytes.clear();
-        let line = depth.row(row).into_iter().zip(grey.row(row)).enumerate();
-        for (column, (&z, grey)) in line.filter(|(_, (z, _))| z.is_finite()) {
+    in_order(height, to, |row| {
+        let mut bytes = vec![0; VERTEX_BYTES * (width + 1)];
+        let mut end = 0;
+        for (column, (&z, grey)) in depth.row(row).into_iter().zip(grey.row(row)).enumerate() {
             let [x, y] = lateral.beside_axis((height, width), column, row, f64::from(z));
             let shade = (255.0 * (grey / brightest).clamp(0.0, 1.0) + 0.5) as u8;
-            let mut vertex = [shade; VERTEX_BYTES];
-            for (place, value) in vertex.chunks_exact_mut(4).zip([x as f32, y as f32, -z]) {
-                place.copy_from_slice(&value.to_le_bytes());
+            let places = [x as f32, y as f32, -z].map(f32::to_le_bytes);
+            bytes[end..end + 12].copy_from_slice(places.as_flattened());
+            bytes[end + 12..end + VERTEX_BYTES].fill(shade);
+            // Without a depth the next vertex takes its place.
+            end += if z.is_finite() { VERTEX_BYTES } else { 0 };
+        }
+        bytes.truncate(end);
+        bytes
+    })?;
+    // Vertices are numbered in order: the first of each row.
+    let mut first = vec![0_u32];
+    first.extend(counts.iter().scan(0, |next, [vertices, _]| {
+        *next += vertices;
+        Some(*next)
+    }));
+    in_order(height, to, |row| {
+        let mut bytes = vec![3; FACE_BYTES * (2 * width + 2)];
+        let mut end = 0;
+        let mut face = |corners: [u32; 3], counts: u8| {
+            bytes[end + 1..end + FACE_BYTES].copy_from_slice(corners.map(u32::to_le_bytes).as_flattened());
+            end += usize::from(counts) * FACE_BYTES;
+            bytes[end] = 3;
+        };
+        if row > 0 {
+            let [mut upper, mut lower] = [first[row - 1], first[row]];
+            let lines = depth.row(row - 1).into_iter().zip(depth.row(row)).zip(marks.row(row));
+            for ((above, below), mark) in lines {
+                let upper_right = upper + u32::from(above.is_finite());
+                let lower_right = lower + u32::from(below.is_finite());
+                face([upper, lower, upper_right], mark & 1);
+                face([upper_right, lower, lower_right], mark >> 1);
+                (upper, lower) = (upper_right, lower_right);
             }
-            bytes.extend_from_slice(&vertex);
         }
-        to.write_all(&bytes)?;
-    }
-    // Vertices are numbered in order, so two rows of numbers suffice.
-    let mut next = 0;
-    let mut numbers = [vec![NONE; width], vec![NONE; width]];
-    for row in 0..height {
-        numbers.swap(0, 1);
-        for (number, z) in numbers[1].iter_mut().zip(depth.row(row)) {
-            *number = if z.is_finite() { next } else { NONE };
-            next += u32::from(z.is_finite());
-        }
-        if row == 0 {
-            continue;
-        }
-        mark_faces(depth, row, step, &mut marks);
-        bytes.clear();
-        let [upper, lower] = &numbers;
-        for ((mark, upper), lower) in marks.iter().zip(upper.windows(2)).zip(lower.windows(2)) {
-            if mark & 1 != 0 {
-                bytes.extend_from_slice(&face([upper[0], lower[0], upper[1]]));
-            }
-            if mark & 2 != 0 {
-                bytes.extend_from_slice(&face([upper[1], lower[0], lower[1]]));
-            }
-        }
-        to.write_all(&bytes)?;
+        bytes.truncate(end);
+        bytes
+    })
+}
+
+/// Encodes rows on all threads and writes them in order.
+fn in_order(
+    rows: usize,
+    to: &mut impl Write,
+    encode: impl Fn(usize) -> Vec<u8> + Sync + Send,
+) -> io::Result<()> {
+    for begin in (0..rows).step_by(ROWS) {
+        let parts: Vec<Vec<u8>> = (begin..(begin + ROWS).min(rows)).into_par_iter().map(&encode).collect();
+        to.write_all(&parts.concat())?;
     }
     Ok(())
 }
 
 const VERTEX_BYTES: usize = 15;
 const FACE_BYTES: usize = 13;
-
-fn face(corners: [u32; 3]) -> [u8; FACE_BYTES] {
-    let mut face = [3_u8; FACE_BYTES];
-    for (place, number) in face[1..].chunks_exact_mut(4).zip(corners) {
-        place.copy_from_slice(&number.to_le_bytes());
-    }
-    face
-}
 
 /// [`write()`] into memory, for thinned maps.
 pub fn ply(depth: ArrayView2<f32>, grey: ArrayView2<f32>, lateral: Lateral, unit: &str) -> Vec<u8> {
@@ -170,12 +178,13 @@ pub fn ply(depth: ArrayView2<f32>, grey: ArrayView2<f32>, lateral: Lateral, unit
 
 /// Triangles between the previous row and this one, right of each column: 1 = upper, lower, upper right; 2 = upper
 /// right, lower, lower right; 3 = both.
-fn mark_faces(depth_mm: ArrayView2<f32>, row: usize, step: f32, marks: &mut [u8]) {
+fn mark_faces(depth_mm: ArrayView2<f32>, row: usize, step: f32, marks: &mut ArrayViewMut1<u8>) {
     let (upper, lower) = (depth_mm.row(row - 1), depth_mm.row(row));
-    marks.fill(0);
     let joined = |a: f32, b: f32, c: f32| {
-        // NaN propagates through the sum, but not through min and max.
-        let spread = a.max(b).max(c) - a.min(b).min(c);
+        // NaN propagates through the sum; these comparisons are one instruction each.
+        let max = |a: f32, b: f32| if a > b { a } else { b };
+        let min = |a: f32, b: f32| if a < b { a } else { b };
+        let spread = max(max(a, b), c) - min(min(a, b), c);
         u8::from((a + b + c).is_finite() & (spread <= step))
     };
     let corners = upper.iter().zip(upper.iter().skip(1)).zip(lower.iter().zip(lower.iter().skip(1)));
