@@ -27,26 +27,45 @@ Pixels = Union[NDArray[np.uint8], NDArray[np.uint16]]
 
 @dataclass(frozen=True)
 class Exposure:
-    """An image and how it was taken."""
+    """An image and its record.
+
+    Attributes
+    ----------
+    image : array uint8 or uint16 (height, width)
+        With more than 8 bits `uint16` over its full range.
+    bits : int
+        Bits of the camera.
+    record : mapping
+        Measurements of the board: `axis`, its `asked_um` and `measured_um`, `sensor_mm` (lens to sensor), `settle_ms`,
+        `strobe_start_us` and `strobe_end_us` (board time of the exposure), `exposure_us`.
+    index : mapping
+        Position in a `useq` sequence.
+    """
 
     image: Pixels
-    """(height, width); `uint8`, or `uint16` over its whole range where the camera has more than 8 bits."""
     bits: int
-    """Bits that carry the picture."""
     record: Mapping[str, Any]
-    """What the board measured: `axis`, `asked_um` and `measured_um` of it, `sensor_mm` (lens to sensor), `settle_ms`,
-    `strobe_start_us` and `strobe_end_us` (board time of the exposure), `exposure_us`."""
     index: Mapping[str, int] = field(default_factory=dict)
-    """The place in a `useq` sequence."""
 
 
 class Rig:
-    """A board behind a serial port, and a camera; a context manager that stops what moves when it is left.
+    """A board and its camera; a context manager that stops all motion at its end.
 
-    `port` is for example `/dev/ttyACM0`; `camera` one of `folder:DIR`, `command:PROGRAM ...`, `HOST:PORT` (an emulated one),
-    needed for images only. Positions are micrometres, absolute, of the axes `coarse` and `fine` (the sensor's) and `lens`. Every method
-    that waits can be interrupted by Ctrl-C, which stops the rig. Errors: `FarnearError` for what cannot be, `RigError` from the
-    rig.
+    Positions are absolute, um, of the axes `coarse` and `fine` (sensor) and `lens`. Ctrl-C interrupts every method and stops the rig.
+
+    Parameters
+    ----------
+    port : str
+        Serial port, such as `/dev/ttyACM0`.
+    camera : str, optional
+        `folder:DIR`, `command:PROGRAM ...` or `HOST:PORT` (emulated); needed for images only.
+
+    Raises
+    ------
+    FarnearError
+        Values out of range.
+    RigError
+        Failures of the rig, its camera or the link.
     """
 
     def __init__(self, port: str, camera: Optional[str] = None) -> None:
@@ -60,13 +79,13 @@ class Rig:
         self.close()
 
     def close(self) -> None:
-        """Stops what moves and gives the port free."""
+        """Stop all motion and release the port."""
         client, self._client = self._client, None
         if client is not None:
             try:
                 client.stop()
             except RigError:
-                pass  # a rig that is gone does not move by this program's wish
+                pass  # a lost link stops the rig
 
     @property
     def _open(self) -> RigClient:
@@ -81,42 +100,73 @@ class Rig:
         return self._camera
 
     def info(self) -> dict[str, Any]:
-        """Who the board is, and how far its axes go."""
+        """Identity of the board, and limits of its axes (um) and exposures (ms)."""
         return self._open.info()
 
     def status(self) -> dict[str, Any]:
-        """Where each axis stands, and the alarm if there is one."""
+        """State and position (um) of each axis, and the alarm, if any."""
         return self._open.status()
 
     def home(self, *axes: str) -> dict[str, float]:
-        """Homes axes at the same time, all that have a home switch where none are named; gives how far each encoder's old zero
-        was off, um."""
+        """Home axes simultaneously, by default all with a home switch.
+
+        Returns
+        -------
+        dict
+            Shift of each encoder's zero, um.
+        """
         return self._open.home(list(axes) or None)
 
     def move(self, *, home: bool = False, **to_um: float) -> dict[str, float]:
-        """Moves axes at the same time, `rig.move(coarse=5800, fine=50)`, and gives where they have come to by encoder or gauge, um. With
-        `home` axes that are not homed are homed first."""
+        """Move axes simultaneously, as in `rig.move(coarse=5800, fine=50)`.
+
+        Parameters
+        ----------
+        home : bool
+            Home axes first that are not homed.
+        **to_um : float
+            Position of each axis, um.
+
+        Returns
+        -------
+        dict
+            Position of each axis by encoder or gauge, um.
+        """
         if home:
             self._open.ensure_homed()
         return self._open.move_to(dict(to_um))
 
     def stop(self) -> None:
-        """Stops all motion along the ramps; positions stay known."""
+        """Stop all motion along the ramps; positions stay known."""
         self._open.stop()
 
     def halt(self) -> None:
-        """Emergency stop: what moved has lost its position, and the alarm has to be cleared."""
+        """Emergency stop: moving axes lose their position and the alarm must be cleared."""
         self._open.halt()
 
     def clear_alarm(self, number: int) -> None:
-        """Clears the alarm of this number, which `status()` gives."""
+        """Clear the alarm with this number from `status()`."""
         self._open.clear_alarm(number)
 
     def expose(
         self, positions: Iterable[tuple[str, float]], *, exposure_ms: float = 5.0, wait_s: float = 30.0
     ) -> list[Exposure]:
-        """An exposure at each position (axis, um), by one program that the board runs by itself: it moves, waits until the
-        position has settled, triggers, and stamps the exposure. A program of more than `info()["shots_max"]` is run in parts."""
+        """Expose at each position by a program on the board: move, settle, trigger, time stamp.
+
+        Parameters
+        ----------
+        positions : iterable of (axis, um)
+            Axis and position, um. More than `info()["shots_max"]` are run in parts.
+        exposure_ms : float
+            Exposure time, ms.
+        wait_s : float
+            Longest wait for an image, s.
+
+        Returns
+        -------
+        list of Exposure
+            Image (height, width) and record of each.
+        """
         shots = list(positions)
         most = int(self.info()["shots_max"])
         taken: list[Exposure] = []
@@ -130,19 +180,39 @@ class Rig:
     def capture_pair(
         self, optics: Optics, *, exposure_ms: float = 5.0, wait_s: float = 30.0
     ) -> tuple[Exposure, Exposure]:
-        """The far- and the near-focused image for some optics, as `farnear.depth` takes them: homes where needed, brings the stage
-        near, exposes both by piezo."""
+        """Capture a pair for `farnear.depth`: home if necessary, move the stage, expose both positions of the piezo.
+
+        Parameters
+        ----------
+        optics : Optics
+            Optics with the two foci.
+        exposure_ms : float
+            Exposure time, ms.
+        wait_s : float
+            Longest wait for an image, s.
+
+        Returns
+        -------
+        far, near : Exposure
+            Images (height, width) with their records.
+        """
         pair = self._open.capture_pair(self._camera_address, optics, exposure_us=round(1000 * exposure_ms), wait_s=wait_s)
         far, near = (_exposure(*image) for image in pair)
         return far, near
 
     def run_sequence(self, sequence: useq.MDASequence, *, axis: str = "fine", wait_s: float = 30.0) -> Iterator[Exposure]:
-        """Runs a `useq` sequence whose `z` positions (um) are those of an axis.
+        """Run a `useq` sequence whose `z` positions (um) are those of an axis.
 
-        Done are `z_plan`, `exposure` (ms, default 5) and `time_plan`: an event with `min_start_time` (s since the start, or since the
-        last event with `reset_event_timer`) waits for it. Events of one exposure and one start time run as one program on the board.
-        Everything else that an event can ask for (channels, stage positions, autofocus, custom actions, properties, SLM images) is
-        refused with `FarnearError` before anything moves, as are positions and exposures outside the limits."""
+        `z_plan`, `exposure` (ms, default 5) and `time_plan` are supported: an event waits for its `min_start_time` (s since the start,
+        or since the last event with `reset_event_timer`). Events of one exposure and one start time run as one program on the board.
+        Channels, stage positions, autofocus, custom actions, properties and SLM images raise `FarnearError` before any motion, as do
+        positions and exposures outside the limits.
+
+        Yields
+        ------
+        Exposure
+            Image (height, width) and record of each event.
+        """
         events = list(sequence)
         info = self.info()
         for event in events:
@@ -172,7 +242,7 @@ class Rig:
 
 
 LATE_S = 0.5
-"""A time lapse that is later than this warns."""
+"""Delay of a time lapse from which a warning is issued."""
 
 
 def _program(event: Any) -> tuple[Any, Any]:
@@ -211,7 +281,7 @@ def _exposure(image: NDArray[np.uint16], bits: int, record: dict[str, Any]) -> E
 
 
 def find_simulator() -> Optional[Path]:
-    """The program `farnear-sim`: the environment's FARNEAR_SIM, on the PATH, or built in the sources that this package lies in."""
+    """Path of `farnear-sim`: from FARNEAR_SIM in the environment, from the PATH, or built in a clone around the current folder."""
     named = os.environ.get("FARNEAR_SIM")
     if named:
         return Path(named)
@@ -229,7 +299,22 @@ def find_simulator() -> Optional[Path]:
 class EmulatedRig:
     """`farnear-sim` as a context manager: the real firmware on an emulated board, with simulated stages and camera.
 
-    `scene` is `plane:MM`, `staircase`, `slant`, `cone` or `sphere`; `optics` are those of its lens. Runs repeat to the byte.
+    Runs repeat to the byte. `port` and `camera` are the arguments of `Rig`.
+
+    Parameters
+    ----------
+    scene : str
+        `plane:MM` (distance in mm), `staircase`, `slant`, `cone` or `sphere`.
+    optics : path, optional
+        An `optics.toml`; by default a 50 mm lens with its far focus at 933 mm.
+    noise : str
+        "none", "8bit" or "12bit".
+    seed : int
+        Seed of texture and noise.
+    more : sequence of str
+        More arguments of `farnear-sim run`.
+    simulator : path, optional
+        The program; by default that of `find_simulator`.
     """
 
     def __init__(
@@ -256,19 +341,17 @@ class EmulatedRig:
         assert self._process.stdout is not None
         line = self._process.stdout.readline()
         if not line:
-            raise RigError(f"{program} ended at once ({self._process.wait()}); its message stands above")
+            raise RigError(f"{program} ended immediately ({self._process.wait()}); see its message above")
         address = json.loads(line)
         self.port: str = address["port"]
-        """The board's serial port."""
         self.camera: str = address["camera"]
-        """The camera's address, as `Rig` takes it."""
 
     def rig(self) -> Rig:
-        """The rig, connected."""
+        """A connected `Rig`."""
         return Rig(self.port, self.camera)
 
     def close(self) -> None:
-        """Ends it."""
+        """Stop the program."""
         for stream in (self._process.stdin, self._process.stdout):
             if stream is not None:
                 stream.close()

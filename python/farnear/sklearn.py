@@ -30,17 +30,25 @@ class Isomap(ClassNamePrefixFeaturesOutMixin, TransformerMixin, BaseEstimator):
 
     Parameters
     ----------
-    n_components : dimensions of the layout.
-    n_neighbors : neighbours of each sample in the graph; doubled, with a warning, where the graph falls apart.
-    gamma : coefficient of the squared distance in the map for new samples; without it one over the features' summed variance.
-    ridge : what is added to the map's diagonal.
+    n_components : int
+        Dimensions of the embedding.
+    n_neighbors : int
+        Neighbours of each sample in the graph; doubled, with a warning, while the graph is disconnected.
+    gamma : float, optional
+        Coefficient of the squared distance in the map for new samples; by default one over the features' summed variance.
+    ridge : float
+        Ridge of the map.
 
     Attributes
     ----------
-    embedding_ : (n_samples, n_components), float32.
-    eigenvalues_ : (n_components,), falling.
-    n_neighbors_ : neighbours that were taken.
-    dist_matrix_ : (n_samples, n_samples) path lengths, float32.
+    embedding_ : array float32 (n_samples, n_components)
+        Coordinates of the samples.
+    eigenvalues_ : array float64 (n_components,)
+        In descending order.
+    n_neighbors_ : int
+        Neighbours in the graph.
+    dist_matrix_ : array float32 (n_samples, n_samples)
+        Path lengths in the unit of the features.
     """
 
     def __init__(
@@ -52,7 +60,7 @@ class Isomap(ClassNamePrefixFeaturesOutMixin, TransformerMixin, BaseEstimator):
         self.ridge = ridge
 
     def fit(self, X: ArrayLike, y: Any = None) -> Isomap:
-        """Lays out samples (n_samples, n_features)."""
+        """Embed samples (n_samples, n_features)."""
         samples = validate_data(self, X, dtype=np.float64, ensure_min_samples=self.n_components + 2)
         self._centre = samples.mean(axis=0)
         samples = self._centred(samples)
@@ -75,11 +83,11 @@ class Isomap(ClassNamePrefixFeaturesOutMixin, TransformerMixin, BaseEstimator):
         return self
 
     def fit_transform(self, X: ArrayLike, y: Any = None) -> NDArray[np.float32]:
-        """The map's answers for the samples that it was learned from; `embedding_` is the layout itself."""
+        """Fit, then map the same samples: (n_samples, n_features) to (n_samples, n_components); `embedding_` is the embedding itself."""
         return self.fit(X).transform(X)
 
     def transform(self, X: ArrayLike) -> NDArray[np.float32]:
-        """Places samples (n_samples, n_features) in the layout, (n_samples, n_components)."""
+        """Map samples (n_samples, n_features) to coordinates float32 (n_samples, n_components)."""
         check_is_fitted(self)
         return self._map.embed(self._centred(validate_data(self, X, dtype=np.float64, reset=False)))
 
@@ -102,12 +110,15 @@ class RbfRegressor(RegressorMixin, BaseEstimator):
 
     Parameters
     ----------
-    gamma : coefficient of the squared distance; without it one over the features' summed variance.
-    ridge : what is added to the system's diagonal.
+    gamma : float, optional
+        Coefficient of the squared distance; by default one over the features' summed variance.
+    ridge : float
+        Ridge of the system.
 
     Attributes
     ----------
-    condition_ : condition number of the system that was solved.
+    condition_ : float
+        Condition number of the system.
     """
 
     def __init__(self, *, gamma: Optional[float] = None, ridge: float = 1e-3) -> None:
@@ -115,7 +126,7 @@ class RbfRegressor(RegressorMixin, BaseEstimator):
         self.ridge = ridge
 
     def fit(self, X: ArrayLike, y: ArrayLike) -> RbfRegressor:
-        """Learns targets (n_samples,) or (n_samples, n_outputs) of samples (n_samples, n_features)."""
+        """Fit targets (n_samples,) or (n_samples, n_outputs) of samples (n_samples, n_features)."""
         samples, targets = validate_data(
             self, X, y, dtype=np.float64, multi_output=True, y_numeric=True, ensure_min_samples=2
         )
@@ -133,7 +144,7 @@ class RbfRegressor(RegressorMixin, BaseEstimator):
         return self
 
     def predict(self, X: ArrayLike) -> NDArray[np.float64]:
-        """The targets of samples (n_samples, n_features)."""
+        """Targets, (n_samples,) or (n_samples, n_outputs), of samples (n_samples, n_features)."""
         check_is_fitted(self)
         samples = validate_data(self, X, dtype=np.float64, reset=False) - self._centre
         found = self._map.embed(np.ascontiguousarray(samples, dtype=np.float32)) + self._mean

@@ -39,8 +39,24 @@ def _grey(image: Pixels) -> NDArray[np.float64]:
 def to_open3d(
     found: DepthMap, optics: Optics, image: Optional[Pixels] = None, *, min_confidence: float = 0.0
 ) -> "open3d.geometry.PointCloud":
-    """The pixels with a depth of at least that confidence as a point cloud: mm, x to the right, y up, z towards the viewer, the lens
-    at the origin; grey by `image` (height, width) where it is given."""
+    """Point cloud of a depth map.
+
+    Parameters
+    ----------
+    found : DepthMap
+        The map, mm.
+    optics : Optics
+        Optics of the map.
+    image : array (height, width), optional
+        Grey values of the points.
+    min_confidence : float
+        Least confidence of a point, 0 to 1.
+
+    Returns
+    -------
+    open3d.geometry.PointCloud
+        Points in mm: x to the right, y up, z towards the viewer; the origin is the lens.
+    """
     open3d = _imported("open3d")
     keep = np.isfinite(found.depth_mm) & (found.confidence >= min_confidence)
     cloud = open3d.geometry.PointCloud()
@@ -53,9 +69,16 @@ def to_open3d(
 
 
 class RerunView:
-    """What a rig sees on Rerun's time line: both images, depth, confidence and the cloud of each pair.
+    """Pairs on Rerun's time line: both images, depth, confidence and point cloud (mm); a context manager.
 
-    `save` names a recording (`.rrd`) to write instead of opening the viewer.
+    Parameters
+    ----------
+    optics : Optics
+        Optics of the pairs.
+    name : str
+        Name of the recording.
+    save : str, optional
+        Recording (`.rrd`) to write instead of opening the viewer.
     """
 
     def __init__(self, optics: Optics, *, name: str = "farnear", save: Optional[str] = None) -> None:
@@ -71,7 +94,19 @@ class RerunView:
     def show(
         self, far: Pixels, near: Pixels, found: DepthMap, *, board_us: Optional[int] = None, min_confidence: float = 0.0
     ) -> None:
-        """Adds a pair. It stands at its number, and at the board's time where that is given."""
+        """Add a pair at its number and, if given, at the board's time.
+
+        Parameters
+        ----------
+        far, near : array (height, width)
+            The images.
+        found : DepthMap
+            Their depth, mm.
+        board_us : int, optional
+            Time of the exposure by the board's clock, us.
+        min_confidence : float
+            Least confidence of a point, 0 to 1.
+        """
         rerun, recording = self._rerun, self._recording
         _check_size(far, found)
         recording.set_time("pair", sequence=self._pairs)
@@ -88,7 +123,7 @@ class RerunView:
         recording.log("cloud", rerun.Points3D(points, colors=np.repeat(shade[:, None], 3, axis=1)))
 
     def close(self) -> None:
-        """Writes what is left."""
+        """Finish the recording."""
         self._recording.flush()
         self._recording.disconnect()
 
@@ -100,7 +135,24 @@ class RerunView:
 
 
 def watch(rig: Rig, view: RerunView, optics: Optics, *, seconds: Optional[float] = None) -> Iterator[DepthMap]:
-    """Captures pair after pair, shows each and gives its depth, until the loop over it is left, or for that long."""
+    """Capture and show pairs.
+
+    Parameters
+    ----------
+    rig : Rig
+        A rig with a camera.
+    view : RerunView
+        Where to show them.
+    optics : Optics
+        Optics of the pairs.
+    seconds : float, optional
+        Duration, s; by default until the loop ends.
+
+    Yields
+    ------
+    DepthMap
+        Depth of each pair, mm, (height, width).
+    """
     until = None if seconds is None else time.monotonic() + seconds
     while until is None or time.monotonic() < until:
         far, near = rig.capture_pair(optics)

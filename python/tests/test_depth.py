@@ -166,3 +166,9 @@ def test_rendering_repeats(optics):
     assert not np.array_equal(first[0], farnear.render(optics, "cone", width=64, height=48, noise="12bit", seed=4)[0])
     with pytest.raises(farnear.FarnearError, match="staircase"):
         farnear.render(optics, "castle")
+
+
+@pytest.mark.parametrize("scene", ["slant", "cone", "staircase", "sphere"])
+def test_a_good_pair_has_no_warning(optics, scene):
+    far, near, _ = farnear.render(optics, scene, width=320, height=240, seed=2)
+    assert farnear.depth(far, near, optics).findings == []

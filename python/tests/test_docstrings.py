@@ -1,6 +1,7 @@
 """Every public object has documentation at run time, with shapes and units where it takes or returns arrays and lengths."""
 
 import doctest
+import importlib
 import importlib.util
 import inspect
 from pathlib import Path
@@ -9,8 +10,6 @@ import numpy as np
 import pytest
 
 import farnear
-import farnear.results
-import farnear.rig
 
 PUBLIC = [name for name in farnear.__all__ if name != "__version__"]
 # Arrays and physical quantities are documented by shape and unit; these objects have neither.
@@ -42,10 +41,51 @@ def test_members_are_documented(name):
         assert documented or (listed and member in inspect.getdoc(found)), f"{name}.{member}"
 
 
-@pytest.mark.parametrize("module", [farnear.rig, farnear.results])
-def test_modules_in_python_are_documented(module):
-    for name in module.__all__:
-        assert inspect.getdoc(getattr(module, name)), name
+# Modules in Python, and what `help()` must state.
+IMAGE, SAMPLES = "(height, width)", "(n_samples, n_features)"
+STATED = {
+    "recording": {"McapRecording": ("32FC1, m",), "McapRecording.add": (IMAGE, "ns")},
+    "results": {"plot": ("mm",), "to_xarray": ("mm", "px")},
+    "rig": {
+        "EmulatedRig": ("mm",),
+        "Exposure": (IMAGE, "_um", "_us"),
+        "Rig": ("um",),
+        "Rig.capture_pair": (IMAGE, "ms", "wait_s"),
+        "Rig.expose": (IMAGE, "um", "ms"),
+        "Rig.home": ("um",),
+        "Rig.info": ("um", "ms"),
+        "Rig.move": ("um",),
+        "Rig.run_sequence": (IMAGE, "um", "ms"),
+        "Rig.status": ("um",),
+    },
+    "sklearn": {
+        "Isomap": ("(n_samples, n_components)",),
+        "Isomap.fit": (SAMPLES,),
+        "Isomap.transform": (SAMPLES, "(n_samples, n_components)"),
+        "RbfRegressor.fit": (SAMPLES, "(n_samples, n_outputs)"),
+        "RbfRegressor.predict": (SAMPLES, "(n_samples, n_outputs)"),
+    },
+    "viewers": {"RerunView.show": (IMAGE, "us", "mm"), "to_open3d": (IMAGE, "mm"), "watch": (IMAGE, "mm")},
+}
+
+
+@pytest.mark.parametrize("name", STATED)
+def test_modules_in_python_state_shapes_and_units(name):
+    if name == "sklearn":
+        pytest.importorskip("sklearn")
+    module = importlib.import_module(f"farnear.{name}")
+    for public in module.__all__:
+        found = getattr(module, public)
+        assert inspect.getdoc(found), public
+        members = vars(found) if inspect.isclass(found) else {}
+        for member in (member for member in members if not member.startswith("_") and callable(members[member])):
+            assert inspect.getdoc(getattr(found, member)), f"{public}.{member}"
+    for path, expected in STATED[name].items():
+        found = module
+        for part in path.split("."):
+            found = getattr(found, part)
+        for words in expected:
+            assert words in inspect.getdoc(found), f"{path} does not state {words}"
 
 
 def test_examples_in_docstrings_run():

@@ -1,5 +1,10 @@
-"""The notebooks run from their first cell to their last, and draw something."""
+"""The notebooks run from their first cell to their last, draw, and print what is stored as their output.
 
+`jupyter nbconvert --to notebook --execute --inplace --ExecutePreprocessor.record_timing=False python/notebooks/*.ipynb` renews them.
+"""
+
+import contextlib
+import io
 import json
 from pathlib import Path
 
@@ -18,10 +23,16 @@ def test_a_notebook_runs(path, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     plt.close("all")
     names = {}
+    stored = []
     for cell in json.loads(path.read_text())["cells"]:
         if cell["cell_type"] == "code":
-            assert not cell["outputs"], f"{path.name} is kept without outputs"
-            exec(compile("".join(cell["source"]), path.name, "exec"), names)  # the notebook is ours
+            stored += cell["outputs"]
+            printed = io.StringIO()
+            with contextlib.redirect_stdout(printed):
+                exec(compile("".join(cell["source"]), path.name, "exec"), names)  # the notebook is ours
+            texts = ["".join(output["text"]) for output in cell["outputs"] if output["output_type"] == "stream"]
+            assert printed.getvalue() == "".join(texts), "the stored output is outdated"
+    assert any("image/png" in output.get("data", {}) for output in stored), "no stored picture"
     figures = [plt.figure(number) for number in plt.get_fignums()]
     assert len(figures) >= 2
     for number, figure in enumerate(figures):

@@ -1,8 +1,9 @@
-"""The stub says what the module has, and only that."""
+"""The stub has what the module has, and type checkers accept it."""
 
 import ast
 import importlib.util
 import inspect
+import json
 import shutil
 import subprocess
 import sys
@@ -65,16 +66,29 @@ swapped = farnear.depth(far.astype(np.int32), np.ma.masked_array(near), optics)
 """
 
 
-@pytest.mark.parametrize("checker", [["mypy", "--strict"], ["pyright"]], ids=["mypy", "pyright"])
+NOTEBOOKS = Path(__file__).resolve().parents[1] / "notebooks"
+# Notebooks have functions without annotations, and import packages without types.
+CHECKS = {
+    "mypy": ["mypy", "--strict", "use.py"],
+    "mypy-notebooks": ["mypy", "--check-untyped-defs", "--ignore-missing-imports", "notebooks"],
+    "pyright": ["pyright", "use.py"],
+}
+
+
+@pytest.mark.parametrize("checker", CHECKS.values(), ids=CHECKS)
 def test_type_checkers_accept_ordinary_use(checker, tmp_path):
     if importlib.util.find_spec(checker[0]) is None:
         pytest.skip(f"{checker[0]} is not installed")
     (tmp_path / "use.py").write_text(USE)
+    (tmp_path / "notebooks").mkdir()
+    for notebook in NOTEBOOKS.glob("*.ipynb"):
+        cells = [cell for cell in json.loads(notebook.read_text())["cells"] if cell["cell_type"] == "code"]
+        code = "\n".join("".join(cell["source"]) for cell in cells)
+        (tmp_path / "notebooks" / f"{notebook.stem}.py").write_text(code)
     # Only the types: a checker needs no compiled module.
     shutil.copytree(Path(farnear.__file__).parent, tmp_path / "farnear", ignore=shutil.ignore_patterns("*.so", "__pycache__"))
-    command = [sys.executable, "-m", *checker, "use.py"]
     try:
-        done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=120)
+        done = subprocess.run([sys.executable, "-m", *checker], cwd=tmp_path, capture_output=True, text=True, timeout=120)
     except subprocess.TimeoutExpired:
-        pytest.skip(f"{checker[0]} does not start here")  # pyright fetches a Node.js of its own
+        pytest.skip(f"{checker[0]} does not start here")  # without its own Node.js pyright fetches one
     assert done.returncode == 0, done.stdout + done.stderr

@@ -14,6 +14,7 @@ mod host;
 mod install;
 mod instructions;
 mod limited;
+mod portable;
 mod python;
 mod release;
 mod run;
@@ -63,6 +64,8 @@ enum Job {
     Bench(bench::Arguments),
     /// Measure the accuracy on rendered (and, where present, real) scenes and write the accuracy pages.
     Evaluate(evaluate::Arguments),
+    /// Check that all but the emulated board compiles for Windows and macOS (four minutes the first time on two idle cores).
+    Portable,
     /// The documents as a site, with search and every command: out/site/html.
     Site,
     /// What a release hands out, each file tried where nothing else is: programs for two processors, Debian packages, the wheel.
@@ -84,6 +87,7 @@ fn main() -> ExitCode {
         Job::Fuzz { seconds } => fuzz::run(seconds),
         Job::Bench(arguments) => bench::run(&arguments),
         Job::Evaluate(arguments) => evaluate::run(&arguments),
+        Job::Portable => portable::run(),
         Job::Site => site::run(),
         Job::Release(arguments) => release::run(&arguments),
         Job::Install => install::run(),

@@ -18,7 +18,7 @@ use crate::{
 
 /// Compiled only if Python is available.
 pub const PACKAGE: &str = "farnear-python";
-const NEEDS: [&str; 7] = [
+const NEEDS: [&str; 11] = [
     "numpy>=1.23",
     "matplotlib>=3.6",
     "pytest>=7",
@@ -26,6 +26,10 @@ const NEEDS: [&str; 7] = [
     "useq-schema>=0.5",
     "mcap-ros2-support>=0.5",
     "mypy>=1.10",
+    "pyright[nodejs]>=1.1.380",
+    "snakemake>=9; python_version >= '3.11'",
+    "trimesh>=4",
+    "xarray>=2023.1",
 ];
 /// Checks version and virtual environments.
 const ABLE: &str = "import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 9))";
@@ -85,6 +89,8 @@ pub fn environment(folder: &Path, needs: &[&str]) -> Result<PathBuf, String> {
     }
     eprintln!("fetching {}", needs.join(", "));
     let fetch = ["-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--only-binary", ":all:"];
+    // Of snakemake; pure Python, published as source only.
+    let fetch = [&fetch[..], &["--no-binary", "connection-pool"]].concat();
     if !succeeds(Command::new(&python).args(fetch).args(needs)) {
         return Err(format!("pip cannot fetch {}", needs.join(", ")));
     }

@@ -81,7 +81,8 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         }
     }
     let native = made.iter().find(|(target, _)| target.runs_here()).map(|(_, built)| built.clone());
-    let extras = native.as_deref().map(|programs| Extras::write(&release, programs, notices)).transpose()?;
+    let extras =
+        native.as_deref().map(|programs| Extras::write(&release, programs, notices.clone())).transpose()?;
     if let Some(extras) = &extras {
         for (target, built) in &made {
             archive::write(&release, target, built, &elves, extras)?;
@@ -89,13 +90,17 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         }
         for (target, built) in &made {
             match debian::write(&release, target, built, &elves, extras)? {
-                Ok(package) => trial::package(&release, target, &package, &mut left_out)?,
+                Ok(packages) => {
+                    for package in packages {
+                        trial::package(&release, target, &package, &mut left_out)?;
+                    }
+                }
                 Err(missing) => left_out.push(format!("Debian package for {}: {missing}", target.debian)),
             }
         }
     }
-    match wheel::write(&release)? {
-        Ok(wheel) => trial::wheel(&release, &wheel, &mut left_out)?,
+    match wheel::write(&release, &notices)? {
+        Ok(wheels) => trial::wheel(&release, &wheels, &mut left_out)?,
         Err(missing) => left_out.push(format!("wheel: {missing}")),
     }
 
@@ -143,8 +148,22 @@ fn lay_programs(programs: &Path, elves: &[PathBuf], folder: &Path) -> Result<()>
     built.iter().chain(elves).try_for_each(|file| copy(file, folder))
 }
 
+/// Copies licences, README and the pages that it links to, in their folders.
 fn lay_documents(folder: &Path) -> Result<()> {
-    ["README.md", "CHANGELOG.md"].iter().try_for_each(|page| copy(&ROOT.join(page), folder))?;
+    let mut git = Command::new("git");
+    git.args([
+        "ls-files",
+        "--",
+        "README.md",
+        "CHANGELOG.md",
+        "LICENSE-*",
+        "docs/*.md",
+        "docs/images",
+        "examples",
+    ]);
+    for page in output(git.current_dir(&*ROOT))?.lines().map(Path::new) {
+        copy(&ROOT.join(page), &folder.join(page.parent().unwrap_or(page)))?;
+    }
     fs::copy(ROOT.join("examples/rig.toml"), folder.join("optics.toml")).context("cannot copy the optics")?;
     Ok(())
 }

@@ -31,7 +31,8 @@ pub fn cargo<S: AsRef<OsStr>>(arguments: impl IntoIterator<Item = S>) -> Command
     let mut arguments = arguments.into_iter();
     if let Some(job) = arguments.next() {
         command.arg(&job);
-        let compiles = ["build", "run", "test", "clippy", "doc"].iter().any(|known| job.as_ref() == *known);
+        let compiles =
+            ["build", "check", "run", "test", "clippy", "doc"].iter().any(|known| job.as_ref() == *known);
         if compiles && host_rust_minor().is_some_and(|minor| minor < EMULATOR_RUST_MINOR) {
             command.arg("--ignore-rust-version");
         }

@@ -10,24 +10,12 @@ const STEP: f32 = 0.02;
 
 /// Why two maps cannot be compared.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[allow(missing_docs, reason = "the messages name the fields")]
 pub enum CompareError {
-    /// The maps or the mask differ in size.
     #[error(
         "{what} is {found_width}x{found_height}, the depth map {width}x{height}: they must have one size"
     )]
-    Size {
-        /// The quantity that differs.
-        what: &'static str,
-        /// Width of the depth map.
-        width: usize,
-        /// Height of the depth map.
-        height: usize,
-        /// Width found.
-        found_width: usize,
-        /// Height found.
-        found_height: usize,
-    },
-    /// No pixel is left to compare.
+    Size { what: &'static str, width: usize, height: usize, found_width: usize, found_height: usize },
     #[error("no pixel to compare: border, mask, edges and missing values leave none of {0}")]
     NothingToCompare(usize),
 }

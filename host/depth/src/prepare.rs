@@ -133,11 +133,10 @@ pub struct PrepareSettings {
 
 /// Why a pair is invalid.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "the messages name the fields")]
 pub enum PrepareError {
-    /// The images differ in size.
     #[error(transparent)]
     Pair(#[from] crate::pipeline::RunError),
-    /// They show different scenes.
     #[error(
         "the images do not show the same scene: the detail that defocus leaves in both has a correlation of {correlation:.2}, a pair \
          has 0.8 to 1"
@@ -146,7 +145,6 @@ pub enum PrepareError {
         /// Correlation relative to what noise allows.
         correlation: f64,
     },
-    /// The camera's frames do not fit.
     #[error(transparent)]
     Camera(#[from] CameraError),
 }

@@ -1,8 +1,7 @@
 //! # farnear
 //!
-//! The command line: parses, shows and asks; the tasks are in `farnear-workflows`. One file per command in [`commands`];
-//! [`terminal`] shows progress, asks, and handles Ctrl-C; [`report`] prints figures as text or JSON; [`hints`] suggests what to type
-//! after an error; [`render`] draws scenes, because a simulated lens does not belong to the workflows.
+//! The command line: parses arguments and prints figures; the tasks are in `farnear-workflows`. [`render`] is here
+//! because the workflows do not depend on a simulated lens.
 //!
 //! Exit code 0 only on success, 1 for failure, 2 for bad usage. Figures go to stdout, everything else to stderr.
 
@@ -18,7 +17,10 @@ mod terminal;
 
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand};
+use clap::{
+    CommandFactory, Parser, Subcommand,
+    error::{ContextKind, ContextValue, ErrorKind},
+};
 use farnear_workflows::{
     WorkflowError, compare::CompareRequest, correct::CorrectRequest, depth::DepthRequest,
     focus_stack::FocusStackRequest, operators::OperatorRequest, optics::OpticsRequest, report::ReportRequest,
@@ -105,7 +107,7 @@ enum Command {
 }
 
 fn main() -> ExitCode {
-    let result = match Arguments::parse().command {
+    let result = match parse().command {
         Command::Optics(task) => task.run(),
         Command::Operators(task) => task.run(),
         Command::Depth(task) => task.run(),
@@ -131,7 +133,7 @@ fn main() -> ExitCode {
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,
-        // Not returned from main: with RUST_BACKTRACE set that buries the message under a backtrace.
+        // Not returned from main: RUST_BACKTRACE would add a backtrace to the message.
         Err(error) => {
             terminal::end_count();
             let hint = hints::hint(&error).map(|hint| format!("; {hint}")).unwrap_or_default();
@@ -143,7 +145,35 @@ fn main() -> ExitCode {
     }
 }
 
-/// An error and its causes in one line. A typed error often says its cause itself; that is not said twice.
+/// Parses the command line; an optional value that lacks its `=` gets a tip.
+fn parse() -> Arguments {
+    Arguments::try_parse().unwrap_or_else(|mut error| {
+        let words: Vec<String> = std::env::args().skip(1).collect();
+        if error.kind() == ErrorKind::UnknownArgument
+            && let Some(tip) = without_equals(&words)
+        {
+            error.insert(ContextKind::Suggested, ContextValue::StyledStrs(vec![tip.into()]));
+        }
+        error.exit()
+    })
+}
+
+/// Tip for the first option whose value must follow `=` and that is followed by a space.
+fn without_equals(words: &[String]) -> Option<String> {
+    let mut command = Arguments::command();
+    for word in words {
+        let Some(found) = command.find_subcommand(word) else { break };
+        command = found.clone();
+    }
+    words.windows(2).find_map(|two| {
+        let (flag, value) = (two[0].strip_prefix("--")?, &two[1]);
+        let option = command.get_arguments().find(|option| option.get_long() == Some(flag))?;
+        let optional = option.is_require_equals_set() && !value.starts_with('-');
+        optional.then(|| format!("the value of --{flag} follows an equals sign: --{flag}={value}"))
+    })
+}
+
+/// An error and its causes in one line, without causes that the error's message already contains.
 fn message(error: &anyhow::Error) -> String {
     error.chain().map(ToString::to_string).fold(String::new(), |message, cause| match message {
         empty if empty.is_empty() => cause.trim_end().into(),
@@ -156,7 +186,7 @@ fn message(error: &anyhow::Error) -> String {
 mod tests {
     use std::collections::{BTreeMap, BTreeSet};
 
-    use clap::{Args, CommandFactory};
+    use clap::Args;
 
     use super::*;
     use crate::commands::rig::target::{CameraArguments, Target};

@@ -22,6 +22,7 @@
 //! ```
 
 pub mod exr;
+pub mod glb;
 pub mod image_file;
 pub mod map;
 pub mod masks;

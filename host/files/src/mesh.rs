@@ -4,7 +4,7 @@
 
 use std::io::{self, Write};
 
-use ndarray::{Array2, ArrayView2, ArrayViewMut1, Axis};
+use ndarray::ArrayView2;
 use rayon::prelude::*;
 
 /// Depth step between surfaces, part of the map's range.
@@ -76,7 +76,123 @@ impl Lateral {
 /// Rows that are encoded together, on all threads.
 const ROWS: usize = 64;
 
-/// Writes the mesh of `depth`, coloured by `grey` (any scale), row by row, as large maps exceed memory. Names the unit.
+/// Surface through a depth map, coloured by an image of any scale. Written row by row, as large maps exceed memory.
+pub(crate) struct Surface<'a> {
+    depth: ArrayView2<'a, f32>,
+    grey: ArrayView2<'a, f32>,
+    lateral: Lateral,
+    /// Largest depth step within a triangle.
+    step: f32,
+    brightest: f32,
+}
+
+impl<'a> Surface<'a> {
+    pub(crate) fn new(depth: ArrayView2<'a, f32>, grey: ArrayView2<'a, f32>, lateral: Lateral) -> Self {
+        let finite = || depth.iter().copied().filter(|value| value.is_finite());
+        let (low, high) = finite().fold((f32::MAX, f32::MIN), |(low, high), z| (low.min(z), high.max(z)));
+        let brightest = grey.iter().copied().filter(|value| value.is_finite()).fold(1e-9, f32::max);
+        Self { depth, grey, lateral, step: (high - low) * STEP, brightest }
+    }
+
+    /// Numbers of vertices and faces.
+    pub(crate) fn count(&self) -> (usize, usize) {
+        let rows = (0..self.depth.nrows()).into_par_iter();
+        let counts = rows.map_init(
+            || vec![0; self.depth.ncols()],
+            |marks, row| {
+                self.mark_faces(row, marks);
+                let faces = marks.iter().map(|mark| u32::from(mark & 1) + u32::from(mark >> 1)).sum::<u32>();
+                (self.vertices_of(row) as usize, faces as usize)
+            },
+        );
+        counts.reduce(|| (0, 0), |a, b| (a.0 + b.0, a.1 + b.1))
+    }
+
+    fn vertices_of(&self, row: usize) -> u32 {
+        self.depth.row(row).iter().map(|z| u32::from(z.is_finite())).sum()
+    }
+
+    fn mark_faces(&self, row: usize, marks: &mut [u8]) {
+        marks.fill(0);
+        if row > 0 {
+            mark_faces(self.depth, row, self.step, marks);
+        }
+    }
+
+    /// Positions and shades of a row's vertices.
+    pub(crate) fn vertices(&self, row: usize) -> impl Iterator<Item = ([f32; 3], u8)> {
+        let line = self.depth.row(row).into_iter().zip(self.grey.row(row)).enumerate();
+        line.filter(|(_, (z, _))| z.is_finite()).map(move |(column, (&z, grey))| {
+            let [x, y] = self.lateral.beside_axis(self.depth.dim(), column, row, f64::from(z));
+            let shade = (255.0 * (grey / self.brightest).clamp(0.0, 1.0) + 0.5) as u8;
+            ([x as f32, y as f32, -z], shade)
+        })
+    }
+
+    /// Writes what `vertex` appends for each vertex, row by row.
+    pub(crate) fn write_vertices(
+        &self,
+        to: &mut impl Write,
+        vertex: impl Fn(&mut Vec<u8>, [f32; 3], u8) + Sync,
+    ) -> io::Result<()> {
+        self.write_rows(to, |row, bytes| {
+            self.vertices(row).for_each(|(position, shade)| vertex(bytes, position, shade));
+        })
+    }
+
+    /// Writes what `face` appends for the corners of each face, anticlockwise for the viewer.
+    pub(crate) fn write_faces(
+        &self,
+        to: &mut impl Write,
+        face: impl Fn(&mut Vec<u8>, [u32; 3]) + Sync,
+    ) -> io::Result<()> {
+        let (height, width) = self.depth.dim();
+        // Vertices are numbered in order; the first of each row.
+        let mut next = 0;
+        let first: Vec<u32> = (0..height)
+            .map(|row| {
+                let count = self.vertices_of(row);
+                next += count;
+                next - count
+            })
+            .collect();
+        self.write_rows(to, |row, bytes| {
+            let mut marks = vec![0; width];
+            self.mark_faces(row, &mut marks);
+            let above = row.saturating_sub(1);
+            let [mut upper, mut lower] = [first[above], first[row]];
+            let lines = self.depth.row(above).into_iter().zip(self.depth.row(row));
+            for (mark, (above, below)) in marks.iter().zip(lines) {
+                let upper_right = upper + u32::from(above.is_finite());
+                let lower_right = lower + u32::from(below.is_finite());
+                if mark & 1 != 0 {
+                    face(bytes, [upper, lower, upper_right]);
+                }
+                if mark & 2 != 0 {
+                    face(bytes, [upper_right, lower, lower_right]);
+                }
+                (upper, lower) = (upper_right, lower_right);
+            }
+        })
+    }
+
+    /// Encodes rows on all threads and writes them in order.
+    fn write_rows(&self, to: &mut impl Write, encode: impl Fn(usize, &mut Vec<u8>) + Sync) -> io::Result<()> {
+        let height = self.depth.nrows();
+        let mut rows = vec![Vec::new(); ROWS.min(height)];
+        for begin in (0..height).step_by(ROWS) {
+            let part = &mut rows[..ROWS.min(height - begin)];
+            part.par_iter_mut().enumerate().for_each(|(i, bytes)| {
+                bytes.clear();
+                encode(begin + i, bytes);
+            });
+            part.iter().try_for_each(|bytes| to.write_all(bytes))?;
+        }
+        Ok(())
+    }
+}
+
+/// Writes the mesh of `depth`, coloured by `grey` (any scale). Names the unit.
 pub fn write(
     depth: ArrayView2<f32>,
     grey: ArrayView2<f32>,
@@ -84,23 +200,8 @@ pub fn write(
     unit: &str,
     to: &mut impl Write,
 ) -> io::Result<()> {
-    let (height, width) = depth.dim();
-    let finite = || depth.iter().copied().filter(|value| value.is_finite());
-    let (low, high) = finite().fold((f32::MAX, f32::MIN), |(low, high), z| (low.min(z), high.max(z)));
-    let step = (high - low) * STEP;
-    let brightest = grey.iter().copied().filter(|value| value.is_finite()).fold(1e-9, f32::max);
-
-    let mut marks = Array2::<u8>::zeros((height, width));
-    let of_rows = marks.axis_iter_mut(Axis(0)).into_par_iter().enumerate().map(|(row, mut marks)| {
-        if row > 0 {
-            mark_faces(depth, row, step, &mut marks);
-        }
-        let vertices: u32 = depth.row(row).iter().map(|z| u32::from(z.is_finite())).sum();
-        let faces: u32 = marks.iter().map(|mark| u32::from(mark & 1) + u32::from(mark >> 1)).sum();
-        [vertices, faces]
-    });
-    let counts: Vec<[u32; 2]> = of_rows.collect();
-    let [vertices, faces] = [0, 1].map(|of| counts.iter().map(|count| count[of] as usize).sum::<usize>());
+    let surface = Surface::new(depth, grey, lateral);
+    let (vertices, faces) = surface.count();
     write!(
         to,
         "ply\nformat binary_little_endian 1.0\ncomment depth map in {unit}\nelement vertex {vertices}\n\
@@ -108,66 +209,21 @@ pub fn write(
          property uchar red\nproperty uchar green\nproperty uchar blue\n\
          element face {faces}\nproperty list uchar uint vertex_indices\nend_header\n"
     )?;
-    in_order(height, to, |row| {
-        let mut bytes = vec![0; VERTEX_BYTES * (width + 1)];
-        let mut end = 0;
-        for (column, (&z, grey)) in depth.row(row).into_iter().zip(grey.row(row)).enumerate() {
-            let [x, y] = lateral.beside_axis((height, width), column, row, f64::from(z));
-            let shade = (255.0 * (grey / brightest).clamp(0.0, 1.0) + 0.5) as u8;
-            let places = [x as f32, y as f32, -z].map(f32::to_le_bytes);
-            bytes[end..end + 12].copy_from_slice(places.as_flattened());
-            bytes[end + 12..end + VERTEX_BYTES].fill(shade);
-            // Without a depth the next vertex takes its place.
-            end += if z.is_finite() { VERTEX_BYTES } else { 0 };
+    surface.write_vertices(to, |bytes, position, shade| {
+        let mut vertex = [shade; 15];
+        for (place, value) in vertex.chunks_exact_mut(4).zip(position) {
+            place.copy_from_slice(&value.to_le_bytes());
         }
-        bytes.truncate(end);
-        bytes
+        bytes.extend_from_slice(&vertex);
     })?;
-    // Vertices are numbered in order: the first of each row.
-    let mut first = vec![0_u32];
-    first.extend(counts.iter().scan(0, |next, [vertices, _]| {
-        *next += vertices;
-        Some(*next)
-    }));
-    in_order(height, to, |row| {
-        let mut bytes = vec![3; FACE_BYTES * (2 * width + 2)];
-        let mut end = 0;
-        let mut face = |corners: [u32; 3], counts: u8| {
-            bytes[end + 1..end + FACE_BYTES].copy_from_slice(corners.map(u32::to_le_bytes).as_flattened());
-            end += usize::from(counts) * FACE_BYTES;
-            bytes[end] = 3;
-        };
-        if row > 0 {
-            let [mut upper, mut lower] = [first[row - 1], first[row]];
-            let lines = depth.row(row - 1).into_iter().zip(depth.row(row)).zip(marks.row(row));
-            for ((above, below), mark) in lines {
-                let upper_right = upper + u32::from(above.is_finite());
-                let lower_right = lower + u32::from(below.is_finite());
-                face([upper, lower, upper_right], mark & 1);
-                face([upper_right, lower, lower_right], mark >> 1);
-                (upper, lower) = (upper_right, lower_right);
-            }
+    surface.write_faces(to, |bytes, corners| {
+        let mut face = [3_u8; 13];
+        for (place, number) in face[1..].chunks_exact_mut(4).zip(corners) {
+            place.copy_from_slice(&number.to_le_bytes());
         }
-        bytes.truncate(end);
-        bytes
+        bytes.extend_from_slice(&face);
     })
 }
-
-/// Encodes rows on all threads and writes them in order.
-fn in_order(
-    rows: usize,
-    to: &mut impl Write,
-    encode: impl Fn(usize) -> Vec<u8> + Sync + Send,
-) -> io::Result<()> {
-    for begin in (0..rows).step_by(ROWS) {
-        let parts: Vec<Vec<u8>> = (begin..(begin + ROWS).min(rows)).into_par_iter().map(&encode).collect();
-        to.write_all(&parts.concat())?;
-    }
-    Ok(())
-}
-
-const VERTEX_BYTES: usize = 15;
-const FACE_BYTES: usize = 13;
 
 /// [`write()`] into memory, for thinned maps.
 pub fn ply(depth: ArrayView2<f32>, grey: ArrayView2<f32>, lateral: Lateral, unit: &str) -> Vec<u8> {
@@ -178,7 +234,7 @@ pub fn ply(depth: ArrayView2<f32>, grey: ArrayView2<f32>, lateral: Lateral, unit
 
 /// Triangles between the previous row and this one, right of each column: 1 = upper, lower, upper right; 2 = upper
 /// right, lower, lower right; 3 = both.
-fn mark_faces(depth_mm: ArrayView2<f32>, row: usize, step: f32, marks: &mut ArrayViewMut1<u8>) {
+fn mark_faces(depth_mm: ArrayView2<f32>, row: usize, step: f32, marks: &mut [u8]) {
     let (upper, lower) = (depth_mm.row(row - 1), depth_mm.row(row));
     let joined = |a: f32, b: f32, c: f32| {
         // NaN propagates through the sum; these comparisons are one instruction each.

@@ -30,12 +30,12 @@ pub struct Track {
 
 /// One performance of an activity by a person.
 #[derive(Clone, Debug, PartialEq)]
+#[allow(missing_docs, reason = "names and types describe these fields")]
 pub struct Clip {
     /// Subject name; clips of a subject are never split between training and test.
     pub subject: String,
     /// Activity name, the answer of recognition.
     pub activity: String,
-    /// Views, equal in number and order for all clips of a set.
     pub views: Vec<Track>,
 }
 

@@ -143,12 +143,12 @@ pub fn segments(windows: &[Stretch]) -> Vec<Segment> {
 
 /// Part of a recording with one answer.
 #[derive(Clone, Debug, PartialEq)]
+#[allow(missing_docs, reason = "names and types describe these fields")]
 pub struct Segment {
     /// First frame, from 0.
     pub from: usize,
     /// End frame, exclusive.
     pub to: usize,
-    /// Activity, `None` = unknown.
     pub activity: Option<String>,
     /// Mean confidence of its windows, 0 to 1.
     pub confidence: f32,
@@ -156,12 +156,12 @@ pub struct Segment {
 
 /// Answer for a segment of a recording.
 #[derive(Clone, Debug, PartialEq)]
+#[allow(missing_docs, reason = "names and types describe these fields")]
 pub struct Stretch {
     /// First frame, from 0.
     pub from: usize,
     /// End frame, exclusive.
     pub to: usize,
-    /// Answer for these frames.
     pub answer: Answer,
 }
 

@@ -16,14 +16,12 @@ use serde::{Deserialize, Serialize};
 
 /// Settings of a recogniser.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[allow(missing_docs, reason = "names and types describe these fields")]
 pub struct RecogniserSettings {
-    /// Scaling of masks before description.
     pub scaling: Scaling,
-    /// Settings of embedding and patterns.
     pub space: SpaceSettings,
     /// Sharpness of soft assignments.
     pub sharpness: f32,
-    /// Classifier with its parameter.
     pub classifier: ClassifierKind,
     /// Also train on mirrored clips.
     pub mirror: bool,
@@ -43,16 +41,13 @@ impl Default for RecogniserSettings {
 
 /// A trained recogniser.
 #[derive(Clone, Debug, PartialEq)]
+#[allow(missing_docs, reason = "names and types describe these fields")]
 pub struct Recogniser {
-    /// Settings of the training.
     pub settings: RecogniserSettings,
     /// Activities by class index.
     pub activities: Vec<String>,
-    /// Number of fused views.
     pub views: usize,
-    /// Learned space of frames and patterns.
     pub space: Space,
-    /// Classifier of the patterns.
     pub classifier: Classifier,
     /// Squared distance limits to the nearest of [`Self::patterns`]; used without an auxiliary model.
     pub limits: Limits,

@@ -23,9 +23,6 @@ pub fn write(
     let folder = release.work.join(&name);
     lay_programs(programs, elves, &folder)?;
     lay_documents(&folder)?;
-    for page in ["LICENSE-MIT", "LICENSE-APACHE"] {
-        copy(&ROOT.join(page), &folder)?;
-    }
     copy(&extras.notices, &folder)?;
     copy(&ROOT.join("packaging/60-farnear.rules"), &folder)?;
     for (from, to) in [(&extras.man, "man"), (&extras.completions, "completions")] {

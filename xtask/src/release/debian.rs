@@ -1,9 +1,8 @@
-//! Debian packages, built by `dpkg-deb`. The one for this machine's processor uses the system's libraries
-//! with all available cameras and depends on them; the other has static programs.
+//! Debian packages, built by `dpkg-deb`. `farnear` has static programs and depends on nothing; `farnear-cameras`, for this
+//! machine's processor, uses the system's libraries with all available cameras and depends on them.
 
 use std::{
     fs,
-    os::unix::fs::symlink,
     path::{Path, PathBuf},
     process::Command,
 };
@@ -19,32 +18,51 @@ use crate::run::{ROOT, cargo, finish, has, output, step, target_folder};
 /// `/usr/bin` points here, because the emulated board expects its firmware next to it.
 const PROGRAMS: &str = "usr/lib/farnear";
 
-/// Returns the path, or the missing tool.
+/// Package without dependencies.
+const STATIC: &str = "farnear";
+/// The same with cameras by libraries of the system; replaces the other.
+const WITH_CAMERAS: &str = "farnear-cameras";
+
+/// Returns the paths, or the missing tool.
 pub fn write(
     release: &Release,
     target: &Target,
     programs: &Path,
     elves: &[PathBuf],
     extras: &Extras,
-) -> Result<Result<PathBuf, String>> {
+) -> Result<Result<Vec<PathBuf>, String>> {
     if !has("dpkg-deb") {
         return Ok(Err("dpkg-deb is missing; Debian's package is dpkg".into()));
     }
-    let (programs, depends) = match target.runs_here().then(cameras).filter(|kinds| !kinds.is_empty()) {
-        Some(kinds) => with_cameras(release, &kinds)?,
-        None => (programs.to_path_buf(), String::new()),
-    };
-    let name = format!("farnear_{}_{}.deb", release.version, target.debian);
+    let mut packages = vec![pack(release, target, STATIC, programs, "", elves, extras)?];
+    let kinds = if target.runs_here() { cameras() } else { Vec::new() };
+    if !kinds.is_empty() {
+        let (programs, depends) = with_cameras(release, &kinds)?;
+        packages.push(pack(release, target, WITH_CAMERAS, &programs, &depends, elves, extras)?);
+    }
+    Ok(Ok(packages))
+}
+
+fn pack(
+    release: &Release,
+    target: &Target,
+    package: &str,
+    programs: &Path,
+    depends: &str,
+    elves: &[PathBuf],
+    extras: &Extras,
+) -> Result<PathBuf> {
+    let name = format!("{package}_{}_{}.deb", release.version, target.debian);
     step(&name);
-    let root = release.work.join(format!("deb-{}", target.debian));
-    lay_programs(&programs, elves, &root.join(PROGRAMS))?;
+    let root = release.work.join(format!("deb-{package}-{}", target.debian));
+    lay_programs(programs, elves, &root.join(PROGRAMS))?;
     fs::create_dir_all(root.join("usr/bin")).context("cannot create usr/bin")?;
     for program in crate::host::PROGRAMS {
-        symlink(format!("../lib/farnear/{program}"), root.join("usr/bin").join(program))
-            .context("cannot make a link in usr/bin")?;
+        let link = root.join("usr/bin").join(program);
+        finish(Command::new("ln").arg("-s").arg(format!("../lib/farnear/{program}")).arg(link))?;
     }
     copy(&ROOT.join("packaging/60-farnear.rules"), &root.join("usr/lib/udev/rules.d"))?;
-    let documents = root.join("usr/share/doc/farnear");
+    let documents = root.join("usr/share/doc").join(package);
     lay_documents(&documents)?;
     let notices = fs::read_to_string(&extras.notices).context("cannot read the licences")?;
     let own = ["LICENSE-MIT", "LICENSE-APACHE"].map(|name| fs::read_to_string(ROOT.join(name)));
@@ -78,7 +96,9 @@ pub fn write(
         .replace("{version}", &release.version)
         .replace("{architecture}", target.debian)
         .replace("{kilobytes}", kilobytes.split_whitespace().next().unwrap_or("0"))
-        .replace("{depends}", &depends);
+        .replace("{depends}", depends)
+        .replace("{package}", package)
+        .replace("{other}", if package == STATIC { WITH_CAMERAS } else { STATIC });
     // A package without dependencies has no such line.
     let control = control.replace("Depends: \n", "");
     fs::create_dir_all(root.join("DEBIAN")).context("cannot create DEBIAN")?;
@@ -92,7 +112,7 @@ pub fn write(
             .arg(&package)
             .env("SOURCE_DATE_EPOCH", &release.epoch),
     )?;
-    Ok(Ok(package))
+    Ok(package)
 }
 
 fn cameras() -> Vec<&'static str> {
@@ -100,7 +120,7 @@ fn cameras() -> Vec<&'static str> {
     let aravis = aravis.is_ok_and(|status| status.success());
     let features = [(aravis, "genicam", "libaravis-dev"), (has("clang"), "v4l2", "clang")];
     for (_, feature, package) in features.iter().filter(|(here, ..)| !here) {
-        eprintln!("the Debian package goes without {feature} cameras: {package} is missing");
+        eprintln!("the Debian packages have no {feature} cameras: {package} is missing");
     }
     features.into_iter().filter(|(here, ..)| *here).map(|(_, feature, _)| feature).collect()
 }

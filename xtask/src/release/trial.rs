@@ -63,7 +63,8 @@ pub fn programs(release: &Release, target: &Target, left_out: &mut Vec<String>) 
 /// Installs a Debian package into an empty root and runs its programs.
 pub fn package(release: &Release, target: &Target, package: &Path, left_out: &mut Vec<String>) -> Result<()> {
     step(&format!("{}, installed into an empty root", package.display()));
-    let root = empty(release, &format!("deb-root-{}", target.debian))?;
+    let stem = package.file_stem().unwrap_or_default().to_string_lossy();
+    let root = empty(release, &format!("root-{stem}"))?;
     let database = root.join("var/lib/dpkg");
     fs::create_dir_all(database.join("info")).context("cannot create dpkg's folder")?;
     fs::write(database.join("status"), "").context("cannot write dpkg's status")?;
@@ -76,7 +77,13 @@ pub fn package(release: &Release, target: &Target, package: &Path, left_out: &mu
         .arg(package);
     finish(&mut install)?;
     let programs = root.join("usr/bin");
-    ensure!(root.join("usr/share/man/man1/farnear-depth.1.gz").is_file(), "the package lacks its manual");
+    let documents = Path::new("usr/share/doc").join(stem.split('_').next().unwrap_or_default());
+    let pages =
+        ["copyright", "README.md", "docs/getting-started.md", "optics.toml"].map(|page| documents.join(page));
+    for page in pages.iter().map(PathBuf::as_path).chain([Path::new("usr/share/man/man1/farnear-depth.1.gz")])
+    {
+        ensure!(root.join(page).is_file(), "the package lacks {}", page.display());
+    }
     let runner = match target.runner() {
         Ok(runner) => runner,
         Err(missing) => {
@@ -96,7 +103,20 @@ pub fn package(release: &Release, target: &Target, package: &Path, left_out: &mu
     if target.runs_here() { captures(&programs, &root.join("capture")) } else { Ok(()) }
 }
 
-pub fn wheel(release: &Release, wheel: &Path, left_out: &mut Vec<String>) -> Result<()> {
+/// Checks the wheels' licences, and computes a depth map with the one for this processor.
+pub fn wheel(release: &Release, wheels: &[PathBuf], left_out: &mut Vec<String>) -> Result<()> {
+    for wheel in wheels {
+        let files = output(Command::new("python3").args(["-m", "zipfile", "--list"]).arg(wheel))?;
+        for licence in ["LICENSE-MIT", "LICENSE-APACHE", "THIRD-PARTY.txt"] {
+            ensure!(files.contains(&format!("licenses/{licence}")), "{} lacks {licence}", wheel.display());
+        }
+    }
+    let here =
+        |wheel: &&PathBuf| wheel.to_string_lossy().ends_with(&format!("{}.whl", std::env::consts::ARCH));
+    let Some(wheel) = wheels.iter().find(here) else {
+        left_out.push("trial of the wheel: none is for this processor".into());
+        return Ok(());
+    };
     step(&format!("{}, installed into a fresh environment", wheel.display()));
     let needs = [wheel.to_string_lossy()];
     match python::environment(&release.work.join("wheel-root"), &needs.each_ref().map(AsRef::as_ref)) {

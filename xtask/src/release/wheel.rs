@@ -1,35 +1,55 @@
-//! The Python wheel, built by maturin in a virtual environment.
+//! The Python wheels, built by maturin in a virtual environment. Zig links them for an old C library and for both processors.
 
-use std::{fs, path::PathBuf, process::Command};
-
-use anyhow::{Context, Result};
-
-use super::{Release, programs::without_paths};
-use crate::{
-    python,
-    run::{ROOT, finish, step, target_folder},
+use std::{
+    fs,
+    path::{Path, PathBuf},
+    process::Command,
 };
 
-const NEEDS: [&str; 1] = ["maturin>=1.9,<2"];
+use anyhow::{Result, ensure};
 
-/// Returns the path, or the missing tool.
-pub fn write(release: &Release) -> Result<Result<PathBuf, String>> {
+use super::{Release, copy, programs::without_paths};
+use crate::{
+    python,
+    run::{ROOT, finish, has_target, step, succeeds, target_folder},
+};
+
+const NEEDS: [&str; 1] = ["maturin[zig]>=1.9,<2"];
+/// glibc 2.28: Debian 10, Ubuntu 18.10, RHEL 8 and later.
+const COMPATIBILITY: &str = "manylinux_2_28";
+const TARGETS: [&str; 2] = ["x86_64-unknown-linux-gnu", "aarch64-unknown-linux-gnu"];
+
+/// Returns the paths, or the missing tool.
+pub fn write(release: &Release, notices: &Path) -> Result<Result<Vec<PathBuf>, String>> {
     let python = match python::environment(&target_folder().join("wheel"), &NEEDS) {
         Ok(python) => python,
         Err(missing) => return Ok(Err(missing)),
     };
-    step("the Python package's wheel");
-    finish(
-        Command::new(python)
-            .args(["-m", "maturin", "build", "--release", "--locked", "--strip", "--out"])
-            .arg(&release.out)
-            .current_dir(ROOT.join("python"))
-            .env("SOURCE_DATE_EPOCH", &release.epoch)
-            .env("CARGO_ENCODED_RUSTFLAGS", without_paths().join("\u{1f}")),
-    )?;
-    let wheel = fs::read_dir(&release.out)?
-        .filter_map(|entry| Some(entry.ok()?.path()))
-        .find(|path| path.extension().is_some_and(|ending| ending == "whl"))
-        .context("maturin built no wheel")?;
-    Ok(Ok(wheel))
+    // maturin takes licences from the package's folder only.
+    copy(notices, &ROOT.join("python"))?;
+    for target in TARGETS {
+        step(&format!("the Python package's wheel for {target}"));
+        if !has_target(target) && !succeeds(Command::new("rustup").args(["target", "add", target])) {
+            return Ok(Err(format!("the target is missing: rustup target add {target}")));
+        }
+        finish(
+            Command::new(&python)
+                .args(["-m", "maturin", "build", "--release", "--locked", "--strip", "--zig"])
+                .args(["--compatibility", COMPATIBILITY, "--target", target, "--out"])
+                .arg(&release.out)
+                .current_dir(ROOT.join("python"))
+                .env("SOURCE_DATE_EPOCH", &release.epoch)
+                .env("CARGO_ENCODED_RUSTFLAGS", without_paths().join("\u{1f}")),
+        )?;
+    }
+    let files = fs::read_dir(&release.out)?.filter_map(|entry| Some(entry.ok()?.path()));
+    let wheels: Vec<PathBuf> =
+        files.filter(|path| path.extension().is_some_and(|ending| ending == "whl")).collect();
+    ensure!(
+        wheels.len() == TARGETS.len(),
+        "maturin built {} wheels, expected {}",
+        wheels.len(),
+        TARGETS.len()
+    );
+    Ok(Ok(wheels))
 }

@@ -71,7 +71,6 @@ pub struct Arguments {
     field: Vec<Pattern>,
 }
 
-/// Runs the command.
 pub fn run(arguments: Arguments) -> Result<()> {
     let Arguments {
         manifest,

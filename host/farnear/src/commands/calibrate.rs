@@ -1,4 +1,4 @@
-//! `farnear calibrate`: learns what the optics do from captured images and depth maps.
+//! `farnear calibrate`: optics and corrections from captured images and depth maps.
 
 use anyhow::Result;
 use clap::Subcommand;
@@ -19,7 +19,6 @@ pub enum What {
     Camera(Run<CalibrateCameraRequest>),
 }
 
-/// Runs the command.
 pub fn run(what: What) -> Result<()> {
     match what {
         What::Psf(task) => task.run(),

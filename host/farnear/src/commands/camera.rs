@@ -112,7 +112,6 @@ pub struct LiveArguments {
     json: bool,
 }
 
-/// Runs the command.
 pub fn run(job: Job) -> Result<()> {
     match job {
         Job::List(arguments) => report::print(&camera::list(), arguments.json),

@@ -1,4 +1,4 @@
-//! `farnear doctor`: whether this computer has what farnear needs.
+//! `farnear doctor`: checks this computer for what farnear needs.
 
 use std::path::PathBuf;
 
@@ -27,7 +27,6 @@ pub struct Arguments {
     json: bool,
 }
 
-/// Runs the command.
 pub fn run(arguments: Arguments) -> Result<()> {
     let settings = DoctorSettings { port: arguments.port, folders: arguments.folders };
     let figures = doctor::examine(&settings, &terminal::context()?)?;

@@ -1,4 +1,4 @@
-//! `farnear man`: the manual's pages.
+//! `farnear man`: manual pages.
 
 use std::path::PathBuf;
 
@@ -16,7 +16,6 @@ pub struct Arguments {
     out: PathBuf,
 }
 
-/// Writes the pages of the program whose arguments `C` describes.
 pub fn run<C: CommandFactory>(arguments: &Arguments) -> Result<()> {
     let mut command = C::command().disable_help_subcommand(true);
     command.build();

@@ -16,7 +16,6 @@ pub enum What {
     Difference(Run<MeasureDifferenceRequest>),
 }
 
-/// Runs the command.
 pub fn run(what: What) -> Result<()> {
     match what {
         What::Region(task) => task.run(),

@@ -1,4 +1,4 @@
-//! `farnear render`: what a camera would see of a known scene, and the truth with it.
+//! `farnear render`: a simulated pair of a known scene, with the true depth.
 
 use std::path::PathBuf;
 
@@ -60,7 +60,6 @@ pub struct Arguments {
     json: bool,
 }
 
-/// Runs the command.
 pub fn run(arguments: Arguments) -> Result<()> {
     let Arguments { scene, elliptical_distortion, psf, optics, noise, seed, width, height, out, json } =
         arguments;

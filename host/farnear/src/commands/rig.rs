@@ -99,7 +99,6 @@ impl Question {
     }
 }
 
-/// Runs the command.
 pub fn run(job: Job) -> Result<()> {
     match job {
         Job::Info(question) => question.answer(info::info),

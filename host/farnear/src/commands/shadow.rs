@@ -1,4 +1,4 @@
-//! `farnear shadow`: shadow on masks of a person.
+//! `farnear shadow`: shadows in masks of a person.
 
 use anyhow::Result;
 use clap::Subcommand;
@@ -12,7 +12,6 @@ pub enum Job {
     Score(Run<ShadowScoreRequest>),
 }
 
-/// Runs the command.
 pub fn run(job: Job) -> Result<()> {
     match job {
         Job::Remove(task) => task.run(),

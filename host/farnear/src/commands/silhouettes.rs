@@ -18,7 +18,6 @@ pub enum Source {
     Passages(Run<PassagesRequest>),
 }
 
-/// Runs the command.
 pub fn run(source: Source) -> Result<()> {
     match source {
         Source::Skeletons(task) => task.run(),

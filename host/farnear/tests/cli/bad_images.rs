@@ -1,10 +1,10 @@
-//! Images and maps that are none: a clear message each, and nothing written.
+//! Invalid images and maps: a clear message each, and no output.
 
 use std::fs;
 
 use crate::common::{Folder, fails, farnear, render, rig_optics, succeeds};
 
-/// Depth of two files that must fail so; looks that nothing is left behind.
+/// Depth of two files fails with these phrases and leaves no file.
 #[track_caller]
 fn depth_fails(folder: &Folder, far: &str, near: &str, phrases: &[&str]) {
     let before = folder.listing();

@@ -1,4 +1,4 @@
-//! Optics that make no sense: the message names the value, and the one that would agree.
+//! Contradictory optics: the message names the value and the one that would agree.
 
 use crate::common::{Folder, fails, farnear};
 

@@ -1,4 +1,4 @@
-//! Ports without a rig behind them: absent, busy, no port at all, silent, garbage, another protocol version.
+//! Ports without a rig: absent, busy, not a port, silent, garbage, another protocol version.
 
 use std::{
     io::{Read, Write},
@@ -13,7 +13,7 @@ use serialport::{SerialPort, TTYPort};
 
 use crate::common::{Folder, fails, farnear, rig_optics};
 
-/// A capture with this port that must fail so and leave nothing behind.
+/// A capture with this port fails and leaves no file.
 #[track_caller]
 fn capture_fails(port: &str, phrases: &[&str]) {
     let folder = Folder::new();
@@ -100,7 +100,7 @@ fn noise_without_a_board_behind_it_is_told_from_silence() {
     let mut line = Line::new();
     let name = line.name();
     std::thread::spawn(move || {
-        // Till the program has gone: a repeating pattern with the frames' delimiter in it.
+        // Until the program ends: a repeating pattern that contains the frame delimiter.
         for byte in (0..=255u8).cycle() {
             std::thread::sleep(Duration::from_millis(2));
             if line.far_end.write_all(&[byte, byte.wrapping_mul(7), 0]).is_err() {
@@ -111,7 +111,7 @@ fn noise_without_a_board_behind_it_is_told_from_silence() {
     capture_fails(&name, &["no answer", &name, "broken frames came", "right port"]);
 }
 
-/// Answers every request as a board does that speaks protocol 4 to 5 only.
+/// Answers every request like a board that supports protocols 4 to 5 only.
 fn board_of_the_future(mut line: Line) {
     let mut decoder = Decoder::new();
     let mut bytes = [0; 64];
@@ -148,7 +148,7 @@ fn a_camera_that_is_none_is_named_before_anything_moves() {
         ("sim", 2, vec!["camera sim: it belongs to the emulated rig"]),
         ("127.0.0.1:1", 1, vec!["127.0.0.1:1", "refused"]),
     ] {
-        // The port is absent as well: it would be the one that is named if it were looked at first.
+        // The camera is checked first: the absent port would give another message.
         let capture = ["rig", "capture", "--port", "/dev/farnear-absent", "--camera", camera];
         fails(farnear(&capture).args(["--optics", rig_optics(), "--out", &out]), code, &phrases);
         assert_eq!(folder.listing(), Vec::<String>::new());

@@ -1,4 +1,4 @@
-//! The emulated rig missing in whole or in part, or going away, or on a bad line.
+//! The emulated rig missing, incomplete, killed, or on a bad line.
 
 use std::{
     fs,
@@ -12,7 +12,7 @@ use serde_json::Value;
 
 use crate::common::{Folder, SIM, beside, fails, farnear, rig_optics, succeeds};
 
-/// A copy of the program alone in a folder, with nothing on its PATH.
+/// A copy of the program alone in a folder, with an empty PATH.
 fn alone(folder: &Folder) -> Assert {
     let copy = folder.path("farnear");
     fs::copy(env!("CARGO_BIN_EXE_farnear"), &copy).expect("a copy");
@@ -62,7 +62,6 @@ fn what_the_simulator_refuses_is_passed_on() {
     fails(farnear(&["rig", "info", "--port", "sim"]).args(["--firmware", "none.elf"]), 1, &said);
 }
 
-/// A capture on the emulated rig with these faults of the line.
 fn capture(folder: &Folder, faults: Option<&str>, out: &str) -> Assert {
     let mut command = farnear(&["rig", "capture", "--port", "sim", "--optics", rig_optics()]);
     command.args(["--out", &folder.text(out)]);
@@ -76,7 +75,7 @@ fn capture(folder: &Folder, faults: Option<&str>, out: &str) -> Assert {
 #[cfg_attr(not(emulated_rig), ignore = "needs farnear-sim: cargo xtask test")]
 fn a_port_that_goes_away_ends_the_capture_without_a_trace() {
     let folder = Folder::new();
-    // Both stages are homed in some 2 s of the board's time, the exposures lie at 3.546 s and 3.565 s.
+    // Both stages are homed after some 2 s of the board's time; the exposures are at 3.546 s and 3.565 s.
     for milliseconds in [300, 3_556] {
         let faults = format!("unplug_after_ms = {milliseconds}");
         fails(&mut capture(&folder, Some(&faults), "out"), 1, &["went away while", "check its cable"]);
@@ -84,7 +83,7 @@ fn a_port_that_goes_away_ends_the_capture_without_a_trace() {
     }
 }
 
-/// A line of the simulator's or the program's output that contains `phrase`.
+/// The first line of output that contains `phrase`.
 fn wait_for(output: &mut impl BufRead, phrase: &str) -> String {
     let mut line = String::new();
     while !line.contains(phrase) {
@@ -94,7 +93,7 @@ fn wait_for(output: &mut impl BufRead, phrase: &str) -> String {
     line
 }
 
-/// Ends the child, should the test fail.
+/// Kills the child even if the test fails.
 struct Reaped(Child);
 
 impl Drop for Reaped {
@@ -140,7 +139,7 @@ fn a_bad_line_changes_nothing_or_fails_cleanly() {
         ["far.png", "near.png"]
             .map(|file| fs::read(folder.path(&format!("{name}/{file}"))).expect("an image"))
     };
-    // A stranger's frame, half a frame, delimiters: as from a terminal that was left open.
+    // A foreign frame, half a frame, delimiters: as from a terminal that was left open.
     succeeds(&mut capture(&folder, Some("garbage = [3, 255, 0, 66, 17, 0, 0, 9]"), "garbage"));
     assert!(images("clean") == images("garbage"));
     let record = |name: &str| fs::read(folder.path(&format!("{name}/capture.toml"))).expect("a record");
@@ -151,7 +150,7 @@ fn a_bad_line_changes_nothing_or_fails_cleanly() {
     let said = String::from_utf8_lossy(&output.stderr);
     match output.status.code() {
         Some(0) => {
-            // What is asked again costs time, so that the piezo stands some nanometres elsewhere in its window.
+            // Retries take time, in which the piezo drifts by some nanometres within its window.
             for file in ["far.png", "near.png"] {
                 let picture =
                     |name: &str| read_grey(&folder.path(&format!("{name}/{file}"))).expect("an image").pixels;

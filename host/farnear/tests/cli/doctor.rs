@@ -1,4 +1,4 @@
-//! `farnear doctor`: what it says of this computer, and how it ends.
+//! `farnear doctor`: report and exit code.
 
 use crate::common::{Folder, beside, farnear};
 

@@ -1,4 +1,4 @@
-//! Optics proposed for what is to be measured, and whether renders with them keep what was promised.
+//! Proposed optics, and whether renders with them keep the promised accuracy.
 
 use crate::common::{Folder, fails, farnear, figures, number, succeeds};
 

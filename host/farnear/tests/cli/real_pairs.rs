@@ -1,4 +1,4 @@
-//! Pairs from a camera that is not perfect, as a user meets them.
+//! Pairs from imperfect cameras.
 
 use std::fs;
 
@@ -22,7 +22,7 @@ fn brightness_and_place_are_mended_and_said() {
     render(&folder, "plane:905", "pair");
     let far = folder.text("pair/far.png");
     let near = read_grey(&folder.path("pair/near.png")).expect("the near image").pixels;
-    // 8 px to the right and a fifth darker; what is not seen is as bright as the middle.
+    // 8 px to the right and 20 % darker; uncovered pixels have the mean brightness.
     let moved = Array2::from_shape_fn(near.dim(), |(y, x)| 0.8 * if x < 8 { 0.45 } else { near[(y, x - 8)] });
     let moved = write(&folder, "moved.png", &moved);
     let depth = |align: &str, out: &str| {
@@ -42,7 +42,7 @@ fn brightness_and_place_are_mended_and_said() {
     for (reason, depth) in reasons.iter().zip(&map) {
         assert_eq!(*reason == 0.0, depth.is_finite());
     }
-    // Not aligned they do not show the same anywhere.
+    // Without alignment the images match nowhere.
     let out = folder.text("none");
     let command = ["depth", &far, &moved, "--optics", rig_optics(), "--align", "none", "--out", &out];
     fails(&mut farnear(&command), 1, &["do not show the same scene", "correlation"]);
@@ -78,7 +78,7 @@ fn windows_and_confidence_are_asked_for() {
     };
     let (ro, _) = errors("ro", &[]);
     let (white, depth) = errors("white", &["--method", "whitened"]);
-    // Adaptive windows take the noise of a plane down 2.6 to 3 times.
+    // Adaptive windows reduce the noise of a plane by a factor of 2.6 to 3.
     assert!(white < 0.45 * ro && (depth - 905.0).abs() < 0.1, "{white} {ro} {depth}");
     let (wide, _) = errors("wide", &["--window", "safe"]);
     assert!(wide < ro, "{wide} {ro}");
@@ -97,7 +97,7 @@ fn windows_and_confidence_are_asked_for() {
 #[test]
 fn a_camera_is_calibrated_and_used() {
     let folder = Folder::new();
-    // Far from the middle of the range, where an uneven response counts: in the middle it cancels between the images.
+    // Far from the middle of the range, where the error of the response does not cancel between the images.
     render(&folder, "plane:928", "pair");
     let response = |y: usize, x: usize| {
         let hash = ((y * 7919 + x * 104_729) as u32 ^ 0x9e37).wrapping_mul(2_654_435_761);

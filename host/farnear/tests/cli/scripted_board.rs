@@ -1,4 +1,4 @@
-//! Boards in trouble, played by a scripted board behind a real pseudo-terminal: no simulator is needed.
+//! Faulty boards, played by a scripted board behind a real pseudo-terminal: no simulator is needed.
 #![cfg(target_os = "linux")]
 
 use farnear_protocol::message::SettingKey;
@@ -6,7 +6,7 @@ use farnear_scripted_board::{Faults, plug_in};
 
 use crate::common::{Folder, fails, farnear, figures, number, rig_optics, succeeds};
 
-/// A capture with this port that must fail so and leave nothing behind.
+/// A capture with this port fails and leaves no file.
 #[track_caller]
 fn capture_fails(port: &str, phrases: &[&str]) {
     let folder = Folder::new();
@@ -90,13 +90,13 @@ fn settings_and_counters_are_read_and_changed() {
 fn a_checklist_without_hands_stops_at_what_fails() {
     let (port, peer) = plug_in(Faults::default());
     peer.board().hello.firmware = env!("CARGO_PKG_VERSION").try_into().expect("a short version");
-    // Waited for like one: on a crowded machine this program answers later than any real board.
+    // Longer time-outs: on a busy machine this program answers later than a real board.
     peer.board().hello.emulated = true;
     let images = Folder::new();
     let camera = format!("folder:{}", images.text(""));
     let check =
         ["rig", "check", "--port", &port, "--no-actuation", "--resting-only", "--json", "--camera", &camera];
-    // The scripted board has no memory worth the name: its counter of boots stands still.
+    // The scripted board stores nothing, so its boot counter does not change.
     let output = farnear(&check).output().expect("it starts");
     let found: serde_json::Value = serde_json::from_slice(&output.stdout).expect("figures");
     assert_eq!(

@@ -1,4 +1,4 @@
-//! `farnear target`: what it says of the page, what is on it, what it refuses.
+//! `farnear target`: figures, page and rejected input.
 
 use std::fs;
 

@@ -1,4 +1,4 @@
-//! The standard deviation that travels with a map.
+//! The standard deviation of a map.
 
 use farnear_files::map;
 use ndarray::Array2;
@@ -9,7 +9,7 @@ fn read(folder: &Folder, name: &str) -> Array2<f32> {
     map::read(&folder.path(name)).expect("a map")
 }
 
-/// The errors of a noisy plane are as large as they are said to be.
+/// The errors of a noisy plane agree with the predicted deviation.
 #[test]
 fn the_predicted_deviation_is_that_of_the_errors() {
     let folder = Folder::new();

@@ -128,6 +128,10 @@ fn bad_usage_ends_with_2() {
             vec!["median-px", "9", "7"],
         ),
         (vec!["depth", "a.png", "b.png", "--optics", optics, "--window", "-3"], vec!["'-3'"]),
+        (
+            vec!["depth", "--fill", "surface", "a.png", "b.png", "--optics", optics],
+            vec!["tip: the value of --fill follows an equals sign: --fill=surface"],
+        ),
         (vec!["operators", "--optics", optics, "--psf", "airy"], vec!["airy", "gaussian"]),
         (vec!["operators", "--optics", optics, "--family", "grow"], vec!["grow", "ggro"]),
         (vec!["operators", "--optics", optics, "--design", "cubic"], vec!["cubic", "linear"]),
@@ -201,7 +205,7 @@ fn completions_name_the_commands() {
     }
 }
 
-/// A reader that has gone is a failure with a message, not a panic.
+/// A closed stdout causes a message, not a panic.
 #[cfg(target_os = "linux")]
 #[test]
 fn a_stdout_that_takes_nothing_is_a_failure() {

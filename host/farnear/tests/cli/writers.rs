@@ -1,11 +1,10 @@
-//! `farnear depth --write`: which files a map is written as, and what is in them.
+//! `farnear depth --write`: the written files and their content.
 
 use exr::prelude::*;
 use farnear_files::map;
 
 use crate::common::{Folder, fails, farnear, render, rig_optics, succeeds};
 
-/// The names below `out`.
 fn written(folder: &Folder, out: &str) -> Vec<String> {
     let below = format!("{out}/");
     folder.listing().iter().filter_map(|name| name.strip_prefix(&below).map(str::to_owned)).collect()
@@ -32,9 +31,10 @@ fn a_map_is_written_as_asked() {
     ];
     depth("usual", &[]);
     assert_eq!(written(&folder, "usual"), usual);
-    depth("all", &["--write", "npy,tiff,png,mesh,view,exr"]);
+    depth("all", &["--write", "npy,tiff,png,mesh,glb,view,exr"]);
     let all = written(&folder, "all");
-    assert_eq!(all.len(), usual.len() + 1);
+    assert_eq!(all.len(), usual.len() + 2);
+    assert!(std::fs::read(folder.path("all/mesh.glb")).unwrap().starts_with(b"glTF"));
     for name in usual.iter().filter(|name| **name != "depth.toml") {
         let bytes = |out: &str| std::fs::read(folder.path(&format!("{out}/{name}"))).unwrap();
         assert!(bytes("usual") == bytes("all"), "{name}");
@@ -48,7 +48,7 @@ fn a_map_is_written_as_asked() {
     assert!(record("some").contains("write = \"tiff,mesh\"") && !record("some").contains("[png]"));
     assert!(!record("usual").contains("write = ") && record("usual").contains("[png]"));
     let unknown = ["depth", &far, &near, "--optics", rig_optics(), "--write", "npy,jpg"];
-    fails(&mut farnear(&unknown), 2, &["jpg", "npy,tiff,png,mesh,view,exr"]);
+    fails(&mut farnear(&unknown), 2, &["jpg", "npy,tiff,png,mesh,glb,view,exr"]);
 }
 
 #[test]
@@ -61,7 +61,7 @@ fn a_folder_holds_the_files_of_one_run_with_hashes_of_its_inputs() {
         let [far, near] = ["far.png", "near.png"].map(|name| folder.text(&format!("{pair}/{name}")));
         succeeds(farnear(&["depth", &far, &near, "--optics", rig_optics(), "--out", &out]).args(more));
     };
-    depth("cone", &["--uncertainty", "--write", "npy,tiff,png,mesh,view,exr"]);
+    depth("cone", &["--uncertainty", "--write", "npy,tiff,png,mesh,glb,view,exr"]);
     folder.file("out/notes.txt", "mine");
     depth("slant", &["--write", "npy"]);
     let left = ["confidence.npy", "depth.npy", "depth.toml", "notes.txt", "reason.png"];
@@ -76,7 +76,7 @@ fn a_folder_holds_the_files_of_one_run_with_hashes_of_its_inputs() {
     assert_eq!(input[1]["bytes"].as_integer(), Some(bytes.len() as i64));
     assert_eq!(input[1]["sha256"].as_str().unwrap().len(), 64);
     assert_ne!(input[0]["sha256"], input[1]["sha256"]);
-    // A failed run leaves the earlier result whole.
+    // A failed run leaves the earlier result unchanged.
     fails(&mut farnear(&["depth", &out, &out, "--optics", rig_optics(), "--out", &out]), 1, &[]);
     assert_eq!(written(&folder, "out"), left);
 }

@@ -1,4 +1,4 @@
-//! One browser has control; nothing moves once it has disconnected.
+//! One browser has control; nothing moves after it has disconnected.
 
 use farnear_scripted_board::Faults;
 

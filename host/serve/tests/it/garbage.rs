@@ -1,4 +1,4 @@
-//! Ten thousand messages that are none: each is answered or ended, and the page is served as before.
+//! Ten thousand invalid messages: each is answered or ends its connection, and the page is still served.
 
 use std::{io::Write, net::TcpStream};
 
@@ -6,12 +6,11 @@ use farnear_scripted_board::Faults;
 
 use super::client::{Served, Socket};
 
-/// Messages over HTTP; the others go over sockets.
 const HTTP: usize = 4_000;
-/// Messages over sockets, of which each connection takes a few.
+/// Each connection takes a few of them.
 const SOCKET: usize = 6_000;
 
-/// Numbers that repeat from run to run (xorshift).
+/// Repeatable random numbers (xorshift).
 struct Dice(u64);
 
 impl Dice {
@@ -26,7 +25,7 @@ impl Dice {
         (0..self.below(longest + 1)).map(|_| self.below(256) as u8).collect()
     }
 
-    /// A request that was right once, with some of its bytes changed, dropped or doubled.
+    /// A valid request with some bytes changed, dropped or doubled.
     fn spoiled(&mut self, request: &str) -> Vec<u8> {
         let mut bytes = request.as_bytes().to_vec();
         for _ in 0..=self.below(4) {

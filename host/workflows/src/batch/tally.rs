@@ -1,4 +1,4 @@
-//! State of the jobs: reported one at a time, failures recorded separately, remaining time.
+//! Progress of the jobs: reports, file of failures, remaining time.
 
 use std::{
     fs::{self, File},
@@ -14,7 +14,6 @@ use crate::{
     error::{Result, WorkflowError},
 };
 
-/// Counts jobs over threads.
 pub(super) struct Tally<'a> {
     total: usize,
     context: &'a Context<'a>,
@@ -26,14 +25,13 @@ pub(super) struct Tally<'a> {
 #[derive(Default)]
 struct Inner {
     figures: BatchFigures,
-    /// The file of failures, made with the first of them.
     file: Option<File>,
     /// Start of the first job that was not already finished.
     working_since: Option<Instant>,
 }
 
 impl<'a> Tally<'a> {
-    /// Nothing is done yet; the failures of the last run are put away.
+    /// Discards the failures of the last run.
     pub fn new(
         total: usize,
         failures: &Path,
@@ -50,9 +48,8 @@ impl<'a> Tally<'a> {
         Ok(Self { total, context, on_job, failures: failures.into(), inner: Mutex::default() })
     }
 
-    /// A job has ended.
     pub fn tell(&self, report: &JobReport) -> Result<()> {
-        // Held during the report, so that lines do not mix and counts rise.
+        // Locked during the report, so that lines do not mix and counts increase.
         let mut inner = self.inner.lock().unwrap_or_else(PoisonError::into_inner);
         inner.figures.jobs += 1;
         match report.state {

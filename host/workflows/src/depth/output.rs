@@ -1,4 +1,4 @@
-//! The folder of results, and the table of what can be in it.
+//! Folder of results, and the table of its possible files.
 
 use std::{
     collections::BTreeSet,
@@ -10,7 +10,7 @@ use std::{
 };
 
 use farnear_files::{
-    exr,
+    exr, glb,
     image_file::{png_to, png8_to},
     map::{self, Scale},
     mesh::{self, Lateral, Projection},
@@ -29,52 +29,47 @@ use crate::{
     result_folder::{self, DEPTH_RECORD},
 };
 
-/// A file being written.
 type Sink = BufWriter<File>;
 
-/// A file of results.
 struct Output {
-    /// Its names.
     names: &'static [&'static str],
     file: &'static str,
-    /// Writes it, piece by piece: with several megapixels a file can be larger than all maps together.
+    /// Writes in pieces: with several megapixels a file can exceed all maps together.
     write: fn(&Results<'_>, &mut Sink) -> io::Result<()>,
 }
 
-/// All that can be written: a new writer is a line here. Beside it there is always `depth.toml`, which says what made the
-/// map.
+/// Possible outputs: a new writer is a line here. `depth.toml` with the provenance is always written.
 #[rustfmt::skip]
 const OUTPUTS: &[Output] = &[
     Output { names: &["npy"], file: "depth.npy", write: |results, to| npy::write_to(results.depth(), to) },
     Output { names: &["tiff"], file: "depth.tiff", write: |results, to| map::tiff_to(results.depth(), to) },
     Output { names: &["png"], file: "depth.png", write: |results, to| results.png(to) },
-    // A map does not travel without its confidence; depth.exr and view.png hold it themselves.
+    // A map is never without confidence; depth.exr and view.png contain it.
     Output { names: &["npy", "tiff", "png"], file: "confidence.npy", write: |results, to| npy::write_to(results.confidence(), to) },
     Output { names: &["npy", "tiff", "png"], file: "reason.png", write: |results, to| results.reasons(to) },
     Output { names: &["npy", "tiff", "png"], file: UNCERTAINTY, write: |results, to| results.uncertainty(to) },
     Output { names: &[MESH], file: "mesh.ply", write: |results, to| results.mesh(to) },
+    Output { names: &[GLB], file: "mesh.glb", write: |results, to| results.glb(to) },
     Output { names: &["view"], file: "view.png", write: |results, to| results.view(to) },
     Output { names: &["exr"], file: "depth.exr", write: |results, to| results.exr(to) },
 ];
 
-/// All files of a result besides its record.
 pub(crate) fn files() -> impl Iterator<Item = &'static str> {
     OUTPUTS.iter().map(|output| output.file)
 }
 
-/// The output that needs the image in addition to the maps.
+/// Outputs that also need the image.
 const MESH: &str = "mesh";
-/// The output that exists only with another option.
+const GLB: &str = "glb";
+/// Output that depends on another option.
 const UNCERTAINTY: &str = "uncertainty.npy";
 
 /// Default outputs.
 const USUAL: [&str; 5] = ["npy", "tiff", "png", "mesh", "view"];
 
-/// Which of the outputs are written.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Outputs(BTreeSet<&'static str>);
 
-/// A name that belongs to no output.
 #[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
 #[error("unknown output \"{name}\"; expected some of {}", Outputs::names().join(","))]
 pub struct UnknownOutput {
@@ -82,7 +77,7 @@ pub struct UnknownOutput {
 }
 
 impl Outputs {
-    /// All names, in the table's order.
+    /// In the table's order.
     pub fn names() -> Vec<&'static str> {
         let mut names: Vec<&str> = Vec::new();
         for name in OUTPUTS.iter().flat_map(|output| output.names) {
@@ -93,9 +88,8 @@ impl Outputs {
         names
     }
 
-    /// Whether any of them shows the image.
     pub(super) fn show_image(&self) -> bool {
-        self.0.contains(MESH)
+        [MESH, GLB].iter().any(|name| self.0.contains(name))
     }
 
     fn outputs(&self) -> impl Iterator<Item = &'static Output> {
@@ -112,7 +106,6 @@ impl Default for Outputs {
 impl FromStr for Outputs {
     type Err = UnknownOutput;
 
-    /// A list such as `npy,exr`.
     fn from_str(text: &str) -> Result<Self, UnknownOutput> {
         let known = |name: &str| {
             let found = Self::names().into_iter().find(|known| *known == name.trim());
@@ -133,9 +126,8 @@ pub(super) struct Results<'a> {
     settings: &'a DepthRequest,
     inputs: &'a Inputs,
     computed: &'a Computed,
-    /// Scale of depth.png's codes, mm, if it is written.
+    /// Scale of depth.png's codes, mm, if written.
     scale: Option<Scale>,
-    /// What made the map, as TOML.
     record: String,
 }
 
@@ -153,10 +145,7 @@ impl<'a> Results<'a> {
         Ok(Self { settings, inputs, computed, scale, record })
     }
 
-    /// Writes everything to the folder `out`, or nothing.
-    ///
-    /// # Errors
-    /// Which file cannot be written; [`crate::WorkflowError::Cancelled`].
+    /// Writes all outputs to `out`, or nothing.
     pub(super) fn write(&self, out: &Path, context: &Context<'_>) -> Result<()> {
         let staged = result_folder::depth(out)?;
         let there = |output: &&Output| output.file != UNCERTAINTY || self.deviation().is_some();
@@ -200,17 +189,24 @@ impl<'a> Results<'a> {
         to.write_all(&view::view_png(self.depth(), self.confidence()).map_err(io::Error::other)?)
     }
 
-    fn mesh(&self, to: &mut Sink) -> io::Result<()> {
+    fn projection(&self) -> Projection {
         let optics = &self.inputs.optics;
-        let projection = Projection {
+        Projection {
             focal_length_mm: optics.focal_length_mm(),
             pixel_um: optics.pixel_um(),
             axis_px: self.inputs.cut.map(|cut| cut.part().axis_px()),
-        };
-        mesh::write(self.depth(), self.computed.image.view(), Lateral::Lens(projection), "mm", to)
+        }
     }
 
-    /// Depth as compositors expect it, `Z`, here in mm; its origin is in the header.
+    fn mesh(&self, to: &mut Sink) -> io::Result<()> {
+        mesh::write(self.depth(), self.computed.image.view(), Lateral::Lens(self.projection()), "mm", to)
+    }
+
+    fn glb(&self, to: &mut Sink) -> io::Result<()> {
+        glb::write(self.depth(), self.computed.image.view(), self.projection(), to)
+    }
+
+    /// Depth channel `Z` as used by compositors, here in mm; its origin is in the header.
     fn exr(&self, to: &mut Sink) -> io::Result<()> {
         let mut channels = vec![("Z", self.depth()), ("confidence", self.confidence())];
         channels.extend(self.deviation().map(|deviation| ("deviation", deviation)));
@@ -238,7 +234,7 @@ mod tests {
         let unknown = "npy,jpg".parse::<Outputs>().unwrap_err();
         assert_eq!(
             unknown.to_string(),
-            "unknown output \"jpg\"; expected some of npy,tiff,png,mesh,view,exr"
+            "unknown output \"jpg\"; expected some of npy,tiff,png,mesh,glb,view,exr"
         );
         assert!("".parse::<Outputs>().is_err());
     }

@@ -24,7 +24,6 @@ struct List {
     model: Vec<shipped::ModelFigures>,
 }
 
-/// Runs the command.
 pub fn run(arguments: Arguments) -> Result<()> {
     if arguments.sheet {
         return report::to_stdout(shipped::SHEET.as_bytes());

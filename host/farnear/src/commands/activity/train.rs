@@ -97,10 +97,6 @@ enum Synthetic {
     Everyday,
 }
 
-/// Runs the command.
-///
-/// # Errors
-/// See [`training::train`] and [`shipped::train`].
 pub fn run(arguments: Arguments) -> Result<()> {
     let json = arguments.json;
     if let Some(Synthetic::Everyday) = arguments.synthetic {

@@ -1,4 +1,4 @@
-//! `farnear rig log`: what the firmware writes into its log.
+//! `farnear rig log`: the firmware's log.
 
 use std::{io::Write, path::PathBuf};
 
@@ -28,7 +28,6 @@ pub struct Arguments {
     reset: bool,
 }
 
-/// Runs the command.
 pub fn run(arguments: Arguments) -> Result<()> {
     let Arguments { target, elf, seconds, reset } = arguments;
     let settings = LogSettings { rig: target.address()?, elf, seconds, reset };

@@ -47,14 +47,12 @@ pub struct MoveArguments {
     json: bool,
 }
 
-/// Runs `home`.
 pub fn home(arguments: HomeArguments) -> Result<()> {
     let axes: Vec<_> = arguments.axis.iter().map(|name| Axis::from(*name)).collect();
     let address = arguments.target.address()?;
     report::print(&motion::home(&address, &axes, &terminal::context()?)?, arguments.json)
 }
 
-/// Runs `move`.
 pub fn go(arguments: MoveArguments) -> Result<()> {
     let MoveArguments { target, axis: axes, to_um, home, json } = arguments;
     if axes.len() != to_um.len() {

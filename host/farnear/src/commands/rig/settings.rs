@@ -1,4 +1,4 @@
-//! `farnear rig settings`: what the board keeps in its memory.
+//! `farnear rig settings`: the settings in the board's memory.
 
 use anyhow::Result;
 use clap::Subcommand;
@@ -32,7 +32,6 @@ pub enum Job {
     },
 }
 
-/// Runs the command.
 pub fn run(job: Job) -> Result<()> {
     match job {
         Job::List(question) => question.answer(settings::list),

@@ -1,8 +1,8 @@
-//! Recordings of motion that teach, and that become samples.
+//! Motion recordings for training and as samples.
 
 use crate::common::{Folder, fails, farnear, figures, number, succeeds};
 
-/// A person's 20 joints as lines of text, metres with y up: in this many frames the arms go up, or the trunk comes down.
+/// The 20 joints of a person as lines of text, metres, y up. Over the frames the arms rise, or the trunk bends.
 fn kinect(size: f64, raise: f64, stoop: f64) -> String {
     let mut text = String::new();
     for frame in 0..30 {

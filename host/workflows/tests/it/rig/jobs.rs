@@ -1,4 +1,4 @@
-//! Tasks on a connected rig, and refusals before.
+//! Tasks on a connected rig, and errors before them.
 
 use std::{thread, time::Duration};
 
@@ -76,7 +76,7 @@ fn the_board_is_asked_and_told() {
 #[test]
 fn a_log_without_its_texts_is_given_as_bytes_until_it_is_cancelled() {
     let (port, board) = plug_in(Faults::default());
-    // The scripted board's line moves when it is asked something, as an emulated board's time does.
+    // The scripted board's line answers on request, like an emulated board's time.
     board.board().hello.emulated = true;
     let face = Face::default();
     let context = face.context();
