@@ -16,7 +16,6 @@ mod fast;
 mod processor;
 #[cfg(test)]
 mod reference;
-mod repair;
 
 use ndarray::ArrayView2;
 use serde::{Deserialize, Serialize};
@@ -187,6 +186,7 @@ mod tests {
                         input: &input,
                         operators: &operators,
                         settings: &settings,
+                        invalid: None,
                         depth_of,
                         backend,
                     }

@@ -7,6 +7,8 @@
 
 mod commands;
 mod hints;
+#[cfg(target_os = "linux")]
+mod huge_pages;
 mod render;
 mod report;
 mod run;
@@ -26,6 +28,10 @@ use farnear_workflows::{
 };
 
 use run::Run;
+
+#[cfg(target_os = "linux")]
+#[global_allocator]
+static ALLOCATOR: huge_pages::HugePages = huge_pages::HugePages;
 
 /// Depth from defocus: design operators, compute depth, drive the rig.
 #[derive(Parser)]

@@ -288,6 +288,18 @@ pub struct DepthFigures {
 /// Computes a depth map and writes the folder: all files, or none on failure or cancellation.
 pub fn compute(settings: &DepthRequest, context: &Context<'_>) -> Result<DepthFigures> {
     settings.check()?;
+    match settings.threads {
+        n if n > 0 && n != rayon::current_num_threads() => rayon::ThreadPoolBuilder::new()
+            .num_threads(n)
+            .build()
+            .map_err(|error| WorkflowError::parameter("threads", n, error.to_string()))?
+            .install(|| compute_here(settings, context)),
+        _ => compute_here(settings, context),
+    }
+}
+
+/// [`compute`] on the threads at hand.
+fn compute_here(settings: &DepthRequest, context: &Context<'_>) -> Result<DepthFigures> {
     let settings = &settings.for_lens(context)?;
     let mut inputs = Inputs::read(settings, context)?;
     let start = Instant::now();

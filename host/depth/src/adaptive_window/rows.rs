@@ -234,6 +234,19 @@ impl<'a> Tile<'a> {
         }
         let Job { far, near, .. } = self.job;
         let (height, width) = far.dim();
+        // Reflection adds no hole that is not within the halo of the image itself.
+        let [rows, columns] =
+            [(place.top, place.rows, halo[0], height), (place.left, place.columns, halo[1], width)]
+                .map(|(first, count, halo, n)| first.saturating_sub(halo)..(first + count + halo).min(n));
+        let whole = [far, near].iter().all(|image| {
+            let rows = image.slice(s![rows.clone(), columns.clone()]);
+            rows.rows()
+                .into_iter()
+                .all(|row| row.iter().map(|v| u32::from(v.is_finite())).sum::<u32>() as usize == row.len())
+        });
+        if whole {
+            return None;
+        }
         let holes =
             Array2::from_shape_fn((place.rows + 2 * halo[0], place.columns + 2 * halo[1]), |(y, x)| {
                 let y = reflect((place.top + y) as isize - halo[0] as isize, height);

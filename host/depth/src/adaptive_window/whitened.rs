@@ -114,9 +114,8 @@ fn constrained(rows: &[(Vec<f64>, f64)], constraints: &[Vec<f64>]) -> Result<DVe
     let least = 1e-9 * svd.singular_values.max();
     let free: Vec<usize> = (0..unknowns).filter(|i| svd.singular_values[*i] <= least).collect();
     let space = DMatrix::from_fn(unknowns, free.len(), |i, j| directions[(free[j], i)]);
-    let matrix = DMatrix::from_fn(rows.len(), unknowns, |i, j| rows[i].0[j]) * &space;
-    let right = DVector::from_fn(rows.len(), |i, _| rows[i].1);
-    Ok(space * least_squares::solve(matrix, right)?)
+    let (matrix, right) = least_squares::reduced(rows);
+    Ok(&space * least_squares::solve(matrix * &space, right)?)
 }
 
 /// One unit row per unknown: keeps undetermined unknowns small.

@@ -253,6 +253,9 @@ fn greys<T: Copy + Into<f64>>(
 ) -> Vec<f32> {
     if colours == 1 {
         let scale = 1.0 / full_scale;
+        if channels == 1 {
+            return samples.iter().map(|sample| ((*sample).into() * scale) as f32).collect();
+        }
         return samples.iter().step_by(channels).map(|sample| ((*sample).into() * scale) as f32).collect();
     }
     if even {

@@ -85,8 +85,7 @@ pub fn record(
         part: inputs.cut.map(|cut| cut.part()),
         prepared: computed.report,
         no_depth: &computed.lost,
-        // The number of threads does not change the result.
-        settings: Settings { threads: Settings::default().threads, ..settings.computation() },
+        settings: Settings { threads: rayon::current_num_threads(), ..settings.computation() },
         uncertainty: computed.deviation.as_ref().map(|(_, found)| found),
         optics: inputs.optics,
         operators: inputs.method.operators(),

@@ -96,6 +96,8 @@ impl Story<'_> {
                 }
                 None => farnear(&arguments),
             };
+            // Records name the number of threads.
+            started.env("RAYON_NUM_THREADS", "2");
             started.current_dir(folder.path("")).output().unwrap()
         };
         for command in self.before {
