@@ -97,7 +97,7 @@ pub(crate) mod tests {
 
     /// A PNG with EXIF in a text chunk.
     pub(crate) fn png_with_exif(orientation: u8, time: &str) -> Vec<u8> {
-        let profile = [b"Exif\0\0", &exif(orientation, time)[..]].concat();
+        let profile = [&b"Exif\0\0"[..], &exif(orientation, time)].concat();
         let mut text = format!("\nexif\n{:8}\n", profile.len());
         for line in profile.chunks(36) {
             line.iter().for_each(|byte| write!(text, "{byte:02x}").unwrap());

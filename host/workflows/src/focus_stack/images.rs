@@ -30,7 +30,7 @@ use crate::{
 };
 
 pub(super) struct Images<'a> {
-    /// 32-bit floats by rows. It has no name and goes with the program.
+    /// 32-bit floats by rows. It has no name: the system removes it when the program ends, whatever the reason.
     file: Mutex<File>,
     folder: PathBuf,
     /// Where each image begins in the file, bytes, with its height and width.
