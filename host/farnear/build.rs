@@ -1,4 +1,4 @@
-//! Which tests can run here.
+//! Enables the tests that can run on this platform.
 
 fn main() {
     farnear_test_data::declare();

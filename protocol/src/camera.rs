@@ -15,6 +15,7 @@ pub const FRAME_HEADER: usize = 17;
 
 /// Header of a frame's pixels.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[allow(missing_docs, reason = "names and types describe these fields")]
 pub struct FrameHeader {
     /// Trigger number since the board's reset ([`crate::message::ShotRecord::trigger_number`]), the id of
     /// [`Control::Expose`], or [`FREE_RUNNING`] for all free-running images.
@@ -23,7 +24,6 @@ pub struct FrameHeader {
     pub exposure: BoardMicros,
     /// Pixels per row.
     pub width: u16,
-    /// Number of rows.
     pub height: u16,
     /// Significant bits per pixel, 8 to 16.
     pub bits: u8,

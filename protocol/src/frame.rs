@@ -54,10 +54,9 @@ impl Kind {
 
 /// Fields before the body.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[allow(missing_docs, reason = "names and types describe these fields")]
 pub struct Header {
-    /// Protocol version of the body.
     pub version: u8,
-    /// Type of the body.
     pub kind: Kind,
     /// Request id or event number.
     pub id: u32,
@@ -67,8 +66,8 @@ pub struct Header {
 
 /// A frame with a correct CRC and an undecoded body.
 #[derive(Clone, PartialEq, Eq, Debug)]
+#[allow(missing_docs, reason = "names and types describe these fields")]
 pub struct Packet {
-    /// Fields before the body.
     pub header: Header,
     /// Undecoded postcard body.
     pub body: Vec<u8, BODY_MAX>,
@@ -86,6 +85,7 @@ impl Packet {
 
 /// Why bytes between two delimiters are rejected.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[allow(missing_docs, reason = "names and types describe these fields")]
 pub enum FrameError {
     /// More than [`FRAME_MAX`] bytes without a delimiter.
     TooLong,
@@ -93,7 +93,6 @@ pub enum FrameError {
     TooShort,
     /// Invalid COBS encoding.
     Encoding,
-    /// The CRC does not match.
     Crc,
     /// Unknown value of [`Kind`].
     Kind,

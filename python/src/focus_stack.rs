@@ -131,7 +131,7 @@ pub fn focus_stack<'py>(
         let moved_px = model.map_or(Ok(0.0), |model| aligned_stack(&mut owned, model)).map_err(wrong)?;
         let views: Vec<ArrayView2<'_, f32>> = owned.iter().map(|image| image.view()).collect();
         let positions = even_positions(views.len(), focused_at_mm.as_deref());
-        let map = depth_from_positions(&views, &positions, &settings).map_err(wrong)?;
+        let map = depth_from_positions(&views[..], &positions, &settings).map_err(wrong)?;
         let depth = depth_of_places(&map.place, views.len(), focused_at_mm.as_deref());
         Ok((map, depth, moved_px))
     })?;

@@ -86,12 +86,12 @@ pub fn remove_shadow<'py>(
     let sun = SunPosition { elevation_deg, azimuth_deg };
     let cut = || shadow::remove(&mask.0, &file, sun, 0.0, method);
     let (clean, report) = py.detach(cut).map_err(wrong)?;
-    let said = PyDict::new(py);
-    said.set_item("beta_deg", report.beta_rad.to_degrees())?;
-    said.set_item("removed_fraction", report.removed_fraction)?;
-    said.set_item("distance_m", report.subject.distance_m)?;
-    said.set_item("trustworthy", report.trustworthy)?;
-    Ok((clean.into_pyarray(py), said))
+    let dict = PyDict::new(py);
+    dict.set_item("beta_deg", report.beta_rad.to_degrees())?;
+    dict.set_item("removed_fraction", report.removed_fraction)?;
+    dict.set_item("distance_m", report.subject.distance_m)?;
+    dict.set_item("trustworthy", report.trustworthy)?;
+    Ok((clean.into_pyarray(py), dict))
 }
 
 /// Centroid distances of a silhouette: its descriptor; takes 20 us.

@@ -97,15 +97,15 @@ impl Recogniser {
         if let Some(among) = among {
             answer = answer.among(&among);
         }
-        let said = PyDict::new(py);
-        said.set_item("activity", answer.activity)?;
-        said.set_item("confidence", answer.confidence)?;
-        said.set_item("outlier_score", answer.outlier_score)?;
+        let dict = PyDict::new(py);
+        dict.set_item("activity", answer.activity)?;
+        dict.set_item("confidence", answer.confidence)?;
+        dict.set_item("outlier_score", answer.outlier_score)?;
         let probabilities = PyDict::new(py);
         for (name, share) in answer.probabilities {
             probabilities.set_item(name, share)?;
         }
-        said.set_item("probabilities", probabilities)?;
-        Ok(said)
+        dict.set_item("probabilities", probabilities)?;
+        Ok(dict)
     }
 }

@@ -84,35 +84,35 @@ impl RigClient {
     /// What the board says of itself now.
     fn status<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let status = self.interruptibly(py, |client| Ok(client.status()?))?;
-        let said = PyDict::new(py);
+        let dict = PyDict::new(py);
         for (name, axis) in [("coarse", &status.coarse), ("fine", &status.fine), ("lens", &status.lens)] {
-            said.set_item(name, of_axis(py, axis)?)?;
+            dict.set_item(name, of_axis(py, axis)?)?;
         }
-        said.set_item("emergency_stop", status.emergency_stop)?;
-        said.set_item("alarm", status.alarm.map(|record| record.number))?;
-        said.set_item("alarm_text", status.alarm.map(|record| alarm_text(record.alarm)))?;
-        Ok(said)
+        dict.set_item("emergency_stop", status.emergency_stop)?;
+        dict.set_item("alarm", status.alarm.map(|record| record.number))?;
+        dict.set_item("alarm_text", status.alarm.map(|record| alarm_text(record.alarm)))?;
+        Ok(dict)
     }
 
     /// Who the board is and how far it goes.
     fn info<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let hello = self.0.hello();
         let limits = hello.limits;
-        let said = PyDict::new(py);
-        said.set_item("board", hello.board.as_str())?;
-        said.set_item("firmware", hello.firmware.as_str())?;
-        said.set_item("emulated", hello.emulated)?;
-        said.set_item("shots_max", limits.shots_max)?;
+        let dict = PyDict::new(py);
+        dict.set_item("board", hello.board.as_str())?;
+        dict.set_item("firmware", hello.firmware.as_str())?;
+        dict.set_item("emulated", hello.emulated)?;
+        dict.set_item("shots_max", limits.shots_max)?;
         let ms = |exposure: Micros| f64::from(exposure.0) / 1e3;
-        said.set_item("exposure_ms", (ms(limits.exposure_min), ms(limits.exposure_max)))?;
+        dict.set_item("exposure_ms", (ms(limits.exposure_min), ms(limits.exposure_max)))?;
         for (name, min, max) in [
             ("coarse_um", limits.coarse_min, limits.coarse_max),
             ("fine_um", limits.fine_min, limits.fine_max),
             ("lens_um", limits.lens_min, limits.lens_max),
         ] {
-            said.set_item(name, (um(min), um(max)))?;
+            dict.set_item(name, (um(min), um(max)))?;
         }
-        Ok(said)
+        Ok(dict)
     }
 
     /// Stops all motion along the ramps.
@@ -255,12 +255,12 @@ fn open(address: &CameraAddress) -> Result<Box<dyn farnear_capture::camera::Came
 }
 
 fn of_axis<'py>(py: Python<'py>, status: &AxisStatus) -> PyResult<Bound<'py, PyDict>> {
-    let said = PyDict::new(py);
-    said.set_item("state", state_name(status.state))?;
-    said.set_item("asked_um", um(status.asked))?;
-    said.set_item("measured_um", um(status.measured))?;
-    said.set_item("moving", status.moving)?;
-    Ok(said)
+    let dict = PyDict::new(py);
+    dict.set_item("state", state_name(status.state))?;
+    dict.set_item("asked_um", um(status.asked))?;
+    dict.set_item("measured_um", um(status.measured))?;
+    dict.set_item("moving", status.moving)?;
+    Ok(dict)
 }
 
 fn of_image<'py>(
@@ -268,14 +268,14 @@ fn of_image<'py>(
     (pixels, bits, record): (Array2<u16>, u8, ShotRecord),
     limits: &Limits,
 ) -> PyResult<Taken<'py>> {
-    let said = PyDict::new(py);
-    said.set_item("axis", record.axis.name())?;
-    said.set_item("asked_um", um(record.asked))?;
-    said.set_item("measured_um", um(record.measured(record.axis)))?;
-    said.set_item("sensor_mm", sensor_mm(&record, limits))?;
-    said.set_item("settle_ms", f64::from(record.settle.0) / 1e3)?;
-    said.set_item("strobe_start_us", record.strobe_start.0)?;
-    said.set_item("strobe_end_us", record.strobe_end.0)?;
-    said.set_item("exposure_us", record.exposure.0)?;
-    Ok((pixels.into_pyarray(py), bits, said))
+    let dict = PyDict::new(py);
+    dict.set_item("axis", record.axis.name())?;
+    dict.set_item("asked_um", um(record.asked))?;
+    dict.set_item("measured_um", um(record.measured(record.axis)))?;
+    dict.set_item("sensor_mm", sensor_mm(&record, limits))?;
+    dict.set_item("settle_ms", f64::from(record.settle.0) / 1e3)?;
+    dict.set_item("strobe_start_us", record.strobe_start.0)?;
+    dict.set_item("strobe_end_us", record.strobe_end.0)?;
+    dict.set_item("exposure_us", record.exposure.0)?;
+    Ok((pixels.into_pyarray(py), bits, dict))
 }

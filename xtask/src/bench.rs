@@ -26,25 +26,25 @@ const SIZE: (usize, usize) = (640, 480);
 
 #[derive(Args)]
 pub struct Arguments {
-    /// Also run the same on numpy and OpenCV, and on scikit-learn, and print the ratios; needs python3 with them.
+    /// Run the same with numpy, OpenCV and scikit-learn, and print the ratios; needs python3 with them.
     #[arg(long)]
     peers: bool,
     /// Other peer scripts that print one JSON object. A script whose text names FEATURES is called as `python3 FILE
     /// FEATURES.npy` and gives `isomap_ms`, `rbf_training_ms` and `embedding_ms`; others as `python3 FILE far near` and give `chain_ms`.
     #[arg(long, value_name = "FILE")]
     peer_script: Vec<PathBuf>,
-    /// Only one half: depth or people.
+    /// Run only one half: depth or people.
     #[arg(long, value_name = "HALF", conflicts_with = "write")]
     only: Option<Half>,
     /// Count the instructions on 64-bit ARM; needs qemu-user, gcc-aarch64-linux-gnu and the target
-    /// aarch64-unknown-linux-gnu. With --write only that section is renewed.
+    /// aarch64-unknown-linux-gnu. With --write, rewrite only that section.
     #[arg(long, conflicts_with_all = ["peers", "only"])]
     arm: bool,
-    /// Time `farnear depth` as a whole program compared with a numpy and OpenCV script, 0.3 to 45 megapixels; with --write the
-    /// page docs/speed-programs.md is renewed.
+    /// Time `farnear depth` as a whole program compared with a numpy and OpenCV script, 0.3 to 45 megapixels. With --write,
+    /// rewrite docs/speed-programs.md.
     #[arg(long, conflicts_with_all = ["peers", "only", "arm"])]
     programs: bool,
-    /// Runs of each program.
+    /// Number of runs of each program.
     #[arg(long, default_value_t = 5, requires = "programs")]
     runs: usize,
     /// Write the page docs/speed.md from the figures.
@@ -355,7 +355,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_figure_is_said() {
+    fn rejects_rows_without_figures() {
         assert!(row("{\"name\": \"x\"}").is_err_and(|e| e.to_string().contains("not a bench's line")));
         assert!(peer("p.py", "{\"chain\": 3}").is_err_and(|e| e.to_string().contains("chain_ms")));
         assert!(peer("p.py", "Traceback").is_err());

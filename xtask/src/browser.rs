@@ -33,18 +33,18 @@ pub fn run() -> Result<Counts> {
         eprintln!("skipped: the page in a browser ({missing})");
         return Ok(Counts { skipped: written(&text), ended_well: true, ..Counts::default() });
     }
-    let said = limited::run(
+    let ended = limited::run(
         Command::new("node")
             .args(["--test", "--test-concurrency=1", "--test-reporter=tap", "page.test.mjs", "rows.test.mjs"])
             .current_dir(folder)
             .env("FARNEAR", target_folder().join("debug/farnear")),
     )?;
-    let count = |name| number(&said.text, name);
+    let count = |name| number(&ended.text, name);
     Ok(Counts {
         passed: count("pass"),
         failed: count("fail"),
         skipped: count("skipped"),
-        ended_well: said.well,
+        ended_well: ended.well,
     })
 }
 

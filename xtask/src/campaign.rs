@@ -13,37 +13,37 @@ use crate::{
 /// Options of `cargo xtask campaign`.
 #[derive(clap::Args)]
 pub struct Arguments {
-    /// How many random scenarios, each a rig, a host and what happens to them: seeds 1, 2, 3 ...
+    /// Number of random scenarios, each with a rig, a host and faults: seeds 1, 2, 3 ...
     #[arg(long, default_value_t = 100)]
     seeds: u64,
     /// First seed
     #[arg(long, default_value_t = 1)]
     first: u64,
-    /// Only a part of the seeds, e.g. 2/8, the second of eight: for several machines. No other tests run then.
+    /// Use only a part of the seeds, e.g. 2/8 for the second of eight machines, and run no other tests.
     #[arg(long)]
     shard: Option<String>,
-    /// Where the small scenarios are written that break a property.
+    /// Folder for the shrunk scenarios of violations.
     #[arg(long, default_value = "out/campaign")]
     out: PathBuf,
-    /// No long tests, only scenarios.
+    /// Play only scenarios, without the long tests.
     #[arg(long)]
     scenarios_only: bool,
-    /// How many rigs the long tests run on, each with its own mechanics.
+    /// Number of rigs for the long tests, each with its own mechanics.
     #[arg(long, default_value_t = 3)]
     rigs: u64,
     /// Random moves of each axis on each rig.
     #[arg(long, default_value_t = 1_000)]
     moves: u32,
-    /// STEP pulses at 40 kHz on both axes together.
+    /// Total STEP pulses of both axes at 40 kHz.
     #[arg(long, default_value_t = 1_000_000)]
     steps: u32,
-    /// Frames with which each rig's link is fuzzed.
+    /// Fuzzed frames on each rig's link.
     #[arg(long, default_value_t = 20_000)]
     fuzz_frames: u64,
-    /// Hostile frames (replays, bursts, noise, other hosts) for the rig's behaviour without the emulator, once for all seeds.
+    /// Hostile frames (replays, bursts, noise, other hosts) to the rig without the emulator, once for all seeds.
     #[arg(long, default_value_t = 1_000_000)]
     hostile_frames: u64,
-    /// Power cuts at random bytes that are written to the memory, without the emulator.
+    /// Power cuts at random bytes of memory writes, without the emulator.
     #[arg(long, default_value_t = 10_000)]
     power_cuts: u64,
 }

@@ -50,7 +50,7 @@ pub fn run() -> Result<()> {
     let depth = ["depth", &far, &near, "--optics", optics, "--median-px", "5", "--out", &path(""), "--json"];
     output(&mut farnear(&depth))?;
 
-    step("compare with what the camera really saw");
+    step("compare with the true depth");
     let truth = path("truth");
     output(farnear(&["render", "--optics", optics, "--out", &truth]).args(SCENE))?;
     let (map, known) = (path("depth.npy"), format!("{truth}/truth.npy"));

@@ -12,10 +12,10 @@ pub struct Arguments {
     /// Folder with real pairs, focal stacks, skeletons and silhouettes; by default the folder next to the repository that tests use.
     #[arg(long, value_name = "DIR")]
     data: Option<PathBuf>,
-    /// Only these parts, such as `planes` or `corrections`; printed, no page is written.
+    /// Print only these parts, such as `planes` or `corrections`, without writing pages.
     #[arg(long, value_name = "NAME")]
     only: Vec<String>,
-    /// Only these pages, written: `accuracy`, `robustness`, `activity`, `thesis` or `real`.
+    /// Write only these pages: `accuracy`, `robustness`, `activity`, `thesis` or `real`.
     #[arg(long, value_name = "NAME", conflicts_with = "only")]
     page: Vec<String>,
 }

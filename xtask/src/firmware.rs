@@ -18,7 +18,7 @@ const COUNTER: &str = "farnear-count";
 fn built(board: &Board, program: &str) -> Result<PathBuf> {
     let elf = board.folder().join("target").join(TARGET).join("release").join(program);
     if !elf.exists() {
-        bail!("the build ended well but left no {}", elf.display());
+        bail!("the build succeeded without creating {}", elf.display());
     }
     Ok(elf)
 }

@@ -11,7 +11,7 @@ pub fn run() -> Result<()> {
     let home = std::env::var_os("CARGO_HOME")
         .map(PathBuf::from)
         .or_else(|| std::env::home_dir().map(|home| home.join(".cargo")))
-        .context("no home folder: set CARGO_HOME to the folder whose bin/ is to take the programs")?;
+        .context("no home folder: set CARGO_HOME to the folder with the bin/ for the programs")?;
     let bin = home.join("bin");
     fs::create_dir_all(&bin).with_context(|| format!("cannot create {}", bin.display()))?;
     let programs = host::PROGRAMS.map(String::from);

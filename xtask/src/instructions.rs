@@ -89,7 +89,7 @@ pub fn run(write: bool) -> Result<()> {
         std::fs::write(&path, page(&counts)).with_context(|| format!("cannot write {}", path.display()))?;
     }
     let page = std::fs::read_to_string(&path)
-        .with_context(|| format!("cannot read {}: `cargo xtask sizes --write` makes it", path.display()))?;
+        .with_context(|| format!("cannot read {}: `cargo xtask sizes --write` creates it", path.display()))?;
     let mut wrong = Vec::new();
     for counted in &counts {
         println!("{}", counted.row());
@@ -115,7 +115,7 @@ pub fn run(write: bool) -> Result<()> {
     }
     if !wrong.is_empty() {
         bail!(
-            "{PAGE} differs from the count; `cargo xtask sizes --write` renews it\n  {}",
+            "{PAGE} differs from the count; `cargo xtask sizes --write` rewrites it\n  {}",
             wrong.join("\n  ")
         );
     }
@@ -127,7 +127,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_written_is_found_again() {
+    fn a_written_table_is_read_back() {
         let counted = Counted::parse("8655\t640\tpixel\tCLSF, ten terms").expect("a line");
         assert_eq!(on_page(&page(&[counted]), "CLSF, ten terms"), Some(8655.0));
     }

@@ -30,9 +30,9 @@ pub struct Output {
 
 /// Errors are shown immediately, output at the end.
 pub fn run(command: &mut Command) -> Result<Output> {
-    let said = run_for(command, LIMIT)?;
-    print!("\n{}\n{}", describe(command), said.text);
-    Ok(said)
+    let finished = run_for(command, LIMIT)?;
+    print!("\n{}\n{}", describe(command), finished.text);
+    Ok(finished)
 }
 
 fn run_for(command: &mut Command, limit: Duration) -> Result<Output> {
@@ -56,7 +56,7 @@ fn run_for(command: &mut Command, limit: Duration) -> Result<Output> {
     match well {
         None => eprintln!("not ended within {} s, and killed: {named}", limit.as_secs()),
         Some(_) if !ends.iter().all(|end| end.recv_timeout(LAST).is_ok()) => {
-            eprintln!("left a program behind that holds its output: {named}");
+            eprintln!("ended, but a child process still holds its output: {named}");
         }
         Some(_) => {}
     }
@@ -101,14 +101,14 @@ mod tests {
     }
 
     #[test]
-    fn what_hangs_is_killed_and_what_it_said_is_kept() {
+    fn a_hanging_program_is_killed_and_its_output_kept() {
         let (text, well, took) = shell("echo begun; exec sleep 60", Duration::from_millis(300));
         assert_eq!((text.as_str(), well), ("begun\n", false));
         assert!(took < Duration::from_secs(30), "{took:?}");
     }
 
     #[test]
-    fn what_is_left_behind_is_not_waited_for() {
+    fn a_leftover_child_process_is_not_awaited() {
         let (text, well, took) = shell("sleep 60 & echo done", Duration::from_secs(50));
         assert_eq!((text.as_str(), well), ("done\n", true));
         assert!(took < Duration::from_secs(30), "{took:?}");

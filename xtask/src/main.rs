@@ -40,35 +40,35 @@ struct Arguments {
 enum Job {
     /// Build everything, capture a pair on the emulated rig, compute its depth, write out/demo/.
     Demo,
-    /// Everything CI runs: format, lints, firmware build and budgets, host tests, tests on the emulated board.
+    /// Run everything that CI runs: format, lints, firmware build and budgets, host tests, tests on the emulated board.
     Test(test::Arguments),
     /// Build the firmware and copy its ELF next to the host programs.
     Firmware,
-    /// The firmware's flash and static RAM against their budgets, and the instructions of its routines against
+    /// Compare the firmware's flash and static RAM with their budgets, and its routines' instructions with
     /// docs/instructions.md.
     Sizes {
-        /// Renew docs/instructions.md.
+        /// Rewrite docs/instructions.md.
         #[arg(long)]
         write: bool,
     },
-    /// Random scenarios on the emulated board, judged and made small; then its long tests, rig after rig: a million steps,
-    /// thousands of moves, a fuzzed link.
+    /// Play random scenarios on the emulated board, check their invariants and shrink failures. Then run the long tests on
+    /// each rig: a million steps, thousands of moves, a fuzzed link.
     Campaign(campaign::Arguments),
     /// Run the property tests with many more cases, seed after seed.
     Fuzz {
-        /// For about so long; a round that has begun is finished.
+        /// Approximate duration; the last round is completed.
         #[arg(long, default_value_t = 60)]
         seconds: u64,
     },
-    /// Time the mathematics, with --peers compared with the same chain on OpenCV.
+    /// Time the mathematics; --peers compares it with the same chain on OpenCV.
     Bench(bench::Arguments),
     /// Measure the accuracy on rendered (and, where present, real) scenes and write the accuracy pages.
     Evaluate(evaluate::Arguments),
     /// Check that all but the emulated board compiles for Windows and macOS (four minutes the first time on two idle cores).
     Portable,
-    /// The documents as a site, with search and every command: out/site/html.
+    /// Build the documents with all help texts as a searchable site in out/site/html.
     Site,
-    /// What a release hands out, each file tried where nothing else is: programs for two processors, Debian packages, the wheel.
+    /// Build and try the release files: programs for two processors, Debian packages, the wheel.
     Release(release::Arguments),
     /// Install farnear and farnear-sim (with the firmware's ELF) into cargo's bin folder.
     Install,

@@ -47,7 +47,7 @@ pub fn run(elf: &Path) -> Result<Counts> {
     };
     let built = target_folder().join("debug");
     lay_out(&folder.join("package/farnear"), &built)?;
-    let said = limited::run(
+    let ended = limited::run(
         Command::new(python)
             .args(["-m", "pytest", "-q", "-p", "farnear.pytest_plugin", "-p", "no:cacheprovider"])
             // Report where a test hangs.
@@ -61,12 +61,12 @@ pub fn run(elf: &Path) -> Result<Counts> {
             .env("FARNEAR_SIM", built.join("farnear-sim"))
             .env("FARNEAR_FIRMWARE", elf),
     )?;
-    let text = said.text;
+    let text = ended.text;
     Ok(Counts {
         passed: count(&text, "passed"),
         failed: count(&text, "failed") + count(&text, "error") + count(&text, "errors"),
         skipped: count(&text, "skipped"),
-        ended_well: said.well,
+        ended_well: ended.well,
     })
 }
 
@@ -85,7 +85,7 @@ pub fn environment(folder: &Path, needs: &[&str]) -> Result<PathBuf, String> {
         return Ok(python);
     }
     if !succeeds(Command::new("python3").args(["-m", "venv", "--clear"]).arg(&venv)) {
-        return Err("python3 -m venv makes no environment; Debian's package is python3-venv".into());
+        return Err("python3 -m venv creates no environment; Debian's package is python3-venv".into());
     }
     eprintln!("fetching {}", needs.join(", "));
     let fetch = ["-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--only-binary", ":all:"];

@@ -26,7 +26,7 @@ use crate::{
 
 #[derive(Args)]
 pub struct Arguments {
-    /// Folder for the files; replaced.
+    /// Output folder; its content is replaced.
     #[arg(long, value_name = "DIR", default_value = "out/release")]
     out: PathBuf,
 }

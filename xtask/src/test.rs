@@ -18,7 +18,7 @@ use crate::{
 /// Options of `cargo xtask test`.
 #[derive(clap::Args)]
 pub struct Arguments {
-    /// Run the test programs too that are unchanged since they passed.
+    /// Also run test programs that are unchanged since they passed.
     #[arg(long)]
     all: bool,
 }

@@ -206,16 +206,16 @@ fn listing(folder: &Path, hasher: &mut DefaultHasher) {
 
 /// Adds the results of a test run; returns the summary if all passed.
 pub fn watch(command: &mut Command, total: &mut Total) -> Result<Option<String>> {
-    let said = limited::run(command)?;
+    let ended = limited::run(command)?;
     let mut result = None;
-    for counts in said.text.lines().filter_map(|line| line.strip_prefix("test result: ")) {
+    for counts in ended.text.lines().filter_map(|line| line.strip_prefix("test result: ")) {
         total.count(counts);
         result = Some(counts.to_owned());
     }
     // A killed program has counted nothing.
-    total.failed += u32::from(!said.well && result.is_none());
-    total.well &= said.well;
-    Ok(result.filter(|_| said.well))
+    total.failed += u32::from(!ended.well && result.is_none());
+    total.well &= ended.well;
+    Ok(result.filter(|_| ended.well))
 }
 
 impl Total {

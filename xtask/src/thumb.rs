@@ -52,7 +52,7 @@ impl Way {
             return Ok(Self::Debian);
         }
         bail!(
-            "the firmware's target {TARGET} is missing, and no way to get it works here. Do one of these:\n  \
+            "the firmware's target {TARGET} is missing, and cannot be installed automatically. Do one of these:\n  \
              rustup target add {TARGET}\n  \
              sudo apt-get update && sudo apt-get install {}\nand run the command again.",
             DEBIAN_PACKAGES.join(" ")

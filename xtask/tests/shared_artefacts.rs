@@ -1,9 +1,9 @@
-//! `cargo xtask demo` builds two programs, `cargo xtask test` the whole workspace. A package is compiled once for both only while
-//! both turn on the same of its features; one feature more, deep below, doubles everything above it.
+//! `cargo xtask demo` builds two programs, `cargo xtask test` the whole workspace. A package is compiled once for both only if
+//! both enable the same features of it; a difference in one dependency recompiles everything above it.
 
 use std::{collections::BTreeMap, process::Command};
 
-/// The features of each package, of all its builds, under a selection of packages and edges.
+/// Features of each build of each package, for a selection of packages and edges.
 fn features(arguments: &[&str]) -> BTreeMap<String, Vec<String>> {
     let output = Command::new(env!("CARGO"))
         .args(["tree", "--locked", "--prefix", "none", "--format", "{p}\t{f}"])
@@ -24,7 +24,7 @@ fn features(arguments: &[&str]) -> BTreeMap<String, Vec<String>> {
     found
 }
 
-/// Those packages of the demo that another selection compiles with other features.
+/// Packages of the demo that another selection compiles with other features.
 fn twice(other: &BTreeMap<String, Vec<String>>) -> Vec<String> {
     let demo = features(&[&DEMO[..], &["--edges", "normal,build"]].concat());
     assert!(demo.len() > 100, "cargo tree found {} packages only", demo.len());

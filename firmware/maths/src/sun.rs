@@ -65,12 +65,10 @@ pub struct Place {
 
 /// Unit vector to the sun.
 #[derive(Clone, Copy, PartialEq, Debug)]
+#[allow(missing_docs, reason = "names and types describe these fields")]
 pub struct Sun {
-    /// Eastern component.
     pub east: f32,
-    /// Northern component.
     pub north: f32,
-    /// Upward component.
     pub up: f32,
 }
 

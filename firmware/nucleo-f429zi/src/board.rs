@@ -182,7 +182,7 @@ impl Board for Nucleo {
             Note::Refused { request, error } => warn!("request {} is refused: {}", request, error),
             Note::Position { axis, state } => info!("position of {}: {}", axis, state),
             Note::Session { request } => info!("a session is opened by request {}", request),
-            Note::LinkRate(rate) => info!("the link's rate is {} baud from now on", rate.baud()),
+            Note::LinkRate(rate) => info!("the link rate is now {} baud", rate.baud()),
         }
     }
 

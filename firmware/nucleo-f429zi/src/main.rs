@@ -102,7 +102,7 @@ fn tell_of(last: Option<Last>) {
             error!("a fault at {:#010x}, CFSR {:#010x}", program_counter, status);
         }
         Some(Last::StackOverflow) => error!("the stack overflowed"),
-        Some(Last::ClockLost) => error!("the clock from outside stopped"),
+        Some(Last::ClockLost) => error!("the external clock stopped"),
         None => {}
     }
 }
@@ -116,7 +116,7 @@ async fn main(_spawner: Spawner) {
     Interrupt::TIM5.set_priority(Priority::P3);
     tell_of(last);
     if own_clock {
-        error!("there is no clock from outside: the chip's own is used");
+        error!("no external clock: the internal oscillator is used");
     }
     if !option_bytes::has_brown_out_reset() {
         error!("the brown-out reset is off or below level 2: set BOR_LEV with the probe (docs/bring-up.md)");

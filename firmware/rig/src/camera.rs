@@ -146,7 +146,7 @@ mod tests {
     use crate::settings::Settings;
 
     #[test]
-    fn a_strobe_that_has_lost_its_beginning_is_none_and_the_read_out_is_waited_for_all_the_same() {
+    fn a_strobe_without_a_start_is_ignored_and_the_read_out_still_awaited() {
         // Found by the campaign: a wire reconnected during an exposure, which was reported 0.86 ms late.
         let answer = |lost_us: u64| {
             let mut camera = Camera::new(Settings::DEFAULT.camera);

@@ -49,10 +49,10 @@ impl LinkSpeed {
         &mut self,
         now: BoardMicros,
         requests: u32,
-        said: impl FnOnce() -> bool,
+        all_sent: impl FnOnce() -> bool,
     ) -> Option<LinkRate> {
         let (rate, change) = match self.change {
-            Change::Asked { to, at } if said() || since(at, now) >= ANSWER_LEAVES => {
+            Change::Asked { to, at } if all_sent() || since(at, now) >= ANSWER_LEAVES => {
                 (to, Change::Trial { back: self.now, at: now, requests })
             }
             Change::Trial { requests: before, .. } if requests != before => (self.now, Change::None),
@@ -107,7 +107,7 @@ mod tests {
     }
 
     #[test]
-    fn the_rate_that_is_there_is_no_change() {
+    fn requesting_the_current_rate_changes_nothing() {
         let mut speed = LinkSpeed::new();
         speed.ask(LinkRate::START, at(0));
         assert_eq!(speed.due(at(200), 0, || true), None);

@@ -102,7 +102,7 @@ impl Rig {
     ) -> Result<Option<EventKind>, (Option<Axis>, Failure)> {
         let progress = run.tick(&self.shots, &mut self.stage, &mut self.camera, &self.settings, now);
         let (index, repeat, shot) = run.shot();
-        let (told, end) = match progress {
+        let (event, end) = match progress {
             Progress::On => return Ok(None),
             Progress::Ready { number } => {
                 let (trigger_number, exposure) = (number, shot.exposure);
@@ -123,7 +123,7 @@ impl Rig {
             }
             Progress::Failed { axis, reason } => return Err((axis, reason)),
         };
-        self.events.push(now, told);
+        self.events.push(now, event);
         if let Some(Flash { trigger_number, levels, edges: [on, off] }) = run.take_flash() {
             self.events.push(now, EventKind::Flash { request, trigger_number, levels, on, off });
         }

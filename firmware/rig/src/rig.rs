@@ -65,11 +65,11 @@ pub struct Rig {
     pub(crate) supply_low: bool,
     wrote: bool,
     rested: bool,
-    untold: Option<Untold>,
+    pending: Option<Pending>,
 }
 
 #[derive(Clone, Copy, Debug)]
-struct Untold {
+struct Pending {
     found: Option<[Found; RECORDS]>,
     in_motion: u8,
 }
@@ -127,7 +127,7 @@ impl Rig {
             supply_low: false,
             wrote: false,
             rested: false,
-            untold: Some(Untold { found: memory.map(record::find_all), in_motion }),
+            pending: Some(Pending { found: memory.map(record::find_all), in_motion }),
         }
     }
 
@@ -139,7 +139,7 @@ impl Rig {
         let contents = Contents {
             counters: self.counters(),
             // Moving axes stay recorded until their alarm is stored.
-            in_motion: self.untold.map_or(self.in_motion, |untold| untold.in_motion),
+            in_motion: self.pending.map_or(self.in_motion, |pending| pending.in_motion),
             alarms: &self.alarms,
             values: &self.values,
             shots: &self.shots,
@@ -155,7 +155,7 @@ impl Rig {
 
     /// Reports the last boot's end and the memory's state first.
     fn begin(&mut self, now: BoardMicros) {
-        let Some(Untold { found, in_motion }) = self.untold.take() else { return };
+        let Some(Pending { found, in_motion }) = self.pending.take() else { return };
         if found.is_none() && self.parts.memory {
             self.alarm(Alarm::MemoryMissing, now);
         }
@@ -320,10 +320,10 @@ impl Rig {
 
     /// Whether the next tick may follow after [`crate::io::REST_TICKS`]: nothing is active, and all inputs are steady.
     pub(crate) fn rest(&mut self) -> bool {
-        let said = self.session.all_sent() && self.events.all_sent() && self.link_speed.is_settled();
+        let all_sent = self.session.all_sent() && self.events.all_sent() && self.link_speed.is_settled();
         let idle = self.works.any().is_none() && self.reboot.is_none() && self.camera.is_idle();
         self.rested =
-            said && idle && self.store.is_idle() && !self.supply_low && self.stage.is_settled_idle();
+            all_sent && idle && self.store.is_idle() && !self.supply_low && self.stage.is_settled_idle();
         self.rested
     }
 
@@ -405,8 +405,8 @@ impl Rig {
 
     fn write(&mut self) -> Option<MemoryWrite> {
         // A tick has time for a write or the host, in turns; with a sinking supply only the write counts.
-        let said = self.session.all_sent() && self.events.all_sent();
-        let gives_way = self.wrote && !self.supply_low && !said;
+        let all_sent = self.session.all_sent() && self.events.all_sent();
+        let gives_way = self.wrote && !self.supply_low && !all_sent;
         self.wrote = false;
         if gives_way || self.store.is_idle() {
             return None;
@@ -440,8 +440,8 @@ impl Rig {
 
     /// Everything is sent, written and at rest, or it took too long.
     fn reset_is_due(&mut self, now: BoardMicros) -> bool {
-        let said = self.session.all_sent() && self.events.all_sent();
-        let quiet = self.works.any().is_none() && said && self.store.is_idle();
+        let all_sent = self.session.all_sent() && self.events.all_sent();
+        let quiet = self.works.any().is_none() && all_sent && self.store.is_idle();
         let link = &self.settings.link;
         let Some(reboot) = &mut self.reboot else { return false };
         if !quiet {

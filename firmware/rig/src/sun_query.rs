@@ -146,7 +146,7 @@ mod tests {
     }
 
     #[test]
-    fn where_there_is_no_angle_the_answer_says_why() {
+    fn a_missing_angle_has_a_reason() {
         let night = SunQuery { unix_seconds: 1_403_308_800, ..QUERY };
         assert_eq!(answer(&night).shadow, Some(ShadowAnswer::SunTooLow));
         let flat = ShadowQuery { height_mm: 0, ..SHADOW };

@@ -21,7 +21,7 @@ pub fn find(named: Option<&Path>) -> Result<PathBuf, SimError> {
     let path = match (named, std::env::var_os(VARIABLE)) {
         (Some(path), _) => path.to_path_buf(),
         (None, Some(path)) => path.into(),
-        (None, None) => beside_program(),
+        (None, None) => next_to_program(),
     };
     if !path.is_file() {
         return Err(SimError::NoFirmware(path));
@@ -36,7 +36,7 @@ pub fn find(named: Option<&Path>) -> Result<PathBuf, SimError> {
     Err(SimError::Firmware { path, reason })
 }
 
-fn beside_program() -> PathBuf {
+fn next_to_program() -> PathBuf {
     let program = std::env::current_exe().unwrap_or_default();
     let mut folder = program.parent().unwrap_or(Path::new(""));
     if folder.ends_with("deps") {

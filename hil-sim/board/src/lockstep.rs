@@ -297,7 +297,7 @@ mod tests {
     }
 
     #[test]
-    fn time_stands_while_the_board_waits_for_its_host() {
+    fn time_stops_while_the_board_waits_for_its_host() {
         let mut lockstep = started();
         lockstep.received(&event(EventKind::StillThere { request: 7 }), 5);
         assert!(lockstep.waits_for_host());

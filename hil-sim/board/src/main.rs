@@ -146,7 +146,7 @@ fn play_again(trace: &Path, firmware: Option<&Path>) -> Result<()> {
     if let Some(departure) = departure {
         let line = |line: Option<String>| line.unwrap_or_else(|| "nothing more".into());
         anyhow::bail!(
-            "the run departs from the trace at {:.6} s, line {} ({}): the trace has {:?}, the run now {:?}",
+            "the run differs from the trace at {:.6} s, line {} ({}): the trace has {:?}, the run now {:?}",
             departure.at_ns as f64 * 1e-9,
             departure.line,
             departure.signal,

@@ -105,7 +105,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn time_stands_until_a_picture_is_fetched() {
+    fn time_stops_until_an_image_is_fetched() {
         let pictures = Arc::new(Pictures::default());
         let mut patience = Patience::new(Some(Arc::clone(&pictures)));
         for _ in 1..WAITING_MAX {

@@ -145,7 +145,7 @@ pub fn run(campaign: &Campaign, mut progress: impl FnMut(u64, &Outcome)) -> Resu
     let stopped = Mutex::new(None);
     let mut summary = Summary::default();
     std::thread::scope(|scope| {
-        let (tell, told) = mpsc::channel();
+        let (tell, results) = mpsc::channel();
         for _ in 0..campaign.jobs.max(1) {
             let (tell, next, seeds, stopped) = (tell.clone(), &next, &seeds, &stopped);
             scope.spawn(move || {
@@ -161,7 +161,7 @@ pub fn run(campaign: &Campaign, mut progress: impl FnMut(u64, &Outcome)) -> Resu
             });
         }
         drop(tell);
-        for (seed, (outcome, file)) in told {
+        for (seed, (outcome, file)) in results {
             summary.add(&outcome);
             progress(seed, &outcome);
             if let (Some(broken), Some(file)) = (outcome.broken.first(), file) {

@@ -148,7 +148,7 @@ fn play_file(file: &Path, firmware: Option<&Path>, trace: Option<PathBuf>) -> Re
             broken.what
         )?;
     }
-    anyhow::ensure!(outcome.broken.is_empty(), "{} properties do not hold", outcome.broken.len());
+    anyhow::ensure!(outcome.broken.is_empty(), "{} properties are violated", outcome.broken.len());
     writeln!(stdout, "every property holds")?;
     Ok(())
 }

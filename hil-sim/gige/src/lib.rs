@@ -53,7 +53,7 @@ pub fn interface(text: &str) -> Result<Ipv4Addr, String> {
     match text {
         "lo" => Ok(Ipv4Addr::LOCALHOST),
         _ => text.parse().map_err(|_| {
-            format!("expected lo or an IPv4 address of this computer, e.g. 192.168.7.1; it is {text:?}")
+            format!("expected lo or an IPv4 address of this computer, e.g. 192.168.7.1; found {text:?}")
         }),
     }
 }
@@ -117,7 +117,7 @@ pub fn open(
             spawn("GigE discovery", Box::new(move || discover(&shouts, &answers, &device)))?;
         }
         Err(error) => eprintln!(
-            "the GigE Vision camera does not hear broadcasts ({error}); clients find it by its address only"
+            "the GigE Vision camera receives no broadcasts ({error}); clients find it by its address only"
         ),
     }
     let (obeying, sending) = (Arc::clone(&device), stream.try_clone().map_err(failed)?);

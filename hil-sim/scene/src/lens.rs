@@ -11,12 +11,10 @@ pub use crate::thin_lens::image_distance_mm;
 
 /// Telecentric lens with its two focus settings.
 #[derive(Debug, Clone, PartialEq)]
+#[allow(missing_docs, reason = "names and types describe these fields")]
 pub struct Lens {
-    /// Focal length, mm.
     pub focal_length_mm: f64,
-    /// Diameter of the aperture, mm.
     pub aperture_mm: f64,
-    /// Pixel pitch, mm.
     pub pixel_mm: f64,
     /// In-focus object distance of the far setting, mm.
     pub far_mm: f64,

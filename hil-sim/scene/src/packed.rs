@@ -31,7 +31,7 @@ pub struct PackedScene {
 pub enum PackedSceneError {
     #[error("a packed scene cannot be read: {0}")]
     Read(#[from] io::Error),
-    #[error("{found:?} begins no packed scene, expected {MAGIC:?}")]
+    #[error("a packed scene begins with {MAGIC:?}, found {found:?}")]
     Magic { found: [u8; 8] },
     #[error("a packed scene's {what} has {found}, expected at most {most}")]
     Size { what: &'static str, found: u64, most: u64 },
@@ -150,7 +150,7 @@ mod tests {
         wide[maps..maps + 8].fill(0xff);
         for (bytes, expected) in [
             (&good[..good.len() - 1], "cannot be read"),
-            (&other, "begins no packed scene"),
+            (&other, "a packed scene begins with"),
             (&long, "text has 4294967295, expected at most 65536"),
             (&wide, "map has 18446744065119617025, expected at most 100000000"),
         ] {

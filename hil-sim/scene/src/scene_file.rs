@@ -60,7 +60,7 @@ impl SceneFile {
         let texture = raw.texture.filter(|_| random.is_none());
         if let (Some(name), Some(_)) = (&texture, raw.contrast) {
             return Err(SceneError::Syntax(format!(
-                "contrast is of sand and fractal; the picture {name:?} has its own"
+                "contrast applies to sand and fractal; the picture {name:?} has its own"
             )));
         }
         Ok(Self { depth: raw.depth, texture, scene, random, contrast: raw.contrast })
@@ -77,7 +77,7 @@ impl SceneFile {
             ("texture", self.texture.is_some(), texture.is_some()),
         ] {
             if wanted != given {
-                let found = if given { "was given but not asked for" } else { "is missing" };
+                let found = if given { "was given but not requested" } else { "is missing" };
                 return Err(SceneError::Maps { what, found });
             }
         }

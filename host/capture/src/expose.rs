@@ -38,8 +38,8 @@ pub enum CaptureError {
         near_height: usize,
         near_bits: u8,
     },
-    #[error("the board reported {told} exposures, {asked} were requested")]
-    Count { told: usize, asked: usize },
+    #[error("the board reported {reported} exposures, {asked} were requested")]
+    Count { reported: usize, asked: usize },
     #[error(
         "shot {index} is triggered by {found}, the ones before by {first}; a program's shots must have one trigger"
     )]
@@ -76,7 +76,7 @@ pub fn expose_together<E: From<CaptureError> + From<ClientError>>(
     for (at, camera) in cameras.iter_mut().enumerate() {
         camera.arm(mode, exposure).map_err(of(at))?;
     }
-    let mut told = 0;
+    let mut reported = 0;
     let run = run_program(client, shots, |kind, received| -> Result<(), E> {
         match kind {
             EventKind::ShotReady { trigger_number, exposure, .. } => {
@@ -85,7 +85,7 @@ pub fn expose_together<E: From<CaptureError> + From<ClientError>>(
                 }
             }
             EventKind::ShotDone { shot, .. } => {
-                told += 1;
+                reported += 1;
                 for (at, camera) in cameras.iter_mut().enumerate() {
                     camera.reported(shot, received);
                     let image = wait_for_image(client, &mut **camera, shot, image_wait);
@@ -112,8 +112,8 @@ pub fn expose_together<E: From<CaptureError> + From<ClientError>>(
         run?;
     }
     let asked = shots.iter().map(|shot| usize::from(shot.repeat)).sum();
-    if told != asked {
-        return Err(CaptureError::Count { told, asked }.into());
+    if reported != asked {
+        return Err(CaptureError::Count { reported, asked }.into());
     }
     for (at, camera) in cameras.iter_mut().enumerate() {
         expect_no_more(client, &mut **camera).map_err(|error| match error {

@@ -32,21 +32,21 @@ pub fn capture_behind_mirror(
     let shots = [Shot { repeat, ..far }];
     let mut cameras = cameras;
     let mut taken: [Option<(ShotRecord, Average)>; 2] = [None, None];
-    let mut told = 0;
+    let mut reported = 0;
     let asked = 2 * usize::from(repeat);
     let images = expose_together(client, &mut cameras, &shots, exposures.image_wait, |at, record, image| {
-        told += 1;
+        reported += 1;
         match taken.get_mut(at) {
             Some(Some((_, average))) => average.add(&image),
             Some(none) => {
                 *none = Some((record, Average::of(image)));
                 Ok(())
             }
-            None => Err(CaptureError::Count { told, asked }),
+            None => Err(CaptureError::Count { reported, asked }),
         }
     });
     images?;
-    let [Some(far), Some(near)] = taken else { return Err(CaptureError::Count { told, asked }) };
+    let [Some(far), Some(near)] = taken else { return Err(CaptureError::Count { reported, asked }) };
     let both = [far, near].map(|(record, average)| (record, average.finish()));
     let mut pair = pair_of(both, sensor, reach.coarse, &client.hello().limits)?;
     pair.near.sensor_measured_mm += further_mm;

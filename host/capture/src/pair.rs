@@ -122,18 +122,18 @@ pub fn capture_pair(
     let repeat = exposures.averaged.max(1);
     let shots = reach.shots.map(|shot| Shot { repeat, ..shot });
     let mut taken: [Option<(ShotRecord, Average)>; 2] = [None, None];
-    let mut told = 0;
+    let mut reported = 0;
     expose(client, camera, &shots, exposures.image_wait, |record, image| -> Result<(), CaptureError> {
-        told += 1;
+        reported += 1;
         match taken.get_mut(usize::from(record.index)) {
             Some(Some((_, average))) => average.add(&image)?,
             Some(none) => *none = Some((record, Average::of(image))),
-            None => return Err(CaptureError::Count { told, asked: 2 * usize::from(repeat) }),
+            None => return Err(CaptureError::Count { reported, asked: 2 * usize::from(repeat) }),
         }
         Ok(())
     })?;
     let [Some(far), Some(near)] = taken else {
-        return Err(CaptureError::Count { told, asked: 2 * usize::from(repeat) });
+        return Err(CaptureError::Count { reported, asked: 2 * usize::from(repeat) });
     };
     let both = [far, near].map(|(record, average)| (record, average.finish()));
     pair_of(both, sensor, reach.coarse, &client.hello().limits)

@@ -214,7 +214,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_with_a_program_is_said() {
+    fn invalid_programs_are_rejected_with_a_reason() {
         for (text, phrase) in [
             ("exposure_us = 3", "no [[shot]]"),
             ("[[shot]]\naxis = \"z\"\nto_um = 1.0", "unknown axis `z`"),

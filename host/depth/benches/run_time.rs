@@ -11,6 +11,7 @@ use farnear_depth::adaptive_window::{Bank, Window, WindowSettings, estimate};
 use farnear_depth::fill::fill_low_texture;
 use farnear_depth::filter::convolve;
 use farnear_depth::kernel::Kernel;
+use farnear_depth::measure::{DepthMethod, MeasureSettings, measure_pair};
 use farnear_depth::operators::{Design, Family, Operators, Request, design};
 use farnear_depth::optics::{FocusSection, LensSection, Optics, OpticsFile, SensorSection};
 use farnear_depth::pipeline::{Backend, Processor, Settings};
@@ -132,6 +133,29 @@ fn real_pair(optics: &Optics, [prepare_name, windowed_name]: [&str; 2], size: (u
     report(windowed_name, Some(Backend::best()), threads, time(runs, windowed), None);
 }
 
+/// Pairs of a stream with registration, depth, standard deviation and reasons, by the default method; on all threads.
+fn live(optics: &Optics) {
+    let texture = random_image(482, 642, 3);
+    // Two blurs of one texture, of five taps.
+    let pair = [0.1, 0.2].map(|weight| {
+        Array2::from_shape_fn((480, 640), |(y, x)| {
+            let ring = [(y, x + 1), (y + 2, x + 1), (y + 1, x), (y + 1, x + 2)];
+            (1.0 - 4.0 * weight) * texture[(y + 1, x + 1)]
+                + weight * ring.map(|at| texture[at]).iter().sum::<f32>()
+        })
+    });
+    let operators = Operators::for_optics(optics).unwrap();
+    let run = || {
+        let images = pair.clone();
+        let settings = MeasureSettings {
+            run: Settings { threads: 0, ..Settings::default() },
+            ..MeasureSettings::default()
+        };
+        measure_pair(images, optics, DepthMethod::Rational(&operators), None, &settings).unwrap()
+    };
+    report("live_640x480", Some(Backend::best()), rayon::current_num_threads(), time(100, run), None);
+}
+
 fn main() {
     let filter: Vec<String> = std::env::args().skip(1).filter(|a| !a.starts_with('-')).collect();
     let wanted = |name: &str| filter.is_empty() || filter.iter().any(|f| name.contains(f.as_str()));
@@ -241,6 +265,9 @@ fn main() {
             let settings = Settings { threads, ..Settings::default() };
             report("chain_4000x3000", Some(Backend::best()), threads, chain(9, &large, &settings), None);
         }
+    }
+    if wanted("live_640x480") {
+        live(&optics("gaussian:k=0.4578"));
     }
     for (name, height, width, runs) in [("640x480", 480, 640, 20), ("4000x3000", 3000, 4000, 3)] {
         let (prepare_name, windowed_name) = (format!("prepare_{name}"), format!("windowed_{name}"));

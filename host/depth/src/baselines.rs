@@ -41,39 +41,18 @@ pub enum Method {
 
 /// Why a baseline gives no depth.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "the messages name the fields")]
 pub enum BaselineError {
-    /// No method of that name.
     #[error("`{0}` is not a baseline: use subbarao, subbarao-fourier or favaro")]
     Unknown(String),
-    /// The images cannot be used.
     #[error(transparent)]
     Pair(#[from] RunError),
-    /// Invalid settings of Favaro's method.
     #[error("{name} = {value}: must lie between {least} and {most}")]
-    Setting {
-        /// Name of the parameter.
-        name: &'static str,
-        /// The value that was given.
-        value: usize,
-        /// Least.
-        least: usize,
-        /// Most.
-        most: usize,
-    },
-    /// Projectors learned for another blur radius or PSF.
+    Setting { name: &'static str, value: usize, least: usize, most: usize },
     #[error("the projectors were learned for {learned}, the optics have {optics}: learn them again")]
-    OtherOptics {
-        /// What they were learned for.
-        learned: String,
-        /// What the optics are.
-        optics: String,
-    },
-    /// The decomposition failed.
+    OtherOptics { learned: String, optics: String },
     #[error("the patches of alpha = {alpha:.2} have no principal directions")]
-    NoDirections {
-        /// Normalised depth of the patches.
-        alpha: f64,
-    },
+    NoDirections { alpha: f64 },
 }
 
 impl Method {

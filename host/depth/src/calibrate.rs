@@ -90,84 +90,36 @@ impl FromStr for Model {
 
 /// Why a calibration failed.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "the messages name the fields")]
 pub enum CalibrationError {
-    /// No model of that name.
     #[error("`{0}` cannot be calibrated: use gaussian, generalised or free")]
     UnknownModel(String),
-    /// No pair was given.
     #[error("no pair to calibrate on")]
     NoPair,
-    /// The images of a pair differ in size.
     #[error(
         "pair {index}: the far image is {far_width}x{far_height}, the near image {near_width}x{near_height}"
     )]
-    SizeMismatch {
-        /// Index of the pair.
-        index: usize,
-        /// Width of the far image.
-        far_width: usize,
-        /// Height of the far image.
-        far_height: usize,
-        /// Width of the near image.
-        near_width: usize,
-        /// Height of the near image.
-        near_height: usize,
-    },
-    /// An image that has no usable spectrum.
+    SizeMismatch { index: usize, far_width: usize, far_height: usize, near_width: usize, near_height: usize },
     #[error("pair {index}, {which} image: {reason}")]
-    Image {
-        /// Index of the pair.
-        index: usize,
-        /// `far` or `near`.
-        which: &'static str,
-        /// The reason.
-        reason: SpectrumError,
-    },
-    /// The target is where the pair carries no information.
+    Image { index: usize, which: &'static str, reason: SpectrumError },
     #[error(
         "pair {index}: at alpha = {alpha:.2} both images are blurred alike; put the target at the far or the near focus"
     )]
-    MiddleOfRange {
-        /// Index of the pair.
-        index: usize,
-        /// Depth of the target.
-        alpha: f64,
-    },
-    /// Neither image is clearly the sharper one.
+    MiddleOfRange { index: usize, alpha: f64 },
     #[error(
         "pair {index}: the far image has {ratio:.2} times the detail of the near one, so neither is in focus; \
          put the target at the far or the near focus, or say at which depth it stands"
     )]
-    NeitherSharp {
-        /// Index of the pair.
-        index: usize,
-        /// Energy of the far image over that of the near one.
-        ratio: f64,
-    },
-    /// The best parameter is at the limit of the search.
+    NeitherSharp { index: usize, ratio: f64 },
     #[error(
         "the best {parameter} is {value}, the end of the search: the images do not show the blur that the optics promise; \
          check max_blur_px, the order of the images and where the target stands"
     )]
-    AtSearchEnd {
-        /// `p` or `k`.
-        parameter: &'static str,
-        /// Its value.
-        value: f64,
-    },
-    /// No profile came out of the search.
+    AtSearchEnd { parameter: &'static str, value: f64 },
     #[error("no round point spread function makes one image of the other: {0}")]
     Profile(String),
-    /// A flat target gave no depth map.
     #[error("flat target {index} at {true_mm} mm: {reason}")]
-    FlatTarget {
-        /// Index of the target.
-        index: usize,
-        /// Its depth.
-        true_mm: f64,
-        /// The reason, in words.
-        reason: RunError,
-    },
+    FlatTarget { index: usize, true_mm: f64, reason: RunError },
 }
 
 /// A pair of images of a flat target.

@@ -40,7 +40,6 @@ impl DepthOfAlpha {
         [self.focal_length_mm, self.focal_length_squared, self.offset, self.slope]
     }
 
-    #[cfg(test)]
     pub(crate) fn depth_mm(self, alpha: f32) -> f32 {
         let square = alpha * alpha;
         let alpha = alpha * self.linearisation.iter().rev().fold(0.0, |sum, c| sum * square + c);

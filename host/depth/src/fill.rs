@@ -290,7 +290,7 @@ mod tests {
     }
 
     #[test]
-    fn what_sees_the_region_from_one_side_is_filled_too_and_marked_pixels_stay() {
+    fn one_sided_regions_are_filled_and_marked_pixels_stay() {
         let size = (60, 60);
         let mut texture = disc(size, (30.0, 30.0), 12.0);
         // Five more pixels on each side with 0.3 of the usual energy, and a strip of it far from any region.

@@ -36,27 +36,14 @@ pub enum FocusMeasure {
 
 /// Why an image has no focus measure.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "the messages name the fields")]
 pub enum FocusError {
-    /// No measure of that name.
     #[error("`{0}` is not a focus measure: use fft-sum, tenengrad or modified-laplacian")]
     Unknown(String),
-    /// Too small.
     #[error("an image of {width}x{height} px: at least 8x8 are needed")]
-    TooSmall {
-        /// Width.
-        width: usize,
-        /// Height.
-        height: usize,
-    },
-    /// A pixel without a value.
+    TooSmall { width: usize, height: usize },
     #[error("the pixel in column {column}, row {row} is not finite")]
-    NotFinite {
-        /// Column.
-        column: usize,
-        /// Row.
-        row: usize,
-    },
-    /// Nothing to see.
+    NotFinite { column: usize, row: usize },
     #[error("the image is too dark to focus (mean {0})")]
     Dark(f64),
 }
@@ -222,7 +209,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_judged_says_so() {
+    fn unusable_images_are_rejected_with_a_reason() {
         let measure = FocusMeasure::Tenengrad;
         assert_eq!("tenengrad".parse::<FocusMeasure>().unwrap(), measure);
         assert!("sharpness".parse::<FocusMeasure>().is_err());

@@ -1,25 +1,26 @@
-//! Depth from focus: of a stack of images, where each place is sharpest.
+//! Depth from focus: where each pixel of a stack of images is sharpest.
 //!
-//! For each pixel the sharpness over the stack (a focus measure, [`Sharpness`]) makes a curve whose tip is sought: a Gaussian through
-//! the points around the largest, fitted by least squares with the weights of Guo (A simple algorithm for fitting a Gaussian
-//! function, IEEE Signal Processing Magazine 28, 2011): log-sharpness as a parabola, each point weighing its sharpness squared, so
-//! that the noise of the tails has no say. Three points, as is usual (Nayar & Nakagawa 1994), have two to three times the
-//! error of eleven.
+//! The sharpness of a pixel over the stack (a focus measure, [`Sharpness`]) is a curve. Its peak is a Gaussian through the
+//! points around the maximum, fitted by least squares with the weights of Guo (A simple algorithm for fitting a Gaussian
+//! function, IEEE Signal Processing Magazine 28, 2011): log-sharpness as a parabola, weighted by the squared sharpness, so
+//! that the noise of the tails has little weight. Three points (Nayar & Nakagawa 1994) have two to three times the error of
+//! eleven.
 //!
-//! Unlike a pair, a stack needs neither point spread function nor aperture and has no limits but its ends. It takes as many images
-//! as the range is long.
+//! A stack needs neither point spread function nor aperture. Its range is that of its images.
 //!
-//! Cost: the focus measure for each image, and about 40 operations per pixel and image; memory: the stack, and as much again
-//! for the rows at work (a fraction).
+//! Cost: the focus measure for each image, and about 40 operations per pixel and image. Images are read by rows ([`Slices`]), so
+//! they need not be in memory. Memory: 28 bytes a pixel for the maps, and the sharpness of the rows at work in all images
+//! (`BAND_BYTES`).
 
 mod error;
 mod guided;
 mod sharpness;
+mod slices;
 mod tip;
 
 use std::ops::Range;
 
-use ndarray::{Array2, ArrayView2, Axis, Zip, s};
+use ndarray::{Array2, ArrayView2, ArrayViewMut1, Axis, Zip, s};
 use rayon::prelude::*;
 
 use crate::{metrics::dilate_square, prepare::band::box_mean};
@@ -27,12 +28,15 @@ pub use error::StackError;
 use guided::{Guide, mended};
 pub use sharpness::{Sharpness, UnknownSharpness};
 use sharpness::{blur_reach_px, blurred};
-use tip::{Tip, tip};
+pub use slices::Slices;
+use tip::tip;
 
 /// Images that make a stack.
 pub const LEAST_IMAGES: usize = 3;
-/// Rows that are worked on at a time.
-const BAND: usize = 48;
+/// Memory for the sharpness of the rows at work in all images, bytes.
+const BAND_BYTES: usize = 128 << 20;
+/// Fewest rows at work: each image needs about 30 more around them.
+const LEAST_BAND: usize = 16;
 /// Most that images are blurred by first, px.
 pub const MOST_SMOOTHING_PX: f32 = 10.0;
 /// Most that places are corrected over, px.
@@ -45,12 +49,11 @@ pub const USUAL_RELIABILITY: f32 = 0.1;
 pub struct StackSettings {
     /// The focus measure.
     pub measure: Sharpness,
-    /// Standard deviation of the Gaussian by which the images are blurred first, px; 0 = not at all. Finer detail is mostly
-    /// noise and rounding, which weak texture drowns in.
+    /// Standard deviation of the Gaussian blur before the measure, px; 0 = none. Finer detail is mostly noise and rounding.
     pub smoothing_px: f32,
-    /// Side of the window it is taken over, odd.
+    /// Side of the measure's window, odd.
     pub window_px: usize,
-    /// Points of the curve that the tip is fitted to, at most; odd.
+    /// Most points of the curve for the fit of its tip; odd.
     pub fit_points: usize,
     /// Side of the median over the places found, odd; 1 = none.
     pub median_px: usize,
@@ -76,15 +79,15 @@ impl Default for StackSettings {
     }
 }
 
-/// What a stack says of each pixel; all maps are (height, width).
+/// Maps of a stack, (height, width).
 #[derive(Debug, Clone)]
 pub struct StackMap {
     /// The image in which it would be sharpest, from 0, between images as a fraction; NaN = unreliable.
     pub place: Array2<f32>,
-    /// How far the curve rises above its own middle, times how well the tip is fitted (the determination of the fit): 0 to 1. 0
-    /// where the largest value stands at an end of the stack, for the tip may lie outside.
+    /// How far the curve rises above its own middle, times how well the tip is fitted (the determination of the fit), times how far
+    /// its tip is above noise of one code: 0 to 1. 0 where the largest value is at an end of the stack: the tip may lie outside.
     pub reliability: Array2<f32>,
-    /// Each pixel as where it is sharpest.
+    /// Each pixel from its sharpest image.
     pub all_in_focus: Array2<f32>,
 }
 
@@ -106,48 +109,36 @@ pub fn depth_from_stack(
 }
 
 /// [`depth_from_stack`] of images at uneven positions along the axis, strictly rising or falling, in any unit: the tip is fitted
-/// over these. Places stay numbers of images. Pixels that are not finite were not seen in that image: places come from the images
-/// that saw a pixel and what the measure takes around it, and have no value where these are fewer than half, or where
-/// the sharpest has no neighbour that saw it.
+/// over these. Places stay numbers of images. A pixel that is not finite was not seen in that image. A place has no value
+/// if fewer than half of the images saw the pixel and its surroundings, or if no neighbour of the sharpest image did.
 ///
 /// # Errors
-/// [`StackError`], without [`StackError::NotFinite`].
-pub fn depth_from_positions(
-    images: &[ArrayView2<f32>],
+/// [`StackError`], without [`StackError::NotFinite`]; those of reading the images.
+pub fn depth_from_positions<S: Slices + ?Sized>(
+    images: &S,
     positions: &[f64],
     settings: &StackSettings,
-) -> Result<StackMap, StackError> {
+) -> Result<StackMap, S::Error> {
     check(images, settings)?;
+    let count = images.count();
     let signs = || positions.windows(2).map(|two| two[1].total_cmp(&two[0]));
     let one_way = signs().all(|sign| sign.is_ne()) && signs().zip(signs().skip(1)).all(|(a, b)| a == b);
-    if positions.len() != images.len() || !one_way || !positions.iter().all(|p| p.is_finite()) {
-        return Err(StackError::Positions { images: images.len(), positions: positions.len() });
+    if positions.len() != count || !one_way || !positions.iter().all(|p| p.is_finite()) {
+        return Err(StackError::Positions { images: count, positions: positions.len() }.into());
     }
-    let (height, width) = images[0].dim();
-    let tops: Vec<usize> = (0..height).step_by(BAND).collect();
-    let bands: Vec<Vec<Tip>> = tops
-        .into_par_iter()
-        .map(|top| band(images, positions, settings, top..(top + BAND).min(height)))
-        .collect();
-    let map = |of: fn(&Tip) -> f32| {
-        let values = bands.iter().flatten().map(of).collect();
-        Array2::from_shape_vec((height, width), values)
-            .unwrap_or_else(|_| unreachable!("every row is in a band"))
-    };
-    let reliability = map(|tip| tip.reliability);
-    let mut place = median(&map(|tip| tip.place), settings.median_px);
-    let mut all_in_focus = sharp_everywhere(images, &place);
+    let band = (BAND_BYTES / (4 * images.dim(0).1 * count)).max(LEAST_BAND);
+    let Curves { place, reliability, sharpness, rise } = curves(images, positions, settings, band)?;
+    let mut place = median(place, settings.median_px);
+    let mut all_in_focus = sharp_everywhere(images, &place, band)?;
     if settings.guided_px > 0.0 {
-        let (sharpness, rise) = (map(|tip| tip.sharpness), map(|tip| tip.rise));
         let guide = Guide {
             sharp: all_in_focus.view(),
             sharpness: sharpness.view(),
-            rise: rise.view(),
             reach_px: settings.guided_px,
-            images: images.len(),
+            images: count,
         };
-        place = mended(place.view(), &guide);
-        all_in_focus = sharp_everywhere(images, &place);
+        place = mended(place.view(), rise, &guide);
+        all_in_focus = sharp_everywhere(images, &place, band)?;
     }
     place.zip_mut_with(&reliability, |place, reliability| {
         if *reliability < settings.min_reliability {
@@ -157,10 +148,57 @@ pub fn depth_from_positions(
     Ok(StackMap { place, reliability, all_in_focus })
 }
 
+/// What the curves of all pixels say (see [`tip::Tip`]).
+struct Curves {
+    place: Array2<f32>,
+    reliability: Array2<f32>,
+    sharpness: Array2<f32>,
+    rise: Array2<f32>,
+}
+
+fn curves<S: Slices + ?Sized>(
+    images: &S,
+    positions: &[f64],
+    settings: &StackSettings,
+    band: usize,
+) -> Result<Curves, S::Error> {
+    let (height, width) = images.dim(0);
+    let floor = noise_floor(images.code_step(), settings);
+    let [mut place, mut reliability, mut sharpness, mut rise] =
+        std::array::from_fn(|_| Array2::zeros((height, width)));
+    for top in (0..height).step_by(band) {
+        let rows = top..(top + band).min(height);
+        let measured = (0..images.count())
+            .into_par_iter()
+            .map(|index| measured_rows(images, index, rows.clone(), settings))
+            .collect::<Result<Vec<_>, _>>()?;
+        let mut maps = [&mut place, &mut reliability, &mut sharpness, &mut rise]
+            .map(|map| map.slice_mut(s![rows.clone(), ..]));
+        let [place, reliability, sharpness, rise] = maps.each_mut().map(|map| map.axis_iter_mut(Axis(0)));
+        let mut found: Vec<[ArrayViewMut1<f32>; 4]> = place
+            .zip(reliability)
+            .zip(sharpness.zip(rise))
+            .map(|((place, reliability), (sharpness, rise))| [place, reliability, sharpness, rise])
+            .collect();
+        found.par_iter_mut().enumerate().for_each(|(y, maps)| {
+            let mut curve = vec![0.0; measured.len()];
+            for x in 0..width {
+                curve.iter_mut().zip(&measured).for_each(|(value, map)| *value = map[(y, x)]);
+                let tip = tip(&curve, positions, settings.fit_points);
+                let above_floor = if floor < tip.sharpness { 1.0 - floor / tip.sharpness } else { 0.0 };
+                let values = [tip.place, tip.reliability * above_floor, tip.sharpness, tip.rise];
+                maps.iter_mut().zip(values).for_each(|(map, value)| map[x] = value);
+            }
+        });
+        images.measured(rows.end, height)?;
+    }
+    Ok(Curves { place, reliability, sharpness, rise })
+}
+
 /// Median over a window of `side` pixels, smaller at the borders.
-fn median(map: &Array2<f32>, side: usize) -> Array2<f32> {
+fn median(map: Array2<f32>, side: usize) -> Array2<f32> {
     if side == 1 {
-        return map.clone();
+        return map;
     }
     let (reach, (height, width)) = (side / 2, map.dim());
     let mut result = Array2::zeros((height, width));
@@ -178,7 +216,7 @@ fn median(map: &Array2<f32>, side: usize) -> Array2<f32> {
     result
 }
 
-fn check(images: &[ArrayView2<f32>], settings: &StackSettings) -> Result<(), StackError> {
+fn check<S: Slices + ?Sized>(images: &S, settings: &StackSettings) -> Result<(), StackError> {
     let odd = |what, value: usize, least, most| {
         let fits = value % 2 == 1 && (least..=most).contains(&value);
         if fits { Ok(()) } else { Err(StackError::Odd { what, value, least, most }) }
@@ -192,13 +230,13 @@ fn check(images: &[ArrayView2<f32>], settings: &StackSettings) -> Result<(), Sta
     if settings.guided_px != 0.0 && !(1.0..=MOST_GUIDED_PX).contains(&settings.guided_px) {
         return Err(StackError::Guided(settings.guided_px));
     }
-    if images.len() < LEAST_IMAGES {
-        return Err(StackError::TooFew { count: images.len() });
+    if images.count() < LEAST_IMAGES {
+        return Err(StackError::TooFew { count: images.count() });
     }
-    let of = images[0].dim();
-    for (index, image) in images.iter().enumerate() {
-        let (number, (height, width)) = (index + 1, image.dim());
-        if image.dim() != of {
+    let of = images.dim(0);
+    for index in 0..images.count() {
+        let (number, (height, width)) = (index + 1, images.dim(index));
+        if (height, width) != of {
             return Err(StackError::Size { number, width, height, of });
         }
         if height.min(width) < settings.window_px {
@@ -208,33 +246,36 @@ fn check(images: &[ArrayView2<f32>], settings: &StackSettings) -> Result<(), Sta
     Ok(())
 }
 
-/// Place and reliability of each pixel of some rows.
-fn band(
-    images: &[ArrayView2<f32>],
-    positions: &[f64],
-    settings: &StackSettings,
+/// The focus measure of some rows of an image.
+fn measured_rows<S: Slices + ?Sized>(
+    images: &S,
+    index: usize,
     rows: Range<usize>,
-) -> Vec<Tip> {
-    let (height, width) = images[0].dim();
-    // Rows beyond the band that its values depend on; at the picture's own border there are none.
+    settings: &StackSettings,
+) -> Result<Array2<f32>, S::Error> {
+    // Rows around these that the values depend on; at the picture's own border there are none.
     let reach = 2 * (settings.window_px / 2) + Sharpness::REACH_PX + blur_reach_px(settings.smoothing_px);
     let from = rows.start.saturating_sub(reach);
-    let seen = from..(rows.end + reach).min(height);
-    let measured: Vec<Array2<f32>> = images
-        .iter()
-        .map(|image| {
-            let rows = image.slice(s![seen.clone(), ..]);
-            measured_over_windows(rows, settings)
-        })
-        .collect();
-    let mut curve = vec![0.0; images.len()];
-    let pixels = rows.flat_map(|y| (0..width).map(move |x| (y, x)));
-    pixels
-        .map(|(y, x)| {
-            curve.iter_mut().zip(&measured).for_each(|(value, map)| *value = map[(y - from, x)]);
-            tip(&curve, positions, settings.fit_points)
-        })
-        .collect()
+    let seen = images.rows(index, from..(rows.end + reach).min(images.dim(index).0))?;
+    let measured = measured_over_windows(seen.view(), settings);
+    Ok(measured.slice(s![rows.start - from..rows.end - from, ..]).to_owned())
+}
+
+/// Sharpness of noise of one code: rounding and the blocks of JPEG reach it where an image shows nothing.
+fn noise_floor(code_step: f32, settings: &StackSettings) -> f32 {
+    if code_step <= 0.0 {
+        return 0.0;
+    }
+    // Uniform noise has the standard deviation of its range / sqrt(12).
+    let range = code_step * 12.0_f32.sqrt();
+    let side = settings.window_px.max(64);
+    let noise = Array2::from_shape_fn((side, side), |(y, x)| {
+        // Mixed as in Fibonacci hashing, twice: neighbours are as good as independent.
+        let mixed = ((y * side + x + 1) as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+        let mixed = (mixed ^ (mixed >> 29)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        0.5 + range * ((mixed >> 40) as f32 / (1 << 24) as f32 - 0.5)
+    });
+    measured_where_seen(noise.view(), settings).mean().unwrap_or(0.0)
 }
 
 /// The focus measure over windows that fade towards their border: the mean over the window is taken twice, for a window with a hard
@@ -268,10 +309,23 @@ fn measured_where_seen(image: ArrayView2<f32>, settings: &StackSettings) -> Arra
 }
 
 /// Each pixel as at its place in the stack.
-fn sharp_everywhere(images: &[ArrayView2<f32>], place: &Array2<f32>) -> Array2<f32> {
+fn sharp_everywhere<S: Slices + ?Sized>(
+    images: &S,
+    place: &Array2<f32>,
+    band: usize,
+) -> Result<Array2<f32>, S::Error> {
     let mut sharp = Array2::zeros(place.dim());
-    Zip::indexed(&mut sharp).and(place).par_for_each(|at, sharp, place| *sharp = between(images, *place, at));
-    sharp
+    for (index, mut sharp) in sharp.axis_chunks_iter_mut(Axis(0), band).enumerate() {
+        let rows = index * band..index * band + sharp.nrows();
+        let read = (0..images.count())
+            .map(|index| images.rows(index, rows.clone()))
+            .collect::<Result<Vec<_>, _>>()?;
+        let views: Vec<ArrayView2<f32>> = read.iter().map(|image| image.view()).collect();
+        Zip::indexed(&mut sharp)
+            .and(place.slice(s![rows, ..]))
+            .par_for_each(|at, sharp, place| *sharp = between(&views, *place, at));
+    }
+    Ok(sharp)
 }
 
 /// A pixel between two images of the stack; of images that did not see it the nearest that did.
@@ -344,17 +398,18 @@ mod tests {
         };
         let images: Vec<_> = (0..7).map(image).collect();
         let views: Vec<_> = images.iter().map(|image| image.view()).collect();
-        let map = depth_from_positions(&views, &even(7), &StackSettings::default()).unwrap();
+        let map = depth_from_positions(&views[..], &even(7), &StackSettings::default()).unwrap();
         assert!(map.place.slice(s![.., ..5]).iter().all(|place| place.is_nan()));
         assert!(map.place.slice(s![4..36, 45..56]).iter().all(|place| (place - 3.0).abs() < 0.5));
         assert!(map.all_in_focus.iter().all(|value| value.is_finite()));
-        let wrong =
-            |positions: &[f64]| depth_from_positions(&views, positions, &StackSettings::default()).is_err();
+        let wrong = |positions: &[f64]| {
+            depth_from_positions(&views[..], positions, &StackSettings::default()).is_err()
+        };
         assert!(wrong(&[0.0, 1.0, 2.0]) && wrong(&[0.0, 1.0, 2.0, 3.0, 3.0, 4.0, 5.0]));
     }
 
     #[test]
-    fn what_rises_to_an_end_or_nowhere_is_unreliable() {
+    fn curves_with_a_maximum_at_an_end_or_without_one_are_unreliable() {
         let rising: Vec<f32> = (1..12).map(|i| i as f32).collect();
         let at_the_end = tip(&rising, &even(11), 11);
         assert_eq!((at_the_end.place, at_the_end.reliability), (10.0, 0.0));
@@ -364,6 +419,7 @@ mod tests {
 
     #[test]
     fn bands_make_no_seams() {
+        const BAND: usize = 48;
         let image = |number: usize| {
             Array2::from_shape_fn((3 * BAND + 5, 40), |(y, x)| {
                 let noise = ((x * 7919 + y * 104_729 + number * 31 + x * y * 13) % 101) as f32 / 101.0;
@@ -375,9 +431,8 @@ mod tests {
         for measure in
             [Sharpness::ModifiedLaplacian, Sharpness::GaussianDerivative, Sharpness::VarianceOfVariance]
         {
-            let settings =
-                StackSettings { measure, min_reliability: 0.0, median_px: 1, ..StackSettings::default() };
-            let all = depth_from_stack(&views, &settings).unwrap();
+            let settings = StackSettings { measure, ..StackSettings::default() };
+            let all = curves(&views[..], &even(7), &settings, BAND).unwrap();
             let whole: Vec<_> =
                 images.iter().map(|image| measured_over_windows(image.view(), &settings)).collect();
             for at in [(BAND - 1, 20), (BAND, 20), (2 * BAND, 3), (3 * BAND + 4, 39)] {
@@ -418,7 +473,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_stack_is_refused_with_the_number_of_the_image() {
+    fn invalid_stacks_are_rejected_with_the_image_number() {
         let image = Array2::from_elem((32, 40), 0.5_f32);
         let other = Array2::from_elem((32, 41), 0.5_f32);
         let mut broken = image.clone();

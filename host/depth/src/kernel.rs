@@ -41,21 +41,12 @@ pub fn sizes_in_words() -> String {
 
 /// An error of a kernel.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[allow(missing_docs, reason = "the messages name the fields")]
 pub enum KernelError {
-    /// The size is not in [`SIZES`].
     #[error("kernel size {0}: must be {sizes}", sizes = sizes_in_words())]
     Size(usize),
-    /// The number of coefficients does not fit the size.
     #[error("a {size}x{size} kernel of eight-fold symmetry has {expected} coefficients, not {found}")]
-    Coefficients {
-        /// Size of the kernel.
-        size: usize,
-        /// Number of free coefficients of that size.
-        expected: usize,
-        /// Number given.
-        found: usize,
-    },
-    /// A coefficient is NaN or infinite.
+    Coefficients { size: usize, expected: usize, found: usize },
     #[error("coefficient {0} of the kernel is not finite")]
     NotFinite(usize),
 }

@@ -22,7 +22,7 @@ use crate::validity::{LARGEST_ALPHA, Lost, Validity, ValiditySettings, assess};
 /// Alpha of a pixel measured out of range before blur scaling is undone.
 const OUT_OF_RANGE_ALPHA: f64 = 1.2;
 /// Part of the pixels lost for one reason above which it is reported.
-const WORTH_SAYING: f64 = 0.01;
+const LEAST_REPORTED: f64 = 0.01;
 /// Unexplained texture, mean squares, from which PSF or blur are doubted.
 const DOUBTFUL: f64 = 3e-4;
 /// The same relative to the noise, which is known to some percent.
@@ -72,20 +72,16 @@ impl Default for MeasureSettings {
 
 /// Why there is no depth map.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "the messages name the fields")]
 pub enum MeasureError {
-    /// The pair is invalid.
     #[error(transparent)]
     Prepare(#[from] PrepareError),
-    /// It cannot be processed.
     #[error(transparent)]
     Run(#[from] RunError),
-    /// A method to compare with.
     #[error(transparent)]
     Baseline(#[from] BaselineError),
-    /// A lens learned from a z-stack needs the operators it was learned with.
     #[error("the optics were learned by calibrate stack for method whitened: use --method whitened")]
     LearnedForWhitened,
-    /// No operators for these optics.
     #[error(transparent)]
     Design(#[from] DesignError),
 }
@@ -227,7 +223,7 @@ pub fn measure_pair(
     let judging = ValiditySettings { least_confidence: settings.least_confidence, filled: settings.run.fill };
     let validity = assess(&mut map, &prepared, estimate, optics, &judging);
     let lost =
-        validity.lost.iter().filter(|lost| lost.fraction > WORTH_SAYING && lost.reason != Reason::Unsure);
+        validity.lost.iter().filter(|lost| lost.fraction > LEAST_REPORTED && lost.reason != Reason::Unsure);
     findings.extend(lost.copied().map(Finding::Lost));
     if validity.valid_fraction < TELLING {
         // With nearly no depth, the residual carries no information on the lens.

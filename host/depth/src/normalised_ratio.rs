@@ -162,7 +162,7 @@ mod tests {
     const RMAX: f64 = 2.703;
 
     #[test]
-    fn the_octant_stands_for_the_whole_grid() {
+    fn one_octant_represents_the_whole_grid() {
         let total: f64 = octant().iter().map(|p| p.multiplicity).sum();
         assert_eq!(total, (GRID * GRID) as f64);
         assert_eq!(octant()[0].w, 0.0);

@@ -16,7 +16,6 @@ mod fast;
 mod processor;
 #[cfg(test)]
 mod reference;
-mod repair;
 
 use ndarray::ArrayView2;
 use serde::{Deserialize, Serialize};
@@ -40,63 +39,25 @@ pub const MAX_SMOOTHING_PX: usize = 63;
 
 /// Why no depth could be computed.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "the messages name the fields")]
 pub enum RunError {
-    /// The images differ in size.
     #[error(
         "the far image is {far_width}x{far_height} and the near image {near_width}x{near_height}: a pair must have one size"
     )]
-    SizeMismatch {
-        /// Width of the far-focused image.
-        far_width: usize,
-        /// Height of the far-focused image.
-        far_height: usize,
-        /// Width of the near-focused image.
-        near_width: usize,
-        /// Height of the near-focused image.
-        near_height: usize,
-    },
-    /// The images are too small.
+    SizeMismatch { far_width: usize, far_height: usize, near_width: usize, near_height: usize },
     #[error("images of {width}x{height} px are too small: at least 16x16 are needed")]
-    TooSmall {
-        /// Width.
-        width: usize,
-        /// Height.
-        height: usize,
-    },
-    /// No pixel has a finite value in both images.
+    TooSmall { width: usize, height: usize },
     #[error("no pixel has a finite value in both images")]
     NothingFinite,
-    /// An image has the same value everywhere.
     #[error("the {which} image is constant ({value}): depth needs texture")]
-    Constant {
-        /// `far` or `near`.
-        which: &'static str,
-        /// The value.
-        value: f32,
-    },
-    /// The smoothing or median window is unusable.
+    Constant { which: &'static str, value: f32 },
     #[error("{what} window of {size} px: must be odd and from 1 to {largest}")]
-    Window {
-        /// Name of the window.
-        what: &'static str,
-        /// The size asked for.
-        size: usize,
-        /// The largest allowed.
-        largest: usize,
-    },
-    /// The operators were designed for another blur.
+    Window { what: &'static str, size: usize, largest: usize },
     #[error(
         "the operators were designed for a largest blur of {operators_px} px, the optics have {optics_px} px: depths \
          would be wrong by {percent:.0} %; design operators for these optics"
     )]
-    BlurMismatch {
-        /// Blur radius of the operators.
-        operators_px: f64,
-        /// Blur radius of the optics.
-        optics_px: f64,
-        /// Difference in percent.
-        percent: f64,
-    },
+    BlurMismatch { operators_px: f64, optics_px: f64, percent: f64 },
 }
 
 /// How a pair is processed.
@@ -225,6 +186,7 @@ mod tests {
                         input: &input,
                         operators: &operators,
                         settings: &settings,
+                        invalid: None,
                         depth_of,
                         backend,
                     }

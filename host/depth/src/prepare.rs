@@ -133,11 +133,10 @@ pub struct PrepareSettings {
 
 /// Why a pair is invalid.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "the messages name the fields")]
 pub enum PrepareError {
-    /// The images differ in size.
     #[error(transparent)]
     Pair(#[from] crate::pipeline::RunError),
-    /// They show different scenes.
     #[error(
         "the images do not show the same scene: the detail that defocus leaves in both has a correlation of {correlation:.2}, a pair \
          has 0.8 to 1"
@@ -146,7 +145,6 @@ pub enum PrepareError {
         /// Correlation relative to what noise allows.
         correlation: f64,
     },
-    /// The camera's frames do not fit.
     #[error(transparent)]
     Camera(#[from] CameraError),
 }
@@ -450,14 +448,20 @@ fn merged(marks: [Option<Array2<u8>>; 2], warp: Option<&Warp>, near: &Array2<f32
         return reasons;
     };
     reasons.axis_iter_mut(Axis(0)).into_par_iter().enumerate().for_each(|(y, mut row)| {
-        for (x, reason) in row.iter_mut().enumerate().filter(|(_, reason)| **reason == 0) {
+        let source = |x: usize| {
             let [px, py] = warp.at([x as f64, y as f64]).map(f64::round);
             let inside = px >= 0.0 && py >= 0.0 && px < width as f64 && py < height as f64;
-            *reason = match &near_marks {
-                _ if !inside => Reason::Edge.code(),
-                Some(marks) => marks[(py as usize, px as usize)],
-                None => 0,
-            };
+            inside.then_some((py as usize, px as usize))
+        };
+        // An affine map sends one stretch of a row into the image.
+        let from = (0..width).find(|x| source(*x).is_some()).unwrap_or(width);
+        let to = (from..width).rev().find(|x| source(*x).is_some()).map_or(from, |last| last + 1);
+        for (x, reason) in row.iter_mut().enumerate().filter(|(_, reason)| **reason == 0) {
+            if !(from..to).contains(&x) {
+                *reason = Reason::Edge.code();
+            } else if let Some(marks) = &near_marks {
+                *reason = source(x).map_or(0, |at| marks[at]);
+            }
         }
     });
     reasons

@@ -33,43 +33,18 @@ const INNER_RANGE: [f64; 2] = [0.0, 0.99];
 
 /// An error of a point-spread function's text or parameters.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "the messages name the fields")]
 pub enum PsfError {
-    /// The name is that of no model.
     #[error(
         "unknown PSF {0:?}, expected pillbox, gaussian:k=0.4578, generalised:p=1.8,k=0.4802 or ring:inner=0.5"
     )]
     Unknown(String),
-    /// A parameter that the model needs is missing.
     #[error("PSF {model} needs {name}=NUMBER, for instance {example}")]
-    Missing {
-        /// The model.
-        model: &'static str,
-        /// The missing parameter.
-        name: &'static str,
-        /// A complete PSF.
-        example: &'static str,
-    },
-    /// A parameter that the model does not have, or has twice.
+    Missing { model: &'static str, name: &'static str, example: &'static str },
     #[error("PSF {model} takes no {name:?} here")]
-    Unexpected {
-        /// The model.
-        model: String,
-        /// The parameter.
-        name: String,
-    },
-    /// A parameter that is not a number or out of range.
+    Unexpected { model: String, name: String },
     #[error("PSF parameter {name} = {value}, expected a number from {low} to {high}")]
-    Range {
-        /// The parameter.
-        name: &'static str,
-        /// The value that was given.
-        value: String,
-        /// Smallest.
-        low: f64,
-        /// Largest.
-        high: f64,
-    },
-    /// An invalid profile.
+    Range { name: &'static str, value: String, low: f64, high: f64 },
     #[error("the PSF's profile or image has {0}")]
     Profile(String),
 }

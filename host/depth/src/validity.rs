@@ -3,7 +3,8 @@
 //! that noise may have made it, and where the model leaves far more than noise. The others get a standard deviation
 //! widened by the residual, and a confidence: the probability of an error below three of these.
 
-use ndarray::{Array2, Zip};
+use ndarray::{Array2, ArrayView1, Axis, Zip};
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::adaptive_window::Estimate;
@@ -12,6 +13,7 @@ use crate::metrics::dilate_square;
 use crate::optics::{Optics, unexplained};
 use crate::prepare::Prepared;
 use crate::reason::Reason;
+use crate::simd::{self, Backend, Believed};
 
 /// Largest valid |alpha|: a tenth beyond either focus the operators are accurate to 1 mm.
 pub const LARGEST_ALPHA: f64 = 1.1;
@@ -71,52 +73,62 @@ pub fn assess(
     let size = map.depth_mm.dim();
     let mut reasons = prepared.reasons.clone();
     let Estimate { mut deviation_mm, misfit, left_over, .. } = estimate;
-    let range = Range::new(optics);
+    let range = range(optics);
+    let backend = Backend::best();
     let stage =
         optics.stage().map(|stage| [stage.residual, stage.usual_unexplained].map(|value| value as f32));
     let of_model =
         MODEL_ERROR.powi(2) * (left_over as f32 - USUAL_LEFT_OVER).max(0.0) * range.slope_mm.powi(2);
     let filled = map.filled.take().filter(|_| settings.filled);
-    let is_filled = |at: (usize, usize)| filled.as_ref().is_some_and(|filled| filled[at]);
-    Zip::indexed(&mut reasons)
-        .and(&mut map.depth_mm)
-        .and(&mut map.confidence)
-        .and(&mut deviation_mm)
-        .and(&misfit)
-        .par_for_each(|at, reason, depth, confidence, deviation, misfit| {
-            if is_filled(at) && depth.is_finite() {
-                (*reason, *deviation) = (0, FILLED_DEVIATION * range.slope_mm);
-                return;
+    let least = settings.least_confidence;
+    Zip::indexed(map.depth_mm.rows_mut())
+        .and(map.confidence.rows_mut())
+        .and(deviation_mm.rows_mut())
+        .and(misfit.rows())
+        .and(reasons.rows_mut())
+        .par_for_each(|y, mut depth, mut confidence, mut deviation, misfit, mut reasons| {
+            let measured = filled.is_some().then(|| (depth.to_owned(), confidence.to_owned()));
+            let noise = deviation.to_vec();
+            let mut misfit = misfit.to_vec();
+            for ((deviation, noise), misfit) in deviation.iter_mut().zip(&noise).zip(&mut misfit) {
+                *deviation = match stage {
+                    Some([residual, usual]) => {
+                        // Relative to the target that the lens was learned from.
+                        *misfit = unexplained(*misfit, noise / range.slope_mm) / usual;
+                        noise.hypot(model_error(residual, *misfit) * range.slope_mm)
+                    }
+                    None => (noise * noise * misfit.max(1.0) + of_model).sqrt(),
+                };
             }
-            let noise = *deviation;
-            let mut misfit = *misfit;
-            *deviation = match stage {
-                Some([residual, usual]) => {
-                    // Relative to the target that the lens was learned from.
-                    misfit = unexplained(misfit, noise / range.slope_mm) / usual;
-                    noise.hypot(model_error(residual, misfit) * range.slope_mm)
+            let rows = [&mut depth, &mut confidence, &mut deviation].map(|row| row.as_slice_mut());
+            let ([Some(depth), Some(confidence), Some(deviation)], Some(reasons)) =
+                (rows, reasons.as_slice_mut())
+            else {
+                unreachable!("maps are made in standard layout")
+            };
+            simd::believe_row(
+                backend,
+                range,
+                least,
+                &noise,
+                &misfit,
+                reasons,
+                [depth, confidence, deviation],
+            );
+            if let (Some((depths, confidences)), Some(filled)) = (measured, &filled) {
+                for (x, _) in filled.row(y).iter().enumerate().filter(|(_, filled)| **filled) {
+                    if depths[x].is_finite() {
+                        (depth[x], confidence[x], reasons[x]) = (depths[x], confidences[x], 0);
+                        deviation[x] = FILLED_DEVIATION * range.slope_mm;
+                    }
                 }
-                None => (noise * noise * misfit.max(1.0) + of_model).sqrt(),
-            };
-            let verdict = if *reason != 0 || !depth.is_finite() {
-                None
-            } else {
-                range.verdict(*depth, [noise, *deviation], misfit, settings.least_confidence)
-            };
-            match verdict {
-                Some(Ok(probability)) => *confidence = probability,
-                Some(Err(why)) => *reason = why.code(),
-                None => {}
-            }
-            if !matches!(verdict, Some(Ok(_))) {
-                (*depth, *confidence, *deviation) = (f32::NAN, 0.0, f32::NAN);
             }
         });
     map.filled = filled;
     drop(misfit); // a map is large, and what follows needs one more
     explain_holes(&mut reasons, map);
     let lost = lost_pixels(&reasons);
-    let valid = map.depth_mm.iter().filter(|depth| depth.is_finite()).count();
+    let valid = map.depth_mm.iter().map(|depth| usize::from(depth.is_finite())).sum::<usize>();
     map.low_texture_fraction =
         lost.iter().find(|lost| lost.reason == Reason::NoTexture).map_or(0.0, |lost| lost.fraction);
     Validity { reasons, deviation_mm, lost, valid_fraction: valid as f64 / (size.0 * size.1) as f64 }
@@ -130,73 +142,43 @@ pub(crate) fn model_error(residual: f32, ratio: f32) -> f32 {
 /// Pixels without a depth by reason, from the map of reasons.
 pub fn lost_pixels(reasons: &Array2<u8>) -> Vec<Lost> {
     let total = reasons.len() as f64;
+    let mut counts = [0_usize; 256];
+    for row in reasons.rows() {
+        // Rows without a reason, which are most, are counted in vectors.
+        if row.iter().fold(0, |all, code| all | code) != 0 {
+            row.iter().for_each(|code| counts[usize::from(*code)] += 1);
+        }
+    }
     Reason::ALL
         .into_iter()
-        .map(|reason| (reason, reasons.iter().filter(|code| **code == reason.code()).count()))
+        .map(|reason| (reason, counts[usize::from(reason.code())]))
         .filter(|(_, count)| *count > 0)
         .map(|(reason, count)| Lost { reason, code: reason.code(), fraction: count as f64 / total })
         .collect()
 }
 
-struct Range {
-    far_mm: f32,
-    near_mm: f32,
-    /// Magnitude of the change of depth with alpha, mm, at alpha 0.
-    slope_mm: f32,
-    /// Whether the model error was learned; the deviation then includes it.
-    learned: bool,
-}
-
-impl Range {
-    fn new(optics: &Optics) -> Self {
-        let [far_mm, near_mm] = [-LARGEST_ALPHA, LARGEST_ALPHA].map(|alpha| optics.depth_mm(alpha) as f32);
-        Self {
-            far_mm,
-            near_mm,
-            slope_mm: optics.depth_per_alpha_mm(0.0).abs() as f32,
-            learned: optics.stage().is_some(),
-        }
+fn range(optics: &Optics) -> Believed {
+    let [far_mm, near_mm] = [-LARGEST_ALPHA, LARGEST_ALPHA].map(|alpha| optics.depth_mm(alpha) as f32);
+    Believed {
+        far_mm,
+        near_mm,
+        slope_mm: optics.depth_per_alpha_mm(0.0).abs() as f32,
+        largest_deviation: LARGEST_DEVIATION,
+        // A learned deviation includes the model's error.
+        largest_misfit: if optics.stage().is_some() { f32::INFINITY } else { LARGEST_MISFIT },
     }
-
-    /// The confidence of a depth, or the reason for its absence. `deviations_mm` are by noise, and with the residual.
-    fn verdict(
-        &self,
-        depth: f32,
-        deviations_mm: [f32; 2],
-        misfit: f32,
-        least: f32,
-    ) -> Option<Result<f32, Reason>> {
-        let [of_noise, of_alpha] = deviations_mm.map(|deviation| deviation / self.slope_mm);
-        if of_noise.is_nan() || of_noise >= LARGEST_DEVIATION {
-            return Some(Err(Reason::NoTexture));
-        }
-        if !(self.near_mm..=self.far_mm).contains(&depth) {
-            return Some(Err(Reason::OutOfRange));
-        }
-        if (!self.learned && misfit > LARGEST_MISFIT) || of_alpha > 3.0 * LARGEST_DEVIATION {
-            return Some(Err(Reason::Misfit));
-        }
-        let probability = probability(of_alpha, misfit);
-        Some(if probability < least { Err(Reason::Unsure) } else { Ok(probability) })
-    }
-}
-
-/// Probability of an error below three standard deviations: 0.997, less for large deviations or residuals.
-fn probability(deviation_of_alpha: f32, misfit: f32) -> f32 {
-    let noisy = (deviation_of_alpha / LARGEST_DEVIATION).powi(2);
-    let unexplained = (misfit - 1.5).max(0.0);
-    0.997 / ((1.0 + 0.3 * noisy) * (1.0 + 0.02 * unexplained))
 }
 
 fn explain_holes(reasons: &mut Array2<u8>, map: &DepthMap) {
-    let unexplained = |reasons: &Array2<u8>| {
-        reasons
-            .indexed_iter()
-            .filter(|(at, code)| **code == 0 && !map.depth_mm[*at].is_finite())
-            .map(|(at, _)| at)
-            .collect::<Vec<_>>()
+    let unexplained = |(y, row): (usize, ArrayView1<f32>)| {
+        let codes = reasons.row(y);
+        // In vectors; in most rows every pixel has a depth.
+        let present = row.iter().map(|depth| u32::from(depth.is_finite())).sum::<u32>() as usize;
+        let pixels = if present == row.len() { 0..0 } else { 0..row.len() };
+        pixels.filter(|x| codes[*x] == 0 && !row[*x].is_finite()).map(|x| (y, x)).collect::<Vec<_>>()
     };
-    let mut left = unexplained(reasons);
+    let mut left: Vec<(usize, usize)> =
+        map.depth_mm.axis_iter(Axis(0)).into_par_iter().enumerate().flat_map_iter(unexplained).collect();
     if left.is_empty() {
         return;
     }
@@ -238,15 +220,37 @@ mod tests {
     /// With a slope of 30 mm: 3.6 mm of noise, 10.8 mm with the model's error, misfit 60.
     #[test]
     fn depths_are_believed_up_to_each_limit_and_no_further() {
-        let range = Range { far_mm: 950.0, near_mm: 880.0, slope_mm: 30.0, learned: false };
-        let verdict = |depth, deviations_mm, misfit| range.verdict(depth, deviations_mm, misfit, 0.0);
-        let believed = |verdict: Option<Result<f32, Reason>>| matches!(verdict, Some(Ok(_)));
-        let why = |verdict: Option<Result<f32, Reason>>| verdict.and_then(Result::err);
+        let range = Believed {
+            far_mm: 950.0,
+            near_mm: 880.0,
+            slope_mm: 30.0,
+            largest_deviation: LARGEST_DEVIATION,
+            largest_misfit: LARGEST_MISFIT,
+        };
+        let of_range = |range, depth, [noise, deviation]: [f32; 2], misfit, least| {
+            let mut codes = Backend::available().into_iter().map(|backend| {
+                let (mut depth, mut deviation, mut confidence, mut reason) =
+                    ([depth], [deviation], [0.0], [0]);
+                let maps = [&mut depth[..], &mut confidence, &mut deviation];
+                simd::believe_row(backend, range, least, &[noise], &[misfit], &mut reason, maps);
+                assert_eq!(
+                    reason == [0],
+                    depth[0].is_finite() && confidence[0] > 0.0 && deviation[0].is_finite()
+                );
+                reason[0]
+            });
+            let first = codes.next().unwrap();
+            assert!(codes.all(|code| code == first));
+            first
+        };
+        let verdict = |depth, deviations_mm, misfit| of_range(range, depth, deviations_mm, misfit, 0.0);
+        let believed = |code: u8| code == 0;
+        let why = |code: u8| Reason::ALL.into_iter().find(|reason| reason.code() == code);
         assert!(believed(verdict(900.0, [0.3, 0.3], 59.0)));
         assert_eq!(why(verdict(900.0, [0.3, 0.3], 61.0)), Some(Reason::Misfit));
-        let learned = Range { learned: true, far_mm: 950.0, near_mm: 880.0, slope_mm: 30.0 };
+        let learned = Believed { largest_misfit: f32::INFINITY, ..range };
         assert!(
-            believed(learned.verdict(900.0, [0.3, 0.3], 61.0, 0.0)),
+            believed(of_range(learned, 900.0, [0.3, 0.3], 61.0, 0.0)),
             "the deviation has the model's error"
         );
         assert!(believed(verdict(900.0, [3.5, 3.5], 1.0)));
@@ -260,6 +264,6 @@ mod tests {
         for depth in [879.9, 950.1] {
             assert_eq!(why(verdict(depth, [0.3, 0.3], 1.0)), Some(Reason::OutOfRange), "{depth}");
         }
-        assert_eq!(why(range.verdict(900.0, [0.3, 0.3], 1.0, 1.0)), Some(Reason::Unsure));
+        assert_eq!(why(of_range(range, 900.0, [0.3, 0.3], 1.0, 1.0)), Some(Reason::Unsure));
     }
 }

@@ -1,4 +1,4 @@
-//! What to type next: the workflows' errors carry facts, the command line knows the commands that mend them.
+//! Commands that remedy an error: the workflows' errors carry facts only.
 
 use farnear_capture::{
     ClientError, PortError, board_correction::BoardCorrectionError, expose::CaptureError,
@@ -10,7 +10,6 @@ use farnear_workflows::{
     silhouettes::SilhouettesError, simulator::SimulatorError,
 };
 
-/// The commands that help with an error, where there are some.
 pub fn hint(error: &anyhow::Error) -> Option<String> {
     error.chain().find_map(|cause| {
         cause.downcast_ref().and_then(of_workflow).or_else(|| cause.downcast_ref().and_then(of_client))

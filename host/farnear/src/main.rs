@@ -1,13 +1,14 @@
 //! # farnear
 //!
-//! The command line: parses, shows and asks; the tasks are in `farnear-workflows`. One file per command in [`commands`];
-//! [`terminal`] shows progress, asks, and handles Ctrl-C; [`report`] prints figures as text or JSON; [`hints`] suggests what to type
-//! after an error; [`render`] draws scenes, because a simulated lens does not belong to the workflows.
+//! The command line: parses arguments and prints figures; the tasks are in `farnear-workflows`. [`render`] is here
+//! because the workflows do not depend on a simulated lens.
 //!
 //! Exit code 0 only on success, 1 for failure, 2 for bad usage. Figures go to stdout, everything else to stderr.
 
 mod commands;
 mod hints;
+#[cfg(target_os = "linux")]
+mod huge_pages;
 mod render;
 mod report;
 mod run;
@@ -27,6 +28,10 @@ use farnear_workflows::{
 };
 
 use run::Run;
+
+#[cfg(target_os = "linux")]
+#[global_allocator]
+static ALLOCATOR: huge_pages::HugePages = huge_pages::HugePages;
 
 /// Depth from defocus: design operators, compute depth, drive the rig.
 #[derive(Parser)]
@@ -128,7 +133,7 @@ fn main() -> ExitCode {
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,
-        // Not returned from main: with RUST_BACKTRACE set that buries the message under a backtrace.
+        // Not returned from main: RUST_BACKTRACE would add a backtrace to the message.
         Err(error) => {
             terminal::end_count();
             let hint = hints::hint(&error).map(|hint| format!("; {hint}")).unwrap_or_default();
@@ -168,7 +173,7 @@ fn without_equals(words: &[String]) -> Option<String> {
     })
 }
 
-/// An error and its causes in one line. A typed error often says its cause itself; that is not said twice.
+/// An error and its causes in one line, without causes that the error's message already contains.
 fn message(error: &anyhow::Error) -> String {
     error.chain().map(ToString::to_string).fold(String::new(), |message, cause| match message {
         empty if empty.is_empty() => cause.trim_end().into(),
@@ -238,10 +243,10 @@ mod tests {
     }
 
     #[test]
-    fn causes_are_said_once() {
+    fn causes_are_printed_once() {
         let inner = std::io::Error::other("Broken pipe");
-        let said = anyhow::Error::new(inner).context("the port went away (Broken pipe)").context("capture");
-        assert_eq!(message(&said), "capture: the port went away (Broken pipe)");
+        let error = anyhow::Error::new(inner).context("the port went away (Broken pipe)").context("capture");
+        assert_eq!(message(&error), "capture: the port went away (Broken pipe)");
         let unsaid = anyhow::anyhow!("No such file").context("cannot read x");
         assert_eq!(message(&unsaid), "cannot read x: No such file");
     }

@@ -1,4 +1,4 @@
-//! What a camera would see of a known scene, and the truth with it, into a folder.
+//! Renders a simulated pair and its true depth into a folder.
 
 use std::{fs, path::PathBuf};
 
@@ -12,22 +12,16 @@ use serde::Serialize;
 use crate::scene::SceneArgument;
 
 pub struct RenderSettings {
-    /// What stands before the camera.
     pub scene: SceneArgument,
-    /// A lens whose focus varies over the field in ellipses.
     pub elliptical_distortion: bool,
-    /// Point spread function by name; without it the one of the optics file.
+    /// The name of a PSF; by default the one of the optics file.
     pub psf: Option<String>,
     pub optics: PathBuf,
-    /// Size and noise of the images.
     pub camera: Camera,
-    /// Decides everything random.
     pub seed: u64,
-    /// Folder for far.png, near.png, truth.npy and optics.toml.
     pub out: PathBuf,
 }
 
-/// What there is to say of a rendered scene.
 #[derive(Serialize)]
 pub struct RenderFigures {
     width: usize,
@@ -36,7 +30,7 @@ pub struct RenderFigures {
     farthest_mm: f64,
 }
 
-/// Renders a far- and a near-focused image; the folder gets all files or none.
+/// Renders a far- and a near-focused image. The folder gets all files or none.
 pub fn render(settings: RenderSettings, context: &Context<'_>) -> Result<RenderFigures> {
     let RenderSettings { camera, optics: file, out, .. } = settings;
     let optics = optics::read(&file)?;

@@ -1,4 +1,4 @@
-//! Figures on stdout: lines for people, one JSON object with `--json`; and the error that means bad usage.
+//! Figures on stdout: lines of text, or one JSON object with `--json`.
 
 use std::io::Write;
 
@@ -17,13 +17,20 @@ impl std::fmt::Display for Usage {
 
 impl std::error::Error for Usage {}
 
-/// Prints the fields of `figures`, in their order.
+/// Prints one line of JSON.
+pub fn line<T: Serialize>(figures: &T) -> std::io::Result<()> {
+    let text = serde_json::to_string(figures)? + "\n";
+    let mut stdout = std::io::stdout();
+    stdout.write_all(text.as_bytes())?;
+    stdout.flush()
+}
+
 pub fn print<T: Serialize>(figures: &T, json: bool) -> Result<()> {
     let text = if json { serde_json::to_string(figures)? + "\n" } else { toml::to_string(figures)? };
     to_stdout(text.as_bytes())
 }
 
-/// Writes to stdout; a reader that has gone or a full disk is a failure like any other, not a panic.
+/// Returns an error, without a panic, for a closed pipe or a full disk.
 pub fn to_stdout(bytes: &[u8]) -> Result<()> {
     let mut stdout = std::io::stdout();
     stdout.write_all(bytes).and_then(|()| stdout.flush()).context("cannot write to the standard output")

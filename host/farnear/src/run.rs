@@ -21,7 +21,6 @@ pub struct Run<R: Request + Args> {
 }
 
 impl<R: Request + Args> Run<R> {
-    /// Checks and runs the request.
     pub fn run(self) -> Result<()> {
         let Self { request, json } = self;
         request.check()?;
@@ -42,10 +41,6 @@ pub struct RigRun<R: RigRequest + Args> {
 }
 
 impl<R: RigRequest + Args> RigRun<R> {
-    /// Runs the request on the rig.
-    ///
-    /// # Errors
-    /// Those of the task.
     pub fn run(self) -> Result<()> {
         let Self { target, mut task } = self;
         task.request.set_rig(target.address()?);
@@ -66,10 +61,6 @@ pub struct CameraRun<R: CameraRequest + Args> {
 }
 
 impl<R: CameraRequest + Args> CameraRun<R> {
-    /// Runs the request on the rig with the camera.
-    ///
-    /// # Errors
-    /// Those of the task.
     pub fn run(self) -> Result<()> {
         let Self { target, camera, mut task } = self;
         task.request.set_rig(target.address()?);

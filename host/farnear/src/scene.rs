@@ -1,6 +1,6 @@
 //! Scenes by name or from a scene file with its maps.
 //!
-//! A scene file is TOML; files that it names lie relative to it:
+//! A scene file is TOML; paths in it are relative to its folder:
 //! ```toml
 //! depth = "bust.npy"      # depths in mm (.npy or float TIFF), stretched over the image; or: scene = "cone"
 //! texture = "bricks.png"  # any picture that `farnear depth` reads; or: "sand" (also without the line), "fractal"
@@ -18,7 +18,7 @@ use anyhow::{Context, Result, bail};
 use farnear_files::{image_file::read_grey, map};
 use farnear_scene::{PackedScene, Scene, SceneError, SceneFile};
 
-/// A scene as an argument names it.
+/// A scene argument.
 #[derive(Clone, Debug)]
 pub enum SceneArgument {
     /// `cone`, `plane:900,contrast=0.3`, ...
@@ -29,7 +29,7 @@ pub enum SceneArgument {
 impl FromStr for SceneArgument {
     type Err = SceneError;
 
-    /// What ends with `.toml` or exists is a file, everything else a name.
+    /// A text that ends with `.toml` or exists is a file, any other a name.
     fn from_str(text: &str) -> Result<Self, SceneError> {
         let path = Path::new(text);
         let ending = path.extension().unwrap_or_default();
@@ -41,7 +41,6 @@ impl FromStr for SceneArgument {
 }
 
 impl SceneArgument {
-    /// The scene, with its maps.
     pub fn read(self) -> Result<Scene> {
         match self {
             Self::Named(scene) => Ok(*scene),
@@ -52,7 +51,7 @@ impl SceneArgument {
     }
 }
 
-/// Data of a scene that the emulated rig needs besides its name: a scene file with its maps, checked.
+/// Data of a scene file with its maps, checked; `None` if the emulated rig needs only the scene's name.
 pub fn packed(scene: Option<&str>) -> Result<Option<Arc<[u8]>>> {
     let Some(SceneArgument::File(path)) = scene.map(str::parse).transpose()? else { return Ok(None) };
     let packed = || {

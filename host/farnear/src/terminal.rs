@@ -1,5 +1,4 @@
-//! The terminal as the face of a workflow: messages on stderr, questions and typed answers, and
-//! Ctrl-C.
+//! The terminal as the face of a workflow: messages on stderr, questions with typed answers, Ctrl-C.
 
 use std::{
     io::{BufRead, IsTerminal, Write},
@@ -14,31 +13,30 @@ use std::{
 use anyhow::{Context as _, Result};
 use farnear_workflows::{Cancel, Context, Progress, Questions, WorkflowError};
 
-/// From one look at the interruption to the next.
+/// Poll interval for the interruption.
 const LOOK: Duration = Duration::from_millis(50);
 
 pub struct Terminal {
     counts: Counts,
 }
 
-/// How counts are shown.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Counts {
     Hidden,
-    /// On one line on which they rise.
+    /// On one line, overwritten.
     Rising,
-    /// On a line of their own, now and then.
+    /// On lines of their own, every [`COUNT_S`].
     Lines,
 }
 
-/// From one line with a count to the next, seconds.
+/// Interval between lines with a count, seconds.
 const COUNT_S: u64 = 10;
-/// When the next line with a count is due, and how long the work will still take, seconds since the first look at the clock.
+/// When the next line with a count is due, in seconds since the first use of the clock.
 static NEXT_COUNT_S: AtomicU64 = AtomicU64::new(0);
-/// What [`Progress::time_left`] said last; the largest number where it said nothing.
+/// The last remaining time from [`Progress::time_left`], seconds; `u64::MAX` means unknown.
 static LEFT_S: AtomicU64 = AtomicU64::new(u64::MAX);
 
-/// Whether the cursor stands behind a count that may still rise.
+/// Whether the cursor is behind a count that may be overwritten.
 static COUNTING_LINE: AtomicBool = AtomicBool::new(false);
 
 /// Ends the line of a count, so that further text begins on a new line.
@@ -64,7 +62,7 @@ pub fn context() -> Result<Context<'static>> {
     Ok(Context::new(&PLAIN, &PLAIN, cancel))
 }
 
-/// The same with counts that rise on a line of their own, where stderr is a terminal and `json` is not asked for.
+/// As [`context`]; counts overwrite one line if stderr is a terminal and `json` is false.
 pub fn counting(json: bool) -> Result<Context<'static>> {
     static COUNTING: Terminal = Terminal { counts: Counts::Rising };
     let plain = context()?;
@@ -72,8 +70,8 @@ pub fn counting(json: bool) -> Result<Context<'static>> {
     Ok(if counts { Context { progress: &COUNTING, ..plain } } else { plain })
 }
 
-/// The same for work of hours: counts with the time that is left, on a line of their own every ten seconds where no terminal can
-/// show them rise, or figures come between.
+/// For work of hours: counts with the remaining time. They are lines of their own if stderr is no terminal or figures
+/// come between.
 pub fn long_work() -> Result<Context<'static>> {
     static LINES: Terminal = Terminal { counts: Counts::Lines };
     static RISING: Terminal = Terminal { counts: Counts::Rising };
@@ -81,7 +79,7 @@ pub fn long_work() -> Result<Context<'static>> {
     Ok(Context { progress: if rising { &RISING } else { &LINES }, ..context()? })
 }
 
-/// Whether a line with a count is due; then the next is due later.
+/// Returns whether a line with a count is due, and schedules the next.
 fn is_due() -> bool {
     static START: OnceLock<Instant> = OnceLock::new();
     let now_s = START.get_or_init(Instant::now).elapsed().as_secs();
@@ -92,7 +90,7 @@ fn is_due() -> bool {
     due
 }
 
-/// A time as a person says it: 40 s, 12 min, 3 h 20 min.
+/// For example 40 s, 12 min, 3 h 20 min.
 fn in_words(seconds: u64) -> String {
     match seconds {
         0..100 => format!("{seconds} s"),
@@ -128,7 +126,7 @@ impl Progress for Terminal {
                 }
                 return;
             }
-            // Blanks over what a longer time has left behind.
+            // Blanks overwrite the rest of a longer time.
             Counts::Rising if LEFT_S.load(Ordering::Relaxed) == u64::MAX => eprint!("\r{count}"),
             Counts::Rising => eprint!("\r{count}{left:<20}"),
         }
@@ -144,7 +142,7 @@ impl Questions for Terminal {
         eprint!("{question}");
         let unanswered = || WorkflowError::Unanswered { question: question.trim().into() };
         std::io::stderr().flush().map_err(|_| unanswered())?;
-        // Ctrl-C does not end a read; so it waits in its own thread, which ends with the program at the latest.
+        // Ctrl-C does not end a read, so a thread of its own reads; it ends with the program at the latest.
         let (sender, typed) = channel();
         std::thread::spawn(move || {
             let mut line = String::new();
@@ -170,7 +168,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn times_are_said_in_words() {
+    fn durations_are_printed_in_words() {
         for (seconds, words) in [(40, "40 s"), (100, "2 min"), (5999, "100 min"), (12_000, "3 h 20 min")] {
             assert_eq!(in_words(seconds), words);
         }

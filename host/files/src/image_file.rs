@@ -12,6 +12,7 @@
 
 mod complete;
 mod decode;
+pub(crate) mod metadata;
 mod tiff_file;
 pub(crate) mod tiff_tags;
 mod write;
@@ -58,11 +59,30 @@ impl GreyImage {
 
 /// Common white level of images of one camera: the lowest of all, if no image exceeds it.
 pub fn shared_white_level<'a>(images: impl Iterator<Item = &'a GreyImage> + Clone) -> Option<f32> {
-    let white = images.clone().filter_map(|image| image.white_level).reduce(f32::min)?;
-    let exceeds = |image: &GreyImage| {
-        image.samples == Samples::Float || image.pixels.iter().any(|value| *value > white * 1.000_001)
-    };
-    (!images.into_iter().any(exceeds)).then_some(white)
+    images.clone().find_map(|image| image.white_level)?;
+    let mut shared = SharedWhiteLevel::default();
+    images.for_each(|image| shared.add(image));
+    shared.get()
+}
+
+/// [`shared_white_level`] of images that are not in memory together.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct SharedWhiteLevel {
+    lowest: Option<f32>,
+    brightest: f32,
+    float: bool,
+}
+
+impl SharedWhiteLevel {
+    pub fn add(&mut self, image: &GreyImage) {
+        self.lowest = self.lowest.into_iter().chain(image.white_level).reduce(f32::min);
+        self.brightest = image.pixels.iter().copied().fold(self.brightest, f32::max);
+        self.float |= image.samples == Samples::Float;
+    }
+
+    pub fn get(self) -> Option<f32> {
+        self.lowest.filter(|white| !self.float && self.brightest <= white * 1.000_001)
+    }
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]

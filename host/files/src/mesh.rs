@@ -5,6 +5,7 @@
 use std::io::{self, Write};
 
 use ndarray::ArrayView2;
+use rayon::prelude::*;
 
 /// Depth step between surfaces, part of the map's range.
 const STEP: f32 = 0.1;
@@ -72,8 +73,8 @@ impl Lateral {
     }
 }
 
-/// No vertex.
-const NONE: u32 = u32::MAX;
+/// Rows that are encoded together, on all threads.
+const ROWS: usize = 64;
 
 /// Surface through a depth map, coloured by an image of any scale. Written row by row, as large maps exceed memory.
 pub(crate) struct Surface<'a> {
@@ -95,18 +96,27 @@ impl<'a> Surface<'a> {
 
     /// Numbers of vertices and faces.
     pub(crate) fn count(&self) -> (usize, usize) {
-        let (height, width) = self.depth.dim();
-        let mut marks = vec![0; width];
-        let (mut vertices, mut faces) = (0, 0);
-        for row in 0..height {
-            vertices += self.depth.row(row).iter().map(|z| u32::from(z.is_finite())).sum::<u32>() as usize;
-            if row > 0 {
-                mark_faces(self.depth, row, self.step, &mut marks);
-                faces +=
-                    marks.iter().map(|mark| u32::from(mark & 1) + u32::from(mark >> 1)).sum::<u32>() as usize;
-            }
+        let rows = (0..self.depth.nrows()).into_par_iter();
+        let counts = rows.map_init(
+            || vec![0; self.depth.ncols()],
+            |marks, row| {
+                self.mark_faces(row, marks);
+                let faces = marks.iter().map(|mark| u32::from(mark & 1) + u32::from(mark >> 1)).sum::<u32>();
+                (self.vertices_of(row) as usize, faces as usize)
+            },
+        );
+        counts.reduce(|| (0, 0), |a, b| (a.0 + b.0, a.1 + b.1))
+    }
+
+    fn vertices_of(&self, row: usize) -> u32 {
+        self.depth.row(row).iter().map(|z| u32::from(z.is_finite())).sum()
+    }
+
+    fn mark_faces(&self, row: usize, marks: &mut [u8]) {
+        marks.fill(0);
+        if row > 0 {
+            mark_faces(self.depth, row, self.step, marks);
         }
-        (vertices, faces)
     }
 
     /// Positions and shades of a row's vertices.
@@ -123,49 +133,60 @@ impl<'a> Surface<'a> {
     pub(crate) fn write_vertices(
         &self,
         to: &mut impl Write,
-        vertex: impl Fn(&mut Vec<u8>, [f32; 3], u8),
+        vertex: impl Fn(&mut Vec<u8>, [f32; 3], u8) + Sync,
     ) -> io::Result<()> {
-        let mut bytes = Vec::new();
-        for row in 0..self.depth.nrows() {
-            bytes.clear();
-            self.vertices(row).for_each(|(position, shade)| vertex(&mut bytes, position, shade));
-            to.write_all(&bytes)?;
-        }
-        Ok(())
+        self.write_rows(to, |row, bytes| {
+            self.vertices(row).for_each(|(position, shade)| vertex(bytes, position, shade));
+        })
     }
 
     /// Writes what `face` appends for the corners of each face, anticlockwise for the viewer.
     pub(crate) fn write_faces(
         &self,
         to: &mut impl Write,
-        face: impl Fn(&mut Vec<u8>, [u32; 3]),
+        face: impl Fn(&mut Vec<u8>, [u32; 3]) + Sync,
     ) -> io::Result<()> {
         let (height, width) = self.depth.dim();
-        // Vertices are numbered in order, so two rows of numbers suffice.
+        // Vertices are numbered in order; the first of each row.
         let mut next = 0;
-        let mut numbers = [vec![NONE; width], vec![NONE; width]];
-        let (mut marks, mut bytes) = (vec![0; width], Vec::new());
-        for row in 0..height {
-            numbers.swap(0, 1);
-            for (number, z) in numbers[1].iter_mut().zip(self.depth.row(row)) {
-                *number = if z.is_finite() { next } else { NONE };
-                next += u32::from(z.is_finite());
-            }
-            if row == 0 {
-                continue;
-            }
-            mark_faces(self.depth, row, self.step, &mut marks);
-            bytes.clear();
-            let [upper, lower] = &numbers;
-            for ((mark, upper), lower) in marks.iter().zip(upper.windows(2)).zip(lower.windows(2)) {
+        let first: Vec<u32> = (0..height)
+            .map(|row| {
+                let count = self.vertices_of(row);
+                next += count;
+                next - count
+            })
+            .collect();
+        self.write_rows(to, |row, bytes| {
+            let mut marks = vec![0; width];
+            self.mark_faces(row, &mut marks);
+            let above = row.saturating_sub(1);
+            let [mut upper, mut lower] = [first[above], first[row]];
+            let lines = self.depth.row(above).into_iter().zip(self.depth.row(row));
+            for (mark, (above, below)) in marks.iter().zip(lines) {
+                let upper_right = upper + u32::from(above.is_finite());
+                let lower_right = lower + u32::from(below.is_finite());
                 if mark & 1 != 0 {
-                    face(&mut bytes, [upper[0], lower[0], upper[1]]);
+                    face(bytes, [upper, lower, upper_right]);
                 }
                 if mark & 2 != 0 {
-                    face(&mut bytes, [upper[1], lower[0], lower[1]]);
+                    face(bytes, [upper_right, lower, lower_right]);
                 }
+                (upper, lower) = (upper_right, lower_right);
             }
-            to.write_all(&bytes)?;
+        })
+    }
+
+    /// Encodes rows on all threads and writes them in order.
+    fn write_rows(&self, to: &mut impl Write, encode: impl Fn(usize, &mut Vec<u8>) + Sync) -> io::Result<()> {
+        let height = self.depth.nrows();
+        let mut rows = vec![Vec::new(); ROWS.min(height)];
+        for begin in (0..height).step_by(ROWS) {
+            let part = &mut rows[..ROWS.min(height - begin)];
+            part.par_iter_mut().enumerate().for_each(|(i, bytes)| {
+                bytes.clear();
+                encode(begin + i, bytes);
+            });
+            part.iter().try_for_each(|bytes| to.write_all(bytes))?;
         }
         Ok(())
     }
@@ -215,10 +236,11 @@ pub fn ply(depth: ArrayView2<f32>, grey: ArrayView2<f32>, lateral: Lateral, unit
 /// right, lower, lower right; 3 = both.
 fn mark_faces(depth_mm: ArrayView2<f32>, row: usize, step: f32, marks: &mut [u8]) {
     let (upper, lower) = (depth_mm.row(row - 1), depth_mm.row(row));
-    marks.fill(0);
     let joined = |a: f32, b: f32, c: f32| {
-        // NaN propagates through the sum, but not through min and max.
-        let spread = a.max(b).max(c) - a.min(b).min(c);
+        // NaN propagates through the sum; these comparisons are one instruction each.
+        let max = |a: f32, b: f32| if a > b { a } else { b };
+        let min = |a: f32, b: f32| if a < b { a } else { b };
+        let spread = max(max(a, b), c) - min(min(a, b), c);
         u8::from((a + b + c).is_finite() & (spread <= step))
     };
     let corners = upper.iter().zip(upper.iter().skip(1)).zip(lower.iter().zip(lower.iter().skip(1)));

@@ -7,6 +7,8 @@ use std::{
     time::SystemTime,
 };
 
+use crate::image_file::metadata::taken;
+
 pub fn sort(paths: &mut [PathBuf]) {
     paths.sort_by(|a, b| natural(&stem(a), &stem(b)));
     if let Some(first) = roll_over(paths) {
@@ -61,8 +63,13 @@ fn roll_over(sorted: &[PathBuf]) -> Option<usize> {
     (two_groups && !written_in_order(sorted)).then_some(first)
 }
 
-/// Whether time stamps rise in this order, seconds apart.
+/// Whether the exposures' times (EXIF), else those of the files, rise in this order.
 fn written_in_order(paths: &[PathBuf]) -> bool {
+    let taken: Option<Vec<String>> = paths.iter().map(|path| taken(path)).collect();
+    if let Some(taken) = taken {
+        // A burst may have one second for several exposures.
+        return taken.is_sorted() && taken.first() != taken.last();
+    }
     let times: Option<Vec<SystemTime>> =
         paths.iter().map(|path| path.metadata().ok()?.modified().ok()).collect();
     let Some(times) = times else { return false };
@@ -100,6 +107,7 @@ fn digits(text: &str) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::image_file::metadata::tests::png_with_exif;
 
     #[test]
     fn numbers_sort_by_value_and_letters_by_letter() {
@@ -165,6 +173,25 @@ mod tests {
         }
         sort(&mut paths);
         assert_eq!(paths, [by_number[1].clone(), by_number[2].clone(), by_number[0].clone()]);
+    }
+
+    #[test]
+    fn times_of_exposure_overrule_the_files_times() {
+        let folder = tempfile::tempdir().unwrap();
+        let paths = ["p0001.png", "p9998.png", "p9999.png"].map(|name| folder.path().join(name));
+        let sorted_with = |seconds: [u8; 3]| {
+            for (path, second) in paths.iter().zip(seconds) {
+                let time = format!("2026:11:25 20:00:{second:02}");
+                std::fs::write(path, png_with_exif(1, &time)).unwrap();
+            }
+            let mut sorted = paths.to_vec();
+            sort(&mut sorted);
+            sorted
+        };
+        assert_eq!(sorted_with([10, 20, 30]), paths);
+        let rolled_over = [&paths[1..], &paths[..1]].concat();
+        assert_eq!(sorted_with([30, 10, 20]), rolled_over);
+        assert_eq!(sorted_with([10, 10, 10]), rolled_over, "a burst within a second");
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! Exact quantiles of large maps in two passes, without copy or sort.
 
-use ndarray::ArrayView2;
+use ndarray::{ArrayView2, Axis};
+use rayon::prelude::*;
 
 /// Histogram bins by the upper half of the ordered key.
 const BINS: usize = 1 << 16;
@@ -23,10 +24,7 @@ fn value(key: u32) -> f32 {
 
 impl<'a> Quantiles<'a> {
     pub fn new(map: ArrayView2<'a, f32>) -> Self {
-        let mut counts = vec![0_u32; BINS];
-        for value in map.iter().filter(|value| value.is_finite()) {
-            counts[(key(*value) >> 16) as usize] += 1;
-        }
+        let counts = histogram(map, |key| Some(key >> 16));
         let finite = counts.iter().map(|count| *count as usize).sum();
         Self { map, counts, finite }
     }
@@ -38,15 +36,32 @@ impl<'a> Quantiles<'a> {
     /// The finite value of this rank (0: smallest).
     pub fn at(&self, rank: usize) -> Option<f32> {
         let (upper, before) = place(&self.counts, rank)?;
-        let mut counts = vec![0_u32; BINS];
-        for key in self.map.iter().filter(|value| value.is_finite()).map(|value| key(*value)) {
-            if (key >> 16) as usize == upper {
-                counts[(key & 0xffff) as usize] += 1;
-            }
-        }
+        let counts = histogram(self.map, |key| ((key >> 16) as usize == upper).then_some(key & 0xffff));
         let (lower, _) = place(&counts, rank - before)?;
         Some(value((upper as u32) << 16 | lower as u32))
     }
+}
+
+/// Counts of the finite values by the bin of their key, on all threads.
+fn histogram(map: ArrayView2<f32>, bin: impl Fn(u32) -> Option<u32> + Sync) -> Vec<u32> {
+    let rows = map.nrows().div_ceil(rayon::current_num_threads()).max(1);
+    let parts = map.axis_chunks_iter(Axis(0), rows).into_par_iter().map(|part| {
+        // Neighbours often have one bin: with one count for both, each would wait for the one before.
+        let mut counts = vec![[0_u32; 4]; BINS];
+        for (i, value) in part.iter().enumerate().filter(|(_, value)| value.is_finite()) {
+            if let Some(bin) = bin(key(*value)) {
+                counts[bin as usize][i % 4] += 1;
+            }
+        }
+        counts.into_iter().map(|counts| counts.iter().sum()).collect::<Vec<u32>>()
+    });
+    parts.reduce(
+        || vec![0; BINS],
+        |mut all, part| {
+            all.iter_mut().zip(part).for_each(|(all, count)| *all += count);
+            all
+        },
+    )
 }
 
 fn place(counts: &[u32], rank: usize) -> Option<(usize, usize)> {

@@ -5,9 +5,12 @@
 mod positions;
 
 use std::{
-    collections::BTreeMap,
+    collections::{BTreeMap, HashMap},
+    hash::{DefaultHasher, Hash, Hasher},
     path::{Path, PathBuf},
 };
+
+use ndarray::Array2;
 
 use crate::{
     image_file::{self, GreyImage, ImageError, ReadSettings, decode, pages, read_bytes, tiff_tags},
@@ -101,16 +104,15 @@ fn file(path: &Path) -> Result<Stack, StackError> {
     })
 }
 
-/// Reads the images in order; `each` is called with each index first and may stop. Two equal images are an error.
+/// Reads the images in order, one at a time; `each` takes each with its index and may stop. Two equal images are an error.
 pub fn read<E: From<StackError>>(
     images: &[PathBuf],
     settings: &ReadSettings,
-    mut each: impl FnMut(usize) -> Result<(), E>,
-) -> Result<Vec<GreyImage>, E> {
-    let mut all: Vec<GreyImage> = Vec::with_capacity(images.len());
+    mut each: impl FnMut(usize, GreyImage) -> Result<(), E>,
+) -> Result<(), E> {
+    let mut seen: HashMap<u64, usize> = HashMap::with_capacity(images.len());
     let mut open: Option<(PathBuf, Vec<u8>)> = None;
     for (index, path) in images.iter().enumerate() {
-        each(index)?;
         let (file, page) = image_file::file_and_page(path);
         let bytes = match &mut open {
             Some((of, bytes)) if *of == file => bytes,
@@ -119,10 +121,18 @@ pub fn read<E: From<StackError>>(
         let image = decode(bytes, page).and_then(|decoded| decoded.grey(settings));
         let image =
             image.map_err(|reason| StackError::from(ImageError::Format { path: path.clone(), reason }))?;
-        if let Some(twin) = all.iter().position(|other| other.pixels == image.pixels) {
+        if let Some(twin) = seen.insert(hash(&image.pixels), index) {
             return Err(StackError::Twice { first: images[twin].clone(), second: path.clone() }.into());
         }
-        all.push(image);
+        each(index, image)?;
     }
-    Ok(all)
+    Ok(())
+}
+
+/// Of 64 bits: two different images of a stack have one hash with a probability below 1e-12.
+fn hash(pixels: &Array2<f32>) -> u64 {
+    let mut hasher = DefaultHasher::new();
+    pixels.dim().hash(&mut hasher);
+    pixels.iter().for_each(|value| hasher.write_u32(value.to_bits()));
+    hasher.finish()
 }

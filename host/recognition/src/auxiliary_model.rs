@@ -33,12 +33,14 @@ impl AuxiliaryModel {
         labels: &[usize],
         classes: usize,
     ) -> Result<Self, ModelError> {
-        let said: Vec<Option<Array1<f32>>> =
+        let auxiliary: Vec<Option<Array1<f32>>> =
             clips.par_iter().map(|clip| roots(&recogniser, clip)).collect::<Result<_, ModelError>>()?;
         let width = recogniser.activities.len();
         let profile = |class: usize, of: &dyn Fn(usize) -> bool| {
-            let own = (0..said.len()).filter(|i| labels[*i] == class && of(*i));
-            let sum = own.filter_map(|i| said[i].as_ref()).fold(Array1::zeros(width), |sum, said| sum + said);
+            let own = (0..auxiliary.len()).filter(|i| labels[*i] == class && of(*i));
+            let sum = own
+                .filter_map(|i| auxiliary[i].as_ref())
+                .fold(Array1::zeros(width), |sum, auxiliary| sum + auxiliary);
             to_unit_length(sum)
         };
         let mut profiles = Array2::zeros((classes, width));
@@ -53,18 +55,18 @@ impl AuxiliaryModel {
                 // Classes of a single subject have no comparison.
                 let others =
                     Some(profile(labels[i], &other)).filter(|sum| sum.iter().any(|root| *root > 0.0))?;
-                Some((labels[i], distance(said[i].as_ref()?.view(), others.view())))
+                Some((labels[i], distance(auxiliary[i].as_ref()?.view(), others.view())))
             })
             .collect();
         let limits = Limits::conformal(&scored, classes, Limits::FALSE_ALARMS);
         Ok(Self { recogniser, profiles, limits })
     }
 
-    pub(super) fn outlier_score(&self, said: &Answer, answer: &Answer) -> f32 {
+    pub(super) fn outlier_score(&self, auxiliary: &Answer, answer: &Answer) -> f32 {
         let probabilities: Vec<f32> =
             answer.probabilities.iter().map(|(_, probability)| *probability).collect();
         let (class, _) = largest(&probabilities);
-        self.limits.score(class, distance(roots_of(said).view(), self.profiles.row(class)))
+        self.limits.score(class, distance(roots_of(auxiliary).view(), self.profiles.row(class)))
     }
 
     pub(super) fn fits(&self, classes: usize, boxes: bool) -> bool {
@@ -78,12 +80,12 @@ impl AuxiliaryModel {
 
 /// `None` without a visible person.
 fn roots(recogniser: &Recogniser, clip: &Clip) -> Result<Option<Array1<f32>>, ModelError> {
-    let said = recogniser.recognise(&clip.views)?;
-    Ok(said.outlier_score.is_finite().then(|| roots_of(&said)))
+    let auxiliary = recogniser.recognise(&clip.views)?;
+    Ok(auxiliary.outlier_score.is_finite().then(|| roots_of(&auxiliary)))
 }
 
-fn roots_of(said: &Answer) -> Array1<f32> {
-    said.probabilities.iter().map(|(_, probability)| probability.max(0.0).sqrt()).collect()
+fn roots_of(auxiliary: &Answer) -> Array1<f32> {
+    auxiliary.probabilities.iter().map(|(_, probability)| probability.max(0.0).sqrt()).collect()
 }
 
 fn to_unit_length(sum: Array1<f32>) -> Array1<f32> {
@@ -92,8 +94,8 @@ fn to_unit_length(sum: Array1<f32>) -> Array1<f32> {
 }
 
 /// Bhattacharyya distance of square roots of probabilities, limited to a finite maximum.
-fn distance(said: ArrayView1<f32>, profile: ArrayView1<f32>) -> f32 {
-    -said.dot(&profile).clamp(1e-9, 1.0).ln()
+fn distance(auxiliary: ArrayView1<f32>, profile: ArrayView1<f32>) -> f32 {
+    -auxiliary.dot(&profile).clamp(1e-9, 1.0).ln()
 }
 
 #[cfg(test)]

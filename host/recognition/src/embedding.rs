@@ -24,7 +24,7 @@ pub enum EmbeddingError {
     TooFewSamples { found: usize, needed: usize },
     #[error("sample {row} holds a value that is not finite")]
     NotFinite { row: usize },
-    #[error("the neighbour graph falls into {} parts ({}); raise the number of neighbours (now {neighbours}), or drop the samples that lie apart", .components.len(), describe(.components))]
+    #[error("the neighbour graph falls into {} parts ({}); raise the number of neighbours (now {neighbours}), or remove the separate samples", .components.len(), describe(.components))]
     Disconnected {
         /// Samples of each part, largest first.
         components: Vec<Vec<usize>>,
@@ -33,7 +33,7 @@ pub enum EmbeddingError {
     },
     /// Fewer useful dimensions than requested.
     #[error(
-        "only {found} eigenvalues are positive, {asked} dimensions were asked for: ask for at most {found}"
+        "only {found} eigenvalues are positive, but {asked} dimensions were requested: use at most {found}"
     )]
     TooFewDimensions {
         /// Positive eigenvalues.
@@ -41,7 +41,7 @@ pub enum EmbeddingError {
         asked: usize,
     },
     #[error(
-        "the RBF system is singular with ridge {ridge}: raise it (1e-4 to 1e-2 are usual) or drop doubled samples"
+        "the RBF system is singular with ridge {ridge}: raise it (1e-4 to 1e-2 are usual) or remove duplicate samples"
     )]
     Singular { ridge: f64 },
     #[error("{what}: expected {expected}, found {found}")]

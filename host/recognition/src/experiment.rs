@@ -12,6 +12,7 @@ use std::sync::Arc;
 
 /// A parameter of the space with its candidate values.
 #[derive(Clone, Debug, PartialEq)]
+#[allow(missing_docs, reason = "names and types describe these fields")]
 pub enum Sweep {
     /// Layout of the gallery with its dimensions.
     Layout(Vec<(Layout, usize)>),
@@ -21,9 +22,7 @@ pub enum Sweep {
     Pattern(Vec<PatternKind>),
     /// [`SpaceSettings::residuals`]; no effect on the thesis' grid.
     Residuals(Vec<usize>),
-    /// [`Weights::box_weight`].
     BoxWeight(Vec<f32>),
-    /// [`Weights::relative_weight`].
     RelativeWeight(Vec<f32>),
     /// [`Weights::motion_weight`]; no effect without order.
     MotionWeight(Vec<f32>),

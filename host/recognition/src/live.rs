@@ -61,7 +61,7 @@ impl<'a> Live<'a> {
         let opinions = self.frames.back().map_or(0, Vec::len);
         let answers: Vec<Answer> = (0..opinions).filter_map(|opinion| self.answer(opinion)).collect();
         Ok(if answers.is_empty() {
-            Answer::nobody(&self.recogniser.activities)
+            Answer::without_person(&self.recogniser.activities)
         } else if let [one] = answers.as_slice() {
             one.clone()
         } else {

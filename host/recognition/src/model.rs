@@ -16,14 +16,12 @@ use serde::{Deserialize, Serialize};
 
 /// Settings of a recogniser.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[allow(missing_docs, reason = "names and types describe these fields")]
 pub struct RecogniserSettings {
-    /// Scaling of masks before description.
     pub scaling: Scaling,
-    /// Settings of embedding and patterns.
     pub space: SpaceSettings,
     /// Sharpness of soft assignments.
     pub sharpness: f32,
-    /// Classifier with its parameter.
     pub classifier: ClassifierKind,
     /// Also train on mirrored clips.
     pub mirror: bool,
@@ -43,16 +41,13 @@ impl Default for RecogniserSettings {
 
 /// A trained recogniser.
 #[derive(Clone, Debug, PartialEq)]
+#[allow(missing_docs, reason = "names and types describe these fields")]
 pub struct Recogniser {
-    /// Settings of the training.
     pub settings: RecogniserSettings,
     /// Activities by class index.
     pub activities: Vec<String>,
-    /// Number of fused views.
     pub views: usize,
-    /// Learned space of frames and patterns.
     pub space: Space,
-    /// Classifier of the patterns.
     pub classifier: Classifier,
     /// Squared distance limits to the nearest of [`Self::patterns`]; used without an auxiliary model.
     pub limits: Limits,
@@ -82,7 +77,7 @@ pub struct Answer {
 }
 
 impl Answer {
-    pub(super) fn nobody(activities: &[String]) -> Self {
+    pub(super) fn without_person(activities: &[String]) -> Self {
         let probabilities = activities.iter().map(|activity| (activity.clone(), 0.0)).collect();
         Self { activity: None, confidence: 0.0, probabilities, outlier_score: f32::INFINITY }
     }
@@ -145,12 +140,12 @@ pub enum ModelError {
     Checksum { found: u32, expected: u32 },
     #[error("the model's body cannot be read: {0}")]
     Body(String),
-    #[error("the model's parts do not belong together: {0}")]
+    #[error("the model's parts are inconsistent: {0}")]
     Parts(&'static str),
     #[error("the clip has {found} views{boxes}, the model was trained on {expected}{expected_boxes}", boxes = with(*.found_boxes), expected_boxes = with(*.expected_boxes))]
     Clip { found: usize, found_boxes: bool, expected: usize, expected_boxes: bool },
     #[error(
-        "the model keeps no training clips of its own to learn on with (those that come with the program do not, for learning on made them \
+        "the model contains no training clips, which adaptation needs (the shipped models contain none, because adaptation made them \
          worse): train one on labelled samples, with this model's features if they are few"
     )]
     Unlabelled,
@@ -177,7 +172,7 @@ impl Recogniser {
             .map(|group| Ok(self.answer(self.pattern(group)?.view())))
             .collect::<Result<Vec<Answer>, ModelError>>()?;
         let answer = match answers.len() {
-            0 => return Ok(Answer::nobody(&self.activities)),
+            0 => return Ok(Answer::without_person(&self.activities)),
             1 => answers.swap_remove(0),
             _ => Answer::joint(&answers),
         };

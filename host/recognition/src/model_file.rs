@@ -180,7 +180,7 @@ impl Recogniser {
         }
         let body = &bytes[HEADER..];
         if body.len() as u64 != u64::from_le_bytes(header[16..24].try_into().unwrap_or_default()) {
-            return Err(ModelError::NotAModel("its length is not what its header says (cut short?)"));
+            return Err(ModelError::NotAModel("its length differs from its header (cut short?)"));
         }
         if checksum(body) != word(24) {
             return Err(ModelError::Checksum { found: checksum(body), expected: word(24) });
@@ -300,7 +300,7 @@ impl Recogniser {
         let labelled = self.labels.len() == self.patterns.nrows()
             && self.labels.iter().all(|label| *label < self.activities.len());
         fits(self.labels.is_empty() || labelled, "the training patterns' activities")?;
-        fits(self.limits.distances.len() == self.activities.len(), "the limits of what is known")?;
+        fits(self.limits.distances.len() == self.activities.len(), "the limits for unknown activities")?;
         fits(self.classifier.fits(width, self.activities.len()), "the classifier")?;
         let measured =
             self.lengths.len() == self.activities.len() && self.lengths.iter().all(Lengths::is_sound);

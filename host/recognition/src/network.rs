@@ -167,7 +167,7 @@ mod tests {
     }
 
     #[test]
-    fn members_stand_side_by_side_and_decide_by_their_mean() {
+    fn members_are_concatenated_and_averaged() {
         let (clips, labels) = clips();
         let trained = |members: usize, seed: u64| {
             let settings = NetworkSettings {
@@ -198,7 +198,7 @@ mod tests {
     }
 
     #[test]
-    fn nobody_and_a_member_of_another_width_do_not_fit() {
+    fn an_empty_ensemble_and_a_member_of_another_width_are_rejected() {
         let (clips, labels) = clips();
         let settings = NetworkSettings { widths: [5, 6, 7], passes: 1, members: 2, ..Default::default() };
         let (whole, _) = train(&clips, &|clip| clip.points.clone(), &labels, 3, &settings, &Unwatched)

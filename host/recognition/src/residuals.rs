@@ -41,7 +41,7 @@ mod tests {
     }
 
     #[test]
-    fn sides_are_told_that_assignments_do_not_tell() {
+    fn residuals_distinguish_sides_that_assignments_do_not() {
         let (left, right) = (array![[-1.0_f32, 0.0], [10.0, 1.0]], array![[1.0_f32, 0.0], [10.0, 1.0]]);
         let (a, b) = (of(left.view(), 1.0), of(right.view(), 1.0));
         let half = 0.5_f32.sqrt();

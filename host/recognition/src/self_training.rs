@@ -69,7 +69,7 @@ mod tests {
     use rand::{Rng, SeedableRng};
 
     #[test]
-    fn what_lies_a_little_elsewhere_is_followed() {
+    fn a_small_shift_of_the_clips_is_followed() {
         let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(2);
         // Two clouds; in the target both are 1.1 further right, so the old border splits the left one.
         let mut cloud = |moved: f32| {

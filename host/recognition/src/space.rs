@@ -49,26 +49,20 @@ pub enum PatternKind {
 /// uses Isomap. Report accuracies for settings chosen on other subjects
 /// ([`super::experiment::Experiment::searched`]), not for these defaults.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[allow(missing_docs, reason = "names and types describe these fields")]
 pub struct SpaceSettings {
-    /// Layout of the gallery.
     pub layout: Layout,
-    /// Dimensions of the embedding.
     pub dimensions: usize,
     /// Largest number of gallery silhouettes.
     pub gallery: usize,
-    /// Coefficient of the RBF map.
     pub gamma: f32,
-    /// Ridge of the RBF map.
     pub ridge: f64,
-    /// Type of a clip's pattern.
     pub pattern: PatternKind,
     /// Centres of residuals in codebook patterns; 0 for none, no effect on the thesis' grid.
     pub residuals: usize,
     /// Whether the order of frames counts.
     pub mode: Mode,
-    /// Weights of a frame vector's parts.
     pub weights: Weights,
-    /// Seed of the clustering.
     pub seed: u64,
 }
 
@@ -103,21 +97,18 @@ impl SpaceSettings {
 
 /// Embedding of new silhouettes.
 #[derive(Clone, Debug, PartialEq)]
+#[allow(missing_docs, reason = "names and types describe these fields")]
 pub enum Map {
-    /// Radial basis functions on the gallery.
     Rbf(Rbf),
-    /// Projection on principal components.
     Pca(Pca),
 }
 
 /// Patterns of embedded clips.
 #[derive(Clone, Debug, PartialEq)]
+#[allow(missing_docs, reason = "names and types describe these fields")]
 pub enum Pattern {
-    /// Grid of the thesis.
     Thesis(OccupancyGrid),
-    /// Codebook of frame vectors.
     Codebook(Codebook),
-    /// Network over frame vectors.
     Network(Box<Network>),
     /// Network features for another classifier.
     Features(Box<Features>),
@@ -125,14 +116,12 @@ pub enum Pattern {
 
 /// The learned space of frames and patterns.
 #[derive(Clone, Debug, PartialEq)]
+#[allow(missing_docs, reason = "names and types describe these fields")]
 pub struct Space {
-    /// Its training options.
     pub settings: SpaceSettings,
-    /// Embedding of silhouettes.
     pub map: Map,
     /// Gallery spread along the first dimension, the divisor of points.
     pub spread: f32,
-    /// Patterns of clips.
     pub pattern: Pattern,
     /// Neighbours of the connected Isomap graph, 0 for PCA.
     pub neighbours: usize,

@@ -1,4 +1,4 @@
-//! The table of routes, and the OpenAPI document that follows from it: a route that is not described cannot be added.
+//! The route table and the OpenAPI document generated from it: every route has a description.
 
 use std::{collections::HashMap, sync::Arc};
 
@@ -14,12 +14,10 @@ use serde_json::{Map, Value, json};
 
 use crate::{app::App, failure::Failure};
 
-/// Where a request's answer lies in the document.
 const SCHEMAS: &str = "/components/schemas";
-/// The header that carries a client's secret.
 pub const CLIENT_HEADER: &str = "x-farnear-client";
 
-/// Routes, and what the document says of them.
+/// Routes and their OpenAPI paths.
 pub struct Api {
     router: Router<Arc<App>>,
     paths: Map<String, Value>,
@@ -29,15 +27,12 @@ pub struct Api {
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum For {
-    /// Every client that the guard admits.
     All,
-    /// The client that has control.
     Control,
-    /// Any connected client.
     Client,
 }
 
-/// Who may use each route: checked before the body is read.
+/// Who may use each route; checked before the body is read.
 pub type Access = HashMap<(String, Method), For>;
 
 impl Default for Api {
@@ -56,7 +51,6 @@ impl Default for Api {
 }
 
 impl Api {
-    /// A route that reads, and answers in JSON.
     pub fn get<R: JsonSchema, H: Handler<T, Arc<App>>, T: 'static>(
         mut self,
         path: &str,
@@ -67,7 +61,6 @@ impl Api {
         self.add(path, "get", get(handler), json!({ "summary": about, "responses": responses }))
     }
 
-    /// A route that reads, and answers with something else: a file, a page, a socket.
     pub fn get_bytes<H: Handler<T, Arc<App>>, T: 'static>(
         self,
         path: &str,
@@ -79,7 +72,6 @@ impl Api {
         self.add(path, "get", get(handler), json!({ "summary": about, "responses": responses }))
     }
 
-    /// A route that does something.
     pub fn post<B: JsonSchema, R: JsonSchema, H: Handler<T, Arc<App>>, T: 'static>(
         self,
         path: &str,
@@ -90,7 +82,6 @@ impl Api {
         self.changing::<B, R>(path, "post", who, about, post(handler))
     }
 
-    /// A route that replaces something.
     pub fn put<B: JsonSchema, R: JsonSchema, H: Handler<T, Arc<App>>, T: 'static>(
         self,
         path: &str,
@@ -101,7 +92,6 @@ impl Api {
         self.changing::<B, R>(path, "put", who, about, put(handler))
     }
 
-    /// A route that receives a file, limited by the upload quota.
     pub fn put_bytes<R: JsonSchema, H: Handler<T, Arc<App>>, T: 'static>(
         mut self,
         path: &str,
@@ -119,7 +109,6 @@ impl Api {
         self.add(path, "put", put(handler).layer(DefaultBodyLimit::disable()), operation)
     }
 
-    /// A route that deletes something.
     pub fn delete<B: JsonSchema, R: JsonSchema, H: Handler<T, Arc<App>>, T: 'static>(
         self,
         path: &str,
@@ -161,7 +150,7 @@ impl Api {
         self.add(path, method, route, operation)
     }
 
-    /// A query parameter of the route that was added last under `path`.
+    /// Adds a query parameter to the GET route of `path`.
     pub fn query(mut self, path: &str, name: &str, about: &str) -> Self {
         let parameter =
             json!({ "name": name, "in": "query", "description": about, "schema": { "type": "string" } });
@@ -196,7 +185,6 @@ impl Api {
         self
     }
 
-    /// The routes, and the document.
     pub fn finish(mut self) -> (Router<Arc<App>>, Value, Access) {
         let _ = self.generator.subschema_for::<Failure>();
         let schemas = self.generator.take_definitions(true);
@@ -216,7 +204,6 @@ impl Api {
     }
 }
 
-/// The header that identifies the client.
 fn client(about: &str) -> Value {
     json!({
         "name": CLIENT_HEADER,
@@ -227,7 +214,6 @@ fn client(about: &str) -> Value {
     })
 }
 
-/// What a route answers, and how it fails.
 fn responses(answer: Value) -> Value {
     let failed = json!({ "application/json": { "schema": { "$ref": "#/components/schemas/Failure" } } });
     json!({

@@ -1,4 +1,4 @@
-//! What all requests share: settings, rig, jobs, control, log, and the state that every browser receives.
+//! State shared by all requests.
 
 use std::{
     collections::VecDeque,
@@ -38,24 +38,17 @@ use crate::{
     view::{ControlState, LiveMode, LiveState, LogLine, Phase, RigState, State},
 };
 
-/// Lines of the log that are kept.
 const LOG_MAX: usize = 1000;
 /// The 50 mm lens of Li 2014, for a session that has no optics yet.
 const USUAL_OPTICS: &str = include_str!("optics.toml");
 
-/// What all requests share.
 pub struct App {
-    /// Who may talk to this program.
     pub guard: Guard,
-    /// Time-outs and limits.
     pub limits: Limits,
     /// Delays guesses of the token.
     pub throttle: Throttle,
-    /// The folder of captures.
     pub session: PathBuf,
-    /// The rig's address, where there is one.
     pub address: Option<RigAddress>,
-    /// The connection, while there is one.
     rig: Mutex<Option<OpenRig>>,
     camera: Mutex<CameraSettings>,
     pub rig_jobs: JobQueue,
@@ -67,41 +60,32 @@ pub struct App {
     pub pictures: watch::Sender<Bytes>,
     live: Mutex<Live>,
     log: Mutex<VecDeque<LogLine>>,
-    /// The recording of live depth that is under way.
+    /// The running recording of live depth.
     pub recorder: Mutex<Option<Recorder>>,
-    /// The answer to a question, until the job has taken it.
+    /// The answer to a prompt, until the job takes it.
     pub answer: Mutex<Option<String>>,
     ending: watch::Sender<bool>,
-    /// Whether the rig is to be connected to.
     reconnect: AtomicBool,
-    /// Why the rig was stopped, if not by a person.
+    /// Why the rig was stopped, if not by a user.
     stop_reason: Mutex<Option<String>>,
-    /// Stops on their way to the board.
     pub stops: Arc<Stops>,
 }
 
-/// Live settings.
 #[derive(Clone, Debug)]
 pub struct Live {
     pub mode: LiveMode,
-    /// Length of an exposure.
     pub exposure: Micros,
-    /// What the focus is measured by.
     pub measure: FocusMeasure,
-    /// Ends the present live view.
     pub cancel: Cancel,
 }
 
-/// The value, also where a thread that held it has panicked: each change leaves it whole.
+/// Ignores poisoning: every change leaves the value consistent.
 pub fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 impl App {
-    /// With nothing under way. Makes the session's folder and its optics where they are missing.
-    ///
-    /// # Errors
-    /// [`WorkflowError::Folder`], [`WorkflowError::Staging`], and invalid optics.
+    /// Creates the session's folder and its optics if they are missing.
     pub fn new(settings: ServeSettings, guard: Guard) -> Result<Arc<Self>, WorkflowError> {
         let ServeSettings { rig, camera, session, optics, limits, .. } = settings;
         fs::create_dir_all(&session)
@@ -146,54 +130,48 @@ impl App {
         }))
     }
 
-    /// The optics file of the session.
     pub fn optics_file(&self) -> PathBuf {
         self.session.join("optics.toml")
     }
 
-    /// The camera, with the exposure that is set.
     pub fn camera(&self) -> CameraSettings {
         let exposure = self.live().exposure;
         CameraSettings { exposure, ..lock(&self.camera).clone() }
     }
 
-    /// Changes camera settings; the live view restarts with them.
+    /// Changes camera settings and restarts the live view.
     pub fn set_camera(&self, settings: Vec<Setting>) {
         lock(&self.camera).settings = settings;
         self.interrupt_live();
     }
 
-    /// Whether a camera is connected without a rig.
     pub fn has_camera_alone(&self) -> bool {
         self.address.is_none() && lock(&self.camera).address != CameraAddress::Emulated
     }
 
-    /// The rig, where it is connected.
     pub fn rig(&self) -> Option<OpenRig> {
         lock(&self.rig).clone()
     }
 
-    /// The rig is connected, or is not any more.
     pub fn set_rig(&self, rig: Option<OpenRig>) {
         *lock(&self.rig) = rig;
     }
 
-    /// Asks for the rig to be connected to (again).
+    /// Requests a (new) connection to the rig.
     pub fn ask_to_connect(&self) {
         self.reconnect.store(true, Ordering::Relaxed);
     }
 
-    /// Whether that was asked since the last look.
+    /// Returns whether a connection was requested since the last call.
     pub fn asked_to_connect(&self) -> bool {
         self.reconnect.swap(false, Ordering::Relaxed)
     }
 
-    /// Live settings.
     pub fn live(&self) -> Live {
         lock(&self.live).clone()
     }
 
-    /// Changes the live settings; the present live view ends.
+    /// Changes the live settings and ends the present live view.
     pub fn set_live(&self, change: impl FnOnce(&mut Live)) {
         let mut live = lock(&self.live);
         change(&mut live);
@@ -214,7 +192,7 @@ impl App {
         live.cancel = Cancel::default();
     }
 
-    /// Changes the state and tells it to every browser.
+    /// Changes the state and publishes it to every browser.
     pub fn change(&self, change: impl FnOnce(&mut State)) {
         let mut state = lock(&self.state);
         let before = state.clone();
@@ -225,18 +203,17 @@ impl App {
     }
 
     fn tell(&self, state: &State) {
-        // A state of plain values always has a JSON form.
+        // Plain values always have a JSON form.
         if let Ok(text) = serde_json::to_string(state) {
             self.told.send_replace(text.into());
         }
     }
 
-    /// The present state.
     pub fn state(&self) -> State {
         lock(&self.state).clone()
     }
 
-    /// Follows the state, as JSON. The first value is there at once.
+    /// The state as JSON; the first value is available immediately.
     pub fn follow(&self) -> watch::Receiver<Arc<str>> {
         let state = lock(&self.state);
         if self.told.borrow().is_empty() {
@@ -247,17 +224,16 @@ impl App {
         receiver
     }
 
-    /// Works with the control lock, and publishes the result.
+    /// Changes the control lock and publishes the result.
     pub fn with_control<T>(&self, work: impl FnOnce(&mut ControlLock) -> T) -> T {
         let mut control = lock(&self.control);
         let given = work(&mut control);
         let (holder, requested_by, clients) = (control.holder(), control.requested_by(), control.clients());
-        // While the lock is held: the last change is the last that is published.
+        // Published while the lock is held, so that the last change is published last.
         self.change(|state| state.control = ControlState { holder, requested_by, clients });
         given
     }
 
-    /// A line for the log.
     pub fn note(&self, line: impl Into<String>) {
         let mut log = lock(&self.log);
         if log.len() == LOG_MAX {
@@ -268,12 +244,10 @@ impl App {
         self.change(|state| state.log += 1);
     }
 
-    /// The log, the oldest line first.
     pub fn log(&self) -> Vec<LogLine> {
         lock(&self.log).iter().cloned().collect()
     }
 
-    /// Ends the recording that is under way, if one is.
     pub fn finish_recording(&self) {
         let Some(recorder) = lock(&self.recorder).take() else { return };
         let name = self.state().live.recording.unwrap_or_default();
@@ -299,16 +273,15 @@ impl App {
         self.begin_stop()
     }
 
-    /// The reason of the last stop, once.
     pub fn take_stop_reason(&self) -> Option<String> {
         lock(&self.stop_reason).take()
     }
 
-    /// Ends jobs and live depth; what this gives tells the board, which may take a while, and nothing begins meanwhile.
+    /// Ends jobs and live depth. Nothing begins until the returned [`Stop`] has reached the board.
     pub fn begin_stop(&self) -> Stop {
         let stop = self.stops.begin(self.rig());
         self.rig_jobs.cancel();
-        // Depth moves the piezo; an image does not.
+        // Live depth moves the piezo; the live image does not.
         self.set_live(|live| {
             if live.mode == LiveMode::Depth {
                 live.mode = LiveMode::Off;
@@ -317,15 +290,12 @@ impl App {
         stop
     }
 
-    /// Ends jobs and live depth, and stops the rig; does not wait for any of them.
-    ///
-    /// # Errors
-    /// [`WorkflowError::Client`] where the board does not answer: the jobs end nevertheless.
+    /// Ends jobs and live depth and stops the rig, without waiting. The jobs end even if the board does not answer.
     pub fn stop(&self) -> Result<(), WorkflowError> {
         self.begin_stop().tell()
     }
 
-    /// At the end of the program: nothing moves, nothing is computed.
+    /// Stops the rig and all computations when the program ends.
     pub fn stop_everything(&self) {
         self.end();
         self.computing.cancel();
@@ -333,26 +303,20 @@ impl App {
         let _ = self.stop(); // the board has its deadline
     }
 
-    /// Everything that waits for the end may go.
     pub fn end(&self) {
         self.ending.send_replace(true);
     }
 
-    /// Whether the program ends.
     pub fn is_ending(&self) -> bool {
         *self.ending.borrow()
     }
 
-    /// Waits until the program ends.
     pub async fn ended(&self) {
         let mut ending = self.ending.subscribe();
         let _ = ending.wait_for(|ending| *ending).await; // a dropped sender has ended, too
     }
 
-    /// Begins a job on the rig.
-    ///
-    /// # Errors
-    /// The running work, in words.
+    /// Begins a job on the rig; the error is the title of the running job.
     pub fn begin_on_rig(&self, task: Task) -> Result<u64, String> {
         let _ = self.take_stop_reason(); // of an earlier stop
         let begun = self.rig_jobs.begin(task, |job| self.change(|state| state.job = Some(job)));
@@ -362,10 +326,7 @@ impl App {
         begun
     }
 
-    /// Begins a computation.
-    ///
-    /// # Errors
-    /// The running work, in words.
+    /// Begins a computation; the error is the title of the running one.
     pub fn begin_computing(&self, task: Task) -> Result<u64, String> {
         self.computing.begin(task, |job| self.change(|state| state.computation = Some(job)))
     }

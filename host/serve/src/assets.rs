@@ -1,4 +1,4 @@
-//! The page: plain files, embedded, served as they are.
+//! The page: plain files, embedded and served unchanged.
 
 use axum::{
     extract::Path,
@@ -8,7 +8,6 @@ use axum::{
 
 use crate::failure::Failure;
 
-/// A file of the page.
 struct Asset {
     path: &'static str,
     media: &'static str,
@@ -27,7 +26,6 @@ macro_rules! assets {
     };
 }
 
-/// All of them: a new file is a line here.
 #[rustfmt::skip]
 const ASSETS: &[Asset] = assets![
     HTML "index.html", HTML "login.html",
@@ -45,19 +43,17 @@ pub async fn page() -> Response {
     of("index.html", StatusCode::OK)
 }
 
-/// Where a token is typed.
 pub fn login_page() -> Response {
     of("login.html", StatusCode::UNAUTHORIZED)
 }
 
-/// A file of the page.
 pub async fn asset(Path(path): Path<String>) -> Response {
     of(&path, StatusCode::OK)
 }
 
 fn of(path: &str, status: StatusCode) -> Response {
     match ASSETS.iter().find(|asset| asset.path == path) {
-        // Not kept: another version of this program may serve the next page at this address.
+        // Not cached: another version may serve the next page at this address.
         Some(asset) => {
             let headers = [(header::CONTENT_TYPE, asset.media), (header::CACHE_CONTROL, "no-cache")];
             (status, headers, asset.bytes).into_response()
@@ -72,14 +68,15 @@ mod tests {
 
     use super::*;
 
-    /// The size of everything that a browser loads suits a slow connection.
+    /// All files of the page load fast over a slow connection.
     #[test]
     fn the_page_is_small() {
         let bytes: usize = ASSETS.iter().map(|asset| asset.bytes.len()).sum();
         assert!(bytes <= 1_500_000, "{bytes} bytes");
     }
 
-    /// No picture in the documents is older than the page: `npm run pictures` in `tests-browser` takes them again, and writes these sums.
+    /// Pictures in the documents are as new as the page. `npm run pictures` in `tests-browser` takes them and writes
+    /// these sums.
     #[test]
     fn the_pictures_of_the_documents_are_of_this_page() {
         let file = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/images/page.sha256");
@@ -91,9 +88,9 @@ mod tests {
         }
     }
 
-    /// Everything needed at the start is requested at the start; the 3-D surface loads on demand.
+    /// The HTML preloads all modules needed at the start; the 3-D surface loads on demand.
     #[test]
-    fn every_module_that_is_needed_at_once_is_announced() {
+    fn modules_needed_at_the_start_are_preloaded() {
         let page = ASSETS.iter().find(|asset| asset.path == "index.html").map(|asset| asset.bytes).unwrap();
         let page = std::str::from_utf8(page).unwrap();
         for asset in ASSETS.iter().filter(|asset| asset.media == JS) {

@@ -1,7 +1,6 @@
-//! Connections: time-outs and limits, so that clients that are slow, silent or too many do not use up descriptors or memory.
+//! Time-outs and limits against slow, silent or too many clients.
 //!
-//! Above a limit the oldest connection without a request is closed, then the oldest idle one: a client that sends requests is
-//! served even if another program at the same address opens connections without end.
+//! Above a limit the oldest connection without a request is closed, then the oldest idle one.
 
 use std::{
     collections::VecDeque,
@@ -28,14 +27,11 @@ use tokio::{
 
 use crate::app::{App, lock};
 
-/// Descriptors left for captures, the camera and the rig.
+/// Descriptors reserved for captures, the camera and the rig.
 const RESERVED_DESCRIPTORS: usize = 128;
-/// Pause after a failed accept.
 const RETRY: Duration = Duration::from_millis(100);
-/// Shortest interval between log lines about closed connections.
 const LOG_INTERVAL: Duration = Duration::from_secs(10);
 
-/// Time-outs and limits of `farnear serve`.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Limits {
     /// Longest time from the first byte of a request, or from the connection, to the end of its headers.
@@ -65,42 +61,37 @@ impl Default for Limits {
     }
 }
 
-/// Phase of a connection. [`WAITING`]: no request yet; [`IDLE`]: between requests; [`SERVING`]: a request is being answered;
-/// [`UPGRADED`]: a WebSocket, which has its own time-outs.
+/// [`WAITING`]: no request yet; [`SERVING`]: a request is being answered; [`IDLE`]: between requests; [`UPGRADED`]: a
+/// WebSocket, which has its own time-outs.
 const WAITING: u8 = 0;
 const IDLE: u8 = 1;
 const SERVING: u8 = 2;
 const UPGRADED: u8 = 3;
 
-/// A connection, shared by its stream and the requests on it.
 #[derive(Debug)]
 pub struct Connection {
     address: IpAddr,
     phase: AtomicU8,
-    /// Number of requests so far.
     requests: AtomicUsize,
     evicted: AtomicBool,
     waker: Mutex<Option<Waker>>,
 }
 
 impl Connection {
-    /// The client's address.
     pub fn address(&self) -> IpAddr {
         self.address
     }
 
-    /// The headers of a request are complete and admitted.
     pub fn begin_request(&self) {
         self.requests.fetch_add(1, Ordering::Relaxed);
         self.phase.store(SERVING, Ordering::Relaxed);
     }
 
-    /// The answer is ready to be sent: bytes read from now on are the next request.
+    /// The answer is ready: bytes read from now on belong to the next request.
     pub fn end_request(&self) {
         self.phase.store(IDLE, Ordering::Relaxed);
     }
 
-    /// The connection is a WebSocket from now on.
     pub fn upgrade(&self) {
         self.phase.store(UPGRADED, Ordering::Relaxed);
     }
@@ -117,7 +108,6 @@ impl Connection {
     }
 }
 
-/// What requests know about their connection.
 #[derive(Clone, Debug)]
 pub struct Peer(pub Arc<Connection>);
 
@@ -127,7 +117,6 @@ impl Connected<IncomingStream<'_, LimitedListener>> for Peer {
     }
 }
 
-/// Accepts connections within [`Limits`].
 pub struct LimitedListener {
     listener: TcpListener,
     app: Arc<App>,
@@ -138,7 +127,6 @@ pub struct LimitedListener {
 }
 
 impl LimitedListener {
-    /// Wraps a bound listener.
     pub fn new(listener: TcpListener, app: Arc<App>) -> Self {
         let mut limits = app.limits;
         if let Some(descriptors) = open_files() {
@@ -232,22 +220,21 @@ impl Listener for LimitedListener {
     }
 }
 
-/// A stream that ends at its deadline.
+/// Ends at its deadline.
 pub struct LimitedStream {
     stream: TcpStream,
     connection: Arc<Connection>,
     open: Arc<Mutex<VecDeque<Arc<Connection>>>>,
     limits: Limits,
-    /// Set from the first byte of a request to the end of its headers.
+    /// From the first byte of a request to the end of its headers.
     request_began: Option<Instant>,
-    /// Requests of the connection whose headers have been read.
     requests: usize,
     active: Instant,
     timer: Pin<Box<Sleep>>,
 }
 
 impl LimitedStream {
-    /// Ready with an error at `deadline`, or when the connection is evicted.
+    /// Returns an error at `deadline`, or when the connection is evicted.
     fn poll_deadline(&mut self, cx: &mut Context<'_>, deadline: Option<Instant>) -> Poll<io::Error> {
         *lock(&self.connection.waker) = Some(cx.waker().clone());
         if self.connection.evicted.load(Ordering::Relaxed) {
@@ -297,7 +284,7 @@ impl AsyncRead for LimitedStream {
             (_, Some(began)) => Some(began + self.limits.header_timeout),
             (_, None) => Some(self.active + self.limits.idle_timeout),
         };
-        // Also while bytes arrive: headers that arrive byte by byte have the same deadline.
+        // Checked while bytes arrive, too: slow headers have the same deadline.
         match self.poll_deadline(cx, deadline) {
             Poll::Ready(error) => Poll::Ready(Err(error)),
             Poll::Pending => read,

@@ -1,32 +1,26 @@
-//! Control of the rig: one browser has it, others watch and can request it.
-//!
-//! A client is one socket. Control is reserved for [`RESERVED`] after the socket of its holder has closed, so that a page that is
-//! reloaded keeps it. The secret of a client accompanies every request that changes something.
+//! Control of the rig: one browser has it, others watch and can request it. A client is one socket.
 
 use std::{fmt::Write as _, time::Duration};
 
 use subtle::ConstantTimeEq;
 
-/// How long control is reserved for a holder that has disconnected: a reload takes about a second.
+/// How long control is reserved for a disconnected holder: a reload takes about a second.
 pub const RESERVED: Duration = Duration::from_secs(3);
 
-/// The connected clients, and which of them has control.
 #[derive(Debug, Default)]
 pub struct ControlLock {
     clients: Vec<Client>,
     last: u32,
     holder: Option<u32>,
-    /// The holder, while it is disconnected and control is reserved for it.
+    /// The disconnected holder while control is reserved for it.
     disconnected: Option<Client>,
-    /// Clients that request control, the first one first.
+    /// Clients that request control, oldest first.
     requests: Vec<u32>,
 }
 
-/// A connected browser.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Client {
     pub id: u32,
-    /// Authenticates its requests.
     pub secret: String,
 }
 
@@ -36,20 +30,18 @@ impl Client {
     }
 }
 
-/// Why control was not handed over.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
 pub enum HandOverError {
-    /// The caller does not hold control.
     #[error("another browser has control of the rig")]
     NotHolder,
-    /// The client named has withdrawn its request, or has disconnected.
+    /// The client has withdrawn its request or has disconnected.
     #[error("browser {0} does not request control")]
     NotRequested(u32),
 }
 
 impl ControlLock {
-    /// Adds a client; it gets control if no client has it. `resumed` is the secret of the same page before it was reloaded: its
-    /// control passes to the new client.
+    /// Adds a client. `resumed` is the secret of the page before it was reloaded. The client gets control if that page
+    /// had it or no client has it.
     pub fn join(&mut self, resumed: Option<&str>) -> Result<Client, getrandom::Error> {
         let mut bytes = [0; 16];
         getrandom::fill(&mut bytes)?;
@@ -85,8 +77,8 @@ impl ControlLock {
         held
     }
 
-    /// Ends the reservation for this client; `true` if it was still reserved. Control passes to the first client that requested
-    /// it, or to the only client left.
+    /// Ends the reservation; `true` if control was still reserved. Control passes to the oldest request, or to the only
+    /// client.
     pub fn expire(&mut self, id: u32) -> bool {
         if self.disconnected.as_ref().is_none_or(|client| client.id != id) {
             return false;
@@ -102,17 +94,15 @@ impl ControlLock {
         self.requests.retain(|other| Some(*other) != id);
     }
 
-    /// The number of the connected client with this secret.
     pub fn id_of(&self, secret: &str) -> Option<u32> {
         self.clients.iter().find(|client| client.has(secret)).map(|client| client.id)
     }
 
-    /// Whether the connected client with this secret has control.
     pub fn has_control(&self, secret: &str) -> bool {
         self.holder.is_some() && self.id_of(secret) == self.holder
     }
 
-    /// Requests control; granted immediately if no client has it. `false` if no client has this secret.
+    /// Requests control; granted immediately if no client has it. `false` for an unknown secret.
     pub fn request(&mut self, secret: &str) -> bool {
         let Some(id) = self.id_of(secret) else { return false };
         if self.holder.is_none() {
@@ -123,7 +113,6 @@ impl ControlLock {
         true
     }
 
-    /// The holder grants or refuses the request of client `to`.
     pub fn answer(&mut self, secret: &str, to: u32, give: bool) -> Result<(), HandOverError> {
         if !self.has_control(secret) {
             return Err(HandOverError::NotHolder);
@@ -138,17 +127,14 @@ impl ControlLock {
         Ok(())
     }
 
-    /// The client that has control.
     pub fn holder(&self) -> Option<u32> {
         self.holder
     }
 
-    /// The client whose request is to be answered next.
     pub fn requested_by(&self) -> Option<u32> {
         self.requests.first().copied()
     }
 
-    /// Number of connected clients.
     pub fn clients(&self) -> usize {
         self.clients.len()
     }
@@ -206,7 +192,7 @@ mod tests {
         assert!(lock.has_control(&again.secret));
         assert!(!lock.expire(holder.id), "the reservation was used");
         assert!(lock.has_control(&again.secret));
-        // A secret that is not the holder's resumes nothing, nor does one that has been used.
+        // Another client's secret or a used one resumes nothing.
         for secret in [&watcher.secret, &holder.secret, &String::new()] {
             let other = lock.join(Some(secret)).unwrap();
             assert!(!lock.has_control(&other.secret));

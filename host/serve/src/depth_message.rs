@@ -1,4 +1,4 @@
-//! Depth as the page sees it before it is in any file: live, played, and of a pair that was just taken.
+//! Depth for the page before it is in a file: live, played, and of a new pair.
 
 use std::time::{Instant, SystemTime, UNIX_EPOCH};
 
@@ -16,25 +16,25 @@ use crate::{
     picture_message::{depth_codes, message},
 };
 
-/// How it is computed: on all cores, so that the map is there soon.
+/// On all cores, for low latency.
 pub fn computation() -> Settings {
     Settings { threads: 0, ..Settings::default() }
 }
 
-/// Milliseconds since 1970 by this computer's clock, which a browser on it has, too.
+/// Milliseconds since 1970 by this computer's clock.
 pub fn unix_ms() -> f64 {
     let since = SystemTime::now().duration_since(UNIX_EPOCH);
     since.map_or(0.0, |since| since.as_secs_f64() * 1e3)
 }
 
-/// Depths between which the page's colours lie: a little beyond the range on both sides, so that what lies just outside is still told apart.
+/// Ends of the page's colour scale, mm: 25 % beyond the working range, so that depths just outside remain
+/// distinguishable.
 pub fn ends(optics: &Optics) -> [f32; 2] {
     let range = optics.working_range();
     let margin = 0.25 * (range.far_mm - range.near_mm);
     [(range.near_mm - margin) as f32, (range.far_mm + margin) as f32]
 }
 
-/// A pair of the live view or of a recording, with its depth.
 pub fn live(depth: &LiveDepth<'_>, ends: [f32; 2], rate_hz: f64) -> Bytes {
     let header = json!({
         "type": "depth",
@@ -46,8 +46,8 @@ pub fn live(depth: &LiveDepth<'_>, ends: [f32; 2], rate_hz: f64) -> Bytes {
     picture(header, depth.map, depth.far, ends)
 }
 
-/// Shows depth of a pair that was just taken, before anything of it is written: that takes longer than computing. What is shown is looked
-/// at; what is kept and measured in is computed from the files, with its standard deviation. Depth that cannot be computed is said with those.
+/// Shows a new pair's depth before its files are written, because writing takes longer than computing. The depth to
+/// keep is computed from the files, with its standard deviation; errors are reported there.
 pub fn show_fresh(app: &App, capture: &str, far: &Image, near: &Image) {
     let (arrived, arrived_ms) = (Instant::now(), unix_ms());
     let shown = || -> Result<Bytes> {
@@ -66,7 +66,7 @@ pub fn show_fresh(app: &App, capture: &str, far: &Image, near: &Image) {
     }
 }
 
-/// Depth, confidence and the far image, with what the page shows next to them.
+/// Depth, confidence and the far image.
 fn picture(mut header: Value, map: &DepthMap, far: &Image, ends: [f32; 2]) -> Bytes {
     let (height, width) = map.depth_mm.dim();
     header["width"] = width.into();

@@ -1,4 +1,4 @@
-//! The page as the face of a workflow: messages go into the state, prompts wait there for an answer.
+//! The page as the face of a workflow: messages go into the state, prompts wait for an answer.
 
 use std::{
     sync::Mutex,
@@ -13,17 +13,14 @@ use crate::{
     view::JobProgress,
 };
 
-/// From one look for an answer to the next.
+/// Poll interval for an answer.
 const LOOK: Duration = Duration::from_millis(50);
-/// Warnings that are kept of one job.
 const WARNINGS: usize = 20;
-/// From one count that is told to the next, except the last: the whole state is told with it, and nobody reads faster.
+/// Shortest interval between counts, except the last: each publishes the whole state.
 const COUNT: Duration = Duration::from_millis(100);
 
-/// The face of one queue's job.
 pub struct Face<'a> {
     pub app: &'a App,
-    /// Position of the job in the state.
     pub place: Place,
     /// Time of the last reported count.
     pub counted: Mutex<Option<Instant>>,

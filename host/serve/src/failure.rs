@@ -25,7 +25,6 @@ pub struct Failure {
 }
 
 impl Failure {
-    /// With a status and no hint.
     pub fn new(status: StatusCode, error: impl Into<String>) -> Self {
         Self { error: error.into(), hint: None, status }
     }
@@ -34,12 +33,10 @@ impl Failure {
         Self { hint: Some(hint.into()), ..self }
     }
 
-    /// The resource does not exist.
     pub fn missing(what: &str) -> Self {
         Self::new(StatusCode::NOT_FOUND, format!("there is no {what}"))
     }
 
-    /// Something else is under way.
     pub fn busy(with: &str) -> Self {
         Self::new(StatusCode::CONFLICT, format!("busy: {with}")).with_hint("Wait for its end, or press Stop.")
     }
@@ -66,7 +63,7 @@ impl From<WorkflowError> for Failure {
     }
 }
 
-/// What to do on the page about an error of a workflow.
+/// Remedies on the page for errors of workflows.
 pub fn hint(error: &WorkflowError) -> Option<&'static str> {
     match error {
         WorkflowError::About { source, .. } => hint(source),

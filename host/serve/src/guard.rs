@@ -1,7 +1,7 @@
-//! Who may talk to this program: by default this computer's own browser, else a holder of the token.
+//! Access: by default the browser of this computer, otherwise holders of a token.
 //!
-//! A page from elsewhere that a browser shows can send requests to loopback too; so the names in `Host` and `Origin` are looked
-//! at. A name from the public DNS could be made to lead here, and is refused unless it was allowed.
+//! A foreign page can send requests to loopback, so `Host` and `Origin` are checked. A public DNS name could resolve to
+//! this computer; it is refused unless allowed.
 
 use std::{
     collections::HashSet,
@@ -20,26 +20,22 @@ use crate::app::lock;
 /// Shortest token: 16 characters of hexadecimal are 64 bits.
 const SHORTEST: usize = 16;
 const LONGEST: usize = 256;
-/// Delay after a wrong token.
 const GUESS: Duration = Duration::from_secs(1);
-/// The cookie that carries the token.
 const COOKIE: &str = "farnear-token";
 
 #[derive(Debug)]
 pub enum Listen {
-    /// This computer only; port 0 = any that is free.
+    /// Port 0 selects a free one.
     Loopback { port: u16 },
     Network {
         address: SocketAddr,
-        /// What everybody has to know.
         token: Token,
-        /// Names under which this computer is known, next to its addresses.
+        /// Names of this computer, in addition to its addresses.
         names: Vec<String>,
     },
 }
 
 impl Listen {
-    /// The address to bind to.
     pub fn address(&self) -> SocketAddr {
         match self {
             Self::Loopback { port } => (Ipv4Addr::LOCALHOST, *port).into(),
@@ -48,7 +44,7 @@ impl Listen {
     }
 }
 
-/// A secret that is compared in constant time and never shown.
+/// A secret, compared in constant time and never shown.
 pub struct Token(String);
 
 impl fmt::Debug for Token {
@@ -57,16 +53,10 @@ impl fmt::Debug for Token {
     }
 }
 
-/// A file that holds no token.
 #[derive(Debug, thiserror::Error)]
 pub enum TokenError {
     #[error("cannot read the token file {}: {source}", path.display())]
-    Read {
-        path: PathBuf,
-        /// What the system says.
-        source: std::io::Error,
-    },
-    /// It holds something else.
+    Read { path: PathBuf, source: std::io::Error },
     #[error(
         "{} holds no token: expected one line of {SHORTEST} to {LONGEST} letters and digits, e.g. from `openssl rand -hex 16`",
         path.display()
@@ -81,45 +71,38 @@ impl Token {
         Self::new(text.trim()).ok_or_else(|| TokenError::Content { path: path.into() })
     }
 
-    /// A token of letters and digits; `None` for any other text, or a short one.
+    /// Accepts letters and digits; `None` for other or short texts.
     pub fn new(text: &str) -> Option<Self> {
         let fits =
             (SHORTEST..=LONGEST).contains(&text.len()) && text.bytes().all(|b| b.is_ascii_alphanumeric());
         fits.then(|| Self(text.into()))
     }
 
-    /// Whether this is the token; takes as long for any wrong one of its length.
+    /// Compares in constant time for a given length.
     pub fn is(&self, text: &str) -> bool {
         self.0.as_bytes().ct_eq(text.as_bytes()).into()
     }
 }
 
-/// Checks of every request.
 #[derive(Debug, Default)]
 pub struct Guard {
     token: Option<Token>,
     names: Vec<String>,
 }
 
-/// Why a request is refused.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
 pub enum Refused {
-    /// It was sent to a name that is not this computer's.
     #[error("this computer is not known by that name; use its address, or allow the name with --name")]
     Host,
-    /// `Host` or `Origin` occurs twice.
     #[error("the header Host or Origin occurs twice; expected one of each")]
     Doubled,
-    /// A page from elsewhere sent it.
     #[error("a page from elsewhere may not talk to the rig")]
     Origin,
-    /// The token is missing or wrong.
     #[error("the token is missing or wrong")]
     Token,
 }
 
 impl Guard {
-    /// As it follows from where is listened.
     pub fn new(listen: &Listen) -> Self {
         match listen {
             Listen::Loopback { .. } => Self::default(),
@@ -129,14 +112,14 @@ impl Guard {
         }
     }
 
-    /// Checks where a request was sent to and where from.
+    /// Checks `Host` and `Origin`.
     pub fn check_names(&self, uri: &Uri, headers: &HeaderMap) -> Result<(), Refused> {
         if [header::HOST, header::ORIGIN].iter().any(|name| headers.get_all(name).iter().count() > 1) {
             return Err(Refused::Doubled);
         }
         let text = |name| headers.get(name).map(|value| value.to_str().unwrap_or("?"));
         let host = text(header::HOST).ok_or(Refused::Host)?;
-        // `GET http://name/path`: the name of the request line must be that of the header.
+        // `GET http://name/path`: the name must be that of the `Host` header.
         let same = uri.authority().is_none_or(|authority| authority.as_str() == host);
         if !self.is_ours(host) || !same {
             return Err(Refused::Host);
@@ -147,7 +130,6 @@ impl Guard {
         }
     }
 
-    /// Checks the token, where there is one: in a cookie or as a bearer's.
     pub fn check_token(&self, headers: &HeaderMap) -> Result<(), Refused> {
         let Some(token) = &self.token else { return Ok(()) };
         let text = |name| headers.get_all(name).iter().filter_map(|value| value.to_str().ok());
@@ -157,14 +139,13 @@ impl Guard {
         if bearer.chain(cookie).any(|given| token.is(given)) { Ok(()) } else { Err(Refused::Token) }
     }
 
-    /// Whether a request carries a token at all, right or wrong.
     pub fn has_token(headers: &HeaderMap) -> bool {
         let cookie = headers.get_all(header::COOKIE).iter().filter_map(|value| value.to_str().ok());
         headers.contains_key(header::AUTHORIZATION)
             || cookie.flat_map(|value| value.split(';')).any(|pair| pair.trim().starts_with(COOKIE))
     }
 
-    /// The cookie for who typed the token; `None` for another text.
+    /// The cookie for a correct token.
     pub fn cookie(&self, typed: &str) -> Option<String> {
         let known = self.token.as_ref().is_some_and(|token| token.is(typed));
         known.then(|| format!("{COOKIE}={typed}; HttpOnly; SameSite=Strict; Path=/"))
@@ -181,7 +162,7 @@ impl Guard {
         if name == "localhost" || address.is_some_and(|address| address.is_loopback()) {
             return true;
         }
-        // Beyond loopback: an address cannot be another host's name, nor can a name without a dot.
+        // Beyond loopback: an address, or a name without a dot, cannot be a foreign host's name.
         let local = !name.contains('.') || name.ends_with(".local");
         self.token.is_some()
             && (address.is_some()
@@ -190,12 +171,12 @@ impl Guard {
     }
 }
 
-/// Delays wrong tokens: one guess a second from each address.
+/// Delays wrong tokens: one guess per second and address.
 #[derive(Debug, Default)]
 pub struct Throttle(Mutex<HashSet<IpAddr>>);
 
 impl Throttle {
-    /// Waits after a wrong token; `false`, without waiting, while an earlier guess of this address waits.
+    /// Waits after a wrong token; `false` immediately while an earlier guess of this address waits.
     pub async fn delay(&self, address: IpAddr) -> bool {
         if !lock(&self.0).insert(address) {
             return false;
@@ -205,13 +186,12 @@ impl Throttle {
         true
     }
 
-    /// Whether a guess of this address waits.
     pub fn is_delayed(&self, address: IpAddr) -> bool {
         lock(&self.0).contains(&address)
     }
 }
 
-/// Ends also when the client disconnects.
+/// Ends when the client disconnects, too.
 struct Waiting<'a> {
     throttle: &'a Throttle,
     address: IpAddr,

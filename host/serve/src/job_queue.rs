@@ -1,5 +1,5 @@
-//! Two job queues of length one: jobs on the rig, and computations. A queue accepts a job or reports the one that is running, so
-//! nothing moves later than expected.
+//! Two job queues of length one, for the rig and for computations. A busy queue rejects a job, so nothing moves later
+//! than expected.
 
 use std::{
     io,
@@ -21,15 +21,13 @@ use crate::{
     view::{Job, JobPhase, LiveMode, State},
 };
 
-/// From one look at the end of the program to the next.
+/// Poll interval for the end of the program.
 const LOOK: Duration = Duration::from_millis(100);
 
-/// Gives the figures of a job.
 pub type Work = Box<dyn FnOnce(&App, &Context<'_>) -> Result<Value, WorkflowError> + Send>;
 
-/// A job that can begin.
 pub struct Task {
-    /// What kind: `home`, `move`, `pair`, ...
+    /// `home`, `move`, `pair`, ...
     pub kind: &'static str,
     pub title: String,
     pub work: Work,
@@ -47,18 +45,15 @@ struct Inner {
     last: u64,
 }
 
-/// A job on its way to the worker thread.
 pub struct Begun {
     job: Job,
     cancel: Cancel,
     work: Work,
 }
 
-/// The threads of both queues.
 pub struct Workers(Vec<JoinHandle<()>>);
 
 impl Workers {
-    /// Waits until both have ended.
     pub fn join(self) {
         for thread in self.0 {
             let _ = thread.join(); // a job that panicked has said so on stderr
@@ -67,7 +62,7 @@ impl Workers {
 }
 
 impl JobQueue {
-    /// Begins a job and gives its number.
+    /// Begins a job and returns its number; the error is the title of the running job.
     pub fn begin(&self, task: Task, told: impl FnOnce(Job)) -> Result<u64, String> {
         let mut inner = lock(&self.inner);
         if let Some((title, _)) = &inner.running {
@@ -97,14 +92,12 @@ impl JobQueue {
         Ok(job.id)
     }
 
-    /// Cancels the running job.
     pub fn cancel(&self) {
         if let Some((_, cancel)) = &lock(&self.inner).running {
             cancel.cancel();
         }
     }
 
-    /// Whether a job is under way.
     pub fn is_busy(&self) -> bool {
         lock(&self.inner).running.is_some()
     }
@@ -120,7 +113,6 @@ impl JobQueue {
     }
 }
 
-/// Starts the thread of each queue. They end with the program.
 pub fn start(app: &Arc<App>) -> io::Result<Workers> {
     let (on_rig, computing) = (app.rig_jobs.open(), app.computing.open());
     let (rig, computer) = (Arc::clone(app), Arc::clone(app));
@@ -131,7 +123,7 @@ pub fn start(app: &Arc<App>) -> io::Result<Workers> {
     Ok(Workers(threads.into()))
 }
 
-/// Jobs on the rig, and live views between them.
+/// Runs jobs on the rig, and live views between them.
 fn run_rig(app: &App, jobs: &Receiver<Begun>) {
     loop {
         let seen = app.live().mode != LiveMode::Off

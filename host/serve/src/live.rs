@@ -1,4 +1,4 @@
-//! Images and depth as they come, between jobs.
+//! Live images and depth between jobs.
 
 use std::{cell::RefCell, path::Path, time::Instant};
 
@@ -31,7 +31,7 @@ const NEWEST: f64 = 0.15;
 /// Runs the live view until another one is selected. After an error it waits for a new selection.
 pub fn look(app: &App) {
     let live = app.live();
-    // After `live` was read: a stop requested from now on ends this look.
+    // After `live` was read: a later stop ends this view.
     app.stops.wait();
     let rig = app.rig();
     if rig.is_none() && !app.has_camera_alone() {
@@ -51,7 +51,7 @@ pub fn look(app: &App) {
         }
         (LiveMode::Depth, Some(rig)) => look_at_depth(app, RigAddress::Open(rig), &context, &rate),
     };
-    // Something else may be wanted already: then the rig's report of the stop must not end the next one.
+    // The rig's report of this stop must not end the next view.
     let cancelled = context.cancel.is_cancelled() || app.is_ending();
     match ended {
         Err(error) if !error.is_cancelled() && !cancelled => {
@@ -63,7 +63,6 @@ pub fn look(app: &App) {
     }
 }
 
-/// No browser watches any more.
 fn enough(app: &App) -> Result<()> {
     if app.is_ending() || app.state().control.clients == 0 {
         return Err(WorkflowError::Cancelled { during: "watching".into() });
@@ -113,7 +112,6 @@ fn look_at_depth(app: &App, rig: RigAddress, context: &Context<'_>, rate: &Rate)
     ended
 }
 
-/// Adds the pair to the recording, if one is under way; a full one ends.
 fn record(app: &App, depth: &LiveDepth<'_>) {
     let added = lock(&app.recorder).as_mut().map(|recorder| recorder.add(depth.far, depth.near));
     match added {
@@ -123,7 +121,7 @@ fn record(app: &App, depth: &LiveDepth<'_>) {
     }
 }
 
-/// Shows a recording as it was recorded, or as fast as depth is computed.
+/// Plays a recording at its own rate, or as fast as depth is computed.
 pub fn play(app: &App, path: &Path, fast: bool, context: &Context<'_>) -> Result<PlayFigures> {
     let rate = Rate::default();
     recording::play(path, &computation(), fast, context, |depth, optics| {
@@ -132,12 +130,11 @@ pub fn play(app: &App, path: &Path, fast: bool, context: &Context<'_>) -> Result
     })
 }
 
-/// Frames a second, smoothed.
+/// Smoothed frames per second.
 #[derive(Default)]
 struct Rate(RefCell<Option<(Instant, f64)>>);
 
 impl Rate {
-    /// Another frame; gives the rate with it.
     fn next(&self) -> f64 {
         let now = Instant::now();
         let mut last = self.0.borrow_mut();

@@ -1,4 +1,4 @@
-//! A picture as it goes over the socket: the length of a JSON header (u32, little-endian), the header, and the pixels.
+//! A picture on the socket: length of a JSON header (u32, little-endian), header, pixels.
 
 use axum::body::Bytes;
 use farnear_workflows::activity::streaming::Moment;
@@ -6,12 +6,12 @@ use ndarray::{Array2, s};
 use serde::Serialize;
 use serde_json::json;
 
-/// Pixels begin at a multiple of this, so that they can be read where they lie; spaces fill the header up to there.
+/// Pixels begin at a multiple of this, so that the page needs no copy; spaces pad the header.
 const ALIGNED: usize = 4;
-/// Codes of depth that are left when 0 means that there is none.
+/// Codes for depth; 0 means no value.
 const CODES: f32 = 65_534.0;
 
-/// Puts header and pixels together; an empty message where the header has no JSON form, which plain values always have.
+/// Empty if the header has no JSON form; plain values always have one.
 pub fn message(header: &impl Serialize, pixels: &[&[u8]]) -> Bytes {
     let mut header = serde_json::to_vec(header).unwrap_or_default();
     header.resize(header.len().next_multiple_of(ALIGNED), b' ');
@@ -22,7 +22,7 @@ pub fn message(header: &impl Serialize, pixels: &[&[u8]]) -> Bytes {
 /// Largest width of a picture of a person, px: for viewing only.
 const PERSON_WIDTH: usize = 320;
 
-/// A moment of a recognition: grey values, then the mask (1 = person), and the answer in the header.
+/// Grey values, then the mask (1 = person); the answer is in the header.
 pub fn person(moment: &Moment<'_>) -> Bytes {
     let step = moment.picture.ncols().div_ceil(PERSON_WIDTH).max(1);
     let picture = moment.picture.slice(s![..;step, ..;step]);
@@ -34,18 +34,17 @@ pub fn person(moment: &Moment<'_>) -> Bytes {
     message(&header, &[&pixels])
 }
 
-/// Depths as 16-bit codes between these ends, little-endian; 0 = no value. Finer than a thousandth of a mm over 50 mm.
+/// 16-bit codes, little-endian; 0 = no value. The resolution over 50 mm is below 0.001 mm.
 pub fn depth_codes(depth_mm: &Array2<f32>, [low, high]: [f32; 2]) -> Vec<u8> {
     let scale = CODES / (high - low).max(f32::MIN_POSITIVE);
     let mut bytes = vec![0; 2 * depth_mm.len()];
-    // A loop over pairs of bytes: a chain of iterators over arrays of two takes much longer, and this is done for each map.
+    // Much faster than a chain of iterators over arrays of two.
     for (pair, depth) in bytes.chunks_exact_mut(2).zip(depth_mm) {
         pair.copy_from_slice(&code(*depth, low, scale).to_le_bytes());
     }
     bytes
 }
 
-/// The next whole code; a float that becomes an integer is cut off.
 fn code(depth: f32, low: f32, scale: f32) -> u16 {
     if depth.is_finite() { (((depth - low) * scale).clamp(0.0, CODES) + 0.5) as u16 + 1 } else { 0 }
 }
@@ -57,7 +56,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_message_says_how_long_its_header_is() {
+    fn a_message_begins_with_the_length_of_its_header() {
         let bytes = message(&serde_json::json!({"width": 2}), &[&[7], &[8]]);
         assert_eq!(&bytes[..4], &12u32.to_le_bytes());
         assert_eq!(&bytes[4..16], b"{\"width\":2} ");

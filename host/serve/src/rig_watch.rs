@@ -21,10 +21,9 @@ use crate::{
 /// Poll interval while a browser watches.
 const OFTEN: Duration = Duration::from_millis(100);
 const SELDOM: Duration = Duration::from_secs(1);
-/// From one look at the end of the program to the next.
+/// Poll interval for the end of the program.
 const LOOK: Duration = Duration::from_millis(50);
 
-/// Starts the thread; it ends with the program.
 pub fn start(app: &Arc<App>) -> io::Result<JoinHandle<()>> {
     let app = Arc::clone(app);
     Builder::new().name("rig watch".into()).spawn(move || run(&app))
@@ -47,7 +46,6 @@ fn run(app: &App) {
     }
 }
 
-/// What connecting says goes into the log.
 struct ToLog<'a>(&'a App);
 
 impl Progress for ToLog<'_> {
@@ -76,7 +74,7 @@ fn connect(app: &App) {
     }
 }
 
-/// Shows the live image again if an error had ended it: the rig that caused the error is there again.
+/// Restarts the live image if an error had ended it.
 fn resume_live(app: &App) {
     if app.state().live.error.is_some() {
         app.set_live(|live| live.mode = LiveMode::Image);

@@ -34,18 +34,14 @@ use crate::{
     guard::{Guard, Refused},
 };
 
-/// Longest body of a request: a note, a program.
 const BODY_MAX: usize = 256 * 1024;
-/// Keeps images of captures from being embedded by pages of other sites.
+/// Prevents other sites from embedding images of captures.
 const RESOURCE_POLICY: HeaderName = HeaderName::from_static("cross-origin-resource-policy");
-/// What a page may load: its own files, and pictures it makes itself.
 const POLICY: &str = "default-src 'self'; img-src 'self' data: blob:; object-src 'none'; base-uri 'none'; \
                       frame-ancestors 'none'; form-action 'self'";
 
-/// What every route may use.
 pub type Shared = State<Arc<App>>;
 
-/// All routes with what belongs to them, and the document about them.
 pub fn api() -> (Router<Arc<App>>, serde_json::Value, Access) {
     let api = general::routes(Api::default());
     let api = rig::routes(api);
@@ -61,7 +57,6 @@ pub fn api() -> (Router<Arc<App>>, serde_json::Value, Access) {
     api.finish()
 }
 
-/// Everything that answers a request.
 pub fn service(app: &Arc<App>) -> Router {
     let (routes, document, access) = api();
     let access = Arc::new(access);
@@ -85,7 +80,7 @@ pub fn service(app: &Arc<App>) -> Router {
         .with_state(Arc::clone(app))
 }
 
-/// Lets through what the guard allows, and sets the page's content policy.
+/// Applies the guard and sets the content policy.
 async fn guarded(app: Arc<App>, access: Arc<Access>, request: Request, next: Next) -> Response {
     let headers = request.headers();
     let peer =
@@ -127,7 +122,7 @@ async fn guarded(app: Arc<App>, access: Arc<Access>, request: Request, next: Nex
     response
 }
 
-/// Whether the client may use the route, before the body is read.
+/// Checked before the body is read.
 fn permitted(app: &App, access: &Access, request: &Request) -> Result<(), Failure> {
     let Some(path) = request.extensions().get::<MatchedPath>() else { return Ok(()) };
     match access.get(&(path.as_str().to_owned(), request.method().clone())) {
@@ -137,7 +132,6 @@ fn permitted(app: &App, access: &Access, request: &Request) -> Result<(), Failur
     }
 }
 
-/// Delays a wrong token; `false` if an earlier one of this address waits.
 pub async fn delayed(app: &App, peer: Option<&Connection>) -> bool {
     match peer {
         Some(peer) => app.throttle.delay(peer.address()).await,
@@ -145,13 +139,12 @@ pub async fn delayed(app: &App, peer: Option<&Connection>) -> bool {
     }
 }
 
-/// The answer while an earlier guess waits.
 pub fn too_many() -> Response {
     Failure::new(StatusCode::TOO_MANY_REQUESTS, "too many wrong tokens: try again in a second")
         .into_response()
 }
 
-/// A JSON body; errors are JSON, too.
+/// A JSON body with JSON errors.
 pub struct Body<T>(pub T);
 
 impl<T: DeserializeOwned> FromRequest<Arc<App>> for Body<T> {
@@ -180,7 +173,7 @@ impl<T: DeserializeOwned> FromRequest<Arc<App>> for Body<T> {
     }
 }
 
-/// The reason without the name of the library's step.
+/// The reason without the library's prefix.
 fn plain(text: &str) -> String {
     [
         "Failed to deserialize the JSON body into the target type: ",
@@ -191,7 +184,6 @@ fn plain(text: &str) -> String {
     .map_or_else(|| text.to_owned(), |reason| format!("request body: {reason}"))
 }
 
-/// Refuses a client that does not have control.
 pub fn require_control(app: &App, headers: &HeaderMap) -> Result<(), Failure> {
     let secret = secret(headers);
     if app.with_control(|control| control.has_control(secret)) {
@@ -201,7 +193,6 @@ pub fn require_control(app: &App, headers: &HeaderMap) -> Result<(), Failure> {
         .with_hint("Ask for control first."))
 }
 
-/// Refuses a request without the secret of a connected client.
 pub fn require_client(app: &App, headers: &HeaderMap) -> Result<(), Failure> {
     match app.with_control(|control| control.id_of(secret(headers))) {
         Some(_) => Ok(()),
@@ -212,12 +203,11 @@ pub fn require_client(app: &App, headers: &HeaderMap) -> Result<(), Failure> {
     }
 }
 
-/// The secret of the client; empty without one.
 pub fn secret(headers: &HeaderMap) -> &str {
     headers.get(CLIENT_HEADER).and_then(|value| value.to_str().ok()).unwrap_or_default()
 }
 
-/// Does what takes a while, in its own thread.
+/// Runs slow work in a thread of its own.
 pub async fn aside<T: Send + 'static>(
     work: impl FnOnce() -> Result<T, Failure> + Send + 'static,
 ) -> Result<T, Failure> {

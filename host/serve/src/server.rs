@@ -1,4 +1,4 @@
-//! From settings to a page that answers, and back to nothing that runs.
+//! Starts and ends the server.
 
 use std::{net::SocketAddr, path::PathBuf, sync::Arc, time::Duration};
 
@@ -14,50 +14,37 @@ use crate::{
     job_queue, rig_watch, routes,
 };
 
-/// Interval between checks of the cancellation.
 const LOOK: Duration = Duration::from_millis(50);
-/// Longest wait for requests that are under way at the end.
+/// Longest wait for running requests at the end.
 const FAREWELL: Duration = Duration::from_secs(2);
 
-/// Served directory and listeners.
 #[derive(Debug)]
 pub struct ServeSettings {
-    /// The rig; without one the page shows captures.
+    /// Without a rig the page shows captures.
     pub rig: Option<RigAddress>,
     pub camera: CameraSettings,
-    /// The folder of captures; made where it is missing.
     pub session: PathBuf,
-    /// The optics to begin with; without it those of the session, or of the 50 mm lens.
+    /// Optics to begin with; by default those of the session, or of the 50 mm lens.
     pub optics: Option<PathBuf>,
     pub listen: Listen,
-    /// Time-outs and limits.
     pub limits: Limits,
 }
 
-/// The page cannot be served.
 #[derive(Debug, thiserror::Error)]
 pub enum ServeError {
-    /// The address is taken or not this computer's.
     #[error("cannot listen at {address}: {source}")]
-    Listen {
-        address: SocketAddr,
-        /// What the system says.
-        source: std::io::Error,
-    },
-    /// The system has no threads or sockets left.
+    Listen { address: SocketAddr, source: std::io::Error },
     #[error("cannot serve: {source}")]
     System {
-        /// What the system says.
         #[from]
         source: std::io::Error,
     },
-    /// The session or its optics.
     #[error(transparent)]
     Workflow(#[from] WorkflowError),
 }
 
-/// Serves the page until `context` is cancelled; motion is stopped then. `ready` receives the address as soon as it answers;
-/// the rig is connected to meanwhile.
+/// Serves the page until `context` is cancelled, which also stops motion. `ready` receives the address as soon as it
+/// answers; the rig is connected in the background.
 pub fn serve(
     settings: ServeSettings,
     context: &Context<'_>,

@@ -1,4 +1,4 @@
-//! State and pictures, pushed to each browser over its WebSocket.
+//! Pushes state and pictures to each browser over its WebSocket.
 
 use std::{sync::Arc, time::Duration};
 
@@ -15,26 +15,23 @@ use tokio::time::{Instant, MissedTickBehavior, interval, timeout};
 
 use crate::{app::App, control::RESERVED, routes::Shared, view::Hello};
 
-/// From one question whether the browser is still there to the next.
+/// Ping interval.
 const ASK: Duration = Duration::from_secs(1);
-/// Longest silence of a browser that is there: it answers by itself, also while its page is busy.
+/// Longest silence: a browser answers pings even while its page is busy.
 const SILENCE: Duration = Duration::from_secs(5);
-/// Pictures on the way to a browser that has not said that it has seen them: one is looked at, one travels. More would wait in the line's
-/// buffers, and what is shown would be from seconds ago.
+/// Pictures without acknowledgement: one on display, one in transit. More would fill buffers and delay the display by
+/// seconds.
 const ON_THE_WAY: u32 = 2;
-/// Interval of pictures for a browser that acknowledges nothing.
+/// Picture interval for a browser that acknowledges nothing.
 const UNSEEN: Duration = Duration::from_secs(1);
-/// Why a job was stopped by [`run`].
 const DISCONNECTED: &str = "the browser that had control has disconnected";
-/// Longest message of a browser.
 const MESSAGE_MAX: usize = 4096;
 
-/// A message of a browser.
 #[derive(Deserialize)]
 #[serde(tag = "type", rename_all = "lowercase", deny_unknown_fields)]
 enum ClientMessage {
     Stop,
-    /// A picture was taken in: the next one may come.
+    /// Acknowledges a picture.
     Seen,
 }
 
@@ -79,7 +76,7 @@ async fn run(mut socket: WebSocket, app: Arc<App>, resumed: Option<String>) {
     }
 }
 
-/// Returns whether it was accepted in time: a browser that accepts nothing has disconnected.
+/// Returns `false` if the browser accepts nothing in time.
 async fn send(socket: &mut WebSocket, message: Message) -> bool {
     matches!(timeout(SILENCE, socket.send(message)).await, Ok(Ok(())))
 }
@@ -111,7 +108,7 @@ async fn talk(socket: &mut WebSocket, app: &Arc<App>) {
                 let state = Arc::clone(&state.borrow_and_update());
                 Message::text(format!("{{\"type\":\"state\",\"state\":{state}}}"))
             }
-            // The newest only: what came while the one before was sent is never seen.
+            // The newest only: pictures that arrive during sending are skipped.
             _ = pictures.changed(), if ready => {
                 (on_the_way, pictured) = ((on_the_way + 1).min(ON_THE_WAY), Instant::now());
                 Message::Binary(pictures.borrow_and_update().clone())

@@ -1,4 +1,4 @@
-//! A stop on its way to the board: nothing begins before it has arrived, because it must not end later work.
+//! Pending stops: nothing begins until they have reached the board, because a stop must not end later work.
 
 use std::sync::{Arc, Condvar, Mutex, PoisonError};
 
@@ -6,7 +6,6 @@ use farnear_workflows::{WorkflowError, rig::open::OpenRig};
 
 use crate::app::lock;
 
-/// How many are on their way.
 #[derive(Default)]
 pub struct Stops {
     on_the_way: Mutex<usize>,
@@ -20,13 +19,11 @@ pub struct Stop {
 }
 
 impl Stops {
-    /// Holds back what would begin.
     pub fn begin(self: &Arc<Self>, rig: Option<OpenRig>) -> Stop {
         *lock(&self.on_the_way) += 1;
         Stop { stops: Arc::clone(self), rig }
     }
 
-    /// Waits until none is on its way.
     pub fn wait(&self) {
         let on_the_way = lock(&self.on_the_way);
         drop(self.arrived.wait_while(on_the_way, |count| *count > 0).unwrap_or_else(PoisonError::into_inner));
@@ -34,7 +31,6 @@ impl Stops {
 }
 
 impl Stop {
-    /// Tells the board.
     pub fn tell(self) -> Result<(), WorkflowError> {
         self.rig.as_ref().map_or(Ok(()), OpenRig::stop)
     }
@@ -54,7 +50,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_begins_waits_for_all_stops_before_it() {
+    fn jobs_wait_for_all_pending_stops() {
         let stops = Arc::new(Stops::default());
         stops.wait();
         let (first, second) = (stops.begin(None), stops.begin(None));

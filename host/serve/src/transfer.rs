@@ -1,4 +1,4 @@
-//! Files to and from a client, a piece at a time: memory does not grow with the size of a file or with the number of slow clients.
+//! File transfer in pieces: memory does not grow with file size or with slow clients.
 
 use std::{
     fs::{self, File, OpenOptions},
@@ -24,7 +24,6 @@ use crate::{app::lock, failure::Failure};
 
 const PIECE: usize = 64 * 1024;
 
-/// An open file as the body of an answer.
 pub fn file_body(file: File) -> Body {
     Body::from_stream(FileStream { file, buffer: vec![0; PIECE] })
 }
@@ -47,7 +46,7 @@ impl Stream for FileStream {
     }
 }
 
-/// The written part of an archive that has not been sent.
+/// Bytes of the archive that are written but not sent.
 #[derive(Clone, Default)]
 struct Unsent(Arc<Mutex<Vec<u8>>>);
 
@@ -62,7 +61,7 @@ impl Write for Unsent {
     }
 }
 
-/// Files of `folder` as a ZIP; `files` are the paths below it, `name` is the folder in the archive.
+/// Files of `folder` as a ZIP; `files` are paths relative to it, `name` is the folder in the archive.
 pub fn zip_body(folder: PathBuf, name: String, mut files: Vec<String>) -> Body {
     files.reverse();
     let unsent = Unsent::default();
@@ -89,7 +88,7 @@ struct ZipStream {
 }
 
 impl ZipStream {
-    /// Writes the next piece into the archive; `false` after the last.
+    /// Writes the next piece; `false` after the last.
     fn step(&mut self) -> io::Result<bool> {
         let Some(archive) = &mut self.archive else { return Ok(false) };
         if let Some(file) = &mut self.current {
@@ -137,7 +136,7 @@ impl Stream for ZipStream {
     }
 }
 
-/// Opens a regular file; a link, FIFO or device is not found.
+/// Opens a regular file; links, FIFOs and devices are not found.
 pub fn regular_file(path: &Path) -> io::Result<File> {
     match fs::symlink_metadata(path)?.is_file() {
         true => File::open(path),
@@ -145,7 +144,7 @@ pub fn regular_file(path: &Path) -> io::Result<File> {
     }
 }
 
-/// Writes an uploaded body to `path`; nothing is left of an upload that fails.
+/// Writes an uploaded body to `path`; a failed upload leaves no file.
 pub async fn receive(body: Body, path: &Path, bytes_max: u64, pause_max: Duration) -> Result<u64, Failure> {
     let part =
         path.with_file_name(format!(".{}.part", path.file_name().unwrap_or_default().to_string_lossy()));

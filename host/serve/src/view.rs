@@ -1,4 +1,4 @@
-//! Messages of the page's interface, with their JSON schemas.
+//! Messages of the API, with their JSON schemas.
 
 use farnear_depth::focus_measure::FocusMeasure;
 use schemars::JsonSchema;
@@ -183,7 +183,6 @@ pub struct Done {
     pub done: bool,
 }
 
-/// The one value of [`Done`].
 pub const DONE: Done = Done { done: true };
 
 /// A request that says nothing: `{}`.

@@ -1,8 +1,5 @@
-//! Cost of a batch compared with a plain loop over the same workflow: processor time per pair, blocks of both in turn, and the most
-//! memory. `cargo run --release --example batch_speed -- [PAIRS] [FOLDER]`; docs/batch.md has its figures.
-//!
-//! The loop does what a program that uses the library does: one thread, shared operators, the same files, no sums, no
-//! `batch.toml`, no line a job.
+//! Compares a batch with a plain loop (one thread, shared operators, no records): processor time per pair and
+//! peak memory. `cargo run --release --example batch_speed -- [PAIRS] [FOLDER]`; figures in docs/batch.md.
 
 use std::{
     error::Error,
@@ -40,7 +37,7 @@ fn main() -> Result<()> {
     (0..pairs).try_for_each(|number| pair(&root, number))?;
     let one = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
     let context = Context::unattended();
-    // Operators are designed, files are in the system's cache.
+    // Warm up: operators are designed, files are in the system's cache.
     one.install(|| by_loop(&root, 0..BLOCK.min(pairs), &context, "warm"))?;
     let (mut of_batch, mut of_loop) = (Vec::new(), Vec::new());
     for begin in (0..pairs).step_by(BLOCK) {
@@ -68,7 +65,7 @@ fn main() -> Result<()> {
     Ok(())
 }
 
-/// A texture, and the texture out of focus.
+/// Writes a texture and its defocused copy.
 fn pair(root: &Path, number: usize) -> Result<()> {
     let texture = |y: usize, x: usize| 40 + (y * 31 + x * 17 + number * 5) * (y + 7) * 7919 % 151;
     for (name, spread) in [("far", 1), ("near", 2)] {
@@ -124,7 +121,7 @@ fn by_batch(root: &Path, numbers: std::ops::Range<usize>) -> Result<()> {
     Ok(())
 }
 
-/// Processor time of this process so far, its own and the system's for it.
+/// User and system time of this process so far.
 fn processor_seconds() -> Result<f64> {
     let text = fs::read_to_string("/proc/self/stat")?;
     let (_, fields) = text.rsplit_once(") ").ok_or("no end of the name")?;
@@ -139,7 +136,6 @@ fn peak() -> Result<String> {
     Ok(line.trim().into())
 }
 
-/// Sorts, and gives the middle.
 fn median(values: &mut [f64]) -> f64 {
     values.sort_by(f64::total_cmp);
     values.get(values.len() / 2).copied().unwrap_or(f64::NAN)

@@ -1,6 +1,4 @@
-//! Recognising what people do from their silhouettes: [`training`] a model on [`samples`] or [`motion`] files, using it ([`recognition`], [`streaming`] with the
-//! pictures, [`multi_person`] in a picture by themselves), evaluating
-//! a [`method`] ([`evaluation`]) or a model ([`judging`]); models that come with the program ([`shipped`]).
+//! Activity recognition from silhouettes: training, recognition, evaluation and the shipped models.
 
 mod annotated_video;
 pub mod answer;
@@ -10,6 +8,7 @@ pub mod judging;
 pub mod method;
 pub mod motion;
 pub mod multi_person;
+pub mod recognise;
 pub mod recognition;
 pub mod samples;
 pub mod sets;

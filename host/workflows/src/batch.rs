@@ -1,9 +1,7 @@
-//! Many jobs from a manifest, on all cores: each done once, also after interruptions.
+//! Runs the jobs of a manifest on all cores, each once, also after interruptions.
 //!
-//! A job is done when its result is whole and `batch.toml` next to it records that it was made from the same settings, the same bytes
-//! of input and by the same version of this program; a run leaves what is done alone. Results are made aside and renamed, so that
-//! one that is there is whole. A job that fails does not stop the others. The manifest is read job by job: memory depends on the
-//! number of jobs at a time and not on that of all.
+//! A job is done if its result is complete and `batch.toml` lists the same settings, input hashes and program
+//! version. Results are moved into place when complete. Memory does not grow with the manifest.
 
 mod error;
 mod fields;
@@ -46,38 +44,32 @@ use crate::{
     figures::rounded,
 };
 
-/// Warnings of one job that are reported.
 const WARNINGS_MAX: usize = 20;
 
-/// Which jobs are done, and how.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct BatchSettings {
-    /// The list of jobs: TOML or CSV.
     pub manifest: PathBuf,
-    /// Jobs at a time, each on one core; 0 = as many as there are cores.
+    /// Parallel jobs, one core each; 0 = number of cores.
     pub jobs: usize,
-    /// The part of the jobs that is done here.
     pub shard: Shard,
-    /// Whether results that are done already are looked through byte by byte, not only by the lengths of their files.
+    /// Verify finished results by hash, not only by file length.
     pub verify: bool,
-    /// Where failures are written, a JSON line each; by default `NAME.failures.jsonl` next to the manifest.
+    /// JSON lines of failures. Default: `NAME.failures.jsonl` next to the manifest.
     pub failures: Option<PathBuf>,
-    /// Table of all jobs of the shard with their figures, as CSV.
+    /// CSV table of the shard's jobs with their figures.
     pub summary: Option<PathBuf>,
-    /// Report what would be done, and do nothing.
     pub dry_run: bool,
-    /// Whether failed jobs leave the run a success: they are in the file of failures.
+    /// Return success even if jobs failed.
     pub allow_failures: bool,
 }
 
-/// Every so-many-th job.
+/// One of `count` interleaved parts of a manifest.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Shard {
     index: usize,
     of: usize,
 }
 
-/// A text that names no part.
 #[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
 #[error("`{0}` is not a shard: expected I/N, from 1/N to N/N")]
 pub struct UnknownShard(String);
@@ -102,45 +94,40 @@ impl std::str::FromStr for Shard {
 }
 
 impl Shard {
-    /// Whether job `number`, from 1, belongs to it.
+    /// `number` counts from 1.
     fn has(self, number: usize) -> bool {
         (number - 1) % self.of == self.index - 1
     }
 
-    /// How many of `jobs` belong to it.
+    /// Number of jobs in this shard, of `jobs`.
     fn share(self, jobs: usize) -> usize {
         (jobs + self.of - self.index) / self.of
     }
 }
 
-/// What became of a job.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum State {
-    /// Its result was made now.
     Done,
-    /// Its result was there.
+    /// Done by an earlier run.
     Already,
-    /// It would be made: a dry run.
+    /// Pending, in a dry run.
     Todo,
     Failed,
 }
 
-/// One job's line.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct JobReport {
-    /// Its number in the manifest, from 1.
+    /// From 1.
     pub job: usize,
-    /// The line of the manifest that it begins on.
     pub line: usize,
     #[serde(rename = "do")]
     pub kind: String,
-    /// Where its result is, as the manifest says it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub out: Option<String>,
     pub state: State,
     pub seconds: f64,
-    /// What the command of the same name prints.
+    /// Output of the command of the same name.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub figures: Option<Value>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
@@ -149,13 +136,11 @@ pub struct JobReport {
     pub error: Option<String>,
 }
 
-/// How many jobs were what.
 #[derive(Clone, PartialEq, Debug, Default, Serialize)]
 pub struct BatchFigures {
     pub jobs: usize,
     pub done: usize,
     pub already: usize,
-    /// To be made, in a dry run.
     #[serde(skip_serializing_if = "is_zero")]
     pub todo: usize,
     pub failed: usize,
@@ -166,11 +151,8 @@ fn is_zero(count: &usize) -> bool {
     *count == 0
 }
 
-/// Does the jobs of a manifest; `on_job` is called for each as it ends, one at a time.
-///
-/// # Errors
-/// A manifest that cannot be read, before anything is done; [`BatchError::Failed`] after all jobs where some failed;
-/// [`crate::WorkflowError::Cancelled`] with what is done in its place; what `on_job` gives as [`crate::WorkflowError::Sink`], which stops the work.
+/// Runs a manifest's jobs and calls `on_job` as each ends, one at a time. Returns [`BatchError::Failed`]
+/// after the last job if any failed. An error from `on_job` stops the run.
 pub fn run(
     settings: &BatchSettings,
     context: &Context<'_>,
@@ -222,7 +204,6 @@ pub fn run(
     Ok(figures)
 }
 
-/// Where failures go that were given no place.
 fn failures_file(settings: &BatchSettings) -> PathBuf {
     let mut name = settings.manifest.file_stem().unwrap_or_default().to_os_string();
     let Shard { index, of } = settings.shard;
@@ -233,7 +214,6 @@ fn failures_file(settings: &BatchSettings) -> PathBuf {
     settings.manifest.with_file_name(name)
 }
 
-/// What the threads share.
 struct Work<'a> {
     settings: &'a BatchSettings,
     begun: SystemTime,
@@ -243,12 +223,11 @@ struct Work<'a> {
     cache: Arc<Cache>,
     tally: &'a Tally<'a>,
     cancel: &'a Cancel,
-    /// One thread's wish that the others stop.
+    /// Cancels all threads after an error in one of them.
     stop: Cancel,
 }
 
 impl Work<'_> {
-    /// Does all jobs. Each runs on one thread, including its parallel parts: jobs fill the cores.
     fn on_all_cores(&self) -> Result<()> {
         let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
         let threads = if self.settings.jobs == 0 { cores } else { self.settings.jobs };
@@ -261,7 +240,7 @@ impl Work<'_> {
             let ended = threads
                 .into_iter()
                 .map(|thread| thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)));
-            // All are waited for before one's error is given.
+            // Wait for all threads before returning an error.
             ended.collect::<Vec<Result<()>>>().into_iter().collect()
         })
     }
@@ -269,11 +248,11 @@ impl Work<'_> {
     fn until_the_end(&self) -> Result<()> {
         while !self.cancel.is_cancelled() && !self.stop.is_cancelled() {
             let next = self.next();
-            let told = next.and_then(|entry| match entry {
+            let done = next.and_then(|entry| match entry {
                 Some(entry) => self.do_one(entry).map(|()| true),
                 None => Ok(false),
             });
-            match told {
+            match done {
                 Ok(true) => {}
                 Ok(false) => return Ok(()),
                 Err(error) => {
@@ -295,7 +274,7 @@ impl Work<'_> {
         Ok(None)
     }
 
-    /// Runs a job and reports it. An error is not one of the job.
+    /// Runs and reports a job. Returns only errors of the batch itself.
     fn do_one(&self, entry: Entry) -> Result<()> {
         let start = Instant::now();
         let Entry { number, line, job } = entry;
@@ -313,7 +292,7 @@ impl Work<'_> {
         };
         let (state, figures, error) = match ended {
             Ok((state, figures)) => (state, figures, None),
-            // Neither done nor failed: the next run does it.
+            // The next run does it.
             Err(error) if error.is_cancelled() => return Ok(()),
             Err(error) => (State::Failed, None, Some(error.to_string())),
         };
@@ -322,17 +301,16 @@ impl Work<'_> {
         }
         let seconds = rounded(start.elapsed().as_secs_f64(), 6);
         let mut warnings = warnings.0.into_inner().unwrap_or_else(PoisonError::into_inner);
-        // Said once.
+        // Report warnings once.
         if figures.as_ref().is_some_and(|figures| figures.get("warnings").is_some()) {
             warnings.clear();
         }
         self.tally.tell(&JobReport { job: number, line, kind, out, state, seconds, figures, warnings, error })
     }
 
-    /// Removes what an earlier run made of a job that has failed now.
     fn discard(&self, kind: &str, out: Option<&str>) {
         let (Ok(kind), Some(out)) = (jobs::kind(kind), out) else { return };
-        // A result that cannot be removed is reported by the job's own error, which most likely has the same cause.
+        // If removal fails, the job's own error most likely has the same cause.
         let _ = Place::new(self.base.join(out), kind.makes_file).discard(self.begun);
     }
 
@@ -356,7 +334,7 @@ impl Work<'_> {
     }
 }
 
-/// Keeps a job's warnings; steps and counts are dropped.
+/// Collects a job's warnings; discards steps and counts.
 #[derive(Default)]
 struct Warnings(Mutex<Vec<String>>);
 
@@ -394,7 +372,7 @@ mod tests {
     }
 
     #[test]
-    fn failures_lie_beside_the_manifest() {
+    fn failures_are_written_next_to_the_manifest() {
         let settings = |shard: &str| BatchSettings {
             manifest: "a/pairs.toml".into(),
             jobs: 0,

@@ -1,4 +1,4 @@
-//! Values that several jobs share: operators, corrections, calibration frames, models. The least recently used value is dropped.
+//! Values shared by jobs: operators, corrections, calibration frames, models. Drops the least recently used.
 
 use std::{
     fs,
@@ -18,12 +18,11 @@ use crate::{
 
 /// Operators and corrections: some kilobytes each.
 const SMALL_VALUES: usize = 16;
-/// Calibration frames are as large as images.
+/// As large as images.
 const CAMERAS: usize = 4;
-/// Models of activities.
 const MODELS: usize = 2;
 
-/// Values shared by the tasks of one [`Context`](crate::Context) and its clones. A file that has changed is read again.
+/// Shared by the tasks of one [`Context`](crate::Context) and its clones. Changed files are read again.
 pub struct Cache {
     operators: LeastRecentlyUsed<OperatorKey, Operators>,
     corrections: LeastRecentlyUsed<FileVersion, Correction>,
@@ -50,19 +49,16 @@ impl Default for Cache {
 }
 
 impl Cache {
-    /// As [`operators::find`].
     pub(crate) fn operators(&self, name: Option<&Path>, optics: &Optics) -> Result<Arc<Operators>> {
         let file = name.and_then(|path| FileVersion::of(operators::KIND, path).ok());
         let key = OperatorKey { name: name.map(Path::to_path_buf), file, optics: *optics };
         self.operators.get(key, || operators::find(name, optics))
     }
 
-    /// As [`correction_file::read`].
     pub(crate) fn correction(&self, file: &Path) -> Result<Arc<Correction>> {
         self.corrections.get(FileVersion::of(correction_file::KIND, file)?, || correction_file::read(file))
     }
 
-    /// As [`camera_frames::read`].
     pub(crate) fn camera(&self, folder: &Path) -> Result<Arc<CameraFrames>> {
         match FileVersion::of("the camera's frames", folder) {
             Ok(version) => self.cameras.get(version, || camera_frames::read(folder)),
@@ -76,14 +72,13 @@ impl Cache {
     }
 }
 
-/// Values by their keys, the last used at the end.
+/// Ordered by last use, the latest at the end.
 pub(crate) struct LeastRecentlyUsed<K, V> {
     entries: Mutex<Vec<(K, Arc<V>)>>,
     most: usize,
 }
 
 impl<K: PartialEq, V> LeastRecentlyUsed<K, V> {
-    /// Holds at most `most` values.
     pub fn new(most: usize) -> Self {
         Self { entries: Mutex::new(Vec::with_capacity(most)), most }
     }
@@ -112,7 +107,7 @@ impl<K: PartialEq, V> LeastRecentlyUsed<K, V> {
     }
 }
 
-/// Identifies one version of a file by length and time of modification.
+/// Identifies a version of a file by length and modification time.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub(crate) struct FileVersion {
     path: PathBuf,

@@ -1,4 +1,4 @@
-//! Learning what the optics do, from captured images and depth maps.
+//! Calibration from captured images and depth maps.
 
 pub mod correction;
 pub mod psf;

@@ -1,4 +1,4 @@
-//! Cameras without a rig: which there are, what can be set, pictures to keep ([`grab`]) and to look at ([`live`]).
+//! Cameras without a rig: list, controls, images to store ([`grab`]) and to view ([`live`]).
 
 pub mod grab;
 pub mod live;
@@ -15,11 +15,10 @@ use crate::{
     },
 };
 
-/// A kind of camera.
 #[derive(Clone, PartialEq, Eq, Debug, Serialize)]
 pub struct Kind {
     pub kind: &'static str,
-    /// How one of it is named.
+    /// Format of its address.
     pub address: &'static str,
     pub about: &'static str,
     /// Whether this program was built with it.
@@ -59,24 +58,20 @@ pub const KINDS: [Kind; 5] = [
     },
 ];
 
-/// A camera that was found.
 #[derive(Clone, PartialEq, Eq, Debug, Serialize)]
 pub struct Found {
-    /// By which it is named.
     pub address: String,
     pub about: String,
 }
 
-/// What cameras there are.
 #[derive(Clone, PartialEq, Eq, Debug, Serialize)]
 pub struct ListFigures {
-    /// Those that were found now.
     pub found: Vec<Found>,
-    /// The kinds that could be.
+    /// Supported kinds.
     pub kinds: Vec<Kind>,
 }
 
-/// Looks for cameras; with GenICam that takes about a second.
+/// Searches for cameras. GenICam takes about a second.
 pub fn list() -> ListFigures {
     let video = |device: v4l::FoundDevice| Found {
         address: format!("v4l:{}", device.path.display()),
@@ -101,16 +96,13 @@ fn genicam() -> Vec<Found> {
     Vec::new()
 }
 
-/// A camera with its initial settings.
 #[derive(Clone, PartialEq, Debug)]
 pub struct CameraChoice {
     pub address: CameraAddress,
-    /// Controls to set, in this order.
     pub settings: Vec<Setting>,
 }
 
 impl CameraChoice {
-    /// Opens it and applies the settings.
     pub fn open(&self) -> Result<Box<dyn Camera>> {
         let Some(mut camera) = self.address.open()? else {
             let expected =
@@ -132,21 +124,19 @@ pub struct ControlFigures {
     pub range: String,
 }
 
-/// A camera's controls.
 #[derive(Clone, PartialEq, Eq, Debug, Serialize)]
 pub struct ShowFigures {
     pub kind: &'static str,
-    /// What can be set or read; nothing for kinds that leave it to others.
+    /// Empty for kinds with external controls.
     pub controls: Vec<ControlFigures>,
 }
 
-/// Lists a camera's controls after the settings were applied.
 pub fn show(choice: &CameraChoice) -> Result<ShowFigures> {
     let mut camera = choice.open()?;
     Ok(ShowFigures { kind: camera.kind(), controls: controls_of(camera.as_mut())? })
 }
 
-/// The same of a camera that hangs on a rig.
+/// As [`show`], for a camera on a rig.
 pub fn show_at_rig(
     settings: &CameraSettings,
     rig: &RigAddress,

@@ -1,4 +1,4 @@
-//! A camera's dark and flat frames in a folder: learned from exposures, read for a depth map.
+//! A camera's dark and flat frames in a folder: calibrated from exposures, used for depth maps.
 
 use std::path::{Path, PathBuf};
 
@@ -57,23 +57,17 @@ impl Request for CalibrateCameraRequest {
     }
 }
 
-/// What there is to say of a camera.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct CameraFigures {
     pub width: usize,
     pub height: usize,
     /// Mean value in the dark, 1 = full scale.
     pub dark_mean: f64,
-    /// Standard deviation of the pixels' response, percent.
     pub response_sd_percent: f64,
-    /// Number of bad pixels.
     pub bad_pixels: usize,
 }
 
-/// Learns a camera's frames and writes them: all files or none.
-///
-/// # Errors
-/// Images; [`WorkflowError::CameraFrames`]; files.
+/// Calibrates a camera's frames and writes all files or none.
 pub fn calibrate(settings: &CalibrateCameraRequest, context: &Context<'_>) -> Result<CameraFigures> {
     let read = |files: &[PathBuf]| -> Result<Vec<Array2<f32>>> {
         files
@@ -103,7 +97,6 @@ pub fn calibrate(settings: &CalibrateCameraRequest, context: &Context<'_>) -> Re
     })
 }
 
-/// Reads a camera's frames from their folder.
 pub fn read(folder: &Path) -> Result<CameraFrames> {
     if !folder.is_dir() {
         let none = std::io::Error::new(std::io::ErrorKind::NotFound, "no such folder");

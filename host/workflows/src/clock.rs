@@ -1,10 +1,8 @@
-//! This computer's clock, for the records of real captures.
-
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use chrono::{DateTime, SecondsFormat};
 
-/// The time, RFC 3339 in UTC; `None` for a clock before 1970.
+/// RFC 3339 in UTC; `None` for a clock before 1970.
 pub fn now_rfc3339() -> Option<String> {
     let seconds = SystemTime::now().duration_since(UNIX_EPOCH).ok()?.as_secs();
     let time = DateTime::from_timestamp(i64::try_from(seconds).ok()?, 0)?;

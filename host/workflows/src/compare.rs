@@ -1,4 +1,4 @@
-//! How near a depth map comes to the truth, from files.
+//! Compares a depth map with ground truth.
 
 use std::path::PathBuf;
 
@@ -54,7 +54,7 @@ impl Request for CompareRequest {
     }
 }
 
-/// Errors of a depth map in its unit.
+/// In the unit of the maps.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct ComparisonFigures {
     pub unit: Unit,
@@ -79,16 +79,12 @@ impl Serialize for ComparisonFigures {
     }
 }
 
-/// Compares a map with the truth.
-///
-/// # Errors
-/// Maps and mask that cannot be read; [`crate::WorkflowError::Parameter`] for maps in different units;
-/// [`crate::WorkflowError::Compare`].
+/// Fails for maps in different units.
 pub fn compare(request: &CompareRequest) -> Result<ComparisonFigures> {
     let (mut depth, mut truth) = (read_map(&request.depth)?, read_map(&request.truth)?);
     let unit = shared_unit("truth", &depth, &truth)?;
     if unit == Unit::Um {
-        // Positions of any sign: the errors stay the same above 0.
+        // Positions may have any sign; a common offset above 0 keeps the errors.
         let lowest = depth.depth.iter().chain(&truth.depth).copied().fold(0.0, f32::min);
         for map in [&mut depth.depth, &mut truth.depth] {
             map.mapv_inplace(|z| z - lowest + 1.0);

@@ -1,7 +1,5 @@
-//! Progress, prompts and cancellation for workflows.
-//!
-//! A workflow does not use the terminal, the keyboard or signals. Its caller (command line, page, batch, Python) passes a
-//! [`Context`].
+//! Progress, prompts and cancellation for workflows. A workflow does not use the terminal, the keyboard or
+//! signals. Its caller passes a [`Context`].
 
 use std::{
     sync::{
@@ -16,12 +14,11 @@ use crate::{
     error::{Result, WorkflowError},
 };
 
-/// Receives the progress of a workflow.
 pub trait Progress: Sync {
     /// Reports a step, for a log: "moving the coarse stage to 5800.000 um".
     fn info(&self, what: &str);
 
-    /// Reports something that the user should know although the work continues.
+    /// Reports a problem that does not stop the work.
     fn warn(&self, what: &str) {
         self.info(&format!("warning: {what}"));
     }
@@ -34,21 +31,20 @@ pub trait Progress: Sync {
 }
 
 pub trait Questions: Sync {
-    /// Shows the question and returns the typed answer; it is empty if the person only confirmed.
+    /// Shows the question and returns the answer; empty if the user only confirmed.
     fn ask(&self, question: &str, cancel: &Cancel) -> Result<String>;
 }
 
-/// Cancellation token; clones share it. A cancelled rig workflow stops the rig before it returns.
+/// Cancellation token, shared by its clones; cannot be reset. A cancelled rig workflow stops the rig before
+/// it returns.
 #[derive(Clone, Debug, Default)]
 pub struct Cancel(Arc<AtomicBool>);
 
 impl Cancel {
-    /// Cancels. Cannot be reset.
     pub fn cancel(&self) {
         self.0.store(true, Ordering::Relaxed);
     }
 
-    /// Whether it is cancelled.
     pub fn is_cancelled(&self) -> bool {
         self.0.load(Ordering::Relaxed)
     }
@@ -60,24 +56,20 @@ impl Cancel {
         }
     }
 
-    /// The flag, for the rig's client.
     pub fn flag(&self) -> Arc<AtomicBool> {
         Arc::clone(&self.0)
     }
 }
 
-/// What a workflow needs in addition to its settings.
 #[derive(Clone)]
 pub struct Context<'a> {
     pub progress: &'a dyn Progress,
     pub questions: &'a dyn Questions,
     pub cancel: Cancel,
-    /// Operators, corrections and models that tasks share.
     pub cache: Arc<Cache>,
 }
 
 impl<'a> Context<'a> {
-    /// A context with an empty cache.
     pub fn new(progress: &'a dyn Progress, questions: &'a dyn Questions, cancel: Cancel) -> Self {
         Self { progress, questions, cancel, cache: Arc::default() }
     }
@@ -102,7 +94,6 @@ impl Questions for Unattended {
 }
 
 impl Context<'static> {
-    /// Discards progress; prompts fail.
     pub fn unattended() -> Self {
         Self::new(&Unattended, &Unattended, Cancel::default())
     }

@@ -1,4 +1,4 @@
-//! Applying a correction to a depth map in a file.
+//! Applies a correction to a depth map file.
 
 use std::path::{Path, PathBuf};
 
@@ -57,24 +57,21 @@ impl Request for CorrectRequest {
     }
 }
 
-/// What the correction did.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct CorrectFigures {
-    /// Which kind of correction.
     pub method: String,
-    /// Mean change, mm; positive = farther.
+    /// Positive = farther.
     pub mean_change_mm: f64,
-    /// Pixels that had a depth and have none now, because it lies beyond what the correction was taught.
+    /// Pixels whose depth was lost because it is outside the correction's range.
     pub lost_pixels: usize,
 }
 
-/// The format of a map by the name of its file.
+/// Format by file name.
 pub fn format_of(out: &Path) -> Result<Format> {
     let expected = "depth maps are written as .npy or .tiff";
     Format::of(out).ok_or_else(|| WorkflowError::parameter("out", out.display(), expected))
 }
 
-/// Corrects a map.
 pub fn apply(settings: &CorrectRequest, context: &Context<'_>) -> Result<CorrectFigures> {
     let format = format_of(&settings.out)?;
     let correction = correction_file::read(&settings.correction)?;

@@ -1,4 +1,4 @@
-//! Reading a saved depth correction.
+//! Reads a saved depth correction.
 
 use std::path::Path;
 
@@ -9,10 +9,8 @@ use crate::{
     text_file,
 };
 
-/// What the file holds, as [`WorkflowError::File`] names it.
 pub const KIND: &str = "a saved correction";
 
-/// Reads and checks a correction.
 pub fn read(path: &Path) -> Result<Correction> {
     let text = text_file::read(path).map_err(WorkflowError::read(KIND, path))?;
     toml::from_str(&text).map_err(WorkflowError::file(path, KIND))

@@ -1,10 +1,8 @@
-//! Counting what several threads get done.
-
 use std::sync::{Mutex, PoisonError};
 
 use crate::{context::Context, error::Result};
 
-/// Counts parts of a work over threads, so that a reader sees the count rise by one each time.
+/// Counts parts of a work over threads. Reported counts increase by one.
 pub(crate) struct Counter<'a> {
     context: &'a Context<'a>,
     unit: &'static str,
@@ -12,14 +10,12 @@ pub(crate) struct Counter<'a> {
 }
 
 impl<'a> Counter<'a> {
-    /// Nothing is done yet of what `unit` names.
     pub fn new(context: &'a Context<'_>, unit: &'static str) -> Self {
         Self { context, unit, done: Mutex::new(0) }
     }
 
-    /// Counts one part, of the total if known.
     pub fn one(&self, total: Option<usize>) {
-        // Held during the report, so that counts are reported in order. A count cannot be half-changed.
+        // Locked while reporting, so that counts are in order. A count is valid even after a panic.
         let mut done = self.done.lock().unwrap_or_else(PoisonError::into_inner);
         *done += 1;
         self.context.progress.advance(self.unit, *done, total);
@@ -29,7 +25,6 @@ impl<'a> Counter<'a> {
         self.context.cancel.check(during)
     }
 
-    /// Whether the work is to stop.
     pub fn is_cancelled(&self) -> bool {
         self.context.cancel.is_cancelled()
     }
@@ -52,7 +47,7 @@ mod tests {
     }
 
     #[test]
-    fn counts_rise_by_one_whoever_counts() {
+    fn counts_rise_by_one_from_any_thread() {
         let heard = Heard::default();
         let context = Context::new(&heard, &Unattended, Cancel::default());
         let counter = Counter::new(&context, "clips");

@@ -1,4 +1,4 @@
-//! A depth map from a far- and a near-focused image, in a folder with its confidence and what made it.
+//! Computes a depth map from a far- and a near-focused image, with confidence and provenance.
 
 pub mod method;
 pub mod noise;
@@ -268,35 +268,38 @@ impl Request for DepthRequest {
     }
 }
 
-/// What there is to say of a map.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct DepthFigures {
-    /// For the depth, its deviation and its correction, without reading and writing.
+    /// Depth, deviation and correction, without reading and writing.
     pub seconds: f64,
-    /// Pixels across.
     pub width: usize,
-    /// Pixels down.
     pub height: usize,
-    /// Median of the depths; NaN without any.
+    /// NaN without values.
     pub median_mm: f64,
-    /// Part of the pixels with too little texture.
+    /// Share of pixels with too little texture.
     pub low_texture_fraction: f64,
-    /// Part of the pixels that have a depth.
+    /// Share of pixels with a depth.
     pub valid_fraction: f64,
-    /// Figures of the standard deviation, where it was wanted.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub uncertainty: Option<Uncertainty>,
-    /// What the user was warned of.
     pub warnings: Vec<String>,
 }
 
-/// Computes a depth map and writes it; the folder gets all files or, after a failure or a cancellation, none.
-///
-/// # Errors
-/// [`WorkflowError::Parameter`] for what contradicts itself, before anything is read; then optics, images, operators,
-/// correction, computation, files.
+/// Computes a depth map and writes the folder: all files, or none on failure or cancellation.
 pub fn compute(settings: &DepthRequest, context: &Context<'_>) -> Result<DepthFigures> {
     settings.check()?;
+    match settings.threads {
+        n if n > 0 && n != rayon::current_num_threads() => rayon::ThreadPoolBuilder::new()
+            .num_threads(n)
+            .build()
+            .map_err(|error| WorkflowError::parameter("threads", n, error.to_string()))?
+            .install(|| compute_here(settings, context)),
+        _ => compute_here(settings, context),
+    }
+}
+
+/// [`compute`] on the threads at hand.
+fn compute_here(settings: &DepthRequest, context: &Context<'_>) -> Result<DepthFigures> {
     let settings = &settings.for_lens(context)?;
     let mut inputs = Inputs::read(settings, context)?;
     let start = Instant::now();
@@ -323,7 +326,7 @@ pub fn compute(settings: &DepthRequest, context: &Context<'_>) -> Result<DepthFi
 }
 
 impl DepthRequest {
-    /// The request with the method that its lens was calibrated for by `calibrate stack`, unless operators are named.
+    /// Selects the method for which `calibrate stack` calibrated the lens, unless operators are named.
     fn for_lens(&self, context: &Context<'_>) -> Result<Self> {
         let usual = self.method == Method::default() && self.operators.is_none();
         if !usual || optics::of_pair(self.optics.as_deref(), &self.far)?.0.stage().is_none() {
@@ -333,12 +336,12 @@ impl DepthRequest {
         Ok(Self { method: Method::Whitened, ..self.clone() })
     }
 
-    /// Whether nothing else is tied to the pixels of the images.
+    /// Whether nothing else depends on the pixels of the images.
     fn may_bin(&self) -> bool {
         self.region.is_none() && self.camera_frames.is_none() && self.operators.is_none()
     }
 
-    /// Pixels per side that are averaged into one, and what there is to say of that.
+    /// Pixels per side to average into one; adds a doubt if needed.
     fn bin_for(&self, optics: &Optics, doubts: &mut Vec<OpticsDoubt>) -> usize {
         let blur_px = optics.max_blur_px();
         let needed = (blur_px / USABLE_BLUR_PX).ceil().clamp(1.0, 16.0) as usize;
@@ -353,7 +356,7 @@ impl DepthRequest {
         if binned { needed } else { 1 }
     }
 
-    /// Windows, filling and threads as the library takes them.
+    /// Library settings: windows, filling, threads.
     pub fn computation(&self) -> Settings {
         let usual = Settings::default();
         Settings {
@@ -374,7 +377,7 @@ impl DepthRequest {
         PrepareSettings { align: self.align, balance: self.balance, ..PrepareSettings::default() }
     }
 
-    /// What [`measure_pair`] takes, for images whose limits and noise are not known.
+    /// Settings of [`measure_pair`] for images with unknown limits and noise.
     pub fn measure(&self) -> MeasureSettings {
         let run = self.computation();
         let usual = match self.method {
@@ -390,27 +393,22 @@ impl DepthRequest {
     }
 }
 
-/// Checked inputs.
 struct Inputs {
     optics: Optics,
     pair: Pair,
     method: Prepared,
     correction: Option<Arc<Correction>>,
     camera: Option<Arc<CameraFrames>>,
-    /// Part of the images, if not all.
     cut: Option<Cut>,
     doubts: Vec<OpticsDoubt>,
 }
 
-/// Computed maps.
 struct Computed {
     map: DepthMap,
     deviation: Option<(Array2<f32>, Uncertainty)>,
-    /// Why each pixel has no depth.
     reasons: Array2<u8>,
-    /// How many pixels have none, by reason.
+    /// Number of pixels without depth, by reason.
     lost: Vec<Lost>,
-    /// The far image as it was measured, where an output shows it; else empty.
     image: Array2<f32>,
     report: Report,
     window: Window,
@@ -453,7 +451,7 @@ impl Inputs {
         Ok(Self { optics, pair, method, correction, camera, cut, doubts })
     }
 
-    /// Takes the images, which nothing needs afterwards.
+    /// Takes the images out of `self` to release their memory early.
     fn compute(&mut self, settings: &DepthRequest, context: &Context<'_>) -> Result<Computed> {
         let cancel = |during| context.cancel.check(during);
         cancel("reading the pair")?;
@@ -527,12 +525,11 @@ impl Inputs {
     }
 }
 
-/// Part of the pixels that have a depth.
 fn valid_fraction(map: &Array2<f32>) -> f64 {
     map.iter().filter(|depth| depth.is_finite()).count() as f64 / map.len() as f64
 }
 
-/// Corrects a map; pixels beyond the correction lose depth and confidence.
+/// Corrects a map; pixels outside the correction lose depth and confidence.
 fn correct(depth: &mut DepthMap, reasons: &mut Array2<u8>, correction: &Correction) -> Result<()> {
     correction.apply_in_place(depth.depth_mm.view_mut())?;
     let pixels = depth.confidence.iter_mut().zip(&depth.depth_mm).zip(reasons);
@@ -547,7 +544,7 @@ fn correct(depth: &mut DepthMap, reasons: &mut Array2<u8>, correction: &Correcti
     Ok(())
 }
 
-/// Median of the values; NaN without any.
+/// NaN without values.
 fn median(map: &Array2<f32>) -> f64 {
     let quantiles = Quantiles::new(map.view());
     quantiles.at(quantiles.finite() / 2).map_or(f64::NAN, f64::from)

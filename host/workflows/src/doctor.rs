@@ -1,7 +1,4 @@
-//! Whether this computer has what farnear needs: processor, folders, emulated rig, ports, cameras, the board's firmware; and what to
-//! do about what it has not.
-//!
-//! Looks only: no port is opened unless one is named, nothing moves.
+//! Checks this computer and suggests remedies. Opens no port unless one is named; moves nothing.
 
 mod folders;
 mod ports;
@@ -14,12 +11,11 @@ use serde::Serialize;
 
 use crate::{camera, context::Context, error::Result, simulator};
 
-/// Options: checks besides the computer itself.
 #[derive(Clone, PartialEq, Eq, Debug, Default)]
 pub struct DoctorSettings {
-    /// Board to ask for its firmware's version.
+    /// Port of a board whose firmware version is checked.
     pub port: Option<String>,
-    /// Folders for results to check, besides the current one.
+    /// Result folders to check, besides the current one.
     pub folders: Vec<PathBuf>,
 }
 
@@ -27,18 +23,16 @@ pub struct DoctorSettings {
 #[serde(rename_all = "lowercase")]
 pub enum Health {
     Ok,
-    /// Not there, and only some need it.
+    /// Missing, and only needed for some tasks.
     Optional,
     Missing,
 }
 
-/// A check with its result.
 #[derive(Clone, PartialEq, Eq, Debug, Serialize)]
 pub struct Finding {
     pub what: String,
     pub health: Health,
     pub found: String,
-    /// What to do; empty where nothing is to be done.
     #[serde(skip_serializing_if = "String::is_empty")]
     pub remedy: String,
 }
@@ -58,23 +52,18 @@ impl Finding {
     }
 }
 
-/// All checks.
 #[derive(Clone, PartialEq, Eq, Debug, Serialize)]
 pub struct DoctorFigures {
     pub findings: Vec<Finding>,
 }
 
 impl DoctorFigures {
-    /// How many of them will make something fail.
     pub fn missing(&self) -> usize {
         self.findings.iter().filter(|finding| finding.health == Health::Missing).count()
     }
 }
 
-/// Looks at everything; takes some milliseconds, and with a port as long as the board's answer.
-///
-/// # Errors
-/// [`crate::WorkflowError::Cancelled`]; what is not well is no error but a finding.
+/// Takes some milliseconds, with a port as long as the board's answer. Problems are findings, not errors.
 pub fn examine(settings: &DoctorSettings, context: &Context<'_>) -> Result<DoctorFigures> {
     let mut findings = vec![processor()];
     findings.extend(folders::findings(&settings.folders));

@@ -1,5 +1,4 @@
-//! What can go wrong in a workflow, as facts: which value, which file, what was expected. What to type or click next is
-//! for the face to add.
+//! Errors of workflows: the value or file, and what was expected. Interfaces add what to do.
 
 use std::path::{Path, PathBuf};
 
@@ -34,167 +33,99 @@ use farnear_shadow::sun::SunError;
 use farnear_shadow::uncertainty::UncertaintyError;
 use farnear_silhouettes::background::BackgroundError;
 
-/// What a workflow gives.
 pub type Result<T, E = WorkflowError> = std::result::Result<T, E>;
 
-/// Why a workflow came to no result.
 #[derive(Debug, thiserror::Error)]
 pub enum WorkflowError {
-    /// A parameter that cannot be, or contradicts another: bad usage, found before anything was done.
+    /// Bad usage, found before any work.
     #[error("{name} {value}: {expected}")]
     Parameter {
-        /// The parameter, as the field's users call it; faces translate it to their own word.
+        /// The field's term; interfaces translate it to their own.
         name: &'static str,
         value: String,
         expected: String,
     },
-    /// A field of a request.
     #[error(transparent)]
     Request(#[from] crate::request::RequestError),
-    /// A file with invalid contents.
     #[error("{} does not hold {expected}: {reason}", path.display())]
-    File {
-        path: PathBuf,
-        /// The expected contents.
-        expected: &'static str,
-        reason: String,
-    },
-    /// A file that cannot be read at all.
+    File { path: PathBuf, expected: &'static str, reason: String },
     #[error("cannot read {what} {}: {source}", path.display())]
     Read {
-        /// Its meaning: "the optics file".
+        /// For example "the optics file".
         what: &'static str,
         path: PathBuf,
-        /// What the system says.
         source: std::io::Error,
     },
-    /// The work was cancelled; a rig has been stopped.
     #[error("interrupted while {during}")]
     Cancelled { during: String },
-    /// The sharpest image would lie where no lens puts one.
     #[error(
         "the sharpest image lies {sensor_mm:.4} mm behind the lens, inside its focal length of {focal_length_mm} mm: is the \
          rig's setting datum_nm right?"
     )]
-    InsideFocalLength {
-        /// Sensor distance of the best focus.
-        sensor_mm: f64,
-        /// The lens' focal length.
-        focal_length_mm: f64,
-    },
-    /// The board calculates otherwise than this computer, which should give the same bits.
+    InsideFocalLength { sensor_mm: f64, focal_length_mm: f64 },
+    /// Board and host calculate different bits.
     #[error("the board's answer differs from this computer's: {0}")]
     Differs(String),
-    /// The bring-up checklist found something.
     #[error("{failed} of the steps failed; put that right before anything moves further (docs/bring-up.md)")]
-    StepsFailed {
-        failed: usize,
-        /// Number of the alarm that is latched.
-        alarm: Option<u32>,
-    },
-    /// The output is closed.
+    StepsFailed { failed: usize, alarm: Option<u32> },
     #[error("the result cannot be passed on: {source}")]
-    Sink {
-        /// What the system says.
-        source: std::io::Error,
-    },
-    /// A folder that cannot be made.
+    Sink { source: std::io::Error },
     #[error("cannot make the folder {}: {source}", folder.display())]
-    Folder {
-        folder: PathBuf,
-        /// What the system says.
-        source: std::io::Error,
-    },
-    /// A prompt without an answer.
+    Folder { folder: PathBuf, source: std::io::Error },
     #[error("no answer, the input has ended: {question}")]
     Unanswered { question: String },
-    /// The optics of a pair are unknown.
     #[error("no optics: none were named, and neither capture.toml nor optics.toml is next to {}", far.display())]
-    NoOptics {
-        /// The pair's far-focused image.
-        far: PathBuf,
-    },
-    /// Images that are not a pair.
+    NoOptics { far: PathBuf },
     #[error("{} and {}: {reason}", far.display(), near.display())]
-    Pair {
-        /// The image that was given as far-focused.
-        far: PathBuf,
-        /// The image that was given as near-focused.
-        near: PathBuf,
-        reason: String,
-    },
-    /// The same, about something.
+    Pair { far: PathBuf, near: PathBuf, reason: String },
     #[error("{about}: {source}")]
-    About {
-        /// Its subject: a pair, a file, a step.
-        about: String,
-        source: Box<Self>,
-    },
-    /// Values that make no optics.
+    About { about: String, source: Box<Self> },
     #[error(transparent)]
     Optics(#[from] OpticsError),
-    /// A design of operators that cannot be.
     #[error(transparent)]
     Design(#[from] DesignError),
-    /// A pair that gives no depth.
     #[error(transparent)]
     Depth(#[from] RunError),
-    /// Images that do not form a pair.
     #[error(transparent)]
     Unpaired(PrepareError),
-    /// A camera's dark and flat frames.
     #[error(transparent)]
     CameraFrames(#[from] CameraFramesError),
-    /// The same with a method to compare with.
     #[error(transparent)]
     Baseline(#[from] BaselineError),
-    /// A correction that cannot be learned or does not fit.
     #[error(transparent)]
     Correction(#[from] CorrectionError),
-    /// Images that give no point spread function.
     #[error(transparent)]
     Calibration(#[from] CalibrationError),
-    /// Images that do not form a focus stack.
     #[error(transparent)]
     Stack(#[from] StackError),
-    /// Files that do not form a focus stack.
     #[error(transparent)]
     StackFiles(#[from] farnear_files::stack::StackError),
-    /// Maps that cannot be compared.
     #[error(transparent)]
     Compare(#[from] CompareError),
-    /// A text that is not TOML of the expected kind.
     #[error(transparent)]
     Parse(#[from] toml::de::Error),
     #[error(transparent)]
     Simulator(#[from] crate::simulator::SimulatorError),
-    /// The board, or the way to it.
     #[error(transparent)]
     Client(#[from] ClientError),
     #[error(transparent)]
     Capture(#[from] CaptureError),
     #[error(transparent)]
     Camera(#[from] CameraError),
-    /// Where the stages would have to go.
     #[error(transparent)]
     Plan(#[from] PlanError),
-    /// The search for the focus.
     #[error(transparent)]
     Focus(#[from] FocusSearchError),
     #[error(transparent)]
     Program(#[from] ProgramError),
-    /// The board's log.
     #[error(transparent)]
     Log(#[from] LogEnded),
-    /// A capture's record.
     #[error(transparent)]
     Record(#[from] RecordError),
-    /// Correction by the board.
     #[error(transparent)]
     BoardCorrection(#[from] BoardCorrectionError),
     #[error(transparent)]
     Image(#[from] ImageError),
-    /// A map of numbers.
     #[error(transparent)]
     Map(#[from] MapError),
     #[error(transparent)]
@@ -203,60 +134,42 @@ pub enum WorkflowError {
     Video(#[from] VideoError),
     #[error(transparent)]
     Encode(#[from] EncodeError),
-    /// Results that cannot be put in place.
     #[error(transparent)]
     Staging(#[from] StagingError),
-    /// A thread that cannot be started.
     #[error("cannot start a thread: {reason}")]
-    Thread {
-        /// What the system says.
-        reason: String,
-    },
-    /// Where the sun stands.
+    Thread { reason: String },
     #[error(transparent)]
     Sun(#[from] SunError),
     #[error(transparent)]
     Silhouettes(#[from] crate::silhouettes::SilhouettesError),
-    /// Moving regions of a video.
     #[error(transparent)]
     Background(#[from] BackgroundError),
-    /// Pictures that a shadow detector cannot take.
     #[error(transparent)]
     ShadowImages(#[from] ImagesError),
     #[error(transparent)]
     CameraFile(#[from] CameraFileError),
-    /// Where a shadow falls.
     #[error(transparent)]
     Shadow(#[from] ShadowError),
-    /// How sure a shadow is.
     #[error(transparent)]
     ShadowUncertainty(#[from] UncertaintyError),
-    /// Pictures that do not belong together.
     #[error(transparent)]
     Shape(#[from] ShapeError),
-    /// A score of shadow removal.
     #[error(transparent)]
     Score(#[from] crate::shadow::score::ScoreError),
-    /// Samples of activities.
     #[error(transparent)]
     Samples(#[from] crate::activity::samples::SamplesError),
-    /// A motion file that teaches nothing.
     #[error(transparent)]
     Motion(#[from] crate::activity::motion::MotionError),
-    /// A model of activities.
     #[error(transparent)]
     Model(#[from] ModelError),
-    /// Other views than a model's.
     #[error(transparent)]
     Views(#[from] crate::activity::recognition::ViewsError),
-    /// What several people cannot be recognised in.
     #[error(transparent)]
     MultiPerson(#[from] crate::activity::multi_person::MultiPersonError),
     #[error(transparent)]
     Evaluation(#[from] EvaluationError),
     #[error(transparent)]
     Batch(#[from] crate::batch::BatchError),
-    /// A record that cannot be put into TOML.
     #[error("cannot write a record: {0}")]
     Toml(#[from] toml::ser::Error),
 }
@@ -288,7 +201,6 @@ impl From<MeasureError> for WorkflowError {
 }
 
 impl WorkflowError {
-    /// A parameter that cannot be.
     pub fn parameter(name: &'static str, value: impl ToString, expected: impl Into<String>) -> Self {
         Self::Parameter { name, value: value.to_string(), expected: expected.into() }
     }
@@ -298,12 +210,10 @@ impl WorkflowError {
         move |error| Self::File { path: path.into(), expected, reason: error.to_string() }
     }
 
-    /// For `map_err`: a file that cannot be read.
     pub fn read(what: &'static str, path: &Path) -> impl FnOnce(std::io::Error) -> Self {
         move |source| Self::Read { what, path: path.into(), source }
     }
 
-    /// Whether the work was cancelled.
     pub fn is_cancelled(&self) -> bool {
         match self {
             Self::Cancelled { .. }
@@ -321,7 +231,7 @@ impl WorkflowError {
         }
     }
 
-    /// Whether the request was invalid: nothing has been done.
+    /// Whether the request was invalid, so that nothing was done.
     pub fn is_usage(&self) -> bool {
         match self {
             Self::Parameter { .. } | Self::Request(_) => true,
@@ -331,12 +241,8 @@ impl WorkflowError {
     }
 }
 
-/// Adds the subject of an error.
 pub trait About<T> {
-    /// The same result, whose error names its subject.
-    ///
-    /// # Errors
-    /// As before.
+    /// Adds the subject of an error.
     fn about(self, about: impl FnOnce() -> String) -> Result<T>;
 }
 

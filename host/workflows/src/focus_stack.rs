@@ -1,6 +1,7 @@
-//! Depth from focus: images at different focus, to a depth map and an image that is sharp everywhere.
+//! Depth from focus: a depth map and an all-in-focus image from images at different focus.
 
 mod frames;
+mod images;
 mod positions;
 
 use std::{
@@ -10,14 +11,18 @@ use std::{
 };
 
 use farnear_depth::{
-    focus_stack::{self, Sharpness, StackMap, StackSettings},
-    optics::{Distortion, DistortionSection, Optics},
-    prepare::{align::Model, straightened},
+    focus_stack::{self, Sharpness, Slices, StackMap, StackSettings},
+    optics::{DistortionSection, Optics},
+    prepare::{
+        align::Model,
+        warp::{Warp, resample},
+    },
 };
 use farnear_files::{
-    image_file::{self, Grey, GreyImage, ReadSettings, shared_white_level},
-    npy, stack, view,
+    image_file::{self, Grey},
+    npy, view,
 };
+use images::Images;
 use ndarray::{Array2, ArrayView2};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -199,7 +204,6 @@ impl FocusStackRequest {
     }
 }
 
-/// Registration of a stack's images.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct StackAlign(pub Option<Model>);
 
@@ -230,21 +234,18 @@ impl FromStr for StackAlign {
 
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct FocusStackFigures {
-    /// Images that were used.
     pub images: usize,
-    /// Files that were left out.
     pub left_out: Vec<String>,
-    /// Unit of depth: `mm`, `um` (positions of a stage), or `image` where the positions are not known.
+    /// Unit of depth: `mm`, `um` (stage positions), or `image` if the positions are unknown.
     pub unit: &'static str,
-    /// Part of the pixels with a value.
+    /// Share of pixels with a value.
     pub known: f64,
     pub median: Option<f64>,
-    /// Farthest that a pixel was moved, px.
+    /// Largest displacement of a pixel.
     pub moved_px: f64,
     pub warnings: Vec<String>,
 }
 
-/// Contents of `stack.toml`.
 #[derive(Serialize)]
 struct Record<'a> {
     made_by: &'static str,
@@ -261,34 +262,27 @@ struct Record<'a> {
     white_level: Option<u32>,
     images: &'a [String],
     left_out: &'a [String],
-    /// Where the images are focused, in the unit.
     positions: &'a [f64],
-    /// The distortion that was removed.
     distortion: Option<DistortionSection>,
-    /// Side of a pixel at the object, from the metadata of the stack.
+    /// Side of a pixel at the object, from the stack's metadata.
     object_pixel_um: Option<f64>,
     optics: Option<Optics>,
-    /// The files that the map was made from.
     input: Vec<HashedFile>,
 }
 
-/// Part of the pixels below which a stack shows too little.
+/// Least share of pixels with a value, below which a warning is given.
 const LITTLE: f64 = 0.5;
 
-/// Measures a stack and writes the results.
-///
-/// # Errors
-/// Images that cannot be read or are no stack; positions that are not as many as the images; a folder that exists already;
-/// [`WorkflowError::Cancelled`].
+/// Measures a stack and writes the results to a new folder.
 pub fn focus_stack(request: &FocusStackRequest, context: &Context<'_>) -> Result<FocusStackFigures> {
     request.check()?;
     let staging = result_folder::stack(&request.out, &request.stack)?;
     let mut listed = positions::of(request)?;
     let inputs: Vec<PathBuf> = listed.images.iter().cloned().chain(listed.described_by.clone()).collect();
     let mut warnings = std::mem::take(&mut listed.remarks);
-    let mut images = read(&listed.images, request, &mut warnings, context)?;
+    let mut images = Images::read(&listed.images, request, &mut warnings, &staging, context)?;
     let mut frames = if request.use_all && request.align.0.is_none() {
-        frames::Frames { warps: Vec::new(), left_out: Vec::new() }
+        frames::Frames { warps: vec![Warp::IDENTITY; images.count()], left_out: Vec::new() }
     } else {
         frames::check(&images, request.align.0, context)?
     };
@@ -306,13 +300,12 @@ pub fn focus_stack(request: &FocusStackRequest, context: &Context<'_>) -> Result
         frames.warps.remove(*index);
     }
     listed.without(&indices);
-    let unseen = listed.distortion().map(|distortion| straighten(&mut images, &distortion));
-    let moved_px = if request.align.0.is_some() { frames::moved(&mut images, &frames.warps) } else { 0.0 };
-    context.cancel.check("measuring the stack")?;
-    context.info(&format!("measuring {} images by {}", images.len(), request.measure));
-    let views: Vec<ArrayView2<f32>> = images.iter().map(|image| image.view()).collect();
+    let moved_px = frames::farthest_px(&frames.warps, images.dim(0));
+    let unseen = images.prepare(listed.distortion(), &frames.warps)?;
+    context.info(&format!("measuring {} images by {}", images.count(), request.measure));
     let mut map =
-        focus_stack::depth_from_positions(&views, &listed.even_positions(), &request.computation())?;
+        focus_stack::depth_from_positions(&images, &listed.even_positions(), &request.computation())?;
+    drop(images);
     for (at, _) in unseen.iter().flat_map(|unseen| unseen.indexed_iter()).filter(|(_, unseen)| **unseen) {
         (map.place[at], map.reliability[at]) = (f32::NAN, 0.0);
     }
@@ -359,53 +352,17 @@ fn name(path: &Path) -> String {
     path.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
-fn read(
-    images: &[PathBuf],
-    request: &FocusStackRequest,
-    warnings: &mut Vec<String>,
-    context: &Context<'_>,
-) -> Result<Vec<Array2<f32>>> {
-    let settings = ReadSettings { grey: request.grey, white_level: request.white_level };
-    let read = stack::read(images, &settings, |index| -> Result<()> {
-        context.cancel.check("reading the stack")?;
-        context.progress.advance("images", index + 1, Some(images.len()));
-        Ok(())
-    })?;
-    if request.grey == Grey::Mean && read.iter().any(|image| image.colour) {
-        warnings.push("colour images: grey is the mean of red, green and blue (--grey)".into());
-    }
-    let white = shared_white_level(read.iter());
-    let relative = |image: GreyImage| match white {
-        Some(white) => image.relative_to(white),
-        None => image,
-    };
-    Ok(read.into_iter().map(|image| relative(image).pixels).collect())
-}
-
-/// Removes the lens' distortion from all images. Where it showed nothing, which is the same in all, they keep their own pixels, and
-/// the mask marks these.
-fn straighten(images: &mut [Array2<f32>], distortion: &Distortion) -> Array2<bool> {
-    let mut unseen = Array2::from_elem((0, 0), false);
-    for image in images {
-        let straight = straightened(image.view(), distortion);
-        unseen = straight.mapv(|value| !value.is_finite());
-        let own = std::mem::replace(image, straight);
-        image.zip_mut_with(&own, |straight, own| {
-            if !straight.is_finite() {
-                *straight = *own;
-            }
-        });
-    }
-    unseen
-}
-
 /// Aligns the images of a stack, NaN where they do not show the scene; returns the farthest distance that a pixel was moved, px.
 ///
 /// # Errors
 /// Those of a context that cancels.
 pub fn aligned_stack(images: &mut [Array2<f32>], model: Model) -> Result<f64> {
-    let frames = frames::check(images, Some(model), &Context::unattended())?;
-    Ok(frames::moved(images, &frames.warps))
+    let views: Vec<ArrayView2<f32>> = images.iter().map(|image| image.view()).collect();
+    let warps = frames::check(&views[..], Some(model), &Context::unattended())?.warps;
+    for (image, warp) in images.iter_mut().zip(&warps).filter(|(_, warp)| **warp != Warp::IDENTITY) {
+        *image = resample(image.view(), warp);
+    }
+    Ok(images.first().map_or(0.0, |first| frames::farthest_px(&warps, first.dim())))
 }
 
 fn figures(

@@ -1,4 +1,4 @@
-//! The files that a result was made from, with their hashes.
+//! Input files of a result, with their hashes.
 
 use std::{
     fs::{self, File},
@@ -15,29 +15,23 @@ use crate::{
     error::{Result, WorkflowError},
 };
 
-/// Read at once while hashing.
 const BUFFER_BYTES: usize = 1 << 16;
 
-/// A file with its length and SHA-256.
+/// Length and SHA-256 of a file.
 #[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
 pub struct HashedFile {
-    /// Its path relative to the folder of the record that lists it.
+    /// Relative to the folder of the record.
     pub file: String,
     pub bytes: u64,
     pub sha256: String,
 }
 
-/// Hashes the inputs of a result that is written to the folder `out`. Folders stand for all files in them, pages of a TIFF
-/// (`stack.tif#3`) for the file.
-///
-/// # Errors
-/// [`WorkflowError::Read`].
+/// Hashes inputs of a result in `out`: all files of a folder; the file of a TIFF page (`stack.tif#3`).
 pub(crate) fn hashed(inputs: &[PathBuf], out: &Path) -> Result<Vec<HashedFile>> {
     let place = batch::final_place(out);
     files(inputs)?.iter().map(|file| hash(file, &relative(file, &place))).collect()
 }
 
-/// The files among paths, and all files in folders among them, each once.
 pub(crate) fn files(inputs: &[PathBuf]) -> Result<Vec<PathBuf>> {
     let mut files: Vec<PathBuf> = Vec::new();
     for input in inputs {
@@ -52,7 +46,6 @@ pub(crate) fn files(inputs: &[PathBuf]) -> Result<Vec<PathBuf>> {
     Ok(files)
 }
 
-/// All files below a folder, in the order of their names.
 pub(crate) fn files_below(folder: &Path) -> Result<Vec<PathBuf>> {
     let entries = fs::read_dir(folder).and_then(Iterator::collect::<io::Result<Vec<_>>>);
     let entries = entries.map_err(WorkflowError::read("the folder", folder))?;
@@ -69,7 +62,6 @@ pub(crate) fn files_below(folder: &Path) -> Result<Vec<PathBuf>> {
     Ok(files)
 }
 
-/// Hashes a file, which is listed under `name`.
 pub(crate) fn hash(file: &Path, name: &str) -> Result<HashedFile> {
     let mut hasher = Sha256::new();
     let mut opened = File::open(file).map_err(WorkflowError::read("the input", file))?;
@@ -90,7 +82,7 @@ pub(crate) fn hash(file: &Path, name: &str) -> Result<HashedFile> {
     Ok(HashedFile { file: name.into(), bytes, sha256 })
 }
 
-/// A file's path from a folder, with `/` between its parts on every system; the whole path where they share no root.
+/// With `/` on all systems; the whole path without a common root.
 fn relative(file: &Path, folder: &Path) -> String {
     let complete = |path: &Path| {
         let path = std::path::absolute(path).unwrap_or_else(|_| path.into());
@@ -128,7 +120,7 @@ mod tests {
     }
 
     #[test]
-    fn folders_and_pages_stand_for_their_files() {
+    fn folders_and_pages_represent_their_files() {
         let folder = tempfile::tempdir().expect("a folder");
         for name in ["b.tif", "camera/dark.npy"] {
             let path = folder.path().join(name);
@@ -139,7 +131,7 @@ mod tests {
         let found = hashed(&inputs, &folder.path().join("out")).expect("readable");
         let names: Vec<_> = found.iter().map(|file| file.file.as_str()).collect();
         assert_eq!(names, ["../b.tif", "../camera/dark.npy"]);
-        // As sha256sum prints it.
+        // Output of sha256sum.
         assert_eq!(found[0].sha256, "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");
     }
 }

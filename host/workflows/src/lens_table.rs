@@ -1,7 +1,7 @@
-//! The working range from lens, sensor and focus distances, or from a micrometer's readings.
+//! Working range from lens, sensor and focus distances, or from a micrometer's readings.
 //!
-//! A rig that is turned by hand has readings instead of positions: m1 where the far target is sharp, and m2 = m1 + 2 Fe Rmax
-//! for the near-focused image (Li 2014, eqs. 4.3 and 4.4). Given both readings, Rmax follows from them.
+//! A manual rig has readings: m1 with the far target in focus, and m2 = m1 + 2 Fe Rmax for the near-focused
+//! image (Li 2014, eqs. 4.3 and 4.4). Rmax follows from both readings.
 
 use farnear_depth::optics::{OpticsFile, WorkingRange};
 use serde::{Deserialize, Serialize};
@@ -11,69 +11,56 @@ use crate::{
     figures::rounded,
 };
 
-/// What a turn of the thesis' micrometer moves, in mm: readings are given as whole half-millimetres and the rest.
+/// Travel per turn of the thesis' micrometer: readings are split into half-millimetres and the rest.
 const MAJOR_MM: f64 = 0.5;
-/// Depths of which the blur is given.
 const SAMPLES: usize = 33;
 
-/// Readings of a micrometer under the sensor, mm.
 #[derive(Clone, Copy, PartialEq, Debug, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Readings {
-    /// m1, where the far-focused target is sharp.
+    /// m1: the far target is in focus.
     pub far_mm: Option<f64>,
-    /// m2, of the near-focused image; with it, the largest blur follows from the readings.
+    /// m2, of the near-focused image. With m1 it gives the largest blur.
     pub near_mm: Option<f64>,
 }
 
-/// A reading as the thimble shows it.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 pub struct Reading {
     pub mm: f64,
-    /// Whole half-millimetres on the sleeve.
+    /// Half-millimetres on the sleeve.
     pub major_mm: f64,
     /// The rest, on the thimble.
     pub minor_mm: f64,
 }
 
-/// Blur of an object at a distance.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 pub struct Blur {
     pub depth_mm: f64,
-    /// Blur radius in the far-focused image, px.
     pub far_px: f64,
-    /// The same in the near-focused image.
     pub near_px: f64,
 }
 
-/// What follows from the optics.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct LensFigures {
-    /// Object and sensor distances.
     pub range: WorkingRange,
     pub f_number: f64,
-    /// Diameter of the aperture.
     pub aperture_mm: f64,
     pub max_blur_px: f64,
-    /// From the near to the far end of the range.
     pub depth_range_mm: f64,
-    /// What a change of the blur by a tenth of a pixel means in depth, in the middle of the range.
+    /// Depth change for a blur change of 0.1 px at mid-range.
     pub depth_per_tenth_px_mm: f64,
-    /// What one pixel sees in the middle of the range, in mm.
+    /// Object size seen by a pixel at mid-range.
     pub pixel_footprint_mm: f64,
-    /// m1, where it was given.
+    /// m1, if given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub reading_far: Option<Reading>,
-    /// m2, as given or as it follows from m1.
+    /// m2, given or calculated from m1.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub reading_near: Option<Reading>,
-    /// Blur over the range, from far to near.
     pub blur: Vec<Blur>,
-    /// The optics, complete.
     pub optics: OpticsFile,
 }
 
-/// Calculates all of it. No cost worth naming.
 pub fn calculate(file: &OpticsFile, readings: Readings) -> Result<LensFigures> {
     let mut file = file.clone();
     for (name, value) in [("m1", readings.far_mm), ("m2", readings.near_mm)] {
@@ -86,7 +73,7 @@ pub fn calculate(file: &OpticsFile, readings: Readings) -> Result<LensFigures> {
             let expected = format!("expected more than m1 = {m1}: the near focus is further from the lens");
             return Err(WorkflowError::parameter("m2", m2, expected));
         }
-        // Any blur makes checked optics of the rest, from which the f-number is taken.
+        // Any blur completes valid optics, which give the f-number.
         file.focus.near_mm = None;
         file.focus.max_blur_px = Some(1.0);
         let unit = file.check()?.working_range().sensor_travel_mm;
@@ -112,7 +99,7 @@ pub fn calculate(file: &OpticsFile, readings: Readings) -> Result<LensFigures> {
         aperture_mm: rounded(optics.aperture_mm(), 4),
         max_blur_px: rounded(optics.max_blur_px(), 4),
         depth_range_mm: rounded(range.far_mm - range.near_mm, 3),
-        // The radius goes from 0 to Rmax while alpha goes from -1 to 1, so half of Rmax per unit of alpha.
+        // The radius grows from 0 to Rmax for alpha from -1 to 1: half of Rmax per unit of alpha.
         depth_per_tenth_px_mm: rounded(0.2 * per_px, 3),
         pixel_footprint_mm: rounded(
             optics.pixel_um() * 1e-3 * (middle_mm / optics.focal_length_mm() - 1.0),
@@ -134,7 +121,7 @@ fn reading(mm: f64) -> Reading {
 mod tests {
     use super::*;
 
-    /// The experiment of Li 2014, section 4.5.2: a target at 800 mm, sharp at a reading of 5.17 mm.
+    /// Experiment of Li 2014, section 4.5.2: a target at 800 mm, in focus at a reading of 5.17 mm.
     fn thesis() -> OpticsFile {
         toml::from_str(
             "[lens]\nfocal_length_mm = 50.0\naperture_mm = 12.8\n[sensor]\npixel_um = 7.4\n[focus]\nfar_mm = 800.0\n\

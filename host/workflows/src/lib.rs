@@ -1,25 +1,9 @@
-//! # farnear-workflows
+//! Tasks of farnear, shared by all interfaces: command line, web page, batch runner, Python.
 //!
-//! What a user can do with farnear, once, for every face: the command line, a web page, a batch runner, Python. A workflow
-//! takes its settings as a struct and a [`Context`] (progress, questions, cancelling), reads and writes files, drives the
-//! rig, and gives figures or a [`WorkflowError`] with the offending values. It never writes to a terminal, reads a
-//! keyboard or listens for a signal.
+//! A workflow takes a settings struct and a [`Context`] (progress, questions, cancellation). It returns figures
+//! or a [`WorkflowError`] with the offending values. It does not use the terminal, the keyboard or signals.
 //!
-//! - [`rig`]: connecting, and all that a rig does; [`simulator`]: starting the emulated one.
-//! - [`camera`]: cameras without a rig: which there are, what they can, pictures to keep and to look at.
-//! - [`depth`]: from a pair to a folder with its map; [`correct`], [`compare`]: what is done with maps.
-//! - [`optics`], [`operators`], [`correction_file`]: what depth is computed with; [`operator_plot`]: operators as a picture.
-//! - [`measure`]: figures of a map: a region with its plane, a profile, a difference; [`picture`]: figures of an image;
-//!   [`lens_table`]: the working range as it is typed; [`sessions`], [`report`]: captures that were kept, and a page about one.
-//! - [`target`]: a flat target to print; [`calibrate`]: learning the point spread function and corrections.
-//! - [`silhouettes`]: masks of a person from video, motion capture or made people; [`shadow`]: taking shadow off them, by where the
-//!   [`sun`] stands; [`activity`]: what the person does.
-//! - [`inputs`], [`result_folder`]: hashes of what a result was made from; folders that hold the result of one run.
-//! - [`batch`]: a list of such jobs on all cores, to be gone on with after whatever stopped it.
-//! - [`doctor`]: checks of this computer.
-//! - [`context`], [`error`]: the way to the face and back.
-//!
-//! A face that keeps what it is told, and a stage that is moved; a scripted board stands behind the port here.
+//! Example: an interface that collects messages, and a stage move with a scripted board on the port.
 //!
 //! ```
 //! # #[cfg(target_os = "linux")] { // where a pseudo-terminal holds the board
@@ -100,5 +84,5 @@ pub mod text_file;
 pub use context::{Cancel, Context, Progress, Questions, Unattended};
 pub use error::{Result, WorkflowError};
 
-/// What records say made them.
+/// Program name and version, for records.
 pub const MADE_BY: &str = concat!("farnear ", env!("CARGO_PKG_VERSION"));

@@ -1,8 +1,8 @@
-//! Figures of a depth map: a region with the plane through it, a profile, the difference of two maps, over time.
+//! Figures of depth maps: region with plane, profile, difference of two maps.
 //!
-//! A map has its own unit: mm, um (positions of a stage), or the number of the image in a stack. A pixel of pitch p sees
-//! p (z - F) / F of the object at distance z (telecentric lens, see `farnear_files::mesh`), which gives positions beside the optical
-//! axis in mm; a stack gives the side of a pixel at the object if its metadata hold it. Otherwise positions are in pixels.
+//! Depth is in mm, um (stage positions) or image numbers of a stack. A pixel of pitch p covers p (z - F) / F
+//! at distance z (telecentric lens, see `farnear_files::mesh`), which gives lateral positions in mm. A stack
+//! may give the pixel size in its metadata; otherwise positions are in pixels.
 
 mod difference;
 mod map_file;
@@ -35,19 +35,18 @@ pub use unit::Unit;
 
 use crate::error::{Result, WorkflowError};
 
-/// A depth map with its standard deviation, where that was computed, and where its pixels see the object.
+/// A depth map with standard deviation (if computed) and lateral positions.
 #[derive(Clone, Debug)]
 pub struct Measured {
-    /// Depths, (height, width); NaN = no value.
+    /// (height, width); NaN = no value.
     pub depth: Array2<f32>,
-    /// Standard deviation of each depth.
+    /// Of each depth.
     pub deviation: Option<Array2<f32>>,
-    /// Unit of both.
+    /// Unit of both maps.
     pub unit: Unit,
     pub lateral: Lateral,
 }
 
-/// A rectangle of pixels.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Rectangle {
@@ -57,7 +56,6 @@ pub struct Rectangle {
     pub height: usize,
 }
 
-/// A text that names no rectangle.
 #[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
 #[error("expected column, row, width and height in pixels, such as 100,80,320,240")]
 pub struct NoRectangle;
@@ -81,14 +79,11 @@ impl std::str::FromStr for Rectangle {
 
 impl Measured {
     /// Reads the map of a result folder, or a map file: `.npy`, float TIFF, or the `depth.png` of a result.
-    ///
-    /// # Errors
-    /// [`WorkflowError::Map`] without a map; records that cannot be read; [`WorkflowError::File`] for a deviation of another size.
     pub fn read(path: &Path) -> Result<Self> {
         map_file::read(path)
     }
 
-    /// Where the pixel sees the object: to the right, up, away from the lens. `None` without a depth.
+    /// Object point of a pixel: right, up, away from the lens. `None` without a depth.
     pub fn point(&self, column: usize, row: usize) -> Option<[f64; 3]> {
         let z = f64::from(*self.depth.get((row, column))?);
         let [x, y] = self.lateral.beside_axis(self.depth.dim(), column, row, z);
@@ -99,15 +94,13 @@ impl Measured {
         at.check_within(self.depth.dim())
     }
 
-    /// The whole map.
     pub fn all(&self) -> Rectangle {
         let (height, width) = self.depth.dim();
         Rectangle { x: 0, y: 0, width, height }
     }
 }
 
-/// The point of the object that each pixel of a whole depth map (mm) sees, (height, width, 3) in mm as in the mesh: to the right, up, towards
-/// the viewer, from the lens; NaN without a depth.
+/// Object points of a depth map, (height, width, 3) in mm as in the mesh: right, up, towards the viewer.
 pub fn points_mm(depth_mm: ArrayView2<f32>, optics: &Optics) -> Array3<f32> {
     let dim = depth_mm.dim();
     let projection =
@@ -123,8 +116,7 @@ pub fn points_mm(depth_mm: ArrayView2<f32>, optics: &Optics) -> Array3<f32> {
 }
 
 impl Rectangle {
-    /// # Errors
-    /// [`WorkflowError::Parameter`] unless it is a part of an image of (height, width).
+    /// Fails outside an image of (height, width).
     pub fn check_within(&self, (height, width): (usize, usize)) -> Result<()> {
         let at = self;
         let fits = |begin: usize, size: usize, all: usize| {

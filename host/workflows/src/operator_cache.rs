@@ -1,9 +1,7 @@
 //! Designed operators in the user's cache folder.
 //!
-//! An entry belongs to what was asked for and to the very build of this program that designed it, so that it is
-//! what a new design would give, bit for bit. One that is broken or belongs to something else is not used but
-//! written again; where nothing can be written, nothing is cached. Reading an entry takes well below a millisecond,
-//! a design some of them (a slow one a second).
+//! An entry belongs to a request and a build of this program, so it equals a new design bit for bit. Damaged
+//! entries are replaced. Reading takes well below 1 ms, a design a few ms, at most 1 s.
 
 use std::{
     env, fs,
@@ -15,12 +13,11 @@ use std::{
 use farnear_depth::operators::{self, DesignError, Operators, Request};
 use farnear_files::staging;
 
-/// Version of an entry's layout: one line with a sum over key and operators, then the operators as TOML.
+/// Version of the layout: a line with a hash of key and operators, then the operators as TOML.
 const LAYOUT: u32 = 1;
-/// Entries that are kept; the oldest go first. Each is 12 kB.
+/// Most entries; the oldest are removed. Each is 12 kB.
 const ENTRIES_MAX: usize = 64;
 
-/// Operators from the cache, else designed and put there.
 pub fn operators(request: &Request) -> Result<Operators, DesignError> {
     let (Some(folder), Some(build)) = (folder(), build()) else { return operators::design(request) };
     cached(&folder.join("farnear").join("operators"), &build, request)
@@ -28,7 +25,7 @@ pub fn operators(request: &Request) -> Result<Operators, DesignError> {
 
 fn cached(folder: &Path, build: &str, request: &Request) -> Result<Operators, DesignError> {
     let format = operators::FORMAT;
-    // The numbers of a Request are printed so that they come back to the last bit.
+    // Numbers of a request are printed without loss.
     let key = format!("layout {LAYOUT}, operators {format}, build {build}, {request:?}");
     let entry = folder.join(format!("{:016x}.toml", sum(&[&key])));
     if let Some(found) = read(&entry, &key).filter(|found| found.request() == request) {
@@ -39,7 +36,7 @@ fn cached(folder: &Path, build: &str, request: &Request) -> Result<Operators, De
         && fs::create_dir_all(folder).is_ok()
     {
         let text = format!("{:016x}\n{body}", sum(&[&key, &body]));
-        // Without an entry the next design takes as long as this one did, that is all.
+        // Without an entry, the next call designs again.
         let _ = staging::write_file(&entry, text.as_bytes());
         drop_oldest(folder);
     }
@@ -70,26 +67,25 @@ fn drop_oldest(folder: &Path) {
     }
 }
 
-/// The hasher is the same wherever one build runs, which is all that is asked of it.
+/// The hasher is stable within a build, which is sufficient.
 fn sum(parts: &[&str]) -> u64 {
     let mut hasher = DefaultHasher::new();
     parts.hash(&mut hasher);
     hasher.finish()
 }
 
-/// Tells builds of this program apart: a design may have changed though the version has not.
+/// Identifies the build: a design may change without a new version.
 fn build() -> Option<String> {
     let program = fs::metadata(env::current_exe().ok()?).ok()?;
     let written = program.modified().ok()?.duration_since(UNIX_EPOCH).ok()?;
     Some(format!("{} of {} bytes at {}", env!("CARGO_PKG_VERSION"), program.len(), written.as_nanos()))
 }
 
-/// The user's cache folder.
 pub(crate) fn folder() -> Option<PathBuf> {
     user_folder("XDG_CACHE_HOME", "Library/Caches", ".cache")
 }
 
-/// The user's data folder: where programs store files that no option gives a place to.
+/// The user's data folder: default place of files.
 pub fn data_folder() -> Option<PathBuf> {
     user_folder("XDG_DATA_HOME", "Library/Application Support", ".local/share")
 }
@@ -123,9 +119,9 @@ mod tests {
     }
 
     #[test]
-    fn what_comes_from_the_cache_is_what_was_designed() {
+    fn cached_operators_equal_designed_ones() {
         let folder = tempfile::tempdir().unwrap();
-        // A number whose last bit matters.
+        // The last bit of the number matters.
         let request = request(2.0 + f64::EPSILON * 2.0);
         let designed = operators::design(&request).unwrap();
         assert_eq!(cached(folder.path(), "a", &request).unwrap(), designed);
@@ -145,13 +141,13 @@ mod tests {
     }
 
     #[test]
-    fn broken_entries_are_written_anew() {
+    fn broken_entries_are_rewritten() {
         let folder = tempfile::tempdir().unwrap();
         let request = request(2.0);
         let designed = cached(folder.path(), "a", &request).unwrap();
         let [entry] = entries(folder.path()).try_into().unwrap();
         let whole = fs::read_to_string(&entry).unwrap();
-        // A digit changed is still TOML and still operators, yet other ones.
+        // A changed digit still gives valid but different operators.
         let digit = whole.rfind(|letter: char| ('1'..'9').contains(&letter)).unwrap();
         let mut other_digit = whole.clone();
         other_digit.replace_range(digit..=digit, "9");

@@ -1,8 +1,8 @@
-//! What the operators were fitted to and how they respond, as SVG or PNG.
+//! Plots the fit and response of operators as SVG or PNG.
 //!
-//! Upper left the normalised image ratio (NIR) over the normalised depth at five frequencies: dots are the optics', lines
-//! the cubic fit `a1 alpha + a3 alpha^3`. Upper right a1 and a3 over frequency. Below the kernels' responses along a row and
-//! along the diagonal, each divided by its largest magnitude.
+//! Upper left: normalised image ratio (NIR) over normalised depth at five frequencies; dots are the optics',
+//! lines the cubic fit `a1 alpha + a3 alpha^3`. Upper right: a1 and a3 over frequency. Below: kernel
+//! responses along a row and along the diagonal, each divided by its largest magnitude.
 
 use std::{f64::consts::PI, path::Path};
 
@@ -13,9 +13,9 @@ use plotters::{coord::Shift, prelude::*, style::register_font};
 use crate::error::{Result, WorkflowError};
 
 const SIZE: (u32, u32) = (1100, 820);
-/// Radial frequencies of the NIR curves, rad/px.
+/// NIR curves by radial frequency, rad/px.
 const FREQUENCIES: usize = 5;
-/// Okabe & Ito 2008: the colour-blind tell them apart.
+/// Okabe & Ito 2008: distinguishable by the colour-blind.
 const COLOURS: [RGBColor; 5] = [
     RGBColor(0, 114, 178),
     RGBColor(213, 94, 0),
@@ -31,7 +31,6 @@ pub enum Format {
 }
 
 impl Format {
-    /// By the ending of a file's name.
     pub fn of(file: &Path) -> Result<Self> {
         match file.extension().unwrap_or_default().to_string_lossy().to_lowercase().as_str() {
             "svg" => Ok(Self::Svg),
@@ -41,7 +40,6 @@ impl Format {
     }
 }
 
-/// The plot of `operators` as the bytes of a file.
 pub fn plot(operators: &Operators, format: Format) -> Result<Vec<u8>> {
     register_font("sans-serif", FontStyle::Normal, dejavu::sans::regular())
         .map_err(|_| EncodeError::of("a plot")("the built-in font is damaged"))?;
@@ -142,10 +140,9 @@ fn frequencies() -> impl Iterator<Item = f64> {
     (0..=STEPS).map(|i| PI * i as f64 / STEPS as f64)
 }
 
-/// The corner where a legend of this many lines covers the fewest of the points, whose coordinates run from 0 to 1 over the
-/// chart; the lower right one if that is as good as any.
+/// Corner in which a legend covers the fewest points (coordinates from 0 to 1); preferably the lower right.
 fn free_corner(points: Vec<[f64; 2]>, lines: usize) -> SeriesLabelPosition {
-    // A little more than the legend takes of a chart.
+    // Slightly more than the legend's share of a chart.
     let (width, height) = (0.3, 0.06 + 0.055 * lines as f64);
     let corners = [
         (SeriesLabelPosition::LowerRight, [1.0, 0.0]),
@@ -185,7 +182,7 @@ fn chart<B: DrawingBackend>(
     chart
         .configure_mesh()
         .x_desc(x_label)
-        // Rounding leaves a -0.0 where 0 is meant.
+        // Avoid a rounded -0.0.
         .y_label_formatter(&|value| format!("{:.1}", if value.abs() < 1e-6 { 0.0 } else { *value }))
         .label_style(("sans-serif", 12))
         .axis_desc_style(("sans-serif", 13))

@@ -1,4 +1,4 @@
-//! Operators by name, from a file, or designed for the optics and kept in the user's cache.
+//! Finds operators by name, in a file or in the user's cache, or designs them.
 
 use std::{
     fs,
@@ -26,7 +26,6 @@ use crate::{
     request::{PathKind, Request},
 };
 
-/// What a file of operators holds, as [`WorkflowError::File`] names it.
 pub const KIND: &str = "saved operators";
 
 /// Design rational operators and report how well they fit.
@@ -98,18 +97,15 @@ impl Request for OperatorRequest {
     }
 }
 
-/// Quality of a design.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct OperatorFigures {
     /// Family, design, point spread function and blur.
     pub name: String,
-    /// How well the cubic fits the normalised image ratio.
+    /// Residual of the cubic fit to the normalised image ratio.
     pub nir_rms: f64,
-    /// How long the design took.
     pub seconds: f64,
 }
 
-/// Designs operators, and saves and draws them where that is wanted.
 pub fn design(settings: &OperatorRequest, context: &Context<'_>) -> Result<OperatorFigures> {
     let plot = match &settings.plot {
         Some(file) => Some((file, Format::of(file)?)),
@@ -125,7 +121,7 @@ pub fn design(settings: &OperatorRequest, context: &Context<'_>) -> Result<Opera
         kernel_size: settings.kernel_size_px,
     };
     let start = Instant::now();
-    // Not from the cache: how long a design takes is one of the figures.
+    // Not from the cache, because the duration is one of the figures.
     let operators = operators::design(&request)?;
     let seconds = start.elapsed().as_secs_f64();
     context.cancel.check("designing the operators")?;
@@ -147,13 +143,12 @@ pub fn design(settings: &OperatorRequest, context: &Context<'_>) -> Result<Opera
     })
 }
 
-/// Operators for some optics: those that `asked` names (`family:design` or a family alone, e.g. `gro:linear` or
-/// `gro`, or a file saved by `farnear operators`), else the default ones.
+/// `asked` is `family:design`, a family alone (`gro:linear`, `gro`), or a file saved by `farnear operators`.
 pub fn find(asked: Option<&Path>, optics: &Optics) -> Result<Operators> {
     let default = operators::Request::for_optics(optics);
     let Some(asked) = asked else { return Ok(cache::operators(&default)?) };
     match named(asked) {
-        // A file has priority over a name.
+        // A file takes precedence over a name.
         Some(name) if !asked.exists() => {
             let (family, design) = name.about(|| format!("operators {}", asked.display()))?;
             let request = operators::Request { family, design, ..default };
@@ -163,7 +158,7 @@ pub fn find(asked: Option<&Path>, optics: &Optics) -> Result<Operators> {
     }
 }
 
-/// The two halves of a name; `None` for what cannot be one.
+/// Splits `family:design`; `None` if it is not a name.
 fn named(asked: &Path) -> Option<Result<(Family, Design), operators::DesignError>> {
     let text = asked.to_str()?;
     let Some((family, design)) = text.split_once(':') else {
@@ -189,7 +184,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_are_told_from_paths() {
+    fn names_are_distinguished_from_paths() {
         let known = named(Path::new("gro:linear")).unwrap().unwrap();
         assert_eq!(known, (Family::Gro, Design::Linear));
         assert_eq!(named(Path::new("gro")).unwrap().unwrap(), known);

@@ -1,4 +1,4 @@
-//! The optics of a rig or of a pair, from `optics.toml` or a capture's record.
+//! Optics of a rig or a pair, from `optics.toml` or a capture's record.
 
 mod expected;
 mod task;
@@ -22,65 +22,48 @@ use crate::{
     text_file,
 };
 
-/// Optics and the file they come from.
 #[derive(Clone, Debug)]
 pub struct GivenOptics {
     pub path: PathBuf,
-    /// The checked contents.
     pub optics: Optics,
-    /// The contents as written, for records.
     pub table: toml::Table,
 }
 
 impl GivenOptics {
-    /// Reads and checks an optics file.
-    ///
-    /// # Errors
-    /// [`WorkflowError::Read`], or which value makes no optics.
     pub fn read(path: &Path) -> Result<Self> {
         let text = text_file::read(path).map_err(WorkflowError::read("the optics file", path))?;
         Self::parse(&text, path)
     }
 
-    /// Checks optics that are part of another file, at `path`.
-    ///
-    /// # Errors
-    /// Which value makes no optics.
+    /// Checks optics that are part of the file `path`.
     pub fn parse(text: &str, path: &Path) -> Result<Self> {
         let table = text.parse().about(|| about(path))?;
         Ok(Self { path: path.into(), optics: check(text, path)?, table })
     }
 
-    /// The optics, and what there is to say of them.
     fn with_doubts(self) -> (Optics, Vec<OpticsDoubt>) {
         let found = doubts(&self.optics, self.table.contains_key("psf"));
         (self.optics, found)
     }
 
-    /// As the emulated rig's lens takes them.
     pub fn for_emulation(&self) -> (&Path, Psf) {
         (&self.path, self.optics.psf())
     }
 }
 
-/// Reads and checks an optics file.
 pub fn read(path: &Path) -> Result<Optics> {
     GivenOptics::read(path).map(|given| given.optics)
 }
 
-/// A reason why optics may be wrong.
 #[derive(Clone, PartialEq, Debug)]
 pub enum OpticsDoubt {
-    /// A value that cameras hardly have.
+    /// An implausible camera value.
     Unusual(Doubt),
-    /// No point spread function is given.
     NoPsf,
-    /// The largest blur is more than can be used.
     TooMuchBlur {
         blur_px: f64,
-        /// Side of the square of pixels to average into one.
+        /// Side of the square of pixels to average.
         bin: usize,
-        /// Whether they were averaged.
         binned: bool,
     },
 }
@@ -108,11 +91,7 @@ fn doubts(optics: &Optics, psf_is_given: bool) -> Vec<OpticsDoubt> {
     unusual.chain((!psf_is_given).then_some(OpticsDoubt::NoPsf)).collect()
 }
 
-/// The optics of a pair: the file that is named, else what the far image's folder knows (`capture.toml` or
-/// `optics.toml`). With what there is to say of them: numbers that are hardly right, a point spread function that is not given.
-///
-/// # Errors
-/// As [`GivenOptics::read`]; [`WorkflowError::NoOptics`] where there is nothing.
+/// From the named file, else `capture.toml` or `optics.toml` in the far image's folder.
 pub fn of_pair(named: Option<&Path>, far: &Path) -> Result<(Optics, Vec<OpticsDoubt>)> {
     if let Some(path) = named {
         return GivenOptics::read(path).map(|given| given.with_doubts());
@@ -129,7 +108,7 @@ pub fn of_pair(named: Option<&Path>, far: &Path) -> Result<(Optics, Vec<OpticsDo
     Err(WorkflowError::NoOptics { far: far.into() })
 }
 
-/// The file that [`of_pair`] reads; `None` without one.
+/// `None` if [`of_pair`] reads no file.
 pub(crate) fn file_of_pair(named: Option<&Path>, far: &Path) -> Option<PathBuf> {
     let folder = far.parent().unwrap_or(Path::new(""));
     let beside =

@@ -1,5 +1,3 @@
-//! Parameters that must lie within limits.
-
 use std::{fmt::Display, ops::RangeInclusive};
 
 use crate::error::{Result, WorkflowError};

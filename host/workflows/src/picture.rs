@@ -1,4 +1,4 @@
-//! Figures of one image: brightness, saturation, texture, focus.
+//! Figures of an image: brightness, saturation, texture, focus.
 
 use farnear_capture::camera::Image;
 use farnear_depth::focus_measure::FocusMeasure;
@@ -6,13 +6,12 @@ use serde::Serialize;
 
 use crate::figures::rounded;
 
-/// Bins of the histogram.
 const BINS: usize = 256;
-/// Part of saturated pixels from which depth suffers: their true values, and so the blur, are unknown.
+/// Share of saturated pixels that affects depth: their true values, and so the blur, are unknown.
 const SATURATED: f64 = 0.005;
-/// Mean, as part of the full scale, below which the noise of reading dominates.
+/// Mean relative to full scale below which read noise dominates.
 const DARK: f64 = 0.04;
-/// Contrast (standard deviation over mean) below which there is hardly a texture to defocus.
+/// Contrast (standard deviation / mean) with too little texture for defocus.
 const TEXTURELESS: f64 = 0.02;
 
 #[derive(Clone, PartialEq, Debug, Serialize)]
@@ -20,22 +19,21 @@ pub struct PictureFigures {
     pub width: usize,
     pub height: usize,
     pub bits: u8,
-    /// Mean, as part of the full scale.
+    /// Relative to full scale.
     pub mean: f64,
-    /// Standard deviation over mean.
+    /// Standard deviation / mean.
     pub contrast: f64,
-    /// Part of the pixels at the largest code.
+    /// Share of pixels at the largest code.
     pub saturated_fraction: f64,
     /// Pixels per bin of the full scale, darkest first.
     pub histogram: Vec<u32>,
-    /// The focus measure; larger is sharper. None for an image that has none (dark, tiny).
+    /// Larger is sharper; `None` for a dark or tiny image.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub focus: Option<f64>,
-    /// What makes this image unfit for depth, each with what to do.
+    /// Reasons against use for depth, with remedies.
     pub warnings: Vec<String>,
 }
 
-/// Measures an image. One pass for the brightness, one for the focus measure.
 pub fn figures(image: &Image, measure: FocusMeasure) -> PictureFigures {
     let (height, width) = image.pixels.dim();
     let counts = image.counts();
@@ -99,7 +97,7 @@ mod tests {
         assert_eq!(found.warnings, Vec::<String>::new());
         assert_eq!((found.width, found.height, found.bits), (48, 32, 12));
         assert_eq!(found.histogram.iter().sum::<u32>(), 48 * 32);
-        // 1000 of 4096 codes lies in bin 62, 3000 in bin 187.
+        // 1000 of 4096 is in bin 62, 3000 in bin 187.
         assert_eq!((found.histogram[62], found.histogram[187]), (768, 768));
         assert!((found.mean - 2000.0 / 4095.0).abs() < 1e-4);
         assert!((found.contrast - 0.5).abs() < 1e-4);
@@ -113,7 +111,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_unfit_is_said() {
+    fn unfit_pictures_give_warnings() {
         assert!(seen(8, |_, x| if x < 4 { 255 } else { 100 }).warnings[0].starts_with("8.3 % of the pixels"));
         let dark = seen(8, |_, x| (x % 2) as u16);
         assert!(dark.warnings[0].starts_with("dark"), "{:?}", dark.warnings);

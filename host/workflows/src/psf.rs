@@ -1,4 +1,4 @@
-//! Point spread functions as a user gives them: by name, or as the file of an image of them.
+//! Point spread functions given by name or as an image file.
 
 use std::path::{Path, PathBuf};
 
@@ -10,23 +10,20 @@ use crate::{
     error::{Result, WorkflowError},
 };
 
-/// Part of an image's energy that is not round, above which a warning is given.
+/// Share of an image's energy that is not rotationally symmetric, above which a warning is given.
 const NOT_ROUND: f64 = 0.1;
 
 #[derive(Clone, PartialEq, Debug)]
 pub enum PsfSource {
-    /// A model with its parameters.
     Named(Psf),
-    /// A file with an image of the point spread function or of the aperture.
     Image {
         /// PNG, TIFF, JPEG, PGM or .npy.
         file: PathBuf,
-        /// What the blur radius (the aperture's edge) has in it; without it half the shorter side.
+        /// Blur radius (edge of the aperture) in pixels of the image. Default: half of the shorter side.
         radius_px: Option<f64>,
     },
 }
 
-/// A text that is neither.
 #[derive(Clone, PartialEq, Debug, thiserror::Error)]
 #[error(
     "{0}; or a file with an image of it: FILE.png or FILE.npy, and ,radius=PX where the blur radius is not half its shorter side"
@@ -66,8 +63,7 @@ impl std::fmt::Display for PsfSource {
 }
 
 impl PsfSource {
-    /// The point spread function. Parts of an image that are not round are averaged over the circle, with a warning where that is
-    /// much.
+    /// Averages an image over the angle, with a warning for a large deviation.
     pub fn read(&self, context: &Context<'_>) -> Result<Psf> {
         let (file, radius_px) = match self {
             Self::Named(psf) => return Ok(*psf),
@@ -94,7 +90,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_and_files_are_told_apart() {
+    fn names_are_distinguished_from_files() {
         assert_eq!("pillbox".parse(), Ok(PsfSource::Named(Psf::PillBox)));
         assert_eq!("ring:inner=0.5".parse(), Ok(PsfSource::Named(Psf::Ring { inner: 0.5 })));
         let image = |file: &str, radius_px| Ok(PsfSource::Image { file: file.into(), radius_px });

@@ -1,6 +1,4 @@
-//! A capture or a result as one page that needs nothing else: pictures, figures and what made them, for a notebook or a printer.
-//!
-//! The pictures are in the page as data, its style is in it, and nothing is fetched from anywhere.
+//! Report of a capture or a result as a self-contained page.
 
 mod kinds;
 mod page;
@@ -57,26 +55,17 @@ impl Request for ReportRequest {
 
 #[derive(Clone, PartialEq, Eq, Debug, Serialize)]
 pub struct ReportFigures {
-    /// Pictures in the page.
     pub pictures: usize,
     pub bytes: usize,
 }
 
-/// Writes the page; it is there whole or not at all.
-///
-/// # Errors
-/// As [`html`], [`crate::WorkflowError::Staging`].
 pub fn write(request: &ReportRequest) -> Result<ReportFigures> {
     let page = html(&request.folder)?;
     write_file(&request.out, page.as_bytes())?;
     Ok(ReportFigures { pictures: page.matches("<figure").count(), bytes: page.len() })
 }
 
-/// The page of a capture or a result. Reads its pictures and maps.
-///
-/// # Errors
-/// [`crate::WorkflowError::Read`] for a folder that does not exist; [`crate::WorkflowError::Parameter`] for one without anything that farnear
-/// writes; [`crate::WorkflowError::Map`].
+/// Fails for a folder without files of farnear.
 pub fn html(folder: &Path) -> Result<String> {
     let has = |name: &str| folder.join(name).is_file();
     if has(CAPTURE_FILE) {
@@ -88,7 +77,6 @@ pub fn html(folder: &Path) -> Result<String> {
     }
 }
 
-/// Maps and their figures.
 fn depth(page: &mut Page, folder: &Path) -> Result<()> {
     let measured = Measured::read(folder)?;
     let unit = measured.unit;
@@ -167,7 +155,7 @@ mod tests {
         let out = folder.path().join("report.html");
         let settings = ReportRequest { folder: folder.path().join("absent"), out: out.clone() };
         assert!(write(&settings).is_err() && !out.exists());
-        // A folder that holds nothing of farnear's.
+        // A folder without farnear's files.
         fs::write(folder.path().join("notes.md"), "mine").unwrap();
         let settings = ReportRequest { folder: folder.path().into(), ..settings };
         assert!(write(&settings).unwrap_err().to_string().contains("result") && !out.exists());

@@ -1,7 +1,5 @@
-//! One description per task: the request struct that the command line, the page, batch and Python share.
-//!
-//! A request's fields are the command's options, the page's JSON, a batch job's fields and Python's keywords. Its doc comments are
-//! the help text and its [`Default`] holds the defaults. [`parse`] reads fields from any of these sources.
+//! Request structs, one per task, shared by the command line, the page, batch and Python. Doc comments are
+//! the help text; [`Default`] holds the defaults.
 
 pub mod reference;
 
@@ -17,17 +15,15 @@ use crate::{
     rig::{RigAddress, camera::CameraSettings},
 };
 
-/// A task that a user can run, with everything that it needs to know.
+/// A task for users, with its parameters.
 pub trait Request:
     Clone + Default + Serialize + DeserializeOwned + JsonSchema + Send + Sync + 'static
 {
-    /// The words of the command: `depth`, `rig capture`.
+    /// Words of the command: `depth`, `rig capture`.
     const NAME: &'static str;
     /// Fields without a usable default.
     const REQUIRED: &'static [&'static str];
-    /// Fields that hold paths.
     const PATHS: &'static [(&'static str, PathKind)];
-    /// The task's result, as printed.
     type Figures: Serialize;
 
     /// Finds contradictions between fields without reading or moving anything.
@@ -35,37 +31,27 @@ pub trait Request:
         Ok(())
     }
 
-    /// Runs the task, after [`Self::check`].
-    ///
-    /// # Errors
-    /// Depends on the task.
     fn run(&self, context: &Context<'_>) -> Result<Self::Figures>;
 
-    /// The error that a complete result amounts to: figures are printed before it.
-    ///
-    /// # Errors
-    /// A comparison or a step that failed.
+    /// Error for a complete result, for instance a failed comparison. Figures are printed before it.
     fn verdict(_: &Self::Figures) -> Result<()> {
         Ok(())
     }
 
-    /// Files and folders that the result depends on.
     fn inputs(&self) -> Vec<PathBuf> {
         inputs(self)
     }
 }
 
-/// A task of a rig. Its caller decides which one.
+/// A rig's task; the caller chooses the rig.
 pub trait RigRequest: Request {
     fn set_rig(&mut self, rig: RigAddress);
 }
 
-/// A task of a rig with a camera.
 pub trait CameraRequest: RigRequest {
     fn set_camera(&mut self, camera: CameraSettings);
 }
 
-/// Files and folders that a request names as inputs.
 pub fn inputs<R: Request>(request: &R) -> Vec<PathBuf> {
     let is_input = |(kind, path): &(PathKind, PathBuf)| match kind {
         PathKind::Input => true,
@@ -75,51 +61,34 @@ pub fn inputs<R: Request>(request: &R) -> Vec<PathBuf> {
     paths_of(request).into_iter().filter(is_input).map(|(_, path)| path).collect()
 }
 
-/// What a field with a path refers to.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum PathKind {
-    /// A file or folder that is read.
     Input,
-    /// The name of something built in, or a file; text after a comma is not part of the path.
+    /// A built-in name or a file; text after a comma is not part of the path.
     InputOrName,
-    /// The file that is written.
     OutputFile,
-    /// The folder that is written.
     OutputFolder,
 }
 
 /// Whether a source of fields may name files.
 #[derive(Clone, Copy, Debug)]
 pub enum Paths<'a> {
-    /// Relative to this folder.
     RelativeTo(&'a Path),
-    /// Refused: the caller sets them itself.
     Refused,
 }
 
-/// A field that cannot be used.
 #[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
 pub enum RequestError {
-    /// The task has no such field.
     #[error("{task} has no field `{name}`; expected some of {}", known.join(", "))]
     UnknownField { task: &'static str, name: String, known: Vec<String> },
-    /// A required field is missing.
     #[error("{task} needs the field `{name}`")]
     MissingField { task: &'static str, name: &'static str },
-    /// The value does not fit.
     #[error("{field}: {reason}")]
-    Value {
-        field: String,
-        /// The value and the expected ones.
-        reason: String,
-    },
+    Value { field: String, reason: String },
 }
 
-/// Reads a request from named values. Names may use `-` or `_`. Texts are converted to numbers, booleans and lists (separated by `;`)
-/// where the field asks for these, so that a row of CSV and a TOML table give the same request.
-///
-/// # Errors
-/// [`RequestError`] for unknown and missing fields and for values that do not fit.
+/// Parses a request from named values. Names may use `-` or `_`. Text is converted to numbers, booleans and
+/// lists (separated by `;`) by the fields' types, so CSV and TOML give the same request.
 pub fn parse<R: Request>(fields: Map<String, Value>, paths: Paths<'_>) -> Result<R, RequestError> {
     let schema = schema::<R>();
     let is_path = |name: &str| R::PATHS.iter().any(|(path, _)| *path == name);
@@ -153,12 +122,12 @@ pub fn parse<R: Request>(fields: Map<String, Value>, paths: Paths<'_>) -> Result
     })
 }
 
-/// The JSON schema of a request: names, types, defaults and help of its fields.
+/// JSON schema of a request: names, types, defaults and help of its fields.
 pub fn schema<R: Request>() -> Value {
     schemars::SchemaGenerator::default().into_root_schema_for::<R>().to_value()
 }
 
-/// The schema without the fields that hold paths, for callers that may not name files.
+/// The schema without path fields, for callers that may not name files.
 pub fn schema_without_paths<R: Request>() -> Value {
     let mut schema = schema::<R>();
     if let Some(properties) = schema.get_mut("properties").and_then(Value::as_object_mut) {
@@ -167,7 +136,6 @@ pub fn schema_without_paths<R: Request>() -> Value {
     schema
 }
 
-/// All tasks that are described by a request.
 pub const TASKS: &[Task] = &[
     Task::of::<crate::depth::DepthRequest>(),
     Task::of::<crate::focus_stack::FocusStackRequest>(),
@@ -190,6 +158,7 @@ pub const TASKS: &[Task] = &[
     Task::of::<crate::silhouettes::markers::MarkersRequest>(),
     Task::of::<crate::silhouettes::skeletons::SkeletonsRequest>(),
     Task::of::<crate::silhouettes::synthetic::SyntheticRequest>(),
+    Task::of::<crate::activity::recognise::RecogniseRequest>(),
     Task::of::<crate::shadow::removal::ShadowRemoveRequest>(),
     Task::of::<crate::shadow::score::ShadowScoreRequest>(),
     Task::of::<crate::rig::pair::CaptureRequest>(),
@@ -206,22 +175,16 @@ pub const TASKS: &[Task] = &[
 /// Reads a job from its fields; paths are relative to the folder.
 type ReadJob = fn(Map<String, Value>, &Path) -> Result<Box<dyn Job>>;
 
-/// A task by its name, for callers that know it at run time only.
+/// A task known at run time only.
 pub struct Task {
-    /// The words of the command.
     pub name: &'static str,
-    /// JSON schema of its request.
     pub schema: fn() -> Value,
-    /// Fields that must be given.
     pub required: &'static [&'static str],
-    /// Fields that hold paths.
     pub paths: &'static [(&'static str, PathKind)],
-    /// Reads its request for [`Job::run`].
     pub job: ReadJob,
 }
 
 impl Task {
-    /// The task of a request.
     pub const fn of<R: Request>() -> Self {
         Self {
             name: R::NAME,
@@ -236,7 +199,7 @@ impl Task {
         }
     }
 
-    /// The field and kind of its result; none where it writes nothing.
+    /// Field and kind of the result; `None` if nothing is written.
     pub const fn output(&self) -> Option<(&'static str, PathKind)> {
         let mut index = 0;
         while index < self.paths.len() {
@@ -251,13 +214,8 @@ impl Task {
 
 /// A parsed request whose output can be redirected.
 pub trait Job: Send {
-    /// See [`Request::inputs`].
     fn inputs(&self) -> Vec<PathBuf>;
 
-    /// Runs the task with its result at `out`.
-    ///
-    /// # Errors
-    /// Those of the task.
     fn run(&self, out: &Path, context: &Context<'_>) -> Result<Value>;
 }
 
@@ -275,7 +233,7 @@ impl<R: Request> Job for Parsed<R> {
     fn run(&self, out: &Path, context: &Context<'_>) -> Result<Value> {
         let mut fields = self.fields.clone();
         if let Some((name, _)) = Task::of::<R>().output() {
-            // Relative paths are relative to the base; this one is complete.
+            // Make the path absolute, because relative paths are relative to the base.
             let out = std::path::absolute(out).map_err(WorkflowError::read("the result's folder", out))?;
             fields.insert(name.into(), out.display().to_string().into());
         }
@@ -299,7 +257,6 @@ fn paths_of<R: Request>(request: &R) -> Vec<(PathKind, PathBuf)> {
     found
 }
 
-/// The part of a value that can be a path.
 fn file_part(text: &str, kind: PathKind) -> &str {
     match kind {
         PathKind::InputOrName => text.split(',').next().unwrap_or(text),
@@ -329,7 +286,6 @@ fn property<'a>(schema: &'a Value, name: &str) -> Option<&'a Value> {
     schema.get("properties")?.get(name)
 }
 
-/// Whether a property accepts values of a JSON type.
 fn accepts(property: &Value, kind: &str, schema: &Value) -> bool {
     if let Some(target) = property.get("$ref").and_then(Value::as_str) {
         let target = target.trim_start_matches('#');

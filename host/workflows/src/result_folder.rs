@@ -1,4 +1,4 @@
-//! Folders that hold the result of one run: a later run removes the files of an earlier one that it does not write itself.
+//! Result folders: a run removes files of an earlier run that it does not write itself.
 
 use std::{fs, path::Path};
 
@@ -10,30 +10,22 @@ use crate::{
     error::{Result, WorkflowError},
 };
 
-/// Describes a depth map of a pair.
 pub const DEPTH_RECORD: &str = "depth.toml";
-/// Describes a result of a focus stack.
 pub const STACK_RECORD: &str = "stack.toml";
-/// Files of a focus stack's result.
 pub(crate) const STACK_FILES: [&str; 5] =
     ["depth.npy", "confidence.npy", "all-in-focus.png", "view.png", STACK_RECORD];
 
-/// Whether farnear wrote a record.
 fn is_ours(record: &Path) -> bool {
     let table = fs::read_to_string(record).ok().and_then(|text| text.parse::<toml::Table>().ok());
     let made_by = table.as_ref().and_then(|table| table.get("made_by")?.as_str());
     made_by.is_some_and(|made_by| made_by.starts_with("farnear"))
 }
 
-/// Whether the folder holds a focus stack's result.
 pub(crate) fn holds_stack(folder: &Path) -> bool {
     is_ours(&folder.join(STACK_RECORD))
 }
 
-/// Begins a depth map's result in a new or existing folder.
-///
-/// # Errors
-/// [`WorkflowError::Parameter`] for the folder of a focus stack's result; [`WorkflowError::Staging`].
+/// Begins a depth map's result in a new or existing folder, except that of a focus stack.
 pub fn depth(out: &Path) -> Result<Staging> {
     if holds_stack(out) {
         let expected = "it holds the result of focus-stack: name another folder";
@@ -44,9 +36,6 @@ pub fn depth(out: &Path) -> Result<Staging> {
 }
 
 /// Begins a focus stack's result in a new folder, an empty one, or that of an earlier focus stack.
-///
-/// # Errors
-/// [`StagingError::Exists`] for a folder with something else; for the folder of the images.
 pub(crate) fn stack(out: &Path, images: &Path) -> Result<Staging, StagingError> {
     let same =
         |a: &Path, b: &Path| fs::canonicalize(a).is_ok_and(|a| fs::canonicalize(b).is_ok_and(|b| a == b));
@@ -57,7 +46,7 @@ pub(crate) fn stack(out: &Path, images: &Path) -> Result<Staging, StagingError> 
     Ok(Staging::into_folder(out)?.replacing(STACK_RECORD, STACK_FILES.into_iter().chain(stale_batch)))
 }
 
-/// A batch's record of such a job: it lists files that are about to be replaced.
+/// A batch's record of such a job: it lists files that will be replaced.
 fn batch_of(folder: &Path, kind: &str) -> Option<&'static str> {
     let text = fs::read_to_string(folder.join(BATCH_RECORD)).ok()?;
     let of = text.parse::<toml::Table>().ok()?.get("do")?.as_str()? == kind;

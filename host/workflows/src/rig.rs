@@ -1,13 +1,3 @@
-//! A rig, real or emulated: connection and tasks. One file per task.
-//!
-//! - [`info`], [`motion`], [`alarms`], [`settings`], [`board`], [`log`]: what the board is asked and told.
-//! - [`camera`]: a rig with its camera; [`pair`], [`half_mirror`], [`sequence`], [`focus`], [`targets`]: tasks with both.
-//! - [`mechanics`], [`correction_fit`], [`correct`], [`sun`]: what the board measures and calculates.
-//! - [`check`]: the bring-up checklist.
-//! - [`open`]: a rig that is held open between jobs; [`live`], [`live_depth`]: images and depth as they come; [`series`]: pair after pair; [`continuous`]: at a pace that
-//!   the board holds;
-//!   [`goto`]: to the far or the near focus; [`quality`]: how good depth is.
-
 pub mod alarms;
 mod axis;
 pub mod board;
@@ -50,24 +40,21 @@ use open::OpenRig;
 
 #[derive(Clone, PartialEq, Debug, Default)]
 pub enum RigAddress {
-    /// The only board that is plugged in.
+    /// The only connected board.
     #[default]
     Attached,
     /// Behind a serial port, e.g. `/dev/ttyACM0`.
     Port(String),
-    /// Emulated: `farnear-sim` is started for it, and ends with it.
+    /// Emulated: `farnear-sim` is started for it and ends with it.
     Emulated(Scenery),
-    /// An open connection.
     Open(OpenRig),
 }
 
 impl RigAddress {
-    /// Whether the rig is the emulated one that is started for this.
     pub fn is_emulated(&self) -> bool {
         matches!(self, Self::Emulated(_))
     }
 
-    /// The emulated rig before another scene.
     pub fn with_scene(&self, scene: String) -> Result<Self> {
         match self {
             Self::Emulated(scenery) => Ok(Self::Emulated(scenery.with_scene(scene))),
@@ -83,16 +70,14 @@ impl RigAddress {
     }
 }
 
-/// A connected rig. The simulator, where there is one, ends after the client.
 pub struct Rig {
-    /// The way to the board.
     pub client: Client,
-    /// The emulated rig that was started for this task, with its options.
+    /// The emulated rig started for this task, with its options. Ends after `client`.
     pub emulation: Option<(Arc<Simulator>, Scenery)>,
 }
 
 impl Rig {
-    /// Connects. Cancelling stops all motion. The emulated rig's lens is that of `optics`, where they are given.
+    /// Connects. Cancelling stops all motion. An emulated rig uses the lens of `optics`, if given.
     pub fn connect(
         address: &RigAddress,
         optics: Option<(&Path, Psf)>,

@@ -1,6 +1,5 @@
-//! Stored captures: the folders of a session, their contents, and notes.
-//!
-//! A capture is a folder with `capture.toml` ([`farnear_capture::record`]); a note is next to it in `note.toml`.
+//! Stored captures of a session: folders with `capture.toml` ([`farnear_capture::record`]) and an optional
+//! `note.toml`.
 
 use std::{
     fs,
@@ -17,11 +16,10 @@ use crate::{
 };
 
 const NOTE_FILE: &str = "note.toml";
-/// Longest note, bytes: a note, not a file store.
 const NOTE_MAX: usize = 64 * 1024;
-/// Begin of the names of folders with another map of a capture.
+/// Prefix of folders with another map of a capture.
 const VARIANT: &str = "variant-";
-/// Names in a session's folder that are not captures.
+/// Other names in a session's folder.
 const RESERVED: &[&str] = &[
     "people",
     "recordings",
@@ -36,7 +34,6 @@ const RESERVED: &[&str] = &[
 ];
 const BEST: u8 = 5;
 
-/// What a person noted about a capture.
 #[derive(Clone, PartialEq, Eq, Debug, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Note {
@@ -46,42 +43,35 @@ pub struct Note {
     pub text: String,
 }
 
-/// A capture in a list.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct Capture {
-    /// Its folder's name.
     pub name: String,
     /// `pair` or `sequence`.
     pub kind: &'static str,
-    /// Its images, in the order of the exposures.
+    /// In the order of the exposures.
     pub images: Vec<String>,
     pub files: Vec<String>,
-    /// Other maps of the same pair: folders in the capture's with a `depth.npy`.
+    /// Folders in the capture's with a `depth.npy`: other maps of the same pair.
     pub variants: Vec<String>,
-    /// When its record was written, seconds since 1970.
+    /// When its record was written.
     pub written_unix_s: u64,
-    /// When it was taken; only of real hardware.
+    /// Only for real hardware.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub time: Option<String>,
     pub width: usize,
     pub height: usize,
     pub bits: u8,
-    /// Length of an exposure.
     pub exposure_us: u32,
-    /// The scene that was emulated, if it was.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub scene: Option<String>,
-    /// The optics file, as it was given.
+    /// The optics file as given.
     pub optics: toml::Table,
-    /// Whether a depth map lies there.
     pub has_depth: bool,
     pub note: Note,
-    /// Why the folder cannot be read, though it is there.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub broken: Option<String>,
 }
 
-/// The folder of a capture in a session's folder.
 pub fn folder_of(session: &Path, name: &str) -> Result<PathBuf> {
     let mut parts = Path::new(name).components();
     let plain = matches!((parts.next(), parts.next()), (Some(Component::Normal(_)), None));
@@ -94,7 +84,6 @@ pub fn folder_of(session: &Path, name: &str) -> Result<PathBuf> {
     Ok(session.join(name))
 }
 
-/// The folder of a new capture.
 pub fn new_capture(session: &Path, name: &str) -> Result<PathBuf> {
     let folder = folder_of(session, name)?;
     let taken = if RESERVED.iter().any(|reserved| reserved.eq_ignore_ascii_case(name)) {
@@ -109,7 +98,7 @@ pub fn new_capture(session: &Path, name: &str) -> Result<PathBuf> {
     Err(WorkflowError::parameter("capture", name, taken))
 }
 
-/// The folder of a capture that exists. Links, FIFOs and devices are refused: they lead out of the session or never end.
+/// Folder of an existing capture. Rejects links, FIFOs and devices, which may leave the session or never end.
 pub fn existing(session: &Path, name: &str) -> Result<PathBuf> {
     let folder = folder_of(session, name)?;
     check_regular(&folder)?;
@@ -141,7 +130,6 @@ fn check_regular(folder: &Path) -> Result<()> {
     odd.map_err(failed)
 }
 
-/// The folder of another map of a capture.
 pub fn variant_of(capture: &Path, variant: &str) -> Result<PathBuf> {
     let letters = variant.chars().all(|c| c.is_ascii_alphanumeric() || c == '-');
     if variant.is_empty() || !letters || variant.len() > 60 {
@@ -151,7 +139,7 @@ pub fn variant_of(capture: &Path, variant: &str) -> Result<PathBuf> {
     Ok(capture.join(format!("{VARIANT}{variant}")))
 }
 
-/// The first free names `KIND-001`, `KIND-002` and so on. A name is free until something has it.
+/// The first free names `KIND-001`, `KIND-002` and so on.
 pub fn free_names(session: &Path, kind: &str, count: usize) -> Result<Vec<PathBuf>> {
     let mut found = Vec::new();
     let mut number = 1;
@@ -165,8 +153,7 @@ pub fn free_names(session: &Path, kind: &str, count: usize) -> Result<Vec<PathBu
     Ok(found)
 }
 
-/// The captures of a session whose record, optics or note hold all words of `search`, by name. A folder that is not there has
-/// none.
+/// Captures whose record, optics or note contain all words of `search`, by name. A missing folder has none.
 pub fn list(session: &Path, search: &str) -> Result<Vec<Capture>> {
     let entries = match fs::read_dir(session) {
         Ok(entries) => entries,
@@ -181,7 +168,7 @@ pub fn list(session: &Path, search: &str) -> Result<Vec<Capture>> {
         if name.starts_with('.') || !is_dir || fs::symlink_metadata(path.join(CAPTURE_FILE)).is_err() {
             continue;
         }
-        // The folder may disappear while it is read: that is a broken capture, not a broken list.
+        // The folder may disappear while it is read: only this capture is broken.
         let capture = read(&path).unwrap_or_else(|error| broken(&name, &error));
         if capture.broken.is_some() && search.trim().is_empty()
             || capture.broken.is_none() && matches(&path, &capture, search)
@@ -193,7 +180,6 @@ pub fn list(session: &Path, search: &str) -> Result<Vec<Capture>> {
     Ok(found)
 }
 
-/// Reads one capture.
 pub fn read(folder: &Path) -> Result<Capture> {
     let missing = || WorkflowError::read("the capture", folder)(std::io::ErrorKind::NotFound.into());
     check_regular(folder)?;
@@ -241,13 +227,11 @@ fn written(folder: &Path) -> u64 {
     since.map_or(0, |since| since.as_secs())
 }
 
-/// Deletes a capture with all of its files.
 pub fn delete(session: &Path, name: &str) -> Result<()> {
     let folder = existing(session, name)?;
     fs::remove_dir_all(&folder).map_err(|source| WorkflowError::Folder { folder, source })
 }
 
-/// Renames a capture.
 pub fn rename(session: &Path, name: &str, to: &str) -> Result<()> {
     let (folder, target) = (existing(session, name)?, new_capture(session, to)?);
     fs::rename(&folder, &target).map_err(|source| WorkflowError::Folder { folder, source })
@@ -285,7 +269,6 @@ fn matches(folder: &Path, capture: &Capture, search: &str) -> bool {
     search.to_lowercase().split_whitespace().all(|word| all.contains(word))
 }
 
-/// The note; empty if there is none.
 pub fn read_note(folder: &Path) -> Result<Note> {
     let path = folder.join(NOTE_FILE);
     match text_file::read(&path) {
@@ -295,7 +278,6 @@ pub fn read_note(folder: &Path) -> Result<Note> {
     }
 }
 
-/// Notes something about a capture.
 pub fn write_note(folder: &Path, note: &Note) -> Result<()> {
     if note.rating > BEST {
         return Err(WorkflowError::parameter("rating", note.rating, "expected 0 (not rated) to 5"));

@@ -1,6 +1,4 @@
-//! Shadow on masks of a person: taking it off by where the sun stands ([`removal`]), also straight from a
-//! video ([`video`]), and scoring how well any removal did
-//! ([`score`]).
+//! Removal of a person's shadow from masks or video, and its scoring.
 
 pub mod removal;
 pub mod score;

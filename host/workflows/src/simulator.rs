@@ -1,4 +1,4 @@
-//! Starts `farnear-sim` as a child process and ends it.
+//! Runs `farnear-sim` as a child process.
 
 use std::{
     io::{BufRead, BufReader, ErrorKind, Read, Write},
@@ -21,82 +21,64 @@ use crate::{
 };
 
 const PROGRAM: &str = "farnear-sim";
-/// Name of the firmware next to it.
 pub(crate) const FIRMWARE: &str = "farnear-nucleo-f429zi.elf";
-/// Time to end by itself before it is killed.
+/// Time to exit before it is killed.
 const FAREWELL: Duration = Duration::from_secs(3);
 
-/// Longest wait for the simulator to say where it listens; it takes about a second.
+/// Longest wait for the simulator's address; it takes about 1 s.
 const START: Duration = Duration::from_secs(60);
-/// From one look at the wish to stop to the next.
+/// Polling interval for cancellation.
 const LOOK: Duration = Duration::from_millis(50);
 
-/// The lens that the emulated rig has without optics: that of the thesis' 50 mm lens.
+/// Default point spread function: the thesis' 50 mm lens.
 pub const USUAL_PSF: Psf = Psf::Gaussian { k: 0.4578 };
 
-/// Options of the emulated rig; unset ones have the simulator's defaults. The texts are checked by the
-/// simulator.
+/// Options of the emulated rig; unset ones have the simulator's defaults. The simulator checks them.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub struct Scenery {
-    /// Scene before the emulated camera: `plane:MM`, `staircase`, `slant`, `cone`, `sphere`, or the name of the scene file that
-    /// is packed in `packed_scene`.
+    /// `plane:MM`, `staircase`, `slant`, `cone`, `sphere`, or the scene file's name in `packed_scene`.
     pub scene: Option<String>,
-    /// A scene file with its maps, as the simulator reads them from its standard input.
+    /// A scene file with its maps, passed to the simulator's standard input.
     pub packed_scene: Option<Arc<[u8]>>,
-    /// Point spread function of the emulated lens; without it the one of the optics.
+    /// Point spread function of the emulated lens; default: that of the optics.
     pub psf: Option<String>,
-    /// Noise of the emulated camera: `none`, `8bit` or `12bit`.
+    /// Camera noise: `none`, `8bit` or `12bit`.
     pub noise: Option<String>,
-    /// Decides everything random.
     pub seed: Option<u64>,
-    /// The firmware; by default the one next to farnear-sim.
+    /// Default: the file next to farnear-sim.
     pub firmware: Option<PathBuf>,
-    /// Faults of the emulated line, a TOML file.
+    /// Faults of the emulated line, TOML.
     pub faults: Option<PathBuf>,
-    /// Where to write what the emulated mechanics really did, CSV.
+    /// Output file for the true state of the mechanics, CSV.
     pub trace: Option<PathBuf>,
-    /// Whether the emulated rig's time follows the clock on the wall; runs do not repeat then.
+    /// Whether emulated time follows wall-clock time; runs are then not repeatable.
     pub paced: bool,
-    /// A half mirror behind the lens, and how much further from it the second camera's sensor stands.
+    /// Adds a half mirror; distance of the second camera's sensor relative to the first.
     pub half_mirror_um: Option<f64>,
 }
 
-/// The simulator could not be started.
 #[derive(Debug, thiserror::Error)]
 pub enum SimulatorError {
-    /// The program does not exist.
     #[error("{program} is neither next to this program nor on the PATH")]
     Missing { program: &'static str },
     #[error("cannot start {}: {source}", program.display())]
-    Start {
-        program: PathBuf,
-        /// What the system says.
-        source: std::io::Error,
-    },
-    /// It ended without a word on its standard output.
+    Start { program: PathBuf, source: std::io::Error },
     #[error("{PROGRAM} ended at once ({status}); its message stands above")]
     Ended { status: String },
-    /// It printed something else than where it listens.
     #[error("{PROGRAM} printed no address but {line:?}: {reason}")]
     Address { line: String, reason: String },
-    /// It did not say where it listens.
     #[error("{PROGRAM} did not say where it listens within {START:?}")]
     Silent,
-    /// Its output cannot be read.
     #[error("the output of {PROGRAM} was lost: {reason}")]
-    Lost {
-        /// What the system says.
-        reason: String,
-    },
+    Lost { reason: String },
 }
 
 impl Scenery {
-    /// The same before another scene.
     pub fn with_scene(&self, scene: String) -> Self {
         Self { scene: Some(scene), packed_scene: None, ..self.clone() }
     }
 
-    /// All options with their values, as in a capture's record.
+    /// All options with their values, for a capture's record.
     pub fn decided(&self, psf: Psf) -> SimulationRecord {
         SimulationRecord {
             scene: self.scene.clone().unwrap_or_else(|| "staircase".into()),
@@ -107,15 +89,15 @@ impl Scenery {
     }
 }
 
-/// A running simulator; it ends with this value.
+/// A running simulator, stopped when dropped.
 pub struct Simulator {
     child: Child,
-    /// Closing it tells the simulator to end.
+    /// Closing it stops the simulator.
     stdin: Option<ChildStdin>,
     address: Address,
 }
 
-/// Where the simulator listens, as it prints it.
+/// Addresses printed by the simulator.
 #[derive(Deserialize, Default)]
 struct Address {
     port: String,
@@ -124,7 +106,7 @@ struct Address {
 }
 
 impl Simulator {
-    /// Starts the simulator and reports it. Without optics it has those of a 50 mm lens.
+    /// Starts the simulator and reports it. Default optics: a 50 mm lens.
     pub fn start(scenery: &Scenery, optics: Option<(&Path, Psf)>, context: &Context<'_>) -> Result<Self> {
         let program = find()?;
         context.info(&format!("starting the emulated rig ({PROGRAM}): no hardware is involved"));
@@ -149,7 +131,7 @@ impl Simulator {
         if scenery.paced {
             command.arg("--paced");
         }
-        // In its own process group: Ctrl-C reaches this program, which stops all motion and then ends the simulator.
+        // In its own process group, so that Ctrl-C first stops all motion and then the simulator.
         #[cfg(unix)]
         std::os::unix::process::CommandExt::process_group(&mut command, 0);
         let mut child = command
@@ -177,17 +159,16 @@ impl Simulator {
         Ok(simulator)
     }
 
-    /// The serial port of the emulated board.
+    /// Serial port of the emulated board.
     pub fn port(&self) -> &str {
         &self.address.port
     }
 
-    /// Address of the emulated camera.
     pub fn camera(&self) -> &str {
         &self.address.camera
     }
 
-    /// Address of the second emulated camera, where there is a half mirror.
+    /// Second emulated camera, with a half mirror.
     pub fn second_camera(&self) -> Option<&str> {
         self.address.second_camera.as_deref()
     }
@@ -203,13 +184,13 @@ impl Drop for Simulator {
             }
             std::thread::sleep(Duration::from_millis(5));
         }
-        // It did not listen; both calls fail only where it has ended meanwhile.
+        // Fails only if the process has already exited.
         let _ = self.child.kill();
         let _ = self.child.wait();
     }
 }
 
-/// The first line of the simulator's output; empty if there is none.
+/// First line of the output; empty if there is none.
 fn first_line(output: impl Read + Send + 'static, cancel: &Cancel) -> Result<String> {
     let (sender, line) = channel();
     std::thread::spawn(move || {
@@ -231,7 +212,6 @@ fn first_line(output: impl Read + Send + 'static, cancel: &Cancel) -> Result<Str
     }
 }
 
-/// Next to this program, else on the PATH.
 pub(crate) fn find() -> Result<PathBuf, SimulatorError> {
     find_program(PROGRAM)
 }
@@ -245,7 +225,7 @@ pub(crate) fn find_program(program: &'static str) -> Result<PathBuf, SimulatorEr
     beside.into_iter().chain(on_path).find(|place| place.is_file()).ok_or(SimulatorError::Missing { program })
 }
 
-/// The firmware that the simulator takes by itself: the one that FARNEAR_FIRMWARE names, else the one next to it.
+/// The simulator's default firmware: FARNEAR_FIRMWARE, else the file next to it.
 pub(crate) fn firmware_of(program: &Path) -> PathBuf {
     std::env::var_os("FARNEAR_FIRMWARE").map_or_else(|| program.with_file_name(FIRMWARE), PathBuf::from)
 }

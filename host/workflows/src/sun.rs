@@ -1,4 +1,4 @@
-//! The sun's position at a place and time.
+//! Position of the sun.
 
 use std::str::FromStr;
 
@@ -9,7 +9,6 @@ use serde::Serialize;
 
 use crate::{error::Result, figures::rounded};
 
-/// A place and a time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Moment {
     pub place: Place,
@@ -17,7 +16,7 @@ pub struct Moment {
 }
 
 impl Moment {
-    /// A place in degrees and a time as RFC 3339 writes it, `2026-06-21T12:00:00+02:00`.
+    /// Time in RFC 3339, `2026-06-21T12:00:00+02:00`.
     pub fn new(latitude_deg: f64, longitude_deg: f64, time: &str) -> Result<Self> {
         let place = Place::new(latitude_deg, longitude_deg)?;
         let wrong = |_| {
@@ -31,13 +30,12 @@ impl Moment {
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Formula {
-    /// The host, in double precision.
+    /// Host, double precision.
     Host(Model),
-    /// The code that runs on the board, in single precision.
+    /// Board code, single precision.
     Board,
 }
 
-/// A name that is no formula's.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{0} (or board)")]
 pub struct UnknownFormula(SunError);
@@ -53,7 +51,6 @@ impl FromStr for Formula {
     }
 }
 
-/// Where the sun stands, without refraction.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct SunFigures {
     pub elevation_deg: f64,
@@ -61,7 +58,7 @@ pub struct SunFigures {
     pub azimuth_deg: f64,
 }
 
-/// Computes where the sun stands, to a millionth of a degree.
+/// Position of the sun without refraction, rounded to 1e-6 degrees.
 pub fn position(moment: &Moment, formula: Formula) -> Result<SunFigures> {
     let (elevation_deg, azimuth_deg) = match formula {
         Formula::Host(model) => {
@@ -76,7 +73,6 @@ pub fn position(moment: &Moment, formula: Formula) -> Result<SunFigures> {
     Ok(SunFigures { elevation_deg: rounded(elevation_deg, 6), azimuth_deg: rounded(azimuth_deg, 6) })
 }
 
-/// A place as the board's code takes it.
 fn on_board(place: Place) -> board::Place {
     let units = |degrees: f64| BinaryAngle::from_degrees_e7((degrees * 1e7).round() as i32);
     let east_deg =

@@ -1,4 +1,4 @@
-//! A flat target to print: a random texture that is as fine on paper as the optics can use, true to scale.
+//! Printable flat target: a random texture as fine as the optics can use, true to scale.
 
 mod page;
 
@@ -20,33 +20,29 @@ use crate::{
     request::{PathKind, Request},
 };
 
-/// Millimetres of an inch.
 const INCH_MM: f64 = 25.4;
-/// Side of a cell in pixels of the image that printer's dots come nearest to: of 1 to 6 it gave the least noise of depth (`docs/bench.md`).
+/// Target side of a cell, image pixels: of 1 to 6 px it gave the least depth noise (`docs/bench.md`).
 const CELL_PX: f64 = 2.5;
-/// Cells that are finer than this many dots come out grey: ink spreads.
+/// Finer cells turn grey, because ink spreads.
 const LEAST_DOTS: f64 = 2.0;
-/// Cells of this many pixels have half as much noise again.
+/// Cells of this many pixels give 50 % more noise.
 const COARSE_PX: f64 = 4.0;
-/// What printers leave white around a page, mm.
+/// Unprinted border of a page.
 const MARGIN_MM: f64 = 10.0;
-/// Height of the line of 100 mm with its label.
+/// Height of the 100 mm line with its label.
 const FOOT_MM: f64 = 18.0;
-/// Cells of a page of 16 MB.
+/// A page of 16 MB.
 const MOST_CELLS: usize = 1 << 27;
-/// Half the length of the cross in the middle, in cells.
+/// Half length of the central cross, in cells.
 const CROSS_CELLS: usize = 12;
 
-/// A sheet of paper, upright.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Paper {
-    /// Width in mm.
     pub width_mm: f64,
-    /// Height in mm.
     pub height_mm: f64,
 }
 
-/// Papers by name: ISO 216, and the American one.
+/// Paper sizes of ISO 216 and North America.
 const PAPERS: [(&str, [f64; 2]); 6] = [
     ("a4", [210.0, 297.0]),
     ("a3", [297.0, 420.0]),
@@ -145,24 +141,19 @@ impl Request for TargetRequest {
     }
 }
 
-/// What there is to say of a target.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct TargetFigures {
-    /// A pixel of the camera on the target, mm.
     pub pixel_on_target_mm: f64,
-    /// Side of a cell, mm.
     pub cell_mm: f64,
-    /// The same in pixels of the camera.
+    /// Side of a cell in camera pixels.
     pub cell_px: f64,
-    /// The same in dots of the printer.
+    /// Side of a cell in printer dots.
     pub cell_dots: u32,
-    /// Cells of a row.
     pub columns: usize,
-    /// Rows of cells.
     pub rows: usize,
 }
 
-/// Black (`true`) and white cells, row by row from the top, with a cross in the middle.
+/// Black (`true`) and white cells, row by row from the top, with a cross in the centre.
 struct Texture {
     columns: usize,
     rows: usize,
@@ -170,7 +161,8 @@ struct Texture {
 }
 
 impl Texture {
-    /// Each cell by itself black or white: all that a printer can do without its own screen, whose period would be seen.
+    /// Random black and white cells, independent of each other, so that the printer does not add a visible
+    /// screen.
     fn drawn(columns: usize, rows: usize, seed: u64) -> Self {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let (middle_column, middle_row) = (columns / 2, rows / 2);
@@ -188,7 +180,6 @@ impl Texture {
     }
 }
 
-/// Writes a target as a PDF page.
 pub fn print(settings: &TargetRequest, context: &Context<'_>) -> Result<TargetFigures> {
     within("dpi", settings.dpi, &(150..=4800), "")?;
     let optics = GivenOptics::read(&settings.optics)?.optics;
@@ -198,7 +189,7 @@ pub fn print(settings: &TargetRequest, context: &Context<'_>) -> Result<TargetFi
         let expected = format!("expected more than the focal length, {focal_mm} mm");
         return Err(WorkflowError::parameter("distance", distance_mm, expected));
     }
-    // An object in focus is larger than its image by its distance from the front focal point over the focal length.
+    // Object size / image size = distance from the front focal point / focal length.
     let pixel_mm = optics.pixel_um() * 1e-3 * (distance_mm - focal_mm) / focal_mm;
     let dot_mm = INCH_MM / f64::from(settings.dpi);
     let dots = (CELL_PX * pixel_mm / dot_mm).round().max(LEAST_DOTS);
@@ -257,7 +248,7 @@ mod tests {
         let texture = Texture::drawn(301, 401, 3);
         let sign = |black: bool| if black { 1.0 } else { -1.0 };
         let n = texture.black.len() as f64;
-        // Sums of n signs, and their products with the neighbour's: five standard deviations of sqrt(n).
+        // Sums of n signs and of neighbours' products: five standard deviations of sqrt(n).
         let sum: f64 = texture.black.iter().map(|black| sign(*black)).sum();
         let together: f64 = texture.black.windows(2).map(|pair| sign(pair[0]) * sign(pair[1])).sum();
         assert!(sum.abs() < 5.0 * n.sqrt() && together.abs() < 5.0 * n.sqrt(), "{sum} {together}");

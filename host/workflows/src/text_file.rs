@@ -1,12 +1,9 @@
-//! Text files of a session, which others may have put there.
+//! Text files from untrusted folders.
 
 use std::{fs, io, path::Path};
 
-/// Reads a text file. A FIFO, socket or device is refused, because reading one may never end; those below `/dev` and `/proc` are
-/// read, since a shell passes them on purpose.
-///
-/// # Errors
-/// [`io::Error`] of the system, or of kind [`io::ErrorKind::InvalidInput`].
+/// Reads a text file. Rejects a FIFO, socket or device, because reading may never end. Accepts those below
+/// `/dev` and `/proc`, which shells pass on purpose.
 pub fn read(path: &Path) -> io::Result<String> {
     let by_shell = path.starts_with("/dev") || path.starts_with("/proc");
     let found = fs::metadata(path)?;

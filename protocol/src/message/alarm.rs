@@ -10,14 +10,13 @@ use crate::units::{BoardMicros, Nanometres};
 /// A raised alarm.
 #[derive(Serialize, Deserialize, Schema, Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[allow(missing_docs, reason = "names and types describe these fields")]
 pub struct AlarmRecord {
     /// Number in this board's life, from 1.
     pub number: u32,
-    /// Boot in which it was raised.
     pub boot: u32,
     /// Time in that boot.
     pub time: BoardMicros,
-    /// Cause of the alarm.
     pub alarm: Alarm,
 }
 

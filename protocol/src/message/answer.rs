@@ -11,28 +11,21 @@ use crate::units::{Micros, Nanometres};
 
 /// Answer to a request that was executed or accepted.
 #[derive(Serialize, Deserialize, Schema, Clone, PartialEq, Debug)]
+#[allow(missing_docs, reason = "names and types describe these fields")]
 pub enum Response {
-    /// Answer to [`super::Request::Hello`].
     Hello(Hello),
-    /// Answer to [`super::Request::Status`].
     Status(Status),
     /// Done or accepted: long work ends with an event that names the request.
     Accepted,
-    /// Answer to [`super::Request::ReadEvent`].
     Event(Event),
-    /// Answer to [`super::Request::ReadAlarm`].
     Alarm(AlarmRecord),
     /// Answer to [`super::Request::ReadSetting`] and [`super::Request::WriteSetting`].
     Setting(Setting),
-    /// Answer to [`super::Request::ReadCounters`].
     Counters(Counters),
-    /// Answer to [`super::Request::Sun`].
     Sun(SunAnswer),
     /// Answer to [`super::Request::LoadCorrection`].
     Correction(CorrectionInfo),
-    /// Answer to [`super::Request::GetCoefficients`].
     Coefficients(CoefficientBits),
-    /// Answer to [`super::Request::GetRow`].
     Row(Codes),
 }
 
@@ -42,12 +35,7 @@ pub enum Response {
 #[allow(missing_docs, reason = "names and types describe these fields")]
 pub enum RequestError {
     /// Unsupported frame version. This variant has the same bytes in all versions.
-    Version {
-        /// Oldest supported version.
-        min: u8,
-        /// Newest supported version.
-        current: u8,
-    },
+    Version { min: u8, current: u8 },
     /// The request was for another boot.
     Boot { current: u32 },
     /// The body is not a request of this version.
@@ -68,7 +56,6 @@ pub enum RequestError {
     EventGone {
         /// Oldest stored event.
         oldest: u32,
-        /// Number of the next event.
         next: u32,
     },
     /// A latched alarm must be cleared first.
@@ -108,18 +95,12 @@ pub enum RequestError {
         last: u32,
     },
     /// Too many outstanding requests. This one was ignored: repeat it.
-    QueueFull {
-        /// Limit of outstanding requests.
-        outstanding: u8,
-    },
+    QueueFull { outstanding: u8 },
     /// Period shorter than the camera permits.
     Period {
         /// Longest exposure of the armed shots plus read-out.
         min: Micros,
     },
     /// The light cannot be set like this.
-    Light {
-        /// The reason.
-        reason: LightFault,
-    },
+    Light { reason: LightFault },
 }

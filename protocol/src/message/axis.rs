@@ -58,15 +58,12 @@ pub enum PositionState {
 
 /// State of an axis.
 #[derive(Serialize, Deserialize, Schema, Clone, Copy, PartialEq, Eq, Debug)]
+#[allow(missing_docs, reason = "names and types describe these fields")]
 pub struct AxisStatus {
-    /// Validity of the position.
     pub state: PositionState,
-    /// Last target position.
     pub asked: Nanometres,
     /// Position by encoder or gauge.
     pub measured: Nanometres,
-    /// Whether the axis moves.
     pub moving: bool,
-    /// Active request of this axis.
     pub request: Option<u32>,
 }

@@ -9,37 +9,30 @@ use crate::units::{BoardMicros, Micros, Nanometres};
 
 /// Identity and capabilities of the board.
 #[derive(Serialize, Deserialize, Schema, Clone, PartialEq, Eq, Debug)]
+#[allow(missing_docs, reason = "names and types describe these fields")]
 pub struct Hello {
-    /// Oldest supported protocol version.
     pub protocol_min: u8,
-    /// Newest supported protocol version.
     pub protocol_current: u8,
     /// [`super::SCHEMA_KEY`] of the firmware.
     pub schema_key: u64,
     /// Board name, e.g. `nucleo-f429zi`.
     pub board: String<24>,
-    /// Version of the firmware.
     pub firmware: String<24>,
-    /// Unique id of the chip.
     pub unique_id: [u8; 12],
     /// Boot number, required in all other requests.
     pub boot: u32,
-    /// Cause of the last reset.
     pub reset_cause: ResetCause,
-    /// Whether the board is emulated.
     pub emulated: bool,
-    /// Fitted parts of the board.
     pub capabilities: Capabilities,
-    /// Ranges and sizes of the board.
     pub limits: Limits,
     /// Largest request id of this boot, 0 = none; a new session continues from it.
     pub last_id: u32,
-    /// Limit of outstanding requests.
     pub outstanding: u8,
 }
 
 /// Fitted parts; all `true` for the rig of `docs/rig.md`.
 #[derive(Serialize, Deserialize, Schema, Clone, Copy, PartialEq, Eq, Debug)]
+#[allow(missing_docs, reason = "names and types describe these fields")]
 pub struct Capabilities {
     /// Stepper of stage A.
     pub sensor_coarse: bool,
@@ -49,9 +42,7 @@ pub struct Capabilities {
     pub strobe: bool,
     /// Stepper of stage B.
     pub lens: bool,
-    /// Non-volatile memory for records.
     pub memory: bool,
-    /// Emergency-stop input.
     pub emergency_stop: bool,
 }
 
@@ -68,36 +59,24 @@ impl Capabilities {
 
 /// Ranges and sizes of the board.
 #[derive(Serialize, Deserialize, Schema, Clone, Copy, PartialEq, Eq, Debug)]
+#[allow(missing_docs, reason = "names and types describe these fields")]
 pub struct Limits {
     /// Distance of principal plane and sensor with all axes at 0.
     pub datum: Nanometres,
-    /// Smallest coarse position.
     pub coarse_min: Nanometres,
-    /// Largest coarse position.
     pub coarse_max: Nanometres,
-    /// Coarse travel per STEP pulse, pm.
     pub coarse_step_pm: u32,
-    /// Smallest fine position.
     pub fine_min: Nanometres,
-    /// Largest fine position.
     pub fine_max: Nanometres,
-    /// Most shots of a program.
     pub shots_max: u8,
-    /// Shortest exposure.
     pub exposure_min: Micros,
-    /// Longest exposure.
     pub exposure_max: Micros,
-    /// Smallest lens position.
     pub lens_min: Nanometres,
-    /// Largest lens position.
     pub lens_max: Nanometres,
-    /// Lens travel per STEP pulse, pm.
     pub lens_step_pm: u32,
     /// Smallest distance of sensor and lens.
     pub distance_min: Nanometres,
-    /// Shortest silence deadline.
     pub silence_min: Micros,
-    /// Longest silence deadline.
     pub silence_max: Micros,
     /// Size of the row buffer for depth correction.
     pub row_pixels_max: u16,
@@ -116,10 +95,9 @@ impl Limits {
 
 /// Cause of a reset.
 #[derive(Serialize, Deserialize, Schema, Clone, Copy, PartialEq, Eq, Debug)]
+#[allow(missing_docs, reason = "names and types describe these fields")]
 pub enum ResetCause {
-    /// Power was switched on.
     PowerOn,
-    /// Reset pin or button.
     Pin,
     /// [`super::Request::Reboot`].
     Software,
@@ -135,38 +113,27 @@ pub enum ResetCause {
 
 /// State of the board.
 #[derive(Serialize, Deserialize, Schema, Clone, PartialEq, Eq, Debug)]
+#[allow(missing_docs, reason = "names and types describe these fields")]
 pub struct Status {
-    /// Board time of this answer.
     pub time: BoardMicros,
-    /// State of the coarse axis.
     pub coarse: AxisStatus,
     /// State of the fine axis; always homed, because its gauge is absolute.
     pub fine: AxisStatus,
-    /// State of the lens axis.
     pub lens: AxisStatus,
-    /// Whether stage A's home switch is closed.
     pub home_switch: bool,
-    /// Whether stage A's far switch is closed.
     pub far_switch: bool,
-    /// Whether stage B's home switch is closed.
     pub lens_home_switch: bool,
-    /// Whether stage B's far switch is closed.
     pub lens_far_switch: bool,
     /// Whether the emergency-stop input is open.
     pub emergency_stop: bool,
     /// Whether the supply is too low for an orderly stop.
     pub supply_low: bool,
-    /// Latched alarm, if any.
     pub alarm: Option<AlarmRecord>,
-    /// State of the exposure program.
     pub program: ProgramStatus,
-    /// Number of the next event.
     pub next_event: u32,
-    /// Triggers since the reset.
     pub triggers: u32,
     /// STEP pulses of both motors since the reset.
     pub steps: u64,
-    /// Statistics of the link.
     pub link: LinkCounters,
 }
 
@@ -192,8 +159,8 @@ impl Status {
 
 /// Link statistics since the reset.
 #[derive(Serialize, Deserialize, Schema, Clone, Copy, PartialEq, Eq, Debug, Default)]
+#[allow(missing_docs, reason = "names and types describe these fields")]
 pub struct LinkCounters {
-    /// Valid frames received.
     pub frames: u32,
     /// Frames with a wrong CRC, length or encoding.
     pub bad_frames: u32,

@@ -36,7 +36,6 @@ pub enum Calibration {
     },
     /// Result of the piezo sweep.
     Piezo {
-        /// Stroke per DAC code.
         gain_pm_per_code: u32,
         /// Loop width relative to the sweep.
         hysteresis_ppm: u32,

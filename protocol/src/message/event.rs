@@ -8,10 +8,9 @@ use crate::units::{BoardMicros, Micros, Nanometres};
 
 /// An event with the board's time. The frame's id is the event number, from 0 at each boot.
 #[derive(Serialize, Deserialize, Schema, Clone, PartialEq, Eq, Debug)]
+#[allow(missing_docs, reason = "names and types describe these fields")]
 pub struct Event {
-    /// Board time of the event.
     pub time: BoardMicros,
-    /// Type and data.
     pub kind: EventKind,
 }
 
@@ -51,7 +50,6 @@ pub enum EventKind {
     /// Long work ended without success; its motion has stopped.
     Failed {
         request: u32,
-        /// Axis concerned, if any.
         axis: Option<Axis>,
         reason: Failure,
     },
@@ -73,7 +71,6 @@ pub enum EventKind {
     /// A shot of [`super::TriggerMode::Software`] has settled: trigger the camera.
     ShotReady {
         request: u32,
-        /// Index in the program.
         index: u8,
         /// Repeat of the shot, from 0.
         repeat: u16,
@@ -122,11 +119,8 @@ pub enum EventKind {
         request: u32,
         /// The exposure's [`ShotRecord::trigger_number`].
         trigger_number: u32,
-        /// Brightness.
         levels: LightLevels,
-        /// Start of the flash.
         on: BoardMicros,
-        /// End of the flash.
         off: BoardMicros,
     },
 }

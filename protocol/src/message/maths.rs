@@ -39,12 +39,10 @@ impl CorrectionForm {
 
 /// Form and scale of a correction.
 #[derive(Serialize, Deserialize, Schema, Clone, Copy, PartialEq, Eq, Debug)]
+#[allow(missing_docs, reason = "names and types describe these fields")]
 pub struct CorrectionInfo {
-    /// Form of the correction.
     pub form: CorrectionForm,
-    /// Width of the depth map, px.
     pub width: u16,
-    /// Height of the depth map, px.
     pub height: u16,
     /// Depth of code 0.
     pub centre_um: i32,
@@ -74,12 +72,10 @@ pub enum CorrectionFault {
 
 /// Place and time for sun and shadow. Degrees times 10^7; north and east positive.
 #[derive(Serialize, Deserialize, Schema, Clone, Copy, PartialEq, Eq, Debug)]
+#[allow(missing_docs, reason = "names and types describe these fields")]
 pub struct SunQuery {
-    /// Seconds since 1970-01-01T00:00:00Z.
     pub unix_seconds: i64,
-    /// Latitude, north positive.
     pub latitude_e7: i32,
-    /// Longitude, east positive.
     pub longitude_e7: i32,
     /// Camera and subject; `None`: sun only.
     pub shadow: Option<ShadowQuery>,
@@ -87,6 +83,7 @@ pub struct SunQuery {
 
 /// Camera and subject of a shadow.
 #[derive(Serialize, Deserialize, Schema, Clone, Copy, PartialEq, Eq, Debug)]
+#[allow(missing_docs, reason = "names and types describe these fields")]
 pub struct ShadowQuery {
     /// Camera azimuth, ANTICLOCKWISE from north, degrees times 10^7.
     pub azimuth_e7: i32,
@@ -96,58 +93,47 @@ pub struct ShadowQuery {
     pub distance_mm: u32,
     /// Subject distance from the optical axis, right positive.
     pub lateral_mm: i32,
-    /// Height of the subject.
     pub height_mm: u32,
-    /// Standard deviations of all inputs.
     pub deviations: QueryDeviations,
 }
 
 /// Standard deviations of a shadow's inputs.
 #[derive(Serialize, Deserialize, Schema, Clone, Copy, PartialEq, Eq, Debug)]
+#[allow(missing_docs, reason = "names and types describe these fields")]
 pub struct QueryDeviations {
     /// Day, in thousandths of a day.
     pub day_e3: u32,
-    /// Time of day, seconds.
     pub time_s: u32,
-    /// Latitude, degrees times 10^7.
     pub latitude_e7: u32,
-    /// Longitude, degrees times 10^7.
     pub longitude_e7: u32,
-    /// Camera azimuth, degrees times 10^7.
     pub azimuth_e7: u32,
-    /// Height of the camera.
     pub camera_height_mm: u32,
-    /// Height of the subject.
     pub height_mm: u32,
-    /// Distance of the subject.
     pub distance_mm: u32,
 }
 
 /// Position of the sun, without refraction.
 #[derive(Serialize, Deserialize, Schema, Clone, Copy, PartialEq, Debug)]
+#[allow(missing_docs, reason = "names and types describe these fields")]
 pub struct SunAnswer {
-    /// Elevation above the horizon.
     pub elevation_deg: f32,
     /// Azimuth, clockwise from north.
     pub azimuth_deg: f32,
-    /// The shadow, if requested.
     pub shadow: Option<ShadowAnswer>,
 }
 
 /// Angle of a shadow in the image.
 #[derive(Serialize, Deserialize, Schema, Clone, Copy, PartialEq, Debug)]
+#[allow(missing_docs, reason = "names and types describe these fields")]
 pub enum ShadowAnswer {
     /// The shadow is visible.
     Angle {
         /// Rotation of the silhouette.
         beta_deg: f32,
-        /// Standard deviation of the angle.
         sigma_beta_deg: f32,
         /// Whether the silhouette is mirrored first.
         mirrored: bool,
-        /// Length of the shadow on the ground.
         length_m: f32,
-        /// Validity of the standard deviation.
         reliability: ShadowReliability,
     },
     /// Sun too low or below the horizon.

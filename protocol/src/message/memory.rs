@@ -8,12 +8,11 @@ use super::Axis;
 /// A record in memory with version, CRC and two copies.
 #[derive(Serialize, Deserialize, Schema, Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[allow(missing_docs, reason = "names and types describe these fields")]
 pub enum RecordName {
-    /// All settings.
     Settings,
     /// Boots, alarms, steps, and the last moved axes.
     Counters,
-    /// The last alarms.
     Alarms,
     /// Loaded exposure program.
     Program,
@@ -24,42 +23,29 @@ pub enum RecordName {
 /// A setting; its name has the unit.
 #[derive(Serialize, Deserialize, Schema, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[allow(missing_docs, reason = "names and types describe these fields")]
 pub enum SettingKey {
     /// Distance of principal plane and sensor with all axes at 0.
     DatumNm,
     /// Smallest distance of sensor and lens (datum + coarse + fine + lens).
     DistanceMinNm,
-    /// Smallest position of stage A's stepper.
     CoarseMinNm,
-    /// Largest position of stage A's stepper.
     CoarseMaxNm,
-    /// Speed of stage A's stepper.
     CoarseSpeedNmPerS,
-    /// Acceleration of stage A's stepper.
     CoarseAccelerationUmPerS2,
-    /// Jerk of stage A's stepper.
     CoarseJerkUmPerS3,
     /// Backlash of stage A's screw; moves end from the same side, this far and a margin before the target.
     CoarseBacklashNm,
-    /// Largest difference of steps and encoder of stage A.
+    /// Largest difference of steps and encoder (following error).
     CoarseFollowingNm,
-    /// Smallest position of stage B.
     LensMinNm,
-    /// Largest position of stage B.
     LensMaxNm,
-    /// Speed of stage B's stepper.
     LensSpeedNmPerS,
-    /// Acceleration of stage B's stepper.
     LensAccelerationUmPerS2,
-    /// Jerk of stage B's stepper.
     LensJerkUmPerS3,
-    /// Backlash of stage B's screw.
     LensBacklashNm,
-    /// Largest difference of steps and encoder of stage B.
     LensFollowingNm,
-    /// Smallest position of the piezo.
     FineMinNm,
-    /// Largest position of the piezo.
     FineMaxNm,
     /// Piezo stroke per DAC code, from the sweep.
     PiezoGainPmPerCode,
@@ -145,20 +131,14 @@ impl SettingKey {
 
 /// Settings of a stepper axis.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[allow(missing_docs, reason = "names and types describe these fields")]
 pub struct StepperKeys {
-    /// Smallest position.
     pub min: SettingKey,
-    /// Largest position.
     pub max: SettingKey,
-    /// Speed of a move.
     pub speed: SettingKey,
-    /// Acceleration of a move.
     pub acceleration: SettingKey,
-    /// Jerk of a move.
     pub jerk: SettingKey,
-    /// Backlash of the screw.
     pub backlash: SettingKey,
-    /// Largest difference of steps and encoder.
     pub following: SettingKey,
 }
 
@@ -197,33 +177,25 @@ impl StepperKeys {
 /// A setting with its range.
 #[derive(Serialize, Deserialize, Schema, Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[allow(missing_docs, reason = "names and types describe these fields")]
 pub struct Setting {
-    /// Key of the setting.
     pub key: SettingKey,
     /// Value in the unit of the name.
     pub value: i32,
-    /// Factory default.
     pub default: i32,
-    /// Smallest permitted value.
     pub min: i32,
-    /// Largest permitted value.
     pub max: i32,
 }
 
 /// Lifetime counters, kept without power.
 #[derive(Serialize, Deserialize, Schema, Clone, Copy, PartialEq, Eq, Debug, Default)]
+#[allow(missing_docs, reason = "names and types describe these fields")]
 pub struct Counters {
-    /// Number of boots.
     pub boots: u32,
-    /// Number of alarms.
     pub alarms: u32,
-    /// Number of triggers.
     pub triggers: u64,
-    /// STEP pulses of stage A.
     pub coarse_steps: u64,
-    /// STEP pulses of stage B.
     pub lens_steps: u64,
-    /// Completed homings.
     pub homings: u32,
     /// Boots with a damaged newer copy of a record.
     pub repaired: u32,

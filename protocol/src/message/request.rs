@@ -22,7 +22,6 @@ pub enum Request {
     Status,
     /// Home an axis: its home switch becomes position 0. Ends with [`super::EventKind::Homed`].
     Home {
-        /// Axis with a home switch.
         axis: Axis,
         /// Silence deadline, see [`Request::Move`].
         silence: Micros,
@@ -164,7 +163,6 @@ pub enum Request {
     /// session, and with [`Request::Stop`], [`Request::OpenSession`], every alarm and every reset. Rejected while an
     /// alarm is latched, except to switch both off.
     SetLights {
-        /// Brightness.
         levels: LightLevels,
         /// Limit of the on time, at most [`super::LIGHT_TIME_MAX`].
         time: Micros,
@@ -176,7 +174,6 @@ pub enum Request {
     SetShotLight {
         /// Place in the program.
         index: u8,
-        /// The flash.
         light: Option<ShotLight>,
     },
 }

@@ -8,10 +8,10 @@ use crate::units::{BoardMicros, Micros, Nanometres};
 
 /// An entry of an exposure program.
 #[derive(Serialize, Deserialize, Schema, Clone, Copy, PartialEq, Eq, Debug)]
+#[allow(missing_docs, reason = "names and types describe these fields")]
 pub struct Shot {
     /// Axis to move before the exposure.
     pub axis: Axis,
-    /// Target position of the axis.
     pub target: Nanometres,
     /// Exposure time; with a hardware trigger the pulse length.
     pub exposure: Micros,
@@ -21,38 +21,34 @@ pub struct Shot {
     pub settle_dwell: Micros,
     /// Exposures at this position, at least 1.
     pub repeat: u16,
-    /// Source of the trigger.
     pub mode: TriggerMode,
 }
 
 /// Why a shot was rejected.
 #[derive(Serialize, Deserialize, Schema, Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[allow(missing_docs, reason = "names and types describe these fields")]
 pub enum ShotFault {
     /// Index not below [`super::Limits::shots_max`], or an empty program.
     Index,
-    /// The shot was not loaded.
     Missing,
     /// Exposure outside [`super::Limits::exposure_min`] to [`super::Limits::exposure_max`].
     Exposure,
     /// Settle window or dwell is 0 or too large.
     Settle,
-    /// The repeat count is 0.
     Repeat,
 }
 
 /// Measurements of one exposure.
 #[derive(Serialize, Deserialize, Schema, Clone, Copy, PartialEq, Eq, Debug)]
+#[allow(missing_docs, reason = "names and types describe these fields")]
 pub struct ShotRecord {
-    /// Index in the program.
     pub index: u8,
     /// Repeat of the shot, from 0.
     pub repeat: u16,
     /// Trigger number since the reset; the camera's shot id.
     pub trigger_number: u32,
-    /// Axis that was moved.
     pub axis: Axis,
-    /// Target position of the axis.
     pub asked: Nanometres,
     /// Coarse position by encoder at the trigger.
     pub coarse: Nanometres,
@@ -110,10 +106,9 @@ pub enum TriggerMode {
 
 /// State of the exposure program.
 #[derive(Serialize, Deserialize, Schema, Clone, Copy, PartialEq, Eq, Debug)]
+#[allow(missing_docs, reason = "names and types describe these fields")]
 pub struct ProgramStatus {
-    /// Phase of the program.
     pub state: ProgramState,
-    /// Number of armed shots.
     pub shots: u8,
     /// Current or next shot.
     pub index: u8,
@@ -124,13 +119,12 @@ pub struct ProgramStatus {
 /// Phase of the exposure program.
 #[derive(Serialize, Deserialize, Schema, Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[allow(missing_docs, reason = "names and types describe these fields")]
 pub enum ProgramState {
     /// Not armed: shots may be loaded.
     Idle,
     /// Checked; `RunProgram` starts it.
     Armed,
-    /// Exposures are being taken.
     Running,
-    /// Paused between two exposures.
     Paused,
 }

@@ -33,7 +33,7 @@ impl Target {
         }
         let names = [format!("qemu-{}", self.processor), format!("qemu-{}-static", self.processor)];
         names.iter().find(|name| has(name)).cloned().map(Some).ok_or_else(|| {
-            format!("nothing here runs {} programs; Debian's package is qemu-user", self.processor)
+            format!("this machine cannot run {} programs; Debian's package is qemu-user", self.processor)
         })
     }
 }

@@ -48,7 +48,7 @@ pub fn programs(release: &Release, target: &Target, left_out: &mut Vec<String>) 
             finish(inside("farnear").arg("doctor"))?;
             return finish(inside("farnear-sim").arg("--help"));
         }
-        left_out.push("an empty root: this user may not make one (unshare --map-root-user --root)".into());
+        left_out.push("an empty root: this user may not create one (unshare --map-root-user --root)".into());
         depth(&|| Command::new(folder.join("farnear")), &ROOT.join(OPTICS), &root.join("pair"))?;
         return captures(&folder, &root.join("capture"));
     };
@@ -156,8 +156,8 @@ fn depth(farnear: &dyn Fn() -> Command, optics: &Path, pair: &Path) -> Result<()
 fn captures(programs: &Path, out: &Path) -> Result<()> {
     let mut capture = Command::new(programs.join("farnear"));
     capture.args(["rig", "capture", "--port", "sim", "--scene", "staircase", "--json", "--optics"]);
-    let told = output(capture.arg(ROOT.join(OPTICS)).arg("--out").arg(out))?;
-    println!("a pair by the emulated rig in {} ms of its time", crate::demo::figure(&told, "pair_ms")?);
+    let report = output(capture.arg(ROOT.join(OPTICS)).arg("--out").arg(out))?;
+    println!("a pair by the emulated rig in {} ms of its time", crate::demo::figure(&report, "pair_ms")?);
     Ok(())
 }
 

@@ -14,20 +14,15 @@ use crate::sun::{Place, equatorial, horizontal};
 
 /// Standard deviations of the inputs.
 #[derive(Clone, Copy, PartialEq, Debug)]
+#[allow(missing_docs, reason = "names and types describe these fields")]
 pub struct Deviations {
     /// Day, with the hour unchanged.
     pub day: f32,
-    /// Time of day, hours.
     pub time_h: f32,
-    /// Latitude, degrees.
     pub latitude_deg: f32,
-    /// Longitude, degrees.
     pub longitude_deg: f32,
-    /// Camera azimuth, degrees.
     pub azimuth_deg: f32,
-    /// Height of the camera.
     pub camera_height_m: f32,
-    /// Height of the subject.
     pub height_m: f32,
     /// Distance of the subject: [`Deviations::of_distance`].
     pub distance_m: f32,
@@ -54,12 +49,10 @@ pub enum Reliability {
 
 /// Standard deviation of beta.
 #[derive(Clone, Copy, PartialEq, Debug)]
+#[allow(missing_docs, reason = "names and types describe these fields")]
 pub struct Deviation {
-    /// First-order standard deviation of beta.
     pub beta_deg: f32,
-    /// Standard deviation of the sun's azimuth.
     pub sun_azimuth_deg: f32,
-    /// Validity of the deviation.
     pub reliability: Reliability,
 }
 

@@ -228,7 +228,7 @@ fn corrected(depths: &[i16], correct: impl FnOnce(&mut [i16]) -> Result<(), Erro
 }
 
 #[test]
-fn what_does_not_fit_is_an_error() {
+fn invalid_inputs_are_errors() {
     assert_eq!(Frame::new(5, 480), Err(Error::FrameSize { width: 5, height: 480 }));
     assert_eq!(Frame::new(640, 8193), Err(Error::FrameSize { width: 640, height: 8193 }));
     assert!(matches!(DepthScale::for_range(900.0, 900.0), Err(Error::EmptyRange { .. })));

@@ -77,7 +77,7 @@ fn the_boards_fit_finds_the_correction() {
 }
 
 #[test]
-fn a_fit_that_its_samples_do_not_determine_says_so() {
+fn an_underdetermined_fit_is_an_error() {
     let frame = Frame::new(60, 60).unwrap();
     let mut fit = RegionFit::new(frame);
     assert_eq!(fit.solve(), Err(Error::Underdetermined { samples: 0, terms: 10 }));

@@ -1,5 +1,5 @@
 //! Backlash of a screw, measured at the home switch, which the stage actuates. The switch closes going down and opens a
-//! known distance higher going up; additional motor travel is the play. Each round closes and opens it once, a pulse
+//! known distance higher going up; the additional motor travel is the backlash. Each round closes and opens it once, a pulse
 //! per millisecond, with positions by encoder. Position 0 depends on the backlash, so the axis is homed again.
 
 use farnear_protocol::Nanometres;

@@ -1,8 +1,8 @@
 //! Gain, hysteresis and creep of the piezo: open-loop sweep and a step.
 //!
 //! 1. Down to code 0, then up and down once, so that the loop does not depend on the history.
-//! 2. Up and down again, 0.5 s each, read at sixteen positions: the stroke gives the gain, the largest difference the
-//!    loop's width. Smooth ends do not excite the resonance; creep adds less than a tenth to the width.
+//! 2. Up and down again, 0.5 s each, read at sixteen positions. The stroke is the gain, the largest difference the
+//!    hysteresis. Smooth ends do not excite the resonance; creep adds less than a tenth to the hysteresis.
 //! 3. Rest, then up to half the range; positions 0.15 and 1.5 s later give a decade of creep.
 
 use farnear_protocol::message::{Axis, Calibration, Failure, SettingKey};

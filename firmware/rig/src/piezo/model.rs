@@ -175,7 +175,7 @@ mod tests {
     }
 
     #[test]
-    fn the_loop_is_as_wide_as_was_said_and_closes_at_both_ends() {
+    fn hysteresis_has_the_given_width_and_closes_at_both_ends() {
         let mut lag = Lag::new(120_000, 0);
         let mut go = |percent: i32| {
             lag.push(STROKE / 100 * percent);

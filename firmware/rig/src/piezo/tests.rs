@@ -57,7 +57,7 @@ fn far_to_near_is_inside_50_nm_within_15_ms_whatever_the_part_is_like() {
 }
 
 #[test]
-fn a_second_mode_is_left_alone_where_the_setting_says_that_there_is_one() {
+fn a_second_mode_by_the_setting_is_not_excited() {
     let mut values = Values::DEFAULT;
     values.set(SettingKey::PiezoHysteresisPpm, 120_000).expect("in range");
     values.set(SettingKey::PiezoCreepPpmPerDecade, 15_000).expect("in range");
@@ -90,7 +90,7 @@ fn a_second_mode_is_left_alone_where_the_setting_says_that_there_is_one() {
 }
 
 #[test]
-fn it_is_called_at_rest_only_where_what_it_says_is_where_it_is() {
+fn rest_is_reported_only_with_a_correct_position() {
     // Found by the campaign: the set-point had arrived while the piezo still moved a micrometre per
     // millisecond.
     let mut piezo = Piezo::new(Settings::DEFAULT.fine);
@@ -123,17 +123,17 @@ fn stopped_on_its_way_it_is_called_at_rest_only_where_it_no_more_swings_through(
         let mut plant = Plant::new(Part { hysteresis: 0.12, creep: 0.015, ..NOMINAL }, stop as u64);
         step(&mut piezo, &mut plant, 20_000);
         piezo.go(Nanometres(176_270));
-        let (mut told, mut moved) = ([None; 700], 0);
-        for tick in 0..told.len() {
+        let (mut reported, mut moved) = ([None; 700], 0);
+        for tick in 0..reported.len() {
             piezo.sense(plant.gauge());
             if tick == stop {
                 piezo.hold();
             }
             plant.tick(piezo.act());
-            told[tick] = (tick > stop && !piezo.is_moving()).then_some(f64::from(piezo.measured().0));
+            reported[tick] = (tick > stop && !piezo.is_moving()).then_some(f64::from(piezo.measured().0));
             moved += usize::from(tick > stop && piezo.is_moving());
-            let answered = tick.checked_sub(ANSWER_TICKS).and_then(|at| told[at]);
-            worst = answered.map_or(worst, |told| worst.max((plant.position - told).abs()));
+            let answered = tick.checked_sub(ANSWER_TICKS).and_then(|at| reported[at]);
+            worst = answered.map_or(worst, |reported| worst.max((plant.position - reported).abs()));
         }
         longest = longest.max(moved);
     }
@@ -182,7 +182,7 @@ fn look(piezo: &mut Piezo, plant: &mut Plant, seconds: u32) -> (f64, f64) {
 }
 
 #[test]
-fn at_ease_it_is_held_as_well_by_a_tenth_of_the_ticks_whatever_the_part_is_like() {
+fn settled_idle_holds_position_with_a_tenth_of_the_ticks_for_all_parts() {
     let worst = Part { hysteresis: 0.12, creep: 0.015, ..NOMINAL };
     let calibrated =
         FineSettings { hysteresis_ppm: 120_000, creep_ppm_per_decade: 15_000, ..Settings::DEFAULT.fine };
@@ -205,7 +205,7 @@ fn at_ease_it_is_held_as_well_by_a_tenth_of_the_ticks_whatever_the_part_is_like(
 }
 
 #[test]
-fn who_is_pushed_off_at_ease_is_led_back_by_all_ticks() {
+fn a_disturbance_in_settled_idle_is_corrected_with_all_ticks() {
     let mut piezo = Piezo::new(Settings::DEFAULT.fine);
     let mut plant = Plant::new(NOMINAL, 1);
     step(&mut piezo, &mut plant, 100_000);
@@ -335,7 +335,7 @@ fn a_piezo_that_follows_is_far_from_one_that_does_not() {
 }
 
 #[test]
-fn a_single_wrong_reading_is_no_piezo_that_does_not_follow() {
+fn a_single_wrong_reading_is_not_a_piezo_fault() {
     for jump in [-90_000, 100_000] {
         let mut piezo = Piezo::new(Settings::DEFAULT.fine);
         let mut plant = Plant::new(Part { hysteresis: 0.12, ..NOMINAL }, 7);
@@ -412,7 +412,7 @@ fn any_way_settles_in_time() {
 }
 
 #[test]
-fn what_the_calibration_knows_makes_the_way_cleaner() {
+fn calibration_improves_the_trajectory() {
     let part = Part { hysteresis: 0.12, creep: 0.015, ..NOMINAL };
     let swing = |hysteresis_ppm, creep_ppm_per_decade| {
         let mut piezo =
@@ -433,7 +433,7 @@ fn what_the_calibration_knows_makes_the_way_cleaner() {
 }
 
 #[test]
-fn after_a_reset_it_is_led_down_from_where_it_stands() {
+fn after_a_reset_it_ramps_down_from_its_position() {
     let mut plant = Plant::new(NOMINAL, 5);
     for _ in 0..5_000 {
         plant.tick(Some(51_000));

@@ -208,7 +208,7 @@ mod tests {
     }
 
     #[test]
-    fn a_value_outside_its_range_changes_nothing_and_is_told_the_range() {
+    fn a_value_outside_its_range_is_rejected_with_the_range() {
         let mut values = Values::DEFAULT;
         let refused = values.set(SettingKey::CoarseMaxNm, 13_000_001);
         assert!(matches!(refused, Err(Setting { max: 13_000_000, min: 0, .. })), "{refused:?}");
@@ -219,7 +219,7 @@ mod tests {
     }
 
     #[test]
-    fn what_the_memory_holds_beyond_its_range_becomes_the_default() {
+    fn stored_values_out_of_range_become_the_default() {
         let mut raw = *Values::DEFAULT.raw();
         (raw[0], raw[2]) = (i32::MIN, 1_000);
         let values = Values::restored(raw);

@@ -309,7 +309,7 @@ fn a_push_at_rest_loses_the_position() {
 }
 
 #[test]
-fn a_motor_that_rolls_on_after_an_abort_is_no_further_alarm() {
+fn a_motor_that_coasts_after_an_abort_raises_no_second_alarm() {
     let mut bench = Bench::homed();
     bench.accepted(&go(9_000_000));
     bench.run_ms(300);

@@ -95,7 +95,7 @@ fn without_a_period_it_is_as_fast_as_piezo_and_camera() {
 }
 
 #[test]
-fn a_frame_that_finds_nothing_ready_is_dropped_and_told_and_its_shot_comes_next() {
+fn a_dropped_frame_is_reported_and_its_shot_is_repeated() {
     let mut bench = Bench::new(700.0);
     pair(&mut bench);
     let id = bench.accepted(&run(PERIOD, 40));
@@ -146,7 +146,7 @@ fn one_missing_strobe_costs_a_frame_and_a_dead_camera_the_run() {
 }
 
 #[test]
-fn it_goes_on_until_it_is_stopped_and_a_pause_begins_the_pace_anew() {
+fn a_run_continues_until_stopped_and_a_pause_restarts_the_period() {
     let mut bench = Bench::new(700.0);
     pair(&mut bench);
     let id = bench.accepted(&run(PERIOD, 0));

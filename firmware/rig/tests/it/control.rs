@@ -94,7 +94,7 @@ fn a_stage_is_homed_by_way_of_the_loop_and_each_tick_feeds_the_watchdog() {
 }
 
 #[test]
-fn whatever_hangs_in_a_tick_leaves_the_watchdog_hungry() {
+fn a_hanging_tick_does_not_feed_the_watchdog() {
     for (place, call) in TICK.iter().enumerate().filter(|(_, call)| **call != Call::FeedWatchdog) {
         let (mut rig, mut fake) = (rig(), Fake::new(800.0));
         fake.logs.push_back(log());
@@ -106,7 +106,7 @@ fn whatever_hangs_in_a_tick_leaves_the_watchdog_hungry() {
 
 /// The circuit cuts the pulses: read too early, it would look closed when the timer already shows a stop.
 #[test]
-fn a_circuit_that_opens_between_two_readings_is_not_told_as_a_late_step() {
+fn an_emergency_stop_between_two_readings_is_not_a_late_step() {
     for moment in [Call::Receive, Call::Gauge, Call::Coarse, Call::Lens, Call::EmergencyStop, Call::Apply] {
         // 20 ticks are two of the longest segments.
         for ticks in 2_000..2_020 {
@@ -131,7 +131,7 @@ fn a_circuit_that_opens_between_two_readings_is_not_told_as_a_late_step() {
 }
 
 #[test]
-fn a_rig_at_rest_is_looked_at_rarely_until_somebody_speaks_or_something_moves() {
+fn an_idle_rig_is_polled_rarely_until_a_request_or_motion() {
     let (mut rig, mut fake) = (rig(), Fake::new(800.0));
     let mut control = Control::new(&mut rig);
     fake.ask(&Request::Status);
@@ -178,7 +178,7 @@ fn a_rig_at_rest_is_looked_at_rarely_until_somebody_speaks_or_something_moves() 
 }
 
 #[test]
-fn a_queue_that_runs_dry_is_told_once() {
+fn a_dry_step_queue_is_reported_once() {
     let (mut rig, mut fake) = (rig(), Fake::new(800.0));
     let mut control = Control::new(&mut rig);
     for (dry, ticks) in [(false, 3), (true, 5), (false, 2), (true, 2)] {
@@ -287,7 +287,7 @@ fn a_link_rate_stays_where_the_host_is_heard_at_it() {
 }
 
 #[test]
-fn a_link_rate_at_which_nobody_is_heard_is_left() {
+fn a_link_rate_without_requests_is_abandoned() {
     let (mut rig, mut fake) = (rig(), Fake::new(800.0));
     let mut control = Control::new(&mut rig);
     let at = asked_for_the_slow_rate(&mut control, &mut fake);

@@ -168,9 +168,9 @@ fn settle_accounts(bench: &mut Bench, ledger: &mut Ledger) {
         match event.kind {
             EventKind::Alarm(record) => {
                 ledger.alarms += 1;
-                let told =
+                let reported =
                     matches!(record.alarm, Alarm::HostSilence { .. } | Alarm::MotionInterrupted { .. });
-                assert!(told, "{record:?}");
+                assert!(reported, "{record:?}");
             }
             kind => {
                 for (id, count) in &mut ledger.ends {
@@ -214,8 +214,8 @@ fn honest_host(bench: &mut Bench, ledger: &mut Ledger, enemy: &mut Enemy) {
     let silence = Micros(60_000_000);
     let (id, accepted) =
         say(bench, ledger, enemy, &Request::Move { axis: Axis::SensorFine, target, silence });
-    let said = bench.answers.clone();
-    assert!(accepted, "it works at once: {said:?}");
+    let answers = bench.answers.clone();
+    assert!(accepted, "it works at once: {answers:?}");
     ledger.fine = target.0;
     ledger.ends.insert(id, 0);
     // The attack continues meanwhile.

@@ -47,7 +47,7 @@ fn requests_for_another_boot_or_version_are_refused() {
 }
 
 #[test]
-fn garbage_is_counted_and_malformed_bodies_are_told() {
+fn garbage_is_counted_and_malformed_bodies_are_reported() {
     let mut bench = Bench::new(0.0);
     bench.send_bytes(b"\x00hello?\x00\xFF\xFF\x00");
     bench.send_bytes(&[7; 1000]);

@@ -162,7 +162,7 @@ fn a_repeated_correction_acts_once() {
 }
 
 #[test]
-fn what_is_not_possible_is_named() {
+fn impossible_requests_are_rejected_with_a_reason() {
     let mut bench = Bench::new(700.0);
     let fault = |fault| Err(RequestError::Correction(fault));
     assert_eq!(bench.ask(&Request::CorrectRow { row: 0 }).1, fault(CorrectionFault::None));

@@ -156,9 +156,9 @@ fn whenever_the_power_goes_what_was_confirmed_is_there_and_nothing_is_silently_a
             start(&mut bench);
             if !bench.torn {
                 // It has reported its number.
-                let told = bench.rig.boot();
-                assert!(told > boot, "boot {told} after boot {boot}");
-                boot = told;
+                let reported = bench.rig.boot();
+                assert!(reported > boot, "boot {reported} after boot {boot}");
+                boot = reported;
             }
             known.clone()
         } else {
@@ -180,10 +180,10 @@ fn whenever_the_power_goes_what_was_confirmed_is_there_and_nothing_is_silently_a
         let lost = latched.iter().any(|alarm| matches!(alarm, Alarm::RecordLost { .. }));
         assert!(!lost, "cut {cut} after {bytes} bytes lost a record: {latched:?}");
         let now = found(&mut bench);
-        let told = latched.iter().any(|alarm| matches!(alarm, Alarm::MotionInterrupted { .. }));
+        let reported = latched.iter().any(|alarm| matches!(alarm, Alarm::MotionInterrupted { .. }));
         let fits = |expected: &Known| {
             let mut expected = expected.clone();
-            if told {
+            if reported {
                 expected.alarms.push(0);
             }
             // An interrupted homing counts or does not.

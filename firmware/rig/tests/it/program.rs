@@ -59,7 +59,7 @@ fn the_piezo_moves_without_homing_and_settles_in_15_ms() {
 }
 
 #[test]
-fn a_pair_takes_at_most_60_ms_besides_its_exposures() {
+fn a_pair_takes_at_most_60_ms_plus_its_exposures() {
     let mut bench = Bench::homed();
     load(&mut bench, &[shot(FAR), shot(NEAR)]);
     for round in 0..5 {
@@ -175,7 +175,7 @@ fn impossible_shots_and_programs_are_refused() {
 }
 
 #[test]
-fn what_breaks_in_a_program_is_named_and_the_next_run_works() {
+fn a_failed_program_is_reported_and_the_next_run_works() {
     let mut bench = Bench::homed();
     load(&mut bench, &[shot(FAR), shot(NEAR)]);
     let mut broken = |set: fn(&mut Bench)| {
@@ -238,7 +238,7 @@ fn stopping_the_piezo_keeps_it_where_it_is() {
 }
 
 #[test]
-fn a_host_that_triggers_the_camera_is_told_when() {
+fn a_software_trigger_is_requested_after_settling() {
     let mut bench = Bench::new(700.0);
     load(&mut bench, &[Shot { mode: TriggerMode::Software, exposure: Micros(3_000), ..shot(FAR) }]);
     bench.accepted(&Request::ArmProgram { shots: 1 });
@@ -299,7 +299,7 @@ fn of_a_camera_that_runs_freely_the_first_frame_after_settling_counts() {
 }
 
 #[test]
-fn a_pause_waits_for_the_exposure_and_a_resumed_program_settles_anew() {
+fn a_pause_waits_for_the_exposure_and_a_resumed_program_settles_again() {
     let mut bench = Bench::homed();
     let coarse = Shot { axis: Axis::SensorCoarse, settle_window: Nanometres(1_000), ..shot(4_000_000) };
     load(&mut bench, &[Shot { exposure: Micros(20_000), ..shot(FAR) }, coarse]);
@@ -333,7 +333,7 @@ fn a_pause_waits_for_the_exposure_and_a_resumed_program_settles_anew() {
 }
 
 #[test]
-fn a_program_that_goes_on_while_it_still_brakes_comes_to_its_place() {
+fn a_program_resumed_during_braking_reaches_its_target() {
     for wait_ms in [1, 20, 60, 120, 200] {
         let mut bench = Bench::homed();
         let coarse = Shot { axis: Axis::SensorCoarse, settle_window: Nanometres(1_000), ..shot(6_000_000) };

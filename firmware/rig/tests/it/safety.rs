@@ -26,7 +26,7 @@ fn alarms(bench: &Bench) -> Vec<AlarmRecord> {
 }
 
 #[test]
-fn both_steppers_and_the_piezo_move_at_once() {
+fn both_steppers_and_the_piezo_move_simultaneously() {
     let mut bench = Bench::both_homed();
     let [coarse, fine, lens] = all_moving(&mut bench);
     let status = bench.status();
@@ -269,7 +269,7 @@ fn settings_shots_and_counters_survive() {
 }
 
 #[test]
-fn damaged_records_are_told_and_lost_ones_are_an_alarm() {
+fn damaged_records_are_reported_and_lost_ones_raise_an_alarm() {
     let mut bench = Bench::new(700.0);
     for value in [5_000_000, 6_000_000] {
         assert!(bench.ask(&Request::WriteSetting { key: SettingKey::CoarseMaxNm, value }).1.is_ok());
@@ -390,7 +390,7 @@ fn a_lens_below_its_zero_comes_up_before_the_sensor_is_homed() {
 }
 
 #[test]
-fn an_encoder_that_is_just_not_wrong_enough_to_be_told_at_rest_does_not_keep_its_axis_from_homing() {
+fn an_encoder_error_below_the_limit_at_rest_does_not_prevent_homing() {
     // Campaign, seed 108681: an encoder slipped by 6 um, and its lag in motion became a fault.
     for microsteps in [38, -38] {
         let mut bench = Bench::both_homed();
@@ -438,7 +438,7 @@ fn a_rotor_that_stood_between_two_poles_falls_to_one_of_them_as_homing_begins() 
 }
 
 #[test]
-fn a_board_without_memory_works_and_says_so() {
+fn a_board_without_memory_works_and_reports_it() {
     let mut bench = Bench::new(700.0);
     bench.rig = farnear_rig::Rig::new(*bench.rig.identity(), None, farnear_protocol::BoardMicros(0));
     bench.open_session();
@@ -450,7 +450,7 @@ fn a_board_without_memory_works_and_says_so() {
 }
 
 #[test]
-fn a_board_on_its_own_clock_works_and_says_so_once() {
+fn a_board_on_its_internal_clock_works_and_reports_it_once() {
     let mut bench = Bench::new(700.0);
     let identity = Identity { own_clock: true, ..*bench.rig.identity() };
     bench.rig = farnear_rig::Rig::new(identity, Some(&[0; MEMORY_BYTES]), farnear_protocol::BoardMicros(0));

@@ -104,10 +104,10 @@ fn no_old_frame_acts_again_however_much_came_since() {
     bench.next_id = first + 2;
     bench.clear();
     bench.work(&fine(100_000));
-    let replay = |bench: &mut Bench, said: &RequestError| {
+    let replay = |bench: &mut Bench, error: &RequestError| {
         for frame in &recorded {
             let answer = answer_to(bench, frame).expect("an answer");
-            assert!(matches!(&answer, Ok(Response::Hello(_))) || answer.as_ref() == Err(said), "{answer:?}");
+            assert!(matches!(&answer, Ok(Response::Hello(_))) || answer.as_ref() == Err(error), "{answer:?}");
         }
         bench.run_ms(20);
         let status = bench.status();

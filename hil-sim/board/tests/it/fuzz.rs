@@ -22,7 +22,7 @@ struct Fuzz {
     noise: Noise,
     boot: u32,
     id: u32,
-    said: Vec<Vec<u8>>,
+    sent: Vec<Vec<u8>>,
 }
 
 impl Fuzz {
@@ -159,19 +159,19 @@ impl Fuzz {
                 let count = self.below(600);
                 frame = (0..count).map(|_| self.noise.bits() as u8).collect();
             }
-            3 if !self.said.is_empty() => {
-                let place = self.below(self.said.len() as u64) as usize;
-                frame = self.said[place].clone();
+            3 if !self.sent.is_empty() => {
+                let place = self.below(self.sent.len() as u64) as usize;
+                frame = self.sent[place].clone();
             }
             4 => {
-                let burst = (0..30).map(|_| self.below(self.said.len().max(1) as u64) as usize);
+                let burst = (0..30).map(|_| self.below(self.sent.len().max(1) as u64) as usize);
                 let places: Vec<usize> = burst.collect();
-                frame.extend(places.iter().filter_map(|place| self.said.get(*place)).flatten());
+                frame.extend(places.iter().filter_map(|place| self.sent.get(*place)).flatten());
             }
-            _ if self.said.len() < KEPT => self.said.push(frame.clone()),
+            _ if self.sent.len() < KEPT => self.sent.push(frame.clone()),
             _ => {
                 let place = self.below(KEPT as u64) as usize;
-                self.said[place] = frame.clone();
+                self.sent[place] = frame.clone();
             }
         }
         frame
@@ -182,7 +182,7 @@ impl Fuzz {
 fn nothing_on_the_link_stops_the_board() {
     let mut bench = Bench::new(amount("FARNEAR_SEED", 1));
     let noise = Noise::new(amount("FARNEAR_SEED", 1), "fuzz");
-    let mut fuzz = Fuzz { noise, boot: bench.boot, id: 1_000, said: Vec::new() };
+    let mut fuzz = Fuzz { noise, boot: bench.boot, id: 1_000, sent: Vec::new() };
     let frames = amount("FARNEAR_FUZZ_FRAMES", FRAMES);
     let mut sent = 0u64;
     while sent < frames {

@@ -245,8 +245,8 @@ fn discovery_settings_and_exclusive_control_until_the_heartbeat_ends() {
         .stdin(std::process::Stdio::piped())
         .output()
         .expect("starts");
-    let said = String::from_utf8_lossy(&second.stderr);
-    assert!(!second.status.success() && said.contains("3956 is taken"), "{said}");
+    let stderr = String::from_utf8_lossy(&second.stderr);
+    assert!(!second.status.success() && stderr.contains("3956 is taken"), "{stderr}");
     assert!(program.end().success());
 }
 

@@ -125,16 +125,16 @@ fn detects_a_wrong_position() {
 
 #[test]
 fn detects_a_wrong_piezo_position_unless_a_program_moves_it() {
-    let said = |state: ProgramState, measured_nm: i32| {
+    let violations = |state: ProgramState, measured_nm: i32| {
         let mut status = status(3);
         (status.fine.state, status.fine.measured) = (PositionState::Homed, Nanometres(measured_nm));
         status.program.state = state;
         broken("", &[answered(3, 2, Response::Status(status))])
     };
     // It is at 0.
-    assert_eq!(said(ProgramState::Idle, 50), [""; 0]);
-    assert_eq!(said(ProgramState::Idle, 5_000), ["position"]);
-    assert_eq!(said(ProgramState::Running, 5_000), [""; 0]);
+    assert_eq!(violations(ProgramState::Idle, 50), [""; 0]);
+    assert_eq!(violations(ProgramState::Idle, 5_000), ["position"]);
+    assert_eq!(violations(ProgramState::Running, 5_000), [""; 0]);
 }
 
 fn setting(value: i32) -> Response {

@@ -17,7 +17,7 @@ fn files() -> Vec<PathBuf> {
 fn every_property_holds_in_each_recorded_scenario() {
     let files = files();
     assert!(files.len() >= 4, "{files:?}");
-    let (next, told) = (Mutex::new(files.iter()), Mutex::new(Vec::new()));
+    let (next, failures) = (Mutex::new(files.iter()), Mutex::new(Vec::new()));
     // Two in parallel: other tests run at the same time.
     std::thread::scope(|scope| {
         for _ in 0..2 {
@@ -27,15 +27,15 @@ fn every_property_holds_in_each_recorded_scenario() {
                     let scenario = Scenario::read(file).unwrap_or_else(|error| panic!("{error}"));
                     let outcome = play_alone(&scenario, None).unwrap_or_else(|error| panic!("{error}"));
                     assert!(outcome.answered > 10, "{} plays nothing: {outcome:?}", file.display());
-                    told.lock().expect("not poisoned").extend(
+                    failures.lock().expect("not poisoned").extend(
                         outcome.broken.iter().map(|broken| format!("{}: {broken:?}", file.display())),
                     );
                 }
             });
         }
     });
-    let told = told.into_inner().expect("not poisoned");
-    assert!(told.is_empty(), "{told:#?}");
+    let failures = failures.into_inner().expect("not poisoned");
+    assert!(failures.is_empty(), "{failures:#?}");
 }
 
 #[test]
@@ -54,9 +54,9 @@ fn plays_a_scenario_and_rejects_an_invalid_one_with_line_and_field() {
     };
     let good = "[[host]]\ndoes = \"move\"\naxis = \"fine\"\nto_um = 50.0\n\
                 [[happens]]\non = \"move-done\"\nwhat = \"reset-button\"";
-    let (well, said) = run(&format!("start_um = [100.0, 200.0]\n{good}"));
-    assert!(well && said.contains("1 resets") && said.contains("every property holds"), "{said}");
-    let (well, said) = run("[[happens]]\nafter_ms = 3\nwhat = \"motor-weak\"\namount = 7");
-    let named = ["line 1", "amount = 7", "0 to 1"].iter().all(|part| said.contains(part));
-    assert!(!well && named && said.contains("scenario.toml"), "{said}");
+    let (well, output) = run(&format!("start_um = [100.0, 200.0]\n{good}"));
+    assert!(well && output.contains("1 resets") && output.contains("every property holds"), "{output}");
+    let (well, output) = run("[[happens]]\nafter_ms = 3\nwhat = \"motor-weak\"\namount = 7");
+    let named = ["line 1", "amount = 7", "0 to 1"].iter().all(|part| output.contains(part));
+    assert!(!well && named && output.contains("scenario.toml"), "{output}");
 }

@@ -212,9 +212,9 @@ impl CommandCamera {
         if let Some(status) = status {
             reason += &format!(" ({status})");
         }
-        let said = self.messages.lock().unwrap_or_else(PoisonError::into_inner);
-        if !said.trim().is_empty() {
-            reason += &format!("; it said: {}", said.trim().replace('\n', " | "));
+        let messages = self.messages.lock().unwrap_or_else(PoisonError::into_inner);
+        if !messages.trim().is_empty() {
+            reason += &format!("; it said: {}", messages.trim().replace('\n', " | "));
         }
         CameraError::Unusable { camera: format!("`{}`", self.name), reason }
     }

@@ -94,7 +94,7 @@ impl GenicamCamera {
         })?;
         let id = camera.device_id().map_or_else(|_| id.to_owned(), |id| id.to_string());
         let lost = Arc::new(AtomicBool::new(false));
-        let told = Arc::clone(&lost);
+        let flag = Arc::clone(&lost);
         let device = camera.device();
         // Aravis also opens a camera held by another program; writes then fail.
         let held = device.as_ref().and_then(|device| device.downcast_ref::<GvDevice>());
@@ -104,7 +104,7 @@ impl GenicamCamera {
             return Err(unusable(&id, reason.into()));
         }
         if let Some(device) = &device {
-            device.connect_control_lost(move |_| told.store(true, Ordering::Relaxed));
+            device.connect_control_lost(move |_| flag.store(true, Ordering::Relaxed));
         }
         let ticks = camera.integer("GevTimestampTickFrequency").ok().filter(|ticks| *ticks > 0);
         let mut camera = Self {

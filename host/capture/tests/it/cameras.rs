@@ -107,13 +107,13 @@ fn disconnects_from_the_simulator_before_the_next_client() {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let address = listener.local_addr().unwrap().to_string();
     let knows = Arc::new(AtomicBool::new(false));
-    let told = Arc::clone(&knows);
+    let flag = Arc::clone(&knows);
     let simulator = thread::spawn(move || {
         let (mut stream, _) = listener.accept().unwrap();
         assert_eq!(stream.read(&mut [0]).unwrap(), 0, "it hangs up");
         // On a busy computer the endpoint notices the disconnection late.
         thread::sleep(Duration::from_millis(200));
-        told.store(true, Ordering::Relaxed);
+        flag.store(true, Ordering::Relaxed);
     });
     drop(SimCamera::connect(&address).unwrap());
     assert!(knows.load(Ordering::Relaxed));

@@ -75,7 +75,7 @@ fn detects_a_free_running_program() {
 }
 
 #[test]
-fn what_is_wrong_with_a_program_is_said() {
+fn invalid_programs_are_rejected_with_a_reason() {
     let absent = failure(start("farnear-no-such-program --x"));
     assert!(absent.contains("farnear-no-such-program") && absent.contains("no such program"), "{absent}");
     let dies = failure(script("echo the lens cap is on >&2; exit 3"));

@@ -106,7 +106,7 @@ fn dropping_stops_the_run_and_waiting_frames_are_counted() {
 }
 
 #[test]
-fn a_refusal_is_told() {
+fn a_refusal_is_reported() {
     let (client, _peer) = connect(Faults::default());
     let pace = Pace { period: Micros(0), exposures: 1 };
     let refused = Continuous::start(&client, &mut Losing::default(), &[], pace, WAIT).err().unwrap();

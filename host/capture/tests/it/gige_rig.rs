@@ -114,9 +114,9 @@ fn reports_a_killed_rig_and_works_with_the_next_one() {
     let mut rig = Rig::start(6, &["--paced"]);
     let (client, mut camera) = (rig.client(), rig.gige());
     let exposing = Arc::new(Mutex::new(false));
-    let told = Arc::clone(&exposing);
+    let reported = Arc::clone(&exposing);
     let capture = std::thread::spawn(move || {
-        let say = &mut |text: &str| *told.lock().unwrap() |= text.starts_with("exposing");
+        let say = &mut |text: &str| *reported.lock().unwrap() |= text.starts_with("exposing");
         let pairs = std::iter::repeat_with(|| {
             capture_pair(&client, &mut camera, &SENSOR, &Exposures::default(), say)
         });
@@ -128,8 +128,8 @@ fn reports_a_killed_rig_and_works_with_the_next_one() {
         std::thread::sleep(Duration::from_millis(1));
     }
     rig.child.kill().unwrap();
-    let said = capture.join().unwrap();
-    assert!(said.contains("answer") || said.contains("gone") || said.contains("away"), "{said}");
+    let message = capture.join().unwrap();
+    assert!(message.contains("answer") || message.contains("gone") || message.contains("away"), "{message}");
     drop(rig);
     let rig = Rig::start(6, &[]);
     let mut camera = rig.gige();
@@ -188,7 +188,7 @@ fn frames_of_a_lossy_line_match_their_exposures() {
     let shots = reach(&client, &SENSOR, &Exposures::default(), &mut |_| {}).unwrap().shots;
     let pace = Pace { period: Micros(0), exposures: frames };
     let mut stream = Continuous::start(&client, &mut camera, &shots, pace, WAIT).unwrap();
-    let (mut whole, mut told) = (0, 0);
+    let (mut whole, mut reported) = (0, 0);
     while let Some(outcome) = stream.outcome().unwrap() {
         match outcome {
             Outcome::Taken(frame) => {
@@ -202,13 +202,13 @@ fn frames_of_a_lossy_line_match_their_exposures() {
             }
             Outcome::Dropped { loss: Loss::Image { reason, .. }, .. } => {
                 assert!(reason.contains("packets were lost"), "{reason}");
-                told += 1;
+                reported += 1;
             }
             // The board waits for read-out where necessary.
             Outcome::Dropped { .. } => {}
         }
     }
-    println!("{frames} exposures: {whole} frames whole, {told} told as incomplete");
+    println!("{frames} exposures: {whole} frames whole, {reported} reported incomplete");
     // Lost packets are resent repeatedly; five losses of one packet in a row practically never occur.
-    assert!(whole > 0 && told * 20 <= whole, "{whole} whole, {told} incomplete");
+    assert!(whole > 0 && reported * 20 <= whole, "{whole} whole, {reported} incomplete");
 }

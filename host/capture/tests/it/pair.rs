@@ -79,12 +79,15 @@ fn names(folder: &Path) -> Vec<String> {
 #[test]
 fn homes_moves_exposes_and_writes_a_pair() {
     let (client, peer) = client();
-    let mut said = Vec::new();
+    let mut messages = Vec::new();
     let pair = capture_pair(&client, &mut numbered(), &SENSOR, &exposures(), &mut |text| {
-        said.push(text.to_string())
+        messages.push(text.to_string())
     })
     .unwrap();
-    assert!(said[0].contains("homing the sensor's coarse axis (its position is unknown)"), "{said:?}");
+    assert!(
+        messages[0].contains("homing the sensor's coarse axis (its position is unknown)"),
+        "{messages:?}"
+    );
     assert_eq!((pair.far.image.pixels[[0, 0]], pair.near.image.pixels[[0, 0]]), (0, 1));
     // The piezo compensates the coarse stage's error of 375 nm; its own 2 nm remain.
     for taken in [&pair.far, &pair.near] {
@@ -102,12 +105,14 @@ fn homes_moves_exposes_and_writes_a_pair() {
 
     // Already homed the second time.
     let acts = peer.board().acts;
-    let mut said = Vec::new();
+    let mut messages = Vec::new();
     client.set_timing(Timing::EMULATED);
     let begin = Instant::now();
-    capture_pair(&client, &mut numbered(), &SENSOR, &exposures(), &mut |text| said.push(text.to_string()))
-        .unwrap();
-    assert!(!said.iter().any(|text| text.contains("homing")), "{said:?}");
+    capture_pair(&client, &mut numbered(), &SENSOR, &exposures(), &mut |text| {
+        messages.push(text.to_string())
+    })
+    .unwrap();
+    assert!(!messages.iter().any(|text| text.contains("homing")), "{messages:?}");
     assert_eq!(peer.board().acts - acts, 2);
     assert!(begin.elapsed() < Duration::from_secs(2), "a homed rig waits for nothing: {:?}", begin.elapsed());
 }
@@ -154,10 +159,10 @@ fn a_picture_of_another_trigger_is_an_error_with_both_numbers() {
             matches!(error, CaptureError::OneCamera { number, cameras: 2, .. } if number == which),
             "{error:?}"
         );
-        let said = error.to_string();
+        let message = error.to_string();
         let expected =
             format!("camera {which} of 2: the camera skipped exposure 0: it sent the image of exposure 1");
-        assert_eq!(said, expected);
+        assert_eq!(message, expected);
         assert_eq!(peer.board().stops, 1);
     }
 }

@@ -155,15 +155,15 @@ fn runs_an_armed_program_twice_and_reports_software_triggered_shots() {
     client.arm(&[shot]).unwrap();
     for run in 0..2 {
         let mut work = client.start_program(&[shot]).unwrap();
-        let mut said = Vec::new();
+        let mut ready = Vec::new();
         let end = loop {
             match work.step().unwrap() {
                 Step::Done(kind) => break kind,
-                Step::Event(kind) => said.push(matches!(kind, EventKind::ShotReady { .. })),
+                Step::Event(kind) => ready.push(matches!(kind, EventKind::ShotReady { .. })),
             }
         };
         assert!(matches!(end, EventKind::ProgramDone { exposures: 2, .. }), "{end:?}");
-        assert_eq!(said, [true, false, true, false], "run {run}");
+        assert_eq!(ready, [true, false, true, false], "run {run}");
     }
     assert_eq!(peer.board().triggers, 4);
 }

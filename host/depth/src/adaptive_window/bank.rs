@@ -1,11 +1,16 @@
 //! Filters before the windows: the residual's four parts and the matched filter, for either kind of operators.
 
+use std::sync::{Mutex, PoisonError};
+
 use super::whitened::Whitened;
 use crate::depth_of_alpha::DepthOfAlpha;
 use crate::kernel::Kernel;
 use crate::operators::{DesignError, Operators, linearise};
 use crate::optics::Optics;
 use crate::simd::{self, Backend, MAX_ROWS, Plane, Taps};
+
+/// The last design: a stream or series of pairs has one lens, and a design takes as long as a map of 640x480.
+static LAST: Mutex<Option<(Optics, Whitened)>> = Mutex::new(None);
 
 /// Filter bank.
 #[derive(Debug, Clone)]
@@ -19,7 +24,13 @@ pub enum Bank {
 impl Bank {
     /// The bank with a white residual. Returns [`DesignError`] for a PSF that allows none.
     pub fn whitened(optics: &Optics) -> Result<Self, DesignError> {
-        Ok(Self::Whitened(Box::new(Whitened::design(optics)?)))
+        let mut last = LAST.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((_, filters)) = last.as_ref().filter(|(of, _)| of == optics) {
+            return Ok(Self::Whitened(Box::new(filters.clone())));
+        }
+        let filters = Whitened::design(optics)?;
+        *last = Some((*optics, filters.clone()));
+        Ok(Self::Whitened(Box::new(filters)))
     }
 
     /// The bank of rational operators.

@@ -26,7 +26,7 @@ const LEAST_EVIDENCE: f32 = 0.02;
 /// Smallest standard deviation of a window, in alpha.
 const FLOOR: f32 = 0.002;
 /// Standard deviation of alpha from which a window excludes nothing.
-const SAYS_NOTHING: f32 = 0.045;
+const UNINFORMATIVE: f32 = 0.045;
 /// Standard deviation of alpha that is certain enough for [`Window::Safe`].
 const CERTAIN: f32 = 0.035;
 /// Variance that remains after a median of 1x1, 3x3, 5x5 and 7x7.
@@ -234,6 +234,19 @@ impl<'a> Tile<'a> {
         }
         let Job { far, near, .. } = self.job;
         let (height, width) = far.dim();
+        // Reflection adds no hole that is not within the halo of the image itself.
+        let [rows, columns] =
+            [(place.top, place.rows, halo[0], height), (place.left, place.columns, halo[1], width)]
+                .map(|(first, count, halo, n)| first.saturating_sub(halo)..(first + count + halo).min(n));
+        let whole = [far, near].iter().all(|image| {
+            let rows = image.slice(s![rows.clone(), columns.clone()]);
+            rows.rows()
+                .into_iter()
+                .all(|row| row.iter().map(|v| u32::from(v.is_finite())).sum::<u32>() as usize == row.len())
+        });
+        if whole {
+            return None;
+        }
         let holes =
             Array2::from_shape_fn((place.rows + 2 * halo[0], place.columns + 2 * halo[1]), |(y, x)| {
                 let y = reflect((place.top + y) as isize - halo[0] as isize, height);
@@ -368,7 +381,7 @@ impl<'a> Tile<'a> {
                 let weighing = Weighing {
                     gamma: GAMMA * factor.sqrt(),
                     floor: (FLOOR * FLOOR + tolerance * tolerance) / factor,
-                    largest: (SAYS_NOTHING * SAYS_NOTHING + tolerance * tolerance) / factor,
+                    largest: (UNINFORMATIVE * UNINFORMATIVE + tolerance * tolerance) / factor,
                 };
                 let choice = Choice { alpha: chosen, variance: of_chosen, low, high, open };
                 simd::choose(backend, alpha, variance, noise, weighing, choice);

@@ -114,9 +114,8 @@ fn constrained(rows: &[(Vec<f64>, f64)], constraints: &[Vec<f64>]) -> Result<DVe
     let least = 1e-9 * svd.singular_values.max();
     let free: Vec<usize> = (0..unknowns).filter(|i| svd.singular_values[*i] <= least).collect();
     let space = DMatrix::from_fn(unknowns, free.len(), |i, j| directions[(free[j], i)]);
-    let matrix = DMatrix::from_fn(rows.len(), unknowns, |i, j| rows[i].0[j]) * &space;
-    let right = DVector::from_fn(rows.len(), |i, _| rows[i].1);
-    Ok(space * least_squares::solve(matrix, right)?)
+    let (matrix, right) = least_squares::reduced(rows);
+    Ok(&space * least_squares::solve(matrix * &space, right)?)
 }
 
 /// One unit row per unknown: keeps undetermined unknowns small.
@@ -244,7 +243,7 @@ mod tests {
     }
 
     #[test]
-    fn noise_does_not_bias_and_the_mean_says_nothing() {
+    fn noise_does_not_bias_and_the_mean_has_no_effect() {
         for psf in [Psf::PillBox, Psf::Gaussian { k: 0.4578 }, Psf::Generalised { p: 1.8, k: 0.4802 }] {
             let found = Whitened::for_psf(psf, 2.703, 0.0).unwrap();
             let [_, r1, _, r3] = &found.residual;

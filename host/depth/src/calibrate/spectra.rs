@@ -15,24 +15,12 @@ const RINGS: usize = 128;
 
 /// Why an image has no usable spectrum.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "the messages name the fields")]
 pub enum SpectrumError {
-    /// Too small.
     #[error("{width}x{height} px are too few, at least 32x32 are needed")]
-    TooSmall {
-        /// Width.
-        width: usize,
-        /// Height.
-        height: usize,
-    },
-    /// A pixel without a value.
+    TooSmall { width: usize, height: usize },
     #[error("the pixel in column {column}, row {row} is not finite")]
-    NotFinite {
-        /// Column.
-        column: usize,
-        /// Row.
-        row: usize,
-    },
-    /// No texture.
+    NotFinite { column: usize, row: usize },
     #[error("it is constant or dark, without texture to compare")]
     Constant,
 }

@@ -3,11 +3,11 @@
 //! 1. [`focus_plane`]: depth from focus per block gives the slice in focus at each pixel, a plane.
 //! 2. [`blur`]: spectra of each slice against the sharpest give blur over distance, on both sides of focus.
 //! 3. Pair separation and binning for a largest blur of 2 to 3 px.
-//! 4. Every pair (i, i + d) is measured with several PSFs, blur radii and least blurs; the response from measured to true normalised
-//!    depth is a polynomial fitted on one half of the field in every other pair. The other parts choose among them and give the
-//!    error that is left, which becomes a part of every later standard deviation.
+//! 4. Every pair (i, i + d) is measured with several PSFs, blur radii and least blurs. A polynomial response from
+//!    measured to true normalised depth is fitted on one half of the field in every other pair. The other parts select
+//!    the model and give the remaining error, which enters every later standard deviation.
 //!
-//! Distances are relative: the far plane lies at [`StackSettings::far_mm`], and depth falls by one step of the stage per slice.
+//! Distances are relative: the far plane is at [`StackSettings::far_mm`], and depth falls by one stage step per slice.
 
 pub mod blur;
 mod curve;
@@ -25,13 +25,12 @@ use focus_plane::FocusPlane;
 
 pub use response::Trial;
 
-/// Blur radius, px, of the far plane in the near image that is aimed at.
+/// Target blur radius, px, of the far plane in the near image.
 const AIM_PX: f64 = 2.5;
 /// Blur radii that are usable.
 const USABLE_PX: [f64; 2] = [1.6, 3.4];
-/// Binnings that are tried.
 const BINS: [usize; 4] = [1, 2, 4, 8];
-/// Pairs that see the target at as many depths within the range are enough to learn a response from.
+/// Depths within the range at which enough pairs see the target to learn a response.
 const ENOUGH_DEPTHS: usize = 4;
 /// Fewest slices.
 pub const FEWEST: usize = 5;
@@ -53,43 +52,24 @@ pub struct StackSettings {
 
 /// Why a stack gives no lens.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "the messages name the fields")]
 pub enum StackError {
-    /// Too few slices.
     #[error("{0} slices: at least {FEWEST} are needed, from in front of the focus to behind it")]
     TooFew(usize),
-    /// Slices of different size.
     #[error("slice {index} has another size than the first one")]
-    Size {
-        /// From 1.
-        index: usize,
-    },
-    /// A number that makes no sense.
+    Size { index: usize },
     #[error("{name} = {value}: expected a positive number")]
-    NotPositive {
-        /// Name of the parameter.
-        name: &'static str,
-        /// Its value.
-        value: f64,
-    },
-    /// No plane in focus.
+    NotPositive { name: &'static str, value: f64 },
     #[error("{0}")]
     NoFocus(String),
-    /// No separation gives a usable blur.
     #[error(
         "no pair of slices has a largest blur of {low} to {high} px: it is {per_slice:.2} px per slice; use a {hint} step",
         low = USABLE_PX[0],
         high = USABLE_PX[1]
     )]
-    NoSeparation {
-        /// Blur radius per slice, px.
-        per_slice: f64,
-        /// finer or coarser.
-        hint: &'static str,
-    },
-    /// Nothing could be measured.
+    NoSeparation { per_slice: f64, hint: &'static str },
     #[error("no pair of slices {0} apart has its target within the range: take more slices around the focus")]
     NoPair(usize),
-    /// The optics that result.
     #[error(transparent)]
     Optics(#[from] crate::optics::OpticsError),
 }
@@ -131,9 +111,6 @@ pub struct HeldOut {
 }
 
 /// Calibrates from `slices`, the far-focused first, (height, width).
-///
-/// # Errors
-/// [`StackError`].
 pub fn calibrate_stack(slices: &[Array2<f32>], settings: &StackSettings) -> Result<StackLens, StackError> {
     check(slices, settings)?;
     let plane = FocusPlane::of(slices).map_err(StackError::NoFocus)?;
@@ -175,8 +152,8 @@ fn check(slices: &[Array2<f32>], settings: &StackSettings) -> Result<(), StackEr
     Ok(())
 }
 
-/// Binning and separation whose largest blur is nearest to [`AIM_PX`]; small bins first, and separations of at least
-/// [`ENOUGH_DEPTHS`] slices: with one of n slices, n pairs see the target within their range.
+/// Binning and separation whose largest blur is nearest to [`AIM_PX`]; small bins first. Separations are at least
+/// [`ENOUGH_DEPTHS`] slices: with n slices, n pairs see the target within their range.
 fn separation(
     blur: &BlurCurve,
     slices: usize,
@@ -206,7 +183,7 @@ fn separation(
         })
 }
 
-/// A thin lens whose pair spans `pair_step` slices: only the range and its place count, depth is nearly linear in alpha.
+/// A thin lens whose pair spans `pair_step` slices: only the range counts; depth is nearly linear in alpha.
 fn optics(
     psf: Psf,
     max_blur_px: f64,

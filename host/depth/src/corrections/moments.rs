@@ -162,7 +162,7 @@ mod tests {
     }
 
     #[test]
-    fn too_little_to_go_by_is_no_solution() {
+    fn too_few_samples_have_no_solution() {
         let mut moments = Moments::new();
         // Three depths cannot determine u^3.
         for row in 0..9 {

@@ -1,13 +1,12 @@
 //! Places of a stack, corrected along the edges of the sharp image.
 //!
-//! Where a surface shows little, the window over which sharpness is taken reaches to a stronger detail next to it: things grow by the
-//! window and by their own blur, mostly over a dull background. The image that is sharp everywhere still shows where they end. So each
-//! place becomes the weighted median of those around it (Ma et al., Constant time weighted median filtering for stereo matching and
-//! beyond, ICCV 2013). Near ones and equally bright ones count more. Each counts by the inverse of its own sharpness, for strong detail puts
-//! its place on weak surroundings, never the other way round; and by how far its curve rises above its mean, for what shows nothing at
-//! all has nothing to say.
+//! Window and blur enlarge a textured object in front of a dull surface; the sharp image still has its edges. Each place
+//! becomes the weighted median of its surroundings (Ma et al., Constant time weighted median filtering for stereo matching
+//! and beyond, ICCV 2013). Near and equally bright places weigh more. A weight falls with the sharpness, because strong
+//! detail spreads over weak surroundings. It rises with the curve's height above its mean, because a place without texture
+//! has no information.
 //!
-//! Places that the median confirms keep their own value, so that smooth surfaces lose nothing of their accuracy.
+//! Places that the median confirms keep their own value, so that smooth surfaces keep their accuracy.
 //!
 //! Cost: about 200 places for each pixel, for any window, and a histogram of 8 bins for each image of the stack.
 
@@ -16,15 +15,15 @@ use rayon::prelude::*;
 
 /// The window's radius in its standard deviations; pixels beyond have less than 6 % of the weight of the centre.
 const RADIUS: f32 = 2.4;
-/// Places looked at along a standard deviation.
+/// Sampled places per standard deviation.
 const PLACES: f32 = 4.0;
-/// Standard deviation of the brightness that counts as equal, as a part of the image's own. From 0.1 to 0.5 little changes.
+/// Standard deviation of the brightness weight, relative to the image's. From 0.1 to 0.5 little changes.
 const EQUAL: f32 = 0.25;
-/// Sharpness, as a part of the image's median, that is added to every place's: below it all is noise and counts alike.
+/// Added to every sharpness, relative to the image's median: noise below it weighs equally.
 const NOISE: f32 = 0.2;
 /// Bins of the histogram for each image of the stack.
 const BINS: f32 = 8.0;
-/// A place that is not farther than this from the median, in images, is confirmed by it.
+/// Largest distance from the median, in images, at which a place is confirmed.
 const CONFIRMED: f32 = 1.0;
 /// Steps of the table of weights over the brightness, and of its end in standard deviations.
 const STEPS: f32 = 16.0;
@@ -36,16 +35,14 @@ pub(super) struct Guide<'a> {
     pub sharp: ArrayView2<'a, f32>,
     /// How sharp each place is.
     pub sharpness: ArrayView2<'a, f32>,
-    /// How far its curve rises above its mean, 0 to 1.
-    pub rise: ArrayView2<'a, f32>,
     /// Standard deviation of the window, px, above 0.
     pub reach_px: f32,
     /// Images in the stack: places are from 0 to one less.
     pub images: usize,
 }
 
-/// The places (finite) corrected along the guide's edges.
-pub(super) fn mended(place: ArrayView2<f32>, guide: &Guide<'_>) -> Array2<f32> {
+/// The places (finite) corrected along the guide's edges; `rise` is how far each one's curve rises above its mean, 0 to 1.
+pub(super) fn mended(place: ArrayView2<f32>, rise: Array2<f32>, guide: &Guide<'_>) -> Array2<f32> {
     let (height, width) = place.dim();
     let offsets = offsets(guide.reach_px);
     // Equally dark images have no edges to keep to: everything is equally bright then.
@@ -53,9 +50,10 @@ pub(super) fn mended(place: ArrayView2<f32>, guide: &Guide<'_>) -> Array2<f32> {
     let table: Vec<f32> =
         (0..=(END * STEPS) as usize).map(|step| (-0.5 * (step as f32 / STEPS).powi(2)).exp()).collect();
     let noise = (NOISE * middle(guide.sharpness)).max(f32::MIN_POSITIVE);
-    let says = Zip::from(guide.sharpness)
-        .and(guide.rise)
-        .map_collect(|sharpness, rise| rise * noise / (sharpness + noise));
+    let mut says = rise;
+    Zip::from(&mut says)
+        .and(guide.sharpness)
+        .for_each(|says, sharpness| *says = *says * noise / (sharpness + noise));
     let bins = guide.images * BINS as usize + 1;
     let mut result = Array2::zeros((height, width));
     result.axis_iter_mut(Axis(0)).into_par_iter().enumerate().for_each(|(y, mut row)| {
@@ -144,18 +142,12 @@ mod tests {
     /// Corrected over 6 px in a stack of 12 images; all curves rise alike.
     fn mend(place: &Array2<f32>, sharp: &Array2<f32>, sharpness: &Array2<f32>) -> Array2<f32> {
         let rise = Array2::from_elem(SIZE, 0.5);
-        let guide = Guide {
-            sharp: sharp.view(),
-            sharpness: sharpness.view(),
-            rise: rise.view(),
-            reach_px: 6.0,
-            images: 12,
-        };
-        mended(place.view(), &guide)
+        let guide = Guide { sharp: sharp.view(), sharpness: sharpness.view(), reach_px: 6.0, images: 12 };
+        mended(place.view(), rise, &guide)
     }
 
     #[test]
-    fn what_grew_over_a_dull_background_ends_at_the_edge_of_the_sharp_image() {
+    fn objects_on_a_dull_background_end_at_the_edge_of_the_sharp_image() {
         // The bright thing ends at column 30, its place at column 36.
         let across = |ends: usize, left: f32, right: f32| {
             Array2::from_shape_fn(SIZE, |(_, x)| if x < ends { left } else { right })
@@ -179,13 +171,7 @@ mod tests {
     fn an_image_without_brightness_and_curves_without_a_tip_leave_all_as_it_is() {
         let place = Array2::from_shape_fn(SIZE, |(y, x)| ((x * 7 + y * 5) % 12) as f32);
         let [dark, flat] = [Array2::zeros(SIZE), Array2::<f32>::zeros(SIZE)];
-        let guide = Guide {
-            sharp: dark.view(),
-            sharpness: flat.view(),
-            rise: flat.view(),
-            reach_px: 6.0,
-            images: 12,
-        };
-        assert_eq!(mended(place.view(), &guide), place);
+        let guide = Guide { sharp: dark.view(), sharpness: flat.view(), reach_px: 6.0, images: 12 };
+        assert_eq!(mended(place.view(), flat.clone(), &guide), place);
     }
 }

@@ -1,8 +1,8 @@
-//! How sharp each place of an image is: the focus measures of Pertuz, Puig & Garcia's survey (Analysis of focus measure
-//! operators for shape-from-focus, Pattern Recognition 46, 2013), by the method's name; their short names next to them.
+//! Focus measures of Pertuz, Puig & Garcia (Analysis of focus measure operators for shape-from-focus, Pattern Recognition
+//! 46, 2013), with their abbreviations.
 //!
 //! Each is a value per pixel, from its neighbours, and a mean or a variance over a window around it. Borders are reflected.
-//! Cost: 10 to 60 operations a pixel, for any window, but for the range (twice the window's side).
+//! Cost: 10 to 60 operations a pixel for any window; for the range twice the window's side.
 
 use std::{fmt, str::FromStr};
 
@@ -29,7 +29,7 @@ macro_rules! measures {
             /// All there are.
             pub const ALL: &[Self] = &[$(Self::$name,)+];
 
-            /// Its name, as users write it.
+            /// The name in options.
             pub const fn name(self) -> &'static str {
                 match self { $(Self::$name => $text,)+ }
             }
@@ -56,7 +56,7 @@ measures! {
     AbsoluteGradient = "absolute-gradient";
     /// Squared difference to the right (GRAS; Eskicioglu & Fisher 1995).
     SquaredGradient = "squared-gradient";
-    /// Squared difference to the next but one, the larger of both directions (BREN; Brenner et al. 1976).
+    /// Squared difference at a distance of two pixels, the larger of both directions (BREN; Brenner et al. 1976).
     Brenner = "brenner";
     /// Squared gradient of the smoothed image (GDER; Geusebroek et al. 2000).
     GaussianDerivative = "gaussian-derivative";
@@ -66,23 +66,23 @@ measures! {
     SpatialFrequency = "spatial-frequency";
     /// Variance of the grey values (GLVA; Krotkov & Martin 1986).
     GreyVariance = "grey-variance";
-    /// The same divided by the mean (GLVN; Santos et al. 1997).
+    /// Variance divided by the mean (GLVN; Santos et al. 1997).
     NormalisedVariance = "normalised-variance";
     /// Variance of the local variance (GLLV; Pech-Pacheco et al. 2000).
     VarianceOfVariance = "variance-of-variance";
-    /// Correlation with the next pixel less that with the next but one (VOLA; Vollath 1987).
+    /// Correlation at a distance of one pixel minus that at two (VOLA; Vollath 1987).
     Vollath = "vollath";
     /// Magnitudes of the differences to all eight neighbours (CONT; Nanda & Cutler 2001).
     Contrast = "contrast";
     /// Magnitudes of the coefficients of a quadratic surface (CURV; Helmli & Scherer 2001).
     Curvature = "curvature";
-    /// Quotient of pixel and mean, in the direction that is above 1 (HELM; Helmli & Scherer 2001).
+    /// Pixel divided by mean, or its inverse, whichever is above 1 (HELM; Helmli & Scherer 2001).
     MeanQuotient = "mean-quotient";
-    /// Largest less smallest grey value (HISR; Firestone et al. 1991).
+    /// Largest minus smallest grey value (HISR; Firestone et al. 1991).
     Range = "range";
 }
 
-/// A name that no measure has.
+/// An unknown name.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("`{0}` is not a focus measure: expected one of {names}", names = names())]
 pub struct UnknownSharpness(String);
@@ -224,9 +224,9 @@ fn quadratic(a: &Around) -> f32 {
     slopes + [x2, y2].map(|sum| (0.5 * sum - all / 3.0).abs()).iter().sum::<f32>()
 }
 
-/// Mean of the squares less the square of the mean, over a window.
+/// Variance over a window.
 fn variance(map: Array2<f32>, window_px: usize) -> Array2<f32> {
-    // About the image's mean, so that little is lost in the difference.
+    // Relative to the image's mean, against cancellation.
     let middle = map.mean().unwrap_or(0.0);
     let centred = map.mapv_into(|v| v - middle);
     let mean = box_mean(centred.view(), window_px);
@@ -293,7 +293,7 @@ fn mean_quotient(image: ArrayView2<f32>, window_px: usize) -> Array2<f32> {
     let mean = box_mean(image, window_px);
     let quotient = Zip::from(image).and(&mean).map_collect(|here, mean| {
         let [here, mean] = [here.max(DARK), mean.max(DARK)];
-        // Less 1, which a place without any texture has: what rises and falls with the focus is the rest.
+        // A place without texture has 1, so 1 is subtracted.
         (here / mean).max(mean / here) - 1.0
     });
     box_mean(quotient.view(), window_px)

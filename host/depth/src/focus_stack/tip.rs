@@ -1,17 +1,16 @@
-//! The tip of a curve of sharpness: log-sharpness as a parabola, by weighted least squares (see the parent module).
+//! The tip of a sharpness curve: log-sharpness as a parabola, by weighted least squares (see the parent module).
 
-/// The tip of a curve.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Tip {
     pub place: f32,
     pub reliability: f32,
     /// The curve's largest value.
     pub sharpness: f32,
-    /// How far that is above the curve's mean, as a part of it.
+    /// Rise above the curve's mean, relative to it.
     pub rise: f32,
 }
 
-/// The tip of a curve of sharpness over the positions of the stack; NaN = not seen.
+/// The tip of a sharpness curve over the stack's positions; NaN = not seen.
 pub(super) fn tip(curve: &[f32], positions: &[f64], fit_points: usize) -> Tip {
     let seen = || (0..curve.len()).filter(|i| curve[*i].is_finite());
     let count = seen().count();
@@ -21,7 +20,7 @@ pub(super) fn tip(curve: &[f32], positions: &[f64], fit_points: usize) -> Tip {
     let rise = if most > 0.0 { (1.0 - mean / most).clamp(0.0, 1.0) } else { 0.0 };
     let unreliable = Tip { place: largest as f32, reliability: 0.0, sharpness: most, rise };
     if 2 * count < curve.len() {
-        // Nor has it a say in its surroundings.
+        // Nor does it count in its surroundings.
         return Tip { rise: 0.0, ..unreliable };
     }
     if largest == 0 || largest + 1 == curve.len() || most <= 0.0 {
@@ -32,7 +31,6 @@ pub(super) fn tip(curve: &[f32], positions: &[f64], fit_points: usize) -> Tip {
     }
     let half = fit_points / 2;
     let window = largest.saturating_sub(half)..(largest + half + 1).min(curve.len());
-    // In units of the spacing around the largest value.
     let unit = (positions[largest + 1] - positions[largest - 1]) / 2.0;
     let mut fit = Parabola::default();
     for i in window.filter(|i| curve[*i].is_finite()) {
@@ -49,7 +47,7 @@ pub(super) fn tip(curve: &[f32], positions: &[f64], fit_points: usize) -> Tip {
     Tip { place: place as f32, reliability, sharpness: most, rise }
 }
 
-/// The number of the image, from 0 and between images as a fraction, at a position; the first or last beyond the ends.
+/// The image number at a position, from 0 and as a fraction between images; the first or last beyond the ends.
 pub(super) fn place_of(positions: &[f64], position: f64) -> f64 {
     let falling = positions.len() > 1 && positions[1] < positions[0];
     let sign = if falling { -1.0 } else { 1.0 };
@@ -64,7 +62,6 @@ pub(super) fn place_of(positions: &[f64], position: f64) -> f64 {
     }
 }
 
-/// Weighted least squares of a parabola, by its sums.
 #[derive(Debug, Default)]
 struct Parabola {
     /// Sums of the weights times `t^0` to `t^4`.
@@ -88,7 +85,7 @@ impl Parabola {
         self.square += weight * v * v;
     }
 
-    /// Where the tip is, and the part of the variance that the parabola explains; `None` where it has no tip above.
+    /// Tip, and the part of the variance that the parabola explains; `None` without a maximum.
     fn tip(&self) -> Option<(f64, f64)> {
         let [s0, s1, s2, s3, s4] = self.powers;
         let [v0, v1, v2] = self.values;

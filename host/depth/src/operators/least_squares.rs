@@ -7,6 +7,26 @@ use super::DesignError;
 /// Relative singular values that count as zero: undetermined taps get the smallest solution.
 const RELATIVE_RANK: f64 = 1e-12;
 
+/// Equations that are reduced together, few enough for a second-level cache.
+const TOGETHER: usize = 256;
+
+/// As many equations as unknowns and one more, with the same normal equations: triangular factors of parts of the rows, each
+/// with what the parts before left (TSQR; Demmel, Grigori, Hoemmen & Langou 2012).
+pub fn reduced(rows: &[(Vec<f64>, f64)]) -> (DMatrix<f64>, DVector<f64>) {
+    let columns = rows[0].0.len() + 1;
+    let mut left = DMatrix::zeros(0, columns);
+    for part in rows.chunks(TOGETHER) {
+        let own = left.nrows();
+        let value = |i: usize, j: usize| match part.get(i) {
+            Some((row, right)) => row.get(j).copied().unwrap_or(*right),
+            None => left[(i - part.len(), j)],
+        };
+        left = DMatrix::from_fn(own + part.len(), columns, value).qr().unpack_r();
+    }
+    let right = left.column(columns - 1).into_owned();
+    (left.remove_column(columns - 1), right)
+}
+
 /// Minimises `|matrix x - rhs|^2` by QR and SVD. Returns [`DesignError::Singular`] without a finite solution.
 pub fn solve(matrix: DMatrix<f64>, rhs: DVector<f64>) -> Result<DVector<f64>, DesignError> {
     let unknowns = matrix.ncols();

@@ -129,7 +129,7 @@ mod tests {
     use crate::psf::Psf;
 
     #[test]
-    fn the_depth_error_has_the_derivative_it_says_and_falls() {
+    fn the_depth_error_has_the_given_derivative_and_decreases() {
         let max_blur_px = 2.703;
         let otf = Psf::PillBox.otf(max_blur_px);
         let grid = octant();

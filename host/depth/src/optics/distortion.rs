@@ -135,7 +135,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_model_of_opencv_is_refused() {
+    fn invalid_opencv_models_are_rejected() {
         let message = |section: DistortionSection| section.check().unwrap_err().to_string();
         assert!(message(section(&[0.1; 12])).contains("12 coefficients"));
         assert!(message(section(&[0.1, f64::NAN, 0.0, 0.0])).contains("k2 = NaN"));

@@ -127,12 +127,13 @@ fn scan<'a>(
     }
     let [low, high] = [whole[0].low.min(whole[1].low), whole[0].high.max(whole[1].high)];
     let not_finite_mask = (!(whole[0].finite && whole[1].finite)).then(|| {
-        Array2::from_shape_fn((height, width), |(y, x)| {
-            let i = y * width + x;
-            !(far[i].is_finite() && near[i].is_finite())
-        })
+        let mut mask = Array2::from_elem((height, width), false);
+        let pixels = mask.iter_mut().zip(far).zip(near);
+        pixels.for_each(|((bad, far), near)| *bad = !far.is_finite() | !near.is_finite());
+        mask
     });
-    let count = |mask: &Option<Array2<bool>>| mask.as_ref().map_or(0, |m| m.iter().filter(|m| **m).count());
+    let count =
+        |mask: &Option<Array2<bool>>| mask.as_ref().map_or(0, |m| m.iter().map(|m| usize::from(*m)).sum());
     let saturated_mask = saturated([far, near], &of_blocks, high, width);
     let [not_finite, saturated] = [count(&not_finite_mask), count(&saturated_mask)];
     let bad = match (not_finite_mask, saturated_mask) {

@@ -6,13 +6,14 @@
 //! still needs, so nothing is computed twice within a tile. A tile holds about 100 rows besides the maps: less than 1
 //! MB for any image size. Bands are independent: threads share only the input.
 
-use ndarray::{ArrayViewMut2, Axis, s};
+use ndarray::{Array2, ArrayViewMut2, Axis, s};
 use rayon::prelude::*;
 
 use super::check::Input;
 use super::{Backend, Settings};
 use crate::border::reflect;
 use crate::depth_of_alpha::DepthOfAlpha;
+use crate::metrics::spread;
 use crate::operators::Operators;
 use crate::simd::{self, CubicRow, Plane, Taps, WindowRow};
 
@@ -28,6 +29,8 @@ pub(crate) struct Job<'a> {
     pub input: &'a Input<'a>,
     pub operators: &'a Operators,
     pub settings: &'a Settings,
+    /// Pixels that an invalid one takes part in; medians are over the others.
+    pub invalid: Option<&'a Array2<bool>>,
     pub depth_of: DepthOfAlpha,
     pub backend: Backend,
 }
@@ -181,6 +184,9 @@ impl Tile {
             for y in 0..rows {
                 if let Some(row) = (begin + y).checked_sub(lag) {
                     self.finish_row(job, row, y, solved, &mut maps);
+                    if let (Some(invalid), Some(row)) = (job.invalid, row.checked_sub(self.median - 1)) {
+                        self.median_without(job, invalid, [top, left], row, &mut maps);
+                    }
                 }
             }
         }
@@ -243,6 +249,51 @@ impl Tile {
             let rows: [&[f32]; 7] = std::array::from_fn(|i| self.alpha.row(i.min(self.median - 1)));
             simd::median_row(job.backend, &rows[..self.median], &mut self.sorted, job.depth_of, depth, width);
             copy(&depth[..width], &mut maps.depth_mm, at);
+        }
+    }
+}
+
+impl Tile {
+    /// Medians of the map's row `at` over the pixels that are not invalid, next to those that are. The tile begins at `top` and
+    /// `left`; the last rows of alpha are those of the median.
+    fn median_without(
+        &mut self,
+        job: &Job,
+        invalid: &Array2<bool>,
+        [top, left]: [usize; 2],
+        at: usize,
+        maps: &mut Maps<'_>,
+    ) {
+        let Some(marks) = invalid.as_slice() else { unreachable!("made in standard layout") };
+        let (height, width) = invalid.dim();
+        let side = self.median;
+        let rows: Vec<_> = (at..at + side)
+            .map(|row| {
+                let of_image = reflect((top + row) as isize - (side / 2) as isize, height);
+                (self.alpha.row(row % side), &marks[of_image * width..(of_image + 1) * width])
+            })
+            .collect();
+        let mut any = rows[0].1.to_vec();
+        for (_, row) in &rows[1..] {
+            any.iter_mut().zip(*row).for_each(|(any, invalid)| *any |= invalid);
+        }
+        let mut near = any.clone();
+        spread(&any, &mut near, side / 2);
+        let mut window = Vec::with_capacity(side * side);
+        let depths = maps.depth_mm.row_mut(at).into_iter().enumerate();
+        for (x, depth) in depths.filter(|(x, _)| near[left + x]) {
+            window.clear();
+            for column in x..x + side {
+                let of_image = reflect((left + column) as isize - (side / 2) as isize, width);
+                let values = rows.iter().filter(|(_, invalid)| !invalid[of_image]);
+                window.extend(values.map(|(alpha, _)| alpha[column]));
+            }
+            if !window.is_empty() && window.len() < side * side {
+                // Depth falls with alpha: of an even number, the depth that counts is the farther of the two in the middle.
+                let middle = (window.len() - 1) / 2;
+                let alpha = *window.select_nth_unstable_by(middle, f32::total_cmp).1;
+                *depth = job.depth_of.depth_mm(alpha);
+            }
         }
     }
 }

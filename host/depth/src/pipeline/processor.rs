@@ -1,6 +1,6 @@
 //! A run time that keeps its buffers between pairs.
 
-use ndarray::{Array2, ArrayView2};
+use ndarray::{Array2, ArrayView2, Zip};
 use rayon::prelude::*;
 
 use super::fast::{Job, Maps, Tile};
@@ -68,8 +68,10 @@ impl Processor {
                 .into_iter()
                 .for_each(|map| *map = Array2::zeros(size));
         }
+        let invalid = input.invalid(&self.operators, &self.settings);
         let job = Job {
             input: &input,
+            invalid: invalid.as_ref(),
             operators: &self.operators,
             settings: &self.settings,
             depth_of: DepthOfAlpha::new(&self.operators, &self.optics),
@@ -85,10 +87,16 @@ impl Processor {
         );
         let mut texture = self.settings.fill.then(|| self.map.confidence.clone());
         finish(&mut self.map, &self.misfit, self.backend, threads);
-        if let Some(invalid) = input.invalid(&self.operators, &self.settings) {
-            job.repair(&mut self.map, &invalid);
+        if let Some(invalid) = &invalid {
+            Zip::from(&mut self.map.depth_mm).and(&mut self.map.confidence).and(invalid).par_for_each(
+                |depth, confidence, invalid| {
+                    if *invalid {
+                        (*depth, *confidence) = (f32::NAN, 0.0);
+                    }
+                },
+            );
             if let Some(texture) = &mut texture {
-                confidence::withhold(texture, &invalid);
+                confidence::withhold(texture, invalid);
             }
         }
         border_fill::fill(&mut self.map, self.operators.kernel_size());

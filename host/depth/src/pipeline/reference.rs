@@ -4,7 +4,6 @@ use ndarray::{Array2, ArrayView2};
 
 use super::Settings;
 use super::check::Input;
-use super::repair::median_at;
 use crate::border::reflect;
 use crate::cubic;
 use crate::kernel::Kernel;
@@ -62,4 +61,21 @@ pub(crate) fn maps(input: &Input, operators: &Operators, settings: &Settings) ->
     }
     let median = Array2::from_shape_fn(size, |at| median_at(&alpha, settings.median_px, at));
     Maps { alpha: median, texture, misfit }
+}
+
+/// Median of the values around (y, x) that are not NaN, with reflected borders; NaN without any.
+fn median_at(image: &Array2<f32>, size: usize, (y, x): (usize, usize)) -> f32 {
+    let (height, width) = image.dim();
+    let r = (size / 2) as isize;
+    let mut window = Vec::with_capacity(size * size);
+    for dy in -r..=r {
+        let row = reflect(y as isize + dy, height);
+        window
+            .extend((-r..=r).map(|dx| image[(row, reflect(x as isize + dx, width))]).filter(|v| !v.is_nan()));
+    }
+    if window.is_empty() {
+        return f32::NAN;
+    }
+    let middle = window.len() / 2;
+    *window.select_nth_unstable_by(middle, f32::total_cmp).1
 }

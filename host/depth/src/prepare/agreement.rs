@@ -5,9 +5,10 @@
 //! moved or is blurred more than the band allows for: much blur turns the sign of detail. Coarse detail tells them apart, because
 //! blur leaves it alone; so does a shift that brings the detail of both images together.
 //!
-//! Cost: three box means per pixel of the small images (`thinned`), and 49 more where something differs.
+//! Cost: three box means per pixel of the small images (`thinned`), and 49 more around the pixels that differ and agree coarsely.
 
-use ndarray::{Array2, Zip};
+use ndarray::{Array2, ArrayViewMut2, Axis, Zip};
+use rayon::prelude::*;
 
 use super::band::{band, band_noise_gain, box_mean, halved, halving_noise_gain};
 use super::noise::PairNoise;
@@ -28,6 +29,8 @@ const SAME_COARSE: f32 = 0.7;
 const SAME_SHIFTED: f32 = 0.6;
 /// Shifts that are tried along both axes, px.
 const SHIFTS_PX: [isize; 7] = [-6, -4, -2, 0, 2, 4, 6];
+/// Side of the tiles in which shifts are tried.
+const TILE_PX: usize = 64;
 
 /// What the comparison of a pair says.
 #[derive(Debug, Clone)]
@@ -68,19 +71,17 @@ pub(super) fn compare(pair: &Thinned, size: (usize, usize), noise: &PairNoise) -
     let mut too_blurred = Array2::from_elem(different.dim(), false);
     if different.iter().any(|d| *d) {
         let coarse = coarse_correlation(pair);
-        let mut unmoved = coarse.mapv(|correlation| correlation > SAME_COARSE);
-        let limit = Zip::from(&of_a).and(&of_b).map_collect(|a, b| SAME_SHIFTED * (a * b).sqrt());
-        for (down, right) in SHIFTS_PX.into_iter().flat_map(|down| SHIFTS_PX.map(|right| (down, right))) {
-            let shifted = product_at(a, b, down, right);
-            Zip::from(&mut unmoved)
-                .and(&shifted)
-                .and(&limit)
-                .for_each(|unmoved, product, limit| *unmoved &= product < limit);
-        }
-        Zip::from(&mut too_blurred).and(&mut different).and(&unmoved).for_each(|blurred, moved, unmoved| {
-            *blurred = *moved && *unmoved;
-            *moved &= !*unmoved;
+        Zip::from(&mut too_blurred).and(&different).and(&coarse).for_each(|blurred, different, coarse| {
+            *blurred = *different && *coarse > SAME_COARSE;
         });
+        let limit = Zip::from(&of_a).and(&of_b).map_collect(|a, b| SAME_SHIFTED * (a * b).sqrt());
+        let bands = too_blurred.axis_chunks_iter_mut(Axis(0), TILE_PX).into_par_iter().enumerate();
+        bands.for_each(|(row, mut band)| {
+            for (column, tile) in band.axis_chunks_iter_mut(Axis(1), TILE_PX).enumerate() {
+                remove_moved(tile, [row * TILE_PX, column * TILE_PX], [a, b], &limit);
+            }
+        });
+        Zip::from(&mut different).and(&too_blurred).for_each(|moved, blurred| *moved &= !*blurred);
     }
     let mask = |mask: &Array2<bool>| mask.iter().any(|d| *d).then(|| enlarged(mask, factor, size));
     Agreement {
@@ -115,14 +116,41 @@ fn coarse_correlation(pair: &Thinned) -> Array2<f32> {
     })
 }
 
-/// Mean product of `a` and `b` around each pixel, `b` moved by this many pixels down and to the right.
-fn product_at(a: &Array2<f32>, b: &Array2<f32>, down: isize, right: isize) -> Array2<f32> {
+/// Unmarks the pixels of a tile, which begins at row `top` and column `left`, where the mean product of `a` and `b` around them
+/// reaches its limit at one of the shifts.
+fn remove_moved(
+    mut tile: ArrayViewMut2<bool>,
+    [top, left]: [usize; 2],
+    [a, b]: [&Array2<f32>; 2],
+    limit: &Array2<f32>,
+) {
+    let mut marked: Vec<_> = tile.indexed_iter().filter(|(_, marked)| **marked).map(|(at, _)| at).collect();
     let (height, width) = a.dim();
+    // The part of the images that the windows of these pixels cover.
+    let cover = |first: usize, of: &dyn Fn(&(usize, usize)) -> usize, n: usize| {
+        let places = || marked.iter().map(of);
+        let reach = WINDOW_PX / 2;
+        Some((first + places().min()?).saturating_sub(reach)..(first + places().max()? + reach + 1).min(n))
+    };
+    let Some((rows, columns)) = cover(top, &|at| at.0, height).zip(cover(left, &|at| at.1, width)) else {
+        return;
+    };
     let inside = |i: usize, by: isize, n: usize| (i as isize + by).clamp(0, n as isize - 1) as usize;
-    let product = Array2::from_shape_fn((height, width), |(y, x)| {
-        a[(y, x)] * b[(inside(y, down, height), inside(x, right, width))]
-    });
-    box_mean(product.view(), WINDOW_PX)
+    for (down, right) in SHIFTS_PX.into_iter().flat_map(|down| SHIFTS_PX.map(|right| (down, right))) {
+        let product = Array2::from_shape_fn((rows.len(), columns.len()), |(y, x)| {
+            let (y, x) = (rows.start + y, columns.start + x);
+            a[(y, x)] * b[(inside(y, down, height), inside(x, right, width))]
+        });
+        let mean = box_mean(product.view(), WINDOW_PX);
+        marked.retain(|at| {
+            let (y, x) = (top + at.0, left + at.1);
+            tile[*at] = mean[(y - rows.start, x - columns.start)] < limit[(y, x)];
+            tile[*at]
+        });
+        if marked.is_empty() {
+            return;
+        }
+    }
 }
 
 /// A mask of a level in the pixels of the image.

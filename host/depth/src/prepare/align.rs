@@ -1,13 +1,12 @@
-//! Finds how the near-focused image lies on the far-focused one: shift, magnification and rotation, or any affine map.
+//! Registers the near-focused image on the far-focused one: shift, magnification and rotation, or any affine map.
 //!
-//! Both images are brought to the band that they share (`band`), from coarse to fine. On the coarsest level
-//! every shift is tried; from there Gauss-Newton steps minimise the squared difference (Lucas & Kanade 1981, in the inverse
-//! compositional form of Baker & Matthews 2004: the far image's gradients serve all steps), with Cauchy's weights, so that
-//! what moved between the exposures has little say. A symmetric point spread function moves nothing, so the minimum lies
-//! where the images belong however different their blur.
+//! Both images are reduced to their common band (`band`), from coarse to fine. The coarsest level tries every shift.
+//! From there Gauss-Newton steps minimise the squared difference (Lucas & Kanade 1981, in the inverse compositional
+//! form of Baker & Matthews 2004: the far image's gradients serve all steps). Cauchy's weights suppress motion between
+//! the exposures. A symmetric PSF moves nothing, so different blur does not shift the minimum.
 //!
-//! Cost: `cargo bench -p farnear-depth --bench registration`; of large images a smaller copy of at most 800,000 pixels is
-//! registered (`thinned`). Where the images already lie on each other, one level is enough to see it (`displaced`).
+//! Cost: `cargo bench -p farnear-depth --bench registration`; large images are reduced to at most 800,000 pixels
+//! (`thinned`). If the images are already aligned, one level confirms it (`displaced`).
 
 use nalgebra::{DMatrix, DVector};
 use ndarray::{Array2, ArrayView2};
@@ -18,26 +17,26 @@ use super::band::{band, halved, normalised};
 use super::thinned::Thinned;
 use super::warp::{Warp, middle};
 
-/// Most pixels of the level on which a displacement is ruled out.
+/// Most pixels of the level that rules out a displacement.
 const CHECKED_PX: usize = 200_000;
-/// Correlation from which the nearest alignment is taken for the right one without a search.
+/// Correlation from which the nearest alignment is accepted without a search.
 const SURE: f64 = 0.6;
-/// Most pixels of a level that take part in a step; of larger ones every few rows.
+/// Most pixels of a level that a step uses; of larger levels every few rows.
 const STEP_PX: usize = 100_000;
 /// Shortest side of the coarsest level.
 const COARSEST_PX: usize = 24;
-/// Steps on a level at most.
+/// Most steps per level.
 const STEPS: usize = 12;
-/// A step that moves no corner farther is the last, px.
+/// Convergence: a step that moves no corner farther is the last, px.
 const SETTLED_PX: f64 = 2e-3;
 /// The same on levels that only start the next finer one.
 const COARSELY_SETTLED_PX: f64 = 2e-2;
-/// Pixels of the band that vary together: its correlation area.
+/// Correlation area of the band, px.
 const CORRELATED_PX: f64 = 12.0;
-/// Pixels of a level's border that are not compared.
+/// Ignored border of a level, px.
 const BORDER_PX: usize = 3;
 
-/// What may differ between the images.
+/// Free parameters of the map.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Model {
@@ -58,7 +57,7 @@ impl Model {
         }
     }
 
-    /// How each parameter moves the place `(x, y)`.
+    /// Derivatives of the place `(x, y)` by each parameter.
     fn basis(self, x: f64, y: f64) -> [[f64; 2]; 6] {
         let shifts = [[1.0, 0.0], [0.0, 1.0]];
         let [a, b, c, d] = match self {
@@ -69,7 +68,7 @@ impl Model {
         [shifts[0], shifts[1], a, b, c, d]
     }
 
-    /// The map that moves by these parameters about `centre`, whose places are measured in `unit` px.
+    /// The map with these parameters about `centre`; places are in units of `unit` px.
     fn warp(self, p: &[f64], centre: [f64; 2], unit: f64) -> Warp {
         let get = |i: usize| p.get(i).copied().unwrap_or(0.0) / unit;
         let matrix = match self {
@@ -81,28 +80,26 @@ impl Model {
     }
 }
 
-/// How the images lie on each other.
+/// Result of the registration.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Alignment {
-    /// From a place in the far image to the one in the near image that shows the same.
+    /// From a place in the far image to the corresponding one in the near image.
     pub warp: Warp,
-    /// Correlation of what both images share where they overlap, -1 to 1; unrelated images have about 0.
+    /// Correlation of the common band in the overlap, -1 to 1; about 0 for unrelated images.
     pub correlation: f64,
     /// The same at the start.
     pub correlation_before: f64,
-    /// Standard error of the map, root mean square over the image, px.
+    /// Standard error of the map, RMS over the image, px.
     pub standard_error_px: f64,
 }
 
-/// A pair on one level.
 struct Level {
     far: Array2<f32>,
     near: Array2<f32>,
 }
 
-/// How the near image lies on the far one, both (height, width) of one size, from `start` on. Holes (NaN) are taken for
-/// the image's mean. `None` where nothing could be compared: images below 48 px, without any detail, or that do not
-/// overlap.
+/// Registers the near image on the far one, both (height, width) of one size, starting at `start`. The image's mean
+/// replaces holes (NaN). `None` for images below 48 px, without any detail, or without overlap.
 pub fn estimate(far: ArrayView2<f32>, near: ArrayView2<f32>, model: Model, start: Warp) -> Option<Alignment> {
     if far.dim() != near.dim() || far.nrows().min(far.ncols()) < 2 * COARSEST_PX {
         return None;
@@ -110,7 +107,7 @@ pub fn estimate(far: ArrayView2<f32>, near: ArrayView2<f32>, model: Model, start
     estimate_thinned(&Thinned::new(far, near), model, start)
 }
 
-/// The same of a pair that is thinned already.
+/// [`estimate`] of a pair that is thinned already.
 pub(super) fn estimate_thinned(pair: &Thinned, model: Model, start: Warp) -> Option<Alignment> {
     let (levels, skipped) = (levels(pair)?, pair.halvings);
     let mut warp = start;
@@ -121,7 +118,7 @@ pub(super) fn estimate_thinned(pair: &Thinned, model: Model, start: Warp) -> Opt
     warp = best_shift(coarsest, warp);
     let mut found = None;
     for (index, level) in levels.iter().enumerate().rev() {
-        // The coarsest levels say little about anything but the shift.
+        // The coarsest levels determine little except the shift.
         let of_level = if index + 1 == levels.len() && levels.len() > 2 { Model::Shift } else { model };
         let settled = if index == 0 { SETTLED_PX } else { COARSELY_SETTLED_PX };
         let refined = refine(level, of_level, warp, settled)?;
@@ -145,8 +142,8 @@ pub(super) fn estimate_thinned(pair: &Thinned, model: Model, start: Warp) -> Opt
     Some(Alignment { warp, correlation, correlation_before, standard_error_px: scale * standard_error })
 }
 
-/// How far the images may lie from `start`, root mean square with its standard error, px: a few steps on one level, without a
-/// search. `None` where they resemble each other too little at `start` for the nearest alignment to be the right one.
+/// Displacement from `start`, RMS with its standard error, px: a few steps on one level, without a search. `None` if
+/// the images differ too much at `start` for the nearest alignment to be certain.
 pub(super) fn displaced(pair: &Thinned, model: Model, start: Warp, size: (usize, usize)) -> Option<f64> {
     let [far, near] = [&pair.far, &pair.near];
     if far.image.nrows().min(far.image.ncols()) < 4 * COARSEST_PX {
@@ -176,7 +173,7 @@ pub(super) fn displaced(pair: &Thinned, model: Model, start: Warp, size: (usize,
     Some(warp.after(&start.inverse()?).rms_px(size) + error)
 }
 
-/// The bands of both images from fine to coarse. `None` for images that are too small.
+/// The bands of both images from fine to coarse; `None` for images that are too small.
 fn levels(pair: &Thinned) -> Option<Vec<Level>> {
     let [far, near] = [&pair.far, &pair.near];
     if far.image.nrows().min(far.image.ncols()) < 2 * COARSEST_PX {
@@ -194,7 +191,7 @@ fn levels(pair: &Thinned) -> Option<Vec<Level>> {
     }
 }
 
-/// The value of an image between its pixels; `None` in its border and outside.
+/// Interpolated value; `None` in the border and outside.
 fn between(image: &Array2<f32>, [x, y]: [f64; 2]) -> Option<f32> {
     let (height, width) = image.dim();
     let border = BORDER_PX as f64;
@@ -210,7 +207,7 @@ fn between(image: &Array2<f32>, [x, y]: [f64; 2]) -> Option<f32> {
     Some(upper + fy * (lower - upper))
 }
 
-/// The shift, of all those up to a quarter of the image, at which the images agree best.
+/// The best shift of all up to a quarter of the image.
 fn best_shift(level: &Level, start: Warp) -> Warp {
     let (height, width) = level.far.dim();
     let reach = (height.min(width) / 4) as isize;
@@ -221,7 +218,7 @@ fn best_shift(level: &Level, start: Warp) -> Warp {
     let best = shifts
         .into_par_iter()
         .map(|shift| (correlation(level, &moved(shift)), shift))
-        // Equal ones: the smaller shift, independent of the order in which threads finish.
+        // Equal ones: the smaller shift, independent of the threads' order.
         .max_by(|(a, [ax, ay]), (b, [bx, by])| {
             a.total_cmp(b)
                 .then_with(|| (bx * bx + by * by).cmp(&(ax * ax + ay * ay)))
@@ -230,7 +227,7 @@ fn best_shift(level: &Level, start: Warp) -> Warp {
     best.map_or(start, |(_, shift)| moved(shift))
 }
 
-/// Correlation of the far image with the near one seen through `warp`; 0 where too little overlaps.
+/// Correlation of the far image with the near one resampled by `warp`; 0 if too little overlaps.
 fn correlation(level: &Level, warp: &Warp) -> f64 {
     let (height, width) = level.far.dim();
     let [mut product, mut of_far, mut of_near, mut count] = [0.0_f64; 4];
@@ -250,7 +247,6 @@ fn correlation(level: &Level, warp: &Warp) -> f64 {
     if enough && of_far > 0.0 && of_near > 0.0 { product / (of_far * of_near).sqrt() } else { 0.0 }
 }
 
-/// Sums over pixels of a step.
 #[derive(Clone)]
 struct Sums {
     normal: [[f64; 6]; 6],
@@ -280,7 +276,7 @@ fn refine(level: &Level, model: Model, start: Warp, settled_px: f64) -> Option<(
     let unit = 0.5 * (height as f64).hypot(width as f64);
     let n = model.parameters();
     let mut warp = start;
-    // Before anything is known no difference is too large.
+    // At the start no difference is an outlier.
     let mut scale = f64::INFINITY;
     let mut error = f64::INFINITY;
     for _ in 0..STEPS {
@@ -311,7 +307,7 @@ fn refine(level: &Level, model: Model, start: Warp, settled_px: f64) -> Option<(
     Some((warp, error))
 }
 
-/// Root mean square over the field of the displacement's standard error.
+/// RMS over the field of the displacement's standard error.
 fn rms_over_field(model: Model, covariance: &DMatrix<f64>, unit: f64, size: (usize, usize)) -> f64 {
     let [x2, y2] = [size.1, size.0].map(|n| (n as f64 / unit).powi(2) / 12.0);
     let place = [x2.sqrt(), y2.sqrt()];
@@ -322,10 +318,11 @@ fn rms_over_field(model: Model, covariance: &DMatrix<f64>, unit: f64, size: (usi
     (along(0) + along(1)).sqrt()
 }
 
-/// Pixels that are summed side by side, which the compiler makes vectors of.
+/// Pixels that are summed in parallel: the compiler vectorises them.
 const SIDE_BY_SIDE: usize = 8;
 
-/// How the far image changes with each of `N` parameters, at pixels with these gradients and places; as [`Model::basis`].
+/// Derivatives of the far image by each of `N` parameters at pixels with these gradients and places; as
+/// [`Model::basis`].
 #[inline(always)]
 fn jacobian<const N: usize>(
     [gx, gy]: [&[f32; SIDE_BY_SIDE]; 2],
@@ -360,7 +357,7 @@ fn sums<const N: usize>(level: &Level, warp: &Warp, scale: f64, centre: [f64; 2]
         }
         sums
     });
-    // In order, so that the sum does not depend on how threads share the work.
+    // In order, so that the sum does not depend on the threads.
     let parts: Vec<Sums> = of_rows.collect();
     parts.into_iter().fold(Sums::NONE, Sums::plus)
 }
@@ -444,7 +441,7 @@ mod tests {
         for shift in [0.0, 0.03, 0.5] {
             let pair = Thinned::new(far.view(), texture(shift).view());
             let px = displaced(&pair, Model::Similarity, Warp::IDENTITY, far.dim()).unwrap();
-            // With its standard error, which is some hundredths here.
+            // With its standard error, some hundredths here.
             assert!((shift - 0.01..shift + 0.04).contains(&px), "{shift}: {px}");
         }
     }

@@ -1,9 +1,9 @@
-//! How much brighter one image of a pair is than the other: one gain, or one that varies slowly over the field.
+//! Relative brightness of a pair's images: one gain, or one that varies slowly over the field.
 //!
-//! Defocus spreads light and loses none, so that means over blocks far larger than the blur are alike in both images. Their
-//! ratio is exposure, lamp, aperture and vignetting. It is fitted by a polynomial of fourth degree over the field, which
-//! follows vignetting (`r^2` and `r^4` about any centre), with Huber's weights: a block across whose border much light
-//! spreads, or in which something moved, has little say.
+//! Defocus preserves light, so means over blocks far larger than the blur are alike in both images. Their ratio is
+//! exposure, lamp, aperture and vignetting. A polynomial of fourth degree over the field, which follows vignetting
+//! (`r^2` and `r^4` about any centre), is fitted with Huber's weights. These suppress blocks with much light spread
+//! across the border or with motion.
 //!
 //! Cost: one pass over both images for the means; one multiplication and a Horner sum per pixel to apply.
 
@@ -20,7 +20,6 @@ const BLOCKS: usize = 24;
 const LEAST_BLOCK_PX: usize = 12;
 /// Degree of the polynomial.
 const DEGREE: usize = 4;
-/// Its terms.
 const TERMS: usize = (DEGREE + 1) * (DEGREE + 2) / 2;
 /// Rounds of reweighting.
 const ROUNDS: usize = 5;
@@ -34,9 +33,9 @@ pub struct Gain {
     pub range: [f64; 2],
     /// Standard error of the mean.
     pub standard_error: f64,
-    /// Root mean square of what the mean alone leaves of the blocks' ratios, and of what the polynomial leaves.
+    /// RMS of the blocks' ratios after division by the mean alone, and after division by the polynomial.
     pub left_over: [f64; 2],
-    /// Blocks that were compared.
+    /// Number of compared blocks.
     pub blocks: usize,
     polynomial: Polynomial,
 }
@@ -44,13 +43,12 @@ pub struct Gain {
 /// Coefficients of x^i y^j with i + j <= [`DEGREE`], x and y from -1 to 1 along the longer side.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 struct Polynomial {
-    /// Whether the value is the near image's brightness over the far one's, or its reciprocal: one of the two is closer to
-    /// a polynomial, depending on which image is vignetted.
+    /// Whether the value is the near image's brightness over the far one's, or its reciprocal. Which of them is closer
+    /// to a polynomial depends on which image is vignetted.
     reciprocal: bool,
     coefficients: Vec<f64>,
 }
 
-/// The exponents of the terms.
 fn exponents() -> impl Iterator<Item = (i32, i32)> {
     (0..=DEGREE as i32).flat_map(|i| (0..=DEGREE as i32 - i).map(move |j| (i, j)))
 }
@@ -61,7 +59,7 @@ fn field([x, y]: [f64; 2], (height, width): (usize, usize)) -> [f64; 2] {
     [(x + 0.5 - 0.5 * width as f64) / half, (y + 0.5 - 0.5 * height as f64) / half]
 }
 
-/// A block: its middle in field coordinates, and the mean of both images.
+/// Middle in field coordinates, and the mean of both images.
 struct Block {
     at: [f64; 2],
     far: f64,
@@ -69,14 +67,14 @@ struct Block {
 }
 
 impl Gain {
-    /// Measures the gain of a pair that lies on each other; pixels without a value (NaN) in either image do not count.
-    /// `None` where brightness says nothing: an image around 0, as differences have, or fewer blocks than terms.
+    /// Measures the gain of an aligned pair; pixels without a value (NaN) in either image are ignored. `None` for
+    /// images around 0, like differences, and for fewer blocks than terms.
     pub fn measure(far: ArrayView2<f32>, near: ArrayView2<f32>) -> Option<Self> {
         let blocks = blocks(far, near);
         if blocks.len() < 2 * TERMS || blocks.iter().any(|block| block.far <= 0.0 || block.near <= 0.0) {
             return None;
         }
-        // The brighter block is the better known one: noise and what spreads over its border count less.
+        // Brighter blocks are more certain: noise and light from across the border weigh less.
         let weights: Vec<f64> = blocks.iter().map(|block| block.far * block.near).collect();
         let ratios: Vec<f64> = blocks.iter().map(|block| block.near / block.far).collect();
         let flat = Fit::new(std::slice::from_ref(&ratios), &weights, |_| vec![1.0], &blocks)?;
@@ -96,7 +94,7 @@ impl Gain {
         })
     }
 
-    /// Whether the gain varies over the field by more than chance and by more than matters.
+    /// Whether the gain varies over the field by more than chance and by more than `least`.
     pub fn varies(&self, least: f64) -> bool {
         let [flat, curved] = self.left_over;
         let explained = (flat * flat - curved * curved).max(0.0);
@@ -110,7 +108,7 @@ impl Gain {
         image.par_mapv_inplace(|value| value * factor);
     }
 
-    /// Divides an image by the gain at each of its places.
+    /// Divides an image by the gain at each place.
     pub fn divide_by_field(&self, image: &mut ArrayViewMut2<f32>) {
         let size = image.dim();
         let reciprocal = self.polynomial.reciprocal;
@@ -151,7 +149,7 @@ fn corners_and_middle(size: (usize, usize)) -> [[f64; 2]; 5] {
         .map(|at| field(at, size))
 }
 
-/// A robust fit to one of several targets: the one that leaves least, relative to its mean.
+/// The robust fit with the least relative residual of several targets.
 struct Fit {
     which: usize,
     coefficients: Vec<f64>,
@@ -175,7 +173,7 @@ impl Fit {
     }
 }
 
-/// Coefficients and robust root mean square (1.48 times the median of the magnitudes) of what they leave.
+/// Coefficients and robust RMS residual (1.48 times the median magnitude).
 fn robust(rows: &[Vec<f64>], target: &[f64], weights: &[f64]) -> Option<(Vec<f64>, f64)> {
     let mut trust = vec![1.0; rows.len()];
     let mut found = (Vec::new(), f64::INFINITY);
@@ -199,7 +197,7 @@ fn robust(rows: &[Vec<f64>], target: &[f64], weights: &[f64]) -> Option<(Vec<f64
     Some(found)
 }
 
-/// Sum of a row of a block in eight sums side by side, which the compiler makes vectors of.
+/// Sum of a row of a block in eight parallel sums, which the compiler vectorises.
 fn sum(row: &[f32]) -> f32 {
     let (parts, rest) = row.as_chunks::<8>();
     let mut sums = [0.0_f32; 8];
@@ -220,7 +218,7 @@ fn blocks(far: ArrayView2<f32>, near: ArrayView2<f32>) -> Vec<Block> {
                 let area = ndarray::s![top..top + side, left..left + side];
                 let (mut sums, mut count) = ([0.0_f64; 2], 0_usize);
                 for (far, near) in far.slice(area).rows().into_iter().zip(near.slice(area).rows()) {
-                    // Without holes, as nearly always, both sums are finite and every pixel counts.
+                    // Without holes, the usual case, both sums are finite and every pixel counts.
                     let whole = [&far, &near].map(|row| row.as_slice().map_or(f32::NAN, sum));
                     if whole.iter().all(|sum| sum.is_finite()) {
                         sums.iter_mut().zip(whole).for_each(|(all, sum)| *all += f64::from(sum));
@@ -286,7 +284,7 @@ mod tests {
     }
 
     #[test]
-    fn what_moved_and_what_is_missing_have_no_say() {
+    fn motion_and_missing_pixels_have_no_influence() {
         let [far, mut near] = pair(|_, _| 0.9);
         near.slice_mut(ndarray::s![60..100, 80..130]).fill(0.2);
         near.slice_mut(ndarray::s![.., 0..9]).fill(f32::NAN);

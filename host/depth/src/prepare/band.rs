@@ -5,10 +5,13 @@
 //! by the root mean square of that band around each pixel: the result is alike in both where they show the same.
 //! Point spread functions are symmetric and move nothing, so that a difference of blur draws no estimate to one side.
 
+use std::borrow::Cow;
+
 use ndarray::{Array2, ArrayView2, Axis, CowArray, Ix2};
 use rayon::prelude::*;
 
 use crate::border::reflect;
+use crate::simd::{self, Backend};
 
 /// Side of the window whose mean is taken away: the band's lower end.
 const MEAN_PX: usize = 9;
@@ -54,7 +57,10 @@ pub(crate) fn halved(image: ArrayView2<f32>) -> Array2<f32> {
 
 /// The image with its pixels without a value set to the mean of the others; itself where every pixel has one.
 pub(crate) fn without_holes(image: ArrayView2<'_, f32>) -> CowArray<'_, f32, Ix2> {
-    let whole = |row: ndarray::ArrayView1<f32>| row.iter().all(|v| v.is_finite());
+    // In 32 bits the loop is done in vectors.
+    let whole = |row: ndarray::ArrayView1<f32>| {
+        row.iter().map(|v| u32::from(v.is_finite())).sum::<u32>() as usize == row.len()
+    };
     if image.axis_iter(Axis(0)).into_par_iter().all(whole) {
         return image.into();
     }
@@ -134,23 +140,23 @@ fn binomial(image: ArrayView2<f32>) -> Array2<f32> {
 pub(crate) fn box_mean(image: ArrayView2<f32>, side: usize) -> Array2<f32> {
     let (height, width) = image.dim();
     let r = side / 2;
+    let backend = Backend::best();
     let mut across = Array2::zeros((height, width));
     across.axis_iter_mut(Axis(0)).into_par_iter().enumerate().for_each_init(
-        || vec![0.0_f64; width + 1],
-        |sums, (y, mut row)| {
-            for (x, value) in image.row(y).iter().enumerate() {
-                sums[x + 1] = sums[x] + f64::from(*value);
-            }
-            let Some(row) = row.as_slice_mut() else { unreachable!("made in standard layout") };
+        || vec![0.0_f32; 2 * width],
+        |work, (y, mut row)| {
+            let (from, row) = (image.row(y), row.as_slice_mut().unwrap_or_default());
+            let from = from.as_slice().map_or_else(|| from.to_vec().into(), Cow::Borrowed);
             let inner = r.min(width)..width.saturating_sub(r).max(r.min(width));
             for x in (0..inner.start).chain(inner.end..width) {
-                let [from, to] = [x.saturating_sub(r), (x + r + 1).min(width)];
-                row[x] = ((sums[to] - sums[from]) / (to - from) as f64) as f32;
+                let window = &from[x.saturating_sub(r)..(x + r + 1).min(width)];
+                row[x] = window.iter().sum::<f32>() / window.len() as f32;
             }
-            let share = 1.0 / (2 * r + 1) as f64;
-            let ends = sums.iter().zip(sums.get(2 * r + 1..).unwrap_or_default());
-            for (value, (from, to)) in row[inner].iter_mut().zip(ends) {
-                *value = ((to - from) * share) as f32;
+            if width > 2 * r {
+                let share = 1.0 / (2 * r + 1) as f32;
+                let row = &mut row[inner];
+                simd::row_sums(backend, &from, 2 * r + 1, work, row);
+                row.iter_mut().for_each(|sum| *sum *= share);
             }
         },
     );

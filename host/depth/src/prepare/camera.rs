@@ -1,22 +1,22 @@
-//! A camera's own frames: dark signal, response of each pixel, and unusable pixels.
+//! Calibration frames of a camera: dark signal, response of each pixel, bad pixels.
 //!
-//! `dark` is the mean of exposures with the lens covered, `flat` the response of each pixel to even light relative to the mean
-//! of what surrounds it: (light - dark) over its mean in a large window, so that the lamp's and the lens' slow falloff stays,
-//! which balancing takes off. A pixel is bad whose dark value or response lies far from all others.
+//! `dark` is the mean of exposures with the lens covered. `flat` is each pixel's response to even light, (light - dark)
+//! relative to its mean in a large window. The slow falloff of lamp and lens thus remains for balancing. A pixel is bad
+//! if its dark value or response is far from all others.
 
 use ndarray::{Array2, ArrayView2, Zip};
 
 use super::{band::box_mean, defects};
 use crate::reason::Reason;
 
-/// Side of the window that a pixel's response is relative to.
+/// Side of the window for a pixel's relative response.
 const SURROUNDINGS_PX: usize = 31;
 /// Robust standard deviations from which a pixel is bad.
 const BAD: f32 = 8.0;
-/// Part of saturated pixels from which an exposure is refused: more than hot pixels make.
+/// Part of saturated pixels from which an exposure is rejected; hot pixels are fewer.
 const SATURATED: f64 = 0.01;
-/// Side of the window whose mean has little noise left, and the structure in it that dust and falloff do not make: standard
-/// deviation as part of the mean for a flat, of full scale for a dark exposure.
+/// Side of the window whose mean has little noise left, and the least structure in it that dust and falloff cannot
+/// cause: standard deviation relative to the mean for a flat, to full scale for a dark exposure.
 const SMOOTHED_PX: usize = 7;
 const FLAT_STRUCTURE: f64 = 0.04;
 const DARK_STRUCTURE: f64 = 0.02;
@@ -25,71 +25,39 @@ const RESPONSE: [f32; 2] = [0.5, 1.5];
 
 /// An error of a camera's frames.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "the messages name the fields")]
 pub enum CameraError {
-    /// They are of another size than the images.
     #[error(
         "the camera's frames are {width}x{height}, the images {image_width}x{image_height}: calibrate the camera in the mode of the images"
     )]
-    Size {
-        /// Width of the frames.
-        width: usize,
-        /// Height of the frames.
-        height: usize,
-        /// Width of the images.
-        image_width: usize,
-        /// Height of the images.
-        image_height: usize,
-    },
-    /// No exposures of a kind.
+    Size { width: usize, height: usize, image_width: usize, image_height: usize },
     #[error("no {kind} exposures: give at least one")]
-    None {
-        /// Kind of frame.
-        kind: &'static str,
-    },
-    /// A flat exposure is saturated.
+    None { kind: &'static str },
     #[error(
         "{kind} exposure {number}: {percent:.1} % of its pixels are saturated; give evenly lit exposures at about half of full scale"
     )]
-    Saturated {
-        /// Flat or dark.
-        kind: &'static str,
-        /// Number of the image, from 1.
-        number: usize,
-        /// Part of the pixels at full scale, percent.
-        percent: f64,
-    },
-    /// An exposure shows something.
+    Saturated { kind: &'static str, number: usize, percent: f64 },
     #[error(
         "{kind} exposure {number} has structure: its brightness varies by {percent:.1} % over {SURROUNDINGS_PX} px, {expected}; is it a picture of the \
          scene? Give {advice}"
     )]
     Structured {
-        /// Flat or dark.
         kind: &'static str,
-        /// Number of the image, from 1.
         number: usize,
         /// Standard deviation of the smoothed brightness around its surroundings, percent of the mean (of full scale in the
         /// dark).
         percent: f64,
-        /// The usual range.
         expected: &'static str,
-        /// Remedy for the fault.
         advice: &'static str,
     },
-    /// The flat exposures are hardly brighter than the dark ones.
     #[error(
         "the flat exposures have a mean of {flat:.4}, the dark ones of {dark:.4}: give evenly lit exposures at about half of \
          full scale"
     )]
-    NoLight {
-        /// Mean of the flat exposures.
-        flat: f64,
-        /// Mean of the dark ones.
-        dark: f64,
-    },
+    NoLight { flat: f64, dark: f64 },
 }
 
-/// Refuses exposures that are saturated or show a scene.
+/// Rejects exposures that are saturated or show a scene.
 fn check_exposure(kind: &'static str, number: usize, image: &Array2<f32>) -> Result<(), CameraError> {
     let count = image.len().max(1) as f64;
     let saturated = image.iter().filter(|value| **value >= 1.0).count() as f64 / count;
@@ -99,7 +67,7 @@ fn check_exposure(kind: &'static str, number: usize, image: &Array2<f32>) -> Res
     let smooth = box_mean(image.view(), SMOOTHED_PX);
     let around = box_mean(smooth.view(), SURROUNDINGS_PX);
     let differences = || smooth.iter().zip(&around).map(|(value, around)| f64::from(value - around));
-    // Robust: single bad pixels and grains of dust are not a scene.
+    // Robust against single bad pixels and grains of dust.
     let mut sizes: Vec<f32> = differences().map(|difference| difference.abs() as f32).collect();
     let at = (0.9 * sizes.len().saturating_sub(1) as f64) as usize;
     let usual = if sizes.is_empty() { 0.0 } else { *sizes.select_nth_unstable_by(at, f32::total_cmp).1 };
@@ -136,10 +104,7 @@ pub struct CameraFrames {
 }
 
 impl CameraFrames {
-    /// Frames as they were stored.
-    ///
-    /// # Errors
-    /// [`CameraError::Size`] where they differ in size.
+    /// Stored frames. Returns [`CameraError::Size`] if they differ in size.
     pub fn new(dark: Array2<f32>, response: Array2<f32>, bad: Array2<bool>) -> Result<Self, CameraError> {
         let frames = Self { dark, response, bad };
         frames.check(frames.response.dim())?;
@@ -151,10 +116,7 @@ impl CameraFrames {
         Ok(frames)
     }
 
-    /// Learns them from exposures in the dark and of even light, all of one size.
-    ///
-    /// # Errors
-    /// [`CameraError`].
+    /// Learns the frames from dark and evenly lit exposures of one size.
     pub fn learn(dark: &[Array2<f32>], flat: &[Array2<f32>]) -> Result<Self, CameraError> {
         for (kind, exposures) in [("flat", flat), ("dark", dark)] {
             for (index, exposure) in exposures.iter().enumerate() {
@@ -191,7 +153,7 @@ impl CameraFrames {
         Ok(Self { dark, response, bad })
     }
 
-    /// The frame in the dark.
+    /// The dark frame.
     pub fn dark(&self) -> ArrayView2<'_, f32> {
         self.dark.view()
     }
@@ -206,7 +168,7 @@ impl CameraFrames {
         self.bad.iter().any(|bad| *bad).then(|| self.bad.view())
     }
 
-    /// Which pixels are bad.
+    /// Mask of the bad pixels.
     pub fn bad_pixels(&self) -> ArrayView2<'_, bool> {
         self.bad.view()
     }
@@ -216,11 +178,8 @@ impl CameraFrames {
         self.bad.iter().filter(|bad| **bad).count()
     }
 
-    /// The image (values from 0 to 1) as a camera without these faults would have taken it, single bad pixels corrected from their
-    /// neighbours. A patch of them is not changed.
-    ///
-    /// # Errors
-    /// [`CameraError::Size`] for an image of another size.
+    /// Corrects an image with values from 0 to 1 for dark signal, response and single bad pixels; patches of bad pixels
+    /// are unchanged. Returns [`CameraError::Size`] for an image of another size.
     pub fn correct(&self, image: ArrayView2<f32>) -> Result<Array2<f32>, CameraError> {
         self.check(image.dim())?;
         let seen = self.apply(image);
@@ -244,7 +203,7 @@ impl CameraFrames {
         Err(CameraError::Size { width, height, image_width, image_height })
     }
 
-    /// The image as a camera without these faults would have taken it.
+    /// Corrects dark signal and response.
     pub(super) fn apply(&self, image: ArrayView2<f32>) -> Array2<f32> {
         Zip::from(&image).and(&self.dark).and(&self.response).map_collect(|v, dark, response| {
             let [least, largest] = RESPONSE;
@@ -326,7 +285,7 @@ mod tests {
     #[test]
     fn rejects_saturated_and_structured_exposures_with_the_figure() {
         let noise = |x: usize, y: usize| ((x * 7919 + y * 104_729 + x * y * 31) % 97) as f32 / 97.0 - 0.5;
-        // Falloff of a fifth to the border, noise of 5 %: as flats are.
+        // Falloff of a fifth to the border, noise of 5 %, as in real flats.
         let flat = Array2::from_shape_fn((90, 120), |(y, x)| {
             let [u, v] = [x as f32 / 60.0 - 1.0, y as f32 / 45.0 - 1.0];
             0.5 * (1.0 - 0.1 * (u * u + v * v)) * (1.0 + 0.1 * noise(x, y))

@@ -1,23 +1,24 @@
-//! Pixels that do not say what the scene is: saturated, black, bad, not finite.
+//! Defective pixels: saturated, black, bad, not finite.
 //!
-//! A single one is replaced by the mean of its neighbours: among the hundreds of pixels that a depth rests on, its error
-//! counts no more than a little noise. A clipped highlight is not changed: its value is a lower bound, and its neighbours are darker. A patch has no such neighbours and becomes a hole (NaN), which takes everything
-//! along that sees it.
+//! A single one is replaced by the mean of its neighbours: its error is small among the hundreds of pixels for a depth.
+//! A clipped highlight is not changed: its value is a lower bound, and its neighbours are darker. A patch has no such
+//! neighbours and becomes a hole (NaN), which removes all depths that depend on it.
 
 use ndarray::{Array2, ArrayView2};
 
 use crate::reason::Reason;
 
-/// Half the side of the neighbourhood that decides whether a pixel stands alone.
+/// Half the side of the neighbourhood that decides whether a defect is single.
 const NEIGHBOURHOOD_PX: isize = 2;
 /// Most defects in it, the pixel included.
 const ALONE: usize = 6;
 
-/// Mean of the neighbours relative to a saturated pixel from which it is a clipped highlight; a pixel far above them is defective.
+/// Least mean of the neighbours, relative to a saturated pixel, of a clipped highlight; a pixel far above them is
+/// defective.
 const HIGHLIGHT: f32 = 0.5;
 
-/// Marks the defects of an image: code of the [`Reason`], 0 = none. `limits` are the black and the white level of a camera
-/// that clips, `bad` the camera's bad pixels.
+/// Marks the defects of an image: code of the [`Reason`], 0 = none. `limits` are the black and the white level of a
+/// camera that clips, `bad` its bad pixels.
 pub(super) fn find(
     image: ArrayView2<f32>,
     limits: Option<[f32; 2]>,
@@ -30,7 +31,7 @@ pub(super) fn find(
                 <= black
         })
     };
-    // Rows in which nothing can be found, which are most, take a comparison per pixel.
+    // Most rows have no defect; one comparison per pixel excludes them.
     let [low, high] = limits.unwrap_or([f32::NEG_INFINITY, f32::INFINITY]);
     let clean = |row: usize| {
         let fine = |value: &f32| u32::from(*value > low && *value < high);
@@ -51,7 +52,7 @@ pub(super) fn find(
         } else if limits.is_some_and(|[_, white]| *value >= white) {
             Reason::Saturated
         } else if limits.is_some_and(|[dark, _]| *value <= dark) {
-            // A black pixel alone may be what the scene is; a patch of them was clipped.
+            // A single black pixel may be part of the scene; a patch was clipped.
             let (y, x) = (y as isize, x as isize);
             let patch = (-1..=1).all(|dy| (-1..=1).all(|dx| black(y + dy, x + dx)));
             if !patch {
@@ -66,10 +67,10 @@ pub(super) fn find(
     marks
 }
 
-/// Replaces defects that stand alone, and makes holes of the others.
+/// Replaces single defects and makes holes of the others.
 pub(super) fn mend(image: &mut Array2<f32>, marks: &Array2<u8>) {
     let (height, width) = image.dim();
-    // Gathered first: no pixel is corrected from a corrected one.
+    // Collected first: no pixel is corrected from a corrected one.
     let mut mended = Vec::new();
     for ((y, x), _) in marks.indexed_iter().filter(|(_, mark)| **mark != 0) {
         let around = |reach: isize| {
@@ -102,7 +103,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn single_pixels_are_mended_and_patches_become_holes() {
+    fn single_pixels_are_replaced_and_patches_become_holes() {
         let mut image = Array2::from_shape_fn((30, 40), |(y, x)| 0.2 + 0.01 * (y + x) as f32);
         image[(10, 10)] = 1.0;
         image.slice_mut(ndarray::s![20..26, 20..26]).fill(1.0);

@@ -1,9 +1,9 @@
 //! The noise of a pair, from the pair itself.
 //!
-//! At the highest frequencies, towards (pi, pi), a lens out of focus leaves nothing: wherever the surface lies, at least one of
-//! the images is out of focus, and what it has there is noise. So both images go through the second difference along both
-//! axes (Immerkaer 1996), whose response peaks there, and of each block's two energies the smaller one counts. Blocks of
-//! several brightnesses tell shot noise from the constant part.
+//! At the highest frequencies, towards (pi, pi), defocus leaves no signal, and at any depth at least one image is out
+//! of focus. Both images pass the second difference along both axes (Immerkaer 1996), whose response peaks there. The
+//! smaller of a block's two energies is the noise. Blocks of several brightnesses separate shot noise from the constant
+//! part.
 //!
 //! Cost: nine additions per pixel and image.
 
@@ -11,12 +11,11 @@ use ndarray::ArrayView2;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-/// Side of a block.
 const BLOCK_PX: usize = 16;
 /// Sum of the squared taps of the second difference along both axes.
 const GAIN: f64 = 36.0;
-/// Mean of the smaller of two independent estimates of one variance from a block's pixels, relative to the variance: the
-/// estimates scatter by about 12 %, whose expected minimum lies 0.56 of that below.
+/// Mean of the smaller of two independent estimates of a variance from a block's pixels, relative to the variance. The
+/// estimates scatter by about 12 %; the expected minimum is 0.56 of that lower.
 const SMALLER_OF_TWO: f64 = 0.93;
 
 /// Variance of a pixel's noise, in the images' units: `constant + per_unit x value`.
@@ -24,7 +23,7 @@ const SMALLER_OF_TWO: f64 = 0.93;
 pub struct PairNoise {
     /// Of a black pixel: read noise and quantisation.
     pub constant: f64,
-    /// Shot noise; 0 where the images are too alike in brightness to tell.
+    /// Shot noise; 0 if the images have too little contrast in brightness to separate it.
     pub per_unit: f64,
     /// Mean over the image.
     pub mean_variance: f64,
@@ -37,7 +36,7 @@ impl PairNoise {
     }
 }
 
-/// The noise of a pair of one size; pixels without a value (NaN) do not count. `None` where no block is whole.
+/// The noise of a pair of one size; pixels without a value (NaN) are ignored. `None` without a complete block.
 pub fn of_pair(far: ArrayView2<f32>, near: ArrayView2<f32>) -> Option<PairNoise> {
     let (height, width) = far.dim();
     let [rows, columns] = [height, width].map(|n| n.saturating_sub(2) / BLOCK_PX);
@@ -60,7 +59,7 @@ pub fn of_pair(far: ArrayView2<f32>, near: ArrayView2<f32>) -> Option<PairNoise>
         values[values.len() / 2]
     };
     let mean_variance = median(&blocks, 1);
-    // Medians of the darkest and of the brightest quarter give the line.
+    // Medians of the darkest and of the brightest quarter determine the line.
     let quarter = (blocks.len() / 4).max(1);
     let [dark, bright] = [&blocks[..quarter], &blocks[blocks.len() - quarter..]];
     let [from, to] = [dark, bright].map(|part| [median(part, 0), median(part, 1)]);
@@ -71,7 +70,7 @@ pub fn of_pair(far: ArrayView2<f32>, near: ArrayView2<f32>) -> Option<PairNoise>
     Some(PairNoise { constant, per_unit, mean_variance })
 }
 
-/// Variance of the noise and mean brightness of each block of a row of blocks.
+/// Noise variance and mean brightness of each block of a row.
 fn energies(image: &ArrayView2<f32>, top: usize, columns: usize) -> Vec<[f64; 2]> {
     let pixels = (BLOCK_PX * BLOCK_PX) as f64;
     let mut sums = vec![[0.0_f64; 2]; columns];
@@ -82,7 +81,7 @@ fn energies(image: &ArrayView2<f32>, top: usize, columns: usize) -> Vec<[f64; 2]
             const SEEN_PX: usize = BLOCK_PX + 2;
             let seen = [above, here, below].map(|row| &row[column * BLOCK_PX..column * BLOCK_PX + SEEN_PX]);
             let down: [f32; SEEN_PX] = std::array::from_fn(|x| seen[0][x] - 2.0 * seen[1][x] + seen[2][x]);
-            // Eight sums side by side, which the compiler makes vectors of.
+            // Eight parallel sums, which the compiler vectorises.
             let (mut squares, mut brightness) = ([0.0_f32; 8], [0.0_f32; 8]);
             for x in 0..BLOCK_PX {
                 let second = down[x] - 2.0 * down[x + 1] + down[x + 2];

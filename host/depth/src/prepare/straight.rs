@@ -1,4 +1,4 @@
-//! Images as a lens without distortion would have taken them.
+//! Removal of lens distortion.
 
 use ndarray::{Array2, ArrayView2};
 
@@ -6,14 +6,14 @@ use super::warp::resample_by;
 use crate::optics::Distortion;
 use crate::reason::Reason;
 
-/// The image without distortion; NaN where the lens showed nothing of what would lie there.
+/// The image without distortion; NaN outside the recorded field.
 ///
 /// Cost: 36 multiply-adds and the map, some 30 operations, per pixel; on all threads.
 pub(super) fn image(image: ArrayView2<f32>, distortion: &Distortion) -> Array2<f32> {
     resample_by(image, |place| distortion.distorted(place))
 }
 
-/// The reasons why pixels say nothing, where the pixels have gone; [`Reason::Edge`] where there was none.
+/// Moves the reasons of pixels like the pixels; [`Reason::Edge`] outside the recorded field.
 pub(super) fn reasons(
     marks: Option<&Array2<u8>>,
     (height, width): (usize, usize),
@@ -44,8 +44,8 @@ mod tests {
         .unwrap()
     }
 
-    /// A wave recorded through the lens: each pixel of the record shows the wave where the model, inverted by repetition,
-    /// says that it comes from.
+    /// A wave recorded through the lens: each recorded pixel has the wave's value at its origin by the model, inverted
+    /// iteratively.
     #[test]
     fn a_wave_is_straight_again() {
         let distortion = distortion();
@@ -67,7 +67,7 @@ mod tests {
         for ((y, x), value) in seen.indexed_iter() {
             let [px, py] = distortion.distorted([x as f64, y as f64]);
             if (4.0..79.0).contains(&px) && (4.0..55.0).contains(&py) {
-                // Lanczos' kernel keeps waves of 0.95 rad/px to some percent.
+                // Lanczos' kernel keeps waves of 0.95 rad/px within some percent.
                 assert!((f64::from(*value) - wave(x as f64, y as f64)).abs() < 0.03, "({x}, {y})");
                 largest_shift = largest_shift.max((px - x as f64).hypot(py - y as f64));
                 judged += 1;

@@ -1,6 +1,5 @@
-//! A pair at the size at which it is compared: halved until few enough pixels are left, with the band that both images share.
-//!
-//! Registration and agreement look at the same small images, so they are made once.
+//! A pair at the size for comparison: halved until it has few enough pixels, with the common band. Registration and
+//! agreement share it.
 
 use ndarray::{Array2, ArrayView2};
 
@@ -9,11 +8,10 @@ use super::band::{band, halved, without_holes};
 /// Most pixels of the small images.
 const FINEST_PX: usize = 800_000;
 
-/// A small pair.
 pub(crate) struct Thinned {
     pub(crate) far: Small,
     pub(crate) near: Small,
-    /// How often the images were halved.
+    /// Number of halvings.
     pub(crate) halvings: usize,
 }
 
@@ -24,13 +22,13 @@ pub(crate) struct Small {
 }
 
 impl Thinned {
-    /// Of images of one size.
+    /// Images of one size.
     pub(crate) fn new(far: ArrayView2<f32>, near: ArrayView2<f32>) -> Self {
         let (far, halvings) = Small::new(far);
         Self { far, near: Small::new(near).0, halvings }
     }
 
-    /// The same after the near image has changed.
+    /// Replaces the near image.
     pub(crate) fn replace_near(&mut self, near: ArrayView2<f32>) {
         self.near = Small::new(near).0;
     }

@@ -210,7 +210,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_round_is_told_and_what_is_none_is_refused() {
+    fn asymmetric_profiles_are_reported_and_invalid_ones_rejected() {
         let bar = Array2::from_shape_fn((61, 61), |(y, _)| if y.abs_diff(30) < 6 { 1.0 } else { 0.0 });
         assert!(RadialPsf::from_image(bar.view(), None).unwrap().not_round > 0.3);
         for (image, phrase) in [

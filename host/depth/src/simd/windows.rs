@@ -3,6 +3,7 @@
 
 use super::dispatch;
 use super::lanes::Lanes;
+use crate::reason::Reason;
 
 const LARGEST_ALPHA: f32 = 1.2;
 /// Slope of the cubic, relative to c1, below which Newton's step is shortened.
@@ -298,6 +299,73 @@ fn deviation_generic<L: Lanes>(of: Deviation, alpha: &[f32], variance: &[f32], t
 #[inline(always)]
 fn polynomial(gain: [f32; 4], x: f32) -> f32 {
     ((gain[3] * x + gain[2]) * x + gain[1]) * x + gain[0]
+}
+
+/// Which depths are believed.
+#[derive(Clone, Copy)]
+pub(crate) struct Believed {
+    pub near_mm: f32,
+    pub far_mm: f32,
+    /// Magnitude of the change of depth with alpha at alpha 0, mm.
+    pub slope_mm: f32,
+    /// Standard deviation of alpha from which noise alone may have made a depth.
+    pub largest_deviation: f32,
+    /// Mean square of what the model leaves, relative to the noise, from which it does not hold.
+    pub largest_misfit: f32,
+}
+
+dispatch! {
+    /// Confidence of a row's depths, or the code of the [`Reason`] for which a depth is removed. `noise_mm` is the deviation by
+    /// noise alone; `maps` are depth, confidence (written) and deviation. Pixels with a reason lose their depth.
+    fn believe_row(
+        of: Believed,
+        least: f32,
+        noise_mm: &[f32],
+        misfit: &[f32],
+        reasons: &mut [u8],
+        maps: [&mut [f32]; 3],
+    ) = believe_generic
+}
+
+#[inline(always)]
+fn believe_generic<L: Lanes>(
+    of: Believed,
+    least: f32,
+    noise_mm: &[f32],
+    misfit: &[f32],
+    reasons: &mut [u8],
+    [depth, confidence, deviation]: [&mut [f32]; 3],
+) {
+    let width = reasons.len();
+    let (noise_mm, misfit) = (&noise_mm[..width], &misfit[..width]);
+    let (depth, confidence, deviation) =
+        (&mut depth[..width], &mut confidence[..width], &mut deviation[..width]);
+    for x in 0..width {
+        let [of_noise, of_alpha] = [noise_mm[x] / of.slope_mm, deviation[x] / of.slope_mm];
+        let probability = probability(of_alpha / of.largest_deviation, misfit[x]);
+        let in_range = (depth[x] >= of.near_mm) & (depth[x] <= of.far_mm);
+        let explained = !(misfit[x] > of.largest_misfit) & !(of_alpha > 3.0 * of.largest_deviation);
+        let unsure = if probability < least { Reason::Unsure as u32 } else { 0 };
+        let misfit = if explained { unsure } else { Reason::Misfit as u32 };
+        let out_of_range = if in_range { misfit } else { Reason::OutOfRange as u32 };
+        let code = if of_noise < of.largest_deviation { out_of_range } else { Reason::NoTexture as u32 };
+        let own = u32::from(reasons[x]);
+        let finite = depth[x].abs() < f32::INFINITY;
+        let code = if (own != 0) | !finite { own } else { code };
+        let valid = (code == 0) & finite;
+        reasons[x] = code as u8;
+        depth[x] = if valid { depth[x] } else { f32::NAN };
+        confidence[x] = if valid { probability } else { 0.0 };
+        deviation[x] = if valid { deviation[x] } else { f32::NAN };
+    }
+}
+
+/// Probability that a depth is off by less than three standard deviations. Of a normal error it is 0.997; it falls where the
+/// deviation, here relative to the largest, is no longer small against the range, and where the model leaves more than noise.
+#[inline(always)]
+fn probability(deviation: f32, misfit: f32) -> f32 {
+    let unexplained = (misfit - 1.5).max(0.0);
+    0.997 / ((1.0 + 0.3 * (deviation * deviation)) * (1.0 + 0.02 * unexplained))
 }
 
 dispatch! {

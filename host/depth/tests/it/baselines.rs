@@ -131,7 +131,7 @@ fn checks_and_filling_are_those_of_the_rational_operators() {
 }
 
 #[test]
-fn what_makes_no_sense_is_refused() {
+fn invalid_settings_are_rejected() {
     let optics = rig("gaussian:k=0.4578");
     let [far, near] = Texture::sand(32, 3).pair(optics.psf(), optics.max_blur_px(), 0.4);
     let settings = Settings::default();

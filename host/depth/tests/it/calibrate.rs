@@ -228,11 +228,14 @@ fn standard_errors_are_those_of_repetition() {
                 fit_psf(&[pair], &optics, model).unwrap()
             })
             .collect();
-        let check = |what: &str, values: Vec<f64>, said: f64| {
+        let check = |what: &str, values: Vec<f64>, predicted: f64| {
             let mean = values.iter().sum::<f64>() / 8.0;
             let spread = (values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / 7.0).sqrt();
-            println!("{model}: {what} {mean:.4}, spread {spread:.5}, said {said:.5}");
-            assert!((0.5..2.0).contains(&(spread / said)), "{model}: {what}: spread {spread}, said {said}");
+            println!("{model}: {what} {mean:.4}, spread {spread:.5}, predicted {predicted:.5}");
+            assert!(
+                (0.5..2.0).contains(&(spread / predicted)),
+                "{model}: {what}: spread {spread}, predicted {predicted}"
+            );
         };
         let k_of = |fit: &PsfFit| match fit.psf {
             Psf::Gaussian { k } | Psf::Generalised { k, .. } => k,
@@ -247,7 +250,7 @@ fn standard_errors_are_those_of_repetition() {
 }
 
 #[test]
-fn a_shift_and_another_psf_are_told_from_noise() {
+fn a_shift_and_another_psf_are_distinguished_from_noise() {
     let optics = rig("pillbox");
     let fit = |[far, near]: &[Array2<f32>; 2], model| {
         let pair = CapturedPair { far: far.view(), near: near.view(), alpha: None };

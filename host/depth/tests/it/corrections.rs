@@ -288,7 +288,7 @@ fn patterns_with_holes_still_teach() {
 }
 
 #[test]
-fn what_cannot_be_learned_or_applied_says_so() {
+fn unusable_patterns_and_corrections_are_rejected_with_a_reason() {
     let series = Series::new((60, 80), 7);
     let patterns = series.patterns();
     let settings = CdcSettings::default();

@@ -97,7 +97,7 @@ fn a_common_gain_and_offset_do_not_matter() {
 }
 
 #[test]
-fn depth_around_an_invalid_pixel_is_no_value_and_no_confidence() {
+fn around_an_invalid_pixel_there_is_no_depth_and_no_confidence() {
     let bench = Bench::new(64);
     let [mut far, near] = bench.pair.clone();
     let clean = bench.run(&far, &near).unwrap();

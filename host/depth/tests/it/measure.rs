@@ -141,7 +141,7 @@ fn a_good_pair_goes_through_untouched() {
 
 /// Aims of the measured page: 0.75 mm on 640x480; smaller images determine gain and geometry less well.
 #[test]
-fn geometry_and_brightness_are_mended() {
+fn geometry_and_brightness_are_corrected() {
     let view = |shift: f64, magnification, rotation_deg| View {
         shift_px: [shift, -0.5 * shift],
         magnification,
@@ -208,7 +208,7 @@ fn different_scenes_are_refused() {
 }
 
 #[test]
-fn what_moved_has_no_depth() {
+fn moved_pixels_have_no_depth() {
     let (still, moved) = (
         plain("plane:905", 5),
         pair("plane:905", PSF, Noise::EightBit, &lens(), View { shift_px: [3.0, 0.0], ..View::default() }, 5),
@@ -290,14 +290,14 @@ fn nothing_is_confident_outside_the_range() {
 }
 
 #[test]
-fn a_wrong_point_spread_function_is_said() {
+fn a_wrong_psf_is_reported() {
     let pair = plain("staircase", 9);
-    for (psf, said) in
+    for (psf, reported) in
         [(PSF, false), ("gaussian:k=0.5036", true), ("pillbox", true), ("generalised:p=1.8,k=0.4802", true)]
     {
         let found = measure(&pair, psf, Window::Adaptive).unwrap();
         println!("{psf}: {:e} {:.3} {:?}", found.left_over, found.excess, found.findings);
-        if !said {
+        if !reported {
             assert!(
                 !found.findings.iter().any(|f| f.to_string().contains("unexplained")),
                 "{psf}: {:?}",
@@ -308,7 +308,7 @@ fn a_wrong_point_spread_function_is_said() {
 }
 
 #[test]
-fn what_is_asked_for_is_done() {
+fn requested_corrections_are_applied() {
     let pair = plain("plane:905", 10);
     let optics = rig(PSF);
     let operators = Operators::for_optics(&optics).unwrap();
@@ -371,7 +371,7 @@ fn claimed(found: &Measurement) -> [f32; 2] {
 
 /// One pair of a plane cannot reveal a wrong width; a wrong shape leaves a residual, which must count.
 #[test]
-fn what_the_model_leaves_unexplained_widens_the_deviation_and_lowers_the_confidence() {
+fn misfit_widens_the_deviation_and_lowers_the_confidence() {
     let pair = pair("plane:925", "pillbox", Noise::EightBit, &lens(), View::default(), 90);
     let [right, wrong] =
         ["pillbox", "gaussian:k=0.7"].map(|psf| measure(&pair, psf, Window::Adaptive).unwrap());

@@ -220,7 +220,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn rank_correlation_knows_order_and_ties() {
+    fn rank_correlation_handles_order_and_ties() {
         let rising: Vec<_> = (0..9).map(|i| (i as f32, (i as f32).powi(3))).collect();
         assert!((rank_correlation(&rising) - 1.0).abs() < 1e-12);
         let falling: Vec<_> = (0..9).map(|i| (i as f32, -(i as f32))).collect();

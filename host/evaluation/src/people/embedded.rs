@@ -63,11 +63,11 @@ pub fn measure(page: &mut Page) -> Result<()> {
         &panels::grid(SHOWN.len(), &shown)?,
         "Patterns of embedded silhouettes of six activities, fig. 9.5 (above), and the spatial objects made of them, fig. 9.6 (below); all silhouettes in grey",
     )?;
-    said(page, &embedded, &objects);
+    summary(page, &embedded, &objects);
     Ok(())
 }
 
-fn said(page: &mut Page, embedded: &Embedded, objects: &[Vec<bool>]) {
+fn summary(page: &mut Page, embedded: &Embedded, objects: &[Vec<bool>]) {
     let cells = |object: &[bool]| object.iter().filter(|visited| **visited).count();
     let all = cells(&visited(embedded, None));
     let counts: Vec<usize> = objects.iter().map(|object| cells(object)).collect();

@@ -121,7 +121,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_keeps_all_distances_leaves_nothing_and_a_projection_leaves_some() {
+    fn an_isometry_has_no_residual_and_a_projection_has_one() {
         let points = Array2::from_shape_fn((40, 2), |(i, k)| ((i * (7 + 5 * k)) % 11) as f32);
         let found = residuals(points.view(), &distances(points.view()));
         assert!(found[1].abs() < 1e-9 && found[0] > 0.1, "{found:?}");

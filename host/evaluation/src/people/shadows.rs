@@ -151,7 +151,7 @@ fn highway(page: &mut Page, folder: &Path) -> Result<()> {
         let frame = Frame::Rgb(pixels);
         let without = Settings { shadow: None, ..Settings::default() };
         let labels = ready(&mut learner, frame, without)?.apply(frame)?;
-        let told = ready(&mut separate, frame, Settings::default())?.apply(frame)?;
+        let classes = ready(&mut separate, frame, Settings::default())?.apply(frame)?;
         let truth_path = folder.join(format!("groundtruth/gt{number:06}.png"));
         // The first 469 frames are for learning only.
         if number < 470 || !truth_path.exists() {
@@ -176,7 +176,7 @@ fn highway(page: &mut Page, folder: &Path) -> Result<()> {
             score.add(Some(foreground.view()), left.view(), truth.view())?;
         }
         plain.add(Some(foreground.view()), foreground.view(), truth.view())?;
-        let left = Array2::from_shape_fn(size, |at| foreground[at] && told[at] == Label::Foreground);
+        let left = Array2::from_shape_fn(size, |at| foreground[at] && classes[at] == Label::Foreground);
         own.add(Some(foreground.view()), left.view(), truth.view())?;
         scored += 1;
     }

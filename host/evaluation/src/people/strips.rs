@@ -138,7 +138,7 @@ mod tests {
     use image::Rgb;
 
     #[test]
-    fn a_dark_body_and_its_waving_arm_are_told_from_a_blotchy_wall() {
+    fn a_dark_body_and_its_waving_arm_are_separated_from_a_blotchy_wall() {
         // A motionless body with an arm raised in every other frame; the wall varies by +-8 grey levels.
         let arm = |n: usize, y: usize, x: usize| {
             n.is_multiple_of(2) && (20..24).contains(&y) && (36..50).contains(&x)

@@ -155,7 +155,7 @@ pub struct Outcome {
     pub error_mm: f64,
     /// Share of pixels with a depth.
     pub valid: f64,
-    pub said: Vec<String>,
+    pub messages: Vec<String>,
     pub found: Option<Measurement>,
 }
 
@@ -183,8 +183,8 @@ impl Taken {
         match found {
             Ok(found) => {
                 let (error_mm, valid) = self.error(&found.map.depth_mm);
-                let said = found.findings.iter().map(Finding::to_string).collect();
-                Outcome { error_mm, valid, said, found: Some(found) }
+                let messages = found.findings.iter().map(Finding::to_string).collect();
+                Outcome { error_mm, valid, messages, found: Some(found) }
             }
             Err(error) => refused(&error),
         }
@@ -217,5 +217,5 @@ impl Taken {
 }
 
 fn refused(error: &MeasureError) -> Outcome {
-    Outcome { error_mm: f64::NAN, valid: 0.0, said: vec![format!("error: {error}")], found: None }
+    Outcome { error_mm: f64::NAN, valid: 0.0, messages: vec![format!("error: {error}")], found: None }
 }

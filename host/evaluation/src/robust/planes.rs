@@ -32,7 +32,7 @@ pub fn measure(page: &mut Page) -> Result<()> {
         .map(|(index, depth_mm)| {
             let taken = take(&rig::plane(*depth_mm)?, SIZE, &Disturbance::default(), SEED + index as u64)?;
             let mut cells = vec![format!("{depth_mm}")];
-            let mut said = Vec::new();
+            let mut messages = Vec::new();
             for way in 0..WAYS.len() {
                 let outcome = taken.measure(way, &operators, &optics, None);
                 let [mut wrong, mut sure, mut valid, mut all] = [0.0_f64; 4];
@@ -54,9 +54,9 @@ pub fn measure(page: &mut Page) -> Result<()> {
                     format!("{:.2} %", 100.0 * wrong / all.max(1.0)),
                     if valid > 0.0 { format!("{:.2}", sure / valid) } else { "-".into() },
                 ]);
-                said = outcome.said;
+                messages = outcome.messages;
             }
-            cells.push(said.join("; "));
+            cells.push(messages.join("; "));
             Ok(cells)
         })
         .collect::<Result<Vec<_>>>()?;

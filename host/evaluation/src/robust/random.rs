@@ -25,14 +25,14 @@ struct Case {
     before_mm: f64,
     error_mm: f64,
     valid: f64,
-    said: Vec<String>,
+    messages: Vec<String>,
     refused: bool,
 }
 
 impl Case {
     /// Wrong without a flag.
     fn silent(&self) -> bool {
-        self.error_mm > SILENT_MM && self.said.is_empty()
+        self.error_mm > SILENT_MM && self.messages.is_empty()
     }
 }
 
@@ -118,7 +118,7 @@ pub fn measure(page: &mut Page) -> Result<()> {
                 mm(case.before_mm),
                 mm(case.error_mm),
                 format!("{:.0} %", 100.0 * case.valid),
-                case.said.join("; "),
+                case.messages.join("; "),
             ]
         })
         .collect();
@@ -148,7 +148,7 @@ fn case(seed: u64, operators: &Operators, optics: &Optics) -> Result<Case> {
         before_mm: taken.plain(operators, optics),
         error_mm: outcome.error_mm,
         valid: outcome.valid,
-        said: outcome.said,
+        messages: outcome.messages,
         refused: outcome.found.is_none(),
     })
 }

@@ -20,12 +20,12 @@ struct Row {
     name: &'static str,
     disturbance: Disturbance,
     calibrated: bool,
-    told: Option<(&'static str, f64)>,
+    stated: Option<(&'static str, f64)>,
 }
 
 fn rows() -> Vec<Row> {
     let none = Disturbance::default;
-    let row = |name, disturbance| Row { name, disturbance, calibrated: false, told: None };
+    let row = |name, disturbance| Row { name, disturbance, calibrated: false, stated: None };
     let gain = |gain| Disturbance { gain, ..none() };
     let shift = |x: f64| Disturbance { view: View { shift_px: [x, -0.5 * x], ..View::default() }, ..none() };
     let grown = |magnification| Disturbance { view: View { magnification, ..View::default() }, ..none() };
@@ -33,7 +33,7 @@ fn rows() -> Vec<Row> {
     let together = View { shift_px: [8.0, -4.0], magnification: 1.03, rotation_deg: 1.0 };
     let all = Disturbance { gain: 1.5, vignetting: 0.5, view: together, ..none() };
     let response = Disturbance { response: 0.03, ..none() };
-    let told = |name, what, value| Row { told: Some((what, value)), ..row(name, none()) };
+    let stated = |name, what, value| Row { stated: Some((what, value)), ..row(name, none()) };
     vec![
         row("nothing", none()),
         row("brightness x 1.02", gain(1.02)),
@@ -66,9 +66,9 @@ fn rows() -> Vec<Row> {
             "images exchanged, lens not telecentric",
             Disturbance { exchanged: true, telecentric: false, ..none() },
         ),
-        told("k told 10 % too wide", "k", 0.5036),
-        told("blur told twice as wide", "max_blur_px", 5.406),
-        told("f/2.8 told for f/3.9", "blur", 1.39),
+        stated("k told 10 % too wide", "k", 0.5036),
+        stated("blur told twice as wide", "max_blur_px", 5.406),
+        stated("f/2.8 told for f/3.9", "blur", 1.39),
     ]
 }
 
@@ -96,7 +96,7 @@ fn one(row: &Row) -> Result<Vec<String>> {
             table.insert(key.to_owned(), value.into());
         }
     };
-    match row.told {
+    match row.stated {
         Some(("k", value)) => put("psf", "k", value),
         Some(("max_blur_px", value)) => put("focus", "max_blur_px", value),
         // With the near focus unchanged a wider aperture means more blur.
@@ -106,7 +106,7 @@ fn one(row: &Row) -> Result<Vec<String>> {
         }
         None => {}
     }
-    if row.told.is_some() {
+    if row.stated.is_some() {
         optics = text.try_into()?;
     }
     let operators = Operators::for_optics(&optics)?;
@@ -118,12 +118,12 @@ fn one(row: &Row) -> Result<Vec<String>> {
         _ => None,
     };
     let mut cells = vec![row.name.to_owned(), mm(taken.plain(&operators, &optics))];
-    let mut said = Vec::new();
+    let mut messages = Vec::new();
     for way in 0..WAYS.len() {
         let outcome = taken.measure(way, &operators, &optics, camera.as_ref());
         cells.extend([mm(outcome.error_mm), format!("{:.1} %", 100.0 * outcome.valid)]);
-        said = outcome.said;
+        messages = outcome.messages;
     }
-    cells.push(said.join("; "));
+    cells.push(messages.join("; "));
     Ok(cells)
 }

@@ -12,16 +12,15 @@ use clap::Subcommand;
 #[derive(Subcommand)]
 pub enum Job {
     Train(train::Arguments),
-    Recognise(recognise::Arguments),
+    Recognise(recognise::Recognise),
     Evaluate(evaluate::Arguments),
     Models(models::Arguments),
 }
 
-/// Runs the command.
 pub fn run(job: Job) -> Result<()> {
     match job {
         Job::Train(arguments) => train::run(arguments),
-        Job::Recognise(arguments) => recognise::run(arguments),
+        Job::Recognise(task) => task.run(),
         Job::Evaluate(arguments) => evaluate::run(arguments),
         Job::Models(arguments) => models::run(arguments),
     }

@@ -1,5 +1,3 @@
-//! `farnear batch`: the jobs of a manifest on all cores.
-
 use std::{io, path::PathBuf};
 
 use anyhow::Result;
@@ -71,7 +69,6 @@ pub struct Arguments {
     field: Vec<Pattern>,
 }
 
-/// Runs the command.
 pub fn run(arguments: Arguments) -> Result<()> {
     let Arguments {
         manifest,
@@ -93,7 +90,7 @@ pub fn run(arguments: Arguments) -> Result<()> {
     let settings =
         BatchSettings { manifest, jobs, shard, verify, failures, summary, dry_run, allow_failures };
     let line =
-        |told: &JobReport| report::print(told, true).map_err(|error| io::Error::other(format!("{error:#}")));
+        |job: &JobReport| report::print(job, true).map_err(|error| io::Error::other(format!("{error:#}")));
     batch::run(&settings, &terminal::long_work()?, &line)?;
     Ok(())
 }

@@ -1,5 +1,3 @@
-//! `farnear calibrate`: learns what the optics do from captured images and depth maps.
-
 use anyhow::Result;
 use clap::Subcommand;
 use farnear_workflows::{
@@ -19,7 +17,6 @@ pub enum What {
     Camera(Run<CalibrateCameraRequest>),
 }
 
-/// Runs the command.
 pub fn run(what: What) -> Result<()> {
     match what {
         What::Psf(task) => task.run(),

@@ -1,5 +1,3 @@
-//! `farnear camera`: cameras without a rig.
-
 use std::{io::Write, path::PathBuf, time::Duration};
 
 use anyhow::Result;
@@ -112,7 +110,6 @@ pub struct LiveArguments {
     json: bool,
 }
 
-/// Runs the command.
 pub fn run(job: Job) -> Result<()> {
     match job {
         Job::List(arguments) => report::print(&camera::list(), arguments.json),

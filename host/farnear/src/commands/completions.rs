@@ -1,5 +1,3 @@
-//! `farnear completions`: completions for a shell.
-
 use anyhow::Result;
 use clap::{Args, CommandFactory};
 use clap_complete::Shell;
@@ -16,7 +14,6 @@ pub struct Arguments {
     shell: Shell,
 }
 
-/// Prints the completions of the program whose arguments `C` describes.
 pub fn run<C: CommandFactory>(arguments: Arguments) -> Result<()> {
     let mut script = Vec::new();
     clap_complete::generate(arguments.shell, &mut C::command(), "farnear", &mut script);

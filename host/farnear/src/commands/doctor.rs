@@ -1,5 +1,3 @@
-//! `farnear doctor`: whether this computer has what farnear needs.
-
 use std::path::PathBuf;
 
 use anyhow::{Result, bail};
@@ -27,7 +25,6 @@ pub struct Arguments {
     json: bool,
 }
 
-/// Runs the command.
 pub fn run(arguments: Arguments) -> Result<()> {
     let settings = DoctorSettings { port: arguments.port, folders: arguments.folders };
     let figures = doctor::examine(&settings, &terminal::context()?)?;

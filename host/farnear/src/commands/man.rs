@@ -1,5 +1,3 @@
-//! `farnear man`: the manual's pages.
-
 use std::path::PathBuf;
 
 use anyhow::Result;
@@ -16,7 +14,6 @@ pub struct Arguments {
     out: PathBuf,
 }
 
-/// Writes the pages of the program whose arguments `C` describes.
 pub fn run<C: CommandFactory>(arguments: &Arguments) -> Result<()> {
     let mut command = C::command().disable_help_subcommand(true);
     command.build();

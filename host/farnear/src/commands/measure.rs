@@ -1,5 +1,3 @@
-//! `farnear measure`: figures of a depth map, with their deviation.
-
 use anyhow::Result;
 use clap::Subcommand;
 use farnear_workflows::measure::{
@@ -16,7 +14,6 @@ pub enum What {
     Difference(Run<MeasureDifferenceRequest>),
 }
 
-/// Runs the command.
 pub fn run(what: What) -> Result<()> {
     match what {
         What::Region(task) => task.run(),

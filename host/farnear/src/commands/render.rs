@@ -1,5 +1,3 @@
-//! `farnear render`: what a camera would see of a known scene, and the truth with it.
-
 use std::path::PathBuf;
 
 use anyhow::Result;
@@ -60,7 +58,6 @@ pub struct Arguments {
     json: bool,
 }
 
-/// Runs the command.
 pub fn run(arguments: Arguments) -> Result<()> {
     let Arguments { scene, elliptical_distortion, psf, optics, noise, seed, width, height, out, json } =
         arguments;

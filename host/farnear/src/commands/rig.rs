@@ -1,5 +1,3 @@
-//! `farnear rig`: drives a rig, real or emulated.
-
 mod calibrate;
 mod log;
 mod motion;
@@ -99,7 +97,6 @@ impl Question {
     }
 }
 
-/// Runs the command.
 pub fn run(job: Job) -> Result<()> {
     match job {
         Job::Info(question) => question.answer(info::info),

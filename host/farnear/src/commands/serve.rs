@@ -1,5 +1,3 @@
-//! `farnear serve`: the page.
-
 use std::{net::SocketAddr, path::PathBuf, time::Duration};
 
 use anyhow::{Result, bail};
@@ -18,7 +16,6 @@ use crate::{
     terminal,
 };
 
-/// The port that is tried where none is named.
 const PORT: u16 = 8080;
 
 /// Serve the page: the rig in a browser. Listens on localhost only, unless --listen names an address.
@@ -83,10 +80,9 @@ fn scene(text: &str) -> Result<String, farnear_scene::SceneError> {
     text.parse::<SceneArgument>().map(|_| text.to_owned())
 }
 
-/// Runs the command, until Ctrl-C.
 pub fn run(arguments: Arguments) -> Result<()> {
     let rig = match arguments.rig.as_deref() {
-        // People watch it, so it keeps their time.
+        // Runs in real time, because people watch it.
         Some("sim") => {
             let packed_scene = packed(arguments.scene.as_deref())?;
             let scene = arguments.scene;

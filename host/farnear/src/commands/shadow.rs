@@ -1,5 +1,3 @@
-//! `farnear shadow`: shadow on masks of a person.
-
 use anyhow::Result;
 use clap::Subcommand;
 use farnear_workflows::shadow::{removal::ShadowRemoveRequest, score::ShadowScoreRequest};
@@ -12,7 +10,6 @@ pub enum Job {
     Score(Run<ShadowScoreRequest>),
 }
 
-/// Runs the command.
 pub fn run(job: Job) -> Result<()> {
     match job {
         Job::Remove(task) => task.run(),

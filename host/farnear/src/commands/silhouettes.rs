@@ -1,5 +1,3 @@
-//! `farnear silhouettes`: masks of a person.
-
 use anyhow::Result;
 use clap::Subcommand;
 use farnear_workflows::silhouettes::{
@@ -18,7 +16,6 @@ pub enum Source {
     Passages(Run<PassagesRequest>),
 }
 
-/// Runs the command.
 pub fn run(source: Source) -> Result<()> {
     match source {
         Source::Skeletons(task) => task.run(),

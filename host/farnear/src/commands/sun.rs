@@ -1,5 +1,3 @@
-//! `farnear sun`: the sun's position at a place and time.
-
 use anyhow::Result;
 use chrono::{DateTime, Utc};
 use clap::Args;
@@ -23,7 +21,6 @@ pub struct MomentArguments {
 }
 
 impl MomentArguments {
-    /// As a workflow takes it.
     pub fn moment(&self) -> Moment {
         Moment { place: Place { latitude_deg: self.lat, longitude_deg: self.lon }, time: self.time }
     }
@@ -44,18 +41,15 @@ pub struct Arguments {
     json: bool,
 }
 
-/// Runs the command.
 pub fn run(arguments: &Arguments) -> Result<()> {
     report::print(&position(&arguments.moment.moment(), arguments.model)?, arguments.json)
 }
 
-/// Degrees that are a latitude.
 pub fn latitude(text: &str) -> Result<f64, String> {
     let degrees = number(text)?;
     Place::new(degrees, 0.0).map(|place| place.latitude_deg).map_err(|error| error.to_string())
 }
 
-/// Degrees that are a longitude.
 pub fn longitude(text: &str) -> Result<f64, String> {
     let degrees = number(text)?;
     Place::new(0.0, degrees).map(|place| place.longitude_deg).map_err(|error| error.to_string())

@@ -1,4 +1,4 @@
-//! `farnear activity` on synthetic people: training, recognition in masks and video, evaluation, and what is refused.
+//! `farnear activity` with synthetic people: training, recognition in masks and video, evaluation, rejected input.
 
 mod motion;
 mod people;
@@ -13,7 +13,7 @@ use crate::common::{Folder, fails, farnear, figures, number, succeeds};
 
 const SUBJECTS: usize = 4;
 
-/// Masks of four people walking, crouching and digging from two views, and a file of samples; made once for all tests.
+/// Masks of four people who walk, crouch and dig in two views, and a file of samples; made once for all tests.
 struct People {
     folder: Folder,
     samples: String,
@@ -46,12 +46,11 @@ impl People {
         self.folder.text(name)
     }
 
-    /// The masks of a performance.
     fn masks(&self, name: &str, view: u32) -> String {
         self.folder.text(&format!("people/{name}-1/view{view}"))
     }
 
-    /// The samples of which `keep` holds, as a file of their own next to the others.
+    /// Writes the samples that satisfy `keep` into a file of their own.
     fn only(&self, name: &str, keep: impl Fn(&str) -> bool) -> String {
         let all = fs::read_to_string(&self.samples).expect("samples");
         let kept: String = all.split_inclusive("\n\n").filter(|sample| keep(sample)).collect();
@@ -106,7 +105,7 @@ fn other_samples_can_be_learned_from_but_never_the_same_people() {
     };
     let found = figures(&mut evaluate(&one, &["--train", &others]));
     assert_eq!((number(&found, "answers"), number(&found, "subjects")), (3.0, 1.0));
-    // Leaving p0 out of the training on everybody is the same training.
+    // Training without p0 is the same as leaving p0 out.
     let left_out = figures(&mut evaluate(&one, &["--train", &people.samples, "--leave-one-subject-out"]));
     assert_eq!(found["confusion"], left_out["confusion"]);
     fails(&mut evaluate(&one, &["--train", &people.samples]), 1, &["`p00`", "--leave-one-subject-out"]);
@@ -155,7 +154,7 @@ fn models_answer_live_and_in_windows_and_refuse_what_they_do_not_know() {
         windows.len() > 1 && windows[0]["from"] == 1 && windows.last().expect("one")["to"] == whole["frames"]
     );
 
-    // A lying bar that pulses is not a person at any of these.
+    // A pulsing horizontal bar is not a person at any of these thresholds.
     let bar = people.text("bar");
     fs::create_dir(&bar).expect("a folder");
     for frame in 0..20_u32 {
@@ -169,7 +168,7 @@ fn models_answer_live_and_in_windows_and_refuse_what_they_do_not_know() {
     let bar = figures(&mut farnear(&["activity", "recognise", &bar, "--model", &model, "--json"]));
     assert!(bar["activity"].is_null() && number(&bar, "outlier_score") > 1.0, "{bar}");
 
-    // The same person walking in a video: dark before a light wall. (At a dozen pixels across the spade of the digger is
+    // The same person walks in a video, dark in front of a light wall. (At a dozen pixels across the digger's spade is
     // cleaned away.)
     fs::create_dir(people.folder.path("video")).expect("a folder");
     let count = fs::read_dir(people.masks("p01-walk", 1)).expect("a folder").count();

@@ -1,10 +1,9 @@
-//! Images and maps that are none: a clear message each, and nothing written.
+//! Invalid images and maps: a clear message each, and no output.
 
 use std::fs;
 
 use crate::common::{Folder, fails, farnear, render, rig_optics, succeeds};
 
-/// Depth of two files that must fail so; looks that nothing is left behind.
 #[track_caller]
 fn depth_fails(folder: &Folder, far: &str, near: &str, phrases: &[&str]) {
     let before = folder.listing();
@@ -61,23 +60,23 @@ fn images_without_texture_or_too_small_have_no_depth() {
 }
 
 #[test]
-fn a_pair_given_the_wrong_way_round_is_told() {
+fn a_swapped_pair_is_reported() {
     let folder = Folder::new();
     render(&folder, "slant", "pair");
     let [far, near] = ["pair/far.png", "pair/near.png"].map(|name| folder.text(name));
     let swapped = ["depth", &near, &far, "--optics", rig_optics()];
-    let (_, said) = succeeds(farnear(&swapped).args(["--out", &folder.text("a")]));
+    let (_, stderr) = succeeds(farnear(&swapped).args(["--out", &folder.text("a")]));
     assert!(
-        said.contains("warning: the pair looks swapped") && said.contains("near.png was given as FAR"),
-        "{said}"
+        stderr.contains("warning: the pair looks swapped") && stderr.contains("near.png was given as FAR"),
+        "{stderr}"
     );
     let right = ["depth", &far, &near, "--optics", rig_optics()];
-    let (_, said) = succeeds(farnear(&right).args(["--out", &folder.text("b")]));
-    assert!(!said.contains("swapped"), "{said}");
+    let (_, stderr) = succeeds(farnear(&right).args(["--out", &folder.text("b")]));
+    assert!(!stderr.contains("swapped"), "{stderr}");
 }
 
 #[test]
-fn maps_that_are_none_are_named() {
+fn invalid_maps_are_named_in_the_error() {
     let folder = Folder::new();
     render(&folder, "slant", "pair");
     let truth = folder.text("pair/truth.npy");

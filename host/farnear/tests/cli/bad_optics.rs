@@ -1,4 +1,4 @@
-//! Optics that make no sense: the message names the value, and the one that would agree.
+//! Contradictory optics: the message names the value and the one that would agree.
 
 use crate::common::{Folder, fails, farnear};
 
@@ -50,7 +50,7 @@ fn optics_that_make_no_sense_are_refused_by_every_command() {
 }
 
 #[test]
-fn optics_files_that_are_none_are_named() {
+fn invalid_optics_files_are_named_in_the_error() {
     let folder = Folder::new();
     let empty = folder.file("empty.toml", "");
     let bytes = folder.file("bytes.toml", [0xff, 0xfe, 0, 9]);

@@ -1,4 +1,4 @@
-//! Ports without a rig behind them: absent, busy, no port at all, silent, garbage, another protocol version.
+//! Ports without a rig: absent, busy, not a port, silent, garbage, another protocol version.
 
 use std::{
     io::{Read, Write},
@@ -13,7 +13,6 @@ use serialport::{SerialPort, TTYPort};
 
 use crate::common::{Folder, fails, farnear, rig_optics};
 
-/// A capture with this port that must fail so and leave nothing behind.
 #[track_caller]
 fn capture_fails(port: &str, phrases: &[&str]) {
     let folder = Folder::new();
@@ -58,7 +57,7 @@ fn the_environment_names_the_port_where_no_flag_does() {
 }
 
 #[test]
-fn a_file_and_a_folder_are_no_ports() {
+fn files_and_folders_are_rejected_as_ports() {
     capture_fails(rig_optics(), &["rig.toml is not a serial port"]);
     capture_fails(env!("CARGO_TARGET_TMPDIR"), &["is not a serial port"]);
 }
@@ -82,7 +81,7 @@ impl Line {
 }
 
 #[test]
-fn a_busy_port_is_told_from_an_absent_one() {
+fn busy_and_absent_ports_have_different_errors() {
     let line = Line::new();
     let held = serialport::new(line.name(), 115_200).open_native().expect("a free port");
     capture_fails(&line.name(), &["is busy", &line.name(), "end that program"]);
@@ -90,17 +89,17 @@ fn a_busy_port_is_told_from_an_absent_one() {
 }
 
 #[test]
-fn a_port_on_which_nobody_answers_is_named() {
+fn a_silent_port_is_named_in_the_error() {
     let line = Line::new();
     capture_fails(&line.name(), &["no answer", &line.name(), "nothing at all came", "powered"]);
 }
 
 #[test]
-fn noise_without_a_board_behind_it_is_told_from_silence() {
+fn noise_and_silence_have_different_errors() {
     let mut line = Line::new();
     let name = line.name();
     std::thread::spawn(move || {
-        // Till the program has gone: a repeating pattern with the frames' delimiter in it.
+        // Until the program ends: a repeating pattern that contains the frame delimiter.
         for byte in (0..=255u8).cycle() {
             std::thread::sleep(Duration::from_millis(2));
             if line.far_end.write_all(&[byte, byte.wrapping_mul(7), 0]).is_err() {
@@ -111,7 +110,7 @@ fn noise_without_a_board_behind_it_is_told_from_silence() {
     capture_fails(&name, &["no answer", &name, "broken frames came", "right port"]);
 }
 
-/// Answers every request as a board does that speaks protocol 4 to 5 only.
+/// Answers every request like a board that supports protocols 4 to 5 only.
 fn board_of_the_future(mut line: Line) {
     let mut decoder = Decoder::new();
     let mut bytes = [0; 64];
@@ -129,7 +128,7 @@ fn board_of_the_future(mut line: Line) {
 }
 
 #[test]
-fn a_board_of_another_protocol_version_is_told_with_both_versions() {
+fn another_protocol_version_is_reported_with_both_versions() {
     let line = Line::new();
     let name = line.name();
     std::thread::spawn(move || board_of_the_future(line));
@@ -139,7 +138,7 @@ fn a_board_of_another_protocol_version_is_told_with_both_versions() {
 }
 
 #[test]
-fn a_camera_that_is_none_is_named_before_anything_moves() {
+fn an_invalid_camera_is_reported_before_any_motion() {
     let folder = Folder::new();
     let out = folder.text("out");
     for (camera, code, phrases) in [
@@ -148,7 +147,7 @@ fn a_camera_that_is_none_is_named_before_anything_moves() {
         ("sim", 2, vec!["camera sim: it belongs to the emulated rig"]),
         ("127.0.0.1:1", 1, vec!["127.0.0.1:1", "refused"]),
     ] {
-        // The port is absent as well: it would be the one that is named if it were looked at first.
+        // The camera is checked first: the absent port would give another message.
         let capture = ["rig", "capture", "--port", "/dev/farnear-absent", "--camera", camera];
         fails(farnear(&capture).args(["--optics", rig_optics(), "--out", &out]), code, &phrases);
         assert_eq!(folder.listing(), Vec::<String>::new());

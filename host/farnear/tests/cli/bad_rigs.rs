@@ -1,4 +1,4 @@
-//! The emulated rig missing in whole or in part, or going away, or on a bad line.
+//! The emulated rig missing, incomplete, killed, or on a bad line.
 
 use std::{
     fs,
@@ -10,9 +10,9 @@ use assert_cmd::Command as Assert;
 use farnear_files::image_file::read_grey;
 use serde_json::Value;
 
-use crate::common::{Folder, SIM, beside, fails, farnear, rig_optics, succeeds};
+use crate::common::{Folder, SIM, built, fails, farnear, rig_optics, succeeds};
 
-/// A copy of the program alone in a folder, with nothing on its PATH.
+/// A copy of the program alone in a folder, with an empty PATH.
 fn alone(folder: &Folder) -> Assert {
     let copy = folder.path("farnear");
     fs::copy(env!("CARGO_BIN_EXE_farnear"), &copy).expect("a copy");
@@ -37,7 +37,7 @@ fn a_missing_simulator_is_named_with_what_to_do() {
 #[cfg_attr(not(emulated_rig), ignore = "needs farnear-sim: cargo xtask test")]
 fn a_missing_or_broken_firmware_is_named_with_what_to_do() {
     let folder = Folder::new();
-    fs::copy(beside(SIM), folder.path(SIM)).expect("a copy");
+    fs::copy(built(SIM), folder.path(SIM)).expect("a copy");
     let mut command = alone(&folder);
     let elf = "farnear-nucleo-f429zi.elf";
     fails(&mut command, 1, &["no firmware at", elf, "cargo xtask firmware", "--firmware"]);
@@ -53,16 +53,15 @@ fn a_missing_or_broken_firmware_is_named_with_what_to_do() {
 
 #[test]
 #[cfg_attr(not(emulated_rig), ignore = "needs farnear-sim: cargo xtask test")]
-fn what_the_simulator_refuses_is_passed_on() {
+fn errors_of_the_simulator_are_forwarded() {
     let folder = Folder::new();
     let typo = folder.file("faults.toml", "bit_eror_rate = 0.1");
-    let said = ["bit_eror_rate", "farnear-sim ended at once"];
-    fails(farnear(&["rig", "info", "--port", "sim"]).args(["--faults", &typo]), 1, &said);
-    let said = ["no firmware at", "none.elf", "farnear-sim ended at once"];
-    fails(farnear(&["rig", "info", "--port", "sim"]).args(["--firmware", "none.elf"]), 1, &said);
+    let messages = ["bit_eror_rate", "farnear-sim ended at once"];
+    fails(farnear(&["rig", "info", "--port", "sim"]).args(["--faults", &typo]), 1, &messages);
+    let messages = ["no firmware at", "none.elf", "farnear-sim ended at once"];
+    fails(farnear(&["rig", "info", "--port", "sim"]).args(["--firmware", "none.elf"]), 1, &messages);
 }
 
-/// A capture on the emulated rig with these faults of the line.
 fn capture(folder: &Folder, faults: Option<&str>, out: &str) -> Assert {
     let mut command = farnear(&["rig", "capture", "--port", "sim", "--optics", rig_optics()]);
     command.args(["--out", &folder.text(out)]);
@@ -76,7 +75,7 @@ fn capture(folder: &Folder, faults: Option<&str>, out: &str) -> Assert {
 #[cfg_attr(not(emulated_rig), ignore = "needs farnear-sim: cargo xtask test")]
 fn a_port_that_goes_away_ends_the_capture_without_a_trace() {
     let folder = Folder::new();
-    // Both stages are homed in some 2 s of the board's time, the exposures lie at 3.546 s and 3.565 s.
+    // Both stages are homed after some 2 s of the board's time; the exposures are at 3.546 s and 3.565 s.
     for milliseconds in [300, 3_556] {
         let faults = format!("unplug_after_ms = {milliseconds}");
         fails(&mut capture(&folder, Some(&faults), "out"), 1, &["went away while", "check its cable"]);
@@ -84,7 +83,6 @@ fn a_port_that_goes_away_ends_the_capture_without_a_trace() {
     }
 }
 
-/// A line of the simulator's or the program's output that contains `phrase`.
 fn wait_for(output: &mut impl BufRead, phrase: &str) -> String {
     let mut line = String::new();
     while !line.contains(phrase) {
@@ -94,7 +92,6 @@ fn wait_for(output: &mut impl BufRead, phrase: &str) -> String {
     line
 }
 
-/// Ends the child, should the test fail.
 struct Reaped(Child);
 
 impl Drop for Reaped {
@@ -108,7 +105,7 @@ impl Drop for Reaped {
 #[cfg_attr(not(emulated_rig), ignore = "needs farnear-sim: cargo xtask test")]
 fn a_simulator_that_is_killed_ends_the_capture_without_a_trace() {
     let folder = Folder::new();
-    let mut command = Command::new(beside(SIM));
+    let mut command = Command::new(built(SIM));
     command.args(["run", "--optics", rig_optics()]).stdin(Stdio::piped()).stdout(Stdio::piped());
     let mut simulator = Reaped(command.spawn().expect("farnear-sim starts"));
     let output = simulator.0.stdout.take().expect("its output");
@@ -120,11 +117,11 @@ fn a_simulator_that_is_killed_ends_the_capture_without_a_trace() {
     command.args(["rig", "capture", "--port", &text("port"), "--camera", &text("camera")]);
     command.args(["--optics", rig_optics(), "--out", &folder.text("out")]).stderr(Stdio::piped());
     let mut program = Reaped(command.spawn().expect("farnear starts"));
-    let mut said = BufReader::new(program.0.stderr.take().expect("its messages"));
-    wait_for(&mut said, "homing");
+    let mut messages = BufReader::new(program.0.stderr.take().expect("its messages"));
+    wait_for(&mut messages, "homing");
     simulator.0.kill().expect("it was running");
     let mut rest = String::new();
-    said.read_to_string(&mut rest).expect("text");
+    messages.read_to_string(&mut rest).expect("text");
     let status = program.0.wait().expect("it ends");
     assert_eq!(status.code(), Some(1), "{rest}");
     assert!(rest.contains("went away while") && rest.contains(&text("port")), "{rest}");
@@ -140,7 +137,7 @@ fn a_bad_line_changes_nothing_or_fails_cleanly() {
         ["far.png", "near.png"]
             .map(|file| fs::read(folder.path(&format!("{name}/{file}"))).expect("an image"))
     };
-    // A stranger's frame, half a frame, delimiters: as from a terminal that was left open.
+    // A foreign frame, half a frame, delimiters: as from a terminal that was left open.
     succeeds(&mut capture(&folder, Some("garbage = [3, 255, 0, 66, 17, 0, 0, 9]"), "garbage"));
     assert!(images("clean") == images("garbage"));
     let record = |name: &str| fs::read(folder.path(&format!("{name}/capture.toml"))).expect("a record");
@@ -148,10 +145,10 @@ fn a_bad_line_changes_nothing_or_fails_cleanly() {
 
     let before = folder.listing();
     let output = capture(&folder, Some("bit_error_rate = 1e-4"), "noisy").output().expect("it starts");
-    let said = String::from_utf8_lossy(&output.stderr);
+    let messages = String::from_utf8_lossy(&output.stderr);
     match output.status.code() {
         Some(0) => {
-            // What is asked again costs time, so that the piezo stands some nanometres elsewhere in its window.
+            // Retries take time, in which the piezo drifts by some nanometres within its window.
             for file in ["far.png", "near.png"] {
                 let picture =
                     |name: &str| read_grey(&folder.path(&format!("{name}/{file}"))).expect("an image").pixels;
@@ -160,9 +157,9 @@ fn a_bad_line_changes_nothing_or_fails_cleanly() {
             }
         }
         Some(1) => {
-            assert!(said.contains("farnear: "), "{said}");
+            assert!(messages.contains("farnear: "), "{messages}");
             assert_eq!(folder.listing(), before);
         }
-        other => panic!("{other:?}: {said}"),
+        other => panic!("{other:?}: {messages}"),
     }
 }

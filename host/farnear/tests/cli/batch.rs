@@ -1,4 +1,4 @@
-//! `farnear batch`: each job gives what its command gives; killed, edited, damaged and failing ones.
+//! `farnear batch`: each job gives what its command gives; killed, edited, damaged and failing jobs.
 
 use std::{
     collections::BTreeMap,
@@ -12,7 +12,7 @@ use serde_json::Value;
 
 use crate::common::{Folder, fails, farnear, figures, rig_optics, succeeds};
 
-/// What a run says of its jobs, in the manifest's order.
+/// The report of a run on its jobs, in the manifest's order.
 #[track_caller]
 fn lines(stdout: &[u8]) -> Vec<Value> {
     let text = std::str::from_utf8(stdout).expect("UTF-8");
@@ -21,14 +21,12 @@ fn lines(stdout: &[u8]) -> Vec<Value> {
     lines
 }
 
-/// The states of all jobs of a run that must succeed.
 #[track_caller]
 fn states(arguments: &[&str]) -> Vec<String> {
     let (stdout, _) = succeeds(&mut farnear(arguments));
     lines(stdout.as_bytes()).iter().map(|line| line["state"].as_str().expect("a state").into()).collect()
 }
 
-/// Every file below a folder with its bytes.
 fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
     let mut found = BTreeMap::new();
     for entry in fs::read_dir(folder).expect("a folder") {
@@ -45,7 +43,7 @@ fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
     found
 }
 
-/// A rendered pair, its optics and a manifest of `jobs` maps of it, each with windows of its own.
+/// A rendered pair, its optics and a manifest of `jobs` maps with different windows.
 fn pairs(folder: &Folder, jobs: usize) -> String {
     let size = ["--width", "160", "--height", "120", "--scene", "slant"];
     succeeds(farnear(&["render", "--optics", rig_optics(), "--out", &folder.text("pair")]).args(size));
@@ -57,7 +55,7 @@ fn pairs(folder: &Folder, jobs: usize) -> String {
 }
 
 #[test]
-fn what_was_killed_goes_on_and_ends_as_if_it_had_not_been() {
+fn a_killed_batch_resumes_with_the_same_result() {
     const JOBS: usize = 24;
     let [whole, killed] = [Folder::new(), Folder::new()];
     let manifests = [&whole, &killed].map(|folder| pairs(folder, JOBS));
@@ -70,7 +68,7 @@ fn what_was_killed_goes_on_and_ends_as_if_it_had_not_been() {
             .stderr(Stdio::null())
             .spawn()
             .expect("the program starts");
-        // The first of its jobs that was worked at has ended, others are under way.
+        // The first job has ended, others are running.
         let lines = BufReader::new(process.stdout.take().expect("a pipe")).lines();
         let done = lines.map_while(Result::ok).find(|line| line.contains("\"done\""));
         process.kill().expect("a process to kill");
@@ -103,18 +101,18 @@ fn a_bad_job_does_not_stop_the_others() {
         ("do = 'depth'\nout = ", &["line"]),
         ("do = 'depth'\nout = 'mine'", &["mine", "was not made by a batch"]),
         ("do = 'depth'\nwindow = 4\nout = 'maps/d'", &["window", "odd"]),
-        // The first job's place.
+        // The first job's folder.
         ("do = 'depth'\nwindow = 9\nout = 'maps/0'", &["another job", "maps/0"]),
     ];
     let bad: String = wrong.iter().map(|(job, _)| format!("[[job]]\n{job}\n")).collect();
     fs::write(&manifest, good.clone() + &bad).expect("a writable folder");
-    // One after the other, so that it is known which of the two that share a place comes second.
+    // One after the other, so that the order of the two jobs with one folder is known.
     let output = farnear(&["batch", &manifest, "--jobs", "1"]).output().expect("the program starts");
     assert_eq!(output.status.code(), Some(1));
-    let said = lines(&output.stdout);
-    assert_eq!(said.len(), 9);
-    assert!(said[..2].iter().all(|line| line["state"] == "done"), "{said:?}");
-    for (line, (job, phrases)) in said[2..].iter().zip(wrong) {
+    let reports = lines(&output.stdout);
+    assert_eq!(reports.len(), 9);
+    assert!(reports[..2].iter().all(|line| line["state"] == "done"), "{reports:?}");
+    for (line, (job, phrases)) in reports[2..].iter().zip(wrong) {
         let error = line["error"].as_str().expect("a message");
         assert!(
             line["state"] == "failed" && phrases.iter().all(|phrase| error.contains(phrase)),
@@ -122,7 +120,7 @@ fn a_bad_job_does_not_stop_the_others() {
         );
     }
     let kept = fs::read(folder.path("pairs.failures.jsonl")).expect("failures");
-    assert_eq!(lines(&kept), said[2..], "kept apart with their messages");
+    assert_eq!(lines(&kept), reports[2..], "kept apart with their messages");
     assert_eq!(files(&folder.path("mine")).len(), 1);
     assert!(!folder.listing().iter().any(|name| name.contains("partial")), "{:?}", folder.listing());
 
@@ -132,7 +130,7 @@ fn a_bad_job_does_not_stop_the_others() {
 }
 
 #[test]
-fn what_has_changed_is_done_again_and_nothing_else() {
+fn only_changed_jobs_run_again() {
     let folder = Folder::new();
     let manifest = pairs(&folder, 2);
     let again = || states(&["batch", &manifest]);
@@ -145,18 +143,18 @@ fn what_has_changed_is_done_again_and_nothing_else() {
     };
     edit("window = 5", "window = 7");
     assert_eq!(again(), ["already", "done"], "a setting");
-    // A pixel of the far image: both were made from it.
+    // One pixel of the far image: both results depend on it.
     let far = folder.path("pair/far.png");
     let mut picture = image::open(&far).expect("a picture").into_luma8();
     picture.get_pixel_mut(80, 60).0[0] ^= 0x10;
     picture.save(&far).expect("a writable folder");
     assert_eq!(again(), ["done"; 2], "an image");
-    // The optics next to the pair, which no field names.
+    // The optics next to the pair; no field names them.
     let optics = fs::read_to_string(folder.path("pair/optics.toml")).expect("optics");
     folder.file("pair/optics.toml", format!("{optics}# looked through\n"));
     assert_eq!(again(), ["done"; 2], "optics");
     assert_eq!(again(), ["already"; 2]);
-    // Damage: a file that is cut is seen at once, one with another byte where it is looked for.
+    // A truncated file is found immediately, a changed byte only by verification.
     let cut = before["0/depth.npy"].len() as u64 - 4;
     let map = fs::File::options().write(true).open(folder.path("maps/0/depth.npy")).expect("a map");
     map.set_len(cut).expect("a writable file");
@@ -166,7 +164,7 @@ fn what_has_changed_is_done_again_and_nothing_else() {
     fs::write(folder.path("maps/1/depth.npy"), bytes).expect("a writable file");
     assert_eq!(again(), ["already"; 2]);
     assert_eq!(states(&["batch", &manifest, "--verify"]), ["already", "done"], "another byte");
-    // What another setting wrote does not stay next to what this one writes.
+    // Files in an earlier format do not stay next to new ones.
     edit("'npy'", "'png'");
     assert_eq!(again(), ["done"; 2]);
     assert!(!folder.path("maps/0/depth.npy").exists() && folder.path("maps/0/depth.png").exists());
@@ -183,7 +181,7 @@ fn shards_do_all_jobs_together() {
     fails(&mut farnear(&["batch", &manifests[0], "--shard", "3/2"]), 2, &["3/2", "1/N to N/N"]);
 }
 
-/// A job of every kind, and the command that does the same.
+/// A job of every kind and the command that does the same.
 #[test]
 fn each_kind_gives_what_its_command_gives() {
     let folder = Folder::new();
@@ -248,8 +246,8 @@ fn each_kind_gives_what_its_command_gives() {
          silhouettes-video,,,,,video,,,,b/video,,,true,true,,,,,,,\n\
          silhouettes-markers,,,,walk.csv,,,2,,b/markers,,,,,suit.toml,,,,,,\n\
          shadow-remove,,,,,,masks,,,b/clean,,,,,,camera.toml,52.38,-1.56,2014-06-23T11:30:00Z,,\n\
-         recognise,,,,,,,people/p01-dig-1/view1,,b/answer,,,,,,,,,,model.fnm,\n\
-         recognise,,,,,,,people/p01-dig-1/view1,,b/shipped,,,,,,,,,,everyday,dig;kick\n",
+         activity-recognise,,,,,,,people/p01-dig-1/view1,,b/answer,,,,,,,,,,model.fnm,\n\
+         activity-recognise,,,,,,,people/p01-dig-1/view1,,b/shipped,,,,,,,,,,everyday,dig;kick\n",
     );
     assert_eq!(states(&["batch", &manifest]), ["done"; 7]);
     assert_eq!(states(&["batch", &manifest]), ["already"; 7]);
@@ -306,8 +304,8 @@ fn methods_and_models_are_evaluated_as_jobs() {
         assert_eq!(output.status.code(), Some(1));
         lines(&output.stdout)
     };
-    let said = run();
-    for (line, phrase) in said[2..].iter().zip(["leave_one_subject_out", "NAME IN THE SAMPLES"]) {
+    let reports = run();
+    for (line, phrase) in reports[2..].iter().zip(["leave_one_subject_out", "NAME IN THE SAMPLES"]) {
         assert!(line["error"].as_str().expect("a message").contains(phrase), "{line}");
     }
     let samples = folder.text("people/samples.toml");
@@ -317,11 +315,10 @@ fn methods_and_models_are_evaluated_as_jobs() {
         let mut expected = figures(farnear(&["activity", "evaluate", &samples, "--json"]).args(arguments));
         let kept = fs::read(folder.path(&format!("b/{name}/figures.json"))).expect("figures");
         let kept: Value = serde_json::from_slice(&kept).expect("JSON");
-        // Times differ from run to run.
         expected.as_object_mut().expect("figures").retain(|name, _| !name.starts_with("seconds"));
         assert_eq!(kept, expected);
     }
-    // A mask that is named by the samples, not by the manifest.
+    // A mask that the samples name, not the manifest.
     let masks = files(&folder.path("people/p01-dig-1/view1"));
     let first = masks.keys().next().expect("a mask");
     fs::remove_file(folder.path("people/p01-dig-1/view1").join(first)).expect("a mask");
@@ -330,7 +327,7 @@ fn methods_and_models_are_evaluated_as_jobs() {
 }
 
 #[test]
-fn a_manifest_that_is_none_is_refused_before_anything_is_done() {
+fn an_invalid_manifest_is_rejected_before_any_job() {
     let folder = Folder::new();
     let manifest = folder.file("list.txt", "");
     fails(&mut farnear(&["batch", &manifest]), 1, &["list.txt", ".toml or .csv"]);
@@ -361,7 +358,7 @@ fn a_second_run_repeats_the_figures_of_the_first() {
     let second = run(&["--summary", &table]);
     for (mut first, second) in first.into_iter().zip(&second) {
         assert_eq!(second["state"], "already");
-        // The duration is that of the first run only.
+        // Only the first run has a duration.
         first["figures"].as_object_mut().expect("figures").remove("seconds");
         assert_eq!(first["figures"], second["figures"]);
     }
@@ -404,7 +401,7 @@ fn a_manifest_is_generated_from_patterns() {
     let fields = ["far=*/far.png", "near=*/near.png", "out=*/depth", "optics=rig.toml", "write=npy"];
     let fields: Vec<&str> = fields.iter().flat_map(|field| ["--field", *field]).collect();
     succeeds(farnear(&["batch", &manifest, "--generate", "depth"]).args(fields));
-    // As a spreadsheet with a comma in numbers writes it.
+    // As a spreadsheet with decimal commas writes it.
     let text = fs::read_to_string(&manifest).expect("a manifest").replace(',', ";");
     fs::write(&manifest, text).expect("a writable folder");
     assert_eq!(states(&["batch", &manifest]), ["done"]);

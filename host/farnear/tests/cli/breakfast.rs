@@ -1,4 +1,4 @@
-//! The pair that Watanabe & Nayar took, where it is present.
+//! The pair of Watanabe & Nayar, where it is present.
 
 use std::path::Path;
 

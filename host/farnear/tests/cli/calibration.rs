@@ -1,5 +1,4 @@
-//! `farnear calibrate`, `correct`, `depth --method --correction --fill` and `operators --plot` as a user runs them, on
-//! small rendered pairs.
+//! `farnear calibrate`, `correct`, `depth --method --correction --fill` and `operators --plot` on small rendered pairs.
 
 use std::{fs, path::Path};
 
@@ -51,7 +50,7 @@ impl Bench {
         fs::write(self.0.path().join(name), npy::write(map.view())).unwrap();
     }
 
-    /// Depth maps of flat targets that come out `bow` times too deep towards the corners, and their list.
+    /// Depth maps of flat targets that are `bow` times too deep towards the corners, and their list.
     fn targets(&self, bow: f32) {
         let mut list = String::new();
         for (index, true_mm) in [932.0_f32, 920.0, 910.0, 900.0, 888.0].into_iter().enumerate() {
@@ -88,7 +87,7 @@ fn the_blur_constant_of_a_rendered_pair_is_found() {
     bench.fails(2, &inside, "no image");
 }
 
-/// A free profile goes through the optics file like any other PSF, and depth by it is as by the model that made the pair.
+/// A free profile works in the optics file like any other PSF. Its depth equals that by the pair's own model.
 #[test]
 fn a_free_profile_is_found_and_used() {
     let bench = Bench::new();
@@ -96,7 +95,7 @@ fn a_free_profile_is_found_and_used() {
     bench.render("plane:905", "8bit", "middle");
     let pair = ["far/far.png", "far/near.png", "--optics", "optics.toml", "--model", "free"];
     let found = bench.figures(&[&["calibrate", "psf"], &pair[..], &["--out", "found.toml"]].concat());
-    // Three standard errors of what one pair of a quarter of the usual pixels leaves open.
+    // Three standard errors for one pair with a quarter of the usual pixels.
     assert!((found["k"].as_f64().unwrap() - 0.4578).abs() < 0.01, "{found}");
     assert_eq!((found["verdict"].as_str(), found["otf"].as_array().unwrap().len()), (Some("good"), 10));
     assert!(found["residual"].as_f64() >= found["noise_residual"].as_f64(), "{found}");
@@ -109,9 +108,9 @@ fn a_free_profile_is_found_and_used() {
     }
 }
 
-/// What a shift takes from both images is no blur: it is taken off first, and told where it is left.
+/// The part of a shift common to both images is not blur: alignment removes it, or a warning reports it.
 #[test]
-fn a_shifted_pair_is_aligned_or_told() {
+fn a_shifted_pair_is_aligned_or_reported() {
     let bench = Bench::new();
     bench.render("plane:933", "8bit", "far");
     let near = image_file::read_grey(&bench.0.path().join("far/near.png")).unwrap().pixels;
@@ -125,13 +124,13 @@ fn a_shifted_pair_is_aligned_or_told() {
     assert!((found["moved_px"][0].as_f64().unwrap() - 1.0).abs() < 0.05, "{found}");
     let left = bench.figures(&[&find[..], &["--align", "none"]].concat());
     assert_eq!(left["verdict"], "unexplained", "{left}");
-    let said = bench.output(&[&find[..], &["--align", "none"]].concat());
+    let output = bench.output(&[&find[..], &["--align", "none"]].concat());
     assert!(
-        String::from_utf8_lossy(&said.stderr).contains("warning: the gaussian point spread function leaves")
+        String::from_utf8_lossy(&output.stderr)
+            .contains("warning: the gaussian point spread function leaves")
     );
 }
 
-/// The thesis' criterion and order of filling, after a correction too.
 #[test]
 fn filling_as_in_the_thesis_is_selectable() {
     let bench = Bench::new();
@@ -200,7 +199,7 @@ fn other_methods_give_depth_and_say_who_they_are() {
     for method in ["ro", "subbarao", "subbarao-fourier"] {
         let found = bench.figures(&[&depth[..], &["--method", method]].concat());
         let median = found["median_mm"].as_f64().unwrap();
-        // The baselines know of the PSF only its second moment.
+        // The baselines use only the second moment of the PSF.
         assert!((median - 905.0).abs() < if method == "ro" { 0.2 } else { 4.0 }, "{method}: {median}");
         let record = fs::read_to_string(bench.0.path().join("out/depth.toml")).unwrap();
         assert!(record.contains(&format!("method = \"{method}\"")), "{record}");

@@ -2,7 +2,7 @@
 
 use crate::common::{Folder, fails, farnear, figures, succeeds};
 
-/// A program that runs freely and writes grey frames of 2x1 px, of which the first pixel is saturated.
+/// A free-running program that writes grey frames of 2x1 px with a saturated first pixel.
 #[cfg(unix)]
 const PROGRAM: &str = "command:2x1:gray:sh -c \"while sleep 0.02; do printf '\\377A'; done\"";
 
@@ -30,7 +30,7 @@ fn pictures_are_kept_with_their_record() {
         for number in 0..2 {
             let path = folder.path(format).join(format!("frame-{number:04}.{ending}"));
             let picture = image::ImageReader::open(&path).unwrap().with_guessed_format().unwrap();
-            // The tests' own reader has no TIFF; a PNG is looked into.
+            // The tests cannot read TIFF, only PNG.
             if format == "png" {
                 assert_eq!(picture.decode().unwrap().to_luma8().as_raw(), &[255, 65]);
             }
@@ -61,7 +61,7 @@ fn looking_gives_a_line_at_a_time() {
 }
 
 #[test]
-fn what_is_wrong_with_a_camera_is_said_and_nothing_is_left() {
+fn camera_errors_are_reported_and_leave_no_files() {
     let folder = Folder::new();
     let out = folder.text("out");
     for (camera, code, phrase) in [

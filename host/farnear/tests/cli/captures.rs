@@ -1,4 +1,4 @@
-//! What is done with a capture that was kept: measuring in it, and a page about it.
+//! Measurements in a stored capture, and its report.
 
 use std::{fs, path::Path};
 
@@ -9,7 +9,7 @@ use crate::common::{Folder, fails, farnear, figures, number, render, rig_optics,
 
 const RECORD: &str = include_str!("../../../workflows/src/sessions/capture.toml");
 
-/// A capture of a plane that slants by 0.05 mm from column to column.
+/// A capture of a plane with a slope of 0.05 mm per column.
 fn capture(folder: &Path, further_mm: f32) {
     fs::create_dir_all(folder).unwrap();
     fs::write(folder.join("capture.toml"), RECORD).unwrap();
@@ -31,7 +31,7 @@ fn a_slant_is_measured_from_the_command_line() {
     assert!((number(&region, "mean_mm") - 900.25).abs() < 1e-3, "{region}");
     assert_eq!(number(&region, "fill_rate"), 1.0);
     let plane = figures(&mut farnear(&["measure", "plane", &first, "--json"]));
-    // A pixel sees 7.4 um * 17 = 0.126 mm at 900 mm.
+    // A pixel covers 7.4 um * 17 = 0.126 mm at 900 mm.
     assert!((number(&plane, "slope_x") - 0.397).abs() < 2e-3, "{plane}");
     let profile =
         figures(&mut farnear(&["measure", "profile", &first, "--from", "0,9", "--to", "59,9", "--json"]));
@@ -57,7 +57,7 @@ fn maps_of_every_kind_are_measured() {
     let farther = folder.file("farther.npy", npy::write(depth.mapv(|z| z + 2.0).view()));
     let difference = figures(&mut farnear(&["measure", "difference", &bare, &farther, "--json"]));
     assert_eq!((number(&difference, "pixels"), number(&difference, "mean_mm")), (2340.0, 2.0));
-    // A result of which only the picture with codes, or the TIFF, was kept.
+    // A result with only the coded picture or the TIFF.
     render(&folder, "slant", "pair");
     let [far, near] = ["pair/far.png", "pair/near.png"].map(|name| folder.text(name));
     let mut means = Vec::new();

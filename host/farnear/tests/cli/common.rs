@@ -1,4 +1,4 @@
-//! Running the program, and what is looked at afterwards.
+//! Runs the program and checks its output.
 
 use std::{
     fs,
@@ -20,7 +20,6 @@ pub fn rig_optics() -> &'static str {
     concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/rig.toml")
 }
 
-/// A folder for one test.
 pub struct Folder(tempfile::TempDir);
 
 impl Folder {
@@ -32,12 +31,11 @@ impl Folder {
         self.0.path().join(name)
     }
 
-    /// A path as an argument.
     pub fn text(&self, name: &str) -> String {
         self.path(name).to_str().expect("temporary folders have plain names").into()
     }
 
-    /// Writes a file and gives its path as an argument.
+    /// Writes a file and returns its path as an argument.
     pub fn file(&self, name: &str, content: impl AsRef<[u8]>) -> String {
         fs::write(self.path(name), content).expect("a writable folder");
         self.text(name)
@@ -63,22 +61,22 @@ fn list(folder: &Path, before: &str, names: &mut Vec<String>) {
     }
 }
 
-/// Runs a program that must fail with this exit code, say all of `phrases` on stderr in a few lines and nothing on
-/// stdout. Gives what it said.
+/// Runs a program that fails with this exit code, `phrases` in a few lines on stderr and an empty stdout. Returns
+/// stderr.
 #[track_caller]
 pub fn fails(command: &mut Command, code: i32, phrases: &[&str]) -> String {
     let output = command.output().expect("the program starts");
-    let said = String::from_utf8(output.stderr).expect("messages are UTF-8");
-    assert_eq!(output.status.code(), Some(code), "{said}");
+    let stderr = String::from_utf8(output.stderr).expect("messages are UTF-8");
+    assert_eq!(output.status.code(), Some(code), "{stderr}");
     for phrase in phrases {
-        assert!(said.contains(phrase), "{phrase:?} is not in: {said}");
+        assert!(stderr.contains(phrase), "{phrase:?} is not in: {stderr}");
     }
-    assert!(!said.contains("panicked") && !said.contains("backtrace"), "{said}");
+    assert!(!stderr.contains("panicked") && !stderr.contains("backtrace"), "{stderr}");
     assert_eq!(String::from_utf8_lossy(&output.stdout), "", "figures of a failure");
-    said
+    stderr
 }
 
-/// Runs a program that must succeed; gives its stdout and stderr.
+/// Runs a program that succeeds; returns its stdout and stderr.
 #[track_caller]
 pub fn succeeds(command: &mut Command) -> (String, String) {
     let output = command.output().expect("the program starts");
@@ -88,7 +86,7 @@ pub fn succeeds(command: &mut Command) -> (String, String) {
     (stdout, stderr)
 }
 
-/// Runs a program whose stdout is one JSON object and nothing else.
+/// Runs a program whose stdout is exactly one JSON object.
 #[track_caller]
 pub fn figures(command: &mut Command) -> Value {
     let (stdout, _) = succeeds(command);
@@ -97,7 +95,6 @@ pub fn figures(command: &mut Command) -> Value {
     value
 }
 
-/// A number among figures.
 #[track_caller]
 pub fn number(figures: &Value, key: &str) -> f64 {
     figures[key].as_f64().unwrap_or_else(|| panic!("no number {key} in {figures}"))
@@ -111,10 +108,9 @@ pub fn render(folder: &Folder, scene: &str, name: &str) {
     succeeds(farnear(&["render", "--scene", scene, "--optics", rig_optics(), "--out", &out]).args(size));
 }
 
-/// Name of the emulated rig's program.
 pub const SIM: &str = "farnear-sim";
 
-/// A file in the folder in which the programs are built.
-pub fn beside(name: &str) -> PathBuf {
+/// A file in the folder of the built programs.
+pub fn built(name: &str) -> PathBuf {
     Path::new(env!("CARGO_BIN_EXE_farnear")).with_file_name(name)
 }

@@ -1,26 +1,26 @@
-//! `farnear doctor`: what it says of this computer, and how it ends.
+//! `farnear doctor`: report and exit code.
 
-use crate::common::{Folder, beside, farnear};
+use crate::common::{Folder, built, farnear};
 
 #[test]
-fn each_line_says_how_it_is_and_what_to_do() {
+fn each_line_has_a_state_and_a_remedy() {
     let folder = Folder::new();
     let gone = folder.text("gone");
     let output = farnear(&["doctor", &gone, "--port", "/dev/does-not-exist"])
         .current_dir(folder.path(""))
         .output()
         .expect("the program starts");
-    let (said, error) = (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
-    assert_eq!(output.status.code(), Some(1), "{said}{error}");
-    for line in said.lines() {
+    let (stdout, error) = (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
+    assert_eq!(output.status.code(), Some(1), "{stdout}{error}");
+    for line in stdout.lines() {
         let (health, rest) = line.split_once(' ').expect("a word");
         assert!(["ok", "optional", "missing"].contains(&health), "{line}");
         assert!(health == "ok" || rest.contains("; "), "nothing to do: {line}");
     }
     for phrase in ["AVX", "can be written to", "does-not-exist"] {
-        assert!(said.contains(phrase), "{phrase}: {said}");
+        assert!(stdout.contains(phrase), "{phrase}: {stdout}");
     }
-    let of_gone = said.lines().find(|line| line.contains(&gone)).expect("a line about the folder");
+    let of_gone = stdout.lines().find(|line| line.contains(&gone)).expect("a line about the folder");
     assert!(of_gone.starts_with("missing"), "{of_gone}");
     assert!(error.contains("missing"), "{error}");
     assert_eq!(folder.listing(), Vec::<String>::new(), "it has left something behind");
@@ -38,7 +38,7 @@ fn a_computer_that_has_all_is_well() {
     let rig = findings.iter().find(|finding| finding["what"] == "emulated rig").expect("the emulated rig");
     assert_eq!(
         rig["health"] == "optional",
-        !beside("farnear-sim").is_file() && !on_path("farnear-sim"),
+        !built("farnear-sim").is_file() && !on_path("farnear-sim"),
         "{rig}"
     );
 }

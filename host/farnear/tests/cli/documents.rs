@@ -1,10 +1,9 @@
-//! What the documents tell people to type is what the program takes.
+//! The program accepts every command line in the documents.
 
 use std::{fs, path::PathBuf};
 
 use crate::common::{farnear, succeeds};
 
-/// Every page for users.
 fn pages() -> Vec<PathBuf> {
     let root = PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."));
     let docs = fs::read_dir(root.join("docs")).expect("docs/ is there").flatten().map(|entry| entry.path());
@@ -14,7 +13,7 @@ fn pages() -> Vec<PathBuf> {
     pages
 }
 
-/// The arguments of a line as a shell takes it apart, up to a pipe, a redirection or a comment.
+/// Splits a line like a shell, up to a pipe, a redirection or a comment.
 fn arguments(line: &str) -> Vec<String> {
     let words = shlex::split(line).unwrap_or_else(|| panic!("a shell would not take `{line}`"));
     words.into_iter().take_while(|word| !["|", ">", "<", "&&", "&", "#"].contains(&word.as_str())).collect()
@@ -26,7 +25,7 @@ fn every_command_of_the_documents_is_understood() {
     for page in pages() {
         let text = fs::read_to_string(&page).expect("a readable page");
         for line in text.lines().filter_map(|line| line.trim().strip_prefix("$ farnear ")) {
-            // Flags and values before --help are looked at before it is.
+            // Flags and values before --help are checked before it.
             let words = arguments(line);
             let words: Vec<&str> = words.iter().map(String::as_str).chain(["--help"]).collect();
             println!("{}: farnear {line}", page.display());

@@ -12,14 +12,14 @@ fn on_the_rig(arguments: &[&str]) -> assert_cmd::Command {
 
 #[test]
 #[cfg_attr(not(emulated_rig), ignore = "needs farnear-sim: cargo xtask test")]
-fn info_says_who_is_there_and_that_it_is_emulated() {
+fn info_identifies_the_emulated_board() {
     let mut command = on_the_rig(&["info", "--json"]);
     let info = figures(&mut command);
     assert_eq!((&info["emulated"], &info["protocol"], &info["boot"]), (&true.into(), &3.into(), &1.into()));
     assert_eq!(info["board"], "nucleo-f429zi");
     assert_eq!(info["coarse"]["state"], "unknown");
-    let (_, said) = succeeds(&mut on_the_rig(&["info"]));
-    assert!(said.contains("starting the emulated rig") && said.contains("no hardware"), "{said}");
+    let (_, stderr) = succeeds(&mut on_the_rig(&["info"]));
+    assert!(stderr.contains("starting the emulated rig") && stderr.contains("no hardware"), "{stderr}");
 }
 
 #[test]
@@ -53,7 +53,7 @@ fn the_stage_homes_moves_and_stops_and_keeps_its_limits() {
     succeeds(&mut on_the_rig(&["stop"]));
 }
 
-/// What the images, the record and the maps of a capture folder hold.
+/// The content of images, record and maps of a capture folder.
 fn content(folder: &Folder, name: &str) -> Vec<(String, Vec<u8>)> {
     let names = folder.listing().into_iter().filter_map(|file| Some(file.strip_prefix(name)?.to_string()));
     let files = names.filter(|file| file.len() > 1);
@@ -116,11 +116,11 @@ fn two_captures_with_one_seed_are_the_same_to_the_byte_and_give_the_depth() {
     assert!(number(&compared, "rmse_mm") <= 0.75, "{compared}");
 }
 
-/// The system lets the program write files of 32 kB (64 kB where a shell counts in KiB) and no larger; an image has some 200 kB.
+/// The file size limit is 32 kB (64 kB where a shell counts in KiB); an image has some 200 kB.
 #[test]
 #[cfg(target_os = "linux")]
 #[cfg_attr(not(emulated_rig), ignore = "needs farnear-sim: cargo xtask test")]
-fn a_capture_on_a_full_disk_is_said_and_leaves_nothing() {
+fn a_capture_on_a_full_disk_fails_and_leaves_no_files() {
     let folder = Folder::new();
     let pair = folder.text("pair");
     let mut command = assert_cmd::Command::new("sh");
@@ -128,7 +128,7 @@ fn a_capture_on_a_full_disk_is_said_and_leaves_nothing() {
     command.args(["rig", "capture", "--port", "sim", "--optics", rig_optics(), "--out", &pair]);
     fails(&mut command, 1, &["cannot write", "far.png"]);
     assert_eq!(folder.listing(), [""; 0]);
-    // The same name is free for the capture that follows.
+    // The next capture can use the same name.
     succeeds(&mut on_the_rig(&["capture", "--optics", rig_optics(), "--out", &pair]));
 }
 
@@ -152,7 +152,7 @@ fn a_lamp_of_the_board_makes_both_images_brighter() {
     });
     for lit in &means[1..] {
         for (lit, dark) in lit.iter().zip(means[0]) {
-            // 1.3, less what saturates.
+            // 1.3, less saturation.
             assert!((1.2..1.32).contains(&(lit / dark)), "{means:?}");
         }
     }

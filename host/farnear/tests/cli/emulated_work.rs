@@ -1,4 +1,4 @@
-//! What the board does at length, on the emulated rig: focusing, programs, calibration, mathematics, the checklist.
+//! Long tasks on the emulated rig: focusing, programs, calibration, mathematics, the checklist.
 
 use std::{fs, path::Path};
 
@@ -13,7 +13,7 @@ fn on_the_rig(arguments: &[&str]) -> assert_cmd::Command {
     command
 }
 
-/// Where the sensor really stands at the end of a trace, in mm from the lens.
+/// True sensor position at the end of a trace, in mm from the lens.
 fn true_sensor_mm(trace: &str) -> f64 {
     let last = trace.lines().last().expect("lines");
     let columns: Vec<&str> = trace.lines().next().expect("a header").split(',').collect();
@@ -28,7 +28,7 @@ fn true_sensor_mm(trace: &str) -> f64 {
 #[test]
 #[cfg_attr(not(emulated_rig), ignore = "needs farnear-sim: cargo xtask test")]
 fn focusing_from_a_millimetre_off_is_quick_and_lands_where_the_image_is_sharpest() {
-    // The image of a plane at 900 mm before the 50 mm lens.
+    // The image of a plane at 900 mm from the 50 mm lens.
     let best_mm = 50.0 * 900.0 / 850.0;
     for start_mm in [best_mm - 0.99, best_mm + 0.6] {
         let folder = Folder::new();
@@ -52,7 +52,7 @@ fn focusing_from_a_millimetre_off_is_quick_and_lands_where_the_image_is_sharpest
 #[cfg_attr(not(emulated_rig), ignore = "needs farnear-sim: cargo xtask test")]
 fn a_stack_and_a_program_leave_their_images_and_what_was_measured() {
     let folder = Folder::new();
-    // Near the focus: pictures from afar take the simulator long to draw.
+    // Near the focus: the simulator takes long to draw strong blur.
     let out = folder.text("stack");
     let stack =
         ["sequence", "--axis", "coarse", "--from", "5790", "--to", "5830", "--steps", "3", "--out", &out];
@@ -66,7 +66,7 @@ fn a_stack_and_a_program_leave_their_images_and_what_was_measured() {
     let asked: Vec<_> = shots.iter().filter_map(|shot| shot["asked_um"].as_float()).collect();
     assert_eq!(asked, [5790.0, 5810.0, 5830.0]);
 
-    // Twice the same armed program, whose exposures the host triggers.
+    // The same armed program twice; the host triggers its exposures.
     let program = "trigger = \"software\"\n[[shot]]\naxis = \"coarse\"\nto_um = 5810.0\n\
                    [[shot]]\naxis = \"fine\"\nto_um = 150.0\nrepeat = 2\n\
                    [[shot]]\naxis = \"fine\"\nto_um = 20.0\n";
@@ -93,7 +93,7 @@ fn a_map_before_the_emulated_camera_is_seen_as_the_plane_that_it_is() {
         ["far.png", "near.png"].map(|name| read_grey(&Path::new(&out).join(name)).expect("an image").pixels)
     };
     let (of_map, of_plane) = (images("map", &file), images("plane", "plane:905,texture=fractal"));
-    // Sixteen bits of a plane, which is drawn by another way than a map: at most one code off.
+    // Sixteen bits of a plane, drawn by another way than a map: at most one code apart.
     for (map, plane) in of_map.iter().zip(&of_plane) {
         let off = (map - plane).fold(0.0_f32, |most, off| most.max(off.abs()));
         assert!(off <= 1.01 / 65_535.0, "{off}");
@@ -123,7 +123,7 @@ fn a_continuous_capture_leaves_pairs_and_a_row_for_each_frame() {
         let record: toml::Table = fs::read_to_string(record).expect("a record").parse().expect("TOML");
         assert_eq!(record["exposure"].as_array().map(Vec::len), Some(2));
     }
-    // Faster than the camera: refused, with what is possible.
+    // A rate above the camera's is refused with the highest possible one.
     let run = ["continuous", "--optics", rig_optics(), "--rate", "100", "--frames", "7"];
     fails(&mut on_the_rig(&run), 1, &["refused", "15500 us"]);
 }
@@ -191,7 +191,7 @@ fn the_checklist_passes_and_the_mechanics_are_measured() {
 #[cfg_attr(not(emulated_rig), ignore = "needs farnear-sim: cargo xtask test")]
 fn the_firmwares_log_is_decoded_with_its_elf() {
     let elf = std::env::var_os("FARNEAR_FIRMWARE")
-        .map_or_else(|| crate::common::beside("farnear-nucleo-f429zi.elf"), Into::into);
+        .map_or_else(|| crate::common::built("farnear-nucleo-f429zi.elf"), Into::into);
     let elf = elf.to_str().expect("a plain path");
     let (text, _) = succeeds(&mut on_the_rig(&["log", "--elf", elf, "--reset", "--seconds", "4"]));
     assert!(text.contains("boot 2, emulated: true"), "{text}");
@@ -210,21 +210,25 @@ fn campaigns_are_jobs_of_a_batch() {
         let output = farnear(&["batch", &manifest]).output().expect("the program starts");
         assert_eq!(output.status.code(), Some(1), "the third has no number of seeds");
         let text = String::from_utf8(output.stdout).expect("UTF-8");
-        let mut said: Vec<(u64, String)> = text
+        let mut states: Vec<(u64, String)> = text
             .lines()
             .map(|line| {
                 let line: serde_json::Value = serde_json::from_str(line).expect(line);
                 (line["job"].as_u64().expect("a number"), line["state"].as_str().expect("a state").into())
             })
             .collect();
-        said.sort();
-        said.into_iter().map(|(_, state)| state).collect::<Vec<_>>()
+        states.sort();
+        states.into_iter().map(|(_, state)| state).collect::<Vec<_>>()
     };
     assert_eq!(run(), ["done", "done", "failed"]);
     for place in ["one", "two"] {
-        let told = std::fs::read(folder.path(&format!("{place}/campaign.json"))).expect("figures");
-        let told: serde_json::Value = serde_json::from_slice(&told).expect("JSON");
-        assert_eq!((&told["scenarios"], &told["broken"]), (&1.into(), &serde_json::json!([])), "{told}");
+        let summary = std::fs::read(folder.path(&format!("{place}/campaign.json"))).expect("figures");
+        let summary: serde_json::Value = serde_json::from_slice(&summary).expect("JSON");
+        assert_eq!(
+            (&summary["scenarios"], &summary["broken"]),
+            (&1.into(), &serde_json::json!([])),
+            "{summary}"
+        );
     }
     assert_eq!(run(), ["already", "already", "failed"]);
 }

@@ -8,15 +8,15 @@ use ndarray::{Array2, s};
 use crate::common::{Folder, fails, farnear, figures, number, rig_optics, succeeds};
 
 const IMAGES: usize = 9;
-/// Where the left and the right half are sharpest, counted from 0.
+/// Sharpest images of the left and the right half, counted from 0.
 const SHARPEST: [f32; 2] = [3.0, 5.5];
 
-/// A stack whose texture fades with the distance from where its half is sharpest, as blur makes it; named 1.png to 9.png.
+/// A stack whose texture fades with the distance from its half's sharpest image, like blur; named 1.png to 9.png.
 fn stack(folder: &Folder) -> String {
     stack_at(folder, &[0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0], SHARPEST)
 }
 
-/// The same with a place for each image, of which both halves have one where they are sharpest; in mean steps.
+/// The same with a position for each image, in mean steps; `sharpest` are positions.
 fn stack_at(folder: &Folder, places: &[f32; IMAGES], sharpest: [f32; 2]) -> String {
     let path = folder.text("stack");
     fs::create_dir(&path).expect("a folder");
@@ -59,7 +59,7 @@ fn each_half_lies_where_it_is_sharpest() {
     assert!(contrast(s![8..52, 8..32]) > 0.2 && contrast(s![8..52, 48..72]) > 0.2);
 }
 
-/// What a barrel-shaped lens showed nothing of has no depth; everything else keeps its place.
+/// Areas outside the view of a barrel-shaped lens have no depth; everything else keeps its position.
 #[test]
 fn a_lens_that_bends_lines_is_straightened() {
     let folder = Folder::new();
@@ -115,9 +115,9 @@ fn stage_positions_are_any_numbers_in_um() {
     let region = figures(&mut farnear(&["measure", "region", &out, "--region", "8,8,24,40", "--json"]));
     assert!((number(&region, "mean_um") + 1.0).abs() < 0.5 && region["unit"] == "um", "{region}");
     assert!(region["plane"]["tilt_deg"].is_null() && region["mean_mm"].is_null(), "{region}");
-    let (said, _) = succeeds(&mut farnear(&["measure", "profile", &out, "--from", "8,9", "--to", "70,9"]));
-    assert!(said.contains("depth_um = ") && !said.contains("_mm"), "{said}");
-    // A truth of the same unit, and one in millimetres.
+    let (stdout, _) = succeeds(&mut farnear(&["measure", "profile", &out, "--from", "8,9", "--to", "70,9"]));
+    assert!(stdout.contains("depth_um = ") && !stdout.contains("_mm"), "{stdout}");
+    // A reference of the same unit, and one in millimetres.
     let same = figures(&mut farnear(&["compare", &out, &format!("{out}/depth.npy"), "--json"]));
     assert_eq!((number(&same, "rmse_um"), number(&same, "missing_fraction")), (0.0, 0.0));
     let page = folder.text("page.html");
@@ -201,6 +201,36 @@ fn a_folder_of_tiff_is_a_stack_and_mixed_formats_are_refused() {
     );
 }
 
+/// A wall far beyond the focus shows rounding only, which has no depth.
+#[test]
+fn a_background_that_is_never_sharp_has_no_depth() {
+    let folder = Folder::new();
+    let (path, out) = (folder.text("stack"), folder.text("out"));
+    fs::create_dir(&path).expect("a folder");
+    for number in 0..IMAGES {
+        let pixels = Array2::from_shape_fn((60, 160), |(y, x)| {
+            let texture =
+                |seed: usize| ((x * 7919 + y * 104_729 + x * y * 31 + seed) % 97) as f32 / 97.0 - 0.5;
+            let away = number as f32 - 4.0;
+            match x < 60 {
+                true => (128.0 + 200.0 * texture(0) * (-0.06 * away * away).exp()) as u16,
+                // A slope of brightness, sensor noise below one code.
+                false => (90.3 + 0.02 * x as f32 + 0.6 * texture(13 * number)) as u16,
+            }
+        });
+        let png = image_file::encode_png(pixels.view(), 8).expect("a picture");
+        fs::write(format!("{path}/{}.png", number + 1), png).expect("a file");
+    }
+    succeeds(&mut farnear(&["focus-stack", &path, "--out", &out]));
+    let depth = read(&out);
+    let known = |columns: std::ops::Range<usize>| {
+        let part = depth.slice(s![.., columns]);
+        part.iter().filter(|depth| depth.is_finite()).count() as f64 / part.len() as f64
+    };
+    assert!(known(4..50) > 0.99, "{}", known(4..50));
+    assert!(known(90..156) < 0.01, "{}", known(90..156));
+}
+
 #[test]
 fn a_moving_camera_is_followed() {
     let folder = Folder::new();
@@ -220,7 +250,7 @@ fn a_moving_camera_is_followed() {
 }
 
 #[test]
-fn what_is_no_stack_is_refused_and_nothing_is_written() {
+fn invalid_stacks_are_rejected_without_output() {
     let folder = Folder::new();
     let (stack, out) = (stack(&folder), folder.text("out"));
     let refuse = |arguments: &[&str], code, phrase: &str| {

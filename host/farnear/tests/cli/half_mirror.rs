@@ -20,7 +20,7 @@ fn capture(arguments: &[&str]) -> assert_cmd::Command {
 #[cfg_attr(not(emulated_rig), ignore = "needs farnear-sim: cargo xtask test")]
 fn one_trigger_gives_a_pair_and_its_depth() {
     let folder = Folder::new();
-    // The second camera's picture is turned round and lies aside by what alignment takes up.
+    // The second camera is rotated and shifted within the range of the alignment.
     let faults = folder.file(
         "mirror.toml",
         "[parts.half_mirror]\nsecond_mirrored = true\nsecond_shift_px = [1.5, -0.75]\nsecond_rotation_deg = 0.05\n",
@@ -53,7 +53,7 @@ fn one_trigger_gives_a_pair_and_its_depth() {
     assert!(number(&compared, "rmse_mm") <= 1.06, "{compared}");
 }
 
-/// A camera whose only picture is of this trigger.
+/// A camera with a single picture, of this trigger.
 fn camera_of(shot_id: u32) -> (String, JoinHandle<()>) {
     let listener = TcpListener::bind("127.0.0.1:0").expect("loopback");
     let address = listener.local_addr().expect("an address").to_string();
@@ -64,7 +64,7 @@ fn camera_of(shot_id: u32) -> (String, JoinHandle<()>) {
         frame.extend(header.to_bytes());
         frame.extend(vec![0; 2 * 640 * 480]);
         client.write_all(&frame).expect("open");
-        // Until the client has gone.
+        // Until the client disconnects.
         let _ = std::io::copy(&mut client, &mut std::io::sink());
     });
     (address, served)
@@ -72,9 +72,9 @@ fn camera_of(shot_id: u32) -> (String, JoinHandle<()>) {
 
 #[test]
 #[cfg_attr(not(emulated_rig), ignore = "needs farnear-sim: cargo xtask test")]
-fn a_picture_of_another_trigger_is_told_with_both_numbers() {
+fn an_image_of_another_trigger_is_rejected_with_both_numbers() {
     let folder = Folder::new();
-    // The board's first exposure is 0: a later one, and one that is older by as much as counts go around.
+    // The board's first exposure is 0: a later one, and one from before the counter wrapped.
     for (came, phrases) in [
         (5, ["camera 2 of 2", "skipped exposure 0", "the image of exposure 5"]),
         (u32::MAX - 2, ["camera 2 of 2", "no image of exposure 0", "that of exposure 4294967293"]),
@@ -89,7 +89,7 @@ fn a_picture_of_another_trigger_is_told_with_both_numbers() {
 }
 
 #[test]
-fn a_rig_without_a_second_camera_is_told_what_to_do() {
+fn a_missing_second_camera_is_reported_with_a_remedy() {
     let folder = Folder::new();
     let out = folder.text("out");
     let port = ["--port", "/dev/none", "--out", &out];

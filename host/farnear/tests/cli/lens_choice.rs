@@ -1,4 +1,4 @@
-//! Optics proposed for what is to be measured, and whether renders with them keep what was promised.
+//! Proposed optics, and whether renders with them keep the promised accuracy.
 
 use crate::common::{Folder, fails, farnear, figures, number, succeeds};
 
@@ -26,14 +26,14 @@ fn a_proposal_measures_within_the_error_it_promises() {
 }
 
 #[test]
-fn too_much_blur_is_said_with_what_to_change() {
+fn too_much_blur_is_reported_with_a_remedy() {
     let folder = Folder::new();
     let ordinary = "[lens]\nfocal_length_mm = 50.0\nf_number = 2.0\n[sensor]\npixel_um = 3.9\n[focus]\nfar_mm = 5000.0\nnear_mm = 1000.0\n";
     let file = folder.file("camera.toml", ordinary);
-    let (said, _) = succeeds(&mut farnear(&["optics", "--optics", &file]));
+    let (stdout, _) = succeeds(&mut farnear(&["optics", "--optics", &file]));
     assert!(
-        said.contains("max_blur_px = 136.") && said.contains("usable is 2 to 4 px: bin 50 x 50"),
-        "{said}"
+        stdout.contains("max_blur_px = 136.") && stdout.contains("usable is 2 to 4 px: bin 50 x 50"),
+        "{stdout}"
     );
     fails(
         &mut farnear(&["optics", "--distance-mm", "300", "--range-mm", "400"]),

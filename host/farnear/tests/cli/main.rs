@@ -1,4 +1,4 @@
-//! The program as its users meet it: what it prints, what it writes, how it ends. One binary, because each costs a link.
+//! The program as users see it: output, files, exit codes. One binary, because each costs a link.
 
 #![allow(clippy::unwrap_used)] // helpers of tests: what cannot be prepared must stop the test
 

@@ -110,7 +110,7 @@ fn the_kinds_of_images_give_the_same_depth() {
             figures(&mut farnear(&["depth", &far, &near, "--optics", rig_optics(), "--out", &out, "--json"]));
         medians.push(number(&found, "median_mm"));
     }
-    // Averaging three equal channels rounds differently, no more.
+    // The mean of three equal channels rounds differently.
     assert!(medians.iter().all(|median| (median - medians[0]).abs() < 1e-3), "{medians:?}");
 }
 
@@ -132,7 +132,7 @@ fn write_as(grey: &image::GrayImage, path: &Path, ending: &str) {
 
 #[cfg(target_os = "linux")]
 #[test]
-fn names_that_are_no_text_are_fine() {
+fn file_names_that_are_not_utf8_are_accepted() {
     use std::os::unix::ffi::OsStrExt;
     let folder = Folder::new();
     let name = folder.path("").join(std::ffi::OsStr::from_bytes(b"pa\xffir"));
@@ -163,7 +163,7 @@ fn median_and_sd(region: ndarray::ArrayView2<f32>) -> [f64; 2] {
     [values[values.len() / 2], variance.sqrt()]
 }
 
-/// The pair that Watanabe and Nayar took, where it is at hand.
+/// The pair of Watanabe and Nayar, where it is present.
 #[test]
 #[cfg_attr(not(shared_data), ignore = "needs the real data next to the repository")]
 fn a_real_pair_gives_the_reference_depths() {
@@ -175,7 +175,7 @@ fn a_real_pair_gives_the_reference_depths() {
             .args([data.join("breakfast_far.png"), data.join("breakfast_near.png")]),
     );
     let map = read(&folder.path("out/depth.npy"));
-    // Medians of an independent implementation with the same point spread function, design and windows.
+    // Medians of an independent implementation with the same PSF, design and windows.
     for (name, rows, columns, reference_mm) in [
         ("wall", 20..130, 30..600, 741.0),
         ("toast", 230..400, 70..200, 635.0),

@@ -1,4 +1,4 @@
-//! `farnear silhouettes markers` on a made CSV suit, on a made BVH skeleton and, where they are at hand, on real recordings.
+//! `farnear silhouettes markers` on synthetic CSV and BVH files and, where present, on real recordings.
 
 use std::fs;
 
@@ -10,7 +10,8 @@ use crate::common::{Folder, fails, farnear, figures, number, succeeds};
 const TEMPLATE: &str = "name = 'boxes'\n[[part]]\nname = 'body'\nmarkers = ['B1', 'B2', 'B3', 'B4', 'B5', 'B6', 'B7', 'B8']\n\
                         [[part]]\nname = 'head'\nmarkers = ['H1', 'H2', 'H3']\n";
 
-/// Three frames in which the figure, away from the origin (zeros are missing markers), steps 0.5 m along x; in the last the head is hidden.
+/// The figure, away from the origin (zeros are missing markers), moves 0.5 m along x in each of three frames. The head
+/// is hidden in the last.
 fn recording() -> String {
     let mut points: Vec<(String, [f64; 3])> = (0..8)
         .map(|i| {
@@ -58,7 +59,7 @@ fn every_view_gets_its_masks_and_hidden_parts_are_flagged() {
             .expect("a mask")
             .into_luma8()
     };
-    // The front is 40 x 130 pixels and moves 50 a frame; the side is 20 wide and stands still. A pixel either way is rounding.
+    // The front is 40 x 130 pixels and moves 50 px per frame; the side is 20 wide and does not move. Rounding: 1 px.
     let [top, left, bottom, right] = bounds(&mask(1, 1));
     assert!(
         (bottom - top).abs_diff(131) <= 1 && (right - left).abs_diff(41) <= 1,
@@ -82,7 +83,7 @@ fn every_view_gets_its_masks_and_hidden_parts_are_flagged() {
     succeeds(farnear(&arguments).args(["--out", &small, "--centred", "--fill", "triplets"]));
     let picture = image::open(folder.path("small/view1/frame_000002.png")).expect("a mask").into_luma8();
     let [top, _, bottom, _] = bounds(&picture);
-    // Filled to the height, but for the head's pointed tip, whose last pixels fall between two samples.
+    // Full height, except for the head's tip, whose last pixels fall between two samples.
     assert!(picture.dimensions() == (100, 100) && bottom - top >= 97, "{top} {bottom}");
 }
 
@@ -132,8 +133,8 @@ fn a_person_who_lies_because_another_axis_points_up_is_warned_of() {
     assert!(lying.contains("longer than high in 3 of 3 frames") && lying.contains("--up"), "{lying}");
 }
 
-/// A body as the CMU library's BVH files have it: joints by their names there, y up, in its units of 56.444 mm, 30.5 of them from
-/// toe to crown. In three frames it walks 10 units along z, and turns about the vertical in the last.
+/// A body like in the CMU library's BVH files: their joint names, y up, units of 56.444 mm, 30.5 units from toe to
+/// crown. In three frames it walks 10 units along z, and turns about the vertical in the last.
 fn skeleton() -> String {
     let chain = |joints: &[(&str, [f64; 3])], end: [f64; 3]| {
         let open: String = joints
@@ -179,17 +180,18 @@ fn skeleton() -> String {
 }
 
 #[test]
-fn a_skeleton_of_joints_is_drawn_and_what_was_guessed_is_said() {
+fn a_skeleton_is_drawn_and_guesses_are_reported() {
     let folder = Folder::new();
     let (file, out) = (folder.file("walk.bvh", skeleton()), folder.text("masks"));
     let arguments = ["silhouettes", "markers", &file, "--template", "bvh", "--views", "4"];
-    let (figures, said) = succeeds(farnear(&arguments).args(["--mm-per-px", "10", "--out", &out, "--json"]));
+    let (figures, stderr) =
+        succeeds(farnear(&arguments).args(["--mm-per-px", "10", "--out", &out, "--json"]));
     let figures: serde_json::Value = serde_json::from_str(&figures).expect("JSON");
     assert_eq!((number(&figures, "silhouettes"), number(&figures, "flagged_frames")), (12.0, 0.0));
     for phrase in
         ["warning: ", "walk.bvh: lengths are taken as units of 56.444 mm", "y is taken as up", "--units"]
     {
-        assert!(said.contains(phrase), "{phrase:?} is not in: {said}");
+        assert!(stderr.contains(phrase), "{phrase:?} is not in: {stderr}");
     }
     assert_eq!(figures["warnings"].as_array().map(Vec::len), Some(2), "{figures}");
     let size = |name: &str| {
@@ -197,9 +199,9 @@ fn a_skeleton_of_joints_is_drawn_and_what_was_guessed_is_said() {
         let [top, left, bottom, right] = bounds(&mask);
         (f64::from(bottom - top), f64::from(right - left))
     };
-    // The skeleton is 30.5 units from toe to crown, each 56.444 mm, and dressed by some centimetres above and below; its arms
-    // are 26 units from tip to tip. Seen from the front it is as wide as its arms, from the side it is not, and after a
-    // quarter turn the other way round.
+    // The skeleton is 30.5 units from toe to crown, each 56.444 mm, plus some centimetres of body at both ends; its
+    // arms are 26 units from tip to tip. The front view is as wide as the arms, the side view is not; a quarter turn
+    // swaps them.
     let (height, width) = size("masks/view1/frame_000001.png");
     assert!((172.0..195.0).contains(&height) && (147.0..165.0).contains(&width), "{height} {width}");
     let (_, turned) = size("masks/view1/frame_000003.png");
@@ -207,11 +209,11 @@ fn a_skeleton_of_joints_is_drawn_and_what_was_guessed_is_said() {
     let (_, side) = size("masks/view2/frame_000001.png");
     assert!(side < 0.5 * width, "{side} {width}");
 
-    // Who knows better is asked nothing and told nothing.
+    // A given scale produces no question and no message.
     let metric = folder.text("metric");
     let named = ["--units", "cm", "--up", "y", "--mm-per-px", "10", "--out", &metric, "--json"];
-    let (figures, said) = succeeds(farnear(&arguments).args(named));
-    assert!(!said.contains("taken as") && !figures.contains("warnings"), "{said} {figures}");
+    let (figures, stderr) = succeeds(farnear(&arguments).args(named));
+    assert!(!stderr.contains("taken as") && !figures.contains("warnings"), "{stderr} {figures}");
     let (small, _) = size("metric/view1/frame_000001.png");
     assert!(small < 0.3 * height, "{small} {height}: centimetres are smaller");
 }
@@ -259,7 +261,7 @@ fn real_recordings_fit_built_in_templates() {
             ["silhouettes", "markers", &file, "--template", template, "--views", "2", "--every", "40"];
         let found = figures(farnear(&arguments).args(["--out", &out, "--json"]));
         assert_eq!(number(&found, "silhouettes"), 2.0 * number(&found, "frames"), "{name}");
-        // Whole parts are hidden in few frames, if in any.
+        // Whole parts are hidden in few frames at most.
         assert!(number(&found, "flagged_frames") <= 0.2 * number(&found, "frames"), "{name}: {found}");
     }
     let file = data.join("walking1.trc").display().to_string();
@@ -272,11 +274,11 @@ fn real_recordings_fit_built_in_templates() {
 }
 
 #[test]
-fn masks_are_cut_into_passages_where_numbers_leap_and_nobody_is_seen() {
+fn masks_are_split_at_number_gaps_and_frames_without_a_person() {
     let folder = Folder::new();
     let masks = folder.text("masks");
     fs::create_dir(&masks).expect("a folder");
-    // 8 to 12, nobody at 13, 14 to 17, then 40 to 41.
+    // Frames with a person: 8 to 12, 14 to 17, 40 to 41.
     for frame in (8..18_u32).chain(40..42) {
         let seen = frame != 13;
         GrayImage::from_fn(60, 40, |x, y| {
@@ -302,7 +304,7 @@ fn masks_are_cut_into_passages_where_numbers_leap_and_nobody_is_seen() {
     assert!(!folder.path("none").exists());
 }
 
-/// A frame of OpenPose with a person upright at every x, 1 px to a centimetre.
+/// A frame of OpenPose with an upright person at every x, 1 px per centimetre.
 fn openpose(people: &[f64]) -> String {
     let upright = [
         (0.0, 30.0),

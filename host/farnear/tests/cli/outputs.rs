@@ -1,9 +1,8 @@
-//! Every command's output on a cheap example is what it has always been: figures, messages, files.
+//! Every command's figures, messages and files on a cheap example equal their recordings in `outputs/golden/NAME.toml`.
 //!
-//! A story is a list of commands that run one after another in an empty folder. What each prints and writes is held
-//! against `outputs/golden/NAME.toml`: byte for byte on the kind of processor that it was recorded on, in form and to a
-//! tolerance elsewhere, because depth is the same to the bit on one kind of processor only. How the recordings were made and
-//! are made again: `outputs/golden/README.md`.
+//! A story is a list of commands that run one after another in an empty folder. Outputs are compared byte for byte on
+//! the kind of processor of the recording, elsewhere by form and tolerance, because rounding differs.
+//! `outputs/golden/README.md` describes the recordings.
 
 mod digest;
 mod held;

@@ -1,4 +1,4 @@
-//! Pairs from a camera that is not perfect, as a user meets them.
+//! Pairs from imperfect cameras.
 
 use std::fs;
 
@@ -17,12 +17,12 @@ fn write(folder: &Folder, name: &str, pixels: &Array2<f32>) -> String {
 }
 
 #[test]
-fn brightness_and_place_are_mended_and_said() {
+fn brightness_and_position_are_corrected_and_reported() {
     let folder = Folder::new();
     render(&folder, "plane:905", "pair");
     let far = folder.text("pair/far.png");
     let near = read_grey(&folder.path("pair/near.png")).expect("the near image").pixels;
-    // 8 px to the right and a fifth darker; what is not seen is as bright as the middle.
+    // 8 px to the right and 20 % darker; uncovered pixels have the mean brightness.
     let moved = Array2::from_shape_fn(near.dim(), |(y, x)| 0.8 * if x < 8 { 0.45 } else { near[(y, x - 8)] });
     let moved = write(&folder, "moved.png", &moved);
     let depth = |align: &str, out: &str| {
@@ -42,26 +42,26 @@ fn brightness_and_place_are_mended_and_said() {
     for (reason, depth) in reasons.iter().zip(&map) {
         assert_eq!(*reason == 0.0, depth.is_finite());
     }
-    // Not aligned they do not show the same anywhere.
+    // Without alignment the images match nowhere.
     let out = folder.text("none");
     let command = ["depth", &far, &moved, "--optics", rig_optics(), "--align", "none", "--out", &out];
     fails(&mut farnear(&command), 1, &["do not show the same scene", "correlation"]);
 }
 
 #[test]
-fn a_missing_psf_and_other_units_are_said() {
+fn a_missing_psf_and_other_units_are_reported() {
     let folder = Folder::new();
     render(&folder, "plane:905", "one");
     let [far, near] = ["one/far.png", "one/near.png"].map(|name| folder.text(name));
     let text = fs::read_to_string(rig_optics()).expect("the optics");
     let bare = folder.file("bare.toml", text.split("[psf]").next().expect("a beginning"));
-    let (_, said) =
+    let (_, stderr) =
         succeeds(&mut farnear(&["depth", &far, &near, "--optics", &bare, "--out", &folder.text("a")]));
-    assert!(said.contains("no [psf]") && said.contains("pill-box"), "{said}");
+    assert!(stderr.contains("no [psf]") && stderr.contains("pill-box"), "{stderr}");
     let metres = folder.file("metres.toml", text.replace("pixel_um = 7.4", "pixel_um = 0.0074"));
-    let (_, said) =
+    let (_, stderr) =
         succeeds(&mut farnear(&["depth", &far, &near, "--optics", &metres, "--out", &folder.text("b")]));
-    assert!(said.contains("pixel_um is 0.0074") && said.contains("another unit"), "{said}");
+    assert!(stderr.contains("pixel_um is 0.0074") && stderr.contains("another unit"), "{stderr}");
 }
 
 #[test]
@@ -78,7 +78,7 @@ fn windows_and_confidence_are_asked_for() {
     };
     let (ro, _) = errors("ro", &[]);
     let (white, depth) = errors("white", &["--method", "whitened"]);
-    // Adaptive windows take the noise of a plane down 2.6 to 3 times.
+    // Adaptive windows reduce the noise of a plane by a factor of 2.6 to 3.
     assert!(white < 0.45 * ro && (depth - 905.0).abs() < 0.1, "{white} {ro} {depth}");
     let (wide, _) = errors("wide", &["--window", "safe"]);
     assert!(wide < ro, "{wide} {ro}");
@@ -97,7 +97,7 @@ fn windows_and_confidence_are_asked_for() {
 #[test]
 fn a_camera_is_calibrated_and_used() {
     let folder = Folder::new();
-    // Far from the middle of the range, where an uneven response counts: in the middle it cancels between the images.
+    // Far from the middle of the range, where the error of the response does not cancel between the images.
     render(&folder, "plane:928", "pair");
     let response = |y: usize, x: usize| {
         let hash = ((y * 7919 + x * 104_729) as u32 ^ 0x9e37).wrapping_mul(2_654_435_761);
@@ -154,8 +154,8 @@ fn an_aperture_is_given_as_a_picture() {
     let bar = Array2::from_shape_fn((64, 64), |(y, _)| f32::from(y.abs_diff(32) < 5));
     let bar = write(&folder, "bar.png", &bar);
     let command = ["depth", &far, &near, "--optics", rig_optics(), "--psf", &bar, "--out", &folder.text("d")];
-    let (_, said) = succeeds(&mut farnear(&command));
-    assert!(said.contains("are not round"), "{said}");
+    let (_, stderr) = succeeds(&mut farnear(&command));
+    assert!(stderr.contains("are not round"), "{stderr}");
     let command =
         ["depth", &far, &near, "--optics", rig_optics(), "--psf", "airy", "--out", &folder.text("e")];
     fails(&mut farnear(&command), 2, &["unknown PSF \"airy\"", "FILE.png"]);
@@ -196,7 +196,7 @@ fn a_region_is_what_the_whole_map_has_there() {
         let command =
             ["depth", &far, &near, "--optics", rig_optics(), "--region", region, "--out", &folder.text("x")];
         let output = farnear(&command).output().expect("a program");
-        let said = String::from_utf8_lossy(&output.stderr).into_owned();
-        assert!(!output.status.success() && said.contains(phrase), "{said}");
+        let stderr = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(!output.status.success() && stderr.contains(phrase), "{stderr}");
     }
 }

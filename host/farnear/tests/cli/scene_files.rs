@@ -1,4 +1,4 @@
-//! Scenes from files: a height map and a picture of one's own.
+//! Scenes from files: a user's height map and texture.
 
 use farnear_files::npy;
 use ndarray::Array2;
@@ -7,7 +7,7 @@ use crate::common::{Folder, fails, farnear, figures, number, rig_optics, succeed
 
 const SIZE: [&str; 4] = ["--width", "200", "--height", "150"];
 
-/// A bump of 30 mm before a wall at 925 mm.
+/// A bump of 30 mm on a wall at 925 mm.
 fn bump(folder: &Folder) -> String {
     let depth = Array2::from_shape_fn((60, 80), |(y, x)| {
         let [y, x] = [y as f32 - 30.0, x as f32 - 40.0].map(|d| d / 26.0);
@@ -16,7 +16,7 @@ fn bump(folder: &Folder) -> String {
     folder.file("bump.npy", npy::write(depth.view()))
 }
 
-/// A picture that is textured everywhere: two pixels of it for one of the camera's.
+/// A picture with texture everywhere: two of its pixels per camera pixel.
 fn picture(folder: &Folder) -> String {
     let mut state = 1_u32;
     let pixels = (0..400 * 300).map(|_| {
@@ -51,7 +51,7 @@ fn a_height_map_and_a_picture_are_rendered_and_found_again() {
 }
 
 #[test]
-fn a_named_scene_may_stand_in_a_file() {
+fn a_scene_file_accepts_a_named_scene() {
     let folder = Folder::new();
     let scene = folder.file("scene.toml", "scene = \"plane:905\"\ntexture = \"fractal\"\ncontrast = 0.3\n");
     let [a, b] = ["a", "b"].map(|name| folder.text(name));

@@ -1,4 +1,4 @@
-//! Boards in trouble, played by a scripted board behind a real pseudo-terminal: no simulator is needed.
+//! Faulty boards, played by a scripted board behind a real pseudo-terminal: no simulator is needed.
 #![cfg(target_os = "linux")]
 
 use farnear_protocol::message::SettingKey;
@@ -6,7 +6,6 @@ use farnear_scripted_board::{Faults, plug_in};
 
 use crate::common::{Folder, fails, farnear, figures, number, rig_optics, succeeds};
 
-/// A capture with this port that must fail so and leave nothing behind.
 #[track_caller]
 fn capture_fails(port: &str, phrases: &[&str]) {
     let folder = Folder::new();
@@ -44,7 +43,7 @@ fn a_board_behind_a_port_is_driven_by_one_program_after_the_other() {
 }
 
 #[test]
-fn an_alarm_is_told_listed_and_cleared_by_its_number() {
+fn an_alarm_is_reported_listed_and_cleared_by_number() {
     let (port, peer) = plug_in(Faults::default());
     let rig = |arguments: &[&str]| {
         let mut command = farnear(&["rig"]);
@@ -87,16 +86,16 @@ fn settings_and_counters_are_read_and_changed() {
 }
 
 #[test]
-fn a_checklist_without_hands_stops_at_what_fails() {
+fn an_unattended_checklist_stops_at_a_failure() {
     let (port, peer) = plug_in(Faults::default());
     peer.board().hello.firmware = env!("CARGO_PKG_VERSION").try_into().expect("a short version");
-    // Waited for like one: on a crowded machine this program answers later than any real board.
+    // Longer time-outs: on a busy machine this program answers later than a real board.
     peer.board().hello.emulated = true;
     let images = Folder::new();
     let camera = format!("folder:{}", images.text(""));
     let check =
         ["rig", "check", "--port", &port, "--no-actuation", "--resting-only", "--json", "--camera", &camera];
-    // The scripted board has no memory worth the name: its counter of boots stands still.
+    // The scripted board stores nothing, so its boot counter does not change.
     let output = farnear(&check).output().expect("it starts");
     let found: serde_json::Value = serde_json::from_slice(&output.stdout).expect("figures");
     assert_eq!(
@@ -132,7 +131,7 @@ fn a_camera_without_images_is_waited_for_no_longer_than_asked_and_the_rig_stops(
 }
 
 #[test]
-fn another_message_table_under_the_same_version_is_told_with_both_keys() {
+fn another_schema_key_is_reported_with_both_keys() {
     let (port, peer) = plug_in(Faults::default());
     peer.board().hello.schema_key = 0xabc;
     capture_fails(&port, &["message tables differ", "0000000000000abc", "flash the firmware"]);

@@ -1,4 +1,4 @@
-//! `farnear shadow remove` on seeded scenes whose shadow is known, and what it refuses or flags.
+//! `farnear shadow remove` on seeded scenes with known shadow; rejected and flagged input.
 
 use farnear_shadow::synthetic::scene::{Kind, Scene, scene};
 use farnear_silhouettes::mask::Mask;
@@ -16,8 +16,8 @@ fn save_mask(folder: &Folder, name: &str, mask: &Mask) {
     save(folder, name, |y, x| if mask[[y, x]] { 255 } else { 0 });
 }
 
-/// A place, a time and a camera azimuth that put the sun where the scene has it: Warwick at midsummer offers every elevation of
-/// the scenes below its noon, and the camera is turned to make up for the azimuth.
+/// A place, a time and a camera azimuth with the sun of the scene. Warwick at midsummer reaches every elevation of the
+/// scenes; the camera's azimuth compensates the sun's.
 fn camera_and_time(scene: &Scene) -> (String, String) {
     use farnear_shadow::sun::{Model, Place, parse_time, position};
     let place = Place { latitude_deg: 10.0, longitude_deg: 0.0 };
@@ -35,7 +35,7 @@ fn camera_and_time(scene: &Scene) -> (String, String) {
     let (time, sun) = best.expect("a minute");
     assert!((sun.elevation_deg - scene.sun.elevation_deg).abs() < 0.2);
     let camera = &scene.camera.camera;
-    // The shadow's direction in the picture depends on azimuth of sun plus camera only.
+    // The shadow's direction in the picture depends on the sum of sun and camera azimuth only.
     let azimuth_deg = (camera.azimuth_deg + scene.sun.azimuth_deg - sun.azimuth_deg).rem_euclid(360.0);
     let text = format!(
         "[camera]\nheight_m = {}\nazimuth_deg = {azimuth_deg}\npitch_deg = {}\nfocal_length_mm = {}\npixel_um = {}\n",
@@ -71,7 +71,7 @@ fn shadows_of_seeded_scenes_go_and_people_stay() {
         wrongly.push(number(&score, "wrongly_removed_percent"));
     }
     let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
-    // The library's test holds a hundred scenes to 78 and 2 per cent; six scatter more.
+    // The library's test requires 78 and 2 per cent over a hundred scenes; six scatter more.
     assert!(mean(&removed) > 70.0 && mean(&wrongly) < 4.0, "{removed:?} {wrongly:?}");
 }
 
@@ -86,12 +86,12 @@ fn a_direction_measured_in_the_picture_does_what_the_sun_does() {
     let remove = ["shadow", "remove", &masks, "--camera", &camera, "--json", "--out"];
     let place = ["--lat", "10", "--lon", "0", "--time", &time];
     let sun = figures(farnear(&remove).arg(&by_sun).args(place));
-    let told = std::fs::read_to_string(folder.path("sun/shadow.toml")).expect("an index");
-    let told: toml::Table = told.parse().expect("TOML");
-    let direction = told["frame"][0]["shadow_direction_deg"].to_string();
+    let index = std::fs::read_to_string(folder.path("sun/shadow.toml")).expect("an index");
+    let index: toml::Table = index.parse().expect("TOML");
+    let direction = index["frame"][0]["shadow_direction_deg"].to_string();
     let hand = figures(farnear(&remove).arg(&by_hand).args(["--shadow-direction", &direction]));
     let [sun_percent, hand_percent] = [&sun, &hand].map(|found| number(found, "removed_percent"));
-    // Where the sun is known the silhouette is explained by its shadow, with a direction alone it is cut by angles: 16.3 and 14.7 % of it here.
+    // A known sun gives a fit of the whole shadow, a direction alone a cut by angles: here 16.3 and 14.7 %.
     assert!((sun_percent - hand_percent).abs() < 2.0, "{sun} {hand}");
     assert!(sun.get("sun_in_view").is_some() && hand.get("sun_in_view").is_none(), "{hand}");
 }
@@ -99,7 +99,7 @@ fn a_direction_measured_in_the_picture_does_what_the_sun_does() {
 #[test]
 fn a_lamp_throws_shadows_where_it_hangs_high_enough() {
     let folder = Folder::new();
-    // A person whose shadow lies to the right, as a lamp to the left throws it; 6 m away by the file.
+    // A person 6 m away by the file; a lamp to the left throws the shadow to the right.
     let shadow = |y: usize, x: usize| (355..365).contains(&y) && (320..460).contains(&x);
     save(&folder, "masks/a1.png", |y, x| if person(y, x) || shadow(y, x) { 255 } else { 0 });
     let camera = folder.file("camera.toml", format!("{CAMERA}[subject]\ndistance_m = 6.0\n"));
@@ -115,18 +115,18 @@ fn a_lamp_throws_shadows_where_it_hangs_high_enough() {
     );
     fails(farnear(&remove).args(["--shadow-direction", "200"]), 2, &["200", "-180"]);
     let found = figures(farnear(&remove).args(["--lamp", "-3,6,3"]));
-    // The shadow is 1,250 pixels of 12,050: most of them go.
+    // The shadow is 1,250 of 12,050 pixels; most of them are removed.
     assert!(number(&found, "removed_percent") > 5.0, "{found}");
-    let told = std::fs::read_to_string(folder.path("out/shadow.toml")).expect("an index");
-    let told: toml::Table = told.parse().expect("TOML");
-    assert_eq!(told["frame"][0]["distance_m"].as_float(), Some(6.0));
+    let index = std::fs::read_to_string(folder.path("out/shadow.toml")).expect("an index");
+    let index: toml::Table = index.parse().expect("TOML");
+    assert_eq!(index["frame"][0]["distance_m"].as_float(), Some(6.0));
     // The lamp is as far away as the person: the shadow lies across the picture.
-    assert_eq!(told["frame"][0]["shadow_direction_deg"].as_float().map(f64::abs), Some(0.0));
+    assert_eq!(index["frame"][0]["shadow_direction_deg"].as_float().map(f64::abs), Some(0.0));
 }
 
 const CAMERA: &str = "[camera]\nheight_m = 1.5\nazimuth_deg = 0\nfocal_length_mm = 4.0\npixel_um = 6.0\n";
 
-/// A person of 60 x 180 pixels, standing.
+/// A standing person of 60 x 180 pixels.
 fn person(y: usize, x: usize) -> bool {
     (180..360).contains(&y) && (290..350).contains(&x)
 }
@@ -139,7 +139,8 @@ fn doubtful_frames_are_flagged() {
     save(&folder, "masks/a3.png", |y, x| if person(y, x) || person(y, x + 250) { 255 } else { 0 });
     let camera = folder.file("camera.toml", CAMERA);
     let [masks, out, into] = ["masks", "out", "into"].map(|name| folder.text(name));
-    // At noon on the northern half the sun stands in the south, behind a camera that looks north: the shadow lies behind.
+    // At noon on the northern half the sun is in the south. The camera looks north, so the shadow lies behind the
+    // person.
     let arguments = [
         "shadow",
         "remove",
@@ -162,7 +163,7 @@ fn doubtful_frames_are_flagged() {
     assert!(flags(0).contains("shadow-behind"), "{}", flags(0));
     assert!(flags(1).contains("empty"), "{}", flags(1));
     assert!(flags(2).contains("several-people:2"), "{}", flags(2));
-    // Looking south into a low winter sun.
+    // The camera looks south into a low winter sun.
     let south = folder.file("south.toml", CAMERA.replace("azimuth_deg = 0", "azimuth_deg = 180"));
     let winter =
         ["--time", "2014-12-21T12:00:00Z", "--lat", "52.38", "--lon", "-1.56", "--out", &into, "--json"];

@@ -1,4 +1,4 @@
-//! `farnear shadow score` as a user runs it, on small masks counted by hand.
+//! `farnear shadow score` on small masks counted by hand.
 
 use std::{fs, path::Path};
 
@@ -46,14 +46,14 @@ fn one_frame_counted_by_hand() {
     picture(&after, AFTER);
     picture(&before, BEFORE);
     let found = figures(score(&[&after, &truth]));
-    // 3 of 4 shadow and 1 of 4 person pixels are not in the mask; it holds 3 person, 1 shadow and 1 background pixel
-    // that count, and the person has 4: 3 / 6.
+    // 3 of 4 shadow and 1 of 4 person pixels are not in the mask. It holds 3 person, 1 shadow and 1 counted background
+    // pixel; the person has 4: 3 / 6.
     assert_eq!(found["removed_percent"], 75.0);
     assert_eq!(found["wrongly_removed_percent"], 25.0);
     assert_eq!(found["iou_percent"], 50.0);
 
     let found = figures(score(&[&after, &truth, Path::new("--before"), &before]));
-    // Of the 3 shadow pixels that were there 2 went; no person pixel that was there went.
+    // Of the 3 present shadow pixels 2 were removed; no present person pixel was.
     assert_eq!(found["removed_percent"], 66.667);
     assert_eq!(found["wrongly_removed_percent"], 0.0);
     assert_eq!(found["iou_percent"], 50.0);

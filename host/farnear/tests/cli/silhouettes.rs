@@ -1,4 +1,4 @@
-//! `farnear silhouettes video` as a user runs it, on small made videos.
+//! `farnear silhouettes video` on small synthetic videos.
 
 use std::{
     fs,
@@ -16,12 +16,12 @@ fn farnear() -> Command {
     crate::common::farnear(&[])
 }
 
-/// The left edge of the block that walks, in frames where it is there.
+/// The left edge of the moving block, in frames that contain it.
 fn block(frame: usize) -> Option<u32> {
     frame.checked_sub(EMPTY_FRAMES).map(|step| 20 + 10 * step as u32)
 }
 
-/// A still, speckled scene and, from some frame on, a block of 20x60 pixels that walks.
+/// A static, speckled scene and, from some frame on, a moving block of 20x60 pixels.
 fn picture(frame: usize) -> RgbImage {
     RgbImage::from_fn(SIZE.0, SIZE.1, |x, y| {
         let noise = ((frame as u32 * 7919 + y * 104_729 + x * 1_299_709) % 7) as u8;
@@ -79,7 +79,6 @@ fn figures(command: &mut Command) -> serde_json::Value {
     serde_json::from_slice(&output.stdout).unwrap()
 }
 
-/// The command fails with exit code 1 and says `expected`; no folder is left at `out`.
 #[track_caller]
 fn fails(command: &mut Command, out: &Path, expected: &[&str]) {
     let output = command.output().unwrap();
@@ -222,7 +221,7 @@ fn without_an_ffmpeg_other_videos_are_a_clear_error() {
     fails(&mut command, &out, &["walk.mp4", "ffmpeg", "PATH"]);
 }
 
-/// A stand-in for ffmpeg that answers as it does: a Y4M stream, or a complaint and exit code 1.
+/// A stand-in for ffmpeg: writes a Y4M stream, or an error and exit code 1.
 #[cfg(unix)]
 fn stand_in(root: &Path, script: &str) {
     use std::os::unix::fs::PermissionsExt;
@@ -245,7 +244,7 @@ fn other_videos_go_through_ffmpeg() {
         command.env("PATH", path).args(["silhouettes", "video", "--out"]).arg(out).arg(&video);
         command
     };
-    // The stream only if it was asked for this video as Y4M on standard output.
+    // Writes the stream only if Y4M of this video on standard output is requested.
     let check = format!(
         "case \"$*\" in *'-i {}'*yuv4mpegpipe*' -') cat {};; *) exit 3;; esac",
         video.display(),
@@ -258,7 +257,7 @@ fn other_videos_go_through_ffmpeg() {
     let other = root.path().join("other");
     stand_in(root.path(), "echo 'moov atom not found' >&2; exit 1");
     fails(&mut run(&other), &other, &["walk.mp4", "moov atom not found"]);
-    // Breaks off in the middle of a frame.
+    // Ends in the middle of a frame.
     stand_in(
         root.path(),
         &format!("head -c 200000 {}; echo 'corrupt packet' >&2; exit 69", stream.display()),

@@ -1,4 +1,4 @@
-//! `farnear sun` against the rig's own sun and against NREL's published example.
+//! `farnear sun` compared with the rig's own sun and with NREL's published example.
 
 use crate::common::{farnear, figures, number};
 

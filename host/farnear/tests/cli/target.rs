@@ -1,4 +1,4 @@
-//! `farnear target`: what it says of the page, what is on it, what it refuses.
+//! `farnear target`: figures, page and rejected input.
 
 use std::fs;
 
@@ -32,7 +32,7 @@ fn a_target_is_a_page_with_cells_of_whole_dots_true_to_scale() {
 }
 
 #[test]
-fn what_cannot_be_printed_is_refused_and_leaves_nothing() {
+fn unprintable_targets_are_rejected_without_output() {
     let folder = Folder::new();
     let out = folder.text("target.pdf");
     let asked = ["target", "--optics", rig_optics(), "--out", &out];

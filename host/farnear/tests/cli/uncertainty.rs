@@ -1,4 +1,4 @@
-//! The standard deviation that travels with a map.
+//! The standard deviation of a map.
 
 use farnear_files::map;
 use ndarray::Array2;
@@ -9,7 +9,6 @@ fn read(folder: &Folder, name: &str) -> Array2<f32> {
     map::read(&folder.path(name)).expect("a map")
 }
 
-/// The errors of a noisy plane are as large as they are said to be.
 #[test]
 fn the_predicted_deviation_is_that_of_the_errors() {
     let folder = Folder::new();
@@ -40,7 +39,7 @@ fn the_predicted_deviation_is_that_of_the_errors() {
 }
 
 #[test]
-fn what_has_no_deviation_says_so() {
+fn maps_without_deviation_are_reported() {
     let folder = Folder::new();
     render(&folder, "slant", "pair");
     let [far, near, map] = ["pair/far.png", "pair/near.png", "map"].map(|name| folder.text(name));

@@ -4,7 +4,6 @@ use std::{fs, fs::File, process::Stdio};
 
 use crate::common::{Folder, fails, farnear, figures, rig_optics, succeeds};
 
-/// Every command and its subcommands.
 const COMMANDS: &[&[&str]] = &[
     &["optics"],
     &["operators"],
@@ -205,10 +204,9 @@ fn completions_name_the_commands() {
     }
 }
 
-/// A reader that has gone is a failure with a message, not a panic.
 #[cfg(target_os = "linux")]
 #[test]
-fn a_stdout_that_takes_nothing_is_a_failure() {
+fn a_closed_stdout_is_a_failure() {
     for arguments in [vec!["optics", "--optics", rig_optics()], vec!["completions", "bash"]] {
         let full = File::options().write(true).open("/dev/full").expect("Linux has /dev/full");
         let child = std::process::Command::new(env!("CARGO_BIN_EXE_farnear"))
@@ -218,9 +216,9 @@ fn a_stdout_that_takes_nothing_is_a_failure() {
             .spawn()
             .expect("the program starts");
         let output = child.wait_with_output().expect("it ends");
-        let said = String::from_utf8_lossy(&output.stderr);
-        assert_eq!(output.status.code(), Some(1), "{said}");
-        assert!(said.contains("cannot write to the standard output"), "{said}");
+        let stderr = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(1), "{stderr}");
+        assert!(stderr.contains("cannot write to the standard output"), "{stderr}");
     }
 }
 

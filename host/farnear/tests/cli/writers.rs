@@ -1,11 +1,10 @@
-//! `farnear depth --write`: which files a map is written as, and what is in them.
+//! `farnear depth --write`: the written files and their content.
 
 use exr::prelude::*;
 use farnear_files::map;
 
 use crate::common::{Folder, fails, farnear, render, rig_optics, succeeds};
 
-/// The names below `out`.
 fn written(folder: &Folder, out: &str) -> Vec<String> {
     let below = format!("{out}/");
     folder.listing().iter().filter_map(|name| name.strip_prefix(&below).map(str::to_owned)).collect()
@@ -77,7 +76,7 @@ fn a_folder_holds_the_files_of_one_run_with_hashes_of_its_inputs() {
     assert_eq!(input[1]["bytes"].as_integer(), Some(bytes.len() as i64));
     assert_eq!(input[1]["sha256"].as_str().unwrap().len(), 64);
     assert_ne!(input[0]["sha256"], input[1]["sha256"]);
-    // A failed run leaves the earlier result whole.
+    // A failed run leaves the earlier result unchanged.
     fails(&mut farnear(&["depth", &out, &out, "--optics", rig_optics(), "--out", &out]), 1, &[]);
     assert_eq!(written(&folder, "out"), left);
 }

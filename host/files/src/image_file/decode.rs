@@ -9,7 +9,7 @@ use zune_jpeg::{
     zune_core::{bytestream::ZCursor, colorspace::ColorSpace, options::DecoderOptions},
 };
 
-use super::{GreyImage, ReadSettings, Samples, complete, tiff_file, tiff_tags};
+use super::{GreyImage, ReadSettings, Samples, complete, metadata, tiff_file, tiff_tags};
 use crate::video::Pixels;
 
 pub(crate) type Samples8 = Pixels;
@@ -86,10 +86,11 @@ fn jpeg(bytes: &[u8]) -> Result<(Decoded, u8), String> {
     if needs_more(bytes, &values, options, to) {
         return Err(INCOMPLETE.into());
     }
-    let orientation = decoder.exif().and_then(|exif| image::metadata::Orientation::from_exif_chunk(exif));
+    let orientation =
+        metadata::orientation(decoder.exif().map(Vec::as_slice), decoder.xmp().map(Vec::as_slice));
     let decoded =
         Decoded { width, height, channels, colours: channels, values: Values::U8(values), white_level: None };
-    Ok((decoded, orientation.map_or(1, image::metadata::Orientation::to_exif)))
+    Ok((decoded, orientation))
 }
 
 /// Whether the decoder reads on when the data continue before the end marker, i.e. they ended early.
@@ -116,7 +117,8 @@ fn other(bytes: &[u8]) -> Result<(Decoded, u8), String> {
     let mut limits = Limits::no_limits();
     limits.max_alloc = Some(2 * most_bytes(bytes.len()));
     decoder.set_limits(limits).map_err(|error| error.to_string())?;
-    let orientation = decoder.orientation().map_or(1, image::metadata::Orientation::to_exif);
+    let (exif, xmp) = metadata::of_decoder(&mut decoder, bytes);
+    let orientation = metadata::orientation(exif.as_deref(), xmp.as_deref());
     let image = DynamicImage::from_decoder(decoder).map_err(|error| error.to_string())?;
     let (width, height) = (image.width() as usize, image.height() as usize);
     use DynamicImage as Image;
@@ -251,6 +253,9 @@ fn greys<T: Copy + Into<f64>>(
 ) -> Vec<f32> {
     if colours == 1 {
         let scale = 1.0 / full_scale;
+        if channels == 1 {
+            return samples.iter().map(|sample| ((*sample).into() * scale) as f32).collect();
+        }
         return samples.iter().step_by(channels).map(|sample| ((*sample).into() * scale) as f32).collect();
     }
     if even {

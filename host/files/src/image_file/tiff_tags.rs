@@ -36,6 +36,9 @@ pub(crate) struct Directory {
     pub make: Option<String>,
     pub software: Option<String>,
     pub date_time: Option<String>,
+    /// Tags 36867 and 37521 of the EXIF directory: second and fraction of a second of the exposure.
+    pub exposed: Option<String>,
+    pub exposed_fraction: Option<String>,
     pub is_dng: bool,
     /// Width and height of the images in tag 330.
     pub sub_images: Vec<(u64, u64)>,
@@ -169,6 +172,13 @@ impl<'a> File<'a> {
                 let sizes = (0..count).take(SUB_IMAGES_MAX).filter_map(sub);
                 directory.sub_images = sizes.map(|(sub, _)| (sub.width, sub.height)).collect();
             }
+            34665 if with_sub_images => {
+                if let Some((exif, _)) = value(0).and_then(|at| self.directory(at, false)) {
+                    (directory.exposed, directory.exposed_fraction) = (exif.exposed, exif.exposed_fraction);
+                }
+            }
+            36867 => directory.exposed = text(),
+            37521 => directory.exposed_fraction = text(),
             338 => directory.extra_samples = value(0),
             50706 => directory.is_dng = true,
             51123 => directory.micro_manager = text(),

@@ -171,7 +171,7 @@ mod tests {
     }
 
     #[test]
-    fn jpeg_ringing_is_tolerated_and_pictures_are_no_masks() {
+    fn jpeg_ringing_is_tolerated_and_pictures_are_rejected_as_masks() {
         let ringing = [(0, 900), (3, 20), (250, 20), (255, 60)];
         assert_eq!(levels(&ringing), Some(Levels::default()));
         let dim = [(0, 900), (2, 20), (98, 20), (100, 60)];

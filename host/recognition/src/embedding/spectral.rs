@@ -52,8 +52,8 @@ pub(super) fn leading_of(
             return None;
         }
         let image = apply(&fresh);
-        basis = beside(&basis, &fresh);
-        images = beside(&images, &image);
+        basis = joined(&basis, &fresh);
+        images = joined(&images, &image);
         block = image;
         // No convergence is possible earlier.
         if round >= 4 {
@@ -114,7 +114,7 @@ fn product_of(a: MatRef<f64>, b: MatRef<f64>) -> Mat<f64> {
     product
 }
 
-fn beside(a: &Mat<f64>, b: &Mat<f64>) -> Mat<f64> {
+fn joined(a: &Mat<f64>, b: &Mat<f64>) -> Mat<f64> {
     let mut both = Mat::<f64>::zeros(b.nrows(), a.ncols() + b.ncols());
     both.as_mut().subcols_mut(0, a.ncols()).copy_from(a);
     both.as_mut().subcols_mut(a.ncols(), b.ncols()).copy_from(b);

@@ -67,8 +67,8 @@ pub enum EvaluationError {
     #[error("an open set needs at least 3 activities, the samples have {0}")]
     Activities(usize),
     #[error(
-        "an open set needs at least {fewest} clips of what is taught by either half of the subjects, without the activity that is left out, one half has {found}: \
-         with fewer nothing can be called unknown at a stated share of false alarms; evaluate more people or clips"
+        "each half of the subjects has to have at least {fewest} clips without the left-out activity for an open set, one has {found}: \
+         fewer clips give no limit for a stated false-alarm rate; evaluate more people or clips"
     )]
     OpenSetClips { found: usize, fewest: usize },
     #[error(transparent)]

@@ -356,7 +356,7 @@ mod tests {
     }
 
     #[test]
-    fn neighbours_stand_beside_a_row_and_their_gradient_comes_back_to_it() {
+    fn neighbours_are_appended_to_a_row_and_return_their_gradient() {
         let rows = Array2::from_shape_fn((3, 2), |(row, k)| (10 * (row + 1) + k) as f32);
         let windows = with_neighbours(rows.view(), 1);
         assert_eq!(windows.row(0).to_vec(), [0.0, 0.0, 10.0, 11.0, 20.0, 21.0]);

@@ -1,18 +1,17 @@
 //! Everyday activities of synthetic people, as training data without recordings. Seeded.
 //!
-//! Bodies follow published anthropometry ([`person`]), gait published joint angles ([`gait`]), hands
-//! minimum-jerk paths ([`gestures`], [`postures`]); [`motion`] varies amplitude, tempo and cut, [`camera`]
-//! the view and the masks. Spreads of clothes, damage and image borders were chosen after viewing public
-//! sets. Proportions, tracker errors, hand positions and clip limits follow the joints of UTKinect and
-//! Florence.
+//! Bodies follow published anthropometry (`person`), gait published joint angles (`gait`), hands minimum-jerk paths
+//! (`gestures`, `postures`). Amplitude, tempo and cut vary (`motion`), and so do view and masks (`camera`). Spreads of
+//! clothes, damage and image borders were chosen after viewing public sets. Proportions, tracker errors, hand positions
+//! and clip limits follow the joints of UTKinect and Florence.
 
-pub mod camera;
-pub mod gait;
-pub mod gestures;
-pub mod moment;
-pub mod motion;
-pub mod person;
-pub mod postures;
+pub(super) mod camera;
+mod gait;
+mod gestures;
+mod moment;
+mod motion;
+mod person;
+mod postures;
 
 use crate::clip::Clip;
 use crate::embedding::descriptor::Scaling;
@@ -30,7 +29,7 @@ use rayon::prelude::*;
 
 type Activity = (&'static str, fn(&mut Maker) -> Motion);
 
-/// All everyday activities by name.
+/// By name.
 pub const ACTIVITIES: &[Activity] = &[
     ("walk", |maker| Motion::Gait(Gait::walking_about(maker.rng, maker.main))),
     ("jog", |maker| Motion::Gait(Gait::jog(maker.rng))),
@@ -63,16 +62,14 @@ pub const ACTIVITIES: &[Activity] = &[
     ("peer", postures::peer),
 ];
 
-/// One performance: person and joints.
-pub struct Performance {
-    /// Name of the person.
-    pub person: Person,
-    /// Joints of every frame, around the origin.
-    pub joints: Vec<Joints>,
+struct Performance {
+    person: Person,
+    /// Of every frame, around the origin.
+    joints: Vec<Joints>,
 }
 
-/// Performance of an activity (index in [`ACTIVITIES`]) from seeds.
-pub fn performance(activity: usize, seed: u64) -> Performance {
+/// Generates the activity with this index in [`ACTIVITIES`].
+fn performance(activity: usize, seed: u64) -> Performance {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let rng = &mut rng;
     let person = Person::drawn(rng);
@@ -173,7 +170,7 @@ mod tests {
     use std::collections::BTreeSet;
 
     #[test]
-    fn everybody_does_everything_on_the_ground_and_in_view() {
+    fn every_person_and_activity_is_on_the_ground_and_in_view() {
         let names: BTreeSet<_> = ACTIVITIES.iter().map(|(name, _)| name).collect();
         assert_eq!(names.len(), ACTIVITIES.len());
         for (activity, (name, _)) in ACTIVITIES.iter().enumerate() {

@@ -204,7 +204,7 @@ mod tests {
     }
 
     #[test]
-    fn a_suit_is_seen_like_the_capsules_it_stands_for() {
+    fn a_suit_looks_like_the_capsules_it_represents() {
         let template = Template::parse(
             "name = 'post'\n[[part]]\nname = 'post'\nmarkers = ['low', 'high']\nthickness_mm = 120.0\n\
              [[part]]\nname = 'arm'\nmarkers = ['shoulder', 'hand']\nthickness_mm = 50.0\n",

@@ -115,7 +115,7 @@ fn taught_without(left_out: &str, mut clips: Vec<Clip>) -> Recogniser {
 }
 
 #[test]
-fn a_auxiliary_model_calls_what_nobody_taught_unknown_and_survives_a_file() {
+fn an_auxiliary_model_rejects_untrained_activities_also_from_a_file() {
     let model = taught_without("lie down", few(600, 8));
     let bytes = model.to_bytes().expect("encoded");
     let model = Recogniser::from_bytes(&bytes).expect("decoded");

@@ -1,4 +1,4 @@
-//! What a rig is taught: its point spread function, and a correction from flat targets.
+//! Calibration of the PSF, and a correction from flat targets.
 
 use std::{
     fs,
@@ -37,9 +37,7 @@ use crate::{
     view::{Begun, Nothing},
 };
 
-/// The correction in the session's folder.
 pub const CORRECTION: &str = "correction.toml";
-/// The series of flat targets in it.
 const SERIES: &str = "flat-series";
 const LIST: &str = "PATTERNS.toml";
 
@@ -124,7 +122,7 @@ pub fn routes(api: Api) -> Api {
         )
 }
 
-/// The series' maps with their distances; empty before the first.
+/// Depth maps of the series with their distances, mm; empty before the first.
 fn patterns(app: &App) -> Result<Vec<(PathBuf, f64)>, WorkflowError> {
     let list = app.session.join(SERIES).join(LIST);
     if !list.is_file() {
@@ -174,7 +172,6 @@ async fn find_psf(
     compute(&app, Task { kind: "psf", title: "Find the point spread function".into(), work: Box::new(work) })
 }
 
-/// Begins a computation.
 fn compute(app: &App, task: Task) -> Result<Json<Begun>, Failure> {
     let job = app.begin_computing(task).map_err(|title| Failure::busy(&title))?;
     Ok(Json(Begun { job }))
@@ -187,9 +184,9 @@ async fn series(
 ) -> Result<Json<Begun>, Failure> {
     require_control(&app, &headers)?;
     let open = connected(&app)?;
-    // The scene of the visible emulated rig cannot be changed: one rig is started per target instead.
+    // The scene of the visible emulated rig is fixed, so each target gets its own rig.
     let (rig, ask) = match &app.address {
-        // Its stages are not visible, so time need not be paced.
+        // Its stages are not visible, so it need not run in real time.
         Some(RigAddress::Emulated(scenery)) => {
             (RigAddress::Emulated(Scenery { paced: false, ..scenery.clone() }), false)
         }

@@ -1,4 +1,4 @@
-//! The camera: what can be set on it.
+//! Camera settings.
 
 use std::str::FromStr;
 
@@ -68,7 +68,7 @@ async fn set(
                 camera::show(&CameraChoice { address, settings })?
             }
         };
-        // What the camera refused is not tried again at the next picture.
+        // A refused setting is not tried again at the next picture.
         app.set_camera(camera.settings);
         figures(found)
     };

@@ -30,7 +30,6 @@ use crate::{
     view::{Begun, DONE, Done, Nothing},
 };
 
-/// Most images of a stack.
 const STACK_MAX: usize = 500;
 
 /// Kind of capture.
@@ -93,7 +92,6 @@ pub struct OneCapture {
     pub capture: Value,
 }
 
-/// Text to search for.
 #[derive(Deserialize)]
 pub struct Search {
     #[serde(default)]
@@ -193,7 +191,7 @@ async fn rename(
     Ok(Json(DONE))
 }
 
-/// Files of a capture do not change under a job.
+/// Files of a capture do not change while a job runs.
 fn idle(app: &App) -> Result<(), Failure> {
     match app.rig_jobs.is_busy() || app.computing.is_busy() {
         true => Err(Failure::busy("a job that may use the capture")),
@@ -323,7 +321,6 @@ fn name_of(folder: &std::path::Path) -> String {
     folder.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
-/// A capture has come.
 fn kept(app: &App, figures: farnear_workflows::Result<Value>) -> farnear_workflows::Result<Value> {
     app.change(|state| state.captures += 1);
     figures

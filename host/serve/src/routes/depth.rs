@@ -1,4 +1,4 @@
-//! Computing depth of a capture, and measuring in it.
+//! Depth of a capture, and measurements in it.
 
 use axum::{
     Json,
@@ -28,18 +28,17 @@ use crate::{
     view::Begun,
 };
 
-/// Most points of a surface that a page turns: 4 MB, and some ten frames a second without a graphics card.
+/// Most points of a 3-D surface: 4 MB, some ten frames per second without a graphics card.
 const MESH_PIXELS: usize = 100_000;
 
-/// A depth request without its files, and the place of the map.
+/// A depth request without its files, and the folder of the map.
 #[derive(Deserialize)]
 pub struct CaptureDepthRequest {
-    /// Whether the correction that the session has learned is applied.
     #[serde(default)]
     corrected: bool,
-    /// Folder within the capture for the map, instead of the capture's own.
+    /// Folder within the capture for the map.
     variant: Option<String>,
-    /// The options of `farnear depth` that name no file, and `operators` as FAMILY:DESIGN.
+    /// Options of `farnear depth` that name no file, and `operators` as FAMILY:DESIGN.
     #[serde(flatten)]
     options: Map<String, Value>,
 }
@@ -199,7 +198,6 @@ async fn profile(
     Ok(Json(Figures { figures }))
 }
 
-/// The folders of two captures, to be compared.
 fn both(app: &App, names: [&str; 2]) -> Result<[std::path::PathBuf; 2], Failure> {
     let [first, second] = names.map(|name| sessions::existing(&app.session, name));
     Ok([first?, second?])

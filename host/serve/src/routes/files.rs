@@ -1,4 +1,4 @@
-//! A capture's files, alone, as one ZIP, and as a page.
+//! Files of a capture: one by one, as a ZIP, and as a report.
 
 use std::path::PathBuf;
 
@@ -16,7 +16,7 @@ use crate::{
     transfer::{file_body, regular_file, zip_body},
 };
 
-/// Content policy of a report: its own contents only.
+/// A report uses its own contents only.
 const REPORT_POLICY: &str = "default-src 'none'; style-src 'unsafe-inline'; img-src data:";
 
 pub fn routes(api: Api) -> Api {
@@ -66,7 +66,7 @@ async fn send(folder: PathBuf, file: String) -> Result<Response, Failure> {
         Some("toml") => "text/plain; charset=utf-8",
         _ => "application/octet-stream",
     };
-    // A map may be computed again under the same name.
+    // A new map can have the same name.
     Ok(([(header::CONTENT_TYPE, media), (header::CACHE_CONTROL, "no-cache")], file_body(opened))
         .into_response())
 }

@@ -1,4 +1,4 @@
-//! The optics: as they are, as they are typed, and what follows from them.
+//! The optics and quantities derived from them.
 
 use axum::{Json, extract::State, http::HeaderMap};
 use farnear_depth::optics::OpticsFile;
@@ -76,7 +76,7 @@ async fn write(
     Body(given): Body<Optics>,
 ) -> Result<Json<Done>, Failure> {
     require_control(&app, &headers)?;
-    // Checked and completed: invalid values are refused before the file changes.
+    // Invalid values are refused before the file changes.
     let checked = lens_table::calculate(&given.optics, Readings::default())?.optics;
     let text = toml::to_string(&checked).map_err(WorkflowError::from)?;
     write_file(&app.optics_file(), text.as_bytes()).map_err(WorkflowError::from)?;

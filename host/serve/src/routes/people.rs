@@ -1,4 +1,4 @@
-//! People before the camera: what they do, and their shadow.
+//! Activities and shadows of people.
 
 use std::{fs, path::PathBuf};
 
@@ -35,11 +35,8 @@ use crate::{
     view::{Begun, DONE, Done},
 };
 
-/// The folder of videos and masks in the session's.
 const FOLDER: &str = "people";
-/// Longest video that a browser may send.
 const VIDEO_MAX_BYTES: u64 = 256 << 20;
-/// The model that comes with the program.
 const USUAL_MODEL: &str = "everyday";
 
 /// Source of the recognition.
@@ -148,7 +145,6 @@ fn folder(app: &App) -> PathBuf {
     app.session.join(FOLDER)
 }
 
-/// The path of a video that was sent.
 fn video_of(app: &App, name: &str) -> Result<PathBuf, Failure> {
     let path = sessions::folder_of(&folder(app), name)?;
     match path.is_file() {

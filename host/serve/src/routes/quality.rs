@@ -1,4 +1,4 @@
-//! How good depth is.
+//! Depth quality.
 
 use axum::{Json, extract::State, http::HeaderMap};
 use farnear_workflows::{
@@ -22,7 +22,6 @@ use crate::{
     view::Begun,
 };
 
-/// The record in the session's folder.
 const RECORD: &str = "quality.toml";
 
 /// Options of the measurement.

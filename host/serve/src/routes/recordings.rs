@@ -1,4 +1,4 @@
-//! Live depth, recorded and played back.
+//! Recorded live depth.
 
 use std::{fs, path::PathBuf};
 
@@ -22,7 +22,6 @@ use crate::{
     view::{Begun, DONE, Done, LiveMode},
 };
 
-/// The folder of recordings in the session's.
 const FOLDER: &str = "recordings";
 const ENDING: &str = ".pairs";
 

@@ -31,7 +31,6 @@ use crate::{
     view::{Begun, DONE, Done, LiveMode, Nothing},
 };
 
-/// Longest exposure that is taken live, us.
 const EXPOSURE_MAX_US: u32 = 1_000_000;
 
 /// Which axes to home.
@@ -163,7 +162,6 @@ pub fn routes(api: Api) -> Api {
         .post::<Clear, Begun, _, _>("/api/rig/alarms/clear", For::Control, "Clears the latched alarm.", clear)
 }
 
-/// The rig, where it is connected.
 pub fn connected(app: &App) -> Result<OpenRig, Failure> {
     let state = app.state().rig;
     app.rig().ok_or_else(|| {
@@ -173,13 +171,11 @@ pub fn connected(app: &App) -> Result<OpenRig, Failure> {
     })
 }
 
-/// Begins a job on the rig.
 pub fn begin(app: &App, task: Task) -> Result<Json<Begun>, Failure> {
     let job = app.begin_on_rig(task).map_err(|title| Failure::busy(&title))?;
     Ok(Json(Begun { job }))
 }
 
-/// Figures as JSON.
 pub fn figures(figures: impl Serialize) -> farnear_workflows::Result<Value> {
     let nowhere = std::path::Path::new("the figures");
     serde_json::to_value(figures).map_err(WorkflowError::file(nowhere, "plain values"))
@@ -259,7 +255,6 @@ async fn go(
     begin(&app, Task { kind: "goto", title: title.into(), work: Box::new(work) })
 }
 
-/// A focus measure by its name.
 fn measure(name: &str) -> Result<farnear_depth::focus_measure::FocusMeasure, Failure> {
     name.parse().map_err(|error: farnear_depth::focus_measure::FocusError| {
         Failure::new(StatusCode::BAD_REQUEST, error.to_string())

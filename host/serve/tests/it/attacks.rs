@@ -1,4 +1,4 @@
-//! Attacks on the doors, as tables: each case says what is sent and what must come back.
+//! Attacks on the API as tables: each case lists the request and the expected answer.
 
 use std::{
     fs,
@@ -24,7 +24,6 @@ fn network(folder: &Path) -> Listen {
     Listen::Network { address, token, names: vec!["rig.lab.example".into()] }
 }
 
-/// Sends a request line and headers as they are.
 fn raw(served: &Served, text: &str) -> u16 {
     Answer::parse(&served.exchange(text.as_bytes(), false)).status
 }
@@ -165,7 +164,7 @@ fn no_path_leaves_the_session_or_a_capture() {
             format!("/api/people/shadows/{climb}/masks/a.png"),
         ] {
             let answer = served.get(&path);
-            // `..` may be resolved by nobody: the route then does not exist.
+            // A client may resolve `..`: then the route does not exist.
             assert!((400..500).contains(&answer.status), "{path}: {answer:?}");
             assert!(!answer.body.windows(15).any(|part| part == b"private content"), "{path}");
         }
@@ -395,7 +394,7 @@ fn memory_mb() -> u64 {
     line.split_whitespace().next().unwrap().parse::<u64>().unwrap() / 1024
 }
 
-/// The time until the server closes a connection on which `bytes` are sent, then one byte each 100 ms.
+/// Time until the server closes a connection that sends `bytes`, then one byte each 100 ms.
 fn closed_after(served: &Served, bytes: &[u8], drip: bool) -> Duration {
     let began = Instant::now();
     let mut stream = TcpStream::connect(&served.address).unwrap();
@@ -468,7 +467,7 @@ fn eleven_hundred_idle_connections_leave_the_owner_at_work() {
     let before = memory_mb();
     let mut idle = Vec::new();
     for count in 0..1100 {
-        // A process may have 1,024 descriptors here: the client's end of those that were closed is dropped.
+        // A process may have 1,024 descriptors here, so the client's end of closed connections is dropped.
         if idle.len() >= 400 {
             idle.remove(0);
         }

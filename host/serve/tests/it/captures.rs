@@ -1,4 +1,4 @@
-//! What was captured, and what is measured in it.
+//! Captures and measurements in them.
 
 use std::{fs, path::Path, process::Command};
 
@@ -10,7 +10,7 @@ use super::client::{Served, Socket};
 
 const RECORD: &str = include_str!("../../../workflows/src/sessions/capture.toml");
 
-/// A capture of a textured pqueue; the near image is a little softer.
+/// A textured plane; the near image is a little softer.
 pub fn put(served: &Served, name: &str, seed: usize) {
     let folder = served.session.join(name);
     fs::create_dir_all(&folder).unwrap();
@@ -77,7 +77,7 @@ fn depth_is_computed_measured_compared_and_taken_along() {
 }
 
 #[test]
-fn notes_are_kept_and_searched_and_broken_captures_are_said() {
+fn notes_are_stored_and_searched_and_broken_captures_reported() {
     let served = Served::captures_only();
     put(&served, "pair-001", 0);
     put(&served, "pair-002", 1);
@@ -133,7 +133,7 @@ fn optics_are_checked_before_they_are_kept() {
     assert!((found["figures"]["reading_near"]["mm"].as_f64().unwrap() - 5.3263).abs() < 1e-3, "{found:#}");
 }
 
-/// The files of a capture, with those that are not whole.
+/// The files of a capture, including temporary ones.
 fn names(folder: &Path) -> Vec<String> {
     let entries = fs::read_dir(folder).unwrap();
     let mut names: Vec<_> =
@@ -142,13 +142,12 @@ fn names(folder: &Path) -> Vec<String> {
     names
 }
 
-/// The system lets this process write files of 8 to 16 kB and no larger, whatever the disk holds: far and near images are smaller, maps of
-/// them are not.
+/// The file size limit (8 or 16 kB, by shell) is above the size of the images and below that of the maps.
 #[test]
-fn a_disk_that_takes_no_more_fails_the_job_and_leaves_nothing_half_written() {
+fn a_full_disk_fails_the_job_and_leaves_no_partial_files() {
     const WITHIN: &str = "FARNEAR_TEST_SMALL_FILES";
     if std::env::var_os(WITHIN).is_none() {
-        let script = r#"trap "" XFSZ; ulimit -f 16; exec "$0" --exact captures::a_disk_that_takes_no_more_fails_the_job_and_leaves_nothing_half_written"#;
+        let script = r#"trap "" XFSZ; ulimit -f 16; exec "$0" --exact captures::a_full_disk_fails_the_job_and_leaves_no_partial_files"#;
         let program = std::env::current_exe().unwrap();
         let ended = Command::new("sh").args(["-c", script]).arg(program).env(WITHIN, "1").output().unwrap();
         assert!(ended.status.success(), "{}", String::from_utf8_lossy(&ended.stdout));
@@ -163,7 +162,7 @@ fn a_disk_that_takes_no_more_fails_the_job_and_leaves_nothing_half_written() {
     assert_eq!(job["phase"], "failed", "{job:#}");
     assert!(job["error"].as_str().is_some_and(|error| error.contains("cannot write")), "{job:#}");
     assert_eq!(names(&folder), before);
-    // Nothing else suffers: what is there is shown, and a note is small enough.
+    // Everything else works: files are served, and a note is small enough.
     assert_eq!(served.get("/api/captures/pair-001/files/far.png").status, 200);
     let note = json!({ "rating": 1, "text": "the disk is full" }).to_string();
     let client = [("x-farnear-client", socket.secret.as_str())];
@@ -171,14 +170,14 @@ fn a_disk_that_takes_no_more_fails_the_job_and_leaves_nothing_half_written() {
 }
 
 #[test]
-fn what_another_program_does_to_the_session_is_seen_and_said() {
+fn changes_of_the_session_by_other_programs_are_reported() {
     let served = Served::captures_only();
     let socket = Socket::open(&served);
     let listed = || served.get("/api/captures").json()["captures"].as_array().unwrap().len();
     put(&served, "pair-001", 0);
     put(&served, "pair-002", 1);
     assert_eq!(listed(), 2);
-    // A capture goes, comes under another name, loses an image, or is not a folder any more.
+    // A capture is moved, loses an image, or is not a folder any more.
     fs::rename(served.session.join("pair-001"), served.session.join("moved")).unwrap();
     assert_eq!((listed(), served.get("/api/captures/pair-001").status), (2, 404));
     assert_eq!(served.get("/api/captures/moved").status, 200);
@@ -192,14 +191,14 @@ fn what_another_program_does_to_the_session_is_seen_and_said() {
     fs::write(served.session.join("pair-002"), b"a file").unwrap();
     let refused = served.get("/api/captures/pair-002");
     assert!(refused.status == 404 && refused.error().contains("pair-002"), "{refused:?}");
-    // The optics are spoiled, then corrected.
+    // The optics become invalid, then valid again.
     let whole = fs::read(served.session.join("optics.toml")).unwrap();
     fs::write(served.session.join("optics.toml"), "[lens]\nfocal_length_mm = \"?\"\n").unwrap();
     let spoiled = served.get("/api/optics");
     assert!(spoiled.status >= 400 && spoiled.error().contains("optics.toml"), "{spoiled:?}");
     fs::write(served.session.join("optics.toml"), whole).unwrap();
     assert_eq!(served.get("/api/optics").status, 200);
-    // The whole folder goes.
+    // The whole session folder disappears.
     fs::remove_dir_all(&served.session).unwrap();
     assert_eq!(served.get("/api/state").status, 200);
     assert!(served.get("/api/captures/moved").status >= 400);

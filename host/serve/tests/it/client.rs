@@ -1,4 +1,4 @@
-//! A served page, and a client that is as plain as HTTP and WebSocket allow: what it sends is what stands here.
+//! A server, and a minimal HTTP and WebSocket client.
 
 use std::{
     fmt::Write as _,
@@ -23,10 +23,9 @@ use farnear_workflows::{
 };
 use serde_json::Value;
 
-/// Longest wait for something that comes in milliseconds on an idle computer.
+/// Longest wait for something that takes milliseconds on an idle computer.
 const PATIENCE: Duration = Duration::from_secs(60);
 
-/// A page that is served until this value goes.
 pub struct Served {
     pub address: String,
     pub session: PathBuf,
@@ -37,7 +36,6 @@ pub struct Served {
 }
 
 impl Served {
-    /// With a board that has these faults.
     pub fn with_board(faults: Faults) -> Self {
         let (port, board) = plug_in(faults);
         Self::start(Some(RigAddress::Port(port)), Some(Box::new(board)), |_| Listen::Loopback { port: 0 })
@@ -85,12 +83,12 @@ impl Served {
         Self { address, session, cancel, thread: Some(thread), _folder: folder, _board: board }
     }
 
-    /// Sends these bytes and nothing more, and gives all that comes back.
+    /// Sends only these bytes and returns the whole answer.
     pub fn raw(&self, bytes: &[u8]) -> Vec<u8> {
         self.exchange(bytes, true)
     }
 
-    /// Sends these bytes and gives all that comes back. A server takes the end of what is sent for a client that has gone, and gives up what it was doing.
+    /// Sends these bytes and returns the whole answer. The server takes the end of a stream for a disconnected client.
     pub fn exchange(&self, bytes: &[u8], ends: bool) -> Vec<u8> {
         let mut stream = TcpStream::connect(&self.address).unwrap();
         stream.set_read_timeout(Some(PATIENCE)).unwrap();
@@ -103,7 +101,6 @@ impl Served {
         answer
     }
 
-    /// Asks; gives status, headers and body.
     pub fn ask(&self, method: &str, path: &str, headers: &[(&str, &str)], body: &str) -> Answer {
         let mut request = format!("{method} {path} HTTP/1.1\r\nconnection: close\r\n");
         if !headers.iter().any(|(name, _)| name.eq_ignore_ascii_case("host")) {
@@ -127,7 +124,7 @@ impl Served {
         self.ask("POST", path, &[("x-farnear-client", client)], body)
     }
 
-    /// The state, once `fits`.
+    /// The state as soon as `fits` holds.
     pub fn state_when(&self, fits: impl Fn(&Value) -> bool) -> Value {
         let until = Instant::now() + PATIENCE;
         loop {
@@ -145,7 +142,7 @@ impl Served {
         self.state_when(|state| state["rig"]["phase"] == "ready")
     }
 
-    /// The job of this number, ended.
+    /// The job with this number after its end.
     pub fn ended(&self, queue: &str, job: &Value) -> Value {
         let state = self.state_when(|state| state[queue]["id"] == *job && state[queue]["phase"] != "running");
         state[queue].clone()
@@ -187,7 +184,6 @@ impl Answer {
     }
 }
 
-/// The parts of a chunked body, as far as it came.
 fn unchunked(mut rest: &[u8]) -> Vec<u8> {
     let mut body = Vec::new();
     while let Some(end) = rest.windows(2).position(|two| two == b"\r\n") {
@@ -201,7 +197,7 @@ fn unchunked(mut rest: &[u8]) -> Vec<u8> {
     body
 }
 
-/// A socket, as RFC 6455 has it, without what a test does not need.
+/// A WebSocket client (RFC 6455), as far as tests need it.
 pub struct Socket {
     stream: TcpStream,
     pub client: u64,
@@ -213,7 +209,7 @@ impl Socket {
         Self::at(served, "/api/socket")
     }
 
-    /// As a page that is reloaded: `secret` is from before.
+    /// A reloaded page with its earlier secret.
     pub fn resume(served: &Served, secret: &str) -> Self {
         Self::at(served, &format!("/api/socket?resume={secret}"))
     }
@@ -235,14 +231,14 @@ impl Socket {
         }
         assert!(headers.starts_with(b"HTTP/1.1 101"), "{}", String::from_utf8_lossy(&headers));
         let mut socket = Self { stream, client: 0, secret: String::new() };
-        let hello = socket.told("hello");
+        let hello = socket.receive("hello");
         socket.client = hello["hello"]["client"].as_u64().unwrap();
         socket.secret = hello["hello"]["secret"].as_str().unwrap().into();
         socket
     }
 
-    /// The next text of this type.
-    pub fn told(&mut self, kind: &str) -> Value {
+    /// The next text message of this type.
+    pub fn receive(&mut self, kind: &str) -> Value {
         loop {
             let (opcode, payload) = self.frame().unwrap();
             if opcode == 1 {
@@ -275,7 +271,7 @@ impl Socket {
         Ok((head[0] & 15, payload))
     }
 
-    /// Sends a frame of at most 125 bytes, masked by zeros.
+    /// Sends a frame of at most 125 bytes, with a mask of zeros.
     pub fn say(&mut self, opcode: u8, payload: &[u8]) {
         assert!(payload.len() < 126);
         let mut frame = vec![0x80 | opcode, 0x80 | payload.len() as u8, 0, 0, 0, 0];

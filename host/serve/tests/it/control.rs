@@ -1,4 +1,4 @@
-//! One browser has control; nothing moves once it has disconnected.
+//! One browser has control; nothing moves after it has disconnected.
 
 use farnear_scripted_board::Faults;
 
@@ -99,7 +99,7 @@ fn anybody_may_stop_and_it_does_not_wait_for_the_job() {
 }
 
 #[test]
-fn what_cannot_be_is_refused_before_anything_moves() {
+fn impossible_requests_are_rejected_before_any_motion() {
     let served = Served::with_board(Faults::default());
     served.ready();
     let holder = Socket::open(&served);
@@ -133,7 +133,7 @@ fn what_cannot_be_is_refused_before_anything_moves() {
 }
 
 #[test]
-fn a_rig_that_is_not_there_is_said_and_can_be_tried_again() {
+fn a_missing_rig_is_reported_and_can_be_retried() {
     let rig = farnear_workflows::rig::RigAddress::Port("/dev/farnear-no-such-port".into());
     let served = Served::start(Some(rig), None, |_| farnear_serve::Listen::Loopback { port: 0 });
     let state = served.state_when(|state| state["rig"]["phase"] == "lost");

@@ -1,4 +1,4 @@
-//! Ten thousand messages that are none: each is answered or ended, and the page is served as before.
+//! Ten thousand invalid messages: each is answered or ends its connection, and the page is still served.
 
 use std::{io::Write, net::TcpStream};
 
@@ -6,12 +6,11 @@ use farnear_scripted_board::Faults;
 
 use super::client::{Served, Socket};
 
-/// Messages over HTTP; the others go over sockets.
 const HTTP: usize = 4_000;
-/// Messages over sockets, of which each connection takes a few.
+/// Each connection takes a few of them.
 const SOCKET: usize = 6_000;
 
-/// Numbers that repeat from run to run (xorshift).
+/// Repeatable random numbers (xorshift).
 struct Dice(u64);
 
 impl Dice {
@@ -26,7 +25,7 @@ impl Dice {
         (0..self.below(longest + 1)).map(|_| self.below(256) as u8).collect()
     }
 
-    /// A request that was right once, with some of its bytes changed, dropped or doubled.
+    /// A valid request with some bytes changed, dropped or doubled.
     fn spoiled(&mut self, request: &str) -> Vec<u8> {
         let mut bytes = request.as_bytes().to_vec();
         for _ in 0..=self.below(4) {
@@ -67,11 +66,11 @@ fn ten_thousand_malformed_messages_change_nothing() {
         assert!(answer.is_empty() || answer.starts_with(b"HTTP/1."), "{bytes:?}: {answer:?}");
         assert!(!answer.starts_with(b"HTTP/1.1 500"), "{}", String::from_utf8_lossy(&answer));
     }
-    let said = r#"{"type":"stop"}"#;
+    let stop = r#"{"type":"stop"}"#;
     for _ in 0..SOCKET / 60 {
         let mut socket = Socket::open(&served);
         for _ in 0..60 {
-            let payload = if dice.below(2) == 0 { dice.bytes(100) } else { dice.spoiled(said) };
+            let payload = if dice.below(2) == 0 { dice.bytes(100) } else { dice.spoiled(stop) };
             socket.say([1, 2, 9, 10][dice.below(4)], &payload);
         }
     }
@@ -88,7 +87,7 @@ fn ten_thousand_malformed_messages_change_nothing() {
 }
 
 #[test]
-fn a_connection_that_says_nothing_holds_nobody_up() {
+fn a_silent_connection_delays_no_other() {
     let served = Served::captures_only();
     let silent: Vec<_> = (0..50).map(|_| TcpStream::connect(&served.address).unwrap()).collect();
     let mut half = TcpStream::connect(&served.address).unwrap();

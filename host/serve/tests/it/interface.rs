@@ -1,4 +1,4 @@
-//! The document, the guard, and every route once.
+//! The OpenAPI document, the guard, and every route once.
 
 use std::collections::BTreeSet;
 
@@ -47,7 +47,6 @@ fn the_document_describes_the_routes_and_refers_to_nothing_that_is_not_there() {
     }
 }
 
-/// What is sent to a route, the first time.
 fn body_of(method: &str, path: &str) -> &'static str {
     match (method, path) {
         ("post", "/api/answer") => r#"{"text":""}"#,
@@ -102,7 +101,7 @@ fn every_route_answers_in_its_own_words() {
             asked += 1;
             let fits = match answer.status {
                 200 => true,
-                // A socket that was asked for without an upgrade is refused by the library in plain words.
+                // The library rejects a socket request without an upgrade in plain text.
                 400 | 426 if path == "/api/socket" => true,
                 400..600 => !answer.error().is_empty(),
                 _ => false,
@@ -139,7 +138,7 @@ fn the_page_and_its_files_are_there_with_a_policy() {
         assert!(answer.headers.contains(&format!("content-type: {media}")), "{}", answer.headers);
         assert!(answer.headers.contains("content-security-policy: default-src 'self'"), "{}", answer.headers);
     }
-    // What a browser keeps that gets no further than the page's text.
+    // The text for a browser that is too old for the page.
     let page = String::from_utf8(served.get("/").body).unwrap();
     assert!(page.contains("it needs JavaScript, and a browser not older than"), "{page}");
     assert_eq!(served.get("/../Cargo.toml").status, 404);

@@ -1,4 +1,4 @@
-//! farnear-serve as a browser meets it, one program for all of it. A scripted board stands behind the port.
+//! farnear-serve with a scripted board, in one test program.
 #![allow(clippy::unwrap_used)] // a test that panics has failed, which is what it is for
 #![cfg(target_os = "linux")] // where a pseudo-terminal holds the board
 

@@ -137,7 +137,7 @@ mod tests {
     }
 
     #[test]
-    fn another_scene_is_no_change_of_light() {
+    fn another_scene_is_not_a_change_of_light() {
         let mut scene = pairs(|_| 0.0);
         scene[0].iter_mut().enumerate().for_each(|(n, pair)| pair[1] = (n * 89 % 251) as u8);
         assert_eq!(Light::unchanged(1).changed(&scene), None);

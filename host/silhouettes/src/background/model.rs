@@ -49,7 +49,7 @@ pub enum Label {
 pub enum BackgroundError {
     #[error(transparent)]
     Settings(#[from] SettingsError),
-    #[error("background model: a frame of {width}x{height} pixels has nothing in it")]
+    #[error("background model: a frame of {width}x{height} pixels is empty")]
     Empty { height: usize, width: usize },
     #[error("background model: {channels} channels per pixel; give 1 (grey) or 3 (red, green, blue)")]
     Channels { channels: usize },

@@ -136,7 +136,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_paired_stays_alone() {
+    fn unmatched_items_stay_unassigned() {
         let costs = arr2(&[[1.0, f64::NAN], [f64::INFINITY, 9.0]]);
         assert_eq!(assigned(costs.view(), 5.0), [Some(0), None]);
         assert_eq!(assigned(arr2(&[[3.0], [1.0]]).view(), 5.0), [None, Some(0)]);

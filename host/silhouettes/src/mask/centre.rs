@@ -52,7 +52,7 @@ mod tests {
     use ndarray::s;
 
     #[test]
-    fn a_tall_box_fills_the_height_and_stands_in_the_middle() {
+    fn a_tall_box_fills_the_height_and_is_centred() {
         let mut mask = Mask::from_elem((400, 300), false);
         mask.slice_mut(s![50..250, 200..280]).fill(true); // 200 x 80: scaled by 1/2 to 100 x 40
         let small = centred(mask.view(), SIDE_PX).unwrap();
@@ -92,7 +92,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_to_centre_is_none() {
+    fn an_empty_mask_is_not_centred() {
         assert_eq!(centred(Mask::from_elem((10, 10), false).view(), SIDE_PX), None);
         assert_eq!(centred(Mask::from_elem((0, 0), false).view(), SIDE_PX), None);
     }

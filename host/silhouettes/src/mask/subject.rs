@@ -197,7 +197,7 @@ mod tests {
     }
 
     #[test]
-    fn nobody_is_an_empty_mask_and_a_flag() {
+    fn no_person_gives_an_empty_mask_and_a_flag() {
         let subject = chooser().choose(people(&[[5, 5, 8, 8]]).view());
         assert_eq!(area(subject.mask.view()), 0);
         assert_eq!((subject.bounds, subject.flags), (None, vec![Flag::Empty]));

@@ -340,7 +340,7 @@ mod tests {
     }
 
     #[test]
-    fn people_who_pass_one_another_are_said_to_cross_and_told_apart_by_their_pace() {
+    fn crossing_people_are_reported_and_distinguished_by_speed() {
         let mut tracker = tracker();
         let (mut crossing, mut parted) = (0, Vec::new());
         let mut last = Vec::new();
@@ -382,7 +382,7 @@ mod tests {
     }
 
     #[test]
-    fn specks_are_nobody_and_who_goes_is_forgotten() {
+    fn specks_are_ignored_and_people_who_leave_are_dropped() {
         let mut tracker = tracker();
         for n in 0..50 {
             let mut mask = if n < 20 { frame(&[(100.0, 20, 70)]) } else { Mask::from_elem(SIZE, false) };

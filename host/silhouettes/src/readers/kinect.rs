@@ -7,7 +7,7 @@ use super::recording::{Found, Known, RecordingError, Source, Unit, Up, text};
 pub const READER: Reader = Reader {
     name: "Kinect joints",
     extensions: &["txt"],
-    about: "20 or 25 joints a line, metres, y up; a frame's number may stand before them",
+    about: "20 or 25 joints per line, metres, y up, optionally after a frame number",
     read,
 };
 
@@ -53,7 +53,7 @@ pub fn read(bytes: &[u8]) -> Result<Found, RecordingError> {
             .map(|word| {
                 let number = word.trim().parse::<f64>();
                 number.map_err(|_| {
-                    wrong(format!("`{}` is no number", word.chars().take(20).collect::<String>()))
+                    wrong(format!("`{}` is not a number", word.chars().take(20).collect::<String>()))
                 })
             })
             .collect::<Result<_, _>>()?;
@@ -65,12 +65,13 @@ pub fn read(bytes: &[u8]) -> Result<Found, RecordingError> {
             75 | 76 => 25,
             other => {
                 return Err(wrong(format!(
-                    "{other} numbers, expected 20 or 25 joints of 3, and the frame's number or not"
+                    "{other} numbers, expected 20 or 25 joints with 3 each, optionally after a frame number"
                 )));
             }
         };
-        if *joints.get_or_insert(found) != found {
-            return Err(wrong(format!("{found} joints, the lines before have others")));
+        let expected = *joints.get_or_insert(found);
+        if expected != found {
+            return Err(wrong(format!("{found} joints, the lines before have {expected}")));
         }
         let points = &numbers[numbers.len() % 3..];
         // Joints that were not found are at the sensor's position.
@@ -110,7 +111,7 @@ mod tests {
     }
 
     #[test]
-    fn first_and_second_sensors_are_told_by_their_joints() {
+    fn first_and_second_sensors_are_distinguished_by_their_joints() {
         let first = read(format!("1 {}\n2 {}\n", line(20), line(20)).as_bytes()).expect("joints");
         assert_eq!(
             (first.frames.len(), first.names.len(), first.names[2].as_str()),

@@ -171,7 +171,7 @@ mod tests {
     }
 
     #[test]
-    fn a_chair_that_stays_longer_is_not_taken_for_the_actor() {
+    fn a_chair_that_is_visible_longer_is_not_the_actor() {
         let body = |id: &str, x: f64| {
             let joints: String =
                 (0..25).map(|j| format!("{x} {} 3 0 0 0 0 0 0 0 0 2\n", j as f64 / 25.0 + 0.01)).collect();
@@ -193,7 +193,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_skeleton_is_refused_with_its_line() {
+    fn invalid_skeletons_are_rejected_with_the_line() {
         for (text, line) in [
             (String::new(), 1),
             ("2\n1\n71 0\n24\n".into(), 4),

@@ -260,7 +260,7 @@ impl Recording {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum RecordingError {
     /// No reader has this extension.
-    #[error("no reader of motion capture knows files that end in `.{found}`: expected {known}")]
+    #[error("no motion-capture format ends with `.{found}`: expected {known}")]
     Extension { found: String, known: String },
     #[error("not a {kind} file: {reason}")]
     Kind {
@@ -325,7 +325,7 @@ mod tests {
     }
 
     #[test]
-    fn recordings_come_in_millimetres_with_z_up_unless_the_caller_knows_better() {
+    fn recordings_are_converted_to_millimetres_and_z_up_unless_the_caller_decides() {
         let by_itself = found([1.0, 2.0, 3.0]).settled(Choices::default());
         assert_eq!(by_itself.frames[0], vec![Some([10.0, -30.0, 20.0])]);
         assert_eq!(by_itself.by_name(0)["HEAD"], by_itself.by_name(0)["Nick:HEAD"]);
@@ -335,14 +335,14 @@ mod tests {
             "what the format fixes is not a guess"
         );
         assert_eq!(by_itself.frames[2], vec![None], "what overflows is hidden");
-        let told =
+        let given =
             found([1.0, 2.0, 3.0]).settled(Choices { unit: Some(Unit::MM), up: Some(Up::X), person: None });
-        assert_eq!(told.frames[0], vec![Some([2.0, 3.0, 1.0])]);
-        assert_eq!((told.unit.source.clone(), told.remarks().len()), (Source::Caller, 0));
+        assert_eq!(given.frames[0], vec![Some([2.0, 3.0, 1.0])]);
+        assert_eq!((given.unit.source.clone(), given.remarks().len()), (Source::Caller, 0));
     }
 
     #[test]
-    fn turning_up_keeps_hands_apart() {
+    fn conversion_to_z_up_stays_right_handed() {
         // A right-handed frame stays one: x cross y is z, for every upward axis.
         for up in [Up::X, Up::Y, Up::Z] {
             let [x, y, z] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(|p| up.to_z(p));
@@ -362,7 +362,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_text_is_named_with_its_line() {
+    fn binary_data_is_reported_with_the_line() {
         assert_eq!(text(b"\xef\xbb\xbfabc"), Ok("abc".into()));
         assert_eq!(text(b"M\xfcller"), Ok("M\u{fc}ller".into()));
         let error = text(b"one\ntwo\n\xff\x00").expect_err("not text");

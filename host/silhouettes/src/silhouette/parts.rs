@@ -37,7 +37,7 @@ impl FromStr for Fill {
         match text {
             "hull" => Ok(Self::Hull),
             "triplets" => Ok(Self::Triplets),
-            other => Err(format!("`{other}` is not a fill: expected hull or triplets")),
+            other => Err(format!("unknown fill `{other}`: expected hull or triplets")),
         }
     }
 }

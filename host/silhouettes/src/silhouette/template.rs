@@ -76,7 +76,7 @@ impl Template {
                 return Err(bad("has a thickness outside 0 to 500 mm"));
             }
             if template.parts[..index].iter().any(|other| other.name == part.name) {
-                return Err(bad("stands twice; left and right limbs need names of their own"));
+                return Err(bad("occurs twice; give left and right limbs different names"));
             }
         }
         Ok(template)

@@ -184,7 +184,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_standing_person_is_as_tall_as_asked_and_stands_on_the_ground() {
+    fn a_standing_person_has_the_requested_height_on_the_ground() {
         let build = Build { height_mm: 1800.0, ..Build::default() };
         let posed = joints(&build, &Pose::default());
         let top = posed.head[2] + 0.062 * build.height_mm;

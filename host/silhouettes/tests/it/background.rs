@@ -87,7 +87,7 @@ fn a_still_scene_keeps_one_component_and_a_flickering_one_two() {
 }
 
 #[test]
-fn what_stays_long_enough_becomes_background() {
+fn objects_at_rest_become_background() {
     let mut noise = Noise(3);
     let settings = Settings { history_frames: 100, ..Settings::default() };
     let mut model = BackgroundModel::new(SIZE, 1, settings).unwrap();

@@ -1,4 +1,4 @@
-//! A recording with the streaming answer drawn on it: a folder of pictures, which is a video to this program and to others.
+//! A folder of frames with the streaming answer drawn on them.
 
 use std::{io::Cursor, path::Path};
 
@@ -16,24 +16,21 @@ const KNOWN: Rgb<u8> = Rgb([60, 160, 90]);
 const UNKNOWN: Rgb<u8> = Rgb([150, 60, 60]);
 const TEXT_PX: f32 = 20.0;
 const GAP_PX: u32 = 6;
-/// Smaller frames are enlarged by whole numbers until they are this high.
+/// Smaller frames are enlarged by whole numbers to at least this height.
 const LEAST_HEIGHT_PX: u32 = 240;
-/// The most probable activities that are shown.
 const SHOWN: usize = 3;
 
-/// Pictures under way; dropped before the end they leave nothing behind.
+/// Removed when dropped before [`Self::finish`].
 pub(super) struct AnnotatedVideo {
     out: Staging,
     writer: Writer,
     frames: usize,
 }
 
-/// One of several people, to be drawn.
 pub(super) struct Shown {
     /// First row, first column, one past the last row and column.
     pub spans: [usize; 4],
     pub text: String,
-    /// Whether the answer is an activity.
     pub known: bool,
 }
 
@@ -42,8 +39,6 @@ impl AnnotatedVideo {
         Ok(Self { out: Staging::new_folder(folder)?, writer: Writer::new(TEXT_PX)?, frames: 0 })
     }
 
-    /// Draws a frame: the picture (the mask if there is no picture), the person's outline, and the answer so far with the next
-    /// most probable ones.
     pub fn draw(&mut self, picture: Option<&Pixels>, mask: &Mask, answer: &Answer) -> Result<()> {
         let seen = with_outline(picture, mask);
         let line = self.writer.height();
@@ -67,7 +62,6 @@ impl AnnotatedVideo {
         self.write(&page)
     }
 
-    /// Draws a frame with everybody in a box of their own, and the answers so far.
     pub fn draw_people(&mut self, picture: Option<&Pixels>, mask: &Mask, people: &[Shown]) -> Result<()> {
         let mut page = with_outline(picture, mask);
         let times = page.height() / mask.nrows().max(1) as u32;
@@ -100,13 +94,11 @@ impl AnnotatedVideo {
         Ok(self.out.write(&format!("frame_{:06}.png", self.frames), &png.into_inner())?)
     }
 
-    /// Puts the folder in place.
     pub fn finish(self) -> Result<()> {
         Ok(self.out.finish()?)
     }
 }
 
-/// The picture, enlarged where it is small, with the mask's outline.
 fn with_outline(picture: Option<&Pixels>, mask: &Mask) -> RgbImage {
     let (height, width) = mask.dim();
     let level = |y: usize, x: usize| match picture {

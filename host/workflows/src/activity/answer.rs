@@ -1,4 +1,4 @@
-//! Answer for a recording or for one of the people in it, as all faces give it.
+//! Answers for a recording or for one of its people, shared by all interfaces.
 
 use std::{fmt, ops::Range};
 
@@ -12,35 +12,29 @@ use serde_with::SerializeDisplay;
 
 use crate::{error::Result, figures::rounded};
 
-/// The answer for all that was seen of one person.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct AnswerSummary {
-    /// The activity; `None` is unknown.
+    /// `None` is unknown.
     pub activity: Option<String>,
-    /// Probability of the activity, 0 to 1.
     pub confidence: f64,
-    /// Outlier score; above 1 the activity is unknown. `None` without a person.
+    /// Above 1 the activity is unknown. `None` without a person.
     pub outlier_score: Option<f64>,
-    /// Why the activity is unknown.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub reason: Option<String>,
-    /// Probability of every activity.
     pub probabilities: Vec<Probability>,
 }
 
-/// One person in a frame: the same for a clip, a stream and several people.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct PersonInFrame {
-    /// The number, from 1 in the order of coming.
+    /// From 1 in order of appearance.
     pub person: usize,
-    /// Box of the person: first row, first column, one past the last row and column; `None` if empty.
+    /// First row, first column, one past the last row and column; `None` if empty.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub top_left_bottom_right: Option<[usize; 4]>,
-    /// The activity so far; `None` is unknown.
+    /// `None` is unknown.
     pub activity: Option<String>,
-    /// Probability of the activity, 0 to 1.
     pub confidence: f64,
-    /// Outlier score: above 1 unknown; `None` where no silhouette has been seen.
+    /// Above 1 the activity is unknown; `None` before the first silhouette.
     pub outlier_score: Option<f64>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub flags: Vec<PersonFlag>,
@@ -49,13 +43,11 @@ pub struct PersonInFrame {
 /// Why the answer for a person in a frame is doubtful. Serialised as `crossing:2`, `missed`, `cut-by-edge`.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, SerializeDisplay)]
 pub enum PersonFlag {
-    /// Overlaps with this person.
     Crossing(usize),
-    /// Has parted from this person after an overlap.
+    /// Separated from this person after an overlap.
     Parted(usize),
     /// May have been exchanged with this person.
     PerhapsSwapped(usize),
-    /// Not found in the frame.
     Missed,
     Mask(Flag),
 }
@@ -72,45 +64,37 @@ impl fmt::Display for PersonFlag {
     }
 }
 
-/// What one person did in a recording: the same for a clip, a stream and several people.
+/// One person's activities in a recording.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct PersonFigures {
     pub person: usize,
-    /// First frame with a silhouette.
     pub from: usize,
-    /// Last frame with a silhouette.
     pub to: usize,
-    /// Frames with a silhouette.
     pub silhouettes: usize,
-    /// Frames in one blob with others.
     pub crossing_frames: usize,
-    /// Those with whom this one may have been swapped.
     pub perhaps_swapped_with: Vec<usize>,
-    /// For all that was seen.
     #[serde(flatten)]
     pub answer: AnswerSummary,
     /// Answers for windows that overlap by half.
     pub windows: Vec<Part>,
-    /// Stretches of one activity each, by a hidden semi-Markov model.
+    /// Segments of one activity, by a hidden semi-Markov model.
     pub segments: Vec<Part>,
 }
 
-/// Probability of an activity.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct Probability {
     pub activity: String,
-    /// 0 to 1; all add up to 1.
+    /// The sum over all activities is 1.
     pub probability: f64,
 }
 
-/// A stretch of the recording; frames from 1, both ends included.
+/// Range of frames, from 1, both ends included.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct Part {
     pub from: usize,
     pub to: usize,
-    /// The activity; `None` is unknown.
+    /// `None` is unknown.
     pub activity: Option<String>,
-    /// Probability of the activity, 0 to 1.
     pub confidence: f64,
 }
 
@@ -126,8 +110,7 @@ impl AnswerSummary {
     }
 }
 
-/// Ranges of visible frames as ranges of the recording, whose `frames` frames have been counted from 1; `numbers` are those
-/// of the frames with a person.
+/// Converts ranges of visible frames to ranges of the recording; `numbers` are the frames with a person.
 pub(super) fn parts<'a>(
     stretches: impl IntoIterator<Item = (usize, usize, &'a Option<String>, f32)>,
     numbers: &[usize],
@@ -145,7 +128,7 @@ pub(super) fn parts<'a>(
 /// Frames without a person after which a new part begins: another person may have come.
 const GAP_FRAMES: usize = 15;
 
-/// Ranges of a recording's frames with a person, without gaps of more than [`GAP_FRAMES`]. `seen` is true where anybody is.
+/// Ranges of frames with a person, without gaps of more than [`GAP_FRAMES`].
 pub(super) fn passages(seen: &[bool]) -> Vec<Range<usize>> {
     let mut found: Vec<Range<usize>> = Vec::new();
     for (frame, _) in (0..).zip(seen).filter(|(_, seen)| **seen) {
@@ -157,7 +140,7 @@ pub(super) fn passages(seen: &[bool]) -> Vec<Range<usize>> {
     found
 }
 
-/// The windows and segments of a recording, passage by passage: `tracks[view][frame]`, and which frames show anybody.
+/// Windows and segments of a recording from `tracks[view][frame]` and the frames with a person.
 pub(super) fn stretches(
     model: &Recogniser,
     tracks: &[Vec<Track>],
@@ -174,7 +157,7 @@ pub(super) fn stretches(
         let mut found = windows(model, &whole, window, window.div_ceil(2))?;
         found.iter_mut().for_each(|s| s.answer = restricted(s.answer.clone(), among));
         let segments = segmented(model, &whole, among, Worth::default())?;
-        // Frames without anybody are not in the tracks.
+        // Empty frames are not in the tracks.
         let numbers: Vec<usize> = views
             .iter()
             .find(|view| view.iter().any(|track| track.frames() > 0))
@@ -189,7 +172,6 @@ pub(super) fn stretches(
     Ok((in_windows, in_segments))
 }
 
-/// The only person of a recording; `None` in an empty one.
 pub(super) fn only_person(
     seen: &[bool],
     answer: &AnswerSummary,
@@ -209,7 +191,6 @@ pub(super) fn only_person(
     })
 }
 
-/// The only person of a frame; `None` where the mask is empty.
 pub(super) fn only_in_frame(mask: &Mask, answer: &Answer, flags: &[Flag]) -> Option<PersonInFrame> {
     let b = BoundingBox::of(mask.view())?;
     Some(PersonInFrame {
@@ -222,14 +203,12 @@ pub(super) fn only_in_frame(mask: &Mask, answer: &Answer, flags: &[Flag]) -> Opt
     })
 }
 
-/// The segments as [`parts`] takes them.
 pub(super) fn of_segments(
     segments: &[Segment],
 ) -> impl Iterator<Item = (usize, usize, &Option<String>, f32)> {
     segments.iter().map(|s| (s.from, s.to, &s.activity, s.confidence))
 }
 
-/// Probability of every activity.
 pub(super) fn probabilities(answer: &Answer) -> Vec<Probability> {
     let probability = |(activity, value): &(String, f32)| Probability {
         activity: activity.clone(),
@@ -238,12 +217,11 @@ pub(super) fn probabilities(answer: &Answer) -> Vec<Probability> {
     answer.probabilities.iter().map(probability).collect()
 }
 
-/// The answer if only some activities can be; all can where none is named.
+/// Restricts the answer to some activities; all if `among` is empty.
 pub(super) fn restricted(answer: Answer, among: &[String]) -> Answer {
     if among.is_empty() { answer } else { answer.among(among) }
 }
 
-/// Why an answer is unknown, in words; `None` where it is not.
 fn unknown_because(answer: &Answer, frames: usize) -> Option<String> {
     if answer.activity.is_some() {
         return None;
@@ -258,12 +236,12 @@ fn unknown_because(answer: &Answer, frames: usize) -> Option<String> {
     })
 }
 
-/// A probability with four decimals, without the digits that f32 does not have.
+/// Rounds to four decimals, without digits beyond f32 precision.
 pub(super) fn rounded_probability(value: f32) -> f64 {
     rounded(f64::from(value), 4)
 }
 
-/// JSON has no infinity: nothing was seen.
+/// JSON has no infinity, the score of an empty recording.
 pub(super) fn outlier_score(answer: &Answer) -> Option<f64> {
     answer.outlier_score.is_finite().then(|| rounded_probability(answer.outlier_score))
 }
@@ -273,7 +251,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_recording_is_cut_where_nobody_is_there_for_a_while() {
+    fn a_recording_is_split_at_long_gaps_without_a_person() {
         let mut seen = vec![false; 400];
         seen[3..40].fill(true);
         seen[20..25].fill(false);

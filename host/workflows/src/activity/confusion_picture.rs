@@ -1,4 +1,4 @@
-//! A confusion matrix as a picture: rows are true activities, columns answers, per cent of the row.
+//! Picture of a confusion matrix: rows are true activities, columns answers, per cent of the row.
 
 use std::io::Cursor;
 
@@ -11,7 +11,6 @@ const INK: Rgb<u8> = Rgb([0, 0, 0]);
 const TEXT_PX: f32 = 18.0;
 const GAP_PX: u32 = 8;
 
-/// The matrix as PNG.
 pub fn png(confusion: &Confusion) -> Result<Vec<u8>, EncodeError> {
     let mut writer = Writer::new(TEXT_PX)?;
     let line = writer.height();
@@ -25,7 +24,7 @@ pub fn png(confusion: &Confusion) -> Result<Vec<u8>, EncodeError> {
         let middle = (side.saturating_sub(line)) / 2;
         let left = GAP_PX + widest - writer.width(name);
         writer.write(&mut picture, left, edge + row * side + middle, name, INK);
-        // The column's name reads upwards.
+        // The column's name is vertical.
         let mut label = RgbImage::from_pixel(widest.max(1), line, PAPER);
         writer.write(&mut label, 0, 0, name, INK);
         let upright = imageops::rotate270(&label);
@@ -61,7 +60,7 @@ mod tests {
         (0..4).for_each(|_| confusion.count(0, 0));
         confusion.count(1, 1);
         let picture = image::load_from_memory(&png(&confusion).expect("a picture")).expect("PNG").into_rgb8();
-        // The lower right corner lies in the cell of the last class; the one above it is empty.
+        // The lower right corner is in the last class's cell; the cell above it is empty.
         let at = |up: u32| picture[(picture.width() - GAP_PX - 4, picture.height() - GAP_PX - 4 - up)];
         let dark = |pixel: Rgb<u8>| pixel.0.iter().map(|&v| u32::from(v)).sum::<u32>() < 300;
         assert!(dark(at(0)) && !dark(at(50)), "{:?} {:?}", at(0), at(50));

@@ -1,4 +1,4 @@
-//! How well the method recognises subjects that it was not trained on.
+//! Evaluates the method on subjects outside its training set.
 
 use std::{
     path::{Path, PathBuf},
@@ -32,33 +32,28 @@ use crate::{
     figures::rounded,
 };
 
-/// How often the time of an answer is taken; the shortest counts.
+/// Timing repetitions; the shortest counts.
 const TIMINGS: usize = 3;
 
 #[derive(Clone, PartialEq, Debug)]
 pub struct EvaluationSettings {
-    /// The samples that are recognised, TOML.
     pub samples: PathBuf,
-    /// Training set.
     pub learn_from: LearnFrom,
-    /// Features and classifier.
     pub method: Method,
-    /// Adaptation to clips from elsewhere.
     pub adaptation: Adaptation,
-    /// Which views are recognised together; without it fused, or each by itself where clips differ in their views.
+    /// Views recognised together. By default fused, or each separately if clips differ in their views.
     pub views: Option<Views>,
-    /// A new folder for confusion.png, confusion.md and evaluation.toml (the choices of every fold).
+    /// For confusion.png, confusion.md and evaluation.toml (the settings of every fold).
     pub out: Option<PathBuf>,
 }
 
-/// Training set; never with the tested subject.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub enum LearnFrom {
     /// The other subjects, each left out in turn.
     OtherSubjects,
-    /// Other samples of other people.
+    /// Separate samples of other people.
     Samples(PathBuf),
-    /// Other samples, of which the subject's own are left out in turn.
+    /// Separate samples; the subject's own are left out in turn.
     SamplesOfOthers(PathBuf),
 }
 
@@ -71,25 +66,21 @@ impl LearnFrom {
     }
 }
 
-/// How well people were recognised.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct EvaluationFigures {
-    /// Share of right answers, 0 to 1.
+    /// Share of correct answers.
     pub accuracy: f64,
-    /// Its 95 % interval (Wilson).
+    /// Wilson interval, 95 %.
     pub confidence_interval: [f64; 2],
     pub right: u32,
     pub answers: u32,
     pub clips: usize,
     pub subjects: usize,
-    /// Which views were recognised together.
     pub views: Views,
-    /// The method's name.
     pub mode: &'static str,
-    /// Whether masks are full frames, so that the box's motion counts.
+    /// Whether masks are full frames, so that motion of the bounding box counts.
     pub full_frames: bool,
     pub frames: usize,
-    /// Masks without anybody.
     pub empty_frames: usize,
     /// From a mask in memory to its part of an answer, one thread.
     pub seconds_per_frame: f64,
@@ -98,7 +89,6 @@ pub struct EvaluationFigures {
     pub confusion: Confusion,
 }
 
-/// `evaluation.toml`: nothing that differs between two runs.
 #[derive(Serialize)]
 struct Record<'a> {
     accuracy: f64,
@@ -108,10 +98,7 @@ struct Record<'a> {
     fold: &'a [Choice],
 }
 
-/// Recognises every subject by a model of the others.
-///
-/// # Errors
-/// Samples that cannot be read or used, too few subjects, results that cannot be written.
+/// Recognises every subject with a model of the others.
 pub fn evaluate(settings: &EvaluationSettings, context: &Context<'_>) -> Result<EvaluationFigures> {
     let start = Instant::now();
     let out = settings.out.as_deref().map(Staging::new_folder).transpose()?;
@@ -157,25 +144,20 @@ pub fn evaluate(settings: &EvaluationSettings, context: &Context<'_>) -> Result<
     Ok(figures)
 }
 
-/// What of an open set is shown.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct OpenSetFigures {
     /// Largest share of known clips that models may call unknown.
     pub false_alarms: f64,
     /// Mean over the activities of the area under the outlier score's ROC curve.
     pub auroc: f64,
-    /// Mean share of the left-out activities' clips that was called unknown.
+    /// Mean share of the left-out activities' clips called unknown.
     pub unknown_of_strangers: f64,
-    /// Mean share of the others' clips that was called unknown.
+    /// Mean share of the other activities' clips called unknown.
     pub unknown_of_known: f64,
-    /// Every activity left out in turn.
     pub activity: Vec<OpenSet>,
 }
 
-/// Leaves every activity out of the training in turn, on one half of the subjects, and lets the other half do all.
-///
-/// # Errors
-/// Samples that cannot be read or used, too few subjects, activities or clips.
+/// Leaves every activity out of the training in turn; half of the subjects train, the other half test.
 pub fn open_set(samples: &Path, method: &Method, context: &Context<'_>) -> Result<OpenSetFigures> {
     let samples = Samples::read(samples, context)?;
     let experiment = method.experiment(samples.full_frames)?;
@@ -202,11 +184,9 @@ pub fn open_set(samples: &Path, method: &Method, context: &Context<'_>) -> Resul
     })
 }
 
-/// The clips of an evaluation, and which of their views are recognised together.
 struct Clips {
     views: Views,
     test: Vec<Clip>,
-    /// The training set, if it is another one.
     train: Option<Vec<Clip>>,
 }
 
@@ -217,7 +197,7 @@ impl Clips {
         }
         let alike = test.views.is_some() && train.as_ref().is_none_or(|train| train.views == test.views);
         let views = asked.unwrap_or(if alike { Views::Fused } else { Views::Each });
-        // Views that correspond each have a classifier of their own; others share one.
+        // Corresponding views have a classifier each; others share one.
         if views == Views::Each && !alike {
             return Ok(Self { views, test: test.split(), train: train.map(Samples::split) });
         }
@@ -229,7 +209,6 @@ impl Clips {
     }
 }
 
-/// Refuses evaluations whose answers would mean nothing.
 fn check_subjects(settings: &EvaluationSettings, subjects: &[String], learned: &[Clip]) -> Result<()> {
     match &settings.learn_from {
         LearnFrom::OtherSubjects if subjects.len() < 3 => {
@@ -245,7 +224,7 @@ fn check_subjects(settings: &EvaluationSettings, subjects: &[String], learned: &
     }
 }
 
-/// Refuses activities outside the training set: an accuracy of 0 would only mean that names differ.
+/// Rejects activities outside the training set: different names would give an accuracy of 0.
 fn check_activities(settings: &EvaluationSettings, test: &[Clip], learned: &[Clip]) -> Result<()> {
     let (found, known) =
         (names(test.iter().map(|clip| &clip.activity)), names(learned.iter().map(|clip| &clip.activity)));
@@ -269,7 +248,7 @@ fn keep(figures: &EvaluationFigures, outcome: &Outcome, out: Staging) -> Result<
     Ok(out.finish()?)
 }
 
-/// One thread's time from masks in memory to an answer, over the frames of the first clip.
+/// Time per frame of one thread, over the first clip, from masks in memory to an answer.
 fn seconds_per_frame(
     clips: &[Clip],
     method: &Method,

@@ -1,4 +1,4 @@
-//! How well a finished model recognises clips that others have named.
+//! Evaluates a finished model on labelled clips.
 
 use std::path::PathBuf;
 
@@ -22,43 +22,41 @@ use crate::{context::Context, counter::Counter, error::Result, figures::rounded}
 #[derive(Clone, PartialEq, Debug)]
 pub struct JudgingSettings {
     pub samples: PathBuf,
-    /// Names of activities in the samples and in the model where they differ.
+    /// Pairs of names that differ between samples and model.
     pub same: Vec<(String, String)>,
-    /// Rounds in which the model learns from its own surest answers for the samples first, without their labels; 0 for none.
+    /// Rounds of self-training on the samples without their labels; 0 for none.
     pub self_training: usize,
-    /// All views of a clip together, instead of each separately.
+    /// Fuse the views of a clip instead of recognising each separately.
     pub fused: bool,
-    /// Why a blind set is opened; without it one is refused.
+    /// Reason for opening a blind set; without it a blind set is rejected.
     pub open_blind: Option<String>,
-    /// A new folder for confusion.png, confusion.md and wrong.csv.
+    /// For confusion.png, confusion.md and wrong.csv.
     pub out: Option<PathBuf>,
 }
 
-/// How well a model did.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct JudgingFigures {
-    /// Answers for clips of activities that the model knows.
+    /// For clips of known activities.
     pub answers: u32,
-    /// Share of right answers among all activities of the model.
+    /// Share of correct answers among all activities of the model.
     pub accuracy: f64,
-    /// Its 95 % interval (Wilson).
+    /// Wilson interval, 95 %.
     pub confidence_interval: [f64; 2],
-    /// Share that is right if only activities of the samples can be.
     pub accuracy_among: f64,
     pub confidence_interval_among: [f64; 2],
-    /// How far confidences are from the fraction of right answers (expected calibration error), 0 to 1.
+    /// Expected calibration error, 0 to 1.
     pub calibration_error: f64,
-    /// The same among the samples' activities.
+    /// Expected calibration error among the samples' activities.
     pub calibration_error_among: f64,
-    /// Share of these clips that is called unknown.
+    /// Share of known activities' clips called unknown.
     pub unknown_of_known: f64,
-    /// Clips of activities that the model does not know.
+    /// Clips of unknown activities.
     pub strangers: u32,
-    /// Share of those that is called unknown; `None` without any.
+    /// Share of unknown activities' clips called unknown; `None` without any.
     pub unknown_of_strangers: Option<f64>,
-    /// How well the outlier score tells them from the others (area under the ROC curve); `None` without any.
+    /// Area under the outlier score's ROC curve; `None` without unknown activities.
     pub outlier_auroc: Option<f64>,
-    /// Activities that the model does not know.
+    /// Activities of the samples that the model lacks.
     pub not_known: Vec<String>,
     /// `counts[truth][answer]` among the samples' activities.
     pub confusion: Confusion,
@@ -67,15 +65,11 @@ pub struct JudgingFigures {
 pub(super) struct Judged<'a> {
     clip: &'a Clip,
     view: usize,
-    /// In the model's words.
+    /// In the model's names.
     pub truth: String,
     pub answer: Answer,
 }
 
-/// Lets a model answer for all clips.
-///
-/// # Errors
-/// Samples that cannot be read, of which the model knows no activity, or which do not fit it.
 pub fn judge(model: &Model, settings: &JudgingSettings, context: &Context<'_>) -> Result<JudgingFigures> {
     let out = settings.out.as_deref().map(Staging::new_folder).transpose()?;
     let samples = Samples::read_opened(&settings.samples, settings.open_blind.as_deref(), context)?;
@@ -129,7 +123,6 @@ pub fn judge(model: &Model, settings: &JudgingSettings, context: &Context<'_>) -
     Ok(figures)
 }
 
-/// The answers for all clips, each view by itself unless they are fused.
 pub(super) fn answers<'a>(
     recogniser: &Recogniser,
     clips: &'a [Clip],
@@ -199,7 +192,7 @@ fn figures(known: &[Judged], strange: &[Judged], among: &[String], not_known: Ve
     }
 }
 
-/// The clips that were taken for something else, the surest mistakes first.
+/// Misclassified clips, the most confident first.
 fn wrong(known: &[Judged], among: &[String]) -> String {
     let mut found: Vec<(f32, String)> = known
         .iter()

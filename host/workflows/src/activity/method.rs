@@ -1,4 +1,4 @@
-//! How activities are classified: options that training and evaluation share.
+//! Classification options shared by training and evaluation.
 
 use std::sync::Arc;
 
@@ -14,38 +14,30 @@ use crate::error::Result;
 /// Adaptation to unlabelled clips from another camera, sensor or laboratory.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub struct Adaptation {
-    /// What of their frames is brought to the training clips'.
+    /// Statistics that are aligned with the training clips'.
     pub align: Alignment,
-    /// Rounds of learning from one's own surest answers for them.
+    /// Rounds of learning from the most confident own answers.
     pub self_training: usize,
 }
 
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Method {
-    /// What clips are turned into.
     pub pattern: Pattern,
-    /// Choose the settings by cross-validation over the training subjects, instead of taking the defaults (quicker).
+    /// By cross-validation over the training subjects, instead of using the defaults (faster).
     pub search: bool,
 }
 
-/// Features and classifier.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub enum Pattern {
-    /// Soft assignments to a codebook.
     Codebook {
         /// Whether the order of frames counts.
         mode: Mode,
-        /// What tells patterns apart.
         classifier: Family,
     },
-    /// What the network of a model that comes with the program gives.
-    Features {
-        /// The model's name.
-        model: &'static Shipped,
-        /// What tells patterns apart.
-        classifier: Family,
-    },
-    /// Embedded pattern learning (EPL) as in the thesis: 0/1 grids over a 3-D Isomap embedding with k nearest neighbours, order-free.
+    /// Features from the network of a shipped model.
+    Features { model: &'static Shipped, classifier: Family },
+    /// Embedded pattern learning (EPL) as in the thesis: 0/1 grids over a 3-D Isomap embedding, order-free
+    /// kNN.
     Thesis,
 }
 
@@ -66,7 +58,7 @@ impl Method {
                     .with_classifier(classifier)
             }
         };
-        // The thesis knows no unknown.
+        // The thesis has no unknown class.
         let second = match self.pattern {
             Pattern::Thesis => None,
             _ => Some(Arc::new(shipped::auxiliary_model(full_frames)?)),
@@ -75,7 +67,6 @@ impl Method {
         Ok(if self.search { experiment } else { experiment.fixed() })
     }
 
-    /// Its name among figures.
     pub fn name(&self) -> &'static str {
         match self.pattern {
             Pattern::Thesis => "thesis",

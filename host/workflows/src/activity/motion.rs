@@ -1,4 +1,4 @@
-//! Motion files as training clips: recordings of markers or joints, and public sets of joints, seen by cameras all round.
+//! Training clips from motion files: marker or joint recordings and public joint sets, viewed from all sides.
 
 use std::{
     fs,
@@ -26,17 +26,14 @@ use crate::{
     silhouettes::{SilhouettesError, markers},
 };
 
-/// Work that is cancelled.
 const DURING: &str = "drawing motion files";
-/// Ending of MATLAB files, which hold sets of joints.
 const MATLAB: &str = "mat";
 
-/// A motion file with its activity and person.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct MotionFile {
-    /// The activity; `None` for files that name it: a set's MATLAB file, or NTU's file names.
+    /// `None` for files with names of activities: a set's MATLAB file, or NTU's file names.
     pub activity: Option<String>,
-    /// Who does it; `None` for the file's name, or what a set says.
+    /// `None` to use the file's name, or the set's subject.
     pub subject: Option<String>,
     pub path: PathBuf,
 }
@@ -62,33 +59,27 @@ impl FromStr for MotionFile {
     }
 }
 
-/// Which motion files are learned from, and how they are seen.
 #[derive(Clone, PartialEq, Debug)]
 pub struct MotionSettings {
     pub files: Vec<MotionFile>,
-    /// What makes bodies of points: a built-in template's name, or a TOML file; without it the built-in one that fits best.
+    /// A built-in template or a TOML file. Default: the best fitting built-in one.
     pub template: Option<String>,
     /// Unit and upward axis, to override the file.
     pub choices: Choices,
-    /// Sides that every recording is seen from, 1 to 500.
+    /// Views of every recording, 1 to 500.
     pub cameras: usize,
 }
 
-/// Why a motion file teaches nothing.
 #[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
 pub enum MotionError {
-    /// The activity is unknown.
     #[error("{}: the activity is unknown; name it ACTIVITY=FILE", path.display())]
     Activity { path: PathBuf },
-    /// A set has its own names.
     #[error("{}: a set of joints says itself who does what; give the file alone", path.display())]
     Named { path: PathBuf },
-    /// No camera sees anybody.
     #[error("{}: no person is visible; the unit or the upward axis may be wrong", path.display())]
     NobodySeen { path: PathBuf },
 }
 
-/// One recorded performance.
 struct Recorded {
     subject: String,
     activity: String,
@@ -101,10 +92,7 @@ enum Joints {
     Points(Recording, Template),
 }
 
-/// The clips of motion files, each in one view.
-///
-/// # Errors
-/// Files that cannot be read, fit no template, do not say what is done in them, or in which nobody is seen.
+/// Single-view clips of motion files. Fails for a file without an activity or without visible people.
 pub fn clips(settings: &MotionSettings, context: &Context<'_>) -> Result<Vec<Clip>> {
     within("cameras", settings.cameras, &(1..=500), "")?;
     let mut all = Vec::new();
@@ -126,14 +114,13 @@ pub fn clips(settings: &MotionSettings, context: &Context<'_>) -> Result<Vec<Cli
     Ok(all)
 }
 
-/// A recording as every camera sees it, a clip each.
 fn seen(recorded: &Recorded, cameras: usize, seed: u64) -> Vec<Clip> {
     let tracks: Vec<Track> = match &recorded.joints {
         Joints::Set(clip, layout) => {
             let bodies = clip.frames.iter().map(|joints| dress(joints, layout)).collect();
             recorded::tracks(&Bodies::Capsules(bodies), recorded.rate_hz, cameras, seed, SCALING)
         }
-        // Seen from one side already: that is the one camera.
+        // A recording from one side has a single view.
         Joints::Points(recording, template) if recording.planar => markers::one_view(recording, template),
         Joints::Points(recording, template) => {
             let frames = (0..recording.frames.len()).map(|n| recording.by_name(n)).collect();
@@ -181,9 +168,9 @@ fn recorded(file: &MotionFile, settings: &MotionSettings, context: &Context<'_>)
     }])
 }
 
-/// The performances of UTKinect or Florence, recognised by their joints.
+/// Reads UTKinect or Florence, distinguished by their joints.
 fn set(path: &Path) -> Result<Vec<Recorded>> {
-    /// Frames per second that both sets come to after their own cutting.
+    /// Frame rate of both sets after their own cutting, Hz.
     const RATE_HZ: f64 = 15.0;
     let bytes = fs::read(path).map_err(WorkflowError::read("the skeletons", path))?;
     let sets: [(Layout, &[&str]); 2] =
@@ -208,7 +195,7 @@ fn set(path: &Path) -> Result<Vec<Recorded>> {
     Err(last.map_or_else(|| MotionError::NobodySeen { path: path.into() }.into(), Into::into))
 }
 
-/// Person and activity in a name as NTU gives it: `S001C001P003R002A008.skeleton`.
+/// Subject and activity from an NTU name such as `S001C001P003R002A008.skeleton`.
 fn ntu_names(path: &Path) -> Option<(String, String)> {
     let stem = path.file_stem()?.to_str()?;
     let part = |letter: char| {
@@ -220,7 +207,7 @@ fn ntu_names(path: &Path) -> Option<(String, String)> {
     Some((part('P')?, part('A')?))
 }
 
-/// The same for a file's name and performance on every computer.
+/// Depends on the file's name and the performance's number only, so it is equal on all computers.
 fn seed_of(path: &Path, number: usize) -> u64 {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     // FNV-1a.

@@ -1,4 +1,4 @@
-//! What everybody in a recording does: people followed apart, a streaming answer for each, then one for all that was seen of each.
+//! Recognises several people in a recording: tracks them and answers for each.
 
 use std::{path::PathBuf, time::Instant};
 
@@ -19,6 +19,7 @@ use super::{
         AnswerSummary, PersonFigures, PersonFlag, PersonInFrame, of_segments, outlier_score, parts,
         restricted, rounded_probability,
     },
+    recognise::RecogniseRequest,
     recognition::Model,
     views::{Frames, View},
 };
@@ -29,55 +30,34 @@ use crate::{
     parameters::at_least,
 };
 
-#[derive(Clone, PartialEq, Eq, Debug)]
-pub struct MultiPersonSettings {
-    /// Masks of full frames, or a video.
-    pub view: View,
-    /// The only activities that can be; empty for all that the model knows.
-    pub among: Vec<String>,
-    /// Frames of the streaming answer; without it as many as a training clip had.
-    pub window: Option<usize>,
-    /// A new folder for the frames with everybody's streaming answer drawn on them.
-    pub annotated_video: Option<PathBuf>,
-}
-
-/// Everybody in a frame.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct FrameOfPeople {
-    /// Number of the frame, from 1.
+    /// From 1.
     pub frame: usize,
     pub name: String,
-    /// Those who are followed, by their numbers.
     pub people: Vec<PersonInFrame>,
     /// Why the frame is not searched for people.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub flags: Vec<String>,
 }
 
-/// Everybody in the recording.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct MultiPersonFigures {
     pub people: Vec<PersonFigures>,
     pub frames: usize,
-    /// Frames in which no person is followed.
     pub empty_frames: usize,
-    /// Frames with something doubtful.
     pub flagged_frames: usize,
     pub window: usize,
-    /// From a file to everybody's part of a streaming answer.
+    /// From the file to the streaming answers for all people.
     pub seconds_per_frame: f64,
-    /// What a user should know about how the view was read.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub remarks: Vec<String>,
 }
 
-/// Silhouettes at 100x100 or several views, where one view of full frames is needed.
 #[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
 pub enum MultiPersonError {
-    /// Cut-out silhouettes hold one person each.
     #[error("{}: these are silhouettes cut out at 100x100, which hold one person each; several are looked for in full frames", path.display())]
     CutOut { path: PathBuf },
-    /// A model that fuses views.
     #[error("{}: the model fuses {views} views; several people are recognised by a model of one view", model.display())]
     Views { model: PathBuf, views: usize },
 }
@@ -86,13 +66,13 @@ struct Somebody<'m> {
     live: Live<'m>,
     answer: Option<Answer>,
     tracks: Vec<Track>,
-    /// Numbers of the frames of the tracks, from 1.
+    /// Frame numbers of the tracks, from 1.
     numbers: Vec<usize>,
     crossing_frames: usize,
     perhaps_swapped_with: Vec<usize>,
 }
 
-/// A recognition under way: [`Self::next`] until there are no more frames, then [`Self::finish`].
+/// Call [`Self::next`] until it returns `None`, then [`Self::finish`].
 pub struct MultiPersonTracker<'m> {
     model: &'m Recogniser,
     frames: Frames,
@@ -109,14 +89,10 @@ pub struct MultiPersonTracker<'m> {
 }
 
 impl<'m> MultiPersonTracker<'m> {
-    /// Opens the view.
-    ///
-    /// # Errors
-    /// [`MultiPersonError`], a view that cannot be opened.
-    pub fn begin(model: &'m Model, settings: &MultiPersonSettings) -> Result<Self> {
-        model.check_known(&settings.among)?;
-        if settings.view.is_cut_out()? {
-            return Err(MultiPersonError::CutOut { path: settings.view.path.clone() }.into());
+    pub(super) fn begin(model: &'m Model, view: &View, request: &RecogniseRequest) -> Result<Self> {
+        model.check_known(&request.among)?;
+        if view.is_cut_out()? {
+            return Err(MultiPersonError::CutOut { path: view.path.clone() }.into());
         }
         let recogniser = model.recogniser(true);
         if recogniser.views != 1 {
@@ -124,25 +100,22 @@ impl<'m> MultiPersonTracker<'m> {
                 MultiPersonError::Views { model: model.path().into(), views: recogniser.views }.into()
             );
         }
-        if let Some(window) = settings.window {
+        if let Some(window) = request.window {
             at_least("window", window, 1, "frames")?;
         }
-        let frames = Frames::open(&settings.view)?;
+        let frames = Frames::open(view)?;
         Ok(Self {
             remarks: model
                 .expectation()
                 .into_iter()
-                .chain(super::views::remarks(
-                    std::slice::from_ref(&settings.view),
-                    std::slice::from_ref(&frames),
-                ))
+                .chain(super::views::remarks(std::slice::from_ref(view), std::slice::from_ref(&frames)))
                 .collect(),
             frames,
             tracker: None,
-            window: settings.window.unwrap_or(recogniser.typical_frames).max(1),
-            among: settings.among.clone(),
+            window: request.window.unwrap_or(recogniser.typical_frames).max(1),
+            among: request.among.clone(),
             people: Vec::new(),
-            annotated_video: settings.annotated_video.as_deref().map(AnnotatedVideo::begin).transpose()?,
+            annotated_video: request.video_out.as_deref().map(AnnotatedVideo::begin).transpose()?,
             count: 0,
             empty_frames: 0,
             flagged_frames: 0,
@@ -151,10 +124,7 @@ impl<'m> MultiPersonTracker<'m> {
         })
     }
 
-    /// Takes the next frame and answers for everybody in it; `None` where there is none.
-    ///
-    /// # Errors
-    /// Frames that cannot be read, [`crate::WorkflowError::Cancelled`].
+    /// Answers for everyone in the next frame; `None` at the end.
     pub fn next(&mut self, context: &Context<'_>) -> Result<Option<FrameOfPeople>> {
         context.cancel.check("recognising")?;
         if self.count == 0 {
@@ -192,7 +162,6 @@ impl<'m> MultiPersonTracker<'m> {
         }))
     }
 
-    /// The streaming answer for one of them.
     fn answered(
         &mut self,
         followed: Followed,
@@ -253,10 +222,6 @@ impl<'m> MultiPersonTracker<'m> {
         })
     }
 
-    /// Answers for all that was seen of everybody.
-    ///
-    /// # Errors
-    /// A model that does not fit.
     pub fn finish(self) -> Result<MultiPersonFigures> {
         if let Some(annotated_video) = self.annotated_video {
             annotated_video.finish()?;
@@ -314,7 +279,6 @@ fn figures(
     })
 }
 
-/// Drawing of one of them.
 fn shown(person: &PersonInFrame) -> Option<Shown> {
     let spans = person.top_left_bottom_right?;
     let crossing = person.flags.iter().any(|flag| matches!(flag, PersonFlag::Crossing(_)));

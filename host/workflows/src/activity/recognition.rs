@@ -1,4 +1,4 @@
-//! A streaming answer over masks or video, then windows and the whole.
+//! Streaming answers over masks or video, then answers for windows and the whole recording.
 
 use std::{
     fs,
@@ -20,6 +20,7 @@ use super::{
         AnswerSummary, Part, PersonFigures, PersonInFrame, only_in_frame, only_person, outlier_score,
         restricted, rounded_probability, stretches,
     },
+    recognise::RecogniseRequest,
     samples::{SCALING, are_full_frames},
     shipped::Shipped,
     views::{Frames, Seen, View},
@@ -32,19 +33,14 @@ use crate::{
     parameters::at_least,
 };
 
-/// A model and where it comes from.
 pub struct Model {
     path: PathBuf,
     recogniser: Recogniser,
-    /// For silhouettes that are cut out, where the other one is not for them.
     cut_out: Option<Recogniser>,
 }
 
 impl Model {
-    /// Reads a model from a file; where there is none of that path, it may be the name of one that comes with the program.
-    ///
-    /// # Errors
-    /// A file that cannot be read, is damaged, or of another version; a path that is neither.
+    /// Reads a model file. A missing path may be the name of a shipped model.
     pub fn read(path: &Path) -> Result<Self> {
         if let Some(shipped) = Self::shipped(path) {
             let [recogniser, cut_out] = shipped.recognisers()?;
@@ -55,7 +51,7 @@ impl Model {
         Ok(Self { path: path.into(), recogniser, cut_out: None })
     }
 
-    /// What to expect of the model on a new set; `None` for a model from a file.
+    /// Expected accuracy on new data; `None` for a model from a file.
     pub fn expectation(&self) -> Option<String> {
         Self::shipped(&self.path).map(Shipped::expectation)
     }
@@ -64,16 +60,13 @@ impl Model {
         path.to_str().and_then(Shipped::named).filter(|_| !path.exists())
     }
 
-    /// The file that [`Model::read`] reads; none for a model that comes with the program.
+    /// The file that [`Model::read`] reads; `None` for a shipped model.
     pub fn file(path: &Path) -> Option<&Path> {
         Self::shipped(path).is_none().then_some(path)
     }
 
-    /// The same model for clips from elsewhere (another camera, sensor, laboratory): it learns on from its surest answers for unlabelled ones, folders
-    /// of masks of one clip in one view each.
-    ///
-    /// # Errors
-    /// Masks that cannot be read or do not fit the model, a model that fuses several views.
+    /// Adapts the model to unlabelled clips from another camera, sensor or laboratory by self-training.
+    /// `clips` are folders of masks, one view of a clip each. Fails for a model that fuses views.
     pub fn adapted_to(self, clips: &[PathBuf], context: &Context<'_>) -> Result<Self> {
         let counter = Counter::new(context, "clips read");
         let mut tracks = Vec::new();
@@ -100,7 +93,6 @@ impl Model {
         })
     }
 
-    /// What recognises masks of that kind.
     pub fn recogniser(&self, full_frames: bool) -> &Recogniser {
         self.cut_out.as_ref().filter(|_| !full_frames).unwrap_or(&self.recogniser)
     }
@@ -113,10 +105,6 @@ impl Model {
         &self.recogniser.activities
     }
 
-    /// Activities in the order of the model.
-    ///
-    /// # Errors
-    /// [`WorkflowError::Parameter`] for one that it does not know.
     pub(super) fn check_known(&self, activities: &[String]) -> Result<()> {
         let Some(unknown) = activities.iter().find(|name| !self.activities().contains(name)) else {
             return Ok(());
@@ -126,19 +114,6 @@ impl Model {
     }
 }
 
-#[derive(Clone, PartialEq, Eq, Debug)]
-pub struct RecognitionSettings {
-    /// As many views as the model fuses, in its order; any number for a model of one view.
-    pub views: Vec<View>,
-    /// The only activities that can be; empty for all that the model knows.
-    pub among: Vec<String>,
-    /// Frames of the streaming answer and of windows over a long recording; without it as many as a training clip had.
-    pub window: Option<usize>,
-    /// A new folder for the first view's frames with the streaming answer drawn on them.
-    pub annotated_video: Option<PathBuf>,
-}
-
-/// More or other views than the model's.
 #[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
 #[error("{}: the model fuses {expected} views, {found} were given", model.display())]
 pub struct ViewsError {
@@ -147,52 +122,47 @@ pub struct ViewsError {
     pub found: usize,
 }
 
-/// The answer for the frames so far, at most a window of them.
+/// The answer for at most a window of frames up to this one.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct FrameAnswer {
-    /// Number of the frame, from 1.
+    /// From 1.
     pub frame: usize,
-    /// Its name in the first view.
+    /// In the first view.
     pub name: String,
-    /// The activity; `None` is unknown.
+    /// `None` is unknown.
     pub activity: Option<String>,
-    /// Probability of the activity, 0 to 1.
     pub confidence: f64,
-    /// Outlier score; above 1 the activity is unknown. `None` without a person.
+    /// Above 1 the activity is unknown. `None` without a person.
     pub outlier_score: Option<f64>,
-    /// The person in the first view, if any: the schema of several people.
+    /// The person in the first view, if any, as for several people.
     pub people: Vec<PersonInFrame>,
-    /// Doubts about the frame's masks.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub flags: Vec<String>,
 }
 
-/// The answer for the whole recording.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct RecognitionFigures {
-    /// The answer for the only person, who is in `people` too.
+    /// The answer for the only person, who is also in `people`.
     #[serde(flatten)]
     pub answer: AnswerSummary,
-    /// One person, or none in an empty recording: the schema of several people.
+    /// One person, or none in an empty recording.
     pub people: Vec<PersonFigures>,
     pub frames: usize,
-    /// Masks of all views without anybody.
     pub empty_frames: usize,
-    /// Frames with something doubtful.
     pub flagged_frames: usize,
     pub window: usize,
     /// Answers for windows that overlap by half.
     pub windows: Vec<Part>,
-    /// The recording cut into stretches of one activity each, by a hidden semi-Markov model; not by the windows.
+    /// Segments of one activity by a hidden semi-Markov model, independent of the windows.
     pub segments: Vec<Part>,
-    /// From a file to its part of a streaming answer.
+    /// From the file to the streaming answer.
     pub seconds_per_frame: f64,
-    /// What a user should know about how the views were read: grey levels of masks, a frame rate that varies.
+    /// Notes on how the views were read: grey levels of masks, a varying frame rate.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub remarks: Vec<String>,
 }
 
-/// A recognition under way: [`Self::next`] until there are no more frames, then [`Self::finish`].
+/// Call [`Self::next`] until it returns `None`, then [`Self::finish`].
 pub struct Recognition<'m> {
     model: &'m Recogniser,
     views: Vec<Frames>,
@@ -200,7 +170,7 @@ pub struct Recognition<'m> {
     live: Live<'m>,
     among: Vec<String>,
     annotated_video: Option<AnnotatedVideo>,
-    /// Everything seen so far: `[view][frame]`.
+    /// `[view][frame]`.
     tracks: Vec<Vec<Track>>,
     frames: usize,
     flagged_frames: usize,
@@ -209,34 +179,30 @@ pub struct Recognition<'m> {
 }
 
 impl<'m> Recognition<'m> {
-    /// Opens the views.
-    ///
-    /// # Errors
-    /// [`ViewsError`], views that cannot be opened.
-    pub fn begin(model: &'m Model, settings: &RecognitionSettings) -> Result<Self> {
+    pub(super) fn begin(model: &'m Model, views: &[View], request: &RecogniseRequest) -> Result<Self> {
         let path = &model.path;
         let expectation = model.expectation();
-        model.check_known(&settings.among)?;
-        let first = settings.views.first().map(View::is_cut_out).transpose()?;
+        model.check_known(&request.among)?;
+        let first = views.first().map(View::is_cut_out).transpose()?;
         let model = model.recogniser(first != Some(true));
-        let (expected, found) = (model.views, settings.views.len());
+        let (expected, found) = (model.views, views.len());
         if found != expected && (expected > 1 || found == 0) {
             return Err(ViewsError { model: path.clone(), expected, found }.into());
         }
-        if let Some(window) = settings.window {
+        if let Some(window) = request.window {
             at_least("window", window, 1, "frames")?;
         }
-        let views = settings.views.iter().map(Frames::open).collect::<Result<Vec<Frames>>>()?;
-        let window = settings.window.unwrap_or(model.typical_frames).max(1);
-        let remarks = expectation.into_iter().chain(super::views::remarks(&settings.views, &views)).collect();
+        let frames = views.iter().map(Frames::open).collect::<Result<Vec<Frames>>>()?;
+        let window = request.window.unwrap_or(model.typical_frames).max(1);
+        let remarks = expectation.into_iter().chain(super::views::remarks(views, &frames)).collect();
         Ok(Self {
             live: Live::new(model, window, true),
-            among: settings.among.clone(),
-            annotated_video: settings.annotated_video.as_deref().map(AnnotatedVideo::begin).transpose()?,
+            among: request.among.clone(),
+            annotated_video: request.video_out.as_deref().map(AnnotatedVideo::begin).transpose()?,
             tracks: vec![Vec::new(); views.len()],
             remarks,
             model,
-            views,
+            views: frames,
             window,
             frames: 0,
             flagged_frames: 0,
@@ -244,10 +210,7 @@ impl<'m> Recognition<'m> {
         })
     }
 
-    /// Takes the next frame of every view and answers for those so far; `None` where the first view ends.
-    ///
-    /// # Errors
-    /// Frames that cannot be read or do not fit the model, [`WorkflowError::Cancelled`].
+    /// Answers for the next frame of every view; `None` at the end of the first view.
     pub fn next(&mut self, context: &Context<'_>) -> Result<Option<FrameAnswer>> {
         context.cancel.check("recognising")?;
         if self.frames == 0 {
@@ -288,10 +251,6 @@ impl<'m> Recognition<'m> {
         }))
     }
 
-    /// Answers for the whole and for its windows.
-    ///
-    /// # Errors
-    /// Views that do not fit the model.
     pub fn finish(self) -> Result<RecognitionFigures> {
         let whole: Vec<Track> = self.tracks.iter().map(|parts| joined(parts.iter())).collect();
         let answer = restricted(self.model.recognise(&whole)?, &self.among);

@@ -1,7 +1,6 @@
-//! SAMPLES.toml: which masks show whom doing what from where, read into described clips.
+//! Reads SAMPLES.toml (folders of masks with subject, activity and view) into described clips.
 //!
-//! Samples of one performance from several views are one clip: those with one `clip` name, or, without names, the first of
-//! each view, the second of each, and so on in the file's order.
+//! Views with the same `clip` name form a clip. Without names, the n-th samples of each view do.
 
 use std::{
     collections::{BTreeMap, BTreeSet, HashMap},
@@ -23,13 +22,12 @@ use crate::{
     error::{About, Result, WorkflowError},
 };
 
-/// How all masks are scaled before they are described.
 pub const SCALING: Scaling = Scaling::KeepAspect;
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct File {
-    /// Marks a set that is opened for releases only, and why.
+    /// Why the set is kept for releases.
     blind: Option<String>,
     #[serde(rename = "sample", default)]
     samples: Vec<Sample>,
@@ -50,107 +48,62 @@ fn first() -> u32 {
     1
 }
 
-/// Why samples cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum SamplesError {
     #[error("it has no [[sample]] (masks, subject, activity, view)")]
     None,
-    /// A set that is kept for releases.
     #[error(
         "{}: the set is blind ({why}); it is opened for a release only: farnear activity evaluate --open-blind-set REASON", samples.display()
     )]
     Blind { samples: PathBuf, why: String },
     #[error("cannot record the opening of a blind set in {}: {source}", file.display())]
     Record { file: PathBuf, source: std::io::Error },
-    /// A sample without a person or without an activity.
     #[error("a sample has an empty subject or activity")]
     Nameless,
-    /// A folder without a visible person.
     #[error("{}: all {count} masks are empty", folder.display())]
     NobodySeen { folder: PathBuf, count: usize },
-    /// Full frames mixed with cut-out silhouettes.
     #[error(
         "the masks of {} are full frames, those of {} cut out at 100x100; samples must be alike", full.display(), cut_out.display()
     )]
-    Kinds {
-        /// A folder, or a file of samples, with full frames.
-        full: PathBuf,
-        /// One with cut-out silhouettes.
-        cut_out: PathBuf,
-    },
-    /// Two samples for one view of a clip.
+    Kinds { full: PathBuf, cut_out: PathBuf },
     #[error("clip `{clip}` of {subject} at {activity} has view {view} twice")]
-    Twice {
-        /// The clip's name.
-        clip: String,
-        subject: String,
-        activity: String,
-        view: u32,
-    },
-    /// Clips with other views, where all views were to be fused.
+    Twice { clip: String, subject: String, activity: String, view: u32 },
     #[error(
         "clips differ in their views (from {least} to {most} of them): fused views must be the same in all clips"
     )]
-    Views {
-        /// Fewest views of a clip.
-        least: usize,
-        most: usize,
-    },
-    /// Samples to test with other views than those to learn from.
+    Views { least: usize, most: usize },
     #[error("{} and {} hold other views, which cannot be fused", test.display(), train.display())]
-    OtherViews {
-        /// Samples to test with.
-        test: PathBuf,
-        /// Samples to learn from.
-        train: PathBuf,
-    },
-    /// None of the samples' activities is known to the model.
+    OtherViews { test: PathBuf, train: PathBuf },
     #[error(
         "{}: none of its activities ({}) is among those that were learned ({}); names must be the same",
         samples.display(), found.join(", "), known.join(", ")
     )]
-    NothingInCommon {
-        samples: PathBuf,
-        found: Vec<String>,
-        /// The model's.
-        known: Vec<String>,
-    },
-    /// The same person in training and test.
+    NothingInCommon { samples: PathBuf, found: Vec<String>, known: Vec<String> },
     #[error(
         "subject `{subject}` is in both {} and {}: recognising people by themselves says nothing", test.display(), train.display()
     )]
-    SamePerson {
-        subject: String,
-        /// Samples to test with.
-        test: PathBuf,
-        /// Samples to learn from.
-        train: PathBuf,
-    },
+    SamePerson { subject: String, test: PathBuf, train: PathBuf },
 }
 
-/// What a file of samples holds.
 pub struct Samples {
     pub path: PathBuf,
-    /// Clips whose views are in the order of their numbers.
+    /// The views of a clip are in the order of their numbers.
     pub clips: Vec<Clip>,
-    /// Numbers of the views of every clip; `None` where clips differ in that.
+    /// View numbers of every clip; `None` if clips differ.
     pub views: Option<Vec<u32>>,
-    /// Frames read, and how many of them were empty.
     pub frames: usize,
-    /// Frames without a subject.
     pub empty_frames: usize,
-    /// Whether masks are full frames, so that the box's motion counts.
+    /// Whether masks are full frames, so that motion of the bounding box counts.
     pub full_frames: bool,
-    /// Folders of the first clips, one per view: what times are taken with.
     pub folders: Vec<PathBuf>,
 }
 
-/// Whether masks of this size are full frames rather than cut-out silhouettes.
+/// Whether masks of this size are full frames, not cut-out silhouettes.
 pub fn are_full_frames(masks: &[Mask]) -> bool {
     masks.first().is_some_and(|mask| mask.dim() != (SIDE_PX, SIDE_PX))
 }
 
-/// Adds a line to `openings.csv` in a folder: when, by which version, what and why.
+/// Appends time, version, set and reason to `openings.csv` in a folder.
 fn record_opening(folder: &Path, path: &Path, reason: &str) -> Result<()> {
     const FILE: &str = "openings.csv";
     let file = folder.join(FILE);
@@ -165,34 +118,23 @@ fn record_opening(folder: &Path, path: &Path, reason: &str) -> Result<()> {
     Ok(opened.write_all(format!("{head}{line}").as_bytes()).map_err(failed)?)
 }
 
-/// What a file of samples lists.
 fn listed(path: &Path) -> Result<File> {
     let text = fs::read_to_string(path).map_err(WorkflowError::read("the samples", path))?;
     toml::from_str(&text).about(|| path.display().to_string())
 }
 
 impl Samples {
-    /// The folders of masks that a file of samples names.
-    ///
-    /// # Errors
-    /// A file that cannot be read or understood.
     pub fn folders(path: &Path) -> Result<Vec<PathBuf>> {
         let base = path.parent().unwrap_or(Path::new(""));
         Ok(listed(path)?.samples.iter().map(|sample| base.join(&sample.masks)).collect())
     }
 
-    /// Reads a file of samples and describes all of its masks.
-    ///
-    /// # Errors
-    /// Files, folders and masks that cannot be read or hold nothing, samples of which some are full frames and others are not.
+    /// Reads and describes the masks. Fails for a mix of full frames and cut-out silhouettes.
     pub fn read(path: &Path, context: &Context<'_>) -> Result<Self> {
         Self::read_opened(path, None, context)
     }
 
-    /// As [`Self::read`]; with a reason blind sets too, and the opening is written to `openings.csv` next to the file.
-    ///
-    /// # Errors
-    /// As [`Self::read`]; [`SamplesError::Blind`] without a reason, a record that cannot be written.
+    /// With a reason, also reads a blind set and records this in `openings.csv` next to the file.
     pub fn read_opened(path: &Path, reason: Option<&str>, context: &Context<'_>) -> Result<Self> {
         let base = path.parent().unwrap_or(Path::new(""));
         let file = listed(path)?;
@@ -235,7 +177,6 @@ impl Samples {
         Ok(Self { path: path.into(), clips, views, frames, empty_frames, full_frames, folders })
     }
 
-    /// Whether these and others are both full frames, or both cut out.
     pub fn check_kind(&self, other: &Self) -> Result<(), SamplesError> {
         if self.full_frames == other.full_frames {
             return Ok(());
@@ -243,10 +184,6 @@ impl Samples {
         Err(kinds(&self.path, &other.path, self.full_frames))
     }
 
-    /// Clips that all have the same views.
-    ///
-    /// # Errors
-    /// [`SamplesError::Views`], with the file.
     pub fn fused(self) -> Result<Vec<Clip>> {
         if self.views.is_some() {
             return Ok(self.clips);
@@ -270,13 +207,12 @@ impl Samples {
     }
 }
 
-/// Of two places that differ in it, which holds full frames and which cut-out silhouettes.
 fn kinds(one: &Path, other: &Path, one_is_full: bool) -> SamplesError {
     let (full, cut_out) = if one_is_full { (one, other) } else { (other, one) };
     SamplesError::Kinds { full: full.into(), cut_out: cut_out.into() }
 }
 
-/// The track of a folder of masks, and whether they are full frames.
+/// Track of a folder of masks, and whether they are full frames.
 fn described(folder: &Path, context: &Context<'_>) -> Result<(Track, bool)> {
     let read = masks::read_all(folder)?;
     if let Some(remark) = &read.remark {
@@ -291,7 +227,6 @@ fn described(folder: &Path, context: &Context<'_>) -> Result<(Track, bool)> {
     Ok((track, full))
 }
 
-/// Clips in the order in which they first appear, and the views that all of them have.
 fn grouped<'a>(
     samples: impl Iterator<Item = (&'a Sample, Track)>,
 ) -> Result<(Vec<Clip>, Option<Vec<u32>>), SamplesError> {
@@ -334,7 +269,6 @@ fn grouped<'a>(
     Ok((clips.into_iter().map(clip).collect(), common))
 }
 
-/// The folders of the first clip's views, in the order of the views.
 fn first_folders(samples: &[Sample], folders: &[PathBuf], count: usize) -> Vec<PathBuf> {
     let Some(first) = samples.first() else { return Vec::new() };
     let mut found: BTreeMap<u32, &PathBuf> = BTreeMap::new();

@@ -1,7 +1,6 @@
-//! Leave one set out: how a finished model, and thresholds set on other sets, do on a whole set that set nothing.
+//! Leave-one-set-out: evaluates a finished model, and thresholds from the other sets, on each set.
 //!
-//! A samples file may mark its set as blind (`blind = "why"`). It is opened for a release only, with a reason, and every opening
-//! is written to `openings.csv` next to it.
+//! A blind set (`blind = "why"`) needs a reason, which is recorded in `openings.csv` next to it.
 
 use std::path::{Path, PathBuf};
 
@@ -22,45 +21,43 @@ use crate::{
 
 #[derive(Clone, PartialEq, Debug)]
 pub struct SetsSettings {
-    /// A file of samples for each set, at least two.
     pub sets: Vec<PathBuf>,
-    /// Names of activities in the samples and in the model where they differ.
+    /// Pairs of names that differ between samples and model.
     pub same: Vec<(String, String)>,
-    /// Why blind sets are opened; without it they are refused.
+    /// Reason for opening blind sets; without it they are rejected.
     pub open_blind: Option<String>,
 }
 
-/// One set, which set nothing.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct SetFigures {
     pub set: String,
     pub answers: usize,
-    /// Share of answers in one view that is right among all activities of the model.
+    /// Share of correct single-view answers among all activities of the model.
     pub accuracy: f64,
-    /// The same if only activities of the set can be.
+    /// As `accuracy`, among the activities of the set.
     pub accuracy_among: f64,
     /// Expected calibration error among the set's activities.
     pub calibration_error_among: f64,
-    /// Share of known clips that is called unknown by the model's own limits.
+    /// Share of known clips called unknown by the model's own limits.
     pub unknown_of_known: f64,
-    /// The same by a limit that keeps the promise on the other sets together.
+    /// As `unknown_of_known`, by `limit_of_other_sets`.
     pub unknown_of_known_by_other_sets: f64,
-    /// That limit: an outlier score.
+    /// Outlier score that gives the promised share on the other sets together.
     pub limit_of_other_sets: f64,
     pub strangers: usize,
-    /// Share of unknown activities that is called unknown by the limit of the other sets; `None` without any.
+    /// Share of unknown activities called unknown by `limit_of_other_sets`; `None` without any.
     pub unknown_of_strangers_by_other_sets: Option<f64>,
-    /// Area under the ROC curve of the outlier score; `None` without unknown activities.
+    /// Area under the outlier score's ROC curve; `None` without unknown activities.
     pub outlier_auroc: Option<f64>,
 }
 
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct SetsFigures {
-    /// Share of known clips that limits promise to call unknown at most.
+    /// Largest share of known clips that the limits promise to call unknown.
     pub promised_unknown_of_known: f64,
-    /// The largest share measured on a left-out set: what to expect of a new one.
+    /// Largest measured share on a left-out set: the expectation for a new one.
     pub worst_unknown_of_known: f64,
-    /// The same by limits set on the other sets.
+    /// As `worst_unknown_of_known`, by the limits of the other sets.
     pub worst_unknown_of_known_by_other_sets: f64,
     pub sets: Vec<SetFigures>,
 }
@@ -74,10 +71,6 @@ struct Measured {
     reliability: Reliability,
 }
 
-/// Judges a model on every set, with a limit for unknown activities from the other sets.
-///
-/// # Errors
-/// Fewer than two sets, blind ones without a reason, samples that cannot be read or of which the model knows no activity.
 pub fn leave_one_set_out(
     model: &Model,
     settings: &SetsSettings,
@@ -151,7 +144,7 @@ fn measured(model: &Model, path: &Path, settings: &SetsSettings, context: &Conte
 
 fn figures(measured: &[Measured], left_out: usize) -> SetFigures {
     let set = &measured[left_out];
-    // Each set counts as much as any other, however many clips it has.
+    // Sets have equal weights, independent of their number of clips.
     let others: Vec<&Measured> =
         measured.iter().enumerate().filter(|(index, _)| *index != left_out).map(|(_, set)| set).collect();
     let largest = others.iter().map(|set| set.known.len()).max().unwrap_or(1);
@@ -197,7 +190,7 @@ mod tests {
 
     #[test]
     fn the_limit_comes_from_the_other_sets_alone() {
-        // The first set's scores are twice as high; the others promise 5 % among themselves.
+        // The first set's scores are twice as high; the others give 5 % among themselves.
         let scores = |factor: f32| (0..100).map(move |n| factor * n as f32 / 100.0);
         let sets = [set("far", scores(2.0)), set("a", scores(1.0)), set("b", scores(1.0))];
         let far = figures(&sets, 0);

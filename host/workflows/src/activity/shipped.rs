@@ -1,4 +1,4 @@
-//! Recognisers that come with the program, and how they are made.
+//! Recognisers included in the program, and their training.
 
 use std::{path::PathBuf, time::Instant};
 
@@ -14,31 +14,28 @@ use serde::Serialize;
 use super::{samples::SCALING, training_progress};
 use crate::{context::Context, error::Result, figures::rounded, parameters::within};
 
-/// A recogniser that comes with the program.
 #[derive(PartialEq)]
 pub struct Shipped {
-    /// Name, used instead of a file.
     pub name: &'static str,
-    /// Description, one line.
     pub about: &'static str,
-    /// Figures of a blind set; `None` if none was measured.
+    /// Figures of a blind set, if measured.
     new_set: Option<NewSet>,
     bytes: &'static [u8],
-    /// Its file for silhouettes cut out at 100x100, without motion through the picture.
+    /// Model file for silhouettes cut out at 100x100, without motion through the picture.
     cut_out: &'static [u8],
 }
 
-/// Figures of a set that had no part in making the model, shares from 0 to 1.
+/// Figures of a set not used for the model; shares from 0 to 1.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 pub struct NewSet {
-    /// Right, of all activities.
+    /// Correct among all activities.
     pub accuracy: f64,
-    /// Right, among the activities of the set.
+    /// Correct among the activities of the set.
     pub accuracy_among: f64,
     pub calibration_error: f64,
-    /// Known activities that are called unknown.
+    /// Known activities called unknown.
     pub unknown_of_known: f64,
-    /// How well the outlier score tells unknown activities (area under the ROC curve; 0.5 is chance).
+    /// Area under the outlier score's ROC curve; 0.5 is chance.
     pub outlier_auroc: f64,
 }
 
@@ -67,14 +64,13 @@ pub const MODELS: &[Shipped] = &[
     },
 ];
 
-/// The recogniser that says beside one trained on full frames or cut-out silhouettes what is unknown. It is the one that sees order, whatever
-/// the trained one sees: it knows strangers better.
+/// The sequence model, which supplies the outlier score for trained models.
 pub fn auxiliary_model(full_frames: bool) -> Result<Recogniser> {
     let [full, cut_out] = MODELS[0].recognisers()?;
     Ok(if full_frames { full } else { cut_out })
 }
 
-/// What they were trained on and tested on, and where they fail.
+/// Data sheet: training, tests and failures.
 pub const SHEET: &str = include_str!("../../../recognition/models/README.md");
 
 impl std::fmt::Debug for Shipped {
@@ -84,7 +80,7 @@ impl std::fmt::Debug for Shipped {
 }
 
 impl Shipped {
-    /// What to expect of it on a new set, for the user.
+    /// Expected accuracy on new data, for the user.
     #[must_use]
     pub fn expectation(&self) -> String {
         match self.new_set {
@@ -103,25 +99,19 @@ impl Shipped {
         MODELS.iter().find(|model| model.name == name)
     }
 
-    /// The recogniser of full frames, and that of cut-out silhouettes.
-    ///
-    /// # Errors
-    /// None but in a program that was built from a damaged file.
+    /// Recognisers of full frames and of cut-out silhouettes.
     pub fn recognisers(&self) -> Result<[Recogniser; 2]> {
         Ok([Recogniser::from_bytes(self.bytes)?, Recogniser::from_bytes(self.cut_out)?])
     }
 }
 
-/// What there is of a shipped model to list.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct ModelFigures {
     pub name: &'static str,
     pub about: &'static str,
-    /// Its size in the program.
     pub bytes: usize,
-    /// Share of known clips called unknown, on synthetic people like those it was made of. Real people: see `on_a_new_set`.
+    /// Share of known clips called unknown, on synthetic people as in training.
     pub false_alarms_on_synthetic_people: f64,
-    /// Figures of a blind set.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub on_a_new_set: Option<NewSet>,
     pub activities: Vec<String>,
@@ -144,71 +134,62 @@ pub fn list() -> Result<Vec<ModelFigures>> {
         .collect()
 }
 
-/// People and passes that the shipped models were made with.
+/// People and passes of the shipped models.
 pub const PEOPLE: usize = 3000;
 pub const PASSES: usize = 6;
 
-/// How models are made of synthetic people.
 #[derive(Clone, PartialEq, Debug)]
 pub struct SyntheticTraining {
-    /// People to learn from, each at all activities once, 20 to 5000.
+    /// Training subjects, each with all activities once, 20 to 5000.
     pub people: usize,
-    /// Passes over all of them, 1 to 200.
+    /// 1 to 200.
     pub passes: usize,
-    /// A new folder for the models.
     pub out: PathBuf,
 }
 
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct SyntheticTrainingFigures {
-    /// Clips learned from; their mirrors come on top.
     pub clips: usize,
-    /// Clips of other people by which models were calibrated.
+    /// Clips of other people for calibration.
     pub calibration_clips: usize,
     pub activities: usize,
     pub seconds: f64,
     pub model: Vec<MadeModel>,
 }
 
-/// A model that was made.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct MadeModel {
-    /// Its file in the folder.
     pub file: String,
-    /// Share of right answers for the clips that calibrated it.
     pub accuracy: f64,
     pub bytes: usize,
 }
 
-/// The first of the people who calibrate: nobody who is learned from, however many those are.
+/// First calibration subject, beyond all training subjects.
 const CALIBRATING_FROM: usize = 100_000;
-/// People who are drawn between two looks at whether to go on.
+/// People drawn between two checks for cancellation.
 const PEOPLE_AT_ONCE: usize = 10;
-/// The models' files, whether the order of frames counts, and whether silhouettes are cut out.
+/// File name, mode, and whether silhouettes are cut out.
 const FILES: [(&str, Mode, bool); 4] = [
     ("everyday.fnm", Mode::Ordered, false),
     ("everyday-order-free.fnm", Mode::OrderFree, false),
     ("everyday-cut-out.fnm", Mode::Ordered, true),
     ("everyday-order-free-cut-out.fnm", Mode::OrderFree, true),
 ];
-/// Frames before and behind a frame that a network sees where their order counts: with it a fifth of a second to a whole one.
+/// Frames before and after a frame in the sequence network's input: together 0.2 s to 1 s.
 const REACH: usize = 2;
-/// Least share of a clip's frames that a step sees where their order does not count. Where it does, it gained less than chance gives (the data sheet has
-/// figures).
+/// Least share of a clip's frames in a training step without order (with order no gain, see the data sheet).
 const KEEP: f32 = 0.6;
-/// Spread of what is added to a whole clip in a step where order counts, in spreads of each component: answers know better how sure they are.
+/// Standard deviation of a whole clip's offset in a training step with order, to improve calibration. In
+/// standard deviations of each component.
 const SHIFT: f32 = 0.2;
-/// Networks of a model that answer together.
+/// Networks in a model's ensemble.
 const MEMBERS: usize = 2;
 /// Principal components of centroid distances and coarse silhouettes.
 const DIMENSIONS: usize = 60;
-/// Silhouettes that principal components are found from.
+/// Silhouettes for the principal components.
 const GALLERY: usize = 4000;
 
-/// Makes recognisers of everyday activities from seeds alone: the same files every time on one kind of processor.
-///
-/// # Errors
-/// Parameters out of range, models that cannot be written, [`crate::WorkflowError::Cancelled`].
+/// Trains recognisers of everyday activities from seeds. The same kind of processor gives identical files.
 pub fn train(settings: &SyntheticTraining, context: &Context<'_>) -> Result<SyntheticTrainingFigures> {
     within("people", settings.people, &(20..=5000), "")?;
     within("passes", settings.passes, &(1..=200), "")?;
@@ -243,7 +224,6 @@ pub fn train(settings: &SyntheticTraining, context: &Context<'_>) -> Result<Synt
     })
 }
 
-/// Trains a model and writes it.
 fn one(
     file: &str,
     mode: Mode,

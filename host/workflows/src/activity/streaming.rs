@@ -1,5 +1,4 @@
-//! A streaming answer with its data, the picture and the person cut out of it: for a face that shows both while they come, from a
-//! video or from the rig's camera.
+//! Streaming answers with picture and silhouette, for a live view of a video or the rig's camera.
 
 use std::{path::Path, time::Instant};
 
@@ -31,52 +30,45 @@ use crate::{
     silhouettes::frame_of,
 };
 
-/// Activities that are named with their probabilities.
 const BEST: usize = 3;
 
-/// The answer for the frames so far, at most a window of them.
+/// The answer for at most a window of frames up to this one.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct RunningAnswer {
-    /// Number of the frame, from 1.
+    /// From 1.
     pub frame: usize,
-    /// The activity; `None` is unknown.
+    /// `None` is unknown.
     pub activity: Option<String>,
-    /// Probability of the activity, 0 to 1.
     pub confidence: f64,
-    /// Outlier score: above 1 unknown; `None` where no silhouette has been seen.
+    /// Above 1 the activity is unknown; `None` before the first silhouette.
     pub outlier_score: Option<f64>,
-    /// The likeliest activities, the best first.
+    /// The most probable first.
     pub best: Vec<Probability>,
-    /// The person, if any: the schema of several people.
+    /// The person, if any, as for several people.
     pub people: Vec<PersonInFrame>,
-    /// Doubts about the frame's mask.
     pub flags: Vec<String>,
 }
 
-/// A frame, its mask and the answer with it.
 pub struct Moment<'a> {
     pub picture: &'a Array2<u8>,
     pub mask: &'a Mask,
     pub answer: &'a RunningAnswer,
 }
 
-/// The answer for all frames.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct RunningFigures {
-    /// The answer for the only person, who is in `people` too.
+    /// The answer for the only person, who is also in `people`.
     #[serde(flatten)]
     pub answer: AnswerSummary,
-    /// The likeliest activities, the best first.
     pub best: Vec<Probability>,
-    /// One person, or none in an empty recording: the schema of several people.
+    /// One person, or none in an empty recording.
     pub people: Vec<PersonFigures>,
     pub frames: usize,
     pub empty_frames: usize,
-    /// From a frame to its answer, mean, in s.
+    /// Mean time from a frame to its answer.
     pub seconds_per_frame: f64,
 }
 
-/// Recognises frame by frame.
 pub struct StreamingRecogniser<'m> {
     model: &'m Recogniser,
     live: Live<'m>,
@@ -92,7 +84,6 @@ impl<'m> StreamingRecogniser<'m> {
         Self { model, live, extractor: None, tracks: Vec::new(), seconds: 0.0 }
     }
 
-    /// Takes the next frame.
     pub fn take(&mut self, pixels: &Pixels) -> Result<(Mask, RunningAnswer)> {
         let start = Instant::now();
         let frame = frame_of(pixels);
@@ -117,7 +108,6 @@ impl<'m> StreamingRecogniser<'m> {
         Ok((found.mask, running))
     }
 
-    /// The answer for all of it.
     pub fn finish(&self) -> Result<RunningFigures> {
         let whole = joined(self.tracks.iter());
         let empty_frames = whole.empty_frames;
@@ -140,7 +130,7 @@ impl<'m> StreamingRecogniser<'m> {
     }
 }
 
-/// Recognises a video and gives each frame with its answer to `on_moment`.
+/// Recognises a video and passes each frame with its answer to `on_moment`.
 pub fn video(
     path: &Path,
     model: &Model,
@@ -162,7 +152,7 @@ pub fn video(
     watcher.finish()
 }
 
-/// Recognises what the rig's camera sees until the context or `on_moment` wants no more.
+/// Recognises images of the rig's camera until the context or `on_moment` stops.
 pub fn camera(
     settings: &LiveSettings,
     model: &Model,
@@ -173,7 +163,7 @@ pub fn camera(
     live::watch(settings, context, |_, image| {
         let pixels = Pixels::Grey(eight_bits(&image));
         let (mask, answer) = watcher.take(&pixels)?;
-        // A live recording has no end: memory must not grow with it.
+        // A live recording has no end, so tracks are not stored.
         watcher.tracks.clear();
         on_moment(&Moment { picture: &grey(pixels), mask: &mask, answer: &answer })
     })

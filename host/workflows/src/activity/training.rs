@@ -1,4 +1,4 @@
-//! Training a model on samples of masks.
+//! Trains a model on samples of masks.
 
 use std::{path::PathBuf, time::Instant};
 
@@ -22,19 +22,18 @@ use crate::{
     parameters::at_least,
 };
 
-/// Fewest frames of a window that shows something.
 const WINDOW_MIN: usize = 5;
 
 #[derive(Clone, PartialEq, Debug)]
 pub struct TrainingSettings {
     pub samples: Option<PathBuf>,
-    /// Motion files to learn from, too or instead; every view is then a separate clip.
+    /// Motion files as additional or only training data; every view is a separate clip.
     pub motion: Option<MotionSettings>,
     pub out: PathBuf,
     pub method: Method,
-    /// Cut clips into windows of this many frames first, at least 5: for un-segmented recordings.
+    /// Cut clips into windows of this many frames, at least 5: for un-segmented recordings.
     pub window: Option<usize>,
-    /// Use every view as a separate clip, so that the model recognises from any single view.
+    /// Use every view as a separate clip, so that the model recognises single views.
     pub any_view: bool,
 }
 
@@ -43,29 +42,24 @@ pub struct TrainingFigures {
     pub clips: usize,
     pub subjects: usize,
     pub activities: usize,
-    /// Views that the model fuses.
     pub views: usize,
     pub frames: usize,
-    /// Masks without anybody.
     pub empty_frames: usize,
-    /// Whether masks are full frames, so that the box's motion is learned.
+    /// Whether masks are full frames, so that motion of the bounding box is learned.
     pub full_frames: bool,
-    /// The method's name.
     pub mode: &'static str,
-    /// How silhouettes are laid out.
     pub layout: String,
-    /// What clips are turned into.
     pub pattern: String,
     /// Of the Gaussians of the RBF map.
     pub gamma: Option<f32>,
     /// Of the RBF map's system.
     pub condition_number: Option<f64>,
-    /// Over the folds in which the settings were chosen, 0 to 1.
+    /// Accuracy in the cross-validation that chose the settings.
     pub inner_accuracy: Option<f64>,
     pub seconds: f64,
 }
 
-/// Trains a model. With two or more subjects and a search, its settings are chosen by cross-validation over them.
+/// With two or more subjects and a search, chooses the settings by cross-validation over subjects.
 pub fn train(settings: &TrainingSettings, context: &Context<'_>) -> Result<TrainingFigures> {
     if let Some(window) = settings.window {
         at_least("window", window, WINDOW_MIN, "frames")?;

@@ -1,4 +1,4 @@
-//! The context of a workflow as what watches a training or an evaluation.
+//! Progress and cancellation of training and evaluation.
 
 use std::{
     sync::{Mutex, PoisonError},
@@ -13,7 +13,6 @@ use crate::{
     error::{Result, WorkflowError},
 };
 
-/// Counts the spaces that a training tries.
 pub(super) struct Training<'a>(Counter<'a>);
 
 impl<'a> Training<'a> {
@@ -36,7 +35,7 @@ impl Watch for Training<'_> {
 pub(super) struct Folds<'a> {
     context: &'a Context<'a>,
     begun: Instant,
-    /// Held during the report, so that counts are reported in order.
+    /// Locked while reporting, so that counts are in order.
     state: Mutex<State>,
 }
 
@@ -50,7 +49,7 @@ struct State {
 }
 
 impl State {
-    /// The share of the work that is done. A fold that is done counts as one, however many spaces it took.
+    /// Completed share of the work. A completed fold counts as one, independent of its spaces.
     fn share(&self) -> f64 {
         let each = self.spaces.max(1);
         let spaces = self.spaces_tried.max(self.folds_done * each) as f64;
@@ -64,7 +63,7 @@ impl<'a> Folds<'a> {
     }
 
     fn note(&self, change: impl FnOnce(&mut State)) {
-        // Numbers cannot be half-changed.
+        // Counts are valid even after a panic.
         let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
         change(&mut state);
         let share = state.share();
@@ -96,7 +95,6 @@ impl Watch for Folds<'_> {
     }
 }
 
-/// Counts the passes of a network's training.
 pub(super) struct Passes<'a>(Counter<'a>);
 
 impl<'a> Passes<'a> {
@@ -115,7 +113,6 @@ impl Watch for Passes<'_> {
     }
 }
 
-/// What came out of watched work, or that it was cancelled.
 pub(super) fn outcome<T, E: Into<WorkflowError>>(
     result: std::result::Result<T, E>,
     context: &Context<'_>,

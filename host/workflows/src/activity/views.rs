@@ -1,6 +1,10 @@
-//! Where the masks of a view come from: a folder of them, or a video.
+//! Reads the masks of a view from a folder or a video.
 
-use std::path::{Path, PathBuf};
+use std::{
+    fmt,
+    path::{Path, PathBuf},
+    str::FromStr,
+};
 
 use farnear_files::{
     masks::{
@@ -18,28 +22,43 @@ use farnear_silhouettes::mask::{
 
 use crate::{error::Result, silhouettes::frame_of};
 
-/// What a view is given as.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum ViewKind {
-    /// Masks: pictures of black and white.
     Masks,
-    /// A video, from which masks are made first.
+    /// A video from which masks are extracted.
     Video,
 }
 
+impl fmt::Display for ViewKind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Masks => "masks",
+            Self::Video => "video",
+        })
+    }
+}
+
+impl FromStr for ViewKind {
+    type Err = String;
+
+    fn from_str(text: &str) -> std::result::Result<Self, String> {
+        match text {
+            "masks" => Ok(Self::Masks),
+            "video" => Ok(Self::Video),
+            other => Err(format!("`{other}` is not a kind of view: expected masks or video")),
+        }
+    }
+}
+
 impl ViewKind {
-    /// What a path most likely holds: masks are folders of pictures (or one picture) with hardly anything but two grey levels, or labels
-    /// of a background model.
-    ///
-    /// # Errors
-    /// Folders without pictures, pictures that cannot be read.
+    /// Guesses the kind from the grey levels. Masks have two levels, or labels of a background model.
     pub fn guess(path: &Path) -> Result<Self> {
         let files = if path.is_dir() { pictures::list(path)? } else { vec![path.to_path_buf()] };
         let ending = files[0].extension().unwrap_or_default().to_string_lossy().to_lowercase();
         if !pictures::EXTENSIONS.contains(&ending.as_str()) {
             return Ok(Self::Video);
         }
-        // The first picture alone first: videos need no survey.
+        // A video is recognised by its first picture, without surveying the rest.
         let mut first = Histogram::default();
         match masks::grey(&files[0]) {
             Ok(picture) => first.add(&picture),
@@ -57,19 +76,13 @@ impl ViewKind {
     }
 }
 
-/// A view: its path and kind.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct View {
-    /// A folder, a picture or a video.
     pub path: PathBuf,
     pub kind: ViewKind,
 }
 
 impl View {
-    /// Whether it holds silhouettes that are cut out at 100x100.
-    ///
-    /// # Errors
-    /// Masks that cannot be read.
     pub(super) fn is_cut_out(&self) -> Result<bool> {
         if self.kind == ViewKind::Video {
             return Ok(false);
@@ -80,7 +93,6 @@ impl View {
     }
 }
 
-/// A frame's mask and the doubts about it.
 pub(super) struct Seen {
     pub name: String,
     pub mask: Mask,
@@ -89,12 +101,10 @@ pub(super) struct Seen {
     pub picture: Option<Pixels>,
 }
 
-/// Everything that moves in a frame.
 pub(super) struct Moved {
     pub name: String,
     /// Or why the frame has no mask.
     pub mask: std::result::Result<Mask, Flag>,
-    /// The video's frame; `None` for masks.
     pub picture: Option<Pixels>,
 }
 
@@ -105,13 +115,11 @@ pub(super) fn size(picture: &Pixels) -> (usize, usize) {
     }
 }
 
-/// The frames of a view, one by one.
 pub(super) enum Frames {
     Masks { files: std::vec::IntoIter<PathBuf>, levels: Levels, first: Option<First> },
     Video { video: Box<Video>, extractor: Option<Box<Extractor>> },
 }
 
-/// What the first mask of a view fixes for the others.
 pub(super) struct First {
     name: String,
     size: (usize, usize),
@@ -130,7 +138,6 @@ impl Frames {
         })
     }
 
-    /// What a user should know about how the view is read.
     pub fn remark(&self) -> Option<&String> {
         match self {
             Self::Masks { levels, .. } => levels.remark.as_ref(),
@@ -138,7 +145,7 @@ impl Frames {
         }
     }
 
-    /// The next frame; `None` at the end.
+    /// Returns `None` at the end.
     pub fn next(&mut self) -> Result<Option<Seen>> {
         match self {
             Self::Masks { files, levels, first } => {
@@ -152,7 +159,7 @@ impl Frames {
 }
 
 impl Frames {
-    /// The next frame's mask of everybody; `None` at the end.
+    /// The next frame's mask of everyone; `None` at the end.
     pub fn next_moving(&mut self) -> Result<Option<Moved>> {
         match self {
             Self::Masks { files, levels, first } => files
@@ -174,7 +181,6 @@ impl Frames {
     }
 }
 
-/// What a user should know about how views are read, each with the view's path.
 pub(super) fn remarks(views: &[View], frames: &[Frames]) -> Vec<String> {
     let remark = |(view, frames): (&View, &Frames)| {
         frames.remark().map(|remark| format!("{}: {remark}", view.path.display()))
@@ -182,7 +188,7 @@ pub(super) fn remarks(views: &[View], frames: &[Frames]) -> Vec<String> {
     views.iter().zip(frames).filter_map(remark).collect()
 }
 
-/// A mask of the size of the view's first.
+/// Reads a mask, which must have the size of the view's first.
 fn like_first<'f>(
     file: &Path,
     levels: &Levels,
@@ -217,7 +223,7 @@ fn seen_in_mask(file: &Path, levels: &Levels, first: &mut Option<First>) -> Resu
     let (name, mask, first) = like_first(file, levels, first)?;
     let found = mask.dim();
     let mut flags = first.chooser.choose(mask.view()).flags;
-    // Cut-out silhouettes fill their picture, so touching its edge says nothing.
+    // Cut-out silhouettes always touch the picture's edge.
     flags.retain(|flag| found != (SIDE_PX, SIDE_PX) || *flag != Flag::CutByEdge);
     Ok(Seen { name, mask, flags, picture: None })
 }
@@ -235,7 +241,7 @@ mod tests {
 
     use super::*;
 
-    /// A folder of three masks (the first one empty) whose background, shadow and person have these levels.
+    /// Three masks, the first one empty, whose background, shadow and person have these levels.
     fn folder([background, shadow, person]: [u8; 3]) -> tempfile::TempDir {
         let folder = tempfile::tempdir().expect("a folder");
         for number in 0..3 {

@@ -1,4 +1,4 @@
-//! A job's fields as texts, taken out one by one with their types: a TOML table and a row of CSV give the same.
+//! A job's fields as typed values. A TOML table and a CSV row give the same.
 
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -11,12 +11,11 @@ use serde_json::{Map, Value};
 
 use super::BatchError;
 
-/// The names of fields and their values; a list has several.
+/// Values by field name; a list has several.
 #[derive(Clone, PartialEq, Eq, Debug, Default)]
 pub(super) struct Fields {
     values: BTreeMap<String, Vec<String>>,
     taken: BTreeSet<&'static str>,
-    /// What paths are relative to.
     base: PathBuf,
 }
 
@@ -25,12 +24,11 @@ impl Fields {
         Self { base: base.into(), ..Self::default() }
     }
 
-    /// Adds a field; `min-confidence` and `min_confidence` are one.
+    /// `min-confidence` and `min_confidence` are the same field.
     pub fn insert(&mut self, name: &str, values: Vec<String>) {
         self.values.insert(name.trim().replace('-', "_"), values);
     }
 
-    /// A row of a table in TOML.
     pub fn of_table(table: &toml::Table, base: &Path) -> Result<Self, BatchError> {
         let mut fields = Self::new(base);
         for (name, value) in table {
@@ -70,19 +68,17 @@ impl Fields {
         .collect()
     }
 
-    /// All fields but one, as they were written, in the order of their names.
+    /// All fields but `name`, as written, sorted by name.
     pub fn without(&self, name: &str) -> BTreeMap<String, Vec<String>> {
         let mut values = self.values.clone();
         values.remove(name);
         values
     }
 
-    /// A field that must be there, as a text.
     pub fn text(&mut self, name: &'static str) -> Result<String, BatchError> {
         self.optional_text(name)?.ok_or(BatchError::MissingField { name })
     }
 
-    /// A field that may be there, as a text.
     pub fn optional_text(&mut self, name: &'static str) -> Result<Option<String>, BatchError> {
         self.taken.insert(name);
         match self.values.get(name).map(Vec::as_slice) {
@@ -92,33 +88,23 @@ impl Fields {
         }
     }
 
-    /// A list of texts, in CSV separated by `;`; empty where it is not there.
+    /// A list, in CSV separated by `;`; empty by default.
     pub fn texts(&mut self, name: &'static str) -> Vec<String> {
         self.taken.insert(name);
         let parts = self.values.get(name).into_iter().flatten().flat_map(|value| value.split(';'));
         parts.map(str::trim).filter(|part| !part.is_empty()).map(Into::into).collect()
     }
 
-    /// A list of paths, in CSV separated by `;`.
-    pub fn paths(&mut self, name: &'static str) -> Result<Vec<PathBuf>, BatchError> {
-        if !self.values.contains_key(name) {
-            return Err(BatchError::MissingField { name });
-        }
-        Ok(self.texts(name).into_iter().map(|part| self.base.join(part)).collect())
-    }
-
-    /// A path that must be there, relative to the manifest.
     pub fn path(&mut self, name: &'static str) -> Result<PathBuf, BatchError> {
         let text = self.text(name)?;
         Ok(self.base.join(text))
     }
 
-    /// A path that may be there.
     pub fn optional_path(&mut self, name: &'static str) -> Result<Option<PathBuf>, BatchError> {
         Ok(self.optional_text(name)?.map(|text| self.base.join(text)))
     }
 
-    /// The name of something built in, or a file of one's own: a file where there is one of that name.
+    /// A built-in name or a file; an existing file takes precedence.
     pub fn name_or_file(&mut self, name: &'static str) -> Result<Option<PathBuf>, BatchError> {
         let text = self.optional_text(name)?;
         Ok(text.map(|text| {
@@ -127,12 +113,10 @@ impl Fields {
         }))
     }
 
-    /// What paths are relative to.
     pub fn base(&self) -> &Path {
         &self.base
     }
 
-    /// A value that may be there.
     pub fn optional<T: FromStr<Err: Display>>(
         &mut self,
         name: &'static str,
@@ -144,12 +128,11 @@ impl Fields {
         }
     }
 
-    /// A value, or the usual one.
     pub fn or<T: FromStr<Err: Display>>(&mut self, name: &'static str, usual: T) -> Result<T, BatchError> {
         Ok(self.optional(name)?.unwrap_or(usual))
     }
 
-    /// `true` or `false`, which it is where it is not there.
+    /// False by default.
     pub fn flag(&mut self, name: &'static str) -> Result<bool, BatchError> {
         match self.optional_text(name)?.as_deref() {
             None | Some("false") => Ok(false),
@@ -158,7 +141,7 @@ impl Fields {
         }
     }
 
-    /// Refuses unknown fields: a typing error must not silently select a default.
+    /// Rejects unknown fields, so that a typing error does not select a default.
     pub fn all_taken(&self) -> Result<(), BatchError> {
         match self.values.keys().find(|name| !self.taken.contains(name.as_str())) {
             None => Ok(()),
@@ -199,10 +182,7 @@ mod tests {
         assert!(fields.flag("fill").expect("well"));
         assert!(!fields.flag("centred").expect("well"));
         assert_eq!(fields.or("median", 3_usize).expect("well"), 3);
-        assert_eq!(
-            fields.paths("views").expect("well"),
-            ["/base/x", "/base/y", "/base/z"].map(PathBuf::from)
-        );
+        assert_eq!(fields.texts("views"), ["x", "y", "z"]);
         assert_eq!(fields.text("time").expect("well"), "2014-06-23T11:30:00Z");
         assert!(matches!(fields.text("near"), Err(BatchError::MissingField { name: "near" })));
         let error = fields.all_taken().expect_err("smooth").to_string();

@@ -1,4 +1,4 @@
-//! A new manifest from files: a row for each file that a pattern matches.
+//! Writes a manifest with a row for each file that matches a pattern.
 
 use std::{
     fs,
@@ -11,7 +11,7 @@ use farnear_files::staging::write_file;
 use super::{BatchError, jobs, manifest::KIND};
 use crate::error::Result;
 
-/// A field and its value, in which each `*` is the text that the same `*` of the first pattern matched.
+/// A field and its value. Each `*` stands for the text matched by the same `*` of the first pattern.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Pattern {
     name: String,
@@ -31,8 +31,8 @@ impl FromStr for Pattern {
     }
 }
 
-/// Writes a manifest (CSV) with a job of `kind` for each file that the first pattern matches, in the order of their names; returns how
-/// many. Patterns are relative to the manifest's folder.
+/// Writes a CSV manifest with a job of `kind` per matching file, sorted by name; returns their number.
+/// Patterns are relative to the manifest's folder.
 pub fn generate(manifest: &Path, kind: &str, fields: &[Pattern]) -> Result<usize> {
     jobs::kind(kind)?;
     let pattern = |reason: String| BatchError::Pattern(reason);
@@ -96,7 +96,7 @@ fn filled(value: &str, captured: &[String]) -> String {
     text
 }
 
-/// What the `*` of the parts of a path matched, for each file below `folder`.
+/// Texts matched by the `*` of each part of a path, for each file below `folder`.
 fn search(folder: &Path, parts: &[&str], captured: &mut Vec<String>, found: &mut Vec<Vec<String>>) {
     let Some((part, rest)) = parts.split_first() else { return };
     if !part.contains('*') {
@@ -125,7 +125,7 @@ fn search(folder: &Path, parts: &[&str], captured: &mut Vec<String>, found: &mut
     }
 }
 
-/// The texts that the `*` of a pattern match in a name, the first ones as short as possible.
+/// Texts matched by each `*` of a pattern; the first ones are as short as possible.
 fn matched(pattern: &str, name: &str) -> Option<Vec<String>> {
     let Some((before, after)) = pattern.split_once('*') else { return (pattern == name).then(Vec::new) };
     let rest = name.strip_prefix(before)?;

@@ -1,8 +1,7 @@
-//! The kinds of jobs: a new one is a line in the table and a function that makes a workflow's settings of fields.
+//! Kinds of jobs: a line in the table and a function that builds a workflow's settings from fields.
 
 mod campaign;
 mod evaluate;
-mod people;
 
 use std::path::{Path, PathBuf};
 
@@ -10,6 +9,7 @@ use serde_json::Value;
 
 use super::{BatchError, fields::Fields};
 use crate::{
+    activity::recognise::RecogniseRequest,
     context::Context,
     correct::CorrectRequest,
     depth::DepthRequest,
@@ -22,7 +22,6 @@ use crate::{
 
 pub(super) struct Kind {
     pub name: &'static str,
-    /// Whether its result is one file and not a folder.
     pub makes_file: bool,
     pub work: fn(&mut Fields) -> Result<Box<dyn Job>>,
 }
@@ -36,13 +35,12 @@ const KINDS: &[Kind] = &[
     Kind::of::<PassagesRequest>(),
     Kind::of::<MarkersRequest>(),
     Kind::of::<ShadowRemoveRequest>(),
-    Kind { name: "recognise", makes_file: false, work: people::recognise },
+    Kind::of::<RecogniseRequest>(),
     Kind { name: "evaluate", makes_file: false, work: evaluate::work },
     Kind { name: "campaign", makes_file: false, work: campaign::work },
 ];
 
 impl Kind {
-    /// The task of a request.
     const fn of<R: Request>() -> Self {
         Self {
             name: R::NAME,
@@ -56,13 +54,12 @@ impl Kind {
 }
 
 impl Kind {
-    /// The words of a command may be joined by hyphens: `silhouettes-video`.
+    /// Accepts hyphens between the words of a command: `silhouettes-video`.
     fn is_named(&self, name: &str) -> bool {
         self.name.replace(' ', "-") == name.replace(' ', "-")
     }
 }
 
-/// The kind of this name.
 pub(super) fn kind(name: &str) -> Result<&'static Kind, BatchError> {
     KINDS
         .iter()
@@ -74,12 +71,10 @@ pub(super) fn is_kind(name: &str) -> bool {
     KINDS.iter().any(|kind| kind.is_named(name))
 }
 
-/// All names, in the table's order.
 pub(super) fn names() -> Vec<String> {
     KINDS.iter().map(|kind| kind.name.replace(' ', "-")).collect()
 }
 
-/// A workflow described by its settings and inputs.
 struct Call<S> {
     settings: S,
     inputs: Vec<PathBuf>,
@@ -96,7 +91,7 @@ impl<S: Send> Job for Call<S> {
     }
 }
 
-/// Figures as they are printed; a number that JSON does not know becomes null.
+/// Figures as printed. A number that JSON cannot represent becomes null.
 pub(super) fn value(figures: impl serde::Serialize) -> Result<Value> {
     serde_json::to_value(figures).map_err(|error| {
         WorkflowError::parameter("figures", error, "figures that JSON can hold") // they are plain structs: not met

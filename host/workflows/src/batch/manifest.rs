@@ -1,7 +1,7 @@
-//! The list of jobs, read job by job so that it may be of any length.
+//! Reads a list of jobs of any length, job by job.
 //!
-//! TOML: a `[[job]]` table per job, after tables of a kind's name (`[depth]`) with what all its jobs share. CSV: a header with the
-//! fields' names, a row per job, an empty cell where a field is not given.
+//! TOML: a `[[job]]` table per job, after tables by kind (`[depth]`) with fields shared by all jobs of that
+//! kind. CSV: a header with field names and a row per job; an empty cell is a missing field.
 
 use std::{
     collections::BTreeMap,
@@ -12,23 +12,18 @@ use std::{
 
 use super::{BatchError, fields::Fields};
 
-/// A longer job is refused: memory must not depend on the file's contents.
+/// Most bytes of a job, so that memory does not depend on the file.
 const JOB_BYTES_MAX: u64 = 1 << 20;
-/// The line that begins a job in TOML.
 const JOB: &str = "[[job]]";
-/// The field that names the task.
 pub(super) const KIND: &str = "do";
 
-/// A job of the manifest.
 pub(super) struct Entry {
     pub number: usize,
-    /// The line that it begins on.
     pub line: usize,
     /// Task and remaining fields, or why they cannot be read.
     pub job: Result<(String, Fields), BatchError>,
 }
 
-/// The jobs of a manifest, one after the other.
 pub(super) struct Manifest {
     path: PathBuf,
     base: PathBuf,
@@ -42,7 +37,6 @@ enum Source {
 }
 
 impl Manifest {
-    /// Opens a manifest and reads the part before its first job.
     pub fn open(path: &Path) -> Result<Self, BatchError> {
         let base = path.parent().unwrap_or(Path::new("")).to_path_buf();
         let ending = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
@@ -55,7 +49,7 @@ impl Manifest {
         Ok(Self { path: path.into(), base, source, number: 0 })
     }
 
-    /// How many jobs there are; reads the manifest once.
+    /// Number of jobs. Reads the file once.
     pub fn count(path: &Path) -> Result<usize, BatchError> {
         let mut all = Self::open(path)?;
         let mut jobs = 0;
@@ -72,7 +66,7 @@ impl Manifest {
         Ok(jobs)
     }
 
-    /// The next job; `None` at the end.
+    /// Returns `None` at the end.
     pub fn next(&mut self) -> Result<Option<Entry>, BatchError> {
         let found = match &mut self.source {
             Source::Csv { reader, names } => {
@@ -104,7 +98,7 @@ impl Manifest {
         }))
     }
 
-    /// The text of the next `[[job]]` in TOML without that line, and the line it begins on.
+    /// The next TOML `[[job]]` without that line, and its line number.
     fn next_table(&mut self) -> Result<Option<(usize, String)>, BatchError> {
         let Source::Toml { reader, next_line, ended, .. } = &mut self.source else { return Ok(None) };
         if *ended {
@@ -120,7 +114,7 @@ impl Manifest {
         let Source::Toml { defaults, .. } = &self.source else {
             return Err(BatchError::MissingField { name: KIND });
         };
-        // Lines are counted from the file's beginning.
+        // Count lines from the beginning of the file.
         let table =
             text.parse::<toml::Table>().map_err(|error| wrong_toml(&self.path, line, text, &error))?;
         let (kind, fields) = split(Fields::of_table(&table, &self.base)?)?;
@@ -132,7 +126,6 @@ impl Manifest {
     }
 }
 
-/// Takes the task's name out of the fields.
 fn split(mut fields: Fields) -> Result<(String, Fields), BatchError> {
     let kind = fields.text(KIND)?;
     fields.remove(KIND);
@@ -156,7 +149,7 @@ fn of_row(
     split(fields)
 }
 
-/// The separator of a header line: spreadsheets of many countries write semicolons or tabs.
+/// Separator of the header: spreadsheets may write semicolons or tabs.
 fn separator(file: &mut File, path: &Path) -> Result<u8, BatchError> {
     let unreadable = |source| BatchError::Read { path: path.into(), source };
     let mut header = String::new();
@@ -172,7 +165,7 @@ fn csv_source(mut file: File, path: &Path) -> Result<Source, BatchError> {
     let mut reader =
         csv::ReaderBuilder::new().delimiter(delimiter).trim(csv::Trim::All).flexible(true).from_reader(file);
     let names = reader.headers().map_err(|error| wrong_csv(path, &error))?.clone();
-    // Spreadsheets begin a file with a byte order mark.
+    // Spreadsheets write a byte order mark.
     let names: csv::StringRecord = names.iter().map(|name| name.trim_start_matches('\u{feff}')).collect();
     if !names.iter().any(|name| name == KIND) {
         let header = names.iter().collect::<Vec<_>>().join(",");
@@ -202,7 +195,7 @@ fn toml_source(file: File, path: &Path, base: &Path) -> Result<Source, BatchErro
     Ok(Source::Toml { reader, next_line, defaults, ended: !more })
 }
 
-/// The text up to the next line `[[job]]`, and whether there is one.
+/// Text up to the next line `[[job]]`, and whether there is one.
 fn until_job(
     reader: &mut BufReader<File>,
     path: &Path,
@@ -245,7 +238,6 @@ fn wrong_csv(path: &Path, error: &csv::Error) -> BatchError {
 mod tests {
     use super::*;
 
-    /// A job's line with its task and fields, or its error.
     type Found = (usize, Result<(String, Fields), String>);
 
     fn all(name: &str, text: &str) -> Vec<Found> {
@@ -297,7 +289,7 @@ mod tests {
     }
 
     #[test]
-    fn a_job_that_is_none_does_not_hide_the_others() {
+    fn an_invalid_job_does_not_hide_the_others() {
         let found =
             all("a.toml", "[[job]]\ndo = 'depth'\nfar = \n[[job]]\nfar = 'x'\n[[job]]\ndo = 'correct'\n");
         let error = found[0].1.as_ref().expect_err("no value");
@@ -309,7 +301,7 @@ mod tests {
     }
 
     #[test]
-    fn a_manifest_that_is_none_is_refused() {
+    fn an_invalid_manifest_is_rejected() {
         let folder = tempfile::tempdir().expect("a folder");
         for (name, text, phrase) in [
             ("a.txt", "", ".toml or .csv"),

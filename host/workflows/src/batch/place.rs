@@ -1,4 +1,4 @@
-//! Where a job's result goes: made aside, put in place when it is whole, never in the place of what no batch made.
+//! Place of a job's result, moved there when complete. Never replaces files that no batch wrote.
 
 use std::{
     ffi::OsString,
@@ -13,30 +13,26 @@ use serde_json::Value;
 use super::{BatchError, provenance::Provenance};
 use crate::error::Result;
 
-/// The name of a folder's provenance, and what is added to a file's name for its own.
+/// Provenance in a result folder; suffix of the provenance of a result file.
 pub(crate) const RECORD: &str = "batch.toml";
-/// Ends the name of the folder in which a result is made.
 const ASIDE: &str = ".batch-partial";
 
-/// The folder that a result will have, where `out` is a batch's place aside.
+/// The final folder of a result, if `out` is a batch's temporary place.
 pub(crate) fn final_place(out: &Path) -> PathBuf {
     let aside = out.parent().filter(|parent| parent.to_string_lossy().ends_with(ASIDE));
     let beside = aside.and_then(|aside| Some(aside.parent()?.join(out.file_name()?)));
     beside.unwrap_or_else(|| out.into())
 }
 
-/// A result's place.
 pub(super) struct Place {
     target: PathBuf,
-    /// Whether the result is a file and not a folder.
     is_file: bool,
 }
 
-/// State of a place.
 pub(super) enum Found {
-    /// The up-to-date result, with its figures.
+    /// Up to date, with its figures.
     Done(Option<Value>),
-    /// Nothing, or a result that was made from something else or is not whole.
+    /// Missing, incomplete, or made from something else.
     ToDo,
 }
 
@@ -46,11 +42,8 @@ impl Place {
         Self { target, is_file }
     }
 
-    /// Examines the place.
-    ///
-    /// # Errors
-    /// [`BatchError::Foreign`] where something lies there that no batch made; [`BatchError::SharedOut`] where another job of this run,
-    /// which began at `begun`, has made it.
+    /// Examines the place. Returns [`BatchError::Foreign`] for files that no batch wrote, and
+    /// [`BatchError::SharedOut`] if another job of this run (started at `begun`) wrote them.
     pub fn look(&self, wanted: &Provenance, begun: SystemTime, verify: bool) -> Result<Found> {
         let (record, root) = (self.record(), self.root());
         if let Some(found) = Provenance::read(&record) {
@@ -64,15 +57,14 @@ impl Place {
             return Ok(Found::ToDo);
         }
         let empty = fs::read_dir(&self.target).is_ok_and(|mut entries| entries.next().is_none());
-        // A file with a record that cannot be read still belongs to a batch.
+        // An unreadable record still marks a batch's file.
         if !self.target.exists() || empty || record.exists() {
             return Ok(Found::ToDo);
         }
         Err(BatchError::Foreign { path: self.target.clone() }.into())
     }
 
-    /// Makes the result by `make`, which is given a place aside, and puts it in its place. What was killed on the way is cleared
-    /// away first.
+    /// Runs `make` with a temporary place and moves its result. First removes remains of an interrupted run.
     pub fn fill(&self, wanted: Provenance, make: impl FnOnce(&Path) -> Result<Value>) -> Result<Value> {
         let name = self.target.file_name().unwrap_or_default();
         let aside = self.beside(".", ASIDE);
@@ -91,8 +83,8 @@ impl Place {
         Ok(found)
     }
 
-    /// Removes the result of an earlier run, so that a job that failed leaves nothing that could be taken for its result. What no batch
-    /// made, and what another job of this run (which began at `begun`) made, stays.
+    /// Removes the result of an earlier run after a failure. Keeps files that no batch wrote, or that another
+    /// job of this run (started at `begun`) wrote.
     pub fn discard(&self, begun: SystemTime) -> io::Result<()> {
         let record = self.record();
         if Provenance::read(&record).is_none() || fs::metadata(&record)?.modified()? > begun {
@@ -105,7 +97,7 @@ impl Place {
         fs::remove_dir_all(&self.target)
     }
 
-    /// The folder aside, held by this process as long as it lives; two that make the same result must not mix.
+    /// Locks the temporary folder for this process, so that two runs of a job do not mix.
     fn lock(&self, aside: &Path) -> Result<File, BatchError> {
         let unwritable = |source| BatchError::Write { path: self.target.clone(), source };
         match fs::create_dir(aside) {
@@ -115,14 +107,14 @@ impl Place {
         let lock = File::open(aside).map_err(unwritable)?;
         match lock.try_lock() {
             Err(fs::TryLockError::WouldBlock) => Err(BatchError::InUse { path: self.target.clone() }),
-            // Systems without such locks on folders go on without.
+            // Continue on systems that cannot lock folders.
             Ok(()) | Err(fs::TryLockError::Error(_)) => Ok(lock),
         }
     }
 
     fn put(&self, aside: &Path, made: &Path, record: &str) -> io::Result<()> {
         if self.is_file {
-            // The old record is removed first, so that it never accompanies another result.
+            // Remove the old record first, so that it never accompanies another result.
             let (old, new) = (self.record(), aside.join("record"));
             fs::write(&new, record)?;
             if old.exists() {
@@ -142,7 +134,6 @@ impl Place {
         if self.is_file { self.beside("", &format!(".{RECORD}")) } else { self.target.join(RECORD) }
     }
 
-    /// What a record's files are relative to.
     fn root(&self) -> &Path {
         if self.is_file { self.target.parent().unwrap_or(Path::new("")) } else { &self.target }
     }
@@ -155,7 +146,7 @@ impl Place {
     }
 }
 
-/// Removes the folder aside at the end of the work, however that ends.
+/// Removes the temporary folder when dropped.
 struct Clearing<'a>(&'a Path);
 
 impl Drop for Clearing<'_> {

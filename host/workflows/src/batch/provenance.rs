@@ -1,4 +1,4 @@
-//! `batch.toml`: what made a result, by which the next run sees that there is nothing to do.
+//! `batch.toml`: what a result was made from. The next run skips a job with matching provenance.
 
 use std::{
     collections::BTreeMap,
@@ -17,21 +17,19 @@ use crate::{
     inputs::{self, HashedFile},
 };
 
-/// Version of the record.
 const FORMAT: u32 = 1;
-/// Files that several jobs read (optics, corrections, models) are hashed once; each job has a few more.
+/// Files shared by jobs (optics, corrections, models) are hashed once; each job has a few more.
 const SUMS: usize = 64;
 
-/// What a job is made from, and what came of it.
 #[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
 pub(super) struct Provenance {
     format: u32,
     made_by: String,
     #[serde(rename = "do")]
     kind: String,
-    /// The job's fields but `out`.
+    /// The job's fields except `out`.
     settings: BTreeMap<String, Vec<String>>,
-    /// What the job printed, as JSON: a later run repeats it.
+    /// The job's output as JSON, for later runs.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     figures: String,
     #[serde(default)]
@@ -40,7 +38,7 @@ pub(super) struct Provenance {
     output: Vec<HashedFile>,
 }
 
-/// Sums of files, of which those that many jobs read are kept.
+/// Hashes of files; recent ones are cached.
 pub(super) struct Sums(LeastRecentlyUsed<FileVersion, HashedFile>);
 
 impl Default for Sums {
@@ -50,11 +48,10 @@ impl Default for Sums {
 }
 
 impl Sums {
-    /// The files, and all files in folders among them, each with its sum.
     pub fn of(&self, paths: &[PathBuf], base: &Path) -> Result<Vec<HashedFile>> {
         let files = inputs::files(paths)?;
         let sum = |file: &PathBuf| {
-            // By the manifest's own word for it, so that the whole may be moved.
+            // Relative to the manifest, so that the whole can be moved.
             let name = file.strip_prefix(base).unwrap_or(file).display().to_string();
             let summed = self.0.get(FileVersion::of("the input", file)?, || inputs::hash(file, &name))?;
             Ok(HashedFile { file: name, ..HashedFile::clone(&summed) })
@@ -64,7 +61,6 @@ impl Sums {
 }
 
 impl Provenance {
-    /// Of a job with nothing done yet.
     pub fn new(kind: &str, fields: &Fields, input: Vec<HashedFile>) -> Self {
         Self {
             format: FORMAT,
@@ -77,12 +73,11 @@ impl Provenance {
         }
     }
 
-    /// The figures of the result; `None` in records of older versions.
     pub fn figures(&self) -> Option<Value> {
         serde_json::from_str(&self.figures).ok()
     }
 
-    /// The same with the figures of the result, except its duration: a record depends on the inputs only.
+    /// Adds the figures except the duration, so that a record depends on the inputs only.
     pub fn with_figures(self, figures: &Value) -> Self {
         let mut figures = figures.clone();
         if let Some(figures) = figures.as_object_mut() {
@@ -91,13 +86,12 @@ impl Provenance {
         Self { figures: figures.to_string(), ..self }
     }
 
-    /// The same with what came of it: the file or the folder at `result`.
     pub fn with_output(mut self, result: &Path) -> Result<Self> {
         let files = if result.is_dir() { inputs::files_below(result)? } else { vec![result.to_path_buf()] };
         let root = if result.is_dir() { result } else { result.parent().unwrap_or(Path::new("")) };
         let summed = |file: &PathBuf| {
             let name = file.strip_prefix(root).unwrap_or(file);
-            // One separator everywhere, so that a record says the same on every system.
+            // Same separator on all systems.
             let parts: Vec<_> = name.components().map(|part| part.as_os_str().to_string_lossy()).collect();
             inputs::hash(file, &parts.join("/"))
         };
@@ -105,14 +99,13 @@ impl Provenance {
         Ok(self)
     }
 
-    /// A record in a file; `None` if missing or of another version.
+    /// Reads a record; `None` if missing or of another version.
     pub fn read(file: &Path) -> Option<Self> {
         let text = fs::read_to_string(file).ok()?;
         toml::from_str(&text).ok().filter(|record: &Self| record.format == FORMAT)
     }
 
-    /// Whether this record's result was made from what `wanted` says, and its files are whole: by their lengths, or by their sums
-    /// where `verify` asks for them.
+    /// Whether the record matches `wanted` and its files are complete: by length, or by hash with `verify`.
     pub fn fulfils(&self, wanted: &Self, root: &Path, verify: bool) -> bool {
         let made_alike = (&self.made_by, &self.kind, &self.settings, &self.input)
             == (&wanted.made_by, &wanted.kind, &wanted.settings, &wanted.input);
@@ -145,7 +138,7 @@ mod tests {
         fields.insert("smooth", vec!["7".into()]);
         let wanted = |fields: &Fields| Provenance::new("depth", fields, sums());
         let made = wanted(&fields).with_output(&result).expect("readable");
-        // As sha256sum prints it.
+        // Output of sha256sum.
         let of_abc = "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad";
         assert_eq!((made.input[0].file.as_str(), made.input[0].sha256.as_str()), ("in", of_abc));
         assert!(made.fulfils(&wanted(&fields), &result, true));
@@ -169,7 +162,7 @@ mod tests {
     }
 
     #[test]
-    fn a_file_that_is_written_anew_is_summed_anew() {
+    fn a_rewritten_file_gets_a_new_checksum() {
         let folder = tempfile::tempdir().expect("a folder");
         let file = folder.path().join("optics.toml");
         let sums = Sums::default();

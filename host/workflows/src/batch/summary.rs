@@ -1,4 +1,4 @@
-//! One table of all jobs: a row per job in the order of the manifest, a column per figure.
+//! Table of all jobs in the order of the manifest, with a column per figure.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -6,10 +6,8 @@ use serde_json::Value;
 
 use super::JobReport;
 
-/// Columns that every job has.
 const FIXED: [&str; 6] = ["job", "line", "do", "out", "state", "error"];
 
-/// The rows so far. Memory grows with the number of jobs.
 #[derive(Default)]
 pub(super) struct Summary {
     rows: BTreeMap<usize, ([String; 6], BTreeMap<String, String>)>,
@@ -35,7 +33,7 @@ impl Summary {
         self.rows.insert(report.job, (fixed, figures));
     }
 
-    /// The table as CSV; a figure that a job does not have is an empty cell.
+    /// CSV; missing figures are empty cells.
     pub fn csv(&self) -> Result<Vec<u8>, csv::Error> {
         let names: BTreeSet<&String> = self.rows.values().flat_map(|(_, figures)| figures.keys()).collect();
         let mut writer = csv::Writer::from_writer(Vec::new());
@@ -48,7 +46,7 @@ impl Summary {
     }
 }
 
-/// Objects become `outer.inner`; lists of texts are joined; other lists are left to the JSON lines.
+/// Objects become `outer.inner`, lists of texts are joined, other lists are omitted.
 fn flatten(name: &str, value: &Value, into: &mut BTreeMap<String, String>) {
     match value {
         Value::Null => {}

@@ -1,4 +1,4 @@
-//! State of the jobs: reported one at a time, failures recorded separately, remaining time.
+//! Progress of the jobs: reports, file of failures, remaining time.
 
 use std::{
     fs::{self, File},
@@ -14,7 +14,6 @@ use crate::{
     error::{Result, WorkflowError},
 };
 
-/// Counts jobs over threads.
 pub(super) struct Tally<'a> {
     total: usize,
     context: &'a Context<'a>,
@@ -26,14 +25,13 @@ pub(super) struct Tally<'a> {
 #[derive(Default)]
 struct Inner {
     figures: BatchFigures,
-    /// The file of failures, made with the first of them.
     file: Option<File>,
     /// Start of the first job that was not already finished.
     working_since: Option<Instant>,
 }
 
 impl<'a> Tally<'a> {
-    /// Nothing is done yet; the failures of the last run are put away.
+    /// Discards the failures of the last run.
     pub fn new(
         total: usize,
         failures: &Path,
@@ -50,9 +48,8 @@ impl<'a> Tally<'a> {
         Ok(Self { total, context, on_job, failures: failures.into(), inner: Mutex::default() })
     }
 
-    /// A job has ended.
     pub fn tell(&self, report: &JobReport) -> Result<()> {
-        // Held during the report, so that lines do not mix and counts rise.
+        // Locked during the report, so that lines do not mix and counts increase.
         let mut inner = self.inner.lock().unwrap_or_else(PoisonError::into_inner);
         inner.figures.jobs += 1;
         match report.state {
@@ -65,15 +62,15 @@ impl<'a> Tally<'a> {
             }
         }
         (self.on_job)(report).map_err(|source| WorkflowError::Sink { source })?;
-        let told = inner.figures.jobs;
+        let finished = inner.figures.jobs;
         if report.state == State::Done {
             let now = Instant::now();
             let own = std::time::Duration::from_secs_f64(report.seconds.max(0.0));
             let since = *inner.working_since.get_or_insert_with(|| now.checked_sub(own).unwrap_or(now));
             let each = now.duration_since(since).div_f64(inner.figures.done as f64);
-            self.context.progress.time_left(each.mul_f64(self.total.saturating_sub(told) as f64));
+            self.context.progress.time_left(each.mul_f64(self.total.saturating_sub(finished) as f64));
         }
-        self.context.progress.advance("jobs", told, Some(self.total));
+        self.context.progress.advance("jobs", finished, Some(self.total));
         Ok(())
     }
 

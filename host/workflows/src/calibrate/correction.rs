@@ -1,4 +1,4 @@
-//! A correction from depth maps of flat targets at known depths.
+//! Fits a depth correction to depth maps of flat targets at known depths.
 
 use std::{
     fs,
@@ -80,22 +80,17 @@ impl Request for CalibrateCorrectionRequest {
     }
 }
 
-/// What there is to say of a correction that was learned.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct CorrectionFigures {
     pub method: String,
-    /// How many targets taught it.
     pub patterns: usize,
-    /// Farthest depth that it was taught.
     pub far_mm: f64,
-    /// Nearest depth that it was taught.
     pub near_mm: f64,
-    /// Root mean square error of the patterns themselves, as measured.
+    /// Error of the maps before correction.
     pub rmse_before_mm: f64,
     pub rmse_after_mm: f64,
 }
 
-/// Learns a correction and saves it.
 pub fn learn(settings: &CalibrateCorrectionRequest, context: &Context<'_>) -> Result<CorrectionFigures> {
     let maps = read(&settings.patterns)?;
     context.cancel.check("reading the maps")?;
@@ -118,7 +113,6 @@ pub fn learn(settings: &CalibrateCorrectionRequest, context: &Context<'_>) -> Re
     Ok(figures)
 }
 
-/// The list of patterns as users write it.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct List {
@@ -133,14 +127,12 @@ struct Entry {
     true_mm: f64,
 }
 
-/// The maps that a list of `[[pattern]]` with `depth = FILE` (relative to the list) and `true_mm = MM` names, with their
-/// true depths in mm.
+/// Reads the maps and true depths (mm) of `[[pattern]]` entries: `depth = FILE` (relative), `true_mm = MM`.
 pub fn read(list: &Path) -> Result<Vec<(Array2<f32>, f64)>> {
     let folder = list.parent().unwrap_or(Path::new(""));
     self::list(list)?.into_iter().map(|(depth, mm)| Ok((map::read(&folder.join(depth))?, mm))).collect()
 }
 
-/// The files (relative to the list) and true depths in mm of a list of patterns.
 pub fn list(list: &Path) -> Result<Vec<(PathBuf, f64)>> {
     const EXPECTED: &str = "a list of [[pattern]] with depth = FILE and true_mm = MM";
     let text = fs::read_to_string(list).map_err(WorkflowError::read("the list of patterns", list))?;

@@ -1,5 +1,4 @@
-//! The point spread function from pairs of a flat, textured target: k of a Gaussian, p and k of a generalised one, or any round
-//! profile.
+//! Fits a point spread function to pairs of a flat, textured target.
 
 use std::path::PathBuf;
 
@@ -22,7 +21,7 @@ use crate::{
     request::{PathKind, Request},
 };
 
-/// Decimals of p and of k: no pair tells them better.
+/// Decimals of p and k, beyond the precision of any pair.
 const DECIMALS: [i32; 2] = [4, 5];
 
 /// Find the point spread function from one pair or several of a flat, textured target.
@@ -111,39 +110,34 @@ impl CalibratePsfRequest {
 
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct PsfFigures {
-    /// The point spread function by name.
     pub psf: String,
     /// Exponent of a generalised Gaussian.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub p: Option<f64>,
-    /// Width over blur radius; of a free profile that of a Gaussian with its second moment.
+    /// Width / blur radius. Radial profile: of the Gaussian with the same second moment.
     pub k: f64,
-    /// Standard error of p.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub standard_error_p: Option<f64>,
-    /// Standard error of k.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub standard_error_k: Option<f64>,
-    /// Residual of the images' energy when one is predicted from the other, 0 to 1.
+    /// Share of the images' energy left when one is predicted from the other, 0 to 1.
     pub residual: f64,
-    /// What noise alone leaves.
+    /// Expected residual from noise alone.
     pub noise_residual: f64,
-    /// `good`, `loose` (open by more than a percent) or `unexplained` (more is left than noise).
+    /// `good`, `loose` (uncertain by more than 1 %) or `unexplained` (residual above noise).
     pub verdict: String,
-    /// Where the target was taken to stand; the first of several.
+    /// Assumed distance of the target; the first of several.
     pub target_mm: f64,
-    /// Where each of several was.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub targets_mm: Vec<f64>,
-    /// How far pixels of each near image were moved, px, where one was.
+    /// Displacement of each near image, if any.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub moved_px: Vec<f64>,
-    /// The OTF of a free profile: frequency times blur radius (rad), value, standard error.
+    /// OTF of a radial profile: frequency x blur radius (rad), value, standard error.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub otf: Vec<[f64; 3]>,
 }
 
-/// Finds the point spread function.
 pub fn fit(settings: &CalibratePsfRequest, context: &Context<'_>) -> Result<PsfFigures> {
     let optics = optics::read(&settings.optics)?;
     let (mut images, mut moved_px) = (Vec::new(), Vec::new());
@@ -196,7 +190,6 @@ pub fn fit(settings: &CalibratePsfRequest, context: &Context<'_>) -> Result<PsfF
     })
 }
 
-/// What there is to say against a calibration.
 fn doubt(found: &PsfFit, model: Model) -> Option<String> {
     let width = found.width();
     match found.verdict() {

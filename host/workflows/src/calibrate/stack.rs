@@ -1,4 +1,4 @@
-//! A lens file from one z-stack of a flat, textured target.
+//! Calibrates a lens file from one z-stack of a flat, textured target.
 
 use std::path::{Path, PathBuf};
 
@@ -16,13 +16,12 @@ use crate::{
     request::{PathKind, Request},
 };
 
-/// Endings of images.
 const ENDINGS: [&str; 5] = ["png", "tif", "tiff", "jpg", "jpeg"];
-/// Part of the errors that three standard deviations must hold for the verdict `good`.
+/// Share of errors within three standard deviations for the verdict `good`.
 const HONEST: f64 = 0.97;
-/// Part of the pixels that must have a depth.
+/// Least share of pixels with a depth.
 const FILLED: f64 = 0.9;
-/// Normalised depth, of 2, that the response must span.
+/// Least span of the response in normalised depth, of 2.
 const LEARNED: f64 = 1.2;
 
 /// Calibrate a lens from a z-stack of a flat, textured target (tilted or not), slices one stage step apart.
@@ -91,57 +90,47 @@ impl Request for CalibrateStackRequest {
     }
 }
 
-/// Result of a stack's calibration.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct StackFigures {
     /// `good`, or what to change.
     pub verdict: String,
     /// How to measure with the lens file.
     pub next: String,
-    /// Number of slices.
     pub slices: usize,
     /// Slices from the far to the near image of a pair.
     pub pair_step: usize,
-    /// Pixels per side that are averaged into one.
+    /// Pixels per side averaged into one.
     pub bin: usize,
-    /// Point spread function.
     pub psf: String,
     /// Largest blur radius, binned px.
     pub max_blur_px: f64,
-    /// Working range of a pair, mm.
     pub range_mm: f64,
-    /// Blur radius per slice before and behind the focus, px of the camera.
+    /// Blur radius per slice before and behind the focus, unbinned px.
     pub blur_per_slice_px: [f64; 2],
-    /// Slices from the focus and blur radius beyond the sharpest slice's, px of the camera, for every slice.
+    /// Per slice: distance from the focus (slices), blur radius above the sharpest slice's (unbinned px).
     pub blur: Vec<[f64; 2]>,
     /// Least blur radius, binned px.
     pub blur_floor_px: f64,
-    /// Part of the range that was learned, mm.
     pub learned_mm: f64,
-    /// `1.4826 x` median of |error| on held-out parts of the target, mm.
+    /// `1.4826 x` median of |error| on held-out parts of the target.
     pub robust_mm: f64,
-    /// Root mean square error there, mm.
+    /// On held-out parts, as the next five.
     pub rms_mm: f64,
-    /// Mean error there, mm.
+    /// Mean error.
     pub bias_mm: f64,
-    /// Slope of measured over true depth there.
+    /// Slope of measured over true depth.
     pub slope: f64,
-    /// Part of the pixels with a depth there.
+    /// Share of pixels with a depth.
     pub fill: f64,
-    /// Part of the errors within three predicted standard deviations there.
+    /// Share of errors within three predicted standard deviations.
     pub within_three: f64,
-    /// Root mean square of error over predicted standard deviation there.
+    /// Root mean square of error / predicted standard deviation.
     pub scatter: f64,
-    /// Standard deviation beyond what noise explains, mm.
+    /// Standard deviation in excess of noise.
     pub residual_mm: f64,
-    /// Number of pairs.
     pub pairs: usize,
 }
 
-/// Calibrates and saves the lens.
-///
-/// # Errors
-/// The folder, its images; [`WorkflowError::Parameter`] for a stack that gives no lens.
 pub fn calibrate(request: &CalibrateStackRequest, context: &Context<'_>) -> Result<StackFigures> {
     let mut files = files(&request.folder)?;
     if request.near_first {
@@ -246,7 +235,7 @@ fn learned(found: &StackLens) -> f64 {
     found.optics.stage().map_or(2.0, |stage| stage.response[RESPONSE_POINTS - 1] - stage.response[0])
 }
 
-/// The images of a folder by the last number in their names.
+/// Images of a folder, by the last number in their names.
 fn files(folder: &Path) -> Result<Vec<PathBuf>> {
     let unusable = |expected: String| WorkflowError::parameter("folder", folder.display(), expected);
     let entries = std::fs::read_dir(folder).map_err(|error| unusable(error.to_string()))?;
@@ -265,7 +254,6 @@ fn files(folder: &Path) -> Result<Vec<PathBuf>> {
     Ok(files.into_iter().map(|(_, path)| path).collect())
 }
 
-/// The last number in a file's name.
 fn last_number(path: &Path) -> Option<f64> {
     let stem = path.file_stem()?.to_string_lossy().into_owned();
     stem.split(|c: char| !c.is_ascii_digit()).rfind(|digits| !digits.is_empty())?.parse().ok()

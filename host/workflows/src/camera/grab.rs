@@ -1,4 +1,4 @@
-//! Pictures of a camera that runs freely, kept in a folder with a record.
+//! Images of a free-running camera, stored in a folder with a record.
 
 use std::{
     path::PathBuf,
@@ -20,15 +20,12 @@ use crate::{
 };
 
 pub const GRAB_FILE: &str = "grab.toml";
-/// Longest single wait, so that an interruption is seen soon.
 const SLICE: Duration = Duration::from_millis(200);
 
-/// How pictures are written.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum PictureFormat {
-    /// PNG, values of more than 8 bits shifted up to 16.
+    /// Values of more than 8 bits are shifted to 16.
     Png,
-    /// TIFF, values as the camera gave them.
     Tiff,
 }
 
@@ -36,29 +33,23 @@ pub enum PictureFormat {
 pub struct GrabSettings {
     pub camera: CameraChoice,
     pub frames: usize,
-    /// How they are written.
     pub format: PictureFormat,
-    /// Longest wait for one.
     pub wait: Duration,
     pub out: PathBuf,
 }
 
-/// What there is to say of it.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct GrabFigures {
     pub frames: usize,
-    /// Pixels across the last one.
     pub width: usize,
     pub height: usize,
-    /// Bits that carry the picture.
+    /// Significant bits.
     pub bits: u8,
-    /// Pictures that the camera counted between the first and the last and that were not kept: lost, or too fast for this computer. Where
-    /// the camera counts.
+    /// Images counted by the camera (if it counts) but not stored: lost, or too fast for this computer.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub passed_over: Option<u64>,
 }
 
-/// The record next to the images.
 #[derive(Serialize)]
 struct GrabRecord {
     made_by: &'static str,
@@ -75,7 +66,7 @@ struct FrameRecord {
     width: usize,
     height: usize,
     bits: u8,
-    /// As the camera counts.
+    /// The camera's frame counter.
     #[serde(skip_serializing_if = "Option::is_none")]
     count: Option<u64>,
     /// By the camera's clock.
@@ -83,7 +74,7 @@ struct FrameRecord {
     time_us: Option<u64>,
 }
 
-/// Takes pictures. The folder appears when everything is in it.
+/// Captures images. The folder appears when it is complete.
 pub fn grab(settings: &GrabSettings, context: &Context<'_>) -> Result<GrabFigures> {
     if settings.frames == 0 {
         return Err(WorkflowError::parameter("frames", 0, "it takes no pictures, expected 1 or more"));

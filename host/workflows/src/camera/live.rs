@@ -1,4 +1,4 @@
-//! What a camera sees now, in numbers: frame rate, focus, brightness, saturation.
+//! Live figures of a camera: frame rate, focus, brightness, saturation.
 
 use std::time::{Duration, Instant};
 
@@ -14,40 +14,34 @@ use crate::{
     figures::rounded,
 };
 
-/// Longest single wait, so that an interruption is seen soon.
 const SLICE: Duration = Duration::from_millis(100);
 
 #[derive(Clone, PartialEq, Debug)]
 pub struct LiveSettings {
     pub camera: CameraChoice,
-    /// Focus value, largest in focus.
     pub measure: FocusMeasure,
-    /// From one line to the next.
     pub every: Duration,
-    /// End after this time; without it, when it is cancelled.
+    /// End after this time; without it, when cancelled.
     pub seconds: Option<f64>,
 }
 
-/// The last picture of a while.
+/// Figures of the last image of an interval.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct LiveFigures {
-    /// Images per second that arrived and were measured.
     pub frames_per_s: f64,
-    /// Focus measure; nothing of a picture that is dark or smaller than 8x8 px.
+    /// `None` for a dark image or one smaller than 8x8 px.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub focus: Option<f64>,
-    /// Mean grey value, in per cent of full scale.
     pub mean_percent: f64,
-    /// Pixels at full scale, in per cent.
     pub saturated_percent: f64,
     pub width: usize,
     pub height: usize,
-    /// Bits that carry the picture.
+    /// Significant bits.
     pub bits: u8,
 }
 
-/// Looks through a camera until time is up or it is cancelled, which is not an error, and gives figures from time to time. A while without a
-/// picture gives none, and is reported. Returns the number of pictures.
+/// Reports figures at intervals until time is up or cancelled (not an error); returns the number of images.
+/// Warns about an interval without images.
 pub fn live(
     settings: &LiveSettings,
     line: &mut dyn FnMut(&LiveFigures) -> std::io::Result<()>,
@@ -82,7 +76,7 @@ pub fn live(
     Ok(all + frames)
 }
 
-/// Gives picture after picture to `on_frame` until it or the context wants no more. The exposure is set where the camera has one.
+/// Passes images to `on_frame` until it or the context stops. Sets the exposure if the camera supports it.
 pub fn watch(
     choice: &CameraChoice,
     exposure: Micros,

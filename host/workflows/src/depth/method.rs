@@ -1,4 +1,4 @@
-//! How depth is computed: rational operators or a method to compare with.
+//! Depth methods: rational operators, or baselines for comparison.
 
 use std::{fmt, path::Path, str::FromStr, sync::Arc};
 
@@ -9,18 +9,15 @@ use crate::{
     error::{Result, WorkflowError},
 };
 
-/// How depth is computed.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum Method {
     #[default]
     RationalOperators,
     /// `whitened`: operators with a white residual.
     Whitened,
-    /// Published by others.
     Baseline(baselines::Method),
 }
 
-/// A name that belongs to no method.
 #[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
 #[error("expected ro, whitened, subbarao, subbarao-fourier or favaro")]
 pub struct UnknownMethod {
@@ -51,16 +48,15 @@ impl fmt::Display for Method {
     }
 }
 
-/// A method with its data.
 pub enum Prepared {
     RationalOperators(Arc<Operators>),
-    /// Designs its kernels for the optics.
+    /// Its kernels are designed for the optics.
     Whitened,
     Baseline(baselines::Method),
 }
 
 impl Prepared {
-    /// Finds the operators, or refuses those that `method` has no use for.
+    /// Finds the operators; rejects operators that `method` does not use.
     pub fn new(method: Method, asked: Option<&Path>, optics: &Optics, cache: &Cache) -> Result<Self> {
         match (method, asked) {
             (Method::RationalOperators, asked) => {
@@ -84,7 +80,6 @@ impl Prepared {
         }
     }
 
-    /// Its operators, if it has any.
     pub fn operators(&self) -> Option<&Operators> {
         match self {
             Self::RationalOperators(operators) => Some(operators),
@@ -92,7 +87,6 @@ impl Prepared {
         }
     }
 
-    /// As the library calls it.
     pub fn as_real(&self) -> DepthMethod<'_> {
         match self {
             Self::RationalOperators(operators) => DepthMethod::Rational(operators),

@@ -1,4 +1,4 @@
-//! The noise of the images and the standard deviation of depth that follows from it.
+//! Image noise and the resulting standard deviation of depth.
 
 use std::{fmt, str::FromStr};
 
@@ -16,33 +16,27 @@ use serde::Serialize;
 
 use crate::{error::Result, figures::rounded};
 
-/// Step in mm over which a correction's slope is taken: far above rounding, far below what a correction bends over.
+/// Step for a correction's slope, mm: far above rounding, far below the correction's curvature.
 const SLOPE_STEP_MM: f32 = 0.5;
 
-/// Source of the images' noise.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum CameraNoise {
-    /// From what the pair itself leaves unexplained.
     Estimated,
-    /// From the camera's data sheet.
     Camera {
-        /// Electrons from black to the images' largest code (float images: to the value 1).
+        /// Electrons from black to the largest code (float images: to the value 1).
         full_well_e: f64,
-        /// Read noise, electrons.
         read_noise_e: f64,
-        /// Bits of the camera, where the file has more.
+        /// Camera bits, if the file has more.
         bits: Option<u8>,
-        /// Code of a pixel without light, in the codes of the camera (float images: value).
+        /// Camera code (float images: value) of a pixel without light.
         black: f64,
     },
 }
 
-/// A text that names no noise.
 #[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
 #[error("{reason}")]
 pub struct NoiseError {
     pub text: String,
-    /// The fault and the expected values.
     pub reason: String,
 }
 
@@ -110,7 +104,7 @@ impl fmt::Display for CameraNoise {
 }
 
 impl CameraNoise {
-    /// A camera's noise as the windows take it; `None` where it is to be estimated.
+    /// Noise in window units; `None` to estimate it.
     pub fn of_camera(self, samples: Samples) -> Option<PairNoise> {
         match self.of(samples) {
             Noise::Camera { constant, per_unit } => {
@@ -121,7 +115,7 @@ impl CameraNoise {
         }
     }
 
-    /// The noise of images whose files have such samples and whose values are 1 at full scale.
+    /// Noise of images with values of 1 at full scale.
     fn of(self, samples: Samples) -> Noise {
         let Self::Camera { full_well_e, read_noise_e, bits, black } = self else { return Noise::Estimated };
         let bits = match samples {
@@ -132,7 +126,7 @@ impl CameraNoise {
         let rounding = bits.map_or(0.0, |_| code * code / 12.0);
         let black = (black * code).clamp(0.0, 0.99);
         let per_unit = (1.0 - black) / full_well_e;
-        // Shot noise counts from the black level on.
+        // Shot noise is zero at the black level.
         Noise::Camera {
             constant: ((1.0 - black) * read_noise_e / full_well_e).powi(2) + rounding - per_unit * black,
             per_unit,
@@ -140,35 +134,27 @@ impl CameraNoise {
     }
 }
 
-/// What the standard deviations come to.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct Uncertainty {
-    /// Where the noise is from.
     pub noise: String,
-    /// Median over the pixels that have one.
+    /// Over pixels with a value.
     pub median_sd_mm: f64,
-    /// 95 % of them have less.
+    /// 95th percentile.
     pub p95_sd_mm: f64,
 }
 
-/// What the standard deviation follows from.
 pub struct Source<'a> {
-    /// How the files store a pixel.
     pub samples: Samples,
-    /// The pair as it was measured.
     pub prepared: &'a Prepared,
-    /// The rational operators of one window that the depth was computed with, if it was.
+    /// Single-window rational operators used for the depth, if any.
     pub operators: Option<&'a Operators>,
     pub optics: &'a Optics,
     pub settings: &'a Settings,
-    /// What the judge says, for every other method.
+    /// Standard deviation from the validity check, for all other methods.
     pub judged: &'a Array2<f32>,
 }
 
 /// Standard deviation of `raw` (before `correction`), mm; NaN without a depth.
-///
-/// # Errors
-/// [`crate::WorkflowError::Depth`], [`crate::WorkflowError::Correction`].
 pub fn deviation(
     noise: CameraNoise,
     source: &Source<'_>,
@@ -241,7 +227,7 @@ mod tests {
         }
     }
 
-    /// The same noise as that of a camera in its codes, for images divided by the largest code.
+    /// Noise does not change when images are divided by the largest code.
     #[test]
     fn noise_follows_the_scale_of_the_images() {
         let Noise::Camera { constant, per_unit } = Noise::camera(20_000.0, 12.0, 255.0) else {
@@ -255,7 +241,7 @@ mod tests {
         assert!((shot * 255.0 / per_unit - 1.0).abs() < 1e-12);
     }
 
-    /// A camera whose black is at code 100 of 1,023 has at code 100 its read noise alone, and its full well at code 1,023.
+    /// With black at code 100 of 1023: only read noise at code 100, full well at code 1023.
     #[test]
     fn shot_noise_counts_from_the_black_level() {
         let noise: CameraNoise =

@@ -1,4 +1,4 @@
-//! The folder of results, and the table of what can be in it.
+//! Folder of results, and the table of its possible files.
 
 use std::{
     collections::BTreeSet,
@@ -29,26 +29,22 @@ use crate::{
     result_folder::{self, DEPTH_RECORD},
 };
 
-/// A file being written.
 type Sink = BufWriter<File>;
 
-/// A file of results.
 struct Output {
-    /// Its names.
     names: &'static [&'static str],
     file: &'static str,
-    /// Writes it, piece by piece: with several megapixels a file can be larger than all maps together.
+    /// Writes in pieces: with several megapixels a file can exceed all maps together.
     write: fn(&Results<'_>, &mut Sink) -> io::Result<()>,
 }
 
-/// All that can be written: a new writer is a line here. Beside it there is always `depth.toml`, which says what made the
-/// map.
+/// Possible outputs: a new writer is a line here. `depth.toml` with the provenance is always written.
 #[rustfmt::skip]
 const OUTPUTS: &[Output] = &[
     Output { names: &["npy"], file: "depth.npy", write: |results, to| npy::write_to(results.depth(), to) },
     Output { names: &["tiff"], file: "depth.tiff", write: |results, to| map::tiff_to(results.depth(), to) },
     Output { names: &["png"], file: "depth.png", write: |results, to| results.png(to) },
-    // A map does not travel without its confidence; depth.exr and view.png hold it themselves.
+    // A map is never without confidence; depth.exr and view.png contain it.
     Output { names: &["npy", "tiff", "png"], file: "confidence.npy", write: |results, to| npy::write_to(results.confidence(), to) },
     Output { names: &["npy", "tiff", "png"], file: "reason.png", write: |results, to| results.reasons(to) },
     Output { names: &["npy", "tiff", "png"], file: UNCERTAINTY, write: |results, to| results.uncertainty(to) },
@@ -58,25 +54,22 @@ const OUTPUTS: &[Output] = &[
     Output { names: &["exr"], file: "depth.exr", write: |results, to| results.exr(to) },
 ];
 
-/// All files of a result besides its record.
 pub(crate) fn files() -> impl Iterator<Item = &'static str> {
     OUTPUTS.iter().map(|output| output.file)
 }
 
-/// The outputs that need the image in addition to the maps.
+/// Outputs that also need the image.
 const MESH: &str = "mesh";
 const GLB: &str = "glb";
-/// The output that exists only with another option.
+/// Output that depends on another option.
 const UNCERTAINTY: &str = "uncertainty.npy";
 
 /// Default outputs.
 const USUAL: [&str; 5] = ["npy", "tiff", "png", "mesh", "view"];
 
-/// Which of the outputs are written.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Outputs(BTreeSet<&'static str>);
 
-/// A name that belongs to no output.
 #[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
 #[error("unknown output \"{name}\"; expected some of {}", Outputs::names().join(","))]
 pub struct UnknownOutput {
@@ -84,7 +77,7 @@ pub struct UnknownOutput {
 }
 
 impl Outputs {
-    /// All names, in the table's order.
+    /// In the table's order.
     pub fn names() -> Vec<&'static str> {
         let mut names: Vec<&str> = Vec::new();
         for name in OUTPUTS.iter().flat_map(|output| output.names) {
@@ -95,7 +88,6 @@ impl Outputs {
         names
     }
 
-    /// Whether any of them shows the image.
     pub(super) fn show_image(&self) -> bool {
         [MESH, GLB].iter().any(|name| self.0.contains(name))
     }
@@ -114,7 +106,6 @@ impl Default for Outputs {
 impl FromStr for Outputs {
     type Err = UnknownOutput;
 
-    /// A list such as `npy,exr`.
     fn from_str(text: &str) -> Result<Self, UnknownOutput> {
         let known = |name: &str| {
             let found = Self::names().into_iter().find(|known| *known == name.trim());
@@ -135,9 +126,8 @@ pub(super) struct Results<'a> {
     settings: &'a DepthRequest,
     inputs: &'a Inputs,
     computed: &'a Computed,
-    /// Scale of depth.png's codes, mm, if it is written.
+    /// Scale of depth.png's codes, mm, if written.
     scale: Option<Scale>,
-    /// What made the map, as TOML.
     record: String,
 }
 
@@ -155,10 +145,7 @@ impl<'a> Results<'a> {
         Ok(Self { settings, inputs, computed, scale, record })
     }
 
-    /// Writes everything to the folder `out`, or nothing.
-    ///
-    /// # Errors
-    /// Which file cannot be written; [`crate::WorkflowError::Cancelled`].
+    /// Writes all outputs to `out`, or nothing.
     pub(super) fn write(&self, out: &Path, context: &Context<'_>) -> Result<()> {
         let staged = result_folder::depth(out)?;
         let there = |output: &&Output| output.file != UNCERTAINTY || self.deviation().is_some();
@@ -219,7 +206,7 @@ impl<'a> Results<'a> {
         glb::write(self.depth(), self.computed.image.view(), self.projection(), to)
     }
 
-    /// Depth as compositors expect it, `Z`, here in mm; its origin is in the header.
+    /// Depth channel `Z` as used by compositors, here in mm; its origin is in the header.
     fn exr(&self, to: &mut Sink) -> io::Result<()> {
         let mut channels = vec![("Z", self.depth()), ("confidence", self.confidence())];
         channels.extend(self.deviation().map(|deviation| ("deviation", deviation)));

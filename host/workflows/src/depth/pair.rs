@@ -1,4 +1,4 @@
-//! A far- and a near-focused image in files.
+//! Reads a far- and a near-focused image.
 
 use std::path::{Path, PathBuf};
 
@@ -8,21 +8,18 @@ use ndarray::Array2;
 
 use crate::error::{Result, WorkflowError};
 
-/// A pair as its files hold it.
 pub struct Pair {
-    /// The far-focused image, (height, width).
     pub far: Array2<f32>,
-    /// The near-focused image.
     pub near: Array2<f32>,
-    /// The coarser kind of samples.
+    /// The coarser of both sample types.
     pub samples: Samples,
 }
 
 impl Pair {
-    /// Reads both images. Their pixels must mean the same: integers of any depth share one scale, float files have their
-    /// own. Where a camera of fewer bits saturates below the full scale, its white becomes 1.
+    /// Reads both images with one scale. Integers of any depth share a scale; float files have their own.
+    /// White is the saturation level if that is below full scale.
     pub fn read(far: &Path, near: &Path, reading: &ReadSettings) -> Result<Self> {
-        // Side by side: unpacking is what reading takes.
+        // In parallel, because decompression takes most of the time.
         let (far_image, near_image) =
             rayon::join(|| read_grey_with(far, reading), || read_grey_with(near, reading));
         let (mut far_image, mut near_image) = (far_image?, near_image?);
@@ -47,10 +44,7 @@ impl Pair {
     }
 }
 
-/// A warning if the names of the files contradict their order.
-///
-/// A scene inside the working range gives a plausible map also from a swapped pair, mirrored between far and near: only
-/// the names show it.
+/// Warns if the file names contradict their order, because a swapped pair gives a plausible mirrored map.
 pub fn swapped_by_names(far: &Path, near: &Path) -> Option<String> {
     named_the_other_way_round(far, near).then(|| {
         format!(
@@ -69,7 +63,6 @@ fn named_the_other_way_round(far: &Path, near: &Path) -> bool {
     says(far, "near", "far") && says(near, "far", "near")
 }
 
-/// The name of a file without its folders, for records.
 pub fn name_of(path: &Path) -> String {
     path.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }

@@ -1,4 +1,4 @@
-//! Depth of a part of the images only.
+//! Depth of a part of the images.
 
 use farnear_depth::prepare::CameraFrames;
 use ndarray::{Array2, s};
@@ -10,29 +10,27 @@ use crate::{
     measure::Rectangle,
 };
 
-/// Margin around the part, px: windows of 21 and operators in a row reach less far.
+/// Margin around the part, px: more than windows of 21 px and a chain of operators.
 pub(super) const AROUND_PX: usize = 40;
 
-/// Place of a map in the images it was computed from; recorded in `depth.toml`.
+/// Position of a map in its images; recorded in `depth.toml`.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]
 pub struct Part {
-    /// Leftmost column of the map in the images.
+    /// Left column of the map in the images.
     pub x: usize,
     pub y: usize,
-    /// Columns of the images.
     pub image_width: usize,
     pub image_height: usize,
 }
 
 impl Part {
-    /// Column and row of the images' middle, where the optical axis is, in the map.
+    /// Optical axis (centre of the images) in the map: column and row.
     pub fn axis_px(&self) -> [f64; 2] {
         let of = |size: usize, begin: usize| 0.5 * (size as f64 - 1.0) - begin as f64;
         [of(self.image_width, self.x), of(self.image_height, self.y)]
     }
 }
 
-/// The part to read, and the part of it to keep.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(super) struct Cut {
     wanted: Rectangle,
@@ -41,8 +39,8 @@ pub(super) struct Cut {
 }
 
 impl Cut {
-    /// Cuts a part with its surroundings out of a pair; without a number of pixels all of it is its surroundings, as where
-    /// a lens' distortion is to be removed, which depends on the place in the whole image.
+    /// Cuts a part with a margin. Without `around` keeps the whole images: distortion depends on the
+    /// position.
     pub fn out_of(pair: &mut Pair, wanted: Rectangle, around: Option<usize>) -> Result<Self> {
         let image @ (height, width) = pair.far.dim();
         wanted.check_within(image)?;
@@ -62,7 +60,6 @@ impl Cut {
         Ok(cut)
     }
 
-    /// A camera's frames of the same place.
     pub fn frames(&self, frames: &CameraFrames) -> Result<CameraFrames> {
         let (height, width) = frames.dark().dim();
         if (height, width) != self.image {
@@ -77,7 +74,6 @@ impl Cut {
         parts.map_err(|error| WorkflowError::parameter("camera", "frames", error.to_string()))
     }
 
-    /// The requested part of a map.
     pub fn wanted<T: Clone>(&self, map: &mut Array2<T>) {
         if !map.is_empty() {
             let Rectangle { x, y, width, height } = self.wanted;

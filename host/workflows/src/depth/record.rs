@@ -1,4 +1,4 @@
-//! `depth.toml`: what made a map.
+//! `depth.toml`: provenance of a map.
 
 use farnear_depth::{
     operators::Operators, optics::Optics, pipeline::Settings, prepare::Report, validity::Lost,
@@ -9,7 +9,6 @@ use serde::Serialize;
 use super::{Computed, DepthRequest, Inputs, noise::Uncertainty, output::Outputs, pair::name_of, part::Part};
 use crate::{MADE_BY, error::Result, inputs::HashedFile};
 
-/// Version of the record.
 const FORMAT: u32 = 1;
 
 #[derive(Serialize)]
@@ -20,21 +19,19 @@ struct Record<'a> {
     near: String,
     units: &'static str,
     warnings: &'a [String],
-    /// Which outputs were written, where they are not the usual ones.
     #[serde(skip_serializing_if = "Option::is_none")]
     write: Option<String>,
     /// Scale of depth.png's codes, mm; code 0 = no value.
     #[serde(skip_serializing_if = "Option::is_none")]
     png: Option<Scale>,
     method: String,
-    /// Over how many pixels evidence was summed.
     window: String,
     #[serde(skip_serializing_if = "Option::is_none")]
     correction: Option<String>,
     /// The request; results are in `prepared`.
     align: String,
     balance: String,
-    /// How colour became grey, where not by the mean.
+    /// Conversion of colour to grey, if not the mean.
     #[serde(skip_serializing_if = "Option::is_none")]
     grey: Option<Grey>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -42,24 +39,22 @@ struct Record<'a> {
     #[serde(skip_serializing_if = "Option::is_none")]
     camera: Option<String>,
     min_confidence: f32,
-    /// Where the map lies in the images, where it is of a part of them.
+    /// Position of the map in the images, if of a part.
     #[serde(skip_serializing_if = "Option::is_none")]
     part: Option<Part>,
     settings: Settings,
-    /// Report of the preparation.
     prepared: Report,
-    /// Why pixels have no depth: the numbers in reason.png, in words, and the part of the map.
+    /// Why pixels have no depth: the codes of reason.png, descriptions, and shares of the map.
     no_depth: &'a [Lost],
     #[serde(skip_serializing_if = "Option::is_none")]
     uncertainty: Option<&'a Uncertainty>,
     optics: Optics,
     #[serde(skip_serializing_if = "Option::is_none")]
     operators: Option<&'a Operators>,
-    /// The files that the map was made from.
     input: Vec<HashedFile>,
 }
 
-/// The record as TOML. `png` is the scale of depth.png, where that is written.
+/// `png` is the scale of depth.png, if written.
 pub fn record(
     settings: &DepthRequest,
     inputs: &Inputs,
@@ -90,8 +85,7 @@ pub fn record(
         part: inputs.cut.map(|cut| cut.part()),
         prepared: computed.report,
         no_depth: &computed.lost,
-        // The number of threads changes nothing in the result.
-        settings: Settings { threads: Settings::default().threads, ..settings.computation() },
+        settings: Settings { threads: rayon::current_num_threads(), ..settings.computation() },
         uncertainty: computed.deviation.as_ref().map(|(_, found)| found),
         optics: inputs.optics,
         operators: inputs.method.operators(),

@@ -8,11 +8,11 @@ use crate::context::{Cancel, Progress, Unattended};
 const OPTICS: &str = "[lens]\nfocal_length_mm = 50.0\naperture_mm = 12.8\n[sensor]\npixel_um = 7.4\n\
                       [focus]\nfar_mm = 933.0\nmax_blur_px = 2.703\n[psf]\nmodel = \"gaussian\"\nk = 0.4578\n";
 
-/// A pair whose names contradict its order, so that a warning stands between computing and writing.
+/// The file names contradict their order, so a warning is reported between computing and writing.
 fn settings(folder: &Path) -> DepthRequest {
     fs::write(folder.join("optics.toml"), OPTICS).unwrap();
     for (name, spread) in [("near.png", 1), ("far.png", 2)] {
-        // A texture, and the mean of it over some pixels.
+        // A texture, and its mean over some pixels.
         let texture = |y: usize, x: usize| 40 + (y * 31 + x * 17) * (y + 7) * 7919 % 151;
         let pixels = Array2::from_shape_fn((48, 64), |(y, x)| {
             let sum: usize = (0..spread * spread).map(|i| texture(y + i / spread, x + i % spread)).sum();
@@ -31,7 +31,6 @@ fn names(folder: &Path) -> Vec<String> {
     names
 }
 
-/// Cancels at the first message.
 struct Impatient(Cancel);
 
 impl Progress for Impatient {
@@ -60,7 +59,7 @@ fn a_cancelled_map_leaves_nothing_behind() {
 }
 
 #[test]
-fn what_a_method_has_no_use_for_is_bad_usage() {
+fn options_without_effect_on_a_method_are_bad_usage() {
     let folder = tempfile::tempdir().unwrap();
     let other = Method::Baseline(farnear_depth::baselines::Method::Subbarao);
     let settings = DepthRequest { method: other, ..settings(folder.path()) };

@@ -1,5 +1,3 @@
-//! Folders that are written to.
-
 use std::{
     env, fs,
     path::{Path, PathBuf},
@@ -8,7 +6,6 @@ use std::{
 use super::{Finding, Health};
 use crate::operator_cache;
 
-/// The current folder, those that are named, and that of what can be made again.
 pub(super) fn findings(named: &[PathBuf]) -> Vec<Finding> {
     let mut findings = vec![env::current_dir().map_or_else(
         |error| {
@@ -22,7 +19,7 @@ pub(super) fn findings(named: &[PathBuf]) -> Vec<Finding> {
     let cache = operator_cache::folder();
     findings.push(match cache {
         Some(folder) => {
-            // It is made when something is put there.
+            // Created on first use, so check its parent.
             let there = folder.ancestors().find(|folder| folder.is_dir()).unwrap_or(&folder).to_path_buf();
             let remedy =
                 "XDG_CACHE_HOME names another; without one operators are designed again each time (some ms)";
@@ -38,7 +35,7 @@ pub(super) fn findings(named: &[PathBuf]) -> Vec<Finding> {
     findings
 }
 
-/// Tries it: rights alone do not tell of a full or read-only disk.
+/// Writes a file: permissions do not show a full or read-only disk.
 fn writable(what: &str, folder: &Path, health: Health, remedy: &str) -> Finding {
     let trial = folder.join(format!(".farnear-doctor-{}", std::process::id()));
     let tried = fs::write(&trial, b"?");

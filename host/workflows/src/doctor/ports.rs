@@ -1,10 +1,7 @@
-//! Serial ports, and whether this user may open them.
-
 use farnear_capture::transport::ports;
 
 use super::{Finding, Health};
 
-/// Each port, or a note that there are none.
 pub(super) fn findings() -> Vec<Finding> {
     let found = ports();
     if found.is_empty() {
@@ -25,7 +22,7 @@ fn of_port(port: &str) -> Finding {
                 Some(false) => {
                     let group = group_name(found.gid());
                     let remedy = format!(
-                        "`sudo usermod -aG {group} \"$USER\"`, then log out and in; or a udev rule (docs/rig.md)"
+                        "`sudo usermod -aG {group} \"$USER\"`, then log out and in; or a udev rule (docs/bring-up.md)"
                     );
                     Finding::bad(
                         Health::Missing,
@@ -51,7 +48,6 @@ fn of_port(port: &str) -> Finding {
     Finding::ok("port", port)
 }
 
-/// Whom a file belongs to, and who may do what.
 #[cfg(unix)]
 struct Rights {
     mode: u32,
@@ -59,15 +55,15 @@ struct Rights {
     group: u32,
 }
 
-/// Whether the user whose `/proc/self/status` this is may read and write; `None` where that cannot be told. Opening would tell too, but
-/// some boards reset when their port is opened.
+/// Whether this user (`/proc/self/status`) may read and write; `None` if unknown. Opening would reset some
+/// boards.
 #[cfg(unix)]
 fn may_open(rights: &Rights, status: &str) -> Option<bool> {
     let numbers = |name: &str| -> Option<Vec<u32>> {
         let line = status.lines().find_map(|line| line.strip_prefix(name))?;
         line.split_whitespace().map(|number| number.parse().ok()).collect()
     };
-    // Real, effective, saved, for files.
+    // Real, effective, saved, file system.
     let (user, group) = (*numbers("Uid:")?.get(1)?, *numbers("Gid:")?.get(1)?);
     if user == 0 {
         return Some(true);
@@ -83,7 +79,7 @@ fn may_open(rights: &Rights, status: &str) -> Option<bool> {
     Some(rights.mode >> shift & 0o6 == 0o6)
 }
 
-/// A group's name, its number where it has none.
+/// A group's name, or its number.
 #[cfg(unix)]
 fn group_name(number: u32) -> String {
     let groups = std::fs::read_to_string("/etc/group").unwrap_or_default();
@@ -107,7 +103,7 @@ mod tests {
                 "Name:\tfarnear\nUid:\t{user}\t{user}\t{user}\t{user}\nGid:\t100\t100\t100\t100\nGroups:\t{groups}\n"
             )
         };
-        // As Debian gives serial ports: root and dialout (20).
+        // Debian's rights: root and dialout (20).
         let port = Rights { mode: 0o20660, owner: 0, group: 20 };
         assert_eq!(may_open(&port, &status(1000, "20 44")), Some(true));
         assert_eq!(may_open(&port, &status(1000, "44")), Some(false));

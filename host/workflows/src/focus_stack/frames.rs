@@ -1,153 +1,219 @@
-//! Whether the images of a stack show one scene: frames that show another, are turned or shaken are found and left out.
+//! Omits frames of a stack that show another scene, are rotated or shaken.
 //!
-//! Each image is compared with the nearest good one. Neighbours in a stack correlate highly in the band that defocus leaves to both,
-//! so a frame whose correlation is far below the usual one shows something else. A shaken frame correlates, but it is less
-//! sharp than both of its neighbours almost everywhere, which no change of focus makes.
+//! Neighbours in a stack correlate highly in the band that defocus leaves to both. Links between neighbours that correlate far less
+//! than usual split the stack into runs. The longest run is the scene. A frame outside belongs to it if it correlates
+//! with the nearest frame of the scene as frames of the scene at the same distance do; so the good neighbour of a bad frame
+//! stays. A shaken frame correlates, but it is less sharp than both of its neighbours in most places, which no change of focus makes.
 
 use farnear_depth::{
     focus_measure::FocusMeasure,
+    focus_stack::Slices,
     prepare::{
         align::{self, Model},
-        warp::{Warp, resample},
+        warp::Warp,
     },
 };
-use ndarray::{Array2, ArrayView2, s};
+use ndarray::{ArrayView2, CowArray, Ix2, s};
 
-use crate::{context::Context, error::Result};
+use crate::{
+    context::Context,
+    error::{Result, WorkflowError},
+};
 
-/// Correlation, as part of the median of all links, below which a frame is foreign.
+/// Correlation, as part of the usual one, below which a frame is foreign.
 const FOREIGN: f64 = 0.5;
-/// Median correlation below which no link tells anything: images without texture, or steps too wide.
+/// Part of the links that correlate less than the usual one: in a stack of four, a bad frame breaks two of three.
+const USUAL: f64 = 2.0 / 3.0;
+/// Usual correlation below which no link tells anything: images without texture, or steps too wide.
 const TELLING: f64 = 0.4;
-/// Blocks across and down in which sharpness is compared.
 const BLOCKS: usize = 6;
 /// Part of the sharpness of the less sharp neighbour below which a block is shaken, and part of the blocks that must be.
-const SHAKEN: f64 = 0.75;
-const SHAKEN_BLOCKS: f64 = 0.75;
+const SHAKEN: f64 = 0.9;
+const SHAKEN_BLOCKS: f64 = 0.6;
 
 pub(super) struct Frames {
-    /// How each image lies on the reference; identity without alignment.
+    /// Warp of each image onto the reference; identity without alignment.
     pub warps: Vec<Warp>,
-    /// Images that are not used, with the reason, in order.
+    /// Omitted images with the reason, in order.
     pub left_out: Vec<(usize, String)>,
 }
 
 /// Compares and, with a model, aligns the frames.
-pub(super) fn check(images: &[Array2<f32>], model: Option<Model>, context: &Context<'_>) -> Result<Frames> {
-    let count = images.len();
-    let same_size = images.windows(2).all(|two| two[0].dim() == two[1].dim());
+pub(super) fn check<S>(images: &S, model: Option<Model>, context: &Context<'_>) -> Result<Frames>
+where
+    S: Slices + ?Sized,
+    WorkflowError: From<S::Error>,
+{
+    let count = images.count();
     let mut frames = Frames { warps: vec![Warp::IDENTITY; count], left_out: Vec::new() };
     // Stacks that are too short or of mixed sizes are refused by the measure.
-    if count < 3 || !same_size {
+    if count < 3 || (1..count).any(|index| images.dim(index) != images.dim(0)) {
         return Ok(frames);
     }
-    let shaken = shaken(images);
-    // From the middle outwards; the links of a foreign start correlate least.
-    let middle = count / 2;
-    let mut starts: Vec<usize> = (0..count).filter(|index| !shaken.contains(index)).collect();
-    starts.sort_by_key(|index| index.abs_diff(middle));
-    let mut best: Option<Chain> = None;
-    for start in starts.into_iter().take(2) {
-        let chain = chain(images, start, model, &shaken, context)?;
-        if best.as_ref().is_none_or(|best| chain.usual > best.usual) {
-            best = Some(chain);
+    let comparison = Comparison { images, model, context };
+    let neighbours = comparison.neighbours()?;
+    let scene = comparison.scene(&neighbours.links)?;
+    let members: Vec<usize> = (0..count).filter(|index| scene.warps[*index].is_some()).collect();
+    let shaken = shaken(&neighbours.sharpness, &members);
+    // Half or more: it is not the frames that are wrong.
+    let few_foreign = (count - members.len()) * 2 < count;
+    let few_shaken = shaken.len() * 4 < count;
+    let start = members.iter().min_by_key(|index| index.abs_diff(count / 2));
+    let back = start.and_then(|start| scene.warps[*start]?.inverse()).unwrap_or(Warp::IDENTITY);
+    for index in 0..count {
+        let warp = match scene.warps[index] {
+            Some(warp) => warp,
+            None => {
+                let (nearest, warp) = nearest(&scene.warps, index).unwrap_or((index, Warp::IDENTITY));
+                let link = comparison.link(nearest, index)?;
+                if few_foreign {
+                    let reason = format!(
+                        "it shows another scene or is turned (correlation with its neighbour {:.2}, of the others {:.2})",
+                        link.correlation, scene.usual
+                    );
+                    frames.left_out.push((index, reason));
+                }
+                link.warp.after(&warp)
+            }
+        };
+        frames.warps[index] = warp.after(&back);
+        if few_shaken && shaken.contains(&index) {
+            let reason = "it is shaken: less sharp than both neighbours in most places";
+            frames.left_out.push((index, reason.into()));
         }
     }
-    let Some(chain) = best else { return Ok(frames) };
-    frames.warps = chain.warps;
-    // More than half: it is not the frames that are wrong.
-    if chain.foreign.len() * 2 < count {
-        for (index, correlation) in chain.foreign {
-            let reason = format!(
-                "it shows another scene or is turned (correlation with its neighbour {correlation:.2}, of the others {:.2})",
-                chain.usual
-            );
-            frames.left_out.push((index, reason));
-        }
-    }
-    if shaken.len() * 4 < count {
-        let reason = "it is shaken: less sharp than both neighbours almost everywhere".to_owned();
-        frames.left_out.extend(shaken.into_iter().map(|index| (index, reason.clone())));
-    }
-    frames.left_out.sort_by_key(|(index, _)| *index);
-    frames.left_out.dedup_by_key(|(index, _)| *index);
     Ok(frames)
 }
 
-struct Chain {
-    warps: Vec<Warp>,
-    /// Frames that do not fit, with their correlation.
-    foreign: Vec<(usize, f64)>,
-    /// Median correlation of the links.
+/// The nearest frame of the scene, with its warp.
+fn nearest(warps: &[Option<Warp>], index: usize) -> Option<(usize, Warp)> {
+    let placed = warps.iter().enumerate().filter_map(|(other, warp)| Some((other, (*warp)?)));
+    placed.min_by_key(|(other, _)| other.abs_diff(index))
+}
+
+/// The frames that show one scene.
+struct Scene {
+    /// Where they lie, on the first frame of the longest run.
+    warps: Vec<Option<Warp>>,
+    /// Usual correlation of neighbours.
     usual: f64,
 }
 
-/// Links each image to the nearest good one on the way to the start.
-fn chain(
-    images: &[Array2<f32>],
-    start: usize,
+/// What neighbours in the stack have in common.
+struct Neighbours {
+    /// From each frame to the next.
+    links: Vec<Link>,
+    /// Of each frame, by blocks.
+    sharpness: Vec<Vec<f64>>,
+}
+
+struct Comparison<'a, S: ?Sized> {
+    images: &'a S,
     model: Option<Model>,
-    shaken: &[usize],
-    context: &Context<'_>,
-) -> Result<Chain> {
-    let count = images.len();
-    let link = |nearer: usize, index: usize| {
-        let found = align::estimate(
-            images[nearer].view(),
-            images[index].view(),
-            model.unwrap_or(Model::Shift),
-            Warp::IDENTITY,
-        );
-        match (found, model) {
-            (None, _) => (Warp::IDENTITY, None),
-            (Some(found), None) => (Warp::IDENTITY, Some(found.correlation_before)),
-            (Some(found), Some(_)) => (found.warp, Some(found.correlation)),
-        }
-    };
-    let mut warps = vec![Warp::IDENTITY; count];
-    let mut links: Vec<(usize, f64)> = Vec::new();
-    let (up, down): (Vec<usize>, Vec<usize>) = ((start + 1..count).collect(), (0..start).rev().collect());
-    let mut done = 0;
-    // The usual correlation so far decides whether a frame is good enough to link the next one to.
-    for direction in [up, down] {
-        let mut nearer = start;
-        for index in direction {
-            context.cancel.check("comparing the stack's images")?;
-            let (warp, correlation) = link(nearer, index);
-            let correlation = correlation.unwrap_or(0.0);
-            warps[index] = warp.after(&warps[nearer]);
-            links.push((index, correlation));
-            if correlation >= FOREIGN * median(&links) && !shaken.contains(&index) {
-                nearer = index;
-            }
-            done += 1;
-            context.progress.advance("images compared", done, Some(count - 1));
+    context: &'a Context<'a>,
+}
+
+#[derive(Clone, Copy)]
+struct Link {
+    /// From a place in the first frame to that in the second.
+    warp: Warp,
+    correlation: f64,
+}
+
+impl<S> Comparison<'_, S>
+where
+    S: Slices + ?Sized,
+    WorkflowError: From<S::Error>,
+{
+    fn image(&self, index: usize) -> Result<CowArray<'_, f32, Ix2>> {
+        self.context.cancel.check("comparing the stack's images")?;
+        Ok(self.images.rows(index, 0..self.images.dim(index).0)?)
+    }
+
+    fn link(&self, first: usize, second: usize) -> Result<Link> {
+        Ok(self.compared(self.image(first)?.view(), self.image(second)?.view()))
+    }
+
+    fn compared(&self, first: ArrayView2<f32>, second: ArrayView2<f32>) -> Link {
+        let found = align::estimate(first, second, self.model.unwrap_or(Model::Shift), Warp::IDENTITY);
+        match (found, self.model) {
+            (None, _) => Link { warp: Warp::IDENTITY, correlation: 0.0 },
+            (Some(found), None) => Link { warp: Warp::IDENTITY, correlation: found.correlation_before },
+            (Some(found), Some(_)) => Link { warp: found.warp, correlation: found.correlation },
         }
     }
-    let usual = median(&links);
-    let foreign =
-        links.into_iter().filter(|(_, correlation)| usual > TELLING && *correlation < FOREIGN * usual);
-    Ok(Chain { warps, foreign: foreign.collect(), usual })
+
+    /// Compares each frame with the next one.
+    fn neighbours(&self) -> Result<Neighbours> {
+        let count = self.images.count();
+        let mut found = Neighbours { links: Vec::with_capacity(count), sharpness: Vec::with_capacity(count) };
+        let mut before: Option<CowArray<'_, f32, Ix2>> = None;
+        for index in 0..count {
+            let image = self.image(index)?;
+            found.sharpness.push(of_blocks(image.view()));
+            found.links.extend(before.map(|before| self.compared(before.view(), image.view())));
+            before = Some(image);
+            self.context.progress.advance("images compared", index + 1, Some(count));
+        }
+        Ok(found)
+    }
+
+    fn scene(&self, links: &[Link]) -> Result<Scene> {
+        let usual = usual(links);
+        let limit = if usual > TELLING { FOREIGN * usual } else { f64::NEG_INFINITY };
+        let breaks = (0..links.len()).filter(|at| links[*at].correlation < limit).map(|at| at + 1);
+        let ends: Vec<usize> = [0].into_iter().chain(breaks).chain([links.len() + 1]).collect();
+        let runs = ends.array_windows().map(|[from, to]| *from..*to);
+        let run = runs.max_by_key(ExactSizeIterator::len).unwrap_or_default();
+        let mut warps = vec![None; links.len() + 1];
+        let mut warp = Warp::IDENTITY;
+        for index in run.clone() {
+            if index > run.start {
+                warp = links[index - 1].warp.after(&warp);
+            }
+            warps[index] = Some(warp);
+        }
+        for index in (0..run.start).rev().chain(run.end..warps.len()) {
+            let Some((other, placed)) = nearest(&warps, index) else { continue };
+            let least = match other.abs_diff(index) {
+                1 => limit,
+                distance => FOREIGN * self.expected(&warps, other, distance, usual)?,
+            };
+            let link = self.link(other, index)?;
+            if link.correlation >= least {
+                warps[index] = Some(link.warp.after(&placed));
+            }
+        }
+        Ok(Scene { warps, usual })
+    }
+
+    /// Correlation of two frames of the scene at this distance, as near as possible to one of its frames.
+    fn expected(&self, warps: &[Option<Warp>], near: usize, distance: usize, usual: f64) -> Result<f64> {
+        let pairs = (0..warps.len().saturating_sub(distance))
+            .filter(|first| warps[*first].is_some() && warps[first + distance].is_some());
+        match pairs.min_by_key(|first| first.abs_diff(near).min((first + distance).abs_diff(near))) {
+            Some(first) => Ok(self.link(first, first + distance)?.correlation),
+            // As if what each step changes had nothing to do with the other steps.
+            None => Ok(usual.powi(i32::try_from(distance).unwrap_or(i32::MAX))),
+        }
+    }
 }
 
-fn median(links: &[(usize, f64)]) -> f64 {
-    let mut values: Vec<f64> = links.iter().map(|(_, correlation)| *correlation).collect();
+/// Members of the scene that are less sharp than both of their neighbours among them in most places.
+fn shaken(sharpness: &[Vec<f64>], members: &[usize]) -> Vec<usize> {
+    let three = members.array_windows().filter(|indices: &&[usize; 3]| {
+        let [before, own, after] = indices.map(|index| &sharpness[index]);
+        let dull =
+            (0..own.len()).filter(|block| own[*block] < SHAKEN * before[*block].min(after[*block])).count();
+        !own.is_empty() && dull as f64 >= SHAKEN_BLOCKS * own.len() as f64
+    });
+    three.map(|[_, own, _]| *own).collect()
+}
+
+fn usual(links: &[Link]) -> f64 {
+    let mut values: Vec<f64> = links.iter().map(|link| link.correlation).collect();
     values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(0.0)
-}
-
-/// Frames that are less sharp than both neighbours almost everywhere.
-fn shaken(images: &[Array2<f32>]) -> Vec<usize> {
-    let sharpness: Vec<Vec<f64>> = images.iter().map(|image| of_blocks(image.view())).collect();
-    (1..images.len().saturating_sub(1))
-        .filter(|index| {
-            let [before, own, after] = [&sharpness[index - 1], &sharpness[*index], &sharpness[index + 1]];
-            let dull = (0..own.len())
-                .filter(|block| own[*block] < SHAKEN * before[*block].min(after[*block]))
-                .count();
-            !own.is_empty() && dull as f64 >= SHAKEN_BLOCKS * own.len() as f64
-        })
-        .collect()
+    values.get((USUAL * values.len() as f64) as usize).copied().unwrap_or(0.0)
 }
 
 fn of_blocks(image: ArrayView2<f32>) -> Vec<f64> {
@@ -160,28 +226,23 @@ fn of_blocks(image: ArrayView2<f32>) -> Vec<f64> {
     measured.collect::<Option<Vec<f64>>>().unwrap_or_default()
 }
 
-/// Lays the images on the reference, NaN where they do not show it, and gives the farthest way of a pixel.
-pub(super) fn moved(images: &mut [Array2<f32>], warps: &[Warp]) -> f64 {
-    let mut farthest = 0.0_f64;
-    for (image, warp) in images.iter_mut().zip(warps).filter(|(_, warp)| **warp != Warp::IDENTITY) {
-        let (height, width) = image.dim();
-        let [right, bottom] = [width as f64 - 1.0, height as f64 - 1.0];
-        for [x, y] in [[0.0, 0.0], [right, 0.0], [0.0, bottom], [right, bottom]] {
-            let [to_x, to_y] = warp.at([x, y]);
-            farthest = farthest.max((to_x - x).hypot(to_y - y));
-        }
-        *image = resample(image.view(), warp);
-    }
-    farthest
+/// Farthest distance that the warps move a pixel of images of this (height, width), px.
+pub(super) fn farthest_px(warps: &[Warp], (height, width): (usize, usize)) -> f64 {
+    let [right, bottom] = [width as f64 - 1.0, height as f64 - 1.0];
+    let corners = [[0.0, 0.0], [right, 0.0], [0.0, bottom], [right, bottom]];
+    let moves = warps.iter().flat_map(|warp| corners.map(|[x, y]| (warp.at([x, y]), [x, y])));
+    moves.map(|(to, from)| (to[0] - from[0]).hypot(to[1] - from[1])).fold(0.0, f64::max)
 }
 
 #[cfg(test)]
 mod tests {
+    use farnear_depth::focus_stack::{StackSettings, depth_from_positions};
+    use ndarray::Array2;
+
     use super::*;
 
     const COUNT: usize = 11;
 
-    /// A scene of two layers that a stack focuses through, by blurring a texture more or less.
     fn stack() -> Vec<Array2<f32>> {
         let texture = scene(1);
         (0..COUNT)
@@ -212,7 +273,8 @@ mod tests {
     }
 
     fn left_out(images: &[Array2<f32>], model: Option<Model>) -> Vec<usize> {
-        let frames = check(images, model, &Context::unattended()).unwrap();
+        let views: Vec<ArrayView2<f32>> = images.iter().map(|image| image.view()).collect();
+        let frames = check(&views[..], model, &Context::unattended()).unwrap();
         frames.left_out.into_iter().map(|(index, _)| index).collect()
     }
 
@@ -224,13 +286,10 @@ mod tests {
 
     #[test]
     fn finds_a_foreign_or_turned_frame_at_any_place() {
-        for at in [0, 4, COUNT / 2, COUNT - 1] {
+        for at in [0, 1, 4, COUNT / 2, COUNT - 2, COUNT - 1] {
             for model in [None, Some(Model::Similarity)] {
-                // One good neighbour may be left out as well: its link leads over the bad frame.
                 let found = |images: &[Array2<f32>], what: &str| {
-                    let found = left_out(images, model);
-                    assert!(found.contains(&at), "{what} {at}, {model:?}: {found:?}");
-                    assert!(found.len() <= 2, "{what} {at}, {model:?}: {found:?}");
+                    assert_eq!(left_out(images, model), [at], "{what}, {model:?}");
                 };
                 let mut images = stack();
                 images[at] = mean(&scene(2), 3);
@@ -260,5 +319,91 @@ mod tests {
     fn images_without_texture_are_not_judged() {
         let images: Vec<_> = (0..7).map(|seed| scene(seed).mapv(|v| 0.5 + 0.01 * v)).collect();
         assert_eq!(left_out(&images, None), [0; 0]);
+    }
+
+    /// A tilted plane with a step, in images: 2.5 to 12 in a stack of 15.
+    fn depth_at(y: usize, x: usize) -> f32 {
+        2.5 + 5.0 * x as f32 / 95.0 + 2.0 * y as f32 / 71.0 + if x > 60 { 2.5 } else { 0.0 }
+    }
+
+    const TRUE_COUNT: usize = 15;
+
+    /// Blurred by passes of (1 2 1) / 4, as many as their variance, half a pixel squared, makes of a blur that grows evenly.
+    fn true_stack() -> Vec<Array2<f32>> {
+        let mut blurred = vec![scene(1)];
+        while blurred.len() < 70 {
+            let next = smoothed(&blurred[blurred.len() - 1]);
+            blurred.push(next);
+        }
+        let image = |index: usize| {
+            let noise = scene(100 + index as u64);
+            Array2::from_shape_fn(noise.dim(), |(y, x)| {
+                let passes = 2.0 * (0.45 * (depth_at(y, x) - index as f32)).powi(2);
+                let below = passes as usize;
+                let part = passes - below as f32;
+                let value = (1.0 - part) * blurred[below][(y, x)] + part * blurred[below + 1][(y, x)];
+                value + 0.01 * (noise[(y, x)] - 0.5)
+            })
+        };
+        (0..TRUE_COUNT).map(image).collect()
+    }
+
+    fn smoothed(image: &Array2<f32>) -> Array2<f32> {
+        let (height, width) = image.dim();
+        let row = |y: usize, x: usize| {
+            0.25 * image[(y, x.saturating_sub(1))]
+                + 0.5 * image[(y, x)]
+                + 0.25 * image[(y, (x + 1).min(width - 1))]
+        };
+        Array2::from_shape_fn(image.dim(), |(y, x)| {
+            0.25 * row(y.saturating_sub(1), x) + 0.5 * row(y, x) + 0.25 * row((y + 1).min(height - 1), x)
+        })
+    }
+
+    /// Root mean square error in images and the part of the pixels with a depth, without some frames.
+    fn error(images: &[Array2<f32>], out: Vec<usize>) -> (f64, f64, Vec<usize>) {
+        let kept: Vec<usize> = (0..images.len()).filter(|index| !out.contains(index)).collect();
+        let views: Vec<ArrayView2<f32>> = kept.iter().map(|index| images[*index].view()).collect();
+        let positions: Vec<f64> = kept.iter().map(|index| *index as f64).collect();
+        let map = depth_from_positions(&views[..], &positions, &StackSettings::default()).unwrap();
+        let (mut sum, mut known) = (0.0, 0.0);
+        for ((y, x), place) in map.place.indexed_iter().filter(|(_, place)| place.is_finite()) {
+            let below = (*place as usize).min(kept.len() - 2);
+            let depth = positions[below]
+                + f64::from(*place - below as f32) * (positions[below + 1] - positions[below]);
+            sum += (depth - f64::from(depth_at(y, x))).powi(2);
+            known += 1.0;
+        }
+        ((sum / known).sqrt(), known / map.place.len() as f64, out)
+    }
+
+    #[test]
+    fn a_bad_frame_at_any_place_costs_no_more_than_its_absence() {
+        let good = true_stack();
+        let (clean, known, out) = error(&good, left_out(&good, None));
+        assert!(clean < 0.3 && known > 0.98 && out.is_empty(), "{clean} {known} {out:?}");
+        let foreign = mean(&scene(2), 3);
+        for at in 0..TRUE_COUNT {
+            let still = &good[at];
+            let defocused = (0..40).fold(still.clone(), |image, _| smoothed(&image));
+            let shaken = Array2::from_shape_fn(still.dim(), |(y, x)| {
+                still.slice(s![y, x.saturating_sub(5)..(x + 6).min(96)]).mean().unwrap()
+            });
+            let turned = still.slice(s![..;-1, ..;-1]).to_owned();
+            // A frame less costs at most a tenth here, where the scene is focused in only ten.
+            let (absent, ..) = error(&good, vec![at]);
+            assert!(absent < 1.12 * clean, "{at}: {absent} {clean}");
+            let kinds =
+                [("foreign", &foreign), ("turned", &turned), ("shaken", &shaken), ("defocused", &defocused)];
+            for (kind, bad) in kinds {
+                let mut images = good.clone();
+                images[at] = bad.clone();
+                let (found, known, out) = error(&images, left_out(&images, None));
+                assert!(found < 1.05 * clean.max(absent) && known > 0.98, "{kind} {at}: {found} {known}");
+                // Nothing tells a shaken first or last frame from one that is less in focus.
+                let at_an_end = at == 0 || at + 1 == TRUE_COUNT;
+                assert!(out == [at] || at_an_end && out.is_empty(), "{kind} {at}: {out:?}");
+            }
+        }
     }
 }

@@ -1,4 +1,4 @@
-//! Which images make a stack, and where each is focused.
+//! Selects the images of a stack and their focus positions.
 
 use std::path::PathBuf;
 
@@ -13,34 +13,27 @@ use crate::{
     optics,
 };
 
-/// The coordinate along the axis in which the images of a stack lie.
+/// Coordinate of the images in a stack.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum Axis {
-    /// Distance from lens to object, mm. The sensor's distance changes evenly with its reciprocal.
+    /// Distance from lens to object. Sensor distance is linear in its reciprocal.
     ObjectMm,
-    /// Position of a stage, um.
     StageUm,
-    /// The number of the image, from 1.
+    /// Image number, from 1.
     Number,
 }
 
-/// The images of a stack in the order of their focus.
 pub(super) struct Listed {
     pub images: Vec<PathBuf>,
     pub axis: Axis,
-    /// Where each is focused, on the axis.
     pub positions: Vec<f64>,
-    /// The files with the optics and the positions.
     pub described_by: Vec<PathBuf>,
-    /// The lens, if known.
     pub optics: Option<Optics>,
-    /// Side of a pixel at the object, um, from the file's metadata.
+    /// Side of a pixel at the object, from the file's metadata.
     pub object_pixel_um: Option<f64>,
-    /// What a person should know of the stack.
     pub remarks: Vec<String>,
 }
 
-/// The images with their positions.
 pub(super) fn of(request: &FocusStackRequest) -> Result<Listed> {
     let record = if request.stack.is_dir() { read_record(&request.stack)? } else { None };
     let listed = match &record {
@@ -89,9 +82,8 @@ pub(super) fn of(request: &FocusStackRequest) -> Result<Listed> {
     Ok(Listed { images, axis, positions, described_by, optics, object_pixel_um, remarks: listed.remarks })
 }
 
-/// The lens, if any file gives it; optics that are named or lie in the folder must be right.
 fn lens(request: &FocusStackRequest) -> Result<Option<Optics>> {
-    // A pair's far image names the folder; here any name in it does.
+    // A far image's path gives the folder; any name in it works.
     let found = optics::of_pair(request.optics.as_deref(), &request.stack.join("stack.png"));
     match found {
         Ok((lens, _)) => Ok(Some(lens)),
@@ -104,7 +96,7 @@ fn sensors(record: &CaptureRecord) -> Vec<f64> {
     record.exposure.iter().map(|exposure| exposure.sensor_measured_mm).collect()
 }
 
-/// Distances of the objects that are sharp with the sensor at these distances from the lens: the thin lens, u = F w / (w - F).
+/// Object distances in focus at these sensor distances; thin lens, u = F w / (w - F).
 fn objects(sensor_mm: &[f64], request: &FocusStackRequest) -> Result<Vec<f64>> {
     let (lens, _) = optics::of_pair(request.optics.as_deref(), &request.stack.join("stack.png"))?;
     let focal_length_mm = lens.focal_length_mm();
@@ -127,7 +119,7 @@ impl Axis {
         }
     }
 
-    /// From a position to the coordinate in which a curve of sharpness is symmetric, rising or falling with it.
+    /// Maps a position to the coordinate in which a sharpness curve is symmetric.
     fn even(self, position: f64) -> f64 {
         if self == Self::ObjectMm { -1.0 / position } else { position }
     }
@@ -138,22 +130,20 @@ impl Axis {
 }
 
 impl Listed {
-    /// The lens' distortion, if known.
     pub(super) fn distortion(&self) -> Option<Distortion> {
         self.optics.and_then(|lens| lens.distortion())
     }
 
-    /// Positions in the coordinate that the tips are fitted over.
+    /// Positions in the coordinate of the peak fit.
     pub(super) fn even_positions(&self) -> Vec<f64> {
         self.positions.iter().map(|position| self.axis.even(*position)).collect()
     }
 
-    /// Depth at each place in the stack, in the axis' unit.
+    /// Depth at each position in the stack, in the axis' unit.
     pub(super) fn depth(&self, place: &Array2<f32>) -> Array2<f32> {
         depth_at(place, self.axis, &self.even_positions())
     }
 
-    /// Leaves out images by their index.
     pub(super) fn without(&mut self, left_out: &[usize]) {
         for index in left_out.iter().rev() {
             self.images.remove(*index);
@@ -162,8 +152,7 @@ impl Listed {
     }
 }
 
-/// Coordinates for [`farnear_depth::focus_stack::depth_from_positions`] of images focused at these distances, or of evenly spaced
-/// ones.
+/// Coordinates for [`farnear_depth::focus_stack::depth_from_positions`]; evenly spaced without distances.
 pub fn even_positions(count: usize, focused_at_mm: Option<&[f64]>) -> Vec<f64> {
     match focused_at_mm {
         Some(mm) => mm.iter().map(|mm| Axis::ObjectMm.even(*mm)).collect(),
@@ -171,7 +160,7 @@ pub fn even_positions(count: usize, focused_at_mm: Option<&[f64]>) -> Vec<f64> {
     }
 }
 
-/// Depth of each place in a stack of `count` images: mm if the distances are known, else the number of the image, from 1.
+/// In mm if the distances are known, else the image number from 1.
 pub fn depth_of_places(place: &Array2<f32>, count: usize, focused_at_mm: Option<&[f64]>) -> Array2<f32> {
     let axis = if focused_at_mm.is_some() { Axis::ObjectMm } else { Axis::Number };
     depth_at(place, axis, &even_positions(count, focused_at_mm))

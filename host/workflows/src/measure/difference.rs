@@ -1,4 +1,4 @@
-//! What differs between two maps of one size.
+//! Difference of two maps of equal size.
 
 use std::path::Path;
 
@@ -8,15 +8,13 @@ use serde::{Serialize, Serializer};
 use super::{Entries, MapFile, Unit, read_map};
 use crate::error::WorkflowError;
 
-/// Figures of a difference, in the unit of the maps.
+/// In the unit of the maps.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct DifferenceFigures {
     pub unit: Unit,
-    /// Pixels with a depth in both maps.
     pub pixels: usize,
-    /// Mean of second minus first; none where no pixel has both, as the next two.
+    /// Mean of second minus first; `None` without pixels, as the next two.
     pub mean: Option<f64>,
-    /// Standard deviation of the differences.
     pub standard_deviation: Option<f64>,
     pub rms: Option<f64>,
 }
@@ -33,17 +31,15 @@ impl Serialize for DifferenceFigures {
     }
 }
 
-/// The second map minus the first, NaN where one has no value, with its figures. Both are result folders or map files.
-///
-/// # Errors
-/// Maps that cannot be read; [`WorkflowError::Parameter`] for maps of different size or unit.
+/// The second map minus the first, NaN without a value. Both are result folders or map files of equal size
+/// and unit.
 pub fn difference(first: &Path, second: &Path) -> crate::Result<(Array2<f32>, DifferenceFigures)> {
     let [first, second] = [read_map(first)?, read_map(second)?];
     let unit = shared_unit("difference", &first, &second)?;
     of_maps(&first.depth, &second.depth, unit)
 }
 
-/// The unit of two maps; a map without a record has that of the other.
+/// The unit of two maps; a map without a record adopts the other's.
 pub(crate) fn shared_unit(name: &'static str, first: &MapFile, second: &MapFile) -> crate::Result<Unit> {
     match (first.unit, second.unit) {
         (Some(a), Some(b)) if a != b => {

@@ -1,4 +1,4 @@
-//! Depth maps in files, with the unit that the record next to them gives.
+//! Depth map files, with the unit from the record next to them.
 
 use std::{
     fs,
@@ -22,7 +22,6 @@ use crate::{
     result_folder::{DEPTH_RECORD, STACK_RECORD},
 };
 
-/// The part of `depth.toml` that is read.
 #[derive(Deserialize)]
 struct DepthRecord {
     optics: Optics,
@@ -30,7 +29,6 @@ struct DepthRecord {
     png: Option<Scale>,
 }
 
-/// The part of `stack.toml` that is read.
 #[derive(Deserialize)]
 struct StackRecord {
     unit: Unit,
@@ -44,14 +42,13 @@ enum Record {
     Stack(Box<StackRecord>),
 }
 
-/// A map as its file holds it; holes are NaN.
+/// Holes are NaN.
 pub(crate) struct MapFile {
     pub depth: Array2<f32>,
-    /// `None` without a record next to the file.
+    /// `None` without a record.
     pub unit: Option<Unit>,
 }
 
-/// Reads a map file, or the map of a result folder.
 pub(crate) fn read_map(path: &Path) -> Result<MapFile> {
     let (file, folder) = file_and_folder(path);
     let record = record_of(&folder)?;
@@ -87,7 +84,7 @@ fn lens(optics: &Optics, part: Option<Part>) -> Lateral {
     })
 }
 
-/// The map's file and its folder; a folder's map is the first of depth.npy, depth.tiff and depth.png.
+/// In a folder the first of depth.npy, depth.tiff and depth.png.
 fn file_and_folder(path: &Path) -> (PathBuf, PathBuf) {
     if !path.is_dir() {
         return (path.into(), path.parent().unwrap_or(Path::new("")).into());

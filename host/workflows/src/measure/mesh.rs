@@ -1,4 +1,4 @@
-//! The surface of a capture as a mesh, as coarse as it has to be.
+//! Coarse mesh of a captured surface.
 
 use std::path::Path;
 
@@ -8,11 +8,8 @@ use ndarray::s;
 use super::Measured;
 use crate::error::{Result, WorkflowError};
 
-/// A PLY of at most `points` points: every second, third, ... row and column of the map, coloured by the far image or the image of a
-/// stack that is sharp everywhere. Positions are in the map's unit.
-///
-/// # Errors
-/// [`crate::WorkflowError::Map`], [`crate::WorkflowError::Image`] where map or image are not there.
+/// A PLY of at most `points` points (every n-th row and column), coloured by the far or all-in-focus image.
+/// Positions are in the map's unit.
 pub fn mesh(folder: &Path, points: usize) -> Result<Vec<u8>> {
     let Measured { depth, lateral, unit, .. } = Measured::read(folder)?;
     let image = ["far.png", "all-in-focus.png"].map(|name| folder.join(name));
@@ -28,7 +25,6 @@ pub fn mesh(folder: &Path, points: usize) -> Result<Vec<u8>> {
     Ok(ply(depth.slice(window), grey.slice(window), lateral.thinned(step), &unit.to_string()))
 }
 
-/// The smallest step that leaves at most this many of `pixels`.
 fn step(pixels: usize, points: usize) -> usize {
     (1..).find(|step| pixels / (step * step) <= points.max(1)).unwrap_or(1)
 }

@@ -1,28 +1,26 @@
-//! The plane through points, by least squares along the optical axis: z = z0 + a x + b y.
+//! Least-squares plane along the optical axis: z = z0 + a x + b y.
 
 use farnear_files::mesh::Lateral;
 use serde::{Serialize, Serializer};
 
 use super::{Entries, Measured, Unit};
 
-/// A plane, and how well the points keep to it.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Plane {
-    /// Distance in the points' middle.
+    /// At the centroid of the points.
     pub z_mm: f64,
-    /// Slope to the right, mm per mm.
+    /// mm per mm to the right.
     pub slope_x: f64,
     pub slope_y: f64,
-    /// Angle between the plane and one square to the optical axis.
+    /// Angle to the sensor plane.
     pub tilt_deg: f64,
-    /// Root mean square of the distances along the axis.
+    /// Of the residuals along the axis.
     pub rms_mm: f64,
-    /// Largest minus smallest of them: the flatness.
+    /// Largest minus smallest residual: the flatness.
     pub peak_to_valley_mm: f64,
 }
 
-/// A plane through a map of any unit: the lengths of [`Plane`] are in it. Where the size of a pixel is not known, slopes are per
-/// pixel and there is no tilt.
+/// A plane in a map of any unit. Without a pixel size, slopes are per pixel and there is no tilt.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct PlaneFigures {
     pub unit: Unit,
@@ -56,7 +54,7 @@ impl Serialize for PlaneFigures {
     }
 }
 
-/// Fits a plane; `None` with fewer than three points or all of them in a line. Three passes.
+/// Fits a plane in three passes; `None` for fewer than three points or collinear ones.
 pub fn fit(points_mm: &[[f64; 3]]) -> Option<Plane> {
     let count = points_mm.len();
     if count < 3 {
@@ -74,7 +72,7 @@ pub fn fit(points_mm: &[[f64; 3]]) -> Option<Plane> {
         yz += y * z;
     }
     let determinant = xx * yy - xy * xy;
-    // Relative to what it would be for points that spread in both directions.
+    // Relative to points that spread in both directions.
     if determinant <= 1e-9 * (xx * yy) || determinant.is_nan() {
         return None;
     }
@@ -113,7 +111,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_off_the_plane_is_measured() {
+    fn deviations_from_the_plane_are_measured() {
         let plane = fit(&grid(|x, y| 900.0 + if (x + y) as i64 % 2 == 0 { 1.0 } else { -1.0 })).unwrap();
         assert!(
             (plane.rms_mm - 1.0).abs() < 0.01 && (plane.peak_to_valley_mm - 2.0).abs() < 0.05,

@@ -1,21 +1,16 @@
-//! Depths along a line.
-
 use serde::{Serialize, Serializer};
 
 use super::{Entries, Measured, Unit};
 use crate::error::WorkflowError;
 
-/// A point of a profile.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct ProfilePoint {
     pub unit: Unit,
     pub x: usize,
     pub y: usize,
-    /// From the profile's begin, in pixels.
+    /// Distance from the start of the profile.
     pub at_px: f64,
-    /// Depth, where there is one.
     pub depth: Option<f64>,
-    /// Its standard deviation, where it was computed.
     pub deviation: Option<f64>,
 }
 
@@ -31,18 +26,14 @@ impl Serialize for ProfilePoint {
     }
 }
 
-/// A profile.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct ProfileFigures {
     pub unit: Unit,
-    /// Its points, a pixel apart.
+    /// One pixel apart.
     pub points: Vec<ProfilePoint>,
 }
 
-/// Takes the depths nearest to the line between two pixels.
-///
-/// # Errors
-/// [`WorkflowError::Parameter`] for an end outside the map.
+/// Nearest depths along the line between two pixels inside the map.
 pub fn profile(map: &Measured, from: [usize; 2], to: [usize; 2]) -> crate::Result<ProfileFigures> {
     let (height, width) = map.depth.dim();
     for [x, y] in [from, to] {

@@ -1,34 +1,28 @@
-//! Figures of a part of a map.
-
 use ndarray::{ArrayView2, s};
 use serde::{Serialize, Serializer};
 
 use super::{Entries, Measured, PlaneFigures, Rectangle, Unit};
 
-/// Side of the blocks whose means count as independent, px: wider than usual windows.
+/// Side of blocks with independent means, px: wider than usual windows.
 const BLOCK_PX: usize = 24;
 
-/// Figures of a region, in the map's unit.
+/// In the map's unit.
 #[derive(Clone, PartialEq, Debug)]
 pub struct RegionFigures {
     pub unit: Unit,
     pub region: Rectangle,
     pub pixels: usize,
-    /// Their part of all pixels of the region.
+    /// Share of the region's pixels with a depth.
     pub fill_rate: f64,
-    /// Mean depth; none where there is no depth at all, as the next five.
+    /// `None` without any depth, as the next five.
     pub mean: Option<f64>,
-    /// Standard error of the mean, from the means of blocks that are wider than a window, because neighbouring depths share
-    /// windows; none with fewer than four blocks.
+    /// From block means, because neighbouring depths share windows. `None` with fewer than four blocks.
     pub standard_error: Option<f64>,
     pub median: Option<f64>,
-    /// Standard deviation of the depths.
     pub standard_deviation: Option<f64>,
-    /// Smallest and largest.
     pub range: Option<[f64; 2]>,
-    /// Root mean square of the deviations predicted for each pixel.
+    /// Root mean square of the predicted deviations.
     pub predicted_deviation: Option<f64>,
-    /// The plane through the region.
     pub plane: Option<PlaneFigures>,
 }
 
@@ -52,10 +46,6 @@ impl Serialize for RegionFigures {
     }
 }
 
-/// Looks at a region.
-///
-/// # Errors
-/// [`crate::WorkflowError::Parameter`] outside the map.
 pub fn region(map: &Measured, at: Rectangle) -> crate::Result<RegionFigures> {
     map.check(&at)?;
     let Rectangle { x, y, width, height } = at;
@@ -90,7 +80,7 @@ pub fn region(map: &Measured, at: Rectangle) -> crate::Result<RegionFigures> {
     })
 }
 
-/// The value in the middle; the upper one of two.
+/// The median; the upper one of two.
 fn median(values: &mut [f64]) -> Option<f64> {
     let middle = values.len() / 2;
     (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)
@@ -133,10 +123,10 @@ mod tests {
         assert_eq!(found.pixels, 2399);
         assert!((found.fill_rate - 2399.0 / 2400.0).abs() < 1e-12);
         assert_eq!(found.predicted_deviation, Some(0.5));
-        // Two blocks of 24 pixels fit: too few for a standard error.
+        // Two blocks of 24 pixels are too few for a standard error.
         assert_eq!(found.standard_error, None);
         assert!((found.median.unwrap() - 901.5).abs() < 0.06, "{found:?}");
-        // A pixel sees 7.4 um * 17 = 0.126 mm at 900 mm, so 0.05 mm per pixel is a slope of 0.397.
+        // A pixel covers 7.4 um * 17 = 0.126 mm at 900 mm, so 0.05 mm per pixel is a slope of 0.397.
         let plane = found.plane.unwrap().plane;
         assert!((plane.slope_x - 0.397).abs() < 0.002, "{plane:?}");
         assert!(plane.rms_mm < 0.01, "{plane:?}");

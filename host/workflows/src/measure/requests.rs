@@ -1,5 +1,3 @@
-//! What can be measured in a map, as requests.
-
 use std::path::PathBuf;
 
 use schemars::JsonSchema;
@@ -142,7 +140,7 @@ impl Request for MeasureDifferenceRequest {
     }
 }
 
-/// Column and row of a pixel.
+/// Column and row.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct Pixel(pub [usize; 2]);
 

@@ -1,17 +1,15 @@
-//! Units of depth maps, and figures whose names end with them.
+//! Units of depth maps.
 
 use farnear_depth::metrics::is_depth;
 use serde::{Deserialize, Serialize, ser::SerializeMap};
 
-/// Unit of a depth map.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Unit {
     #[default]
     Mm,
-    /// Positions of a stage.
     Um,
-    /// Numbers of images in a stack, from 1.
+    /// Image numbers in a stack, from 1.
     Image,
 }
 
@@ -26,13 +24,12 @@ impl std::fmt::Display for Unit {
 }
 
 impl Unit {
-    /// Whether a value is a depth. 0, negative values, NaN and infinity are holes in maps of many sources; positions of a stage have
-    /// any sign.
+    /// Positions may have any sign; otherwise 0, negative values, NaN and infinity are holes.
     pub fn is_depth(self, value: f32) -> bool {
         if self == Self::Um { value.is_finite() } else { is_depth(value) }
     }
 
-    /// What ends the names of lengths along the axis: `mean_mm`, `mean_um`, `mean_images`.
+    /// Suffix of lengths along the axis: `mean_mm`, `mean_um`, `mean_images`.
     fn suffix(self) -> &'static str {
         match self {
             Self::Mm => "mm",
@@ -42,7 +39,7 @@ impl Unit {
     }
 }
 
-/// Figures of a map as fields; the names of lengths end with its unit.
+/// Serialises figures of a map; names of lengths end with its unit.
 pub(crate) struct Entries<M> {
     to: M,
     unit: Unit,
@@ -57,12 +54,10 @@ impl<M: SerializeMap> Entries<M> {
         self.to.serialize_entry(name, value)
     }
 
-    /// A length along the axis; none is left out.
     pub fn length(&mut self, name: &str, value: Option<impl Serialize>) -> Result<(), M::Error> {
         value.map_or(Ok(()), |value| self.field(&format!("{name}_{}", self.unit.suffix()), &value))
     }
 
-    /// A change of depth per pixel; none is left out.
     pub fn per_pixel(&mut self, name: &str, value: Option<f64>) -> Result<(), M::Error> {
         value.map_or(Ok(()), |value| self.field(&format!("{name}_{}_per_px", self.unit.suffix()), &value))
     }

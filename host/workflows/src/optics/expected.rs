@@ -1,21 +1,20 @@
-//! The error of depth that noise alone causes, before anything is built.
+//! Depth error from noise alone, for planned optics.
 //!
-//! For a texture of known power spectrum P and noise of variance s^2 in both images (each divided by its mean), no estimator that sums
-//! over w x w pixels is more certain than `SD(alpha) = 1 / (w sqrt(J))`,
-//! `J = mean over frequencies of P D^2 / (s^2 (H1^2 + H2^2))`, `D = H1 dH2/dalpha - H2 dH1/dalpha`, with the transfer functions H1 and
-//! H2 of the two images. Depth follows with `dz/dalpha`. What the methods reach above that bound was measured on rendered planes.
+//! For a texture of power spectrum P and noise variance s^2 in both images (each divided by its mean), no
+//! estimator over w x w pixels is below `SD(alpha) = 1 / (w sqrt(J))`. With the transfer functions H1 and H2:
+//! `J = mean over frequencies of P D^2 / (s^2 (H1^2 + H2^2))`, `D = H1 dH2/dalpha - H2 dH1/dalpha`.
+//! Depth follows with `dz/dalpha`. The methods' excess over this bound was measured on rendered planes.
 
 use farnear_depth::optics::Optics;
 use serde::Serialize;
 
-/// Frequencies along each axis.
+/// Per axis.
 const FREQUENCIES: usize = 64;
-/// Depths over which the error is averaged.
 const DEPTHS: usize = 9;
-/// Variance of a pixel's noise relative to its mean, squared: 8 bit, 9,000 electrons, read noise of 12 electrons.
+/// Variance of a pixel's noise / mean squared: 8 bit, 9,000 electrons, read noise of 12 electrons.
 const NOISE_VARIANCE: f64 = 1.19e-4;
-/// Windows of the two methods by default, and their error above the bound there: 1.07 and 1.08 on rendered planes; 1.1 to 1.4 and 1.3 to
-/// 1.5 on slants through the whole range with four proposed lenses. The larger is what a user meets.
+/// Default windows and error / bound. Measured: 1.07 and 1.08 on rendered planes; 1.1 to 1.4 and 1.3 to 1.5
+/// on slants through the whole range with four proposed lenses. The larger values are used.
 const RATIONAL: Reached = Reached { window_px: 7.0, above_bound: 1.37 };
 const WHITENED: Reached = Reached { window_px: 21.0, above_bound: 1.5 };
 
@@ -24,7 +23,7 @@ struct Reached {
     above_bound: f64,
 }
 
-/// Root mean square of the error of depth over the working range, from the camera's noise alone.
+/// Root-mean-square depth error over the working range from the camera's noise.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 pub struct ExpectedError {
     /// `--method ro`: window of 7 pixels.
@@ -33,8 +32,8 @@ pub struct ExpectedError {
     pub whitened_mm: f64,
 }
 
-/// The error expected of a texture whose standard deviation is `contrast` of its mean, with `binning` x `binning` pixels of the
-/// sensor in each pixel of the image.
+/// For a texture with standard deviation / mean = `contrast`, and `binning` x `binning` sensor pixels per
+/// pixel.
 pub fn expected_error(optics: &Optics, contrast: f64, binning: usize) -> ExpectedError {
     let otf = optics.psf().otf(1.1 * optics.max_blur_px());
     let noise = NOISE_VARIANCE / (binning * binning) as f64;
@@ -60,7 +59,7 @@ pub fn expected_error(optics: &Optics, contrast: f64, binning: usize) -> Expecte
     ExpectedError { ro_mm: of(&RATIONAL), whitened_mm: of(&WHITENED) }
 }
 
-/// Frequencies in radians per pixel with their part of the texture's variance: a spectrum that falls as 1/w, seen by square pixels.
+/// Radial frequencies (rad/px) and share of the texture's variance: a 1/w spectrum sampled by square pixels.
 fn spectrum(contrast: f64) -> Vec<(f64, f64)> {
     let axis = |index: usize| {
         let signed = index as f64 - if index > FREQUENCIES / 2 { FREQUENCIES as f64 } else { 0.0 };

@@ -1,4 +1,4 @@
-//! `farnear optics`: what a pair with given optics can measure, and optics for a given distance, range and error.
+//! What a pair with given optics can measure, and optics for a given distance, range and error.
 
 use std::path::PathBuf;
 
@@ -19,20 +19,17 @@ use crate::{
     request::{PathKind, Request},
 };
 
-/// Largest blur radius that the operators are made for, px, and the target.
+/// Usable range of the largest blur radius, px, and its target.
 const USABLE_BLUR_PX: [f64; 2] = [2.0, 4.0];
 const BEST_BLUR_PX: f64 = 2.7;
-/// Focal lengths of common lenses, mm.
 const FOCAL_LENGTHS_MM: [f64; 14] =
     [8.0, 12.0, 16.0, 25.0, 35.0, 50.0, 75.0, 85.0, 100.0, 135.0, 150.0, 180.0, 200.0, 300.0];
-/// Full stops that lenses have.
 const STOPS: [f64; 6] = [1.4, 2.0, 2.8, 4.0, 5.6, 8.0];
 const BINNINGS: [usize; 4] = [1, 2, 4, 8];
-/// Lenses of the list focus down to some three focal lengths.
+/// Closest focus of these lenses, in focal lengths.
 const NEAREST_FOCUS: f64 = 3.0;
-/// Radius of the Airy disc per f-number at 550 nm, um.
+/// Radius of the Airy disc per f-number at 550 nm.
 const AIRY_UM: f64 = 0.67;
-/// Most exposures that are averaged.
 const AVERAGED_MAX: f64 = 64.0;
 
 /// Print what a pair can measure: working range, blur, expected error, and what to change; or propose optics.
@@ -146,33 +143,28 @@ impl Request for OpticsRequest {
     }
 }
 
-/// What a pair of these optics can measure.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct OpticsFigures {
     #[serde(flatten)]
     pub range: WorkingRange,
     pub focal_length_mm: f64,
     pub f_number: f64,
-    /// Pitch of the image's pixels, with binning.
+    /// Of the image, with binning.
     pub pixel_um: f64,
-    /// Pixels of the sensor along each side of one of the image.
+    /// Sensor pixels per side of an image pixel.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub binning: Option<usize>,
     /// Exposures to average for the accepted error.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub averaged_exposures: Option<usize>,
-    /// Largest blur radius in the range.
     pub max_blur_px: f64,
-    /// Depths beyond these are not given.
     pub farthest_usable_mm: f64,
     pub nearest_usable_mm: f64,
-    /// Side of a pixel at the object in the middle of the range.
+    /// Side of a pixel at the object at mid-range.
     pub pixel_at_object_mm: f64,
-    /// What to change, in words.
     pub advice: Vec<String>,
-    /// Root mean square of the error from noise, with `--method ro`.
+    /// From noise, root mean square.
     pub expected_error_ro_mm: f64,
-    /// The same with `--method whitened`, on smooth surfaces.
     pub expected_error_whitened_mm: f64,
 }
 
@@ -208,7 +200,6 @@ fn figures(optics: &Optics, binning: usize, contrast: f64, accepted_mm: Option<f
     }
 }
 
-/// What to change about the blur.
 fn advice(optics: &Optics) -> Vec<String> {
     let blur = optics.max_blur_px();
     let [least, most] = USABLE_BLUR_PX;
@@ -249,14 +240,12 @@ fn advice(optics: &Optics) -> Vec<String> {
     advice
 }
 
-/// Distance of the near focus that gives a blur, with the rest of the optics unchanged.
 fn of_blur(optics: &Optics, blur_px: f64) -> Option<f64> {
     let mut file = OpticsFile::from(*optics);
     file.focus = FocusSection { max_blur_px: Some(blur_px), near_mm: None, ..file.focus };
     file.check().ok().map(|optics| optics.working_range().near_mm)
 }
 
-/// Optics for a given distance, range and error.
 fn propose(request: &OpticsRequest) -> Result<(Optics, OpticsFigures)> {
     let (distance, range) = (request.distance_mm.unwrap_or(f64::NAN), request.range_mm.unwrap_or(f64::NAN));
     let accepted = request.error_mm.unwrap_or(f64::INFINITY);
@@ -293,7 +282,7 @@ fn propose(request: &OpticsRequest) -> Result<(Optics, OpticsFigures)> {
             }
             let error = expected_error(&optics, request.contrast, binning).whitened_mm;
             let averaged = (error / accepted).powi(2).ceil().max(1.0);
-            // One exposure before fine pixels, fine pixels before a usual aperture, that before the best blur.
+            // Prefer one exposure, then fine pixels, then a common aperture, then the best blur.
             let rank = [averaged, binning as f64, (f_number / 4.0).ln().abs(), (blur - BEST_BLUR_PX).abs()];
             if best
                 .as_ref()
@@ -340,8 +329,8 @@ mod tests {
 
     #[test]
     fn the_expected_error_is_that_of_rendered_planes() {
-        // Independent renders of slants of contrast 0.2, 8 bit: 0.621 mm with a window of 7 on planes, 0.204 to 0.245 mm on planes and
-        // slants with adaptive ones.
+        // From independent renders of slants, contrast 0.2, 8 bit: 0.621 mm with a window of 7 on planes,
+        // 0.204 to 0.245 mm on planes and slants with adaptive windows.
         let found = expected_error(&rig(2.703), 0.2, 1);
         assert!((0.6..0.85).contains(&found.ro_mm), "{found:?}");
         assert!((0.2..0.33).contains(&found.whitened_mm), "{found:?}");

@@ -1,5 +1,3 @@
-//! Contents of the page for each kind of folder.
-
 use std::{fmt::Write as _, fs, path::Path};
 
 use super::{
@@ -12,11 +10,10 @@ use crate::{
     sessions::{self, Capture},
 };
 
-/// Pictures of a result that are shown: its masks can be thousands.
+/// Most pictures shown: a result can have thousands of masks.
 const PICTURES_MAX: usize = 12;
-/// Endings of records and tables.
 const TEXTS: [&str; 5] = ["toml", "json", "jsonl", "csv", "md"];
-/// Records by which a result of farnear is recognised.
+/// Records that identify a farnear result.
 const RECORDS: [&str; 8] = [
     "silhouettes.toml",
     "samples.toml",
@@ -28,7 +25,6 @@ const RECORDS: [&str; 8] = [
     "batch.toml",
 ];
 
-/// The page of a capture, with its depth where it has one.
 pub(super) fn capture(folder: &Path) -> Result<String> {
     let capture = sessions::read(folder)?;
     let mut page = begun(&capture.name, &subtitle(&capture));
@@ -54,7 +50,6 @@ pub(super) fn capture(folder: &Path) -> Result<String> {
     Ok(page.end())
 }
 
-/// The page of a depth map or a focus stack.
 pub(super) fn depth_result(folder: &Path) -> Result<String> {
     let (record, kind) = if folder.join(DEPTH_RECORD).is_file() {
         (DEPTH_RECORD, "depth from a far- and a near-focused image")
@@ -69,7 +64,6 @@ pub(super) fn depth_result(folder: &Path) -> Result<String> {
     Ok(page.end())
 }
 
-/// The page of any other result: its pictures, records and tables.
 pub(super) fn other(folder: &Path) -> Result<String> {
     let entries = fs::read_dir(folder).and_then(Iterator::collect::<std::io::Result<Vec<_>>>);
     let entries = entries.map_err(WorkflowError::read("the folder", folder))?;
@@ -92,7 +86,7 @@ pub(super) fn other(folder: &Path) -> Result<String> {
         let shown = pictures.len().min(PICTURES_MAX);
         let _ =
             write!(page.0, "<section><h2>Pictures</h2><p>{shown} of {}</p><div class=row>", pictures.len());
-        // Spread over the recording.
+        // Evenly spread over the recording.
         for index in 0..shown {
             picture(&mut page, folder, pictures[index * pictures.len() / shown])?;
         }
@@ -114,7 +108,7 @@ fn begun(name: &str, subtitle: &str) -> Page {
     page
 }
 
-/// The folder's own name, also of `.`.
+/// The folder's name, also of `.`.
 fn name(folder: &Path) -> String {
     let whole = fs::canonicalize(folder).unwrap_or_else(|_| folder.into());
     whole.file_name().unwrap_or_default().to_string_lossy().into_owned()

@@ -1,5 +1,3 @@
-//! The page as it grows.
-
 use std::fmt::Write as _;
 
 use base64::{Engine as _, engine::general_purpose::STANDARD};
@@ -10,10 +8,8 @@ use crate::{
     measure::{PlaneFigures, RegionFigures},
 };
 
-/// Characters of a text file that are shown.
 const TEXT_MAX: usize = 20_000;
 
-/// A page that grows.
 pub(super) struct Page(pub String);
 
 impl Page {
@@ -59,7 +55,6 @@ impl Page {
         self.0.push_str("</table>");
     }
 
-    /// A text file of the folder, cut where it is long.
     pub fn text(&mut self, heading: &str, text: &str) {
         let end = text.char_indices().nth(TEXT_MAX).map_or(text.len(), |(at, _)| at);
         let cut = if end < text.len() { "\n..." } else { "" };
@@ -73,7 +68,7 @@ impl Page {
     }
 }
 
-/// Escapes a text for a page, also inside quotes.
+/// Escapes text for HTML, also inside quotes.
 pub(super) fn escaped(text: &str) -> String {
     text.chars().fold(String::with_capacity(text.len()), |mut escaped, letter| {
         match letter {

@@ -1,4 +1,4 @@
-//! Maps as pictures with a colour map for every eye (viridis), and a histogram as SVG.
+//! Maps as images (viridis), and a histogram as SVG.
 
 use std::{fmt::Write as _, io::Cursor};
 
@@ -8,11 +8,10 @@ use ndarray::ArrayView2;
 
 use crate::error::Result;
 
-/// Bins of the histogram.
 const BINS: usize = 96;
 const NONE: Rgb<u8> = Rgb([150, 150, 152]);
 
-/// The value below which this part of the finite values lies; `None` without any.
+/// Quantile of the finite values; `None` without any.
 pub fn quantile(map: ArrayView2<f32>, part: f64) -> Option<f32> {
     let mut finite: Vec<f32> = map.iter().copied().filter(|value| value.is_finite()).collect();
     if finite.is_empty() {
@@ -22,7 +21,7 @@ pub fn quantile(map: ArrayView2<f32>, part: f64) -> Option<f32> {
     Some(*finite.select_nth_unstable_by(at, f32::total_cmp).1)
 }
 
-/// A map as the bytes of a PNG, from dark at `low` to bright at `high`.
+/// A map as PNG, from dark at `low` to bright at `high`.
 pub fn colours(map: ArrayView2<f32>, [low, high]: [f32; 2]) -> Result<Vec<u8>> {
     let (height, width) = map.dim();
     let span = f64::from((high - low).max(f32::MIN_POSITIVE));
@@ -39,7 +38,7 @@ pub fn colours(map: ArrayView2<f32>, [low, high]: [f32; 2]) -> Result<Vec<u8>> {
     Ok(png.into_inner())
 }
 
-/// How often which depth occurs, between the outermost half percents, as SVG.
+/// Histogram without the outer half percents, as SVG.
 pub fn histogram(depth: ArrayView2<f32>, unit: &str) -> String {
     let (Some(low), Some(high)) = (quantile(depth, 0.005), quantile(depth, 0.995)) else {
         return "<p>no depth</p>".into();

@@ -1,5 +1,3 @@
-//! How a report looks, on a screen and on paper.
-
 pub const STYLE: &str = "\
 :root{color-scheme:light}\
 body{margin:0;background:#fff;color:#1b2126;font:15px/1.5 system-ui,sans-serif}\

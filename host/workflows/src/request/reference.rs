@@ -1,4 +1,4 @@
-//! The reference page of all options, generated from the schemas of the requests.
+//! Generates the reference page of all options from the requests' schemas.
 
 use std::fmt::Write;
 
@@ -10,7 +10,6 @@ const HEAD: &str = "# All options\n\n\
     Generated from the requests of the tasks. A name is the same as an option of the command line (`--min-confidence`), as a field of \
     a batch job and of the page's interface, and as a keyword in Python (`min_confidence`).\n";
 
-/// The page in Markdown.
 pub fn page() -> String {
     let mut page = HEAD.to_owned();
     for task in TASKS {

@@ -1,12 +1,9 @@
-//! What stopped the rig, and clearing it.
-
 use farnear_capture::describe::alarm_text;
 use serde::Serialize;
 
 use super::{Rig, RigAddress};
 use crate::{context::Context, error::Result};
 
-/// The alarms that the board keeps.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct AlarmFigures {
     /// Number of the latched alarm; 0 = none.
@@ -16,17 +13,15 @@ pub struct AlarmFigures {
 
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct AlarmEntry {
-    /// Its number, by which it is cleared.
     pub number: u32,
-    /// The boot in which it came up.
     pub boot: u32,
-    /// When, since that boot.
+    /// Time since that boot.
     pub time_s: f64,
     /// Description and remedy.
     pub text: String,
 }
 
-/// Lists the alarms, after clearing the one with this number.
+/// Lists the alarms after clearing alarm number `clear`.
 pub fn alarms(rig: &RigAddress, clear: Option<u32>, context: &Context<'_>) -> Result<AlarmFigures> {
     let rig = Rig::connect(rig, None, context)?;
     if let Some(number) = clear {

@@ -1,40 +1,32 @@
-//! The board itself: its counters, and restarting it.
-
 use farnear_capture::describe::{alarm_text, cause_name};
 use serde::Serialize;
 
 use super::{Rig, RigAddress};
 use crate::{context::Context, error::Result};
 
-/// What the board has counted in its life.
+/// Totals over the board's life.
 #[derive(Clone, PartialEq, Eq, Debug, Serialize)]
 pub struct CounterFigures {
     pub boots: u32,
     pub alarms: u32,
-    /// Exposures that were triggered.
     pub triggers: u64,
-    /// Steps of the sensor's coarse axis.
     pub coarse_steps: u64,
-    /// Steps of the lens stage.
     pub lens_steps: u64,
     pub homings: u32,
-    /// Records in the memory of which one copy was bad.
+    /// Records with one bad copy.
     pub repaired_records: u32,
 }
 
 #[derive(Clone, PartialEq, Eq, Debug, Serialize)]
 pub struct ResetFigures {
-    /// Number of the boot that it ended.
     pub boot_before: u32,
-    /// Number of the boot that it began.
     pub boot: u32,
-    /// Its cause, as the board knows it.
+    /// Reset cause reported by the board.
     pub cause: &'static str,
     /// Number of the latched alarm; 0 = none.
     pub alarm: u32,
 }
 
-/// Reads the counters.
 pub fn counters(rig: &RigAddress, context: &Context<'_>) -> Result<CounterFigures> {
     let counters = Rig::connect(rig, None, context)?.client.counters()?;
     Ok(CounterFigures {
@@ -48,7 +40,7 @@ pub fn counters(rig: &RigAddress, context: &Context<'_>) -> Result<CounterFigure
     })
 }
 
-/// Resets the board; the stages have to be homed again afterwards.
+/// Resets the board; the stages must be homed afterwards.
 pub fn reset(rig: &RigAddress, context: &Context<'_>) -> Result<ResetFigures> {
     let mut rig = Rig::connect(rig, None, context)?;
     let boot_before = rig.client.hello().boot;

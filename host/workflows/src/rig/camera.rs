@@ -1,4 +1,4 @@
-//! The camera that goes with a rig, as users name it.
+//! Cameras that users can name for a rig.
 
 use std::{
     path::{Path, PathBuf},
@@ -26,22 +26,18 @@ use crate::{
 
 #[derive(Clone, PartialEq, Eq, Debug, Default)]
 pub enum CameraAddress {
-    /// The emulated rig's own.
     #[default]
     Emulated,
     /// Camera of a running `farnear-sim`, HOST:PORT.
     Endpoint(String),
-    /// A folder in which images appear.
     Folder(PathBuf),
-    /// A program that writes pictures to its standard output.
+    /// A program that writes images to its standard output.
     Command(CommandLine),
-    /// A Video4Linux device.
     V4l(PathBuf),
-    /// A GigE Vision or USB3 Vision camera, by its identification; the first where it is empty.
+    /// A GigE Vision or USB3 Vision camera by its identification; the first one if empty.
     Genicam(String),
 }
 
-/// What an address looks like.
 pub const ADDRESSES: &str = "sim, HOST:PORT, folder:DIR, command:\"PROGRAM ...\", v4l:DEVICE or genicam:ID";
 
 impl FromStr for CameraAddress {
@@ -67,7 +63,7 @@ impl FromStr for CameraAddress {
 }
 
 impl CameraAddress {
-    /// Opens the camera; `None` for the one that comes with the emulated rig.
+    /// Opens the camera; `None` for the emulated rig's camera.
     pub fn open(&self) -> Result<Option<Box<dyn Camera>>> {
         Ok(Some(match self {
             Self::Emulated => return Ok(None),
@@ -109,24 +105,17 @@ fn not_built(kind: &str, address: impl std::fmt::Display, feature: &str) -> Work
     WorkflowError::parameter("camera", format!("{kind}:{address}"), expected)
 }
 
-/// A camera and how it exposes.
 #[derive(Clone, PartialEq, Debug)]
 pub struct CameraSettings {
     pub address: CameraAddress,
-    /// Length of an exposure.
     pub exposure: Micros,
-    /// Longest wait for an image.
     pub image_wait: Duration,
-    /// Controls to set before anything moves, in this order; never the exposure.
+    /// Controls to set before any motion, in this order; never the exposure.
     pub settings: Vec<Setting>,
-    /// Light outputs of the board during each exposure.
     pub light: Option<LightLevels>,
 }
 
-/// Reads `FIRST` or `FIRST,SECOND`, percent.
-///
-/// # Errors
-/// Why the device cannot be used.
+/// Parses `FIRST` or `FIRST,SECOND`, percent.
 pub fn parse_light(text: &str) -> std::result::Result<LightLevels, String> {
     let level = |part: &str| match part.trim().parse::<f64>() {
         Ok(percent) if (0.0..=100.0).contains(&percent) => {
@@ -150,19 +139,15 @@ impl Default for CameraSettings {
     }
 }
 
-/// A camera that does not hang on the emulated rig, opened before the rig: one that is not there is known before anything
-/// moves.
+/// A camera opened before the rig, so that a missing camera is reported before any motion.
 pub struct EarlyCamera {
     camera: Option<Box<dyn Camera>>,
     settings: CameraSettings,
 }
 
-/// Why this camera cannot be used with another rig.
 const OF_THE_EMULATED_RIG: &str = "it belongs to the emulated rig";
 
 impl CameraSettings {
-    /// Opens the camera and connects to the rig, in the order in which the least is done in vain. Everything that takes
-    /// pictures begins with this, after its folder.
     pub fn connect(
         &self,
         address: &RigAddress,
@@ -172,7 +157,6 @@ impl CameraSettings {
         self.open_early(address)?.connect(address, optics, context)
     }
 
-    /// Opens the camera, unless it is the one that comes with the emulated rig.
     pub fn open_early(&self, rig: &RigAddress) -> Result<EarlyCamera> {
         let other = match (&self.address, rig) {
             (CameraAddress::Emulated, RigAddress::Open(open)) if !open.is_emulated() => {
@@ -203,7 +187,7 @@ impl CameraSettings {
 }
 
 impl EarlyCamera {
-    /// Connects to the rig; without a named camera, to the emulated rig's.
+    /// Connects to the rig; without a named camera, uses the emulated rig's.
     pub fn connect(
         self,
         address: &RigAddress,
@@ -224,7 +208,7 @@ impl EarlyCamera {
         Ok(equipped)
     }
 
-    /// The same with a second camera, behind a half mirror; without a named one, the emulated rig's second.
+    /// As [`Self::connect`], with a second camera behind a half mirror; by default the emulated rig's second.
     pub(super) fn connect_both(
         self,
         second: Self,
@@ -245,19 +229,17 @@ impl EarlyCamera {
     }
 }
 
-/// A connected rig with its camera, which goes before the rig does.
+/// A connected rig with its camera. The camera is dropped before the rig.
 pub struct EquippedRig {
-    /// Where images come from.
     pub camera: Box<dyn Camera>,
     pub rig: Rig,
 }
 
 impl EquippedRig {
-    /// Checks an exposure against the limits of board and camera, before anything moves.
     fn check_exposure(&mut self, exposure: Micros) -> Result<()> {
         check_exposure(&self.rig.client, exposure).map_err(CaptureError::from)?;
         let asked = f64::from(exposure.0);
-        // A camera whose settings cannot be read says why when it is armed.
+        // Unreadable camera settings are reported when the camera is armed.
         for control in self.camera.controls().unwrap_or_default() {
             if control.name == "exposure_us"
                 && matches!(control.range, Range::Number { .. })
@@ -270,8 +252,7 @@ impl EquippedRig {
         Ok(())
     }
 
-    /// What a capture's record says next to what was measured. `psf` and `optics` are those that were captured with, as
-    /// far as they are known.
+    /// Metadata of a capture. `psf` and `optics` are those used for the capture, as far as known.
     pub fn circumstances(&self, psf: Psf, optics: toml::Table) -> Circumstances {
         Circumstances {
             made_by: MADE_BY.into(),

@@ -1,7 +1,6 @@
-//! The bring-up checklist: its steps in order, each with a verdict and details.
+//! Bring-up checklist. Prompts the user before each manual step and measures the rest.
 //!
-//! Prompts the person before each step that needs actuation by hand and measures the rest. On an emulated rig these steps
-//! are skipped; their detail names the later step that shows the same.
+//! An emulated rig skips manual steps; their detail names the later step that covers the same fault.
 
 mod actuation;
 mod moving;
@@ -21,22 +20,20 @@ use crate::{
     request::{CameraRequest, PathKind, Request, RigRequest},
 };
 
-/// A step.
 struct Step {
     name: &'static str,
     check: fn(&mut Checkup<'_>) -> Found,
 }
 
-/// Steps that belong together. After a phase with a failure no other begins.
+/// Related steps. A phase with a failure is the last one.
 struct Phase {
-    /// Whether anything moves by motor.
     moves: bool,
-    /// Whether each step rests on the one before: the first failure ends the phase.
+    /// Whether the first failure ends the phase, because each step depends on the one before.
     in_turn: bool,
     steps: &'static [Step],
 }
 
-/// The order is that of docs/bring-up.md: the first half is done with the motors disconnected.
+/// In the order of docs/bring-up.md: the first half is done with the motors disconnected.
 const PHASES: [Phase; 3] = [
     Phase {
         moves: false,
@@ -130,10 +127,9 @@ impl CameraRequest for CheckRequest {
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Verdict {
-    /// It is as it should be.
     Passed,
     Failed,
-    /// It was not looked at; the detail says why.
+    /// Skipped; the detail gives the reason.
     PassedOver,
 }
 
@@ -147,7 +143,6 @@ impl Verdict {
     }
 }
 
-/// A step that was taken.
 #[derive(Clone, PartialEq, Eq, Debug, Serialize)]
 pub struct Outcome {
     pub step: &'static str,
@@ -155,23 +150,17 @@ pub struct Outcome {
     pub detail: String,
 }
 
-/// The checklist, as far as it went.
 #[derive(Clone, PartialEq, Eq, Debug, Serialize)]
 pub struct Checklist {
     pub passed: usize,
     pub failed: usize,
-    /// Steps that were not looked at.
     pub passed_over: usize,
-    /// All that were taken, in order.
     pub steps: Vec<Outcome>,
-    /// Number of the alarm that is latched after a failure.
     #[serde(skip)]
     pub alarm: Option<u32>,
 }
 
 impl Checklist {
-    /// # Errors
-    /// [`WorkflowError::StepsFailed`] where any did.
     pub fn check(&self) -> Result<()> {
         match self.failed {
             0 => Ok(()),
@@ -180,23 +169,17 @@ impl Checklist {
     }
 }
 
-/// What a step found: how it ended, and what to say of it.
 type Found = Result<(Verdict, String)>;
 
-/// The rig while it is checked.
 struct Checkup<'a> {
     equipped: EquippedRig,
     settings: &'a CheckRequest,
     context: &'a Context<'a>,
-    /// Whether a person can press switches.
     actuation: bool,
     outcomes: Vec<Outcome>,
 }
 
-/// Goes through the checklist.
-///
-/// # Errors
-/// Camera and rig that are not there, and cancelling. Any other error is the failure of its step.
+/// Fails for a missing camera or rig and when cancelled. Any other error is a failed step.
 pub fn check(settings: &CheckRequest, context: &Context<'_>) -> Result<Checklist> {
     let equipped = settings.camera.connect(&settings.rig, None, context)?;
     let actuation = !settings.no_actuation && !equipped.rig.client.hello().emulated;
@@ -224,7 +207,7 @@ impl Checkup<'_> {
         &self.equipped.rig.client
     }
 
-    /// Gives whether no step of the phase failed.
+    /// Returns whether all steps of the phase passed or were skipped.
     fn go_through(&mut self, phase: &Phase) -> Result<bool> {
         let mut sound = true;
         for step in phase.steps {
@@ -236,7 +219,7 @@ impl Checkup<'_> {
         Ok(sound)
     }
 
-    /// Carries out a step; gives whether it did not fail.
+    /// Returns whether the step passed or was skipped.
     fn take(&mut self, step: &Step) -> Result<bool> {
         self.context.info(&format!("\n{}. {}", self.outcomes.len() + 1, step.name));
         let (verdict, detail) = match (step.check)(self) {
@@ -249,17 +232,16 @@ impl Checkup<'_> {
         Ok(verdict != Verdict::Failed)
     }
 
-    /// Tells the person what to actuate while the board is polled.
+    /// Tells the user what to actuate while the board is polled.
     fn info(&self, what: &str) {
         self.context.info(&format!("   {what}"));
     }
 
-    /// Asks the person to do something and waits until it is done.
     fn ask(&self, what: &str) -> Result<()> {
         self.answer(&format!("   {what}, then press Enter: ")).map(|_| ())
     }
 
-    /// Asks a question and takes everything but an n for yes.
+    /// Takes every answer but "n" as yes.
     fn yes(&self, question: &str) -> Result<bool> {
         let answer = self.answer(&format!("   {question} [Y/n] "))?;
         Ok(!answer.trim().to_lowercase().starts_with('n'))

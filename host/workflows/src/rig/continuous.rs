@@ -1,5 +1,4 @@
-//! Continuous capture: far, near, far, near ... or a cycle of shots at a pace that the board holds, until its end or until a user
-//! ends it; with figures of the pace, and pairs or images in a folder where one is named.
+//! Continuous capture: pairs, or a cycle of shots, at a pace kept by the board.
 
 mod figures;
 mod folder;
@@ -32,7 +31,7 @@ use crate::{
 
 pub use figures::ContinuousFigures;
 
-/// Fastest and slowest pace, exposures a second: beyond it the request's 32-bit microseconds, and any camera, end.
+/// Exposures per second. The request's 32-bit microseconds and any camera allow no more.
 const RATES_HZ: std::ops::RangeInclusive<f64> = 0.001..=10_000.0;
 
 /// Capture far, near, far, near ... (or any cycle of shots) until the limit or Ctrl-C: home if needed, move the stage near, and let
@@ -129,16 +128,12 @@ impl ContinuousRequest {
     }
 }
 
-/// A rig that is ready to begin.
 struct Ready {
     shots: Vec<Shot>,
     pair: Option<(GivenOptics, SensorPair, Reach)>,
 }
 
-/// Captures until it is enough. Whoever cancels it ends it in order: the figures are those of what was taken until then.
-///
-/// # Errors
-/// Parameters, program or optics, folder, camera, rig: in this order, so that nothing moves in vain.
+/// Cancelling is not an error: the figures cover the frames taken. Checks everything before any motion.
 pub fn run(settings: &ContinuousRequest, context: &Context<'_>) -> Result<ContinuousFigures> {
     let pace = settings.pace()?;
     let (program, optics) = match (&settings.program, &settings.optics) {

@@ -1,4 +1,4 @@
-//! The board corrects a depth map, row by row over the link, and this computer checks its bits.
+//! Depth correction on the board, row by row over the link, compared bit by bit with this computer.
 
 use std::{path::PathBuf, time::Instant};
 
@@ -68,31 +68,24 @@ impl RigRequest for BoardCorrectRequest {
     }
 }
 
-/// What the correction did.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct BoardCorrectFigures {
     pub method: String,
     pub width: usize,
     pub height: usize,
-    /// Mean change, mm; positive = farther.
+    /// Positive = farther.
     pub mean_change_mm: f64,
-    /// Pixels whose bits differ from this computer's calculation.
     pub different_pixels: usize,
-    /// By this computer's clock.
     pub rows_per_second: f64,
-    /// The first of those pixels.
     #[serde(skip)]
     pub first_difference: Option<PixelDifference>,
 }
 
-/// A pixel of which board and computer make different depths.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct PixelDifference {
     pub row: usize,
     pub column: usize,
-    /// The board's depth.
     pub board_mm: f32,
-    /// This computer's depth.
     pub host_mm: f32,
 }
 
@@ -108,16 +101,12 @@ impl BoardCorrectFigures {
     }
 }
 
-/// Lets the board correct a map.
-///
-/// # Errors
-/// [`WorkflowError::Parameter`] for a place with another ending; correction and map that cannot be read or do not belong
-/// together; the rig.
+/// Corrects a map on the board. Fails if correction and map do not match.
 pub fn correct(settings: &BoardCorrectRequest, context: &Context<'_>) -> Result<BoardCorrectFigures> {
     let format = format_of(&settings.out)?;
     let correction = correction_file::read(&settings.correction)?;
     let depth = map::read(&settings.depth)?;
-    // What the board has to give; also finds out whether map and correction belong together.
+    // The expected result. Also checks that map and correction match.
     let expected = correction.apply_as_board(depth.view())?;
     let board = correction.for_board()?;
     let rig = Rig::connect(&settings.rig, None, context)?;
@@ -149,7 +138,6 @@ pub fn correct(settings: &BoardCorrectRequest, context: &Context<'_>) -> Result<
     })
 }
 
-/// How many pixels differ in their bits, and the first of them.
 fn compare(board: &Array2<f32>, host: &Array2<f32>) -> (usize, Option<PixelDifference>) {
     let mut different =
         board.indexed_iter().zip(host).filter(|((_, board), host)| board.to_bits() != host.to_bits()).map(

@@ -1,4 +1,4 @@
-//! The board fits a depth correction to flat targets, and this computer checks its bits.
+//! Depth correction fitted on the board to flat targets, compared bit by bit with this computer.
 
 use std::path::PathBuf;
 
@@ -91,18 +91,14 @@ impl RigRequest for FitRequest {
     }
 }
 
-/// What there is to say of a fit.
 #[derive(Clone, PartialEq, Eq, Debug, Serialize)]
 pub struct FitFigures {
     pub method: String,
     pub targets: usize,
-    /// Pixels that were taken of all of them.
     pub samples: usize,
-    /// Coefficients of the correction.
     pub coefficients: usize,
     /// Coefficients that differ from this computer's.
     pub different: usize,
-    /// Whether the board has stored it.
     pub stored: bool,
 }
 
@@ -115,10 +111,7 @@ impl FitFigures {
     }
 }
 
-/// Sends the maps row by row, lets the board fit, and compares its coefficients with the same calculation here.
-///
-/// # Errors
-/// The method, the list and its maps, the rig.
+/// Sends the maps row by row, fits on the board, and compares the coefficients with the same fit here.
 pub fn fit(settings: &FitRequest, context: &Context<'_>) -> Result<FitFigures> {
     if settings.method.board_form().is_none() {
         let expected = format!("the board fits {}", Method::board_names());
@@ -168,7 +161,7 @@ fn frame_and_scale(maps: &[(Array2<f32>, f64)]) -> Result<(Frame, DepthScale), C
     Ok((Frame::new(side(width), side(height))?, DepthScale::for_range(farthest, nearest)?))
 }
 
-/// The same fit here, by the code that the board runs.
+/// The same fit on the host, with the board's code.
 fn on_host(method: Method, frame: Frame, targets: &[CodedTarget], step: u16) -> Result<Vec<i32>, Error> {
     let columns = Columns { first: 0, step };
     let rows = || {

@@ -1,4 +1,4 @@
-//! Finding m1, the sensor distance of the best focus, and the working range that follows from it.
+//! Finds m1, the sensor distance of the best focus, and the resulting working range.
 
 use std::path::PathBuf;
 
@@ -106,36 +106,25 @@ impl CameraRequest for FocusRequest {
     }
 }
 
-/// The best focus, and the working range of optics whose far focus lies there.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct FocusFigures {
-    /// Where the target is sharpest.
     pub m1_mm: f64,
-    /// The second sensor distance of a pair: m2 = m1 + 2 Fe Rmax (Li 2014, eqs. 4.3 and 4.4).
+    /// m2 = m1 + 2 Fe Rmax (Li 2014, eqs. 4.3 and 4.4).
     pub m2_mm: f64,
     /// Far end of the working range: the target's distance.
     pub far_mm: f64,
-    /// Near end of the working range.
     pub near_mm: f64,
     /// Offset of the normalised depth.
     pub alpha0_mm: f64,
     pub sensor_travel_mm: f64,
-    /// Where the sensor's coarse axis stands.
     pub coarse_um: f64,
-    /// Where the piezo stands.
     pub fine_um: f64,
-    /// The board's time for the search.
     pub board_ms: f64,
-    /// Stepper positions that were measured.
     pub places: usize,
-    /// Images that were taken.
     pub exposures: usize,
 }
 
-/// Finds the best focus of the target before the rig and leaves the sensor there.
-///
-/// # Errors
-/// Optics, parameters, camera, rig; [`WorkflowError::Focus`] where there is none.
+/// Finds the best focus of the target in front of the rig and leaves the sensor there.
 pub fn focus(settings: &FocusRequest, context: &Context<'_>) -> Result<FocusFigures> {
     let given = GivenOptics::read(&settings.optics)?;
     let optics = &given.optics;
@@ -160,14 +149,14 @@ pub fn focus(settings: &FocusRequest, context: &Context<'_>) -> Result<FocusFigu
     figures(given.optics, &found)
 }
 
-/// Homes axes that are not homed; returns whether all were.
+/// Homes axes that are not homed; returns whether all were homed.
 fn ensure_ready(client: &Client, context: &Context<'_>) -> Result<bool> {
     let before = client.status()?.coarse.state;
     ensure_homed(client, &mut |what| context.info(what))?;
     Ok(before == client.status()?.coarse.state)
 }
 
-/// Brings the sensor to a distance from the lens, with the piezo in the middle of its range.
+/// Moves the sensor to a distance from the lens, with the piezo at mid-range.
 fn begin_at(client: &Client, start_mm: f64, context: &Context<'_>) -> Result<()> {
     let limits = client.hello().limits;
     let middle = i64::from(limits.fine_min.0 + limits.fine_max.0) / 2;
@@ -179,7 +168,7 @@ fn begin_at(client: &Client, start_mm: f64, context: &Context<'_>) -> Result<()>
     Ok(())
 }
 
-/// The figures of the optics with their far focus where the target was found to be.
+/// Figures of the optics with the far focus at the target.
 fn figures(optics: Optics, focus: &Focus) -> Result<FocusFigures> {
     let far_mm = object_mm(optics.focal_length_mm(), focus.sensor_mm)?;
     let mut file = OpticsFile::from(optics);
@@ -200,7 +189,6 @@ fn figures(optics: Optics, focus: &Focus) -> Result<FocusFigures> {
     })
 }
 
-/// Where an object is whose image is sharp at this sensor distance, by the lens equation.
 fn object_mm(focal_length_mm: f64, sensor_mm: f64) -> Result<f64> {
     let behind = sensor_mm - focal_length_mm;
     if behind <= 0.0 {

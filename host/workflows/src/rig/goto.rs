@@ -1,4 +1,4 @@
-//! To the far or the near focus: the sensor where one image of a pair is taken, to look at it.
+//! Moves the sensor to the far or near focus, to view that image of a pair.
 
 use std::path::PathBuf;
 
@@ -13,34 +13,28 @@ use serde::Serialize;
 use super::{Rig, RigAddress};
 use crate::{context::Context, error::Result, optics::GivenOptics};
 
-/// Which image of a pair.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Focus {
-    /// The one that is sharp at the far end of the working range.
+    /// Sharp at the far end of the working range.
     Far,
-    /// The one that is sharp at its near end.
     Near,
 }
 
 #[derive(Clone, PartialEq, Debug)]
 pub struct GotoSettings {
     pub rig: RigAddress,
-    /// The optics file, whose working range counts.
     pub optics: PathBuf,
     pub focus: Focus,
 }
 
-/// Where the sensor has come to.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct GotoFigures {
     pub sensor_mm: f64,
-    /// Where the coarse stage's encoder says it is.
     pub coarse_um: f64,
-    /// Where the piezo's gauge says it is.
     pub fine_um: f64,
 }
 
-/// Homes where needed, brings the coarse stage where the piezo reaches both focus settings, and sends the piezo to one.
+/// Homes if needed. Moves the coarse stage so that the piezo reaches both foci, then the piezo.
 pub fn goto(settings: &GotoSettings, context: &Context<'_>) -> Result<GotoFigures> {
     let optics = GivenOptics::read(&settings.optics)?;
     let range = optics.optics.working_range();

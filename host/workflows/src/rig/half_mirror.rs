@@ -1,4 +1,4 @@
-//! A far- and a near-focused image of one exposure, by two cameras behind a half mirror, into a capture folder.
+//! Captures a far- and a near-focused image in one exposure, by two cameras behind a half mirror.
 
 use farnear_capture::{
     camera::Camera,
@@ -22,15 +22,13 @@ use crate::{
     parameters::within,
 };
 
-/// Least and largest distance of both sensors along the light, um: a thousandth of what a piezo moves, and far more than any lens asks for.
+/// Distance between both sensors along the optical axis, um: a thousandth of a piezo's travel to far more
+/// than any lens needs.
 const FURTHER_UM: std::ops::RangeInclusive<f64> = 0.1..=10_000.0;
-/// Relative difference from the distance of the optics above which a warning is given: depth is off by about as much of the working range.
+/// Relative difference from the optics' distance that gives a warning: depth is off by about the same share.
 const UNLIKE: f64 = 0.005;
 
-/// Captures a pair of one exposure: homes where needed, brings the stage to the far place, exposes both cameras by one trigger.
-///
-/// # Errors
-/// Optics, parameters, folder, cameras, rig: in this order, so that nothing moves where the result could not be kept.
+/// Homes if needed, moves to the far focus, triggers both cameras. Checks everything before any motion.
 pub(super) fn capture(settings: &CaptureRequest, context: &Context<'_>) -> Result<PairFigures> {
     let CaptureRequest { camera, average: averaged, out, .. } = settings;
     let optics = GivenOptics::read(&settings.optics)?;
@@ -79,7 +77,6 @@ pub(super) fn capture(settings: &CaptureRequest, context: &Context<'_>) -> Resul
     Ok(PairFigures::from(&pair))
 }
 
-/// The second camera's address, where the rig has one.
 fn second_address(settings: &CaptureRequest) -> Result<CameraAddress> {
     let CaptureRequest { rig, camera, camera_frames: frames, .. } = settings;
     let named: Option<CameraAddress> = settings.second_camera.as_deref().map(str::parse).transpose()?;
@@ -111,7 +108,6 @@ fn second_address(settings: &CaptureRequest) -> Result<CameraAddress> {
     }
 }
 
-/// What there is to say of a distance that is not what the optics ask for.
 fn doubt(optics: &Optics, sensor: &SensorPair, further_um: f64) -> Option<String> {
     let asked_um = (sensor.near_mm - sensor.far_mm) * 1e3;
     if (further_um / asked_um - 1.0).abs() <= UNLIKE {
@@ -135,7 +131,7 @@ mod tests {
     const OPTICS: &str = "[lens]\nfocal_length_mm = 50.0\naperture_mm = 12.8\n[sensor]\npixel_um = 7.4\n[focus]\nfar_mm = 933.0\n";
 
     #[test]
-    fn a_distance_that_does_not_fit_is_said_with_the_one_that_does() {
+    fn a_wrong_distance_is_reported_with_the_right_one() {
         let read = |focus: &str| {
             let optics =
                 GivenOptics::parse(&format!("{OPTICS}{focus}"), Path::new("optics.toml")).expect("good");

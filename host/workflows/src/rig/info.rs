@@ -1,5 +1,3 @@
-//! Who the board is, how far it goes and where it stands.
-
 use farnear_capture::describe::{alarm_text, cause_name, program_name, state_name, um};
 use farnear_protocol::message::AxisStatus;
 use serde::Serialize;
@@ -7,7 +5,6 @@ use serde::Serialize;
 use super::{Rig, RigAddress};
 use crate::{context::Context, error::Result};
 
-/// What the board says of itself.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 #[allow(missing_docs)] // the names say what they are, with their units
 pub struct InfoFigures {
@@ -50,14 +47,12 @@ pub struct InfoFigures {
     pub lens: AxisFigures,
 }
 
-/// Where an axis stands.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct AxisFigures {
     /// Position state: unknown, homed, lost.
     pub state: &'static str,
-    /// Where it was last sent.
+    /// Commanded position.
     pub asked_um: f64,
-    /// Where its encoder or gauge says it is.
     pub measured_um: f64,
     pub moving: bool,
 }
@@ -73,7 +68,6 @@ impl From<&AxisStatus> for AxisFigures {
     }
 }
 
-/// Asks the board who it is and how it is.
 pub fn info(rig: &RigAddress, context: &Context<'_>) -> Result<InfoFigures> {
     let rig = Rig::connect(rig, None, context)?;
     let status = rig.client.status()?;

@@ -1,7 +1,7 @@
-//! Live image: repeats a program at the current piezo position, frame after frame, until it is cancelled.
+//! Live image: repeats a program at the current piezo position until cancelled.
 //!
-//! Nothing moves but the piezo, which is held where it is. A program takes as many exposures as come within a quarter of a second, so
-//! that a fast camera costs little on the line, and a slow one has no queue of old images when something else is wanted.
+//! Only the piezo is active: it is held in place. A program lasts about a quarter of a second. A fast camera
+//! then needs few requests, and a slow one queues no old images.
 
 use std::time::{Duration, Instant};
 
@@ -18,11 +18,9 @@ use crate::{
     error::{Result, WorkflowError},
 };
 
-/// About how long a program lasts.
 const PROGRAM: Duration = Duration::from_millis(250);
-/// Programs in a row that lose their first image, after which none is expected.
+/// Consecutive programs without their first image after which the live image fails.
 const LOST_MAX: u32 = 8;
-/// Most exposures of a program.
 const REPEATS_MAX: u16 = 100;
 
 #[derive(Clone, PartialEq, Debug)]
@@ -31,7 +29,7 @@ pub struct LiveSettings {
     pub camera: CameraSettings,
 }
 
-/// Gives frame after frame to `on_frame` until it or the context wants no more. The rig is stopped before this returns.
+/// Passes each frame to `on_frame` until it or the context stops. Stops the rig before returning.
 pub fn watch(
     settings: &LiveSettings,
     context: &Context<'_>,
@@ -50,7 +48,7 @@ pub fn watch(
             on_frame(record, image)
         });
         match exposed {
-            // Known at once, unlike an image that was waited for in vain: the next one may come.
+            // The camera reports this loss without a time-out, so the next image may still come.
             Err(WorkflowError::Capture(CaptureError::Camera(
                 error @ (CameraError::Skipped { .. } | CameraError::Incomplete { .. }),
             ))) if lost + 1 < LOST_MAX => {
@@ -63,7 +61,7 @@ pub fn watch(
     }
 }
 
-/// A shot where the piezo stands; a piezo that was never sent anywhere may stand outside its limits.
+/// A shot at the current piezo position, moved inside the limits if the piezo was never commanded.
 fn held(fine_nm: i32, client: &farnear_capture::Client, settings: &LiveSettings) -> Shot {
     let limits = client.hello().limits;
     let target = farnear_protocol::Nanometres(fine_nm.clamp(limits.fine_min.0, limits.fine_max.0));
@@ -71,7 +69,7 @@ fn held(fine_nm: i32, client: &farnear_capture::Client, settings: &LiveSettings)
     defaults.shot(Axis::SensorFine, target)
 }
 
-/// How many exposures the next program takes, where the last one took `repeats` in `took`.
+/// Exposures of the next program, if the last one took `repeats` in `took`.
 fn next(repeats: u16, took: Duration) -> u16 {
     let each_s = took.as_secs_f64() / f64::from(repeats.max(1));
     (PROGRAM.as_secs_f64() / each_s.max(1e-3)).clamp(1.0, f64::from(REPEATS_MAX)) as u16

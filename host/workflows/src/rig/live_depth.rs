@@ -1,4 +1,4 @@
-//! Live depth: pair after pair by the piezo, each with its map, until it is cancelled.
+//! Live depth: pairs by the piezo, each with its map, until cancelled.
 
 use std::{
     path::PathBuf,
@@ -17,7 +17,7 @@ use farnear_protocol::{Micros, Settle, message::Axis};
 use super::{RigAddress, camera::CameraSettings, camera::EquippedRig};
 use crate::{context::Context, error::Result, operators, optics::GivenOptics};
 
-/// So long pairs may be passed over for newer ones.
+/// Longest time for which pairs may be skipped in favour of newer ones.
 const PASSED_OVER: Duration = Duration::from_millis(100);
 
 #[derive(Clone, PartialEq, Debug)]
@@ -25,26 +25,20 @@ pub struct LiveDepthSettings {
     pub rig: RigAddress,
     pub camera: CameraSettings,
     pub optics: PathBuf,
-    /// Windows, filling and threads.
     pub computation: Settings,
 }
 
-/// A pair and its depth.
 pub struct LiveDepth<'a> {
-    /// The far-focused image.
     pub far: &'a Image,
-    /// The near-focused image.
     pub near: &'a Image,
-    /// Its depth, confidence and warnings.
     pub map: &'a DepthMap,
-    /// Board time from the start of the far exposure to the end of the near one, in ms.
+    /// Board time from the start of the far exposure to the end of the near one.
     pub pair_ms: f64,
-    /// From the arrival of the near image to the finished map, in ms of this computer's clock.
+    /// From the arrival of the near image to the finished map, by the host's clock.
     pub latency_ms: f64,
 }
 
-/// Gives pair after pair with its depth to `on_depth` until it or the context wants no more. Homes where needed. The rig is
-/// stopped before this returns.
+/// Passes each pair to `on_depth` until it or the context stops. Homes if needed; stops the rig at the end.
 pub fn watch(
     settings: &LiveDepthSettings,
     context: &Context<'_>,
@@ -75,8 +69,7 @@ pub fn watch(
         else {
             continue;
         };
-        // Where this computer is slower than the rig, the newest pair is shown and not one from long ago; but some are shown, however
-        // far ahead the rig is.
+        // Skip old pairs if this computer is slower than the rig, but show some however slow it is.
         if stream.waiting()? >= shots.len() && shown.is_some_and(|shown| shown.elapsed() < PASSED_OVER) {
             continue;
         }

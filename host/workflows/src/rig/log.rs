@@ -1,4 +1,4 @@
-//! What the firmware writes into its log: pieces of a defmt stream, decoded with the texts of the firmware's ELF file.
+//! Firmware log: a defmt stream, decoded with the strings of the firmware's ELF file.
 
 use std::{
     fs, io,
@@ -15,28 +15,22 @@ use crate::{
     error::{Result, WorkflowError},
 };
 
-/// Longest single wait, so that an interruption is seen soon.
 const SLICE: Duration = Duration::from_millis(100);
 /// Interval between requests if the board's time stops without them.
 const NUDGE: Duration = Duration::from_millis(20);
-/// What the ELF file is expected to hold.
 const TEXTS: &str = "the texts of the firmware's log";
 
-/// Whose log, and for how long.
 #[derive(Clone, PartialEq, Debug)]
 pub struct LogSettings {
     pub rig: RigAddress,
-    /// The firmware that runs on the board; without it the log is given as bytes.
+    /// Firmware on the board; without it the log is passed on as bytes.
     pub elf: Option<PathBuf>,
-    /// End after this time; without it, when it is cancelled.
+    /// End after this time; without it, when cancelled.
     pub seconds: Option<f64>,
-    /// Whether to reset the board first, to see how it starts.
     pub reset: bool,
 }
 
-/// Takes the lines of a log, one by one and without their end.
 pub trait LogSink {
-    /// Takes a line.
     fn line(&mut self, line: &str) -> io::Result<()>;
 }
 
@@ -46,7 +40,7 @@ impl<F: FnMut(&str) -> io::Result<()>> LogSink for F {
     }
 }
 
-/// Follows the log until the time is up or it is cancelled, which is not an error. Returns the number of lines.
+/// Ends when the time is up or when cancelled (not an error). Returns the number of lines.
 pub fn follow(settings: &LogSettings, sink: &mut dyn LogSink, context: &Context<'_>) -> Result<usize> {
     let table = settings.elf.as_deref().map(read_table).transpose()?;
     if let Some(seconds) = settings.seconds.filter(|seconds| !(0.0..1e9).contains(seconds)) {
@@ -66,7 +60,7 @@ pub fn follow(settings: &LogSettings, sink: &mut dyn LogSink, context: &Context<
         if let Some(part) = logs.next_within(slice)? {
             reader.take(&part)?;
         } else if emulated && last_nudge.elapsed() >= NUDGE {
-            // Virtual time passes while a question is unanswered only.
+            // Virtual time advances only while a request is unanswered.
             rig.client.status()?;
             last_nudge = Instant::now();
         }
@@ -86,7 +80,6 @@ fn read_table(path: &Path) -> Result<Table> {
     }
 }
 
-/// Makes lines of the log's pieces.
 struct Reader<'a> {
     table: Option<&'a Table>,
     decoder: Option<Box<dyn StreamDecoder + Send + Sync + 'a>>,
@@ -116,7 +109,7 @@ impl<'a> Reader<'a> {
             match frame {
                 Ok(line) => self.line(&line)?,
                 Err(DecodeError::UnexpectedEof) => break,
-                // A damaged frame is passed over; the next one begins behind it.
+                // Skip a damaged frame; the next one begins after it.
                 Err(DecodeError::Malformed) => {
                     self.context.info("a piece of the log is damaged, or of another firmware");
                 }

@@ -1,4 +1,4 @@
-//! The board measures its own mechanics: travel, backlash, the piezo's and the strain gauge's gain.
+//! Mechanics measured by the board: travel, backlash, gain of piezo and strain gauge.
 
 use farnear_capture::{describe::um, ready::ensure_homed};
 use farnear_protocol::message::{Calibration, Routine};
@@ -10,41 +10,35 @@ use crate::{context::Context, error::Result};
 #[derive(Clone, PartialEq, Debug, Serialize)]
 #[serde(untagged)]
 pub enum MechanicsFigures {
-    /// The way between a stage's two end switches.
-    Travel {
-        /// The axis: coarse, lens.
-        axis: &'static str,
-        travel_um: f64,
-    },
-    /// A screw's backlash.
+    /// Distance between a stage's end switches.
+    Travel { axis: &'static str, travel_um: f64 },
     Backlash {
-        /// The axis: coarse, lens.
         axis: &'static str,
-        /// Mean of the turns that were measured.
+        /// Mean over the reversals measured.
         backlash_um: f64,
-        /// Largest less smallest.
+        /// Largest minus smallest.
         spread_um: f64,
     },
-    /// The piezo against its strain gauge.
+    /// The piezo relative to its strain gauge.
     Piezo {
-        /// Picometres for each code of the converter.
+        /// Per code of the converter.
         gain_pm_per_code: u32,
-        /// Width of the loop, in percent of the travel.
+        /// Width of the loop, as a percentage of the travel.
         hysteresis_percent: f64,
-        /// Creep after a step, in percent of the step for each decade of time.
+        /// Creep after a step, as a percentage of the step per decade of time.
         creep_percent_per_decade: f64,
     },
-    /// The strain gauge against stage A's encoder.
+    /// The strain gauge relative to stage A's encoder.
     Gauge {
-        /// True position per gauge reading, 1 = as in its data sheet.
+        /// True position / gauge reading; 1 = data sheet.
         gauge_gain: f64,
         /// Gauge reading of the relaxed piezo.
         gauge_offset_um: f64,
     },
 }
 
-/// Lets the board measure; backlash and the piezo's figures are kept as settings. A stage is homed by having its travel
-/// measured, and before its backlash is.
+/// Backlash and piezo figures are stored as settings. Measuring travel homes the stage; measuring backlash
+/// homes it first.
 pub fn measure(rig: &RigAddress, routine: Routine, context: &Context<'_>) -> Result<MechanicsFigures> {
     let rig = Rig::connect(rig, None, context)?;
     if matches!(routine, Routine::Backlash { .. }) {

@@ -1,5 +1,3 @@
-//! Homing, moving, stopping.
-
 use farnear_capture::{
     describe::um,
     ready::{ensure_homed, steppers},
@@ -14,10 +12,10 @@ use crate::{
     error::{Result, WorkflowError},
 };
 
-/// How far each encoder's old zero was from the new one.
+/// Difference between the old and the new zero of each encoder.
 #[derive(Clone, PartialEq, Debug, Default, Serialize)]
 pub struct HomeFigures {
-    /// Of stage A's stepper.
+    /// Stage A's stepper.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub shift_um: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -27,34 +25,26 @@ pub struct HomeFigures {
 #[derive(Clone, PartialEq, Debug)]
 pub struct MoveSettings {
     pub rig: RigAddress,
-    /// Each axis with its position in micrometres; they move at the same time.
     pub targets: Vec<(Axis, f64)>,
-    /// Whether to home axes first that are not homed.
+    /// Whether to home axes that are not homed.
     pub home: bool,
 }
 
-/// Where an axis has come to.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct MovedAxis {
-    /// Its name: coarse, fine, lens.
     pub axis: &'static str,
     pub asked_um: f64,
-    /// Where its encoder or gauge says it is.
     pub measured_um: f64,
 }
 
-/// Where the axes have come to: of one the figures alone, of several a list.
+/// Positions reached. One axis is serialised as an object, several as a list.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 #[serde(untagged)]
 pub enum MoveFigures {
     One(MovedAxis),
-    All {
-        /// In the order of the targets.
-        moved: Vec<MovedAxis>,
-    },
+    All { moved: Vec<MovedAxis> },
 }
 
-/// A position in micrometres as the wire carries it. `name` is the parameter's.
 pub fn nanometres(name: &'static str, position_um: f64) -> Result<Nanometres> {
     sequence::nanometres(position_um).ok_or_else(|| {
         let expected = "expected a position of -2147483 to 2147483 um";
@@ -62,7 +52,7 @@ pub fn nanometres(name: &'static str, position_um: f64) -> Result<Nanometres> {
     })
 }
 
-/// Homes these axes at the same time; all that have a home switch where none are named.
+/// Homes these axes simultaneously; without any, all that have a home switch.
 pub fn home(rig: &RigAddress, axes: &[Axis], context: &Context<'_>) -> Result<HomeFigures> {
     let rig = Rig::connect(rig, None, context)?;
     let axes = if axes.is_empty() { steppers(&rig.client.hello().capabilities) } else { axes.to_vec() };
@@ -77,7 +67,6 @@ pub fn home(rig: &RigAddress, axes: &[Axis], context: &Context<'_>) -> Result<Ho
     Ok(homed)
 }
 
-/// Moves axes to absolute positions.
 pub fn move_to(settings: &MoveSettings, context: &Context<'_>) -> Result<MoveFigures> {
     let targets: Vec<_> = settings
         .targets
@@ -104,7 +93,7 @@ pub fn stop(rig: &RigAddress, context: &Context<'_>) -> Result<()> {
     Ok(Rig::connect(rig, None, context)?.client.stop()?)
 }
 
-/// Emergency stop: what moved has lost its position, and the alarm has to be cleared.
+/// Emergency stop: moving axes lose their positions, and the alarm must be cleared.
 pub fn halt(rig: &RigAddress, context: &Context<'_>) -> Result<()> {
     Ok(Rig::connect(rig, None, context)?.client.halt()?)
 }

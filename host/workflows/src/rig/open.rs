@@ -1,7 +1,7 @@
-//! A rig that is held open between jobs, for a face that stays: status, stop and job share one port.
+//! A rig that stays open between jobs: status, stop and job share one port.
 //!
-//! [`RigAddress::Open`] represents it where a workflow takes a rig. Requests of several threads come one after the other at
-//! the port's owner, so a stop does not wait for a job that is under way.
+//! [`RigAddress::Open`] passes it to a workflow. The port's owner serialises requests of several threads, so
+//! a stop does not wait for the running job.
 
 use std::{
     fmt,
@@ -18,14 +18,14 @@ use crate::{
     simulator::{Scenery, Simulator},
 };
 
-/// A connected rig that several threads share; the last one that lets go closes it.
+/// A connected rig shared by several threads. The last owner closes it.
 #[derive(Clone)]
 pub struct OpenRig(Arc<Held>);
 
 struct Held {
     name: String,
     client: Mutex<Client>,
-    // Ends after the client.
+    // Dropped after the client.
     emulation: Option<(Arc<Simulator>, Scenery)>,
 }
 
@@ -42,7 +42,7 @@ impl PartialEq for OpenRig {
 }
 
 impl OpenRig {
-    /// Connects and stays connected. An emulated rig has the lens of `optics`.
+    /// Connects and stays connected. An emulated rig uses the lens of `optics`.
     pub fn open(address: &RigAddress, optics: &GivenOptics, context: &Context<'_>) -> Result<Self> {
         if let RigAddress::Open(open) = address {
             return Ok(open.clone());
@@ -60,12 +60,11 @@ impl OpenRig {
         &self.0.name
     }
 
-    /// Whether it is emulated, by this program.
+    /// Whether this program started it as an emulated rig.
     pub fn is_emulated(&self) -> bool {
         self.0.emulation.is_some()
     }
 
-    /// What the emulated rig was made of.
     pub fn scenery(&self) -> Option<&Scenery> {
         self.0.emulation.as_ref().map(|(_, scenery)| scenery)
     }
@@ -74,7 +73,6 @@ impl OpenRig {
         self.0.client.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// A handle for a job, which `context` can cancel.
     pub(super) fn connect(&self, context: &Context<'_>) -> Rig {
         let mut client = self.client().clone();
         client.interrupt_by(context.cancel.flag());
@@ -84,19 +82,19 @@ impl OpenRig {
         Rig { client, emulation: self.0.emulation.clone() }
     }
 
-    /// Stops all motion along the ramps and ends a running program immediately, during any job.
+    /// Stops all motion along the ramps and ends a running program, during any job.
     pub fn stop(&self) -> Result<()> {
         let client = self.client().clone(); // the lock is not held while the board answers
         Ok(client.stop()?)
     }
 
-    /// Emergency stop, now: what moved has lost its position, and the alarm has to be cleared.
+    /// Emergency stop: moving axes lose their positions, and the alarm must be cleared.
     pub fn halt(&self) -> Result<()> {
         let client = self.client().clone();
         Ok(client.halt()?)
     }
 
-    /// Continues with a board that was reset or unplugged: it may have lost its position.
+    /// Resumes after a reset or reconnection of the board. Its position may be lost.
     pub fn reopen(&self) -> Result<()> {
         let mut client = self.client().clone();
         client.reopen()?;

@@ -1,5 +1,3 @@
-//! A far- and a near-focused image into a capture folder.
-
 use std::path::PathBuf;
 
 use farnear_capture::{
@@ -118,21 +116,19 @@ impl CameraRequest for CaptureRequest {
     }
 }
 
-/// Most exposures that are averaged: beyond, drift counts more than noise.
+/// Most exposures to average: beyond this, drift exceeds noise.
 pub const AVERAGED_MAX: u16 = 256;
 
-/// What there is to say of a pair.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct PairFigures {
     /// Board time for both settled moves and both images, without the exposures.
     pub pair_ms: f64,
-    /// From the start of the far move until it was settled.
+    /// From the start of the far move until it settled.
     pub far_settle_ms: f64,
-    /// The same of the near move; 0 behind a half mirror, which has no such move.
+    /// As `far_settle_ms`; 0 behind a half mirror, which has no near move.
     pub near_settle_ms: f64,
-    /// Sensor distance by encoder and gauge at the far exposure.
+    /// Measured sensor distance (encoder and gauge) at the far exposure.
     pub sensor_far_mm: f64,
-    /// The same at the near exposure.
     pub sensor_near_mm: f64,
     pub width: usize,
     pub height: usize,
@@ -154,11 +150,8 @@ impl From<&Pair> for PairFigures {
     }
 }
 
-/// Captures a pair: homes where needed, brings the stage near, exposes both by piezo. The folder appears when everything
-/// is in it: far.png, near.png and capture.toml.
-///
-/// # Errors
-/// Optics, folder, camera, rig: in this order, so that nothing moves where the result could not be kept.
+/// Homes if needed, exposes both images by piezo. The folder appears when it is complete. Checks everything
+/// before any motion.
 pub fn capture(settings: &CaptureRequest, context: &Context<'_>) -> Result<PairFigures> {
     if settings.half_mirror {
         return half_mirror::capture(settings, context);
@@ -166,7 +159,7 @@ pub fn capture(settings: &CaptureRequest, context: &Context<'_>) -> Result<PairF
     capture_seen(settings, context, |_| ())
 }
 
-/// The same; `on_pair` receives the pair before anything is written.
+/// As [`capture`]; `on_pair` receives the pair before anything is written.
 pub fn capture_seen(
     settings: &CaptureRequest,
     context: &Context<'_>,
@@ -192,8 +185,7 @@ pub fn capture_seen(
     Ok(PairFigures::from(&pair))
 }
 
-/// The image without the camera's faults, in 16 bits: what is not saturated stays below white, and what is darker than the dark frame
-/// is black.
+/// In 16 bits: unsaturated pixels stay below white; pixels darker than the dark frame are black.
 fn corrected(image: &Image, frames: &CameraFrames) -> Result<Image> {
     const WHITE: f32 = 65_535.0;
     let white = ((1_u32 << image.bits.min(16)) - 1) as u16;
@@ -206,7 +198,6 @@ fn corrected(image: &Image, frames: &CameraFrames) -> Result<Image> {
     Ok(Image { pixels, bits: 16 })
 }
 
-/// Captures a pair with an open rig and camera.
 pub fn take(
     equipped: &mut EquippedRig,
     optics: &GivenOptics,
@@ -216,7 +207,7 @@ pub fn take(
     take_averaged(equipped, optics, settings, 1, context)
 }
 
-/// As [`take`], with each image the mean of this many exposures.
+/// As [`take`]; each image is the mean of `averaged` exposures.
 fn take_averaged(
     equipped: &mut EquippedRig,
     optics: &GivenOptics,
@@ -239,7 +230,6 @@ fn take_averaged(
     Ok((pair, record))
 }
 
-/// The record of a pair, with its settings.
 pub(super) fn noted(
     pair: &Pair,
     equipped: &EquippedRig,

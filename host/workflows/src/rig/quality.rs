@@ -1,5 +1,4 @@
-//! How good depth is: pairs of a flat target, and what owners of depth cameras ask of them. Each measurement is a line in a
-//! record, so that a rig's health is seen over weeks.
+//! Depth quality from pairs of a flat target, recorded to follow a rig over weeks.
 
 use std::{
     io::ErrorKind,
@@ -29,9 +28,8 @@ use crate::{
     text_file,
 };
 
-/// Fewest and most pairs.
 const PAIRS: std::ops::RangeInclusive<usize> = 2..=50;
-/// Part of the image that is measured, along each side: the rim has less light and more distortion.
+/// Measured part of the image along each side: the border has less light and more distortion.
 const MIDDLE: f64 = 0.8;
 
 #[derive(Clone, PartialEq, Debug)]
@@ -40,45 +38,38 @@ pub struct QualitySettings {
     pub camera: CameraSettings,
     pub optics: PathBuf,
     pub pairs: usize,
-    /// How far the target is, where that is known.
     pub true_mm: Option<f64>,
-    /// The record that the figures are added to.
     pub record: PathBuf,
 }
 
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 pub struct QualityFigures {
-    /// When; only of real hardware.
+    /// Only for real hardware.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub time: Option<String>,
     pub pairs: usize,
-    /// Part of the pixels with a depth.
+    /// Share of pixels with a depth.
     pub fill_rate: f64,
     pub mean_mm: f64,
-    /// Distance of the depths from the plane through them, root mean square; of the mean over the pairs.
+    /// Root-mean-square distance of the mean map from its plane.
     pub plane_rms_mm: f64,
-    /// Angle between the plane and one square to the optical axis.
+    /// Angle between the plane and the sensor plane.
     pub tilt_deg: f64,
     /// Median over the pixels of the standard deviation over the pairs.
     pub temporal_noise_mm: f64,
-    /// Median of the standard deviations that are predicted for each pixel of the first pair.
+    /// Median of the standard deviations predicted for the first pair.
     pub predicted_noise_mm: f64,
-    /// Mean depth minus the true distance.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub accuracy_mm: Option<f64>,
 }
 
-/// The measurements of a rig.
 #[derive(Clone, PartialEq, Debug, Default, Serialize, Deserialize)]
 pub struct QualityRecord {
     #[serde(default, rename = "measurement")]
     pub measurements: Vec<QualityFigures>,
 }
 
-/// Reads a record; empty without one.
-///
-/// # Errors
-/// [`WorkflowError::Read`], [`WorkflowError::File`].
+/// Reads a record; empty if there is no file.
 pub fn read_record(path: &Path) -> Result<QualityRecord> {
     match text_file::read(path) {
         Ok(text) => toml::from_str(&text).map_err(WorkflowError::file(path, "a record of depth quality")),
@@ -87,10 +78,7 @@ pub fn read_record(path: &Path) -> Result<QualityRecord> {
     }
 }
 
-/// Takes the pairs, computes their depth and adds the figures to the record.
-///
-/// # Errors
-/// Parameters, optics, record, camera, rig, computation: in this order. The record changes only at the end.
+/// Captures the pairs, computes depth and appends the figures. The record changes only at the end.
 pub fn measure(settings: &QualitySettings, context: &Context<'_>) -> Result<QualityFigures> {
     if !PAIRS.contains(&settings.pairs) {
         return Err(WorkflowError::parameter("pairs", settings.pairs, "expected 2 to 50"));
@@ -132,7 +120,6 @@ pub fn measure(settings: &QualitySettings, context: &Context<'_>) -> Result<Qual
     Ok(found)
 }
 
-/// What follows from the maps. Only the middle of the image counts.
 fn figures(
     maps: &[Array2<f32>],
     predicted: Option<&Array2<f32>>,
@@ -188,7 +175,7 @@ fn figures(
     })
 }
 
-/// Mean and standard deviation (of a sample) of two values or more.
+/// Mean and sample standard deviation of at least two values.
 fn spread(values: &[f64]) -> (f64, f64) {
     let count = values.len() as f64;
     let mean = values.iter().sum::<f64>() / count;
@@ -196,7 +183,7 @@ fn spread(values: &[f64]) -> (f64, f64) {
     (mean, (squares / (count - 1.0)).sqrt())
 }
 
-/// The middle value; 0 without any.
+/// The median; 0 without values.
 fn median(mut values: Vec<f64>) -> f64 {
     if values.is_empty() {
         return 0.0;
@@ -211,7 +198,7 @@ mod tests {
 
     const PROJECTION: Projection = Projection { focal_length_mm: 50.0, pixel_um: 7.4, axis_px: None };
 
-    /// Maps of a plane at 900 mm that tremble by `noise` from pair to pair.
+    /// Maps of a plane at 900 mm that differ by `noise` from pair to pair.
     fn maps(noise: f32) -> Vec<Array2<f32>> {
         let sign = |index: usize| if index.is_multiple_of(2) { 1.0 } else { -1.0 };
         (0..4).map(|index| Array2::from_shape_fn((50, 60), |_| 900.0 + noise * sign(index))).collect()
@@ -228,7 +215,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_there_lowers_the_fill_rate_and_without_depth_there_is_no_quality() {
+    fn missing_pixels_lower_the_fill_rate_and_a_map_without_depth_has_no_quality() {
         let mut some = maps(0.0);
         some[0].slice_mut(s![.., ..30]).fill(f32::NAN);
         let found = figures(&some, None, PROJECTION, None).unwrap();

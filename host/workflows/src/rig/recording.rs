@@ -1,7 +1,7 @@
-//! Recorded live depth: the pairs as they came, with their times and the optics, in one file. Played back, depth is computed again, at the
-//! pace of the record or as fast as this computer can.
+//! Recorded live depth: pairs with times and optics in one file. Playback computes depth again, at the
+//! recorded pace or as fast as possible.
 //!
-//! The file, all numbers little-endian:
+//! File format, little-endian:
 //! ```text
 //! "FNPAIRS1" | u32 length of the optics | optics (TOML) | pairs
 //! pair: u64 microseconds since the first | u16 width | u16 height | u8 bits | far: u16 per pixel | near: u16 per pixel
@@ -35,40 +35,34 @@ use crate::{
 };
 
 const MAGIC: &[u8; 8] = b"FNPAIRS1";
-/// What a file of this kind is called in messages.
 const EXPECTED: &str = "recorded pairs";
-/// Most pairs of a recording: 2.5 GB at 640x480.
+/// 2.5 GB at 640x480.
 pub const PAIRS_MAX: usize = 2000;
 const OPTICS_MAX: u32 = 1 << 20;
-/// Most pixels of an image.
 const PIXELS_MAX: usize = 1 << 26;
-/// Pairs that are read before they are due.
+/// Pairs read before they are due.
 const AHEAD: usize = 2;
-/// From one look at the wish to stop to the next.
 const LOOK: Duration = Duration::from_millis(20);
 
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct RecordingFigures {
     pub pairs: usize,
-    /// From the first to the last.
     pub seconds: f64,
 }
 
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct PlayFigures {
     pub pairs: usize,
-    /// Over the time that it took.
+    /// Over the computing time.
     pub maps_per_second: f64,
-    /// From a pair's grey values to its map, median, in ms of this computer's clock.
+    /// Median, from a pair's grey values to its map, by the host's clock.
     pub latency_ms: f64,
-    /// Recorded time, s.
     pub seconds: f64,
 }
 
-/// A recording under way. The file has its name when it is finished; one that is not goes with this value.
 pub struct Recorder {
     file: File,
-    /// Bytes of complete content: the head and pairs.
+    /// Length of the header and complete pairs.
     whole_bytes: u64,
     partial: PathBuf,
     target: PathBuf,
@@ -79,7 +73,6 @@ pub struct Recorder {
 }
 
 impl Recorder {
-    /// Begins a recording.
     pub fn begin(target: &Path, optics: &GivenOptics) -> Result<Self> {
         let folder = target.parent().unwrap_or(Path::new("."));
         fs::create_dir_all(folder)
@@ -102,7 +95,7 @@ impl Recorder {
         Ok(recorder)
     }
 
-    /// Writes all of it, or leaves the file as it was: one that a full disk ends is whole to its last pair.
+    /// Writes all bytes, or truncates to the last complete pair, for instance if the disk is full.
     fn append(&mut self, bytes: &[u8]) -> Result<()> {
         if let Err(error) = self.file.write_all(bytes) {
             self.file.set_len(self.whole_bytes).map_err(StagingError::at(&self.target))?;
@@ -112,7 +105,7 @@ impl Recorder {
         Ok(())
     }
 
-    /// Adds a pair; gives whether there is room for more.
+    /// Adds a pair; returns whether there is room for more.
     pub fn add(&mut self, far: &Image, near: &Image) -> Result<bool> {
         let (height, width) = far.pixels.dim();
         let (Ok(width), Ok(height)) = (u16::try_from(width), u16::try_from(height)) else {
@@ -142,7 +135,6 @@ impl Recorder {
         Ok(self.pairs < PAIRS_MAX)
     }
 
-    /// Moves the file to its final name.
     pub fn finish(mut self) -> Result<RecordingFigures> {
         fs::rename(&self.partial, &self.target).map_err(StagingError::at(&self.target))?;
         self.finished = true;
@@ -158,17 +150,13 @@ impl Drop for Recorder {
     }
 }
 
-/// A pair of a recording.
 #[derive(Clone, PartialEq, Debug)]
 pub struct RecordedPair {
     pub at: Duration,
-    /// The far-focused image.
     pub far: Image,
-    /// The near-focused image.
     pub near: Image,
 }
 
-/// A recording that is read, pair after pair.
 pub struct Recording {
     file: BufReader<File>,
     path: PathBuf,
@@ -177,7 +165,6 @@ pub struct Recording {
 }
 
 impl Recording {
-    /// Opens a file.
     pub fn open(path: &Path) -> Result<Self> {
         let file = File::open(path).map_err(WorkflowError::read("the recording", path))?;
         let mut file = BufReader::new(file);
@@ -197,7 +184,7 @@ impl Recording {
         Ok(Self { file, path: path.into(), optics, read: 0 })
     }
 
-    /// The next pair; `None` at the end.
+    /// Returns `None` at the end.
     pub fn next_pair(&mut self) -> Result<Option<RecordedPair>> {
         let (path, number) = (self.path.clone(), self.read + 1);
         let wrong = |what: &str| WorkflowError::file(&path, EXPECTED)(format!("pair {number} {what}"));
@@ -233,14 +220,14 @@ impl Recording {
     }
 }
 
-/// A pair of a recording with its grey values, made while depth of the one before is computed.
+/// A pair with its grey values, prepared while depth of the previous pair is computed.
 struct Ready {
     pair: RecordedPair,
     far: Array2<f32>,
     near: Array2<f32>,
 }
 
-/// Reads ahead, by at most [`AHEAD`] pairs, until the end, an error, or until the receiver is closed.
+/// Reads up to [`AHEAD`] pairs in advance until the end, an error, or a closed receiver.
 fn read_ahead(mut recording: Recording, to: &SyncSender<Result<Ready>>) {
     loop {
         let ready = match recording.next_pair() {
@@ -255,7 +242,7 @@ fn read_ahead(mut recording: Recording, to: &SyncSender<Result<Ready>>) {
     }
 }
 
-/// Plays a recording and gives each pair with its depth to `on_depth`. One thread reads, another computes.
+/// Plays a recording and passes each pair with its depth to `on_depth`. One thread reads, another computes.
 pub fn play(
     path: &Path,
     computation: &Settings,
@@ -340,7 +327,7 @@ mod tests {
         assert!(Recording::open(&path).err().expect("refused").to_string().contains("FNPAIRS1"));
     }
 
-    /// The system lets this process write files of 4 kB (8 kB where a shell counts in KiB) and no larger.
+    /// The system limits this process's files to 4 kB (8 kB if the shell counts in KiB).
     #[test]
     #[cfg(target_os = "linux")]
     fn a_disk_that_fills_up_ends_a_recording_with_the_last_whole_pair() {

@@ -1,4 +1,4 @@
-//! An exposure program, from a file or as a focus stack, and the folder with its images.
+//! Runs an exposure program, from a file or as a focus stack, and writes its images.
 
 use std::{fs, path::PathBuf};
 
@@ -127,24 +127,19 @@ impl CameraRequest for SequenceRequest {
     }
 }
 
-/// What there is to say of a sequence.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct SequenceFigures {
-    /// Shots of the program.
     pub shots: usize,
     pub exposures: usize,
-    /// From the first move to the end of the last exposure, by the board's clock.
+    /// Board time from the first move to the end of the last exposure.
     pub board_ms: f64,
-    /// Longest time from the start of a move until it was settled.
+    /// Longest time from the start of a move until it settled.
     pub longest_settle_ms: f64,
-    /// Largest distance between the position asked for and the one measured at an exposure.
+    /// Largest difference between commanded and measured position at an exposure.
     pub largest_error_um: f64,
 }
 
-/// Runs a program and writes its images. The folder appears when everything is in it.
-///
-/// # Errors
-/// Parameters, program, optics, folder, camera, rig: in this order.
+/// The folder appears when it is complete. Checks everything before any motion.
 pub fn run(settings: &SequenceRequest, context: &Context<'_>) -> Result<SequenceFigures> {
     if settings.runs == 0 {
         return Err(WorkflowError::parameter("runs", 0, "it takes no images, expected 1 or more"));
@@ -167,13 +162,12 @@ pub fn run(settings: &SequenceRequest, context: &Context<'_>) -> Result<Sequence
         None => (USUAL_PSF, toml::Table::new()),
     };
     let record = record_of_sequence(&taken, &rig.rig.client, rig.circumstances(psf, table))
-        .ok_or(CaptureError::Count { told: 0, asked: shots.len() })?;
+        .ok_or(CaptureError::Count { reported: 0, asked: shots.len() })?;
     finish_sequence(folder, &taken, &record)?;
     context.info(&format!("wrote {}", settings.out.display()));
     Ok(figures(&shots, &taken))
 }
 
-/// Runs the program once and adds its images to `taken`.
 fn run_once(
     rig: &mut EquippedRig,
     shots: &[Shot],

@@ -1,4 +1,4 @@
-//! Pair after pair, each in its own folder: for noise over time, and for changes.
+//! A series of pairs, each in its own folder, to measure noise over time and changes.
 
 use std::path::PathBuf;
 
@@ -16,7 +16,6 @@ use crate::{
     optics::GivenOptics,
 };
 
-/// Most pairs of a series: more belong into several.
 const MOST: usize = 1000;
 
 #[derive(Clone, Debug)]
@@ -24,17 +23,15 @@ pub struct SeriesSettings {
     pub rig: RigAddress,
     pub camera: CameraSettings,
     pub optics: PathBuf,
-    /// The new capture folders, one per pair.
     pub out: Vec<PathBuf>,
 }
 
-/// What there is to say of a series.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct SeriesFigures {
     pub pairs: Vec<PairFigures>,
 }
 
-/// Captures the pairs. A series that is cancelled keeps the pairs that are complete.
+/// Captures the pairs. A cancelled series keeps its complete pairs.
 pub fn capture(settings: &SeriesSettings, context: &Context<'_>) -> Result<SeriesFigures> {
     let count = settings.out.len();
     if count == 0 || count > MOST {

@@ -1,5 +1,3 @@
-//! What the board keeps in its memory.
-
 use farnear_protocol::message::{Setting, SettingKey};
 use serde::Serialize;
 
@@ -9,15 +7,13 @@ use crate::{
     error::{Result, WorkflowError},
 };
 
-/// A setting, in the unit of its name.
+/// In the unit of its name.
 #[derive(Clone, PartialEq, Eq, Debug, Serialize)]
 pub struct SettingFigures {
     pub key: &'static str,
     pub value: i32,
     pub default: i32,
-    /// Smallest value allowed.
     pub min: i32,
-    /// Largest value allowed.
     pub max: i32,
 }
 
@@ -30,11 +26,10 @@ impl From<Setting> for SettingFigures {
 
 #[derive(Clone, PartialEq, Eq, Debug, Serialize)]
 pub struct AllSettings {
-    /// In the order of their numbers on the wire.
+    /// In the order of their wire numbers.
     pub settings: Vec<SettingFigures>,
 }
 
-/// The setting of this name.
 pub fn key(name: &str) -> Result<SettingKey> {
     SettingKey::ALL.into_iter().find(|key| key.name() == name).ok_or_else(|| {
         let names = SettingKey::ALL.map(SettingKey::name).join(", ");
@@ -42,19 +37,17 @@ pub fn key(name: &str) -> Result<SettingKey> {
     })
 }
 
-/// Reads all settings.
 pub fn list(rig: &RigAddress, context: &Context<'_>) -> Result<AllSettings> {
     let rig = Rig::connect(rig, None, context)?;
     let settings = SettingKey::ALL.iter().map(|key| Ok(rig.client.setting(*key)?.into()));
     Ok(AllSettings { settings: settings.collect::<Result<_>>()? })
 }
 
-/// Reads a setting.
 pub fn get(rig: &RigAddress, key: SettingKey, context: &Context<'_>) -> Result<SettingFigures> {
     Ok(Rig::connect(rig, None, context)?.client.setting(key)?.into())
 }
 
-/// Changes a setting, now and for later boots.
+/// Changes a setting immediately and for later boots.
 pub fn set(rig: &RigAddress, key: SettingKey, value: i32, context: &Context<'_>) -> Result<SettingFigures> {
     Ok(Rig::connect(rig, None, context)?.client.set_setting(key, value)?.into())
 }

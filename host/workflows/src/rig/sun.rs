@@ -1,4 +1,4 @@
-//! The board's answer where the sun is and how a person's shadow lies, and the same calculation on this computer.
+//! Sun and shadow calculated by the board and, for comparison, on the host.
 
 use chrono::DateTime;
 use farnear_protocol::message::{
@@ -95,35 +95,29 @@ impl RigRequest for SunRequest {
     }
 }
 
-/// Where the sun is and how the shadow lies.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct BoardSunFigures {
-    /// Above the horizon, without refraction; the board's.
+    /// Above the horizon, without refraction; calculated by the board.
     pub elevation_deg: f32,
-    /// Clockwise from north; the board's.
+    /// Clockwise from north; calculated by the board.
     pub azimuth_deg: f32,
     pub host_elevation_deg: f32,
     pub host_azimuth_deg: f32,
     /// Reliability of the shadow's angle, or why there is none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub shadow: Option<&'static str>,
-    /// Angle of the shadow in the image.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub beta_deg: Option<f32>,
-    /// Its standard deviation.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sigma_beta_deg: Option<f32>,
-    /// Whether the shadow lies to the other side.
+    /// Whether the shadow is on the other side.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mirrored: Option<bool>,
-    /// Length of the shadow on the ground.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub shadow_length_m: Option<f32>,
-    /// Whether board and host agree bit for bit.
     pub same_bits: bool,
     #[serde(skip)]
     pub board: SunAnswer,
-    /// What this computer makes of the same question.
     #[serde(skip)]
     pub host: SunAnswer,
 }
@@ -137,10 +131,6 @@ impl BoardSunFigures {
     }
 }
 
-/// Asks the board, and calculates the same here.
-///
-/// # Errors
-/// [`WorkflowError::Parameter`] for places and lengths that cannot be, the rig.
 pub fn sun(settings: &SunRequest, context: &Context<'_>) -> Result<BoardSunFigures> {
     let query = query(settings)?;
     let rig = Rig::connect(&settings.rig, None, context)?;
@@ -202,7 +192,7 @@ fn query(settings: &SunRequest) -> Result<SunQuery> {
     })
 }
 
-/// How well a careful person knows these: a clock set by hand, a map, a compass, a tape measure.
+/// Typical standard deviations: a clock set by hand, a map, a compass, a tape measure.
 const USUAL: QueryDeviations = QueryDeviations {
     day_e3: 0,
     time_s: 30,
@@ -214,7 +204,7 @@ const USUAL: QueryDeviations = QueryDeviations {
     distance_mm: 100,
 };
 
-/// An angle as the wire carries it, in 1e-7 degrees.
+/// Converts to the wire unit, 1e-7 degrees.
 fn degrees_e7(name: &'static str, degrees: f64, limit: f64) -> Result<i32> {
     if degrees.abs() <= limit {
         return Ok((degrees * 1e7).round() as i32);
@@ -235,7 +225,7 @@ fn length_mm(name: &'static str, metres: f64) -> Result<u32> {
     u32::try_from(millimetres(name, metres)?).map_err(negative)
 }
 
-/// An answer as bits, so that even two NaN are compared.
+/// Bits of an answer, so that even NaNs compare.
 fn bits(answer: &SunAnswer) -> [u32; 7] {
     let shadow = match answer.shadow {
         None => [0; 5],

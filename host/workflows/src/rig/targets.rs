@@ -1,5 +1,4 @@
-//! The series of flat targets that teaches a depth correction: a pair and its depth map at each distance, and the list of
-//! them.
+//! Flat targets for a depth correction: a pair and depth map at each distance, and their list.
 
 use std::{
     fs,
@@ -32,9 +31,7 @@ use crate::{
     text_file,
 };
 
-/// Name of the list in the series' folder.
 const LIST: &str = "PATTERNS.toml";
-/// Targets of a series where none are named.
 const USUAL_TARGETS: usize = 24;
 
 /// Capture a flat target at known distances, compute the depth maps, and list them for `farnear calibrate correction`.
@@ -97,18 +94,15 @@ impl CameraRequest for TargetSeriesRequest {
     }
 }
 
-/// What there is to say of a series.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct TargetFigures {
     pub targets: usize,
-    /// Those that were captured now.
     pub captured: usize,
-    /// Root mean square of the maps' error before any correction, mm; of those that were captured now.
+    /// Root-mean-square error before correction, of the maps captured in this run.
     pub rmse_mm: f64,
     pub patterns: String,
 }
 
-/// The list, as corrections are learned from it.
 #[derive(Serialize, Deserialize, Default)]
 struct List {
     #[serde(default)]
@@ -121,12 +115,8 @@ struct Entry {
     true_mm: f64,
 }
 
-/// Captures a flat target at each distance, computes the depth maps and lists them. A series that was broken off continues
-/// where it stood when it is started again with the same folder. A real rig stays connected, an emulated one is started
-/// before each target.
-///
-/// # Errors
-/// Optics, distances, camera, folder, rig, in this order; [`WorkflowError::Unanswered`] where nobody places the target.
+/// Computes and lists the depth maps. The same folder resumes an interrupted series. A real rig stays
+/// connected; an emulated one restarts per target. Checks everything before any motion.
 pub fn capture(settings: &TargetSeriesRequest, context: &Context<'_>) -> Result<TargetFigures> {
     let optics = GivenOptics::read(&settings.optics)?;
     let operators = operators::find(None, &optics.optics)?;
@@ -177,13 +167,11 @@ struct Series<'a> {
 }
 
 impl Series<'_> {
-    /// The emulated rig before a flat target.
     fn emulated_before(&self, true_mm: f64) -> Result<EquippedRig> {
         let address = self.settings.rig.with_scene(format!("plane:{true_mm}"))?;
         self.settings.camera.connect(&address, Some(self.optics.for_emulation()), self.context)
     }
 
-    /// Has the target placed.
     fn place(&self, number: usize, count: usize, true_mm: f64) -> Result<()> {
         let place = format!(
             "place the flat target {true_mm} mm before the lens ({} of {count}), square to it",
@@ -197,7 +185,7 @@ impl Series<'_> {
         self.context.questions.ask(&question, &self.context.cancel).map(|_| ())
     }
 
-    /// Captures a pair and computes its depth, mm, into its own folder.
+    /// Captures a pair into its own folder and computes its depth, mm.
     fn capture(&self, rig: &mut EquippedRig, name: &str) -> Result<Array2<f32>> {
         let folder = begin_folder(&self.settings.out.join(name))?;
         let (pair, record) = pair::take(rig, self.optics, &self.settings.camera, self.context)?;
@@ -213,7 +201,6 @@ impl Series<'_> {
     }
 }
 
-/// The mean square of depth maps' errors, pixel by pixel.
 #[derive(Default)]
 struct MeanSquare {
     sum: f64,
@@ -243,7 +230,7 @@ fn distances(asked_mm: &[f64], optics: &Optics) -> Result<Vec<f64>> {
     }
     let range = optics.working_range();
     let step = (range.far_mm - range.near_mm) / (USUAL_TARGETS - 1) as f64;
-    // To a tenth of a millimetre, which can be set on a rail.
+    // Rounded to 0.1 mm, which can be set on a rail.
     Ok((0..USUAL_TARGETS).map(|i| rounded(range.near_mm + step * i as f64, 1)).collect())
 }
 

@@ -1,4 +1,4 @@
-//! Taking a person's shadow off masks by where the sun or a lamp is, or by the direction that the shadow was seen to have, and by how the camera stands.
+//! Removes a person's shadow from masks, given the camera's pose and the light or shadow direction.
 
 use std::{
     fs,
@@ -31,10 +31,8 @@ use crate::{
     sun::Moment,
 };
 
-/// Name of the file with the camera's pose.
 pub const CAMERA_FILE: &str = "the camera file";
 
-/// Above this share of a silhouette removed the cut is doubted, 0 to 1.
 const MUCH: f64 = 0.6;
 
 /// Remove a person's shadow from masks, from the pose of the camera and the place of the sun, of a lamp, or a measured direction.
@@ -140,20 +138,16 @@ impl Request for ShadowRemoveRequest {
     }
 }
 
-/// Light that casts the shadow.
 #[derive(Clone, Copy, PartialEq, Debug)]
 enum LightSource {
     Sun {
-        /// Place of the camera and time of the first mask.
         moment: Moment,
-        /// Masks per second, 0.001 to a million; without it all have one time.
+        /// Masks per second, 0.001 to 1e6; without it all masks have the same time.
         rate_hz: Option<f64>,
     },
-    /// A lamp at a place.
     Lamp(Lamp),
-    /// Something whose shadow was measured in the picture, degrees from right towards down.
+    /// Measured shadow direction in the picture, clockwise from the right, -180 to 180.
     Direction {
-        /// The angle, -180 to 180.
         degrees: f64,
     },
 }
@@ -162,20 +156,16 @@ enum LightSource {
 pub struct RemovalFigures {
     pub frames: usize,
     pub cut: usize,
-    /// Masks with something doubtful.
     pub flagged: usize,
-    /// Masks without a subject.
     pub empty: usize,
-    /// The sun above the horizon at the first mask; this and the next two where the sun it is.
+    /// At the first mask. This and the next two are for the sun only.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sun_elevation_deg: Option<f64>,
-    /// The sun clockwise from north.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sun_azimuth_deg: Option<f64>,
-    /// Whether the camera looks into the sun.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sun_in_view: Option<bool>,
-    /// Mean share of the silhouettes that were cut off, of those that were cut.
+    /// Mean over the cut silhouettes.
     pub removed_percent: Option<f64>,
     pub cut_ms_per_frame: f64,
     pub seconds: f64,
@@ -192,7 +182,6 @@ struct Index {
 struct Sun {
     elevation_deg: f64,
     azimuth_deg: f64,
-    /// The camera looks into the sun.
     in_view: bool,
 }
 
@@ -206,31 +195,27 @@ struct Entry {
 
 #[derive(Serialize)]
 struct Cut {
-    /// Direction of the shadow in the picture, degrees from right towards down.
+    /// In the picture, clockwise from the right.
     shadow_direction_deg: f64,
-    /// Rotation angle of the cut (Li 2014, eq. 8.20) and its standard deviation; the latter only where first order holds.
+    /// Rotation angle of the cut (Li 2014, eq. 8.20) and its standard deviation (first order, if valid).
     beta_deg: f64,
     #[serde(skip_serializing_if = "Option::is_none")]
     beta_sd_deg: Option<f64>,
     distance_m: f64,
     removed_percent: f64,
-    /// What body and shadow together leave unexplained; not there where the cut went by angles alone.
+    /// Pixels explained by neither body nor shadow. Missing if the cut used angles only.
     #[serde(skip_serializing_if = "Option::is_none")]
     unexplained_percent: Option<f64>,
 }
 
-/// Cuts the shadow off all masks and writes them with `shadow.toml`, which flags the doubtful ones.
-///
-/// # Errors
-/// Missing or wrong camera files and masks, a sun too low for shadows, masks that cannot be written; then the new folder is
-/// not there.
+/// Also writes `shadow.toml`, which flags doubtful masks. Writes nothing on failure.
 pub fn remove_from_masks(request: &ShadowRemoveRequest, context: &Context<'_>) -> Result<RemovalFigures> {
     let start = Instant::now();
     request.check()?;
     let camera = camera(&request.camera)?;
     let source = request.light()?;
     let (light, _) = source.at(0)?;
-    // Before any mask is read: without a usable light there is nothing to do.
+    // Fail without a usable light before reading any mask.
     light.check(camera.subject.height_m, &camera.camera)?;
     let sun = sun_of(light, &camera);
     if let Some(Sun { elevation_deg, in_view: true, .. }) = sun {
@@ -286,7 +271,7 @@ pub fn remove_from_masks(request: &ShadowRemoveRequest, context: &Context<'_>) -
     })
 }
 
-/// Place of a lamp, `RIGHT,AHEAD,UP` in metres from the ground below the lens.
+/// Parses `RIGHT,AHEAD,UP` in metres from the ground below the lens.
 fn parse_lamp(text: &str) -> Result<Lamp, String> {
     let numbers: Vec<f64> = text.split(',').filter_map(|part| part.trim().parse().ok()).collect();
     let [right_m, ahead_m, up_m] = numbers[..] else {
@@ -333,7 +318,7 @@ impl ShadowRemoveRequest {
         }
     }
 
-    /// Neither of the two new folders may contain the other, because each appears when it is complete.
+    /// Neither new folder may contain the other, because each appears when it is complete.
     fn check_folders(&self) -> Result<()> {
         let Some(stages) = &self.stages else { return Ok(()) };
         if stages.starts_with(&self.out) || self.out.starts_with(stages) {
@@ -362,7 +347,7 @@ impl LightSource {
         }
     }
 
-    /// The light of a mask, and the sun's place and time where it is the sun.
+    /// Light for a mask, with the moment if the light is the sun.
     fn at(&self, number: usize) -> Result<(Light, Option<Moment>)> {
         Ok(match *self {
             Self::Sun { moment, rate_hz } => {
@@ -382,7 +367,6 @@ fn camera(path: &Path) -> Result<CameraFile> {
     CameraFile::parse(&text).about(|| path.display().to_string())
 }
 
-/// State carried from frame to frame.
 struct Work<'a> {
     light: LightSource,
     method: Method,
@@ -399,7 +383,7 @@ impl Work<'_> {
         let chosen = chooser.choose(mask.view());
         let mut flags: Vec<String> = chosen.flags.iter().map(Flag::to_string).collect();
         let several = chosen.flags.iter().any(|flag| matches!(flag, Flag::SeveralPeople { .. }));
-        // With several people in it, what is cut for one would be cut off the others.
+        // With several people, a cut for one would also cut the others.
         let mask = if several { &chosen.mask } else { mask };
         let (light, moment) = self.light.at(number)?;
         let start = Instant::now();
@@ -410,13 +394,14 @@ impl Work<'_> {
                     flags.push(Flag::Empty.to_string());
                 }
                 if let Some(stages) = &mut self.stages {
-                    stages.nobody(&file, mask)?;
+                    stages.without_person(&file, mask)?;
                 }
                 return Ok((mask.clone(), Entry { file, flags, cut: None }));
             }
             Err(error) => return Err(error.into()),
         };
-        // How sure the angle is follows from the sun's time and place; of a lamp and of a measurement nobody has said it.
+        // The angle's uncertainty follows from the sun's time and place. It is unknown for lamps and
+        // measurements.
         let sure = match moment {
             Some(Moment { place, time }) => Some(propagate(self.camera, time, place, Model::Psa, subject)?),
             None => None,
@@ -448,9 +433,8 @@ impl Work<'_> {
     }
 }
 
-/// Doubts about a cut.
 fn doubts(cut: &CutReport, light: Light) -> Vec<&'static str> {
-    /// Below this the shadow is so long that its direction in the picture hangs on small errors.
+    /// Below this, small errors change the long shadow's direction too much.
     const LOW_DEG: f64 = 8.0;
     let found = [
         (cut.shadow.eta_rad.sin() < -SIDEWAYS, "shadow-behind"),

@@ -1,6 +1,6 @@
-//! How much shadow was taken off masks, and how much of the subject with it, against a ground truth.
+//! Scores shadow removal against ground truth: shadow removed, and person lost.
 //!
-//! Truth pictures are grey: 0 background, 50 (or 127) shadow, 255 person, 85 and 170 not judged.
+//! Grey levels of truth pictures: 0 background, 50 (or 127) shadow, 255 person, 85 and 170 ignored.
 
 use std::{
     collections::HashMap,
@@ -57,71 +57,43 @@ impl Request for ShadowScoreRequest {
     }
 }
 
-/// The figures, summed over all frames; without a value where there is nothing to count.
+/// Sums over all frames; `None` if there is nothing to count.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct ScoreFigures {
-    /// Share of the shadow that went.
     pub removed_percent: Option<f64>,
-    /// Share of the person that went with it.
     pub wrongly_removed_percent: Option<f64>,
-    /// Intersection over union of the result and the person.
+    /// Intersection over union of result and person.
     pub iou_percent: Option<f64>,
     pub frames: usize,
-    /// Pixels of shadow in the truth.
+    /// In the truth.
     pub shadow_pixels: u64,
-    /// Pixels of the person in the truth.
     pub subject_pixels: u64,
 }
 
-/// Why pictures cannot be scored.
 #[derive(Debug, thiserror::Error)]
 pub enum ScoreError {
-    /// Two masks for one frame.
     #[error(
         "{} and {} both end in number {number}: which belongs to the truth's frame {number}?", one.display(), other.display()
     )]
-    Ambiguous {
-        /// A mask.
-        one: PathBuf,
-        other: PathBuf,
-        number: u64,
-    },
-    /// No mask for a frame of the truth.
+    Ambiguous { one: PathBuf, other: PathBuf, number: u64 },
     #[error(
         "{}: no mask for {}; masks need its name or a name that ends in its number", masks.display(), truth.display()
     )]
-    NoMask {
-        /// Where masks were looked for.
-        masks: PathBuf,
-        /// The truth's frame.
-        truth: PathBuf,
-    },
-    /// A grey level that means nothing.
+    NoMask { masks: PathBuf, truth: PathBuf },
     #[error(
         "{}: level {level} at column {column}, row {row} has no meaning in a truth; use 0 background, 50 or 127 shadow, \
          255 person, 85 or 170 not judged (and no lossy compression)", path.display()
     )]
-    Level {
-        /// The truth's frame.
-        path: PathBuf,
-        level: u8,
-        /// Its place from the left.
-        column: usize,
-        /// Its place from the top.
-        row: usize,
-    },
+    Level { path: PathBuf, level: u8, column: usize, row: usize },
 }
 
-/// Scores masks against the truth.
-///
-/// # Errors
-/// Where pictures cannot be read, do not belong together or differ in size, or the truth holds a level without a meaning.
+/// Fails if pictures do not match in name or size, or for an undefined level in the truth.
 pub fn score(settings: &ShadowScoreRequest, context: &Context<'_>) -> Result<ScoreFigures> {
     let truths = listed(&settings.truth)?;
     let masks = Partners::new(&settings.masks, truths.len())?;
     let before = settings.before.as_deref().map(|path| Partners::new(path, truths.len())).transpose()?;
     let mut labelled = ShadowScore::default();
-    // The same with shadow told by the masks before, for truths that hold none.
+    // Score with shadow taken from the previous masks, for truths without shadow.
     let mut told = ShadowScore::default();
     for path in &truths {
         context.cancel.check("scoring masks")?;
@@ -150,7 +122,6 @@ pub fn score(settings: &ShadowScoreRequest, context: &Context<'_>) -> Result<Sco
     })
 }
 
-/// Masks to be found by the name of their truth.
 struct Partners {
     path: PathBuf,
     levels: Levels,
@@ -184,7 +155,6 @@ impl Partners {
     }
 }
 
-/// The number that a name ends in.
 fn trailing_number(name: &str) -> Option<u64> {
     let digits = name.bytes().rev().take_while(u8::is_ascii_digit).count();
     name[name.len() - digits..].parse().ok()

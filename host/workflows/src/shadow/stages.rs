@@ -1,5 +1,4 @@
-//! How a shadow was cut off, as a picture per mask: what was seen, along which axis it is read, where the shadow is expected, which body
-//! and shadow explain it, and what went.
+//! Pictures of each cut: silhouette, axis, expected shadow, explanation by body and shadow, and result.
 
 use std::{io::Cursor, path::Path};
 
@@ -19,7 +18,7 @@ const SEEN: Rgb<u8> = Rgb([120, 120, 120]);
 const KEPT: Rgb<u8> = Rgb([235, 235, 235]);
 const GONE: Rgb<u8> = Rgb([200, 60, 60]);
 const THROWN: Rgb<u8> = Rgb([230, 150, 40]);
-/// Shadow that is expected where nothing was seen.
+/// Expected shadow without observed pixels.
 const UNSEEN: Rgb<u8> = Rgb([95, 62, 20]);
 const LOWER_EDGE: Rgb<u8> = Rgb([255, 170, 0]);
 const EDGE: Rgb<u8> = Rgb([90, 170, 255]);
@@ -27,13 +26,11 @@ const BOUND: Rgb<u8> = Rgb([140, 200, 140]);
 
 const TEXT_PX: f32 = 15.0;
 const GAP_PX: u32 = 8;
-/// A stage is enlarged by whole numbers until it is this high; its caption wants some width.
+/// Stages are enlarged by whole numbers to at least this height, for the caption.
 const LEAST_HEIGHT_PX: usize = 240;
 const LEAST_WIDTH_PX: u32 = 210;
-/// Margin around silhouette and expected shadow, px.
 const MARGIN_PX: usize = 12;
 
-/// A mask and the data of its cut.
 #[derive(Clone, Copy)]
 pub(super) struct Stage<'a> {
     pub mask: &'a Mask,
@@ -42,11 +39,11 @@ pub(super) struct Stage<'a> {
     pub light: Light,
     pub method: Method,
     pub report: &'a CutReport,
-    /// SD of the angle; `None` if unknown.
+    /// Standard deviation of the angle; `None` if unknown.
     pub sure: Option<&'a Uncertainty>,
 }
 
-/// Pictures under way; dropped before the end they leave nothing behind.
+/// Removed when dropped before [`Self::finish`].
 pub(super) struct Stages {
     out: Staging,
     writer: Writer,
@@ -57,19 +54,16 @@ impl Stages {
         Ok(Self { out: Staging::new_folder(folder)?, writer: Writer::new(TEXT_PX)? })
     }
 
-    /// Puts the folder in place.
     pub fn finish(self) -> Result<()> {
         Ok(self.out.finish()?)
     }
 
-    /// A mask without a person.
-    pub fn nobody(&mut self, file: &str, mask: &Mask) -> Result<()> {
+    pub fn without_person(&mut self, file: &str, mask: &Mask) -> Result<()> {
         let frame = Frame::of([0, 0, mask.nrows(), mask.ncols()]);
         let panel = frame.panel(|y, x| if mask[[y, x]] { SEEN } else { DARK });
         self.write(file, &[(vec!["mask: no person".into()], panel)])
     }
 
-    /// All stages of one cut, side by side.
     pub fn draw(&mut self, file: &str, stage: Stage<'_>) -> Result<()> {
         let explained = match stage.method {
             Method::Thesis => None,
@@ -91,14 +85,14 @@ impl Stages {
         ));
         if let Some(found) = explained {
             let caption = format!("{:.1} % unexplained", 100.0 * found.unexplained);
-            let told = |y, x| match (stage.mask[[y, x]], found.body[[y, x]], found.thrown[[y, x]]) {
+            let colour = |y, x| match (stage.mask[[y, x]], found.body[[y, x]], found.thrown[[y, x]]) {
                 (_, true, _) => KEPT,
                 (true, _, true) => THROWN,
                 (true, ..) => GONE,
                 (.., true) => UNSEEN,
                 _ => DARK,
             };
-            panels.push((vec!["body and its shadow".into(), caption], frame.panel(told)));
+            panels.push((vec!["body and its shadow".into(), caption], frame.panel(colour)));
         }
         let cut = |y, x| match (stage.mask[[y, x]], stage.clean[[y, x]]) {
             (_, true) => KEPT,
@@ -110,7 +104,6 @@ impl Stages {
         self.write(file, &panels)
     }
 
-    /// Panels in one row, each below its caption.
     fn write(&mut self, file: &str, panels: &[(Vec<String>, RgbImage)]) -> Result<()> {
         let line = self.writer.height();
         let lines = panels.iter().map(|(caption, _)| caption.len()).max().unwrap_or(0) as u32;
@@ -138,7 +131,8 @@ impl Stage<'_> {
         if self.mask[[y, x]] { SEEN } else { DARK }
     }
 
-    /// The angle's standard deviation, where first order says it. `beta = 3 pi / 4 - eta / 2` (8.20): eta's is twice beta's.
+    /// Standard deviation by first-order propagation: `beta = 3 pi / 4 - eta / 2` (8.20), so eta's is twice
+    /// beta's.
     fn eta_sd_rad(self) -> Option<f64> {
         self.sure.filter(|sure| sure.first_order_holds).map(|sure| 2.0 * sure.beta_rad)
     }
@@ -152,14 +146,14 @@ fn how_sure(stage: Stage<'_>) -> String {
     }
 }
 
-/// The lower edge of the turned silhouette, and the straight edge that was cut along.
+/// The lower edge of the rotated silhouette, and the straight edge used for the cut.
 fn axis(stage: Stage<'_>, frame: &Frame) -> RgbImage {
     let mut panel = frame.panel(|y, x| stage.seen(y, x));
     let report = stage.report;
     let width = stage.mask.ncols() as f64;
     let mirrored = report.shadow.mirrored;
     let (sin, cos) = report.beta_rad.sin_cos();
-    // From the turned picture back: the inverse of eq. 8.38.
+    // Inverse of eq. 8.38: back from the rotated picture.
     let back = |x: f64, y: f64| {
         let at = [x * cos + y * sin, y * cos - x * sin];
         if mirrored { [width - 1.0 - at[0], at[1]] } else { at }
@@ -178,7 +172,7 @@ fn axis(stage: Stage<'_>, frame: &Frame) -> RgbImage {
     panel
 }
 
-/// From the feet to where the head's shadow falls, and one standard deviation to either side.
+/// From the feet to the expected shadow of the head, with one standard deviation to either side.
 fn expected(stage: Stage<'_>, frame: &Frame) -> RgbImage {
     let mut panel = frame.panel(|y, x| stage.seen(y, x));
     let shadow = stage.report.shadow;
@@ -197,7 +191,6 @@ fn expected(stage: Stage<'_>, frame: &Frame) -> RgbImage {
     panel
 }
 
-/// The part of the masks that is shown, and how large.
 struct Frame {
     top: usize,
     left: usize,
@@ -207,12 +200,11 @@ struct Frame {
 }
 
 impl Frame {
-    /// Silhouette and expected shadow with a margin, inside of the mask.
     fn about(stage: Stage<'_>) -> Self {
         let (rows, columns) = stage.mask.dim();
         let mut spans = [0, 0, rows, columns];
         if let Some(bounds) = BoundingBox::of(stage.mask.view()) {
-            // A tip far outside of the picture ends at the picture's edge.
+            // A tip outside the picture is moved to its edge.
             let inside = |at: f64, most: usize| at.clamp(0.0, most as f64) as usize;
             let [x, y] = stage.report.shadow.tip_px;
             let (x, y) = (inside(x, columns), inside(y, rows));
@@ -250,12 +242,12 @@ impl Frame {
         }
     }
 
-    /// A line between two places of the mask, two pixels of the panel wide.
+    /// A line between two positions in the mask, two panel pixels wide.
     fn line(&self, panel: &mut RgbImage, ends: [[f64; 2]; 2], colour: Rgb<u8>) {
         let times = self.times as f64;
         let [[x0, y0], [x1, y1]] =
             ends.map(|[x, y]| [(x + 0.5 - self.left as f64) * times, (y + 0.5 - self.top as f64) * times]);
-        // A shadow's tip may lie anywhere, not a number included: longer lines than a picture's are not stepped through.
+        // Limit, as a shadow's tip may be arbitrarily far away or NaN.
         const MOST_STEPS: f64 = 1e5;
         let steps = (x1 - x0).abs().max((y1 - y0).abs()).min(MOST_STEPS).ceil().max(1.0);
         for i in 0..=steps as u32 {

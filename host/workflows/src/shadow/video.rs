@@ -1,5 +1,4 @@
-//! From a video of a person in the sun to silhouettes without their shadow, in one go: masks in which the shadow still is, the camera's file,
-//! and the masks without it, in one folder.
+//! Removes the shadow of a person in the sun from a video.
 
 use std::{fs, path::PathBuf};
 
@@ -21,30 +20,25 @@ use crate::{
     },
 };
 
-/// The folder of masks in which the shadow still is.
 pub const WITH: &str = "with-shadow";
-/// The folder of masks without it.
 pub const WITHOUT: &str = "without-shadow";
 
 #[derive(Clone, PartialEq, Debug)]
 pub struct VideoShadowSettings {
     pub video: PathBuf,
-    /// How the camera stands; the size of its pictures is the video's.
+    /// Pose of the camera; the picture's size is taken from the video.
     pub camera: CameraFile,
-    /// Latitude in degrees, north positive.
     pub lat: f64,
-    /// Longitude in degrees, east positive.
     pub lon: f64,
-    /// Time of the video, RFC 3339.
+    /// RFC 3339.
     pub time: String,
     pub out: PathBuf,
 }
 
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct VideoShadowFigures {
-    /// Frames with a usable silhouette.
     pub silhouettes: usize,
-    /// Names of some masks with a person, evenly through the video.
+    /// Names of some masks with a person, spread evenly over the video.
     pub samples: Vec<String>,
     #[serde(flatten)]
     pub removal: RemovalFigures,
@@ -52,10 +46,7 @@ pub struct VideoShadowFigures {
 
 const SAMPLES: usize = 6;
 
-/// Makes both folders of masks.
-///
-/// # Errors
-/// The video, the camera's numbers, a sun too low for shadows, folders that cannot be written. What was complete stays.
+/// Makes both folders of masks. On failure the complete ones remain.
 pub fn remove_from_video(
     settings: &VideoShadowSettings,
     context: &Context<'_>,
@@ -97,7 +88,6 @@ pub fn remove_from_video(
     Ok(VideoShadowFigures { silhouettes: made.silhouettes, samples: samples(&with)?, removal })
 }
 
-/// Names of masks with something in them.
 fn samples(folder: &std::path::Path) -> Result<Vec<String>> {
     let masks = farnear_files::masks::read_all(folder)?.named;
     let seen: Vec<&String> = masks

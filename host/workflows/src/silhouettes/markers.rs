@@ -1,6 +1,6 @@
-//! Silhouettes of a motion-capture recording (markers or joints with names) from views all round.
+//! Silhouettes of motion-capture recordings (named markers or joints) in views from all sides.
 //!
-//! A template says which points make which part of the body; parts are filled and the gaps between them closed.
+//! A template assigns points to body parts. Parts are filled and the gaps between them closed.
 
 mod drawing;
 mod missing;
@@ -177,7 +177,6 @@ impl Request for MarkersRequest {
     }
 }
 
-/// Who does what in a recording.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Performer {
     pub subject: String,
@@ -195,7 +194,7 @@ impl MarkersRequest {
         self.samples.clone().map(|activity| Performer { activity, subject })
     }
 
-    /// A recording from one side has one view, as its camera saw it.
+    /// A recording from one side has a single view.
     fn views(&self, planar: bool) -> Vec<View> {
         if planar {
             return vec![View::default()];
@@ -209,25 +208,19 @@ impl MarkersRequest {
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct MarkersFigures {
     pub views: usize,
-    /// Frames drawn of each.
     pub frames: usize,
-    /// Masks with a person.
     pub silhouettes: usize,
-    /// Frames of which a part could not be drawn.
     pub flagged_frames: usize,
-    /// Frames without a visible point.
     pub empty_frames: usize,
-    /// Points of the recording.
     pub markers: usize,
-    /// Share of all points in all frames that were hidden.
+    /// Over all points and frames.
     pub hidden_markers_percent: f64,
     pub seconds: f64,
-    /// Guesses about the recording.
+    /// Assumptions about the recording.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub warnings: Vec<String>,
 }
 
-/// `silhouettes.toml`: the drawing's options, and one entry per doubtful frame.
 #[derive(Serialize)]
 struct Index<'a> {
     template: &'a str,
@@ -235,9 +228,7 @@ struct Index<'a> {
     mm_per_px: f64,
     elevation_deg: f64,
     view_directions_deg: Vec<f64>,
-    /// Parts of the template of which the recording has no marker at all.
     parts_not_recorded: &'a [String],
-    /// Guesses about the recording.
     #[serde(skip_serializing_if = "<[String]>::is_empty")]
     guessed: &'a [String],
     #[serde(skip_serializing_if = "Vec::is_empty")]
@@ -247,21 +238,17 @@ struct Index<'a> {
 #[derive(Serialize)]
 struct Flagged<'a> {
     frame: &'a str,
-    /// `empty`, or `missing:PART` where all markers of a part were hidden.
+    /// `empty`, or `missing:PART` if all markers of a part were hidden.
     flags: &'a [String],
 }
 
-/// Draws a recording: a folder `view1`, `view2`, ... of masks for every view, one picture per frame, all of a view on one
-/// canvas so that the subject moves in it as in a camera's picture; and `silhouettes.toml`.
-///
-/// # Errors
-/// Files that cannot be read or do not fit the template, a subject larger than a picture may be, masks that cannot be
-/// written; then the new folder is not there.
+/// Draws `view1`, `view2`, ... with a mask per frame, and `silhouettes.toml`. A view's masks share one
+/// canvas, so the subject moves as in a camera's picture. Writes nothing on failure.
 pub fn draw(settings: &MarkersRequest, context: &Context<'_>) -> Result<MarkersFigures> {
     settings.check()?;
     let start = Instant::now();
     let recording = recording(&settings.file, settings.choices())?;
-    // The name alone: records must not depend on the folder.
+    // Store the name only, so that records do not depend on the folder.
     let name = settings.file.file_name().unwrap_or_default().display();
     let template = match &settings.template {
         Some(name) => template(name)?,
@@ -330,12 +317,11 @@ pub fn draw(settings: &MarkersRequest, context: &Context<'_>) -> Result<MarkersF
     })
 }
 
-/// The only view of a recording from one side, described; nothing where it is too large for a picture.
+/// The single view of a recording from one side, described; empty if it is too large for a picture.
 pub(crate) fn one_view(recording: &Recording, template: &Template) -> Vec<Track> {
     /// Coarse enough for any training, fine enough for hands.
     const MM_PER_PX: f64 = 10.0;
     const MARGIN_PX: usize = 2;
-    /// Gaps at joints that are closed.
     const GAP_PX: usize = 4;
     let frames: Vec<HashMap<&str, Point3>> =
         (0..recording.frames.len()).map(|n| recording.by_name(n)).collect();
@@ -350,14 +336,13 @@ pub(crate) fn one_view(recording: &Recording, template: &Template) -> Vec<Track>
     if track.frames() == 0 { Vec::new() } else { vec![track] }
 }
 
-/// Guesses about a recording, and doubts.
 pub(crate) fn remarks(recording: &Recording) -> Vec<String> {
     recording.remarks().into_iter().chain(lying(recording)).collect()
 }
 
-/// A person who is longer than high in most frames lies down, or another axis points up.
+/// Most frames show a person longer than high: lying, or another axis points up.
 fn lying(recording: &Recording) -> Option<String> {
-    /// Arms spread reach as far as a person is high; this is clearly more.
+    /// The span of spread arms equals the body height; this is clearly more.
     const LONGER: f64 = 1.4;
     let extents = recording.frames.iter().filter_map(|frame| {
         let points: Vec<&Point3> = frame.iter().flatten().collect();
@@ -377,14 +362,13 @@ fn lying(recording: &Recording) -> Option<String> {
     })
 }
 
-/// Share of all points in all frames that were hidden, per cent.
+/// Over all points and frames.
 fn hidden_percent(recording: &Recording) -> f64 {
     let all: usize = recording.frames.iter().map(Vec::len).sum();
     let hidden = recording.frames.iter().flatten().filter(|point| point.is_none()).count();
     100.0 * hidden as f64 / all.max(1) as f64
 }
 
-/// A built-in template, else one from a file.
 pub(crate) fn template(name: &str) -> Result<Template> {
     let path = Path::new(name);
     let wrong = |source| SilhouettesError::Template { name: name.into(), source };
@@ -412,7 +396,7 @@ pub(crate) fn recording(path: &Path, choices: Choices) -> Result<Recording> {
     Ok(recording)
 }
 
-/// The JSON files of a folder (OpenPose writes one per frame), in the order of their numbers.
+/// JSON files of a folder (one per frame in OpenPose), in the order of their numbers.
 fn keypoint_files(folder: &Path) -> Result<Vec<PathBuf>> {
     let entries = fs::read_dir(folder).map_err(WorkflowError::read("the recording", folder))?;
     let mut files = Vec::new();
@@ -429,10 +413,7 @@ fn keypoint_files(folder: &Path) -> Result<Vec<PathBuf>> {
     }
 }
 
-/// The built-in template of which the recording has the largest share of markers; of equals the one that uses more of them.
-///
-/// # Errors
-/// [`SilhouettesError::Unfit`] where no template has half of its markers in the recording.
+/// Prefers the largest share of its markers in the recording, then more markers. Fails below one half.
 pub(crate) fn best_template(recording: &Recording, path: &Path) -> Result<Template> {
     let mut ranked: Vec<(f64, usize, Template)> = Template::names()
         .filter_map(|name| Template::named(name).ok())
@@ -451,7 +432,7 @@ pub(crate) fn best_template(recording: &Recording, path: &Path) -> Result<Templa
     Ok(best)
 }
 
-/// Refuses a template with other names than the recording's, and says which built-in one fits best.
+/// Fails if the template's names do not fit the recording, with the best fitting built-in template.
 pub(crate) fn check_fit(template: &Template, recording: &Recording, path: &Path) -> Result<()> {
     template.check(&recording.known_names()).map_err(|source| {
         let best = best_template(recording, path).ok();

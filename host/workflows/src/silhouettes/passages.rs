@@ -1,4 +1,4 @@
-//! A folder of masks cut into passages: one for each passage of a person (KTH's walking, say).
+//! Cuts a folder of masks into passages of a person, for example KTH's walking.
 
 use std::{path::PathBuf, time::Instant};
 
@@ -82,18 +82,13 @@ pub struct PassagesFigures {
     pub masks: usize,
     pub passages: usize,
     pub frames: usize,
-    /// Passages too short to be written.
     pub too_short: usize,
     pub seconds: f64,
 }
 
-/// A mask with its name.
 type NamedMask = (String, Mask);
 
 /// Cuts at gaps in the numbers of the masks' names, and at frames without a person.
-///
-/// # Errors
-/// Masks that cannot be read, no passage of enough frames, a folder that cannot be written.
 pub fn cut(settings: &PassagesRequest, context: &Context<'_>) -> Result<PassagesFigures> {
     at_least("frames of a passage", settings.least_frames, 2, "frames")?;
     let start = Instant::now();
@@ -166,7 +161,6 @@ pub fn cut(settings: &PassagesRequest, context: &Context<'_>) -> Result<Passages
     })
 }
 
-/// The last number in a name.
 fn last_number(name: &str) -> Option<u64> {
     let end = name.rfind(|c: char| c.is_ascii_digit())? + 1;
     let begin = name[..end]

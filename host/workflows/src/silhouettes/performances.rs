@@ -1,4 +1,4 @@
-//! Performances of bodies made of capsules, as masks and as samples to train on.
+//! Performances of capsule bodies, as masks and as training samples.
 
 use std::{
     collections::{BTreeSet, HashMap},
@@ -18,9 +18,7 @@ use serde::{Deserialize, Serialize};
 use super::{MM_PER_PX, SilhouettesError, VIEWS, markers::Performer};
 use crate::{context::Context, counter::Counter, error::Result, figures::rounded, parameters::within};
 
-/// The activity that is cancelled.
 const DURING: &str = "drawing performances";
-/// Pixels kept free round a body.
 const MARGIN_PX: usize = 2;
 
 // No doc comment: it would replace the help of the commands.
@@ -63,14 +61,12 @@ pub struct PerformancesFigures {
     pub performances: usize,
     pub subjects: usize,
     pub activities: usize,
-    /// Views of each performance.
     pub views: usize,
     pub masks: usize,
     pub seconds: f64,
 }
 
-/// Draws all performances from views that begin at `first_view_deg`, a folder each with a folder per view, and lists them in
-/// `samples.toml`.
+/// Draws all performances and lists them in `samples.toml`. The first view is at `first_view_deg`.
 pub(super) fn write(
     performances: &[Performance],
     first_view_deg: f64,
@@ -99,7 +95,7 @@ pub(super) fn write(
         })
         .collect();
     let masks = drawn?.iter().sum();
-    // Where there are more threads than performances, all had begun before the wish to stop.
+    // With more threads than performances, all begin before a cancellation.
     counter.check(DURING)?;
     out.write("samples.toml", samples(performances, &names, views.len()).as_bytes())?;
     out.finish()?;
@@ -116,7 +112,7 @@ pub(super) fn write(
     })
 }
 
-/// Names of folders: subject, activity, and how often it was done by then.
+/// Names of folders: subject, activity, and its repetition.
 fn names(performances: &[Performance]) -> Vec<String> {
     let mut counts: HashMap<(&str, &str), u32> = HashMap::new();
     performances
@@ -129,7 +125,6 @@ fn names(performances: &[Performance]) -> Vec<String> {
         .collect()
 }
 
-/// All frames of a performance from one view.
 fn draw_view(
     performance: &Performance,
     name: &str,
@@ -161,7 +156,6 @@ fn samples(performances: &[Performance], names: &[String], views: usize) -> Stri
     samples
 }
 
-/// One sample of `samples.toml`.
 pub(super) fn samples_entry(masks: &str, performer: &Performer, view: usize, clip: &str) -> String {
     let quoted = |text: &str| toml::Value::String(text.into()).to_string();
     format!(

@@ -1,4 +1,4 @@
-//! Silhouettes of a data set that has body joints only: joints are dressed with capsules and drawn from views all round.
+//! Silhouettes of public joint sets: capsules around the joints, drawn in views from all sides.
 
 use std::{fmt, fs, path::PathBuf, str::FromStr};
 
@@ -60,13 +60,12 @@ impl Request for SkeletonsRequest {
     }
 }
 
-/// A public data set of body joints.
 #[derive(Clone, Copy, Default, PartialEq, Eq, Debug)]
 pub enum SkeletonSet {
-    /// UTKinect-Action3D: 20 joints of a Kinect.
+    /// 20 joints of a Kinect.
     #[default]
     UtKinect,
-    /// Florence 3D Actions: 15 joints.
+    /// 15 joints.
     Florence,
 }
 
@@ -100,7 +99,6 @@ impl SkeletonSet {
     }
 }
 
-/// Draws all performances of a set.
 pub fn draw(settings: &SkeletonsRequest, context: &Context<'_>) -> Result<PerformancesFigures> {
     settings.drawing.check()?;
     let path = &settings.file;

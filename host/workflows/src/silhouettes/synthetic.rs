@@ -12,7 +12,7 @@ use crate::{
     request::{PathKind, Request},
 };
 
-/// Starting obliquely, so that no view looks exactly along the path.
+/// Oblique, so that no view is along the path.
 const FIRST_VIEW_DEG: f64 = 45.0;
 
 /// Silhouettes of seeded synthetic people at the ten activities of Li 2014, table 7.1.
@@ -64,7 +64,6 @@ impl Request for SyntheticRequest {
     }
 }
 
-/// Draws every person at every activity.
 pub fn draw(settings: &SyntheticRequest, context: &Context<'_>) -> Result<PerformancesFigures> {
     settings.check()?;
     let activities: Vec<usize> = match settings.activities.as_slice() {

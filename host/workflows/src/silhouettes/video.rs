@@ -1,7 +1,7 @@
-//! Masks of the person who moves in a video, one picture per frame.
+//! Masks of the person who moves in a video, one per frame.
 //!
-//! A background model learns static pixels; moving regions are cleaned and the person chosen. Memory does not grow with the
-//! video's length but for the index.
+//! A background model learns static pixels; moving regions are cleaned and the person chosen. Memory does not
+//! grow with the video's length, except for the index.
 
 use std::{path::PathBuf, time::Instant};
 
@@ -30,9 +30,8 @@ use crate::{
     request::{PathKind, Request},
 };
 
-/// From one sign of progress to the next, frames.
+/// Interval between progress reports.
 const PROGRESS_FRAMES: usize = 50;
-/// Work that is cancelled.
 const DURING: &str = "making masks";
 
 /// Masks of the person who moves in a video, one PNG per frame (255 = person).
@@ -127,31 +126,27 @@ impl Request for SilhouettesVideoRequest {
     }
 }
 
-/// How many frames were what.
 #[derive(Clone, PartialEq, Debug, Default, Serialize)]
 pub struct VideoFigures {
     pub frames: usize,
     /// Frames with a usable silhouette.
     pub silhouettes: usize,
-    /// Frames that only taught the background.
+    /// Frames used only to learn the background.
     pub learning: usize,
     pub empty: usize,
-    /// Frames with several people.
     pub several_people: usize,
-    /// Frames whose person is cut by the picture's edge.
+    /// Frames with a person cut by the picture's edge.
     pub cut_by_edge: usize,
     /// Frames in which most of the picture changed.
     pub scene_changed: usize,
-    /// Frames with a person who has stopped moving.
+    /// Frames with a person who stopped moving.
     pub stopped_moving: usize,
-    /// Frames whose person is in several pieces.
     pub fragments: usize,
-    /// Times that the light of the whole scene changed suddenly.
+    /// Sudden changes of the whole scene's light.
     pub changes_of_light: usize,
     pub seconds: f64,
-    /// Frames over that time.
     pub frames_per_second: f64,
-    /// What a user should know about how the video was read.
+    /// Notes on how the video was read.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub remarks: Vec<String>,
 }
@@ -184,15 +179,13 @@ struct Index {
 struct Entry {
     file: String,
     flags: Vec<String>,
-    /// First row, first column, one past the last row and column, pixels of the full frame.
+    /// First row, first column, one past the last row and column, in the full frame.
     #[serde(skip_serializing_if = "Option::is_none")]
     top_left_bottom_right: Option<[usize; 4]>,
 }
 
-/// Makes a mask of every frame (255 = person) and `silhouettes.toml`, which flags doubtful frames.
-///
-/// # Errors
-/// Where the video cannot be read, its frames differ, or the masks cannot be written; then the new folder is not there.
+/// Makes a mask of every frame (255 = person) and `silhouettes.toml`, which flags doubtful frames. Writes
+/// nothing on failure.
 pub fn extract(settings: &SilhouettesVideoRequest, context: &Context<'_>) -> Result<VideoFigures> {
     let out = Staging::new_folder(&settings.out)?;
     let labels = settings.labels.as_deref().map(Staging::new_folder).transpose()?;
@@ -235,7 +228,7 @@ pub fn extract(settings: &SilhouettesVideoRequest, context: &Context<'_>) -> Res
     Ok(figures)
 }
 
-/// Writes a frame's mask and, where asked for, the labels it was made of.
+/// Writes a frame's mask and, if requested, the labels it was made from.
 fn keep(
     name: &str,
     found: &Extracted,
@@ -262,7 +255,7 @@ fn keep(
     })
 }
 
-/// Grey where asked for: the mean of the three channels.
+/// Grey if requested: the mean of the three channels.
 fn prepared(frame: VideoFrame, grey: bool) -> VideoFrame {
     match frame.pixels {
         Pixels::Rgb(rgb) if grey => {
@@ -276,7 +269,6 @@ fn prepared(frame: VideoFrame, grey: bool) -> VideoFrame {
     }
 }
 
-/// Extraction and, where chosen, a shadow detector.
 struct Work {
     extractor: Extractor,
     detector: Option<Detector>,
@@ -301,7 +293,6 @@ impl Work {
         Ok(Self { extractor: Extractor::like(frame, settings)?, detector })
     }
 
-    /// The frame's extraction and the mask to write.
     fn mask(&mut self, frame: &VideoFrame) -> Result<(Extracted, Mask)> {
         let found = self.extractor.extract(frame_of(&frame.pixels))?;
         let mut mask = found.subject.mask.clone();

@@ -1,24 +1,24 @@
-//! The target's page: cells as an image of one bit each, a line of 100 mm, marks that lead to the middle.
+//! Page of the target: cells as a 1-bit image, a 100 mm line, centre marks.
 
 use pdf_writer::{Content, Finish, Name, Pdf, Rect, Ref, Str};
 
 use super::{MARGIN_MM, Paper, Texture};
 
-/// Points of a millimetre.
+/// Per millimetre.
 const POINTS: f64 = 72.0 / 25.4;
-/// Length of the line that tells whether the page was printed true to scale.
+/// Line to check the printed scale.
 const RULER_MM: f64 = 100.0;
-/// Length of the marks next to the texture's middles.
+/// Marks at the middle of the texture's sides.
 const MARK_MM: f64 = 5.0;
 
-/// The page as a PDF file.
+/// Draws a PDF file.
 pub(super) fn pdf(texture: &Texture, paper: Paper, cell_mm: f64, label: &str) -> Vec<u8> {
     let [catalog, tree, page, image, font, content] = [1, 2, 3, 4, 5, 6].map(Ref::new);
     let (picture, letters) = (Name(b"Cells"), Name(b"Letters"));
     let mut pdf = Pdf::new();
     let mut root = pdf.catalog(catalog);
     root.pages(tree);
-    // Viewers print it at its actual size unless they are told otherwise.
+    // Request printing at actual size.
     root.viewer_preferences().pair(Name(b"PrintScaling"), Name(b"None"));
     root.finish();
     pdf.pages(tree).kids([page]).count(1);
@@ -40,7 +40,6 @@ pub(super) fn pdf(texture: &Texture, paper: Paper, cell_mm: f64, label: &str) ->
     pdf.finish()
 }
 
-/// Layout of the page.
 fn drawing(
     texture: &Texture,
     paper: Paper,
@@ -60,7 +59,7 @@ fn drawing(
     let mut line = |from: [f64; 2], to: [f64; 2]| {
         content.move_to(points(from[0]), points(from[1])).line_to(points(to[0]), points(to[1])).stroke();
     };
-    // The cross stands on a whole cell, so its middle is not quite the page's.
+    // The cross is on a whole cell, so slightly off the page's centre.
     let middle = left + ((texture.columns / 2) as f64 + 0.5) * cell_mm;
     let level = top - ((texture.rows / 2) as f64 + 0.5) * cell_mm;
     for (x, away) in [(left - 1.0, -MARK_MM), (left + width + 1.0, MARK_MM)] {
@@ -84,7 +83,7 @@ fn drawing(
     content.finish().into_vec()
 }
 
-/// Rows of bits, whole bytes each; white is 1.
+/// Packs rows of bits into whole bytes; white is 1.
 fn packed(texture: &Texture) -> Vec<u8> {
     let row = |cells: &[bool]| -> Vec<u8> {
         let byte = |eight: &[bool]| {

@@ -1,4 +1,4 @@
-//! Lists that a user writes by hand, with words damaged: read or refused, in little time and memory, and what is read is used.
+//! Manual lists with damaged words are accepted or rejected in limited time and memory.
 
 use std::{cell::RefCell, fs, path::Path};
 
@@ -55,7 +55,7 @@ const JOBS_CSV: &str = "do,masks,camera,lamp,out\nshadow-remove,a,camera.toml,\"
 
 const CAMERA: &str = "[camera]\nheight_m = 1.2\nazimuth_deg = 140.0\nfocal_length_mm = 4.0\npixel_um = 120.0\nwidth_px = 32\nheight_px = 32\n";
 
-/// Two folders of small masks, a person and half of one, and the camera that saw them.
+/// Two folders of small masks (a person and half of one), and their camera.
 fn folder() -> tempfile::TempDir {
     let root = tempfile::tempdir().expect("a folder");
     fs::write(root.path().join("camera.toml"), CAMERA).expect("a file");
@@ -67,7 +67,7 @@ fn folder() -> tempfile::TempDir {
     root
 }
 
-/// Runs the jobs of a list and gives how many were told of.
+/// Runs a list's jobs and returns the number of reports.
 fn done(list: &Path) -> usize {
     let settings = BatchSettings {
         manifest: list.into(),
@@ -79,13 +79,13 @@ fn done(list: &Path) -> usize {
         dry_run: false,
         allow_failures: false,
     };
-    let told = std::sync::atomic::AtomicUsize::new(0);
+    let warnings = std::sync::atomic::AtomicUsize::new(0);
     let on_job = |_: &JobReport| {
-        told.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
+        warnings.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
         Ok(())
     };
     let _ = batch::run(&settings, &Context::unattended(), &on_job);
-    told.into_inner()
+    warnings.into_inner()
 }
 
 fn config(usual: u32) -> ProptestConfig {
@@ -127,12 +127,12 @@ proptest! {
     ) {
         for (name, text) in [("jobs.toml", JOBS), ("jobs.csv", JOBS_CSV)] {
             let text = damaged(text, &words, lost);
-            let told = FOLDER.with_borrow(|root| {
+            let warnings = FOLDER.with_borrow(|root| {
                 let list = root.path().join(name);
                 fs::write(&list, &text).expect("a file");
                 done(&list)
             });
-            prop_assert!(told <= text.lines().count(), "{told} of\n{text}");
+            prop_assert!(warnings <= text.lines().count(), "{warnings} of\n{text}");
         }
     }
 }

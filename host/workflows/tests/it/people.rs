@@ -1,4 +1,4 @@
-//! Work on people without a face: what is heard of it, and that nothing half-made stays where it is cancelled.
+//! Progress of people workflows, and no partial results after cancelling.
 
 use std::{
     fs,
@@ -23,7 +23,7 @@ use farnear_workflows::{
     },
 };
 
-/// Keeps what it hears, and may cancel at the first count of a unit.
+/// Records progress, and may cancel at the first count of a unit.
 #[derive(Default)]
 struct Listener {
     cancel: Cancel,
@@ -142,15 +142,15 @@ fn training_and_evaluation_are_counted_and_stop_in_the_middle() {
     assert_eq!((figures.subjects, figures.clips, figures.answers), (3, 6, 6));
     assert!(whole.heard().contains(&"3/Some(3) folds".into()), "{:?}", whole.heard());
 
-    // A search is long: what is left is told from the first space on, and nothing is left at the end.
+    // A search reports the remaining time from the first space to the end.
     let searched =
         EvaluationSettings { method: Method { search: true, ..evaluation.method }, out: None, ..evaluation };
     let watched = Listener::default();
     evaluation::evaluate(&searched, &watched.context()).expect("evaluated");
     let heard = watched.heard();
-    let told = heard.iter().position(|what| what.starts_with("left ")).expect("time left");
-    assert_eq!(heard[told + 1], "0/Some(3) folds", "{heard:?}");
-    assert!(heard[told] != "left 0.000", "{heard:?}");
+    let first = heard.iter().position(|what| what.starts_with("left ")).expect("time left");
+    assert_eq!(heard[first + 1], "0/Some(3) folds", "{heard:?}");
+    assert!(heard[first] != "left 0.000", "{heard:?}");
     let last = heard.iter().rposition(|what| what.starts_with("left ")).expect("time left");
     assert_eq!(heard[last..last + 2], ["left 0.000", "3/Some(3) folds"], "{heard:?}");
 }

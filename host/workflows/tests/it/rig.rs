@@ -1,4 +1,4 @@
-//! Rig workflows with a scripted board behind a port.
+//! Rig workflows with a scripted board on a port.
 
 mod cancelling;
 mod checklist;
@@ -17,10 +17,10 @@ use farnear_workflows::{
     },
 };
 
-/// A face that keeps what it is told, and answers nothing but Enter.
+/// Records messages and confirms every question.
 #[derive(Default)]
 struct Face {
-    said: Mutex<Vec<String>>,
+    messages: Mutex<Vec<String>>,
 }
 
 impl Face {
@@ -29,13 +29,13 @@ impl Face {
     }
 
     fn heard(&self, phrase: &str) -> bool {
-        self.said.lock().unwrap().iter().any(|said| said.contains(phrase))
+        self.messages.lock().unwrap().iter().any(|messages| messages.contains(phrase))
     }
 }
 
 impl Progress for Face {
     fn info(&self, what: &str) {
-        self.said.lock().unwrap().push(what.into());
+        self.messages.lock().unwrap().push(what.into());
     }
 }
 
@@ -46,7 +46,7 @@ impl Questions for Face {
     }
 }
 
-/// A camera that watches a folder, in which nothing appears unless a test puts it there.
+/// A camera that watches a folder, which is empty unless a test adds images.
 fn camera(folder: &Path) -> CameraSettings {
     CameraSettings {
         address: CameraAddress::Folder(folder.into()),
@@ -57,12 +57,11 @@ fn camera(folder: &Path) -> CameraSettings {
     }
 }
 
-/// The optics of the rig in docs/, which the scripted board can reach.
+/// The optics of the rig in docs/, within the scripted board's reach.
 fn optics() -> std::path::PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/rig.toml")
 }
 
-/// A focus stack of three images.
 fn stack() -> SequenceRequest {
     SequenceRequest {
         axis: Some(AxisName::Fine),

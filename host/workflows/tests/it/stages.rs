@@ -1,4 +1,4 @@
-//! Pictures of how a shadow was cut off.
+//! Pictures of shadow removal.
 
 use std::{fs, path::Path};
 
@@ -18,7 +18,7 @@ fn save(path: &Path, mask: &Mask) {
     GrayImage::from_fn(640, 480, level).save(path).expect("a picture");
 }
 
-/// A person 60 px wide, whose shadow lies to the right as a lamp to the left throws it.
+/// A person 60 px wide with a shadow to the right, cast by a lamp to the left.
 fn person(y: usize, x: usize) -> bool {
     (180..360).contains(&y) && (290..350).contains(&x)
 }
@@ -54,7 +54,7 @@ fn every_mask_has_a_picture_of_its_stages() {
     let (explained, nobody) = (read("stages/a1.png"), read("stages/a2.png"));
     let red = |[r, g, b]: [u8; 3]| r > 150 && g < 90 && b < 90;
     let blue = |[r, g, b]: [u8; 3]| b > 200 && r < 120 && g < 200;
-    // What went is red: in the picture of the cut as many pixels as the mask lost.
+    // Removed pixels are red: as many in the picture as in the mask.
     let lost = |out: &str| {
         let [before, after] = [read("masks/a1.png"), read(out)].map(|p| count(&p, |[r, ..]| r > 127));
         before - after
@@ -67,12 +67,12 @@ fn every_mask_has_a_picture_of_its_stages() {
         lost("out/a1.png")
     );
     assert!(count(&explained, blue) > 100, "the edge is drawn");
-    // Nobody is one panel, somebody five: mask, edge, direction, explanation, cut.
+    // An empty mask gives one panel, a person five: mask, edge, direction, explanation, cut.
     assert_eq!((count(&nobody, red), count(&nobody, blue)), (0, 0));
     let panels_of = |picture: &RgbImage| picture.width() / 210;
     assert!(panels_of(&explained) >= 5 && nobody.width() < 700, "{} {}", explained.width(), nobody.width());
 
-    // The printed method has no explanation: a panel less, of the same mask.
+    // The published method has no explanation: one panel less for the same mask.
     let printed = ShadowRemoveRequest {
         method: Method::Thesis,
         out: root.path().join("printed"),

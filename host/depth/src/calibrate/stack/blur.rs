@@ -1,8 +1,6 @@
-//! Blur over distance on both sides of focus, from spectra relative to the sharpest slice.
-//!
-//! With a Gaussian of variance s^2 the cross-spectrum falls as `exp(-w^2 (s^2 - s0^2) / 2)`; the slope of its logarithm over
-//! `w^2` is a variance for every profile at low frequencies, where every OTF is a parabola. A pill-box of radius R has
-//! `s = R / 2`.
+//! Blur over distance on both sides of focus, from spectra relative to the sharpest slice. With a Gaussian of variance
+//! s^2 the cross-spectrum falls as `exp(-w^2 (s^2 - s0^2) / 2)`. The slope of its logarithm over `w^2` is a variance
+//! for every profile at low frequencies, where every OTF is a parabola. A pill-box of radius R has `s = R / 2`.
 
 use serde::{Deserialize, Serialize};
 
@@ -20,7 +18,7 @@ const BAND: [f64; 2] = [0.15, 1.2];
 pub struct BlurPoint {
     /// Slices from the focus, negative before it in the stack.
     pub slices: f64,
-    /// Radius of the pill-box of the same variance beyond the sharpest slice's, px.
+    /// Radius, px, of the pill-box of the variance beyond the sharpest slice's.
     pub radius_px: f64,
 }
 
@@ -71,7 +69,7 @@ impl BlurCurve {
             let sums = points
                 .iter()
                 .filter(|p| (p.slices < 0.0) == before && p.radius_px.is_finite() && p.radius_px < 5.0)
-                // R^2 = g^2 z^2 + what the reference itself lacks of focus, which is small.
+                // R^2 = g^2 z^2 + the reference's own defocus, which is small.
                 .fold([0.0; 2], |[a, b], p| {
                     let z = p.slices * p.slices;
                     [a + z * p.radius_px * p.radius_px, b + z * z]
@@ -108,7 +106,7 @@ fn variance(sharp: &Array2<f32>, image: &Array2<f32>) -> Option<f64> {
         let cross = (value * b[(y, x)].conj()).re;
         *ring = [ring[0] + cross, ring[1] + value.norm_sqr(), ring[2] + w * w, ring[3] + 1.0];
     }
-    // Weighted line of ln(ratio) over w^2; ratios near 0 say little.
+    // Weighted line of ln(ratio) over w^2; ratios near 0 carry little information.
     let [mut n, mut sx, mut sy, mut sxx, mut sxy] = [0.0; 5];
     for [cross, power, w2, count] in rings.into_iter().filter(|r| r[3] > 0.0) {
         let ratio = cross / power;

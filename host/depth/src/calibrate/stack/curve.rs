@@ -1,14 +1,13 @@
-//! The response from measured to true normalised depth: a polynomial whose slope stays near that of a straight line.
-//!
-//! A stack knows few depths when its pairs are close together. A free polynomial would draw every measured depth towards these, which
-//! is right for the target and wrong for every other scene.
+//! The response from measured to true normalised depth: a polynomial whose slope stays near a straight line's. A stack
+//! has few depths when its pairs are close together. A free polynomial would pull every measured depth towards these,
+//! which is wrong for other scenes.
 
 use nalgebra::{DMatrix, DVector};
 
 use super::response::Sample;
 use crate::optics::{RESPONSE_POINTS, interpolated};
 
-/// How far beyond the learned depths the response goes, in normalised depth.
+/// Extent of the response beyond the learned depths, in normalised depth.
 const BEYOND: f64 = 0.05;
 /// Part of the samples at either end that may be outliers.
 const OUTLIERS: f64 = 0.002;
@@ -16,10 +15,9 @@ const OUTLIERS: f64 = 0.002;
 const LARGEST: f64 = 1.19;
 /// Slopes relative to the straight line's.
 const SLOPES: [f64; 2] = [1.0 / 3.0, 3.0];
-/// Parts in which the polynomial is mixed with the line.
+/// Steps of the mixture of polynomial and line.
 const MIXTURES: usize = 50;
 
-/// A rising curve.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Curve {
     /// Least and largest measured depth.
@@ -85,7 +83,7 @@ fn polynomial<'a>(samples: impl Iterator<Item = &'a Sample> + Clone, degree: usi
                 }
             }
         }
-        // What few depths leave open stays straight.
+        // Keeps what few depths leave undetermined straight.
         for i in 0..n {
             normal[(i, i)] += if i > 1 { 1e-4 } else { 1e-9 } * sizes.len() as f64;
         }
@@ -124,7 +122,7 @@ mod tests {
         assert_eq!(Curve::fit(falling.iter(), 3), None);
     }
 
-    /// Two depths with noise: the best polynomial for these is flat at either, and no other scene could be measured with it.
+    /// Two depths with noise: their best polynomial is flat at either and useless for other scenes.
     #[test]
     fn two_known_depths_make_no_plateaus() {
         let learned: Vec<Sample> = (0..2000)

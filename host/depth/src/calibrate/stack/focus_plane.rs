@@ -1,4 +1,4 @@
-//! Depth from focus of a flat target: per block the slice of most detail, and the plane through all blocks.
+//! Depth from focus of a flat target: the slice of most detail per block, and the plane through all blocks.
 
 use nalgebra::{DMatrix, DVector};
 use ndarray::{Array2, s};
@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 /// Side of a block in parts of the shorter side.
 const BLOCKS: usize = 24;
-/// Least ratio of a block's largest energy to its least one for a peak.
+/// Least ratio of a block's largest to its least energy for a peak.
 const PEAK: f64 = 1.3;
 
 /// The slice in focus, from 0, at column x and row y: `x_per_px x + y_per_px y + at_origin`.
@@ -30,17 +30,14 @@ impl FocusPlane {
         self.x_per_px * x + self.y_per_px * y + self.at_origin
     }
 
-    /// The same for images of which `bin` x `bin` pixels were made one.
+    /// The plane for images binned by `bin` x `bin`.
     pub fn binned(&self, bin: usize) -> Self {
         let b = bin as f64;
         let at_origin = self.at((b - 1.0) / 2.0, (b - 1.0) / 2.0);
         Self { x_per_px: self.x_per_px * b, y_per_px: self.y_per_px * b, at_origin, ..*self }
     }
 
-    /// Finds the plane.
-    ///
-    /// # Errors
-    /// In words, where too few blocks have a peak inside the stack.
+    /// Finds the plane. Returns a message if too few blocks have a peak inside the stack.
     pub fn of(slices: &[Array2<f32>]) -> Result<Self, String> {
         let (height, width) = slices[0].dim();
         let side = (height.min(width) / BLOCKS).clamp(12, 64);
@@ -64,7 +61,7 @@ impl FocusPlane {
     }
 }
 
-/// Place of the maximum by a parabola through the logarithms around it; `None` at the ends of the stack.
+/// Maximum of a parabola through the logarithms around it; `None` at the ends of the stack.
 fn peak(curve: &[f64]) -> Option<f64> {
     let floor = curve.iter().copied().fold(f64::INFINITY, f64::min);
     let (top, most) = curve.iter().copied().enumerate().max_by(|a, b| a.1.total_cmp(&b.1))?;
@@ -123,7 +120,7 @@ pub(super) fn middle(image: &Array2<f32>) -> Array2<f32> {
     image.slice(s![top..top + side, left..left + side]).to_owned()
 }
 
-/// Mean square of the Laplacian of the image, blurred by a binomial of five taps, over blocks.
+/// Mean square over blocks of the Laplacian, after a binomial blur of five taps.
 fn laplacian_energy(image: &Array2<f32>, side: usize) -> Array2<f64> {
     let (height, width) = image.dim();
     let taps = [1.0_f32, 4.0, 6.0, 4.0, 1.0].map(|tap| tap / 16.0);

@@ -1,8 +1,7 @@
-//! Which PSF, blur and response fit the target, learned on a part of it and judged on the rest.
-//!
-//! Choices are made on a checkerboard of blocks. The error is stated more strictly: a part is a half of the field in every other
-//! pair, judged by the response of the other half in the other pairs, at other places and other distances; and the target is judged
-//! a second time with its texture made coarser, which no choice may depend on.
+//! Which PSF, blur and response fit the target, learned on one part of it and tested on the rest. A checkerboard of
+//! blocks decides the choices. The stated error is stricter: half of the field in every other pair is tested with the
+//! response of the other half in the other pairs, at other places and distances. The target is tested again with
+//! coarser texture, on which no choice may depend.
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -21,37 +20,36 @@ use crate::prepare::{PrepareSettings, Prepared, prepare_owned};
 use crate::psf::Psf;
 use crate::validity::model_error;
 
-/// Side of a block of the checkerboard, px: larger than what windows see.
+/// Side of a checkerboard block, px: larger than the windows' reach.
 const BLOCK_PX: usize = 48;
-/// Border that takes no part, px.
+/// Ignored border, px.
 const BORDER_PX: usize = 12;
 /// One of this many pixels is used, along both axes.
 const THIN: usize = 5;
 /// True normalised depths that are learned; a little beyond the range.
 const LEARNED: f64 = 1.12;
-/// Measured normalised depths that the operators still tell apart.
+/// Measured normalised depths that the operators still distinguish.
 const MEASURED: f64 = 1.17;
 /// Standard deviation of normalised depth by noise beyond which a pixel has no depth.
 const TOO_NOISY: f64 = 0.12;
-/// Degrees of the polynomial.
 const DEGREES: [usize; 3] = [1, 3, 5];
 /// Blur radii relative to the measured one.
 const FACTORS: [f64; 5] = [0.7, 0.85, 1.0, 1.2, 1.4];
-/// Price of a blur that differs from the measured one, per square of the logarithm of their ratio.
+/// Penalty of a blur that differs from the measured one, per squared logarithm of their ratio.
 const UNLIKELY: f64 = 0.5;
 /// Least blur radii that are tried with the best PSF, px.
 const FLOORS_PX: [f64; 2] = [0.5, 0.9];
 /// Differences between windows that are tried with the best lens.
 const TOLERANCES: [f64; 2] = [0.02, 0.05];
-/// Gain for which a lens with one more number is taken.
+/// Improvement that justifies a lens with one more parameter.
 const WORTH: f64 = 0.97;
 /// Fewest pairs of which some are held out.
 const PAIRS_TO_SPLIT: usize = 4;
-/// What smoothing leaves of the noise's variance: sum of the squared taps.
+/// Part of the noise's variance that smoothing leaves: sum of the squared taps.
 const SMOOTHED_NOISE: f64 = 0.0748;
-/// What is unexplained, relative to the variance of the model's error, from which it tells of that error.
+/// Least unexplained part, relative to the variance of the model's error, that is evidence of that error.
 const TELLING: f64 = 0.25;
-/// Least part of the errors within three standard deviations and largest root mean square of error over standard deviation, of the
+/// Least part of the errors within three standard deviations and largest RMS of error over standard deviation, of the
 /// target and of the target with coarser texture.
 const HONEST: [[f64; 2]; 2] = [[0.985, 1.0], [0.975, 1.15]];
 
@@ -77,22 +75,22 @@ pub(super) struct Sample {
     pub truth: f64,
     /// Standard deviation of `measured` by noise.
     noise: f64,
-    /// Mean square of what the model leaves, relative to the noise.
+    /// Mean square residual relative to the noise.
     misfit: f32,
     /// Colour of its block on a checkerboard.
     even: bool,
     /// Half of the field, and every other pair.
     part: [bool; 2],
-    /// Of the original target, not with coarser texture.
+    /// Original target, not smoothed.
     original: bool,
 }
 
-/// How samples are split into those that are learned from and those that are judged.
+/// How samples are split for learning and testing.
 #[derive(Clone, Copy, PartialEq)]
 enum Split {
-    /// A checkerboard over the field: what a choice is made by.
+    /// A checkerboard over the field: for choices.
     Blocks,
-    /// Halves of the field and every other pair: what the error is stated by.
+    /// Halves of the field and every other pair: for the stated error.
     Parts,
 }
 
@@ -104,7 +102,6 @@ impl Sample {
     }
 }
 
-/// A held-out pixel.
 struct Judged {
     error: f64,
     truth: f64,
@@ -119,11 +116,9 @@ struct Samples {
     pairs: usize,
 }
 
-/// A pair of slices that is ready to be measured.
 struct Pair {
     far: usize,
     prepared: Prepared,
-    /// Original, not smoothed.
     original: bool,
 }
 
@@ -179,9 +174,9 @@ pub(super) fn learn(target: &Target<'_>) -> Result<Learned, StackError> {
             let fill = inside * samples.of.len() as f64 / samples.looked_at.max(1) as f64;
             let of =
                 |original: bool| robust(judged.iter().filter(|j| j.original == original).map(|j| j.error));
-            // A lens is right with any texture.
+            // A right lens fits any texture.
             let robust = (of(true) * of(false)).sqrt() * half_mm;
-            // The response makes up for a wrong blur, so that errors hardly tell: the measured blur is preferred.
+            // The response compensates a wrong blur, so errors hardly discriminate: prefer the measured blur.
             let unlikely = 1.0 + UNLIKELY * factor.ln().powi(2);
             let cost = unlikely * robust / fill.clamp(0.05, 1.0).powi(2);
             trials.push(Trial {
@@ -311,8 +306,8 @@ impl Target<'_> {
     }
 }
 
-/// Every sample judged by the response of the other ones. Depths beyond their range are not judged. With the part of
-/// the judged ones that has a depth.
+/// Tests every sample with the response of the others, and returns the part of them that has a depth. Depths beyond the
+/// response's range are not tested.
 fn judge(samples: &Samples, degree: usize, by: Split) -> Option<(Vec<Judged>, f64)> {
     let split = by == Split::Parts && samples.pairs >= PAIRS_TO_SPLIT;
     let part = |s: &Sample| match by {
@@ -358,7 +353,7 @@ impl Curve {
     }
 }
 
-/// The image smoothed by a binomial of five taps: the same target with coarser texture, for blur and smoothing commute.
+/// Binomial blur of five taps: equals a target with coarser texture, because blur and smoothing commute.
 fn smoothed(image: &Array2<f32>) -> Array2<f32> {
     let (height, width) = image.dim();
     let pass = |image: &Array2<f32>, down: isize, right: isize| {
@@ -386,7 +381,7 @@ fn rms(judged: &[Judged]) -> f64 {
     (judged.iter().map(|j| j.error * j.error).sum::<f64>() / judged.len().max(1) as f64).sqrt()
 }
 
-/// The response of all samples, and what the held-out ones say of it.
+/// The response of all samples, and the held-out errors.
 fn finish(samples: &Samples, degree: usize, optics: &Optics, half_mm: f64) -> Option<(Stage, HeldOut)> {
     let (judged, inside) = judge(samples, degree, Split::Parts)?;
     let curve = Curve::fit(samples.of.iter().filter(|s| s.original), degree)?;
@@ -399,7 +394,7 @@ fn finish(samples: &Samples, degree: usize, optics: &Optics, half_mm: f64) -> Op
         let ratio = j.unexplained / usual(residual) as f32;
         j.noise.hypot(f64::from(model_error(residual as f32, ratio)))
     };
-    // Part within three deviations, and root mean square of error over deviation.
+    // Part within three deviations, and RMS of error over deviation.
     let honesty = |original: bool, residual: f64| {
         let relative = judged
             .iter()

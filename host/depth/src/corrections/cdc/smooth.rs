@@ -90,7 +90,7 @@ mod tests {
     }
 
     #[test]
-    fn noise_shrinks_as_theory_says() {
+    fn noise_decreases_as_predicted() {
         // White noise of SD 1 under a Gaussian of SD s keeps 1 / (2 s sqrt(pi)); a pseudo-random sign suffices.
         let mut state = 1_u32;
         let noise = Array2::from_shape_fn((200, 200), |_| {

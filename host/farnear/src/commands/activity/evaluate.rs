@@ -1,4 +1,4 @@
-//! `farnear activity evaluate`: how well the method recognises subjects that it was not trained on, or a model samples.
+//! `farnear activity evaluate`: recognition of subjects outside the training, or by a stored model.
 
 use std::path::PathBuf;
 
@@ -90,10 +90,6 @@ fn same(text: &str) -> Result<(String, String), String> {
     Ok((own.trim().into(), known.trim().into()))
 }
 
-/// Runs the command.
-///
-/// # Errors
-/// See [`evaluation::evaluate`] and [`judging::judge`]; nothing to learn from.
 pub fn run(arguments: Arguments) -> Result<()> {
     if let Some(model) = arguments.model.as_ref().filter(|_| !arguments.leave_one_set_out.is_empty()) {
         let sets = [vec![arguments.samples], arguments.leave_one_set_out].concat();
@@ -115,7 +111,7 @@ pub fn run(arguments: Arguments) -> Result<()> {
         return printed(&figures, &figures.confusion, arguments.json);
     }
     if arguments.open_set {
-        // One setting for all rounds: with a search in each there would be dozens.
+        // One setting for all rounds: a search in each would run dozens of times.
         let method = Method { search: false, ..arguments.method.method() };
         let context = terminal::counting(arguments.json)?;
         return report::print(&evaluation::open_set(&arguments.samples, &method, &context)?, arguments.json);
@@ -145,7 +141,7 @@ pub fn run(arguments: Arguments) -> Result<()> {
     printed(&figures, &figures.confusion, arguments.json)
 }
 
-/// Prints figures, and the confusion as a table where they are for people.
+/// Prints figures; for people the confusion is a table.
 fn printed<T: Serialize>(figures: &T, confusion: &Confusion, json: bool) -> Result<()> {
     report::print(figures, json)?;
     if json {

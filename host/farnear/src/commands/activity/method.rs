@@ -1,4 +1,4 @@
-//! How activities are classified: the flags that training and evaluation share.
+//! Flags that training and evaluation share.
 
 use std::io::IsTerminal;
 
@@ -40,7 +40,7 @@ enum Epl {
 }
 
 impl MethodArguments {
-    /// As a workflow takes it. Says on a terminal what will take long.
+    /// Reports on a terminal what will take long.
     pub fn method(&self) -> Method {
         let search = !self.no_search;
         if search && std::io::stderr().is_terminal() {
@@ -59,13 +59,12 @@ impl MethodArguments {
     }
 }
 
-/// The names of all models that come with the program.
 fn shipped() -> impl TypedValueParser<Value = &'static Shipped> {
     PossibleValuesParser::new(MODELS.iter().map(|model| model.name))
         .try_map(|name| Shipped::named(&name).ok_or("no model of that name"))
 }
 
-/// The names of all classifiers, so that help and completions list them.
+/// All names, so that help and completions list them.
 fn classifiers() -> impl TypedValueParser<Value = Family> {
     PossibleValuesParser::new(Family::ALL.iter().map(|family| family.name()))
         .try_map(|name| name.parse::<Family>())

@@ -1,5 +1,3 @@
-//! `farnear activity models`: recognisers that come with the program.
-
 use anyhow::Result;
 use clap::Args;
 use farnear_workflows::activity::shipped;
@@ -24,7 +22,6 @@ struct List {
     model: Vec<shipped::ModelFigures>,
 }
 
-/// Runs the command.
 pub fn run(arguments: Arguments) -> Result<()> {
     if arguments.sheet {
         return report::to_stdout(shipped::SHEET.as_bytes());

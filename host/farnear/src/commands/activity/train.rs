@@ -1,5 +1,3 @@
-//! `farnear activity train`: samples, or synthetic people, to a model.
-
 use std::path::PathBuf;
 
 use anyhow::Result;
@@ -97,10 +95,6 @@ enum Synthetic {
     Everyday,
 }
 
-/// Runs the command.
-///
-/// # Errors
-/// See [`training::train`] and [`shipped::train`].
 pub fn run(arguments: Arguments) -> Result<()> {
     let json = arguments.json;
     if let Some(Synthetic::Everyday) = arguments.synthetic {

@@ -1,5 +1,3 @@
-//! `farnear rig calibrate`: the board measures its mechanics; a series of flat targets teaches the depth correction.
-
 use anyhow::{Result, bail};
 use clap::Subcommand;
 use farnear_protocol::message::{Axis, Routine};
@@ -14,7 +12,7 @@ use crate::{
 #[derive(Subcommand)]
 #[expect(clippy::large_enum_variant, reason = "parsed once")]
 pub enum What {
-    /// Measure the distance between a stage's two end switches. The stage is homed by it.
+    /// Measure the distance between a stage's two end switches. This homes the stage.
     #[command(after_help = "Example: farnear rig calibrate travel --port /dev/ttyACM0 --axis lens")]
     Travel {
         /// coarse or lens.
@@ -35,15 +33,13 @@ pub enum What {
     /// Measure the piezo's gain, hysteresis and creep against its strain gauge, and keep them as settings.
     #[command(after_help = "Example: farnear rig calibrate piezo --port /dev/ttyACM0 --json")]
     Piezo(Question),
-    /// Measure the strain gauge's gain and zero against stage A's encoder, by way of its home switch, and keep them as settings. The
-    /// stage is homed by it.
+    /// Measure the strain gauge's gain and zero against stage A's encoder, and keep them as settings. This homes the stage.
     #[command(after_help = "Example: farnear rig calibrate gauge --port /dev/ttyACM0 --json")]
     Gauge(Question),
     Targets(CameraRun<TargetSeriesRequest>),
     Fit(RigRun<FitRequest>),
 }
 
-/// Runs the command.
 pub fn run(what: What) -> Result<()> {
     let measure = |question: Question, routine| {
         question.answer(|rig, context| mechanics::measure(rig, routine, context))

@@ -1,5 +1,3 @@
-//! `farnear rig log`: what the firmware writes into its log.
-
 use std::{io::Write, path::PathBuf};
 
 use anyhow::Result;
@@ -28,7 +26,6 @@ pub struct Arguments {
     reset: bool,
 }
 
-/// Runs the command.
 pub fn run(arguments: Arguments) -> Result<()> {
     let Arguments { target, elf, seconds, reset } = arguments;
     let settings = LogSettings { rig: target.address()?, elf, seconds, reset };

@@ -1,5 +1,3 @@
-//! `farnear rig home | move`.
-
 use anyhow::{Result, bail};
 use clap::Args;
 use farnear_protocol::message::Axis;
@@ -47,14 +45,12 @@ pub struct MoveArguments {
     json: bool,
 }
 
-/// Runs `home`.
 pub fn home(arguments: HomeArguments) -> Result<()> {
     let axes: Vec<_> = arguments.axis.iter().map(|name| Axis::from(*name)).collect();
     let address = arguments.target.address()?;
     report::print(&motion::home(&address, &axes, &terminal::context()?)?, arguments.json)
 }
 
-/// Runs `move`.
 pub fn go(arguments: MoveArguments) -> Result<()> {
     let MoveArguments { target, axis: axes, to_um, home, json } = arguments;
     if axes.len() != to_um.len() {

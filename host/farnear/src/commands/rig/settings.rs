@@ -1,5 +1,3 @@
-//! `farnear rig settings`: what the board keeps in its memory.
-
 use anyhow::Result;
 use clap::Subcommand;
 use farnear_workflows::rig::settings;
@@ -32,7 +30,6 @@ pub enum Job {
     },
 }
 
-/// Runs the command.
 pub fn run(job: Job) -> Result<()> {
     match job {
         Job::List(question) => question.answer(settings::list),

@@ -1,4 +1,4 @@
-//! Which rig and which camera, as every command of `farnear rig` takes them.
+//! Flags of `farnear rig` that select rig and camera.
 
 use std::{path::PathBuf, time::Duration};
 
@@ -62,13 +62,13 @@ struct SceneryArguments {
     paced: bool,
 }
 
-/// Takes the text if it parses as a `T`; the simulator parses it again.
+/// Checks that the text parses as a `T`; the simulator parses it again.
 fn checked<T: std::str::FromStr>(text: &str) -> Result<String, T::Err> {
     text.parse::<T>().map(|_| text.to_owned())
 }
 
 impl SceneryArguments {
-    /// The first of these flags that was given.
+    /// The first flag of these that was given.
     fn given(&self) -> Option<&'static str> {
         [
             ("--scene", self.scene.is_some()),
@@ -86,7 +86,6 @@ impl SceneryArguments {
 }
 
 impl Target {
-    /// The rig's address.
     pub fn address(&self) -> Result<RigAddress> {
         let Some(port) = &self.port else {
             self.without_scenery("a real rig")?;
@@ -148,7 +147,6 @@ pub struct CameraArguments {
 }
 
 impl CameraArguments {
-    /// As a workflow takes it.
     pub fn settings(&self) -> Result<CameraSettings> {
         Ok(CameraSettings {
             address: self.camera.parse()?,

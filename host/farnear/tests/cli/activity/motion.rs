@@ -1,8 +1,8 @@
-//! Recordings of motion that teach, and that become samples.
+//! Motion recordings for training and as samples.
 
 use crate::common::{Folder, fails, farnear, figures, number, succeeds};
 
-/// A person's 20 joints as lines of text, metres with y up: in this many frames the arms go up, or the trunk comes down.
+/// The 20 joints of a person as lines of text, metres, y up. Over the frames the arms rise, or the trunk bends.
 fn kinect(size: f64, raise: f64, stoop: f64) -> String {
     let mut text = String::new();
     for frame in 0..30 {
@@ -55,8 +55,8 @@ fn motion_files_teach_and_become_samples() {
     let out = folder.text("eve");
     let draw =
         ["silhouettes", "markers", &eve, "--views", "4", "--mm-per-px", "15", "--samples", "raise arms"];
-    let (_, said) = succeeds(farnear(&draw).args(["--out", &out]));
-    assert!(said.contains("`kinect` fits best"), "{said}");
+    let (_, stderr) = succeeds(farnear(&draw).args(["--out", &out]));
+    assert!(stderr.contains("`kinect` fits best"), "{stderr}");
     let samples = folder.text("eve/samples.toml");
     let judged = figures(&mut farnear(&["activity", "evaluate", &samples, "--model", &model, "--json"]));
     assert_eq!((number(&judged, "answers"), number(&judged, "accuracy")), (4.0, 1.0), "{judged}");

@@ -1,4 +1,4 @@
-//! Several people in one picture, each recognised apart.
+//! Several people in one picture, recognised separately.
 
 use std::{fs, path::Path};
 
@@ -8,7 +8,6 @@ use serde_json::Value;
 use super::PEOPLE;
 use crate::common::{Folder, fails, farnear, figures, succeeds};
 
-/// The masks of a performance, in order.
 fn masks(name: &str) -> Vec<GrayImage> {
     let folder = PEOPLE.masks(name, 1);
     let mut files: Vec<_> =
@@ -65,12 +64,12 @@ fn two_people_side_by_side_get_an_answer_each() {
             (&count.into(), &0.into()),
             "{person}"
         );
-        // As if nobody else were there.
+        // Each person alone in the picture.
         let frames: Vec<GrayImage> = (0..count).map(|n| frame(n, [index == 0, index == 1])).collect();
         let path = written(&folder, &format!("alone{index}"), &frames);
         let recognise = ["activity", "recognise", &path, "--as", "masks", "--model", "everyday", "--json"];
         let alone = figures(farnear(&recognise).args(["--among", "dig,crouch"]));
-        // One schema: the only person of a clip and one of several have the same keys and answers.
+        // One schema: a single person and one of several have the same keys and answers.
         let only = alone["people"][0].as_object().expect("a person");
         let keys = |person: &serde_json::Map<String, Value>| person.keys().cloned().collect::<Vec<String>>();
         let without = |mut keys: Vec<String>| {
@@ -88,7 +87,7 @@ fn two_people_side_by_side_get_an_answer_each() {
     }
     assert_eq!(fs::read_dir(&film).expect("a film").count(), count);
 
-    // Line by line: both are there from the third frame on, each in a box of their own.
+    // Both people are present from the third frame on, each in a separate box.
     let (lines, _) = succeeds(&mut farnear(&recognise));
     let lines: Vec<Value> = lines.lines().map(|line| serde_json::from_str(line).expect("JSON")).collect();
     let boxes = |line: &Value| -> Vec<u64> {
@@ -101,7 +100,7 @@ fn two_people_side_by_side_get_an_answer_each() {
 }
 
 #[test]
-fn people_who_cross_are_said_to_and_what_cannot_be_followed_is_refused() {
+fn crossings_are_reported_and_untrackable_videos_rejected() {
     let folder = Folder::new();
     let post = GrayImage::from_pixel(24, 90, Luma([255]));
     let frames: Vec<GrayImage> = (0..50)
@@ -124,7 +123,7 @@ fn people_who_cross_are_said_to_and_what_cannot_be_followed_is_refused() {
         assert_eq!(person["silhouettes"].as_u64().map(|seen| seen + crossing), Some(50), "{person}");
     }
     let two = ["activity", "recognise", &path, &path, "--as", "masks", "--model", "everyday", "--people"];
-    fails(&mut farnear(&two), 1, &["one view, 2 were given"]);
+    fails(&mut farnear(&two), 2, &["number of views 2", "one view"]);
     let small = written(&folder, "small", &[GrayImage::from_pixel(100, 100, Luma([255]))]);
     let cut_out = ["activity", "recognise", &small, "--as", "masks", "--model", "everyday", "--people"];
     fails(&mut farnear(&cut_out), 1, &["cut out at 100x100", "full frames"]);

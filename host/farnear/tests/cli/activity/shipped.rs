@@ -1,4 +1,4 @@
-//! The models that come with the program, and judging one.
+//! Models that come with the program, and their evaluation.
 
 use std::{fs, path::Path};
 
@@ -28,7 +28,8 @@ fn models_that_come_with_the_program_need_nothing_else() {
             found["probabilities"].as_array().map(Vec::len),
             listed["model"][0]["activities"].as_array().map(Vec::len)
         );
-        // Somebody who walks, however strangely, where nothing else can be but what is least alike.
+        // A person walks. Restricted to walking and an unlike activity, the answer is walking even for a high outlier
+        // score.
         let among = figures(farnear(&recognise).args(["--among", "walk,jumping jack"]));
         assert_eq!(among["probabilities"].as_array().map(Vec::len), Some(2), "{among}");
         assert_eq!(among["probabilities"][1]["activity"], "walk", "{among}");
@@ -57,7 +58,7 @@ fn a_finished_model_is_judged_and_its_mistakes_are_listed() {
     let out = people.text("judged");
     let evaluate = ["activity", "evaluate", &people.samples, "--model", "everyday", "--json"];
     let found = figures(farnear(&evaluate).args(["--out", &out]));
-    // Two views of twelve clips, each by itself.
+    // Two views of twelve clips, each separately.
     assert_eq!((number(&found, "answers"), number(&found, "strangers")), (24.0, 0.0));
     assert!(found["accuracy_among"].as_f64() >= found["accuracy"].as_f64(), "{found}");
     assert_eq!(found["confusion"]["classes"], serde_json::json!(["crouch", "dig", "walk"]));
@@ -68,7 +69,7 @@ fn a_finished_model_is_judged_and_its_mistakes_are_listed() {
     assert_eq!(number(&fused, "answers"), 12.0);
     assert_eq!(fused["confusion"]["classes"], serde_json::json!(["crouch", "dig", "sneak"]));
 
-    // What the model does not know is strange, not wrong; where it knows nothing, nothing can be said.
+    // Activities that the model does not know are unknown, not wrong; without any known activity there is no accuracy.
     let all = fs::read_to_string(&people.samples).expect("samples");
     let renamed = people.folder.file("people/renamed.toml", all.replace("\"dig\"", "\"yodel\""));
     let strange = figures(&mut farnear(&["activity", "evaluate", &renamed, "--model", "everyday", "--json"]));
@@ -80,7 +81,7 @@ fn a_finished_model_is_judged_and_its_mistakes_are_listed() {
     let nothing = people.folder.file("people/yodel.toml", text);
     let refused = ["none of its activities (yodel)", "jumping jack"];
     fails(&mut farnear(&["activity", "evaluate", &nothing, "--model", "everyday"]), 1, &refused);
-    // The same between samples: an accuracy of 0 would only say that names differ.
+    // The same between samples: an accuracy of 0 would only mean that names differ.
     let others = people.only("others.toml", |sample| sample.contains("p00") && !sample.contains("dig"));
     let text = fs::read_to_string(&nothing).expect("samples").replace("subject = \"p", "subject = \"q");
     let nothing = people.folder.file("people/yodel.toml", text);
@@ -89,7 +90,7 @@ fn a_finished_model_is_judged_and_its_mistakes_are_listed() {
 }
 
 #[test]
-fn an_unknown_answer_says_why() {
+fn an_unknown_answer_has_a_reason() {
     let folder = Folder::new();
     let masks = folder.text("nobody");
     fs::create_dir(&masks).expect("a folder");
@@ -110,10 +111,10 @@ fn an_unknown_answer_says_why() {
     assert_eq!(found["reason"], "no person in any of the 3 frames");
 }
 
-/// Silhouettes of two people walking through the picture, eight times, as a background model cut them out of video.
+/// Silhouettes of two people who walk through the picture, eight times, by a background model from video.
 #[test]
 #[cfg_attr(not(shared_data), ignore = "needs the real data next to the repository")]
-fn somebody_walking_before_a_real_camera_is_said_to_walk() {
+fn walking_in_front_of_a_real_camera_is_recognised() {
     let folder = Folder::new();
     let mut walking = 0;
     let mut passages = 0;
@@ -134,7 +135,7 @@ fn somebody_walking_before_a_real_camera_is_said_to_walk() {
             for (number, path) in run {
                 fs::copy(path, Path::new(&masks).join(format!("{number:06}.jpg"))).expect("copied");
             }
-            // JPEG leaves greys about the edges; they are taken for masks all the same.
+            // JPEG leaves grey values at the edges; the files still count as masks.
             let found =
                 figures(&mut farnear(&["activity", "recognise", &masks, "--model", "everyday", "--json"]));
             let best = found["probabilities"].as_array().expect("probabilities").iter().max_by(|a, b| {
@@ -192,12 +193,12 @@ fn a_shipped_network_and_unlabelled_clips_serve_where_samples_come_from_elsewher
     let pictures = fs::read_dir(&film).expect("a folder").count();
     assert_eq!(pictures as f64, number(&answer, "frames"));
     let picture = image::open(people.folder.path("film/frame_000003.png")).expect("a picture").into_rgb8();
-    // The strip with the answer below the enlarged frame, and in it the bar of the most probable activity.
+    // The strip with the answer is below the enlarged frame, with the bar of the most probable activity.
     assert!(picture.width() >= 320 && picture.height() > 240);
     assert!(picture.pixels().any(|pixel| pixel.0 == [255, 160, 0]), "the outline");
     let mut again = farnear(&["activity", "recognise", &masks, "--model", &model, "--video-out", &film]);
     fails(&mut again, 1, &["film", "exists already"]);
-    // What ships keeps no clips.
+    // Shipped models contain no clips.
     let mut shipped = farnear(&["activity", "recognise", &masks, "--model", "everyday", "--adapt-to"]);
-    fails(shipped.args(&unlabelled), 1, &["everyday", "no training clips of its own", "features"]);
+    fails(shipped.args(&unlabelled), 1, &["everyday", "contains no training clips", "features"]);
 }

@@ -1,4 +1,4 @@
-//! What is held of a file.
+//! The recorded properties of a file.
 
 use std::path::Path;
 
@@ -6,28 +6,25 @@ use farnear_files::map;
 use image::GenericImageView;
 use serde::{Deserialize, Serialize};
 
-/// Values that are kept of a file.
 const VALUES: usize = 9;
-/// How far values may lie apart between kinds of processors, relative and absolute: hundredths of a millimetre in maps,
-/// a grey level or a plotted pixel in pictures.
+/// Relative and absolute tolerance between kinds of processors: hundredths of a millimetre in maps, a grey level or a
+/// plotted pixel in pictures.
 const TOLERANCE: [f64; 2] = [1e-4, 5e-3];
 const PICTURE_TOLERANCE: [f64; 2] = [0.0, 1.5];
 
-/// Bytes of a line of text at a file's beginning, of a binary file's mark, and of a TIFF's: what follows these two depends on rounding.
+/// Recorded bytes of a text's first line, of a binary file's header, and of a TIFF's: later bytes depend on rounding.
 const HEAD: usize = 100;
 const MARK: usize = 8;
 const TIFF_MARK: usize = 4;
 
-/// A file: its form, some of its values, and a hash of every byte.
 #[derive(Serialize, Deserialize, PartialEq, Debug)]
 pub struct Digest {
-    /// Its path below the story's folder.
+    /// Path relative to the story's folder.
     pub name: String,
-    /// What no rounding changes.
+    /// Independent of rounding.
     form: String,
-    /// Values from all over the file.
     values: Vec<f64>,
-    /// Of all bytes: FNV-1a, 64 bits.
+    /// FNV-1a, 64 bits, over all bytes.
     hash: String,
 }
 
@@ -39,7 +36,7 @@ impl Digest {
             "png" | "jpg" => of_picture(bytes),
             "toml" | "svg" | "csv" | "json" | "txt" => {
                 let text = String::from_utf8_lossy(bytes);
-                // Inputs that another kind of processor renders otherwise.
+                // Inputs that differ by rounding between kinds of processors.
                 let of_input = |line: &str| line.starts_with("sha256 = ") || line.starts_with("bytes = ");
                 let same: String = text.split_inclusive('\n').filter(|line| !of_input(line)).collect();
                 let (numbers, rest) = numbers_and_rest(&same);
@@ -56,7 +53,7 @@ impl Digest {
         Self { name: name.into(), form, values, hash: format!("{:016x}", hash(bytes)) }
     }
 
-    /// Whether it can be the same file made on another kind of processor.
+    /// Whether it can be the same file from another kind of processor.
     pub fn is_close_to(&self, recorded: &Self) -> bool {
         let pictures = [".png", ".svg", ".jpg"].iter().any(|ending| self.name.ends_with(ending));
         let [relative, absolute] = if pictures { PICTURE_TOLERANCE } else { TOLERANCE };
@@ -75,7 +72,7 @@ fn of_map(name: &str, bytes: &[u8]) -> (String, Vec<f64>) {
     let values: Vec<f64> =
         map.iter().filter(|value| value.is_finite()).map(|value| f64::from(*value)).collect();
     let (height, width) = map.dim();
-    // A NumPy file begins with a line of text; in a TIFF values may follow its mark at once.
+    // A NumPy file begins with a line of text; in a TIFF values may follow the magic number directly.
     let head = if name.ends_with(".npy") { HEAD } else { TIFF_MARK };
     (
         format!("map of {width}x{height}, {} with a value, in {}", values.len(), beginning(bytes, head)),
@@ -88,14 +85,13 @@ fn of_picture(bytes: &[u8]) -> (String, Vec<f64>) {
     let (width, height) = picture.dimensions();
     let form = format!("picture of {width}x{height} {:?}", picture.color());
     let values: Vec<f64> = match picture.as_luma16() {
-        // Codes of a range that differs in its last bits.
+        // The last bits of the codes' range may differ.
         Some(codes) => codes.iter().map(|code| f64::from(*code) / 256.0).collect(),
         None => picture.into_bytes().into_iter().map(f64::from).collect(),
     };
     (form, some_of(&values))
 }
 
-/// The mean, and values from all over.
 fn some_of(values: &[f64]) -> Vec<f64> {
     let Some(last) = values.len().checked_sub(1) else { return Vec::new() };
     let mean = values.iter().sum::<f64>() / values.len() as f64;
@@ -103,7 +99,6 @@ fn some_of(values: &[f64]) -> Vec<f64> {
     std::iter::once(mean).chain(places.map(|place| values[place])).collect()
 }
 
-/// The first line, of at most so many bytes.
 fn beginning(bytes: &[u8], most: usize) -> String {
     let line = bytes.split(|byte| *byte == b'\n').next().unwrap_or_default();
     let line: Vec<u8> = line.iter().take(most).copied().collect();
@@ -137,14 +132,13 @@ pub fn numbers_and_rest(text: &str) -> (Vec<f64>, String) {
     (numbers, rest)
 }
 
-/// FNV-1a (Fowler, Noll, Vo), 64 bits.
 pub fn hash(bytes: &[u8]) -> u64 {
     bytes
         .iter()
         .fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(*byte)).wrapping_mul(0x100_0000_01b3))
 }
 
-/// Kind of this machine, as far as sums of floating-point numbers depend on it.
+/// Kind of this machine, as far as floating-point sums depend on it.
 pub fn machine() -> String {
     #[cfg(target_arch = "x86_64")]
     let units = [
@@ -160,7 +154,7 @@ pub fn machine() -> String {
 }
 
 #[test]
-fn numbers_are_told_from_words() {
+fn numbers_are_distinguished_from_words() {
     let (numbers, rest) = numbers_and_rest("[p1]\nk = -4.5e-3, x2 = 7. -b M3,4");
     assert_eq!(numbers, [-4.5e-3, 7.0, 4.0]);
     assert_eq!(rest, "[p1]\nk = #, x2 = # -b M3,#");

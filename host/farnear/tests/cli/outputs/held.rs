@@ -1,4 +1,4 @@
-//! Running a story and holding it against its recording.
+//! Runs a story and compares it with its recording.
 
 use std::{collections::BTreeMap, env, fs, path::PathBuf};
 
@@ -8,49 +8,41 @@ use serde::{Deserialize, Serialize};
 use super::digest::{Digest, hash, machine, numbers_and_rest};
 use crate::common::{Folder, farnear, rig_optics};
 
-/// What `SMALL` stands for in a command: a picture that is quickly rendered.
+/// Replaces `SMALL` in a command: a picture that renders fast.
 const SMALL: &str = "--optics rig.toml --width 96 --height 72";
-/// Figures that no two runs share.
 const TIMES: [&str; 4] = ["seconds", "seconds_per_frame", "cut_ms_per_frame", "rows_per_second"];
-/// How far numbers of text may lie apart between kinds of processors, relative and absolute.
+/// Relative and absolute tolerance for numbers in text between kinds of processors.
 const TEXT_TOLERANCE: [f64; 2] = [2e-3, 2e-3];
 
-/// Commands and what they need.
 #[derive(Default)]
 pub struct Story<'a> {
-    /// Name of the recording.
     pub name: &'a str,
-    /// Files that lie there, next to the rig's optics as `rig.toml`.
+    /// Files in the folder, in addition to the rig's optics as `rig.toml`.
     pub files: &'a [(&'a str, &'a str)],
-    /// Commands that run first, whose output is not held.
+    /// Commands that run first, whose output is not compared.
     pub before: &'a [&'a str],
-    /// Commands whose output is held; arguments are parted by blanks.
+    /// Commands whose output is compared; blanks separate arguments.
     pub commands: &'a [&'a str],
 }
 
-/// What is kept of a story.
 #[derive(Serialize, Deserialize)]
 struct Recording {
-    /// The kind of machine it was recorded on.
     machine: String,
     step: Vec<Step>,
 }
 
-/// What is kept of a command.
 #[derive(Serialize, Deserialize)]
 struct Step {
     command: String,
     code: i32,
     stdout: String,
     stderr: String,
-    /// The files that it wrote.
     #[serde(default)]
     file: Vec<Digest>,
 }
 
 impl Story<'_> {
-    /// Runs the story; panics with all that differs from its recording. With `FARNEAR_RECORD=PROGRAM` it is recorded with
-    /// that program instead.
+    /// Runs the story; panics with all differences. `FARNEAR_RECORD=PROGRAM` records it with that program instead.
     pub fn is_held(&self) {
         let golden = PathBuf::from(env!("CARGO_MANIFEST_DIR"))
             .join("tests/cli/outputs/golden")
@@ -96,7 +88,7 @@ impl Story<'_> {
             let command = command.replace("SMALL", SMALL);
             let arguments: Vec<&str> = command.split_whitespace().collect();
             let mut started = match &recorder {
-                // Its cache is nobody else's.
+                // A cache of its own.
                 Some(program) => {
                     let mut other = Command::new(program);
                     other.env("XDG_CACHE_HOME", folder.path(".cache")).args(&arguments);
@@ -104,6 +96,8 @@ impl Story<'_> {
                 }
                 None => farnear(&arguments),
             };
+            // Records name the number of threads.
+            started.env("RAYON_NUM_THREADS", "2");
             started.current_dir(folder.path("")).output().unwrap()
         };
         for command in self.before {
@@ -132,13 +126,12 @@ impl Story<'_> {
     }
 }
 
-/// The files below a folder, without hidden ones, and a hash of each.
+/// The files below a folder, without hidden ones, with a hash of each.
 fn contents(folder: &Folder) -> BTreeMap<String, u64> {
     let names = folder.listing().into_iter().filter(|name| !name.starts_with('.'));
     names.filter_map(|name| Some((name.clone(), hash(&fs::read(folder.path(&name)).ok()?)))).collect()
 }
 
-/// The text with `_` for figures that are times of the clock on the wall.
 fn without_times(text: &str) -> String {
     let mut text = text.to_owned();
     for key in TIMES {
@@ -154,7 +147,6 @@ fn without_times(text: &str) -> String {
 }
 
 impl Step {
-    /// Adds what differs from the recording.
     fn compare(&self, recorded: &Self, same_kind: bool, differences: &mut Vec<String>) {
         let mut differ = |what: &str, recorded: &dyn std::fmt::Debug, found: &dyn std::fmt::Debug| {
             differences.push(format!("`{}`: {what} was {recorded:?} and is {found:?}", self.command));

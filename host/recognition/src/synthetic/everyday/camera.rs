@@ -16,7 +16,6 @@ use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 use std::collections::HashMap;
 
-/// A camera directed at a person.
 #[derive(Clone, Copy, Debug)]
 pub struct Camera {
     view: View,
@@ -24,7 +23,7 @@ pub struct Camera {
     target_mm: f64,
     person_px: f64,
     segmentation: Segmentation,
-    /// Shares of the standing person cut off by the image border: below, and at a side.
+    /// Parts of the standing person cut off by the image border: below, and at a side.
     cut: [f64; 2],
 }
 
@@ -173,7 +172,6 @@ impl Camera {
     }
 }
 
-/// Segmenters drop regions that are too small for a person.
 fn large_enough(mask: &Mask, person_px: f64) -> bool {
     BoundingBox::of(mask.view())
         .is_some_and(|bounds| bounds.height().max(bounds.width()) as f64 > 0.3 * person_px)

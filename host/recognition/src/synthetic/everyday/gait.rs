@@ -14,7 +14,6 @@ const WALK_KNEE: Cycle = [5.0, 15.0, 18.0, 11.0, 7.0, 11.0, 35.0, 61.0, 54.0, 17
 const RUN_HIP: Cycle = [35.0, 31.0, 16.0, 0.0, -9.0, 0.0, 22.0, 42.0, 53.0, 46.0];
 const RUN_KNEE: Cycle = [18.0, 41.0, 36.0, 22.0, 28.0, 66.0, 98.0, 104.0, 78.0, 36.0];
 
-/// A person's gait.
 #[derive(Clone, Copy, Debug)]
 pub struct Gait {
     /// 0 walking to 1 running.
@@ -27,7 +26,6 @@ pub struct Gait {
     swing_deg: f64,
     elbow_deg: f64,
     out: f64,
-    /// Stride frequency, Hz.
     pub strides_hz: f64,
     /// Hands with another task: `None` swings.
     held: [Option<Hand>; 2],
@@ -118,7 +116,6 @@ impl Gait {
         gait
     }
 
-    /// Moment at `phase` cycles.
     pub fn at(&self, phase: f64) -> Moment {
         let mut moment = Moment::standing().bent(self.lean_deg, self.nod_deg);
         for side in 0..2 {

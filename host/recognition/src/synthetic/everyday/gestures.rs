@@ -6,7 +6,6 @@ use super::motion::{Maker, Motion};
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 
-/// Hand at the ear.
 pub fn ear(rng: &mut ChaCha8Rng) -> Hand {
     Hand::at(rng.random_range(-0.14..0.06), rng.random_range(0.06..0.28), rng.random_range(0.1..0.4))
         .elbow(rng.random_range(0.0..0.4))
@@ -46,18 +45,15 @@ fn wave(maker: &mut Maker, hands: &[usize]) -> Motion {
     maker.repeated(way_in, &[(swing, b), (swing, a)], times)
 }
 
-/// Waving with one hand.
 pub fn wave_one_hand(maker: &mut Maker) -> Motion {
     let main = maker.main;
     wave(maker, &[main])
 }
 
-/// Waving with both hands.
 pub fn wave_two_hands(maker: &mut Maker) -> Motion {
     wave(maker, &[0, 1])
 }
 
-/// Clapping before the chest.
 pub fn clap(maker: &mut Maker) -> Motion {
     let place = Hand::at(-0.28, 0.57, -0.12);
     let middle = Hand { out: -0.29, ..maker.near(place, 0.22) };
@@ -85,7 +81,6 @@ fn hold(maker: &mut Maker) -> f64 {
     maker.draw(0.1_f64.ln(), 2.2_f64.ln()).exp()
 }
 
-/// Phone call: the hand stays at the ear.
 pub fn answer_phone(maker: &mut Maker) -> Motion {
     let hand = ear(maker.rng);
     let (hold, back, nod) = (hold(maker), maker.chance(0.25), maker.draw(-5.0, 20.0));
@@ -179,7 +174,6 @@ fn with(rest: Moment, hands: &[usize], hand: Hand) -> Moment {
     moment
 }
 
-/// Pushing something away.
 pub fn push(maker: &mut Maker) -> Motion {
     let hands = both_or_one(maker, 0.2);
     let (near, far, turn) = near_and_far(maker, hands.len() == 1);
@@ -198,7 +192,6 @@ pub fn push(maker: &mut Maker) -> Motion {
     maker.gesture(parts)
 }
 
-/// Pulling something near.
 pub fn pull(maker: &mut Maker) -> Motion {
     let hands = both_or_one(maker, 0.2);
     let (near, far, turn) = near_and_far(maker, hands.len() == 1);
@@ -246,7 +239,6 @@ pub fn punch(maker: &mut Maker) -> Motion {
     maker.repeated(vec![(raise, guard)], &cycle, times)
 }
 
-/// Aiming and firing a short gun with one or both hands.
 pub fn shoot(maker: &mut Maker) -> Motion {
     let both = maker.chance(0.65);
     let main = maker.main;

@@ -7,21 +7,17 @@ use farnear_silhouettes::synthetic::body::{Leg, Pose};
 pub struct Hand {
     /// Outwards; negative reaches across the body.
     pub out: f64,
-    /// Forwards, in arm lengths.
     pub ahead: f64,
-    /// Upwards, in arm lengths.
     pub up: f64,
     /// Elbow direction: 0 down and back, 1 outwards.
     pub elbow: f64,
 }
 
 impl Hand {
-    /// Hand position with the elbow down.
     pub const fn at(out: f64, ahead: f64, up: f64) -> Self {
         Self { out, ahead, up, elbow: 0.25 }
     }
 
-    /// Same position with another elbow direction.
     pub const fn elbow(self, elbow: f64) -> Self {
         Self { elbow, ..self }
     }
@@ -77,7 +73,6 @@ impl Hand {
         (self.out * self.out + self.ahead * self.ahead + self.up * self.up).sqrt()
     }
 
-    /// Shifted hand position.
     pub fn moved(self, out: f64, ahead: f64, up: f64) -> Self {
         Self { out: self.out + out, ahead: self.ahead + ahead, up: self.up + up, ..self }
     }
@@ -88,7 +83,6 @@ impl Hand {
 pub struct Moment {
     /// Trunk, head and legs; its arms are unused.
     pub pose: Pose,
-    /// Hand positions, left and right.
     pub hands: [Hand; 2],
     /// Shoulder rotation against the hips, to the left.
     pub twist_deg: f64,
@@ -111,7 +105,6 @@ fn mixed(a: f64, b: f64, s: f64) -> f64 {
 }
 
 impl Moment {
-    /// Standing with hanging hands.
     pub fn standing() -> Self {
         Self {
             pose: Pose { lean_deg: 3.0, ..Pose::default() },
@@ -158,35 +151,29 @@ impl Moment {
         }
     }
 
-    /// Both legs bent equally.
     pub fn legs(mut self, hip_deg: f64, knee_deg: f64, spread_deg: f64) -> Self {
         self.pose.legs = [Leg { hip_deg, knee_deg, spread_deg }; 2];
         self
     }
 
-    /// Trunk and head bent.
     pub fn bent(mut self, lean_deg: f64, nod_deg: f64) -> Self {
         (self.pose.lean_deg, self.pose.nod_deg) = (lean_deg, nod_deg);
         self
     }
 
-    /// One hand elsewhere.
     pub fn hand(mut self, side: usize, hand: Hand) -> Self {
         self.hands[side] = hand;
         self
     }
 
-    /// Both hands elsewhere, equally.
     pub fn both(self, hand: Hand) -> Self {
         Self { hands: [hand; 2], ..self }
     }
 
-    /// Shoulders turned.
     pub fn twisted(self, twist_deg: f64) -> Self {
         Self { twist_deg, ..self }
     }
 
-    /// Moved ahead.
     pub fn gone(self, ahead: f64) -> Self {
         Self { ahead, ..self }
     }
@@ -195,7 +182,6 @@ impl Moment {
 /// A motion: its duration, seconds, and the posture at its end.
 pub type Keys = Vec<(f64, Moment)>;
 
-/// Total duration, seconds.
 pub fn duration(keys: &Keys) -> f64 {
     keys.iter().map(|(seconds, _)| seconds).sum()
 }

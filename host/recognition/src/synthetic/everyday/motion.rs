@@ -5,42 +5,33 @@ use super::moment::{Hand, Keys, Moment, at, duration};
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 
-/// Kind of motion.
 #[derive(Clone, Debug)]
 pub enum Motion {
-    /// Endless gait of a person.
+    /// Endless.
     Gait(Gait),
     /// Single action; times before and after (seconds) may be cut.
     Once {
-        /// All keys of the motion.
         keys: Keys,
-        /// Start of the activity.
         from: f64,
-        /// Posture at the end.
         to: f64,
         /// Preparation complete; some clips start here.
         ready: f64,
     },
     /// Action repeated between `from` and `to`.
     Repeated {
-        /// All keys of the motion.
         keys: Keys,
-        /// Start of the repetition.
         from: f64,
-        /// Posture at the end.
         to: f64,
-        /// Seconds of one repetition.
+        /// Seconds per repetition.
         period: f64,
     },
 }
 
 /// Generates motions of one person with their stance, handedness and tempo.
 pub struct Maker<'r> {
-    /// Random numbers of all spreads.
     pub rng: &'r mut ChaCha8Rng,
     /// Main hand: 0 left, 1 right.
     pub main: usize,
-    /// Stance while nothing happens.
     pub rest: Moment,
     tempo: f64,
 }
@@ -83,7 +74,6 @@ impl<'r> Maker<'r> {
         self.rng.random_range(low..high)
     }
 
-    /// True with this probability.
     pub fn chance(&mut self, share: f64) -> bool {
         self.rng.random_bool(share)
     }

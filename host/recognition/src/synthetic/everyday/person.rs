@@ -9,7 +9,6 @@ use rand_chacha::ChaCha8Rng;
 /// Build and clothes; thickness relative to the average body.
 #[derive(Clone, Copy, Debug)]
 pub struct Person {
-    /// Body proportions.
     pub build: Build,
     trunk: f64,
     arms: f64,
@@ -98,7 +97,6 @@ impl Person {
         (bent, std::array::from_fn(|k| shoulder[k] + length * direction[k]))
     }
 
-    /// Capsules of the dressed body.
     pub fn dressed(&self, found: &Joints) -> Vec<Capsule> {
         let h = self.build.height_mm;
         let ball = |at: Point3, radius: f64| Capsule::new(at, at, radius);
@@ -142,7 +140,6 @@ impl Person {
     }
 }
 
-/// Midpoint.
 pub fn middle(a: Point3, b: Point3) -> Point3 {
     std::array::from_fn(|k| 0.5 * (a[k] + b[k]))
 }
@@ -180,7 +177,7 @@ mod tests {
     use rand::SeedableRng;
 
     #[test]
-    fn arms_keep_their_length_and_hands_get_where_they_can() {
+    fn arms_keep_their_length_and_hands_reach_as_far_as_possible() {
         let mut rng = ChaCha8Rng::seed_from_u64(1);
         for _ in 0..50 {
             let person = Person::drawn(&mut rng);

@@ -49,7 +49,6 @@ fn one_or_two(maker: &mut Maker) -> Vec<usize> {
     if maker.chance(0.5) { vec![0, 1] } else { vec![maker.main] }
 }
 
-/// Picking something up.
 pub fn pick_up(maker: &mut Maker) -> Motion {
     let hands = one_or_two(maker);
     let deep = maker.draw(0.85, 1.2);
@@ -62,7 +61,6 @@ pub fn pick_up(maker: &mut Maker) -> Motion {
     maker.once(parts)
 }
 
-/// Putting something down.
 pub fn put_down(maker: &mut Maker) -> Motion {
     let hands = one_or_two(maker);
     let deep = maker.draw(0.85, 1.2);
@@ -142,7 +140,6 @@ pub fn tie_laces(maker: &mut Maker) -> Motion {
     maker.once(vec![(go, busy[1]), (beat, busy[0]), (0.5 * beat, busy[1])])
 }
 
-/// Crouching, holding, getting up.
 pub fn crouch(maker: &mut Maker) -> Motion {
     let knee = maker.draw(95.0, 145.0);
     let mut low = maker.rest.bent(maker.draw(12.0, 55.0), maker.draw(-25.0, 15.0)).legs(
@@ -175,7 +172,6 @@ fn seated(maker: &mut Maker) -> (Moment, Moment) {
     (seated, between)
 }
 
-/// Sitting down.
 pub fn sit_down(maker: &mut Maker) -> Motion {
     let (seated, between) = seated(maker);
     let mut parts = vec![(maker.seconds(0.7), between), (maker.seconds(0.6), seated)];
@@ -185,7 +181,6 @@ pub fn sit_down(maker: &mut Maker) -> Motion {
     maker.once(parts)
 }
 
-/// Standing up from a chair.
 pub fn stand_up(maker: &mut Maker) -> Motion {
     let (seated, between) = seated(maker);
     let standing = maker.rest;
@@ -215,7 +210,6 @@ pub fn lie_down(maker: &mut Maker) -> Motion {
     maker.once(parts)
 }
 
-/// Kicking ahead with one leg.
 pub fn kick(maker: &mut Maker) -> Motion {
     let main = maker.main;
     let (high, back) = (maker.draw(35.0, 95.0), maker.draw(5.0, 30.0));
@@ -241,7 +235,6 @@ pub fn kick(maker: &mut Maker) -> Motion {
     maker.once(parts)
 }
 
-/// Jumping jacks.
 pub fn jumping_jack(maker: &mut Maker) -> Motion {
     let reach = maker.draw(0.85, 0.99);
     let (low, high) = (maker.draw(-84.0, -55.0), maker.draw(40.0, 100.0));
@@ -259,7 +252,6 @@ pub fn jumping_jack(maker: &mut Maker) -> Motion {
     maker.repeated(Vec::new(), &[(beat, flight), (beat, open), (beat, flight), (beat, closed)], times)
 }
 
-/// Digging with a spade.
 pub fn dig(maker: &mut Maker) -> Motion {
     let main = maker.main;
     let (upright, deep) = (maker.draw(12.0, 35.0), maker.draw(40.0, 75.0));

@@ -83,10 +83,7 @@ pub fn parse(text: &str) -> Result<Motion, RecordingError> {
     let (line, time) = lines.value("Frame Time")?;
     let frame_time_s = number(time, line, "the seconds from frame to frame")?;
     if frame_time_s <= 0.0 {
-        return Err(wrong(
-            line,
-            format!("found a frame time of {frame_time_s} s, expected more than nought"),
-        ));
+        return Err(wrong(line, format!("found a frame time of {frame_time_s} s, expected more than 0")));
     }
     let frames = lines.frames(promised, channels, most_points / joints.len().max(1))?;
     Ok(Motion { joints, frame_time_s, frames })
@@ -308,9 +305,8 @@ impl<'a> Lines<'a> {
                 return Err(wrong(line, reason));
             }
             if frames.len() == most {
-                let reason = format!(
-                    "found {channels} channels for so many joints that hardly one moves, expected a body"
-                );
+                let reason =
+                    format!("found {channels} channels, too few for the number of joints, expected a body");
                 return Err(wrong(line, reason));
             }
             let values: Result<Vec<f64>, RecordingError> =
@@ -363,7 +359,7 @@ mod tests {
     }
 
     #[test]
-    fn errors_name_the_line_what_stands_there_and_what_was_expected() {
+    fn errors_name_the_line_its_content_and_the_expectation() {
         refused("HIERARCHY", "TREE", "line 1: found `TREE`, expected `HIERARCHY`");
         refused("ROOT Bip01 Hips", "ROOT", "line 2: found nothing, expected the root's name");
         refused("ROOT", "JOINT", "line 2: found `JOINT`, expected ROOT");
@@ -394,7 +390,7 @@ mod tests {
         refused("MOTION", "", "line 13: found `Frames:`, expected ROOT or MOTION");
         refused("Frames: 2", "Frames: two", "line 13: found `two`, expected the number of frames");
         refused("Frame Time: .025", "Time: 1", "line 14: found `Time: 1`, expected `Frame Time:`");
-        refused(".025", "0", "line 14: found a frame time of 0 s, expected more than nought");
+        refused(".025", "0", "line 14: found a frame time of 0 s, expected more than 0");
         refused("1 2 3 4 5", "1 2 3 4", "line 15: found 4 values, expected 5, one per channel");
         refused("1 2 3 4 5", "1 2 x 4 5", "line 15: found `x`, expected a number: a channel's value");
         refused("1 2 3 4 5", "1 2 NaN 4 5", "line 15: found `NaN`, expected a number: a channel's value");
@@ -415,6 +411,6 @@ mod tests {
         );
         // Names extend to the bracket: a chain of 3001 joints with one moving.
         let error = parse(&text).expect_err("nine million points from 80 kB");
-        assert!(error.to_string().contains("found 1 channels for so many joints"), "{error}");
+        assert!(error.to_string().contains("found 1 channels, too few for the number of joints"), "{error}");
     }
 }

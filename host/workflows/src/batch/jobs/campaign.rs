@@ -1,4 +1,4 @@
-//! Random scenarios on the emulated rig: a job for each range of seeds.
+//! Job: random scenarios on the emulated rig for a range of seeds.
 
 use std::{
     fs,
@@ -16,10 +16,8 @@ use crate::{
     simulator::{self, SimulatorError},
 };
 
-/// From one look at the wish to stop to the next.
 const LOOK: Duration = Duration::from_millis(50);
 const PROGRAM: &str = "farnear-campaign";
-/// Name of the figures next to the scenarios that broke something.
 const FIGURES: &str = "campaign.json";
 
 struct Seeds {
@@ -38,13 +36,13 @@ pub(super) fn work(fields: &mut Fields) -> Result<Box<dyn Job>> {
         firmware: fields.optional_path("firmware")?,
         program: program.clone(),
     };
-    // Another program, or firmware, may find something else.
+    // Program and firmware are inputs, because they may change the findings.
     let firmware = settings.firmware.clone().unwrap_or_else(|| simulator::firmware_of(&program));
     let inputs = vec![program, firmware];
     Ok(Box::new(Call { inputs, settings, run: played }))
 }
 
-/// Plays them, one after the other. One that breaks a property is a result and no failure.
+/// Runs the scenarios. A violated property is a result, not a failure.
 fn played(settings: &Seeds, out: &Path, context: &Context<'_>) -> Result<Value> {
     let folder = |source| WorkflowError::Folder { folder: out.into(), source };
     fs::create_dir_all(out).map_err(folder)?;

@@ -1,4 +1,4 @@
-//! How well a method, or a finished model, recognises samples: a job for each method, set or mode that is compared.
+//! Job: evaluates a method or a finished model on samples.
 
 use std::{
     fs,
@@ -25,7 +25,6 @@ use crate::{
     error::{Result, WorkflowError},
 };
 
-/// Name of the figures next to the pictures.
 const FIGURES: &str = "figures.json";
 
 pub(super) fn work(fields: &mut Fields) -> Result<Box<dyn Job>> {
@@ -76,7 +75,6 @@ pub(super) fn work(fields: &mut Fields) -> Result<Box<dyn Job>> {
     }))
 }
 
-/// A file of samples and the masks that it names.
 fn masks_of(samples: &Path) -> Result<Vec<PathBuf>> {
     let mut inputs = vec![samples.to_path_buf()];
     inputs.extend(Samples::folders(samples)?);
@@ -100,7 +98,7 @@ fn judged(
     kept(value(judging::judge(&model, &settings, context)?)?, out)
 }
 
-/// Writes the figures next to the pictures, without times: the same samples are to give the same file.
+/// Writes the figures without times, so that equal samples give equal files.
 fn kept(figures: Value, out: &Path) -> Result<Value> {
     let mut same = figures.clone();
     if let Some(same) = same.as_object_mut() {

@@ -1,5 +1,3 @@
-//! Steps that a person actuates: switches, the emergency stop, turning a motor's shaft.
-
 use std::time::{Duration, Instant};
 
 use farnear_capture::{
@@ -11,14 +9,12 @@ use farnear_protocol::message::{Alarm, Status};
 use super::{Checkup, Found, failed, passed, passed_over};
 use crate::error::Result;
 
-/// Time for a person to press or turn something.
 const PATIENCE: Duration = Duration::from_secs(60);
-/// From one look to the next.
 const LOOK: Duration = Duration::from_millis(20);
-/// A motor's shaft is turned at least so far: a tenth of a turn of a 0.5 mm screw.
+/// Least rotation of a motor's shaft: a tenth of a turn of a 0.5 mm screw.
 const TURNED_UM: f64 = 50.0;
 
-/// Waits for a status; `None` after the time-out.
+/// Returns `None` after the time-out.
 fn wait_for(checkup: &Checkup<'_>, what: impl Fn(&Status) -> bool) -> Result<Option<Status>> {
     let until = Instant::now() + PATIENCE;
     loop {

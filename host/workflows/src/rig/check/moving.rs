@@ -14,11 +14,11 @@ use farnear_protocol::{
 
 use super::{Checkup, EquippedRig, Found, failed, passed, passed_over};
 
-/// Speed of the first move, a twelfth of the usual one.
+/// A twelfth of the usual speed.
 const SLOW_NM_PER_S: i32 = 500_000;
-/// Two homings agree within this.
+/// Largest difference between two homings.
 const REPEATS_UM: f64 = 1.5;
-/// Exposures of the strobe's check, and how far the strobe's length may be from the exposure asked for.
+/// Exposures of the strobe check, and tolerance of the strobe's length.
 const EXPOSURES: u16 = 5;
 const STROBE_US: u64 = 200;
 
@@ -27,7 +27,7 @@ fn range(axis: Axis, limits: &Limits) -> (i32, i32) {
     (min.0, max.0)
 }
 
-/// Where an axis may stand from where it was sent: within the window in which the board calls a move settled.
+/// Largest position error: the window in which the board reports a move as settled.
 fn tolerance_um(axis: Axis) -> f64 {
     um(Settle::of_move(axis).window)
 }
@@ -48,7 +48,7 @@ pub(super) fn slow_homing(checkup: &mut Checkup<'_>) -> Found {
         let usual = client.setting(speed_key(*axis))?;
         client.set_setting(speed_key(*axis), SLOW_NM_PER_S.clamp(usual.min, usual.max))?;
         let homed = client.home(*axis);
-        // In any case: the speed must not stay this low.
+        // Restore the speed in any case.
         let restored = client.set_setting(speed_key(*axis), usual.value);
         homed?;
         restored?;
@@ -90,15 +90,15 @@ pub(super) fn full_speed(checkup: &mut Checkup<'_>) -> Found {
             return failed(format!("the {} stands {error:+.3} um off", axis_name(axis)));
         }
         if axis == Axis::Lens {
-            // Where it stands decides which distances of the sensor can be reached: the next capture expects it where homing
-            // leaves it.
+            // The next capture expects the stage where homing leaves it: its position limits the sensor
+            // distances.
             client.move_to(axis, Nanometres(min))?;
         }
     }
     passed(format!("to the middle of the travel; off by {}", said.join(", ")))
 }
 
-/// A halt in mid-move: the alarm comes up, everything is refused, and it goes when it is cleared.
+/// Halts in mid-move. The alarm must be latched, refuse requests, and clear.
 pub(super) fn halt(checkup: &mut Checkup<'_>) -> Found {
     let client = checkup.client();
     let Some(axis) = steppers(&client.hello().capabilities).first().copied() else {

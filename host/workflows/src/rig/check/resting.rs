@@ -1,4 +1,4 @@
-//! What the board can tell while nothing moves.
+//! Steps without motion.
 
 use std::time::{Duration, Instant};
 
@@ -7,11 +7,10 @@ use farnear_protocol::message::SettingKey;
 
 use super::{Checkup, Found, failed, passed, passed_over};
 
-/// Questions that are asked to judge the line.
 const QUESTIONS: usize = 200;
-/// So often they are asked at most: one good time shows that the line is good, and that it was this computer that was late.
+/// Most attempts. One fast attempt shows that the line is good and this computer was late.
 const ROUNDS: usize = 3;
-/// A real board answers within this, nineteen times of twenty.
+/// Limit for 95 % of a real board's answers.
 const ANSWER: Duration = Duration::from_millis(50);
 
 pub(super) fn link(checkup: &mut Checkup<'_>) -> Found {
@@ -35,7 +34,7 @@ pub(super) fn link(checkup: &mut Checkup<'_>) -> Found {
             usual.as_secs_f64() * 1e3,
             slowest.as_secs_f64() * 1e3
         );
-        // A line that is slow is slow with most; with a few it is this computer, which had something else to do.
+        // A slow line delays most answers. A busy computer delays a few.
         let late = repeated > 0 || (usual > ANSWER && !client.hello().emulated);
         if bad == 0 && !late {
             return passed(said);
@@ -78,7 +77,7 @@ pub(super) fn alarms(checkup: &mut Checkup<'_>) -> Found {
     }
 }
 
-/// A setting is changed, read back after a reset, and put back.
+/// Changes a setting, reads it back after a reset, and restores it.
 pub(super) fn memory(checkup: &mut Checkup<'_>) -> Found {
     if !checkup.client().hello().capabilities.memory {
         return passed_over("the board has none: settings and alarms are lost without power");

@@ -1,4 +1,4 @@
-//! How well the pace of a continuous capture was held.
+//! How well a continuous capture kept its pace.
 
 use farnear_capture::continuous::{Frame, Loss, Outcome};
 use farnear_protocol::{
@@ -9,51 +9,42 @@ use serde::Serialize;
 
 use crate::figures::rounded;
 
-/// What there is to say of a continuous capture.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct ContinuousFigures {
-    /// Exposures with their images.
+    /// Exposures with an image.
     pub exposures: usize,
-    /// Whole cycles among them: pairs.
     pub cycles: usize,
-    /// From the first exposure to the last, by the board's clock.
     pub board_s: f64,
-    /// Exposures a second of the board's time.
+    /// By board time.
     pub rate_hz: f64,
-    /// Frames without an exposure, for the position had not settled.
+    /// Frames without an exposure because the position had not settled.
     pub dropped_not_settled: usize,
-    /// The same, for the camera was not ready.
+    /// Frames without an exposure because the camera was not ready.
     pub dropped_camera_busy: usize,
-    /// The same, for the camera did not answer its trigger.
+    /// Frames without an exposure because the camera did not respond to its trigger.
     pub dropped_no_strobe: usize,
-    /// Frames of which the board's word was lost.
     pub lost_events: usize,
-    /// Exposures whose image did not come.
     pub lost_images: usize,
     /// Exposures during which the measured position left the settle window.
     pub exposures_outside_window: usize,
-    /// Largest distance of a trigger from its moment; of a capture without a pace, of an interval from the mean one.
+    /// Largest error of a trigger time. Without a pace: largest difference of an interval from the mean.
     pub jitter_us: f64,
-    /// Longest time from the start of a move until it was settled.
+    /// Longest time from the start of a move until it settled.
     pub longest_settle_ms: f64,
-    /// Largest distance of the measured position from the one asked for during an exposure.
+    /// Largest difference between measured and commanded position during an exposure.
     pub largest_deviation_um: f64,
 }
 
-/// Counts frames as they come.
 pub struct Tally {
     period: Micros,
     windows_nm: Vec<i32>,
     counted: ContinuousFigures,
-    /// Number and trigger of the first exposure.
     first: Option<(u32, u64)>,
-    /// Number and trigger of the last one.
     last: Option<(u32, u64)>,
     intervals_us: (u64, u64),
 }
 
 impl Tally {
-    /// Of a cycle of shots at a pace.
     pub fn new(period: Micros, shots: &[Shot]) -> Self {
         let counted = ContinuousFigures {
             exposures: 0,
@@ -78,18 +69,16 @@ impl Tally {
         self.counted.exposures
     }
 
-    /// Board time from the first exposure to this one.
+    /// Board time since the first exposure.
     pub fn seconds_at(&self, frame: &Frame) -> f64 {
         let begin = self.first.map_or(frame.record.trigger.0, |(_, begin)| begin);
         frame.record.trigger.0.saturating_sub(begin) as f64 / 1e6
     }
 
-    /// A cycle is whole.
     pub fn completed(&mut self) {
         self.counted.cycles += 1;
     }
 
-    /// Takes what became of a frame.
     pub fn count(&mut self, outcome: &Outcome) {
         let counted = &mut self.counted;
         let frame = match outcome {
@@ -123,7 +112,6 @@ impl Tally {
         self.last = Some((number, trigger));
     }
 
-    /// What there is to say.
     pub fn figures(self) -> ContinuousFigures {
         let mut figures = self.counted;
         if let (Some((_, first)), Some((_, last))) = (self.first, self.last) {

@@ -1,5 +1,4 @@
-//! What a continuous capture leaves behind: a capture folder for each pair, or an image for each exposure, and `frames.csv` with
-//! a row for each frame, taken or not.
+//! A capture folder per pair or an image per exposure, and `frames.csv` with a row per frame.
 
 use std::{
     fmt::Write,
@@ -29,7 +28,7 @@ pub struct Folder {
 }
 
 impl Folder {
-    /// Begins a new folder; one that holds something already is refused. Complete captures stay, also if the run ends early.
+    /// Creates the folder, which must be new or empty. Complete captures remain if the run ends early.
     pub fn begin(path: &Path) -> Result<Self> {
         Staging::new_folder(path)
             .and_then(Staging::finish)
@@ -40,7 +39,6 @@ impl Folder {
         Ok(Self { path: path.into(), rows, pairs: 0 })
     }
 
-    /// Keeps a frame's row.
     pub fn note(&mut self, outcome: &Outcome) {
         // Writing to a string cannot fail.
         let _ = match outcome {
@@ -69,7 +67,6 @@ impl Folder {
         };
     }
 
-    /// Writes a pair's capture folder.
     pub fn pair(
         &mut self,
         cycle: Vec<Frame>,

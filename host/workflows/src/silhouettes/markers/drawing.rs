@@ -1,5 +1,3 @@
-//! Drawing the frames of a recording from a view.
-
 use std::collections::HashMap;
 
 use farnear_files::{masks, staging::Staging};
@@ -22,31 +20,25 @@ use super::{
 };
 use crate::{context::Context, counter::Counter, error::Result};
 
-/// Pixels kept free round the subject.
 const MARGIN_PX: usize = 2;
-/// Gaps that are closed in the thesis, and where parts have a thickness.
+/// Gaps closed in the thesis, and with thick parts.
 const CLOSED_MM: f64 = 126.0;
 const CLOSED_BETWEEN_THICK_PARTS_MM: f64 = 40.0;
 const UNIT: &str = "masks";
-/// Work that is cancelled.
 const DURING: &str = "drawing silhouettes";
 
-/// What all views share.
 pub struct Job<'a> {
     pub settings: &'a MarkersRequest,
-    /// How many views are drawn.
     pub views: usize,
-    /// The body's parts.
     pub template: &'a Template,
-    /// Visible points of each drawn frame.
     pub frames: &'a [HashMap<&'a str, Point3>],
-    /// The frames' names, by their numbers in the recording.
+    /// Frame names, by their numbers in the recording.
     pub names: &'a [String],
     pub context: &'a Context<'a>,
 }
 
 impl Job<'_> {
-    /// All frames of every view, a folder of masks each; returns the number of masks with a person.
+    /// Draws a folder of masks per view; returns the number of masks with a person.
     pub fn sequences(&self, views: &[View], out: &Staging) -> Result<usize> {
         let counter = Counter::new(self.context, UNIT);
         let drawn: Result<Vec<usize>> = views
@@ -72,7 +64,7 @@ impl Job<'_> {
         Ok(silhouettes)
     }
 
-    /// The `keep` least alike silhouettes of all views, in one folder; gives how many there are.
+    /// Draws the `keep` least similar silhouettes of all views into one folder; returns their number.
     pub fn gallery(&self, views: &[View], keep: usize, out: &Staging) -> Result<usize> {
         let counter = Counter::new(self.context, UNIT);
         let all: Result<Vec<Vec<(String, Mask)>>> = views
@@ -88,7 +80,6 @@ impl Job<'_> {
         Ok(kept.len())
     }
 
-    /// The silhouettes of a view, cut out, with names.
     fn cut_outs(&self, view: &View, prefix: &str, counter: &Counter<'_>) -> Result<Vec<(String, Mask)>> {
         let canvas = self.canvas(view)?;
         let mut named = Vec::new();
@@ -102,7 +93,6 @@ impl Job<'_> {
         Ok(named)
     }
 
-    /// Draws a frame of a view.
     fn mask(&self, frame: &HashMap<&str, Point3>, view: &View, canvas: &Canvas) -> Mask {
         let drawn = parts::draw(frame, self.template, view, canvas, self.settings.fill);
         let thick = self.template.parts.iter().any(|part| part.thickness_mm > 0.0);

@@ -1,4 +1,4 @@
-//! Parts of a template that cannot be drawn, because nothing of them was recorded or seen.
+//! Template parts that cannot be drawn, because they were not recorded or are hidden.
 
 use std::collections::HashMap;
 
@@ -7,16 +7,13 @@ use farnear_silhouettes::silhouette::{capsule::Point3, template::Template};
 
 use super::Flagged;
 
-/// Parts that cannot be drawn.
 pub struct MissingParts {
-    /// Names of parts of which the recording has no point at all.
+    /// Parts for which the recording has no point.
     pub always: Vec<String>,
-    /// What each frame is flagged with.
     per_frame: Vec<Vec<String>>,
 }
 
 impl MissingParts {
-    /// Compares a template with what was recorded and with what is visible in every frame.
     pub fn of(template: &Template, recording: &Recording, frames: &[HashMap<&str, Point3>]) -> Self {
         let short = |name: &str| name.rsplit_once(':').map_or(name, |(_, short)| short).to_owned();
         let names = recording.known_names();
@@ -37,7 +34,6 @@ impl MissingParts {
         }
     }
 
-    /// The doubtful ones among the same frames, by their names.
     pub fn flagged<'a>(&'a self, names: &'a [String]) -> Vec<Flagged<'a>> {
         let all = names.iter().zip(&self.per_frame);
         all.filter(|(_, flags)| !flags.is_empty()).map(|(frame, flags)| Flagged { frame, flags }).collect()

@@ -1,4 +1,4 @@
-//! Cancelling a workflow, from any thread, stops the rig.
+//! Cancelling a workflow from any thread stops the rig.
 
 use std::{
     thread,
@@ -27,12 +27,12 @@ use farnear_workflows::{
 
 use super::{Face, camera, optics, stack};
 
-/// Longest time from cancelling to the end of the workflow, with a board that answers and stops immediately.
+/// Longest time from cancelling to the end of the workflow, with a board that stops immediately.
 const STOPPED_WITHIN: Duration = Duration::from_millis(300);
-/// A crowded computer may be late once; a slow path is slow each time.
+/// A busy computer may be late once; a slow path is slow each time.
 const TRIES: usize = 3;
 
-/// Waits, but not for ever: a workflow that ended before its time shall fail the test and not hang it.
+/// Waits with a limit, so that a test fails instead of hanging.
 fn wait_until(reached: impl Fn() -> bool) {
     let until = Instant::now() + Duration::from_secs(60);
     while !reached() && Instant::now() < until {
@@ -40,7 +40,7 @@ fn wait_until(reached: impl Fn() -> bool) {
     }
 }
 
-/// Starts a workflow with this board and cancels it from a second thread as soon as `under_way` is true of the board.
+/// Starts a workflow with this board and cancels it from a second thread when `under_way` is true.
 fn cancelled(
     faults: &Faults,
     under_way: impl Fn(&Peer) -> bool + Clone + Send + 'static,
@@ -161,8 +161,8 @@ fn every_workflow_that_moves_stops_the_rig() {
 fn a_camera_that_gives_nothing_is_waited_for_no_longer() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path();
-    // Homed, moved, both exposed; a moment later the workflow has heard of it, and waits for the first image. Of how long that moment is
-    // on a busy machine nobody can be told, so a wish that came too soon is made again later.
+    // After both exposures the workflow waits for the first image. The delay until then depends on the
+    // machine, so an early cancellation is repeated later.
     for moment in [50, 500, 5_000].map(Duration::from_millis) {
         let exposed = move |board: &Peer| {
             let exposed = board.board().triggers > 0;

@@ -1,4 +1,4 @@
-//! The checklist as data: verdicts and details, and a person whose hands do what is said.
+//! Checklist results: verdicts, details, and a user who follows the prompts.
 
 use farnear_protocol::message::Alarm;
 use farnear_scripted_board::{Faults, Peer, plug_in};
@@ -12,7 +12,7 @@ use farnear_workflows::{
 
 use super::{Face, camera};
 
-/// A person next to the scripted board.
+/// A user at the scripted board.
 struct Person {
     board: Peer,
     face: Face,
@@ -78,7 +78,7 @@ fn hands_press_turn_and_release_what_the_checklist_says() {
 fn a_failure_ends_the_list_where_the_next_step_would_rest_on_it() {
     let (port, board) = plug_in(Faults::default());
     board.board().hello.capabilities.memory = false;
-    // The scripted board ends each move at once, so that a halt comes too late.
+    // The scripted board ends each move immediately, so a halt is too late.
     let (list, _) = go_through(board, port, false, false);
     let last = list.steps.last().unwrap();
     assert_eq!((last.step, last.verdict), ("halt and its alarm", Verdict::Failed), "{list:?}");
@@ -89,7 +89,7 @@ fn a_failure_ends_the_list_where_the_next_step_would_rest_on_it() {
 }
 
 #[test]
-fn a_latched_alarm_is_told_and_nothing_goes_on() {
+fn a_latched_alarm_is_reported_and_ends_the_checklist() {
     let (port, board) = plug_in(Faults::default());
     board.board().raise(Alarm::SupplyLow);
     let (list, _) = go_through(board, port, true, false);

@@ -1,4 +1,4 @@
-//! Tasks on a connected rig, and refusals before.
+//! Tasks on a connected rig, and errors before them.
 
 use std::{thread, time::Duration};
 
@@ -33,7 +33,7 @@ fn moves_home_first_where_asked_to_and_say_so() {
 }
 
 #[test]
-fn what_cannot_be_is_refused_before_the_port_is_looked_at() {
+fn impossible_requests_are_rejected_before_the_port_is_opened() {
     let rig = RigAddress::Port("/dev/farnear-no-such-port".into());
     let context = Context::unattended();
     let targets = vec![(Axis::SensorFine, f64::NAN)];
@@ -76,7 +76,7 @@ fn the_board_is_asked_and_told() {
 #[test]
 fn a_log_without_its_texts_is_given_as_bytes_until_it_is_cancelled() {
     let (port, board) = plug_in(Faults::default());
-    // The scripted board's line moves when it is asked something, as an emulated board's time does.
+    // The scripted board's line answers on request, like an emulated board's time.
     board.board().hello.emulated = true;
     let face = Face::default();
     let context = face.context();

@@ -1,4 +1,4 @@
-//! A second job on a running rig waits for nothing that the first one did.
+//! A second job on a running rig waits for nothing from the first.
 
 use std::{
     path::Path,
@@ -32,26 +32,26 @@ use ndarray::Array2;
 
 use super::{Face, camera, optics, stack};
 
-/// What a second run may take longer than the first on a crowded computer. Each needless wait for the board is 5 s or more.
+/// Extra time of a second run on a busy computer. Each needless wait for the board is at least 5 s.
 const LEEWAY: Duration = Duration::from_secs(2);
 
-/// Sharpest where the piezo and the coarse stage together are here.
+/// Sum of piezo and coarse stage positions in best focus.
 const SHARPEST_NM: i32 = 2_880_000;
 
-/// A checkerboard whose contrast tells how far the sensor is from the best focus.
+/// A checkerboard whose contrast depends on the distance from the best focus.
 fn picture(shot: &ShotRecord) -> Vec<u8> {
     let away_um = f64::from(shot.coarse.0 + shot.fine.0 - SHARPEST_NM) / 1e3;
     let contrast = 100.0 / (1.0 + (away_um / 60.0).powi(2));
     let light = |(row, column): (usize, usize)| {
         let sign = if (row / 2 + column / 2) % 2 == 0 { 1.0 } else { -1.0 };
-        // No two pictures are the same, as those of a camera are not.
+        // Images differ, as those of a camera do.
         let noise = ((row * 31 + column * 17 + shot.trigger_number as usize * 7) % 97 % 5) as f64;
         (120.0 + sign * contrast + noise) as u16
     };
     encode_png(Array2::from_shape_fn((96, 96), light).view(), 8).unwrap()
 }
 
-/// Puts a picture of each exposure into the folder until `over`.
+/// Writes an image of each exposure to the folder until `over`.
 fn feed(folder: &Path, board: &Peer, over: &AtomicBool) {
     let mut seen = 0;
     while !over.load(Ordering::Relaxed) {
@@ -76,7 +76,7 @@ fn feed(folder: &Path, board: &Peer, over: &AtomicBool) {
 
 type Job<'a> = Box<dyn Fn(RigAddress, usize, &Context<'_>) -> Result<()> + 'a>;
 
-/// Watches until two pictures or maps have come.
+/// Runs until two images or maps arrive.
 fn until_two<T>(watch: impl FnOnce(&mut dyn FnMut(T) -> Result<()>) -> Result<()>) -> Result<()> {
     let mut count = 0;
     let ended = watch(&mut |_| {
@@ -185,7 +185,7 @@ fn a_second_run_takes_no_longer_than_the_first() {
     ];
     let (port, board) = plug_in(Faults::default());
     board.board().hello.capabilities.memory = false;
-    // The host is patient with an emulated board: a wait for nothing takes as long as it can.
+    // The host waits longest for an emulated board.
     board.board().hello.emulated = true;
     board.board().hello.firmware = env!("CARGO_PKG_VERSION").try_into().unwrap();
     let face = Face::default();

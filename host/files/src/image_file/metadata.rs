@@ -1,0 +1,126 @@
+//! Orientation and time of exposure from EXIF and XMP.
+
+use std::{io::Cursor, path::Path};
+
+use image::{ImageDecoder, ImageFormat, ImageReader, metadata::Orientation};
+use zune_jpeg::{JpegDecoder, zune_core::bytestream::ZCursor};
+
+use super::tiff_tags;
+
+/// Orientation as in EXIF, 1 to 8; 1 = upright. EXIF comes before XMP.
+pub(super) fn orientation(exif: Option<&[u8]>, xmp: Option<&[u8]>) -> u8 {
+    let of_exif = || exif.and_then(Orientation::from_exif_chunk).map(Orientation::to_exif);
+    of_exif().or_else(|| of_xmp(xmp?)).unwrap_or(1)
+}
+
+/// `tiff:Orientation`, as an attribute or an element.
+fn of_xmp(xmp: &[u8]) -> Option<u8> {
+    let text = String::from_utf8_lossy(xmp);
+    let value = text.split("tiff:Orientation").nth(1)?.trim_start_matches(['=', '"', '\'', '>', ' ']);
+    let value = value.chars().next()?.to_digit(10)? as u8;
+    (1..=8).contains(&value).then_some(value)
+}
+
+/// EXIF and XMP of an image that is neither JPEG nor TIFF.
+pub(super) fn of_decoder(
+    decoder: &mut impl ImageDecoder,
+    bytes: &[u8],
+) -> (Option<Vec<u8>>, Option<Vec<u8>>) {
+    let exif = decoder.exif_metadata().ok().flatten().or_else(|| raw_profile(bytes));
+    (exif, decoder.xmp_metadata().ok().flatten())
+}
+
+/// EXIF in hexadecimal, in a text chunk of a PNG, as ImageMagick writes it: an empty line, `exif`, the length, the data.
+fn raw_profile(bytes: &[u8]) -> Option<Vec<u8>> {
+    const NAMES: [&str; 2] = ["Raw profile type exif", "Raw profile type APP1"];
+    let png = png::Decoder::new(Cursor::new(bytes)).read_info().ok()?;
+    let info = png.info();
+    let plain = info.uncompressed_latin1_text.iter().find(|text| NAMES.contains(&text.keyword.as_str()));
+    let packed = || info.compressed_latin1_text.iter().find(|text| NAMES.contains(&text.keyword.as_str()));
+    let text = plain.map(|plain| plain.text.clone()).or_else(|| packed()?.get_text().ok())?;
+    let digits: Vec<u8> = text
+        .trim_start()
+        .lines()
+        .skip(2)
+        .flat_map(str::chars)
+        .filter_map(|digit| Some(digit.to_digit(16)? as u8))
+        .collect();
+    let bytes: Vec<u8> = digits.chunks_exact(2).map(|two| 16 * two[0] + two[1]).collect();
+    Some(bytes.strip_prefix(b"Exif\0\0").map(<[u8]>::to_vec).unwrap_or(bytes))
+}
+
+/// Time of the exposure, `2026:11:25 20:15:03`, with the fraction of a second where it is stated.
+pub(crate) fn taken(path: &Path) -> Option<String> {
+    let bytes = std::fs::read(path).ok()?;
+    let exif = if tiff_tags::is_tiff(&bytes) {
+        bytes
+    } else if bytes.starts_with(b"\xff\xd8") {
+        let mut decoder = JpegDecoder::new(ZCursor::new(&bytes));
+        decoder.decode_headers().ok()?;
+        decoder.exif()?.clone()
+    } else {
+        let format: ImageFormat = image::guess_format(&bytes).ok()?;
+        let mut decoder = ImageReader::with_format(Cursor::new(&bytes), format).into_decoder().ok()?;
+        of_decoder(&mut decoder, &bytes).0?
+    };
+    let directory = tiff_tags::directories(&exif).ok()?.into_iter().next()?;
+    let exposed = directory.exposed.or(directory.date_time)?;
+    Some(exposed + "." + directory.exposed_fraction.as_deref().unwrap_or_default())
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use std::fmt::Write;
+
+    use super::super::decode_grey;
+
+    /// EXIF with an orientation, and the exposure's time in its own directory.
+    fn exif(orientation: u8, time: &str) -> Vec<u8> {
+        assert_eq!(time.len(), 19);
+        let entry = |tag: u16, kind: u16, count: u32, value: u32| {
+            [&tag.to_le_bytes()[..], &kind.to_le_bytes(), &count.to_le_bytes(), &value.to_le_bytes()].concat()
+        };
+        let first = [entry(274, 3, 1, orientation.into()), entry(34665, 4, 1, 38)].concat();
+        let second = entry(36867, 2, 20, 56);
+        let end = [0; 4];
+        [&b"II*\0\x08\0\0\0\x02\0"[..], &first, &end, b"\x01\0", &second, &end, time.as_bytes(), b"\0"]
+            .concat()
+    }
+
+    fn png(add: impl FnOnce(&mut png::Encoder<&mut Vec<u8>>)) -> Vec<u8> {
+        let mut bytes = Vec::new();
+        let mut encoder = png::Encoder::new(&mut bytes, 3, 2);
+        add(&mut encoder);
+        encoder.write_header().unwrap().write_image_data(&[0, 50, 100, 150, 200, 250]).unwrap();
+        bytes
+    }
+
+    /// A PNG with EXIF in a text chunk.
+    pub(crate) fn png_with_exif(orientation: u8, time: &str) -> Vec<u8> {
+        let profile = [&b"Exif\0\0"[..], &exif(orientation, time)].concat();
+        let mut text = format!("\nexif\n{:8}\n", profile.len());
+        for line in profile.chunks(36) {
+            line.iter().for_each(|byte| write!(text, "{byte:02x}").unwrap());
+            text.push('\n');
+        }
+        png(|encoder| encoder.add_ztxt_chunk("Raw profile type exif".into(), text).unwrap())
+    }
+
+    #[test]
+    fn xmp_and_text_chunks_turn_an_image() {
+        let xmp = |text: &str| {
+            let text = format!("<x:xmpmeta xmlns:x='adobe:ns:meta/'><rdf:Description {text}</x:xmpmeta>");
+            png(|encoder| encoder.add_itxt_chunk("XML:com.adobe.xmp".into(), text).unwrap())
+        };
+        let files = [
+            xmp("tiff:Orientation=\"6\"/>"),
+            xmp("><tiff:Orientation>6</tiff:Orientation>"),
+            png_with_exif(6, "2026:11:25 20:00:00"),
+        ];
+        for file in files {
+            let pixels = decode_grey(&file).unwrap().pixels.mapv(|v| (255.0 * v).round() as u8);
+            assert_eq!(pixels, ndarray::array![[150, 0], [200, 50], [250, 100]]);
+        }
+        assert_eq!(decode_grey(&xmp("tiff:Orientation=\"9\"/>")).unwrap().pixels.dim(), (2, 3));
+    }
+}

@@ -1,0 +1,172 @@
+//! The images of a stack in a temporary file in the result's folder, so that one at a time is in memory.
+
+use std::{
+    fs::File,
+    io::{self, Read, Seek, SeekFrom, Write},
+    ops::Range,
+    path::PathBuf,
+    sync::{Mutex, PoisonError},
+};
+
+use farnear_depth::{
+    focus_stack::Slices,
+    optics::Distortion,
+    prepare::{
+        straightened,
+        warp::{Warp, resample},
+    },
+};
+use farnear_files::{
+    image_file::{Grey, ReadSettings, Samples, SharedWhiteLevel},
+    stack,
+    staging::{Staging, StagingError},
+};
+use ndarray::{Array2, ArrayView2, CowArray, Ix2};
+
+use super::FocusStackRequest;
+use crate::{
+    context::Context,
+    error::{Result, WorkflowError},
+};
+
+pub(super) struct Images<'a> {
+    /// 32-bit floats by rows. It has no name: the system removes it when the program ends, whatever the reason.
+    file: Mutex<File>,
+    folder: PathBuf,
+    /// Where each image begins in the file, bytes, with its height and width.
+    images: Vec<(u64, (usize, usize))>,
+    /// Pixels are divided by it.
+    white_level: f32,
+    /// Step between the codes of the coarsest image, before the division.
+    code_step: f32,
+    context: &'a Context<'a>,
+}
+
+/// Bytes of a pixel in the file.
+const PIXEL: usize = size_of::<f32>();
+
+impl<'a> Images<'a> {
+    /// Reads all image files.
+    pub fn read(
+        paths: &[PathBuf],
+        request: &FocusStackRequest,
+        warnings: &mut Vec<String>,
+        staging: &Staging,
+        context: &'a Context<'a>,
+    ) -> Result<Self> {
+        let folder = staging.path("");
+        let file = tempfile::tempfile_in(&folder).map_err(StagingError::at(&request.out))?;
+        let mut read = Self {
+            file: Mutex::new(file),
+            folder: request.out.clone(),
+            images: Vec::with_capacity(paths.len()),
+            white_level: 1.0,
+            code_step: 0.0,
+            context,
+        };
+        let (mut end, mut colour, mut white) = (0, false, SharedWhiteLevel::default());
+        let settings = ReadSettings { grey: request.grey, white_level: request.white_level };
+        context.cancel.check("reading the stack")?;
+        stack::read(paths, &settings, |index, image| -> Result<()> {
+            context.cancel.check("reading the stack")?;
+            context.progress.advance("images", index + 1, Some(paths.len()));
+            colour |= image.colour;
+            white.add(&image);
+            if let Samples::Integer(bits) = image.samples {
+                read.code_step = read.code_step.max(1.0 / (2_f32.powi(bits.into()) - 1.0));
+            }
+            read.images.push((end, image.pixels.dim()));
+            read.write(index, image.pixels.view())?;
+            end += (PIXEL * image.pixels.len()) as u64;
+            Ok(())
+        })?;
+        if request.grey == Grey::Mean && colour {
+            warnings.push("colour images: grey is the mean of red, green and blue (--grey)".into());
+        }
+        read.white_level = white.get().unwrap_or(1.0);
+        Ok(read)
+    }
+
+    pub fn remove(&mut self, index: usize) {
+        self.images.remove(index);
+    }
+
+    /// Removes the lens' distortion from all images and moves each by its warp, NaN where it does not show the scene. Where the
+    /// lens showed nothing, which is the same in all, images keep their own pixels, and the mask returned marks these.
+    pub fn prepare(&self, distortion: Option<Distortion>, warps: &[Warp]) -> Result<Option<Array2<bool>>> {
+        let mut unseen = None;
+        for (index, warp) in warps.iter().enumerate() {
+            if distortion.is_none() && *warp == Warp::IDENTITY {
+                continue;
+            }
+            self.context.cancel.check("aligning the stack")?;
+            let mut image = self.stored(index, 0..self.dim(index).0)?;
+            if let Some(distortion) = &distortion {
+                let straight = straightened(image.view(), distortion);
+                unseen = Some(straight.mapv(|value| !value.is_finite()));
+                image.zip_mut_with(&straight, |own, straight| {
+                    if straight.is_finite() {
+                        *own = *straight;
+                    }
+                });
+            }
+            if *warp != Warp::IDENTITY {
+                image = resample(image.view(), warp);
+            }
+            self.write(index, image.view())?;
+        }
+        Ok(unseen)
+    }
+
+    fn write(&self, index: usize, image: ArrayView2<f32>) -> Result<()> {
+        let bytes: Vec<u8> = image.iter().flat_map(|value| value.to_le_bytes()).collect();
+        self.at(index, 0, |file| file.write_all(&bytes))
+    }
+
+    /// Rows as they were written.
+    fn stored(&self, index: usize, rows: Range<usize>) -> Result<Array2<f32>> {
+        let shape = (rows.len(), self.dim(index).1);
+        let mut bytes = vec![0; PIXEL * shape.0 * shape.1];
+        self.at(index, rows.start, |file| file.read_exact(&mut bytes))?;
+        let (values, _) = bytes.as_chunks::<PIXEL>();
+        let values = values.iter().map(|bytes| f32::from_le_bytes(*bytes)).collect();
+        Ok(Array2::from_shape_vec(shape, values).unwrap_or_else(|_| unreachable!("one value for each pixel")))
+    }
+
+    fn at(&self, index: usize, row: usize, work: impl FnOnce(&mut File) -> io::Result<()>) -> Result<()> {
+        let (begin, (_, width)) = self.images[index];
+        let mut file = self.file.lock().unwrap_or_else(PoisonError::into_inner);
+        let done =
+            file.seek(SeekFrom::Start(begin + (PIXEL * row * width) as u64)).and_then(|_| work(&mut file));
+        Ok(done.map_err(StagingError::at(&self.folder))?)
+    }
+}
+
+impl Slices for Images<'_> {
+    type Error = WorkflowError;
+
+    fn count(&self) -> usize {
+        self.images.len()
+    }
+
+    fn dim(&self, index: usize) -> (usize, usize) {
+        self.images[index].1
+    }
+
+    fn rows(&self, index: usize, rows: Range<usize>) -> Result<CowArray<'_, f32, Ix2>> {
+        let mut image = self.stored(index, rows)?;
+        if self.white_level != 1.0 {
+            image.mapv_inplace(|value| value / self.white_level);
+        }
+        Ok(image.into())
+    }
+
+    fn code_step(&self) -> f32 {
+        self.code_step / self.white_level
+    }
+
+    fn measured(&self, rows: usize, of: usize) -> Result<()> {
+        self.context.progress.advance("rows", rows, Some(of));
+        self.context.cancel.check("measuring the stack")
+    }
+}
