@@ -90,7 +90,7 @@ class Rig:
     @property
     def _open(self) -> RigClient:
         if self._client is None:
-            raise RigError("the rig is closed; open it anew")
+            raise RigError("the rig is closed; open it again")
         return self._client
 
     @property
