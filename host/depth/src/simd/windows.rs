@@ -328,6 +328,7 @@ dispatch! {
 }
 
 #[inline(always)]
+#[expect(clippy::neg_cmp_op_on_partial_ord, reason = "NaN, which is not measured, counts as explained")]
 fn believe_generic<L: Lanes>(
     of: Believed,
     least: f32,

@@ -45,7 +45,7 @@ pub fn tracks(bodies: &Bodies, rate_hz: f64, count: usize, seed: u64, scaling: S
                 bodies.selected(&cut(bodies.frames(), rate_hz, &mut rng)).dressed(rng.random_range(0.8..1.3));
             let mut track = Track::from_masks(&[], scaling, true);
             for _ in 0..LOOKS {
-                let camera = Camera::drawn(&mut rng).from_side(from_deg);
+                let camera = Camera::drawn(&mut rng).seen_from(from_deg);
                 track = clip.seen_by(&camera, stature_mm, scaling, &mut rng);
                 if 2 * track.frames() > clip.frames() {
                     break;

@@ -71,7 +71,7 @@ impl Camera {
 
     /// The same camera moved around to this side.
     #[must_use]
-    pub fn from_side(self, gamma_deg: f64) -> Self {
+    pub fn seen_from(self, gamma_deg: f64) -> Self {
         Self { view: View { gamma_deg, ..self.view }, ..self }
     }
 
