@@ -112,7 +112,7 @@ fn side_by_side(threads: usize, rounds: usize, chain: impl Fn(&mut dyn FnMut()) 
 }
 
 /// Alignment and balance of a pair, and adaptive windows; on all threads.
-fn real_pair(optics: &Optics, [prepare_name, windowed_name]: [&str; 2], size: (usize, usize), runs: usize) {
+fn real_pair(optics: &Optics, [prepare_name, adaptive_name]: [&str; 2], size: (usize, usize), runs: usize) {
     let texture = random_image(size.0 + 2, size.1 + 2, 3);
     let part = |dy: usize, dx: usize| texture.slice(ndarray::s![dy..dy + size.0, dx..dx + size.1]).to_owned();
     let [far, near] = [part(0, 0), part(1, 2) * 1.1];
@@ -129,8 +129,8 @@ fn real_pair(optics: &Optics, [prepare_name, windowed_name]: [&str; 2], size: (u
     let bank = Bank::whitened(optics).unwrap();
     let of_windows =
         WindowSettings { window: Window::Adaptive, median_px: 3, noise: pair.noise, backend: None };
-    let windowed = || estimate(pair.far.view(), pair.near.view(), &bank, optics, &of_windows).unwrap();
-    report(windowed_name, Some(Backend::best()), threads, time(runs, windowed), None);
+    let adaptive = || estimate(pair.far.view(), pair.near.view(), &bank, optics, &of_windows).unwrap();
+    report(adaptive_name, Some(Backend::best()), threads, time(runs, adaptive), None);
 }
 
 /// Pairs of a stream with registration, depth, standard deviation and reasons, by the default method; on all threads.
@@ -270,9 +270,9 @@ fn main() {
         live(&optics("gaussian:k=0.4578"));
     }
     for (name, height, width, runs) in [("640x480", 480, 640, 20), ("4000x3000", 3000, 4000, 3)] {
-        let (prepare_name, windowed_name) = (format!("prepare_{name}"), format!("windowed_{name}"));
-        if wanted(&prepare_name) || wanted(&windowed_name) {
-            real_pair(&optics_pill, [&prepare_name, &windowed_name], (height, width), runs);
+        let (prepare_name, adaptive_name) = (format!("prepare_{name}"), format!("windowed_{name}"));
+        if wanted(&prepare_name) || wanted(&adaptive_name) {
+            real_pair(&optics_pill, [&prepare_name, &adaptive_name], (height, width), runs);
         }
     }
     let designs = [

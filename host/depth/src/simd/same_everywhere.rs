@@ -69,9 +69,9 @@ fn every_processor_gives_what_avx2_gave() {
         let map = depth_from_pair(far.view(), near.view(), &operators, &optics, &settings).unwrap();
         let settings =
             WindowSettings { window: Window::Adaptive, median_px: 3, noise, backend: Some(backend) };
-        let windowed = estimate(far.view(), near.view(), &bank, &optics, &settings).unwrap();
+        let adaptive = estimate(far.view(), near.view(), &bank, &optics, &settings).unwrap();
         let found: Vec<[f32; 3]> =
-            places().map(|at| [map.depth_mm[at], map.confidence[at], windowed.depth_mm[at]]).collect();
+            places().map(|at| [map.depth_mm[at], map.confidence[at], adaptive.depth_mm[at]]).collect();
         println!("{backend:?} {found:?}");
         for ((found, recorded), at) in found.iter().zip(&BY_AVX2).zip(places()) {
             for i in [0, 2] {

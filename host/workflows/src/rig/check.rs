@@ -81,11 +81,9 @@ const PHASES: [Phase; 3] = [
 )]
 #[serde(default)]
 pub struct CheckRequest {
-    /// Set by the caller.
     #[serde(skip)]
     #[cfg_attr(feature = "clap", arg(skip))]
     pub rig: RigAddress,
-    /// Set by the caller.
     #[serde(skip)]
     #[cfg_attr(feature = "clap", arg(skip))]
     pub camera: CameraSettings,

@@ -49,11 +49,9 @@ const RATES_HZ: std::ops::RangeInclusive<f64> = 0.001..=10_000.0;
 )]
 #[serde(default)]
 pub struct ContinuousRequest {
-    /// Set by the caller.
     #[serde(skip)]
     #[cfg_attr(feature = "clap", arg(skip))]
     pub rig: RigAddress,
-    /// Set by the caller.
     #[serde(skip)]
     #[cfg_attr(feature = "clap", arg(skip))]
     pub camera: CameraSettings,

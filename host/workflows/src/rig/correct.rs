@@ -29,7 +29,6 @@ use crate::{
 )]
 #[serde(default)]
 pub struct BoardCorrectRequest {
-    /// Set by the caller.
     #[serde(skip)]
     #[cfg_attr(feature = "clap", arg(skip))]
     pub rig: RigAddress,

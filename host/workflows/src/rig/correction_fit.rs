@@ -33,7 +33,6 @@ use crate::{
 )]
 #[serde(default)]
 pub struct FitRequest {
-    /// Set by the caller.
     #[serde(skip)]
     #[cfg_attr(feature = "clap", arg(skip))]
     pub rig: RigAddress,

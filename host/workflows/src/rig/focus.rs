@@ -42,11 +42,9 @@ use crate::{
 )]
 #[serde(default)]
 pub struct FocusRequest {
-    /// Set by the caller.
     #[serde(skip)]
     #[cfg_attr(feature = "clap", arg(skip))]
     pub rig: RigAddress,
-    /// Set by the caller.
     #[serde(skip)]
     #[cfg_attr(feature = "clap", arg(skip))]
     pub camera: CameraSettings,

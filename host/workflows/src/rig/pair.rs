@@ -39,11 +39,9 @@ Example: farnear rig capture --port /dev/ttyACM0 --camera folder:incoming/ --opt
 )]
 #[serde(default)]
 pub struct CaptureRequest {
-    /// Set by the caller.
     #[serde(skip)]
     #[cfg_attr(feature = "clap", arg(skip))]
     pub rig: RigAddress,
-    /// Set by the caller.
     #[serde(skip)]
     #[cfg_attr(feature = "clap", arg(skip))]
     pub camera: CameraSettings,

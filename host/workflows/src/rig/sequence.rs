@@ -46,7 +46,6 @@ Example: farnear rig sequence --port sim --axis fine --from 20 --to 180 --steps 
 )]
 #[serde(default)]
 pub struct SequenceRequest {
-    /// Set by the caller.
     #[serde(skip)]
     #[cfg_attr(feature = "clap", arg(skip))]
     pub rig: RigAddress,

@@ -25,7 +25,6 @@ use crate::{
 )]
 #[serde(default)]
 pub struct SunRequest {
-    /// Set by the caller.
     #[serde(skip)]
     #[cfg_attr(feature = "clap", arg(skip))]
     pub rig: RigAddress,

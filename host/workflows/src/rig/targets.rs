@@ -48,11 +48,9 @@ const USUAL_TARGETS: usize = 24;
 )]
 #[serde(default)]
 pub struct TargetSeriesRequest {
-    /// Set by the caller.
     #[serde(skip)]
     #[cfg_attr(feature = "clap", arg(skip))]
     pub rig: RigAddress,
-    /// Set by the caller.
     #[serde(skip)]
     #[cfg_attr(feature = "clap", arg(skip))]
     pub camera: CameraSettings,

@@ -52,9 +52,10 @@ fn two_people_side_by_side_get_an_answer_each() {
     };
     let frames: Vec<GrayImage> = (0..count).map(|n| frame(n, [true, true])).collect();
     let path = written(&folder, "both", &frames);
-    let film = folder.text("film");
+    let annotated = folder.text("annotated");
     let recognise = ["activity", "recognise", &path, "--as", "masks", "--model", "everyday", "--people"];
-    let found = figures(farnear(&recognise).args(["--among", "dig,crouch", "--video-out", &film, "--json"]));
+    let found =
+        figures(farnear(&recognise).args(["--among", "dig,crouch", "--video-out", &annotated, "--json"]));
     let people = found["people"].as_array().expect("people");
     assert_eq!(people.len(), 2, "{found}");
     assert_eq!(found["frames"], count);
@@ -85,7 +86,7 @@ fn two_people_side_by_side_get_an_answer_each() {
             assert_eq!(person[key], alone[key], "{key}: {person} {alone}");
         }
     }
-    assert_eq!(fs::read_dir(&film).expect("a film").count(), count);
+    assert_eq!(fs::read_dir(&annotated).expect("a folder").count(), count);
 
     // Both people are present from the third frame on, each in a separate box.
     let (lines, _) = succeeds(&mut farnear(&recognise));

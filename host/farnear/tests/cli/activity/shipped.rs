@@ -176,13 +176,13 @@ fn a_shipped_network_and_unlabelled_clips_serve_where_samples_come_from_elsewher
     let trained = figures(&mut farnear(&train));
     assert_eq!((&trained["pattern"], &trained["mode"]), (&"network".into(), &"everyday".into()));
     let masks = people.masks("p00-dig", 1);
-    let film = people.text("film");
+    let annotated = people.text("annotated");
     let unlabelled: Vec<String> = ["p00-walk", "p00-crouch", "p00-dig"]
         .iter()
         .flat_map(|name| [1, 2].map(|view| people.masks(name, view)))
         .collect();
     let mut recognise = farnear(&["activity", "recognise", &masks, "--model", &model, "--json"]);
-    recognise.args(["--video-out", &film, "--adapt-to"]).args(&unlabelled);
+    recognise.args(["--video-out", &annotated, "--adapt-to"]).args(&unlabelled);
     let answer = figures(&mut recognise);
     let probabilities = answer["probabilities"].as_array().expect("probabilities");
     let dig = probabilities.iter().find(|share| share["activity"] == "dig").expect("an activity");
@@ -190,14 +190,15 @@ fn a_shipped_network_and_unlabelled_clips_serve_where_samples_come_from_elsewher
     let segments = answer["segments"].as_array().expect("segments");
     assert_eq!(segments[0]["from"], 1);
     assert_eq!(segments.last().expect("one")["to"], answer["frames"]);
-    let pictures = fs::read_dir(&film).expect("a folder").count();
+    let pictures = fs::read_dir(&annotated).expect("a folder").count();
     assert_eq!(pictures as f64, number(&answer, "frames"));
-    let picture = image::open(people.folder.path("film/frame_000003.png")).expect("a picture").into_rgb8();
+    let picture =
+        image::open(people.folder.path("annotated/frame_000003.png")).expect("a picture").into_rgb8();
     // The strip with the answer is below the enlarged frame, with the bar of the most probable activity.
     assert!(picture.width() >= 320 && picture.height() > 240);
     assert!(picture.pixels().any(|pixel| pixel.0 == [255, 160, 0]), "the outline");
-    let mut again = farnear(&["activity", "recognise", &masks, "--model", &model, "--video-out", &film]);
-    fails(&mut again, 1, &["film", "exists already"]);
+    let mut again = farnear(&["activity", "recognise", &masks, "--model", &model, "--video-out", &annotated]);
+    fails(&mut again, 1, &["annotated", "exists already"]);
     // Shipped models contain no clips.
     let mut shipped = farnear(&["activity", "recognise", &masks, "--model", "everyday", "--adapt-to"]);
     fails(shipped.args(&unlabelled), 1, &["everyday", "contains no training clips", "features"]);
