@@ -30,7 +30,10 @@ class Recognition(TypedDict):
     probabilities: dict[str, float]
 
 class FarnearError(ValueError):
-    """What was given makes no sense; the message says what and why."""
+    """An argument or file cannot be used; the message states the value and what was expected."""
+
+class DisconnectedError(FarnearError):
+    """The neighbour graph of an embedding is disconnected: raise the number of neighbours."""
 
 class RigError(RuntimeError):
     """The rig, its camera or the way to them failed."""

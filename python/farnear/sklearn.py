@@ -14,7 +14,7 @@ try:
 except ImportError as error:  # pragma: no cover
     raise ImportError("farnear.sklearn needs scikit-learn 1.6 or newer: pip install 'farnear[sklearn]'") from error
 
-from ._farnear import FarnearError, Rbf, isomap
+from ._farnear import DisconnectedError, Rbf, isomap
 
 __all__ = ["Isomap", "RbfRegressor"]
 
@@ -69,8 +69,8 @@ class Isomap(ClassNamePrefixFeaturesOutMixin, TransformerMixin, BaseEstimator):
             try:
                 found = isomap(samples, neighbours=self.n_neighbors_, dimensions=self.n_components)
                 break
-            except FarnearError as error:
-                if "falls into" not in str(error) or self.n_neighbors_ >= len(samples) - 1:
+            except DisconnectedError:
+                if self.n_neighbors_ >= len(samples) - 1:
                     raise
             self.n_neighbors_ = min(2 * self.n_neighbors_, len(samples) - 1)
         if self.n_neighbors_ > self.n_neighbors < len(samples) - 1:

@@ -1,10 +1,12 @@
 //! Isomap and the map that embeds new samples.
 
-use farnear_recognition::embedding::{isomap::isomap as lay_out, neighbours::Neighbourhood, rbf};
+use farnear_recognition::embedding::{
+    EmbeddingError, isomap::isomap as lay_out, neighbours::Neighbourhood, rbf,
+};
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyReadonlyArray2};
 use pyo3::prelude::*;
 
-use crate::errors::wrong;
+use crate::errors::{DisconnectedError, wrong};
 
 /// Coordinates, eigenvalues, geodesic distances.
 type Laid<'py> = (Bound<'py, PyArray2<f32>>, Bound<'py, PyArray1<f64>>, Bound<'py, PyArray2<f32>>);
@@ -21,8 +23,11 @@ pub fn isomap<'py>(
     dimensions: usize,
 ) -> PyResult<Laid<'py>> {
     let samples = samples.as_array();
-    let found =
-        py.detach(|| lay_out(samples, Neighbourhood::Nearest(neighbours), dimensions)).map_err(wrong)?;
+    let found = py.detach(|| lay_out(samples, Neighbourhood::Nearest(neighbours), dimensions));
+    let found = found.map_err(|error| match &error {
+        EmbeddingError::Disconnected { .. } => DisconnectedError::new_err(error.to_string()),
+        _ => wrong(error),
+    })?;
     Ok((
         found.coordinates.into_pyarray(py),
         found.eigenvalues.into_pyarray(py),

@@ -12,7 +12,13 @@ create_exception!(
     farnear,
     FarnearError,
     PyValueError,
-    "What was given makes no sense; the message says what and why."
+    "An argument or file cannot be used; the message states the value and what was expected."
+);
+create_exception!(
+    farnear,
+    DisconnectedError,
+    FarnearError,
+    "The neighbour graph of an embedding is disconnected: raise the number of neighbours."
 );
 create_exception!(farnear, RigError, PyRuntimeError, "The rig, its camera or the way to them failed.");
 

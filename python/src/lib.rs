@@ -37,7 +37,7 @@ mod _farnear {
     #[pymodule_export]
     use super::embedding::{Rbf, isomap};
     #[pymodule_export]
-    use super::errors::{FarnearError, RigError};
+    use super::errors::{DisconnectedError, FarnearError, RigError};
     #[pymodule_export]
     use super::focus_stack::{FocusStack, focus_stack};
     #[cfg(feature = "measure")]
