@@ -1,14 +1,10 @@
-//! Leave-one-subject-out on every set: accuracies, parameters, confusion matrices (Li 2014, tables 9.1 to
-//! 9.3).
-
-use std::collections::BTreeMap;
+//! Leave-one-subject-out on every set: accuracies and confusion matrices (Li 2014, tables 9.1 to 9.3).
 
 use anyhow::{Context, Result};
-use farnear_recognition::choice::Views;
 use farnear_recognition::classifier::Family;
 use farnear_recognition::evaluation::{
     confusion::{Confusion, wilson},
-    leave_one_out::{Choice, Outcome, leave_one_subject_out},
+    leave_one_out::{Outcome, leave_one_subject_out},
 };
 use farnear_recognition::experiment::{Experiment, Sweep};
 use farnear_recognition::frames::Mode;
@@ -139,11 +135,6 @@ fn measure_set(page: &mut Page, set: &Set) -> Result<()> {
         })
         .collect();
     page.table(2, &head, &rows);
-    for (method, outcome) in &outcomes {
-        if !matches!(method.kind, Kind::Neighbours(_)) {
-            page.paragraph(&format!("{}, chosen: {}.", method.name, chosen(&outcome.chosen, views)));
-        }
-    }
     let shown = |kind: Kind| {
         outcomes.iter().find(|(method, _)| method.kind == kind).map(|(_, outcome)| &outcome.fused)
     };
@@ -159,8 +150,6 @@ fn measure_set(page: &mut Page, set: &Set) -> Result<()> {
         &png,
         &format!("{}: confusion in per cent of the true activity (rows), {seen}", set.name),
     )?;
-    page.paragraph(&format!("Order-free, SVC, {seen}, in per cent of the true activity (rows):"));
-    page.block(&free.to_markdown());
     Ok(())
 }
 
@@ -174,48 +163,4 @@ fn interval(confusion: &Confusion, set: &Set) -> (f64, f64) {
     let trials = set.clips.len() / if set.mirror { 1 } else { 2 };
     let right = (confusion.accuracy() * trials as f64).round();
     wilson(right as u32, trials as u32, 1.96)
-}
-
-fn chosen(choices: &[Choice], views: usize) -> String {
-    let wanted = if views > 1 { Views::Fused } else { Views::Each };
-    let choices: Vec<&Choice> = choices.iter().filter(|choice| choice.views == wanted).collect();
-    let mut parts = Vec::new();
-    let mut tell = |name: &str, value: &dyn Fn(&Choice) -> String| {
-        let mut counts: BTreeMap<String, usize> = BTreeMap::new();
-        for choice in &choices {
-            *counts.entry(value(choice)).or_default() += 1;
-        }
-        let mut counts: Vec<(String, usize)> =
-            counts.into_iter().filter(|(value, _)| !value.is_empty()).collect();
-        counts.sort_by(|a, b| b.1.cmp(&a.1).then(a.0.cmp(&b.0)));
-        if !counts.is_empty() {
-            let text: Vec<String> =
-                counts.iter().map(|(value, count)| format!("{value} ({count})")).collect();
-            parts.push(format!("{name} {}", text.join(", ")));
-        }
-    };
-    let thesis = |choice: &Choice| matches!(choice.space.pattern, PatternKind::Thesis(_));
-    let unless_thesis = |choice: &Choice, text: String| if thesis(choice) { String::new() } else { text };
-    tell("layout", &|choice| match choice.space.layout {
-        Layout::Isomap(least) => {
-            format!("Isomap {least} to {} dimensions, gamma {}", choice.space.dimensions, choice.space.gamma)
-        }
-        Layout::Pca => format!("PCA to {} dimensions", choice.space.dimensions),
-    });
-    tell("pattern", &|choice| match &choice.space.pattern {
-        PatternKind::Thesis(bins) => bins.iter().map(ToString::to_string).collect::<Vec<_>>().join(" x "),
-        PatternKind::Codebook(size) => format!("codebook of {size}"),
-        PatternKind::Network => "network".into(),
-    });
-    tell("residuals", &|choice| unless_thesis(choice, choice.space.residuals.to_string()));
-    tell("box weight", &|choice| unless_thesis(choice, choice.space.weights.box_weight.to_string()));
-    tell("relative weight", &|choice| {
-        unless_thesis(choice, choice.space.weights.relative_weight.to_string())
-    });
-    tell("motion weight", &|choice| {
-        let moves = choice.space.mode == Mode::Ordered && !thesis(choice);
-        if moves { choice.space.weights.motion_weight.to_string() } else { String::new() }
-    });
-    tell("classifier", &|choice| choice.classifier.described());
-    parts.join("; ")
 }
