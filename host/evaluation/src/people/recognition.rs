@@ -8,7 +8,7 @@ use farnear_recognition::evaluation::{
 };
 use farnear_recognition::experiment::{Experiment, Sweep};
 use farnear_recognition::frames::Mode;
-use farnear_recognition::space::{Layout, PatternKind, SpaceSettings};
+use farnear_recognition::space::{Layout, SpaceSettings};
 
 use super::{
     data::Data,

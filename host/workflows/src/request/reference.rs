@@ -8,7 +8,7 @@ use super::{TASKS, Task};
 
 const HEAD: &str = "# All options\n\n\
     Generated from the requests of the tasks. A name is the same as an option of the command line (`--min-confidence`), as a field of \
-    a batch job and of the page's interface, and as a keyword in Python (`min_confidence`).\n";
+    a batch job and of the page's interface, and as a keyword in Python (`min_confidence`). `farnear TASK --help` says more.\n";
 
 pub fn page() -> String {
     let mut page = HEAD.to_owned();
@@ -20,7 +20,8 @@ pub fn page() -> String {
 
 fn section(page: &mut String, task: &Task) {
     let schema = (task.schema)();
-    let about = schema["description"].as_str().unwrap_or_default();
+    // `--help` has the rest.
+    let about = schema["description"].as_str().and_then(|text| text.split("\n\n").next()).unwrap_or_default();
     let _ = writeln!(page, "\n## {}\n\n{about}\n\n| option | default | meaning |\n|---|---|---|", task.name);
     for (name, field) in schema["properties"].as_object().into_iter().flatten() {
         let default = match &field["default"] {
