@@ -37,26 +37,17 @@ const MUCH: f64 = 0.6;
 
 /// Remove a person's shadow from masks, from the pose of the camera and the place of the sun, of a lamp, or a measured direction.
 ///
-/// The camera file has the camera's pose:
+/// The camera file has the pose in a table `camera`: height_m (lens above the ground), azimuth_deg (viewing direction,
+/// anticlockwise from north), pitch_deg (downwards positive), focal_length_mm, pixel_um, width_px and height_px. Tables `subject`
+/// (height_m = 1.75, head_width_m = 0.17; optionally distance_m) and `standard_deviations` change the defaults (docs/people.md).
 ///
-///     [camera]
-///     height_m = 0.8              # lens above the ground
-///     azimuth_deg = 140.0         # viewing direction, anticlockwise from north
-///     pitch_deg = 0.0             # downwards positive
-///     focal_length_mm = 4.0
-///     pixel_um = 6.0
-///     width_px = 640
-///     height_px = 480
-///
-/// and, in tables `subject` (height_m = 1.75, head_width_m = 0.17; optionally distance_m) and `standard_deviations`, values other
-/// than the defaults. `shadow.toml` next to the masks flags doubtful frames: no person or several, the shadow behind the person or
-/// cut off by the lower edge of the picture, much removed, an uncertain angle.
+/// `shadow.toml` next to the masks flags doubtful frames: no person or several, the shadow behind the person or cut off by the
+/// lower edge of the picture, much removed, an uncertain angle.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize, JsonSchema)]
 #[cfg_attr(feature = "clap", derive(clap::Args))]
 #[cfg_attr(
     feature = "clap",
     command(
-        verbatim_doc_comment,
         after_help = "Example: farnear shadow remove masks/ --camera camera.toml --time 2014-06-23T11:30:00Z --lat 52.38 \
                       --lon -1.56 --out clean/"
     )
