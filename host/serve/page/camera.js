@@ -1,4 +1,4 @@
-// What can be set on the camera beside its exposure: gain, black level, pixel format, region.
+// Camera settings other than exposure: gain, black level, pixel format, region.
 import { act, hasControl, ended, on } from "./link.js";
 import { h, button, choice, field, rows } from "./ui.js";
 

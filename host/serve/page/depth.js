@@ -1,4 +1,4 @@
-// Depth of a capture: map, confidence, deviation, images, surface; probe, profile, region; two of them beside a wipe.
+// Depth of a capture: map, confidence, deviation, images, surface; probe, profile, region; two layers compared by a wipe.
 import { act, bytes, ended, get, on, store } from "./link.js";
 import { h, button, choice, field, number, panel, notice } from "./ui.js";
 import { Viewer } from "./viewer.js";
@@ -21,7 +21,7 @@ export function make(host, remember) {
   /** @type {{ name: string | null, layer: string, colours: string, other: string, maps: any, loading: number, capture: any, mesh?: Promise<ArrayBuffer | null> | null }} */
   const show = { name: null, layer: "depth", colours: "viridis", other: "", maps: {}, loading: 0, capture: null };
   const captures = h("select", { "aria-label": "Capture", onchange: (event) => open(event.target.value) });
-  const layers = h("div", { class: "group", role: "group", "aria-label": "What is shown" }, LAYERS.map(([name, text]) => button(text, () => pick(name), { "data-layer": name })));
+  const layers = h("div", { class: "group", role: "group", "aria-label": "Layer" }, LAYERS.map(([name, text]) => button(text, () => pick(name), { "data-layer": name })));
   const tools = h("div", { class: "group", role: "group", "aria-label": "Tool" }, [["pan", "Probe"], ["line", "Profile"], ["region", "Region"]].map(([name, text]) => button(text, () => use(name), { "data-tool": name })));
   const legend = h("canvas", { class: "legend-bar", role: "img", "aria-label": "colours, without a map yet" });
   const [low, high] = [h("span", {}), h("span", {})];
@@ -104,7 +104,7 @@ export function make(host, remember) {
       pages(capture);
       if (capture.kind !== "pair") return stack(name, capture, loading);
       if (!names.includes(show.layer) && show.layer !== "surface") show.layer = capture.has_depth ? "depth" : "far";
-      // What is looked at comes first, the rest after it is on the screen.
+      // The visible layer is loaded first, the rest after it is drawn.
       const first = names.filter((layer) => layer === show.layer || layer === "confidence" || (show.layer === "surface" && layer === "depth"));
       for (const part of [first, names.filter((layer) => !first.includes(layer))]) {
         const loaded = await Promise.all(part.map((layer) => load(`/api/captures/${encodeURIComponent(name)}/files/${FILES[layer]}`)));
@@ -144,7 +144,7 @@ export function make(host, remember) {
 
   /** Depth of a pair that was just taken; what is measured and kept is computed from its files, and follows. */
   function fresh(header, pixels) {
-    show.loading++; // whatever is on its way is of another capture
+    show.loading++; // pending requests belong to another capture
     show.name = header.capture;
     show.capture = null;
     [show.layer, show.mesh, viewer.shape] = ["depth", null, null];
@@ -215,7 +215,7 @@ export function make(host, remember) {
       const map = show.maps[name];
       return !map ? null : name === "reason" ? paintReasons(map) : paint(map, limits(name, map), colours(name));
     }
-    // Depth has the scale of this depth, whatever layer is on the left.
+    // Depth on the right uses the scale of this capture's depth, also next to another layer.
     const depths = (map) => paint(map, show.maps.depth ? limits("depth", show.maps.depth) : range(map), show.colours);
     if (kind === "minus" && show.maps.depth) return minus(await load(`/api/captures/${encodeURIComponent(show.name ?? "")}/variants/${encodeURIComponent(name)}/depth.npy`));
     if (kind === "variant") return depths(await load(`/api/captures/${encodeURIComponent(show.name ?? "")}/variants/${encodeURIComponent(name)}/depth.npy`));
@@ -234,7 +234,7 @@ export function make(host, remember) {
   }
 
   async function turn() {
-    // One request, however often this is asked for while it is on its way.
+    // Calls share one pending request.
     const mesh = (show.mesh ??= bytes(`/api/captures/${encodeURIComponent(show.name ?? "")}/mesh.ply`));
     const { show: begin, sorry } = await import("./mesh.js");
     try {
@@ -322,7 +322,7 @@ function counts({ data }, [low, high]) {
   return bins;
 }
 
-/** The panel that computes depth anew, beside the capture's own map or in its place. */
+/** The panel that computes depth again, as a variant or to replace the capture's own map. */
 function compute(name, done) {
   const method = choice(METHODS, "whitened", () => {});
   const smooth = h("input", { type: "number", placeholder: "default", min: 1, max: 63, step: 2 });

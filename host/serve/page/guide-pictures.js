@@ -35,10 +35,10 @@ export const spread = () => picture("a point and how it spreads", line("M8 66 H1
 /** What a lens bends, and the straight line. */
 export const curve = () => picture("a bent surface is made flat", line("M14 56 Q60 14 106 56", "weak"), line("M14 60 H106", "accent"), line("M60 38 V54 m-4 -5 l4 6 l4 -6", "dark-line"));
 /** Somebody, seen and cut out. */
-export const person = () => picture("somebody, and the silhouette", figure(34, "part"), figure(84, "accent-part"), line("M52 40 h14 m-5 -4 l5 4 l-5 4", "dark-line"));
+export const person = () => picture("a person and the silhouette", figure(34, "part"), figure(84, "accent-part"), line("M52 40 h14 m-5 -4 l5 4 l-5 4", "dark-line"));
 const figure = (x, cls) => [round(x, 18, 7, cls), s("path", { d: `M${x - 8} 28 h16 l-2 22 h-3 v22 h-3 v-20 v20 h-3 v-22 h-3 z`, class: cls })];
 
-/** The sun, somebody, and the shadow, from the side and from above: elevation and shadow's direction in degrees, its length per height. */
+/** Sun, person and shadow, from the side and from above: elevation and shadow's direction in degrees, its length per height. */
 export function sun(elevation, direction, length) {
   const up = Number.isFinite(length) && elevation > 0;
   const angle = (elevation * Math.PI) / 180;

@@ -12,7 +12,7 @@ const STEPS = [
   ["encoder direction", "Turn each shaft by hand, away from home.", "encoder"],
   ["motors on", "24 V off, connect the motors, stages in mid-travel; a hand on the emergency stop; 24 V on.", "motor"],
   ["first slow homing", "Slowly towards its home switch.", "home"], ["homing repeats", "The second time within 1 µm.", "home"],
-  ["a move at full speed", "To the middle of the travel.", "motor"], ["halt and its alarm", "It stops at once, and says so.", "stop"],
+  ["a move at full speed", "To the middle of the travel.", "motor"], ["halt and its alarm", "It stops immediately and raises an alarm.", "stop"],
   ["piezo sweep", "Gauge and amplifier follow.", "piezo"], ["far and near by piezo", "Settled within milliseconds.", "piezo"],
   ["camera and strobe", "Trigger, strobe and image belong together.", "camera"],
 ];
@@ -23,7 +23,7 @@ export function make(host) {
   const guides = [
     ["power", "First power-up", draw.board(), powerUp()], ["psf", "Point spread function", draw.target(), psf()],
     ["series", "Flat series and correction", draw.series(), series()], ["shadow", "Shadow by the sun", draw.sun(40, 200, 1.2), people.shadow()],
-    ["activity", "What somebody does", draw.person(), people.activity()],
+    ["activity", "Activity of a person", draw.person(), people.activity()],
   ];
   const place = h("div", { class: "guide scroll", tabindex: "0", role: "region", "aria-label": "Guide" });
   const list = h("div", { class: "guide-list", role: "group", "aria-label": "Guides" }, guides.map(([name, title, picture]) =>
@@ -86,7 +86,7 @@ function powerUp() {
   on("state", ({ job }) => { if (job?.kind === "check" && job.phase === "running") said.textContent = job.said ?? "…"; });
   const element = h("div", { class: "guide-body" },
     h("section", { class: "panel" }, h("h2", {}, "First power-up"),
-      h("p", {}, "Take the next step only when the one before did what it should. What the board can tell is measured; where a pair of hands is needed, the page asks. The first seven steps are done with the motors disconnected."),
+      h("p", {}, "Take the next step only when the one before succeeded. The board measures what it can; the page asks for manual steps. The first seven steps are done with the motors disconnected."),
       h("div", { class: "buttons" }, button("Start the checklist", start, { class: "primary", "data-needs": "rig" })), said),
     h("ol", { class: "check-steps" }, items));
   return { element };
@@ -135,7 +135,7 @@ function psf() {
     }
   }
   const element = h("div", { class: "guide-body" },
-    step(1, "Place the target", draw.target(), h("p", {}, "A flat, finely textured target, square to the rig: at the far or the near focus, or at a distance that you know. With several distances p and k are told apart better.")),
+    step(1, "Place the target", draw.target(), h("p", {}, "A flat, finely textured target, square to the rig: at the far or the near focus, or at a distance that you know. Several distances determine p and k better.")),
     step(2, "Capture", draw.camera(), h("p", {}, "A far- and a near-focused image. Repeat steps 1 and 2 for more distances."), h("div", { class: "buttons" }, button("Capture pair", capture, { "data-needs": "rig" }))),
     step(3, "Choose and find", draw.spread(), pairs, taught, field("Model", model), h("div", { class: "buttons" }, button("Find", find, { class: "primary", "data-needs": "client" })), result));
   return { element, shown };
@@ -188,7 +188,7 @@ function series() {
     }
   }
   const element = h("div", { class: "guide-body" },
-    step(1, "Flat targets through the range", draw.series(), h("p", {}, "A flat, textured target at several known distances; the page asks for each. On the emulated rig it moves by itself. A series that was broken off goes on where it stood."),
+    step(1, "Flat targets through the range", draw.series(), h("p", {}, "A flat, textured target at several known distances; the page asks for each. On the emulated rig it moves automatically. An interrupted series continues where it stopped."),
       field("Targets", count), field("Distances", own, "mm"), h("div", { class: "buttons" }, button("Capture the series", start, { class: "primary", "data-needs": "rig" }), button("Forget it", forget, { "data-needs": "rig" })), captured),
     step(2, "Learn the correction", draw.curve(), h("p", {}, "What the lens bends is learned from the maps of planes, and taken off other maps."), field("Method", method), h("div", { class: "buttons" }, button("Learn", learn, { class: "primary", "data-needs": "client" }))),
     panel("Result", result));

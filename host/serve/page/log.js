@@ -1,4 +1,4 @@
-// What was said, and the alarms that the board keeps, each with what to do.
+// Messages, and the alarms in the board's memory, each with its remedy.
 import { act, hasControl, get, on, store } from "./link.js";
 import { h, button, number, panel } from "./ui.js";
 

@@ -50,7 +50,7 @@ function go(name, detail, back = false) {
     tab.tabIndex = host.hidden ? -1 : 0;
     if (!host.hidden) current = other;
   }
-  // On a small screen not all tabs are beside each other.
+  // A small screen does not show all tabs.
   const { tab } = view;
   if (tab.parentElement.scrollWidth > tab.parentElement.clientWidth) tab.parentElement.scrollLeft = tab.offsetLeft - tab.parentElement.offsetLeft - 40;
   const address = `#${current}${detail ? `/${encodeURIComponent(detail)}` : ""}`;
@@ -125,7 +125,7 @@ function showJob(state, before) {
     const [, said, progress] = place.children[at].children;
     const bar = /** @type {HTMLProgressElement} */ (progress);
     const { total, done, unit } = job.progress ?? {};
-    // A bar without an end is moved by the browser all the time, which costs it more than what is counted; a count says that it goes on.
+    // An indeterminate bar is animated all the time, which costs more than the counting; a count shows progress.
     bar.hidden = done != null && !total;
     said.textContent = bar.hidden ? `${done} ${unit}` : job.said ?? "";
     if (total) bar.value = done / total;
@@ -169,7 +169,7 @@ async function showQuestion(state) {
 
 /** A fault of the page itself is reported: silence would look like a dead button. */
 function reportFaults() {
-  // Delayed size notifications are no fault.
+  // Delayed size notifications are not errors.
   addEventListener("error", ({ message }) => !message.startsWith("ResizeObserver") && notice(`Fault of the page: ${message}`, "error", "Reload the page; please report it."));
   addEventListener("unhandledrejection", ({ reason }) => notice(`Fault of the page: ${reason?.message ?? reason}`, "error", "Reload the page; please report it."));
 }
@@ -215,6 +215,6 @@ function begin() {
   addressed(false);
 }
 
-// What stands in the page itself is painted before its views are built.
+// Paint the static page before its views are built.
 requestAnimationFrame(() => setTimeout(begin));
 export { help };

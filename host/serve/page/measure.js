@@ -1,4 +1,4 @@
-// Figures of a map at the side: what is under the pointer, a profile, a region with its plane.
+// Figures of a map at the side: value under the pointer, a profile, a region with its plane.
 import { act } from "./link.js";
 import { h, button, number, panel, rows } from "./ui.js";
 import { Plot } from "./plot.js";

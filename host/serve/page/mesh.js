@@ -1,4 +1,4 @@
-// The surface in three dimensions: turns until somebody takes hold of it.
+// The surface in three dimensions: turns until it is dragged.
 import * as THREE from "./vendor/three.js";
 import { table } from "./maps.js";
 import { h } from "./ui.js";

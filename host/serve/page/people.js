@@ -41,7 +41,7 @@ function videos() {
   return { parts: [field("Video", chosen), field("Send one", file), said], shown, name: () => chosen.value };
 }
 
-/** What somebody does: a running answer beside the picture it rests on. */
+/** Activity of a person: the streaming answer next to the picture. */
 export function activity() {
   const video = videos();
   const canvas = h("canvas", { class: "person", role: "img", "aria-label": "Picture with the person marked" });
@@ -81,8 +81,8 @@ export function activity() {
     stripes(strip, past);
   });
   const element = h("div", { class: "guide-body" },
-    h("section", { class: "panel guide-step" }, h("div", { class: "guide-picture" }, draw.person()), h("div", { class: "guide-words" }, h("h2", {}, "What somebody does"),
-      h("p", {}, "A camera that stands still and one person who moves. The first frames teach the background. Stop ends it."), video.parts, known,
+    h("section", { class: "panel guide-step" }, h("div", { class: "guide-picture" }, draw.person()), h("div", { class: "guide-words" }, h("h2", {}, "Activity of a person"),
+      h("p", {}, "A fixed camera and one person who moves. The first frames teach the background. Stop ends it."), video.parts, known,
       h("div", { class: "buttons" }, button("Recognise the video", () => start({ video: video.name() }, "computation"), { class: "primary", "data-needs": "computation" }), button("Watch the camera", () => start({}, "job"), { "data-needs": "rig" })))),
     panel("Answer", h("div", { class: "person-answer" }, canvas, h("div", {}, answer, strip, details))));
   const shown = async () => {

@@ -1,4 +1,4 @@
-// The captures of the session: what they show, what was noted, and what can be taken along.
+// The captures of the session: pictures, notes and downloads.
 import { act, get, on, store } from "./link.js";
 import { ask, h, button, choice, notice, number } from "./ui.js";
 
