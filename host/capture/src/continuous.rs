@@ -1,6 +1,6 @@
 //! Continuous capture: cycles of shots (far, near, ...) with an image each, for a number of exposures or until stopped.
 //! The board numbers its frames without gaps and reports dropped ones. Losses on the way are reported, too: a missing
-//! event by its number, a missing image as such. No image is assigned to another exposure.
+//! event by its number, and a missing image is an error. No image is assigned to another exposure.
 
 use std::{
     collections::VecDeque,

@@ -52,6 +52,30 @@ pub trait CameraRequest: RigRequest {
     fn set_camera(&mut self, camera: CameraSettings);
 }
 
+macro_rules! rig_request {
+    ($request:ty) => {
+        impl $crate::request::RigRequest for $request {
+            fn set_rig(&mut self, rig: $crate::rig::RigAddress) {
+                self.rig = rig;
+            }
+        }
+    };
+}
+
+macro_rules! camera_request {
+    ($request:ty) => {
+        $crate::request::rig_request!($request);
+
+        impl $crate::request::CameraRequest for $request {
+            fn set_camera(&mut self, camera: $crate::rig::camera::CameraSettings) {
+                self.camera = camera;
+            }
+        }
+    };
+}
+
+pub(crate) use {camera_request, rig_request};
+
 pub fn inputs<R: Request>(request: &R) -> Vec<PathBuf> {
     let is_input = |(kind, path): &(PathKind, PathBuf)| match kind {
         PathKind::Input => true,

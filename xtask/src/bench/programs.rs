@@ -114,7 +114,7 @@ fn page(labels: &[Label], figures: &[Value], runs: usize) -> String {
          `farnear depth` by its default method is compared with a numpy + OpenCV script that reads, registers, computes and \
          writes ([`program_opencv.py`](../host/depth/benches/program_opencv.py), one thread, a fixed window, no uncertainty). \
          The script writes depth and a coloured picture; `farnear depth` writes all its default outputs, or depth.npy only. A ratio \
-         below 1 means that farnear uses less CPU time. A shifted pair needs registration; an aligned one is recognised as such.\n\n\
+         below 1 means that farnear uses less CPU time. A shifted pair needs registration; an aligned pair skips it.\n\n\
          | pair | outputs | CPU s, 1 thread | CPU s, 2 threads | script, CPU s | ratio, 1 thread | ratio of user time | wall / CPU, 2 threads | memory MiB | script, memory MiB |\n\
          |---|---|--:|--:|--:|--:|--:|--:|--:|--:|\n",
         processor(),

@@ -17,7 +17,7 @@ use super::{
 use crate::{
     context::Context,
     error::{Result, WorkflowError},
-    request::{CameraRequest, PathKind, Request, RigRequest},
+    request::{PathKind, Request},
 };
 
 struct Step {
@@ -110,17 +110,7 @@ impl Request for CheckRequest {
     }
 }
 
-impl RigRequest for CheckRequest {
-    fn set_rig(&mut self, rig: RigAddress) {
-        self.rig = rig;
-    }
-}
-
-impl CameraRequest for CheckRequest {
-    fn set_camera(&mut self, camera: CameraSettings) {
-        self.camera = camera;
-    }
-}
+crate::request::camera_request!(CheckRequest);
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize)]
 #[serde(rename_all = "kebab-case")]

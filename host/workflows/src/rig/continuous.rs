@@ -26,7 +26,7 @@ use crate::{
     context::Context,
     error::{About, Result, WorkflowError},
     optics::GivenOptics,
-    request::{CameraRequest, PathKind, Request, RigRequest},
+    request::{PathKind, Request},
 };
 
 pub use figures::ContinuousFigures;
@@ -67,10 +67,10 @@ pub struct ContinuousRequest {
     /// Exposures per second, each at its microsecond [default: as fast as position and camera allow, about 50].
     #[cfg_attr(feature = "clap", arg(long, value_name = "HZ"))]
     pub rate: Option<f64>,
-    /// End after so many seconds of the board's time.
+    /// End after this time by the board's clock, seconds.
     #[cfg_attr(feature = "clap", arg(long, value_name = "S", conflicts_with = "frames"))]
     pub r#for: Option<f64>,
-    /// End after so many exposures.
+    /// End after this number of exposures.
     #[cfg_attr(feature = "clap", arg(long, value_name = "N"))]
     pub frames: Option<u32>,
     /// Keep the images in this new folder.
@@ -90,17 +90,7 @@ impl Request for ContinuousRequest {
     }
 }
 
-impl RigRequest for ContinuousRequest {
-    fn set_rig(&mut self, rig: RigAddress) {
-        self.rig = rig;
-    }
-}
-
-impl CameraRequest for ContinuousRequest {
-    fn set_camera(&mut self, camera: CameraSettings) {
-        self.camera = camera;
-    }
-}
+crate::request::camera_request!(ContinuousRequest);
 
 impl ContinuousRequest {
     fn pace(&self) -> Result<Pace> {

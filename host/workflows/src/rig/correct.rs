@@ -15,7 +15,7 @@ use crate::{
     correction_file,
     error::{Result, WorkflowError},
     figures::rounded,
-    request::{PathKind, Request, RigRequest},
+    request::{PathKind, Request},
 };
 
 /// Let the board correct a depth map, row by row over the link, and compare its bits with this computer's.
@@ -61,11 +61,7 @@ impl Request for BoardCorrectRequest {
     }
 }
 
-impl RigRequest for BoardCorrectRequest {
-    fn set_rig(&mut self, rig: RigAddress) {
-        self.rig = rig;
-    }
-}
+crate::request::rig_request!(BoardCorrectRequest);
 
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct BoardCorrectFigures {

@@ -16,7 +16,7 @@ use crate::{
     context::Context,
     error::{Result, WorkflowError},
     parameters::within,
-    request::{PathKind, Request, RigRequest},
+    request::{PathKind, Request},
 };
 
 /// Let the board fit a depth correction to flat targets, and keep it in its memory.
@@ -84,11 +84,7 @@ impl Request for FitRequest {
     }
 }
 
-impl RigRequest for FitRequest {
-    fn set_rig(&mut self, rig: RigAddress) {
-        self.rig = rig;
-    }
-}
+crate::request::rig_request!(FitRequest);
 
 #[derive(Clone, PartialEq, Eq, Debug, Serialize)]
 pub struct FitFigures {

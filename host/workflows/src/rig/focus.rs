@@ -24,7 +24,7 @@ use crate::{
     figures::rounded,
     measure::Rectangle,
     optics::GivenOptics,
-    request::{CameraRequest, PathKind, Request, RigRequest},
+    request::{PathKind, Request},
 };
 
 /// Find the sensor distance at which a target is sharpest (m1), and the working range that begins there.
@@ -92,17 +92,7 @@ impl Request for FocusRequest {
     }
 }
 
-impl RigRequest for FocusRequest {
-    fn set_rig(&mut self, rig: RigAddress) {
-        self.rig = rig;
-    }
-}
-
-impl CameraRequest for FocusRequest {
-    fn set_camera(&mut self, camera: CameraSettings) {
-        self.camera = camera;
-    }
-}
+crate::request::camera_request!(FocusRequest);
 
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct FocusFigures {

@@ -22,7 +22,7 @@ use crate::{
     error::Result,
     optics::GivenOptics,
     parameters::within,
-    request::{CameraRequest, PathKind, Request, RigRequest},
+    request::{PathKind, Request},
 };
 
 /// Capture a far- and a near-focused image: home if needed, move the stage near, expose both by piezo.
@@ -48,7 +48,7 @@ pub struct CaptureRequest {
     /// The optics file.
     #[cfg_attr(feature = "clap", arg(long, value_name = "FILE"))]
     pub optics: PathBuf,
-    /// Take each image as the mean of so many exposures (1 to 256): noise falls with the root of their number.
+    /// Exposures averaged for each image, 1 to 256: noise falls with the root of their number.
     #[cfg_attr(feature = "clap", arg(long, value_name = "N", default_value_t = Self::default().average))]
     pub average: u16,
     /// Subtract the camera's dark and flat frames from both images: a folder of `farnear calibrate camera`. Do not give it to
@@ -102,17 +102,7 @@ impl Request for CaptureRequest {
     }
 }
 
-impl RigRequest for CaptureRequest {
-    fn set_rig(&mut self, rig: RigAddress) {
-        self.rig = rig;
-    }
-}
-
-impl CameraRequest for CaptureRequest {
-    fn set_camera(&mut self, camera: CameraSettings) {
-        self.camera = camera;
-    }
-}
+crate::request::camera_request!(CaptureRequest);
 
 /// Most exposures to average: beyond this, drift exceeds noise.
 pub const AVERAGED_MAX: u16 = 256;

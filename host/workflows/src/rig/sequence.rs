@@ -21,7 +21,7 @@ use crate::{
     context::Context,
     error::{About, Result, WorkflowError},
     optics::GivenOptics,
-    request::{CameraRequest, PathKind, Request, RigRequest},
+    request::{PathKind, Request},
     simulator::USUAL_PSF,
 };
 
@@ -114,17 +114,7 @@ impl Request for SequenceRequest {
     }
 }
 
-impl RigRequest for SequenceRequest {
-    fn set_rig(&mut self, rig: RigAddress) {
-        self.rig = rig;
-    }
-}
-
-impl CameraRequest for SequenceRequest {
-    fn set_camera(&mut self, camera: CameraSettings) {
-        self.camera = camera;
-    }
-}
+crate::request::camera_request!(SequenceRequest);
 
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct SequenceFigures {

@@ -11,7 +11,7 @@ use super::{Rig, RigAddress};
 use crate::{
     context::Context,
     error::{Result, WorkflowError},
-    request::{PathKind, Request, RigRequest},
+    request::{PathKind, Request},
 };
 
 /// Ask the board where the sun is and how a person's shadow lies, and compare its answer with this computer's.
@@ -88,11 +88,7 @@ impl Request for SunRequest {
     }
 }
 
-impl RigRequest for SunRequest {
-    fn set_rig(&mut self, rig: RigAddress) {
-        self.rig = rig;
-    }
-}
+crate::request::rig_request!(SunRequest);
 
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct BoardSunFigures {

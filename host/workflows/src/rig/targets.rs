@@ -27,7 +27,7 @@ use crate::{
     figures::rounded,
     operators,
     optics::GivenOptics,
-    request::{CameraRequest, PathKind, Request, RigRequest},
+    request::{PathKind, Request},
     text_file,
 };
 
@@ -80,17 +80,7 @@ impl Request for TargetSeriesRequest {
     }
 }
 
-impl RigRequest for TargetSeriesRequest {
-    fn set_rig(&mut self, rig: RigAddress) {
-        self.rig = rig;
-    }
-}
-
-impl CameraRequest for TargetSeriesRequest {
-    fn set_camera(&mut self, camera: CameraSettings) {
-        self.camera = camera;
-    }
-}
+crate::request::camera_request!(TargetSeriesRequest);
 
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct TargetFigures {
