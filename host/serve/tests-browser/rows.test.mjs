@@ -171,6 +171,7 @@ test("all options of a depth request are offered, with their help, and an answer
   const page = await open(browser, `${server.address}#depth/pair-001`);
   await page.locator("canvas[data-layer=depth]").waitFor();
   await page.getByText("All options").click();
+  await page.getByLabel("balance", { exact: true }).waitFor();
   const { components } = await server.ask("/openapi.json");
   const names = Object.keys(components.schemas.CaptureDepthRequest.properties);
   const offered = await page.locator("#view-depth details [name]").evaluateAll((all) => all.map((one) => one.name));
