@@ -27,6 +27,7 @@ pub enum SimError {
     Stopped,
     #[error("{what}: {source}")]
     Io { what: String, source: std::io::Error },
+    #[cfg(unix)]
     #[error("cannot make a pty: {0}")]
     Port(#[from] serialport::Error),
     #[error("the camera cannot render: {0}")]

@@ -4,7 +4,7 @@
 //!
 //! - [`parts`]: properties of the parts (`parts.toml`); [`processor`]: instruction costs.
 //! - [`rig`]: the rig in this process, for tests, with [`config`], [`command`] and [`report`].
-//! - [`run`](mod@run): the program with a pty ([`port`]), a camera [`endpoint`] and a [`farnear_gige`]
+//! - [`run`](mod@run): the program with its [`port`], a camera [`endpoint`] and a [`farnear_gige`]
 //!   camera.
 //! - [`board`], [`chips`], [`memory`], [`memory_file`], [`serial`], [`wiring`]: the emulated board.
 //! - [`camera`], [`imager`], [`half_mirror`]: exposure timing, images, and the second camera.

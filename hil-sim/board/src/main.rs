@@ -1,9 +1,8 @@
 //! `farnear-sim`: the emulated rig for any client.
 
 use std::{
-    fs::File,
     io::Write,
-    os::{fd::AsFd, unix::fs::FileTypeExt},
+    net::SocketAddr,
     path::{Path, PathBuf},
     process::ExitCode,
     str::FromStr,
@@ -13,7 +12,9 @@ use anyhow::{Context, Result};
 use clap::{Args, Parser, Subcommand};
 use farnear_gige::{self as gige, GigeConfig};
 use farnear_scene::{Camera, Lens, Noise, OpticsFile, PackedScene, Psf, Scene, SceneError, standard};
-use farnear_sim::{Pace, Parts, RigConfig, Scenario, half_mirror::Further, imager::Imager, run::ServedRig};
+use farnear_sim::{
+    Pace, Parts, RigConfig, Scenario, half_mirror::Further, imager::Imager, port::PortKind, run::ServedRig,
+};
 
 /// The farnear rig without hardware: the real firmware on an emulated board.
 #[derive(Parser)]
@@ -85,8 +86,14 @@ struct Run {
     /// the rig ends.
     #[arg(long, value_name = "FILE")]
     memory: Option<PathBuf>,
+    /// Listen on TCP instead of a serial port: a free port of this computer, or ADDRESS:PORT. Clients open
+    /// tcp:ADDRESS:PORT, one at a time. There is no password: an address beyond this computer lets everybody on
+    /// the network move the rig.
+    #[arg(long, value_name = "ADDRESS:PORT", num_args = 0..=1, require_equals = true, default_missing_value = "127.0.0.1:0")]
+    tcp: Option<SocketAddr>,
     /// Link to the serial port, removed at the end. A client finds a restarted rig by this name.
-    #[arg(long, value_name = "PATH")]
+    #[cfg(unix)]
+    #[arg(long, value_name = "PATH", conflicts_with = "tcp")]
     link: Option<PathBuf>,
     /// File for the true motion of the mechanics: CSV, or VCD (ending .vcd), which `replay` can run again.
     #[arg(long, value_name = "FILE")]
@@ -227,17 +234,23 @@ fn serve(run: &Run) -> Result<()> {
         sensor_px: (standard::SIZE_PX.0 as u16, standard::SIZE_PX.1 as u16),
         bits: run.noise.bits(),
     });
+    #[cfg(unix)]
     let linked = run.link.clone();
     let renamed = move |port: &str| {
+        #[cfg(unix)]
         if let Some(Err(error)) = linked.as_deref().map(|path| Link::point(path, port)) {
             eprintln!("farnear-sim: {error:#}");
         }
         // The reader of the first line may have closed the pipe.
         let _ = writeln!(std::io::stdout(), "{{\"port\": \"{port}\"}}");
     };
-    let rig = ServedRig::start(&config, first, second, gige.as_ref(), renamed)?;
+    let rig = ServedRig::start(&config, port_kind(run.tcp), first, second, gige.as_ref(), renamed)?;
+    #[cfg(unix)]
     let link = run.link.as_deref().map(|path| Link::new(path, &rig.port)).transpose()?;
+    #[cfg(unix)]
     let port = link.as_ref().map_or(rig.port.clone(), |link| link.0.display().to_string());
+    #[cfg(not(unix))]
+    let port = rig.port.clone();
     ctrlc::set_handler(rig.stopper()).context("cannot listen to signals")?;
     let stop = rig.stopper();
     if stdin_is_a_pipe() {
@@ -257,8 +270,21 @@ fn serve(run: &Run) -> Result<()> {
     Ok(())
 }
 
+#[cfg(unix)]
+fn port_kind(tcp: Option<SocketAddr>) -> PortKind {
+    tcp.map_or(PortKind::Pty, PortKind::Tcp)
+}
+
+/// Without pseudo-terminals TCP is the only kind.
+#[cfg(not(unix))]
+fn port_kind(tcp: Option<SocketAddr>) -> PortKind {
+    PortKind::Tcp(tcp.unwrap_or((std::net::Ipv4Addr::LOCALHOST, 0).into()))
+}
+
+#[cfg(unix)]
 struct Link(PathBuf);
 
+#[cfg(unix)]
 impl Link {
     /// Replaces a dangling link of a killed rig; keeps other files.
     fn new(path: &Path, port: &str) -> Result<Self> {
@@ -279,16 +305,24 @@ impl Link {
     }
 }
 
+#[cfg(unix)]
 impl Drop for Link {
     fn drop(&mut self) {
         let _ = std::fs::remove_file(&self.0); // it may have been removed
     }
 }
 
+#[cfg(not(unix))]
 fn stdin_is_a_pipe() -> bool {
+    !std::io::IsTerminal::is_terminal(&std::io::stdin())
+}
+
+#[cfg(unix)]
+fn stdin_is_a_pipe() -> bool {
+    use std::os::{fd::AsFd, unix::fs::FileTypeExt};
     let stdin = std::io::stdin();
     let Ok(handle) = stdin.as_fd().try_clone_to_owned() else { return false };
-    File::from(handle).metadata().is_ok_and(|data| {
+    std::fs::File::from(handle).metadata().is_ok_and(|data| {
         let kind = data.file_type();
         kind.is_fifo() || kind.is_socket()
     })

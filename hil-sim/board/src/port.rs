@@ -1,10 +1,14 @@
-//! The serial port that clients open: a pty. Forwards client bytes in whole frames. Bytes written together
+//! The port that clients open: a pty, or a TCP port. Forwards client bytes in whole frames. Bytes written together
 //! stay together: later ones would reach the board in another state.
 
+#[cfg(unix)]
+mod pty;
+mod tcp;
+
 use std::{
-    io::{ErrorKind, Read, Write},
+    io::{self, ErrorKind, Read},
+    net::SocketAddr,
     sync::{
-        Arc,
         atomic::{AtomicBool, Ordering},
         mpsc::Receiver,
     },
@@ -13,7 +17,6 @@ use std::{
 };
 
 use farnear_protocol::frame::FRAME_MAX;
-use serialport::{SerialPort, TTYPort};
 
 use crate::{command::Command, error::SimError};
 
@@ -22,49 +25,66 @@ const LOOK: Duration = Duration::from_millis(20);
 /// A client that reads nothing for this long loses bytes, as on a real line.
 const PATIENCE: Duration = Duration::from_millis(500);
 
-/// Opens a pty and returns its name. Whole frames and changed baud rates go to `from_client`, which returns
-/// whether it accepts more. The port closes when `to_client` ends.
-pub fn open(
-    to_client: Receiver<Vec<u8>>,
-    from_client: impl Fn(Command) -> bool + Send + 'static,
-) -> Result<String, SimError> {
-    let (mut writer, slave) = TTYPort::pair()?;
-    let name = slave.name().unwrap_or_default();
-    let mut reader = writer.try_clone_native()?;
-    reader.set_timeout(LOOK)?;
-    writer.set_timeout(PATIENCE)?;
-    let unplugged = Arc::new(AtomicBool::new(false));
-    let seen = unplugged.clone();
-    let no_thread = |source| SimError::Io { what: "cannot start the port's thread".into(), source };
-    thread::Builder::new()
-        .name("port out".into())
-        .spawn(move || {
-            for bytes in to_client {
-                // Without a reader the bytes are lost.
-                let _ = writer.write_all(&bytes);
-            }
-            unplugged.store(true, Ordering::Relaxed);
-            // Kept open so that clients may reconnect.
-            drop(slave);
-        })
-        .map_err(no_thread)?;
-    thread::Builder::new()
-        .name("port in".into())
-        .spawn(move || read(&mut reader, &seen, &from_client))
-        .map_err(no_thread)?;
-    Ok(name)
+/// Where clients find the board.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum PortKind {
+    /// A pseudo-terminal, which clients open as a serial port.
+    #[cfg(unix)]
+    Pty,
+    /// One client at a time; further ones are disconnected.
+    Tcp(SocketAddr),
 }
 
-fn read(port: &mut TTYPort, unplugged: &AtomicBool, from_client: &impl Fn(Command) -> bool) {
+impl PortKind {
+    /// Opens the port and returns its name. Whole frames and changed baud rates go to `from_client`, which returns
+    /// whether it accepts more. The port closes when `to_client` ends.
+    pub fn open(
+        self,
+        to_client: Receiver<Vec<u8>>,
+        from_client: impl Fn(Command) -> bool + Send + Sync + 'static,
+    ) -> Result<String, SimError> {
+        match self {
+            #[cfg(unix)]
+            Self::Pty => pty::open(to_client, from_client),
+            Self::Tcp(address) => tcp::open(address, to_client, from_client),
+        }
+    }
+
+    /// The port of a board that is plugged in again: another pty, or another TCP port of that interface.
+    pub(crate) fn another(self) -> Self {
+        match self {
+            Self::Tcp(address) => Self::Tcp(SocketAddr::new(address.ip(), 0)),
+            #[cfg(unix)]
+            Self::Pty => Self::Pty,
+        }
+    }
+}
+
+fn spawn(name: &str, work: impl FnOnce() + Send + 'static) -> Result<(), SimError> {
+    let started = thread::Builder::new().name(name.into()).spawn(work);
+    started.map(drop).map_err(|source| SimError::Io { what: "cannot start the port's thread".into(), source })
+}
+
+/// The emulator's end of a line.
+trait End: Read {
+    /// The client's baud rate, if the line has one.
+    fn baud(&self) -> Option<u32>;
+
+    /// Whether a client may come back after this error.
+    fn survives(&self, error: &io::Error) -> bool;
+}
+
+/// Forwards what a client sends until the port is unplugged or its line has ended, or until `from_client` accepts no
+/// more.
+fn read(end: &mut impl End, unplugged: &AtomicBool, from_client: &impl Fn(Command) -> bool) {
     let mut cutter = FrameCutter::default();
     let mut bytes = [0; 4096];
     let mut rate = None;
     let mut frames = Vec::new();
     while !unplugged.load(Ordering::Relaxed) {
-        let rest_may_come = match port.read(&mut bytes) {
+        let rest_may_come = match end.read(&mut bytes) {
             Ok(count) => {
-                // The client's baud rate can be read at this end of a pty.
-                let now = port.baud_rate().ok();
+                let now = end.baud();
                 if now != rate && !now.is_some_and(|baud| from_client(Command::HostRate(baud))) {
                     return;
                 }
@@ -72,9 +92,14 @@ fn read(port: &mut TTYPort, unplugged: &AtomicBool, from_client: &impl Fn(Comman
                 frames.extend(cutter.cut(&bytes[..count]).concat());
                 cutter.is_within_frame()
             }
-            Err(error) if matches!(error.kind(), ErrorKind::TimedOut | ErrorKind::Interrupted) => false,
-            Err(_) => {
-                thread::sleep(LOOK);
+            Err(error) => {
+                use ErrorKind::{Interrupted, TimedOut, WouldBlock};
+                if !matches!(error.kind(), TimedOut | WouldBlock | Interrupted) {
+                    if !end.survives(&error) {
+                        return;
+                    }
+                    thread::sleep(LOOK);
+                }
                 false
             }
         };
@@ -123,36 +148,7 @@ impl FrameCutter {
 
 #[cfg(test)]
 mod tests {
-    use std::sync::mpsc::channel;
-
     use super::*;
-
-    #[test]
-    fn bytes_written_together_stay_together() {
-        let (mut client, mut port) = TTYPort::pair().expect("a pty");
-        port.set_timeout(LOOK).expect("a timeout");
-        let (heard, commands) = channel();
-        let unplugged = Arc::new(AtomicBool::new(false));
-        let seen = unplugged.clone();
-        let reader = thread::spawn(move || read(&mut port, &seen, &|command| heard.send(command).is_ok()));
-        for parts in [&[[1, 2, 0, 3, 4, 0].as_slice()][..], &[&[1, 2, 0, 3], &[4, 0]]] {
-            for part in parts {
-                client.write_all(part).expect("room");
-                thread::sleep(LOOK / 10); // the operating system may pause within a write
-            }
-            let bytes = commands.iter().find_map(|command| match command {
-                Command::Bytes(bytes) => Some(bytes),
-                _ => None,
-            });
-            assert_eq!(bytes, Some(vec![1, 2, 0, 3, 4, 0]));
-        }
-        // A frame that never ends delays others only briefly.
-        client.write_all(&[5, 6, 0, 7]).expect("room");
-        let first = commands.recv_timeout(10 * LOOK);
-        assert!(matches!(first, Ok(Command::Bytes(bytes)) if bytes == [5, 6, 0]));
-        unplugged.store(true, Ordering::Relaxed);
-        reader.join().expect("an orderly end");
-    }
 
     #[test]
     fn frames_stay_whole_and_garbage_passes() {

@@ -1,4 +1,4 @@
-//! The program: emulated rigs behind a pty and a camera endpoint.
+//! The program: emulated rigs behind a port and a camera endpoint.
 
 use std::{
     net::SocketAddr,
@@ -20,7 +20,7 @@ use crate::{
     error::SimError,
     imager::{self, Imager},
     pictures::Pictures,
-    port,
+    port::PortKind,
     rig::launch,
 };
 
@@ -37,10 +37,11 @@ pub struct ServedRig {
 }
 
 impl ServedRig {
-    /// Starts the rig with its port and camera. `second` is a camera behind a half mirror; `gige` also serves
-    /// the first camera. `renamed` receives the new name when a scenario renames the pty.
+    /// Starts the rig with a port of this kind and its camera. `second` is a camera behind a half mirror; `gige` also serves
+    /// the first camera. `renamed` receives the new name when a scenario renames the port.
     pub fn start(
         config: &RigConfig,
+        kind: PortKind,
         first: Imager,
         second: Option<Imager>,
         gige: Option<&GigeConfig>,
@@ -53,7 +54,7 @@ impl ServedRig {
         let to_board = Arc::new(OnceLock::new());
         let outlets = Outlets {
             bytes: Some(bytes_out),
-            another_port: Some(another_port(Arc::clone(&to_board), renamed)),
+            another_port: Some(another_port(kind, Arc::clone(&to_board), renamed)),
             shots: shots_out,
             pictures: Some(Arc::clone(&pictures)),
         };
@@ -82,7 +83,7 @@ impl ServedRig {
         let second_camera = second.map(door).transpose()?;
         imager::watch(cameras, shots, frames_to_gige, pictures)?;
         let to_board = commands.clone();
-        let port = port::open(bytes, move |command| to_board.send(command).is_ok())?;
+        let port = kind.open(bytes, move |command| to_board.send(command).is_ok())?;
         Ok(Self { port, camera, second_camera, gige, commands, thread })
     }
 
@@ -100,13 +101,14 @@ impl ServedRig {
 }
 
 fn another_port(
+    kind: PortKind,
     to_board: Arc<OnceLock<Sender<Command>>>,
     renamed: impl Fn(&str) + Send + 'static,
 ) -> AnotherPort {
     Box::new(move || {
         let to_board = to_board.get()?.clone();
         let (bytes_out, bytes) = mpsc::channel();
-        let name = port::open(bytes, move |command| to_board.send(command).is_ok()).ok()?;
+        let name = kind.another().open(bytes, move |command| to_board.send(command).is_ok()).ok()?;
         renamed(&name);
         Some(bytes_out)
     })

@@ -25,7 +25,7 @@ use crate::{
     log_stream::LogStream,
     owner::{Answered, Command, Connect, Listener, Owner, Question, Session, nonsense, nothing},
     timing::{Pace, Timing},
-    transport::{Place, Transport, with_rate},
+    transport::{Place, with_rate},
 };
 
 const INTERRUPT_POLL: Duration = Duration::from_millis(25);
@@ -63,7 +63,7 @@ impl Drop for Port {
 }
 
 impl Client {
-    /// Opens a serial port and says hello. An unplugged board is reconnected when it returns. `/dev/ttyACM0@921600`
+    /// Opens a serial port, or `tcp:HOST:PORT`, and says hello. An unplugged board is reconnected when it returns. `/dev/ttyACM0@921600`
     /// requests a link rate; without it on both ends the link keeps its rate, see [`Client::link_note`].
     pub fn open(port: &str) -> Result<Self, ClientError> {
         let (port, wanted) = with_rate(port)?;
@@ -287,5 +287,5 @@ impl Client {
 
 fn serial(port: &str) -> Connect {
     let mut place = Place::new(port);
-    Box::new(move || Ok(Box::new(place.open()?) as Box<dyn Transport>))
+    Box::new(move || place.open())
 }

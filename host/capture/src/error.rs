@@ -25,6 +25,12 @@ pub enum PortError {
     SeveralBoards { ports: Vec<String> },
     #[error("{port}: {rate} baud requested, but the link supports {} baud", rates())]
     Rate { port: String, rate: String },
+    #[error("{port} has no baud rate of its own; set that of the line at the serial server and omit it here")]
+    TcpRate { port: String },
+    #[error(
+        "cannot connect to {port}: {reason}; expected tcp:HOST:PORT of a running farnear-sim or serial server"
+    )]
+    Connect { port: String, reason: String },
     #[error("{port} is not a serial port")]
     NoPort { port: String },
     #[error(

@@ -1,5 +1,7 @@
 //! Byte pipes to a board: the trait [`Transport`] and its serial port. Every operation has a timeout.
 
+mod tcp;
+
 use std::{
     io,
     time::{Duration, Instant},
@@ -9,6 +11,8 @@ use farnear_protocol::message::LinkRate;
 use serialport::{ClearBuffer, SerialPort, SerialPortInfo, SerialPortType};
 
 use crate::{error::PortError, find};
+
+pub use tcp::TcpTransport;
 
 pub trait Transport: Send {
     /// Waits at most `wait` for the first byte. `Ok(0)` is a timeout; an error means that the pipe has ended.
@@ -92,7 +96,10 @@ impl Place {
     }
 
     /// Remembers the port's adapter.
-    pub(crate) fn open(&mut self) -> Result<SerialTransport, PortError> {
+    pub(crate) fn open(&mut self) -> Result<Box<dyn Transport>, PortError> {
+        if self.name.starts_with(tcp::SCHEME) {
+            return Ok(Box::new(TcpTransport::open(&self.name)?));
+        }
         let present = find::present();
         let name = self.find(&present).unwrap_or(&self.name).to_owned();
         let opened = SerialTransport::open(&name).map_err(|error| match error {
@@ -103,7 +110,7 @@ impl Place {
         if self.adapter.is_none() {
             self.adapter = present.iter().find(|port| port.port_name == name).and_then(Adapter::of);
         }
-        Ok(opened)
+        Ok(Box::new(opened))
     }
 
     /// Present port of the board, by its adapter.
@@ -147,6 +154,9 @@ pub(crate) fn with_rate(given: &str) -> Result<(&str, Option<LinkRate>), PortErr
     let Some((port, rate)) = parts.filter(|_| !std::path::Path::new(given).exists()) else {
         return Ok((given, None));
     };
+    if port.starts_with(tcp::SCHEME) {
+        return Err(PortError::TcpRate { port: port.into() });
+    }
     let known = rate.parse().ok().and_then(LinkRate::of);
     let rate = known.ok_or_else(|| PortError::Rate { port: port.into(), rate: rate.into() })?;
     Ok((port, Some(rate)))
@@ -245,6 +255,8 @@ mod tests {
         for other in ["/dev/usb@left", "/dev/usb@"] {
             assert_eq!(with_rate(other).unwrap(), (other, None));
         }
+        let error = with_rate("tcp:lab:5000@921600").err().unwrap().to_string();
+        assert!(error.contains("serial server"), "{error}");
         let error = with_rate("/dev/ttyACM0@115200").err().unwrap().to_string();
         assert!(error.contains("115200") && error.contains("2000000 or 921600"), "{error}");
     }

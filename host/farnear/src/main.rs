@@ -187,6 +187,7 @@ mod tests {
     use std::collections::{BTreeMap, BTreeSet};
 
     use clap::Args;
+    use farnear_workflows::request::{RIG_TASKS, TASKS};
 
     use super::*;
     use crate::commands::rig::target::{CameraArguments, Target};
@@ -201,7 +202,7 @@ mod tests {
         let equipment = CameraArguments::augment_args(Target::augment_args(equipment));
         let equipment: BTreeSet<_> =
             equipment.get_arguments().map(|option| option.get_id().to_string()).collect();
-        for task in farnear_workflows::request::TASKS {
+        for task in TASKS.iter().chain(RIG_TASKS) {
             let find = |command: &clap::Command, word: &str| command.find_subcommand(word).cloned();
             let found = task.name.split(' ').try_fold(command.clone(), |command, word| find(&command, word));
             let mut found = found.unwrap_or_else(|| panic!("no command for the task {}", task.name));

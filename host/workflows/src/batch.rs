@@ -311,18 +311,18 @@ impl Work<'_> {
     fn discard(&self, kind: &str, out: Option<&str>) {
         let (Ok(kind), Some(out)) = (jobs::kind(kind), out) else { return };
         // If removal fails, the job's own error most likely has the same cause.
-        let _ = Place::new(self.base.join(out), kind.makes_file).discard(self.begun);
+        let _ = Place::new(self.base.join(out), kind.makes_file()).discard(self.begun);
     }
 
     fn job(&self, kind: &str, fields: &mut Fields, context: &Context<'_>) -> Result<(State, Option<Value>)> {
         let kind = jobs::kind(kind)?;
         let wanted = fields.clone();
         let out = fields.path("out")?;
-        let work = (kind.work)(fields)?;
+        let work = kind.job(fields)?;
         fields.all_taken()?;
         let input = self.sums.of(&work.inputs(), &self.base)?;
-        let wanted = Provenance::new(kind.name, &wanted, input);
-        let place = Place::new(out, kind.makes_file);
+        let wanted = Provenance::new(kind.name(), &wanted, input);
+        let place = Place::new(out, kind.makes_file());
         match place.look(&wanted, self.begun, self.settings.verify)? {
             Found::Done(figures) => Ok((State::Already, figures)),
             Found::ToDo if self.settings.dry_run => Ok((State::Todo, None)),

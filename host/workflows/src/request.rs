@@ -160,6 +160,7 @@ pub fn schema_without_paths<R: Request>() -> Value {
     schema
 }
 
+/// Tasks without a rig.
 pub const TASKS: &[Task] = &[
     Task::of::<crate::depth::DepthRequest>(),
     Task::of::<crate::focus_stack::FocusStackRequest>(),
@@ -185,6 +186,10 @@ pub const TASKS: &[Task] = &[
     Task::of::<crate::activity::recognise::RecogniseRequest>(),
     Task::of::<crate::shadow::removal::ShadowRemoveRequest>(),
     Task::of::<crate::shadow::score::ShadowScoreRequest>(),
+];
+
+/// Tasks of a rig.
+pub const RIG_TASKS: &[Task] = &[
     Task::of::<crate::rig::pair::CaptureRequest>(),
     Task::of::<crate::rig::focus::FocusRequest>(),
     Task::of::<crate::rig::sequence::SequenceRequest>(),

@@ -1,4 +1,4 @@
-//! The program as a client sees it: JSON line, pty, camera endpoint, exit.
+//! The program as a client sees it: JSON line, pty or TCP port, camera endpoint, exit.
 
 use std::{
     collections::VecDeque,
@@ -16,8 +16,6 @@ use farnear_protocol::{
     frame::{Decoder, Kind},
     message::Axis,
 };
-use serialport::SerialPort;
-
 /// Turns a hang into a failure.
 const PATIENCE: Duration = Duration::from_secs(60);
 
@@ -68,8 +66,27 @@ impl Program {
     }
 }
 
+trait Line: Read + Write {}
+impl<T: Read + Write + ?Sized> Line for T {}
+
+fn open_line(name: &str) -> Box<dyn Line> {
+    let wait = Duration::from_millis(100);
+    match name.strip_prefix("tcp:") {
+        None => Box::new(serialport::new(name, 2_000_000).timeout(wait).open().expect("the pty opens")),
+        Some(address) => {
+            let stream = TcpStream::connect(address).expect("the port listens");
+            stream.set_read_timeout(Some(wait)).expect("a timeout");
+            Box::new(stream)
+        }
+    }
+}
+
+fn is_timeout(error: &std::io::Error) -> bool {
+    matches!(error.kind(), std::io::ErrorKind::TimedOut | std::io::ErrorKind::WouldBlock)
+}
+
 struct Client {
-    port: Box<dyn SerialPort>,
+    port: Box<dyn Line>,
     decoder: Decoder,
     /// Bytes received after the last match.
     rest: VecDeque<u8>,
@@ -79,10 +96,7 @@ struct Client {
 
 impl Client {
     fn open(name: &str) -> Self {
-        let port = serialport::new(name, 2_000_000)
-            .timeout(Duration::from_millis(100))
-            .open()
-            .expect("the pty opens");
+        let port = open_line(name);
         let mut client = Self { port, decoder: Decoder::new(), rest: VecDeque::new(), boot: 0, next: 0 };
         match client.ask(&Request::Hello) {
             Ok(Response::Hello(hello)) => (client.boot, client.next) = (hello.boot, hello.last_id),
@@ -99,7 +113,7 @@ impl Client {
             let read = if self.rest.is_empty() { self.port.read(&mut bytes) } else { Ok(0) };
             let count = match read {
                 Ok(count) => count,
-                Err(error) if error.kind() == std::io::ErrorKind::TimedOut => 0,
+                Err(error) if is_timeout(&error) => 0,
                 Err(error) => panic!("the port failed: {error}"),
             };
             self.rest.extend(&bytes[..count]);
@@ -191,6 +205,30 @@ fn a_capture_through_pty_and_camera_repeats_to_the_byte() {
     let second = capture(&program);
     assert!(program.end().success());
     assert!(first == second, "two programs with one seed differ");
+    let program = Program::start(&[&arguments[..], &["--tcp"]].concat());
+    assert!(program.port.starts_with("tcp:127.0.0.1:"), "{}", program.port);
+    let third = capture(&program);
+    assert!(program.end().success());
+    assert!(first == third, "the kind of port changes the run");
+}
+
+#[test]
+fn a_tcp_port_serves_one_client_after_the_other() {
+    let program = Program::start(&["--tcp"]);
+    let mut client = Client::open(&program.port);
+    let mut other = open_line(&program.port);
+    let deadline = Instant::now() + PATIENCE;
+    loop {
+        assert!(Instant::now() < deadline, "a second client is kept waiting");
+        match other.read(&mut [0; 8]) {
+            Err(error) if is_timeout(&error) => {}
+            ended => break assert!(!matches!(ended, Ok(1..)), "the second client receives bytes"),
+        }
+    }
+    let time_us = client.time_us();
+    drop(client);
+    assert!(Client::open(&program.port).time_us() >= time_us, "the board did not restart");
+    assert!(program.end().success());
 }
 
 #[test]
@@ -267,7 +305,7 @@ fn garbage_comes_first_and_the_port_goes_away_in_mid_move() {
     let gone = loop {
         assert!(Instant::now() < deadline, "the port is still there");
         match client.port.read(&mut bytes) {
-            Err(error) if error.kind() != std::io::ErrorKind::TimedOut => break error,
+            Err(error) if !is_timeout(&error) => break error,
             _ => {}
         }
     };
@@ -324,7 +362,7 @@ fn the_link_follows_an_adapter_that_reappears_under_another_name() {
         std::thread::sleep(Duration::from_millis(5));
     }
     let mut bytes = [0; 64];
-    while !client.port.read(&mut bytes).is_err_and(|error| error.kind() != std::io::ErrorKind::TimedOut) {
+    while !client.port.read(&mut bytes).is_err_and(|error| !is_timeout(&error)) {
         assert!(Instant::now() < deadline, "the old port is still open");
     }
     // The board has not restarted.

@@ -6,10 +6,11 @@ use farnear_workflows::batch::{self, BatchSettings, JobReport, Pattern, Shard};
 
 use crate::{report, terminal};
 
-/// Do many jobs on all cores: depth, correct, silhouettes-video, silhouettes-markers, shadow-remove, recognise.
+/// Do many jobs on all cores.
 ///
-/// A manifest in TOML names what jobs of a kind share, then every job; `do` is the kind, the other fields are the flags of the
-/// command of that name, and paths are relative to the manifest:
+/// A manifest in TOML names what jobs of a kind share, then every job. `do` is a command that writes --out and needs no rig, with
+/// hyphens between its words (depth, focus-stack, calibrate-camera, silhouettes-video), or campaign. The other fields are the flags of
+/// that command. Paths are relative to the manifest:
 ///
 ///     [depth]
 ///     optics = "rig.toml"
@@ -21,9 +22,7 @@ use crate::{report, terminal};
 ///     near = "001/near.png"
 ///     out = "001/depth"
 ///
-/// A manifest in CSV has a header with the names of the fields and a row per job. Kinds and fields: depth (far, near, out, optics,
-/// ...), correct (depth, correction, out), silhouettes-video (video, out, ...), silhouettes-markers (file, template, out, ...),
-/// shadow-remove (masks, camera, lat, lon, time, out, ...), recognise (views, model, out, as, window).
+/// A manifest in CSV has a header with the names of the fields and a row per job.
 ///
 /// Each job prints a JSON line when it ends: "done", "already" (its result was made before from the same inputs and settings by
 /// the same version, as batch.toml next to it records) or "failed", with its message. One that fails does not stop the others; failures

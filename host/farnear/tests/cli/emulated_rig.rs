@@ -24,6 +24,34 @@ fn info_identifies_the_emulated_board() {
 
 #[test]
 #[cfg_attr(not(emulated_rig), ignore = "needs farnear-sim: cargo xtask test")]
+fn a_rig_behind_tcp_gives_a_pair_and_its_depth() {
+    let folder = Folder::new();
+    let mut sim = std::process::Command::new(assert_cmd::cargo::cargo_bin("farnear-sim"))
+        .args(["run", "--tcp"])
+        .stdin(std::process::Stdio::piped())
+        .stdout(std::process::Stdio::piped())
+        .spawn()
+        .expect("farnear-sim starts");
+    let mut line = String::new();
+    let output = sim.stdout.take().expect("piped");
+    std::io::BufRead::read_line(&mut std::io::BufReader::new(output), &mut line).expect("text");
+    let address: serde_json::Value = serde_json::from_str(&line).expect("JSON");
+    let [port, camera] = ["port", "camera"].map(|key| address[key].as_str().expect("text"));
+    let capture = ["rig", "capture", "--optics", rig_optics(), "--port", port, "--camera", camera];
+    succeeds(farnear(&capture).args(["--out", &folder.text("pair")]));
+    drop(sim.stdin.take());
+    assert!(sim.wait().expect("it ends").success());
+    let [far, near] = ["far.png", "near.png"].map(|file| folder.text(&format!("pair/{file}")));
+    succeeds(&mut farnear(&["depth", &far, &near, "--optics", rig_optics(), "--median-px", "5"]));
+    let scene = folder.text("scene");
+    succeeds(&mut farnear(&["render", "--optics", rig_optics(), "--out", &scene]));
+    let (map, truth) = (folder.text("pair/depth.npy"), format!("{scene}/truth.npy"));
+    let compared = figures(&mut farnear(&["compare", &map, &truth, "--away-from-edges", "8", "--json"]));
+    assert!(number(&compared, "rmse_mm") <= 0.75, "{compared}"); // as below
+}
+
+#[test]
+#[cfg_attr(not(emulated_rig), ignore = "needs farnear-sim: cargo xtask test")]
 fn the_stage_homes_moves_and_stops_and_keeps_its_limits() {
     let homed = figures(&mut on_the_rig(&["home", "--json"]));
     assert!(homed["shift_um"].is_number() && homed["lens_shift_um"].is_number(), "{homed}");

@@ -1,4 +1,4 @@
-//! Kinds of jobs: a line in the table and a function that builds a workflow's settings from fields.
+//! Kinds of jobs.
 
 mod campaign;
 mod evaluate;
@@ -9,70 +9,66 @@ use serde_json::Value;
 
 use super::{BatchError, fields::Fields};
 use crate::{
-    activity::recognise::RecogniseRequest,
     context::Context,
-    correct::CorrectRequest,
-    depth::DepthRequest,
     error::{Result, WorkflowError},
-    focus_stack::FocusStackRequest,
-    request::{Job, PathKind, Request, Task},
-    shadow::removal::ShadowRemoveRequest,
-    silhouettes::{markers::MarkersRequest, passages::PassagesRequest, video::SilhouettesVideoRequest},
+    request::{Job, PathKind, TASKS, Task},
 };
 
-pub(super) struct Kind {
-    pub name: &'static str,
-    pub makes_file: bool,
-    pub work: fn(&mut Fields) -> Result<Box<dyn Job>>,
+/// What a job does: any task that writes its result to `out` and needs no rig, or one of two more.
+#[derive(Clone, Copy)]
+pub(super) enum Kind {
+    Task(&'static Task),
+    Evaluate,
+    Campaign,
 }
 
-#[rustfmt::skip]
-const KINDS: &[Kind] = &[
-    Kind::of::<DepthRequest>(),
-    Kind::of::<FocusStackRequest>(),
-    Kind::of::<CorrectRequest>(),
-    Kind::of::<SilhouettesVideoRequest>(),
-    Kind::of::<PassagesRequest>(),
-    Kind::of::<MarkersRequest>(),
-    Kind::of::<ShadowRemoveRequest>(),
-    Kind::of::<RecogniseRequest>(),
-    Kind { name: "evaluate", makes_file: false, work: evaluate::work },
-    Kind { name: "campaign", makes_file: false, work: campaign::work },
-];
-
 impl Kind {
-    const fn of<R: Request>() -> Self {
-        Self {
-            name: R::NAME,
-            makes_file: matches!(Task::of::<R>().output(), Some((_, PathKind::OutputFile))),
-            work: |fields| {
-                let base = fields.base().to_path_buf();
-                (Task::of::<R>().job)(fields.take_all(), &base)
-            },
+    fn all() -> impl Iterator<Item = Self> {
+        let tasks = TASKS.iter().filter(|task| task.output().is_some_and(|(name, _)| name == "out"));
+        tasks.map(Self::Task).chain([Self::Evaluate, Self::Campaign])
+    }
+
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Task(task) => task.name,
+            Self::Evaluate => "evaluate",
+            Self::Campaign => "campaign",
         }
     }
-}
 
-impl Kind {
+    pub fn makes_file(self) -> bool {
+        matches!(self, Self::Task(task) if matches!(task.output(), Some((_, PathKind::OutputFile))))
+    }
+
+    pub fn job(self, fields: &mut Fields) -> Result<Box<dyn Job>> {
+        match self {
+            Self::Task(task) => {
+                let base = fields.base().to_path_buf();
+                (task.job)(fields.take_all(), &base)
+            }
+            Self::Evaluate => evaluate::work(fields),
+            Self::Campaign => campaign::work(fields),
+        }
+    }
+
     /// Accepts hyphens between the words of a command: `silhouettes-video`.
-    fn is_named(&self, name: &str) -> bool {
-        self.name.replace(' ', "-") == name.replace(' ', "-")
+    fn is_named(self, name: &str) -> bool {
+        self.name().replace(' ', "-") == name.replace(' ', "-")
     }
 }
 
-pub(super) fn kind(name: &str) -> Result<&'static Kind, BatchError> {
-    KINDS
-        .iter()
+pub(super) fn kind(name: &str) -> Result<Kind, BatchError> {
+    Kind::all()
         .find(|kind| kind.is_named(name))
         .ok_or_else(|| BatchError::UnknownKind { name: name.into(), known: names().join(", ") })
 }
 
 pub(super) fn is_kind(name: &str) -> bool {
-    KINDS.iter().any(|kind| kind.is_named(name))
+    Kind::all().any(|kind| kind.is_named(name))
 }
 
 pub(super) fn names() -> Vec<String> {
-    KINDS.iter().map(|kind| kind.name.replace(' ', "-")).collect()
+    Kind::all().map(|kind| kind.name().replace(' ', "-")).collect()
 }
 
 struct Call<S> {
@@ -96,4 +92,21 @@ pub(super) fn value(figures: impl serde::Serialize) -> Result<Value> {
     serde_json::to_value(figures).map_err(|error| {
         WorkflowError::parameter("figures", error, "figures that JSON can hold") // they are plain structs: not met
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_task_with_a_result_is_a_job_but_none_that_moves_a_rig() {
+        let names = names();
+        for name in
+            ["depth", "focus-stack", "calibrate-stack", "calibrate-camera", "activity-recognise", "report"]
+        {
+            assert!(names.iter().any(|known| known == name), "{name} of {names:?}");
+        }
+        assert!(!names.iter().any(|name| name.starts_with("rig")), "{names:?}");
+        assert!(kind("calibrate stack").is_ok_and(Kind::makes_file));
+    }
 }

@@ -23,8 +23,9 @@ use crate::{
 
 #[derive(Args, Clone)]
 pub struct Target {
-    /// Serial port of the board, e.g. /dev/ttyACM0; or sim, to start the emulated rig. Without it the only NUCLEO that is
-    /// plugged in. /dev/ttyACM0@921600 asks for that rate of the link, for adapters that lose bytes at 2000000.
+    /// Serial port of the board, e.g. /dev/ttyACM0; tcp:HOST:PORT of a farnear-sim or serial server; or sim, to start the
+    /// emulated rig. Without it the only NUCLEO that is plugged in. /dev/ttyACM0@921600 asks for that rate of the link,
+    /// for adapters that lose bytes at 2000000.
     #[arg(long, value_name = "PORT|sim", env = "FARNEAR_PORT")]
     port: Option<String>,
     #[command(flatten)]

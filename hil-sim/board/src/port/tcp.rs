@@ -1,0 +1,123 @@
+//! A TCP port.
+
+use std::{
+    io::{self, Read, Write},
+    net::{Shutdown, SocketAddr, TcpListener, TcpStream},
+    sync::{
+        Arc, Mutex, MutexGuard, PoisonError,
+        atomic::{AtomicBool, Ordering},
+        mpsc::Receiver,
+    },
+    thread,
+    time::{Duration, Instant},
+};
+
+use super::{End, LOOK, PATIENCE, read, spawn};
+use crate::{command::Command, error::SimError};
+
+/// Grace period in which a client that just disconnected may still appear connected.
+const FAREWELL: Duration = Duration::from_millis(500);
+
+struct Connection(TcpStream);
+
+impl Read for Connection {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        match self.0.read(buffer) {
+            Ok(0) => Err(io::ErrorKind::UnexpectedEof.into()),
+            other => other,
+        }
+    }
+}
+
+impl End for Connection {
+    fn baud(&self) -> Option<u32> {
+        None
+    }
+
+    fn survives(&self, _: &io::Error) -> bool {
+        false
+    }
+}
+
+#[derive(Default)]
+struct Line {
+    client: Mutex<Option<TcpStream>>,
+    unplugged: AtomicBool,
+}
+
+impl Line {
+    fn client(&self) -> MutexGuard<'_, Option<TcpStream>> {
+        self.client.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Whether the last client leaves within the grace period.
+    fn becomes_free(&self) -> bool {
+        let until = Instant::now() + FAREWELL;
+        while self.client().is_some() {
+            if Instant::now() > until {
+                return false;
+            }
+            thread::sleep(LOOK / 10);
+        }
+        true
+    }
+}
+
+pub(super) fn open(
+    address: SocketAddr,
+    to_client: Receiver<Vec<u8>>,
+    from_client: impl Fn(Command) -> bool + Send + Sync + 'static,
+) -> Result<String, SimError> {
+    let failed = |source| SimError::Io { what: format!("cannot listen on {address}"), source };
+    let listener = TcpListener::bind(address).map_err(failed)?;
+    listener.set_nonblocking(true).map_err(failed)?;
+    let name = format!("tcp:{}", listener.local_addr().map_err(failed)?);
+    let line = Arc::new(Line::default());
+    let shared = line.clone();
+    spawn("port out", move || {
+        for bytes in to_client {
+            let client = shared.client().as_ref().and_then(|client| client.try_clone().ok());
+            // Without a client the bytes are lost.
+            let _ = client.map(|mut client| client.write_all(&bytes));
+        }
+        shared.unplugged.store(true, Ordering::Relaxed);
+    })?;
+    spawn("port in", move || accept(&listener, &line, &Arc::new(from_client)))?;
+    Ok(name)
+}
+
+fn accept(
+    listener: &TcpListener,
+    line: &Arc<Line>,
+    from_client: &Arc<impl Fn(Command) -> bool + Send + Sync + 'static>,
+) {
+    while !line.unplugged.load(Ordering::Relaxed) {
+        let Ok((stream, _)) = listener.accept() else {
+            thread::sleep(LOOK);
+            continue;
+        };
+        if !line.becomes_free() {
+            let _ = stream.shutdown(Shutdown::Both); // it may have gone already
+            continue;
+        }
+        let (Ok(()), Ok(reader)) = (configure(&stream), stream.try_clone()) else { continue };
+        *line.client() = Some(stream);
+        let (shared, from_client) = (line.clone(), from_client.clone());
+        let work = move || {
+            read(&mut Connection(reader), &shared.unplugged, &*from_client);
+            if let Some(gone) = shared.client().take() {
+                let _ = gone.shutdown(Shutdown::Both); // the client may have done so
+            }
+        };
+        if spawn("port client", work).is_err() {
+            line.client().take();
+        }
+    }
+}
+
+fn configure(stream: &TcpStream) -> io::Result<()> {
+    stream.set_nonblocking(false)?; // some systems inherit it from the listener
+    stream.set_nodelay(true)?;
+    stream.set_read_timeout(Some(LOOK))?;
+    stream.set_write_timeout(Some(PATIENCE))
+}
