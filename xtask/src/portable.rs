@@ -80,7 +80,7 @@ fn under_wine() -> Result<()> {
         let [far, near] = ["far", "near"].map(|name| format!("{system}/{name}.png"));
         let capture = ["rig", "capture", "--port", "sim", "--optics", "optics.toml", "--out", system];
         output(&mut farnear(&capture))?;
-        output(&mut farnear(&["depth", &far, &near, "--optics", "optics.toml", "--uncertainty", "8bit"]))?;
+        output(&mut farnear(&["depth", &far, &near, "--optics", "optics.toml", "--uncertainty=estimated"]))?;
     }
     let files = same_files(&folder.join("linux"), &folder.join("windows"))?;
     eprintln!("{files} files of a capture and its depth are the same on both");

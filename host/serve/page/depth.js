@@ -8,10 +8,14 @@ import { parse } from "./npy.js";
 import * as measure from "./measure.js";
 import { REASONS, REASON_COLOURS } from "./reasons.js";
 
-const LAYERS = [["depth", "Depth"], ["confidence", "Confidence"], ["deviation", "Deviation"], ["far", "Far image"], ["near", "Near image"], ["reason", "Reason"], ["surface", "3-D"]];
-const FILES = { depth: "depth.npy", confidence: "confidence.npy", deviation: "uncertainty.npy", far: "far.png", near: "near.png", reason: "reason.png" };
-const UNITS = { depth: "mm", confidence: "", deviation: "mm", difference: "mm", far: "", near: "", reason: "" };
+const LAYERS = [["depth", "Depth"], ["confidence", "Confidence"], ["deviation", "Deviation"], ["far", "Far image"], ["near", "Near image"], ["reason", "Reason"], ["sharp", "All in focus"], ["surface", "3-D"]];
+const FILES = { depth: "depth.npy", confidence: "confidence.npy", deviation: "uncertainty.npy", far: "far.png", near: "near.png", reason: "reason.png", sharp: "all-in-focus.png" };
+const UNITS = { depth: "mm", confidence: "", deviation: "mm", difference: "mm", far: "", near: "", reason: "", sharp: "" };
 const METHODS = [["whitened", "Whitened (noise limit)"], ["ro", "Rational operators"], ["favaro", "Favaro & Soatto"], ["subbarao", "Subbarao, spatial"], ["subbarao-fourier", "Subbarao, Fourier"]];
+
+/** Folder of what is computed from a stack, within its capture. */
+const STACK = "focus-stack";
+const GREY = ["far", "near", "sharp"];
 
 /** Makes the view. `open(name)` shows a capture. */
 export function make(host, remember) {
@@ -39,6 +43,10 @@ export function make(host, remember) {
     show.other = variant ? `variant:${variant}` : show.other;
     open(show.name, true);
   });
+  const stacking = computeStack(() => show.name, () => {
+    show.layer = "depth";
+    open(show.name, true);
+  });
 
   host.append(h("div", { class: "split" },
     h("div", { class: "stage" },
@@ -46,7 +54,7 @@ export function make(host, remember) {
       h("div", { class: "viewers" }, viewer.element, surface, empty),
       h("div", { class: "legend" }, low, legend, high, reasons, choice(NAMES, "viridis", (name) => { show.colours = name; refresh(); }, { "aria-label": "Colours" }))),
     h("div", { class: "side" }, side.elements, panel("Distribution", histogram, field("Colours from", least, "mm"), field("to", most, "mm")),
-      panel("Compare", field("With", other), field("Wipe", wipe), against), settings,
+      panel("Compare", field("With", other), field("Wipe", wipe), against), settings, stacking,
       panel("Files", links(() => show.name)))));
 
   viewer.onprobe = (at) => side.under(show.maps, at);
@@ -57,7 +65,8 @@ export function make(host, remember) {
     if (map && mm > 0) viewer.canvas.dataset.scale = scaleBar(context, point, map, mm);
     else delete viewer.canvas.dataset.scale;
   };
-  viewer.onshape = (kind, from, to) => show.name && show.capture?.has_depth && side.shape(show.name, kind, from, to);
+  const has_map = (capture) => capture?.has_depth || capture?.variants.includes(STACK);
+  viewer.onshape = (kind, from, to) => show.name && has_map(show.capture) && side.shape(show.name, kind, from, to);
 
   const use = (tool) => {
     viewer.use(tool);
@@ -82,7 +91,7 @@ export function make(host, remember) {
     const option = (value, text) => h("option", { value, selected: value === present }, text);
     const own = found.find((capture) => capture.name === show.name);
     other.replaceChildren(option("", "nothing"),
-      ...LAYERS.slice(0, 6).map(([name, text]) => option(`layer:${name}`, text)),
+      ...LAYERS.slice(0, -1).map(([name, text]) => option(`layer:${name}`, text)),
       ...(own?.variants ?? []).map((name) => option(`variant:${name}`, `this, by ${name}`)),
       ...(own?.variants ?? []).map((name) => option(`minus:${name}`, `difference: ${name} minus this`)),
       ...found.filter((capture) => capture.has_depth && capture.name !== show.name).flatMap((capture) => [option(`depth:${capture.name}`, `depth of ${capture.name}`), option(`difference:${capture.name}`, `difference to ${capture.name}`)]));
@@ -127,17 +136,23 @@ export function make(host, remember) {
   index.addEventListener("input", () => show.capture && stack(show.name, show.capture, show.loading));
 
   function pages({ kind, images }) {
+    settings.hidden = kind !== "pair";
+    stacking.hidden = kind === "pair" || images.length < 3;
     slider.hidden = kind === "pair" || images.length < 2;
     index.max = String(images.length - 1);
     index.value = "0";
   }
 
   async function stack(name, capture, loading) {
-    const file = capture.images[Number(index.value)];
-    const map = await load(`/api/captures/${encodeURIComponent(name)}/files/${encodeURIComponent(file)}`);
+    const at = `/api/captures/${encodeURIComponent(name)}`;
+    const of = capture.variants.includes(STACK) ? ["depth", "confidence", "sharp"] : [];
+    const image = load(`${at}/files/${encodeURIComponent(capture.images[Number(index.value)])}`);
+    const computed = await Promise.all(of.map((layer) => load(`${at}/variants/${STACK}/${FILES[layer]}`)));
+    const maps = { far: await image, ...Object.fromEntries(of.map((layer, at) => [layer, computed[at]])) };
     if (loading !== show.loading) return;
-    [show.maps, show.mesh, viewer.shape, show.layer] = [{ far: map }, null, null, "far"];
-    which.textContent = `${Number(index.value) + 1} of ${capture.images.length}: ${file}`;
+    [show.maps, show.mesh, viewer.shape] = [maps, null, null];
+    if (!(show.layer in maps) && !(show.layer === "surface" && maps.depth)) show.layer = "far";
+    which.textContent = `${Number(index.value) + 1} of ${capture.images.length}: ${capture.images[Number(index.value)]}`;
     await refresh();
     await list();
   }
@@ -159,7 +174,7 @@ export function make(host, remember) {
     empty.hidden = Boolean(maps.far || maps.depth);
     for (const control of layers.children) {
       control.setAttribute("aria-pressed", control.dataset.layer === layer);
-      control.disabled = control.dataset.layer === "surface" ? !maps.depth || !show.capture?.has_depth : !maps[control.dataset.layer];
+      control.disabled = control.dataset.layer === "surface" ? !maps.depth || !has_map(show.capture) : !maps[control.dataset.layer];
     }
     const solid = layer === "surface" && maps.depth;
     surface.hidden = !solid;
@@ -203,8 +218,8 @@ export function make(host, remember) {
     return paint(difference, [-most, most], "difference");
   }
 
-  const colours = (layer) => (layer === "far" || layer === "near" ? "grey" : show.colours);
-  const limits = (layer, map) => (layer === "confidence" ? [0, 1] : layer === "reason" ? [0, REASONS.length - 1] : layer === "depth" && manual() ? /** @type {[number, number]} */ (manual()) : layer === "far" || layer === "near" ? [0, 255] : layer === "deviation" ? [0, range(map, 0.03)[1]] : range(map));
+  const colours = (layer) => (GREY.includes(layer) ? "grey" : show.colours);
+  const limits = (layer, map) => (layer === "confidence" ? [0, 1] : layer === "reason" ? [0, REASONS.length - 1] : layer === "depth" && manual() ? /** @type {[number, number]} */ (manual()) : GREY.includes(layer) ? [0, 255] : layer === "deviation" ? [0, range(map, 0.03)[1]] : range(map));
 
   /** What is right of the wipe. */
   async function beside() {
@@ -330,7 +345,7 @@ function compute(name, done) {
   const filled = h("input", { type: "checkbox" });
   const corrected = h("input", { type: "checkbox" });
   const keep = h("input", { type: "checkbox" });
-  const more = furtherOptions();
+  const more = furtherOptions("CaptureDepthRequest");
   const start = async () => {
     if (!name()) return;
     /** @type {Record<string, any>} */
@@ -350,8 +365,20 @@ function compute(name, done) {
 /** Options of a depth request that have a control of their own, or that the page fills in. */
 const SHOWN = ["method", "window", "median_px", "fill", "corrected", "variant", "uncertainty", "write"];
 
-/** All other options of a depth request, from its schema: what the program learns is offered here. */
-function furtherOptions() {
+/** The panel that computes the depth of a stack. */
+function computeStack(name, done) {
+  const more = furtherOptions("CaptureStackRequest");
+  const start = async () => {
+    const begun = name() && (await act(`/api/captures/${encodeURIComponent(name())}/stack`, more.values()));
+    if (begun && (await ended("computation", begun.job)).phase === "done") done();
+  };
+  const element = panel("Depth from focus", more.element, button("Compute stack", start));
+  element.hidden = true;
+  return element;
+}
+
+/** The options of a request that have no control of their own, from its schema. */
+function furtherOptions(request) {
   const place = h("div", { class: "details" });
   const element = h("details", {}, h("summary", {}, "All options"), place);
   /** @type {[string, string, HTMLInputElement][]} */
@@ -360,7 +387,7 @@ function furtherOptions() {
     if (inputs.length) return;
     try {
       const { components } = await get("/openapi.json");
-      const all = /** @type {[string, any][]} */ (Object.entries(components.schemas.CaptureDepthRequest.properties));
+      const all = /** @type {[string, any][]} */ (Object.entries(components.schemas[request].properties));
       inputs = all.filter(([name]) => !SHOWN.includes(name)).map(([name, { type, default: usual, description }]) => {
         const [kind] = [type].flat();
         const input = /** @type {HTMLInputElement} */ (h("input", { type: kind === "boolean" ? "checkbox" : kind === "string" ? "text" : "number", step: "any", name, title: description, placeholder: usual ?? "default" }));

@@ -98,7 +98,7 @@ test("another method is compared on the scale of depth, and its difference has f
 test("a stack is looked at image by image", async () => {
   const page = await open(browser, server.address);
   await page.waitForFunction(() => !document.querySelector("[data-capture]").disabled);
-  const { job, names } = await post(page, "/api/captures", { kind: "stack", axis: "fine", from_um: 20, to_um: 60, steps: 3 });
+  const { job, names } = await post(page, "/api/captures", { kind: "stack", axis: "coarse", from_um: 5830, to_um: 5990, steps: 3 });
   assert.ok(job, "begun");
   while ((await server.ask("/api/state")).job.phase === "running") await page.waitForTimeout(200);
   await page.locator("#tab-captures").click();
@@ -107,6 +107,10 @@ test("a stack is looked at image by image", async () => {
   await page.locator(".toolbar .dim", { hasText: "1 of 3" }).waitFor();
   await page.getByLabel("Image of the stack").fill("2");
   await page.locator(".toolbar .dim", { hasText: "3 of 3" }).waitFor();
+  await page.getByRole("button", { name: "Compute stack" }).click();
+  await page.locator("canvas[data-layer=depth]").waitFor();
+  await page.getByRole("button", { name: "All in focus" }).click();
+  await page.locator("canvas[data-layer=sharp]").waitFor();
   assert.deepEqual(page.complaints, []);
   await page.context().close();
 });

@@ -59,8 +59,8 @@ pub enum WorkflowError {
     #[error("interrupted while {during}")]
     Cancelled { during: String },
     #[error(
-        "the sharpest image lies {sensor_mm:.4} mm behind the lens, inside its focal length of {focal_length_mm} mm: is the \
-         rig's setting datum_nm right?"
+        "the sharpest image lies {sensor_mm:.4} mm behind the lens, inside its focal length of {focal_length_mm} mm: move the \
+         coarse stage into focus before the stack; if it was, the rig's setting datum_nm is wrong"
     )]
     InsideFocalLength { sensor_mm: f64, focal_length_mm: f64 },
     /// Board and host calculate different bits.

@@ -130,6 +130,9 @@ fn check_regular(folder: &Path) -> Result<()> {
     odd.map_err(failed)
 }
 
+/// Variant with the result of a focus stack.
+pub const STACK_VARIANT: &str = "focus-stack";
+
 pub fn variant_of(capture: &Path, variant: &str) -> Result<PathBuf> {
     let letters = variant.chars().all(|c| c.is_ascii_alphanumeric() || c == '-');
     if variant.is_empty() || !letters || variant.len() > 60 {
@@ -137,6 +140,12 @@ pub fn variant_of(capture: &Path, variant: &str) -> Result<PathBuf> {
         return Err(WorkflowError::parameter("variant", variant, expected));
     }
     Ok(capture.join(format!("{VARIANT}{variant}")))
+}
+
+/// Folder of a capture's map: that of a stack is the variant [`STACK_VARIANT`].
+pub fn with_map(capture: PathBuf) -> PathBuf {
+    let stack = capture.join(format!("{VARIANT}{STACK_VARIANT}"));
+    if capture.join("depth.npy").exists() || !stack.is_dir() { capture } else { stack }
 }
 
 /// The first free names `KIND-001`, `KIND-002` and so on.

@@ -10,6 +10,7 @@ use farnear_files::npy;
 use farnear_workflows::{
     Context,
     depth::DepthRequest,
+    focus_stack::FocusStackRequest,
     measure::{self, Measured, Rectangle},
     request::{self, Paths, Request},
     sessions,
@@ -65,6 +66,20 @@ impl JsonSchema for CaptureDepthRequest {
     }
 }
 
+/// A focus stack request without its files.
+#[derive(Deserialize)]
+pub struct CaptureStackRequest(Map<String, Value>);
+
+impl JsonSchema for CaptureStackRequest {
+    fn schema_name() -> std::borrow::Cow<'static, str> {
+        "CaptureStackRequest".into()
+    }
+
+    fn json_schema(_: &mut SchemaGenerator) -> Schema {
+        request::schema_without_paths::<FocusStackRequest>().try_into().unwrap_or_default()
+    }
+}
+
 /// A part of the map.
 #[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -102,6 +117,12 @@ pub fn routes(api: Api) -> Api {
         For::Control,
         "Computes the depth of a pair, with its standard deviation.",
         compute,
+    )
+    .post::<CaptureStackRequest, Begun, _, _>(
+        "/api/captures/{capture}/stack",
+        For::Control,
+        "Computes the depth of a stack by focus, and its sharp image, as the variant `focus-stack`.",
+        compute_stack,
     )
     .post::<Region, Figures, _, _>(
         "/api/captures/{capture}/region",
@@ -177,12 +198,40 @@ async fn compute(
     Ok(Json(Begun { job }))
 }
 
+async fn compute_stack(
+    State(app): Shared,
+    Path(name): Path<String>,
+    headers: HeaderMap,
+    Body(CaptureStackRequest(options)): Body<CaptureStackRequest>,
+) -> Result<Json<Begun>, Failure> {
+    require_control(&app, &headers)?;
+    let folder = sessions::existing(&app.session, &name)?;
+    let options: FocusStackRequest = request::parse(options, Paths::Refused)
+        .map_err(|error| Failure::new(StatusCode::BAD_REQUEST, error.to_string()))?;
+    let out = sessions::variant_of(&folder, sessions::STACK_VARIANT)?;
+    let request = FocusStackRequest { stack: folder, out, ..options };
+    request.check()?;
+    let work = move |app: &App, context: &Context<'_>| {
+        let computed = request.run(context)?;
+        app.change(|state| state.captures += 1);
+        figures(computed)
+    };
+    let task = Task { kind: "depth", title: format!("Depth of {name}"), work: Box::new(work) };
+    let job = app.begin_computing(task).map_err(|title| Failure::busy(&title))?;
+    Ok(Json(Begun { job }))
+}
+
+/// Folder of a capture's map.
+fn with_map(app: &App, name: &str) -> Result<std::path::PathBuf, Failure> {
+    Ok(sessions::with_map(sessions::existing(&app.session, name)?))
+}
+
 async fn region(
     State(app): Shared,
     Path(name): Path<String>,
     Body(Region { x, y, width, height }): Body<Region>,
 ) -> Result<Json<Figures>, Failure> {
-    let folder = sessions::existing(&app.session, &name)?;
+    let folder = with_map(&app, &name)?;
     let at = Rectangle { x, y, width, height };
     let figures = aside(move || Ok(figures(measure::region(&Measured::read(&folder)?, at)?)?)).await?;
     Ok(Json(Figures { figures }))
@@ -193,13 +242,13 @@ async fn profile(
     Path(name): Path<String>,
     Body(Line { from, to }): Body<Line>,
 ) -> Result<Json<Figures>, Failure> {
-    let folder = sessions::existing(&app.session, &name)?;
+    let folder = with_map(&app, &name)?;
     let figures = aside(move || Ok(figures(measure::profile(&Measured::read(&folder)?, from, to)?)?)).await?;
     Ok(Json(Figures { figures }))
 }
 
 fn both(app: &App, names: [&str; 2]) -> Result<[std::path::PathBuf; 2], Failure> {
-    let [first, second] = names.map(|name| sessions::existing(&app.session, name));
+    let [first, second] = names.map(|name| with_map(app, name));
     Ok([first?, second?])
 }
 
@@ -222,7 +271,7 @@ async fn difference_map(
 }
 
 async fn mesh(State(app): Shared, Path(name): Path<String>) -> Result<Response, Failure> {
-    let folder = sessions::existing(&app.session, &name)?;
+    let folder = with_map(&app, &name)?;
     let bytes = aside(move || Ok(measure::mesh(&folder, MESH_PIXELS)?)).await?;
     Ok(bytes.into_response())
 }
