@@ -148,6 +148,7 @@ export function make(host, remember) {
     const of = capture.variants.includes(STACK) ? ["depth", "confidence", "sharp"] : [];
     const image = load(`${at}/files/${encodeURIComponent(capture.images[Number(index.value)])}`);
     const computed = await Promise.all(of.map((layer) => load(`${at}/variants/${STACK}/${FILES[layer]}`)));
+    /** @type {Record<string, import("./maps.js").NumberMap>} */
     const maps = { far: await image, ...Object.fromEntries(of.map((layer, at) => [layer, computed[at]])) };
     if (loading !== show.loading) return;
     [show.maps, show.mesh, viewer.shape] = [maps, null, null];
