@@ -984,10 +984,23 @@ class RigClient:
     def clear_alarm(self, number: int) -> None:
         """Clears an alarm by its number."""
     def expose(
-        self, camera: str, shots: Sequence[tuple[str, float]], *, exposure_us: int = 5000, wait_s: float = 30.0
+        self,
+        camera: str,
+        shots: Sequence[tuple[str, float]],
+        *,
+        exposure_us: int = 5000,
+        wait_s: float = 30.0,
+        light: Optional[tuple[float, float]] = None,
     ) -> list[tuple[NDArray[np.uint16], int, dict[str, object]]]:
         """Runs a program of positions (axis, um) on the board; gives an image with its record for each."""
     def capture_pair(
-        self, camera: str, optics: Optics, *, exposure_us: int = 5000, wait_s: float = 30.0
+        self,
+        camera: str,
+        optics: Optics,
+        *,
+        exposure_us: int = 5000,
+        wait_s: float = 30.0,
+        light: Optional[tuple[float, float]] = None,
+        subtract_ambient: bool = False,
     ) -> tuple[tuple[NDArray[np.uint16], int, dict[str, object]], tuple[NDArray[np.uint16], int, dict[str, object]]]:
         """A far- and a near-focused image for some optics: homes where needed, brings the stage near, exposes both by piezo."""

@@ -149,7 +149,12 @@ class Rig:
         self._open.clear_alarm(number)
 
     def expose(
-        self, positions: Iterable[tuple[str, float]], *, exposure_ms: float = 5.0, wait_s: float = 30.0
+        self,
+        positions: Iterable[tuple[str, float]],
+        *,
+        exposure_ms: float = 5.0,
+        wait_s: float = 30.0,
+        light: Optional[tuple[float, float]] = None,
     ) -> list[Exposure]:
         """Expose at each position by a program on the board: move, settle, trigger, time stamp.
 
@@ -161,6 +166,8 @@ class Rig:
             Exposure time, ms.
         wait_s : float
             Longest wait for an image, s.
+        light : (float, float), optional
+            Brightness of the board's two light outputs during the exposures, percent.
 
         Returns
         -------
@@ -173,12 +180,18 @@ class Rig:
         for begin in range(0, len(shots), most):
             part = shots[begin : begin + most]
             exposure_us = round(1000 * exposure_ms)
-            images = self._open.expose(self._camera_address, part, exposure_us=exposure_us, wait_s=wait_s)
+            images = self._open.expose(self._camera_address, part, exposure_us=exposure_us, wait_s=wait_s, light=light)
             taken.extend(_exposure(*image) for image in images)
         return taken
 
     def capture_pair(
-        self, optics: Optics, *, exposure_ms: float = 5.0, wait_s: float = 30.0
+        self,
+        optics: Optics,
+        *,
+        exposure_ms: float = 5.0,
+        wait_s: float = 30.0,
+        light: Optional[tuple[float, float]] = None,
+        subtract_ambient: bool = False,
     ) -> tuple[Exposure, Exposure]:
         """Capture a pair for `farnear.depth`: home if necessary, move the stage, expose both positions of the piezo.
 
@@ -190,22 +203,41 @@ class Rig:
             Exposure time, ms.
         wait_s : float
             Longest wait for an image, s.
+        light : (float, float), optional
+            Brightness of the board's two light outputs during the exposures, percent.
+        subtract_ambient : bool
+            Subtract images without that light. The scene must not move and the room's light must be steady.
 
         Returns
         -------
         far, near : Exposure
             Images (height, width) with their records.
         """
-        pair = self._open.capture_pair(self._camera_address, optics, exposure_us=round(1000 * exposure_ms), wait_s=wait_s)
+        pair = self._open.capture_pair(
+            self._camera_address,
+            optics,
+            exposure_us=round(1000 * exposure_ms),
+            wait_s=wait_s,
+            light=light,
+            subtract_ambient=subtract_ambient,
+        )
         far, near = (_exposure(*image) for image in pair)
         return far, near
 
-    def run_sequence(self, sequence: useq.MDASequence, *, axis: str = "fine", wait_s: float = 30.0) -> Iterator[Exposure]:
+    def run_sequence(
+        self,
+        sequence: useq.MDASequence,
+        *,
+        axis: str = "fine",
+        wait_s: float = 30.0,
+        channels: Optional[Mapping[str, tuple[float, float]]] = None,
+    ) -> Iterator[Exposure]:
         """Run a `useq` sequence whose `z` positions (um) are those of an axis.
 
         `z_plan`, `exposure` (ms, default 5) and `time_plan` are supported: an event waits for its `min_start_time` (s since the start,
-        or since the last event with `reset_event_timer`). Events of one exposure and one start time run as one program on the board.
-        Channels, stage positions, autofocus, custom actions, properties and SLM images raise `FarnearError` before any motion, as do
+        or since the last event with `reset_event_timer`). `channels` has the light of each channel: the brightness of the board's two
+        outputs, percent, as in `channels={"blue": (100, 0)}`. Events of one exposure, light and start time run as one program on the
+        board. Other channels, stage positions, autofocus, custom actions, properties and SLM images raise `FarnearError` before any motion, as do
         positions and exposures outside the limits.
 
         Yields
@@ -216,10 +248,12 @@ class Rig:
         events = list(sequence)
         info = self.info()
         for event in events:
-            _check(event, axis, info)
-        return self._run_events(events, axis, wait_s)
+            _check(event, axis, info, channels or {})
+        return self._run_events(events, axis, wait_s, channels or {})
 
-    def _run_events(self, events: list[Any], axis: str, wait_s: float) -> Iterator[Exposure]:
+    def _run_events(
+        self, events: list[Any], axis: str, wait_s: float, channels: Mapping[str, tuple[float, float]]
+    ) -> Iterator[Exposure]:
         begin = time.monotonic()
         while events:
             first, same = events[0], 1
@@ -236,7 +270,8 @@ class Rig:
                     warnings.warn(f"event {dict(first.index)} starts {late_s:.1f} s late", stacklevel=2)
             positions = [(axis, float(event.z_pos)) for event in part]
             exposure_ms = 5.0 if first.exposure is None else float(first.exposure)
-            taken = self.expose(positions, exposure_ms=exposure_ms, wait_s=wait_s)
+            light = None if first.channel is None else channels[first.channel.config]
+            taken = self.expose(positions, exposure_ms=exposure_ms, wait_s=wait_s, light=light)
             for event, exposure in zip(part, taken):
                 yield Exposure(exposure.image, exposure.bits, exposure.record, dict(event.index))
 
@@ -245,20 +280,23 @@ LATE_S = 0.5
 """Delay of a time lapse from which a warning is issued."""
 
 
-def _program(event: Any) -> tuple[Any, Any]:
-    return event.exposure, event.min_start_time
+def _program(event: Any) -> tuple[Any, Any, Any]:
+    return event.exposure, event.channel, event.min_start_time
 
 
-def _check(event: Any, axis: str, info: Mapping[str, Any]) -> None:
+def _check(event: Any, axis: str, info: Mapping[str, Any], channels: Mapping[str, tuple[float, float]]) -> None:
     name = f"event {dict(event.index)}"
     action = getattr(event.action, "type", "acquire_image") if event.action is not None else "acquire_image"
     if action != "acquire_image":
         raise FarnearError(f"{name} asks for the action {action!r}; expected images only. Find the focus with `farnear rig focus` before")
-    asked = {"x_pos": event.x_pos, "y_pos": event.y_pos, "channel": event.channel, "slm_image": event.slm_image}
+    if event.channel is not None and event.channel.config not in channels:
+        light = f"channels={{{event.channel.config!r}: (100, 0)}}"
+        raise FarnearError(f"{name} asks for the channel {event.channel.config!r}; give its light in percent, as in {light}")
+    asked = {"x_pos": event.x_pos, "y_pos": event.y_pos, "slm_image": event.slm_image}
     others = [what for what, value in asked.items() if value is not None]
     others += [what for what in ("properties", "keep_shutter_open") if getattr(event, what)]
     if others:
-        raise FarnearError(f"{name} asks for {', '.join(others)}; the rig has z and time only")
+        raise FarnearError(f"{name} asks for {', '.join(others)}; the rig has z, channels and time only")
     if event.z_pos is None:
         raise FarnearError(f"{name} has no z position; give the sequence a z_plan")
     exposure_ms = 5.0 if event.exposure is None else float(event.exposure)

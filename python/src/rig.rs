@@ -20,9 +20,9 @@ use farnear_capture::{
 };
 use farnear_protocol::{
     Micros, Nanometres,
-    message::{Axis, AxisStatus, Limits, ShotRecord},
+    message::{Axis, AxisStatus, LightLevels, Limits, ShotRecord},
 };
-use farnear_workflows::rig::camera::CameraAddress;
+use farnear_workflows::rig::camera::{CameraAddress, light_of_percent};
 use ndarray::Array2;
 use numpy::{IntoPyArray, PyArray2};
 use pyo3::{prelude::*, types::PyDict};
@@ -131,7 +131,7 @@ impl RigClient {
     }
 
     /// Runs a program of positions (axis, um) on the board; gives an image with its record for each.
-    #[pyo3(signature = (camera, shots, *, exposure_us=5000, wait_s=30.0))]
+    #[pyo3(signature = (camera, shots, *, exposure_us=5000, wait_s=30.0, light=None))]
     fn expose<'py>(
         &self,
         py: Python<'py>,
@@ -139,16 +139,20 @@ impl RigClient {
         shots: Vec<(String, f64)>,
         exposure_us: u32,
         wait_s: f64,
+        light: Option<[f64; 2]>,
     ) -> PyResult<Vec<Taken<'py>>> {
         let (address, wait) = (address(camera)?, waiting(wait_s)?);
+        let light = levels(light)?;
         let usual = ShotDefaults { exposure: Micros(exposure_us), ..ShotDefaults::default() };
         let shots = shots.iter().map(|(name, to_um)| Ok(usual.shot(axis(name)?, position(*to_um)?)));
         let shots = shots.collect::<PyResult<Vec<_>>>()?;
         let limits = self.0.hello().limits;
         let taken = self.interruptibly(py, |client| {
             let mut camera = open(&address)?;
+            let mut client = client.clone();
+            client.set_light(light);
             let mut taken = Vec::with_capacity(shots.len());
-            expose(client, camera.as_mut(), &shots, wait, |record, image| -> Result<(), CaptureError> {
+            expose(&client, camera.as_mut(), &shots, wait, |record, image| -> Result<(), CaptureError> {
                 taken.push((image.pixels, image.bits, record));
                 Ok(())
             })?;
@@ -158,7 +162,8 @@ impl RigClient {
     }
 
     /// A far- and a near-focused image for some optics: homes where needed, brings the stage near, exposes both by piezo.
-    #[pyo3(signature = (camera, optics, *, exposure_us=5000, wait_s=30.0))]
+    #[pyo3(signature = (camera, optics, *, exposure_us=5000, wait_s=30.0, light=None, subtract_ambient=false))]
+    #[allow(clippy::too_many_arguments, reason = "keywords of Python")]
     fn capture_pair<'py>(
         &self,
         py: Python<'py>,
@@ -166,15 +171,24 @@ impl RigClient {
         optics: &Optics,
         exposure_us: u32,
         wait_s: f64,
+        light: Option<[f64; 2]>,
+        subtract_ambient: bool,
     ) -> PyResult<(Taken<'py>, Taken<'py>)> {
+        let light = levels(light)?;
+        if subtract_ambient && light.is_none() {
+            return Err(FarnearError::new_err("subtract_ambient needs light=(first, second) in percent"));
+        }
         let (address, image_wait) = (address(camera)?, waiting(wait_s)?);
         let range = optics.0.working_range();
         let sensor = SensorPair { far_mm: range.sensor_far_mm, near_mm: range.sensor_near_mm };
-        let exposures = Exposures { exposure: Micros(exposure_us), image_wait, ..Exposures::default() };
+        let exposures =
+            Exposures { exposure: Micros(exposure_us), image_wait, subtract_ambient, ..Exposures::default() };
         let limits = self.0.hello().limits;
         let pair = self.interruptibly(py, |client| {
             let mut camera = open(&address)?;
-            Ok(capture_pair(client, camera.as_mut(), &sensor, &exposures, &mut |_| {})?)
+            let mut client = client.clone();
+            client.set_light(light);
+            Ok(capture_pair(&client, camera.as_mut(), &sensor, &exposures, &mut |_| {})?)
         })?;
         let [far, near] = [pair.far, pair.near]
             .map(|taken| of_image(py, (taken.image.pixels, taken.image.bits, taken.record), &limits));
@@ -248,6 +262,13 @@ fn address(camera: &str) -> PyResult<CameraAddress> {
         )),
         address => Ok(address),
     }
+}
+
+fn levels(percent: Option<[f64; 2]>) -> PyResult<Option<LightLevels>> {
+    percent
+        .map(light_of_percent)
+        .transpose()
+        .map_err(|reason| FarnearError::new_err(format!("light: {reason}")))
 }
 
 fn open(address: &CameraAddress) -> Result<Box<dyn farnear_capture::camera::Camera>, Failed> {

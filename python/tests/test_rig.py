@@ -51,6 +51,23 @@ def test_a_time_lapse_keeps_its_interval(emulated_rig):
     assert time.monotonic() - begin >= 1
 
 
+def test_channels_are_the_light_of_the_board(emulated_rig):
+    useq = pytest.importorskip("useq")
+    emulated_rig.home()
+    events = [useq.MDAEvent(z_pos=50, channel=name) for name in ("dark", "lit", "dark")]
+    taken = list(emulated_rig.run_sequence(events, channels={"dark": (0, 0), "lit": (50, 0)}))
+    first, lit, last = (exposure.image.mean() for exposure in taken)
+    # The emulated lamp is as bright as the room: 1.5, less saturation.
+    assert 1.3 < lit / first < 1.55 and last == pytest.approx(first, rel=0.01)
+
+
+def test_an_ambient_image_needs_light(emulated_rig, optics):
+    with pytest.raises(farnear.FarnearError, match="light"):
+        emulated_rig.capture_pair(optics, subtract_ambient=True)
+    with pytest.raises(farnear.FarnearError, match="130"):
+        emulated_rig.capture_pair(optics, light=(130, 0))
+
+
 def test_refuses_events_that_the_rig_cannot_do(emulated_rig):
     useq = pytest.importorskip("useq")
     for event, what in [

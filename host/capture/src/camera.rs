@@ -9,7 +9,7 @@ use farnear_protocol::{
     message::{ShotRecord, TriggerMode},
     units::Micros,
 };
-use ndarray::Array2;
+use ndarray::{Array2, Zip};
 
 pub mod command;
 pub mod controls;
@@ -40,6 +40,16 @@ pub struct Image {
 }
 
 impl Image {
+    /// This image less one of the same size without the lamp; saturated pixels stay white.
+    pub(crate) fn without(&self, dark: &Self) -> Self {
+        let white = ((1u32 << self.bits.min(16)) - 1) as u16;
+        let pixels = Zip::from(&self.pixels).and(&dark.pixels).map_collect(|lit, dark| match *lit >= white {
+            true => white,
+            false => lit.saturating_sub(*dark),
+        });
+        Self { pixels, bits: self.bits }
+    }
+
     /// Grey values from 0 to 1.
     pub fn grey(&self) -> Array2<f32> {
         let largest = f32::from(((1u32 << self.bits.min(16)) - 1) as u16);

@@ -40,6 +40,8 @@ pub struct Client {
     interrupt: Option<Arc<AtomicBool>>,
     /// Light of the shots that the board triggers.
     light: Option<LightLevels>,
+    /// Whether every second shot is without light.
+    alternating: bool,
 }
 
 /// Channel to the port's thread, which ends with the last handle.
@@ -110,7 +112,7 @@ impl Client {
             inbox: Some(inbox),
             thread: Some(thread),
         };
-        Ok(Self { port: Arc::new(port), session, interrupt: None, light: None })
+        Ok(Self { port: Arc::new(port), session, interrupt: None, light: None, alternating: false })
     }
 
     /// Light during each exposure of this handle's programs; the board rejects it for shots that it does not trigger.
@@ -118,8 +120,13 @@ impl Client {
         self.light = light;
     }
 
-    pub(crate) fn light(&self) -> Option<LightLevels> {
-        self.light
+    /// A handle whose programs have light in the first shot and every second one after it.
+    pub(crate) fn with_alternating_light(&self) -> Self {
+        Self { alternating: true, ..self.clone() }
+    }
+
+    pub(crate) fn light(&self, index: u8) -> Option<LightLevels> {
+        self.light.filter(|_| !self.alternating || index.is_multiple_of(2))
     }
 
     /// Continues after a reset or unplugging. Axes are at rest and not homed. May be repeated.

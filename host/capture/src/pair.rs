@@ -29,6 +29,8 @@ pub struct Exposures {
     pub image_wait: Duration,
     /// Averaged exposures per image, at least 1.
     pub averaged: u16,
+    /// Subtracts as many exposures without the board's light.
+    pub subtract_ambient: bool,
 }
 
 impl Default for Exposures {
@@ -38,6 +40,7 @@ impl Default for Exposures {
             settle: Settle::of_move(Axis::SensorFine),
             image_wait: Duration::from_secs(30),
             averaged: 1,
+            subtract_ambient: false,
         }
     }
 }
@@ -120,22 +123,32 @@ pub fn capture_pair(
     let [far, near] = reach.shots.map(|shot| um(shot.target));
     say(&format!("exposing far (piezo at {far:.3} um) and near ({near:.3} um)"));
     let repeat = exposures.averaged.max(1);
-    let shots = reach.shots.map(|shot| Shot { repeat, ..shot });
-    let mut taken: [Option<(ShotRecord, Average)>; 2] = [None, None];
+    let [far, near] = reach.shots.map(|shot| Shot { repeat, ..shot });
+    let (shots, lit) = match exposures.subtract_ambient {
+        true => (vec![far, far, near, near], &client.with_alternating_light()),
+        false => (vec![far, near], client),
+    };
+    let mut taken: Vec<Option<(ShotRecord, Average)>> = vec![None; shots.len()];
+    let asked = shots.len() * usize::from(repeat);
     let mut reported = 0;
-    expose(client, camera, &shots, exposures.image_wait, |record, image| -> Result<(), CaptureError> {
+    expose(lit, camera, &shots, exposures.image_wait, |record, image| -> Result<(), CaptureError> {
         reported += 1;
         match taken.get_mut(usize::from(record.index)) {
             Some(Some((_, average))) => average.add(&image)?,
             Some(none) => *none = Some((record, Average::of(image))),
-            None => return Err(CaptureError::Count { reported, asked: 2 * usize::from(repeat) }),
+            None => return Err(CaptureError::Count { reported, asked }),
         }
         Ok(())
     })?;
-    let [Some(far), Some(near)] = taken else {
-        return Err(CaptureError::Count { reported, asked: 2 * usize::from(repeat) });
+    let finished = |(record, average): (ShotRecord, Average)| (record, average.finish());
+    let images: Option<Vec<_>> = taken.into_iter().map(|taken| taken.map(finished)).collect();
+    let both = match images.as_deref() {
+        Some([far, near]) => [far.clone(), near.clone()],
+        Some([far, dark, near, dark_near]) => {
+            [(far.0, far.1.without(&dark.1)), (near.0, near.1.without(&dark_near.1))]
+        }
+        _ => return Err(CaptureError::Count { reported, asked }),
     };
-    let both = [far, near].map(|(record, average)| (record, average.finish()));
     pair_of(both, sensor, reach.coarse, &client.hello().limits)
 }
 

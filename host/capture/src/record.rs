@@ -102,6 +102,9 @@ pub struct CameraRecord {
     pub bits: u8,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub averaged: Option<u16>,
+    /// Whether exposures without the board's light were subtracted.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub ambient_subtracted: bool,
     /// Whether dark and flat frames were applied.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub corrected: bool,
@@ -219,6 +222,7 @@ fn record(
             height,
             bits: image.bits,
             averaged: None,
+            ambient_subtracted: false,
             corrected: false,
             settings: BTreeMap::new(),
         },

@@ -366,7 +366,7 @@ impl Client {
         for (index, shot) in (0..count).zip(shots) {
             let request = Request::LoadShot { index, shot: *shot };
             self.expect_accepted(&request, &format!("loading shot {index}"))?;
-            if let Some(levels) = self.light() {
+            if let Some(levels) = self.light(index) {
                 let light = Some(ShotLight { levels, delay: Micros(0), length: shot.exposure });
                 let during = format!("setting the light of shot {index}");
                 self.expect_accepted(&Request::SetShotLight { index, light }, &during)?;

@@ -32,12 +32,13 @@ export function warn(found) {
 export function make() {
   const depth = h("input", { type: "checkbox", checked: true });
   const averaged = h("input", { type: "number", value: 1, min: 1, max: 256, "aria-label": "Exposures of each image, averaged" });
+  const ambient = h("input", { type: "checkbox" });
   const amount = h("input", { type: "number", value: 10, min: 1, max: 500, "aria-label": "Pairs of the series" });
   const axis = choice([["fine", "Piezo"], ["coarse", "Coarse"], ["lens", "Lens"]], "fine", () => {}, { "aria-label": "Axis of the stack" });
   const [from, to, steps] = [["From", 20], ["To", 180], ["Images", 17]].map(([text, value]) => field(text, h("input", { type: "number", value, step: "any" }), text === "Images" ? "" : "µm"));
   const value = (place) => Number(place.querySelector("input").value);
   warnings = h("ul", { class: "warnings", hidden: true, "aria-label": "Before you capture" });
-  const pair = button("Capture pair", () => take({ kind: "pair", averaged: Math.round(Number(averaged.value)) }, depth.checked), { class: "primary", title: "C", "data-capture": "" });
+  const pair = button("Capture pair", () => take({ kind: "pair", averaged: Math.round(Number(averaged.value)), subtract_ambient: ambient.checked }, depth.checked), { class: "primary", title: "C", "data-capture": "" });
   const all = [
     pair,
     button("Series", () => take({ kind: "series", pairs: Math.round(Number(amount.value)) }, false), { "data-capture": "" }),
@@ -52,6 +53,7 @@ export function make() {
   return panel("Capture", warnings, h("div", { class: "capture" }, pair, h("label", { class: "check" }, depth, "compute depth")),
     h("details", {}, h("summary", {}, "Average, series, still, stack"),
       h("div", { class: "row" }, h("span", {}, "Average"), averaged, h("span", { class: "unit" }, "exposures")),
+      h("label", { class: "check" }, ambient, "subtract images without the board's light"),
       h("div", { class: "row" }, all[1], amount, h("span", { class: "unit" }, "pairs")),
       h("div", { class: "row" }, all[2], h("span", { class: "dim" }, "at the present focus")),
       h("div", { class: "row" }, all[3], axis), h("div", { class: "three" }, from, to, steps)));

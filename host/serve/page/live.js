@@ -93,6 +93,8 @@ export function make(host) {
   };
   const exposure = h("input", { type: "number", min: 1, max: 1000000, step: 100, inputmode: "numeric" });
   exposure.addEventListener("change", () => act("/api/live", { exposure_us: Math.round(Number(exposure.value)) }));
+  const light = ["First", "Second"].map((text) => h("input", { type: "number", min: 0, max: 100, "aria-label": `${text} light output` }));
+  for (const level of light) level.addEventListener("change", () => act("/api/live", { light_percent: light.map((input) => Number(input.value)) }));
   const measure = choice(MEASURES, MEASURES[0][0], (name) => { values.length = 0; best = 0; act("/api/live", { measure: name }); });
   const forget = button("Reset", () => { values.length = 0; best = 0; }, { title: "Forgets the largest value" });
 
@@ -106,7 +108,7 @@ export function make(host) {
       capture.make(),
       panel("Focus value", h("div", { class: "reading" }, focus, forget), place, field("Measure", measure)),
       panel("Recordings", h("div", { class: "row record-row" }, play, recordings), h("label", { class: "check" }, fast, "as fast as it goes"), played),
-      panel("Camera", field("Exposure", exposure, "µs"), histogram, figures, warnings, camera.make()))));
+      panel("Camera", field("Exposure", exposure, "µs"), h("div", { class: "row", title: "The board's light outputs during captures and live depth" }, h("span", {}, "Light"), ...light, h("span", { class: "unit" }, "%")), histogram, figures, warnings, camera.make()))));
   depth.element.hidden = true;
   depth.onprobe = (at) => {
     const code = at && live ? live.codes[at[1] * live.width + at[0]] : 0;
@@ -136,6 +138,10 @@ export function make(host) {
     deep.setAttribute("aria-pressed", live.mode === "depth");
     const seen = rig.phase === "ready" || live.camera_alone;
     for (const control of [off, exposure, measure]) control.disabled = !hasControl() || !seen;
+    light.forEach((level, at) => {
+      level.disabled = !hasControl() || rig.phase !== "ready";
+      if (document.activeElement !== level) level.value = String(Math.round(live.light_percent[at]));
+    });
     deep.disabled = !hasControl() || rig.phase !== "ready";
     if (document.activeElement !== exposure) exposure.value = live.exposure_us;
     measure.value = live.measure;

@@ -14,13 +14,13 @@ use axum::body::Bytes;
 use farnear_capture::camera::Setting;
 use farnear_depth::focus_measure::FocusMeasure;
 use farnear_files::staging::write_file;
-use farnear_protocol::Micros;
+use farnear_protocol::{Micros, message::LightLevels};
 use farnear_workflows::{
     Cancel, WorkflowError,
     optics::GivenOptics,
     rig::{
         RigAddress,
-        camera::{CameraAddress, CameraSettings},
+        camera::{CameraAddress, CameraSettings, percent_of_light},
         open::OpenRig,
         recording::Recorder,
     },
@@ -75,6 +75,8 @@ pub struct App {
 pub struct Live {
     pub mode: LiveMode,
     pub exposure: Micros,
+    /// Of exposures that the board triggers.
+    pub light: Option<LightLevels>,
     pub measure: FocusMeasure,
     pub cancel: Cancel,
 }
@@ -101,6 +103,7 @@ impl App {
         let live = Live {
             mode: LiveMode::Image,
             exposure: camera.exposure,
+            light: camera.light,
             measure: FocusMeasure::ModifiedLaplacian,
             cancel: Cancel::default(),
         };
@@ -135,8 +138,8 @@ impl App {
     }
 
     pub fn camera(&self) -> CameraSettings {
-        let exposure = self.live().exposure;
-        CameraSettings { exposure, ..lock(&self.camera).clone() }
+        let Live { exposure, light, .. } = self.live();
+        CameraSettings { exposure, light, ..lock(&self.camera).clone() }
     }
 
     /// Changes camera settings and restarts the live view.
@@ -177,11 +180,17 @@ impl App {
         change(&mut live);
         live.cancel.cancel();
         live.cancel = Cancel::default();
-        let Live { mode, exposure, measure, .. } = live.clone();
+        let Live { mode, exposure, light, measure, .. } = live.clone();
         drop(live);
         self.change(|state| {
-            state.live =
-                LiveState { mode, exposure_us: exposure.0, measure, error: None, ..state.live.clone() };
+            state.live = LiveState {
+                mode,
+                exposure_us: exposure.0,
+                light_percent: percent_of_light(light.unwrap_or_default()),
+                measure,
+                error: None,
+                ..state.live.clone()
+            };
         });
     }
 
@@ -352,6 +361,7 @@ fn beginning(address: Option<&RigAddress>, camera: &CameraSettings, live: &Live)
         live: LiveState {
             mode: live.mode,
             exposure_us: live.exposure.0,
+            light_percent: percent_of_light(live.light.unwrap_or_default()),
             measure: live.measure,
             error: None,
             recording: None,

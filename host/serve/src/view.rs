@@ -122,6 +122,8 @@ pub struct LiveState {
     pub mode: LiveMode,
     /// Exposure time, us.
     pub exposure_us: u32,
+    /// Brightness of the board's light outputs during captures and live depth.
+    pub light_percent: [f64; 2],
     /// Focus measure.
     #[schemars(with = "String")]
     pub measure: FocusMeasure,

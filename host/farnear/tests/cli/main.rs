@@ -21,6 +21,7 @@ mod emulated_work;
 mod focus_stack;
 mod half_mirror;
 mod lens_choice;
+mod light;
 mod maps;
 mod markers;
 mod outputs;

@@ -44,6 +44,9 @@ pub enum CaptureRequest {
         /// Exposures that each image is the mean of, 1 to 256.
         #[serde(default = "once")]
         averaged: u16,
+        /// Whether images without the board's light are subtracted.
+        #[serde(default)]
+        subtract_ambient: bool,
     },
     /// Several pairs, one after the other.
     Series {
@@ -222,7 +225,7 @@ async fn capture(
     let (camera, optics) = (app.camera(), app.optics_file());
     let free = |kind, count| sessions::free_names(&app.session, kind, count);
     let (task, out) = match request {
-        CaptureRequest::Pair { name, averaged } => {
+        CaptureRequest::Pair { name, averaged, subtract_ambient } => {
             let out = match name {
                 Some(name) => sessions::new_capture(&app.session, &name)?,
                 None => free("pair", 1)?.remove(0),
@@ -232,6 +235,7 @@ async fn capture(
                 camera,
                 optics,
                 average: averaged,
+                subtract_ambient,
                 out: out.clone(),
                 ..PairRequest::default()
             };

@@ -11,6 +11,7 @@ use farnear_workflows::{
     measure::Rectangle,
     rig::{
         AxisName, RigAddress, alarms, board,
+        camera::light_of_percent,
         check::{self, CheckRequest},
         focus::{self, FocusRequest},
         goto::{self, GotoSettings},
@@ -110,6 +111,9 @@ pub struct LiveRequest {
     /// Length of an exposure, also of captures.
     #[serde(default)]
     pub exposure_us: Option<u32>,
+    /// Brightness of the board's light outputs in percent, during captures and live depth.
+    #[serde(default)]
+    pub light_percent: Option<[f64; 2]>,
     /// `fft-sum`, `tenengrad` or `modified-laplacian`.
     #[serde(default)]
     pub measure: Option<String>,
@@ -319,8 +323,13 @@ async fn live(
         let error = format!("exposure_us {us}: expected 1 to {EXPOSURE_MAX_US} us");
         return Err(Failure::new(StatusCode::BAD_REQUEST, error));
     }
+    let wrong = |reason: String| Failure::new(StatusCode::BAD_REQUEST, format!("light_percent: {reason}"));
+    let light = request.light_percent.map(light_of_percent).transpose().map_err(wrong)?;
     let measure = request.measure.as_deref().map(measure).transpose()?;
     app.set_live(|live| {
+        if let Some(levels) = light {
+            live.light = Some(levels).filter(|levels| levels.is_on());
+        }
         live.mode = request.mode.unwrap_or(live.mode);
         live.exposure = request.exposure_us.map_or(live.exposure, Micros);
         live.measure = measure.unwrap_or(live.measure);

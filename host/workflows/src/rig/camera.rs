@@ -117,14 +117,27 @@ pub struct CameraSettings {
 
 /// Parses `FIRST` or `FIRST,SECOND`, percent.
 pub fn parse_light(text: &str) -> std::result::Result<LightLevels, String> {
-    let level = |part: &str| match part.trim().parse::<f64>() {
-        Ok(percent) if (0.0..=100.0).contains(&percent) => {
-            Ok((percent / 100.0 * f64::from(LIGHT_LEVEL_MAX)).round() as u16)
-        }
-        _ => Err(format!("{part:?} is not a brightness: expected 0 to 100 %")),
-    };
+    let percent = |part: &str| part.trim().parse().map_err(|_| not_a_brightness(part));
     let (first, second) = text.split_once(',').unwrap_or((text, "0"));
+    light_of_percent([percent(first)?, percent(second)?])
+}
+
+fn not_a_brightness(given: impl std::fmt::Display) -> String {
+    format!("{given} is not a brightness: expected 0 to 100 %")
+}
+
+/// Brightness of both outputs.
+pub fn light_of_percent([first, second]: [f64; 2]) -> std::result::Result<LightLevels, String> {
+    let level = |percent: f64| match (0.0..=100.0).contains(&percent) {
+        true => Ok((percent / 100.0 * f64::from(LIGHT_LEVEL_MAX)).round() as u16),
+        false => Err(not_a_brightness(percent)),
+    };
     Ok(LightLevels { first: level(first)?, second: level(second)? })
+}
+
+/// Brightness of both outputs in percent.
+pub fn percent_of_light(levels: LightLevels) -> [f64; 2] {
+    [levels.first, levels.second].map(|level| 100.0 * f64::from(level) / f64::from(LIGHT_LEVEL_MAX))
 }
 
 impl Default for CameraSettings {

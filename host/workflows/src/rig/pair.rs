@@ -19,7 +19,7 @@ use super::{
 use crate::{
     camera_frames,
     context::Context,
-    error::Result,
+    error::{Result, WorkflowError},
     optics::GivenOptics,
     parameters::within,
     request::{PathKind, Request},
@@ -51,6 +51,10 @@ pub struct CaptureRequest {
     /// Exposures averaged for each image, 1 to 256: noise falls with the root of their number.
     #[cfg_attr(feature = "clap", arg(long, value_name = "N", default_value_t = Self::default().average))]
     pub average: u16,
+    /// Take each image also without the board's light and subtract it, so that only that light counts. Needs --light, a scene that
+    /// does not move, and a steady room light: with mains lamps expose for multiples of 10 ms (8.333 ms at 60 Hz).
+    #[cfg_attr(feature = "clap", arg(long, conflicts_with = "half_mirror"))]
+    pub subtract_ambient: bool,
     /// Subtract the camera's dark and flat frames from both images: a folder of `farnear calibrate camera`. Do not give it to
     /// `farnear depth` again.
     #[cfg_attr(feature = "clap", arg(long, value_name = "DIR"))]
@@ -80,6 +84,7 @@ impl Default for CaptureRequest {
             camera: CameraSettings::default(),
             optics: PathBuf::new(),
             average: 1,
+            subtract_ambient: false,
             camera_frames: None,
             half_mirror: false,
             second_camera: None,
@@ -155,11 +160,19 @@ pub fn capture_seen(
 ) -> Result<PairFigures> {
     let optics = GivenOptics::read(&settings.optics)?;
     within("average", settings.average, &(1..=AVERAGED_MAX), "exposures")?;
+    if settings.subtract_ambient && settings.camera.light.is_none() {
+        let expected = "expected light to switch: --light 100";
+        return Err(WorkflowError::parameter("subtract-ambient", "true", expected));
+    }
     let frames = settings.camera_frames.as_deref().map(camera_frames::read).transpose()?;
     let folder = begin_folder(&settings.out)?;
     let mut rig = settings.camera.connect(&settings.rig, Some(optics.for_emulation()), context)?;
-    let (mut pair, mut record) =
-        take_averaged(&mut rig, &optics, &settings.camera, settings.average, context)?;
+    let exposures = Exposures {
+        averaged: settings.average,
+        subtract_ambient: settings.subtract_ambient,
+        ..Exposures::default()
+    };
+    let (mut pair, mut record) = take_by(&mut rig, &optics, &settings.camera, exposures, context)?;
     if let Some(frames) = &frames {
         for taken in [&mut pair.far, &mut pair.near] {
             taken.image = corrected(&taken.image, frames)?;
@@ -192,30 +205,46 @@ pub fn take(
     settings: &CameraSettings,
     context: &Context<'_>,
 ) -> Result<(Pair, CaptureRecord)> {
-    take_averaged(equipped, optics, settings, 1, context)
+    take_by(equipped, optics, settings, Exposures::default(), context)
 }
 
-/// As [`take`]; each image is the mean of `averaged` exposures.
-fn take_averaged(
+/// As [`take`], by several exposures; their time is that of `settings`.
+fn take_by(
     equipped: &mut EquippedRig,
     optics: &GivenOptics,
     settings: &CameraSettings,
-    averaged: u16,
+    exposures: Exposures,
     context: &Context<'_>,
 ) -> Result<(Pair, CaptureRecord)> {
     let range = optics.optics.working_range();
     let sensor = SensorPair { far_mm: range.sensor_far_mm, near_mm: range.sensor_near_mm };
-    let exposures = Exposures {
-        exposure: settings.exposure,
-        image_wait: settings.image_wait,
-        averaged,
-        ..Exposures::default()
-    };
+    let exposures = Exposures { exposure: settings.exposure, image_wait: settings.image_wait, ..exposures };
     let EquippedRig { camera, rig } = equipped;
     let say = &mut |what: &str| context.info(what);
     let pair = capture_pair(&rig.client, camera.as_mut(), &sensor, &exposures, say)?;
-    let record = noted(&pair, equipped, optics, settings, averaged);
+    if let Some(doubt) = doubt_of_light(&pair) {
+        context.progress.warn(&doubt);
+    }
+    let mut record = noted(&pair, equipped, optics, settings, exposures.averaged);
+    record.camera.ambient_subtracted = exposures.subtract_ambient;
     Ok((pair, record))
+}
+
+/// A lens that is not telecentric changes the brightness by about 1 % with its focus.
+const BRIGHTNESS_RATIO_MAX: f64 = 1.03;
+
+/// Doubt about a pair whose images differ in brightness.
+fn doubt_of_light(pair: &Pair) -> Option<String> {
+    let mean = |image: &Image| image.pixels.iter().map(|code| f64::from(*code)).sum::<f64>();
+    let (far, near) = (mean(&pair.far.image), mean(&pair.near.image));
+    let ratio = far.max(near) / far.min(near).max(1.0);
+    (ratio > BRIGHTNESS_RATIO_MAX).then(|| {
+        format!(
+            "one image is {:.0} % brighter than the other, so the light changed: expose for multiples of 10 ms under mains lamps \
+             (8.333 ms at 60 Hz), or keep daylight out",
+            100.0 * (ratio - 1.0)
+        )
+    })
 }
 
 pub(super) fn noted(

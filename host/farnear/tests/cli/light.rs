@@ -1,0 +1,91 @@
+//! Light of the board and of the room, on the emulated rig.
+
+use crate::common::{Folder, farnear, figures, number, rig_optics, succeeds};
+
+/// Emulated light: of the room, its share that flickers at 100 Hz, of the second lamp; and whether only lamps show texture.
+struct Light {
+    room: f64,
+    flicker: f64,
+    lamp: f64,
+    blank_walls: bool,
+}
+
+/// Captures a pair; returns its warnings.
+fn capture(folder: &Folder, name: &str, light: &Light, arguments: &[&str]) -> String {
+    let Light { room, flicker, lamp, blank_walls } = light;
+    let parts = format!(
+        "[parts.imaging]\nlight = {{ room = {room:?}, flicker = {flicker:?}, flicker_hz = 100.0, \
+         lamps = [0.0, {lamp:?}], blank_walls = {blank_walls} }}\n"
+    );
+    let parts = folder.file(&format!("{name}.toml"), parts);
+    let mut command = farnear(&["rig", "capture", "--port", "sim", "--optics", rig_optics()]);
+    command.args(["--faults", &parts, "--out", &folder.text(name)]).args(arguments);
+    succeeds(&mut command).1
+}
+
+/// Computes depth; returns the figures of the map, and its error in mm.
+fn depth(folder: &Folder, name: &str) -> (serde_json::Value, f64) {
+    let [far, near] = ["far.png", "near.png"].map(|file| folder.text(&format!("{name}/{file}")));
+    let found = figures(&mut farnear(&[
+        "depth",
+        &far,
+        &near,
+        "--optics",
+        rig_optics(),
+        "--median-px",
+        "5",
+        "--json",
+    ]));
+    let scene = folder.text("scene");
+    if !folder.path("scene").exists() {
+        succeeds(&mut farnear(&["render", "--optics", rig_optics(), "--out", &scene]));
+    }
+    let (map, truth) = (folder.text(&format!("{name}/depth.npy")), format!("{scene}/truth.npy"));
+    let compare = ["compare", &map, &truth, "--away-from-edges", "8", "--json"];
+    let error = match number(&found, "valid_fraction") > 0.5 {
+        true => number(&figures(&mut farnear(&compare)), "rmse_mm"),
+        false => f64::INFINITY,
+    };
+    (found, error)
+}
+
+#[test]
+#[cfg_attr(not(emulated_rig), ignore = "needs farnear-sim: cargo xtask test")]
+fn a_projected_texture_gives_a_blank_wall_its_depth() {
+    let folder = Folder::new();
+    let textured = Light { room: 1.0, flicker: 0.0, lamp: 0.0, blank_walls: false };
+    capture(&folder, "textured", &textured, &[]);
+    let blank = Light { room: 0.3, flicker: 0.0, lamp: 1.0, blank_walls: true };
+    capture(&folder, "dark", &blank, &[]);
+    capture(&folder, "lit", &blank, &["--light", "0,100"]);
+    capture(&folder, "subtracted", &blank, &["--light", "0,100", "--subtract-ambient"]);
+    let (found, error) = depth(&folder, "dark");
+    assert!(error.is_infinite() && found.to_string().contains("too little texture"), "{found}");
+    let [textured, lit, subtracted] = ["textured", "lit", "subtracted"].map(|name| depth(&folder, name).1);
+    // The room's light lowers the pattern's contrast. A second exposure doubles the dark pixels' noise.
+    assert!(lit < 1.2 * textured && subtracted < 1.3 * textured, "{textured} {lit} {subtracted}");
+}
+
+#[test]
+#[cfg_attr(not(emulated_rig), ignore = "needs farnear-sim: cargo xtask test")]
+fn flicker_is_reported_and_averages_out_over_whole_periods() {
+    let folder = Folder::new();
+    let steady = Light { room: 0.8, flicker: 0.0, lamp: 0.0, blank_walls: false };
+    let flickering = Light { flicker: 0.9, ..steady };
+    let short = capture(&folder, "short", &flickering, &["--exposure-us", "5000"]);
+    assert!(short.contains("brighter") && short.contains("multiples of 10 ms"), "{short}");
+    let whole = capture(&folder, "whole", &flickering, &["--exposure-us", "10000"]);
+    let without = capture(&folder, "without", &steady, &["--exposure-us", "10000"]);
+    assert!(![&whole, &without].iter().any(|said| said.contains("warning")), "{whole} {without}");
+    let [whole, without] = ["whole", "without"].map(|name| depth(&folder, name).1);
+    assert!((whole / without - 1.0).abs() < 0.05, "{whole} {without}");
+}
+
+#[test]
+#[cfg_attr(not(emulated_rig), ignore = "needs farnear-sim: cargo xtask test")]
+fn ambient_light_is_subtracted_with_a_lamp_only() {
+    let folder = Folder::new();
+    let mut command = farnear(&["rig", "capture", "--port", "sim", "--optics", rig_optics()]);
+    command.args(["--subtract-ambient", "--out", &folder.text("pair")]);
+    crate::common::fails(&mut command, 2, &["--light 100"]);
+}
