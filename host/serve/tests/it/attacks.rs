@@ -8,16 +8,16 @@ use std::{
     time::{Duration, Instant},
 };
 
-use farnear_serve::{Limits, Listen, Token};
+use farnear_serve::{Listen, Token};
 
 use super::{
     captures::put,
     client::{Answer, Served, Socket},
 };
 
-const TOKEN: &str = "0123456789abcdef0123";
+pub(super) const TOKEN: &str = "0123456789abcdef0123";
 
-fn network(folder: &Path) -> Listen {
+pub(super) fn network(folder: &Path) -> Listen {
     let file = folder.join("token");
     fs::write(&file, TOKEN).unwrap();
     let (address, token) = ("127.0.0.1:0".parse().unwrap(), Token::read(&file).unwrap());
@@ -386,139 +386,4 @@ fn guesses_of_the_token_are_slow_and_others_are_not_delayed() {
     let cookie = format!("farnear-token={TOKEN}");
     assert_eq!(served.ask("GET", "/api/state", &[("cookie", cookie.as_str())], "").status, 200);
     assert_eq!(served.get("/").status, 401, "the form is shown without delay");
-}
-
-fn memory_mb() -> u64 {
-    let status = fs::read_to_string("/proc/self/status").unwrap();
-    let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:")).unwrap();
-    line.split_whitespace().next().unwrap().parse::<u64>().unwrap() / 1024
-}
-
-/// Time until the server closes a connection that sends `bytes`, then one byte each 100 ms.
-fn closed_after(served: &Served, bytes: &[u8], drip: bool) -> Duration {
-    let began = Instant::now();
-    let mut stream = TcpStream::connect(&served.address).unwrap();
-    stream.set_read_timeout(Some(Duration::from_millis(100))).unwrap();
-    stream.write_all(bytes).unwrap();
-    let mut buffer = [0; 4096];
-    loop {
-        match stream.read(&mut buffer) {
-            Ok(0) => return began.elapsed(),
-            Ok(_) => {}
-            Err(error)
-                if [std::io::ErrorKind::WouldBlock, std::io::ErrorKind::TimedOut].contains(&error.kind()) => {
-            }
-            Err(_) => return began.elapsed(),
-        }
-        assert!(began.elapsed() < Duration::from_secs(20), "never closed");
-        if drip && stream.write_all(b"x").is_err() {
-            return began.elapsed();
-        }
-    }
-}
-
-#[test]
-fn slow_headers_half_bodies_and_idle_connections_are_closed() {
-    let second = Duration::from_secs(1);
-    let limits =
-        Limits { header_timeout: second, body_timeout: second, idle_timeout: second, ..Limits::default() };
-    let served = Served::limited(None, None, |_| Listen::Loopback { port: 0 }, limits);
-    let own = &served.address;
-    let cases = [
-        ("nothing", String::new(), false),
-        ("a request line without an end", "GET / HTTP/1.1\r\nhost: local".into(), false),
-        ("headers byte by byte", "GET / HTTP/1.1\r\nhost: local".into(), true),
-        (
-            "half a body",
-            format!(
-                "POST /api/stop HTTP/1.1\r\nhost: {own}\r\ncontent-type: application/json\r\ncontent-length: 99\r\n\r\n{{"
-            ),
-            false,
-        ),
-        (
-            "a body byte by byte",
-            format!(
-                "POST /api/stop HTTP/1.1\r\nhost: {own}\r\ncontent-type: application/json\r\ncontent-length: 9999\r\n\r\n{{"
-            ),
-            true,
-        ),
-        ("nothing after an answer", format!("GET /api/state HTTP/1.1\r\nhost: {own}\r\n\r\n"), false),
-        (
-            "half a request after an answer",
-            format!("GET /api/state HTTP/1.1\r\nhost: {own}\r\n\r\nGET"),
-            false,
-        ),
-    ];
-    for (what, bytes, drip) in cases {
-        let after = closed_after(&served, bytes.as_bytes(), drip);
-        assert!(after < Duration::from_secs(8), "{what}: {after:?}");
-    }
-    let mut socket = Socket::open(&served);
-    std::thread::sleep(3 * second);
-    socket.say(10, b"");
-    assert_eq!(served.get("/api/state").json()["control"]["clients"], 1, "a WebSocket is not closed");
-}
-
-#[test]
-fn eleven_hundred_idle_connections_leave_the_owner_at_work() {
-    let served = Served::start(None, None, network);
-    let cookie = format!("farnear-token={TOKEN}");
-    let owner = [("cookie", cookie.as_str())];
-    let before = memory_mb();
-    let mut idle = Vec::new();
-    for count in 0..1100 {
-        // A process may have 1,024 descriptors here, so the client's end of closed connections is dropped.
-        if idle.len() >= 400 {
-            idle.remove(0);
-        }
-        idle.push(TcpStream::connect(&served.address).unwrap());
-        if count % 100 == 99 {
-            assert_eq!(served.ask("GET", "/api/state", &owner, "").status, 200, "after {count}");
-        }
-    }
-    let log = served.ask("GET", "/api/log", &owner, "").json().to_string();
-    assert!(log.contains("has 128 connections, the limit"), "{log}");
-    assert!(memory_mb() <= before + 100, "{} MB, {before} MB before", memory_mb());
-}
-
-#[test]
-fn sixty_archives_that_are_not_read_take_no_memory() {
-    let served = Served::captures_only();
-    put(&served, "pair-001", 0);
-    fs::write(served.session.join("pair-001/large.tiff"), vec![7; 24 << 20]).unwrap();
-    let before = memory_mb();
-    let clients: Vec<_> = (0..60)
-        .map(|_| {
-            let mut stream = TcpStream::connect(&served.address).unwrap();
-            let text = format!("GET /api/captures/pair-001/zip HTTP/1.1\r\nhost: {}\r\n\r\n", served.address);
-            stream.write_all(text.as_bytes()).unwrap();
-            stream
-        })
-        .collect();
-    std::thread::sleep(Duration::from_secs(2));
-    let after = memory_mb();
-    assert_eq!(served.get("/api/state").status, 200);
-    assert!(after.saturating_sub(before) <= 100, "{before} to {after} MB");
-    drop(clients);
-    let whole = served.get("/api/captures/pair-001/zip");
-    assert!(whole.body.len() > 24 << 20 && whole.status == 200);
-}
-
-#[test]
-fn an_upload_above_the_quota_leaves_nothing() {
-    let limits = Limits { upload_quota_bytes: 1 << 20, ..Limits::default() };
-    let served = Served::limited(None, None, |_| Listen::Loopback { port: 0 }, limits);
-    let holder = Socket::open(&served);
-    let client = [("x-farnear-client", holder.secret.as_str())];
-    let put = |name: &str, bytes: usize| {
-        served.ask("PUT", &format!("/api/people/videos/{name}"), &client, &"x".repeat(bytes)).status
-    };
-    assert_eq!(put("small.y4m", 600 << 10), 200);
-    assert_eq!(put("second.y4m", 600 << 10), 413);
-    assert_eq!(put("third.y4m", 300 << 10), 200);
-    let names: Vec<_> = fs::read_dir(served.session.join("people"))
-        .unwrap()
-        .map(|entry| entry.unwrap().file_name())
-        .collect();
-    assert_eq!(names.len(), 2, "{names:?}");
 }

@@ -6,5 +6,6 @@ mod attacks;
 mod captures;
 mod client;
 mod control;
+mod exhaustion;
 mod garbage;
 mod interface;
