@@ -32,6 +32,23 @@ _CLOUD = (
 )
 
 
+def camera_matrix(found: DepthMap) -> list[float]:
+    """Camera matrix of a map, row by row, px.
+
+    Rays of a telecentric lens meet in its front focus, so a pixel of pitch p sees p (z - F) / F: as a pinhole at the front focus
+    with the focal length F / p.
+    """
+    height, width = found.depth_mm.shape
+    focal_px = found.optics.focal_length_mm / (1e-3 * found.optics.pixel_um)
+    return [focal_px, 0.0, 0.5 * (width - 1), 0.0, focal_px, 0.5 * (height - 1), 0.0, 0.0, 1.0]
+
+
+def points_m(found: DepthMap) -> NDArray[np.float32]:
+    """Points of a map in m, (height, width, 3): x to the right, y down, z away from the lens."""
+    points = points_mm(found.depth_mm, found.optics) * np.array([1e-3, -1e-3, -1e-3], np.float32)
+    return np.ascontiguousarray(points).astype("<f4")
+
+
 class McapRecording:
     """MCAP file of pairs: both images, depth in metres, camera info and point cloud of each; a context manager.
 
@@ -92,28 +109,23 @@ class McapRecording:
             image(f"{name}/image", pixels, "mono8" if pixels.dtype == np.uint8 else "mono16")
         image("depth/image", found.depth_mm * np.float32(1e-3), "32FC1")
         image("confidence/image", found.confidence, "32FC1")
-        # Telecentric: rays meet in the front focus, so a pixel pitch p sees p (z - F) / F. In terms of a pinhole at the front focus
-        # the focal length in px is F / p.
-        optics = found.optics
-        focal_px = optics.focal_length_mm / (1e-3 * optics.pixel_um)
-        cx, cy = 0.5 * (width - 1), 0.5 * (height - 1)
+        k = camera_matrix(found)
         write(
             "depth/camera_info",
             self._info,
             {
                 "distortion_model": "plumb_bob",
                 "d": [0.0] * 5,
-                "k": [focal_px, 0.0, cx, 0.0, focal_px, cy, 0.0, 0.0, 1.0],
+                "k": k,
                 "r": [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],
-                "p": [focal_px, 0.0, cx, 0.0, 0.0, focal_px, cy, 0.0, 0.0, 0.0, 1.0, 0.0],
+                "p": [*k[:3], 0.0, *k[3:6], 0.0, *k[6:], 0.0],
                 "binning_x": 1,
                 "binning_y": 1,
                 "roi": {"x_offset": 0, "y_offset": 0, "height": 0, "width": 0, "do_rectify": False},
             },
         )
-        points = points_mm(found.depth_mm, optics) * np.array([1e-3, -1e-3, -1e-3], np.float32)
         fields = [{"name": name, "offset": 4 * index, "datatype": 7, "count": 1} for index, name in enumerate("xyz")]
-        data = np.ascontiguousarray(points).astype("<f4").tobytes()
+        data = points_m(found).tobytes()
         cloud = {"fields": fields, "is_bigendian": False, "point_step": 12, "row_step": 12 * width, "data": data, "is_dense": False}
         write("points", self._cloud, cloud)
 

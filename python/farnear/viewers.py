@@ -1,4 +1,4 @@
-"""Depth maps in other people's viewers, where those are installed: Open3D's point clouds, Rerun's time line."""
+"""Depth maps in other people's viewers, where those are installed: Open3D's point clouds, Rerun's time line, Foxglove live."""
 
 from __future__ import annotations
 
@@ -9,13 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ._farnear import DepthMap, FarnearError, Optics, depth, points_mm
+from .recording import FRAME, camera_matrix, points_m
 
 if TYPE_CHECKING:
     import open3d
 
     from .rig import Rig
 
-__all__ = ["RerunView", "watch", "to_open3d"]
+__all__ = ["FoxgloveView", "RerunView", "watch", "to_open3d"]
 
 Pixels = Union[NDArray[np.uint8], NDArray[np.uint16], NDArray[np.float32], NDArray[np.float64]]
 
@@ -26,7 +27,7 @@ def _imported(name: str) -> Any:
     try:
         return importlib.import_module(name)
     except ImportError as error:
-        package = {"rerun": "rerun-sdk"}.get(name, name)
+        package = {"rerun": "rerun-sdk", "foxglove": "foxglove-sdk"}.get(name, name)
         raise FarnearError(f"{package} is not installed here; `pip install {package}` installs it") from error
 
 
@@ -134,14 +135,101 @@ class RerunView:
         self.close()
 
 
-def watch(rig: Rig, view: RerunView, optics: Optics, *, seconds: Optional[float] = None) -> Iterator[DepthMap]:
+class FoxgloveView:
+    """Pairs live in Foxglove: a WebSocket server with both images, depth and points in metres; a context manager.
+
+    Open a connection to `ws://localhost:8765` in Foxglove. Topics are those of `McapRecording`.
+
+    Parameters
+    ----------
+    host, port : str, int
+        Address to listen at; port 0 takes a free one. The server has no password.
+    """
+
+    def __init__(self, *, host: str = "127.0.0.1", port: int = 8765) -> None:
+        foxglove = _imported("foxglove")
+        self._messages = _imported("foxglove.messages")
+        channels = _imported("foxglove.channels")
+        self._context = foxglove.Context()
+        self._server = foxglove.start_server(name="farnear", host=host, port=port, context=self._context)
+
+        def channel(kind: str, topic: str) -> Any:
+            return getattr(channels, f"{kind}Channel")(f"/farnear/{topic}", context=self._context)
+
+        images = ("far/image", "near/image", "depth/image", "confidence/image")
+        self._images = {topic: channel("RawImage", topic) for topic in images}
+        self._calibration = channel("CameraCalibration", "depth/camera_info")
+        self._points = channel("PointCloud", "points")
+
+    @property
+    def port(self) -> int:
+        """Port of the server."""
+        return int(self._server.port)
+
+    def show(
+        self, far: Pixels, near: Pixels, found: DepthMap, *, board_us: Optional[int] = None, min_confidence: float = 0.0
+    ) -> None:
+        """Send a pair to all viewers.
+
+        Parameters
+        ----------
+        far, near : array uint8 or uint16 (height, width)
+            The images.
+        found : DepthMap
+            Their depth, mm.
+        board_us : int, optional
+            Time of the exposure by the board's clock, us; by default the present time.
+        min_confidence : float
+            Least confidence of a point, 0 to 1.
+        """
+        messages = self._messages
+        _check_size(far, found)
+        _check_size(near, found)
+        height, width = found.depth_mm.shape
+        ns = time.time_ns() if board_us is None else 1000 * board_us
+        stamp = {"timestamp": messages.Timestamp(ns // 10**9, ns % 10**9), "frame_id": FRAME}
+
+        def image(topic: str, pixels: NDArray[Any], encoding: str) -> None:
+            pixels = np.ascontiguousarray(pixels, pixels.dtype.newbyteorder("<"))
+            size = {"width": width, "height": height, "step": pixels.strides[0]}
+            self._images[topic].log(messages.RawImage(**stamp, **size, encoding=encoding, data=pixels.tobytes()), log_time=ns)
+
+        for name, pixels in (("far", far), ("near", near)):
+            if pixels.dtype == np.uint8:
+                image(f"{name}/image", pixels, "mono8")
+            else:
+                image(f"{name}/image", np.round(65535 * _grey(pixels)).astype(np.uint16), "mono16")
+        image("depth/image", found.depth_mm * np.float32(1e-3), "32FC1")
+        image("confidence/image", found.confidence, "32FC1")
+        k = camera_matrix(found)
+        p = [*k[:3], 0.0, *k[3:6], 0.0, *k[6:], 0.0]
+        size = {"width": width, "height": height}
+        self._calibration.log(messages.CameraCalibration(**stamp, **size, K=k, P=p), log_time=ns)
+        keep = np.isfinite(found.depth_mm) & (found.confidence >= min_confidence)
+        kind = messages.PackedElementFieldNumericType.Float32
+        fields = [messages.PackedElementField(name=name, offset=4 * index, type=kind) for index, name in enumerate("xyz")]
+        cloud = messages.PointCloud(**stamp, point_stride=12, fields=fields, data=points_m(found)[keep].tobytes())
+        self._points.log(cloud, log_time=ns)
+
+    def close(self) -> None:
+        """Stop the server."""
+        self._server.stop()
+
+    def __enter__(self) -> FoxgloveView:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+
+def watch(rig: Rig, view: Union[FoxgloveView, RerunView], optics: Optics, *, seconds: Optional[float] = None) -> Iterator[DepthMap]:
     """Capture and show pairs.
 
     Parameters
     ----------
     rig : Rig
         A rig with a camera.
-    view : RerunView
+    view : FoxgloveView or RerunView
         Where to show them.
     optics : Optics
         Optics of the pairs.

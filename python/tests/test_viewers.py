@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import farnear
-from farnear.viewers import RerunView, to_open3d, watch
+from farnear.viewers import FoxgloveView, RerunView, to_open3d, watch
 
 
 @pytest.fixture(scope="module")
@@ -46,6 +46,34 @@ def test_rerun_gets_the_pairs_of_a_rig(emulated_rig, optics, tmp_path):
                 break
     # Two pairs of 640x480: two images, two maps of floats and a cloud.
     assert recording.stat().st_size > 2 * 640 * 480 * 10
+
+
+def test_foxglove_gets_a_pair_over_its_own_protocol(found, slant):
+    pytest.importorskip("foxglove")
+    client = pytest.importorskip("websockets.sync.client")
+    import json
+
+    far, near, _ = slant
+    with FoxgloveView(port=0) as view:
+        with client.connect(f"ws://127.0.0.1:{view.port}", subprotocols=["foxglove.sdk.v1"], max_size=None) as viewer:
+            channels = {}
+            while len(channels) < 6:
+                message = json.loads(viewer.recv(timeout=20))
+                channels.update({channel["topic"]: channel for channel in message.get("channels", [])})
+            depth = channels["/farnear/depth/image"]
+            assert depth["schemaName"] == "foxglove.RawImage" and depth["encoding"] == "protobuf"
+            viewer.send(json.dumps({"op": "subscribe", "subscriptions": [{"id": 7, "channelId": depth["id"]}]}))
+            message = ""
+            for _ in range(100):  # until the server has taken the subscription
+                view.show(far, near, found)
+                try:
+                    message = viewer.recv(timeout=0.2)
+                    break
+                except TimeoutError:
+                    continue
+    # An opcode, the subscription's id, a time of 8 bytes, and the message with the map.
+    assert message[0] == 1 and int.from_bytes(message[1:5], "little") == 7
+    assert (found.depth_mm * np.float32(1e-3)).tobytes() in message
 
 
 def test_a_viewer_that_is_not_installed_is_named(monkeypatch, optics):

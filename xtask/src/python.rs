@@ -18,13 +18,15 @@ use crate::{
 
 /// Compiled only if Python is available.
 pub const PACKAGE: &str = "farnear-python";
-const NEEDS: [&str; 11] = [
+const NEEDS: [&str; 13] = [
     "numpy>=1.23",
     "matplotlib>=3.6",
     "pytest>=7",
     "scikit-learn>=1.6",
     "useq-schema>=0.5",
     "mcap-ros2-support>=0.5",
+    "foxglove-sdk>=0.20; python_version >= '3.10'",
+    "websockets>=13",
     "mypy>=1.10",
     "pyright[nodejs]>=1.1.380",
     "snakemake>=9; python_version >= '3.11'",
