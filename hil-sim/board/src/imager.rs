@@ -189,7 +189,7 @@ mod tests {
             piezo_min_um: 0.0,
             piezo_max_um: 0.0,
         };
-        Shot { id: 0, board_us: 0, begin_ns, end_ns: begin_ns, truth, light: [0.0; 2] }
+        Shot { id: 0, board_us: 0, begin_ns, end_ns: begin_ns + 5_000_000, truth, light: [0.0; 2] }
     }
 
     fn codes(imager: &mut Imager, shot: &Shot) -> Vec<i32> {
@@ -236,9 +236,11 @@ mod tests {
     #[test]
     fn lamps_add_to_the_rooms_light_and_flicker_averages_out_over_whole_periods() {
         let light =
-            LightParts { room: 0.5, flicker: 0.4, flicker_hz: 100.0, lamps: [0.3, 1.0], blank_walls: false };
+            LightParts { room: 0.5, flicker: 0.4, lamps: [0.3, 1.0], ..Parts::default().imaging.light };
+        // Per 5 ms.
         let over = |begin_us: u64, length_us: u64| {
-            light.brightness((1_000 * begin_us, 1_000 * (begin_us + length_us)), [0.5, 0.1]).0
+            let exposed_ns = (1_000 * begin_us, 1_000 * (begin_us + length_us));
+            5_000.0 / length_us as f64 * light.brightness(exposed_ns, [0.5, 0.1]).0
         };
         for begin_us in [0, 1_300, 2_500, 7_500] {
             let lamps = 0.15 + 0.1;
@@ -260,7 +262,7 @@ mod tests {
     #[test]
     fn a_blank_wall_has_structure_only_under_the_projectors_pattern() {
         let blank =
-            LightParts { room: 0.5, flicker: 0.0, flicker_hz: 100.0, lamps: [0.0, 0.5], blank_walls: true };
+            LightParts { room: 0.5, lamps: [0.0, 0.5], blank_walls: true, ..Parts::default().imaging.light };
         let contrast = |light: LightParts, outputs: [f64; 2]| {
             let (imager, far_mm) = imager("");
             let codes = codes(&mut imager.lit_by(light), &Shot { light: outputs, ..shot(0, far_mm) });

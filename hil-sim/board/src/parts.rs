@@ -73,7 +73,9 @@ pub struct ImagingParts {
 #[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct LightParts {
-    /// Brightness of the room; 1 exposes as the camera's exposure level says.
+    /// Exposure time at which a brightness of 1 exposes as the camera's exposure level says.
+    pub exposure_ms: f64,
+    /// Brightness of the room.
     pub room: f64,
     /// Share of the room's light that flickers, and how often a second.
     pub flicker: f64,
@@ -90,9 +92,12 @@ impl LightParts {
         let turn = |at_ns: u64| std::f64::consts::TAU * self.flicker_hz * 1e-9 * at_ns as f64;
         let (begin, end) = (turn(begin_ns), turn(end_ns));
         let swing = if end > begin { (begin.cos() - end.cos()) / (end - begin) } else { begin.sin() };
+        let gain = 1e-6 * end_ns.saturating_sub(begin_ns) as f64 / self.exposure_ms;
         let room = self.room * (1.0 + self.flicker * swing);
         let [first, second] = [0, 1].map(|i| self.lamps[i] * outputs[i]);
-        if self.blank_walls { (second, room + first) } else { (room + first + second, 0.0) }
+        let (textured, even) =
+            if self.blank_walls { (second, room + first) } else { (room + first + second, 0.0) };
+        (gain * textured, gain * even)
     }
 }
 
@@ -313,6 +318,7 @@ impl Parts {
             ("piezo.second_mode_share", self.piezo.second_mode_share, 0.0, 1.0),
             ("switches.bounces_per_ms", self.switches.bounces_per_ms, 0.0, 1e3),
             ("switches.glitches_per_s", self.switches.glitches_per_s, 0.0, 1e4),
+            ("imaging.light.exposure_ms", self.imaging.light.exposure_ms, 0.001, 60_000.0),
             ("imaging.light.room", self.imaging.light.room, 0.0, 100.0),
             ("imaging.light.flicker", self.imaging.light.flicker, 0.0, 1.0),
             ("imaging.light.flicker_hz", self.imaging.light.flicker_hz, 0.1, 10_000.0),

@@ -47,6 +47,7 @@ mod handshake;
 mod link;
 mod link_rate;
 pub mod log_stream;
+mod meter;
 mod owner;
 pub mod pair;
 pub mod plan;

@@ -14,6 +14,7 @@ use crate::{
     client::Client,
     describe::um,
     expose::{check_exposure, expose, sensor_mm},
+    meter,
     plan::{SensorPair, coarse_for, fine_for},
     ready::{base_nm, base_when_homed_nm, ensure_homed},
     work::Moved,
@@ -29,6 +30,8 @@ pub struct Exposures {
     pub image_wait: Duration,
     /// Averaged exposures per image, at least 1.
     pub averaged: u16,
+    /// Finds the exposure time, beginning with `exposure`.
+    pub auto: bool,
     /// Subtracts as many exposures without the board's light.
     pub subtract_ambient: bool,
 }
@@ -40,6 +43,7 @@ impl Default for Exposures {
             settle: Settle::of_move(Axis::SensorFine),
             image_wait: Duration::from_secs(30),
             averaged: 1,
+            auto: false,
             subtract_ambient: false,
         }
     }
@@ -119,7 +123,12 @@ pub fn capture_pair(
     exposures: &Exposures,
     say: &mut dyn FnMut(&str),
 ) -> Result<Pair, CaptureError> {
-    let reach = reach(client, sensor, exposures, say)?;
+    let mut reach = reach(client, sensor, exposures, say)?;
+    if exposures.auto {
+        let found = meter::exposure(client, camera, reach.shots[0], exposures.image_wait)?;
+        say(&format!("exposure time {} us", found.0));
+        reach.shots.iter_mut().for_each(|shot| shot.exposure = found);
+    }
     let [far, near] = reach.shots.map(|shot| um(shot.target));
     say(&format!("exposing far (piezo at {far:.3} um) and near ({near:.3} um)"));
     let repeat = exposures.averaged.max(1);

@@ -95,6 +95,24 @@ test("another method is compared on the scale of depth, and its difference has f
   await page.context().close();
 });
 
+test("half the exposure time halves the brightness of the live image", async () => {
+  const page = await open(browser, server.address);
+  const mean = async () => parseFloat(await page.locator("#view-live dt", { hasText: /^mean$/ }).locator("+ dd").textContent());
+  const within = async (low, high) => {
+    for (let value = await mean(); !(value >= low && value <= high); value = await mean()) await page.waitForTimeout(100);
+  };
+  const exposure = page.locator("#view-live").getByLabel("Exposure", { exact: true });
+  await within(5, 95);
+  const usual = await mean();
+  await exposure.fill("2500");
+  await exposure.press("Tab");
+  await within(0.45 * usual, 0.55 * usual);
+  await exposure.fill("5000");
+  await exposure.press("Tab");
+  await within(0.95 * usual, 1.05 * usual);
+  await page.context().close();
+});
+
 test("a stack is looked at image by image", async () => {
   const page = await open(browser, server.address);
   await page.waitForFunction(() => !document.querySelector("[data-capture]").disabled);

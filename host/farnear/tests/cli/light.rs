@@ -14,7 +14,7 @@ struct Light {
 fn capture(folder: &Folder, name: &str, light: &Light, arguments: &[&str]) -> String {
     let Light { room, flicker, lamp, blank_walls } = light;
     let parts = format!(
-        "[parts.imaging]\nlight = {{ room = {room:?}, flicker = {flicker:?}, flicker_hz = 100.0, \
+        "[parts.imaging]\nlight = {{ exposure_ms = 5.0, room = {room:?}, flicker = {flicker:?}, flicker_hz = 100.0, \
          lamps = [0.0, {lamp:?}], blank_walls = {blank_walls} }}\n"
     );
     let parts = folder.file(&format!("{name}.toml"), parts);
@@ -70,7 +70,7 @@ fn a_projected_texture_gives_a_blank_wall_its_depth() {
 #[cfg_attr(not(emulated_rig), ignore = "needs farnear-sim: cargo xtask test")]
 fn flicker_is_reported_and_averages_out_over_whole_periods() {
     let folder = Folder::new();
-    let steady = Light { room: 0.8, flicker: 0.0, lamp: 0.0, blank_walls: false };
+    let steady = Light { room: 0.5, flicker: 0.0, lamp: 0.0, blank_walls: false };
     let flickering = Light { flicker: 0.9, ..steady };
     let short = capture(&folder, "short", &flickering, &["--exposure-us", "5000"]);
     assert!(short.contains("brighter") && short.contains("multiples of 10 ms"), "{short}");
@@ -88,4 +88,19 @@ fn ambient_light_is_subtracted_with_a_lamp_only() {
     let mut command = farnear(&["rig", "capture", "--port", "sim", "--optics", rig_optics()]);
     command.args(["--subtract-ambient", "--out", &folder.text("pair")]);
     crate::common::fails(&mut command, 2, &["--light 100"]);
+}
+
+#[test]
+#[cfg_attr(not(emulated_rig), ignore = "needs farnear-sim: cargo xtask test")]
+fn the_exposure_time_is_found_for_dark_and_bright_rooms() {
+    let folder = Folder::new();
+    for (name, room) in [("dark", 0.04), ("bright", 12.0)] {
+        let light = Light { room, flicker: 0.0, lamp: 0.0, blank_walls: false };
+        capture(&folder, name, &light, &["--auto-exposure"]);
+        let image = image::open(folder.path(&format!("{name}/far.png"))).expect("an image").into_luma8();
+        let mut codes: Vec<u8> = image.pixels().map(|pixel| pixel.0[0]).collect();
+        codes.sort_unstable();
+        let brightest = f64::from(codes[codes.len() * 995 / 1000]) / 255.0;
+        assert!((0.7..0.9).contains(&brightest), "{name}: {brightest}");
+    }
 }

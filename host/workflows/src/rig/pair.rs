@@ -51,6 +51,9 @@ pub struct CaptureRequest {
     /// Exposures averaged for each image, 1 to 256: noise falls with the root of their number.
     #[cfg_attr(feature = "clap", arg(long, value_name = "N", default_value_t = Self::default().average))]
     pub average: u16,
+    /// Find the exposure time at which the brightest pixels have 80 % of white, beginning with --exposure-us.
+    #[cfg_attr(feature = "clap", arg(long, conflicts_with = "half_mirror"))]
+    pub auto_exposure: bool,
     /// Take each image also without the board's light and subtract it, so that only that light counts. Needs --light, a scene that
     /// does not move, and a steady room light: with mains lamps expose for multiples of 10 ms (8.333 ms at 60 Hz).
     #[cfg_attr(feature = "clap", arg(long, conflicts_with = "half_mirror"))]
@@ -84,6 +87,7 @@ impl Default for CaptureRequest {
             camera: CameraSettings::default(),
             optics: PathBuf::new(),
             average: 1,
+            auto_exposure: false,
             subtract_ambient: false,
             camera_frames: None,
             half_mirror: false,
@@ -169,6 +173,7 @@ pub fn capture_seen(
     let mut rig = settings.camera.connect(&settings.rig, Some(optics.for_emulation()), context)?;
     let exposures = Exposures {
         averaged: settings.average,
+        auto: settings.auto_exposure,
         subtract_ambient: settings.subtract_ambient,
         ..Exposures::default()
     };
