@@ -108,24 +108,64 @@ fn compression(code: u64) -> String {
     format!("{name} compression")
 }
 
-fn decode_page(bytes: &[u8], page: &Page) -> Result<Decoded, String> {
-    let Directory { width, height, samples_per_pixel, bits, .. } = page.directory;
-    if !matches!(page.directory.compression, 1 | 5 | 8 | 32773 | 32946) {
-        return Err(format!(
+/// Kinds of pages that are not read, with what to do.
+fn unsupported(page: &Directory) -> Option<String> {
+    let &Directory { bits, sample_format, photometric, .. } = page;
+    if !matches!(page.compression, 1 | 5 | 8 | 32773 | 32946) {
+        return Some(format!(
             "its {} is not read: store it uncompressed, with LZW or with deflate (`tiffcp -c lzw`)",
-            compression(page.directory.compression)
+            compression(page.compression)
         ));
     }
-    if page.directory.fill_order == 2 {
-        return Err("its bits are in reverse order (FillOrder 2), which is not read: rewrite it (`tiffcp -f msb2lsb`)".into());
+    if page.fill_order == 2 {
+        return Some("its bits are in reverse order (FillOrder 2), which is not read: rewrite it (`tiffcp -f msb2lsb`)".into());
+    }
+    if page.image_depth > 1 {
+        return Some(format!(
+            "its page is a volume of {} slices, which is not read: store each slice as a page",
+            page.image_depth
+        ));
     }
     // The decoder does not expect these.
-    if page.directory.planar == 2 && samples_per_pixel > 1 && page.directory.tile_width.is_some() {
-        return Err(
+    if page.planar == 2 && page.samples_per_pixel > 1 && page.tile_width.is_some() {
+        return Some(
             "its channels are separate planes in tiles, which is not read: store it in strips (`tiffcp -s`)"
                 .into(),
         );
     }
+    let colours = match photometric {
+        0..=2 => None,
+        3 => Some("colours from a palette".into()),
+        5 => Some("CMYK colours".into()),
+        6 => Some("YCbCr colours".into()),
+        8..=10 => Some("L*a*b* colours".into()),
+        32844 | 32845 => Some("logarithmic colours".into()),
+        other => Some(format!("colours of kind {other} (PhotometricInterpretation)")),
+    };
+    if let Some(colours) = colours {
+        return Some(format!("it has {colours}, which are not read: convert it to grey or RGB"));
+    }
+    match (sample_format, bits) {
+        (2, _) => Some(
+            "its samples are signed integers, whose black and white are not known: convert it to float or unsigned integers"
+                .into(),
+        ),
+        (5 | 6, _) => Some("its samples are complex numbers: store their magnitude as float".into()),
+        (3, 16 | 32 | 64) if photometric == 0 => {
+            Some("its white is 0, which float samples do not define: store it with black as 0".into())
+        }
+        (3, 16 | 32 | 64) | (0 | 1 | 4, 1 | 2 | 4 | 8 | 16 | 32) => None,
+        _ => Some(format!(
+            "its samples have {bits} bits, of which 1, 2, 4, 8, 16 and 32 are read: convert it to 16 bits"
+        )),
+    }
+}
+
+fn decode_page(bytes: &[u8], page: &Page) -> Result<Decoded, String> {
+    if let Some(advice) = unsupported(&page.directory) {
+        return Err(advice);
+    }
+    let Directory { width, height, samples_per_pixel, bits, .. } = page.directory;
     let decoded_bytes = (width * height).saturating_mul(samples_per_pixel).saturating_mul(bits.max(8) / 8);
     if decoded_bytes > most_bytes(bytes.len()) {
         return Err(format!("it is incomplete: {} bytes cannot hold {width}x{height} px", bytes.len()));
@@ -141,11 +181,10 @@ fn decode_page(bytes: &[u8], page: &Page) -> Result<Decoded, String> {
     }
     let colour = decoder.colortype().map_err(say)?;
     let alpha = matches!(page.directory.extra_samples, Some(1 | 2));
-    let (channels, colours) = match colour {
-        ColorType::Gray(_) => (1, 1),
-        ColorType::GrayA(_) | ColorType::Multiband { num_samples: 2, .. } if alpha => (2, 1),
-        ColorType::RGB(_) => (3, 3),
-        ColorType::RGBA(_) => (4, 3),
+    let colours = match colour {
+        ColorType::Gray(_) => 1,
+        ColorType::GrayA(_) | ColorType::Multiband { num_samples: 2, .. } if alpha => 1,
+        ColorType::RGB(_) | ColorType::RGBA(_) => 3,
         ColorType::Multiband { num_samples, .. } => {
             return Err(format!(
                 "it has {num_samples} channels that are not colours: store one channel as grey"
@@ -153,14 +192,14 @@ fn decode_page(bytes: &[u8], page: &Page) -> Result<Decoded, String> {
         }
         other => return Err(format!("its pixels are {other:?}: convert it to grey or RGB")),
     };
-    // Extra samples other than alpha count as channels.
-    let channels = channels.max(samples_per_pixel as usize);
     let mut data = DecodingResult::U8(Vec::new());
     let layout = decoder.read_image_to_buffer(&mut data).map_err(say)?;
     if data.as_buffer(0).byte_len() < layout.complete_len {
-        return Err(format!("its {width}x{height} px in {channels} planes are more than it can hold"));
+        return Err(format!("its {width}x{height} px in {} planes are more than it can hold", layout.planes));
     }
     let planes = if layout.plane_stride.is_some() && layout.planes > 1 { layout.planes } else { 1 };
+    // The decoder leaves out extra samples other than alpha, but not extra planes.
+    let channels = if planes > 1 { planes } else { usize::from(colour.num_samples()) };
     let (width, height) = (width as usize, height as usize);
     let values = match data {
         DecodingResult::U8(v) if matches!(colour.bit_depth(), 1 | 2 | 4) && planes == 1 && channels == 1 => {
@@ -175,17 +214,7 @@ fn decode_page(bytes: &[u8], page: &Page) -> Result<Decoded, String> {
         DecodingResult::F16(v) => Values::F32(interleaved(v, planes).into_iter().map(f32::from).collect()),
         DecodingResult::F32(v) => Values::F32(interleaved(v, planes)),
         DecodingResult::F64(v) => Values::F32(interleaved(v, planes).into_iter().map(|v| v as f32).collect()),
-        DecodingResult::I8(_) | DecodingResult::I16(_) | DecodingResult::I32(_) | DecodingResult::I64(_) => {
-            return Err("its samples are signed integers, whose black and white are not known: convert it to float or \
-                        unsigned integers"
-                .into());
-        }
-        _ => {
-            return Err(format!(
-                "its samples have {} bits; 1, 2, 4, 8, 16 and 32 are read",
-                colour.bit_depth()
-            ));
-        }
+        _ => return Err(format!("its samples are {colour:?}: convert it to grey or RGB of 8 or 16 bits")),
     };
     let white_level = camera_white(&page.directory);
     Ok(Decoded { width, height, channels, colours, values, white_level })

@@ -25,6 +25,10 @@ pub(crate) struct Directory {
     pub orientation: u64,
     pub samples_per_pixel: u64,
     pub bits: u64,
+    /// Tag 339: 1 = unsigned, 2 = signed, 3 = float, 5 and 6 = complex.
+    pub sample_format: u64,
+    /// Tag 32997: slices of a volume in one page.
+    pub image_depth: u64,
     pub compression: u64,
     pub strip_offset: u64,
     pub strips: u64,
@@ -113,6 +117,8 @@ impl<'a> File<'a> {
             orientation: 1,
             samples_per_pixel: 1,
             bits: 1,
+            sample_format: 1,
+            image_depth: 1,
             compression: 1,
             ..Directory::default()
         };
@@ -180,6 +186,8 @@ impl<'a> File<'a> {
             36867 => directory.exposed = text(),
             37521 => directory.exposed_fraction = text(),
             338 => directory.extra_samples = value(0),
+            339 => directory.sample_format = first(),
+            32997 => directory.image_depth = first(),
             50706 => directory.is_dng = true,
             51123 => directory.micro_manager = text(),
             _ => {}

@@ -118,6 +118,25 @@ fn names_unsupported_formats() {
 }
 
 #[test]
+fn names_unsupported_pixels_of_a_tiff() {
+    let page = || Page::grey(4, 3, 8, vec![0; 96]);
+    let float = || page().with(258, &[32]).with(339, &[3]);
+    for (page, expected) in [
+        (page().with(258, &[12]), "12 bits"),
+        (page().with(258, &[64]), "64 bits"),
+        (page().with(262, &[3]), "palette"),
+        (page().with(262, &[6]), "YCbCr"),
+        (page().with(258, &[64]).with(339, &[6]), "complex"),
+        (float().with(262, &[0]), "white is 0"),
+        (page().with(32997, &[5]), "volume of 5 slices"),
+    ] {
+        let refused = refusal(&tiff(CLASSIC, &[page]));
+        assert!(refused.contains(expected) && !refused.contains("unsupported"), "{expected}: {refused}");
+    }
+    assert!(decode_grey(&tiff(CLASSIC, &[float()])).is_ok());
+}
+
+#[test]
 fn rotates_a_jpeg_by_its_orientation() {
     let plain = decode_grey(&jpeg(48, 32)).unwrap().pixels;
     let turned = decode_grey(&jpeg_turned(48, 32, 6)).unwrap().pixels;

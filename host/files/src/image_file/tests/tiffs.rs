@@ -35,6 +35,22 @@ fn planar_colour_is_read_plane_by_plane() {
 }
 
 #[test]
+fn colours_with_a_sample_of_unknown_meaning_are_read() {
+    let pixels = vec![30, 60, 90, 7, 60, 90, 120, 8];
+    let page = Page::grey(2, 1, 8, pixels).with(262, &[2]).with(277, &[4]).with(258, &[8; 4]);
+    for extra in [0, 1, 2] {
+        assert_eq!(
+            read(&tiff(CLASSIC, &[page.clone().with(338, &[extra])])),
+            array![[60.0, 90.0]],
+            "{extra}"
+        );
+    }
+    let planes = [[30_u8, 60], [60, 90], [90, 120], [7, 8]].map(Vec::from).to_vec();
+    let page = Page { strips: planes, ..page.with(284, &[2]).with(338, &[0]) };
+    assert_eq!(read(&tiff(CLASSIC, &[page])), array![[60.0, 90.0]]);
+}
+
+#[test]
 fn half_float_and_few_bits_are_read() {
     // 1.0 and -0.5 in half precision.
     let half = Page::grey(2, 1, 16, vec![0x00, 0x3c, 0x00, 0xb8]).with(339, &[3]);
