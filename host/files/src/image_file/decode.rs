@@ -64,6 +64,9 @@ pub(crate) fn decode(bytes: &[u8], page: Option<usize>) -> Result<Decoded, Strin
 fn jpeg(bytes: &[u8]) -> Result<(Decoded, u8), String> {
     const INCOMPLETE: &str =
         "it is incomplete: the data end before the image does; copy it again from the camera";
+    if let Some(advice) = complete::unsupported_jpeg(bytes) {
+        return Err(advice);
+    }
     if !complete::jpeg_has_its_end(bytes) {
         return Err(INCOMPLETE.into());
     }
@@ -106,6 +109,10 @@ fn needs_more(bytes: &[u8], values: &[u8], options: DecoderOptions, to: ColorSpa
 fn other(bytes: &[u8]) -> Result<(Decoded, u8), String> {
     let format =
         image::guess_format(bytes).map_err(|_| "its first bytes match none of these formats".to_string())?;
+    let images = if format == ImageFormat::Png { complete::png_images(bytes) } else { 1 };
+    if images > 1 {
+        return Err(format!("it is an animation of {images} images: store each as a file"));
+    }
     let mut reader = ImageReader::with_format(Cursor::new(bytes), format);
     reader.no_limits();
     let mut decoder = reader.into_decoder().map_err(|error| error.to_string())?;

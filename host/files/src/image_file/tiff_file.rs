@@ -192,13 +192,24 @@ fn decode_page(bytes: &[u8], page: &Page) -> Result<Decoded, String> {
         }
         other => return Err(format!("its pixels are {other:?}: convert it to grey or RGB")),
     };
+    // The decoder leaves out extra samples other than alpha, which it does right only here.
+    let extra = samples_per_pixel > u64::from(colour.num_samples());
+    if extra
+        && page.directory.planar != 2
+        && (page.directory.tile_width.is_some() || page.directory.predictor > 1)
+    {
+        return Err(format!(
+            "it has {samples_per_pixel} samples per pixel, of which the last have no stated meaning (ExtraSamples 0): store it \
+             as RGB, or in strips without a predictor"
+        ));
+    }
     let mut data = DecodingResult::U8(Vec::new());
     let layout = decoder.read_image_to_buffer(&mut data).map_err(say)?;
     if data.as_buffer(0).byte_len() < layout.complete_len {
         return Err(format!("its {width}x{height} px in {} planes are more than it can hold", layout.planes));
     }
     let planes = if layout.plane_stride.is_some() && layout.planes > 1 { layout.planes } else { 1 };
-    // The decoder leaves out extra samples other than alpha, but not extra planes.
+    // Extra planes are not left out.
     let channels = if planes > 1 { planes } else { usize::from(colour.num_samples()) };
     let (width, height) = (width as usize, height as usize);
     let values = match data {

@@ -19,6 +19,8 @@ pub(crate) struct Directory {
     /// Tag 266: 2 = the lowest bit of a byte comes first.
     pub fill_order: u64,
     pub planar: u64,
+    /// Tag 317: 1 = none.
+    pub predictor: u64,
     /// Tag 322.
     pub tile_width: Option<u64>,
     /// Tag 274, 1 to 8.
@@ -118,6 +120,7 @@ impl<'a> File<'a> {
             samples_per_pixel: 1,
             bits: 1,
             sample_format: 1,
+            predictor: 1,
             image_depth: 1,
             compression: 1,
             ..Directory::default()
@@ -160,6 +163,7 @@ impl<'a> File<'a> {
             262 => directory.photometric = first(),
             266 => directory.fill_order = first(),
             284 => directory.planar = first(),
+            317 => directory.predictor = first(),
             322 => directory.tile_width = value(0),
             270 => directory.description = text(),
             271 => directory.make = text(),

@@ -45,6 +45,11 @@ fn colours_with_a_sample_of_unknown_meaning_are_read() {
             "{extra}"
         );
     }
+    for (tag, value) in [(317, 2), (322, 16)] {
+        let page = page.clone().with(338, &[0]).with(tag, &[value]);
+        let refused = decode_grey(&tiff(CLASSIC, &[page])).unwrap_err();
+        assert!(refused.contains("ExtraSamples 0"), "{tag}: {refused}");
+    }
     let planes = [[30_u8, 60], [60, 90], [90, 120], [7, 8]].map(Vec::from).to_vec();
     let page = Page { strips: planes, ..page.with(284, &[2]).with(338, &[0]) };
     assert_eq!(read(&tiff(CLASSIC, &[page])), array![[60.0, 90.0]]);
