@@ -154,9 +154,10 @@ fn unsupported(page: &Directory) -> Option<String> {
         (3, 16 | 32 | 64) if photometric == 0 => {
             Some("its white is 0, which float samples do not define: store it with black as 0".into())
         }
-        (3, 16 | 32 | 64) | (0 | 1 | 4, 1 | 2 | 4 | 8 | 16 | 32) => None,
+        (3, 16 | 32 | 64) | (0 | 1 | 4, 8 | 16 | 32) => None,
+        (0 | 1 | 4, 1 | 2 | 4) if page.samples_per_pixel == 1 => None,
         _ => Some(format!(
-            "its samples have {bits} bits, of which 1, 2, 4, 8, 16 and 32 are read: convert it to 16 bits"
+            "its samples have {bits} bits, of which 8, 16 and 32 are read, and 1, 2 and 4 in grey: convert it to 16 bits"
         )),
     }
 }
@@ -170,7 +171,7 @@ fn decode_page(bytes: &[u8], page: &Page) -> Result<Decoded, String> {
     if decoded_bytes > most_bytes(bytes.len()) {
         return Err(format!("it is incomplete: {} bytes cannot hold {width}x{height} px", bytes.len()));
     }
-    let say = |error: tiff::TiffError| error.to_string();
+    let say = |error: tiff::TiffError| format!("{error}; rewrite it, for instance with `tiffcp -c lzw`");
     let mut limits = Limits::default();
     limits.decoding_buffer_size = usize::try_from(most_bytes(bytes.len())).unwrap_or(usize::MAX);
     limits.intermediate_buffer_size = limits.decoding_buffer_size;

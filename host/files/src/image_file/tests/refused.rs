@@ -124,6 +124,7 @@ fn names_unsupported_pixels_of_a_tiff() {
     for (page, expected) in [
         (page().with(258, &[12]), "12 bits"),
         (page().with(258, &[64]), "64 bits"),
+        (page().with(258, &[4; 3]).with(262, &[2]).with(277, &[3]), "4 bits"),
         (page().with(262, &[3]), "palette"),
         (page().with(262, &[6]), "YCbCr"),
         (page().with(258, &[64]).with(339, &[6]), "complex"),
