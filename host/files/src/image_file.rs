@@ -26,6 +26,7 @@ use std::{
 use ndarray::Array2;
 
 pub(crate) use decode::{Decoded, Samples8, decode};
+pub use metadata::exposure_time;
 pub use tiff_file::page_count;
 pub(crate) use tiff_file::{Page, pages};
 pub(crate) use write::encode_to;
