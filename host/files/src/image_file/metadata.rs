@@ -67,7 +67,7 @@ pub fn exposure_time(bytes: &[u8]) -> Option<String> {
         let mut decoder = ImageReader::with_format(Cursor::new(bytes), format).into_decoder().ok()?;
         of_decoder(&mut decoder, bytes).0?
     };
-    let directory = tiff_tags::directories(&exif).ok()?.into_iter().next()?;
+    let directory = tiff_tags::directories(exif.as_slice()).ok()?.into_iter().next()?;
     let exposed = directory.exposed.or(directory.date_time)?;
     Some(exposed + "." + directory.exposed_fraction.as_deref().unwrap_or_default())
 }

@@ -1,6 +1,10 @@
 //! TIFF pages and their pixels.
 
-use std::{io::Cursor, path::Path};
+use std::{
+    fs::File,
+    io::{BufReader, Cursor, Read, Seek},
+    path::{Path, PathBuf},
+};
 
 use tiff::{
     ColorType,
@@ -10,12 +14,14 @@ use tiff::{
 use super::{
     ImageError, complete,
     decode::{Decoded, Values, most_bytes},
-    read_bytes,
-    tiff_tags::{self, Directory},
+    tiff_tags::{self, Directory, InFile, Source},
 };
 
 /// Colour filter array and linear raw (TIFF/EP, DNG).
 const RAW_PHOTOMETRIC: [u64; 2] = [32803, 34892];
+
+/// Enough for the names of formats.
+const HEAD_BYTES: u64 = 32;
 
 #[derive(Debug, Clone)]
 pub(crate) struct Page {
@@ -23,18 +29,49 @@ pub(crate) struct Page {
     pub directory: Directory,
 }
 
+/// A TIFF file whose pages are read one at a time.
+pub(crate) struct Pages {
+    path: PathBuf,
+    size: u64,
+    pub pages: Vec<Page>,
+}
+
+impl Pages {
+    /// `None` for other formats and those that [`super::decode`] refuses. Fails for raw files and mere previews.
+    pub fn open(path: &Path) -> Result<Option<Self>, ImageError> {
+        let failed = |source| ImageError::Read { path: path.into(), source };
+        let file = InFile::open(path).map_err(failed)?;
+        let head = file.read(0, HEAD_BYTES).unwrap_or_default();
+        if !tiff_tags::is_tiff(&head) || complete::unsupported(&head).is_some() {
+            return Ok(None);
+        }
+        let pages = pages(&file).map_err(|reason| ImageError::Format { path: path.into(), reason })?;
+        Ok(Some(Self { path: path.into(), size: file.size(), pages }))
+    }
+
+    /// Decodes page `number` (from 1).
+    pub fn decode(&self, number: usize) -> Result<Decoded, ImageError> {
+        let file =
+            File::open(&self.path).map_err(|source| ImageError::Read { path: self.path.clone(), source })?;
+        let page = number.checked_sub(1).and_then(|index| self.pages.get(index)).ok_or_else(|| {
+            format!("it has no page {number}: pages are numbered from 1 to {}", self.pages.len())
+        });
+        let decoded = page.and_then(|page| decode_page(BufReader::new(file), self.size, page));
+        decoded.map_err(|reason| {
+            let path = format!("{}#{number}", self.path.display()).into();
+            ImageError::Format { path, reason }
+        })
+    }
+}
+
 /// Number of full-resolution images; 1 for other formats. Fails for raw files and mere previews.
 pub fn page_count(path: &Path) -> Result<usize, ImageError> {
-    let bytes = read_bytes(path)?;
-    if !tiff_tags::is_tiff(&bytes) || complete::unsupported(&bytes).is_some() {
-        return Ok(1);
-    }
-    pages(&bytes).map(|pages| pages.len()).map_err(|reason| ImageError::Format { path: path.into(), reason })
+    Ok(Pages::open(path)?.map_or(1, |file| file.pages.len()))
 }
 
 /// Full-resolution images. Fails for raw files, or previews only.
-pub(crate) fn pages(bytes: &[u8]) -> Result<Vec<Page>, String> {
-    let directories = tiff_tags::directories(bytes)?;
+fn pages<S: Source + ?Sized>(source: &S) -> Result<Vec<Page>, String> {
+    let directories = tiff_tags::directories(source)?;
     let Some(first) = directories.first() else { return Err("it holds no image".into()) };
     if directories.iter().any(|d| d.is_dng || RAW_PHOTOMETRIC.contains(&d.photometric)) {
         return Err(complete::RAW.into());
@@ -66,31 +103,21 @@ pub(crate) fn pages(bytes: &[u8]) -> Result<Vec<Page>, String> {
     Ok(pages)
 }
 
-/// Decodes the only page, or page `number` (from 1), with its orientation.
-pub(super) fn decode(bytes: &[u8], number: Option<usize>) -> Result<(Decoded, u8), String> {
+/// Decodes the only page.
+pub(super) fn decode(bytes: &[u8]) -> Result<Decoded, String> {
     let pages = pages(bytes)?;
-    let page = match number {
-        Some(number) => number.checked_sub(1).and_then(|index| pages.get(index)).ok_or_else(|| {
-            format!("it has no page {number}: pages are numbered from 1 to {}", pages.len())
-        })?,
-        None if pages.len() == 1 => &pages[0],
-        None => {
-            let sizes: Vec<String> = pages
-                .iter()
-                .take(3)
-                .map(|p| format!("{}x{}", p.directory.width, p.directory.height))
-                .collect();
-            return Err(format!(
-                "it holds {} images ({}{}): name one as FILE#1 to FILE#{}, or measure all of them with `farnear focus-stack`",
-                pages.len(),
-                sizes.join(", "),
-                if pages.len() > 3 { ", ..." } else { "" },
-                pages.len()
-            ));
-        }
-    };
-    let decoded = decode_page(bytes, page)?;
-    Ok((decoded, page.directory.orientation as u8))
+    if let [page] = pages.as_slice() {
+        return decode_page(Cursor::new(bytes), bytes.len() as u64, page);
+    }
+    let sizes: Vec<String> =
+        pages.iter().take(3).map(|p| format!("{}x{}", p.directory.width, p.directory.height)).collect();
+    Err(format!(
+        "it holds {} images ({}{}): name one as FILE#1 to FILE#{}, or measure all of them with `farnear focus-stack`",
+        pages.len(),
+        sizes.join(", "),
+        if pages.len() > 3 { ", ..." } else { "" },
+        pages.len()
+    ))
 }
 
 fn compression(code: u64) -> String {
@@ -162,21 +189,22 @@ fn unsupported(page: &Directory) -> Option<String> {
     }
 }
 
-fn decode_page(bytes: &[u8], page: &Page) -> Result<Decoded, String> {
+/// A page of a file of this size, upright.
+fn decode_page(file: impl Read + Seek, size: u64, page: &Page) -> Result<Decoded, String> {
     if let Some(advice) = unsupported(&page.directory) {
         return Err(advice);
     }
     let Directory { width, height, samples_per_pixel, bits, .. } = page.directory;
     let decoded_bytes = (width * height).saturating_mul(samples_per_pixel).saturating_mul(bits.max(8) / 8);
-    if decoded_bytes > most_bytes(bytes.len()) {
-        return Err(format!("it is incomplete: {} bytes cannot hold {width}x{height} px", bytes.len()));
+    if decoded_bytes > most_bytes(size) {
+        return Err(format!("it is incomplete: {size} bytes cannot hold {width}x{height} px"));
     }
     let say = |error: tiff::TiffError| format!("{error}; rewrite it, for instance with `tiffcp -c lzw`");
     let mut limits = Limits::default();
-    limits.decoding_buffer_size = usize::try_from(most_bytes(bytes.len())).unwrap_or(usize::MAX);
+    limits.decoding_buffer_size = usize::try_from(most_bytes(size)).unwrap_or(usize::MAX);
     limits.intermediate_buffer_size = limits.decoding_buffer_size;
-    limits.ifd_value_size = bytes.len().max(1 << 20);
-    let mut decoder = Decoder::new(Cursor::new(bytes)).map_err(say)?.with_limits(limits);
+    limits.ifd_value_size = usize::try_from(size).unwrap_or(usize::MAX).max(1 << 20);
+    let mut decoder = Decoder::new(file).map_err(say)?.with_limits(limits);
     if page.index > 0 {
         decoder.seek_to_image(page.index).map_err(say)?;
     }
@@ -229,7 +257,8 @@ fn decode_page(bytes: &[u8], page: &Page) -> Result<Decoded, String> {
         _ => return Err(format!("its samples are {colour:?}: convert it to grey or RGB of 8 or 16 bits")),
     };
     let white_level = camera_white(&page.directory);
-    Ok(Decoded { width, height, channels, colours, values, white_level })
+    let decoded = Decoded { width, height, channels, colours, values, white_level };
+    Ok(decoded.turned(page.directory.orientation as u8))
 }
 
 /// Saturation code from the description (as written by farnear), or the maximum sample value below 16 bits.

@@ -1,11 +1,78 @@
-//! TIFF directories without pixels: sizes, kinds and descriptions (TIFF 6.0, section 2; BigTIFF as in libtiff). The
+//! TIFF directories without pixels, from memory or a file: sizes, kinds and descriptions (TIFF 6.0, section 2; BigTIFF as in libtiff). The
 //! `tiff` crate rejects files such as raw files, whose kind error messages need.
+
+use std::{
+    borrow::Cow,
+    cell::RefCell,
+    fs,
+    io::{self, Read, Seek, SeekFrom},
+    path::Path,
+};
 
 const DIRECTORIES_MAX: usize = 100_000;
 const ENTRIES_MAX: u64 = 4096;
 /// OME-XML of large stacks has megabytes.
 const TEXT_MAX: u64 = 64 << 20;
 const SUB_IMAGES_MAX: usize = 16;
+const BLOCK_BYTES: u64 = 1 << 16;
+
+/// Contents of a file, by places.
+pub(crate) trait Source {
+    fn size(&self) -> u64;
+    /// Up to this many bytes, fewer only at the end.
+    fn read(&self, at: u64, length: u64) -> Option<Cow<'_, [u8]>>;
+}
+
+impl Source for [u8] {
+    fn size(&self) -> u64 {
+        self.len() as u64
+    }
+
+    fn read(&self, at: u64, length: u64) -> Option<Cow<'_, [u8]>> {
+        let end = at.checked_add(length)?.min(self.size());
+        Some(self.get(usize::try_from(at).ok()?..end as usize)?.into())
+    }
+}
+
+/// A file, of which the last block is in memory.
+pub(crate) struct InFile {
+    file: fs::File,
+    size: u64,
+    block: RefCell<(u64, Vec<u8>)>,
+}
+
+impl InFile {
+    pub fn open(path: &Path) -> io::Result<Self> {
+        let file = fs::File::open(path)?;
+        Ok(Self { size: file.metadata()?.len(), file, block: RefCell::new((0, Vec::new())) })
+    }
+
+    fn at(&self, at: u64, length: u64) -> io::Result<Vec<u8>> {
+        let mut bytes = Vec::new();
+        (&self.file).seek(SeekFrom::Start(at))?;
+        (&self.file).take(length).read_to_end(&mut bytes)?;
+        Ok(bytes)
+    }
+}
+
+impl Source for InFile {
+    fn size(&self) -> u64 {
+        self.size
+    }
+
+    fn read(&self, at: u64, length: u64) -> Option<Cow<'_, [u8]>> {
+        let length = length.min(self.size.checked_sub(at)?);
+        if length > BLOCK_BYTES {
+            return Some(self.at(at, length).ok()?.into());
+        }
+        let mut block = self.block.borrow_mut();
+        if at < block.0 || at + length > block.0 + block.1.len() as u64 {
+            *block = (at, self.at(at, BLOCK_BYTES).ok()?);
+        }
+        let from = (at - block.0) as usize;
+        Some(block.1.get(from..from + length as usize)?.to_vec().into())
+    }
+}
 
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct Directory {
@@ -61,13 +128,14 @@ impl Directory {
     }
 }
 
+/// From the first four bytes.
 pub(crate) fn is_tiff(bytes: &[u8]) -> bool {
     [b"II*\0", b"MM\0*", b"II+\0", b"MM\0+"].iter().any(|magic| bytes.starts_with(*magic))
 }
 
 /// All directories in file order. Fails for a directory beyond the end, or an endless chain.
-pub(crate) fn directories(bytes: &[u8]) -> Result<Vec<Directory>, String> {
-    let file = File::new(bytes)?;
+pub(crate) fn directories<S: Source + ?Sized>(source: &S) -> Result<Vec<Directory>, String> {
+    let file = File::new(source)?;
     let mut at = file.first;
     let mut seen = std::collections::HashSet::new();
     let mut found = Vec::new();
@@ -83,17 +151,17 @@ pub(crate) fn directories(bytes: &[u8]) -> Result<Vec<Directory>, String> {
     Ok(found)
 }
 
-struct File<'a> {
-    bytes: &'a [u8],
+struct File<'a, S: ?Sized> {
+    source: &'a S,
     little: bool,
     big: bool,
     first: u64,
 }
 
-impl<'a> File<'a> {
-    fn new(bytes: &'a [u8]) -> Result<Self, String> {
-        let little = bytes.starts_with(b"II");
-        let mut file = Self { bytes, little, big: false, first: 0 };
+impl<'a, S: Source + ?Sized> File<'a, S> {
+    fn new(source: &'a S) -> Result<Self, String> {
+        let little = source.read(0, 2).is_some_and(|order| *order == *b"II");
+        let mut file = Self { source, little, big: false, first: 0 };
         file.big = file.number(2, 2) == Some(43);
         let first = if file.big { file.number(8, 8) } else { file.number(4, 4) };
         file.first = first.ok_or("it ends within its header")?;
@@ -101,8 +169,7 @@ impl<'a> File<'a> {
     }
 
     fn number(&self, at: u64, size: usize) -> Option<u64> {
-        let at = usize::try_from(at).ok()?;
-        let bytes = self.bytes.get(at..at.checked_add(size)?)?;
+        let bytes = self.source.read(at, size as u64).filter(|bytes| bytes.len() == size)?;
         let shift = |value: u64, byte: &u8| value << 8 | u64::from(*byte);
         Some(if self.little { bytes.iter().rev().fold(0, shift) } else { bytes.iter().fold(0, shift) })
     }
@@ -147,10 +214,8 @@ impl<'a> File<'a> {
         let place = if fits { field } else { self.number(field, inline)? };
         let value = |index: u64| self.number(place.checked_add(index * size as u64)?, size);
         let text = || {
-            let from = usize::try_from(place).ok()?;
-            let to = from.checked_add(usize::try_from(count.min(TEXT_MAX)).ok()?)?;
-            let text = self.bytes.get(from..to.min(self.bytes.len()))?;
-            Some(String::from_utf8_lossy(text).trim_end_matches('\0').to_owned())
+            let text = self.source.read(place, count.min(TEXT_MAX))?;
+            Some(String::from_utf8_lossy(&text).trim_end_matches('\0').to_owned())
         };
         let first = || value(0).unwrap_or(0);
         match tag {
