@@ -276,6 +276,30 @@ fn invalid_stacks_are_rejected_without_output() {
     refuse(&[&stack], 1, "image 5 has 8x8 px and the first one 80x60");
 }
 
+/// A map without a record has the unit, and so the holes, of the other one: positions of a stage may be negative.
+#[test]
+fn a_bare_map_is_compared_in_the_unit_of_the_other() {
+    let folder = Folder::new();
+    let positions = Array2::from_shape_fn((12, 16), |(y, x)| (x as f32 - 8.0) + 0.1 * y as f32);
+    let result = folder.text("result");
+    fs::create_dir(&result).expect("a folder");
+    folder.file("result/depth.npy", farnear_files::npy::write(positions.view()));
+    folder.file("result/stack.toml", "unit = \"um\"\n");
+    let bare = folder.file("bare.npy", farnear_files::npy::write(positions.view()));
+    for arguments in [["compare", &result, &bare], ["compare", &bare, &result]] {
+        let found = figures(farnear(&arguments).arg("--json"));
+        assert_eq!((number(&found, "pixels"), number(&found, "rmse_um")), (192.0, 0.0), "{found}");
+    }
+    let found = figures(farnear(&["measure", "difference", &bare, &result]).arg("--json"));
+    assert_eq!(number(&found, "pixels"), 192.0, "{found}");
+    let (_, stderr) = succeeds(&mut farnear(&["measure", "region", &bare]));
+    assert!(stderr.contains("are taken as mm") && stderr.contains("stack.toml"), "{stderr}");
+    let (_, stderr) = succeeds(&mut farnear(&["measure", "region", &result]));
+    assert!(!stderr.contains("taken as mm"), "{stderr}");
+    let file = format!("{result}/depth.npy");
+    fails(&mut farnear(&["report", &file, "--out", &folder.text("report.html")]), 2, &["the folder of"]);
+}
+
 /// The peak of the program's memory, MB.
 #[cfg(target_os = "linux")]
 fn peak_mb(arguments: &[&str]) -> f64 {
