@@ -342,7 +342,6 @@ fn memory_does_not_grow_with_the_images_of_a_stack() {
             (0..100_000).map(|at| (30_000.0 + 40_000.0 * contrast * texture(at)) as u16).collect();
         pages.write_image::<Gray16>(400, 250, &pixels).expect("a page");
     }
-    drop(pages);
     drop(file);
     let quick = ["--use-all", "--guided-px", "0", "--median-px", "1", "--smoothing-px", "0"];
     let peak = peak_mb(&[&["focus-stack", &stack, "--out", &out][..], &quick].concat());
