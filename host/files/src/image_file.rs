@@ -26,8 +26,9 @@ use std::{
 use ndarray::Array2;
 
 pub(crate) use decode::{Decoded, Samples8, decode};
+pub use metadata::exposure_time;
 pub use tiff_file::page_count;
-pub(crate) use tiff_file::{Page, pages};
+pub(crate) use tiff_file::{Page, Pages};
 pub(crate) use write::encode_to;
 pub use write::{encode_png, encode_tiff, png_to, png8_to};
 
@@ -199,8 +200,17 @@ pub(crate) fn read_8_bit(path: &Path) -> Result<Samples8, ImageError> {
 
 fn read_decoded(path: &Path) -> Result<(Decoded, PathBuf), ImageError> {
     let (file, page) = file_and_page(path);
+    if let Some(page) = page {
+        if let Some(pages) = Pages::open(&file)? {
+            return Ok((pages.decode(page)?, path.into()));
+        }
+        if page != 1 {
+            let reason = "it has one image: only TIFF files have pages".into();
+            return Err(ImageError::Format { path: path.into(), reason });
+        }
+    }
     let bytes = read_bytes(&file)?;
-    let decoded = decode(&bytes, page).map_err(|reason| ImageError::Format { path: file, reason })?;
+    let decoded = decode(&bytes).map_err(|reason| ImageError::Format { path: file, reason })?;
     Ok((decoded, path.into()))
 }
 
@@ -213,7 +223,7 @@ pub(crate) fn read_bytes(path: &Path) -> Result<Vec<u8>, ImageError> {
 }
 
 pub fn decode_grey(bytes: &[u8]) -> Result<GreyImage, String> {
-    decode(bytes, None)?.grey(&ReadSettings::default())
+    decode(bytes)?.grey(&ReadSettings::default())
 }
 
 #[cfg(test)]

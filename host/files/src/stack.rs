@@ -13,7 +13,7 @@ use std::{
 use ndarray::Array2;
 
 use crate::{
-    image_file::{self, GreyImage, ImageError, ReadSettings, decode, pages, read_bytes, tiff_tags},
+    image_file::{self, Decoded, GreyImage, ImageError, Pages, ReadSettings},
     order,
     video::{VideoError, pictures},
 };
@@ -86,12 +86,9 @@ fn file(path: &Path) -> Result<Stack, StackError> {
     if !path.is_file() {
         return Err(StackError::Missing { path: path.into() });
     }
-    let bytes = read_bytes(path)?;
-    if !tiff_tags::is_tiff(&bytes) {
+    let Some(Pages { pages, .. }) = Pages::open(path)? else {
         return Ok(Stack { images: vec![path.into()], ..Stack::default() });
-    }
-    let broken = |reason| ImageError::Format { path: path.into(), reason };
-    let pages = pages(&bytes).map_err(broken)?;
+    };
     let positions_um =
         positions::of(&pages).map_err(|reason| StackError::Planes { path: path.into(), reason })?;
     let page = |number: usize| PathBuf::from(format!("{}#{number}", path.display()));
@@ -111,22 +108,30 @@ pub fn read<E: From<StackError>>(
     mut each: impl FnMut(usize, GreyImage) -> Result<(), E>,
 ) -> Result<(), E> {
     let mut seen: HashMap<u64, usize> = HashMap::with_capacity(images.len());
-    let mut open: Option<(PathBuf, Vec<u8>)> = None;
+    let mut open: Option<(PathBuf, Pages)> = None;
     for (index, path) in images.iter().enumerate() {
-        let (file, page) = image_file::file_and_page(path);
-        let bytes = match &mut open {
-            Some((of, bytes)) if *of == file => bytes,
-            open => &mut open.insert((file.clone(), read_bytes(&file).map_err(StackError::from)?)).1,
+        let image = match page(path, &mut open).map_err(StackError::from)? {
+            Some(decoded) => {
+                decoded.grey(settings).map_err(|reason| ImageError::Format { path: path.clone(), reason })
+            }
+            None => image_file::read_grey_with(path, settings),
         };
-        let image = decode(bytes, page).and_then(|decoded| decoded.grey(settings));
-        let image =
-            image.map_err(|reason| StackError::from(ImageError::Format { path: path.clone(), reason }))?;
+        let image = image.map_err(StackError::from)?;
         if let Some(twin) = seen.insert(hash(&image.pixels), index) {
             return Err(StackError::Twice { first: images[twin].clone(), second: path.clone() }.into());
         }
         each(index, image)?;
     }
     Ok(())
+}
+
+/// The page of a TIFF file that stays open for the next one; `None` for an image of its own.
+fn page(path: &Path, open: &mut Option<(PathBuf, Pages)>) -> Result<Option<Decoded>, ImageError> {
+    let (file, Some(number)) = image_file::file_and_page(path) else { return Ok(None) };
+    if open.as_ref().is_none_or(|(of, _)| *of != file) {
+        *open = Pages::open(&file)?.map(|pages| (file, pages));
+    }
+    open.as_ref().map(|(_, pages)| pages.decode(number)).transpose()
 }
 
 /// Of 64 bits: two different images of a stack have one hash with a probability below 1e-12.

@@ -81,18 +81,19 @@ impl Serialize for ComparisonFigures {
 
 /// Fails for maps in different units.
 pub fn compare(request: &CompareRequest) -> Result<ComparisonFigures> {
-    let (mut depth, mut truth) = (read_map(&request.depth)?, read_map(&request.truth)?);
+    let (depth, truth) = (read_map(&request.depth)?, read_map(&request.truth)?);
     let unit = shared_unit("truth", &depth, &truth)?;
+    let (mut depth, mut truth) = (depth.depth(unit), truth.depth(unit));
     if unit == Unit::Um {
         // Positions may have any sign; a common offset above 0 keeps the errors.
-        let lowest = depth.depth.iter().chain(&truth.depth).copied().fold(0.0, f32::min);
-        for map in [&mut depth.depth, &mut truth.depth] {
+        let lowest = depth.iter().chain(&truth).copied().fold(0.0, f32::min);
+        for map in [&mut depth, &mut truth] {
             map.mapv_inplace(|z| z - lowest + 1.0);
         }
     }
     let mask = request.mask.as_deref().map(map::read_mask).transpose()?;
     let mask = mask.as_ref().map(|mask| mask.view());
     let pixels = CompareSettings { border_px: request.border, away_from_edges_px: request.away_from_edges };
-    let found = metrics::compare(depth.depth.view(), truth.depth.view(), mask, &pixels)?;
+    let found = metrics::compare(depth.view(), truth.view(), mask, &pixels)?;
     Ok(ComparisonFigures { unit, found })
 }

@@ -18,7 +18,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     context::Context,
-    error::Result,
+    error::{Result, WorkflowError},
     measure::{Measured, region},
     request::{PathKind, Request},
     result_folder::{DEPTH_RECORD, STACK_RECORD},
@@ -67,6 +67,10 @@ pub fn write(request: &ReportRequest) -> Result<ReportFigures> {
 
 /// Fails for a folder without files of farnear.
 pub fn html(folder: &Path) -> Result<String> {
+    if folder.is_file() {
+        let expected = "the folder of a capture or a result, in which this file is";
+        return Err(WorkflowError::parameter("folder", folder.display(), expected));
+    }
     let has = |name: &str| folder.join(name).is_file();
     if has(CAPTURE_FILE) {
         kinds::capture(folder)

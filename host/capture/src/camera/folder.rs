@@ -7,7 +7,7 @@ use std::{
     time::{Duration, Instant, SystemTime},
 };
 
-use farnear_files::image_file::decode_grey;
+use farnear_files::image_file::{decode_grey, exposure_time};
 use farnear_protocol::{
     message::{ShotRecord, TriggerMode},
     units::Micros,
@@ -115,15 +115,15 @@ impl FolderCamera {
         Ok(fresh)
     }
 
-    /// The next image; `None` at the timeout.
-    fn next(&mut self, wait: Duration) -> Result<Option<(Image, SystemTime, PathBuf)>, CameraError> {
+    /// The next image with its times and file; `None` at the timeout.
+    fn next(&mut self, wait: Duration) -> Result<Option<(Image, Evidence)>, CameraError> {
         let until = Instant::now() + wait;
         loop {
             if let Some((written, path)) = self.fresh()?.into_iter().next() {
                 let bytes = fs::read(&path).unwrap_or_default();
                 match &self.candidate {
                     // Equal bytes twice: the file is complete.
-                    Some((same, content, since)) if *same == path && *content == bytes => {
+                    Some((same, read, since)) if *same == path && *read == bytes => {
                         match complete(&bytes).and_then(|()| decode_grey(&bytes)) {
                             Ok(picture) => {
                                 let size = bytes.len() as u64;
@@ -131,7 +131,13 @@ impl FolderCamera {
                                 self.used.insert(path.clone(), used);
                                 let failed = |reason| CameraError::File { path: path.clone(), reason };
                                 let image = of_picture(picture).map_err(failed)?;
-                                return Ok(Some((image, written, path)));
+                                let evidence = Evidence {
+                                    taken: Some((written, path)),
+                                    exposed: exposure_time(&bytes),
+                                    content: content(&image),
+                                    ..Evidence::default()
+                                };
+                                return Ok(Some((image, evidence)));
                             }
                             Err(reason) if since.elapsed() > QUIET => {
                                 return Err(CameraError::File { path, reason });
@@ -187,11 +193,9 @@ impl Camera for FolderCamera {
 
     fn image(&mut self, shot: &ShotRecord, wait: Duration) -> Result<Image, CameraError> {
         let camera = format!("folder {}", self.folder.display());
-        let Some((image, written, path)) = self.next(wait)? else {
+        let Some((image, evidence)) = self.next(wait)? else {
             return Err(CameraError::Late { camera, trigger_number: shot.trigger_number, waited: wait });
         };
-        let evidence =
-            Evidence { taken: Some((written, path)), content: content(&image), ..Evidence::default() };
         match self.pairing.judge(&camera, evidence, shot)? {
             Belongs::Here => Ok(image),
             Belongs::Earlier | Belongs::Later(_) => Err(CameraError::Surplus { camera }),

@@ -41,6 +41,8 @@ pub struct Evidence {
     pub arrived: Option<Instant>,
     /// File and its time, by one clock for all pictures of the camera.
     pub taken: Option<(SystemTime, PathBuf)>,
+    /// Time of the exposure in the file (EXIF). It comes before the file's time, which synchronisation changes.
+    pub exposed: Option<String>,
     /// [`content`] hash, if nothing else identifies it.
     pub content: Option<u64>,
 }
@@ -145,11 +147,16 @@ impl Pairing {
         if let Some((_, earlier)) = same {
             return Err(CameraError::Doubled { camera: camera.into(), earlier: *earlier, wanted });
         }
-        if let (Some((before, _)), Some((at, path))) =
-            (self.last.as_ref().and_then(|(last, _)| last.taken.as_ref()), &evidence.taken)
-            && (at < before || (at == before && self.is_earlier_by_name(path)))
+        if let Some((last, _)) = &self.last
+            && let (Some((before, _)), Some((at, path))) = (&last.taken, &evidence.taken)
         {
-            return Err(CameraError::Reordered { path: path.clone() });
+            let by_file = || at.cmp(before).then_with(|| self.by_name(path));
+            let exposed = evidence.exposed.as_ref().zip(last.exposed.as_ref());
+            if exposed.map_or(Ordering::Equal, |(at, before)| at.cmp(before)).then_with(by_file)
+                == Ordering::Less
+            {
+                return Err(CameraError::Reordered { path: path.clone() });
+            }
         }
         let belongs = self.by_stamp(camera, evidence.stamp, shot)?;
         if belongs != Belongs::Here {
@@ -171,9 +178,9 @@ impl Pairing {
         Ok(Belongs::Here)
     }
 
-    fn is_earlier_by_name(&self, path: &Path) -> bool {
+    fn by_name(&self, path: &Path) -> Ordering {
         let last = self.last.as_ref().and_then(|(last, _)| last.taken.as_ref());
-        last.is_some_and(|(_, last)| by_number(path, last) == Some(Ordering::Less))
+        last.and_then(|(_, last)| by_number(path, last)).unwrap_or(Ordering::Equal)
     }
 
     fn by_stamp(&self, camera: &str, stamp: Stamp, shot: &ShotRecord) -> Result<Belongs, CameraError> {

@@ -189,6 +189,35 @@ fn an_older_picture_after_a_newer_one_is_refused() {
     assert!(matches!(error, CameraError::Reordered { .. }), "{error:?}");
 }
 
+/// Synchronised files have the order of their arrival; EXIF has that of the exposures.
+#[test]
+fn times_of_exposure_come_before_those_of_the_files() {
+    for (second, refused) in [(11, false), (10, false), (9, true)] {
+        let folder = tempfile::tempdir().unwrap();
+        let mut camera = FolderCamera::watch(folder.path()).unwrap();
+        camera.arm(TriggerMode::Hardware, Micros(1)).unwrap();
+        fs::write(folder.path().join("a.png"), exposed_at(10, 10)).unwrap();
+        camera.image(&shot(0), Duration::from_secs(20)).unwrap();
+        fs::write(folder.path().join("b.png"), exposed_at(20, second)).unwrap();
+        let result = second_picture(&mut camera);
+        assert_eq!(matches!(result, Err(CameraError::Reordered { .. })), refused, "{second}: {result:?}");
+        assert_eq!(result.is_ok(), !refused);
+    }
+}
+
+/// A PNG exposed at this second of a minute.
+fn exposed_at(value: u16, second: u8) -> Vec<u8> {
+    use image::ImageEncoder;
+    let entry = b"II*\0\x08\0\0\0\x01\0\x32\x01\x02\0\x14\0\0\0\x1a\0\0\0\0\0\0\0";
+    let exif = [&entry[..], format!("2026:11:25 20:00:{second:02}\0").as_bytes()].concat();
+    let mut bytes = Vec::new();
+    let mut encoder = image::codecs::png::PngEncoder::new(&mut bytes);
+    encoder.set_exif_metadata(exif).unwrap();
+    let pixels: Vec<u8> = (0..64).map(|at| value as u8 + at).collect();
+    encoder.write_image(&pixels, 8, 8, image::ExtendedColorType::L8).unwrap();
+    bytes
+}
+
 #[test]
 fn names_a_rewritten_file() {
     let (folder, mut camera) = used_folder("capt0000.png");

@@ -1,4 +1,4 @@
-//! The tip of a sharpness curve: log-sharpness as a parabola, by weighted least squares (see the parent module).
+//! The tip of a sharpness curve: its reciprocal as a parabola, by weighted least squares (see the parent module).
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Tip {
@@ -32,12 +32,21 @@ pub(super) fn tip(curve: &[f32], positions: &[f64], fit_points: usize) -> Tip {
     let half = fit_points / 2;
     let window = largest.saturating_sub(half)..(largest + half + 1).min(curve.len());
     let unit = (positions[largest + 1] - positions[largest - 1]) / 2.0;
-    let mut fit = Parabola::default();
-    for i in window.filter(|i| curve[*i].is_finite()) {
+    let [mut reciprocal, mut logarithm] = [Parabola::default(), Parabola::default()];
+    let seen: Vec<usize> = window.filter(|i| curve[*i].is_finite()).collect();
+    for (at, &i) in seen.iter().enumerate() {
         let value = f64::from((curve[i] / most).max(1e-6));
-        fit.add((positions[i] - positions[largest]) / unit, value.ln(), value * value);
+        let t = (positions[i] - positions[largest]) / unit;
+        // A sample next to a gap also counts for the gap: the samples then weigh as if they were even.
+        let [before, after] = [at.saturating_sub(1), (at + 1).min(seen.len() - 1)];
+        let spacing = (positions[seen[after]] - positions[seen[before]]) / (unit * (after - before) as f64);
+        // Equal noise of all values: the weight is the squared inverse derivative.
+        reciprocal.add(t, -1.0 / value, value.powi(4) * spacing);
+        logarithm.add(t, value.ln(), value * value * spacing);
     }
-    let Some((tip, determination)) = fit.tip() else { return unreliable };
+    let (Some((tip, _)), Some((_, determination))) = (reciprocal.tip(), logarithm.tip()) else {
+        return unreliable;
+    };
     let place = place_of(positions, positions[largest] + tip * unit);
     // A maximum beyond the neighbours does not belong to this curve: two peaks, or noise.
     if (place - largest as f64).abs() > 1.5 || tip.abs() > 3.0 {

@@ -275,3 +275,99 @@ fn invalid_stacks_are_rejected_without_output() {
     .expect("a file");
     refuse(&[&stack], 1, "image 5 has 8x8 px and the first one 80x60");
 }
+
+/// A map without a record has the unit, and so the holes, of the other one: positions of a stage may be negative.
+#[test]
+fn a_bare_map_is_compared_in_the_unit_of_the_other() {
+    let folder = Folder::new();
+    let positions = Array2::from_shape_fn((12, 16), |(y, x)| (x as f32 - 8.0) + 0.1 * y as f32);
+    let result = folder.text("result");
+    fs::create_dir(&result).expect("a folder");
+    folder.file("result/depth.npy", farnear_files::npy::write(positions.view()));
+    folder.file("result/stack.toml", "unit = \"um\"\n");
+    let bare = folder.file("bare.npy", farnear_files::npy::write(positions.view()));
+    for arguments in [["compare", &result, &bare], ["compare", &bare, &result]] {
+        let found = figures(farnear(&arguments).arg("--json"));
+        assert_eq!((number(&found, "pixels"), number(&found, "rmse_um")), (192.0, 0.0), "{found}");
+    }
+    let found = figures(farnear(&["measure", "difference", &bare, &result]).arg("--json"));
+    assert_eq!(number(&found, "pixels"), 192.0, "{found}");
+    let (_, stderr) = succeeds(&mut farnear(&["measure", "region", &bare]));
+    assert!(stderr.contains("are taken as mm") && stderr.contains("stack.toml"), "{stderr}");
+    let (_, stderr) = succeeds(&mut farnear(&["measure", "region", &result]));
+    assert!(!stderr.contains("taken as mm"), "{stderr}");
+    let file = format!("{result}/depth.npy");
+    fails(&mut farnear(&["report", &file, "--out", &folder.text("report.html")]), 2, &["the folder of"]);
+}
+
+/// The peak of the program's memory, MB.
+#[cfg(target_os = "linux")]
+fn peak_mb(arguments: &[&str]) -> f64 {
+    let mut child = std::process::Command::new(env!("CARGO_BIN_EXE_farnear"))
+        .args(arguments)
+        .stdout(std::process::Stdio::null())
+        .spawn()
+        .expect("the program starts");
+    let mut peak_kb = 0.0;
+    loop {
+        let status = fs::read_to_string(format!("/proc/{}/status", child.id())).unwrap_or_default();
+        let high_water = status.lines().find_map(|line| line.strip_prefix("VmHWM:"));
+        peak_kb =
+            high_water.and_then(|text| text.trim().strip_suffix(" kB")?.parse().ok()).unwrap_or(peak_kb);
+        match child.try_wait().expect("a child") {
+            Some(status) => {
+                assert!(status.success(), "{arguments:?}: {status}");
+                return peak_kb / 1024.0;
+            }
+            None => std::thread::sleep(std::time::Duration::from_millis(2)),
+        }
+    }
+}
+
+/// Images are in memory one at a time: 160 of 0.1 MP would have 64 MB, as their sharpness has.
+#[cfg(target_os = "linux")]
+#[test]
+fn memory_does_not_grow_with_the_images_of_a_stack() {
+    use tiff::encoder::{TiffEncoder, colortype::Gray16};
+
+    const COUNT: usize = 160;
+    let folder = Folder::new();
+    let (stack, out) = (folder.text("stack.tif"), folder.text("out"));
+    let mut file = std::io::BufWriter::new(fs::File::create(&stack).expect("a file"));
+    let mut pages = TiffEncoder::new(&mut file).expect("a TIFF");
+    for number in 0..COUNT {
+        let contrast = (-((number as f32 - 70.3) / 50.0).powi(2)).exp();
+        let texture = |at: usize| (at.wrapping_mul(0x9e37_79b1) >> 16 & 0xff) as f32 / 255.0 - 0.5;
+        let pixels: Vec<u16> =
+            (0..100_000).map(|at| (30_000.0 + 40_000.0 * contrast * texture(at)) as u16).collect();
+        pages.write_image::<Gray16>(400, 250, &pixels).expect("a page");
+    }
+    drop(file);
+    let quick = ["--use-all", "--guided-px", "0", "--median-px", "1", "--smoothing-px", "0"];
+    let peak = peak_mb(&[&["focus-stack", &stack, "--out", &out][..], &quick].concat());
+    // 64 MB of sharpness and 25 MB for the program and its maps.
+    assert!(peak < 120.0, "{peak} MB");
+}
+
+/// A pair of 201 MP needs as many bytes per pixel as one of 4 MP.
+#[cfg(target_os = "linux")]
+#[test]
+fn the_memory_of_a_pair_is_bounded_per_pixel() {
+    let folder = Folder::new();
+    let peak = |side: usize| {
+        let [far, near] = [("far", 90.0), ("near", 100.0)].map(|(name, contrast)| {
+            let pixels = Array2::from_shape_fn((side, side), |(y, x)| {
+                let (x, y) = (x / 3, y / 3);
+                let texture = ((x * 7919 + y * 104_729 + x * y * 31) % 97) as f32 / 97.0 - 0.5;
+                (128.0 + contrast * texture) as u16
+            });
+            let png = image_file::encode_png(pixels.view(), 8).expect("a picture");
+            folder.file(&format!("{name}-{side}.png"), png)
+        });
+        let out = folder.text(&format!("out-{side}"));
+        peak_mb(&["depth", &far, &near, "--optics", rig_optics(), "--out", &out])
+    };
+    let per_pixel = (peak(2000) - peak(1000)) * f64::from(1 << 20) / 3e6;
+    // 33 bytes today: both images, their moments, the maps, and the files at work.
+    assert!(per_pixel < 45.0, "{per_pixel} bytes");
+}

@@ -61,15 +61,52 @@ pub(super) fn jpeg_has_its_end(bytes: &[u8]) -> bool {
     }
 }
 
+/// Why a JPEG of this coding is not read (T.81, table B.1; JPEG-LS), from the marker and precision of its frame.
+pub(super) fn unsupported_jpeg(bytes: &[u8]) -> Option<String> {
+    let mut at = 2;
+    loop {
+        let (marker, length) = match *bytes.get(at..at + 4)? {
+            [0xff, 0xff, ..] => {
+                at += 1;
+                continue;
+            }
+            [0xff, marker, high, low] => (marker, usize::from(u16::from_be_bytes([high, low]))),
+            _ => return None,
+        };
+        let coding = match marker {
+            0xc0..=0xc2 if bytes.get(at + 4)? == &8 => return None,
+            0xc0..=0xc2 => &format!("a JPEG of {} bits", bytes[at + 4]),
+            0xc3 | 0xc7 | 0xcb | 0xcf => "a lossless JPEG",
+            0xc5 | 0xc6 | 0xcd | 0xce => "a hierarchical JPEG",
+            0xc9 | 0xca => "a JPEG with arithmetic coding",
+            0xf7 => "JPEG-LS",
+            0xd9 | 0xda => return None,
+            _ => {
+                at += 2 + length;
+                continue;
+            }
+        };
+        return Some(format!("it is {coding}, which is not read: convert it to PNG or TIFF"));
+    }
+}
+
+/// Number of images of an animated PNG (chunk acTL), else 1.
+pub(super) fn png_images(bytes: &[u8]) -> u32 {
+    png_chunk(bytes, b"acTL").and_then(|data| Some(u32::from_be_bytes(*data.first_chunk()?))).unwrap_or(1)
+}
+
 /// Significant bits of a PNG's first channel (chunk sBIT), if given.
 pub(super) fn png_significant_bits(bytes: &[u8]) -> Option<u8> {
+    png_chunk(bytes, b"sBIT")?.first().copied().filter(|bits| (1..=16).contains(bits))
+}
+
+/// Data of a chunk before the pixels.
+fn png_chunk<'a>(bytes: &'a [u8], name: &[u8; 4]) -> Option<&'a [u8]> {
     let mut at = 8;
     loop {
         let length = u32::from_be_bytes(bytes.get(at..at + 4)?.try_into().ok()?) as usize;
         match bytes.get(at + 4..at + 8)? {
-            b"sBIT" => {
-                return bytes.get(at + 8).copied().filter(|bits| (1..=16).contains(bits) && length > 0);
-            }
+            found if found == name => return bytes.get(at + 8..at.checked_add(length)?.checked_add(8)?),
             b"IDAT" | b"IEND" => return None,
             _ => at = at.checked_add(length)?.checked_add(12)?,
         }

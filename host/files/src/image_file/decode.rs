@@ -41,29 +41,28 @@ pub(crate) struct Decoded {
     pub white_level: Option<u16>,
 }
 
-pub(super) fn most_bytes(file: usize) -> u64 {
-    SMALL_BYTES.max((file as u64).saturating_mul(EXPANSION))
+pub(super) fn most_bytes(file: u64) -> u64 {
+    SMALL_BYTES.max(file.saturating_mul(EXPANSION))
 }
 
-/// Decodes the only image, or this page (from 1).
-pub(crate) fn decode(bytes: &[u8], page: Option<usize>) -> Result<Decoded, String> {
+/// Decodes the only image.
+pub(crate) fn decode(bytes: &[u8]) -> Result<Decoded, String> {
     if let Some(advice) = complete::unsupported(bytes) {
         return Err(advice.into());
     }
-    let (decoded, orientation) = if tiff_tags::is_tiff(bytes) {
-        tiff_file::decode(bytes, page)?
-    } else {
-        if page.is_some_and(|page| page != 1) {
-            return Err("it has one image: only TIFF files have pages".into());
-        }
-        if bytes.starts_with(b"\xff\xd8") { jpeg(bytes)? } else { other(bytes)? }
-    };
+    if tiff_tags::is_tiff(bytes) {
+        return tiff_file::decode(bytes);
+    }
+    let (decoded, orientation) = if bytes.starts_with(b"\xff\xd8") { jpeg(bytes)? } else { other(bytes)? };
     Ok(decoded.turned(orientation))
 }
 
 fn jpeg(bytes: &[u8]) -> Result<(Decoded, u8), String> {
     const INCOMPLETE: &str =
         "it is incomplete: the data end before the image does; copy it again from the camera";
+    if let Some(advice) = complete::unsupported_jpeg(bytes) {
+        return Err(advice);
+    }
     if !complete::jpeg_has_its_end(bytes) {
         return Err(INCOMPLETE.into());
     }
@@ -79,7 +78,7 @@ fn jpeg(bytes: &[u8]) -> Result<(Decoded, u8), String> {
     let info = decoder.info().ok_or("it has no header")?;
     let (width, height) = (usize::from(info.width), usize::from(info.height));
     let pixels = (width * height * channels) as u64;
-    if pixels > most_bytes(bytes.len()) {
+    if pixels > most_bytes(bytes.len() as u64) {
         return Err(INCOMPLETE.into());
     }
     let values = decoder.decode().map_err(broken)?;
@@ -106,16 +105,20 @@ fn needs_more(bytes: &[u8], values: &[u8], options: DecoderOptions, to: ColorSpa
 fn other(bytes: &[u8]) -> Result<(Decoded, u8), String> {
     let format =
         image::guess_format(bytes).map_err(|_| "its first bytes match none of these formats".to_string())?;
+    let images = if format == ImageFormat::Png { complete::png_images(bytes) } else { 1 };
+    if images > 1 {
+        return Err(format!("it is an animation of {images} images: store each as a file"));
+    }
     let mut reader = ImageReader::with_format(Cursor::new(bytes), format);
     reader.no_limits();
     let mut decoder = reader.into_decoder().map_err(|error| error.to_string())?;
-    if decoder.total_bytes() > most_bytes(bytes.len()) {
+    if decoder.total_bytes() > most_bytes(bytes.len() as u64) {
         let (width, height) = decoder.dimensions();
         return Err(format!("it is incomplete: {} bytes cannot hold {width}x{height} px", bytes.len()));
     }
     // The decoded size was checked; the decoder's buffers are of that size.
     let mut limits = Limits::no_limits();
-    limits.max_alloc = Some(2 * most_bytes(bytes.len()));
+    limits.max_alloc = Some(2 * most_bytes(bytes.len() as u64));
     decoder.set_limits(limits).map_err(|error| error.to_string())?;
     let (exif, xmp) = metadata::of_decoder(&mut decoder, bytes);
     let orientation = metadata::orientation(exif.as_deref(), xmp.as_deref());
@@ -206,7 +209,7 @@ impl Decoded {
     }
 
     /// Applies an EXIF orientation (1 to 8).
-    fn turned(mut self, orientation: u8) -> Self {
+    pub(super) fn turned(mut self, orientation: u8) -> Self {
         if !(2..=8).contains(&orientation) {
             return self;
         }

@@ -51,19 +51,23 @@ fn raw_profile(bytes: &[u8]) -> Option<Vec<u8>> {
 
 /// Time of the exposure, `2026:11:25 20:15:03`, with the fraction of a second where it is stated.
 pub(crate) fn taken(path: &Path) -> Option<String> {
-    let bytes = std::fs::read(path).ok()?;
-    let exif = if tiff_tags::is_tiff(&bytes) {
-        bytes
+    exposure_time(&std::fs::read(path).ok()?)
+}
+
+/// [`taken`] of a file's contents; later times are larger.
+pub fn exposure_time(bytes: &[u8]) -> Option<String> {
+    let exif = if tiff_tags::is_tiff(bytes) {
+        bytes.to_vec()
     } else if bytes.starts_with(b"\xff\xd8") {
-        let mut decoder = JpegDecoder::new(ZCursor::new(&bytes));
+        let mut decoder = JpegDecoder::new(ZCursor::new(bytes));
         decoder.decode_headers().ok()?;
         decoder.exif()?.clone()
     } else {
-        let format: ImageFormat = image::guess_format(&bytes).ok()?;
-        let mut decoder = ImageReader::with_format(Cursor::new(&bytes), format).into_decoder().ok()?;
-        of_decoder(&mut decoder, &bytes).0?
+        let format: ImageFormat = image::guess_format(bytes).ok()?;
+        let mut decoder = ImageReader::with_format(Cursor::new(bytes), format).into_decoder().ok()?;
+        of_decoder(&mut decoder, bytes).0?
     };
-    let directory = tiff_tags::directories(&exif).ok()?.into_iter().next()?;
+    let directory = tiff_tags::directories(exif.as_slice()).ok()?.into_iter().next()?;
     let exposed = directory.exposed.or(directory.date_time)?;
     Some(exposed + "." + directory.exposed_fraction.as_deref().unwrap_or_default())
 }

@@ -1,6 +1,10 @@
 //! TIFF pages and their pixels.
 
-use std::{io::Cursor, path::Path};
+use std::{
+    fs::File,
+    io::{BufReader, Cursor, Read, Seek},
+    path::{Path, PathBuf},
+};
 
 use tiff::{
     ColorType,
@@ -10,12 +14,14 @@ use tiff::{
 use super::{
     ImageError, complete,
     decode::{Decoded, Values, most_bytes},
-    read_bytes,
-    tiff_tags::{self, Directory},
+    tiff_tags::{self, Directory, InFile, Source},
 };
 
 /// Colour filter array and linear raw (TIFF/EP, DNG).
 const RAW_PHOTOMETRIC: [u64; 2] = [32803, 34892];
+
+/// Enough for the names of formats.
+const HEAD_BYTES: u64 = 32;
 
 #[derive(Debug, Clone)]
 pub(crate) struct Page {
@@ -23,18 +29,49 @@ pub(crate) struct Page {
     pub directory: Directory,
 }
 
+/// A TIFF file whose pages are read one at a time.
+pub(crate) struct Pages {
+    path: PathBuf,
+    size: u64,
+    pub pages: Vec<Page>,
+}
+
+impl Pages {
+    /// `None` for other formats and those that [`super::decode`] refuses. Fails for raw files and mere previews.
+    pub fn open(path: &Path) -> Result<Option<Self>, ImageError> {
+        let failed = |source| ImageError::Read { path: path.into(), source };
+        let file = InFile::open(path).map_err(failed)?;
+        let head = file.read(0, HEAD_BYTES).unwrap_or_default();
+        if !tiff_tags::is_tiff(&head) || complete::unsupported(&head).is_some() {
+            return Ok(None);
+        }
+        let pages = pages(&file).map_err(|reason| ImageError::Format { path: path.into(), reason })?;
+        Ok(Some(Self { path: path.into(), size: file.size(), pages }))
+    }
+
+    /// Decodes page `number` (from 1).
+    pub fn decode(&self, number: usize) -> Result<Decoded, ImageError> {
+        let file =
+            File::open(&self.path).map_err(|source| ImageError::Read { path: self.path.clone(), source })?;
+        let page = number.checked_sub(1).and_then(|index| self.pages.get(index)).ok_or_else(|| {
+            format!("it has no page {number}: pages are numbered from 1 to {}", self.pages.len())
+        });
+        let decoded = page.and_then(|page| decode_page(BufReader::new(file), self.size, page));
+        decoded.map_err(|reason| {
+            let path = format!("{}#{number}", self.path.display()).into();
+            ImageError::Format { path, reason }
+        })
+    }
+}
+
 /// Number of full-resolution images; 1 for other formats. Fails for raw files and mere previews.
 pub fn page_count(path: &Path) -> Result<usize, ImageError> {
-    let bytes = read_bytes(path)?;
-    if !tiff_tags::is_tiff(&bytes) || complete::unsupported(&bytes).is_some() {
-        return Ok(1);
-    }
-    pages(&bytes).map(|pages| pages.len()).map_err(|reason| ImageError::Format { path: path.into(), reason })
+    Ok(Pages::open(path)?.map_or(1, |file| file.pages.len()))
 }
 
 /// Full-resolution images. Fails for raw files, or previews only.
-pub(crate) fn pages(bytes: &[u8]) -> Result<Vec<Page>, String> {
-    let directories = tiff_tags::directories(bytes)?;
+fn pages<S: Source + ?Sized>(source: &S) -> Result<Vec<Page>, String> {
+    let directories = tiff_tags::directories(source)?;
     let Some(first) = directories.first() else { return Err("it holds no image".into()) };
     if directories.iter().any(|d| d.is_dng || RAW_PHOTOMETRIC.contains(&d.photometric)) {
         return Err(complete::RAW.into());
@@ -66,31 +103,21 @@ pub(crate) fn pages(bytes: &[u8]) -> Result<Vec<Page>, String> {
     Ok(pages)
 }
 
-/// Decodes the only page, or page `number` (from 1), with its orientation.
-pub(super) fn decode(bytes: &[u8], number: Option<usize>) -> Result<(Decoded, u8), String> {
+/// Decodes the only page.
+pub(super) fn decode(bytes: &[u8]) -> Result<Decoded, String> {
     let pages = pages(bytes)?;
-    let page = match number {
-        Some(number) => number.checked_sub(1).and_then(|index| pages.get(index)).ok_or_else(|| {
-            format!("it has no page {number}: pages are numbered from 1 to {}", pages.len())
-        })?,
-        None if pages.len() == 1 => &pages[0],
-        None => {
-            let sizes: Vec<String> = pages
-                .iter()
-                .take(3)
-                .map(|p| format!("{}x{}", p.directory.width, p.directory.height))
-                .collect();
-            return Err(format!(
-                "it holds {} images ({}{}): name one as FILE#1 to FILE#{}, or measure all of them with `farnear focus-stack`",
-                pages.len(),
-                sizes.join(", "),
-                if pages.len() > 3 { ", ..." } else { "" },
-                pages.len()
-            ));
-        }
-    };
-    let decoded = decode_page(bytes, page)?;
-    Ok((decoded, page.directory.orientation as u8))
+    if let [page] = pages.as_slice() {
+        return decode_page(Cursor::new(bytes), bytes.len() as u64, page);
+    }
+    let sizes: Vec<String> =
+        pages.iter().take(3).map(|p| format!("{}x{}", p.directory.width, p.directory.height)).collect();
+    Err(format!(
+        "it holds {} images ({}{}): name one as FILE#1 to FILE#{}, or measure all of them with `farnear focus-stack`",
+        pages.len(),
+        sizes.join(", "),
+        if pages.len() > 3 { ", ..." } else { "" },
+        pages.len()
+    ))
 }
 
 fn compression(code: u64) -> String {
@@ -108,44 +135,85 @@ fn compression(code: u64) -> String {
     format!("{name} compression")
 }
 
-fn decode_page(bytes: &[u8], page: &Page) -> Result<Decoded, String> {
-    let Directory { width, height, samples_per_pixel, bits, .. } = page.directory;
-    if !matches!(page.directory.compression, 1 | 5 | 8 | 32773 | 32946) {
-        return Err(format!(
+/// Kinds of pages that are not read, with what to do.
+fn unsupported(page: &Directory) -> Option<String> {
+    let &Directory { bits, sample_format, photometric, .. } = page;
+    if !matches!(page.compression, 1 | 5 | 8 | 32773 | 32946) {
+        return Some(format!(
             "its {} is not read: store it uncompressed, with LZW or with deflate (`tiffcp -c lzw`)",
-            compression(page.directory.compression)
+            compression(page.compression)
         ));
     }
-    if page.directory.fill_order == 2 {
-        return Err("its bits are in reverse order (FillOrder 2), which is not read: rewrite it (`tiffcp -f msb2lsb`)".into());
+    if page.fill_order == 2 {
+        return Some("its bits are in reverse order (FillOrder 2), which is not read: rewrite it (`tiffcp -f msb2lsb`)".into());
+    }
+    if page.image_depth > 1 {
+        return Some(format!(
+            "its page is a volume of {} slices, which is not read: store each slice as a page",
+            page.image_depth
+        ));
     }
     // The decoder does not expect these.
-    if page.directory.planar == 2 && samples_per_pixel > 1 && page.directory.tile_width.is_some() {
-        return Err(
+    if page.planar == 2 && page.samples_per_pixel > 1 && page.tile_width.is_some() {
+        return Some(
             "its channels are separate planes in tiles, which is not read: store it in strips (`tiffcp -s`)"
                 .into(),
         );
     }
-    let decoded_bytes = (width * height).saturating_mul(samples_per_pixel).saturating_mul(bits.max(8) / 8);
-    if decoded_bytes > most_bytes(bytes.len()) {
-        return Err(format!("it is incomplete: {} bytes cannot hold {width}x{height} px", bytes.len()));
+    let colours = match photometric {
+        0..=2 => None,
+        3 => Some("colours from a palette".into()),
+        5 => Some("CMYK colours".into()),
+        6 => Some("YCbCr colours".into()),
+        8..=10 => Some("L*a*b* colours".into()),
+        32844 | 32845 => Some("logarithmic colours".into()),
+        other => Some(format!("colours of kind {other} (PhotometricInterpretation)")),
+    };
+    if let Some(colours) = colours {
+        return Some(format!("it has {colours}, which are not read: convert it to grey or RGB"));
     }
-    let say = |error: tiff::TiffError| error.to_string();
+    match (sample_format, bits) {
+        (2, _) => Some(
+            "its samples are signed integers, whose black and white are not known: convert it to float or unsigned integers"
+                .into(),
+        ),
+        (5 | 6, _) => Some("its samples are complex numbers: store their magnitude as float".into()),
+        (3, 16 | 32 | 64) if photometric == 0 => {
+            Some("its white is 0, which float samples do not define: store it with black as 0".into())
+        }
+        (3, 16 | 32 | 64) | (0 | 1 | 4, 8 | 16 | 32) => None,
+        (0 | 1 | 4, 1 | 2 | 4) if page.samples_per_pixel == 1 => None,
+        _ => Some(format!(
+            "its samples have {bits} bits, of which 8, 16 and 32 are read, and 1, 2 and 4 in grey: convert it to 16 bits"
+        )),
+    }
+}
+
+/// A page of a file of this size, upright.
+fn decode_page(file: impl Read + Seek, size: u64, page: &Page) -> Result<Decoded, String> {
+    if let Some(advice) = unsupported(&page.directory) {
+        return Err(advice);
+    }
+    let Directory { width, height, samples_per_pixel, bits, .. } = page.directory;
+    let decoded_bytes = (width * height).saturating_mul(samples_per_pixel).saturating_mul(bits.max(8) / 8);
+    if decoded_bytes > most_bytes(size) {
+        return Err(format!("it is incomplete: {size} bytes cannot hold {width}x{height} px"));
+    }
+    let say = |error: tiff::TiffError| format!("{error}; rewrite it, for instance with `tiffcp -c lzw`");
     let mut limits = Limits::default();
-    limits.decoding_buffer_size = usize::try_from(most_bytes(bytes.len())).unwrap_or(usize::MAX);
+    limits.decoding_buffer_size = usize::try_from(most_bytes(size)).unwrap_or(usize::MAX);
     limits.intermediate_buffer_size = limits.decoding_buffer_size;
-    limits.ifd_value_size = bytes.len().max(1 << 20);
-    let mut decoder = Decoder::new(Cursor::new(bytes)).map_err(say)?.with_limits(limits);
+    limits.ifd_value_size = usize::try_from(size).unwrap_or(usize::MAX).max(1 << 20);
+    let mut decoder = Decoder::new(file).map_err(say)?.with_limits(limits);
     if page.index > 0 {
         decoder.seek_to_image(page.index).map_err(say)?;
     }
     let colour = decoder.colortype().map_err(say)?;
     let alpha = matches!(page.directory.extra_samples, Some(1 | 2));
-    let (channels, colours) = match colour {
-        ColorType::Gray(_) => (1, 1),
-        ColorType::GrayA(_) | ColorType::Multiband { num_samples: 2, .. } if alpha => (2, 1),
-        ColorType::RGB(_) => (3, 3),
-        ColorType::RGBA(_) => (4, 3),
+    let colours = match colour {
+        ColorType::Gray(_) => 1,
+        ColorType::GrayA(_) | ColorType::Multiband { num_samples: 2, .. } if alpha => 1,
+        ColorType::RGB(_) | ColorType::RGBA(_) => 3,
         ColorType::Multiband { num_samples, .. } => {
             return Err(format!(
                 "it has {num_samples} channels that are not colours: store one channel as grey"
@@ -153,14 +221,25 @@ fn decode_page(bytes: &[u8], page: &Page) -> Result<Decoded, String> {
         }
         other => return Err(format!("its pixels are {other:?}: convert it to grey or RGB")),
     };
-    // Extra samples other than alpha count as channels.
-    let channels = channels.max(samples_per_pixel as usize);
+    // The decoder leaves out extra samples other than alpha, which it does right only here.
+    let extra = samples_per_pixel > u64::from(colour.num_samples());
+    if extra
+        && page.directory.planar != 2
+        && (page.directory.tile_width.is_some() || page.directory.predictor > 1)
+    {
+        return Err(format!(
+            "it has {samples_per_pixel} samples per pixel, of which the last have no stated meaning (ExtraSamples 0): store it \
+             as RGB, or in strips without a predictor"
+        ));
+    }
     let mut data = DecodingResult::U8(Vec::new());
     let layout = decoder.read_image_to_buffer(&mut data).map_err(say)?;
     if data.as_buffer(0).byte_len() < layout.complete_len {
-        return Err(format!("its {width}x{height} px in {channels} planes are more than it can hold"));
+        return Err(format!("its {width}x{height} px in {} planes are more than it can hold", layout.planes));
     }
     let planes = if layout.plane_stride.is_some() && layout.planes > 1 { layout.planes } else { 1 };
+    // Extra planes are not left out.
+    let channels = if planes > 1 { planes } else { usize::from(colour.num_samples()) };
     let (width, height) = (width as usize, height as usize);
     let values = match data {
         DecodingResult::U8(v) if matches!(colour.bit_depth(), 1 | 2 | 4) && planes == 1 && channels == 1 => {
@@ -175,20 +254,11 @@ fn decode_page(bytes: &[u8], page: &Page) -> Result<Decoded, String> {
         DecodingResult::F16(v) => Values::F32(interleaved(v, planes).into_iter().map(f32::from).collect()),
         DecodingResult::F32(v) => Values::F32(interleaved(v, planes)),
         DecodingResult::F64(v) => Values::F32(interleaved(v, planes).into_iter().map(|v| v as f32).collect()),
-        DecodingResult::I8(_) | DecodingResult::I16(_) | DecodingResult::I32(_) | DecodingResult::I64(_) => {
-            return Err("its samples are signed integers, whose black and white are not known: convert it to float or \
-                        unsigned integers"
-                .into());
-        }
-        _ => {
-            return Err(format!(
-                "its samples have {} bits; 1, 2, 4, 8, 16 and 32 are read",
-                colour.bit_depth()
-            ));
-        }
+        _ => return Err(format!("its samples are {colour:?}: convert it to grey or RGB of 8 or 16 bits")),
     };
     let white_level = camera_white(&page.directory);
-    Ok(Decoded { width, height, channels, colours, values, white_level })
+    let decoded = Decoded { width, height, channels, colours, values, white_level };
+    Ok(decoded.turned(page.directory.orientation as u8))
 }
 
 /// Saturation code from the description (as written by farnear), or the maximum sample value below 16 bits.

@@ -1,11 +1,78 @@
-//! TIFF directories without pixels: sizes, kinds and descriptions (TIFF 6.0, section 2; BigTIFF as in libtiff). The
+//! TIFF directories without pixels, from memory or a file: sizes, kinds and descriptions (TIFF 6.0, section 2; BigTIFF as in libtiff). The
 //! `tiff` crate rejects files such as raw files, whose kind error messages need.
+
+use std::{
+    borrow::Cow,
+    cell::RefCell,
+    fs,
+    io::{self, Read, Seek, SeekFrom},
+    path::Path,
+};
 
 const DIRECTORIES_MAX: usize = 100_000;
 const ENTRIES_MAX: u64 = 4096;
 /// OME-XML of large stacks has megabytes.
 const TEXT_MAX: u64 = 64 << 20;
 const SUB_IMAGES_MAX: usize = 16;
+const BLOCK_BYTES: u64 = 1 << 16;
+
+/// Contents of a file, by places.
+pub(crate) trait Source {
+    fn size(&self) -> u64;
+    /// Up to this many bytes, fewer only at the end.
+    fn read(&self, at: u64, length: u64) -> Option<Cow<'_, [u8]>>;
+}
+
+impl Source for [u8] {
+    fn size(&self) -> u64 {
+        self.len() as u64
+    }
+
+    fn read(&self, at: u64, length: u64) -> Option<Cow<'_, [u8]>> {
+        let end = at.checked_add(length)?.min(self.size());
+        Some(self.get(usize::try_from(at).ok()?..end as usize)?.into())
+    }
+}
+
+/// A file, of which the last block is in memory.
+pub(crate) struct InFile {
+    file: fs::File,
+    size: u64,
+    block: RefCell<(u64, Vec<u8>)>,
+}
+
+impl InFile {
+    pub fn open(path: &Path) -> io::Result<Self> {
+        let file = fs::File::open(path)?;
+        Ok(Self { size: file.metadata()?.len(), file, block: RefCell::new((0, Vec::new())) })
+    }
+
+    fn at(&self, at: u64, length: u64) -> io::Result<Vec<u8>> {
+        let mut bytes = Vec::new();
+        (&self.file).seek(SeekFrom::Start(at))?;
+        (&self.file).take(length).read_to_end(&mut bytes)?;
+        Ok(bytes)
+    }
+}
+
+impl Source for InFile {
+    fn size(&self) -> u64 {
+        self.size
+    }
+
+    fn read(&self, at: u64, length: u64) -> Option<Cow<'_, [u8]>> {
+        let length = length.min(self.size.checked_sub(at)?);
+        if length > BLOCK_BYTES {
+            return Some(self.at(at, length).ok()?.into());
+        }
+        let mut block = self.block.borrow_mut();
+        if at < block.0 || at + length > block.0 + block.1.len() as u64 {
+            *block = (at, self.at(at, BLOCK_BYTES).ok()?);
+        }
+        let from = (at - block.0) as usize;
+        Some(block.1.get(from..from + length as usize)?.to_vec().into())
+    }
+}
 
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct Directory {
@@ -19,12 +86,18 @@ pub(crate) struct Directory {
     /// Tag 266: 2 = the lowest bit of a byte comes first.
     pub fill_order: u64,
     pub planar: u64,
+    /// Tag 317: 1 = none.
+    pub predictor: u64,
     /// Tag 322.
     pub tile_width: Option<u64>,
     /// Tag 274, 1 to 8.
     pub orientation: u64,
     pub samples_per_pixel: u64,
     pub bits: u64,
+    /// Tag 339: 1 = unsigned, 2 = signed, 3 = float, 5 and 6 = complex.
+    pub sample_format: u64,
+    /// Tag 32997: slices of a volume in one page.
+    pub image_depth: u64,
     pub compression: u64,
     pub strip_offset: u64,
     pub strips: u64,
@@ -55,13 +128,14 @@ impl Directory {
     }
 }
 
+/// From the first four bytes.
 pub(crate) fn is_tiff(bytes: &[u8]) -> bool {
     [b"II*\0", b"MM\0*", b"II+\0", b"MM\0+"].iter().any(|magic| bytes.starts_with(*magic))
 }
 
 /// All directories in file order. Fails for a directory beyond the end, or an endless chain.
-pub(crate) fn directories(bytes: &[u8]) -> Result<Vec<Directory>, String> {
-    let file = File::new(bytes)?;
+pub(crate) fn directories<S: Source + ?Sized>(source: &S) -> Result<Vec<Directory>, String> {
+    let file = File::new(source)?;
     let mut at = file.first;
     let mut seen = std::collections::HashSet::new();
     let mut found = Vec::new();
@@ -77,17 +151,17 @@ pub(crate) fn directories(bytes: &[u8]) -> Result<Vec<Directory>, String> {
     Ok(found)
 }
 
-struct File<'a> {
-    bytes: &'a [u8],
+struct File<'a, S: ?Sized> {
+    source: &'a S,
     little: bool,
     big: bool,
     first: u64,
 }
 
-impl<'a> File<'a> {
-    fn new(bytes: &'a [u8]) -> Result<Self, String> {
-        let little = bytes.starts_with(b"II");
-        let mut file = Self { bytes, little, big: false, first: 0 };
+impl<'a, S: Source + ?Sized> File<'a, S> {
+    fn new(source: &'a S) -> Result<Self, String> {
+        let little = source.read(0, 2).is_some_and(|order| *order == *b"II");
+        let mut file = Self { source, little, big: false, first: 0 };
         file.big = file.number(2, 2) == Some(43);
         let first = if file.big { file.number(8, 8) } else { file.number(4, 4) };
         file.first = first.ok_or("it ends within its header")?;
@@ -95,8 +169,7 @@ impl<'a> File<'a> {
     }
 
     fn number(&self, at: u64, size: usize) -> Option<u64> {
-        let at = usize::try_from(at).ok()?;
-        let bytes = self.bytes.get(at..at.checked_add(size)?)?;
+        let bytes = self.source.read(at, size as u64).filter(|bytes| bytes.len() == size)?;
         let shift = |value: u64, byte: &u8| value << 8 | u64::from(*byte);
         Some(if self.little { bytes.iter().rev().fold(0, shift) } else { bytes.iter().fold(0, shift) })
     }
@@ -113,6 +186,9 @@ impl<'a> File<'a> {
             orientation: 1,
             samples_per_pixel: 1,
             bits: 1,
+            sample_format: 1,
+            predictor: 1,
+            image_depth: 1,
             compression: 1,
             ..Directory::default()
         };
@@ -138,10 +214,8 @@ impl<'a> File<'a> {
         let place = if fits { field } else { self.number(field, inline)? };
         let value = |index: u64| self.number(place.checked_add(index * size as u64)?, size);
         let text = || {
-            let from = usize::try_from(place).ok()?;
-            let to = from.checked_add(usize::try_from(count.min(TEXT_MAX)).ok()?)?;
-            let text = self.bytes.get(from..to.min(self.bytes.len()))?;
-            Some(String::from_utf8_lossy(text).trim_end_matches('\0').to_owned())
+            let text = self.source.read(place, count.min(TEXT_MAX))?;
+            Some(String::from_utf8_lossy(&text).trim_end_matches('\0').to_owned())
         };
         let first = || value(0).unwrap_or(0);
         match tag {
@@ -154,6 +228,7 @@ impl<'a> File<'a> {
             262 => directory.photometric = first(),
             266 => directory.fill_order = first(),
             284 => directory.planar = first(),
+            317 => directory.predictor = first(),
             322 => directory.tile_width = value(0),
             270 => directory.description = text(),
             271 => directory.make = text(),
@@ -180,6 +255,8 @@ impl<'a> File<'a> {
             36867 => directory.exposed = text(),
             37521 => directory.exposed_fraction = text(),
             338 => directory.extra_samples = value(0),
+            339 => directory.sample_format = first(),
+            32997 => directory.image_depth = first(),
             50706 => directory.is_dng = true,
             51123 => directory.micro_manager = text(),
             _ => {}

@@ -1,6 +1,6 @@
 //! Focus positions of TIFF pages by microscopes and ImageJ.
 
-use crate::image_file::Page;
+use crate::image_file::{Page, tiff_tags::Directory};
 
 /// Positions along the axis, um; `None` if not stated. Fails for channels, times or planes in other files.
 pub(super) fn of(pages: &[Page]) -> Result<Option<Vec<f64>>, String> {
@@ -8,6 +8,9 @@ pub(super) fn of(pages: &[Page]) -> Result<Option<Vec<f64>>, String> {
     let description = first.directory.description.as_deref().unwrap_or_default();
     if description.starts_with("ImageJ=") {
         return image_j(description, pages.len());
+    }
+    if let Some(array) = Array::of(description) {
+        return array.check(&first.directory, pages.len()).map(|()| None);
     }
     if let Some(pixels) = description.contains("<OME").then(|| element(description, "Pixels")).flatten() {
         return ome(description, pixels, pages);
@@ -54,11 +57,66 @@ fn image_j(description: &str, pages: usize) -> Result<Option<Vec<f64>>, String> 
     Ok((pages > 1).then(|| (0..pages).map(|page| page as f64 * spacing * micrometres).collect()))
 }
 
+/// An array in the pages, as `tifffile` describes it: `{"shape": [5, 300, 400], "axes": "ZYX"}`; axes are optional.
+struct Array<'a> {
+    shape: Vec<u64>,
+    axes: Option<&'a str>,
+}
+
+impl<'a> Array<'a> {
+    fn of(description: &'a str) -> Option<Self> {
+        if !description.starts_with('{') {
+            return None;
+        }
+        let value = |key| Some(description.split_once(key)?.1.trim_start().strip_prefix(':')?.trim_start());
+        let shape = value("\"shape\"")?.strip_prefix('[')?.split(']').next()?;
+        let shape: Vec<u64> = shape.split(',').map(|size| size.trim().parse().ok()).collect::<Option<_>>()?;
+        let axes = value("\"axes\"").and_then(|text| text.strip_prefix('"')?.split('"').next());
+        Some(Self { axes: axes.filter(|axes| axes.len() == shape.len()), shape })
+    }
+
+    /// Fails if the pages are not images of one focus series.
+    fn check(&self, page: &Directory, pages: usize) -> Result<(), String> {
+        let shape = self.shape.iter().map(u64::to_string).collect::<Vec<_>>().join(" x ");
+        if page.photometric == 2 && page.planar == 2 && !self.axes.is_some_and(|axes| axes.contains('S')) {
+            return Err(format!(
+                "it is an array of {shape} whose {} planes are marked as colours: write focus planes with photometric='minisblack', \
+                 colours with metadata={{'axes': ...}} that has S for their axis",
+                page.samples_per_pixel
+            ));
+        }
+        let per_page = (page.width * page.height).saturating_mul(page.samples_per_pixel).max(1);
+        let images = self.shape.iter().fold(1, |all: u64, size| all.saturating_mul(*size)) / per_page;
+        if images > pages as u64 {
+            return Err(format!(
+                "it is an array of {shape} and lists {pages} of {images} images: write it without truncate=True"
+            ));
+        }
+        let mut product = 1_u64;
+        let series = self.shape.iter().take_while(|size| {
+            let within = product < images;
+            product = product.saturating_mul(**size);
+            within
+        });
+        let axes: Vec<usize> =
+            series.enumerate().filter(|(_, size)| **size > 1).map(|(axis, _)| axis).collect();
+        if axes.len() > 1 {
+            return Err(format!(
+                "it is an array of {shape}, images along {} axes: a stack is one focus series; write one of them",
+                axes.len()
+            ));
+        }
+        let axis = self.axes.zip(axes.first()).and_then(|(axes, axis)| axes.chars().nth(*axis));
+        let size = |letter| if axis == Some(letter) { images as usize } else { 1 };
+        one_series(size('C'), size('T'))
+    }
+}
+
 fn one_series(channels: usize, times: usize) -> Result<(), String> {
     if channels > 1 || times > 1 {
         return Err(format!(
             "it holds {channels} channels and {times} times: a stack is one focus series; split it (ImageJ: Image > Hyperstacks > \
-             Make Subset)"
+             Make Subset). If they are focus planes, make them slices (ImageJ: Image > Properties)"
         ));
     }
     Ok(())
@@ -137,7 +195,6 @@ fn json_number(json: &str, key: &str) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::image_file::tiff_tags::Directory;
 
     fn pages(count: usize, description: &str) -> Vec<Page> {
         let directory = |index| Directory {
@@ -160,6 +217,36 @@ mod tests {
             of(&pages(6, "ImageJ=1.54f\nimages=6\nchannels=2\nslices=3")).unwrap_err().contains("2 channels")
         );
         assert!(of(&pages(1, "ImageJ=1.54f\nimages=900\nslices=900")).unwrap_err().contains("900 images"));
+    }
+
+    #[test]
+    fn an_array_of_several_series_channels_or_colours_is_rejected() {
+        let of_array = |count: usize, page: &Directory, description: &str| {
+            let mut all = pages(count, description);
+            for other in &mut all {
+                other.directory =
+                    Directory { description: other.directory.description.take(), ..page.clone() };
+            }
+            of(&all).map_err(|error| error.split(':').next().unwrap_or_default().to_owned())
+        };
+        let grey =
+            Directory { width: 8, height: 6, samples_per_pixel: 1, photometric: 1, ..Directory::default() };
+        let planes = Directory { photometric: 2, planar: 2, samples_per_pixel: 4, ..grey.clone() };
+        for shape in ["5, 6, 8", "1, 5, 6, 8", "5, 1, 6, 8, 1"] {
+            assert_eq!(of_array(5, &grey, &format!("{{\"shape\": [{shape}]}}")), Ok(None), "{shape}");
+        }
+        assert_eq!(of_array(5, &grey, "{\"shape\": [5, 6, 8], \"axes\": \"ZYX\"}"), Ok(None));
+        let refused = |count, page, text| of_array(count, page, text).unwrap_err();
+        assert!(refused(5, &grey, "{\"shape\": [5, 6, 8], \"axes\": \"CYX\"}").contains("5 channels"));
+        assert!(refused(5, &grey, "{\"shape\": [5, 6, 8], \"axes\": \"TYX\"}").contains("5 times"));
+        assert!(refused(12, &grey, "{\"shape\": [3, 4, 6, 8]}").contains("along 2 axes"));
+        assert!(
+            refused(1, &grey, "{\"shape\": [5, 6, 8], \"truncated\": true}").contains("lists 1 of 5 images")
+        );
+        assert!(refused(3, &planes, "{\"shape\": [3, 4, 6, 8]}").contains("4 planes are marked as colours"));
+        assert_eq!(of_array(3, &planes, "{\"shape\": [3, 4, 6, 8], \"axes\": \"ZSYX\"}"), Ok(None));
+        // Written one by one, each with its own description.
+        assert_eq!(of_array(5, &grey, "{\"shape\": [6, 8]}"), Ok(None));
     }
 
     #[test]

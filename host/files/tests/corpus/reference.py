@@ -15,6 +15,9 @@ def grey(path):
     with Image.open(path) as image:
         if getattr(image, "n_frames", 1) != 1:
             return None
+        # Colour times alpha (TIFF, ExtraSamples 1): Pillow divides, farnear ignores alpha.
+        if 1 in getattr(image, "tag_v2", {}).get(338, ()):
+            return None
         image.load()
         image = ImageOps.exif_transpose(image)
         # Alpha is ignored, palettes are looked up; other colour spaces and 16-bit colour, which Pillow halves, are not compared.

@@ -36,7 +36,7 @@ impl Serialize for DifferenceFigures {
 pub fn difference(first: &Path, second: &Path) -> crate::Result<(Array2<f32>, DifferenceFigures)> {
     let [first, second] = [read_map(first)?, read_map(second)?];
     let unit = shared_unit("difference", &first, &second)?;
-    of_maps(&first.depth, &second.depth, unit)
+    of_maps(&first.depth(unit), &second.depth(unit), unit)
 }
 
 /// The unit of two maps; a map without a record adopts the other's.

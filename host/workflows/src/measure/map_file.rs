@@ -42,23 +42,37 @@ enum Record {
     Stack(Box<StackRecord>),
 }
 
-/// Holes are NaN.
+/// Values of a file, whose holes depend on the unit.
 pub(crate) struct MapFile {
-    pub depth: Array2<f32>,
+    values: Array2<f32>,
     /// `None` without a record.
     pub unit: Option<Unit>,
+}
+
+impl MapFile {
+    /// Depths in this unit; holes are NaN.
+    pub fn depth(self, unit: Unit) -> Array2<f32> {
+        self.values.mapv_into(|value| if unit.is_depth(value) { value } else { f32::NAN })
+    }
 }
 
 pub(crate) fn read_map(path: &Path) -> Result<MapFile> {
     let (file, folder) = file_and_folder(path);
     let record = record_of(&folder)?;
-    depth_of(&file, record.as_ref())
+    values_of(&file, record.as_ref())
+}
+
+/// Whether a record states the unit of a map.
+pub(super) fn has_record(path: &Path) -> Result<bool> {
+    Ok(record_of(&file_and_folder(path).1)?.is_some())
 }
 
 pub(super) fn read(path: &Path) -> Result<Measured> {
     let (file, folder) = file_and_folder(path);
     let record = record_of(&folder)?;
-    let MapFile { depth, unit } = depth_of(&file, record.as_ref())?;
+    let map = values_of(&file, record.as_ref())?;
+    let unit = map.unit.unwrap_or_default();
+    let depth = map.depth(unit);
     let deviation = deviation_of(&file, &folder, depth.dim())?;
     let lateral = match &record {
         Some(Record::Depth(record)) => lens(&record.optics, record.part),
@@ -73,7 +87,7 @@ pub(super) fn read(path: &Path) -> Result<Measured> {
             Err(error) => return Err(error),
         },
     };
-    Ok(Measured { depth, deviation, unit: unit.unwrap_or_default(), lateral })
+    Ok(Measured { depth, deviation, unit, lateral })
 }
 
 fn lens(optics: &Optics, part: Option<Part>) -> Lateral {
@@ -114,7 +128,7 @@ fn record_of(folder: &Path) -> Result<Option<Record>> {
     Ok(None)
 }
 
-fn depth_of(file: &Path, record: Option<&Record>) -> Result<MapFile> {
+fn values_of(file: &Path, record: Option<&Record>) -> Result<MapFile> {
     let unit = record.map(|record| match record {
         Record::Depth(_) => Unit::Mm,
         Record::Stack(stack) => stack.unit,
@@ -127,11 +141,9 @@ fn depth_of(file: &Path, record: Option<&Record>) -> Result<MapFile> {
         let codes = image_file::read_grey(file)?.pixels.mapv(|value| f64::from(value) * f64::from(u16::MAX));
         let depth = |code: f64| (offset_mm + scale_mm * code.round()) as f32;
         let depth = codes.mapv(|code| if code < 0.5 { f32::NAN } else { depth(code) });
-        return Ok(MapFile { depth, unit });
+        return Ok(MapFile { values: depth, unit });
     }
-    let is_depth = |value: f32| unit.unwrap_or_default().is_depth(value);
-    let depth = map::read(file)?.mapv(|value| if is_depth(value) { value } else { f32::NAN });
-    Ok(MapFile { depth, unit })
+    Ok(MapFile { values: map::read(file)?, unit })
 }
 
 fn deviation_of(file: &Path, folder: &Path, dim: (usize, usize)) -> Result<Option<Array2<f32>>> {

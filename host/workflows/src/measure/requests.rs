@@ -1,18 +1,26 @@
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_with::{DisplayFromStr, serde_as};
 
 use super::{
-    DifferenceFigures, Measured, PlaneFigures, ProfileFigures, Rectangle, RegionFigures, difference, profile,
-    region,
+    DifferenceFigures, Measured, PlaneFigures, ProfileFigures, Rectangle, RegionFigures, difference,
+    map_file, profile, region,
 };
 use crate::{
     context::Context,
     error::{Result, WorkflowError},
     request::{PathKind, Request},
 };
+
+fn read(map: &Path, context: &Context<'_>) -> Result<Measured> {
+    if !map_file::has_record(map)? {
+        let reason = "no depth.toml or stack.toml next to it states the unit";
+        context.progress.warn(&format!("the depths of {} are taken as mm: {reason}", map.display()));
+    }
+    Measured::read(map)
+}
 
 /// Measure a region of a depth map: mean, deviation, fill rate, and the plane through it.
 ///
@@ -40,8 +48,8 @@ impl Request for MeasureRegionRequest {
     const PATHS: &'static [(&'static str, PathKind)] = &[("map", PathKind::Input)];
     type Figures = RegionFigures;
 
-    fn run(&self, _: &Context<'_>) -> Result<RegionFigures> {
-        let map = Measured::read(&self.map)?;
+    fn run(&self, context: &Context<'_>) -> Result<RegionFigures> {
+        let map = read(&self.map, context)?;
         region(&map, self.region.unwrap_or_else(|| map.all()))
     }
 }
@@ -108,8 +116,8 @@ impl Request for MeasureProfileRequest {
     const PATHS: &'static [(&'static str, PathKind)] = &[("map", PathKind::Input)];
     type Figures = ProfileFigures;
 
-    fn run(&self, _: &Context<'_>) -> Result<ProfileFigures> {
-        profile(&Measured::read(&self.map)?, self.from.0, self.to.0)
+    fn run(&self, context: &Context<'_>) -> Result<ProfileFigures> {
+        profile(&read(&self.map, context)?, self.from.0, self.to.0)
     }
 }
 

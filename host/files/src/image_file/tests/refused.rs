@@ -118,6 +118,56 @@ fn names_unsupported_formats() {
 }
 
 #[test]
+fn names_unsupported_pixels_of_a_tiff() {
+    let page = || Page::grey(4, 3, 8, vec![0; 96]);
+    let float = || page().with(258, &[32]).with(339, &[3]);
+    for (page, expected) in [
+        (page().with(258, &[12]), "12 bits"),
+        (page().with(258, &[64]), "64 bits"),
+        (page().with(258, &[4; 3]).with(262, &[2]).with(277, &[3]), "4 bits"),
+        (page().with(262, &[3]), "palette"),
+        (page().with(262, &[6]), "YCbCr"),
+        (page().with(258, &[64]).with(339, &[6]), "complex"),
+        (float().with(262, &[0]), "white is 0"),
+        (page().with(32997, &[5]), "volume of 5 slices"),
+    ] {
+        let refused = refusal(&tiff(CLASSIC, &[page]));
+        assert!(refused.contains(expected) && !refused.contains("unsupported"), "{expected}: {refused}");
+    }
+    assert!(decode_grey(&tiff(CLASSIC, &[float()])).is_ok());
+}
+
+#[test]
+fn names_codings_of_jpeg_that_are_not_read() {
+    let whole = jpeg(16, 16);
+    let frame = whole.windows(2).position(|two| two == [0xff, 0xc0]).unwrap();
+    for (marker, bits, expected) in [
+        (0xc9, 8, "arithmetic"),
+        (0xc3, 16, "lossless"),
+        (0xc5, 8, "hierarchical"),
+        (0xc1, 12, "12 bits"),
+        (0xf7, 8, "JPEG-LS"),
+    ] {
+        let mut other = whole.clone();
+        (other[frame + 1], other[frame + 4]) = (marker, bits);
+        let refused = refusal(&other);
+        assert!(refused.contains(expected) && refused.contains("convert"), "{refused}");
+    }
+}
+
+#[test]
+fn rejects_an_animation() {
+    let mut animated = Vec::new();
+    let mut encoder = png::Encoder::new(&mut animated, 2, 1);
+    encoder.set_animated(2, 0).unwrap();
+    let mut writer = encoder.write_header().unwrap();
+    writer.write_image_data(&[1, 2]).unwrap();
+    writer.write_image_data(&[3, 4]).unwrap();
+    writer.finish().unwrap();
+    assert!(refusal(&animated).contains("2 images"));
+}
+
+#[test]
 fn rotates_a_jpeg_by_its_orientation() {
     let plain = decode_grey(&jpeg(48, 32)).unwrap().pixels;
     let turned = decode_grey(&jpeg_turned(48, 32, 6)).unwrap().pixels;

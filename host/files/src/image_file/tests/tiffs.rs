@@ -29,9 +29,30 @@ fn planar_colour_is_read_plane_by_plane() {
     let page = page.with(262, &[2]).with(277, &[3]).with(258, &[8, 8, 8]).with(284, &[2]);
     assert_eq!(read(&tiff(CLASSIC, std::slice::from_ref(&page))), array![[60.0, 60.0]]);
     let settings = ReadSettings { grey: Grey::Green, ..ReadSettings::default() };
-    let green = decode(&tiff(CLASSIC, &[page]), None).unwrap().grey(&settings).unwrap();
+    let green = decode(&tiff(CLASSIC, &[page])).unwrap().grey(&settings).unwrap();
     assert!(green.colour);
     assert_eq!(green.pixels.mapv(|v| (255.0 * v).round()), array![[60.0, 90.0]]);
+}
+
+#[test]
+fn colours_with_a_sample_of_unknown_meaning_are_read() {
+    let pixels = vec![30, 60, 90, 7, 60, 90, 120, 8];
+    let page = Page::grey(2, 1, 8, pixels).with(262, &[2]).with(277, &[4]).with(258, &[8; 4]);
+    for extra in [0, 1, 2] {
+        assert_eq!(
+            read(&tiff(CLASSIC, &[page.clone().with(338, &[extra])])),
+            array![[60.0, 90.0]],
+            "{extra}"
+        );
+    }
+    for (tag, value) in [(317, 2), (322, 16)] {
+        let page = page.clone().with(338, &[0]).with(tag, &[value]);
+        let refused = decode_grey(&tiff(CLASSIC, &[page])).unwrap_err();
+        assert!(refused.contains("ExtraSamples 0"), "{tag}: {refused}");
+    }
+    let planes = [[30_u8, 60], [60, 90], [90, 120], [7, 8]].map(Vec::from).to_vec();
+    let page = Page { strips: planes, ..page.with(284, &[2]).with(338, &[0]) };
+    assert_eq!(read(&tiff(CLASSIC, &[page])), array![[60.0, 90.0]]);
 }
 
 #[test]
@@ -111,13 +132,11 @@ fn finds_the_white_level_of_fewer_bits() {
     assert_eq!(white(Page::grey(6, 1, 16, codes(&[3, 4, 5, 6, 7, 3001])).with(281, &[3001])), None);
     let asked = ReadSettings { white_level: Some(3000), ..ReadSettings::default() };
     let bytes = tiff(CLASSIC, &[Page::grey(2, 1, 16, codes(&[3000, 1500]))]);
-    let image = decode(&bytes, None).unwrap().grey(&asked).unwrap();
+    let image = decode(&bytes).unwrap().grey(&asked).unwrap();
     let image = image.clone().relative_to(image.white_level.unwrap());
     assert_eq!(image.samples, Samples::Integer(12));
     assert!((image.pixels[(0, 1)] - 0.5).abs() < 1e-6 && image.pixels[(0, 0)] == 1.0);
-    assert!(
-        decode(&bytes, None).unwrap().grey(&ReadSettings { white_level: Some(70_000), ..asked }).is_err()
-    );
+    assert!(decode(&bytes).unwrap().grey(&ReadSettings { white_level: Some(70_000), ..asked }).is_err());
 }
 
 #[test]
