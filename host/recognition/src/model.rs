@@ -220,7 +220,7 @@ impl Recogniser {
         views.iter().flat_map(both).map(|view| vec![view]).collect()
     }
 
-    /// The joint answer of several views; without any, nobody is seen.
+    /// The joint answer of several views; empty means that no person is visible.
     pub(super) fn joint(&self, answers: &[Answer]) -> Answer {
         match answers {
             [] => Answer::without_person(&self.activities),
