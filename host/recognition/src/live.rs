@@ -60,13 +60,7 @@ impl<'a> Live<'a> {
         }
         let opinions = self.frames.back().map_or(0, Vec::len);
         let answers: Vec<Answer> = (0..opinions).filter_map(|opinion| self.answer(opinion)).collect();
-        Ok(if answers.is_empty() {
-            Answer::without_person(&self.recogniser.activities)
-        } else if let [one] = answers.as_slice() {
-            one.clone()
-        } else {
-            Answer::joint(&answers)
-        })
+        Ok(self.recogniser.joint(&answers))
     }
 
     fn answer(&self, opinion: usize) -> Option<Answer> {

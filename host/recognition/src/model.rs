@@ -49,9 +49,11 @@ pub struct Recogniser {
     pub views: usize,
     pub space: Space,
     pub classifier: Classifier,
-    /// Squared distance limits to the nearest of [`Self::patterns`]; used without an auxiliary model.
+    /// Limits of the squared distance to the nearest of [`Self::patterns`], or without patterns of the entropy
+    /// of the probabilities, nats; used without an auxiliary model.
     pub limits: Limits,
-    /// Training patterns, or prototypes of them; the outlier score is measured from the nearest.
+    /// Training patterns, or prototypes of them; the outlier score is measured from the nearest. Empty for
+    /// networks, whose probabilities separate unknown clips better than distances do.
     pub patterns: Array2<f32>,
     /// Class of each of [`Self::patterns`] if they are training clips; empty for networks and older models.
     pub labels: Vec<usize>,
@@ -116,6 +118,11 @@ impl Answer {
     }
 }
 
+/// Shannon entropy, nats.
+pub(super) fn entropy(probabilities: impl Iterator<Item = f32>) -> f32 {
+    probabilities.filter(|p| *p > 0.0).map(|p| -p * p.ln()).sum()
+}
+
 fn most_probable(probabilities: &[(String, f32)]) -> Option<&(String, f32)> {
     probabilities.iter().fold(None, |best, next| match best {
         Some((_, share)) if *share >= next.1 => best,
@@ -166,16 +173,15 @@ impl Recogniser {
     /// views that the model does not accept, or cropped silhouettes where it needs full frames.
     pub fn recognise(&self, views: &[Track]) -> Result<Answer, ModelError> {
         self.check(views)?;
-        let mut answers = self
+        let answers = self
             .groups(views)
             .iter()
             .map(|group| Ok(self.answer(self.pattern(group)?.view())))
             .collect::<Result<Vec<Answer>, ModelError>>()?;
-        let answer = match answers.len() {
-            0 => return Ok(Answer::without_person(&self.activities)),
-            1 => answers.swap_remove(0),
-            _ => Answer::joint(&answers),
-        };
+        let answer = self.joint(&answers);
+        if answers.is_empty() {
+            return Ok(answer);
+        }
         let Some(second) = &self.second else { return Ok(answer) };
         let outlier_score = second.outlier_score(&second.recogniser.recognise(views)?, &answer);
         Ok(Answer::of(answer.probabilities, outlier_score))
@@ -214,20 +220,43 @@ impl Recogniser {
         views.iter().flat_map(both).map(|view| vec![view]).collect()
     }
 
+    /// The joint answer of several views; empty means that no person is visible.
+    pub(super) fn joint(&self, answers: &[Answer]) -> Answer {
+        match answers {
+            [] => Answer::without_person(&self.activities),
+            [one] => one.clone(),
+            several => {
+                let joint = Answer::joint(several);
+                let outlier_score = self.entropy_score(&joint.probabilities).unwrap_or(joint.outlier_score);
+                Answer::of(joint.probabilities, outlier_score)
+            }
+        }
+    }
+
+    /// The outlier score of an answer if the model did not have this activity; `None` for models that measure
+    /// distances.
+    pub fn outlier_score_without(&self, answer: &Answer, activity: &str) -> Option<f32> {
+        let others: Vec<String> = self.activities.iter().filter(|name| *name != activity).cloned().collect();
+        self.entropy_score(&answer.among(&others).probabilities)
+    }
+
+    /// Entropy over its limit, which all activities of a network share; `None` with patterns.
+    fn entropy_score(&self, probabilities: &[(String, f32)]) -> Option<f32> {
+        let nats = entropy(probabilities.iter().map(|(_, probability)| *probability));
+        (self.patterns.nrows() == 0).then(|| self.limits.score(0, nats))
+    }
+
     pub(super) fn answer(&self, pattern: ArrayView1<f32>) -> Answer {
         self.answer_by(pattern, self.distance(pattern))
     }
 
     pub(super) fn answer_by(&self, pattern: ArrayView1<f32>, squared_distance: f32) -> Answer {
         let probabilities = self.classifier.probabilities(pattern);
-        let (best, confidence) = largest(&probabilities);
-        let outlier_score = self.limits.score(best, squared_distance);
-        Answer {
-            activity: (outlier_score <= 1.0).then(|| self.activities[best].clone()),
-            confidence,
-            probabilities: self.activities.iter().cloned().zip(probabilities).collect(),
-            outlier_score,
-        }
+        let (best, _) = largest(&probabilities);
+        let probabilities: Vec<(String, f32)> = self.activities.iter().cloned().zip(probabilities).collect();
+        let outlier_score =
+            self.entropy_score(&probabilities).unwrap_or_else(|| self.limits.score(best, squared_distance));
+        Answer::of(probabilities, outlier_score)
     }
 
     pub(super) fn pattern(&self, views: &[Track]) -> Result<Array1<f32>, ModelError> {

@@ -101,6 +101,19 @@ fn the_shipped_models_are_small_and_know_people_they_never_saw() {
     }
 }
 
+#[test]
+fn a_shipped_model_is_less_certain_of_an_activity_removed_from_its_answers() {
+    let model = Recogniser::from_bytes(SHIPPED[0]).expect("whole");
+    let mut lying = few(700_000, 6);
+    lying.retain(|clip| clip.activity == "lie down");
+    for clip in lying {
+        let answer = model.recognise(&clip.views).expect("fits");
+        let without = |activity| model.outlier_score_without(&answer, activity).expect("a network");
+        assert!(answer.outlier_score < 1.0 && without("lie down") > 2.0 * without("wave one hand"));
+        assert!((without("sing") - answer.outlier_score).abs() < 1e-4, "an activity it does not have");
+    }
+}
+
 fn with_auxiliary_model() -> Experiment {
     let other = Recogniser::from_bytes(SHIPPED[0]).expect("whole");
     let space =

@@ -103,7 +103,7 @@ pub fn are_full_frames(masks: &[Mask]) -> bool {
     masks.first().is_some_and(|mask| mask.dim() != (SIDE_PX, SIDE_PX))
 }
 
-/// Appends time, version, set and reason to `openings.csv` in a folder.
+/// Appends time, user, version, set and reason to `openings.csv` in a folder.
 fn record_opening(folder: &Path, path: &Path, reason: &str) -> Result<()> {
     const FILE: &str = "openings.csv";
     let file = folder.join(FILE);
@@ -111,10 +111,12 @@ fn record_opening(folder: &Path, path: &Path, reason: &str) -> Result<()> {
     let quoted = |text: &str| format!("\"{}\"", text.replace('"', "'").replace(['\n', '\r'], " "));
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     let time = crate::clock::now_rfc3339().unwrap_or_default();
-    let line = format!("{time},{},{},{}\n", env!("CARGO_PKG_VERSION"), quoted(&name), quoted(reason));
+    let user = ["USER", "LOGNAME", "USERNAME"].into_iter().find_map(|name| std::env::var(name).ok());
+    let [user, name, reason] = [&user.unwrap_or_default(), &*name, reason].map(quoted);
+    let line = format!("{time},{user},{},{name},{reason}\n", env!("CARGO_PKG_VERSION"));
     let new = !file.exists();
     let mut opened = fs::OpenOptions::new().create(true).append(true).open(&file).map_err(failed)?;
-    let head = if new { "time,version,samples,reason\n" } else { "" };
+    let head = if new { "time,user,version,samples,reason\n" } else { "" };
     Ok(opened.write_all(format!("{head}{line}").as_bytes()).map_err(failed)?)
 }
 
@@ -320,7 +322,7 @@ mod tests {
         }
         let record = fs::read_to_string(openings).expect("a record");
         let lines: Vec<&str> = record.lines().collect();
-        assert_eq!((lines.len(), lines[0]), (3, "time,version,samples,reason"));
+        assert_eq!((lines.len(), lines[0]), (3, "time,user,version,samples,reason"));
         assert!(
             lines[1].ends_with("\"samples.toml\",\"release 1\"") && lines[2].ends_with("\"release '2'\""),
             "{record}"

@@ -5,6 +5,7 @@
 use std::path::{Path, PathBuf};
 
 use farnear_recognition::evaluation::calibration::{Reliability, area_under_roc};
+use farnear_recognition::model::Recogniser;
 use farnear_recognition::unknown::Limits;
 use serde::Serialize;
 
@@ -49,6 +50,9 @@ pub struct SetFigures {
     pub unknown_of_strangers_by_other_sets: Option<f64>,
     /// Area under the outlier score's ROC curve; `None` without unknown activities.
     pub outlier_auroc: Option<f64>,
+    /// As `outlier_auroc`, mean over the set's activities, each in turn removed from the answers of the model;
+    /// `None` for fewer than two activities or a model that is not a network.
+    pub left_out_auroc: Option<f64>,
 }
 
 #[derive(Clone, PartialEq, Debug, Serialize)]
@@ -69,6 +73,7 @@ struct Measured {
     right: usize,
     right_among: usize,
     reliability: Reliability,
+    left_out_auroc: Option<f64>,
 }
 
 pub fn leave_one_set_out(
@@ -129,6 +134,7 @@ fn measured(model: &Model, path: &Path, settings: &SetsSettings, context: &Conte
         right: 0,
         right_among: 0,
         reliability: Reliability::default(),
+        left_out_auroc: left_out_auroc(recogniser, &known, &among),
     };
     for judged in &known {
         let answer = judged.answer.among(&among);
@@ -140,6 +146,19 @@ fn measured(model: &Model, path: &Path, settings: &SetsSettings, context: &Conte
         measured.known.push((judged.answer.outlier_score, right_among));
     }
     Ok(measured)
+}
+
+fn left_out_auroc(recogniser: &Recogniser, known: &[Judged], among: &[String]) -> Option<f64> {
+    let of_activity = |activity: &String| {
+        let (mut others, mut own) = (Vec::new(), Vec::new());
+        for judged in known {
+            let score = recogniser.outlier_score_without(&judged.answer, activity)?;
+            if judged.truth == *activity { &mut own } else { &mut others }.push(score);
+        }
+        Some(area_under_roc(&others, &own))
+    };
+    let areas = among.iter().map(of_activity).collect::<Option<Vec<f64>>>()?;
+    (areas.len() > 1).then(|| areas.iter().sum::<f64>() / areas.len() as f64)
 }
 
 fn figures(measured: &[Measured], left_out: usize) -> SetFigures {
@@ -170,6 +189,7 @@ fn figures(measured: &[Measured], left_out: usize) -> SetFigures {
         unknown_of_strangers_by_other_sets: any
             .then(|| share(beyond(&set.strange, limit), set.strange.len())),
         outlier_auroc: any.then(|| rounded(area_under_roc(&known, &set.strange), 4)),
+        left_out_auroc: set.left_out_auroc.map(|area| rounded(area, 4)),
     }
 }
 
@@ -185,6 +205,7 @@ mod tests {
             right: 10,
             right_among: 20,
             reliability: Reliability::default(),
+            left_out_auroc: None,
         }
     }
 

@@ -18,8 +18,8 @@ use crate::{context::Context, error::Result, figures::rounded, parameters::withi
 pub struct Shipped {
     pub name: &'static str,
     pub about: &'static str,
-    /// Figures of a blind set, if measured.
-    new_set: Option<NewSet>,
+    /// Figures of a set opened after the training.
+    new_set: NewSet,
     bytes: &'static [u8],
     /// Model file for silhouettes cut out at 100x100, without motion through the picture.
     cut_out: &'static [u8],
@@ -32,6 +32,7 @@ pub struct NewSet {
     pub accuracy: f64,
     /// Correct among the activities of the set.
     pub accuracy_among: f64,
+    /// Among the activities of the set.
     pub calibration_error: f64,
     /// Known activities called unknown.
     pub unknown_of_known: f64,
@@ -39,26 +40,37 @@ pub struct NewSet {
     pub outlier_auroc: f64,
 }
 
+/// MSR Action3D (Li et al. 2010), opened when both models were finished: 278 clips of eight known and 231 of
+/// eight unknown activities, in four views.
 const EVERYDAY_ON_A_NEW_SET: NewSet = NewSet {
-    accuracy: 0.38,
-    accuracy_among: 0.76,
-    calibration_error: 0.30,
-    unknown_of_known: 0.43,
-    outlier_auroc: 0.57,
+    accuracy: 0.33,
+    accuracy_among: 0.51,
+    calibration_error: 0.24,
+    unknown_of_known: 0.18,
+    outlier_auroc: 0.58,
+};
+
+/// As [`EVERYDAY_ON_A_NEW_SET`].
+const ORDER_FREE_ON_A_NEW_SET: NewSet = NewSet {
+    accuracy: 0.37,
+    accuracy_among: 0.53,
+    calibration_error: 0.25,
+    unknown_of_known: 0.03,
+    outlier_auroc: 0.54,
 };
 
 pub const MODELS: &[Shipped] = &[
     Shipped {
         name: "everyday",
         about: "everyday activities from one view or several, from any side; the order of frames counts",
-        new_set: Some(EVERYDAY_ON_A_NEW_SET),
+        new_set: EVERYDAY_ON_A_NEW_SET,
         bytes: include_bytes!("../../../recognition/models/everyday.fnm"),
         cut_out: include_bytes!("../../../recognition/models/everyday-cut-out.fnm"),
     },
     Shipped {
         name: "everyday-order-free",
         about: "the same where the order of frames does not count",
-        new_set: None,
+        new_set: ORDER_FREE_ON_A_NEW_SET,
         bytes: include_bytes!("../../../recognition/models/everyday-order-free.fnm"),
         cut_out: include_bytes!("../../../recognition/models/everyday-order-free-cut-out.fnm"),
     },
@@ -83,16 +95,16 @@ impl Shipped {
     /// Expected accuracy on new data, for the user.
     #[must_use]
     pub fn expectation(&self) -> String {
-        match self.new_set {
-            Some(NewSet { accuracy, unknown_of_known, outlier_auroc, .. }) => format!(
-                "`{}` on a new set: {:.0} % of answers right, {:.0} % of known activities called unknown, \
-                 unknown ones told apart with an AUROC of {outlier_auroc} (0.5 is chance)",
-                self.name,
-                100.0 * accuracy,
-                100.0 * unknown_of_known
-            ),
-            None => format!("`{}` was not measured on a new set", self.name),
-        }
+        let NewSet { accuracy, accuracy_among, unknown_of_known, outlier_auroc, .. } = self.new_set;
+        let percent = |share: f64| (100.0 * share).round();
+        format!(
+            "`{}` on a new set: {} % of answers right ({} % among the set's activities), {} % of known activities called unknown, \
+             unknown ones separated with an AUROC of {outlier_auroc} (0.5 is chance)",
+            self.name,
+            percent(accuracy),
+            percent(accuracy_among),
+            percent(unknown_of_known)
+        )
     }
 
     pub fn named(name: &str) -> Option<&'static Self> {
@@ -112,8 +124,7 @@ pub struct ModelFigures {
     pub bytes: usize,
     /// Share of known clips called unknown, on synthetic people as in training.
     pub false_alarms_on_synthetic_people: f64,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub on_a_new_set: Option<NewSet>,
+    pub on_a_new_set: NewSet,
     pub activities: Vec<String>,
 }
 

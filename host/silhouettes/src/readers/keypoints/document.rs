@@ -29,8 +29,9 @@ pub struct Document {
 const PEOPLE: [&str; 8] =
     ["people", "bodies", "instances", "persons", "poses", "predictions", "detections", "annotations"];
 const FRAMES: [&str; 6] = ["frames", "instance_info", "pose_frames", "results", "data", "root"];
-const POINTS: [&str; 8] = [
+const POINTS: [&str; 9] = [
     "pose_keypoints_2d",
+    "pose_keypoints",
     "keypoints",
     "joints",
     "pose_landmarks",
@@ -43,7 +44,7 @@ const CONFIDENCES: [&str; 3] = ["keypoint_scores", "keypoints_scores", "keypoint
 
 impl Document {
     pub fn parse(bytes: &[u8]) -> Result<Self, RecordingError> {
-        let value: Value = serde_json::from_slice(bytes).map_err(|error| RecordingError::Line {
+        let value: Value = serde_json::from_slice(&finite(bytes)).map_err(|error| RecordingError::Line {
             line: error.line(),
             reason: format!("not JSON: {error}"),
         })?;
@@ -176,13 +177,16 @@ impl Document {
     }
 
     fn points(&mut self, value: &Value, confidences: Option<&[Value]>) -> Option<Vec<Option<[f64; 2]>>> {
-        self.points_of(value.as_array()?, confidences)
+        match value {
+            Value::Object(columns) => self.points_of(&rows(columns)?, confidences),
+            other => self.points_of(other.as_array()?, confidences),
+        }
     }
 
     /// Points as x, y, c, ... in one list, lists of two to four numbers, or objects with x and y.
     fn points_of(&mut self, items: &[Value], confidences: Option<&[Value]>) -> Option<Vec<Option<[f64; 2]>>> {
-        let number = |value: &Value| value.as_f64().unwrap_or(0.0);
-        let flat = items.first()?.is_number();
+        let number = |value: &Value| value.as_f64().unwrap_or(f64::NAN);
+        let flat = items.iter().any(Value::is_number);
         let (layout, triples): (_, Vec<[f64; 3]>) = if flat {
             // 33 points have depth as well; no two layouts share a length.
             let (layout, width) = [3, 2, 4].iter().find_map(|width| {
@@ -202,7 +206,9 @@ impl Document {
                     Value::Object(map) => {
                         let get = |key: &str| map.get(key).and_then(Value::as_f64);
                         let sure = ["visibility", "score", "confidence", "c"].iter().find_map(|key| get(key));
-                        Some([get("x")?, get("y")?, sure.unwrap_or(1.0)])
+                        // PoseNet nests the position.
+                        let place = map.get("position").and_then(Value::as_object).unwrap_or(map);
+                        Some([number(place.get("x")?), number(place.get("y")?), sure.unwrap_or(1.0)])
                     }
                     Value::Null => Some([0.0; 3]),
                     _ => None,
@@ -225,6 +231,39 @@ impl Document {
         }
         Some(points)
     }
+}
+
+/// `NaN` and `Infinity`, which Python's json module writes, as `null`.
+fn finite(bytes: &[u8]) -> Vec<u8> {
+    let mut out = Vec::with_capacity(bytes.len());
+    let (mut at, mut quoted) = (0, false);
+    while let Some(&byte) = bytes.get(at) {
+        let not_finite = ["NaN", "-Infinity", "Infinity"]
+            .into_iter()
+            .find(|word| !quoted && bytes[at..].starts_with(word.as_bytes()));
+        if let Some(word) = not_finite {
+            out.extend(b"null");
+            at += word.len();
+            continue;
+        }
+        let length = if quoted && byte == b'\\' { 2 } else { 1 };
+        quoted ^= byte == b'"';
+        out.extend(&bytes[at..bytes.len().min(at + length)]);
+        at += length;
+    }
+    out
+}
+
+/// Points of Ultralytics' columns `x`, `y` and `visible`.
+fn rows(columns: &Map<String, Value>) -> Option<Vec<Value>> {
+    let column = |key: &str| columns.get(key).and_then(Value::as_array);
+    let (x, y) = (column("x")?, column("y")?);
+    let sure = ["visible", "confidence"].into_iter().find_map(column);
+    let row = |(index, (x, y)): (usize, (&Value, &Value))| {
+        let sure = sure.and_then(|sure| sure.get(index)).cloned();
+        Value::Array([Some(x.clone()), Some(y.clone()), sure].into_iter().flatten().collect())
+    };
+    Some(x.iter().zip(y).enumerate().map(row).collect())
 }
 
 /// The value after x and y; MediaPipe's third number is a depth.

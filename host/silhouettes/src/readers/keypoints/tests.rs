@@ -189,3 +189,40 @@ fn other_json_is_refused_with_what_was_expected() {
     let error = read(b"{\n\"people\":", "json", Choices::default()).expect_err("cut short").to_string();
     assert!(error.starts_with("line 2"), "{error}");
 }
+
+#[test]
+fn points_of_openpose_1_posenet_and_ultralytics_are_read() {
+    let points = person(layout(18), 100.0);
+    upright(&format!(r#"{{"version":1.0,"people":[{{"pose_keypoints":{}}}]}}"#, flat(&points)), 1);
+    let points = person(layout(17), 100.0);
+    let nested = points
+        .iter()
+        .map(|[x, y, c]| format!(r#"{{"score":{c},"part":"nose","position":{{"x":{x},"y":{y}}}}}"#))
+        .collect::<Vec<_>>()
+        .join(",");
+    upright(
+        &format!(r#"[{{"score":0.9,"keypoints":[{nested}]}},{{"score":0.9,"keypoints":[{nested}]}}]"#),
+        2,
+    );
+    let column = |k: usize| points.iter().map(|p| p[k].to_string()).collect::<Vec<_>>().join(",");
+    let person = format!(
+        r#"{{"name":"person","track_id":1,"keypoints":{{"x":[{}],"y":[{}],"visible":[{}]}}}}"#,
+        column(0),
+        column(1),
+        column(2)
+    );
+    upright(&format!("[[{person}],[{person}],[]]"), 3);
+}
+
+#[test]
+fn not_a_number_is_a_missing_point_and_stays_in_names() {
+    let mut points = person(layout(17), 100.0);
+    // The first point and the left wrist.
+    points[0][0] = f64::NAN;
+    points[9] = [f64::NAN, f64::NEG_INFINITY, f64::NAN];
+    let numbers = flat(&points).replace("-inf", "-Infinity");
+    assert!(numbers.contains("NaN,") && numbers.contains("-Infinity"));
+    let item = |name: &str| format!(r#"{{"image_id":"NaN\"{name}.jpg","keypoints":{numbers}}}"#);
+    let found = upright(&format!("[{},{}]", item("1"), item("2")), 2);
+    assert!(!found.by_name(0).contains_key("nose") && !found.by_name(0).contains_key("left wrist"));
+}
