@@ -6,7 +6,7 @@ use ndarray::{Array2, ArrayView2, ArrayViewMut2, s};
 
 use super::bank::{Bank, Filters};
 use super::scales::Scales;
-use super::{ADAPTIVE_PX, SAFE_PX, Window, WindowSettings};
+use super::{ADAPTIVE_PX, LEARNED_PX, SAFE_PX, Window, WindowSettings};
 use crate::border::reflect;
 use crate::depth_of_alpha::DepthOfAlpha;
 use crate::optics::Optics;
@@ -110,6 +110,7 @@ impl<'a> Tile<'a> {
     pub(super) fn new(job: &'a Job<'a>) -> Self {
         let sides = match job.settings.window {
             Window::Fixed(side) => vec![side],
+            Window::Adaptive if job.optics.stage().is_some() => LEARNED_PX.to_vec(),
             Window::Adaptive => ADAPTIVE_PX.to_vec(),
             Window::Safe => SAFE_PX.to_vec(),
         };
