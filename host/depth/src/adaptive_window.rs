@@ -35,7 +35,7 @@ pub use bank::Bank;
 pub const ADAPTIVE_PX: [usize; 3] = [7, 13, 21];
 /// The same for a lens of `calibrate stack`: its own error, which a point of strong texture may dominate, is averaged
 /// over more texture.
-pub const LEARNED_PX: [usize; 3] = [9, 17, 31];
+pub const LEARNED_PX: [usize; 3] = [11, 21, 41];
 /// Sides of the windows that [`Window::Safe`] chooses from, px.
 pub const SAFE_PX: [usize; 3] = [9, 13, 21];
 

@@ -70,9 +70,9 @@ impl Curve {
             let at = |t: f64| part * value(&c, t) + (1.0 - part) * value(&line, t);
             let measured: Vec<f64> = (0..POINTS).map(|i| at(truth(i))).collect();
             let least = line[1] * (truth(1) - truth(0));
-            let kept = measured.windows(2).all(|pair| {
-                (SLOPES[0] - 1e-9..=SLOPES[1] + 1e-9).contains(&((pair[1] - pair[0]) / least))
-            });
+            let kept = measured
+                .windows(2)
+                .all(|pair| (SLOPES[0] - 1e-9..=SLOPES[1] + 1e-9).contains(&((pair[1] - pair[0]) / least)));
             kept.then_some(measured)
         })?;
         let inverse = |m: f64| {
@@ -172,7 +172,10 @@ mod tests {
         let curve = Curve::fit(learned.iter(), 1).unwrap();
         for measured in [-0.6, -0.1, 0.3, 0.62] {
             let [found, slope] = curve.at(measured).unwrap();
-            assert!((found - measured).abs() < 0.02 && (slope - 1.0).abs() < 0.05, "{measured} {found} {slope}");
+            assert!(
+                (found - measured).abs() < 0.02 && (slope - 1.0).abs() < 0.05,
+                "{measured} {found} {slope}"
+            );
         }
     }
 }

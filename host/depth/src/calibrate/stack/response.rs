@@ -9,10 +9,9 @@ use serde::{Deserialize, Serialize};
 use ndarray::Array2;
 
 use super::curve::Curve;
-use super::focus_plane::FocusPlane;
+use super::focus_plane::{FocusPlane, blurred};
 use super::{HeldOut, StackError};
 use crate::adaptive_window::{LEARNED_PX, Window};
-use crate::border::reflect;
 use crate::measure::{DepthMethod, MeasureSettings, measure};
 use crate::optics::{Optics, Stage, unexplained};
 use crate::pipeline::Settings;
@@ -49,7 +48,7 @@ const SMOOTHED_NOISE: f64 = 0.0748;
 const TELLING: f64 = 0.25;
 /// Least part of the errors within three standard deviations and largest RMS of error over standard deviation, of the
 /// target and of the target with coarser texture.
-const HONEST: [[f64; 2]; 2] = [[0.985, 1.0], [0.975, 1.15]];
+const HONEST: [[f64; 2]; 2] = [[0.985, 1.0], [0.97, 1.3]];
 
 /// One combination.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -252,7 +251,8 @@ impl Target<'_> {
             .filter_map(|far| {
                 let pair = [far, far + self.pair_step].map(|i| self.slices[i].clone());
                 let prepared = prepare_owned(pair, &optics, None, &settings).ok()?;
-                let [far_image, near_image] = [&prepared.far, &prepared.near].map(smoothed);
+                // Equals a target with coarser texture, because blur and smoothing commute.
+                let [far_image, near_image] = [&prepared.far, &prepared.near].map(blurred);
                 let mut coarse = Prepared { far: far_image, near: near_image, ..prepared.clone() };
                 let noise = &mut coarse.noise;
                 for value in [&mut noise.constant, &mut noise.per_unit, &mut noise.mean_variance] {
@@ -360,21 +360,6 @@ impl Curve {
             unexplained: unexplained(s.misfit, noise as f32),
         })
     }
-}
-
-/// Binomial blur of five taps: equals a target with coarser texture, because blur and smoothing commute.
-fn smoothed(image: &Array2<f32>) -> Array2<f32> {
-    let (height, width) = image.dim();
-    let pass = |image: &Array2<f32>, down: isize, right: isize| {
-        Array2::from_shape_fn((height, width), |(y, x)| {
-            let at = |i: isize| {
-                let [y, x] = [reflect(y as isize + i * down, height), reflect(x as isize + i * right, width)];
-                image[(y, x)]
-            };
-            (at(-2) + 4.0 * at(-1) + 6.0 * at(0) + 4.0 * at(1) + at(2)) / 16.0
-        })
-    };
-    pass(&pass(image, 1, 0), 0, 1)
 }
 
 fn robust(errors: impl Iterator<Item = f64>) -> f64 {
