@@ -98,8 +98,9 @@ pub fn measure(page: &mut Page, data: &Path) -> Result<()> {
     page.table(1, &head, &rows);
     page.paragraph(
         "The response is learned by classical calibration (measured depth as a polynomial of the stage's), so that it has no plateaus at the few depths of the pairs. Windows are up to 41 binned px. \
-         The error that remains is the same in all pairs of a place: texture and relief of the plate, which only larger windows average. Choices were made on the left half; the right half was looked at \
-         three times.",
+         The error that remains is the same in all pairs of a place: texture and relief of the plate, which only larger windows average. The lens was chosen on the left half. \
+         The right half was measured once to find the cause of the errors and after each of three changes. With windows of up to 31 px, the ratios were 0.69, 0.82, 0.74 and 0.77, \
+         and 41 px were chosen after that measurement, so these figures are not blind to the right half. The peer's windows are 15 px: part of the gain is their size.",
     );
     Ok(())
 }
