@@ -33,6 +33,9 @@ pub use bank::Bank;
 
 /// Sides of the windows that [`Window::Adaptive`] chooses from, px.
 pub const ADAPTIVE_PX: [usize; 3] = [7, 13, 21];
+/// The same for a lens of `calibrate stack`: its own error, which a point of strong texture may dominate, is averaged
+/// over more texture.
+pub const LEARNED_PX: [usize; 3] = [11, 21, 41];
 /// Sides of the windows that [`Window::Safe`] chooses from, px.
 pub const SAFE_PX: [usize; 3] = [9, 13, 21];
 
@@ -42,7 +45,7 @@ pub const SAFE_PX: [usize; 3] = [9, 13, 21];
 pub enum Window {
     /// One square everywhere; odd side, px.
     Fixed(usize),
-    /// The largest of [`ADAPTIVE_PX`] that nothing contradicts.
+    /// The largest of [`ADAPTIVE_PX`] ([`LEARNED_PX`] for a learned lens) that nothing contradicts.
     Adaptive,
     /// The smallest of [`SAFE_PX`] that is certain enough.
     Safe,

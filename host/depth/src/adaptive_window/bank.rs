@@ -211,6 +211,13 @@ impl Filters {
         }
     }
 
+    pub(super) fn matched_mut(&mut self) -> &mut Plane {
+        match self {
+            Self::Whitened { rho, .. } => &mut rho[4],
+            Self::Rational { rho, .. } => &mut rho[1],
+        }
+    }
+
     pub(super) fn matched(&self) -> &Plane {
         match self {
             Self::Whitened { rho, .. } => &rho[4],

@@ -6,7 +6,7 @@ use ndarray::{Array2, ArrayView2, ArrayViewMut2, s};
 
 use super::bank::{Bank, Filters};
 use super::scales::Scales;
-use super::{ADAPTIVE_PX, SAFE_PX, Window, WindowSettings};
+use super::{ADAPTIVE_PX, LEARNED_PX, SAFE_PX, Window, WindowSettings};
 use crate::border::reflect;
 use crate::depth_of_alpha::DepthOfAlpha;
 use crate::optics::Optics;
@@ -98,6 +98,14 @@ struct Row {
     chosen: [Vec<f32>; 5],
 }
 
+/// Surroundings of pixels without a value.
+struct Holes {
+    /// Pixels of the tile whose smallest window contains one: they have no depth.
+    own: Array2<bool>,
+    /// Pixels, with the halo, whose filters contain one; larger windows leave them out.
+    of_filters: Array2<bool>,
+}
+
 #[derive(Clone, Copy)]
 struct Place {
     top: usize,
@@ -110,6 +118,7 @@ impl<'a> Tile<'a> {
     pub(super) fn new(job: &'a Job<'a>) -> Self {
         let sides = match job.settings.window {
             Window::Fixed(side) => vec![side],
+            Window::Adaptive if job.optics.stage().is_some() => LEARNED_PX.to_vec(),
             Window::Adaptive => ADAPTIVE_PX.to_vec(),
             Window::Safe => SAFE_PX.to_vec(),
         };
@@ -205,19 +214,28 @@ impl<'a> Tile<'a> {
             }
             let inputs = [&self.difference, &self.sum];
             self.filters.feed(self.job.backend, inputs, first, count, input);
+            if let Some(Holes { of_filters, .. }) = &holes {
+                // A filter across the rim of a hole finds an equally sharp edge in both images: no evidence.
+                for y in 0..count {
+                    let Some(middle) = (begin + y).checked_sub(reach) else { continue };
+                    let of_row = of_filters.row(middle).into_iter().skip(reach);
+                    let matched = self.filters.matched_mut().row_mut(first + y);
+                    matched.iter_mut().zip(of_row).filter(|(_, hole)| **hole).for_each(|(u, _)| *u = 0.0);
+                }
+            }
             // A row of windows needs filter input from `radius + 2 reach` rows further down.
             while next < place.rows + 2 * above && next + 2 * self.radius + 2 * reach < begin + count {
                 self.windows(place, next, wide, products);
                 self.residual_row(next, wide);
                 if let Some(y) = next.checked_sub(above).filter(|y| *y < place.rows) {
-                    self.own_row(place, y, holes.as_ref(), &mut maps, &mut sums);
+                    self.own_row(place, y, holes.as_ref().map(|holes| &holes.own), &mut maps, &mut sums);
                 }
                 self.finish(place, next, wide, &mut maps);
                 next += 1;
             }
         }
-        if let Some(holes) = holes {
-            for (at, _) in holes.indexed_iter().filter(|(_, hole)| **hole) {
+        if let Some(Holes { own, .. }) = holes {
+            for (at, _) in own.indexed_iter().filter(|(_, hole)| **hole) {
                 maps.deviation_mm[at] = f32::NAN;
                 if let Some(depth_mm) = &mut maps.depth_mm {
                     depth_mm[at] = f32::NAN;
@@ -227,8 +245,8 @@ impl<'a> Tile<'a> {
         sums
     }
 
-    /// Pixels whose smallest window contains a hole, if any; larger windows use mean brightness there.
-    fn holes(&self, place: Place, halo: [usize; 2]) -> Option<Array2<bool>> {
+    /// The holes' surroundings, if there are any.
+    fn holes(&self, place: Place, halo: [usize; 2]) -> Option<Holes> {
         if self.job.scales.whole {
             return None;
         }
@@ -254,9 +272,13 @@ impl<'a> Tile<'a> {
                 !(far[(y, x)].is_finite() && near[(y, x)].is_finite())
             });
         holes.iter().any(|hole| *hole).then(|| {
-            let wide = crate::metrics::dilate_square(&holes, self.job.bank.reach_px() + self.sides[0] / 2);
+            let reach = self.job.bank.reach_px();
+            let wide = crate::metrics::dilate_square(&holes, reach + self.sides[0] / 2);
             let own = s![halo[0]..halo[0] + place.rows, halo[1]..halo[1] + place.columns];
-            wide.slice(own).to_owned()
+            Holes {
+                own: wide.slice(own).to_owned(),
+                of_filters: crate::metrics::dilate_square(&holes, reach),
+            }
         })
     }
 

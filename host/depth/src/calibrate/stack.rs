@@ -32,6 +32,8 @@ const USABLE_PX: [f64; 2] = [1.6, 3.4];
 const BINS: [usize; 4] = [1, 2, 4, 8];
 /// Depths within the range at which enough pairs see the target to learn a response.
 const ENOUGH_DEPTHS: usize = 4;
+/// Largest spread of the blocks' focus around the plane, in pair steps.
+const FLAT: f64 = 0.15;
 /// Fewest slices.
 pub const FEWEST: usize = 5;
 
@@ -70,6 +72,11 @@ pub enum StackError {
     NoSeparation { per_slice: f64, hint: &'static str },
     #[error("no pair of slices {0} apart has its target within the range: take more slices around the focus")]
     NoPair(usize),
+    #[error(
+        "the target is not flat: its parts are in focus {spread:.2} slices (SD) from their common plane, at most {limit:.2} is \
+         usable for pairs {pair_step} slices apart; use a flat, textured target, or a part of the images that is flat"
+    )]
+    NotFlat { spread: f64, limit: f64, pair_step: usize },
     #[error(transparent)]
     Optics(#[from] crate::optics::OpticsError),
 }
@@ -116,6 +123,10 @@ pub fn calibrate_stack(slices: &[Array2<f32>], settings: &StackSettings) -> Resu
     let plane = FocusPlane::of(slices).map_err(StackError::NoFocus)?;
     let blur = BlurCurve::of(slices, &plane);
     let (bin, pair_step) = separation(&blur, slices.len(), settings)?;
+    let limit = FLAT * pair_step as f64;
+    if plane.spread > limit {
+        return Err(StackError::NotFlat { spread: plane.spread, limit, pair_step });
+    }
     let small: Vec<Array2<f32>> = slices.iter().map(|slice| binned(slice.clone(), bin)).collect();
     let plane_of_bins = plane.binned(bin);
     let radius = (blur.px_per_slice() * pair_step as f64 / bin as f64).clamp(1.0, 4.0);

@@ -75,7 +75,7 @@ struct Judged {
     fill: f64,
 }
 
-/// Standard deviation of depth at the noise limit, windows of 21 px, mm.
+/// Standard deviation of depth at the noise limit in the largest windows of lenses without calibration, 21 px, mm.
 fn bound_mm(lens: &WaveLens, [far_um, near_um]: [f64; 2], pair_step: usize, sand: bool) -> f64 {
     const SIDE: usize = 12;
     let frequency = |i: usize| (i as f64 + 0.5) / (2 * SIDE) as f64;

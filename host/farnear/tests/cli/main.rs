@@ -11,6 +11,7 @@ mod bad_ports;
 mod bad_rigs;
 mod batch;
 mod breakfast;
+mod calibrate_stack;
 mod calibration;
 mod camera;
 mod captures;

@@ -1,6 +1,7 @@
-//! The response from measured to true normalised depth: a polynomial whose slope stays near a straight line's. A stack
-//! has few depths when its pairs are close together. A free polynomial would pull every measured depth towards these,
-//! which is wrong for other scenes.
+//! The response from measured to true normalised depth. The stage gives the truth, the operators' measurement scatters:
+//! so the measured depth is fitted as a polynomial of the true one, and the polynomial is inverted (classical
+//! calibration). The regression of truth on measurement would pull every depth towards the few that the stack contains,
+//! which is wrong for other scenes. The polynomial's slope stays near a straight line's.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -17,6 +18,10 @@ const LARGEST: f64 = 1.19;
 const SLOPES: [f64; 2] = [1.0 / 3.0, 3.0];
 /// Steps of the mixture of polynomial and line.
 const MIXTURES: usize = 50;
+/// Points at which the polynomial is inverted.
+const POINTS: usize = 200;
+/// Width of a class of true depths, for [`Curve::largest_degree`].
+const CLASS: f64 = 0.1;
 
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Curve {
@@ -27,33 +32,65 @@ pub(super) struct Curve {
 }
 
 impl Curve {
+    /// Degree that the true depths of a stack determine: one less than its separate depths, or one per half unit.
+    pub fn largest_degree<'a>(samples: impl Iterator<Item = &'a Sample> + Clone) -> usize {
+        let class = |s: &Sample| ((s.truth + 2.0) / CLASS).clamp(0.0, 4.0 / CLASS) as usize;
+        let mut counts = vec![0_usize; (4.0 / CLASS) as usize + 1];
+        samples.clone().for_each(|s| counts[class(s)] += 1);
+        let least = 1 + samples.count() / 200;
+        let occupied: Vec<bool> = counts.iter().map(|count| *count >= least).collect();
+        let runs = occupied.windows(2).filter(|pair| pair[1] && !pair[0]).count();
+        let covered = CLASS * occupied.iter().filter(|occupied| **occupied).count() as f64;
+        runs.saturating_sub(1).max((2.0 * covered) as usize).max(1)
+    }
+
     /// `None` for too few samples, and for values that do not rise with the truth.
     pub fn fit<'a>(samples: impl Iterator<Item = &'a Sample> + Clone, degree: usize) -> Option<Self> {
-        let mut places: Vec<f64> = samples.clone().map(|s| s.measured).collect();
+        let sorted = |value: fn(&Sample) -> f64| {
+            let mut values: Vec<f64> = samples.clone().map(value).collect();
+            values.sort_by(f64::total_cmp);
+            values
+        };
+        let (places, truths) = (sorted(|s| s.measured), sorted(|s| s.truth));
         if places.len() < 50 {
             return None;
         }
-        places.sort_by(f64::total_cmp);
-        let quantile = |q: f64| places[((places.len() - 1) as f64 * q) as usize];
-        let low = (quantile(OUTLIERS) - BEYOND).max(-LARGEST);
-        let high = (quantile(1.0 - OUTLIERS) + BEYOND).min(LARGEST);
+        let quantile = |of: &[f64], q: f64| of[((of.len() - 1) as f64 * q) as usize];
+        let low = (quantile(&places, OUTLIERS) - BEYOND).max(-LARGEST);
+        let high = (quantile(&places, 1.0 - OUTLIERS) + BEYOND).min(LARGEST);
+        let [first, last] = [OUTLIERS, 1.0 - OUTLIERS].map(|q| quantile(&truths, q));
         let line = polynomial(samples.clone(), 1)?;
         let c = polynomial(samples, degree)?;
-        if line[1] <= 0.05 || low >= high {
+        if line[1] <= 0.05 || low >= high || first >= last {
             return None;
         }
-        let unit = (high - low) / (RESPONSE_POINTS - 1) as f64;
+        let truth = |i: usize| first + (last - first) * i as f64 / (POINTS - 1) as f64;
         // The largest part of the polynomial that keeps the slopes.
-        let response = (0..=MIXTURES).rev().map(|part| part as f64 / MIXTURES as f64).find_map(|part| {
-            let at = |x: f64| part * value(&c, x) + (1.0 - part) * value(&line, x);
-            let response: [f64; RESPONSE_POINTS] = std::array::from_fn(|i| at(low + unit * i as f64));
-            let kept = response.windows(2).all(|pair| {
-                let slope = (pair[1] - pair[0]) / unit / line[1];
-                (SLOPES[0] - 1e-9..=SLOPES[1]).contains(&slope)
-            });
-            kept.then_some(response)
+        let measured = (0..=MIXTURES).rev().map(|part| part as f64 / MIXTURES as f64).find_map(|part| {
+            let at = |t: f64| part * value(&c, t) + (1.0 - part) * value(&line, t);
+            let measured: Vec<f64> = (0..POINTS).map(|i| at(truth(i))).collect();
+            let least = line[1] * (truth(1) - truth(0));
+            let kept = measured
+                .windows(2)
+                .all(|pair| (SLOPES[0] - 1e-9..=SLOPES[1] + 1e-9).contains(&((pair[1] - pair[0]) / least)));
+            kept.then_some(measured)
         })?;
-        Some(Self { measured: [low, high], response: response.map(|v| v.clamp(-1.5, 1.5)) })
+        let inverse = |m: f64| {
+            let after = measured.partition_point(|v| *v < m);
+            // Beyond the learned depths, where only scatter leads, along the line.
+            let beyond = |i: usize| truth(i) + (m - measured[i]) / line[1];
+            match after {
+                0 => beyond(0),
+                POINTS => beyond(POINTS - 1),
+                _ => {
+                    let [a, b] = [measured[after - 1], measured[after]];
+                    truth(after - 1) + (truth(after) - truth(after - 1)) * (m - a) / (b - a)
+                }
+            }
+        };
+        let unit = (high - low) / (RESPONSE_POINTS - 1) as f64;
+        let response = std::array::from_fn(|i| inverse(low + unit * i as f64).clamp(-1.5, 1.5));
+        Some(Self { measured: [low, high], response })
     }
 
     /// True normalised depth and slope at a measured one; `None` outside the learned range.
@@ -62,7 +99,7 @@ impl Curve {
     }
 }
 
-/// Coefficients of the polynomial from measured to true, by least squares with Huber's weights.
+/// Coefficients of the polynomial from true to measured depth, by least squares with Huber's weights.
 fn polynomial<'a>(samples: impl Iterator<Item = &'a Sample> + Clone, degree: usize) -> Option<Vec<f64>> {
     let n = degree + 1;
     let mut found: Vec<f64> = (0..n).map(|k| f64::from(u8::from(k == 1))).collect();
@@ -72,12 +109,12 @@ fn polynomial<'a>(samples: impl Iterator<Item = &'a Sample> + Clone, degree: usi
         let mut right = DVector::<f64>::zeros(n);
         let mut sizes = Vec::new();
         for s in samples.clone() {
-            let error = s.truth - value(&found, s.measured);
+            let error = s.measured - value(&found, s.truth);
             sizes.push(error.abs());
             let weight = if error.abs() > limit { limit / error.abs() } else { 1.0 };
-            let powers: Vec<f64> = (0..n).map(|k| s.measured.powi(k as i32)).collect();
+            let powers: Vec<f64> = (0..n).map(|k| s.truth.powi(k as i32)).collect();
             for i in 0..n {
-                right[i] += weight * powers[i] * s.truth;
+                right[i] += weight * powers[i] * s.measured;
                 for j in 0..n {
                     normal[(i, j)] += weight * powers[i] * powers[j];
                 }
@@ -122,7 +159,7 @@ mod tests {
         assert_eq!(Curve::fit(falling.iter(), 3), None);
     }
 
-    /// Two depths with noise: their best polynomial is flat at either and useless for other scenes.
+    /// Two depths with noise: the best prediction of these two is flat at either and useless for other scenes.
     #[test]
     fn two_known_depths_make_no_plateaus() {
         let learned: Vec<Sample> = (0..2000)
@@ -131,14 +168,13 @@ mod tests {
                 Sample::exact(truth + 0.3 * ((i as f64 * 0.618).fract() - 0.5), truth)
             })
             .collect();
-        for degree in [1, 3, 5] {
-            let curve = Curve::fit(learned.iter(), degree).unwrap();
-            let unit = (curve.measured[1] - curve.measured[0]) / (RESPONSE_POINTS - 1) as f64;
-            let slopes = curve.response.windows(2).map(|pair| (pair[1] - pair[0]) / unit);
+        assert_eq!(Curve::largest_degree(learned.iter()), 1);
+        let curve = Curve::fit(learned.iter(), 1).unwrap();
+        for measured in [-0.6, -0.1, 0.3, 0.62] {
+            let [found, slope] = curve.at(measured).unwrap();
             assert!(
-                slopes.clone().all(|slope| (0.2..3.1).contains(&slope)),
-                "{degree} {:?}",
-                slopes.collect::<Vec<_>>()
+                (found - measured).abs() < 0.02 && (slope - 1.0).abs() < 0.05,
+                "{measured} {found} {slope}"
             );
         }
     }

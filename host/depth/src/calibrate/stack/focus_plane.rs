@@ -1,13 +1,27 @@
-//! Depth from focus of a flat target: the slice of most detail per block, and the plane through all blocks.
+//! Depth from focus of a flat target: the slice of most detail per block, and the plane through all blocks. Detail is
+//! the energy of a Laplacian. Its scale and the size of the blocks are those with the least standard error of the plane:
+//! fine ones are the sharpest measure of focus, coarse ones remain where noise hides fine detail.
 
 use nalgebra::{DMatrix, DVector};
 use ndarray::{Array2, s};
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-/// Side of a block in parts of the shorter side.
+use crate::border::reflect;
+
+/// Side of the smallest block in parts of the shorter side.
 const BLOCKS: usize = 24;
+/// Sides of larger blocks in smallest ones.
+const MERGED: [usize; 3] = [1, 2, 4];
+/// Binomial blurs before the Laplacian, each of variance 1 px^2.
+const BLURS: [usize; 3] = [1, 4, 12];
+/// Fewest blocks of a plane.
+const FEWEST: usize = 12;
 /// Least ratio of a block's largest to its least energy for a peak.
 const PEAK: f64 = 1.3;
+/// Least height of a peak in standard deviations of the curve's noise. Curves of few slices, whose peak is sharp, have
+/// large second differences without noise.
+const ABOVE_NOISE: f64 = 10.0;
 
 /// The slice in focus, from 0, at column x and row y: `x_per_px x + y_per_px y + at_origin`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -41,37 +55,76 @@ impl FocusPlane {
     pub fn of(slices: &[Array2<f32>]) -> Result<Self, String> {
         let (height, width) = slices[0].dim();
         let side = (height.min(width) / BLOCKS).clamp(12, 64);
-        let energies: Vec<Array2<f64>> = slices.iter().map(|slice| laplacian_energy(slice, side)).collect();
-        let mut points = Vec::new();
-        for (block, _) in energies[0].indexed_iter() {
-            let curve: Vec<f64> = energies.iter().map(|energy| energy[block]).collect();
-            if let Some(peak) = peak(&curve) {
-                let centre = |i: usize| (i * side) as f64 + (side - 1) as f64 / 2.0;
-                points.push([centre(block.1), centre(block.0), peak]);
+        let mut smooth: Vec<Array2<f32>> = slices.to_vec();
+        let mut best: Option<(f64, Self)> = None;
+        let (mut most, mut of_most) = (0, 0);
+        let mut passes = 0;
+        for blurs in BLURS {
+            while passes < blurs {
+                smooth = smooth.par_iter().map(blurred).collect();
+                passes += 1;
+            }
+            let energies: Vec<Array2<f64>> =
+                smooth.par_iter().map(|slice| laplacian_energy(slice, side)).collect();
+            for merged in MERGED {
+                let points = peaks(&energies, merged, side);
+                let all = (energies[0].nrows() / merged) * (energies[0].ncols() / merged);
+                if points.len() > most {
+                    (most, of_most) = (points.len(), all);
+                }
+                if points.len() < FEWEST.max(all / 20) {
+                    continue;
+                }
+                let found = fit(&points);
+                let error = found.spread / (points.len() as f64).sqrt();
+                if best.is_none_or(|(least, _)| error < least) {
+                    best = Some((error, found));
+                }
             }
         }
-        let all = energies[0].len();
-        if points.len() < 12.max(all / 20) {
-            return Err(format!(
-                "{} of {all} blocks are sharpest inside the stack: the target must be textured, and the stack must go through its focus",
-                points.len()
-            ));
-        }
-        Ok(fit(&points))
+        best.map(|(_, found)| found).ok_or_else(|| {
+            format!(
+                "{most} of {of_most} blocks are sharpest inside the stack: the target must be textured, and the stack must go \
+                 through its focus"
+            )
+        })
     }
 }
 
-/// Maximum of a parabola through the logarithms around it; `None` at the ends of the stack.
+/// Column, row and slice of the blocks with a peak; a block is `merged` x `merged` of the energies' blocks.
+fn peaks(energies: &[Array2<f64>], merged: usize, side: usize) -> Vec<[f64; 3]> {
+    let (rows, columns) = energies[0].dim();
+    let mut points = Vec::new();
+    for y in 0..rows / merged {
+        for x in 0..columns / merged {
+            let part = s![y * merged..(y + 1) * merged, x * merged..(x + 1) * merged];
+            let curve: Vec<f64> = energies.iter().map(|energy| energy.slice(part).sum()).collect();
+            if let Some(peak) = peak(&curve) {
+                let centre = |i: usize| (i * merged * side) as f64 + (merged * side - 1) as f64 / 2.0;
+                points.push([centre(x), centre(y), peak]);
+            }
+        }
+    }
+    points
+}
+
+/// Maximum of a parabola through the logarithms of the upper half of the peak; `None` at the ends of the stack and for
+/// peaks within the curve's noise.
 fn peak(curve: &[f64]) -> Option<f64> {
     let floor = curve.iter().copied().fold(f64::INFINITY, f64::min);
     let (top, most) = curve.iter().copied().enumerate().max_by(|a, b| a.1.total_cmp(&b.1))?;
-    if most.partial_cmp(&(PEAK * floor)) != Some(std::cmp::Ordering::Greater)
-        || top == 0
-        || top + 1 == curve.len()
-    {
+    // Second differences of independent noise have six times its variance.
+    let mut bends: Vec<f64> = curve.windows(3).map(|v| (v[0] - 2.0 * v[1] + v[2]).abs()).collect();
+    bends.sort_by(f64::total_cmp);
+    let noise = 1.4826 * bends.get(bends.len() / 2)? / 6.0_f64.sqrt();
+    let high = most > PEAK * floor && most - floor > ABOVE_NOISE * noise;
+    if !high || top == 0 || top + 1 == curve.len() {
         return None;
     }
-    let reach = 2.min(top).min(curve.len() - 1 - top);
+    let upper = |i: &usize| curve[*i] > 0.5 * (floor + most);
+    let below = (0..top).rev().take_while(upper).count();
+    let above = (top + 1..curve.len()).take_while(upper).count();
+    let reach = below.min(above).max(2).min(top).min(curve.len() - 1 - top);
     let points: Vec<(f64, f64)> = (top - reach..=top + reach)
         .map(|i| (i as f64 - top as f64, (curve[i] - 0.9 * floor).max(1e-30).ln()))
         .collect();
@@ -79,7 +132,7 @@ fn peak(curve: &[f64]) -> Option<f64> {
     let right = DVector::from_fn(points.len(), |i, _| points[i].1);
     let c = matrix.svd(true, true).solve(&right, 1e-12).ok()?;
     let place = -c[1] / (2.0 * c[2]);
-    (c[2] < 0.0 && place.abs() <= 1.0).then_some(top as f64 + place)
+    (c[2] < 0.0 && place.abs() <= 0.5 * reach as f64).then_some(top as f64 + place)
 }
 
 /// Least squares with Tukey's weights.
@@ -120,23 +173,24 @@ pub(super) fn middle(image: &Array2<f32>) -> Array2<f32> {
     image.slice(s![top..top + side, left..left + side]).to_owned()
 }
 
-/// Mean square over blocks of the Laplacian, after a binomial blur of five taps.
-fn laplacian_energy(image: &Array2<f32>, side: usize) -> Array2<f64> {
+/// Binomial blur of five taps along both axes.
+pub(super) fn blurred(image: &Array2<f32>) -> Array2<f32> {
     let (height, width) = image.dim();
-    let taps = [1.0_f32, 4.0, 6.0, 4.0, 1.0].map(|tap| tap / 16.0);
-    let smooth = |image: &Array2<f32>| {
-        let rows = Array2::from_shape_fn((height, width), |(y, x)| {
-            (0..5)
-                .map(|i| taps[i] * image[(y, crate::border::reflect(x as isize + i as isize - 2, width))])
-                .sum::<f32>()
-        });
+    let pass = |image: &Array2<f32>, down: isize, right: isize| {
         Array2::from_shape_fn((height, width), |(y, x)| {
-            (0..5)
-                .map(|i| taps[i] * rows[(crate::border::reflect(y as isize + i as isize - 2, height), x)])
-                .sum::<f32>()
+            let at = |i: isize| {
+                let [y, x] = [reflect(y as isize + i * down, height), reflect(x as isize + i * right, width)];
+                image[(y, x)]
+            };
+            (at(-2) + 4.0 * at(-1) + 6.0 * at(0) + 4.0 * at(1) + at(2)) / 16.0
         })
     };
-    let image = smooth(image);
+    pass(&pass(image, 1, 0), 0, 1)
+}
+
+/// Sum of squares over blocks of the Laplacian.
+fn laplacian_energy(image: &Array2<f32>, side: usize) -> Array2<f64> {
+    let (height, width) = image.dim();
     Array2::from_shape_fn((height / side, width / side), |(by, bx)| {
         let mut sum = 0.0;
         for y in (by * side).max(1)..((by + 1) * side).min(height - 1) {

@@ -9,10 +9,9 @@ use serde::{Deserialize, Serialize};
 use ndarray::Array2;
 
 use super::curve::Curve;
-use super::focus_plane::FocusPlane;
+use super::focus_plane::{FocusPlane, blurred};
 use super::{HeldOut, StackError};
-use crate::adaptive_window::Window;
-use crate::border::reflect;
+use crate::adaptive_window::{LEARNED_PX, Window};
 use crate::measure::{DepthMethod, MeasureSettings, measure};
 use crate::optics::{Optics, Stage, unexplained};
 use crate::pipeline::Settings;
@@ -28,30 +27,28 @@ const BORDER_PX: usize = 12;
 const THIN: usize = 5;
 /// True normalised depths that are learned; a little beyond the range.
 const LEARNED: f64 = 1.12;
-/// Measured normalised depths that the operators still distinguish.
-const MEASURED: f64 = 1.17;
 /// Standard deviation of normalised depth by noise beyond which a pixel has no depth.
 const TOO_NOISY: f64 = 0.12;
-const DEGREES: [usize; 3] = [1, 3, 5];
+const DEGREES: [usize; 4] = [1, 2, 3, 5];
 /// Blur radii relative to the measured one.
 const FACTORS: [f64; 5] = [0.7, 0.85, 1.0, 1.2, 1.4];
 /// Penalty of a blur that differs from the measured one, per squared logarithm of their ratio.
 const UNLIKELY: f64 = 0.5;
 /// Least blur radii that are tried with the best PSF, px.
-const FLOORS_PX: [f64; 2] = [0.5, 0.9];
+const FLOORS_PX: [f64; 3] = [0.5, 0.9, 1.3];
 /// Differences between windows that are tried with the best lens.
-const TOLERANCES: [f64; 2] = [0.02, 0.05];
+const TOLERANCES: [f64; 4] = [0.0, 0.03, 0.07, 0.15];
 /// Improvement that justifies a lens with one more parameter.
 const WORTH: f64 = 0.97;
 /// Fewest pairs of which some are held out.
-const PAIRS_TO_SPLIT: usize = 4;
+const PAIRS_TO_SPLIT: usize = 6;
 /// Part of the noise's variance that smoothing leaves: sum of the squared taps.
 const SMOOTHED_NOISE: f64 = 0.0748;
 /// Least unexplained part, relative to the variance of the model's error, that is evidence of that error.
 const TELLING: f64 = 0.25;
 /// Least part of the errors within three standard deviations and largest RMS of error over standard deviation, of the
 /// target and of the target with coarser texture.
-const HONEST: [[f64; 2]; 2] = [[0.985, 1.0], [0.975, 1.15]];
+const HONEST: [[f64; 2]; 2] = [[0.985, 1.0], [0.97, 1.3]];
 
 /// One combination.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -136,10 +133,20 @@ pub(super) struct Target<'a> {
     pub optics_of: &'a (dyn Fn(Psf, f64) -> Result<Optics, StackError> + Sync),
 }
 
+/// A lens to try.
+#[derive(Clone, Copy)]
+struct Candidate {
+    psf: Psf,
+    /// Blur relative to the measured one.
+    factor: f64,
+    floor_px: f64,
+    /// Accepted difference between windows.
+    tolerance: f64,
+}
+
 struct Best {
     cost: f64,
-    psf: Psf,
-    factor: f64,
+    lens: Candidate,
     degree: usize,
     optics: Optics,
     samples: Samples,
@@ -156,7 +163,8 @@ pub(super) fn learn(target: &Target<'_>) -> Result<Learned, StackError> {
     ];
     let mut best: Option<Best> = None;
     let mut trials = Vec::new();
-    let mut attempt = |psf: Psf, factor: f64, [floor_px, tolerance]: [f64; 2], best: &mut Option<Best>| {
+    let mut attempt = |lens: Candidate, window: Window, best: &mut Option<Best>| {
+        let Candidate { psf, factor, floor_px, tolerance } = lens;
         let worth = if floor_px > 0.0 || tolerance > 0.0 { WORTH } else { 1.0 };
         let max_blur_px = (target.radius_px * factor).clamp(0.8, 4.5);
         let optics = (target.optics_of)(psf, max_blur_px)?;
@@ -167,8 +175,9 @@ pub(super) fn learn(target: &Target<'_>) -> Result<Learned, StackError> {
         };
         let optics = optics.with_stage(stage);
         // With a PSF that fits badly a target may have no depth.
-        let Ok(samples) = target.measure(&pairs, &optics) else { return Ok(()) };
-        for degree in DEGREES {
+        let Ok(samples) = target.measure(&pairs, &optics, window) else { return Ok(()) };
+        let largest = Curve::largest_degree(samples.of.iter().filter(|s| s.original));
+        for degree in DEGREES.into_iter().filter(|degree| *degree <= largest) {
             let Some((judged, inside)) = judge(&samples, degree, Split::Blocks) else { continue };
             // Holes count: unmeasured pixels have no error.
             let fill = inside * samples.of.len() as f64 / samples.looked_at.max(1) as f64;
@@ -188,29 +197,28 @@ pub(super) fn learn(target: &Target<'_>) -> Result<Learned, StackError> {
             });
             if best.as_ref().is_none_or(|best| cost < worth * best.cost) {
                 let samples = Samples { of: samples.of.clone(), ..samples };
-                *best = Some(Best { cost, psf, factor, degree, optics, samples });
+                *best = Some(Best { cost, lens, degree, optics, samples });
             }
         }
         Ok::<(), StackError>(())
     };
+    // One window finds the lens; the choice among windows follows.
+    let single = Window::Fixed(LEARNED_PX[2]);
     for psf in psfs {
         for factor in FACTORS {
-            attempt(psf, factor, [0.0; 2], &mut best)?;
+            attempt(Candidate { psf, factor, floor_px: 0.0, tolerance: 0.0 }, single, &mut best)?;
         }
     }
-    if let Some((psf, factor)) = best.as_ref().map(|best| (best.psf, best.factor)) {
+    if let Some(lens) = best.as_ref().map(|best| best.lens) {
         for floor_px in FLOORS_PX {
-            for factor in [0.85 * factor, factor] {
-                attempt(psf, factor, [floor_px, 0.0], &mut best)?;
+            for factor in [0.85 * lens.factor, lens.factor] {
+                attempt(Candidate { factor, floor_px, ..lens }, single, &mut best)?;
             }
         }
     }
-    if let Some((psf, factor, floor_px)) = best
-        .as_ref()
-        .map(|best| (best.psf, best.factor, best.optics.stage().map_or(0.0, |s| s.blur_floor_px)))
-    {
+    if let Some(Best { lens, .. }) = best.take() {
         for tolerance in TOLERANCES {
-            attempt(psf, factor, [floor_px, tolerance], &mut best)?;
+            attempt(Candidate { tolerance, ..lens }, Window::Adaptive, &mut best)?;
         }
     }
     trials.sort_by(|a, b| a.robust_mm.total_cmp(&b.robust_mm));
@@ -243,7 +251,8 @@ impl Target<'_> {
             .filter_map(|far| {
                 let pair = [far, far + self.pair_step].map(|i| self.slices[i].clone());
                 let prepared = prepare_owned(pair, &optics, None, &settings).ok()?;
-                let [far_image, near_image] = [&prepared.far, &prepared.near].map(smoothed);
+                // Equals a target with coarser texture, because blur and smoothing commute.
+                let [far_image, near_image] = [&prepared.far, &prepared.near].map(blurred);
                 let mut coarse = Prepared { far: far_image, near: near_image, ..prepared.clone() };
                 let noise = &mut coarse.noise;
                 for value in [&mut noise.constant, &mut noise.per_unit, &mut noise.mean_variance] {
@@ -256,9 +265,9 @@ impl Target<'_> {
             .collect())
     }
 
-    fn measure(&self, pairs: &[Pair], optics: &Optics) -> Result<Samples, StackError> {
+    fn measure(&self, pairs: &[Pair], optics: &Optics, window: Window) -> Result<Samples, StackError> {
         let settings = MeasureSettings {
-            window: Window::Adaptive,
+            window,
             run: Settings { median_px: 3, ..Settings::default() },
             ..MeasureSettings::default()
         };
@@ -289,7 +298,7 @@ impl Target<'_> {
             let measured = optics.alpha(f64::from(map.depth_mm[(y, x)]));
             let slope = optics.depth_per_alpha_mm(0.0).abs();
             let noise = f64::from(estimate.deviation_mm[(y, x)]) / slope;
-            let usable = pair.prepared.reasons[(y, x)] == 0 && measured.abs() < MEASURED && noise < TOO_NOISY;
+            let usable = pair.prepared.reasons[(y, x)] == 0 && measured.is_finite() && noise < TOO_NOISY;
             if usable {
                 samples.push(Sample {
                     measured,
@@ -327,7 +336,7 @@ fn judge(samples: &Samples, degree: usize, by: Split) -> Option<(Vec<Judged>, f6
         if own.is_empty() {
             continue;
         }
-        let curve = Curve::fit(others(), degree)?;
+        let curve = Curve::fit(others(), degree.min(Curve::largest_degree(others())))?;
         let [low, high] =
             others().fold([f64::MAX, f64::MIN], |[low, high], s| [low.min(s.truth), high.max(s.truth)]);
         for s in own.into_iter().filter(|s| (low..=high).contains(&s.truth)) {
@@ -351,21 +360,6 @@ impl Curve {
             unexplained: unexplained(s.misfit, noise as f32),
         })
     }
-}
-
-/// Binomial blur of five taps: equals a target with coarser texture, because blur and smoothing commute.
-fn smoothed(image: &Array2<f32>) -> Array2<f32> {
-    let (height, width) = image.dim();
-    let pass = |image: &Array2<f32>, down: isize, right: isize| {
-        Array2::from_shape_fn((height, width), |(y, x)| {
-            let at = |i: isize| {
-                let [y, x] = [reflect(y as isize + i * down, height), reflect(x as isize + i * right, width)];
-                image[(y, x)]
-            };
-            (at(-2) + 4.0 * at(-1) + 6.0 * at(0) + 4.0 * at(1) + at(2)) / 16.0
-        })
-    };
-    pass(&pass(image, 1, 0), 0, 1)
 }
 
 fn robust(errors: impl Iterator<Item = f64>) -> f64 {
