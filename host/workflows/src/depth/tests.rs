@@ -2,7 +2,7 @@ use std::{fs, path::Path};
 
 use farnear_files::image_file::encode_png;
 
-use super::*;
+use super::{method::Method, noise::CameraNoise, *};
 use crate::context::{Cancel, Progress, Unattended};
 
 const OPTICS: &str = "[lens]\nfocal_length_mm = 50.0\naperture_mm = 12.8\n[sensor]\npixel_um = 7.4\n\
