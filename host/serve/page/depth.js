@@ -16,6 +16,8 @@ const METHODS = [["whitened", "Whitened (noise limit)"], ["ro", "Rational operat
 /** Folder of what is computed from a stack, within its capture. */
 const STACK = "focus-stack";
 const GREY = ["far", "near", "sharp"];
+const OF_STACKS = ["sharp"];
+const OF_PAIRS = ["deviation", "near", "reason"];
 
 /** Makes the view. `open(name)` shows a capture. */
 export function make(host, remember) {
@@ -175,6 +177,7 @@ export function make(host, remember) {
     empty.hidden = Boolean(maps.far || maps.depth);
     for (const control of layers.children) {
       control.setAttribute("aria-pressed", control.dataset.layer === layer);
+      control.hidden = (show.capture && show.capture.kind !== "pair" ? OF_PAIRS : OF_STACKS).includes(control.dataset.layer);
       control.disabled = control.dataset.layer === "surface" ? !maps.depth || !has_map(show.capture) : !maps[control.dataset.layer];
     }
     const solid = layer === "surface" && maps.depth;
