@@ -93,7 +93,7 @@ export function make(host) {
   };
   const exposure = h("input", { type: "number", min: 1, max: 1000000, step: 100, inputmode: "numeric" });
   exposure.addEventListener("change", () => act("/api/live", { exposure_us: Math.round(Number(exposure.value)) }));
-  const light = ["First", "Second"].map((text) => h("input", { type: "number", min: 0, max: 100, "aria-label": `${text} light output` }));
+  const light = [0, 1].map(() => h("input", { type: "number", min: 0, max: 100, title: "Light output of the board during captures and live depth" }));
   for (const level of light) level.addEventListener("change", () => act("/api/live", { light_percent: light.map((input) => Number(input.value)) }));
   const measure = choice(MEASURES, MEASURES[0][0], (name) => { values.length = 0; best = 0; act("/api/live", { measure: name }); });
   const forget = button("Reset", () => { values.length = 0; best = 0; }, { title: "Forgets the largest value" });
@@ -108,7 +108,7 @@ export function make(host) {
       capture.make(),
       panel("Focus value", h("div", { class: "reading" }, focus, forget), place, field("Measure", measure)),
       panel("Recordings", h("div", { class: "row record-row" }, play, recordings), h("label", { class: "check" }, fast, "as fast as it goes"), played),
-      panel("Camera", field("Exposure", exposure, "µs"), h("div", { class: "row", title: "The board's light outputs during captures and live depth" }, h("span", {}, "Light"), ...light, h("span", { class: "unit" }, "%")), histogram, figures, warnings, camera.make()))));
+      panel("Camera", field("Exposure", exposure, "µs"), ...light.map((level, at) => field(`Light ${at + 1}`, level, "%")), histogram, figures, warnings, camera.make()))));
   depth.element.hidden = true;
   depth.onprobe = (at) => {
     const code = at && live ? live.codes[at[1] * live.width + at[0]] : 0;
