@@ -1,7 +1,6 @@
-//! Registration of pairs from files, with its processor time; `peer_ecc.py` compares it with OpenCV's ECC.
-//!
-//! Arguments: WIDTH HEIGHT TIMES FAR NEAR [FAR NEAR ...], images of 32-bit floats, row by row. Prints one JSON object
-//! per pair. One thread; the processor time is the minimum of TIMES runs, as Linux counts it for all threads.
+//! Registration of pairs from files, with its processor time; `peer_ecc.py` compares it with OpenCV's ECC. Arguments:
+//! WIDTH HEIGHT TIMES FAR NEAR [FAR NEAR ...], images of 32-bit floats, row by row. Prints one JSON object per pair.
+//! One thread; the processor time is the minimum of TIMES runs, as Linux counts it for all threads.
 #![allow(clippy::unwrap_used, missing_docs)] // A benchmark may stop; it has no users.
 
 use std::fs;

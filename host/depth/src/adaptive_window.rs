@@ -33,8 +33,7 @@ pub use bank::Bank;
 
 /// Sides of the windows that [`Window::Adaptive`] chooses from, px.
 pub const ADAPTIVE_PX: [usize; 3] = [7, 13, 21];
-/// The same for a lens of `calibrate stack`: its own error, which a point of strong texture may dominate, is averaged
-/// over more texture.
+/// The same for `calibrate stack` lenses: more texture averages their own error, which strong points may dominate.
 pub const LEARNED_PX: [usize; 3] = [11, 21, 41];
 /// Sides of the windows that [`Window::Safe`] chooses from, px.
 pub const SAFE_PX: [usize; 3] = [9, 13, 21];

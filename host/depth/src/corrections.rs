@@ -110,8 +110,7 @@ impl TryFrom<Stored> for Correction {
     }
 }
 
-/// Learns a correction. Returns [`CorrectionError`] for too few patterns, invalid or repeated depths, or too few valid
-/// pixels.
+/// Learns a correction. [`CorrectionError`] for too few patterns or valid pixels, and for invalid or repeated depths.
 pub fn fit(
     method: Method,
     patterns: &[Pattern<'_>],

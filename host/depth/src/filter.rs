@@ -1,7 +1,6 @@
 //! Convolution of a whole image with an eight-fold symmetric kernel. Borders are reflected without repeating the edge
-//! pixel. The middle of the image is processed in place; only columns near the left and right border use a copy with
-//! the reflected ones. Cost for 7x7: 16 multiply-adds and 10 additions per pixel (see `simd::convolve`), 0.13 ms for
-//! 640x480 with AVX-512.
+//! pixel. The middle is processed in place; only columns near the left and right border use a reflected copy. Cost for
+//! 7x7: 16 multiply-adds and 10 additions per pixel (see `simd::convolve`), 0.13 ms for 640x480 with AVX-512.
 
 use std::ops::Range;
 

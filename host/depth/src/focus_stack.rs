@@ -8,11 +8,9 @@
 //! images are missing on one side; it serves for the reliability. Three points (Nayar & Nakagawa 1994) have two to three times
 //! the error of eleven.
 //!
-//! A stack needs neither point spread function nor aperture. Its range is that of its images.
-//!
-//! Cost: the focus measure for each image, and about 40 operations per pixel and image. Images are read by rows ([`Slices`]), so
-//! they need not be in memory. Memory: 28 bytes a pixel for the maps, and the sharpness of the rows at work in all images
-//! (`BAND_BYTES`).
+//! A stack needs neither point spread function nor aperture. Its range is that of its images. Cost: the focus measure
+//! for each image, and about 40 operations per pixel and image. Images are read by rows ([`Slices`]), not held in
+//! memory. Memory: 28 bytes a pixel for the maps, and the sharpness of the rows at work in all images (`BAND_BYTES`).
 
 mod error;
 mod guided;

@@ -114,8 +114,7 @@ impl Optics {
         Self { stage: Some(stage), ..self }
     }
 
-    /// Magnification of the near- relative to the far-focused image without telecentricity: the sensor distances'
-    /// ratio.
+    /// Magnification of the near relative to the far image without telecentricity: the ratio of the sensor distances.
     pub fn magnification_ratio(&self) -> f64 {
         let range = self.working_range();
         range.sensor_near_mm / range.sensor_far_mm

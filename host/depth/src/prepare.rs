@@ -8,8 +8,7 @@
 //! 5. Both are brought to one brightness ([`balance`]).
 //! 6. What moved between the exposures is marked, and a pair of different scenes is refused ([`agreement`]).
 //!
-//! By itself ([`Align::Auto`], [`Balance::Auto`]) it changes only what it finds to be different for certain: a good pair
-//! goes through untouched.
+//! By default ([`Align::Auto`], [`Balance::Auto`]) it corrects only significant differences; a good pair is unchanged.
 
 pub mod agreement;
 pub mod align;
@@ -272,9 +271,8 @@ pub fn prepare_owned(
     finish(pair, Some(recorded), marks, optics, &PrepareSettings { noise, ..*settings })
 }
 
-/// An image as a lens without distortion would have taken it; NaN where the lens showed nothing of what would lie there.
-///
-/// Cost: 36 multiply-adds and the map, some 30 operations, per pixel; on all threads.
+/// An image as a lens without distortion would have taken it; NaN where the lens recorded nothing. Cost: 36
+/// multiply-adds and the map, some 30 operations, per pixel; on all threads.
 pub fn straightened(image: ArrayView2<f32>, distortion: &Distortion) -> Array2<f32> {
     straight::image(image, distortion)
 }

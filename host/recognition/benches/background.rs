@@ -1,8 +1,6 @@
-//! Frame rates of the background model, frame to silhouette and frame to embedded point; one thread, 640x480.
-//!
-//! Scene: textured background with noise, a tenth of the pixels flickering (foliage), three moving discs. The
-//! highway sequence of ChangeDetection.net, doubled to 640x480, is timed if present. `FARNEAR_JSON=1` prints
-//! JSON.
+//! Frame rates of the background model, frame to silhouette and frame to embedded point; one thread, 640x480. Scene:
+//! textured background with noise, a tenth of the pixels flickering (foliage), three moving discs. The highway sequence
+//! of ChangeDetection.net, doubled to 640x480, is timed if present. `FARNEAR_JSON=1` prints JSON.
 
 use std::{fs, hint::black_box, time::Instant};
 

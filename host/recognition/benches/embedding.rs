@@ -1,7 +1,6 @@
-//! Times from silhouettes to points: `cargo bench -p farnear-recognition --bench embedding`.
-//!
-//! The gallery is 1500 seeded synthetic silhouettes. `-- --features FILE.npy` only writes its descriptors (N
-//! x 360). `FARNEAR_JSON=1` prints JSON lines. `landmark_20000` runs first, so the peak memory is its own.
+//! Times from silhouettes to points: `cargo bench -p farnear-recognition --bench embedding`. The gallery is 1500 seeded
+//! synthetic silhouettes. `-- --features FILE.npy` only writes its descriptors (N x 360).
+//! `FARNEAR_JSON=1` prints JSON lines. `landmark_20000` runs first, so the peak memory is its own.
 
 use std::{hint::black_box, io::Write, time::Instant};
 

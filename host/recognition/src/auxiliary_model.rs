@@ -1,9 +1,7 @@
-//! An auxiliary model with many more activities, trained on synthetic people, separates untrained ones
-//! better.
-//!
-//! An activity's profile is the normalised mean of the square roots of the auxiliary model's probabilities
-//! over the training clips. A clip's distance is the Bhattacharyya distance, -ln of the scalar product
-//! (Kailath, IEEE Trans. Communication Technology 15, 1967). Background clips: Hendrycks et al., ICLR 2019.
+//! An auxiliary model with many more activities, trained on synthetic people, separates untrained ones better. An
+//! activity's profile is the normalised mean of the square roots of the auxiliary model's probabilities over the
+//! training clips. A clip's distance is the Bhattacharyya distance, -ln of the scalar product (Kailath, IEEE Trans.
+//! Communication Technology 15, 1967). Background clips: Hendrycks et al., ICLR 2019.
 
 use super::classifier::largest;
 use super::clip::Clip;

@@ -1,7 +1,5 @@
-//! Cross-validation over training subjects.
-//!
-//! Spaces are learned once from all training clips (unsupervised). Classifiers are trained and tested over
-//! folds of subjects on the Gram matrix. O(spaces x (clips^2 P + folds clips^2)).
+//! Cross-validation over training subjects. Spaces are learned once from all training clips (unsupervised). Classifiers
+//! are trained and tested over folds of subjects on the Gram matrix. O(spaces x (clips^2 P + folds clips^2)).
 
 use super::classifier::ClassifierKind;
 use super::classifier::method::Fold;

@@ -1,10 +1,8 @@
-//! A clip's pattern over a codebook of typical frames.
-//!
-//! Typical frames are k-means centres of the training frames; the cells of the thesis' grid grow with the
-//! power of the dimensions. Each frame is assigned softly, to all centres by a Gaussian of its distance. The
-//! mean assignment is square-rooted, so that the scalar product of two patterns is the Bhattacharyya
-//! coefficient. It is independent of the order of frames. An ordered pattern adds the same over the clip's
-//! halves and thirds. A second, smaller codebook may add its [`super::residuals`].
+//! A clip's pattern over a codebook of typical frames, the k-means centres of the training frames (cells of the thesis'
+//! grid grow with the power of the dimensions). Each frame is assigned softly, to all centres by a Gaussian of its
+//! distance. The mean assignment, independent of the order of frames, is square-rooted: the scalar product of two
+//! patterns is the Bhattacharyya coefficient. An ordered pattern adds the same over the clip's halves and thirds; a
+//! second, smaller codebook may add its [`super::residuals`].
 
 use super::frames::Mode;
 use super::residuals::residuals;

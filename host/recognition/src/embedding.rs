@@ -17,7 +17,6 @@ use ndarray::{Array2, ArrayView2};
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[allow(missing_docs, reason = "the messages name the fields")]
 pub enum EmbeddingError {
-    /// The work was cancelled.
     #[error("stopped before the embedding was made")]
     Stopped,
     #[error("{found} samples are too few: {needed} are needed")]
@@ -31,12 +30,10 @@ pub enum EmbeddingError {
         /// The requested neighbourhood, in words.
         neighbours: String,
     },
-    /// Fewer useful dimensions than requested.
     #[error(
         "only {found} eigenvalues are positive, but {asked} dimensions were requested: use at most {found}"
     )]
     TooFewDimensions {
-        /// Positive eigenvalues.
         found: usize,
         asked: usize,
     },
@@ -46,7 +43,6 @@ pub enum EmbeddingError {
     Singular { ridge: f64 },
     #[error("{what}: expected {expected}, found {found}")]
     Shape {
-        /// Mismatched array or dimension.
         what: &'static str,
         expected: usize,
         found: usize,

@@ -1,7 +1,6 @@
-//! Parameters chosen by cross-validation, and their candidates.
-//!
-//! Each parameter in turn takes each of its values and the best is kept, by the accuracy of inner folds over
-//! the training subjects. Values are factors of two or three around equal weight, not tuned to any set.
+//! Parameters chosen by cross-validation, and their candidates. Each parameter in turn takes each of its values and the
+//! best is kept, by the accuracy of inner folds over the training subjects. Values are factors of two or three around
+//! equal weight, not tuned to any set.
 
 use super::alignment::Alignment;
 use super::classifier::{ClassifierKind, Family};

@@ -20,7 +20,6 @@ use serde::{Deserialize, Serialize};
 pub struct RecogniserSettings {
     pub scaling: Scaling,
     pub space: SpaceSettings,
-    /// Sharpness of soft assignments.
     pub sharpness: f32,
     pub classifier: ClassifierKind,
     /// Also train on mirrored clips.
@@ -233,8 +232,7 @@ impl Recogniser {
         }
     }
 
-    /// The outlier score of an answer if the model did not have this activity; `None` for models that measure
-    /// distances.
+    /// The outlier score of an answer if the model lacked this activity; `None` for models that measure distances.
     pub fn outlier_score_without(&self, answer: &Answer, activity: &str) -> Option<f32> {
         let others: Vec<String> = self.activities.iter().filter(|name| *name != activity).cloned().collect();
         self.entropy_score(&answer.among(&others).probabilities)

@@ -1,7 +1,6 @@
-//! Model files: 8 bytes `farnearA`, format version (u32), descriptor version (u32), body length (u64), CRC-32
-//! of the body (u32), little-endian; then the body (postcard), pattern classes, an optional auxiliary model,
-//! and clip lengths. Older versions end earlier and are accepted. Decoded parts are checked against each
-//! other, so a crafted file cannot cause a panic.
+//! Model files: 8 bytes `farnearA`, format version (u32), descriptor version (u32), body length (u64), CRC-32 of the
+//! body (u32), little-endian; then the body (postcard), pattern classes, an optional auxiliary model, and clip lengths.
+//! Older, shorter versions are accepted. Decoded parts are checked against each other: a crafted file cannot panic.
 
 use super::auxiliary_model::AuxiliaryModel;
 use super::classifier::Classifier;

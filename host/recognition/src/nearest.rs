@@ -1,7 +1,5 @@
-//! Exact nearest pattern without comparing all.
-//!
-//! Distances of projections on some dozen orthonormal directions, and the residual lengths, bound the
-//! distance from below. Only patterns with a bound below the best distance are compared. O(patterns x
+//! Exact nearest pattern without comparing all. Projections on some dozen orthonormal directions and the residual
+//! lengths bound distances from below; only patterns with a bound below the best distance are compared. O(patterns x
 //! directions).
 
 use crate::embedding::squared_distance;

@@ -1,7 +1,6 @@
-//! Embedded pattern learning (EPL) as in Li 2014 (eq. 9.11 to 9.13): visited cells of a grid over the
-//! embedding. Members per dimension are at `min + (n - 1/2) R / Nt`; a frame selects the nearest in each; a
-//! visited cell is 1. (The printed `n R / Nt + min` leaves half a cell unused.) Independent of the order of
-//! frames.
+//! Embedded pattern learning (EPL) as in Li 2014 (eq. 9.11 to 9.13): visited cells of a grid over the embedding.
+//! Members per dimension are at `min + (n - 1/2) R / Nt`; a frame selects the nearest in each; a visited cell is 1.
+//! (The printed `n R / Nt + min` leaves half a cell unused.) Independent of the order of frames.
 
 use ndarray::{Array1, ArrayView2, Axis};
 use serde::{Deserialize, Serialize};

@@ -1,9 +1,7 @@
-//! Segmentation of recordings by a hidden semi-Markov model (Yu, Artificial Intelligence 174, 2010).
-//!
-//! The score of a segment from frame a to b is `(b - a) (ln p(a, b) - strange * outlier(a, b)) - change -
-//! unlikely(b - a)` for the best activity. Dynamic programming over a grid of borders finds the best
-//! sequence; borders are then refined frame by frame. O(frames / step x lengths) answers; frames are embedded
-//! once.
+//! Segmentation of recordings by a hidden semi-Markov model (Yu, Artificial Intelligence 174, 2010). The score of a
+//! segment from frame a to b is `(b - a) (ln p(a, b) - strange * outlier(a, b)) - change - unlikely(b - a)` for the
+//! best activity. Dynamic programming over a grid of borders finds the best sequence; borders are then refined frame by
+//! frame. O(frames / step x lengths) answers; frames are embedded once.
 
 use super::clip::Track;
 use super::lengths::Lengths;

@@ -1,6 +1,5 @@
-//! Self-training on unlabelled clips from another camera, sensor or laboratory: the classifier is retrained
-//! with its surest answers as labels (Yarowsky, ACL 1995; equal shares per class: Zou et al., ECCV 2018).
-//! Requires mostly correct first answers.
+//! Self-training on unlabelled clips from another camera, sensor or laboratory: retrains the classifier on its surest
+//! answers (Yarowsky, ACL 1995; equal shares per class: Zou et al., ECCV 2018). Requires mostly correct first answers.
 
 use super::classifier::{Classifier, ClassifierKind, largest};
 use ndarray::{Array2, ArrayView2, Axis, concatenate};

@@ -43,10 +43,8 @@ pub enum PatternKind {
     Network,
 }
 
-/// Settings before patterns exist.
-///
-/// The default uses twenty principal components, which need no connected neighbour graph; [`Self::thesis`]
-/// uses Isomap. Report accuracies for settings chosen on other subjects
+/// Settings before patterns exist. By default twenty principal components, which need no connected neighbour graph;
+/// [`Self::thesis`] uses Isomap. Report accuracies of settings chosen on other subjects
 /// ([`super::experiment::Experiment::searched`]), not for these defaults.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[allow(missing_docs, reason = "names and types describe these fields")]
@@ -60,7 +58,6 @@ pub struct SpaceSettings {
     pub pattern: PatternKind,
     /// Centres of residuals in codebook patterns; 0 for none, no effect on the thesis' grid.
     pub residuals: usize,
-    /// Whether the order of frames counts.
     pub mode: Mode,
     pub weights: Weights,
     pub seed: u64,

@@ -2,8 +2,7 @@
 //!
 //! The normal matrix of a polynomial in x, y and u contains only sums of `x^a y^b u^c` with `a + b + c <= 6`, and the
 //! right side sums of `x^a y^b u^c t` with `a + b + c <= 3`. Collecting them once costs less than the outer product of
-//! 20 terms and serves every choice of terms. Everything is f64: with |x|, |y| <= 1 a region's condition number is
-//! below 1e9.
+//! 20 terms and serves any terms. Everything is f64: with |x|, |y| <= 1 a region's condition number is below 1e9.
 
 use nalgebra::{DMatrix, DVector};
 

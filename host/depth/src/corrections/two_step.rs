@@ -1,8 +1,6 @@
-//! The two-step correction (Li 2014, section 5.3), for comparison.
-//!
-//! A first fit gives the true depth from place and raw depth, `T = f(x, y, Uraw)` (eq. 5.21), a second one the raw
-//! depth from place and true depth, `Uc = g(x, y, T)` (eq. 5.22). The corrected depth is `Uraw - Uc + T`. Errors of the
-//! first fit enter the second, which is why one fit (CLSF) does better.
+//! The two-step correction (Li 2014, section 5.3), for comparison. A first fit gives the true depth from place and raw
+//! depth, `T = f(x, y, Uraw)` (eq. 5.21), a second one the raw depth from place and true depth, `Uc = g(x, y, T)` (eq.
+//! 5.22). The corrected depth is `Uraw - Uc + T`. Errors of the first fit enter the second; one fit (CLSF) is better.
 
 use farnear_maths::clsf::DepthScale;
 use ndarray::ArrayViewMut2;

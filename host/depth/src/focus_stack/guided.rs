@@ -1,14 +1,12 @@
 //! Places of a stack, corrected along the edges of the sharp image.
 //!
-//! Window and blur enlarge a textured object in front of a dull surface; the sharp image still has its edges. Each place
-//! becomes the weighted median of its surroundings (Ma et al., Constant time weighted median filtering for stereo matching
-//! and beyond, ICCV 2013). Near and equally bright places weigh more. A weight falls with the sharpness, because strong
-//! detail spreads over weak surroundings. It rises with the curve's height above its mean, because a place without texture
-//! has no information.
-//!
-//! Places that the median confirms keep their own value, so that smooth surfaces keep their accuracy.
-//!
-//! Cost: about 200 places for each pixel, for any window, and a histogram of 8 bins for each image of the stack.
+//! Window and blur enlarge a textured object in front of a dull surface; the sharp image still has its edges. Each
+//! place becomes the weighted median of its surroundings (Ma et al., Constant time weighted median filtering for stereo
+//! matching and beyond, ICCV 2013). Near and equally bright places weigh more. A weight falls with the sharpness
+//! (strong detail spreads over weak surroundings) and rises with the curve's height above its mean (a place without
+//! texture has no information). Places that the median confirms keep their own value, so that smooth surfaces keep
+//! their accuracy. Cost: about 200 places for each pixel, for any window, and a histogram of 8 bins for each image of
+//! the stack.
 
 use ndarray::{Array2, ArrayView2, Axis, Zip};
 use rayon::prelude::*;

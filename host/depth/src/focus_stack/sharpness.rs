@@ -1,8 +1,7 @@
-//! Focus measures of Pertuz, Puig & Garcia (Analysis of focus measure operators for shape-from-focus, Pattern Recognition
-//! 46, 2013), with their abbreviations.
-//!
-//! Each is a value per pixel, from its neighbours, and a mean or a variance over a window around it. Borders are reflected.
-//! Cost: 10 to 60 operations a pixel for any window; for the range twice the window's side.
+//! Focus measures of Pertuz, Puig & Garcia (Analysis of focus measure operators for shape-from-focus, Pattern
+//! Recognition 46, 2013), with their abbreviations. Each is a value per pixel, from its neighbours, and a mean or a
+//! variance over a window around it. Borders are reflected. Cost: 10 to 60 operations a pixel for any window; for the
+//! range twice the window's side.
 
 use std::{fmt, str::FromStr};
 

@@ -46,7 +46,6 @@ pub enum OpticsError {
         blur_would_be_px: f64,
         percent: f64,
     },
-    /// A camera matrix that is not one of OpenCV's.
     #[error(
         "[distortion] camera_matrix = {rows:?}: expected [[fx, 0, cx], [0, fy, cy], [0, 0, 1]] in pixels, as cv2.calibrateCamera \
          returns it"

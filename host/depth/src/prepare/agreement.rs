@@ -35,8 +35,7 @@ const TILE_PX: usize = 64;
 /// What the comparison of a pair says.
 #[derive(Debug, Clone)]
 pub struct Agreement {
-    /// Correlation over the whole image of those windows that have detail, relative to what noise allows; `None` where
-    /// none has.
+    /// Correlation of the windows with detail over the whole image, relative to what noise allows; `None` without any.
     pub correlation: Option<f64>,
     /// Part of the windows that have detail in both images.
     pub detailed: f64,

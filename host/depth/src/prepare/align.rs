@@ -3,10 +3,9 @@
 //! Both images are reduced to their common band (`band`), from coarse to fine. The coarsest level tries every shift.
 //! From there Gauss-Newton steps minimise the squared difference (Lucas & Kanade 1981, in the inverse compositional
 //! form of Baker & Matthews 2004: the far image's gradients serve all steps). Cauchy's weights suppress motion between
-//! the exposures. A symmetric PSF moves nothing, so different blur does not shift the minimum.
-//!
-//! Cost: `cargo bench -p farnear-depth --bench registration`; large images are reduced to at most 800,000 pixels
-//! (`thinned`). If the images are already aligned, one level confirms it (`displaced`).
+//! the exposures. A symmetric PSF moves nothing, so different blur does not shift the minimum. Large images are reduced
+//! to at most 800,000 pixels (`thinned`). If the images are already aligned, one level confirms it (`displaced`). Cost:
+//! `cargo bench -p farnear-depth --bench registration`.
 
 use nalgebra::{DMatrix, DVector};
 use ndarray::{Array2, ArrayView2};
@@ -321,8 +320,7 @@ fn rms_over_field(model: Model, covariance: &DMatrix<f64>, unit: f64, size: (usi
 /// Pixels that are summed in parallel: the compiler vectorises them.
 const SIDE_BY_SIDE: usize = 8;
 
-/// Derivatives of the far image by each of `N` parameters at pixels with these gradients and places; as
-/// [`Model::basis`].
+/// Derivatives of the far image by each of `N` parameters at pixels with these gradients and places ([`Model::basis`]).
 #[inline(always)]
 fn jacobian<const N: usize>(
     [gx, gy]: [&[f32; SIDE_BY_SIDE]; 2],

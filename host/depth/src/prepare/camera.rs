@@ -1,8 +1,6 @@
-//! Calibration frames of a camera: dark signal, response of each pixel, bad pixels.
-//!
-//! `dark` is the mean of exposures with the lens covered. `flat` is each pixel's response to even light, (light - dark)
-//! relative to its mean in a large window. The slow falloff of lamp and lens thus remains for balancing. A pixel is bad
-//! if its dark value or response is far from all others.
+//! Calibration frames of a camera. `dark` is the mean of exposures with the lens covered. `flat` is each pixel's
+//! response to even light, (light - dark) relative to its mean in a large window; the slow falloff of lamp and lens
+//! remains for balancing. A pixel is bad if its dark value or response is far from all others.
 
 use ndarray::{Array2, ArrayView2, Zip};
 
@@ -44,8 +42,7 @@ pub enum CameraError {
     Structured {
         kind: &'static str,
         number: usize,
-        /// Standard deviation of the smoothed brightness around its surroundings, percent of the mean (of full scale in the
-        /// dark).
+        /// SD of the smoothed brightness around its surroundings, percent of the mean (in the dark: of full scale).
         percent: f64,
         expected: &'static str,
         advice: &'static str,

@@ -1,8 +1,6 @@
-//! Defective pixels: saturated, black, bad, not finite.
-//!
-//! A single one is replaced by the mean of its neighbours: its error is small among the hundreds of pixels for a depth.
-//! A clipped highlight is not changed: its value is a lower bound, and its neighbours are darker. A patch has no such
-//! neighbours and becomes a hole (NaN), which removes all depths that depend on it.
+//! Defective pixels: saturated, black, bad, not finite. The mean of its neighbours replaces a single one: its error is
+//! small among the hundreds of pixels for a depth. A clipped highlight is unchanged: its value is a lower bound, and
+//! its neighbours are darker. A patch becomes a hole (NaN), which removes all depths that depend on it.
 
 use ndarray::{Array2, ArrayView2};
 
@@ -13,8 +11,7 @@ const NEIGHBOURHOOD_PX: isize = 2;
 /// Most defects in it, the pixel included.
 const ALONE: usize = 6;
 
-/// Least mean of the neighbours, relative to a saturated pixel, of a clipped highlight; a pixel far above them is
-/// defective.
+/// Least mean of the neighbours of a clipped highlight, relative to a saturated pixel; below it the pixel is defective.
 const HIGHLIGHT: f32 = 0.5;
 
 /// Marks the defects of an image: code of the [`Reason`], 0 = none. `limits` are the black and the white level of a

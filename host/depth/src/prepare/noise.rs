@@ -3,9 +3,7 @@
 //! At the highest frequencies, towards (pi, pi), defocus leaves no signal, and at any depth at least one image is out
 //! of focus. Both images pass the second difference along both axes (Immerkaer 1996), whose response peaks there. The
 //! smaller of a block's two energies is the noise. Blocks of several brightnesses separate shot noise from the constant
-//! part.
-//!
-//! Cost: nine additions per pixel and image.
+//! part. Cost: nine additions per pixel and image.
 
 use ndarray::ArrayView2;
 use rayon::prelude::*;

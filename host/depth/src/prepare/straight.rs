@@ -6,9 +6,8 @@ use super::warp::resample_by;
 use crate::optics::Distortion;
 use crate::reason::Reason;
 
-/// The image without distortion; NaN outside the recorded field.
-///
-/// Cost: 36 multiply-adds and the map, some 30 operations, per pixel; on all threads.
+/// The image without distortion; NaN outside the recorded field. Cost: 36 multiply-adds and the map, some 30
+/// operations, per pixel; on all threads.
 pub(super) fn image(image: ArrayView2<f32>, distortion: &Distortion) -> Array2<f32> {
     resample_by(image, |place| distortion.distorted(place))
 }
@@ -44,8 +43,7 @@ mod tests {
         .unwrap()
     }
 
-    /// A wave recorded through the lens: each recorded pixel has the wave's value at its origin by the model, inverted
-    /// iteratively.
+    /// A recorded wave: each pixel has the wave's value at its origin by the model, inverted iteratively.
     #[test]
     fn a_wave_is_straight_again() {
         let distortion = distortion();

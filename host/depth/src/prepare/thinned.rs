@@ -1,5 +1,4 @@
-//! A pair at the size for comparison: halved until it has few enough pixels, with the common band. Registration and
-//! agreement share it.
+//! A pair at the size for registration and agreement, halved to few enough pixels, with its common band.
 
 use ndarray::{Array2, ArrayView2};
 

@@ -1,6 +1,5 @@
-//! Where a pixel of one image lies in another: an affine map, and resampling by it.
-//!
-//! Coordinates are (x, y) in pixels, the centre of the first pixel at (0, 0).
+//! An affine map from the pixels of one image to another, and resampling by it. Coordinates are (x, y) in pixels, the
+//! centre of the first pixel at (0, 0).
 
 use ndarray::{Array2, ArrayView2, Axis};
 use rayon::prelude::*;
@@ -148,11 +147,10 @@ impl Lanczos {
     }
 }
 
-/// The image as seen through `warp`: pixel `p` of the result shows the place `warp(p)` of `image`, interpolated by Lanczos'
-/// kernel of three lobes, which keeps what the operators look at (up to 0.6 of the pixels' Nyquist frequency to 2 %). NaN
-/// where that place lies outside, and where a pixel without a value would take part.
-///
-/// Cost: 12 multiply-adds per pixel where neighbours lie between the same rows, 54 elsewhere; on all threads of the pool.
+/// The image as seen through `warp`: pixel `p` of the result shows the place `warp(p)` of `image`, interpolated by
+/// Lanczos' kernel of three lobes, which keeps what the operators look at (up to 0.6 of the pixels' Nyquist frequency
+/// to 2 %). NaN where that place lies outside, and where a pixel without a value would take part. Cost: 12
+/// multiply-adds per pixel where neighbours lie between the same rows, 54 elsewhere; on all threads of the pool.
 pub fn resample(image: ArrayView2<f32>, warp: &Warp) -> Array2<f32> {
     resample_by(image, |place| warp.at(place))
 }

@@ -58,8 +58,7 @@ impl RadialPsf {
     }
 
     /// The profile of an image of the PSF or aperture, black = no light, about its centroid. `radius_px` is the blur
-    /// radius (the aperture's edge) in the image; `None` takes half the shorter side. [`PsfError::Profile`] without
-    /// light.
+    /// radius (the aperture's edge) in the image; `None`: half the shorter side. [`PsfError::Profile`] without light.
     pub fn from_image(image: ArrayView2<f32>, radius_px: Option<f64>) -> Result<Drawn, PsfError> {
         let (height, width) = image.dim();
         let radius_px = radius_px.unwrap_or(0.5 * height.min(width) as f64);

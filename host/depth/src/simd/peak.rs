@@ -10,8 +10,7 @@ use crate::simd::Backend;
 const SUMS: usize = 12;
 
 impl Backend {
-    /// Does independent multiply-adds in registers; returns their floating-point operations, two per lane and
-    /// multiply-add.
+    /// Independent multiply-adds in registers; returns their floating-point operations, two per lane and multiply-add.
     pub fn multiply_adds(self, rounds: u32) -> u64 {
         let [factor, summand] = black_box([0.999_f32, 0.001]);
         black_box(chains(self, rounds, factor, summand))

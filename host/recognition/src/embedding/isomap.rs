@@ -1,7 +1,6 @@
-//! Isomap (Tenenbaum, de Silva, Langford, Science 290, 2000): classical scaling of geodesic distances.
-//!
-//! Coordinates are the leading eigenvectors of `B = -1/2 J D^2 J` times the square roots of their
-//! eigenvalues. K = N - 1 (the thesis' choice) is exactly PCA. O(N^2 (d + K)) time, 8 N^2 bytes.
+//! Isomap (Tenenbaum, de Silva, Langford, Science 290, 2000): classical scaling of geodesic distances. Coordinates are
+//! the leading eigenvectors of `B = -1/2 J D^2 J` times the square roots of their eigenvalues. K = N - 1 (the thesis'
+//! choice) is exactly PCA. O(N^2 (d + K)) time, 8 N^2 bytes.
 
 use super::geodesic::all_pairs;
 use super::neighbours::{Graph, Neighbourhood};

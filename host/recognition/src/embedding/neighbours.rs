@@ -1,6 +1,5 @@
-//! Neighbour graph: K nearest or within a radius, symmetric, in compressed sparse rows. O(N^2 d) flops, O(N
-//! K) memory. Edges are recomputed from the samples to avoid the cancellation of the blockwise matrix
-//! product.
+//! Neighbour graph: K nearest or within a radius, symmetric, in compressed sparse rows. O(N^2 d) flops, O(N K) memory.
+//! Edges are recomputed from the samples to avoid the cancellation of the blockwise matrix product.
 
 use super::{EmbeddingError, squared_distance, squared_norms, times_transposed};
 use ndarray::{ArrayView2, s};

@@ -1,7 +1,6 @@
-//! Leave-one-subject-out evaluation.
-//!
-//! Space, sharpness and classifier are chosen by cross-validation over the other subjects ([`crate::choice`])
-//! and trained on all of these. The left-out clips are recognised once and influence nothing.
+//! Leave-one-subject-out evaluation. Space, sharpness and classifier are chosen by cross-validation over the other
+//! subjects ([`crate::choice`]) and trained on all of these. The left-out clips are recognised once and influence
+//! nothing.
 
 use super::confusion::Confusion;
 use crate::alignment::{Alignment, Statistics};

@@ -22,9 +22,8 @@ use rayon::prelude::*;
 const REAL_CLIPS: f32 = 1.3;
 
 impl Recogniser {
-    /// Trains a network on one-view clips and their mirrors, calibrated on `others`, clips of different
-    /// people. Fails for fewer than two activities, clips without frames or with several views, or a gallery
-    /// that cannot be laid out.
+    /// Trains a network on one-view clips and their mirrors, calibrated on `others`, clips of different people. Fails
+    /// for fewer than two activities, clips without frames or with several views, or a gallery that cannot be laid out.
     pub fn train_network(
         clips: &[Clip],
         others: &[Clip],

@@ -1,7 +1,6 @@
-//! Synthetic people performing the ten activities of Li 2014, table 7.1, as capsules.
-//!
-//! Every subject has a build and habits; performances vary around these. Positions, directions and counts
-//! follow the table: most activities begin and end with walking, which makes them similar.
+//! Synthetic people performing the ten activities of Li 2014, table 7.1, as capsules. Every subject has a build and
+//! habits; performances vary around these. Positions, directions and counts follow the table: most activities begin and
+//! end with walking, which makes them similar.
 
 use crate::clip::{Clip, Track};
 use crate::embedding::descriptor::Scaling;

@@ -108,8 +108,7 @@ fn peaks(energies: &[Array2<f64>], merged: usize, side: usize) -> Vec<[f64; 3]> 
     points
 }
 
-/// Maximum of a parabola through the logarithms of the upper half of the peak; `None` at the ends of the stack and for
-/// peaks within the curve's noise.
+/// Maximum of a parabola through the logarithms of the peak's upper half; `None` at the stack's ends or within noise.
 fn peak(curve: &[f64]) -> Option<f64> {
     let floor = curve.iter().copied().fold(f64::INFINITY, f64::min);
     let (top, most) = curve.iter().copied().enumerate().max_by(|a, b| a.1.total_cmp(&b.1))?;

@@ -153,8 +153,7 @@ fn both_or_one(maker: &mut Maker, both: f64) -> Vec<usize> {
     if maker.chance(both) { vec![0, 1] } else { vec![maker.main] }
 }
 
-/// Near and far hand positions (chest or waist, and ahead), and the shoulders' turn for one hand. Relative to
-/// turned shoulders, ahead is outwards.
+/// Near (chest, waist) and far (ahead) hand positions, and a single hand's shoulder turn, where ahead is outwards.
 fn near_and_far(maker: &mut Maker, single: bool) -> (Hand, Hand, f64) {
     let up = maker.draw(-0.35, 0.25);
     let turn = if single { maker.draw(0.0, 40.0) } else { 0.0 };
