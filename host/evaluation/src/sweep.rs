@@ -9,8 +9,7 @@ use crate::{
     rig::{self, Exposure},
 };
 
-/// RMSE in mm over planes from far to near focus, `[clean, 8-bit]` per operator. Each plane has its own
-/// texture and noise and is rendered once.
+/// RMSE, mm, `[clean, 8-bit]` per operator over planes from far to near focus, each with its own texture and noise.
 pub fn planes(psf: &str, count: usize, seed: u64, by: &[(Operators, Optics)]) -> Result<Vec<[f64; 2]>> {
     let (depths, lens) = (rig::depths(count, 0.0)?, rig::lens(false)?);
     let mut found = vec![[f64::NAN; 2]; by.len()];

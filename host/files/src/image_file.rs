@@ -186,7 +186,6 @@ pub fn read_grey(path: &Path) -> Result<GreyImage, ImageError> {
     read_grey_with(path, &ReadSettings::default())
 }
 
-/// [`read_grey`] with settings.
 pub fn read_grey_with(path: &Path, settings: &ReadSettings) -> Result<GreyImage, ImageError> {
     let (decoded, path) = read_decoded(path)?;
     decoded.grey(settings).map_err(|reason| ImageError::Format { path, reason })

@@ -44,7 +44,6 @@ pub struct EncodeError {
 }
 
 impl EncodeError {
-    /// For `map_err`.
     pub fn of<E: std::fmt::Display>(what: &'static str) -> impl FnOnce(E) -> Self {
         move |error| Self { what, reason: error.to_string() }
     }

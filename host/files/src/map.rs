@@ -99,7 +99,6 @@ pub fn tiff_to(map: ArrayView2<f32>, to: &mut (impl Write + Seek)) -> io::Result
 /// Codes of a 16-bit depth image: `mm = offset_mm + scale_mm * code`, 0 = no value.
 #[derive(Clone, Copy, Debug, serde::Serialize, serde::Deserialize)]
 pub struct Scale {
-    /// Depth of code 0.
     pub offset_mm: f64,
     pub scale_mm: f64,
 }

@@ -33,12 +33,10 @@ pub enum MaskError {
         column: usize,
         row: usize,
     },
-    /// Several dark levels, none known to be the person.
     #[error(
         "{}: grey levels {levels:?} and none from 128 on; masks have two levels, or 0, 127 and 255", path.display()
     )]
     Levels { path: PathBuf, levels: Vec<u8> },
-    /// A mask of another size than the first.
     #[error(
         "{}: the mask is {}x{}, but `{first}` is {}x{}; the masks of a sequence must be alike",
         path.display(), found.1, found.0, expected.1, expected.0
@@ -89,7 +87,6 @@ pub fn read(path: &Path, levels: &Levels) -> Result<Mask, MaskError> {
     Ok(grey(path)?.mapv(|level| level >= levels.set_from))
 }
 
-/// The levels of masks in these pictures ([`Levels::of_masks`]).
 pub fn levels_of(files: &[PathBuf]) -> Result<Levels, MaskError> {
     let Some(first) = files.first() else { return Ok(Levels::default()) };
     Levels::of_masks(&Levels::survey(files)?, first)
@@ -97,7 +94,6 @@ pub fn levels_of(files: &[PathBuf]) -> Result<Levels, MaskError> {
 
 pub struct Masks {
     pub named: Vec<Named>,
-    /// Notice to the user about the grey levels.
     pub remark: Option<String>,
 }
 

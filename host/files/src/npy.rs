@@ -36,7 +36,6 @@ pub enum NpyError {
     Missing { key: &'static str },
     #[error("its values are '{descr}', and '<f4', '>f4', '<f8' and '>f8' are read")]
     Kind {
-        /// NumPy's type name.
         descr: String,
     },
     #[error("its shape is {shape:?}, and a map has two axes (height, width)")]
@@ -44,7 +43,6 @@ pub enum NpyError {
     #[error("its shape is {shape:?} of '{descr}', and {found} bytes follow the header")]
     Size {
         shape: [usize; 2],
-        /// NumPy's type name.
         descr: String,
         found: usize,
     },

@@ -40,7 +40,6 @@ pub enum StackError {
     #[error("{} holds {found}: the images of a stack have one format; move the others away", path.display())]
     Mixed {
         path: PathBuf,
-        /// Counts per format.
         found: String,
     },
     #[error("{} and {} hold the same image; move one of them away", first.display(), second.display())]

@@ -17,7 +17,6 @@ pub enum StagingError {
 }
 
 impl StagingError {
-    /// For `map_err`.
     pub fn at(path: &Path) -> impl FnOnce(io::Error) -> Self + '_ {
         move |source| Self::Io { path: path.into(), source }
     }

@@ -11,7 +11,6 @@ pub struct Writer {
 }
 
 impl Writer {
-    /// Prepares text of this height.
     pub fn new(height_px: f32) -> Result<Self, EncodeError> {
         let font = FontRef::try_from_slice(dejavu::sans::regular()).map_err(EncodeError::of("text"))?;
         Ok(Self { font, scale: PxScale::from(height_px) })

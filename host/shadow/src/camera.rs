@@ -62,7 +62,6 @@ fn default_height() -> usize {
 #[serde(deny_unknown_fields, default)]
 pub struct SubjectPrior {
     pub height_m: f64,
-    /// Mean width w.
     pub head_width_m: f64,
     /// Distance from the lens along the ground; `None`: from the head's width and row.
     #[serde(skip_serializing_if = "Option::is_none")]

@@ -1,7 +1,6 @@
-//! Silhouettes along a rotated axis, without image rotation or resampling loss.
-//!
-//! Only the lower edge of each column and the pixels left of a column are needed. They follow from `x' = x
-//! cos b - y sin b`, `y' = x sin b + y cos b` (Li 2014, eq. 8.38) in one pass over the outline per angle.
+//! Silhouettes along a rotated axis, without image rotation or resampling loss. Only the lower edge of each column and
+//! the pixels left of a column are needed. They follow from `x' = x cos b - y sin b`, `y' = x sin b + y cos b` (Li
+//! 2014, eq. 8.38) in one pass over the outline per angle.
 
 use farnear_silhouettes::mask::Mask;
 use ndarray::ArrayView2;

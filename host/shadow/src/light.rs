@@ -83,8 +83,7 @@ impl Lamp {
         Err(ShadowError::LampTooLow { up_m: self.up_m, least_m: ABOVE_HEAD * height_m })
     }
 
-    /// The ray over the head meets the ground beyond the feet by their distance from the lamp
-    /// times `H / (up - H)`.
+    /// The ray over the head meets the ground beyond the feet by their distance from the lamp times `H / (up - H)`.
     fn on_ground(&self, subject: Subject) -> Result<GroundShadow, ShadowError> {
         self.check(subject.height_m)?;
         let stretch = subject.height_m / (self.up_m - subject.height_m);

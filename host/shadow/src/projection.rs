@@ -1,7 +1,6 @@
-//! Shadow on the ground (Li 2014, eq. 8.1 and 8.9 to 8.13) and in the image (8.14 to 8.20).
-//!
-//! Corrected: the lateral component includes the subject's offset X0, `m_x = v ((X0 + r_x) / (u + r_y) - X0 /
-//! u)` (missing in 8.18); angles use `atan2`; a pitched camera projects both ground points exactly.
+//! Shadow on the ground (Li 2014, eq. 8.1 and 8.9 to 8.13) and in the image (8.14 to 8.20). Corrected: the lateral
+//! component includes the subject's offset X0, `m_x = v ((X0 + r_x) / (u + r_y) - X0 / u)` (missing in 8.18); angles
+//! use `atan2`; a pitched camera projects both ground points exactly.
 
 use super::camera::{Camera, CameraFile};
 use crate::sun::SunPosition;
@@ -60,7 +59,6 @@ pub struct ImageShadow {
     pub eta_rad: f64,
     /// Rotation of the silhouette (mirrored if m_x <= 0) that points the bisector down: `3 pi / 4 - eta / 2`.
     pub beta_rad: f64,
-    /// m_x <= 0: mirrored before the rotation.
     pub mirrored: bool,
     pub height_px: f64,
     /// Shortened at the near image border (8.19).
@@ -146,8 +144,7 @@ pub fn distance_from_head_m(file: &CameraFile, head_width_px: f64) -> f64 {
     file.subject.head_width_m * file.camera.focal_px() / head_width_px
 }
 
-/// Distance by the head's row: a level camera at height Hc sees the head `f (H - Hc) / u` above the horizon.
-/// `None` if both heights are nearly equal.
+/// By the head's row: a level camera at height Hc sees it `f (H - Hc) / u` above the horizon; `None` if H is near Hc.
 pub fn distance_from_head_row_m(file: &CameraFile, top_row_px: f64) -> Option<f64> {
     let camera = &file.camera;
     let above_m = file.subject.height_m - camera.height_m;

@@ -1,14 +1,12 @@
 //! Standard deviation of the cutting angle beta: error propagation (Li 2014, eq. 8.21 to 8.37, corrected).
 //!
-//! The printed chain counts the elevation twice, divides by the wrong root, drops covariances and is ten
-//! times too large. Here beta is differentiated as a whole. With `A = -Hc r_y`, `B = u r_x - X0 r_y` (X0 = u
-//! times a fixed image slope) and `D = A^2 + B^2`:
+//! The printed chain (elevation twice, wrong root, no covariances) is ten times too large. Here beta is differentiated
+//! as a whole. With `A = -Hc r_y`, `B = u r_x - X0 r_y` (X0 = u times a fixed image slope) and `D = A^2 + B^2`:
 //!
 //! `s_beta^2 = 1/4 [ (Hc u s^2 / D)^2 (s_psi^2 + s_alpha^2) + (A B / (u D))^2 s_u^2 + (B r_y / D)^2 s_Hc^2
 //! ]`, `s_u^2 = (v / w_i)^2 s_w^2 + (w / w_i)^2 s_v^2 + (u / w_i)^2 s_wi^2`.
 //!
-//! Agrees with Monte Carlo to 2 %, unless the shadow's tip nears the camera
-//! ([`Uncertainty::first_order_holds`]).
+//! Agrees with Monte Carlo to 2 %, unless the shadow's tip nears the camera ([`Uncertainty::first_order_holds`]).
 
 use super::camera::CameraFile;
 use super::projection::{GroundShadow, ShadowError, Subject, on_ground};

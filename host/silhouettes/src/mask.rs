@@ -21,7 +21,6 @@ pub type Mask = Array2<bool>;
 pub struct BoundingBox {
     pub top: usize,
     pub left: usize,
-    /// One past the last row.
     pub bottom: usize,
     pub right: usize,
 }

@@ -43,8 +43,7 @@ pub const READERS: [Reader; 8] = [
     trc::READER,
 ];
 
-/// Reads a recording by file extension (any case, without the dot). `choices` overrides what the file states
-/// or suggests; guesses are in [`Recording::remarks`].
+/// Reads by file extension (any case, no dot). `choices` overrides the file; guesses are in [`Recording::remarks`].
 pub fn read(bytes: &[u8], extension: &str, choices: Choices) -> Result<Recording, RecordingError> {
     let ending = extension.to_lowercase();
     let reader = READERS.iter().find(|reader| reader.extensions.contains(&ending.as_str()));

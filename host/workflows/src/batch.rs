@@ -1,7 +1,6 @@
-//! Runs the jobs of a manifest on all cores, each once, also after interruptions.
-//!
-//! A job is done if its result is complete and `batch.toml` lists the same settings, input hashes and program
-//! version. Results are moved into place when complete. Memory does not grow with the manifest.
+//! Runs the jobs of a manifest on all cores, each once, also after interruptions. A job is done if its result is
+//! complete and `batch.toml` lists the same settings, input hashes and program version. Results are moved into place
+//! when complete. Memory does not grow with the manifest.
 
 mod error;
 mod fields;

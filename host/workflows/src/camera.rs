@@ -21,7 +21,6 @@ pub struct Kind {
     /// Format of its address.
     pub address: &'static str,
     pub about: &'static str,
-    /// Whether this program was built with it.
     pub built_in: bool,
 }
 
@@ -67,7 +66,6 @@ pub struct Found {
 #[derive(Clone, PartialEq, Eq, Debug, Serialize)]
 pub struct ListFigures {
     pub found: Vec<Found>,
-    /// Supported kinds.
     pub kinds: Vec<Kind>,
 }
 

@@ -1,5 +1,4 @@
-//! Progress, prompts and cancellation for workflows. A workflow does not use the terminal, the keyboard or
-//! signals. Its caller passes a [`Context`].
+//! Progress, prompts and cancellation for workflows: no terminal, keyboard or signals, only the caller's [`Context`].
 
 use std::{
     sync::{
@@ -35,8 +34,7 @@ pub trait Questions: Sync {
     fn ask(&self, question: &str, cancel: &Cancel) -> Result<String>;
 }
 
-/// Cancellation token, shared by its clones; cannot be reset. A cancelled rig workflow stops the rig before
-/// it returns.
+/// Cancellation token, shared by its clones; cannot be reset. A cancelled rig workflow stops the rig before it returns.
 #[derive(Clone, Debug, Default)]
 pub struct Cancel(Arc<AtomicBool>);
 

@@ -50,9 +50,7 @@ pub struct DepthFigures {
     pub height: usize,
     /// NaN without values.
     pub median_mm: f64,
-    /// Share of pixels with too little texture.
     pub low_texture_fraction: f64,
-    /// Share of pixels with a depth.
     pub valid_fraction: f64,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub uncertainty: Option<Uncertainty>,

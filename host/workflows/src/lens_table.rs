@@ -1,7 +1,6 @@
-//! Working range from lens, sensor and focus distances, or from a micrometer's readings.
-//!
-//! A manual rig has readings: m1 with the far target in focus, and m2 = m1 + 2 Fe Rmax for the near-focused
-//! image (Li 2014, eqs. 4.3 and 4.4). Rmax follows from both readings.
+//! Working range from lens, sensor and focus distances, or from a micrometer's readings. A manual rig has readings: m1
+//! with the far target in focus, and m2 = m1 + 2 Fe Rmax for the near-focused image (Li 2014, eqs. 4.3 and 4.4). Rmax
+//! follows from both readings.
 
 use farnear_depth::optics::{OpticsFile, WorkingRange};
 use serde::{Deserialize, Serialize};

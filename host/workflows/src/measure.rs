@@ -1,8 +1,7 @@
-//! Figures of depth maps: region with plane, profile, difference of two maps.
-//!
-//! Depth is in mm, um (stage positions) or image numbers of a stack. A pixel of pitch p covers p (z - F) / F
-//! at distance z (telecentric lens, see `farnear_files::mesh`), which gives lateral positions in mm. A stack
-//! may give the pixel size in its metadata; otherwise positions are in pixels.
+//! Figures of depth maps: region with plane, profile, difference of two maps. Depth is in mm, um (stage positions) or
+//! image numbers of a stack. A pixel of pitch p covers p (z - F) / F at distance z (telecentric lens, see
+//! `farnear_files::mesh`), which gives lateral positions in mm. A stack may give the pixel size in its metadata;
+//! otherwise positions are in pixels.
 
 mod difference;
 mod map_file;
@@ -40,7 +39,6 @@ use crate::error::{Result, WorkflowError};
 pub struct Measured {
     /// (height, width); NaN = no value.
     pub depth: Array2<f32>,
-    /// Of each depth.
     pub deviation: Option<Array2<f32>>,
     /// Unit of both maps.
     pub unit: Unit,

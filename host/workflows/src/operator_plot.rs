@@ -1,8 +1,6 @@
-//! Plots the fit and response of operators as SVG or PNG.
-//!
-//! Upper left: normalised image ratio (NIR) over normalised depth at five frequencies; dots are the optics',
-//! lines the cubic fit `a1 alpha + a3 alpha^3`. Upper right: a1 and a3 over frequency. Below: kernel
-//! responses along a row and along the diagonal, each divided by its largest magnitude.
+//! Plots the fit and response of operators as SVG or PNG. Upper left: normalised image ratio (NIR) over normalised
+//! depth at five frequencies; dots are the optics', lines the cubic fit `a1 alpha + a3 alpha^3`. Upper right: a1 and a3
+//! over frequency. Below: kernel responses along a row and along the diagonal, each divided by its largest magnitude.
 
 use std::{f64::consts::PI, path::Path};
 

@@ -188,7 +188,6 @@ pub const TASKS: &[Task] = &[
     Task::of::<crate::shadow::score::ShadowScoreRequest>(),
 ];
 
-/// Tasks of a rig.
 pub const RIG_TASKS: &[Task] = &[
     Task::of::<crate::rig::pair::CaptureRequest>(),
     Task::of::<crate::rig::focus::FocusRequest>(),

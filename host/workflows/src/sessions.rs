@@ -1,5 +1,4 @@
-//! Stored captures of a session: folders with `capture.toml` ([`farnear_capture::record`]) and an optional
-//! `note.toml`.
+//! Stored captures of a session: folders with `capture.toml` ([`farnear_capture::record`]) and an optional `note.toml`.
 
 use std::{
     fs,

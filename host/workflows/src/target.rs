@@ -161,8 +161,7 @@ struct Texture {
 }
 
 impl Texture {
-    /// Random black and white cells, independent of each other, so that the printer does not add a visible
-    /// screen.
+    /// Random black and white cells, independent of each other, so that the printer does not add a visible screen.
     fn drawn(columns: usize, rows: usize, seed: u64) -> Self {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let (middle_column, middle_row) = (columns / 2, rows / 2);

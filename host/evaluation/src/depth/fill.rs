@@ -97,8 +97,7 @@ fn distance_px(row: f64, column: f64) -> f64 {
     (row - CENTRE.0).hypot(column - CENTRE.1)
 }
 
-/// RMSE inside the disc in mm and the filled share: without filling, filled, and by the thesis' criterion
-/// with either threshold.
+/// RMSE in the disc, mm, and filled share: without filling, filled, by the thesis' criterion with both thresholds.
 fn one(
     psf: &str,
     scene: &str,

@@ -31,8 +31,7 @@ pub fn measure(page: &mut Page, data: &Path) -> Result<()> {
     Ok(())
 }
 
-/// Surfaces of the breakfast table: name, rows, columns, and the median depth of an independent
-/// implementation, mm.
+/// Surfaces of the breakfast table: name, rows, columns, and the median depth of an independent implementation, mm.
 const SURFACES: [(&str, [usize; 2], [usize; 2], f64); 4] = [
     ("wall", [20, 130], [30, 600], 741.0),
     ("toast", [230, 400], [70, 200], 635.0),

@@ -1,5 +1,4 @@
-//! The thesis' chapter 7 redone: silhouettes from markers (fig. 7.6) and activities from eight sides (fig.
-//! 7.10).
+//! The thesis' chapter 7 redone: silhouettes from markers (fig. 7.6) and activities from eight sides (fig. 7.10).
 
 use anyhow::{Context, Result};
 use farnear_recognition::synthetic::activities::{ACTIVITIES, performance};

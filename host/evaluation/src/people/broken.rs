@@ -1,5 +1,4 @@
-//! Broken silhouettes of two walking people of the KTH set, recognised after training on synthetic people
-//! only.
+//! Broken silhouettes of two walking people of the KTH set, recognised after training on synthetic people only.
 
 use anyhow::{Context, Result};
 use farnear_recognition::clip::{Clip, Track};

@@ -1,5 +1,4 @@
-//! The thesis' embedding redone: the gallery (fig. 9.3), its use by six activities (fig. 9.5), and the
-//! spatial objects (fig. 9.6).
+//! The thesis' embedding redone: gallery (fig. 9.3), its use by six activities (9.5), spatial objects (9.6).
 
 use anyhow::{Context, Result};
 use farnear_recognition::clip::{Clip, Track};

@@ -1,5 +1,4 @@
-//! Residual variance over dimensions of Isomap, landmark Isomap and principal components (Li 2014, section
-//! 9.3.1).
+//! Residual variance over dimensions of Isomap, landmark Isomap and principal components (Li 2014, section 9.3.1).
 
 use anyhow::Result;
 use farnear_recognition::embedding::{

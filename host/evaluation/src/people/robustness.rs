@@ -1,6 +1,5 @@
 //! Effect of shuffled frames, other speeds and bad masks on synthetic people; the first two also on measured
-//! joints. Per left-out subject a recogniser trained on the others' clean clips answers every changed copy,
-//! with default settings.
+//! joints. Per left-out subject a recogniser trained on the others' clean clips answers all changed copies (defaults).
 
 use std::collections::BTreeSet;
 

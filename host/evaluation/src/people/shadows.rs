@@ -1,5 +1,4 @@
-//! Shadow removal: seeded scenes for the geometric cutters, coloured scenes and the highway sequence for the
-//! detectors (Li 2014, tables 8.1 and 8.2).
+//! Shadow removal: cutters on seeded scenes, detectors on coloured ones and the highway (Li 2014, tables 8.1 and 8.2).
 
 use anyhow::{Context, Result, ensure};
 use farnear_shadow::Method as Cutter;

@@ -99,7 +99,6 @@ pub(crate) mod tests {
         bytes
     }
 
-    /// A PNG with EXIF in a text chunk.
     pub(crate) fn png_with_exif(orientation: u8, time: &str) -> Vec<u8> {
         let profile = [&b"Exif\0\0"[..], &exif(orientation, time)].concat();
         let mut text = format!("\nexif\n{:8}\n", profile.len());

@@ -13,8 +13,7 @@ const LABELS: [u8; 6] = [0, 50, 85, 127, 170, 255];
 const SHADOW: u8 = 127;
 /// Surveyed pictures of a folder; more while they hold one level only.
 const SURVEYED: usize = 8;
-/// JPEG rings: levels this near to black or white (part of the range) count as those; at most one pixel in
-/// [`ONE_BETWEEN_IN`] may lie between.
+/// JPEG rings: levels this near to black or white (part of the range) are those, save one pixel in [`ONE_BETWEEN_IN`].
 const RINGING: f64 = 0.157;
 const ONE_BETWEEN_IN: u64 = 50;
 /// Two levels nearer than this with others between them are a picture, not a mask.

@@ -2,10 +2,8 @@ use serde::{Deserialize, Serialize};
 
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SunError {
-    /// Outside -90 to 90, or NaN.
     #[error("latitude {0} deg is outside -90 to 90 deg")]
     Latitude(f64),
-    /// Outside -180 to 360, or NaN.
     #[error("longitude {0} deg is outside -180 to 360 deg (east is positive)")]
     Longitude(f64),
     #[error("unknown sun model `{0}`: expected psa, almanac, thesis or spa")]

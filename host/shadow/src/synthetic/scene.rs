@@ -1,6 +1,5 @@
-//! Seeded scenes: a walking person on level ground under the sun, with true body and shadow. Each capsule's
-//! image is body; the hull of its end spheres' outlines along the rays is shadow. Independent of
-//! [`crate::projection`], so that errors there show.
+//! Seeded scenes: a walking person on level ground under the sun, with true body (each capsule's image) and shadow
+//! (hull of its end spheres' outlines along the rays). Independent of [`crate::projection`], to show its errors.
 
 use crate::camera::{Camera, CameraFile, StandardDeviations, SubjectPrior};
 use crate::score::Truth;

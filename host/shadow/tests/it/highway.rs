@@ -1,5 +1,4 @@
-//! Background model and shadow detectors on the highway sequence of ChangeDetection.net (Goyette et al.
-//! 2012).
+//! Background model and shadow detectors on the highway sequence of ChangeDetection.net (Goyette et al. 2012).
 //!
 //! Reference: OpenCV 5.0.0's `createBackgroundSubtractorMOG2()` with default settings (equal to ours) and the
 //! same score: label 255 against truth 255, truth 85 and 170 excluded, frames 470 onwards.

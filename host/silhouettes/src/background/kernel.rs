@@ -299,9 +299,8 @@ impl<S: Simd, const CHANNELS: usize> Mixture<'_, S, CHANNELS> {
         }
     }
 
-    /// Samples that are a darker copy of a background component: with a the projection on the mean's line,
-    /// darkest <= a <= 1 and the rest |a mean - x|^2 within background_threshold a^2 variance ("statistical
-    /// non-parametric" in Prati et al., PAMI 25, 2003).
+    /// Darker copies of a background component: projection a on the mean's line within darkest <= a <= 1, rest
+    /// `|a mean - x|^2` within background_threshold a^2 variance ("statistical non-parametric": Prati, PAMI 25, 2003).
     #[inline(always)]
     fn shadow(&self, c: &Constants<S>, darkest: S::f32s, used: usize, x: [S::f32s; CHANNELS]) -> S::m32s {
         let simd = self.simd;

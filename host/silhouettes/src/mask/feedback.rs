@@ -1,8 +1,7 @@
-//! Feedback from people to the background, which would learn a motionless person within seconds.
-//!
-//! A region that entered over the picture's edge or walked is a person for as long as it exists. A region
-//! that appears and never moves is furniture, a change of light, or a hole left by a person who was part of
-//! the background; it is learned. The outline of a hole is sharper in the background than in the frame.
+//! Feedback from people to the background, which would learn a motionless person within seconds. A region that entered
+//! over the picture's edge or walked is a person for as long as it exists. A region that appears and never moves is
+//! furniture, a change of light, or a hole left by a person who was part of the background; it is learned. The outline
+//! of a hole is sharper in the background than in the frame.
 
 use ndarray::ArrayView3;
 

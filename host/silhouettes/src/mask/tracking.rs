@@ -1,9 +1,7 @@
-//! Tracking of several people.
-//!
-//! Each person has a constant-velocity Kalman filter. Blobs of the mask ([`super::people`]) are assigned at
-//! minimum cost ([`super::assignment`]): distance from the prediction and height change, in standard
-//! deviations. People who share a blob are reported as crossing, without silhouettes. After separation they
-//! are identified by their motion; the crossing is ambiguous if the swap is nearly as likely.
+//! Tracking of several people. Each person has a constant-velocity Kalman filter. Blobs of the mask ([`super::people`])
+//! are assigned at minimum cost ([`super::assignment`]): distance from the prediction and height change, in standard
+//! deviations. People who share a blob are reported as crossing, without silhouettes. After separation they are
+//! identified by their motion; the crossing is ambiguous if the swap is nearly as likely.
 
 mod motion;
 

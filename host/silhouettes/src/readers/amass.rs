@@ -16,7 +16,6 @@ pub const READER: Reader = Reader {
     read,
 };
 
-/// Array names of joint positions.
 const POSITIONS: [&str; 8] =
     ["joints", "Jtr", "jtr", "joints3d", "joints_3d", "keypoints3d", "joint_positions", "positions"];
 const RATES: [&str; 4] = ["mocap_framerate", "mocap_frame_rate", "fps", "framerate"];

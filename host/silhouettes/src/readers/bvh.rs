@@ -1,7 +1,6 @@
 //! BVH motion capture: a skeleton and joint angles, converted to joint positions.
-//!
-//! [`parse`] reads the text, [`kinematics`] computes positions, [`guess`] estimates the unit and the up axis,
-//! which BVH files do not state. Each joint and end site becomes a named point. Linear in the file.
+//! [`parse`] reads the text, [`kinematics`] computes positions, [`guess`] estimates the unit and the up axis, which BVH
+//! files do not state. Each joint and end site becomes a named point. Linear in the file.
 
 pub mod guess;
 pub mod kinematics;

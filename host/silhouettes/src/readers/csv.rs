@@ -1,5 +1,4 @@
-//! Markers as CSV: a header `frame,NAME_x,NAME_y,NAME_z,...` (or `NAME:x`, `NAME.X`), one frame per row,
-//! millimetres, empty = hidden.
+//! CSV markers: header `frame,NAME_x,NAME_y,NAME_z,...` (or `NAME:x`, `NAME.X`), a frame per row, mm, empty = hidden.
 
 use super::reader::Reader;
 use super::recording::{Found, Known, RecordingError, Source, Unit, Up, text};

@@ -106,7 +106,6 @@ pub enum Source {
     Caller,
     File,
     Format,
-    /// The file states an unknown value.
     Unknown {
         stated: String,
     },
@@ -150,11 +149,9 @@ pub struct Found {
     /// `frames[f][m]`: point m in frame f.
     pub frames: Vec<Vec<Option<Point3>>>,
     pub others: Vec<Vec<Vec<Option<Point3>>>>,
-    /// Seen from one side: points are in the plane of x and z.
     pub planar: bool,
     pub unit: Known<Unit>,
     pub up: Known<Up>,
-    /// Information for users about the reading, one sentence each.
     pub remarks: Vec<String>,
 }
 
@@ -259,13 +256,11 @@ impl Recording {
 
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum RecordingError {
-    /// No reader has this extension.
     #[error("no motion-capture format ends with `.{found}`: expected {known}")]
     Extension { found: String, known: String },
     #[error("not a {kind} file: {reason}")]
     Kind {
         kind: &'static str,
-        /// Found and expected contents.
         reason: String,
     },
     #[error("the {kind} file ends within {what}: {needed} bytes are needed, {found} are there")]
@@ -281,7 +276,6 @@ pub enum RecordingError {
     #[error("line {line}: {reason}")]
     Line {
         line: usize,
-        /// Found and expected contents.
         reason: String,
     },
     #[error(

@@ -109,11 +109,9 @@ pub const FLORENCE_ACTIVITIES: [&str; 9] =
 
 #[derive(Clone, Debug, PartialEq)]
 pub struct SkeletonClip {
-    /// First index of the cell array, from 0.
+    /// As `subject` and `repetition`, an index of the cell array, from 0.
     pub activity: usize,
-    /// Second index.
     pub subject: usize,
-    /// Third index.
     pub repetition: usize,
     pub frames: Vec<Vec<Point3>>,
 }

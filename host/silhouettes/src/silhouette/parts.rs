@@ -1,7 +1,6 @@
-//! Silhouettes by parts: the markers of each body part, projected and filled (Li 2014, section 7.2.2).
-//!
-//! The thesis fills all triplets of a part's markers. Their union is the convex hull, which is faster; tests
-//! compare both. [`close`] fills gaps between rigid parts (21 pixels at 167 pixels per metre in the thesis).
+//! Silhouettes by parts: the markers of each body part, projected and filled (Li 2014, section 7.2.2). The thesis fills
+//! all triplets of a part's markers. Their union is the convex hull, which is faster; tests compare both. [`close`]
+//! fills gaps between rigid parts (21 pixels at 167 pixels per metre in the thesis).
 
 use super::capsule::Point3;
 use super::raster::{Point, convex_hull, fill_convex, fill_discs_hull};

@@ -44,7 +44,6 @@ pub enum TemplateError {
         "the recording lacks {} of the {of} markers of template `{template}` ({}); it has {}", .missing.len(), listed(.missing), listed(.present)
     )]
     UnknownMarkers {
-        /// Markers of the template that the recording lacks.
         missing: Vec<String>,
         of: usize,
         template: String,

@@ -1,7 +1,6 @@
-//! Rotation and projection to a view (Li 2014, eq. 7.1 and 7.2, with cos beta as the last entry of Ry).
-//!
-//! A point is rotated by `Rx(alpha) Ry(beta) Rz(gamma)` and projected along y: image x is the rotated x,
-//! image height the rotated z. `gamma` moves around the subject, `alpha` raises the camera.
+//! Rotation and projection to a view (Li 2014, eq. 7.1 and 7.2, with cos beta as the last entry of Ry). A point is
+//! rotated by `Rx(alpha) Ry(beta) Rz(gamma)` and projected along y: image x is the rotated x, image height the rotated
+//! z. `gamma` moves around the subject, `alpha` raises the camera.
 
 use super::capsule::{Capsule, Point3};
 use super::raster::{Point, fill_discs_hull};

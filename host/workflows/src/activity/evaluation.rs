@@ -68,7 +68,6 @@ impl LearnFrom {
 
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct EvaluationFigures {
-    /// Share of correct answers.
     pub accuracy: f64,
     /// Wilson interval, 95 %.
     pub confidence_interval: [f64; 2],

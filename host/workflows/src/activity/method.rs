@@ -36,8 +36,7 @@ pub enum Pattern {
     },
     /// Features from the network of a shipped model.
     Features { model: &'static Shipped, classifier: Family },
-    /// Embedded pattern learning (EPL) as in the thesis: 0/1 grids over a 3-D Isomap embedding, order-free
-    /// kNN.
+    /// Embedded pattern learning (EPL) as in the thesis: 0/1 grids over a 3-D Isomap embedding, order-free kNN.
     Thesis,
 }
 

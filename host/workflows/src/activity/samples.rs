@@ -1,6 +1,5 @@
-//! Reads SAMPLES.toml (folders of masks with subject, activity and view) into described clips.
-//!
-//! Views with the same `clip` name form a clip. Without names, the n-th samples of each view do.
+//! Reads SAMPLES.toml (folders of masks with subject, activity and view) into described clips. Views with the same
+//! `clip` name form a clip. Without names, the n-th samples of each view do.
 
 use std::{
     collections::{BTreeMap, BTreeSet, HashMap},

@@ -1,6 +1,5 @@
-//! Leave-one-set-out: evaluates a finished model, and thresholds from the other sets, on each set.
-//!
-//! A blind set (`blind = "why"`) needs a reason, which is recorded in `openings.csv` next to it.
+//! Leave-one-set-out: evaluates a finished model, and thresholds from the other sets, on each set. A blind set
+//! (`blind = "why"`) needs a reason, which is recorded in `openings.csv` next to it.
 
 use std::path::{Path, PathBuf};
 

@@ -40,8 +40,7 @@ pub struct NewSet {
     pub outlier_auroc: f64,
 }
 
-/// MSR Action3D (Li et al. 2010), opened when both models were finished: 278 clips of eight known and 231 of
-/// eight unknown activities, in four views.
+/// MSR Action3D (Li et al. 2010), opened after training: 278 clips of 8 known, 231 of 8 unknown activities, four views.
 const EVERYDAY_ON_A_NEW_SET: NewSet = NewSet {
     accuracy: 0.33,
     accuracy_among: 0.51,
@@ -190,8 +189,7 @@ const FILES: [(&str, Mode, bool); 4] = [
 const REACH: usize = 2;
 /// Least share of a clip's frames in a training step without order (with order no gain, see the data sheet).
 const KEEP: f32 = 0.6;
-/// Standard deviation of a whole clip's offset in a training step with order, to improve calibration. In
-/// standard deviations of each component.
+/// SD of a whole clip's offset in a training step with order, for calibration, in SDs of each component.
 const SHIFT: f32 = 0.2;
 /// Networks in a model's ensemble.
 const MEMBERS: usize = 2;

@@ -31,8 +31,7 @@ impl FromStr for Pattern {
     }
 }
 
-/// Writes a CSV manifest with a job of `kind` per matching file, sorted by name; returns their number.
-/// Patterns are relative to the manifest's folder.
+/// Writes a CSV manifest, a job of `kind` per match, by name; returns the number. Patterns are relative to its folder.
 pub fn generate(manifest: &Path, kind: &str, fields: &[Pattern]) -> Result<usize> {
     jobs::kind(kind)?;
     let pattern = |reason: String| BatchError::Pattern(reason);

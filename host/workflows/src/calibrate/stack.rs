@@ -116,7 +116,6 @@ pub struct StackFigures {
     pub robust_mm: f64,
     /// On held-out parts, as the next five.
     pub rms_mm: f64,
-    /// Mean error.
     pub bias_mm: f64,
     /// Slope of measured over true depth.
     pub slope: f64,

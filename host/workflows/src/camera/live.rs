@@ -40,8 +40,7 @@ pub struct LiveFigures {
     pub bits: u8,
 }
 
-/// Reports figures at intervals until time is up or cancelled (not an error); returns the number of images.
-/// Warns about an interval without images.
+/// Reports figures (or a lack of images) at intervals until the end or cancelled (no error); returns the image count.
 pub fn live(
     settings: &LiveSettings,
     line: &mut dyn FnMut(&LiveFigures) -> std::io::Result<()>,

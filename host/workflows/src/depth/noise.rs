@@ -139,7 +139,6 @@ pub struct Uncertainty {
     pub noise: String,
     /// Over pixels with a value.
     pub median_sd_mm: f64,
-    /// 95th percentile.
     pub p95_sd_mm: f64,
 }
 

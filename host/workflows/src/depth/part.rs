@@ -39,8 +39,7 @@ pub(super) struct Cut {
 }
 
 impl Cut {
-    /// Cuts a part with a margin. Without `around` keeps the whole images: distortion depends on the
-    /// position.
+    /// Cuts a part with a margin. Without `around` keeps the whole images: distortion depends on the position.
     pub fn out_of(pair: &mut Pair, wanted: Rectangle, around: Option<usize>) -> Result<Self> {
         let image @ (height, width) = pair.far.dim();
         wanted.check_within(image)?;

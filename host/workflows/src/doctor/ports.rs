@@ -55,8 +55,7 @@ struct Rights {
     group: u32,
 }
 
-/// Whether this user (`/proc/self/status`) may read and write; `None` if unknown. Opening would reset some
-/// boards.
+/// Whether this user (`/proc/self/status`) may read and write; `None` if unknown. Opening would reset some boards.
 #[cfg(unix)]
 fn may_open(rights: &Rights, status: &str) -> Option<bool> {
     let numbers = |name: &str| -> Option<Vec<u32>> {

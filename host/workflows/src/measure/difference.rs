@@ -31,8 +31,7 @@ impl Serialize for DifferenceFigures {
     }
 }
 
-/// The second map minus the first, NaN without a value. Both are result folders or map files of equal size
-/// and unit.
+/// The second map minus the first, NaN without a value. Both are result folders or map files of equal size and unit.
 pub fn difference(first: &Path, second: &Path) -> crate::Result<(Array2<f32>, DifferenceFigures)> {
     let [first, second] = [read_map(first)?, read_map(second)?];
     let unit = shared_unit("difference", &first, &second)?;

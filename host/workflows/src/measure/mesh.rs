@@ -8,8 +8,7 @@ use ndarray::s;
 use super::Measured;
 use crate::error::{Result, WorkflowError};
 
-/// A PLY of at most `points` points (every n-th row and column), coloured by the far or all-in-focus image.
-/// Positions are in the map's unit.
+/// A PLY of at most `points` points (every n-th row and column), map's unit, coloured by the far or all-in-focus image.
 pub fn mesh(folder: &Path, points: usize) -> Result<Vec<u8>> {
     let Measured { depth, lateral, unit, .. } = Measured::read(folder)?;
     let image = ["far.png", "all-in-focus.png"].map(|name| folder.join(name));

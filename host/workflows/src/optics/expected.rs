@@ -1,9 +1,8 @@
-//! Depth error from noise alone, for planned optics.
-//!
-//! For a texture of power spectrum P and noise variance s^2 in both images (each divided by its mean), no
-//! estimator over w x w pixels is below `SD(alpha) = 1 / (w sqrt(J))`. With the transfer functions H1 and H2:
-//! `J = mean over frequencies of P D^2 / (s^2 (H1^2 + H2^2))`, `D = H1 dH2/dalpha - H2 dH1/dalpha`.
-//! Depth follows with `dz/dalpha`. The methods' excess over this bound was measured on rendered planes.
+//! Depth error from noise alone, for planned optics. For a texture of power spectrum P and noise variance s^2 in both
+//! images (each divided by its mean), no estimator over w x w pixels is below `SD(alpha) = 1 / (w sqrt(J))`. With the
+//! transfer functions H1 and H2: `J = mean over frequencies of P D^2 / (s^2 (H1^2 + H2^2))`,
+//! `D = H1 dH2/dalpha - H2 dH1/dalpha`. Depth follows with `dz/dalpha`. The methods' excess over this bound was
+//! measured on rendered planes.
 
 use farnear_depth::optics::Optics;
 use serde::Serialize;
@@ -32,8 +31,7 @@ pub struct ExpectedError {
     pub whitened_mm: f64,
 }
 
-/// For a texture with standard deviation / mean = `contrast`, and `binning` x `binning` sensor pixels per
-/// pixel.
+/// For a texture with standard deviation / mean = `contrast`, and `binning` x `binning` sensor pixels per pixel.
 pub fn expected_error(optics: &Optics, contrast: f64, binning: usize) -> ExpectedError {
     let otf = optics.psf().otf(1.1 * optics.max_blur_px());
     let noise = NOISE_VARIANCE / (binning * binning) as f64;

@@ -21,7 +21,6 @@ pub struct CounterFigures {
 pub struct ResetFigures {
     pub boot_before: u32,
     pub boot: u32,
-    /// Reset cause reported by the board.
     pub cause: &'static str,
     /// Number of the latched alarm; 0 = none.
     pub alarm: u32,

@@ -1,6 +1,5 @@
-//! Bring-up checklist. Prompts the user before each manual step and measures the rest.
-//!
-//! An emulated rig skips manual steps; their detail names the later step that covers the same fault.
+//! Bring-up checklist. Prompts the user before each manual step and measures the rest. An emulated rig skips manual
+//! steps; their detail names the later step that covers the same fault.
 
 mod actuation;
 mod moving;

@@ -22,8 +22,7 @@ use crate::{
     parameters::within,
 };
 
-/// Distance between both sensors along the optical axis, um: a thousandth of a piezo's travel to far more
-/// than any lens needs.
+/// Distance between both sensors along the axis, um: a thousandth of a piezo's travel to far more than any lens needs.
 const FURTHER_UM: std::ops::RangeInclusive<f64> = 0.1..=10_000.0;
 /// Relative difference from the optics' distance that gives a warning: depth is off by about the same share.
 const UNLIKE: f64 = 0.005;

@@ -37,8 +37,7 @@ pub enum MechanicsFigures {
     },
 }
 
-/// Backlash and piezo figures are stored as settings. Measuring travel homes the stage; measuring backlash
-/// homes it first.
+/// Stores backlash and piezo figures as settings. Measuring travel homes the stage, measuring backlash homes it first.
 pub fn measure(rig: &RigAddress, routine: Routine, context: &Context<'_>) -> Result<MechanicsFigures> {
     let rig = Rig::connect(rig, None, context)?;
     if matches!(routine, Routine::Backlash { .. }) {

@@ -1,7 +1,5 @@
-//! A rig that stays open between jobs: status, stop and job share one port.
-//!
-//! [`RigAddress::Open`] passes it to a workflow. The port's owner serialises requests of several threads, so
-//! a stop does not wait for the running job.
+//! A rig that stays open between jobs ([`RigAddress::Open`]): status, stop and job share one port, whose owner
+//! serialises requests of several threads. A stop does not wait for the running job.
 
 use std::{
     fmt,

@@ -147,8 +147,7 @@ impl From<&Pair> for PairFigures {
     }
 }
 
-/// Homes if needed, exposes both images by piezo. The folder appears when it is complete. Checks everything
-/// before any motion.
+/// Homes if needed, exposes both images by piezo. The folder appears when complete. Checks everything before moving.
 pub fn capture(settings: &CaptureRequest, context: &Context<'_>) -> Result<PairFigures> {
     if settings.half_mirror {
         return half_mirror::capture(settings, context);

@@ -48,7 +48,6 @@ pub struct QualityFigures {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub time: Option<String>,
     pub pairs: usize,
-    /// Share of pixels with a depth.
     pub fill_rate: f64,
     pub mean_mm: f64,
     /// Root-mean-square distance of the mean map from its plane.

@@ -1,6 +1,5 @@
-//! Scores shadow removal against ground truth: shadow removed, and person lost.
-//!
-//! Grey levels of truth pictures: 0 background, 50 (or 127) shadow, 255 person, 85 and 170 ignored.
+//! Scores shadow removal against ground truth: shadow removed, and person lost. Grey levels of truth pictures: 0
+//! background, 50 (or 127) shadow, 255 person, 85 and 170 ignored.
 
 use std::{
     collections::HashMap,

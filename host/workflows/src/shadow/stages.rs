@@ -131,8 +131,7 @@ impl Stage<'_> {
         if self.mask[[y, x]] { SEEN } else { DARK }
     }
 
-    /// Standard deviation by first-order propagation: `beta = 3 pi / 4 - eta / 2` (8.20), so eta's is twice
-    /// beta's.
+    /// Standard deviation by first-order propagation: `beta = 3 pi / 4 - eta / 2` (8.20), so eta's is twice beta's.
     fn eta_sd_rad(self) -> Option<f64> {
         self.sure.filter(|sure| sure.first_order_holds).map(|sure| 2.0 * sure.beta_rad)
     }

@@ -1,6 +1,5 @@
-//! Silhouettes of motion-capture recordings (named markers or joints) in views from all sides.
-//!
-//! A template assigns points to body parts. Parts are filled and the gaps between them closed.
+//! Silhouettes of motion-capture recordings (named markers or joints) in views from all sides. A template assigns
+//! points to body parts. Parts are filled and the gaps between them closed.
 
 mod drawing;
 mod missing;

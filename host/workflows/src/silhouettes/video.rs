@@ -1,7 +1,5 @@
-//! Masks of the person who moves in a video, one per frame.
-//!
-//! A background model learns static pixels; moving regions are cleaned and the person chosen. Memory does not
-//! grow with the video's length, except for the index.
+//! Masks of the person who moves in a video, one per frame. A background model learns static pixels; moving regions are
+//! cleaned and the person chosen. Memory does not grow with the video's length, except for the index.
 
 use std::{path::PathBuf, time::Instant};
 
@@ -184,8 +182,7 @@ struct Entry {
     top_left_bottom_right: Option<[usize; 4]>,
 }
 
-/// Makes a mask of every frame (255 = person) and `silhouettes.toml`, which flags doubtful frames. Writes
-/// nothing on failure.
+/// Masks every frame (255 = person) and writes `silhouettes.toml`, which flags doubtful frames; nothing on failure.
 pub fn extract(settings: &SilhouettesVideoRequest, context: &Context<'_>) -> Result<VideoFigures> {
     let out = Staging::new_folder(&settings.out)?;
     let labels = settings.labels.as_deref().map(Staging::new_folder).transpose()?;

@@ -1,7 +1,6 @@
-//! Estimates the unit and up axis of a BVH file from the joints `head` and `foot`, `ankle` or `toe`.
-//!
-//! Some writers keep all bones along one axis, so that the rest pose folds head and feet to one side of the
-//! hips; then the frames give the up axis. Lengths along bones are valid in every pose.
+//! Estimates the unit and up axis of a BVH file from the joints `head` and `foot`, `ankle` or `toe`. Some writers keep
+//! all bones along one axis, so that the rest pose folds head and feet to one side of the hips; then the frames give
+//! the up axis. Lengths along bones are valid in every pose.
 
 use super::super::recording::{Known, Source, Unit, Up};
 use super::kinematics::{Kinematics, at_rest};

@@ -1,8 +1,6 @@
-//! Forward kinematics: joint positions from a frame's values.
-//!
-//! A joint's rotation is the product of its rotation channels in file order, intrinsic: `Zrotation Yrotation
-//! Xrotation` is `Rz Ry Rx` before a column vector. A joint is at its parent's position plus the parent's
-//! total rotation times its own translation. O(joints) per frame.
+//! Forward kinematics: joint positions from a frame's values. A joint's rotation is the product of its rotation
+//! channels in file order, intrinsic: `Zrotation Yrotation Xrotation` is `Rz Ry Rx` before a column vector. A joint is
+//! at its parent's position plus the parent's total rotation times its own translation. O(joints) per frame.
 
 use super::parse::{Channel, Joint, Motion};
 use crate::silhouette::capsule::Point3;
@@ -29,9 +27,8 @@ pub struct Kinematics<'a> {
 }
 
 impl<'a> Kinematics<'a> {
-    /// The first frame decides how position channels are meant: Biovision adds them to the offset, most
-    /// current writers store the whole translation. They replace offset o if the first position is nearer to
-    /// o than to 0.
+    /// The first frame decides how position channels are meant: Biovision adds them to the offset, most current writers
+    /// store the whole translation. They replace offset o if the first position is nearer to o than to 0.
     pub fn new(motion: &'a Motion) -> Self {
         let mut replaces = Vec::with_capacity(motion.joints.len());
         let mut from = 0;
