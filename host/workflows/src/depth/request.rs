@@ -301,7 +301,7 @@ impl DepthRequest {
         PrepareSettings { align: self.align, balance: self.balance, ..PrepareSettings::default() }
     }
 
-    /// Settings of [`measure_pair`] for images with unknown limits and noise.
+    /// Settings of [`farnear_depth::measure::measure_pair`] for images with unknown limits and noise.
     pub fn measure(&self) -> MeasureSettings {
         let run = self.computation();
         let usual = match self.method {
