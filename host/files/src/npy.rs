@@ -35,17 +35,11 @@ pub enum NpyError {
     #[error("its header has no '{key}'")]
     Missing { key: &'static str },
     #[error("its values are '{descr}', and '<f4', '>f4', '<f8' and '>f8' are read")]
-    Kind {
-        descr: String,
-    },
+    Kind { descr: String },
     #[error("its shape is {shape:?}, and a map has two axes (height, width)")]
     Axes { shape: Vec<usize> },
     #[error("its shape is {shape:?} of '{descr}', and {found} bytes follow the header")]
-    Size {
-        shape: [usize; 2],
-        descr: String,
-        found: usize,
-    },
+    Size { shape: [usize; 2], descr: String, found: usize },
 }
 
 /// Reads an array of (height, width); f64 is rounded to f32. Uses no more memory than the file's size.

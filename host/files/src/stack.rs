@@ -38,10 +38,7 @@ pub enum StackError {
     #[error("{}: no such folder or file", path.display())]
     Missing { path: PathBuf },
     #[error("{} holds {found}: the images of a stack have one format; move the others away", path.display())]
-    Mixed {
-        path: PathBuf,
-        found: String,
-    },
+    Mixed { path: PathBuf, found: String },
     #[error("{} and {} hold the same image; move one of them away", first.display(), second.display())]
     Twice { first: PathBuf, second: PathBuf },
     #[error("{}: {reason}", path.display())]

@@ -33,20 +33,13 @@ pub enum EmbeddingError {
     #[error(
         "only {found} eigenvalues are positive, but {asked} dimensions were requested: use at most {found}"
     )]
-    TooFewDimensions {
-        found: usize,
-        asked: usize,
-    },
+    TooFewDimensions { found: usize, asked: usize },
     #[error(
         "the RBF system is singular with ridge {ridge}: raise it (1e-4 to 1e-2 are usual) or remove duplicate samples"
     )]
     Singular { ridge: f64 },
     #[error("{what}: expected {expected}, found {found}")]
-    Shape {
-        what: &'static str,
-        expected: usize,
-        found: usize,
-    },
+    Shape { what: &'static str, expected: usize, found: usize },
 }
 
 fn describe(components: &[Vec<usize>]) -> String {

@@ -54,7 +54,7 @@ pub(crate) fn taken(path: &Path) -> Option<String> {
     exposure_time(&std::fs::read(path).ok()?)
 }
 
-/// [`taken`] of a file's contents; later times are larger.
+/// Time of the exposure in an image file's bytes, `2026:11:25 20:15:03`; later times are larger.
 pub fn exposure_time(bytes: &[u8]) -> Option<String> {
     let exif = if tiff_tags::is_tiff(bytes) {
         bytes.to_vec()

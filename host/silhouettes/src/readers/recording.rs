@@ -259,10 +259,7 @@ pub enum RecordingError {
     #[error("no motion-capture format ends with `.{found}`: expected {known}")]
     Extension { found: String, known: String },
     #[error("not a {kind} file: {reason}")]
-    Kind {
-        kind: &'static str,
-        reason: String,
-    },
+    Kind { kind: &'static str, reason: String },
     #[error("the {kind} file ends within {what}: {needed} bytes are needed, {found} are there")]
     Truncated { kind: &'static str, what: &'static str, needed: usize, found: usize },
     /// Only a licensed body model converts pose parameters to joints.
@@ -274,10 +271,7 @@ pub enum RecordingError {
     #[error("no person {wanted}: {found} are in the file")]
     Person { wanted: usize, found: usize },
     #[error("line {line}: {reason}")]
-    Line {
-        line: usize,
-        reason: String,
-    },
+    Line { line: usize, reason: String },
     #[error(
         "unknown unit of length `{0}`: expected mm, cm, m, in, cmu (56.444 mm) or a number of millimetres"
     )]

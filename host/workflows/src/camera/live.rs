@@ -40,7 +40,7 @@ pub struct LiveFigures {
     pub bits: u8,
 }
 
-/// Reports figures (or a lack of images) at intervals until the end or cancelled (no error); returns the image count.
+/// Reports figures (or a lack of images) at intervals until the time is up or cancelled (no error); returns the image count.
 pub fn live(
     settings: &LiveSettings,
     line: &mut dyn FnMut(&LiveFigures) -> std::io::Result<()>,
