@@ -87,7 +87,7 @@ struct Run {
     #[arg(long, value_name = "FILE")]
     memory: Option<PathBuf>,
     /// Listen on TCP instead of a serial port: a free port of this computer, or ADDRESS:PORT. Clients open
-    /// tcp:ADDRESS:PORT, one at a time. There is no password: an address beyond this computer lets everybody on
+    /// tcp:ADDRESS:PORT, one at a time. It has no password: an address beyond this computer lets everybody on
     /// the network move the rig.
     #[arg(long, value_name = "ADDRESS:PORT", num_args = 0..=1, require_equals = true, default_missing_value = "127.0.0.1:0")]
     tcp: Option<SocketAddr>,

@@ -16,7 +16,7 @@ use crate::{
 #[command(
     after_help = "Example: farnear render --scene staircase --psf gaussian:k=0.4578 --optics optics.toml --noise 8bit --seed 1 --out scene/
 
-A scene of your own is a TOML file; the files it names lie beside it:
+A scene of your own is a TOML file; the files that it names are next to it:
   depth = \"bust.npy\"      # depths in mm, .npy or float .tiff, stretched over the image; or scene = \"cone\"
   texture = \"bricks.png\"  # any picture; or \"sand\" (also without this line) or \"fractal\"
   contrast = 0.3          # of sand or fractal: the standard deviation, the mean being 1
