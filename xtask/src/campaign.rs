@@ -1,5 +1,4 @@
-//! Campaigns on the emulated board: seeded random scenarios, and the long versions of
-//! `hil-sim/board/tests/it`.
+//! Campaigns on the emulated board: random scenarios, and the long versions of `hil-sim/board/tests/it`.
 
 use std::path::{Path, PathBuf};
 

@@ -1,5 +1,4 @@
-//! Builds the firmware of every board and copies the ELFs next to the host programs, where `farnear-sim`
-//! expects its own.
+//! Builds every board's firmware and copies the ELFs next to the host programs, where `farnear-sim` finds its own.
 
 use std::{fs, path::PathBuf};
 

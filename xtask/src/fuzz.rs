@@ -1,5 +1,4 @@
-//! Property tests with more cases: seeds 1, 2, 3 ... until the time is over. proptest stores a failing case
-//! in a `proptest-regressions` file next to its test; commit it, and the case runs first in later test runs.
+//! Property tests with more cases, seed by seed. Commit a failing test's `proptest-regressions` file: it runs first.
 
 use std::time::{Duration, Instant};
 

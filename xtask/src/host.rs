@@ -9,8 +9,7 @@ pub const PROGRAMS: [&str; 3] = ["farnear", "farnear-sim", "farnear-campaign"];
 
 const PACKAGES: [&str; 6] = ["--package", PROGRAMS[0], "--package", PROGRAMS[1], "--package", PROGRAMS[2]];
 
-/// Builds [`PROGRAMS`] with the tests' and the demo's profile, so that everything is compiled once; returns
-/// their folder.
+/// Builds [`PROGRAMS`] with the profile of tests and demo, to compile everything once; returns their folder.
 pub fn build() -> Result<PathBuf> {
     step("host programs (the first build takes some minutes)");
     build_silently()

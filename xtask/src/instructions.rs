@@ -1,5 +1,4 @@
-//! Table of instructions in `docs/instructions.md`, written from a count on the emulated board or compared
-//! with one, to detect slower routines.
+//! Table of `docs/instructions.md`, written from an emulated count or compared with one, to detect slower routines.
 
 use std::{fmt::Write, process::Command};
 
@@ -15,8 +14,7 @@ const PAGE: &str = "docs/instructions.md";
 const TOLERANCE: f64 = 0.20;
 /// Absolute tolerance: short routines change by whole instructions.
 const SLACK: f64 = 4.0;
-/// Limits per unit on any compiler: rows are corrected at the camera's rate, and a control tick fits its
-/// period.
+/// Limits per unit on any compiler: rows keep up with the camera, and a control tick fits its period.
 const CEILINGS: [(&str, f64); 5] = [
     ("CLSF, ten terms in 3x3 regions", 16.0),
     ("CLSF, blended", 24.0),

@@ -1,5 +1,4 @@
-//! Runs a test program with a time limit: a test that hangs, or a program that it left with the output open,
-//! must not hide other results.
+//! Runs a test program with a time limit: a hang, or a child with the output open, must not hide other results.
 
 use std::{
     io::{self, Read, Write},

@@ -1,5 +1,4 @@
-//! `cargo xtask`: set-up, demo, tests and measurements, with a Rust toolchain only. One file per job. Each
-//! step is announced; each failure names the next command to type.
+//! `cargo xtask`: set-up, demo, tests, measurements, with Rust only; one file per job. Failures name the next command.
 
 mod arm;
 mod bench;

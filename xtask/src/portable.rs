@@ -1,5 +1,4 @@
-//! Compiles the programs for systems on which they cannot be run here, Windows and macOS, and runs the Windows
-//! programs under Wine where it is installed.
+//! Compiles the programs for Windows and macOS; runs the Windows ones under Wine where it is installed.
 
 use std::{
     fs,

@@ -1,5 +1,4 @@
-//! Tests of the Python package: builds the module, copies it next to the package's files and runs pytest in a
-//! virtual environment.
+//! Tests of the Python package: builds the module next to its files and runs pytest in a virtual environment.
 
 use std::{
     fs,
@@ -100,8 +99,7 @@ pub fn environment(folder: &Path, needs: &[&str]) -> Result<PathBuf, String> {
     Ok(python)
 }
 
-/// Builds the module and the tests' programs in one call, to compile shared crates once; does nothing without
-/// Python.
+/// Builds the module and the tests' programs in one call, to compile shared crates once; nothing without Python.
 pub fn build(elf: &Path) -> Result<()> {
     if !able() {
         return Ok(());

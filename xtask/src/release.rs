@@ -1,6 +1,5 @@
-//! Release files, each tried in an empty root: static programs for two processors, Debian packages, the
-//! Python wheel, the firmware, contents with licences, checksums. Two runs from the same commit and toolchain
-//! give the same bytes: archives carry the commit's time, programs no path of this machine.
+//! Release files, each tried in an empty root: static programs for two processors, Debian packages, Python wheel,
+//! firmware, licences, checksums. Repeatable to the byte: archives carry the commit's time, programs no local path.
 
 mod archive;
 mod debian;

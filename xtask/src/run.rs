@@ -24,8 +24,7 @@ pub fn target_folder() -> PathBuf {
     }
 }
 
-/// A cargo call in the root workspace, with the flag that lets older compilers build the emulator; no cargo
-/// configuration key can do that.
+/// Cargo in the root workspace; its flag lets older compilers build the emulator, which no configuration key can do.
 pub fn cargo<S: AsRef<OsStr>>(arguments: impl IntoIterator<Item = S>) -> Command {
     let mut command = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
     let mut arguments = arguments.into_iter();

@@ -1,5 +1,4 @@
-//! The documents as a site: `docs/site/stage.py` lays out pages and help texts, a generator in a virtual
-//! environment builds it.
+//! The documents as a site: `docs/site/stage.py` lays out pages and help texts, a generator in a virtual env builds it.
 
 use std::{fs, process::Command};
 

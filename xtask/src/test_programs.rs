@@ -1,5 +1,4 @@
-//! The workspace's test programs: built by one cargo call, run in turn, and skipped if nothing they depend on
-//! has changed since they passed.
+//! The workspace's test programs: built by one cargo call, skipped if nothing they depend on changed since they passed.
 
 use std::{
     collections::hash_map::DefaultHasher,
@@ -120,8 +119,7 @@ impl Programs {
     }
 }
 
-/// Touches build scripts that look for data and programs if these appeared or disappeared: cargo does not
-/// watch missing files.
+/// Touches build scripts that look for files which appeared or disappeared: cargo does not watch missing ones.
 fn look_again() -> Result<()> {
     let record = target_folder().join("at-hand");
     let now = farnear_test_data::at_hand();

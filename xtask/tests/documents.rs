@@ -40,8 +40,7 @@ fn links_lead_to_files() {
     }
 }
 
-/// In the pages that lead through the code, a word in code type with a slash in it is a path from the repository's root;
-/// `FOO/` and `<name>` are placeholders.
+/// On pages through the code, a code word with a slash is a path from the root; `FOO/` and `<name>` are placeholders.
 #[test]
 fn paths_in_the_signposts_exist() {
     let mut checked = 0;

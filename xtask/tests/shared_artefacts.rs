@@ -1,5 +1,4 @@
-//! `cargo xtask demo` builds two programs, `cargo xtask test` the whole workspace. A package is compiled once for both only if
-//! both enable the same features of it; a difference in one dependency recompiles everything above it.
+//! `cargo xtask demo` and `test` share a compiled package, and all above it, only if both enable the same features.
 
 use std::{collections::BTreeMap, process::Command};
 

@@ -1,6 +1,5 @@
-//! Angles as 32-bit binary fractions of a turn; sine and cosine in single precision. A binary angle wraps automatically
-//! and resolves 8.4e-8 deg after any number of turns; an `f32` of 25 years in days has an error of 3.6 deg. Only
-//! exactly rounded single-precision operations are used, so all processors give the same bits.
+//! Angles as 32-bit fractions of a turn: they wrap automatically and resolve 8.4e-8 deg (an `f32` of 25 years in days
+//! errs by 3.6 deg). Sine and cosine use exactly rounded single precision: all processors give the same bits.
 
 use core::f32::consts::PI;
 

@@ -1,8 +1,7 @@
 //! Correction by least squares fit (CLSF) in fixed point, row by row.
 //!
-//! Depth from defocus maps a flat target through a real lens to a bowl that depends on depth. CLSF corrects the
-//! distorted depth `U` at column `x` and row `y` by a third-order polynomial fitted to flat targets (Li 2014, eq.
-//! 6.11). Forms:
+//! Depth from defocus maps a flat target through a real lens to a bowl that depends on depth. CLSF corrects depth `U`
+//! at column `x`, row `y` by a third-order polynomial fitted to flat targets (Li 2014, eq. 6.11). Forms:
 //!
 //! | form | terms | seams | table words | instructions per pixel (640-pixel rows; with the tables) |
 //! |---|---|---|---|---|
@@ -10,8 +9,7 @@
 //! | [`Blend`] | the same, bilinear between region centres | none | `3 width` | 22.1 (23.6) |
 //! | [`Full`] | all 20 of third order, one set | none | `3 width` | 22.7 (22.7) |
 //!
-//! (Emulated Cortex-M4F, `opt-level = "s"`, fat LTO.) [`RegionFit`] and [`FullFit`] fit the coefficients to flat
-//! targets.
+//! (Emulated Cortex-M4F, `opt-level = "s"`, fat LTO.) [`RegionFit`] and [`FullFit`] fit the coefficients.
 //!
 //! Units: `U = (depth - centre) / half_span` ([`DepthScale`]) as Q1.15 in an `i16`; `x` and `y` from -1 (first column,
 //! row) to +1 (last). Coefficients are Q2.29 ([`Coefficient`]). [`NO_VALUE`] passes unchanged; a result beyond the

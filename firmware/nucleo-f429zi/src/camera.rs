@@ -1,7 +1,6 @@
-//! Camera trigger and exposure-active signal (strobe) on TIM2, which counts board microseconds. Trigger: channel 3,
-//! PB10. Both edges are compare matches, exact to the microsecond; the interrupt only prepares the next. Flash:
-//! channels 1 and 2 without pins, whose compare interrupts switch the light and stamp it. Strobe: channel 4, PB11,
-//! captured in hardware after a trigger or while listening.
+//! Camera trigger and strobe (exposure active) on TIM2, which counts board microseconds. Trigger: channel 3, PB10; both
+//! edges are compare matches, exact to the microsecond, prepared by the interrupt. Flash: channels 1 and 2 without
+//! pins; their interrupts switch and stamp the light. Strobe: channel 4, PB11, captured in hardware.
 
 use core::cell::RefCell;
 

@@ -47,8 +47,7 @@ fn has_outer_clock() -> bool {
     comes
 }
 
-/// Returns whether the internal clock is used. A clock `lost` in the last boot is not tried, because it may reset
-/// again.
+/// Returns whether the internal clock is used. A clock `lost` in the last boot may reset again and is not tried.
 pub fn start(lost: bool) -> (Peripherals, bool) {
     let own_clock = lost || !has_outer_clock();
     let peripherals = critical_section::with(|_| {
@@ -65,8 +64,7 @@ pub fn start(lost: bool) -> (Peripherals, bool) {
 /// Flash wait states at 168 MHz down to 2.4 V (RM0090, section 3.5.1), below brown-out level 2.
 const LATENCY: embassy_stm32::pac::flash::vals::Latency = embassy_stm32::pac::flash::vals::Latency::WS6;
 
-/// Enables the flash accelerator (RM0090, section 3.5.2), which embassy disables; the program is up to 1.9 times
-/// faster.
+/// Enables the flash accelerator (RM0090, section 3.5.2), which embassy disables: up to 1.9 times faster.
 fn accelerate() {
     pac::FLASH.acr().modify(|acr| {
         acr.set_latency(LATENCY);

@@ -1,5 +1,4 @@
-//! Incremental encoder: the 16-bit timer counts all four edges and is extended here. Must be read once per 32,767
-//! counts (0.6 s at 6.25 mm/s; the loop reads every 200 us).
+//! Incremental encoder: extends a 16-bit timer of all four edges. Read it every 32,767 counts (0.6 s at 6.25 mm/s).
 
 use embassy_stm32::{
     Peri,

@@ -1,5 +1,4 @@
-//! Two outputs for a lamp, a flash or a projector: TIM12, channels 1 and 2, PB14 and PB15, PWM of 21 kHz. The camera's
-//! timer ([`crate::camera`]) switches a flash; this module sets the outputs outside it.
+//! Outputs for lamp, flash or projector: TIM12 CH1, CH2 (PB14, PB15), PWM of 21 kHz; [`crate::camera`] runs a flash.
 
 use core::cell::Cell;
 

@@ -1,7 +1,6 @@
-//! Serial link: USART3 on the ST-LINK's virtual COM port, 8N1, 2 Mbaud or as requested, both directions by DMA. No
-//! interrupts: a circular transfer fills a ring that each tick empties; a second ring is sent piece by piece. The HAL's
-//! buffered port is not used: at the end of each frame its handler writes back the status register, and a byte received
-//! in between is lost, because a written zero clears RXNE (RM0090, USART_SR). That damaged one in 2,000 frames.
+//! Serial link: USART3 on the ST-LINK's virtual COM port, 8N1, 2 Mbaud or as requested, by DMA without interrupts. A
+//! circular transfer fills a ring that each tick empties; a second ring is sent piece by piece. The HAL's port damages
+//! one in 2,000 frames: writing back the status register clears RXNE of a byte received in between (RM0090, USART_SR).
 
 use core::sync::atomic::{AtomicU8, Ordering, fence};
 
@@ -107,8 +106,7 @@ impl Link {
         self.hand_over();
     }
 
-    /// Call while nothing is sent. The divider gives exactly 2,000,000 baud and 913,043 for 921,600: 0.9 % off, of 3 %
-    /// permitted for both ends (RM0090, tolerance of the receiver).
+    /// Call while nothing is sent. Exact at 2,000,000 baud; 921,600 gives 913,043: 0.9 % off, 3 % permitted (RM0090).
     pub fn set_rate(&mut self, rate: LinkRate) {
         let baud = rate.baud();
         // Sixteen samples per bit: the register counts sixteenths of the divider.

@@ -1,6 +1,5 @@
-//! FRAM: Cypress FM25V02 (document 001-84494) or FM25V02A (001-90865), 32 KiB on SPI4, mode 0. Writes at bus speed
-//! without pages or busy time: 64 bytes take 26 us. Reads are repeated until two agree, and the name is queried several
-//! times: a flipped bit on the bus while plugs bounce must not lose a record or the memory.
+//! FRAM: Cypress FM25V02 (001-84494) or FM25V02A (001-90865), 32 KiB on SPI4, mode 0; no pages, 64 bytes take 26 us.
+//! Reads repeat until two agree: a bit flipped while plugs bounce must not lose a record or, in the name, the memory.
 
 use embassy_stm32::{
     Peri,

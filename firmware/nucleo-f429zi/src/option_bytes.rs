@@ -1,8 +1,7 @@
-//! Brown-out reset of the option bytes, which is off in a factory chip. Without it the chip runs outside its
-//! specification below 2.4 V with the memory enabled. Level 2 resets below 2.50 V (DS9405, table 22, typical): 0.5 V
-//! below the supply's detector, which leaves time to store an alarm. The firmware never programs the option bytes:
-//! programming erases their sector, and a supply failure then leaves read protection and PCROP on. Power-on with a
-//! bouncing plug is the worst time. See `docs/bring-up.md` for the debug probe.
+//! Brown-out reset of the option bytes, off in a factory chip, which then runs outside its specification below 2.4 V
+//! with the memory enabled. Level 2 resets below 2.50 V (DS9405, table 22, typical), 0.5 V below the supply's detector:
+//! time to store an alarm. The firmware never programs the option bytes: that erases their sector, and a supply failure
+//! (a bouncing plug) then leaves read protection and PCROP on. See `docs/bring-up.md` for the debug probe.
 
 use embassy_stm32::pac;
 

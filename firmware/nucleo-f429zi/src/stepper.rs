@@ -1,11 +1,10 @@
 //! Exact numbers of STEP pulses from an advanced timer: TIM1 for stage A, TIM8 for stage B.
 //!
 //! One-pulse mode: the timer plays one [`Segment`] from its repetition counter and stops at the update event, so a late
-//! interrupt never adds a pulse. The update interrupt, the highest priority, loads the next segment and restarts the
-//! timer in well under a microsecond, which the pulse spacing (at least 25 us) absorbs. STEP is low for the first half
-//! of a period. The emergency stop is on the break input: hardware takes STEP low immediately, then the break interrupt
-//! clears the queue. Pulses of the interrupted segment are not counted; the position is lost anyway. DIR, EN and DIAG
-//! are the driver's other lines (TMC2209 class: EN active low, DIAG active high).
+//! interrupt never adds a pulse. The update interrupt, the highest priority, loads the next segment in well under a
+//! microsecond; pulses are at least 25 us apart. STEP is low for the first half of a period. The emergency stop is on
+//! the break input: hardware takes STEP low, then the break interrupt clears the queue; pulses of the interrupted
+//! segment are not counted, as the position is lost. DIR, EN, DIAG as on a TMC2209: EN active low, DIAG active high.
 
 use core::cell::RefCell;
 

@@ -2,8 +2,7 @@
 
 use embassy_stm32::pac;
 
-/// Level 7, the highest: low below 3.03 V, released above 3.14 V (DS9405, table 22, typical). Brown-out level 2 follows
-/// at 2.50 V; `docs/rig.md` has the capacitor that provides time for a record.
+/// Level 7: low below 3.03 V, released above 3.14 V (DS9405, table 22, typical). `docs/rig.md` has the capacitor.
 const LEVEL: u8 = 7;
 
 pub struct Supply(());

@@ -1,6 +1,5 @@
-//! Alarms: latched, numbered over the board's life, stored, cleared one by one by number. Further alarms are latched
-//! behind the first; the host reads the oldest first, usually the cause. A latched cause raises no second alarm. The
-//! last eight are stored, always including uncleared ones; with eight latched, no more are.
+//! Alarms: latched, numbered over the board's life, stored, cleared by number. A latched cause raises no second alarm.
+//! The host reads the oldest first, usually the cause. The last eight are stored; with eight latched, no more are.
 
 use farnear_protocol::BoardMicros;
 use farnear_protocol::message::{Alarm, AlarmRecord, Axis, Failure, RequestError};

@@ -1,9 +1,8 @@
 //! When the camera may be exposed, and the meaning of its strobe.
 //!
 //! Read-out overlaps the next move, but the next trigger waits for [`CameraSettings::readout`] after the exposure. Its
-//! end is known from the strobe, before that estimated from pulse length and the longest permitted latency. A strobe
-//! shorter than the pulse has lost its beginning (loose contact) and counts as missing. For exposures not triggered by
-//! the board (host, free running) the first one that begins after listening started counts.
+//! end comes from the strobe, before that from pulse length and longest latency. A strobe shorter than the pulse has
+//! lost its beginning (loose contact): missing. Untriggered: the first to begin after listening started counts.
 
 use farnear_protocol::message::ShotLight;
 use farnear_protocol::{BoardMicros, Micros};

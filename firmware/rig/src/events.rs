@@ -1,5 +1,4 @@
-//! Numbered events, sent once, the last ones stored for repetition. One ring serves `ReadEvent` and as transmit queue:
-//! an event overwritten before it was sent is skipped, which the host detects as a gap. RAM: about 1.5 KiB.
+//! Ring of numbered events, to send and (`ReadEvent`) repeat. One overwritten unsent is a gap. RAM: about 1.5 KiB.
 
 use farnear_protocol::BoardMicros;
 use farnear_protocol::message::{Event, EventKind};

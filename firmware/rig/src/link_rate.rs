@@ -1,5 +1,4 @@
-//! Link rate changes with fallback. The answer leaves at the old rate. The first valid request confirms the new one;
-//! without one within [`LINK_TRIAL`] the old rate returns.
+//! Link rate change. The answer leaves at the old rate, which returns without a valid request within [`LINK_TRIAL`].
 
 use farnear_protocol::message::{LINK_TRIAL, LinkRate};
 use farnear_protocol::{BoardMicros, Micros};

@@ -1,5 +1,4 @@
-//! Non-volatile records in two copies each: format ([`record`]), incremental writes over the older copy ([`store`]),
-//! conversion of values to blocks ([`contents`]).
+//! Records in two copies: format ([`record`]), writes over the older copy ([`store`]), values as blocks ([`contents`]).
 
 pub(crate) mod contents;
 pub(crate) mod record;

@@ -1,5 +1,4 @@
-//! Entries of the board's log: changes, rejections, alarms. The host gets all of it by answers, events and status; the
-//! log is for later analysis and times without a host.
+//! Entries of the board's log: changes, rejections, alarms; for later analysis and times without a host.
 
 use farnear_protocol::BoardMicros;
 use farnear_protocol::message::{AlarmRecord, Axis, LinkRate, PositionState, RequestError};

@@ -29,14 +29,12 @@ use crate::shaper::Shaper;
 
 /// At rest within this distance of the target ...
 const AT_REST: Nanometres = Nanometres(100);
-/// ... and within this swing about the recent middle: half the stated error minus the gauge's noise, because a reported
-/// position may have swung to the other side when it arrives.
+/// ... and within this swing (half the stated error minus gauge noise): a report may arrive at its other side.
 const SWING: i32 = 45 << BITS;
 /// Averaging ticks of the middle, as a shift: two thirds of a resonance period, of which a quarter remains.
 const MIDDLE_SHIFT: u32 = 4;
 /// Duration: one period of the resonance, in which a larger swing shows.
 const NEAR_TICKS: u16 = 25;
-/// Ticks near the target until idle.
 const IDLE_TICKS: u16 = TICK_HZ as u16;
 /// Shares, as shifts, of the error after a rest that go to disturbance and drift: critically damped, time constant 64
 /// rests (0.13 s). At a resonance with Q = 30 the loop gain is a half.

@@ -1,5 +1,3 @@
-//! Continuation and end of long work.
-
 use farnear_protocol::BoardMicros;
 use farnear_protocol::message::{Axis, Calibration, EventKind, Failure, RecordName};
 

@@ -1,5 +1,3 @@
-//! Hello and status.
-
 use farnear_protocol::message::{
     Axis, Capabilities, Hello, Limits, ProgramState, ProgramStatus, SCHEMA_KEY, Status,
 };

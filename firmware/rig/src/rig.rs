@@ -1,5 +1,3 @@
-//! The rig: a tick, alarms, stored state.
-
 use farnear_protocol::BoardMicros;
 use farnear_protocol::frame::{self, Encoded, Kind};
 use farnear_protocol::message::{

@@ -1,8 +1,7 @@
-//! Input shaping: a step becomes three smaller ones without residual vibration. Two equal zero-vibration stages in
-//! series (N. Singer, W. Seering, "Preshaping command inputs to reduce system vibration", J. Dyn. Sys. 1990) form a ZVD
-//! shaper: the residual grows with the square of the resonance error (5 % off: 0.6 %). Weights are exact on the tick
-//! grid ([`crate::gains`]). A step takes one resonance period (26 ticks of 0.2 ms at 200 Hz). Cost: six
-//! multiplications.
+//! Input shaping: a step becomes three smaller ones without residual vibration. Two zero-vibration stages in series (N.
+//! Singer, W. Seering, "Preshaping command inputs to reduce system vibration", J. Dyn. Sys. 1990) form a ZVD shaper:
+//! the residual grows with the square of the resonance error (5 % off: 0.6 %). Weights are exact on the tick grid
+//! ([`crate::gains`]). A step takes one period (26 ticks of 0.2 ms at 200 Hz) and six multiplications.
 
 use crate::gains::{GAIN_BITS, ShaperGains};
 

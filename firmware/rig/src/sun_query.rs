@@ -1,6 +1,5 @@
-//! Sun and shadow: converts the message's integers for `farnear_maths` and the answer back. The only definition of
-//! those integers; the host calls it too, to compare with the board bit by bit (`docs/decisions/0009-sun-query.md`).
-//! Cost: 550 instructions for the sun, 250 for its angles, 400 for the shadow, 1,160 for its deviation.
+//! Sun and shadow: the message's integers for `farnear_maths` and back. The host calls it too, to compare bit by bit
+//! (`docs/decisions/0009-sun-query.md`). Instructions: sun 550, its angles 250, shadow 400, its deviation 1,160.
 
 use farnear_maths::angle::BinaryAngle;
 use farnear_maths::shadow::{Deviations, Error, Geometry, Reliability, Shadow};

@@ -1,5 +1,4 @@
-//! Speed of the emulated rig in board seconds per CPU second (other load hardly affects it); Linux only.
-//! "Cold" includes the translation of the firmware.
+//! Speed of the emulated rig in board seconds per CPU second; Linux only. "Cold" includes translating the firmware.
 //!
 //! `cargo run --release --ignore-rust-version -p farnear-sim --example speed` after `cargo xtask firmware`.
 

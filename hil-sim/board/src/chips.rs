@@ -63,11 +63,9 @@ impl std::fmt::Debug for Dac {
     }
 }
 
-/// AD7691 in three-wire CS mode: the rising edge of CNV samples. If CNV is low again before the shortest
-/// conversion ends, a 0 (busy indicator) precedes the result.
-///
-/// The output is released until the longest conversion ends and from half a clock after the last bit. The
-/// pull-up then needs time to charge a line that was low.
+/// AD7691 in three-wire CS mode: the rising edge of CNV samples. If CNV is low again before the shortest conversion
+/// ends, a 0 (busy indicator) precedes the result. The output is released until the longest conversion ends and from
+/// half a clock after the last bit. The pull-up then needs time to charge a line that was low.
 pub struct GaugeConverter {
     plant: SharedPlant,
     parts: ConverterParts,

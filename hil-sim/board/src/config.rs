@@ -1,5 +1,3 @@
-//! Configuration of an emulated rig.
-
 use std::path::PathBuf;
 
 use crate::{parts::Parts, scenario::Scenario};

@@ -1,5 +1,4 @@
-//! Instruction counts of the on-board routines, measured by the firmware `farnear-count`, at one cycle per
-//! instruction. Flash wait states, branches and divisions make a real board slower: times are lower bounds.
+//! Instruction counts by the firmware `farnear-count` at a cycle each: lower bounds, as a real board has wait states.
 
 use std::path::Path;
 

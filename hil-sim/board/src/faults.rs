@@ -1,5 +1,4 @@
-//! Table of fault kinds with action and repair. A scenario ([`crate::scenario`]) sets the times. A new kind
-//! is a constant in this module, a line in [`KINDS`] and a row in `docs/hil.md`.
+//! Fault kinds with action and repair. A new kind is a constant here, a line in [`KINDS`] and a row in `docs/hil.md`.
 
 pub mod chips;
 mod happening;

@@ -1,5 +1,4 @@
-//! Half mirror behind the lens with a second camera. Both expose at each trigger; the second sensor is
-//! further from the lens, so one exposure gives the far and the near image (Li 2014, sections 5.5 and 10.2).
+//! Half mirror: a second camera with its sensor further away, so one trigger gives far and near (Li 2014, 5.5, 10.2).
 
 use std::str::FromStr;
 

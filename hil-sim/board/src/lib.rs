@@ -1,20 +1,17 @@
-//! The rig without hardware: the unmodified firmware ELF on an emulated STM32, with two motorised stages, a
-//! piezo, encoders, end switches and a camera. The firmware measures through its registers; the true state is
-//! in [`plant`].
+//! The rig without hardware: the unmodified firmware ELF on an emulated STM32 with motorised stages, piezo, encoders,
+//! end switches and camera. The firmware measures through its registers; the true state is in [`plant`].
 //!
 //! - [`parts`]: properties of the parts (`parts.toml`); [`processor`]: instruction costs.
 //! - [`rig`]: the rig in this process, for tests, with [`config`], [`command`] and [`report`].
-//! - [`run`](mod@run): the program with its [`port`], a camera [`endpoint`] and a [`farnear_gige`]
-//!   camera.
+//! - [`run`](mod@run): the program with its [`port`], a camera [`endpoint`] and a [`farnear_gige`] camera.
 //! - [`board`], [`chips`], [`memory`], [`memory_file`], [`serial`], [`wiring`]: the emulated board.
 //! - [`camera`], [`imager`], [`half_mirror`]: exposure timing, images, and the second camera.
 //! - [`driver`]: the emulator's stops; [`pacing`], [`lockstep`]: when virtual time passes.
 //! - [`mod@count`]: instruction counts of on-board routines.
 //! - [`faults`]: faults from a file; [`access`]: faults from a test; [`trace`]: recordings.
 //!
-//! Virtual time is in nanoseconds, independent of the wall clock. In lockstep it passes only while the board
-//! has something outstanding. The same requests then give the same bytes on any machine, unless sent during a
-//! move.
+//! Virtual time, in nanoseconds, is independent of the wall clock; in lockstep it passes only while the board has
+//! something outstanding. The same requests then give the same bytes on any machine, unless sent during a move.
 
 pub mod access;
 mod adapter;

@@ -1,5 +1,4 @@
-//! Baud rates of both ends of the line. With different rates the receiver reads wrong bytes: each byte is
-//! replaced by a fixed other one, so that runs repeat.
+//! Baud rates of both ends. If they differ, each byte arrives as a fixed wrong one, so that runs repeat.
 
 use std::ops::Range;
 

@@ -44,26 +44,18 @@ impl HalfMirrorParts {
     }
 }
 
+/// Fields up to `field_radius`: [`EllipticalDistortion`]; the next four: [`Defects`].
 #[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ImagingParts {
-    /// [`EllipticalDistortion::offset`].
     pub field_offset: f64,
-    /// [`EllipticalDistortion::curvature`].
     pub field_curvature: f64,
-    /// [`EllipticalDistortion::slope`].
     pub field_slope: f64,
-    /// [`EllipticalDistortion::centre`].
     pub field_centre: [f64; 2],
-    /// [`EllipticalDistortion::radius`].
     pub field_radius: [f64; 2],
-    /// [`Defects::vignetting`].
     pub vignetting: f64,
-    /// [`Defects::uneven_light`].
     pub uneven_light: [f64; 2],
-    /// [`Defects::hot_pixel_share`].
     pub hot_pixel_share: f64,
-    /// [`Defects::hot_pixel_e`].
     pub hot_pixel_e: f64,
     /// Speed of the scene in the image, right and down.
     pub scene_px_per_s: [f64; 2],

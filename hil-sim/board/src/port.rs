@@ -25,7 +25,6 @@ const LOOK: Duration = Duration::from_millis(20);
 /// A client that reads nothing for this long loses bytes, as on a real line.
 const PATIENCE: Duration = Duration::from_millis(500);
 
-/// Where clients find the board.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum PortKind {
     /// A pseudo-terminal, which clients open as a serial port.
@@ -74,8 +73,7 @@ trait End: Read {
     fn survives(&self, error: &io::Error) -> bool;
 }
 
-/// Forwards what a client sends until the port is unplugged or its line has ended, or until `from_client` accepts no
-/// more.
+/// Forwards a client's input until the port is unplugged, its line ends, or `from_client` accepts no more.
 fn read(end: &mut impl End, unplugged: &AtomicBool, from_client: &impl Fn(Command) -> bool) {
     let mut cutter = FrameCutter::default();
     let mut bytes = [0; 4096];

@@ -1,5 +1,4 @@
-//! Instruction costs: the emulator retires one instruction per cycle, a real processor does not. [`Metered`]
-//! wraps the emulator's processor and counts cycles, so that timers and plant run as on a real processor.
+//! Instruction costs: [`Metered`] wraps the emulator's processor and counts a real one's cycles, for timers and plant.
 //!
 //! - Average: [`ProcessorParts::cycles_per_instruction`], more while the flash accelerator is not fully on
 //!   (watches FLASH_ACR). No run-time cost.

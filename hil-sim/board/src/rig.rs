@@ -1,5 +1,4 @@
-//! The emulated rig in this process: firmware, board, plant and time. The emulator has its own thread; a call
-//! returns when its request is done. [`EmulatedRig::advance_us`] and [`EmulatedRig::settle`] let time pass.
+//! The emulated rig on its own thread; calls block. [`EmulatedRig::advance_us`] and [`EmulatedRig::settle`] pass time.
 
 use std::{
     sync::mpsc::{self, Receiver, Sender},

@@ -1,5 +1,4 @@
-//! A well-behaved host that executes a scenario, then reverts all faults and checks that the rig works. It
-//! repeats unanswered requests, says hello to each new boot and answers keep-alives.
+//! A host that executes a scenario with repeats, hellos and keep-alives, reverts all faults and checks the rig.
 
 mod client;
 mod recovery;

@@ -44,8 +44,7 @@ impl Case<'_> {
         self.scenario.happens.iter().any(|happening| kinds.contains(&happening.what.name))
     }
 
-    /// Per board life: virtual time minus board time, as the smallest event delay. Boot numbers cannot be
-    /// keys: a board with dead memory restarts at 1.
+    /// Smallest event delay (virtual minus board time) per board life; a board with dead memory repeats boot number 1.
     fn clocks(&self) -> Vec<u64> {
         let mut clocks = vec![u64::MAX];
         for sight in self.sights {

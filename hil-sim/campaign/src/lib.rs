@@ -49,7 +49,6 @@ impl FromStr for Shard {
 
 #[derive(Clone, Debug)]
 pub struct Campaign {
-    /// End exclusive.
     pub seeds: std::ops::Range<u64>,
     pub shard: Shard,
     pub jobs: usize,

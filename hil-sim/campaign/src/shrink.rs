@@ -1,5 +1,4 @@
-//! Shrinks a scenario: removes parts in turn while it violates the same property (simplest form of Zeller &
-//! Hildebrandt, IEEE Trans. Software Engineering 28, 2002).
+//! Removes parts of a scenario while it violates the same property (after Zeller & Hildebrandt, IEEE TSE 28, 2002).
 
 use farnear_sim::{
     SimError,

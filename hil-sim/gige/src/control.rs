@@ -25,7 +25,6 @@ const WRITE_MEMORY: u16 = 0x0086;
 pub enum Ask {
     Discovery,
     Resend {
-        /// 16-bit frame id.
         frame: u16,
         first: u32,
         last: u32,

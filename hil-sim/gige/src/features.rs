@@ -34,7 +34,6 @@ pub const SENSOR_HEIGHT: u32 = 0xA004;
 pub const OFFSET_X: u32 = 0xA008;
 /// First row of the region.
 pub const OFFSET_Y: u32 = 0xA00C;
-/// Columns of the region.
 pub const WIDTH: u32 = 0xA010;
 pub const HEIGHT: u32 = 0xA014;
 /// [`MONO_8`] and so on.

@@ -10,9 +10,8 @@
 //! radius of a depth step over the whole working range the error is 1.5 % RMS and at most 8 % (white noise of
 //! contrast 0.2). Elsewhere it is 1e-4 for planes and 6e-4 for slopes (`tests/it/exact.rs`).
 //!
-//! *Levels.* Up to [`MAX_EXACT_LEVELS`] depths have a slab with its exact kernel each. A continuous surface
-//! has slabs of [`SLAB_PX`] blur with kernels tabulated every [`LEVEL_PX`], interpolated in the square of the
-//! radius, which keeps the second moment exact.
+//! *Levels.* Up to [`MAX_EXACT_LEVELS`] depths have an exact kernel each. A continuous surface has slabs of [`SLAB_PX`]
+//! blur, kernels every [`LEVEL_PX`], interpolated in the squared radius, which keeps the second moment exact.
 //!
 //! *Cost.* Cells times kernel pixels, twice (light and cover): 20 to 300 ms for 640 x 480 at 2.7 px. Kernels
 //! wider than [`MAX_DIRECT_PX`] use an FFT slab with levels spaced by [`LEVEL_RATIO`]: up to a second.

@@ -1,6 +1,5 @@
-//! From irradiance to codes: size, electrons and quantisation. A pixel of mean radiance collects
-//! `exposure_level` of the full well. Each pixel draws Poisson shot noise and normal read noise, is limited
-//! to 0..full well and rounded to codes (Janesick, Photon Transfer, 2007, ch. 3).
+//! From irradiance to codes. A pixel of mean radiance collects `exposure_level` of the full well, gets Poisson shot and
+//! normal read noise, is limited to 0..full well and rounded to codes (Janesick, Photon Transfer, 2007, ch. 3).
 
 use std::fmt;
 use std::str::FromStr;
@@ -147,8 +146,7 @@ impl Camera {
         self.defects.check()
     }
 
-    /// Codes of one exposure of `radiance` (blurred scene, mean 1). The noise depends on `seed` and
-    /// `exposure_number` only. The camera must be valid ([`Renderer::new`](crate::Renderer::new) checks it).
+    /// Codes of one exposure of `radiance` (blurred, mean 1) by a valid camera; noise by `seed` and `exposure_number`.
     #[must_use]
     pub fn expose(&self, radiance: ArrayView2<'_, f32>, seed: u64, exposure_number: u32) -> Array2<u16> {
         let max_code = f64::from(self.noise.max_code());

@@ -1,5 +1,4 @@
-//! Shading and hot pixels of a real lens, lamp and sensor; none by default. Shading scales each pixel's
-//! light; then hot pixels add electrons, the same ones in every exposure of a seed.
+//! Shading of the light, then hot pixels (the same ones in every exposure of a seed); none by default.
 
 use ndarray::Array2;
 use rand::{RngCore, SeedableRng};

@@ -1,5 +1,4 @@
-//! Two-dimensional FFTs on row-major arrays, by rustfft's scalar planner: vector planners round differently
-//! per CPU, and a seed must give the same image everywhere.
+//! Two-dimensional row-major FFTs by rustfft's scalar planner: vector ones round per CPU, but a seed fixes the image.
 
 use rustfft::FftPlannerScalar;
 use rustfft::num_complex::Complex32;

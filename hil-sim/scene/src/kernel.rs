@@ -1,8 +1,7 @@
 //! PSFs integrated over texture cells and pixels.
 //!
-//! A texture sample is the centre of a square cell of half a pixel, with bilinear radiance in between. Cells
-//! of constant radiance would alias and make focused images up to 10 % too crisp, a depth error of 0.5 mm at
-//! the ends of the working range.
+//! A texture sample is the centre of a square cell of half a pixel, bilinear in between. Constant cells would alias and
+//! make focused images up to 10 % too crisp, a depth error of 0.5 mm at the ends of the working range.
 //!
 //! Lengths are in cells. A sample of radiance 1 gives the cell at offset `d` the mean
 //! `V(d) = integral psf(x, y) B(x - d_x) B(y - d_y) dx dy` with the quadratic B-spline `B` (the triangle of

@@ -1,8 +1,7 @@
 //! The image-side telecentric thin lens: blur of an object distance at a sensor position.
 //!
-//! Distances in mm from the lens: `u` on the object side, `w` and `s` on the image side. `1/F = 1/u + 1/w`;
-//! the blur radius is `|s - w(u)| D / 2F`. The telecentric aperture in the front focal plane makes the
-//! magnification independent of `s` (Watanabe & Nayar 1997).
+//! `1/F = 1/u + 1/w`, blur radius `|s - w(u)| D / 2F`; mm from the lens, `u` to the object, `w` and `s` to the image.
+//! The aperture in the front focal plane makes magnification independent of `s` (Watanabe & Nayar 1997).
 
 use thiserror::Error;
 

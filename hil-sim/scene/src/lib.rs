@@ -1,18 +1,15 @@
 #![doc = include_str!("../README.md")]
 //!
 //! # Model
-//! 1. **Surface.** A height field over the image ([`scene`]) with a texture of two samples per pixel
-//!    ([`texture`]), bilinear.
+//! 1. **Surface.** A height field ([`scene`]) with a bilinear texture of two samples per pixel ([`texture`]).
 //! 2. **Lens.** Image-side telecentric thin lens ([`lens`]): an object at `u` mm focuses `w(u)` mm behind it,
 //!    a sensor at `s` sees blur of radius `|s - w| D / 2F`, and moving the sensor keeps the magnification.
 //! 3. **Blur.** Each cell spreads by the PSF ([`psf`]) of its blur radius, integrated over cell and pixel
 //!    ([`kernel`]); nearer surfaces hide farther ones ([`blur`]).
-//! 4. **Exposure.** Optional shading and hot pixels ([`defects`]); electrons, noise, full well, quantisation
-//!    ([`camera`]).
+//! 4. **Exposure.** Optional shading and hot pixels ([`defects`]); electrons, noise, full well, codes ([`camera`]).
 //!
-//! [`wave`] has a lens by wave optics for flat surfaces. [`render()`] makes one exposure; [`Renderer`] keeps
-//! the texture for many. Everything is a function of its arguments and the seed: no clock, no thread count,
-//! no CPU feature enters.
+//! [`wave`]: wave optics for flat surfaces. [`render()`] makes one exposure; [`Renderer`] keeps the texture for many.
+//! All depends on arguments and seed only: no clock, thread count or CPU feature.
 
 #![deny(missing_docs)]
 

@@ -1,7 +1,6 @@
-//! Scenes: a height field over the image, and its texture. Depths in mm from the lens. The lens is
-//! telecentric, so a point keeps its image position at any depth; the field uses image coordinates (px,
-//! centre of the first pixel at 0.5, 0.5). Named shapes span far to near focus exactly and continue outside
-//! the image.
+//! Scenes: a height field (mm from the lens) and its texture. The lens is telecentric, so a point keeps its image
+//! position at any depth; the field uses image coordinates (px, centre of the first pixel at 0.5, 0.5). Named shapes
+//! span far to near focus exactly and continue outside the image.
 
 use crate::camera::Camera;
 use crate::lens::Lens;

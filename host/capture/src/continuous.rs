@@ -1,6 +1,5 @@
 //! Continuous capture: cycles of shots (far, near, ...) with an image each, for a number of exposures or until stopped.
-//! The board numbers its frames without gaps and reports dropped ones. Losses on the way are reported, too: a missing
-//! event by its number, and a missing image is an error. No image is assigned to another exposure.
+//! Dropped frames, lost events and missing images are reported; no image is assigned to another exposure.
 
 use std::{
     collections::VecDeque,
@@ -68,8 +67,7 @@ enum Reported {
     Dropped { number: u32, loss: Loss },
 }
 
-/// A continuous run; dropping it stops the rig. Unread images wait in the camera; if [`Self::outcome`] is called less
-/// than once a period, some are lost and reported.
+/// A continuous run; dropping it stops the rig. Call [`Self::outcome`] once a period, or images are lost and reported.
 pub struct Continuous<'c> {
     client: Client,
     camera: &'c mut dyn Camera,

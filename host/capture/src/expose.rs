@@ -1,5 +1,3 @@
-//! Runs an exposure program with a camera.
-
 use std::time::{Duration, Instant};
 
 use farnear_protocol::{

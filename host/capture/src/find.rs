@@ -1,5 +1,3 @@
-//! Finds the board's port.
-
 use std::path::Path;
 
 use serialport::{SerialPortInfo, SerialPortType};
@@ -11,8 +9,7 @@ const ST: u16 = 0x0483;
 /// ST-LINKs with a serial port: V2-1 and V3, with and without disk and second port.
 const ST_LINKS: [u16; 7] = [0x374b, 0x374e, 0x374f, 0x3752, 0x3753, 0x3754, 0x3757];
 
-/// The port of the only ST-LINK (on every NUCLEO). Sends nothing, in case of other instruments. Fails unless there is
-/// one.
+/// The port of the only ST-LINK (on every NUCLEO), or an error. Sends nothing, as there may be other instruments.
 pub fn board_port() -> Result<String, PortError> {
     only(&present())
 }

@@ -1,9 +1,8 @@
 //! Finds the sensor distance of best focus.
 //!
-//! *Coarse*: at each stepper position three images up to 190 um apart are taken by piezo. Their spectra give side and
-//! distance of the focus (`model`), so the stepper moves there directly. *Fine*: a piezo sweep around the estimate; the
-//! result is the tip of a parabola through the largest measures ([`farnear_depth::focus_measure::peak`]). Positions are
-//! sums of coarse and fine position in nanometres unless named otherwise.
+//! *Coarse*: per stepper position the piezo takes three images up to 190 um apart, whose spectra give side and distance
+//! of the focus (`model`); the stepper moves there. *Fine*: a piezo sweep, and the tip of a parabola through the
+//! largest measures ([`farnear_depth::focus_measure::peak`]). Positions: coarse plus fine, nm, unless named otherwise.
 
 mod model;
 

@@ -1,5 +1,4 @@
-//! A pair behind a half mirror: two cameras, the second sensor further from the lens. One trigger gives both images
-//! without motion in between (Li 2014, sections 5.5 and 10.2).
+//! A pair of one exposure by two cameras behind a half mirror, one sensor further from the lens (Li 2014, 5.5, 10.2).
 
 use farnear_protocol::message::{Shot, ShotRecord};
 
@@ -13,8 +12,7 @@ use crate::{
     plan::SensorPair,
 };
 
-/// Takes a pair with one exposure (or several, averaged) at the far position: far image by the first camera, near image
-/// by the second, whose sensor is `further_mm` further away.
+/// A pair of one exposure (or several, averaged) at the far position; the second sensor is `further_mm` further away.
 pub fn capture_behind_mirror(
     client: &Client,
     cameras: [&mut dyn Camera; 2],

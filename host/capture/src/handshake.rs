@@ -10,8 +10,7 @@ use farnear_protocol::{
 
 use crate::{error::ClientError, link::Link, timing::Timing};
 
-/// Timeouts of hello, 3 s in total: the board may be starting, and may be emulated. The link's other rates are tried in
-/// between, because an earlier host may have changed it.
+/// Timeouts of hello, 3 s in total, as the board may be starting or emulated; in between at the link's other rates.
 const FIRST_MS: [u64; 4] = [50, 100, 200, 400];
 const OTHER_RATE_MS: [u64; 2] = [50, 50];
 const LAST_MS: [u64; 2] = [800, 1500];
@@ -19,8 +18,7 @@ const DURING: &str = "asking the board who it is";
 /// Fixed session of an emulated board: a random one would change the run. Programs differ by request ids.
 const EMULATED_SESSION: u32 = 0x5eed_0001;
 
-/// Drains the line, identifies the board and selects a version. A repeated hello would change an emulated run: long
-/// timeout.
+/// Drains the line, identifies the board, selects a version. Emulated: long timeout, as a repeat changes the run.
 pub(crate) fn shake_hands(link: &mut Link, known_emulated: bool) -> Result<(Hello, u8), ClientError> {
     link.drain(DURING)?;
     let millis = |waits: &[u64]| waits.iter().map(|ms| Duration::from_millis(*ms)).collect::<Vec<_>>();

@@ -1,5 +1,4 @@
-//! Requests and answers: frames over a [`Transport`], with repeats. The caller chooses boot and version and interprets
-//! events; the link keeps session and request ids ([`Link::begin_session`]).
+//! Frames over a [`Transport`], with repeats; keeps session and ids ([`Link::begin_session`]), not boot or version.
 
 use std::{
     io::{self, ErrorKind},

@@ -1,5 +1,3 @@
-//! The board's log as a stream.
-
 use std::{
     sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TrySendError, sync_channel},
     time::Duration,

@@ -22,8 +22,7 @@ const SATURATED: f64 = 0.98;
 const STEP_MAX: f64 = 8.0;
 const EXPOSURES_MAX: usize = 8;
 
-/// Finds the exposure time at which an image has the largest brightness without saturation, by up to 8 exposures of
-/// `shot`. Returns the nearest one within the board's limits.
+/// Finds the brightest unsaturated exposure, by up to 8 of `shot`; returns the nearest time within the board's limits.
 pub fn exposure(
     client: &Client,
     camera: &mut dyn Camera,

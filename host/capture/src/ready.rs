@@ -1,5 +1,3 @@
-//! Homes the axes, and gives the sensor position that results.
-
 use farnear_protocol::{
     Nanometres,
     message::{Axis, Capabilities, PositionState, Status, sensor_distance_nm},

@@ -1,6 +1,5 @@
-//! Timeouts, and durations of work. A real board answers within 50 ms. An emulated one takes as long as the host needs
-//! for its instructions, so its timeouts are generous. The host sends nothing on its own initiative while it waits for
-//! one, because requests at wall-clock times would make the run unrepeatable.
+//! Timeouts, and durations of work. A real board answers within 50 ms. An emulated one needs generous timeouts, and
+//! gets no requests at wall-clock times, which would make the run unrepeatable.
 
 use std::time::Duration;
 

@@ -64,9 +64,8 @@ impl SerialTransport {
     }
 }
 
-/// Finds a board that reappears under another port name: by its USB adapter's serial number, else by name, else by the
-/// only unnumbered adapter of that make. `/dev/serial/by-id` links are stable names. The caller must verify the
-/// identity.
+/// Finds a board under another port name: by its USB adapter's serial number, else name, else the only unnumbered one
+/// of that make. `/dev/serial/by-id` links are stable names. The caller must verify the identity.
 #[derive(Clone, Debug)]
 pub(crate) struct Place {
     name: String,

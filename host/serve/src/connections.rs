@@ -1,6 +1,5 @@
-//! Time-outs and limits against slow, silent or too many clients.
-//!
-//! Above a limit the oldest connection without a request is closed, then the oldest idle one.
+//! Time-outs and limits against slow, silent or too many clients. Above a limit the oldest connection without a request
+//! is closed, then the oldest idle one.
 
 use std::{
     collections::VecDeque,
@@ -42,7 +41,6 @@ pub struct Limits {
     pub idle_timeout: Duration,
     /// Most connections; fewer if the system allows this process fewer than this plus 128 descriptors.
     pub connections: usize,
-    /// Most connections of one address.
     pub connections_per_address: usize,
     /// Most bytes of uploaded videos in a session.
     pub upload_quota_bytes: u64,

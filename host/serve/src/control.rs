@@ -40,8 +40,7 @@ pub enum HandOverError {
 }
 
 impl ControlLock {
-    /// Adds a client. `resumed` is the secret of the page before it was reloaded. The client gets control if that page
-    /// had it or no client has it.
+    /// Adds a client. It gets control if free, or if its page had it before a reload (`resumed`: that page's secret).
     pub fn join(&mut self, resumed: Option<&str>) -> Result<Client, getrandom::Error> {
         let mut bytes = [0; 16];
         getrandom::fill(&mut bytes)?;
@@ -77,8 +76,7 @@ impl ControlLock {
         held
     }
 
-    /// Ends the reservation; `true` if control was still reserved. Control passes to the oldest request, or to the only
-    /// client.
+    /// Ends a reservation, if any (`true`): control passes to the oldest request, or to the only client.
     pub fn expire(&mut self, id: u32) -> bool {
         if self.disconnected.as_ref().is_none_or(|client| client.id != id) {
             return false;

@@ -27,8 +27,7 @@ pub fn unix_ms() -> f64 {
     since.map_or(0.0, |since| since.as_secs_f64() * 1e3)
 }
 
-/// Ends of the page's colour scale, mm: 25 % beyond the working range, so that depths just outside remain
-/// distinguishable.
+/// Ends of the colour scale, mm: 25 % beyond the working range, so that depths just outside remain distinguishable.
 pub fn ends(optics: &Optics) -> [f32; 2] {
     let range = optics.working_range();
     let margin = 0.25 * (range.far_mm - range.near_mm);

@@ -1,5 +1,4 @@
-//! Two job queues of length one, for the rig and for computations. A busy queue rejects a job, so nothing moves later
-//! than expected.
+//! Two job queues of length one, rig and computations. A busy one rejects jobs: nothing moves later than expected.
 
 use std::{
     io,

@@ -1,8 +1,7 @@
 //! # farnear-serve
 //!
-//! The rig in a browser: an embedded page of ES modules, and a typed HTTP and WebSocket API described at
-//! `/openapi.json`. The tasks are in `farnear-workflows`. If the client that has control disconnects and does not
-//! return, the rig is stopped.
+//! The rig in a browser: an embedded page of ES modules, and a typed HTTP and WebSocket API (`/openapi.json`) for the
+//! tasks of `farnear-workflows`. The rig is stopped if the client in control disconnects and does not return.
 
 pub mod api;
 pub mod app;

@@ -1,5 +1,3 @@
-//! Starts and ends the server.
-
 use std::{net::SocketAddr, path::PathBuf, sync::Arc, time::Duration};
 
 use farnear_workflows::{
@@ -43,8 +41,7 @@ pub enum ServeError {
     Workflow(#[from] WorkflowError),
 }
 
-/// Serves the page until `context` is cancelled, which also stops motion. `ready` receives the address as soon as it
-/// answers; the rig is connected in the background.
+/// Serves until `context` is cancelled, which stops motion. `ready` receives the address; the rig is connected later.
 pub fn serve(
     settings: ServeSettings,
     context: &Context<'_>,

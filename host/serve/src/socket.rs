@@ -19,8 +19,7 @@ use crate::{app::App, control::RESERVED, routes::Shared, view::Hello};
 const ASK: Duration = Duration::from_secs(1);
 /// Longest silence: a browser answers pings even while its page is busy.
 const SILENCE: Duration = Duration::from_secs(5);
-/// Pictures without acknowledgement: one on display, one in transit. More would fill buffers and delay the display by
-/// seconds.
+/// Pictures without acknowledgement: on display and in transit. More would delay the display by seconds.
 const ON_THE_WAY: u32 = 2;
 /// Picture interval for a browser that acknowledges nothing.
 const UNSEEN: Duration = Duration::from_secs(1);

@@ -1,5 +1,4 @@
-//! Instructions per pixel of the run time on 64-bit ARM and x86-64, counted by qemu. An emulator gives no
-//! times, but instructions show whether the vectors are used.
+//! Instructions per pixel on 64-bit ARM and x86-64 by qemu, which shows whether the vectors are used, but no times.
 
 use std::{
     fmt::Write as _,

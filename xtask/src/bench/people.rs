@@ -1,5 +1,4 @@
-//! Times of host/recognition from video and masks to embedded points, compared with scikit-learn's Isomap and
-//! an RBF map on the same 1500 descriptors.
+//! Times of host/recognition up to embedded points; scikit-learn's Isomap and an RBF map on the same 1500 descriptors.
 
 use std::{
     fmt::Write as _,

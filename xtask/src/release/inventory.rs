@@ -1,5 +1,4 @@
-//! Contents of a release: a bill of materials (CycloneDX) and all licences, from cargo's metadata. A licence
-//! outside [`ACCEPTED`] stops the release.
+//! Bill of materials (CycloneDX) and licences from cargo's metadata; one outside [`ACCEPTED`] stops the release.
 
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -21,8 +20,7 @@ use crate::{
 const LIST: &str = "farnear.cdx.json";
 const NOTICES: &str = "THIRD-PARTY.txt";
 const PAGE: &str = "host/serve/page/vendor/LICENSES.txt";
-/// Each dependency must offer one of these. All allow binary distribution; MPL-2.0 requires available
-/// sources, which crates.io provides.
+/// Each dependency must offer one. All allow binaries; MPL-2.0 requires available sources, as on crates.io.
 const ACCEPTED: [&str; 9] = [
     "MIT",
     "Apache-2.0",

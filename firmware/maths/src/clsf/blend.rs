@@ -1,7 +1,6 @@
-//! The 3x3 regions blended bilinearly between their centres, without seams. Between two centres the factors of `U`,
-//! `U^2`, `U^3` and the terms in y are linear in the column's weight: one product each. The terms in x are not; a table
-//! holds their blend along x for both region rows, blended along y by one more product. Beyond the outer centres one
-//! region applies.
+//! The 3x3 regions blended bilinearly between their centres, without seams; beyond the outer centres one region
+//! applies. Factors of `U`, `U^2`, `U^3` and terms in y are linear in the column's weight: one product each. Terms in x
+//! are not: a table holds their blend along x for both region rows, blended along y by one more product.
 
 use super::{
     Coefficient, Error, Frame, REGION_TERMS, REGIONS, RegionCoefficients, TableState,

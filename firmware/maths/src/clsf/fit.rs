@@ -18,8 +18,7 @@ const TERM_BITS: u32 = 20;
 /// Capacity of the sums, samples.
 const MOST_SAMPLES: u32 = 1 << 22;
 
-/// Smaller pivots of the normalised matrix are rounding: the samples do not determine the terms. Third powers on a
-/// third of the image give 6e-3; three depths instead of four less than 1e-6.
+/// Below this the samples do not determine the terms: a third of the image gives 6e-3, three depths less than 1e-6.
 const LEAST_PIVOT: f64 = 3e-5;
 
 #[derive(Clone, Debug)]

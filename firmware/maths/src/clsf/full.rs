@@ -8,8 +8,7 @@ use super::{
     row::{Factors, polynomial},
 };
 
-/// Terms in this order: 1, x, x^2, x^3, y, xy, x^2 y, y^2, x y^2, y^3, U, xU, x^2 U, yU, xyU, y^2 U, U^2, xU^2, yU^2,
-/// U^3.
+/// Order: 1, x, x^2, x^3, y, xy, x^2 y, y^2, x y^2, y^3, U, xU, x^2 U, yU, xyU, y^2 U, U^2, xU^2, yU^2, U^3.
 pub const FULL_TERMS: usize = 20;
 
 /// Coefficients in the order of [`FULL_TERMS`].

@@ -1,6 +1,5 @@
-//! Inner loops: the cubic in `U` with three kinds of factors along the row. Each loop is one pass with few values: a
-//! Cortex-M4 has 13 registers and needs a load for each value beyond. Positions come from a table too, because a
-//! running sum needs two registers more.
+//! Inner loops: the cubic in `U` with three kinds of factors along the row. Each is one pass, because a Cortex-M4 loads
+//! each value beyond 13 registers. Positions come from a table, because a running sum needs two registers more.
 
 use super::{
     NO_VALUE,

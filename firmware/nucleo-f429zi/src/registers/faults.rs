@@ -43,8 +43,7 @@ unsafe fn NonMaskableInt() -> ! {
     SCB::sys_reset()
 }
 
-/// All faults (the configurable ones escalate). The stack may be full, so it is reset first. `r0` is the stack pointer
-/// from cortex-m-rt's trampoline.
+/// All faults (configurable ones escalate). Resets the stack first: it may be full. `r0`: cortex-m-rt's stack pointer.
 // SAFETY: the name is cortex-m-rt's hook for this; there is no other.
 #[unsafe(naked)]
 #[unsafe(no_mangle)]

@@ -48,7 +48,6 @@ pub fn piezo_code() -> Option<u16> {
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub enum Last {
     Panic {
-        /// Source file, if known.
         file: Option<&'static str>,
         line: u32,
     },

@@ -1,6 +1,5 @@
-//! Writes records, one chunk per tick. The most urgent marked record is written over its older copy, blocks first,
-//! header last. A change during the write restarts it, so that no copy mixes two states. Cost: 700 instructions per
-//! tick.
+//! Writes records, one chunk per tick, over the most urgent one's older copy: blocks first, header last. A change
+//! during the write restarts it, so that no copy mixes two states. Cost: 700 instructions per tick.
 
 use farnear_protocol::message::RecordName;
 use heapless::Vec;

@@ -6,8 +6,7 @@
 //! `n` pulses lasts exactly as long as the curve, so errors never accumulate. Short distances reduce top speed and
 //! bend. A stop lowers the top speed: the new curve equals the old one so far, and never needs more pulses than remain.
 //!
-//! Single precision: 0.004 pulses; the pulse count is integer. Cost on a Cortex-M4F: some 200 instructions per segment,
-//! 600 to plan (a bisection, no root).
+//! Single precision: 0.004 pulses; integer count. Cortex-M4F: 200 instructions a segment, 600 to plan (bisection).
 
 use crate::io::{SEGMENT_MAX_PULSES, SEGMENT_MAX_TICKS, STEP_TIMER_HZ, Segment};
 

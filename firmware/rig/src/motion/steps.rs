@@ -1,5 +1,4 @@
-//! Exact conversion of positions between nanometres and STEP pulses of 156.25 nm = 625 / 4 nm. Absolute positions are
-//! converted, so rounding (to nearest, halves away from zero) never accumulates.
+//! Absolute nanometres to and from STEP pulses of 625 / 4 nm; rounding (halves away from zero) never accumulates.
 
 use farnear_protocol::Nanometres;
 

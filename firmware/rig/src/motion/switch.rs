@@ -1,5 +1,4 @@
-//! An end switch with a filter. Contacts bounce for most of a millisecond and pick up chopper noise: [`SAMPLES`] equal
-//! samples in a row change the state, at the position of the first.
+//! An end switch, filtered against bounce (< 1 ms) and chopper noise: [`SAMPLES`] equal samples count, from the first.
 
 use farnear_protocol::Nanometres;
 

@@ -1,5 +1,3 @@
-//! The loop with the piezo model.
-
 use super::*;
 use crate::io::REST_TICKS;
 use crate::piezo::plant::{NOMINAL, Part, Plant};

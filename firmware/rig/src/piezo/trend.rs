@@ -1,7 +1,6 @@
 //! The piezo's disturbance during a rest, when the observer does not run.
 
-/// Disturbance and drift. The observer's values follow the gauge's noise, so a rest uses means of 128 and 1,024 ticks,
-/// which lag ramps.
+/// Disturbance and drift: means of the observer's noisy values over 128 and 1,024 ticks, which lag ramps.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Trend {
     /// With [`Self::BITS`] more.

@@ -1,6 +1,5 @@
-//! Timing of a continuous run: due times and counts. Frame k is due a whole number of periods after the first, so
-//! delays never accumulate. Triggers are ordered a tick ahead and rise by compare match, exact to the microsecond. If
-//! position or camera are not ready, the period passes and the same shot is due next.
+//! Timing of a continuous run. Frame k is due k whole periods after the first, so delays never accumulate. Triggers are
+//! ordered a tick ahead, exact by compare match. If position or camera lag, the same shot is due a period later.
 
 use farnear_protocol::{BoardMicros, Micros};
 

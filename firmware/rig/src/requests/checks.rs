@@ -1,5 +1,3 @@
-//! Preconditions of requests.
-
 use farnear_protocol::message::{Axis, PositionState, RequestError, sensor_distance_nm};
 use farnear_protocol::{Micros, Nanometres};
 

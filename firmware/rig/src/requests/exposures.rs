@@ -1,5 +1,3 @@
-//! Requests about the exposure program.
-
 use farnear_protocol::message::{
     Axis, LightLevels, RecordName, RequestError, Response, Shot, ShotFault, ShotLight,
 };

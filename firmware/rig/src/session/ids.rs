@@ -1,5 +1,4 @@
-//! Request ids. Ids increase over a boot. A delayed request may arrive after later ones, so the last [`IDS`] ids are
-//! tracked (anti-replay window of IPsec, RFC 4303, section 3.4.3); older ones count as used. Cost: twelve bytes.
+//! Request ids over a boot. The last [`IDS`] are tracked for delayed ones (RFC 4303, 3.4.3); older ones count as used.
 
 use farnear_protocol::message::ID_STEP_MAX;
 

@@ -1,6 +1,4 @@
-//! A rig on the bench: the behaviour under test, a small hardware model, and the host's end of the link. The model is
-//! as simple as the tests allow (a resonant piezo without hysteresis, a screw with play); the emulated board's is
-//! thorough.
+//! A rig on the bench: behaviour, host, and simple hardware (resonant piezo without hysteresis, screw with play).
 
 pub mod hardware;
 pub mod motor;

@@ -1,5 +1,4 @@
-//! A hostile link: recorded frames, bursts, noise, other hosts that connect and die, resets. Nothing acts twice,
-//! nothing is reported that was not done, and the next honest host works immediately.
+//! A hostile link: recorded frames, bursts, noise, dying hosts, resets. Nothing acts twice; an honest host works on.
 
 use std::collections::BTreeMap;
 

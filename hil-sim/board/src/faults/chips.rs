@@ -1,5 +1,3 @@
-//! Faults of the chips on the board.
-
 use super::{Kind, Takes};
 use crate::board::SpiChip;
 

@@ -1,5 +1,3 @@
-//! Faults of supply, clock, resets and program flow.
-
 use super::{Kind, Takes};
 use crate::board::SUPPLY_MV;
 

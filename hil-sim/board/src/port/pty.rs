@@ -1,5 +1,3 @@
-//! A pseudo-terminal.
-
 use std::{
     io::{self, Read, Write},
     sync::{

@@ -1,5 +1,3 @@
-//! A TCP port.
-
 use std::{
     io::{self, Read, Write},
     net::{Shutdown, SocketAddr, TcpListener, TcpStream},

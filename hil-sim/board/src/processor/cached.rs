@@ -1,8 +1,7 @@
 //! Translations that survive a reset and a rig.
 //!
-//! The emulator drops the translated instructions at each reset and rig: more than half of a short scenario's
-//! CPU time. Here an idle twin computes the reset state, and the next rig with the same program reuses the
-//! processor. Behaviour does not depend on translations, so runs stay identical to the bit.
+//! The emulator drops translations at each reset and rig: more than half of a short scenario's CPU time. An idle twin
+//! computes the reset state, and the next rig with the program reuses the processor. Runs stay identical to the bit.
 
 use std::{
     collections::BTreeSet,

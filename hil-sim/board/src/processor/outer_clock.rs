@@ -1,5 +1,4 @@
-//! Failure of the ST-LINK's HSE clock, which the emulator lacks: HSE never becomes ready, and the clock
-//! security system raises its non-maskable interrupt (RM0090, section 6.2.7).
+//! Failure of the ST-LINK's HSE clock: never ready, and the clock security system's NMI (RM0090, section 6.2.7).
 
 use std::sync::atomic::{AtomicBool, Ordering};
 

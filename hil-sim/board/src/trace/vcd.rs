@@ -1,6 +1,5 @@
-//! A run as a value change dump: positions, pulses, exposures, line bytes, faults; comments hold what a
-//! replay needs. STEP pulses and exposures have exact times; positions are sampled each millisecond with
-//! motion, bytes and faults at stops of the emulator (at least every 0.1 ms).
+//! A run as a value change dump of positions, pulses, exposures, bytes and faults; comments hold what a replay needs.
+//! STEP pulses and exposures are exact; positions: each ms of motion; bytes, faults: at stops (every 0.1 ms or less).
 
 use std::{
     fmt::Write as _,

@@ -1,5 +1,3 @@
-//! End of each scenario: all faults are reverted, and the rig must work.
-
 use farnear_protocol::{
     Request, RequestError, Response,
     message::{Axis, PositionState},

@@ -1,5 +1,3 @@
-//! Exposures: each is reported, at the true position.
-
 use farnear_protocol::{
     EventKind,
     camera::FREE_RUNNING,

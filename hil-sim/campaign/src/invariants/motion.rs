@@ -1,5 +1,3 @@
-//! Motors: hard stops, alarms and unrequested motion.
-
 use farnear_protocol::{EventKind, Request, Response};
 
 use super::{Broken, Case};

@@ -1,5 +1,3 @@
-//! Positions: each one reported as homed is correct.
-
 use std::collections::BTreeSet;
 
 use farnear_protocol::{

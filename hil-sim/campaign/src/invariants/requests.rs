@@ -1,5 +1,3 @@
-//! Requests: none acts twice.
-
 use std::collections::{BTreeMap, BTreeSet};
 
 use farnear_protocol::{

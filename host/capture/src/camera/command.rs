@@ -1,7 +1,6 @@
-//! A program as a camera: `ffmpeg`, `rpicam-vid` or vendor tools that write pictures to standard output, as YUV4MPEG2
-//! (Y4M) or as raw frames of a given size and format. The program runs while the camera is open and must give one
-//! picture per trigger (external-trigger mode). Its pictures have neither number nor time, so only their order
-//! identifies them, and a surplus or missing one fails the whole program of exposures.
+//! A program as a camera: `ffmpeg`, `rpicam-vid` or vendor tools that write Y4M or raw frames of a given size and
+//! format to standard output, one per trigger (external-trigger mode), while the camera is open. Pictures have neither
+//! number nor time, only their order: a surplus or missing one fails the whole program of exposures.
 
 use std::{
     io::{BufRead, BufReader, Read},

@@ -1,5 +1,3 @@
-//! Camera settings with ranges.
-
 use std::{fmt, str::FromStr};
 
 #[derive(Clone, PartialEq, Debug)]

@@ -1,5 +1,4 @@
-//! GigE Vision and USB3 Vision cameras through Aravis with GenICam SFNC names. A cargo feature, `genicam`, because not
-//! every system has the library (Debian: `libaravis-dev`).
+//! GigE and USB3 Vision cameras through Aravis (SFNC names); feature `genicam`, as it needs `libaravis-dev` (Debian).
 
 mod settings;
 

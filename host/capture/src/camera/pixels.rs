@@ -1,5 +1,4 @@
-//! Converts camera pixels to 16-bit grey values. Names as in Video4Linux and ffmpeg, and GenICam's PFNC for machine
-//! vision. YUV gives its luma, MJPEG the mean of the colours, as for picture files. Cost: one pass.
+//! Camera pixels to 16-bit grey (YUV: luma, MJPEG: mean of colours); names of Video4Linux, ffmpeg, PFNC. One pass.
 
 use std::{fmt, str::FromStr};
 

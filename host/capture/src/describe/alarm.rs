@@ -1,5 +1,3 @@
-//! Texts of alarms and failures, with remedies.
-
 use farnear_protocol::message::{Alarm, AlarmRecord, Failure};
 
 use super::{axis_name, record_name, um};

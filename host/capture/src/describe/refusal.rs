@@ -1,5 +1,3 @@
-//! Texts of refusals, with remedies.
-
 use farnear_protocol::{
     RequestError,
     message::{Axis, CorrectionFault, LIGHT_LEVEL_MAX, LIGHT_TIME_MAX, LightFault, ShotFault},

@@ -3,9 +3,8 @@
 //! Blur of standard deviation `s` pixels multiplies the power at frequency `w` by `exp(-s^2 w^2)`, with
 //! `s = k e / (2 Fe d)` at the distance `e` from focus (`d` = pixel pitch). The log ratio of two images' power is
 //! therefore linear in `w^2`, independent of texture: `ln(Pi / Pj) = -(k / (2 Fe d))^2 (ei^2 - ej^2) w^2`. With both
-//! positions known, the slope gives `e` (after Subbarao). For other PSFs it holds while blur is small against `1 / w`,
-//! so higher frequencies are excluded. A wrong `k` only changes the next step's length. Cost: one FFT of the binned
-//! image.
+//! positions known, the slope gives `e` (after Subbarao). Other PSFs agree while blur is small against `1 / w`: higher
+//! frequencies are excluded. A wrong `k` only changes the next step's length. Cost: one FFT of the binned image.
 
 use farnear_depth::fourier::{Complex64, transform};
 use ndarray::Array2;

@@ -1,5 +1,3 @@
-//! End and begin of sessions.
-
 use std::{
     io,
     sync::Arc,

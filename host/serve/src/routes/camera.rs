@@ -1,5 +1,3 @@
-//! Camera settings.
-
 use std::str::FromStr;
 
 use axum::{

@@ -1,5 +1,3 @@
-//! Depth quality.
-
 use axum::{Json, extract::State, http::HeaderMap};
 use farnear_workflows::{
     Context,

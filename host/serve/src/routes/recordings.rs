@@ -1,5 +1,3 @@
-//! Recorded live depth.
-
 use std::{fs, path::PathBuf};
 
 use axum::{

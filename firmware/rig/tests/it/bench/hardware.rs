@@ -124,7 +124,6 @@ impl Hardware {
         self.lens.cut();
     }
 
-    /// Executes the outputs for a control tick.
     pub fn run(&mut self, outputs: &Outputs, now: u64) {
         self.coarse.run(&outputs.coarse, now, self.faults.emergency_stop);
         self.lens.run(&outputs.lens, now, self.faults.emergency_stop);

@@ -1,5 +1,3 @@
-//! Ranges and choices of camera settings.
-
 use aravis::{Auto, prelude::*};
 
 use super::GenicamCamera;
