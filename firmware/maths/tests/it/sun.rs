@@ -109,7 +109,8 @@ fn sun_agrees_with_f64_over_a_century_and_the_globe() {
     assert!(azimuth_error < TOLERANCE_DEG / 5.0, "{azimuth_error}");
 }
 
-/// Example of NREL's SPA (TP-560-34302, table A5.1), no refraction: elevation 39.872046 deg, azimuth 194.340241 deg.
+/// Example of NREL's SPA (Reda & Andreas, TP-560-34302, table A5.1): elevation without refraction 39.872046 deg,
+/// azimuth 194.340241 deg.
 #[test]
 fn sun_agrees_with_the_example_of_spa() {
     let time = unix_seconds(2003, 10, 17, 19 * 3600 + 30 * 60 + 30);
