@@ -11,6 +11,7 @@
 //! kernels, five products, and 15 window sums and three cubics for three windows; see `docs/speed.md`.
 
 mod bank;
+mod holes;
 mod rows;
 mod scales;
 mod whitened;

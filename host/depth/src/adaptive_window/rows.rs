@@ -5,6 +5,7 @@
 use ndarray::{Array2, ArrayView2, ArrayViewMut2, s};
 
 use super::bank::{Bank, Filters};
+use super::holes::Holes;
 use super::scales::Scales;
 use super::{ADAPTIVE_PX, LEARNED_PX, SAFE_PX, Window, WindowSettings};
 use crate::border::reflect;
@@ -98,20 +99,12 @@ struct Row {
     chosen: [Vec<f32>; 5],
 }
 
-/// Surroundings of pixels without a value.
-struct Holes {
-    /// Pixels of the tile whose smallest window contains one: they have no depth.
-    own: Array2<bool>,
-    /// Pixels, with the halo, whose filters contain one; larger windows leave them out.
-    of_filters: Array2<bool>,
-}
-
 #[derive(Clone, Copy)]
-struct Place {
-    top: usize,
-    left: usize,
-    rows: usize,
-    columns: usize,
+pub(super) struct Place {
+    pub top: usize,
+    pub left: usize,
+    pub rows: usize,
+    pub columns: usize,
 }
 
 impl<'a> Tile<'a> {
@@ -201,7 +194,9 @@ impl<'a> Tile<'a> {
         let wide = place.columns + 2 * beside;
         let products = wide + 2 * self.radius;
         let [inputs, input] = [place.rows + 2 * halo[0], place.columns + 2 * halo[1]];
-        let holes = self.holes(place, halo);
+        let Job { far, near, bank, scales, .. } = self.job;
+        let around = [bank.reach_px(), self.sides[0]];
+        let holes = if scales.whole { None } else { Holes::of([*far, *near], place, halo, around) };
         self.filters.reset();
         let mut sums = [0.0; 3];
         let mut next = 0;
@@ -243,43 +238,6 @@ impl<'a> Tile<'a> {
             }
         }
         sums
-    }
-
-    /// The holes' surroundings, if there are any.
-    fn holes(&self, place: Place, halo: [usize; 2]) -> Option<Holes> {
-        if self.job.scales.whole {
-            return None;
-        }
-        let Job { far, near, .. } = self.job;
-        let (height, width) = far.dim();
-        // Reflection adds no hole that is not within the halo of the image itself.
-        let [rows, columns] =
-            [(place.top, place.rows, halo[0], height), (place.left, place.columns, halo[1], width)]
-                .map(|(first, count, halo, n)| first.saturating_sub(halo)..(first + count + halo).min(n));
-        let whole = [far, near].iter().all(|image| {
-            let rows = image.slice(s![rows.clone(), columns.clone()]);
-            rows.rows()
-                .into_iter()
-                .all(|row| row.iter().map(|v| u32::from(v.is_finite())).sum::<u32>() as usize == row.len())
-        });
-        if whole {
-            return None;
-        }
-        let holes =
-            Array2::from_shape_fn((place.rows + 2 * halo[0], place.columns + 2 * halo[1]), |(y, x)| {
-                let y = reflect((place.top + y) as isize - halo[0] as isize, height);
-                let x = reflect((place.left + x) as isize - halo[1] as isize, width);
-                !(far[(y, x)].is_finite() && near[(y, x)].is_finite())
-            });
-        holes.iter().any(|hole| *hole).then(|| {
-            let reach = self.job.bank.reach_px();
-            let wide = crate::metrics::dilate_square(&holes, reach + self.sides[0] / 2);
-            let own = s![halo[0]..halo[0] + place.rows, halo[1]..halo[1] + place.columns];
-            Holes {
-                own: wide.slice(own).to_owned(),
-                of_filters: crate::metrics::dilate_square(&holes, reach),
-            }
-        })
     }
 
     /// Loads an image row into a ring row from column `left` on; both may lie beyond the image.
