@@ -192,7 +192,7 @@ test("a scale bar lies in the depth map, and its length is that of the optics", 
 test("all options of a depth request are offered, with their help, and an answer names the wrong one", async () => {
   const page = await open(browser, `${server.address}#depth/pair-001`);
   await page.locator("canvas[data-layer=depth]").waitFor();
-  await page.locator("section", { hasText: "Compute depth" }).getByText("All options").click();
+  await page.locator("section.panel", { hasText: "Compute depth" }).getByText("All options").click();
   await page.getByLabel("balance", { exact: true }).waitFor();
   const { components } = await server.ask("/openapi.json");
   const names = Object.keys(components.schemas.CaptureDepthRequest.properties);
