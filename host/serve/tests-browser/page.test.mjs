@@ -124,8 +124,8 @@ test("the depth of the capture is that of the staircase", async () => {
   const rms = page.locator("dt", { hasText: "plane: RMS" }).locator("+ dd");
   await rms.waitFor();
   const mm = Number.parseFloat(await rms.textContent());
-  // A step of the staircase is flat; the noise of 8 bits leaves about a millimetre.
-  assert.ok(mm > 0.1 && mm < 4, `${mm} mm`);
+  // A step of the staircase is flat; with the page's method 8 bits of noise leave 0.1 mm, more at the step's edges.
+  assert.ok(mm > 0.02 && mm < 1, `${mm} mm`);
   assert.match(await page.locator(".probe output").textContent(), /^\d{3}\.\d\d mm$/);
   assert.deepEqual(page.complaints, []);
   await page.context().close();
