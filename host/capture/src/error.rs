@@ -25,7 +25,7 @@ pub enum PortError {
     SeveralBoards { ports: Vec<String> },
     #[error("{port}: {rate} baud requested, but the link supports {} baud", rates())]
     Rate { port: String, rate: String },
-    #[error("{port} has no baud rate of its own; set that of the line at the serial server and omit it here")]
+    #[error("TCP has no baud rate: set that of {port} at the serial server and omit it here")]
     TcpRate { port: String },
     #[error(
         "cannot connect to {port}: {reason}; expected tcp:HOST:PORT of a running farnear-sim or serial server"

@@ -185,6 +185,29 @@ fn explain(path: &str, error: serialport::Error) -> PortError {
     }
 }
 
+/// Sends by `write`, which gets the rest and the time left.
+fn send_all(
+    bytes: &[u8],
+    wait: Duration,
+    mut write: impl FnMut(&[u8], Duration) -> io::Result<usize>,
+) -> io::Result<()> {
+    let until = Instant::now() + wait;
+    let mut rest = bytes;
+    while !rest.is_empty() {
+        let left = until.saturating_duration_since(Instant::now());
+        if left.is_zero() {
+            return Err(io::ErrorKind::TimedOut.into());
+        }
+        match write(rest, left) {
+            Ok(0) => return Err(io::ErrorKind::WriteZero.into()),
+            Ok(count) => rest = &rest[count..],
+            Err(error) if matches!(error.kind(), io::ErrorKind::Interrupted | io::ErrorKind::WouldBlock) => {}
+            Err(error) => return Err(error),
+        }
+    }
+    Ok(())
+}
+
 impl Transport for SerialTransport {
     fn receive(&mut self, buffer: &mut [u8], wait: Duration) -> io::Result<usize> {
         let port = self.open_port()?;
@@ -201,23 +224,11 @@ impl Transport for SerialTransport {
     }
 
     fn send(&mut self, bytes: &[u8], wait: Duration) -> io::Result<()> {
-        let until = Instant::now() + wait;
-        let mut rest = bytes;
-        while !rest.is_empty() {
-            let left = until.saturating_duration_since(Instant::now());
-            if left.is_zero() {
-                return Err(io::ErrorKind::TimedOut.into());
-            }
+        send_all(bytes, wait, |rest, left| {
             let port = self.open_port()?;
             port.set_timeout(left)?;
-            match port.write(rest) {
-                Ok(0) => return Err(io::ErrorKind::WriteZero.into()),
-                Ok(count) => rest = &rest[count..],
-                Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
-                Err(error) => return Err(error),
-            }
-        }
-        Ok(())
+            port.write(rest)
+        })
     }
 
     fn discard_input(&mut self) -> io::Result<()> {

@@ -121,7 +121,7 @@ pub fn read<E: From<StackError>>(
     Ok(())
 }
 
-/// The page of a TIFF file that stays open for the next one; `None` for an image of its own.
+/// The page of a TIFF file that stays open for the next one; `None` for a file with one image.
 fn page(path: &Path, open: &mut Option<(PathBuf, Pages)>) -> Result<Option<Decoded>, ImageError> {
     let (file, Some(number)) = image_file::file_and_page(path) else { return Ok(None) };
     if open.as_ref().is_none_or(|(of, _)| *of != file) {

@@ -3,10 +3,10 @@
 use std::{
     io::{self, Read, Write},
     net::{TcpStream, ToSocketAddrs},
-    time::{Duration, Instant},
+    time::Duration,
 };
 
-use super::Transport;
+use super::{Transport, send_all};
 use crate::error::PortError;
 
 /// Start of a port's name that means an address, `tcp:HOST:PORT`.
@@ -38,7 +38,7 @@ impl TcpTransport {
     }
 }
 
-/// Whether a read or write ended without progress.
+/// Whether a read ended without progress.
 fn is_timeout(error: &io::Error) -> bool {
     use io::ErrorKind::{Interrupted, TimedOut, WouldBlock};
     matches!(error.kind(), TimedOut | WouldBlock | Interrupted)
@@ -55,22 +55,10 @@ impl Transport for TcpTransport {
     }
 
     fn send(&mut self, bytes: &[u8], wait: Duration) -> io::Result<()> {
-        let until = Instant::now() + wait;
-        let mut rest = bytes;
-        while !rest.is_empty() {
-            let left = until.saturating_duration_since(Instant::now());
-            if left.is_zero() {
-                return Err(io::ErrorKind::TimedOut.into());
-            }
+        send_all(bytes, wait, |rest, left| {
             self.stream.set_write_timeout(Some(left))?;
-            match self.stream.write(rest) {
-                Ok(0) => return Err(io::ErrorKind::WriteZero.into()),
-                Ok(count) => rest = &rest[count..],
-                Err(error) if is_timeout(&error) => {}
-                Err(error) => return Err(error),
-            }
-        }
-        Ok(())
+            self.stream.write(rest)
+        })
     }
 
     fn discard_input(&mut self) -> io::Result<()> {
@@ -95,7 +83,7 @@ impl Transport for TcpTransport {
 
 #[cfg(test)]
 mod tests {
-    use std::net::TcpListener;
+    use std::{net::TcpListener, time::Instant};
 
     use super::*;
 

@@ -187,6 +187,11 @@ async fn compute(
         out: Some(out),
         ..options
     };
+    begin(&app, &name, request)
+}
+
+/// Computes a map of a capture in the background.
+fn begin(app: &App, name: &str, request: impl Request) -> Result<Json<Begun>, Failure> {
     request.check()?;
     let work = move |app: &App, context: &Context<'_>| {
         let computed = request.run(context)?;
@@ -210,15 +215,7 @@ async fn compute_stack(
         .map_err(|error| Failure::new(StatusCode::BAD_REQUEST, error.to_string()))?;
     let out = sessions::variant_of(&folder, sessions::STACK_VARIANT)?;
     let request = FocusStackRequest { stack: folder, out, ..options };
-    request.check()?;
-    let work = move |app: &App, context: &Context<'_>| {
-        let computed = request.run(context)?;
-        app.change(|state| state.captures += 1);
-        figures(computed)
-    };
-    let task = Task { kind: "depth", title: format!("Depth of {name}"), work: Box::new(work) };
-    let job = app.begin_computing(task).map_err(|title| Failure::busy(&title))?;
-    Ok(Json(Begun { job }))
+    begin(&app, &name, request)
 }
 
 /// Folder of a capture's map.

@@ -28,7 +28,7 @@ use crate::{
 /// Compute a depth map from a far- and a near-focused image.
 ///
 /// Writes depth.npy and depth.tiff (mm, NaN = no value), depth.png (16 bit), confidence.npy (0 to 1), mesh.ply, view.png
-/// (a picture with a scale), reason.png (0 = a depth, else why there is no depth, as listed in depth.toml), depth.toml (settings and
+/// (a picture with a scale), reason.png (0 = a depth, else the reason without one, as listed in depth.toml), depth.toml (settings and
 /// origin of the map) and, with --uncertainty, uncertainty.npy (mm).
 #[serde_as]
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize, JsonSchema)]
