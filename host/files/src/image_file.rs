@@ -25,6 +25,7 @@ use std::{
 
 use ndarray::Array2;
 
+use decode::largest_but_defective;
 pub(crate) use decode::{Decoded, Samples8, decode};
 pub use metadata::exposure_time;
 pub use tiff_file::page_count;
@@ -77,13 +78,23 @@ pub struct SharedWhiteLevel {
 impl SharedWhiteLevel {
     pub fn add(&mut self, image: &GreyImage) {
         self.lowest = self.lowest.into_iter().chain(image.white_level).reduce(f32::min);
-        self.brightest = image.pixels.iter().copied().fold(self.brightest, f32::max);
+        self.brightest = self.brightest.max(brightest(image));
         self.float |= image.samples == Samples::Float;
     }
 
     pub fn get(self) -> Option<f32> {
         self.lowest.filter(|white| !self.float && self.brightest <= white * 1.000_001)
     }
+}
+
+/// Without defective pixels, where integers tell.
+fn brightest(image: &GreyImage) -> f32 {
+    if image.samples != Samples::Integer(16) {
+        return image.pixels.iter().copied().fold(0.0, f32::max);
+    }
+    let mut counts = vec![0; 1 << 16];
+    image.pixels.iter().for_each(|value| counts[usize::from((value * 65535.0).round() as u16)] += 1);
+    largest_but_defective(&counts).map_or(0.0, |code| f32::from(code) / 65535.0)
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]

@@ -36,34 +36,41 @@ pub(super) fn unsupported(bytes: &[u8]) -> Option<&'static str> {
     OTHERS.iter().find(|(magic, _)| bytes.starts_with(magic)).map(|(_, advice)| *advice)
 }
 
-/// Whether a JPEG has its end marker after the last scan; later data (previews, films) is ignored.
-pub(super) fn jpeg_has_its_end(bytes: &[u8]) -> bool {
-    let mut at = 2;
+/// A JPEG up to its end marker, without stray bytes between its segments, which decoders skip; `None` without an end. Later data
+/// (previews, films) is ignored.
+pub(super) fn whole_jpeg(bytes: &[u8]) -> Option<Vec<u8>> {
+    let mut whole = bytes.get(..2)?.to_vec();
+    let (mut at, mut in_scan) = (2, false);
     loop {
-        // Between segments: a marker, possibly after fill bytes.
-        let Some(found) = bytes
-            .get(at..)
-            .and_then(|rest| rest.windows(2).position(|two| two[0] == 0xff && two[1] != 0xff && two[1] != 0))
-        else {
-            return false;
-        };
-        let marker = bytes[at + found + 1];
-        at += found + 2;
-        match marker {
-            0xd9 => return true,
-            0x01 | 0xd0..=0xd8 => {}
-            _ => {
-                let Some(&[high, low]) = bytes.get(at..at + 2) else { return false };
-                at += usize::from(u16::from_be_bytes([high, low])).max(2);
-                // Scan data has no marker except resets, which the search skips.
-            }
+        let rest = bytes.get(at..)?;
+        let found = rest.windows(2).position(|two| two[0] == 0xff && two[1] != 0xff && two[1] != 0)?;
+        if in_scan {
+            // Bytes of 0xff before a marker are fill.
+            let fill = rest[..found].iter().rev().take_while(|byte| **byte == 0xff).count();
+            whole.extend_from_slice(&rest[..found - fill]);
         }
+        at += found;
+        let length = match bytes[at + 1] {
+            0x01 | 0xd0..=0xd7 | 0xd9 => 2,
+            // Another image begins.
+            0xd8 => return None,
+            _ => 2 + usize::from(u16::from_be_bytes(*bytes.get(at + 2..)?.first_chunk()?)).max(2),
+        };
+        whole.extend_from_slice(bytes.get(at..at + length)?);
+        match bytes[at + 1] {
+            0xd9 => return Some(whole),
+            0x01 | 0xd0..=0xd7 => {}
+            marker => in_scan = marker == 0xda,
+        }
+        at += length;
     }
 }
 
 /// Why a JPEG of this coding is not read (T.81, table B.1; JPEG-LS), from the marker and precision of its frame.
 pub(super) fn unsupported_jpeg(bytes: &[u8]) -> Option<String> {
     let mut at = 2;
+    // Colours of a frame whose scans hold all of them.
+    let mut together = 0;
     loop {
         let (marker, length) = match *bytes.get(at..at + 4)? {
             [0xff, 0xff, ..] => {
@@ -74,7 +81,19 @@ pub(super) fn unsupported_jpeg(bytes: &[u8]) -> Option<String> {
             _ => return None,
         };
         let coding = match marker {
-            0xc0..=0xc2 if bytes.get(at + 4)? == &8 => return None,
+            0xc2 if bytes.get(at + 4)? == &8 => return None,
+            0xc0 | 0xc1 if bytes.get(at + 4)? == &8 => {
+                let components = bytes.get(at + 10..at + 2 + length)?.chunks_exact(3);
+                let colours = components.len();
+                together =
+                    if components.into_iter().any(|component| component[1] & 15 > 1) { colours } else { 0 };
+                at += 2 + length;
+                continue;
+            }
+            // The decoder confuses their rows.
+            0xda if usize::from(*bytes.get(at + 4)?) < together => {
+                "a JPEG with subsampled colours in separate scans"
+            }
             0xc0..=0xc2 => &format!("a JPEG of {} bits", bytes[at + 4]),
             0xc3 | 0xc7 | 0xcb | 0xcf => "a lossless JPEG",
             0xc5 | 0xc6 | 0xcd | 0xce => "a hierarchical JPEG",

@@ -21,6 +21,8 @@ const SMALL_BYTES: u64 = 64 << 20;
 const CAMERA_BITS: std::ops::RangeInclusive<u32> = 8..=15;
 /// Pixels at the largest code that make it the white level.
 const SATURATED_PX: usize = 4;
+/// Of this many pixels one may be defective, with any code.
+const DEFECTIVE: usize = 20_000;
 
 pub(crate) enum Values {
     U8(Vec<u8>),
@@ -60,12 +62,11 @@ pub(crate) fn decode(bytes: &[u8]) -> Result<Decoded, String> {
 fn jpeg(bytes: &[u8]) -> Result<(Decoded, u8), String> {
     const INCOMPLETE: &str =
         "it is incomplete: the data end before the image does; copy it again from the camera";
-    if let Some(advice) = complete::unsupported_jpeg(bytes) {
+    let whole = complete::whole_jpeg(bytes);
+    if let Some(advice) = complete::unsupported_jpeg(whole.as_deref().unwrap_or(bytes)) {
         return Err(advice);
     }
-    if !complete::jpeg_has_its_end(bytes) {
-        return Err(INCOMPLETE.into());
-    }
+    let bytes = whole.as_deref().ok_or(INCOMPLETE)?;
     let options = DecoderOptions::default().set_max_width(usize::MAX).set_max_height(usize::MAX);
     let options = options.set_strict_mode(true);
     let mut decoder = JpegDecoder::new_with_options(ZCursor::new(bytes), options);
@@ -95,7 +96,7 @@ fn jpeg(bytes: &[u8]) -> Result<(Decoded, u8), String> {
 /// Whether the decoder reads on when the data continue before the end marker, i.e. they ended early.
 fn needs_more(bytes: &[u8], values: &[u8], options: DecoderOptions, to: ColorSpace) -> bool {
     const FURTHER: [u8; 64] = [0xa6; 64];
-    let Some(end) = bytes.windows(2).rposition(|two| two == [0xff, 0xd9]) else { return true };
+    let end = bytes.len() - 2;
     let longer = [&bytes[..end], &FURTHER, &bytes[end..]].concat();
     let options = options.set_strict_mode(false).jpeg_set_out_colorspace(to);
     let again = JpegDecoder::new_with_options(ZCursor::new(&longer), options).decode();
@@ -109,7 +110,8 @@ fn other(bytes: &[u8]) -> Result<(Decoded, u8), String> {
     if images > 1 {
         return Err(format!("it is an animation of {images} images: store each as a file"));
     }
-    let mut reader = ImageReader::with_format(Cursor::new(bytes), format);
+    let mut cursor = Cursor::new(bytes);
+    let mut reader = ImageReader::with_format(&mut cursor, format);
     reader.no_limits();
     let mut decoder = reader.into_decoder().map_err(|error| error.to_string())?;
     if decoder.total_bytes() > most_bytes(bytes.len() as u64) {
@@ -123,6 +125,10 @@ fn other(bytes: &[u8]) -> Result<(Decoded, u8), String> {
     let (exif, xmp) = metadata::of_decoder(&mut decoder, bytes);
     let orientation = metadata::orientation(exif.as_deref(), xmp.as_deref());
     let image = DynamicImage::from_decoder(decoder).map_err(|error| error.to_string())?;
+    let after = bytes.get(cursor.position() as usize..).unwrap_or_default();
+    if format == ImageFormat::Pnm && matches!(after.trim_ascii_start(), [b'P', b'1'..=b'7', ..]) {
+        return Err("it holds several images: store each as a file (`pamsplit`)".into());
+    }
     let (width, height) = (image.width() as usize, image.height() as usize);
     use DynamicImage as Image;
     let (channels, values) = match image {
@@ -271,16 +277,26 @@ fn greys<T: Copy + Into<f64>>(
     pixels.map(|p| (p[0].into() * r + p[1].into() * g + p[2].into() * b) as f32).collect()
 }
 
-/// Saturation code of a camera with fewer than 16 bits, if several pixels have it: 2^n - 1, or shifted up.
+/// Saturation code of a camera with fewer than 16 bits, if several pixels have it: 2^n - 1, or shifted up. Defective pixels may
+/// have more.
 fn white_of_values(codes: &[u16]) -> Option<u16> {
-    let (mut largest, mut used) = (0, 0);
-    for code in codes {
-        largest = largest.max(*code);
-        used |= code;
-    }
+    let mut counts = vec![0; 1 << 16];
+    codes.iter().for_each(|code| counts[usize::from(*code)] += 1);
+    let largest = largest_but_defective(&counts)?;
+    let used = (0..=u16::MAX).filter(|code| counts[usize::from(*code)] > 0).fold(0, |used, code| used | code);
     let lower = CAMERA_BITS.map(|bits| ((1_u32 << bits) - 1) as u16).any(|white| white == largest);
     let zeros = used.trailing_zeros();
     let upper = (1..=8).contains(&zeros) && largest == 0xffff << zeros;
-    let saturated = (lower || upper) && codes.iter().filter(|code| **code == largest).count() >= SATURATED_PX;
-    saturated.then_some(largest)
+    ((lower || upper) && counts[usize::from(largest)] >= SATURATED_PX).then_some(largest)
+}
+
+/// The largest code, from the numbers of pixels of each, where a few in 100,000 are defective.
+pub(super) fn largest_but_defective(counts: &[usize]) -> Option<u16> {
+    let defective = counts.iter().sum::<usize>() / DEFECTIVE;
+    let mut above = 0;
+    let largest = counts.iter().rposition(|count| {
+        above += count;
+        above > defective
+    });
+    largest.map(|code| code as u16)
 }

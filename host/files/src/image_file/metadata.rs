@@ -2,15 +2,14 @@
 
 use std::{io::Cursor, path::Path};
 
-use image::{ImageDecoder, ImageFormat, ImageReader, metadata::Orientation};
+use image::{ImageDecoder, ImageFormat, ImageReader};
 use zune_jpeg::{JpegDecoder, zune_core::bytestream::ZCursor};
 
 use super::tiff_tags;
 
 /// Orientation as in EXIF, 1 to 8; 1 = upright. EXIF comes before XMP.
 pub(super) fn orientation(exif: Option<&[u8]>, xmp: Option<&[u8]>) -> u8 {
-    let of_exif = || exif.and_then(Orientation::from_exif_chunk).map(Orientation::to_exif);
-    of_exif().or_else(|| of_xmp(xmp?)).unwrap_or(1)
+    exif.and_then(tiff_tags::orientation).or_else(|| of_xmp(xmp?)).unwrap_or(1)
 }
 
 /// `tiff:Orientation`, as an attribute or an element.

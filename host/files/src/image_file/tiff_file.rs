@@ -153,10 +153,14 @@ fn unsupported(page: &Directory) -> Option<String> {
             page.image_depth
         ));
     }
-    // The decoder does not expect these.
-    if page.planar == 2 && page.samples_per_pixel > 1 && page.tile_width.is_some() {
+    // The decoder takes the padding below the lowest tiles for pixels in all planes but the first.
+    if page.planar == 2
+        && page.samples_per_pixel > 1
+        && page.tile_length.is_some_and(|length| length == 0 || !page.height.is_multiple_of(length))
+    {
         return Some(
-            "its channels are separate planes in tiles, which is not read: store it in strips (`tiffcp -s`)"
+            "its channels are separate planes in tiles that reach beyond its height, which is not read: store it in strips \
+             (`tiffcp -s`)"
                 .into(),
         );
     }
@@ -258,7 +262,7 @@ fn decode_page(file: impl Read + Seek, size: u64, page: &Page) -> Result<Decoded
     };
     let white_level = camera_white(&page.directory);
     let decoded = Decoded { width, height, channels, colours, values, white_level };
-    Ok(decoded.turned(page.directory.orientation as u8))
+    Ok(decoded.turned(page.directory.orientation.unwrap_or(1)))
 }
 
 /// Saturation code from the description (as written by farnear), or the maximum sample value below 16 bits.

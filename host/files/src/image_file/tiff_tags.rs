@@ -90,8 +90,10 @@ pub(crate) struct Directory {
     pub predictor: u64,
     /// Tag 322.
     pub tile_width: Option<u64>,
-    /// Tag 274, 1 to 8.
-    pub orientation: u64,
+    /// Tag 323.
+    pub tile_length: Option<u64>,
+    /// Tag 274, 1 to 8, of any type of integers, as in libtiff.
+    pub orientation: Option<u8>,
     pub samples_per_pixel: u64,
     pub bits: u64,
     /// Tag 339: 1 = unsigned, 2 = signed, 3 = float, 5 and 6 = complex.
@@ -143,12 +145,19 @@ pub(crate) fn directories<S: Source + ?Sized>(source: &S) -> Result<Vec<Director
         if !seen.insert(at) || found.len() >= DIRECTORIES_MAX {
             return Err("its list of images has no end".into());
         }
+        let directory = file.directory(at, true).and_then(|(directory, next)| Some((directory, next?)));
         let (directory, next) =
-            file.directory(at, true).ok_or("it is incomplete: an image's directory lies beyond its end")?;
+            directory.ok_or("it is incomplete: an image's directory lies beyond its end")?;
         found.push(directory);
         at = next;
     }
     Ok(found)
+}
+
+/// Orientation in EXIF, whose list of directories often is cut.
+pub(crate) fn orientation(exif: &[u8]) -> Option<u8> {
+    let file = is_tiff(exif).then(|| File::new(exif).ok())??;
+    file.directory(file.first, false)?.0.orientation
 }
 
 struct File<'a, S: ?Sized> {
@@ -174,16 +183,15 @@ impl<'a, S: Source + ?Sized> File<'a, S> {
         Some(if self.little { bytes.iter().rev().fold(0, shift) } else { bytes.iter().fold(0, shift) })
     }
 
-    fn directory(&self, at: u64, with_sub_images: bool) -> Option<(Directory, u64)> {
+    fn directory(&self, at: u64, with_sub_images: bool) -> Option<(Directory, Option<u64>)> {
         let (count_size, entry_size, offset_size) = if self.big { (8, 20, 8) } else { (2, 12, 4) };
         let count = self.number(at, count_size)?;
         if count > ENTRIES_MAX {
             return None;
         }
         let entries = at + count_size as u64;
-        let next = self.number(entries + count * entry_size, offset_size)?;
+        let next = self.number(entries + count * entry_size, offset_size);
         let mut directory = Directory {
-            orientation: 1,
             samples_per_pixel: 1,
             bits: 1,
             sample_format: 1,
@@ -200,7 +208,8 @@ impl<'a, S: Source + ?Sized> File<'a, S> {
 
     fn entry(&self, at: u64, directory: &mut Directory, with_sub_images: bool) -> Option<()> {
         let tag = self.number(at, 2)?;
-        let size = match self.number(at + 2, 2)? {
+        let kind = self.number(at + 2, 2)?;
+        let size = match kind {
             1 | 2 | 6 | 7 => 1,
             3 | 8 => 2,
             4 | 9 | 11 | 13 => 4,
@@ -230,10 +239,16 @@ impl<'a, S: Source + ?Sized> File<'a, S> {
             284 => directory.planar = first(),
             317 => directory.predictor = first(),
             322 => directory.tile_width = value(0),
+            323 => directory.tile_length = value(0),
             270 => directory.description = text(),
             271 => directory.make = text(),
             273 => (directory.strip_offset, directory.strips) = (first(), count),
-            274 => directory.orientation = first(),
+            274 => {
+                let integer = !matches!(kind, 2 | 5 | 7 | 10..=12);
+                let upright = |value: &u8| (1..=8).contains(value);
+                directory.orientation =
+                    value(0).filter(|_| integer).and_then(|value| u8::try_from(value).ok()).filter(upright);
+            }
             277 => directory.samples_per_pixel = first(),
             281 => directory.max_sample_value = value(0),
             282 => {

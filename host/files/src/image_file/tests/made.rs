@@ -74,8 +74,10 @@ pub(super) fn tiff(layout: Layout, pages: &[Page]) -> Vec<u8> {
         let places: Vec<u64> = page.strips.iter().map(|strip| put(strip, &mut file)).collect();
         let longs = |values: &[u64]| values.iter().flat_map(|value| number(*value, 4)).collect::<Vec<u8>>();
         let lengths: Vec<u64> = page.strips.iter().map(|strip| strip.len() as u64).collect();
-        entries.push((273, 4, places.len(), longs(&places)));
-        entries.push((279, 4, lengths.len(), longs(&lengths)));
+        let tiled = page.shorts.iter().any(|(tag, _)| *tag == 322);
+        let [place_tag, length_tag] = if tiled { [324, 325] } else { [273, 279] };
+        entries.push((place_tag, 4, places.len(), longs(&places)));
+        entries.push((length_tag, 4, lengths.len(), longs(&lengths)));
         entries.sort_by_key(|entry| entry.0);
         let fields: Vec<Vec<u8>> = entries
             .iter()

@@ -45,12 +45,12 @@ fn rejects_truncated_files_of_every_format() {
 }
 
 #[test]
-fn rejects_reversed_bits_and_tiles_of_planes() {
+fn rejects_reversed_bits_and_padded_tiles_of_planes() {
     let reversed = tiff(CLASSIC, &[Page::grey(4, 3, 8, vec![1; 12]).with(266, &[2])]);
     assert!(refusal(&reversed).contains("FillOrder"));
     let plain = tiff(CLASSIC, &[Page::grey(4, 3, 8, vec![1; 12]).with(266, &[1])]);
     assert!(decode_grey(&plain).is_ok());
-    let planes = Page::grey(16, 16, 8, vec![1; 768]).with(258, &[8, 8, 8]).with(262, &[2]).with(277, &[3]);
+    let planes = Page::grey(16, 17, 8, vec![1; 768]).with(258, &[8, 8, 8]).with(262, &[2]).with(277, &[3]);
     let tiled = planes.with(284, &[2]).with(322, &[16]).with(323, &[16]);
     assert!(refusal(&tiff(CLASSIC, &[tiled])).contains("separate planes in tiles"));
 }
@@ -152,6 +152,51 @@ fn names_codings_of_jpeg_that_are_not_read() {
         (other[frame + 1], other[frame + 4]) = (marker, bits);
         let refused = refusal(&other);
         assert!(refused.contains(expected) && refused.contains("convert"), "{refused}");
+    }
+}
+
+#[test]
+fn rejects_subsampled_colours_in_separate_scans() {
+    let frame = |sampling: u8| [255, 0xc0, 0, 17, 8, 0, 16, 0, 16, 3, 1, sampling, 0, 2, 17, 0, 3, 17, 0];
+    for (sampling, refused) in [(0x22, true), (0x12, true), (0x21, false), (0x11, false)] {
+        let scan = [255, 0xda, 0, 8, 1, 1, 0, 0, 63, 0, 255, 0xd9];
+        let said = refusal(&[&[255, 0xd8], &frame(sampling)[..], &scan].concat());
+        assert_eq!(said.contains("separate scans"), refused, "{sampling:x} {said}");
+    }
+}
+
+#[test]
+fn skips_stray_bytes_between_the_segments_of_a_jpeg() {
+    let whole = jpeg_turned(48, 32, 6);
+    let pixels = decode_grey(&whole).unwrap().pixels;
+    let at = |marker: u8| whole.windows(2).position(|two| two == [0xff, marker]).unwrap();
+    for place in [2, at(0xdb), at(0xc0), at(0xc4), at(0xda)] {
+        for stray in [&[][..], &[0], &[0xff], &[1, 2, 3], &[0xff, 0, 7]] {
+            let bytes = [&whole[..place], stray, &whole[place..]].concat();
+            assert_eq!(decode_grey(&bytes).unwrap().pixels, pixels, "{place} {stray:?}");
+            assert!(refusal(&bytes[..bytes.len() * 3 / 4]).contains("incomplete"));
+        }
+    }
+    // Fill bytes before the end.
+    let filled = [&whole[..whole.len() - 2], &[255, 255, 255, 0xd9]].concat();
+    assert_eq!(decode_grey(&filled).unwrap().pixels, pixels);
+    // What follows the end is no part of the image, whatever it looks like.
+    assert_eq!(decode_grey(&[&whole[..], &[0xff, 0xd8, 0xff], &whole].concat()).unwrap().pixels, pixels);
+    // A file that was cut and another one in its place.
+    assert!(refusal(&[&whole[..whole.len() * 3 / 4], &whole].concat()).contains("incomplete"));
+}
+
+#[test]
+fn rejects_several_images_in_a_pnm() {
+    for (one, two) in [
+        (&b"P5 2 1 255\n\x07\x08"[..], &b"P5 2 1 255\n\x09\x08"[..]),
+        (b"P6 1 1 65535\n123456", b"\nP6 1 1 255\n123"),
+        (b"P2 2 1 255\n1 2\n", b"P2 2 1 255\n3 2\n"),
+        (b"P4 9 1\n\x80\x80", b"P4 9 1\n\x80\x80"),
+    ] {
+        assert!(decode_grey(one).is_ok());
+        assert!(decode_grey(&[one, b"\n"].concat()).is_ok());
+        assert!(refusal(&[one, two].concat()).contains("several images"));
     }
 }
 

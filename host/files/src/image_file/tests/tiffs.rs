@@ -35,6 +35,21 @@ fn planar_colour_is_read_plane_by_plane() {
 }
 
 #[test]
+fn planes_in_tiles_are_read() {
+    // Two tiles across, padded to the right, and two down.
+    let (width, height) = (20, 32);
+    let value = |x: usize, y: usize, plane: usize| (3 * x + 2 * y + 50 * plane) as u8;
+    let tile = |index: usize| {
+        let (plane, row, column) = (index / 4, index / 2 % 2, index % 2);
+        (0..256).map(|at| value(16 * column + at % 16, 16 * row + at / 16, plane)).collect()
+    };
+    let page = Page { strips: (0..12).map(tile).collect(), ..Page::grey(width, height, 8, Vec::new()) };
+    let page = page.with(262, &[2]).with(277, &[3]).with(258, &[8, 8, 8]).with(284, &[2]);
+    let found = read(&tiff(CLASSIC, &[page.with(322, &[16]).with(323, &[16])]));
+    assert_eq!(found, Array2::from_shape_fn((32, 20), |(y, x)| f32::from(value(x, y, 1))));
+}
+
+#[test]
 fn colours_with_a_sample_of_unknown_meaning_are_read() {
     let pixels = vec![30, 60, 90, 7, 60, 90, 120, 8];
     let page = Page::grey(2, 1, 8, pixels).with(262, &[2]).with(277, &[4]).with(258, &[8; 4]);
@@ -46,7 +61,7 @@ fn colours_with_a_sample_of_unknown_meaning_are_read() {
         );
     }
     for (tag, value) in [(317, 2), (322, 16)] {
-        let page = page.clone().with(338, &[0]).with(tag, &[value]);
+        let page = page.clone().with(338, &[0]).with(323, &[16]).with(tag, &[value]);
         let refused = decode_grey(&tiff(CLASSIC, &[page])).unwrap_err();
         assert!(refused.contains("ExtraSamples 0"), "{tag}: {refused}");
     }
@@ -114,6 +129,24 @@ fn applies_the_orientation() {
         let bytes = tiff(CLASSIC, &[stored.clone().with(274, &[orientation])]);
         assert_eq!(read(&bytes), expected, "{orientation}");
     }
+    // As libtiff does, integers of any size count, and nothing else does.
+    let bytes = tiff(CLASSIC, &[stored.clone().with(274, &[6])]);
+    let entry = bytes.windows(4).position(|four| four == [18, 1, 3, 0]).unwrap();
+    for (kind, value, right) in [
+        (1, 6, true),
+        (4, 6, true),
+        (9, 6, true),
+        (2, 6, false),
+        (5, 6, false),
+        (11, 6, false),
+        (4, 262, false),
+    ] {
+        let mut bytes = bytes.clone();
+        bytes[entry + 2] = kind;
+        bytes[entry + 8..entry + 12].copy_from_slice(&u32::to_le_bytes(value));
+        let dim = if right { (3, 2) } else { (2, 3) };
+        assert_eq!(read(&bytes).dim(), dim, "{kind} {value}");
+    }
 }
 
 #[test]
@@ -125,6 +158,12 @@ fn finds_the_white_level_of_fewer_bits() {
     assert_eq!(white(Page::grey(6, 1, 16, codes(&saturated))), Some(4095.0));
     assert_eq!(white(Page::grey(6, 1, 16, codes(&saturated.map(|v| v << 4)))), Some(65520.0));
     assert_eq!(white(Page::grey(6, 1, 16, codes(&saturated.map(|v| v / 4)))), Some(1023.0));
+    // A few defective pixels lie above.
+    for (defective, expected) in [(0, Some(4095.0)), (4, Some(4095.0)), (40, None)] {
+        let camera = (0..100_000 - defective).map(|i| if i < 400 { 4095 } else { i as u16 % 3000 });
+        let pixels: Vec<u16> = camera.chain(vec![65535; defective]).collect();
+        assert_eq!(white(Page::grey(50_000, 2, 16, codes(&pixels))), expected, "{defective}");
+    }
     // A single pixel at that code may be chance; other codes are no camera's limit.
     assert_eq!(white(Page::grey(6, 1, 16, codes(&[4095, 4094, 1, 2, 3, 4]))), None);
     assert_eq!(white(Page::grey(6, 1, 16, codes(&[3000; 6]))), None);
@@ -160,7 +199,8 @@ fn images_of_one_camera_share_the_lowest_white_level() {
         white_level,
     };
     let of = |images: &[GreyImage]| shared_white_level(images.iter());
-    assert_eq!(of(&[image(Some(0.25), 0.25), image(None, 0.1)]), Some(0.25));
-    assert_eq!(of(&[image(Some(0.25), 0.25), image(None, 0.3)]), None);
+    let white = 4095.0 / 65535.0;
+    assert_eq!(of(&[image(Some(white), white), image(None, 0.05)]), Some(white));
+    assert_eq!(of(&[image(Some(white), white), image(None, 0.3)]), None);
     assert_eq!(of(&[image(None, 0.25), image(None, 0.3)]), None);
 }
