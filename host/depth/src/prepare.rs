@@ -36,7 +36,7 @@ use noise::PairNoise;
 use thinned::Thinned;
 use warp::Warp;
 
-pub use camera::{CameraError, CameraFrames};
+pub use camera::{CameraError, CameraFrames, check_saturation};
 
 /// Displacement (root mean square over the image) below which a pair is not changed, px.
 const LEAST_DISPLACEMENT_PX: f64 = 0.06;

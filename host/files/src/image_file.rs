@@ -4,7 +4,7 @@
 //! |---|---|
 //! | PNG, BMP, PGM/PPM | all that `image` reads |
 //! | JPEG | complete files only (`zune-jpeg`, strict mode) |
-//! | TIFF, BigTIFF | 1 to 16-bit and 32-bit integers, 16 to 64-bit float, grey and RGB, planar or not, strips or tiles |
+//! | TIFF, BigTIFF | 1 to 16-bit and 32-bit integers, 16 to 64-bit float, grey and RGB, planar or not, strips or tiles (planes in padded tiles are refused) |
 //!
 //! The content, not the name, selects the format. EXIF orientation is applied. Raw camera files, previews and other
 //! formats are rejected with a remedy. `file.tif#3` is page 3 (from 1) of a multi-page TIFF. Colour becomes

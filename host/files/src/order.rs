@@ -11,6 +11,10 @@ use crate::image_file::metadata::taken;
 
 pub fn sort(paths: &mut [PathBuf]) {
     paths.sort_by(|a, b| natural(&stem(a), &stem(b)));
+    if let Some(before) = before_signs(paths) {
+        paths.sort_by_key(|path| signed(path, &before));
+        return;
+    }
     if let Some(first) = roll_over(paths) {
         paths.rotate_left(first);
     }
@@ -44,6 +48,24 @@ fn number(path: &Path) -> Option<(u64, (String, usize, String))> {
     let begin = (begin..end).find(|at| stem.is_char_boundary(*at))?;
     let digits = &stem[begin..end];
     Some((digits.parse().ok()?, (stem[..begin].into(), digits.len(), stem[end..].into())))
+}
+
+/// The text before the numbers if some have a sign and others have not: `z-2`, `z0`, `z2`.
+fn before_signs(paths: &[PathBuf]) -> Option<String> {
+    let texts: Vec<_> = paths.iter().map(|path| Some(number(path)?.1)).collect::<Option<_>>()?;
+    let (before, _, after) = texts.iter().min_by_key(|(before, ..)| before.len())?;
+    let negative = format!("{before}-");
+    let positive = format!("{before}+");
+    let known = |text: &String| text == before || *text == negative || *text == positive;
+    let mixed =
+        texts.iter().any(|(text, ..)| *text == negative) && texts.iter().any(|(text, ..)| *text != negative);
+    (mixed && texts.iter().all(|(text, _, end)| known(text) && end == after)).then(|| before.clone())
+}
+
+fn signed(path: &Path, before: &str) -> Option<i64> {
+    let (value, (text, ..)) = number(path)?;
+    let value = i64::try_from(value).ok()?;
+    Some(if text.len() > before.len() && text.ends_with('-') { -value } else { value })
 }
 
 /// Start of the order after a counter restart, if any.
@@ -137,6 +159,17 @@ mod tests {
         assert_eq!(sorted(&["DSC00001.tif", "DSC09999.tif"]), ["DSC09999.tif", "DSC00001.tif"]);
         // Some pictures around the end were deleted.
         assert_eq!(sorted(&["p0004.png", "p0006.png", "p9990.png"]), ["p9990.png", "p0004.png", "p0006.png"]);
+    }
+
+    #[test]
+    fn a_minus_is_a_sign_where_others_have_none() {
+        assert_eq!(
+            sorted(&["z0.png", "z-10.png", "z5.png", "z-5.png", "z10.png"]),
+            ["z-10.png", "z-5.png", "z0.png", "z5.png", "z10.png"]
+        );
+        assert_eq!(sorted(&["+2.tif", "-2.tif", "0.tif"]), ["-2.tif", "0.tif", "+2.tif"]);
+        assert_eq!(sorted(&["a-1.png", "a-2.png", "a-3.png"]), ["a-1.png", "a-2.png", "a-3.png"]);
+        assert_eq!(sorted(&["a-1.png", "a-2.png", "b0.png"]), ["a-1.png", "a-2.png", "b0.png"]);
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use farnear_depth::prepare::CameraFrames;
+use farnear_depth::prepare::{CameraFrames, check_saturation};
 use farnear_files::{
     image_file::{encode_png, read_grey},
     map, npy,
@@ -67,18 +67,20 @@ pub struct CameraFigures {
     pub bad_pixels: usize,
 }
 
-/// Calibrates a camera's frames and writes all files or none.
 pub fn calibrate(settings: &CalibrateCameraRequest, context: &Context<'_>) -> Result<CameraFigures> {
-    let read = |files: &[PathBuf]| -> Result<Vec<Array2<f32>>> {
-        files
-            .iter()
-            .map(|file| {
-                context.cancel.check("reading the exposures")?;
-                Ok(read_grey(file)?.pixels)
-            })
-            .collect()
+    let read = |files: &[PathBuf], kind| -> Result<Vec<Array2<f32>>> {
+        let mut exposures = Vec::with_capacity(files.len());
+        for (index, file) in files.iter().enumerate() {
+            context.cancel.check("reading the exposures")?;
+            let image = read_grey(file)?;
+            if let Some(white) = image.white_level {
+                check_saturation(kind, index + 1, &image.pixels, white)?;
+            }
+            exposures.push(image.pixels);
+        }
+        Ok(exposures)
     };
-    let frames = CameraFrames::learn(&read(&settings.dark)?, &read(&settings.flat)?)?;
+    let frames = CameraFrames::learn(&read(&settings.dark, "dark")?, &read(&settings.flat, "flat")?)?;
     let staged = Staging::into_folder(&settings.out)?;
     staged.write(DARK, &npy::write(frames.dark()))?;
     staged.write(RESPONSE, &npy::write(frames.response()))?;

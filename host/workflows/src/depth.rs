@@ -152,6 +152,13 @@ impl Inputs {
             (Some(frames), Some(cut)) => Some(Arc::new(cut.frames(&frames)?)),
             (camera, _) => camera,
         };
+        // The frames have the scale of the files.
+        let camera = match camera {
+            Some(frames) if pair.white != 1.0 => {
+                Some(Arc::new(Arc::unwrap_or_clone(frames).relative_to(pair.white)))
+            }
+            camera => camera,
+        };
         Ok(Self { optics, pair, method, correction, camera, cut, doubts })
     }
 

@@ -282,12 +282,18 @@ pub fn focus_stack(request: &FocusStackRequest, context: &Context<'_>) -> Result
     let mut warnings = std::mem::take(&mut listed.remarks);
     let mut images = Images::read(&listed.images, request, &mut warnings, &staging, context)?;
     let mut frames = if request.use_all && request.align.0.is_none() {
-        frames::Frames { warps: vec![Warp::IDENTITY; images.count()], left_out: Vec::new() }
+        frames::Frames::unchecked(images.count())
     } else {
-        frames::check(&images, request.align.0, context)?
+        frames::check(&images, &listed.even_positions(), request.align.0, context)?
     };
     if request.use_all {
         frames.left_out.clear();
+    } else if !frames.untold.is_empty() {
+        let names: Vec<String> = frames.untold.iter().map(|index| name(&listed.images[*index])).collect();
+        warnings.push(format!(
+            "could not check whether {} is shaken or defocused: most of the scene is sharpest next to it, or the images are fewer than 5",
+            names.join(" or ")
+        ));
     }
     let mut left_out = Vec::new();
     for (index, reason) in &frames.left_out {
@@ -358,7 +364,8 @@ fn name(path: &Path) -> String {
 /// Those of a context that cancels.
 pub fn aligned_stack(images: &mut [Array2<f32>], model: Model) -> Result<f64> {
     let views: Vec<ArrayView2<f32>> = images.iter().map(|image| image.view()).collect();
-    let warps = frames::check(&views[..], Some(model), &Context::unattended())?.warps;
+    let positions = even_positions(views.len(), None);
+    let warps = frames::check(&views[..], &positions, Some(model), &Context::unattended())?.warps;
     for (image, warp) in images.iter_mut().zip(&warps).filter(|(_, warp)| **warp != Warp::IDENTITY) {
         *image = resample(image.view(), warp);
     }

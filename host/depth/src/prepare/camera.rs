@@ -14,10 +14,11 @@ const BAD: f32 = 8.0;
 /// Part of saturated pixels from which an exposure is rejected; hot pixels are fewer.
 const SATURATED: f64 = 0.01;
 /// Side of the window whose mean has little noise left, and the least structure in it that dust and falloff cannot
-/// cause: standard deviation relative to the mean for a flat, to full scale for a dark exposure.
+/// cause: standard deviation relative to the flats' mean, whose scale does not depend on the bits in use.
 const SMOOTHED_PX: usize = 7;
-const FLAT_STRUCTURE: f64 = 0.04;
-const DARK_STRUCTURE: f64 = 0.02;
+const STRUCTURE: f64 = 0.04;
+/// Part of bad pixels from which the light was not even; no camera has as many.
+const MANY_BAD: f64 = 0.02;
 /// Least and largest response of a good pixel.
 const RESPONSE: [f32; 2] = [0.5, 1.5];
 
@@ -42,7 +43,7 @@ pub enum CameraError {
     Structured {
         kind: &'static str,
         number: usize,
-        /// SD of the smoothed brightness around its surroundings, percent of the mean (in the dark: of full scale).
+        /// SD of the smoothed brightness around its surroundings, percent of the flats' mean.
         percent: f64,
         expected: &'static str,
         advice: &'static str,
@@ -52,15 +53,35 @@ pub enum CameraError {
          full scale"
     )]
     NoLight { flat: f64, dark: f64 },
+    #[error(
+        "{percent:.1} % of the pixels would be bad: give exposures of an evenly lit surface, out of focus, and dark ones of the same \
+         exposure time"
+    )]
+    Uneven { percent: f64 },
 }
 
-/// Rejects exposures that are saturated or show a scene.
-fn check_exposure(kind: &'static str, number: usize, image: &Array2<f32>) -> Result<(), CameraError> {
-    let count = image.len().max(1) as f64;
-    let saturated = image.iter().filter(|value| **value >= 1.0).count() as f64 / count;
+/// Rejects exposures of which too many pixels reach `white`.
+pub fn check_saturation(
+    kind: &'static str,
+    number: usize,
+    image: &Array2<f32>,
+    white: f32,
+) -> Result<(), CameraError> {
+    let saturated = image.iter().filter(|value| **value >= white).count() as f64 / image.len().max(1) as f64;
     if saturated > SATURATED {
         return Err(CameraError::Saturated { kind, number, percent: 100.0 * saturated });
     }
+    Ok(())
+}
+
+/// Rejects exposures that are saturated or show a scene.
+fn check_exposure(
+    kind: &'static str,
+    number: usize,
+    image: &Array2<f32>,
+    of_flats: f64,
+) -> Result<(), CameraError> {
+    check_saturation(kind, number, image, 1.0)?;
     let smooth = box_mean(image.view(), SMOOTHED_PX);
     let around = box_mean(smooth.view(), SURROUNDINGS_PX);
     let differences = || smooth.iter().zip(&around).map(|(value, around)| f64::from(value - around));
@@ -70,23 +91,13 @@ fn check_exposure(kind: &'static str, number: usize, image: &Array2<f32>) -> Res
     let usual = if sizes.is_empty() { 0.0 } else { *sizes.select_nth_unstable_by(at, f32::total_cmp).1 };
     // 90 % of a normal distribution lie within 1.645 standard deviations.
     let deviation = f64::from(usual) / 1.645;
-    let mean = image.iter().map(|value| f64::from(*value)).sum::<f64>() / count;
-    let (relative, limit, expected, advice) = if kind == "flat" {
-        (
-            deviation / mean.max(1e-6),
-            FLAT_STRUCTURE,
-            "an even one by less than 4 %",
-            "exposures of an evenly lit surface, out of focus",
-        )
+    let relative = deviation / of_flats.max(1e-6);
+    let (expected, advice) = if kind == "flat" {
+        ("an even one by less than 4 %", "exposures of an evenly lit surface, out of focus")
     } else {
-        (
-            deviation,
-            DARK_STRUCTURE,
-            "a dark one by less than 2 % of full scale",
-            "exposures with the lens covered",
-        )
+        ("a dark one by less than 4 % of the flat exposures' mean", "exposures with the lens covered")
     };
-    if relative > limit {
+    if relative > STRUCTURE {
         return Err(CameraError::Structured { kind, number, percent: 100.0 * relative, expected, advice });
     }
     Ok(())
@@ -115,21 +126,23 @@ impl CameraFrames {
 
     /// Learns the frames from dark and evenly lit exposures of one size.
     pub fn learn(dark: &[Array2<f32>], flat: &[Array2<f32>]) -> Result<Self, CameraError> {
-        for (kind, exposures) in [("flat", flat), ("dark", dark)] {
+        let average =
+            |image: &Array2<f32>| image.iter().map(|v| f64::from(*v)).sum::<f64>() / image.len() as f64;
+        let exposures = [("flat", flat), ("dark", dark)];
+        let flat = mean(flat, "flat")?;
+        let of_flat = average(&flat);
+        for (kind, exposures) in exposures {
             for (index, exposure) in exposures.iter().enumerate() {
-                check_exposure(kind, index + 1, exposure)?;
+                check_exposure(kind, index + 1, exposure, of_flat)?;
             }
         }
-        let flat = mean(flat, "flat")?;
         let dark = if dark.is_empty() { Array2::zeros(flat.dim()) } else { mean(dark, "dark")? };
         if dark.dim() != flat.dim() {
             let ((height, width), (image_height, image_width)) = (dark.dim(), flat.dim());
             return Err(CameraError::Size { width, height, image_width, image_height });
         }
         let light = &flat - &dark;
-        let average =
-            |image: &Array2<f32>| image.iter().map(|v| f64::from(*v)).sum::<f64>() / image.len() as f64;
-        let [of_flat, of_dark] = [&flat, &dark].map(average);
+        let of_dark = average(&dark);
         if of_flat - of_dark <= 0.02 * of_flat.abs() || of_flat <= 0.0 {
             return Err(CameraError::NoLight { flat: of_flat, dark: of_dark });
         }
@@ -147,7 +160,18 @@ impl CameraFrames {
             .and(&of_response)
             .and(&response)
             .map_collect(|a, b, v| *a || *b || !(least..=largest).contains(v));
-        Ok(Self { dark, response, bad })
+        let frames = Self { dark, response, bad };
+        let part = frames.bad_count() as f64 / frames.bad.len().max(1) as f64;
+        if part > MANY_BAD {
+            return Err(CameraError::Uneven { percent: 100.0 * part });
+        }
+        Ok(frames)
+    }
+
+    /// For images whose values were divided by `white`.
+    pub fn relative_to(mut self, white: f32) -> Self {
+        self.dark.mapv_inplace(|value| value / white);
+        self
     }
 
     /// The dark frame.
@@ -296,7 +320,17 @@ mod tests {
         });
         let error = CameraFrames::learn(&[], std::slice::from_ref(&scene)).unwrap_err().to_string();
         assert!(error.contains("flat exposure 1 has structure") && error.contains('%'), "{error}");
-        let error = CameraFrames::learn(&[scene], &[flat]).unwrap_err().to_string();
-        assert!(error.contains("dark exposure 1 has structure") && error.contains("lens covered"), "{error}");
+        // Also where the codes use few of the bits.
+        for scale in [1.0, 0.06] {
+            let [scene, flat] = [&scene, &flat].map(|image| image.mapv(|v| scale * v));
+            let error = CameraFrames::learn(&[scene.mapv(|v| 0.3 * v)], &[flat]).unwrap_err().to_string();
+            assert!(
+                error.contains("dark exposure 1 has structure") && error.contains("lens covered"),
+                "{error}"
+            );
+        }
+        let slope = Array2::from_shape_fn((90, 120), |(_, x)| 0.05 + 0.007 * x as f32);
+        let error = CameraFrames::learn(&[], &[slope]).unwrap_err().to_string();
+        assert!(error.contains("would be bad") && error.contains("evenly lit"), "{error}");
     }
 }

@@ -11,6 +11,8 @@ use crate::error::{Result, WorkflowError};
 pub struct Pair {
     pub far: Array2<f32>,
     pub near: Array2<f32>,
+    /// White level that both were divided by, 1 = full scale.
+    pub white: f32,
     /// The coarser of both sample types.
     pub samples: Samples,
 }
@@ -23,7 +25,8 @@ impl Pair {
         let (far_image, near_image) =
             rayon::join(|| read_grey_with(far, reading), || read_grey_with(near, reading));
         let (mut far_image, mut near_image) = (far_image?, near_image?);
-        if let Some(white) = shared_white_level([&far_image, &near_image].into_iter()) {
+        let white = shared_white_level([&far_image, &near_image].into_iter());
+        if let Some(white) = white {
             (far_image, near_image) = (far_image.relative_to(white), near_image.relative_to(white));
         }
         let unfit = |reason| WorkflowError::Pair { far: far.into(), near: near.into(), reason };
@@ -40,7 +43,7 @@ impl Pair {
             let twice = "they hold the same image: depth needs one focused far and one focused near";
             return Err(unfit(twice.into()));
         }
-        Ok(Self { far: far_image.pixels, near: near_image.pixels, samples })
+        Ok(Self { far: far_image.pixels, near: near_image.pixels, white: white.unwrap_or(1.0), samples })
     }
 }
 

@@ -156,7 +156,7 @@ impl Slices for Images<'_> {
     fn rows(&self, index: usize, rows: Range<usize>) -> Result<CowArray<'_, f32, Ix2>> {
         let mut image = self.stored(index, rows)?;
         if self.white_level != 1.0 {
-            image.mapv_inplace(|value| value / self.white_level);
+            image.mapv_inplace(|value| (value / self.white_level).min(1.0));
         }
         Ok(image.into())
     }

@@ -1,0 +1,144 @@
+//! Shaken or defocused frames are less sharp than both neighbours. The first and the last frame are compared with what the next
+//! three let expect: blur grows evenly with the distance from the focus, so a power of the sharpness (which one depends on the
+//! texture) is a parabola of the position. A block that is sharpest in the next frame tells nothing: its peak may lie between.
+
+use farnear_depth::focus_measure::FocusMeasure;
+use ndarray::{ArrayView2, s};
+
+const BLOCKS: usize = 6;
+/// Part of the sharpness of the less sharp neighbour below which a block is shaken, and part of the blocks that must be.
+const SHAKEN: f64 = 0.9;
+const SHAKEN_BLOCKS: f64 = 0.6;
+/// The same of the expected sharpness in the first or last frame, of blocks that tell it, and the least part of these.
+const SHAKEN_END: f64 = 0.85;
+const TELLING_BLOCKS: f64 = 0.25;
+/// Powers of the squared gradient for textures from coarse to fine, and the least blur, as part of that of the next frames.
+const POWERS: [f64; 3] = [-1.0, -0.5, -0.25];
+const LEAST_BLUR: f64 = 0.7;
+/// Fewest frames of which one may be left out.
+const LEAST_FRAMES: usize = 5;
+
+/// Sharpness of each block of a frame; empty for images that are too small or dark.
+pub(super) fn of_blocks(image: ArrayView2<f32>) -> Vec<f64> {
+    let (height, width) = image.dim();
+    let edges = |size: usize, block: usize| size * block / BLOCKS..size * (block + 1) / BLOCKS;
+    let blocks =
+        (0..BLOCKS * BLOCKS).map(|block| (edges(height, block / BLOCKS), edges(width, block % BLOCKS)));
+    let measured =
+        blocks.map(|(rows, columns)| FocusMeasure::Tenengrad.of(image.slice(s![rows, columns])).ok());
+    measured.collect::<Option<Vec<f64>>>().unwrap_or_default()
+}
+
+#[derive(Debug, Default, PartialEq)]
+pub(super) struct Shaken {
+    pub frames: Vec<usize>,
+    /// First or last frames that cannot be judged.
+    pub untold: Vec<usize>,
+}
+
+pub(super) fn find(sharpness: &[Vec<f64>], positions: &[f64], members: &[usize]) -> Shaken {
+    let mut found = Shaken { frames: inside(sharpness, members), untold: Vec::new() };
+    if members.iter().any(|index| sharpness[*index].is_empty()) {
+        return found;
+    }
+    let kept: Vec<usize> = members.iter().copied().filter(|index| !found.frames.contains(index)).collect();
+    let judge = |frames: &[usize]| dull_end(sharpness, positions, frames);
+    for frames in [kept.clone(), kept.iter().rev().copied().collect()] {
+        let Some(end) = frames.first() else { continue };
+        // If the next frames are not as expected either, this stack is of another kind.
+        let of_another_kind =
+            || (1..frames.len() - LEAST_FRAMES + 1).any(|first| judge(&frames[first..]) == Some(true));
+        match judge(&frames) {
+            Some(false) => {}
+            Some(true) if !of_another_kind() => found.frames.push(*end),
+            _ => found.untold.push(*end),
+        }
+    }
+    found
+}
+
+fn inside(sharpness: &[Vec<f64>], members: &[usize]) -> Vec<usize> {
+    let three = members.array_windows().filter(|indices: &&[usize; 3]| {
+        let [before, own, after] = indices.map(|index| &sharpness[index]);
+        let dull =
+            (0..own.len()).filter(|block| own[*block] < SHAKEN * before[*block].min(after[*block])).count();
+        !own.is_empty() && dull as f64 >= SHAKEN_BLOCKS * own.len() as f64
+    });
+    three.map(|[_, own, _]| *own).collect()
+}
+
+/// Whether the first of these frames is duller than the next three let expect, in most of the blocks that tell it.
+fn dull_end(sharpness: &[Vec<f64>], positions: &[f64], frames: &[usize]) -> Option<bool> {
+    let (&[end, near, middle, far], true) = (frames.first_chunk()?, frames.len() >= LEAST_FRAMES) else {
+        return None;
+    };
+    let at = |frame: usize| positions[frame] - positions[end];
+    let weight = |of: usize, a: usize, b: usize| at(a) * at(b) / ((at(of) - at(a)) * (at(of) - at(b)));
+    let next = [
+        (near, weight(near, middle, far)),
+        (middle, weight(middle, near, far)),
+        (far, weight(far, near, middle)),
+    ];
+    let expected = |block: usize| {
+        let by = |power: f64| {
+            let blurs = next.map(|(frame, weight)| (sharpness[frame][block].powf(power), weight));
+            let least = blurs.iter().map(|(blur, _)| *blur).fold(f64::INFINITY, f64::min);
+            let blur: f64 = blurs.iter().map(|(blur, weight)| blur * weight).sum();
+            blur.max(LEAST_BLUR * least).powf(1.0 / power)
+        };
+        POWERS.map(by).into_iter().fold(f64::INFINITY, f64::min)
+    };
+    let tells =
+        |block: &usize| frames[2..].iter().any(|frame| sharpness[*frame][*block] > sharpness[near][*block]);
+    let blocks = sharpness[end].len();
+    let telling: Vec<usize> = (0..blocks).filter(tells).collect();
+    let dull =
+        telling.iter().filter(|block| sharpness[end][**block] < SHAKEN_END * expected(**block)).count();
+    (telling.len() as f64 >= TELLING_BLOCKS * blocks as f64)
+        .then_some(dull as f64 >= SHAKEN_BLOCKS * telling.len() as f64)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Blocks at depths from `depths.0` to `depths.1`, as sharp as blur that grows by `slope` px per position makes them.
+    fn curves(positions: &[f64], depths: (f64, f64), slope: f64, power: i32) -> Vec<Vec<f64>> {
+        let block = |position: f64, block: usize| {
+            let depth = depths.0 + (depths.1 - depths.0) * block as f64 / 35.0;
+            (1.0 + (slope * (position - depth)).powi(2)).powi(-power)
+        };
+        positions.iter().map(|position| (0..36).map(|index| block(*position, index)).collect()).collect()
+    }
+
+    #[test]
+    fn tells_a_dull_end_from_one_that_is_out_of_focus() {
+        for slope in [0.15, 0.5, 2.0] {
+            for (power, depths) in [(1, (2.0, 8.0)), (2, (-3.0, 6.0)), (2, (4.5, 4.5)), (1, (3.0, 15.0))] {
+                for uneven in [0.0, 0.3] {
+                    let positions: Vec<f64> =
+                        (0..12).map(|index| f64::from(index) + uneven * f64::from(index % 2)).collect();
+                    let members: Vec<usize> = (0..12).collect();
+                    let good = curves(&positions, depths, slope, power);
+                    let found = find(&good, &positions, &members);
+                    assert_eq!(found, Shaken::default(), "{slope} {power} {depths:?}");
+                    for at in [0, 11] {
+                        let mut bad = good.clone();
+                        bad[at].iter_mut().for_each(|value| *value *= 0.6);
+                        let found = find(&bad, &positions, &members);
+                        assert_eq!(found.frames, [at], "{slope} {power} {depths:?}");
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn an_end_next_to_the_focus_or_in_a_short_stack_is_not_judged() {
+        let positions: Vec<f64> = (0..8).map(f64::from).collect();
+        let members: Vec<usize> = (0..8).collect();
+        let focused = curves(&positions, (0.6, 1.4), 1.0, 2);
+        assert_eq!(find(&focused, &positions, &members).untold, [0]);
+        assert_eq!(find(&focused, &positions, &members[..4]).untold, [0, 3]);
+    }
+}
