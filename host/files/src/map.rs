@@ -48,7 +48,6 @@ pub fn read(path: &Path) -> Result<Array2<f32>, MapError> {
     Ok(image.pixels)
 }
 
-/// Reads a mask: set where not black.
 pub fn read_mask(path: &Path) -> Result<Array2<bool>, ImageError> {
     Ok(image_file::read_grey(path)?.pixels.mapv(|value| value > 0.0))
 }

@@ -273,7 +273,6 @@ struct Record<'a> {
 /// Least share of pixels with a value, below which a warning is given.
 const LITTLE: f64 = 0.5;
 
-/// Measures a stack and writes the results to a new folder.
 pub fn focus_stack(request: &FocusStackRequest, context: &Context<'_>) -> Result<FocusStackFigures> {
     request.check()?;
     let staging = result_folder::stack(&request.out, &request.stack)?;

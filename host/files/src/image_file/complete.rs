@@ -119,7 +119,6 @@ pub(super) fn png_significant_bits(bytes: &[u8]) -> Option<u8> {
     png_chunk(bytes, b"sBIT")?.first().copied().filter(|bits| (1..=16).contains(bits))
 }
 
-/// Data of a chunk before the pixels.
 fn png_chunk<'a>(bytes: &'a [u8], name: &[u8; 4]) -> Option<&'a [u8]> {
     let mut at = 8;
     loop {

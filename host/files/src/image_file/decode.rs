@@ -47,7 +47,6 @@ pub(super) fn most_bytes(file: u64) -> u64 {
     SMALL_BYTES.max(file.saturating_mul(EXPANSION))
 }
 
-/// Decodes the only image.
 pub(crate) fn decode(bytes: &[u8]) -> Result<Decoded, String> {
     if let Some(advice) = complete::unsupported(bytes) {
         return Err(advice.into());
@@ -189,7 +188,6 @@ impl Decoded {
         Ok(GreyImage { pixels, samples, colour: self.colours == 3, white_level })
     }
 
-    /// Eight bits per sample, without alpha.
     pub(crate) fn in_8_bits(self) -> Result<Pixels, String> {
         let bytes = match self.values {
             Values::U8(values) => values,

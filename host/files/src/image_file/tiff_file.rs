@@ -20,7 +20,6 @@ use super::{
 /// Colour filter array and linear raw (TIFF/EP, DNG).
 const RAW_PHOTOMETRIC: [u64; 2] = [32803, 34892];
 
-/// Enough for the names of formats.
 const HEAD_BYTES: u64 = 32;
 
 #[derive(Debug, Clone)]
@@ -103,7 +102,6 @@ fn pages<S: Source + ?Sized>(source: &S) -> Result<Vec<Page>, String> {
     Ok(pages)
 }
 
-/// Decodes the only page.
 pub(super) fn decode(bytes: &[u8]) -> Result<Decoded, String> {
     let pages = pages(bytes)?;
     if let [page] = pages.as_slice() {

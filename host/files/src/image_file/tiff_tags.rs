@@ -130,7 +130,6 @@ impl Directory {
     }
 }
 
-/// From the first four bytes.
 pub(crate) fn is_tiff(bytes: &[u8]) -> bool {
     [b"II*\0", b"MM\0*", b"II+\0", b"MM\0+"].iter().any(|magic| bytes.starts_with(*magic))
 }

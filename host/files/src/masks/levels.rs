@@ -19,7 +19,6 @@ const ONE_BETWEEN_IN: u64 = 50;
 /// Two levels nearer than this with others between them are a picture, not a mask.
 const LEAST_GAP: u8 = 40;
 
-/// Threshold of a mask's grey levels.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Levels {
     pub set_from: u8,
@@ -27,7 +26,6 @@ pub struct Levels {
     pub remark: Option<String>,
 }
 
-/// Count of each grey level.
 #[derive(Clone, Debug)]
 pub struct Histogram([u64; 256]);
 

@@ -12,7 +12,6 @@ pub struct Header {
 }
 
 impl Header {
-    /// Parses the keys in any order.
     pub fn parse(bytes: &[u8]) -> Result<Self, NpyError> {
         let mut text = Text { bytes, at: 0 };
         let (mut descr, mut fortran_order, mut shape) = (None, None, None);

@@ -14,7 +14,6 @@ use crate::{
 /// Lower-case endings of pictures; other files are ignored.
 pub const EXTENSIONS: [&str; 8] = ["png", "tif", "tiff", "jpg", "jpeg", "bmp", "pgm", "ppm"];
 
-/// Pictures of a folder in natural order.
 pub fn list(folder: &Path) -> Result<Vec<PathBuf>, VideoError> {
     let entries = fs::read_dir(folder).map_err(|source| VideoError::io(folder, source))?;
     let mut paths = Vec::new();

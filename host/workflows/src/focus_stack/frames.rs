@@ -1,5 +1,4 @@
 //! Omits frames of a stack that show another scene, are rotated or shaken.
-//!
 //! Neighbours in a stack correlate highly in the band that defocus leaves to both. Links between neighbours that correlate far less
 //! than usual split the stack into runs. The longest run is the scene. A frame outside belongs to it if it correlates
 //! with the nearest frame of the scene as frames of the scene at the same distance do; so the good neighbour of a bad frame
@@ -31,7 +30,6 @@ const TELLING: f64 = 0.4;
 pub(super) struct Frames {
     /// Warp of each image onto the reference; identity without alignment.
     pub warps: Vec<Warp>,
-    /// Omitted images with the reason, in order.
     pub left_out: Vec<(usize, String)>,
     /// First or last images of which it cannot be told whether they are shaken.
     pub untold: Vec<usize>,
@@ -109,7 +107,6 @@ struct Scene {
     usual: f64,
 }
 
-/// What neighbours in the stack have in common.
 struct Neighbours {
     /// From each frame to the next.
     links: Vec<Link>,
@@ -153,7 +150,6 @@ where
         }
     }
 
-    /// Compares each frame with the next one.
     fn neighbours(&self) -> Result<Neighbours> {
         let count = self.images.count();
         let mut found = Neighbours { links: Vec::with_capacity(count), sharpness: Vec::with_capacity(count) };

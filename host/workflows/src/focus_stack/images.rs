@@ -42,11 +42,9 @@ pub(super) struct Images<'a> {
     context: &'a Context<'a>,
 }
 
-/// Bytes of a pixel in the file.
 const PIXEL: usize = size_of::<f32>();
 
 impl<'a> Images<'a> {
-    /// Reads all image files.
     pub fn read(
         paths: &[PathBuf],
         request: &FocusStackRequest,

@@ -139,7 +139,6 @@ impl Listed {
         self.positions.iter().map(|position| self.axis.even(*position)).collect()
     }
 
-    /// Depth at each position in the stack, in the axis' unit.
     pub(super) fn depth(&self, place: &Array2<f32>) -> Array2<f32> {
         depth_at(place, self.axis, &self.even_positions())
     }
