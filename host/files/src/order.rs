@@ -22,6 +22,9 @@ pub fn sort(paths: &mut [PathBuf]) {
 
 /// Neighbours of a sorted list between which the counter restarted.
 pub fn counter_started_again(sorted: &[PathBuf]) -> Option<[&PathBuf; 2]> {
+    if before_signs(sorted).is_some() {
+        return None;
+    }
     sorted.windows(2).find_map(|two| {
         let [before, after] = two else { return None };
         let ((a, text), (b, other)) = (number(before)?, number(after)?);
@@ -167,6 +170,8 @@ mod tests {
             sorted(&["z0.png", "z-10.png", "z5.png", "z-5.png", "z10.png"]),
             ["z-10.png", "z-5.png", "z0.png", "z5.png", "z10.png"]
         );
+        let names = ["z-2.png", "z-1.png", "z0.png"].map(PathBuf::from);
+        assert_eq!(counter_started_again(&names), None);
         assert_eq!(sorted(&["+2.tif", "-2.tif", "0.tif"]), ["-2.tif", "0.tif", "+2.tif"]);
         assert_eq!(sorted(&["a-1.png", "a-2.png", "a-3.png"]), ["a-1.png", "a-2.png", "a-3.png"]);
         assert_eq!(sorted(&["a-1.png", "a-2.png", "b0.png"]), ["a-1.png", "a-2.png", "b0.png"]);

@@ -43,6 +43,16 @@ pub(crate) struct Decoded {
     pub white_level: Option<u16>,
 }
 
+const INCOMPLETE: &str =
+    "it is incomplete: the data end before the image does; copy it again from the camera";
+
+pub(super) fn said(error: impl std::fmt::Display) -> String {
+    let text = error.to_string();
+    let ended =
+        ["failed to fill whole buffer", "unexpected end of file"].iter().any(|end| text.contains(end));
+    if ended { INCOMPLETE.into() } else { text }
+}
+
 pub(super) fn most_bytes(file: u64) -> u64 {
     SMALL_BYTES.max(file.saturating_mul(EXPANSION))
 }
@@ -59,8 +69,6 @@ pub(crate) fn decode(bytes: &[u8]) -> Result<Decoded, String> {
 }
 
 fn jpeg(bytes: &[u8]) -> Result<(Decoded, u8), String> {
-    const INCOMPLETE: &str =
-        "it is incomplete: the data end before the image does; copy it again from the camera";
     let whole = complete::whole_jpeg(bytes);
     if let Some(advice) = complete::unsupported_jpeg(whole.as_deref().unwrap_or(bytes)) {
         return Err(advice);
@@ -112,7 +120,7 @@ fn other(bytes: &[u8]) -> Result<(Decoded, u8), String> {
     let mut cursor = Cursor::new(bytes);
     let mut reader = ImageReader::with_format(&mut cursor, format);
     reader.no_limits();
-    let mut decoder = reader.into_decoder().map_err(|error| error.to_string())?;
+    let mut decoder = reader.into_decoder().map_err(said)?;
     if decoder.total_bytes() > most_bytes(bytes.len() as u64) {
         let (width, height) = decoder.dimensions();
         return Err(format!("it is incomplete: {} bytes cannot hold {width}x{height} px", bytes.len()));
@@ -120,10 +128,10 @@ fn other(bytes: &[u8]) -> Result<(Decoded, u8), String> {
     // The decoded size was checked; the decoder's buffers are of that size.
     let mut limits = Limits::no_limits();
     limits.max_alloc = Some(2 * most_bytes(bytes.len() as u64));
-    decoder.set_limits(limits).map_err(|error| error.to_string())?;
+    decoder.set_limits(limits).map_err(said)?;
     let (exif, xmp) = metadata::of_decoder(&mut decoder, bytes);
     let orientation = metadata::orientation(exif.as_deref(), xmp.as_deref());
-    let image = DynamicImage::from_decoder(decoder).map_err(|error| error.to_string())?;
+    let image = DynamicImage::from_decoder(decoder).map_err(said)?;
     let after = bytes.get(cursor.position() as usize..).unwrap_or_default();
     if format == ImageFormat::Pnm && matches!(after.trim_ascii_start(), [b'P', b'1'..=b'7', ..]) {
         return Err("it holds several images: store each as a file (`pamsplit`)".into());

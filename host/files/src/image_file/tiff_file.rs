@@ -13,7 +13,7 @@ use tiff::{
 
 use super::{
     ImageError, complete,
-    decode::{Decoded, Values, most_bytes},
+    decode::{Decoded, Values, most_bytes, said},
     tiff_tags::{self, Directory, InFile, Source},
 };
 
@@ -201,7 +201,8 @@ fn decode_page(file: impl Read + Seek, size: u64, page: &Page) -> Result<Decoded
     if decoded_bytes > most_bytes(size) {
         return Err(format!("it is incomplete: {size} bytes cannot hold {width}x{height} px"));
     }
-    let say = |error: tiff::TiffError| format!("{error}; rewrite it, for instance with `tiffcp -c lzw`");
+    let say =
+        |error: tiff::TiffError| format!("{}; rewrite it, for instance with `tiffcp -c lzw`", said(error));
     let mut limits = Limits::default();
     limits.decoding_buffer_size = usize::try_from(most_bytes(size)).unwrap_or(usize::MAX);
     limits.intermediate_buffer_size = limits.decoding_buffer_size;
