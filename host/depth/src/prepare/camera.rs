@@ -329,7 +329,7 @@ mod tests {
                 "{error}"
             );
         }
-        let slope = Array2::from_shape_fn((90, 120), |(_, x)| 0.05 + 0.007 * x as f32);
+        let slope = Array2::from_shape_fn((120, 160), |(_, x)| 0.1 + 0.005 * x as f32);
         let error = CameraFrames::learn(&[], &[slope]).unwrap_err().to_string();
         assert!(error.contains("would be bad") && error.contains("evenly lit"), "{error}");
     }
