@@ -377,7 +377,10 @@ mod tests {
             assert!((of.far_mm - of.near_mm - range).abs() < 1e-6, "{found:?}");
             assert!((2.0..=4.0).contains(&found.max_blur_px), "{found:?}");
             let exposures = found.averaged_exposures.unwrap() as f64;
-            assert!(found.expected_error_whitened_mm.unwrap() / exposures.sqrt() <= 1.001 * error, "{found:?}");
+            assert!(
+                found.expected_error_whitened_mm.unwrap() / exposures.sqrt() <= 1.001 * error,
+                "{found:?}"
+            );
         }
         let request = OpticsRequest {
             distance_mm: Some(300.0),
