@@ -1,5 +1,4 @@
 //! Bytes on the wire.
-//!
 //! ```text
 //! COBS( version u8 | kind u8 | id u32 | boot u32 | postcard body | CRC-32 ) 0x00
 //! ```

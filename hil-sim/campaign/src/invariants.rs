@@ -1,5 +1,4 @@
 //! Invariants of every run, checked against the observer's record.
-//!
 //! | property | meaning |
 //! |---|---|
 //! | `hard-stop` | no driver pushes a stage against its hard stop if the home switch works, and at most until a stall otherwise |

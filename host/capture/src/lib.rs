@@ -1,7 +1,5 @@
 //! # farnear-capture
-//!
 //! Controls the rig and takes pictures with it; blocking, no async runtime.
-//!
 //! - [`transport`], [`client`], [`work`], [`log_stream`]: serial port, board handles, long work, and the board's log.
 //! - [`camera`]: image sources.
 //! - [`ready`], [`plan`], [`pair`], [`record`]: homing, positions of a pair, its capture, and its folder.

@@ -1,5 +1,4 @@
 //! Exposure programs from a file, and focus stacks.
-//!
 //! ```toml
 //! exposure_us = 5000            # defaults of all shots
 //! settle_window_nm = 100

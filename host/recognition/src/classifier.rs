@@ -1,5 +1,5 @@
-//! Classifiers with probabilities per class. To add one, implement [`Method`] in a file of this module and add a line
-//! to the table below.
+//! Classifiers with probabilities per class. To add one, implement [`Method`] in a file of this module and
+//! add a line to the table below.
 
 pub mod method;
 pub mod neighbours;

@@ -5,11 +5,9 @@
 //! [`alignment`] and [`self_training`] adapt to another camera. [`choice`] finds the settings of an
 //! [`experiment`] by cross-validation, [`training`] makes the [`model`], [`live`] uses it frame by frame,
 //! [`segmentation`] on un-segmented recordings. [`evaluation`] measures, [`synthetic`] makes seeded clips.
-//!
 //! # From markers to an activity
 //! A recording's points are turned to a view, filled part by part and described; such clips train a
 //! recogniser, which then answers for an unseen one.
-//!
 //! ```
 //! use farnear_recognition::clip::{Clip, Track};
 //! use farnear_recognition::embedding::descriptor::{ANGLES, Scaling, centroid_distance};

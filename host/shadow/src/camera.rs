@@ -1,5 +1,4 @@
 //! Camera file (TOML): pose of the camera and prior knowledge of the subject.
-//!
 //! ```toml
 //! [camera]
 //! height_m = 0.8             # lens above the ground

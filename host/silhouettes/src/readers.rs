@@ -3,7 +3,6 @@
 //!
 //! [`READERS`] lists the formats; a new one is a file with a `READER` and a line in the table. [`read`]
 //! selects by file extension and returns millimetres with z up:
-//!
 //! ```
 //! use farnear_silhouettes::readers::{self, recording::Choices};
 //!
@@ -11,7 +10,6 @@
 //! assert_eq!(recording.by_name(0)["HEAD"], [0.0, 0.0, 1700.0]);
 //! # Ok::<(), farnear_silhouettes::readers::recording::RecordingError>(())
 //! ```
-//!
 //! MATLAB files hold data sets of body joints ([`skeletons`]).
 
 mod amass;

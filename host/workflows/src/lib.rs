@@ -4,7 +4,6 @@
 //! or a [`WorkflowError`] with the offending values. It does not use the terminal, the keyboard or signals.
 //!
 //! Example: an interface that collects messages, and a stage move with a scripted board on the port.
-//!
 //! ```
 //! # #[cfg(target_os = "linux")] { // where a pseudo-terminal holds the board
 //! # use std::sync::Mutex;

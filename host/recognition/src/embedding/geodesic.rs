@@ -1,7 +1,7 @@
 //! Shortest paths in the neighbour graph. [`dijkstra`] uses a binary heap for one source. [`all_pairs`] and
-//! [`from_sources`] relax sixteen sources at a time (Bellman-Ford label correction, sweeping nodes forwards and
-//! backwards along the data), so an edge costs one vector operation. N = 1500, K = 12: tens of ms on one thread, 150
-//! with heaps.
+//! [`from_sources`] relax sixteen sources at a time (Bellman-Ford label correction, sweeping nodes forwards
+//! and backwards along the data), so an edge costs one vector operation. N = 1500, K = 12: tens of ms on one
+//! thread, 150 with heaps.
 
 use super::neighbours::Graph;
 use ndarray::Array2;

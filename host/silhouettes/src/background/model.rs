@@ -67,7 +67,6 @@ pub enum BackgroundError {
 }
 
 /// An adaptive Gaussian mixture per pixel.
-///
 /// ```
 /// use farnear_silhouettes::background::{BackgroundModel, Frame, Label, Settings};
 /// use ndarray::Array2;

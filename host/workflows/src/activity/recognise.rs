@@ -122,7 +122,6 @@ impl Request for RecogniseRequest {
 
 impl RecogniseRequest {
     /// Recognises, and passes each streaming answer on.
-    ///
     /// # Errors
     /// Models and views that cannot be read, and errors of `each`.
     pub fn answers(

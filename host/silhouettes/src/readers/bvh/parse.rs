@@ -1,5 +1,4 @@
 //! The syntax of BVH: a tree of joints, then one line of numbers per frame.
-//!
 //! ```text
 //! HIERARCHY
 //! ROOT Hips
@@ -21,7 +20,6 @@
 //! Frame Time: 0.0083333
 //! 9.4 17.9 -17.3 0 0 0 0 0 -21
 //! ```
-//!
 //! Keywords in any case; free white space and line breaks up to `MOTION`. Names extend to the end of their
 //! line, so they may hold blanks (`Bip01 L Foot`) and colons (`mixamorig:Hips`).
 
