@@ -38,7 +38,7 @@ macro_rules! classifiers {
             /// All classifiers of the table.
             pub const ALL: &[Self] = &[$(Self::$name,)+];
 
-            /// Name for users.
+            /// Name in options, messages and files.
             pub fn name(self) -> &'static str {
                 match self {
                     $(Self::$name => <$trained as Method>::NAME,)+

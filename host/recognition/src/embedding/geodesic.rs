@@ -45,7 +45,7 @@ pub fn dijkstra(graph: &Graph, source: usize) -> Vec<f32> {
     distance
 }
 
-/// N x N path lengths.
+/// Path lengths between all nodes, N x N.
 pub fn all_pairs(graph: &Graph) -> Array2<f32> {
     let sources: Vec<usize> = (0..graph.nodes()).collect();
     from_sources(graph, &sources)

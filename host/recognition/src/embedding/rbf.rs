@@ -15,7 +15,7 @@ const LARGEST: f32 = 1.45;
 /// Differences summed as integers before conversion to float.
 const RUN: usize = 64;
 
-/// A trained map.
+/// A trained map from samples to embedded points.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rbf {
     /// Gallery samples (M x d).
