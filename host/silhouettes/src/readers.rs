@@ -5,7 +5,6 @@
 //! selects by file extension and returns millimetres with z up:
 //! ```
 //! use farnear_silhouettes::readers::{self, recording::Choices};
-//!
 //! let recording = readers::read(b"HEAD_x,HEAD_y,HEAD_z\n0,0,1700\n", "csv", Choices::default())?;
 //! assert_eq!(recording.by_name(0)["HEAD"], [0.0, 0.0, 1700.0]);
 //! # Ok::<(), farnear_silhouettes::readers::recording::RecordingError>(())

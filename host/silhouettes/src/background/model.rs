@@ -70,7 +70,6 @@ pub enum BackgroundError {
 /// ```
 /// use farnear_silhouettes::background::{BackgroundModel, Frame, Label, Settings};
 /// use ndarray::Array2;
-///
 /// let mut model = BackgroundModel::new((48, 64), 1, Settings::default())?;
 /// let empty = Array2::from_elem((48, 64), 100_u8);
 /// for _ in 0..20 {
