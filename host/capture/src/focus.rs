@@ -69,7 +69,7 @@ pub struct Focus {
     pub fine: Nanometres,
     pub places: usize,
     pub exposures: usize,
-    /// Board time.
+    /// Duration by the clock of the board.
     pub board: Duration,
     /// Fine sweep: sensor distance in mm, focus measure.
     pub sweep: Vec<(f64, f64)>,

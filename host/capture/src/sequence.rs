@@ -5,11 +5,9 @@
 //! settle_dwell_us = 2000
 //! repeat = 1
 //! trigger = "hardware"          # hardware, software, free-running; the same for all shots
-//!
 //! [[shot]]
 //! axis = "coarse"               # coarse, fine, lens
 //! to_um = 5800.0
-//!
 //! [[shot]]
 //! axis = "fine"
 //! to_um = 120.0

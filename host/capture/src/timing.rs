@@ -96,7 +96,6 @@ impl Pace {
         way + self.ramps
     }
 
-    /// Limited to a speed.
     fn at_most(self, nm_per_s: u64) -> Self {
         Self { speed_nm_per_s: self.speed_nm_per_s.min(nm_per_s), ..self }
     }
