@@ -18,7 +18,6 @@ use anyhow::{Context, Result, bail};
 use farnear_files::{image_file::read_grey, map};
 use farnear_scene::{PackedScene, Scene, SceneError, SceneFile};
 
-/// A scene argument.
 #[derive(Clone, Debug)]
 pub enum SceneArgument {
     /// `cone`, `plane:900,contrast=0.3`, ...
