@@ -60,7 +60,7 @@ impl Case<'_> {
     }
 }
 
-/// Ordered by time.
+/// Violations of a run, ordered by time.
 pub fn check(case: &Case<'_>) -> Vec<Broken> {
     let checks = [
         motion::hard_stop,
