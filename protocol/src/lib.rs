@@ -1,5 +1,4 @@
 #![doc = include_str!("../README.md")]
-//!
 //! # Modules
 //! - [`message`]: requests, responses, events and errors, with units.
 //! - [`frame`]: framing with COBS and CRC-32, and a decoder that resynchronises after any garbage.
