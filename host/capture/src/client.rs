@@ -48,7 +48,6 @@ struct Port {
     name: String,
     timing: Arc<Mutex<Timing>>,
     wanted: Option<LinkRate>,
-    /// Cached speeds of the axes.
     paces: Mutex<Vec<(Axis, Pace)>>,
     inbox: Option<Sender<Command>>,
     thread: Option<JoinHandle<()>>,

@@ -61,8 +61,7 @@ fn list(folder: &Path, before: &str, names: &mut Vec<String>) {
     }
 }
 
-/// Returns stderr of a program that fails with this exit code, with `phrases` in a few lines there, and an empty
-/// stdout.
+/// Returns the few lines on stderr, with `phrases`, of a program with this exit code and an empty stdout.
 #[track_caller]
 pub fn fails(command: &mut Command, code: i32, phrases: &[&str]) -> String {
     let output = command.output().expect("the program starts");
