@@ -38,7 +38,7 @@ const LOOK: Duration = Duration::from_millis(2);
 /// An image (height, width), its bit depth, and its record.
 type Taken<'py> = (Bound<'py, PyArray2<u16>>, u8, Bound<'py, PyDict>);
 
-/// A connected board.
+/// A board on a serial port, connected.
 #[pyclass(module = "farnear._farnear")]
 pub struct RigClient(Client);
 
@@ -120,7 +120,7 @@ impl RigClient {
         py.detach(|| self.0.stop()).map_err(rig)
     }
 
-    /// Emergency stop.
+    /// Emergency stop; raises an alarm.
     fn halt(&self, py: Python<'_>) -> PyResult<()> {
         py.detach(|| self.0.halt()).map_err(rig)
     }

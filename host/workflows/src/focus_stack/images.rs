@@ -46,7 +46,6 @@ pub(super) struct Images<'a> {
 const PIXEL: usize = size_of::<f32>();
 
 impl<'a> Images<'a> {
-    /// Reads all image files.
     pub fn read(
         paths: &[PathBuf],
         request: &FocusStackRequest,
