@@ -995,5 +995,7 @@ class RigClient:
         wait_s: float = 30.0,
         light: Optional[tuple[float, float]] = None,
         subtract_ambient: bool = False,
+        average: int = 1,
+        auto_exposure: bool = False,
     ) -> tuple[tuple[NDArray[np.uint16], int, dict[str, object]], tuple[NDArray[np.uint16], int, dict[str, object]]]:
         """A far- and a near-focused image for some optics: homes where needed, brings the stage near, exposes both by piezo."""
