@@ -1,6 +1,4 @@
-//! The simulator's camera endpoint: a loopback TCP stream next to the serial link.
-//!
-//! Each image from the simulator is
+//! The simulator's camera endpoint: a loopback TCP stream next to the serial link. Each image is
 //! ```text
 //! length u32 | shot_id u32 | exposure_us u64 | width u16 | height u16 | bits u8 | pixels u16 * width * height
 //! ```
@@ -22,7 +20,6 @@ pub struct FrameHeader {
     pub shot_id: u32,
     /// Start of the exposure, board time.
     pub exposure: BoardMicros,
-    /// Pixels per row.
     pub width: u16,
     pub height: u16,
     /// Significant bits per pixel, 8 to 16.
@@ -30,7 +27,7 @@ pub struct FrameHeader {
 }
 
 impl FrameHeader {
-    /// Header as bytes.
+    /// The header in the order of its fields, little-endian.
     pub fn to_bytes(&self) -> [u8; FRAME_HEADER] {
         let mut bytes = [0; FRAME_HEADER];
         bytes[0..4].copy_from_slice(&self.shot_id.to_le_bytes());

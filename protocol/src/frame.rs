@@ -1,5 +1,4 @@
-//! Bytes on the wire.
-//!
+//! Frames: the bytes on the wire.
 //! ```text
 //! COBS( version u8 | kind u8 | id u32 | boot u32 | postcard body | CRC-32 ) 0x00
 //! ```
@@ -166,8 +165,7 @@ impl Decoder {
         Self { between: Vec::new(), overlong: false }
     }
 
-    /// Accepts one byte; at a delimiter returns the frame before it or its error. Skips empty frames, which flush
-    /// garbage.
+    /// Accepts one byte; at a delimiter returns the frame before it or its error. Skips empty frames: they flush.
     pub fn push(&mut self, byte: u8) -> Option<Result<Packet, FrameError>> {
         if byte != 0 {
             self.overlong |= self.between.push(byte).is_err();

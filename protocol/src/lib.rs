@@ -1,7 +1,5 @@
 #![doc = include_str!("../README.md")]
-//!
 //! # Modules
-//!
 //! - [`message`]: requests, responses, events and errors, with units.
 //! - [`frame`]: framing with COBS and CRC-32, and a decoder that resynchronises after any garbage.
 //! - [`settle`]: when a position counts as reached.

@@ -1,5 +1,4 @@
-//! The message tables: [`Request`]; [`Response`] and [`RequestError`]; [`EventKind`]. Parts are in one file per
-//! subject.
+//! The message tables: [`Request`]; [`Response`] and [`RequestError`]; [`EventKind`]. Parts are in a file per subject.
 //!
 //! Positions are [`Nanometres`], positive = sensor and lens apart (towards near focus), 0 = home switch; sensor
 //! distance = datum + coarse + fine + lens ([`sensor_distance_nm`]). Set-points are absolute, so a repeated request has

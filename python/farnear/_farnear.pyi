@@ -96,7 +96,7 @@ class Optics:
         """Signed blur radii (far image, near image) in px at a normalised depth."""
     @property
     def focal_length_mm(self) -> float:
-        """Focal length, mm."""
+        """Focal length of the lens, mm."""
     @property
     def f_number(self) -> float:
         """Focal length over the diameter of the aperture."""
@@ -128,7 +128,7 @@ class Operators:
     Parameters
     ----------
     optics : Optics
-        The optics.
+        The optics to design the operators for.
     family : {"watanabe", "raj", "ro", "gro", "ggro"}, optional
         Family of operators; by default the one that belongs to the point spread function.
     design : {"linear", "thesis"}
@@ -310,8 +310,7 @@ def depth(
     ----------
     far, near : array (height, width)
         Grey images of one size and one kind, at least 16x16 px. In `uint8` and `uint16` values from `white_level` on are saturated;
-        other integers and floating point numbers have any common scale. `float32` is not copied. Masked pixels of a masked array
-        have no depth.
+        other integers and floating point numbers have any common scale. `float32` is not copied. Masked pixels have no depth.
     optics : Optics
         The optics of the pair.
     operators : Operators, optional
@@ -448,7 +447,7 @@ def points_mm(depth_mm: Map, optics: Optics) -> NDArray[np.float32]:
     Parameters
     ----------
     depth_mm : array (height, width)
-        Depth map, mm.
+        Depth map, mm; NaN where there is none.
     optics : Optics
         The optics of the map.
 
@@ -561,13 +560,10 @@ class Correction:
     def dumps(self) -> str:
         """TOML of the correction, as `farnear correct --correction` reads it."""
     def apply(self, depth_mm: Map) -> NDArray[np.float32]:
-        """Correct a depth map.
-
-        `depth_mm` is (height, width) in mm. Returns float32 (height, width) in mm; NaN stays NaN, and depths beyond the fitted range become NaN.
-        """
+        """Correct a depth map. `depth_mm` is (height, width) in mm. Returns float32 (height, width) in mm; NaN stays NaN, and depths beyond the fitted range become NaN."""
     @property
     def method(self) -> str:
-        """Name of the method."""
+        """Method of the correction."""
     @property
     def shape(self) -> tuple[int, int]:
         """(height, width) of the maps that it corrects."""
@@ -771,7 +767,7 @@ def render(
     Parameters
     ----------
     optics : Optics
-        The lens.
+        The lens, its focus pair and the pixels.
     scene : str
         "plane:MM", "staircase", "slant", "cone" or "sphere", with options such as "cone,texture=fractal,contrast=0.3".
     width, height : int
@@ -788,7 +784,7 @@ def render(
     far, near : array uint8 or uint16 (height, width)
         The images; with more than 8 bits `uint16` over its full range.
     truth : array float32 (height, width)
-        True depth, mm.
+        True depth of each pixel, mm.
 
     Examples
     --------
@@ -814,7 +810,7 @@ def sun_position(
     latitude_deg, longitude_deg : float
         Place, degrees; north and east are positive.
     model : {"psa", "almanac", "thesis", "spa"}
-        Formulas.
+        Formulas: PSA+, an almanac, the thesis, or NREL's SPA.
 
     Returns
     -------
@@ -881,10 +877,7 @@ def centroid_distance(mask: Mask, *, scaling: Literal["keep-aspect", "stretch"] 
 def isomap(
     samples: NDArray[np.float32], *, neighbours: int = 5, dimensions: int = 2
 ) -> tuple[NDArray[np.float32], NDArray[np.float64], NDArray[np.float32]]:
-    """Isomap of samples.
-
-    `samples` is float32 (n, features). Returns coordinates (n, dimensions), eigenvalues (dimensions) and path lengths (n, n).
-    """
+    """Isomap of float32 samples (n, features). Returns coordinates (n, dimensions), eigenvalues (dimensions) and path lengths (n, n)."""
 
 class Rbf:
     """Gaussian radial basis functions on all samples (n, features), solved with a ridge for targets (n, d)."""
@@ -964,7 +957,7 @@ class Recogniser:
         """
 
 class RigClient:
-    """A connected board."""
+    """A board on a serial port, connected."""
 
     def __init__(self, port: str) -> None: ...
     def home(self, axes: Optional[Sequence[str]] = None) -> dict[str, float]:
@@ -980,7 +973,7 @@ class RigClient:
     def stop(self) -> None:
         """Stops all motion along the ramps."""
     def halt(self) -> None:
-        """Emergency stop."""
+        """Emergency stop; raises an alarm."""
     def clear_alarm(self, number: int) -> None:
         """Clears an alarm by its number."""
     def expose(
@@ -1002,5 +995,7 @@ class RigClient:
         wait_s: float = 30.0,
         light: Optional[tuple[float, float]] = None,
         subtract_ambient: bool = False,
+        average: int = 1,
+        auto_exposure: bool = False,
     ) -> tuple[tuple[NDArray[np.uint16], int, dict[str, object]], tuple[NDArray[np.uint16], int, dict[str, object]]]:
         """A far- and a near-focused image for some optics: homes where needed, brings the stage near, exposes both by piezo."""

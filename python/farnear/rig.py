@@ -192,6 +192,8 @@ class Rig:
         wait_s: float = 30.0,
         light: Optional[tuple[float, float]] = None,
         subtract_ambient: bool = False,
+        average: int = 1,
+        auto_exposure: bool = False,
     ) -> tuple[Exposure, Exposure]:
         """Capture a pair for `farnear.depth`: home if necessary, move the stage, expose both positions of the piezo.
 
@@ -207,6 +209,10 @@ class Rig:
             Brightness of the board's two light outputs during the exposures, percent.
         subtract_ambient : bool
             Subtract images without that light. The scene must not move and the room's light must be steady.
+        average : int
+            Exposures averaged for each image, 1 to 256.
+        auto_exposure : bool
+            Find the exposure time at which the brightest pixels have 80 % of white, from `exposure_ms`.
 
         Returns
         -------
@@ -220,6 +226,8 @@ class Rig:
             wait_s=wait_s,
             light=light,
             subtract_ambient=subtract_ambient,
+            average=average,
+            auto_exposure=auto_exposure,
         )
         far, near = (_exposure(*image) for image in pair)
         return far, near

@@ -60,7 +60,6 @@ impl Correction {
         Self::loads(py, &text).map_err(|error| FarnearError::new_err(format!("{}: {error}", path.display())))
     }
 
-    /// For pickle.
     fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, (String,))> {
         Ok((py.get_type::<Self>().getattr("loads")?, (self.dumps(py)?,)))
     }
@@ -70,9 +69,7 @@ impl Correction {
         py.detach(|| toml::to_string(&self.0)).map_err(wrong)
     }
 
-    /// Correct a depth map.
-    ///
-    /// `depth_mm` is (height, width) in mm. Returns float32 (height, width) in mm; NaN stays NaN, and depths beyond the fitted range become NaN.
+    /// Correct a depth map. `depth_mm` is (height, width) in mm. Returns float32 (height, width) in mm; NaN stays NaN, and depths beyond the fitted range become NaN.
     fn apply<'py>(
         &self,
         py: Python<'py>,
@@ -83,7 +80,7 @@ impl Correction {
         Ok(py.detach(|| self.0.apply(map)).map_err(wrong)?.into_pyarray(py))
     }
 
-    /// Name of the method.
+    /// Method of the correction.
     #[getter]
     fn method(&self) -> String {
         self.0.method().to_string()

@@ -1,4 +1,4 @@
-//! Depth of pairs.
+//! Depth of pairs of images.
 
 use farnear_depth::{
     adaptive_window::Window,
@@ -62,8 +62,7 @@ fn filling(fill: &Fill, low_texture: &str) -> PyResult<Settings> {
 /// ----------
 /// far, near : array (height, width)
 ///     Grey images of one size and one kind, at least 16x16 px. In `uint8` and `uint16` values from `white_level` on are saturated;
-///     other integers and floating point numbers have any common scale. `float32` is not copied. Masked pixels of a masked array
-///     have no depth.
+///     other integers and floating point numbers have any common scale. `float32` is not copied. Masked pixels have no depth.
 /// optics : Optics
 ///     The optics of the pair.
 /// operators : Operators, optional

@@ -11,9 +11,7 @@ use crate::errors::{DisconnectedError, wrong};
 /// Coordinates, eigenvalues, geodesic distances.
 type Laid<'py> = (Bound<'py, PyArray2<f32>>, Bound<'py, PyArray1<f64>>, Bound<'py, PyArray2<f32>>);
 
-/// Isomap of samples.
-///
-/// `samples` is float32 (n, features). Returns coordinates (n, dimensions), eigenvalues (dimensions) and path lengths (n, n).
+/// Isomap of float32 samples (n, features). Returns coordinates (n, dimensions), eigenvalues (dimensions) and path lengths (n, n).
 #[pyfunction]
 #[pyo3(signature = (samples, *, neighbours=5, dimensions=2))]
 pub fn isomap<'py>(
@@ -80,7 +78,6 @@ impl Rbf {
         Self(rbf::Rbf::assemble(centres, weights, gamma, ridge, condition))
     }
 
-    /// For pickle.
     fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, Parts<'py>)> {
         let rbf::Rbf { centres, weights, gamma, ridge, condition, .. } = &self.0;
         let arrays = (PyArray2::from_array(py, centres), PyArray2::from_array(py, weights));

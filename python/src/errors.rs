@@ -27,7 +27,6 @@ pub fn wrong(error: impl Error) -> PyErr {
     FarnearError::new_err(message(&error))
 }
 
-/// As a `RigError`.
 pub fn rig(error: impl Error) -> PyErr {
     RigError::new_err(message(&error))
 }

@@ -96,7 +96,6 @@ impl Optics {
         Self::loads(&text).map_err(|error| FarnearError::new_err(format!("{}: {error}", path.display())))
     }
 
-    /// For pickle.
     fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, (String,))> {
         Ok((py.get_type::<Self>().getattr("loads")?, (self.dumps()?,)))
     }
@@ -122,7 +121,7 @@ impl Optics {
         (far, near)
     }
 
-    /// Focal length, mm.
+    /// Focal length of the lens, mm.
     #[getter]
     fn focal_length_mm(&self) -> f64 {
         self.0.focal_length_mm()
@@ -193,7 +192,7 @@ impl Optics {
 /// Parameters
 /// ----------
 /// optics : Optics
-///     The optics.
+///     The optics to design the operators for.
 /// family : {"watanabe", "raj", "ro", "gro", "ggro"}, optional
 ///     Family of operators; by default the one that belongs to the point spread function.
 /// design : {"linear", "thesis"}
@@ -233,7 +232,6 @@ impl Operators {
         toml::from_str(text).map(Self).map_err(wrong)
     }
 
-    /// For pickle.
     fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, (String,))> {
         Ok((py.get_type::<Self>().getattr("loads")?, (self.dumps()?,)))
     }

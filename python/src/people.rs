@@ -20,7 +20,7 @@ use crate::{
 /// latitude_deg, longitude_deg : float
 ///     Place, degrees; north and east are positive.
 /// model : {"psa", "almanac", "thesis", "spa"}
-///     Formulas.
+///     Formulas: PSA+, an almanac, the thesis, or NREL's SPA.
 ///
 /// Returns
 /// -------

@@ -10,7 +10,7 @@ use crate::arrays::{Map, named, optics_named};
 /// Parameters
 /// ----------
 /// depth_mm : array (height, width)
-///     Depth map, mm.
+///     Depth map, mm; NaN where there is none.
 /// optics : Optics
 ///     The optics of the map.
 ///

@@ -48,7 +48,6 @@ impl Recogniser {
         self.model.activities().to_vec()
     }
 
-    /// For pickle.
     fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, (&Path,))> {
         Ok((py.get_type::<Self>().into_any(), (&self.path,)))
     }

@@ -15,7 +15,7 @@ type Rendered<'py> = (Bound<'py, PyAny>, Bound<'py, PyAny>, Bound<'py, PyArray2<
 /// Parameters
 /// ----------
 /// optics : Optics
-///     The lens.
+///     The lens, its focus pair and the pixels.
 /// scene : str
 ///     "plane:MM", "staircase", "slant", "cone" or "sphere", with options such as "cone,texture=fractal,contrast=0.3".
 /// width, height : int
@@ -32,7 +32,7 @@ type Rendered<'py> = (Bound<'py, PyAny>, Bound<'py, PyAny>, Bound<'py, PyArray2<
 /// far, near : array uint8 or uint16 (height, width)
 ///     The images; with more than 8 bits `uint16` over its full range.
 /// truth : array float32 (height, width)
-///     True depth, mm.
+///     True depth of each pixel, mm.
 ///
 /// Examples
 /// --------

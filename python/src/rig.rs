@@ -22,7 +22,10 @@ use farnear_protocol::{
     Micros, Nanometres,
     message::{Axis, AxisStatus, LightLevels, Limits, ShotRecord},
 };
-use farnear_workflows::rig::camera::{CameraAddress, light_of_percent};
+use farnear_workflows::rig::{
+    camera::{CameraAddress, light_of_percent},
+    pair::AVERAGED_MAX,
+};
 use ndarray::Array2;
 use numpy::{IntoPyArray, PyArray2};
 use pyo3::{prelude::*, types::PyDict};
@@ -38,7 +41,7 @@ const LOOK: Duration = Duration::from_millis(2);
 /// An image (height, width), its bit depth, and its record.
 type Taken<'py> = (Bound<'py, PyArray2<u16>>, u8, Bound<'py, PyDict>);
 
-/// A connected board.
+/// A board on a serial port, connected.
 #[pyclass(module = "farnear._farnear")]
 pub struct RigClient(Client);
 
@@ -120,7 +123,7 @@ impl RigClient {
         py.detach(|| self.0.stop()).map_err(rig)
     }
 
-    /// Emergency stop.
+    /// Emergency stop; raises an alarm.
     fn halt(&self, py: Python<'_>) -> PyResult<()> {
         py.detach(|| self.0.halt()).map_err(rig)
     }
@@ -162,7 +165,7 @@ impl RigClient {
     }
 
     /// A far- and a near-focused image for some optics: homes where needed, brings the stage near, exposes both by piezo.
-    #[pyo3(signature = (camera, optics, *, exposure_us=5000, wait_s=30.0, light=None, subtract_ambient=false))]
+    #[pyo3(signature = (camera, optics, *, exposure_us=5000, wait_s=30.0, light=None, subtract_ambient=false, average=1, auto_exposure=false))]
     #[allow(clippy::too_many_arguments, reason = "keywords of Python")]
     fn capture_pair<'py>(
         &self,
@@ -173,16 +176,27 @@ impl RigClient {
         wait_s: f64,
         light: Option<[f64; 2]>,
         subtract_ambient: bool,
+        average: u16,
+        auto_exposure: bool,
     ) -> PyResult<(Taken<'py>, Taken<'py>)> {
         let light = levels(light)?;
         if subtract_ambient && light.is_none() {
             return Err(FarnearError::new_err("subtract_ambient needs light=(first, second) in percent"));
         }
+        if !(1..=AVERAGED_MAX).contains(&average) {
+            return Err(FarnearError::new_err(format!("average = {average}: expected 1 to {AVERAGED_MAX}")));
+        }
         let (address, image_wait) = (address(camera)?, waiting(wait_s)?);
         let range = optics.0.working_range();
         let sensor = SensorPair { far_mm: range.sensor_far_mm, near_mm: range.sensor_near_mm };
-        let exposures =
-            Exposures { exposure: Micros(exposure_us), image_wait, subtract_ambient, ..Exposures::default() };
+        let exposures = Exposures {
+            exposure: Micros(exposure_us),
+            image_wait,
+            averaged: average,
+            auto: auto_exposure,
+            subtract_ambient,
+            ..Exposures::default()
+        };
         let limits = self.0.hello().limits;
         let pair = self.interruptibly(py, |client| {
             let mut camera = open(&address)?;

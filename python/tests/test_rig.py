@@ -68,6 +68,14 @@ def test_an_ambient_image_needs_light(emulated_rig, optics):
         emulated_rig.capture_pair(optics, light=(130, 0))
 
 
+def test_a_pair_is_exposed_for_80_percent_of_white_and_averaged(emulated_rig, optics):
+    far, near = emulated_rig.capture_pair(optics, exposure_ms=0.5, auto_exposure=True, average=2)
+    assert far.image.dtype == near.image.dtype
+    assert np.percentile(far.image, 99.9) == pytest.approx(0.8 * np.iinfo(far.image.dtype).max, rel=0.1)
+    with pytest.raises(farnear.FarnearError, match="average = 0: expected 1 to 256"):
+        emulated_rig.capture_pair(optics, average=0)
+
+
 def test_refuses_events_that_the_rig_cannot_do(emulated_rig):
     useq = pytest.importorskip("useq")
     for event, what in [

@@ -1,7 +1,6 @@
-//! Times of the mathematics in release, and ratios to OpenCV on the same machine.
-//!
-//! Peers are scripts of the project or the user, run with the machine's `python3`; nothing is installed. A peer runs
-//! before and after our benches and its better time counts, in case the machine slows down.
+//! Times of the mathematics in release, and ratios to OpenCV on the same machine. Peers are scripts of the
+//! project or the user, run with the machine's `python3`; nothing is installed. A peer runs before and after
+//! our benches and its better time counts, in case the machine slows down.
 
 mod arm;
 mod people;

@@ -31,7 +31,7 @@ pub struct Arguments {
 }
 
 struct Release {
-    /// Of all crates.
+    /// Version of all crates of the workspace.
     version: String,
     /// Commit time, seconds since 1970, of files in archives.
     epoch: String,

@@ -1,5 +1,4 @@
 //! Invariants of every run, checked against the observer's record.
-//!
 //! | property | meaning |
 //! |---|---|
 //! | `hard-stop` | no driver pushes a stage against its hard stop if the home switch works, and at most until a stall otherwise |
@@ -61,7 +60,7 @@ impl Case<'_> {
     }
 }
 
-/// Ordered by time.
+/// Violations of a run, ordered by time.
 pub fn check(case: &Case<'_>) -> Vec<Broken> {
     let checks = [
         motion::hard_stop,

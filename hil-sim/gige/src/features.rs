@@ -12,7 +12,7 @@ pub enum Value {
         min: u32,
         max: u32,
         parts: u32,
-        /// Empty for a factor.
+        /// As GenICam names it; empty for a factor.
         unit: &'static str,
     },
     Choice(Vec<(&'static str, u32)>),
@@ -40,18 +40,18 @@ pub const HEIGHT: u32 = 0xA014;
 pub const PIXEL_FORMAT: u32 = 0xA018;
 /// Bytes per frame with chunks.
 pub const PAYLOAD_SIZE: u32 = 0xA01C;
-/// Continuous only.
+/// `Continuous` is the only mode.
 pub const ACQUISITION_MODE: u32 = 0xA020;
 /// Starts ([`START`]) and stops ([`STOP`]).
 pub const ACQUISITION: u32 = 0xA024;
 /// Frames per 1000 s when free running.
 pub const FRAME_RATE: u32 = 0xA028;
-/// FrameStart only.
+/// `FrameStart` is the only trigger.
 pub const TRIGGER_SELECTOR: u32 = 0xA02C;
 pub const TRIGGER_MODE: u32 = 0xA030;
 /// [`LINE_1`] or [`SOFTWARE`].
 pub const TRIGGER_SOURCE: u32 = 0xA034;
-/// Rising edge only.
+/// `RisingEdge` is the only activation.
 pub const TRIGGER_ACTIVATION: u32 = 0xA038;
 pub const TRIGGER_SOFTWARE: u32 = 0xA03C;
 /// Exposure in us for software triggers and free running; a hardware trigger's pulse sets its own.

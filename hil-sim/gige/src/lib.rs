@@ -1,5 +1,4 @@
 //! GigE Vision server for the emulated camera, from public protocol descriptions. Unlike Aravis' fake camera:
-//!
 //! - the hardware trigger is the emulated board's trigger line; software triggers and free running work, too;
 //! - frames are stamped in rig time, in leader and chunks, and counted from the start of the acquisition;
 //! - lost packets are resent on request, and can be lost on purpose;

@@ -201,7 +201,7 @@ impl Registers {
         })
     }
 
-    /// `None` until set.
+    /// Where frames are sent; `None` until it is set.
     pub fn destination(&self) -> Option<std::net::SocketAddr> {
         let port = u16::try_from(self.get(STREAM_PORT)).ok().filter(|port| *port > 0)?;
         Some((Ipv4Addr::from_bits(self.get(STREAM_ADDRESS)), port).into())

@@ -21,7 +21,7 @@ pub struct Frame {
     /// From 1 at the start of the acquisition.
     pub number: u64,
     pub time_ns: u64,
-    /// PFNC code.
+    /// Code of the Pixel Format Naming Convention.
     pub pixel_format: u32,
     pub size_px: (u32, u32),
     pub offset_px: (u32, u32),

@@ -29,7 +29,7 @@ pub enum BoardCorrectionError {
 
 #[derive(Clone, Debug)]
 pub struct CodedTarget {
-    /// (height, width).
+    /// Depth codes, (height, width).
     pub codes: Array2<i16>,
     /// Code of the true depth.
     pub truth: i16,

@@ -1,9 +1,8 @@
-//! Handle of a board: requests, and streams of events and logs.
-//!
-//! A request is repeated byte for byte until its answer comes; the board acts once per id. Handles can be cloned and
-//! used from any thread; one thread owns the port and sends requests in sequence. A handle belongs to one session.
-//! After a reset or unplugging each request fails with [`ClientError::Reset`] or [`ClientError::Gone`] until
-//! [`Client::reopen`], because the rig may have lost its position. See `docs/protocol.md`.
+//! Handle of a board: requests, and streams of events and logs. A request is repeated byte for byte until its
+//! answer comes; the board acts once per id. Handles can be cloned and used from any thread; one thread owns
+//! the port and sends requests in sequence. A handle belongs to one session. After a reset or unplugging each
+//! request fails with [`ClientError::Reset`] or [`ClientError::Gone`] until [`Client::reopen`], because the
+//! rig may have lost its position. See `docs/protocol.md`.
 
 use std::{
     sync::{
@@ -49,7 +48,6 @@ struct Port {
     name: String,
     timing: Arc<Mutex<Timing>>,
     wanted: Option<LinkRate>,
-    /// Cached speeds of the axes.
     paces: Mutex<Vec<(Axis, Pace)>>,
     inbox: Option<Sender<Command>>,
     thread: Option<JoinHandle<()>>,

@@ -27,13 +27,13 @@ const UNDELIVERED_MAX: u32 = 8;
 pub struct Pace {
     /// 0 = as fast as possible.
     pub period: Micros,
-    /// 0 = until stopped.
+    /// Limit of the run; 0 = until stopped.
     pub exposures: u32,
 }
 
 #[derive(Clone, PartialEq, Debug)]
 pub struct Frame {
-    /// From 0.
+    /// Number of the period, from 0.
     pub number: u32,
     /// Largest deviation from the target between trigger and end of exposure.
     pub deviation: Nanometres,
@@ -56,7 +56,7 @@ pub enum Loss {
 pub enum Outcome {
     Taken(Box<Frame>),
     Dropped {
-        /// From 0.
+        /// Number of the period, from 0.
         number: u32,
         loss: Loss,
     },

@@ -1,8 +1,7 @@
-//! Finds the sensor distance of best focus.
-//!
-//! *Coarse*: per stepper position the piezo takes three images up to 190 um apart, whose spectra give side and distance
-//! of the focus (`model`); the stepper moves there. *Fine*: a piezo sweep, and the tip of a parabola through the
-//! largest measures ([`farnear_depth::focus_measure::peak`]). Positions: coarse plus fine, nm, unless named otherwise.
+//! Finds the sensor distance of best focus. *Coarse*: per stepper position the piezo takes three images up to
+//! 190 um apart, whose spectra give side and distance of the focus (`model`); the stepper moves there.
+//! *Fine*: a piezo sweep, and the tip of a parabola through the largest measures
+//! ([`farnear_depth::focus_measure::peak`]). Positions: coarse plus fine, nm, unless named otherwise.
 
 mod model;
 
@@ -70,7 +69,7 @@ pub struct Focus {
     pub fine: Nanometres,
     pub places: usize,
     pub exposures: usize,
-    /// Board time.
+    /// Duration by the clock of the board.
     pub board: Duration,
     /// Fine sweep: sensor distance in mm, focus measure.
     pub sweep: Vec<(f64, f64)>,

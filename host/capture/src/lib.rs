@@ -1,7 +1,4 @@
-//! # farnear-capture
-//!
 //! Controls the rig and takes pictures with it; blocking, no async runtime.
-//!
 //! - [`transport`], [`client`], [`work`], [`log_stream`]: serial port, board handles, long work, and the board's log.
 //! - [`camera`]: image sources.
 //! - [`ready`], [`plan`], [`pair`], [`record`]: homing, positions of a pair, its capture, and its folder.
@@ -16,14 +13,11 @@
 //! use farnear_capture::{Client, ClientError};
 //! use farnear_protocol::{Nanometres, message::Axis};
 //! use farnear_scripted_board::{Faults, Peer};
-//!
 //! let board = Peer::new(Faults::default());
 //! let rig = Client::connect(board.connect(), "scripted")?;
-//!
 //! // Only the piezo moves before homing.
 //! let refused = rig.move_to(Axis::SensorCoarse, Nanometres(5_800_000));
 //! assert!(matches!(refused, Err(ClientError::Refused { .. })));
-//!
 //! rig.home(Axis::SensorCoarse)?;
 //! let moved = rig.move_to(Axis::SensorCoarse, Nanometres(5_800_000))?;
 //! // Position by encoder; the piezo compensates for the difference.

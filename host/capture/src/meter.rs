@@ -1,4 +1,4 @@
-//! Automatic exposure.
+//! Automatic exposure time from test images.
 
 use std::time::Duration;
 

@@ -1,16 +1,13 @@
 //! Exposure programs from a file, and focus stacks.
-//!
 //! ```toml
 //! exposure_us = 5000            # defaults of all shots
 //! settle_window_nm = 100
 //! settle_dwell_us = 2000
 //! repeat = 1
 //! trigger = "hardware"          # hardware, software, free-running; the same for all shots
-//!
 //! [[shot]]
 //! axis = "coarse"               # coarse, fine, lens
 //! to_um = 5800.0
-//!
 //! [[shot]]
 //! axis = "fine"
 //! to_um = 120.0

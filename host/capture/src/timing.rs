@@ -77,7 +77,6 @@ impl Pace {
     /// Piezo: travel time is negligible.
     pub const AT_ONCE: Self = Self { speed_nm_per_s: u64::MAX, ramps: Duration::ZERO };
 
-    /// Reads the settings with `setting`.
     pub fn of<E>(axis: Axis, mut setting: impl FnMut(SettingKey) -> Result<i32, E>) -> Result<Self, E> {
         let Some(StepperKeys { speed, acceleration, jerk, .. }) = StepperKeys::of(axis) else {
             return Ok(Self::AT_ONCE);
@@ -96,7 +95,6 @@ impl Pace {
         way + self.ramps
     }
 
-    /// Limited to a speed.
     fn at_most(self, nm_per_s: u64) -> Self {
         Self { speed_nm_per_s: self.speed_nm_per_s.min(nm_per_s), ..self }
     }

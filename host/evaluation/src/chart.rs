@@ -1,4 +1,4 @@
-//! Line charts as PNG.
+//! Line charts as PNG pictures.
 
 use anyhow::{Result, anyhow};
 use plotters::{prelude::*, style::register_font as register};

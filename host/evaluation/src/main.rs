@@ -1,10 +1,9 @@
 //! Measures the accuracy of depth maps and writes `docs/accuracy.md`, `docs/accuracy-real.md` ([`depth`]),
 //! `docs/activity.md` ([`people`]), `docs/robustness.md` ([`robust`]) and `docs/thesis.md` ([`thesis`]), with
-//! their pictures.
-//!
-//! Everything is seeded; apart from the thesis' table of times, two runs on one kind of processor write the same bytes.
-//! [`rig`] renders and compares, [`sweep`] does so for several operators, [`page`] writes Markdown, [`chart`] and
-//! [`panels`] draw. Takes a few minutes on four cores; run it by `cargo xtask evaluate`.
+//! their pictures. Everything is seeded; apart from the thesis' table of times, two runs on one kind of
+//! processor write the same bytes. [`rig`] renders and compares, [`sweep`] does so for several operators,
+//! [`page`] writes Markdown, [`chart`] and [`panels`] draw. Takes a few minutes on four cores; run it by
+//! `cargo xtask evaluate`.
 
 mod chart;
 mod depth;

@@ -20,9 +20,9 @@ pub struct Panel<'a> {
 
 #[derive(Clone, Copy)]
 pub enum Scale {
-    /// Range in mm.
+    /// Depths of both ends of the scale, mm.
     Depth([f32; 2]),
-    /// Largest magnitude, mm.
+    /// Magnitude at the ends of the scale, mm.
     Error(f32),
     Grey(f32),
 }

@@ -1,5 +1,3 @@
-//! # farnear
-//!
 //! The command line: parses arguments and prints figures; the tasks are in `farnear-workflows`. [`render`] is here
 //! because the workflows do not depend on a simulated lens.
 //!

@@ -1,6 +1,4 @@
-//! Scenes by name or from a scene file with its maps.
-//!
-//! A scene file is TOML; paths in it are relative to its folder:
+//! Scenes by name or from a scene file with its maps. A scene file is TOML; paths in it are relative to its folder:
 //! ```toml
 //! depth = "bust.npy"      # depths in mm (.npy or float TIFF), stretched over the image; or: scene = "cone"
 //! texture = "bricks.png"  # any picture that `farnear depth` reads; or: "sand" (also without the line), "fractal"
@@ -18,7 +16,6 @@ use anyhow::{Context, Result, bail};
 use farnear_files::{image_file::read_grey, map};
 use farnear_scene::{PackedScene, Scene, SceneError, SceneFile};
 
-/// A scene argument.
 #[derive(Clone, Debug)]
 pub enum SceneArgument {
     /// `cone`, `plane:900,contrast=0.3`, ...

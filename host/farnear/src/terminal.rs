@@ -70,8 +70,8 @@ pub fn counting(json: bool) -> Result<Context<'static>> {
     Ok(if counts { Context { progress: &COUNTING, ..plain } } else { plain })
 }
 
-/// For work of hours: counts with the remaining time. They are lines of their own if stderr is no terminal or figures
-/// come between.
+/// For work of hours: counts with the remaining time. They are lines of their own if stderr is no terminal or
+/// figures come between.
 pub fn long_work() -> Result<Context<'static>> {
     static LINES: Terminal = Terminal { counts: Counts::Lines };
     static RISING: Terminal = Terminal { counts: Counts::Rising };

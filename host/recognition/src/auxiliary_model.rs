@@ -14,7 +14,7 @@ use std::sync::Arc;
 /// Another recogniser with its answers for the trained activities.
 #[derive(Clone, Debug, PartialEq)]
 pub struct AuxiliaryModel {
-    /// Describes clips.
+    /// Recogniser that describes and answers for clips.
     pub recogniser: Arc<Recogniser>,
     /// Trained x auxiliary activities: square roots, rows of length 1.
     pub profiles: Array2<f32>,

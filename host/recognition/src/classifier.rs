@@ -1,5 +1,5 @@
-//! Classifiers with probabilities per class. To add one, implement [`Method`] in a file of this module and add a line
-//! to the table below.
+//! Classifiers with probabilities per class. To add one, implement [`Method`] in a file of this module and
+//! add a line to the table below.
 
 pub mod method;
 pub mod neighbours;
@@ -38,7 +38,7 @@ macro_rules! classifiers {
             /// All classifiers of the table.
             pub const ALL: &[Self] = &[$(Self::$name,)+];
 
-            /// Name for users.
+            /// Name in options, messages and files.
             pub fn name(self) -> &'static str {
                 match self {
                     $(Self::$name => <$trained as Method>::NAME,)+

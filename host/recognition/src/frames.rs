@@ -1,9 +1,7 @@
 //! Features of one frame of a clip.
-//!
 //! - Point: embedded coordinates in standard deviations of the first dimension.
 //! - Relative point: minus the clip's mean, which removes the person's build.
-//! - Box: height and width over the clip's largest height; centroid relative to the clip's mean in the same
-//!   unit.
+//! - Box: height and width over the clip's largest height; centroid relative to the clip's mean in the same unit.
 //! - Motion (ordered mode): central difference over two frames, over the clip's RMS, so independent of speed.
 
 use super::clip::BOX_NUMBERS;

@@ -5,11 +5,9 @@
 //! [`alignment`] and [`self_training`] adapt to another camera. [`choice`] finds the settings of an
 //! [`experiment`] by cross-validation, [`training`] makes the [`model`], [`live`] uses it frame by frame,
 //! [`segmentation`] on un-segmented recordings. [`evaluation`] measures, [`synthetic`] makes seeded clips.
-//!
 //! # From markers to an activity
 //! A recording's points are turned to a view, filled part by part and described; such clips train a
 //! recogniser, which then answers for an unseen one.
-//!
 //! ```
 //! use farnear_recognition::clip::{Clip, Track};
 //! use farnear_recognition::embedding::descriptor::{ANGLES, Scaling, centroid_distance};
@@ -18,7 +16,6 @@
 //! use farnear_silhouettes::mask::Mask;
 //! use farnear_silhouettes::readers::{self, recording::Choices};
 //! use farnear_silhouettes::silhouette::{parts::{Fill, draw, extent}, template::Template, view::{Canvas, View}};
-//!
 //! // Head, hip and hands, millimetres; the hands go up, or the head goes down.
 //! let recording = |raise_mm: f64, stoop_mm: f64| {
 //!     let mut csv = String::from("frame,HEAD_x,HEAD_y,HEAD_z,HIP_x,HIP_y,HIP_z,LHND_x,LHND_y,LHND_z,RHND_x,RHND_y,RHND_z\n");
@@ -35,7 +32,6 @@
 //!      [[part]]\nname = 'left arm'\nmarkers = ['HIP', 'LHND']\nthickness_mm = 50.0\n\
 //!      [[part]]\nname = 'right arm'\nmarkers = ['HIP', 'RHND']\nthickness_mm = 50.0\n",
 //! )?;
-//!
 //! // Silhouettes from the front, one per frame, at 20 mm per pixel.
 //! let silhouettes = |raise_mm, stoop_mm| -> Result<Vec<Mask>, Box<dyn std::error::Error>> {
 //!     let (recording, view) = (recording(raise_mm, stoop_mm)?, View::default());
@@ -45,7 +41,6 @@
 //! };
 //! let descriptor = centroid_distance(silhouettes(0.0, 0.0)?[0].view(), Scaling::KeepAspect)?;
 //! assert_eq!(descriptor.len(), ANGLES);
-//!
 //! // Two people do both, each in their own measure; a third one, never seen before, raises the arms.
 //! let clip = |subject: &str, activity: &str, raise_mm, stoop_mm| -> Result<Clip, Box<dyn std::error::Error>> {
 //!     let track = Track::from_masks(&silhouettes(raise_mm, stoop_mm)?, Scaling::KeepAspect, true);

@@ -86,7 +86,7 @@ impl<'a> Live<'a> {
         seen.then(|| self.recogniser.answer_by(pattern.view(), distance))
     }
 
-    /// Forgets all frames.
+    /// Forgets all frames, before another clip.
     pub fn clear(&mut self) {
         self.frames.clear();
     }

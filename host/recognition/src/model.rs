@@ -64,7 +64,7 @@ pub struct Recogniser {
     pub lengths: Vec<Lengths>,
 }
 
-/// Answer for a clip.
+/// Answer for a clip, with all probabilities.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Answer {
     /// Activity; `None` = unknown or nothing to see.

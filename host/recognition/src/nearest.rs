@@ -1,6 +1,6 @@
-//! Exact nearest pattern without comparing all. Projections on some dozen orthonormal directions and the residual
-//! lengths bound distances from below; only patterns with a bound below the best distance are compared. O(patterns x
-//! directions).
+//! Exact nearest pattern without comparing all. Projections on some dozen orthonormal directions and the
+//! residual lengths bound distances from below; only patterns with a bound below the best distance are
+//! compared. O(patterns x directions).
 
 use crate::embedding::squared_distance;
 use ndarray::{Array1, Array2, ArrayView1, ArrayView2, Axis};

@@ -45,7 +45,7 @@ impl Dense {
     }
 }
 
-/// A trained network.
+/// A trained network with the statistics of its training frames.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Network {
     /// Mean of the training frames.

@@ -28,7 +28,7 @@ impl OccupancyGrid {
         Self { low, range, bins: bins[..used].to_vec() }
     }
 
-    /// Number of cells.
+    /// Number of cells, the length of a pattern.
     pub fn cells(&self) -> usize {
         self.bins.iter().product()
     }

@@ -16,7 +16,7 @@ pub struct Labelled<'a> {
     pub patterns: ArrayView2<'a, f32>,
     /// Classes of the patterns.
     pub labels: &'a [usize],
-    /// Number of classes.
+    /// Number of classes, larger than every label.
     pub classes: usize,
 }
 

@@ -1,6 +1,5 @@
-//! Unknown activities by the conformal rule (Vovk et al., Algorithmic Learning in a Random World, 2005).
-//!
-//! A clip is unknown if its distance exceeds the k-th of n calibration distances of other people, k =
+//! Unknown activities by the conformal rule (Vovk et al., Algorithmic Learning in a Random World, 2005). A
+//! clip is unknown if its distance exceeds the k-th of n calibration distances of other people, k =
 //! ceil((n + 1) (1 - share)). A new person of the same population is wrongly called unknown with at most that
 //! probability. Each activity with enough clips has its own limit (Mondrian); the others share one.
 

@@ -75,8 +75,7 @@ mod tests {
         assert!(bytes <= 1_500_000, "{bytes} bytes");
     }
 
-    /// Pictures in the documents are as new as the page. `npm run pictures` in `tests-browser` takes them and writes
-    /// these sums.
+    /// `npm run pictures` in `tests-browser` takes the pictures of the documents and writes these sums.
     #[test]
     fn the_pictures_of_the_documents_are_of_this_page() {
         let file = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/images/page.sha256");

@@ -1,7 +1,6 @@
-//! Access: by default the browser of this computer, otherwise holders of a token.
-//!
-//! A foreign page can send requests to loopback, so `Host` and `Origin` are checked. A public DNS name could resolve to
-//! this computer; it is refused unless allowed.
+//! Access: by default the browser of this computer, otherwise holders of a token. A foreign page can send
+//! requests to loopback, so `Host` and `Origin` are checked. A public DNS name could resolve to this
+//! computer; it is refused unless allowed.
 
 use std::{
     collections::HashSet,

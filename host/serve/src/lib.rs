@@ -1,5 +1,3 @@
-//! # farnear-serve
-//!
 //! The rig in a browser: an embedded page of ES modules, and a typed HTTP and WebSocket API (`/openapi.json`) for the
 //! tasks of `farnear-workflows`. The rig is stopped if the client in control disconnects and does not return.
 

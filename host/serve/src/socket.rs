@@ -15,7 +15,7 @@ use tokio::time::{Instant, MissedTickBehavior, interval, timeout};
 
 use crate::{app::App, control::RESERVED, routes::Shared, view::Hello};
 
-/// Ping interval.
+/// Interval between pings to the browser.
 const ASK: Duration = Duration::from_secs(1);
 /// Longest silence: a browser answers pings even while its page is busy.
 const SILENCE: Duration = Duration::from_secs(5);

@@ -1,33 +1,17 @@
 //! Camera file (TOML): pose of the camera and prior knowledge of the subject.
-//!
 //! ```toml
 //! [camera]
-//! height_m = 0.8             # lens above the ground
-//! azimuth_deg = 140.0        # viewing direction, anticlockwise from north
-//! pitch_deg = 0.0            # optional: downwards positive
+//! height_m = 0.8                        # lens above the ground
+//! azimuth_deg = 140.0                   # viewing direction, anticlockwise from north
+//! pitch_deg = 0.0                       # optional: downwards positive
 //! focal_length_mm = 4.0
-//! pixel_um = 6.0
-//! width_px = 640             # optional: 640
-//! height_px = 480            # optional: 480
-//! principal_point_px = [319.5, 239.5]   # optional: the middle
-//!
-//! [subject]                  # optional, these are the defaults
-//! height_m = 1.75
-//! head_width_m = 0.17
-//! distance_m = 6.0           # optional, no default; otherwise estimated from the head
-//!
-//! [standard_deviations]      # optional, these are the defaults
-//! day = 0.3
-//! time_h = 0.05
-//! latitude_deg = 0.05
-//! longitude_deg = 0.05
-//! subject_height_m = 0.07
-//! camera_height_m = 0.05
-//! azimuth_deg = 2.0
-//! head_width_m = 0.012
-//! head_width_px = 0.5
-//! image_distance_um = 20.0
+//! pixel_um = 6.0                        # pitch of the pixels
+//! width_px = 640                        # optional: 640
+//! height_px = 480                       # optional: 480
+//! principal_point_px = [319.5, 239.5]   # default: the middle
 //! ```
+//! Two tables are optional: `subject` with `height_m` (1.75), `head_width_m` (0.17) and `distance_m` (without it
+//! estimated from the head), and `standard_deviations` with the fields of [`StandardDeviations`].
 
 use crate::sun::SunPosition;
 use serde::{Deserialize, Serialize};

@@ -1,5 +1,4 @@
 //! Removes the shadow from a silhouette: `thesis` (Li 2014, section 8.2.4) and `hybrid`, the default.
-//!
 //! - `thesis`: run-point cut at angles within beta plus or minus its standard deviation, at most 10 degrees
 //!   apart; the longest run wins. Shadows straight down are cut by length. Removes a good part of the person
 //!   if legs break the run.

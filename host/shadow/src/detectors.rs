@@ -1,8 +1,8 @@
-//! Image-based shadow detectors: which foreground pixels are shadow. The five that Li 2014 (tables 8.1 and 8.2)
-//! compares with, described by Sanin, Sanderson and Lovell, "Shadow detection: a survey and comparative evaluation of
-//! recent methods", Pattern Recognition 45 (2012). Thresholds are this project's. All need colour and the empty scene.
-//! Known limits: chromaticity fails on grey clothes, geometry on shadows under the body's own columns, texture on
-//! smooth ground.
+//! Image-based shadow detectors: which foreground pixels are shadow. The five that Li 2014 (tables 8.1 and
+//! 8.2) compares with, described by Sanin, Sanderson and Lovell, "Shadow detection: a survey and comparative
+//! evaluation of recent methods", Pattern Recognition 45 (2012). Thresholds are this project's. All need
+//! colour and the empty scene. Known limits: chromaticity fails on grey clothes, geometry on shadows under
+//! the body's own columns, texture on smooth ground.
 
 pub mod chromaticity;
 pub mod geometry;

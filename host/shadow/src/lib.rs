@@ -1,10 +1,8 @@
-//! Sun, cast shadows, and their removal from masks and pictures (Li 2014, chapter 8). No I/O.
-//!
-//! [`sun`] gives elevation and azimuth, [`light`] a lamp or a measured direction; [`projection`] the shadow
-//! on the ground and in the image; [`uncertainty`] the standard deviation of the cutting angle; [`cast`]
-//! models body and shadow; [`cut`] removes the shadow; [`detectors`] use colour and texture; [`score`]
-//! compares with truth. Ground `r_x` is to the camera's right, `r_y` along its viewing direction, metres;
-//! image x right, y down.
+//! Sun, cast shadows, and their removal from masks and pictures (Li 2014, chapter 8). No I/O. [`sun`] gives
+//! elevation and azimuth, [`light`] a lamp or a measured direction; [`projection`] the shadow on the ground
+//! and in the image; [`uncertainty`] the standard deviation of the cutting angle; [`cast`] models body and
+//! shadow; [`cut`] removes the shadow; [`detectors`] use colour and texture; [`score`] compares with truth.
+//! Ground `r_x` is to the camera's right, `r_y` along its viewing direction, metres; image x right, y down.
 
 pub mod camera;
 pub mod cast;

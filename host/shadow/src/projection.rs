@@ -51,7 +51,7 @@ pub struct Subject {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ImageShadow {
     pub foot_px: [f64; 2],
-    /// Shadow of the head.
+    /// Image of the shadow of the head.
     pub tip_px: [f64; 2],
     /// Tip minus foot: (m_x, m_y).
     pub m_px: [f64; 2],

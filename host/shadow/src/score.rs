@@ -1,6 +1,5 @@
 //! Quality of shadow removal in pixels, compared with ground truth: figures of Li 2014 (tables 8.1 and 8.2)
 //! and of Sanin, Sanderson and Lovell, Pattern Recognition 45 (2012).
-//!
 //! | figure | definition |
 //! |---|---|
 //! | shadow removed, % | removed shadow pixels of all shadow pixels (table 8.1; the survey's detection rate) |

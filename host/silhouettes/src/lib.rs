@@ -1,5 +1,4 @@
 //! Silhouettes of people, from motion capture, joints or video. No input or output beyond parsing bytes.
-//!
 //! | module | what it does |
 //! |---|---|
 //! | [`readers`] | motion capture (C3D, TRC, CSV, BVH) and skeletons (Kinect, NTU, MATLAB) |

@@ -3,15 +3,12 @@
 //!
 //! [`READERS`] lists the formats; a new one is a file with a `READER` and a line in the table. [`read`]
 //! selects by file extension and returns millimetres with z up:
-//!
 //! ```
 //! use farnear_silhouettes::readers::{self, recording::Choices};
-//!
 //! let recording = readers::read(b"HEAD_x,HEAD_y,HEAD_z\n0,0,1700\n", "csv", Choices::default())?;
 //! assert_eq!(recording.by_name(0)["HEAD"], [0.0, 0.0, 1700.0]);
 //! # Ok::<(), farnear_silhouettes::readers::recording::RecordingError>(())
 //! ```
-//!
 //! MATLAB files hold data sets of body joints ([`skeletons`]).
 
 mod amass;

@@ -117,7 +117,7 @@ pub enum State {
 
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct JobReport {
-    /// From 1.
+    /// Number in the manifest, from 1.
     pub job: usize,
     pub line: usize,
     #[serde(rename = "do")]

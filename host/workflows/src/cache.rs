@@ -18,7 +18,7 @@ use crate::{
 
 /// Operators and corrections: some kilobytes each.
 const SMALL_VALUES: usize = 16;
-/// As large as images.
+/// Cameras with maps as large as images.
 const CAMERAS: usize = 4;
 const MODELS: usize = 2;
 

@@ -60,7 +60,7 @@ impl Request for CorrectRequest {
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct CorrectFigures {
     pub method: String,
-    /// Positive = farther.
+    /// Change of depth; positive = farther.
     pub mean_change_mm: f64,
     /// Pixels whose depth was lost because it is outside the correction's range.
     pub lost_pixels: usize,

@@ -48,7 +48,7 @@ pub struct DepthFigures {
     pub seconds: f64,
     pub width: usize,
     pub height: usize,
-    /// NaN without values.
+    /// NaN if no pixel has a depth.
     pub median_mm: f64,
     pub low_texture_fraction: f64,
     pub valid_fraction: f64,
@@ -255,7 +255,7 @@ fn correct(depth: &mut DepthMap, reasons: &mut Array2<u8>, correction: &Correcti
     Ok(())
 }
 
-/// NaN without values.
+/// NaN if no pixel has a value.
 fn median(map: &Array2<f32>) -> f64 {
     let quantiles = Quantiles::new(map.view());
     quantiles.at(quantiles.finite() / 2).map_or(f64::NAN, f64::from)

@@ -359,9 +359,6 @@ fn name(path: &Path) -> String {
 }
 
 /// Aligns the images of a stack, NaN where they do not show the scene; returns the farthest distance that a pixel was moved, px.
-///
-/// # Errors
-/// Those of a context that cancels.
 pub fn aligned_stack(images: &mut [Array2<f32>], model: Model) -> Result<f64> {
     let views: Vec<ArrayView2<f32>> = images.iter().map(|image| image.view()).collect();
     let positions = even_positions(views.len(), None);

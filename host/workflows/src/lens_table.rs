@@ -50,7 +50,7 @@ pub struct LensFigures {
     pub depth_per_tenth_px_mm: f64,
     /// Object size seen by a pixel at mid-range.
     pub pixel_footprint_mm: f64,
-    /// m1, if given.
+    /// Sensor distance m1, if it is given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub reading_far: Option<Reading>,
     /// m2, given or calculated from m1.

@@ -4,14 +4,12 @@
 //! or a [`WorkflowError`] with the offending values. It does not use the terminal, the keyboard or signals.
 //!
 //! Example: an interface that collects messages, and a stage move with a scripted board on the port.
-//!
 //! ```
 //! # #[cfg(target_os = "linux")] { // where a pseudo-terminal holds the board
 //! # use std::sync::Mutex;
 //! # use farnear_protocol::message::Axis;
 //! # use farnear_scripted_board::{Faults, plug_in};
 //! use farnear_workflows::{Cancel, Context, Unattended, Progress, rig};
-//!
 //! #[derive(Default)]
 //! struct Face(Mutex<Vec<String>>);
 //!
@@ -20,7 +18,6 @@
 //!         self.0.lock().expect("one thread").push(what.into());
 //!     }
 //! }
-//!
 //! let (port, _board) = plug_in(Faults::default());
 //! let settings = rig::motion::MoveSettings {
 //!     rig: rig::RigAddress::Port(port),
@@ -34,7 +31,6 @@
 //! let moved = rig::motion::move_to(&settings, &context)?;
 //! assert!(matches!(moved, rig::motion::MoveFigures::One(lens) if lens.measured_um == 1_000.125));
 //! assert!(face.0.lock().expect("one thread").iter().any(|said| said.starts_with("homing the lens stage")));
-//!
 //! cancel.cancel();
 //! let error = rig::motion::move_to(&settings, &context).expect_err("nothing moves any more");
 //! assert!(error.is_cancelled());

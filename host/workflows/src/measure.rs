@@ -40,7 +40,7 @@ pub struct Measured {
     /// (height, width); NaN = no value.
     pub depth: Array2<f32>,
     pub deviation: Option<Array2<f32>>,
-    /// Unit of both maps.
+    /// Unit of depth and deviation.
     pub unit: Unit,
     pub lateral: Lateral,
 }

@@ -1,6 +1,6 @@
-//! Designed operators in the user's cache folder. An entry belongs to a request and a build of this program, so it
-//! equals a new design bit for bit. Damaged entries are replaced. Reading takes well below 1 ms, a design a few ms, at
-//! most 1 s.
+//! Designed operators in the user's cache folder. An entry belongs to a request and a build of this program,
+//! so it equals a new design bit for bit. Damaged entries are replaced. Reading takes well below 1 ms, a
+//! design a few ms, at most 1 s.
 
 use std::{
     env, fs,

@@ -31,7 +31,7 @@ const COARSE_PX: f64 = 4.0;
 const MARGIN_MM: f64 = 10.0;
 /// Height of the 100 mm line with its label.
 const FOOT_MM: f64 = 18.0;
-/// A page of 16 MB.
+/// Limit of the page in memory: 16 MB.
 const MOST_CELLS: usize = 1 << 27;
 /// Half length of the central cross, in cells.
 const CROSS_CELLS: usize = 12;

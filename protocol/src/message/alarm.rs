@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::{Axis, RecordName};
 use crate::units::{BoardMicros, Nanometres};
 
-/// A raised alarm.
+/// An alarm with its number and time.
 #[derive(Serialize, Deserialize, Schema, Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[allow(missing_docs, reason = "names and types describe these fields")]
@@ -15,12 +15,12 @@ pub struct AlarmRecord {
     /// Number in this board's life, from 1.
     pub number: u32,
     pub boot: u32,
-    /// Time in that boot.
+    /// Time since the start of that boot.
     pub time: BoardMicros,
     pub alarm: Alarm,
 }
 
-/// Cause of an alarm.
+/// What raised an alarm, with the offending axis or value.
 #[derive(Serialize, Deserialize, Schema, Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[allow(missing_docs, reason = "names and types describe these fields")]

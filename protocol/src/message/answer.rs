@@ -62,9 +62,9 @@ pub enum RequestError {
     Alarm { number: u32, alarm: Alarm },
     /// No latched or stored alarm has this number.
     NoSuchAlarm {
-        /// Latched alarm, or 0.
+        /// Number of the latched alarm, or 0.
         latched: u32,
-        /// Last alarm, or 0.
+        /// Number of the last alarm, or 0.
         last: u32,
     },
     /// The cause persists, so the alarm cannot be cleared.

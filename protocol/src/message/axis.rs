@@ -1,11 +1,11 @@
-//! Axes of the rig.
+//! Axes of the rig, and the distance of sensor and lens.
 
 use postcard_schema::Schema;
 use serde::{Deserialize, Serialize};
 
 use crate::units::Nanometres;
 
-/// An axis of the rig.
+/// A motor axis; a position is in nanometres.
 #[derive(Serialize, Deserialize, Schema, Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Axis {
@@ -56,7 +56,7 @@ pub enum PositionState {
     Lost,
 }
 
-/// State of an axis.
+/// Commanded and measured position of an axis.
 #[derive(Serialize, Deserialize, Schema, Clone, Copy, PartialEq, Eq, Debug)]
 #[allow(missing_docs, reason = "names and types describe these fields")]
 pub struct AxisStatus {

@@ -34,13 +34,13 @@ pub struct Hello {
 #[derive(Serialize, Deserialize, Schema, Clone, Copy, PartialEq, Eq, Debug)]
 #[allow(missing_docs, reason = "names and types describe these fields")]
 pub struct Capabilities {
-    /// Stepper of stage A.
+    /// Stage A's stepper and screw.
     pub sensor_coarse: bool,
-    /// Piezo of stage A.
+    /// Stage A's piezo and gauge.
     pub sensor_fine: bool,
     /// Measurement of the camera's exposure signal.
     pub strobe: bool,
-    /// Stepper of stage B.
+    /// Stage B's stepper and screw.
     pub lens: bool,
     pub memory: bool,
     pub emergency_stop: bool,
@@ -93,7 +93,7 @@ impl Limits {
     }
 }
 
-/// Cause of a reset.
+/// Why the processor was reset, from its flags.
 #[derive(Serialize, Deserialize, Schema, Clone, Copy, PartialEq, Eq, Debug)]
 #[allow(missing_docs, reason = "names and types describe these fields")]
 pub enum ResetCause {
@@ -111,7 +111,7 @@ pub enum ResetCause {
     Unknown,
 }
 
-/// State of the board.
+/// Positions, switches, alarm, program and counters of the board.
 #[derive(Serialize, Deserialize, Schema, Clone, PartialEq, Eq, Debug)]
 #[allow(missing_docs, reason = "names and types describe these fields")]
 pub struct Status {
@@ -138,7 +138,7 @@ pub struct Status {
 }
 
 impl Status {
-    /// State of an axis.
+    /// Commanded and measured position of an axis.
     pub const fn axis(&self, axis: Axis) -> &AxisStatus {
         match axis {
             Axis::SensorCoarse => &self.coarse,

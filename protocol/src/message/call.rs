@@ -15,6 +15,6 @@ pub struct Call {
     /// Number of [`Request::OpenSession`], or [`NO_SESSION`]. Always four bytes, little-endian, for equal durations.
     #[serde(with = "postcard::fixint::le")]
     pub session: u32,
-    /// The request itself.
+    /// What the board is to do or to answer.
     pub request: Request,
 }

@@ -80,7 +80,7 @@ pub enum EventKind {
     /// The program is paused between two exposures.
     Paused {
         request: u32,
-        /// Next shot.
+        /// Index of the shot that is next.
         index: u8,
     },
     /// A damaged copy of a record was replaced by the other one.
@@ -103,7 +103,6 @@ pub enum EventKind {
         request: u32,
         /// Period number, from 0.
         frame: u32,
-        /// Index of the shot.
         index: u8,
         reason: DropReason,
     },

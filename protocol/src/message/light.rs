@@ -20,7 +20,7 @@ pub struct LightLevels {
 }
 
 impl LightLevels {
-    /// Both outputs off.
+    /// Both outputs at brightness 0.
     pub const OFF: Self = Self { first: 0, second: 0 };
 
     /// Whether either output is on.

@@ -1,4 +1,4 @@
-//! Link rates.
+//! Rates of the serial link.
 
 use postcard_schema::Schema;
 use serde::{Deserialize, Serialize};
@@ -12,7 +12,7 @@ pub const LINK_TRIAL: Micros = Micros(300_000);
 #[derive(Serialize, Deserialize, Schema, Clone, Copy, PartialEq, Eq, Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum LinkRate {
-    /// 2,000,000 baud.
+    /// 2,000,000 baud, the rate after a reset.
     Baud2000000,
     /// 921,600 baud, for adapters and cables that lose bytes at 2,000,000.
     Baud921600,
@@ -24,7 +24,7 @@ impl LinkRate {
     /// Rate after each reset.
     pub const START: Self = Self::Baud2000000;
 
-    /// Rate in baud.
+    /// The rate in bits per second.
     pub const fn baud(self) -> u32 {
         match self {
             Self::Baud2000000 => 2_000_000,

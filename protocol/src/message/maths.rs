@@ -1,6 +1,5 @@
 //! Mathematics on the board: depth correction by rows, its fit, and sun and shadow. Depths are Q1.15 codes of
-//! `farnear-maths` (`DepthScale`), coefficients its Q2.29 bits. Requests carry integers, answers the board's `f32`
-//! bits.
+//! `farnear-maths` (`DepthScale`), coefficients its Q2.29 bits. Requests carry integers, answers `f32` bits.
 
 use heapless::Vec;
 use postcard_schema::Schema;
@@ -44,7 +43,7 @@ pub struct CorrectionInfo {
     pub form: CorrectionForm,
     pub width: u16,
     pub height: u16,
-    /// Depth of code 0.
+    /// Depth of code 0, the middle of the scale.
     pub centre_um: i32,
     /// Depth from code 0 to full scale.
     pub half_span_um: i32,
@@ -138,7 +137,7 @@ pub enum ShadowAnswer {
     },
     /// Sun too low or below the horizon.
     SunTooLow,
-    /// Sun at the zenith.
+    /// The sun is at the zenith: no direction.
     SunOverhead,
     /// A length is not positive.
     Senseless,

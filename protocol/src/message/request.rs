@@ -101,14 +101,13 @@ pub enum Request {
     StoreCorrection,
     /// Set coefficients of the open correction.
     PutCoefficients {
-        /// Index of the first.
+        /// Index of the first coefficient.
         first: u8,
-        /// Q2.29 values.
         bits: CoefficientBits,
     },
     /// Read coefficients of the open correction. Answer: [`super::Response::Coefficients`].
     GetCoefficients {
-        /// Index of the first.
+        /// Index of the first coefficient.
         first: u8,
         /// At most [`super::COEFFICIENTS_MAX`].
         count: u8,
@@ -118,7 +117,7 @@ pub enum Request {
         row: u16,
         /// Column of the first pixel.
         first: u16,
-        /// Column step.
+        /// Columns from one pixel to the next.
         step: u16,
         /// Code of the target's true depth.
         truth: i16,

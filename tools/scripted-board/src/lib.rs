@@ -1,7 +1,7 @@
-//! A scripted board with configurable faults of line and board, for tests and examples. It follows the protocol (an id
-//! acts once, events are numbered and can be read again), so tests see how the client handles a fault. Work ends
-//! immediately. The line is in memory ([`Peer::connect`]) or, on Linux, a pseudo-terminal (`plug_in`). `farnear-sim` is
-//! realistic.
+//! A scripted board with configurable faults of line and board, for tests and examples. It follows the
+//! protocol (an id acts once, events are numbered and can be read again), so tests see how the client handles
+//! a fault. Work ends immediately. The line is in memory ([`Peer::connect`]) or, on Linux, a pseudo-terminal
+//! (`plug_in`). `farnear-sim` is realistic.
 
 #![allow(clippy::unwrap_used)] // panics fail the test
 

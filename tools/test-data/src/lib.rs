@@ -1,9 +1,8 @@
-//! Shared by tests: damaged texts ([`damaged`]), and optional resources: real data, programs, and the emulated rig.
-//!
-//! Tests without their resource count as skipped. The crate's build script calls [`declare`], which sets the
-//! configuration `shared_data`; the test has `#[cfg_attr(not(shared_data), ignore = "needs the real data beside the
-//! repository")]` and uses [`path`]. Build scripts watch only files that exist: cargo treats missing ones as changed
-//! and would rebuild the crate each time. `cargo xtask test` reruns them when [`at_hand`] changes.
+//! Shared by tests: damaged texts ([`damaged`]), and optional resources: real data, programs, and the emulated
+//! rig. Tests without their resource count as skipped. The crate's build script calls [`declare`], which sets the
+//! configuration `shared_data`; the test has `#[cfg_attr(not(shared_data), ignore = "needs the real data beside
+//! the repository")]` and uses [`path`]. Build scripts watch only files that exist: cargo treats missing ones as
+//! changed and would rebuild the crate each time. `cargo xtask test` reruns them when [`at_hand`] changes.
 
 mod damage;
 
@@ -25,9 +24,9 @@ pub fn declare() {
     found("shared_data", data());
 }
 
-/// For build scripts: sets `emulated_rig` if `FARNEAR_REQUIRE_SIM=1`, which `cargo xtask test` sets after building
-/// `farnear-sim` and its firmware. Tests use `#[cfg_attr(not(emulated_rig), ignore = "needs farnear-sim: cargo xtask
-/// test")]`.
+/// For build scripts: sets `emulated_rig` if `FARNEAR_REQUIRE_SIM=1`, which `cargo xtask test` sets after
+/// building `farnear-sim` and its firmware. Tests use `#[cfg_attr(not(emulated_rig), ignore = "needs
+/// farnear-sim: cargo xtask test")]`.
 pub fn declare_emulated_rig() {
     println!("cargo::rustc-check-cfg=cfg(emulated_rig)");
     println!("cargo::rerun-if-env-changed=FARNEAR_REQUIRE_SIM");

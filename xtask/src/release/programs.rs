@@ -11,7 +11,7 @@ pub struct Target {
     pub triple: &'static str,
     /// As in archive names.
     pub processor: &'static str,
-    /// As in Debian.
+    /// Debian's name of the processor.
     pub debian: &'static str,
 }
 

@@ -1,9 +1,8 @@
-//! Pairs frames with exposures.
-//!
-//! One set of rules for all cameras, based on frame count, time stamps, arrival, file time and pixels. Between arming
-//! and the end of a program the n-th frame belongs to the n-th trigger. The camera's count must advance with the
-//! board's trigger number, and its time stamps with the strobe. Contradictions are errors, never guesses. A surplus or
-//! missing frame is found at the end of the program at the latest ([`super::Camera::finish`]).
+//! Pairs frames with exposures. One set of rules for all cameras, based on frame count, time stamps, arrival,
+//! file time and pixels. Between arming and the end of a program the n-th frame belongs to the n-th trigger.
+//! The camera's count must advance with the board's trigger number, and its time stamps with the strobe.
+//! Contradictions are errors, never guesses. A surplus or missing frame is found at the end of the program at
+//! the latest ([`super::Camera::finish`]).
 
 use std::{
     cmp::Ordering,

@@ -64,7 +64,7 @@ impl fmt::Display for BadFrame {
 }
 
 impl Layout {
-    /// 8 for a JPEG.
+    /// Significant bits of a pixel; 8 for a JPEG.
     pub fn bits(self) -> u8 {
         match self {
             Self::Grey16 { bits } => bits,

@@ -24,7 +24,7 @@ const NOISE_RINGS: usize = 8;
 
 #[derive(Clone, PartialEq, Debug)]
 pub(super) struct Spectrum {
-    /// Position, nm.
+    /// Coarse plus fine position, nm.
     pub place: f64,
     power: [f64; RINGS],
     count: [f64; RINGS],

@@ -23,7 +23,7 @@ fn script(text: &str) -> Result<CommandCamera, CameraError> {
     start(&format!("sh -c \"{text}\""))
 }
 
-/// Waits for an image.
+/// Error of the start or of the first image.
 fn failure(camera: Result<CommandCamera, CameraError>) -> String {
     let failed = |mut camera: CommandCamera| camera.image(&shot(1), WAIT).map(|_| ());
     camera.and_then(failed).unwrap_err().to_string()

@@ -1,4 +1,4 @@
-//! Optional real data.
+//! Real data, where this computer has it.
 
 use std::path::{Path, PathBuf};
 

@@ -195,7 +195,7 @@ fn gallery(embedded: &Embedded) -> Array2<f32> {
 
 const SMALL: [usize; 2] = [420, 480];
 
-/// Fig. 9.5.
+/// As fig. 9.5 of the thesis: the points of an activity.
 fn pattern(embedded: &Embedded, activity: usize) -> Array2<f32> {
     let places = embedded.places(SMALL);
     let mut map = dots(SMALL, &places, GREY);
@@ -213,7 +213,7 @@ fn visited(embedded: &Embedded, activity: Option<usize>) -> Vec<bool> {
     grid.pattern(embedded.points.select(Axis(0), &rows).view()).iter().map(|cell| *cell > 0.0).collect()
 }
 
-/// Fig. 9.6.
+/// As fig. 9.6 of the thesis: the visited cells of the grid.
 fn object(embedded: &Embedded, cells: &[bool]) -> Array2<f32> {
     let places = embedded.places(SMALL);
     let mut map = dots(SMALL, &places, GREY);

@@ -1,5 +1,4 @@
 //! Silhouettes from strips of 64x64 frames before a plain wall, where a still person would become background.
-//!
 //! The wall's colours in a row are those of the columns at both edges over the whole strip, as one Gaussian;
 //! pixels far from it are the person. Moving pixels need less evidence.
 

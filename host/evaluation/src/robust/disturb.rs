@@ -69,7 +69,7 @@ pub struct Taken {
     pub far: Array2<f32>,
     pub near: Array2<f32>,
     pub truth: Array2<f32>,
-    /// `None`: even.
+    /// Response per pixel; `None` is an even one.
     pub response: Option<Array2<f32>>,
 }
 

@@ -15,8 +15,8 @@ const FAR_MM: f64 = 100.0;
 /// Defocus on the image side per slice: 0.6 px of blur.
 const STEP_UM: f64 = 29.0;
 
-/// Writes slices `numbers` of a surface, in focus at slice `focus` (from 1) in the middle and 0.3 slices later at the
-/// lower border.
+/// Writes slices `numbers` of a surface, in focus at slice `focus` (from 1) in the middle and 0.3 slices
+/// later at the lower border.
 fn slices(path: &str, focus: f64, numbers: impl Iterator<Item = usize>, seed: u64) {
     fs::create_dir_all(path).expect("a folder");
     let lens = WaveLens {

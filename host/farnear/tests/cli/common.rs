@@ -61,8 +61,7 @@ fn list(folder: &Path, before: &str, names: &mut Vec<String>) {
     }
 }
 
-/// Runs a program that fails with this exit code, `phrases` in a few lines on stderr and an empty stdout. Returns
-/// stderr.
+/// Returns the few lines on stderr, with `phrases`, of a program with this exit code and an empty stdout.
 #[track_caller]
 pub fn fails(command: &mut Command, code: i32, phrases: &[&str]) -> String {
     let output = command.output().expect("the program starts");

@@ -1,8 +1,7 @@
-//! Every command's figures, messages and files on a cheap example equal their recordings in `outputs/golden/NAME.toml`.
-//!
-//! A story is a list of commands that run one after another in an empty folder. Outputs are compared byte for byte on
-//! the kind of processor of the recording, elsewhere by form and tolerance, because rounding differs.
-//! `outputs/golden/README.md` describes the recordings.
+//! Every command's figures, messages and files on a cheap example equal their recordings in
+//! `outputs/golden/NAME.toml`. A story is a list of commands that run one after another in an empty folder.
+//! Outputs are compared byte for byte on the kind of processor of the recording, elsewhere by form and
+//! tolerance, because rounding differs. `outputs/golden/README.md` describes the recordings.
 
 mod digest;
 mod held;

@@ -6,7 +6,7 @@ use ndarray::{ArrayView1, ArrayView2};
 pub trait Method: Sized {
     /// Its chosen parameters.
     type Parameter: Copy + 'static;
-    /// Name for users.
+    /// Name in options, messages and files.
     const NAME: &'static str;
     /// Candidate parameters, default first.
     const TRIED: &'static [Self::Parameter];
@@ -34,13 +34,13 @@ pub trait Method: Sized {
 pub struct Fold<'a> {
     /// Gram matrix of all patterns.
     pub gram: ArrayView2<'a, f32>,
-    /// Rows for training.
+    /// Rows whose labels train the classifier.
     pub kept: &'a [usize],
-    /// Rows to answer for.
+    /// Rows for which the classifier answers.
     pub held: &'a [usize],
-    /// Class of every row.
+    /// Class of every row, less than `classes`.
     pub labels: &'a [usize],
-    /// Number of classes.
+    /// Number of classes over all rows.
     pub classes: usize,
 }
 

@@ -9,9 +9,9 @@ use serde::{Deserialize, Serialize};
 pub struct Neighbours {
     /// One training clip per row.
     pub patterns: Array2<f32>,
-    /// Class of each row.
+    /// Class of each training clip.
     pub labels: Vec<usize>,
-    /// Number of classes.
+    /// Number of classes to answer for.
     pub classes: usize,
     /// Number of voting neighbours.
     pub k: usize,

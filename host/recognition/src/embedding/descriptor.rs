@@ -21,7 +21,7 @@ pub const CELLS_ACROSS: usize = 20;
 /// Cells of the coarse silhouette.
 pub const CELLS: usize = CELLS_ACROSS * CELLS_ACROSS;
 const CELL_SIDE: usize = SIDE / CELLS_ACROSS;
-/// Pixels of a cell.
+/// Pixels in a cell of the coarse silhouette.
 pub const CELL_PIXELS: usize = CELL_SIDE * CELL_SIDE;
 /// Descriptor version, stored in models.
 pub const DESCRIPTOR_VERSION: u32 = 1;

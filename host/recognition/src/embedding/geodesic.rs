@@ -1,7 +1,7 @@
 //! Shortest paths in the neighbour graph. [`dijkstra`] uses a binary heap for one source. [`all_pairs`] and
-//! [`from_sources`] relax sixteen sources at a time (Bellman-Ford label correction, sweeping nodes forwards and
-//! backwards along the data), so an edge costs one vector operation. N = 1500, K = 12: tens of ms on one thread, 150
-//! with heaps.
+//! [`from_sources`] relax sixteen sources at a time (Bellman-Ford label correction, sweeping nodes forwards
+//! and backwards along the data), so an edge costs one vector operation. N = 1500, K = 12: tens of ms on one
+//! thread, 150 with heaps.
 
 use super::neighbours::Graph;
 use ndarray::Array2;
@@ -45,7 +45,7 @@ pub fn dijkstra(graph: &Graph, source: usize) -> Vec<f32> {
     distance
 }
 
-/// N x N path lengths.
+/// Path lengths between all nodes, N x N.
 pub fn all_pairs(graph: &Graph) -> Array2<f32> {
     let sources: Vec<usize> = (0..graph.nodes()).collect();
     from_sources(graph, &sources)

@@ -1,7 +1,7 @@
-//! Landmark Isomap (de Silva and Tenenbaum, NIPS 15, 2003) for large galleries: scales the paths from some landmarks
-//! and places other samples by their distances to them. Farthest-point steps over the path lengths choose landmarks
-//! that cover the data. L N floats instead of N^2; 20,000 samples of 360 numbers take seconds, mostly for the neighbour
-//! search.
+//! Landmark Isomap (de Silva and Tenenbaum, NIPS 15, 2003) for large galleries: scales the paths from some
+//! landmarks and places other samples by their distances to them. Farthest-point steps over the path lengths
+//! choose landmarks that cover the data. L N floats instead of N^2; 20,000 samples of 360 numbers take
+//! seconds, mostly for the neighbour search.
 
 use super::geodesic::{dijkstra, from_sources};
 use super::isomap::classical_scaling;

@@ -102,7 +102,7 @@ impl Graph {
         graph
     }
 
-    /// Number of nodes.
+    /// Number of nodes, one per sample.
     pub fn nodes(&self) -> usize {
         self.offsets.len() - 1
     }

@@ -1,6 +1,5 @@
-//! Embedding of new silhouettes by Gaussian radial basis functions with a ridge (Li 2014, eq. 9.3 to 9.7).
-//!
-//! `y = sum_m w_m exp(-gamma |x - c_m|^2)`, `W = (B + ridge I)^-1 Y`. gamma is 0.03 to 0.1 for centroid
+//! Embedding of new silhouettes by Gaussian radial basis functions with a ridge (Li 2014, eq. 9.3 to 9.7). `y
+//! = sum_m w_m exp(-gamma |x - c_m|^2)`, `W = (B + ridge I)^-1 Y`. gamma is 0.03 to 0.1 for centroid
 //! distances in [0, 0.7] (the thesis' 1e-4 is for pixels). Training is O(N^3 / 3). Embedding is one pass over
 //! the centres in 16-bit fixed point: about 15 us for 1500 x 360, error far below 1e-3.
 
@@ -16,7 +15,7 @@ const LARGEST: f32 = 1.45;
 /// Differences summed as integers before conversion to float.
 const RUN: usize = 64;
 
-/// A trained map.
+/// A trained map from samples to embedded points.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rbf {
     /// Gallery samples (M x d).

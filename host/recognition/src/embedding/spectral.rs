@@ -1,8 +1,7 @@
-//! Leading eigenpairs of a symmetric matrix by block Krylov subspaces and Rayleigh-Ritz.
-//!
-//! A block is repeatedly multiplied by the matrix and orthogonalised twice against all previous ones; the
-//! projected matrix gives the pairs (Golub and Van Loan, Matrix Computations, section 10.3.6). A block costs
-//! one pass over the matrix; about eight suffice for a gallery of 1500. Falls back to the dense solver.
+//! Leading eigenpairs of a symmetric matrix by block Krylov subspaces and Rayleigh-Ritz. A block is
+//! repeatedly multiplied by the matrix and orthogonalised twice against all previous ones; the projected
+//! matrix gives the pairs (Golub and Van Loan, Matrix Computations, section 10.3.6). A block costs one pass
+//! over the matrix; about eight suffice for a gallery of 1500. Falls back to the dense solver.
 
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, MatRef, Par, Side};

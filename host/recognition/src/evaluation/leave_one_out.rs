@@ -1,6 +1,5 @@
 //! Leave-one-subject-out evaluation. Space, sharpness and classifier are chosen by cross-validation over the other
-//! subjects ([`crate::choice`]) and trained on all of these. The left-out clips are recognised once and influence
-//! nothing.
+//! subjects ([`crate::choice`]) and trained on all of these. The left-out clips do not influence it.
 
 use super::confusion::Confusion;
 use crate::alignment::{Alignment, Statistics};

@@ -18,7 +18,7 @@ pub struct NetworkSettings {
     pub reach: usize,
     /// Passes over all clips.
     pub passes: usize,
-    /// Clips per step.
+    /// Clips per step of the optimiser.
     pub batch: usize,
     /// Initial learning rate.
     pub rate: f32,

@@ -29,7 +29,7 @@ use rayon::prelude::*;
 
 type Activity = (&'static str, fn(&mut Maker) -> Motion);
 
-/// By name.
+/// Names of the activities, and how their motions are made.
 pub const ACTIVITIES: &[Activity] = &[
     ("walk", |maker| Motion::Gait(Gait::walking_about(maker.rng, maker.main))),
     ("jog", |maker| Motion::Gait(Gait::jog(maker.rng))),

@@ -32,7 +32,7 @@ pub struct Served {
     cancel: Cancel,
     thread: Option<JoinHandle<()>>,
     _folder: tempfile::TempDir,
-    _board: Option<Box<dyn std::any::Any>>,
+    _board: Option<Box<dyn std::any::Any + Send + Sync>>,
 }
 
 impl Served {
@@ -47,7 +47,7 @@ impl Served {
 
     pub fn start(
         rig: Option<RigAddress>,
-        board: Option<Box<dyn std::any::Any>>,
+        board: Option<Box<dyn std::any::Any + Send + Sync>>,
         listen: impl FnOnce(&Path) -> Listen,
     ) -> Self {
         Self::limited(rig, board, listen, Limits::default())
@@ -55,7 +55,7 @@ impl Served {
 
     pub fn limited(
         rig: Option<RigAddress>,
-        board: Option<Box<dyn std::any::Any>>,
+        board: Option<Box<dyn std::any::Any + Send + Sync>>,
         listen: impl FnOnce(&Path) -> Listen,
         limits: Limits,
     ) -> Self {
@@ -206,20 +206,25 @@ pub struct Socket {
 
 impl Socket {
     pub fn open(served: &Served) -> Self {
-        Self::at(served, "/api/socket")
+        Self::at(served, "/api/socket", "")
+    }
+
+    /// As [`Self::open`], with the cookie that a server on the network asks for.
+    pub fn with_cookie(served: &Served, cookie: &str) -> Self {
+        Self::at(served, "/api/socket", &format!("cookie: {cookie}\r\n"))
     }
 
     /// A reloaded page with its earlier secret.
     pub fn resume(served: &Served, secret: &str) -> Self {
-        Self::at(served, &format!("/api/socket?resume={secret}"))
+        Self::at(served, &format!("/api/socket?resume={secret}"), "")
     }
 
-    fn at(served: &Served, path: &str) -> Self {
+    fn at(served: &Served, path: &str, headers: &str) -> Self {
         let mut stream = TcpStream::connect(&served.address).unwrap();
         stream.set_read_timeout(Some(PATIENCE)).unwrap();
         let request = format!(
             "GET {path} HTTP/1.1\r\nhost: {}\r\nconnection: upgrade\r\nupgrade: websocket\r\n\
-             sec-websocket-version: 13\r\nsec-websocket-key: AAAAAAAAAAAAAAAAAAAAAA==\r\n\r\n",
+             sec-websocket-version: 13\r\nsec-websocket-key: AAAAAAAAAAAAAAAAAAAAAA==\r\n{headers}\r\n",
             served.address
         );
         stream.write_all(request.as_bytes()).unwrap();

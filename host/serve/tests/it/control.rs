@@ -1,8 +1,12 @@
 //! One browser has control; nothing moves after it has disconnected.
 
-use farnear_scripted_board::Faults;
+use farnear_scripted_board::{Faults, plug_in};
+use farnear_workflows::rig::RigAddress;
 
-use super::client::{Served, Socket};
+use super::{
+    attacks::{TOKEN, network},
+    client::{Served, Socket},
+};
 
 const FINE: &str = r#"{"targets":[{"axis":"fine","to_um":50}]}"#;
 
@@ -95,6 +99,41 @@ fn anybody_may_stop_and_it_does_not_wait_for_the_job() {
         }
         let job = served.ended("job", &begun["job"]);
         assert_eq!(job["phase"], "stopped", "{job:#}");
+    }
+}
+
+/// Ten browsers behind one address, with six connections each while they load the page.
+#[test]
+fn ten_browsers_of_a_lab_see_the_job_that_one_of_them_runs() {
+    let (port, board) = plug_in(Faults { never_ends: true, ..Faults::default() });
+    let served = Served::start(Some(RigAddress::Port(port)), Some(Box::new(board)), network);
+    let cookie = format!("farnear-token={TOKEN}");
+    let get = |path: &str| served.ask("GET", path, &[("cookie", &cookie)], "");
+    while get("/api/state").json()["rig"]["phase"] != "ready" {
+        std::thread::sleep(std::time::Duration::from_millis(20));
+    }
+    let mut browsers: Vec<_> = std::thread::scope(|scope| {
+        for _ in 0..60 {
+            scope.spawn(|| assert_eq!(get("/main.js").status, 200));
+        }
+        let opened: Vec<_> = (0..10).map(|_| scope.spawn(|| Socket::with_cookie(&served, &cookie))).collect();
+        opened.into_iter().map(|browser| browser.join().unwrap()).collect()
+    });
+    let control = get("/api/state").json()["control"].clone();
+    assert_eq!(control["clients"], 10, "{control}");
+    let begin = |browser: &Socket| {
+        let headers = [("cookie", cookie.as_str()), ("x-farnear-client", &browser.secret)];
+        served.ask("POST", "/api/rig/move", &headers, FINE)
+    };
+    let begun: Vec<_> = browsers.iter().map(|browser| (browser.client, begin(browser))).collect();
+    for (client, answer) in &begun {
+        assert_eq!(answer.status, if control["holder"] == *client { 200 } else { 403 }, "{answer:?}");
+    }
+    for phase in ["running", "stopped"] {
+        for browser in &mut browsers {
+            while browser.receive("state")["state"]["job"]["phase"] != phase {}
+        }
+        browsers[0].say(1, br#"{"type":"stop"}"#);
     }
 }
 

@@ -4,13 +4,10 @@
 //!
 //! Per region: the tallest columns are the body; the lower part that leans out on the heavier side is the
 //! first guess. Its centre, orientation and grey level define a Gaussian; pixels that fit are shadow:
-//!
 //! ```text
 //! exp(-(s^2 / (w sd_s)^2 + t^2 / (w sd_t)^2 + (g - mean_g)^2 / (w sd_g)^2) / 2) >= threshold
 //! ```
-//!
-//! with s and t along and across the guess. Misses shadows under or behind the body's own columns. Linear
-//! cost.
+//! with s and t along and across the guess. Misses shadows under or behind the body's own columns. Linear cost.
 
 use ndarray::Array2;
 

@@ -2,11 +2,9 @@
 //! Lovell, "Improved shadow removal for robust person tracking in surveillance scenarios", ICPR 2010).
 //! Candidates pass a loose chromaticity test; edges missing in the background split them into regions. Over a
 //! region's n pixels with sufficient gradient,
-//!
 //! ```text
 //! c = (1 / n) sum H(largest angle - angle between the frame's and the background's gradient)
 //! ```
-//!
 //! and the region is shadow if c reaches a threshold (H is the unit step). With too few such pixels colour
 //! alone decides. Linear cost.
 

@@ -16,9 +16,9 @@ pub enum SunError {
 
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Place {
-    /// North positive.
+    /// North of the equator is positive.
     pub latitude_deg: f64,
-    /// East positive.
+    /// East of Greenwich is positive.
     pub longitude_deg: f64,
 }
 

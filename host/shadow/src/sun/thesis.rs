@@ -1,8 +1,7 @@
 //! Li 2014, eq. 8.3 to 8.8, with corrected units, to reproduce the thesis: up to 1.03 deg of elevation and
-//! 10.7 deg of azimuth off SPA. UTC, longitude east, day 1 = 1 January.
-//!
-//! The printed formulas take the standard meridian in radians per hour instead of 15 degrees per hour (8.7),
-//! swap latitude and longitude near 8.3, and omit the equation of time's unit (minutes).
+//! 10.7 deg of azimuth off SPA. UTC, longitude east, day 1 = 1 January. The printed formulas take the
+//! standard meridian in radians per hour instead of 15 degrees per hour (8.7), swap latitude and longitude
+//! near 8.3, and omit the equation of time's unit (minutes).
 
 use super::angles::Equatorial;
 use super::clock::hours_of_day;

@@ -1,7 +1,6 @@
-//! Background model and shadow detectors on the highway sequence of ChangeDetection.net (Goyette et al. 2012).
-//!
-//! Reference: OpenCV 5.0.0's `createBackgroundSubtractorMOG2()` with default settings (equal to ours) and the
-//! same score: label 255 against truth 255, truth 85 and 170 excluded, frames 470 onwards.
+//! Background model and shadow detectors on the highway sequence of ChangeDetection.net (Goyette et al.
+//! 2012). Reference: OpenCV 5.0.0's `createBackgroundSubtractorMOG2()` with default settings (equal to ours)
+//! and the same score: label 255 against truth 255, truth 85 and 170 excluded, frames 470 onwards.
 
 #![allow(clippy::unwrap_used)] // helpers of tests: data that cannot be read must stop the test
 

@@ -3,13 +3,11 @@
 //!
 //! The recursive equations of Zivkovic 2004 (equations 4 to 6 with the prior of 14) and Zivkovic and van der
 //! Heijden 2006 (equations 4 to 9), for isotropic components; o is 1 for the component that owns the sample:
-//!
 //! ```text
 //! weight   += rate (o - weight) - rate c_T       discarded at 0, then normalised to sum 1
 //! mean     += o (rate / weight) (x - mean)
 //! variance += o (rate / weight) (|x - mean|^2 - variance)
 //! ```
-//!
 //! The owner is the heaviest component within `component_threshold`. One pass of neighbour exchanges keeps
 //! components sorted by weight, because at most one has grown. A tile of a component holds weight, variance
 //! and channel means of [`TILE`] pixels; unused components are never touched. About 10 floating-point

@@ -67,11 +67,9 @@ pub enum BackgroundError {
 }
 
 /// An adaptive Gaussian mixture per pixel.
-///
 /// ```
 /// use farnear_silhouettes::background::{BackgroundModel, Frame, Label, Settings};
 /// use ndarray::Array2;
-///
 /// let mut model = BackgroundModel::new((48, 64), 1, Settings::default())?;
 /// let empty = Array2::from_elem((48, 64), 100_u8);
 /// for _ in 0..20 {

@@ -79,7 +79,7 @@ const FOLLOWING: f64 = 0.2;
 
 #[derive(Clone, Debug)]
 struct Track {
-    /// 0 until confirmed.
+    /// Number from 1 on; 0 until confirmed.
     person: usize,
     row: Motion,
     column: Motion,

@@ -50,7 +50,7 @@ const FEET: [usize; 2] = [10, 11];
 struct Array {
     name: String,
     shape: Vec<usize>,
-    /// Empty for text.
+    /// Numbers in C order; empty for text.
     values: Vec<f64>,
     text: String,
 }

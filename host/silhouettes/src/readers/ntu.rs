@@ -1,9 +1,8 @@
-//! NTU RGB+D skeleton files (Shahroudy et al., CVPR 2016): 25 joints of a second Kinect, as text.
-//!
-//! The number of frames; per frame the number of bodies; per body a line (its id first), the number of joints
-//! and a line per joint: x, y, z in metres (x across, y up, z away), eight further numbers, and whether it
-//! was tracked. Of several bodies present for at least half as long as the longest, the one whose joints vary
-//! most is used: the sensor also reports chairs as bodies, and their joints only jitter.
+//! NTU RGB+D skeleton files (Shahroudy et al., CVPR 2016): 25 joints of a second Kinect, as text. The number
+//! of frames; per frame the number of bodies; per body a line (its id first), the number of joints and a line
+//! per joint: x, y, z in metres (x across, y up, z away), eight further numbers, and whether it was tracked.
+//! Of several bodies present for at least half as long as the longest, the one whose joints vary most is
+//! used: the sensor also reports chairs as bodies, and their joints only jitter.
 
 use super::kinect::JOINTS_25;
 use super::reader::Reader;

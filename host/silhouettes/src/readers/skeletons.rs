@@ -100,10 +100,10 @@ pub const FLORENCE_15: Layout = Layout {
     unit_mm: 1.0,
 };
 
-/// In file order.
+/// In the order of the file's numbers.
 pub const UTKINECT_ACTIVITIES: [&str; 10] =
     ["walk", "sit down", "stand up", "pick up", "carry", "throw", "push", "pull", "wave hands", "clap hands"];
-/// In file order.
+/// In the order of the file's numbers.
 pub const FLORENCE_ACTIVITIES: [&str; 9] =
     ["wave", "drink", "answer phone", "clap", "tight lace", "sit down", "stand up", "read watch", "bow"];
 

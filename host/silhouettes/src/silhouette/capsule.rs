@@ -1,4 +1,4 @@
-/// Millimetres.
+/// Coordinates x, y and z in millimetres.
 pub type Point3 = [f64; 3];
 
 /// All points within `radius_mm` of the segment from `from` to `to`.

@@ -1,5 +1,4 @@
 //! Marker templates as TOML: the markers of each rigid part of body or prop (Li 2014, section 7.2.1).
-//!
 //! ```toml
 //! name = "my suit"
 //! [[part]]
@@ -7,7 +6,6 @@
 //! markers = ["LFHD", "RFHD", "LBHD", "RBHD"]
 //! thickness_mm = 90.0     # optional: grows the part by so much all round, for suits with few markers
 //! ```
-//!
 //! Left and right limbs are separate parts. Markers may belong to several parts, which closes joints.
 
 use serde::{Deserialize, Serialize};

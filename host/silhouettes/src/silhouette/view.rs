@@ -24,7 +24,7 @@ pub fn views_round(count: usize, elevation_deg: f64) -> Vec<View> {
 }
 
 impl View {
-    /// `Rx Ry Rz`.
+    /// Product of the rotations: `Rx Ry Rz`.
     pub fn matrix(&self) -> [[f64; 3]; 3] {
         let (sa, ca) = self.alpha_deg.to_radians().sin_cos();
         let (sb, cb) = self.beta_deg.to_radians().sin_cos();

@@ -14,7 +14,7 @@ use crate::{error::Result, figures::rounded};
 
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct AnswerSummary {
-    /// `None` is unknown.
+    /// Name of the activity; `None` is unknown.
     pub activity: Option<String>,
     pub confidence: f64,
     /// Above 1 the activity is unknown. `None` without a person.
@@ -31,7 +31,7 @@ pub struct PersonInFrame {
     /// First row, first column, one past the last row and column; `None` if empty.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub top_left_bottom_right: Option<[usize; 4]>,
-    /// `None` is unknown.
+    /// Name of the activity; `None` is unknown.
     pub activity: Option<String>,
     pub confidence: f64,
     /// Above 1 the activity is unknown; `None` before the first silhouette.
@@ -93,7 +93,7 @@ pub struct Probability {
 pub struct Part {
     pub from: usize,
     pub to: usize,
-    /// `None` is unknown.
+    /// Name of the activity; `None` is unknown.
     pub activity: Option<String>,
     pub confidence: f64,
 }

@@ -32,7 +32,7 @@ use crate::{
 
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct FrameOfPeople {
-    /// From 1.
+    /// Number of the frame, from 1.
     pub frame: usize,
     pub name: String,
     pub people: Vec<PersonInFrame>,

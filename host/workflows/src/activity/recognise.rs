@@ -72,7 +72,6 @@ pub struct RecogniseRequest {
     pub out: Option<PathBuf>,
 }
 
-/// The answer for a whole recording.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 #[serde(untagged)]
 pub enum RecogniseFigures {
@@ -80,7 +79,6 @@ pub enum RecogniseFigures {
     People(MultiPersonFigures),
 }
 
-/// The streaming answer for one frame.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 #[serde(untagged)]
 pub enum StreamingAnswer {
@@ -121,10 +119,7 @@ impl Request for RecogniseRequest {
 }
 
 impl RecogniseRequest {
-    /// Recognises, and passes each streaming answer on.
-    ///
-    /// # Errors
-    /// Models and views that cannot be read, and errors of `each`.
+    /// Recognises, and passes each streaming answer on. Fails for unreadable models and views, and as `each` does.
     pub fn answers(
         &self,
         context: &Context<'_>,

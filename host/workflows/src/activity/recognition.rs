@@ -125,11 +125,11 @@ pub struct ViewsError {
 /// The answer for at most a window of frames up to this one.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct FrameAnswer {
-    /// From 1.
+    /// Number of the frame, from 1.
     pub frame: usize,
-    /// In the first view.
+    /// Name of the frame in the first view.
     pub name: String,
-    /// `None` is unknown.
+    /// Name of the activity; `None` is unknown.
     pub activity: Option<String>,
     pub confidence: f64,
     /// Above 1 the activity is unknown. `None` without a person.
@@ -170,7 +170,7 @@ pub struct Recognition<'m> {
     live: Live<'m>,
     among: Vec<String>,
     annotated_video: Option<AnnotatedVideo>,
-    /// `[view][frame]`.
+    /// Indexed as `[view][frame]`.
     tracks: Vec<Vec<Track>>,
     frames: usize,
     flagged_frames: usize,

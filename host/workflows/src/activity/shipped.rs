@@ -152,7 +152,7 @@ pub const PASSES: usize = 6;
 pub struct SyntheticTraining {
     /// Training subjects, each with all activities once, 20 to 5000.
     pub people: usize,
-    /// 1 to 200.
+    /// Passes over the clips in training, 1 to 200.
     pub passes: usize,
     pub out: PathBuf,
 }

@@ -35,9 +35,9 @@ const BEST: usize = 3;
 /// The answer for at most a window of frames up to this one.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct RunningAnswer {
-    /// From 1.
+    /// Number of the frame, from 1.
     pub frame: usize,
-    /// `None` is unknown.
+    /// Name of the activity; `None` is unknown.
     pub activity: Option<String>,
     pub confidence: f64,
     /// Above 1 the activity is unknown; `None` before the first silhouette.

@@ -132,7 +132,7 @@ impl Fields {
         Ok(self.optional(name)?.unwrap_or(usual))
     }
 
-    /// False by default.
+    /// Value of a field of true or false; false by default.
     pub fn flag(&mut self, name: &'static str) -> Result<bool, BatchError> {
         match self.optional_text(name)?.as_deref() {
             None | Some("false") => Ok(false),

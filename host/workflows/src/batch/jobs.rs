@@ -1,4 +1,4 @@
-//! Kinds of jobs.
+//! Kinds of jobs, each with its fields.
 
 mod campaign;
 mod evaluate;

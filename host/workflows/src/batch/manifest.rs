@@ -1,6 +1,6 @@
-//! Reads a list of jobs of any length, job by job. TOML: a `[[job]]` table per job, after tables by kind (`[depth]`)
-//! with fields shared by all jobs of that kind. CSV: a header with field names and a row per job; an empty cell is a
-//! missing field.
+//! Reads a list of jobs of any length, job by job. TOML: a `[[job]]` table per job, after tables by kind
+//! (`[depth]`) with fields shared by all jobs of that kind. CSV: a header with field names and a row per job;
+//! an empty cell is a missing field.
 
 use std::{
     collections::BTreeMap,

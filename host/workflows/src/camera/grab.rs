@@ -43,7 +43,7 @@ pub struct GrabFigures {
     pub frames: usize,
     pub width: usize,
     pub height: usize,
-    /// Significant bits.
+    /// Significant bits of a pixel.
     pub bits: u8,
     /// Images counted by the camera (if it counts) but not stored: lost, or too fast for this computer.
     #[serde(skip_serializing_if = "Option::is_none")]

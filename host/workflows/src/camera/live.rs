@@ -36,7 +36,7 @@ pub struct LiveFigures {
     pub saturated_percent: f64,
     pub width: usize,
     pub height: usize,
-    /// Significant bits.
+    /// Significant bits of a pixel.
     pub bits: u8,
 }
 

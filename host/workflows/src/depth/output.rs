@@ -64,7 +64,7 @@ const GLB: &str = "glb";
 /// Output that depends on another option.
 const UNCERTAINTY: &str = "uncertainty.npy";
 
-/// Default outputs.
+/// Outputs without `--write`.
 const USUAL: [&str; 5] = ["npy", "tiff", "png", "mesh", "view"];
 
 #[derive(Clone, PartialEq, Eq, Debug)]

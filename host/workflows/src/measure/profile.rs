@@ -29,7 +29,7 @@ impl Serialize for ProfilePoint {
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct ProfileFigures {
     pub unit: Unit,
-    /// One pixel apart.
+    /// Points of the line, one pixel apart.
     pub points: Vec<ProfilePoint>,
 }
 

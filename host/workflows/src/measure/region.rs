@@ -6,7 +6,7 @@ use super::{Entries, Measured, PlaneFigures, Rectangle, Unit};
 /// Side of blocks with independent means, px: wider than usual windows.
 const BLOCK_PX: usize = 24;
 
-/// In the map's unit.
+/// Figures in the unit of the map.
 #[derive(Clone, PartialEq, Debug)]
 pub struct RegionFigures {
     pub unit: Unit,

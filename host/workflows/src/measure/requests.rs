@@ -148,7 +148,7 @@ impl Request for MeasureDifferenceRequest {
     }
 }
 
-/// Column and row.
+/// Column and row, written as `x,y`.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct Pixel(pub [usize; 2]);
 

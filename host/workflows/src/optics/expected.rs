@@ -7,7 +7,7 @@
 use farnear_depth::optics::Optics;
 use serde::Serialize;
 
-/// Per axis.
+/// Frequencies per axis of the spectrum.
 const FREQUENCIES: usize = 64;
 const DEPTHS: usize = 9;
 /// Variance of a pixel's noise / mean squared: 8 bit, 9,000 electrons, read noise of 12 electrons.

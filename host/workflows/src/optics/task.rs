@@ -163,14 +163,17 @@ pub struct OpticsFigures {
     /// Side of a pixel at the object at mid-range.
     pub pixel_at_object_mm: f64,
     pub advice: Vec<String>,
-    /// From noise, root mean square.
-    pub expected_error_ro_mm: f64,
-    pub expected_error_whitened_mm: f64,
+    /// From noise, root mean square; absent where it exceeds the range.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub expected_error_ro_mm: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub expected_error_whitened_mm: Option<f64>,
 }
 
 fn figures(optics: &Optics, binning: usize, contrast: f64, accepted_mm: Option<f64>) -> OpticsFigures {
     let range = optics.working_range();
     let error = expected_error(optics, contrast, binning);
+    let estimate = |mm: f64| Some(rounded(mm, 4)).filter(|mm| *mm < range.far_mm - range.near_mm);
     let mut advice = advice(optics);
     let averaged = accepted_mm.map(|accepted| (error.whitened_mm / accepted).powi(2).ceil().max(1.0));
     if let Some(needed) = averaged.filter(|needed| *needed > 1.0) {
@@ -195,8 +198,8 @@ fn figures(optics: &Optics, binning: usize, contrast: f64, accepted_mm: Option<f
             4,
         ),
         advice,
-        expected_error_ro_mm: rounded(error.ro_mm, 4),
-        expected_error_whitened_mm: rounded(error.whitened_mm, 4),
+        expected_error_ro_mm: estimate(error.ro_mm),
+        expected_error_whitened_mm: estimate(error.whitened_mm),
     }
 }
 
@@ -339,6 +342,13 @@ mod tests {
     }
 
     #[test]
+    fn states_no_error_where_the_blur_leaves_no_depth() {
+        let found = figures(&rig(133.0), 1, 0.2, None);
+        assert_eq!((found.expected_error_ro_mm, found.expected_error_whitened_mm), (None, None));
+        assert!(!found.advice.is_empty());
+    }
+
+    #[test]
     fn advice_brings_the_blur_into_the_usable_range() {
         assert!(advice(&rig(2.703)).is_empty());
         let text = advice(&rig(133.0)).join("; ");
@@ -367,7 +377,10 @@ mod tests {
             assert!((of.far_mm - of.near_mm - range).abs() < 1e-6, "{found:?}");
             assert!((2.0..=4.0).contains(&found.max_blur_px), "{found:?}");
             let exposures = found.averaged_exposures.unwrap() as f64;
-            assert!(found.expected_error_whitened_mm / exposures.sqrt() <= 1.001 * error, "{found:?}");
+            assert!(
+                found.expected_error_whitened_mm.unwrap() / exposures.sqrt() <= 1.001 * error,
+                "{found:?}"
+            );
         }
         let request = OpticsRequest {
             distance_mm: Some(300.0),

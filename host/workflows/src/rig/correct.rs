@@ -68,7 +68,7 @@ pub struct BoardCorrectFigures {
     pub method: String,
     pub width: usize,
     pub height: usize,
-    /// Positive = farther.
+    /// Change of depth; positive = farther.
     pub mean_change_mm: f64,
     pub different_pixels: usize,
     pub rows_per_second: f64,

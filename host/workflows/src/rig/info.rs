@@ -51,7 +51,6 @@ pub struct InfoFigures {
 pub struct AxisFigures {
     /// Position state: unknown, homed, lost.
     pub state: &'static str,
-    /// Commanded position.
     pub asked_um: f64,
     pub measured_um: f64,
     pub moving: bool,

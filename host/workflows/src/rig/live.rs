@@ -1,6 +1,6 @@
-//! Live image: repeats a program at the current piezo position until cancelled. Only the piezo is active: it is held in
-//! place. A program lasts about a quarter of a second. A fast camera then needs few requests, and a slow one queues no
-//! old images.
+//! Live image: repeats a program at the current piezo position until cancelled. Only the piezo is active: it
+//! is held in place. A program lasts about a quarter of a second. A fast camera then needs few requests, and
+//! a slow one queues no old images.
 
 use std::time::{Duration, Instant};
 

@@ -15,7 +15,7 @@ use crate::{
 /// Difference between the old and the new zero of each encoder.
 #[derive(Clone, PartialEq, Debug, Default, Serialize)]
 pub struct HomeFigures {
-    /// Stage A's stepper.
+    /// Of stage A's stepper, which moves the sensor.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub shift_um: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]

@@ -36,7 +36,7 @@ use crate::{
 
 const MAGIC: &[u8; 8] = b"FNPAIRS1";
 const EXPECTED: &str = "recorded pairs";
-/// 2.5 GB at 640x480.
+/// Longest recording: 2.5 GB at 640x480 px.
 pub const PAIRS_MAX: usize = 2000;
 const OPTICS_MAX: u32 = 1 << 20;
 const PIXELS_MAX: usize = 1 << 26;

@@ -64,7 +64,7 @@ pub struct ScoreFigures {
     /// Intersection over union of result and person.
     pub iou_percent: Option<f64>,
     pub frames: usize,
-    /// In the truth.
+    /// Pixels of shadow in the truth.
     pub shadow_pixels: u64,
     pub subject_pixels: u64,
 }

@@ -30,7 +30,7 @@ pub struct VideoShadowSettings {
     pub camera: CameraFile,
     pub lat: f64,
     pub lon: f64,
-    /// RFC 3339.
+    /// Time of the video, RFC 3339.
     pub time: String,
     pub out: PathBuf,
 }

@@ -65,7 +65,7 @@ pub enum SkeletonSet {
     /// 20 joints of a Kinect.
     #[default]
     UtKinect,
-    /// 15 joints.
+    /// 15 joints of a Kinect.
     Florence,
 }
 

@@ -4,14 +4,13 @@ use pdf_writer::{Content, Finish, Name, Pdf, Rect, Ref, Str};
 
 use super::{MARGIN_MM, Paper, Texture};
 
-/// Per millimetre.
+/// Units of a PDF page per millimetre.
 const POINTS: f64 = 72.0 / 25.4;
 /// Line to check the printed scale.
 const RULER_MM: f64 = 100.0;
 /// Marks at the middle of the texture's sides.
 const MARK_MM: f64 = 5.0;
 
-/// Draws a PDF file.
 pub(super) fn pdf(texture: &Texture, paper: Paper, cell_mm: f64, label: &str) -> Vec<u8> {
     let [catalog, tree, page, image, font, content] = [1, 2, 3, 4, 5, 6].map(Ref::new);
     let (picture, letters) = (Name(b"Cells"), Name(b"Letters"));

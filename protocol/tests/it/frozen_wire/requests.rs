@@ -1,4 +1,4 @@
-//! Host to board.
+//! Messages from host to board.
 
 use farnear_protocol::{
     Call, Micros, Nanometres, Request,

@@ -13,9 +13,8 @@ use crate::{
     rig,
 };
 
-/// Learned surfaces, as many as in the thesis.
+/// Surfaces to learn from, as many as in the thesis; [`JUDGED`] others are measured.
 const PATTERNS: usize = 24;
-/// Measured surfaces.
 const JUDGED: usize = 12;
 const SEED: u64 = 5_400;
 /// Methods of fig. 6.4; "Li" is GGRO.
@@ -90,7 +89,6 @@ impl Flat {
     }
 }
 
-/// Excluded border.
 const RIM_PX: usize = 16;
 
 impl Planes {

@@ -7,7 +7,6 @@ use rand_chacha::ChaCha8Rng;
 
 #[derive(Clone, Debug)]
 pub enum Motion {
-    /// Endless.
     Gait(Gait),
     /// Single action; times before and after (seconds) may be cut.
     Once {

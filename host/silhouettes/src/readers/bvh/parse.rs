@@ -1,27 +1,15 @@
 //! The syntax of BVH: a tree of joints, then one line of numbers per frame.
-//!
 //! ```text
-//! HIERARCHY
-//! ROOT Hips
-//! {
-//!     OFFSET 0 0 0
-//!     CHANNELS 6 Xposition Yposition Zposition Zrotation Yrotation Xrotation
+//! HIERARCHY ROOT Hips
+//! { OFFSET 0 0 0 CHANNELS 6 Xposition Yposition Zposition Zrotation Yrotation Xrotation
 //!     JOINT LeftUpLeg
-//!     {
-//!         OFFSET 1.6 -1.8 0.6
-//!         CHANNELS 3 Zrotation Yrotation Xrotation
-//!         End Site
-//!         {
-//!             OFFSET 2.6 -7.1 0
-//!         }
-//!     }
-//! }
+//!     { OFFSET 1.6 -1.8 0.6 CHANNELS 3 Zrotation Yrotation Xrotation
+//!         End Site { OFFSET 2.6 -7.1 0 } } }
 //! MOTION
 //! Frames: 1
 //! Frame Time: 0.0083333
 //! 9.4 17.9 -17.3 0 0 0 0 0 -21
 //! ```
-//!
 //! Keywords in any case; free white space and line breaks up to `MOTION`. Names extend to the end of their
 //! line, so they may hold blanks (`Bip01 L Foot`) and colons (`mixamorig:Hips`).
 
@@ -51,15 +39,15 @@ pub struct Joint {
     pub name: String,
     /// Earlier in the list; `None` for roots.
     pub parent: Option<usize>,
-    /// At rest, file unit.
+    /// From the parent at rest, in the file's unit.
     pub offset: Point3,
-    /// In file order.
+    /// In the order of the numbers in a frame.
     pub channels: Vec<Channel>,
 }
 
 #[derive(Clone, Debug, PartialEq)]
 pub struct Motion {
-    /// Parents first.
+    /// In file order: parents before their children.
     pub joints: Vec<Joint>,
     pub frame_time_s: f64,
     pub frames: Vec<Vec<f64>>,

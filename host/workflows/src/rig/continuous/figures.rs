@@ -15,7 +15,7 @@ pub struct ContinuousFigures {
     pub exposures: usize,
     pub cycles: usize,
     pub board_s: f64,
-    /// By board time.
+    /// Exposures per second of board time.
     pub rate_hz: f64,
     /// Frames without an exposure because the position had not settled.
     pub dropped_not_settled: usize,
