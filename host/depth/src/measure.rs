@@ -13,7 +13,7 @@ use crate::depth_map::{DepthMap, Warning};
 use crate::fill;
 use crate::operators::{DesignError, Operators};
 use crate::optics::{Optics, Stage};
-use crate::pipeline::{RunError, Settings, depth_from_pair, fill_border, warnings_after};
+use crate::pipeline::{RunError, Settings, depth_from_pair, extend_border, fill_border, warnings_after};
 use crate::prepare::{CameraFrames, PrepareError, PrepareSettings, Prepared, Report, prepare_owned};
 use crate::psf::Psf;
 use crate::reason::Reason;
@@ -283,6 +283,14 @@ pub(crate) fn measure(
         DepthMethod::Baseline(_) => BASELINE_OVER_WHITENED,
     };
     judging.deviation_mm *= noisier;
+    // The border has the depth, so also the deviation and misfit, of the pixels next to it.
+    let border = match method {
+        DepthMethod::Rational(operators) => operators.kernel_size().max(white.reach_px() + 1),
+        _ => white.reach_px() + 1,
+    };
+    for map in [&mut judging.deviation_mm, &mut judging.misfit] {
+        extend_border(map, border);
+    }
     let estimate = judging;
     let mut map = map;
     if let Some(aligned) = prepared.report.aligned {
