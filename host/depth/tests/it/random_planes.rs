@@ -40,6 +40,7 @@ fn random_planes_and_magnifications_give_no_confident_wrong_plateau() {
             random.random_range(600.0..1500.0)
         };
         let magnification: f64 = random.random_range(0.9..1.1);
+        let magnification = std::env::var("MAG").map_or(magnification, |t| t.parse().unwrap());
         let scene: Scene = format!("plane:{depth:.2}").parse().unwrap();
         let camera = Camera::new(SIZE.0, SIZE.1, Noise::EightBit);
         let renderer = Renderer::new(&scene, &lens, &PSF.parse().unwrap(), &camera, number).unwrap();
@@ -62,6 +63,15 @@ fn random_planes_and_magnifications_give_no_confident_wrong_plateau() {
                     && off > 3.0 * found.validity.deviation_mm[*at]
                     && found.map.confidence[*at] >= CONFIDENT
             });
+            if std::env::var("STAT").is_ok() {
+                let (mut n, mut e, mut ee, mut r, mut w, mut mm) = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
+                for (at, f) in found.map.depth_mm.indexed_iter().filter(|(_, f)| f.is_finite()) {
+                    let d = f64::from(*f) - depth;
+                    let sd = f64::from(found.validity.deviation_mm[at]);
+                    n += 1.0; e += d; ee += d * d; r += (d / sd).powi(2); w += f64::from(u8::from(d.abs() > 3.0 * sd)); mm += sd;
+                }
+                println!("{number} {depth:.1} {magnification:.4} {window}: n {:.3} mean {:.3} sd {:.3} rel {:.2} beyond {:.4} pred {:.3} left {:.2e} excess {:.3} noise {:.3e}", n / (SIZE.0 * SIZE.1) as f64, e / n, (ee / n - (e / n).powi(2)).sqrt(), (r / n).sqrt(), w / n, mm / n, found.left_over, found.excess, found.prepared.noise.mean_variance);
+            }
             let list: Vec<_> = wrong.clone().collect();
             if std::env::var("DIAG").is_ok() && list.len() > 120 {
                 let mut bins = std::collections::BTreeMap::new();
