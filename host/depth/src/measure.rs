@@ -9,6 +9,7 @@ use crate::adaptive_window::{
     Bank, Estimate, Window, WindowSettings, check_pair, estimate, estimate_without_depth,
 };
 use crate::baselines::{self, BaselineError};
+use crate::coarseness::coarseness;
 use crate::depth_map::{DepthMap, Warning};
 use crate::fill;
 use crate::operators::{DesignError, Operators};
@@ -305,16 +306,18 @@ pub(crate) fn measure(
     }
     let mut estimate = judging;
     if let (DepthMethod::Whitened, Some(stage)) = (method, optics.stage()) {
-        respond(&mut map.depth_mm, &mut estimate.deviation_mm, stage, optics);
+        respond([&mut map.depth_mm, &mut estimate.deviation_mm], prepared, stage, optics);
     }
     Ok((map, estimate))
 }
 
 /// Applies the stage's response and scales the deviation; unlearned depths move out of the valid range.
-fn respond(depth_mm: &mut Array2<f32>, deviation_mm: &mut Array2<f32>, stage: &Stage, optics: &Optics) {
-    Zip::from(depth_mm).and(deviation_mm).par_for_each(|depth, deviation| {
+fn respond([depth_mm, deviation_mm]: [&mut Array2<f32>; 2], pair: &Prepared, stage: &Stage, optics: &Optics) {
+    let coarseness = stage.coarser.map(|_| coarseness(pair));
+    Zip::indexed(depth_mm).and(deviation_mm).par_for_each(|at, depth, deviation| {
         let measured = optics.alpha(f64::from(*depth));
-        match stage.respond(measured) {
+        let coarseness = coarseness.as_ref().map_or(f64::NAN, |map| f64::from(map[at]));
+        match stage.respond(measured, coarseness) {
             Some([alpha, slope]) => {
                 *depth = optics.depth_mm(alpha) as f32;
                 *deviation *= slope as f32;

@@ -29,9 +29,14 @@ fn random_planes_and_magnifications_give_no_confident_wrong_plateau() {
     let operators = Operators::for_optics(&optics).unwrap();
     let lens = Lens::from_optics(&OpticsFile::parse(standard::OPTICS).unwrap()).unwrap();
     let mut broken = Vec::new();
-    let only: Option<Vec<u64>> = std::env::var("ONLY").ok().map(|t| t.split(',').map(|n| n.parse().unwrap()).collect());
+    let only: Option<Vec<u64>> =
+        std::env::var("ONLY").ok().map(|t| t.split(',').map(|n| n.parse().unwrap()).collect());
     let from: u64 = std::env::var("FROM").map_or(0, |t| t.parse().unwrap());
-    for number in only.unwrap_or_else(|| (from..from + count).collect()).into_iter().chain(RIM.into_iter().filter(|number| *number >= count)) {
+    for number in only
+        .unwrap_or_else(|| (from..from + count).collect())
+        .into_iter()
+        .chain(RIM.into_iter().filter(|number| *number >= count))
+    {
         let mut random = ChaCha8Rng::seed_from_u64(number);
         // Half of the planes in and near the range of 887 to 933 mm, half anywhere.
         let depth: f64 = if number % 2 == 0 {
@@ -68,9 +73,25 @@ fn random_planes_and_magnifications_give_no_confident_wrong_plateau() {
                 for (at, f) in found.map.depth_mm.indexed_iter().filter(|(_, f)| f.is_finite()) {
                     let d = f64::from(*f) - depth;
                     let sd = f64::from(found.validity.deviation_mm[at]);
-                    n += 1.0; e += d; ee += d * d; r += (d / sd).powi(2); w += f64::from(u8::from(d.abs() > 3.0 * sd)); mm += sd;
+                    n += 1.0;
+                    e += d;
+                    ee += d * d;
+                    r += (d / sd).powi(2);
+                    w += f64::from(u8::from(d.abs() > 3.0 * sd));
+                    mm += sd;
                 }
-                println!("{number} {depth:.1} {magnification:.4} {window}: n {:.3} mean {:.3} sd {:.3} rel {:.2} beyond {:.4} pred {:.3} left {:.2e} excess {:.3} noise {:.3e}", n / (SIZE.0 * SIZE.1) as f64, e / n, (ee / n - (e / n).powi(2)).sqrt(), (r / n).sqrt(), w / n, mm / n, found.left_over, found.excess, found.prepared.noise.mean_variance);
+                println!(
+                    "{number} {depth:.1} {magnification:.4} {window}: n {:.3} mean {:.3} sd {:.3} rel {:.2} beyond {:.4} pred {:.3} left {:.2e} excess {:.3} noise {:.3e}",
+                    n / (SIZE.0 * SIZE.1) as f64,
+                    e / n,
+                    (ee / n - (e / n).powi(2)).sqrt(),
+                    (r / n).sqrt(),
+                    w / n,
+                    mm / n,
+                    found.left_over,
+                    found.excess,
+                    found.prepared.noise.mean_variance
+                );
             }
             let list: Vec<_> = wrong.clone().collect();
             if std::env::var("DIAG").is_ok() && list.len() > 120 {
@@ -83,10 +104,27 @@ fn random_planes_and_magnifications_give_no_confident_wrong_plateau() {
                     sd += found.validity.deviation_mm[*at];
                 }
                 let n = list.len() as f32;
-                println!("{number} {depth:.1} {magnification:.3} {window}: mean error {:.2} sd {:.2} aligned {:?} bins {bins:?}", e / n, sd / n, found.report.aligned.map(|a| a.magnification));
+                println!(
+                    "{number} {depth:.1} {magnification:.3} {window}: mean error {:.2} sd {:.2} aligned {:?} bins {bins:?}",
+                    e / n,
+                    sd / n,
+                    found.report.aligned.map(|a| a.magnification)
+                );
                 let seen: std::collections::HashSet<_> = list.iter().map(|(at, _)| *at).collect();
                 for y in (0..SIZE.1).step_by(2) {
-                    println!("{}", (0..SIZE.0).step_by(2).map(|x| if seen.contains(&(y, x)) { '#' } else if found.map.depth_mm[(y, x)].is_finite() { '.' } else { ' ' }).collect::<String>());
+                    println!(
+                        "{}",
+                        (0..SIZE.0)
+                            .step_by(2)
+                            .map(|x| if seen.contains(&(y, x)) {
+                                '#'
+                            } else if found.map.depth_mm[(y, x)].is_finite() {
+                                '.'
+                            } else {
+                                ' '
+                            })
+                            .collect::<String>()
+                    );
                 }
             }
             let part = wrong.count() as f64 / (SIZE.0 * SIZE.1) as f64;
