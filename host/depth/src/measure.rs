@@ -314,13 +314,14 @@ pub(crate) fn measure(
 /// Applies the stage's response and scales the deviation; unlearned depths move out of the valid range.
 fn respond([depth_mm, deviation_mm]: [&mut Array2<f32>; 2], pair: &Prepared, stage: &Stage, optics: &Optics) {
     let coarseness = stage.coarser.map(|_| coarseness(pair));
+    let per_alpha_mm = optics.depth_per_alpha_mm(0.0).abs() as f32;
     Zip::indexed(depth_mm).and(deviation_mm).par_for_each(|at, depth, deviation| {
         let measured = optics.alpha(f64::from(*depth));
         let coarseness = coarseness.as_ref().map_or(f64::NAN, |map| f64::from(map[at]));
         match stage.respond(measured, coarseness) {
-            Some([alpha, slope]) => {
+            Some([alpha, slope, of_texture]) => {
                 *depth = optics.depth_mm(alpha) as f32;
-                *deviation *= slope as f32;
+                *deviation = (*deviation * slope as f32).hypot(of_texture as f32 * per_alpha_mm);
             }
             None if measured.is_finite() => {
                 *depth = optics.depth_mm(OUT_OF_RANGE_ALPHA.copysign(measured)) as f32;

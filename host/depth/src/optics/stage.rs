@@ -47,6 +47,9 @@ pub struct Coarser {
 
 /// Extrapolation between the textures.
 const MIXED: [f64; 2] = [-0.3, 1.3];
+/// Standard deviation of a mixture `p` of two responses, relative to `4 p (1 - p)` of their difference: depth need not change
+/// evenly from one texture to the other. Measured on lenses by wave optics.
+const MIXING_ERROR: f64 = 0.15;
 
 /// Unexplained texture as a variance of normalised depth: `misfit` is the residual's mean square relative to the noise,
 /// `deviation` the standard deviation of normalised depth by noise.
@@ -74,10 +77,11 @@ impl Stage {
         }
     }
 
-    /// True normalised depth and slope at a measured one, for texture of a coarseness; `None` outside the learned range.
-    pub fn respond(&self, measured: f64, coarseness: f64) -> Option<[f64; 2]> {
+    /// True normalised depth, slope, and deviation by the texture's coarseness, at a measured depth; `None` outside the
+    /// learned range.
+    pub fn respond(&self, measured: f64, coarseness: f64) -> Option<[f64; 3]> {
         let [value, slope] = interpolated(self.measured, &self.response, measured)?;
-        let Some(coarser) = &self.coarser else { return Some([value, slope]) };
+        let Some(coarser) = &self.coarser else { return Some([value, slope, 0.0]) };
         let [[other, its_slope], [fine, _], [coarse, _]] = [
             interpolated(self.measured, &coarser.response, measured)?,
             interpolated(self.measured, &coarser.of_target, measured)?,
@@ -85,7 +89,8 @@ impl Stage {
         ];
         let part = (coarseness - fine) / (coarse - fine);
         let part = if part.is_finite() { part.clamp(MIXED[0], MIXED[1]) } else { 0.0 };
-        Some([value + part * (other - value), slope + part * (its_slope - slope)])
+        let mixed = MIXING_ERROR * (4.0 * part * (1.0 - part) * (other - value)).abs();
+        Some([value + part * (other - value), slope + part * (its_slope - slope), mixed])
     }
 
     pub(super) fn problem(&self) -> Option<&'static str> {
@@ -140,11 +145,22 @@ mod tests {
     fn identity_changes_nothing_and_ends_at_its_range() {
         let stage = Stage::identity(2, 3);
         for alpha in [-1.19, -0.4, 0.0, 0.77, 1.18] {
-            let [value, slope] = stage.respond(alpha, f64::NAN).unwrap();
+            let [value, slope, _] = stage.respond(alpha, f64::NAN).unwrap();
             assert!((value - alpha).abs() < 1e-12 && (slope - 1.0).abs() < 1e-9);
         }
         assert!(stage.respond(1.3, 0.0).is_none() && stage.respond(f64::NAN, 0.0).is_none());
         assert_eq!(stage.problem(), None);
+        let coarser = Coarser {
+            response: stage.response.map(|v| v + 0.1),
+            of_target: [1.0; RESPONSE_POINTS],
+            coarseness: [2.0; RESPONSE_POINTS],
+        };
+        let mixed = Stage { coarser: Some(coarser), ..stage };
+        for (coarseness, more) in [(1.0, 0.0), (1.5, 0.05), (2.0, 0.1), (9.0, 0.13), (f64::NAN, 0.0)] {
+            let [value, _, deviation] = mixed.respond(0.2, coarseness).unwrap();
+            assert!((value - 0.2 - more).abs() < 1e-9, "{coarseness} {value}");
+            assert_eq!(deviation > 0.0, coarseness != 1.0 && coarseness != 2.0 && !coarseness.is_nan());
+        }
         let mut falling = stage;
         falling.response[4] = -1.1;
         assert_eq!(falling.problem(), Some("response must rise"));

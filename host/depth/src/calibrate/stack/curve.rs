@@ -170,7 +170,7 @@ fn value(c: &[f64], x: f64) -> f64 {
 mod tests {
     use super::*;
 
-    fn at(curve: &Curve, measured: f64) -> Option<[f64; 2]> {
+    fn at(curve: &Curve, measured: f64) -> Option<[f64; 3]> {
         curve.stage(None).respond(measured, f64::NAN)
     }
 
@@ -184,7 +184,7 @@ mod tests {
         let learned = samples(bent, (0..400).map(|i| -0.9 + 1.8 * f64::from(i) / 399.0));
         let curve = Curve::fit(learned.iter(), 5, None).unwrap();
         for truth in [-0.85, -0.3, 0.0, 0.5, 0.88] {
-            let [found, slope] = at(&curve, bent(truth)).unwrap();
+            let [found, slope, _] = at(&curve, bent(truth)).unwrap();
             assert!((found - truth).abs() < 0.01, "{truth} {found}");
             let expected = 1.0 / (0.8 + 0.45 * truth * truth);
             assert!((slope - expected).abs() < 0.15 * expected, "{truth} {slope} {expected}");
@@ -206,7 +206,7 @@ mod tests {
         assert_eq!(Curve::largest_degree(learned.iter()), 1);
         let curve = Curve::fit(learned.iter(), 1, None).unwrap();
         for measured in [-0.6, -0.1, 0.3, 0.62] {
-            let [found, slope] = at(&curve, measured).unwrap();
+            let [found, slope, _] = at(&curve, measured).unwrap();
             assert!(
                 (found - measured).abs() < 0.02 && (slope - 1.0).abs() < 0.05,
                 "{measured} {found} {slope}"

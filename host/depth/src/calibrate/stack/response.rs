@@ -367,8 +367,8 @@ fn judge(samples: &Samples, degree: usize, by: Split, textures: bool) -> Option<
 }
 
 fn tested(stage: &Stage, s: &Sample) -> Option<Judged> {
-    let [found, slope] = stage.respond(s.measured, s.coarseness)?;
-    let noise = s.noise * slope;
+    let [found, slope, of_texture] = stage.respond(s.measured, s.coarseness)?;
+    let noise = (s.noise * slope).hypot(of_texture);
     Some(Judged {
         error: found - s.truth,
         truth: s.truth,
