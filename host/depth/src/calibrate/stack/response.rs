@@ -10,7 +10,7 @@ use ndarray::Array2;
 
 use super::curve::{Curve, by_texture};
 use super::focus_plane::{FocusPlane, blurred};
-use super::{HeldOut, StackError};
+use super::{ENOUGH_DEPTHS, HeldOut, StackError};
 use crate::adaptive_window::{LEARNED_PX, Window};
 use crate::coarseness::coarseness;
 use crate::measure::{DepthMethod, MeasureSettings, measure};
@@ -41,6 +41,9 @@ const FLOORS_PX: [f64; 3] = [0.5, 0.9, 1.3];
 const TOLERANCES: [f64; 4] = [0.0, 0.03, 0.07, 0.15];
 /// Improvement that justifies a lens with one more parameter.
 const WORTH: f64 = 0.97;
+/// Largest error on coarser texture, relative to that of one response, of a response by texture: elsewhere the responses
+/// differ by scatter.
+const TEXTURE_PAYS: f64 = 0.67;
 /// Fewest pairs of which some are held out.
 const PAIRS_TO_SPLIT: usize = 6;
 /// Part of the noise's variance that smoothing leaves: sum of the squared taps.
@@ -393,13 +396,19 @@ fn rms(judged: &[Judged]) -> f64 {
 
 /// The response of all samples, and the held-out errors.
 fn finish(samples: &Samples, degree: usize, optics: &Optics, half_mm: f64) -> Option<(Stage, HeldOut)> {
-    let original = |judged: &[Judged]| robust(judged.iter().filter(|j| j.original).map(|j| j.error));
+    let of = |judged: &[Judged], original: bool| {
+        robust(judged.iter().filter(|j| j.original == original).map(|j| j.error))
+    };
     let (plain, inside) = judge(samples, degree, Split::Parts, false)?;
     let curve = Curve::fit(samples.of.iter().filter(|s| s.original), degree, None)?;
-    // Worth its parameters where it does not cost the target itself.
-    let by_texture = by_texture(samples.of.iter(), degree, &curve).and_then(|coarser| {
+    // Few pairs do not determine the difference of two responses; the deviation has to cover it.
+    let enough = samples.pairs >= ENOUGH_DEPTHS;
+    let coarser = if enough { by_texture(samples.of.iter(), degree, &curve) } else { None };
+    let by_texture = coarser.and_then(|coarser| {
         let (judged, inside) = judge(samples, degree, Split::Parts, true)?;
-        (original(&judged) <= original(&plain) / WORTH).then_some((judged, inside, coarser))
+        let pays = of(&judged, false) <= TEXTURE_PAYS * of(&plain, false)
+            && of(&judged, true) <= of(&plain, true) / WORTH;
+        pays.then_some((judged, inside, coarser))
     });
     let (judged, inside, coarser) = match by_texture {
         Some((judged, inside, coarser)) => (judged, inside, Some(coarser)),
