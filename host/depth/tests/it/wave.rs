@@ -164,8 +164,7 @@ fn judged(lens: &WaveLens, found: &StackLens, sand: bool) -> Judged {
 /// Prints the figures of docs/calibrate-stack.md. `FARNEAR_WAVE_LENSES=all` adds half a wave with astigmatism.
 #[test]
 fn a_lens_by_wave_optics_is_calibrated_by_its_stack_and_measures_other_scenes_honestly() {
-    // Spherical aberration and astigmatism, waves, and the largest RMSE relative to the bound: one response cannot
-    // compensate sides of focus that differ, and the deviation must reflect it.
+    // Spherical aberration and astigmatism, waves, and the largest RMSE relative to the bound.
     let mut lenses = vec![(0.0, 0.0, 1.2), (1.0, 0.0, 1.8)];
     if std::env::var("FARNEAR_WAVE_LENSES").is_ok_and(|text| text == "all") {
         lenses.push((0.5, 0.15, 1.5));
