@@ -48,7 +48,7 @@ pub struct Coarser {
 /// Extrapolation between the textures.
 const MIXED: [f64; 2] = [-0.3, 1.3];
 /// Standard deviation of a mixture `p` of two responses, relative to `4 p (1 - p)` of their difference: depth need not change
-/// evenly from one texture to the other. Measured on lenses by wave optics.
+/// evenly from one texture to the other. Chosen on one lens by wave optics.
 const MIXING_ERROR: f64 = 0.15;
 
 /// Unexplained texture as a variance of normalised depth: `misfit` is the residual's mean square relative to the noise,
