@@ -5,6 +5,7 @@ pub mod adaptive_window;
 pub mod baselines;
 mod border;
 pub mod calibrate;
+mod coarseness;
 pub mod confidence;
 pub mod corrections;
 mod cubic;

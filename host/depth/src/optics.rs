@@ -20,8 +20,7 @@ pub use distortion::{Distortion, DistortionSection};
 pub use doubt::Doubt;
 pub use error::OpticsError;
 pub use file::{FocusSection, LensSection, OpticsFile, SensorSection};
-pub(crate) use stage::interpolated;
-pub use stage::{RESPONSE_POINTS, Stage, unexplained};
+pub use stage::{Coarser, RESPONSE_POINTS, Stage, unexplained};
 
 /// Image distance of an object at `object_mm`; the thin lens is its own inverse, so this also maps back.
 fn image_mm(focal_length_mm: f64, object_mm: f64) -> f64 {

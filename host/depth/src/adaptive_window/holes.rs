@@ -1,9 +1,62 @@
-//! Pixels without a value in a tile.
+//! Pixels without a value in a tile, and those whose filters reach beyond the image.
+
+use std::ops::Range;
 
 use ndarray::{Array2, ArrayView2, s};
 
 use super::rows::Place;
 use crate::{border::reflect, metrics::dilate_square};
+
+/// Pixels whose filters see only the image. Blur mixed in the real scene beyond it, not its reflection, and differently
+/// in each image; and a reflected pixel is no second observation. So the others are no evidence.
+#[derive(Clone, Copy)]
+pub(super) struct Inner {
+    /// (height, width) of the image.
+    pub size: (usize, usize),
+    pub reach: usize,
+}
+
+impl Inner {
+    fn of(&self, n: usize) -> Range<isize> {
+        self.reach as isize..n as isize - self.reach as isize
+    }
+
+    /// Clears the matched filter of a row, from column `left` on, outside.
+    pub fn keep(&self, row: isize, left: isize, matched: &mut [f32]) {
+        if !self.of(self.size.0).contains(&row) {
+            matched.fill(0.0);
+            return;
+        }
+        let Range { start, end } = self.of(self.size.1);
+        let inside = |column: isize| (column - left).clamp(0, matched.len() as isize) as usize;
+        let [first, last] = [start, end].map(inside);
+        matched[..first].fill(0.0);
+        matched[last..].fill(0.0);
+    }
+
+    fn overlap(range: &Range<isize>, middle: isize, side: usize) -> usize {
+        let half = (side / 2) as isize;
+        ((middle + half + 1).min(range.end) - (middle - half).max(range.start)).max(0) as usize
+    }
+
+    /// Rows inside of a window around `row`.
+    pub fn rows_of_window(&self, row: isize, side: usize) -> usize {
+        Self::overlap(&self.of(self.size.0), row, side)
+    }
+
+    /// `noise` of a row from column `left` on, times the part of each window's columns that are inside.
+    pub fn share_columns(&self, left: isize, side: usize, noise: &[f32], to: &mut [f32]) {
+        to.copy_from_slice(noise);
+        let inner = self.of(self.size.1);
+        let half = (side / 2) as isize;
+        let whole = (inner.start + half - left).clamp(0, to.len() as isize) as usize
+            ..(inner.end - half - left).clamp(0, to.len() as isize) as usize;
+        let end = whole.end.max(whole.start);
+        for x in (0..whole.start).chain(end..to.len()) {
+            to[x] *= Self::overlap(&inner, left + x as isize, side) as f32 / side as f32;
+        }
+    }
+}
 
 /// Surroundings of pixels without a value.
 pub(super) struct Holes {

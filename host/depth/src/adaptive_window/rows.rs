@@ -5,7 +5,7 @@
 use ndarray::{Array2, ArrayView2, ArrayViewMut2, s};
 
 use super::bank::{Bank, Filters};
-use super::holes::Holes;
+use super::holes::{Holes, Inner};
 use super::scales::Scales;
 use super::{ADAPTIVE_PX, LEARNED_PX, SAFE_PX, Window, WindowSettings};
 use crate::border::reflect;
@@ -79,6 +79,7 @@ pub(super) struct Tile<'a> {
     depth_of: DepthOfAlpha,
     deviation: Deviation,
     of_residual: Residual,
+    inner: Inner,
 }
 
 /// Column sums over a window's rows of `rho_k u`, `u u` and the pair's brightness.
@@ -165,6 +166,7 @@ impl<'a> Tile<'a> {
                 slope: slope as f32,
             },
             of_residual,
+            inner: Inner { size: job.far.dim(), reach },
         }
     }
 
@@ -209,6 +211,12 @@ impl<'a> Tile<'a> {
             }
             let inputs = [&self.difference, &self.sum];
             self.filters.feed(self.job.backend, inputs, first, count, input);
+            for y in 0..count {
+                let Some(middle) = (begin + y).checked_sub(reach) else { continue };
+                let row = (place.top + middle) as isize - halo[0] as isize;
+                let matched = self.filters.matched_mut().row_mut(first + y);
+                self.inner.keep(row, place.left as isize + (reach as isize - halo[1] as isize), matched);
+            }
             if let Some(Holes { of_filters, .. }) = &holes {
                 // A filter across the rim of a hole finds an equally sharp edge in both images: no evidence.
                 for y in 0..count {
@@ -269,7 +277,7 @@ impl<'a> Tile<'a> {
     fn windows(&mut self, place: Place, row: usize, wide: usize, products: usize) {
         for index in 0..self.columns.len() {
             self.advance(place, index, row, products);
-            self.row(index, wide);
+            self.row(place, index, row, wide);
         }
         let [alpha, variance, ..] = &mut self.row.chosen;
         self.alpha.row_mut(row % WAITING)[..wide].copy_from_slice(&alpha[..wide]);
@@ -318,8 +326,9 @@ impl<'a> Tile<'a> {
         }
     }
 
-    fn row(&mut self, index: usize, wide: usize) {
-        let Self { job, row, radius, .. } = self;
+    fn row(&mut self, place: Place, index: usize, line: usize, wide: usize) {
+        let [above, beside] = self.around;
+        let Self { job, row, radius, inner, .. } = self;
         let Columns { side, sums } = &self.columns[index];
         let (side, backend, scales, bank) = (*side, job.backend, job.scales, job.bank);
         let from = *radius - side / 2;
@@ -342,8 +351,11 @@ impl<'a> Tile<'a> {
         let (alpha, variance) = (&mut row.alpha[..wide], &mut row.variance[..wide]);
         let found = Found { alpha: &mut *alpha, variance: &mut *variance };
         simd::roots(backend, CubicSums { c: [c0, c1, c2, c3], energy }, bank.least_slope(), found);
-        let of_noise = bank.noise_energy() * (side * side) as f32;
-        simd::without_noise(backend, energy, noise, [of_noise, LEAST_EVIDENCE], variance);
+        let rows = inner.rows_of_window((place.top + line) as isize - above as isize, side);
+        let of_noise = bank.noise_energy() * (rows * side) as f32;
+        let of_pixels = &mut row.work[..wide];
+        inner.share_columns(place.left as isize - beside as isize, side, noise, of_pixels);
+        simd::without_noise(backend, energy, of_pixels, [of_noise, LEAST_EVIDENCE], variance);
         let [chosen, of_chosen, low, high, open] = row.chosen.each_mut().map(|values| &mut values[..wide]);
         if index == 0 {
             chosen.copy_from_slice(alpha);

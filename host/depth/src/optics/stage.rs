@@ -27,7 +27,29 @@ pub struct Stage {
     pub residual: f64,
     /// Median over the target of [`unexplained`].
     pub usual_unexplained: f64,
+    /// Response to coarser texture.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub coarser: Option<Coarser>,
 }
+
+/// No profile fits a real lens at all frequencies, so depth depends on the spectrum of the texture. All values are at the
+/// measured depths of [`Stage::response`].
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Coarser {
+    /// True normalised depth with the coarser texture.
+    pub response: [f64; RESPONSE_POINTS],
+    /// Coarseness (logarithm, see `coarseness.rs`) of the target.
+    pub of_target: [f64; RESPONSE_POINTS],
+    /// Coarseness of the coarser texture; larger.
+    pub coarseness: [f64; RESPONSE_POINTS],
+}
+
+/// Extrapolation between the textures.
+const MIXED: [f64; 2] = [-0.3, 1.3];
+/// Standard deviation of a mixture `p` of two responses, relative to `4 p (1 - p)` of their difference: depth need not change
+/// evenly from one texture to the other. Chosen on one lens by wave optics.
+const MIXING_ERROR: f64 = 0.15;
 
 /// Unexplained texture as a variance of normalised depth: `misfit` is the residual's mean square relative to the noise,
 /// `deviation` the standard deviation of normalised depth by noise.
@@ -51,12 +73,24 @@ impl Stage {
             window_tolerance: 0.0,
             residual: 0.0,
             usual_unexplained: 1.0,
+            coarser: None,
         }
     }
 
-    /// True normalised depth and slope at a measured one; `None` outside the learned range.
-    pub fn respond(&self, measured: f64) -> Option<[f64; 2]> {
-        interpolated(self.measured, &self.response, measured)
+    /// True normalised depth, slope, and deviation by the texture's coarseness, at a measured depth; `None` outside the
+    /// learned range.
+    pub fn respond(&self, measured: f64, coarseness: f64) -> Option<[f64; 3]> {
+        let [value, slope] = interpolated(self.measured, &self.response, measured)?;
+        let Some(coarser) = &self.coarser else { return Some([value, slope, 0.0]) };
+        let [[other, its_slope], [fine, _], [coarse, _]] = [
+            interpolated(self.measured, &coarser.response, measured)?,
+            interpolated(self.measured, &coarser.of_target, measured)?,
+            interpolated(self.measured, &coarser.coarseness, measured)?,
+        ];
+        let part = (coarseness - fine) / (coarse - fine);
+        let part = if part.is_finite() { part.clamp(MIXED[0], MIXED[1]) } else { 0.0 };
+        let mixed = MIXING_ERROR * (4.0 * part * (1.0 - part) * (other - value)).abs();
+        Some([value + part * (other - value), slope + part * (its_slope - slope), mixed])
     }
 
     pub(super) fn problem(&self) -> Option<&'static str> {
@@ -66,6 +100,13 @@ impl Stage {
         }
         if !finite || self.measured[0] >= self.measured[1] {
             return Some("measured and response must be finite and measured must rise");
+        }
+        if let Some(Coarser { response, of_target, coarseness }) = &self.coarser {
+            let apart = of_target.iter().zip(coarseness).all(|(fine, coarse)| coarse > fine);
+            let all = response.iter().chain(of_target).chain(coarseness);
+            if !(apart && all.clone().all(|v| v.is_finite() && v.abs() < 20.0)) {
+                return Some("coarser must have finite values and a larger coarseness than of_target");
+            }
         }
         if self.response.windows(2).any(|pair| pair[1] < pair[0]) {
             return Some("response must rise");
@@ -85,11 +126,7 @@ impl Stage {
 }
 
 /// Value and slope of a response at a measured depth; `None` outside the range of its points.
-pub(crate) fn interpolated(
-    [low, high]: [f64; 2],
-    response: &[f64; RESPONSE_POINTS],
-    measured: f64,
-) -> Option<[f64; 2]> {
+fn interpolated([low, high]: [f64; 2], response: &[f64; RESPONSE_POINTS], measured: f64) -> Option<[f64; 2]> {
     if !(low..=high).contains(&measured) {
         return None;
     }
@@ -108,11 +145,22 @@ mod tests {
     fn identity_changes_nothing_and_ends_at_its_range() {
         let stage = Stage::identity(2, 3);
         for alpha in [-1.19, -0.4, 0.0, 0.77, 1.18] {
-            let [value, slope] = stage.respond(alpha).unwrap();
+            let [value, slope, _] = stage.respond(alpha, f64::NAN).unwrap();
             assert!((value - alpha).abs() < 1e-12 && (slope - 1.0).abs() < 1e-9);
         }
-        assert!(stage.respond(1.3).is_none() && stage.respond(f64::NAN).is_none());
+        assert!(stage.respond(1.3, 0.0).is_none() && stage.respond(f64::NAN, 0.0).is_none());
         assert_eq!(stage.problem(), None);
+        let coarser = Coarser {
+            response: stage.response.map(|v| v + 0.1),
+            of_target: [1.0; RESPONSE_POINTS],
+            coarseness: [2.0; RESPONSE_POINTS],
+        };
+        let mixed = Stage { coarser: Some(coarser), ..stage };
+        for (coarseness, more) in [(1.0, 0.0), (1.5, 0.05), (2.0, 0.1), (9.0, 0.13), (f64::NAN, 0.0)] {
+            let [value, _, deviation] = mixed.respond(0.2, coarseness).unwrap();
+            assert!((value - 0.2 - more).abs() < 1e-9, "{coarseness} {value}");
+            assert_eq!(deviation > 0.0, coarseness != 1.0 && coarseness != 2.0 && !coarseness.is_nan());
+        }
         let mut falling = stage;
         falling.response[4] = -1.1;
         assert_eq!(falling.problem(), Some("response must rise"));

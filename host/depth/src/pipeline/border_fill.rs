@@ -4,6 +4,8 @@
 //! operators (pre-filter and kernel, half a kernel size each) see only the image, at [`BORDER_CONFIDENCE`] of its
 //! confidence. Pixels without a depth stay without. Cost: the border's pixels once.
 
+use ndarray::Array2;
+
 use crate::depth_map::DepthMap;
 
 /// Confidence factor of a neighbour's value.
@@ -52,6 +54,21 @@ pub(crate) fn fill(map: &mut DepthMap, width_px: usize) {
     }
 }
 
+/// Values of the nearest inner pixels in the border of `width_px` pixels, where it has values.
+pub(crate) fn extend(map: &mut Array2<f32>, width_px: usize) {
+    let (height, width) = map.dim();
+    let inner = |i: usize, n: usize| i.clamp(width_px.min((n - 1) / 2), n - 1 - width_px.min((n - 1) / 2));
+    for y in 0..height {
+        let row = inner(y, height);
+        let beside = if row == y { inner(0, width) } else { width };
+        for x in (0..beside).chain((width - beside).max(beside)..width) {
+            if !map[(y, x)].is_nan() {
+                map[(y, x)] = map[(row, inner(x, width))];
+            }
+        }
+    }
+}
+
 fn take(depth: &mut f32, confidence: &mut f32, from_depth: f32, from_confidence: f32) {
     let has = !depth.is_nan();
     *confidence = if has { BORDER_CONFIDENCE * from_confidence } else { *confidence };
@@ -60,8 +77,6 @@ fn take(depth: &mut f32, confidence: &mut f32, from_depth: f32, from_confidence:
 
 #[cfg(test)]
 mod tests {
-    use ndarray::Array2;
-
     use super::*;
 
     fn map(height: usize, width: usize) -> DepthMap {

@@ -164,11 +164,10 @@ fn judged(lens: &WaveLens, found: &StackLens, sand: bool) -> Judged {
 /// Prints the figures of docs/calibrate-stack.md. `FARNEAR_WAVE_LENSES=all` adds half a wave with astigmatism.
 #[test]
 fn a_lens_by_wave_optics_is_calibrated_by_its_stack_and_measures_other_scenes_honestly() {
-    // Spherical aberration and astigmatism, waves, and the largest RMSE relative to the bound: one response cannot
-    // compensate sides of focus that differ, and the deviation must reflect it.
-    let mut lenses = vec![(0.0, 0.0, 1.5), (1.0, 0.0, 5.0)];
+    // Spherical aberration and astigmatism, waves, and the largest RMSE relative to the bound.
+    let mut lenses = vec![(0.0, 0.0, 1.2), (1.0, 0.0, 1.8)];
     if std::env::var("FARNEAR_WAVE_LENSES").is_ok_and(|text| text == "all") {
-        lenses.push((0.5, 0.15, 5.0));
+        lenses.push((0.5, 0.15, 1.5));
     }
     for (spherical, astigmatism, largest) in lenses {
         let lens = lens(spherical, astigmatism);
@@ -185,7 +184,10 @@ fn a_lens_by_wave_optics_is_calibrated_by_its_stack_and_measures_other_scenes_ho
             let of_bound = judged.rms_mm / judged.bound_mm;
             println!("  {} {judged:.4?}, {of_bound:.2} of the bound", if sand { "sand" } else { "fractal" });
             assert!(judged.fill > 0.95 && of_bound < largest, "{spherical} {of_bound} {judged:?}");
-            assert!(judged.within_three > 0.97 && judged.scatter < 1.3, "{spherical} {judged:?}");
+            assert!(
+                judged.within_three > 0.97 && (0.65..1.3).contains(&judged.scatter),
+                "{spherical} {judged:?}"
+            );
         }
     }
 }

@@ -6,7 +6,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::response::Sample;
-use crate::optics::{RESPONSE_POINTS, interpolated};
+use crate::optics::{Coarser, RESPONSE_POINTS, Stage};
 
 /// Extent of the response beyond the learned depths, in normalised depth.
 const BEYOND: f64 = 0.05;
@@ -20,6 +20,10 @@ const SLOPES: [f64; 2] = [1.0 / 3.0, 3.0];
 const MIXTURES: usize = 50;
 /// Points at which the polynomial is inverted.
 const POINTS: usize = 200;
+/// Degree of coarseness over measured depth: of both sides of focus, the more blurred is coarser.
+const COARSENESS_DEGREE: usize = 2;
+/// Least difference of two textures' coarseness.
+const LEAST_APART: f64 = 0.1;
 /// Width of a class of true depths, for [`Curve::largest_degree`].
 const CLASS: f64 = 0.1;
 
@@ -44,8 +48,13 @@ impl Curve {
         runs.saturating_sub(1).max((2.0 * covered) as usize).max(1)
     }
 
-    /// `None` for too few samples, and for values that do not rise with the truth.
-    pub fn fit<'a>(samples: impl Iterator<Item = &'a Sample> + Clone, degree: usize) -> Option<Self> {
+    /// `None` for too few samples, and for values that do not rise with the truth. `over` is the range of measured depths;
+    /// by default that of the samples.
+    pub fn fit<'a>(
+        samples: impl Iterator<Item = &'a Sample> + Clone,
+        degree: usize,
+        over: Option<[f64; 2]>,
+    ) -> Option<Self> {
         let sorted = |value: fn(&Sample) -> f64| {
             let mut values: Vec<f64> = samples.clone().map(value).collect();
             values.sort_by(f64::total_cmp);
@@ -56,11 +65,14 @@ impl Curve {
             return None;
         }
         let quantile = |of: &[f64], q: f64| of[((of.len() - 1) as f64 * q) as usize];
-        let low = (quantile(&places, OUTLIERS) - BEYOND).max(-LARGEST);
-        let high = (quantile(&places, 1.0 - OUTLIERS) + BEYOND).min(LARGEST);
+        let [low, high] = over.unwrap_or([
+            (quantile(&places, OUTLIERS) - BEYOND).max(-LARGEST),
+            (quantile(&places, 1.0 - OUTLIERS) + BEYOND).min(LARGEST),
+        ]);
         let [first, last] = [OUTLIERS, 1.0 - OUTLIERS].map(|q| quantile(&truths, q));
-        let line = polynomial(samples.clone(), 1)?;
-        let c = polynomial(samples, degree)?;
+        let points = samples.map(|s| [s.truth, s.measured]);
+        let line = polynomial(points.clone(), 1)?;
+        let c = polynomial(points, degree)?;
         if line[1] <= 0.05 || low >= high || first >= last {
             return None;
         }
@@ -93,14 +105,33 @@ impl Curve {
         Some(Self { measured: [low, high], response })
     }
 
-    /// True normalised depth and slope at a measured one; `None` outside the learned range.
-    pub fn at(&self, measured: f64) -> Option<[f64; 2]> {
-        interpolated(self.measured, &self.response, measured)
+    pub fn stage(&self, coarser: Option<Coarser>) -> Stage {
+        Stage { measured: self.measured, response: self.response, coarser, ..Stage::identity(1, 1) }
     }
 }
 
-/// Coefficients of the polynomial from true to measured depth, by least squares with Huber's weights.
-fn polynomial<'a>(samples: impl Iterator<Item = &'a Sample> + Clone, degree: usize) -> Option<Vec<f64>> {
+/// Responses to the target and to the coarser target, if their textures differ enough.
+pub(super) fn by_texture<'a>(
+    samples: impl Iterator<Item = &'a Sample> + Clone,
+    degree: usize,
+    curve: &Curve,
+) -> Option<Coarser> {
+    let of = |original: bool| samples.clone().filter(move |s| s.original == original);
+    let coarse = Curve::fit(of(false), degree, Some(curve.measured))?;
+    let [low, high] = curve.measured;
+    let table = |original: bool| {
+        let points = of(original).map(|s| [s.measured, s.coarseness]).filter(|[_, y]| y.is_finite());
+        let c = polynomial(points, COARSENESS_DEGREE)?;
+        let at = |i: usize| low + (high - low) * i as f64 / (RESPONSE_POINTS - 1) as f64;
+        Some(std::array::from_fn(|i| value(&c, at(i))))
+    };
+    let [of_target, coarseness]: [[f64; RESPONSE_POINTS]; 2] = [table(true)?, table(false)?];
+    let apart = of_target.iter().zip(&coarseness).all(|(fine, coarse)| coarse - fine > LEAST_APART);
+    apart.then_some(Coarser { response: coarse.response, of_target, coarseness })
+}
+
+/// Coefficients of the polynomial through points `[x, y]`, by least squares with Huber's weights.
+fn polynomial(points: impl Iterator<Item = [f64; 2]> + Clone, degree: usize) -> Option<Vec<f64>> {
     let n = degree + 1;
     let mut found: Vec<f64> = (0..n).map(|k| f64::from(u8::from(k == 1))).collect();
     let mut limit = f64::INFINITY;
@@ -108,13 +139,13 @@ fn polynomial<'a>(samples: impl Iterator<Item = &'a Sample> + Clone, degree: usi
         let mut normal = DMatrix::<f64>::zeros(n, n);
         let mut right = DVector::<f64>::zeros(n);
         let mut sizes = Vec::new();
-        for s in samples.clone() {
-            let error = s.measured - value(&found, s.truth);
+        for [x, y] in points.clone() {
+            let error = y - value(&found, x);
             sizes.push(error.abs());
             let weight = if error.abs() > limit { limit / error.abs() } else { 1.0 };
-            let powers: Vec<f64> = (0..n).map(|k| s.truth.powi(k as i32)).collect();
+            let powers: Vec<f64> = (0..n).map(|k| x.powi(k as i32)).collect();
             for i in 0..n {
-                right[i] += weight * powers[i] * s.measured;
+                right[i] += weight * powers[i] * y;
                 for j in 0..n {
                     normal[(i, j)] += weight * powers[i] * powers[j];
                 }
@@ -139,6 +170,10 @@ fn value(c: &[f64], x: f64) -> f64 {
 mod tests {
     use super::*;
 
+    fn at(curve: &Curve, measured: f64) -> Option<[f64; 3]> {
+        curve.stage(None).respond(measured, f64::NAN)
+    }
+
     fn samples(measured_of: impl Fn(f64) -> f64, truths: impl Iterator<Item = f64>) -> Vec<Sample> {
         truths.map(|truth| Sample::exact(measured_of(truth), truth)).collect()
     }
@@ -147,16 +182,16 @@ mod tests {
     fn a_bent_response_is_learned_and_ends_where_the_samples_do() {
         let bent = |t: f64| 0.1 + 0.8 * t + 0.15 * t.powi(3);
         let learned = samples(bent, (0..400).map(|i| -0.9 + 1.8 * f64::from(i) / 399.0));
-        let curve = Curve::fit(learned.iter(), 5).unwrap();
+        let curve = Curve::fit(learned.iter(), 5, None).unwrap();
         for truth in [-0.85, -0.3, 0.0, 0.5, 0.88] {
-            let [found, slope] = curve.at(bent(truth)).unwrap();
+            let [found, slope, _] = at(&curve, bent(truth)).unwrap();
             assert!((found - truth).abs() < 0.01, "{truth} {found}");
             let expected = 1.0 / (0.8 + 0.45 * truth * truth);
             assert!((slope - expected).abs() < 0.15 * expected, "{truth} {slope} {expected}");
         }
-        assert!(curve.at(bent(1.05)).is_none(), "no depth beyond the learned range");
+        assert!(at(&curve, bent(1.05)).is_none(), "no depth beyond the learned range");
         let falling = samples(|t| -t, (0..400).map(|i| -1.0 + f64::from(i) / 200.0));
-        assert_eq!(Curve::fit(falling.iter(), 3), None);
+        assert_eq!(Curve::fit(falling.iter(), 3, None), None);
     }
 
     /// Two depths with noise: the best prediction of these two is flat at either and useless for other scenes.
@@ -169,9 +204,9 @@ mod tests {
             })
             .collect();
         assert_eq!(Curve::largest_degree(learned.iter()), 1);
-        let curve = Curve::fit(learned.iter(), 1).unwrap();
+        let curve = Curve::fit(learned.iter(), 1, None).unwrap();
         for measured in [-0.6, -0.1, 0.3, 0.62] {
-            let [found, slope] = curve.at(measured).unwrap();
+            let [found, slope, _] = at(&curve, measured).unwrap();
             assert!(
                 (found - measured).abs() < 0.02 && (slope - 1.0).abs() < 0.05,
                 "{measured} {found} {slope}"

@@ -8,10 +8,11 @@ use serde::{Deserialize, Serialize};
 
 use ndarray::Array2;
 
-use super::curve::Curve;
+use super::curve::{Curve, by_texture};
 use super::focus_plane::{FocusPlane, blurred};
-use super::{HeldOut, StackError};
+use super::{ENOUGH_DEPTHS, HeldOut, StackError};
 use crate::adaptive_window::{LEARNED_PX, Window};
+use crate::coarseness::coarseness;
 use crate::measure::{DepthMethod, MeasureSettings, measure};
 use crate::optics::{Optics, Stage, unexplained};
 use crate::pipeline::Settings;
@@ -40,6 +41,9 @@ const FLOORS_PX: [f64; 3] = [0.5, 0.9, 1.3];
 const TOLERANCES: [f64; 4] = [0.0, 0.03, 0.07, 0.15];
 /// Improvement that justifies a lens with one more parameter.
 const WORTH: f64 = 0.97;
+/// Largest error on coarser texture, relative to that of one response, of a response by texture: elsewhere the responses
+/// differ by scatter.
+const TEXTURE_PAYS: f64 = 0.67;
 /// Fewest pairs of which some are held out.
 const PAIRS_TO_SPLIT: usize = 6;
 /// Part of the noise's variance that smoothing leaves: sum of the squared taps.
@@ -74,12 +78,13 @@ pub(super) struct Sample {
     noise: f64,
     /// Mean square residual relative to the noise.
     misfit: f32,
+    pub coarseness: f64,
     /// Colour of its block on a checkerboard.
     even: bool,
     /// Half of the field, and every other pair.
     part: [bool; 2],
     /// Original target, not smoothed.
-    original: bool,
+    pub original: bool,
 }
 
 /// How samples are split for learning and testing.
@@ -95,7 +100,16 @@ enum Split {
 impl Sample {
     /// Without noise.
     pub(super) fn exact(measured: f64, truth: f64) -> Self {
-        Self { measured, truth, noise: 0.0, misfit: 1.0, even: false, part: [false; 2], original: true }
+        Self {
+            measured,
+            truth,
+            noise: 0.0,
+            misfit: 1.0,
+            coarseness: 0.0,
+            even: false,
+            part: [false; 2],
+            original: true,
+        }
     }
 }
 
@@ -116,6 +130,7 @@ struct Samples {
 struct Pair {
     far: usize,
     prepared: Prepared,
+    coarseness: Array2<f32>,
     original: bool,
 }
 
@@ -178,7 +193,7 @@ pub(super) fn learn(target: &Target<'_>) -> Result<Learned, StackError> {
         let Ok(samples) = target.measure(&pairs, &optics, window) else { return Ok(()) };
         let largest = Curve::largest_degree(samples.of.iter().filter(|s| s.original));
         for degree in DEGREES.into_iter().filter(|degree| *degree <= largest) {
-            let Some((judged, inside)) = judge(&samples, degree, Split::Blocks) else { continue };
+            let Some((judged, inside)) = judge(&samples, degree, Split::Blocks, false) else { continue };
             // Holes count: unmeasured pixels have no error.
             let fill = inside * samples.of.len() as f64 / samples.looked_at.max(1) as f64;
             let of =
@@ -258,7 +273,8 @@ impl Target<'_> {
                 for value in [&mut noise.constant, &mut noise.per_unit, &mut noise.mean_variance] {
                     *value *= SMOOTHED_NOISE;
                 }
-                let pair = |prepared, original| Pair { far, prepared, original };
+                let pair =
+                    |prepared, original| Pair { far, coarseness: coarseness(&prepared), prepared, original };
                 Some([pair(prepared, true), pair(coarse, false)])
             })
             .flatten_iter()
@@ -305,6 +321,7 @@ impl Target<'_> {
                     truth,
                     noise,
                     misfit: estimate.misfit[(y, x)],
+                    coarseness: f64::from(pair.coarseness[(y, x)]),
                     even: (y / BLOCK_PX + x / BLOCK_PX).is_multiple_of(2),
                     part: [2 * x < width, pair.far.is_multiple_of(2)],
                     original: pair.original,
@@ -317,7 +334,7 @@ impl Target<'_> {
 
 /// Tests every sample with the response of the others, and returns the part of them that has a depth. Depths beyond the
 /// response's range are not tested.
-fn judge(samples: &Samples, degree: usize, by: Split) -> Option<(Vec<Judged>, f64)> {
+fn judge(samples: &Samples, degree: usize, by: Split, textures: bool) -> Option<(Vec<Judged>, f64)> {
     let split = by == Split::Parts && samples.pairs >= PAIRS_TO_SPLIT;
     let part = |s: &Sample| match by {
         Split::Blocks => [s.even, false],
@@ -327,39 +344,41 @@ fn judge(samples: &Samples, degree: usize, by: Split) -> Option<(Vec<Judged>, f6
     let mut judged = Vec::with_capacity(samples.of.len());
     let mut eligible = 0_usize;
     for part in [[false, false], [true, false], [false, true], [true, true]] {
-        let others = || {
+        let all = || {
             let other = |of: &[bool; 2]| of[0] != part[0] && (!split || of[1] != part[1]);
-            samples.of.iter().zip(&parts).filter(move |(s, of)| s.original && other(of)).map(|(s, _)| s)
+            samples.of.iter().zip(&parts).filter(move |(_, of)| other(of)).map(|(s, _)| s)
         };
+        let others = || all().filter(|s| s.original);
         let own: Vec<&Sample> =
             samples.of.iter().zip(&parts).filter(|(_, of)| **of == part).map(|(s, _)| s).collect();
         if own.is_empty() {
             continue;
         }
-        let curve = Curve::fit(others(), degree.min(Curve::largest_degree(others())))?;
+        let degree = degree.min(Curve::largest_degree(others()));
+        let curve = Curve::fit(others(), degree, None)?;
+        let coarser = if textures { Some(by_texture(all(), degree, &curve)?) } else { None };
+        let stage = curve.stage(coarser);
         let [low, high] =
             others().fold([f64::MAX, f64::MIN], |[low, high], s| [low.min(s.truth), high.max(s.truth)]);
         for s in own.into_iter().filter(|s| (low..=high).contains(&s.truth)) {
             eligible += 1;
-            judged.extend(curve.judge(s));
+            judged.extend(tested(&stage, s));
         }
     }
     let inside = judged.len() as f64 / eligible.max(1) as f64;
     (judged.len() > 100).then_some((judged, inside))
 }
 
-impl Curve {
-    fn judge(&self, s: &Sample) -> Option<Judged> {
-        let [found, slope] = self.at(s.measured)?;
-        let noise = s.noise * slope;
-        Some(Judged {
-            error: found - s.truth,
-            truth: s.truth,
-            original: s.original,
-            noise,
-            unexplained: unexplained(s.misfit, noise as f32),
-        })
-    }
+fn tested(stage: &Stage, s: &Sample) -> Option<Judged> {
+    let [found, slope, of_texture] = stage.respond(s.measured, s.coarseness)?;
+    let noise = (s.noise * slope).hypot(of_texture);
+    Some(Judged {
+        error: found - s.truth,
+        truth: s.truth,
+        original: s.original,
+        noise,
+        unexplained: unexplained(s.misfit, noise as f32),
+    })
 }
 
 fn robust(errors: impl Iterator<Item = f64>) -> f64 {
@@ -377,8 +396,24 @@ fn rms(judged: &[Judged]) -> f64 {
 
 /// The response of all samples, and the held-out errors.
 fn finish(samples: &Samples, degree: usize, optics: &Optics, half_mm: f64) -> Option<(Stage, HeldOut)> {
-    let (judged, inside) = judge(samples, degree, Split::Parts)?;
-    let curve = Curve::fit(samples.of.iter().filter(|s| s.original), degree)?;
+    let of = |judged: &[Judged], original: bool| {
+        robust(judged.iter().filter(|j| j.original == original).map(|j| j.error))
+    };
+    let (plain, inside) = judge(samples, degree, Split::Parts, false)?;
+    let curve = Curve::fit(samples.of.iter().filter(|s| s.original), degree, None)?;
+    // Few pairs do not determine the difference of two responses; the deviation has to cover it.
+    let enough = samples.pairs >= ENOUGH_DEPTHS;
+    let coarser = if enough { by_texture(samples.of.iter(), degree, &curve) } else { None };
+    let by_texture = coarser.and_then(|coarser| {
+        let (judged, inside) = judge(samples, degree, Split::Parts, true)?;
+        let pays = of(&judged, false) <= TEXTURE_PAYS * of(&plain, false)
+            && of(&judged, true) <= of(&plain, true) / WORTH;
+        pays.then_some((judged, inside, coarser))
+    });
+    let (judged, inside, coarser) = match by_texture {
+        Some((judged, inside, coarser)) => (judged, inside, Some(coarser)),
+        None => (plain, inside, None),
+    };
     let mut left: Vec<f32> = judged.iter().map(|j| j.unexplained).collect();
     let middle = left.len() / 2;
     let median = f64::from(*left.select_nth_unstable_by(middle, f32::total_cmp).1);
@@ -415,6 +450,7 @@ fn finish(samples: &Samples, degree: usize, optics: &Optics, half_mm: f64) -> Op
         response: curve.response,
         residual: high,
         usual_unexplained: usual(high),
+        coarser,
         ..*identity
     };
     let [within, scatter] = honesty(true, high);
