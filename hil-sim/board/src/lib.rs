@@ -51,6 +51,7 @@ pub mod rig;
 pub mod run;
 pub mod scenario;
 pub mod serial;
+mod stop_wire;
 pub mod trace;
 pub mod wiring;
 

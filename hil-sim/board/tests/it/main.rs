@@ -21,3 +21,4 @@ mod session;
 mod silence;
 mod silicon;
 mod steps;
+mod supply;
