@@ -16,6 +16,7 @@
 pub mod access;
 mod adapter;
 pub mod board;
+pub mod board_test;
 pub mod camera;
 
 pub mod chips;

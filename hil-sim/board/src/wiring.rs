@@ -18,7 +18,7 @@ use crate::{
 };
 
 /// Alternate functions of TIM2, and of TIM3 and TIM4 (DS9405, table 12); other pins are disconnected.
-const TIM2_FUNCTION: u8 = 1;
+pub const TIM2_FUNCTION: u8 = 1;
 const ENCODER_FUNCTION: u8 = 2;
 /// TIM2's counter: lower 32 bits of the firmware's microseconds.
 const TIM2_CNT: u64 = 0x4000_0024;
@@ -82,7 +82,7 @@ pub struct Wiring {
     shots: Vec<Shot>,
 }
 
-fn channel(number: u8) -> Channel {
+pub fn channel(number: u8) -> Channel {
     Channel::new(number).unwrap_or_else(|| unreachable!("timers have channels 1 to 4"))
 }
 
@@ -453,7 +453,7 @@ impl Wiring {
     }
 }
 
-fn is_high(
+pub fn is_high(
     chip: &mut Chip,
     name: PinName,
     function: u8,

@@ -74,8 +74,12 @@ fn overflow(depth: u32) -> u32 {
 }
 
 fn let_the_watchdog_bite(watchdog: embassy_stm32::Peri<'static, IWDG>) -> ! {
+    let mut watchdog = IndependentWatchdog::new(watchdog, WATCHDOG_US);
+    watchdog.unleash();
+    // The counter takes its reload value with the first feed; its registers take five cycles of 32 kHz to change.
+    block_for(Duration::from_millis(1));
+    watchdog.pet();
     let begin = Instant::now();
-    IndependentWatchdog::new(watchdog, WATCHDOG_US).unleash();
     loop {
         retained::keep_piezo_code(begin.elapsed().as_millis() as u16);
     }
