@@ -48,7 +48,6 @@ use farnear_protocol::message::ResetCause;
 use farnear_rig::{Identity, Rig, io::MEMORY_BYTES};
 use static_cell::StaticCell;
 
-
 /// From power-on to the FRAM's first answer (FM25V02, t_PU).
 const MEMORY_STARTS: Duration = Duration::from_micros(250);
 

@@ -135,8 +135,8 @@ pub fn report(path: &Path, wired: bool) -> Result<String, SimError> {
     let emulator = |error: &dyn std::fmt::Display| SimError::Emulator(error.to_string());
     let (line, costs) = (Line::default(), Costs::Average(parts.processor));
     let program = firmware::fingerprint(image.bytes());
-    let mut board = RigBoard::new(&plant, line.clone(), (1, program), &parts, costs)
-        .map_err(|error| emulator(&error))?;
+    let mut board =
+        RigBoard::new(&plant, line.clone(), (1, program), &parts, costs).map_err(|error| emulator(&error))?;
     if wired {
         board.chip.loop_converter_bus(Loop);
     }

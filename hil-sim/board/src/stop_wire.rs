@@ -57,7 +57,8 @@ mod tests {
         let mut firsts = Vec::new();
         for seed in 0..50 {
             let mut wire = StopWire::new(&parts, Noise::new(seed, "stop"));
-            let high = |wire: &mut StopWire| (0..1_000).map(|us| wire.is_high(us * 1_000)).collect::<Vec<_>>();
+            let high =
+                |wire: &mut StopWire| (0..1_000).map(|us| wire.is_high(us * 1_000)).collect::<Vec<_>>();
             assert!(high(&mut wire).iter().all(|high| !high));
             wire.press(true);
             let levels = (1_000..2_000).map(|us| wire.is_high(us * 1_000)).collect::<Vec<_>>();

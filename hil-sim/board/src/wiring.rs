@@ -329,7 +329,13 @@ impl Wiring {
 
     pub fn next_ns(&self) -> Option<u64> {
         let switches_ns = self.stages.iter().map(|stage| stage.due_ns).min();
-        self.camera.next_ns().into_iter().chain(switches_ns).chain([self.stops_due_ns]).min().filter(|at| *at < u64::MAX)
+        self.camera
+            .next_ns()
+            .into_iter()
+            .chain(switches_ns)
+            .chain([self.stops_due_ns])
+            .min()
+            .filter(|at| *at < u64::MAX)
     }
 
     /// STEP too soon after DIR or enable, DIR too soon after STEP.

@@ -19,7 +19,7 @@ use crate::psf::Psf;
 pub use distortion::{Distortion, DistortionSection};
 pub use doubt::Doubt;
 pub use error::OpticsError;
-pub use file::{FocusSection, LensSection, OpticsFile, SensorSection};
+pub use file::{FocusSection, LensSection, LightSection, OpticsFile, SensorSection};
 pub(crate) use stage::interpolated;
 pub use stage::{RESPONSE_POINTS, Stage, unexplained};
 

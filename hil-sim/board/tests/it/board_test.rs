@@ -25,8 +25,19 @@ fn the_test_of_a_real_board_passes_on_the_emulated_one_and_finds_missing_wires()
     let with = report(true);
     println!("{with}");
     let all = [
-        "FRAM", "board", "brown-out reset", "control tick", "converter bus", "emergency stop", "exposures",
-        "external clock", "link", "stack overflow", "steps", "time base", "watchdog",
+        "FRAM",
+        "board",
+        "brown-out reset",
+        "control tick",
+        "converter bus",
+        "emergency stop",
+        "exposures",
+        "external clock",
+        "link",
+        "stack overflow",
+        "steps",
+        "time base",
+        "watchdog",
     ];
     assert_eq!((verdicts(&with, "pass"), verdicts(&with, "fail")), (all.to_vec(), vec![]));
     let without = report(false);

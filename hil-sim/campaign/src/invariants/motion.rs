@@ -39,12 +39,15 @@ pub fn hard_stop(case: &Case<'_>) -> Vec<Broken> {
 
 pub fn piezo_step(case: &Case<'_>) -> Vec<Broken> {
     let truths = case.sights.iter().filter_map(|sight| match &sight.seen {
-        Seen::Reported { truth, .. } | Seen::Answered { truth, .. } => Some((sight.at_ns, truth.piezo_step_um)),
+        Seen::Reported { truth, .. } | Seen::Answered { truth, .. } => {
+            Some((sight.at_ns, truth.piezo_step_um))
+        }
         _ => None,
     });
     let mut larger = truths.filter(|(_, um)| *um > PIEZO_STEP_MAX_UM);
     let broken = larger.next().map(|(at_ns, um)| {
-        let what = format!("the piezo's command changed by {um:.1} um at once, {PIEZO_STEP_MAX_UM} are allowed");
+        let what =
+            format!("the piezo's command changed by {um:.1} um at once, {PIEZO_STEP_MAX_UM} are allowed");
         Broken { property: "piezo-step", at_ns, what }
     });
     broken.into_iter().collect()

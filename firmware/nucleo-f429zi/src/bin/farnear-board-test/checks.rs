@@ -71,7 +71,12 @@ fn tick(board: &mut Nucleo, report: &mut Report) {
         longest = longest.max(DWT::cycle_count().wrapping_sub(cycles));
         while begin.elapsed() < Duration::from_micros(u64::from(TICK_US)) {}
     }
-    tell(report, "control tick", longest < TICK_CYCLES, format_args!("{longest} cycles, allowed {TICK_CYCLES}"));
+    tell(
+        report,
+        "control tick",
+        longest < TICK_CYCLES,
+        format_args!("{longest} cycles, allowed {TICK_CYCLES}"),
+    );
 }
 
 /// STEP (PE9) at TIM4's first channel (PD12), which counts its rising edges.
@@ -93,7 +98,11 @@ fn edges() -> u16 {
     pac::TIM4.cnt().read().cnt()
 }
 
-fn play<T: farnear_nucleo_f429zi::stepper::StepInstance>(stepper: &mut Stepper<T>, segments: &[Segment], enable: bool) {
+fn play<T: farnear_nucleo_f429zi::stepper::StepInstance>(
+    stepper: &mut Stepper<T>,
+    segments: &[Segment],
+    enable: bool,
+) {
     let segments = Vec::from_slice(segments).unwrap_or_default();
     stepper.apply(&MotorOutputs { enable, segments, ..MotorOutputs::default() });
 }
@@ -113,10 +122,18 @@ fn steps<T: farnear_nucleo_f429zi::stepper::StepInstance>(stepper: &mut Stepper<
     let counted = stepper.state().pulses.wrapping_sub(before);
     // 30 pulses of 25 us and 10 of 100 us.
     let passed = edges() == 40 && counted == 40 && us.abs_diff(1_750) < 20;
-    tell(report, "steps", passed, format_args!("{} edges at PD12 of 40, {counted} counted, {us} us of 1750", edges()));
+    tell(
+        report,
+        "steps",
+        passed,
+        format_args!("{} edges at PD12 of 40, {counted} counted, {us} us of 1750", edges()),
+    );
 }
 
-fn emergency_stop<T: farnear_nucleo_f429zi::stepper::StepInstance>(stepper: &mut Stepper<T>, report: &mut Report) {
+fn emergency_stop<T: farnear_nucleo_f429zi::stepper::StepInstance>(
+    stepper: &mut Stepper<T>,
+    report: &mut Report,
+) {
     count_edges();
     play(stepper, &[LONG, LONG, LONG, Segment { last: true, ..LONG }], true);
     block_for(Duration::from_micros(1_550));
@@ -126,7 +143,12 @@ fn emergency_stop<T: farnear_nucleo_f429zi::stepper::StepInstance>(stepper: &mut
     block_for(Duration::from_millis(5));
     let (after, told) = (edges(), stepper.emergency_stop());
     let passed = told && at_the_stop == after && (14..=17).contains(&after);
-    tell(report, "emergency stop", passed, format_args!("{after} of 40 steps, {at_the_stop} at the stop; told: {told}"));
+    tell(
+        report,
+        "emergency stop",
+        passed,
+        format_args!("{after} of 40 steps, {at_the_stop} at the stop; told: {told}"),
+    );
 }
 
 /// Trigger (PB10) at the strobe input (PB11).

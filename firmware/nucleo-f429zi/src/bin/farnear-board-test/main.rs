@@ -117,7 +117,12 @@ fn speak(link: &mut Link, report: &str) -> ! {
             line.clear();
             let baud = rate.baud();
             let passed = count == PATTERN && wrong == 0;
-            tell(&mut line, "link", passed, format_args!("{baud} baud: {count} of {PATTERN} bytes, {wrong} wrong"));
+            tell(
+                &mut line,
+                "link",
+                passed,
+                format_args!("{baud} baud: {count} of {PATTERN} bytes, {wrong} wrong"),
+            );
             send(link, report);
             let _ = writeln!(line, "end\t{baud}");
             send(link, &line);
@@ -153,9 +158,19 @@ async fn main(_spawner: Spawner) {
     let mut report = Report::new();
     let _ = writeln!(report, "farnear-board-test\t{}\t{:02x?}", env!("CARGO_PKG_VERSION"), uid::uid());
     let overflow_reported = boot.wrapping_sub(1) == BITTEN;
-    tell(&mut report, "stack overflow", overflow_reported, format_args!("a bus fault below the stack, and a reset"));
+    tell(
+        &mut report,
+        "stack overflow",
+        overflow_reported,
+        format_args!("a bus fault below the stack, and a reset"),
+    );
     let bitten = cause == ResetCause::Watchdog && WATCHDOG_MS.contains(&watchdog_ms);
-    tell(&mut report, "watchdog", bitten, format_args!("{watchdog_ms} ms, expected 68 to 188; cause {cause:?}"));
+    tell(
+        &mut report,
+        "watchdog",
+        bitten,
+        format_args!("{watchdog_ms} ms, expected 68 to 188; cause {cause:?}"),
+    );
     // The next reset begins anew.
     retained::set_boot(0);
     match Nucleo::set_up(p) {
