@@ -56,18 +56,20 @@ fn a_sinking_supply_leaves_time_to_store_its_alarm() {
 
 #[test]
 fn unplugging_the_board_with_the_amplifier_on_does_not_snap_the_stack() {
-    for rest_us in [0, 1_500_000] {
+    for (rest_us, left_us, allowed) in
+        [(0, 4_800, 20.0..90.0), (1_500_000, 4_800, 20.0..90.0), (0, 0, 110.0..200.0)]
+    {
         let mut bench = Bench::new(1);
         bench.move_to(Axis::SensorFine, Nanometres(156_000));
         bench.rig.advance_us(rest_us).expect("runs");
         bench.access(|rig| rig.set_supply_mv(2_950));
-        bench.rig.advance_us(4_800).expect("runs");
+        bench.rig.advance_us(left_us).expect("runs");
         bench.access(|rig| rig.set_power(false));
         bench.rig.advance_us(100_000).expect("runs");
         let pulled = bench.report().piezo_pulled_um;
-        println!("{rest_us} us after the move: pulled by {pulled:.1} um");
-        // At once it would be 110 um or more. Blocking force: 200 um.
-        assert!(pulled < 90.0, "{pulled} um");
+        println!("{rest_us} us after the move, {left_us} us left: pulled by {pulled:.1} um");
+        // Without the 4.8 ms nothing softens it. Blocking force: 200 um.
+        assert!(allowed.contains(&pulled), "{pulled} um");
     }
 }
 

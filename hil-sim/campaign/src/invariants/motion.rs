@@ -38,6 +38,10 @@ pub fn hard_stop(case: &Case<'_>) -> Vec<Broken> {
 }
 
 pub fn piezo_step(case: &Case<'_>) -> Vec<Broken> {
+    // A DAC whose wire returns takes over the held code at once (docs/silicon.md).
+    if case.has(&["dac-dead"]) {
+        return Vec::new();
+    }
     let truths = case.sights.iter().filter_map(|sight| match &sight.seen {
         Seen::Reported { truth, .. } | Seen::Answered { truth, .. } => {
             Some((sight.at_ns, truth.piezo_step_um))
