@@ -78,6 +78,7 @@ impl Optics {
             psf: psf_of(psf)?,
             distortion: None,
             stage: None,
+            light: None,
         };
         file.check().map(Self).map_err(wrong)
     }

@@ -1,6 +1,9 @@
 //! Builds every board's firmware and copies the ELFs next to the host programs, where `farnear-sim` finds its own.
 
-use std::{fs, path::PathBuf};
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
 
 use anyhow::{Context, Result, bail};
 
@@ -13,6 +16,8 @@ use crate::{
 
 /// Counts the instructions of the on-board routines.
 const COUNTER: &str = "farnear-count";
+/// Tests a real board.
+const BOARD_TEST: &str = "farnear-board-test";
 
 fn built(board: &Board, program: &str) -> Result<PathBuf> {
     let elf = board.folder().join("target").join(TARGET).join("release").join(program);
@@ -37,14 +42,27 @@ fn build_board(board: &Board, way: Way, selection: Selection) -> Result<PathBuf>
     }
     finish(&mut cargo)?;
     let elf = built(board, &program)?;
+    put_beside(&elf, &program)?;
+    if selection == Selection::All {
+        put_beside(&built(board, BOARD_TEST)?, BOARD_TEST)?;
+    }
+    Ok(elf)
+}
+
+/// Copies an ELF next to the host programs.
+fn put_beside(elf: &Path, program: &str) -> Result<()> {
     for profile in ["debug", "release"] {
         let beside = target_folder().join(profile);
         let copy = beside.join(format!("{program}.elf"));
         fs::create_dir_all(&beside)
-            .and_then(|()| fs::copy(&elf, &copy))
+            .and_then(|()| fs::copy(elf, &copy))
             .with_context(|| format!("cannot write {}", copy.display()))?;
     }
-    Ok(elf)
+    Ok(())
+}
+
+pub fn board_test() -> Result<PathBuf> {
+    built(EMULATED, BOARD_TEST)
 }
 
 pub fn counter() -> Result<PathBuf> {

@@ -2,6 +2,7 @@
 
 mod arm;
 mod bench;
+mod board_test;
 mod boards;
 mod browser;
 mod campaign;
@@ -50,6 +51,8 @@ enum Job {
         #[arg(long)]
         write: bool,
     },
+    /// Test a NUCLEO-F429ZI with jumper wires and no rig (docs/bring-up.md), and write a report; without --port the emulated one.
+    BoardTest(board_test::Arguments),
     /// Play random scenarios on the emulated board, check their invariants and shrink failures. Then run the long tests on
     /// each rig: a million steps, thousands of moves, a fuzzed link.
     Campaign(campaign::Arguments),
@@ -82,6 +85,7 @@ fn main() -> ExitCode {
             sizes::check(&elf)?;
             instructions::run(write)
         }),
+        Job::BoardTest(arguments) => board_test::run(&arguments),
         Job::Campaign(arguments) => campaign::run(&arguments),
         Job::Fuzz { seconds } => fuzz::run(seconds),
         Job::Bench(arguments) => bench::run(&arguments),

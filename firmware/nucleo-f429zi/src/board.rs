@@ -11,7 +11,7 @@ use embassy_stm32::{
 use farnear_protocol::{BoardMicros, Log, message::LinkRate};
 use farnear_rig::{
     control::{Board, Note},
-    io::{ExposureEdges, MotorInputs, Outputs, StrobeEdges},
+    io::{ExposureEdges, MotorInputs, Outputs, StrobeEdges, Trigger},
 };
 
 use crate::{
@@ -32,7 +32,7 @@ use crate::{
 const WATCHDOG_US: u32 = 100_000;
 
 pub struct Nucleo {
-    coarse: Axis<TIM1, TIM4>,
+    pub coarse: Axis<TIM1, TIM4>,
     lens: Axis<TIM8, TIM3>,
     piezo: Piezo,
     camera: CameraPort,
@@ -80,6 +80,14 @@ impl Nucleo {
             watchdog: IndependentWatchdog::new(p.IWDG, WATCHDOG_US),
         };
         Ok(Parts { board, led: p.PB0, emulated })
+    }
+
+    pub const fn link(&mut self) -> &mut Link {
+        &mut self.link
+    }
+
+    pub fn expose(&mut self, order: Trigger) {
+        self.camera.expose(order);
     }
 
     pub fn wake_watchdog(&mut self) {
@@ -146,7 +154,7 @@ impl Board for Nucleo {
         }
         self.camera.listen(outputs.listen);
         if let Some(trigger) = outputs.trigger {
-            self.camera.expose(trigger);
+            self.expose(trigger);
         }
         if let (Some(memory), Some(order)) = (&mut self.memory, &outputs.memory) {
             memory.write(order);

@@ -1,7 +1,7 @@
 //! # farnear-nucleo-f429zi
 //!
 //! Firmware of a NUCLEO-F429ZI: clocks, pins and registers; behaviour is in `farnear-rig`. One file per driver;
-//! [`board`] combines them, and [`control`] ticks 5000 times a second, 500 times at rest.
+//! `board` combines them, and `control` ticks 5000 times a second, 500 times at rest.
 //!
 //! | pin | function | signal |
 //! |---|---|---|
@@ -27,22 +27,6 @@
 #![no_std]
 #![no_main]
 
-mod axis;
-mod board;
-mod camera;
-mod clock;
-mod clock_tree;
-mod control;
-mod encoder;
-mod light;
-mod link;
-mod memory;
-mod option_bytes;
-mod piezo;
-mod registers;
-mod stepper;
-mod supply;
-
 use defmt::{error, info};
 use embassy_executor::Spawner;
 use embassy_stm32::{
@@ -50,15 +34,19 @@ use embassy_stm32::{
     uid,
 };
 use embassy_time::{Duration, block_for};
+use farnear_nucleo_f429zi::{
+    board::{Nucleo, Parts},
+    clock, control,
+    memory::Memory,
+    option_bytes,
+    registers::{
+        self,
+        retained::{self, Last},
+    },
+};
 use farnear_protocol::message::ResetCause;
 use farnear_rig::{Identity, Rig, io::MEMORY_BYTES};
 use static_cell::StaticCell;
-
-use crate::{
-    board::{Nucleo, Parts},
-    memory::Memory,
-    registers::retained::{self, Last},
-};
 
 /// From power-on to the FRAM's first answer (FM25V02, t_PU).
 const MEMORY_STARTS: Duration = Duration::from_micros(250);

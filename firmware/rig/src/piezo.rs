@@ -49,6 +49,8 @@ const INNOVATION_SHIFT: u32 = 4;
 const INNOVATION_CLIP: i32 = 2 * INNOVATION_LIMIT;
 /// Ticks of the lowering at the start, and the codes (3 um) below which none is needed.
 const RELAX: u32 = TICK_HZ / 10;
+/// Ticks of the lowering while the supply sinks: 4.4 of the 4.8 ms that are left (docs/rig.md).
+const RELAX_FAST: u32 = 22;
 const RELAXED: u16 = 1_000;
 
 /// Fraction bits of a position.
@@ -87,8 +89,8 @@ impl Loop {
 enum Start {
     /// The gauge has not given the position.
     Unknown,
-    /// Lowered from a code.
-    Down { from: u16, ticks: u32 },
+    /// Lowered from a code within `over` ticks.
+    Down { from: u16, ticks: u32, over: u32 },
     /// Relaxed or controlled.
     Over,
 }
@@ -313,16 +315,26 @@ impl Piezo {
             None => self.scale.playable(fixed(self.measured)),
         };
         (self.start, self.code, self.command) = if from > RELAXED {
-            (Start::Down { from, ticks: 0 }, from, command)
+            (Start::Down { from, ticks: 0, over: RELAX }, from, command)
         } else {
             (Start::Over, 0, 0)
         };
     }
 
+    /// The DAC drops to 0 with its supply; a stack that it stretches would swing into tension.
+    pub(crate) const fn release(&mut self) {
+        if matches!(self.start, Start::Unknown) || self.code == 0 {
+            return;
+        }
+        (self.control, self.closing, self.driven) = (None, false, false);
+        self.start = Start::Down { from: self.code, ticks: 0, over: RELAX_FAST };
+        self.target = Nanometres(0);
+    }
+
     fn relax(&mut self) {
-        let Start::Down { from, ticks } = &mut self.start else { return };
+        let Start::Down { from, ticks, over } = &mut self.start else { return };
         *ticks += 1;
-        let (at, over) = (u64::from(*ticks), u64::from(RELAX));
+        let (at, over) = (u64::from(*ticks), u64::from(*over));
         // 3 t^2 - 2 t^3 of the remaining time; 43 bits.
         let left = over - at;
         self.code = (u64::from(*from) * left * left * (3 * over - 2 * left) / (over * over * over)) as u16; // at most `from`

@@ -289,9 +289,13 @@ impl Rig {
     pub fn tick(&mut self, inputs: &Inputs) -> Outputs {
         let now = inputs.now;
         self.begin(now);
+        let sinks = inputs.supply_low && !self.supply_low;
         (self.emergency_stop, self.supply_low) = (inputs.emergency_stop, inputs.supply_low);
         // First: an open circuit has cut the pulses, which is not a timer fault.
         self.watch_inputs(inputs);
+        if sinks {
+            self.stage.fine.release();
+        }
         self.stage.sense(inputs, core::mem::take(&mut self.rested));
         let stage = &self.stage;
         self.notes.look(|axis| stage.state(axis));

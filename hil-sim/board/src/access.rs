@@ -58,11 +58,7 @@ impl RigAccess<'_, '_> {
 
     /// `pressed` opens the circuit.
     pub fn set_emergency_stop(&mut self, pressed: bool) {
-        let at = self.stop.at;
-        for stage in [StageName::Sensor, StageName::Lens] {
-            self.chip().drive_pin(at, pins(stage).stop.0, Level::from(pressed));
-        }
-        self.chip().join_breaks(at);
+        self.wiring.press_stop(pressed);
     }
 
     pub fn set_driver_fault(&mut self, stage: StageName, fault: bool) {

@@ -17,7 +17,7 @@ use rigless::{
 use crate::{
     access::{RigAccess, forget},
     adapter::Adapter,
-    board::{NOTHING, RigBoard},
+    board::{Chip, NOTHING, RigBoard},
     chips::{SharedPlant, with_plant},
     command::{CameraOrder, Command, Outlets},
     config::RigConfig,
@@ -30,7 +30,7 @@ use crate::{
     pacing::Pacing,
     parts::Parts,
     pictures::Patience,
-    plant::StageName,
+    plant::{Noise, StageName},
     replay::Script,
     report::{Report, StageReport},
     scenario::Scenario,
@@ -333,7 +333,19 @@ impl Driver {
         self.wiring.next_ns().is_some() || !self.schedule.is_over() || self.scenario.unplug_after_ms.is_some()
     }
 
-    fn note_resets(&mut self, session: &Session<RigBoard>, at: VirtualNanos) {
+    /// Without the resistors of docs/rig.md: what noise does to the pins while the chip is reset.
+    fn float(&mut self, chip: &mut Chip, at: VirtualNanos) {
+        let mut noise = Noise::new(at.0, "floating pins");
+        let code = noise.bits() as u16;
+        with_plant(&self.plant, |plant| plant.disturb_dac(at.0, code));
+        if let Some(memory) = chip.memory() {
+            memory.disturb(noise.bits());
+        }
+        self.wiring.camera_mut().trigger(at.0, true);
+        self.wiring.camera_mut().trigger(at.0, false);
+    }
+
+    fn note_resets(&mut self, session: &mut Session<RigBoard>, at: VirtualNanos) {
         let (resets, powered) = (session.resets().len(), !session.unpowered());
         if (resets, powered) == (self.resets, self.powered) {
             return;
@@ -347,6 +359,12 @@ impl Driver {
         }
         if powered != self.powered {
             self.observer.note(at.0, Seen::Powered(powered));
+        }
+        if powered != self.powered && !powered {
+            // The DAC's output drops with its supply; the amplifier stays on.
+            with_plant(&self.plant, |plant| plant.disturb_dac(at.0, 0));
+        } else if !self.parts.wires.resistors {
+            self.float(&mut session.board_mut().chip, at);
         }
         self.observer.reset();
         (self.resets, self.powered) = (resets, powered);

@@ -16,6 +16,7 @@
 pub mod access;
 mod adapter;
 pub mod board;
+pub mod board_test;
 pub mod camera;
 
 pub mod chips;
@@ -51,6 +52,7 @@ pub mod rig;
 pub mod run;
 pub mod scenario;
 pub mod serial;
+mod stop_wire;
 pub mod trace;
 pub mod wiring;
 

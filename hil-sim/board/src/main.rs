@@ -47,6 +47,12 @@ enum Job {
         /// Counting firmware, built by `cargo xtask firmware`.
         elf: PathBuf,
     },
+    /// Run the test of a real board on the emulated one, with jumper wires instead of the rig, and print its report.
+    #[command(hide = true)]
+    BoardTest {
+        /// Test firmware, built by `cargo xtask firmware`.
+        elf: PathBuf,
+    },
 }
 
 #[derive(Args)]
@@ -138,6 +144,7 @@ fn main() -> ExitCode {
         Job::Run(run) => serve(&run),
         Job::Replay { trace, firmware } => play_again(&trace, firmware.as_deref()),
         Job::Count { elf } => count(&elf),
+        Job::BoardTest { elf } => board_test(&elf),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,
@@ -146,6 +153,11 @@ fn main() -> ExitCode {
             ExitCode::FAILURE
         }
     }
+}
+
+fn board_test(elf: &Path) -> Result<()> {
+    let report = farnear_sim::board_test::report(elf, true)?;
+    Ok(std::io::stdout().write_all(report.as_bytes())?)
 }
 
 fn play_again(trace: &Path, firmware: Option<&Path>) -> Result<()> {

@@ -76,6 +76,16 @@ impl MemoryChip {
         self.failed && self.fails_at.take().is_some()
     }
 
+    /// Noise on select, clock and data: another byte at a random address.
+    pub fn disturb(&mut self, noise: u64) {
+        let mut contents = self.chip.stored().to_vec();
+        let at = noise as usize % contents.len().max(1);
+        if let Some(byte) = contents.get_mut(at) {
+            *byte = (noise >> 32) as u8;
+        }
+        self.rebuild(&contents, VirtualNanos(0));
+    }
+
     pub fn set_contents(&mut self, contents: &[u8; SIZE]) {
         self.rebuild(contents, VirtualNanos(0));
     }

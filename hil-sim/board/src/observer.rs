@@ -19,6 +19,8 @@ pub struct Truth {
     pub piezo_um: f64,
     /// Microsteps against a hard stop, per stage.
     pub pressed: [u64; 2],
+    /// Largest step of the piezo's command so far.
+    pub piezo_step_um: f64,
 }
 
 impl Truth {
@@ -29,6 +31,7 @@ impl Truth {
             lens_um: lens.position_um(),
             piezo_um: plant.piezo().position_um(),
             pressed: [sensor.pressed(), lens.pressed()],
+            piezo_step_um: plant.piezo().largest_step_um(),
         }
     }
 }

@@ -20,6 +20,7 @@ pub struct Parts {
     pub memory: MemoryParts,
     pub supply: SupplyParts,
     pub switches: SwitchParts,
+    pub wires: WireParts,
     pub driver: DriverParts,
     pub imaging: ImagingParts,
     pub half_mirror: HalfMirrorParts,
@@ -251,6 +252,15 @@ pub struct SwitchParts {
     pub glitch_us: u64,
     /// Rate of false openings while the driver is on.
     pub glitches_per_s: f64,
+}
+
+#[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct WireParts {
+    /// Pull resistors at the selects, clock and trigger; without them a reset lets these float.
+    pub resistors: bool,
+    pub break_rise_us: u64,
+    pub break_bounce_us: u64,
 }
 
 #[derive(Clone, Copy, PartialEq, Debug, Serialize, Deserialize)]

@@ -124,6 +124,12 @@ impl Plant {
         self.piezo.set_dac(code);
     }
 
+    /// See [`Piezo::disturb_dac`].
+    pub fn disturb_dac(&mut self, now_ns: u64, code: u16) {
+        self.advance(now_ns);
+        self.piezo.disturb_dac(code);
+    }
+
     pub fn sample_gauge(&mut self, now_ns: u64) -> u32 {
         self.advance(now_ns);
         let GaugeParts { gain, offset_um, noise_um } = self.gauge;

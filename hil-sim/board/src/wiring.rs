@@ -14,10 +14,11 @@ use crate::{
     lights::Lights,
     parts::{DriverParts, Parts},
     plant::{Contact, ExposureTruth, Noise, StageName},
+    stop_wire::StopWire,
 };
 
 /// Alternate functions of TIM2, and of TIM3 and TIM4 (DS9405, table 12); other pins are disconnected.
-const TIM2_FUNCTION: u8 = 1;
+pub const TIM2_FUNCTION: u8 = 1;
 const ENCODER_FUNCTION: u8 = 2;
 /// TIM2's counter: lower 32 bits of the firmware's microseconds.
 const TIM2_CNT: u64 = 0x4000_0024;
@@ -70,6 +71,9 @@ pub struct Wiring {
     plant: SharedPlant,
     camera: Camera,
     stages: [StageWires; 2],
+    /// Contacts of the emergency stop.
+    stops: [StopWire; 2],
+    stops_due_ns: u64,
     lights: Lights,
     trigger: bool,
     strobe_cut: bool,
@@ -78,7 +82,7 @@ pub struct Wiring {
     shots: Vec<Shot>,
 }
 
-fn channel(number: u8) -> Channel {
+pub fn channel(number: u8) -> Channel {
     Channel::new(number).unwrap_or_else(|| unreachable!("timers have channels 1 to 4"))
 }
 
@@ -233,6 +237,9 @@ impl Wiring {
             plant,
             camera,
             stages,
+            stops: ["stop contact", "lens stop contact"]
+                .map(|purpose| StopWire::new(&parts.1.wires, Noise::new(parts.0, purpose))),
+            stops_due_ns: u64::MAX,
             lights: Lights::default(),
             trigger: false,
             strobe_cut: false,
@@ -263,6 +270,9 @@ impl Wiring {
         for stage in &mut self.stages {
             stage.look(&self.plant, chip, at, driver_written);
         }
+        if self.stops_due_ns <= at.0 {
+            self.put_stops(chip, at);
+        }
         let trigger = is_high(chip, TRIGGER, TIM2_FUNCTION, |chip| {
             let (timer, registers) = chip.part().timer(TIM2);
             timer.output(channel(3), registers)
@@ -278,6 +288,20 @@ impl Wiring {
         for stage in &mut self.stages {
             stage.put(&self.plant, chip, at);
         }
+        self.put_stops(chip, at);
+    }
+
+    /// `pressed` opens the contacts; takes effect at the next [`Self::put`].
+    pub fn press_stop(&mut self, pressed: bool) {
+        self.stops.iter_mut().for_each(|stop| stop.press(pressed));
+    }
+
+    fn put_stops(&mut self, chip: &mut Chip, at: VirtualNanos) {
+        for (stop, stage) in self.stops.iter_mut().zip([StageName::Sensor, StageName::Lens]) {
+            chip.drive_pin(at, pins(stage).stop.0, Level::from(stop.is_high(at.0)));
+        }
+        self.stops_due_ns = self.stops.iter().map(|stop| stop.next_ns(at.0)).min().unwrap_or(u64::MAX);
+        chip.join_breaks(at);
     }
 
     fn expose(&mut self, chip: &mut Chip, at: VirtualNanos, at_ns: u64, edge: Edge) {
@@ -305,7 +329,13 @@ impl Wiring {
 
     pub fn next_ns(&self) -> Option<u64> {
         let switches_ns = self.stages.iter().map(|stage| stage.due_ns).min();
-        self.camera.next_ns().into_iter().chain(switches_ns).min().filter(|at| *at < u64::MAX)
+        self.camera
+            .next_ns()
+            .into_iter()
+            .chain(switches_ns)
+            .chain([self.stops_due_ns])
+            .min()
+            .filter(|at| *at < u64::MAX)
     }
 
     /// STEP too soon after DIR or enable, DIR too soon after STEP.
@@ -429,7 +459,7 @@ impl Wiring {
     }
 }
 
-fn is_high(
+pub fn is_high(
     chip: &mut Chip,
     name: PinName,
     function: u8,

@@ -193,6 +193,9 @@ struct RawFile {
     sensor: RawSensor,
     focus: RawFocus,
     psf: Option<RawPsf>,
+    /// Of the rig's commands.
+    #[serde(default, rename = "light")]
+    _light: serde::de::IgnoredAny,
 }
 
 #[derive(Deserialize)]

@@ -31,6 +31,7 @@ fn optics() -> Optics {
         psf: "gaussian:k=0.4578".parse().unwrap(),
         distortion: None,
         stage: None,
+        light: None,
     }
     .check()
     .unwrap()

@@ -32,6 +32,7 @@ fn main() {
         psf: "pillbox".parse().unwrap(),
         distortion: None,
         stage: None,
+        light: None,
     }
     .check()
     .unwrap();

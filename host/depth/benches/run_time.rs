@@ -34,6 +34,7 @@ fn optics(psf: &str) -> Optics {
         psf: psf.parse().unwrap(),
         distortion: None,
         stage: None,
+        light: None,
     }
     .check()
     .unwrap()

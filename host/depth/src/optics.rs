@@ -19,7 +19,7 @@ use crate::psf::Psf;
 pub use distortion::{Distortion, DistortionSection};
 pub use doubt::Doubt;
 pub use error::OpticsError;
-pub use file::{FocusSection, LensSection, OpticsFile, SensorSection};
+pub use file::{FocusSection, LensSection, LightSection, OpticsFile, SensorSection};
 pub use stage::{Coarser, RESPONSE_POINTS, Stage, unexplained};
 
 /// Image distance of an object at `object_mm`; the thin lens is its own inverse, so this also maps back.

@@ -289,6 +289,7 @@ mod tests {
             psf: "pillbox".parse().unwrap(),
             distortion: None,
             stage: None,
+            light: None,
         };
         let operators = Operators::for_optics(&optics.check().unwrap()).unwrap();
         let image = Array2::from_shape_fn((12, 19), |(y, x)| ((37 * y + 11 * x) % 17) as f32 - 8.0);

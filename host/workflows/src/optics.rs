@@ -10,15 +10,17 @@ use std::{
 
 use farnear_capture::record::{CAPTURE_FILE, read_record};
 use farnear_depth::{
-    optics::{Doubt, Optics, OpticsFile},
+    optics::{Doubt, LightSection, Optics, OpticsFile},
     psf::Psf,
 };
+use farnear_protocol::message::LightLevels;
 
 pub use expected::{ExpectedError, expected_error};
 pub use task::{OpticsFigures, OpticsRequest};
 
 use crate::{
     error::{About, Result, WorkflowError},
+    rig::camera::light_of_percent,
     text_file,
 };
 
@@ -27,6 +29,8 @@ pub struct GivenOptics {
     pub path: PathBuf,
     pub optics: Optics,
     pub table: toml::Table,
+    /// Of `[light]`, if it switches one on.
+    pub light: Option<LightLevels>,
 }
 
 impl GivenOptics {
@@ -38,7 +42,13 @@ impl GivenOptics {
     /// Checks optics that are part of the file `path`.
     pub fn parse(text: &str, path: &Path) -> Result<Self> {
         let table = text.parse().about(|| about(path))?;
-        Ok(Self { path: path.into(), optics: check(text, path)?, table })
+        let file: OpticsFile = toml::from_str(text).about(|| about(path))?;
+        let light = file.light.map(|LightSection { first, second }| light_of_percent([first, second]));
+        let wrong = |expected: String| {
+            WorkflowError::parameter("light", path.display(), format!("[light]: {expected}"))
+        };
+        let light = light.transpose().map_err(wrong)?.filter(|levels| *levels != LightLevels::OFF);
+        Ok(Self { path: path.into(), optics: file.check().about(|| about(path))?, table, light })
     }
 
     fn with_doubts(self) -> (Optics, Vec<OpticsDoubt>) {
@@ -98,8 +108,8 @@ pub fn of_pair(named: Option<&Path>, far: &Path) -> Result<(Optics, Vec<OpticsDo
     }
     let folder = far.parent().unwrap_or(Path::new(""));
     if let Some(record) = read_record(folder)? {
-        let optics = check(&toml::to_string(&record.optics)?, &folder.join(CAPTURE_FILE))?;
-        return Ok((optics, doubts(&optics, record.optics.contains_key("psf"))));
+        let text = toml::to_string(&record.optics)?;
+        return GivenOptics::parse(&text, &folder.join(CAPTURE_FILE)).map(|given| given.with_doubts());
     }
     let beside = folder.join("optics.toml");
     if beside.exists() {
@@ -114,11 +124,6 @@ pub(crate) fn file_of_pair(named: Option<&Path>, far: &Path) -> Option<PathBuf> 
     let beside =
         || [CAPTURE_FILE, "optics.toml"].map(|name| folder.join(name)).into_iter().find(|file| file.exists());
     named.map(Path::to_path_buf).or_else(beside)
-}
-
-fn check(text: &str, path: &Path) -> Result<Optics> {
-    let file: OpticsFile = toml::from_str(text).about(|| about(path))?;
-    file.check().about(|| about(path))
 }
 
 fn about(path: &Path) -> String {

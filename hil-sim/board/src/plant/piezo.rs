@@ -35,6 +35,7 @@ pub struct Piezo {
     second: Mode,
     parts: PiezoParts,
     pulled_um: f64,
+    largest_step: u16,
     full_step: Propagator,
 }
 
@@ -125,13 +126,25 @@ impl Piezo {
             first: Mode::default(),
             second: Mode::default(),
             pulled_um: 0.0,
+            largest_step: 0,
             full_step: Propagator::over(Self::STEP_NS as f64 * 1e-9, &parts),
             parts,
         }
     }
 
     pub fn set_dac(&mut self, code: u16) {
+        self.largest_step = self.largest_step.max(code.abs_diff(self.code));
         self.code = code;
+    }
+
+    /// A code that the firmware did not send.
+    pub fn disturb_dac(&mut self, code: u16) {
+        self.code = code;
+    }
+
+    /// Largest change of the firmware's codes from one to the next, micrometres.
+    pub fn largest_step_um(&self) -> f64 {
+        f64::from(self.largest_step) / DAC_MAX * STROKE_UM
     }
 
     pub fn dac(&self) -> u16 {

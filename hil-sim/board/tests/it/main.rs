@@ -3,6 +3,7 @@
 mod accuracy;
 mod bad_line;
 mod bench;
+mod board_test;
 mod calibration;
 mod continuous;
 mod fuzz;
@@ -21,3 +22,4 @@ mod session;
 mod silence;
 mod silicon;
 mod steps;
+mod supply;

@@ -6,14 +6,14 @@ use farnear_protocol::{
 };
 use farnear_sim::{
     Parts, Report, RigConfig,
-    parts::{BrownOut, GaugeParts, MemoryMake, PiezoParts, SwitchParts},
+    parts::{GaugeParts, MemoryMake, PiezoParts, SwitchParts},
 };
 
 use crate::bench::{Bench, SILENCE, fine_shot, go};
 
 const TICK_CYCLES: u32 = 33_600;
 
-fn rig_with(change: impl FnOnce(&mut Parts)) -> Bench {
+pub fn rig_with(change: impl FnOnce(&mut Parts)) -> Bench {
     let mut parts = Parts::default();
     change(&mut parts);
     Bench::with(&RigConfig { parts, ..RigConfig::default() })
@@ -121,45 +121,6 @@ fn read_errors_at_start_lose_neither_the_memory_nor_a_record() {
         assert_eq!(bench.alarm(), None);
     }
     assert!(!bench.events.iter().any(|event| matches!(event.kind, EventKind::RecordRepaired { .. })));
-}
-
-#[test]
-fn the_firmware_never_programs_the_option_bytes() {
-    // Programming erases the sector: a supply failure then leaves the chip protected.
-    let mut bench = rig_with(|parts| parts.supply.brown_out = BrownOut::Off);
-    assert_eq!(bench.boot, 1);
-    bench.access(|rig| rig.press_reset());
-    bench.settle();
-    assert_eq!(bench.say_hello().boot, 2);
-    // Brown-out reset off: the dip is not detected.
-    bench.access(|rig| rig.brown_out());
-    bench.rig.advance_us(200_000).expect("runs");
-    assert_eq!(bench.say_hello().boot, 2);
-}
-
-#[test]
-fn a_supply_below_the_brown_out_level_resets_the_chip() {
-    let mut bench = rig_with(|parts| parts.supply.brown_out = BrownOut::Level3);
-    bench.access(|rig| rig.set_supply_mv(2_800));
-    bench.settle();
-    let hello = bench.say_hello();
-    assert_eq!((hello.boot, hello.reset_cause), (2, ResetCause::BrownOut));
-}
-
-#[test]
-fn a_sinking_supply_leaves_time_to_store_its_alarm() {
-    let mut bench = Bench::new(1);
-    // Below the detector's level; 2,200 uF at 0.2 A give 4.8 ms from 2.95 V to the brown-out reset at 2.5 V.
-    bench.access(|rig| rig.set_supply_mv(2_950));
-    bench.rig.advance_us(4_800).expect("runs");
-    bench.access(|rig| rig.brown_out());
-    bench.access(|rig| rig.set_supply_mv(3_300));
-    bench.settle();
-    assert_eq!(bench.say_hello().reset_cause, ResetCause::BrownOut);
-    let first = bench.alarm().expect("an alarm is latched");
-    assert_eq!(first.alarm, Alarm::SupplyLow);
-    assert_eq!(bench.ask(&Request::ClearAlarm { number: first.number }), Ok(Response::Accepted));
-    bench.clear(|alarm| *alarm == Alarm::BrownOut);
 }
 
 #[test]

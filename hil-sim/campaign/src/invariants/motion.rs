@@ -5,6 +5,8 @@ use farnear_sim::observer::Seen;
 
 /// Microsteps against a hard stop until a stall: 38 (6 um following error), 26 (segment), one rotor period.
 const PRESSED_MAX: u64 = 150;
+/// The shaper moves by a quarter of a move at a time, at most 50 um; feedback adds to it.
+const PIEZO_STEP_MAX_UM: f64 = 60.0;
 /// From an alarm to the last STEP: running segment 1 ms, tick 0.2 ms, board clock 0.5 ms.
 const LAST_STEP_NS: u64 = 2_000_000;
 /// A stop brakes along the ramp after the terminal event.
@@ -33,6 +35,26 @@ pub fn hard_stop(case: &Case<'_>) -> Vec<Broken> {
         }
     }
     Vec::new()
+}
+
+pub fn piezo_step(case: &Case<'_>) -> Vec<Broken> {
+    // A DAC whose wire returns takes over the held code at once (docs/silicon.md).
+    if case.has(&["dac-dead"]) {
+        return Vec::new();
+    }
+    let truths = case.sights.iter().filter_map(|sight| match &sight.seen {
+        Seen::Reported { truth, .. } | Seen::Answered { truth, .. } => {
+            Some((sight.at_ns, truth.piezo_step_um))
+        }
+        _ => None,
+    });
+    let mut larger = truths.filter(|(_, um)| *um > PIEZO_STEP_MAX_UM);
+    let broken = larger.next().map(|(at_ns, um)| {
+        let what =
+            format!("the piezo's command changed by {um:.1} um at once, {PIEZO_STEP_MAX_UM} are allowed");
+        Broken { property: "piezo-step", at_ns, what }
+    });
+    broken.into_iter().collect()
 }
 
 pub fn step_after_alarm(case: &Case<'_>) -> Vec<Broken> {

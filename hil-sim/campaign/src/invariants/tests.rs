@@ -107,6 +107,13 @@ fn detects_a_hard_stop_and_permits_one_stall_with_a_dead_switch() {
 }
 
 #[test]
+fn detects_a_step_of_the_piezo() {
+    let stepped = |um| reported(9, 0, done(7, 0), Truth { piezo_step_um: um, ..at(0.0) });
+    assert_eq!(broken("", &[asked(1, 7, go()), stepped(50.0)]), [""; 0]);
+    assert_eq!(broken("", &[asked(1, 7, go()), stepped(61.0)]), ["piezo-step"]);
+}
+
+#[test]
 fn detects_work_that_ends_twice_and_changed_answers() {
     let run = asked(1, 7, go());
     let twice = [run.clone(), reported(9, 0, done(7, 0), at(0.0)), reported(10, 1, done(7, 0), at(0.0))];

@@ -221,6 +221,7 @@ fn optics(
         psf,
         distortion: None,
         stage: None,
+        light: None,
     };
     Ok(file.check()?)
 }

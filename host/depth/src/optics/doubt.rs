@@ -63,6 +63,7 @@ mod tests {
                 psf: Default::default(),
                 distortion: None,
                 stage: None,
+                light: None,
             }
             .check()
             .unwrap()

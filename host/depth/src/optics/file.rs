@@ -48,6 +48,18 @@ pub struct FocusSection {
     pub near_mm: Option<f64>,
 }
 
+/// `[light]` of an optics file, in percent: the light outputs that commands of the rig switch on without `--light`.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LightSection {
+    /// First output.
+    #[serde(default)]
+    pub first: f64,
+    /// Second output.
+    #[serde(default)]
+    pub second: f64,
+}
+
 /// An optics file as written, to be checked by [`OpticsFile::check`]. One of `max_blur_px` and `near_mm` suffices.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -67,6 +79,9 @@ pub struct OpticsFile {
     /// What a z-stack of a flat target taught.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stage: Option<Stage>,
+    /// Light during exposures; off where the file names none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub light: Option<LightSection>,
 }
 
 impl OpticsFile {
@@ -198,6 +213,7 @@ impl From<Optics> for OpticsFile {
             psf: optics.psf,
             distortion: optics.distortion.map(DistortionSection::from),
             stage: optics.stage,
+            light: None,
         }
     }
 }

@@ -26,6 +26,7 @@ pub fn rig(psf: &str) -> Optics {
         psf: psf.parse().unwrap(),
         distortion: None,
         stage: None,
+        light: None,
     };
     file.check().unwrap()
 }

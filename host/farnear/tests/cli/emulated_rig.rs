@@ -184,6 +184,21 @@ fn a_lamp_of_the_board_makes_both_images_brighter() {
             assert!((1.2..1.32).contains(&(lit / dark)), "{means:?}");
         }
     }
+    // The same by [light] of the optics file; --light 0 switches it off.
+    let optics = std::fs::read_to_string(rig_optics()).expect("the example");
+    let lit = folder.file("lit.toml", format!("{optics}[light]\nfirst = 10\nsecond = 20\n"));
+    let pairs =
+        [("by-file", &["--json"][..]), ("switched-off", &["--light", "0"])].map(|(name, arguments)| {
+            let out = folder.text(name);
+            succeeds(on_the_rig(&["capture", "--optics", &lit, "--out", &out]).args(arguments));
+            std::fs::read(format!("{out}/far.png")).expect("an image")
+        });
+    let of_option = ["10,20", "off"]
+        .map(|name| std::fs::read(folder.path(&format!("{name}/far.png"))).expect("an image"));
+    assert_eq!(pairs, of_option);
+    let wrong = folder.file("wrong.toml", format!("{optics}[light]\nfirst = 130\n"));
+    let mut refused = on_the_rig(&["capture", "--optics", &wrong, "--out", &folder.text("wrong")]);
+    fails(&mut refused, 2, &["[light]", "130", "0 to 100 %"]);
     let mut too_bright = on_the_rig(&["capture", "--optics", rig_optics(), "--out", &folder.text("bright")]);
     fails(too_bright.args(["--light", "130"]), 2, &["130", "0 to 100 %"]);
 }

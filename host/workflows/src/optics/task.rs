@@ -276,6 +276,7 @@ fn propose(request: &OpticsRequest) -> Result<(Optics, OpticsFigures)> {
                 psf: Psf::default(),
                 distortion: None,
                 stage: None,
+                light: None,
             };
             let Ok(optics) = file.check() else { continue };
             let blur = optics.max_blur_px();

@@ -22,6 +22,7 @@ use crate::{
     MADE_BY, clock,
     context::Context,
     error::{Result, WorkflowError},
+    optics::GivenOptics,
 };
 
 #[derive(Clone, PartialEq, Eq, Debug, Default)]
@@ -164,10 +165,18 @@ impl CameraSettings {
     pub fn connect(
         &self,
         address: &RigAddress,
-        optics: Option<(&Path, Psf)>,
+        optics: Option<&GivenOptics>,
         context: &Context<'_>,
     ) -> Result<EquippedRig> {
         self.open_early(address)?.connect(address, optics, context)
+    }
+
+    /// The light of the request; without one that of the optics file.
+    pub fn light_with(&self, optics: Option<&GivenOptics>) -> Option<LightLevels> {
+        match self.light {
+            Some(levels) => Some(levels).filter(|levels| *levels != LightLevels::OFF),
+            None => optics.and_then(|optics| optics.light),
+        }
     }
 
     pub fn open_early(&self, rig: &RigAddress) -> Result<EarlyCamera> {
@@ -204,11 +213,11 @@ impl EarlyCamera {
     pub fn connect(
         self,
         address: &RigAddress,
-        optics: Option<(&Path, Psf)>,
+        optics: Option<&GivenOptics>,
         context: &Context<'_>,
     ) -> Result<EquippedRig> {
-        let mut rig = Rig::connect(address, optics, context)?;
-        rig.client.set_light(self.settings.light);
+        let mut rig = Rig::connect(address, optics.map(GivenOptics::for_emulation), context)?;
+        rig.client.set_light(self.settings.light_with(optics));
         let camera = match (self.camera, &rig.emulation) {
             (Some(camera), _) => camera,
             (None, Some((simulator, _))) => {
@@ -226,7 +235,7 @@ impl EarlyCamera {
         self,
         second: Self,
         address: &RigAddress,
-        optics: Option<(&Path, Psf)>,
+        optics: Option<&GivenOptics>,
         context: &Context<'_>,
     ) -> Result<(EquippedRig, Box<dyn Camera>)> {
         let equipped = self.connect(address, optics, context)?;

@@ -135,8 +135,7 @@ pub fn run(settings: &ContinuousRequest, context: &Context<'_>) -> Result<Contin
         }
     };
     let mut folder = settings.out.as_deref().map(Folder::begin).transpose()?;
-    let lens = optics.as_ref().map(GivenOptics::for_emulation);
-    let mut equipped = settings.camera.connect(&settings.rig, lens, context)?;
+    let mut equipped = settings.camera.connect(&settings.rig, optics.as_ref(), context)?;
     let ready = make_ready(&equipped, program, optics, settings, context)?;
     context.info("capturing; Ctrl-C ends it");
     let mut tally = Tally::new(pace.period, &ready.shots);

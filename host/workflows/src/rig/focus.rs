@@ -119,7 +119,7 @@ pub fn focus(settings: &FocusRequest, context: &Context<'_>) -> Result<FocusFigu
     if !(settings.range_mm > 0.0 && settings.range_mm.is_finite()) {
         return Err(WorkflowError::parameter("range-mm", settings.range_mm, "expected a positive length"));
     }
-    let mut rig = settings.camera.connect(&settings.rig, Some(given.for_emulation()), context)?;
+    let mut rig = settings.camera.connect(&settings.rig, Some(&given), context)?;
     let client = &rig.rig.client;
     let was_homed = ensure_ready(client, context)?;
     let default = (!was_homed).then_some(optics.working_range().sensor_far_mm);

@@ -50,8 +50,7 @@ pub(super) fn capture(settings: &CaptureRequest, context: &Context<'_>) -> Resul
         other => other.clone(),
     };
     let (early, early_second) = (camera.open_early(&address)?, second.open_early(&address)?);
-    let (mut equipped, mut second) =
-        early.connect_both(early_second, &address, Some(optics.for_emulation()), context)?;
+    let (mut equipped, mut second) = early.connect_both(early_second, &address, Some(&optics), context)?;
     let exposures = Exposures {
         exposure: camera.exposure,
         image_wait: camera.image_wait,

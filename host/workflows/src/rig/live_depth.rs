@@ -47,7 +47,7 @@ pub fn watch(
     let optics = GivenOptics::read(&settings.optics)?;
     let designed = operators::find(None, &optics.optics)?;
     let mut processor = Processor::new(&designed, &optics.optics, &settings.computation)?;
-    let mut equipped = settings.camera.connect(&settings.rig, Some(optics.for_emulation()), context)?;
+    let mut equipped = settings.camera.connect(&settings.rig, Some(&optics), context)?;
     let range = optics.optics.working_range();
     let sensor = SensorPair { far_mm: range.sensor_far_mm, near_mm: range.sensor_near_mm };
     let exposures = Exposures {

@@ -163,13 +163,13 @@ pub fn capture_seen(
 ) -> Result<PairFigures> {
     let optics = GivenOptics::read(&settings.optics)?;
     within("average", settings.average, &(1..=AVERAGED_MAX), "exposures")?;
-    if settings.subtract_ambient && settings.camera.light.is_none() {
-        let expected = "expected light to switch: --light 100";
+    if settings.subtract_ambient && settings.camera.light_with(Some(&optics)).is_none() {
+        let expected = "expected light to switch: --light 100, or [light] in the optics file";
         return Err(WorkflowError::parameter("subtract-ambient", "true", expected));
     }
     let frames = settings.camera_frames.as_deref().map(camera_frames::read).transpose()?;
     let folder = begin_folder(&settings.out)?;
-    let mut rig = settings.camera.connect(&settings.rig, Some(optics.for_emulation()), context)?;
+    let mut rig = settings.camera.connect(&settings.rig, Some(&optics), context)?;
     let exposures = Exposures {
         averaged: settings.average,
         auto: settings.auto_exposure,

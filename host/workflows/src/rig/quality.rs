@@ -89,7 +89,7 @@ pub fn measure(settings: &QualitySettings, context: &Context<'_>) -> Result<Qual
     let mut record = read_record(&settings.record)?;
     let designed = operators::find(None, &optics.optics)?;
     let computation = Settings::default();
-    let mut rig = settings.camera.connect(&settings.rig, Some(optics.for_emulation()), context)?;
+    let mut rig = settings.camera.connect(&settings.rig, Some(&optics), context)?;
     let emulated = rig.rig.client.hello().emulated;
     let mut maps = Vec::new();
     let mut predicted = None;

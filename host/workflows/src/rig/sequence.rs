@@ -136,8 +136,7 @@ pub fn run(settings: &SequenceRequest, context: &Context<'_>) -> Result<Sequence
     let shots = settings.shots()?;
     let optics = settings.optics.as_deref().map(GivenOptics::read).transpose()?;
     let folder = begin_folder(&settings.out)?;
-    let lens = optics.as_ref().map(GivenOptics::for_emulation);
-    let mut rig = settings.camera.connect(&settings.rig, lens, context)?;
+    let mut rig = settings.camera.connect(&settings.rig, optics.as_ref(), context)?;
     check_exposures(&rig.rig.client, &shots).map_err(CaptureError::from)?;
     ensure_homed(&rig.rig.client, &mut |what| context.info(what))?;
     let mut taken = Vec::new();

@@ -38,7 +38,7 @@ pub fn capture(settings: &SeriesSettings, context: &Context<'_>) -> Result<Serie
         return Err(WorkflowError::parameter("pairs", count, format!("expected 1 to {MOST}")));
     }
     let optics = GivenOptics::read(&settings.optics)?;
-    let mut rig = settings.camera.connect(&settings.rig, Some(optics.for_emulation()), context)?;
+    let mut rig = settings.camera.connect(&settings.rig, Some(&optics), context)?;
     let mut pairs = Vec::new();
     for out in &settings.out {
         context.cancel.check("capturing a series")?;

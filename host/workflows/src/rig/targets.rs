@@ -116,7 +116,7 @@ pub fn capture(settings: &TargetSeriesRequest, context: &Context<'_>) -> Result<
     let series = Series { settings, optics: &optics, operators: &operators, context };
     let mut standing = match settings.rig.is_emulated() {
         true => None,
-        false => Some(early.connect(&settings.rig, Some(optics.for_emulation()), context)?),
+        false => Some(early.connect(&settings.rig, Some(&optics), context)?),
     };
     let (mut captured, mut error) = (0, MeanSquare::default());
     for (number, true_mm) in distances_mm.iter().copied().enumerate() {
@@ -157,7 +157,7 @@ struct Series<'a> {
 impl Series<'_> {
     fn emulated_before(&self, true_mm: f64) -> Result<EquippedRig> {
         let address = self.settings.rig.with_scene(format!("plane:{true_mm}"))?;
-        self.settings.camera.connect(&address, Some(self.optics.for_emulation()), self.context)
+        self.settings.camera.connect(&address, Some(self.optics), self.context)
     }
 
     fn place(&self, number: usize, count: usize, true_mm: f64) -> Result<()> {
