@@ -2,7 +2,6 @@
 //!
 //! Depth from defocus maps a flat target through a real lens to a bowl that depends on depth. CLSF corrects depth `U`
 //! at column `x`, row `y` by a third-order polynomial fitted to flat targets (Li 2014, eq. 6.11). Forms:
-//!
 //! | form | terms | seams | table words | instructions per pixel (640-pixel rows; with the tables) |
 //! |---|---|---|---|---|
 //! | [`Regions`] | 10 in each of 3x3 regions | steps at region borders | `width` | 13.5 (13.7) |

@@ -54,7 +54,7 @@ const SIDEREAL: Phase = Phase {
 /// Horizontal parallax, radians (0.00244 deg).
 const PARALLAX: f32 = 4.2586e-5;
 
-/// Place on the earth.
+/// Place on the earth, without height.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Place {
     /// Latitude, north positive.

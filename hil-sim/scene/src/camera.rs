@@ -34,7 +34,7 @@ impl Noise {
         }
     }
 
-    /// Bits per code.
+    /// Bits of a pixel's code; 16 without noise.
     #[must_use]
     pub fn bits(self) -> u8 {
         match self {
@@ -45,7 +45,7 @@ impl Noise {
     }
 }
 
-/// An invalid camera.
+/// Invalid size, electrons or noise of a camera.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[expect(missing_docs, reason = "the messages name the fields")]
 pub enum CameraError {
@@ -84,9 +84,9 @@ impl fmt::Display for Noise {
 /// Size and electrons of the camera.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Camera {
-    /// Image width, px.
+    /// Pixels per row of the image.
     pub width_px: usize,
-    /// Image height, px.
+    /// Rows of pixels of the image.
     pub height_px: usize,
     /// Noise and bit depth.
     pub noise: Noise,

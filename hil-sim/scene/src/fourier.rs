@@ -16,7 +16,7 @@ impl Fourier2 {
         Self { height, width, planner: FftPlannerScalar::new(), scratch }
     }
 
-    /// Unscaled.
+    /// Forward transform in place, unscaled.
     pub(crate) fn forward(&mut self, data: &mut [Complex32]) {
         let (rows, columns) =
             (self.planner.plan_fft_forward(self.width), self.planner.plan_fft_forward(self.height));

@@ -6,7 +6,6 @@
 //! Lengths are in cells. A sample of radiance 1 gives the cell at offset `d` the mean
 //! `V(d) = integral psf(x, y) B(x - d_x) B(y - d_y) dx dy` with the quadratic B-spline `B` (the triangle of
 //! linear interpolation averaged over the cell). A pixel is the mean of its four cells.
-//!
 //! * Pill-box: the inner integral over y is a polynomial in the disc's height; the outer one over
 //!   `x = R sin t` is split at each kink and integrated by Gauss-Legendre to rounding.
 //! * Gaussian: closed form in the error function.

@@ -1,7 +1,6 @@
-//! The image-side telecentric thin lens: blur of an object distance at a sensor position.
-//!
-//! `1/F = 1/u + 1/w`, blur radius `|s - w(u)| D / 2F`; mm from the lens, `u` to the object, `w` and `s` to the image.
-//! The aperture in the front focal plane makes magnification independent of `s` (Watanabe & Nayar 1997).
+//! The image-side telecentric thin lens: blur of an object distance at a sensor position. `1/F = 1/u + 1/w`,
+//! blur radius `|s - w(u)| D / 2F`; mm from the lens, `u` to the object, `w` and `s` to the image. The
+//! aperture in the front focal plane makes magnification independent of `s` (Watanabe & Nayar 1997).
 
 use thiserror::Error;
 

@@ -1,5 +1,4 @@
 #![doc = include_str!("../README.md")]
-//!
 //! # Model
 //! 1. **Surface.** A height field ([`scene`]) with a bilinear texture of two samples per pixel ([`texture`]).
 //! 2. **Lens.** Image-side telecentric thin lens ([`lens`]): an object at `u` mm focuses `w(u)` mm behind it,

@@ -14,11 +14,11 @@ const AGREEMENT: f64 = 0.02;
 /// Checked contents of an `optics.toml`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OpticsFile {
-    /// Focal length, mm.
+    /// Focal length of the thin lens, mm.
     pub focal_length_mm: f64,
     /// Diameter of the aperture, mm.
     pub aperture_mm: f64,
-    /// Pixel pitch, um.
+    /// Distance of neighbouring pixels, um.
     pub pixel_um: f64,
     /// In-focus object distance of the far setting, mm.
     pub far_mm: f64,

@@ -1,5 +1,4 @@
 //! Point spread functions, normalised to 1, for a blur radius `R` in any unit.
-//!
 //! * Pill-box: constant over the disc of radius `R`, the image of a round aperture.
 //! * Gaussian: standard deviation `sigma = k R` in each direction.
 //! * Generalised Gaussian: `f(r) = p^(1 - 2/p) / (2 pi sigma^2 Gamma(2/p)) exp(-(r / sigma)^p / p)`,

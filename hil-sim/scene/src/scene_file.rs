@@ -1,5 +1,4 @@
 //! Scene files, whose maps are separate files:
-//!
 //! ```toml
 //! depth = "bust.npy"      # depths in mm; or: scene = "cone"
 //! texture = "bricks.png"  # a picture; or: "sand", "fractal"

@@ -1,8 +1,7 @@
-//! A lens by wave optics: aberrations and diffraction of a finite aperture.
-//!
-//! The amplitude on the sensor is the Fourier transform of the pupil, whose phase holds defocus, spherical aberration
-//! and astigmatism; its square is summed over the wavelengths (Goodman, Introduction to Fourier Optics, ch. 6). It uses
-//! no [`psf`](crate::psf). Varying defocus is a mixture, pixel by pixel, of images at two neighbouring levels.
+//! A lens by wave optics: aberrations and diffraction of a finite aperture. The amplitude on the sensor is
+//! the Fourier transform of the pupil, whose phase holds defocus, spherical aberration and astigmatism; its
+//! square is summed over the wavelengths (Goodman, Introduction to Fourier Optics, ch. 6). It uses no
+//! [`psf`](crate::psf). Varying defocus is a mixture, pixel by pixel, of images at two neighbouring levels.
 
 use ndarray::Array2;
 use rustfft::num_complex::Complex32;

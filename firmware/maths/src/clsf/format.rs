@@ -83,7 +83,7 @@ impl Coefficient {
         if bits == i32::MIN { Err(Error::CoefficientTooLarge { value: -4.0 }) } else { Ok(Self(bits)) }
     }
 
-    /// Q2.29 bit pattern.
+    /// Bits of the coefficient in Q2.29.
     pub fn to_bits(self) -> i32 {
         self.0
     }

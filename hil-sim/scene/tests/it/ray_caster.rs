@@ -1,8 +1,7 @@
-//! Slow exact renderer: traces rays from a pixel through the aperture to the first surface.
-//!
-//! A telecentric lens maps the aperture point `a` (unit disc) and the sensor point `p` to a ray through the
-//! image position `p + b a` at the signed blur radius `b`. It hits a height field at the first `b`, from near
-//! to far, with `b >= b_surface(p + b a)`. Uses no convolution, kernel, slab or interpolation of the crate.
+//! Slow exact renderer: traces rays from a pixel through the aperture to the first surface. A telecentric
+//! lens maps the aperture point `a` (unit disc) and the sensor point `p` to a ray through the image position
+//! `p + b a` at the signed blur radius `b`. It hits a height field at the first `b`, from near to far, with
+//! `b >= b_surface(p + b a)`. Uses no convolution, kernel, slab or interpolation of the crate.
 
 use farnear_scene::{Lens, Psf, Scene};
 use ndarray::Array2;
