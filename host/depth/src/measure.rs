@@ -458,6 +458,7 @@ mod tests {
             psf: Psf::PillBox,
             distortion: None,
             stage: None,
+            light: None,
         }
         .check()
         .unwrap();
