@@ -71,7 +71,8 @@ NOTEBOOKS = Path(__file__).resolve().parents[1] / "notebooks"
 CHECKS = {
     "mypy": ["mypy", "--strict", "use.py"],
     "mypy-notebooks": ["mypy", "--check-untyped-defs", "--ignore-missing-imports", "notebooks"],
-    "pyright": ["pyright", "use.py"],
+    # Without --pythonpath pyright takes the packages of the `python` on PATH.
+    "pyright": ["pyright", "--pythonpath", sys.executable, "use.py"],
 }
 
 
