@@ -25,7 +25,8 @@ use crate::{
     wiring::{TIM2_FUNCTION, Wiring, channel, is_high},
 };
 
-pub const FILE_NAME: &str = "farnear-board-test.elf";
+/// Beside the firmware, with the same extension.
+pub const PROGRAM: &str = "farnear-board-test";
 /// Longer than both resets, all checks and a report at each link rate.
 const PATIENCE_NS: u64 = 10_000_000_000;
 const LOOK_NS: u64 = 1_000_000;

@@ -3,7 +3,11 @@
 use farnear_sim::{board_test, firmware};
 
 fn report(wired: bool) -> String {
-    let elf = firmware::find(None).expect("a firmware").with_file_name(board_test::FILE_NAME);
+    let firmware = firmware::find(None).expect("a firmware");
+    let mut elf = firmware.with_file_name(board_test::PROGRAM);
+    if let Some(extension) = firmware.extension() {
+        elf.set_extension(extension);
+    }
     board_test::report(&elf, wired).unwrap_or_else(|error| panic!("{error}"))
 }
 

@@ -1,6 +1,6 @@
 //! # farnear-board-test
 //!
-//! Tests a real NUCLEO-F429ZI with five jumper wires and no rig; `docs/bring-up.md` has the wires, `cargo xtask board-test`
+//! Tests a real NUCLEO-F429ZI with four jumper wires and no rig; `docs/bring-up.md` has the wires, `cargo xtask board-test`
 //! runs it, also on the emulated board. It overflows the stack and lets the watchdog bite, each time continuing after the
 //! reset, then tests the drivers and repeats its report at each link rate. A line of the report: name, tab, `pass`,
 //! `fail` or `skip`, tab, what was measured.
