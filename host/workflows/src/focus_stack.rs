@@ -290,8 +290,8 @@ pub fn focus_stack(request: &FocusStackRequest, context: &Context<'_>) -> Result
     } else if !frames.untold.is_empty() {
         let names: Vec<String> = frames.untold.iter().map(|index| name(&listed.images[*index])).collect();
         warnings.push(format!(
-            "could not check whether {} is shaken or defocused: the next images do not tell how sharp it should be (the scene is \
-             sharpest there, they are irregular, or all are fewer than 5)",
+            "could not check whether {} is shaken or defocused: the images next to it do not tell how sharp it should be (the scene is \
+             sharpest there, or the images are irregular or fewer than 5)",
             names.join(" or ")
         ));
     }

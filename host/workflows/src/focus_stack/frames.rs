@@ -85,8 +85,7 @@ where
         };
         frames.warps[index] = warp.after(&back);
         if few_shaken && shaken.frames.contains(&index) {
-            let reason =
-                "it is shaken or defocused: less sharp than its neighbours let expect in most places";
+            let reason = "it is shaken or defocused: less sharp in most places than its neighbours suggest";
             frames.left_out.push((index, reason.into()));
         }
     }

@@ -1,5 +1,5 @@
 //! Shaken or defocused frames are less sharp than both neighbours. The first and the last frame are compared with what the next
-//! three let expect: blur grows evenly with the distance from the focus, so a power of the sharpness (which one depends on the
+//! three suggest: blur grows evenly with the distance from the focus, so a power of the sharpness (which one depends on the
 //! texture) is a parabola of the position. A block that is sharpest in the next frame tells nothing: its peak may lie between.
 
 use farnear_depth::focus_measure::FocusMeasure;
@@ -67,7 +67,7 @@ fn inside(sharpness: &[Vec<f64>], members: &[usize]) -> Vec<usize> {
     three.map(|[_, own, _]| *own).collect()
 }
 
-/// Whether the first of these frames is duller than the next three let expect, in most of the blocks that tell it.
+/// Whether the first of these frames is duller than the next three suggest, in most of the blocks that tell it.
 fn dull_end(sharpness: &[Vec<f64>], positions: &[f64], frames: &[usize]) -> Option<bool> {
     let (&[end, near, middle, far], true) = (frames.first_chunk()?, frames.len() >= LEAST_FRAMES) else {
         return None;
