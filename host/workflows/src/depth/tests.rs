@@ -1,6 +1,6 @@
 use std::{fs, path::Path};
 
-use farnear_files::image_file::encode_png;
+use farnear_files::{image_file::encode_png, npy};
 
 use super::{method::Method, noise::CameraNoise, *};
 use crate::context::{Cancel, Progress, Unattended};
@@ -70,4 +70,28 @@ fn options_without_effect_on_a_method_are_bad_usage() {
         let error = compute(&settings, &Context::unattended()).unwrap_err();
         assert!(error.is_usage(), "{error}");
     }
+}
+
+/// A camera of 12 bits in files of 16: the images are divided by its white level.
+#[test]
+fn a_dark_frame_is_on_the_scale_of_the_images() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut settings = settings(folder.path());
+    for (name, step) in [("near.png", 37), ("far.png", 41)] {
+        let code = |(y, x)| if y == 0 { 4095 } else { 1000 + x as u16 * step % 500 };
+        let pixels = Array2::from_shape_fn((48, 64), code);
+        fs::write(folder.path().join(name), encode_png(pixels.view(), 16).unwrap()).unwrap();
+    }
+    let frames = folder.path().join("camera");
+    fs::create_dir(&frames).unwrap();
+    for (name, value) in [("dark.npy", 200.0 / 65_535.0), ("response.npy", 1.0)] {
+        fs::write(frames.join(name), npy::write(Array2::from_elem((48, 64), value as f32).view())).unwrap();
+    }
+    let none_bad = Array2::<u16>::zeros((48, 64));
+    fs::write(frames.join("bad.png"), encode_png(none_bad.view(), 8).unwrap()).unwrap();
+    settings.camera_frames = Some(frames);
+    let inputs = Inputs::read(&settings, &Context::unattended()).unwrap();
+    let dark = inputs.camera.unwrap().dark()[(5, 5)];
+    assert!((inputs.pair.far[(0, 0)] - 1.0).abs() < 1e-5, "{}", inputs.pair.far[(0, 0)]);
+    assert!((dark - 200.0 / 4095.0).abs() < 1e-5, "{dark}");
 }
