@@ -25,7 +25,7 @@ use crate::{
     wiring::{TIM2_FUNCTION, Wiring, channel, is_high},
 };
 
-/// Beside the firmware, with the same extension.
+/// Name, without extension, of the ELF in the firmware's folder.
 pub const PROGRAM: &str = "farnear-board-test";
 /// Longer than both resets, all checks and a report at each link rate.
 const PATIENCE_NS: u64 = 10_000_000_000;
