@@ -10,10 +10,14 @@ function videos() {
   const chosen = h("select", { "aria-label": "Video" });
   const file = h("input", { type: "file", accept: "video/*,.y4m", "data-needs": "computation", "aria-label": "Video file to send" });
   const said = h("p", { class: "dim", "aria-live": "polite" });
-  async function shown() {
+  let newest = 0;
+  async function shown(sent = "") {
+    const asked = ++newest;
     try {
       const { videos: names } = await get("/api/people");
-      const present = chosen.value;
+      // An answer that is overtaken by a later question is old.
+      if (asked !== newest) return;
+      const present = sent || chosen.value;
       chosen.replaceChildren(...names.map((name) => h("option", { value: name, selected: name === present }, name)));
       if (!names.length) chosen.append(h("option", { value: "" }, "none sent yet"));
     } catch (error) {
@@ -30,9 +34,8 @@ function videos() {
       const answer = await fetch(`/api/people/videos/${name}`, { method: "PUT", body: video, headers: { "x-farnear-client": store.client?.secret ?? "" } });
       const given = await answer.json().catch(() => ({}));
       if (!answer.ok) throw Object.assign(new Error(given.error ?? `failed (${answer.status})`), { hint: given.hint });
+      await shown(name);
       said.textContent = `${name} is there`;
-      await shown();
-      chosen.value = name;
     } catch (error) {
       said.textContent = "";
       notice(error.message, "error", error.hint);
