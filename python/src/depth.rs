@@ -67,10 +67,12 @@ fn filling(fill: &Fill, low_texture: &str) -> PyResult<Settings> {
 ///     The optics of the pair.
 /// operators : Operators, optional
 ///     Operators for method "ro"; by default they are designed for the optics.
-/// method : {"ro", "whitened", "subbarao", "subbarao-fourier", "favaro"}
-///     Rational operators, whitened (least noise), or a baseline.
-/// window : int or {"adaptive", "safe"}, optional
-///     Side in px (odd, up to 63) of the window over which evidence is summed; by default adaptive for "whitened", else 7.
+/// method : {"whitened", "ro", "subbarao", "subbarao-fourier", "favaro"}, optional
+///     Whitened (least noise), rational operators, or a baseline; by default rational operators if `operators` are given, else
+///     whitened.
+/// window : int or "adaptive", optional
+///     Side in px (odd, up to 63) of the window over which evidence is summed; by default adaptive for "whitened",
+///     else 7.
 /// median_px : int
 ///     Side of the median filter, px, odd; 1 = none.
 /// fill : bool or {"surface", "thesis"}
@@ -109,7 +111,7 @@ fn filling(fill: &Fill, low_texture: &str) -> PyResult<Settings> {
 /// >>> farnear.depth(far, near, optics).depth_mm.shape
 /// (120, 160)
 #[pyfunction]
-#[pyo3(signature = (far, near, optics, *, operators=None, method="ro", window=None, median_px=3, fill=Fill(None), low_texture="energy", align="auto",
+#[pyo3(signature = (far, near, optics, *, operators=None, method=None, window=None, median_px=3, fill=Fill(None), low_texture="energy", align="auto",
                     balance="auto", min_confidence=0.0, white_level=None, threads=1))]
 #[allow(clippy::too_many_arguments)] // keywords in Python
 pub fn depth(
@@ -118,7 +120,7 @@ pub fn depth(
     near: &Bound<'_, PyAny>,
     optics: &Bound<'_, PyAny>,
     operators: Option<&Operators>,
-    method: &str,
+    method: Option<&str>,
     window: Option<&Bound<'_, PyAny>>,
     median_px: usize,
     fill: Fill,
@@ -139,23 +141,25 @@ pub fn depth(
         return Err(FarnearError::new_err(message));
     }
     let designed;
-    let method = match (method, operators) {
+    let usual = if operators.is_some() { "ro" } else { "whitened" };
+    let method = match (method.unwrap_or(usual), operators) {
         ("ro", Some(operators)) => DepthMethod::Rational(&operators.0),
         ("ro", None) => {
             designed = py.detach(|| operators::Operators::for_optics(&optics.0)).map_err(wrong)?;
             DepthMethod::Rational(&designed)
         }
         ("whitened", None) => DepthMethod::Whitened,
-        (_, Some(_)) => return Err(FarnearError::new_err(format!("method {method:?} uses no operators"))),
+        (other, Some(_)) => {
+            return Err(FarnearError::new_err(format!("method {other:?} uses no operators")));
+        }
         (other, None) => DepthMethod::Baseline(other.parse().map_err(|_| {
-            let known = "ro, whitened, subbarao, subbarao-fourier or favaro";
+            let known = "whitened, ro, subbarao, subbarao-fourier or favaro";
             FarnearError::new_err(format!("there is no method {other:?}; expected {known}"))
         })?),
     };
     let window: Window = match window {
         Some(window) => window.to_string().parse().map_err(wrong)?,
-        None if matches!(method, DepthMethod::Whitened) => Window::Adaptive,
-        None => Window::Fixed(7),
+        None => method.usual_window(),
     };
     let smoothing_px = if let Window::Fixed(side) = window { side } else { 7 };
     let settings = MeasureSettings {

@@ -2,14 +2,13 @@
 //!
 //! [`Bank`] filters a pair so that `rho0 + alpha rho1 + alpha^2 rho2 + alpha^3 rho3` vanishes at the true depth, except
 //! for noise. A window finds the root of `sum c_k alpha^k`, `c_k = sum rho_k u`, with the matched filter `u`. The
-//! variance follows from the noise, the filter's energy and the cubic's slope. Windows have one size or three:
-//! - [`Window::Adaptive`] takes the largest window whose value lies within two standard deviations of all smaller ones'
-//!   (intersection of confidence intervals; Goldenshluger & Nemirovski 1997, Katkovnik 1999). It preserves steps.
-//! - [`Window::Safe`] takes the smallest window that is certain enough, without comparison.
+//! variance follows from the noise, the filter's energy and the cubic's slope. [`Window::Adaptive`] takes the largest of
+//! three windows where the surface is flat over it, else the smallest that is certain enough (`agreement`).
 //!
 //! Work proceeds in tiles (`rows`), so that memory beyond the maps does not grow with the image. Cost: five 7x7
 //! kernels, five products, and 15 window sums and three cubics for three windows; see `docs/speed.md`.
 
+mod agreement;
 mod bank;
 mod holes;
 mod rows;
@@ -36,8 +35,6 @@ pub use bank::Bank;
 pub const ADAPTIVE_PX: [usize; 3] = [7, 13, 21];
 /// The same for `calibrate stack` lenses: more texture averages their own error, which strong points may dominate.
 pub const LEARNED_PX: [usize; 3] = [11, 21, 41];
-/// Sides of the windows that [`Window::Safe`] chooses from, px.
-pub const SAFE_PX: [usize; 3] = [9, 13, 21];
 
 /// Window over which evidence is summed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -45,15 +42,14 @@ pub const SAFE_PX: [usize; 3] = [9, 13, 21];
 pub enum Window {
     /// One square everywhere; odd side, px.
     Fixed(usize),
-    /// The largest of [`ADAPTIVE_PX`] ([`LEARNED_PX`] for a learned lens) that nothing contradicts.
+    /// The largest of [`ADAPTIVE_PX`] ([`LEARNED_PX`] for a learned lens) on flat surfaces, else the smallest that is certain
+    /// enough.
     Adaptive,
-    /// The smallest of [`SAFE_PX`] that is certain enough.
-    Safe,
 }
 
 /// Unknown window name.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("expected adaptive, safe or an odd number of pixels from 1 to {MAX_SMOOTHING_PX}")]
+#[error("expected adaptive or an odd number of pixels from 1 to {MAX_SMOOTHING_PX}")]
 pub struct UnknownWindow;
 
 impl FromStr for Window {
@@ -62,7 +58,6 @@ impl FromStr for Window {
     fn from_str(text: &str) -> Result<Self, UnknownWindow> {
         match text.trim() {
             "adaptive" => Ok(Self::Adaptive),
-            "safe" => Ok(Self::Safe),
             number => {
                 let side = number.parse().map_err(|_| UnknownWindow)?;
                 let usable = side % 2 == 1 && side <= MAX_SMOOTHING_PX;
@@ -77,7 +72,6 @@ impl fmt::Display for Window {
         match self {
             Self::Fixed(side) => write!(f, "{side}"),
             Self::Adaptive => f.write_str("adaptive"),
-            Self::Safe => f.write_str("safe"),
         }
     }
 }

@@ -50,6 +50,16 @@ pub enum DepthMethod<'a> {
     Baseline(baselines::Method),
 }
 
+impl DepthMethod<'_> {
+    /// The window where none is asked for.
+    pub fn usual_window(&self) -> Window {
+        match self {
+            Self::Whitened => Window::Adaptive,
+            Self::Rational(_) | Self::Baseline(_) => Window::Fixed(7),
+        }
+    }
+}
+
 /// Settings of the whole measurement.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MeasureSettings {

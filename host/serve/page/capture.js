@@ -67,7 +67,7 @@ async function take(wish, depth) {
   performance.mark("captured");
   if (job.phase !== "done" || !depth) return;
   const [name] = begun.names;
-  const computing = await act(`/api/captures/${encodeURIComponent(name)}/depth`, { method: "whitened", uncertainty: "estimated" });
+  const computing = await act(`/api/captures/${encodeURIComponent(name)}/depth`, { uncertainty: "estimated" });
   if (!computing) return;
   const computed = await ended("computation", computing.job);
   if (computed.phase !== "done") return;

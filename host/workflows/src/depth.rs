@@ -72,7 +72,6 @@ pub fn compute(settings: &DepthRequest, context: &Context<'_>) -> Result<DepthFi
 
 /// [`compute`] on the threads at hand.
 fn compute_here(settings: &DepthRequest, context: &Context<'_>) -> Result<DepthFigures> {
-    let settings = &settings.for_lens(context)?;
     let mut inputs = Inputs::read(settings, context)?;
     let start = Instant::now();
     let computed = inputs.compute(settings, context)?;
@@ -140,7 +139,7 @@ impl Inputs {
         let optics = optics.binned(bin);
         let around = optics.distortion().is_none().then_some(AROUND_PX);
         let cut = settings.region.map(|region| Cut::out_of(&mut pair, region, around)).transpose()?;
-        let method = Prepared::new(settings.method, settings.operators.as_deref(), &optics, &context.cache)?;
+        let method = Prepared::new(settings.method(), settings.operators.as_deref(), &optics, &context.cache)?;
         let correction =
             settings.correction.as_deref().map(|file| context.cache.correction(file)).transpose()?;
         if let Some(correction) = &correction {
@@ -231,7 +230,7 @@ impl Inputs {
         let noise = request.uncertainty.and_then(|noise| noise.of_camera(self.pair.samples));
         MeasureSettings {
             prepare: PrepareSettings { limits, noise, ..request.prepare() },
-            ..request.measure()
+            ..request.measure(self.method.as_real())
         }
     }
 }

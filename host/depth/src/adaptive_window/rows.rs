@@ -1,17 +1,18 @@
-//! One tile: rows stream through filters, window sums, roots, the choice among windows and the median. Filtered rows
+//! One tile: rows stream through filters, window sums, roots, the choice of window and the median. Filtered rows
 //! stay in rings as long as windows need them, so that they are read from the cache. Beyond its borders the pair is
 //! reflected. Filters and windows are symmetric, so later stages need no border handling.
 
 use ndarray::{Array2, ArrayView2, ArrayViewMut2, s};
 
+use super::agreement::Agreement;
 use super::bank::{Bank, Filters};
 use super::holes::{Holes, Inner};
 use super::scales::Scales;
-use super::{ADAPTIVE_PX, LEARNED_PX, SAFE_PX, Window, WindowSettings};
+use super::{ADAPTIVE_PX, LEARNED_PX, Window, WindowSettings};
 use crate::border::reflect;
 use crate::depth_of_alpha::DepthOfAlpha;
 use crate::optics::Optics;
-use crate::simd::{self, Backend, Choice, CubicSums, Deviation, Found, MAX_ROWS, Plane, Residual, Weighing};
+use crate::simd::{self, Backend, Contrast, CubicSums, Deviation, Found, MAX_ROWS, Plane, Residual};
 
 /// Rows of a band: its halo of about 20 rows on either side is computed twice.
 const ROWS: usize = 256;
@@ -20,15 +21,13 @@ const COLUMNS: usize = 512;
 const MISFIT_PX: [usize; 2] = [7, 21];
 /// Border in which filters and windows depend on reflections, which no model explains, px.
 const BORDER_PX: usize = 14;
-/// Required agreement of windows, in standard deviations.
-const GAMMA: f32 = 2.0;
 /// Least part of the energy that counts as evidence.
 const LEAST_EVIDENCE: f32 = 0.02;
-/// Smallest standard deviation of a window, in alpha.
-const FLOOR: f32 = 0.002;
-/// Standard deviation of alpha from which a window excludes nothing.
+/// Standard deviation of alpha by the operators' own error: 0.003 on noise-free slants.
+const FLOOR: f32 = 0.0026;
+/// Standard deviation of alpha from which a window tells nothing about the surface.
 const UNINFORMATIVE: f32 = 0.045;
-/// Standard deviation of alpha that is certain enough for [`Window::Safe`].
+/// Standard deviation of alpha that is certain enough.
 const CERTAIN: f32 = 0.035;
 /// Variance that remains after a median of 1x1, 3x3, 5x5 and 7x7.
 const MEDIAN_GAIN: [f32; 4] = [1.0, 0.94, 0.85, 0.74];
@@ -63,7 +62,9 @@ pub(super) struct Maps<'a> {
 pub(super) struct Tile<'a> {
     job: &'a Job<'a>,
     sides: Vec<usize>,
+    /// Rows and columns around the tile for the median and the misfit, and with those for the choice of window.
     around: [usize; 2],
+    outer: [usize; 2],
     radius: usize,
     ring: usize,
     difference: Plane,
@@ -71,6 +72,7 @@ pub(super) struct Tile<'a> {
     filters: Filters,
     columns: Vec<Columns>,
     row: Row,
+    agreement: Option<Agreement>,
     alpha: Plane,
     residual: Plane,
     work: Plane,
@@ -97,7 +99,10 @@ struct Row {
     alpha: Vec<f32>,
     variance: Vec<f32>,
     noise: Vec<f32>,
-    chosen: [Vec<f32>; 5],
+    /// Alpha and variance of the smallest window that is certain enough.
+    small: [Vec<f32>; 2],
+    /// Variance of the window that was taken.
+    taken: Vec<f32>,
 }
 
 #[derive(Clone, Copy)]
@@ -114,15 +119,16 @@ impl<'a> Tile<'a> {
             Window::Fixed(side) => vec![side],
             Window::Adaptive if job.optics.stage().is_some() => LEARNED_PX.to_vec(),
             Window::Adaptive => ADAPTIVE_PX.to_vec(),
-            Window::Safe => SAFE_PX.to_vec(),
         };
         let radius = sides.iter().copied().max().unwrap_or(1) / 2;
         let median = job.settings.median_px / 2;
         let around = [median.max(MISFIT_PX[0] / 2), median.max(MISFIT_PX[1] / 2)];
+        let compared = if job.settings.window == Window::Adaptive { radius } else { 0 };
+        let outer = around.map(|around| around + compared);
         let reach = job.bank.reach_px();
         // Window, the row that leaves it, the pixels in the middle of its filters, and a block of new rows.
         let ring = (2 * radius + 2 + reach + MAX_ROWS).next_multiple_of(MAX_ROWS);
-        let wide = columns(job.far.ncols()) + 2 * around[1];
+        let wide = columns(job.far.ncols()) + 2 * outer[1];
         let (products, input) = (wide + 2 * radius, wide + 2 * radius + 2 * reach);
         let gain = MEDIAN_GAIN[median] * job.bank.variance_factor();
         let [offset, slope] = job.optics.defocus_line_mm();
@@ -134,6 +140,7 @@ impl<'a> Tile<'a> {
         Self {
             job,
             around,
+            outer,
             radius,
             ring,
             difference: Plane::new(ring, input),
@@ -150,8 +157,20 @@ impl<'a> Tile<'a> {
                 alpha: vec![0.0; wide],
                 variance: vec![0.0; wide],
                 noise: vec![0.0; wide],
-                chosen: [(); 5].map(|()| vec![0.0; wide]),
+                small: [(); 2].map(|()| vec![0.0; wide]),
+                taken: vec![0.0; wide],
             },
+            agreement: (compared > 0).then(|| {
+                // Differences within a learned lens's own error are no step.
+                let tolerance = job.optics.stage().map_or(0.0, |stage| stage.window_tolerance as f32).powi(2);
+                let of = Contrast {
+                    gain: job.bank.variance_factor(),
+                    of_residual: of_residual.gain,
+                    tolerance,
+                    largest: UNINFORMATIVE.powi(2) + tolerance,
+                };
+                Agreement::new(2 * compared + 1, wide, of)
+            }),
             alpha: Plane::new(WAITING, wide),
             residual: Plane::new(WAITING, wide),
             work: Plane::new(3, wide),
@@ -164,6 +183,7 @@ impl<'a> Tile<'a> {
                 squared: job.optics.focal_length_mm().powi(2) as f32,
                 offset: offset as f32,
                 slope: slope as f32,
+                floor: FLOOR.powi(2),
             },
             of_residual,
             inner: Inner { size: job.far.dim(), reach },
@@ -190,10 +210,10 @@ impl<'a> Tile<'a> {
     }
 
     fn run(&mut self, place: Place, mut maps: Maps<'_>) -> [f64; 3] {
-        let [above, beside] = self.around;
+        let [above, _] = self.around;
         let reach = self.job.bank.reach_px();
-        let halo = [above, beside].map(|around| around + self.radius + reach);
-        let wide = place.columns + 2 * beside;
+        let halo = self.outer.map(|around| around + self.radius + reach);
+        let wide = place.columns + 2 * self.outer[1];
         let products = wide + 2 * self.radius;
         let [inputs, input] = [place.rows + 2 * halo[0], place.columns + 2 * halo[1]];
         let Job { far, near, bank, scales, .. } = self.job;
@@ -227,13 +247,18 @@ impl<'a> Tile<'a> {
                 }
             }
             // A row of windows needs filter input from `radius + 2 reach` rows further down.
-            while next < place.rows + 2 * above && next + 2 * self.radius + 2 * reach < begin + count {
+            while next < place.rows + 2 * self.outer[0]
+                && next + 2 * self.radius + 2 * reach < begin + count
+            {
                 self.windows(place, next, wide, products);
-                self.residual_row(next, wide);
-                if let Some(y) = next.checked_sub(above).filter(|y| *y < place.rows) {
-                    self.own_row(place, y, holes.as_ref().map(|holes| &holes.own), &mut maps, &mut sums);
+                if let Some(row) = next.checked_sub(2 * self.compared()) {
+                    self.take(row, wide);
+                    self.residual_row(row, place.columns + 2 * self.around[1]);
+                    if let Some(y) = row.checked_sub(above).filter(|y| *y < place.rows) {
+                        self.own_row(place, y, holes.as_ref().map(|holes| &holes.own), &mut maps, &mut sums);
+                    }
+                    self.finish(place, row, &mut maps);
                 }
-                self.finish(place, next, wide, &mut maps);
                 next += 1;
             }
         }
@@ -279,9 +304,38 @@ impl<'a> Tile<'a> {
             self.advance(place, index, row, products);
             self.row(place, index, row, wide);
         }
-        let [alpha, variance, ..] = &mut self.row.chosen;
-        self.alpha.row_mut(row % WAITING)[..wide].copy_from_slice(&alpha[..wide]);
-        variance[..wide].iter_mut().zip(&self.row.noise).for_each(|(v, noise)| *v *= noise);
+        let Self { job, row: found, agreement, outer, .. } = self;
+        let Row { alpha, variance, small, noise, .. } = found;
+        for variance in [&mut *variance, &mut small[1]] {
+            variance[..wide].iter_mut().zip(&*noise).for_each(|(v, noise)| *v *= noise);
+        }
+        if let Some(agreement) = agreement {
+            let anew = ((place.top + row) as isize - outer[0] as isize).rem_euclid(RECOMPUTED) == 0;
+            let small = small.each_ref().map(|small| &small[..wide]);
+            agreement.add(job.backend, row, anew, small, [&alpha[..wide], &variance[..wide]]);
+        }
+    }
+
+    /// Rows and columns on either side over which windows are compared.
+    fn compared(&self) -> usize {
+        self.agreement.as_ref().map_or(0, |agreement| agreement.half)
+    }
+
+    /// Alpha and variance of a row, from the row of windows `compared` before the last one.
+    fn take(&mut self, row: usize, wide: usize) {
+        let Self { job, row: found, agreement, alpha, .. } = self;
+        let to = alpha.row_mut(row % WAITING);
+        match agreement {
+            Some(agreement) => {
+                let inner = wide - 2 * agreement.half;
+                let to = [&mut to[..inner], &mut found.taken[..inner]];
+                agreement.decide(job.backend, row + 2 * agreement.half, wide, to);
+            }
+            None => {
+                to[..wide].copy_from_slice(&found.small[0][..wide]);
+                found.taken[..wide].copy_from_slice(&found.small[1][..wide]);
+            }
+        }
     }
 
     fn advance(&mut self, place: Place, index: usize, row: usize, products: usize) {
@@ -289,7 +343,7 @@ impl<'a> Tile<'a> {
         let backend = job.backend;
         let Columns { side, sums } = &mut columns[index];
         let (half, reach) = (*side / 2, job.bank.reach_px());
-        let image_row = (place.top + row) as isize - self.around[0] as isize;
+        let image_row = (place.top + row) as isize - self.outer[0] as isize;
         // Ring rows: a filtered row lies `2 reach` below its first input pixel and `reach` below the middle.
         let filtered = |d: isize| (row as isize + *radius as isize + d + 2 * reach as isize) as usize % *ring;
         let bright = |d: isize| (row as isize + *radius as isize + d + reach as isize) as usize % *ring;
@@ -327,7 +381,7 @@ impl<'a> Tile<'a> {
     }
 
     fn row(&mut self, place: Place, index: usize, line: usize, wide: usize) {
-        let [above, beside] = self.around;
+        let [above, beside] = self.outer;
         let Self { job, row, radius, inner, .. } = self;
         let Columns { side, sums } = &self.columns[index];
         let (side, backend, scales, bank) = (*side, job.backend, job.scales, job.bank);
@@ -356,45 +410,27 @@ impl<'a> Tile<'a> {
         let of_pixels = &mut row.work[..wide];
         inner.share_columns(place.left as isize - beside as isize, side, noise, of_pixels);
         simd::without_noise(backend, energy, of_pixels, [of_noise, LEAST_EVIDENCE], variance);
-        let [chosen, of_chosen, low, high, open] = row.chosen.each_mut().map(|values| &mut values[..wide]);
+        let [small, of_small] = row.small.each_mut().map(|values| &mut values[..wide]);
         if index == 0 {
-            chosen.copy_from_slice(alpha);
-            of_chosen.copy_from_slice(variance);
-            low.fill(-10.0);
-            high.fill(10.0);
-            open.fill(1.0);
-        }
-        match job.settings.window {
-            Window::Fixed(_) => {}
-            Window::Adaptive => {
-                let factor = bank.weighing_factor();
-                // Differences within the model's own error are no step.
-                let tolerance = job.optics.stage().map_or(0.0, |stage| stage.window_tolerance as f32);
-                let weighing = Weighing {
-                    gamma: GAMMA * factor.sqrt(),
-                    floor: (FLOOR * FLOOR + tolerance * tolerance) / factor,
-                    largest: (UNINFORMATIVE * UNINFORMATIVE + tolerance * tolerance) / factor,
-                };
-                let choice = Choice { alpha: chosen, variance: of_chosen, low, high, open };
-                simd::choose(backend, alpha, variance, noise, weighing, choice);
-            }
-            Window::Safe if index > 0 => {
-                let largest = CERTAIN * CERTAIN / bank.weighing_factor();
-                simd::choose_safe(backend, alpha, variance, noise, largest, chosen, of_chosen);
-            }
-            Window::Safe => {}
+            small.copy_from_slice(alpha);
+            of_small.copy_from_slice(variance);
+        } else {
+            let largest = CERTAIN * CERTAIN / bank.weighing_factor();
+            simd::choose_certain(backend, alpha, variance, noise, largest, small, of_small);
         }
     }
 
     fn residual_row(&mut self, row: usize, wide: usize) {
+        let compared = self.compared();
         let Self { job, radius, ring, filters, sum, zeros, work, of_residual, .. } = self;
         let reach = job.bank.reach_px();
+        let middle = row + compared + *radius + reach;
+        let left = *radius + compared;
         let rho = filters.rho().map(|plane| match plane {
-            Some(plane) => &plane.row((row + *radius + 2 * reach) % *ring)[*radius..*radius + wide],
+            Some(plane) => &plane.row((middle + reach) % *ring)[left..left + wide],
             None => &zeros[..wide],
         });
-        let left = *radius + reach;
-        let sum = &sum.row((row + *radius + reach) % *ring)[left..left + wide];
+        let sum = &sum.row(middle % *ring)[left + reach..left + reach + wide];
         let alpha = &self.alpha.row(row % WAITING)[..wide];
         let stride = work.stride();
         let (squares, rest) = work.all_mut().split_at_mut(stride);
@@ -414,7 +450,7 @@ impl<'a> Tile<'a> {
         let own = beside..beside + place.columns;
         let row = y + above;
         let alpha = &self.alpha.row(row % WAITING)[own.clone()];
-        let variance = &self.row.chosen[1][own.clone()];
+        let variance = &self.row.taken[own.clone()];
         if let Some(to) = maps.deviation_mm.row_mut(y).as_slice_mut() {
             simd::deviation_row(self.job.backend, self.deviation, alpha, variance, to);
         }
@@ -425,8 +461,9 @@ impl<'a> Tile<'a> {
         let from = BORDER_PX.saturating_sub(place.left).min(place.columns);
         let to = width.saturating_sub(BORDER_PX).saturating_sub(place.left).clamp(from, place.columns);
         let reach = self.job.bank.reach_px();
+        let from_outer = self.radius + self.compared();
         let texture = self.filters.rho()[1].map_or(&self.zeros[..], |plane| {
-            &plane.row((row + self.radius + 2 * reach) % self.ring)[self.radius + beside..]
+            &plane.row((row + from_outer + 2 * reach) % self.ring)[from_outer + beside..]
         });
         let [squares, expected] = [0, 1].map(|i| &self.work.row(i)[own.clone()]);
         match holes {
@@ -445,8 +482,9 @@ impl<'a> Tile<'a> {
         }
     }
 
-    fn finish(&mut self, place: Place, row: usize, wide: usize, maps: &mut Maps<'_>) {
+    fn finish(&mut self, place: Place, row: usize, maps: &mut Maps<'_>) {
         let [above, beside] = self.around;
+        let wide = place.columns + 2 * beside;
         let backend = self.job.backend;
         let side = self.job.settings.median_px;
         let complete = |half: usize| row.checked_sub(above + half).filter(|y| *y < place.rows);

@@ -9,9 +9,8 @@ use crate::{
     error::{Result, WorkflowError},
 };
 
-#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Method {
-    #[default]
     RationalOperators,
     /// `whitened`: operators with a white residual.
     Whitened,

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use farnear_depth::{
     adaptive_window::Window,
     fill::{FillBy, LowTexture},
-    measure::MeasureSettings,
+    measure::{DepthMethod, MeasureSettings},
     optics::{Optics, USABLE_BLUR_PX},
     pipeline::Settings,
     prepare::{Align, Balance, PrepareSettings},
@@ -56,15 +56,15 @@ pub struct DepthRequest {
     /// [default: designed for the optics].
     #[cfg_attr(feature = "clap", arg(long, value_name = "NAME|FILE"))]
     pub operators: Option<PathBuf>,
-    /// Method: ro (rational operators; whitened for a lens file of calibrate stack), whitened (operators at the noise limit), or for comparison subbarao, subbarao-fourier or
-    /// favaro.
-    #[cfg_attr(feature = "clap", arg(long, default_value_t))]
-    #[serde_as(as = "DisplayFromStr")]
-    pub method: Method,
-    /// Window over which evidence is summed: an odd number of pixels from 1 to 63, adaptive (the largest of 7, 13 and 21 that agrees
-    /// with the smaller ones), or safe (the smallest of 9, 13 and 21 that is certain enough)
-    /// [default: adaptive for whitened, 7 otherwise].
-    #[cfg_attr(feature = "clap", arg(long, value_name = "PX|adaptive|safe"))]
+    /// Method: whitened (operators at the noise limit), ro (rational operators), or for comparison subbarao,
+    /// subbarao-fourier or favaro [default: ro with --operators, else whitened].
+    #[cfg_attr(feature = "clap", arg(long))]
+    #[serde_as(as = "Option<DisplayFromStr>")]
+    pub method: Option<Method>,
+    /// Window over which evidence is summed: an odd number of pixels from 1 to 63, or adaptive (21 where the
+    /// surface is flat, else the smallest of 7, 13 and 21 that is certain enough) [default: adaptive for whitened, 7 for other
+    /// methods].
+    #[cfg_attr(feature = "clap", arg(long, value_name = "PX|adaptive"))]
     #[serde_as(as = "Option<DisplayFromStr>")]
     pub window: Option<Window>,
     /// Side of the median window in pixels: 1, 3, 5 or 7.
@@ -146,7 +146,7 @@ impl Default for DepthRequest {
             optics: None,
             psf: None,
             operators: None,
-            method: Method::default(),
+            method: None,
             window: None,
             median_px: 3,
             align: Align::default(),
@@ -198,9 +198,6 @@ impl Request for DepthRequest {
             let expected = "it defines the regions that `fill` fills: give `fill` too";
             return Err(WorkflowError::parameter("low-texture", self.low_texture, expected));
         }
-        if let (Method::Whitened, Some(asked)) = (self.method, &self.operators) {
-            return Err(WorkflowError::parameter("operators", asked.display(), "method whitened uses none"));
-        }
         if let Some(bin) = self.bin.filter(|bin| !(1..=16).contains(bin)) {
             return Err(WorkflowError::parameter("bin", bin, "1 to 16 pixels"));
         }
@@ -213,20 +210,15 @@ impl Request for DepthRequest {
             let expected = "a correction knows the lens by the place in the whole image: correct the whole map, or give no region";
             return Err(WorkflowError::parameter("correction", file.display(), expected));
         }
-        let Method::Baseline(method) = self.method else { return Ok(()) };
-        if let Some(window @ (Window::Adaptive | Window::Safe)) = self.window {
-            return Err(WorkflowError::parameter(
-                "window",
-                window,
-                format!("method {method} takes a number of pixels"),
-            ));
+        let method = self.method();
+        if let (Method::Whitened | Method::Baseline(_), Some(asked)) = (method, &self.operators) {
+            let expected = format!("method {method} uses none");
+            return Err(WorkflowError::parameter("operators", asked.display(), expected));
         }
-        if let Some(asked) = &self.operators {
-            return Err(WorkflowError::parameter(
-                "operators",
-                asked.display(),
-                format!("method {method} uses none"),
-            ));
+        let Method::Baseline(method) = method else { return Ok(()) };
+        if let Some(window @ Window::Adaptive) = self.window {
+            let expected = format!("method {method} takes a number of pixels");
+            return Err(WorkflowError::parameter("window", window, expected));
         }
         if let Some(noise) = self.uncertainty {
             let expected =
@@ -250,14 +242,12 @@ impl Request for DepthRequest {
 }
 
 impl DepthRequest {
-    /// Selects the method for which `calibrate stack` calibrated the lens, unless operators are named.
-    pub(super) fn for_lens(&self, context: &Context<'_>) -> Result<Self> {
-        let usual = self.method == Method::default() && self.operators.is_none();
-        if !usual || optics::of_pair(self.optics.as_deref(), &self.far)?.0.stage().is_none() {
-            return Ok(self.clone());
+    /// The method, or its default.
+    pub fn method(&self) -> Method {
+        match self.operators {
+            Some(_) => self.method.unwrap_or(Method::RationalOperators),
+            None => self.method.unwrap_or(Method::Whitened),
         }
-        context.info("method whitened: calibrate stack made this lens file for it");
-        Ok(Self { method: Method::Whitened, ..self.clone() })
     }
 
     /// Whether nothing else depends on the pixels of the images.
@@ -302,16 +292,11 @@ impl DepthRequest {
     }
 
     /// Settings of [`farnear_depth::measure::measure_pair`] for images with unknown limits and noise.
-    pub fn measure(&self) -> MeasureSettings {
-        let run = self.computation();
-        let usual = match self.method {
-            Method::Whitened => Window::Adaptive,
-            Method::RationalOperators | Method::Baseline(_) => Window::Fixed(run.smoothing_px),
-        };
+    pub fn measure(&self, method: DepthMethod<'_>) -> MeasureSettings {
         MeasureSettings {
             prepare: self.prepare(),
-            window: self.window.unwrap_or(usual),
-            run,
+            window: self.window.unwrap_or_else(|| method.usual_window()),
+            run: self.computation(),
             least_confidence: self.min_confidence,
         }
     }

@@ -62,7 +62,7 @@ fn a_cancelled_map_leaves_nothing_behind() {
 fn options_without_effect_on_a_method_are_bad_usage() {
     let folder = tempfile::tempdir().unwrap();
     let other = Method::Baseline(farnear_depth::baselines::Method::Subbarao);
-    let settings = DepthRequest { method: other, ..settings(folder.path()) };
+    let settings = DepthRequest { method: Some(other), ..settings(folder.path()) };
     for settings in [
         DepthRequest { operators: Some("gro".into()), ..settings.clone() },
         DepthRequest { uncertainty: Some(CameraNoise::Estimated), ..settings },

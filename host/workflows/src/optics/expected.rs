@@ -12,7 +12,7 @@ const FREQUENCIES: usize = 64;
 const DEPTHS: usize = 9;
 /// Variance of a pixel's noise / mean squared: 8 bit, 9,000 electrons, read noise of 12 electrons.
 const NOISE_VARIANCE: f64 = 1.19e-4;
-/// Default windows and error / bound. Measured: 1.07 and 1.08 on rendered planes; 1.1 to 1.4 and 1.3 to 1.5
+/// Default windows on flat surfaces and error / bound. Measured: 1.07 and 1.08 on rendered planes; 1.1 to 1.4 and 1.3 to 1.5
 /// on slants through the whole range with four proposed lenses. The larger values are used.
 const RATIONAL: Reached = Reached { window_px: 7.0, above_bound: 1.37 };
 const WHITENED: Reached = Reached { window_px: 21.0, above_bound: 1.5 };
@@ -25,9 +25,9 @@ struct Reached {
 /// Root-mean-square depth error over the working range from the camera's noise.
 #[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 pub struct ExpectedError {
-    /// `--method ro`: window of 7 pixels.
+    /// `--method ro`.
     pub ro_mm: f64,
-    /// `--method whitened`: adaptive windows, on smooth surfaces.
+    /// `--method whitened`, on flat surfaces.
     pub whitened_mm: f64,
 }
 
