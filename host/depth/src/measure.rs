@@ -22,6 +22,8 @@ use crate::validity::{LARGEST_ALPHA, Lost, Validity, ValiditySettings, assess};
 
 /// Alpha of a pixel measured out of range before blur scaling is undone.
 const OUT_OF_RANGE_ALPHA: f64 = 1.2;
+/// Least part of the estimated noise that the residual may leave.
+const LEAST_NOISE: f64 = 0.1;
 /// Part of the pixels lost for one reason above which it is reported.
 const LEAST_REPORTED: f64 = 0.01;
 /// Unexplained texture, mean squares, from which PSF or blur are doubted.
@@ -297,6 +299,12 @@ pub(crate) fn measure(
         DepthMethod::Baseline(_) => BASELINE_OVER_WHITENED,
     };
     judging.deviation_mm *= noisier;
+    // The noise of the pair contains what fine texture the blur leaves; the residual of the right depth does not.
+    let noise = judging.excess.clamp(LEAST_NOISE, 1.0) as f32;
+    if noise < 1.0 {
+        judging.deviation_mm *= noise.sqrt();
+        judging.misfit /= noise;
+    }
     // The border has the depth, so also the deviation and misfit, of the pixels next to it.
     let border = match method {
         DepthMethod::Rational(operators) => operators.kernel_size().max(white.reach_px() + 1),

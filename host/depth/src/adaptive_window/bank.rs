@@ -53,17 +53,20 @@ impl Bank {
         }
     }
 
-    /// Variance of `alpha` for unit noise, in (residual's gain x energy / slope^2), measured at 8 bit on planes:
-    /// includes correlations between neighbouring pixels.
-    pub(super) fn variance_factor(&self) -> f32 {
+    /// Variance of `alpha` for noise of unit variance, in energies / slope^2: a polynomial in alpha^2. It is the residual's
+    /// noise where the texture has its energy, because neighbouring residuals correlate.
+    pub(super) fn variance_gain(&self) -> [f32; 4] {
         match self {
-            Self::Whitened(_) => 1.15,
-            // Relative to the gain at alpha = 0.
-            Self::Rational(_) => 1.2 / self.residual_gain()[0],
+            Self::Whitened(filters) => filters.variance_gain,
+            Self::Rational(_) => {
+                // Measured at 8 bit on planes, relative to the gain at alpha = 0.
+                let gain = self.residual_gain();
+                gain.map(|coefficient| 1.2 * coefficient / gain[0])
+            }
         }
     }
 
-    /// As [`Self::variance_factor`], for weighing windows against each other.
+    /// As [`Self::variance_gain`], for all depths.
     pub(super) fn weighing_factor(&self) -> f32 {
         match self {
             Self::Whitened(_) => 0.87,

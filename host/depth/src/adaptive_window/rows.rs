@@ -130,7 +130,7 @@ impl<'a> Tile<'a> {
         let ring = (2 * radius + 2 + reach + MAX_ROWS).next_multiple_of(MAX_ROWS);
         let wide = columns(job.far.ncols()) + 2 * outer[1];
         let (products, input) = (wide + 2 * radius, wide + 2 * radius + 2 * reach);
-        let gain = MEDIAN_GAIN[median] * job.bank.variance_factor();
+        let variance_gain = job.bank.variance_gain();
         let [offset, slope] = job.optics.defocus_line_mm();
         let of_residual = Residual {
             gain: job.bank.residual_gain(),
@@ -164,8 +164,7 @@ impl<'a> Tile<'a> {
                 // Differences within a learned lens's own error are no step.
                 let tolerance = job.optics.stage().map_or(0.0, |stage| stage.window_tolerance as f32).powi(2);
                 let of = Contrast {
-                    gain: job.bank.variance_factor(),
-                    of_residual: of_residual.gain,
+                    gain: variance_gain,
                     tolerance,
                     largest: UNINFORMATIVE.powi(2) + tolerance,
                 };
@@ -178,8 +177,7 @@ impl<'a> Tile<'a> {
             zeros: vec![0.0; products],
             depth_of: job.bank.depth_of(job.optics),
             deviation: Deviation {
-                gain,
-                of_residual: of_residual.gain,
+                gain: variance_gain.map(|coefficient| MEDIAN_GAIN[median] * coefficient),
                 squared: job.optics.focal_length_mm().powi(2) as f32,
                 offset: offset as f32,
                 slope: slope as f32,

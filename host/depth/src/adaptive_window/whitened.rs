@@ -41,6 +41,8 @@ pub struct Whitened {
     pub(crate) matched: Kernel,
     /// `sum (R1 p) u` over `sum u^2` at alpha = 0, for the design's texture and noise.
     pub(crate) slope_in_energy: f64,
+    /// Variance of alpha, in energies / slope^2, for noise of unit variance: a polynomial in alpha^2.
+    pub(crate) variance_gain: [f32; 4],
 }
 
 struct Point {
@@ -74,7 +76,8 @@ impl Whitened {
         let residual = residual(&points, &samples)?;
         let matched = matched(&points, &samples, &residual)?;
         let slope_in_energy = slope_in_energy(&points, &samples, &residual, &matched);
-        Ok(Self { residual, matched, slope_in_energy })
+        let variance_gain = variance_gain(&points, &samples, &residual, &matched)?;
+        Ok(Self { residual, matched, slope_in_energy, variance_gain })
     }
 }
 
@@ -217,6 +220,38 @@ fn slope_in_energy(
         energy += point.at.multiplicity * of_sum * u * u;
     }
     slope / energy
+}
+
+/// The residual's noise power, weighed by the power of the matched filter's output for a texture of even power. A sum of
+/// products of both has this variance (Parseval), however their neighbouring pixels correlate.
+fn variance_gain(
+    points: &[Point],
+    samples: &[[Sample; ALPHAS]],
+    residual: &[Kernel; 4],
+    matched: &Kernel,
+) -> Result<[f32; 4], DesignError> {
+    let responses: Vec<([f64; 4], f64)> = points
+        .iter()
+        .map(|p| (residual.each_ref().map(|r| r.response(p.at.u, p.at.v)), matched.response(p.at.u, p.at.v)))
+        .collect();
+    let rows: Vec<(Vec<f64>, f64)> = (ALPHAS / 2..ALPHAS)
+        .map(|index| {
+            let alpha = samples[0][index].alpha;
+            let [mut of_noise, mut of_texture] = [0.0; 2];
+            for ((point, samples), (r, u)) in points.iter().zip(samples).zip(&responses) {
+                let sum = |sign: f64| (0..4).map(|k| (sign * alpha).powi(k as i32) * r[k]).sum::<f64>();
+                let h = samples[index].h;
+                let power = point.power * point.at.w;
+                let texture = u * u * (power * (h[0] + h[1]).powi(2) + 2.0 * NOISE);
+                of_noise += point.at.multiplicity * texture * (sum(1.0).powi(2) + sum(-1.0).powi(2));
+                of_texture += point.at.multiplicity * texture;
+            }
+            ((0..4).map(|k| alpha.powi(2 * k)).collect(), of_noise / of_texture)
+        })
+        .collect();
+    let (matrix, right) = least_squares::reduced(&rows);
+    let found = least_squares::solve(matrix, right)?;
+    Ok(std::array::from_fn(|k| found[k] as f32))
 }
 
 #[cfg(test)]

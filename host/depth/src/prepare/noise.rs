@@ -1,9 +1,9 @@
 //! The noise of a pair, from the pair itself.
 //!
-//! At the highest frequencies, towards (pi, pi), defocus leaves no signal, and at any depth at least one image is out
-//! of focus. Both images pass the second difference along both axes (Immerkaer 1996), whose response peaks there. The
-//! smaller of a block's two energies is the noise. Blocks of several brightnesses separate shot noise from the constant
-//! part. Cost: nine additions per pixel and image.
+//! At the highest frequencies, towards (pi, pi), strong defocus leaves no signal, and equal defocus leaves none in the
+//! difference of the images. Both images and their difference pass the second difference along both axes (Immerkaer
+//! 1996), whose response peaks there. The smallest of a block's three energies is the noise. Blocks of several
+//! brightnesses separate shot noise from the constant part. Cost: twenty additions per pixel.
 
 use ndarray::ArrayView2;
 use rayon::prelude::*;
@@ -12,9 +12,9 @@ use serde::{Deserialize, Serialize};
 const BLOCK_PX: usize = 16;
 /// Sum of the squared taps of the second difference along both axes.
 const GAIN: f64 = 36.0;
-/// Mean of the smaller of two independent estimates of a variance from a block's pixels, relative to the variance. The
-/// estimates scatter by about 12 %; the expected minimum is 0.56 of that lower.
-const SMALLER_OF_TWO: f64 = 0.93;
+/// Mean of the smallest of a block's three estimates, relative to the variance. They scatter by about 12 %, and the
+/// difference's is not independent of the others.
+const SMALLEST: f64 = 0.92;
 
 /// Variance of a pixel's noise, in the images' units: `constant + per_unit x value`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -40,9 +40,9 @@ pub fn of_pair(far: ArrayView2<f32>, near: ArrayView2<f32>) -> Option<PairNoise>
     let [rows, columns] = [height, width].map(|n| n.saturating_sub(2) / BLOCK_PX);
     let [far, near] = [&far, &near].map(|image| image.as_standard_layout());
     let of_row = |row: usize| {
-        let [far, near] = [&far, &near].map(|image| energies(&image.view(), row * BLOCK_PX, columns));
-        far.into_iter().zip(near).filter_map(|(a, b)| {
-            let (variance, brightness) = (a[0].min(b[0]) / SMALLER_OF_TWO, 0.5 * (a[1] + b[1]));
+        let of_blocks = energies([far.view(), near.view()], row * BLOCK_PX, columns);
+        of_blocks.into_iter().filter_map(|([of_far, of_near, of_difference], brightness)| {
+            let variance = of_far.min(of_near).min(0.5 * of_difference) / SMALLEST;
             (variance.is_finite() && brightness.is_finite()).then_some([brightness, variance])
         })
     };
@@ -68,27 +68,40 @@ pub fn of_pair(far: ArrayView2<f32>, near: ArrayView2<f32>) -> Option<PairNoise>
     Some(PairNoise { constant, per_unit, mean_variance })
 }
 
-/// Noise variance and mean brightness of each block of a row.
-fn energies(image: &ArrayView2<f32>, top: usize, columns: usize) -> Vec<[f64; 2]> {
+/// Noise variance of the far image, the near one and their difference, and mean brightness, of each block of a row.
+fn energies(images: [ArrayView2<f32>; 2], top: usize, columns: usize) -> Vec<([f64; 3], f64)> {
+    const SEEN_PX: usize = BLOCK_PX + 2;
     let pixels = (BLOCK_PX * BLOCK_PX) as f64;
-    let mut sums = vec![[0.0_f64; 2]; columns];
+    let mut sums = vec![([0.0_f64; 3], 0.0_f64); columns];
     for y in top + 1..=top + BLOCK_PX {
-        let rows = [y - 1, y, y + 1].map(|y| image.row(y).to_slice());
-        let [Some(above), Some(here), Some(below)] = rows else { unreachable!("made in standard layout") };
-        for (column, sums) in sums.iter_mut().enumerate() {
-            const SEEN_PX: usize = BLOCK_PX + 2;
-            let seen = [above, here, below].map(|row| &row[column * BLOCK_PX..column * BLOCK_PX + SEEN_PX]);
-            let down: [f32; SEEN_PX] = std::array::from_fn(|x| seen[0][x] - 2.0 * seen[1][x] + seen[2][x]);
+        let rows = images.each_ref().map(|image| {
+            [y - 1, y, y + 1].map(|y| image.row(y).to_slice().expect("made in standard layout"))
+        });
+        for (column, (energy, brightness)) in sums.iter_mut().enumerate() {
+            let seen = |row: &&'_ [f32]| -> [f32; SEEN_PX] {
+                let from = &row[column * BLOCK_PX..column * BLOCK_PX + SEEN_PX];
+                std::array::from_fn(|x| from[x])
+            };
+            let [far, near] = rows.each_ref().map(|rows| rows.each_ref().map(seen));
+            let down = |[above, here, below]: &[[f32; SEEN_PX]; 3]| -> [f32; SEEN_PX] {
+                std::array::from_fn(|x| above[x] - 2.0 * here[x] + below[x])
+            };
+            let down = [down(&far), down(&near)];
             // Eight parallel sums, which the compiler vectorises.
-            let (mut squares, mut brightness) = ([0.0_f32; 8], [0.0_f32; 8]);
+            let (mut squares, mut bright) = ([[0.0_f32; 8]; 3], [0.0_f32; 8]);
             for x in 0..BLOCK_PX {
-                let second = down[x] - 2.0 * down[x + 1] + down[x + 2];
-                squares[x % 8] += second * second;
-                brightness[x % 8] += seen[1][x + 1];
+                let [of_far, of_near] = down.each_ref().map(|down| down[x] - 2.0 * down[x + 1] + down[x + 2]);
+                let apart = of_far - of_near;
+                squares[0][x % 8] += of_far * of_far;
+                squares[1][x % 8] += of_near * of_near;
+                squares[2][x % 8] += apart * apart;
+                bright[x % 8] += 0.5 * (far[1][x + 1] + near[1][x + 1]);
             }
-            sums[0] += f64::from(squares.iter().sum::<f32>());
-            sums[1] += f64::from(brightness.iter().sum::<f32>());
+            for (sum, squares) in energy.iter_mut().zip(&squares) {
+                *sum += f64::from(squares.iter().sum::<f32>()) / pixels / GAIN;
+            }
+            *brightness += f64::from(bright.iter().sum::<f32>()) / pixels;
         }
     }
-    sums.into_iter().map(|[squares, sum]| [squares / pixels / GAIN, sum / pixels]).collect()
+    sums
 }

@@ -110,9 +110,8 @@ fn choose_certain_generic<L: Lanes>(
 /// How two windows are compared.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Contrast {
-    /// Variance of alpha: `gain` times a polynomial in alpha^2 times the window's own.
-    pub gain: f32,
-    pub of_residual: [f32; 4],
+    /// Variance of alpha relative to the window's own, a polynomial in alpha^2.
+    pub gain: [f32; 4],
     /// Variance of alpha within which windows may differ by the model's error.
     pub tolerance: f32,
     /// Variance of alpha from which a window tells nothing.
@@ -146,7 +145,7 @@ fn contrast_generic<L: Lanes>(of: Contrast, small: [&[f32]; 2], large: [&[f32]; 
         (&mut variance[..width], &mut difference[..width], &mut counted[..width]);
     for x in 0..width {
         let a = small[x];
-        let factor = of.gain * polynomial(of.of_residual, a * a);
+        let factor = polynomial(of.gain, a * a);
         let total = factor * of_small[x] + of.tolerance;
         let tells = total <= of.largest;
         let apart = a - large[x];
@@ -303,10 +302,8 @@ fn residual_generic<L: Lanes>(
 
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Deviation {
-    /// Factor of the variance.
-    pub gain: f32,
-    /// The residual's mean square for noise of unit variance, a polynomial in alpha^2.
-    pub of_residual: [f32; 4],
+    /// Variance of alpha relative to the window's own, a polynomial in alpha^2.
+    pub gain: [f32; 4],
     /// Depth changes with alpha by `squared slope / (offset + slope alpha)^2`.
     pub squared: f32,
     pub offset: f32,
@@ -325,9 +322,9 @@ fn deviation_generic<L: Lanes>(of: Deviation, alpha: &[f32], variance: &[f32], t
     let (alpha, variance) = (&alpha[..width], &variance[..width]);
     for x in 0..width {
         let a = alpha[x];
-        let noise = polynomial(of.of_residual, a * a);
+        let gain = polynomial(of.gain, a * a);
         let w = of.offset + of.slope * a;
-        to[x] = (of.gain * noise * variance[x] + of.floor).sqrt() * (of.squared * of.slope / (w * w));
+        to[x] = (gain * variance[x] + of.floor).sqrt() * (of.squared * of.slope / (w * w));
     }
 }
 
@@ -476,7 +473,7 @@ mod tests {
     /// A plane, and a step of 0.2 in the middle, seen by windows with a variance of 1e-3 and 1e-4.
     #[test]
     fn the_larger_window_counts_where_the_surface_is_flat() {
-        let of = Contrast { gain: 1.0, of_residual: [1.0, 0.0, 0.0, 0.0], tolerance: 0.0, largest: 2e-3 };
+        let of = Contrast { gain: [1.0, 0.0, 0.0, 0.0], tolerance: 0.0, largest: 2e-3 };
         for backend in Backend::available() {
             let small = [[0.13, 0.30, 0.3], [1e-3, 1e-3, f32::NAN]];
             let large = [[0.11, 0.20, 0.2], [1e-4; 3]];

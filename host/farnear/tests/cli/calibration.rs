@@ -139,7 +139,7 @@ fn filling_as_in_the_thesis_is_selectable() {
         let path = bench.0.path().join("plane").join(name);
         let pixels = image_file::read_grey(&path).unwrap().pixels;
         let blank = Array2::from_shape_fn(pixels.dim(), |(y, x)| {
-            let inside = (y as f32 - 120.0).hypot(x as f32 - 160.0) < 25.0;
+            let inside = (y as f32 - 120.0).hypot(x as f32 - 160.0) < 40.0;
             if inside { 30_000 } else { (65_535.0 * pixels[(y, x)]).round() as u16 }
         });
         fs::write(path, image_file::encode_png(blank.view(), 16).unwrap()).unwrap();

@@ -13,7 +13,7 @@ fn a_proposal_measures_within_the_error_it_promises() {
     let render = ["render", "--scene", "slant", "--optics", &file, "--width", "320", "--height", "240"];
     succeeds(farnear(&render).args(["--out", &pair]));
     let [far, near] = ["far", "near"].map(|name| format!("{pair}/{name}.png"));
-    let depth = ["depth", &far, &near, "--optics", &file, "--method", "whitened", "--out", &out];
+    let depth = ["depth", &far, &near, "--optics", &file, "--out", &out];
     succeeds(&mut farnear(&depth));
     let truth = format!("{pair}/truth.npy");
     let found = figures(&mut farnear(&["compare", &out, &truth, "--border", "24", "--json"]));

@@ -76,11 +76,11 @@ fn windows_and_confidence_are_asked_for() {
             figures(&mut farnear(&["measure", "plane", &folder.text(&format!("{out}/depth.npy")), "--json"]));
         (number(&measured, "rms_mm"), number(&measured, "z_mm"))
     };
-    let (ro, _) = errors("ro", &[]);
-    let (white, depth) = errors("white", &["--method", "whitened"]);
+    let (ro, _) = errors("ro", &["--method", "ro"]);
+    let (white, depth) = errors("white", &[]);
     // Adaptive windows reduce the noise of a plane by a factor of 2.6 to 3.
     assert!(white < 0.45 * ro && (depth - 905.0).abs() < 0.1, "{white} {ro} {depth}");
-    let (wide, _) = errors("wide", &["--window", "safe"]);
+    let (wide, _) = errors("wide", &["--method", "ro", "--window", "adaptive"]);
     assert!(wide < ro, "{wide} {ro}");
     let out = folder.text("sure");
     let found = figures(farnear(&pair).arg(&out).args(["--min-confidence", "0.9999"]));

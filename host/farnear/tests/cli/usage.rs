@@ -250,6 +250,8 @@ fn operators_are_named_or_read_or_refused() {
         &near,
         "--optics",
         rig_optics(),
+        "--method",
+        "ro",
         "--out",
         &folder.text("default"),
     ]));

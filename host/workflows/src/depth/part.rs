@@ -10,7 +10,7 @@ use crate::{
     measure::Rectangle,
 };
 
-/// Margin around the part, px: more than windows of 21 px and a chain of operators.
+/// Margin around the part, px: more than two windows of 21 px and a chain of operators.
 pub(super) const AROUND_PX: usize = 40;
 
 /// Position of a map in its images; recorded in `depth.toml`.
