@@ -1,5 +1,5 @@
 //! The choice between a small and a large window. Where a surface is flat over the large window, both find the same
-//! depth, except for noise: the mean square of their difference, relative to the small window's variance, is about 0.6.
+//! depth, except for noise: the mean square of their difference, relative to the small window's variance, is about 0.9.
 //! Steps, edges and curvature raise it all around. There the small window is taken.
 //!
 //! What the windows disagree in beyond noise also widens the standard deviation of either, since neither knows the

@@ -1,8 +1,8 @@
 //! The noise of a pair, from the pair itself.
 //!
-//! At the highest frequencies, towards (pi, pi), strong defocus leaves no signal, and equal defocus leaves none in the
-//! difference of the images. Both images and their difference pass the second difference along both axes (Immerkaer
-//! 1996), whose response peaks there. The smallest of a block's three energies is the noise. Blocks of several
+//! Both images pass the second difference along both axes (Immerkaer 1996), whose response peaks at the highest
+//! frequencies, towards (pi, pi). There defocus leaves little signal, and what it leaves in one image is proportional to
+//! what it leaves in the other. So the smaller eigenvalue of a block's covariance is the noise. Blocks of several
 //! brightnesses separate shot noise from the constant part. Cost: twenty additions per pixel.
 
 use ndarray::ArrayView2;
@@ -12,9 +12,8 @@ use serde::{Deserialize, Serialize};
 const BLOCK_PX: usize = 16;
 /// Sum of the squared taps of the second difference along both axes.
 const GAIN: f64 = 36.0;
-/// Mean of the smallest of a block's three estimates, relative to the variance. They scatter by about 12 %, and the
-/// difference's is not independent of the others.
-const SMALLEST: f64 = 0.92;
+/// Mean of a block's smaller eigenvalue relative to the variance, for noise alone: the estimates scatter by about 12 %.
+const SMALLER: f64 = 0.92;
 
 /// Variance of a pixel's noise, in the images' units: `constant + per_unit x value`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -41,8 +40,9 @@ pub fn of_pair(far: ArrayView2<f32>, near: ArrayView2<f32>) -> Option<PairNoise>
     let [far, near] = [&far, &near].map(|image| image.as_standard_layout());
     let of_row = |row: usize| {
         let of_blocks = energies([far.view(), near.view()], row * BLOCK_PX, columns);
-        of_blocks.into_iter().filter_map(|([of_far, of_near, of_difference], brightness)| {
-            let variance = of_far.min(of_near).min(0.5 * of_difference) / SMALLEST;
+        of_blocks.into_iter().filter_map(|([of_far, of_near, of_both], brightness)| {
+            let apart = (0.5 * (of_far - of_near)).hypot(of_both);
+            let variance = (0.5 * (of_far + of_near) - apart) / SMALLER;
             (variance.is_finite() && brightness.is_finite()).then_some([brightness, variance])
         })
     };
@@ -68,7 +68,7 @@ pub fn of_pair(far: ArrayView2<f32>, near: ArrayView2<f32>) -> Option<PairNoise>
     Some(PairNoise { constant, per_unit, mean_variance })
 }
 
-/// Noise variance of the far image, the near one and their difference, and mean brightness, of each block of a row.
+/// Variance of the far image, of the near one, their covariance, and the mean brightness, of each block of a row.
 fn energies(images: [ArrayView2<f32>; 2], top: usize, columns: usize) -> Vec<([f64; 3], f64)> {
     const SEEN_PX: usize = BLOCK_PX + 2;
     let pixels = (BLOCK_PX * BLOCK_PX) as f64;
@@ -88,17 +88,16 @@ fn energies(images: [ArrayView2<f32>; 2], top: usize, columns: usize) -> Vec<([f
             };
             let down = [down(&far), down(&near)];
             // Eight parallel sums, which the compiler vectorises.
-            let (mut squares, mut bright) = ([[0.0_f32; 8]; 3], [0.0_f32; 8]);
+            let (mut products, mut bright) = ([[0.0_f32; 8]; 3], [0.0_f32; 8]);
             for x in 0..BLOCK_PX {
                 let [of_far, of_near] = down.each_ref().map(|down| down[x] - 2.0 * down[x + 1] + down[x + 2]);
-                let apart = of_far - of_near;
-                squares[0][x % 8] += of_far * of_far;
-                squares[1][x % 8] += of_near * of_near;
-                squares[2][x % 8] += apart * apart;
+                products[0][x % 8] += of_far * of_far;
+                products[1][x % 8] += of_near * of_near;
+                products[2][x % 8] += of_far * of_near;
                 bright[x % 8] += 0.5 * (far[1][x + 1] + near[1][x + 1]);
             }
-            for (sum, squares) in energy.iter_mut().zip(&squares) {
-                *sum += f64::from(squares.iter().sum::<f32>()) / pixels / GAIN;
+            for (sum, products) in energy.iter_mut().zip(&products) {
+                *sum += f64::from(products.iter().sum::<f32>()) / pixels / GAIN;
             }
             *brightness += f64::from(bright.iter().sum::<f32>()) / pixels;
         }

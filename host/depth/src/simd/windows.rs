@@ -68,7 +68,9 @@ fn roots_generic<L: Lanes>(sums: CubicSums<'_>, floor: f32, found: Found<'_>) {
     let energy = &sums.energy[..width];
     let (alphas, variances) = (&mut found.alpha[..width], &mut found.variance[..width]);
     for x in 0..width {
-        let c1 = c1[x].max(floor * energy[x]).max(f32::MIN_POSITIVE);
+        // Rounding leaves energies of 0 or below where there is no texture.
+        let energy = energy[x].max(f32::MIN_POSITIVE);
+        let c1 = c1[x].max(floor * energy);
         let least = SLOPE_FLOOR * c1;
         let mut alpha = (-c0[x] / c1).clamp(-LARGEST_ALPHA, LARGEST_ALPHA);
         let mut slope = c1;
@@ -78,7 +80,7 @@ fn roots_generic<L: Lanes>(sums: CubicSums<'_>, floor: f32, found: Found<'_>) {
             alpha = (alpha - value / slope).clamp(-LARGEST_ALPHA, LARGEST_ALPHA);
         }
         alphas[x] = alpha;
-        variances[x] = energy[x] / (slope * slope);
+        variances[x] = energy / (slope * slope);
     }
 }
 
@@ -121,11 +123,11 @@ pub(crate) struct Contrast {
 /// Largest counted squared difference, relative to the variance.
 const LARGEST_CONTRAST: f32 = 100.0;
 /// Mean square difference of two windows, relative to the smaller one's variance, from which the surface is not flat
-/// over the larger one. On planes 99 % are below 1.45.
-const NOT_FLAT: f32 = 1.5;
+/// over the larger one. On planes 99 % are below 1.9.
+const NOT_FLAT: f32 = 2.0;
 /// That of a flat surface, which 75 % do not reach, and the part of what is beyond it by which the larger window's
 /// variance grows. Chosen on rendered spheres, cones and slants for an error over deviation of 0.9 to 1.25.
-const FLAT: f32 = 0.8;
+const FLAT: f32 = 1.05;
 const DOUBT: f32 = 0.5;
 /// Largest growth of the smaller one's variance: a certain depth beside a large step stays one.
 const LARGEST_GROWTH: f32 = 9.0;
@@ -256,8 +258,9 @@ fn without_noise_generic<L: Lanes>(
     let width = variance.len();
     let (energy, noise) = (&energy[..width], &noise[..width]);
     for x in 0..width {
-        let evidence = (energy[x] - of_noise * noise[x]).max(least * energy[x]).max(f32::MIN_POSITIVE);
-        let widened = energy[x] / evidence;
+        let energy = energy[x].max(f32::MIN_POSITIVE);
+        let evidence = (energy - of_noise * noise[x]).max(least * energy);
+        let widened = energy / evidence;
         variance[x] *= widened * widened;
     }
 }
