@@ -139,7 +139,8 @@ impl Inputs {
         let optics = optics.binned(bin);
         let around = optics.distortion().is_none().then_some(AROUND_PX);
         let cut = settings.region.map(|region| Cut::out_of(&mut pair, region, around)).transpose()?;
-        let method = Prepared::new(settings.method(), settings.operators.as_deref(), &optics, &context.cache)?;
+        let method =
+            Prepared::new(settings.method(), settings.operators.as_deref(), &optics, &context.cache)?;
         let correction =
             settings.correction.as_deref().map(|file| context.cache.correction(file)).transpose()?;
         if let Some(correction) = &correction {

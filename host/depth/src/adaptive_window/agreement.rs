@@ -42,14 +42,7 @@ impl Agreement {
 
     /// Adds a row of alpha and its variance by both windows. Sums are made anew in the first row and where `anew` is set,
     /// because rounding errors would add up.
-    pub fn add(
-        &mut self,
-        backend: Backend,
-        row: usize,
-        anew: bool,
-        small: [&[f32]; 2],
-        large: [&[f32]; 2],
-    ) {
+    pub fn add(&mut self, backend: Backend, row: usize, anew: bool, small: [&[f32]; 2], large: [&[f32]; 2]) {
         let at = row % self.ring;
         let wide = large[0].len();
         for (to, from) in self.large.iter_mut().zip(large) {
@@ -83,11 +76,17 @@ impl Agreement {
         let (of_rows, of_windows) = self.sums.all_mut().split_at_mut(2 * stride);
         for index in 0..2 {
             let sums = &mut of_windows[index * stride..][..width];
-            simd::row_sums(backend, &of_rows[index * stride..][..wide], 2 * self.half + 1, &mut self.work, sums);
+            simd::row_sums(
+                backend,
+                &of_rows[index * stride..][..wide],
+                2 * self.half + 1,
+                &mut self.work,
+                sums,
+            );
         }
         let (first, last) = (self.half, self.half + width);
-        let [small, large] =
-            [&self.small, &self.large].map(|planes| planes.each_ref().map(|plane| &plane.row(at)[first..last]));
+        let [small, large] = [&self.small, &self.large]
+            .map(|planes| planes.each_ref().map(|plane| &plane.row(at)[first..last]));
         let sums = [&of_windows[..width], &of_windows[stride..][..width]];
         simd::decide_row(backend, sums, small, large, to);
     }

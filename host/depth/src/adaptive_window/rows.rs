@@ -163,11 +163,8 @@ impl<'a> Tile<'a> {
             agreement: (compared > 0).then(|| {
                 // Differences within a learned lens's own error are no step.
                 let tolerance = job.optics.stage().map_or(0.0, |stage| stage.window_tolerance as f32).powi(2);
-                let of = Contrast {
-                    gain: variance_gain,
-                    tolerance,
-                    largest: UNINFORMATIVE.powi(2) + tolerance,
-                };
+                let of =
+                    Contrast { gain: variance_gain, tolerance, largest: UNINFORMATIVE.powi(2) + tolerance };
                 Agreement::new(2 * compared + 1, wide, of)
             }),
             alpha: Plane::new(WAITING, wide),
@@ -245,8 +242,7 @@ impl<'a> Tile<'a> {
                 }
             }
             // A row of windows needs filter input from `radius + 2 reach` rows further down.
-            while next < place.rows + 2 * self.outer[0]
-                && next + 2 * self.radius + 2 * reach < begin + count
+            while next < place.rows + 2 * self.outer[0] && next + 2 * self.radius + 2 * reach < begin + count
             {
                 self.windows(place, next, wide, products);
                 if let Some(row) = next.checked_sub(2 * self.compared()) {

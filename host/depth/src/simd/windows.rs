@@ -243,7 +243,8 @@ fn move_products_generic<L: Lanes>(gone: [&[f32]; 2], come: [&[f32]; 2], sums: &
 }
 
 dispatch! {
-    /// Increases variances for noise in the energy, `of_noise` times the noise; at least the part `least` remains.
+    /// Increases variances for noise in the energy, `of_noise` times the noise; at least the part `least` remains. A window
+    /// without a pixel, whose energy is a rounding error, has an infinite one.
     fn without_noise(energy: &[f32], noise: &[f32], of_noise_and_least: [f32; 2], variance: &mut [f32]) =
         without_noise_generic
 }
@@ -259,8 +260,9 @@ fn without_noise_generic<L: Lanes>(
     let (energy, noise) = (&energy[..width], &noise[..width]);
     for x in 0..width {
         let energy = energy[x].max(f32::MIN_POSITIVE);
-        let evidence = (energy - of_noise * noise[x]).max(least * energy);
-        let widened = energy / evidence;
+        let expected = of_noise * noise[x];
+        let evidence = (energy - expected).max(least * energy);
+        let widened = if expected > 0.0 { energy / evidence } else { f32::INFINITY };
         variance[x] *= widened * widened;
     }
 }

@@ -154,7 +154,8 @@ fn filling_as_in_the_thesis_is_selectable() {
     assert!(hole > 0.015, "{hole}");
     assert!(!record().contains("fill_by") && !record().contains("low_texture ="), "{}", record());
     let filled = known(&["--fill"]);
-    assert!(filled > 0.999 && !record().contains("fill_by"), "{filled}");
+    // The sharp outline of the disc is a misfit, which is not filled.
+    assert!(filled > 0.995 && !record().contains("fill_by"), "{filled}");
     let thesis = known(&["--fill=thesis"]);
     assert!(thesis > 1.0 - 0.7 * hole && record().contains("fill_by = \"thesis\""), "{thesis}: {}", record());
     known(&["--fill=thesis", "--low-texture", "variance:0.00001"]);
