@@ -71,8 +71,8 @@ fn filling(fill: &Fill, low_texture: &str) -> PyResult<Settings> {
 ///     Whitened (least noise), rational operators, or a baseline; by default rational operators if `operators` are given, else
 ///     whitened.
 /// window : int or "adaptive", optional
-///     Side in px (odd, up to 63) of the window over which evidence is summed; by default adaptive for "whitened",
-///     else 7.
+///     Side in px (odd, up to 63) of the window over which evidence is summed; "adaptive" is for "whitened", whose default it
+///     is. Else the default is 7.
 /// median_px : int
 ///     Side of the median filter, px, odd; 1 = none.
 /// fill : bool or {"surface", "thesis"}

@@ -16,7 +16,6 @@ use farnear_depth::operators::{Design, Family, Operators, Request, design};
 use farnear_depth::optics::{FocusSection, LensSection, Optics, OpticsFile, SensorSection};
 use farnear_depth::pipeline::{Backend, Processor, Settings};
 use farnear_depth::prepare::{Align, Balance, PrepareSettings, prepare};
-use farnear_depth::uncertainty::{Noise, standard_deviation_mm};
 use ndarray::Array2;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -243,20 +242,6 @@ fn main() {
             None,
             1,
             time(20, || fill_low_texture(&mut map.clone(), texture.view(), 9)),
-            None,
-        );
-    }
-    if wanted("uncertainty_640x480") {
-        let settings = Settings::default();
-        let [far, near] = [vga[0].view(), vga[1].view()];
-        report(
-            "uncertainty_640x480",
-            None,
-            1,
-            time(5, || {
-                standard_deviation_mm(far, near, &operators, &optics_pill, &settings, Noise::Estimated)
-                    .unwrap()
-            }),
             None,
         );
     }

@@ -22,6 +22,7 @@ pub(crate) const LEAST_T: f32 = -4.0 / 27.0;
 pub(crate) const SLOPE_FLOOR: f32 = 0.02;
 
 /// The root in scalar code, reference of the vectorised one; `c1` must be positive.
+#[cfg(test)]
 pub(crate) fn root(c0: f32, c1: f32, c3: f32) -> f32 {
     let ratio = (c0 / c1).abs();
     let cubic = c3 / c1;

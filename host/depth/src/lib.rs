@@ -28,5 +28,4 @@ pub mod prepare;
 pub mod psf;
 pub mod reason;
 mod simd;
-pub mod uncertainty;
 pub mod validity;

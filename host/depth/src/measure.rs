@@ -98,6 +98,8 @@ pub enum MeasureError {
     Baseline(#[from] BaselineError),
     #[error("the optics were learned by calibrate stack for method whitened: use --method whitened")]
     LearnedForWhitened,
+    #[error("window adaptive is for method whitened: give a number of pixels")]
+    FixedWindow,
     #[error(transparent)]
     Design(#[from] DesignError),
 }
@@ -273,22 +275,16 @@ pub(crate) fn measure(
             let depth_mm = std::mem::take(&mut judging.depth_mm);
             (of_estimate(depth_mm, &judging.deviation_mm, prepared, &white, optics, settings), judging)
         }
-        (method, window) => {
-            let map = match (method, window) {
-                (DepthMethod::Rational(operators), Window::Fixed(side)) => {
+        (_, Window::Adaptive) => return Err(MeasureError::FixedWindow),
+        (method, Window::Fixed(side)) => {
+            let map = match method {
+                DepthMethod::Rational(operators) => {
                     depth_from_pair(far, near, operators, optics, &run(side))?
                 }
-                (DepthMethod::Rational(operators), _) => {
-                    let bank = Bank::rational(operators);
-                    let Estimate { depth_mm, deviation_mm, .. } =
-                        estimate(far, near, &bank, optics, &of_windows)?;
-                    of_estimate(depth_mm, &deviation_mm, prepared, &bank, optics, settings)
-                }
-                (DepthMethod::Baseline(method), window) => {
-                    let side = if let Window::Fixed(side) = window { side } else { 7 };
+                DepthMethod::Baseline(method) => {
                     baselines::depth_from_pair(method, far, near, optics, &run(side))?
                 }
-                (DepthMethod::Whitened, _) => unreachable!("above"),
+                DepthMethod::Whitened => unreachable!("above"),
             };
             (map, estimate_without_depth(far, near, &white, optics, &of_windows)?)
         }

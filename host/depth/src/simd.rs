@@ -9,7 +9,6 @@
 #![allow(clippy::needless_range_loop)] // Indexed loops on purpose: see `Lanes` on closures.
 
 mod convolve;
-mod lags;
 mod lanes;
 mod median;
 #[cfg(all(target_arch = "aarch64", target_feature = "neon"))]
@@ -23,7 +22,6 @@ mod windows;
 use serde::{Deserialize, Serialize};
 
 pub(crate) use convolve::{MAX_ROWS, READ_BEYOND, Taps, convolve, convolve_rows};
-pub(crate) use lags::{Lag, lagged_products};
 pub(crate) use median::median_row;
 pub(crate) use rows::{
     CubicRow, Extremes, SEVEN_BLOCK, WindowRow, confidence_row, extremes, normalise_row, vertical_sums,

@@ -36,7 +36,7 @@ use farnear_files::{
     quantiles::Quantiles,
 };
 use method::Prepared;
-use noise::{Source, Uncertainty};
+use noise::Uncertainty;
 use output::Results;
 use pair::Pair;
 use part::{AROUND_PX, Cut};
@@ -176,27 +176,14 @@ impl Inputs {
         )
         .about(|| format!("{} and {}", settings.far.display(), settings.near.display()))?;
         cancel("computing depth")?;
-        let (mut map, validity) = (found.map, found.validity);
-        let deviation = settings
+        let (mut map, Validity { mut reasons, mut lost, deviation_mm, .. }) = (found.map, found.validity);
+        let mut deviation = settings
             .uncertainty
-            .map(|noise| {
-                let Self { optics, .. } = self;
-                let source = Source {
-                    samples: self.pair.samples,
-                    prepared: &found.prepared,
-                    operators: self.method.operators().filter(|_| matches!(real.window, Window::Fixed(_))),
-                    optics,
-                    settings: &real.run,
-                    judged: &validity.deviation_mm,
-                };
-                noise::deviation(noise, &source, &map, self.correction.as_deref())
-            })
+            .map(|noise| noise::corrected(noise, deviation_mm, &map, self.correction.as_deref()))
             .transpose()?;
         cancel("computing its deviation")?;
         let mut image =
             if settings.write.show_image() { found.prepared.far } else { Array2::default((0, 0)) };
-        let Validity { mut reasons, mut lost, .. } = validity;
-        let mut deviation = deviation;
         if let Some(cut) = &self.cut {
             [&mut map.depth_mm, &mut map.confidence, &mut image].into_iter().for_each(|map| cut.wanted(map));
             cut.wanted(&mut reasons);

@@ -196,6 +196,11 @@ impl From<MeasureError> for WorkflowError {
                 "ro or another",
                 "the optics were learned by calibrate stack: use --method whitened",
             ),
+            MeasureError::FixedWindow => Self::parameter(
+                "window",
+                "adaptive",
+                "only method whitened chooses windows: give a number of pixels",
+            ),
         }
     }
 }

@@ -11,6 +11,7 @@ use super::scales::Scales;
 use super::{ADAPTIVE_PX, LEARNED_PX, Window, WindowSettings};
 use crate::border::reflect;
 use crate::depth_of_alpha::DepthOfAlpha;
+use crate::operators::linearise;
 use crate::optics::Optics;
 use crate::simd::{self, Backend, Contrast, CubicSums, Deviation, Found, MAX_ROWS, Plane, Residual};
 
@@ -27,8 +28,8 @@ const LEAST_EVIDENCE: f32 = 0.02;
 const FLOOR: f32 = 0.0026;
 /// Standard deviation of alpha from which a window tells nothing about the surface.
 const UNINFORMATIVE: f32 = 0.045;
-/// Standard deviation of alpha that is certain enough.
-const CERTAIN: f32 = 0.035;
+/// Standard deviation of alpha, at alpha = 0, that is certain enough.
+const CERTAIN: f32 = 0.0375;
 /// Variance that remains after a median of 1x1, 3x3, 5x5 and 7x7.
 const MEDIAN_GAIN: [f32; 4] = [1.0, 0.94, 0.85, 0.74];
 const RECOMPUTED: isize = 16;
@@ -77,7 +78,6 @@ pub(super) struct Tile<'a> {
     residual: Plane,
     work: Plane,
     sorted: Plane,
-    zeros: Vec<f32>,
     depth_of: DepthOfAlpha,
     deviation: Deviation,
     of_residual: Residual,
@@ -171,8 +171,7 @@ impl<'a> Tile<'a> {
             residual: Plane::new(WAITING, wide),
             work: Plane::new(3, wide),
             sorted: Plane::new(job.settings.median_px, wide),
-            zeros: vec![0.0; products],
-            depth_of: job.bank.depth_of(job.optics),
+            depth_of: DepthOfAlpha::linear(job.optics, linearise::IDENTITY),
             deviation: Deviation {
                 gain: variance_gain.map(|coefficient| MEDIAN_GAIN[median] * coefficient),
                 squared: job.optics.focal_length_mm().powi(2) as f32,
@@ -344,10 +343,10 @@ impl<'a> Tile<'a> {
         let with_brightness = job.scales.noise[1] > 0.0;
         let half = half as isize;
         let u = filters.matched();
-        let factors = filters.rho().into_iter().chain([Some(u)]).enumerate();
+        let factors = filters.rho().into_iter().chain([u]).enumerate();
         if row == 0 || image_row.rem_euclid(RECOMPUTED) == 0 {
             sums.all_mut().fill(0.0);
-            for (k, rho) in factors.filter_map(|(k, rho)| Some((k, rho?))) {
+            for (k, rho) in factors {
                 for d in -half..=half {
                     let [rho, u] = [rho, u].map(|plane| &plane.row(filtered(d))[..products]);
                     simd::add_products(backend, rho, u, &mut sums.row_mut(k)[..products]);
@@ -362,7 +361,7 @@ impl<'a> Tile<'a> {
             return;
         }
         let [gone, come] = [filtered(-half - 1), filtered(half)];
-        for (k, rho) in factors.filter_map(|(k, rho)| Some((k, rho?))) {
+        for (k, rho) in factors {
             let [gone, come] = [gone, come].map(|row| [rho, u].map(|plane| &plane.row(row)[..products]));
             simd::move_products(backend, gone, come, &mut sums.row_mut(k)[..products]);
         }
@@ -409,21 +408,18 @@ impl<'a> Tile<'a> {
             small.copy_from_slice(alpha);
             of_small.copy_from_slice(variance);
         } else {
-            let largest = CERTAIN * CERTAIN / bank.weighing_factor();
+            let largest = CERTAIN * CERTAIN;
             simd::choose_certain(backend, alpha, variance, noise, largest, small, of_small);
         }
     }
 
     fn residual_row(&mut self, row: usize, wide: usize) {
         let compared = self.compared();
-        let Self { job, radius, ring, filters, sum, zeros, work, of_residual, .. } = self;
+        let Self { job, radius, ring, filters, sum, work, of_residual, .. } = self;
         let reach = job.bank.reach_px();
         let middle = row + compared + *radius + reach;
         let left = *radius + compared;
-        let rho = filters.rho().map(|plane| match plane {
-            Some(plane) => &plane.row((middle + reach) % *ring)[left..left + wide],
-            None => &zeros[..wide],
-        });
+        let rho = filters.rho().map(|plane| &plane.row((middle + reach) % *ring)[left..left + wide]);
         let sum = &sum.row(middle % *ring)[left + reach..left + reach + wide];
         let alpha = &self.alpha.row(row % WAITING)[..wide];
         let stride = work.stride();
@@ -456,9 +452,8 @@ impl<'a> Tile<'a> {
         let to = width.saturating_sub(BORDER_PX).saturating_sub(place.left).clamp(from, place.columns);
         let reach = self.job.bank.reach_px();
         let from_outer = self.radius + self.compared();
-        let texture = self.filters.rho()[1].map_or(&self.zeros[..], |plane| {
-            &plane.row((row + from_outer + 2 * reach) % self.ring)[from_outer + beside..]
-        });
+        let texture =
+            &self.filters.rho()[1].row((row + from_outer + 2 * reach) % self.ring)[from_outer + beside..];
         let [squares, expected] = [0, 1].map(|i| &self.work.row(i)[own.clone()]);
         match holes {
             None => {

@@ -12,5 +12,4 @@ mod optics_files;
 mod planes;
 mod random_planes;
 mod stack;
-mod uncertainty;
 mod wave;

@@ -2,14 +2,7 @@
 
 use std::{fmt, str::FromStr};
 
-use farnear_depth::{
-    corrections::Correction,
-    operators::Operators,
-    optics::Optics,
-    pipeline::{DepthMap, Settings},
-    prepare::{Prepared, noise::PairNoise},
-    uncertainty::{Noise, standard_deviation_mm},
-};
+use farnear_depth::{corrections::Correction, pipeline::DepthMap, prepare::noise::PairNoise};
 use farnear_files::{image_file::Samples, quantiles::Quantiles};
 use ndarray::{Array2, Zip};
 use serde::Serialize;
@@ -104,20 +97,9 @@ impl fmt::Display for CameraNoise {
 }
 
 impl CameraNoise {
-    /// Noise in window units; `None` to estimate it.
+    /// Noise of images with values of 1 at full scale; `None` to estimate it.
     pub fn of_camera(self, samples: Samples) -> Option<PairNoise> {
-        match self.of(samples) {
-            Noise::Camera { constant, per_unit } => {
-                // At half of full scale.
-                Some(PairNoise { constant, per_unit, mean_variance: (constant + 0.5 * per_unit).max(0.0) })
-            }
-            Noise::Estimated => None,
-        }
-    }
-
-    /// Noise of images with values of 1 at full scale.
-    fn of(self, samples: Samples) -> Noise {
-        let Self::Camera { full_well_e, read_noise_e, bits, black } = self else { return Noise::Estimated };
+        let Self::Camera { full_well_e, read_noise_e, bits, black } = self else { return None };
         let bits = match samples {
             Samples::Integer(of_file) => Some(bits.map_or(of_file, |bits| bits.min(of_file))),
             Samples::Float => bits,
@@ -127,10 +109,9 @@ impl CameraNoise {
         let black = (black * code).clamp(0.0, 0.99);
         let per_unit = (1.0 - black) / full_well_e;
         // Shot noise is zero at the black level.
-        Noise::Camera {
-            constant: ((1.0 - black) * read_noise_e / full_well_e).powi(2) + rounding - per_unit * black,
-            per_unit,
-        }
+        let constant = ((1.0 - black) * read_noise_e / full_well_e).powi(2) + rounding - per_unit * black;
+        // At half of full scale.
+        Some(PairNoise { constant, per_unit, mean_variance: (constant + 0.5 * per_unit).max(0.0) })
     }
 }
 
@@ -142,45 +123,18 @@ pub struct Uncertainty {
     pub p95_sd_mm: f64,
 }
 
-pub struct Source<'a> {
-    pub samples: Samples,
-    pub prepared: &'a Prepared,
-    /// Single-window rational operators used for the depth, if any.
-    pub operators: Option<&'a Operators>,
-    pub optics: &'a Optics,
-    pub settings: &'a Settings,
-    /// Standard deviation from the validity check, for all other methods.
-    pub judged: &'a Array2<f32>,
-}
-
-/// Standard deviation of `raw` (before `correction`), mm; NaN without a depth.
-pub fn deviation(
+/// `deviation` of the map `raw` (before `correction`), mm, as corrected; NaN without a depth.
+pub fn corrected(
     noise: CameraNoise,
-    source: &Source<'_>,
+    mut deviation: Array2<f32>,
     raw: &DepthMap,
     correction: Option<&Correction>,
 ) -> Result<(Array2<f32>, Uncertainty)> {
-    let mut deviation = match source.operators {
-        Some(operators) => standard_deviation_mm(
-            source.prepared.far.view(),
-            source.prepared.near.view(),
-            operators,
-            source.optics,
-            source.settings,
-            noise.of(source.samples),
-        )?,
-        None => source.judged.clone(),
-    };
-    let filled = |at| raw.filled.as_ref().is_some_and(|filled| filled[at]);
-    Zip::indexed(&mut deviation).and(&raw.depth_mm).and(source.judged).for_each(
-        |at, deviation, depth_mm, judged| {
-            if depth_mm.is_nan() {
-                *deviation = f32::NAN;
-            } else if filled(at) || !deviation.is_finite() {
-                *deviation = *judged;
-            }
-        },
-    );
+    Zip::from(&mut deviation).and(&raw.depth_mm).for_each(|deviation, depth_mm| {
+        if depth_mm.is_nan() {
+            *deviation = f32::NAN;
+        }
+    });
     if let Some(correction) = correction {
         let moved = |step: f32| correction.apply(raw.depth_mm.mapv(|depth_mm| depth_mm + step).view());
         let (nearer, farther) = (moved(-0.5 * SLOPE_STEP_MM)?, moved(0.5 * SLOPE_STEP_MM)?);
@@ -226,18 +180,13 @@ mod tests {
         }
     }
 
-    /// Noise does not change when images are divided by the largest code.
+    /// Read noise, rounding and shot noise, in parts of full scale.
     #[test]
     fn noise_follows_the_scale_of_the_images() {
-        let Noise::Camera { constant, per_unit } = Noise::camera(20_000.0, 12.0, 255.0) else {
-            unreachable!()
-        };
         let noise = CameraNoise::Camera { full_well_e: 20_000.0, read_noise_e: 12.0, bits: None, black: 0.0 };
-        let Noise::Camera { constant: of_unit, per_unit: shot } = noise.of(Samples::Integer(8)) else {
-            unreachable!()
-        };
-        assert!((of_unit * 255.0 * 255.0 / constant - 1.0).abs() < 1e-12);
-        assert!((shot * 255.0 / per_unit - 1.0).abs() < 1e-12);
+        let PairNoise { constant, per_unit, .. } = noise.of_camera(Samples::Integer(8)).unwrap();
+        assert!((constant - (12.0_f64 / 20_000.0).powi(2) - 1.0 / (12.0 * 255.0 * 255.0)).abs() < 1e-15);
+        assert!((per_unit * 20_000.0 - 1.0).abs() < 1e-12);
     }
 
     /// With black at code 100 of 1023: only read noise at code 100, full well at code 1023.
@@ -245,7 +194,7 @@ mod tests {
     fn shot_noise_counts_from_the_black_level() {
         let noise: CameraNoise =
             "camera:full_well_e=20000,read_noise_e=12,bits=10,black=100".parse().unwrap();
-        let Noise::Camera { constant, per_unit } = noise.of(Samples::Integer(10)) else { unreachable!() };
+        let PairNoise { constant, per_unit, .. } = noise.of_camera(Samples::Integer(10)).unwrap();
         let codes_per_electron: f64 = 923.0 / 20_000.0;
         let at = |code: f64| (constant + per_unit * code / 1023.0) * 1023.0 * 1023.0 - 1.0 / 12.0;
         let read = (12.0 * codes_per_electron).powi(2);

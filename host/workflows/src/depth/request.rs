@@ -61,9 +61,8 @@ pub struct DepthRequest {
     #[cfg_attr(feature = "clap", arg(long))]
     #[serde_as(as = "Option<DisplayFromStr>")]
     pub method: Option<Method>,
-    /// Window over which evidence is summed: an odd number of pixels from 1 to 63, or adaptive (21 where the
-    /// surface is flat, else the smallest of 7, 13 and 21 that is certain enough) [default: adaptive for whitened, 7 for other
-    /// methods].
+    /// Window over which evidence is summed: an odd number of pixels from 1 to 63, or for whitened adaptive (21 where the
+    /// surface is flat, else the smallest of 7, 13 and 21 that is certain enough) [default: adaptive for whitened, else 7].
     #[cfg_attr(feature = "clap", arg(long, value_name = "PX|adaptive"))]
     #[serde_as(as = "Option<DisplayFromStr>")]
     pub window: Option<Window>,
@@ -215,11 +214,13 @@ impl Request for DepthRequest {
             let expected = format!("method {method} uses none");
             return Err(WorkflowError::parameter("operators", asked.display(), expected));
         }
-        let Method::Baseline(method) = method else { return Ok(()) };
-        if let Some(window @ Window::Adaptive) = self.window {
+        if let (Method::RationalOperators | Method::Baseline(_), Some(window @ Window::Adaptive)) =
+            (method, self.window)
+        {
             let expected = format!("method {method} takes a number of pixels");
             return Err(WorkflowError::parameter("window", window, expected));
         }
+        let Method::Baseline(method) = method else { return Ok(()) };
         if let Some(noise) = self.uncertainty {
             let expected =
                 format!("the standard deviation is known of methods ro and whitened, not of {method}");

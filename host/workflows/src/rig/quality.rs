@@ -5,10 +5,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use farnear_depth::{
-    pipeline::{Settings, depth_from_pair},
-    uncertainty::{Noise, standard_deviation_mm},
-};
+use farnear_depth::measure::{DepthMethod, MeasureSettings, measure_pair_of_views};
 use farnear_files::{
     mesh::{Lateral, Projection},
     staging::write_file,
@@ -23,7 +20,6 @@ use crate::{
     error::{Result, WorkflowError},
     figures::rounded,
     measure::{Measured, Unit, fit},
-    operators,
     optics::GivenOptics,
     text_file,
 };
@@ -87,8 +83,8 @@ pub fn measure(settings: &QualitySettings, context: &Context<'_>) -> Result<Qual
     }
     let optics = GivenOptics::read(&settings.optics)?;
     let mut record = read_record(&settings.record)?;
-    let designed = operators::find(None, &optics.optics)?;
-    let computation = Settings::default();
+    let method = DepthMethod::Whitened;
+    let computation = MeasureSettings { window: method.usual_window(), ..MeasureSettings::default() };
     let mut rig = settings.camera.connect(&settings.rig, Some(&optics), context)?;
     let emulated = rig.rig.client.hello().emulated;
     let mut maps = Vec::new();
@@ -97,14 +93,10 @@ pub fn measure(settings: &QualitySettings, context: &Context<'_>) -> Result<Qual
         context.cancel.check("measuring the depth quality")?;
         let (pair, _) = take(&mut rig, &optics, &settings.camera, context)?;
         let (far, near) = (pair.far.image.grey(), pair.near.image.grey());
-        let map = depth_from_pair(far.view(), near.view(), &designed, &optics.optics, &computation)?;
-        if index == 0 {
-            let (far, near) = (far.view(), near.view());
-            let noise = Noise::Estimated;
-            predicted =
-                Some(standard_deviation_mm(far, near, &designed, &optics.optics, &computation, noise)?);
-        }
-        maps.push(map.depth_mm);
+        let found =
+            measure_pair_of_views(far.view(), near.view(), &optics.optics, method, None, &computation)?;
+        predicted.get_or_insert(found.validity.deviation_mm);
+        maps.push(found.map.depth_mm);
         context.progress.advance("pairs", index + 1, Some(settings.pairs));
     }
     let projection = Projection {
