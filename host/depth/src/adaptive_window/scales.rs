@@ -5,6 +5,9 @@ use rayon::prelude::*;
 
 use crate::prepare::noise::PairNoise;
 
+/// Least variance of a pixel, in squared means: above the rounding errors of running sums.
+const LEAST_NOISE: f64 = 1e-8;
+
 pub(super) struct Scales {
     pub mean: f32,
     pub gain: f32,
@@ -36,7 +39,7 @@ impl Scales {
                 ((noise.constant + noise.per_unit * mean) / square) as f32,
                 (noise.per_unit * scale / square) as f32,
             ],
-            least_noise: (noise.variance(mean) / square * 0.1).max(1e-14) as f32,
+            least_noise: (noise.variance(mean) / square * 0.1).max(LEAST_NOISE) as f32,
             whole,
         }
     }

@@ -188,7 +188,8 @@ fn decide_generic<L: Lanes>(sums: [&[f32]; 2], small: [&[f32]; 2], large: [&[f32
     for x in 0..width {
         let mean = differences[x] / counts[x].max(1.0);
         let flat = mean <= NOT_FLAT;
-        let widened = of_large[x] + of_small[x] * (DOUBT * (mean - FLAT).max(0.0));
+        // An infinite variance times 0 would be none.
+        let widened = of_large[x] + of_small[x].min(f32::MAX) * (DOUBT * (mean - FLAT).max(0.0));
         alpha[x] = if flat { large[x] } else { small[x] };
         variance[x] = if flat { widened } else { of_small[x] * mean.min(LARGEST_GROWTH) };
     }
@@ -243,8 +244,8 @@ fn move_products_generic<L: Lanes>(gone: [&[f32]; 2], come: [&[f32]; 2], sums: &
 }
 
 dispatch! {
-    /// Increases variances for noise in the energy, `of_noise` times the noise; at least the part `least` remains. A window
-    /// without a pixel, whose energy is a rounding error, has an infinite one.
+    /// Increases variances for noise in the energy, `of_noise` times the noise; at least the part `least` remains. Energy
+    /// below half of the noise is a rounding error of running sums: the variance is infinite.
     fn without_noise(energy: &[f32], noise: &[f32], of_noise_and_least: [f32; 2], variance: &mut [f32]) =
         without_noise_generic
 }
@@ -259,11 +260,12 @@ fn without_noise_generic<L: Lanes>(
     let width = variance.len();
     let (energy, noise) = (&energy[..width], &noise[..width]);
     for x in 0..width {
-        let energy = energy[x].max(f32::MIN_POSITIVE);
+        let energy = energy[x];
         let expected = of_noise * noise[x];
         let evidence = (energy - expected).max(least * energy);
-        let widened = if expected > 0.0 { energy / evidence } else { f32::INFINITY };
-        variance[x] *= widened * widened;
+        let known = expected > 0.0 && energy > 0.5 * expected;
+        let widened = energy / evidence;
+        variance[x] = if known { variance[x] * widened * widened } else { f32::INFINITY };
     }
 }
 

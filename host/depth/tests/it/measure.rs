@@ -116,6 +116,23 @@ fn adaptive_windows_take_most_of_the_noise() {
     }
 }
 
+/// Running sums leave rounding errors where an image is constant; they are no texture.
+#[test]
+fn a_blank_square_has_no_depth() {
+    for seed in 1..4 {
+        let mut pair = plain("slant", seed);
+        for image in [&mut pair.far, &mut pair.near] {
+            image.slice_mut(ndarray::s![90..150, 130..190]).fill(128.0 / 255.0);
+        }
+        for window in [Window::Fixed(7), Window::Adaptive] {
+            let found = measure(&pair, PSF, window).unwrap();
+            let inside = found.map.depth_mm.slice(ndarray::s![104..136, 144..176]).to_owned();
+            let known = inside.iter().filter(|depth| depth.is_finite()).count();
+            assert_eq!(known, 0, "{window}, seed {seed}");
+        }
+    }
+}
+
 #[test]
 fn a_good_pair_goes_through_untouched() {
     for (seed, scene) in [(1, "staircase"), (2, "slant"), (3, "cone"), (4, "plane:925")] {
