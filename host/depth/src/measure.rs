@@ -53,7 +53,7 @@ pub enum DepthMethod<'a> {
 }
 
 impl DepthMethod<'_> {
-    /// The window where none is asked for.
+    /// The default window.
     pub fn usual_window(&self) -> Window {
         match self {
             Self::Whitened => Window::Adaptive,

@@ -40,9 +40,16 @@ impl Agreement {
         }
     }
 
-    /// Adds a row of alpha and its variance by both windows. Sums are made anew in the first row and where `anew` is set,
+    /// Adds a row of alpha and its variance by both windows. Sums start from zero in the first row and where `restart` is set,
     /// because rounding errors would add up.
-    pub fn add(&mut self, backend: Backend, row: usize, anew: bool, small: [&[f32]; 2], large: [&[f32]; 2]) {
+    pub fn add(
+        &mut self,
+        backend: Backend,
+        row: usize,
+        restart: bool,
+        small: [&[f32]; 2],
+        large: [&[f32]; 2],
+    ) {
         let at = row % self.ring;
         let wide = large[0].len();
         for (to, from) in self.large.iter_mut().zip(large) {
@@ -54,7 +61,7 @@ impl Agreement {
         simd::contrast_row(backend, self.of, small, large, to);
         for (index, plane) in self.difference.iter().enumerate() {
             let sums = &mut self.sums.row_mut(index)[..wide];
-            if row == 0 || anew {
+            if row == 0 || restart {
                 sums.fill(0.0);
                 for back in 0..=(2 * self.half).min(row) {
                     simd::add_row(backend, &plane.row((row - back) % self.ring)[..wide], 1.0, sums);

@@ -161,7 +161,7 @@ impl<'a> Tile<'a> {
                 taken: vec![0.0; wide],
             },
             agreement: (compared > 0).then(|| {
-                // Differences within a learned lens's own error are no step.
+                // A learned lens has an error of its own, which is no depth step.
                 let tolerance = job.optics.stage().map_or(0.0, |stage| stage.window_tolerance as f32).powi(2);
                 let of =
                     Contrast { gain: variance_gain, tolerance, largest: UNINFORMATIVE.powi(2) + tolerance };
@@ -303,9 +303,9 @@ impl<'a> Tile<'a> {
             variance[..wide].iter_mut().zip(&*noise).for_each(|(v, noise)| *v *= noise);
         }
         if let Some(agreement) = agreement {
-            let anew = ((place.top + row) as isize - outer[0] as isize).rem_euclid(RECOMPUTED) == 0;
+            let restart = ((place.top + row) as isize - outer[0] as isize).rem_euclid(RECOMPUTED) == 0;
             let small = small.each_ref().map(|small| &small[..wide]);
-            agreement.add(job.backend, row, anew, small, [&alpha[..wide], &variance[..wide]]);
+            agreement.add(job.backend, row, restart, small, [&alpha[..wide], &variance[..wide]]);
         }
     }
 

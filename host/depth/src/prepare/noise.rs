@@ -1,9 +1,9 @@
 //! The noise of a pair, from the pair itself.
 //!
 //! Both images pass the second difference along both axes (Immerkaer 1996), whose response peaks at the highest
-//! frequencies, towards (pi, pi). There defocus leaves little signal, and what it leaves in one image is proportional to
-//! what it leaves in the other. So the smaller eigenvalue of a block's covariance is the noise. Blocks of several
-//! brightnesses separate shot noise from the constant part. Cost: twenty additions per pixel.
+//! frequencies, towards (pi, pi). There defocus leaves little signal, proportional in both images. So the smaller
+//! eigenvalue of a block's covariance is the noise. Blocks of several brightnesses separate shot noise from the constant
+//! part. Cost: twenty additions per pixel.
 
 use ndarray::ArrayView2;
 use rayon::prelude::*;

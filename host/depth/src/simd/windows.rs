@@ -68,7 +68,7 @@ fn roots_generic<L: Lanes>(sums: CubicSums<'_>, floor: f32, found: Found<'_>) {
     let energy = &sums.energy[..width];
     let (alphas, variances) = (&mut found.alpha[..width], &mut found.variance[..width]);
     for x in 0..width {
-        // Rounding leaves energies of 0 or below where there is no texture.
+        // In constant regions rounding leaves energies of 0 or below.
         let energy = energy[x].max(f32::MIN_POSITIVE);
         let c1 = c1[x].max(floor * energy);
         let least = SLOPE_FLOOR * c1;
@@ -125,11 +125,11 @@ const LARGEST_CONTRAST: f32 = 100.0;
 /// Mean square difference of two windows, relative to the smaller one's variance, from which the surface is not flat
 /// over the larger one. On planes 99 % are below 1.9.
 const NOT_FLAT: f32 = 2.0;
-/// That of a flat surface, which 75 % do not reach, and the part of what is beyond it by which the larger window's
+/// The same mean square of a flat surface (75 % are below), and the part of any excess by which the larger window's
 /// variance grows. Chosen on rendered spheres, cones and slants for an error over deviation of 0.9 to 1.25.
 const FLAT: f32 = 1.05;
 const DOUBT: f32 = 0.5;
-/// Largest growth of the smaller one's variance: a certain depth beside a large step stays one.
+/// Largest growth of the smaller one's variance: a certain depth next to a large step remains certain.
 const LARGEST_GROWTH: f32 = 9.0;
 
 dispatch! {

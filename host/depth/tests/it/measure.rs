@@ -116,7 +116,7 @@ fn adaptive_windows_take_most_of_the_noise() {
     }
 }
 
-/// Running sums leave rounding errors where an image is constant; they are no texture.
+/// In a constant image running sums leave rounding errors, not texture.
 #[test]
 fn a_blank_square_has_no_depth() {
     for seed in 1..4 {
