@@ -28,5 +28,6 @@ pub mod prepare;
 pub mod psf;
 pub mod reason;
 mod simd;
+pub mod stream;
 pub mod uncertainty;
 pub mod validity;

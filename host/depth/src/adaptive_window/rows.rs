@@ -81,6 +81,7 @@ pub(super) struct Tile<'a> {
     depth_of: DepthOfAlpha,
     deviation: Deviation,
     of_residual: Residual,
+    noise_energy: f32,
     inner: Inner,
 }
 
@@ -181,6 +182,7 @@ impl<'a> Tile<'a> {
                 floor: FLOOR.powi(2),
             },
             of_residual,
+            noise_energy: job.bank.noise_energy(),
             inner: Inner { size: job.far.dim(), reach },
         }
     }
@@ -376,7 +378,7 @@ impl<'a> Tile<'a> {
 
     fn row(&mut self, place: Place, index: usize, line: usize, wide: usize) {
         let [above, beside] = self.outer;
-        let Self { job, row, radius, inner, .. } = self;
+        let Self { job, row, radius, inner, noise_energy, .. } = self;
         let Columns { side, sums } = &self.columns[index];
         let (side, backend, scales, bank) = (*side, job.backend, job.scales, job.bank);
         let from = *radius - side / 2;
@@ -400,7 +402,7 @@ impl<'a> Tile<'a> {
         let found = Found { alpha: &mut *alpha, variance: &mut *variance };
         simd::roots(backend, CubicSums { c: [c0, c1, c2, c3], energy }, bank.least_slope(), found);
         let rows = inner.rows_of_window((place.top + line) as isize - above as isize, side);
-        let of_noise = bank.noise_energy() * (rows * side) as f32;
+        let of_noise = *noise_energy * (rows * side) as f32;
         let of_pixels = &mut row.work[..wide];
         inner.share_columns(place.left as isize - beside as isize, side, noise, of_pixels);
         simd::without_noise(backend, energy, of_pixels, [of_noise, LEAST_EVIDENCE], variance);

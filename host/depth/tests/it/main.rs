@@ -12,5 +12,6 @@ mod optics_files;
 mod planes;
 mod random_planes;
 mod stack;
+mod stream;
 mod uncertainty;
 mod wave;
