@@ -136,20 +136,23 @@ fn real_pair(optics: &Optics, [prepare_name, adaptive_name]: [&str; 2], size: (u
     report(adaptive_name, Some(Backend::best()), threads, time(runs, adaptive), None);
 }
 
-/// A rendered pair of 8 bits; its grey values are 0 to 1.
-fn rendered() -> [Array2<f32>; 2] {
+/// Rendered pairs of 8 bits, each with its own noise; their grey values are 0 to 1.
+fn rendered(pairs: u32) -> Vec<[Array2<f32>; 2]> {
     let lens = Lens::from_optics(&farnear_scene::OpticsFile::parse(standard::OPTICS).unwrap()).unwrap();
     let (scene, psf): (Scene, _) = ("staircase".parse().unwrap(), "gaussian:k=0.4578".parse().unwrap());
     let camera = Camera::new(640, 480, farnear_scene::Noise::EightBit);
     let renderer = Renderer::new(&scene, &lens, &psf, &camera, 3).unwrap();
-    let image = |sensor_mm: f64, exposure: u32| renderer.expose(sensor_mm, exposure).unwrap();
-    [image(lens.sensor_far_mm, 0), image(lens.sensor_near_mm, 1)]
-        .map(|codes| codes.mapv(|code| f32::from(code) / 255.0))
+    let image = |sensor_mm: f64, exposure: u32| {
+        renderer.expose(sensor_mm, exposure).unwrap().mapv(|code| f32::from(code) / 255.0)
+    };
+    (0..pairs).map(|i| [image(lens.sensor_far_mm, 2 * i), image(lens.sensor_near_mm, 2 * i + 1)]).collect()
 }
 
-/// Depth, standard deviation and reasons by the default method, of a pair alone or of pair after pair; on all threads.
+/// Depth, standard deviation and reasons by the default method, of pairs alone or of pair after pair; on all threads.
 fn live(name: &str, optics: &Optics) {
-    let pair = rendered();
+    let pairs = rendered(5);
+    let mut next = pairs.iter().cycle().cloned();
+    let mut next = || next.next().unwrap();
     let settings = MeasureSettings {
         prepare: PrepareSettings { limits: Some([0.0, 1.0]), ..PrepareSettings::default() },
         window: Window::Adaptive,
@@ -157,9 +160,9 @@ fn live(name: &str, optics: &Optics) {
     };
     let mut stream = Stream::new(optics, &settings).unwrap();
     let times = if name == "live_640x480" {
-        time(100, || stream.measure(pair.clone()).unwrap())
+        time(200, || stream.measure(next()).unwrap())
     } else {
-        time(100, || measure_pair(pair.clone(), optics, DepthMethod::Whitened, None, &settings).unwrap())
+        time(200, || measure_pair(next(), optics, DepthMethod::Whitened, None, &settings).unwrap())
     };
     report(name, Some(Backend::best()), rayon::current_num_threads(), times, None);
 }

@@ -17,7 +17,7 @@ use crate::simd::{self, Backend, Contrast, CubicSums, Deviation, Found, MAX_ROWS
 /// Rows of a band: its halo of about 20 rows on either side is computed twice.
 const ROWS: usize = 256;
 /// Columns of a tile: as many as the cache holds.
-const COLUMNS: usize = 512;
+const COLUMNS: usize = 640;
 const MISFIT_PX: [usize; 2] = [7, 21];
 /// Border in which filters and windows depend on reflections, which no model explains, px.
 const BORDER_PX: usize = 14;
@@ -343,7 +343,8 @@ impl<'a> Tile<'a> {
         // Ring rows: a filtered row lies `2 reach` below its first input pixel and `reach` below the middle.
         let filtered = |d: isize| (row as isize + *radius as isize + d + 2 * reach as isize) as usize % *ring;
         let bright = |d: isize| (row as isize + *radius as isize + d + reach as isize) as usize % *ring;
-        let with_brightness = job.scales.noise[1] > 0.0;
+        // The smallest window tells the brightness.
+        let with_brightness = index == 0 && job.scales.noise[1] > 0.0;
         let half = half as isize;
         let u = filters.matched();
         let factors = filters.rho().into_iter().chain([Some(u)]).enumerate();

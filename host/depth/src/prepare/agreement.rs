@@ -7,12 +7,11 @@
 //!
 //! Cost: three box means per pixel of the small images (`thinned`), and 49 more around the pixels that differ and agree coarsely.
 
-use ndarray::{Array2, ArrayViewMut2, Axis, Zip};
+use ndarray::{Array2, ArrayViewMut2, Axis, Zip, s};
 use rayon::prelude::*;
 
 use super::band::{
-    RollingMean, band, band_noise_gain, box_mean, box_mean_of, halved, halving_noise_gain, product,
-    rows_of_part,
+    RollingMean, band, band_noise_gain, box_mean, halved, halving_noise_gain, product, rows_of_part,
 };
 use super::noise::PairNoise;
 use super::thinned::Thinned;
@@ -90,13 +89,10 @@ pub(super) fn compare(pair: &Thinned, size: (usize, usize), noise: &PairNoise) -
         Zip::from(&mut too_blurred).and(&different).and(&coarse).for_each(|blurred, different, coarse| {
             *blurred = *different && *coarse > SAME_COARSE;
         });
-        let [of_a, of_b] =
-            [a, b].map(|band| box_mean_of(band.dim(), WINDOW_PX, |y, row| product(band, band, y, row)));
-        let limit = Zip::from(&of_a).and(&of_b).map_collect(|a, b| SAME_SHIFTED * (a * b).sqrt());
         let bands = too_blurred.axis_chunks_iter_mut(Axis(0), TILE_PX).into_par_iter().enumerate();
         bands.for_each(|(row, mut band)| {
             for (column, tile) in band.axis_chunks_iter_mut(Axis(1), TILE_PX).enumerate() {
-                remove_moved(tile, [row * TILE_PX, column * TILE_PX], [a, b], &limit);
+                remove_moved(tile, [row * TILE_PX, column * TILE_PX], [a, b]);
             }
         });
         Zip::from(&mut different).and(&too_blurred).for_each(|moved, blurred| *moved &= !*blurred);
@@ -135,13 +131,8 @@ fn coarse_correlation(pair: &Thinned) -> Array2<f32> {
 }
 
 /// Unmarks the pixels of a tile, which begins at row `top` and column `left`, where the mean product of `a` and `b` around them
-/// reaches its limit at one of the shifts.
-fn remove_moved(
-    mut tile: ArrayViewMut2<bool>,
-    [top, left]: [usize; 2],
-    [a, b]: [&Array2<f32>; 2],
-    limit: &Array2<f32>,
-) {
+/// reaches [`SAME_SHIFTED`] at one of the shifts.
+fn remove_moved(mut tile: ArrayViewMut2<bool>, [top, left]: [usize; 2], [a, b]: [&Array2<f32>; 2]) {
     let mut marked: Vec<_> = tile.indexed_iter().filter(|(_, marked)| **marked).map(|(at, _)| at).collect();
     let (height, width) = a.dim();
     // The part of the images that the windows of these pixels cover.
@@ -153,6 +144,11 @@ fn remove_moved(
     let Some((rows, columns)) = cover(top, &|at| at.0, height).zip(cover(left, &|at| at.1, width)) else {
         return;
     };
+    let [of_a, of_b] = [a, b].map(|band| {
+        let part = band.slice(s![rows.clone(), columns.clone()]);
+        box_mean((&part * &part).view(), WINDOW_PX)
+    });
+    let limit = Zip::from(&of_a).and(&of_b).map_collect(|a, b| SAME_SHIFTED * (a * b).sqrt());
     let inside = |i: usize, by: isize, n: usize| (i as isize + by).clamp(0, n as isize - 1) as usize;
     for (down, right) in SHIFTS_PX.into_iter().flat_map(|down| SHIFTS_PX.map(|right| (down, right))) {
         let product = Array2::from_shape_fn((rows.len(), columns.len()), |(y, x)| {
@@ -161,8 +157,8 @@ fn remove_moved(
         });
         let mean = box_mean(product.view(), WINDOW_PX);
         marked.retain(|at| {
-            let (y, x) = (top + at.0, left + at.1);
-            tile[*at] = mean[(y - rows.start, x - columns.start)] < limit[(y, x)];
+            let place = (top + at.0 - rows.start, left + at.1 - columns.start);
+            tile[*at] = mean[place] < limit[place];
             tile[*at]
         });
         if marked.is_empty() {
