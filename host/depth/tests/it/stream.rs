@@ -42,8 +42,9 @@ fn assert_same(a: &Measurement, b: &Measurement) {
 
 #[test]
 fn a_pair_of_a_stream_is_measured_as_alone() {
-    for shift in [0.0, 0.7] {
-        let pairs = [3, 4].map(|seed| seen("staircase", [shift, 0.0], seed));
+    for (shift, magnification) in [(0.0, 1.0), (0.7, 1.0), (0.7, 1.02)] {
+        let view = View { shift_px: [shift, 0.0], magnification, ..View::default() };
+        let pairs = [3, 4].map(|seed| rendered("staircase", view, seed));
         let mut stream = Stream::new(&rig(PSF), &settings()).unwrap();
         let found = [&pairs[0], &pairs[1], &pairs[0]].map(|pair| stream.measure(pair.clone()).unwrap());
         let first = alone(&pairs[0], &settings());
