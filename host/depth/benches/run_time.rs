@@ -16,6 +16,8 @@ use farnear_depth::operators::{Design, Family, Operators, Request, design};
 use farnear_depth::optics::{FocusSection, LensSection, Optics, OpticsFile, SensorSection};
 use farnear_depth::pipeline::{Backend, Processor, Settings};
 use farnear_depth::prepare::{Align, Balance, PrepareSettings, prepare};
+use farnear_depth::stream::Stream;
+use farnear_scene::{Camera, Lens, Renderer, Scene, standard};
 use ndarray::Array2;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -133,27 +135,35 @@ fn real_pair(optics: &Optics, [prepare_name, adaptive_name]: [&str; 2], size: (u
     report(adaptive_name, Some(Backend::best()), threads, time(runs, adaptive), None);
 }
 
-/// Pairs of a stream with registration, depth, standard deviation and reasons, by the default method; on all threads.
-fn live(optics: &Optics) {
-    let texture = random_image(482, 642, 3);
-    // Two blurs of one texture, of five taps.
-    let pair = [0.1, 0.2].map(|weight| {
-        Array2::from_shape_fn((480, 640), |(y, x)| {
-            let ring = [(y, x + 1), (y + 2, x + 1), (y + 1, x), (y + 1, x + 2)];
-            (1.0 - 4.0 * weight) * texture[(y + 1, x + 1)]
-                + weight * ring.map(|at| texture[at]).iter().sum::<f32>()
-        })
-    });
-    let operators = Operators::for_optics(optics).unwrap();
-    let run = || {
-        let images = pair.clone();
-        let settings = MeasureSettings {
-            run: Settings { threads: 0, ..Settings::default() },
-            ..MeasureSettings::default()
-        };
-        measure_pair(images, optics, DepthMethod::Rational(&operators), None, &settings).unwrap()
+/// Rendered pairs of 8 bits, each with its own noise; their grey values are 0 to 1.
+fn rendered(pairs: u32) -> Vec<[Array2<f32>; 2]> {
+    let lens = Lens::from_optics(&farnear_scene::OpticsFile::parse(standard::OPTICS).unwrap()).unwrap();
+    let (scene, psf): (Scene, _) = ("staircase".parse().unwrap(), "gaussian:k=0.4578".parse().unwrap());
+    let camera = Camera::new(640, 480, farnear_scene::Noise::EightBit);
+    let renderer = Renderer::new(&scene, &lens, &psf, &camera, 3).unwrap();
+    let image = |sensor_mm: f64, exposure: u32| {
+        renderer.expose(sensor_mm, exposure).unwrap().mapv(|code| f32::from(code) / 255.0)
     };
-    report("live_640x480", Some(Backend::best()), rayon::current_num_threads(), time(100, run), None);
+    (0..pairs).map(|i| [image(lens.sensor_far_mm, 2 * i), image(lens.sensor_near_mm, 2 * i + 1)]).collect()
+}
+
+/// Depth, standard deviation and reasons by the default method, of pairs alone or of pair after pair; on all threads.
+fn live(name: &str, optics: &Optics) {
+    let pairs = rendered(5);
+    let mut next = pairs.iter().cycle().cloned();
+    let mut next = || next.next().unwrap();
+    let settings = MeasureSettings {
+        prepare: PrepareSettings { limits: Some([0.0, 1.0]), ..PrepareSettings::default() },
+        window: Window::Adaptive,
+        ..MeasureSettings::default()
+    };
+    let mut stream = Stream::new(optics, &settings).unwrap();
+    let times = if name == "live_640x480" {
+        time(200, || stream.measure(next()).unwrap())
+    } else {
+        time(200, || measure_pair(next(), optics, DepthMethod::Whitened, None, &settings).unwrap())
+    };
+    report(name, Some(Backend::best()), rayon::current_num_threads(), times, None);
 }
 
 fn main() {
@@ -252,8 +262,10 @@ fn main() {
             report("chain_4000x3000", Some(Backend::best()), threads, chain(9, &large, &settings), None);
         }
     }
-    if wanted("live_640x480") {
-        live(&optics("gaussian:k=0.4578"));
+    for name in ["alone_640x480", "live_640x480"] {
+        if wanted(name) {
+            live(name, &optics("gaussian:k=0.4578"));
+        }
     }
     for (name, height, width, runs) in [("640x480", 480, 640, 20), ("4000x3000", 3000, 4000, 3)] {
         let (prepare_name, adaptive_name) = (format!("prepare_{name}"), format!("windowed_{name}"));

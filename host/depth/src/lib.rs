@@ -28,4 +28,5 @@ pub mod prepare;
 pub mod psf;
 pub mod reason;
 mod simd;
+pub mod stream;
 pub mod validity;

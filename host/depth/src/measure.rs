@@ -15,7 +15,7 @@ use crate::fill;
 use crate::operators::{DesignError, Operators};
 use crate::optics::{Optics, Stage};
 use crate::pipeline::{RunError, Settings, depth_from_pair, extend_border, fill_border, warnings_after};
-use crate::prepare::{CameraFrames, PrepareError, PrepareSettings, Prepared, Report, prepare_owned};
+use crate::prepare::{CameraFrames, Laid, PrepareError, PrepareSettings, Prepared, Report, prepare_after};
 use crate::psf::Psf;
 use crate::reason::Reason;
 use crate::validity::{LARGEST_ALPHA, Lost, Validity, ValiditySettings, assess};
@@ -220,6 +220,19 @@ pub fn measure_pair(
     camera: Option<&CameraFrames>,
     settings: &MeasureSettings,
 ) -> Result<Measurement, MeasureError> {
+    measure_after(&mut None, &Bank::whitened(optics)?, images, optics, method, camera, settings)
+}
+
+/// [`measure_pair`] of the next pair of a rig, as [`prepare_after`]; `white` is of the optics.
+pub(crate) fn measure_after(
+    last: &mut Option<Laid>,
+    white: &Bank,
+    images: [Array2<f32>; 2],
+    optics: &Optics,
+    method: DepthMethod<'_>,
+    camera: Option<&CameraFrames>,
+    settings: &MeasureSettings,
+) -> Result<Measurement, MeasureError> {
     check_pair(images[0].view(), images[1].view())?;
     if optics.stage().is_some() && !matches!(method, DepthMethod::Whitened) {
         return Err(MeasureError::LearnedForWhitened);
@@ -234,8 +247,8 @@ pub fn measure_pair(
         None => images,
     };
     check_pair(images[0].view(), images[1].view())?;
-    let prepared = prepare_owned(images, optics, camera, &prepare)?;
-    let (mut map, estimate) = measure(&prepared, optics, method, settings)?;
+    let prepared = prepare_after(last, images, optics, camera, &prepare)?;
+    let (mut map, estimate) = measure(&prepared, white, optics, method, settings)?;
     let mut findings = findings(&map, &prepared, &estimate, optics);
     let (left_over, excess) = (estimate.left_over, estimate.excess);
     let judging = ValiditySettings { least_confidence: settings.least_confidence, filled: settings.run.fill };
@@ -252,8 +265,10 @@ pub fn measure_pair(
     Ok(Measurement { map, validity, report, findings, left_over, excess, prepared })
 }
 
+/// The white residual judges every method, because its deviation is known best.
 pub(crate) fn measure(
     prepared: &Prepared,
+    white: &Bank,
     optics: &Optics,
     method: DepthMethod<'_>,
     settings: &MeasureSettings,
@@ -265,15 +280,13 @@ pub(crate) fn measure(
         noise: prepared.noise,
         backend: settings.run.backend,
     };
-    // The white residual judges every method, because its deviation is known best.
-    let white = Bank::whitened(optics)?;
     let run = |side: usize| Settings { smoothing_px: side, ..settings.run };
     // The map first: validity needs no depth of its own, and maps are large.
     let (map, mut judging) = match (method, settings.window) {
         (DepthMethod::Whitened, _) => {
-            let mut judging = estimate(far, near, &white, optics, &of_windows)?;
+            let mut judging = estimate(far, near, white, optics, &of_windows)?;
             let depth_mm = std::mem::take(&mut judging.depth_mm);
-            (of_estimate(depth_mm, &judging.deviation_mm, prepared, &white, optics, settings), judging)
+            (of_estimate(depth_mm, &judging.deviation_mm, prepared, white, optics, settings), judging)
         }
         (_, Window::Adaptive) => return Err(MeasureError::FixedWindow),
         (method, Window::Fixed(side)) => {
@@ -286,7 +299,7 @@ pub(crate) fn measure(
                 }
                 DepthMethod::Whitened => unreachable!("above"),
             };
-            (map, estimate_without_depth(far, near, &white, optics, &of_windows)?)
+            (map, estimate_without_depth(far, near, white, optics, &of_windows)?)
         }
     };
     let noisier = match method {

@@ -239,6 +239,17 @@ pub fn prepare(
 /// # Errors
 /// As [`prepare`].
 pub fn prepare_owned(
+    images: [Array2<f32>; 2],
+    optics: &Optics,
+    camera: Option<&CameraFrames>,
+    settings: &PrepareSettings,
+) -> Result<Prepared, PrepareError> {
+    prepare_after(&mut None, images, optics, camera, settings)
+}
+
+/// [`prepare_owned`] of the next pair of a rig: it is laid as the `last` one where that holds for it too, and else anew.
+pub(crate) fn prepare_after(
+    last: &mut Option<Laid>,
     [mut far, mut near]: [Array2<f32>; 2],
     optics: &Optics,
     camera: Option<&CameraFrames>,
@@ -261,14 +272,14 @@ pub fn prepare_owned(
         }
     }
     let Some(distortion) = optics.distortion() else {
-        return finish([far, near], None, marks, optics, settings);
+        return finish(last, [far, near], None, marks, optics, settings);
     };
     // Interpolation takes noise away, so it is measured before.
     let noise = settings.noise.or_else(|| noise::of_pair(far.view(), near.view()));
     let recorded = Recorded { near: near.clone(), distortion };
     let marks = marks.map(|marks| Some(straight::reasons(marks.as_ref(), size, &distortion)));
     let pair = [far, near].map(|image| straight::image(image.view(), &distortion));
-    finish(pair, Some(recorded), marks, optics, &PrepareSettings { noise, ..*settings })
+    finish(last, pair, Some(recorded), marks, optics, &PrepareSettings { noise, ..*settings })
 }
 
 /// An image as a lens without distortion would have taken it; NaN where the lens recorded nothing. Cost: 36
@@ -283,6 +294,16 @@ struct Recorded {
     distortion: Distortion,
 }
 
+/// How a near image was laid on the far one.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Laid {
+    size: (usize, usize),
+    /// `None` where it stayed.
+    warp: Option<Warp>,
+    aligned: Option<Aligned>,
+    looks_not_telecentric: bool,
+}
+
 fn check_sizes(
     (far_height, far_width): (usize, usize),
     (near_height, near_width): (usize, usize),
@@ -295,31 +316,49 @@ fn check_sizes(
 
 /// What follows once single pixels are corrected and lines are straight: geometry, brightness, agreement.
 fn finish(
-    [far, mut near]: [Array2<f32>; 2],
+    last: &mut Option<Laid>,
+    [far, near]: [Array2<f32>; 2],
     recorded: Option<Recorded>,
     marks: [Option<Array2<u8>>; 2],
     optics: &Optics,
     settings: &PrepareSettings,
 ) -> Result<Prepared, PrepareError> {
+    let size = far.dim();
     let measured = settings.noise.or_else(|| noise::of_pair(far.view(), near.view()));
     let noise = measured.unwrap_or(PairNoise { constant: 0.0, per_unit: 0.0, mean_variance: 0.0 });
     let mut report = Report::default();
-    let mut thinned = Thinned::new(far.view(), near.view());
-    let warp = geometry(&thinned, far.dim(), optics, settings.align, &mut report);
-    if let Some(warp) = &warp {
-        near = match &recorded {
-            Some(Recorded { near, distortion }) => {
-                warp::resample_by(near.view(), |place| distortion.distorted(warp.at(place)))
-            }
-            None => warp::resample(near.view(), warp),
-        };
-        thinned.replace_near(near.view());
-    }
+    let moved = |warp: Warp| match &recorded {
+        Some(Recorded { near, distortion }) => {
+            warp::resample_by(near.view(), |place| distortion.distorted(warp.at(place)))
+        }
+        None => warp::resample(near.view(), &warp),
+    };
+    let of_last =
+        last.filter(|last| last.size == size).zip(model(settings.align)).and_then(|(last, model)| {
+            let moved = last.warp.map(moved);
+            let thinned = Thinned::new(far.view(), moved.as_ref().unwrap_or(&near).view());
+            align::stays(&thinned, model, size, LEAST_DISPLACEMENT_PX).then_some((last, moved, thinned))
+        });
+    let (laid, moved, mut thinned) = of_last.unwrap_or_else(|| {
+        let mut thinned = Thinned::new(far.view(), near.view());
+        let laid = geometry(&thinned, size, optics, settings.align);
+        let moved = laid.warp.map(moved);
+        if let Some(moved) = &moved {
+            thinned.replace_near(moved.view());
+        }
+        (laid, moved, thinned)
+    });
+    *last = Some(laid);
+    (report.aligned, report.looks_not_telecentric) = (laid.aligned, laid.looks_not_telecentric);
+    let (warp, mut near) = (laid.warp, moved.unwrap_or(near));
     drop(recorded);
     brightness(&far, &mut near, &mut thinned, settings.balance, &mut report);
+    let marked = marks.iter().any(Option::is_some);
     let mut reasons = merged(marks, warp.as_ref(), &near);
-    report.saturated_fraction = part_of(&reasons, Reason::Saturated);
-    let agreement = agreement::compare(&thinned, far.dim(), &noise);
+    if marked {
+        report.saturated_fraction = part_of(&reasons, Reason::Saturated);
+    }
+    let agreement = agreement::compare(&thinned, size, &noise);
     drop(thinned);
     (report.correlation, report.detailed_fraction) = (agreement.correlation, agreement.detailed);
     let mut far = far;
@@ -329,8 +368,9 @@ fn finish(
         {
             return Err(PrepareError::Unrelated { correlation });
         }
-        let masks = [(&agreement.moved, Reason::Moved), (&agreement.too_blurred, Reason::Misfit)];
-        for (mask, reason) in masks {
+        let of_moved = (&agreement.moved, Reason::Moved, &mut report.moved_fraction);
+        let of_blurred = (&agreement.too_blurred, Reason::Misfit, &mut report.too_blurred_fraction);
+        for (mask, reason, fraction) in [of_moved, of_blurred] {
             let Some(mask) = mask else { continue };
             for (at, _) in mask.indexed_iter().filter(|(_, differs)| **differs) {
                 if reasons[at] == 0 {
@@ -338,9 +378,8 @@ fn finish(
                 }
                 (far[at], near[at]) = (f32::NAN, f32::NAN);
             }
+            *fraction = part_of(&reasons, reason);
         }
-        report.moved_fraction = part_of(&reasons, Reason::Moved);
-        report.too_blurred_fraction = part_of(&reasons, Reason::Misfit);
     }
     Ok(Prepared { far, near, reasons, noise, report })
 }
@@ -349,32 +388,31 @@ fn part_of(reasons: &Array2<u8>, reason: Reason) -> f64 {
     reasons.iter().filter(|code| **code == reason.code()).count() as f64 / reasons.len() as f64
 }
 
-/// The map by which the near image is laid on the far one; `None` where it stays.
-fn geometry(
-    pair: &Thinned,
-    size: (usize, usize),
-    optics: &Optics,
-    align: Align,
-    report: &mut Report,
-) -> Option<Warp> {
-    let of_optics = || Warp::about_middle(size, optics.magnification_ratio(), 0.0, [0.0; 2]);
-    let start = match (align, optics.telecentric()) {
-        (Align::None, _) => return None,
-        (Align::Optics, _) | (_, Some(false)) => of_optics(),
-        _ => Warp::IDENTITY,
-    };
-    let model = match align {
+/// What is found of how an image lies; `None` where nothing is looked for.
+fn model(align: Align) -> Option<Model> {
+    match align {
         Align::Shift => Some(Model::Shift),
         Align::Affine => Some(Model::Affine),
         Align::Auto | Align::Similarity => Some(Model::Similarity),
         Align::None | Align::Optics => None,
+    }
+}
+
+/// How the near image is laid on the far one.
+fn geometry(pair: &Thinned, size: (usize, usize), optics: &Optics, align: Align) -> Laid {
+    let stays = Laid { size, warp: None, aligned: None, looks_not_telecentric: false };
+    let of_optics = || Warp::about_middle(size, optics.magnification_ratio(), 0.0, [0.0; 2]);
+    let start = match (align, optics.telecentric()) {
+        (Align::None, _) => return stays,
+        (Align::Optics, _) | (_, Some(false)) => of_optics(),
+        _ => Warp::IDENTITY,
     };
     // A displacement that cannot be significant needs no search.
     let in_place = |model: &Model| {
         align == Align::Auto
             && align::displaced(pair, *model, start, size).is_some_and(|px| px < LEAST_DISPLACEMENT_PX)
     };
-    let found = model
+    let found = model(align)
         .filter(|model| !in_place(model))
         .and_then(|model| align::estimate_thinned(pair, model, start))
         .filter(|found| {
@@ -383,19 +421,22 @@ fn geometry(
         });
     let warp = found.map_or(start, |found| found.warp);
     if warp == Warp::IDENTITY {
-        return None;
+        return stays;
     }
     let [of_lens, found_ratio] = [optics.magnification_ratio(), warp.magnification()];
-    report.looks_not_telecentric = optics.telecentric().is_none()
-        && found.is_some_and(|_| (found_ratio - of_lens).abs() < 0.25 * (of_lens - 1.0));
-    report.aligned = Some(Aligned {
-        shift_px: warp.shift_of_middle_px(size),
-        magnification: warp.magnification(),
-        rotation_deg: warp.rotation_deg(),
-        displacement_px: warp.rms_px(size),
-        standard_error_px: found.map(|found| found.standard_error_px),
-    });
-    Some(warp)
+    Laid {
+        size,
+        warp: Some(warp),
+        aligned: Some(Aligned {
+            shift_px: warp.shift_of_middle_px(size),
+            magnification: warp.magnification(),
+            rotation_deg: warp.rotation_deg(),
+            displacement_px: warp.rms_px(size),
+            standard_error_px: found.map(|found| found.standard_error_px),
+        }),
+        looks_not_telecentric: optics.telecentric().is_none()
+            && found.is_some_and(|_| (found_ratio - of_lens).abs() < 0.25 * (of_lens - 1.0)),
+    }
 }
 
 /// Whether the result differs from the start by more than chance and by more than matters.

@@ -30,7 +30,7 @@ pub(crate) use rows::{
 pub(crate) use windows::{
     Believed, Contrast, CubicSums, Deviation, Found, Residual, add_products, add_row, believe_row,
     choose_certain, contrast_row, decide_row, deviation_row, dimensionless_row, move_products, residual_row,
-    roots, row_sums, sum, sum_of_squares, sum_rows, without_noise,
+    roll_row, roots, row_sums, sum, sum_of_squares, sum_rows, weigh_rows, without_noise,
 };
 
 /// Calls the generic function inside one with the backend's instructions enabled, so that it is compiled with them.

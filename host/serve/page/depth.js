@@ -288,7 +288,7 @@ export function make(host, remember) {
   };
 }
 
-/** Depth, confidence and the far image of a picture from the socket, as numbers. @param {any} header @param {Uint8Array} pixels */
+/** Depth, confidence, the far image, deviation and reasons of a new pair from the socket, as numbers. @param {any} header @param {Uint8Array} pixels */
 function decoded({ width, height, low_mm, high_mm }, pixels) {
   const count = width * height;
   const codes = new Uint16Array(pixels.buffer, pixels.byteOffset, count);
@@ -302,6 +302,8 @@ function decoded({ width, height, low_mm, high_mm }, pixels) {
     depth: map((at) => (codes[at] ? low_mm + (codes[at] - 1) * step : NaN)),
     confidence: map((at) => pixels[2 * count + at] / 255),
     far: map((at) => pixels[3 * count + at]),
+    deviation: { width, height, data: new Float32Array(pixels.buffer, pixels.byteOffset + 4 * count, count) },
+    reason: map((at) => pixels[8 * count + at]),
   };
 }
 

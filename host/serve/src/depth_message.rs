@@ -4,22 +4,18 @@ use std::time::{Instant, SystemTime, UNIX_EPOCH};
 
 use axum::body::Bytes;
 use farnear_capture::camera::Image;
-use farnear_depth::{
-    optics::Optics,
-    pipeline::{DepthMap, Processor, Settings},
+use farnear_depth::{measure::Measurement, optics::Optics};
+use farnear_workflows::{
+    Result, optics,
+    rig::live_depth::{self, LiveDepth},
 };
-use farnear_workflows::{Result, operators, optics, rig::live_depth::LiveDepth};
+use ndarray::s;
 use serde_json::{Value, json};
 
 use crate::{
     app::App,
     picture_message::{depth_codes, message},
 };
-
-/// On all cores, for low latency.
-pub fn computation() -> Settings {
-    Settings { threads: 0, ..Settings::default() }
-}
 
 /// Milliseconds since 1970 by this computer's clock.
 pub fn unix_ms() -> f64 {
@@ -42,31 +38,33 @@ pub fn live(depth: &LiveDepth<'_>, ends: [f32; 2], rate_hz: f64) -> Bytes {
         "latency_ms": depth.latency_ms,
         "arrived_ms": unix_ms() - depth.latency_ms,
     });
-    picture(header, depth.map, depth.far, ends)
+    picture(header, depth.found, depth.far, ends, &[])
 }
 
-/// Shows a new pair's depth before its files are written, because writing takes longer than computing. The depth to
-/// keep is computed from the files, with its standard deviation; errors are reported there.
+/// Shows a new pair's depth, with its standard deviation (32-bit floats, mm) and reasons, before its files are written,
+/// because writing takes longer than computing. The depth to keep is computed from the files; errors are reported there.
 pub fn show_fresh(app: &App, capture: &str, far: &Image, near: &Image) {
     let (arrived, arrived_ms) = (Instant::now(), unix_ms());
     let shown = || -> Result<Bytes> {
         let optics = optics::read(&app.optics_file())?;
-        let designed = operators::find(None, &optics)?;
-        let mut processor = Processor::new(&designed, &optics, &computation())?;
-        let map = processor.run(far.grey().view(), near.grey().view())?;
+        let found = live_depth::stream(&optics)?.measure([far, near].map(Image::grey))?;
         let latency_ms = arrived.elapsed().as_secs_f64() * 1e3;
         let header = json!({
             "type": "fresh", "capture": capture, "latency_ms": latency_ms, "arrived_ms": arrived_ms,
         });
-        Ok(picture(header, map, far, ends(&optics)))
+        let validity = &found.validity;
+        let deviation: Vec<u8> = validity.deviation_mm.iter().flat_map(|value| value.to_le_bytes()).collect();
+        let reasons: Vec<u8> = validity.reasons.iter().copied().collect();
+        Ok(picture(header, &found, far, ends(&optics), &[&deviation, &reasons]))
     };
     if let Ok(picture) = shown() {
         app.pictures.send_replace(picture);
     }
 }
 
-/// Depth, confidence and the far image.
-fn picture(mut header: Value, map: &DepthMap, far: &Image, ends: [f32; 2]) -> Bytes {
+/// Depth, confidence, the far image, and what `more` is shown of them.
+fn picture(mut header: Value, found: &Measurement, far: &Image, ends: [f32; 2], more: &[&[u8]]) -> Bytes {
+    let map = &found.map;
     let (height, width) = map.depth_mm.dim();
     header["width"] = width.into();
     header["height"] = height.into();
@@ -75,5 +73,9 @@ fn picture(mut header: Value, map: &DepthMap, far: &Image, ends: [f32; 2]) -> By
     header["low_texture_fraction"] = map.low_texture_fraction.into();
     let codes = depth_codes(&map.depth_mm, ends);
     let confidence: Vec<u8> = map.confidence.iter().map(|value| (value * 255.0) as u8).collect();
-    message(&header, &[&codes, &confidence, &far.eight_bits()])
+    // A learned lens may have its pixels averaged.
+    let step = (far.pixels.nrows() / height.max(1)).max(1);
+    let pixels = far.pixels.slice(s![..height * step; step, ..width * step; step]).to_owned();
+    let far = Image { pixels, bits: far.bits };
+    message(&header, &[&[&codes[..], &confidence, &far.eight_bits()], more].concat())
 }

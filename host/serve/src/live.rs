@@ -20,7 +20,7 @@ use serde_json::json;
 
 use crate::{
     app::{App, Live, lock},
-    depth_message::{self, computation, ends, unix_ms},
+    depth_message::{self, ends, unix_ms},
     picture_message::message,
     view::LiveMode,
 };
@@ -97,12 +97,7 @@ fn image_message(record: Option<&ShotRecord>, image: &Image, live: &Live, rate_h
 
 fn look_at_depth(app: &App, rig: RigAddress, context: &Context<'_>, rate: &Rate) -> Result<()> {
     let ends = ends(&optics::read(&app.optics_file())?);
-    let settings = LiveDepthSettings {
-        rig,
-        camera: app.camera(),
-        optics: app.optics_file(),
-        computation: computation(),
-    };
+    let settings = LiveDepthSettings { rig, camera: app.camera(), optics: app.optics_file() };
     let ended = live_depth::watch(&settings, context, |depth: LiveDepth<'_>| {
         record(app, &depth);
         app.pictures.send_replace(depth_message::live(&depth, ends, rate.next()));
@@ -124,7 +119,7 @@ fn record(app: &App, depth: &LiveDepth<'_>) {
 /// Plays a recording at its own rate, or as fast as depth is computed.
 pub fn play(app: &App, path: &Path, fast: bool, context: &Context<'_>) -> Result<PlayFigures> {
     let rate = Rate::default();
-    recording::play(path, &computation(), fast, context, |depth, optics| {
+    recording::play(path, fast, context, |depth, optics| {
         app.pictures.send_replace(depth_message::live(&depth, ends(optics), rate.next()));
         Ok(())
     })

@@ -18,7 +18,7 @@ use crate::simd::{self, Backend, Contrast, CubicSums, Deviation, Found, MAX_ROWS
 /// Rows of a band: its halo of about 20 rows on either side is computed twice.
 const ROWS: usize = 256;
 /// Columns of a tile: as many as the cache holds.
-const COLUMNS: usize = 512;
+const COLUMNS: usize = 640;
 const MISFIT_PX: [usize; 2] = [7, 21];
 /// Border in which filters and windows depend on reflections, which no model explains, px.
 const BORDER_PX: usize = 14;
@@ -81,6 +81,7 @@ pub(super) struct Tile<'a> {
     depth_of: DepthOfAlpha,
     deviation: Deviation,
     of_residual: Residual,
+    noise_energy: f32,
     inner: Inner,
 }
 
@@ -180,6 +181,7 @@ impl<'a> Tile<'a> {
                 floor: FLOOR.powi(2),
             },
             of_residual,
+            noise_energy: job.bank.noise_energy(),
             inner: Inner { size: job.far.dim(), reach },
         }
     }
@@ -340,7 +342,8 @@ impl<'a> Tile<'a> {
         // Ring rows: a filtered row lies `2 reach` below its first input pixel and `reach` below the middle.
         let filtered = |d: isize| (row as isize + *radius as isize + d + 2 * reach as isize) as usize % *ring;
         let bright = |d: isize| (row as isize + *radius as isize + d + reach as isize) as usize % *ring;
-        let with_brightness = job.scales.noise[1] > 0.0;
+        // The smallest window tells the brightness.
+        let with_brightness = index == 0 && job.scales.noise[1] > 0.0;
         let half = half as isize;
         let u = filters.matched();
         let factors = filters.rho().into_iter().chain([u]).enumerate();
@@ -375,7 +378,7 @@ impl<'a> Tile<'a> {
 
     fn row(&mut self, place: Place, index: usize, line: usize, wide: usize) {
         let [above, beside] = self.outer;
-        let Self { job, row, radius, inner, .. } = self;
+        let Self { job, row, radius, inner, noise_energy, .. } = self;
         let Columns { side, sums } = &self.columns[index];
         let (side, backend, scales, bank) = (*side, job.backend, job.scales, job.bank);
         let from = *radius - side / 2;
@@ -399,7 +402,7 @@ impl<'a> Tile<'a> {
         let found = Found { alpha: &mut *alpha, variance: &mut *variance };
         simd::roots(backend, CubicSums { c: [c0, c1, c2, c3], energy }, bank.least_slope(), found);
         let rows = inner.rows_of_window((place.top + line) as isize - above as isize, side);
-        let of_noise = bank.noise_energy() * (rows * side) as f32;
+        let of_noise = *noise_energy * (rows * side) as f32;
         let of_pixels = &mut row.work[..wide];
         inner.share_columns(place.left as isize - beside as isize, side, noise, of_pixels);
         simd::without_noise(backend, energy, of_pixels, [of_noise, LEAST_EVIDENCE], variance);

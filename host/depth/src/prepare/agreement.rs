@@ -7,10 +7,12 @@
 //!
 //! Cost: three box means per pixel of the small images (`thinned`), and 49 more around the pixels that differ and agree coarsely.
 
-use ndarray::{Array2, ArrayViewMut2, Axis, Zip};
+use ndarray::{Array2, ArrayViewMut2, Axis, Zip, s};
 use rayon::prelude::*;
 
-use super::band::{band, band_noise_gain, box_mean, halved, halving_noise_gain};
+use super::band::{
+    RollingMean, band, band_noise_gain, box_mean, halved, halving_noise_gain, product, rows_of_part,
+};
 use super::noise::PairNoise;
 use super::thinned::Thinned;
 
@@ -50,22 +52,36 @@ pub(super) fn compare(pair: &Thinned, size: (usize, usize), noise: &PairNoise) -
     let factor = 1 << pair.halvings;
     let variance = noise.mean_variance * band_noise_gain() * halving_noise_gain().powi(pair.halvings as i32);
     let [a, b] = [&pair.far.band, &pair.near.band];
-    let mean = |x: &Array2<f32>, y: &Array2<f32>| box_mean((x * y).view(), WINDOW_PX);
-    let [product, of_a, of_b] = [mean(a, b), mean(a, a), mean(b, b)];
     let noise = variance as f32;
-    let [mut sum, mut expected, mut windows] = [0.0_f64; 3];
     let mut different = Array2::from_elem(a.dim(), false);
-    Zip::from(&mut different).and(&product).and(&of_a).and(&of_b).for_each(|different, product, a, b| {
-        let detail = [a, b].map(|energy| 1.0 - noise / energy.max(f32::MIN_POSITIVE));
-        if detail.iter().all(|part| *part > DETAIL) {
-            let allowed = (detail[0] * detail[1]).sqrt();
-            let correlation = product / (a * b).sqrt();
-            *different = correlation < DIFFERENT * allowed;
-            sum += f64::from(correlation);
-            expected += f64::from(allowed);
-            windows += 1.0;
+    let rows = rows_of_part(a.nrows());
+    let of_part = |(part, mut different): (usize, ArrayViewMut2<bool>)| {
+        let mut sums = [0.0_f64; 3];
+        let mut rolling = [(); 3].map(|()| RollingMean::new(a.dim(), WINDOW_PX));
+        let mut means = [(); 3].map(|()| vec![0.0_f32; a.ncols()]);
+        for (i, mut different) in different.axis_iter_mut(Axis(0)).enumerate() {
+            let factors = [(a, b), (a, a), (b, b)];
+            for ((rolling, mean), (a, b)) in rolling.iter_mut().zip(&mut means).zip(factors) {
+                rolling.mean(part * rows + i, |y, row| product(a, b, y, row), mean);
+            }
+            let [product, of_a, of_b] = &means;
+            for (((different, product), a), b) in different.iter_mut().zip(product).zip(of_a).zip(of_b) {
+                let detail = [a, b].map(|energy| 1.0 - noise / energy.max(f32::MIN_POSITIVE));
+                if detail.iter().all(|part| *part > DETAIL) {
+                    let allowed = (detail[0] * detail[1]).sqrt();
+                    let correlation = product / (a * b).sqrt();
+                    *different = correlation < DIFFERENT * allowed;
+                    let of_window = [f64::from(correlation), f64::from(allowed), 1.0];
+                    sums.iter_mut().zip(of_window).for_each(|(sum, value)| *sum += value);
+                }
+            }
         }
-    });
+        sums
+    };
+    let of_parts: Vec<[f64; 3]> =
+        different.axis_chunks_iter_mut(Axis(0), rows).into_par_iter().enumerate().map(of_part).collect();
+    let [sum, expected, windows] =
+        of_parts.into_iter().fold([0.0; 3], |a, b| [a[0] + b[0], a[1] + b[1], a[2] + b[2]]);
     let detailed = windows / different.len() as f64;
     let mut too_blurred = Array2::from_elem(different.dim(), false);
     if different.iter().any(|d| *d) {
@@ -73,11 +89,10 @@ pub(super) fn compare(pair: &Thinned, size: (usize, usize), noise: &PairNoise) -
         Zip::from(&mut too_blurred).and(&different).and(&coarse).for_each(|blurred, different, coarse| {
             *blurred = *different && *coarse > SAME_COARSE;
         });
-        let limit = Zip::from(&of_a).and(&of_b).map_collect(|a, b| SAME_SHIFTED * (a * b).sqrt());
         let bands = too_blurred.axis_chunks_iter_mut(Axis(0), TILE_PX).into_par_iter().enumerate();
         bands.for_each(|(row, mut band)| {
             for (column, tile) in band.axis_chunks_iter_mut(Axis(1), TILE_PX).enumerate() {
-                remove_moved(tile, [row * TILE_PX, column * TILE_PX], [a, b], &limit);
+                remove_moved(tile, [row * TILE_PX, column * TILE_PX], [a, b]);
             }
         });
         Zip::from(&mut different).and(&too_blurred).for_each(|moved, blurred| *moved &= !*blurred);
@@ -116,13 +131,8 @@ fn coarse_correlation(pair: &Thinned) -> Array2<f32> {
 }
 
 /// Unmarks the pixels of a tile, which begins at row `top` and column `left`, where the mean product of `a` and `b` around them
-/// reaches its limit at one of the shifts.
-fn remove_moved(
-    mut tile: ArrayViewMut2<bool>,
-    [top, left]: [usize; 2],
-    [a, b]: [&Array2<f32>; 2],
-    limit: &Array2<f32>,
-) {
+/// reaches [`SAME_SHIFTED`] at one of the shifts.
+fn remove_moved(mut tile: ArrayViewMut2<bool>, [top, left]: [usize; 2], [a, b]: [&Array2<f32>; 2]) {
     let mut marked: Vec<_> = tile.indexed_iter().filter(|(_, marked)| **marked).map(|(at, _)| at).collect();
     let (height, width) = a.dim();
     // The part of the images that the windows of these pixels cover.
@@ -134,6 +144,11 @@ fn remove_moved(
     let Some((rows, columns)) = cover(top, &|at| at.0, height).zip(cover(left, &|at| at.1, width)) else {
         return;
     };
+    let [of_a, of_b] = [a, b].map(|band| {
+        let part = band.slice(s![rows.clone(), columns.clone()]);
+        box_mean((&part * &part).view(), WINDOW_PX)
+    });
+    let limit = Zip::from(&of_a).and(&of_b).map_collect(|a, b| SAME_SHIFTED * (a * b).sqrt());
     let inside = |i: usize, by: isize, n: usize| (i as isize + by).clamp(0, n as isize - 1) as usize;
     for (down, right) in SHIFTS_PX.into_iter().flat_map(|down| SHIFTS_PX.map(|right| (down, right))) {
         let product = Array2::from_shape_fn((rows.len(), columns.len()), |(y, x)| {
@@ -142,8 +157,8 @@ fn remove_moved(
         });
         let mean = box_mean(product.view(), WINDOW_PX);
         marked.retain(|at| {
-            let (y, x) = (top + at.0, left + at.1);
-            tile[*at] = mean[(y - rows.start, x - columns.start)] < limit[(y, x)];
+            let place = (top + at.0 - rows.start, left + at.1 - columns.start);
+            tile[*at] = mean[place] < limit[place];
             tile[*at]
         });
         if marked.is_empty() {

@@ -30,6 +30,8 @@ const STEPS: usize = 12;
 const SETTLED_PX: f64 = 2e-3;
 /// The same on levels that only start the next finer one.
 const COARSELY_SETTLED_PX: f64 = 2e-2;
+/// Least RMS difference of the bands by which outliers are told: equal images have none.
+const LEAST_SCALE: f64 = 1e-6;
 /// Correlation area of the band, px.
 const CORRELATED_PX: f64 = 12.0;
 /// Ignored border of a level, px.
@@ -144,19 +146,7 @@ pub(super) fn estimate_thinned(pair: &Thinned, model: Model, start: Warp) -> Opt
 /// Displacement from `start`, RMS with its standard error, px: a few steps on one level, without a search. `None` if
 /// the images differ too much at `start` for the nearest alignment to be certain.
 pub(super) fn displaced(pair: &Thinned, model: Model, start: Warp, size: (usize, usize)) -> Option<f64> {
-    let [far, near] = [&pair.far, &pair.near];
-    if far.image.nrows().min(far.image.ncols()) < 4 * COARSEST_PX {
-        return None;
-    }
-    let mut halvings = pair.halvings;
-    let level = if far.image.len() > CHECKED_PX {
-        halvings += 1;
-        let [far, near] = [far, near].map(|small| normalised(&band(halved(small.image.view()).view())));
-        Level { far, near }
-    } else {
-        let [far, near] = [far, near].map(|small| normalised(&small.band));
-        Level { far, near }
-    };
+    let (level, halvings) = checked_level(pair)?;
     let mut first = start;
     for _ in 0..halvings {
         first = first.halved();
@@ -170,6 +160,35 @@ pub(super) fn displaced(pair: &Thinned, model: Model, start: Warp, size: (usize,
         error *= 2.0;
     }
     Some(warp.after(&start.inverse()?).rms_px(size) + error)
+}
+
+/// Whether a pair lies on each other to `within` px, RMS with its standard error: two steps at no displacement, the
+/// second one robust.
+pub(super) fn stays(pair: &Thinned, model: Model, size: (usize, usize), within: f64) -> bool {
+    let displaced = || {
+        let (level, halvings) = checked_level(pair)?;
+        let Step { scale, .. } = Step::new(&level, model, &Warp::IDENTITY, f64::INFINITY)?;
+        let Step { mut warp, error, .. } = Step::new(&level, model, &Warp::IDENTITY, scale.max(LEAST_SCALE))?;
+        for _ in 0..halvings {
+            warp = warp.doubled();
+        }
+        Some(warp.rms_px(size) + error * f64::from(1 << halvings))
+    };
+    displaced().is_some_and(|px| px < within)
+}
+
+/// The level that rules out a displacement, and its number of halvings; `None` for images that are too small.
+fn checked_level(pair: &Thinned) -> Option<(Level, usize)> {
+    let [far, near] = [&pair.far, &pair.near];
+    if far.image.nrows().min(far.image.ncols()) < 4 * COARSEST_PX {
+        return None;
+    }
+    if far.image.len() > CHECKED_PX {
+        let [far, near] = [far, near].map(|small| normalised(&band(halved(small.image.view()).view())));
+        return Some((Level { far, near }, pair.halvings + 1));
+    }
+    let [far, near] = [far, near].map(|small| normalised(&small.band));
+    Some((Level { far, near }, pair.halvings))
 }
 
 /// The bands of both images from fine to coarse; `None` for images that are too small.
@@ -270,40 +289,59 @@ impl Sums {
 
 /// Gauss-Newton steps on one level: the map, and its standard error in the level's pixels.
 fn refine(level: &Level, model: Model, start: Warp, settled_px: f64) -> Option<(Warp, f64)> {
-    let (height, width) = level.far.dim();
-    let centre = middle((height, width));
-    let unit = 0.5 * (height as f64).hypot(width as f64);
-    let n = model.parameters();
     let mut warp = start;
     // At the start no difference is an outlier.
     let mut scale = f64::INFINITY;
     let mut error = f64::INFINITY;
     for _ in 0..STEPS {
+        let step = Step::new(level, model, &warp, scale)?;
+        (warp, scale, error) = (step.warp, step.scale, step.error);
+        if step.largest_px < settled_px {
+            break;
+        }
+    }
+    Some((warp, error))
+}
+
+/// A Gauss-Newton step.
+struct Step {
+    warp: Warp,
+    /// RMS difference before the step.
+    scale: f64,
+    error: f64,
+    largest_px: f64,
+}
+
+impl Step {
+    fn new(level: &Level, model: Model, warp: &Warp, scale: f64) -> Option<Self> {
+        let (height, width) = level.far.dim();
+        let centre = middle((height, width));
+        let unit = 0.5 * (height as f64).hypot(width as f64);
+        let n = model.parameters();
         let sums = match model {
-            Model::Shift => sums::<2>(level, &warp, scale, centre, unit),
-            Model::Similarity => sums::<4>(level, &warp, scale, centre, unit),
-            Model::Affine => sums::<6>(level, &warp, scale, centre, unit),
+            Model::Shift => sums::<2>(level, warp, scale, centre, unit),
+            Model::Similarity => sums::<4>(level, warp, scale, centre, unit),
+            Model::Affine => sums::<6>(level, warp, scale, centre, unit),
         };
         if sums.count < 8.0 * n as f64 {
             return None;
         }
         let variance = sums.squares / sums.count;
-        scale = variance.sqrt();
         let normal = DMatrix::from_fn(n, n, |i, j| sums.normal[i][j]);
         let right = DVector::from_fn(n, |i, _| sums.right[i]);
         let factor = normal.cholesky()?;
         let step = factor.solve(&right);
         let covariance = factor.inverse() * (variance * CORRELATED_PX);
-        error = rms_over_field(model, &covariance, unit, (height, width));
         if !step.iter().all(|p| p.is_finite()) {
             return None;
         }
-        warp = warp.after(&model.warp(step.as_slice(), centre, unit).inverse()?);
-        if step.iter().map(|p| p.abs()).fold(0.0, f64::max) < settled_px {
-            break;
-        }
+        Some(Self {
+            warp: warp.after(&model.warp(step.as_slice(), centre, unit).inverse()?),
+            scale: variance.sqrt(),
+            error: rms_over_field(model, &covariance, unit, (height, width)),
+            largest_px: step.iter().map(|p| p.abs()).fold(0.0, f64::max),
+        })
     }
-    Some((warp, error))
 }
 
 /// RMS over the field of the displacement's standard error.
@@ -376,9 +414,28 @@ fn sums_of_row<const N: usize>(
     let (mut right, mut squares, mut count) = ([NONE; N], NONE, 0_usize);
     let row_of_field = ((y as f64 - centre[1]) / unit) as f32;
     let [above, here, below] = [y - 1, y, y + 1].map(|y| &far[y * width..(y + 1) * width]);
+    // Where nothing is displaced nothing is interpolated.
+    let in_place = match level.near.as_slice() {
+        Some(near) if *warp == Warp::IDENTITY && y + 1 + BORDER_PX < level.near.nrows() => {
+            &near[y * width..(y + 1) * width - 1 - BORDER_PX]
+        }
+        _ => &[],
+    };
     for left in (BORDER_PX..width - BORDER_PX).step_by(SIDE_BY_SIDE) {
         let (mut gx, mut gy, mut difference, mut present, mut column) = (NONE, NONE, NONE, NONE, NONE);
-        for i in 0..SIDE_BY_SIDE.min(width - BORDER_PX - left) {
+        if let Some(near) = in_place.get(left..left + SIDE_BY_SIDE) {
+            for i in 0..SIDE_BY_SIDE {
+                let x = left + i;
+                gx[i] = 0.5 * (here[x + 1] - here[x - 1]);
+                gy[i] = 0.5 * (below[x] - above[x]);
+                difference[i] = near[i] - here[x];
+                column[i] = ((x as f64 - centre[0]) / unit) as f32;
+            }
+            present = [1.0; SIDE_BY_SIDE];
+            count += SIDE_BY_SIDE;
+        }
+        let first = if present[0] > 0.0 { SIDE_BY_SIDE } else { 0 };
+        for i in first..SIDE_BY_SIDE.min(width - BORDER_PX - left) {
             let x = left + i;
             if let Some(near) = between(&level.near, warp.at([x as f64, y as f64])) {
                 gx[i] = 0.5 * (here[x + 1] - here[x - 1]);
@@ -441,6 +498,15 @@ mod tests {
             let px = displaced(&pair, Model::Similarity, Warp::IDENTITY, far.dim()).unwrap();
             // With its standard error, some hundredths here.
             assert!((shift - 0.01..shift + 0.04).contains(&px), "{shift}: {px}");
+        }
+    }
+
+    #[test]
+    fn a_pair_stays_within_what_matters() {
+        let far = texture(0.0);
+        for (shift, expected) in [(0.0, true), (0.02, true), (0.1, false), (0.5, false), (25.0, false)] {
+            let pair = Thinned::new(far.view(), texture(shift).view());
+            assert_eq!(stays(&pair, Model::Similarity, far.dim(), 0.06), expected, "{shift}");
         }
     }
 

@@ -177,23 +177,47 @@ fn robust(rows: &[Vec<f64>], target: &[f64], weights: &[f64]) -> Option<(Vec<f64
     let mut trust = vec![1.0; rows.len()];
     let mut found = (Vec::new(), f64::INFINITY);
     for _ in 0..ROUNDS {
-        let root: Vec<f64> = weights.iter().zip(&trust).map(|(w, t)| (w * t).sqrt()).collect();
-        let matrix = DMatrix::from_fn(rows.len(), rows[0].len(), |i, j| root[i] * rows[i][j]);
-        let right = DVector::from_fn(rows.len(), |i, _| root[i] * target[i]);
-        let coefficients = least_squares::solve(matrix, right).ok()?;
+        let weights: Vec<f64> = weights.iter().zip(&trust).map(|(w, t)| w * t).collect();
+        let coefficients = weighted(rows, target, &weights)?;
         let left: Vec<f64> = rows
             .iter()
             .zip(target)
             .map(|(row, t)| t - row.iter().zip(coefficients.iter()).map(|(a, b)| a * b).sum::<f64>())
             .collect();
         let mut sizes: Vec<f64> = left.iter().map(|l| l.abs()).collect();
-        sizes.sort_unstable_by(f64::total_cmp);
-        let rms = (1.4826 * sizes[sizes.len() / 2]).max(1e-12);
+        let middle = sizes.len() / 2;
+        let rms = (1.4826 * *sizes.select_nth_unstable_by(middle, f64::total_cmp).1).max(1e-12);
         // Huber's weights.
         trust = left.iter().map(|l| (1.5 * rms / l.abs().max(1e-300)).min(1.0)).collect();
         found = (coefficients.as_slice().to_vec(), rms);
     }
     Some(found)
+}
+
+/// Least squares by the normal equations, which the field's few terms allow; by QR where they are nearly dependent.
+fn weighted(rows: &[Vec<f64>], target: &[f64], weights: &[f64]) -> Option<DVector<f64>> {
+    const LEAST_PIVOT: f64 = 1e-5;
+    let n = rows[0].len();
+    let (mut normal, mut right) = (DMatrix::<f64>::zeros(n, n), DVector::<f64>::zeros(n));
+    for ((row, target), weight) in rows.iter().zip(target).zip(weights) {
+        for (i, value) in row.iter().enumerate() {
+            let weighed = weight * value;
+            right[i] += weighed * target;
+            // The lower half, column by column.
+            let column = &mut normal.as_mut_slice()[i * n..][i..n];
+            column.iter_mut().zip(&row[i..]).for_each(|(sum, value)| *sum += weighed * value);
+        }
+    }
+    let certain = |factor: &nalgebra::Cholesky<f64, nalgebra::Dyn>| {
+        let pivots = factor.l_dirty().diagonal();
+        pivots.min() > LEAST_PIVOT * pivots.max()
+    };
+    if let Some(factor) = normal.cholesky().filter(certain) {
+        return Some(factor.solve(&right));
+    }
+    let roots: Vec<f64> = weights.iter().map(|weight| weight.sqrt()).collect();
+    let matrix = DMatrix::from_fn(rows.len(), n, |i, j| roots[i] * rows[i][j]);
+    least_squares::solve(matrix, DVector::from_fn(rows.len(), |i, _| roots[i] * target[i])).ok()
 }
 
 /// Sum of a row of a block in eight parallel sums, which the compiler vectorises.

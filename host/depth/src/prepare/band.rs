@@ -5,8 +5,6 @@
 //! by the root mean square of that band around each pixel: the result is alike in both where they show the same.
 //! Point spread functions are symmetric and move nothing, so that a difference of blur draws no estimate to one side.
 
-use std::borrow::Cow;
-
 use ndarray::{Array2, ArrayView2, Axis, CowArray, Ix2};
 use rayon::prelude::*;
 
@@ -96,41 +94,44 @@ pub(crate) fn halving_noise_gain() -> f64 {
 
 /// The band divided by its strength around each pixel.
 pub(crate) fn normalised(band: &Array2<f32>) -> Array2<f32> {
-    let square = band.mapv(|v| v * v);
-    let mean = square.iter().map(|v| f64::from(*v)).sum::<f64>() / square.len() as f64;
+    let of_rows: Vec<f64> = band
+        .axis_iter(Axis(0))
+        .into_par_iter()
+        .map(|row| row.as_slice().map_or(0.0, simd::sum_of_squares))
+        .collect();
+    let mean = of_rows.iter().sum::<f64>() / band.len() as f64;
     let floor = (FLOOR * mean as f32).max(f32::MIN_POSITIVE);
-    let mut strength = box_mean(square.view(), STRENGTH_PX);
+    let mut strength = box_mean_of(band.dim(), STRENGTH_PX, |y, row| product(band, band, y, row));
     strength.zip_mut_with(band, |strength, band| *strength = band / (*strength + floor).sqrt());
     strength
+}
+
+/// Row `y` of a product.
+pub(crate) fn product(a: &Array2<f32>, b: &Array2<f32>, y: usize, row: &mut [f32]) {
+    let [a, b] = [a, b].map(|image| image.row(y).to_slice().unwrap_or_default());
+    row.iter_mut().zip(a).zip(b).for_each(|((to, a), b)| *to = a * b);
 }
 
 /// Binomial of five taps along both axes; borders reflected.
 fn binomial(image: ArrayView2<f32>) -> Array2<f32> {
     const WEIGHTS: [f32; 5] = [0.0625, 0.25, 0.375, 0.25, 0.0625];
     let (height, width) = image.dim();
+    let backend = Backend::best();
+    let image = image.as_standard_layout();
     let mut result = Array2::zeros((height, width));
     result.axis_iter_mut(Axis(0)).into_par_iter().enumerate().for_each_init(
         || vec![0.0_f32; width + 4],
         |row_sum, (y, mut row)| {
-            row_sum.fill(0.0);
-            for (tap, weight) in WEIGHTS.iter().enumerate() {
-                let from = image.row(reflect(y as isize + tap as isize - 2, height));
-                let to = row_sum[2..2 + width].iter_mut();
-                match from.as_slice() {
-                    Some(from) => to.zip(from).for_each(|(sum, value)| *sum += weight * value),
-                    None => to.zip(from).for_each(|(sum, value)| *sum += weight * value),
-                }
-            }
+            let rows = [-2, -1, 0, 1, 2].map(|tap| image.row(reflect(y as isize + tap, height)));
+            let rows = rows.each_ref().map(|row| row.as_slice().unwrap_or_default());
+            simd::weigh_rows(backend, rows, WEIGHTS, &mut row_sum[2..2 + width]);
             for d in 1..=2_isize {
                 row_sum[(2 - d) as usize] = row_sum[2 + reflect(-d, width)];
                 row_sum[(width as isize + 1 + d) as usize] =
                     row_sum[2 + reflect(width as isize - 1 + d, width)];
             }
             let Some(row) = row.as_slice_mut() else { unreachable!("made in standard layout") };
-            for (tap, weight) in WEIGHTS.iter().enumerate() {
-                let from = &row_sum[tap..tap + width];
-                row.iter_mut().zip(from).for_each(|(sum, value)| *sum += weight * value);
-            }
+            simd::weigh_rows(backend, [0, 1, 2, 3, 4].map(|tap| &row_sum[tap..]), WEIGHTS, row);
         },
     );
     result
@@ -138,56 +139,109 @@ fn binomial(image: ArrayView2<f32>) -> Array2<f32> {
 
 /// Mean over a window of odd side around each pixel, fewer pixels at the borders.
 pub(crate) fn box_mean(image: ArrayView2<f32>, side: usize) -> Array2<f32> {
-    let (height, width) = image.dim();
-    let r = side / 2;
-    let backend = Backend::best();
-    let mut across = Array2::zeros((height, width));
-    across.axis_iter_mut(Axis(0)).into_par_iter().enumerate().for_each_init(
-        || vec![0.0_f32; 2 * width],
-        |work, (y, mut row)| {
-            let (from, row) = (image.row(y), row.as_slice_mut().unwrap_or_default());
-            let from = from.as_slice().map_or_else(|| from.to_vec().into(), Cow::Borrowed);
-            let inner = r.min(width)..width.saturating_sub(r).max(r.min(width));
-            for x in (0..inner.start).chain(inner.end..width) {
-                let window = &from[x.saturating_sub(r)..(x + r + 1).min(width)];
-                row[x] = window.iter().sum::<f32>() / window.len() as f32;
-            }
-            if width > 2 * r {
-                let share = 1.0 / (2 * r + 1) as f32;
-                let row = &mut row[inner];
-                simd::row_sums(backend, &from, 2 * r + 1, work, row);
-                row.iter_mut().for_each(|sum| *sum *= share);
-            }
-        },
-    );
-    let mut result = Array2::zeros((height, width));
-    let rows = height.div_ceil(rayon::current_num_threads().max(1)).max(32);
-    result.axis_chunks_iter_mut(Axis(0), rows).into_par_iter().enumerate().for_each(
-        |(chunk, mut rows_out)| {
-            let top = chunk * rows;
-            let mut sums = vec![0.0_f64; width];
-            let add = |sums: &mut [f64], y: usize, sign: f64| {
-                let Some(row) = across.row(y).to_slice() else { unreachable!("made in standard layout") };
-                sums.iter_mut().zip(row).for_each(|(sum, value)| *sum += sign * f64::from(*value));
-            };
-            let [mut from, mut to] = [top.saturating_sub(r), top.saturating_sub(r)];
-            for (i, mut row) in rows_out.axis_iter_mut(Axis(0)).enumerate() {
-                let y = top + i;
-                while to < (y + r + 1).min(height) {
-                    add(&mut sums, to, 1.0);
-                    to += 1;
-                }
-                while from < y.saturating_sub(r) {
-                    add(&mut sums, from, -1.0);
-                    from += 1;
-                }
-                let share = 1.0 / (to - from) as f64;
-                let Some(row) = row.as_slice_mut() else { unreachable!("made in standard layout") };
-                row.iter_mut().zip(&sums).for_each(|(value, sum)| *value = (sum * share) as f32);
-            }
-        },
-    );
+    box_mean_of(image.dim(), side, |y, row| match image.row(y).as_slice() {
+        Some(from) => row.copy_from_slice(from),
+        None => row.iter_mut().zip(image.row(y)).for_each(|(to, from)| *to = *from),
+    })
+}
+
+/// [`box_mean`] of rows that `source` makes, of (height, width).
+pub(crate) fn box_mean_of(
+    size: (usize, usize),
+    side: usize,
+    source: impl Fn(usize, &mut [f32]) + Sync,
+) -> Array2<f32> {
+    let mut result = Array2::zeros(size);
+    let rows = rows_of_part(size.0);
+    result.axis_chunks_iter_mut(Axis(0), rows).into_par_iter().enumerate().for_each(|(part, mut means)| {
+        let mut rolling = RollingMean::new(size, side);
+        for (i, mut row) in means.axis_iter_mut(Axis(0)).enumerate() {
+            rolling.mean(part * rows + i, &source, row.as_slice_mut().unwrap_or_default());
+        }
+    });
     result
+}
+
+/// Rows of an image that one thread works on, since a window's rows around them are summed again.
+pub(crate) fn rows_of_part(height: usize) -> usize {
+    height.div_ceil(rayon::current_num_threads().max(1)).max(32)
+}
+
+/// [`box_mean`] row by row: each row is made once, and kept as long as a window has it.
+pub(crate) struct RollingMean {
+    backend: Backend,
+    height: usize,
+    reach: usize,
+    /// Sums over the window's rows.
+    sums: Vec<f64>,
+    /// Means along rows, of a window's rows and the one that leaves it.
+    kept: Vec<f32>,
+    row: Vec<f32>,
+    work: Vec<f32>,
+    /// The rows that are summed; `None` before the first.
+    summed: Option<std::ops::Range<usize>>,
+}
+
+impl RollingMean {
+    pub(crate) fn new((height, width): (usize, usize), side: usize) -> Self {
+        Self {
+            backend: Backend::best(),
+            height,
+            reach: side / 2,
+            sums: vec![0.0; width],
+            kept: vec![0.0; (side + 1) * width],
+            row: vec![0.0; width],
+            work: vec![0.0; 2 * width],
+            summed: None,
+        }
+    }
+
+    /// Means around the pixels of row `y`, which follows the one before.
+    pub(crate) fn mean(&mut self, y: usize, source: impl Fn(usize, &mut [f32]), to: &mut [f32]) {
+        let Self { backend, height, reach: r, sums, kept, row, work, summed } = self;
+        let width = row.len();
+        let place = |y: usize| (y % (2 * *r + 2)) * width..(y % (2 * *r + 2) + 1) * width;
+        let rows = summed.get_or_insert(y.saturating_sub(*r)..y.saturating_sub(*r));
+        let (first, end) = (y.saturating_sub(*r), (y + *r + 1).min(*height));
+        let mut along = |kept: &mut [f32], y: usize| {
+            source(y, row);
+            means_along(*backend, row, *r, work, &mut kept[place(y)]);
+        };
+        if rows.end + 1 == end && rows.start + 1 == first {
+            along(kept, rows.end);
+            let share = 1.0 / (end - first) as f64;
+            simd::roll_row(*backend, [rows.end, rows.start].map(|y| &kept[place(y)]), sums, share, to);
+            *rows = first..end;
+            return;
+        }
+        while rows.end < end {
+            along(kept, rows.end);
+            sums.iter_mut().zip(&kept[place(rows.end)]).for_each(|(sum, value)| *sum += f64::from(*value));
+            rows.end += 1;
+        }
+        while rows.start < first {
+            sums.iter_mut().zip(&kept[place(rows.start)]).for_each(|(sum, value)| *sum -= f64::from(*value));
+            rows.start += 1;
+        }
+        let share = 1.0 / rows.len() as f64;
+        to.iter_mut().zip(sums).for_each(|(value, sum)| *value = (*sum * share) as f32);
+    }
+}
+
+/// Mean over `2 r + 1` columns.
+fn means_along(backend: Backend, from: &[f32], r: usize, work: &mut [f32], to: &mut [f32]) {
+    let width = from.len();
+    let inner = r.min(width)..width.saturating_sub(r).max(r.min(width));
+    for x in (0..inner.start).chain(inner.end..width) {
+        let window = &from[x.saturating_sub(r)..(x + r + 1).min(width)];
+        to[x] = window.iter().sum::<f32>() / window.len() as f32;
+    }
+    if width > 2 * r {
+        let share = 1.0 / (2 * r + 1) as f32;
+        let to = &mut to[inner];
+        simd::row_sums(backend, from, 2 * r + 1, work, to);
+        to.iter_mut().for_each(|sum| *sum *= share);
+    }
 }
 
 #[cfg(test)]

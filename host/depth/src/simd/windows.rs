@@ -18,10 +18,54 @@ dispatch! {
 #[inline(always)]
 fn row_sums_generic<L: Lanes>(values: &[f32], window: usize, work: &mut [f32], sums: &mut [f32]) {
     let width = sums.len();
+    if window < 4 {
+        sums.copy_from_slice(&values[..width]);
+        for from in (1..window).rev() {
+            sums.iter_mut().zip(&values[from..]).for_each(|(sum, value)| *sum += value);
+        }
+        return;
+    }
     let (mut here, mut there) = work.split_at_mut(values.len());
-    here[..values.len()].copy_from_slice(values);
-    let (mut length, mut power, mut offset, mut rest) = (values.len(), 1, 0, window);
-    sums.fill(0.0);
+    let at = |d: usize| &values[d..][..width];
+    // The usual windows in two passes: sums of four, then of those. Their order is that of the loop below.
+    let mut length = values.len() - 3;
+    let quads = &mut here[..length];
+    let [a, b, c, d] = [0, 1, 2, 3].map(|d| &values[d..d + length]);
+    for x in 0..length {
+        quads[x] = (a[x] + b[x]) + (c[x] + d[x]);
+    }
+    let quad = |d: usize| &quads[d..][..width];
+    match window {
+        7 => {
+            let (a, b, c, d) = (at(0), at(1), at(2), quad(3));
+            (0..width).for_each(|x| sums[x] = (a[x] + (b[x] + c[x])) + d[x]);
+            return;
+        }
+        9 => {
+            let (a, b, c) = (at(0), quad(1), quad(5));
+            (0..width).for_each(|x| sums[x] = a[x] + (b[x] + c[x]));
+            return;
+        }
+        13 => {
+            let (a, b, c, d) = (at(0), quad(1), quad(5), quad(9));
+            (0..width).for_each(|x| sums[x] = (a[x] + b[x]) + (c[x] + d[x]));
+            return;
+        }
+        21 => {
+            let (a, b, c, d, e, f) = (at(0), quad(1), quad(5), quad(9), quad(13), quad(17));
+            (0..width).for_each(|x| sums[x] = (a[x] + b[x]) + ((c[x] + d[x]) + (e[x] + f[x])));
+            return;
+        }
+        _ => {}
+    }
+    let (mut power, mut offset, mut rest) = (4, window % 4, window / 4);
+    sums.copy_from_slice(at(0));
+    match window % 4 {
+        0 => sums.fill(0.0),
+        1 => {}
+        2 => (0..width).for_each(|x| sums[x] += at(1)[x]),
+        _ => (0..width).for_each(|x| sums[x] += at(1)[x] + at(2)[x]),
+    }
     loop {
         if rest % 2 == 1 {
             let from = &here[offset..offset + width];
@@ -156,6 +200,35 @@ fn contrast_generic<L: Lanes>(of: Contrast, small: [&[f32]; 2], large: [&[f32]; 
         variance[x] = if tells { total / factor } else { of_large[x] };
         difference[x] = if tells { square } else { 0.0 };
         counted[x] = if tells { 1.0 } else { 0.0 };
+    }
+}
+
+dispatch! {
+    /// Adds the first row to `sums` and takes the second one off; `to` is their `share`.
+    fn roll_row(rows: [&[f32]; 2], sums: &mut [f64], share: f64, to: &mut [f32]) = roll_generic
+}
+
+#[inline(always)]
+fn roll_generic<L: Lanes>(rows: [&[f32]; 2], sums: &mut [f64], share: f64, to: &mut [f32]) {
+    let width = to.len();
+    let ([come, gone], sums) = (rows.map(|row| &row[..width]), &mut sums[..width]);
+    for x in 0..width {
+        sums[x] = (sums[x] + f64::from(come[x])) - f64::from(gone[x]);
+        to[x] = (sums[x] * share) as f32;
+    }
+}
+
+dispatch! {
+    fn weigh_rows(rows: [&[f32]; 5], weights: [f32; 5], to: &mut [f32]) = weigh_generic
+}
+
+#[inline(always)]
+fn weigh_generic<L: Lanes>(rows: [&[f32]; 5], weights: [f32; 5], to: &mut [f32]) {
+    let width = to.len();
+    let [a, b, c, d, e] = rows.map(|row| &row[..width]);
+    for x in 0..width {
+        let first = (weights[0] * a[x] + weights[1] * b[x]) + weights[2] * c[x];
+        to[x] = (first + weights[3] * d[x]) + weights[4] * e[x];
     }
 }
 

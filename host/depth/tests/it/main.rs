@@ -12,4 +12,5 @@ mod optics_files;
 mod planes;
 mod random_planes;
 mod stack;
+mod stream;
 mod wave;

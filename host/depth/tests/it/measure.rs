@@ -15,7 +15,7 @@ use farnear_scene::{Camera, Lens, Noise, OpticsFile, Renderer, Scene, View, stan
 use ndarray::Array2;
 
 const SIZE: (usize, usize) = (320, 240);
-const PSF: &str = "gaussian:k=0.4578";
+pub const PSF: &str = "gaussian:k=0.4578";
 
 struct Pair {
     far: Array2<f32>,
@@ -41,6 +41,12 @@ fn pair(scene: &str, psf: &str, noise: Noise, lens: &Lens, view: View, seed: u64
 
 fn plain(scene: &str, seed: u64) -> Pair {
     pair(scene, PSF, Noise::EightBit, &lens(), View::default(), seed)
+}
+
+/// A pair `[far, near]` of 8 bits.
+pub fn rendered(scene: &str, view: View, seed: u64) -> [Array2<f32>; 2] {
+    let Pair { far, near, .. } = pair(scene, PSF, Noise::EightBit, &lens(), view, seed);
+    [far, near]
 }
 
 fn settings(window: Window) -> MeasureSettings {

@@ -11,11 +11,17 @@ use farnear_capture::{
     pair::{Exposures, reach},
     plan::SensorPair,
 };
-use farnear_depth::pipeline::{DepthMap, Processor, Settings};
+use farnear_depth::{
+    measure::{DepthMethod, MeasureError, MeasureSettings, Measurement},
+    optics::Optics,
+    prepare::{PrepareError, PrepareSettings},
+    stream::Stream,
+};
 use farnear_protocol::{Micros, Settle, message::Axis};
+use ndarray::Array2;
 
 use super::{RigAddress, camera::CameraSettings, camera::EquippedRig};
-use crate::{context::Context, error::Result, operators, optics::GivenOptics};
+use crate::{context::Context, depth::DepthRequest, error::Result, optics::GivenOptics};
 
 /// Longest time for which pairs may be skipped in favour of newer ones.
 const PASSED_OVER: Duration = Duration::from_millis(100);
@@ -25,17 +31,32 @@ pub struct LiveDepthSettings {
     pub rig: RigAddress,
     pub camera: CameraSettings,
     pub optics: PathBuf,
-    pub computation: Settings,
 }
 
 pub struct LiveDepth<'a> {
     pub far: &'a Image,
     pub near: &'a Image,
-    pub map: &'a DepthMap,
+    pub found: &'a Measurement,
     /// Board time from the start of the far exposure to the end of the near one.
     pub pair_ms: f64,
     /// From the arrival of the near image to the finished map, by the host's clock.
     pub latency_ms: f64,
+}
+
+/// Depth of grey values (0 to 1) as of a capture's files, if nothing else is asked for.
+pub fn stream(optics: &Optics) -> Result<Stream> {
+    let usual = DepthRequest::default().measure(DepthMethod::Whitened);
+    let prepare = PrepareSettings { limits: Some([0.0, 1.0]), ..usual.prepare };
+    Ok(Stream::new(optics, &MeasureSettings { prepare, ..usual })?)
+}
+
+/// Depth of the next pair; `None` if the scene changed between its exposures, as it may before a running camera.
+pub(super) fn measure(stream: &mut Stream, pair: [Array2<f32>; 2]) -> Result<Option<Measurement>> {
+    match stream.measure(pair) {
+        Ok(found) => Ok(Some(found)),
+        Err(MeasureError::Prepare(PrepareError::Unrelated { .. })) => Ok(None),
+        Err(error) => Err(error.into()),
+    }
 }
 
 /// Passes each pair to `on_depth` until it or the context stops. Homes if needed; stops the rig at the end.
@@ -45,8 +66,7 @@ pub fn watch(
     mut on_depth: impl FnMut(LiveDepth<'_>) -> Result<()>,
 ) -> Result<()> {
     let optics = GivenOptics::read(&settings.optics)?;
-    let designed = operators::find(None, &optics.optics)?;
-    let mut processor = Processor::new(&designed, &optics.optics, &settings.computation)?;
+    let mut depths = stream(&optics.optics)?;
     let mut equipped = settings.camera.connect(&settings.rig, Some(&optics), context)?;
     let range = optics.optics.working_range();
     let sensor = SensorPair { far_mm: range.sensor_far_mm, near_mm: range.sensor_near_mm };
@@ -75,13 +95,15 @@ pub fn watch(
         }
         let arrived = Instant::now();
         shown = Some(arrived);
-        let map = processor.run(far.image.grey().view(), near.image.grey().view())?;
+        let Some(found) = measure(&mut depths, [&far, &near].map(|frame| frame.image.grey()))? else {
+            continue;
+        };
         let pair_us = near.record.strobe_end.0.saturating_sub(far.record.strobe_start.0);
         let latency_ms = arrived.elapsed().as_secs_f64() * 1e3;
         on_depth(LiveDepth {
             far: &far.image,
             near: &near.image,
-            map,
+            found: &found,
             pair_ms: pair_us as f64 / 1e3,
             latency_ms,
         })?;

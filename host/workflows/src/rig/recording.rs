@@ -17,20 +17,16 @@ use std::{
 };
 
 use farnear_capture::camera::{Image, pixels::Layout};
-use farnear_depth::{
-    optics::Optics,
-    pipeline::{Processor, Settings},
-};
+use farnear_depth::optics::Optics;
 use farnear_files::staging::StagingError;
 use ndarray::Array2;
 use serde::Serialize;
 
-use super::live_depth::LiveDepth;
+use super::live_depth::{LiveDepth, measure, stream};
 use crate::{
     context::Context,
     error::{Result, WorkflowError},
     figures::rounded,
-    operators,
     optics::GivenOptics,
 };
 
@@ -223,15 +219,14 @@ impl Recording {
 /// A pair with its grey values, prepared while depth of the previous pair is computed.
 struct Ready {
     pair: RecordedPair,
-    far: Array2<f32>,
-    near: Array2<f32>,
+    grey: [Array2<f32>; 2],
 }
 
 /// Reads up to [`AHEAD`] pairs in advance until the end, an error, or a closed receiver.
 fn read_ahead(mut recording: Recording, to: &SyncSender<Result<Ready>>) {
     loop {
         let ready = match recording.next_pair() {
-            Ok(Some(pair)) => Ok(Ready { far: pair.far.grey(), near: pair.near.grey(), pair }),
+            Ok(Some(pair)) => Ok(Ready { grey: [&pair.far, &pair.near].map(Image::grey), pair }),
             Ok(None) => return,
             Err(error) => Err(error),
         };
@@ -245,34 +240,32 @@ fn read_ahead(mut recording: Recording, to: &SyncSender<Result<Ready>>) {
 /// Plays a recording and passes each pair with its depth to `on_depth`. One thread reads, another computes.
 pub fn play(
     path: &Path,
-    computation: &Settings,
     fast: bool,
     context: &Context<'_>,
     mut on_depth: impl FnMut(LiveDepth<'_>, &Optics) -> Result<()>,
 ) -> Result<PlayFigures> {
     let recording = Recording::open(path)?;
     let optics = recording.optics;
-    let designed = operators::find(None, &optics)?;
-    let mut processor = Processor::new(&designed, &optics, computation)?;
+    let mut depths = stream(&optics)?;
     let (begin, mut latencies_ms, mut seconds) = (Instant::now(), Vec::new(), 0.0);
     thread::scope(|scope| {
         // The reader ends when the receiver is dropped, at the end of this closure.
         let (to, pairs) = mpsc::sync_channel(AHEAD);
         scope.spawn(move || read_ahead(recording, &to));
         for ready in pairs {
-            let Ready { pair: RecordedPair { at, far, near }, far: far_grey, near: near_grey } = ready?;
+            let Ready { pair: RecordedPair { at, far, near }, grey } = ready?;
             while !fast && begin.elapsed() < at {
                 context.cancel.check("playing a recording")?;
                 thread::sleep(LOOK.min(at.saturating_sub(begin.elapsed())));
             }
             context.cancel.check("playing a recording")?;
             let arrived = Instant::now();
-            let map = processor.run(far_grey.view(), near_grey.view())?;
+            let Some(found) = measure(&mut depths, grey)? else { continue };
             let latency_ms = arrived.elapsed().as_secs_f64() * 1e3;
             latencies_ms.push(latency_ms);
             seconds = at.as_secs_f64();
             context.progress.advance("pairs", latencies_ms.len(), None);
-            on_depth(LiveDepth { far: &far, near: &near, map, pair_ms: 0.0, latency_ms }, &optics)?;
+            on_depth(LiveDepth { far: &far, near: &near, found: &found, pair_ms: 0.0, latency_ms }, &optics)?;
         }
         Ok::<_, WorkflowError>(())
     })?;

@@ -11,7 +11,7 @@ use ndarray::Array2;
 use super::curve::{Curve, by_texture};
 use super::focus_plane::{FocusPlane, blurred};
 use super::{ENOUGH_DEPTHS, HeldOut, StackError};
-use crate::adaptive_window::{LEARNED_PX, Window};
+use crate::adaptive_window::{Bank, LEARNED_PX, Window};
 use crate::coarseness::coarseness;
 use crate::measure::{DepthMethod, MeasureSettings, measure};
 use crate::optics::{Optics, Stage, unexplained};
@@ -299,7 +299,9 @@ impl Target<'_> {
 
     fn samples(&self, pair: &Pair, optics: &Optics, settings: &MeasureSettings) -> (Vec<Sample>, usize) {
         let (height, width) = self.slices[0].dim();
-        let found = measure(&pair.prepared, optics, DepthMethod::Whitened, settings).ok();
+        let white = Bank::whitened(optics).ok();
+        let found = white
+            .and_then(|white| measure(&pair.prepared, &white, optics, DepthMethod::Whitened, settings).ok());
         let (mut samples, mut looked_at) = (Vec::new(), 0);
         let places = (BORDER_PX..height.saturating_sub(BORDER_PX))
             .step_by(THIN)

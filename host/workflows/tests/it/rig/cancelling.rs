@@ -141,8 +141,7 @@ fn every_workflow_that_moves_stops_the_rig() {
         (
             "live depth",
             Box::new(|rig, context| {
-                let (camera, computation) = (camera(path), farnear_depth::pipeline::Settings::default());
-                let settings = LiveDepthSettings { rig, camera, optics: optics(), computation };
+                let settings = LiveDepthSettings { rig, camera: camera(path), optics: optics() };
                 live_depth::watch(&settings, context, |_| Ok(()))
             }),
         ),

@@ -157,8 +157,7 @@ fn a_second_run_takes_no_longer_than_the_first() {
         (
             "live depth",
             Box::new(|rig, _, context| {
-                let computation = farnear_depth::pipeline::Settings::default();
-                let settings = LiveDepthSettings { rig, camera: camera(), optics: optics(), computation };
+                let settings = LiveDepthSettings { rig, camera: camera(), optics: optics() };
                 until_two(|seen| live_depth::watch(&settings, context, |depth| seen(depth.pair_ms)))
             }),
         ),
