@@ -49,6 +49,8 @@ pub struct RecordingFigures {
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct PlayFigures {
     pub pairs: usize,
+    /// Their two images show different scenes: no depth.
+    pub unrelated_pairs: usize,
     /// Over the computing time.
     pub maps_per_second: f64,
     /// Median, from a pair's grey values to its map, by the host's clock.
@@ -248,6 +250,7 @@ pub fn play(
     let optics = recording.optics;
     let mut depths = stream(&optics)?;
     let (begin, mut latencies_ms, mut seconds) = (Instant::now(), Vec::new(), 0.0);
+    let mut unrelated_pairs = 0;
     thread::scope(|scope| {
         // The reader ends when the receiver is dropped, at the end of this closure.
         let (to, pairs) = mpsc::sync_channel(AHEAD);
@@ -260,7 +263,10 @@ pub fn play(
             }
             context.cancel.check("playing a recording")?;
             let arrived = Instant::now();
-            let Some(found) = measure(&mut depths, grey)? else { continue };
+            let Some(found) = measure(&mut depths, grey)? else {
+                unrelated_pairs += 1;
+                continue;
+            };
             let latency_ms = arrived.elapsed().as_secs_f64() * 1e3;
             latencies_ms.push(latency_ms);
             seconds = at.as_secs_f64();
@@ -273,6 +279,7 @@ pub fn play(
     let pairs = latencies_ms.len();
     Ok(PlayFigures {
         pairs,
+        unrelated_pairs,
         maps_per_second: rounded(pairs as f64 / begin.elapsed().as_secs_f64().max(1e-9), 2),
         latency_ms: rounded(latencies_ms.get(pairs / 2).copied().unwrap_or_default(), 2),
         seconds: rounded(seconds, 3),
