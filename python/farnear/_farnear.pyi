@@ -315,10 +315,12 @@ def depth(
         The optics of the pair.
     operators : Operators, optional
         Operators for method "ro"; by default they are designed for the optics.
-    method : {"ro", "whitened", "subbarao", "subbarao-fourier", "favaro"}
-        Rational operators, whitened (least noise), or a baseline.
-    window : int or {"adaptive", "safe"}, optional
-        Side in px (odd, up to 63) of the window over which evidence is summed; by default adaptive for "whitened", else 7.
+    method : {"whitened", "ro", "subbarao", "subbarao-fourier", "favaro"}, optional
+        Whitened (least noise), rational operators, or a baseline; by default rational operators if `operators` are given, else
+        whitened.
+    window : int or "adaptive", optional
+        Side in px (odd, up to 63) of the window over which evidence is summed; "adaptive" is for "whitened", whose default it
+        is. Else the default is 7.
     median_px : int
         Side of the median filter, px, odd; 1 = none.
     fill : bool or {"surface", "thesis"}
