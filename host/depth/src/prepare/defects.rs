@@ -12,7 +12,7 @@ const NEIGHBOURHOOD_PX: isize = 2;
 const ALONE: usize = 6;
 
 /// Least mean of the neighbours of a clipped highlight, relative to a saturated pixel; below it the pixel is defective.
-const HIGHLIGHT: f32 = 0.5;
+const HIGHLIGHT: f32 = 0.65;
 
 /// Marks the defects of an image: code of the [`Reason`], 0 = none. `limits` are the black and the white level of a
 /// camera that clips, `bad` its bad pixels.
