@@ -40,9 +40,17 @@ async function painted(page, canvas, pid, during) {
 
 /** Pairs as `farnear serve` records them, 30 a second: a texture, and the same a little softer. */
 function recording(optics, pairs) {
-  const [near, far] = [Buffer.alloc(2 * WIDTH * HEIGHT), Buffer.alloc(2 * WIDTH * HEIGHT)];
-  for (let at = 0; at < WIDTH * HEIGHT; at++) near.writeUInt16LE(60 + ((Math.imul(at, 2654435761) >>> 13) % 90), 2 * at);
-  for (let at = 0; at < WIDTH * HEIGHT; at++) far.writeUInt16LE((near.readUInt16LE(2 * at) + near.readUInt16LE(2 * Math.max(0, at - 1))) >> 1, 2 * at);
+  const texture = (at) => 60 + ((Math.imul(at, 2654435761) >>> 13) % 90);
+  /** A flat scene near the middle of the range; the weight of the four neighbours gives the blur. */
+  const image = (weight) => {
+    const codes = Buffer.alloc(2 * WIDTH * HEIGHT);
+    for (let at = 0; at < WIDTH * HEIGHT; at++) {
+      const around = texture(at - 1) + texture(at + 1) + texture(at - WIDTH) + texture(at + WIDTH);
+      codes.writeUInt16LE(Math.round((texture(at) + weight * around) / (1 + 4 * weight)), 2 * at);
+    }
+    return codes;
+  };
+  const [far, near] = [0.1, 0.25].map(image);
   const length = Buffer.alloc(4);
   length.writeUInt32LE(optics.length);
   const parts = [Buffer.from("FNPAIRS1"), length, optics];
