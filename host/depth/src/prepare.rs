@@ -17,6 +17,7 @@ pub(crate) mod band;
 mod camera;
 mod defects;
 pub mod noise;
+mod registration;
 mod straight;
 mod thinned;
 pub mod warp;
@@ -30,20 +31,18 @@ use serde::{Deserialize, Serialize};
 
 use crate::optics::{Distortion, Optics};
 use crate::reason::Reason;
-use align::{Alignment, Model};
 use balance::Gain;
 use noise::PairNoise;
+use registration::{LEAST_DISPLACEMENT_PX, model};
 use thinned::Thinned;
 use warp::Warp;
 
+pub(crate) use registration::Registration;
+
 pub use camera::{CameraError, CameraFrames, check_saturation};
 
-/// Displacement (root mean square over the image) below which a pair is not changed, px.
-const LEAST_DISPLACEMENT_PX: f64 = 0.06;
 /// A displacement below this many standard errors counts as none.
 const SIGNIFICANT: f64 = 5.0;
-/// Correlation of the shared band from which an alignment is believed.
-const BELIEVED: f64 = 0.25;
 /// Difference of brightness below which a pair is not changed: 0.5 % costs 0.05 mm in squares on the thesis' rig.
 const LEAST_GAIN: f64 = 0.005;
 /// Correlation relative to what noise allows below which the images show different scenes.
@@ -51,7 +50,7 @@ const UNRELATED: f64 = 0.3;
 /// Part of the windows that must have detail for that verdict.
 const TELLING: f64 = 0.05;
 
-/// How the near image is laid on the far one.
+/// Registers the near image to the far one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Align {
@@ -148,7 +147,7 @@ pub enum PrepareError {
     Camera(#[from] CameraError),
 }
 
-/// How the near image was laid on the far one.
+/// Geometry of the near image relative to the far one, which was corrected.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Aligned {
     /// Shift of the image's middle, right and down, px.
@@ -247,9 +246,9 @@ pub fn prepare_owned(
     prepare_after(&mut None, images, optics, camera, settings)
 }
 
-/// [`prepare_owned`] of the next pair of a rig: it is laid as the `last` one where that holds for it too, and else anew.
+/// [`prepare_owned`] of the next pair of a rig. Reuses the registration of the `last` pair if it fits, else registers again.
 pub(crate) fn prepare_after(
-    last: &mut Option<Laid>,
+    last: &mut Option<Registration>,
     [mut far, mut near]: [Array2<f32>; 2],
     optics: &Optics,
     camera: Option<&CameraFrames>,
@@ -294,16 +293,6 @@ struct Recorded {
     distortion: Distortion,
 }
 
-/// How a near image was laid on the far one.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Laid {
-    size: (usize, usize),
-    /// `None` where it stayed.
-    warp: Option<Warp>,
-    aligned: Option<Aligned>,
-    looks_not_telecentric: bool,
-}
-
 fn check_sizes(
     (far_height, far_width): (usize, usize),
     (near_height, near_width): (usize, usize),
@@ -316,7 +305,7 @@ fn check_sizes(
 
 /// What follows once single pixels are corrected and lines are straight: geometry, brightness, agreement.
 fn finish(
-    last: &mut Option<Laid>,
+    last: &mut Option<Registration>,
     [far, near]: [Array2<f32>; 2],
     recorded: Option<Recorded>,
     marks: [Option<Array2<u8>>; 2],
@@ -339,18 +328,19 @@ fn finish(
             let thinned = Thinned::new(far.view(), moved.as_ref().unwrap_or(&near).view());
             align::stays(&thinned, model, size, LEAST_DISPLACEMENT_PX).then_some((last, moved, thinned))
         });
-    let (laid, moved, mut thinned) = of_last.unwrap_or_else(|| {
+    let (registration, moved, mut thinned) = of_last.unwrap_or_else(|| {
         let mut thinned = Thinned::new(far.view(), near.view());
-        let laid = geometry(&thinned, size, optics, settings.align);
-        let moved = laid.warp.map(moved);
+        let registration = Registration::find(&thinned, size, optics, settings.align);
+        let moved = registration.warp.map(moved);
         if let Some(moved) = &moved {
             thinned.replace_near(moved.view());
         }
-        (laid, moved, thinned)
+        (registration, moved, thinned)
     });
-    *last = Some(laid);
-    (report.aligned, report.looks_not_telecentric) = (laid.aligned, laid.looks_not_telecentric);
-    let (warp, mut near) = (laid.warp, moved.unwrap_or(near));
+    *last = Some(registration);
+    (report.aligned, report.looks_not_telecentric) =
+        (registration.aligned, registration.looks_not_telecentric);
+    let (warp, mut near) = (registration.warp, moved.unwrap_or(near));
     drop(recorded);
     brightness(&far, &mut near, &mut thinned, settings.balance, &mut report);
     let marked = marks.iter().any(Option::is_some);
@@ -386,66 +376,6 @@ fn finish(
 
 fn part_of(reasons: &Array2<u8>, reason: Reason) -> f64 {
     reasons.iter().filter(|code| **code == reason.code()).count() as f64 / reasons.len() as f64
-}
-
-/// What is found of how an image lies; `None` where nothing is looked for.
-fn model(align: Align) -> Option<Model> {
-    match align {
-        Align::Shift => Some(Model::Shift),
-        Align::Affine => Some(Model::Affine),
-        Align::Auto | Align::Similarity => Some(Model::Similarity),
-        Align::None | Align::Optics => None,
-    }
-}
-
-/// How the near image is laid on the far one.
-fn geometry(pair: &Thinned, size: (usize, usize), optics: &Optics, align: Align) -> Laid {
-    let stays = Laid { size, warp: None, aligned: None, looks_not_telecentric: false };
-    let of_optics = || Warp::about_middle(size, optics.magnification_ratio(), 0.0, [0.0; 2]);
-    let start = match (align, optics.telecentric()) {
-        (Align::None, _) => return stays,
-        (Align::Optics, _) | (_, Some(false)) => of_optics(),
-        _ => Warp::IDENTITY,
-    };
-    // A displacement that cannot be significant needs no search.
-    let in_place = |model: &Model| {
-        align == Align::Auto
-            && align::displaced(pair, *model, start, size).is_some_and(|px| px < LEAST_DISPLACEMENT_PX)
-    };
-    let found = model(align)
-        .filter(|model| !in_place(model))
-        .and_then(|model| align::estimate_thinned(pair, model, start))
-        .filter(|found| {
-            let beyond_doubt = align != Align::Auto || significant(found, &start, size);
-            beyond_doubt && found.correlation > BELIEVED
-        });
-    let warp = found.map_or(start, |found| found.warp);
-    if warp == Warp::IDENTITY {
-        return stays;
-    }
-    let [of_lens, found_ratio] = [optics.magnification_ratio(), warp.magnification()];
-    Laid {
-        size,
-        warp: Some(warp),
-        aligned: Some(Aligned {
-            shift_px: warp.shift_of_middle_px(size),
-            magnification: warp.magnification(),
-            rotation_deg: warp.rotation_deg(),
-            displacement_px: warp.rms_px(size),
-            standard_error_px: found.map(|found| found.standard_error_px),
-        }),
-        looks_not_telecentric: optics.telecentric().is_none()
-            && found.is_some_and(|_| (found_ratio - of_lens).abs() < 0.25 * (of_lens - 1.0)),
-    }
-}
-
-/// Whether the result differs from the start by more than chance and by more than matters.
-fn significant(found: &Alignment, start: &Warp, size: (usize, usize)) -> bool {
-    let Some(back) = start.inverse() else { return false };
-    let displacement = found.warp.after(&back).rms_px(size);
-    displacement > LEAST_DISPLACEMENT_PX
-        && displacement > SIGNIFICANT * found.standard_error_px
-        && found.correlation > found.correlation_before
 }
 
 fn brightness(

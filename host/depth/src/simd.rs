@@ -8,6 +8,7 @@
 #![allow(unsafe_code)] // std::arch intrinsics and unchecked loads; each block states why it is sound.
 #![allow(clippy::needless_range_loop)] // Indexed loops on purpose: see `Lanes` on closures.
 
+mod choice;
 mod convolve;
 mod lanes;
 mod median;
@@ -21,6 +22,7 @@ mod windows;
 
 use serde::{Deserialize, Serialize};
 
+pub(crate) use choice::{Contrast, choose_certain, contrast_row, decide_row};
 pub(crate) use convolve::{MAX_ROWS, READ_BEYOND, Taps, convolve, convolve_rows};
 pub(crate) use median::median_row;
 pub(crate) use rows::{
@@ -28,9 +30,9 @@ pub(crate) use rows::{
     vertical_sums_of_seven,
 };
 pub(crate) use windows::{
-    Believed, Contrast, CubicSums, Deviation, Found, Residual, add_products, add_row, believe_row,
-    choose_certain, contrast_row, decide_row, deviation_row, dimensionless_row, move_products, residual_row,
-    roll_row, roots, row_sums, sum, sum_of_squares, sum_rows, weigh_rows, without_noise,
+    Believed, CubicSums, Deviation, Found, Residual, add_products, add_row, believe_row, deviation_row,
+    dimensionless_row, move_products, residual_row, roll_row, roots, row_sums, sum, sum_of_squares, sum_rows,
+    weigh_rows, without_noise,
 };
 
 /// Calls the generic function inside one with the backend's instructions enabled, so that it is compiled with them.

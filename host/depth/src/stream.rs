@@ -5,7 +5,7 @@ use ndarray::Array2;
 use crate::adaptive_window::Bank;
 use crate::measure::{DepthMethod, MeasureError, MeasureSettings, Measurement, measure_after};
 use crate::optics::Optics;
-use crate::prepare::Laid;
+use crate::prepare::Registration;
 use crate::prepare::noise::PairNoise;
 
 /// Pairs for which noise is measured once.
@@ -19,7 +19,7 @@ pub struct Stream {
     optics: Optics,
     settings: MeasureSettings,
     bank: Bank,
-    laid: Option<Laid>,
+    registration: Option<Registration>,
     /// With the number of pairs for which it still counts.
     noise: Option<(PairNoise, usize)>,
 }
@@ -28,19 +28,19 @@ impl Stream {
     /// The default method for `optics`. Returns [`MeasureError::Design`] for a PSF that allows none.
     pub fn new(optics: &Optics, settings: &MeasureSettings) -> Result<Self, MeasureError> {
         let bank = Bank::whitened(optics)?;
-        Ok(Self { optics: *optics, settings: *settings, bank, laid: None, noise: None })
+        Ok(Self { optics: *optics, settings: *settings, bank, registration: None, noise: None })
     }
 
     /// Depth of the next pair `[far, near]`. Pairs of other sizes may follow each other; errors as
-    /// [`measure_pair`](crate::measure::measure_pair), after which the stream goes on.
+    /// [`measure_pair`](crate::measure::measure_pair), after which the stream remains usable.
     pub fn measure(&mut self, images: [Array2<f32>; 2]) -> Result<Measurement, MeasureError> {
-        let Self { optics, bank, laid, .. } = self;
+        let Self { optics, bank, registration, .. } = self;
         let mut settings = self.settings;
         let known = self.noise.filter(|(_, pairs)| *pairs > 0);
         settings.prepare.noise = settings.prepare.noise.or(known.map(|(noise, _)| noise));
         // From within the pool: otherwise each parallel stage would wake it again.
         let measure = |_: &rayon::Scope<'_>| {
-            measure_after(laid, bank, images, optics, DepthMethod::Whitened, None, &settings)
+            measure_after(registration, bank, images, optics, DepthMethod::Whitened, None, &settings)
         };
         let found = rayon::scope(measure)?;
         let pairs = known.map_or(SAME_NOISE, |(_, pairs)| pairs) - 1;

@@ -162,7 +162,7 @@ impl<'a> Tile<'a> {
                 taken: vec![0.0; wide],
             },
             agreement: (compared > 0).then(|| {
-                // A learned lens has an error of its own, which is no depth step.
+                // The model error of a learned lens must not count as a depth step.
                 let tolerance = job.optics.stage().map_or(0.0, |stage| stage.window_tolerance as f32).powi(2);
                 let of =
                     Contrast { gain: variance_gain, tolerance, largest: UNINFORMATIVE.powi(2) + tolerance };

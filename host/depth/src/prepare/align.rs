@@ -30,7 +30,7 @@ const STEPS: usize = 12;
 const SETTLED_PX: f64 = 2e-3;
 /// The same on levels that only start the next finer one.
 const COARSELY_SETTLED_PX: f64 = 2e-2;
-/// Least RMS difference of the bands by which outliers are told: equal images have none.
+/// Least RMS difference of the bands for the outlier limit: that of equal images is 0.
 const LEAST_SCALE: f64 = 1e-6;
 /// Correlation area of the band, px.
 const CORRELATED_PX: f64 = 12.0;

@@ -1,5 +1,5 @@
-//! Rows of the estimator with several window sizes: sums along rows, the cubic's root with its slope, and the choice of
-//! window. Plain loops along rows, vectorised by the compiler.
+//! Rows of the estimator with several window sizes: sums along rows, the cubic's root with its slope, residual and
+//! deviation. Plain loops along rows, vectorised by the compiler.
 
 use super::dispatch;
 use super::lanes::Lanes;
@@ -129,81 +129,6 @@ fn roots_generic<L: Lanes>(sums: CubicSums<'_>, floor: f32, found: Found<'_>) {
 }
 
 dispatch! {
-    /// Takes a larger window's value where the present one is less certain than required.
-    fn choose_certain(alpha: &[f32], variance: &[f32], noise: &[f32], largest: f32, chosen: &mut [f32], of_chosen: &mut [f32]) =
-        choose_certain_generic
-}
-
-#[inline(always)]
-fn choose_certain_generic<L: Lanes>(
-    alpha: &[f32],
-    variance: &[f32],
-    noise: &[f32],
-    largest: f32,
-    chosen: &mut [f32],
-    of_chosen: &mut [f32],
-) {
-    let width = chosen.len();
-    let (alpha, variance, noise) = (&alpha[..width], &variance[..width], &noise[..width]);
-    let of_chosen = &mut of_chosen[..width];
-    for x in 0..width {
-        let certain = of_chosen[x] * noise[x] <= largest;
-        chosen[x] = if certain { chosen[x] } else { alpha[x] };
-        of_chosen[x] = if certain { of_chosen[x] } else { variance[x] };
-    }
-}
-
-/// How two windows are compared.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Contrast {
-    /// Variance of alpha relative to the window's own, a polynomial in alpha^2.
-    pub gain: [f32; 4],
-    /// Variance of alpha within which windows may differ by the model's error.
-    pub tolerance: f32,
-    /// Variance of alpha from which a window tells nothing.
-    pub largest: f32,
-}
-
-/// Largest counted squared difference, relative to the variance.
-const LARGEST_CONTRAST: f32 = 100.0;
-/// Mean square difference of two windows, relative to the smaller one's variance, from which the surface is not flat
-/// over the larger one. On planes 99 % are below 1.9.
-const NOT_FLAT: f32 = 2.0;
-/// The same mean square of a flat surface (75 % are below), and the part of any excess by which the larger window's
-/// variance grows. Chosen on rendered spheres, cones and slants for an error over deviation of 0.9 to 1.25.
-const FLAT: f32 = 1.05;
-const DOUBT: f32 = 0.5;
-/// Largest growth of the smaller one's variance: a certain depth next to a large step remains certain.
-const LARGEST_GROWTH: f32 = 9.0;
-
-dispatch! {
-    /// Compares windows: `to` gets alpha and variance of the smaller one (of the larger one where it tells nothing), the squared
-    /// difference relative to this variance, and 1 where it tells something.
-    fn contrast_row(of: Contrast, small: [&[f32]; 2], large: [&[f32]; 2], to: [&mut [f32]; 4]) = contrast_generic
-}
-
-#[inline(always)]
-fn contrast_generic<L: Lanes>(of: Contrast, small: [&[f32]; 2], large: [&[f32]; 2], to: [&mut [f32]; 4]) {
-    let [alpha, variance, difference, counted] = to;
-    let width = alpha.len();
-    let ([small, of_small], [large, of_large]) = (small.map(|s| &s[..width]), large.map(|s| &s[..width]));
-    let (variance, difference, counted) =
-        (&mut variance[..width], &mut difference[..width], &mut counted[..width]);
-    for x in 0..width {
-        let a = small[x];
-        let factor = polynomial(of.gain, a * a);
-        let total = factor * of_small[x] + of.tolerance;
-        let tells = total <= of.largest;
-        let apart = a - large[x];
-        let square = (apart * apart / total).min(LARGEST_CONTRAST);
-        alpha[x] = if tells { a } else { large[x] };
-        variance[x] = if tells { total / factor } else { of_large[x] };
-        difference[x] = if tells { square } else { 0.0 };
-        counted[x] = if tells { 1.0 } else { 0.0 };
-    }
-}
-
-dispatch! {
     /// Adds the first row to `sums` and takes the second one off; `to` is their `share`.
     fn roll_row(rows: [&[f32]; 2], sums: &mut [f64], share: f64, to: &mut [f32]) = roll_generic
 }
@@ -242,29 +167,6 @@ fn add_row_generic<L: Lanes>(values: &[f32], times: f32, sums: &mut [f32]) {
     let values = &values[..width];
     for x in 0..width {
         sums[x] += times * values[x];
-    }
-}
-
-dispatch! {
-    /// Alpha and variance of the larger window where the surface is flat, else of the smaller one. `sums` are of
-    /// [`contrast_row`]'s differences and counts.
-    fn decide_row(sums: [&[f32]; 2], small: [&[f32]; 2], large: [&[f32]; 2], to: [&mut [f32]; 2]) = decide_generic
-}
-
-#[inline(always)]
-fn decide_generic<L: Lanes>(sums: [&[f32]; 2], small: [&[f32]; 2], large: [&[f32]; 2], to: [&mut [f32]; 2]) {
-    let [alpha, variance] = to;
-    let width = alpha.len();
-    let variance = &mut variance[..width];
-    let [[differences, counts], [small, of_small], [large, of_large]] =
-        [sums, small, large].map(|rows| rows.map(|row| &row[..width]));
-    for x in 0..width {
-        let mean = differences[x] / counts[x].max(1.0);
-        let flat = mean <= NOT_FLAT;
-        // An infinite variance times 0 would be none.
-        let widened = of_large[x] + of_small[x].min(f32::MAX) * (DOUBT * (mean - FLAT).max(0.0));
-        alpha[x] = if flat { large[x] } else { small[x] };
-        variance[x] = if flat { widened } else { of_small[x] * mean.min(LARGEST_GROWTH) };
     }
 }
 
@@ -409,7 +311,7 @@ fn deviation_generic<L: Lanes>(of: Deviation, alpha: &[f32], variance: &[f32], t
 }
 
 #[inline(always)]
-fn polynomial(gain: [f32; 4], x: f32) -> f32 {
+pub(super) fn polynomial(gain: [f32; 4], x: f32) -> f32 {
     ((gain[3] * x + gain[2]) * x + gain[1]) * x + gain[0]
 }
 
@@ -547,27 +449,6 @@ mod tests {
                 let slope = 2.0 + 0.2 * wanted + 0.6 * wanted * wanted;
                 assert!((variance * slope * slope - 1.0).abs() < 1e-2);
             }
-        }
-    }
-
-    /// A plane, and a step of 0.2 in the middle, seen by windows with a variance of 1e-3 and 1e-4.
-    #[test]
-    fn the_larger_window_counts_where_the_surface_is_flat() {
-        let of = Contrast { gain: [1.0, 0.0, 0.0, 0.0], tolerance: 0.0, largest: 2e-3 };
-        for backend in Backend::available() {
-            let small = [[0.13, 0.30, 0.3], [1e-3, 1e-3, f32::NAN]];
-            let large = [[0.11, 0.20, 0.2], [1e-4; 3]];
-            let mut to = [[0.0; 3]; 4];
-            let [small, large] = [&small, &large].map(|rows| rows.each_ref().map(|row| &row[..]));
-            contrast_row(backend, of, small, large, to.each_mut().map(|row| &mut row[..]));
-            let [alpha, variance, difference, counted] = to;
-            assert_eq!((alpha, counted), ([0.13, 0.30, 0.2], [1.0, 1.0, 0.0]));
-            assert!((difference[0] - 0.4).abs() < 1e-4 && (difference[1] - 10.0).abs() < 1e-3);
-            let (mut chosen, mut of_chosen) = ([0.0; 3], [0.0; 3]);
-            let small = [&alpha[..], &variance];
-            decide_row(backend, [&difference, &counted], small, large, [&mut chosen, &mut of_chosen]);
-            assert_eq!(chosen, [0.11, 0.30, 0.2]);
-            assert!((of_chosen[1] - 9e-3).abs() < 1e-6 && of_chosen[0] == 1e-4 && of_chosen[2] == 1e-4);
         }
     }
 }

@@ -43,7 +43,7 @@ pub struct LiveDepth<'a> {
     pub latency_ms: f64,
 }
 
-/// Depth of grey values (0 to 1) as of a capture's files, if nothing else is asked for.
+/// Depth of grey values (0 to 1) with the default settings for a capture's files.
 pub fn stream(optics: &Optics) -> Result<Stream> {
     let usual = DepthRequest::default().measure(DepthMethod::Whitened);
     let prepare = PrepareSettings { limits: Some([0.0, 1.0]), ..usual.prepare };
