@@ -26,7 +26,7 @@ use crate::optics::Optics;
 use crate::pipeline::{MAX_SMOOTHING_PX, RunError};
 use crate::prepare::noise::PairNoise;
 use crate::simd::Backend;
-use rows::{Job, Maps, Tile};
+use rows::Tile;
 use scales::Scales;
 
 pub use bank::Bank;
@@ -141,6 +141,24 @@ pub(crate) fn estimate_without_depth(
     settings: &WindowSettings,
 ) -> Result<Estimate, RunError> {
     estimate_into(None, far, near, bank, optics, settings)
+}
+
+/// What all tiles share.
+struct Job<'a> {
+    far: ArrayView2<'a, f32>,
+    near: ArrayView2<'a, f32>,
+    bank: &'a Bank,
+    optics: &'a Optics,
+    settings: &'a WindowSettings,
+    scales: &'a Scales,
+    backend: Backend,
+}
+
+/// A band's rows of the results.
+struct Maps<'a> {
+    depth_mm: Option<ArrayViewMut2<'a, f32>>,
+    deviation_mm: ArrayViewMut2<'a, f32>,
+    misfit: ArrayViewMut2<'a, f32>,
 }
 
 fn estimate_into(

@@ -2,18 +2,16 @@
 //! stay in rings as long as windows need them, so that they are read from the cache. Beyond its borders the pair is
 //! reflected. Filters and windows are symmetric, so later stages need no border handling.
 
-use ndarray::{Array2, ArrayView2, ArrayViewMut2, s};
+use ndarray::{Array2, s};
 
 use super::agreement::Agreement;
-use super::bank::{Bank, Filters};
+use super::bank::Filters;
 use super::holes::{Holes, Inner};
-use super::scales::Scales;
-use super::{ADAPTIVE_PX, LEARNED_PX, Window, WindowSettings};
+use super::{ADAPTIVE_PX, Job, LEARNED_PX, Maps, Window};
 use crate::border::reflect;
 use crate::depth_of_alpha::DepthOfAlpha;
 use crate::operators::linearise;
-use crate::optics::Optics;
-use crate::simd::{self, Backend, Contrast, CubicSums, Deviation, Found, MAX_ROWS, Plane, Residual};
+use crate::simd::{self, Contrast, CubicSums, Deviation, Found, MAX_ROWS, Plane, Residual};
 
 /// Rows of a band: its halo of about 20 rows on either side is computed twice.
 const ROWS: usize = 256;
@@ -42,22 +40,6 @@ pub(super) fn rows((height, _): (usize, usize)) -> usize {
 
 fn columns(width: usize) -> usize {
     width.div_ceil(width.div_ceil(COLUMNS))
-}
-
-pub(super) struct Job<'a> {
-    pub far: ArrayView2<'a, f32>,
-    pub near: ArrayView2<'a, f32>,
-    pub bank: &'a Bank,
-    pub optics: &'a Optics,
-    pub settings: &'a WindowSettings,
-    pub scales: &'a Scales,
-    pub backend: Backend,
-}
-
-pub(super) struct Maps<'a> {
-    pub depth_mm: Option<ArrayViewMut2<'a, f32>>,
-    pub deviation_mm: ArrayViewMut2<'a, f32>,
-    pub misfit: ArrayViewMut2<'a, f32>,
 }
 
 pub(super) struct Tile<'a> {
