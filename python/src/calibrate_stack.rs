@@ -1,6 +1,6 @@
 //! A lens from a z-stack of a flat target.
 
-use farnear_depth::calibrate::stack::{self, StackSettings};
+use farnear_depth::calibrate::stack::{self, Moved, StackSettings};
 use farnear_workflows::calibrate::stack::verdict;
 use pyo3::prelude::*;
 
@@ -95,8 +95,8 @@ pub fn calibrate_stack<'py>(
     for (index, image) in images.iter().enumerate() {
         slices.push(named::<Image<'py>>(&format!("images[{index}]"), image)?.view().to_owned());
     }
-    let settings = StackSettings { step_mm, pixel_um, far_mm, pair_step, bin };
-    let found = py.detach(|| stack::calibrate_stack(&slices, &settings)).map_err(wrong)?;
+    let settings = StackSettings { step_mm, moved: Moved::Target { pixel_um, far_mm }, pair_step, bin };
+    let found = py.detach(|| stack::calibrate_stack(&slices, &settings, &|_| true)).map_err(wrong)?;
     let stage = found.optics.stage().ok_or_else(|| FarnearError::new_err("the stack gives no pairs"))?;
     let held_out = &found.held_out;
     Ok(StackFit {

@@ -84,6 +84,8 @@ impl OpticsFile {
             per_blur_mm: 2.0 * f_number * pixel_um * 1e-3,
         };
         let (near_mm, max_blur_px) = raw.focus.range(&travel)?;
+        let bin = f64::from(raw.stage.map_or(1, |stage| stage.bin.max(1)));
+        let (pixel_um, max_blur_px) = (pixel_um / bin, max_blur_px * bin);
         let telecentric = raw.lens.telecentric;
         Ok(Self { focal_length_mm, aperture_mm, pixel_um, far_mm, near_mm, max_blur_px, psf, telecentric })
     }
@@ -193,9 +195,16 @@ struct RawFile {
     sensor: RawSensor,
     focus: RawFocus,
     psf: Option<RawPsf>,
+    /// A calibrated lens counts binned pixels; the camera has its own.
+    stage: Option<RawStage>,
     /// Of the rig's commands.
     #[serde(default, rename = "light")]
     _light: serde::de::IgnoredAny,
+}
+
+#[derive(Deserialize)]
+struct RawStage {
+    bin: u16,
 }
 
 #[derive(Deserialize)]
@@ -237,6 +246,16 @@ mod tests {
 
     fn file(lens: &str, focus: &str) -> String {
         format!("[lens]\nfocal_length_mm = 50.0\n{lens}\n[sensor]\npixel_um = 7.4\n[focus]\n{focus}\n")
+    }
+
+    /// The sensor's travel and the near plane stay; pixels are those of the camera.
+    #[test]
+    fn a_calibrated_lens_has_the_pixels_of_the_camera() {
+        let text = file("f_number = 4.0", "far_mm = 933.0\nmax_blur_px = 2.5");
+        let [plain, calibrated] = ["", "[stage]\nbin = 2\npair_step = 5\n"]
+            .map(|stage| OpticsFile::parse(&(text.clone() + stage)).unwrap());
+        assert_eq!((calibrated.pixel_um, calibrated.max_blur_px), (3.7, 5.0));
+        assert_eq!(calibrated.near_mm, plain.near_mm);
     }
 
     #[test]

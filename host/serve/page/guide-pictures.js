@@ -32,6 +32,8 @@ export const target = () => picture("a flat textured target before the rig", box
 export const series = () => picture("a flat target at several distances", [8, 22, 36, 50].map((x, at) => box(x, 18 + at, 5, 44 - 2 * at, at === 3 ? "accent-part" : "part")), s("ellipse", { cx: 88, cy: 40, rx: 4, ry: 16, class: "glass" }), box(102, 30, 6, 20), line("M10 72 H56 m-6 -4 l6 4 l-6 4", "accent"));
 /** A point and its blur. */
 export const spread = () => picture("a point and how it spreads", line("M8 66 H112", "dark-line"), line("M30 66 V16", "accent"), line("M58 66 C74 66 76 26 84 26 C92 26 94 66 110 66", "weak"));
+/** The sensor steps through the focus of a flat target. */
+export const slices = () => picture("the sensor steps through the focus of a flat target", box(8, 16, 14, 48), texture(9, 19), s("ellipse", { cx: 58, cy: 40, rx: 4, ry: 18, class: "glass" }), [76, 84, 92, 100, 108].map((x, at) => box(x, 28, 3, 24, at === 2 ? "accent-part" : "part")), line("M22 40 L58 22 L93 40 L58 58 Z", "rays"), line("M76 66 H110 m-6 -4 l6 4 l-6 4", "accent"));
 /** What a lens bends, and the straight line. */
 export const curve = () => picture("a bent surface is made flat", line("M14 56 Q60 14 106 56", "weak"), line("M14 60 H106", "accent"), line("M60 38 V54 m-4 -5 l4 6 l4 -6", "dark-line"));
 /** Somebody, seen and cut out. */

@@ -3,6 +3,7 @@ import { act, call, hasControl, ended, get, on, store } from "./link.js";
 import { h, button, choice, field, notice, number, panel, rows } from "./ui.js";
 import * as draw from "./guide-pictures.js";
 import * as people from "./people.js";
+import { Plot } from "./plot.js";
 
 /** Steps of the bring-up checklist as the program names them: what to do, and the picture beside it. */
 const STEPS = [
@@ -22,6 +23,7 @@ const SIGNS = { passed: ["✓", "passed"], failed: ["✗", "failed"], "passed-ov
 export function make(host) {
   const guides = [
     ["power", "First power-up", draw.board(), powerUp()], ["psf", "Point spread function", draw.target(), psf()],
+    ["lens", "Lens from a stack", draw.slices(), lens()],
     ["series", "Flat series and correction", draw.series(), series()], ["shadow", "Shadow by the sun", draw.sun(40, 200, 1.2), people.shadow()],
     ["activity", "Activity of a person", draw.person(), people.activity()],
   ];
@@ -139,6 +141,42 @@ function psf() {
     step(2, "Capture", draw.camera(), h("p", {}, "A far- and a near-focused image. Repeat steps 1 and 2 for more distances."), h("div", { class: "buttons" }, button("Capture pair", capture, { "data-needs": "rig" }))),
     step(3, "Choose and find", draw.spread(), pairs, taught, field("Model", model), h("div", { class: "buttons" }, button("Find", find, { class: "primary", "data-needs": "client" })), result));
   return { element, shown };
+}
+
+/** Blur, response and errors of a lens that a stack has calibrated. */
+function lens() {
+  const slices = h("input", { type: "number", value: 21, min: 11, max: 101 });
+  const result = h("div", { "aria-live": "polite" });
+  const plots = [
+    ["Blur radius", { x: "slices from the focus", y: "px" }],
+    ["Response", { x: "measured normalised depth", y: "true" }],
+    ["Held-out errors", { x: "true normalised depth", y: "mm", names: ["RMS error", "predicted SD"] }],
+  ].map(([title, options]) => {
+    const place = h("div", {});
+    return { element: h("section", { class: "panel", hidden: true }, h("h2", {}, title), place), plot: new Plot(place, { label: title, height: 180, ...options }) };
+  });
+  const columns = (points) => [0, 1].map((at) => points.map((point) => point[at]));
+  const show = (found) => {
+    const apply = async () => { if (await act("/api/optics", { optics: found.optics }, "PUT")) notice("In use for captures from now on."); };
+    result.replaceChildren(rows([["verdict", found.verdict], ["largest blur", number(found.max_blur_px, 2, "px")], ["point spread function", found.psf], ["working range", number(found.range_mm, 2, "mm")],
+      ["error on parts left out, RMS", number(found.rms_mm, 3, "mm")], ["slope", number(found.slope, 3)], ["target with a depth", number(100 * found.fill, 1, "%")], ["errors within three SD", number(100 * found.within_three, 1, "%")]]),
+      h("div", { class: "buttons" }, button("Use it", apply, { class: "primary", "data-needs": "rig" })));
+    for (const { element } of plots) element.hidden = false;
+    plots[0].plot.set(columns(found.blur));
+    plots[1].plot.set(columns(found.response));
+    plots[2].plot.set([found.by_depth.map(({ depth }) => depth), found.by_depth.map(({ rms_mm }) => rms_mm), found.by_depth.map(({ predicted_mm }) => predicted_mm)]);
+  };
+  const start = async () => {
+    const begun = await act("/api/calibrate/stack", { slices: Math.round(Number(slices.value)) });
+    const job = begun && (await ended("job", begun.job));
+    if (job?.phase === "done") show(job.result);
+  };
+  const element = h("div", { class: "guide-body" },
+    step(1, "Place the target", draw.target(), h("p", {}, "A flat, finely textured target that fills the image, in the middle of the working range. A slight tilt helps. The emulated rig places its own.")),
+    step(2, "Take the stack", draw.slices(), h("p", {}, "Finds the focus and takes slices on both sides of it, a fifth of a pair's sensor travel apart. The slices stay in the session."), field("Slices", slices),
+      h("div", { class: "buttons" }, button("Calibrate the lens", start, { class: "primary", "data-needs": "rig" }))),
+    panel("Result", result), ...plots.map(({ element }) => element));
+  return { element };
 }
 
 function series() {

@@ -12,7 +12,7 @@ import { browser as launch, knows, open, serve, simulator } from "./server.mjs";
 
 const AXE = readFileSync(createRequire(import.meta.url).resolve("axe-core/axe.min.js"), "utf8");
 const VIEWS = ["live", "depth", "optics", "captures", "quality", "guides", "log"];
-const GUIDES = ["power", "psf", "series", "shadow", "activity"];
+const GUIDES = ["power", "psf", "lens", "series", "shadow", "activity"];
 const SIZES = [[1440, 900], [820, 1180], [390, 844]];
 let server;
 let browser;
@@ -336,6 +336,28 @@ test("the guide of the flat series captures targets, learns a correction and fin
   // The emulated lens is that of the session's optics: a Gaussian with k = 0.4578.
   const k = Number.parseFloat((await found.textContent()).match(/k=([0-9.]+)/)[1]);
   assert.ok(Math.abs(k - 0.4578) < 0.03, `k = ${k}`);
+  assert.deepEqual(page.complaints, []);
+});
+
+test("the guide of the lens takes a stack, plots blur, response and errors, and its lens measures a pair", async () => {
+  const page = await open(browser, `${server.address}#guides/lens`);
+  const guide = page.locator("#view-guides");
+  await guide.getByLabel("Slices").fill("13");
+  await guide.getByRole("button", { name: "Calibrate the lens" }).click();
+  const told = (name) => guide.locator("dt", { hasText: name }).locator("+ dd").textContent();
+  await guide.locator("dt", { hasText: "verdict" }).waitFor();
+  assert.equal(await told("verdict"), "good");
+  // 933 to 886.81 mm.
+  assert.ok(Math.abs(Number.parseFloat(await told("working range")) - 46.19) < 0.5, await told("working range"));
+  assert.equal(await guide.locator(".plot canvas").count(), 3);
+  const { optics: before } = await server.ask("/api/optics");
+  await guide.getByRole("button", { name: "Use it" }).click();
+  await page.getByText("In use for captures from now on.").waitFor();
+  const { optics } = await server.ask("/api/optics");
+  assert.equal(optics.stage.bin, 1);
+  // The other tests want the optics of before.
+  await page.evaluate(async (optics) => (await import("/link.js")).act("/api/optics", { optics }, "PUT"), before);
+  assert.equal((await server.ask("/api/optics")).optics.stage, undefined);
   assert.deepEqual(page.complaints, []);
 });
 

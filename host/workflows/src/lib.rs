@@ -64,6 +64,7 @@ pub mod operators;
 pub mod optics;
 mod parameters;
 pub mod picture;
+pub mod plot;
 pub mod psf;
 pub mod report;
 pub mod request;

@@ -19,9 +19,8 @@ use crate::{
     context::Context,
     error::{About, Result, WorkflowError},
     figures::rounded,
-    operator_cache as cache,
-    operator_plot::{self, Format},
-    optics,
+    operator_cache as cache, operator_plot, optics,
+    plot::Format,
     psf::PsfSource,
     request::{PathKind, Request},
 };

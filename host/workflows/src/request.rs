@@ -194,6 +194,7 @@ pub const RIG_TASKS: &[Task] = &[
     Task::of::<crate::rig::sequence::SequenceRequest>(),
     Task::of::<crate::rig::continuous::ContinuousRequest>(),
     Task::of::<crate::rig::targets::TargetSeriesRequest>(),
+    Task::of::<crate::rig::lens_stack::RigStackRequest>(),
     Task::of::<crate::rig::correction_fit::FitRequest>(),
     Task::of::<crate::rig::correct::BoardCorrectRequest>(),
     Task::of::<crate::rig::sun::SunRequest>(),

@@ -10,6 +10,7 @@ pub mod focus;
 pub mod goto;
 pub mod half_mirror;
 pub mod info;
+pub mod lens_stack;
 pub mod live;
 pub mod live_depth;
 pub mod log;

@@ -7,15 +7,16 @@
 //!    measured to true normalised depth is fitted on one half of the field in every other pair. The other parts select
 //!    the model and give the remaining error, which enters every later standard deviation.
 //!
-//! Distances are relative: the far plane is at [`StackSettings::far_mm`], and depth falls by one stage step per slice.
+//! A stage that moves the target gives relative distances: the far plane is at [`Moved::Target::far_mm`], and depth falls
+//! by one step per slice. A stage that moves the sensor of a known lens gives distances by the lens equation.
 
 pub mod blur;
 mod curve;
 pub mod focus_plane;
+mod held_out;
 mod response;
 
 use ndarray::Array2;
-use serde::{Deserialize, Serialize};
 
 use crate::measure::binned;
 use crate::optics::{FocusSection, LensSection, Optics, OpticsFile, SensorSection};
@@ -23,7 +24,8 @@ use crate::psf::Psf;
 use blur::BlurCurve;
 use focus_plane::FocusPlane;
 
-pub use response::Trial;
+pub use held_out::{AtDepth, HeldOut};
+pub use response::{LENSES, Trial};
 
 /// Target blur radius, px, of the far plane in the near image.
 const AIM_PX: f64 = 2.5;
@@ -42,14 +44,26 @@ pub const FEWEST: usize = 5;
 pub struct StackSettings {
     /// Distance between neighbouring slices.
     pub step_mm: f64,
-    /// Pixel pitch of the camera.
-    pub pixel_um: f64,
-    /// Distance of the far plane; `None` is 200 times the range of a pair, where only relative depth is known.
-    pub far_mm: Option<f64>,
+    /// What the stage moves.
+    pub moved: Moved,
     /// Slices between the images of a pair; `None` chooses.
     pub pair_step: Option<usize>,
     /// Binning; `None` chooses.
     pub bin: Option<usize>,
+}
+
+/// What the stage moves between the slices.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Moved {
+    /// The target towards the camera, or the whole camera towards the target.
+    Target {
+        /// Pixel pitch of the camera.
+        pixel_um: f64,
+        /// Distance of the far plane; `None` is 200 times the range of a pair, where only relative depth is known.
+        far_mm: Option<f64>,
+    },
+    /// The sensor away from this lens. Its far plane, focal length and pixel pitch are kept.
+    Sensor(Optics),
 }
 
 /// Why a stack gives no lens.
@@ -77,6 +91,8 @@ pub enum StackError {
          usable for pairs {pair_step} slices apart; use a flat, textured target, or a part of the images that is flat"
     )]
     NotFlat { spread: f64, limit: f64, pair_step: usize },
+    #[error("stopped")]
+    Stopped,
     #[error(transparent)]
     Optics(#[from] crate::optics::OpticsError),
 }
@@ -96,32 +112,20 @@ pub struct StackLens {
     pub trials: Vec<Trial>,
 }
 
-/// Errors on parts that the response was not learned from.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct HeldOut {
-    /// `1.4826 x` median of |error|, mm.
-    pub robust_mm: f64,
-    /// Root mean square error, mm.
-    pub rms_mm: f64,
-    /// Mean error, mm.
-    pub bias_mm: f64,
-    /// Slope of measured over true depth.
-    pub slope: f64,
-    /// Part of the pixels that have a depth.
-    pub fill: f64,
-    /// Part of the errors within three predicted standard deviations.
-    pub within_three: f64,
-    /// Root mean square of error over predicted standard deviation.
-    pub scatter: f64,
-    /// Number of pairs.
-    pub pairs: usize,
-}
-
-/// Calibrates from `slices`, the far-focused first, (height, width).
-pub fn calibrate_stack(slices: &[Array2<f32>], settings: &StackSettings) -> Result<StackLens, StackError> {
+/// Calibrates from `slices`, the far-focused first, (height, width). `proceed` is called before each measurement of a pair with
+/// the number of lenses tried, of [`LENSES`]; when it returns false the result is [`StackError::Stopped`]. Cost: two
+/// measurements of every pair that sees the target for each lens.
+pub fn calibrate_stack(
+    slices: &[Array2<f32>],
+    settings: &StackSettings,
+    proceed: &(dyn Fn(usize) -> bool + Sync),
+) -> Result<StackLens, StackError> {
     check(slices, settings)?;
+    let go_on = || if proceed(0) { Ok(()) } else { Err(StackError::Stopped) };
     let plane = FocusPlane::of(slices).map_err(StackError::NoFocus)?;
+    go_on()?;
     let blur = BlurCurve::of(slices, &plane);
+    go_on()?;
     let (bin, pair_step) = separation(&blur, slices.len(), settings)?;
     let limit = FLAT * pair_step as f64;
     if plane.spread > limit {
@@ -137,8 +141,8 @@ pub fn calibrate_stack(slices: &[Array2<f32>], settings: &StackSettings) -> Resu
         pair_step,
         bin,
         radius_px: radius,
-        step_mm: settings.step_mm,
         optics_of: &optics_of,
+        proceed,
     })?;
     Ok(StackLens { optics, plane, blur, held_out, trials })
 }
@@ -150,11 +154,11 @@ fn check(slices: &[Array2<f32>], settings: &StackSettings) -> Result<(), StackEr
     if let Some(index) = slices.iter().position(|slice| slice.dim() != slices[0].dim()) {
         return Err(StackError::Size { index: index + 1 });
     }
-    let numbers = [
-        ("step_mm", Some(settings.step_mm)),
-        ("pixel_um", Some(settings.pixel_um)),
-        ("far_mm", settings.far_mm),
-    ];
+    let (pixel_um, far_mm) = match settings.moved {
+        Moved::Target { pixel_um, far_mm } => (Some(pixel_um), far_mm),
+        Moved::Sensor(_) => (None, None),
+    };
+    let numbers = [("step_mm", Some(settings.step_mm)), ("pixel_um", pixel_um), ("far_mm", far_mm)];
     for (name, value) in numbers {
         if let Some(value) = value.filter(|value| !(value.is_finite() && *value > 0.0)) {
             return Err(StackError::NotPositive { name, value });
@@ -194,7 +198,8 @@ fn separation(
         })
 }
 
-/// A thin lens whose pair spans `pair_step` slices: only the range counts; depth is nearly linear in alpha.
+/// A thin lens whose pair spans `pair_step` slices. For a moved target only the range counts; depth is nearly linear in
+/// alpha.
 fn optics(
     psf: Psf,
     max_blur_px: f64,
@@ -203,19 +208,22 @@ fn optics(
     settings: &StackSettings,
 ) -> Result<Optics, StackError> {
     let span_mm = settings.step_mm * pair_step as f64;
-    let far_mm = settings.far_mm.unwrap_or(200.0 * span_mm);
-    let near_mm = far_mm - span_mm;
-    let pixel_um = settings.pixel_um * bin as f64;
-    let focal_length_mm = 0.3 * far_mm;
-    let image = |u: f64| focal_length_mm + focal_length_mm * focal_length_mm / (u - focal_length_mm);
-    let f_number = (image(near_mm) - image(far_mm)) / (2.0 * max_blur_px * pixel_um * 1e-3);
+    let (focal_length_mm, pixel_um, far_mm, travel_mm, telecentric) = match settings.moved {
+        Moved::Target { pixel_um, far_mm } => {
+            let far_mm = far_mm.unwrap_or(200.0 * span_mm);
+            let focal_length_mm = 0.3 * far_mm;
+            let image = |u: f64| focal_length_mm * focal_length_mm / (u - focal_length_mm);
+            (focal_length_mm, pixel_um, far_mm, image(far_mm - span_mm) - image(far_mm), Some(true))
+        }
+        Moved::Sensor(lens) => {
+            let far_mm = lens.working_range().far_mm;
+            (lens.focal_length_mm(), lens.pixel_um(), far_mm, span_mm, lens.telecentric())
+        }
+    };
+    let pixel_um = pixel_um * bin as f64;
+    let f_number = travel_mm / (2.0 * max_blur_px * pixel_um * 1e-3);
     let file = OpticsFile {
-        lens: LensSection {
-            focal_length_mm,
-            aperture_mm: None,
-            f_number: Some(f_number),
-            telecentric: Some(true),
-        },
+        lens: LensSection { focal_length_mm, aperture_mm: None, f_number: Some(f_number), telecentric },
         sensor: SensorSection { pixel_um },
         focus: FocusSection { far_mm, max_blur_px: Some(max_blur_px), near_mm: None },
         psf,

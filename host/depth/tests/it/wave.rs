@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 
 use crate::common::eight_bit;
 use farnear_depth::adaptive_window::Window;
-use farnear_depth::calibrate::stack::{StackError, StackLens, StackSettings, calibrate_stack};
+use farnear_depth::calibrate::stack::{Moved, StackError, StackLens, StackSettings, calibrate_stack};
 use farnear_depth::measure::{DepthMethod, MeasureSettings, measure_pair};
 use farnear_depth::pipeline::Settings;
 use farnear_scene::wave::{WaveLens, random_texture};
@@ -61,9 +61,9 @@ fn calibrated(lens: &WaveLens) -> Result<StackLens, StackError> {
     let cells = random_texture(true, SIZE[0], SIZE[1], CONTRAST, 11);
     let stack: Vec<Array2<f32>> =
         (0..SLICES).map(|index| slice(lens, &cells, TARGET, index, best_um(lens), 1)).collect();
-    let settings =
-        StackSettings { step_mm: STEP_MM, pixel_um: 6.0, far_mm: None, pair_step: None, bin: None };
-    calibrate_stack(&stack, &settings)
+    let moved = Moved::Target { pixel_um: 6.0, far_mm: None };
+    let settings = StackSettings { step_mm: STEP_MM, moved, pair_step: None, bin: None };
+    calibrate_stack(&stack, &settings, &|_| true)
 }
 
 #[derive(Debug)]

@@ -5,7 +5,7 @@ use std::path::Path;
 use anyhow::{Context, Result};
 use farnear_depth::{
     adaptive_window::Window,
-    calibrate::stack::{StackSettings, calibrate_stack},
+    calibrate::stack::{Moved, StackSettings, calibrate_stack},
     measure::{DepthMethod, MeasureSettings, measure_pair},
     optics::Optics,
     pipeline::Settings,
@@ -66,12 +66,11 @@ pub fn measure(page: &mut Page, data: &Path) -> Result<()> {
             slices.iter().map(|slice| slice.slice(s![.., ..half]).to_owned()).collect();
         let settings = StackSettings {
             step_mm: truth.step_mm,
-            pixel_um: 6.9,
-            far_mm: None,
+            moved: Moved::Target { pixel_um: 6.9, far_mm: None },
             pair_step: Some(step),
             bin: Some(bin),
         };
-        let lens = calibrate_stack(&left, &settings).context("calibrating the left half")?;
+        let lens = calibrate_stack(&left, &settings, &|_| true).context("calibrating the left half")?;
         eprintln!("binning {bin}, step {step}: held-out {:?}", lens.held_out);
         let found = judge(&slices, &lens.optics, &truth, bin, step)?;
         rows.push(vec![

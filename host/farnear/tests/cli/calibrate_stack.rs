@@ -104,3 +104,39 @@ fn a_target_that_is_not_flat_is_refused_with_its_spread() {
     fails(&mut farnear(&arguments), 2, &["not flat", "slices", "flat, textured target"]);
     assert!(!folder.path("lens.toml").exists());
 }
+
+#[test]
+fn the_pages_of_a_tiff_tell_their_step_and_give_the_same_lens() {
+    use tiff::{
+        encoder::{TiffEncoder, colortype::Gray8},
+        tags::Tag,
+    };
+
+    let folder = Folder::new();
+    let [target, pages, lens, other, plot] =
+        ["target", "stack.tif", "lens.toml", "other.toml", "lens.svg"].map(|name| folder.text(name));
+    slices(&target, 7.2, 1..=SLICES, 3);
+    let mut file = TiffEncoder::new(fs::File::create(&pages).expect("a file")).expect("a TIFF");
+    for number in 1..=SLICES {
+        let path = format!("{target}/{number:02}.png");
+        let grey = image_file::read_grey(path.as_ref()).expect("a picture").pixels;
+        let codes: Vec<u8> = grey.iter().map(|value| (255.0 * value).round() as u8).collect();
+        let mut page = file.new_image::<Gray8>(SIZE[0] as u32, SIZE[1] as u32).expect("a page");
+        if number == 1 {
+            let about =
+                format!("ImageJ=1.53t\nimages={SLICES}\nslices={SLICES}\nunit=mm\nspacing={STEP_MM}\n");
+            page.encoder().write_tag(Tag::ImageDescription, &*about).expect("a tag");
+        }
+        page.write_data(&codes).expect("pixels");
+    }
+    let of_pages =
+        figures(&mut farnear(&["calibrate", "stack", &pages, "--plot", &plot, "--out", &lens, "--json"]));
+    assert_eq!(of_pages["verdict"].as_str(), Some("good"), "{of_pages}");
+    let step = STEP_MM.to_string();
+    figures(&mut farnear(&["calibrate", "stack", &target, "--step-mm", &step, "--out", &other, "--json"]));
+    let read = |path: &str| fs::read_to_string(path).expect("a lens");
+    assert_eq!(read(&lens), read(&other));
+    assert!(read(&plot).contains("Held-out errors"));
+    let without = ["calibrate", "stack", &target, "--out", &other];
+    fails(&mut farnear(&without), 2, &["step-mm", "these files do not tell it"]);
+}

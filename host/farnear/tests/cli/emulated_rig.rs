@@ -202,3 +202,27 @@ fn a_lamp_of_the_board_makes_both_images_brighter() {
     let mut too_bright = on_the_rig(&["capture", "--optics", rig_optics(), "--out", &folder.text("bright")]);
     fails(too_bright.args(["--light", "130"]), 2, &["130", "0 to 100 %"]);
 }
+
+/// The emulated lens is the one of the optics file: 46.2 mm of working range.
+#[test]
+#[cfg_attr(not(emulated_rig), ignore = "needs farnear-sim: cargo xtask test")]
+fn a_stack_calibrates_the_lens_for_pairs_of_the_same_rig() {
+    let folder = Folder::new();
+    let [out, pair] = ["lens", "pair"].map(|name| folder.text(name));
+    let mut stack = on_the_rig(&["calibrate", "stack", "--optics", rig_optics(), "--out", &out, "--json"]);
+    let found = figures(stack.args(["--scene", "plane:910", "--slices", "15"]));
+    assert_eq!(found["verdict"].as_str(), Some("good"), "{found}");
+    assert!((number(&found, "range_mm") - 46.19).abs() < 0.5, "{found}");
+    assert!(number(&found, "within_three") > 0.97, "{found}");
+    let lens = format!("{out}/lens.toml");
+    let taken = ["capture", "--optics", &lens, "--scene", "slant", "--out", &pair];
+    succeeds(&mut on_the_rig(&taken));
+    let images = ["far.png", "near.png"].map(|name| format!("{pair}/{name}"));
+    succeeds(&mut farnear(&["depth", &images[0], &images[1], "--out", &pair]));
+    let truth = folder.text("truth");
+    succeeds(&mut farnear(&["render", "--optics", &lens, "--scene", "slant", "--out", &truth]));
+    let [map, truth] = [format!("{pair}/depth.npy"), format!("{truth}/truth.npy")];
+    let compared = figures(&mut farnear(&["compare", &map, &truth, "--json"]));
+    // 0.22 mm with exact optics; the calibration's own error is 0.1 mm.
+    assert!(number(&compared, "rmse_mm") < 0.35, "{compared}");
+}

@@ -10,15 +10,18 @@ use axum::{
     extract::State,
     http::{HeaderMap, StatusCode},
 };
-use farnear_depth::{calibrate::Model, corrections::Method};
+use farnear_depth::{calibrate::Model, corrections::Method, optics::OpticsFile};
 use farnear_workflows::{
     Context, WorkflowError,
     calibrate::{
         correction::{self, CalibrateCorrectionRequest},
         psf::{self, CalibratePsfRequest},
     },
+    optics::GivenOptics,
+    request::Request,
     rig::{
         RigAddress,
+        lens_stack::{self, RigStackRequest},
         targets::{self, TargetSeriesRequest},
     },
     sessions,
@@ -75,6 +78,14 @@ pub struct SeriesRequest {
     pub distances_mm: Vec<f64>,
 }
 
+/// A stack that calibrates the lens.
+#[derive(Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct StackRequest {
+    /// Slices, 11 or more.
+    pub slices: usize,
+}
+
 /// What a correction is learned by.
 #[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -101,6 +112,12 @@ pub fn routes(api: Api) -> Api {
             For::Client,
             "Finds the point spread function from one pair or several of flat targets.",
             find_psf,
+        )
+        .post::<StackRequest, Begun, _, _>(
+            "/api/calibrate/stack",
+            For::Control,
+            "Takes a stack of a flat target around its focus and calibrates the lens from it; the result has the optics.",
+            lens_of_stack,
         )
         .post::<SeriesRequest, Begun, _, _>(
             "/api/calibrate/series",
@@ -202,6 +219,37 @@ async fn series(
     };
     let work = move |_: &App, context: &Context<'_>| figures(targets::capture(&settings, context)?);
     begin(&app, Task { kind: "flat-series", title: "Capture flat targets".into(), work: Box::new(work) })
+}
+
+async fn lens_of_stack(
+    State(app): Shared,
+    headers: HeaderMap,
+    Body(StackRequest { slices }): Body<StackRequest>,
+) -> Result<Json<Begun>, Failure> {
+    require_control(&app, &headers)?;
+    let open = connected(&app)?;
+    let rig = match &app.address {
+        // An emulated rig of its own sees a flat target, and its stages are not visible.
+        Some(RigAddress::Emulated(scenery)) => {
+            let middle_mm = GivenOptics::read(&app.optics_file())?.optics.working_range().alpha0_mm;
+            RigAddress::Emulated(Scenery { paced: false, ..scenery.clone() })
+                .with_scene(format!("plane:{middle_mm:.3}"))?
+        }
+        _ => RigAddress::Open(open),
+    };
+    let out = sessions::free_names(&app.session, "lens", 1)?.remove(0);
+    let settings =
+        RigStackRequest { rig, camera: app.camera(), optics: app.optics_file(), slices, out: out.clone() };
+    settings.check()?;
+    let work = move |app: &App, context: &Context<'_>| {
+        let found = lens_stack::run(&settings, context);
+        app.change(|state| state.captures += 1);
+        let mut figures = figures(found?)?;
+        let lens = GivenOptics::read(&out.join(lens_stack::LENS))?.optics;
+        figures["optics"] = self::figures(OpticsFile::from(lens))?;
+        Ok(figures)
+    };
+    begin(&app, Task { kind: "lens-stack", title: "Calibrate the lens".into(), work: Box::new(work) })
 }
 
 async fn forget(

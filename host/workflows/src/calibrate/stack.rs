@@ -1,22 +1,37 @@
 //! Calibrates a lens file from one z-stack of a flat, textured target.
 
-use std::path::{Path, PathBuf};
+mod plot;
 
-use farnear_depth::calibrate::stack::{StackLens, StackSettings, calibrate_stack};
-use farnear_depth::optics::{RESPONSE_POINTS, Stage};
-use farnear_files::{image_file::read_grey, staging};
+use std::{
+    path::PathBuf,
+    sync::atomic::{AtomicUsize, Ordering},
+};
+
+use farnear_capture::record::read_record;
+use farnear_depth::{
+    calibrate::stack::{AtDepth, LENSES, Moved, StackError, StackLens, StackSettings, calibrate_stack},
+    optics::{Optics, RESPONSE_POINTS, Stage},
+};
+use farnear_files::{
+    image_file::{Grey, ReadSettings, SharedWhiteLevel},
+    stack, staging,
+};
 use ndarray::Array2;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use serde_with::{DisplayFromStr, serde_as};
 
 use crate::{
     context::Context,
     error::{Result, WorkflowError},
     figures::rounded,
+    optics,
+    plot::Format,
     request::{PathKind, Request},
 };
 
-const ENDINGS: [&str; 5] = ["png", "tif", "tiff", "jpg", "jpeg"];
+/// Largest difference of a step from their mean, relative to it.
+const EVEN: f64 = 0.1;
 /// Share of errors within three standard deviations for the verdict `good`.
 const HONEST: f64 = 0.97;
 /// Least share of pixels with a depth.
@@ -26,8 +41,9 @@ const LEARNED: f64 = 1.2;
 
 /// Calibrate a lens from a z-stack of a flat, textured target (tilted or not), slices one stage step apart.
 ///
-/// Images are ordered by the last number in their names. Depth measured with the result is relative to the far plane unless
-/// --far-mm is given.
+/// Depth measured with the result is relative to the far plane unless --far-mm is given. The stack of a rig (farnear rig sequence)
+/// gives distances by its optics.
+#[serde_as]
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize, JsonSchema)]
 #[cfg_attr(feature = "clap", derive(clap::Args))]
 #[cfg_attr(
@@ -38,11 +54,12 @@ Example: farnear calibrate stack slices --step-mm 0.1 --out lens.toml
 )]
 #[serde(default)]
 pub struct CalibrateStackRequest {
-    /// Folder with the slices, one image each.
-    pub folder: PathBuf,
-    /// Distance between neighbouring slices in mm, or in any unit of the stage (um, steps); all depths are in that unit then.
+    /// A folder with the slices in the order of their numbers, a TIFF with several pages, or the folder of `farnear rig sequence`.
+    pub stack: PathBuf,
+    /// Distance between neighbouring slices in mm, or in any unit of the stage (um, steps); all depths are in that unit then. By
+    /// default that of the TIFF's metadata or of the rig's record.
     #[cfg_attr(feature = "clap", arg(long, value_name = "MM"))]
-    pub step_mm: f64,
+    pub step_mm: Option<f64>,
     /// Pixel pitch of the camera, um; only the scale of point clouds depends on it.
     #[cfg_attr(feature = "clap", arg(long, value_name = "UM", default_value_t = Self::default().pixel_um))]
     pub pixel_um: f64,
@@ -58,6 +75,16 @@ pub struct CalibrateStackRequest {
     /// The first slice is focused nearest to the camera, not farthest.
     #[cfg_attr(feature = "clap", arg(long))]
     pub near_first: bool,
+    /// How colour becomes grey: mean, luma, red, green or blue.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "CHANNEL", default_value_t))]
+    #[serde_as(as = "DisplayFromStr")]
+    pub grey: Grey,
+    /// Code at which the camera saturates, such as 4095 for 12 bits in 16 [default: from the files].
+    #[cfg_attr(feature = "clap", arg(long, value_name = "CODE"))]
+    pub white_level: Option<u32>,
+    /// File for a plot of blur, response and errors: .svg or .png.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "FILE"))]
+    pub plot: Option<PathBuf>,
     /// File for the lens.
     #[cfg_attr(feature = "clap", arg(long, value_name = "FILE"))]
     pub out: PathBuf,
@@ -66,13 +93,16 @@ pub struct CalibrateStackRequest {
 impl Default for CalibrateStackRequest {
     fn default() -> Self {
         Self {
-            folder: PathBuf::new(),
-            step_mm: 0.0,
+            stack: PathBuf::new(),
+            step_mm: None,
             pixel_um: 5.0,
             far_mm: None,
             pair_step: None,
             bin: None,
             near_first: false,
+            grey: Grey::default(),
+            white_level: None,
+            plot: None,
             out: PathBuf::new(),
         }
     }
@@ -80,9 +110,9 @@ impl Default for CalibrateStackRequest {
 
 impl Request for CalibrateStackRequest {
     const NAME: &'static str = "calibrate stack";
-    const REQUIRED: &'static [&'static str] = &["folder", "step_mm", "out"];
+    const REQUIRED: &'static [&'static str] = &["stack", "out"];
     const PATHS: &'static [(&'static str, PathKind)] =
-        &[("folder", PathKind::Input), ("out", PathKind::OutputFile)];
+        &[("stack", PathKind::Input), ("plot", PathKind::OutputFile), ("out", PathKind::OutputFile)];
     type Figures = StackFigures;
 
     fn run(&self, context: &Context<'_>) -> Result<StackFigures> {
@@ -128,49 +158,175 @@ pub struct StackFigures {
     /// Standard deviation in excess of noise.
     pub residual_mm: f64,
     pub pairs: usize,
+    /// Measured and true normalised depth, -1 (far plane) to 1.
+    pub response: Vec<[f64; 2]>,
+    /// Errors on held-out parts at each depth.
+    pub by_depth: Vec<AtDepth>,
 }
 
 pub fn calibrate(request: &CalibrateStackRequest, context: &Context<'_>) -> Result<StackFigures> {
-    let mut files = files(&request.folder)?;
-    if request.near_first {
-        files.reverse();
-    }
-    let slices =
-        files.iter().map(|path| Ok(read_grey(path)?.pixels)).collect::<Result<Vec<Array2<f32>>>>()?;
-    context.cancel.check("reading the slices")?;
-    let settings = StackSettings {
-        step_mm: request.step_mm,
-        pixel_um: request.pixel_um,
-        far_mm: request.far_mm,
-        pair_step: request.pair_step,
-        bin: request.bin,
+    let plot = match &request.plot {
+        Some(file) => Some((file, Format::of(file)?)),
+        None => None,
     };
-    let found = calibrate_stack(&slices, &settings)
-        .map_err(|error| WorkflowError::parameter("folder", request.folder.display(), error.to_string()))?;
+    let listed = Listed::of(request)?;
+    listed.remarks.iter().for_each(|remark| context.progress.warn(remark));
+    let slices = read(&listed.images, request, context)?;
+    let moved = match listed.lens {
+        Some(lens) => Moved::Sensor(lens),
+        None => Moved::Target { pixel_um: request.pixel_um, far_mm: request.far_mm },
+    };
+    let settings =
+        StackSettings { step_mm: listed.step_mm, moved, pair_step: request.pair_step, bin: request.bin };
+    let step_mm = rounded(listed.step_mm, 6);
+    context.info(&format!("calibrating the lens from {} slices {step_mm} mm apart", slices.len()));
+    let told = AtomicUsize::new(0);
+    let proceed = |tried: usize| {
+        if told.fetch_max(tried, Ordering::Relaxed) < tried {
+            context.progress.advance("lenses", tried, Some(LENSES));
+        }
+        !context.cancel.is_cancelled()
+    };
+    let found = calibrate_stack(&slices, &settings, &proceed);
     context.cancel.check("calibrating the lens")?;
+    let found = found.map_err(|error| match error {
+        StackError::NotPositive { name, value } => WorkflowError::parameter(name, value, "a positive number"),
+        error => WorkflowError::parameter("stack", request.stack.display(), error.to_string()),
+    })?;
+    let figures = figures(&found, &listed, slices[0].dim(), request);
+    let drawn = match plot {
+        Some((file, format)) => Some((file, plot::plot(&figures, format)?)),
+        None => None,
+    };
     staging::write_file(&request.out, toml::to_string(&found.optics)?.as_bytes())?;
     context.info(&format!("wrote {}", request.out.display()));
-    Ok(figures(&found, &files, slices[0].dim(), request))
+    if let Some((file, bytes)) = drawn {
+        staging::write_file(file, &bytes)?;
+        context.info(&format!("wrote {}", file.display()));
+    }
+    Ok(figures)
+}
+
+/// Slices, the far-focused first.
+struct Listed {
+    images: Vec<PathBuf>,
+    step_mm: f64,
+    /// Of the rig whose sensor moved.
+    lens: Option<Optics>,
+    remarks: Vec<String>,
+}
+
+impl Listed {
+    fn of(request: &CalibrateStackRequest) -> Result<Self> {
+        let record = if request.stack.is_dir() { read_record(&request.stack)? } else { None };
+        let mut listed = match record {
+            Some(record) => {
+                if request.step_mm.is_some() || request.far_mm.is_some() {
+                    let expected =
+                        "the rig's record has the steps and the optics: leave --step-mm and --far-mm out";
+                    return Err(WorkflowError::parameter("stack", request.stack.display(), expected));
+                }
+                let (lens, _) = optics::of_pair(None, &request.stack.join("slice.png"))?;
+                if lens.distortion().is_some() {
+                    let expected = "optics without [distortion]: a lens from a stack cannot have one yet";
+                    return Err(WorkflowError::parameter("stack", request.stack.display(), expected));
+                }
+                let mut order: Vec<(f64, PathBuf)> = record
+                    .exposure
+                    .iter()
+                    .map(|exposure| (exposure.sensor_measured_mm, request.stack.join(&exposure.image)))
+                    .collect();
+                order.sort_by(|a, b| a.0.total_cmp(&b.0));
+                let (positions, images): (Vec<f64>, Vec<PathBuf>) = order.into_iter().unzip();
+                let step_mm = even_step(&positions, request)?;
+                Self { images, step_mm, lens: Some(lens), remarks: Vec::new() }
+            }
+            None => {
+                let stack::Stack { images, positions_um, remarks, .. } = stack::list(&request.stack)?;
+                let step_mm = match (request.step_mm, positions_um) {
+                    (Some(step_mm), _) => step_mm,
+                    (None, Some(positions)) => even_step(&positions, request)? * 1e-3,
+                    (None, None) => {
+                        let expected = "the distance between neighbouring slices; these files do not tell it";
+                        return Err(WorkflowError::parameter("step-mm", "none", expected));
+                    }
+                };
+                Self { images, step_mm, lens: None, remarks }
+            }
+        };
+        if request.near_first {
+            listed.images.reverse();
+        }
+        Ok(listed)
+    }
+}
+
+/// Mean step between positions that are in order, above 0.
+fn even_step(positions: &[f64], request: &CalibrateStackRequest) -> Result<f64> {
+    let steps = || positions.windows(2).map(|two| two[1] - two[0]);
+    let mean = steps().sum::<f64>() / steps().count().max(1) as f64;
+    let uneven = steps().enumerate().find(|(_, step)| !((step - mean).abs() <= EVEN * mean.abs()));
+    match uneven {
+        Some((index, step)) => {
+            let (from, to) = (index + 1, index + 2);
+            let expected = format!(
+                "even steps, but slices {from} and {to} are {step:.6} apart, and {mean:.6} is the mean"
+            );
+            Err(WorkflowError::parameter("stack", request.stack.display(), expected))
+        }
+        None => Ok(rounded(mean.abs(), 9)),
+    }
+}
+
+fn read(
+    images: &[PathBuf],
+    request: &CalibrateStackRequest,
+    context: &Context<'_>,
+) -> Result<Vec<Array2<f32>>> {
+    let settings = ReadSettings { grey: request.grey, white_level: request.white_level };
+    let mut slices = Vec::with_capacity(images.len());
+    let mut white = SharedWhiteLevel::default();
+    stack::read(images, &settings, |index, image| -> Result<()> {
+        context.cancel.check("reading the slices")?;
+        context.progress.advance("slices", index + 1, Some(images.len()));
+        white.add(&image);
+        slices.push(image.pixels);
+        Ok(())
+    })?;
+    if let Some(white) = white.get() {
+        slices.iter_mut().for_each(|slice| slice.mapv_inplace(|value| (value / white).min(1.0)));
+    }
+    Ok(slices)
 }
 
 fn figures(
     found: &StackLens,
-    files: &[PathBuf],
+    listed: &Listed,
     size: (usize, usize),
     request: &CalibrateStackRequest,
 ) -> StackFigures {
     let StackLens { optics, blur, held_out, plane, .. } = found;
+    let files = &listed.images;
     let stage = optics.stage().copied().unwrap_or_else(|| Stage::identity(1, 1));
     let Stage { bin, pair_step, residual, .. } = stage;
-    let range_mm = request.step_mm * pair_step as f64;
+    let range = optics.working_range();
+    let range_mm = range.far_mm - range.near_mm;
     let middle = plane.at(0.5 * size.0 as f64, 0.5 * size.1 as f64) - 0.5 * pair_step as f64;
     let far = (middle.round().max(0.0) as usize).min(files.len().saturating_sub(pair_step + 1));
-    let next = format!(
-        "take pairs {pair_step} slices ({range_mm} mm) apart, the far-focused image first: farnear depth {} {} --optics {}",
-        files[far].display(),
-        files[far + pair_step].display(),
-        request.out.display()
-    );
+    let out = request.out.display();
+    let next = match listed.lens {
+        Some(_) => format!("farnear rig capture --optics {out} --out pair/"),
+        None => format!(
+            "take pairs {pair_step} slices ({} mm) apart, the far-focused image first: farnear depth {} {} --optics {out}",
+            rounded(range_mm, 6),
+            files[far].display(),
+            files[far + pair_step].display()
+        ),
+    };
+    let [least, largest] = stage.measured;
+    let response = stage.response.iter().enumerate().map(|(index, depth)| {
+        [least + (largest - least) * index as f64 / (RESPONSE_POINTS - 1) as f64, *depth]
+    });
     StackFigures {
         verdict: verdict(found),
         next,
@@ -193,6 +349,17 @@ fn figures(
         scatter: rounded(held_out.scatter, 3),
         residual_mm: rounded(0.5 * residual * range_mm, 6),
         pairs: held_out.pairs,
+        response: response.map(|pair| pair.map(|depth| rounded(depth, 4))).collect(),
+        by_depth: held_out
+            .by_depth
+            .iter()
+            .map(|at| AtDepth {
+                depth: rounded(at.depth, 3),
+                bias_mm: rounded(at.bias_mm, 6),
+                rms_mm: rounded(at.rms_mm, 6),
+                predicted_mm: rounded(at.predicted_mm, 6),
+            })
+            .collect(),
     }
 }
 
@@ -234,39 +401,17 @@ fn learned(found: &StackLens) -> f64 {
     found.optics.stage().map_or(2.0, |stage| stage.response[RESPONSE_POINTS - 1] - stage.response[0])
 }
 
-/// Images of a folder, by the last number in their names.
-fn files(folder: &Path) -> Result<Vec<PathBuf>> {
-    let unusable = |expected: String| WorkflowError::parameter("folder", folder.display(), expected);
-    let entries = std::fs::read_dir(folder).map_err(|error| unusable(error.to_string()))?;
-    let mut files: Vec<(f64, PathBuf)> = entries
-        .filter_map(|entry| entry.ok().map(|entry| entry.path()))
-        .filter(|path| {
-            let ending = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
-            ENDINGS.contains(&ending.as_str())
-        })
-        .filter_map(|path| last_number(&path).map(|number| (number, path)))
-        .collect();
-    files.sort_by(|a, b| a.0.total_cmp(&b.0));
-    if files.is_empty() {
-        return Err(unusable("expected images whose names hold their number, such as 01.png".into()));
-    }
-    Ok(files.into_iter().map(|(_, path)| path).collect())
-}
-
-fn last_number(path: &Path) -> Option<f64> {
-    let stem = path.file_stem()?.to_string_lossy().into_owned();
-    stem.split(|c: char| !c.is_ascii_digit()).rfind(|digits| !digits.is_empty())?.parse().ok()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
-    fn slices_are_ordered_by_the_last_number_in_their_names() {
-        let number = |name: &str| last_number(Path::new(name));
-        assert_eq!(number("a/slice_2_010.png"), Some(10.0));
-        assert_eq!(number("9.tif"), Some(9.0));
-        assert_eq!(number("target.png"), None);
+    fn uneven_positions_are_refused_by_the_slices_between_which_they_are() {
+        let request = CalibrateStackRequest::default();
+        assert!((even_step(&[5.0, 4.0, 3.02, 2.0], &request).unwrap() - 1.0).abs() < 1e-12);
+        let error = even_step(&[0.0, 1.0, 2.0, 3.5], &request).unwrap_err().to_string();
+        assert!(error.contains("slices 3 and 4 are 1.5"), "{error}");
+        let standing = even_step(&[1.0, 1.0, 2.0], &request).unwrap_err().to_string();
+        assert!(standing.contains("slices 1 and 2 are 0"), "{standing}");
     }
 }

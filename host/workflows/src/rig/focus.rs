@@ -17,7 +17,11 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_with::{DisplayFromStr, serde_as};
 
-use super::{RigAddress, camera::CameraSettings, motion::nanometres};
+use super::{
+    RigAddress,
+    camera::{CameraSettings, EquippedRig},
+    motion::nanometres,
+};
 use crate::{
     context::Context,
     error::{Result, WorkflowError},
@@ -87,6 +91,13 @@ impl Request for FocusRequest {
     const PATHS: &'static [(&'static str, PathKind)] = &[("optics", PathKind::Input)];
     type Figures = FocusFigures;
 
+    fn check(&self) -> Result<()> {
+        if self.range_mm > 0.0 && self.range_mm.is_finite() {
+            return Ok(());
+        }
+        Err(WorkflowError::parameter("range-mm", self.range_mm, "expected a positive length"))
+    }
+
     fn run(&self, context: &Context<'_>) -> Result<FocusFigures> {
         focus(self, context)
     }
@@ -115,11 +126,19 @@ pub struct FocusFigures {
 /// Finds the best focus of the target in front of the rig and leaves the sensor there.
 pub fn focus(settings: &FocusRequest, context: &Context<'_>) -> Result<FocusFigures> {
     let given = GivenOptics::read(&settings.optics)?;
-    let optics = &given.optics;
-    if !(settings.range_mm > 0.0 && settings.range_mm.is_finite()) {
-        return Err(WorkflowError::parameter("range-mm", settings.range_mm, "expected a positive length"));
-    }
+    settings.check()?;
     let mut rig = settings.camera.connect(&settings.rig, Some(&given), context)?;
+    let found = search(&mut rig, &given.optics, settings, context)?;
+    figures(given.optics, &found)
+}
+
+/// The same with an open rig.
+pub(super) fn search(
+    rig: &mut EquippedRig,
+    optics: &Optics,
+    settings: &FocusRequest,
+    context: &Context<'_>,
+) -> Result<Focus> {
     let client = &rig.rig.client;
     let was_homed = ensure_ready(client, context)?;
     let default = (!was_homed).then_some(optics.working_range().sensor_far_mm);
@@ -133,8 +152,7 @@ pub fn focus(settings: &FocusRequest, context: &Context<'_>) -> Result<FocusFigu
         image_wait: settings.camera.image_wait,
         region: settings.region.map(|at| [at.x, at.y, at.width, at.height]),
     };
-    let found = find_focus(client, rig.camera.as_mut(), optics, &search, &mut |what| context.info(what))?;
-    figures(given.optics, &found)
+    Ok(find_focus(client, rig.camera.as_mut(), optics, &search, &mut |what| context.info(what))?)
 }
 
 /// Homes axes that are not homed; returns whether all were homed.

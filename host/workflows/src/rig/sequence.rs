@@ -8,6 +8,7 @@ use farnear_capture::{
     record::{begin_folder, finish_sequence, record_of_sequence},
     sequence::{SequenceShot, ShotDefaults, image_name, read_program},
 };
+use farnear_files::staging::Staging;
 use farnear_protocol::message::Shot;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -137,13 +138,26 @@ pub fn run(settings: &SequenceRequest, context: &Context<'_>) -> Result<Sequence
     let optics = settings.optics.as_deref().map(GivenOptics::read).transpose()?;
     let folder = begin_folder(&settings.out)?;
     let mut rig = settings.camera.connect(&settings.rig, optics.as_ref(), context)?;
-    check_exposures(&rig.rig.client, &shots).map_err(CaptureError::from)?;
+    let taken = take(&mut rig, &shots, settings, optics, folder, context)?;
+    Ok(figures(&shots, &taken))
+}
+
+/// Runs the shots with an open rig and writes the folder. Checks everything before any motion.
+pub(super) fn take(
+    rig: &mut EquippedRig,
+    shots: &[Shot],
+    settings: &SequenceRequest,
+    optics: Option<GivenOptics>,
+    folder: Staging,
+    context: &Context<'_>,
+) -> Result<Vec<SequenceShot>> {
+    check_exposures(&rig.rig.client, shots).map_err(CaptureError::from)?;
     ensure_homed(&rig.rig.client, &mut |what| context.info(what))?;
     let mut taken = Vec::new();
     for run in 0..settings.runs {
         context.info(&format!("running {} shots", shots.len()));
         let name = |name: String| if settings.runs > 1 { format!("run-{run:02}-{name}") } else { name };
-        run_once(&mut rig, &shots, settings, name, &mut taken)?;
+        run_once(rig, shots, settings, name, &mut taken, context)?;
     }
     let (psf, table) = match optics {
         Some(given) => (given.optics.psf(), given.table),
@@ -153,7 +167,7 @@ pub fn run(settings: &SequenceRequest, context: &Context<'_>) -> Result<Sequence
         .ok_or(CaptureError::Count { reported: 0, asked: shots.len() })?;
     finish_sequence(folder, &taken, &record)?;
     context.info(&format!("wrote {}", settings.out.display()));
-    Ok(figures(&shots, &taken))
+    Ok(taken)
 }
 
 fn run_once(
@@ -162,13 +176,16 @@ fn run_once(
     settings: &SequenceRequest,
     name: impl Fn(String) -> String,
     taken: &mut Vec<SequenceShot>,
+    context: &Context<'_>,
 ) -> Result<(), CaptureError> {
+    let exposures: usize = shots.iter().map(|shot| usize::from(shot.repeat.max(1))).sum();
     let EquippedRig { camera, rig } = rig;
     let wait = settings.camera.image_wait;
     expose(&rig.client, camera.as_mut(), shots, wait, |record, image| {
         let shot = &shots[usize::from(record.index).min(shots.len() - 1)];
         let name = name(image_name(&record, shot.repeat));
         taken.push(SequenceShot { name, record, mode: shot.mode, image });
+        context.progress.advance("images", taken.len(), Some(exposures * settings.runs));
         Ok(())
     })
 }

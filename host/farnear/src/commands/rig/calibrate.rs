@@ -1,7 +1,9 @@
 use anyhow::{Result, bail};
 use clap::Subcommand;
 use farnear_protocol::message::{Axis, Routine};
-use farnear_workflows::rig::{correction_fit::FitRequest, mechanics, targets::TargetSeriesRequest};
+use farnear_workflows::rig::{
+    correction_fit::FitRequest, lens_stack::RigStackRequest, mechanics, targets::TargetSeriesRequest,
+};
 
 use super::{AxisName, Question};
 use crate::{
@@ -37,6 +39,7 @@ pub enum What {
     #[command(after_help = "Example: farnear rig calibrate gauge --port /dev/ttyACM0 --json")]
     Gauge(Question),
     Targets(CameraRun<TargetSeriesRequest>),
+    Stack(CameraRun<RigStackRequest>),
     Fit(RigRun<FitRequest>),
 }
 
@@ -50,6 +53,7 @@ pub fn run(what: What) -> Result<()> {
         What::Piezo(question) => measure(question, Routine::Piezo),
         What::Gauge(question) => measure(question, Routine::Gauge),
         What::Targets(task) => task.run(),
+        What::Stack(task) => task.run(),
         What::Fit(task) => task.run(),
     }
 }
