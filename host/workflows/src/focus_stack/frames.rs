@@ -1,8 +1,9 @@
 //! Omits frames of a stack that show another scene, are rotated or shaken. Neighbours in a stack correlate highly in
 //! the band that defocus leaves to both. Links between neighbours that correlate far less than usual split the stack
-//! into runs. The longest run is the scene. A frame outside belongs to it if it correlates with one of the two
-//! nearest frames of the scene as frames of the scene at the same distance do; so the good neighbour of a bad frame stays. A shaken frame
-//! correlates, but is less sharp than its neighbours allow ([`shaken`]).
+//! into runs. The longest run is the scene. A frame outside belongs to it if it correlates with one of the two nearest
+//! frames of the scene as frames of the scene at the same distance do; so the good neighbour of a bad frame stays. A
+//! shaken frame correlates, but is less sharp than its neighbours allow ([`shaken`]). Where neighbours correlate
+//! little, no frame is judged.
 
 mod shaken;
 #[cfg(test)]
