@@ -12,6 +12,8 @@ const SHAKEN_BLOCKS: f64 = 0.6;
 /// The same of the expected sharpness in the first or last frame, of blocks that tell it, and the least part of these.
 const SHAKEN_END: f64 = 0.85;
 const TELLING_BLOCKS: f64 = 0.25;
+/// Part of all blocks that are sharper in the first or last frame than in the next: it is not bad, or it shows what no other does.
+const SHARP_BLOCKS: f64 = 0.1;
 /// Powers of the squared gradient for textures from coarse to fine, and the least blur, as part of that of the next frames.
 const POWERS: [f64; 3] = [-1.0, -0.5, -0.25];
 const LEAST_BLUR: f64 = 0.7;
@@ -86,7 +88,10 @@ fn dull_end(sharpness: &[Vec<f64>], positions: &[f64], frames: &[usize]) -> Opti
         let dull = telling.iter().filter(|block| sharpness[end][**block] < part * expected(**block)).count();
         dull as f64 >= SHAKEN_BLOCKS * telling.len() as f64
     };
+    let sharper = (0..blocks).filter(|block| sharpness[end][*block] > sharpness[near][*block]).count();
     match dull([near, middle, far], SHAKEN_END) {
+        // What is in focus only in this frame must not be lost.
+        true if sharper as f64 >= SHARP_BLOCKS * blocks as f64 => None,
         // Where the middle one is blurred itself, the others contradict it; the outer two only make less be expected.
         true if !dull([near, far, beyond], 1.0) => None,
         verdict => Some(verdict),
@@ -146,8 +151,9 @@ mod tests {
                         let mut bad = good.clone();
                         bad[at].iter_mut().for_each(|value| *value *= 0.6);
                         let found = find(&bad, &positions, &members);
-                        // Steps of twice the depth of field tell less.
-                        let untold = slope == 2.0 && found.frames.is_empty() && found.untold == [at];
+                        // Steps of twice the depth of field tell less, and what is sharpest in the frame stays.
+                        let tells_less = slope == 2.0 || depths.0 < 0.0 && at == 0;
+                        let untold = tells_less && found.frames.is_empty() && found.untold == [at];
                         assert!(found.frames == [at] || untold, "{slope} {power} {depths:?} {found:?}");
                     }
                 }
@@ -168,6 +174,21 @@ mod tests {
                 assert!(!found.frames.iter().any(|frame| [0, 6].contains(frame)), "{slope} {at}: {found:?}");
             }
         }
+    }
+
+    /// A close-up: the nearest part is sharp in the first frame only, and the rest is duller there than the next frames suggest.
+    #[test]
+    fn an_end_in_which_a_part_is_sharpest_is_kept() {
+        let positions: Vec<f64> = (0..7).map(f64::from).collect();
+        let members: Vec<usize> = (0..7).collect();
+        let mut sharpness = curves(&positions, (3.5, 5.5), 0.5, 2);
+        sharpness[0].iter_mut().for_each(|value| *value *= 0.5);
+        assert_eq!(find(&sharpness, &positions, &members).frames, [0]);
+        let near = sharpness[0].len() / 8;
+        for (frame, row) in sharpness.iter_mut().enumerate() {
+            row[..near].iter_mut().for_each(|value| *value = 1.0 / (1 + frame) as f64);
+        }
+        assert_eq!(find(&sharpness, &positions, &members), Shaken { frames: vec![], untold: vec![0] });
     }
 
     #[test]
