@@ -12,6 +12,8 @@ const SHAKEN_BLOCKS: f64 = 0.6;
 /// The same of the expected sharpness in the first or last frame, of blocks that tell it, and the least part of these.
 const SHAKEN_END: f64 = 0.85;
 const TELLING_BLOCKS: f64 = 0.25;
+/// Part of all blocks that are sharper in the first or last frame than in the next: it is not bad, or it shows what no other does.
+const SHARP_BLOCKS: f64 = 0.1;
 /// Powers of the squared gradient for textures from coarse to fine, and the least blur, as part of that of the next frames.
 const POWERS: [f64; 3] = [-1.0, -0.5, -0.25];
 const LEAST_BLUR: f64 = 0.7;
@@ -67,11 +69,42 @@ fn inside(sharpness: &[Vec<f64>], members: &[usize]) -> Vec<usize> {
     three.map(|[_, own, _]| *own).collect()
 }
 
-/// Whether the first of these frames is duller than the next three suggest, in most of the blocks that tell it.
+/// Whether the first of these frames is duller than the next ones suggest, in most of the blocks that tell it. `None` if too few
+/// tell it, or if it depends on a frame that may be bad itself.
 fn dull_end(sharpness: &[Vec<f64>], positions: &[f64], frames: &[usize]) -> Option<bool> {
-    let (&[end, near, middle, far], true) = (frames.first_chunk()?, frames.len() >= LEAST_FRAMES) else {
+    let (&[end, near, middle, far, beyond], true) = (frames.first_chunk()?, frames.len() >= LEAST_FRAMES)
+    else {
         return None;
     };
+    let tells =
+        |block: &usize| frames[2..].iter().any(|frame| sharpness[*frame][*block] > sharpness[near][*block]);
+    let blocks = sharpness[end].len();
+    let telling: Vec<usize> = (0..blocks).filter(tells).collect();
+    if (telling.len() as f64) < TELLING_BLOCKS * blocks as f64 {
+        return None;
+    }
+    let dull = |next: [usize; 3], part: f64| {
+        let expected = expectation(sharpness, positions, end, next);
+        let dull = telling.iter().filter(|block| sharpness[end][**block] < part * expected(**block)).count();
+        dull as f64 >= SHAKEN_BLOCKS * telling.len() as f64
+    };
+    let sharper = (0..blocks).filter(|block| sharpness[end][*block] > sharpness[near][*block]).count();
+    match dull([near, middle, far], SHAKEN_END) {
+        // What is in focus only in this frame must not be lost.
+        true if sharper as f64 >= SHARP_BLOCKS * blocks as f64 => None,
+        // Where the middle one is blurred itself, the others contradict it; the outer two only make less be expected.
+        true if !dull([near, far, beyond], 1.0) => None,
+        verdict => Some(verdict),
+    }
+}
+
+/// Sharpness of each block of a frame, extrapolated from three others.
+fn expectation(
+    sharpness: &[Vec<f64>],
+    positions: &[f64],
+    end: usize,
+    [near, middle, far]: [usize; 3],
+) -> impl Fn(usize) -> f64 {
     let at = |frame: usize| positions[frame] - positions[end];
     let weight = |of: usize, a: usize, b: usize| at(a) * at(b) / ((at(of) - at(a)) * (at(of) - at(b)));
     let next = [
@@ -79,7 +112,7 @@ fn dull_end(sharpness: &[Vec<f64>], positions: &[f64], frames: &[usize]) -> Opti
         (middle, weight(middle, near, far)),
         (far, weight(far, near, middle)),
     ];
-    let expected = |block: usize| {
+    move |block: usize| {
         let by = |power: f64| {
             let blurs = next.map(|(frame, weight)| (sharpness[frame][block].powf(power), weight));
             let least = blurs.iter().map(|(blur, _)| *blur).fold(f64::INFINITY, f64::min);
@@ -87,15 +120,7 @@ fn dull_end(sharpness: &[Vec<f64>], positions: &[f64], frames: &[usize]) -> Opti
             blur.max(LEAST_BLUR * least).powf(1.0 / power)
         };
         POWERS.map(by).into_iter().fold(f64::INFINITY, f64::min)
-    };
-    let tells =
-        |block: &usize| frames[2..].iter().any(|frame| sharpness[*frame][*block] > sharpness[near][*block]);
-    let blocks = sharpness[end].len();
-    let telling: Vec<usize> = (0..blocks).filter(tells).collect();
-    let dull =
-        telling.iter().filter(|block| sharpness[end][**block] < SHAKEN_END * expected(**block)).count();
-    (telling.len() as f64 >= TELLING_BLOCKS * blocks as f64)
-        .then_some(dull as f64 >= SHAKEN_BLOCKS * telling.len() as f64)
+    }
 }
 
 #[cfg(test)]
@@ -126,11 +151,44 @@ mod tests {
                         let mut bad = good.clone();
                         bad[at].iter_mut().for_each(|value| *value *= 0.6);
                         let found = find(&bad, &positions, &members);
-                        assert_eq!(found.frames, [at], "{slope} {power} {depths:?}");
+                        // Steps of twice the depth of field tell less, and what is sharpest in the frame stays.
+                        let tells_less = slope == 2.0 || depths.0 < 0.0 && at == 0;
+                        let untold = tells_less && found.frames.is_empty() && found.untold == [at];
+                        assert!(found.frames == [at] || untold, "{slope} {power} {depths:?} {found:?}");
                     }
                 }
             }
         }
+    }
+
+    #[test]
+    fn a_dull_frame_next_but_one_to_an_end_does_not_condemn_the_end() {
+        let positions: Vec<f64> = (0..7).map(f64::from).collect();
+        let members: Vec<usize> = (0..7).collect();
+        for slope in [0.15, 0.5, 1.0, 2.0] {
+            let good = curves(&positions, (1.5, 4.5), slope, 2);
+            for at in [2, 4] {
+                let mut bad = good.clone();
+                bad[at].iter_mut().for_each(|value| *value *= 0.3);
+                let found = find(&bad, &positions, &members);
+                assert!(!found.frames.iter().any(|frame| [0, 6].contains(frame)), "{slope} {at}: {found:?}");
+            }
+        }
+    }
+
+    /// A close-up: the nearest part is sharp in the first frame only, and the rest is duller there than the next frames suggest.
+    #[test]
+    fn an_end_in_which_a_part_is_sharpest_is_kept() {
+        let positions: Vec<f64> = (0..7).map(f64::from).collect();
+        let members: Vec<usize> = (0..7).collect();
+        let mut sharpness = curves(&positions, (3.5, 5.5), 0.5, 2);
+        sharpness[0].iter_mut().for_each(|value| *value *= 0.5);
+        assert_eq!(find(&sharpness, &positions, &members).frames, [0]);
+        let near = sharpness[0].len() / 8;
+        for (frame, row) in sharpness.iter_mut().enumerate() {
+            row[..near].iter_mut().for_each(|value| *value = 1.0 / (1 + frame) as f64);
+        }
+        assert_eq!(find(&sharpness, &positions, &members), Shaken { frames: vec![], untold: vec![0] });
     }
 
     #[test]
