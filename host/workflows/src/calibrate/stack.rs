@@ -112,7 +112,7 @@ impl Request for CalibrateStackRequest {
     const NAME: &'static str = "calibrate stack";
     const REQUIRED: &'static [&'static str] = &["stack", "out"];
     const PATHS: &'static [(&'static str, PathKind)] =
-        &[("stack", PathKind::Input), ("plot", PathKind::OutputFile), ("out", PathKind::OutputFile)];
+        &[("stack", PathKind::Input), ("out", PathKind::OutputFile), ("plot", PathKind::OutputFile)];
     type Figures = StackFigures;
 
     fn run(&self, context: &Context<'_>) -> Result<StackFigures> {
@@ -263,18 +263,20 @@ impl Listed {
 
 /// Mean step between positions that are in order, above 0.
 fn even_step(positions: &[f64], request: &CalibrateStackRequest) -> Result<f64> {
-    let steps = || positions.windows(2).map(|two| two[1] - two[0]);
-    let mean = steps().sum::<f64>() / steps().count().max(1) as f64;
-    let uneven = steps().enumerate().find(|(_, step)| !((step - mean).abs() <= EVEN * mean.abs()));
-    match uneven {
+    let steps: Vec<f64> = positions.windows(2).map(|two| two[1] - two[0]).collect();
+    let mut sorted = steps.clone();
+    sorted.sort_unstable_by(f64::total_cmp);
+    let usual = sorted.get(sorted.len() / 2).copied().unwrap_or(0.0);
+    let even = |step: f64| (step - usual).abs() <= EVEN * usual.abs();
+    match steps.iter().enumerate().find(|(_, step)| !even(**step)) {
         Some((index, step)) => {
             let (from, to) = (index + 1, index + 2);
             let expected = format!(
-                "even steps, but slices {from} and {to} are {step:.6} apart, and {mean:.6} is the mean"
+                "even steps, but slices {from} and {to} are {step:.6} apart, and {usual:.6} is usual"
             );
             Err(WorkflowError::parameter("stack", request.stack.display(), expected))
         }
-        None => Ok(rounded(mean.abs(), 9)),
+        None => Ok(rounded((steps.iter().sum::<f64>() / steps.len().max(1) as f64).abs(), 9)),
     }
 }
 

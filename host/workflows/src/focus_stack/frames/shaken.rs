@@ -152,7 +152,7 @@ mod tests {
                         bad[at].iter_mut().for_each(|value| *value *= 0.6);
                         let found = find(&bad, &positions, &members);
                         // Steps of twice the depth of field tell less, and what is sharpest in the frame stays.
-                        let tells_less = slope == 2.0 || depths.0 < 0.0 && at == 0;
+                        let tells_less = slope == 2.0 || (depths.0..depths.1).contains(&positions[at]);
                         let untold = tells_less && found.frames.is_empty() && found.untold == [at];
                         assert!(found.frames == [at] || untold, "{slope} {power} {depths:?} {found:?}");
                     }
