@@ -40,7 +40,7 @@ const FLAT: f64 = 0.15;
 pub const FEWEST: usize = 5;
 
 /// How a stack is calibrated.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct StackSettings {
     /// Distance between neighbouring slices.
     pub step_mm: f64,
@@ -53,7 +53,7 @@ pub struct StackSettings {
 }
 
 /// What the stage moves between the slices.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub enum Moved {
     /// The target towards the camera, or the whole camera towards the target.
     Target {
@@ -63,7 +63,7 @@ pub enum Moved {
         far_mm: Option<f64>,
     },
     /// The sensor away from this lens. Its far plane, focal length and pixel pitch are kept.
-    Sensor(Optics),
+    Sensor(Box<Optics>),
 }
 
 /// Why a stack gives no lens.
@@ -154,8 +154,8 @@ fn check(slices: &[Array2<f32>], settings: &StackSettings) -> Result<(), StackEr
     if let Some(index) = slices.iter().position(|slice| slice.dim() != slices[0].dim()) {
         return Err(StackError::Size { index: index + 1 });
     }
-    let (pixel_um, far_mm) = match settings.moved {
-        Moved::Target { pixel_um, far_mm } => (Some(pixel_um), far_mm),
+    let (pixel_um, far_mm) = match &settings.moved {
+        Moved::Target { pixel_um, far_mm } => (Some(*pixel_um), *far_mm),
         Moved::Sensor(_) => (None, None),
     };
     let numbers = [("step_mm", Some(settings.step_mm)), ("pixel_um", pixel_um), ("far_mm", far_mm)];
@@ -208,12 +208,12 @@ fn optics(
     settings: &StackSettings,
 ) -> Result<Optics, StackError> {
     let span_mm = settings.step_mm * pair_step as f64;
-    let (focal_length_mm, pixel_um, far_mm, travel_mm, telecentric) = match settings.moved {
+    let (focal_length_mm, pixel_um, far_mm, travel_mm, telecentric) = match &settings.moved {
         Moved::Target { pixel_um, far_mm } => {
             let far_mm = far_mm.unwrap_or(200.0 * span_mm);
             let focal_length_mm = 0.3 * far_mm;
             let image = |u: f64| focal_length_mm * focal_length_mm / (u - focal_length_mm);
-            (focal_length_mm, pixel_um, far_mm, image(far_mm - span_mm) - image(far_mm), Some(true))
+            (focal_length_mm, *pixel_um, far_mm, image(far_mm - span_mm) - image(far_mm), Some(true))
         }
         Moved::Sensor(lens) => {
             let far_mm = lens.working_range().far_mm;

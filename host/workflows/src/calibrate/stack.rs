@@ -173,7 +173,7 @@ pub fn calibrate(request: &CalibrateStackRequest, context: &Context<'_>) -> Resu
     listed.remarks.iter().for_each(|remark| context.progress.warn(remark));
     let slices = read(&listed.images, request, context)?;
     let moved = match listed.lens {
-        Some(lens) => Moved::Sensor(lens),
+        Some(lens) => Moved::Sensor(Box::new(lens)),
         None => Moved::Target { pixel_um: request.pixel_um, far_mm: request.far_mm },
     };
     let settings =

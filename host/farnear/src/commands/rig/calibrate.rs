@@ -12,7 +12,6 @@ use crate::{
 };
 
 #[derive(Subcommand)]
-#[expect(clippy::large_enum_variant, reason = "parsed once")]
 pub enum What {
     /// Measure the distance between a stage's two end switches. This homes the stage.
     #[command(after_help = "Example: farnear rig calibrate travel --port /dev/ttyACM0 --axis lens")]
