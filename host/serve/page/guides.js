@@ -148,12 +148,12 @@ function lens() {
   const slices = h("input", { type: "number", value: 21, min: 11, max: 101 });
   const result = h("div", { "aria-live": "polite" });
   const plots = [
-    ["Blur radius", { x: "slices from the focus", y: "px" }],
-    ["Response", { x: "measured normalised depth", y: "true" }],
-    ["Held-out errors", { x: "true normalised depth", y: "mm", names: ["RMS error", "predicted SD"] }],
-  ].map(([title, options]) => {
+    { label: "Blur radius", x: "slices from the focus", y: "px" },
+    { label: "Response", x: "measured normalised depth", y: "true" },
+    { label: "Held-out errors: RMS, and predicted SD", x: "true normalised depth", y: "mm", names: ["RMS error", "predicted SD"] },
+  ].map((options) => {
     const place = h("div", {});
-    return { element: h("section", { class: "panel", hidden: true }, h("h2", {}, title), place), plot: new Plot(place, { label: title, height: 180, ...options }) };
+    return { element: h("section", { class: "panel", hidden: true }, h("h2", {}, options.label), place), plot: new Plot(place, { height: 180, ...options }) };
   });
   const columns = (points) => [0, 1].map((at) => points.map((point) => point[at]));
   const show = (found) => {
