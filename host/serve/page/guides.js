@@ -150,7 +150,7 @@ function lens() {
   const plots = [
     { label: "Blur radius", x: "slices from the focus", y: "px" },
     { label: "Response", x: "measured normalised depth", y: "true" },
-    { label: "Held-out errors: RMS, and predicted SD", x: "true normalised depth", y: "mm", names: ["RMS error", "predicted SD"] },
+    { label: "Held-out errors: RMS (dark), predicted SD (light)", x: "true normalised depth", y: "mm", names: ["RMS error", "predicted SD"] },
   ].map((options) => {
     const place = h("div", {});
     return { element: h("section", { class: "panel", hidden: true }, h("h2", {}, options.label), place), plot: new Plot(place, { height: 180, ...options }) };
