@@ -339,7 +339,7 @@ test("the guide of the flat series captures targets, learns a correction and fin
   assert.deepEqual(page.complaints, []);
 });
 
-test("the guide of the lens takes a stack, plots blur, response and errors, and its lens measures a pair", async () => {
+test("the guide of the lens takes a stack, plots blur, response and errors, and puts its lens in use", async () => {
   const page = await open(browser, `${server.address}#guides/lens`);
   const guide = page.locator("#view-guides");
   await guide.getByLabel("Slices").fill("13");
