@@ -298,28 +298,34 @@ fn half_plane(mask: &Mask, out: &mut Mask, shadow: &ImageShadow) -> Edge {
 mod tests {
     use super::*;
 
-    fn cut_of_shadow_at(eta_rad: f64) -> Edge {
-        let (foot, length) = ([60.0, 90.0], 40.0);
+    const FOOT: [f64; 2] = [60.0, 90.0];
+    const LENGTH_PX: f64 = 40.0;
+
+    fn shadow_at(eta_rad: f64) -> ImageShadow {
         let (sin, cos) = eta_rad.sin_cos();
-        let mask = Mask::from_shape_fn((140, 160), |(y, x)| {
-            let body = (50..70).contains(&x) && (30..90).contains(&y);
-            let (dx, dy) = (x as f64 - foot[0], y as f64 - foot[1]);
-            let (along, across) = (dx * cos + dy * sin, dy * cos - dx * sin);
-            body || (along > 0.0 && along < length && across.abs() < 5.0)
-        });
-        let m_px = [length * cos, length * sin];
-        let shadow = ImageShadow {
-            foot_px: foot,
-            tip_px: [foot[0] + m_px[0], foot[1] + m_px[1]],
+        let m_px = [LENGTH_PX * cos, LENGTH_PX * sin];
+        ImageShadow {
+            foot_px: FOOT,
+            tip_px: [FOOT[0] + m_px[0], FOOT[1] + m_px[1]],
             m_px,
             eta_rad,
             beta_rad: 0.75 * PI - 0.5 * eta_rad,
             mirrored: false,
             height_px: 60.0,
             shortened: false,
-        };
+        }
+    }
+
+    fn cut_of_shadow_at(eta_rad: f64) -> Edge {
+        let (sin, cos) = eta_rad.sin_cos();
+        let mask = Mask::from_shape_fn((140, 160), |(y, x)| {
+            let body = (50..70).contains(&x) && (30..90).contains(&y);
+            let (dx, dy) = (x as f64 - FOOT[0], y as f64 - FOOT[1]);
+            let (along, across) = (dx * cos + dy * sin, dy * cos - dx * sin);
+            body || (along > 0.0 && along < LENGTH_PX && across.abs() < 5.0)
+        });
         let outline = Outline::new(&mask).expect("not empty");
-        hybrid(&mask, &mut mask.clone(), &outline, &shadow)
+        hybrid(&mask, &mut mask.clone(), &outline, &shadow_at(eta_rad))
     }
 
     #[test]
@@ -328,5 +334,79 @@ mod tests {
             assert!(!cut_of_shadow_at(side * 0.44_f64.asin()).half_plane, "{side}");
             assert!(cut_of_shadow_at(side * 0.46_f64.asin()).half_plane, "{side}");
         }
+    }
+
+    /// The pixels of a full picture that `cut` leaves, compared with `stays`; `None` is too close to an edge to tell.
+    fn assert_left(
+        cut: impl Fn(&Mask, &mut Mask, &Outline) -> Edge,
+        stays: impl Fn(f64, f64) -> Option<bool>,
+    ) -> Edge {
+        let full = Mask::from_elem((140, 160), true);
+        let mut out = full.clone();
+        let edge = cut(&full, &mut out, &Outline::new(&full).expect("not empty"));
+        for ((y, x), left) in out.indexed_iter() {
+            if let Some(stays) = stays(x as f64, y as f64) {
+                assert_eq!(*left, stays, "column {x}, row {y}");
+            }
+        }
+        edge
+    }
+
+    /// Whether a value is above 0; `None` within half a pixel of it.
+    fn above(value: f64) -> Option<bool> {
+        (value.abs() > 0.5).then_some(value > 0.0)
+    }
+
+    #[test]
+    fn the_half_plane_ends_at_the_feet_in_either_direction() {
+        for mirrored in [false, true] {
+            for beta_rad in [1.7, 2.2, 3.0] {
+                let shadow = ImageShadow { mirrored, beta_rad, ..shadow_at(0.0) };
+                let (sin, cos) = beta_rad.sin_cos();
+                let edge = assert_left(
+                    |mask, out, _| half_plane(mask, out, &shadow),
+                    |x, y| {
+                        let across = if mirrored { FOOT[0] - x } else { x - FOOT[0] };
+                        above(across * cos - (y - FOOT[1]) * sin)
+                    },
+                );
+                assert!(edge.half_plane);
+            }
+        }
+    }
+
+    #[test]
+    fn only_a_shadow_that_points_away_leaves_what_is_beside_it_and_beyond_it() {
+        // Towards the camera, all below the feet goes.
+        let towards = shadow_at(FRAC_PI_2);
+        assert_left(|mask, out, outline| hybrid(mask, out, outline, &towards), |_, y| above(FOOT[1] - y));
+        // Away from it the half-plane is right of the feet; 0.17 and 0.04 of the height of 60 px are the strip's.
+        let away = shadow_at(-FRAC_PI_2);
+        assert_left(
+            |mask, out, outline| hybrid(mask, out, outline, &away),
+            |x, y| {
+                let kept = above(FOOT[0] - x)?;
+                let beside = above((x - FOOT[0]).abs() - 10.2)?;
+                let beyond = above(FOOT[1] - y - 42.4)?;
+                Some(kept || beside || beyond)
+            },
+        );
+    }
+
+    #[test]
+    fn the_thesis_method_cuts_a_shadow_straight_down_by_its_length() {
+        for turned_deg in [-9.0_f64, 0.0, 9.0] {
+            let shadow = shadow_at(FRAC_PI_2 + turned_deg.to_radians());
+            // The last row is 139.
+            let edge = assert_left(
+                |mask, out, outline| thesis(mask, out, outline, &shadow, 0.0),
+                |_, y| above(139.0 - shadow.m_px[1] - y),
+            );
+            assert!(edge.half_plane);
+        }
+        let sideways = shadow_at(FRAC_PI_2 + 11.0_f64.to_radians());
+        let full = Mask::from_elem((140, 160), true);
+        let outline = Outline::new(&full).expect("not empty");
+        assert!(!thesis(&full, &mut full.clone(), &outline, &sideways, 0.0).half_plane);
     }
 }
