@@ -380,17 +380,85 @@ mod tests {
         // Towards the camera, all below the feet goes.
         let towards = shadow_at(FRAC_PI_2);
         assert_left(|mask, out, outline| hybrid(mask, out, outline, &towards), |_, y| above(FOOT[1] - y));
-        // Away from it the half-plane is right of the feet; 0.17 and 0.04 of the height of 60 px are the strip's.
-        let away = shadow_at(-FRAC_PI_2);
-        assert_left(
-            |mask, out, outline| hybrid(mask, out, outline, &away),
-            |x, y| {
-                let kept = above(FOOT[0] - x)?;
-                let beside = above((x - FOOT[0]).abs() - 10.2)?;
-                let beyond = above(FOOT[1] - y - 42.4)?;
-                Some(kept || beside || beyond)
-            },
-        );
+        // 0.17 and 0.04 of the height of 60 px are the strip's.
+        for turned_deg in [-25.0_f64, 0.0, 25.0] {
+            let away = shadow_at(turned_deg.to_radians() - FRAC_PI_2);
+            let ((sin, cos), (sin_b, cos_b)) = (away.eta_rad.sin_cos(), away.beta_rad.sin_cos());
+            assert_left(
+                |mask, out, outline| hybrid(mask, out, outline, &away),
+                |x, y| {
+                    let (dx, dy) = (x - FOOT[0], y - FOOT[1]);
+                    let kept = above(dx * cos_b - dy * sin_b)?;
+                    let beside = above((dy * cos - dx * sin).abs() - 10.2)?;
+                    let beyond = above(dx * cos + dy * sin - 42.4)?;
+                    Some(kept || beside || beyond)
+                },
+            );
+        }
+    }
+
+    #[test]
+    fn the_silhouette_reaches_to_its_farthest_pixel_in_the_direction_of_the_shadow() {
+        let mask = Mask::from_shape_fn((40, 50), |(y, x)| (10..=30).contains(&y) && (20..=45).contains(&x));
+        let outline = Outline::new(&mask).expect("not empty");
+        for (eta_rad, reach) in [(0.0, 20.0), (FRAC_PI_2, 12.0), (PI, 5.0), (-FRAC_PI_2, 8.0)] {
+            assert!((reach_px(&mask, &outline, [25.0, 18.0], eta_rad) - reach).abs() < 1e-9, "{eta_rad}");
+        }
+        let diagonal = reach_px(&mask, &outline, [25.0, 18.0], 0.25 * PI);
+        assert!((diagonal - 32.0 / 2.0_f64.sqrt()).abs() < 1e-9, "{diagonal}");
+        assert_eq!(reach_px(&mask, &outline, [60.0, 18.0], 0.0), 0.0, "nothing lies there");
+    }
+
+    #[test]
+    fn a_cut_is_doubtful_if_the_shadow_points_away_or_much_is_removed() {
+        let text = "[camera]\nheight_m = 1.2\nazimuth_deg = 0.0\nfocal_length_mm = 4.0\npixel_um = 6.0\n";
+        let mut file = CameraFile::parse(text).expect("valid");
+        // The feet are in row 400.
+        file.subject.distance_m = Some(1.2 * file.camera.focal_px() / (400.0 - 239.5));
+        // A person of 200 px, with something at the feet's right or left, or a wide thing below the feet.
+        let report = |eta_rad, ground: fn(usize, usize) -> bool| {
+            let mask = Mask::from_shape_fn((480, 640), |(y, x)| {
+                ((200..400).contains(&y) && (300..340).contains(&x)) || ground(y, x)
+            });
+            remove(&mask, &file, Light::Direction { eta_rad }, 0.0, Method::Hybrid).expect("a cut").1
+        };
+        let sideways = report(0.3, |y, x| (390..400).contains(&y) && (340..400).contains(&x));
+        assert!(sideways.trustworthy && sideways.removed_fraction < 0.6, "{sideways:?}");
+        let away = report(-FRAC_PI_2, |_, _| false);
+        assert!(!away.trustworthy && away.removed_fraction < 0.6, "{away:?}");
+        let wide = report(FRAC_PI_2, |y, x| (400..470).contains(&y) && (200..600).contains(&x));
+        assert!(!wide.trustworthy && wide.removed_fraction > 0.6, "{wide:?}");
+    }
+
+    #[test]
+    fn the_distance_is_weighted_between_the_heads_width_and_its_row() {
+        let text = "[camera]\nheight_m = 0.8\nazimuth_deg = 0.0\nfocal_length_mm = 4.0\npixel_um = 6.0\n";
+        let mut file = CameraFile::parse(text).expect("valid");
+        // A head 20 px wide from row 100, a body below it.
+        let mask = Mask::from_shape_fn((480, 640), |(y, x)| {
+            (100..130).contains(&y) && (400..420).contains(&x)
+                || (130..430).contains(&y) && (380..440).contains(&x)
+        });
+        let by_width = projection::distance_from_head_m(&file, 20.0);
+        let by_row = projection::distance_from_head_row_m(&file, 99.5).expect("not at eye height");
+        let sd = &file.standard_deviations;
+        let of_width = (sd.head_width_m / file.subject.head_width_m).hypot((sd.head_width_px + 1.0) / 20.0);
+        file.standard_deviations.camera_height_m = 0.0;
+        // The row's relative deviation is that of the 0.95 m from the lens to the head.
+        for (of_row, expected) in [
+            (1e-6, by_row),
+            (1e6, by_width),
+            (of_width, 2.0 / (1.0 / by_width + 1.0 / by_row)),
+            (0.5 * of_width, 5.0 / (1.0 / by_width + 4.0 / by_row)),
+        ] {
+            file.standard_deviations.subject_height_m = 0.95 * of_row;
+            let found = subject_of(&mask, &file).expect("a subject");
+            assert!((found.distance_m / expected - 1.0).abs() < 1e-9, "{of_row}: {found:?} {expected}");
+            let slope = (409.5 - 319.5) / file.camera.focal_px();
+            assert!((found.offset_m - slope * found.distance_m).abs() < 1e-9, "{found:?}");
+        }
+        file.subject.distance_m = Some(4.5);
+        assert_eq!(subject_of(&mask, &file).expect("a subject").distance_m, 4.5);
     }
 
     #[test]
