@@ -320,4 +320,15 @@ mod tests {
             );
         }
     }
+
+    #[test]
+    fn a_silhouette_of_an_impossible_size_is_not_split() {
+        of_block([100, 400, 300, 340], 0.0, |scene| {
+            // The head is 139.5 px above the horizon: 1.2 m + 0.21 m per metre of distance.
+            assert!(scene.split(2.5).is_some());
+            for distance_m in [6.0, f64::NAN, f64::INFINITY] {
+                assert!(scene.split(distance_m).is_none(), "{distance_m}");
+            }
+        });
+    }
 }

@@ -398,6 +398,14 @@ mod tests {
     }
 
     #[test]
+    fn of_equal_runs_that_of_the_middle_angle_counts() {
+        let mask = Mask::from_shape_fn((9, 9), |place| place == (4, 5));
+        let outline = Outline::new(&mask).expect("not empty");
+        let (beta_rad, _) = longest_run(&outline, None, [1.7, 1.8, 1.9].into_iter()).expect("angles");
+        assert_eq!(beta_rad, 1.8);
+    }
+
+    #[test]
     fn the_silhouette_reaches_to_its_farthest_pixel_in_the_direction_of_the_shadow() {
         let mask = Mask::from_shape_fn((40, 50), |(y, x)| (10..=30).contains(&y) && (20..=45).contains(&x));
         let outline = Outline::new(&mask).expect("not empty");

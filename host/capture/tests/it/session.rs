@@ -161,7 +161,7 @@ fn a_board_that_was_taken_over_is_left_alone_until_it_is_taken_back() {
 #[test]
 fn an_unplugged_board_is_not_looked_for_all_the_time() {
     // Attempts are half a second apart.
-    const WATCHED: Duration = Duration::from_millis(200);
+    const WATCHED: Duration = Duration::from_millis(1_200);
     let peer = Peer::new(Faults::default());
     let attempts = Arc::new(AtomicU32::new(0));
     let (mut connect, counted) = (peer.connect(), Arc::clone(&attempts));
@@ -178,6 +178,39 @@ fn an_unplugged_board_is_not_looked_for_all_the_time() {
     let tried = attempts.load(Ordering::SeqCst) - 1;
     let due = lost.elapsed().as_millis() / 500;
     assert!(u128::from(tried) <= due, "{tried} attempts where {due} were due");
+}
+
+#[test]
+fn a_real_board_that_was_unplugged_is_found_again_and_an_emulated_one_is_not() {
+    for emulated in [false, true] {
+        let peer = Peer::new(Faults::default());
+        peer.board().hello.emulated = emulated;
+        let client = Client::connect(peer.connect(), "scripted").unwrap();
+        client.set_timing(SHORT);
+        peer.board().gone = true;
+        assert!(matches!(client.status(), Err(ClientError::Gone { .. })));
+        let connections = peer.board().connections;
+        peer.board().gone = false;
+        let until = Instant::now() + Duration::from_secs(if emulated { 1 } else { 20 });
+        while peer.board().connections == connections && Instant::now() < until {
+            std::thread::sleep(Duration::from_millis(10));
+        }
+        assert_eq!(
+            peer.board().connections == connections,
+            emulated,
+            "the port may be another program's by now"
+        );
+    }
+}
+
+#[test]
+fn work_of_a_board_that_was_reset_ends_when_the_board_is_greeted_again() {
+    let (client, peer) = connect(Faults { never_ends: true, ..Faults::default() });
+    let work = client.start_home(Axis::SensorCoarse).unwrap();
+    peer.board().hello.boot = 8;
+    client.clone().reopen().unwrap();
+    let error = work.homed().err().unwrap();
+    assert!(matches!(error, ClientError::Reset { was: 7, now: 8, .. }), "{error:?}");
 }
 
 #[test]

@@ -36,6 +36,9 @@ fn images_that_did_not_see_a_pixel_do_not_count() {
     let curve = [unseen, 0.1, 0.4, 0.9, 0.8, 0.3, 0.1, unseen];
     let found = tip(&curve, &even(8), 11);
     assert!((found.place - 3.4).abs() < 0.2 && found.reliability > 0.3, "{found:?}");
+    // Five of nine are enough.
+    let half = [unseen, unseen, unseen, unseen, 0.1, 0.3, 0.9, 0.3, 0.1];
+    assert!(tip(&half, &even(9), 11).reliability > 0.3);
     // The sharpest image's neighbour did not see it; too few did.
     assert_eq!(tip(&[0.1, 0.2, 0.9, unseen, 0.3, 0.1], &even(6), 11).reliability, 0.0);
     assert_eq!(tip(&[unseen, unseen, unseen, unseen, 0.3, 0.9, 0.3], &even(7), 11).reliability, 0.0);
