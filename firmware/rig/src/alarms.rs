@@ -216,4 +216,27 @@ mod tests {
             }
         }
     }
+
+    #[test]
+    fn the_same_cause_with_other_values_is_not_latched_twice() {
+        let following = |axis, nm| Alarm::Following { axis, error: Nanometres(nm) };
+        let mut alarms = Alarms::new();
+        assert_eq!(raise(&mut alarms, following(Axis::Lens, 9_000)), Some(1));
+        assert_eq!(raise(&mut alarms, following(Axis::Lens, -7_000)), None);
+        assert_eq!(raise(&mut alarms, following(Axis::SensorCoarse, 9_000)), Some(2));
+        assert_eq!(raise(&mut alarms, Alarm::HostSilence { request: 4 }), Some(3));
+        assert_eq!(raise(&mut alarms, Alarm::HostSilence { request: 5 }), None);
+        assert_eq!(raise(&mut alarms, Alarm::DriverFault { axis: Axis::Lens }), Some(4));
+        assert_eq!(raise(&mut alarms, Alarm::DriverFault { axis: Axis::SensorCoarse }), Some(5));
+    }
+
+    #[test]
+    fn stored_alarms_without_a_number_and_those_before_the_last_eight_are_dropped() {
+        let record = |number| AlarmRecord { number, boot: 3, time: BoardMicros(5), alarm: STOP };
+        let restored = Alarms::restored(9, 1, [record(9), record(2), record(1), record(10)].into_iter());
+        let kept: std::vec::Vec<u32> = restored.kept().iter().flatten().map(|record| record.number).collect();
+        assert_eq!(kept, [9, 2]);
+        assert_eq!(restored.latched(), Some(&record(9)));
+        assert_eq!(Alarms::restored(3, 0, [record(0)].into_iter()).kept(), &[None; RETAINED]);
+    }
 }

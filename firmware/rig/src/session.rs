@@ -246,3 +246,48 @@ impl Session {
 fn count(counter: &mut u32) {
     *counter = counter.wrapping_add(1);
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn all_is_sent_when_no_request_waits_and_no_answer() {
+        let mut session = Session::new(7);
+        assert!(session.all_sent());
+        let header = Header { version: PROTOCOL_CURRENT, kind: Kind::Request, id: 1, boot: 7 };
+        let call = Call { session: 5, request: Request::OpenSession };
+        let frame = frame::encode(header, &call).expect("every request fits");
+        frame::delimited(&frame).iter().for_each(|byte| session.receive(*byte));
+        assert!(session.has_request() && !session.all_sent(), "a request waits");
+        let incoming = session.next_request().expect("a new request");
+        session.answer(incoming, Ok(Response::Accepted));
+        assert!(!session.all_sent(), "its answer waits to be encoded");
+        session.put_answer();
+        assert!(!session.all_sent(), "its answer waits to be sent");
+        assert!(session.send().is_some() && session.all_sent());
+    }
+
+    #[test]
+    fn requests_beyond_the_promised_number_are_refused_at_any_stage_of_the_others() {
+        let mut session = Session::new(7);
+        let mut id = 0;
+        let mut ask = |session: &mut Session, request| {
+            id += 1;
+            let header = Header { version: PROTOCOL_CURRENT, kind: Kind::Request, id, boot: 7 };
+            let frame = frame::encode(header, &Call { session: 5, request }).expect("every request fits");
+            frame::delimited(&frame).iter().for_each(|byte| session.receive(*byte));
+            session.counters().overflowed
+        };
+        assert_eq!(ask(&mut session, Request::OpenSession), 0);
+        assert!((1..OUTSTANDING).all(|_| ask(&mut session, Request::Status) == 0));
+        assert_eq!(ask(&mut session, Request::Status), 1, "eight frames wait");
+        let incoming = session.next_request().expect("a new request");
+        session.answer(incoming, Ok(Response::Accepted));
+        assert_eq!(ask(&mut session, Request::Status), 2, "seven frames and a result");
+        session.put_answer();
+        assert_eq!(ask(&mut session, Request::Status), 3, "seven frames and an answer");
+        assert!(session.send().is_some());
+        assert_eq!(ask(&mut session, Request::Status), 3, "seven frames");
+    }
+}

@@ -153,3 +153,24 @@ fn agree(hello: &Hello) -> Result<u8, ClientError> {
 fn version_error(board_min: u8, board_current: u8) -> ClientError {
     ClientError::Version { board_min, board_current, host_min: PROTOCOL_MIN, host_current: PROTOCOL_CURRENT }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn silence_at_several_rates_is_added_up() {
+        let silent = |attempts, seconds, bad_frames, bytes| ClientError::Silent {
+            port: "port".into(),
+            during: DURING.into(),
+            attempts,
+            waited: Duration::from_secs(seconds),
+            bad_frames,
+            bytes,
+        };
+        let sum = both(Some(silent(2, 1, 3, 5)), silent(4, 7, 11, 13));
+        let ClientError::Silent { attempts, waited, bad_frames, bytes, .. } = sum else { panic!("{sum:?}") };
+        assert_eq!((attempts, waited, bad_frames, bytes), (6, Duration::from_secs(8), 14, 18));
+        assert!(matches!(both(None, silent(2, 1, 3, 5)), ClientError::Silent { attempts: 2, .. }));
+    }
+}

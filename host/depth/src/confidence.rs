@@ -51,3 +51,33 @@ pub(crate) fn withhold(texture: &mut Array2<f32>, invalid: &Array2<bool>) {
         }
     });
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn invalid_pixels_have_no_texture() {
+        let mut texture = ndarray::array![[1.0, 2.0], [3.0, 4.0]];
+        withhold(&mut texture, &ndarray::array![[false, true], [false, false]]);
+        assert!(texture[(0, 1)].is_nan() && texture.iter().filter(|value| value.is_finite()).count() == 3);
+    }
+
+    #[test]
+    fn about_ten_thousand_pixels_are_sampled() {
+        for (size, side) in [((50, 80), (50, 80)), ((400, 900), (67, 150)), ((1000, 1000), (100, 100))] {
+            let map = Array2::<f32>::zeros(size);
+            // The step is rounded down.
+            assert_eq!(map.slice(sample(size)).dim(), side);
+        }
+    }
+
+    #[test]
+    fn the_scale_is_the_median_of_the_pixels_with_texture() {
+        assert_eq!(
+            texture_scale(ndarray::array![[0.0, 0.0, 0.0], [f32::NAN, 3.0, 0.0], [5.0, 0.0, 4.0]].view()),
+            4.0
+        );
+        assert_eq!(texture_scale(Array2::zeros((4, 4)).view()), 0.0);
+    }
+}

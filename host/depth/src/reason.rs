@@ -80,4 +80,11 @@ mod tests {
             assert_eq!(usize::from(reason.code()), index + 1);
         }
     }
+
+    #[test]
+    fn every_reason_has_words_of_its_own() {
+        let words: std::collections::BTreeSet<&str> =
+            Reason::ALL.iter().map(|reason| reason.words()).collect();
+        assert_eq!(words.len(), Reason::ALL.len());
+    }
 }

@@ -307,4 +307,37 @@ mod tests {
         }
         assert!(!format!("{:?}", network()).contains(SECRET));
     }
+
+    #[test]
+    fn a_token_that_is_sent_is_noticed_whether_or_not_it_is_right() {
+        for (name, value, sent) in [
+            ("authorization", "Bearer 0123", true),
+            ("cookie", "a=b; farnear-token=0123", true),
+            ("cookie", "a=b; c=d", false),
+            ("accept", "farnear-token=0123", false),
+        ] {
+            assert_eq!(Guard::has_token(&headers(&[(name, value)])), sent, "{name}: {value}");
+        }
+    }
+
+    #[test]
+    fn one_wrong_token_per_address_waits_and_others_are_refused_at_once() {
+        let [guessing, other] = [1, 2].map(|last| IpAddr::from([192, 168, 0, last]));
+        let throttle = Throttle::default();
+        let runtime = tokio::runtime::Builder::new_current_thread().enable_time().build().unwrap();
+        runtime.block_on(async {
+            let mut waiting = Box::pin(throttle.delay(guessing));
+            let waits = std::future::poll_fn(|context| {
+                std::task::Poll::Ready(waiting.as_mut().poll(context).is_pending())
+            });
+            assert!(waits.await && throttle.is_delayed(guessing) && !throttle.is_delayed(other));
+            assert!(!throttle.delay(guessing).await);
+            assert!(throttle.is_delayed(guessing), "the first still waits");
+            drop(waiting);
+            assert!(!throttle.is_delayed(guessing), "the client is gone");
+            let began = std::time::Instant::now();
+            assert!(throttle.delay(guessing).await && began.elapsed() >= GUESS);
+            assert!(!throttle.is_delayed(guessing));
+        });
+    }
 }

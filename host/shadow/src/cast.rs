@@ -243,3 +243,92 @@ impl Scene<'_> {
             || (x >= columns as f64 && self.bounds.right < columns)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sun::SunPosition;
+
+    fn camera(pitch_deg: f64) -> Camera {
+        CameraFile::parse(&format!(
+            "[camera]\nheight_m = 1.2\nazimuth_deg = 0.0\npitch_deg = {pitch_deg}\nfocal_length_mm = 4.0\npixel_um = 6.0\n"
+        ))
+        .expect("valid")
+        .camera
+    }
+
+    fn block([top, bottom, left, right]: [usize; 4]) -> Mask {
+        Mask::from_shape_fn((480, 640), |(y, x)| (top..bottom).contains(&y) && (left..right).contains(&x))
+    }
+
+    fn of_block<T>(at: [usize; 4], pitch_deg: f64, ask: impl FnOnce(&Scene<'_>) -> T) -> T {
+        let (mask, camera) = (block(at), camera(pitch_deg));
+        let light = Light::Sun(SunPosition { elevation_deg: 45.0, azimuth_deg: 225.0 });
+        let bounds = BoundingBox::of(mask.view()).expect("not empty");
+        ask(&Scene { mask: &mask, bounds, camera: &camera, light, stature_m: 1.75 })
+    }
+
+    #[test]
+    fn a_row_is_where_the_camera_sees_that_height() {
+        for pitch_deg in [-4.0, 0.0, 12.0] {
+            of_block([100, 400, 300, 340], pitch_deg, |scene| {
+                for (up_m, x_m) in [(0.0, 0.5), (1.1, -0.8), (1.7, 0.2)] {
+                    let [x, y] = scene.camera.project([x_m, 6.0, up_m]).expect("visible");
+                    let row = scene.row(y, 6.0);
+                    assert!((row.up_m - up_m).abs() < 1e-9, "{pitch_deg}: {} {up_m}", row.up_m);
+                    assert!((row.offset_m(x) - x_m).abs() < 1e-9, "{pitch_deg}: {} {x_m}", row.offset_m(x));
+                }
+            });
+        }
+    }
+
+    #[test]
+    fn a_shadow_would_be_cut_beyond_an_edge_that_the_silhouette_does_not_touch() {
+        let places =
+            [[320.0, 479.5], [320.0, 480.0], [0.0, 240.0], [-0.5, 240.0], [639.5, 240.0], [640.0, 240.0]];
+        let cut = |at| of_block(at, 0.0, |scene| places.map(|place| scene.would_be_cut(place)));
+        assert_eq!(cut([100, 400, 300, 340]), [false, true, false, true, false, true]);
+        assert_eq!(cut([100, 480, 300, 340]), [false, false, false, true, false, true]);
+        assert_eq!(cut([100, 400, 0, 340]), [false, true, false, false, false, true]);
+        assert_eq!(cut([100, 400, 300, 640]), [false, true, false, true, false, false]);
+    }
+
+    #[test]
+    fn feet_are_looked_for_below_a_silhouette_that_the_picture_cuts() {
+        let rows = |at| of_block(at, 0.0, |scene| scene.feet_rows().collect::<Vec<_>>());
+        let whole = rows([100, 400, 300, 340]);
+        assert_eq!((whole[0], whole[1], whole.last(), whole.len()), (401.0, 400.0, Some(&101.0), 301));
+        let cut = rows([80, 480, 300, 340]);
+        assert_eq!((cut[0], cut.len()), (600.0, 520));
+    }
+
+    #[test]
+    fn a_shrunk_picture_shows_the_same_places_in_larger_pixels() {
+        let (mask, camera) = (block([90, 390, 300, 345]), camera(3.0));
+        for by in [2, 3, 5] {
+            let (small, shrunk_camera) = shrunk(&mask, &camera, by);
+            assert_eq!(small.dim(), (480 / by, 640 / by));
+            let point = [0.4, 6.0, 1.0];
+            let [whole, seen] =
+                [&camera, &shrunk_camera].map(|camera| camera.project(point).expect("visible"));
+            // Each pixel of the copy is the middle one of its block.
+            for (whole, seen) in whole.iter().zip(seen) {
+                assert!((seen * by as f64 + (by / 2) as f64 - whole).abs() < 1e-9, "{by}: {whole} {seen}");
+            }
+            assert!(
+                small.indexed_iter().all(|((y, x), set)| *set == mask[[y * by + by / 2, x * by + by / 2]])
+            );
+        }
+    }
+
+    #[test]
+    fn a_silhouette_of_an_impossible_size_is_not_split() {
+        of_block([100, 400, 300, 340], 0.0, |scene| {
+            // The head is 139.5 px above the horizon: 1.2 m + 0.21 m per metre of distance.
+            assert!(scene.split(2.5).is_some());
+            for distance_m in [6.0, f64::NAN, f64::INFINITY] {
+                assert!(scene.split(distance_m).is_none(), "{distance_m}");
+            }
+        });
+    }
+}

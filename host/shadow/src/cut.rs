@@ -298,28 +298,34 @@ fn half_plane(mask: &Mask, out: &mut Mask, shadow: &ImageShadow) -> Edge {
 mod tests {
     use super::*;
 
-    fn cut_of_shadow_at(eta_rad: f64) -> Edge {
-        let (foot, length) = ([60.0, 90.0], 40.0);
+    const FOOT: [f64; 2] = [60.0, 90.0];
+    const LENGTH_PX: f64 = 40.0;
+
+    fn shadow_at(eta_rad: f64) -> ImageShadow {
         let (sin, cos) = eta_rad.sin_cos();
-        let mask = Mask::from_shape_fn((140, 160), |(y, x)| {
-            let body = (50..70).contains(&x) && (30..90).contains(&y);
-            let (dx, dy) = (x as f64 - foot[0], y as f64 - foot[1]);
-            let (along, across) = (dx * cos + dy * sin, dy * cos - dx * sin);
-            body || (along > 0.0 && along < length && across.abs() < 5.0)
-        });
-        let m_px = [length * cos, length * sin];
-        let shadow = ImageShadow {
-            foot_px: foot,
-            tip_px: [foot[0] + m_px[0], foot[1] + m_px[1]],
+        let m_px = [LENGTH_PX * cos, LENGTH_PX * sin];
+        ImageShadow {
+            foot_px: FOOT,
+            tip_px: [FOOT[0] + m_px[0], FOOT[1] + m_px[1]],
             m_px,
             eta_rad,
             beta_rad: 0.75 * PI - 0.5 * eta_rad,
             mirrored: false,
             height_px: 60.0,
             shortened: false,
-        };
+        }
+    }
+
+    fn cut_of_shadow_at(eta_rad: f64) -> Edge {
+        let (sin, cos) = eta_rad.sin_cos();
+        let mask = Mask::from_shape_fn((140, 160), |(y, x)| {
+            let body = (50..70).contains(&x) && (30..90).contains(&y);
+            let (dx, dy) = (x as f64 - FOOT[0], y as f64 - FOOT[1]);
+            let (along, across) = (dx * cos + dy * sin, dy * cos - dx * sin);
+            body || (along > 0.0 && along < LENGTH_PX && across.abs() < 5.0)
+        });
         let outline = Outline::new(&mask).expect("not empty");
-        hybrid(&mask, &mut mask.clone(), &outline, &shadow)
+        hybrid(&mask, &mut mask.clone(), &outline, &shadow_at(eta_rad))
     }
 
     #[test]
@@ -328,5 +334,155 @@ mod tests {
             assert!(!cut_of_shadow_at(side * 0.44_f64.asin()).half_plane, "{side}");
             assert!(cut_of_shadow_at(side * 0.46_f64.asin()).half_plane, "{side}");
         }
+    }
+
+    /// The pixels of a full picture that `cut` leaves, compared with `stays`; `None` is too close to an edge to tell.
+    fn assert_left(
+        cut: impl Fn(&Mask, &mut Mask, &Outline) -> Edge,
+        stays: impl Fn(f64, f64) -> Option<bool>,
+    ) -> Edge {
+        let full = Mask::from_elem((140, 160), true);
+        let mut out = full.clone();
+        let edge = cut(&full, &mut out, &Outline::new(&full).expect("not empty"));
+        for ((y, x), left) in out.indexed_iter() {
+            if let Some(stays) = stays(x as f64, y as f64) {
+                assert_eq!(*left, stays, "column {x}, row {y}");
+            }
+        }
+        edge
+    }
+
+    /// Whether a value is above 0; `None` within half a pixel of it.
+    fn above(value: f64) -> Option<bool> {
+        (value.abs() > 0.5).then_some(value > 0.0)
+    }
+
+    #[test]
+    fn the_half_plane_ends_at_the_feet_in_either_direction() {
+        for mirrored in [false, true] {
+            for beta_rad in [1.7, 2.2, 3.0] {
+                let shadow = ImageShadow { mirrored, beta_rad, ..shadow_at(0.0) };
+                let (sin, cos) = beta_rad.sin_cos();
+                let edge = assert_left(
+                    |mask, out, _| half_plane(mask, out, &shadow),
+                    |x, y| {
+                        let across = if mirrored { FOOT[0] - x } else { x - FOOT[0] };
+                        above(across * cos - (y - FOOT[1]) * sin)
+                    },
+                );
+                assert!(edge.half_plane);
+            }
+        }
+    }
+
+    #[test]
+    fn only_a_shadow_that_points_away_leaves_what_is_beside_it_and_beyond_it() {
+        // Towards the camera, all below the feet goes.
+        let towards = shadow_at(FRAC_PI_2);
+        assert_left(|mask, out, outline| hybrid(mask, out, outline, &towards), |_, y| above(FOOT[1] - y));
+        // 0.17 and 0.04 of the height of 60 px are the strip's.
+        for turned_deg in [-25.0_f64, 0.0, 25.0] {
+            let away = shadow_at(turned_deg.to_radians() - FRAC_PI_2);
+            let ((sin, cos), (sin_b, cos_b)) = (away.eta_rad.sin_cos(), away.beta_rad.sin_cos());
+            assert_left(
+                |mask, out, outline| hybrid(mask, out, outline, &away),
+                |x, y| {
+                    let (dx, dy) = (x - FOOT[0], y - FOOT[1]);
+                    let kept = above(dx * cos_b - dy * sin_b)?;
+                    let beside = above((dy * cos - dx * sin).abs() - 10.2)?;
+                    let beyond = above(dx * cos + dy * sin - 42.4)?;
+                    Some(kept || beside || beyond)
+                },
+            );
+        }
+    }
+
+    #[test]
+    fn of_equal_runs_that_of_the_middle_angle_counts() {
+        let mask = Mask::from_shape_fn((9, 9), |place| place == (4, 5));
+        let outline = Outline::new(&mask).expect("not empty");
+        let (beta_rad, _) = longest_run(&outline, None, [1.7, 1.8, 1.9].into_iter()).expect("angles");
+        assert_eq!(beta_rad, 1.8);
+    }
+
+    #[test]
+    fn the_silhouette_reaches_to_its_farthest_pixel_in_the_direction_of_the_shadow() {
+        let mask = Mask::from_shape_fn((40, 50), |(y, x)| (10..=30).contains(&y) && (20..=45).contains(&x));
+        let outline = Outline::new(&mask).expect("not empty");
+        for (eta_rad, reach) in [(0.0, 20.0), (FRAC_PI_2, 12.0), (PI, 5.0), (-FRAC_PI_2, 8.0)] {
+            assert!((reach_px(&mask, &outline, [25.0, 18.0], eta_rad) - reach).abs() < 1e-9, "{eta_rad}");
+        }
+        let diagonal = reach_px(&mask, &outline, [25.0, 18.0], 0.25 * PI);
+        assert!((diagonal - 32.0 / 2.0_f64.sqrt()).abs() < 1e-9, "{diagonal}");
+        assert_eq!(reach_px(&mask, &outline, [60.0, 18.0], 0.0), 0.0, "nothing lies there");
+    }
+
+    #[test]
+    fn a_cut_is_doubtful_if_the_shadow_points_away_or_much_is_removed() {
+        let text = "[camera]\nheight_m = 1.2\nazimuth_deg = 0.0\nfocal_length_mm = 4.0\npixel_um = 6.0\n";
+        let mut file = CameraFile::parse(text).expect("valid");
+        // The feet are in row 400.
+        file.subject.distance_m = Some(1.2 * file.camera.focal_px() / (400.0 - 239.5));
+        // A person of 200 px, with something at the feet's right or left, or a wide thing below the feet.
+        let report = |eta_rad, ground: fn(usize, usize) -> bool| {
+            let mask = Mask::from_shape_fn((480, 640), |(y, x)| {
+                ((200..400).contains(&y) && (300..340).contains(&x)) || ground(y, x)
+            });
+            remove(&mask, &file, Light::Direction { eta_rad }, 0.0, Method::Hybrid).expect("a cut").1
+        };
+        let sideways = report(0.3, |y, x| (390..400).contains(&y) && (340..400).contains(&x));
+        assert!(sideways.trustworthy && sideways.removed_fraction < 0.6, "{sideways:?}");
+        let away = report(-FRAC_PI_2, |_, _| false);
+        assert!(!away.trustworthy && away.removed_fraction < 0.6, "{away:?}");
+        let wide = report(FRAC_PI_2, |y, x| (400..470).contains(&y) && (200..600).contains(&x));
+        assert!(!wide.trustworthy && wide.removed_fraction > 0.6, "{wide:?}");
+    }
+
+    #[test]
+    fn the_distance_is_weighted_between_the_heads_width_and_its_row() {
+        let text = "[camera]\nheight_m = 0.8\nazimuth_deg = 0.0\nfocal_length_mm = 4.0\npixel_um = 6.0\n";
+        let mut file = CameraFile::parse(text).expect("valid");
+        // A head 20 px wide from row 100, a body below it.
+        let mask = Mask::from_shape_fn((480, 640), |(y, x)| {
+            (100..130).contains(&y) && (400..420).contains(&x)
+                || (130..430).contains(&y) && (380..440).contains(&x)
+        });
+        let by_width = projection::distance_from_head_m(&file, 20.0);
+        let by_row = projection::distance_from_head_row_m(&file, 99.5).expect("not at eye height");
+        let sd = &file.standard_deviations;
+        let of_width = (sd.head_width_m / file.subject.head_width_m).hypot((sd.head_width_px + 1.0) / 20.0);
+        file.standard_deviations.camera_height_m = 0.0;
+        // The row's relative deviation is that of the 0.95 m from the lens to the head.
+        for (of_row, expected) in [
+            (1e-6, by_row),
+            (1e6, by_width),
+            (of_width, 2.0 / (1.0 / by_width + 1.0 / by_row)),
+            (0.5 * of_width, 5.0 / (1.0 / by_width + 4.0 / by_row)),
+        ] {
+            file.standard_deviations.subject_height_m = 0.95 * of_row;
+            let found = subject_of(&mask, &file).expect("a subject");
+            assert!((found.distance_m / expected - 1.0).abs() < 1e-9, "{of_row}: {found:?} {expected}");
+            let slope = (409.5 - 319.5) / file.camera.focal_px();
+            assert!((found.offset_m - slope * found.distance_m).abs() < 1e-9, "{found:?}");
+        }
+        file.subject.distance_m = Some(4.5);
+        assert_eq!(subject_of(&mask, &file).expect("a subject").distance_m, 4.5);
+    }
+
+    #[test]
+    fn the_thesis_method_cuts_a_shadow_straight_down_by_its_length() {
+        for turned_deg in [-9.0_f64, 0.0, 9.0] {
+            let shadow = shadow_at(FRAC_PI_2 + turned_deg.to_radians());
+            // The last row is 139.
+            let edge = assert_left(
+                |mask, out, outline| thesis(mask, out, outline, &shadow, 0.0),
+                |_, y| above(139.0 - shadow.m_px[1] - y),
+            );
+            assert!(edge.half_plane);
+        }
+        let sideways = shadow_at(FRAC_PI_2 + 11.0_f64.to_radians());
+        let full = Mask::from_elem((140, 160), true);
+        let outline = Outline::new(&full).expect("not empty");
+        assert!(!thesis(&full, &mut full.clone(), &outline, &sideways, 0.0).half_plane);
     }
 }

@@ -155,4 +155,64 @@ mod tests {
         row[129] = true;
         assert_eq!(row_extent(&row), Some((3, 129)));
     }
+
+    #[test]
+    fn an_outline_is_what_has_an_unset_neighbour_or_the_border() {
+        let block = Mask::from_shape_fn((7, 9), |(y, x)| (1..=4).contains(&y) && (2..=6).contains(&x));
+        let outline = Outline::new(&block).expect("not empty");
+        assert_eq!((outline.area, outline.bounds, outline.points.len()), (20, (1, 4, 2, 6), 14));
+        assert!(!outline.points.contains(&[3.0, 2.0]) && outline.points.contains(&[2.0, 3.0]));
+        let full = Outline::new(&Mask::from_elem((7, 9), true)).expect("not empty");
+        assert_eq!((full.area, full.bounds, full.points.len()), (63, (0, 6, 0, 8), 28));
+        assert!(Outline::new(&Mask::default((7, 9))).is_none());
+    }
+
+    /// Columns 2 to 4 and 7, down to row 5, 7, 3 and 6.
+    fn comb() -> Mask {
+        Mask::from_shape_fn((10, 12), |(y, x)| {
+            y <= [0, 0, 5, 7, 3, 0, 0, 6, 0, 0, 0, 0][x] && [2, 3, 4, 7].contains(&x)
+        })
+    }
+
+    #[test]
+    fn the_lower_edge_is_the_lowest_pixel_of_each_column() {
+        let edge = Outline::new(&comb()).expect("not empty").lower_edge(0.0, None);
+        assert_eq!((edge.origin, edge.edge), (2.0, vec![5.0, 7.0, 3.0, 3.0, 3.0, 6.0]));
+    }
+
+    #[test]
+    fn a_flipped_silhouette_is_that_of_the_mirrored_picture() {
+        let mask = comb();
+        let mirrored = Mask::from_shape_fn(mask.dim(), |(y, x)| mask[[y, 11 - x]]);
+        let [plain, other] = [&mask, &mirrored].map(|mask| Outline::new(mask).expect("not empty"));
+        for angle in [0.0, 0.7, 2.0] {
+            let (flipped, expected) = (plain.lower_edge(angle, Some(12.0)), other.lower_edge(angle, None));
+            assert_eq!((flipped.origin, flipped.edge), (expected.origin, expected.edge));
+            let [mut left, mut of_mirrored] = [mask.clone(), mirrored.clone()];
+            let cleared = clear_left_of(mask.view(), &mut left, angle, 1.5, true);
+            assert_eq!(cleared, clear_left_of(mirrored.view(), &mut of_mirrored, angle, 1.5, false));
+            assert_eq!(left, Mask::from_shape_fn(mask.dim(), |(y, x)| of_mirrored[[y, 11 - x]]));
+        }
+    }
+
+    #[test]
+    fn what_is_left_of_a_rotated_limit_is_cleared() {
+        let full = Mask::from_elem((6, 8), true);
+        let mut left = full.clone();
+        let (angle, limit) = (0.5_f32, 1.0);
+        let cleared = clear_left_of(full.view(), &mut left, angle, limit, false);
+        for ((y, x), left) in left.indexed_iter() {
+            assert_eq!(*left, x as f32 * angle.cos() - y as f32 * angle.sin() >= limit, "{x}, {y}");
+        }
+        assert_eq!(cleared, left.iter().filter(|left| !**left).count());
+    }
+
+    #[test]
+    fn the_rotation_point_ends_the_longest_fall() {
+        let falling = |edge: &[f32]| LowerEdge { edge: edge.to_vec(), origin: 10.0 }.rotation_point(2);
+        // Each slope is over the neighbours of a column.
+        assert_eq!(falling(&[0.0, 1.0, 2.0, 3.0, 2.0, 1.0, 0.0, 1.0, 2.0]), (2, 15.5));
+        assert_eq!(falling(&[5.0, 4.0, 5.0, 9.0, 8.0, 7.0, 6.0, 6.0]), (3, 16.5));
+        assert_eq!(falling(&[0.0, 1.0, 2.0]), (0, 10.0));
+    }
 }

@@ -146,3 +146,81 @@ fn beta_variance(
         + (a * b / (u * d)).powi(2) * distance_var
         + (b * shadow.ry_m / d).powi(2) * sd.camera_height_m.powi(2))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_derivatives_of_azimuth_and_elevation_are_those_of_differences() {
+        const STEP: f64 = 1e-5;
+        for (declination, hour_angle, latitude) in [(0.4, 0.5, 0.9), (-0.3, -0.7, 0.6), (0.1, 1.1, -0.8)] {
+            let found = horizon_partials(declination, hour_angle, latitude);
+            for i in 0..3 {
+                let at = |step: f64| {
+                    let mut moved = [declination, hour_angle, latitude];
+                    moved[i] += step;
+                    let [declination, hour_angle, latitude] = moved;
+                    sun::to_horizon(declination, hour_angle, latitude)
+                };
+                let (before, after) = (at(-STEP), at(STEP));
+                let slope = |before: f64, after: f64| (after - before).to_radians() / (2.0 * STEP);
+                let azimuth = slope(before.azimuth_deg, after.azimuth_deg);
+                let elevation = slope(before.elevation_deg, after.elevation_deg);
+                // Third derivatives times the squared step, and rounding divided by it.
+                assert!((found.azimuth[i] - azimuth).abs() < 1e-8, "{i}: {azimuth} {:?}", found.azimuth);
+                assert!(
+                    (found.elevation[i] - elevation).abs() < 1e-8,
+                    "{i}: {elevation} {:?}",
+                    found.elevation
+                );
+            }
+        }
+    }
+
+    fn file() -> CameraFile {
+        let text = "[camera]\nheight_m = 1.2\nazimuth_deg = 130.0\nfocal_length_mm = 4.0\npixel_um = 6.0\n";
+        CameraFile::parse(text).expect("valid")
+    }
+
+    #[test]
+    fn the_variance_of_the_tip_is_that_of_differences() {
+        let (file, subject_m) = (file(), 1.75);
+        let (azimuth_deg, elevation_deg) = (70.0, 35.0_f64);
+        let along = |azimuth_deg, elevation_deg, height_m| {
+            let sun = sun::SunPosition { elevation_deg, azimuth_deg };
+            on_ground(sun, height_m, &file.camera).expect("the sun is up")
+        };
+        let shadow = along(azimuth_deg, elevation_deg, subject_m);
+        let [azimuth_var, elevation_var] = [0.02_f64.powi(2), 0.03_f64.powi(2)];
+        const STEP: f64 = 1e-5;
+        let by_azimuth = (along(azimuth_deg + STEP.to_degrees(), elevation_deg, subject_m).ry_m
+            - along(azimuth_deg - STEP.to_degrees(), elevation_deg, subject_m).ry_m)
+            / (2.0 * STEP);
+        let by_elevation = (along(azimuth_deg, elevation_deg + STEP.to_degrees(), subject_m).ry_m
+            - along(azimuth_deg, elevation_deg - STEP.to_degrees(), subject_m).ry_m)
+            / (2.0 * STEP);
+        let by_height = shadow.ry_m / subject_m;
+        let sd = &file.standard_deviations;
+        let expected = by_azimuth.powi(2) * (azimuth_var + sd.azimuth_deg.to_radians().powi(2))
+            + by_elevation.powi(2) * elevation_var
+            + (by_height * sd.subject_height_m).powi(2);
+        let found = tip_variance(&file, elevation_deg.to_radians(), shadow, azimuth_var, elevation_var);
+        // Third derivatives times the squared step, and rounding divided by it.
+        assert!((found / expected - 1.0).abs() < 1e-7, "{found} {expected}");
+    }
+
+    #[test]
+    fn the_variance_of_the_distance_is_that_of_the_heads_width_and_its_image() {
+        let file = file();
+        let (sd, distance_m) = (&file.standard_deviations, 5.0);
+        let focal_m = 4e-3;
+        let in_image_m = file.subject.head_width_m * focal_m / distance_m;
+        // The distance is a quotient: its relative variance is the sum of those of its parts.
+        let relative = (sd.head_width_m / file.subject.head_width_m).powi(2)
+            + (1e-6 * sd.image_distance_um / focal_m).powi(2)
+            + (6e-6 * sd.head_width_px / in_image_m).powi(2);
+        let found = distance_variance(&file, distance_m);
+        assert!((found / (relative * distance_m * distance_m) - 1.0).abs() < 1e-12, "{found}");
+    }
+}

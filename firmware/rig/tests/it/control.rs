@@ -345,3 +345,23 @@ fn alarms_and_their_end_are_in_the_log() {
     let halted = |note: &Note| matches!(note, Note::Alarm(record) if record.alarm == Alarm::Halt);
     assert!(fake.notes.iter().any(halted) && fake.notes.contains(&Note::AlarmCleared { number: 1 }));
 }
+
+#[test]
+fn a_stop_acts_in_the_tick_that_brings_it_and_other_requests_wait() {
+    let (mut rig, mut fake) = (rig(), Fake::new(800.0));
+    let mut control = Control::new(&mut rig);
+    fake.ask(&Request::Status);
+    run(&mut control, &mut fake, 10);
+    fake.ask(&Request::Halt);
+    tick(&mut control, &mut fake);
+    let halted = |note: &Note| matches!(note, Note::Alarm(record) if record.alarm == Alarm::Halt);
+    assert!(fake.notes.iter().any(halted));
+    run(&mut control, &mut fake, 10);
+    let cleared = Note::AlarmCleared { number: 1 };
+    fake.ask(&Request::ClearAlarm { number: 1 });
+    tick(&mut control, &mut fake);
+    tick(&mut control, &mut fake);
+    assert!(!fake.notes.contains(&cleared), "a tick takes its notes before it serves others");
+    run(&mut control, &mut fake, 10);
+    assert!(fake.notes.contains(&cleared));
+}

@@ -313,6 +313,21 @@ mod tests {
         assert_eq!(pairing.quiet_time(), Duration::from_secs(1));
     }
 
+    /// The board may be ahead by 200 ppm: 100 s of it last 99.98 s here.
+    #[test]
+    fn an_exposure_may_be_early_by_the_drift_of_the_clocks_and_no_more() {
+        let after_100_s = |arrived_ms| {
+            let mut pairing = Pairing::default();
+            pairing.begin();
+            arrive(&mut pairing, long_shot(1, 1_000_000), 18).unwrap();
+            arrive(&mut pairing, long_shot(2, 100_990_000), arrived_ms)
+        };
+        // A picture counts as arrived 10 ms later.
+        assert_eq!(after_100_s(99_971).unwrap(), Belongs::Here);
+        let error = after_100_s(99_969).unwrap_err();
+        assert!(matches!(error, CameraError::Stale { wanted: 2, .. }), "{error:?}");
+    }
+
     #[test]
     fn rejects_repeated_pixels_unless_the_picture_is_uniform() {
         let image = |pixels: [u16; 3]| Image { pixels: ndarray::array![pixels], bits: 8 };
@@ -344,6 +359,32 @@ mod tests {
         assert!(judge(at(9, "IMG_0007.jpg"), at(9, "IMG_0006.jpg")).is_err());
         assert!(judge(at(9, "IMG_9999.jpg"), at(9, "IMG_0001.jpg")).is_ok());
         assert!(judge(at(9, "IMG_0001.jpg"), at(9, "IMG_9999.jpg")).is_err());
+    }
+
+    #[test]
+    fn only_counters_of_four_digits_wrap_and_only_over_half_of_their_range() {
+        let order = |a: &str, b: &str| by_number(Path::new(a), Path::new(b));
+        assert_eq!(order("IMG_0001.jpg", "IMG_5001.jpg"), Some(Ordering::Less));
+        assert_eq!(order("IMG_0001.jpg", "IMG_5002.jpg"), Some(Ordering::Greater));
+        assert_eq!(order("IMG_00001.jpg", "IMG_09999.jpg"), Some(Ordering::Less));
+        assert_eq!(order("IMG_10000.jpg", "IMG_4000.jpg"), Some(Ordering::Greater));
+        assert_eq!(order("IMG_4000.jpg", "IMG_10000.jpg"), Some(Ordering::Less));
+        assert_eq!(order("IMG_0001.jpg", "DSC_0002.jpg"), None);
+    }
+
+    #[test]
+    fn short_counts_skip_nought_and_wrap_the_shorter_way() {
+        for (from, to, advance) in [(65_535, 1, 1), (1, 65_535, -1), (65_530, 3, 8), (3, 65_530, -8)] {
+            assert_eq!(counted(from, to), advance, "{from} to {to}");
+        }
+        // Half of the range is 32767 in either direction.
+        for (from, to, advance) in
+            [(1, 32_768, 32_767), (32_768, 1, -32_767), (1, 32_769, -32_767), (32_769, 1, 32_767)]
+        {
+            assert_eq!(counted(from, to), advance, "{from} to {to}");
+        }
+        assert_eq!((counted(65_535, 65_536), counted(65_536, 1)), (1, -65_535), "longer counts do not wrap");
+        assert_eq!((counted(0, u64::MAX), counted(u64::MAX, 0)), (i64::MAX, i64::MIN));
     }
 
     fn stamp(count: Option<u64>, time_us: Option<u64>) -> Stamp {
@@ -389,7 +430,9 @@ mod tests {
             assert_eq!(after_1000_s(1_000_000_000 + drift_us).unwrap(), Belongs::Here, "{drift_us}");
             assert_eq!(after_1000_s(1_000_000_000 - drift_us).unwrap(), Belongs::Here, "-{drift_us}");
         }
-        let beyond_us = 210_000 + JITTER.as_micros() as u64;
+        let most_us = 200_000 + JITTER.as_micros() as u64;
+        assert_eq!(after_1000_s(1_000_000_000 + most_us).unwrap(), Belongs::Here);
+        let beyond_us = most_us + 1;
         assert!(after_1000_s(1_000_000_000 + beyond_us).is_err());
         assert!(after_1000_s(1_000_000_000 - beyond_us).is_err());
     }

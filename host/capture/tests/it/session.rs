@@ -1,6 +1,12 @@
 //! Sessions: versions, resets, unplugged boards.
 
-use std::time::Duration;
+use std::{
+    sync::{
+        Arc,
+        atomic::{AtomicU32, Ordering},
+    },
+    time::{Duration, Instant},
+};
 
 use farnear_capture::{Client, ClientError, Timing, Transport};
 use farnear_protocol::{
@@ -99,11 +105,11 @@ fn reports_a_board_on_another_port_and_rejects_another_board() {
     peer.board().hello.unique_id = [0xab; 12];
     leave(&client);
     let sessions = peer.board().session;
-    let until = std::time::Instant::now() + Duration::from_secs(20);
+    let until = Instant::now() + Duration::from_secs(20);
     // The owner reconnects on its own and may have found the other board already.
     let error = loop {
         match client.reopen().err().unwrap() {
-            ClientError::Gone { .. } if std::time::Instant::now() < until => {}
+            ClientError::Gone { .. } if Instant::now() < until => {}
             error => break error,
         }
     };
@@ -134,6 +140,77 @@ fn ignores_the_work_of_a_dead_program() {
     // Its later requests are refused with the reason.
     let error = died.status().err().unwrap();
     assert!(matches!(error, ClientError::TakenOver { .. }), "{error:?}");
+}
+
+#[test]
+fn a_board_that_was_taken_over_is_left_alone_until_it_is_taken_back() {
+    let (first, peer) = connect(Faults::default());
+    let second = Client::connect(peer.connect(), "scripted").unwrap();
+    let taken = peer.board().session;
+    assert!(matches!(first.status(), Err(ClientError::TakenOver { .. })));
+    assert!(matches!(first.status(), Err(ClientError::TakenOver { .. })));
+    assert_eq!(peer.board().session, taken, "no session of its own accord");
+    second.status().unwrap();
+    let mut first = first;
+    first.reopen().unwrap();
+    first.status().unwrap();
+    assert_ne!(peer.board().session, taken);
+    assert!(matches!(second.status(), Err(ClientError::TakenOver { .. })));
+}
+
+#[test]
+fn an_unplugged_board_is_not_looked_for_all_the_time() {
+    // Attempts are half a second apart.
+    const WATCHED: Duration = Duration::from_millis(1_200);
+    let peer = Peer::new(Faults::default());
+    let attempts = Arc::new(AtomicU32::new(0));
+    let (mut connect, counted) = (peer.connect(), Arc::clone(&attempts));
+    let connect = move || {
+        counted.fetch_add(1, Ordering::SeqCst);
+        connect()
+    };
+    let client = Client::connect(Box::new(connect), "scripted").unwrap();
+    client.set_timing(SHORT);
+    peer.board().gone = true;
+    let lost = Instant::now();
+    assert!(matches!(client.status(), Err(ClientError::Gone { .. })));
+    std::thread::sleep(WATCHED);
+    let tried = attempts.load(Ordering::SeqCst) - 1;
+    let due = lost.elapsed().as_millis() / 500;
+    assert!(u128::from(tried) <= due, "{tried} attempts where {due} were due");
+}
+
+#[test]
+fn a_real_board_that_was_unplugged_is_found_again_and_an_emulated_one_is_not() {
+    for emulated in [false, true] {
+        let peer = Peer::new(Faults::default());
+        peer.board().hello.emulated = emulated;
+        let client = Client::connect(peer.connect(), "scripted").unwrap();
+        client.set_timing(SHORT);
+        peer.board().gone = true;
+        assert!(matches!(client.status(), Err(ClientError::Gone { .. })));
+        let connections = peer.board().connections;
+        peer.board().gone = false;
+        let until = Instant::now() + Duration::from_secs(if emulated { 1 } else { 20 });
+        while peer.board().connections == connections && Instant::now() < until {
+            std::thread::sleep(Duration::from_millis(10));
+        }
+        assert_eq!(
+            peer.board().connections == connections,
+            emulated,
+            "the port may be another program's by now"
+        );
+    }
+}
+
+#[test]
+fn work_of_a_board_that_was_reset_ends_when_the_board_is_greeted_again() {
+    let (client, peer) = connect(Faults { never_ends: true, ..Faults::default() });
+    let work = client.start_home(Axis::SensorCoarse).unwrap();
+    peer.board().hello.boot = 8;
+    client.clone().reopen().unwrap();
+    let error = work.homed().err().unwrap();
+    assert!(matches!(error, ClientError::Reset { was: 7, now: 8, .. }), "{error:?}");
 }
 
 #[test]

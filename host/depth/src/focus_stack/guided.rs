@@ -172,4 +172,30 @@ mod tests {
         let guide = Guide { sharp: dark.view(), sharpness: flat.view(), reach_px: 6.0, images: 12 };
         assert_eq!(mended(place.view(), flat.clone(), &guide), place);
     }
+
+    #[test]
+    fn a_wrong_place_in_a_narrow_bright_stripe_is_mended_by_the_stripe() {
+        let in_stripe = |x: usize| (20..25).contains(&x);
+        // Much brighter than its surroundings; two of the standard deviations over which brightness counts as equal, in an
+        // image with more contrast beyond the window.
+        for (stripe, end) in [(0.9, 0.2), (0.35, 1.0)] {
+            let sharp = Array2::from_shape_fn(SIZE, |(_, x)| match x {
+                x if in_stripe(x) => stripe,
+                50.. => end,
+                _ => 0.2,
+            });
+            let mut wrong = Array2::from_shape_fn(SIZE, |(_, x)| if in_stripe(x) { 2.0 } else { 9.0 });
+            wrong[(20, 22)] = 9.0;
+            let found = mend(&wrong, &sharp, &Array2::from_elem(SIZE, 0.3));
+            // The mean of a bin is rounded.
+            assert!((found[(20, 22)] - 2.0).abs() < 1e-4, "{stripe}: {}", found[(20, 22)]);
+        }
+    }
+
+    #[test]
+    fn the_middle_of_a_map_is_its_median() {
+        assert_eq!(middle(ndarray::array![[5.0, 1.0, 9.0, 3.0, 7.0]].view()), 5.0);
+        assert_eq!(middle(ndarray::array![[5.0, 1.0], [9.0, 3.0]].view()), 5.0);
+        assert_eq!(middle(Array2::zeros((0, 4)).view()), 0.0);
+    }
 }

@@ -369,4 +369,103 @@ mod tests {
         // Variance of 7 equal steps: 4 squared slopes in each direction.
         close(Sharpness::GreyVariance, 4e-3);
     }
+
+    /// A pixel's neighbour, rows down and columns to the right.
+    type Neighbour<'a> = &'a dyn Fn(isize, isize) -> f64;
+
+    fn offsets(reach: isize) -> impl Iterator<Item = [isize; 2]> {
+        (-reach..=reach).flat_map(move |y| (-reach..=reach).map(move |x| [y, x]))
+    }
+
+    fn mean_and_variance(values: impl Iterator<Item = f64>) -> [f64; 2] {
+        let values: Vec<f64> = values.collect();
+        let mean = values.iter().sum::<f64>() / values.len() as f64;
+        [mean, values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / values.len() as f64]
+    }
+
+    /// The measures over 3x3 pixels as the survey defines them: sums of masks at each pixel, and their mean or variance.
+    fn by_definition(measure: Sharpness, v: Neighbour) -> f64 {
+        let masked = |weight: fn(f64, f64) -> f64, reach: isize, v: Neighbour| -> f64 {
+            offsets(reach).map(|[y, x]| weight(y as f64, x as f64) * v(y, x)).sum()
+        };
+        let over = |f: &dyn Fn(Neighbour) -> f64| {
+            mean_and_variance(offsets(1).map(|[y, x]| f(&|dy, dx| v(y + dy, x + dx))))
+        };
+        let mean = |f: &dyn Fn(Neighbour) -> f64| over(f)[0];
+        let variance = |f: &dyn Fn(Neighbour) -> f64| over(f)[1];
+        let right = |v: Neighbour| v(0, 1) - v(0, 0);
+        let below = |v: Neighbour| v(1, 0) - v(0, 0);
+        let second = |v: Neighbour, y: isize, x: isize| (2.0 * v(0, 0) - v(y, x) - v(-y, -x)).abs();
+        let laplacian = |v: Neighbour| 4.0 * v(0, 0) - v(0, 1) - v(0, -1) - v(1, 0) - v(-1, 0);
+        let sobel = |v: Neighbour| {
+            [masked(|y, x| x * (2.0 - y.abs()), 1, v), masked(|y, x| y * (2.0 - x.abs()), 1, v)]
+        };
+        let bell = |v: Neighbour| {
+            let total: f64 = (-4..=4).map(|t| (-0.5 * f64::from(t * t)).exp()).sum();
+            let slopes: [f64; 2] = [
+                masked(|y, x| x * (-0.5 * (y * y + x * x)).exp(), 4, v),
+                masked(|y, x| y * (-0.5 * (y * y + x * x)).exp(), 4, v),
+            ];
+            slopes.map(|slope| slope / (total * total))
+        };
+        let around = |v: Neighbour| offsets(1).map(|[y, x]| v(y, x)).collect::<Vec<_>>();
+        match measure {
+            Sharpness::ModifiedLaplacian => mean(&|v| second(v, 0, 1) + second(v, 1, 0)),
+            Sharpness::DiagonalLaplacian => mean(&|v| {
+                second(v, 0, 1) + second(v, 1, 0) + (second(v, 1, 1) + second(v, 1, -1)) / 2.0_f64.sqrt()
+            }),
+            Sharpness::LaplacianEnergy => mean(&|v| laplacian(v).powi(2)),
+            Sharpness::LaplacianVariance => variance(&laplacian),
+            Sharpness::Tenengrad => mean(&|v| sobel(v).map(|s| s * s).iter().sum()),
+            Sharpness::TenengradVariance => variance(&|v| sobel(v)[0].hypot(sobel(v)[1])),
+            Sharpness::GradientEnergy => mean(&|v| right(v).powi(2) + below(v).powi(2)),
+            Sharpness::AbsoluteGradient => mean(&|v| right(v).abs().max(below(v).abs())),
+            Sharpness::SquaredGradient => mean(&|v| right(v).powi(2)),
+            Sharpness::Brenner => mean(&|v| (v(0, 2) - v(0, 0)).powi(2).max((v(2, 0) - v(0, 0)).powi(2))),
+            Sharpness::GaussianDerivative => mean(&|v| bell(v).map(|s| s * s).iter().sum()),
+            Sharpness::Steerable => mean(&|v| {
+                let [x, y] = bell(v);
+                let along = |i| (f64::from(i) * std::f64::consts::PI / 8.0).sin_cos();
+                (0..8).map(|i| (along(i).1 * x + along(i).0 * y).abs()).fold(0.0, f64::max)
+            }),
+            Sharpness::SpatialFrequency => mean(&|v| right(v).powi(2) + below(v).powi(2)).sqrt(),
+            Sharpness::GreyVariance => variance(&|v| v(0, 0)),
+            Sharpness::NormalisedVariance => variance(&|v| v(0, 0)) / mean(&|v| v(0, 0)),
+            Sharpness::VarianceOfVariance => variance(&|v| mean_and_variance(around(v).into_iter())[1]),
+            Sharpness::Vollath => mean(&|v| v(0, 0) * (v(0, 1) - v(0, 2))).max(0.0),
+            Sharpness::Contrast => mean(&|v| around(v).iter().map(|n| (n - v(0, 0)).abs()).sum()),
+            // The surface has a constant, too; over nine pixels the sum of x^2 is 6, that of (x^2 - 2/3)^2 is 2.
+            Sharpness::Curvature => mean(&|v| {
+                let slopes = masked(|_, x| x, 1, v).abs() + masked(|y, _| y, 1, v).abs();
+                let squares = masked(|_, x| x * x - 2.0 / 3.0, 1, v).abs()
+                    + masked(|y, _| y * y - 2.0 / 3.0, 1, v).abs();
+                slopes / 6.0 + squares / 2.0
+            }),
+            Sharpness::MeanQuotient => mean(&|v| {
+                let local = mean_and_variance(around(v).into_iter())[0];
+                (v(0, 0) / local).max(local / v(0, 0)) - 1.0
+            }),
+            Sharpness::Range => {
+                let values = around(v);
+                values.iter().fold(0.0, |a: f64, b| a.max(*b))
+                    - values.iter().fold(9.0, |a: f64, b| a.min(*b))
+            }
+        }
+    }
+
+    #[test]
+    fn every_measure_is_what_the_survey_defines() {
+        let image = texture(1);
+        for measure in Sharpness::ALL {
+            let map = measure.of(image.view(), 3);
+            for (row, column) in [(20_usize, 30_usize), (21, 30), (33, 11), (14, 47)] {
+                let value = |y: isize, x: isize| {
+                    f64::from(image[(row.wrapping_add_signed(y), column.wrapping_add_signed(x))])
+                };
+                let (found, expected) = (f64::from(map[(row, column)]), by_definition(*measure, &value));
+                // Running sums over a row in single precision, of values around 1.
+                assert!((found - expected).abs() < 1e-3 * expected + 1e-5, "{measure}: {found} {expected}");
+            }
+        }
+    }
 }

@@ -168,6 +168,14 @@ mod tests {
     }
 
     #[test]
+    fn window_means_reach_equally_far_to_all_sides() {
+        let values = Array2::from_shape_fn((5, 7), |(row, column)| [(1 << column) as f32, (1 << row) as f32]);
+        let all = Array2::from_elem((5, 7), true);
+        assert_eq!(window_means(&values, all.view(), 1)[[2, 3]], [28.0 / 3.0, 14.0 / 3.0]);
+        assert_eq!(window_means(&values, all.view(), 2)[[2, 3]], [62.0 / 5.0, 31.0 / 5.0]);
+    }
+
+    #[test]
     fn rejects_pictures_of_different_sizes() {
         let (frame, narrow) = (Array3::zeros((4, 5, 3)), Array3::zeros((4, 4, 3)));
         let mask = Array2::from_elem((4, 5), true);

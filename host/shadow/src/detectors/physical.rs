@@ -226,4 +226,53 @@ mod tests {
         detector.learn(&[([0.8, 0.9], 1.0); 50]);
         assert!(detector.is_shadow([0.8, 0.9]) && !detector.is_shadow([1.5, 0.2]));
     }
+
+    #[test]
+    fn a_component_has_the_weighted_mean_and_spread_of_its_samples() {
+        let mut detector = Physical::new(Settings::default());
+        let samples: Vec<_> =
+            (0..50).map(|i| if i < 25 { ([1.0, 1.0], 3.0) } else { ([1.2, 1.0], 2.0) }).collect();
+        // 0.9 to the power of 200 is nothing.
+        (0..200).for_each(|_| detector.learn(&samples));
+        // Mean 1 + 0.4 * 0.2; variance per axis half of 0.6 * 0.08^2 + 0.4 * 0.12^2.
+        let spread = 0.0048_f32.sqrt();
+        for (angles, distance) in
+            [([1.08, 1.0], 0.0), ([1.08 + spread, 1.0], 1.0), ([1.08, 1.0 - 2.0 * spread], 2.0)]
+        {
+            let found = detector.mixture[0].distance_sd(angles);
+            assert!((found - distance).abs() < 1e-3, "{angles:?}: {found}");
+        }
+        assert_eq!(detector.mixture.len(), 1);
+    }
+
+    #[test]
+    fn a_second_light_is_learned_and_forgotten_and_strays_are_not() {
+        let (first, second, between) = ([0.5, 0.5], [1.2, 0.9], [0.85, 0.7]);
+        let samples = |of_second| -> Vec<_> {
+            (0..50).map(|i| (if i < of_second { second } else { first }, 1.0)).collect()
+        };
+        let mut detector = Physical::new(Settings::default());
+        (0..50).for_each(|_| detector.learn(&samples(5)));
+        assert!(detector.is_shadow(first) && detector.mixture.len() == 1, "a tenth may be noise");
+        (0..50).for_each(|_| detector.learn(&samples(20)));
+        assert!(detector.is_shadow(first) && detector.is_shadow(second) && !detector.is_shadow(between));
+        (0..50).for_each(|_| detector.learn(&samples(0)));
+        assert!(detector.is_shadow(first) && !detector.is_shadow(second));
+        let total: f32 = detector.mixture.iter().map(|component| component.weight).sum();
+        assert!((total - 1.0).abs() < 1e-5);
+    }
+
+    #[test]
+    fn the_weakest_component_makes_room_for_a_new_one() {
+        let mut detector = Physical::new(Settings::default());
+        for light in 0..=COMPONENTS {
+            // Ever fewer of the first; 1 apart, far beyond the reach of two standard deviations.
+            let samples: Vec<_> =
+                (0..50).map(|i| ([if i < 30 { 0.0 } else { 1.0 + light as f32 }, 0.0], 1.0)).collect();
+            detector.learn(&samples);
+        }
+        assert_eq!(detector.mixture.len(), COMPONENTS);
+        let means = || detector.mixture.iter().map(|component| component.mean[0]);
+        assert!(means().any(|mean| mean == 0.0) && means().any(|mean| mean == 1.0 + COMPONENTS as f32));
+    }
 }

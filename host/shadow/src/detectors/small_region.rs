@@ -147,6 +147,19 @@ mod tests {
     use ndarray::Array3;
 
     #[test]
+    fn functions_have_no_mean_and_their_squares_sum_to_the_energy() {
+        let bank = gabor_bank();
+        let total =
+            |window: &Window, of: fn(f32) -> f32| window.iter().flatten().map(|v| of(*v)).sum::<f32>();
+        // Sums of 81 single-precision numbers.
+        for function in &bank.functions {
+            assert!(total(function, |v| v).abs() < 1e-5 && (total(function, f32::abs) - 1.0).abs() < 1e-5);
+        }
+        let squares: f32 = bank.functions.iter().map(|function| total(function, |v| v.powi(2))).sum();
+        assert!((bank.energy - squares).abs() < 1e-5 * squares, "{} {squares}", bank.energy);
+    }
+
+    #[test]
     fn functions_ignore_constants_and_gain() {
         let bank = gabor_bank();
         let all = Array2::from_elem((20, 20), true);

@@ -36,27 +36,26 @@ fn hybrid_removes_shadows_of_a_hundred_scenes_and_keeps_the_person() {
         percent(total.wrongly_removed_percent()),
         percent(total.iou_percent())
     );
-    assert!(percent(total.removed_percent()) >= 78.0, "{}", percent(total.removed_percent()));
-    assert!(percent(total.wrongly_removed_percent()) <= 2.0, "{}", percent(total.wrongly_removed_percent()));
-    assert!(percent(total.iou_percent()) >= 92.0, "{}", percent(total.iou_percent()));
+    // Half a point from the results.
+    assert!(percent(total.removed_percent()) >= 93.3, "{}", percent(total.removed_percent()));
+    assert!(percent(total.wrongly_removed_percent()) <= 1.3, "{}", percent(total.wrongly_removed_percent()));
+    assert!(percent(total.iou_percent()) >= 97.0, "{}", percent(total.iou_percent()));
 }
 
 #[test]
 fn the_thesis_method_removes_shadows_too_and_harder_scenes_stay_usable() {
     let printed = score(Kind::Standard, Method::Thesis, 30);
-    assert!(
-        percent(printed.removed_percent()) > 60.0 && percent(printed.wrongly_removed_percent()) < 10.0,
-        "{printed:?}"
-    );
-    // Some points below the results of 50 scenes (93.8, 94.7 and 84.0 removed), well above angles alone (80,
-    // 57 and 83).
-    for (kind, removed, iou) in
-        [(Kind::Pitched, 88.0, 95.0), (Kind::Bending, 88.0, 94.0), (Kind::Behind, 78.0, 92.0)]
+    let found = [printed.removed_percent(), printed.wrongly_removed_percent()].map(percent);
+    // Half a point from the results, here and below.
+    assert!(found[0] > 83.9 && found[1] < 2.2, "{found:?}");
+    // Angles alone remove 80, 57 and 83.
+    for (kind, removed, wrongly, iou) in
+        [(Kind::Pitched, 93.4, 1.6, 96.7), (Kind::Bending, 93.2, 1.9, 95.7), (Kind::Behind, 88.5, 4.0, 93.8)]
     {
         let total = score(kind, Method::Hybrid, 30);
         let found =
             [total.removed_percent(), total.wrongly_removed_percent(), total.iou_percent()].map(percent);
-        assert!(found[0] > removed && found[1] < 5.0 && found[2] > iou, "{kind:?} {found:?}");
+        assert!(found[0] > removed && found[1] < wrongly && found[2] > iou, "{kind:?} {found:?}");
     }
 }
 

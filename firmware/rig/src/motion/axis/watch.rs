@@ -156,3 +156,76 @@ impl Stepper {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::settings::Settings;
+
+    /// A homed and enabled axis at these steps, by count and by encoder.
+    fn at(position: i32) -> Stepper {
+        let mut stepper = Stepper::new(Settings::DEFAULT.coarse);
+        (stepper.state, stepper.enabled) = (PositionState::Homed, true);
+        stepper.position = position;
+        stepper.encoder = steps::to_encoder(steps::to_nanometres(position));
+        stepper
+    }
+
+    #[test]
+    fn the_encoder_may_be_anywhere_in_the_running_segment() {
+        // The step and the count of the encoder are rounded.
+        const ROUNDING_NM: i32 = 300;
+        // 400 of 1000 pulses of the segment are counted: 600 are to come.
+        for (away, ahead) in [(true, 600_i32), (false, -600)] {
+            for (from, sign) in [(0, -ahead.signum()), (ahead, ahead.signum())] {
+                let error = |beyond_nm: i32| {
+                    let mut stepper = at(4_000);
+                    stepper.away = away;
+                    let _ = stepper.outstanding.push_back(1_000);
+                    stepper.counted_of_oldest = 400;
+                    let limit = stepper.settings.following.0;
+                    let end = steps::to_nanometres(4_000 + from).0;
+                    stepper.encoder = steps::to_encoder(Nanometres(end + sign * (limit + beyond_nm)));
+                    stepper.following_error().map(|error| error.0.signum())
+                };
+                assert_eq!(error(-ROUNDING_NM), None, "{away} {from}");
+                assert_eq!(error(ROUNDING_NM), Some(-sign), "{away} {from}");
+            }
+        }
+    }
+
+    #[test]
+    fn pulses_away_take_up_the_play_and_pulses_back_restore_it() {
+        let mut stepper = at(0);
+        stepper.settings.backlash = Nanometres(6_250);
+        let most = steps::to_steps(stepper.approach()).unsigned_abs();
+        let mut pulses = 0;
+        let mut count = |stepper: &mut Stepper, away, new| {
+            stepper.away = away;
+            pulses += new;
+            stepper.count(&StepperState { pulses, ..StepperState::IDLE });
+            stepper.slack
+        };
+        count(&mut stepper, true, 0);
+        stepper.slack = u32::MAX;
+        assert_eq!(count(&mut stepper, true, 10), most - 10);
+        assert_eq!(count(&mut stepper, true, 0), most - 10);
+        assert_eq!(count(&mut stepper, false, 4), most - 6);
+        assert_eq!(count(&mut stepper, false, 400), most);
+        assert_eq!(count(&mut stepper, true, most + 5), 0);
+        assert_eq!(stepper.position, 10 - 4 - 400 + most as i32 + 5);
+    }
+
+    #[test]
+    fn the_home_switch_may_be_closed_up_to_the_end_of_its_zone() {
+        let fault = |beyond| {
+            let zone = steps::to_steps(Settings::DEFAULT.coarse.home_zone);
+            let mut stepper = at(zone + beyond);
+            stepper.go(Nanometres(5_000_000));
+            stepper.home_switch.sample(true, Place { position: 0, measured: Nanometres(0) });
+            stepper.find_fault(&MotorInputs::IDLE, false)
+        };
+        assert_eq!(fault(0), None);
+        assert_eq!(fault(1), Some(Failure::HomeSwitch));
+    }
+}
