@@ -96,7 +96,7 @@ export function make(host) {
     model.value = optics.psf.model;
     if (optics.psf.k != null) inputs.k.value = optics.psf.k;
     if (optics.psf.p != null) inputs.p.value = optics.psf.p;
-    using.textContent = optics.stage ? "In use: a lens calibrated from a stack. “Use these optics” replaces the calibration by what is typed." : "";
+    using.textContent = optics.stage ? "In use: a lens calibrated from a stack. “Use these optics” replaces the calibration by the typed values." : "";
     await calculate();
   }
   let loaded = -1;

@@ -229,7 +229,7 @@ async fn lens_of_stack(
     require_control(&app, &headers)?;
     let open = connected(&app)?;
     let rig = match &app.address {
-        // An emulated rig of its own sees a flat target, and its stages are not visible.
+        // Another emulated rig sees a flat target; its stages are not visible.
         Some(RigAddress::Emulated(scenery)) => {
             let middle_mm = GivenOptics::read(&app.optics_file())?.optics.working_range().alpha0_mm;
             RigAddress::Emulated(Scenery { paced: false, ..scenery.clone() })

@@ -90,7 +90,7 @@ fn dull_end(sharpness: &[Vec<f64>], positions: &[f64], frames: &[usize]) -> Opti
     };
     let sharper = (0..blocks).filter(|block| sharpness[end][*block] > sharpness[near][*block]).count();
     match dull([near, middle, far], SHAKEN_END) {
-        // What is in focus only in this frame must not be lost.
+        // A part that is in focus in this frame only must not be lost.
         true if sharper as f64 >= SHARP_BLOCKS * blocks as f64 => None,
         // Where the middle one is blurred itself, the others contradict it; the outer two only make less be expected.
         true if !dull([near, far, beyond], 1.0) => None,
@@ -151,7 +151,7 @@ mod tests {
                         let mut bad = good.clone();
                         bad[at].iter_mut().for_each(|value| *value *= 0.6);
                         let found = find(&bad, &positions, &members);
-                        // Steps of twice the depth of field tell less, and what is sharpest in the frame stays.
+                        // Steps of twice the depth of field tell less, and a frame that is sharpest somewhere stays.
                         let tells_less = slope == 2.0 || (depths.0..depths.1).contains(&positions[at]);
                         let untold = tells_less && found.frames.is_empty() && found.untold == [at];
                         assert!(found.frames == [at] || untold, "{slope} {power} {depths:?} {found:?}");
