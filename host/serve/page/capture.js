@@ -34,6 +34,7 @@ export function make() {
   const averaged = h("input", { type: "number", value: 1, min: 1, max: 256, "aria-label": "Exposures of each image, averaged" });
   const ambient = h("input", { type: "checkbox" });
   const amount = h("input", { type: "number", value: 10, min: 1, max: 500, "aria-label": "Pairs of the series" });
+  const every = h("input", { type: "number", value: 0, min: 0, max: 86400, step: "any", "aria-label": "Seconds from pair to pair; 0 is at once" });
   const axis = choice([["fine", "Piezo"], ["coarse", "Coarse"], ["lens", "Lens"]], "fine", () => {}, { "aria-label": "Axis of the stack" });
   const [from, to, steps] = [["From", 20], ["To", 180], ["Images", 17]].map(([text, value]) => field(text, h("input", { type: "number", value, step: "any" }), text === "Images" ? "" : "µm"));
   const value = (place) => Number(place.querySelector("input").value);
@@ -41,7 +42,7 @@ export function make() {
   const pair = button("Capture pair", () => take({ kind: "pair", averaged: Math.round(Number(averaged.value)), subtract_ambient: ambient.checked }, depth.checked), { class: "primary", title: "C", "data-capture": "" });
   const all = [
     pair,
-    button("Series", () => take({ kind: "series", pairs: Math.round(Number(amount.value)) }, false), { "data-capture": "" }),
+    button("Series", () => take({ kind: "series", pairs: Math.round(Number(amount.value)), interval_s: Number(every.value) }, false), { "data-capture": "" }),
     button("Still", () => take({ kind: "still" }, false), { "data-capture": "", title: "One image where the sensor stands" }),
     button("Stack", () => take({ kind: "stack", axis: axis.value, from_um: value(from), to_um: value(to), steps: value(steps) }, false), { "data-capture": "" }),
   ];
@@ -54,7 +55,7 @@ export function make() {
     h("details", {}, h("summary", {}, "Average, series, still, stack"),
       h("div", { class: "row" }, h("span", {}, "Average"), averaged, h("span", { class: "unit" }, "exposures")),
       h("label", { class: "check" }, ambient, "subtract images without the board's light"),
-      h("div", { class: "row" }, all[1], amount, h("span", { class: "unit" }, "pairs")),
+      h("div", { class: "row" }, all[1], amount, h("span", { class: "unit" }, "pairs, every"), every, h("span", { class: "unit" }, "s")),
       h("div", { class: "row" }, all[2], h("span", { class: "dim" }, "at the present focus")),
       h("div", { class: "row" }, all[3], axis), h("div", { class: "three" }, from, to, steps)));
 }

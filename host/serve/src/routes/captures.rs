@@ -1,5 +1,7 @@
 //! Capturing, and stored captures.
 
+use std::time::Duration;
+
 use axum::{
     Json,
     extract::{Path, Query, State},
@@ -52,6 +54,9 @@ pub enum CaptureRequest {
     Series {
         /// Number of pairs.
         pairs: usize,
+        /// Seconds from the start of a pair to that of the next, 0 to 86,400; a pair that takes longer delays the next one.
+        #[serde(default)]
+        interval_s: f64,
     },
     /// One image where the sensor stands.
     Still {},
@@ -248,7 +253,11 @@ async fn capture(
             };
             (Task { kind: "pair", title: "Capture a pair".into(), work: Box::new(work) }, vec![out])
         }
-        CaptureRequest::Series { pairs } => {
+        CaptureRequest::Series { pairs, interval_s } => {
+            if !(0.0..=86_400.0).contains(&interval_s) {
+                let expected = format!("interval_s {interval_s}: expected 0 to 86400");
+                return Err(Failure::new(StatusCode::BAD_REQUEST, expected));
+            }
             if !(1..=STACK_MAX).contains(&pairs) {
                 return Err(Failure::new(
                     StatusCode::BAD_REQUEST,
@@ -256,7 +265,8 @@ async fn capture(
                 ));
             }
             let out = free("series", pairs)?;
-            let settings = SeriesSettings { rig, camera, optics, out: out.clone() };
+            let interval = Duration::from_secs_f64(interval_s);
+            let settings = SeriesSettings { rig, camera, optics, interval, out: out.clone() };
             let work = move |app: &App, context: &Context<'_>| {
                 let captured = series::capture(&settings, context);
                 kept(app, figures(captured?)) // those that are complete stay, also of a series that was stopped

@@ -156,6 +156,11 @@ fn impossible_requests_are_rejected_before_any_motion() {
         ("/api/live", r#"{"measure":"sharp"}"#, "not a focus measure"),
         ("/api/rig/focus", r#"{"range_mm":-1}"#, "range_mm -1"),
         ("/api/captures", r#"{"kind":"series","pairs":0}"#, "pairs 0"),
+        (
+            "/api/captures",
+            r#"{"kind":"series","pairs":2,"interval_s":-1}"#,
+            "interval_s -1: expected 0 to 86400",
+        ),
         ("/api/captures", r#"{"kind":"pair","name":"../x"}"#, "expected a name"),
         (
             "/api/captures",

@@ -68,6 +68,7 @@ fn body_of(method: &str, path: &str) -> &'static str {
         ("post", "/api/captures/{capture}/region") => r#"{"x":0,"y":0,"width":2,"height":2}"#,
         ("post", "/api/captures/{capture}/profile") => r#"{"from":[0,0],"to":[3,3]}"#,
         ("post", "/api/calibrate/psf") => r#"{"targets":[{"capture":"absent"}],"model":"gaussian"}"#,
+        ("post", "/api/calibrate/stack") => r#"{"slices":11}"#,
         ("post", "/api/calibrate/correction") => r#"{"method":"planar"}"#,
         ("post", "/api/people/recognise") => r#"{"video":"absent.y4m"}"#,
         ("post", "/api/people/sun") => {

@@ -1,6 +1,10 @@
-//! A series of pairs, each in its own folder, to measure noise over time and changes.
+//! A series of pairs, each in its own folder: to measure noise, or changes over time (time lapse).
 
-use std::path::PathBuf;
+use std::{
+    path::PathBuf,
+    thread,
+    time::{Duration, Instant},
+};
 
 use farnear_capture::record::{begin_folder, finish_folder};
 use serde::Serialize;
@@ -17,12 +21,18 @@ use crate::{
 };
 
 const MOST: usize = 1000;
+/// Interval at which a wait looks for cancellation.
+const LOOK: Duration = Duration::from_millis(50);
+/// Wait that is announced.
+const SAID: Duration = Duration::from_secs(1);
 
 #[derive(Clone, Debug)]
 pub struct SeriesSettings {
     pub rig: RigAddress,
     pub camera: CameraSettings,
     pub optics: PathBuf,
+    /// From the start of a pair to that of the next; a pair that takes longer delays the next one.
+    pub interval: Duration,
     pub out: Vec<PathBuf>,
 }
 
@@ -40,8 +50,10 @@ pub fn capture(settings: &SeriesSettings, context: &Context<'_>) -> Result<Serie
     let optics = GivenOptics::read(&settings.optics)?;
     let mut rig = settings.camera.connect(&settings.rig, Some(&optics), context)?;
     let mut pairs = Vec::new();
+    let mut due = Instant::now();
     for out in &settings.out {
-        context.cancel.check("capturing a series")?;
+        wait(due, context)?;
+        due += settings.interval;
         let folder = begin_folder(out)?;
         let (pair, record) = take(&mut rig, &optics, &settings.camera, context)?;
         finish_folder(folder, &pair, &record)?;
@@ -49,4 +61,32 @@ pub fn capture(settings: &SeriesSettings, context: &Context<'_>) -> Result<Serie
         context.progress.advance("pairs", pairs.len(), Some(count));
     }
     Ok(SeriesFigures { pairs })
+}
+
+fn wait(due: Instant, context: &Context<'_>) -> Result<()> {
+    let left = || due.saturating_duration_since(Instant::now());
+    if left() > SAID {
+        context.info(&format!("the next pair is due in {:.0} s", left().as_secs_f64()));
+    }
+    while !left().is_zero() {
+        context.cancel.check("capturing a series")?;
+        thread::sleep(left().min(LOOK));
+    }
+    context.cancel.check("capturing a series")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_pair_waits_until_it_is_due_and_a_stop_ends_the_wait() {
+        let context = Context::unattended();
+        let begin = Instant::now();
+        wait(begin + Duration::from_millis(120), &context).unwrap();
+        assert!(begin.elapsed() >= Duration::from_millis(120));
+        wait(begin, &context).unwrap();
+        context.cancel.cancel();
+        assert!(wait(Instant::now() + Duration::from_secs(3600), &context).unwrap_err().is_cancelled());
+    }
 }

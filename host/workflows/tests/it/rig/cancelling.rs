@@ -128,7 +128,11 @@ fn every_workflow_that_moves_stops_the_rig() {
             "series",
             Box::new(|rig, context| {
                 let (camera, out) = (camera(path), vec![path.join("series")]);
-                series::capture(&SeriesSettings { rig, camera, optics: optics(), out }, context).map(drop)
+                series::capture(
+                    &SeriesSettings { rig, camera, optics: optics(), interval: Duration::ZERO, out },
+                    context,
+                )
+                .map(drop)
             }),
         ),
         (
