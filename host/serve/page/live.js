@@ -46,6 +46,8 @@ export function make(host) {
     if (!state) return;
     const { rig, live, job } = state;
     const running = job?.phase === "running";
+    // The image is held while the rig works.
+    if (running) pictured = performance.now();
     const unhomed = rig.phase === "ready" && [rig.info?.coarse, rig.info?.lens].some((stage) => stage && stage.state === "unknown");
     const silent = live.mode !== "off" && !running && rig.phase !== "connecting" && (rig.phase === "ready" || live.camera_alone) && performance.now() - pictured > 3000;
     const what = running ? ["job", job.title, job.said] : live.error ? ["error", live.error] : silent ? ["silent", Math.floor((performance.now() - pictured) / 1000)] : unhomed ? ["unhomed"] : null;
