@@ -30,7 +30,7 @@ use crate::{
     request::{PathKind, Request},
 };
 
-/// Largest difference of a step from their mean, relative to it.
+/// Largest difference of a step from the usual one, relative to it.
 const EVEN: f64 = 0.1;
 /// Share of errors within three standard deviations for the verdict `good`.
 const HONEST: f64 = 0.97;
