@@ -1,5 +1,5 @@
 //! farnear for Python: thin functions and classes over the libraries. Doc comments of Python items are docstrings,
-//! which `python/docstrings.py` copies into the stub. `float32` arrays are not copied.
+//! which `python/docstrings.py` copies into `_farnear.pyi`. `float32` arrays are not copied.
 
 mod arrays;
 mod calibrate;

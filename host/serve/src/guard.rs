@@ -334,7 +334,7 @@ mod tests {
             assert!(!throttle.delay(guessing).await);
             assert!(throttle.is_delayed(guessing), "the first still waits");
             drop(waiting);
-            assert!(!throttle.is_delayed(guessing), "the client is gone");
+            assert!(!throttle.is_delayed(guessing), "a dropped request frees the address");
             let began = std::time::Instant::now();
             assert!(throttle.delay(guessing).await && began.elapsed() >= GUESS);
             assert!(!throttle.is_delayed(guessing));

@@ -298,7 +298,7 @@ test("Stop works within 0.3 s in every state", async () => {
   };
   const found = {};
   for (const [name, start] of Object.entries(begin)) {
-    // Another program may have the processor: twice what is promised, in one of three attempts.
+    // Twice the promised 0.3 s, in one of three attempts: other tests use the same processor.
     for (let attempt = 0; attempt < 3 && !(found[name] < 600); attempt++) {
       const answer = await start();
       assert.equal(answer.status, 200, `${name}: ${answer.error}`);

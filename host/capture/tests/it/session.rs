@@ -149,7 +149,7 @@ fn a_board_that_was_taken_over_is_left_alone_until_it_is_taken_back() {
     let taken = peer.board().session;
     assert!(matches!(first.status(), Err(ClientError::TakenOver { .. })));
     assert!(matches!(first.status(), Err(ClientError::TakenOver { .. })));
-    assert_eq!(peer.board().session, taken, "no session of its own accord");
+    assert_eq!(peer.board().session, taken, "the client that lost the board opens no new session");
     second.status().unwrap();
     let mut first = first;
     first.reopen().unwrap();

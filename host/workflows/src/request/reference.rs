@@ -73,8 +73,8 @@ mod tests {
     #[test]
     fn keywords_of_python_are_the_options_of_depth() {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../python/farnear/_farnear.pyi");
-        let stub = fs::read_to_string(path).expect("the stub");
-        let (_, rest) = stub.split_once("\ndef depth(\n").expect("depth");
+        let types = fs::read_to_string(path).expect("the .pyi file");
+        let (_, rest) = types.split_once("\ndef depth(\n").expect("depth");
         let (parameters, _) = rest.split_once("\n)").expect("its parameters");
         let parameters: BTreeMap<&str, Option<&str>> = parameters
             .lines()

@@ -1,4 +1,4 @@
-//! Plots a lens calibration: blur over distance, the response, and errors beside the predicted deviations.
+//! Plots a lens calibration: blur over distance, the response, errors and predicted deviations.
 
 use plotters::{coord::Shift, prelude::*};
 
