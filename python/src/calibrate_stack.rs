@@ -95,7 +95,8 @@ pub fn calibrate_stack<'py>(
     for (index, image) in images.iter().enumerate() {
         slices.push(named::<Image<'py>>(&format!("images[{index}]"), image)?.view().to_owned());
     }
-    let settings = StackSettings { step_mm, moved: Moved::Target { pixel_um, far_mm }, pair_step, bin };
+    let settings =
+        StackSettings { step_mm, moved: Moved::Target { pixel_um, far_mm }, pair_step, bin, coding: 0.0 };
     let found = py.detach(|| stack::calibrate_stack(&slices, &settings, &|_| true)).map_err(wrong)?;
     let stage = found.optics.stage().ok_or_else(|| FarnearError::new_err("the stack gives no pairs"))?;
     let held_out = &found.held_out;

@@ -116,6 +116,8 @@ pub struct Estimate {
     pub left_over: f64,
     /// The same mean square relative to noise alone.
     pub excess: f64,
+    /// Noise relative to the texture, mean squares.
+    pub noise_part: f64,
 }
 
 /// Depth of an aligned, balanced pair, ignoring NaN pixels. Returns [`RunError`] for images that differ in size, are
@@ -203,8 +205,9 @@ fn estimate_into(
         of_bands.into_iter().fold([0.0; 3], |a, b| [a[0] + b[0], a[1] + b[1], a[2] + b[2]]);
     let left_over = if texture > 0.0 { (left - noise) / texture } else { f64::NAN };
     let excess = if noise > 0.0 { left / noise } else { f64::NAN };
+    let noise_part = if texture > 0.0 { noise / texture } else { 0.0 };
     let [deviation_mm, misfit] = maps;
-    Ok(Estimate { depth_mm: Array2::zeros((0, 0)), deviation_mm, misfit, left_over, excess })
+    Ok(Estimate { depth_mm: Array2::zeros((0, 0)), deviation_mm, misfit, left_over, excess, noise_part })
 }
 
 pub(crate) fn check_pair(far: ArrayView2<f32>, near: ArrayView2<f32>) -> Result<(), RunError> {

@@ -247,6 +247,7 @@ pub(crate) fn measure_after(
         Some(stage) => {
             // A learned response compares the residual with its own usual one instead.
             prepare.trust = true;
+            prepare.coding /= (stage.bin * stage.bin) as f64;
             images.map(|image| binned(image, stage.bin))
         }
         None => images,

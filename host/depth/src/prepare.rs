@@ -127,6 +127,8 @@ pub struct PrepareSettings {
     pub trust: bool,
     /// The camera's noise, if known; otherwise it is measured in the pair.
     pub noise: Option<PairNoise>,
+    /// Variance of a pixel by lossy compression, in the images' units; 0 without.
+    pub coding: f64,
 }
 
 /// Why a pair is invalid.
@@ -314,7 +316,8 @@ fn finish(
 ) -> Result<Prepared, PrepareError> {
     let size = far.dim();
     let measured = settings.noise.or_else(|| noise::of_pair(far.view(), near.view()));
-    let noise = measured.unwrap_or(PairNoise { constant: 0.0, per_unit: 0.0, mean_variance: 0.0 });
+    let noise = measured.unwrap_or_default();
+    let noise = if settings.coding > 0.0 { noise.coded(settings.coding, mean_of(&far)) } else { noise };
     let mut report = Report::default();
     let moved = |warp: Warp| match &recorded {
         Some(Recorded { near, distortion }) => {
@@ -372,6 +375,15 @@ fn finish(
         }
     }
     Ok(Prepared { far, near, reasons, noise, report })
+}
+
+/// Of the pixels with a value.
+fn mean_of(image: &Array2<f32>) -> f64 {
+    let (sum, count) = image
+        .iter()
+        .filter(|value| value.is_finite())
+        .fold((0.0, 0.0), |(sum, count), value| (sum + f64::from(*value), count + 1.0));
+    sum / f64::max(count, 1.0)
 }
 
 fn part_of(reasons: &Array2<u8>, reason: Reason) -> f64 {

@@ -11,7 +11,7 @@ use crate::adaptive_window::Estimate;
 use crate::depth_map::DepthMap;
 use crate::metrics::dilate_square;
 use crate::optics::{Optics, unexplained};
-use crate::prepare::Prepared;
+use crate::prepare::{Prepared, noise::PairNoise};
 use crate::reason::Reason;
 use crate::simd::{self, Backend, Believed};
 
@@ -21,6 +21,9 @@ pub const LARGEST_ALPHA: f64 = 1.1;
 const LARGEST_DEVIATION: f32 = 0.12;
 /// Systematic error of alpha per root of the unexplained part of the texture: a residual that is all depth has 1.
 const MODEL_ERROR: f32 = 1.0;
+/// Error of depth, relative to its distance from the middle of the range, per root of the part of the texture that
+/// lossy compression changed: rounding to zero favours the sharper image.
+const CODING_ERROR: f32 = 0.15;
 /// Mean square residual of right models (`Estimate::left_over`).
 const USUAL_LEFT_OVER: f32 = 3e-4;
 /// Standard deviation of alpha of a filled pixel: larger than any measured one.
@@ -72,13 +75,20 @@ pub fn assess(
 ) -> Validity {
     let size = map.depth_mm.dim();
     let mut reasons = prepared.reasons.clone();
-    let Estimate { mut deviation_mm, misfit, left_over, .. } = estimate;
+    let Estimate { mut deviation_mm, misfit, left_over, noise_part, .. } = estimate;
     let range = range(optics);
     let backend = Backend::best();
     let stage =
         optics.stage().map(|stage| [stage.residual, stage.usual_unexplained].map(|value| value as f32));
     let of_model =
         MODEL_ERROR.powi(2) * (left_over as f32 - USUAL_LEFT_OVER).max(0.0) * range.slope_mm.powi(2);
+    let of_coding = match prepared.noise {
+        PairNoise { coding, mean_variance, .. } if coding > 0.0 => {
+            CODING_ERROR * ((coding / mean_variance * noise_part) as f32).sqrt()
+        }
+        _ => 0.0,
+    };
+    let middle_mm = optics.depth_mm(0.0) as f32;
     let filled = map.filled.take().filter(|_| settings.filled);
     let least = settings.least_confidence;
     Zip::indexed(map.depth_mm.rows_mut())
@@ -99,6 +109,11 @@ pub fn assess(
                     }
                     None => (noise * noise * misfit.max(1.0) + of_model).sqrt(),
                 };
+            }
+            if of_coding > 0.0 {
+                for (deviation, depth) in deviation.iter_mut().zip(&depth) {
+                    *deviation = deviation.hypot(of_coding * (depth - middle_mm));
+                }
             }
             let rows = [&mut depth, &mut confidence, &mut deviation].map(|row| row.as_slice_mut());
             let ([Some(depth), Some(confidence), Some(deviation)], Some(reasons)) =

@@ -41,6 +41,8 @@ pub struct GreyImage {
     pub colour: bool,
     /// Saturation value, if known to be below full scale (12 bits in 16).
     pub white_level: Option<f32>,
+    /// Variance of a pixel by lossy compression (JPEG), in the pixels' units; 0 without.
+    pub coding_variance: f64,
 }
 
 impl GreyImage {

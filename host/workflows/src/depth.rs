@@ -135,6 +135,7 @@ impl Inputs {
         if bin > 1 {
             let [far, near] = [&mut pair.far, &mut pair.near].map(|image| binned(std::mem::take(image), bin));
             (pair.far, pair.near) = (far, near);
+            pair.coding_variance /= (bin * bin) as f64;
         }
         let optics = optics.binned(bin);
         let around = optics.distortion().is_none().then_some(AROUND_PX);
@@ -206,6 +207,7 @@ impl Inputs {
         if !found.findings.iter().any(Finding::is_swapped) {
             findings.extend(pair::swapped_by_names(&settings.far, &settings.near));
         }
+        findings.extend(pair::lossy(self.pair.coding_variance));
         let report = found.report;
         Ok(Computed { map, deviation, reasons, lost, image, report, window: real.window, findings })
     }
@@ -217,7 +219,12 @@ impl Inputs {
         };
         let noise = request.uncertainty.and_then(|noise| noise.of_camera(self.pair.samples));
         MeasureSettings {
-            prepare: PrepareSettings { limits, noise, ..request.prepare() },
+            prepare: PrepareSettings {
+                limits,
+                noise,
+                coding: self.pair.coding_variance,
+                ..request.prepare()
+            },
             ..request.measure(self.method.as_real())
         }
     }

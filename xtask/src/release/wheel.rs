@@ -25,6 +25,10 @@ pub fn write(release: &Release, notices: &Path) -> Result<Result<Vec<PathBuf>, S
         Ok(python) => python,
         Err(missing) => return Ok(Err(missing)),
     };
+    // maturin looks for the environment's Zig on the path.
+    let programs = python.parent().map(Path::to_path_buf);
+    let path = std::env::var_os("PATH").unwrap_or_default();
+    let path = std::env::join_paths(programs.into_iter().chain(std::env::split_paths(&path)))?;
     // maturin takes licences from the package's folder only.
     copy(notices, &ROOT.join("python"))?;
     for target in TARGETS {
@@ -38,6 +42,7 @@ pub fn write(release: &Release, notices: &Path) -> Result<Result<Vec<PathBuf>, S
                 .args(["--compatibility", COMPATIBILITY, "--target", target, "--out"])
                 .arg(&release.out)
                 .current_dir(ROOT.join("python"))
+                .env("PATH", &path)
                 .env("SOURCE_DATE_EPOCH", &release.epoch)
                 .env("CARGO_ENCODED_RUSTFLAGS", without_paths().join("\u{1f}")),
         )?;

@@ -50,6 +50,8 @@ pub struct StackSettings {
     pub pair_step: Option<usize>,
     /// Binning; `None` chooses.
     pub bin: Option<usize>,
+    /// Variance of a pixel by lossy compression, in the slices' units; 0 without.
+    pub coding: f64,
 }
 
 /// What the stage moves between the slices.
@@ -140,6 +142,7 @@ pub fn calibrate_stack(
         plane: &plane_of_bins,
         pair_step,
         bin,
+        coding: settings.coding / (bin * bin) as f64,
         radius_px: radius,
         optics_of: &optics_of,
         proceed,

@@ -14,9 +14,15 @@ const BLOCK_PX: usize = 16;
 const GAIN: f64 = 36.0;
 /// Mean of a block's smaller eigenvalue relative to the variance, for noise alone: the estimates scatter by about 12 %.
 const SMALLER: f64 = 0.92;
+/// Rounding of the finest frequencies relative to that of the ones that depth uses (T.81, table K.1).
+const HIDDEN: f64 = 20.0;
+/// Part of the hidden noise that counts as an error of the coding: detail is rounded away with it.
+const DETAIL: f64 = 0.2;
+/// Standard deviation of a camera's noise relative to the brightness, where nothing measures it.
+const USUAL_NOISE: f64 = 0.015;
 
 /// Variance of a pixel's noise, in the images' units: `constant + per_unit x value`.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct PairNoise {
     /// Of a black pixel: read noise and quantisation.
     pub constant: f64,
@@ -24,9 +30,29 @@ pub struct PairNoise {
     pub per_unit: f64,
     /// Mean over the image.
     pub mean_variance: f64,
+    /// The part of `constant` that lossy compression made.
+    #[serde(default)]
+    pub coding: f64,
 }
 
 impl PairNoise {
+    /// Adds the error of a lossy coding of variance `coding`, of images with this mean `brightness`. The same
+    /// rounding removes fine noise, from which [`of_pair`] would measure that of the camera.
+    #[must_use]
+    pub fn coded(self, coding: f64, brightness: f64) -> Self {
+        if coding <= 0.0 || self.coding > 0.0 {
+            return self;
+        }
+        let hidden = (HIDDEN * coding).min((USUAL_NOISE * brightness).powi(2));
+        let added = coding + (hidden - self.mean_variance).max(0.0);
+        Self {
+            constant: self.constant + added,
+            mean_variance: self.mean_variance + added,
+            coding: coding + DETAIL * hidden,
+            ..self
+        }
+    }
+
     /// Variance at a brightness.
     pub fn variance(&self, brightness: f64) -> f64 {
         (self.constant + self.per_unit * brightness).max(0.1 * self.mean_variance).max(f64::MIN_POSITIVE)
@@ -65,7 +91,7 @@ pub fn of_pair(far: ArrayView2<f32>, near: ArrayView2<f32>) -> Option<PairNoise>
     let tells = to[0] - from[0] > 0.1 * to[0].abs() && slope.is_finite() && slope > 0.0;
     let per_unit = if tells { slope } else { 0.0 };
     let constant = if tells { from[1] - slope * from[0] } else { mean_variance };
-    Some(PairNoise { constant, per_unit, mean_variance })
+    Some(PairNoise { constant, per_unit, mean_variance, coding: 0.0 })
 }
 
 /// Variance of the far image, of the near one, their covariance, and the mean brightness, of each block of a row.

@@ -43,7 +43,7 @@ impl Case {
             far: grey.clone(),
             near: grey,
             reasons: Array2::zeros(size),
-            noise: PairNoise { constant: 0.0, per_unit: 0.0, mean_variance: 0.0 },
+            noise: PairNoise::default(),
             report: Report::default(),
         };
         let estimate = Estimate {
@@ -52,6 +52,7 @@ impl Case {
             misfit: Array2::from_elem(size, 1.0),
             left_over: f64::from(USUAL_LEFT_OVER),
             excess: 1.0,
+            noise_part: 0.0,
         };
         Self { optics, map, prepared, estimate, settings: ValiditySettings::default() }
     }

@@ -62,7 +62,7 @@ fn calibrated(lens: &WaveLens) -> Result<StackLens, StackError> {
     let stack: Vec<Array2<f32>> =
         (0..SLICES).map(|index| slice(lens, &cells, TARGET, index, best_um(lens), 1)).collect();
     let moved = Moved::Target { pixel_um: 6.0, far_mm: None };
-    let settings = StackSettings { step_mm: STEP_MM, moved, pair_step: None, bin: None };
+    let settings = StackSettings { step_mm: STEP_MM, moved, pair_step: None, bin: None, coding: 0.0 };
     calibrate_stack(&stack, &settings, &|_| true)
 }
 

@@ -69,6 +69,7 @@ pub fn measure(page: &mut Page, data: &Path) -> Result<()> {
             moved: Moved::Target { pixel_um: 6.9, far_mm: None },
             pair_step: Some(step),
             bin: Some(bin),
+            coding: 0.0,
         };
         let lens = calibrate_stack(&left, &settings, &|_| true).context("calibrating the left half")?;
         eprintln!("binning {bin}, step {step}: held-out {:?}", lens.held_out);

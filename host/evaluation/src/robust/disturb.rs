@@ -11,6 +11,7 @@ use farnear_depth::{
     pipeline::{Settings, depth_from_pair},
     prepare::{CameraFrames, PrepareSettings},
 };
+use farnear_files::image_file::{GreyImage, decode_grey};
 use farnear_scene::{Camera, Lens, Noise, Renderer, Scene, View, truth};
 use image::codecs::jpeg::JpegEncoder;
 use ndarray::Array2;
@@ -71,6 +72,8 @@ pub struct Taken {
     pub truth: Array2<f32>,
     /// Response per pixel; `None` is an even one.
     pub response: Option<Array2<f32>>,
+    /// Variance of a pixel by its coding.
+    pub coding: f64,
 }
 
 pub fn take(scene: &Scene, size: (usize, usize), disturbance: &Disturbance, seed: u64) -> Result<Taken> {
@@ -110,15 +113,17 @@ pub fn take(scene: &Scene, size: (usize, usize), disturbance: &Disturbance, seed
     let spots: Vec<(usize, usize)> = (0..disturbance.hot)
         .map(|_| (random.random_range(0..size.1), random.random_range(0..size.0)))
         .collect();
+    let mut coding = 0.0;
     for image in &mut images {
         spots.iter().for_each(|at| image[*at] = 1.0);
         if let Some(quality) = disturbance.jpeg {
-            *image = jpeg(image, quality)?;
+            let read = jpeg(image, quality)?;
+            (*image, coding) = (read.pixels, read.coding_variance);
         }
     }
     let [far, near] = images;
     let (far, near) = if disturbance.exchanged { (near, far) } else { (far, near) };
-    Ok(Taken { far, near, truth: truth(scene, &lens, &camera), response })
+    Ok(Taken { far, near, truth: truth(scene, &lens, &camera), response, coding })
 }
 
 fn shade(image: &mut Array2<f32>, disturbance: &Disturbance) {
@@ -131,7 +136,7 @@ fn shade(image: &mut Array2<f32>, disturbance: &Disturbance) {
     }
 }
 
-fn jpeg(image: &Array2<f32>, quality: u8) -> Result<Array2<f32>> {
+fn jpeg(image: &Array2<f32>, quality: u8) -> Result<GreyImage> {
     let (height, width) = image.dim();
     let bytes: Vec<u8> = image.iter().map(|v| (v * 255.0).round() as u8).collect();
     let mut file = Cursor::new(Vec::new());
@@ -142,9 +147,7 @@ fn jpeg(image: &Array2<f32>, quality: u8) -> Result<Array2<f32>> {
         size.1,
         image::ExtendedColorType::L8,
     )?;
-    let read = image::load_from_memory(file.get_ref())?.into_luma8();
-    let value = |(y, x): (usize, usize)| f32::from(read.get_pixel(x as u32, y as u32)[0]) / 255.0;
-    Ok(Array2::from_shape_fn((height, width), value))
+    decode_grey(file.get_ref()).map_err(anyhow::Error::msg)
 }
 
 pub const WAYS: [(&str, Window); 2] =
@@ -175,7 +178,8 @@ impl Taken {
         camera: Option<&CameraFrames>,
     ) -> Outcome {
         let window = WAYS[way].1;
-        let prepare = PrepareSettings { limits: Some([0.0, 1.0]), ..PrepareSettings::default() };
+        let prepare =
+            PrepareSettings { limits: Some([0.0, 1.0]), coding: self.coding, ..PrepareSettings::default() };
         let settings = MeasureSettings { prepare, window, ..MeasureSettings::default() };
         let method = if way == 0 { DepthMethod::Rational(operators) } else { DepthMethod::Whitened };
         let found =
@@ -218,4 +222,33 @@ impl Taken {
 
 fn refused(error: &MeasureError) -> Outcome {
     Outcome { error_mm: f64::NAN, valid: 0.0, messages: vec![format!("error: {error}")], found: None }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Rounding leaves no noise to measure and favours the sharper image. Before its error was known, quality 50 had
+    /// no depth in 94 % of a map.
+    #[test]
+    fn a_jpeg_has_depth_within_its_deviations() {
+        let optics = rig::optics(PSF).unwrap();
+        let operators = Operators::for_optics(&optics).unwrap();
+        let scene = "staircase".parse().unwrap();
+        for (quality, least_valid) in [(95, 0.99), (75, 0.95), (50, 0.8)] {
+            let jpeg = Disturbance { jpeg: Some(quality), ..Disturbance::default() };
+            let taken = take(&scene, (320, 240), &jpeg, 3).unwrap();
+            let outcome = taken.measure(1, &operators, &optics, None);
+            assert!(outcome.valid > least_valid, "quality {quality}: valid {}", outcome.valid);
+            let found = outcome.found.unwrap();
+            let (depth, deviation) = (&found.map.depth_mm, &found.validity.deviation_mm);
+            let kept: Vec<_> = taken.counted().filter(|at| depth[*at].is_finite()).collect();
+            let within = kept
+                .iter()
+                .filter(|at| (depth[**at] - taken.truth[**at]).abs() < 3.0 * deviation[**at])
+                .count();
+            let fraction = within as f64 / kept.len() as f64;
+            assert!(fraction > 0.97, "quality {quality}: {fraction} within three deviations");
+        }
+    }
 }

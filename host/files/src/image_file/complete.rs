@@ -109,6 +109,53 @@ pub(super) fn unsupported_jpeg(bytes: &[u8]) -> Option<String> {
     }
 }
 
+/// Variance of a grey pixel by the rounding of a JPEG's coefficients, as a part of full scale squared: a twelfth of the
+/// squared steps of brightness (T.81, B.2.4.1), averaged over the frequencies that depth from defocus uses.
+pub(super) fn jpeg_coding_variance(bytes: &[u8]) -> Option<f64> {
+    /// Cycles per pixel.
+    const USED: std::ops::Range<f64> = 0.08..0.3;
+    let mut tables: [Option<[f64; 64]>; 4] = [None; 4];
+    let mut of_brightness = 0;
+    let mut at = 2;
+    loop {
+        let &[0xff, marker, high, low] = bytes.get(at..at + 4)? else { return None };
+        let mut data = bytes.get(at + 4..at + 2 + usize::from(u16::from_be_bytes([high, low])))?;
+        at += 4 + data.len();
+        match marker {
+            0xdb => {
+                while let [kind, rest @ ..] = data {
+                    let wide = 1 + usize::from(kind >> 4 != 0);
+                    let (steps, rest) = rest.split_at_checked(64 * wide)?;
+                    let step = |k: usize| {
+                        steps[k * wide..][..wide].iter().fold(0.0, |all, byte| 256.0 * all + f64::from(*byte))
+                    };
+                    *tables.get_mut(usize::from(kind & 15))? = Some(std::array::from_fn(step));
+                    data = rest;
+                }
+            }
+            0xc0..=0xc2 => of_brightness = usize::from(*data.get(8)?),
+            0xda => {
+                let steps = (*tables.get(of_brightness)?)?;
+                let used = zigzag()
+                    .zip(steps)
+                    .filter(|([u, v], _)| USED.contains(&(f64::from(*u).hypot(f64::from(*v)) / 16.0)));
+                let (sum, count) =
+                    used.fold((0.0, 0.0), |(sum, count), (_, step)| (sum + step * step / 12.0, count + 1.0));
+                return Some(sum / count / (255.0 * 255.0));
+            }
+            _ => {}
+        }
+    }
+}
+
+/// Horizontal and vertical frequency of a block's coefficients in the order of T.81, figure A.6.
+fn zigzag() -> impl Iterator<Item = [u8; 2]> {
+    (0..15_u8).flat_map(|sum| {
+        let along = sum.saturating_sub(7)..=sum.min(7);
+        along.map(move |k| if sum % 2 == 0 { [k, sum - k] } else { [sum - k, k] })
+    })
+}
+
 /// Number of images of an animated PNG (chunk acTL), else 1.
 pub(super) fn png_images(bytes: &[u8]) -> u32 {
     png_chunk(bytes, b"acTL").and_then(|data| Some(u32::from_be_bytes(*data.first_chunk()?))).unwrap_or(1)

@@ -41,6 +41,8 @@ pub(crate) struct Decoded {
     pub values: Values,
     /// White level in codes from metadata on the camera's bit depth.
     pub white_level: Option<u16>,
+    /// As in [`GreyImage`].
+    pub coding_variance: f64,
 }
 
 const INCOMPLETE: &str =
@@ -95,8 +97,10 @@ fn jpeg(bytes: &[u8]) -> Result<(Decoded, u8), String> {
     }
     let orientation =
         metadata::orientation(decoder.exif().map(Vec::as_slice), decoder.xmp().map(Vec::as_slice));
+    let coding_variance = complete::jpeg_coding_variance(bytes).unwrap_or(0.0);
+    let values = Values::U8(values);
     let decoded =
-        Decoded { width, height, channels, colours: channels, values: Values::U8(values), white_level: None };
+        Decoded { width, height, channels, colours: channels, values, white_level: None, coding_variance };
     Ok((decoded, orientation))
 }
 
@@ -153,7 +157,7 @@ fn other(bytes: &[u8]) -> Result<(Decoded, u8), String> {
     // Shifted up to 16 bits: the largest code has trailing zeros.
     let white_level = significant.filter(|bits| (8..16).contains(bits)).map(|bits| 0xffff << (16 - bits));
     let colours = if channels < 3 { 1 } else { 3 };
-    Ok((Decoded { width, height, channels, colours, values, white_level }, orientation))
+    Ok((Decoded { width, height, channels, colours, values, white_level, coding_variance: 0.0 }, orientation))
 }
 
 impl Decoded {
@@ -193,7 +197,8 @@ impl Decoded {
         };
         let pixels = Array2::from_shape_vec((self.height, self.width), values)
             .map_err(|_| "it has fewer pixels than its header says".to_string())?;
-        Ok(GreyImage { pixels, samples, colour: self.colours == 3, white_level })
+        let (colour, coding_variance) = (self.colours == 3, self.coding_variance);
+        Ok(GreyImage { pixels, samples, colour, white_level, coding_variance })
     }
 
     pub(crate) fn in_8_bits(self) -> Result<Pixels, String> {

@@ -260,7 +260,7 @@ fn decode_page(file: impl Read + Seek, size: u64, page: &Page) -> Result<Decoded
         _ => return Err(format!("its samples are {colour:?}: convert it to grey or RGB of 8 or 16 bits")),
     };
     let white_level = camera_white(&page.directory);
-    let decoded = Decoded { width, height, channels, colours, values, white_level };
+    let decoded = Decoded { width, height, channels, colours, values, white_level, coding_variance: 0.0 };
     Ok(decoded.turned(page.directory.orientation.unwrap_or(1)))
 }
 

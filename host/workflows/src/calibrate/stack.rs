@@ -171,13 +171,13 @@ pub fn calibrate(request: &CalibrateStackRequest, context: &Context<'_>) -> Resu
     };
     let listed = Listed::of(request)?;
     listed.remarks.iter().for_each(|remark| context.progress.warn(remark));
-    let slices = read(&listed.images, request, context)?;
+    let (slices, coding) = read(&listed.images, request, context)?;
     let moved = match listed.lens {
         Some(lens) => Moved::Sensor(Box::new(lens)),
         None => Moved::Target { pixel_um: request.pixel_um, far_mm: request.far_mm },
     };
-    let settings =
-        StackSettings { step_mm: listed.step_mm, moved, pair_step: request.pair_step, bin: request.bin };
+    let (step_mm, pair_step, bin) = (listed.step_mm, request.pair_step, request.bin);
+    let settings = StackSettings { step_mm, moved, pair_step, bin, coding };
     let step_mm = rounded(listed.step_mm, 6);
     context.info(&format!("calibrating the lens from {} slices {step_mm} mm apart", slices.len()));
     let told = AtomicUsize::new(0);
@@ -280,25 +280,28 @@ fn even_step(positions: &[f64], request: &CalibrateStackRequest) -> Result<f64> 
     }
 }
 
+/// The slices, and the mean variance of a pixel by lossy compression.
 fn read(
     images: &[PathBuf],
     request: &CalibrateStackRequest,
     context: &Context<'_>,
-) -> Result<Vec<Array2<f32>>> {
+) -> Result<(Vec<Array2<f32>>, f64)> {
     let settings = ReadSettings { grey: request.grey, white_level: request.white_level };
     let mut slices = Vec::with_capacity(images.len());
     let mut white = SharedWhiteLevel::default();
+    let mut coding = 0.0;
     stack::read(images, &settings, |index, image| -> Result<()> {
         context.cancel.check("reading the slices")?;
         context.progress.advance("slices", index + 1, Some(images.len()));
         white.add(&image);
+        coding += image.coding_variance / images.len() as f64;
         slices.push(image.pixels);
         Ok(())
     })?;
     if let Some(white) = white.get() {
         slices.iter_mut().for_each(|slice| slice.mapv_inplace(|value| (value / white).min(1.0)));
     }
-    Ok(slices)
+    Ok((slices, coding))
 }
 
 fn figures(

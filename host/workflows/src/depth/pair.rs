@@ -8,6 +8,9 @@ use ndarray::Array2;
 
 use crate::error::{Result, WorkflowError};
 
+/// Codes of 8 bits, root mean square; JPEG of quality 95 has 0.6.
+const LARGEST_CODING_ERROR: f64 = 1.0;
+
 pub struct Pair {
     pub far: Array2<f32>,
     pub near: Array2<f32>,
@@ -15,6 +18,8 @@ pub struct Pair {
     pub white: f32,
     /// The coarser of both sample types.
     pub samples: Samples,
+    /// Mean variance of a pixel by lossy compression.
+    pub coding_variance: f64,
 }
 
 impl Pair {
@@ -43,8 +48,25 @@ impl Pair {
             let twice = "they hold the same image: depth needs one focused far and one focused near";
             return Err(unfit(twice.into()));
         }
-        Ok(Self { far: far_image.pixels, near: near_image.pixels, white: white.unwrap_or(1.0), samples })
+        Ok(Self {
+            coding_variance: 0.5 * (far_image.coding_variance + near_image.coding_variance),
+            far: far_image.pixels,
+            near: near_image.pixels,
+            white: white.unwrap_or(1.0),
+            samples,
+        })
     }
+}
+
+/// Warns of strong compression, from the variance it adds.
+pub fn lossy(coding_variance: f64) -> Option<String> {
+    let codes = 255.0 * coding_variance.sqrt();
+    (codes > LARGEST_CODING_ERROR).then(|| {
+        format!(
+            "the images are compressed (JPEG) with an error of {codes:.1} codes, which makes depth less exact: \
+             save PNG or TIFF, or JPEG of quality 95"
+        )
+    })
 }
 
 /// Warns if the file names contradict their order, because a swapped pair gives a plausible mirrored map.
@@ -79,6 +101,13 @@ pub fn default_folder(far: &Path) -> PathBuf {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn strong_compression_is_said() {
+        let of_codes = |codes: f64| lossy((codes / 255.0).powi(2));
+        assert_eq!((lossy(0.0), of_codes(0.7)), (None, None));
+        assert!(of_codes(3.24).unwrap().contains("error of 3.2 codes"));
+    }
 
     #[test]
     fn names_tell_a_swapped_pair() {

@@ -122,6 +122,7 @@ pub(super) struct Target<'a> {
     pub plane: &'a FocusPlane,
     pub pair_step: usize,
     pub bin: usize,
+    pub coding: f64,
     /// Largest blur radius as measured, px.
     pub radius_px: f64,
     pub optics_of: &'a (dyn Fn(Psf, f64) -> Result<Optics, StackError> + Sync),
@@ -240,7 +241,7 @@ impl Target<'_> {
             low < 1.05 && high > -1.05
         };
         let optics = (self.optics_of)(Psf::PillBox, 2.0)?;
-        let settings = PrepareSettings { trust: true, ..PrepareSettings::default() };
+        let settings = PrepareSettings { trust: true, coding: self.coding, ..PrepareSettings::default() };
         let pairs: Vec<Pair> = (0..self.slices.len().saturating_sub(self.pair_step))
             .filter(usable)
             .collect::<Vec<usize>>()
@@ -255,7 +256,9 @@ impl Target<'_> {
                 let [far_image, near_image] = [&prepared.far, &prepared.near].map(blurred);
                 let mut coarse = Prepared { far: far_image, near: near_image, ..prepared.clone() };
                 let noise = &mut coarse.noise;
-                for value in [&mut noise.constant, &mut noise.per_unit, &mut noise.mean_variance] {
+                for value in
+                    [&mut noise.constant, &mut noise.per_unit, &mut noise.mean_variance, &mut noise.coding]
+                {
                     *value *= SMOOTHED_NOISE;
                 }
                 let pair =

@@ -235,3 +235,22 @@ fn a_deep_pgm_has_the_scale_of_its_header() {
     let pgm = decode_grey(b"P5 2 1 4095\n\x0f\xff\x07\xff").unwrap();
     assert!((pgm.pixels[(0, 0)] - 1.0).abs() < 1e-6 && (pgm.pixels[(0, 1)] - 0.5).abs() < 1e-3, "{pgm:?}");
 }
+
+/// Mean of the squared steps of T.81, table K.1, over 0.08 to 0.3 cycles per pixel, a twelfth of it: 39.88.
+#[test]
+fn quantisation_tables_give_the_error_of_a_jpeg() {
+    let of_quality = |quality| {
+        let image = image::GrayImage::from_fn(64, 48, |x, y| image::Luma([(x * 3 + y * 5) as u8]));
+        let mut bytes = Vec::new();
+        image::codecs::jpeg::JpegEncoder::new_with_quality(&mut bytes, quality).encode_image(&image).unwrap();
+        decode_grey(&bytes).unwrap().coding_variance * 255.0 * 255.0
+    };
+    assert!((of_quality(50) - 39.88).abs() < 0.01, "{}", of_quality(50));
+    assert!((of_quality(95) - 0.4035).abs() < 0.001, "{}", of_quality(95));
+    let turned = decode_grey(&jpeg_turned(48, 32, 6)).unwrap().coding_variance;
+    assert_eq!(turned, decode_grey(&jpeg(48, 32)).unwrap().coding_variance);
+    assert_eq!(
+        decode_grey(&tiff(CLASSIC, &[Page::grey(4, 3, 8, vec![7; 12])])).unwrap().coding_variance,
+        0.0
+    );
+}

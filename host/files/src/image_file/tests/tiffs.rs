@@ -197,6 +197,7 @@ fn images_of_one_camera_share_the_lowest_white_level() {
         samples: Samples::Integer(16),
         colour: false,
         white_level,
+        coding_variance: 0.0,
     };
     let of = |images: &[GreyImage]| shared_white_level(images.iter());
     let white = 4095.0 / 65535.0;
