@@ -31,6 +31,8 @@ const OUT_OF_RANGE_ALPHA: f64 = 1.2;
 const LEAST_NOISE: f64 = 0.1;
 /// Part of the pixels lost for one reason above which it is reported.
 const LEAST_REPORTED: f64 = 0.01;
+/// Part of the noise by lossy compression that is worth a word: JPEG of quality 95 has 0.3, 90 has 0.4.
+const COMPRESSED: f64 = 0.35;
 /// Unexplained texture, mean squares, from which PSF or blur are doubted.
 const DOUBTFUL: f64 = 3e-4;
 /// The same relative to the noise, which is known to some percent.
@@ -141,6 +143,11 @@ pub enum Finding {
     },
     /// Nothing rises above the noise.
     NothingSharp,
+    /// Lossy compression is a large part of the noise.
+    Compressed {
+        /// Part of the noise's variance.
+        of_noise: f64,
+    },
 }
 
 impl Finding {
@@ -175,6 +182,11 @@ impl fmt::Display for Finding {
                 "the model leaves {:.1} % of the detail unexplained (usual is below 2): is the PSF {psf} with a blur of up to \
                  {max_blur_px:.3} px right? farnear calibrate psf finds it",
                 100.0 * left_over.sqrt()
+            ),
+            Self::Compressed { of_noise } => write!(
+                f,
+                "compression (JPEG) is {:.0} % of the noise, which makes depth less exact: save PNG or TIFF, or JPEG of quality 95",
+                100.0 * of_noise
             ),
             Self::NothingSharp => f.write_str(
                 "neither image has detail above its noise: the scene lies far outside the range, or has none",
@@ -420,6 +432,10 @@ fn findings(map: &DepthMap, prepared: &Prepared, estimate: &Estimate, optics: &O
         if optics.telecentric() == Some(false) && (shrunk - of_optics).abs() < 0.25 * (of_optics - 1.0) {
             findings.push(Finding::SwappedByMagnification { magnification: aligned.magnification });
         }
+    }
+    let of_noise = prepared.noise.coding / prepared.noise.mean_variance;
+    if of_noise > COMPRESSED {
+        findings.push(Finding::Compressed { of_noise });
     }
     if report.detailed_fraction < 0.01 {
         findings.push(Finding::NothingSharp);

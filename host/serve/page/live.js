@@ -12,6 +12,10 @@ const MEASURES = [["modified-laplacian", "Modified Laplacian"], ["tenengrad", "T
 const REMEMBERED = 300;
 /** Difference of neighbours, of 255, from which an edge counts as sharp. */
 const SHARP = 26;
+/** Codes, of 255, between which the brightest pixels are well exposed, and the one aimed at: as `farnear rig capture --auto-exposure`. */
+const [DARKEST, AIM, BRIGHTEST] = [190, 204, 220];
+/** Exposure times that are tried. */
+const TRIES = 8;
 /** From one change of the curves, figures and words beside the image to the next, ms: the page is laid out anew for each, which takes
  * longer than to paint the image, and nobody reads faster. */
 const READ = 200;
@@ -95,6 +99,21 @@ export function make(host) {
   };
   const exposure = h("input", { type: "number", min: 1, max: 1000000, step: 100, inputmode: "numeric" });
   exposure.addEventListener("change", () => act("/api/live", { exposure_us: Math.round(Number(exposure.value)) }));
+  /** Exposure times that may still be tried. */
+  let tries = 0;
+  const auto = button("Auto", () => { tries = TRIES; }, { title: "Finds the time at which the brightest pixels have 80 % of white" });
+  const meter = ({ figures, exposure_us }) => {
+    if (exposure_us !== store.state?.live.exposure_us) return; // of the time before
+    const code = brightest(figures.histogram);
+    const factor = code === 255 ? 0.4 : Math.min(AIM / Math.max(code, 1), 8);
+    const next = Math.min(Math.max(Math.round(exposure_us * factor), Number(exposure.min)), Number(exposure.max));
+    tries -= 1;
+    if (code >= DARKEST && code <= BRIGHTEST) tries = 0;
+    else if (next === exposure_us || !tries) {
+      tries = 0;
+      notice(`The brightest pixels have ${number((100 * code) / 255, 0)} % of white at ${exposure_us} µs: change the light or the gain.`, "warning");
+    } else act("/api/live", { exposure_us: next });
+  };
   const light = [0, 1].map(() => h("input", { type: "number", min: 0, max: 100, title: "Light output of the board during captures and live depth" }));
   for (const level of light) level.addEventListener("change", () => act("/api/live", { light_percent: light.map((input) => Number(input.value)) }));
   const measure = choice(MEASURES, MEASURES[0][0], (name) => { values.length = 0; best = 0; act("/api/live", { measure: name }); });
@@ -110,7 +129,7 @@ export function make(host) {
       capture.make(),
       panel("Focus value", h("div", { class: "reading" }, focus, forget), place, field("Measure", measure)),
       panel("Recordings", h("div", { class: "row record-row" }, play, recordings), h("label", { class: "check" }, fast, "as fast as it goes"), played),
-      panel("Camera", field("Exposure", exposure, "µs"), ...light.map((level, at) => field(`Light ${at + 1}`, level, "%")), histogram, figures, warnings, camera.make()))));
+      panel("Camera", field("Exposure", exposure, "µs"), h("div", { class: "row" }, auto), ...light.map((level, at) => field(`Light ${at + 1}`, level, "%")), histogram, figures, warnings, camera.make()))));
   depth.element.hidden = true;
   depth.onprobe = (at) => {
     const code = at && live ? live.codes[at[1] * live.width + at[0]] : 0;
@@ -140,6 +159,8 @@ export function make(host) {
     deep.setAttribute("aria-pressed", live.mode === "depth");
     const seen = rig.phase === "ready" || live.camera_alone;
     for (const control of [off, exposure, measure]) control.disabled = !hasControl() || !seen;
+    auto.disabled = exposure.disabled || live.mode !== "image";
+    if (auto.disabled) tries = 0;
     light.forEach((level, at) => {
       level.disabled = !hasControl() || rig.phase !== "ready";
       if (document.activeElement !== level) level.value = String(Math.round(live.light_percent[at]));
@@ -171,6 +192,7 @@ export function make(host) {
     pictured = performance.now();
     image.show(shade(blank(found, reused.image), pixels, saturation.box.checked, peaking.box.checked));
     time(image, header);
+    if (tries) meter(header);
     values.push(found.focus ?? null);
     if (values.length > REMEMBERED) values.shift();
     best = Math.max(best, found.focus ?? 0);
@@ -201,6 +223,14 @@ export function make(host) {
     if (due()) status.textContent = `${number(header.rate_hz, 1)} maps/s · ${number(header.latency_ms, 0)} ms from image to map · ${number(low_mm, 0)} to ${number(high_mm, 0)} mm`;
   });
   return { shown: () => { image.draw(); plot.size(); } };
+}
+
+/** The code below which all but a thousandth of the pixels lie. @param {number[]} histogram */
+function brightest(histogram) {
+  let above = histogram.reduce((sum, count) => sum + count, 0) / 1000;
+  let code = histogram.length - 1;
+  while (code > 0 && (above -= histogram[code]) > 0) code -= 1;
+  return code;
 }
 
 /** Words that are there already cost nothing. @param {HTMLElement} place @param {string} text */

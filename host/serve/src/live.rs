@@ -86,6 +86,7 @@ fn image_message(record: Option<&ShotRecord>, image: &Image, live: &Live, rate_h
         "type": "image",
         "figures": figures,
         "measure": live.measure.name(),
+        "exposure_us": live.exposure.0,
         "rate_hz": rate_hz,
         "arrived_ms": arrived_ms,
         "trigger": record.map(|record| record.trigger_number),

@@ -110,6 +110,22 @@ test("half the exposure time halves the brightness of the live image", async () 
   await exposure.fill("5000");
   await exposure.press("Tab");
   await within(0.95 * usual, 1.05 * usual);
+  const found = [];
+  for (const begun of ["200", "60000"]) {
+    await exposure.fill(begun);
+    await exposure.press("Tab");
+    await page.waitForFunction((us) => document.querySelector("#view-live input[max='1000000']").value === us, begun);
+    await page.getByRole("button", { name: "Auto", exact: true }).click();
+    await page.locator(".status", { hasText: "frames/s" }).waitFor();
+    let last = begun;
+    for (let same = 0; same < 8; await page.waitForTimeout(200)) {
+      const value = await exposure.inputValue();
+      same = value === last && value !== begun ? same + 1 : 0;
+      last = value;
+    }
+    found.push(Number(last));
+  }
+  assert.ok(found[0] > 1000 && Math.abs(found[0] / found[1] - 1) < 0.2, `both ways lead to one time: ${found} µs`);
   await page.context().close();
 });
 

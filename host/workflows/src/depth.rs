@@ -207,7 +207,6 @@ impl Inputs {
         if !found.findings.iter().any(Finding::is_swapped) {
             findings.extend(pair::swapped_by_names(&settings.far, &settings.near));
         }
-        findings.extend(pair::lossy(self.pair.coding_variance));
         let report = found.report;
         Ok(Computed { map, deviation, reasons, lost, image, report, window: real.window, findings })
     }

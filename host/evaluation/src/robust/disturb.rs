@@ -239,6 +239,8 @@ mod tests {
             let jpeg = Disturbance { jpeg: Some(quality), ..Disturbance::default() };
             let taken = take(&scene, (320, 240), &jpeg, 3).unwrap();
             let outcome = taken.measure(1, &operators, &optics, None);
+            let said = outcome.messages.iter().any(|text| text.starts_with("compression (JPEG)"));
+            assert_eq!(said, quality < 95, "{:?}", outcome.messages);
             assert!(outcome.valid > least_valid, "quality {quality}: valid {}", outcome.valid);
             let found = outcome.found.unwrap();
             let (depth, deviation) = (&found.map.depth_mm, &found.validity.deviation_mm);

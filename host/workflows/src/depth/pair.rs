@@ -8,9 +8,6 @@ use ndarray::Array2;
 
 use crate::error::{Result, WorkflowError};
 
-/// Codes of 8 bits, root mean square; JPEG of quality 95 has 0.6.
-const LARGEST_CODING_ERROR: f64 = 1.0;
-
 pub struct Pair {
     pub far: Array2<f32>,
     pub near: Array2<f32>,
@@ -58,17 +55,6 @@ impl Pair {
     }
 }
 
-/// Warns of strong compression, from the variance it adds.
-pub fn lossy(coding_variance: f64) -> Option<String> {
-    let codes = 255.0 * coding_variance.sqrt();
-    (codes > LARGEST_CODING_ERROR).then(|| {
-        format!(
-            "the images are compressed (JPEG) with an error of {codes:.1} codes, which makes depth less exact: \
-             save PNG or TIFF, or JPEG of quality 95"
-        )
-    })
-}
-
 /// Warns if the file names contradict their order, because a swapped pair gives a plausible mirrored map.
 pub fn swapped_by_names(far: &Path, near: &Path) -> Option<String> {
     named_the_other_way_round(far, near).then(|| {
@@ -101,13 +87,6 @@ pub fn default_folder(far: &Path) -> PathBuf {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn strong_compression_is_said() {
-        let of_codes = |codes: f64| lossy((codes / 255.0).powi(2));
-        assert_eq!((lossy(0.0), of_codes(0.7)), (None, None));
-        assert!(of_codes(3.24).unwrap().contains("error of 3.2 codes"));
-    }
 
     #[test]
     fn names_tell_a_swapped_pair() {
