@@ -684,6 +684,8 @@ class StackFit:
         Part of the pixels with a depth, 0 to 1.
     within_three : float
         Part of the errors within three predicted standard deviations, 0 to 1.
+    by_depth : array (n, 4), float64
+        Rows of normalised depth (-1 far plane, 1 near plane), mean error, root mean square error and predicted standard deviation, mm.
     """
 
     @property
@@ -715,6 +717,9 @@ class StackFit:
         """-"""
     @property
     def within_three(self) -> float:
+        """-"""
+    @property
+    def by_depth(self) -> NDArray[np.float64]:
         """-"""
 
 def calibrate_stack(

@@ -2,6 +2,8 @@
 
 use farnear_depth::calibrate::stack::{self, Moved, StackSettings};
 use farnear_workflows::calibrate::stack::verdict;
+use ndarray::Array2;
+use numpy::{IntoPyArray, PyArray2};
 use pyo3::prelude::*;
 
 use crate::{
@@ -30,6 +32,8 @@ use crate::{
 ///     Part of the pixels with a depth, 0 to 1.
 /// within_three : float
 ///     Part of the errors within three predicted standard deviations, 0 to 1.
+/// by_depth : array (n, 4), float64
+///     Rows of normalised depth (-1 far plane, 1 near plane), mean error, root mean square error and predicted standard deviation, mm.
 #[pyclass(frozen, get_all, module = "farnear")]
 pub struct StackFit {
     optics: Optics,
@@ -42,6 +46,7 @@ pub struct StackFit {
     slope: f64,
     fill: f64,
     within_three: f64,
+    by_depth: Py<PyArray2<f64>>,
 }
 
 #[pymethods]
@@ -100,6 +105,9 @@ pub fn calibrate_stack<'py>(
     let found = py.detach(|| stack::calibrate_stack(&slices, &settings, &|_| true)).map_err(wrong)?;
     let stage = found.optics.stage().ok_or_else(|| FarnearError::new_err("the stack gives no pairs"))?;
     let held_out = &found.held_out;
+    let rows: Vec<[f64; 4]> =
+        held_out.by_depth.iter().map(|at| [at.depth, at.bias_mm, at.rms_mm, at.predicted_mm]).collect();
+    let by_depth = Array2::from(rows);
     Ok(StackFit {
         verdict: verdict(&found),
         pair_step: stage.pair_step,
@@ -110,6 +118,7 @@ pub fn calibrate_stack<'py>(
         slope: held_out.slope,
         fill: held_out.fill,
         within_three: held_out.within_three,
+        by_depth: by_depth.into_pyarray(py).unbind(),
         optics: Optics(found.optics),
     })
 }
