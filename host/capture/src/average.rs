@@ -62,7 +62,8 @@ impl Average {
             // Unsaturated pixels stay below white.
             (if *saturated { whole } else { mean.min(whole - 1) }) as u16
         });
-        Image { pixels, bits: bits as u8 }
+        // Exposures of one scene are rounded alike.
+        Image { pixels, bits: bits as u8, coding_variance: self.first.coding_variance }
     }
 }
 
@@ -77,7 +78,7 @@ mod tests {
     use super::*;
 
     fn image(pixels: Array2<u16>) -> Image {
-        Image { pixels, bits: 8 }
+        Image::new(pixels, 8)
     }
 
     #[test]

@@ -37,9 +37,16 @@ pub struct Image {
     pub pixels: Array2<u16>,
     /// Significant bits, 8 to 16.
     pub bits: u8,
+    /// Variance of a pixel by lossy compression, as a part of full scale squared; 0 without.
+    pub coding_variance: f64,
 }
 
 impl Image {
+    /// An image without lossy compression.
+    pub fn new(pixels: Array2<u16>, bits: u8) -> Self {
+        Self { pixels, bits, coding_variance: 0.0 }
+    }
+
     /// This image less one of the same size without the lamp; saturated pixels stay white.
     pub(crate) fn without(&self, dark: &Self) -> Self {
         let white = ((1u32 << self.bits.min(16)) - 1) as u16;
@@ -47,7 +54,7 @@ impl Image {
             true => white,
             false => lit.saturating_sub(*dark),
         });
-        Self { pixels, bits: self.bits }
+        Self { pixels, bits: self.bits, coding_variance: self.coding_variance + dark.coding_variance }
     }
 
     /// Grey values from 0 to 1.
@@ -217,7 +224,7 @@ mod tests {
 
     #[test]
     fn pixels_keep_their_upper_bits() {
-        let image = |bits, code| Image { pixels: array![[code]], bits };
+        let image = |bits, code| Image::new(array![[code]], bits);
         assert_eq!(image(8, 200).eight_bits(), [200]);
         assert_eq!(image(12, 0xabc).eight_bits(), [0xab]);
         assert_eq!(image(4, 0xf).eight_bits(), [0xf0]);
@@ -227,7 +234,7 @@ mod tests {
 
     #[test]
     fn pixels_are_counted_by_code() {
-        let counts = Image { pixels: array![[0, 3], [3, 4000]], bits: 8 }.counts();
+        let counts = Image::new(array![[0, 3], [3, 4000]], 8).counts();
         assert_eq!(counts.len(), 256);
         assert_eq!([counts[0], counts[1], counts[3], counts[255]], [1, 0, 2, 1]);
     }

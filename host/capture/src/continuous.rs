@@ -281,7 +281,7 @@ mod tests {
             strobe_end: BoardMicros(0),
             exposure: Micros(1),
         };
-        let image = Image { pixels: ndarray::Array2::zeros((1, 1)), bits: 8 };
+        let image = Image::new(ndarray::Array2::zeros((1, 1)), 8);
         Frame { number, deviation: Nanometres(0), record, image }
     }
 

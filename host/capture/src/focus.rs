@@ -339,7 +339,7 @@ mod tests {
 
     #[test]
     fn bins_images_and_crops_regions() {
-        let image = Image { pixels: Array2::from_shape_fn((5, 6), |(r, c)| (r * 6 + c) as u16), bits: 8 };
+        let image = Image::new(Array2::from_shape_fn((5, 6), |(r, c)| (r * 6 + c) as u16), 8);
         let part = cut(&image, Some([2, 1, 4, 2])).unwrap();
         assert_eq!(binned(&part, 2), ndarray::array![[11.5, 13.5]]);
         assert!(matches!(cut(&image, Some([3, 0, 4, 1])), Err(FocusSearchError::Region { .. })));

@@ -77,10 +77,10 @@ mod tests {
     fn few_bright_pixels_do_not_count() {
         let mut pixels = Array2::from_elem((20, 100), 51);
         pixels.iter_mut().take(10).for_each(|code| *code = 255);
-        let image = Image { pixels, bits: 8 };
+        let image = Image::new(pixels, 8);
         assert_eq!(brightest(&image), 0.2);
         let pixels = image.pixels.mapv(|code| if code == 51 { 60 } else { code });
-        let mut image = Image { pixels, bits: 8 };
+        let mut image = Image::new(pixels, 8);
         image.pixels[[19, 99]] = 255;
         assert_eq!(brightest(&image), 1.0, "11 of 2000 pixels");
     }

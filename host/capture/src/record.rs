@@ -100,6 +100,9 @@ pub struct CameraRecord {
     pub height: usize,
     /// Camera bits; 9 to 15 are shifted up to 16 in the files.
     pub bits: u8,
+    /// Variance of a pixel by the camera's lossy compression (JPEG), as a part of full scale squared.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub coding_variance: Option<f64>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub averaged: Option<u16>,
     /// Whether exposures without the board's light were subtracted.
@@ -221,6 +224,7 @@ fn record(
             width,
             height,
             bits: image.bits,
+            coding_variance: Some(image.coding_variance).filter(|variance| *variance > 0.0),
             averaged: None,
             ambient_subtracted: false,
             corrected: false,

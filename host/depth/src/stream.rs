@@ -31,6 +31,11 @@ impl Stream {
         Ok(Self { optics: *optics, settings: *settings, bank, registration: None, noise: None })
     }
 
+    /// Variance of a pixel of the next pairs by lossy compression, in their units; 0 without.
+    pub fn set_coding(&mut self, variance: f64) {
+        self.settings.prepare.coding = variance;
+    }
+
     /// Depth of the next pair `[far, near]`. Pairs of other sizes may follow each other; errors as
     /// [`measure_pair`](crate::measure::measure_pair), after which the stream remains usable.
     pub fn measure(&mut self, images: [Array2<f32>; 2]) -> Result<Measurement, MeasureError> {

@@ -76,6 +76,6 @@ fn picture(mut header: Value, found: &Measurement, far: &Image, ends: [f32; 2], 
     // A learned lens may have its pixels averaged.
     let step = (far.pixels.nrows() / height.max(1)).max(1);
     let pixels = far.pixels.slice(s![..height * step; step, ..width * step; step]).to_owned();
-    let far = Image { pixels, bits: far.bits };
+    let far = Image::new(pixels, far.bits);
     message(&header, &[&[&codes[..], &confidence, &far.eight_bits()], more].concat())
 }

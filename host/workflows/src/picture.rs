@@ -88,7 +88,7 @@ mod tests {
 
     fn seen(bits: u8, code: impl Fn(usize, usize) -> u16) -> PictureFigures {
         let pixels = Array2::from_shape_fn((32, 48), |(y, x)| code(y, x));
-        figures(&Image { pixels, bits }, FocusMeasure::Tenengrad)
+        figures(&Image::new(pixels, bits), FocusMeasure::Tenengrad)
     }
 
     #[test]

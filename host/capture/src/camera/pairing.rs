@@ -330,7 +330,7 @@ mod tests {
 
     #[test]
     fn rejects_repeated_pixels_unless_the_picture_is_uniform() {
-        let image = |pixels: [u16; 3]| Image { pixels: ndarray::array![pixels], bits: 8 };
+        let image = |pixels: [u16; 3]| Image::new(ndarray::array![pixels], 8);
         assert_eq!(content(&image([7, 7, 7])), None);
         assert_ne!(content(&image([1, 2, 3])), content(&image([3, 2, 1])));
         let mut pairing = Pairing::default();

@@ -160,7 +160,7 @@ impl Layout {
         }
         let pixels =
             Array2::from_shape_vec((height, width), values).map_err(|error| BadFrame(error.to_string()))?;
-        Ok(Image { pixels, bits })
+        Ok(Image::new(pixels, bits))
     }
 }
 
@@ -212,7 +212,8 @@ pub fn of_picture(picture: GreyImage) -> Result<Image, String> {
         return Err("a camera's image has integer pixels, this one has float".into());
     };
     let full_scale = f32::from(((1u32 << bits) - 1) as u16);
-    Ok(Image { pixels: picture.pixels.mapv(|value| (value * full_scale).round() as u16), bits })
+    let pixels = picture.pixels.mapv(|value| (value * full_scale).round() as u16);
+    Ok(Image { pixels, bits, coding_variance: picture.coding_variance })
 }
 
 #[cfg(test)]

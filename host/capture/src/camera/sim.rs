@@ -158,7 +158,7 @@ impl SimCamera {
             address: self.address.clone(),
             reason: error.to_string(),
         })?;
-        Ok(Image { pixels, bits })
+        Ok(Image::new(pixels, bits))
     }
 
     fn ended(&self) -> CameraError {

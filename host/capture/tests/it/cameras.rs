@@ -12,7 +12,7 @@ use std::{
     time::Duration,
 };
 
-use farnear_capture::camera::{Camera, CameraError, FolderCamera, SimCamera};
+use farnear_capture::camera::{Camera, CameraError, FolderCamera, Image, SimCamera};
 use farnear_files::image_file::encode_png;
 use farnear_protocol::{
     camera::FrameHeader,
@@ -148,8 +148,8 @@ fn used_folder(first: &str) -> (tempfile::TempDir, FolderCamera) {
     (folder, camera)
 }
 
-fn second_picture(camera: &mut FolderCamera) -> Result<(), CameraError> {
-    camera.image(&shot(1), Duration::from_secs(5)).map(drop)
+fn second_picture(camera: &mut FolderCamera) -> Result<Image, CameraError> {
+    camera.image(&shot(1), Duration::from_secs(5))
 }
 
 #[test]
@@ -243,5 +243,6 @@ fn waits_for_and_rejects_a_truncated_jpeg() {
     let error = second_picture(&mut camera).unwrap_err().to_string();
     assert!(error.contains("b.jpg") && error.contains("incomplete"), "{error}");
     fs::write(&path, &jpeg).unwrap();
-    second_picture(&mut camera).unwrap();
+    let image = second_picture(&mut camera).unwrap();
+    assert!(image.coding_variance > 0.0, "compression is known");
 }

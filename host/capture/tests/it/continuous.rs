@@ -41,7 +41,7 @@ impl Camera for Losing {
         if self.lost.contains(&trigger_number) {
             return Err(CameraError::Late { camera: "it".into(), trigger_number, waited });
         }
-        Ok(Image { pixels: Array2::from_elem((3, 4), trigger_number as u16), bits: 8 })
+        Ok(Image::new(Array2::from_elem((3, 4), trigger_number as u16), 8))
     }
 }
 

@@ -41,7 +41,7 @@ impl Camera for Answering {
 }
 
 fn numbered() -> Answering {
-    Answering(|shot| Ok(Image { pixels: Array2::from_elem((3, 4), shot.trigger_number as u16), bits: 8 }))
+    Answering(|shot| Ok(Image::new(Array2::from_elem((3, 4), shot.trigger_number as u16), 8)))
 }
 
 fn one_ahead() -> Answering {

@@ -123,12 +123,12 @@ mod tests {
     fn a_pictures_figures_follow_from_its_pixels() {
         let mut pixels = Array2::from_elem((10, 20), 1000_u16);
         pixels.row_mut(0).fill(4095);
-        let seen = figures(&Image { pixels, bits: 12 }, FocusMeasure::Tenengrad, 24.996);
+        let seen = figures(&Image::new(pixels, 12), FocusMeasure::Tenengrad, 24.996);
         assert_eq!((seen.frames_per_s, seen.saturated_percent), (25.0, 10.0));
         // (20 * 4095 + 180 * 1000) / 200 / 4095
         assert_eq!(seen.mean_percent, 31.98);
         assert!(seen.focus.is_some_and(|focus| focus > 0.0), "{seen:?}");
-        let dark = figures(&Image { pixels: Array2::zeros((10, 20)), bits: 8 }, FocusMeasure::Tenengrad, 1.0);
+        let dark = figures(&Image::new(Array2::zeros((10, 20)), 8), FocusMeasure::Tenengrad, 1.0);
         assert_eq!((dark.focus, dark.mean_percent), (None, 0.0));
     }
 }

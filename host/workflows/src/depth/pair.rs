@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use farnear_capture::record::CAPTURE_FILE;
+use farnear_capture::record::{CAPTURE_FILE, read_record};
 use farnear_files::image_file::{ReadSettings, Samples, read_grey_with, shared_white_level};
 use ndarray::Array2;
 
@@ -45,8 +45,10 @@ impl Pair {
             let twice = "they hold the same image: depth needs one focused far and one focused near";
             return Err(unfit(twice.into()));
         }
+        let of_camera = far.parent().and_then(|folder| read_record(folder).ok()?).map(|record| record.camera);
+        let of_files = 0.5 * (far_image.coding_variance + near_image.coding_variance);
         Ok(Self {
-            coding_variance: 0.5 * (far_image.coding_variance + near_image.coding_variance),
+            coding_variance: of_files + of_camera.and_then(|camera| camera.coding_variance).unwrap_or(0.0),
             far: far_image.pixels,
             near: near_image.pixels,
             white: white.unwrap_or(1.0),
@@ -86,7 +88,25 @@ pub fn default_folder(far: &Path) -> PathBuf {
 
 #[cfg(test)]
 mod tests {
+    use farnear_files::image_file::encode_png;
+
     use super::*;
+
+    /// A capture keeps the pictures of a JPEG camera as PNG, which has no quantisation tables.
+    #[test]
+    fn the_record_of_a_capture_tells_of_its_cameras_compression() {
+        let folder = tempfile::tempdir().unwrap();
+        let [far, near] = ["far.png", "near.png"].map(|name| folder.path().join(name));
+        for (file, code) in [(&far, 10_u16), (&near, 20)] {
+            std::fs::write(file, encode_png(Array2::from_elem((4, 5), code).view(), 8).unwrap()).unwrap();
+        }
+        let variance = || Pair::read(&far, &near, &ReadSettings::default()).unwrap().coding_variance;
+        assert_eq!(variance(), 0.0);
+        let record = include_str!("../sessions/capture.toml");
+        let record = record.replace("[camera]\n", "[camera]\ncoding_variance = 2.5e-5\n");
+        std::fs::write(folder.path().join(CAPTURE_FILE), record).unwrap();
+        assert_eq!(variance(), 2.5e-5);
+    }
 
     #[test]
     fn names_tell_a_swapped_pair() {

@@ -95,6 +95,7 @@ pub fn watch(
         }
         let arrived = Instant::now();
         shown = Some(arrived);
+        depths.set_coding(0.5 * (far.image.coding_variance + near.image.coding_variance));
         let Some(found) = measure(&mut depths, [&far, &near].map(|frame| frame.image.grey()))? else {
             continue;
         };

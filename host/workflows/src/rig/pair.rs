@@ -200,7 +200,7 @@ fn corrected(image: &Image, frames: &CameraFrames) -> Result<Image> {
         true => u16::MAX,
         false => (seen * WHITE).round().clamp(0.0, WHITE - 1.0) as u16,
     });
-    Ok(Image { pixels, bits: 16 })
+    Ok(Image { pixels, bits: 16, coding_variance: image.coding_variance })
 }
 
 pub fn take(

@@ -293,7 +293,7 @@ mod tests {
     use super::*;
 
     fn image(code: u16) -> Image {
-        Image { pixels: Array2::from_shape_fn((3, 5), |(y, x)| code + (5 * y + x) as u16), bits: 12 }
+        Image::new(Array2::from_shape_fn((3, 5), |(y, x)| code + (5 * y + x) as u16), 12)
     }
 
     fn optics() -> GivenOptics {
@@ -351,7 +351,7 @@ mod tests {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("a.pairs");
         let mut recorder = Recorder::begin(&path, &optics()).expect("begins");
-        let large = Image { pixels: Array2::from_elem((12, 20), 7), bits: 12 };
+        let large = Image::new(Array2::from_elem((12, 20), 7), 12);
         let mut whole = 0;
         let error = loop {
             match recorder.add(&large, &large) {
