@@ -14,7 +14,7 @@ import farnear
 PUBLIC = [name for name in farnear.__all__ if name != "__version__"]
 # Arrays and physical quantities are documented by shape and unit; these objects have neither.
 WITHOUT_SHAPES = {"FarnearError", "RigError", "Operators", "Recogniser", "Optics", "Plane", "PsfFit", "sun_position"}
-SHAPES = ("(height, width", "(frames, height", "(n, features)", "(360,)")
+SHAPES = ("(height, width", "(frames, height", "(n, features)", "(n, 4)", "(360,)")
 UNITS = ("mm", "px", "degree", "0 to 1", "um")
 
 

@@ -56,6 +56,7 @@ impl GreyImage {
             if code == 0xffff << shifted & 0xffff { 16 - shifted } else { 32 - code.leading_zeros() };
         self.samples = Samples::Integer(bits.min(of_camera as u8).max(1));
         self.pixels.mapv_inplace(|value| (value / white_level).min(1.0));
+        self.coding_variance /= f64::from(white_level).powi(2);
         self.white_level = None;
         self
     }

@@ -300,6 +300,7 @@ fn read(
     })?;
     if let Some(white) = white.get() {
         slices.iter_mut().for_each(|slice| slice.mapv_inplace(|value| (value / white).min(1.0)));
+        coding /= f64::from(white).powi(2);
     }
     Ok((slices, coding))
 }

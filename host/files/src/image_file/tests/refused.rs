@@ -216,6 +216,9 @@ fn rejects_an_animation() {
 #[test]
 fn rotates_a_jpeg_by_its_orientation() {
     let plain = decode_grey(&jpeg(48, 32)).unwrap().pixels;
+    let image = decode_grey(&jpeg(48, 32)).unwrap();
+    let scaled = image.clone().relative_to(0.5).coding_variance;
+    assert_eq!(scaled, 4.0 * image.coding_variance, "the variance has the units of the pixels");
     let turned = decode_grey(&jpeg_turned(48, 32, 6)).unwrap().pixels;
     assert_eq!(turned.dim(), (48, 32));
     assert_eq!(turned[(40, 10)], plain[(31 - 10, 40)]);
