@@ -66,47 +66,49 @@ pub(super) fn whole_jpeg(bytes: &[u8]) -> Option<Vec<u8>> {
     }
 }
 
+/// Markers of a JPEG with the data of their segments, up to the first that is incomplete.
+fn jpeg_segments(bytes: &[u8]) -> impl Iterator<Item = (u8, &[u8])> {
+    let mut at = 2;
+    std::iter::from_fn(move || {
+        while bytes.get(at..at + 2)? == [0xff, 0xff] {
+            at += 1;
+        }
+        let &[0xff, marker, high, low] = bytes.get(at..at + 4)? else { return None };
+        let end = at + 2 + usize::from(u16::from_be_bytes([high, low]));
+        let data = bytes.get(at + 4..end)?;
+        at = end;
+        Some((marker, data))
+    })
+}
+
 /// Why a JPEG of this coding is not read (T.81, table B.1; JPEG-LS), from the marker and precision of its frame.
 pub(super) fn unsupported_jpeg(bytes: &[u8]) -> Option<String> {
-    let mut at = 2;
     // Colours of a frame whose scans hold all of them.
     let mut together = 0;
-    loop {
-        let (marker, length) = match *bytes.get(at..at + 4)? {
-            [0xff, 0xff, ..] => {
-                at += 1;
-                continue;
-            }
-            [0xff, marker, high, low] => (marker, usize::from(u16::from_be_bytes([high, low]))),
-            _ => return None,
-        };
+    for (marker, data) in jpeg_segments(bytes) {
+        let first = data.first().copied().unwrap_or(0);
         let coding = match marker {
-            0xc2 if bytes.get(at + 4)? == &8 => return None,
-            0xc0 | 0xc1 if bytes.get(at + 4)? == &8 => {
-                let components = bytes.get(at + 10..at + 2 + length)?.chunks_exact(3);
+            0xc2 if first == 8 => return None,
+            0xc0 | 0xc1 if first == 8 => {
+                let components = data.get(6..)?.chunks_exact(3);
                 let colours = components.len();
                 together =
                     if components.into_iter().any(|component| component[1] & 15 > 1) { colours } else { 0 };
-                at += 2 + length;
                 continue;
             }
             // The decoder confuses their rows.
-            0xda if usize::from(*bytes.get(at + 4)?) < together => {
-                "a JPEG with subsampled colours in separate scans"
-            }
-            0xc0..=0xc2 => &format!("a JPEG of {} bits", bytes[at + 4]),
+            0xda if usize::from(first) < together => "a JPEG with subsampled colours in separate scans",
+            0xc0..=0xc2 => &format!("a JPEG of {first} bits"),
             0xc3 | 0xc7 | 0xcb | 0xcf => "a lossless JPEG",
             0xc5 | 0xc6 | 0xcd | 0xce => "a hierarchical JPEG",
             0xc9 | 0xca => "a JPEG with arithmetic coding",
             0xf7 => "JPEG-LS",
             0xd9 | 0xda => return None,
-            _ => {
-                at += 2 + length;
-                continue;
-            }
+            _ => continue,
         };
         return Some(format!("it is {coding}, which is not read: convert it to PNG or TIFF"));
     }
+    None
 }
 
 /// Variance of a grey pixel by the rounding of a JPEG's coefficients, as a part of full scale squared: a twelfth of the
@@ -116,11 +118,7 @@ pub(super) fn jpeg_coding_variance(bytes: &[u8]) -> Option<f64> {
     const USED: std::ops::Range<f64> = 0.08..0.3;
     let mut tables: [Option<[f64; 64]>; 4] = [None; 4];
     let mut of_brightness = 0;
-    let mut at = 2;
-    loop {
-        let &[0xff, marker, high, low] = bytes.get(at..at + 4)? else { return None };
-        let mut data = bytes.get(at + 4..at + 2 + usize::from(u16::from_be_bytes([high, low])))?;
-        at += 4 + data.len();
+    for (marker, mut data) in jpeg_segments(bytes) {
         match marker {
             0xdb => {
                 while let [kind, rest @ ..] = data {
@@ -136,16 +134,17 @@ pub(super) fn jpeg_coding_variance(bytes: &[u8]) -> Option<f64> {
             0xc0..=0xc2 => of_brightness = usize::from(*data.get(8)?),
             0xda => {
                 let steps = (*tables.get(of_brightness)?)?;
-                let used = zigzag()
+                let used: Vec<f64> = zigzag()
                     .zip(steps)
-                    .filter(|([u, v], _)| USED.contains(&(f64::from(*u).hypot(f64::from(*v)) / 16.0)));
-                let (sum, count) =
-                    used.fold((0.0, 0.0), |(sum, count), (_, step)| (sum + step * step / 12.0, count + 1.0));
-                return Some(sum / count / (255.0 * 255.0));
+                    .filter(|([u, v], _)| USED.contains(&(f64::from(*u).hypot(f64::from(*v)) / 16.0)))
+                    .map(|(_, step)| step * step / 12.0)
+                    .collect();
+                return Some(used.iter().sum::<f64>() / used.len() as f64 / (255.0 * 255.0));
             }
             _ => {}
         }
     }
+    None
 }
 
 /// Horizontal and vertical frequency of a block's coefficients in the order of T.81, figure A.6.

@@ -45,13 +45,16 @@ impl Pair {
             let twice = "they hold the same image: depth needs one focused far and one focused near";
             return Err(unfit(twice.into()));
         }
-        let of_camera = far.parent().and_then(|folder| read_record(folder).ok()?).map(|record| record.camera);
+        let white = white.unwrap_or(1.0);
         let of_files = 0.5 * (far_image.coding_variance + near_image.coding_variance);
+        // A capture's pictures are PNG; its record tells what the camera gave.
+        let record = far.parent().filter(|_| of_files == 0.0).and_then(|folder| read_record(folder).ok()?);
+        let of_camera = record.and_then(|record| record.camera.coding_variance);
         Ok(Self {
-            coding_variance: of_files + of_camera.and_then(|camera| camera.coding_variance).unwrap_or(0.0),
+            coding_variance: of_files + of_camera.map_or(0.0, |variance| variance / f64::from(white).powi(2)),
             far: far_image.pixels,
             near: near_image.pixels,
-            white: white.unwrap_or(1.0),
+            white,
             samples,
         })
     }
