@@ -2,7 +2,7 @@ use std::path::PathBuf;
 
 use anyhow::Result;
 
-use crate::run::{cargo, finish, step, target_folder};
+use crate::run::{cargo, features, finish, step, target_folder};
 
 /// Programs for users; package and program have the same name.
 pub const PROGRAMS: [&str; 3] = ["farnear", "farnear-sim", "farnear-campaign"];
@@ -16,7 +16,7 @@ pub fn build() -> Result<PathBuf> {
 }
 
 pub fn build_silently() -> Result<PathBuf> {
-    finish(cargo(["build", "--locked"]).args(PACKAGES))?;
+    finish(cargo(["build", "--locked"]).args(PACKAGES).args(features()))?;
     Ok(target_folder().join("debug"))
 }
 

@@ -11,7 +11,7 @@ use anyhow::{Context, Result};
 use crate::{
     browser::Counts,
     limited,
-    run::{ROOT, cargo, finish, succeeds, target_folder},
+    run::{ROOT, cargo, features, finish, succeeds, target_folder},
     test_programs,
 };
 
@@ -106,7 +106,7 @@ pub fn build(elf: &Path) -> Result<()> {
     }
     let packages = [PACKAGE, "farnear", "farnear-sim"].map(|name| ["--package", name]);
     let mut command = cargo(["build", "--locked"]);
-    command.args(packages.as_flattened());
+    command.args(packages.as_flattened()).args(features());
     // An extension for every Python version is neither linked with Python nor asks one.
     command.env("PYO3_BUILD_EXTENSION_MODULE", "1").env("PYO3_NO_PYTHON", "1");
     finish(test_programs::environment(&mut command, elf))

@@ -9,7 +9,7 @@ use crate::{
     boards::BOARDS,
     browser::{self, Counts},
     firmware, instructions, python,
-    run::{cargo, finish, step},
+    run::{cargo, features, finish, step},
     sizes,
     test_programs::{Programs, Total},
     thumb::Way,
@@ -39,7 +39,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
 
     step("lints");
     let workspace = ["--workspace", "--exclude", python::PACKAGE, "--locked"];
-    finish(cargo(["clippy", "--all-targets"]).args(workspace).args(["--", "--deny", "warnings"]))?;
+    finish(cargo(["clippy", "--all-targets"]).args(workspace).args(features()).args(["--", "--deny", "warnings"]))?;
     if way.has_clippy() {
         let arguments = ["--release", "--locked", "--", "--deny", "warnings"];
         for board in &BOARDS {
@@ -49,10 +49,13 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         eprintln!("skipped: clippy for the firmware (Debian's rust-web-clippy is not installed)");
     }
     step("documentation");
-    finish(cargo(["doc", "--no-deps", "--quiet"]).args(workspace).env("RUSTDOCFLAGS", "--deny warnings"))?;
+    finish(cargo(["doc", "--no-deps", "--quiet"]).args(workspace).args(features()).env("RUSTDOCFLAGS", "--deny warnings"))?;
 
     step("compiling the tests on the host and on the emulated board");
     // Build before running: a cargo call during the tests could replace their programs.
+    if features().is_empty() {
+        eprintln!("skipped: cameras through Aravis (libaravis-dev 0.8.25 or newer is missing)");
+    }
     let programs = Programs::build(&elf)?;
     python::build(&elf)?;
     step(

@@ -15,7 +15,7 @@ use serde_json::Value;
 
 use crate::{
     limited, python,
-    run::{ROOT, cargo, finish, output, target_folder},
+    run::{ROOT, cargo, features, finish, output, target_folder},
 };
 
 /// Packages whose tests run the programs or the firmware; others depend on their own files only.
@@ -78,7 +78,7 @@ impl Programs {
         }
         eprintln!("running the examples in the documentation");
         let mut examples = cargo(["test", "--workspace", "--exclude", python::PACKAGE, "--locked", "--doc"]);
-        watch(environment(&mut examples, elf), &mut total)?;
+        watch(environment(examples.args(features()), elf), &mut total)?;
         Ok(total)
     }
 
@@ -86,7 +86,7 @@ impl Programs {
         look_again()?;
         let mut command =
             cargo(["test", "--workspace", "--exclude", python::PACKAGE, "--locked", "--no-run"]);
-        finish(environment(&mut command, elf))?;
+        finish(environment(command.args(features()), elf))?;
         let text = output(command.arg("--message-format=json-render-diagnostics"))?;
         let (mut tests, mut others) = (Vec::new(), Vec::new());
         for line in text.lines() {

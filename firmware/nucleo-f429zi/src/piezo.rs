@@ -31,9 +31,8 @@ const SPI_HZ: Hertz = Hertz(10_500_000);
 const CONVERSION_CYCLES: u32 = 622;
 /// CNV pulse: 60 ns, between the 50 ns required and the 500 ns of the shortest conversion.
 const PULSE_CYCLES: u32 = 10;
-/// Half of a word's 256 cycles.
-const HALF_A_WORD_CYCLES: u32 = 128;
-const LOOK_CYCLES: u32 = 12;
+/// Sixteen bits of sixteen cycles.
+const WORD_CYCLES: u32 = 256;
 /// Busy indicator, first of the 32 bits.
 const BUSY_BIT: u32 = 1 << 31;
 /// Clocks after indicator and 18 bits.
@@ -76,10 +75,8 @@ impl Piezo {
 
     fn exchange(&mut self, word: u16) -> u16 {
         pac::SPI3.dr().write(|w| w.set_dr(word));
-        clock::wait_cycles(HALF_A_WORD_CYCLES);
-        while !pac::SPI3.sr().read().rxne() {
-            clock::wait_cycles(LOOK_CYCLES);
-        }
+        clock::wait_cycles(WORD_CYCLES);
+        while !pac::SPI3.sr().read().rxne() {}
         pac::SPI3.dr().read().dr()
     }
 
