@@ -38,8 +38,8 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     instructions::run(false)?;
 
     step("lints");
-    let workspace = ["--workspace", "--exclude", python::PACKAGE, "--locked"];
-    finish(cargo(["clippy", "--all-targets"]).args(workspace).args(features()).args(["--", "--deny", "warnings"]))?;
+    let workspace = [&["--workspace", "--exclude", python::PACKAGE, "--locked"], features()].concat();
+    finish(cargo(["clippy", "--all-targets"]).args(&workspace).args(["--", "--deny", "warnings"]))?;
     if way.has_clippy() {
         let arguments = ["--release", "--locked", "--", "--deny", "warnings"];
         for board in &BOARDS {
@@ -49,7 +49,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         eprintln!("skipped: clippy for the firmware (Debian's rust-web-clippy is not installed)");
     }
     step("documentation");
-    finish(cargo(["doc", "--no-deps", "--quiet"]).args(workspace).args(features()).env("RUSTDOCFLAGS", "--deny warnings"))?;
+    finish(cargo(["doc", "--no-deps", "--quiet"]).args(&workspace).env("RUSTDOCFLAGS", "--deny warnings"))?;
 
     step("compiling the tests on the host and on the emulated board");
     // Build before running: a cargo call during the tests could replace their programs.
