@@ -205,6 +205,18 @@ fn a_driver_fault_takes_the_current_away_and_homing_tries_again() {
 }
 
 #[test]
+fn a_fault_line_counts_once_the_driver_has_its_current() {
+    let mut bench = Bench::new(300.0);
+    bench.hardware.coarse.faults.driver = true;
+    bench.run_ms(5);
+    assert_eq!(bench.alarm(), None, "without current");
+    let id = bench.accepted(&HOME);
+    assert!((0..3).any(|_| bench.tick().coarse.enable));
+    bench.hardware.coarse.faults.driver = false;
+    assert!(matches!(bench.end_of(id), EventKind::Homed { .. }), "a driver that woke up in time");
+}
+
+#[test]
 fn a_step_timer_that_fails_is_named() {
     let dead = Faults { timer_dead: true, ..Faults::default() };
     let lossy = Faults { queue_lost: true, ..Faults::default() };
