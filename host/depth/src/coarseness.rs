@@ -32,3 +32,52 @@ pub(crate) fn coarseness(pair: &Prepared) -> Array2<f32> {
         if told { (apart_texture / near_texture).ln() } else { f32::NAN }
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use rand::{Rng, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    use super::*;
+    use crate::prepare::{Report, noise::PairNoise};
+
+    const SIZE: (usize, usize) = (96, 96);
+
+    fn of(image: &Array2<f32>, mean_variance: f64) -> Array2<f32> {
+        let half = image / 2.0;
+        coarseness(&Prepared {
+            far: half.clone(),
+            near: half,
+            reasons: Array2::zeros(SIZE),
+            noise: PairNoise { mean_variance, ..PairNoise::default() },
+            report: Report::default(),
+        })
+    }
+
+    fn white() -> Array2<f32> {
+        let mut rng = ChaCha8Rng::seed_from_u64(1);
+        Array2::from_shape_simple_fn(SIZE, || rng.random::<f32>())
+    }
+
+    #[test]
+    fn a_slope_is_coarse_and_white_texture_is_not() {
+        let slope = of(&Array2::from_shape_fn(SIZE, |(y, x)| (x + 2 * y) as f32 / 500.0), 0.0);
+        // Away from the border, where differences look back. In f32, of values up to 0.6 and differences of 0.002.
+        assert!((slope[(48, 48)] - 9_f32.ln()).abs() < 1e-3, "{}", slope[(48, 48)]);
+        // 3362 squares a window, of a relative standard deviation of about one.
+        let largest = of(&white(), 0.0).iter().fold(0.0_f32, |largest, value| largest.max(value.abs()));
+        assert!(largest < 0.12, "{largest}");
+    }
+
+    #[test]
+    fn noise_is_subtracted_and_hides_fine_texture() {
+        // A slope of 0.1 a pixel and noise of a variance of 1/12 in the sum of both images: its mean square difference is 1/3
+        // across both directions, the slope's 0.01 and 0.09.
+        let noisy = white() + Array2::from_shape_fn(SIZE, |(_, x)| x as f32 * 0.1);
+        let half_variance = 1.0 / 24.0;
+        assert!(of(&noisy, half_variance).iter().all(|value| value.is_nan()), "no texture beside the noise");
+        // Without a noise level it counts as texture: (1/3 + 0.09) / (1/3 + 0.01).
+        let centre = of(&noisy, 0.0)[(48, 48)];
+        assert!((centre - (0.4233_f32 / 0.3433).ln()).abs() < 0.1, "{centre}");
+    }
+}
