@@ -85,12 +85,13 @@ pub fn has(program: &str) -> bool {
     succeeds(Command::new(program).arg("--version"))
 }
 
-/// Features for cargo calls on the workspace, the same in each, so that nothing is compiled twice: cameras through Aravis
-/// where its library is new enough.
+pub fn has_aravis() -> bool {
+    succeeds(Command::new("pkg-config").args(["--exists", "aravis-0.8 >= 0.8.25"]))
+}
+
+/// Features of every cargo call, so that nothing is compiled twice: `genicam` where its library is installed.
 pub fn features() -> &'static [&'static str] {
-    static ARAVIS: LazyLock<bool> =
-        LazyLock::new(|| succeeds(Command::new("pkg-config").args(["--exists", "aravis-0.8 >= 0.8.25"])));
-    if *ARAVIS { &["--features", "farnear/genicam"] } else { &[] }
+    if has_aravis() { &["--features", "farnear/genicam"] } else { &[] }
 }
 
 /// Whether the toolchain on the PATH has a target's libraries.

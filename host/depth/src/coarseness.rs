@@ -64,7 +64,7 @@ mod tests {
         let slope = of(&Array2::from_shape_fn(SIZE, |(y, x)| (x + 2 * y) as f32 / 500.0), 0.0);
         // Away from the border, where differences look back. In f32, of values up to 0.6 and differences of 0.002.
         assert!((slope[(48, 48)] - 9_f32.ln()).abs() < 1e-3, "{}", slope[(48, 48)]);
-        // 3362 squares a window, of a relative standard deviation of about one.
+        // 3362 squares a window, of a relative standard deviation of about one: four standard deviations of the ratio.
         let largest = of(&white(), 0.0).iter().fold(0.0_f32, |largest, value| largest.max(value.abs()));
         assert!(largest < 0.12, "{largest}");
     }
@@ -75,7 +75,7 @@ mod tests {
         // across both directions, the slope's 0.01 and 0.09.
         let noisy = white() + Array2::from_shape_fn(SIZE, |(_, x)| x as f32 * 0.1);
         let half_variance = 1.0 / 24.0;
-        assert!(of(&noisy, half_variance).iter().all(|value| value.is_nan()), "no texture beside the noise");
+        assert!(of(&noisy, half_variance).iter().all(|value| value.is_nan()), "noise hides the texture");
         // Without a noise level it counts as texture: (1/3 + 0.09) / (1/3 + 0.01).
         let centre = of(&noisy, 0.0)[(48, 48)];
         assert!((centre - (0.4233_f32 / 0.3433).ln()).abs() < 0.1, "{centre}");

@@ -13,7 +13,7 @@ use super::{
     Extras, Release, copy, lay_documents, lay_programs,
     programs::{Target, without_paths},
 };
-use crate::run::{ROOT, cargo, finish, has, output, step, target_folder};
+use crate::run::{ROOT, cargo, finish, has, has_aravis, output, step, target_folder};
 
 /// `/usr/bin` points here, because the emulated board expects its firmware next to it.
 const PROGRAMS: &str = "usr/lib/farnear";
@@ -116,9 +116,7 @@ fn pack(
 }
 
 fn cameras() -> Vec<&'static str> {
-    let aravis = Command::new("pkg-config").args(["--exists", "aravis-0.8 >= 0.8.25"]).status();
-    let aravis = aravis.is_ok_and(|status| status.success());
-    let features = [(aravis, "genicam", "libaravis-dev"), (has("clang"), "v4l2", "clang")];
+    let features = [(has_aravis(), "genicam", "libaravis-dev"), (has("clang"), "v4l2", "clang")];
     for (_, feature, package) in features.iter().filter(|(here, ..)| !here) {
         eprintln!("the Debian packages have no {feature} cameras: {package} is missing");
     }
