@@ -197,9 +197,19 @@ impl GenicamCamera {
 
     fn take(&mut self, wait: Duration) -> Result<Option<Frame>, CameraError> {
         let Some(stream) = &self.stream else { return Ok(None) };
-        let micros = u64::try_from(wait.as_micros()).unwrap_or(u64::MAX).max(1);
-        let Some(buffer) = stream.timeout_pop_buffer(micros) else {
-            return if self.lost.load(Ordering::Relaxed) { Err(self.gone()) } else { Ok(None) };
+        let begin = Instant::now();
+        let buffer = loop {
+            let left = wait.saturating_sub(begin.elapsed());
+            let micros = u64::try_from(left.as_micros()).unwrap_or(u64::MAX).max(1);
+            let Some(buffer) = stream.timeout_pop_buffer(micros) else {
+                return if self.lost.load(Ordering::Relaxed) { Err(self.gone()) } else { Ok(None) };
+            };
+            // Aravis returns an unfilled buffer for a packet that is not a camera's: those of other programs reach
+            // its raw socket before its filter is set.
+            if buffer.status() != BufferStatus::Cleared {
+                break buffer;
+            }
+            stream.push_buffer(buffer);
         };
         let frame = self.frame(&buffer, stream);
         stream.push_buffer(buffer);

@@ -151,6 +151,38 @@ fn each_software_trigger_gives_a_frame_and_a_surplus_one_is_an_error() {
     assert!(matches!(surplus, CameraError::Surplus { .. }), "{surplus:?}");
 }
 
+/// UDP ports of this process on all interfaces.
+fn own_ports() -> Vec<u16> {
+    let links = std::fs::read_dir("/proc/self/fd").unwrap();
+    let targets = links.filter_map(|link| std::fs::read_link(link.ok()?.path()).ok());
+    let open: Vec<String> = targets.map(|target| target.display().to_string()).collect();
+    let table = std::fs::read_to_string("/proc/net/udp").unwrap();
+    let port = |line: &str| {
+        let fields: Vec<&str> = line.split_whitespace().collect();
+        let (_, port) = fields[1].split_once(':')?;
+        let inode = format!("socket:[{}]", fields[9]);
+        open.contains(&inode).then(|| u16::from_str_radix(port, 16).unwrap())
+    };
+    table.lines().skip(1).filter_map(port).collect()
+}
+
+#[test]
+#[cfg_attr(not(fake_gige_camera), ignore = "needs arv-fake-gv-camera-0.8")]
+fn a_packet_of_another_program_is_no_frame() {
+    let fake = Fake::start(0);
+    let mut camera = fake.open();
+    camera.arm(TriggerMode::Software, EXPOSURE).unwrap();
+    // Frame 1, packet 0, of a type that GigE Vision does not have.
+    let foreign = [&[0, 0, 0, 1, 0x7f, 0, 0, 0][..], &[0; 56]].concat();
+    let sender = std::net::UdpSocket::bind("127.0.0.1:0").unwrap();
+    for port in own_ports() {
+        sender.send_to(&foreign, ("127.0.0.1", port)).unwrap();
+    }
+    camera.trigger(1, EXPOSURE).unwrap();
+    camera.image(&shot_at(1, Instant::now()), WAIT).unwrap();
+    camera.finish(Duration::ZERO).unwrap();
+}
+
 #[test]
 #[cfg_attr(not(fake_gige_camera), ignore = "needs arv-fake-gv-camera-0.8")]
 fn reports_lost_packets_and_never_returns_another_exposures_frame() {
