@@ -25,6 +25,12 @@ export function make(host) {
   const image = new Viewer("Live image");
   const depth = new Viewer("Live depth");
   const [saturation, peaking] = [check("Saturation", true), check("Focus peaking", false)];
+  const region = button("Region", () => {
+    if (store.state?.live.region) act("/api/live", { region: [0, 0, 0, 0] });
+    else image.use(image.tool === "pan" ? "region" : "pan");
+    press();
+  }, { "aria-pressed": "false", title: "Drag a rectangle in the image: focus value, histogram, Auto and Find focus use it alone" });
+  const press = () => region.setAttribute("aria-pressed", String(image.tool === "region" || Boolean(store.state?.live.region)));
   const focus = h("output", { class: "big" }, "–");
   const histogram = h("canvas", { class: "histogram", role: "img", "aria-label": "histogram of brightness" });
   const figures = h("div", {});
@@ -116,12 +122,13 @@ export function make(host) {
   };
   const light = [0, 1].map(() => h("input", { type: "number", min: 0, max: 100, title: "Light output of the board during captures and live depth" }));
   for (const level of light) level.addEventListener("change", () => act("/api/live", { light_percent: light.map((input) => Number(input.value)) }));
-  const measure = choice(MEASURES, MEASURES[0][0], (name) => { values.length = 0; best = 0; act("/api/live", { measure: name }); });
-  const forget = button("Reset", () => { values.length = 0; best = 0; }, { title: "Forgets the largest value" });
+  const forgetValues = () => { values.length = 0; best = 0; };
+  const measure = choice(MEASURES, MEASURES[0][0], (name) => { forgetValues(); act("/api/live", { measure: name }); });
+  const forget = button("Reset", forgetValues, { title: "Forgets the largest value" });
 
   host.append(h("div", { class: "split" },
     h("div", { class: "stage" },
-      h("div", { class: "toolbar" }, h("div", { class: "group" }, off, deep), record, saturation.label, peaking.label,
+      h("div", { class: "toolbar" }, h("div", { class: "group" }, off, deep), record, region, saturation.label, peaking.label,
         h("span", { class: "grow" }), status),
       scale,
       h("div", { class: "viewers" }, image.element, depth.element, resting, lead)),
@@ -130,6 +137,10 @@ export function make(host) {
       panel("Focus value", h("div", { class: "reading" }, focus, forget), place, field("Measure", measure)),
       panel("Recordings", h("div", { class: "row record-row" }, play, recordings), h("label", { class: "check" }, fast, "as fast as it goes"), played),
       panel("Camera", field("Exposure", exposure, "µs"), h("div", { class: "row" }, auto), ...light.map((level, at) => field(`Light ${at + 1}`, level, "%")), histogram, figures, warnings, camera.make()))));
+  image.onshape = (_, [x0, y0], [x1, y1]) => {
+    image.use("pan");
+    act("/api/live", { region: [Math.min(x0, x1), Math.min(y0, y1), Math.abs(x1 - x0) + 1, Math.abs(y1 - y0) + 1] });
+  };
   depth.element.hidden = true;
   depth.onprobe = (at) => {
     const code = at && live ? live.codes[at[1] * live.width + at[0]] : 0;
@@ -140,8 +151,7 @@ export function make(host) {
     [live, shown, pictured] = [null, false, performance.now()];
     scale.hidden = true;
     for (const viewer of [image, depth]) viewer.clear();
-    values.length = 0;
-    best = 0;
+    forgetValues();
     focus.replaceChildren("–");
     plot.set([[], []]);
     bars(histogram, []);
@@ -159,8 +169,18 @@ export function make(host) {
     deep.setAttribute("aria-pressed", live.mode === "depth");
     const seen = rig.phase === "ready" || live.camera_alone;
     for (const control of [off, exposure, measure]) control.disabled = !hasControl() || !seen;
-    auto.disabled = exposure.disabled || live.mode !== "image";
-    if (auto.disabled) tries = 0;
+    auto.disabled = region.disabled = exposure.disabled || live.mode !== "image";
+    if (auto.disabled) {
+      tries = 0;
+      image.use("pan");
+    }
+    press();
+    if (!image.shape?.open) {
+      const [x, y, width, height] = live.region ?? [];
+      image.shape = live.region && live.mode === "image" ? { kind: "region", from: [x, y], to: [x + width - 1, y + height - 1], open: false } : null;
+      image.draw();
+    }
+    if (before && String(before.live.region) !== String(live.region)) forgetValues();
     light.forEach((level, at) => {
       level.disabled = !hasControl() || rig.phase !== "ready";
       if (document.activeElement !== level) level.value = String(Math.round(live.light_percent[at]));
@@ -190,7 +210,7 @@ export function make(host) {
     const found = header.figures;
     shown = true;
     pictured = performance.now();
-    image.show(shade(blank(found, reused.image), pixels, saturation.box.checked, peaking.box.checked));
+    image.show(shade(blank(header, reused.image), pixels, saturation.box.checked, peaking.box.checked));
     time(image, header);
     if (tries) meter(header);
     values.push(found.focus ?? null);

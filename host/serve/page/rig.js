@@ -1,7 +1,7 @@
 // The rig: how it is, and moving it. Always in reach.
 import { act, call, hasControl, get, on, store } from "./link.js";
 import { h, button, choice, keep, notice, number, rows } from "./ui.js";
-import { draw } from "./stages.js";
+import { draw, listen } from "./stages.js";
 import { key } from "./keys.js";
 
 const STEPS = [[0.1, "0.1"], [1, "1"], [10, "10"], [100, "100"], [1000, "1000"]];
@@ -9,14 +9,15 @@ let range = null;
 
 /** Fills the panel on the left. */
 export function mount(host) {
-  const stages = h("div", { class: "stages" });
+  const stages = h("div", { class: "stages", title: "Click a rail to move its stage there" });
+  listen(stages, (axis, to_um) => able() && act("/api/rig/move", { targets: [{ axis, to_um }] }));
   const phase = h("div", { class: "phase" });
   const axes = h("div", { class: "axes" }, axis("coarse", "Coarse", 100), axis("fine", "Piezo", 1), axis("lens", "Lens", 100));
   const whole = h("div", { class: "buttons" },
     button("Home", () => act("/api/rig/home", { axes: [] }), { title: "Homes all stages (H)", "data-needs": "control" }),
     button("Far focus", () => act("/api/rig/goto", { focus: "far" }), { title: "F", "data-needs": "control" }),
     button("Near focus", () => act("/api/rig/goto", { focus: "near" }), { title: "N", "data-needs": "control" }),
-    button("Find focus", () => act("/api/rig/focus", {}), { title: "Searches for the sharpest image", "data-needs": "control" }));
+    button("Find focus", () => act("/api/rig/focus", store.state?.live.region ? { region: store.state.live.region } : {}), { title: "Searches for the sharpest image, in the region drawn in the live image if there is one", "data-needs": "control" }));
   const facts = h("div", {});
   const more = h("details", {}, h("summary", {}, "More"), h("div", { class: "details" }, facts, h("div", { class: "buttons" },
     button("Bring-up checklist", () => act("/api/rig/check"), { "data-needs": "control" }),
@@ -26,12 +27,12 @@ export function mount(host) {
 
   const show = (state) => {
     const { rig } = state;
-    keep(phase, [rig.phase, rig.name, rig.error, rig.emulated], () => phaseWords(rig));
+    keep(phase, [rig.phase, rig.name, rig.error, rig.emulated, rig.scene], () => phaseWords(rig));
     if (rig.info) draw(stages, rig.info, range);
     stages.hidden = !rig.info;
     if (more.open) facts.replaceChildren(details(rig));
-    const able = hasControl() && rig.phase === "ready";
-    for (const control of host.querySelectorAll("[data-needs=control]")) control.disabled = !able;
+    stages.classList.toggle("able", able());
+    for (const control of host.querySelectorAll("[data-needs=control]")) control.disabled = !able();
   };
   on("state", (state, before) => {
     if (!before || state.optics !== before.optics) measure().then(() => store.state && show(store.state));
@@ -43,6 +44,25 @@ export function mount(host) {
   key("n", "Go to the near focus", () => act("/api/rig/goto", { focus: "near" }));
   key("[", "Piezo one step towards the lens", () => step("fine", -1));
   key("]", "Piezo one step away from the lens", () => step("fine", 1));
+}
+
+function able() {
+  return hasControl() && store.state?.rig.phase === "ready";
+}
+
+const SCENES = [["staircase", "Staircase"], ["slant", "Slanted plane"], ["cone", "Cone"], ["sphere", "Sphere"]];
+const FLAT = /^plane:(.+)$/;
+
+/** What stands before the emulated rig. @param {string} scene */
+function sceneChoice(scene) {
+  const flat = FLAT.exec(scene)?.[1];
+  const known = flat || SCENES.some(([name]) => name === scene);
+  const set = (to) => act("/api/rig/scene", { scene: to });
+  const distance = h("input", { type: "number", min: 1, step: "any", value: flat ?? 900, "aria-label": "Distance of the flat target, mm", title: "Distance of the flat target", "data-needs": "control" });
+  distance.addEventListener("change", () => set(`plane:${distance.value}`));
+  const list = [...(known ? [] : [[scene, scene]]), ...SCENES, ["plane", "Flat target"]];
+  const chosen = choice(list, flat ? "plane" : scene, (name) => set(name === "plane" ? `plane:${distance.value}` : name), { "aria-label": "Scene", title: "Restarts the emulated rig before this scene", "data-needs": "control" });
+  return h("div", { class: "row scene-choice" }, h("span", { class: "dim" }, "Scene"), chosen, h("span", { class: "unit", hidden: !flat }, distance, " mm"));
 }
 
 /** The working range of the optics in use. */
@@ -61,7 +81,7 @@ function phaseWords(rig) {
   if (rig.phase === "connecting") return [h("p", {}, `Connecting to ${rig.name} …`)];
   if (rig.phase === "lost" && rig.emulated) return [h("p", { class: "bad" }, "The emulated rig has ended."), h("p", { class: "dim" }, "Connect again to restart it; its stages are not homed then."), again];
   if (rig.phase === "lost") return [h("p", { class: "bad" }, rig.error ?? "The rig does not answer."), again];
-  return [h("p", { class: "rig-name" }, rig.name, rig.emulated ? h("span", { class: "badge", title: "No hardware is involved" }, "emulated") : null)];
+  return [h("p", { class: "rig-name" }, rig.name, rig.emulated ? h("span", { class: "badge", title: "No hardware is involved" }, "emulated") : null), ...(rig.scene ? [sceneChoice(rig.scene)] : [])];
 }
 
 const chosen = { coarse: 100, fine: 1, lens: 100 };

@@ -14,6 +14,22 @@ export function focusPositions(info, range) {
   return { coarse, far: fine(range.sensor_far_mm), near: fine(range.sensor_near_mm) };
 }
 
+/** Calls `go` with the axis and the position, um, of a click on its rail; not for an absent stage. @param {HTMLElement} host @param {(axis: string, um: number) => void} go */
+export function listen(host, go) {
+  host.addEventListener("click", ({ clientX, clientY }) => {
+    // The rails are drawn anew while a button is down, so the target of the click may have gone.
+    const rail = /** @type {SVGElement | null | undefined} */ (document.elementFromPoint(clientX, clientY)?.closest("svg[data-axis]"));
+    if (!rail) return;
+    const { axis, low, high } = rail.dataset;
+    const box = rail.getBoundingClientRect();
+    const part = (((clientX - box.left) / box.width) * WIDTH - RAIL[0]) / (RAIL[1] - RAIL[0]);
+    const travel = Number(high) - Number(low);
+    const digit = 10 ** Math.floor(Math.log10(travel / (RAIL[1] - RAIL[0])));
+    const um = Number(low) + Math.max(0, Math.min(1, part)) * travel;
+    go(String(axis), Number((Math.round(um / digit) * digit).toFixed(3)));
+  });
+}
+
 /** Draws the rails into `host`. */
 export function draw(host, info, range) {
   const focus = focusPositions(info, range);
@@ -21,9 +37,9 @@ export function draw(host, info, range) {
   const marks = (list) => list.filter(([, at]) => Number.isFinite(at));
   host.replaceChildren(
     scene(info, focus, distance),
-    rail("Lens", info.lens, [info.lens_min_um, info.lens_max_um], [], !info.has_lens_stage),
-    rail("Coarse", info.coarse, [info.coarse_min_um, info.coarse_max_um], focus ? marks([["focus", focus.coarse]]) : []),
-    rail("Piezo", info.fine, [info.fine_min_um, info.fine_max_um], focus ? marks([["far", focus.far], ["near", focus.near]]) : []),
+    rail("lens", "Lens", info.lens, [info.lens_min_um, info.lens_max_um], [], !info.has_lens_stage),
+    rail("coarse", "Coarse", info.coarse, [info.coarse_min_um, info.coarse_max_um], focus ? marks([["focus", focus.coarse]]) : []),
+    rail("fine", "Piezo", info.fine, [info.fine_min_um, info.fine_max_um], focus ? marks([["far", focus.far], ["near", focus.near]]) : []),
   );
 }
 
@@ -55,7 +71,7 @@ function bracket(from, to) {
 }
 
 /** One axis: its rail with limits, where it is, where it was sent, and the marks. */
-function rail(name, axis, [low, high], marks, absent = false) {
+function rail(key, name, axis, [low, high], marks, absent = false) {
   const place = (um) => RAIL[0] + ((RAIL[1] - RAIL[0]) * (um - low)) / (high - low || 1);
   const inside = (um) => Math.max(RAIL[0] - 7, Math.min(RAIL[1] + 7, place(um)));
   const state = absent ? "absent" : axis.moving ? "moving" : axis.state;
@@ -66,7 +82,7 @@ function rail(name, axis, [low, high], marks, absent = false) {
   return h("div", { class: "rail", "data-state": state },
     h("div", { class: "rail-head" }, h("span", { class: "rail-name" }, name), h("span", { class: "state" }, state),
       h("output", {}, number(axis.measured_um, 3, "µm"))),
-    s("svg", { viewBox: `0 0 ${WIDTH} 30`, role: "img", "aria-label": text },
+    s("svg", { viewBox: `0 0 ${WIDTH} 30`, role: "img", "aria-label": text, ...(absent ? {} : { "data-axis": key, "data-low": low, "data-high": high }) },
       s("rect", { x: RAIL[0], y: 10, width: RAIL[1] - RAIL[0], height: 5, rx: 2.5, class: "track" }),
       marks.map(([, um], at) => s("g", { class: um < low || um > high ? "mark outside" : "mark" },
         s("line", { x1: inside(um), y1: 7, x2: inside(um), y2: 18 }),

@@ -17,6 +17,7 @@ export interface State {
     phase: "absent" | "connecting" | "ready" | "lost";
     name: string | null;
     emulated: boolean;
+    scene: string | null;
     error: string | null;
     /** As `farnear rig info --json` prints it. */
     info: any;
@@ -26,7 +27,9 @@ export interface State {
   live: {
     mode: "off" | "image" | "depth";
     exposure_us: number;
+    light_percent: [number, number];
     measure: string;
+    region: [number, number, number, number] | null;
     error: string | null;
     recording: string | null;
     recording_ended: string | null;

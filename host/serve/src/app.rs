@@ -17,6 +17,7 @@ use farnear_files::staging::write_file;
 use farnear_protocol::{Micros, message::LightLevels};
 use farnear_workflows::{
     Cancel, WorkflowError,
+    measure::Rectangle,
     optics::GivenOptics,
     rig::{
         RigAddress,
@@ -49,6 +50,8 @@ pub struct App {
     pub throttle: Throttle,
     pub session: PathBuf,
     pub address: Option<RigAddress>,
+    /// Scene chosen on the page.
+    scene: Mutex<Option<String>>,
     rig: Mutex<Option<OpenRig>>,
     camera: Mutex<CameraSettings>,
     pub rig_jobs: JobQueue,
@@ -78,6 +81,8 @@ pub struct Live {
     /// Of exposures that the board triggers.
     pub light: Option<LightLevels>,
     pub measure: FocusMeasure,
+    /// Part of the image that the figures describe; `None`: all.
+    pub region: Option<Rectangle>,
     pub cancel: Cancel,
 }
 
@@ -105,6 +110,7 @@ impl App {
             exposure: camera.exposure,
             light: camera.light,
             measure: FocusMeasure::ModifiedLaplacian,
+            region: None,
             cancel: Cancel::default(),
         };
         let state = beginning(rig.as_ref(), &camera, &live);
@@ -115,6 +121,7 @@ impl App {
             session,
             reconnect: AtomicBool::new(rig.is_some()),
             address: rig,
+            scene: Mutex::default(),
             rig: Mutex::default(),
             camera: Mutex::new(camera),
             rig_jobs: JobQueue::default(),
@@ -160,6 +167,23 @@ impl App {
         *lock(&self.rig) = rig;
     }
 
+    /// Sets the scene before the emulated rig from the next connection on.
+    pub fn set_scene(&self, scene: String) {
+        *lock(&self.scene) = Some(scene.clone());
+        self.change(|state| state.rig.scene = Some(scene));
+    }
+
+    /// The rig to connect to.
+    pub fn chosen_rig(&self) -> Option<Result<RigAddress, WorkflowError>> {
+        let address = self.address.as_ref()?;
+        let scene = lock(&self.scene).clone();
+        // The given scene may be a file, which has no other name.
+        Some(match scene.filter(|scene| Some(scene) != address.scene().as_ref()) {
+            Some(scene) => address.with_scene(scene),
+            None => Ok(address.clone()),
+        })
+    }
+
     /// Requests a (new) connection to the rig.
     pub fn ask_to_connect(&self) {
         self.reconnect.store(true, Ordering::Relaxed);
@@ -180,7 +204,7 @@ impl App {
         change(&mut live);
         live.cancel.cancel();
         live.cancel = Cancel::default();
-        let Live { mode, exposure, light, measure, .. } = live.clone();
+        let Live { mode, exposure, light, measure, region, .. } = live.clone();
         drop(live);
         self.change(|state| {
             state.live = LiveState {
@@ -188,6 +212,7 @@ impl App {
                 exposure_us: exposure.0,
                 light_percent: percent_of_light(light.unwrap_or_default()),
                 measure,
+                region: region.map(Into::into),
                 error: None,
                 ..state.live.clone()
             };
@@ -353,6 +378,7 @@ fn beginning(address: Option<&RigAddress>, camera: &CameraSettings, live: &Live)
                 None => None,
             },
             emulated: address.is_some_and(RigAddress::is_emulated),
+            scene: address.and_then(RigAddress::scene),
             error: None,
             info: None,
         },
@@ -363,6 +389,7 @@ fn beginning(address: Option<&RigAddress>, camera: &CameraSettings, live: &Live)
             exposure_us: live.exposure.0,
             light_percent: percent_of_light(live.light.unwrap_or_default()),
             measure: live.measure,
+            region: None,
             error: None,
             recording: None,
             recording_ended: None,

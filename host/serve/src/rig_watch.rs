@@ -55,7 +55,7 @@ impl Progress for ToLog<'_> {
 }
 
 fn connect(app: &App) {
-    let Some(address) = &app.address else { return };
+    let Some(address) = app.chosen_rig() else { return };
     app.change(|state| {
         state.rig.phase = Phase::Connecting;
         state.rig.error = None;
@@ -63,8 +63,10 @@ fn connect(app: &App) {
     app.set_rig(None);
     let log = ToLog(app);
     let context = Context::new(&log, &Unattended, Cancel::default());
-    let opened =
-        GivenOptics::read(&app.optics_file()).and_then(|optics| OpenRig::open(address, &optics, &context));
+    let opened = address.and_then(|address| {
+        let optics = GivenOptics::read(&app.optics_file())?;
+        OpenRig::open(&address, &optics, &context)
+    });
     match opened {
         Ok(rig) => {
             app.set_rig(Some(rig));

@@ -45,6 +45,8 @@ pub struct RigState {
     pub name: Option<String>,
     /// Whether it is emulated: no hardware is involved.
     pub emulated: bool,
+    /// Scene before the emulated rig.
+    pub scene: Option<String>,
     /// Why it cannot be talked to.
     pub error: Option<String>,
     /// Positions, limits, alarms: as `farnear rig info --json` prints them, less the count of the line's frames.
@@ -127,6 +129,8 @@ pub struct LiveState {
     /// Focus measure.
     #[schemars(with = "String")]
     pub measure: FocusMeasure,
+    /// Part of the live image that its figures describe: column, row, width, height in pixels; absent: all.
+    pub region: Option<[usize; 4]>,
     /// Why the selected mode gives no image.
     pub error: Option<String>,
     /// Name of the running recording of live depth.

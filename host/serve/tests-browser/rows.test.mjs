@@ -129,6 +129,49 @@ test("half the exposure time halves the brightness of the live image", async () 
   await page.context().close();
 });
 
+test("a region drawn in the live image is what its figures and Find focus use", async () => {
+  const page = await open(browser, server.address);
+  const canvas = page.locator("#view-live .viewer canvas").first();
+  const value = async () => parseFloat(await page.locator("#view-live output.big").textContent());
+  const differs = async (from) => { while (!(Math.abs((await value()) / from - 1) > 0.05)) await page.waitForTimeout(100); };
+  const button = page.getByRole("button", { name: "Region", exact: true });
+  await page.locator("#view-live .status", { hasText: "frames/s" }).waitFor();
+  const whole = await value();
+  await button.click();
+  const box = await canvas.boundingBox();
+  await page.mouse.move(box.x + 0.4 * box.width, box.y + 0.4 * box.height);
+  await page.mouse.down();
+  await page.mouse.move(box.x + 0.55 * box.width, box.y + 0.6 * box.height, { steps: 4 });
+  await page.mouse.up();
+  await page.waitForFunction(() => document.querySelector("#view-live [aria-pressed=true][title^='Drag']"));
+  await differs(whole);
+  const [x, y, width, height] = (await server.ask("/api/state")).live.region;
+  assert.ok(x > 150 && x + width < 450 && y > 100 && y + height < 400 && width > 20 && height > 20, `${[x, y, width, height]}`);
+  const part = await value();
+  const sent = page.waitForRequest((request) => request.url().endsWith("/api/rig/focus"));
+  await page.getByRole("button", { name: "Find focus" }).click();
+  assert.deepEqual((await sent).postDataJSON().region, [x, y, width, height]);
+  await page.waitForFunction(async () => ["done", "failed"].includes((await (await fetch("/api/state")).json()).job.phase));
+  await button.click();
+  await differs(part);
+  assert.equal((await server.ask("/api/state")).live.region, null);
+  assert.deepEqual(page.complaints, []);
+});
+
+test("a click on a rail moves its stage there", async () => {
+  const page = await open(browser, server.address);
+  const { fine_min_um: low, fine_max_um: high } = (await server.ask("/api/state")).rig.info;
+  const rail = page.locator("svg[data-axis=fine]");
+  const { width, height } = await rail.boundingBox();
+  for (const part of [0.3, 0.6]) {
+    await rail.click({ position: { x: (width * (14 + part * 272)) / 300, y: height / 2 } });
+    const wanted = low + part * (high - low);
+    const there = async () => Math.abs((await server.ask("/api/state")).rig.info.fine.asked_um - wanted) < 0.02 * (high - low);
+    while (!(await there())) await page.waitForTimeout(100);
+  }
+  assert.deepEqual(page.complaints, []);
+});
+
 test("a stack is looked at image by image", async () => {
   const page = await open(browser, server.address);
   await page.waitForFunction(() => !document.querySelector("[data-capture]").disabled);
@@ -407,7 +450,7 @@ test("twelve jobs of a lab session, from the page alone: no dead end, and no sil
   await page.context().close();
 });
 
-test("an emulated rig that has ended is started anew, and the live image goes on", async () => {
+test("an emulated rig that has ended is started anew, as it is before another scene, and the live image goes on", async () => {
   const own = await serve();
   try {
     const page = await open(browser, own.address);
@@ -418,6 +461,14 @@ test("an emulated rig that has ended is started anew, and the live image goes on
     await page.getByRole("button", { name: "Connect again" }).click();
     await page.locator("#link[data-phase=ready]").waitFor();
     await page.locator("#view-live .status", { hasText: "frames/s" }).waitFor();
+    await page.getByLabel("Scene", { exact: true }).selectOption("plane");
+    await page.getByLabel("Distance of the flat target, mm").waitFor();
+    await page.locator("#link[data-phase=ready]").waitFor();
+    await page.locator("#view-live .status", { hasText: "frames/s" }).waitFor();
+    assert.equal((await own.ask("/api/state")).rig.scene, "plane:900");
+    const refused = await post(page, "/api/rig/scene", { scene: "attic" });
+    assert.equal(refused.status, 400);
+    assert.match(refused.error, /"attic": expected staircase, slant, cone, sphere or plane:MM/);
     await page.context().close();
   } finally {
     assert.equal(await own.close(), 0);

@@ -54,6 +54,19 @@ pub struct Rectangle {
     pub height: usize,
 }
 
+/// Column, row, width, height.
+impl From<[usize; 4]> for Rectangle {
+    fn from([x, y, width, height]: [usize; 4]) -> Self {
+        Self { x, y, width, height }
+    }
+}
+
+impl From<Rectangle> for [usize; 4] {
+    fn from(Rectangle { x, y, width, height }: Rectangle) -> Self {
+        [x, y, width, height]
+    }
+}
+
 #[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
 #[error("expected column, row, width and height in pixels, such as 100,80,320,240")]
 pub struct NoRectangle;

@@ -2,9 +2,10 @@
 
 use farnear_capture::camera::Image;
 use farnear_depth::focus_measure::FocusMeasure;
+use ndarray::s;
 use serde::Serialize;
 
-use crate::figures::rounded;
+use crate::{figures::rounded, measure::Rectangle};
 
 const BINS: usize = 256;
 /// Share of saturated pixels that affects depth: their true values, and so the blur, are unknown.
@@ -32,6 +33,18 @@ pub struct PictureFigures {
     pub focus: Option<f64>,
     /// Reasons against use for depth, with remedies.
     pub warnings: Vec<String>,
+}
+
+/// The pixels of `region` that lie in the image; `None` if there are none.
+pub fn part(image: &Image, region: Rectangle) -> Option<Image> {
+    let (height, width) = image.pixels.dim();
+    let right = region.x.saturating_add(region.width).min(width);
+    let bottom = region.y.saturating_add(region.height).min(height);
+    if region.x >= right || region.y >= bottom {
+        return None;
+    }
+    let pixels = image.pixels.slice(s![region.y..bottom, region.x..right]).to_owned();
+    Some(Image { pixels, ..*image })
 }
 
 pub fn figures(image: &Image, measure: FocusMeasure) -> PictureFigures {
@@ -101,6 +114,15 @@ mod tests {
         assert_eq!((found.histogram[62], found.histogram[187]), (768, 768));
         assert!((found.mean - 2000.0 / 4095.0).abs() < 1e-4);
         assert!((found.contrast - 0.5).abs() < 1e-4);
+    }
+
+    #[test]
+    fn a_part_ends_at_the_border_and_none_lies_outside() {
+        let image = Image::new(Array2::from_shape_fn((4, 6), |(y, x)| (10 * y + x) as u16), 8);
+        let at = |region: [usize; 4]| part(&image, region.into()).map(|part| part.pixels);
+        assert_eq!(at([1, 2, 2, 1]), Some(ndarray::array![[21, 22]]));
+        assert_eq!(at([4, 3, 9, usize::MAX]), Some(ndarray::array![[34, 35]]));
+        assert_eq!((at([6, 0, 1, 1]), at([0, 0, 0, 3])), (None, None));
     }
 
     #[test]

@@ -56,6 +56,14 @@ impl RigAddress {
         matches!(self, Self::Emulated(_))
     }
 
+    /// Scene before an emulated rig that is yet to start.
+    pub fn scene(&self) -> Option<String> {
+        match self {
+            Self::Emulated(scenery) => Some(scenery.scene()),
+            Self::Attached | Self::Port(_) | Self::Open(_) => None,
+        }
+    }
+
     pub fn with_scene(&self, scene: String) -> Result<Self> {
         match self {
             Self::Emulated(scenery) => Ok(Self::Emulated(scenery.with_scene(scene))),

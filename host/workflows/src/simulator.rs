@@ -78,10 +78,14 @@ impl Scenery {
         Self { scene: Some(scene), packed_scene: None, ..self.clone() }
     }
 
+    pub fn scene(&self) -> String {
+        self.scene.clone().unwrap_or_else(|| "staircase".into())
+    }
+
     /// All options with their values, for a capture's record.
     pub fn decided(&self, psf: Psf) -> SimulationRecord {
         SimulationRecord {
-            scene: self.scene.clone().unwrap_or_else(|| "staircase".into()),
+            scene: self.scene(),
             psf: self.psf.clone().unwrap_or_else(|| psf.to_string()),
             noise: self.noise.clone().unwrap_or_else(|| "8bit".into()),
             seed: self.seed.unwrap_or(1),

@@ -33,6 +33,8 @@ use crate::{
 };
 
 const EXPOSURE_MAX_US: u32 = 1_000_000;
+/// Scenes of `farnear-sim` without a parameter.
+const SCENES: [&str; 4] = ["staircase", "slant", "cone", "sphere"];
 
 /// Which axes to home.
 #[derive(Deserialize, JsonSchema)]
@@ -117,6 +119,17 @@ pub struct LiveRequest {
     /// `fft-sum`, `tenengrad` or `modified-laplacian`.
     #[serde(default)]
     pub measure: Option<String>,
+    /// Part of the live image that its figures describe: column, row, width, height in pixels; width 0: all.
+    #[serde(default)]
+    pub region: Option<[usize; 4]>,
+}
+
+/// What stands before the emulated rig.
+#[derive(Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Scene {
+    /// `staircase`, `slant`, `cone`, `sphere` or `plane:MM`, or the scene that the program was started with.
+    pub scene: String,
 }
 
 /// The alarm to clear.
@@ -136,6 +149,12 @@ pub struct Alarms {
 
 pub fn routes(api: Api) -> Api {
     api.post::<Nothing, Done, _, _>("/api/rig/connect", For::Control, "Connects to the rig again.", connect)
+        .post::<Scene, Done, _, _>(
+            "/api/rig/scene",
+            For::Control,
+            "Restarts the emulated rig before another scene.",
+            set_scene,
+        )
         .post::<Home, Begun, _, _>("/api/rig/home", For::Control, "Homes axes.", home)
         .post::<Move, Begun, _, _>(
             "/api/rig/move",
@@ -194,12 +213,34 @@ async fn connect(
     if app.address.is_none() {
         connected(&app)?;
     }
+    connect_again(&app, || ())
+}
+
+fn connect_again(app: &App, prepare: impl FnOnce()) -> Result<Json<Done>, Failure> {
     if app.rig_jobs.is_busy() {
         return Err(Failure::busy("a job on the rig"));
     }
+    prepare();
     app.interrupt_live();
     app.ask_to_connect();
     Ok(Json(DONE))
+}
+
+async fn set_scene(
+    State(app): Shared,
+    headers: HeaderMap,
+    Body(Scene { scene }): Body<Scene>,
+) -> Result<Json<Done>, Failure> {
+    require_control(&app, &headers)?;
+    let Some(given) = app.address.as_ref().and_then(RigAddress::scene) else {
+        return Err(Failure::new(StatusCode::BAD_REQUEST, "only an emulated rig can change its scene"));
+    };
+    let distance = scene.strip_prefix("plane:").and_then(|text| text.parse::<f64>().ok());
+    if scene != given && !SCENES.contains(&scene.as_str()) && !distance.is_some_and(|mm| mm > 0.0) {
+        let error = format!("scene {scene:?}: expected {} or plane:MM", SCENES.join(", "));
+        return Err(Failure::new(StatusCode::BAD_REQUEST, error));
+    }
+    connect_again(&app, || app.set_scene(scene))
 }
 
 async fn home(
@@ -283,7 +324,7 @@ async fn seek(
         start_mm: None,
         range_mm: request.range_mm,
         measure: request.measure.as_deref().map_or(Ok(app.live().measure), measure)?,
-        region: request.region.map(|[x, y, width, height]| Rectangle { x, y, width, height }),
+        region: request.region.map(Rectangle::from),
     };
     let work = move |_: &App, context: &Context<'_>| figures(focus::focus(&settings, context)?);
     begin(&app, Task { kind: "focus", title: "Find the focus".into(), work: Box::new(work) })
@@ -333,6 +374,10 @@ async fn live(
         live.mode = request.mode.unwrap_or(live.mode);
         live.exposure = request.exposure_us.map_or(live.exposure, Micros);
         live.measure = measure.unwrap_or(live.measure);
+        if let Some(region) = request.region {
+            live.region =
+                Some(Rectangle::from(region)).filter(|region| region.width > 0 && region.height > 0);
+        }
     });
     Ok(Json(DONE))
 }

@@ -54,6 +54,7 @@ fn body_of(method: &str, path: &str) -> &'static str {
         ("post", "/login") => r#"{"token":"x"}"#,
         ("post", "/api/rig/move") => r#"{"targets":[{"axis":"fine","to_um":20}]}"#,
         ("post", "/api/rig/goto") => r#"{"focus":"far"}"#,
+        ("post", "/api/rig/scene") => r#"{"scene":"plane:900"}"#,
         ("post", "/api/live") => r#"{"mode":"off"}"#,
         ("post", "/api/rig/alarms/clear") => r#"{"number":1}"#,
         ("put", "/api/optics") => {

@@ -150,7 +150,7 @@ pub(super) fn search(
         range_mm: settings.range_mm,
         exposure: settings.camera.exposure,
         image_wait: settings.camera.image_wait,
-        region: settings.region.map(|at| [at.x, at.y, at.width, at.height]),
+        region: settings.region.map(Into::into),
     };
     Ok(find_focus(client, rig.camera.as_mut(), optics, &search, &mut |what| context.info(what))?)
 }
