@@ -686,6 +686,8 @@ class StackFit:
         Part of the errors within three predicted standard deviations, 0 to 1.
     by_depth : array (n, 4), float64
         Rows of normalised depth (-1 far plane, 1 near plane), mean error, root mean square error and predicted standard deviation, mm.
+    response : array (m, 2), float64
+        Rows of measured and true normalised depth: the correction that `depth` applies.
     """
 
     @property
@@ -720,6 +722,9 @@ class StackFit:
         """-"""
     @property
     def by_depth(self) -> NDArray[np.float64]:
+        """-"""
+    @property
+    def response(self) -> NDArray[np.float64]:
         """-"""
 
 def calibrate_stack(

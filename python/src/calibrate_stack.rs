@@ -34,6 +34,8 @@ use crate::{
 ///     Part of the errors within three predicted standard deviations, 0 to 1.
 /// by_depth : array (n, 4), float64
 ///     Rows of normalised depth (-1 far plane, 1 near plane), mean error, root mean square error and predicted standard deviation, mm.
+/// response : array (m, 2), float64
+///     Rows of measured and true normalised depth: the correction that `depth` applies.
 #[pyclass(frozen, get_all, module = "farnear")]
 pub struct StackFit {
     optics: Optics,
@@ -47,6 +49,7 @@ pub struct StackFit {
     fill: f64,
     within_three: f64,
     by_depth: Py<PyArray2<f64>>,
+    response: Py<PyArray2<f64>>,
 }
 
 #[pymethods]
@@ -119,6 +122,7 @@ pub fn calibrate_stack<'py>(
         fill: held_out.fill,
         within_three: held_out.within_three,
         by_depth: by_depth.into_pyarray(py).unbind(),
+        response: Array2::from(stage.curve().to_vec()).into_pyarray(py).unbind(),
         optics: Optics(found.optics),
     })
 }

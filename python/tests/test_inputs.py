@@ -221,6 +221,8 @@ def test_a_lens_is_calibrated_from_a_stack_and_measures_its_pairs():
     assert fit.fill > 0.9 and abs(fit.slope - 1) < 0.1, fit
     depth, bias, rms, predicted = fit.by_depth.T
     assert np.all(np.diff(depth) > 0) and np.all(np.abs(bias) <= rms) and np.all(predicted > 0), fit.by_depth
+    measured, true = fit.response.T
+    assert np.all(np.diff(measured) > 0) and np.all(np.diff(true) >= 0) and true[0] < -0.5 and true[-1] > 0.5, fit.response
     first = 20 - fit.pair_step // 2
     found = farnear.depth(slices[first], slices[first + fit.pair_step], fit.optics, method="whitened")
     # The target is in focus at slice 20: so many steps nearer than the far plane. Within a third of a step.

@@ -61,9 +61,7 @@ impl Stage {
     /// A neutral stage, to learn from.
     pub fn identity(bin: usize, pair_step: usize) -> Self {
         let measured = [-1.19, 1.19];
-        let response = std::array::from_fn(|i| {
-            measured[0] + (measured[1] - measured[0]) * i as f64 / (RESPONSE_POINTS - 1) as f64
-        });
+        let response = places(measured);
         Self {
             bin,
             pair_step,
@@ -75,6 +73,12 @@ impl Stage {
             usual_unexplained: 1.0,
             coarser: None,
         }
+    }
+
+    /// Measured and true normalised depth, row by row.
+    pub fn curve(&self) -> [[f64; 2]; RESPONSE_POINTS] {
+        let measured = places(self.measured);
+        std::array::from_fn(|i| [measured[i], self.response[i]])
     }
 
     /// True normalised depth, slope, and deviation by the texture's coarseness, at a measured depth; `None` outside the
@@ -126,6 +130,11 @@ impl Stage {
 }
 
 /// Value and slope of a response at a measured depth; `None` outside the range of its points.
+/// Evenly spaced measured depths of the response.
+fn places([low, high]: [f64; 2]) -> [f64; RESPONSE_POINTS] {
+    std::array::from_fn(|i| low + (high - low) * i as f64 / (RESPONSE_POINTS - 1) as f64)
+}
+
 fn interpolated([low, high]: [f64; 2], response: &[f64; RESPONSE_POINTS], measured: f64) -> Option<[f64; 2]> {
     if !(low..=high).contains(&measured) {
         return None;

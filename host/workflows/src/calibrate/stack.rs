@@ -329,10 +329,6 @@ fn figures(
             files[far + pair_step].display()
         ),
     };
-    let [least, largest] = stage.measured;
-    let response = stage.response.iter().enumerate().map(|(index, depth)| {
-        [least + (largest - least) * index as f64 / (RESPONSE_POINTS - 1) as f64, *depth]
-    });
     StackFigures {
         verdict: verdict(found),
         next,
@@ -355,7 +351,7 @@ fn figures(
         scatter: rounded(held_out.scatter, 3),
         residual_mm: rounded(0.5 * residual * range_mm, 6),
         pairs: held_out.pairs,
-        response: response.map(|pair| pair.map(|depth| rounded(depth, 4))).collect(),
+        response: stage.curve().map(|pair| pair.map(|depth| rounded(depth, 4))).to_vec(),
         by_depth: held_out
             .by_depth
             .iter()
