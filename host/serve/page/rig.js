@@ -53,7 +53,7 @@ function able() {
 const SCENES = [["staircase", "Staircase"], ["slant", "Slanted plane"], ["cone", "Cone"], ["sphere", "Sphere"]];
 const FLAT = /^plane:(.+)$/;
 
-/** What stands before the emulated rig. @param {string} scene */
+/** Chooses the scene of the emulated rig. @param {string} scene */
 function sceneChoice(scene) {
   const flat = FLAT.exec(scene)?.[1];
   const known = flat || SCENES.some(([name]) => name === scene);
@@ -61,7 +61,7 @@ function sceneChoice(scene) {
   const distance = h("input", { type: "number", min: 1, step: "any", value: flat ?? 900, "aria-label": "Distance of the flat target, mm", title: "Distance of the flat target", "data-needs": "control" });
   distance.addEventListener("change", () => set(`plane:${distance.value}`));
   const list = [...(known ? [] : [[scene, scene]]), ...SCENES, ["plane", "Flat target"]];
-  const chosen = choice(list, flat ? "plane" : scene, (name) => set(name === "plane" ? `plane:${distance.value}` : name), { "aria-label": "Scene", title: "Restarts the emulated rig before this scene", "data-needs": "control" });
+  const chosen = choice(list, flat ? "plane" : scene, (name) => set(name === "plane" ? `plane:${distance.value}` : name), { "aria-label": "Scene", title: "Restarts the emulated rig with this scene", "data-needs": "control" });
   return h("div", { class: "row scene-choice" }, h("span", { class: "dim" }, "Scene"), chosen, h("span", { class: "unit", hidden: !flat }, distance, " mm"));
 }
 

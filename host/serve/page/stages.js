@@ -17,7 +17,7 @@ export function focusPositions(info, range) {
 /** Calls `go` with the axis and the position, um, of a click on its rail; not for an absent stage. @param {HTMLElement} host @param {(axis: string, um: number) => void} go */
 export function listen(host, go) {
   host.addEventListener("click", ({ clientX, clientY }) => {
-    // The rails are drawn anew while a button is down, so the target of the click may have gone.
+    // The rails may be redrawn between press and release, so the target of the click may not exist any more.
     const rail = /** @type {SVGElement | null | undefined} */ (document.elementFromPoint(clientX, clientY)?.closest("svg[data-axis]"));
     if (!rail) return;
     const { axis, low, high } = rail.dataset;

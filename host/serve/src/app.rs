@@ -50,8 +50,8 @@ pub struct App {
     pub throttle: Throttle,
     pub session: PathBuf,
     pub address: Option<RigAddress>,
-    /// Scene chosen on the page.
-    scene: Mutex<Option<String>>,
+    /// As `address`, with the scene chosen on the page.
+    chosen: Mutex<Option<RigAddress>>,
     rig: Mutex<Option<OpenRig>>,
     camera: Mutex<CameraSettings>,
     pub rig_jobs: JobQueue,
@@ -120,8 +120,8 @@ impl App {
             throttle: Throttle::default(),
             session,
             reconnect: AtomicBool::new(rig.is_some()),
+            chosen: Mutex::new(rig.clone()),
             address: rig,
-            scene: Mutex::default(),
             rig: Mutex::default(),
             camera: Mutex::new(camera),
             rig_jobs: JobQueue::default(),
@@ -167,21 +167,14 @@ impl App {
         *lock(&self.rig) = rig;
     }
 
-    /// Sets the scene before the emulated rig from the next connection on.
-    pub fn set_scene(&self, scene: String) {
-        *lock(&self.scene) = Some(scene.clone());
-        self.change(|state| state.rig.scene = Some(scene));
+    /// Sets the rig of the next connection.
+    pub fn choose_rig(&self, address: RigAddress) {
+        self.change(|state| state.rig.scene = address.scene());
+        *lock(&self.chosen) = Some(address);
     }
 
-    /// The rig to connect to.
-    pub fn chosen_rig(&self) -> Option<Result<RigAddress, WorkflowError>> {
-        let address = self.address.as_ref()?;
-        let scene = lock(&self.scene).clone();
-        // The given scene may be a file, which has no other name.
-        Some(match scene.filter(|scene| Some(scene) != address.scene().as_ref()) {
-            Some(scene) => address.with_scene(scene),
-            None => Ok(address.clone()),
-        })
+    pub fn chosen_rig(&self) -> Option<RigAddress> {
+        lock(&self.chosen).clone()
     }
 
     /// Requests a (new) connection to the rig.

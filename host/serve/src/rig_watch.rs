@@ -63,10 +63,8 @@ fn connect(app: &App) {
     app.set_rig(None);
     let log = ToLog(app);
     let context = Context::new(&log, &Unattended, Cancel::default());
-    let opened = address.and_then(|address| {
-        let optics = GivenOptics::read(&app.optics_file())?;
-        OpenRig::open(&address, &optics, &context)
-    });
+    let opened =
+        GivenOptics::read(&app.optics_file()).and_then(|optics| OpenRig::open(&address, &optics, &context));
     match opened {
         Ok(rig) => {
             app.set_rig(Some(rig));

@@ -45,7 +45,7 @@ pub struct RigState {
     pub name: Option<String>,
     /// Whether it is emulated: no hardware is involved.
     pub emulated: bool,
-    /// Scene before the emulated rig.
+    /// Scene of the emulated rig.
     pub scene: Option<String>,
     /// Why it cannot be talked to.
     pub error: Option<String>,

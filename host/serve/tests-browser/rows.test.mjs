@@ -450,7 +450,7 @@ test("twelve jobs of a lab session, from the page alone: no dead end, and no sil
   await page.context().close();
 });
 
-test("an emulated rig that has ended is started anew, as it is before another scene, and the live image goes on", async () => {
+test("an emulated rig that has ended is restarted, also with another scene, and the live image continues", async () => {
   const own = await serve();
   try {
     const page = await open(browser, own.address);

@@ -35,7 +35,7 @@ pub struct PictureFigures {
     pub warnings: Vec<String>,
 }
 
-/// The pixels of `region` that lie in the image; `None` if there are none.
+/// The part of `region` inside the image; `None` if it is empty.
 pub fn part(image: &Image, region: Rectangle) -> Option<Image> {
     let (height, width) = image.pixels.dim();
     let right = region.x.saturating_add(region.width).min(width);

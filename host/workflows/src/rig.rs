@@ -56,7 +56,7 @@ impl RigAddress {
         matches!(self, Self::Emulated(_))
     }
 
-    /// Scene before an emulated rig that is yet to start.
+    /// Scene of an emulated rig that has not been started.
     pub fn scene(&self) -> Option<String> {
         match self {
             Self::Emulated(scenery) => Some(scenery.scene()),

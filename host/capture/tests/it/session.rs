@@ -270,6 +270,17 @@ fn an_idle_reset_requires_a_reopen() {
 }
 
 #[test]
+fn reopening_a_healthy_session_asks_the_board_again_and_keeps_its_work() {
+    let (mut client, peer) = connect(Faults::default());
+    let work = client.start_home(Axis::SensorCoarse).unwrap();
+    client.clone().reopen().unwrap();
+    work.homed().unwrap();
+    peer.board().hello.boot = 8;
+    client.reopen().unwrap();
+    assert_eq!(client.hello().boot, 8);
+}
+
+#[test]
 fn detects_a_reset_during_a_move_with_and_without_event() {
     for silent_reset in [false, true] {
         let (mut client, peer) = connect(Faults { silent_reset, ..Faults::default() });

@@ -124,7 +124,7 @@ pub struct LiveRequest {
     pub region: Option<[usize; 4]>,
 }
 
-/// What stands before the emulated rig.
+/// Scene of the emulated rig.
 #[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Scene {
@@ -152,7 +152,7 @@ pub fn routes(api: Api) -> Api {
         .post::<Scene, Done, _, _>(
             "/api/rig/scene",
             For::Control,
-            "Restarts the emulated rig before another scene.",
+            "Restarts the emulated rig with another scene.",
             set_scene,
         )
         .post::<Home, Begun, _, _>("/api/rig/home", For::Control, "Homes axes.", home)
@@ -232,15 +232,25 @@ async fn set_scene(
     Body(Scene { scene }): Body<Scene>,
 ) -> Result<Json<Done>, Failure> {
     require_control(&app, &headers)?;
-    let Some(given) = app.address.as_ref().and_then(RigAddress::scene) else {
-        return Err(Failure::new(StatusCode::BAD_REQUEST, "only an emulated rig can change its scene"));
+    let given =
+        app.address.as_ref().filter(|address| address.is_emulated()).ok_or_else(|| {
+            Failure::new(StatusCode::BAD_REQUEST, "only an emulated rig can change its scene")
+        })?;
+    let address = match given.scene().as_ref() == Some(&scene) {
+        true => given.clone(), // it may be a file
+        false => given.with_scene(known(scene)?)?,
     };
-    let distance = scene.strip_prefix("plane:").and_then(|text| text.parse::<f64>().ok());
-    if scene != given && !SCENES.contains(&scene.as_str()) && !distance.is_some_and(|mm| mm > 0.0) {
-        let error = format!("scene {scene:?}: expected {} or plane:MM", SCENES.join(", "));
-        return Err(Failure::new(StatusCode::BAD_REQUEST, error));
+    connect_again(&app, || app.choose_rig(address))
+}
+
+/// Fails for a scene that `farnear-sim` does not know by name.
+fn known(scene: String) -> Result<String, Failure> {
+    let distance_mm = scene.strip_prefix("plane:").and_then(|text| text.parse::<f64>().ok());
+    if SCENES.contains(&scene.as_str()) || distance_mm.is_some_and(|mm| mm > 0.0) {
+        return Ok(scene);
     }
-    connect_again(&app, || app.set_scene(scene))
+    let error = format!("scene {scene:?}: expected {} or plane:MM", SCENES.join(", "));
+    Err(Failure::new(StatusCode::BAD_REQUEST, error))
 }
 
 async fn home(
