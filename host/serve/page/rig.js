@@ -27,7 +27,7 @@ export function mount(host) {
 
   const show = (state) => {
     const { rig } = state;
-    keep(phase, [rig.phase, rig.name, rig.error, rig.emulated, rig.scene], () => phaseWords(rig));
+    keep(phase, [rig.phase, rig.name, rig.error, rig.emulated, rig.scene, hasControl()], () => phaseWords(rig));
     if (rig.info) draw(stages, rig.info, range);
     stages.hidden = !rig.info;
     if (more.open) facts.replaceChildren(details(rig));
@@ -52,16 +52,20 @@ function able() {
 
 const SCENES = [["staircase", "Staircase"], ["slant", "Slanted plane"], ["cone", "Cone"], ["sphere", "Sphere"]];
 const FLAT = /^plane:(.+)$/;
+const USUAL_MM = 900;
 
 /** Chooses the scene of the emulated rig. @param {string} scene */
 function sceneChoice(scene) {
   const flat = FLAT.exec(scene)?.[1];
   const known = flat || SCENES.some(([name]) => name === scene);
-  const set = (to) => act("/api/rig/scene", { scene: to });
-  const distance = h("input", { type: "number", min: 1, step: "any", value: flat ?? 900, "aria-label": "Distance of the flat target, mm", title: "Distance of the flat target", "data-needs": "control" });
+  const set = async (to) => {
+    if (await act("/api/rig/scene", { scene: to })) return;
+    [chosen.value, distance.value] = [flat ? "plane" : scene, flat ?? USUAL_MM];
+  };
+  const distance = h("input", { type: "number", min: 1, step: "any", value: flat ?? USUAL_MM, "aria-label": "Distance of the flat target, mm", title: "Distance of the flat target", disabled: !hasControl() });
   distance.addEventListener("change", () => set(`plane:${distance.value}`));
-  const list = [...(known ? [] : [[scene, scene]]), ...SCENES, ["plane", "Flat target"]];
-  const chosen = choice(list, flat ? "plane" : scene, (name) => set(name === "plane" ? `plane:${distance.value}` : name), { "aria-label": "Scene", title: "Restarts the emulated rig with this scene", "data-needs": "control" });
+  const names = [...(known ? [] : [[scene, scene]]), ...SCENES, ["plane", "Flat target"]];
+  const chosen = choice(names, flat ? "plane" : scene, (name) => set(name === "plane" ? `plane:${distance.value}` : name), { "aria-label": "Scene", title: "Restarts the emulated rig with this scene", disabled: !hasControl() });
   return h("div", { class: "row scene-choice" }, h("span", { class: "dim" }, "Scene"), chosen, h("span", { class: "unit", hidden: !flat }, distance, " mm"));
 }
 
@@ -76,12 +80,13 @@ async function measure() {
 }
 
 function phaseWords(rig) {
+  const scene = rig.scene ? [sceneChoice(rig.scene)] : [];
   const again = button("Connect again", () => act("/api/rig/connect"), { "data-needs": "client" });
   if (rig.phase === "absent") return [h("p", { class: "dim" }, "No rig: captures only. Start farnear serve with --rig sim or a port to drive one.")];
   if (rig.phase === "connecting") return [h("p", {}, `Connecting to ${rig.name} …`)];
-  if (rig.phase === "lost" && rig.emulated) return [h("p", { class: "bad" }, "The emulated rig has ended."), h("p", { class: "dim" }, "Connect again to restart it; its stages are not homed then."), again];
+  if (rig.phase === "lost" && rig.emulated) return [h("p", { class: "bad" }, "The emulated rig has ended."), h("p", { class: "dim" }, "Connect again to restart it; its stages are not homed then."), again, ...scene];
   if (rig.phase === "lost") return [h("p", { class: "bad" }, rig.error ?? "The rig does not answer."), again];
-  return [h("p", { class: "rig-name" }, rig.name, rig.emulated ? h("span", { class: "badge", title: "No hardware is involved" }, "emulated") : null), ...(rig.scene ? [sceneChoice(rig.scene)] : [])];
+  return [h("p", { class: "rig-name" }, rig.name, rig.emulated ? h("span", { class: "badge", title: "No hardware is involved" }, "emulated") : null), ...scene];
 }
 
 const chosen = { coarse: 100, fine: 1, lens: 100 };

@@ -466,6 +466,11 @@ test("an emulated rig that has ended is restarted, also with another scene, and 
     await page.locator("#link[data-phase=ready]").waitFor();
     await page.locator("#view-live .status", { hasText: "frames/s" }).waitFor();
     assert.equal((await own.ask("/api/state")).rig.scene, "plane:900");
+    const distance = page.getByLabel("Distance of the flat target, mm");
+    await distance.fill("20");
+    await distance.press("Tab");
+    await page.locator(".notice.error", { hasText: "beyond the focal length of 50 mm" }).waitFor();
+    assert.equal(await distance.inputValue(), "900");
     const refused = await post(page, "/api/rig/scene", { scene: "attic" });
     assert.equal(refused.status, 400);
     assert.match(refused.error, /"attic": expected staircase, slant, cone, sphere or plane:MM/);

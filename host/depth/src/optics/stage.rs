@@ -129,12 +129,12 @@ impl Stage {
     }
 }
 
-/// Value and slope of a response at a measured depth; `None` outside the range of its points.
 /// Evenly spaced measured depths of the response.
 fn places([low, high]: [f64; 2]) -> [f64; RESPONSE_POINTS] {
     std::array::from_fn(|i| low + (high - low) * i as f64 / (RESPONSE_POINTS - 1) as f64)
 }
 
+/// Value and slope of a response at a measured depth; `None` outside the range of its points.
 fn interpolated([low, high]: [f64; 2], response: &[f64; RESPONSE_POINTS], measured: f64) -> Option<[f64; 2]> {
     if !(low..=high).contains(&measured) {
         return None;

@@ -9,6 +9,7 @@ use farnear_protocol::{Micros, message::Axis};
 use farnear_workflows::{
     Context, WorkflowError,
     measure::Rectangle,
+    optics,
     rig::{
         AxisName, RigAddress, alarms, board,
         camera::light_of_percent,
@@ -238,19 +239,22 @@ async fn set_scene(
         })?;
     let address = match given.scene().as_ref() == Some(&scene) {
         true => given.clone(), // it may be a file
-        false => given.with_scene(known(scene)?)?,
+        false => given.with_scene(known(scene, &app)?)?,
     };
     connect_again(&app, || app.choose_rig(address))
 }
 
-/// Fails for a scene that `farnear-sim` does not know by name.
-fn known(scene: String) -> Result<String, Failure> {
+/// Fails for a scene that `farnear-sim` does not know by name or that the session's lens cannot image.
+fn known(scene: String, app: &App) -> Result<String, Failure> {
     let distance_mm = scene.strip_prefix("plane:").and_then(|text| text.parse::<f64>().ok());
-    if SCENES.contains(&scene.as_str()) || distance_mm.is_some_and(|mm| mm > 0.0) {
-        return Ok(scene);
-    }
-    let error = format!("scene {scene:?}: expected {} or plane:MM", SCENES.join(", "));
-    Err(Failure::new(StatusCode::BAD_REQUEST, error))
+    let focal_length_mm = optics::read(&app.optics_file())?.focal_length_mm();
+    let expected = match distance_mm {
+        None if SCENES.contains(&scene.as_str()) => return Ok(scene),
+        None => format!("{} or plane:MM", SCENES.join(", ")),
+        Some(mm) if mm > focal_length_mm && mm.is_finite() => return Ok(scene),
+        Some(_) => format!("a distance beyond the focal length of {focal_length_mm} mm"),
+    };
+    Err(Failure::new(StatusCode::BAD_REQUEST, format!("scene {scene:?}: expected {expected}")))
 }
 
 async fn home(
