@@ -15,8 +15,6 @@ use crate::{
 
 const WINDOWS: &str = "x86_64-pc-windows-gnu";
 const TARGETS: [&str; 2] = [WINDOWS, "aarch64-apple-darwin"];
-/// It needs the target's own Python.
-const EXCLUDED: &str = python::PACKAGE;
 /// The linker for Windows.
 const LINKER: &str = "x86_64-w64-mingw32-gcc";
 /// `ProcessPrng`, which Rust's library imports, for a Wine that does not have it yet.
@@ -31,8 +29,7 @@ pub fn run() -> Result<()> {
         if !has_target(target) && !succeeds(Command::new("rustup").args(["target", "add", target])) {
             bail!("the target is missing: rustup target add {target}");
         }
-        let mut check = cargo(["check", "--locked", "--workspace", "--lib", "--bins", "--target", target]);
-        finish(check.args(["--exclude", EXCLUDED]))?;
+        finish(cargo(["check", "--lib", "--bins", "--target", target]).args(python::OTHERS))?;
     }
     if has("wine") && has(LINKER) {
         return under_wine();

@@ -16,7 +16,9 @@ use crate::{
 };
 
 /// Compiled only if Python is available.
-pub const PACKAGE: &str = "farnear-python";
+const PACKAGE: &str = "farnear-python";
+/// All crates except the Python package, which needs an environment of its own.
+pub const OTHERS: [&str; 4] = ["--workspace", "--exclude", PACKAGE, "--locked"];
 const NEEDS: [&str; 13] = [
     "numpy>=1.23",
     "matplotlib>=3.6",

@@ -38,7 +38,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     instructions::run(false)?;
 
     step("lints");
-    let workspace = [&["--workspace", "--exclude", python::PACKAGE, "--locked"], features()].concat();
+    let workspace = [&python::OTHERS[..], features()].concat();
     finish(cargo(["clippy", "--all-targets"]).args(&workspace).args(["--", "--deny", "warnings"]))?;
     if way.has_clippy() {
         let arguments = ["--release", "--locked", "--", "--deny", "warnings"];

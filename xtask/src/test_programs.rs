@@ -77,16 +77,15 @@ impl Programs {
             }
         }
         eprintln!("running the examples in the documentation");
-        let mut examples = cargo(["test", "--workspace", "--exclude", python::PACKAGE, "--locked", "--doc"]);
-        watch(environment(examples.args(features()), elf), &mut total)?;
+        let mut examples = cargo(["test", "--doc"]);
+        watch(environment(examples.args(python::OTHERS).args(features()), elf), &mut total)?;
         Ok(total)
     }
 
     pub fn build(elf: &Path) -> Result<Self> {
         look_again()?;
-        let mut command =
-            cargo(["test", "--workspace", "--exclude", python::PACKAGE, "--locked", "--no-run"]);
-        finish(environment(command.args(features()), elf))?;
+        let mut command = cargo(["test", "--no-run"]);
+        finish(environment(command.args(python::OTHERS).args(features()), elf))?;
         let text = output(command.arg("--message-format=json-render-diagnostics"))?;
         let (mut tests, mut others) = (Vec::new(), Vec::new());
         for line in text.lines() {

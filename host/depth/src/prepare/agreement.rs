@@ -1,11 +1,12 @@
-//! Where both images show the same: motion between the exposures, and images of different scenes.
+//! Detects motion between the exposures and images of different scenes.
 //!
-//! In the band that defocus leaves to both images (`band`) these are correlated by nearly 1 wherever they show
-//! the same surface, less what noise takes. A window in which they are not, although both have detail far above the noise, either
-//! moved or is blurred more than the band allows for: much blur turns the sign of detail. Coarse detail tells them apart, because
-//! blur leaves it alone; so does a shift that brings the detail of both images together.
+//! In their common band (`band`) both images of a surface are correlated by nearly 1, reduced by noise. A window with
+//! detail far above the noise in both images and a low correlation shows motion, or blur beyond the band's limit: large
+//! blur inverts the sign of detail. Coarse detail separates the two, because blur preserves it; so does a shift that
+//! restores the correlation.
 //!
-//! Cost: three box means per pixel of the small images (`thinned`), and 49 more around the pixels that differ and agree coarsely.
+//! Cost: three box means per pixel of the small images (`thinned`), and 49 more around the pixels whose coarse detail
+//! alone agrees.
 
 use ndarray::{Array2, ArrayViewMut2, Axis, Zip, s};
 use rayon::prelude::*;
@@ -18,36 +19,36 @@ use super::thinned::Thinned;
 
 /// Side of the window.
 const WINDOW_PX: usize = 21;
-/// Part of the energy that must be detail, in both images, for a window to say anything.
+/// Least part of a window's energy above the noise, in both images, for a comparison.
 const DETAIL: f32 = 0.6;
-/// Correlation relative to what noise allows below which a window shows different things.
+/// Correlation relative to the largest that noise permits, below which a window differs.
 const DIFFERENT: f32 = 0.5;
 
-/// Halvings down to coarse detail.
+/// Halvings from the small images to coarse detail.
 const COARSER: usize = 2;
-/// Correlation of coarse detail from which a window shows the same thing, blurred.
+/// Correlation of coarse detail from which a difference may be blur.
 const SAME_COARSE: f32 = 0.7;
-/// Correlation at a shift from which a window shows the same thing, moved.
+/// Correlation at a shift from which a difference is motion.
 const SAME_SHIFTED: f32 = 0.6;
-/// Shifts that are tried along both axes, px.
+/// Tested shifts along both axes, px.
 const SHIFTS_PX: [isize; 7] = [-6, -4, -2, 0, 2, 4, 6];
 /// Side of the tiles in which shifts are tried.
 const TILE_PX: usize = 64;
 
-/// What the comparison of a pair says.
+/// Comparison of a pair.
 #[derive(Debug, Clone)]
 pub struct Agreement {
-    /// Correlation of the windows with detail over the whole image, relative to what noise allows; `None` without any.
+    /// Mean correlation of the windows with detail, relative to the largest that noise permits; `None` without any.
     pub correlation: Option<f64>,
     /// Part of the windows that have detail in both images.
     pub detailed: f64,
-    /// Pixels that show different things, (height, width) of the images; `None` without any.
+    /// Pixels with motion or different objects, (height, width) of the images; `None` without any.
     pub moved: Option<Array2<bool>>,
-    /// Pixels that show the same thing with more blur than a pair has.
+    /// Pixels with blur beyond the common band.
     pub too_blurred: Option<Array2<bool>>,
 }
 
-/// Compares a pair that lies on each other and has `size` at full size.
+/// Compares an aligned pair of `size` (height, width) before thinning.
 pub(super) fn compare(pair: &Thinned, size: (usize, usize), noise: &PairNoise) -> Agreement {
     let factor = 1 << pair.halvings;
     let variance = noise.mean_variance * band_noise_gain() * halving_noise_gain().powi(pair.halvings as i32);
@@ -130,8 +131,7 @@ fn coarse_correlation(pair: &Thinned) -> Array2<f32> {
     })
 }
 
-/// Unmarks the pixels of a tile, which begins at row `top` and column `left`, where the mean product of `a` and `b` around them
-/// reaches [`SAME_SHIFTED`] at one of the shifts.
+/// Unmarks the pixels of a tile at row `top` and column `left` whose correlation reaches [`SAME_SHIFTED`] at a shift.
 fn remove_moved(mut tile: ArrayViewMut2<bool>, [top, left]: [usize; 2], [a, b]: [&Array2<f32>; 2]) {
     let mut marked: Vec<_> = tile.indexed_iter().filter(|(_, marked)| **marked).map(|(at, _)| at).collect();
     let (height, width) = a.dim();
@@ -167,7 +167,7 @@ fn remove_moved(mut tile: ArrayViewMut2<bool>, [top, left]: [usize; 2], [a, b]: 
     }
 }
 
-/// A mask of a level in the pixels of the image.
+/// Enlarges a mask of the small images to the pixels of the image.
 fn enlarged(mask: &Array2<bool>, factor: usize, size: (usize, usize)) -> Array2<bool> {
     let (height, width) = mask.dim();
     Array2::from_shape_fn(size, |(y, x)| mask[((y / factor).min(height - 1), (x / factor).min(width - 1))])

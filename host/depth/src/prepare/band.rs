@@ -1,9 +1,8 @@
-//! What both images of a pair share: the detail that defocus leaves in both, with its strength taken out.
+//! The common band of both images of a pair, normalised by its local RMS, for registration.
 //!
-//! Defocus takes the finest detail from one image and not from the other, by an amount that varies from place to place; lamp,
-//! aperture and vignetting change the brightness of one. So images are compared in a band of middle frequencies and divided
-//! by the root mean square of that band around each pixel: the result is alike in both where they show the same.
-//! Point spread functions are symmetric and move nothing, so that a difference of blur draws no estimate to one side.
+//! Defocus removes the finest detail from one image only, by an amount that depends on the place; lamp, aperture and
+//! vignetting change the brightness of one image. A band of middle frequencies, divided by its RMS around each pixel, is
+//! equal in both images of an object. Point spread functions are symmetric, so different blur does not bias a shift.
 
 use ndarray::{Array2, ArrayView2, Axis, CowArray, Ix2};
 use rayon::prelude::*;
@@ -11,14 +10,14 @@ use rayon::prelude::*;
 use crate::border::reflect;
 use crate::simd::{self, Backend};
 
-/// Side of the window whose mean is taken away: the band's lower end.
+/// Side of the window whose mean is subtracted: the band's lower end.
 const MEAN_PX: usize = 9;
-/// Side of the window over which the strength is measured.
+/// Side of the window of the RMS.
 const STRENGTH_PX: usize = 15;
-/// Part of the image's mean strength that is added everywhere, so that noise is not made large where nothing is.
+/// Part of the image's mean square that is added everywhere, so that noise is not amplified in areas without texture.
 const FLOOR: f32 = 0.1;
 
-/// An image of half the size: binomial weights, which removes frequencies beyond the smaller grid.
+/// An image of half the size; binomial weights remove frequencies beyond the smaller grid.
 pub(crate) fn halved(image: ArrayView2<f32>) -> Array2<f32> {
     const WEIGHTS: [f32; 4] = [0.125, 0.375, 0.375, 0.125];
     let (height, width) = image.dim();
@@ -53,9 +52,9 @@ pub(crate) fn halved(image: ArrayView2<f32>) -> Array2<f32> {
     half
 }
 
-/// The image with its pixels without a value set to the mean of the others; itself where every pixel has one.
+/// The image with its NaN pixels set to the mean of the others; borrowed if there are none.
 pub(crate) fn without_holes(image: ArrayView2<'_, f32>) -> CowArray<'_, f32, Ix2> {
-    // In 32 bits the loop is done in vectors.
+    // 32-bit sums are vectorised.
     let whole = |row: ndarray::ArrayView1<f32>| {
         row.iter().map(|v| u32::from(v.is_finite())).sum::<u32>() as usize == row.len()
     };
@@ -70,7 +69,7 @@ pub(crate) fn without_holes(image: ArrayView2<'_, f32>) -> CowArray<'_, f32, Ix2
     image.mapv(|v| if v.is_finite() { v } else { mean }).into()
 }
 
-/// The band of an unscaled image: blurred by a binomial of five taps, less its mean over [`MEAN_PX`].
+/// The band: the image blurred by a binomial of five taps, minus its mean over [`MEAN_PX`].
 pub(crate) fn band(image: ArrayView2<f32>) -> Array2<f32> {
     let fine = binomial(image);
     let mut coarse = box_mean(fine.view(), MEAN_PX);
@@ -78,21 +77,21 @@ pub(crate) fn band(image: ArrayView2<f32>) -> Array2<f32> {
     coarse
 }
 
-/// By how much [`band`] changes the variance of noise that is independent from pixel to pixel: sum of its squared taps.
+/// Factor of [`band`] on the variance of white noise: the sum of its squared taps.
 pub(crate) fn band_noise_gain() -> f64 {
     let taps = [1.0, 4.0, 6.0, 4.0, 1.0].map(|t| t / 16.0);
     let n = MEAN_PX as f64;
     let own: f64 = taps.iter().map(|t| t * t).sum::<f64>().powi(2);
-    // Binomial and box overlap wholly: the mixed term is the box's weight; the box of the binomial is a little wider.
+    // The box contains the binomial, so the mixed term is the box's weight; the blurred box is slightly wider.
     own - 2.0 / (n * n) + 1.0 / (n * n)
 }
 
-/// By how much [`halved`] changes it, once.
+/// Factor of [`halved`] on the variance of white noise.
 pub(crate) fn halving_noise_gain() -> f64 {
     (2.0 * (0.125_f64.powi(2) + 0.375_f64.powi(2))).powi(2)
 }
 
-/// The band divided by its strength around each pixel.
+/// The band divided by its RMS around each pixel.
 pub(crate) fn normalised(band: &Array2<f32>) -> Array2<f32> {
     let of_rows: Vec<f64> = band
         .axis_iter(Axis(0))
@@ -145,7 +144,7 @@ pub(crate) fn box_mean(image: ArrayView2<f32>, side: usize) -> Array2<f32> {
     })
 }
 
-/// [`box_mean`] of rows that `source` makes, of (height, width).
+/// [`box_mean`] of the rows that `source` writes, of (height, width).
 pub(crate) fn box_mean_of(
     size: (usize, usize),
     side: usize,
@@ -162,23 +161,23 @@ pub(crate) fn box_mean_of(
     result
 }
 
-/// Rows of an image that one thread works on, since a window's rows around them are summed again.
+/// Rows of an image per thread: each part also sums the rows of its windows beyond it.
 pub(crate) fn rows_of_part(height: usize) -> usize {
     height.div_ceil(rayon::current_num_threads().max(1)).max(32)
 }
 
-/// [`box_mean`] row by row: each row is made once, and kept as long as a window has it.
+/// [`box_mean`] row by row: each row is computed once and kept while a window contains it.
 pub(crate) struct RollingMean {
     backend: Backend,
     height: usize,
     reach: usize,
     /// Sums over the window's rows.
     sums: Vec<f64>,
-    /// Means along rows, of a window's rows and the one that leaves it.
+    /// Means along the rows of a window and of the row that leaves it.
     kept: Vec<f32>,
     row: Vec<f32>,
     work: Vec<f32>,
-    /// The rows that are summed; `None` before the first.
+    /// Summed rows; `None` before the first.
     summed: Option<std::ops::Range<usize>>,
 }
 
@@ -271,12 +270,12 @@ mod tests {
             image[at] = 1.0;
             halved(image.view()).iter().map(|v| f64::from(*v).powi(2)).sum::<f64>()
         });
-        // A quarter of the pixels each: their sum is that of one output pixel's taps.
+        // Each stands for a quarter of the pixels; their sum is that of one output pixel's taps.
         assert!((energies.iter().sum::<f64>() / 4.0 * 4.0 - halving_noise_gain()).abs() < 1e-6);
     }
 
     #[test]
-    fn strength_is_taken_out() {
+    fn normalisation_removes_the_contrast() {
         let image = Array2::from_shape_fn((60, 80), |(y, x)| {
             let strength = if x < 40 { 1.0 } else { 2.0 };
             strength * ((y * 7 + x * x * 3) % 11) as f32

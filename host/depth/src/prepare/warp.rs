@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 /// Taps of the interpolation along each axis: Lanczos' kernel of three lobes.
 const TAPS: usize = 6;
 
-/// Places between two pixels that have weights of their own: the nearest is off by 1/1024 px at most.
+/// Tabulated places between two pixels; the nearest differs by at most 1/1024 px.
 const PHASES: usize = 512;
 
 /// `p' = matrix p + shift`: the position in the other image of the object at `p`.
@@ -42,13 +42,13 @@ impl Warp {
         Self { matrix, shift: [cx - a * cx - b * cy + sx, cy - c * cx - d * cy + sy] }
     }
 
-    /// The place that belongs to `[x, y]`.
+    /// Position of `[x, y]` in the other image.
     pub fn at(&self, [x, y]: [f64; 2]) -> [f64; 2] {
         let [[a, b], [c, d]] = self.matrix;
         [a * x + b * y + self.shift[0], c * x + d * y + self.shift[1]]
     }
 
-    /// First `first`, then this.
+    /// `first`, then this map.
     pub fn after(&self, first: &Self) -> Self {
         let [[a, b], [c, d]] = self.matrix;
         let [[e, f], [g, h]] = first.matrix;
@@ -58,7 +58,7 @@ impl Warp {
         }
     }
 
-    /// The way back; `None` for a map that has none.
+    /// The inverse; `None` for a singular map.
     pub fn inverse(&self) -> Option<Self> {
         let [[a, b], [c, d]] = self.matrix;
         let determinant = a * d - b * c;
@@ -84,14 +84,14 @@ impl Warp {
         Self { matrix: self.matrix, shift: [2.0 * self.shift[0] + 0.5 - x, 2.0 * self.shift[1] + 0.5 - y] }
     }
 
-    /// By how much the middle of an image of (height, width) is moved, px.
+    /// Shift of the middle of an image of (height, width), px.
     pub fn shift_of_middle_px(&self, size: (usize, usize)) -> [f64; 2] {
         let from = middle(size);
         let to = self.at(from);
         [to[0] - from[0], to[1] - from[1]]
     }
 
-    /// Magnification: square root of the area's.
+    /// Square root of the magnification of areas.
     pub fn magnification(&self) -> f64 {
         let [[a, b], [c, d]] = self.matrix;
         (a * d - b * c).abs().sqrt()
@@ -103,7 +103,7 @@ impl Warp {
         (c - b).atan2(a + d).to_degrees()
     }
 
-    /// Root mean square over an image of (height, width) of how far pixels are moved, px.
+    /// RMS displacement over an image of (height, width), px.
     pub fn rms_px(&self, size: (usize, usize)) -> f64 {
         let [[a, b], [c, d]] = self.matrix;
         let [sx, sy] = self.shift_of_middle_px(size);
@@ -140,17 +140,17 @@ impl Lanczos {
 
     /// First tap and phase of a place along an axis, from -1 on.
     fn at(place: f64) -> (isize, usize) {
-        // Truncated, which takes no call; positive.
+        // Positive, so truncation is the floor, without a call.
         let whole = (place + 1.0) as isize - 1;
         let phase = ((place - whole as f64) * PHASES as f64 + 0.5) as usize;
         (whole - 2, phase.min(PHASES))
     }
 }
 
-/// The image as seen through `warp`: pixel `p` of the result shows the place `warp(p)` of `image`, interpolated by
-/// Lanczos' kernel of three lobes, which keeps what the operators look at (up to 0.6 of the pixels' Nyquist frequency
-/// to 2 %). NaN where that place lies outside, and where a pixel without a value would take part. Cost: 12
-/// multiply-adds per pixel where neighbours lie between the same rows, 54 elsewhere; on all threads of the pool.
+/// The image resampled by `warp`: pixel `p` of the result is `image` at `warp(p)`, interpolated by Lanczos' kernel of
+/// three lobes, which keeps the operators' frequencies (up to 0.6 of Nyquist) to 2 %. NaN outside and where a NaN pixel
+/// has a weight. Cost: 12 multiply-adds per pixel where neighbours lie between the same rows, 54 elsewhere; on all
+/// threads of the pool.
 pub fn resample(image: ArrayView2<f32>, warp: &Warp) -> Array2<f32> {
     resample_by(image, |place| warp.at(place))
 }
@@ -183,7 +183,7 @@ pub(crate) fn resample_by(image: ArrayView2<f32>, map: impl Fn([f64; 2]) -> [f64
     result
 }
 
-/// Where a pixel of the result comes from.
+/// Source of a pixel of the result.
 #[derive(Clone, Copy)]
 struct Taps {
     first: [isize; 2],
@@ -201,12 +201,12 @@ impl Taps {
         Self { first: [left, top], phase: [across, down], inside: Some(inside) }
     }
 
-    /// First row and phase down, for places all of whose taps lie in the image.
+    /// First row and vertical phase, if all taps lie in the image.
     fn rows(&self) -> Option<[usize; 2]> {
         self.inside.filter(|inside| *inside).map(|_| [self.first[1] as usize, self.phase[1]])
     }
 
-    /// The value of a place near the border, whose taps beyond it take the nearest pixel; NaN outside.
+    /// Value near the border: taps beyond it take the nearest pixel. NaN outside.
     fn at_border(&self, pixels: &[f32], (height, width): (usize, usize), lanczos: &Lanczos) -> f32 {
         if self.inside.is_none() {
             return f32::NAN;
@@ -223,7 +223,7 @@ impl Taps {
     }
 }
 
-/// Values of places that lie between the same rows: these are weighed once for all columns that take part.
+/// Values between the same rows, which are interpolated vertically once for all columns.
 fn along_rows(
     pixels: &[f32],
     width: usize,
@@ -261,7 +261,7 @@ mod tests {
     }
 
     #[test]
-    fn a_warp_and_its_inverse_lead_back() {
+    fn a_warp_after_its_inverse_is_the_identity() {
         let warp = Warp::about_middle((480, 640), 1.02, 0.7, [3.0, -5.0]);
         assert!(close(&warp.after(&warp.inverse().unwrap()), &Warp::IDENTITY));
         assert!((warp.magnification() - 1.02).abs() < 1e-12 && (warp.rotation_deg() - 0.7).abs() < 1e-9);
@@ -280,12 +280,12 @@ mod tests {
                 sum += (to[0] - f64::from(x)).powi(2) + (to[1] - f64::from(y)).powi(2);
             }
         }
-        // The continuous formula takes a pixel's own width for part of the image's.
+        // The continuous formula includes half a pixel beyond the outermost centres.
         assert!((warp.rms_px((48, 64)) - (sum / 3072.0).sqrt()).abs() < 1e-3);
     }
 
     #[test]
-    fn a_wave_is_found_again_between_its_pixels() {
+    fn a_wave_is_interpolated_between_its_pixels() {
         let wave = |x: f64, y: f64| (1.3 * x + 0.4 * y).sin() + 0.5 * (0.9 * y).cos();
         let image = Array2::from_shape_fn((40, 50), |(y, x)| wave(x as f64, y as f64) as f32);
         let warp = Warp::about_middle((40, 50), 1.01, 0.5, [0.4, 1.3]);
@@ -302,7 +302,7 @@ mod tests {
     }
 
     #[test]
-    fn a_missing_pixel_is_missing_around_it_only() {
+    fn a_missing_pixel_affects_only_the_taps_around_it() {
         let mut image = Array2::from_elem((30, 30), 1.0_f32);
         image[(15, 15)] = f32::NAN;
         let seen = resample(image.view(), &Warp { matrix: [[1.0, 0.0], [0.0, 1.0]], shift: [0.5, 0.0] });
