@@ -295,7 +295,7 @@ pub fn focus_stack(request: &FocusStackRequest, context: &Context<'_>) -> Result
             names.join(" or ")
         ));
     }
-    warnings.extend(frames.warning());
+    warnings.extend(frames.warnings());
     let mut left_out = Vec::new();
     for (index, reason) in &frames.left_out {
         left_out.push(name(&listed.images[*index]));

@@ -32,6 +32,8 @@ const TELLING: f64 = 0.6;
 
 /// Usual correlation below which a missing frame costs more than a tenth of the error.
 const COARSE: f64 = 0.85;
+/// Displacement over an unaligned stack from which a warning is given, px: edges move out of the sharpness window's core.
+const DRIFT_PX: f64 = 2.0;
 
 pub(super) struct Frames {
     /// Warp of each image onto the reference; identity without alignment.
@@ -41,20 +43,33 @@ pub(super) struct Frames {
     pub untold: Vec<usize>,
     /// Usual correlation of neighbours; `None` if it was not measured.
     pub usual: Option<f64>,
+    /// Farthest displacement of a corner over the stack without alignment, px.
+    pub drift_px: f64,
 }
 
 impl Frames {
     pub fn unchecked(count: usize) -> Self {
-        Self { warps: vec![Warp::IDENTITY; count], left_out: Vec::new(), untold: Vec::new(), usual: None }
+        let warps = vec![Warp::IDENTITY; count];
+        Self { warps, left_out: Vec::new(), untold: Vec::new(), usual: None, drift_px: 0.0 }
     }
 
-    pub fn warning(&self) -> Option<String> {
-        let usual = self.usual.filter(|usual| *usual < COARSE)?;
-        let unchecked = if usual > TELLING { "" } else { ", and bad images are not recognised" };
-        Some(format!(
-            "neighbouring images have little in common (correlation {usual:.2}): the steps are wide, or the images are noisy or not aligned; \
-             a missing image costs much accuracy{unchecked}"
-        ))
+    pub fn warnings(&self) -> Vec<String> {
+        let mut warnings = Vec::new();
+        if let Some(usual) = self.usual.filter(|usual| *usual < COARSE) {
+            let unchecked = if usual > TELLING { "" } else { ", and bad images are not recognised" };
+            warnings.push(format!(
+                "neighbouring images have little in common (correlation {usual:.2}): the steps are wide, or the images are noisy or not aligned; \
+                 a missing image costs much accuracy{unchecked}"
+            ));
+        }
+        if self.drift_px > DRIFT_PX {
+            warnings.push(format!(
+                "the images move by {:.1} px over the stack (a breathing lens or a moving camera), so depth is wrong at edges: use \
+                 --align similarity",
+                self.drift_px
+            ));
+        }
+        warnings
     }
 }
 
@@ -113,6 +128,13 @@ where
     }
     frames.untold = shaken.untold;
     frames.usual = Some(scene.usual);
+    if model.is_none() {
+        if scene.usual > TELLING {
+            let measured: Vec<Warp> = members.iter().map(|index| frames.warps[*index]).collect();
+            frames.drift_px = farthest_px(&measured, images.dim(0));
+        }
+        frames.warps.fill(Warp::IDENTITY);
+    }
     Ok(frames)
 }
 
@@ -167,11 +189,14 @@ where
     }
 
     fn compared(&self, first: ArrayView2<f32>, second: ArrayView2<f32>) -> Link {
-        let found = align::estimate(first, second, self.model.unwrap_or(Model::Shift), Warp::IDENTITY);
-        match (found, self.model) {
-            (None, _) => Link { warp: Warp::IDENTITY, correlation: 0.0 },
-            (Some(found), None) => Link { warp: Warp::IDENTITY, correlation: found.correlation_before },
-            (Some(found), Some(_)) => Link { warp: found.warp, correlation: found.correlation },
+        let model = self.model.unwrap_or(Model::Similarity);
+        match align::estimate(first, second, model, Warp::IDENTITY) {
+            None => Link { warp: Warp::IDENTITY, correlation: 0.0 },
+            Some(found) => {
+                let aligned = self.model.is_some();
+                let correlation = if aligned { found.correlation } else { found.correlation_before };
+                Link { warp: found.warp, correlation }
+            }
         }
     }
 

@@ -1,4 +1,7 @@
-use farnear_depth::focus_stack::{StackSettings, depth_from_positions};
+use farnear_depth::{
+    focus_stack::{StackSettings, depth_from_positions},
+    prepare::warp::resample,
+};
 use ndarray::{Array2, s};
 
 use super::*;
@@ -48,6 +51,32 @@ fn left_out(images: &[Array2<f32>], model: Option<Model>) -> Vec<usize> {
 fn a_good_stack_loses_no_frame() {
     assert_eq!(left_out(&stack(), None), [0; 0]);
     assert_eq!(left_out(&stack(), Some(Model::Similarity)), [0; 0]);
+}
+
+#[test]
+fn warns_of_a_breathing_lens_unless_the_images_are_aligned() {
+    let positions: Vec<f64> = (0..COUNT).map(|index| index as f64).collect();
+    let still = stack();
+    assert!(checked(&still, &positions, None).drift_px < 0.5);
+    let breathing: Vec<Array2<f32>> = still
+        .iter()
+        .enumerate()
+        .map(|(index, image)| {
+            let magnification = 1.0 + 0.01 * (index as f64 - 5.0);
+            let warp = Warp::about_middle(image.dim(), magnification, 0.0, [0.0; 2]);
+            resample(image.view(), &warp).mapv(|v| if v.is_nan() { 0.5 } else { v })
+        })
+        .collect();
+    let found = checked(&breathing, &positions, None);
+    // A corner lies 59 px from the middle; the first and last images differ from the middle one by 5 %.
+    assert!((found.drift_px - 0.05 * 59.0).abs() < 0.6, "{}", found.drift_px);
+    assert!(
+        found.warnings().iter().any(|text| text.contains("--align similarity")),
+        "{:?}",
+        found.warnings()
+    );
+    assert!(found.warps.iter().all(|warp| *warp == Warp::IDENTITY));
+    assert_eq!(checked(&breathing, &positions, Some(Model::Similarity)).drift_px, 0.0);
 }
 
 #[test]
@@ -210,7 +239,7 @@ fn no_good_frame_of_a_coarse_stack_is_left_out() {
         let good = rendered(&positions, slope, (count - 1) as f32 / (TRUE_COUNT - 1) as f32);
         let found = checked(&good, &positions, None);
         assert!(found.left_out.is_empty(), "{slope}: {:?}", found.left_out);
-        assert_eq!(found.warning().is_some(), slope > 1.0, "{slope}: {:?}", found.warning());
+        assert_eq!(!found.warnings().is_empty(), slope > 1.0, "{slope}: {:?}", found.warnings());
         for at in 0..good.len() {
             for (kind, bad) in bad_frames(&good[at]) {
                 let mut images = good.clone();
