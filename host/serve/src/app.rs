@@ -169,7 +169,6 @@ impl App {
 
     /// Sets the rig of the next connection.
     pub fn choose_rig(&self, address: RigAddress) {
-        self.change(|state| state.rig.scene = address.scene());
         *lock(&self.chosen) = Some(address);
     }
 
@@ -180,6 +179,15 @@ impl App {
     /// Requests a (new) connection to the rig.
     pub fn ask_to_connect(&self) {
         self.reconnect.store(true, Ordering::Relaxed);
+        let scene = self.chosen_rig().as_ref().and_then(RigAddress::scene);
+        self.change(|state| {
+            state.rig = RigState { phase: Phase::Connecting, error: None, scene, ..state.rig.clone() };
+        });
+    }
+
+    /// Whether a connection was requested and has not begun.
+    pub fn is_to_connect(&self) -> bool {
+        self.reconnect.load(Ordering::Relaxed)
     }
 
     /// Returns whether a connection was requested since the last call.

@@ -94,6 +94,8 @@ fn lost(app: &App, error: &WorkflowError) {
 
 fn ask(app: &App, rig: &OpenRig) {
     match info::info(&RigAddress::Open(rig.clone()), &Context::unattended()) {
+        // The rig that answered is about to be replaced.
+        Ok(_) if app.is_to_connect() => {}
         Ok(figures) => {
             let mut info = serde_json::to_value(&figures).unwrap_or_default();
             if let Some(fields) = info.as_object_mut() {

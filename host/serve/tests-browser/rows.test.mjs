@@ -162,7 +162,9 @@ test("a click on a rail moves its stage there", async () => {
   const page = await open(browser, server.address);
   const { fine_min_um: low, fine_max_um: high } = (await server.ask("/api/state")).rig.info;
   const rail = page.locator("svg[data-axis=fine]");
-  const { width, height } = await rail.boundingBox();
+  let box = null; // while the rail is redrawn
+  while (!box) box = await rail.boundingBox();
+  const { width, height } = box;
   for (const part of [0.3, 0.6]) {
     await rail.click({ position: { x: (width * (14 + part * 272)) / 300, y: height / 2 } });
     const wanted = low + part * (high - low);
