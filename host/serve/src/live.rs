@@ -81,8 +81,7 @@ fn look_through_camera(app: &App, live: &Live, context: &Context<'_>, rate: &Rat
 
 fn image_message(record: Option<&ShotRecord>, image: &Image, live: &Live, rate_hz: f64) -> axum::body::Bytes {
     let arrived_ms = unix_ms();
-    let part = live.region.and_then(|region| picture::part(image, region));
-    let figures = picture::figures(part.as_ref().unwrap_or(image), live.measure);
+    let figures = picture::figures_of(image, live.region, live.measure);
     let (height, width) = image.pixels.dim();
     let header = json!({
         "type": "image",

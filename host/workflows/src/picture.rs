@@ -35,8 +35,17 @@ pub struct PictureFigures {
     pub warnings: Vec<String>,
 }
 
+/// Figures of the part of `region` inside the image, or of all of it. The warnings are always those of the whole image.
+pub fn figures_of(image: &Image, region: Option<Rectangle>, measure: FocusMeasure) -> PictureFigures {
+    let whole = figures(image, measure);
+    match region.and_then(|region| part(image, region)) {
+        Some(part) => PictureFigures { warnings: whole.warnings, ..figures(&part, measure) },
+        None => whole,
+    }
+}
+
 /// The part of `region` inside the image; `None` if it is empty.
-pub fn part(image: &Image, region: Rectangle) -> Option<Image> {
+fn part(image: &Image, region: Rectangle) -> Option<Image> {
     let (height, width) = image.pixels.dim();
     let right = region.x.saturating_add(region.width).min(width);
     let bottom = region.y.saturating_add(region.height).min(height);
@@ -123,6 +132,15 @@ mod tests {
         assert_eq!(at([1, 2, 2, 1]), Some(ndarray::array![[21, 22]]));
         assert_eq!(at([4, 3, 9, usize::MAX]), Some(ndarray::array![[34, 35]]));
         assert_eq!((at([6, 0, 1, 1]), at([0, 0, 0, 3])), (None, None));
+    }
+
+    #[test]
+    fn a_region_hides_no_warning_of_the_whole_image() {
+        let image = Image::new(Array2::from_shape_fn((32, 48), |(_, x)| if x < 4 { 255 } else { 100 }), 8);
+        let found = figures_of(&image, Some([10, 0, 20, 32].into()), FocusMeasure::Tenengrad);
+        assert_eq!((found.width, found.saturated_fraction), (20, 0.0));
+        assert!(found.warnings[0].starts_with("8.3 % of the pixels"), "{:?}", found.warnings);
+        assert_eq!(figures_of(&image, None, FocusMeasure::Tenengrad).width, 48);
     }
 
     #[test]
