@@ -17,7 +17,7 @@ use crate::{
 
 /// Compiled only if Python is available.
 const PACKAGE: &str = "farnear-python";
-/// All crates except the Python package, which needs an environment of its own.
+/// All crates except the Python package, which is built with other environment variables.
 pub const OTHERS: [&str; 4] = ["--workspace", "--exclude", PACKAGE, "--locked"];
 const NEEDS: [&str; 13] = [
     "numpy>=1.23",

@@ -52,7 +52,7 @@ pub(crate) fn halved(image: ArrayView2<f32>) -> Array2<f32> {
     half
 }
 
-/// The image with its NaN pixels set to the mean of the others; borrowed if there are none.
+/// The image with its NaN pixels set to the mean of the others; borrowed without NaN pixels.
 pub(crate) fn without_holes(image: ArrayView2<'_, f32>) -> CowArray<'_, f32, Ix2> {
     // 32-bit sums are vectorised.
     let whole = |row: ndarray::ArrayView1<f32>| {
@@ -270,7 +270,7 @@ mod tests {
             image[at] = 1.0;
             halved(image.view()).iter().map(|v| f64::from(*v).powi(2)).sum::<f64>()
         });
-        // Each stands for a quarter of the pixels; their sum is that of one output pixel's taps.
+        // Each position represents a quarter of the pixels, so the energies add up to that of one output pixel's taps.
         assert!((energies.iter().sum::<f64>() / 4.0 * 4.0 - halving_noise_gain()).abs() < 1e-6);
     }
 
