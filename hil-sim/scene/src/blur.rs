@@ -1,6 +1,6 @@
 //! The blurred scene on the sensor: each texture cell spreads by its own blur, nearer surfaces hide others.
 //!
-//! *Scatter.* Each texture sample (one per cell of half a pixel) adds light to the surrounding pixels with
+//! *Sum.* Each texture sample (one per cell of half a pixel) adds light to the surrounding pixels with
 //! the weights of its blur's [kernel](crate::kernel). For one plane this is the exact convolution.
 //!
 //! *Occlusion.* Cells are grouped into slabs of signed blur, nearest first. A slab gives each pixel light `L`
@@ -13,14 +13,16 @@
 //! *Levels.* Up to [`MAX_EXACT_LEVELS`] depths have an exact kernel each. A continuous surface has slabs of [`SLAB_PX`]
 //! blur, kernels every [`LEVEL_PX`], interpolated in the squared radius, which keeps the second moment exact.
 //!
-//! *Cost.* Cells times kernel pixels, twice (light and cover): 20 to 300 ms for 640 x 480 at 2.7 px. Kernels
-//! wider than [`MAX_DIRECT_PX`] use an FFT slab with levels spaced by [`LEVEL_RATIO`]: up to a second.
+//! *Cost.* Cells times kernel pixels, twice (light and cover). For 640 x 480 at 2.7 px on one thread: 15 ms a plane,
+//! 25 ms a staircase, 200 ms a continuous surface. Kernels wider than [`MAX_DIRECT_PX`] use an FFT slab with levels
+//! spaced by [`LEVEL_RATIO`]: up to two seconds.
 
-use ndarray::Array2;
+use ndarray::{Array2, ArrayView2, CowArray, Ix2, s};
 use rustfft::num_complex::Complex32;
 
 use crate::composite::{Composite, Sums};
 use crate::fourier::{Fourier2, good_size};
+use crate::gather::{Region, gather};
 use crate::kernel::{CELLS_PER_PIXEL, CellKernel};
 use crate::psf::Psf;
 
@@ -32,45 +34,64 @@ pub const SLAB_PX: f32 = 0.25;
 pub const LEVEL_PX: f32 = 0.05;
 /// Spacing of tabulated kernels relative to the radius, if wider than [`LEVEL_PX`].
 pub const LEVEL_RATIO: f32 = 0.02;
-/// Widest kernel that is scattered directly, px from its centre.
+/// Widest kernel that is summed directly, px from its centre.
 pub const MAX_DIRECT_PX: usize = 15;
 
-pub(crate) struct Cells {
+pub(crate) struct Cells<'a> {
     pub(crate) margin_px: usize,
     pub(crate) radiance: Array2<f32>,
-    /// Signed blur radius in px, larger = farther; a plane's is uniform.
-    pub(crate) blur_px: Blur,
+    pub(crate) blur_px: Blur<'a>,
 }
 
-pub(crate) enum Blur {
+/// Signed blur radius of each cell in px, larger = farther.
+pub(crate) enum Blur<'a> {
     Uniform(f32),
+    /// At most [`MAX_EXACT_LEVELS`] radii, nearest first, and the index of each cell's.
+    Levels(Vec<f32>, ArrayView2<'a, u8>),
     Varying(Array2<f32>),
+}
+
+impl Blur<'_> {
+    fn at(&self, place: [usize; 2]) -> f32 {
+        match self {
+            Self::Uniform(radius) => *radius,
+            Self::Levels(radii, index) => radii[usize::from(index[place])],
+            Self::Varying(radii) => radii[place],
+        }
+    }
+
+    /// Least and largest signed radius.
+    pub(crate) fn ends(&self) -> (f32, f32) {
+        let of = |(low, high): (f32, f32), &radius: &f32| (low.min(radius), high.max(radius));
+        match self {
+            Self::Uniform(radius) => (*radius, *radius),
+            Self::Levels(radii, _) => radii.iter().fold((f32::MAX, f32::MIN), of),
+            Self::Varying(radii) => radii.iter().fold((f32::MAX, f32::MIN), of),
+        }
+    }
 }
 
 pub(crate) fn kernel_reach_px(psf: &Psf, blur_px: f32) -> usize {
     CellKernel::reach(psf, f64::from(blur_px.abs())).div_ceil(CELLS_PER_PIXEL)
 }
 
-impl Cells {
+impl Cells<'_> {
     /// Mean radiance of each pixel, shape (height, width).
     pub(crate) fn blurred(&self, psf: &Psf) -> Array2<f32> {
         let (slabs, members) = self.slabs(psf);
+        let members = members.as_ref().map(|members| members.view());
         let mut image = Composite::new(self.image_size());
-        for (index, slab) in slabs.iter().enumerate() {
-            let chosen = |row: usize, column: usize| {
-                members.as_ref().is_none_or(|m| usize::from(m[[row, column]]) == index)
-            };
-            let rows = members.as_ref().map_or(0..self.radiance.nrows(), |members| {
-                let holds =
-                    |&row: &usize| members.row(row).iter().any(|&member| usize::from(member) == index);
-                let first = (0..members.nrows()).find(holds).unwrap_or(0);
-                let last = (0..members.nrows()).rev().find(holds).map_or(0, |row| row + 1);
-                first..last
-            });
-            let sums = if slab.reach_px > MAX_DIRECT_PX {
-                self.convolve(psf, slab)
-            } else {
-                self.scatter(psf, slab, rows, chosen)
+        let regions = self.regions(members, slabs.len());
+        for ((number, slab), region) in (0..).zip(&slabs).zip(regions) {
+            let members = members.map(|members| (members, number));
+            let sums = match (&self.blur_px, members) {
+                _ if slab.reach_px > MAX_DIRECT_PX => self.convolve(psf, slab),
+                (Blur::Varying(blur_px), Some(members)) => self.scatter(psf, slab, region, blur_px, members),
+                _ => {
+                    let kernel = (&CellKernel::new(psf, f64::from(slab.radii_px[0])), slab.reach_px);
+                    let image = (self.image_size(), self.margin_px);
+                    gather(self.radiance.view(), members, region, image, kernel)
+                }
             };
             image.add_behind(&sums);
         }
@@ -83,22 +104,21 @@ impl Cells {
     }
 
     /// Slabs, nearest first, and the slab of each cell (`None`: one slab).
-    fn slabs(&self, psf: &Psf) -> (Vec<Slab>, Option<Array2<u8>>) {
+    fn slabs(&self, psf: &Psf) -> (Vec<Slab>, Option<CowArray<'_, u8, Ix2>>) {
+        let (low, high) = self.blur_px.ends();
+        let widest = low.abs().max(high.abs());
         let blur = match &self.blur_px {
-            Blur::Uniform(blur) => return (vec![Slab::new(psf, vec![blur.abs()], false)], None),
+            Blur::Uniform(radius) => return (vec![Slab::new(psf, vec![radius.abs()], false)], None),
+            _ if kernel_reach_px(psf, widest) > MAX_DIRECT_PX => {
+                let least = if low <= 0.0 && high >= 0.0 { 0.0 } else { low.abs().min(high.abs()) };
+                return (vec![Slab::new(psf, levels(least, widest), true)], None);
+            }
+            Blur::Levels(radii, index) => {
+                let slab = |radius: &f32| Slab::new(psf, vec![radius.abs()], true);
+                return (radii.iter().map(slab).collect(), Some((*index).into()));
+            }
             Blur::Varying(blur) => blur,
         };
-        let (low, high) = blur.iter().fold((f32::MAX, f32::MIN), |(low, high), &b| (low.min(b), high.max(b)));
-        let distinct = distinct_values(blur);
-        let widest = low.abs().max(high.abs());
-        if kernel_reach_px(psf, widest) > MAX_DIRECT_PX {
-            let least = if low <= 0.0 && high >= 0.0 { 0.0 } else { low.abs().min(high.abs()) };
-            return (vec![Slab::new(psf, levels(least, widest), true)], None);
-        }
-        if let Some(values) = distinct {
-            let members = blur.map(|b| values.partition_point(|value| value < b) as u8);
-            return (values.iter().map(|b| Slab::new(psf, vec![b.abs()], true)).collect(), Some(members));
-        }
         let count = ((high - low) / SLAB_PX).ceil().clamp(1.0, 255.0);
         let thickness = (high - low) / count;
         let members = blur.map(|b| ((b - low) / thickness).clamp(0.0, count - 1.0) as u8);
@@ -109,23 +129,40 @@ impl Cells {
                 Slab::new(psf, levels(least, near.abs().max(far.abs())), true)
             })
             .collect();
-        (slabs, Some(members))
+        (slabs, Some(members.into()))
+    }
+
+    /// The cells of each slab lie in these rows and columns.
+    fn regions(&self, members: Option<ArrayView2<'_, u8>>, slabs: usize) -> Vec<Region> {
+        let Some(members) = members else {
+            return vec![Region { first: (0, 0), last: self.radiance.dim() }; slabs];
+        };
+        let mut regions = vec![Region { first: members.dim(), last: (0, 0) }; slabs];
+        for (row, members) in members.outer_iter().enumerate() {
+            for (column, &member) in members.iter().enumerate() {
+                let Region { first, last } = &mut regions[usize::from(member)];
+                *first = (first.0.min(row), first.1.min(column));
+                *last = (row + 1, last.1.max(column + 1));
+            }
+        }
+        regions
     }
 
     fn scatter(
         &self,
         psf: &Psf,
         slab: &Slab,
-        rows: std::ops::Range<usize>,
-        chosen: impl Fn(usize, usize) -> bool,
+        region: Region,
+        blur_px: &Array2<f32>,
+        members: (ArrayView2<'_, u8>, u8),
     ) -> Sums {
         match 2 * slab.reach_px + 1 {
-            0..=4 => self.scatter_lanes::<4>(psf, slab, rows, chosen),
-            5..=8 => self.scatter_lanes::<8>(psf, slab, rows, chosen),
-            9..=12 => self.scatter_lanes::<12>(psf, slab, rows, chosen),
-            13..=16 => self.scatter_lanes::<16>(psf, slab, rows, chosen),
-            17..=24 => self.scatter_lanes::<24>(psf, slab, rows, chosen),
-            _ => self.scatter_lanes::<32>(psf, slab, rows, chosen),
+            0..=4 => self.scatter_lanes::<4>(psf, slab, region, blur_px, members),
+            5..=8 => self.scatter_lanes::<8>(psf, slab, region, blur_px, members),
+            9..=12 => self.scatter_lanes::<12>(psf, slab, region, blur_px, members),
+            13..=16 => self.scatter_lanes::<16>(psf, slab, region, blur_px, members),
+            17..=24 => self.scatter_lanes::<24>(psf, slab, region, blur_px, members),
+            _ => self.scatter_lanes::<32>(psf, slab, region, blur_px, members),
         }
     }
 
@@ -134,44 +171,42 @@ impl Cells {
         &self,
         psf: &Psf,
         slab: &Slab,
-        rows: std::ops::Range<usize>,
-        chosen: impl Fn(usize, usize) -> bool,
+        region: Region,
+        blur_px: &Array2<f32>,
+        (members, number): (ArrayView2<'_, u8>, u8),
     ) -> Sums {
         let side = 2 * slab.reach_px + 1;
         let kernels: Vec<[Vec<[f32; LANES]>; 4]> =
             slab.radii_px.iter().map(|&radius| pixel_kernels(psf, radius, slab.reach_px)).collect();
-        let mut sums = Sums::new(self.image_size(), self.margin_px, LANES, slab.needs_cover);
-        let stride = sums.stride;
+        let (height, width) = self.image_size();
+        let border_px = 2 * self.margin_px;
+        let mut light = Array2::zeros((height + 2 * border_px, width + 2 * border_px + LANES));
+        let mut cover = light.clone();
+        let stride = light.ncols();
         // The kernel's first pixel relative to the buffer's, for a cell of the first margin pixel.
-        let corner = sums.border_px - self.margin_px - slab.reach_px;
-        let mut blended = [[0.0f32; LANES]; 2 * MAX_DIRECT_PX + 1];
-        for row in rows {
-            for column in 0..self.radiance.ncols() {
-                if !chosen(row, column) {
-                    continue;
-                }
-                let phase = (row % 2) * 2 + column % 2;
-                let kernel = match &self.blur_px {
-                    Blur::Varying(blur) if kernels.len() > 1 => {
-                        let (level, fraction) = slab.level(blur[[row, column]].abs());
-                        let (lower, upper) = (&kernels[level][phase], &kernels[level + 1][phase]);
-                        for ((blend, lower), upper) in blended.iter_mut().zip(lower).zip(upper) {
-                            for lane in 0..LANES {
-                                blend[lane] = lower[lane] + fraction * (upper[lane] - lower[lane]);
-                            }
+        let corner = border_px - self.margin_px - slab.reach_px;
+        let mut kernel = [[0.0f32; LANES]; 2 * MAX_DIRECT_PX + 1];
+        if let (Some(light), Some(cover)) = (light.as_slice_mut(), cover.as_slice_mut()) {
+            for row in region.first.0..region.last.0 {
+                for column in
+                    (region.first.1..region.last.1).filter(|&column| members[[row, column]] == number)
+                {
+                    let phase = (row % 2) * 2 + column % 2;
+                    let (level, fraction) = slab.level(blur_px[[row, column]].abs());
+                    let (lower, upper) = (&kernels[level][phase], &kernels[level + 1][phase]);
+                    for ((blend, lower), upper) in kernel.iter_mut().zip(lower).zip(upper) {
+                        for lane in 0..LANES {
+                            blend[lane] = lower[lane] + fraction * (upper[lane] - lower[lane]);
                         }
-                        &blended[..side]
                     }
-                    _ => &kernels[0][phase][..],
-                };
-                let start = (row / 2 + corner) * stride + column / 2 + corner;
-                add_kernel(&mut sums.light[start..], stride, kernel, self.radiance[[row, column]]);
-                if slab.needs_cover {
-                    add_kernel(&mut sums.cover[start..], stride, kernel, 1.0);
+                    let start = (row / 2 + corner) * stride + column / 2 + corner;
+                    add_kernel(&mut light[start..], stride, &kernel[..side], self.radiance[[row, column]]);
+                    add_kernel(&mut cover[start..], stride, &kernel[..side], 1.0);
                 }
             }
         }
-        sums
+        let image = s![border_px..border_px + height, border_px..border_px + width];
+        Sums { first: (0, 0), light: light.slice_move(image), cover: Some(cover.slice_move(image)) }
     }
 
     /// Light and cover by FFT: one convolution per level; each cell is shared between two levels.
@@ -184,10 +219,9 @@ impl Cells {
         for (index, &radius) in slab.radii_px.iter().enumerate() {
             let mut field = vec![Complex32::default(); height * width];
             for ((row, column), &radiance) in self.radiance.indexed_iter() {
-                let share = match &self.blur_px {
-                    Blur::Uniform(_) => 1.0,
-                    Blur::Varying(_) if slab.radii_px.len() == 1 => 1.0,
-                    Blur::Varying(blur) => match slab.level(blur[[row, column]].abs()) {
+                let share = match slab.radii_px.len() {
+                    1 => 1.0,
+                    _ => match slab.level(self.blur_px.at([row, column]).abs()) {
                         (level, fraction) if level == index => 1.0 - fraction,
                         (level, fraction) if level + 1 == index => fraction,
                         _ => continue,
@@ -212,21 +246,13 @@ impl Cells {
             }
         }
         fourier.inverse(&mut total);
-        let mut sums = Sums::new(self.image_size(), self.margin_px, 0, slab.needs_cover);
         let scale = 0.25 / (height * width) as f32;
-        let (image_height, image_width) = self.image_size();
-        for row in 0..image_height {
-            for column in 0..image_width {
-                let first = (row + self.margin_px) * 2 * width + (column + self.margin_px) * 2;
-                let cells = total[first] + total[first + 1] + total[first + width] + total[first + width + 1];
-                let place = (row + sums.border_px) * sums.stride + column + sums.border_px;
-                sums.light[place] = cells.re * scale;
-                if slab.needs_cover {
-                    sums.cover[place] = cells.im * scale;
-                }
-            }
-        }
-        sums
+        let pixels = Array2::from_shape_fn(self.image_size(), |(row, column)| {
+            let first = (row + self.margin_px) * 2 * width + (column + self.margin_px) * 2;
+            (total[first] + total[first + 1] + total[first + width] + total[first + width + 1]) * scale
+        });
+        let cover = slab.needs_cover.then(|| pixels.map(|sum| sum.im));
+        Sums { first: (0, 0), light: pixels.map(|sum| sum.re), cover }
     }
 }
 
@@ -262,25 +288,6 @@ fn levels(least: f32, widest: f32) -> Vec<f32> {
     let spacing = LEVEL_PX.max(LEVEL_RATIO * widest);
     let count = ((widest - least) / spacing).ceil().max(1.0);
     (0..=count as usize).map(|index| least + (widest - least) * index as f32 / count).collect()
-}
-
-fn distinct_values(blur: &Array2<f32>) -> Option<Vec<f32>> {
-    let mut values: Vec<f32> = Vec::new();
-    let mut last = f32::NAN;
-    for &b in blur {
-        if b == last {
-            continue;
-        }
-        last = b;
-        let place = values.partition_point(|&value| value < b);
-        if values.get(place) != Some(&b) {
-            if values.len() == MAX_EXACT_LEVELS {
-                return None;
-            }
-            values.insert(place, b);
-        }
-    }
-    Some(values)
 }
 
 struct Slab {

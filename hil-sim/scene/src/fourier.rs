@@ -1,7 +1,11 @@
 //! Two-dimensional row-major FFTs by rustfft's scalar planner: vector ones round per CPU, but a seed fixes the image.
 
+use rayon::prelude::*;
 use rustfft::FftPlannerScalar;
 use rustfft::num_complex::Complex32;
+
+/// Rows that a thread takes at a time.
+const ROWS: usize = 16;
 
 pub(crate) struct Fourier2 {
     pub(crate) height: usize,
@@ -31,24 +35,25 @@ impl Fourier2 {
     }
 
     fn run(&mut self, data: &mut [Complex32], rows: &dyn rustfft::Fft<f32>, columns: &dyn rustfft::Fft<f32>) {
-        rows.process(data);
+        let process = |data: &mut [Complex32], length: usize, each: &dyn rustfft::Fft<f32>| {
+            data.par_chunks_mut(ROWS * length).for_each(|rows| each.process(rows));
+        };
+        process(data, self.width, rows);
         transpose(data, &mut self.scratch, self.height, self.width);
-        columns.process(&mut self.scratch);
+        process(&mut self.scratch, self.height, columns);
         transpose(&self.scratch, data, self.width, self.height);
     }
 }
 
 fn transpose(from: &[Complex32], to: &mut [Complex32], height: usize, width: usize) {
-    const BLOCK: usize = 16;
-    for row_block in (0..height).step_by(BLOCK) {
-        for column_block in (0..width).step_by(BLOCK) {
-            for row in row_block..(row_block + BLOCK).min(height) {
-                for column in column_block..(column_block + BLOCK).min(width) {
-                    to[column * height + row] = from[row * width + column];
-                }
+    to.par_chunks_mut(ROWS * height).zip((0..width).into_par_iter().step_by(ROWS)).for_each(|(to, first)| {
+        for row in 0..height {
+            let from = &from[row * width + first..(row + 1) * width];
+            for (to, from) in to.chunks_exact_mut(height).zip(from) {
+                to[row] = *from;
             }
         }
-    }
+    });
 }
 
 /// Smallest even size of at least `least` without prime factors above 5.

@@ -17,6 +17,7 @@ pub mod camera;
 mod composite;
 pub mod defects;
 mod fourier;
+mod gather;
 pub mod kernel;
 pub mod lens;
 pub mod maps;

@@ -1,9 +1,9 @@
 //! One exposure of a scene from texture, depth, blur and noise.
 
-use ndarray::Array2;
+use ndarray::{Array2, s};
 use thiserror::Error;
 
-use crate::blur::{Blur, Cells, kernel_reach_px};
+use crate::blur::{Blur, Cells, MAX_EXACT_LEVELS, kernel_reach_px};
 use crate::camera::{Camera, CameraError};
 use crate::kernel::CELLS_PER_PIXEL;
 use crate::lens::{Lens, LensError};
@@ -91,12 +91,46 @@ enum Paint {
     Picture(Picture),
 }
 
-/// Image distance of the surface relative to the far setting's sensor distance, mm.
+/// Image distance of the surface relative to the far setting's sensor distance, mm; one value per cell of the image and
+/// [`KEPT_MARGIN_PX`] around it.
 #[derive(Debug, Clone)]
 enum Surface {
     Plane(f64),
-    /// One value per cell of the image and [`KEPT_MARGIN_PX`] around it.
+    /// A few distances, nearest surface first, and the index of each cell's.
+    Levels(Vec<f32>, Array2<u8>),
     Field(Array2<f32>),
+}
+
+impl Surface {
+    fn of(field: Array2<f32>) -> Self {
+        match distinct_values(&field) {
+            Some(values) => {
+                let index = field.map(|offset| values.partition_point(|value| value > offset) as u8);
+                Self::Levels(values, index)
+            }
+            None => Self::Field(field),
+        }
+    }
+}
+
+/// The values of a field, descending, if they are no more than [`MAX_EXACT_LEVELS`].
+fn distinct_values(field: &Array2<f32>) -> Option<Vec<f32>> {
+    let mut values: Vec<f32> = Vec::new();
+    let mut last = f32::NAN;
+    for &value in field {
+        if value == last {
+            continue;
+        }
+        last = value;
+        let place = values.partition_point(|&known| known > value);
+        if values.get(place) != Some(&value) {
+            if values.len() == MAX_EXACT_LEVELS {
+                return None;
+            }
+            values.insert(place, value);
+        }
+    }
+    Some(values)
 }
 
 impl Renderer {
@@ -120,7 +154,7 @@ impl Renderer {
             Shape::Plane { depth_mm } if lens.distortion.is_none() => {
                 Surface::Plane(lens.image_distance_mm(depth_mm)? - lens.sensor_far_mm)
             }
-            _ => Surface::Field(image_field(scene, lens, camera, KEPT_MARGIN_PX, &View::default())?),
+            _ => Surface::of(image_field(scene, lens, camera, KEPT_MARGIN_PX, &View::default())?),
         };
         Ok(Self {
             scene: scene.clone(),
@@ -187,11 +221,13 @@ impl Renderer {
         let blur_px = |offset_mm: f64| {
             self.lens.signed_blur_px(sensor_distance_mm - self.lens.sensor_far_mm, offset_mm) as f32
         };
+        let widest = |offsets: &mut dyn Iterator<Item = &f32>| {
+            offsets.map(|&offset_mm| blur_px(offset_mm.into()).abs()).fold(0.0, f32::max)
+        };
         let widest_px = match &self.surface {
             Surface::Plane(offset_mm) => blur_px(*offset_mm).abs(),
-            Surface::Field(field) => {
-                field.iter().map(|&offset_mm| blur_px(f64::from(offset_mm)).abs()).fold(0.0, f32::max)
-            }
+            Surface::Levels(offsets, _) => widest(&mut offsets.iter()),
+            Surface::Field(offsets) => widest(&mut offsets.iter()),
         };
         if f64::from(widest_px) > MAX_BLUR_PX {
             return Err(RenderError::Blur {
@@ -204,17 +240,23 @@ impl Renderer {
         }
         let view = self.view_at(sensor_distance_mm);
         let margin_px = kernel_reach_px(&self.psf, widest_px).max(1);
-        let blur_px = match &self.surface {
+        let kept = margin_px <= KEPT_MARGIN_PX && view == View::default();
+        let wider = match &self.surface {
+            Surface::Plane(_) => None,
+            _ if kept => None,
+            _ => Some(Surface::of(image_field(&self.scene, &self.lens, &self.camera, margin_px, &view)?)),
+        };
+        let skip = if kept { (KEPT_MARGIN_PX - margin_px) * CELLS_PER_PIXEL } else { 0 };
+        let (rows, columns) = cell_grid(&self.camera, margin_px);
+        let place = s![skip..skip + rows, skip..skip + columns];
+        let blur_px = match wider.as_ref().unwrap_or(&self.surface) {
             Surface::Plane(offset_mm) => Blur::Uniform(blur_px(*offset_mm)),
-            Surface::Field(kept) => {
-                let field = if margin_px <= KEPT_MARGIN_PX && view == View::default() {
-                    let skip = (KEPT_MARGIN_PX - margin_px) * CELLS_PER_PIXEL;
-                    let (rows, columns) = kept.dim();
-                    kept.slice(ndarray::s![skip..rows - skip, skip..columns - skip]).to_owned()
-                } else {
-                    image_field(&self.scene, &self.lens, &self.camera, margin_px, &view)?
-                };
-                Blur::Varying(field.mapv_into(|offset_mm| blur_px(f64::from(offset_mm))))
+            Surface::Levels(offsets, index) => {
+                let radii = offsets.iter().map(|&offset_mm| blur_px(offset_mm.into())).collect();
+                Blur::Levels(radii, index.slice(place))
+            }
+            Surface::Field(offsets) => {
+                Blur::Varying(offsets.slice(place).map(|&offset_mm| blur_px(offset_mm.into())))
             }
         };
         Ok(Cells { margin_px, radiance: self.cell_radiance(margin_px, &view), blur_px }.blurred(&self.psf))
@@ -235,10 +277,18 @@ impl Renderer {
             Paint::Random(period) => {
                 let (height, width) = period.dim();
                 let margin = (margin_px * CELLS_PER_PIXEL) as isize;
-                let wrap = |index: usize, period: usize| {
-                    (index as isize - margin).rem_euclid(period as isize) as usize
-                };
-                Array2::from_shape_fn(size, |(row, column)| period[[wrap(row, height), wrap(column, width)]])
+                let first = |period: usize| (-margin).rem_euclid(period as isize) as usize;
+                let rows = (0..height).cycle().skip(first(height)).take(size.0);
+                let mut cells = Vec::with_capacity(size.0 * size.1);
+                for row in rows.filter_map(|row| period.row(row).to_slice()) {
+                    let (mut column, end) = (first(width), cells.len() + size.1);
+                    while cells.len() < end {
+                        let count = (width - column).min(end - cells.len());
+                        cells.extend_from_slice(&row[column..column + count]);
+                        column = 0;
+                    }
+                }
+                Array2::from_shape_vec(size, cells).unwrap_or_default()
             }
             Paint::Picture(picture) => Array2::from_shape_fn(size, |cell| {
                 let (width, height) = (self.camera.width_px as f64, self.camera.height_px as f64);

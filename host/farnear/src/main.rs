@@ -217,11 +217,15 @@ mod tests {
             let fields = schema["properties"].as_object().expect("a struct");
             let names = |keys: Vec<&String>| keys.into_iter().cloned().collect::<BTreeSet<_>>();
             assert_eq!(names(options.keys().collect()), names(fields.keys().collect()), "{}", task.name);
+            let words = |text: &str| text.split_whitespace().collect::<Vec<_>>().join(" ");
+            let help = found.get_long_about().or(found.get_about()).map(ToString::to_string);
+            let about = words(schema["description"].as_str().unwrap_or_default());
+            let help = words(&help.unwrap_or_default());
+            assert_eq!(help.trim_end_matches('.'), about.trim_end_matches('.'), "{}", task.name);
             for (name, option) in options {
                 let field = &fields[&name];
                 let help = option.get_long_help().or(option.get_help()).map(ToString::to_string);
                 let help = help.unwrap_or_else(|| panic!("{}: {name} has no help", task.name));
-                let words = |text: &str| text.split_whitespace().collect::<Vec<_>>().join(" ");
                 let about = words(field["description"].as_str().unwrap_or_default());
                 assert_eq!(words(&help), about.trim_end_matches('.'), "{}: {name}", task.name);
                 let default = option.get_default_values().first().map(|value| value.to_string_lossy());

@@ -9,7 +9,7 @@ use crate::{
     report, terminal,
 };
 
-// No doc comments: the help text of a command is that of its request.
+// A task. Not a doc comment on these three: the help text of a command is that of its request.
 #[allow(missing_docs)]
 #[derive(Args)]
 pub struct Run<R: Request + Args> {
@@ -30,7 +30,7 @@ impl<R: Request + Args> Run<R> {
     }
 }
 
-/// A task of a rig.
+// A task of a rig.
 #[allow(missing_docs)]
 #[derive(Args)]
 pub struct RigRun<R: RigRequest + Args> {
@@ -48,7 +48,7 @@ impl<R: RigRequest + Args> RigRun<R> {
     }
 }
 
-/// A task of a rig with a camera.
+// A task of a rig with a camera.
 #[allow(missing_docs)]
 #[derive(Args)]
 pub struct CameraRun<R: CameraRequest + Args> {

@@ -82,19 +82,25 @@ pub fn watch(
     let mut stream = Continuous::start(&rig.client, camera.as_mut(), &shots, pace, wait)?;
     let mut cycles = Cycles::of(&shots);
     let mut shown: Option<Instant> = None;
-    while let Some(outcome) = stream.outcome()? {
+    // Time spent waiting for the camera since then.
+    let mut waited = Duration::ZERO;
+    loop {
+        let asked = Instant::now();
+        let Some(outcome) = stream.outcome()? else { break };
+        waited += asked.elapsed();
         context.cancel.check("watching depth")?;
         let Outcome::Taken(frame) = outcome else { continue };
         let Some([far, near]) = cycles.push(*frame).and_then(|cycle| <[Frame; 2]>::try_from(cycle).ok())
         else {
             continue;
         };
-        // Skip old pairs if this computer is slower than the rig, but show some however slow it is.
-        if stream.waiting()? >= shots.len() && shown.is_some_and(|shown| shown.elapsed() < PASSED_OVER) {
+        // Skip old pairs if this computer is slower than rig and camera, but show some however slow it is.
+        let skips = |shown: Instant| shown.elapsed() < PASSED_OVER && waited < shown.elapsed() / 10;
+        if stream.waiting()? >= shots.len() && shown.is_some_and(skips) {
             continue;
         }
         let arrived = Instant::now();
-        shown = Some(arrived);
+        (shown, waited) = (Some(arrived), Duration::ZERO);
         depths.set_coding(0.5 * (far.image.coding_variance + near.image.coding_variance));
         let Some(found) = measure(&mut depths, [&far, &near].map(|frame| frame.image.grey()))? else {
             continue;
