@@ -198,4 +198,54 @@ mod tests {
         assert_eq!(middle(ndarray::array![[5.0, 1.0], [9.0, 3.0]].view()), 5.0);
         assert_eq!(middle(Array2::zeros((0, 4)).view()), 0.0);
     }
+
+    #[test]
+    fn the_window_is_round_and_its_weight_is_that_of_the_distance() {
+        // Every second pixel within 15 px, every pixel within 6 px.
+        for (reach_px, count, stride, weight) in [(6.0_f32, 177, 2, 0.945_96), (2.5, 113, 1, 0.923_12)] {
+            let offsets = offsets(reach_px);
+            assert_eq!(offsets.len(), count);
+            let of = |down: isize, across: isize| {
+                offsets.iter().find(|o| (o.0, o.1) == (down, across)).map(|o| o.2)
+            };
+            assert_eq!(of(0, 0), Some(1.0));
+            for found in [of(0, stride), of(-stride, 0)] {
+                assert!((found.unwrap() - weight).abs() < 1e-4, "{found:?}");
+            }
+            assert_eq!(of(0, 1).is_some(), stride == 1);
+        }
+    }
+
+    /// What a wrong place in the middle becomes where every third column has the place 2 and the others 9.
+    fn decided(
+        sharp: impl Fn(bool) -> f32,
+        sharpness: impl Fn(bool) -> f32,
+        rise: impl Fn(bool) -> f32,
+    ) -> f32 {
+        // A reach of 3 px: the window takes every column.
+        let map = |of: &dyn Fn(bool) -> f32| Array2::from_shape_fn(SIZE, |(_, x)| of(x % 3 == 0));
+        let (mut sharp, sharpness) = (map(&sharp), map(&sharpness));
+        // Contrast of the image beyond the window.
+        sharp.slice_mut(ndarray::s![.., ..18]).fill(0.1);
+        sharp.slice_mut(ndarray::s![.., 42..]).fill(0.9);
+        let mut place = map(&|third| if third { 2.0 } else { 9.0 });
+        place[(20, 30)] = 0.0; // among the smaller ones, as its column is
+        let guide = Guide { sharp: sharp.view(), sharpness: sharpness.view(), reach_px: 3.0, images: 12 };
+        mended(place.view(), map(&rise), &guide)[(20, 30)]
+    }
+
+    #[test]
+    fn brightness_sharpness_and_rise_weigh_as_documented() {
+        // A third of the places wins if each weighs twice as much as another.
+        let same = |_: bool| 0.5;
+        let either = |third: f32, other: f32| move |is: bool| if is { third } else { other };
+        // By brightness at exp(-d^2 / 2) = 1/2, d = 1.18 times a quarter of the image's standard deviation, 0.31.
+        assert_eq!(decided(either(0.5, 0.5 + 0.085), same, same).round(), 9.0);
+        assert_eq!(decided(either(0.5, 0.5 + 0.097), same, same).round(), 2.0);
+        // By sharpness s relative to the median: 0.2 / (s + 0.2) is twice 0.2 / 1.2 at s = 0.4.
+        assert_eq!(decided(same, either(0.43, 1.0), same).round(), 9.0);
+        assert_eq!(decided(same, either(0.37, 1.0), same).round(), 2.0);
+        assert_eq!(decided(same, same, either(0.5, 0.26)).round(), 9.0);
+        assert_eq!(decided(same, same, either(0.5, 0.24)).round(), 2.0);
+    }
 }

@@ -468,4 +468,23 @@ mod tests {
             }
         }
     }
+
+    #[test]
+    fn a_blurred_point_is_a_gaussian_and_a_ramp_has_its_slope() {
+        let mut point = Array2::zeros((41, 41));
+        point[(20, 20)] = 1.0;
+        let blurred = blurred(point.view(), 3.0);
+        assert!((blurred.sum() - 1.0).abs() < 1e-5);
+        for ((down, across), sds) in
+            [((3, 0), 1.0_f32), ((0, 3), 1.0), ((6, 0), 2.0), ((3, 3), 2.0_f32.sqrt())]
+        {
+            let ratio = blurred[(20 + down, 20 + across)] / blurred[(20, 20)];
+            assert!((ratio - (-0.5 * sds * sds).exp()).abs() < 1e-5, "{ratio}");
+        }
+        assert_eq!((blur_reach_px(3.0), blur_reach_px(0.5), blurred[(20, 30)]), (9, 2, 0.0));
+        let ramp = Array2::from_shape_fn((20, 20), |(y, x)| 0.3 * x as f32 + 0.1 * y as f32);
+        let slopes = derivatives(ramp.view()).map(|map| map[(10, 10)].abs());
+        // The Gaussian ends at 4 of its standard deviations.
+        assert!((slopes[0] - 0.3).abs() < 3e-3 && (slopes[1] - 0.1).abs() < 1e-3, "{slopes:?}");
+    }
 }

@@ -30,6 +30,53 @@ fn the_tip_is_fitted_over_uneven_positions() {
     }
 }
 
+/// Expected: numpy's `polyfit` with the square roots of the weights of `tip`.
+#[test]
+fn place_and_reliability_are_those_of_weighted_least_squares() {
+    let positions = [0.0, 1.0, 2.5, 3.0, 5.0, 6.5, 7.5];
+    let curve = [0.2, 0.5, 0.9, 1.0, 0.7, 0.3, 0.1];
+    let gap = [0.2, 0.5, 0.9, 1.0, 0.7, f32::NAN, 0.1];
+    for (curve, fit_points, position, reliability) in [
+        (curve, 5, 3.379_715_1, 0.470_045_47),
+        (curve, 7, 3.403_125_5, 0.468_764_46),
+        (gap, 5, 3.397_404_5, 0.432_171_93),
+        (gap, 7, 3.416_134_2, 0.431_725_13),
+        ([0.3, f32::NAN, 0.9, 1.0, 0.4, 0.5, 0.2], 7, 3.503_071_1, 0.341_238_81),
+    ] {
+        let found = tip(&curve, &positions, fit_points);
+        assert!((f64::from(found.place) - place_of(&positions, position)).abs() < 1e-5, "{found:?}");
+        assert!((found.reliability - reliability).abs() < 1e-5 && found.sharpness == 1.0, "{found:?}");
+    }
+}
+
+#[test]
+fn a_curve_with_two_peaks_or_a_minimum_is_unreliable_but_rises() {
+    // Its parabola has a maximum 3.5 images from the largest value; then none at all.
+    let positions = [0.0, 1.0, 2.5, 3.0, 5.0, 6.5, 7.5];
+    let far = [0.3, f32::NAN, 0.9, 1.0, 0.4, 0.5, 0.2];
+    let two = [0.1, 0.2, 0.95, 0.9, 0.93, 1.0, 0.97, 0.1, 0.1];
+    for (found, largest, rise) in
+        [(tip(&far, &positions, 5), 3.0, 0.45), (tip(&two, &even(9), 7), 5.0, 0.416_666)]
+    {
+        assert_eq!((found.place, found.reliability), (largest, 0.0));
+        assert!((found.rise - rise).abs() < 1e-5, "{found:?}");
+    }
+}
+
+#[test]
+fn a_curve_without_a_tip_says_how_far_it_rises_where_it_was_seen() {
+    let unseen = f32::NAN;
+    let rise = |curve: &[f32]| tip(curve, &even(curve.len()), 5).rise;
+    assert_eq!(rise(&[0.0; 5]), 0.0);
+    // Sharpest at either end.
+    assert_eq!((rise(&[1.0, 0.5, 0.5, 0.0]), rise(&[0.5, 0.5, 0.0, 1.0])), (0.5, 0.5));
+    // Seen by fewer than half, by half, but not next to the sharpest image.
+    assert_eq!(rise(&[unseen, unseen, unseen, 0.25, 1.0, 0.25, unseen]), 0.0);
+    assert_eq!(rise(&[unseen, unseen, unseen, 0.25, 1.0, 0.25]), 0.5);
+    assert_eq!(rise(&[0.1, 0.2, 1.0, unseen, 0.3, 0.1]), 0.0);
+    assert_eq!(rise(&[0.1, unseen, 1.0, 0.2, 0.3, 0.1]), 0.0);
+}
+
 #[test]
 fn images_that_did_not_see_a_pixel_do_not_count() {
     let unseen = f32::NAN;
@@ -63,6 +110,7 @@ fn a_border_that_few_images_saw_has_no_depth() {
     let wrong =
         |positions: &[f64]| depth_from_positions(&views[..], positions, &StackSettings::default()).is_err();
     assert!(wrong(&[0.0, 1.0, 2.0]) && wrong(&[0.0, 1.0, 2.0, 3.0, 3.0, 4.0, 5.0]));
+    assert!(wrong(&[1.0; 7]) && wrong(&[0.0, 2.0, 1.0, 3.0, 2.0, 4.0, 3.0]));
 }
 
 #[test]
@@ -314,4 +362,15 @@ fn settings_are_valid_up_to_their_limits() {
     let views = [small.view(), small.view(), small.view()];
     assert!(check(&views[..], &StackSettings::default()).is_err());
     assert!(check(&views[..], &StackSettings { window_px: 7, ..StackSettings::default() }).is_ok());
+}
+
+#[test]
+fn the_sharp_image_is_put_together_across_bands() {
+    let images: Vec<_> = [0.0, 100.0, 200.0]
+        .map(|base| Array2::from_shape_fn((7, 3), |(y, x)| base + (3 * y + x) as f32))
+        .into();
+    let views: Vec<_> = images.iter().map(|image| image.view()).collect();
+    let place = Array2::from_shape_fn((7, 3), |(y, _)| (y % 3) as f32);
+    let sharp = sharp_everywhere(&views[..], &place, 2).unwrap();
+    assert_eq!(sharp, Array2::from_shape_fn((7, 3), |(y, x)| (100 * (y % 3) + 3 * y + x) as f32));
 }

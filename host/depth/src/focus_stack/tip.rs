@@ -111,3 +111,56 @@ impl Parabola {
         (c < 0.0 && total > 0.0).then(|| (-b / (2.0 * c), explained / total))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// `v = 2 + t - 3 t^2` at these places, with errors that are orthogonal to all parabolas.
+    fn parabola(weight: f64, errors: [f64; 4]) -> Parabola {
+        let mut parabola = Parabola::default();
+        for (t, error) in [-1.0, 0.0, 1.0, 2.0].into_iter().zip(errors) {
+            parabola.add(t, 2.0 + t - 3.0 * t * t + error, weight);
+        }
+        parabola
+    }
+
+    #[test]
+    fn the_tip_and_the_explained_part_do_not_depend_on_the_unit_of_the_weights() {
+        // Values -2, 2, 0, -8: their mean is -2, the squares about it sum to 56; the errors' squares to 20.
+        for weight in [1e-4, 1.0, 1e4] {
+            let (tip, explained) = parabola(weight, [0.0; 4]).tip().unwrap();
+            assert!((tip - 1.0 / 6.0).abs() < 1e-9 && (explained - 1.0).abs() < 1e-9, "{tip} {explained}");
+            let (tip, explained) = parabola(weight, [-1.0, 3.0, -3.0, 1.0]).tip().unwrap();
+            assert!(
+                (tip - 1.0 / 6.0).abs() < 1e-9 && (explained - 56.0 / 76.0).abs() < 1e-9,
+                "{tip} {explained}"
+            );
+        }
+    }
+
+    #[test]
+    fn two_places_a_constant_or_a_minimum_have_no_tip() {
+        let of = |samples: &[(f64, f64)]| {
+            let mut parabola = Parabola::default();
+            samples.iter().for_each(|&(t, v)| parabola.add(t, v, 1.0));
+            parabola.tip()
+        };
+        assert_eq!(of(&[(0.0, 1.0), (1.0, 2.0), (1.0, 3.0)]), None);
+        assert_eq!(of(&[(-1.0, 1.0), (0.0, 1.0), (1.0, 1.0)]), None);
+        assert_eq!(of(&[(-1.0, 1.0), (0.0, 0.5), (1.0, 2.0)]), None);
+        assert!(of(&[(-1.0, 1.0), (0.0, 1.5), (1.0, 1.2)]).is_some());
+    }
+
+    #[test]
+    fn places_lie_between_the_images_in_either_direction() {
+        for sign in [1.0, -1.0] {
+            let positions = [2.0, 3.0, 5.0, 9.0].map(|position| sign * position);
+            for (position, place) in
+                [(0.0, 0.0), (2.0, 0.0), (2.25, 0.25), (3.0, 1.0), (6.0, 2.25), (9.0, 3.0), (20.0, 3.0)]
+            {
+                assert_eq!(place_of(&positions, sign * position), place, "{position}");
+            }
+        }
+    }
+}
