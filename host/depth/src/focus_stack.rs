@@ -137,7 +137,8 @@ pub fn depth_from_positions<S: Slices + ?Sized>(
             reach_px: settings.guided_px,
             images: count,
         };
-        place = mended(place.view(), rise, &guide);
+        let height = place.nrows();
+        place = mended(place.view(), rise, &guide, |rows| images.measured(rows, height))?;
         all_in_focus = sharp_everywhere(images, &place, band)?;
     }
     place.zip_mut_with(&reliability, |place, reliability| {

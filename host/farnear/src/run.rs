@@ -2,7 +2,10 @@
 
 use anyhow::Result;
 use clap::Args;
-use farnear_workflows::request::{CameraRequest, Request, RigRequest};
+use farnear_workflows::{
+    Context,
+    request::{CameraRequest, Request, RigRequest},
+};
 
 use crate::{
     commands::rig::target::{CameraArguments, Target},
@@ -22,9 +25,14 @@ pub struct Run<R: Request + Args> {
 
 impl<R: Request + Args> Run<R> {
     pub fn run(self) -> Result<()> {
+        let context = terminal::computing(self.json)?;
+        self.run_in(&context)
+    }
+
+    fn run_in(self, context: &Context<'_>) -> Result<()> {
         let Self { request, json } = self;
         request.check()?;
-        let figures = request.run(&terminal::counting(json)?)?;
+        let figures = request.run(context)?;
         report::print(&figures, json)?;
         Ok(R::verdict(&figures)?)
     }
@@ -44,7 +52,8 @@ impl<R: RigRequest + Args> RigRun<R> {
     pub fn run(self) -> Result<()> {
         let Self { target, mut task } = self;
         task.request.set_rig(target.address()?);
-        task.run()
+        let context = terminal::counting(task.json)?;
+        task.run_in(&context)
     }
 }
 
@@ -65,6 +74,7 @@ impl<R: CameraRequest + Args> CameraRun<R> {
         let Self { target, camera, mut task } = self;
         task.request.set_rig(target.address()?);
         task.request.set_camera(camera.settings()?);
-        task.run()
+        let context = terminal::counting(task.json)?;
+        task.run_in(&context)
     }
 }

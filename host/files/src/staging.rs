@@ -5,6 +5,7 @@ use std::{
     fs::{self, File},
     io::{self, BufWriter, Write},
     path::{Path, PathBuf},
+    sync::{Mutex, MutexGuard, PoisonError},
     time::Duration,
 };
 
@@ -30,6 +31,25 @@ const JUST_BEGUN: Duration = Duration::from_secs(10);
 const LEFT_BEHIND_MAX: u32 = 100;
 
 const BUFFER_BYTES: usize = 1 << 18;
+
+/// Folders of this process that are not published, and the targets created for them. Locked while something is published.
+static UNPUBLISHED: Mutex<Vec<(PathBuf, Option<PathBuf>)>> = Mutex::new(Vec::new());
+
+fn unpublished() -> MutexGuard<'static, Vec<(PathBuf, Option<PathBuf>)>> {
+    UNPUBLISHED.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Before the process exits in the middle of its work: waits for what is being published, then removes everything that is
+/// not. Staging after it waits forever.
+pub fn abandon_all() {
+    let mut folders = unpublished();
+    for (folder, target) in folders.drain(..) {
+        // Another thread may still write into it.
+        let _ = (0..3).find(|_| fs::remove_dir_all(&folder).is_ok());
+        let _ = target.map(fs::remove_dir); // fails if it is not empty, as intended
+    }
+    std::mem::forget(folders);
+}
 
 /// A folder that appears under its name once complete. Dropping it earlier removes everything.
 #[derive(Debug)]
@@ -88,6 +108,7 @@ impl Staging {
         }
         sweep(folder.parent().unwrap_or(Path::new(".")));
         fs::create_dir(&free).map_err(StagingError::at(&target))?;
+        unpublished().push((free.clone(), made_target.then(|| target.clone())));
         let in_use = File::open(&free).ok().filter(|folder| folder.try_lock().is_ok());
         let (replaced, record) = (Vec::new(), None);
         Ok(Self { folder: free, _in_use: in_use, target, made_target, replaced, record })
@@ -123,6 +144,8 @@ impl Staging {
 
     /// Publishes everything: a new folder with one rename, files with one rename each.
     pub fn finish(self) -> Result<(), StagingError> {
+        // Released before `self` is dropped.
+        let _publishing = unpublished();
         let into_folder = self.folder.parent() == Some(self.target.as_path());
         if !into_folder {
             if occupied(&self.target) {
@@ -163,6 +186,7 @@ impl Drop for Staging {
     fn drop(&mut self) {
         // Nothing is left after `finish` of a new folder.
         let _ = fs::remove_dir_all(&self.folder);
+        unpublished().retain(|(folder, _)| *folder != self.folder);
         if self.made_target {
             // Fails if it is not empty, as intended.
             let _ = fs::remove_dir(&self.target);
@@ -174,6 +198,7 @@ impl Drop for Staging {
 pub fn write_file(path: &Path, bytes: &[u8]) -> Result<(), StagingError> {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     let partial = path.with_file_name(partial_name(&name));
+    let _publishing = unpublished();
     let written = fs::write(&partial, bytes).and_then(|()| fs::rename(&partial, path));
     written.map_err(|source| {
         let _ = fs::remove_file(&partial);

@@ -1,5 +1,5 @@
 // The captures of the session: pictures, notes and downloads.
-import { act, get, on, store } from "./link.js";
+import { act, ended, get, on, store } from "./link.js";
 import { ask, h, button, choice, notice, number } from "./ui.js";
 
 /** Makes the view. `open(name)` shows a capture's depth. */
@@ -9,16 +9,32 @@ export function make(host, open) {
   const list = h("ul", { class: "captures" });
   host.append(h("div", { class: "toolbar" }, search, count), list);
   const kinds = choice([["", "all kinds"], ["pair", "pairs"], ["sequence", "stills and stacks"], ["depth", "with depth"], ["rated", "rated"]], "", () => refresh(), { "aria-label": "Show" });
-  search.after(kinds);
+  /** Depth of all shown pairs that have none, for a series; ends where one fails or is stopped. */
+  const measure = button("Compute depth of all", async () => {
+    const pairs = shown.filter((capture) => capture.kind === "pair" && !capture.has_depth && !capture.broken).reverse();
+    if (!pairs.length) notice("All pairs that are shown here have a depth.", "info");
+    measure.disabled = true;
+    for (const [at, { name }] of pairs.entries()) {
+      measure.textContent = `Depth ${at + 1} of ${pairs.length}`;
+      const begun = await act(`/api/captures/${encodeURIComponent(name)}/depth`, { uncertainty: "estimated" });
+      if (!begun || (await ended("computation", begun.job)).phase !== "done") break;
+    }
+    measure.disabled = false;
+    measure.textContent = "Compute depth of all";
+    refresh();
+  }, { title: "Of the pairs shown here that have none" });
+  search.after(kinds, measure);
   const wanted = (capture) => !kinds.value || kinds.value === capture.kind || (kinds.value === "depth" && capture.has_depth) || (kinds.value === "rated" && capture.note.rating > 0);
   let waiting = 0;
+  let shown = [];
   search.addEventListener("input", () => { clearTimeout(waiting); waiting = setTimeout(refresh, 200); });
 
   async function refresh() {
     try {
       const { captures } = await get(`/api/captures?search=${encodeURIComponent(search.value)}`);
       count.textContent = captures.length === 1 ? "1 capture" : `${captures.length} captures`;
-      list.replaceChildren(...captures.filter(wanted).sort((a, b) => b.written_unix_s - a.written_unix_s || b.name.localeCompare(a.name)).map((capture) => card(capture, open)));
+      shown = captures.filter(wanted).sort((a, b) => b.written_unix_s - a.written_unix_s || b.name.localeCompare(a.name));
+      list.replaceChildren(...shown.map((capture) => card(capture, open)));
       if (!captures.length) list.append(h("li", { class: "empty" }, search.value ? "Nothing holds all of these words." : "Nothing captured yet."));
     } catch (error) {
       notice(error.message, "error", error.hint);

@@ -220,6 +220,24 @@ test("captures: newest first, names with blanks and &, rename, delete, filter; B
   await page.context().close();
 });
 
+test("the depth of a whole series is computed from the captures", async () => {
+  const page = await open(browser, server.address);
+  await page.locator("#who", { hasText: "you have control" }).waitFor();
+  const begun = await post(page, "/api/captures", { kind: "series", pairs: 2 });
+  await page.waitForFunction(async (id) => {
+    const { store } = await import("/link.js");
+    return store.state.job?.id === id && store.state.job.phase === "done";
+  }, begun.job);
+  await page.locator("#tab-captures").click();
+  await page.getByLabel("Show", { exact: true }).selectOption("pair");
+  await page.getByRole("button", { name: "Compute depth of all" }).click();
+  await page.waitForFunction((names) => names.every((name) => document.querySelector(`.capture-card img[src="/api/captures/${name}/files/view.png"]`)), begun.names);
+  await page.getByRole("button", { name: "Compute depth of all" }).click();
+  await page.locator(".notice", { hasText: "All pairs that are shown here have a depth." }).waitFor();
+  assert.deepEqual(page.complaints, []);
+  await page.context().close();
+});
+
 test("two regions give the step between them, and a profile is saved as CSV", async () => {
   const page = await open(browser, `${server.address}#depth/pair-001`);
   await page.locator("canvas[data-layer=depth]").waitFor();

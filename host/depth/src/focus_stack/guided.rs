@@ -26,6 +26,8 @@ const CONFIRMED: f32 = 1.0;
 /// Steps of the table of weights over the brightness, and of its end in standard deviations.
 const STEPS: f32 = 16.0;
 const END: f32 = 4.0;
+/// Pixels between two calls of `after`: about 0.1 s.
+const BAND_PX: usize = 1 << 18;
 
 /// What the places are corrected by; all (height, width).
 pub(super) struct Guide<'a> {
@@ -40,7 +42,13 @@ pub(super) struct Guide<'a> {
 }
 
 /// The places (finite) corrected along the guide's edges; `rise` is how far each one's curve rises above its mean, 0 to 1.
-pub(super) fn mended(place: ArrayView2<f32>, rise: Array2<f32>, guide: &Guide<'_>) -> Array2<f32> {
+/// `after` is called with the number of rows that are done, and may end the work.
+pub(super) fn mended<E>(
+    place: ArrayView2<f32>,
+    rise: Array2<f32>,
+    guide: &Guide<'_>,
+    mut after: impl FnMut(usize) -> Result<(), E>,
+) -> Result<Array2<f32>, E> {
     let (height, width) = place.dim();
     let offsets = offsets(guide.reach_px);
     // Equally dark images have no edges to keep to: everything is equally bright then.
@@ -53,27 +61,39 @@ pub(super) fn mended(place: ArrayView2<f32>, rise: Array2<f32>, guide: &Guide<'_
         .and(guide.sharpness)
         .for_each(|says, sharpness| *says = *says * noise / (sharpness + noise));
     let bins = guide.images * BINS as usize + 1;
+    let bin = place.mapv(|place| bin_of(place).min(bins - 1) as u32);
     let mut result = Array2::zeros((height, width));
-    result.axis_iter_mut(Axis(0)).into_par_iter().enumerate().for_each(|(y, mut row)| {
-        let mut histogram = Histogram::new(bins);
-        for (x, value) in row.iter_mut().enumerate() {
-            let (own, bright) = (place[(y, x)], guide.sharp[(y, x)]);
-            histogram.clear();
-            for &(down, across, near) in &offsets {
-                let at = (y.wrapping_add_signed(down), x.wrapping_add_signed(across));
-                if at.0 >= height || at.1 >= width {
-                    continue;
+    let band = (BAND_PX / width.max(1)).max(rayon::current_num_threads());
+    for (index, mut rows) in result.axis_chunks_iter_mut(Axis(0), band).enumerate() {
+        let first = index * band;
+        rows.axis_iter_mut(Axis(0)).into_par_iter().enumerate().for_each(|(y, mut row)| {
+            let y = first + y;
+            let mut histogram = Histogram::new(bins);
+            for (x, value) in row.iter_mut().enumerate() {
+                let (own, bright) = (place[(y, x)], guide.sharp[(y, x)]);
+                histogram.clear();
+                for &(down, across, near) in &offsets {
+                    let at = (y.wrapping_add_signed(down), x.wrapping_add_signed(across));
+                    if at.0 >= height || at.1 >= width {
+                        continue;
+                    }
+                    let step = (guide.sharp[at] - bright).abs() / equal * STEPS;
+                    if let Some(alike) = table.get(step as usize) {
+                        histogram.add(bin[at] as usize, place[at], near * alike * says[at]);
+                    }
                 }
-                let step = (guide.sharp[at] - bright).abs() / equal * STEPS;
-                if let Some(alike) = table.get(step as usize) {
-                    histogram.add(place[at], near * alike * says[at]);
-                }
+                let found = histogram.median().unwrap_or(own);
+                *value = if (found - own).abs() <= CONFIRMED { own } else { found };
             }
-            let found = histogram.median().unwrap_or(own);
-            *value = if (found - own).abs() <= CONFIRMED { own } else { found };
-        }
-    });
-    result
+        });
+        after(first + rows.nrows())?;
+    }
+    Ok(result)
+}
+
+/// The bin of a place of 0 or more.
+fn bin_of(place: f32) -> usize {
+    (place * BINS).round() as usize
 }
 
 /// Rows down, columns across and the weight by the distance, of a round window.
@@ -113,8 +133,7 @@ impl Histogram {
         self.total = 0.0;
     }
 
-    fn add(&mut self, place: f32, weight: f32) {
-        let bin = ((place * BINS).round() as usize).min(self.weights.len() - 1);
+    fn add(&mut self, bin: usize, place: f32, weight: f32) {
         self.weights[bin] += weight;
         self.places[bin] += weight * place;
         self.total += weight;
@@ -141,7 +160,12 @@ mod tests {
     fn mend(place: &Array2<f32>, sharp: &Array2<f32>, sharpness: &Array2<f32>) -> Array2<f32> {
         let rise = Array2::from_elem(SIZE, 0.5);
         let guide = Guide { sharp: sharp.view(), sharpness: sharpness.view(), reach_px: 6.0, images: 12 };
-        mended(place.view(), rise, &guide)
+        mended_whole(place, rise, &guide)
+    }
+
+    fn mended_whole(place: &Array2<f32>, rise: Array2<f32>, guide: &Guide<'_>) -> Array2<f32> {
+        let Ok(found) = mended(place.view(), rise, guide, |_| Ok::<_, std::convert::Infallible>(()));
+        found
     }
 
     #[test]
@@ -170,7 +194,7 @@ mod tests {
         let place = Array2::from_shape_fn(SIZE, |(y, x)| ((x * 7 + y * 5) % 12) as f32);
         let [dark, flat] = [Array2::zeros(SIZE), Array2::<f32>::zeros(SIZE)];
         let guide = Guide { sharp: dark.view(), sharpness: flat.view(), reach_px: 6.0, images: 12 };
-        assert_eq!(mended(place.view(), flat.clone(), &guide), place);
+        assert_eq!(mended_whole(&place, flat.clone(), &guide), place);
     }
 
     #[test]
@@ -231,7 +255,7 @@ mod tests {
         let mut place = map(&|third| if third { 2.0 } else { 9.0 });
         place[(20, 30)] = 0.0; // among the smaller ones, as its column is
         let guide = Guide { sharp: sharp.view(), sharpness: sharpness.view(), reach_px: 3.0, images: 12 };
-        mended(place.view(), map(&rise), &guide)[(20, 30)]
+        mended_whole(&place, map(&rise), &guide)[(20, 30)]
     }
 
     #[test]

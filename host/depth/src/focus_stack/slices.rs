@@ -28,7 +28,8 @@ pub trait Slices: Sync {
         0.0
     }
 
-    /// Called after each band of rows, with the rows that are measured and all there are.
+    /// Called after each band of rows, with the rows that are done and all there are: once for the curves, once for the
+    /// correction along edges.
     ///
     /// # Errors
     /// Any error stops the measurement.

@@ -1,6 +1,10 @@
 //! Depth from a stack of images at different focus.
 
-use std::fs;
+use std::{
+    fs,
+    process::{Command, Stdio},
+    time::{Duration, Instant},
+};
 
 use farnear_files::{image_file, map};
 use ndarray::{Array2, s};
@@ -370,4 +374,38 @@ fn the_memory_of_a_pair_is_bounded_per_pixel() {
     let per_pixel = (peak(2000) - peak(1000)) * f64::from(1 << 20) / 3e6;
     // 33 bytes today: both images, their moments, the maps, and the files at work.
     assert!(per_pixel < 45.0, "{per_pixel} bytes");
+}
+
+#[test]
+#[cfg(unix)]
+fn an_interruption_ends_the_work_at_once_and_leaves_nothing() {
+    let folder = Folder::new();
+    let stack = folder.text("stack");
+    fs::create_dir(&stack).expect("a folder");
+    for number in 1..=3 {
+        // The work would take some 20 s.
+        let pixels = (0..4000 * 3000).map(|at: usize| ((at * at) >> (3 + number)) as u8);
+        let image: Vec<u8> = b"P5 4000 3000 255\n".iter().copied().chain(pixels).collect();
+        fs::write(format!("{stack}/{number}.pgm"), image).expect("a file");
+    }
+    let arguments = ["focus-stack", &stack, "--out", &folder.text("results/out")];
+    let mut child = Command::new(env!("CARGO_BIN_EXE_farnear"))
+        .args(arguments)
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("farnear runs");
+    while folder.path("results").read_dir().map_or(0, Iterator::count) == 0 {
+        assert!(child.try_wait().expect("a process").is_none(), "it has ended");
+        std::thread::sleep(Duration::from_millis(10));
+    }
+    std::thread::sleep(Duration::from_millis(500));
+    let interrupted = Instant::now();
+    let sent = Command::new("kill").args(["-INT", &child.id().to_string()]).status();
+    assert!(sent.expect("kill runs").success());
+    let output = child.wait_with_output().expect("it ends");
+    // 0.3 s are promised; other tests use the same processor.
+    assert!(interrupted.elapsed() < Duration::from_secs(3), "{:?}", interrupted.elapsed());
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(output.status.code() == Some(1) && said.contains("interrupted"), "{said}");
+    assert_eq!(folder.path("results").read_dir().map_or(0, Iterator::count), 0);
 }
