@@ -113,7 +113,7 @@ impl Surface {
     }
 }
 
-/// The values of a field, descending, if they are no more than [`MAX_EXACT_LEVELS`].
+/// The values of a field, descending; `None` for more than [`MAX_EXACT_LEVELS`].
 fn distinct_values(field: &Array2<f32>) -> Option<Vec<f32>> {
     let mut values: Vec<f32> = Vec::new();
     let mut last = f32::NAN;

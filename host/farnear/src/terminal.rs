@@ -83,7 +83,7 @@ pub fn counting(json: bool) -> Result<Context<'static>> {
     Ok(if counts { Context { progress: &COUNTING, ..plain } } else { plain })
 }
 
-/// As [`counting`], for a computation that moves nothing: Ctrl-C ends the program within 0.3 s, whatever it computes.
+/// As [`counting`], for tasks without a rig: Ctrl-C ends the program within 0.3 s.
 pub fn computing(json: bool) -> Result<Context<'static>> {
     EXITS.store(true, Ordering::Relaxed);
     counting(json)

@@ -39,8 +39,8 @@ fn unpublished() -> MutexGuard<'static, Vec<(PathBuf, Option<PathBuf>)>> {
     UNPUBLISHED.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Before the process exits in the middle of its work: waits for what is being published, then removes everything that is
-/// not. Staging after it waits forever.
+/// Removes all unpublished files of this process, for an exit during work. Waits until a publication has ended. Later
+/// staging blocks forever.
 pub fn abandon_all() {
     let mut folders = unpublished();
     for (folder, target) in folders.drain(..) {

@@ -12,7 +12,7 @@ export function make(host, open) {
   /** Depth of all shown pairs that have none, for a series; ends where one fails or is stopped. */
   const measure = button("Compute depth of all", async () => {
     const pairs = shown.filter((capture) => capture.kind === "pair" && !capture.has_depth && !capture.broken).reverse();
-    if (!pairs.length) notice("All pairs that are shown here have a depth.", "info");
+    if (!pairs.length) notice("No pair without a depth is shown here.");
     measure.disabled = true;
     for (const [at, { name }] of pairs.entries()) {
       measure.textContent = `Depth ${at + 1} of ${pairs.length}`;
@@ -42,7 +42,7 @@ export function make(host, open) {
   }
   let seen = -1;
   on("state", (state) => {
-    if (state.captures === seen || host.hidden || host.contains(document.activeElement)) return;
+    if (state.captures === seen || host.hidden || list.contains(document.activeElement)) return;
     seen = state.captures;
     refresh();
   });
