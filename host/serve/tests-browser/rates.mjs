@@ -125,11 +125,25 @@ async function pair(browser) {
   }
 }
 
+async function emulated(browser) {
+  const server = await serve();
+  try {
+    const page = await browser.open(server.address);
+    await until(page, shown("ready"));
+    await click(page, "Live depth"); // homes first
+    await until(page, `document.querySelector('${DEPTH}').dataset.painted > 5`);
+    console.log(`live depth of the emulated rig: ${await painted(page, DEPTH, server.pid, () => wait(1000 * SECONDS))}`);
+  } finally {
+    await server.close();
+  }
+}
+
 console.log(`${cpus().length} x ${cpus()[0].model}, load ${loadavg()[0].toFixed(1)}, ${WIDTH}x${HEIGHT} px`);
 const browser = plain();
 try {
   await imageAndPlay(browser);
   await pair(browser);
+  await emulated(browser);
 } finally {
   await browser.close();
 }
