@@ -3,7 +3,7 @@
 use std::{
     sync::{
         Arc,
-        mpsc::{Receiver, SyncSender},
+        mpsc::{Receiver, SyncSender, sync_channel},
     },
     thread::JoinHandle,
 };
@@ -13,6 +13,7 @@ use farnear_protocol::{
     camera::{FRAME_HEADER, FREE_RUNNING, FrameHeader},
 };
 use farnear_scene::{Camera, Lens, Psf, Renderer, Scene, View};
+use ndarray::Array2;
 
 use crate::{
     error::SimError,
@@ -47,9 +48,32 @@ impl Picture {
 /// Separates the second camera's noise from the first's and from nearby seeds.
 const OF_THE_SECOND: u64 = 0x5ec0_0d00_0000_0000;
 
+/// The light on the sensor during an exposure, before noise.
+struct OpticalImage {
+    radiance: Array2<f32>,
+    camera: Arc<Camera>,
+    noise_seed: u64,
+    exposure_number: u32,
+    mirrored: bool,
+    begin_ns: u64,
+    header: FrameHeader,
+}
+
+impl OpticalImage {
+    fn expose(self) -> Picture {
+        let codes = self.camera.expose(self.radiance.view(), self.noise_seed, self.exposure_number);
+        let pixels: Vec<u16> = match self.mirrored {
+            true => codes.rows().into_iter().flat_map(|row| row.into_iter().rev()).copied().collect(),
+            false => codes.into_iter().collect(),
+        };
+        Picture::new(self.begin_ns, self.header, &pixels)
+    }
+}
+
 pub struct Imager {
     renderer: Renderer,
-    camera: Camera,
+    camera: Arc<Camera>,
+    noise_seed: u64,
     view: View,
     speed_px_per_s: [f64; 2],
     light: Option<LightParts>,
@@ -72,7 +96,8 @@ impl Imager {
         let (view, speed_px_per_s) = (View::default(), [0.0; 2]);
         Ok(Self {
             renderer,
-            camera,
+            camera: Arc::new(camera),
+            noise_seed: seed,
             view,
             speed_px_per_s,
             light: None,
@@ -86,8 +111,8 @@ impl Imager {
     #[must_use]
     pub fn as_second(self, further_mm: f64, mirror: &HalfMirrorParts, seed: u64) -> Self {
         let view = mirror.second_view();
-        let renderer = self.renderer.with_noise_of(seed ^ OF_THE_SECOND).seen_by(view);
-        Self { renderer, view, further_mm, mirrored: mirror.second_mirrored, ..self }
+        let (renderer, noise_seed) = (self.renderer.seen_by(view), seed ^ OF_THE_SECOND);
+        Self { renderer, noise_seed, view, further_mm, mirrored: mirror.second_mirrored, ..self }
     }
 
     /// Moves the scene from power-on, without motion blur (exact below a pixel per exposure).
@@ -107,6 +132,10 @@ impl Imager {
     }
 
     fn picture(&mut self, shot: &Shot) -> Result<Picture, SimError> {
+        Ok(self.optical_image(shot)?.expose())
+    }
+
+    fn optical_image(&mut self, shot: &Shot) -> Result<OpticalImage, SimError> {
         let number = self.exposures;
         self.exposures += 1;
         if self.speed_px_per_s != [0.0; 2] {
@@ -118,9 +147,9 @@ impl Imager {
         }
         let exposed_ns = (shot.begin_ns, shot.end_ns);
         let brightness = self.light.map_or((1.0, 0.0), |light| light.brightness(exposed_ns, shot.light));
-        let image = self
+        let radiance = self
             .renderer
-            .expose_lit(shot.truth.sensor_mm + self.further_mm, number, brightness)
+            .lit_radiance(shot.truth.sensor_mm + self.further_mm, brightness)
             .map_err(|error| SimError::Scene(error.to_string()))?;
         let header = FrameHeader {
             shot_id: shot.id,
@@ -129,48 +158,78 @@ impl Imager {
             height: self.camera.height_px as u16,
             bits: self.camera.noise.bits(),
         };
-        let pixels: Vec<u16> = match self.mirrored {
-            true => image.rows().into_iter().flat_map(|row| row.into_iter().rev()).copied().collect(),
-            false => image.iter().copied().collect(),
-        };
-        Ok(Picture::new(shot.begin_ns, header, &pixels))
+        Ok(OpticalImage {
+            radiance,
+            camera: Arc::clone(&self.camera),
+            noise_seed: self.noise_seed,
+            exposure_number: number,
+            mirrored: self.mirrored,
+            begin_ns: shot.begin_ns,
+            header,
+        })
     }
 }
 
-/// Renders exposures until the channel closes. `gige` gets all pictures of the first camera.
+/// Renders exposures until the channel closes. `gige` gets all pictures of the first camera. A second thread adds the
+/// noise, while this one renders the next exposure.
 pub fn watch(
-    mut cameras: Vec<(Imager, SyncSender<Vec<u8>>)>,
+    cameras: Vec<(Imager, SyncSender<Vec<u8>>)>,
     shots: Receiver<Shot>,
-    mut gige: Option<SyncSender<farnear_gige::Picture>>,
+    gige: Option<SyncSender<farnear_gige::Picture>>,
     pictures: Arc<Pictures>,
 ) -> Result<JoinHandle<()>, SimError> {
-    std::thread::Builder::new()
-        .name("camera".into())
-        .spawn(move || {
-            for (number, shot) in shots.into_iter().enumerate() {
-                let dropped = shot.id == FREE_RUNNING && pictures.is_of_ended_run(number);
-                for (at, (imager, frames)) in cameras.iter_mut().enumerate() {
-                    if dropped || !pictures.wants(at, number) {
-                        imager.exposures += 1; // later exposures keep their noise
-                        continue;
-                    }
-                    match imager.picture(&shot) {
-                        Ok(picture) => {
-                            if at == 0 {
-                                // A client that has disconnected is removed.
-                                gige = gige.take().filter(|gige| gige.send(picture.for_gige()).is_ok());
-                            }
-                            if frames.send(picture.frame).is_err() {
-                                return;
-                            }
-                        }
-                        Err(error) => eprintln!("exposure {}: {error}", shot.id),
-                    }
+    let start = |source| SimError::Io { what: "cannot start the camera's thread".into(), source };
+    let (mut imagers, frames): (Vec<_>, Vec<_>) = cameras.into_iter().unzip();
+    let (images, exposed) = sync_channel(1);
+    let done = Arc::clone(&pictures);
+    let sensor = std::thread::Builder::new()
+        .name("sensor".into())
+        .spawn(move || expose(exposed, frames, gige, &done))
+        .map_err(start)?;
+    let render = move || {
+        for (number, shot) in shots.into_iter().enumerate() {
+            let dropped = shot.id == FREE_RUNNING && pictures.is_of_ended_run(number);
+            let mut rendered = Vec::new();
+            for (at, imager) in imagers.iter_mut().enumerate() {
+                if dropped || !pictures.wants(at, number) {
+                    imager.exposures += 1; // later exposures keep their noise
+                    continue;
                 }
-                pictures.finish();
+                match imager.optical_image(&shot) {
+                    Ok(image) => rendered.push((at, image)),
+                    Err(error) => eprintln!("exposure {}: {error}", shot.id),
+                }
             }
-        })
-        .map_err(|source| SimError::Io { what: "cannot start the camera's thread".into(), source })
+            if images.send(rendered).is_err() {
+                break; // a client has gone
+            }
+        }
+        drop(images);
+        let _ = sensor.join(); // it has reported its panic
+    };
+    std::thread::Builder::new().name("camera".into()).spawn(render).map_err(start)
+}
+
+/// Exposes the images of each shot, with the number of their camera, until the channel or a client closes.
+fn expose(
+    images: Receiver<Vec<(usize, OpticalImage)>>,
+    frames: Vec<SyncSender<Vec<u8>>>,
+    mut gige: Option<SyncSender<farnear_gige::Picture>>,
+    pictures: &Pictures,
+) {
+    for shot in images {
+        for (at, image) in shot {
+            let picture = image.expose();
+            if at == 0 {
+                // A client that has disconnected is removed.
+                gige = gige.take().filter(|gige| gige.send(picture.for_gige()).is_ok());
+            }
+            if frames[at].send(picture.frame).is_err() {
+                return;
+            }
+        }
+        pictures.finish();
+    }
 }
 
 #[cfg(test)]

@@ -175,13 +175,6 @@ impl Renderer {
         self
     }
 
-    /// Another sensor: noise and hot pixels of this seed, same texture.
-    #[must_use]
-    pub fn with_noise_of(mut self, seed: u64) -> Self {
-        self.seed = seed;
-        self
-    }
-
     /// Changes the view, for a moving scene.
     pub fn look(&mut self, view: View) {
         self.view = view;
@@ -199,18 +192,18 @@ impl Renderer {
         Ok(self.camera.expose(radiance.view(), self.seed, exposure_number))
     }
 
-    /// [`Renderer::expose`] with light: `textured` times the texture plus `even`, as from a blank wall.
-    pub fn expose_lit(
+    /// [`Renderer::radiance`] with light: `textured` times the texture plus `even`, as from a blank wall.
+    /// [`Camera::expose`] makes the codes.
+    pub fn lit_radiance(
         &self,
         sensor_distance_mm: f64,
-        exposure_number: u32,
         (textured, even): (f64, f64),
-    ) -> Result<Array2<u16>, RenderError> {
+    ) -> Result<Array2<f32>, RenderError> {
         let mut radiance = self.radiance(sensor_distance_mm)?;
         if (textured, even) != (1.0, 0.0) {
             radiance.mapv_inplace(|radiance| textured.max(0.0) as f32 * radiance + even.max(0.0) as f32);
         }
-        Ok(self.camera.expose(radiance.view(), self.seed, exposure_number))
+        Ok(radiance)
     }
 
     /// Mean radiance per pixel, shape (height, width), scene mean 1; fails as [`Renderer::expose`].
