@@ -64,7 +64,7 @@ pub fn context() -> Result<Context<'static>> {
             if EXITS.load(Ordering::Relaxed) {
                 std::thread::sleep(GRACE);
                 farnear_files::staging::abandon_all();
-                eprintln!("farnear: interrupted; nothing was written");
+                eprintln!("farnear: interrupted; unfinished files were removed");
                 std::process::exit(1);
             }
         })
