@@ -2,7 +2,8 @@
 
 use std::fmt;
 
-use ndarray::Array2;
+use ndarray::{Array2, Axis};
+use rayon::prelude::*;
 
 use crate::psf::Psf;
 
@@ -19,6 +20,17 @@ pub struct DepthMap {
     pub low_texture_fraction: f64,
     /// Caveats of the map.
     pub warnings: Vec<Warning>,
+}
+
+impl DepthMap {
+    /// Part of the pixels that have a depth; NaN without pixels.
+    pub fn valid_fraction(&self) -> f64 {
+        let rows = self.depth_mm.axis_iter(Axis(0)).into_par_iter();
+        // 32-bit sums are vectorised.
+        let valid =
+            rows.map(|row| u64::from(row.iter().map(|depth| u32::from(depth.is_finite())).sum::<u32>()));
+        valid.sum::<u64>() as f64 / self.depth_mm.len() as f64
+    }
 }
 
 /// Caveat of a map.

@@ -325,12 +325,14 @@ pub(crate) fn measure(
         DepthMethod::Rational(_) => RATIONAL_OVER_WHITENED,
         DepthMethod::Baseline(_) => BASELINE_OVER_WHITENED,
     };
-    judging.deviation_mm *= noisier;
     // The noise of the pair contains what fine texture the blur leaves; the residual of the right depth does not.
     let noise = judging.excess.clamp(LEAST_NOISE, 1.0) as f32;
+    let of_deviation = noisier * noise.sqrt();
+    if of_deviation != 1.0 {
+        judging.deviation_mm.par_mapv_inplace(|deviation| deviation * of_deviation);
+    }
     if noise < 1.0 {
-        judging.deviation_mm *= noise.sqrt();
-        judging.misfit /= noise;
+        judging.misfit.par_mapv_inplace(|misfit| misfit / noise);
     }
     // The border has the depth, so also the deviation and misfit, of the pixels next to it.
     let border = match method {
@@ -346,7 +348,8 @@ pub(crate) fn measure(
         if optics.stage().is_none() {
             let moments = (SCALED_BLUR_ERROR * (1.0 - aligned.magnification.powi(-2)).abs()) as f32;
             let of_model = moments * optics.depth_per_alpha_mm(0.0).abs() as f32;
-            judging.deviation_mm.par_mapv_inplace(|deviation| deviation.hypot(of_model));
+            let of_model = of_model * of_model;
+            judging.deviation_mm.par_mapv_inplace(|deviation| (deviation * deviation + of_model).sqrt());
         }
     }
     let mut estimate = judging;
@@ -398,9 +401,12 @@ fn of_estimate(
 ) -> DepthMap {
     let unit = (0.05 * optics.depth_per_alpha_mm(0.0).abs()) as f32;
     // Evidence is the reciprocal variance, like texture energy in the run time.
-    let mut confidence: Array2<f32> = deviation_mm.mapv(|deviation| (unit / deviation).powi(2));
-    let evidence = settings.run.fill.then(|| confidence.clone());
-    confidence.mapv_inplace(|evidence| if evidence.is_finite() { evidence / (1.0 + evidence) } else { 0.0 });
+    let evidence = |deviation: f32| (unit / deviation).powi(2);
+    let confidence = Zip::from(deviation_mm).par_map_collect(|deviation| {
+        let evidence = evidence(*deviation);
+        if evidence.is_finite() { evidence / (1.0 + evidence) } else { 0.0 }
+    });
+    let evidence = settings.run.fill.then(|| deviation_mm.mapv(evidence));
     let mut map =
         DepthMap { depth_mm, confidence, filled: None, low_texture_fraction: 0.0, warnings: Vec::new() };
     fill_border(&mut map, bank.reach_px() + 1);

@@ -30,9 +30,9 @@ pub(crate) use rows::{
     vertical_sums_of_seven,
 };
 pub(crate) use windows::{
-    Believed, CubicSums, Deviation, Found, Residual, add_products, add_row, believe_row, deviation_row,
-    dimensionless_row, move_products, residual_row, roll_row, roots, row_sums, sum, sum_of_squares, sum_rows,
-    weigh_rows, without_noise,
+    Believed, CubicSums, Deviation, Found, Residual, add_energies, add_products, add_row, believe_row,
+    compare_row, deviation_row, dimensionless_row, move_products, residual_row, roll_row, roots, row_sums,
+    sum, sum_of_squares, sum_rows, weigh_rows, without_noise,
 };
 
 /// Calls the generic function inside one with the backend's instructions enabled, so that it is compiled with them.

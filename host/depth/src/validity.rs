@@ -73,7 +73,6 @@ pub fn assess(
     optics: &Optics,
     settings: &ValiditySettings,
 ) -> Validity {
-    let size = map.depth_mm.dim();
     let mut reasons = prepared.reasons.clone();
     let Estimate { mut deviation_mm, misfit, left_over, noise_part, .. } = estimate;
     let range = range(optics);
@@ -143,10 +142,9 @@ pub fn assess(
     drop(misfit); // a map is large, and what follows needs one more
     explain_holes(&mut reasons, map);
     let lost = lost_pixels(&reasons);
-    let valid = map.depth_mm.iter().map(|depth| usize::from(depth.is_finite())).sum::<usize>();
     map.low_texture_fraction =
         lost.iter().find(|lost| lost.reason == Reason::NoTexture).map_or(0.0, |lost| lost.fraction);
-    Validity { reasons, deviation_mm, lost, valid_fraction: valid as f64 / (size.0 * size.1) as f64 }
+    Validity { reasons, deviation_mm, lost, valid_fraction: map.valid_fraction() }
 }
 
 /// Standard deviation of normalised depth by model error, for a residual `ratio` times the learned target's.
@@ -208,20 +206,21 @@ fn explain_holes(reasons: &mut Array2<u8>, map: &DepthMap) {
         Reason::NotFinite,
     ];
     let original = reasons.clone();
+    let present = lost_pixels(&original);
     for reason in spreading {
         if left.is_empty() {
             return;
         }
-        let own = original.mapv(|code| code == reason.code());
-        if own.iter().any(|own| *own) {
-            let near = dilate_square(&own, SEARCH_PX);
-            left.retain(|at| {
-                if near[*at] {
-                    reasons[*at] = reason.code();
-                }
-                !near[*at]
-            });
+        if !present.iter().any(|lost| lost.reason == reason) {
+            continue;
         }
+        let near = dilate_square(&original.mapv(|code| code == reason.code()), SEARCH_PX);
+        left.retain(|at| {
+            if near[*at] {
+                reasons[*at] = reason.code();
+            }
+            !near[*at]
+        });
     }
     for at in left {
         reasons[at] = Reason::NoTexture.code();

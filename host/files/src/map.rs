@@ -5,7 +5,8 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use ndarray::{Array2, ArrayView2};
+use ndarray::{Array2, ArrayView1, ArrayView2, Axis};
+use rayon::prelude::*;
 use tiff::{
     TiffError,
     encoder::{TiffEncoder, colortype::Gray32Float},
@@ -102,13 +103,33 @@ pub struct Scale {
     pub scale_mm: f64,
 }
 
+/// Least and largest finite value; `None` without one.
+pub(crate) fn range(map: ArrayView2<f32>) -> Option<[f32; 2]> {
+    let nothing = [f32::INFINITY, f32::NEG_INFINITY];
+    // Comparisons are one instruction each, and false for NaN.
+    let wider = |[low, high]: [f32; 2], [other_low, other_high]: [f32; 2]| {
+        [if other_low < low { other_low } else { low }, if other_high > high { other_high } else { high }]
+    };
+    let with = |range: [f32; 2], value: f32| {
+        let value = if value.is_finite() { value } else { f32::NAN };
+        wider(range, [value, value])
+    };
+    let of_row = |row: ArrayView1<f32>| {
+        let Some(values) = row.as_slice() else { return row.iter().copied().fold(nothing, with) };
+        // Eight parallel ranges, which the compiler vectorises.
+        let (parts, rest) = values.as_chunks::<8>();
+        let mut ranges = [nothing; 8];
+        for part in parts {
+            ranges.iter_mut().zip(part).for_each(|(range, value)| *range = with(*range, *value));
+        }
+        rest.iter().copied().fold(ranges.into_iter().fold(nothing, wider), with)
+    };
+    let [low, high] = map.axis_iter(Axis(0)).into_par_iter().map(of_row).reduce(|| nothing, wider);
+    (low <= high).then_some([low, high])
+}
+
 pub fn scale(map: ArrayView2<f32>) -> Scale {
-    let finite = || map.iter().copied().filter(|value| value.is_finite());
-    let low = finite().fold(f32::INFINITY, f32::min);
-    let high = finite().fold(f32::NEG_INFINITY, f32::max);
-    if low > high {
-        return Scale { offset_mm: 0.0, scale_mm: 1.0 };
-    }
+    let Some([low, high]) = range(map) else { return Scale { offset_mm: 0.0, scale_mm: 1.0 } };
     // Code 1 is the nearest depth, code 65535 the farthest.
     let scale_mm = f64::from(high - low).max(1e-6) / 65_534.0;
     Scale { offset_mm: f64::from(low) - scale_mm, scale_mm }

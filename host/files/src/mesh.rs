@@ -4,8 +4,10 @@
 
 use std::io::{self, Write};
 
-use ndarray::ArrayView2;
+use ndarray::{ArrayView2, CowArray, Ix2};
 use rayon::prelude::*;
+
+use crate::map;
 
 /// Depth step between surfaces, part of the map's range.
 const STEP: f32 = 0.1;
@@ -24,6 +26,7 @@ impl Projection {
     }
 
     /// Position of a pixel's object at depth `z` relative to the optical axis: right and up, mm.
+    #[inline]
     pub fn beside_axis_mm(&self, dim: (usize, usize), column: usize, row: usize, z: f64) -> [f64; 2] {
         let axis = self.axis_in(dim);
         let scale = self.pixel_um * 1e-3 * (z / self.focal_length_mm - 1.0);
@@ -44,6 +47,7 @@ pub enum Lateral {
 
 impl Lateral {
     /// Position of a pixel's object at depth `z`, right and up, in the unit of the depths, or in pixels if unknown.
+    #[inline]
     pub fn beside_axis(&self, dim: (usize, usize), column: usize, row: usize, z: f64) -> [f64; 2] {
         let even = |side: f64| {
             let (height, width) = dim;
@@ -73,12 +77,13 @@ impl Lateral {
     }
 }
 
-/// Rows that are encoded together, on all threads.
-const ROWS: usize = 64;
+/// Rows that are encoded together, per thread: few, to be written from the cache.
+const ROWS: usize = 8;
 
 /// Surface through a depth map, coloured by an image of any scale. Written row by row, as large maps exceed memory.
 pub(crate) struct Surface<'a> {
-    depth: ArrayView2<'a, f32>,
+    /// By rows.
+    depth: CowArray<'a, f32, Ix2>,
     grey: ArrayView2<'a, f32>,
     lateral: Lateral,
     /// Largest depth step within a triangle.
@@ -88,9 +93,10 @@ pub(crate) struct Surface<'a> {
 
 impl<'a> Surface<'a> {
     pub(crate) fn new(depth: ArrayView2<'a, f32>, grey: ArrayView2<'a, f32>, lateral: Lateral) -> Self {
-        let finite = || depth.iter().copied().filter(|value| value.is_finite());
-        let (low, high) = finite().fold((f32::MAX, f32::MIN), |(low, high), z| (low.min(z), high.max(z)));
-        let brightest = grey.iter().copied().filter(|value| value.is_finite()).fold(1e-9, f32::max);
+        let [low, high] = map::range(depth).unwrap_or_default();
+        let brightest = map::range(grey).map_or(0.0, |[_, high]| high).max(1e-9);
+        let by_rows = depth.is_standard_layout();
+        let depth = if by_rows { depth.into() } else { depth.as_standard_layout().into_owned().into() };
         Self { depth, grey, lateral, step: (high - low) * STEP, brightest }
     }
 
@@ -115,7 +121,8 @@ impl<'a> Surface<'a> {
     fn mark_faces(&self, row: usize, marks: &mut [u8]) {
         marks.fill(0);
         if row > 0 {
-            mark_faces(self.depth, row, self.step, marks);
+            let rows = [row - 1, row].map(|row| self.depth.row(row).to_slice().expect("made by rows"));
+            mark_faces(rows, self.step, marks);
         }
     }
 
@@ -179,9 +186,10 @@ impl<'a> Surface<'a> {
     /// Encodes rows on all threads and writes them in order.
     fn write_rows(&self, to: &mut impl Write, encode: impl Fn(usize, &mut Vec<u8>) + Sync) -> io::Result<()> {
         let height = self.depth.nrows();
-        let mut rows = vec![Vec::new(); ROWS.min(height)];
-        for begin in (0..height).step_by(ROWS) {
-            let part = &mut rows[..ROWS.min(height - begin)];
+        let together = (ROWS * rayon::current_num_threads()).min(height.max(1));
+        let mut rows = vec![Vec::new(); together];
+        for begin in (0..height).step_by(together) {
+            let part = &mut rows[..together.min(height - begin)];
             part.par_iter_mut().enumerate().for_each(|(i, bytes)| {
                 bytes.clear();
                 encode(begin + i, bytes);
@@ -232,20 +240,22 @@ pub fn ply(depth: ArrayView2<f32>, grey: ArrayView2<f32>, lateral: Lateral, unit
     bytes
 }
 
-/// Triangles between the previous row and this one, right of each column: 1 = upper, lower, upper right; 2 = upper
-/// right, lower, lower right; 3 = both.
-fn mark_faces(depth_mm: ArrayView2<f32>, row: usize, step: f32, marks: &mut [u8]) {
-    let (upper, lower) = (depth_mm.row(row - 1), depth_mm.row(row));
+/// Triangles between two rows, right of each column but the last: 1 = upper, lower, upper right; 2 = upper right, lower,
+/// lower right; 3 = both.
+fn mark_faces([upper, lower]: [&[f32]; 2], step: f32, marks: &mut [u8]) {
+    // NaN propagates through the sum; these comparisons are one instruction each.
     let joined = |a: f32, b: f32, c: f32| {
-        // NaN propagates through the sum; these comparisons are one instruction each.
         let max = |a: f32, b: f32| if a > b { a } else { b };
         let min = |a: f32, b: f32| if a < b { a } else { b };
         let spread = max(max(a, b), c) - min(min(a, b), c);
         u8::from((a + b + c).is_finite() & (spread <= step))
     };
-    let corners = upper.iter().zip(upper.iter().skip(1)).zip(lower.iter().zip(lower.iter().skip(1)));
-    for (mark, ((above, above_right), (below, below_right))) in marks.iter_mut().zip(corners) {
-        *mark = joined(*above, *below, *above_right) | joined(*above_right, *below, *below_right) << 1;
+    let faces = upper.len().saturating_sub(1);
+    let (above, below, marks) = (&upper[..faces], &lower[..faces], &mut marks[..faces]);
+    let [above_right, below_right] = [upper, lower].map(|row| &row[row.len() - faces..]);
+    for x in 0..faces {
+        marks[x] = joined(above[x], below[x], above_right[x])
+            | joined(above_right[x], below[x], below_right[x]) << 1;
     }
 }
 

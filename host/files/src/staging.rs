@@ -30,7 +30,8 @@ const JUST_BEGUN: Duration = Duration::from_secs(10);
 /// Limit of leftover folders of one name, before the user must check.
 const LEFT_BEHIND_MAX: u32 = 100;
 
-const BUFFER_BYTES: usize = 1 << 18;
+/// Longer pieces, such as the rows of a large mesh, go to the file without a copy.
+const BUFFER_BYTES: usize = 1 << 15;
 
 /// Folders of this process that are not published, and the targets created for them. Locked while something is published.
 static UNPUBLISHED: Mutex<Vec<(PathBuf, Option<PathBuf>)>> = Mutex::new(Vec::new());

@@ -2,6 +2,7 @@
 
 use image::{Rgb, RgbImage};
 use ndarray::ArrayView2;
+use rayon::prelude::*;
 
 use crate::{EncodeError, image_file::encode_to, quantiles::Quantiles, text::Writer};
 
@@ -51,16 +52,15 @@ fn draw(unit: &str, depth_mm: ArrayView2<f32>, confidence: ArrayView2<f32>) -> R
     let mut canvas = RgbImage::from_pixel(canvas_width, height + 2 * MARGIN_PX, BACKGROUND);
 
     let colours = Colours::new(&range);
-    let map_rows = canvas.rows_mut().skip(MARGIN_PX as usize).take(height as usize);
-    for (y, row) in map_rows.enumerate() {
-        let values = depth_mm.row(y / zoom as usize);
-        let confidences = confidence.row(y / zoom as usize);
-        let mut pixels = row.skip(MARGIN_PX as usize);
-        for (depth, confidence) in values.iter().zip(confidences) {
-            let colour = faded(colours.of(*depth), *confidence);
-            pixels.by_ref().take(zoom as usize).for_each(|pixel| *pixel = colour);
+    let zoom = zoom as usize;
+    let lines = canvas.par_chunks_exact_mut(3 * canvas_width as usize);
+    lines.skip(MARGIN_PX as usize).take(height as usize).enumerate().for_each(|(y, line)| {
+        let (pixels, _) = line[3 * MARGIN_PX as usize..].as_chunks_mut();
+        let values = depth_mm.row(y / zoom).into_iter().zip(confidence.row(y / zoom));
+        for (places, (depth, confidence)) in pixels.chunks_mut(zoom).zip(values) {
+            places.fill(faded(colours.of(*depth), *confidence).0);
         }
-    }
+    });
     let Some((near, far)) = range.0 else {
         writer.write(&mut canvas, bar_left, MARGIN_PX, "no depth", INK);
         return Ok(canvas);
@@ -143,6 +143,9 @@ impl Range {
 
 /// Mixes towards grey by confidence, but keeps a tint.
 fn faded(colour: Rgb<u8>, confidence: f32) -> Rgb<u8> {
+    if confidence >= CONFIDENT {
+        return colour;
+    }
     let kept = FAINTEST + (1.0 - FAINTEST) * (confidence / CONFIDENT).clamp(0.0, 1.0);
     // Positive: adding a half and truncating rounds to nearest.
     let mix =

@@ -90,7 +90,7 @@ fn compute_here(settings: &DepthRequest, context: &Context<'_>) -> Result<DepthF
         height,
         median_mm: rounded(median(&computed.map.depth_mm), 3),
         low_texture_fraction: rounded(computed.map.low_texture_fraction, 6),
-        valid_fraction: rounded(valid_fraction(&computed.map.depth_mm), 6),
+        valid_fraction: rounded(computed.map.valid_fraction(), 6),
         uncertainty: computed.deviation.map(|(_, found)| found),
         warnings,
     })
@@ -227,10 +227,6 @@ impl Inputs {
             ..request.measure(self.method.as_real())
         }
     }
-}
-
-fn valid_fraction(map: &Array2<f32>) -> f64 {
-    map.iter().filter(|depth| depth.is_finite()).count() as f64 / map.len() as f64
 }
 
 /// Corrects a map; pixels outside the correction lose depth and confidence.

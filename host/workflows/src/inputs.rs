@@ -7,6 +7,7 @@ use std::{
 };
 
 use farnear_files::image_file::file_and_page;
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
@@ -29,7 +30,7 @@ pub struct HashedFile {
 /// Hashes inputs of a result in `out`: all files of a folder; the file of a TIFF page (`stack.tif#3`).
 pub(crate) fn hashed(inputs: &[PathBuf], out: &Path) -> Result<Vec<HashedFile>> {
     let place = batch::final_place(out);
-    files(inputs)?.iter().map(|file| hash(file, &relative(file, &place))).collect()
+    files(inputs)?.par_iter().map(|file| hash(file, &relative(file, &place))).collect()
 }
 
 pub(crate) fn files(inputs: &[PathBuf]) -> Result<Vec<PathBuf>> {

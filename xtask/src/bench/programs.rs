@@ -41,6 +41,7 @@ pub fn run(runs: usize) -> Result<String> {
         ["render", "--scene", "staircase", "--noise", "8bit", "--width", &width, "--height", &height];
     finish(Command::new(&farnear).args(render).arg("--optics").arg(&optics).arg("--out").arg(&tile))?;
 
+    let results = folder.join("results");
     let text = |path: &Path| path.to_string_lossy().into_owned();
     let mut labels = Vec::new();
     let mut groups = Vec::new();
@@ -52,13 +53,13 @@ pub fn run(runs: usize) -> Result<String> {
                     let words =
                         [&text(&farnear), "depth", &text(&far), &text(&near), "--optics", &text(&optics)];
                     let mut words: Vec<String> = words.iter().map(ToString::to_string).collect();
-                    let out = text(&folder.join("ours"));
+                    let out = text(&results.join("ours"));
                     words.extend(["--threads", threads, "--out", &out].map(String::from));
                     words
                         .extend(npy_only.then(|| ["--write", "npy"].map(String::from)).into_iter().flatten());
                     words
                 };
-                let peer = [text(&ROOT.join(PEER)), text(&far), text(&near), text(&folder.join("peer"))];
+                let peer = [text(&ROOT.join(PEER)), text(&far), text(&near), text(&results.join("peer"))];
                 let mut peer: Vec<String> = ["python3".into()].into_iter().chain(peer).collect();
                 peer.extend(npy_only.then(|| "--npy-only".into()));
                 labels.push((size, shift, npy_only));
@@ -67,7 +68,7 @@ pub fn run(runs: usize) -> Result<String> {
         }
     }
     step("programs in turn");
-    let figures = timed(&groups, runs)?;
+    let figures = timed(&groups, runs, &results)?;
     Ok(page(&labels, &figures, runs))
 }
 
@@ -86,10 +87,11 @@ fn pair(folder: &Path, tile: &Path, size: [usize; 2], shift: [usize; 2]) -> Resu
     Ok(files)
 }
 
-fn timed(groups: &[Value], runs: usize) -> Result<Vec<Value>> {
+fn timed(groups: &[Value], runs: usize, results: &Path) -> Result<Vec<Value>> {
     let mut timer = Command::new("python3")
         .arg(ROOT.join(TIMER))
         .arg(runs.to_string())
+        .arg(results)
         .stdin(Stdio::piped())
         .stdout(Stdio::piped())
         .spawn()
@@ -110,7 +112,7 @@ type Label = ([usize; 2], [usize; 2], bool);
 
 fn page(labels: &[Label], figures: &[Value], runs: usize) -> String {
     let mut text = format!(
-        "# Speed of whole programs\n\nWritten by `cargo xtask bench --programs --write` on {}; medians of {runs} runs in turn. \
+        "# Speed of whole programs\n\nWritten by `cargo xtask bench --programs --write` on {}; medians of {runs} runs in turn, each into an empty folder. \
          `farnear depth` by its default method is compared with a numpy + OpenCV script that reads, registers, computes and \
          writes ([`program_opencv.py`](../host/depth/benches/program_opencv.py), one thread, a fixed window, no uncertainty). \
          The script writes depth and a coloured picture; `farnear depth` writes all its default outputs, or depth.npy only. A ratio \

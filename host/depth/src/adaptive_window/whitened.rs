@@ -9,7 +9,7 @@
 //!
 //! A window of side w has a standard deviation within 6 % of the bound for unknown texture (`docs/accuracy.md`):
 //! `1 / (w sqrt J)`, `J = mean over frequencies of P D^2 / (s^2 (H1^2 + H2^2))`, `D = H1 H2' - H2 H1'`, P the texture's
-//! power, s^2 the noise's. Cost of [`Whitened::design`]: 153 x 25 points, 60 unknowns, some ms; at run time five 7x7
+//! power, s^2 the noise's. Cost of [`Whitened::design`]: 153 x 13 points, 60 unknowns, some ms; at run time five 7x7
 //! kernels.
 
 use std::f64::consts::PI;
@@ -23,8 +23,8 @@ use crate::optics::Optics;
 use crate::psf::{Otf, Psf};
 
 pub(crate) const SIZE: usize = 7;
-/// Depths sampled by the design, -1.1 to 1.1.
-const ALPHAS: usize = 25;
+/// Depths sampled by the design, 0 to 1.1. Those from -1.1 to 0 have the same equations: far and near change places.
+const ALPHAS: usize = 13;
 const REACH: f64 = 1.1;
 /// Design variance of the noise relative to the mean brightness: 9,000 electrons, read noise 12 electrons.
 const NOISE: f64 = 1.19e-4;
@@ -53,6 +53,8 @@ struct Point {
 
 struct Sample {
     alpha: f64,
+    /// 2 if it also counts for `-alpha`.
+    multiplicity: f64,
     h: [f64; 2],
     q: f64,
     turn: f64,
@@ -68,8 +70,7 @@ impl Whitened {
     fn for_psf(psf: Psf, max_blur_px: f64, floor_px: f64) -> Result<Self, DesignError> {
         let otf = psf.checked()?.otf((1.2 * max_blur_px).hypot(floor_px));
         let points = points();
-        let alphas: [f64; ALPHAS] =
-            std::array::from_fn(|i| REACH * (2.0 * i as f64 / (ALPHAS - 1) as f64 - 1.0));
+        let alphas: [f64; ALPHAS] = std::array::from_fn(|i| REACH * i as f64 / (ALPHAS - 1) as f64);
         let sampled =
             |point: &Point| alphas.map(|alpha| sample(&otf, [max_blur_px, floor_px], point.at.w, alpha));
         let samples: Vec<[Sample; ALPHAS]> = points.iter().map(sampled).collect();
@@ -104,7 +105,8 @@ fn sample(otf: &Otf, [max_blur_px, floor_px]: [f64; 2], w: f64, alpha: f64) -> S
     let h = both(alpha);
     let (above, below) = (both(alpha + STEP), both(alpha - STEP));
     let slope = |i: usize| (above[i] - below[i]) / (2.0 * STEP);
-    Sample { alpha, h, q: h[0] * h[0] + h[1] * h[1], turn: h[0] * slope(1) - h[1] * slope(0) }
+    let multiplicity = if alpha > 0.0 { 2.0 } else { 1.0 };
+    Sample { alpha, multiplicity, h, q: h[0] * h[0] + h[1] * h[1], turn: h[0] * slope(1) - h[1] * slope(0) }
 }
 
 /// The `x` that minimises `|rows x - right|^2` with every constraint's product with `x` exactly 0.
@@ -144,7 +146,7 @@ fn residual(points: &[Point], samples: &[[Sample; ALPHAS]]) -> Result<[Kernel; 4
             let powers: [f64; 4] = std::array::from_fn(|k| s.alpha.powi(k as i32));
             let signs = [1.0, -1.0, 1.0, -1.0];
             let row = |factor: &dyn Fn(usize) -> f64, weight: f64, right: f64| {
-                let weight = (point.at.multiplicity * weight).sqrt();
+                let weight = (point.at.multiplicity * s.multiplicity * weight).sqrt();
                 let taps = (0..4)
                     .flat_map(|k| point.basis.iter().map(move |b| (k, b)))
                     .map(|(k, b)| weight * factor(k) * b);
@@ -186,7 +188,7 @@ fn matched(
             let gain = sum(1.0).hypot(sum(-1.0)).max(0.15);
             let energy = point.power * s.q + NOISE;
             let target = s.turn * point.power / (s.q.sqrt().max(1e-9) * energy * gain);
-            let weight = (point.at.multiplicity * energy).sqrt();
+            let weight = (point.at.multiplicity * s.multiplicity * energy).sqrt();
             for (h, sign) in s.h.iter().zip([1.0, -1.0]) {
                 let own = point.basis.iter().map(|b| weight * b);
                 let with_alpha = point.basis.iter().map(|b| weight * sign * s.alpha * b);
@@ -213,7 +215,7 @@ fn slope_in_energy(
 ) -> f64 {
     let [mut slope, mut energy] = [0.0; 2];
     for (point, samples) in points.iter().zip(samples) {
-        let s = &samples[ALPHAS / 2];
+        let s = &samples[0];
         let of_sum = point.power * (s.h[0] + s.h[1]).powi(2) + 2.0 * NOISE;
         let [r1, u] = [&residual[1], matched].map(|kernel| kernel.response(point.at.u, point.at.v));
         slope += point.at.multiplicity * of_sum * r1 * u;
@@ -234,7 +236,7 @@ fn variance_gain(
         .iter()
         .map(|p| (residual.each_ref().map(|r| r.response(p.at.u, p.at.v)), matched.response(p.at.u, p.at.v)))
         .collect();
-    let rows: Vec<(Vec<f64>, f64)> = (ALPHAS / 2..ALPHAS)
+    let rows: Vec<(Vec<f64>, f64)> = (0..ALPHAS)
         .map(|index| {
             let alpha = samples[0][index].alpha;
             let [mut of_noise, mut of_texture] = [0.0; 2];

@@ -16,6 +16,7 @@ use super::band::{
 };
 use super::noise::PairNoise;
 use super::thinned::Thinned;
+use crate::simd::{self, Backend};
 
 /// Side of the window.
 const WINDOW_PX: usize = 21;
@@ -55,6 +56,7 @@ pub(super) fn compare(pair: &Thinned, size: (usize, usize), noise: &PairNoise) -
     let [a, b] = [&pair.far.band, &pair.near.band];
     let noise = variance as f32;
     let mut different = Array2::from_elem(a.dim(), false);
+    let (backend, limits) = (Backend::best(), [DETAIL, DIFFERENT]);
     let rows = rows_of_part(a.nrows());
     let of_part = |(part, mut different): (usize, ArrayViewMut2<bool>)| {
         let mut sums = [0.0_f64; 3];
@@ -65,17 +67,10 @@ pub(super) fn compare(pair: &Thinned, size: (usize, usize), noise: &PairNoise) -
             for ((rolling, mean), (a, b)) in rolling.iter_mut().zip(&mut means).zip(factors) {
                 rolling.mean(part * rows + i, |y, row| product(a, b, y, row), mean);
             }
-            let [product, of_a, of_b] = &means;
-            for (((different, product), a), b) in different.iter_mut().zip(product).zip(of_a).zip(of_b) {
-                let detail = [a, b].map(|energy| 1.0 - noise / energy.max(f32::MIN_POSITIVE));
-                if detail.iter().all(|part| *part > DETAIL) {
-                    let allowed = (detail[0] * detail[1]).sqrt();
-                    let correlation = product / (a * b).sqrt();
-                    *different = correlation < DIFFERENT * allowed;
-                    let of_window = [f64::from(correlation), f64::from(allowed), 1.0];
-                    sums.iter_mut().zip(of_window).for_each(|(sum, value)| *sum += value);
-                }
-            }
+            let Some(different) = different.as_slice_mut() else { unreachable!("made in standard layout") };
+            let of_row =
+                simd::compare_row(backend, noise, limits, means.each_ref().map(|row| &row[..]), different);
+            sums.iter_mut().zip(of_row).for_each(|(sum, value)| *sum += f64::from(value));
         }
         sums
     };
@@ -170,5 +165,13 @@ fn remove_moved(mut tile: ArrayViewMut2<bool>, [top, left]: [usize; 2], [a, b]: 
 /// Enlarges a mask of the small images to the pixels of the image.
 fn enlarged(mask: &Array2<bool>, factor: usize, size: (usize, usize)) -> Array2<bool> {
     let (height, width) = mask.dim();
-    Array2::from_shape_fn(size, |(y, x)| mask[((y / factor).min(height - 1), (x / factor).min(width - 1))])
+    let mut large = Array2::from_elem(size, false);
+    large.axis_iter_mut(Axis(0)).into_par_iter().enumerate().for_each(|(y, mut row)| {
+        let from = mask.row((y / factor).min(height - 1));
+        let Some(row) = row.as_slice_mut() else { unreachable!("made in standard layout") };
+        for (x, pixels) in row.chunks_mut(factor).enumerate() {
+            pixels.fill(from[x.min(width - 1)]);
+        }
+    });
+    large
 }

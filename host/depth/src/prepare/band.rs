@@ -4,7 +4,7 @@
 //! vignetting change the brightness of one image. A band of middle frequencies, divided by its RMS around each pixel, is
 //! equal in both images of an object. Point spread functions are symmetric, so different blur does not bias a shift.
 
-use ndarray::{Array2, ArrayView2, Axis, CowArray, Ix2};
+use ndarray::{Array2, ArrayView2, Axis, CowArray, Ix2, Zip};
 use rayon::prelude::*;
 
 use crate::border::reflect;
@@ -73,7 +73,7 @@ pub(crate) fn without_holes(image: ArrayView2<'_, f32>) -> CowArray<'_, f32, Ix2
 pub(crate) fn band(image: ArrayView2<f32>) -> Array2<f32> {
     let fine = binomial(image);
     let mut coarse = box_mean(fine.view(), MEAN_PX);
-    coarse.zip_mut_with(&fine, |coarse, fine| *coarse = fine - *coarse);
+    Zip::from(&mut coarse).and(&fine).par_for_each(|coarse, fine| *coarse = fine - *coarse);
     coarse
 }
 
@@ -101,7 +101,9 @@ pub(crate) fn normalised(band: &Array2<f32>) -> Array2<f32> {
     let mean = of_rows.iter().sum::<f64>() / band.len() as f64;
     let floor = (FLOOR * mean as f32).max(f32::MIN_POSITIVE);
     let mut strength = box_mean_of(band.dim(), STRENGTH_PX, |y, row| product(band, band, y, row));
-    strength.zip_mut_with(band, |strength, band| *strength = band / (*strength + floor).sqrt());
+    Zip::from(&mut strength)
+        .and(band)
+        .par_for_each(|strength, band| *strength = band / (*strength + floor).sqrt());
     strength
 }
 

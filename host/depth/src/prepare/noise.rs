@@ -3,13 +3,17 @@
 //! Both images pass the second difference along both axes (Immerkaer 1996), whose response peaks at the highest
 //! frequencies, towards (pi, pi). There defocus leaves little signal, proportional in both images. So the smaller
 //! eigenvalue of a block's covariance is the noise. Blocks of several brightnesses separate shot noise from the constant
-//! part. Cost: twenty additions per pixel.
+//! part. Cost: twenty additions per pixel of the blocks.
 
 use ndarray::ArrayView2;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
+use crate::simd::{self, Backend};
+
 const BLOCK_PX: usize = 16;
+/// The medians of so many blocks are known to 0.3 %.
+const ENOUGH: usize = 10_000;
 /// Sum of the squared taps of the second difference along both axes.
 const GAIN: f64 = 36.0;
 /// Mean of a block's smaller eigenvalue relative to the variance, for noise alone: the estimates scatter by about 12 %.
@@ -59,20 +63,22 @@ impl PairNoise {
     }
 }
 
-/// The noise of a pair of one size; pixels without a value (NaN) are ignored. `None` without a complete block.
+/// The noise of a pair of one size, from at most some [`ENOUGH`] blocks in rows spread over it; pixels without a value
+/// (NaN) are ignored. `None` without a complete block.
 pub fn of_pair(far: ArrayView2<f32>, near: ArrayView2<f32>) -> Option<PairNoise> {
     let (height, width) = far.dim();
     let [rows, columns] = [height, width].map(|n| n.saturating_sub(2) / BLOCK_PX);
+    let step = (rows * columns).div_ceil(ENOUGH).max(1);
     let [far, near] = [&far, &near].map(|image| image.as_standard_layout());
-    let of_row = |row: usize| {
-        let of_blocks = energies([far.view(), near.view()], row * BLOCK_PX, columns);
-        of_blocks.into_iter().filter_map(|([of_far, of_near, of_both], brightness)| {
+    let of_row = |index: usize| {
+        let of_blocks = energies([far.view(), near.view()], index * step * BLOCK_PX, columns);
+        of_blocks.into_iter().filter_map(|[of_far, of_near, of_both, brightness]| {
             let apart = (0.5 * (of_far - of_near)).hypot(of_both);
             let variance = (0.5 * (of_far + of_near) - apart) / SMALLER;
             (variance.is_finite() && brightness.is_finite()).then_some([brightness, variance])
         })
     };
-    let mut blocks: Vec<[f64; 2]> = (0..rows).into_par_iter().flat_map_iter(of_row).collect();
+    let mut blocks: Vec<[f64; 2]> = (0..rows.div_ceil(step)).into_par_iter().flat_map_iter(of_row).collect();
     if blocks.is_empty() {
         return None;
     }
@@ -95,38 +101,48 @@ pub fn of_pair(far: ArrayView2<f32>, near: ArrayView2<f32>) -> Option<PairNoise>
 }
 
 /// Variance of the far image, of the near one, their covariance, and the mean brightness, of each block of a row.
-fn energies(images: [ArrayView2<f32>; 2], top: usize, columns: usize) -> Vec<([f64; 3], f64)> {
-    const SEEN_PX: usize = BLOCK_PX + 2;
-    let pixels = (BLOCK_PX * BLOCK_PX) as f64;
-    let mut sums = vec![([0.0_f64; 3], 0.0_f64); columns];
-    for y in top + 1..=top + BLOCK_PX {
+fn energies(images: [ArrayView2<f32>; 2], top: usize, columns: usize) -> Vec<[f64; 4]> {
+    let width = columns * BLOCK_PX;
+    let mut of_columns = [(); 4].map(|()| vec![0.0; width]);
+    for y in top..top + BLOCK_PX {
         let rows = images.each_ref().map(|image| {
-            [y - 1, y, y + 1].map(|y| image.row(y).to_slice().expect("made in standard layout"))
+            [y, y + 1, y + 2].map(|y| image.row(y).to_slice().expect("made in standard layout"))
         });
-        for (column, (energy, brightness)) in sums.iter_mut().enumerate() {
-            let seen = |row: &&'_ [f32]| -> [f32; SEEN_PX] {
-                let from = &row[column * BLOCK_PX..column * BLOCK_PX + SEEN_PX];
-                std::array::from_fn(|x| from[x])
-            };
-            let [far, near] = rows.each_ref().map(|rows| rows.each_ref().map(seen));
-            let down = |[above, here, below]: &[[f32; SEEN_PX]; 3]| -> [f32; SEEN_PX] {
-                std::array::from_fn(|x| above[x] - 2.0 * here[x] + below[x])
-            };
-            let down = [down(&far), down(&near)];
-            // Eight parallel sums, which the compiler vectorises.
-            let (mut products, mut bright) = ([[0.0_f32; 8]; 3], [0.0_f32; 8]);
-            for x in 0..BLOCK_PX {
-                let [of_far, of_near] = down.each_ref().map(|down| down[x] - 2.0 * down[x + 1] + down[x + 2]);
-                products[0][x % 8] += of_far * of_far;
-                products[1][x % 8] += of_near * of_near;
-                products[2][x % 8] += of_far * of_near;
-                bright[x % 8] += 0.5 * (far[1][x + 1] + near[1][x + 1]);
-            }
-            for (sum, products) in energy.iter_mut().zip(&products) {
-                *sum += f64::from(products.iter().sum::<f32>()) / pixels / GAIN;
-            }
-            *brightness += f64::from(bright.iter().sum::<f32>()) / pixels;
+        simd::add_energies(Backend::best(), rows, of_columns.each_mut().map(|sums| &mut sums[..]));
+    }
+    let pixels = (BLOCK_PX * BLOCK_PX) as f64;
+    let of_block = |block: usize| {
+        let sums =
+            of_columns.each_ref().map(|of_columns| simd::sum(&of_columns[block..block + BLOCK_PX]) / pixels);
+        let [of_far, of_near, of_both, brightness] = sums;
+        [of_far / GAIN, of_near / GAIN, of_both / GAIN, brightness]
+    };
+    (0..width).step_by(BLOCK_PX).map(of_block).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use ndarray::Array2;
+
+    use super::*;
+
+    /// As many blocks as are looked at, and more. Without texture the median of the smaller eigenvalues is 0.855 of the
+    /// variance (numpy, 15,625 blocks of uniform noise): 0.93 of what [`SMALLER`] expects of them.
+    #[test]
+    fn noise_is_found_at_any_size() {
+        let uniform = |seed: usize, y: usize, x: usize| {
+            let mut h = (y * 4096 + x + (seed << 40)) as u64;
+            h = (h ^ (h >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+            h = (h ^ (h >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+            ((h ^ (h >> 31)) >> 40) as f32 / 16_777_216.0
+        };
+        for (height, width) in [(1000, 1000), (2100, 2050)] {
+            let [far, near] = [1, 2].map(|seed| {
+                Array2::from_shape_fn((height, width), |(y, x)| 0.2 + 0.02 * uniform(seed, y, x))
+            });
+            let expected = 0.93 * 0.02_f64.powi(2) / 12.0;
+            let found = of_pair(far.view(), near.view()).unwrap().mean_variance;
+            assert!((found / expected - 1.0).abs() < 0.01, "{height} x {width}: {found} of {expected}");
         }
     }
-    sums
 }
