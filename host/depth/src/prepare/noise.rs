@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 use crate::simd::{self, Backend};
 
 const BLOCK_PX: usize = 16;
-/// The medians of so many blocks are known to 0.3 %.
+/// Medians of this number of blocks are exact to 0.3 %.
 const ENOUGH: usize = 10_000;
 /// Sum of the squared taps of the second difference along both axes.
 const GAIN: f64 = 36.0;
@@ -126,7 +126,7 @@ mod tests {
 
     use super::*;
 
-    /// As many blocks as are looked at, and more. Without texture the median of the smaller eigenvalues is 0.855 of the
+    /// Fewer blocks than [`ENOUGH`], and more. Without texture the median of the smaller eigenvalues is 0.855 of the
     /// variance (numpy, 15,625 blocks of uniform noise): 0.93 of what [`SMALLER`] expects of them.
     #[test]
     fn noise_is_found_at_any_size() {
