@@ -22,6 +22,7 @@ use crate::prepare::{
 };
 use crate::psf::Psf;
 use crate::reason::Reason;
+use crate::simd::{self, Backend};
 use crate::validity::{Lost, Validity, ValiditySettings, assess};
 use scaled_blur::undo_scaled_blur;
 
@@ -401,12 +402,15 @@ fn of_estimate(
 ) -> DepthMap {
     let unit = (0.05 * optics.depth_per_alpha_mm(0.0).abs()) as f32;
     // Evidence is the reciprocal variance, like texture energy in the run time.
-    let evidence = |deviation: f32| (unit / deviation).powi(2);
-    let confidence = Zip::from(deviation_mm).par_map_collect(|deviation| {
-        let evidence = evidence(*deviation);
-        if evidence.is_finite() { evidence / (1.0 + evidence) } else { 0.0 }
+    let evidence = settings.run.fill.then(|| deviation_mm.mapv(|deviation| (unit / deviation).powi(2)));
+    let mut confidence = Array2::zeros(deviation_mm.dim());
+    let backend = settings.run.backend.unwrap_or_else(Backend::best);
+    Zip::from(confidence.rows_mut()).and(deviation_mm.rows()).par_for_each(|mut to, from| {
+        let (Some(to), Some(from)) = (to.as_slice_mut(), from.as_slice()) else {
+            unreachable!("maps are made in standard layout")
+        };
+        simd::evidence_row(backend, unit, from, to);
     });
-    let evidence = settings.run.fill.then(|| deviation_mm.mapv(evidence));
     let mut map =
         DepthMap { depth_mm, confidence, filled: None, low_texture_fraction: 0.0, warnings: Vec::new() };
     fill_border(&mut map, bank.reach_px() + 1);

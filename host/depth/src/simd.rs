@@ -31,8 +31,8 @@ pub(crate) use rows::{
 };
 pub(crate) use windows::{
     Believed, CubicSums, Deviation, Found, Residual, add_energies, add_products, add_row, believe_row,
-    compare_row, deviation_row, dimensionless_row, move_products, residual_row, roll_row, roots, row_sums,
-    sum, sum_of_squares, sum_rows, weigh_rows, without_noise,
+    compare_row, deviation_row, dimensionless_row, evidence_row, halve_row, move_products, residual_row,
+    roll_row, roots, row_sums, sum, sum_of_squares, sum_rows, weigh_rows, without_noise,
 };
 
 /// Calls the generic function inside one with the backend's instructions enabled, so that it is compiled with them.

@@ -22,6 +22,7 @@ pub(crate) fn halved(image: ArrayView2<f32>) -> Array2<f32> {
     const WEIGHTS: [f32; 4] = [0.125, 0.375, 0.375, 0.125];
     let (height, width) = image.dim();
     let (rows, columns) = (height / 2, width / 2);
+    let backend = Backend::best();
     let mut half = Array2::zeros((rows, columns));
     half.axis_iter_mut(Axis(0)).into_par_iter().enumerate().for_each_init(
         || vec![0.0_f32; width + 2],
@@ -44,9 +45,8 @@ pub(crate) fn halved(image: ArrayView2<f32>) -> Array2<f32> {
             }
             across[0] = across[1 + reflect(-1, width)];
             across[width + 1] = across[1 + reflect(width as isize, width)];
-            for (value, taps) in row.iter_mut().zip(across.windows(4).step_by(2)) {
-                *value = taps.iter().zip(WEIGHTS).map(|(value, weight)| value * weight).sum();
-            }
+            let Some(row) = row.as_slice_mut() else { unreachable!("made in standard layout") };
+            simd::halve_row(backend, across, WEIGHTS, row);
         },
     );
     half

@@ -193,6 +193,36 @@ fn dimensionless_generic<L: Lanes>(
 }
 
 dispatch! {
+    /// Every second weighted sum of four neighbours: `values` has at least `2 to.len() + 2`.
+    fn halve_row(values: &[f32], weights: [f32; 4], to: &mut [f32]) = halve_generic
+}
+
+#[inline(always)]
+fn halve_generic<L: Lanes>(values: &[f32], [a, b, c, d]: [f32; 4], to: &mut [f32]) {
+    let width = to.len();
+    let values = &values[..2 * width + 2];
+    for x in 0..width {
+        to[x] = a * values[2 * x] + b * values[2 * x + 1] + c * values[2 * x + 2] + d * values[2 * x + 3];
+    }
+}
+
+dispatch! {
+    /// Confidence by evidence, the square of `unit` over a deviation: `evidence / (1 + evidence)`; 0 unless that is finite.
+    fn evidence_row(unit: f32, deviation: &[f32], to: &mut [f32]) = evidence_generic
+}
+
+#[inline(always)]
+fn evidence_generic<L: Lanes>(unit: f32, deviation: &[f32], to: &mut [f32]) {
+    let width = to.len();
+    let deviation = &deviation[..width];
+    for x in 0..width {
+        let root = unit / deviation[x];
+        let evidence = root * root;
+        to[x] = if evidence < f32::INFINITY { evidence / (1.0 + evidence) } else { 0.0 };
+    }
+}
+
+dispatch! {
     /// For each column, adds the squares and the product of a pair's second differences along both axes, and its
     /// brightness. `rows` are three of the far image and three of the near one, two columns wider than the sums.
     fn add_energies(rows: [[&[f32]; 3]; 2], sums: [&mut [f32]; 4]) = add_energies_generic
