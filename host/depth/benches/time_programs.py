@@ -4,8 +4,8 @@
 usage: time_programs.py RUNS RESULTS < programs.json
 
 Reads a list of groups; a group is a list of commands, each a list of words. The commands of a group run in turn,
-RUNS times, each with the folder RESULTS empty. Each line of the answer is a list with, per command, the medians of CPU seconds (user and system), user
-seconds and wall seconds, and the peak memory in MiB.
+RUNS times, each with the folder RESULTS empty. Each line of the answer is a list with, per command, the medians of CPU
+seconds (user and system), user seconds and wall seconds, and the peak memory in MiB.
 """
 
 import json

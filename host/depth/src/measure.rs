@@ -327,7 +327,7 @@ pub(crate) fn measure(
         DepthMethod::Baseline(_) => BASELINE_OVER_WHITENED,
     };
     // The noise of the pair contains what fine texture the blur leaves; the residual of the right depth does not.
-    let noise = judging.excess.clamp(LEAST_NOISE, 1.0) as f32;
+    let noise = if judging.excess < 1.0 { judging.excess.max(LEAST_NOISE) as f32 } else { 1.0 };
     let of_deviation = noisier * noise.sqrt();
     if of_deviation != 1.0 {
         judging.deviation_mm.par_mapv_inplace(|deviation| deviation * of_deviation);
