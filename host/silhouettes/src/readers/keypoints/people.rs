@@ -26,6 +26,7 @@ struct Followed {
 }
 
 pub fn followed(frames: &[Vec<Person>]) -> (Vec<Track>, usize) {
+    let numbered = numbered(frames);
     let mut all: Vec<Followed> = Vec::new();
     let mut of_id: BTreeMap<i64, usize> = BTreeMap::new();
     for (frame, people) in frames.iter().enumerate() {
@@ -37,7 +38,7 @@ pub fn followed(frames: &[Vec<Person>]) -> (Vec<Track>, usize) {
                 taken[place] = true;
                 continue;
             };
-            if let Some(id) = person.id {
+            if let Some(id) = person.id.filter(|_| numbered) {
                 taken[place] = true;
                 let index = *of_id.entry(id).or_insert_with(|| {
                     all.push(begun(Some(id), centre, height));
@@ -89,6 +90,21 @@ pub fn followed(frames: &[Vec<Person>]) -> (Vec<Track>, usize) {
         whole
     };
     (all.iter().take(MOST).map(points).collect(), count)
+}
+
+/// Whether the file's numbers tell people apart: not if most frames of several people repeat one, as those of AlphaPose
+/// without tracking, where everybody is 0.
+fn numbered(frames: &[Vec<Person>]) -> bool {
+    let [mut several, mut repeated] = [0_usize; 2];
+    for people in frames {
+        let mut ids: Vec<i64> = people.iter().filter_map(|person| person.id).collect();
+        let count = ids.len();
+        ids.sort_unstable();
+        ids.dedup();
+        several += usize::from(count > 1);
+        repeated += usize::from(count > ids.len());
+    }
+    2 * repeated <= several
 }
 
 fn begun(id: Option<i64>, centre: [f64; 2], height: f64) -> Followed {

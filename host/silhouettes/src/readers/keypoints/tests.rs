@@ -97,6 +97,30 @@ fn coco_and_halpe_results_are_ordered_by_picture_and_gaps_are_empty() {
     }
 }
 
+/// AlphaPose without tracking numbers everybody 0 and lists people in any order.
+#[test]
+fn people_with_one_number_are_followed_by_place() {
+    let entry = |frame: usize, x: f64| {
+        format!(
+            r#"{{"image_id":"{frame}.jpg","category_id":1,"keypoints":{},"score":2.5,"idx":[0.0]}}"#,
+            flat(&person(layout(17), x))
+        )
+    };
+    let entries: Vec<String> = (0..12)
+        .flat_map(|frame| {
+            let [left, right] = [100.0, 400.0].map(|x| entry(frame, x + frame as f64));
+            if frame % 3 == 0 { [left, right] } else { [right, left] }
+        })
+        .collect();
+    let json = format!("[{}]", entries.join(","));
+    for number in [1, 2] {
+        let choices = Choices { person: Some(number), ..Choices::default() };
+        let found = read(json.as_bytes(), "json", choices).expect("two people");
+        let places: Vec<f64> = (0..12).map(|frame| found.by_name(frame)["nose"][0]).collect();
+        assert!(places.windows(2).all(|pair| (pair[1] - pair[0]).abs() < 30.0), "{places:?} mm");
+    }
+}
+
 #[test]
 fn coco_annotations_take_the_order_of_their_pictures() {
     let json = format!(
