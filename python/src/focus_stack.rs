@@ -4,7 +4,7 @@ use farnear_depth::{
     focus_stack::{StackSettings, depth_from_positions},
     prepare::align::Model,
 };
-use farnear_workflows::focus_stack::{aligned_stack, depth_of_places, even_positions};
+use farnear_workflows::focus_stack::{depth_of_places, even_positions, prepare_stack};
 use ndarray::ArrayView2;
 use numpy::{IntoPyArray, PyArray2};
 use pyo3::prelude::*;
@@ -128,7 +128,7 @@ pub fn focus_stack<'py>(
         owned.push(named::<Image<'py>>(&format!("images[{index}]"), image)?.view().to_owned());
     }
     let (map, depth, moved_px) = py.detach(|| -> PyResult<_> {
-        let moved_px = model.map_or(Ok(0.0), |model| aligned_stack(&mut owned, model)).map_err(wrong)?;
+        let moved_px = prepare_stack(&mut owned, model).map_err(wrong)?;
         let views: Vec<ArrayView2<'_, f32>> = owned.iter().map(|image| image.view()).collect();
         let positions = even_positions(views.len(), focused_at_mm.as_deref());
         let map = depth_from_positions(&views[..], &positions, &settings).map_err(wrong)?;

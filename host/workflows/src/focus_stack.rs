@@ -261,6 +261,9 @@ struct Record<'a> {
     grey: Grey,
     white_level: Option<u32>,
     images: &'a [String],
+    /// Brightness of each image relative to the usual one; images are divided by it.
+    #[serde(skip_serializing_if = "is_even")]
+    brightness: &'a [f64],
     left_out: &'a [String],
     positions: &'a [f64],
     distortion: Option<DistortionSection>,
@@ -268,6 +271,10 @@ struct Record<'a> {
     object_pixel_um: Option<f64>,
     optics: Option<Optics>,
     input: Vec<HashedFile>,
+}
+
+fn is_even(gains: &&[f64]) -> bool {
+    gains.iter().all(|gain| *gain == 1.0)
 }
 
 /// Least share of pixels with a value, below which a warning is given.
@@ -305,7 +312,15 @@ pub fn focus_stack(request: &FocusStackRequest, context: &Context<'_>) -> Result
     for index in indices.iter().rev() {
         images.remove(*index);
         frames.warps.remove(*index);
+        frames.gains.remove(*index);
     }
+    if !is_even(&&frames.gains[..]) {
+        let [least, most] = [f64::min, f64::max].map(|of| frames.gains.iter().copied().fold(1.0, of));
+        context.info(&format!(
+            "evening out the brightness of the images, {least:.2} to {most:.2} of the usual one"
+        ));
+    }
+    images.divide_by(&frames.gains);
     listed.without(&indices);
     let moved_px = frames::farthest_px(&frames.warps, images.dim(0));
     let unseen = images.prepare(listed.distortion(), &frames.warps)?;
@@ -337,6 +352,7 @@ pub fn focus_stack(request: &FocusStackRequest, context: &Context<'_>) -> Result
         grey: request.grey,
         white_level: request.white_level,
         images: &names,
+        brightness: &frames.gains,
         left_out: &figures.left_out,
         positions: &listed.positions,
         distortion: listed.distortion().map(DistortionSection::from),
@@ -359,13 +375,20 @@ fn name(path: &Path) -> String {
     path.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
-/// Aligns the images of a stack, NaN where they do not show the scene; returns the farthest distance that a pixel was moved, px.
-pub fn aligned_stack(images: &mut [Array2<f32>], model: Model) -> Result<f64> {
+/// Evens out the brightness of a stack's images and aligns them, NaN where they do not show the scene; returns the farthest
+/// distance that a pixel was moved, px.
+pub fn prepare_stack(images: &mut [Array2<f32>], model: Option<Model>) -> Result<f64> {
     let views: Vec<ArrayView2<f32>> = images.iter().map(|image| image.view()).collect();
     let positions = even_positions(views.len(), None);
-    let warps = frames::check(&views[..], &positions, Some(model), &Context::unattended())?.warps;
-    for (image, warp) in images.iter_mut().zip(&warps).filter(|(_, warp)| **warp != Warp::IDENTITY) {
-        *image = resample(image.view(), warp);
+    let frames::Frames { warps, gains, .. } =
+        frames::check(&views[..], &positions, model, &Context::unattended())?;
+    for ((image, warp), gain) in images.iter_mut().zip(&warps).zip(gains) {
+        if gain != 1.0 {
+            *image /= gain as f32;
+        }
+        if *warp != Warp::IDENTITY {
+            *image = resample(image.view(), warp);
+        }
     }
     Ok(images.first().map_or(0.0, |first| frames::farthest_px(&warps, first.dim())))
 }

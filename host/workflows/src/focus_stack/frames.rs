@@ -5,6 +5,7 @@
 //! shaken frame correlates, but is less sharp than its neighbours allow ([`shaken`]). Where neighbours correlate
 //! little, no frame is judged.
 
+mod brightness;
 mod shaken;
 #[cfg(test)]
 mod tests;
@@ -38,6 +39,8 @@ const DRIFT_PX: f64 = 2.0;
 pub(super) struct Frames {
     /// Warp of each image onto the reference; identity without alignment.
     pub warps: Vec<Warp>,
+    /// Brightness of each image relative to the usual one.
+    pub gains: Vec<f64>,
     pub left_out: Vec<(usize, String)>,
     /// First or last images of which it cannot be told whether they are shaken.
     pub untold: Vec<usize>,
@@ -49,8 +52,8 @@ pub(super) struct Frames {
 
 impl Frames {
     pub fn unchecked(count: usize) -> Self {
-        let warps = vec![Warp::IDENTITY; count];
-        Self { warps, left_out: Vec::new(), untold: Vec::new(), usual: None, drift_px: 0.0 }
+        let (warps, gains) = (vec![Warp::IDENTITY; count], vec![1.0; count]);
+        Self { warps, gains, left_out: Vec::new(), untold: Vec::new(), usual: None, drift_px: 0.0 }
     }
 
     pub fn warnings(&self) -> Vec<String> {
@@ -126,6 +129,7 @@ where
             frames.left_out.push((index, reason.into()));
         }
     }
+    frames.gains = brightness::gains(&neighbours.brightness, &members);
     frames.untold = shaken.untold;
     frames.usual = Some(scene.usual);
     if model.is_none() {
@@ -159,6 +163,7 @@ struct Neighbours {
     links: Vec<Link>,
     /// Of each frame, by blocks.
     sharpness: Vec<Vec<f64>>,
+    brightness: Vec<Vec<f64>>,
 }
 
 struct Comparison<'a, S: ?Sized> {
@@ -202,11 +207,12 @@ where
 
     fn neighbours(&self) -> Result<Neighbours> {
         let count = self.images.count();
-        let mut found = Neighbours { links: Vec::with_capacity(count), sharpness: Vec::with_capacity(count) };
+        let mut found = Neighbours { links: Vec::new(), sharpness: Vec::new(), brightness: Vec::new() };
         let mut before: Option<CowArray<'_, f32, Ix2>> = None;
         for index in 0..count {
             let image = self.image(index)?;
             found.sharpness.push(shaken::of_blocks(image.view()));
+            found.brightness.push(brightness::of_blocks(image.view()));
             found.links.extend(before.map(|before| self.compared(before.view(), image.view())));
             before = Some(image);
             self.context.progress.advance("images compared", index + 1, Some(count));
@@ -262,6 +268,11 @@ fn usual(links: &[Link]) -> f64 {
     let mut values: Vec<f64> = links.iter().map(|link| link.correlation).collect();
     values.sort_by(f64::total_cmp);
     values.get((USUAL * values.len() as f64) as usize).copied().unwrap_or(0.0)
+}
+
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied().unwrap_or(1.0)
 }
 
 /// Farthest distance that the warps move a pixel of (height, width), px.

@@ -35,6 +35,8 @@ pub(super) struct Images<'a> {
     folder: PathBuf,
     /// Where each image begins in the file, bytes, with its height and width.
     images: Vec<(u64, (usize, usize))>,
+    /// Brightness of each image, which is divided by it.
+    gains: Vec<f32>,
     /// Pixels are divided by it.
     white_level: f32,
     /// Step between the codes of the coarsest image, before the division.
@@ -58,6 +60,7 @@ impl<'a> Images<'a> {
             file: Mutex::new(file),
             folder: request.out.clone(),
             images: Vec::with_capacity(paths.len()),
+            gains: vec![1.0; paths.len()],
             white_level: 1.0,
             code_step: 0.0,
             context,
@@ -87,6 +90,11 @@ impl<'a> Images<'a> {
 
     pub fn remove(&mut self, index: usize) {
         self.images.remove(index);
+        self.gains.remove(index);
+    }
+
+    pub fn divide_by(&mut self, gains: &[f64]) {
+        self.gains = gains.iter().map(|gain| *gain as f32).collect();
     }
 
     /// Removes the lens' distortion from all images and moves each by its warp, NaN where it does not show the scene. Where the
@@ -155,6 +163,9 @@ impl Slices for Images<'_> {
         let mut image = self.stored(index, rows)?;
         if self.white_level != 1.0 {
             image.mapv_inplace(|value| (value / self.white_level).min(1.0));
+        }
+        if self.gains[index] != 1.0 {
+            image /= self.gains[index];
         }
         Ok(image.into())
     }

@@ -252,3 +252,18 @@ fn no_good_frame_of_a_coarse_stack_is_left_out() {
         }
     }
 }
+
+#[test]
+fn flicker_costs_nothing() {
+    let good = true_stack(&even_positions());
+    let (clean, ..) = error(&good, Vec::new());
+    let factors = [1.0, 1.1, 0.85, 1.0, 1.25, 0.9, 1.0, 0.8];
+    let flickering = || good.iter().zip(factors.iter().cycle()).map(|(image, factor)| image * *factor);
+    let mut images: Vec<Array2<f32>> = flickering().collect();
+    assert_eq!(left_out(&images, None), [0; 0]);
+    let (untreated, ..) = error(&images, Vec::new());
+    super::super::prepare_stack(&mut images, None).unwrap();
+    let (found, known, _) = error(&images, Vec::new());
+    assert!(untreated > 1.1 * clean, "{untreated} {clean}: the factors must matter");
+    assert!(found < 1.05 * clean && known > 0.98, "{found} {clean} {known}");
+}

@@ -1,0 +1,86 @@
+//! Flicker of lamp or exposure: the brightness of whole frames. Defocus keeps the mean of a region, so a factor that is
+//! common to all blocks of a frame is not of the scene. Sharpness grows with it, and a bright frame attracts depths.
+
+use ndarray::{ArrayView2, s};
+
+use super::median;
+
+const BLOCKS: usize = 6;
+/// Least deviation from 1 of a factor that counts, and in multiples of its median deviation among the blocks.
+const LEAST: f64 = 0.01;
+const SIGNIFICANT: f64 = 3.0;
+/// A darker frame would have its noise amplified.
+const LARGEST: f64 = 2.0;
+
+/// Mean of each block of a frame, without pixels that are not finite.
+pub(super) fn of_blocks(image: ArrayView2<f32>) -> Vec<f64> {
+    let (height, width) = image.dim();
+    let edges = |size: usize, block: usize| size * block / BLOCKS..size * (block + 1) / BLOCKS;
+    let mean = |block: usize| {
+        let part = image.slice(s![edges(height, block / BLOCKS), edges(width, block % BLOCKS)]);
+        let seen = || part.iter().filter(|value| value.is_finite());
+        seen().map(|value| f64::from(*value)).sum::<f64>() / seen().count().max(1) as f64
+    };
+    (0..BLOCKS * BLOCKS).map(mean).collect()
+}
+
+/// Brightness of each frame relative to the `members`' usual one; 1 where its blocks do not agree on another.
+pub(super) fn gains(frames: &[Vec<f64>], members: &[usize]) -> Vec<f64> {
+    let usual: Vec<f64> = (0..BLOCKS * BLOCKS)
+        .map(|block| median(members.iter().map(|frame| frames[*frame][block]).collect()))
+        .collect();
+    let gain = |means: &Vec<f64>| {
+        let ratios: Vec<f64> = means
+            .iter()
+            .zip(&usual)
+            .filter(|(_, usual)| **usual > 0.0)
+            .map(|(own, usual)| own / usual)
+            .collect();
+        let gain = median(ratios.clone());
+        let spread = median(ratios.iter().map(|ratio| (ratio - gain).abs()).collect());
+        let counts = (gain - 1.0).abs() > LEAST.max(SIGNIFICANT * spread);
+        let small = (LARGEST.recip()..=LARGEST).contains(&gain);
+        if counts && small { gain } else { 1.0 }
+    };
+    frames.iter().map(gain).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use ndarray::Array2;
+
+    use super::*;
+
+    fn gains_of(factors: &[f64], slope: f64) -> Vec<f64> {
+        let frames: Vec<Vec<f64>> = factors
+            .iter()
+            .enumerate()
+            .map(|(number, factor)| {
+                of_blocks(
+                    Array2::from_shape_fn((60, 90), |(y, x)| {
+                        let tilt = 1.0 + slope * (number as f64 - 2.0) * (x as f64 - 44.5) / 44.5;
+                        (factor * tilt * (0.3 + 0.002 * y as f64)) as f32
+                    })
+                    .view(),
+                )
+            })
+            .collect();
+        gains(&frames, &[0, 1, 2, 3, 4])
+    }
+
+    #[test]
+    fn a_factor_of_the_whole_frame_is_found() {
+        let found = gains_of(&[1.0, 1.3, 1.0, 0.8, 1.0], 0.0);
+        for (found, expected) in found.iter().zip([1.0, 1.3, 1.0, 0.8, 1.0]) {
+            assert!((found - expected).abs() < 1e-6, "{found} {expected}");
+        }
+    }
+
+    /// Slices of a microscope that sees one plane, noise, and frames that are all but dark.
+    #[test]
+    fn other_changes_are_of_the_scene() {
+        assert_eq!(gains_of(&[1.0, 1.05, 1.0, 1.1, 1.0], 0.3), [1.0; 5]);
+        assert_eq!(gains_of(&[1.0, 1.005, 1.0, 0.995, 1.0], 0.0), [1.0; 5]);
+        assert_eq!(gains_of(&[1.0, 0.1, 1.0, 3.0, 1.0], 0.0), [1.0; 5]);
+    }
+}
