@@ -4,6 +4,7 @@
 pub mod adaptive_window;
 pub mod baselines;
 mod border;
+pub mod brightness;
 pub mod calibrate;
 mod coarseness;
 pub mod confidence;

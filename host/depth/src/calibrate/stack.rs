@@ -18,6 +18,7 @@ mod response;
 
 use ndarray::Array2;
 
+use crate::brightness;
 use crate::measure::binned;
 use crate::optics::{FocusSection, LensSection, Optics, OpticsFile, SensorSection};
 use crate::psf::Psf;
@@ -124,9 +125,11 @@ pub fn calibrate_stack(
 ) -> Result<StackLens, StackError> {
     check(slices, settings)?;
     let go_on = || if proceed(0) { Ok(()) } else { Err(StackError::Stopped) };
-    let plane = FocusPlane::of(slices).map_err(StackError::NoFocus)?;
+    let evened = brightness::evened(slices);
+    let plane = FocusPlane::of(&evened).map_err(StackError::NoFocus)?;
     go_on()?;
-    let blur = BlurCurve::of(slices, &plane);
+    let blur = BlurCurve::of(&evened, &plane);
+    drop(evened);
     go_on()?;
     let (bin, pair_step) = separation(&blur, slices.len(), settings)?;
     let limit = FLAT * pair_step as f64;

@@ -57,13 +57,30 @@ fn best_um(lens: &WaveLens) -> f64 {
 
 const TARGET: Plane = Plane([7.1, 0.7, -0.3]);
 
-fn calibrated(lens: &WaveLens) -> Result<StackLens, StackError> {
+fn stack(lens: &WaveLens) -> Vec<Array2<f32>> {
     let cells = random_texture(true, SIZE[0], SIZE[1], CONTRAST, 11);
-    let stack: Vec<Array2<f32>> =
-        (0..SLICES).map(|index| slice(lens, &cells, TARGET, index, best_um(lens), 1)).collect();
+    (0..SLICES).map(|index| slice(lens, &cells, TARGET, index, best_um(lens), 1)).collect()
+}
+
+fn settings() -> StackSettings {
     let moved = Moved::Target { pixel_um: 6.0, far_mm: None };
-    let settings = StackSettings { step_mm: STEP_MM, moved, pair_step: None, bin: None, coding: 0.0 };
-    calibrate_stack(&stack, &settings, &|_| true)
+    StackSettings { step_mm: STEP_MM, moved, pair_step: None, bin: None, coding: 0.0 }
+}
+
+fn calibrated(lens: &WaveLens) -> Result<StackLens, StackError> {
+    calibrate_stack(&stack(lens), &settings(), &|_| true)
+}
+
+/// A factor on a whole slice is no detail: the plane of best focus stays, and with it all depths.
+#[test]
+fn a_flickering_lamp_moves_no_depth() {
+    let factors = [1.0, 0.9, 1.12, 1.0, 0.85, 1.05, 1.15, 0.95, 0.88, 1.0];
+    let mut stack = stack(&lens(0.0, 0.0));
+    stack.iter_mut().zip(factors.iter().cycle()).for_each(|(slice, factor)| *slice *= 0.8 * factor);
+    let found = calibrate_stack(&stack, &settings(), &|_| true).unwrap();
+    let middle = found.plane.at(SIZE[1] as f64 / 2.0, SIZE[0] as f64 / 2.0);
+    assert!((middle - TARGET.0[0]).abs() < 0.1, "{middle}");
+    assert!((found.held_out.slope - 1.0).abs() < 0.02, "{:?}", found.held_out);
 }
 
 #[derive(Debug)]

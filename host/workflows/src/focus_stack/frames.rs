@@ -5,12 +5,12 @@
 //! shaken frame correlates, but is less sharp than its neighbours allow ([`shaken`]). Where neighbours correlate
 //! little, no frame is judged.
 
-mod brightness;
 mod shaken;
 #[cfg(test)]
 mod tests;
 
 use farnear_depth::{
+    brightness,
     focus_stack::Slices,
     prepare::{
         align::{self, Model},
@@ -268,11 +268,6 @@ fn usual(links: &[Link]) -> f64 {
     let mut values: Vec<f64> = links.iter().map(|link| link.correlation).collect();
     values.sort_by(f64::total_cmp);
     values.get((USUAL * values.len() as f64) as usize).copied().unwrap_or(0.0)
-}
-
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(1.0)
 }
 
 /// Farthest distance that the warps move a pixel of (height, width), px.

@@ -1,9 +1,9 @@
-//! Flicker of lamp or exposure: the brightness of whole frames. Defocus keeps the mean of a region, so a factor that is
-//! common to all blocks of a frame is not of the scene. Sharpness grows with it, and a bright frame attracts depths.
+//! Flicker of lamp or exposure: the brightness of whole frames of a stack. Defocus keeps the mean of a region, so a factor
+//! that is common to all blocks of a frame is not of the scene. Sharpness grows with it, and a bright frame attracts depths.
 
-use ndarray::{ArrayView2, s};
+use std::borrow::Cow;
 
-use super::median;
+use ndarray::{Array2, ArrayView2, s};
 
 const BLOCKS: usize = 6;
 /// Least deviation from 1 of a factor that counts, and in multiples of its median deviation among the blocks.
@@ -12,8 +12,8 @@ const SIGNIFICANT: f64 = 3.0;
 /// A darker frame would have its noise amplified.
 const LARGEST: f64 = 2.0;
 
-/// Mean of each block of a frame, without pixels that are not finite.
-pub(super) fn of_blocks(image: ArrayView2<f32>) -> Vec<f64> {
+/// Mean of each of 6x6 blocks of a frame, without pixels that are not finite.
+pub fn of_blocks(image: ArrayView2<f32>) -> Vec<f64> {
     let (height, width) = image.dim();
     let edges = |size: usize, block: usize| size * block / BLOCKS..size * (block + 1) / BLOCKS;
     let mean = |block: usize| {
@@ -24,8 +24,9 @@ pub(super) fn of_blocks(image: ArrayView2<f32>) -> Vec<f64> {
     (0..BLOCKS * BLOCKS).map(mean).collect()
 }
 
-/// Brightness of each frame relative to the `members`' usual one; 1 where its blocks do not agree on another.
-pub(super) fn gains(frames: &[Vec<f64>], members: &[usize]) -> Vec<f64> {
+/// Brightness of each frame, from its blocks ([`of_blocks`]), relative to the usual one of the `members`; 1 where its blocks
+/// do not agree on another from 0.5 to 2.
+pub fn gains(frames: &[Vec<f64>], members: &[usize]) -> Vec<f64> {
     let usual: Vec<f64> = (0..BLOCKS * BLOCKS)
         .map(|block| median(members.iter().map(|frame| frames[*frame][block]).collect()))
         .collect();
@@ -43,6 +44,21 @@ pub(super) fn gains(frames: &[Vec<f64>], members: &[usize]) -> Vec<f64> {
         if counts && small { gain } else { 1.0 }
     };
     frames.iter().map(gain).collect()
+}
+
+/// The frames divided by their [`gains`]; borrowed if all are 1.
+pub fn evened(frames: &[Array2<f32>]) -> Cow<'_, [Array2<f32>]> {
+    let blocks: Vec<Vec<f64>> = frames.iter().map(|frame| of_blocks(frame.view())).collect();
+    let gains = gains(&blocks, &(0..frames.len()).collect::<Vec<_>>());
+    if gains.iter().all(|gain| *gain == 1.0) {
+        return frames.into();
+    }
+    frames.iter().zip(gains).map(|(frame, gain)| frame / gain as f32).collect::<Vec<_>>().into()
+}
+
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied().unwrap_or(1.0)
 }
 
 #[cfg(test)]
