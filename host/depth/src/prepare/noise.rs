@@ -63,7 +63,7 @@ impl PairNoise {
     }
 }
 
-/// The noise of a pair of one size, from at most some [`ENOUGH`] blocks in rows spread over it; pixels without a value
+/// The noise of a pair of one size, from at most some 10,000 blocks in rows spread over it; pixels without a value
 /// (NaN) are ignored. `None` without a complete block.
 pub fn of_pair(far: ArrayView2<f32>, near: ArrayView2<f32>) -> Option<PairNoise> {
     let (height, width) = far.dim();
