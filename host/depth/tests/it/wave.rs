@@ -71,7 +71,7 @@ fn calibrated(lens: &WaveLens) -> Result<StackLens, StackError> {
     calibrate_stack(&stack(lens), &settings(), &|_| true)
 }
 
-/// A factor on a whole slice is no detail: the plane of best focus stays, and with it all depths.
+/// A factor on a whole slice changes neither the plane of best focus nor depth.
 #[test]
 fn a_flickering_lamp_moves_no_depth() {
     let factors = [1.0, 0.9, 1.12, 1.0, 0.85, 1.05, 1.15, 0.95, 0.88, 1.0];
