@@ -2,6 +2,7 @@
 //! that is common to all blocks of a frame is not of the scene. Sharpness grows with it, and a bright frame attracts depths.
 
 use std::borrow::Cow;
+use std::ops::Range;
 
 use ndarray::{Array2, ArrayView2, s};
 
@@ -12,16 +13,20 @@ const SIGNIFICANT: f64 = 3.0;
 /// A darker frame would have its noise amplified.
 const LARGEST: f64 = 2.0;
 
-/// Mean of each of 6x6 blocks of a frame, without pixels that are not finite.
-pub fn of_blocks(image: ArrayView2<f32>) -> Vec<f64> {
-    let (height, width) = image.dim();
+/// Rows and columns of the 6x6 blocks of an image of (height, width).
+pub fn blocks((height, width): (usize, usize)) -> impl Iterator<Item = [Range<usize>; 2]> {
     let edges = |size: usize, block: usize| size * block / BLOCKS..size * (block + 1) / BLOCKS;
-    let mean = |block: usize| {
-        let part = image.slice(s![edges(height, block / BLOCKS), edges(width, block % BLOCKS)]);
+    (0..BLOCKS * BLOCKS).map(move |block| [edges(height, block / BLOCKS), edges(width, block % BLOCKS)])
+}
+
+/// Mean of each of the [`blocks`] of a frame, without pixels that are not finite.
+pub fn of_blocks(image: ArrayView2<f32>) -> Vec<f64> {
+    let mean = |[rows, columns]: [Range<usize>; 2]| {
+        let part = image.slice(s![rows, columns]);
         let seen = || part.iter().filter(|value| value.is_finite());
         seen().map(|value| f64::from(*value)).sum::<f64>() / seen().count().max(1) as f64
     };
-    (0..BLOCKS * BLOCKS).map(mean).collect()
+    blocks(image.dim()).map(mean).collect()
 }
 
 /// Brightness of each frame, from its blocks ([`of_blocks`]), relative to the usual one of the `members`; 1 where its blocks

@@ -15,6 +15,7 @@ mod median;
 #[cfg(all(target_arch = "aarch64", target_feature = "neon"))]
 mod neon;
 mod peak;
+mod preparation;
 mod rows;
 #[cfg(test)]
 mod same_everywhere;
@@ -25,14 +26,16 @@ use serde::{Deserialize, Serialize};
 pub(crate) use choice::{Contrast, choose_certain, contrast_row, decide_row};
 pub(crate) use convolve::{MAX_ROWS, READ_BEYOND, Taps, convolve, convolve_rows};
 pub(crate) use median::median_row;
+pub(crate) use preparation::{
+    add_energies, compare_row, halve_row, roll_row, sum, sum_of_squares, weigh_rows,
+};
 pub(crate) use rows::{
     CubicRow, Extremes, SEVEN_BLOCK, WindowRow, confidence_row, extremes, normalise_row, vertical_sums,
     vertical_sums_of_seven,
 };
 pub(crate) use windows::{
-    Believed, CubicSums, Deviation, Found, Residual, add_energies, add_products, add_row, believe_row,
-    compare_row, deviation_row, dimensionless_row, evidence_row, halve_row, move_products, residual_row,
-    roll_row, roots, row_sums, sum, sum_of_squares, sum_rows, weigh_rows, without_noise,
+    Believed, CubicSums, Deviation, Found, Residual, add_products, add_row, believe_row, deviation_row,
+    dimensionless_row, evidence_row, move_products, residual_row, roots, row_sums, sum_rows, without_noise,
 };
 
 /// Calls the generic function inside one with the backend's instructions enabled, so that it is compiled with them.

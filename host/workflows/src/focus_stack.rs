@@ -273,7 +273,7 @@ struct Record<'a> {
     input: Vec<HashedFile>,
 }
 
-fn is_even(gains: &&[f64]) -> bool {
+fn is_even(gains: &[f64]) -> bool {
     gains.iter().all(|gain| *gain == 1.0)
 }
 
@@ -288,7 +288,7 @@ pub fn focus_stack(request: &FocusStackRequest, context: &Context<'_>) -> Result
     let mut warnings = std::mem::take(&mut listed.remarks);
     let mut images = Images::read(&listed.images, request, &mut warnings, &staging, context)?;
     let mut frames = if request.use_all && request.align.0.is_none() {
-        frames::Frames::unchecked(images.count())
+        frames::Frames { gains: frames::gains(&images)?, ..frames::Frames::unchecked(images.count()) }
     } else {
         frames::check(&images, &listed.even_positions(), request.align.0, context)?
     };
@@ -314,7 +314,7 @@ pub fn focus_stack(request: &FocusStackRequest, context: &Context<'_>) -> Result
         frames.warps.remove(*index);
         frames.gains.remove(*index);
     }
-    if !is_even(&&frames.gains[..]) {
+    if !is_even(&frames.gains) {
         let [least, most] = [f64::min, f64::max].map(|of| frames.gains.iter().copied().fold(1.0, of));
         context.info(&format!(
             "evening out the brightness of the images, {least:.2} to {most:.2} of the usual one"

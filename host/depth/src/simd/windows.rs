@@ -129,35 +129,6 @@ fn roots_generic<L: Lanes>(sums: CubicSums<'_>, floor: f32, found: Found<'_>) {
 }
 
 dispatch! {
-    /// Adds the first row to `sums` and takes the second one off; `to` is their `share`.
-    fn roll_row(rows: [&[f32]; 2], sums: &mut [f64], share: f64, to: &mut [f32]) = roll_generic
-}
-
-#[inline(always)]
-fn roll_generic<L: Lanes>(rows: [&[f32]; 2], sums: &mut [f64], share: f64, to: &mut [f32]) {
-    let width = to.len();
-    let ([come, gone], sums) = (rows.map(|row| &row[..width]), &mut sums[..width]);
-    for x in 0..width {
-        sums[x] = (sums[x] + f64::from(come[x])) - f64::from(gone[x]);
-        to[x] = (sums[x] * share) as f32;
-    }
-}
-
-dispatch! {
-    fn weigh_rows(rows: [&[f32]; 5], weights: [f32; 5], to: &mut [f32]) = weigh_generic
-}
-
-#[inline(always)]
-fn weigh_generic<L: Lanes>(rows: [&[f32]; 5], weights: [f32; 5], to: &mut [f32]) {
-    let width = to.len();
-    let [a, b, c, d, e] = rows.map(|row| &row[..width]);
-    for x in 0..width {
-        let first = (weights[0] * a[x] + weights[1] * b[x]) + weights[2] * c[x];
-        to[x] = (first + weights[3] * d[x]) + weights[4] * e[x];
-    }
-}
-
-dispatch! {
     fn add_row(values: &[f32], times: f32, sums: &mut [f32]) = add_row_generic
 }
 
@@ -193,20 +164,6 @@ fn dimensionless_generic<L: Lanes>(
 }
 
 dispatch! {
-    /// Every second weighted sum of four neighbours: `values` has at least `2 to.len() + 2`.
-    fn halve_row(values: &[f32], weights: [f32; 4], to: &mut [f32]) = halve_generic
-}
-
-#[inline(always)]
-fn halve_generic<L: Lanes>(values: &[f32], [a, b, c, d]: [f32; 4], to: &mut [f32]) {
-    let width = to.len();
-    let values = &values[..2 * width + 2];
-    for x in 0..width {
-        to[x] = a * values[2 * x] + b * values[2 * x + 1] + c * values[2 * x + 2] + d * values[2 * x + 3];
-    }
-}
-
-dispatch! {
     /// Confidence by evidence, the square of `unit` over a deviation: `evidence / (1 + evidence)`; 0 unless that is finite.
     fn evidence_row(unit: f32, deviation: &[f32], to: &mut [f32]) = evidence_generic
 }
@@ -219,29 +176,6 @@ fn evidence_generic<L: Lanes>(unit: f32, deviation: &[f32], to: &mut [f32]) {
         let root = unit / deviation[x];
         let evidence = root * root;
         to[x] = if evidence < f32::INFINITY { evidence / (1.0 + evidence) } else { 0.0 };
-    }
-}
-
-dispatch! {
-    /// For each column, adds the squares and the product of a pair's second differences along both axes, and its
-    /// brightness. `rows` are three of the far image and three of the near one, two columns wider than the sums.
-    fn add_energies(rows: [[&[f32]; 3]; 2], sums: [&mut [f32]; 4]) = add_energies_generic
-}
-
-#[inline(always)]
-fn add_energies_generic<L: Lanes>(rows: [[&[f32]; 3]; 2], [far, near, both, brightness]: [&mut [f32]; 4]) {
-    let width = far.len();
-    let (near, both, brightness) = (&mut near[..width], &mut both[..width], &mut brightness[..width]);
-    let [of_far, of_near] = rows.map(|rows| rows.map(|row| [0, 1, 2].map(|d| &row[d..d + width])));
-    for x in 0..width {
-        let [a, b] = [&of_far, &of_near].map(|rows| {
-            let [left, here, right] = [0, 1, 2].map(|d| rows[0][d][x] - 2.0 * rows[1][d][x] + rows[2][d][x]);
-            left - 2.0 * here + right
-        });
-        far[x] += a * a;
-        near[x] += b * b;
-        both[x] += a * b;
-        brightness[x] += 0.5 * (of_far[1][1][x] + of_near[1][1][x]);
     }
 }
 
@@ -437,46 +371,6 @@ fn probability(deviation: f32, misfit: f32) -> f32 {
 }
 
 dispatch! {
-    /// Compares a pair's bands from the mean product of both, and of each with itself, around each pixel. Marks correlations
-    /// below `limits[1]` of the largest that `noise` permits, where the part `limits[0]` of both is above the noise, and
-    /// returns the sums there: of the correlations, of the largest ones, and the number of pixels.
-    fn compare_row(noise: f32, limits: [f32; 2], means: [&[f32]; 3], different: &mut [bool]) -> [f32; 3] =
-        compare_generic
-}
-
-#[inline(always)]
-fn compare_generic<L: Lanes>(
-    noise: f32,
-    [least_detail, least_correlation]: [f32; 2],
-    [product, of_far, of_near]: [&[f32]; 3],
-    different: &mut [bool],
-) -> [f32; 3] {
-    const TOGETHER: usize = 16;
-    let width = different.len();
-    let (product, of_far, of_near) = (&product[..width], &of_far[..width], &of_near[..width]);
-    let mut sums = [[0.0_f32; TOGETHER]; 3];
-    let mut begin = 0;
-    // Whole vectors; then single pixels, which the first sums take.
-    while begin < width {
-        let count = if begin + TOGETHER <= width { TOGETHER } else { 1 };
-        for i in 0..count {
-            let x = begin + i;
-            let (a, b) = (of_far[x], of_near[x]);
-            let detail = [a, b].map(|energy| 1.0 - noise / energy.max(f32::MIN_POSITIVE));
-            let counts = (detail[0] > least_detail) & (detail[1] > least_detail);
-            let largest = (detail[0] * detail[1]).sqrt();
-            let correlation = product[x] / (a * b).sqrt();
-            different[x] = counts & (correlation < least_correlation * largest);
-            sums[0][i] += if counts { correlation } else { 0.0 };
-            sums[1][i] += if counts { largest } else { 0.0 };
-            sums[2][i] += if counts { 1.0 } else { 0.0 };
-        }
-        begin += count;
-    }
-    sums.map(|sums| sums.iter().sum())
-}
-
-dispatch! {
     fn sum_rows(rows: [&[f32]; 7], sums: &mut [f32]) = sum_rows_generic
 }
 
@@ -487,23 +381,6 @@ fn sum_rows_generic<L: Lanes>(rows: [&[f32]; 7], sums: &mut [f32]) {
     for x in 0..width {
         sums[x] = a[x] + b[x] + c[x] + d[x] + e[x] + f[x] + g[x];
     }
-}
-
-pub(crate) fn sum(values: &[f32]) -> f64 {
-    sum_of(values, |value| value)
-}
-
-pub(crate) fn sum_of_squares(values: &[f32]) -> f64 {
-    sum_of(values, |value| value * value)
-}
-
-fn sum_of(values: &[f32], each: impl Fn(f32) -> f32) -> f64 {
-    let (parts, rest) = values.as_chunks::<8>();
-    let mut sums = [0.0_f32; 8];
-    for part in parts {
-        sums.iter_mut().zip(part).for_each(|(sum, value)| *sum += each(*value));
-    }
-    sums.into_iter().chain(rest.iter().map(|value| each(*value))).map(f64::from).sum()
 }
 
 #[cfg(test)]
@@ -522,52 +399,6 @@ mod tests {
                 for (x, sum) in sums.iter().enumerate() {
                     assert_eq!(*sum, values[x..x + window].iter().sum::<f32>(), "{backend:?} {window}");
                 }
-            }
-        }
-    }
-
-    #[test]
-    fn second_differences_are_those_of_each_pixel() {
-        let value = |seed: usize, y: usize, x: usize| ((seed + y * 7919 + x * x * 104_729) % 101) as f32;
-        for backend in Backend::available() {
-            for width in [16, 48, 50] {
-                let rows = [3, 59].map(|seed| {
-                    [0, 1, 2].map(|y| (0..width + 2).map(|x| value(seed, y, x)).collect::<Vec<f32>>())
-                });
-                let mut sums = [(); 4].map(|()| vec![1.0; width]);
-                let views = rows.each_ref().map(|rows| rows.each_ref().map(|row| &row[..]));
-                add_energies(backend, views, sums.each_mut().map(|sums| &mut sums[..]));
-                for x in 0..width {
-                    let taps = [1.0, -2.0, 1.0];
-                    let [a, b] = rows.each_ref().map(|rows| {
-                        let at = |i: usize| taps[i / 3] * taps[i % 3] * rows[i / 3][x + i % 3];
-                        (0..9).map(at).sum::<f32>()
-                    });
-                    let middle = 0.5 * (rows[0][1][x + 1] + rows[1][1][x + 1]);
-                    let expected = [a * a, b * b, a * b, middle].map(|value| 1.0 + value);
-                    assert_eq!(sums.each_ref().map(|sums| sums[x]), expected, "{backend:?} {width} {x}");
-                }
-            }
-        }
-    }
-
-    #[test]
-    fn only_pixels_with_detail_in_both_images_are_compared() {
-        // Noise 1: the third pixel has no detail in the near image, the last two are unlike and alike.
-        let means: [Vec<f32>; 3] =
-            [[8.0, -8.0, 8.0].repeat(7), [10.0, 10.0, 10.0].repeat(7), [10.0, 10.0, 1.0].repeat(7)];
-        for backend in Backend::available() {
-            for width in [3, 16, 21] {
-                let mut different = vec![true; width];
-                let rows = means.each_ref().map(|row| &row[..width]);
-                let [correlation, largest, count] =
-                    compare_row(backend, 1.0, [0.6, 0.5], rows, &mut different);
-                let expected: Vec<bool> = (0..width).map(|x| x % 3 == 1).collect();
-                assert_eq!(different, expected, "{backend:?}");
-                let [alike, unlike] = [0, 1].map(|first| (width + 2 - first) / 3);
-                assert_eq!(count, (alike + unlike) as f32);
-                assert!((correlation - 0.8 * (alike as f32 - unlike as f32)).abs() < 1e-5);
-                assert!((largest - 0.9 * count).abs() < 1e-5);
             }
         }
     }

@@ -79,6 +79,7 @@ fn a_flickering_lamp_moves_no_depth() {
     stack.iter_mut().zip(factors.iter().cycle()).for_each(|(slice, factor)| *slice *= 0.8 * factor);
     let found = calibrate_stack(&stack, &settings(), &|_| true).unwrap();
     let middle = found.plane.at(SIZE[1] as f64 / 2.0, SIZE[0] as f64 / 2.0);
+    // As of an even stack; otherwise the plane is 0.55 slices off.
     assert!((middle - TARGET.0[0]).abs() < 0.1, "{middle}");
     assert!((found.held_out.slope - 1.0).abs() < 0.02, "{:?}", found.held_out);
 }

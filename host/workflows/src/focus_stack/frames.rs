@@ -142,6 +142,14 @@ where
     Ok(frames)
 }
 
+/// Brightness of each of the images, which are not compared, relative to the usual one.
+pub(super) fn gains<S: Slices + ?Sized>(images: &S) -> std::result::Result<Vec<f64>, S::Error> {
+    let of_frame =
+        |index: usize| Ok(brightness::of_blocks(images.rows(index, 0..images.dim(index).0)?.view()));
+    let blocks = (0..images.count()).map(of_frame).collect::<std::result::Result<Vec<_>, S::Error>>()?;
+    Ok(brightness::gains(&blocks, &(0..blocks.len()).collect::<Vec<_>>()))
+}
+
 /// The two nearest frames of the scene.
 fn nearest(warps: &[Option<Warp>], index: usize) -> impl Iterator<Item = (usize, Warp)> + use<> {
     let mut placed: Vec<(usize, Warp)> =

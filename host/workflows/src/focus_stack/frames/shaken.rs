@@ -2,10 +2,9 @@
 //! three suggest: blur grows evenly with the distance from the focus, so a power of the sharpness (which one depends on the
 //! texture) is a parabola of the position. A block that is sharpest in the next frame tells nothing: its peak may lie between.
 
-use farnear_depth::focus_measure::FocusMeasure;
+use farnear_depth::{brightness, focus_measure::FocusMeasure};
 use ndarray::{ArrayView2, s};
 
-const BLOCKS: usize = 6;
 /// Part of the sharpness of the less sharp neighbour below which a block is shaken, and part of the blocks that must be.
 const SHAKEN: f64 = 0.9;
 const SHAKEN_BLOCKS: f64 = 0.6;
@@ -22,12 +21,8 @@ const LEAST_FRAMES: usize = 5;
 
 /// Sharpness of each block of a frame; empty for images that are too small or dark.
 pub(super) fn of_blocks(image: ArrayView2<f32>) -> Vec<f64> {
-    let (height, width) = image.dim();
-    let edges = |size: usize, block: usize| size * block / BLOCKS..size * (block + 1) / BLOCKS;
-    let blocks =
-        (0..BLOCKS * BLOCKS).map(|block| (edges(height, block / BLOCKS), edges(width, block % BLOCKS)));
-    let measured =
-        blocks.map(|(rows, columns)| FocusMeasure::Tenengrad.of(image.slice(s![rows, columns])).ok());
+    let measured = brightness::blocks(image.dim())
+        .map(|[rows, columns]| FocusMeasure::Tenengrad.of(image.slice(s![rows, columns])).ok());
     measured.collect::<Option<Vec<f64>>>().unwrap_or_default()
 }
 

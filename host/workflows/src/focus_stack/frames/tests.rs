@@ -262,6 +262,9 @@ fn flicker_costs_nothing() {
     let mut images: Vec<Array2<f32>> = flickering().collect();
     assert_eq!(left_out(&images, None), [0; 0]);
     let (untreated, ..) = error(&images, Vec::new());
+    let views: Vec<ArrayView2<f32>> = images.iter().map(|image| image.view()).collect();
+    let uncompared = gains(&views[..]).unwrap();
+    assert_eq!(checked(&images, &even_positions(), None).gains, uncompared, "as by --use-all");
     super::super::prepare_stack(&mut images, None).unwrap();
     let (found, known, _) = error(&images, Vec::new());
     assert!(untreated > 1.1 * clean, "{untreated} {clean}: the factors must matter");
