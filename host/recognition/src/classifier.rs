@@ -113,6 +113,12 @@ classifiers! {
     Softmax(f32) => Softmax;
 }
 
+impl std::fmt::Display for Family {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
 impl std::str::FromStr for Family {
     type Err = String;
 

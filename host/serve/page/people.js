@@ -66,7 +66,8 @@ export function activity() {
     const job = await ended(queue, begun.job);
     if (job.phase !== "done" || !job.result) return;
     answered = true;
-    tell(job.result, `of all ${job.result.frames} frames`);
+    const best = job.result.probabilities.toSorted((a, b) => b.probability - a.probability).slice(0, 3);
+    tell({ ...job.result, best }, `of all ${job.result.frames} frames`);
   };
   const tell = (found, of) => {
     const [first] = found.best ?? [];

@@ -1,8 +1,9 @@
 //! A picture on the socket: length of a JSON header (u32, little-endian), header, pixels.
 
 use axum::body::Bytes;
+use farnear_files::video::Pixels;
 use farnear_workflows::activity::streaming::Moment;
-use ndarray::{Array2, s};
+use ndarray::{Array2, Axis, s};
 use serde::Serialize;
 use serde_json::json;
 
@@ -24,10 +25,16 @@ const PERSON_WIDTH: usize = 320;
 
 /// Grey values, then the mask (1 = person); the answer is in the header.
 pub fn person(moment: &Moment<'_>) -> Bytes {
-    let step = moment.picture.ncols().div_ceil(PERSON_WIDTH).max(1);
-    let picture = moment.picture.slice(s![..;step, ..;step]);
+    let step = moment.mask.ncols().div_ceil(PERSON_WIDTH).max(1);
     let mask = moment.mask.slice(s![..;step, ..;step]);
-    let (height, width) = picture.dim();
+    let picture = match moment.picture {
+        Pixels::Grey(grey) => grey.slice(s![..;step, ..;step]).to_owned(),
+        Pixels::Rgb(rgb) => rgb.slice(s![..;step, ..;step, ..]).map_axis(Axis(2), |pixel| {
+            let sum: u16 = pixel.iter().map(|level| u16::from(*level)).sum();
+            ((sum + 1) / 3) as u8
+        }),
+    };
+    let (height, width) = mask.dim();
     let header = json!({ "type": "person", "width": width, "height": height, "answer": moment.answer });
     let pixels: Vec<u8> =
         picture.iter().copied().chain(mask.iter().map(|person| u8::from(*person))).collect();

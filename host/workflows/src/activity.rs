@@ -3,11 +3,13 @@
 mod annotated_video;
 pub mod answer;
 mod confusion_picture;
+pub mod evaluate;
 pub mod evaluation;
 pub mod judging;
 pub mod method;
 pub mod motion;
 pub mod multi_person;
+mod person;
 pub mod recognise;
 pub mod recognition;
 pub mod samples;

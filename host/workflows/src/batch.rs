@@ -2,6 +2,7 @@
 //! complete and `batch.toml` lists the same settings, input hashes and program version. Results are moved into place
 //! when complete. Memory does not grow with the manifest.
 
+mod campaign;
 mod error;
 mod fields;
 mod generate;
@@ -41,6 +42,7 @@ use crate::{
     context::{Cancel, Context, Progress, Unattended},
     error::Result,
     figures::rounded,
+    request::{PathKind, Task},
 };
 
 const WARNINGS_MAX: usize = 20;
@@ -277,17 +279,17 @@ impl Work<'_> {
     fn do_one(&self, entry: Entry) -> Result<()> {
         let start = Instant::now();
         let Entry { number, line, job } = entry;
-        let (kind, mut fields, unreadable) = match job {
+        let (kind, fields, unreadable) = match job {
             Ok((kind, fields)) => (kind, fields, None),
             Err(error) => (String::new(), Fields::default(), Some(error)),
         };
         let warnings = Warnings::default();
         let cache = Arc::clone(&self.cache);
         let context = Context { cache, ..Context::new(&warnings, &Unattended, self.cancel.clone()) };
-        let out = fields.optional_text("out").ok().flatten();
+        let out = fields.text("out").ok();
         let ended = match unreadable {
             Some(error) => Err(error.into()),
-            None => self.job(&kind, &mut fields, &context),
+            None => self.job(&kind, &fields, &context),
         };
         let (state, figures, error) = match ended {
             Ok((state, figures)) => (state, figures, None),
@@ -310,18 +312,16 @@ impl Work<'_> {
     fn discard(&self, kind: &str, out: Option<&str>) {
         let (Ok(kind), Some(out)) = (jobs::kind(kind), out) else { return };
         // If removal fails, the job's own error most likely has the same cause.
-        let _ = Place::new(self.base.join(out), kind.makes_file()).discard(self.begun);
+        let _ = Place::new(self.base.join(out), makes_file(kind)).discard(self.begun);
     }
 
-    fn job(&self, kind: &str, fields: &mut Fields, context: &Context<'_>) -> Result<(State, Option<Value>)> {
+    fn job(&self, kind: &str, fields: &Fields, context: &Context<'_>) -> Result<(State, Option<Value>)> {
         let kind = jobs::kind(kind)?;
-        let wanted = fields.clone();
-        let out = fields.path("out")?;
-        let work = kind.job(fields)?;
-        fields.all_taken()?;
+        let out = fields.base().join(fields.text("out")?);
+        let work = (kind.job)(fields.all(), fields.base())?;
         let input = self.sums.of(&work.inputs(), &self.base)?;
-        let wanted = Provenance::new(kind.name(), &wanted, input);
-        let place = Place::new(out, kind.makes_file());
+        let wanted = Provenance::new(kind.name, fields, input);
+        let place = Place::new(out, makes_file(kind));
         match place.look(&wanted, self.begun, self.settings.verify)? {
             Found::Done(figures) => Ok((State::Already, figures)),
             Found::ToDo if self.settings.dry_run => Ok((State::Todo, None)),
@@ -331,6 +331,10 @@ impl Work<'_> {
             }
         }
     }
+}
+
+fn makes_file(task: &Task) -> bool {
+    matches!(task.output(), Some((_, PathKind::OutputFile)))
 }
 
 /// Collects a job's warnings; discards steps and counts.

@@ -78,7 +78,7 @@ pub(crate) use {camera_request, rig_request};
 
 pub fn inputs<R: Request>(request: &R) -> Vec<PathBuf> {
     let is_input = |(kind, path): &(PathKind, PathBuf)| match kind {
-        PathKind::Input => true,
+        PathKind::Input | PathKind::NamedInput => true,
         PathKind::InputOrName => path.exists(),
         PathKind::OutputFile | PathKind::OutputFolder => false,
     };
@@ -90,6 +90,8 @@ pub enum PathKind {
     Input,
     /// A built-in name or a file; text after a comma is not part of the path.
     InputOrName,
+    /// A file after a name and `=`, or a file alone.
+    NamedInput,
     OutputFile,
     OutputFolder,
 }
@@ -183,7 +185,10 @@ pub const TASKS: &[Task] = &[
     Task::of::<crate::silhouettes::markers::MarkersRequest>(),
     Task::of::<crate::silhouettes::skeletons::SkeletonsRequest>(),
     Task::of::<crate::silhouettes::synthetic::SyntheticRequest>(),
+    Task::of::<crate::activity::training::TrainRequest>(),
+    Task::of::<crate::activity::shipped::TrainSyntheticRequest>(),
     Task::of::<crate::activity::recognise::RecogniseRequest>(),
+    Task::of::<crate::activity::evaluate::EvaluateRequest>(),
     Task::of::<crate::shadow::removal::ShadowRemoveRequest>(),
     Task::of::<crate::shadow::score::ShadowScoreRequest>(),
 ];
@@ -289,6 +294,7 @@ fn paths_of<R: Request>(request: &R) -> Vec<(PathKind, PathBuf)> {
 fn file_part(text: &str, kind: PathKind) -> &str {
     match kind {
         PathKind::InputOrName => text.split(',').next().unwrap_or(text),
+        PathKind::NamedInput => text.split_once('=').map_or(text, |(_, file)| file),
         _ => text,
     }
 }
@@ -296,10 +302,11 @@ fn file_part(text: &str, kind: PathKind) -> &str {
 fn rebase(value: &mut Value, kind: PathKind, base: &Path) {
     match value {
         Value::String(text) => {
-            let joined = base.join(&*text);
-            let is_name = kind == PathKind::InputOrName && !base.join(file_part(text, kind)).exists();
+            let file = file_part(text, kind);
+            let is_name = kind == PathKind::InputOrName && !base.join(file).exists();
             if !is_name {
-                *text = joined.display().to_string();
+                let joined = base.join(file).display().to_string();
+                *text = text.replace(file, &joined);
             }
         }
         Value::Array(list) => list.iter_mut().for_each(|item| rebase(item, kind, base)),
@@ -428,6 +435,19 @@ mod tests {
         assert!(read(json!({"file": "/etc/passwd"}), Paths::Refused).is_err());
         let schema = schema_without_paths::<Sample>();
         assert!(property(&schema, "file").is_none() && property(&schema, "share").is_some());
+    }
+
+    #[test]
+    fn a_file_after_a_name_is_relative_to_the_base() {
+        for (given, expected) in [
+            ("anna:walk=a.bvh", "anna:walk=/base/a.bvh"),
+            ("a.mat", "/base/a.mat"),
+            ("walk=/a.bvh", "walk=/a.bvh"),
+        ] {
+            let mut value = json!([given]);
+            rebase(&mut value, PathKind::NamedInput, Path::new("/base"));
+            assert_eq!(value, json!([expected]));
+        }
     }
 
     #[test]

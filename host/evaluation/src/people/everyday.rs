@@ -50,7 +50,7 @@ struct Judged {
 pub fn measure(page: &mut Page, data: &Data) -> Result<()> {
     page.heading("The models that come with the program");
     page.paragraph(
-        "`everyday` and `everyday-order-free` have learned from synthetic people only (`farnear activity train --synthetic everyday`); no clip of these sets was trained on, and one model answers for \
+        "`everyday` and `everyday-order-free` have learned from synthetic people only (`farnear activity train-synthetic`); no clip of these sets was trained on, and one model answers for \
          all of them, from any side. *All* lets it answer any of its activities, *among* those that the set holds (`--among`); *one view* counts the answers of all views, *fused* is one answer from \
          all of them. *Calibration* is the expected calibration error of the answers among the set's activities. *Known called unknown* has a limit of 1.3 times the one that gives 5 % on synthetic people. How synthetic people move \
          (which hand, where hands go, how deep they bend, how fast they are, where a clip begins and ends) and their proportions were set after looking at these sets' silhouettes and joints and at the confusions, so that the figures are not blind.",

@@ -1,27 +1,30 @@
 //! `farnear activity`: train, recognise, evaluate, list models.
 
 mod evaluate;
-mod method;
 mod models;
 mod recognise;
-mod train;
 
 use anyhow::Result;
 use clap::Subcommand;
+use farnear_workflows::activity::{shipped::TrainSyntheticRequest, training::TrainRequest};
+
+use crate::run::Run;
 
 #[derive(Subcommand)]
 pub enum Job {
-    Train(train::Arguments),
+    Train(Run<TrainRequest>),
+    TrainSynthetic(Run<TrainSyntheticRequest>),
     Recognise(recognise::Recognise),
-    Evaluate(evaluate::Arguments),
+    Evaluate(evaluate::Evaluate),
     Models(models::Arguments),
 }
 
 pub fn run(job: Job) -> Result<()> {
     match job {
-        Job::Train(arguments) => train::run(arguments),
+        Job::Train(task) => task.run(),
+        Job::TrainSynthetic(task) => task.run(),
         Job::Recognise(task) => task.run(),
-        Job::Evaluate(arguments) => evaluate::run(arguments),
+        Job::Evaluate(task) => task.run(),
         Job::Models(arguments) => models::run(arguments),
     }
 }

@@ -8,7 +8,7 @@ use std::{
     process::{Command, Stdio},
 };
 
-use serde_json::Value;
+use serde_json::{Value, json};
 
 use crate::common::{Folder, fails, farnear, figures, rig_optics, succeeds};
 
@@ -293,11 +293,12 @@ fn methods_and_models_are_evaluated_as_jobs() {
     succeeds(farnear(&["silhouettes", "synthetic", "--out", &folder.text("people")]).args(people));
     let manifest = folder.file(
         "compared.toml",
-        "[evaluate]\nsamples = 'people/samples.toml'\n\
-         [[job]]\ndo = 'evaluate'\nleave_one_subject_out = true\nno_search = true\nout = 'b/others'\n\
-         [[job]]\ndo = 'evaluate'\nmodel = 'everyday'\nout = 'b/shipped'\n\
-         [[job]]\ndo = 'evaluate'\nout = 'b/none'\n\
-         [[job]]\ndo = 'evaluate'\nmodel = 'everyday'\nsame = 'dig'\nout = 'b/same'\n",
+        "[activity-evaluate]\nsamples = 'people/samples.toml'\n\
+         [[job]]\ndo = 'activity-evaluate'\nleave_one_subject_out = true\nno_search = true\nout = 'b/others'\n\
+         [[job]]\ndo = 'activity-evaluate'\nmodel = 'everyday'\nout = 'b/shipped'\n\
+         [[job]]\ndo = 'activity-evaluate'\nout = 'b/none'\n\
+         [[job]]\ndo = 'activity-evaluate'\nmodel = 'everyday'\nsame = 'dig'\nout = 'b/same'\n\
+         [[job]]\ndo = 'activity-train'\nsamples = 'people/samples.toml'\nno_search = true\nmode = 'ordered'\nout = 'b/model.fnm'\n",
     );
     let run = || {
         let output = farnear(&["batch", &manifest]).output().expect("the program starts");
@@ -305,7 +306,7 @@ fn methods_and_models_are_evaluated_as_jobs() {
         lines(&output.stdout)
     };
     let reports = run();
-    for (line, phrase) in reports[2..].iter().zip(["leave_one_subject_out", "NAME IN THE SAMPLES"]) {
+    for (line, phrase) in reports[2..].iter().zip(["leave-one-subject-out", "NAME IN THE SAMPLES"]) {
         assert!(line["error"].as_str().expect("a message").contains(phrase), "{line}");
     }
     let samples = folder.text("people/samples.toml");
@@ -318,12 +319,14 @@ fn methods_and_models_are_evaluated_as_jobs() {
         expected.as_object_mut().expect("figures").retain(|name, _| !name.starts_with("seconds"));
         assert_eq!(kept, expected);
     }
+    assert_eq!((&reports[4]["state"], &reports[4]["figures"]["mode"]), (&json!("done"), &json!("ordered")));
+    assert!(folder.path("b/model.fnm").is_file());
     // A mask that the samples name, not the manifest.
     let masks = files(&folder.path("people/p01-dig-1/view1"));
     let first = masks.keys().next().expect("a mask");
     fs::remove_file(folder.path("people/p01-dig-1/view1").join(first)).expect("a mask");
     let again: Vec<Value> = run().iter().map(|line| line["state"].clone()).collect();
-    assert_eq!(again, ["done", "done", "failed", "failed"]);
+    assert_eq!(again, ["done", "done", "failed", "failed", "done"]);
 }
 
 #[test]

@@ -70,6 +70,7 @@ const COMMANDS: &[&[&str]] = &[
     &["silhouettes", "video"],
     &["activity"],
     &["activity", "train"],
+    &["activity", "train-synthetic"],
     &["activity", "recognise"],
     &["activity", "evaluate"],
     &["activity", "models"],

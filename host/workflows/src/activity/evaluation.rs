@@ -1,9 +1,6 @@
 //! Evaluates the method on subjects outside its training set.
 
-use std::{
-    path::{Path, PathBuf},
-    time::Instant,
-};
+use std::{path::PathBuf, time::Instant};
 
 use farnear_files::{masks, staging::Staging};
 use farnear_recognition::choice::{Views, names};
@@ -15,6 +12,7 @@ use farnear_recognition::evaluation::{
 };
 use farnear_recognition::experiment::Experiment;
 use farnear_recognition::model::Recogniser;
+use farnear_recognition::self_training::ROUNDS;
 use farnear_recognition::unknown::Limits;
 use farnear_recognition::watch::Unwatched;
 use farnear_silhouettes::mask::Mask;
@@ -22,7 +20,8 @@ use serde::Serialize;
 
 use super::{
     confusion_picture,
-    method::{Adaptation, Method},
+    evaluate::EvaluateRequest,
+    method::Method,
     samples::{SCALING, Samples, SamplesError, are_full_frames},
     training_progress,
 };
@@ -34,37 +33,6 @@ use crate::{
 
 /// Timing repetitions; the shortest counts.
 const TIMINGS: usize = 3;
-
-#[derive(Clone, PartialEq, Debug)]
-pub struct EvaluationSettings {
-    pub samples: PathBuf,
-    pub learn_from: LearnFrom,
-    pub method: Method,
-    pub adaptation: Adaptation,
-    /// Views recognised together. By default fused, or each separately if clips differ in their views.
-    pub views: Option<Views>,
-    /// For confusion.png, confusion.md and evaluation.toml (the settings of every fold).
-    pub out: Option<PathBuf>,
-}
-
-#[derive(Clone, PartialEq, Eq, Debug)]
-pub enum LearnFrom {
-    /// The other subjects, each left out in turn.
-    OtherSubjects,
-    /// Separate samples of other people.
-    Samples(PathBuf),
-    /// Separate samples; the subject's own are left out in turn.
-    SamplesOfOthers(PathBuf),
-}
-
-impl LearnFrom {
-    fn path(&self) -> Option<&Path> {
-        match self {
-            Self::OtherSubjects => None,
-            Self::Samples(path) | Self::SamplesOfOthers(path) => Some(path),
-        }
-    }
-}
 
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct EvaluationFigures {
@@ -97,21 +65,26 @@ struct Record<'a> {
     fold: &'a [Choice],
 }
 
-/// Recognises every subject with a model of the others.
-pub fn evaluate(settings: &EvaluationSettings, context: &Context<'_>) -> Result<EvaluationFigures> {
+/// Recognises every subject with a model of the others, or of the samples to train on.
+pub(super) fn evaluate(
+    request: &EvaluateRequest,
+    out: Option<&Staging>,
+    context: &Context<'_>,
+) -> Result<EvaluationFigures> {
     let start = Instant::now();
-    let out = settings.out.as_deref().map(Staging::new_folder).transpose()?;
-    let test = Samples::read(&settings.samples, context)?;
-    let train = settings.learn_from.path().map(|path| Samples::read(path, context)).transpose()?;
+    let method = request.method.method()?;
+    method.announce(context);
+    let test = Samples::read(&request.samples, context)?;
+    let train = request.train.as_deref().map(|path| Samples::read(path, context)).transpose()?;
     let (frames, empty_frames, full_frames) = (test.frames, test.empty_frames, test.full_frames);
     let folders = test.folders.clone();
-    let Clips { views, test, train } = Clips::of(test, train, settings.views)?;
+    let Clips { views, test, train } = Clips::of(test, train, request.views)?;
     let subjects = names(test.iter().map(|clip| &clip.subject));
     let learned = train.as_deref().unwrap_or(&test);
-    check_subjects(settings, &subjects, learned)?;
-    check_activities(settings, &test, learned)?;
-    let Adaptation { align, self_training } = settings.adaptation;
-    let experiment = Experiment { align, self_training, ..settings.method.experiment(full_frames)? };
+    check_subjects(request, &subjects, learned)?;
+    check_activities(request, &test, learned)?;
+    let self_training = if request.adapt { ROUNDS } else { 0 };
+    let experiment = Experiment { align: request.align, self_training, ..method.experiment(full_frames)? };
     let outcome =
         train_on_others(learned, &test, &experiment, &[views], &training_progress::Folds::new(context));
     let outcome = training_progress::outcome(outcome, context, "evaluating")?;
@@ -126,7 +99,7 @@ pub fn evaluate(settings: &EvaluationSettings, context: &Context<'_>) -> Result<
         clips: test.len(),
         subjects: subjects.len(),
         views,
-        mode: settings.method.name(),
+        mode: method.name(),
         full_frames,
         frames,
         empty_frames,
@@ -134,11 +107,10 @@ pub fn evaluate(settings: &EvaluationSettings, context: &Context<'_>) -> Result<
         seconds: 0.0,
         confusion: confusion.clone(),
     };
-    if let (Some(staged), Some(out)) = (out, &settings.out) {
-        keep(&figures, &outcome, staged)?;
-        context.info(&format!("wrote {}", out.display()));
+    if let Some(out) = out {
+        write(&figures, &outcome, out)?;
     }
-    figures.seconds_per_frame = seconds_per_frame(learned, &settings.method, &folders, context)?;
+    figures.seconds_per_frame = seconds_per_frame(learned, &method, &folders, context)?;
     figures.seconds = rounded(start.elapsed().as_secs_f64(), 3);
     Ok(figures)
 }
@@ -157,8 +129,10 @@ pub struct OpenSetFigures {
 }
 
 /// Leaves every activity out of the training in turn; half of the subjects train, the other half test.
-pub fn open_set(samples: &Path, method: &Method, context: &Context<'_>) -> Result<OpenSetFigures> {
-    let samples = Samples::read(samples, context)?;
+pub(super) fn open_set(request: &EvaluateRequest, context: &Context<'_>) -> Result<OpenSetFigures> {
+    // One setting for all rounds: a search in each would run dozens of times.
+    let method = Method { search: false, ..request.method.method()? };
+    let samples = Samples::read(&request.samples, context)?;
     let experiment = method.experiment(samples.full_frames)?;
     let found = open_set::open_set(
         &samples.fused()?,
@@ -208,32 +182,30 @@ impl Clips {
     }
 }
 
-fn check_subjects(settings: &EvaluationSettings, subjects: &[String], learned: &[Clip]) -> Result<()> {
-    match &settings.learn_from {
-        LearnFrom::OtherSubjects if subjects.len() < 3 => {
-            Err(EvaluationError::Subjects(subjects.len()).into())
-        }
-        LearnFrom::OtherSubjects | LearnFrom::SamplesOfOthers(_) => Ok(()),
-        LearnFrom::Samples(train) => {
+fn check_subjects(request: &EvaluateRequest, subjects: &[String], learned: &[Clip]) -> Result<()> {
+    match (&request.train, request.leave_one_subject_out) {
+        (None, _) if subjects.len() < 3 => Err(EvaluationError::Subjects(subjects.len()).into()),
+        (None, _) | (Some(_), true) => Ok(()),
+        (Some(train), false) => {
             let known = names(learned.iter().map(|clip| &clip.subject));
             let Some(both) = subjects.iter().find(|subject| known.contains(subject)) else { return Ok(()) };
-            let (test, train) = (settings.samples.clone(), train.clone());
+            let (test, train) = (request.samples.clone(), train.clone());
             Err(SamplesError::SamePerson { subject: both.clone(), test, train }.into())
         }
     }
 }
 
 /// Rejects activities outside the training set: different names would give an accuracy of 0.
-fn check_activities(settings: &EvaluationSettings, test: &[Clip], learned: &[Clip]) -> Result<()> {
+fn check_activities(request: &EvaluateRequest, test: &[Clip], learned: &[Clip]) -> Result<()> {
     let (found, known) =
         (names(test.iter().map(|clip| &clip.activity)), names(learned.iter().map(|clip| &clip.activity)));
     if found.iter().any(|activity| known.contains(activity)) {
         return Ok(());
     }
-    Err(SamplesError::NothingInCommon { samples: settings.samples.clone(), found, known }.into())
+    Err(SamplesError::NothingInCommon { samples: request.samples.clone(), found, known }.into())
 }
 
-fn keep(figures: &EvaluationFigures, outcome: &Outcome, out: Staging) -> Result<()> {
+fn write(figures: &EvaluationFigures, outcome: &Outcome, out: &Staging) -> Result<()> {
     let record = Record {
         accuracy: figures.accuracy,
         confidence_interval: figures.confidence_interval,
@@ -243,8 +215,7 @@ fn keep(figures: &EvaluationFigures, outcome: &Outcome, out: Staging) -> Result<
     };
     out.write("confusion.png", &confusion_picture::png(&figures.confusion)?)?;
     out.write("confusion.md", figures.confusion.to_markdown().as_bytes())?;
-    out.write("evaluation.toml", toml::to_string(&record)?.as_bytes())?;
-    Ok(out.finish()?)
+    Ok(out.write("evaluation.toml", toml::to_string(&record)?.as_bytes())?)
 }
 
 /// Time per frame of one thread, over the first clip, from masks in memory to an answer.

@@ -1,38 +1,24 @@
 //! Evaluates a finished model on labelled clips.
 
-use std::path::PathBuf;
-
 use farnear_files::staging::Staging;
+use farnear_recognition::choice::Views;
 use farnear_recognition::clip::{Clip, Track};
 use farnear_recognition::evaluation::{
     calibration::{Reliability, area_under_roc},
     confusion::{Confusion, wilson},
 };
 use farnear_recognition::model::{Answer, Recogniser};
+use farnear_recognition::self_training::ROUNDS;
 use rayon::prelude::*;
 use serde::Serialize;
 
 use super::{
     confusion_picture,
+    evaluate::EvaluateRequest,
     recognition::Model,
     samples::{Samples, SamplesError},
 };
 use crate::{context::Context, counter::Counter, error::Result, figures::rounded};
-
-#[derive(Clone, PartialEq, Debug)]
-pub struct JudgingSettings {
-    pub samples: PathBuf,
-    /// Pairs of names that differ between samples and model.
-    pub same: Vec<(String, String)>,
-    /// Rounds of self-training on the samples without their labels; 0 for none.
-    pub self_training: usize,
-    /// Fuse the views of a clip instead of recognising each separately.
-    pub fused: bool,
-    /// Reason for opening a blind set; without it a blind set is rejected.
-    pub open_blind: Option<String>,
-    /// For confusion.png, confusion.md and wrong.csv.
-    pub out: Option<PathBuf>,
-}
 
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct JudgingFigures {
@@ -70,15 +56,20 @@ pub(super) struct Judged<'a> {
     pub answer: Answer,
 }
 
-pub fn judge(model: &Model, settings: &JudgingSettings, context: &Context<'_>) -> Result<JudgingFigures> {
-    let out = settings.out.as_deref().map(Staging::new_folder).transpose()?;
-    let samples = Samples::read_opened(&settings.samples, settings.open_blind.as_deref(), context)?;
+/// Evaluates the model on the samples of a request.
+pub(super) fn judge(
+    model: &Model,
+    request: &EvaluateRequest,
+    out: Option<&Staging>,
+    context: &Context<'_>,
+) -> Result<JudgingFigures> {
+    let samples = Samples::read_opened(&request.samples, request.open_blind_set.as_deref(), context)?;
     let activities = model.activities();
-    let name = |activity: &str| {
-        settings.same.iter().find(|(own, _)| own == activity).map_or(activity, |(_, known)| known).to_owned()
-    };
+    let name = |activity: &str| request.name_in_model(activity);
+    let fused = request.views == Some(Views::Fused);
     let recogniser = model.recogniser(samples.full_frames);
-    let adapted = (settings.self_training > 0)
+    let adapted = request
+        .adapt
         .then(|| {
             let apart = |clip: &Clip| -> Vec<Vec<Track>> {
                 if recogniser.views > 1 {
@@ -88,11 +79,11 @@ pub fn judge(model: &Model, settings: &JudgingSettings, context: &Context<'_>) -
                 }
             };
             let clips: Vec<Vec<Track>> = samples.clips.iter().flat_map(apart).collect();
-            recogniser.adapted(&clips, settings.self_training)
+            recogniser.adapted(&clips, ROUNDS)
         })
         .transpose()?;
     let recogniser = adapted.as_ref().unwrap_or(recogniser);
-    let judged = answers(recogniser, &samples.clips, settings.fused, &name, context)?;
+    let judged = answers(recogniser, &samples.clips, fused, &name, context)?;
     let (known, strange): (Vec<Judged>, Vec<Judged>) =
         judged.into_iter().partition(|judged| activities.contains(&judged.truth));
     let mut among: Vec<String> = known.iter().map(|judged| judged.truth.clone()).collect();
@@ -103,7 +94,7 @@ pub fn judge(model: &Model, settings: &JudgingSettings, context: &Context<'_>) -
     not_known.dedup();
     if known.is_empty() {
         return Err(SamplesError::NothingInCommon {
-            samples: settings.samples.clone(),
+            samples: request.samples.clone(),
             found: not_known,
             known: activities.to_vec(),
         }
@@ -113,12 +104,10 @@ pub fn judge(model: &Model, settings: &JudgingSettings, context: &Context<'_>) -
         context.info(&format!("the model does not know: {}", not_known.join(", ")));
     }
     let figures = figures(&known, &strange, &among, not_known);
-    if let (Some(staged), Some(out)) = (out, &settings.out) {
-        staged.write("confusion.png", &confusion_picture::png(&figures.confusion)?)?;
-        staged.write("confusion.md", figures.confusion.to_markdown().as_bytes())?;
-        staged.write("wrong.csv", wrong(&known, &among).as_bytes())?;
-        staged.finish()?;
-        context.info(&format!("wrote {}", out.display()));
+    if let Some(out) = out {
+        out.write("confusion.png", &confusion_picture::png(&figures.confusion)?)?;
+        out.write("confusion.md", figures.confusion.to_markdown().as_bytes())?;
+        out.write("wrong.csv", wrong(&known, &among).as_bytes())?;
     }
     Ok(figures)
 }

@@ -1,23 +1,113 @@
 //! Classification options shared by training and evaluation.
 
-use std::sync::Arc;
+use std::{str::FromStr, sync::Arc};
 
-use farnear_recognition::alignment::Alignment;
 use farnear_recognition::classifier::Family;
 use farnear_recognition::experiment::Experiment;
 use farnear_recognition::frames::Mode;
 use farnear_recognition::space::SpaceSettings;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use serde_with::{DisplayFromStr, serde_as};
 
 use super::shipped::{self, Shipped};
-use crate::error::Result;
+use crate::{
+    context::Context,
+    error::{Result, WorkflowError},
+};
 
-/// Adaptation to unlabelled clips from another camera, sensor or laboratory.
-#[derive(Clone, Copy, PartialEq, Debug, Default)]
-pub struct Adaptation {
-    /// Statistics that are aligned with the training clips'.
-    pub align: Alignment,
-    /// Rounds of learning from the most confident own answers.
-    pub self_training: usize,
+/// How activities are told apart.
+#[serde_as]
+#[derive(Clone, Default, PartialEq, Eq, Debug, Serialize, Deserialize, JsonSchema)]
+#[cfg_attr(feature = "clap", derive(clap::Args))]
+#[serde(default)]
+pub struct MethodOptions {
+    /// Whether the order of frames counts: order-free (the thesis' promise) or ordered (sitting down is not standing up) [default:
+    /// order-free].
+    #[cfg_attr(feature = "clap", arg(long))]
+    #[schemars(with = "Option<String>")]
+    pub mode: Option<Mode>,
+    /// Embedded pattern learning (EPL) as in the thesis: 0/1 grids over a 3-D Isomap embedding with k nearest neighbours, order-free.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "thesis"))]
+    pub epl: Option<Epl>,
+    /// svc (linear support vectors), softmax (logistic regression) or knn (nearest neighbours) [default: svc].
+    #[cfg_attr(feature = "clap", arg(long))]
+    #[serde_as(as = "Option<DisplayFromStr>")]
+    pub classifier: Option<Family>,
+    /// Tell activities apart by what the network of a model that comes with the program makes of clips: where samples are few, or come from
+    /// another camera. The model decides whether the order of frames counts.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "MODEL"))]
+    pub features: Option<String>,
+    /// Take the default settings instead of choosing them by cross-validation over the training subjects (quicker).
+    #[cfg_attr(feature = "clap", arg(long))]
+    pub no_search: bool,
+}
+
+/// Variants of embedded pattern learning.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Epl {
+    Thesis,
+}
+
+impl FromStr for Epl {
+    type Err = String;
+
+    fn from_str(text: &str) -> std::result::Result<Self, String> {
+        match text {
+            "thesis" => Ok(Self::Thesis),
+            other => Err(format!("unknown variant `{other}`: expected thesis")),
+        }
+    }
+}
+
+impl MethodOptions {
+    /// Fails for options that exclude each other, and for an unknown model.
+    pub fn method(&self) -> Result<Method> {
+        let Self { mode, epl, classifier, features, no_search } = self;
+        let pattern = match (epl, features) {
+            (Some(_), _) => {
+                let others = [
+                    ("mode", mode.is_some()),
+                    ("classifier", classifier.is_some()),
+                    ("features", features.is_some()),
+                ];
+                none_of("epl", "thesis", others)?;
+                Pattern::Thesis
+            }
+            (None, Some(name)) => {
+                none_of("features", name, [("mode", mode.is_some())])?;
+                let model = Shipped::named(name).ok_or_else(|| {
+                    let names: Vec<&str> = shipped::MODELS.iter().map(|model| model.name).collect();
+                    WorkflowError::parameter("features", name, format!("expected {}", names.join(" or ")))
+                })?;
+                Pattern::Features { model, classifier: classifier.unwrap_or(Family::Svc) }
+            }
+            (None, None) => Pattern::Codebook {
+                mode: mode.unwrap_or_default(),
+                classifier: classifier.unwrap_or(Family::Svc),
+            },
+        };
+        Ok(Method { pattern, search: !no_search })
+    }
+
+    pub fn is_default(&self) -> bool {
+        *self == Self::default()
+    }
+}
+
+/// Fails for the first option that is given although `name` excludes it.
+pub(super) fn none_of<const N: usize>(
+    name: &'static str,
+    value: impl ToString,
+    others: [(&str, bool); N],
+) -> Result<()> {
+    match others.into_iter().find(|(_, given)| *given) {
+        None => Ok(()),
+        Some((other, _)) => {
+            Err(WorkflowError::parameter(name, value, format!("cannot be used with --{other}")))
+        }
+    }
 }
 
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -41,6 +131,15 @@ pub enum Pattern {
 }
 
 impl Method {
+    /// Says what takes long.
+    pub(super) fn announce(&self, context: &Context<'_>) {
+        if self.search {
+            context.info(
+                "settings are chosen by cross-validation over the subjects (--no-search takes the defaults)",
+            );
+        }
+    }
+
     /// Candidates of the search, for full frames or cropped silhouettes.
     pub fn experiment(&self, full_frames: bool) -> Result<Experiment> {
         let experiment = match (self.pattern, self.search) {

@@ -1,7 +1,7 @@
 //! Training clips from motion files: marker or joint recordings and public joint sets, viewed from all sides.
 
 use std::{
-    fs,
+    fmt, fs,
     path::{Path, PathBuf},
     str::FromStr,
 };
@@ -17,12 +17,11 @@ use farnear_silhouettes::readers::{
 };
 use farnear_silhouettes::silhouette::template::Template;
 
-use super::samples::SCALING;
+use super::{samples::SCALING, training::TrainRequest};
 use crate::{
     context::Context,
     counter::Counter,
     error::{Result, WorkflowError},
-    parameters::within,
     silhouettes::{SilhouettesError, markers},
 };
 
@@ -59,15 +58,14 @@ impl FromStr for MotionFile {
     }
 }
 
-#[derive(Clone, PartialEq, Debug)]
-pub struct MotionSettings {
-    pub files: Vec<MotionFile>,
-    /// A built-in template or a TOML file. Default: the best fitting built-in one.
-    pub template: Option<String>,
-    /// Unit and upward axis, to override the file.
-    pub choices: Choices,
-    /// Views of every recording, 1 to 500.
-    pub cameras: usize,
+impl fmt::Display for MotionFile {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if let Some(activity) = &self.activity {
+            let subject = self.subject.iter().flat_map(|subject| [subject.as_str(), ":"]);
+            subject.chain([activity.as_str(), "="]).try_for_each(|part| f.write_str(part))?;
+        }
+        self.path.display().fmt(f)
+    }
 }
 
 #[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
@@ -93,23 +91,22 @@ enum Joints {
 }
 
 /// Single-view clips of motion files. Fails for a file without an activity or without visible people.
-pub fn clips(settings: &MotionSettings, context: &Context<'_>) -> Result<Vec<Clip>> {
-    within("cameras", settings.cameras, &(1..=500), "")?;
+pub(super) fn clips(request: &TrainRequest, context: &Context<'_>) -> Result<Vec<Clip>> {
     let mut all = Vec::new();
     let counter = Counter::new(context, "motion files");
-    for file in &settings.files {
+    for file in &request.motion {
         counter.check(DURING)?;
         let mut found = Vec::new();
-        for recorded in recorded(file, settings, context)? {
+        for recorded in recorded(file, request, context)? {
             counter.check(DURING)?;
             let seed = seed_of(&file.path, found.len());
-            found.extend(seen(&recorded, settings.cameras, seed));
+            found.extend(seen(&recorded, request.cameras, seed));
         }
         if found.is_empty() {
             return Err(MotionError::NobodySeen { path: file.path.clone() }.into());
         }
         all.extend(found);
-        counter.one(Some(settings.files.len()));
+        counter.one(Some(request.motion.len()));
     }
     Ok(all)
 }
@@ -136,7 +133,7 @@ fn seen(recorded: &Recorded, cameras: usize, seed: u64) -> Vec<Clip> {
     tracks.into_iter().map(clip).collect()
 }
 
-fn recorded(file: &MotionFile, settings: &MotionSettings, context: &Context<'_>) -> Result<Vec<Recorded>> {
+fn recorded(file: &MotionFile, request: &TrainRequest, context: &Context<'_>) -> Result<Vec<Recorded>> {
     let path = &file.path;
     let ending = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
     if ending == MATLAB {
@@ -151,11 +148,12 @@ fn recorded(file: &MotionFile, settings: &MotionSettings, context: &Context<'_>)
         return Err(MotionError::Activity { path: path.clone() }.into());
     };
     let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-    let recording = markers::recording(path, settings.choices)?;
+    let choices = Choices { unit: request.units, up: request.up, person: None };
+    let recording = markers::recording(path, choices)?;
     for remark in markers::remarks(&recording) {
         context.progress.warn(&format!("{}: {remark}", path.display()));
     }
-    let template = match &settings.template {
+    let template = match &request.template {
         Some(name) => markers::template(name)?,
         None => markers::best_template(&recording, path)?,
     };

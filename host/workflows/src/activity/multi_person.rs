@@ -3,31 +3,26 @@
 use std::{path::PathBuf, time::Instant};
 
 use farnear_recognition::clip::Track;
-use farnear_recognition::live::{Live, joined, windows};
 use farnear_recognition::model::{Answer, Recogniser};
-use farnear_recognition::segmentation::{Worth, segmented};
 use farnear_silhouettes::mask::{
     Mask,
     subject::Flag,
-    tracking::{Followed, Sight, Tracker, TrackingSettings},
+    tracking::{self, Sight, Tracker, TrackingSettings},
 };
 use serde::Serialize;
 
 use super::{
     annotated_video::{AnnotatedVideo, Shown},
-    answer::{
-        AnswerSummary, PersonFigures, PersonFlag, PersonInFrame, of_segments, outlier_score, parts,
-        restricted, rounded_probability,
-    },
+    answer::{PersonFigures, PersonFlag, PersonInFrame, outlier_score, rounded_probability},
+    person::Person,
     recognise::RecogniseRequest,
-    recognition::Model,
+    recognition::{Model, window},
     views::{Frames, View},
 };
 use crate::{
     context::Context,
     error::{About, Result},
     figures::rounded,
-    parameters::at_least,
 };
 
 #[derive(Clone, PartialEq, Debug, Serialize)]
@@ -62,12 +57,9 @@ pub enum MultiPersonError {
     Views { model: PathBuf, views: usize },
 }
 
-struct Somebody<'m> {
-    live: Live<'m>,
+struct Followed<'m> {
+    person: Person<'m>,
     answer: Option<Answer>,
-    tracks: Vec<Track>,
-    /// Frame numbers of the tracks, from 1.
-    numbers: Vec<usize>,
     crossing_frames: usize,
     perhaps_swapped_with: Vec<usize>,
 }
@@ -79,7 +71,7 @@ pub struct MultiPersonTracker<'m> {
     tracker: Option<Tracker>,
     window: usize,
     among: Vec<String>,
-    people: Vec<Somebody<'m>>,
+    people: Vec<Followed<'m>>,
     annotated_video: Option<AnnotatedVideo>,
     count: usize,
     empty_frames: usize,
@@ -100,9 +92,7 @@ impl<'m> MultiPersonTracker<'m> {
                 MultiPersonError::Views { model: model.path().into(), views: recogniser.views }.into()
             );
         }
-        if let Some(window) = request.window {
-            at_least("window", window, 1, "frames")?;
-        }
+        let window = window(recogniser, request)?;
         let frames = Frames::open(view)?;
         Ok(Self {
             remarks: model
@@ -112,7 +102,7 @@ impl<'m> MultiPersonTracker<'m> {
                 .collect(),
             frames,
             tracker: None,
-            window: request.window.unwrap_or(recogniser.typical_frames).max(1),
+            window,
             among: request.among.clone(),
             people: Vec::new(),
             annotated_video: request.video_out.as_deref().map(AnnotatedVideo::begin).transpose()?,
@@ -164,20 +154,18 @@ impl<'m> MultiPersonTracker<'m> {
 
     fn answered(
         &mut self,
-        followed: Followed,
+        followed: tracking::Followed,
     ) -> Result<PersonInFrame, farnear_recognition::model::ModelError> {
-        let Followed { person, sight, parted } = followed;
+        let tracking::Followed { person, sight, parted } = followed;
         while self.people.len() < person {
-            self.people.push(Somebody {
-                live: Live::new(self.model, self.window, true),
+            self.people.push(Followed {
+                person: Person::new(self.model, 1, self.window, &self.among),
                 answer: None,
-                tracks: Vec::new(),
-                numbers: Vec::new(),
                 crossing_frames: 0,
                 perhaps_swapped_with: Vec::new(),
             });
         }
-        let somebody = &mut self.people[person - 1];
+        let followed = &mut self.people[person - 1];
         let mut flags = Vec::new();
         let mut spans = None;
         match sight {
@@ -185,16 +173,13 @@ impl<'m> MultiPersonTracker<'m> {
                 let first = self.count - before.len();
                 for (number, mask) in (first..).zip(before.into_iter().chain([mask])) {
                     let track = Track::from_masks(&[mask], self.model.settings.scaling, true);
-                    somebody.tracks.push(track.clone());
-                    somebody.numbers.push(number);
-                    let answer = somebody.live.push_described(vec![track])?;
-                    somebody.answer = Some(restricted(answer, &self.among));
+                    followed.answer = Some(followed.person.see(number, vec![track])?);
                 }
                 flags.extend(cut_by_edge.then_some(PersonFlag::Mask(Flag::CutByEdge)));
                 spans = Some(bounds);
             }
             Sight::Crossing { with, bounds } => {
-                somebody.crossing_frames += 1;
+                followed.crossing_frames += 1;
                 flags.extend(with.iter().copied().map(PersonFlag::Crossing));
                 spans = Some(bounds);
             }
@@ -207,11 +192,11 @@ impl<'m> MultiPersonTracker<'m> {
             } else {
                 PersonFlag::Parted(other)
             });
-            if parting.ambiguous && !somebody.perhaps_swapped_with.contains(&other) {
-                somebody.perhaps_swapped_with.push(other);
+            if parting.ambiguous && !followed.perhaps_swapped_with.contains(&other) {
+                followed.perhaps_swapped_with.push(other);
             }
         }
-        let answer = somebody.answer.as_ref();
+        let answer = followed.answer.as_ref();
         Ok(PersonInFrame {
             person,
             top_left_bottom_right: spans.map(|b| [b.top, b.left, b.bottom, b.right]),
@@ -226,12 +211,16 @@ impl<'m> MultiPersonTracker<'m> {
         if let Some(annotated_video) = self.annotated_video {
             annotated_video.finish()?;
         }
-        let (model, among, window) = (self.model, &self.among, self.window);
-        let people = (1..)
-            .zip(&self.people)
-            .filter(|(_, somebody)| !somebody.tracks.is_empty())
-            .map(|(person, somebody)| figures(model, among, window, person, somebody))
-            .collect::<Result<Vec<PersonFigures>>>()?;
+        let mut people = Vec::new();
+        for (number, followed) in (1..).zip(self.people) {
+            let Followed { person, crossing_frames, perhaps_swapped_with, .. } = followed;
+            let figures = person.figures(number, person.summary()?)?;
+            people.extend(figures.map(|figures| PersonFigures {
+                crossing_frames,
+                perhaps_swapped_with,
+                ..figures
+            }));
+        }
         Ok(MultiPersonFigures {
             people,
             frames: self.count,
@@ -242,41 +231,6 @@ impl<'m> MultiPersonTracker<'m> {
             remarks: self.remarks,
         })
     }
-}
-
-fn figures(
-    model: &Recogniser,
-    among: &[String],
-    window: usize,
-    person: usize,
-    somebody: &Somebody<'_>,
-) -> Result<PersonFigures> {
-    let whole = joined(somebody.tracks.iter());
-    let numbers: Vec<usize> = somebody
-        .numbers
-        .iter()
-        .zip(&somebody.tracks)
-        .filter(|(_, track)| track.frames() > 0)
-        .map(|(n, _)| *n)
-        .collect();
-    let at = |index: usize| numbers.get(index).copied().unwrap_or(0);
-    let answer = restricted(model.recognise(std::slice::from_ref(&whole))?, among);
-    let found = segmented(model, std::slice::from_ref(&whole), among, Worth::default())?;
-    let last = at(numbers.len().saturating_sub(1));
-    let mut in_windows = windows(model, std::slice::from_ref(&whole), window, window.div_ceil(2))?;
-    in_windows.iter_mut().for_each(|s| s.answer = restricted(s.answer.clone(), among));
-    let of_windows = in_windows.iter().map(|s| (s.from, s.to, &s.answer.activity, s.answer.confidence));
-    Ok(PersonFigures {
-        windows: parts(of_windows, &numbers, last),
-        person,
-        from: at(0),
-        to: last,
-        silhouettes: numbers.len(),
-        crossing_frames: somebody.crossing_frames,
-        perhaps_swapped_with: somebody.perhaps_swapped_with.clone(),
-        answer: AnswerSummary::new(answer, numbers.len()),
-        segments: parts(of_segments(&found), &numbers, last),
-    })
 }
 
 fn shown(person: &PersonInFrame) -> Option<Shown> {

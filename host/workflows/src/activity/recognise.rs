@@ -149,7 +149,7 @@ impl RecogniseRequest {
             }
             (_, views) => {
                 let mut work = Recognition::begin(&model, views, self)?;
-                while let Some(answer) = work.next(context)? {
+                while let Some((_, answer)) = work.next(context)? {
                     pass(StreamingAnswer::One(answer))?;
                 }
                 RecogniseFigures::One(Box::new(work.finish()?))

@@ -8,18 +8,18 @@ use std::{
 
 use farnear_files::masks;
 use farnear_recognition::clip::Track;
-use farnear_recognition::live::{Live, joined};
-use farnear_recognition::model::Recogniser;
+use farnear_recognition::model::{Answer, Recogniser};
 use farnear_recognition::self_training::ROUNDS;
-use farnear_silhouettes::mask::{Mask, centre::SIDE_PX, subject::Flag};
+use farnear_silhouettes::mask::{BoundingBox, Mask, centre::SIDE_PX, subject::Flag};
 use serde::Serialize;
 
 use super::{
     annotated_video::AnnotatedVideo,
     answer::{
-        AnswerSummary, Part, PersonFigures, PersonInFrame, only_in_frame, only_person, outlier_score,
-        restricted, rounded_probability, stretches,
+        AnswerSummary, Part, PersonFigures, PersonFlag, PersonInFrame, Probability, outlier_score,
+        probabilities, rounded_probability,
     },
+    person::Person,
     recognise::RecogniseRequest,
     samples::{SCALING, are_full_frames},
     shipped::Shipped,
@@ -122,6 +122,9 @@ pub struct ViewsError {
     pub found: usize,
 }
 
+/// Activities named in an answer for a frame.
+const BEST: usize = 3;
+
 /// The answer for at most a window of frames up to this one.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct FrameAnswer {
@@ -134,6 +137,8 @@ pub struct FrameAnswer {
     pub confidence: f64,
     /// Above 1 the activity is unknown. `None` without a person.
     pub outlier_score: Option<f64>,
+    /// The most probable first.
+    pub best: Vec<Probability>,
     /// The person in the first view, if any, as for several people.
     pub people: Vec<PersonInFrame>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
@@ -162,16 +167,13 @@ pub struct RecognitionFigures {
     pub remarks: Vec<String>,
 }
 
-/// Call [`Self::next`] until it returns `None`, then [`Self::finish`].
+/// Recognises one person in all views. Call [`Self::next`] until it returns `None`, then [`Self::finish`].
 pub struct Recognition<'m> {
     model: &'m Recogniser,
+    person: Person<'m>,
     views: Vec<Frames>,
     window: usize,
-    live: Live<'m>,
-    among: Vec<String>,
     annotated_video: Option<AnnotatedVideo>,
-    /// Indexed as `[view][frame]`.
-    tracks: Vec<Vec<Track>>,
     frames: usize,
     flagged_frames: usize,
     seconds: f64,
@@ -180,38 +182,41 @@ pub struct Recognition<'m> {
 
 impl<'m> Recognition<'m> {
     pub(super) fn begin(model: &'m Model, views: &[View], request: &RecogniseRequest) -> Result<Self> {
-        let path = &model.path;
-        let expectation = model.expectation();
         model.check_known(&request.among)?;
         let first = views.first().map(View::is_cut_out).transpose()?;
-        let model = model.recogniser(first != Some(true));
-        let (expected, found) = (model.views, views.len());
+        let recogniser = model.recogniser(first != Some(true));
+        let (expected, found) = (recogniser.views, views.len());
         if found != expected && (expected > 1 || found == 0) {
-            return Err(ViewsError { model: path.clone(), expected, found }.into());
+            return Err(ViewsError { model: model.path.clone(), expected, found }.into());
         }
-        if let Some(window) = request.window {
-            at_least("window", window, 1, "frames")?;
-        }
+        let window = window(recogniser, request)?;
         let frames = views.iter().map(Frames::open).collect::<Result<Vec<Frames>>>()?;
-        let window = request.window.unwrap_or(model.typical_frames).max(1);
-        let remarks = expectation.into_iter().chain(super::views::remarks(views, &frames)).collect();
+        let remarks = model.expectation().into_iter().chain(super::views::remarks(views, &frames)).collect();
         Ok(Self {
-            live: Live::new(model, window, true),
-            among: request.among.clone(),
             annotated_video: request.video_out.as_deref().map(AnnotatedVideo::begin).transpose()?,
-            tracks: vec![Vec::new(); views.len()],
             remarks,
-            model,
             views: frames,
-            window,
-            frames: 0,
-            flagged_frames: 0,
-            seconds: 0.0,
+            ..Self::of_frames(recogniser, found, window, &request.among)
         })
     }
 
-    /// Answers for the next frame of every view; `None` at the end of the first view.
-    pub fn next(&mut self, context: &Context<'_>) -> Result<Option<FrameAnswer>> {
+    /// A recognition whose frames are given to [`Self::take`].
+    pub(super) fn of_frames(model: &'m Recogniser, views: usize, window: usize, among: &[String]) -> Self {
+        Self {
+            person: Person::new(model, views, window, among),
+            model,
+            views: Vec::new(),
+            window,
+            annotated_video: None,
+            frames: 0,
+            flagged_frames: 0,
+            seconds: 0.0,
+            remarks: Vec::new(),
+        }
+    }
+
+    /// The first view's next frame and the answer up to it; `None` at the end of the first view.
+    pub(super) fn next(&mut self, context: &Context<'_>) -> Result<Option<(Seen, FrameAnswer)>> {
         context.cancel.check("recognising")?;
         if self.frames == 0 {
             self.remarks.iter().for_each(|remark| context.progress.warn(remark));
@@ -219,62 +224,91 @@ impl<'m> Recognition<'m> {
         let start = Instant::now();
         let moment: Option<Vec<Seen>> =
             self.views.iter_mut().map(Frames::next).collect::<Result<Option<Vec<Seen>>>>()?;
-        let Some(moment) = moment else { return Ok(None) };
-        let Some(name) = moment.first().map(|seen| seen.name.clone()) else { return Ok(None) };
-        self.frames += 1;
+        self.seconds += start.elapsed().as_secs_f64();
+        moment.map_or(Ok(None), |moment| self.take(moment))
+    }
+
+    /// [`Self::next`] for a frame of each view.
+    pub(super) fn take(&mut self, moment: Vec<Seen>) -> Result<Option<(Seen, FrameAnswer)>> {
+        let start = Instant::now();
         let scaling = self.model.settings.scaling;
         let described = |seen: &Seen| {
             let full = seen.mask.dim() != (SIDE_PX, SIDE_PX);
             Track::from_masks(std::slice::from_ref(&seen.mask), scaling, full)
         };
         let described: Vec<Track> = moment.iter().map(described).collect();
-        for (all, track) in self.tracks.iter_mut().zip(&described) {
-            all.push(track.clone());
-        }
-        let answer = self.live.push_described(described).about(|| name.clone())?;
-        let answer = restricted(answer, &self.among);
+        let flags: Vec<Flag> = moment.iter().flat_map(|seen| seen.flags.iter().copied()).collect();
+        let Some(first) = moment.into_iter().next() else { return Ok(None) };
+        self.frames += 1;
+        let answer = self.person.see(self.frames, described).about(|| first.name.clone())?;
         self.seconds += start.elapsed().as_secs_f64();
-        if let (Some(annotated_video), Some(first)) = (&mut self.annotated_video, moment.first()) {
+        if let Some(annotated_video) = &mut self.annotated_video {
             annotated_video.draw(first.picture.as_ref(), &first.mask, &answer)?;
         }
-        let flags: Vec<Flag> = moment.iter().flat_map(|seen| seen.flags.iter().copied()).collect();
         self.flagged_frames += usize::from(!flags.is_empty());
-        let only = moment.first().and_then(|first| only_in_frame(&first.mask, &answer, &flags));
-        Ok(Some(FrameAnswer {
-            people: only.into_iter().collect(),
+        let answer = FrameAnswer {
             frame: self.frames,
-            name,
+            name: first.name.clone(),
             confidence: rounded_probability(answer.confidence),
             outlier_score: outlier_score(&answer),
+            best: best(&answer),
+            people: in_frame(&first.mask, &answer, &flags).into_iter().collect(),
             activity: answer.activity,
             flags: flags.iter().map(Flag::to_string).collect(),
-        }))
+        };
+        Ok(Some((first, answer)))
     }
 
-    pub fn finish(self) -> Result<RecognitionFigures> {
-        let whole: Vec<Track> = self.tracks.iter().map(|parts| joined(parts.iter())).collect();
-        let answer = restricted(self.model.recognise(&whole)?, &self.among);
+    /// Keeps only the running window of a recording without an end.
+    pub(super) fn forget(&mut self) {
+        self.person.forget();
+    }
+
+    pub(super) fn finish(self) -> Result<RecognitionFigures> {
         if let Some(annotated_video) = self.annotated_video {
             annotated_video.finish()?;
         }
-        let seen: Vec<bool> = (0..self.frames)
-            .map(|frame| {
-                self.tracks.iter().any(|view| view.get(frame).is_some_and(|track| track.frames() > 0))
-            })
-            .collect();
-        let (windows, segments) = stretches(self.model, &self.tracks, &seen, self.window, &self.among)?;
-        let answer = AnswerSummary::new(answer, self.frames);
+        let answer = self.person.summary()?;
+        let person = self.person.figures(1, answer.clone())?;
+        let of_person = |parts: fn(&PersonFigures) -> &Vec<Part>| person.as_ref().map(parts).cloned();
         Ok(RecognitionFigures {
-            people: only_person(&seen, &answer, &windows, &segments).into_iter().collect(),
+            windows: of_person(|person| &person.windows).unwrap_or_default(),
+            segments: of_person(|person| &person.segments).unwrap_or_default(),
+            people: person.into_iter().collect(),
             answer,
             frames: self.frames,
-            empty_frames: whole.iter().map(|track| track.empty_frames).sum(),
+            empty_frames: self.person.empty_frames(),
             flagged_frames: self.flagged_frames,
             window: self.window,
-            windows,
-            segments,
             seconds_per_frame: rounded(self.seconds / self.frames.max(1) as f64, 6),
             remarks: self.remarks,
         })
     }
+}
+
+/// Frames of the streaming answer and of windows.
+pub(super) fn window(model: &Recogniser, request: &RecogniseRequest) -> Result<usize> {
+    if let Some(window) = request.window {
+        at_least("window", window, 1, "frames")?;
+    }
+    Ok(request.window.unwrap_or(model.typical_frames).max(1))
+}
+
+fn best(answer: &Answer) -> Vec<Probability> {
+    let mut probabilities = probabilities(answer);
+    probabilities.sort_by(|a, b| b.probability.total_cmp(&a.probability));
+    probabilities.truncate(BEST);
+    probabilities
+}
+
+fn in_frame(mask: &Mask, answer: &Answer, flags: &[Flag]) -> Option<PersonInFrame> {
+    let b = BoundingBox::of(mask.view())?;
+    Some(PersonInFrame {
+        person: 1,
+        top_left_bottom_right: Some([b.top, b.left, b.bottom, b.right]),
+        activity: answer.activity.clone(),
+        confidence: rounded_probability(answer.confidence),
+        outlier_score: outlier_score(answer),
+        flags: flags.iter().copied().map(PersonFlag::Mask).collect(),
+    })
 }

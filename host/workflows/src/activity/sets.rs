@@ -1,7 +1,7 @@
 //! Leave-one-set-out: evaluates a finished model, and thresholds from the other sets, on each set. A blind set
 //! (`blind = "why"`) needs a reason, which is recorded in `openings.csv` next to it.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use farnear_recognition::evaluation::calibration::{Reliability, area_under_roc};
 use farnear_recognition::model::Recogniser;
@@ -9,24 +9,12 @@ use farnear_recognition::unknown::Limits;
 use serde::Serialize;
 
 use super::{
+    evaluate::EvaluateRequest,
     judging::{Judged, answers},
     recognition::Model,
     samples::{Samples, SamplesError},
 };
-use crate::{
-    context::Context,
-    error::{Result, WorkflowError},
-    figures::rounded,
-};
-
-#[derive(Clone, PartialEq, Debug)]
-pub struct SetsSettings {
-    pub sets: Vec<PathBuf>,
-    /// Pairs of names that differ between samples and model.
-    pub same: Vec<(String, String)>,
-    /// Reason for opening blind sets; without it they are rejected.
-    pub open_blind: Option<String>,
-}
+use crate::{context::Context, error::Result, figures::rounded};
 
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct SetFigures {
@@ -75,22 +63,15 @@ struct Measured {
     left_out_auroc: Option<f64>,
 }
 
-pub fn leave_one_set_out(
+/// Evaluates the model on the samples of a request and on its other sets.
+pub(super) fn leave_one_set_out(
     model: &Model,
-    settings: &SetsSettings,
+    request: &EvaluateRequest,
     context: &Context<'_>,
 ) -> Result<SetsFigures> {
-    if settings.sets.len() < 2 {
-        return Err(WorkflowError::parameter(
-            "sets",
-            settings.sets.len(),
-            "at least 2, each a file of samples",
-        ));
-    }
-    let measured = settings
-        .sets
-        .iter()
-        .map(|path| measured(model, path, settings, context))
+    let measured = std::iter::once(&request.samples)
+        .chain(&request.leave_one_set_out)
+        .map(|path| measured(model, path, request, context))
         .collect::<Result<Vec<Measured>>>()?;
     let sets: Vec<SetFigures> = (0..measured.len()).map(|left_out| figures(&measured, left_out)).collect();
     let worst = |of: fn(&SetFigures) -> f64| sets.iter().map(of).fold(0.0, f64::max);
@@ -102,11 +83,14 @@ pub fn leave_one_set_out(
     })
 }
 
-fn measured(model: &Model, path: &Path, settings: &SetsSettings, context: &Context<'_>) -> Result<Measured> {
-    let samples = Samples::read_opened(path, settings.open_blind.as_deref(), context)?;
-    let name = |activity: &str| {
-        settings.same.iter().find(|(own, _)| own == activity).map_or(activity, |(_, known)| known).to_owned()
-    };
+fn measured(
+    model: &Model,
+    path: &Path,
+    request: &EvaluateRequest,
+    context: &Context<'_>,
+) -> Result<Measured> {
+    let samples = Samples::read_opened(path, request.open_blind_set.as_deref(), context)?;
+    let name = |activity: &str| request.name_in_model(activity);
     let recogniser = model.recogniser(samples.full_frames);
     let judged = answers(recogniser, &samples.clips, false, &name, context)?;
     let (known, strange): (Vec<Judged>, Vec<Judged>) =

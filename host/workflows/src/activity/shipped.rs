@@ -9,10 +9,17 @@ use farnear_recognition::model::Recogniser;
 use farnear_recognition::network::training::NetworkSettings;
 use farnear_recognition::space::SpaceSettings;
 use farnear_recognition::synthetic::everyday;
-use serde::Serialize;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
 use super::{samples::SCALING, training_progress};
-use crate::{context::Context, error::Result, figures::rounded, parameters::within};
+use crate::{
+    context::Context,
+    error::Result,
+    figures::rounded,
+    parameters::within,
+    request::{PathKind, Request},
+};
 
 #[derive(PartialEq)]
 pub struct Shipped {
@@ -144,17 +151,46 @@ pub fn list() -> Result<Vec<ModelFigures>> {
         .collect()
 }
 
-/// People and passes of the shipped models.
-pub const PEOPLE: usize = 3000;
-pub const PASSES: usize = 6;
-
-#[derive(Clone, PartialEq, Debug)]
-pub struct SyntheticTraining {
-    /// Training subjects, each with all activities once, 20 to 5000.
+/// Trains models of everyday activities on seeded synthetic people alone, as those that come with the program were made.
+///
+/// The networks recognise from any one view, ordered and order-free, for full frames and for 100x100.
+#[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize, JsonSchema)]
+#[cfg_attr(feature = "clap", derive(clap::Args))]
+#[cfg_attr(feature = "clap", command(after_help = "Example: farnear activity train-synthetic --out models/"))]
+#[serde(default)]
+pub struct TrainSyntheticRequest {
+    /// Synthetic people to learn from, each at all activities once, 20 to 5000.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "COUNT", default_value_t = Self::default().people))]
     pub people: usize,
-    /// Passes over the clips in training, 1 to 200.
+    /// Passes of the learning over all synthetic people, 1 to 200.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "COUNT", default_value_t = Self::default().passes))]
     pub passes: usize,
+    /// New folder for the models.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "DIR"))]
     pub out: PathBuf,
+}
+
+impl Default for TrainSyntheticRequest {
+    /// As the shipped models.
+    fn default() -> Self {
+        Self { people: 3000, passes: 6, out: PathBuf::new() }
+    }
+}
+
+impl Request for TrainSyntheticRequest {
+    const NAME: &'static str = "activity train-synthetic";
+    const REQUIRED: &'static [&'static str] = &["out"];
+    const PATHS: &'static [(&'static str, PathKind)] = &[("out", PathKind::OutputFolder)];
+    type Figures = SyntheticTrainingFigures;
+
+    fn check(&self) -> Result<()> {
+        within("people", self.people, &(20..=5000), "")?;
+        within("passes", self.passes, &(1..=200), "")
+    }
+
+    fn run(&self, context: &Context<'_>) -> Result<SyntheticTrainingFigures> {
+        train(self, context)
+    }
 }
 
 #[derive(Clone, PartialEq, Debug, Serialize)]
@@ -198,10 +234,9 @@ const DIMENSIONS: usize = 60;
 /// Silhouettes for the principal components.
 const GALLERY: usize = 4000;
 
-/// Trains recognisers of everyday activities from seeds. The same kind of processor gives identical files.
-pub fn train(settings: &SyntheticTraining, context: &Context<'_>) -> Result<SyntheticTrainingFigures> {
-    within("people", settings.people, &(20..=5000), "")?;
-    within("passes", settings.passes, &(1..=200), "")?;
+/// The same kind of processor gives identical files.
+fn train(settings: &TrainSyntheticRequest, context: &Context<'_>) -> Result<SyntheticTrainingFigures> {
+    settings.check()?;
     let start = Instant::now();
     let out = Staging::new_folder(&settings.out)?;
     let mut people = Vec::new();

@@ -1,4 +1,4 @@
-//! Trains a model on samples of masks.
+//! The task of training: a model from samples of masks or motion files.
 
 use std::{path::PathBuf, time::Instant};
 
@@ -7,34 +7,131 @@ use farnear_recognition::choice::names;
 use farnear_recognition::clip::{Clip, Track};
 use farnear_recognition::model::Recogniser;
 use farnear_recognition::space::{Map, PatternKind};
-use serde::Serialize;
+use farnear_silhouettes::readers::recording::{Unit, Up};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use serde_with::{DisplayFromStr, serde_as};
 
 use super::{
-    method::Method,
-    motion::{self, MotionSettings},
+    method::MethodOptions,
+    motion::{self, MotionFile},
     samples::{SCALING, Samples},
     training_progress,
 };
 use crate::{
     context::Context,
-    error::{About, Result},
+    error::{About, Result, WorkflowError},
     figures::rounded,
-    parameters::at_least,
+    parameters::{at_least, within},
+    request::{PathKind, Request},
 };
 
 const WINDOW_MIN: usize = 5;
 
-#[derive(Clone, PartialEq, Debug)]
-pub struct TrainingSettings {
+/// Trains a model on samples of masks.
+///
+/// SAMPLES.toml lists `[[sample]] masks = "dir" subject = "s01" activity = "walk" view = 1` with folders relative to itself.
+/// Masks are full frames (the box's motion is learned too) or 100x100 (shapes only). Samples of one performance from several
+/// views are fused; give them a common `clip = "name"` where a subject does an activity more than once and the order does not tell.
+/// With two or more subjects the settings are chosen by cross-validation over them.
+///
+/// --motion learns from motion files, alone or with samples: recordings of markers or joints (.c3d, .trc, .bvh, .csv, .skeleton, .txt), or
+/// UTKinect's and Florence's MATLAB files. Each recording is seen by cameras all round, at any height and distance, in clothes of any
+/// thickness, cut and segmented as recordings are.
+#[serde_as]
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize, JsonSchema)]
+#[cfg_attr(feature = "clap", derive(clap::Args))]
+#[cfg_attr(
+    feature = "clap",
+    command(after_help = "Example: farnear activity train samples.toml --out model.fnm --mode ordered\n\
+                  \x20        farnear activity train --motion walk=02_01.bvh anna:'sit down'=sit.c3d --out model.fnm")
+)]
+#[serde(default)]
+pub struct TrainRequest {
+    /// The samples, TOML.
     pub samples: Option<PathBuf>,
-    /// Motion files as additional or only training data; every view is a separate clip.
-    pub motion: Option<MotionSettings>,
-    pub out: PathBuf,
-    pub method: Method,
-    /// Cut clips into windows of this many frames, at least 5: for un-segmented recordings.
+    /// Motion files to learn from: FILE that names its activity (UTKinect, Florence, NTU), or with the activity and, where it
+    /// is not the file's name, the person before it.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "[[SUBJECT:]ACTIVITY=]FILE", num_args = 1..))]
+    #[serde_as(as = "Vec<DisplayFromStr>")]
+    pub motion: Vec<MotionFile>,
+    /// What makes bodies of the points: a built-in template's name or a TOML file [default: the built-in one that fits best].
+    #[cfg_attr(feature = "clap", arg(long, value_name = "NAME|FILE"))]
+    pub template: Option<String>,
+    /// Which axis of the motion files points up: x, y or z [default: as they say or suggest].
+    #[cfg_attr(feature = "clap", arg(long))]
+    #[serde_as(as = "Option<DisplayFromStr>")]
+    pub up: Option<Up>,
+    /// Their unit of length: mm, cm, m, in, cmu or a number of millimetres [default: as they say or suggest].
+    #[cfg_attr(feature = "clap", arg(long, value_name = "UNIT"))]
+    #[serde_as(as = "Option<DisplayFromStr>")]
+    pub units: Option<Unit>,
+    /// Cameras that see every recording, 1 to 500.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "COUNT", default_value_t = Self::default().cameras))]
+    pub cameras: usize,
+    #[cfg_attr(feature = "clap", command(flatten))]
+    #[serde(flatten)]
+    pub method: MethodOptions,
+    /// Cut clips into windows of this many frames first, at least 5: for un-segmented recordings.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "FRAMES"))]
     pub window: Option<usize>,
-    /// Use every view as a separate clip, so that the model recognises single views.
+    /// Use every view as a separate clip, so that the model recognises from any single view.
+    #[cfg_attr(feature = "clap", arg(long))]
     pub any_view: bool,
+    /// The model to write.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "FILE"))]
+    pub out: PathBuf,
+}
+
+impl Default for TrainRequest {
+    fn default() -> Self {
+        Self {
+            samples: None,
+            motion: Vec::new(),
+            template: None,
+            up: None,
+            units: None,
+            cameras: 24,
+            method: MethodOptions::default(),
+            window: None,
+            any_view: false,
+            out: PathBuf::new(),
+        }
+    }
+}
+
+impl Request for TrainRequest {
+    const NAME: &'static str = "activity train";
+    const REQUIRED: &'static [&'static str] = &["out"];
+    const PATHS: &'static [(&'static str, PathKind)] = &[
+        ("samples", PathKind::Input),
+        ("motion", PathKind::NamedInput),
+        ("template", PathKind::InputOrName),
+        ("out", PathKind::OutputFile),
+    ];
+    type Figures = TrainingFigures;
+
+    fn check(&self) -> Result<()> {
+        if self.samples.is_none() && self.motion.is_empty() {
+            let expected = "a file of samples, --motion with recordings, or both";
+            return Err(WorkflowError::parameter("what to learn from", "is missing", expected));
+        }
+        within("cameras", self.cameras, &(1..=500), "")?;
+        if let Some(window) = self.window {
+            at_least("window", window, WINDOW_MIN, "frames")?;
+        }
+        self.method.method().map(|_| ())
+    }
+
+    fn run(&self, context: &Context<'_>) -> Result<TrainingFigures> {
+        train(self, context)
+    }
+
+    /// The masks too.
+    fn inputs(&self) -> Vec<PathBuf> {
+        let masks = self.samples.iter().flat_map(|file| Samples::folders(file).unwrap_or_default());
+        crate::request::inputs(self).into_iter().chain(masks).collect()
+    }
 }
 
 #[derive(Clone, PartialEq, Debug, Serialize)]
@@ -54,29 +151,28 @@ pub struct TrainingFigures {
     pub gamma: Option<f32>,
     /// Of the RBF map's system.
     pub condition_number: Option<f64>,
-    /// Accuracy in the cross-validation that chose the settings.
+    /// Accuracy in the cross-validation that chose the request.
     pub inner_accuracy: Option<f64>,
     pub seconds: f64,
 }
 
-/// With two or more subjects and a search, chooses the settings by cross-validation over subjects.
-pub fn train(settings: &TrainingSettings, context: &Context<'_>) -> Result<TrainingFigures> {
-    if let Some(window) = settings.window {
-        at_least("window", window, WINDOW_MIN, "frames")?;
-    }
+fn train(request: &TrainRequest, context: &Context<'_>) -> Result<TrainingFigures> {
+    request.check()?;
+    let method = request.method.method()?;
+    method.announce(context);
     let start = Instant::now();
-    let learned = Learned::read(settings, context)?;
+    let learned = Learned::read(request, context)?;
     let Learned { clips, frames, empty_frames, full_frames, what } = learned;
-    let clips: Vec<Clip> = match settings.window {
+    let clips: Vec<Clip> = match request.window {
         Some(length) => clips.iter().flat_map(|clip| clip.windows(length)).collect(),
         None => clips,
     };
-    let experiment = settings.method.experiment(full_frames)?;
+    let experiment = method.experiment(full_frames)?;
     let trained =
         Recogniser::train_searched(&clips, &experiment, SCALING, &training_progress::Training::new(context));
     let (model, inner_accuracy) = training_progress::outcome(trained, context, "training").about(|| what)?;
-    staging::write_file(&settings.out, &model.to_bytes()?)?;
-    context.info(&format!("wrote {}", settings.out.display()));
+    staging::write_file(&request.out, &model.to_bytes()?)?;
+    context.info(&format!("wrote {}", request.out.display()));
     let (gamma, condition_number) = match &model.space.map {
         Map::Rbf(rbf) => (Some(rbf.gamma), Some(rbf.condition)),
         Map::Pca(_) => (None, None),
@@ -89,7 +185,7 @@ pub fn train(settings: &TrainingSettings, context: &Context<'_>) -> Result<Train
         frames,
         empty_frames,
         full_frames,
-        mode: settings.method.name(),
+        mode: method.name(),
         layout: layout(&model),
         pattern: pattern(&model),
         gamma,
@@ -108,7 +204,7 @@ struct Learned {
 }
 
 impl Learned {
-    fn read(settings: &TrainingSettings, context: &Context<'_>) -> Result<Self> {
+    fn read(request: &TrainRequest, context: &Context<'_>) -> Result<Self> {
         let mut learned = Self {
             clips: Vec::new(),
             frames: 0,
@@ -116,17 +212,17 @@ impl Learned {
             full_frames: true,
             what: "motion files".into(),
         };
-        if let Some(path) = &settings.samples {
+        if let Some(path) = &request.samples {
             let samples = Samples::read(path, context)?;
             learned.frames = samples.frames;
             learned.empty_frames = samples.empty_frames;
             learned.full_frames = samples.full_frames;
             learned.what = path.display().to_string();
-            let apart = settings.any_view || settings.motion.is_some();
+            let apart = request.any_view || !request.motion.is_empty();
             learned.clips = if apart { samples.split() } else { samples.fused()? };
         }
-        if let Some(motion) = &settings.motion {
-            let mut clips = motion::clips(motion, context)?;
+        if !request.motion.is_empty() {
+            let mut clips = motion::clips(request, context)?;
             learned.frames += clips.iter().flat_map(|clip| &clip.views).map(Track::frames).sum::<usize>();
             if !learned.full_frames {
                 clips.iter_mut().flat_map(|clip| &mut clip.views).for_each(|view| view.boxes = None);

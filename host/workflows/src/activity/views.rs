@@ -228,7 +228,8 @@ fn seen_in_mask(file: &Path, levels: &Levels, first: &mut Option<First>) -> Resu
     Ok(Seen { name, mask, flags, picture: None })
 }
 
-fn seen_in_frame(frame: VideoFrame, extractor: &mut Option<Box<Extractor>>) -> Result<Seen> {
+/// Learns the background with `extractor`, made for the first frame.
+pub(super) fn seen_in_frame(frame: VideoFrame, extractor: &mut Option<Box<Extractor>>) -> Result<Seen> {
     let VideoFrame { name, pixels } = frame;
     let found = extractor_for(&pixels, extractor)?.extract(frame_of(&pixels))?.subject;
     Ok(Seen { name, mask: found.mask, flags: found.flags, picture: Some(pixels) })

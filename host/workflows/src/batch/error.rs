@@ -18,8 +18,6 @@ pub enum BatchError {
     UnknownKind { name: String, known: String },
     #[error("the field `{name}` is missing")]
     MissingField { name: &'static str },
-    #[error("unknown field `{name}`; expected some of {known}")]
-    UnknownField { name: String, known: String },
     #[error("the field `{name}` is {value}: {reason}")]
     Field { name: String, value: String, reason: String },
     #[error(

@@ -1,10 +1,8 @@
-//! A job's fields as typed values. A TOML table and a CSV row give the same.
+//! A job's fields. A TOML table and a CSV row give the same.
 
 use std::{
-    collections::{BTreeMap, BTreeSet},
-    fmt::Display,
+    collections::BTreeMap,
     path::{Path, PathBuf},
-    str::FromStr,
 };
 
 use serde_json::{Map, Value};
@@ -15,7 +13,6 @@ use super::BatchError;
 #[derive(Clone, PartialEq, Eq, Debug, Default)]
 pub(super) struct Fields {
     values: BTreeMap<String, Vec<String>>,
-    taken: BTreeSet<&'static str>,
     base: PathBuf,
 }
 
@@ -53,19 +50,14 @@ impl Fields {
 
     pub fn remove(&mut self, name: &str) {
         self.values.remove(name);
-        self.taken.remove(name);
     }
 
-    pub fn take_all(&mut self) -> Map<String, Value> {
-        let all = std::mem::take(&mut self.values).into_iter();
-        all.map(|(name, values)| {
-            let value = match <[String; 1]>::try_from(values) {
-                Ok([one]) => Value::from(one),
-                Err(several) => Value::from(several),
-            };
-            (name, value)
-        })
-        .collect()
+    pub fn all(&self) -> Map<String, Value> {
+        let value = |values: &Vec<String>| match values.as_slice() {
+            [one] => Value::from(one.as_str()),
+            several => Value::from(several),
+        };
+        self.values.iter().map(|(name, values)| (name.clone(), value(values))).collect()
     }
 
     /// All fields but `name`, as written, sorted by name.
@@ -75,81 +67,16 @@ impl Fields {
         values
     }
 
-    pub fn text(&mut self, name: &'static str) -> Result<String, BatchError> {
-        self.optional_text(name)?.ok_or(BatchError::MissingField { name })
-    }
-
-    pub fn optional_text(&mut self, name: &'static str) -> Result<Option<String>, BatchError> {
-        self.taken.insert(name);
+    pub fn text(&self, name: &'static str) -> Result<String, BatchError> {
         match self.values.get(name).map(Vec::as_slice) {
-            None => Ok(None),
-            Some([one]) => Ok(Some(one.clone())),
+            None => Err(BatchError::MissingField { name }),
+            Some([one]) => Ok(one.clone()),
             Some(several) => Err(BatchError::field(name, several.join(", "), "expected one value")),
         }
     }
 
-    /// A list, in CSV separated by `;`; empty by default.
-    pub fn texts(&mut self, name: &'static str) -> Vec<String> {
-        self.taken.insert(name);
-        let parts = self.values.get(name).into_iter().flatten().flat_map(|value| value.split(';'));
-        parts.map(str::trim).filter(|part| !part.is_empty()).map(Into::into).collect()
-    }
-
-    pub fn path(&mut self, name: &'static str) -> Result<PathBuf, BatchError> {
-        let text = self.text(name)?;
-        Ok(self.base.join(text))
-    }
-
-    pub fn optional_path(&mut self, name: &'static str) -> Result<Option<PathBuf>, BatchError> {
-        Ok(self.optional_text(name)?.map(|text| self.base.join(text)))
-    }
-
-    /// A built-in name or a file; an existing file takes precedence.
-    pub fn name_or_file(&mut self, name: &'static str) -> Result<Option<PathBuf>, BatchError> {
-        let text = self.optional_text(name)?;
-        Ok(text.map(|text| {
-            let file = self.base.join(&text);
-            if file.exists() { file } else { text.into() }
-        }))
-    }
-
     pub fn base(&self) -> &Path {
         &self.base
-    }
-
-    pub fn optional<T: FromStr<Err: Display>>(
-        &mut self,
-        name: &'static str,
-    ) -> Result<Option<T>, BatchError> {
-        let Some(text) = self.optional_text(name)? else { return Ok(None) };
-        match text.parse() {
-            Ok(value) => Ok(Some(value)),
-            Err(error) => Err(BatchError::field(name, text, error)),
-        }
-    }
-
-    pub fn or<T: FromStr<Err: Display>>(&mut self, name: &'static str, usual: T) -> Result<T, BatchError> {
-        Ok(self.optional(name)?.unwrap_or(usual))
-    }
-
-    /// Value of a field of true or false; false by default.
-    pub fn flag(&mut self, name: &'static str) -> Result<bool, BatchError> {
-        match self.optional_text(name)?.as_deref() {
-            None | Some("false") => Ok(false),
-            Some("true") => Ok(true),
-            Some(other) => Err(BatchError::field(name, other, "expected true or false")),
-        }
-    }
-
-    /// Rejects unknown fields, so that a typing error does not select a default.
-    pub fn all_taken(&self) -> Result<(), BatchError> {
-        match self.values.keys().find(|name| !self.taken.contains(name.as_str())) {
-            None => Ok(()),
-            Some(name) => Err(BatchError::UnknownField {
-                name: name.clone(),
-                known: self.taken.iter().copied().collect::<Vec<_>>().join(", "),
-            }),
-        }
     }
 }
 
@@ -173,34 +100,18 @@ mod tests {
     }
 
     #[test]
-    fn fields_have_types_and_paths_a_base() {
-        let mut fields = fields(
-            "far = 'a/far.png'\nmin-confidence = 0.5\nfill = true\nsmooth = 9\nviews = ['x', 'y;z']\ntime = 2014-06-23T11:30:00Z",
+    fn a_table_gives_texts_and_lists() {
+        let fields = fields(
+            "far = 'a/far.png'\nmin-confidence = 0.5\nviews = ['x', 'y;z']\ntime = 2014-06-23T11:30:00Z",
         );
-        assert_eq!(fields.path("far").expect("well"), Path::new("/base/a/far.png"));
-        assert_eq!(fields.optional("min_confidence").expect("well"), Some(0.5));
-        assert!(fields.flag("fill").expect("well"));
-        assert!(!fields.flag("centred").expect("well"));
-        assert_eq!(fields.or("median", 3_usize).expect("well"), 3);
-        assert_eq!(fields.texts("views"), ["x", "y", "z"]);
+        assert_eq!(fields.text("far").expect("well"), "a/far.png");
+        assert_eq!(fields.text("min_confidence").expect("well"), "0.5");
         assert_eq!(fields.text("time").expect("well"), "2014-06-23T11:30:00Z");
         assert!(matches!(fields.text("near"), Err(BatchError::MissingField { name: "near" })));
-        let error = fields.all_taken().expect_err("smooth").to_string();
-        assert!(error.contains("smooth") && error.contains("min_confidence"), "{error}");
-        assert_eq!(fields.or("smooth", 7_usize).expect("well"), 9);
-        fields.all_taken().expect("well");
-    }
-
-    #[test]
-    fn wrong_values_are_named() {
-        let mut fields = fields("smooth = 'wide'\nfill = 'yes'\nfar = ['a', 'b']\n");
-        for (error, phrases) in [
-            (fields.or("smooth", 7_usize).map(|_| ()), ["smooth", "wide"]),
-            (fields.flag("fill").map(|_| ()), ["fill", "yes"]),
-            (fields.path("far").map(|_| ()), ["far", "one value"]),
-        ] {
-            let error = error.expect_err("wrong").to_string();
-            assert!(phrases.iter().all(|phrase| error.contains(phrase)), "{error}");
-        }
+        let error = fields.text("views").expect_err("several").to_string();
+        assert!(error.contains("views") && error.contains("one value"), "{error}");
+        let all = fields.all();
+        assert_eq!(all["views"], serde_json::json!(["x", "y;z"]));
+        assert_eq!(all["far"], "a/far.png");
     }
 }

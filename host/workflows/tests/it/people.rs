@@ -7,15 +7,14 @@ use std::{
     time::Duration,
 };
 
-use farnear_recognition::classifier::Family;
-use farnear_recognition::frames::Mode;
 use farnear_workflows::{
     Cancel, Context, Progress, Result, Unattended, WorkflowError,
     activity::{
-        evaluation::{self, EvaluationSettings, LearnFrom},
-        method::{Adaptation, Method, Pattern},
-        training::{self, TrainingSettings},
+        evaluate::{EvaluateFigures, EvaluateRequest},
+        method::MethodOptions,
+        training::TrainRequest,
     },
+    request::Request,
     silhouettes::{
         performances::Drawing,
         synthetic::{self, SyntheticRequest},
@@ -76,10 +75,8 @@ fn people(out: PathBuf) -> SyntheticRequest {
     }
 }
 
-fn training(samples: PathBuf, out: PathBuf) -> TrainingSettings {
-    let pattern = Pattern::Codebook { mode: Mode::OrderFree, classifier: Family::Svc };
-    let method = Method { pattern, search: true };
-    TrainingSettings { samples: Some(samples), motion: None, out, method, window: None, any_view: false }
+fn training(samples: PathBuf, out: PathBuf) -> TrainRequest {
+    TrainRequest { samples: Some(samples), out, ..TrainRequest::default() }
 }
 
 #[track_caller]
@@ -122,31 +119,30 @@ fn training_and_evaluation_are_counted_and_stop_in_the_middle() {
     let stopped = tempfile::tempdir().expect("a folder");
     let listener = Listener::cancelling("spaces tried");
     let settings = training(samples.clone(), stopped.path().join("model.fnm"));
-    assert_cancelled(training::train(&settings, &listener.context()), stopped.path());
+    assert_cancelled(settings.run(&listener.context()), stopped.path());
     let heard = listener.heard();
     assert_eq!(heard.iter().filter(|what| what.ends_with("samples read")).count(), 6, "{heard:?}");
     assert_eq!(heard.last().map(String::as_str), Some("1/None spaces tried"), "{heard:?}");
 
-    let evaluation = EvaluationSettings {
+    let evaluation = EvaluateRequest {
         samples,
-        learn_from: LearnFrom::OtherSubjects,
-        method: Method { search: false, ..settings.method },
-        adaptation: Adaptation::default(),
-        views: None,
+        leave_one_subject_out: true,
+        method: MethodOptions { no_search: true, ..MethodOptions::default() },
         out: Some(stopped.path().join("evaluation")),
+        ..EvaluateRequest::default()
     };
     let listener = Listener::cancelling("samples read");
-    assert_cancelled(evaluation::evaluate(&evaluation, &listener.context()), stopped.path());
+    assert_cancelled(evaluation.run(&listener.context()), stopped.path());
     let whole = Listener::default();
-    let figures = evaluation::evaluate(&evaluation, &whole.context()).expect("evaluated");
+    let figures = evaluation.run(&whole.context()).expect("evaluated");
+    let EvaluateFigures::Method(figures) = figures else { panic!("{figures:?}") };
     assert_eq!((figures.subjects, figures.clips, figures.answers), (3, 6, 6));
     assert!(whole.heard().contains(&"3/Some(3) folds".into()), "{:?}", whole.heard());
 
     // A search reports the remaining time from the first space to the end.
-    let searched =
-        EvaluationSettings { method: Method { search: true, ..evaluation.method }, out: None, ..evaluation };
+    let searched = EvaluateRequest { method: MethodOptions::default(), out: None, ..evaluation };
     let watched = Listener::default();
-    evaluation::evaluate(&searched, &watched.context()).expect("evaluated");
+    searched.run(&watched.context()).expect("evaluated");
     let heard = watched.heard();
     let first = heard.iter().position(|what| what.starts_with("left ")).expect("time left");
     assert_eq!(heard[first + 1], "0/Some(3) folds", "{heard:?}");

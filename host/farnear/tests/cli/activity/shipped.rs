@@ -168,7 +168,11 @@ fn a_shipped_network_and_unlabelled_clips_serve_where_samples_come_from_elsewher
     assert!(number(&aligned, "accuracy") > 0.4 && number(&plain, "accuracy") > 0.4, "{aligned} {plain}");
     fails(&mut evaluate(&["--align", "sideways"]), 2, &["sideways", "coral"]);
     fails(&mut evaluate(&["--features", "nobody"]), 2, &["nobody", "everyday-order-free"]);
-    fails(&mut evaluate(&["--features", "everyday", "--mode", "ordered"]), 2, &["--features", "--mode"]);
+    fails(
+        &mut evaluate(&["--features", "everyday", "--mode", "ordered"]),
+        2,
+        &["features everyday", "--mode"],
+    );
 
     let model = people.text("features.fnm");
     let train =

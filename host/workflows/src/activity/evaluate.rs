@@ -1,0 +1,220 @@
+//! The task of evaluation: a method on subjects outside its training, or a finished model.
+
+use std::path::{Path, PathBuf};
+
+use farnear_files::staging::Staging;
+use farnear_recognition::alignment::Alignment;
+use farnear_recognition::choice::Views;
+use farnear_recognition::evaluation::confusion::Confusion;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::{
+    evaluation::{self, EvaluationFigures, OpenSetFigures},
+    judging::{self, JudgingFigures},
+    method::{MethodOptions, none_of},
+    recognition::Model,
+    samples::Samples,
+    sets::{self, SetsFigures},
+};
+use crate::{
+    context::Context,
+    error::{Result, WorkflowError},
+    request::{PathKind, Request},
+};
+
+const FIGURES: &str = "figures.json";
+
+/// Evaluates the method: every subject is recognised by a model of the others.
+///
+/// With --leave-one-subject-out each subject in turn is left out of the training, in which everything that can be
+/// chosen is chosen by cross-validation over the remaining subjects. --train gives other samples to learn from (clean
+/// masks for damaged ones of the same people, say; a subject's own are left out as before). Without
+/// --leave-one-subject-out but with --train all of that is learned from, and the subjects must be others.
+///
+/// --open-set leaves out activities instead of subjects: half of the subjects train the others, the other half performs all.
+///
+/// --model judges a finished model instead: answers among all that it knows and among what the samples hold, how far confidences are
+/// from the fraction of right answers, how many known and unknown activities it calls unknown. With --leave-one-set-out it is judged on several
+/// sets: expect of a new set the figures of the worst left-out one.
+#[derive(Clone, Default, PartialEq, Eq, Debug, Serialize, Deserialize, JsonSchema)]
+#[cfg_attr(feature = "clap", derive(clap::Args))]
+#[cfg_attr(
+    feature = "clap",
+    command(
+        after_help = "Example: farnear activity evaluate samples.toml --leave-one-subject-out --mode ordered --json\n\
+         \x20        farnear activity evaluate samples.toml --model everyday --same 'clap hands=clap' --out judged/\n\
+         \x20        farnear activity evaluate one/samples.toml --model everyday --leave-one-set-out two/samples.toml three/samples.toml"
+    )
+)]
+#[serde(default)]
+pub struct EvaluateRequest {
+    /// The samples, TOML (see farnear activity train --help).
+    pub samples: PathBuf,
+    /// Leave every subject out in turn.
+    #[cfg_attr(feature = "clap", arg(long))]
+    pub leave_one_subject_out: bool,
+    /// Learn from these samples instead.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "SAMPLES"))]
+    pub train: Option<PathBuf>,
+    /// Judge this model: a file, or the name of one that comes with the program.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "FILE|NAME"))]
+    pub model: Option<PathBuf>,
+    /// Judge the model on these sets too, each with a limit for unknown activities that the other sets give.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "SAMPLES", num_args = 1..))]
+    pub leave_one_set_out: Vec<PathBuf>,
+    /// Open sets that their samples file marks as blind, for this reason; every opening is recorded in openings.csv next to the file.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "REASON"))]
+    pub open_blind_set: Option<String>,
+    /// An activity's name in the samples and in the model, where they differ; may be repeated.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "SAMPLES=MODEL"))]
+    pub same: Vec<String>,
+    /// Leave every activity out of the training in turn, and report how often it is called unknown.
+    #[cfg_attr(feature = "clap", arg(long))]
+    pub open_set: bool,
+    /// Learn on from one's own surest answers for the clips that are recognised, without their labels: for clips from another camera,
+    /// sensor or laboratory than those learned from.
+    #[cfg_attr(feature = "clap", arg(long))]
+    pub adapt: bool,
+    /// Bring the frames of the clips that are recognised to those learned from, without labels: none, mean, spread (mean and
+    /// spread) or coral (covariance too).
+    #[cfg_attr(feature = "clap", arg(long, value_name = "STATISTICS", default_value = "none"))]
+    #[schemars(with = "String")]
+    pub align: Alignment,
+    #[cfg_attr(feature = "clap", command(flatten))]
+    #[serde(flatten)]
+    pub method: MethodOptions,
+    /// each: every view by itself, answers counted together; fused: all views of a clip at once [default: fused, or each where clips
+    /// differ in their views].
+    #[cfg_attr(feature = "clap", arg(long))]
+    #[schemars(with = "Option<String>")]
+    pub views: Option<Views>,
+    /// Folder for figures.json, confusion.png, confusion.md and evaluation.toml (the choices of every fold), or wrong.csv (a model's
+    /// mistakes).
+    #[cfg_attr(feature = "clap", arg(long, value_name = "DIR"))]
+    pub out: Option<PathBuf>,
+}
+
+#[derive(Clone, PartialEq, Debug, Serialize)]
+#[serde(untagged)]
+pub enum EvaluateFigures {
+    Method(EvaluationFigures),
+    OpenSet(OpenSetFigures),
+    Model(JudgingFigures),
+    Sets(SetsFigures),
+}
+
+impl EvaluateFigures {
+    pub fn confusion(&self) -> Option<&Confusion> {
+        match self {
+            Self::Method(figures) => Some(&figures.confusion),
+            Self::Model(figures) => Some(&figures.confusion),
+            Self::OpenSet(_) | Self::Sets(_) => None,
+        }
+    }
+}
+
+impl Request for EvaluateRequest {
+    const NAME: &'static str = "activity evaluate";
+    const REQUIRED: &'static [&'static str] = &["samples"];
+    const PATHS: &'static [(&'static str, PathKind)] = &[
+        ("samples", PathKind::Input),
+        ("train", PathKind::Input),
+        ("model", PathKind::InputOrName),
+        ("leave_one_set_out", PathKind::Input),
+        ("out", PathKind::OutputFolder),
+    ];
+    type Figures = EvaluateFigures;
+
+    fn check(&self) -> Result<()> {
+        self.method.method()?;
+        for same in &self.same {
+            pair(same)?;
+        }
+        let learning = [
+            ("leave-one-subject-out", self.leave_one_subject_out),
+            ("train", self.train.is_some()),
+            ("open-set", self.open_set),
+        ];
+        let sets = !self.leave_one_set_out.is_empty();
+        let rest = [
+            ("views", self.views.is_some()),
+            ("adapt", self.adapt),
+            ("align", self.align != Alignment::None),
+        ];
+        if let Some(model) = &self.model {
+            let model = model.display();
+            none_of("model", &model, learning)?;
+            none_of("model", &model, [("the options of the method", !self.method.is_default())])?;
+            none_of("model", &model, [rest[2]])?;
+            return if sets { none_of("leave-one-set-out", "given", [rest[0], rest[1]]) } else { Ok(()) };
+        }
+        let of_models = [
+            ("leave-one-set-out", sets),
+            ("open-blind-set", self.open_blind_set.is_some()),
+            ("same", !self.same.is_empty()),
+        ];
+        if let Some((name, _)) = of_models.into_iter().find(|(_, given)| *given) {
+            return Err(WorkflowError::parameter(name, "given", "it needs --model"));
+        }
+        match (self.open_set, self.leave_one_subject_out || self.train.is_some()) {
+            (true, _) => none_of("open-set", "given", [learning[0], learning[1], rest[0], rest[1], rest[2]]),
+            (false, true) => Ok(()),
+            (false, false) => Err(WorkflowError::parameter(
+                "what to learn from",
+                "is missing",
+                "--leave-one-subject-out (the other subjects), --train SAMPLES, or both; or --open-set; or --model to judge a finished one",
+            )),
+        }
+    }
+
+    fn run(&self, context: &Context<'_>) -> Result<EvaluateFigures> {
+        self.check()?;
+        let out = self.out.as_deref().map(Staging::new_folder).transpose()?;
+        let model = self.model.as_deref().map(|model| context.cache.model(model)).transpose()?;
+        let figures = match &model {
+            Some(model) if self.leave_one_set_out.is_empty() => {
+                EvaluateFigures::Model(judging::judge(model, self, out.as_ref(), context)?)
+            }
+            Some(model) => EvaluateFigures::Sets(sets::leave_one_set_out(model, self, context)?),
+            None if self.open_set => EvaluateFigures::OpenSet(evaluation::open_set(self, context)?),
+            None => EvaluateFigures::Method(evaluation::evaluate(self, out.as_ref(), context)?),
+        };
+        if let (Some(staged), Some(out)) = (out, &self.out) {
+            staged.write(FIGURES, untimed(&figures)?.as_bytes())?;
+            staged.finish()?;
+            context.info(&format!("wrote {}", out.display()));
+        }
+        Ok(figures)
+    }
+
+    /// The masks too.
+    fn inputs(&self) -> Vec<PathBuf> {
+        let samples = || std::iter::once(&self.samples).chain(&self.train).chain(&self.leave_one_set_out);
+        let masks = samples().flat_map(|file| Samples::folders(file).unwrap_or_default());
+        let model = self.model.as_deref().and_then(Model::file).map(Path::to_path_buf);
+        samples().cloned().chain(masks).chain(model).collect()
+    }
+}
+
+impl EvaluateRequest {
+    pub(super) fn name_in_model(&self, activity: &str) -> String {
+        let pairs = self.same.iter().filter_map(|same| pair(same).ok());
+        pairs.into_iter().find(|(own, _)| *own == activity).map_or(activity, |(_, known)| known).to_owned()
+    }
+}
+
+fn pair(same: &str) -> Result<(&str, &str)> {
+    let pair = same.split_once('=').map(|(own, known)| (own.trim(), known.trim()));
+    pair.ok_or_else(|| WorkflowError::parameter("same", same, "NAME IN THE SAMPLES=NAME IN THE MODEL"))
+}
+
+/// The figures without times, so that equal samples give equal files.
+fn untimed(figures: &EvaluateFigures) -> Result<String> {
+    let mut figures = serde_json::to_value(figures)
+        .map_err(|error| WorkflowError::parameter("figures", error, "figures that JSON can hold"))?;
+    if let Some(figures) = figures.as_object_mut() {
+        figures.retain(|name, _| !name.starts_with("seconds"));
+    }
+    Ok(format!("{figures}\n"))
+}

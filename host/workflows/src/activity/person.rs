@@ -1,0 +1,153 @@
+//! One person's recognition in progress: of a recording with one person, of each of several, or before a camera.
+
+use std::ops::Range;
+
+use farnear_recognition::clip::Track;
+use farnear_recognition::live::{Live, joined, windows};
+use farnear_recognition::model::{Answer, ModelError, Recogniser};
+use farnear_recognition::segmentation::{Worth, segmented};
+
+use super::answer::{AnswerSummary, Part, PersonFigures, restricted, rounded_probability};
+use crate::error::Result;
+
+/// Frames without the person after which a new part begins.
+const GAP_FRAMES: usize = 15;
+
+pub(super) struct Person<'m> {
+    model: &'m Recogniser,
+    live: Live<'m>,
+    window: usize,
+    among: Vec<String>,
+    /// Indexed as `[view][frame]`.
+    tracks: Vec<Vec<Track>>,
+    /// The recording's number of each frame, from 1.
+    numbers: Vec<usize>,
+}
+
+impl<'m> Person<'m> {
+    /// Answers among some activities (all if empty) for the last `window` frames of `views` views.
+    pub fn new(model: &'m Recogniser, views: usize, window: usize, among: &[String]) -> Self {
+        Self {
+            live: Live::new(model, window, true),
+            model,
+            window,
+            among: among.to_vec(),
+            tracks: vec![Vec::new(); views],
+            numbers: Vec::new(),
+        }
+    }
+
+    /// Adds frame `number`, a track of one frame per view, and answers for the window that ends with it.
+    pub fn see(&mut self, number: usize, views: Vec<Track>) -> Result<Answer, ModelError> {
+        for (track, frame) in self.tracks.iter_mut().zip(&views) {
+            track.push(frame.clone());
+        }
+        self.numbers.push(number);
+        Ok(restricted(self.live.push_described(views)?, &self.among))
+    }
+
+    /// Drops the frames but those of the running window.
+    pub fn forget(&mut self) {
+        self.tracks.iter_mut().for_each(Vec::clear);
+        self.numbers.clear();
+    }
+
+    /// Frames without the person, summed over the views.
+    pub fn empty_frames(&self) -> usize {
+        self.tracks.iter().flatten().map(|track| track.empty_frames).sum()
+    }
+
+    /// The answer for all frames.
+    pub fn summary(&self) -> Result<AnswerSummary> {
+        let whole: Vec<Track> = self.tracks.iter().map(|frames| joined(frames.iter())).collect();
+        let answer = restricted(self.model.recognise(&whole)?, &self.among);
+        Ok(AnswerSummary::new(answer, self.numbers.len()))
+    }
+
+    /// Answers for all frames, for windows and for segments; `None` if no frame has a silhouette.
+    pub fn figures(&self, person: usize, answer: AnswerSummary) -> Result<Option<PersonFigures>> {
+        let is_seen = |frame: &usize| {
+            self.tracks.iter().any(|view| view.get(*frame).is_some_and(|track| track.frames() > 0))
+        };
+        let seen: Vec<usize> = (0..self.numbers.len()).filter(is_seen).collect();
+        let number = |frame: Option<&usize>| frame.and_then(|frame| self.numbers.get(*frame)).copied();
+        let (Some(from), Some(to)) = (number(seen.first()), number(seen.last())) else { return Ok(None) };
+        let (mut in_windows, mut in_segments) = (Vec::new(), Vec::new());
+        for passage in passages(&seen, &self.numbers) {
+            let (windows, segments) = self.stretches(passage)?;
+            in_windows.extend(windows);
+            in_segments.extend(segments);
+        }
+        Ok(Some(PersonFigures {
+            person,
+            from,
+            to,
+            silhouettes: seen.len(),
+            crossing_frames: 0,
+            perhaps_swapped_with: Vec::new(),
+            answer,
+            windows: in_windows,
+            segments: in_segments,
+        }))
+    }
+
+    /// Windows that overlap by half, and segments.
+    fn stretches(&self, passage: Range<usize>) -> Result<(Vec<Part>, Vec<Part>)> {
+        let numbers = &self.numbers[passage.clone()];
+        let views: Vec<&[Track]> = self.tracks.iter().map(|view| &view[passage.clone()]).collect();
+        let whole: Vec<Track> = views.iter().map(|view| joined(view.iter())).collect();
+        // Frames without a silhouette are not in the tracks.
+        let numbers: Vec<usize> = views
+            .iter()
+            .find(|view| view.iter().any(|track| track.frames() > 0))
+            .into_iter()
+            .flat_map(|view| numbers.iter().zip(*view).filter(|(_, track)| track.frames() > 0))
+            .map(|(number, _)| *number)
+            .collect();
+        let part = |from: usize, to: usize, activity: Option<String>, confidence: f32| {
+            let last = numbers.len().saturating_sub(1);
+            let number = |frame: usize| numbers.get(frame.min(last)).copied().unwrap_or(1);
+            Part {
+                from: number(from),
+                to: number(to.saturating_sub(1)),
+                activity,
+                confidence: rounded_probability(confidence),
+            }
+        };
+        let of_windows = windows(self.model, &whole, self.window, self.window.div_ceil(2))?;
+        let of_segments = segmented(self.model, &whole, &self.among, Worth::default())?;
+        Ok((
+            of_windows
+                .into_iter()
+                .map(|window| (window.from, window.to, restricted(window.answer, &self.among)))
+                .map(|(from, to, answer)| part(from, to, answer.activity, answer.confidence))
+                .collect(),
+            of_segments
+                .into_iter()
+                .map(|segment| part(segment.from, segment.to, segment.activity, segment.confidence))
+                .collect(),
+        ))
+    }
+}
+
+/// Splits the frames `seen` where more than [`GAP_FRAMES`] of the recording lie between two.
+fn passages(seen: &[usize], numbers: &[usize]) -> Vec<Range<usize>> {
+    let near = |a: &usize, b: &usize| numbers[*b] - numbers[*a] <= GAP_FRAMES + 1;
+    seen.chunk_by(near).filter_map(|part| Some(*part.first()?..part.last()? + 1)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_recording_is_split_at_long_gaps_without_a_person() {
+        let numbers: Vec<usize> = (1..=400).collect();
+        let seen: Vec<usize> = (3..20).chain(25..40).chain(340..390).collect();
+        assert_eq!(passages(&seen, &numbers), [3..40, 340..390]);
+        assert!(passages(&[], &numbers).is_empty());
+        // Frames of a person whom another hid for a second are numbered with a gap.
+        let numbers: Vec<usize> = (1..=20).chain(46..=60).collect();
+        assert_eq!(passages(&(0..35).collect::<Vec<_>>(), &numbers), [0..20, 20..35]);
+    }
+}
