@@ -28,7 +28,7 @@ pub fn read(bytes: &[u8]) -> Result<Found, RecordingError> {
         planar: false,
         unit: guess::unit(&motion.joints),
         up: guess::up(&motion, &kinematics),
-        remarks: Vec::new(),
+        remarks: motion.remarks,
         names: motion.joints.iter().map(|joint| joint.name.clone()).collect(),
         rate_hz: if rate_hz.is_finite() { rate_hz } else { 0.0 },
         frames,

@@ -278,8 +278,19 @@ pub enum RecordingError {
     Unit(String),
 }
 
-/// Text without a byte-order mark; Latin-1 if it is not UTF-8. Errors have the line of the first other byte.
+/// A number with a point or, as programs of many countries write it, a comma before its decimals.
+pub(super) fn number(text: &str) -> Option<f64> {
+    text.parse().or_else(|_| text.replacen(',', ".", 1).parse()).ok()
+}
+
+/// Text without a byte-order mark, with line feeds for lone carriage returns; Latin-1 if it is not UTF-8. Errors have the
+/// line of the first other byte.
 pub(super) fn text(bytes: &[u8]) -> Result<Cow<'_, str>, RecordingError> {
+    let text = decoded(bytes)?;
+    Ok(if text.contains('\n') || !text.contains('\r') { text } else { text.replace('\r', "\n").into() })
+}
+
+fn decoded(bytes: &[u8]) -> Result<Cow<'_, str>, RecordingError> {
     let control = |byte: &u8| byte.is_ascii_control() && !byte.is_ascii_whitespace();
     match std::str::from_utf8(bytes) {
         Ok(text) => Ok(text.trim_start_matches('\u{feff}').into()),

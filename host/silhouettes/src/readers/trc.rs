@@ -1,7 +1,7 @@
 //! TRC files (Motion Analysis, OpenSim): tab-separated marker trajectories.
 
 use super::reader::Reader;
-use super::recording::{Found, Known, RecordingError, Source, Up, text};
+use super::recording::{Found, Known, RecordingError, Source, Up, number, text};
 use crate::silhouette::capsule::Point3;
 
 pub const READER: Reader =
@@ -29,15 +29,15 @@ pub fn read(bytes: &[u8]) -> Result<Found, RecordingError> {
         let found = keys.iter().position(|k| *k == key).and_then(|index| values.get(index).copied());
         found.ok_or_else(|| RecordingError::Line { line: 3, reason: format!("no value of {key}") })
     };
-    let number = |key: &str| {
+    let stated = |key: &str| {
         let text = value(key)?;
-        text.parse::<f64>().map_err(|_| RecordingError::Line {
+        number(text).ok_or_else(|| RecordingError::Line {
             line: 3,
             reason: format!("{key} = `{text}` is not a number"),
         })
     };
     let unit = Found::stated_unit(value("Units")?);
-    let (rate_hz, count) = (number("DataRate")?, number("NumMarkers")?);
+    let (rate_hz, count) = (stated("DataRate")?, stated("NumMarkers")?);
     // A name is above the first of its three columns; Cortex omits names of unidentified trajectories.
     let cells: Vec<&str> = line(3)?.split('\t').skip(2).map(str::trim).collect();
     let all: Vec<(usize, String)> = (0..)
@@ -65,7 +65,7 @@ pub fn read(bytes: &[u8]) -> Result<Found, RecordingError> {
     }
     let frames = rows(&lines, &places)?;
     // Without the number all frames are read; a larger promised number means truncation.
-    if let Ok(promised) = number("NumFrames")
+    if let Ok(promised) = stated("NumFrames")
         && promised > frames.len() as f64
     {
         // Some exporters count one frame too many.
@@ -111,9 +111,8 @@ pub(super) fn point(cells: [&str; 3], line: usize) -> Result<Option<Point3>, Rec
     }
     let mut point = [0.0; 3];
     for (value, cell) in point.iter_mut().zip(cells) {
-        let parsed = cell.parse::<f64>();
-        *value =
-            parsed.map_err(|_| RecordingError::Line { line, reason: format!("`{cell}` is not a number") })?;
+        *value = number(cell)
+            .ok_or_else(|| RecordingError::Line { line, reason: format!("`{cell}` is not a number") })?;
     }
     Ok(Some(point))
 }

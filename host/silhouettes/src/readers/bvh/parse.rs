@@ -13,7 +13,7 @@
 //! Keywords in any case; free white space and line breaks up to `MOTION`. Names extend to the end of their
 //! line, so they may hold blanks (`Bip01 L Foot`) and colons (`mixamorig:Hips`).
 
-use super::super::recording::RecordingError;
+use super::super::recording::{self, RecordingError};
 use crate::silhouette::capsule::Point3;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -51,6 +51,8 @@ pub struct Motion {
     pub joints: Vec<Joint>,
     pub frame_time_s: f64,
     pub frames: Vec<Vec<f64>>,
+    /// Where the file differs from what it promises.
+    pub remarks: Vec<String>,
 }
 
 /// Limit of points per byte of text; without it a few bytes could request any memory. A joint with three
@@ -73,8 +75,21 @@ pub fn parse(text: &str) -> Result<Motion, RecordingError> {
     if frame_time_s <= 0.0 {
         return Err(wrong(line, format!("found a frame time of {frame_time_s} s, expected more than 0")));
     }
-    let frames = lines.frames(promised, channels, most_points / joints.len().max(1))?;
-    Ok(Motion { joints, frame_time_s, frames })
+    let last = lines.last;
+    let (frames, cut) = lines.frames(channels, most_points / joints.len().max(1))?;
+    let mut remarks = Vec::new();
+    if cut {
+        remarks.push("the last frame is cut short and left out".into());
+    }
+    // Some programs count one frame too many.
+    if frames.len() + 1 < promised {
+        let reason = format!("found the end of the file after {} frames, expected {promised}", frames.len());
+        return Err(wrong(last, reason));
+    }
+    if frames.len() != promised {
+        remarks.push(format!("{promised} frames are promised, the file has {}", frames.len()));
+    }
+    Ok(Motion { joints, frame_time_s, frames, remarks })
 }
 
 /// Joints up to the word MOTION. One loop with an arm per word: splitting would spread the bracket handling.
@@ -155,7 +170,7 @@ fn shown(word: Option<&str>) -> String {
 }
 
 fn number(text: &str, line: usize, what: &str) -> Result<f64, RecordingError> {
-    let value = text.parse().ok().filter(|value: &f64| value.is_finite());
+    let value = recording::number(text).filter(|value| value.is_finite());
     value.ok_or_else(|| wrong(line, format!("found `{}`, expected a number: {what}", short(text))))
 }
 
@@ -267,18 +282,15 @@ impl<'a> Lines<'a> {
         let Some((line, text)) = self.lines.next() else {
             return Err(wrong(self.last, format!("found the end of the file, expected `{key}:`")));
         };
-        let value = text.split_once(':').filter(|(found, _)| found.trim_end().eq_ignore_ascii_case(key));
+        let is_key =
+            |found: &str| found.split_whitespace().collect::<Vec<_>>().join(" ").eq_ignore_ascii_case(key);
+        let value = text.split_once(':').filter(|(found, _)| is_key(found));
         let value = value.map(|(_, value)| (line, value.trim()));
         value.ok_or_else(|| wrong(line, format!("found `{}`, expected `{key}:`", short(text))))
     }
 
-    /// The promised number of frames, at most `most`, with one value per channel.
-    fn frames(
-        mut self,
-        promised: usize,
-        channels: usize,
-        most: usize,
-    ) -> Result<Vec<Vec<f64>>, RecordingError> {
+    /// The frames, at most `most`, with one value per channel; and whether a shorter last one follows.
+    fn frames(mut self, channels: usize, most: usize) -> Result<(Vec<Vec<f64>>, bool), RecordingError> {
         if channels == 0 {
             return Err(wrong(
                 self.last,
@@ -287,32 +299,50 @@ impl<'a> Lines<'a> {
         }
         let mut frames: Vec<Vec<f64>> = Vec::new();
         for (line, text) in self.lines.by_ref() {
-            if frames.len() == promised {
-                let reason =
-                    format!("found `{}`, expected no more than the {promised} promised frames", short(text));
-                return Err(wrong(line, reason));
-            }
             if frames.len() == most {
                 let reason =
                     format!("found {channels} channels, too few for the number of joints, expected a body");
                 return Err(wrong(line, reason));
             }
-            let values: Result<Vec<f64>, RecordingError> =
-                text.split_ascii_whitespace().map(|word| number(word, line, "a channel's value")).collect();
-            let values = values?;
-            if values.len() != channels {
-                let reason = format!("found {} values, expected {channels}, one per channel", values.len());
+            let words = values(text);
+            if words.len() < channels && line == self.last {
+                return Ok((frames, true));
+            }
+            if words.len() != channels {
+                let reason = format!("found {} values, expected {channels}, one per channel", words.len());
                 return Err(wrong(line, reason));
             }
-            frames.push(values);
+            frames.push(
+                words
+                    .into_iter()
+                    .map(|word| number(word, line, "a channel's value"))
+                    .collect::<Result<_, _>>()?,
+            );
         }
-        if frames.len() < promised {
-            let reason =
-                format!("found the end of the file after {} frames, expected {promised}", frames.len());
-            return Err(wrong(self.last, reason));
-        }
-        Ok(frames)
+        Ok((frames, false))
     }
+}
+
+/// Words of a line; numbers without a blank between them are several (`0.0-7.5`, as SlimeVR wrote).
+fn values(line: &str) -> Vec<&str> {
+    let mut words = Vec::new();
+    for mut word in line.split_ascii_whitespace() {
+        while let Some(at) = second_sign(word) {
+            let (number, rest) = word.split_at(at);
+            words.push(number);
+            word = rest;
+        }
+        words.push(word);
+    }
+    words
+}
+
+/// Place of a minus sign that begins another number, not an exponent.
+fn second_sign(word: &str) -> Option<usize> {
+    word.as_bytes()
+        .windows(2)
+        .position(|pair| pair[1] == b'-' && !matches!(pair[0], b'e' | b'E'))
+        .map(|before| before + 1)
 }
 
 #[cfg(test)]
@@ -382,12 +412,40 @@ mod tests {
         refused("1 2 3 4 5", "1 2 3 4", "line 15: found 4 values, expected 5, one per channel");
         refused("1 2 3 4 5", "1 2 x 4 5", "line 15: found `x`, expected a number: a channel's value");
         refused("1 2 3 4 5", "1 2 NaN 4 5", "line 15: found `NaN`, expected a number: a channel's value");
-        refused(
-            "Frames: 2",
-            "Frames: 1",
-            "line 17: found `6 7 8 9 1e1`, expected no more than the 1 promised frames",
-        );
-        refused("Frames: 2", "Frames: 3", "line 17: found the end of the file after 2 frames, expected 3");
+    }
+
+    #[test]
+    fn files_that_differ_from_what_they_promise_are_read_and_it_is_said() {
+        let good = parse(SMALL).expect("a BVH file");
+        for (frames, left, phrases) in [
+            ("Frames: 1", 2, vec!["1 frames are promised, the file has 2"]),
+            ("Frames: 3", 2, vec!["3 frames are promised, the file has 2"]),
+        ] {
+            let motion = parse(&SMALL.replace("Frames: 2", frames)).expect("a BVH file");
+            assert_eq!(
+                (motion.frames.len(), motion.remarks),
+                (left, phrases.into_iter().map(String::from).collect())
+            );
+        }
+        refused("Frames: 2", "Frames: 4", "line 17: found the end of the file after 2 frames, expected 4");
+        let cut = parse(SMALL.trim_end().trim_end_matches(" 9 1e1")).expect("a BVH file");
+        assert_eq!(cut.frames, good.frames[..1]);
+        assert_eq!(cut.remarks[0], "the last frame is cut short and left out");
+    }
+
+    #[test]
+    fn numbers_as_programs_of_many_countries_write_them() {
+        let good = parse(SMALL).expect("a BVH file");
+        for (from, to) in [
+            (".025", "0,025"),
+            ("6 7 8 9 1e1", "6,0 7 8 9 1,0e1"),
+            ("Frame Time:", "Frame\tTime :"),
+            ("0 -4 0.5", "0 -4 5e-1"),
+        ] {
+            assert_eq!(parse(&SMALL.replacen(from, to, 1)), Ok(good.clone()), "{to}");
+        }
+        let glued = parse(&SMALL.replace("1 2 3 4 5", "1-2-3e-1 4-5")).expect("a BVH file");
+        assert_eq!(glued.frames[0], [1.0, -2.0, -0.3, 4.0, -5.0]);
     }
 
     #[test]
