@@ -17,7 +17,7 @@ pub(super) fn of(pages: &[Page]) -> Result<Option<Vec<f64>>, String> {
     }
     let of_pages =
         pages.iter().map(|page| json_number(page.directory.micro_manager.as_deref()?, "ZPositionUm"));
-    Ok(of_pages.collect::<Option<Vec<f64>>>().filter(|all| all.len() > 1 && distinct(all)))
+    Ok(of_pages.collect::<Option<Vec<f64>>>().filter(|all| moving(all)))
 }
 
 /// Side of a pixel at the object; `None` if not stated.
@@ -35,8 +35,9 @@ pub(super) fn object_pixel_um(pages: &[Page]) -> Option<f64> {
     (side.is_finite() && side > 0.0).then_some(side)
 }
 
-fn distinct(positions: &[f64]) -> bool {
-    positions.windows(2).all(|two| two[0] != two[1])
+/// Some programs write the position of the first plane for all.
+fn moving(positions: &[f64]) -> bool {
+    positions.windows(2).any(|two| two[0] != two[1])
 }
 
 fn image_j(description: &str, pages: usize) -> Result<Option<Vec<f64>>, String> {
@@ -146,7 +147,7 @@ fn ome(xml: &str, pixels: &str, pages: &[Page]) -> Result<Option<Vec<f64>>, Stri
             positions[at] = Some(z * unit);
         }
     }
-    if let Some(all) = positions.into_iter().collect::<Option<Vec<f64>>>().filter(|all| distinct(all)) {
+    if let Some(all) = positions.into_iter().collect::<Option<Vec<f64>>>().filter(|all| moving(all)) {
         return Ok(Some(all));
     }
     let unit = attribute(pixels, "PhysicalSizeZUnit").map_or(Some(1.0), unit_um);

@@ -11,7 +11,7 @@ struct Naming {
     names: &'static [(&'static str, &'static str)],
 }
 
-const NAMINGS: [Naming; 4] = [
+const NAMINGS: [Naming; 5] = [
     Naming {
         about: "joints named as Biovision and SMPL do",
         template: "bvh",
@@ -128,6 +128,35 @@ const NAMINGS: [Naming; 4] = [
             ("@footend", "#ToeBase"),
             ("@toeend", "#ToeBase_End"),
             ("#toeend", "#ToeBase_End"),
+        ],
+    },
+    Naming {
+        about: "bones named as ASF files of Acclaim and CMU do",
+        template: "bvh",
+        names: &[
+            ("root", "Hips"),
+            ("pelvis", "Hips"),
+            ("lowerback", "Spine"),
+            ("upperback", "Spine1"),
+            ("thorax", "Spine2"),
+            ("lowerneck", "Neck"),
+            ("neck", "Neck"),
+            ("upperneck", "Neck1"),
+            ("neck", "Neck1"),
+            ("head", "Head"),
+            ("headend", "Head_End"),
+            ("@humerus", "#Arm"),
+            ("@radius", "#ForeArm"),
+            ("@wrist", "#Hand"),
+            ("@hand", "#Hand"),
+            ("@hand", "#HandIndex1"),
+            ("@fingers", "#HandIndex1_End"),
+            ("@handend", "#Hand_End"),
+            ("@femur", "#UpLeg"),
+            ("@tibia", "#Leg"),
+            ("@foot", "#Foot"),
+            ("@toes", "#ToeBase"),
+            ("@toesend", "#ToeBase_End"),
         ],
     },
     Naming {
@@ -313,6 +342,19 @@ mod tests {
                  thigh_l calf_l foot_l ball_l thigh_r calf_r foot_r ball_r",
                 "bvh",
                 20,
+            ),
+            (
+                "root lhipjoint lfemur ltibia lfoot ltoes rhipjoint rfemur rtibia rfoot rtoes lowerback upperback thorax \
+                 lowerneck upperneck head lclavicle lhumerus lradius lwrist lhand lfingers lthumb rclavicle rhumerus \
+                 rradius rwrist rhand rfingers rthumb",
+                "bvh",
+                25,
+            ),
+            (
+                "pelvis lfemur ltibia lfoot ltoes rfemur rtibia rfoot rtoes thorax head lclavicle lhumerus lradius lhand \
+                 rclavicle rhumerus rradius rhand",
+                "bvh",
+                17,
             ),
             (
                 "Hip RHip RKnee RAnkle RBigToe RSmallToe RHeel LHip LKnee LAnkle LBigToe LSmallToe LHeel Neck Head Nose \

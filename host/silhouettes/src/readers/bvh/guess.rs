@@ -80,7 +80,11 @@ pub fn unit(joints: &[Joint]) -> Known<Unit> {
         Some(body) => (body.stature(joints), "from head to toe along the bones"),
         None => (extent(joints), "at its longest, without a joint that is named head or foot"),
     };
-    let far = |mm: f64| (size * mm / 1000.0 / TYPICAL_M).ln().abs();
+    // A child is likelier than a giant.
+    let far = |mm: f64| {
+        let off = (size * mm / 1000.0 / TYPICAL_M).ln();
+        if off > 0.0 { 1.5 * off } else { -off }
+    };
     let mut value = Unit::MM;
     for (_, mm, _) in Unit::NAMED {
         if far(mm) < far(value.mm) {
@@ -171,6 +175,9 @@ mod tests {
         // 17 x 60 units: a metre in millimetres, the nearest possibility.
         let dwarf = unit(&body(60.0, |p| p, STILL).joints);
         assert!(!sure(&dwarf), "{dwarf:?}");
+        // A child of 1.13 m in inches; in the CMU library's unit it would be 2.52 m.
+        let child = unit(&body(44.66 / 17.0, |p| p, STILL).joints);
+        assert!(child.value.mm == 25.4 && !sure(&child), "{child:?}");
     }
 
     #[test]

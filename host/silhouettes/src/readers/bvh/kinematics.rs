@@ -19,32 +19,61 @@ pub fn at_rest(joints: &[Joint]) -> Vec<Point3> {
     places
 }
 
+/// What the position channels of a joint mean.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+enum Positions {
+    /// Added to the offset, as Biovision did.
+    Added,
+    /// The translation from the parent, instead of the offset, as most current writers have it.
+    Translation,
+    /// The place in the world, independent of the parent (pelvis, thorax and head of some files).
+    World,
+}
+
 #[derive(Clone, Debug)]
 pub struct Kinematics<'a> {
     joints: &'a [Joint],
-    /// Per joint, whether position channels replace the offset (or are added).
-    replaces: Vec<bool>,
+    positions: Vec<Positions>,
 }
 
 impl<'a> Kinematics<'a> {
-    /// The first frame decides how position channels are meant: Biovision adds them to the offset, most current writers
-    /// store the whole translation. They replace offset o if the first position is nearer to o than to 0.
+    /// The first frame decides what position channels mean. They are the translation from the parent instead of offset o if they are
+    /// nearer to o than to 0; and the place in the world if the bone would be three times o, and then has about the length of o.
     pub fn new(motion: &'a Motion) -> Self {
-        let mut replaces = Vec::with_capacity(motion.joints.len());
+        let first = motion.frames.first().map(Vec::as_slice).unwrap_or_default();
+        let mut found = Self { joints: &motion.joints, positions: Vec::with_capacity(motion.joints.len()) };
         let mut from = 0;
         for joint in &motion.joints {
-            let values = motion.frames.first().and_then(|frame| frame.get(from..)).unwrap_or_default();
-            let mut along = 0.0;
-            for (channel, value) in joint.channels.iter().zip(values) {
-                if let Channel::Position(axis) = *channel {
-                    along += value * joint.offset[axis];
+            let values = first.get(from..).unwrap_or_default();
+            let channels = || joint.channels.iter().zip(values);
+            let along: f64 = channels()
+                .map(|(channel, value)| match *channel {
+                    Channel::Position(axis) => value * joint.offset[axis],
+                    Channel::Rotation(_) => 0.0,
+                })
+                .sum();
+            let offset = length(joint.offset);
+            found.positions.push(if 2.0 * along > offset * offset {
+                Positions::Translation
+            } else {
+                Positions::Added
+            });
+            let moves = channels().filter(|(channel, _)| matches!(channel, Channel::Position(_))).count();
+            if let Some(parent) = joint.parent.filter(|_| moves == 3 && offset > 0.0) {
+                let bone = |places: &[Point3]| {
+                    let end = places.last().copied().unwrap_or_default();
+                    length(std::array::from_fn(|k| end[k] - places[parent][k]))
+                };
+                let meant = found.positions.len() - 1;
+                let far = bone(&found.places(first)) > 3.0 * offset;
+                let before = std::mem::replace(&mut found.positions[meant], Positions::World);
+                if !far || !(0.5..2.0).contains(&(bone(&found.places(first)) / offset)) {
+                    found.positions[meant] = before;
                 }
             }
-            let length: f64 = joint.offset.iter().map(|v| v * v).sum();
-            replaces.push(2.0 * along > length);
             from += joint.channels.len();
         }
-        Self { joints: &motion.joints, replaces }
+        found
     }
 
     /// File units and axes.
@@ -52,23 +81,30 @@ impl<'a> Kinematics<'a> {
         let mut values = frame.iter().copied();
         let mut places: Vec<Point3> = Vec::with_capacity(self.joints.len());
         let mut turns: Vec<Matrix> = Vec::with_capacity(self.joints.len());
-        for (joint, replaces) in self.joints.iter().zip(&self.replaces) {
+        for (joint, positions) in self.joints.iter().zip(&self.positions) {
             let (from, turn) = joint.parent.map_or(([0.0; 3], STRAIGHT), |p| (places[p], turns[p]));
             let (mut translation, mut rotation) = (joint.offset, STRAIGHT);
             for (channel, value) in joint.channels.iter().zip(values.by_ref()) {
                 match *channel {
-                    Channel::Position(axis) if *replaces => translation[axis] = value,
-                    Channel::Position(axis) => translation[axis] += value,
+                    Channel::Position(axis) if *positions == Positions::Added => translation[axis] += value,
+                    Channel::Position(axis) => translation[axis] = value,
                     Channel::Rotation(axis) => rotation = product(&rotation, &about(axis, value)),
                 }
             }
-            places.push(std::array::from_fn(|i| {
-                from[i] + (0..3).map(|k| turn[i][k] * translation[k]).sum::<f64>()
-            }));
+            places.push(match positions {
+                Positions::World => translation,
+                Positions::Added | Positions::Translation => std::array::from_fn(|i| {
+                    from[i] + (0..3).map(|k| turn[i][k] * translation[k]).sum::<f64>()
+                }),
+            });
             turns.push(product(&turn, &rotation));
         }
         places
     }
+}
+
+fn length(v: Point3) -> f64 {
+    v.iter().map(|v| v * v).sum::<f64>().sqrt()
 }
 
 /// Rotation about a coordinate axis, anticlockwise seen from its tip.
@@ -147,6 +183,19 @@ mod tests {
         };
         assert_eq!(root_at("5 92 1"), [5.0, 92.0, 1.0]);
         assert_eq!(root_at("5 2 1"), [5.0, 92.0, 1.0]);
+    }
+
+    #[test]
+    fn positions_far_from_the_parent_are_places_in_the_world() {
+        let text = "HIERARCHY ROOT pelvis\n{ OFFSET 0 0 0 CHANNELS 6 Xposition Yposition Zposition Xrotation Yrotation Zrotation \
+             JOINT thorax\n{ OFFSET 0 0 6 CHANNELS 6 Xposition Yposition Zposition Xrotation Yrotation Zrotation \
+             JOINT head\n{ OFFSET 0 0 18 CHANNELS 3 Xrotation Yrotation Zrotation } } } \
+             MOTION\nFrames: 2\nFrame Time: 1\n-46 -6 36 90 0 0 -49 -6 42 0 90 0 0 0 0\n10 0 36 90 0 0 10 -6 36 0 90 0 0 0 0\n";
+        let motion = parse(text).expect("a BVH file");
+        let kinematics = Kinematics::new(&motion);
+        // The thorax turns with the pelvis: Rx(90) Ry(90) (0, 0, 18) = (18, 0, 0).
+        are(&kinematics.places(&motion.frames[0])[1..], &[[-49.0, -6.0, 42.0], [-31.0, -6.0, 42.0]]);
+        are(&kinematics.places(&motion.frames[1])[1..], &[[10.0, -6.0, 36.0], [28.0, -6.0, 36.0]]);
     }
 
     #[test]

@@ -1,5 +1,5 @@
 //! People in the JSON of pose estimators, in all common nestings: a frame per file (OpenPose), a list of
-//! people with their picture (COCO, AlphaPose), lists of frames (MMPose, MediaPipe), or picture names.
+//! people with their picture (COCO, AlphaPose), lists of frames (MMPose, MediaPipe), picture names, or tracks of people.
 
 use std::collections::BTreeMap;
 
@@ -42,6 +42,9 @@ const POINTS: [&str; 9] = [
 ];
 const CONFIDENCES: [&str; 3] = ["keypoint_scores", "keypoints_scores", "keypoint_confidences"];
 
+/// Frames by the sort keys of their names.
+type Named = BTreeMap<(String, u64, String), Vec<Person>>;
+
 impl Document {
     pub fn parse(bytes: &[u8]) -> Result<Self, RecordingError> {
         let value: Value = serde_json::from_slice(&finite(bytes)).map_err(|error| RecordingError::Line {
@@ -72,6 +75,9 @@ impl Document {
                     self.frames.push(frame);
                     return;
                 }
+                if map.values().any(is_track) {
+                    return self.by_names(map);
+                }
                 // Frames by picture names.
                 let mut named: Vec<(&String, &Value)> = map
                     .iter()
@@ -101,7 +107,7 @@ impl Document {
 
     /// Pictures between them without people are empty frames.
     fn by_picture(&mut self, items: &[Value], pictures: &[Value]) {
-        let mut frames: BTreeMap<(String, u64, String), Vec<Person>> = BTreeMap::new();
+        let mut frames: Named = BTreeMap::new();
         let mut names: BTreeMap<String, String> = BTreeMap::new();
         for picture in pictures {
             if let (Some(id), Some(name)) =
@@ -117,6 +123,26 @@ impl Document {
             let person = self.person(item);
             frames.entry(key).or_default().extend(person);
         }
+        self.numbered(frames);
+    }
+
+    /// Maps of people's frames (ShanghaiTech's poses, PoseLift), or of frames' people: there are fewer people.
+    fn by_names(&mut self, outer: &Map<String, Value>) {
+        let longest = outer.values().filter_map(|inner| Some(inner.as_object()?.len())).max();
+        let are_frames = longest.is_some_and(|inner| outer.len() > inner);
+        let mut frames: Named = BTreeMap::new();
+        for (name, inner) in outer {
+            for (own, value) in inner.as_object().into_iter().flatten() {
+                let (id, frame) = if are_frames { (own, name) } else { (name, own) };
+                let person = self.person(value);
+                let person = person.map(|person| Person { id: id.parse().ok().or(person.id), ..person });
+                frames.entry(order(frame)).or_default().extend(person);
+            }
+        }
+        self.numbered(frames);
+    }
+
+    fn numbered(&mut self, frames: Named) {
         /// Gaps are filled if the recording grows at most by this factor.
         const LONGEST: u64 = 10;
         let numbers: Vec<u64> = frames.keys().map(|(_, number, _)| *number).collect();
@@ -279,6 +305,12 @@ fn confidence(numbers: &[Value], layout: &Layout) -> f64 {
 
 fn is_frame(map: &Map<String, Value>) -> bool {
     PEOPLE.iter().chain(&POINTS).any(|key| map.contains_key(*key))
+}
+
+fn is_track(value: &Value) -> bool {
+    value.as_object().is_some_and(|track| {
+        !is_frame(track) && track.values().any(|frame| frame.as_object().is_some_and(is_frame))
+    })
 }
 
 fn picture_of(item: &Value) -> Option<String> {

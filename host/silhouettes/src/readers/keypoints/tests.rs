@@ -122,6 +122,34 @@ fn people_with_one_number_are_followed_by_place() {
 }
 
 #[test]
+fn tracks_of_people_and_people_of_frames_are_the_same_recording() {
+    let person = |x: f64| format!(r#"{{"keypoints": {}, "scores": 0.9}}"#, flat(&person(layout(17), x)));
+    // One of them is not there in frame 11, nobody in frame 12.
+    let tracks = format!(
+        r#"{{"7": {{"0009": {}, "0010": {}, "0013": {}}}, "8": {{"0009": {}, "0010": {}, "0011": {}, "0013": {}}}}}"#,
+        person(100.0),
+        person(101.0),
+        person(102.0),
+        person(300.0),
+        person(300.0),
+        person(300.0),
+        person(300.0)
+    );
+    let frames = format!(
+        r#"{{"f9": {{"7": {}, "8": {}}}, "f10": {{"8": {}, "7": {}}}, "f11": {{"8": {}}}, "f13": {{"7": {}, "8": {}}}}}"#,
+        person(100.0),
+        person(300.0),
+        person(300.0),
+        person(101.0),
+        person(300.0),
+        person(102.0),
+        person(300.0)
+    );
+    let [by_track, by_frame] = [tracks, frames].map(|json| upright(&json, 5));
+    assert_eq!(by_track.frames, by_frame.frames);
+}
+
+#[test]
 fn coco_annotations_take_the_order_of_their_pictures() {
     let json = format!(
         r#"{{"images":[{{"id":7,"file_name":"b2.png","width":640,"height":480}},{{"id":3,"file_name":"b1.png"}}],
