@@ -138,6 +138,7 @@ const NAMINGS: [Naming; 5] = [
             ("pelvis", "Hips"),
             ("lowerback", "Spine"),
             ("upperback", "Spine1"),
+            ("thorax", "Spine"),
             ("thorax", "Spine2"),
             ("lowerneck", "Neck"),
             ("neck", "Neck"),
