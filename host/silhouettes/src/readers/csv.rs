@@ -1,13 +1,17 @@
-//! CSV markers: header `frame,NAME_x,NAME_y,NAME_z,...` (or `NAME:x`, `NAME.X`), a frame per row, mm, empty = hidden.
+//! CSV markers: header `frame,NAME_x,NAME_y,NAME_z,...` (or `NAME:x`, `NAME.X`), a frame per row, mm, empty = hidden; or with
+//! names above the axes, as Vicon Nexus and OptiTrack Motive export them ([`layered`]).
 
 use super::reader::Reader;
-use super::recording::{Found, Known, RecordingError, Source, Unit, Up, text};
+use csv::StringRecord;
+
+use super::recording::{Found, Known, RecordingError, Source, Unit, Up, number, text};
 use super::trc::point;
+use crate::silhouette::capsule::Point3;
 
 pub const READER: Reader = Reader {
     name: "CSV",
     extensions: &["csv"],
-    about: "a table with columns NAME_x, NAME_y, NAME_z in millimetres, z up",
+    about: "a table with columns NAME_x, NAME_y, NAME_z in millimetres, z up, or of Vicon Nexus or OptiTrack Motive",
     read,
 };
 
@@ -18,13 +22,27 @@ pub fn read(bytes: &[u8]) -> Result<Found, RecordingError> {
     let header = text.lines().find(|line| !line.trim().is_empty() && !line.starts_with('#'));
     let count = |separator: u8| header.unwrap_or_default().bytes().filter(|byte| *byte == separator).count();
     let separator = [b'\t', b';', b','].into_iter().max_by_key(|separator| count(*separator)).unwrap_or(b',');
-    let mut table = csv::ReaderBuilder::new()
+    let rows: Vec<StringRecord> = csv::ReaderBuilder::new()
         .delimiter(separator)
         .comment(Some(b'#'))
         .trim(csv::Trim::All)
         .flexible(true)
-        .from_reader(text.as_bytes());
-    let columns = table.headers().map_err(unreadable)?.clone();
+        .has_headers(false)
+        .from_reader(text.as_bytes())
+        .records()
+        .collect::<Result<_, _>>()
+        .map_err(|error| RecordingError::Kind { kind: "CSV", reason: error.to_string() })?;
+    match layered(&rows)? {
+        Some(found) => Ok(found),
+        None => plain(&rows),
+    }
+}
+
+/// A table with one row of names.
+fn plain(rows: &[StringRecord]) -> Result<Found, RecordingError> {
+    let (columns, rows) = rows
+        .split_first()
+        .ok_or_else(|| RecordingError::Kind { kind: "CSV", reason: "it is empty".into() })?;
     let mut markers: Vec<(String, [Option<usize>; 3])> = Vec::new();
     for (index, column) in columns.iter().enumerate() {
         let Some((name, axis)) = coordinate(column) else {
@@ -55,15 +73,13 @@ pub fn read(bytes: &[u8]) -> Result<Found, RecordingError> {
         places.push([x, y, z]);
     }
     let mut frames = Vec::new();
-    for row in table.records() {
-        let row = row.map_err(unreadable)?;
-        let line = row.position().map_or(0, |position| position.line() as usize);
+    for row in rows {
+        let line = line(row);
         if row.len() != columns.len() {
             let reason = format!("{} values, the header has {}", row.len(), columns.len());
             return Err(RecordingError::Line { line, reason });
         }
-        let cells = |place: &[usize; 3]| place.map(|column| row.get(column).unwrap_or_default());
-        frames.push(places.iter().map(|place| point(cells(place), line)).collect::<Result<Vec<_>, _>>()?);
+        frames.push(points(row, &places)?);
     }
     Ok(Found {
         others: Vec::new(),
@@ -77,8 +93,67 @@ pub fn read(bytes: &[u8]) -> Result<Found, RecordingError> {
     })
 }
 
-fn unreadable(error: csv::Error) -> RecordingError {
-    RecordingError::Kind { kind: "CSV", reason: error.to_string() }
+/// A table with names in a row above `Frame, ..., X, Y, Z, X, Y, Z`: of Vicon Nexus (units below, z up), or of OptiTrack Motive
+/// (metadata in the first row, y up). `None` for other tables.
+fn layered(rows: &[StringRecord]) -> Result<Option<Found>, RecordingError> {
+    let first =
+        |row: &StringRecord, word: &str| row.get(0).is_some_and(|cell| cell.eq_ignore_ascii_case(word));
+    // Forces and angles of Nexus have tables of their own before the trajectories.
+    let from = rows.iter().position(|row| first(row, "Trajectories")).unwrap_or(0);
+    let is_axes = |row: &StringRecord, column: usize| {
+        ["X", "Y", "Z"].iter().zip(column..).all(|(axis, at)| row.get(at).is_some_and(|cell| cell == *axis))
+    };
+    let header = (from..rows.len()).find(|at| {
+        first(&rows[*at], "Frame") && (1..rows[*at].len()).any(|column| is_axes(&rows[*at], column))
+    });
+    let Some(header) = header.filter(|header| *header > 0) else { return Ok(None) };
+    let motive = rows[..header].iter().position(|row| row.get(1) == Some("Name"));
+    let names = &rows[motive.unwrap_or(header - 1)];
+    let is_place = |column: usize| motive.is_none() || rows[header - 1].get(column) == Some("Position");
+    let (mut markers, mut places): (Vec<String>, Vec<[usize; 3]>) = (Vec::new(), Vec::new());
+    for column in
+        (1..rows[header].len()).filter(|column| is_axes(&rows[header], *column) && is_place(*column))
+    {
+        let name = names.get(column).unwrap_or_default();
+        if !name.is_empty() && markers.iter().all(|known| known != name) {
+            markers.push(name.to_owned());
+            places.push([column, column + 1, column + 2]);
+        }
+    }
+    let stated = |key: &str| {
+        let cell = rows[0].iter().position(|cell| cell == key)?;
+        rows[0].get(cell + 1)
+    };
+    let data = header + 1 + usize::from(motive.is_none());
+    let unit = match motive {
+        Some(_) => stated("Length Units"),
+        None => places.first().and_then(|place| rows.get(header + 1)?.get(place[0])),
+    };
+    let rate = match motive {
+        Some(_) => stated("Export Frame Rate").or_else(|| stated("Capture Frame Rate")),
+        None => header.checked_sub(2).and_then(|row| rows[row].get(0)),
+    };
+    let is_frame = |row: &&StringRecord| row.get(0).is_some_and(|cell| number(cell).is_some());
+    let frames = rows.iter().skip(data).take_while(is_frame).map(|row| points(row, &places));
+    Ok(Some(Found {
+        others: Vec::new(),
+        planar: false,
+        names: markers,
+        rate_hz: rate.and_then(number).unwrap_or_default(),
+        frames: frames.collect::<Result<_, _>>()?,
+        unit: Found::stated_unit(unit.unwrap_or("mm")),
+        up: Known { value: if motive.is_some() { Up::Y } else { Up::Z }, source: Source::Format },
+        remarks: Vec::new(),
+    }))
+}
+
+fn points(row: &StringRecord, places: &[[usize; 3]]) -> Result<Vec<Option<Point3>>, RecordingError> {
+    let cells = |place: &[usize; 3]| place.map(|column| row.get(column).unwrap_or_default());
+    places.iter().map(|place| point(cells(place), line(row))).collect()
+}
+
+fn line(row: &StringRecord) -> usize {
+    row.position().map_or(0, |position| position.line() as usize)
 }
 
 /// Name and axis (0 to 2) of a column `NAME_x`.
@@ -119,5 +194,28 @@ mod tests {
         ] {
             assert_eq!(read(text.as_bytes()).expect("valid").frames, plain, "{text}");
         }
+    }
+
+    #[test]
+    fn tables_of_nexus_and_motive_have_their_names_above_the_axes() {
+        let nexus = "Devices\n1000\n,,Plate - Force\nFrame,Sub Frame,Fx,Fy,Fz\n,,N,N,N\n1,0,1,2,3\n\n\
+            Trajectories\n100\n,,Nick:LASI,,,Nick:RASI,,\nFrame,Sub Frame,X,Y,Z,X,Y,Z\n,,cm,cm,cm,cm,cm,cm\n\
+            1,0,1,2,3,,,\n2,0,4,5,6,7,8,9\n";
+        let found = read(nexus.as_bytes()).expect("valid");
+        assert_eq!(found.names, ["Nick:LASI", "Nick:RASI"]);
+        assert_eq!(
+            found.frames,
+            [vec![Some([1.0, 2.0, 3.0]), None], vec![Some([4.0, 5.0, 6.0]), Some([7.0, 8.0, 9.0])]]
+        );
+        assert_eq!((found.rate_hz, found.unit.value.mm, found.up.value), (100.0, 10.0, Up::Z));
+
+        let motive = "Format Version,1.23,Take Name,Walk,Capture Frame Rate,120.0,Export Frame Rate,60.0,Length Units,Meters\n\n\
+            ,Type,Bone,Bone,Bone,Bone,Bone,Bone,Bone,Marker,Marker,Marker\n,Name,Ann:Hip,Ann:Hip,Ann:Hip,Ann:Hip,Ann:Hip,Ann:Hip,Ann:Hip,C7,C7,C7\n\
+            ,ID,1,1,1,1,1,1,1,2,2,2\n,,Rotation,Rotation,Rotation,Rotation,Position,Position,Position,Position,Position,Position\n\
+            Frame,Time (Seconds),X,Y,Z,W,X,Y,Z,X,Y,Z\n0,0.0,0,0,0,1,0.1,0.9,0.2,0.1,1.5,0.2\n";
+        let found = read(motive.as_bytes()).expect("valid");
+        assert_eq!(found.names, ["Ann:Hip", "C7"]);
+        assert_eq!(found.frames, [[Some([0.1, 0.9, 0.2]), Some([0.1, 1.5, 0.2])]]);
+        assert_eq!((found.rate_hz, found.unit.value.mm, found.up.value), (60.0, 1000.0, Up::Y));
     }
 }

@@ -1,4 +1,4 @@
-//! TRC files (Motion Analysis, OpenSim): tab-separated marker trajectories.
+//! TRC files (Motion Analysis, OpenSim): marker trajectories separated by tabs, or as spreadsheets save them.
 
 use super::reader::Reader;
 use super::recording::{Found, Known, RecordingError, Source, Up, number, text};
@@ -23,8 +23,10 @@ pub fn read(bytes: &[u8]) -> Result<Found, RecordingError> {
             reason: "its first line does not start with PathFileType".into(),
         });
     }
-    let keys: Vec<&str> = line(1)?.split('\t').map(str::trim).collect();
-    let values: Vec<&str> = line(2)?.split('\t').map(str::trim).collect();
+    let separator =
+        line(0)?.chars().nth("PathFileType".len()).filter(|c| matches!(c, ',' | ';')).unwrap_or('\t');
+    let keys: Vec<&str> = line(1)?.split(separator).map(str::trim).collect();
+    let values: Vec<&str> = line(2)?.split(separator).map(str::trim).collect();
     let value = |key: &str| {
         let found = keys.iter().position(|k| *k == key).and_then(|index| values.get(index).copied());
         found.ok_or_else(|| RecordingError::Line { line: 3, reason: format!("no value of {key}") })
@@ -39,7 +41,7 @@ pub fn read(bytes: &[u8]) -> Result<Found, RecordingError> {
     let unit = Found::stated_unit(value("Units")?);
     let (rate_hz, count) = (stated("DataRate")?, stated("NumMarkers")?);
     // A name is above the first of its three columns; Cortex omits names of unidentified trajectories.
-    let cells: Vec<&str> = line(3)?.split('\t').skip(2).map(str::trim).collect();
+    let cells: Vec<&str> = line(3)?.split(separator).skip(2).map(str::trim).collect();
     let all: Vec<(usize, String)> = (0..)
         .zip(cells.chunks(3))
         .filter(|(_, group)| !group[0].is_empty())
@@ -63,7 +65,7 @@ pub fn read(bytes: &[u8]) -> Result<Found, RecordingError> {
     if unnamed > 0.0 {
         remarks.push(format!("{unnamed} of {count} trajectories have no name and are not read"));
     }
-    let frames = rows(&lines, &places)?;
+    let frames = rows(&lines, &places, separator)?;
     // Without the number all frames are read; a larger promised number means truncation.
     if let Ok(promised) = stated("NumFrames")
         && promised > frames.len() as f64
@@ -83,12 +85,16 @@ pub fn read(bytes: &[u8]) -> Result<Found, RecordingError> {
 }
 
 /// Rows after the header: number, time, then x, y, z in these columns; missing cells at the end are hidden.
-fn rows(lines: &[&str], places: &[usize]) -> Result<Vec<Vec<Option<Point3>>>, RecordingError> {
+fn rows(
+    lines: &[&str],
+    places: &[usize],
+    separator: char,
+) -> Result<Vec<Vec<Option<Point3>>>, RecordingError> {
     let mut frames = Vec::new();
     for (index, row) in lines.iter().enumerate().skip(5) {
         // Trailing tabs are common; a blank row separates header and data.
-        let cells: Vec<&str> = row.trim_end_matches(['\t', '\r']).split('\t').collect();
-        if row.trim().is_empty() {
+        let cells: Vec<&str> = row.trim_end_matches([separator, '\r']).split(separator).collect();
+        if row.trim_matches(|c: char| c.is_whitespace() || c == separator).is_empty() {
             continue;
         }
         let mut points = Vec::with_capacity(places.len());

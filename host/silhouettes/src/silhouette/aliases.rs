@@ -53,13 +53,14 @@ const NAMINGS: [Naming; 5] = [
         ],
     },
     Naming {
-        about: "segments named as DAZ, 3ds Max, Unreal, Unity and Xsens do",
+        about: "segments named as DAZ, 3ds Max, Unreal, Unity, Xsens and Motive do",
         template: "bvh",
         names: &[
             ("hip", "Hips"),
             ("hips", "Hips"),
             ("pelvis", "Hips"),
             ("abdomen", "Spine"),
+            ("ab", "Spine"),
             ("abdomenlower", "Spine"),
             ("abdomen2", "Spine1"),
             ("abdomenupper", "Spine1"),
@@ -86,12 +87,14 @@ const NAMINGS: [Naming; 5] = [
             ("headend", "Head_End"),
             ("headnub", "Head_End"),
             ("@shldr", "#Arm"),
+            ("@uarm", "#Arm"),
             ("@shldrbend", "#Arm"),
             ("@upperarm", "#Arm"),
             ("upperarm@", "#Arm"),
             ("#upperarm", "#Arm"),
             ("#arm", "#Arm"),
             ("@forearm", "#ForeArm"),
+            ("@farm", "#ForeArm"),
             ("@forearmbend", "#ForeArm"),
             ("lowerarm@", "#ForeArm"),
             ("@lowerarm", "#ForeArm"),
@@ -356,6 +359,12 @@ mod tests {
                  rclavicle rhumerus rradius rhand",
                 "bvh",
                 17,
+            ),
+            (
+                "Ann:Hip Ann:Ab Ann:Chest Ann:Neck Ann:Head Ann:LShoulder Ann:LUArm Ann:LFArm Ann:LHand Ann:RShoulder Ann:RUArm \
+                 Ann:RFArm Ann:RHand Ann:LThigh Ann:LShin Ann:LFoot Ann:LToe Ann:RThigh Ann:RShin Ann:RFoot Ann:RToe",
+                "bvh",
+                19,
             ),
             (
                 "Hip RHip RKnee RAnkle RBigToe RSmallToe RHeel LHip LKnee LAnkle LBigToe LSmallToe LHeel Neck Head Nose \

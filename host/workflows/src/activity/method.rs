@@ -16,7 +16,7 @@ use crate::{
     error::{Result, WorkflowError},
 };
 
-/// How activities are told apart.
+/// Options of the classifier.
 #[serde_as]
 #[derive(Clone, Default, PartialEq, Eq, Debug, Serialize, Deserialize, JsonSchema)]
 #[cfg_attr(feature = "clap", derive(clap::Args))]
@@ -131,7 +131,7 @@ pub enum Pattern {
 }
 
 impl Method {
-    /// Says what takes long.
+    /// Reports that a search takes long.
     pub(super) fn announce(&self, context: &Context<'_>) {
         if self.search {
             context.info(

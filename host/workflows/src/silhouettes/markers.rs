@@ -57,7 +57,7 @@ use crate::{
 #[serde(default)]
 pub struct MarkersRequest {
     /// The recording: .c3d, .trc, .bvh, .skeleton (NTU RGB+D), .txt (20 or 25 Kinect joints a line), .csv with columns NAME_x,
-    /// NAME_y, NAME_z in mm, .npz with joint positions of an SMPL body, or 2-D keypoints: .json of OpenPose, COCO, HALPE or
+    /// NAME_y, NAME_z in mm or of Vicon Nexus or OptiTrack Motive, .npz with joint positions of an SMPL body, or 2-D keypoints: .json of OpenPose, COCO, HALPE or
     /// MediaPipe, or a folder of such files, a frame each. Keypoints have one view.
     pub file: PathBuf,
     /// plug-in-gait (also CMU's 41 markers), vicon-53, opencap, thesis, bvh, kinect, keypoints, or a TOML file of `[[part]] name,

@@ -51,7 +51,7 @@ pub struct Motion {
     pub joints: Vec<Joint>,
     pub frame_time_s: f64,
     pub frames: Vec<Vec<f64>>,
-    /// Where the file differs from what it promises.
+    /// Differences from the promised frames.
     pub remarks: Vec<String>,
 }
 

@@ -124,7 +124,7 @@ fn people_with_one_number_are_followed_by_place() {
 #[test]
 fn tracks_of_people_and_people_of_frames_are_the_same_recording() {
     let person = |x: f64| format!(r#"{{"keypoints": {}, "scores": 0.9}}"#, flat(&person(layout(17), x)));
-    // One of them is not there in frame 11, nobody in frame 12.
+    // Frame 11 lacks one of them, frame 12 both.
     let tracks = format!(
         r#"{{"7": {{"0009": {}, "0010": {}, "0013": {}}}, "8": {{"0009": {}, "0010": {}, "0011": {}, "0013": {}}}}}"#,
         person(100.0),
