@@ -1,6 +1,6 @@
 //! Renders a simulated pair and its true depth into a folder.
 
-use std::{fs, path::PathBuf};
+use std::fs;
 
 use anyhow::{Context as _, Result};
 use farnear_depth::psf::Psf as OpticsPsf;
@@ -9,18 +9,7 @@ use farnear_scene::{Camera, EllipticalDistortion, Lens, OpticsFile, Psf, Rendere
 use farnear_workflows::{Context, optics};
 use serde::Serialize;
 
-use crate::scene::SceneArgument;
-
-pub struct RenderSettings {
-    pub scene: SceneArgument,
-    pub elliptical_distortion: bool,
-    /// The name of a PSF; by default the one of the optics file.
-    pub psf: Option<String>,
-    pub optics: PathBuf,
-    pub camera: Camera,
-    pub seed: u64,
-    pub out: PathBuf,
-}
+use crate::commands::render::Arguments;
 
 #[derive(Serialize)]
 pub struct RenderFigures {
@@ -31,18 +20,21 @@ pub struct RenderFigures {
 }
 
 /// Renders a far- and a near-focused image. The folder gets all files or none.
-pub fn render(settings: RenderSettings, context: &Context<'_>) -> Result<RenderFigures> {
-    let RenderSettings { camera, optics: file, out, .. } = settings;
+pub fn render(arguments: Arguments, context: &Context<'_>) -> Result<RenderFigures> {
+    let Arguments {
+        scene, elliptical_distortion, psf, optics: file, noise, seed, width, height, out, ..
+    } = arguments;
+    let camera = Camera::new(width, height, noise);
     let optics = optics::read(&file)?;
-    let psf = settings.psf.map_or(Ok(optics.psf()), |name| name.parse::<OpticsPsf>())?;
+    let psf = psf.map_or(Ok(optics.psf()), |name| name.parse::<OpticsPsf>())?;
     let spread: Psf =
         psf.to_string().parse().context("the renderer does not know this point spread function")?;
     let mut lens = Lens::from_optics(&OpticsFile::parse(&fs::read_to_string(&file)?)?)?;
-    if settings.elliptical_distortion {
+    if elliptical_distortion {
         lens = lens.with_distortion(EllipticalDistortion::default());
     }
-    let scene = settings.scene.read()?;
-    let renderer = Renderer::new(&scene, &lens, &spread, &camera, settings.seed)?;
+    let scene = scene.read()?;
+    let renderer = Renderer::new(&scene, &lens, &spread, &camera, seed)?;
     let staged = Staging::into_folder(&out)?;
     for (number, name, sensor_mm) in
         [(0, "far.png", lens.sensor_far_mm), (1, "near.png", lens.sensor_near_mm)]

@@ -2,14 +2,9 @@ use std::path::PathBuf;
 
 use anyhow::Result;
 use clap::Args;
-use farnear_scene::{Camera, Noise};
+use farnear_scene::Noise;
 
-use crate::{
-    render::{self, RenderSettings},
-    report,
-    scene::SceneArgument,
-    terminal,
-};
+use crate::{render, report, scene::SceneArgument, terminal};
 
 /// Render a far- and a near-focused image of a known scene, with its true depth.
 #[derive(Args)]
@@ -28,40 +23,37 @@ pub struct Arguments {
     ///
     /// A name takes options, such as cone,texture=fractal,contrast=0.3.
     #[arg(long, value_name = "NAME|FILE", default_value = "staircase")]
-    scene: SceneArgument,
+    pub scene: SceneArgument,
     /// A lens whose focus varies over the field in ellipses, which corrections undo.
     #[arg(long)]
-    elliptical_distortion: bool,
+    pub elliptical_distortion: bool,
     /// Point spread function: pillbox, gaussian:k=K, generalised:p=P,k=K or ring:inner=I; without it the one of the optics file.
     #[arg(long)]
-    psf: Option<String>,
+    pub psf: Option<String>,
     /// The optics file.
     #[arg(long, value_name = "FILE")]
-    optics: PathBuf,
+    pub optics: PathBuf,
     /// Noise and bits: none, 8bit or 12bit.
     #[arg(long, default_value = "8bit")]
-    noise: Noise,
+    pub noise: Noise,
     /// Decides everything random.
     #[arg(long, default_value_t = 1)]
-    seed: u64,
+    pub seed: u64,
     /// Width of the images in pixels.
     #[arg(long, value_name = "PX", default_value_t = 640)]
-    width: usize,
+    pub width: usize,
     /// Height of the images in pixels.
     #[arg(long, value_name = "PX", default_value_t = 480)]
-    height: usize,
+    pub height: usize,
     /// Folder for far.png, near.png, truth.npy and optics.toml.
     #[arg(long, value_name = "DIR")]
-    out: PathBuf,
+    pub out: PathBuf,
     /// Print one JSON object.
     #[arg(long)]
     json: bool,
 }
 
 pub fn run(arguments: Arguments) -> Result<()> {
-    let Arguments { scene, elliptical_distortion, psf, optics, noise, seed, width, height, out, json } =
-        arguments;
-    let camera = Camera::new(width, height, noise);
-    let settings = RenderSettings { scene, elliptical_distortion, psf, optics, camera, seed, out };
-    report::print(&render::render(settings, &terminal::context()?)?, json)
+    let json = arguments.json;
+    report::print(&render::render(arguments, &terminal::context()?)?, json)
 }

@@ -132,33 +132,29 @@ impl Request for EvaluateRequest {
             pair(same)?;
         }
         let learning = [
-            ("leave-one-subject-out", self.leave_one_subject_out),
-            ("train", self.train.is_some()),
-            ("open-set", self.open_set),
+            ("--leave-one-subject-out", self.leave_one_subject_out),
+            ("--train", self.train.is_some()),
+            ("--open-set", self.open_set),
         ];
-        let sets = !self.leave_one_set_out.is_empty();
-        let rest = [
-            ("views", self.views.is_some()),
-            ("adapt", self.adapt),
-            ("align", self.align != Alignment::None),
-        ];
+        let views = ("--views", self.views.is_some());
+        let adapt = ("--adapt", self.adapt);
+        let align = ("--align", self.align != Alignment::None);
+        let set = self.leave_one_set_out.first();
         if let Some(model) = &self.model {
-            let model = model.display();
-            none_of("model", &model, learning)?;
-            none_of("model", &model, [("the options of the method", !self.method.is_default())])?;
-            none_of("model", &model, [rest[2]])?;
-            return if sets { none_of("leave-one-set-out", "given", [rest[0], rest[1]]) } else { Ok(()) };
+            none_of("model", model.display(), learning)?;
+            none_of("model", model.display(), [align, ("options of the method", !self.method.is_default())])?;
+            return set.map_or(Ok(()), |set| none_of("leave-one-set-out", set.display(), [views, adapt]));
         }
         let of_models = [
-            ("leave-one-set-out", sets),
-            ("open-blind-set", self.open_blind_set.is_some()),
-            ("same", !self.same.is_empty()),
+            ("leave-one-set-out", set.map(|set| set.display().to_string())),
+            ("open-blind-set", self.open_blind_set.clone()),
+            ("same", self.same.first().cloned()),
         ];
-        if let Some((name, _)) = of_models.into_iter().find(|(_, given)| *given) {
-            return Err(WorkflowError::parameter(name, "given", "it needs --model"));
+        if let Some((name, value)) = of_models.into_iter().find_map(|(name, value)| Some((name, value?))) {
+            return Err(WorkflowError::parameter(name, value, "it needs --model"));
         }
         match (self.open_set, self.leave_one_subject_out || self.train.is_some()) {
-            (true, _) => none_of("open-set", "given", [learning[0], learning[1], rest[0], rest[1], rest[2]]),
+            (true, _) => none_of("open-set", true, [learning[0], learning[1], views, adapt, align]),
             (false, true) => Ok(()),
             (false, false) => Err(WorkflowError::parameter(
                 "what to learn from",
@@ -217,4 +213,65 @@ fn untimed(figures: &EvaluateFigures) -> Result<String> {
         figures.retain(|name, _| !name.starts_with("seconds"));
     }
     Ok(format!("{figures}\n"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::activity::training::TrainRequest;
+
+    #[test]
+    fn options_that_exclude_each_other_are_refused_by_name() {
+        let model = EvaluateRequest { model: Some("everyday".into()), ..EvaluateRequest::default() };
+        let features = MethodOptions { features: Some("everyday".into()), ..MethodOptions::default() };
+        let others = EvaluateRequest { leave_one_subject_out: true, ..EvaluateRequest::default() };
+        for (request, phrases) in [
+            (EvaluateRequest::default(), ["what to learn from", "--train"]),
+            (EvaluateRequest { open_set: true, ..model.clone() }, ["model everyday", "--open-set"]),
+            (
+                EvaluateRequest { method: features.clone(), ..model.clone() },
+                ["model everyday", "of the method"],
+            ),
+            (
+                EvaluateRequest { open_set: true, adapt: true, ..EvaluateRequest::default() },
+                ["open-set", "--adapt"],
+            ),
+            (EvaluateRequest { same: vec!["a=b".into()], ..others.clone() }, ["same a=b", "--model"]),
+            (EvaluateRequest { same: vec!["a".into()], ..model.clone() }, ["same a", "NAME IN THE MODEL"]),
+            (
+                EvaluateRequest {
+                    leave_one_set_out: vec!["b.toml".into()],
+                    views: Some(Views::Each),
+                    ..model.clone()
+                },
+                ["leave-one-set-out b.toml", "--views"],
+            ),
+            (
+                EvaluateRequest {
+                    method: MethodOptions { epl: Some(super::super::method::Epl::Thesis), ..features },
+                    ..others.clone()
+                },
+                ["epl thesis", "--features"],
+            ),
+        ] {
+            let error = request.check().expect_err("refused").to_string();
+            assert!(phrases.iter().all(|phrase| error.contains(phrase)), "{error}");
+        }
+        assert!(model.check().is_ok() && others.check().is_ok());
+    }
+
+    #[test]
+    fn training_needs_clips_and_options_of_motion_files_need_them() {
+        let samples = TrainRequest { samples: Some("a.toml".into()), ..TrainRequest::default() };
+        assert!(samples.check().is_ok());
+        for (request, phrase) in [
+            (TrainRequest::default(), "--motion"),
+            (TrainRequest { template: Some("bvh".into()), ..samples.clone() }, "template bvh"),
+            (TrainRequest { window: Some(4), ..samples.clone() }, "window"),
+            (TrainRequest { cameras: 0, ..samples }, "cameras"),
+        ] {
+            let error = request.check().expect_err("refused").to_string();
+            assert!(error.contains(phrase), "{error}");
+        }
+    }
 }

@@ -68,15 +68,15 @@ impl MethodOptions {
         let pattern = match (epl, features) {
             (Some(_), _) => {
                 let others = [
-                    ("mode", mode.is_some()),
-                    ("classifier", classifier.is_some()),
-                    ("features", features.is_some()),
+                    ("--mode", mode.is_some()),
+                    ("--classifier", classifier.is_some()),
+                    ("--features", features.is_some()),
                 ];
                 none_of("epl", "thesis", others)?;
                 Pattern::Thesis
             }
             (None, Some(name)) => {
-                none_of("features", name, [("mode", mode.is_some())])?;
+                none_of("features", name, [("--mode", mode.is_some())])?;
                 let model = Shipped::named(name).ok_or_else(|| {
                     let names: Vec<&str> = shipped::MODELS.iter().map(|model| model.name).collect();
                     WorkflowError::parameter("features", name, format!("expected {}", names.join(" or ")))
@@ -105,7 +105,7 @@ pub(super) fn none_of<const N: usize>(
     match others.into_iter().find(|(_, given)| *given) {
         None => Ok(()),
         Some((other, _)) => {
-            Err(WorkflowError::parameter(name, value, format!("cannot be used with --{other}")))
+            Err(WorkflowError::parameter(name, value, format!("cannot be used with {other}")))
         }
     }
 }

@@ -116,6 +116,16 @@ impl Request for TrainRequest {
             let expected = "a file of samples, --motion with recordings, or both";
             return Err(WorkflowError::parameter("what to learn from", "is missing", expected));
         }
+        let about_motion = [
+            ("template", self.template.clone()),
+            ("up", self.up.map(|up| up.to_string())),
+            ("units", self.units.map(|unit| unit.to_string())),
+        ];
+        if let Some((name, value)) = about_motion.into_iter().find_map(|(name, value)| Some((name, value?)))
+            && self.motion.is_empty()
+        {
+            return Err(WorkflowError::parameter(name, value, "it is about --motion, which is missing"));
+        }
         within("cameras", self.cameras, &(1..=500), "")?;
         if let Some(window) = self.window {
             at_least("window", window, WINDOW_MIN, "frames")?;
