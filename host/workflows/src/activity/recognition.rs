@@ -168,7 +168,7 @@ pub struct RecognitionFigures {
 }
 
 /// Recognises one person in all views. Call [`Self::next`] until it returns `None`, then [`Self::finish`].
-pub struct Recognition<'m> {
+pub(super) struct Recognition<'m> {
     model: &'m Recogniser,
     person: Person<'m>,
     views: Vec<Frames>,
