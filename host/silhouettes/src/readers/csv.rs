@@ -1,5 +1,5 @@
 //! CSV markers: header `frame,NAME_x,NAME_y,NAME_z,...` (or `NAME:x`, `NAME.X`), a frame per row, mm, empty = hidden; or with
-//! names above the axes, as Vicon Nexus and OptiTrack Motive export them ([`layered`]).
+//! names above the axes, as Vicon Nexus and OptiTrack Motive export them.
 
 use super::reader::Reader;
 use csv::StringRecord;

@@ -7,7 +7,7 @@ use farnear_recognition::model::{Answer, Recogniser};
 use farnear_silhouettes::mask::{
     Mask,
     subject::Flag,
-    tracking::{self, Sight, Tracker, TrackingSettings},
+    tracking::{Followed, Sight, Tracker, TrackingSettings},
 };
 use serde::Serialize;
 
@@ -57,7 +57,7 @@ pub enum MultiPersonError {
     Views { model: PathBuf, views: usize },
 }
 
-struct Followed<'m> {
+struct Tracked<'m> {
     person: Person<'m>,
     answer: Option<Answer>,
     crossing_frames: usize,
@@ -71,7 +71,7 @@ pub struct MultiPersonTracker<'m> {
     tracker: Option<Tracker>,
     window: usize,
     among: Vec<String>,
-    people: Vec<Followed<'m>>,
+    people: Vec<Tracked<'m>>,
     annotated_video: Option<AnnotatedVideo>,
     count: usize,
     empty_frames: usize,
@@ -154,18 +154,18 @@ impl<'m> MultiPersonTracker<'m> {
 
     fn answered(
         &mut self,
-        followed: tracking::Followed,
+        followed: Followed,
     ) -> Result<PersonInFrame, farnear_recognition::model::ModelError> {
-        let tracking::Followed { person, sight, parted } = followed;
+        let Followed { person, sight, parted } = followed;
         while self.people.len() < person {
-            self.people.push(Followed {
+            self.people.push(Tracked {
                 person: Person::new(self.model, 1, self.window, &self.among),
                 answer: None,
                 crossing_frames: 0,
                 perhaps_swapped_with: Vec::new(),
             });
         }
-        let followed = &mut self.people[person - 1];
+        let tracked = &mut self.people[person - 1];
         let mut flags = Vec::new();
         let mut spans = None;
         match sight {
@@ -173,13 +173,13 @@ impl<'m> MultiPersonTracker<'m> {
                 let first = self.count - before.len();
                 for (number, mask) in (first..).zip(before.into_iter().chain([mask])) {
                     let track = Track::from_masks(&[mask], self.model.settings.scaling, true);
-                    followed.answer = Some(followed.person.see(number, vec![track])?);
+                    tracked.answer = Some(tracked.person.see(number, vec![track])?);
                 }
                 flags.extend(cut_by_edge.then_some(PersonFlag::Mask(Flag::CutByEdge)));
                 spans = Some(bounds);
             }
             Sight::Crossing { with, bounds } => {
-                followed.crossing_frames += 1;
+                tracked.crossing_frames += 1;
                 flags.extend(with.iter().copied().map(PersonFlag::Crossing));
                 spans = Some(bounds);
             }
@@ -192,11 +192,11 @@ impl<'m> MultiPersonTracker<'m> {
             } else {
                 PersonFlag::Parted(other)
             });
-            if parting.ambiguous && !followed.perhaps_swapped_with.contains(&other) {
-                followed.perhaps_swapped_with.push(other);
+            if parting.ambiguous && !tracked.perhaps_swapped_with.contains(&other) {
+                tracked.perhaps_swapped_with.push(other);
             }
         }
-        let answer = followed.answer.as_ref();
+        let answer = tracked.answer.as_ref();
         Ok(PersonInFrame {
             person,
             top_left_bottom_right: spans.map(|b| [b.top, b.left, b.bottom, b.right]),
@@ -212,8 +212,8 @@ impl<'m> MultiPersonTracker<'m> {
             annotated_video.finish()?;
         }
         let mut people = Vec::new();
-        for (number, followed) in (1..).zip(self.people) {
-            let Followed { person, crossing_frames, perhaps_swapped_with, .. } = followed;
+        for (number, tracked) in (1..).zip(self.people) {
+            let Tracked { person, crossing_frames, perhaps_swapped_with, .. } = tracked;
             let figures = person.figures(number, person.summary()?)?;
             people.extend(figures.map(|figures| PersonFigures {
                 crossing_frames,
