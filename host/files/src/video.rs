@@ -121,7 +121,9 @@ impl Video {
             Box::new(pictures::open(path)?)
         } else if path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("y4m")) {
             let file = std::fs::File::open(path).map_err(|source| VideoError::io(path, source))?;
-            Box::new(y4m::Y4m::new(path, io::BufReader::new(file))?)
+            let video = y4m::Y4m::new(path, io::BufReader::new(file))?;
+            remark = video.remark();
+            Box::new(video)
         } else {
             let timing = timing::Timing::of(path);
             remark = timing.as_ref().and_then(timing::Timing::remark);
@@ -246,6 +248,15 @@ mod tests {
         assert!((74..=76).contains(&frames), "{frames} frames of 2.5 s at 30 frames/s");
         let remark = remark.expect("a remark");
         assert!(remark.contains("frame rate varies") && remark.contains("30.00 frames/s"), "{remark}");
+    }
+
+    #[test]
+    fn pixels_that_are_not_square_are_widened() {
+        let Some((_, remark)) = through_ffmpeg("setsar=2/1") else {
+            eprintln!("skipped: no ffmpeg");
+            return;
+        };
+        assert!(remark.is_some_and(|remark| remark.contains("2.000 times as wide as high")));
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! Frame times from ffmpeg's list of packets (without decoding), and the rate for reading. Browsers, phones and
+//! Frame times and the shape of pixels from ffmpeg's list of packets (without decoding), and the rate for reading. Browsers, phones and
 //! meetings record at no constant rate, and their files state 1000 frames a second or none: ffmpeg would repeat frames.
 
 use std::{
@@ -26,6 +26,8 @@ const USUAL_HZ: [f64; 13] = [
 ];
 /// Relative tolerance for a usual rate.
 const NEAR: f64 = 0.0004;
+/// Least deviation of a pixel from a square.
+const SQUARE: f64 = 0.005;
 /// The same with irregular time stamps, where the rate is an estimate.
 const ROUGHLY_NEAR: f64 = 0.04;
 
@@ -37,6 +39,8 @@ pub(super) struct Timing {
     frames: usize,
     seconds: f64,
     longest_s: f64,
+    /// Width of a pixel over its height.
+    aspect: f64,
 }
 
 impl Timing {
@@ -50,8 +54,9 @@ impl Timing {
             .stderr(Stdio::null())
             .output()
             .ok()?;
-        let (tick_s, ticks) = parsed(&String::from_utf8_lossy(&listed.stdout))?;
-        Self::of_times(ticks.into_iter().map(|tick| tick as f64 * tick_s).collect())
+        let Listed { tick_s, ticks, aspect } = parsed(&String::from_utf8_lossy(&listed.stdout))?;
+        let timing = Self::of_times(ticks.into_iter().map(|tick| tick as f64 * tick_s).collect())?;
+        Some(Self { aspect, ..timing })
     }
 
     fn of_times(mut times: Vec<f64>) -> Option<Self> {
@@ -82,46 +87,78 @@ impl Timing {
             frames: times.len(),
             seconds,
             longest_s: sorted.last().copied().unwrap_or(median),
+            aspect: 1.0,
         })
     }
 
-    /// Arguments that give every frame once or, for irregular intervals, frames at the nominal rate by time stamp.
+    /// Arguments that give every frame once or, for irregular intervals, frames at the nominal rate by time stamp; with square
+    /// pixels.
     pub fn arguments(&self) -> [String; 4] {
         let rate = self.rate_hz;
-        let filter = match self.regular {
+        let times = match self.regular {
             true => format!("setpts=N/({rate:.6}*TB)"),
             false => format!("fps={rate:.6}"),
+        };
+        let filter = match self.is_square() {
+            true => times,
+            false => format!("{times},scale=round(iw*sar):ih,setsar=1"),
         };
         ["-vf".into(), filter, "-r".into(), format!("{rate:.6}")]
     }
 
-    /// Notice to the user about irregular times.
+    fn is_square(&self) -> bool {
+        (self.aspect - 1.0).abs() < SQUARE
+    }
+
+    /// Notice to the user about irregular times and pixels that are not square.
     pub fn remark(&self) -> Option<String> {
         let read = (self.seconds * self.rate_hz).round() as usize + 1;
-        (!self.regular).then(|| {
+        let times = (!self.regular).then(|| {
             format!(
                 "the frame rate varies: {} frames in {:.2} s, at most {:.2} s apart; resampled by their time stamps to {read} \
                  frames at {:.2} frames/s",
                 self.frames, self.seconds, self.longest_s, self.rate_hz
             )
-        })
+        });
+        let shape = (!self.is_square()).then(|| {
+            format!("its pixels are {:.3} times as wide as high: the frames are widened", self.aspect)
+        });
+        let remarks: Vec<String> = times.into_iter().chain(shape).collect();
+        (!remarks.is_empty()).then(|| remarks.join("; "))
     }
 }
 
-/// Seconds per tick, and the presentation times in ticks.
-fn parsed(text: &str) -> Option<(f64, Vec<i64>)> {
-    let mut tick_s = None;
+/// ffmpeg's list of packets.
+#[derive(Debug, PartialEq)]
+struct Listed {
+    tick_s: f64,
+    /// Presentation times.
+    ticks: Vec<i64>,
+    aspect: f64,
+}
+
+fn parsed(text: &str) -> Option<Listed> {
+    /// ffmpeg's mark of a packet without a time.
+    const NO_TIME: i64 = i64::MIN;
+    let (mut tick_s, mut aspect) = (None, 1.0);
     let mut ticks = Vec::new();
+    let ratio = |text: &str| {
+        let (over, under) = text.trim().split_once('/')?;
+        let ratio = over.parse::<f64>().ok()? / under.parse::<f64>().ok()?;
+        (ratio.is_finite() && ratio > 0.0).then_some(ratio)
+    };
     for line in text.lines() {
         if let Some(base) = line.strip_prefix("#tb 0:") {
-            let (over, under) = base.trim().split_once('/')?;
-            tick_s = Some(over.parse::<f64>().ok()? / under.parse::<f64>().ok()?);
+            tick_s = ratio(base);
+        } else if let Some(shape) = line.strip_prefix("#sar 0:") {
+            aspect = ratio(shape).unwrap_or(1.0);
         } else if !line.starts_with('#') {
             // Stream, decoding time, presentation time, duration, size, checksum.
-            ticks.extend(line.split(',').nth(2).and_then(|cell| cell.trim().parse::<i64>().ok()));
+            let tick = line.split(',').nth(2).and_then(|cell| cell.trim().parse::<i64>().ok());
+            ticks.extend(tick.filter(|tick| *tick != NO_TIME));
         }
     }
-    Some((tick_s?, ticks))
+    Some(Listed { tick_s: tick_s?, ticks, aspect })
 }
 
 #[cfg(test)]
@@ -145,6 +182,20 @@ mod tests {
         let timing = Timing::of_times(times).expect("times");
         assert_eq!((timing.regular, timing.rate_hz), (false, 30.0));
         assert!(timing.remark().expect("a remark").contains("30.00 frames/s"));
+    }
+
+    #[test]
+    fn packets_without_a_time_are_left_out_and_pixels_have_a_shape() {
+        let listed = parsed(
+            "#tb 0: 1/90000\n#sar 0: 64/45\n0, -3600, 0, 3600, 28, 0xd3\n0, 0, -9223372036854775808, 3600, 11, 0xe3\n0, 3600, 3600, 3600, 9, 0x1\n",
+        )
+        .expect("a list");
+        assert_eq!(listed, Listed { tick_s: 1.0 / 90_000.0, ticks: vec![0, 3600], aspect: 64.0 / 45.0 });
+        let wide =
+            Timing { aspect: listed.aspect, ..Timing::of_times(vec![0.0, 0.04, 0.08]).expect("times") };
+        assert!(wide.arguments()[1].ends_with("scale=round(iw*sar):ih,setsar=1"));
+        assert!(wide.remark().expect("a remark").contains("1.422 times as wide"));
+        assert_eq!(parsed("#tb 0: 1/25\n#sar 0: 0/1\n").expect("a list").aspect, 1.0);
     }
 
     #[test]

@@ -64,6 +64,17 @@ impl<R: Read> Y4m<R> {
             .any(|parameter| parameter == b"XCOLORRANGE=FULL");
         Ok(Self { path: path.into(), decoder, bytes, frames: 0, full_range })
     }
+
+    /// Notice to the user about pixels that are not square (`A64:45`).
+    pub(super) fn remark(&self) -> Option<String> {
+        let mut parameters = self.decoder.get_raw_params().split(|&byte| byte == b' ');
+        let aspect =
+            parameters.find_map(|parameter| std::str::from_utf8(parameter.strip_prefix(b"A")?).ok())?;
+        let (over, under) = aspect.split_once(':')?;
+        (over != under && over != "0").then(|| {
+            format!("its pixels are {over}:{under}, not square: widen them first (ffmpeg -vf scale=round(iw*sar):ih,setsar=1)")
+        })
+    }
 }
 
 impl<R: Read> Iterator for Y4m<R> {
@@ -173,6 +184,20 @@ mod tests {
         assert_eq!(read, vec![Pixels::Rgb(Array3::from_elem((3, 3, 3), 128)); 2]);
         let read = frames(&stream("W2 H1 F25:1 Cmono XCOLORRANGE=FULL", &[&[7, 9]])).unwrap();
         assert_eq!(read, [Pixels::Grey(Array2::from_shape_vec((1, 2), vec![7, 9]).unwrap())]);
+    }
+
+    #[test]
+    fn pixels_that_are_not_square_are_reported() {
+        let remark = |header: &str| {
+            let bytes = stream(header, &[&[7, 9]]);
+            Y4m::new(Path::new("a.y4m"), bytes.as_slice()).unwrap().remark()
+        };
+        assert!(
+            remark("W2 H1 F25:1 A64:45 Cmono").is_some_and(|remark| remark.contains("64:45, not square"))
+        );
+        for square in ["W2 H1 F25:1 A1:1 Cmono", "W2 H1 F25:1 A0:0 Cmono", "W2 H1 F25:1 Cmono"] {
+            assert_eq!(remark(square), None, "{square}");
+        }
     }
 
     #[test]
