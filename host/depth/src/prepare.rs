@@ -16,6 +16,7 @@ pub mod balance;
 pub(crate) mod band;
 mod camera;
 mod defects;
+mod mismatch;
 pub mod noise;
 mod registration;
 mod straight;
@@ -40,6 +41,7 @@ use warp::Warp;
 pub(crate) use registration::Registration;
 
 pub use camera::{CameraError, CameraFrames, check_saturation};
+pub use mismatch::Mismatch;
 
 /// A displacement below this many standard errors counts as none.
 const SIGNIFICANT: f64 = 5.0;
@@ -139,11 +141,14 @@ pub enum PrepareError {
     Pair(#[from] crate::pipeline::RunError),
     #[error(
         "the images do not show the same scene: the detail that defocus leaves in both has a correlation of {correlation:.2}, a pair \
-         has 0.8 to 1"
+         has 0.8 to 1{}",
+        because.map_or("", Mismatch::words)
     )]
     Unrelated {
         /// Correlation relative to what noise allows.
         correlation: f64,
+        /// What would make them a pair.
+        because: Option<Mismatch>,
     },
     #[error(transparent)]
     Camera(#[from] CameraError),
@@ -314,6 +319,7 @@ fn finish(
     optics: &Optics,
     settings: &PrepareSettings,
 ) -> Result<Prepared, PrepareError> {
+    let is_first = last.is_none();
     let size = far.dim();
     let measured = settings.noise.or_else(|| noise::of_pair(far.view(), near.view()));
     let noise = measured.unwrap_or_default();
@@ -359,7 +365,10 @@ fn finish(
         if let Some(correlation) =
             agreement.correlation.filter(|c| *c < UNRELATED && agreement.detailed > TELLING)
         {
-            return Err(PrepareError::Unrelated { correlation });
+            // Pairs of a stream have no time for it.
+            let because =
+                is_first.then(|| Mismatch::of(&far, &near, correlation, optics, settings)).flatten();
+            return Err(PrepareError::Unrelated { correlation, because });
         }
         let of_moved = (&agreement.moved, Reason::Moved, &mut report.moved_fraction);
         let of_blurred = (&agreement.too_blurred, Reason::Misfit, &mut report.too_blurred_fraction);

@@ -12,7 +12,7 @@ use farnear_depth::pipeline::{Settings, depth_from_pair};
 use farnear_depth::prepare::{Align, Balance, PrepareError, PrepareSettings};
 use farnear_depth::reason::Reason;
 use farnear_scene::{Camera, Lens, Noise, OpticsFile, Renderer, Scene, View, standard, truth};
-use ndarray::Array2;
+use ndarray::{Array2, s};
 
 const SIZE: (usize, usize) = (320, 240);
 pub const PSF: &str = "gaussian:k=0.4578";
@@ -227,7 +227,25 @@ fn different_scenes_are_refused() {
     let (one, other) = (plain("staircase", 1), plain("staircase", 2));
     let mixed = Pair { near: other.near, ..one };
     let refused = measure(&mixed, PSF, Window::Fixed(7)).unwrap_err();
-    assert!(matches!(refused, MeasureError::Prepare(PrepareError::Unrelated { .. })), "{refused}");
+    assert!(
+        matches!(refused, MeasureError::Prepare(PrepareError::Unrelated { because: None, .. })),
+        "{refused}"
+    );
+}
+
+#[test]
+fn a_mirrored_turned_or_inverted_image_is_named() {
+    let Pair { far, near, truth } = plain("staircase", 1);
+    for (changed, words) in [
+        (near.slice(s![.., ..;-1]).to_owned(), "mirrored left to right"),
+        (near.slice(s![..;-1, ..]).to_owned(), "mirrored top to bottom"),
+        (near.slice(s![..;-1, ..;-1]).to_owned(), "turned by 180 degrees"),
+        (near.fold(0.0, |a: f32, b| a.max(*b)) - &near, "negative"),
+    ] {
+        let pair = Pair { far: far.clone(), near: changed, truth: truth.clone() };
+        let refused = measure(&pair, PSF, Window::Fixed(7)).unwrap_err().to_string();
+        assert!(refused.contains("the same scene") && refused.contains(words), "{refused}");
+    }
 }
 
 #[test]
