@@ -258,6 +258,11 @@ mod tests {
         let planes = "<Plane TheZ='0' PositionZ='-3'/><Plane TheZ='2' PositionZ='5'/><Plane TheZ='1' PositionZ='0.5'/>";
         let uneven = even.replace("</Pixels>", &format!("{planes}</Pixels>"));
         assert_eq!(of(&pages(3, &uneven)), Ok(Some(vec![-3.0, 0.5, 5.0])));
+        // The first plane's for all is no position; two planes at one place are refused by those who need places.
+        let at_once = uneven.replace("'-3'", "'5'").replace("'0.5'", "'5'");
+        assert_eq!(of(&pages(3, &at_once)), Ok(Some(vec![0.0, 1.5, 3.0])));
+        let twice = uneven.replace("'-3'", "'0.5'");
+        assert_eq!(of(&pages(3, &twice)), Ok(Some(vec![0.5, 0.5, 5.0])));
         assert!(of(&pages(1, even)).unwrap_err().contains("3 planes"));
         let times = even.replace("SizeT=\"1\"", "SizeT=\"3\"").replace("SizeZ=\"3\"", "SizeZ=\"1\"");
         assert!(of(&pages(3, &times)).unwrap_err().contains("3 times"));
@@ -282,5 +287,9 @@ mod tests {
                 Some(format!("{{\"Slice\": 1, \"ZPositionUm\": {z}, \"Width\": 8}}"));
         }
         assert_eq!(of(&pages), Ok(Some(vec![-1.0, 0.5, 2.0])));
+        for page in &mut pages {
+            page.directory.micro_manager = Some("{\"ZPositionUm\": 2.0}".into());
+        }
+        assert_eq!(of(&pages), Ok(None));
     }
 }
