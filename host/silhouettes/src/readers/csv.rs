@@ -1,9 +1,9 @@
 //! CSV markers: header `frame,NAME_x,NAME_y,NAME_z,...` (or `NAME:x`, `NAME.X`), a frame per row, mm, empty = hidden; or with
 //! names above the axes, as Vicon Nexus and OptiTrack Motive export them.
 
-use super::reader::Reader;
 use csv::StringRecord;
 
+use super::reader::Reader;
 use super::recording::{Found, Known, RecordingError, Source, Unit, Up, number, text};
 use super::trc::point;
 use crate::silhouette::capsule::Point3;
@@ -19,11 +19,12 @@ pub const READER: Reader = Reader {
 /// visibility). Errors have their line.
 pub fn read(bytes: &[u8]) -> Result<Found, RecordingError> {
     let text = text(bytes)?;
-    let header = text.lines().find(|line| !line.trim().is_empty() && !line.starts_with('#'));
-    let count = |separator: u8| header.unwrap_or_default().bytes().filter(|byte| *byte == separator).count();
-    let separator = [b'\t', b';', b','].into_iter().max_by_key(|separator| count(*separator)).unwrap_or(b',');
+    const SEPARATORS: [char; 3] = ['\t', ';', ','];
+    let header = text.lines().find(|line| line.contains(SEPARATORS) && !line.starts_with('#'));
+    let count = |separator: char| header.unwrap_or_default().matches(separator).count();
+    let separator = SEPARATORS.into_iter().max_by_key(|separator| count(*separator)).unwrap_or(',');
     let rows: Vec<StringRecord> = csv::ReaderBuilder::new()
-        .delimiter(separator)
+        .delimiter(separator as u8)
         .comment(Some(b'#'))
         .trim(csv::Trim::All)
         .flexible(true)
@@ -208,6 +209,9 @@ mod tests {
             [vec![Some([1.0, 2.0, 3.0]), None], vec![Some([4.0, 5.0, 6.0]), Some([7.0, 8.0, 9.0])]]
         );
         assert_eq!((found.rate_hz, found.unit.value.mm, found.up.value), (100.0, 10.0, Up::Z));
+
+        let with_tabs = read(nexus.replace(',', "\t").as_bytes()).expect("valid");
+        assert_eq!(with_tabs.frames, found.frames);
 
         let motive = "Format Version,1.23,Take Name,Walk,Capture Frame Rate,120.0,Export Frame Rate,60.0,Length Units,Meters\n\n\
             ,Type,Bone,Bone,Bone,Bone,Bone,Bone,Bone,Marker,Marker,Marker\n,Name,Ann:Hip,Ann:Hip,Ann:Hip,Ann:Hip,Ann:Hip,Ann:Hip,Ann:Hip,C7,C7,C7\n\
