@@ -34,6 +34,8 @@ const LEAST_NOISE: f64 = 0.1;
 const LEAST_REPORTED: f64 = 0.01;
 /// Part of the noise by lossy compression that is worth a word: JPEG of quality 95 has 0.3, 90 has 0.4.
 const COMPRESSED: f64 = 0.35;
+/// Deviation of a band's brightness that is worth a word.
+const BANDED: f64 = 0.02;
 /// Unexplained texture, mean squares, from which PSF or blur are doubted.
 const DOUBTFUL: f64 = 3e-4;
 /// The same relative to the noise, which is known to some percent.
@@ -144,6 +146,11 @@ pub enum Finding {
     },
     /// Nothing rises above the noise.
     NothingSharp,
+    /// Bands of brightness were evened out.
+    Bands {
+        /// Largest deviation from 1 of a row's relative brightness.
+        amplitude: f64,
+    },
     /// Lossy compression is a large part of the noise.
     Compressed {
         /// Part of the noise's variance.
@@ -183,6 +190,11 @@ impl fmt::Display for Finding {
                 "the model leaves {:.1} % of the detail unexplained (usual is below 2): is the PSF {psf} with a blur of up to \
                  {max_blur_px:.3} px right? farnear calibrate psf finds it",
                 100.0 * left_over.sqrt()
+            ),
+            Self::Bands { amplitude } => write!(
+                f,
+                "bands of brightness of up to {:.1} % across one image were evened out: a lamp that flickers and a rolling shutter?",
+                100.0 * amplitude
             ),
             Self::Compressed { of_noise } => write!(
                 f,
@@ -442,6 +454,9 @@ fn findings(map: &DepthMap, prepared: &Prepared, estimate: &Estimate, optics: &O
         if optics.telecentric() == Some(false) && (shrunk - of_optics).abs() < 0.25 * (of_optics - 1.0) {
             findings.push(Finding::SwappedByMagnification { magnification: aligned.magnification });
         }
+    }
+    if let Some(amplitude) = report.bands.filter(|amplitude| *amplitude > BANDED) {
+        findings.push(Finding::Bands { amplitude });
     }
     let of_noise = prepared.noise.coding / prepared.noise.mean_variance;
     if of_noise > COMPRESSED {

@@ -14,6 +14,7 @@ pub mod agreement;
 pub mod align;
 pub mod balance;
 pub(crate) mod band;
+mod bands;
 mod camera;
 mod defects;
 mod mismatch;
@@ -33,6 +34,7 @@ use serde::{Deserialize, Serialize};
 use crate::optics::{Distortion, Optics};
 use crate::reason::Reason;
 use balance::Gain;
+use bands::Bands;
 use noise::PairNoise;
 use registration::{LEAST_DISPLACEMENT_PX, model};
 use thinned::Thinned;
@@ -189,6 +191,9 @@ pub struct Report {
     /// `None` for unchanged brightness.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub balanced: Option<Balanced>,
+    /// Largest deviation from 1 of a row's or column's relative brightness that was divided out; `None` without bands.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub bands: Option<f64>,
     /// Correlation of what both images share, relative to what noise allows; `None` where nothing rises above it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub correlation: Option<f64>,
@@ -409,7 +414,15 @@ fn brightness(
     if balance == Balance::None {
         return;
     }
-    let Some(gain) = Gain::measure(far.view(), near.view()) else { return };
+    let Some(mut gain) = Gain::measure(far.view(), near.view()) else { return };
+    if balance == Balance::Auto && gain.left_over[1] > LEAST_GAIN {
+        report.bands = even_bands(far, near);
+        if report.bands.is_some() {
+            thinned.replace_near(near.view());
+            let Some(evened) = Gain::measure(far.view(), near.view()) else { return };
+            gain = evened;
+        }
+    }
     let varies = match balance {
         Balance::Auto => gain.varies(LEAST_GAIN),
         other => other == Balance::Local,
@@ -424,6 +437,19 @@ fn brightness(
         gain.divide_by_mean(&mut thinned.near.band.view_mut());
         report.balanced = Some(Balanced { gain: gain.mean, range: None });
     }
+}
+
+/// Divides bands along rows, then along columns, out of the near image. Returns their largest deviation from 1.
+fn even_bands(far: &Array2<f32>, near: &mut Array2<f32>) -> Option<f64> {
+    let rows = Bands::measure(far.view(), near.view(), LEAST_GAIN);
+    if let Some(bands) = &rows {
+        bands.divide(near.view_mut());
+    }
+    let columns = Bands::measure(far.t(), near.t(), LEAST_GAIN);
+    if let Some(bands) = &columns {
+        bands.divide(near.view_mut().reversed_axes());
+    }
+    [rows, columns].into_iter().flatten().map(|bands| bands.amplitude).reduce(f64::max)
 }
 
 /// The reasons of both images in the far one's pixels, and the edge that the near image does not reach.

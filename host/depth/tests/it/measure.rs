@@ -249,6 +249,35 @@ fn a_mirrored_turned_or_inverted_image_is_named() {
 }
 
 #[test]
+fn bands_of_a_rolling_shutter_move_no_depth_and_are_reported() {
+    let plain = plain("slant", 3);
+    let known = measure(&plain, PSF, Window::Fixed(7)).unwrap();
+    let off = |map: &Array2<f32>| {
+        let pairs = map.iter().zip(&plain.truth).filter(|(depth, _)| depth.is_finite());
+        let (sum, count) = pairs.fold((0.0, 0.0), |(sum, count), (depth, truth)| {
+            (sum + f64::from(depth - truth).powi(2), count + 1.0)
+        });
+        (f64::sqrt(sum / count), count)
+    };
+    let (expected, seen) = off(&known.map.depth_mm);
+    assert!(known.report.bands.is_none(), "{:?}", known.report);
+    for columns in [false, true] {
+        let mut far = plain.far.clone();
+        for ((row, column), value) in far.indexed_iter_mut() {
+            let at = if columns { column } else { row };
+            *value *= 1.0 + 0.1 * (std::f32::consts::TAU * at as f32 / 90.0).sin();
+        }
+        let banded = Pair { far, near: plain.near.clone(), truth: plain.truth.clone() };
+        let found = measure(&banded, PSF, Window::Fixed(7)).unwrap();
+        assert!(found.findings.iter().any(|f| matches!(f, Finding::Bands { .. })), "{:?}", found.findings);
+        let (error, count) = off(&found.map.depth_mm);
+        println!("{expected} {error} {seen} {count}");
+        // A tenth of the band is left, and brighter rows have more noise.
+        assert!(error < 1.3 * expected && count > 0.95 * seen, "{error} {expected} {count} {seen}");
+    }
+}
+
+#[test]
 fn moved_pixels_have_no_depth() {
     let (still, moved) = (
         plain("plane:905", 5),
