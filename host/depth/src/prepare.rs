@@ -5,7 +5,7 @@
 //! 3. Lens distortion is taken out of both, where the optics name one.
 //! 4. The near image is laid on the far one ([`align`]): by the magnification that follows from the optics of a lens that is
 //!    not telecentric, and by what is measured.
-//! 5. Both are brought to one brightness ([`balance`]).
+//! 5. Both are brought to one brightness ([`balance`]), without bands of a lamp that flickers.
 //! 6. What moved between the exposures is marked, and a pair of different scenes is refused ([`agreement`]).
 //!
 //! By default ([`Align::Auto`], [`Balance::Auto`]) it corrects only significant differences; a good pair is unchanged.
