@@ -1,5 +1,5 @@
-//! What was done to one image of a pair that does not correlate: cameras behind a beam splitter are mirrored, others
-//! are mounted upside down.
+//! Why a pair does not correlate: images of cameras behind a beam splitter are mirrored, others
+//! come from cameras that are mounted upside down.
 
 use ndarray::{Array2, ArrayView2, s};
 

@@ -258,7 +258,7 @@ mod tests {
         let planes = "<Plane TheZ='0' PositionZ='-3'/><Plane TheZ='2' PositionZ='5'/><Plane TheZ='1' PositionZ='0.5'/>";
         let uneven = even.replace("</Pixels>", &format!("{planes}</Pixels>"));
         assert_eq!(of(&pages(3, &uneven)), Ok(Some(vec![-3.0, 0.5, 5.0])));
-        // The first plane's for all is no position; two planes at one place are refused by those who need places.
+        // All planes at one place say nothing; two of them are refused where places are needed.
         let at_once = uneven.replace("'-3'", "'5'").replace("'0.5'", "'5'");
         assert_eq!(of(&pages(3, &at_once)), Ok(Some(vec![0.0, 1.5, 3.0])));
         let twice = uneven.replace("'-3'", "'0.5'");
