@@ -416,9 +416,8 @@ fn brightness(
     }
     let Some(mut gain) = Gain::measure(far.view(), near.view()) else { return };
     if balance == Balance::Auto && gain.left_over[1] > LEAST_GAIN {
-        report.bands = even_bands(far, near);
+        report.bands = even_bands(near, thinned);
         if report.bands.is_some() {
-            thinned.replace_near(near.view());
             let Some(evened) = Gain::measure(far.view(), near.view()) else { return };
             gain = evened;
         }
@@ -440,14 +439,19 @@ fn brightness(
 }
 
 /// Divides bands along rows, then along columns, out of the near image. Returns their largest deviation from 1.
-fn even_bands(far: &Array2<f32>, near: &mut Array2<f32>) -> Option<f64> {
-    let rows = Bands::measure(far.view(), near.view(), LEAST_GAIN);
+fn even_bands(near: &mut Array2<f32>, thinned: &mut Thinned) -> Option<f64> {
+    let scale = 1 << thinned.halvings;
+    let [far, small] = [&thinned.far, &thinned.near].map(|small| small.image.view());
+    let rows = Bands::measure(far, small, LEAST_GAIN);
     if let Some(bands) = &rows {
-        bands.divide(near.view_mut());
+        bands.divide(near.view_mut(), scale);
+        thinned.replace_near(near.view());
     }
-    let columns = Bands::measure(far.t(), near.t(), LEAST_GAIN);
+    let [far, small] = [&thinned.far, &thinned.near].map(|small| small.image.t());
+    let columns = Bands::measure(far, small, LEAST_GAIN);
     if let Some(bands) = &columns {
-        bands.divide(near.view_mut().reversed_axes());
+        bands.divide(near.view_mut().reversed_axes(), scale);
+        thinned.replace_near(near.view());
     }
     [rows, columns].into_iter().flatten().map(|bands| bands.amplitude).reduce(f64::max)
 }

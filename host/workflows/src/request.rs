@@ -76,6 +76,11 @@ macro_rules! camera_request {
 
 pub(crate) use {camera_request, rig_request};
 
+pub(crate) fn json(figures: &impl Serialize) -> Result<Value> {
+    serde_json::to_value(figures)
+        .map_err(|error| WorkflowError::parameter("figures", error, "figures that JSON can hold"))
+}
+
 pub fn inputs<R: Request>(request: &R) -> Vec<PathBuf> {
     let is_input = |(kind, path): &(PathKind, PathBuf)| match kind {
         PathKind::Input | PathKind::NamedInput => true,
@@ -272,8 +277,7 @@ impl<R: Request> Job for Parsed<R> {
             fields.insert(name.into(), out.display().to_string().into());
         }
         let request: R = parse(fields, Paths::RelativeTo(&self.base))?;
-        serde_json::to_value(request.run(context)?)
-            .map_err(|error| WorkflowError::parameter("figures", error, "figures that JSON can hold"))
+        json(&request.run(context)?)
     }
 }
 

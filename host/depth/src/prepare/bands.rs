@@ -2,7 +2,7 @@
 //!
 //! Defocus keeps the light of a row but for what crosses into the next rows. So a ratio of both images' rows on which all
 //! parts of the rows agree is not of the scene, unless it follows the second difference of the rows' brightness
-//! (diffusion: rows of a ruled target). Cost: one pass over both images.
+//! (diffusion: rows of a ruled target). Cost: one pass over both images, of some 800,000 px at most.
 
 use ndarray::{ArrayView2, ArrayViewMut2, Axis};
 use rayon::prelude::*;
@@ -10,7 +10,7 @@ use rayon::prelude::*;
 /// Parts of a row that must agree.
 const PARTS: usize = 8;
 const LEAST_PART_PX: usize = 16;
-/// SD of the Gaussian over the rows, px: far larger than the blur, smaller than a band.
+/// SD of the Gaussian over the rows, px: larger than the blur, smaller than a band.
 const SMOOTHING_PX: f64 = 6.0;
 /// Degree of the polynomial along the rows that is left to the field's gain.
 const DEGREE: i32 = 4;
@@ -98,10 +98,18 @@ impl Bands {
         })
     }
 
-    /// Divides the rows of the near image.
-    pub fn divide(&self, mut near: ArrayViewMut2<f32>) {
-        let rows = near.axis_iter_mut(Axis(0)).into_par_iter();
-        rows.zip(&self.factors).for_each(|(mut row, factor)| row.mapv_inplace(|value| value / factor));
+    /// Divides the rows of the near image, of which `scale` are one of the measured image.
+    pub fn divide(&self, mut near: ArrayViewMut2<f32>, scale: usize) {
+        let last = self.factors.len() - 1;
+        let factor = |row: usize| {
+            let at = ((row as f32 + 0.5) / scale as f32 - 0.5).clamp(0.0, last as f32);
+            let (above, below) = (self.factors[at as usize], self.factors[(at as usize + 1).min(last)]);
+            above + (below - above) * at.fract()
+        };
+        near.axis_iter_mut(Axis(0)).into_par_iter().enumerate().for_each(|(row, mut values)| {
+            let factor = factor(row);
+            values.mapv_inplace(|value| value / factor);
+        });
     }
 }
 
@@ -112,12 +120,12 @@ fn smoothed(rows: &[f64]) -> Vec<f64> {
     let weights: Vec<f64> = (0..=reach).map(weight).collect();
     let last = rows.len() - 1;
     let sum = |row: usize| -> f64 {
-        let off = |off: usize| {
+        let of_both_sides = |off: usize| {
             let above = row.abs_diff(off);
             let below = last - last.abs_diff(row + off);
             weights[off] * (rows[above] + rows[below])
         };
-        weights[0] * rows[row] + (1..=reach).map(off).sum::<f64>()
+        weights[0] * rows[row] + (1..=reach).map(of_both_sides).sum::<f64>()
     };
     (0..rows.len()).map(sum).collect()
 }
@@ -186,10 +194,17 @@ mod tests {
         let found = Bands::measure(far.view(), near.view(), LEAST).expect("bands");
         // The smoothing takes a tenth of a band of 80 rows; a polynomial, which the field's gain has, some of the rest.
         assert!((0.04..0.055).contains(&found.amplitude), "{}", found.amplitude);
-        found.divide(near.view_mut());
+        found.divide(near.view_mut(), 1);
         let off = near.iter().zip(&plain).map(|(a, b)| f64::from((a / b - 1.0).powi(2))).sum::<f64>()
             / near.len() as f64;
         assert!(off.sqrt() < 0.01, "{}", off.sqrt());
+        // In an image of twice the size each row has two, around its place.
+        let mut twice = Array2::from_elem((960, 1), 1.0);
+        found.divide(twice.view_mut(), 2);
+        for (row, factor) in found.factors.iter().enumerate() {
+            let both = 0.5 * (twice[[2 * row, 0]] + twice[[2 * row + 1, 0]]);
+            assert!((both * factor - 1.0).abs() < 1e-3, "{row}: {both} {factor}");
+        }
     }
 
     #[test]

@@ -271,7 +271,6 @@ fn bands_of_a_rolling_shutter_move_no_depth_and_are_reported() {
         let found = measure(&banded, PSF, Window::Fixed(7)).unwrap();
         assert!(found.findings.iter().any(|f| matches!(f, Finding::Bands { .. })), "{:?}", found.findings);
         let (error, count) = off(&found.map.depth_mm);
-        println!("{expected} {error} {seen} {count}");
         // A tenth of the band is left, and brighter rows have more noise.
         assert!(error < 1.3 * expected && count > 0.95 * seen, "{error} {expected} {count} {seen}");
     }

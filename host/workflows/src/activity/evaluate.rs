@@ -20,7 +20,7 @@ use super::{
 use crate::{
     context::Context,
     error::{Result, WorkflowError},
-    request::{PathKind, Request},
+    request::{PathKind, Request, json},
 };
 
 const FIGURES: &str = "figures.json";
@@ -207,8 +207,7 @@ fn pair(same: &str) -> Result<(&str, &str)> {
 
 /// The figures without times, so that equal samples give equal files.
 fn untimed(figures: &EvaluateFigures) -> Result<String> {
-    let mut figures = serde_json::to_value(figures)
-        .map_err(|error| WorkflowError::parameter("figures", error, "figures that JSON can hold"))?;
+    let mut figures = json(figures)?;
     if let Some(figures) = figures.as_object_mut() {
         figures.retain(|name, _| !name.starts_with("seconds"));
     }

@@ -5,7 +5,6 @@ use std::path::{Path, PathBuf};
 use farnear_files::staging::Staging;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use serde_json::Value;
 use serde_with::{DisplayFromStr, serde_as};
 
 use super::{
@@ -16,7 +15,7 @@ use super::{
 use crate::{
     context::Context,
     error::{Result, WorkflowError},
-    request::{PathKind, Request},
+    request::{PathKind, Request, json},
 };
 
 /// Recognises what a person does, frame by frame.
@@ -183,9 +182,4 @@ impl RecogniseRequest {
         };
         Ok(View { path: path.to_path_buf(), kind })
     }
-}
-
-fn json(figures: &impl Serialize) -> Result<Value> {
-    serde_json::to_value(figures)
-        .map_err(|error| WorkflowError::parameter("figures", error, "figures that JSON can hold"))
 }

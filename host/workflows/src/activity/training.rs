@@ -161,7 +161,7 @@ pub struct TrainingFigures {
     pub gamma: Option<f32>,
     /// Of the RBF map's system.
     pub condition_number: Option<f64>,
-    /// Accuracy in the cross-validation that chose the request.
+    /// Accuracy in the cross-validation that chose the settings.
     pub inner_accuracy: Option<f64>,
     pub seconds: f64,
 }
