@@ -13,4 +13,3 @@ pub mod rig;
 pub mod serve;
 pub mod shadow;
 pub mod silhouettes;
-pub mod sun;

@@ -22,7 +22,7 @@ use clap::{
 use farnear_workflows::{
     WorkflowError, compare::CompareRequest, correct::CorrectRequest, depth::DepthRequest,
     focus_stack::FocusStackRequest, operators::OperatorRequest, optics::OpticsRequest, report::ReportRequest,
-    target::TargetRequest,
+    sun::SunPositionRequest, target::TargetRequest,
 };
 
 use run::Run;
@@ -70,7 +70,7 @@ enum Command {
         after_help = "Example: farnear rig capture --port sim --optics optics.toml --out pair1/"
     )]
     Rig(commands::rig::Job),
-    Sun(commands::sun::Arguments),
+    Sun(Run<SunPositionRequest>),
     /// Remove a person's shadow from masks by the place of the sun, and score the result.
     #[command(subcommand, after_help = "Example: farnear shadow score masks/ truth/ --json")]
     Shadow(commands::shadow::Job),
@@ -116,7 +116,7 @@ fn main() -> ExitCode {
         Command::Compare(task) => task.run(),
         Command::Render(arguments) => commands::render::run(arguments),
         Command::Rig(arguments) => commands::rig::run(arguments),
-        Command::Sun(arguments) => commands::sun::run(&arguments),
+        Command::Sun(task) => task.run(),
         Command::Shadow(arguments) => commands::shadow::run(arguments),
         Command::Silhouettes(arguments) => commands::silhouettes::run(arguments),
         Command::Activity(arguments) => commands::activity::run(arguments),
@@ -185,7 +185,7 @@ mod tests {
     use std::collections::{BTreeMap, BTreeSet};
 
     use clap::Args;
-    use farnear_workflows::request::{RIG_TASKS, TASKS};
+    use farnear_workflows::request::{DEVICE_TASKS, TASKS};
 
     use super::*;
     use crate::commands::rig::target::{CameraArguments, Target};
@@ -200,7 +200,7 @@ mod tests {
         let equipment = CameraArguments::augment_args(Target::augment_args(equipment));
         let equipment: BTreeSet<_> =
             equipment.get_arguments().map(|option| option.get_id().to_string()).collect();
-        for task in TASKS.iter().chain(RIG_TASKS) {
+        for task in TASKS.iter().chain(DEVICE_TASKS) {
             let find = |command: &clap::Command, word: &str| command.find_subcommand(word).cloned();
             let found = task.name.split(' ').try_fold(command.clone(), |command, word| find(&command, word));
             let mut found = found.unwrap_or_else(|| panic!("no command for the task {}", task.name));

@@ -195,9 +195,9 @@ function series() {
   };
   const start = async () => {
     try {
-      const distances_mm = await distances();
-      if (distances_mm.some((mm) => !Number.isFinite(mm))) return notice("Distances are numbers in mm, with commas between them.", "error");
-      const begun = await act("/api/calibrate/series", { distances_mm });
+      const given = await distances();
+      if (given.some((mm) => !Number.isFinite(mm))) return notice("Distances are numbers in mm, with commas between them.", "error");
+      const begun = await act("/api/calibrate/series", { distances: given });
       const job = begun && (await ended("job", begun.job));
       if (job?.phase === "done") result.replaceChildren(rows([["targets", job.result.targets], ["error before correction, RMS", number(job.result.rmse_mm, 2, "mm")]]));
       await shown();

@@ -47,7 +47,7 @@ export function make(host) {
   const lead = h("div", { class: "lead", role: "status", hidden: true });
   let pictured = performance.now();
   const homeAndFocus = async () => {
-    const homing = await act("/api/rig/home", { axes: [] });
+    const homing = await act("/api/rig/home");
     if (homing && (await ended("job", homing.job)).phase === "done") act("/api/rig/goto", { focus: "far" });
   };
   /** What keeps the image from being useful, with the way out. */

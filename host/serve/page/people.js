@@ -133,7 +133,7 @@ export function shadow() {
   const facts = h("div", { "aria-live": "polite" });
   const results = h("div", { "aria-live": "polite" });
   const value = (control) => Number(control.value);
-  const sunlight = () => ({ latitude_deg: value(inputs.latitude), longitude_deg: value(inputs.longitude), time: new Date(time.value).toISOString() });
+  const sunlight = () => ({ lat: value(inputs.latitude), lon: value(inputs.longitude), time: new Date(time.value).toISOString() });
   async function shown() {
     if (!time.value) return;
     try {

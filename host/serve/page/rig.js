@@ -7,17 +7,22 @@ import { key } from "./keys.js";
 const STEPS = [[0.1, "0.1"], [1, "1"], [10, "10"], [100, "100"], [1000, "1000"]];
 let range = null;
 
+const findFocus = () => {
+  const { measure, region } = store.state?.live ?? {};
+  return act("/api/rig/focus", { range_mm: 0.5, measure, region: region?.join(",") });
+};
+
 /** Fills the panel on the left. */
 export function mount(host) {
   const stages = h("div", { class: "stages", title: "Click a rail to move its stage there" });
-  listen(stages, (axis, to_um) => able() && act("/api/rig/move", { targets: [{ axis, to_um }] }));
+  listen(stages, (axis, to_um) => able() && act("/api/rig/move", { axis: [axis], to_um: [to_um] }));
   const phase = h("div", { class: "phase" });
   const axes = h("div", { class: "axes" }, axis("coarse", "Coarse", 100), axis("fine", "Piezo", 1), axis("lens", "Lens", 100));
   const whole = h("div", { class: "buttons" },
-    button("Home", () => act("/api/rig/home", { axes: [] }), { title: "Homes all stages (H)", "data-needs": "control" }),
+    button("Home", () => act("/api/rig/home"), { title: "Homes all stages (H)", "data-needs": "control" }),
     button("Far focus", () => act("/api/rig/goto", { focus: "far" }), { title: "F", "data-needs": "control" }),
     button("Near focus", () => act("/api/rig/goto", { focus: "near" }), { title: "N", "data-needs": "control" }),
-    button("Find focus", () => act("/api/rig/focus", store.state?.live.region ? { region: store.state.live.region } : {}), { title: "Searches for the sharpest image, in the region drawn in the live image if there is one", "data-needs": "control" }));
+    button("Find focus", findFocus, { title: "Searches for the sharpest image, in the region drawn in the live image if there is one", "data-needs": "control" }));
   const facts = h("div", {});
   const more = h("details", {}, h("summary", {}, "More"), h("div", { class: "details" }, facts, h("div", { class: "buttons" },
     button("Bring-up checklist", () => act("/api/rig/check"), { "data-needs": "control" }),
@@ -39,7 +44,7 @@ export function mount(host) {
     show(state);
   });
   more.addEventListener("toggle", () => store.state && show(store.state));
-  key("h", "Home all stages", () => act("/api/rig/home", { axes: [] }));
+  key("h", "Home all stages", () => act("/api/rig/home"));
   key("f", "Go to the far focus", () => act("/api/rig/goto", { focus: "far" }));
   key("n", "Go to the near focus", () => act("/api/rig/goto", { focus: "near" }));
   key("[", "Piezo one step towards the lens", () => step("fine", -1));
@@ -97,7 +102,7 @@ function axis(name, label, usual) {
   const go = () => {
     const to_um = Number(input.value);
     if (input.value === "" || !Number.isFinite(to_um)) return notice("Type a position in µm.", "error");
-    return act("/api/rig/move", { targets: [{ axis: name, to_um }] });
+    return act("/api/rig/move", { axis: [name], to_um: [to_um] });
   };
   input.addEventListener("keydown", (event) => { if (event.key === "Enter") go(); });
   return h("div", { class: "axis" }, h("span", { class: "axis-name" }, label), input,
@@ -111,7 +116,7 @@ function step(name, sign) {
   const info = store.state?.rig.info;
   if (!info) return;
   const to_um = Number((info[name].asked_um + sign * chosen[name]).toFixed(3));
-  act("/api/rig/move", { targets: [{ axis: name, to_um }] });
+  act("/api/rig/move", { axis: [name], to_um: [to_um] });
 }
 
 function details({ info }) {

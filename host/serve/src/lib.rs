@@ -12,6 +12,7 @@ pub mod failure;
 pub mod guard;
 pub mod job_queue;
 pub mod live;
+pub mod options;
 pub mod picture_message;
 pub mod rig_watch;
 pub mod routes;

@@ -5,9 +5,7 @@ use std::{cell::RefCell, path::Path, time::Instant};
 use farnear_capture::camera::Image;
 use farnear_protocol::message::ShotRecord;
 use farnear_workflows::{
-    Context, Result, Unattended, WorkflowError,
-    camera::{self, CameraChoice},
-    optics, picture,
+    Context, Result, Unattended, WorkflowError, camera, optics, picture,
     rig::{
         RigAddress,
         camera::CameraSettings,
@@ -73,7 +71,8 @@ fn enough(app: &App) -> Result<()> {
 /// Without a rig a camera runs freely.
 fn look_through_camera(app: &App, live: &Live, context: &Context<'_>, rate: &Rate) -> Result<()> {
     let CameraSettings { address, settings, .. } = app.camera();
-    camera::live::watch(&CameraChoice { address, settings }, live.exposure, context, |frame| {
+    let camera = camera::open(&address, &settings)?;
+    camera::live::watch(camera, live.exposure, context, |frame| {
         app.pictures.send_replace(image_message(None, &frame.image, live, rate.next()));
         enough(app)
     })

@@ -150,7 +150,7 @@ test("a region drawn in the live image is what its figures and Find focus use", 
   const part = await value();
   const sent = page.waitForRequest((request) => request.url().endsWith("/api/rig/focus"));
   await page.getByRole("button", { name: "Find focus" }).click();
-  assert.deepEqual((await sent).postDataJSON().region, [x, y, width, height]);
+  assert.deepEqual((await sent).postDataJSON().region, [x, y, width, height].join(","));
   await page.waitForFunction(async () => ["done", "failed"].includes((await (await fetch("/api/state")).json()).job.phase));
   await button.click();
   await differs(part);
@@ -278,9 +278,9 @@ test("all options of a depth request are offered, with their help, and an answer
   await page.getByLabel("balance", { exact: true }).fill("much");
   await page.getByRole("button", { name: "Compute depth" }).click();
   await page.locator(".notice.error", { hasText: "balance: expected" }).waitFor();
-  const raw = await post(page, "/api/rig/move", { targets: 5 });
+  const raw = await post(page, "/api/rig/move", { to_um: 5 });
   assert.equal(raw.status, 422);
-  assert.match(raw.error, /targets/);
+  assert.match(raw.error, /axis/);
   assert.doesNotMatch(raw.error, /deserialize|target type/);
   await page.context().close();
 });
@@ -365,7 +365,7 @@ test("Stop works within 0.3 s in every state", async () => {
   const page = await open(browser, server.address);
   await page.locator("#who", { hasText: "you have control" }).waitFor();
   const begin = {
-    home: () => post(page, "/api/rig/home", { axes: [] }),
+    home: () => post(page, "/api/rig/home", {}),
     focus: () => post(page, "/api/rig/focus", {}),
     pair: () => post(page, "/api/captures", { kind: "pair" }),
     series: () => post(page, "/api/captures", { kind: "series", pairs: 20 }),

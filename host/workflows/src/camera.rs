@@ -4,15 +4,15 @@ pub mod grab;
 pub mod live;
 
 use farnear_capture::camera::{Camera, Setting, v4l};
-use serde::Serialize;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use serde_with::{DisplayFromStr, serde_as};
 
 use crate::{
     context::Context,
     error::{Result, WorkflowError},
-    rig::{
-        RigAddress,
-        camera::{CameraAddress, CameraSettings},
-    },
+    request::{PathKind, Request},
+    rig::camera::CameraAddress,
 };
 
 #[derive(Clone, PartialEq, Eq, Debug, Serialize)]
@@ -94,24 +94,39 @@ fn genicam() -> Vec<Found> {
     Vec::new()
 }
 
-#[derive(Clone, PartialEq, Debug)]
+/// A camera without a rig.
+#[serde_as]
+#[derive(Clone, PartialEq, Debug, Default, Serialize, Deserialize, JsonSchema)]
+#[cfg_attr(feature = "clap", derive(clap::Args))]
+#[serde(default)]
 pub struct CameraChoice {
-    pub address: CameraAddress,
-    pub settings: Vec<Setting>,
+    /// Camera: HOST:PORT of a farnear-sim, folder:DIR, command:"PROGRAM ...", v4l:/dev/videoN or genicam:ID.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "CAMERA"))]
+    pub camera: String,
+    /// Set something first, e.g. gain=3, exposure_us=5000, black_level=8, pixel_format=Mono12, region=0,0,640,480,
+    /// trigger_source=Line1; may be repeated.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "NAME=VALUE"))]
+    #[serde_as(as = "Vec<DisplayFromStr>")]
+    pub set: Vec<Setting>,
 }
 
 impl CameraChoice {
     pub fn open(&self) -> Result<Box<dyn Camera>> {
-        let Some(mut camera) = self.address.open()? else {
-            let expected =
-                "the emulated rig's camera comes with the rig; start farnear-sim and name its HOST:PORT";
-            return Err(WorkflowError::parameter("camera", "sim", expected));
-        };
-        for setting in &self.settings {
-            camera.set(setting)?;
-        }
-        Ok(camera)
+        open(&self.camera.parse()?, &self.set)
     }
+}
+
+/// Opens a camera without a rig and applies the settings.
+pub fn open(address: &CameraAddress, settings: &[Setting]) -> Result<Box<dyn Camera>> {
+    let Some(mut camera) = address.open()? else {
+        let expected =
+            "the emulated rig's camera comes with the rig; start farnear-sim and name its HOST:PORT";
+        return Err(WorkflowError::parameter("camera", "sim", expected));
+    };
+    for setting in settings {
+        camera.set(setting)?;
+    }
+    Ok(camera)
 }
 
 #[derive(Clone, PartialEq, Eq, Debug, Serialize)]
@@ -129,19 +144,32 @@ pub struct ShowFigures {
     pub controls: Vec<ControlFigures>,
 }
 
-pub fn show(choice: &CameraChoice) -> Result<ShowFigures> {
-    let mut camera = choice.open()?;
-    Ok(ShowFigures { kind: camera.kind(), controls: controls_of(camera.as_mut())? })
+/// Show what can be set at a camera, its value and its range. What --set sets stays set where the camera keeps it.
+#[derive(Clone, PartialEq, Debug, Default, Serialize, Deserialize, JsonSchema)]
+#[cfg_attr(feature = "clap", derive(clap::Args))]
+#[cfg_attr(
+    feature = "clap",
+    command(after_help = "Example: farnear camera show --camera genicam:Aravis-Fake-GV01 --set gain=3")
+)]
+#[serde(default)]
+pub struct ShowRequest {
+    #[cfg_attr(feature = "clap", command(flatten))]
+    #[serde(flatten)]
+    pub camera: CameraChoice,
 }
 
-/// As [`show`], for a camera on a rig.
-pub fn show_at_rig(
-    settings: &CameraSettings,
-    rig: &RigAddress,
-    context: &Context<'_>,
-) -> Result<ShowFigures> {
-    let mut equipped = settings.connect(rig, None, context)?;
-    let camera = equipped.camera.as_mut();
+impl Request for ShowRequest {
+    const NAME: &'static str = "camera show";
+    const REQUIRED: &'static [&'static str] = &["camera"];
+    const PATHS: &'static [(&'static str, PathKind)] = &[];
+    type Figures = ShowFigures;
+
+    fn run(&self, _: &Context<'_>) -> Result<ShowFigures> {
+        show(self.camera.open()?.as_mut())
+    }
+}
+
+pub fn show(camera: &mut dyn Camera) -> Result<ShowFigures> {
     Ok(ShowFigures { kind: camera.kind(), controls: controls_of(camera)? })
 }
 
@@ -160,10 +188,7 @@ mod tests {
 
     #[test]
     fn the_emulated_rigs_camera_and_bad_addresses_are_refused() {
-        let open = |text: &str| {
-            let address = text.parse::<CameraAddress>()?;
-            CameraChoice { address, settings: Vec::new() }.open().map(|_| ())
-        };
+        let open = |text: &str| CameraChoice { camera: text.into(), set: Vec::new() }.open().map(|_| ());
         for (text, phrase) in [
             ("sim", "HOST:PORT"),
             ("nothing", "genicam:ID"),

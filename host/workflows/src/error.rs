@@ -239,7 +239,7 @@ impl WorkflowError {
     /// Whether the request was invalid, so that nothing was done.
     pub fn is_usage(&self) -> bool {
         match self {
-            Self::Parameter { .. } | Self::Request(_) => true,
+            Self::Parameter { .. } | Self::Request(_) | Self::Sun(_) => true,
             Self::About { source, .. } => source.is_usage(),
             _ => false,
         }

@@ -1,15 +1,14 @@
 //! Tasks of farnear, shared by all interfaces: command line, web page, batch runner, Python.
 //!
-//! A workflow takes a settings struct and a [`Context`] (progress, questions, cancellation). It returns figures
+//! A workflow takes a request and a [`Context`] (progress, questions, cancellation). It returns figures
 //! or a [`WorkflowError`] with the offending values. It does not use the terminal, the keyboard or signals.
 //!
 //! Example: an interface that collects messages, and a stage move with a scripted board on the port.
 //! ```
 //! # #[cfg(target_os = "linux")] { // where a pseudo-terminal holds the board
 //! # use std::sync::Mutex;
-//! # use farnear_protocol::message::Axis;
 //! # use farnear_scripted_board::{Faults, plug_in};
-//! use farnear_workflows::{Cancel, Context, Unattended, Progress, rig};
+//! use farnear_workflows::{Cancel, Context, Unattended, Progress, request::Request, rig};
 //! #[derive(Default)]
 //! struct Face(Mutex<Vec<String>>);
 //!
@@ -19,20 +18,21 @@
 //!     }
 //! }
 //! let (port, _board) = plug_in(Faults::default());
-//! let settings = rig::motion::MoveSettings {
+//! let request = rig::motion::MoveRequest {
 //!     rig: rig::RigAddress::Port(port),
-//!     targets: vec![(Axis::Lens, 1_000.0)],
+//!     axis: vec![rig::AxisName::Lens],
+//!     to_um: vec![1_000.0],
 //!     home: true,
 //! };
 //! let face = Face::default();
 //! // A clone of `cancel` can stop the rig from any thread.
 //! let cancel = Cancel::default();
 //! let context = Context::new(&face, &Unattended, cancel.clone());
-//! let moved = rig::motion::move_to(&settings, &context)?;
+//! let moved = request.run(&context)?;
 //! assert!(matches!(moved, rig::motion::MoveFigures::One(lens) if lens.measured_um == 1_000.125));
 //! assert!(face.0.lock().expect("one thread").iter().any(|said| said.starts_with("homing the lens stage")));
 //! cancel.cancel();
-//! let error = rig::motion::move_to(&settings, &context).expect_err("nothing moves any more");
+//! let error = request.run(&context).expect_err("nothing moves any more");
 //! assert!(error.is_cancelled());
 //! # }
 //! # Ok::<(), farnear_workflows::WorkflowError>(())

@@ -5,7 +5,7 @@ pub mod reference;
 
 use std::path::{Path, PathBuf};
 
-use schemars::JsonSchema;
+use schemars::{JsonSchema, Schema};
 use serde::{Serialize, de::DeserializeOwned};
 use serde_json::{Map, Value};
 
@@ -158,16 +158,15 @@ pub fn schema<R: Request>() -> Value {
     schemars::SchemaGenerator::default().into_root_schema_for::<R>().to_value()
 }
 
-/// The schema without path fields, for callers that may not name files.
-pub fn schema_without_paths<R: Request>() -> Value {
-    let mut schema = schema::<R>();
+/// Removes the path fields from the request's schema, for callers that may not name files.
+pub fn without_paths<R: Request>(mut schema: Schema) -> Schema {
     if let Some(properties) = schema.get_mut("properties").and_then(Value::as_object_mut) {
         properties.retain(|name, _| R::PATHS.iter().all(|(path, _)| path != name));
     }
     schema
 }
 
-/// Tasks without a rig.
+/// Tasks on files.
 pub const TASKS: &[Task] = &[
     Task::of::<crate::depth::DepthRequest>(),
     Task::of::<crate::focus_stack::FocusStackRequest>(),
@@ -196,9 +195,13 @@ pub const TASKS: &[Task] = &[
     Task::of::<crate::activity::evaluate::EvaluateRequest>(),
     Task::of::<crate::shadow::removal::ShadowRemoveRequest>(),
     Task::of::<crate::shadow::score::ShadowScoreRequest>(),
+    Task::of::<crate::sun::SunPositionRequest>(),
 ];
 
-pub const RIG_TASKS: &[Task] = &[
+/// Tasks of a rig or a camera. They are no batch jobs.
+pub const DEVICE_TASKS: &[Task] = &[
+    Task::of::<crate::rig::motion::HomeRequest>(),
+    Task::of::<crate::rig::motion::MoveRequest>(),
     Task::of::<crate::rig::pair::CaptureRequest>(),
     Task::of::<crate::rig::focus::FocusRequest>(),
     Task::of::<crate::rig::sequence::SequenceRequest>(),
@@ -207,8 +210,11 @@ pub const RIG_TASKS: &[Task] = &[
     Task::of::<crate::rig::lens_stack::RigStackRequest>(),
     Task::of::<crate::rig::correction_fit::FitRequest>(),
     Task::of::<crate::rig::correct::BoardCorrectRequest>(),
+    Task::of::<crate::rig::quality::QualityRequest>(),
     Task::of::<crate::rig::sun::SunRequest>(),
     Task::of::<crate::rig::check::CheckRequest>(),
+    Task::of::<crate::camera::ShowRequest>(),
+    Task::of::<crate::camera::grab::GrabRequest>(),
 ];
 
 /// Reads a job from its fields; paths are relative to the folder.
@@ -437,7 +443,7 @@ mod tests {
     fn refuses_paths_where_the_caller_sets_them() {
         assert!(read(json!({"share": 1}), Paths::Refused).is_ok());
         assert!(read(json!({"file": "/etc/passwd"}), Paths::Refused).is_err());
-        let schema = schema_without_paths::<Sample>();
+        let schema = without_paths::<Sample>(schemars::schema_for!(Sample)).to_value();
         assert!(property(&schema, "file").is_none() && property(&schema, "share").is_some());
     }
 

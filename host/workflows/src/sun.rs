@@ -1,13 +1,17 @@
 //! Position of the sun.
 
-use std::str::FromStr;
-
 use chrono::{DateTime, Utc};
 use farnear_maths::{angle::BinaryAngle, sun as board};
-use farnear_shadow::sun::{self, Model, Place, SunError};
-use serde::Serialize;
+use farnear_shadow::sun::{self, Model, Place};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
-use crate::{error::Result, figures::rounded};
+use crate::{
+    context::Context,
+    error::{Result, WorkflowError},
+    figures::rounded,
+    request::{PathKind, Request},
+};
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Moment {
@@ -20,34 +24,73 @@ impl Moment {
     pub fn new(latitude_deg: f64, longitude_deg: f64, time: &str) -> Result<Self> {
         let place = Place::new(latitude_deg, longitude_deg)?;
         let wrong = |_| {
-            let expected = "expected a date and a time with its zone, as 2026-06-21T12:00:00+02:00";
-            crate::WorkflowError::parameter("time", time, expected)
+            let expected =
+                "expected a date and a time with its zone (RFC 3339), as 2026-06-21T12:00:00+02:00";
+            WorkflowError::parameter("time", time, expected)
         };
         let time = DateTime::parse_from_rfc3339(time).map_err(wrong)?.with_timezone(&Utc);
         Ok(Self { place, time })
     }
 }
 
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[cfg_attr(feature = "clap", derive(clap::ValueEnum))]
+#[serde(rename_all = "lowercase")]
 pub enum Formula {
-    /// Host, double precision.
-    Host(Model),
-    /// Board code, single precision.
+    /// PSA+, within 0.01 deg of NREL's SPA.
+    #[default]
+    Psa,
+    /// Two sines.
+    Almanac,
+    /// Li 2014, a degree off.
+    Thesis,
+    /// NREL's own.
+    Spa,
+    /// The rig's single-precision answer, bit for bit.
     Board,
 }
 
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error("{0} (or board)")]
-pub struct UnknownFormula(SunError);
+/// Where the sun stands: elevation above the horizon and azimuth clockwise from north, without refraction.
+#[derive(Clone, PartialEq, Debug, Default, Serialize, Deserialize, JsonSchema)]
+#[cfg_attr(feature = "clap", derive(clap::Args))]
+#[cfg_attr(
+    feature = "clap",
+    command(after_help = "Example: farnear sun --lat 52.38 --lon -1.56 --time 2014-06-23T11:30:00Z --json")
+)]
+#[serde(default)]
+pub struct SunPositionRequest {
+    /// Latitude in degrees, north positive.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "DEG", allow_negative_numbers = true))]
+    pub lat: f64,
+    /// Longitude in degrees, east positive.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "DEG", allow_negative_numbers = true))]
+    pub lon: f64,
+    /// Time with its zone (RFC 3339), such as 2014-06-23T12:30:00+01:00.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "RFC3339"))]
+    pub time: String,
+    /// The formula.
+    #[cfg_attr(feature = "clap", arg(long, value_enum, default_value = "psa"))]
+    pub model: Formula,
+}
 
-impl FromStr for Formula {
-    type Err = UnknownFormula;
+impl SunPositionRequest {
+    pub fn moment(&self) -> Result<Moment> {
+        Moment::new(self.lat, self.lon, &self.time)
+    }
+}
 
-    fn from_str(text: &str) -> Result<Self, UnknownFormula> {
-        match text {
-            "board" => Ok(Self::Board),
-            other => other.parse().map(Self::Host).map_err(UnknownFormula),
-        }
+impl Request for SunPositionRequest {
+    const NAME: &'static str = "sun";
+    const REQUIRED: &'static [&'static str] = &["lat", "lon", "time"];
+    const PATHS: &'static [(&'static str, PathKind)] = &[];
+    type Figures = SunFigures;
+
+    fn check(&self) -> Result<()> {
+        self.moment().map(drop)
+    }
+
+    fn run(&self, _: &Context<'_>) -> Result<SunFigures> {
+        position(&self.moment()?, self.model)
     }
 }
 
@@ -60,15 +103,19 @@ pub struct SunFigures {
 
 /// Position of the sun without refraction, rounded to 1e-6 degrees.
 pub fn position(moment: &Moment, formula: Formula) -> Result<SunFigures> {
-    let (elevation_deg, azimuth_deg) = match formula {
-        Formula::Host(model) => {
-            let sun = sun::position(moment.time, moment.place, model)?;
-            (sun.elevation_deg, sun.azimuth_deg)
-        }
-        Formula::Board => {
-            let sun = board::Sun::at(moment.time.timestamp(), &on_board(moment.place));
-            (f64::from(sun.elevation_deg()), f64::from(sun.azimuth_deg()))
-        }
+    let model = match formula {
+        Formula::Psa => Some(Model::Psa),
+        Formula::Almanac => Some(Model::Almanac),
+        Formula::Thesis => Some(Model::Thesis),
+        Formula::Spa => Some(Model::Spa),
+        Formula::Board => None,
+    };
+    let (elevation_deg, azimuth_deg) = if let Some(model) = model {
+        let sun = sun::position(moment.time, moment.place, model)?;
+        (sun.elevation_deg, sun.azimuth_deg)
+    } else {
+        let sun = board::Sun::at(moment.time.timestamp(), &on_board(moment.place));
+        (f64::from(sun.elevation_deg()), f64::from(sun.azimuth_deg()))
     };
     Ok(SunFigures { elevation_deg: rounded(elevation_deg, 6), azimuth_deg: rounded(azimuth_deg, 6) })
 }
@@ -83,14 +130,6 @@ fn on_board(place: Place) -> board::Place {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn formulas_have_names() {
-        assert_eq!("board".parse(), Ok(Formula::Board));
-        assert_eq!("spa".parse(), Ok(Formula::Host(Model::Spa)));
-        let error = "noaa".parse::<Formula>().expect_err("no formula");
-        assert!(error.to_string().contains("`noaa`") && error.to_string().ends_with("(or board)"), "{error}");
-    }
 
     #[test]
     fn the_board_counts_longitudes_above_180_degrees_as_west() {

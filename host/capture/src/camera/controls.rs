@@ -37,6 +37,13 @@ impl Setting {
     }
 }
 
+/// As [`Setting::from_str`] reads it.
+impl fmt::Display for Setting {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}={}", self.name(), self.value())
+    }
+}
+
 impl FromStr for Setting {
     type Err = String;
 

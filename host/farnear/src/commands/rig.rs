@@ -1,6 +1,5 @@
 mod calibrate;
 mod log;
-mod motion;
 mod settings;
 pub mod target;
 
@@ -9,9 +8,17 @@ use clap::{Args, Subcommand};
 use farnear_workflows::{
     Context,
     rig::{
-        AxisName, RigAddress, alarms, board, check::CheckRequest, continuous::ContinuousRequest,
-        correct::BoardCorrectRequest, focus::FocusRequest, info, motion as moving, pair::CaptureRequest,
-        sequence::SequenceRequest, sun::SunRequest,
+        AxisName, RigAddress, alarms, board,
+        check::CheckRequest,
+        continuous::ContinuousRequest,
+        correct::BoardCorrectRequest,
+        focus::FocusRequest,
+        info,
+        motion::{self, HomeRequest, MoveRequest},
+        pair::CaptureRequest,
+        quality::QualityRequest,
+        sequence::SequenceRequest,
+        sun::SunRequest,
     },
 };
 use serde::Serialize;
@@ -28,8 +35,8 @@ pub enum Job {
     /// Print the board's identity, its limits and where it is.
     #[command(after_help = "Example: farnear rig info --port /dev/ttyACM0")]
     Info(Question),
-    Home(motion::HomeArguments),
-    Move(motion::MoveArguments),
+    Home(RigRun<HomeRequest>),
+    Move(RigRun<MoveRequest>),
     /// Stop all motion along the ramps and end a running program; positions stay known.
     #[command(after_help = "Example: farnear rig stop --port /dev/ttyACM0")]
     Stop {
@@ -53,6 +60,7 @@ pub enum Job {
         after_help = "Example: farnear rig calibrate backlash --port /dev/ttyACM0 --axis coarse"
     )]
     Calibrate(calibrate::What),
+    Quality(CameraRun<QualityRequest>),
     Sun(RigRun<SunRequest>),
     Correct(RigRun<BoardCorrectRequest>),
     /// List the last alarms, or clear the latched one by its number. While an alarm is latched nothing moves.
@@ -100,15 +108,16 @@ impl Question {
 pub fn run(job: Job) -> Result<()> {
     match job {
         Job::Info(question) => question.answer(info::info),
-        Job::Home(arguments) => motion::home(arguments),
-        Job::Move(arguments) => motion::go(arguments),
-        Job::Stop { target } => Ok(moving::stop(&target.address()?, &terminal::context()?)?),
-        Job::Halt { target } => Ok(moving::halt(&target.address()?, &terminal::context()?)?),
+        Job::Home(task) => task.run(),
+        Job::Move(task) => task.run(),
+        Job::Stop { target } => Ok(motion::stop(&target.address()?, &terminal::context()?)?),
+        Job::Halt { target } => Ok(motion::halt(&target.address()?, &terminal::context()?)?),
         Job::Focus(task) => task.run(),
         Job::Capture(task) => task.run(),
         Job::Continuous(task) => task.run(),
         Job::Sequence(task) => task.run(),
         Job::Calibrate(arguments) => calibrate::run(arguments),
+        Job::Quality(task) => task.run(),
         Job::Sun(task) => task.run(),
         Job::Correct(task) => task.run(),
         Job::Alarms { question, clear } => {

@@ -226,3 +226,19 @@ fn a_stack_calibrates_the_lens_for_pairs_of_the_same_rig() {
     // 0.22 mm with exact optics; the calibration's own error is 0.1 mm.
     assert!(number(&compared, "rmse_mm") < 0.35, "{compared}");
 }
+
+#[test]
+#[cfg_attr(not(emulated_rig), ignore = "needs farnear-sim: cargo xtask test")]
+fn the_quality_of_depth_is_measured_on_a_plane_and_recorded() {
+    let folder = Folder::new();
+    let record = folder.text("quality.toml");
+    let mut quality = on_the_rig(&["quality", "--optics", rig_optics(), "--record", &record, "--json"]);
+    let found = figures(quality.args(["--scene", "plane:910", "--pairs", "2", "--true-mm", "910"]));
+    assert!(number(&found, "fill_rate") > 0.95, "{found}");
+    assert!(number(&found, "accuracy_mm").abs() < 0.3, "{found}");
+    // Of two pairs.
+    let noise = number(&found, "temporal_noise_mm") / number(&found, "predicted_noise_mm");
+    assert!((0.5..2.0).contains(&noise), "{found}");
+    let recorded = std::fs::read_to_string(&record).expect("the record");
+    assert_eq!(recorded.matches("[[measurement]]").count(), 1, "{recorded}");
+}

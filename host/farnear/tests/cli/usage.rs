@@ -47,6 +47,7 @@ const COMMANDS: &[&[&str]] = &[
     &["rig", "calibrate", "gauge"],
     &["rig", "calibrate", "targets"],
     &["rig", "calibrate", "fit"],
+    &["rig", "quality"],
     &["rig", "sun"],
     &["rig", "correct"],
     &["rig", "alarms"],
@@ -155,14 +156,14 @@ fn bad_usage_ends_with_2() {
         (vec!["rig", "move", "--port", "sim", "--axis", "z", "--to-um", "1"], vec!["'z'", "coarse", "lens"]),
         (
             vec!["rig", "move", "--port", "x", "--axis", "lens", "--axis", "fine", "--to-um", "1"],
-            vec!["--axis is given 2 times and --to-um 1 times"],
+            vec!["to-um 1: expected 2 positions, one for each axis"],
         ),
         (
             vec![
                 "rig", "move", "--port", "x", "--axis", "fine", "--to-um", "1", "--axis", "fine", "--to-um",
                 "2",
             ],
-            vec!["--axis fine is given twice"],
+            vec!["axis fine: expected each axis once"],
         ),
         (vec!["rig", "settings", "get", "speed", "--port", "x"], vec!["setting speed", "datum_nm"]),
         (vec!["rig", "calibrate", "backlash", "--port", "x", "--axis", "fine"], vec!["fine", "piezo"]),

@@ -36,6 +36,7 @@ use crate::{
     app::App,
     failure::Failure,
     job_queue::Task,
+    options::Options,
     routes::rig::{begin, connected, figures},
     view::{Begun, Nothing},
 };
@@ -69,31 +70,6 @@ pub struct PsfRequest {
     pub model: String,
 }
 
-/// Where flat targets are captured.
-#[derive(Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct SeriesRequest {
-    /// Their distances from the lens; the working range in equal steps without any.
-    #[serde(default)]
-    pub distances_mm: Vec<f64>,
-}
-
-/// A stack that calibrates the lens.
-#[derive(Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct StackRequest {
-    /// Slices, 11 or more.
-    pub slices: usize,
-}
-
-/// What a correction is learned by.
-#[derive(Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct CorrectionRequest {
-    /// As `farnear calibrate correction --method` names it.
-    pub method: String,
-}
-
 /// What the session has been taught.
 #[derive(Serialize, JsonSchema)]
 pub struct Taught {
@@ -113,13 +89,13 @@ pub fn routes(api: Api) -> Api {
             "Finds the point spread function from one pair or several of flat targets.",
             find_psf,
         )
-        .post::<StackRequest, Begun, _, _>(
+        .post::<Options<RigStackRequest>, Begun, _, _>(
             "/api/calibrate/stack",
             For::Control,
             "Takes a stack of a flat target around its focus and calibrates the lens from it; the result has the optics.",
             lens_of_stack,
         )
-        .post::<SeriesRequest, Begun, _, _>(
+        .post::<Options<TargetSeriesRequest>, Begun, _, _>(
             "/api/calibrate/series",
             For::Control,
             "Captures flat targets at several distances; at a real rig a person places them and answers.",
@@ -131,7 +107,7 @@ pub fn routes(api: Api) -> Api {
             "Forgets the flat series and the correction, to start again.",
             forget,
         )
-        .post::<CorrectionRequest, Begun, _, _>(
+        .post::<Options<CalibrateCorrectionRequest>, Begun, _, _>(
             "/api/calibrate/correction",
             For::Client,
             "Learns a correction from the flat series.",
@@ -197,7 +173,7 @@ fn compute(app: &App, task: Task) -> Result<Json<Begun>, Failure> {
 async fn series(
     State(app): Shared,
     headers: HeaderMap,
-    Body(SeriesRequest { distances_mm }): Body<SeriesRequest>,
+    Body(Options(options)): Body<Options<TargetSeriesRequest>>,
 ) -> Result<Json<Begun>, Failure> {
     require_control(&app, &headers)?;
     let open = connected(&app)?;
@@ -213,9 +189,9 @@ async fn series(
         rig,
         camera: app.camera(),
         optics: app.optics_file(),
-        distances: distances_mm,
         no_prompt: !ask,
         out: app.session.join(SERIES),
+        ..options
     };
     let work = move |_: &App, context: &Context<'_>| figures(targets::capture(&settings, context)?);
     begin(&app, Task { kind: "flat-series", title: "Capture flat targets".into(), work: Box::new(work) })
@@ -224,7 +200,7 @@ async fn series(
 async fn lens_of_stack(
     State(app): Shared,
     headers: HeaderMap,
-    Body(StackRequest { slices }): Body<StackRequest>,
+    Body(Options(options)): Body<Options<RigStackRequest>>,
 ) -> Result<Json<Begun>, Failure> {
     require_control(&app, &headers)?;
     let open = connected(&app)?;
@@ -239,7 +215,7 @@ async fn lens_of_stack(
     };
     let out = sessions::free_names(&app.session, "lens", 1)?.remove(0);
     let settings =
-        RigStackRequest { rig, camera: app.camera(), optics: app.optics_file(), slices, out: out.clone() };
+        RigStackRequest { rig, camera: app.camera(), optics: app.optics_file(), out: out.clone(), ..options };
     settings.check()?;
     let work = move |app: &App, context: &Context<'_>| {
         let found = lens_stack::run(&settings, context);
@@ -276,15 +252,13 @@ async fn forget(
 async fn learn(
     State(app): Shared,
     headers: HeaderMap,
-    Body(CorrectionRequest { method }): Body<CorrectionRequest>,
+    Body(Options(options)): Body<Options<CalibrateCorrectionRequest>>,
 ) -> Result<Json<Begun>, Failure> {
     require_client(&app, &headers)?;
-    let wrong = |error| Failure::new(StatusCode::BAD_REQUEST, format!("method {method:?}: {error}"));
     let settings = CalibrateCorrectionRequest {
         patterns: app.session.join(SERIES).join(LIST),
-        method: method.parse().map_err(wrong)?,
         out: app.session.join(CORRECTION),
-        ..CalibrateCorrectionRequest::default()
+        ..options
     };
     let work = move |_: &App, context: &Context<'_>| figures(correction::learn(&settings, context)?);
     compute(&app, Task { kind: "correction", title: "Learn the correction".into(), work: Box::new(work) })

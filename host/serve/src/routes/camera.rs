@@ -6,11 +6,7 @@ use axum::{
     http::{HeaderMap, StatusCode},
 };
 use farnear_capture::camera::Setting;
-use farnear_workflows::{
-    Context,
-    camera::{self, CameraChoice},
-    rig::RigAddress,
-};
+use farnear_workflows::{Context, camera, rig::RigAddress};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
@@ -60,11 +56,8 @@ async fn set(
     }
     let work = move |app: &App, context: &Context<'_>| {
         let found = match rig {
-            Some(rig) => camera::show_at_rig(&camera, &rig, context)?,
-            None => {
-                let (address, settings) = (camera.address.clone(), camera.settings.clone());
-                camera::show(&CameraChoice { address, settings })?
-            }
+            Some(rig) => camera::show(camera.connect(&rig, None, context)?.camera.as_mut())?,
+            None => camera::show(camera::open(&camera.address, &camera.settings)?.as_mut())?,
         };
         // A refused setting is not tried again at the next picture.
         app.set_camera(camera.settings);

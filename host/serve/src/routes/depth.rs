@@ -25,6 +25,7 @@ use crate::{
     app::App,
     failure::Failure,
     job_queue::Task,
+    options::Options,
     routes::rig::figures,
     view::Begun,
 };
@@ -49,8 +50,8 @@ impl JsonSchema for CaptureDepthRequest {
         "CaptureDepthRequest".into()
     }
 
-    fn json_schema(_: &mut SchemaGenerator) -> Schema {
-        let mut schema = request::schema_without_paths::<DepthRequest>();
+    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
+        let mut schema = Options::<DepthRequest>::json_schema(generator);
         if let Some(properties) = schema.get_mut("properties").and_then(Value::as_object_mut) {
             let about = "Whether the correction that the session has learned is applied.";
             properties.insert(
@@ -62,21 +63,7 @@ impl JsonSchema for CaptureDepthRequest {
             let about = "Name of the rational operators: FAMILY:DESIGN.";
             properties.insert("operators".into(), json!({"type": ["string", "null"], "description": about}));
         }
-        schema.try_into().unwrap_or_default()
-    }
-}
-
-/// A focus stack request without its files.
-#[derive(Deserialize)]
-pub struct CaptureStackRequest(Map<String, Value>);
-
-impl JsonSchema for CaptureStackRequest {
-    fn schema_name() -> std::borrow::Cow<'static, str> {
-        "CaptureStackRequest".into()
-    }
-
-    fn json_schema(_: &mut SchemaGenerator) -> Schema {
-        request::schema_without_paths::<FocusStackRequest>().try_into().unwrap_or_default()
+        schema
     }
 }
 
@@ -118,7 +105,7 @@ pub fn routes(api: Api) -> Api {
         "Computes the depth of a pair, with its standard deviation.",
         compute,
     )
-    .post::<CaptureStackRequest, Begun, _, _>(
+    .post::<Options<FocusStackRequest>, Begun, _, _>(
         "/api/captures/{capture}/stack",
         For::Control,
         "Computes the depth of a stack by focus, and its sharp image, as the variant `focus-stack`.",
@@ -207,12 +194,10 @@ async fn compute_stack(
     State(app): Shared,
     Path(name): Path<String>,
     headers: HeaderMap,
-    Body(CaptureStackRequest(options)): Body<CaptureStackRequest>,
+    Body(Options(options)): Body<Options<FocusStackRequest>>,
 ) -> Result<Json<Begun>, Failure> {
     require_control(&app, &headers)?;
     let folder = sessions::existing(&app.session, &name)?;
-    let options: FocusStackRequest = request::parse(options, Paths::Refused)
-        .map_err(|error| Failure::new(StatusCode::BAD_REQUEST, error.to_string()))?;
     let out = sessions::variant_of(&folder, sessions::STACK_VARIANT)?;
     let request = FocusStackRequest { stack: folder, out, ..options };
     begin(&app, &name, request)

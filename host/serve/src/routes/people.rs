@@ -9,15 +9,15 @@ use axum::{
     http::{HeaderMap, StatusCode, header},
     response::{IntoResponse, Response},
 };
-use farnear_shadow::sun::Model as SunModel;
 use farnear_shadow::{CameraFile, camera};
 use farnear_workflows::{
     Context, WorkflowError,
     activity::{recognition::Model, streaming},
+    request::Request,
     rig::{RigAddress, live::LiveSettings},
     sessions,
     shadow::video::{self, VideoShadowSettings},
-    sun::{self, Formula, Moment},
+    sun::SunPositionRequest,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -29,6 +29,7 @@ use crate::{
     app::App,
     failure::Failure,
     job_queue::Task,
+    options::Options,
     picture_message::person,
     routes::rig::{begin, connected, figures},
     transfer,
@@ -46,18 +47,6 @@ pub struct RecogniseRequest {
     /// An uploaded video; without it the rig's camera, until it is stopped.
     #[serde(default)]
     pub video: Option<String>,
-}
-
-/// A place and a time.
-#[derive(Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct Sunlight {
-    /// North positive, degrees.
-    pub latitude_deg: f64,
-    /// East positive, degrees.
-    pub longitude_deg: f64,
-    /// RFC 3339: `2026-06-21T12:00:00+02:00`.
-    pub time: String,
 }
 
 /// How a camera stands.
@@ -83,7 +72,7 @@ pub struct ShadowRequest {
     /// A video that was sent.
     pub video: String,
     /// Place and time of a recording.
-    pub sun: Sunlight,
+    pub sun: SunPositionRequest,
     /// How the camera stood.
     pub camera: Standing,
 }
@@ -126,7 +115,7 @@ pub fn routes(api: Api) -> Api {
             "Recognises a person's activity; the streaming answer comes by the socket.",
             recognise,
         )
-        .post::<Sunlight, Shadow, _, _>(
+        .post::<Options<SunPositionRequest>, Shadow, _, _>(
             "/api/people/sun",
             For::All,
             "Where the sun stands and what shadow it throws; nothing is changed.",
@@ -221,12 +210,8 @@ async fn recognise(
     Ok(Json(Begun { job }))
 }
 
-fn moment(sun: &Sunlight) -> Result<Moment, WorkflowError> {
-    Moment::new(sun.latitude_deg, sun.longitude_deg, &sun.time)
-}
-
-async fn sunlight(Body(given): Body<Sunlight>) -> Result<Json<Shadow>, Failure> {
-    let found = sun::position(&moment(&given)?, Formula::Host(SunModel::Psa))?;
+async fn sunlight(Body(Options(sun)): Body<Options<SunPositionRequest>>) -> Result<Json<Shadow>, Failure> {
+    let found = sun.run(&Context::unattended())?;
     let up = found.elevation_deg > 0.0;
     Ok(Json(Shadow {
         length_per_height: up.then(|| 1.0 / found.elevation_deg.to_radians().tan()),
@@ -242,7 +227,7 @@ async fn shadow(
 ) -> Result<Json<Removing>, Failure> {
     require_client(&app, &headers)?;
     let video = video_of(&app, &request.video)?;
-    moment(&request.sun)?;
+    request.sun.check()?;
     let out = sessions::free_names(&folder(&app), "shadow", 1)?.remove(0);
     let name = out.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let Standing { height_m, azimuth_deg, pitch_deg, focal_length_mm, pixel_um } = request.camera;
@@ -263,8 +248,8 @@ async fn shadow(
             subject: camera::SubjectPrior::default(),
             standard_deviations: camera::StandardDeviations::default(),
         },
-        lat: request.sun.latitude_deg,
-        lon: request.sun.longitude_deg,
+        lat: request.sun.lat,
+        lon: request.sun.lon,
         time: request.sun.time,
         out,
     };

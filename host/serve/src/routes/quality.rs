@@ -1,13 +1,14 @@
 use axum::{Json, extract::State, http::HeaderMap};
 use farnear_workflows::{
     Context,
+    request::Request,
     rig::{
         RigAddress,
-        quality::{self, QualitySettings},
+        quality::{self, QualityRequest},
     },
 };
 use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 use serde_json::Value;
 
 use super::{Body, Shared, aside, require_control};
@@ -16,22 +17,12 @@ use crate::{
     app::App,
     failure::Failure,
     job_queue::Task,
+    options::Options,
     routes::rig::{begin, connected, figures},
     view::Begun,
 };
 
 const RECORD: &str = "quality.toml";
-
-/// Options of the measurement.
-#[derive(Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct QualityRequest {
-    /// Number of pairs, 2 to 50.
-    pub pairs: usize,
-    /// How far the target is, where that is known.
-    #[serde(default)]
-    pub true_mm: Option<f64>,
-}
 
 /// The measurements so far.
 #[derive(Serialize, JsonSchema)]
@@ -42,7 +33,7 @@ pub struct Records {
 
 pub fn routes(api: Api) -> Api {
     api.get::<Records, _, _>("/api/quality", "The measurements of depth quality so far.", list)
-        .post::<QualityRequest, Begun, _, _>(
+        .post::<Options<QualityRequest>, Begun, _, _>(
             "/api/quality",
             For::Control,
             "Measures fill rate, plane fit, noise and accuracy on a flat target.",
@@ -62,20 +53,18 @@ async fn list(State(app): Shared) -> Result<Json<Records>, Failure> {
 async fn measure(
     State(app): Shared,
     headers: HeaderMap,
-    Body(QualityRequest { pairs, true_mm }): Body<QualityRequest>,
+    Body(Options(options)): Body<Options<QualityRequest>>,
 ) -> Result<Json<Begun>, Failure> {
     require_control(&app, &headers)?;
-    let settings = QualitySettings {
+    let request = QualityRequest {
         rig: RigAddress::Open(connected(&app)?),
         camera: app.camera(),
         optics: app.optics_file(),
-        pairs,
-        true_mm,
         record: app.session.join(RECORD),
+        ..options
     };
-    let work = move |_: &App, context: &Context<'_>| figures(quality::measure(&settings, context)?);
-    begin(
-        &app,
-        Task { kind: "quality", title: format!("Depth quality over {pairs} pairs"), work: Box::new(work) },
-    )
+    request.check()?;
+    let title = format!("Depth quality over {} pairs", request.pairs);
+    let work = move |_: &App, context: &Context<'_>| figures(request.run(context)?);
+    begin(&app, Task { kind: "quality", title, work: Box::new(work) })
 }

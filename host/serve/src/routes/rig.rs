@@ -10,13 +10,14 @@ use farnear_workflows::{
     Context, WorkflowError,
     measure::Rectangle,
     optics,
+    request::{Request, RigRequest},
     rig::{
-        AxisName, RigAddress, alarms, board,
+        RigAddress, alarms, board,
         camera::light_of_percent,
         check::{self, CheckRequest},
-        focus::{self, FocusRequest},
+        focus::FocusRequest,
         goto::{self, GotoSettings},
-        motion::{self, MoveSettings},
+        motion::{HomeRequest, MoveRequest},
         open::OpenRig,
     },
 };
@@ -30,42 +31,13 @@ use crate::{
     app::App,
     failure::Failure,
     job_queue::Task,
+    options::Options,
     view::{Begun, DONE, Done, LiveMode, Nothing},
 };
 
 const EXPOSURE_MAX_US: u32 = 1_000_000;
 /// Scenes of `farnear-sim` without a parameter.
 const SCENES: [&str; 4] = ["staircase", "slant", "cone", "sphere"];
-
-/// Which axes to home.
-#[derive(Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct Home {
-    /// All with a home switch where none is named.
-    #[serde(default)]
-    pub axes: Vec<AxisName>,
-}
-
-/// Target of a move.
-#[derive(Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct Target {
-    /// Axis to move.
-    pub axis: AxisName,
-    /// Absolute position.
-    pub to_um: f64,
-}
-
-/// Where axes go, at the same time.
-#[derive(Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct Move {
-    /// Each at most once.
-    pub targets: Vec<Target>,
-    /// Whether to home axes first that are not homed.
-    #[serde(default)]
-    pub home: bool,
-}
 
 /// One of the images of a pair.
 #[derive(Clone, Copy, Deserialize, JsonSchema)]
@@ -83,25 +55,6 @@ pub enum FocusName {
 pub struct Goto {
     /// Far or near focus.
     pub focus: FocusName,
-}
-
-/// Find the focus of a target.
-#[derive(Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct Seek {
-    /// How far the focus may be from where the stage stands.
-    #[serde(default = "half_a_millimetre")]
-    pub range_mm: f64,
-    /// `fft-sum`, `tenengrad` or `modified-laplacian`.
-    #[serde(default)]
-    pub measure: Option<String>,
-    /// Part of the image: column, row, width, height in pixels.
-    #[serde(default)]
-    pub region: Option<[usize; 4]>,
-}
-
-fn half_a_millimetre() -> f64 {
-    0.5
 }
 
 /// Live settings; absent fields stay unchanged.
@@ -156,15 +109,15 @@ pub fn routes(api: Api) -> Api {
             "Restarts the emulated rig with another scene.",
             set_scene,
         )
-        .post::<Home, Begun, _, _>("/api/rig/home", For::Control, "Homes axes.", home)
-        .post::<Move, Begun, _, _>(
+        .post::<Options<HomeRequest>, Begun, _, _>("/api/rig/home", For::Control, "Homes axes.", home)
+        .post::<Options<MoveRequest>, Begun, _, _>(
             "/api/rig/move",
             For::Control,
             "Moves axes to absolute positions.",
             move_to,
         )
         .post::<Goto, Begun, _, _>("/api/rig/goto", For::Control, "Moves to the far or the near focus.", go)
-        .post::<Seek, Begun, _, _>(
+        .post::<Options<FocusRequest>, Begun, _, _>(
             "/api/rig/focus",
             For::Control,
             "Finds the focus of a target and stays there.",
@@ -260,41 +213,26 @@ fn known(scene: String, app: &App) -> Result<String, Failure> {
 async fn home(
     State(app): Shared,
     headers: HeaderMap,
-    Body(request): Body<Home>,
+    Body(Options(mut request)): Body<Options<HomeRequest>>,
 ) -> Result<Json<Begun>, Failure> {
     require_control(&app, &headers)?;
-    let rig = RigAddress::Open(connected(&app)?);
-    let axes: Vec<Axis> = request.axes.into_iter().map(Into::into).collect();
-    let work = move |_: &App, context: &Context<'_>| figures(motion::home(&rig, &axes, context)?);
+    request.set_rig(RigAddress::Open(connected(&app)?));
+    let work = move |_: &App, context: &Context<'_>| figures(request.run(context)?);
     begin(&app, Task { kind: "home", title: "Home".into(), work: Box::new(work) })
 }
 
 async fn move_to(
     State(app): Shared,
     headers: HeaderMap,
-    Body(request): Body<Move>,
+    Body(Options(mut request)): Body<Options<MoveRequest>>,
 ) -> Result<Json<Begun>, Failure> {
     require_control(&app, &headers)?;
-    let rig = RigAddress::Open(connected(&app)?);
-    let targets: Vec<(Axis, f64)> =
-        request.targets.iter().map(|target| (target.axis.into(), target.to_um)).collect();
-    let twice = targets
-        .iter()
-        .enumerate()
-        .any(|(at, (axis, _))| targets[..at].iter().any(|(other, _)| other == axis));
-    if targets.is_empty() || twice {
-        return Err(Failure::new(
-            StatusCode::BAD_REQUEST,
-            "expected one target or more, each axis at most once",
-        ));
-    }
-    for (_, to_um) in &targets {
-        motion::nanometres("to_um", *to_um)?;
-    }
+    request.set_rig(RigAddress::Open(connected(&app)?));
+    request.check()?;
+    let targets = request.axis.iter().zip(&request.to_um);
     let words: Vec<_> =
-        targets.iter().map(|(axis, to_um)| format!("{} to {to_um:.3} um", axis.name())).collect();
-    let settings = MoveSettings { rig, targets, home: request.home };
-    let work = move |_: &App, context: &Context<'_>| figures(motion::move_to(&settings, context)?);
+        targets.map(|(axis, to_um)| format!("{} to {to_um:.3} um", Axis::from(*axis).name())).collect();
+    let work = move |_: &App, context: &Context<'_>| figures(request.run(context)?);
     begin(&app, Task { kind: "move", title: format!("Move {}", words.join(", ")), work: Box::new(work) })
 }
 
@@ -323,24 +261,13 @@ fn measure(name: &str) -> Result<farnear_depth::focus_measure::FocusMeasure, Fai
 async fn seek(
     State(app): Shared,
     headers: HeaderMap,
-    Body(request): Body<Seek>,
+    Body(Options(options)): Body<Options<FocusRequest>>,
 ) -> Result<Json<Begun>, Failure> {
     require_control(&app, &headers)?;
     let rig = RigAddress::Open(connected(&app)?);
-    if !(request.range_mm > 0.0 && request.range_mm <= 10.0) {
-        let error = format!("range_mm {}: expected more than 0 and at most 10 mm", request.range_mm);
-        return Err(Failure::new(StatusCode::BAD_REQUEST, error));
-    }
-    let settings = FocusRequest {
-        rig,
-        camera: app.camera(),
-        optics: app.optics_file(),
-        start_mm: None,
-        range_mm: request.range_mm,
-        measure: request.measure.as_deref().map_or(Ok(app.live().measure), measure)?,
-        region: request.region.map(Rectangle::from),
-    };
-    let work = move |_: &App, context: &Context<'_>| figures(focus::focus(&settings, context)?);
+    let request = FocusRequest { rig, camera: app.camera(), optics: app.optics_file(), ..options };
+    request.check()?;
+    let work = move |_: &App, context: &Context<'_>| figures(request.run(context)?);
     begin(&app, Task { kind: "focus", title: "Find the focus".into(), work: Box::new(work) })
 }
 

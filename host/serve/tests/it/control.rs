@@ -8,7 +8,7 @@ use super::{
     client::{Served, Socket},
 };
 
-const FINE: &str = r#"{"targets":[{"axis":"fine","to_um":50}]}"#;
+const FINE: &str = r#"{"axis":["fine"],"to_um":[50]}"#;
 
 #[test]
 fn one_browser_has_control_and_hands_it_over_on_request() {
@@ -143,18 +143,16 @@ fn impossible_requests_are_rejected_before_any_motion() {
     served.ready();
     let holder = Socket::open(&served);
     for (path, body, words) in [
-        ("/api/rig/move", r#"{"targets":[]}"#, "one target or more"),
-        (
-            "/api/rig/move",
-            r#"{"targets":[{"axis":"fine","to_um":1},{"axis":"fine","to_um":2}]}"#,
-            "at most once",
-        ),
-        ("/api/rig/move", r#"{"targets":[{"axis":"fine","to_um":1e12}]}"#, "expected a position"),
-        ("/api/rig/move", r#"{"targets":[{"axis":"x","to_um":1}]}"#, "unknown variant"),
-        ("/api/rig/move", r#"{"targets":"#, "EOF"),
+        ("/api/rig/move", r#"{"axis":[],"to_um":[]}"#, "one for each axis"),
+        ("/api/rig/move", r#"{"axis":["fine","fine"],"to_um":[1,2]}"#, "expected each axis once"),
+        ("/api/rig/move", r#"{"axis":["fine"],"to_um":[1e12]}"#, "expected a position"),
+        ("/api/rig/move", r#"{"axis":["x"],"to_um":[1]}"#, "unknown variant"),
+        ("/api/rig/move", r#"{"axis":["fine"]}"#, "needs the field `to_um`"),
+        ("/api/rig/move", r#"{"axis":"#, "EOF"),
+        ("/api/rig/focus", r#"{"optics":"/etc/passwd"}"#, "no field `optics`"),
         ("/api/live", r#"{"exposure_us":0}"#, "expected 1 to 1000000"),
         ("/api/live", r#"{"measure":"sharp"}"#, "not a focus measure"),
-        ("/api/rig/focus", r#"{"range_mm":-1}"#, "range_mm -1"),
+        ("/api/rig/focus", r#"{"range_mm":-1}"#, "range-mm -1"),
         ("/api/captures", r#"{"kind":"series","pairs":0}"#, "pairs 0"),
         (
             "/api/captures",
@@ -194,7 +192,7 @@ fn a_refusal_of_the_board_reaches_the_page_with_what_to_do() {
     let served = Served::with_board(Faults::default());
     served.ready();
     let holder = Socket::open(&served);
-    let coarse = r#"{"targets":[{"axis":"coarse","to_um":100}]}"#;
+    let coarse = r#"{"axis":["coarse"],"to_um":[100]}"#;
     let begun = served.post("/api/rig/move", &holder.secret, coarse).json();
     let job = served.ended("job", &begun["job"]);
     assert_eq!((&job["phase"], &job["hint"]), (&"failed".into(), &"Press Home first.".into()), "{job:#}");

@@ -51,8 +51,7 @@ fn ten_thousand_malformed_messages_change_nothing() {
     let mut dice = Dice(0x5eed);
     let paths =
         ["/api/rig/move", "/api/captures", "/api/stop", "/api/live", "/api/optics/calculate", "/login", "/x"];
-    let bodies =
-        [r#"{"targets":[{"axis":"fine","to_um":20}]}"#, r#"{"kind":"pair"}"#, "{}", r#"{"mode":"off"}"#];
+    let bodies = [r#"{"axis":["fine"],"to_um":[20]}"#, r#"{"kind":"pair"}"#, "{}", r#"{"mode":"off"}"#];
     for count in 0..HTTP {
         let (path, body) = (paths[dice.below(paths.len())], bodies[dice.below(bodies.len())]);
         let length = body.len();
@@ -81,7 +80,7 @@ fn ten_thousand_malformed_messages_change_nothing() {
     assert_eq!(state["rig"]["phase"], "ready");
     let holder = Socket::open(&served);
     served.state_when(|state| state["control"]["holder"] == holder.client);
-    let targets = r#"{"targets":[{"axis":"fine","to_um":20}]}"#;
+    let targets = r#"{"axis":["fine"],"to_um":[20]}"#;
     let begun = served.post("/api/rig/move", &holder.secret, targets).json();
     assert_eq!(served.ended("job", &begun["job"])["phase"], "done");
 }

@@ -52,7 +52,7 @@ fn body_of(method: &str, path: &str) -> &'static str {
         ("post", "/api/answer") => r#"{"text":""}"#,
         ("post", "/api/control/answer") => r#"{"to":1,"give":false}"#,
         ("post", "/login") => r#"{"token":"x"}"#,
-        ("post", "/api/rig/move") => r#"{"targets":[{"axis":"fine","to_um":20}]}"#,
+        ("post", "/api/rig/move") => r#"{"axis":["fine"],"to_um":[20]}"#,
         ("post", "/api/rig/goto") => r#"{"focus":"far"}"#,
         ("post", "/api/rig/scene") => r#"{"scene":"plane:900"}"#,
         ("post", "/api/live") => r#"{"mode":"off"}"#,
@@ -70,13 +70,11 @@ fn body_of(method: &str, path: &str) -> &'static str {
         ("post", "/api/captures/{capture}/profile") => r#"{"from":[0,0],"to":[3,3]}"#,
         ("post", "/api/calibrate/psf") => r#"{"targets":[{"capture":"absent"}],"model":"gaussian"}"#,
         ("post", "/api/calibrate/stack") => r#"{"slices":11}"#,
-        ("post", "/api/calibrate/correction") => r#"{"method":"planar"}"#,
+        ("post", "/api/calibrate/correction") => r#"{"method":"cdc"}"#,
         ("post", "/api/people/recognise") => r#"{"video":"absent.y4m"}"#,
-        ("post", "/api/people/sun") => {
-            r#"{"latitude_deg":52,"longitude_deg":-1,"time":"2026-06-21T12:00:00Z"}"#
-        }
+        ("post", "/api/people/sun") => r#"{"lat":52,"lon":-1,"time":"2026-06-21T12:00:00Z"}"#,
         ("post", "/api/people/shadow") => {
-            r#"{"video":"absent.y4m","sun":{"latitude_deg":52,"longitude_deg":-1,"time":"2026-06-21T12:00:00Z"},"camera":{"height_m":1,"azimuth_deg":0,"pitch_deg":0,"focal_length_mm":4,"pixel_um":6}}"#
+            r#"{"video":"absent.y4m","sun":{"lat":52,"lon":-1,"time":"2026-06-21T12:00:00Z"},"camera":{"height_m":1,"azimuth_deg":0,"pitch_deg":0,"focal_length_mm":4,"pixel_um":6}}"#
         }
         ("post", "/api/recordings") => r#"{"on":true}"#,
         ("post", "/api/recordings/play") => r#"{"recording":"absent.pairs"}"#,

@@ -10,32 +10,87 @@ use farnear_files::{
     image_file::{encode_png, encode_tiff},
     staging::Staging,
 };
-use serde::Serialize;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
 use super::{CameraChoice, ControlFigures, controls_of};
 use crate::{
     MADE_BY, clock,
     context::Context,
     error::{Result, WorkflowError},
+    request::{PathKind, Request},
 };
 
 pub const GRAB_FILE: &str = "grab.toml";
 const SLICE: Duration = Duration::from_millis(200);
 
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default, Serialize, Deserialize, JsonSchema)]
+#[cfg_attr(feature = "clap", derive(clap::ValueEnum))]
+#[serde(rename_all = "lowercase")]
 pub enum PictureFormat {
-    /// Values of more than 8 bits are shifted to 16.
+    /// Values of more than 8 bits are shifted up to 16.
+    #[default]
     Png,
+    /// Values stay as the camera gave them.
     Tiff,
 }
 
-#[derive(Clone, PartialEq, Debug)]
-pub struct GrabSettings {
+/// Keep pictures of a camera that runs freely. The folder appears when everything is in it.
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize, JsonSchema)]
+#[cfg_attr(feature = "clap", derive(clap::Args))]
+#[cfg_attr(
+    feature = "clap",
+    command(
+        after_help = "Example: farnear camera grab --camera v4l:/dev/video0 --frames 10 --out pictures/"
+    )
+)]
+#[serde(default)]
+pub struct GrabRequest {
+    #[cfg_attr(feature = "clap", command(flatten))]
+    #[serde(flatten)]
     pub camera: CameraChoice,
+    /// How many pictures.
+    #[cfg_attr(feature = "clap", arg(long, default_value_t = Self::default().frames))]
     pub frames: usize,
+    /// How they are written.
+    #[cfg_attr(feature = "clap", arg(long, value_enum, default_value = "png"))]
     pub format: PictureFormat,
-    pub wait: Duration,
+    /// Longest wait for a picture in seconds.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "S", default_value_t = Self::default().image_wait_s))]
+    pub image_wait_s: u64,
+    /// The new folder.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "DIR"))]
     pub out: PathBuf,
+}
+
+impl Default for GrabRequest {
+    fn default() -> Self {
+        Self {
+            camera: CameraChoice::default(),
+            frames: 1,
+            format: PictureFormat::default(),
+            image_wait_s: 10,
+            out: PathBuf::new(),
+        }
+    }
+}
+
+impl Request for GrabRequest {
+    const NAME: &'static str = "camera grab";
+    const REQUIRED: &'static [&'static str] = &["camera", "out"];
+    const PATHS: &'static [(&'static str, PathKind)] = &[("out", PathKind::OutputFolder)];
+    type Figures = GrabFigures;
+
+    fn check(&self) -> Result<()> {
+        if self.frames == 0 {
+            return Err(WorkflowError::parameter("frames", 0, "it takes no pictures, expected 1 or more"));
+        }
+        Ok(())
+    }
+
+    fn run(&self, context: &Context<'_>) -> Result<GrabFigures> {
+        grab(self, context)
+    }
 }
 
 #[derive(Clone, PartialEq, Debug, Serialize)]
@@ -75,12 +130,11 @@ struct FrameRecord {
 }
 
 /// Captures images. The folder appears when it is complete.
-pub fn grab(settings: &GrabSettings, context: &Context<'_>) -> Result<GrabFigures> {
-    if settings.frames == 0 {
-        return Err(WorkflowError::parameter("frames", 0, "it takes no pictures, expected 1 or more"));
-    }
-    let staged = Staging::new_folder(&settings.out)?;
-    let mut camera = settings.camera.open()?;
+pub fn grab(request: &GrabRequest, context: &Context<'_>) -> Result<GrabFigures> {
+    request.check()?;
+    let wait = Duration::from_secs(request.image_wait_s);
+    let staged = Staging::new_folder(&request.out)?;
+    let mut camera = request.camera.open()?;
     let mut record = GrabRecord {
         made_by: MADE_BY,
         time: clock::now_rfc3339(),
@@ -89,24 +143,24 @@ pub fn grab(settings: &GrabSettings, context: &Context<'_>) -> Result<GrabFigure
         frame: Vec::new(),
     };
     camera.watch()?;
-    for number in 0..settings.frames {
-        let until = Instant::now() + settings.wait;
+    for number in 0..request.frames {
+        let until = Instant::now() + wait;
         let frame = loop {
             context.cancel.check("taking pictures")?;
-            if let Some(frame) = camera.newest(SLICE.min(settings.wait))? {
+            if let Some(frame) = camera.newest(SLICE.min(wait))? {
                 break frame;
             }
             if Instant::now() >= until {
-                let (camera, waited) = (camera.kind().to_owned(), settings.wait);
+                let (camera, waited) = (camera.kind().to_owned(), wait);
                 return Err(CameraError::Late { camera, trigger_number: number as u32, waited }.into());
             }
         };
-        record.frame.push(write(&staged, number, &frame, settings.format)?);
-        context.progress.advance("pictures", number + 1, Some(settings.frames));
+        record.frame.push(write(&staged, number, &frame, request.format)?);
+        context.progress.advance("pictures", number + 1, Some(request.frames));
     }
     staged.write(GRAB_FILE, toml::to_string(&record)?.as_bytes())?;
     staged.finish()?;
-    context.info(&format!("wrote {}", settings.out.display()));
+    context.info(&format!("wrote {}", request.out.display()));
     figures(&record).ok_or_else(|| WorkflowError::parameter("frames", 0, "expected 1 or more"))
 }
 

@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-use farnear_capture::camera::{Frame, Image, Setting};
+use farnear_capture::camera::{Camera, Frame, Image, Setting};
 use farnear_depth::focus_measure::FocusMeasure;
 use farnear_protocol::Micros;
 use serde::Serialize;
@@ -77,12 +77,11 @@ pub fn live(
 
 /// Passes images to `on_frame` until it or the context stops. Sets the exposure if the camera supports it.
 pub fn watch(
-    choice: &CameraChoice,
+    mut camera: Box<dyn Camera>,
     exposure: Micros,
     context: &Context<'_>,
     mut on_frame: impl FnMut(Frame) -> Result<()>,
 ) -> Result<()> {
-    let mut camera = choice.open()?;
     let exposure = Setting::ExposureUs(f64::from(exposure.0));
     if camera.controls()?.iter().any(|control| control.name == exposure.name()) {
         camera.set(&exposure)?;

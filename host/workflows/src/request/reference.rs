@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use serde_json::Value;
 
-use super::{RIG_TASKS, TASKS, Task};
+use super::{DEVICE_TASKS, TASKS, Task};
 
 const HEAD: &str = "# All options\n\n\
     Generated from the requests of the tasks. A name is the same as an option of the command line (`--min-confidence`), as a field of \
@@ -12,7 +12,7 @@ const HEAD: &str = "# All options\n\n\
 
 pub fn page() -> String {
     let mut page = HEAD.to_owned();
-    for task in TASKS.iter().chain(RIG_TASKS) {
+    for task in TASKS.iter().chain(DEVICE_TASKS) {
         section(&mut page, task);
     }
     page

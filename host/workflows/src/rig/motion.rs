@@ -4,13 +4,45 @@ use farnear_capture::{
     sequence,
 };
 use farnear_protocol::{Nanometres, message::Axis};
-use serde::Serialize;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
-use super::{Rig, RigAddress};
+use super::{AxisName, Rig, RigAddress};
 use crate::{
     context::Context,
     error::{Result, WorkflowError},
+    request::{PathKind, Request},
 };
+
+/// Find the home switches and make them position 0: of all stages at once, or of those that are named.
+#[derive(Clone, PartialEq, Debug, Default, Serialize, Deserialize, JsonSchema)]
+#[cfg_attr(feature = "clap", derive(clap::Args))]
+#[cfg_attr(
+    feature = "clap",
+    command(after_help = "Example: farnear rig home --port /dev/ttyACM0 --axis lens")
+)]
+#[serde(default)]
+pub struct HomeRequest {
+    #[serde(skip)]
+    #[cfg_attr(feature = "clap", arg(skip))]
+    pub rig: RigAddress,
+    /// The axis to home; may be given again [default: all that have a home switch].
+    #[cfg_attr(feature = "clap", arg(long, value_name = "AXIS"))]
+    pub axis: Vec<AxisName>,
+}
+
+impl Request for HomeRequest {
+    const NAME: &'static str = "rig home";
+    const REQUIRED: &'static [&'static str] = &[];
+    const PATHS: &'static [(&'static str, PathKind)] = &[];
+    type Figures = HomeFigures;
+
+    fn run(&self, context: &Context<'_>) -> Result<HomeFigures> {
+        home(self, context)
+    }
+}
+
+crate::request::rig_request!(HomeRequest);
 
 /// Difference between the old and the new zero of each encoder.
 #[derive(Clone, PartialEq, Debug, Default, Serialize)]
@@ -22,12 +54,67 @@ pub struct HomeFigures {
     pub lens_shift_um: Option<f64>,
 }
 
-#[derive(Clone, PartialEq, Debug)]
-pub struct MoveSettings {
+/// Move to absolute positions, several axes at once; outside the limits it is refused.
+#[derive(Clone, PartialEq, Debug, Default, Serialize, Deserialize, JsonSchema)]
+#[cfg_attr(feature = "clap", derive(clap::Args))]
+#[cfg_attr(
+    feature = "clap",
+    command(
+        after_help = "Example: farnear rig move --port /dev/ttyACM0 --axis coarse --to-um 5800 --axis lens --to-um 1000"
+    )
+)]
+#[serde(default)]
+pub struct MoveRequest {
+    #[serde(skip)]
+    #[cfg_attr(feature = "clap", arg(skip))]
     pub rig: RigAddress,
-    pub targets: Vec<(Axis, f64)>,
-    /// Whether to home axes that are not homed.
+    /// The axis; may be given again, each with its position.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "AXIS", required = true))]
+    pub axis: Vec<AxisName>,
+    /// The position in micrometres, positive = sensor and lens away from each other; 0 = home switch, or relaxed piezo.
+    #[cfg_attr(
+        feature = "clap",
+        arg(long, value_name = "UM", allow_negative_numbers = true, required = true)
+    )]
+    pub to_um: Vec<f64>,
+    /// Home axes first that are not homed.
+    #[cfg_attr(feature = "clap", arg(long))]
     pub home: bool,
+}
+
+impl Request for MoveRequest {
+    const NAME: &'static str = "rig move";
+    const REQUIRED: &'static [&'static str] = &["axis", "to_um"];
+    const PATHS: &'static [(&'static str, PathKind)] = &[];
+    type Figures = MoveFigures;
+
+    fn check(&self) -> Result<()> {
+        self.targets().map(drop)
+    }
+
+    fn run(&self, context: &Context<'_>) -> Result<MoveFigures> {
+        move_to(self, context)
+    }
+}
+
+crate::request::rig_request!(MoveRequest);
+
+impl MoveRequest {
+    fn targets(&self) -> Result<Vec<(Axis, Nanometres)>> {
+        let axes = self.axis.len();
+        if axes != self.to_um.len() || axes == 0 {
+            let given: Vec<String> = self.to_um.iter().map(f64::to_string).collect();
+            let expected = format!("expected {axes} positions, one for each axis");
+            return Err(WorkflowError::parameter("to-um", given.join(", "), expected));
+        }
+        let twice = (1..axes).find(|at| self.axis[..*at].contains(&self.axis[*at]));
+        if let Some(at) = twice {
+            let expected = "expected each axis once";
+            return Err(WorkflowError::parameter("axis", Axis::from(self.axis[at]).name(), expected));
+        }
+        let pairs = self.axis.iter().zip(&self.to_um);
+        pairs.map(|(axis, to_um)| Ok((Axis::from(*axis), nanometres("to-um", *to_um)?))).collect()
+    }
 }
 
 #[derive(Clone, PartialEq, Debug, Serialize)]
@@ -52,10 +139,13 @@ pub fn nanometres(name: &'static str, position_um: f64) -> Result<Nanometres> {
     })
 }
 
-/// Homes these axes simultaneously; without any, all that have a home switch.
-pub fn home(rig: &RigAddress, axes: &[Axis], context: &Context<'_>) -> Result<HomeFigures> {
-    let rig = Rig::connect(rig, None, context)?;
-    let axes = if axes.is_empty() { steppers(&rig.client.hello().capabilities) } else { axes.to_vec() };
+/// Homes the axes simultaneously.
+pub fn home(request: &HomeRequest, context: &Context<'_>) -> Result<HomeFigures> {
+    let rig = Rig::connect(&request.rig, None, context)?;
+    let axes = match &request.axis[..] {
+        [] => steppers(&rig.client.hello().capabilities),
+        named => named.iter().map(|axis| Axis::from(*axis)).collect(),
+    };
     let mut homed = HomeFigures::default();
     for (axis, work) in axes.iter().zip(rig.client.start_homing(&axes)?) {
         let shift = Some(um(work.homed()?));
@@ -67,14 +157,10 @@ pub fn home(rig: &RigAddress, axes: &[Axis], context: &Context<'_>) -> Result<Ho
     Ok(homed)
 }
 
-pub fn move_to(settings: &MoveSettings, context: &Context<'_>) -> Result<MoveFigures> {
-    let targets: Vec<_> = settings
-        .targets
-        .iter()
-        .map(|(axis, to_um)| Ok((*axis, nanometres("to-um", *to_um)?)))
-        .collect::<Result<_>>()?;
-    let rig = Rig::connect(&settings.rig, None, context)?;
-    if settings.home {
+pub fn move_to(request: &MoveRequest, context: &Context<'_>) -> Result<MoveFigures> {
+    let targets = request.targets()?;
+    let rig = Rig::connect(&request.rig, None, context)?;
+    if request.home {
         ensure_homed(&rig.client, &mut |what| context.info(what))?;
     }
     let mut moved = Vec::new();

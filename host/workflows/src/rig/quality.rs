@@ -11,6 +11,7 @@ use farnear_files::{
     staging::write_file,
 };
 use ndarray::{Array2, s};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::{RigAddress, camera::CameraSettings, pair::take};
@@ -21,6 +22,7 @@ use crate::{
     figures::rounded,
     measure::{Measured, Unit, fit},
     optics::GivenOptics,
+    request::{PathKind, Request},
     text_file,
 };
 
@@ -28,15 +30,75 @@ const PAIRS: std::ops::RangeInclusive<usize> = 2..=50;
 /// Measured part of the image along each side: the border has less light and more distortion.
 const MIDDLE: f64 = 0.8;
 
-#[derive(Clone, PartialEq, Debug)]
-pub struct QualitySettings {
+/// Measure fill rate, plane fit, noise and accuracy of depth on a flat target, and append them to a record.
+///
+/// Put a flat, textured target square before the rig, inside the working range.
+#[derive(Clone, PartialEq, Debug, Serialize, Deserialize, JsonSchema)]
+#[cfg_attr(feature = "clap", derive(clap::Args))]
+#[cfg_attr(
+    feature = "clap",
+    command(
+        after_help = "Example: farnear rig quality --port sim --scene plane:920 --optics optics.toml --true-mm 920 --record quality.toml"
+    )
+)]
+#[serde(default)]
+pub struct QualityRequest {
+    #[serde(skip)]
+    #[cfg_attr(feature = "clap", arg(skip))]
     pub rig: RigAddress,
+    #[serde(skip)]
+    #[cfg_attr(feature = "clap", arg(skip))]
     pub camera: CameraSettings,
+    /// The optics file.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "FILE"))]
     pub optics: PathBuf,
+    /// Number of pairs, 2 to 50.
+    #[cfg_attr(feature = "clap", arg(long, default_value_t = Self::default().pairs))]
     pub pairs: usize,
+    /// The target's distance from the lens, where it is known.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "MM"))]
     pub true_mm: Option<f64>,
+    /// The record to append to; a new file if there is none.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "FILE"))]
     pub record: PathBuf,
 }
+
+impl Default for QualityRequest {
+    fn default() -> Self {
+        Self {
+            rig: RigAddress::default(),
+            camera: CameraSettings::default(),
+            optics: PathBuf::new(),
+            pairs: 10,
+            true_mm: None,
+            record: PathBuf::new(),
+        }
+    }
+}
+
+impl Request for QualityRequest {
+    const NAME: &'static str = "rig quality";
+    const REQUIRED: &'static [&'static str] = &["optics", "record"];
+    const PATHS: &'static [(&'static str, PathKind)] =
+        &[("optics", PathKind::Input), ("record", PathKind::OutputFile)];
+    type Figures = QualityFigures;
+
+    fn check(&self) -> Result<()> {
+        if !PAIRS.contains(&self.pairs) {
+            return Err(WorkflowError::parameter("pairs", self.pairs, "expected 2 to 50"));
+        }
+        match self.true_mm.filter(|mm| !(*mm > 0.0 && mm.is_finite())) {
+            Some(mm) => Err(WorkflowError::parameter("true-mm", mm, "expected a positive number of mm")),
+            None => Ok(()),
+        }
+    }
+
+    fn run(&self, context: &Context<'_>) -> Result<QualityFigures> {
+        measure(self, context)
+    }
+}
+
+crate::request::camera_request!(QualityRequest);
 
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize)]
 pub struct QualityFigures {
@@ -74,40 +136,35 @@ pub fn read_record(path: &Path) -> Result<QualityRecord> {
 }
 
 /// Captures the pairs, computes depth and appends the figures. The record changes only at the end.
-pub fn measure(settings: &QualitySettings, context: &Context<'_>) -> Result<QualityFigures> {
-    if !PAIRS.contains(&settings.pairs) {
-        return Err(WorkflowError::parameter("pairs", settings.pairs, "expected 2 to 50"));
-    }
-    if let Some(true_mm) = settings.true_mm.filter(|mm| !(*mm > 0.0 && mm.is_finite())) {
-        return Err(WorkflowError::parameter("true distance", true_mm, "expected a positive number of mm"));
-    }
-    let optics = GivenOptics::read(&settings.optics)?;
-    let mut record = read_record(&settings.record)?;
+pub fn measure(request: &QualityRequest, context: &Context<'_>) -> Result<QualityFigures> {
+    request.check()?;
+    let optics = GivenOptics::read(&request.optics)?;
+    let mut record = read_record(&request.record)?;
     let method = DepthMethod::Whitened;
     let computation = MeasureSettings { window: method.usual_window(), ..MeasureSettings::default() };
-    let mut rig = settings.camera.connect(&settings.rig, Some(&optics), context)?;
+    let mut rig = request.camera.connect(&request.rig, Some(&optics), context)?;
     let emulated = rig.rig.client.hello().emulated;
     let mut maps = Vec::new();
     let mut predicted = None;
-    for index in 0..settings.pairs {
+    for index in 0..request.pairs {
         context.cancel.check("measuring the depth quality")?;
-        let (pair, _) = take(&mut rig, &optics, &settings.camera, context)?;
+        let (pair, _) = take(&mut rig, &optics, &request.camera, context)?;
         let (far, near) = (pair.far.image.grey(), pair.near.image.grey());
         let found =
             measure_pair_of_views(far.view(), near.view(), &optics.optics, method, None, &computation)?;
         predicted.get_or_insert(found.validity.deviation_mm);
         maps.push(found.map.depth_mm);
-        context.progress.advance("pairs", index + 1, Some(settings.pairs));
+        context.progress.advance("pairs", index + 1, Some(request.pairs));
     }
     let projection = Projection {
         focal_length_mm: optics.optics.focal_length_mm(),
         pixel_um: optics.optics.pixel_um(),
         axis_px: None,
     };
-    let found = figures(&maps, predicted.as_ref(), projection, settings.true_mm)?;
+    let found = figures(&maps, predicted.as_ref(), projection, request.true_mm)?;
     let found = QualityFigures { time: (!emulated).then(clock::now_rfc3339).flatten(), ..found };
     record.measurements.push(found.clone());
-    write_file(&settings.record, toml::to_string(&record)?.as_bytes())?;
+    write_file(&request.record, toml::to_string(&record)?.as_bytes())?;
     Ok(found)
 }
 
@@ -147,7 +204,7 @@ fn figures(
         WorkflowError::parameter(
             "target",
             format!("{} pixels with a depth", points.len()),
-            "expected a textured plane",
+            "expected a textured plane within the working range",
         )
     })?;
     let predicted = predicted.map(|map| {

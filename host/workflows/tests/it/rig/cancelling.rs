@@ -5,19 +5,20 @@ use std::{
     time::{Duration, Instant},
 };
 
-use farnear_protocol::message::{Axis, Routine};
+use farnear_protocol::message::Routine;
 use farnear_scripted_board::{Faults, Peer, plug_in};
 use farnear_workflows::{
     Context, Result, WorkflowError,
+    request::Request,
     rig::{
-        RigAddress,
+        AxisName, RigAddress,
         check::{self, CheckRequest},
         continuous::{self, ContinuousRequest},
         focus::{self, FocusRequest},
         live,
         live_depth::{self, LiveDepthSettings},
         mechanics,
-        motion::{self, MoveSettings},
+        motion::{HomeRequest, MoveRequest},
         pair::{self, CaptureRequest},
         sequence::{self, SequenceRequest},
         series::{self, SeriesSettings},
@@ -75,12 +76,12 @@ fn every_workflow_that_moves_stops_the_rig() {
     let out = || path.join("out");
     type Job<'a> = Box<dyn Fn(RigAddress, &Context<'_>) -> Result<()> + 'a>;
     let jobs: Vec<(&str, Job<'_>)> = vec![
-        ("home", Box::new(|rig, context| motion::home(&rig, &[], context).map(drop))),
+        ("home", Box::new(|rig, context| HomeRequest { rig, axis: vec![] }.run(context).map(drop))),
         (
             "move",
             Box::new(|rig, context| {
-                let settings = MoveSettings { rig, targets: vec![(Axis::SensorFine, 50.0)], home: false };
-                motion::move_to(&settings, context).map(drop)
+                let (axis, to_um) = (vec![AxisName::Fine], vec![50.0]);
+                MoveRequest { rig, axis, to_um, home: false }.run(context).map(drop)
             }),
         ),
         ("mechanics", Box::new(|rig, context| mechanics::measure(&rig, Routine::Piezo, context).map(drop))),

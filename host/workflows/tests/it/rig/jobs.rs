@@ -6,11 +6,12 @@ use farnear_protocol::message::{Axis, Routine, SettingKey};
 use farnear_scripted_board::{Faults, plug_in};
 use farnear_workflows::{
     Context, WorkflowError,
+    request::Request,
     rig::{
-        RigAddress, alarms, board,
+        AxisName, RigAddress, alarms, board,
         log::{self, LogSettings},
         mechanics::{self, MechanicsFigures},
-        motion::{self, MoveFigures, MoveSettings},
+        motion::{self, MoveFigures, MoveRequest},
         pair::{self, CaptureRequest},
         settings,
     },
@@ -22,9 +23,9 @@ use super::{Face, camera, optics};
 fn moves_home_first_where_asked_to_and_say_so() {
     let (port, _board) = plug_in(Faults::default());
     let face = Face::default();
-    let targets = vec![(Axis::SensorCoarse, 5_000.0), (Axis::Lens, 2_000.0)];
-    let settings = MoveSettings { rig: RigAddress::Port(port), targets, home: true };
-    let moved = motion::move_to(&settings, &face.context()).unwrap();
+    let (axis, to_um) = (vec![AxisName::Coarse, AxisName::Lens], vec![5_000.0, 2_000.0]);
+    let request = MoveRequest { rig: RigAddress::Port(port), axis, to_um, home: true };
+    let moved = request.run(&face.context()).unwrap();
     let MoveFigures::All { moved } = moved else { panic!("{moved:?}") };
     assert_eq!((moved[0].axis, moved[0].measured_um), ("coarse", 5_000.375));
     assert_eq!((moved[1].axis, moved[1].measured_um), ("lens", 2_000.125));
@@ -36,9 +37,17 @@ fn moves_home_first_where_asked_to_and_say_so() {
 fn impossible_requests_are_rejected_before_the_port_is_opened() {
     let rig = RigAddress::Port("/dev/farnear-no-such-port".into());
     let context = Context::unattended();
-    let targets = vec![(Axis::SensorFine, f64::NAN)];
-    let error = motion::move_to(&MoveSettings { rig: rig.clone(), targets, home: false }, &context);
-    assert!(error.unwrap_err().is_usage());
+    let lens = vec![AxisName::Lens];
+    for (axis, to_um, phrase) in [
+        (lens.clone(), vec![f64::NAN], "to-um NaN"),
+        (lens.clone(), vec![1.0, 2.5], "to-um 1, 2.5: expected 1 positions"),
+        (lens.repeat(2), vec![1.0, 2.0], "axis lens: expected each axis once"),
+        (vec![], vec![], "to-um"),
+    ] {
+        let request = MoveRequest { rig: rig.clone(), axis, to_um, home: false };
+        let error = request.run(&context).unwrap_err();
+        assert!(error.is_usage() && error.to_string().starts_with(phrase), "{error}");
+    }
     let error = settings::key("speed").unwrap_err();
     assert!(error.is_usage() && error.to_string().contains("datum_nm"), "{error}");
     let error = settings::get(&rig, SettingKey::DatumNm, &context).unwrap_err();

@@ -13,6 +13,7 @@ use farnear_scripted_board::{Faults, Peer, plug_in};
 use farnear_workflows::{
     Context, Result, WorkflowError,
     optics::GivenOptics,
+    request::Request,
     rig::{
         RigAddress,
         check::{self, CheckRequest},
@@ -20,7 +21,8 @@ use farnear_workflows::{
         focus::{self, FocusRequest},
         live,
         live_depth::{self, LiveDepthSettings},
-        mechanics, motion,
+        mechanics,
+        motion::HomeRequest,
         open::OpenRig,
         pair::{self, CaptureRequest},
         sequence::{self, SequenceRequest},
@@ -98,7 +100,7 @@ fn a_second_run_takes_no_longer_than_the_first() {
     let out = |name: &str, run: usize| folder.path().join(format!("{name}-{run}"));
     let camera = || camera(&images);
     let jobs: Vec<(&str, Job<'_>)> = vec![
-        ("home", Box::new(|rig, _, context| motion::home(&rig, &[], context).map(drop))),
+        ("home", Box::new(|rig, _, context| HomeRequest { rig, axis: vec![] }.run(context).map(drop))),
         (
             "capture",
             Box::new(|rig, run, context| {
