@@ -83,25 +83,9 @@ pub enum WorkflowError {
     #[error(transparent)]
     Optics(#[from] OpticsError),
     #[error(transparent)]
-    Design(#[from] DesignError),
-    #[error(transparent)]
     Depth(#[from] RunError),
     #[error(transparent)]
-    Unpaired(PrepareError),
-    #[error(transparent)]
-    CameraFrames(#[from] CameraFramesError),
-    #[error(transparent)]
     Baseline(#[from] BaselineError),
-    #[error(transparent)]
-    Correction(#[from] CorrectionError),
-    #[error(transparent)]
-    Calibration(#[from] CalibrationError),
-    #[error(transparent)]
-    Stack(#[from] StackError),
-    #[error(transparent)]
-    StackFiles(#[from] farnear_files::stack::StackError),
-    #[error(transparent)]
-    Compare(#[from] CompareError),
     #[error(transparent)]
     Parse(#[from] toml::de::Error),
     #[error(transparent)]
@@ -113,29 +97,15 @@ pub enum WorkflowError {
     #[error(transparent)]
     Camera(#[from] CameraError),
     #[error(transparent)]
-    Plan(#[from] PlanError),
-    #[error(transparent)]
     Focus(#[from] FocusSearchError),
-    #[error(transparent)]
-    Program(#[from] ProgramError),
-    #[error(transparent)]
-    Log(#[from] LogEnded),
-    #[error(transparent)]
-    Record(#[from] RecordError),
     #[error(transparent)]
     BoardCorrection(#[from] BoardCorrectionError),
     #[error(transparent)]
     Image(#[from] ImageError),
     #[error(transparent)]
-    Map(#[from] MapError),
-    #[error(transparent)]
     Masks(#[from] MaskError),
     #[error(transparent)]
     Video(#[from] VideoError),
-    #[error(transparent)]
-    Encode(#[from] EncodeError),
-    #[error(transparent)]
-    Staging(#[from] StagingError),
     #[error("cannot start a thread: {reason}")]
     Thread { reason: String },
     #[error(transparent)]
@@ -145,41 +115,61 @@ pub enum WorkflowError {
     #[error(transparent)]
     Background(#[from] BackgroundError),
     #[error(transparent)]
-    ShadowImages(#[from] ImagesError),
-    #[error(transparent)]
-    CameraFile(#[from] CameraFileError),
-    #[error(transparent)]
     Shadow(#[from] ShadowError),
-    #[error(transparent)]
-    ShadowUncertainty(#[from] UncertaintyError),
-    #[error(transparent)]
-    Shape(#[from] ShapeError),
-    #[error(transparent)]
-    Score(#[from] crate::shadow::score::ScoreError),
     #[error(transparent)]
     Samples(#[from] crate::activity::samples::SamplesError),
     #[error(transparent)]
-    Motion(#[from] crate::activity::motion::MotionError),
-    #[error(transparent)]
     Model(#[from] ModelError),
-    #[error(transparent)]
-    Views(#[from] crate::activity::recognition::ViewsError),
-    #[error(transparent)]
-    MultiPerson(#[from] crate::activity::multi_person::MultiPersonError),
-    #[error(transparent)]
-    Evaluation(#[from] EvaluationError),
-    #[error(transparent)]
-    Batch(#[from] crate::batch::BatchError),
     #[error("cannot write a record: {0}")]
     Toml(#[from] toml::ser::Error),
+    /// An error of a library that no caller tells from others.
+    #[error(transparent)]
+    Library(Box<dyn std::error::Error + Send + Sync>),
+}
+
+macro_rules! library_errors {
+    ($($error:ty),+ $(,)?) => {
+        $(impl From<$error> for WorkflowError {
+            fn from(error: $error) -> Self {
+                Self::Library(Box::new(error))
+            }
+        })+
+    };
+}
+
+library_errors! {
+    CalibrationError,
+    CameraFileError,
+    CameraFramesError,
+    CompareError,
+    CorrectionError,
+    DesignError,
+    EncodeError,
+    EvaluationError,
+    ImagesError,
+    LogEnded,
+    MapError,
+    PlanError,
+    ProgramError,
+    RecordError,
+    ShapeError,
+    StackError,
+    StagingError,
+    UncertaintyError,
+    crate::activity::motion::MotionError,
+    crate::activity::multi_person::MultiPersonError,
+    crate::activity::recognition::ViewsError,
+    crate::batch::BatchError,
+    crate::shadow::score::ScoreError,
+    farnear_files::stack::StackError,
 }
 
 impl From<PrepareError> for WorkflowError {
     fn from(error: PrepareError) -> Self {
         match error {
             PrepareError::Pair(error) => Self::Depth(error),
-            PrepareError::Camera(error) => Self::CameraFrames(error),
-            error @ PrepareError::Unrelated { .. } => Self::Unpaired(error),
+            PrepareError::Camera(error) => error.into(),
+            error @ PrepareError::Unrelated { .. } => Self::Library(Box::new(error)),
         }
     }
 }
@@ -190,7 +180,7 @@ impl From<MeasureError> for WorkflowError {
             MeasureError::Run(error) => Self::Depth(error),
             MeasureError::Prepare(error) => error.into(),
             MeasureError::Baseline(error) => Self::Baseline(error),
-            MeasureError::Design(error) => Self::Design(error),
+            MeasureError::Design(error) => error.into(),
             MeasureError::LearnedForWhitened => Self::parameter(
                 "method",
                 "ro or another",
