@@ -79,11 +79,16 @@ pub enum VideoError {
          videos; install ffmpeg, or convert with it elsewhere: ffmpeg -i VIDEO -pix_fmt yuv444p out.y4m", path.display()
     )]
     NoFfmpeg { path: PathBuf },
+    #[error(
+        "{}: the shape of its frames changes ({sizes}): cut it into parts of one shape (ffmpeg -ss START -to END -i VIDEO PART)",
+        path.display()
+    )]
+    Turned { path: PathBuf, sizes: String },
     #[error("{}: ffmpeg could not read it ({status}): {message}", path.display())]
     Ffmpeg {
         path: PathBuf,
         status: String,
-        /// End of its messages.
+        /// Its first errors.
         message: String,
     },
 }
@@ -94,7 +99,12 @@ impl VideoError {
     }
 }
 
-type Frames = Box<dyn Iterator<Item = Result<VideoFrame, VideoError>>>;
+type Read = Result<VideoFrame, VideoError>;
+
+enum Frames {
+    Direct(Box<dyn Iterator<Item = Read>>),
+    Ffmpeg(ffmpeg::Ffmpeg),
+}
 
 /// Iterator over frames; ends after the first error.
 pub struct Video {
@@ -102,8 +112,7 @@ pub struct Video {
     frames: Frames,
     first: Option<Kind>,
     ended: bool,
-    /// Notice to the user about how it is read.
-    pub remark: Option<String>,
+    remarks: Vec<String>,
 }
 
 impl std::fmt::Debug for Video {
@@ -116,31 +125,50 @@ impl Video {
     /// Opens a folder of pictures, a `.y4m` file, or any other file through ffmpeg. Frames report later errors.
     pub fn open(path: &Path) -> Result<Self, VideoError> {
         let metadata = path.metadata().map_err(|source| VideoError::io(path, source))?;
-        let mut remark = None;
-        let frames: Frames = if metadata.is_dir() {
-            Box::new(pictures::open(path)?)
+        let (frames, remark) = if metadata.is_dir() {
+            (Frames::Direct(Box::new(pictures::open(path)?)), None)
         } else if path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("y4m")) {
             let file = std::fs::File::open(path).map_err(|source| VideoError::io(path, source))?;
             let video = y4m::Y4m::new(path, io::BufReader::new(file))?;
-            remark = video.remark();
-            Box::new(video)
+            let remark = video.remark();
+            (Frames::Direct(Box::new(video)), remark)
         } else {
             let timing = timing::Timing::of(path);
-            remark = timing.as_ref().and_then(timing::Timing::remark);
-            Box::new(ffmpeg::open(path, timing.as_ref())?)
+            let remark = timing.as_ref().and_then(timing::Timing::remark);
+            (Frames::Ffmpeg(ffmpeg::open(path, timing.as_ref())?), remark)
         };
-        Ok(Self { path: path.into(), frames, first: None, ended: false, remark })
+        Ok(Self {
+            path: path.into(),
+            frames,
+            first: None,
+            ended: false,
+            remarks: remark.into_iter().collect(),
+        })
+    }
+
+    /// New notices to the user about how it is read; some come at the end.
+    pub fn take_remarks(&mut self) -> Vec<String> {
+        let new = std::mem::take(&mut self.remarks);
+        new.into_iter().map(|remark| format!("{}: {remark}", self.path.display())).collect()
     }
 }
 
 impl Iterator for Video {
-    type Item = Result<VideoFrame, VideoError>;
+    type Item = Read;
 
     fn next(&mut self) -> Option<Self::Item> {
         if self.ended {
             return None;
         }
-        let next = match self.frames.next() {
+        let next = match &mut self.frames {
+            Frames::Direct(frames) => frames.next(),
+            Frames::Ffmpeg(ffmpeg) => {
+                let next = ffmpeg.next();
+                self.remarks.append(&mut ffmpeg.remarks);
+                next
+            }
+        };
+        let next = match next {
             Some(Ok(frame)) => {
                 let found = frame.pixels.kind();
                 let expected = *self.first.get_or_insert(found);
@@ -232,9 +260,9 @@ mod tests {
         if !made.is_ok_and(|status| status.success()) {
             return None;
         }
-        let video = Video::open(&file).unwrap();
-        let remark = video.remark.clone();
-        Some((video.map(Result::unwrap).count(), remark))
+        let mut video = Video::open(&file).unwrap();
+        let frames = video.by_ref().map(Result::unwrap).count();
+        Some((frames, video.take_remarks().pop()))
     }
 
     #[test]
@@ -257,6 +285,37 @@ mod tests {
             return;
         };
         assert!(remark.is_some_and(|remark| remark.contains("2.000 times as wide as high")));
+    }
+
+    /// A recording that begins anew with another size after one second, as browsers' meetings do; `None` without ffmpeg.
+    fn of_two_sizes(second: &str) -> Option<tempfile::TempDir> {
+        let folder = tempfile::tempdir().unwrap();
+        let parts = ["64x48", second].map(|size| {
+            let offset = if size == "64x48" { "0" } else { "1" };
+            let source = format!("testsrc=size={size}:rate=30:duration=1");
+            let output = std::process::Command::new("ffmpeg")
+                .args(["-nostdin", "-v", "error", "-f", "lavfi", "-i", &source, "-output_ts_offset", offset])
+                .args(["-c:v", "mpeg2video", "-f", "mpegts", "-"])
+                .output();
+            output.ok().filter(|output| output.status.success()).map(|output| output.stdout)
+        });
+        let [first, second] = parts;
+        std::fs::write(folder.path().join("call.ts"), [first?, second?].concat()).unwrap();
+        Some(folder)
+    }
+
+    #[test]
+    fn frames_after_a_change_of_size_are_kept_and_another_shape_is_refused() {
+        let (Some(larger), Some(turned)) = (of_two_sizes("128x96"), of_two_sizes("48x64")) else {
+            eprintln!("skipped: no ffmpeg");
+            return;
+        };
+        let mut video = Video::open(&larger.path().join("call.ts")).unwrap();
+        let frames = video.by_ref().map(Result::unwrap).count();
+        assert!((58..=61).contains(&frames), "{frames}");
+        assert!(video.take_remarks().concat().contains("64x48, 128x96"));
+        let last = Video::open(&turned.path().join("call.ts")).unwrap().last().unwrap();
+        assert!(matches!(last, Err(VideoError::Turned { .. })), "{last:?}");
     }
 
     #[test]

@@ -75,6 +75,14 @@ impl<'a> Context<'a> {
     pub fn info(&self, what: &str) {
         self.progress.info(what);
     }
+
+    /// Warns of each new remark and appends it to those of the figures.
+    pub fn warn(&self, new: impl IntoIterator<Item = String>, remarks: &mut Vec<String>) {
+        for remark in new {
+            self.progress.warn(&remark);
+            remarks.push(remark);
+        }
+    }
 }
 
 /// Discards progress; prompts fail.

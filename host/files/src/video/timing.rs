@@ -6,6 +6,8 @@ use std::{
     process::{Command, Stdio},
 };
 
+use super::ffmpeg::as_file;
+
 /// Relative deviation of an irregular interval. Millisecond time stamps of 60 frames/s are off by 6 %.
 const IRREGULAR: f64 = 0.25;
 /// Usual camera rates, frames per second.
@@ -39,6 +41,8 @@ pub(super) struct Timing {
     frames: usize,
     seconds: f64,
     longest_s: f64,
+    /// Time of the first frame after the start of the file.
+    first_s: f64,
     /// Width of a pixel over its height.
     aspect: f64,
 }
@@ -48,7 +52,7 @@ impl Timing {
     pub fn of(path: &Path) -> Option<Self> {
         let listed = Command::new("ffmpeg")
             .args(["-nostdin", "-v", "error", "-i"])
-            .arg(path)
+            .arg(as_file(path))
             .args(["-map", "0:v:0", "-c", "copy", "-f", "framecrc", "-"])
             .stdin(Stdio::null())
             .stderr(Stdio::null())
@@ -86,24 +90,29 @@ impl Timing {
             regular,
             frames: times.len(),
             seconds,
+            first_s: times.first().copied().unwrap_or(0.0),
             longest_s: sorted.last().copied().unwrap_or(median),
             aspect: 1.0,
         })
     }
 
-    /// Arguments that give every frame once or, for irregular intervals, frames at the nominal rate by time stamp; with square
-    /// pixels.
-    pub fn arguments(&self) -> [String; 4] {
-        let rate = self.rate_hz;
-        let times = match self.regular {
-            true => format!("setpts=N/({rate:.6}*TB)"),
-            false => format!("fps={rate:.6}"),
-        };
-        let filter = match self.is_square() {
-            true => times,
-            false => format!("{times},scale=round(iw*sar):ih,setsar=1"),
-        };
-        ["-vf".into(), filter, "-r".into(), format!("{rate:.6}")]
+    /// For regular intervals every frame comes once, whatever its time; else the first frame is at 0.
+    pub fn input_arguments(&self) -> [String; 2] {
+        match self.regular {
+            true => ["-r".into(), format!("{:.6}", self.rate_hz)],
+            false => ["-itsoffset".into(), format!("{:.6}", -self.first_s)],
+        }
+    }
+
+    /// Square pixels and, for irregular intervals, frames at the nominal rate by time stamp.
+    pub fn output_arguments(&self) -> Vec<String> {
+        let rate = format!("{:.6}", self.rate_hz);
+        let times = (!self.regular).then(|| format!("fps={rate}"));
+        let shape = (!self.is_square()).then(|| "scale=round(iw*sar):ih,setsar=1".to_owned());
+        let filters: Vec<String> = times.into_iter().chain(shape).collect();
+        let filters =
+            (!filters.is_empty()).then(|| ["-vf".to_owned(), filters.join(",")]).into_iter().flatten();
+        filters.chain(["-r".into(), rate]).collect()
     }
 
     fn is_square(&self) -> bool {
@@ -193,7 +202,7 @@ mod tests {
         assert_eq!(listed, Listed { tick_s: 1.0 / 90_000.0, ticks: vec![0, 3600], aspect: 64.0 / 45.0 });
         let wide =
             Timing { aspect: listed.aspect, ..Timing::of_times(vec![0.0, 0.04, 0.08]).expect("times") };
-        assert!(wide.arguments()[1].ends_with("scale=round(iw*sar):ih,setsar=1"));
+        assert_eq!(wide.output_arguments()[1], "scale=round(iw*sar):ih,setsar=1");
         assert!(wide.remark().expect("a remark").contains("1.422 times as wide"));
         assert_eq!(parsed("#tb 0: 1/25\n#sar 0: 0/1\n").expect("a list").aspect, 1.0);
     }

@@ -1,6 +1,6 @@
 //! Background model over frames: size checks, learning rate, labels.
 
-use ndarray::{Array2, Array3, ArrayView2, ArrayView3};
+use ndarray::{Array2, Array3, ArrayView1, ArrayView2, ArrayView3, Axis};
 use pulp::Arch;
 
 use super::{
@@ -8,6 +8,11 @@ use super::{
     settings::{Settings, SettingsError},
     shake::{self, Shift},
 };
+
+/// Largest difference between a grey pixel's channels after compression.
+const EQUAL_CHANNELS: u8 = 6;
+const COLOURLESS_BUT_ONE_IN: usize = 500;
+const DARK: u8 = 16;
 
 #[derive(Clone, Copy, Debug)]
 pub enum Frame<'a> {
@@ -32,6 +37,24 @@ impl Frame<'_> {
             Self::Grey(_) => 1,
             Self::Rgb(pixels) => pixels.dim().2,
         }
+    }
+
+    /// Whether colours can be told from greys. Infrared and other grey videos come in three channels, equal but for
+    /// compression. A dark frame, before a recording fades in, counts as colour.
+    #[must_use]
+    pub fn has_colour(&self) -> bool {
+        let Self::Rgb(pixels) = self else { return false };
+        let of_pixel = |pixel: ArrayView1<'_, u8>| {
+            let (least, most) =
+                pixel.iter().fold((u8::MAX, 0), |(a, b), level| (a.min(*level), b.max(*level)));
+            (most - least > EQUAL_CHANNELS, most > DARK)
+        };
+        let pixels = pixels.lanes(Axis(2)).into_iter().map(of_pixel);
+        let (all, coloured, lit) =
+            pixels.fold((0_usize, 0_usize, 0_usize), |(all, coloured, lit), (colour, light)| {
+                (all + 1, coloured + usize::from(colour), lit + usize::from(light))
+            });
+        coloured > all / COLOURLESS_BUT_ONE_IN || lit < all / 2
     }
 }
 

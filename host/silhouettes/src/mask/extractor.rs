@@ -74,14 +74,12 @@ pub struct ExtractorSettings {
 }
 
 impl ExtractorSettings {
-    /// Settings for people in frames like this one. Grey frames do not distinguish shadow from dark clothes.
+    /// Settings for people in frames like this one. Without colour, shadow is not told from dark clothes.
     #[must_use]
     pub fn for_frame(frame: Frame<'_>) -> Self {
         let size = frame.size();
-        let background = match frame {
-            Frame::Grey(_) => Settings { shadow: None, ..Settings::default() },
-            Frame::Rgb(_) => Settings::default(),
-        };
+        let usual = Settings::default();
+        let background = Settings { shadow: usual.shadow.filter(|_| frame.has_colour()), ..usual };
         Self {
             background,
             cleaning: Cleaning::for_size(size),

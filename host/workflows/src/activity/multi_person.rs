@@ -93,14 +93,9 @@ impl<'m> MultiPersonTracker<'m> {
             );
         }
         let window = window(recogniser, request)?;
-        let frames = Frames::open(view)?;
         Ok(Self {
-            remarks: model
-                .expectation()
-                .into_iter()
-                .chain(super::views::remarks(std::slice::from_ref(view), std::slice::from_ref(&frames)))
-                .collect(),
-            frames,
+            remarks: model.expectation().into_iter().collect(),
+            frames: Frames::open(view)?,
             tracker: None,
             window,
             among: request.among.clone(),
@@ -121,7 +116,9 @@ impl<'m> MultiPersonTracker<'m> {
             self.remarks.iter().for_each(|remark| context.progress.warn(remark));
         }
         let start = Instant::now();
-        let Some(moved) = self.frames.next_moving()? else { return Ok(None) };
+        let moved = self.frames.next_moving()?;
+        context.warn(self.frames.take_remarks(), &mut self.remarks);
+        let Some(moved) = moved else { return Ok(None) };
         self.count += 1;
         let (followed, flag) = match &moved.mask {
             Ok(mask) => {

@@ -191,10 +191,9 @@ impl<'m> Recognition<'m> {
         }
         let window = window(recogniser, request)?;
         let frames = views.iter().map(Frames::open).collect::<Result<Vec<Frames>>>()?;
-        let remarks = model.expectation().into_iter().chain(super::views::remarks(views, &frames)).collect();
         Ok(Self {
             annotated_video: request.video_out.as_deref().map(AnnotatedVideo::begin).transpose()?,
-            remarks,
+            remarks: model.expectation().into_iter().collect(),
             views: frames,
             ..Self::of_frames(recogniser, found, window, &request.among)
         })
@@ -224,6 +223,7 @@ impl<'m> Recognition<'m> {
         let start = Instant::now();
         let moment: Option<Vec<Seen>> =
             self.views.iter_mut().map(Frames::next).collect::<Result<Option<Vec<Seen>>>>()?;
+        context.warn(self.views.iter_mut().flat_map(Frames::take_remarks), &mut self.remarks);
         self.seconds += start.elapsed().as_secs_f64();
         moment.map_or(Ok(None), |moment| self.take(moment))
     }

@@ -116,7 +116,7 @@ pub(super) fn size(picture: &Pixels) -> (usize, usize) {
 }
 
 pub(super) enum Frames {
-    Masks { files: std::vec::IntoIter<PathBuf>, levels: Levels, first: Option<First> },
+    Masks { files: std::vec::IntoIter<PathBuf>, levels: Levels, remark: Option<String>, first: Option<First> },
     Video { video: Box<Video>, extractor: Option<Box<Extractor>> },
 }
 
@@ -132,23 +132,26 @@ impl Frames {
             ViewKind::Masks => {
                 let files = masks::listed(&view.path)?;
                 let levels = masks::levels_of(&files)?;
-                Self::Masks { files: files.into_iter(), levels, first: None }
+                let remark =
+                    levels.remark.as_ref().map(|remark| format!("{}: {remark}", view.path.display()));
+                Self::Masks { files: files.into_iter(), levels, remark, first: None }
             }
             ViewKind::Video => Self::Video { video: Box::new(Video::open(&view.path)?), extractor: None },
         })
     }
 
-    pub fn remark(&self) -> Option<&String> {
+    /// New notices to the user about how the view is read; some come at the end.
+    pub fn take_remarks(&mut self) -> Vec<String> {
         match self {
-            Self::Masks { levels, .. } => levels.remark.as_ref(),
-            Self::Video { video, .. } => video.remark.as_ref(),
+            Self::Masks { remark, .. } => remark.take().into_iter().collect(),
+            Self::Video { video, .. } => video.take_remarks(),
         }
     }
 
     /// Returns `None` at the end.
     pub fn next(&mut self) -> Result<Option<Seen>> {
         match self {
-            Self::Masks { files, levels, first } => {
+            Self::Masks { files, levels, first, .. } => {
                 files.next().map(|file| seen_in_mask(&file, levels, first)).transpose()
             }
             Self::Video { video, extractor } => {
@@ -162,7 +165,7 @@ impl Frames {
     /// The next frame's mask of everyone; `None` at the end.
     pub fn next_moving(&mut self) -> Result<Option<Moved>> {
         match self {
-            Self::Masks { files, levels, first } => files
+            Self::Masks { files, levels, first, .. } => files
                 .next()
                 .map(|file| {
                     let (name, mask, _) = like_first(&file, levels, first)?;
@@ -179,13 +182,6 @@ impl Frames {
                 .transpose(),
         }
     }
-}
-
-pub(super) fn remarks(views: &[View], frames: &[Frames]) -> Vec<String> {
-    let remark = |(view, frames): (&View, &Frames)| {
-        frames.remark().map(|remark| format!("{}: {remark}", view.path.display()))
-    };
-    views.iter().zip(frames).filter_map(remark).collect()
 }
 
 /// Reads a mask, which must have the size of the view's first.
@@ -265,7 +261,7 @@ mod tests {
             assert_eq!(ViewKind::guess(&path).expect("a kind"), ViewKind::Masks, "{levels:?}");
             let view = View { path, kind: ViewKind::Masks };
             let mut frames = Frames::open(&view).expect("masks");
-            assert_eq!(frames.remark().is_some(), levels != [0, 0, 255], "{levels:?}");
+            assert_eq!(frames.take_remarks().len(), usize::from(levels != [0, 0, 255]), "{levels:?}");
             let mut areas = Vec::new();
             while let Some(seen) = frames.next().expect("a mask") {
                 areas.push(seen.mask.iter().filter(|set| **set).count());

@@ -187,12 +187,16 @@ pub fn extract(settings: &SilhouettesVideoRequest, context: &Context<'_>) -> Res
     let out = Staging::new_folder(&settings.out)?;
     let labels = settings.labels.as_deref().map(Staging::new_folder).transpose()?;
     let mut video = Video::open(&settings.video)?;
-    let remarks: Vec<String> =
-        video.remark.iter().map(|remark| format!("{}: {remark}", settings.video.display())).collect();
-    remarks.iter().for_each(|remark| context.progress.warn(remark));
+    let mut remarks = Vec::new();
+    context.warn(video.take_remarks(), &mut remarks);
     let none = || VideoError::NoFrames { path: settings.video.clone() };
     let first = prepared(video.next().ok_or_else(none)??, settings.grey);
     let mut work = Work::new(&first, settings)?;
+    if first.pixels.kind().colour && !frame_of(&first.pixels).has_colour() {
+        let kept =
+            format!("{}: its frames are grey: shadow is kept with the people", settings.video.display());
+        context.warn([kept], &mut remarks);
+    }
     let start = Instant::now();
     if settings.learn_first {
         for frame in Video::open(&settings.video)? {
@@ -200,9 +204,9 @@ pub fn extract(settings: &SilhouettesVideoRequest, context: &Context<'_>) -> Res
             work.extractor.learn(frame_of(&prepared(frame?, settings.grey).pixels))?;
         }
     }
-    let mut figures = VideoFigures { remarks, ..VideoFigures::default() };
+    let mut figures = VideoFigures::default();
     let mut index = Index::default();
-    for frame in std::iter::once(Ok(first)).chain(video) {
+    for frame in std::iter::once(Ok(first)).chain(video.by_ref()) {
         context.cancel.check(DURING)?;
         let frame = prepared(frame?, settings.grey);
         let (found, mask) = work.mask(&frame)?;
@@ -212,6 +216,8 @@ pub fn extract(settings: &SilhouettesVideoRequest, context: &Context<'_>) -> Res
             context.progress.advance("frames", figures.frames, None);
         }
     }
+    context.warn(video.take_remarks(), &mut remarks);
+    figures.remarks = remarks;
     figures.changes_of_light = work.extractor.changes_of_light();
     let seconds = start.elapsed().as_secs_f64();
     figures.seconds = rounded(seconds, 3);
@@ -280,13 +286,10 @@ impl Work {
         if asked.keep_shadow || asked.shadow_detector.is_some() {
             settings.background.shadow = None;
         }
-        let detector = match (asked.shadow_detector, &first.pixels) {
-            (Some(method), Pixels::Grey(_)) => {
-                return Err(SilhouettesError::NeedsColour { method }.into());
-            }
-            (Some(method), Pixels::Rgb(_)) => Some(Detector::new(method)),
-            _ => None,
-        };
+        if let Some(method) = asked.shadow_detector.filter(|_| !frame.has_colour()) {
+            return Err(SilhouettesError::NeedsColour { method }.into());
+        }
+        let detector = asked.shadow_detector.map(Detector::new);
         Ok(Self { extractor: Extractor::like(frame, settings)?, detector })
     }
 
