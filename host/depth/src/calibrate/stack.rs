@@ -13,6 +13,7 @@
 pub mod blur;
 mod curve;
 pub mod focus_plane;
+mod foreign;
 mod held_out;
 mod response;
 
@@ -113,6 +114,8 @@ pub struct StackLens {
     pub held_out: HeldOut,
     /// All that was tried, the best first.
     pub trials: Vec<Trial>,
+    /// A slice that does not fit the others: defocused, exchanged or of something else. Nothing was learned from it.
+    pub foreign: Option<usize>,
 }
 
 /// Calibrates from `slices`, the far-focused first, (height, width). `proceed` is called before each measurement of a pair with
@@ -140,7 +143,7 @@ pub fn calibrate_stack(
     let plane_of_bins = plane.binned(bin);
     let radius = (blur.px_per_slice() * pair_step as f64 / bin as f64).clamp(1.0, 4.0);
     let optics_of = |psf: Psf, max_blur_px: f64| optics(psf, max_blur_px, bin, pair_step, settings);
-    let (optics, held_out, trials) = response::learn(&response::Target {
+    let response::Learned { optics, held_out, trials, foreign } = response::learn(&response::Target {
         slices: &small,
         plane: &plane_of_bins,
         pair_step,
@@ -150,7 +153,7 @@ pub fn calibrate_stack(
         optics_of: &optics_of,
         proceed,
     })?;
-    Ok(StackLens { optics, plane, blur, held_out, trials })
+    Ok(StackLens { optics, plane, blur, held_out, trials, foreign })
 }
 
 fn check(slices: &[Array2<f32>], settings: &StackSettings) -> Result<(), StackError> {

@@ -3,7 +3,7 @@
 mod plot;
 
 use std::{
-    path::PathBuf,
+    path::{Path, PathBuf},
     sync::atomic::{AtomicUsize, Ordering},
 };
 
@@ -36,6 +36,8 @@ const EVEN: f64 = 0.1;
 const HONEST: f64 = 0.97;
 /// Least share of pixels with a depth.
 const FILLED: f64 = 0.9;
+/// Largest RMS error relative to the range. Real and simulated lenses have 0.01 to 0.03.
+const ROUGH: f64 = 0.05;
 /// Least span of the response in normalised depth, of 2.
 const LEARNED: f64 = 1.2;
 
@@ -127,6 +129,9 @@ pub struct StackFigures {
     /// How to measure with the lens file.
     pub next: String,
     pub slices: usize,
+    /// A slice that does not fit the others.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub left_out: Option<String>,
     /// Slices from the far to the near image of a pair.
     pub pair_step: usize,
     /// Pixels per side averaged into one.
@@ -194,6 +199,9 @@ pub fn calibrate(request: &CalibrateStackRequest, context: &Context<'_>) -> Resu
         error => WorkflowError::parameter("stack", request.stack.display(), error.to_string()),
     })?;
     let figures = figures(&found, &listed, slices[0].dim(), request);
+    if let Some(slice) = &figures.left_out {
+        context.progress.warn(&format!("{slice} does not fit the other slices and is left out"));
+    }
     let drawn = match plot {
         Some((file, format)) => Some((file, plot::plot(&figures, format)?)),
         None => None,
@@ -333,6 +341,7 @@ fn figures(
         verdict: verdict(found),
         next,
         slices: files.len(),
+        left_out: found.foreign.map(|slice| named(&files[slice], slice)),
         pair_step,
         bin,
         psf: optics.psf().to_string(),
@@ -365,6 +374,11 @@ fn figures(
     }
 }
 
+/// The file, and the number among the slices, which is needed in a file of many.
+fn named(file: &Path, slice: usize) -> String {
+    format!("{} (slice {})", file.display(), slice + 1)
+}
+
 /// `good`, or what to change.
 pub fn verdict(found: &StackLens) -> String {
     let held_out = &found.held_out;
@@ -380,6 +394,15 @@ pub fn verdict(found: &StackLens) -> String {
         return format!(
             "only {:.0} % of the target has a depth: use a target with more fine texture, more light or a finer step",
             100.0 * held_out.fill
+        );
+    }
+    let range = found.optics.working_range();
+    let error = held_out.rms_mm / (range.far_mm - range.near_mm);
+    if error > ROUGH {
+        return format!(
+            "the error is {:.0} % of the range of a pair: look for slices that are missing, moved or out of order, and check that the \
+             stage's steps are even and the target is flat",
+            100.0 * error
         );
     }
     if !(0.9..=1.1).contains(&held_out.slope) {

@@ -11,6 +11,7 @@ use ndarray::Array2;
 use super::StackError;
 use super::curve::Curve;
 use super::focus_plane::{FocusPlane, blurred};
+use super::foreign;
 use super::held_out::{HeldOut, Split, finish, judge, robust};
 use crate::adaptive_window::{Bank, LEARNED_PX, Window};
 use crate::coarseness::coarseness;
@@ -82,6 +83,8 @@ pub(super) struct Sample {
     pub part: [bool; 2],
     /// Original target, not smoothed.
     pub original: bool,
+    /// Far slice of its pair.
+    pub far: usize,
 }
 
 #[cfg(test)]
@@ -97,6 +100,7 @@ impl Sample {
             even: false,
             part: [false; 2],
             original: true,
+            far: 0,
         }
     }
 }
@@ -114,7 +118,12 @@ struct Pair {
     original: bool,
 }
 
-type Learned = (Optics, HeldOut, Vec<Trial>);
+pub(super) struct Learned {
+    pub optics: Optics,
+    pub held_out: HeldOut,
+    pub trials: Vec<Trial>,
+    pub foreign: Option<usize>,
+}
 
 /// Slices to calibrate, binned.
 pub(super) struct Target<'a> {
@@ -221,9 +230,10 @@ pub(super) fn learn(target: &Target<'_>) -> Result<Learned, StackError> {
     }
     trials.sort_by(|a, b| a.robust_mm.total_cmp(&b.robust_mm));
     let unfit = StackError::NoPair(target.pair_step);
-    let Some(Best { degree, optics, samples, .. }) = best else { return Err(unfit) };
+    let Some(Best { degree, optics, mut samples, .. }) = best else { return Err(unfit) };
+    let foreign = foreign::leave_out(&mut samples, degree, target.pair_step, target.slices.len());
     let Some((stage, held_out)) = finish(&samples, degree, &optics, half_mm) else { return Err(unfit) };
-    Ok((optics.with_stage(stage), held_out, trials))
+    Ok(Learned { optics: optics.with_stage(stage), held_out, trials, foreign })
 }
 
 impl Target<'_> {
@@ -327,6 +337,7 @@ impl Target<'_> {
                     even: (y / BLOCK_PX + x / BLOCK_PX).is_multiple_of(2),
                     part: [2 * x < width, pair.far.is_multiple_of(2)],
                     original: pair.original,
+                    far: pair.far,
                 });
             }
         }
