@@ -42,7 +42,7 @@ pub fn same_stem(paths: &[PathBuf]) -> Option<[PathBuf; 2]> {
     paths.iter().find_map(|path| stems.insert(stem(path), path).map(|other| [other.clone(), path.clone()]))
 }
 
-fn stem(path: &Path) -> String {
+pub(crate) fn stem(path: &Path) -> String {
     path.file_stem().unwrap_or_default().to_string_lossy().into_owned()
 }
 

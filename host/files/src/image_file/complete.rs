@@ -3,6 +3,9 @@
 pub(super) const RAW: &str = "it is a camera's raw file: develop it to a 16-bit TIFF, linear and without sharpening (with `dcraw -4 -T`, \
                               RawTherapee or darktable), and give that";
 
+/// Bytes at the beginning that tell a format.
+pub(super) const HEAD_BYTES: u64 = 32;
+
 /// Description and remedy of an unsupported format, else `None`.
 pub(super) fn unsupported(bytes: &[u8]) -> Option<&'static str> {
     let brand = |names: &[&[u8]]| {

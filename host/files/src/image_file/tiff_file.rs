@@ -20,8 +20,6 @@ use super::{
 /// Colour filter array and linear raw (TIFF/EP, DNG).
 const RAW_PHOTOMETRIC: [u64; 2] = [32803, 34892];
 
-const HEAD_BYTES: u64 = 32;
-
 #[derive(Debug, Clone)]
 pub(crate) struct Page {
     pub index: usize,
@@ -40,7 +38,7 @@ impl Pages {
     pub fn open(path: &Path) -> Result<Option<Self>, ImageError> {
         let failed = |source| ImageError::Read { path: path.into(), source };
         let file = InFile::open(path).map_err(failed)?;
-        let head = file.read(0, HEAD_BYTES).unwrap_or_default();
+        let head = file.read(0, complete::HEAD_BYTES).unwrap_or_default();
         if !tiff_tags::is_tiff(&head) || complete::unsupported(&head).is_some() {
             return Ok(None);
         }
