@@ -28,10 +28,10 @@ use image::ImageFormat;
 use ndarray::Array2;
 
 use decode::largest_but_defective;
-pub(crate) use decode::{Decoded, Samples8, decode};
+pub(crate) use decode::{Decoded, Samples8, decode, decode_with};
 pub use metadata::exposure_time;
 pub use tiff_file::page_count;
-pub(crate) use tiff_file::{Page, Pages};
+pub(crate) use tiff_file::{Page, Pages, Signed};
 pub(crate) use write::encode_to;
 pub use write::{encode_png, encode_tiff, png_to, png8_to};
 
