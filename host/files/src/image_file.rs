@@ -19,17 +19,19 @@ mod write;
 
 use std::{
     fs,
+    io::Read,
     path::{Path, PathBuf},
     str::FromStr,
 };
 
+use image::ImageFormat;
 use ndarray::Array2;
 
 use decode::largest_but_defective;
-pub(crate) use decode::{Decoded, Samples8, decode};
+pub(crate) use decode::{Decoded, Samples8, decode, decode_with};
 pub use metadata::exposure_time;
 pub use tiff_file::page_count;
-pub(crate) use tiff_file::{Page, Pages};
+pub(crate) use tiff_file::{Page, Pages, Signed};
 pub(crate) use write::encode_to;
 pub use write::{encode_png, encode_tiff, png_to, png8_to};
 
@@ -209,6 +211,22 @@ pub fn read_grey_with(path: &Path, settings: &ReadSettings) -> Result<GreyImage,
 pub(crate) fn read_8_bit(path: &Path) -> Result<Samples8, ImageError> {
     let (decoded, path) = read_decoded(path)?;
     decoded.in_8_bits().map_err(|reason| ImageError::Format { path, reason })
+}
+
+/// Why a file is not read that is an image by its content; `None` if it is not.
+pub(crate) fn unread(path: &Path) -> Option<ImageError> {
+    let mut head = Vec::new();
+    fs::File::open(path).ok()?.take(complete::HEAD_BYTES).read_to_end(&mut head).ok()?;
+    let refused = |reason: &str| ImageError::Format { path: path.into(), reason: reason.into() };
+    if let Some(reason) = complete::unsupported(&head) {
+        return Some(refused(reason));
+    }
+    let rename = || refused("its name has another ending: rename it to .png, .tif or .jpg");
+    match image::guess_format(&head).ok()? {
+        ImageFormat::Tiff => Some(Pages::open(path).err().unwrap_or_else(rename)),
+        ImageFormat::Png | ImageFormat::Jpeg => Some(rename()),
+        _ => None,
+    }
 }
 
 fn read_decoded(path: &Path) -> Result<(Decoded, PathBuf), ImageError> {

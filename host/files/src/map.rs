@@ -14,7 +14,7 @@ use tiff::{
 
 use crate::{
     EncodeError,
-    image_file::{self, ImageError},
+    image_file::{self, ImageError, ReadSettings, Signed, tiff_tags},
     npy::{self, NpyError},
 };
 
@@ -28,29 +28,105 @@ pub enum MapError {
     Npy { path: PathBuf, reason: NpyError },
     #[error("{} is neither .npy nor TIFF: {reason}", path.display())]
     Format { path: PathBuf, reason: String },
+    #[error("{} is not a mask: {reason}", path.display())]
+    Mask { path: PathBuf, reason: NpyError },
+    #[error(transparent)]
+    Image(#[from] ImageError),
+    #[error("{} has three channels, and a map has one: store the depth as grey", path.display())]
+    Colours { path: PathBuf },
     /// Integers have no known unit.
     #[error("{} holds {samples} integers, not mm; give the .npy or the float .tiff", path.display())]
     Integers { path: PathBuf, samples: image_file::Samples },
 }
 
+/// Pixels that a file marks as holes by a value.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct NoData {
+    pub value: f32,
+    pub pixels: usize,
+}
+
 pub fn read(path: &Path) -> Result<Array2<f32>, MapError> {
+    Ok(read_with_nodata(path)?.0)
+}
+
+/// Pixels of the value that GDAL's tag of a TIFF states for holes are NaN.
+pub fn read_with_nodata(path: &Path) -> Result<(Array2<f32>, Option<NoData>), MapError> {
     let bytes = std::fs::read(path).map_err(|source| MapError::Read { path: path.into(), source })?;
     if bytes.is_empty() {
         return Err(MapError::Empty { path: path.into() });
     }
     if bytes.starts_with(npy::MAGIC) {
-        return npy::read(&bytes).map_err(|reason| MapError::Npy { path: path.into(), reason });
+        let values = npy::read(&bytes).map_err(|reason| MapError::Npy { path: path.into(), reason })?;
+        return Ok((values, None));
     }
     let image =
         image_file::decode_grey(&bytes).map_err(|reason| MapError::Format { path: path.into(), reason })?;
     if image.samples != image_file::Samples::Float {
         return Err(MapError::Integers { path: path.into(), samples: image.samples });
     }
-    Ok(image.pixels)
+    if image.colour {
+        return Err(MapError::Colours { path: path.into() });
+    }
+    let mut values = image.pixels;
+    let Some(value) = nodata(&bytes) else { return Ok((values, None)) };
+    let mut pixels = 0;
+    values.iter_mut().filter(|pixel| **pixel == value).for_each(|pixel| {
+        *pixel = f32::NAN;
+        pixels += 1;
+    });
+    Ok((values, (pixels > 0).then_some(NoData { value, pixels })))
 }
 
-pub fn read_mask(path: &Path) -> Result<Array2<bool>, ImageError> {
-    Ok(image_file::read_grey(path)?.pixels.mapv(|value| value > 0.0))
+fn nodata(tiff: &[u8]) -> Option<f32> {
+    let directories = tiff_tags::directories(tiff).ok()?;
+    let text = directories.iter().find_map(|directory| directory.nodata.as_deref())?;
+    text.trim().parse::<f64>().ok().map(|value| value as f32)
+}
+
+/// Where a mask is not 0: an image, or a `.npy` of bool, integers or floats.
+pub fn read_mask(path: &Path) -> Result<Array2<bool>, MapError> {
+    let bytes = image_file::read_bytes(path)?;
+    if bytes.starts_with(npy::MAGIC) {
+        return npy::read_mask(&bytes).map_err(|reason| MapError::Mask { path: path.into(), reason });
+    }
+    let refused = |reason: String| ImageError::Format { path: path.into(), reason };
+    let decoded = image_file::decode_with(&bytes, Signed::AsUnsigned).map_err(refused)?;
+    if decoded.only_alpha_differs() {
+        let reason = "all its pixels have one colour and differ only in alpha: store the mask as grey".into();
+        return Err(refused(reason).into());
+    }
+    let grey = decoded.grey(&ReadSettings::default()).map_err(refused)?;
+    Ok(grey.pixels.mapv(|value| value != 0.0 && !value.is_nan()))
+}
+
+/// Distance of a value from all others, relative to their range, at which it is no depth.
+const FAR: f32 = 20.0;
+
+/// Values at the ends of a map that several pixels have, far from all others, with their numbers of pixels.
+pub fn far_from_others(map: ArrayView2<f32>) -> Vec<NoData> {
+    let mut found = Vec::new();
+    let mut rest = map.to_owned();
+    while let Some([low, high]) = range(rest.view()) {
+        let before = found.len();
+        for value in [low, high] {
+            let others = rest.mapv(|other| if other == value { f32::NAN } else { other });
+            let pixels = rest.iter().filter(|other| **other == value).count();
+            let Some([least, most]) = range(others.view()).filter(|[least, most]| least < most) else {
+                continue;
+            };
+            let distance = (least - value).max(value - most);
+            if pixels > 1 && distance > FAR * (most - least) {
+                found.push(NoData { value, pixels });
+                rest = others;
+                break;
+            }
+        }
+        if found.len() == before {
+            break;
+        }
+    }
+    found
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -157,6 +233,68 @@ mod tests {
             assert!(back.iter().zip(&map).all(|(a, b)| a.to_bits() == b.to_bits()), "{name}");
         }
         assert_eq!(Format::of(Path::new("a.png")), None);
+    }
+
+    fn stored(name: &str, bytes: &[u8]) -> (tempfile::TempDir, PathBuf) {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join(name);
+        std::fs::write(&path, bytes).unwrap();
+        (folder, path)
+    }
+
+    #[test]
+    fn pixels_of_gdals_nodata_are_holes() {
+        for (text, value) in [("-9999", -9999.0), ("1e10\n", 1e10), ("-3.4028234663852886e+38", f32::MIN)] {
+            let mut bytes = Cursor::new(Vec::new());
+            let mut encoder = TiffEncoder::new(&mut bytes).unwrap();
+            let mut image = encoder.new_image::<Gray32Float>(3, 1).unwrap();
+            image.encoder().write_tag(tiff::tags::Tag::Unknown(42113), text).unwrap();
+            image.write_data(&[5.0, value, value]).unwrap();
+            let (_folder, path) = stored("a.tif", bytes.get_ref());
+            let (values, nodata) = read_with_nodata(&path).unwrap();
+            assert_eq!((values[[0, 0]], values[[0, 1]].is_nan()), (5.0, true));
+            assert_eq!(nodata, Some(NoData { value, pixels: 2 }), "{text}");
+        }
+    }
+
+    #[test]
+    fn a_map_of_three_channels_is_refused() {
+        let mut bytes = Cursor::new(Vec::new());
+        let mut encoder = TiffEncoder::new(&mut bytes).unwrap();
+        encoder.write_image::<tiff::encoder::colortype::RGB32Float>(1, 1, &[1.0, 2.0, 900.0]).unwrap();
+        let (_folder, path) = stored("xyz.tif", bytes.get_ref());
+        assert!(matches!(read(&path), Err(MapError::Colours { .. })));
+    }
+
+    #[test]
+    fn constant_values_far_from_all_others_are_found() {
+        let mut map = Array2::from_shape_fn((8, 8), |(y, x)| 900.0 + (y + x) as f32);
+        assert_eq!(far_from_others(map.view()), []);
+        map[[0, 0]] = 1e10;
+        assert_eq!(far_from_others(map.view()), [], "one pixel is no constant");
+        map[[0, 1]] = 1e10;
+        map.row_mut(7).fill(-9999.0);
+        let found = [NoData { value: 1e10, pixels: 2 }, NoData { value: -9999.0, pixels: 8 }];
+        assert_eq!(far_from_others(map.view()), found);
+        assert_eq!(far_from_others(array![[500.0, 500.0, 900.0, 900.0]].view()), [], "two planes");
+        assert_eq!(far_from_others(array![[f32::NAN]].view()), []);
+    }
+
+    #[test]
+    fn masks_of_signed_labels_and_arrays_are_read_and_alpha_is_refused() {
+        let mut bytes = Cursor::new(Vec::new());
+        let mut encoder = TiffEncoder::new(&mut bytes).unwrap();
+        encoder.write_image::<tiff::encoder::colortype::GrayI32>(3, 1, &[0, 7, -1]).unwrap();
+        let (_folder, path) = stored("labels.tif", bytes.get_ref());
+        assert_eq!(read_mask(&path).unwrap(), array![[false, true, true]]);
+        let (_folder, path) = stored("a.npy", &npy::write(array![[0.0, f32::NAN, 0.2]].view()));
+        assert_eq!(read_mask(&path).unwrap(), array![[false, false, true]]);
+        let mut png = Cursor::new(Vec::new());
+        let image = image::GrayAlphaImage::from_fn(2, 1, |x, _| image::LumaA([0, 255 * x as u8]));
+        image.write_to(&mut png, image::ImageFormat::Png).unwrap();
+        let (_folder, path) = stored("alpha.png", png.get_ref());
+        let error = read_mask(&path).unwrap_err().to_string();
+        assert!(error.contains("only in alpha"), "{error}");
     }
 
     #[test]

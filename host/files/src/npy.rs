@@ -36,6 +36,8 @@ pub enum NpyError {
     Missing { key: &'static str },
     #[error("its values are '{descr}', and '<f4', '>f4', '<f8' and '>f8' are read")]
     Kind { descr: String },
+    #[error("its values are '{descr}', and a mask has bool, integers, f32 or f64")]
+    MaskKind { descr: String },
     #[error("its shape is {shape:?}, and a map has two axes (height, width)")]
     Axes { shape: Vec<usize> },
     #[error("its shape is {shape:?} of '{descr}', and {found} bytes follow the header")]
@@ -45,16 +47,51 @@ pub enum NpyError {
 /// Reads an array of (height, width); f64 is rounded to f32. Uses no more memory than the file's size.
 pub fn read(bytes: &[u8]) -> Result<Array2<f32>, NpyError> {
     let (header, values) = split(bytes)?;
-    let Header { descr, fortran_order, shape } = Header::parse(header)?;
-    let [height, width] = shape[..].try_into().map_err(|_| NpyError::Axes { shape: shape.clone() })?;
-    let size = || NpyError::Size { shape: [height, width], descr: descr.clone(), found: values.len() };
-    let numbers = match descr.as_str() {
+    let header = Header::parse(header)?;
+    let numbers =
+        floats(&header.descr, values).ok_or_else(|| NpyError::Kind { descr: header.descr.clone() })?;
+    array(header, numbers, values.len())
+}
+
+/// Where an array of bool, integers or floats is neither 0 nor NaN.
+pub fn read_mask(bytes: &[u8]) -> Result<Array2<bool>, NpyError> {
+    let (header, values) = split(bytes)?;
+    let header = Header::parse(header)?;
+    let size = match header.descr.trim_start_matches(['<', '>', '|', '=']) {
+        "b1" | "i1" | "u1" => Some(1),
+        "i2" | "u2" => Some(2),
+        "i4" | "u4" => Some(4),
+        "i8" | "u8" => Some(8),
+        _ => None,
+    };
+    let truths = match size {
+        Some(size) => {
+            let items = values.chunks_exact(size);
+            let whole = items.remainder().is_empty();
+            whole.then(|| items.map(|item| item.iter().any(|byte| *byte != 0)).collect())
+        }
+        None => floats(&header.descr, values)
+            .ok_or_else(|| NpyError::MaskKind { descr: header.descr.clone() })?
+            .map(|values| values.into_iter().map(|value| value != 0.0 && !value.is_nan()).collect()),
+    };
+    array(header, truths, values.len())
+}
+
+/// `None` for other kinds; within, `None` for a part of a number at the end.
+fn floats(descr: &str, values: &[u8]) -> Option<Option<Vec<f32>>> {
+    Some(match descr {
         "<f4" => numbers(values, f32::from_le_bytes),
         ">f4" => numbers(values, f32::from_be_bytes),
         "<f8" => numbers(values, |bytes| f64::from_le_bytes(bytes) as f32),
         ">f8" => numbers(values, |bytes| f64::from_be_bytes(bytes) as f32),
-        _ => return Err(NpyError::Kind { descr }),
-    };
+        _ => return None,
+    })
+}
+
+fn array<T: Clone>(header: Header, numbers: Option<Vec<T>>, found: usize) -> Result<Array2<T>, NpyError> {
+    let Header { descr, fortran_order, shape } = header;
+    let [height, width] = shape[..].try_into().map_err(|_| NpyError::Axes { shape: shape.clone() })?;
+    let size = || NpyError::Size { shape: [height, width], descr: descr.clone(), found };
     let numbers = numbers.ok_or_else(size)?;
     if fortran_order {
         let columns = Array2::from_shape_vec((width, height), numbers).map_err(|_| size())?;
@@ -180,6 +217,26 @@ mod tests {
         let columns = "{'descr': '<f4', 'fortran_order': True, 'shape': (2, 3), }\n";
         let values = [1f32, 2.0, 3.0, 4.0, 5.0, 6.0].map(f32::to_le_bytes).concat();
         assert_eq!(read(&file(1, columns, &values)).unwrap(), array![[1.0, 3.0, 5.0], [2.0, 4.0, 6.0]]);
+    }
+
+    #[test]
+    fn masks_of_any_kind_are_true_where_not_zero() {
+        let mask = |descr: &str, values: &[u8]| {
+            let header = format!("{{'descr': '{descr}', 'fortran_order': False, 'shape': (1, 2), }}\n");
+            read_mask(&file(1, &header, values)).map(|mask| mask.into_raw_vec_and_offset().0)
+        };
+        for (descr, values) in [
+            ("|b1", vec![0, 1]),
+            ("|i1", vec![0, 0xff]),
+            ("<i4", [0_i32, -256].map(i32::to_le_bytes).concat()),
+            (">u2", [0_u16, 1].map(u16::to_be_bytes).concat()),
+            ("<f4", [-0.0_f32, 0.5].map(f32::to_le_bytes).concat()),
+            ("<f8", [f64::NAN, -1.0].map(f64::to_le_bytes).concat()),
+        ] {
+            assert_eq!(mask(descr, &values), Ok(vec![false, true]), "{descr}");
+        }
+        assert!(mask("<U4", &[0; 32]).unwrap_err().to_string().contains("bool"));
+        assert!(matches!(mask("<i4", &[0; 7]), Err(NpyError::Size { .. })));
     }
 
     #[test]

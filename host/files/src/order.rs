@@ -1,5 +1,8 @@
-//! Order of capture by the numbers in file names: `in9` before `in10`. Camera counters restart after 9999 (DCF): if the
-//! numbers form two dense groups at the ends of the range, the upper one comes first unless time stamps contradict.
+//! Order of capture by the numbers in file names: `in9` before `in10`, `z-0.5` before `z0.25`. Camera counters restart after
+//! 9999 (DCF): if the numbers form two dense groups at the ends of the range, the upper one comes first unless time stamps
+//! contradict.
+
+pub(crate) mod name;
 
 use std::{
     cmp::Ordering,
@@ -8,11 +11,12 @@ use std::{
 };
 
 use crate::image_file::metadata::taken;
+use name::{Name, Number, last_varying};
 
 pub fn sort(paths: &mut [PathBuf]) {
     paths.sort_by(|a, b| natural(&stem(a), &stem(b)));
-    if let Some(before) = before_signs(paths) {
-        paths.sort_by_key(|path| signed(path, &before));
+    if let Some(values) = values(paths) {
+        paths.sort_by(|a, b| values.order(a, b));
         return;
     }
     if let Some(first) = roll_over(paths) {
@@ -22,7 +26,7 @@ pub fn sort(paths: &mut [PathBuf]) {
 
 /// Neighbours of a sorted list between which the counter restarted.
 pub fn counter_started_again(sorted: &[PathBuf]) -> Option<[&PathBuf; 2]> {
-    if before_signs(sorted).is_some() {
+    if values(sorted).is_some() {
         return None;
     }
     sorted.windows(2).find_map(|two| {
@@ -38,7 +42,7 @@ pub fn same_stem(paths: &[PathBuf]) -> Option<[PathBuf; 2]> {
     paths.iter().find_map(|path| stems.insert(stem(path), path).map(|other| [other.clone(), path.clone()]))
 }
 
-fn stem(path: &Path) -> String {
+pub(crate) fn stem(path: &Path) -> String {
     path.file_stem().unwrap_or_default().to_string_lossy().into_owned()
 }
 
@@ -53,22 +57,43 @@ fn number(path: &Path) -> Option<(u64, (String, usize, String))> {
     Some((digits.parse().ok()?, (stem[..begin].into(), digits.len(), stem[end..].into())))
 }
 
-/// The text before the numbers if some have a sign and others have not: `z-2`, `z0`, `z2`.
-fn before_signs(paths: &[PathBuf]) -> Option<String> {
-    let texts: Vec<_> = paths.iter().map(|path| Some(number(path)?.1)).collect::<Option<_>>()?;
-    let (before, _, after) = texts.iter().min_by_key(|(before, ..)| before.len())?;
-    let negative = format!("{before}-");
-    let positive = format!("{before}+");
-    let known = |text: &String| text == before || *text == negative || *text == positive;
-    let mixed =
-        texts.iter().any(|(text, ..)| *text == negative) && texts.iter().any(|(text, ..)| *text != negative);
-    (mixed && texts.iter().all(|(text, _, end)| known(text) && end == after)).then(|| before.clone())
+/// How to compare names of one pattern whose last varying number has decimals or signs.
+struct Values {
+    column: usize,
+    signed: bool,
 }
 
-fn signed(path: &Path, before: &str) -> Option<i64> {
-    let (value, (text, ..)) = number(path)?;
-    let value = i64::try_from(value).ok()?;
-    Some(if text.len() > before.len() && text.ends_with('-') { -value } else { value })
+fn values(paths: &[PathBuf]) -> Option<Values> {
+    let names: Vec<Name> = paths.iter().map(|path| Name::of(path)).collect();
+    let column = last_varying(&names)?;
+    let numbers: Vec<&Number> = names.iter().map(|name| &name.numbers[column]).collect();
+    let minus = |number: &&Number| number.sign == Some('-');
+    // With all names, a minus separates: `a-1`, `a-2`.
+    let signed = numbers.iter().any(minus) && !numbers.iter().all(minus);
+    (signed || decimals(&numbers)).then_some(Values { column, signed })
+}
+
+/// Whether the numbers are decimals, not `1.9` and `1.10` of a numbering by sections.
+fn decimals(numbers: &[&Number]) -> bool {
+    let lengths = || numbers.iter().map(|number| number.fraction().map_or(0, str::len));
+    let one_length = lengths().min() == lengths().max();
+    // Programs print decimals of several lengths without trailing zeros, apart from `1.0`.
+    let shortest = |number: &&Number| number.fraction().is_none_or(|f| f.len() == 1 || !f.ends_with('0'));
+    lengths().any(|length| length > 0) && (one_length || numbers.iter().all(shortest))
+}
+
+impl Values {
+    fn order(&self, a: &Path, b: &Path) -> Ordering {
+        let (a, b) = (Name::of(a), Name::of(b));
+        let before = a.numbers.iter().zip(&b.numbers).take(self.column);
+        let before = before.map(|(a, b)| natural(&a.text, &b.text)).find(|order| order.is_ne());
+        let value = |name: &Name| {
+            let Number { sign, text } = &name.numbers[self.column];
+            let magnitude: f64 = text.parse().unwrap_or(f64::INFINITY);
+            if self.signed && *sign == Some('-') { -magnitude } else { magnitude }
+        };
+        before.unwrap_or_else(|| value(&a).partial_cmp(&value(&b)).unwrap_or(Ordering::Equal))
+    }
 }
 
 /// Start of the order after a counter restart, if any.
@@ -175,6 +200,40 @@ mod tests {
         assert_eq!(sorted(&["+2.tif", "-2.tif", "0.tif"]), ["-2.tif", "0.tif", "+2.tif"]);
         assert_eq!(sorted(&["a-1.png", "a-2.png", "a-3.png"]), ["a-1.png", "a-2.png", "a-3.png"]);
         assert_eq!(sorted(&["a-1.png", "a-2.png", "b0.png"]), ["a-1.png", "a-2.png", "b0.png"]);
+        let with_signs = ["i+0_c1.png", "i+12_c1.png", "i+2_c1.png", "i-1_c1.png", "i-4_c1.png"];
+        assert_eq!(
+            sorted(&with_signs),
+            ["i-4_c1.png", "i-1_c1.png", "i+0_c1.png", "i+2_c1.png", "i+12_c1.png"]
+        );
+    }
+
+    #[test]
+    fn decimals_sort_by_value() {
+        for names in [
+            &["pos_0.0.png", "pos_0.25.png", "pos_0.5.png", "pos_0.75.png", "pos_1.0.png", "pos_10.0.png"][..],
+            &["z_0.1.tif", "z_0.2.tif", "z_0.30000000000000004.tif", "z_0.4.tif"],
+            &["1305031103.02.png", "1305031103.1.png"],
+            &["z-2.0um.png", "z-1.5um.png", "z0.0um.png", "z0.25um.png", "z0.5um.png"],
+            &["z_0.png", "z_0.25.png", "z_0.5.png", "z_1.png"],
+        ] {
+            let reversed: Vec<&str> = names.iter().rev().copied().collect();
+            assert_eq!(sorted(&reversed), names);
+            let paths: Vec<PathBuf> = names.iter().map(PathBuf::from).collect();
+            assert_eq!(counter_started_again(&paths), None);
+        }
+    }
+
+    #[test]
+    fn versions_and_dates_are_not_decimals() {
+        for names in [
+            &["v1.2_003.png", "v1.2_010.png", "v1.12_001.png"][..],
+            &["fig1.1.png", "fig1.9.png", "fig1.10.png"],
+            &["2024.5.9.png", "2024.5.25.png"],
+            &["a.9.png", "a.10.png"],
+        ] {
+            let reversed: Vec<&str> = names.iter().rev().copied().collect();
+            assert_eq!(sorted(&reversed), names);
+        }
     }
 
     #[test]

@@ -2,10 +2,12 @@
 //! (`spacing`, `unit`), OME-XML (`PositionZ` of each plane, else `PhysicalSizeZ`) or Micro-Manager's page tag
 //! (`ZPositionUm`); the pixel size from OME-XML (`PhysicalSizeX`) or an ImageJ file's resolution.
 
+mod folder;
+mod names;
 mod positions;
 
 use std::{
-    collections::{BTreeMap, HashMap},
+    collections::HashMap,
     hash::{DefaultHasher, Hash, Hasher},
     path::{Path, PathBuf},
 };
@@ -14,8 +16,7 @@ use ndarray::Array2;
 
 use crate::{
     image_file::{self, Decoded, GreyImage, ImageError, Pages, ReadSettings},
-    order,
-    video::{VideoError, pictures},
+    video::VideoError,
 };
 
 #[derive(Debug, Clone, Default)]
@@ -42,6 +43,8 @@ pub enum StackError {
     #[error("{} and {} hold the same image; move one of them away", first.display(), second.display())]
     Twice { first: PathBuf, second: PathBuf },
     #[error("{}: {reason}", path.display())]
+    Series { path: PathBuf, reason: String },
+    #[error("{}: {reason}", path.display())]
     Planes { path: PathBuf, reason: String },
 }
 
@@ -51,31 +54,11 @@ pub fn list(path: &Path) -> Result<Stack, StackError> {
 }
 
 fn folder(path: &Path) -> Result<Stack, StackError> {
-    let images = pictures::list(path)?;
-    let mut formats: BTreeMap<&str, usize> = BTreeMap::new();
-    for image in &images {
-        let ending = image.extension().unwrap_or_default().to_string_lossy().to_lowercase();
-        let format = match ending.as_str() {
-            "tif" | "tiff" => "TIFF",
-            "jpg" | "jpeg" => "JPEG",
-            "png" => "PNG",
-            "bmp" => "BMP",
-            _ => "PGM",
-        };
-        *formats.entry(format).or_default() += 1;
-    }
-    if formats.len() > 1 {
-        let found = formats.iter().map(|(format, count)| format!("{count} {format}")).collect::<Vec<_>>();
-        return Err(StackError::Mixed { path: path.into(), found: format!("{} files", found.join(" and ")) });
-    }
+    let names::Series { images, remarks, .. } = folder::images(path)?;
     if let [only] = images.as_slice() {
-        return file(only);
+        return file(only).map(|stack| Stack { remarks: [remarks, stack.remarks].concat(), ..stack });
     }
-    let name = |path: &PathBuf| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-    let remarks = order::counter_started_again(&images).map(|[before, after]| {
-        format!("the camera's counter started again: {} follows {}", name(after), name(before))
-    });
-    Ok(Stack { remarks: remarks.into_iter().collect(), images, ..Stack::default() })
+    Ok(Stack { remarks, images, ..Stack::default() })
 }
 
 fn file(path: &Path) -> Result<Stack, StackError> {
@@ -85,16 +68,11 @@ fn file(path: &Path) -> Result<Stack, StackError> {
     let Some(Pages { pages, .. }) = Pages::open(path)? else {
         return Ok(Stack { images: vec![path.into()], ..Stack::default() });
     };
-    let positions_um =
+    let positions::Planes { pages: order, positions_um, remarks } =
         positions::of(&pages).map_err(|reason| StackError::Planes { path: path.into(), reason })?;
-    let page = |number: usize| PathBuf::from(format!("{}#{number}", path.display()));
-    let images = (1..=pages.len()).map(page).collect();
-    Ok(Stack {
-        images,
-        positions_um,
-        object_pixel_um: positions::object_pixel_um(&pages),
-        remarks: Vec::new(),
-    })
+    let page = |index: usize| PathBuf::from(format!("{}#{}", path.display(), index + 1));
+    let images = order.into_iter().map(page).collect();
+    Ok(Stack { images, positions_um, object_pixel_um: positions::object_pixel_um(&pages), remarks })
 }
 
 /// Reads the images in order, one at a time; `each` takes each with its index and may stop. Two equal images are an error.

@@ -3,6 +3,40 @@
 pub(super) const RAW: &str = "it is a camera's raw file: develop it to a 16-bit TIFF, linear and without sharpening (with `dcraw -4 -T`, \
                               RawTherapee or darktable), and give that";
 
+const VIDEO: &str =
+    "it is a video: extract its frames (`ffmpeg -i FILE frames/%04d.png`) and give their folder";
+const MICROSCOPE: &str =
+    "it is a microscope's file, which is not read: convert it to OME-TIFF (Bio-Formats: bfconvert)";
+const ARRAYS: &str = "it is a file of several arrays: save the one you need as .npy (`numpy.save`)";
+
+/// Formats that are not read, by their first bytes.
+const OTHERS: [(&[u8], &str); 21] = [
+    (b"GIF8", "GIF is not read: convert it to PNG or TIFF"),
+    (b"\x76\x2f\x31\x01", "OpenEXR is not read: convert it to float TIFF"),
+    (b"\xff\x0a", "JPEG XL is not read: convert it to PNG or TIFF"),
+    (b"\0\0\0\x0cJXL ", "JPEG XL is not read: convert it to PNG or TIFF"),
+    (b"\0\0\0\x0cjP  ", "JPEG 2000 is not read: convert it to PNG or TIFF"),
+    (b"\xff\x4f\xff\x51", "JPEG 2000 is not read: convert it to PNG or TIFF"),
+    (b"SIMPLE  =", "FITS is not read: convert it to float TIFF"),
+    (b"#?RADIANCE", "Radiance HDR is not read: convert it to float TIFF"),
+    (b"ZISRAWFILE", MICROSCOPE),
+    (b"\xda\xce\xbe\x0a", MICROSCOPE),
+    (b"\x70\0\0\0", MICROSCOPE),
+    (b"\x89HDF\r\n\x1a\n", ARRAYS),
+    (b"MATLAB 5.0 MAT-file", ARRAYS),
+    (b"PK\x03\x04", "it is an archive (.zip or .npz): unpack it, and save an array as .npy (`numpy.save`)"),
+    (b"Pf\n", "PFM is not read: convert it to float TIFF or .npy"),
+    (b"PF\n", "PFM is not read: convert it to float TIFF or .npy"),
+    (b"PIEH", "Sintel's .dpt is not read: convert it to float TIFF or .npy"),
+    (b"DIGITAL SURF", "Digital Surf's .sur is not read: export the heights as float TIFF"),
+    (b"DSCOMPRESSED", "Digital Surf's .sur is not read: export the heights as float TIFF"),
+    (b"%PDF", "it is a PDF file: export its image as PNG or TIFF"),
+    (b"\x1aE\xdf\xa3", VIDEO),
+];
+
+/// Bytes at the beginning that tell a format.
+pub(super) const HEAD_BYTES: u64 = 32;
+
 /// Description and remedy of an unsupported format, else `None`.
 pub(super) fn unsupported(bytes: &[u8]) -> Option<&'static str> {
     let brand = |names: &[&[u8]]| {
@@ -23,16 +57,9 @@ pub(super) fn unsupported(bytes: &[u8]) -> Option<&'static str> {
     if brand(&[b"avif", b"avis"]) || bytes.starts_with(b"RIFF") && bytes.get(8..12) == Some(b"WEBP") {
         return Some("AVIF and WebP are not read: convert it to PNG or TIFF");
     }
-    const OTHERS: [(&[u8], &str); 8] = [
-        (b"GIF8", "GIF is not read: convert it to PNG or TIFF"),
-        (b"\x76\x2f\x31\x01", "OpenEXR is not read: convert it to float TIFF"),
-        (b"\xff\x0a", "JPEG XL is not read: convert it to PNG or TIFF"),
-        (b"\0\0\0\x0cJXL ", "JPEG XL is not read: convert it to PNG or TIFF"),
-        (b"\0\0\0\x0cjP  ", "JPEG 2000 is not read: convert it to PNG or TIFF"),
-        (b"\xff\x4f\xff\x51", "JPEG 2000 is not read: convert it to PNG or TIFF"),
-        (b"SIMPLE  =", "FITS is not read: convert it to float TIFF"),
-        (b"#?RADIANCE", "Radiance HDR is not read: convert it to float TIFF"),
-    ];
+    if bytes.starts_with(b"RIFF") && bytes.get(8..12) == Some(b"AVI ") || bytes.get(4..8) == Some(b"ftyp") {
+        return Some(VIDEO);
+    }
     OTHERS.iter().find(|(magic, _)| bytes.starts_with(magic)).map(|(_, advice)| *advice)
 }
 

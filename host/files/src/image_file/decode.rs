@@ -9,7 +9,7 @@ use zune_jpeg::{
     zune_core::{bytestream::ZCursor, colorspace::ColorSpace, options::DecoderOptions},
 };
 
-use super::{GreyImage, ReadSettings, Samples, complete, metadata, tiff_file, tiff_tags};
+use super::{GreyImage, ReadSettings, Samples, complete, metadata, tiff_file, tiff_file::Signed, tiff_tags};
 use crate::video::Pixels;
 
 pub(crate) type Samples8 = Pixels;
@@ -60,11 +60,15 @@ pub(super) fn most_bytes(file: u64) -> u64 {
 }
 
 pub(crate) fn decode(bytes: &[u8]) -> Result<Decoded, String> {
+    decode_with(bytes, Signed::Refused)
+}
+
+pub(crate) fn decode_with(bytes: &[u8], signed: Signed) -> Result<Decoded, String> {
     if let Some(advice) = complete::unsupported(bytes) {
         return Err(advice.into());
     }
     if tiff_tags::is_tiff(bytes) {
-        return tiff_file::decode(bytes);
+        return tiff_file::decode(bytes, signed);
     }
     let (decoded, orientation) = if bytes.starts_with(b"\xff\xd8") { jpeg(bytes)? } else { other(bytes)? };
     Ok(decoded.turned(orientation))
@@ -201,6 +205,15 @@ impl Decoded {
         Ok(GreyImage { pixels, samples, colour, white_level, coding_variance })
     }
 
+    /// Whether all pixels have one colour and differ only in alpha.
+    pub(crate) fn only_alpha_differs(&self) -> bool {
+        match &self.values {
+            Values::U8(v) => only_last_differ(v, self.channels, self.colours),
+            Values::U16(v) => only_last_differ(v, self.channels, self.colours),
+            Values::U32(v) | Values::F32(v) => only_last_differ(v, self.channels, self.colours),
+        }
+    }
+
     pub(crate) fn in_8_bits(self) -> Result<Pixels, String> {
         let bytes = match self.values {
             Values::U8(values) => values,
@@ -241,6 +254,12 @@ impl Decoded {
         }
         self
     }
+}
+
+fn only_last_differ<T: PartialEq>(values: &[T], channels: usize, colours: usize) -> bool {
+    let pixels = || values.chunks_exact(channels);
+    let Some(first) = pixels().next() else { return false };
+    pixels().all(|pixel| pixel[..colours] == first[..colours]) && pixels().any(|pixel| pixel != first)
 }
 
 fn turn<T: Copy>(values: &mut Vec<T>, (height, width): (usize, usize), channels: usize, orientation: u8) {

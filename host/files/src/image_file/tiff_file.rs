@@ -20,7 +20,13 @@ use super::{
 /// Colour filter array and linear raw (TIFF/EP, DNG).
 const RAW_PHOTOMETRIC: [u64; 2] = [32803, 34892];
 
-const HEAD_BYTES: u64 = 32;
+/// How signed integers are read, whose black is not known.
+#[derive(Clone, Copy, PartialEq)]
+pub(crate) enum Signed {
+    Refused,
+    /// By their bits: 0 remains 0.
+    AsUnsigned,
+}
 
 #[derive(Debug, Clone)]
 pub(crate) struct Page {
@@ -40,7 +46,7 @@ impl Pages {
     pub fn open(path: &Path) -> Result<Option<Self>, ImageError> {
         let failed = |source| ImageError::Read { path: path.into(), source };
         let file = InFile::open(path).map_err(failed)?;
-        let head = file.read(0, HEAD_BYTES).unwrap_or_default();
+        let head = file.read(0, complete::HEAD_BYTES).unwrap_or_default();
         if !tiff_tags::is_tiff(&head) || complete::unsupported(&head).is_some() {
             return Ok(None);
         }
@@ -55,7 +61,8 @@ impl Pages {
         let page = number.checked_sub(1).and_then(|index| self.pages.get(index)).ok_or_else(|| {
             format!("it has no page {number}: pages are numbered from 1 to {}", self.pages.len())
         });
-        let decoded = page.and_then(|page| decode_page(BufReader::new(file), self.size, page));
+        let decoded =
+            page.and_then(|page| decode_page(BufReader::new(file), self.size, page, Signed::Refused));
         decoded.map_err(|reason| {
             let path = format!("{}#{number}", self.path.display()).into();
             ImageError::Format { path, reason }
@@ -74,6 +81,12 @@ fn pages<S: Source + ?Sized>(source: &S) -> Result<Vec<Page>, String> {
     let Some(first) = directories.first() else { return Err("it holds no image".into()) };
     if directories.iter().any(|d| d.is_dng || RAW_PHOTOMETRIC.contains(&d.photometric)) {
         return Err(complete::RAW.into());
+    }
+    if let ([only], true) = (directories.as_slice(), first.metamorph_planes > 1) {
+        return Err(format!(
+            "it is a MetaMorph stack of {} planes, of which only the first has a directory: open it in ImageJ and save it as TIFF",
+            only.metamorph_planes
+        ));
     }
     let larger = |d: &Directory| {
         d.sub_images.iter().copied().filter(|(w, h)| w * h > d.width * d.height).max_by_key(|(w, h)| w * h)
@@ -102,10 +115,10 @@ fn pages<S: Source + ?Sized>(source: &S) -> Result<Vec<Page>, String> {
     Ok(pages)
 }
 
-pub(super) fn decode(bytes: &[u8]) -> Result<Decoded, String> {
+pub(super) fn decode(bytes: &[u8], signed: Signed) -> Result<Decoded, String> {
     let pages = pages(bytes)?;
     if let [page] = pages.as_slice() {
-        return decode_page(Cursor::new(bytes), bytes.len() as u64, page);
+        return decode_page(Cursor::new(bytes), bytes.len() as u64, page, signed);
     }
     let sizes: Vec<String> =
         pages.iter().take(3).map(|p| format!("{}x{}", p.directory.width, p.directory.height)).collect();
@@ -192,8 +205,12 @@ fn unsupported(page: &Directory) -> Option<String> {
 }
 
 /// A page of a file of this size, upright.
-fn decode_page(file: impl Read + Seek, size: u64, page: &Page) -> Result<Decoded, String> {
-    if let Some(advice) = unsupported(&page.directory) {
+fn decode_page(file: impl Read + Seek, size: u64, page: &Page, signed: Signed) -> Result<Decoded, String> {
+    let mut kind = page.directory.clone();
+    if signed == Signed::AsUnsigned && kind.sample_format == 2 {
+        kind.sample_format = 1;
+    }
+    if let Some(advice) = unsupported(&kind) {
         return Err(advice);
     }
     let Directory { width, height, samples_per_pixel, bits, .. } = page.directory;
@@ -244,6 +261,12 @@ fn decode_page(file: impl Read + Seek, size: u64, page: &Page) -> Result<Decoded
     // Extra planes are not left out.
     let channels = if planes > 1 { planes } else { usize::from(colour.num_samples()) };
     let (width, height) = (width as usize, height as usize);
+    let data = match data {
+        DecodingResult::I8(v) => DecodingResult::U8(v.into_iter().map(i8::cast_unsigned).collect()),
+        DecodingResult::I16(v) => DecodingResult::U16(v.into_iter().map(i16::cast_unsigned).collect()),
+        DecodingResult::I32(v) => DecodingResult::U32(v.into_iter().map(i32::cast_unsigned).collect()),
+        other => other,
+    };
     let values = match data {
         DecodingResult::U8(v) if matches!(colour.bit_depth(), 1 | 2 | 4) && planes == 1 && channels == 1 => {
             Values::U8(unpacked(&v, width, height, colour.bit_depth())?)

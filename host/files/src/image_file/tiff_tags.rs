@@ -118,6 +118,10 @@ pub(crate) struct Directory {
     /// Width and height of the images in tag 330.
     pub sub_images: Vec<(u64, u64)>,
     pub micro_manager: Option<String>,
+    /// Tag 33629 of MetaMorph: planes behind this one, without directories.
+    pub metamorph_planes: u64,
+    /// Tag 42113, `GDAL_NODATA`: the value of pixels without one.
+    pub nodata: Option<String>,
 }
 
 impl Directory {
@@ -271,6 +275,8 @@ impl<'a, S: Source + ?Sized> File<'a, S> {
             338 => directory.extra_samples = value(0),
             339 => directory.sample_format = first(),
             32997 => directory.image_depth = first(),
+            33629 => directory.metamorph_planes = count,
+            42113 => directory.nodata = text(),
             50706 => directory.is_dng = true,
             51123 => directory.micro_manager = text(),
             _ => {}

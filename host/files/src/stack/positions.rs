@@ -1,23 +1,38 @@
-//! Focus positions of TIFF pages by microscopes and ImageJ.
+//! Order and focus positions of TIFF pages by microscopes and ImageJ.
+
+mod micro_manager;
+mod ome;
 
 use crate::image_file::{Page, tiff_tags::Directory};
 
-/// Positions along the axis, um; `None` if not stated. Fails for channels, times or planes in other files.
-pub(super) fn of(pages: &[Page]) -> Result<Option<Vec<f64>>, String> {
-    let Some(first) = pages.first() else { return Ok(None) };
+/// The planes of a focus series.
+#[derive(Clone, PartialEq, Debug, Default)]
+pub(super) struct Planes {
+    /// Index of each plane's page.
+    pub pages: Vec<usize>,
+    /// Along the axis; `None` if not stated.
+    pub positions_um: Option<Vec<f64>>,
+    pub remarks: Vec<String>,
+}
+
+/// Fails for channels, times or planes in other files.
+pub(super) fn of(pages: &[Page]) -> Result<Planes, String> {
+    let in_order =
+        |positions_um| Planes { pages: (0..pages.len()).collect(), positions_um, ..Planes::default() };
+    let Some(first) = pages.first() else { return Ok(in_order(None)) };
     let description = first.directory.description.as_deref().unwrap_or_default();
+    micro_manager::one_series(pages)?;
     if description.starts_with("ImageJ=") {
-        return image_j(description, pages.len());
+        let (positions_um, remark) = image_j(description, pages.len())?;
+        return Ok(Planes { remarks: Vec::from_iter(remark), ..in_order(positions_um) });
     }
     if let Some(array) = Array::of(description) {
-        return array.check(&first.directory, pages.len()).map(|()| None);
+        return array.check(&first.directory, pages.len()).map(|()| in_order(None));
     }
-    if let Some(pixels) = description.contains("<OME").then(|| element(description, "Pixels")).flatten() {
-        return ome(description, pixels, pages);
+    if let Some(metadata) = ome::Metadata::of(description) {
+        return metadata.planes(pages);
     }
-    let of_pages =
-        pages.iter().map(|page| json_number(page.directory.micro_manager.as_deref()?, "ZPositionUm"));
-    Ok(of_pages.collect::<Option<Vec<f64>>>().filter(|all| moving(all)))
+    Ok(micro_manager::planes(pages))
 }
 
 /// Side of a pixel at the object; `None` if not stated.
@@ -28,9 +43,7 @@ pub(super) fn object_pixel_um(pages: &[Page]) -> Option<f64> {
         let unit = description.lines().find_map(|line| line.strip_prefix("unit="))?;
         unit_um(unit)? / directory.x_resolution?
     } else {
-        let pixels = element(description, "Pixels")?;
-        let unit = attribute(pixels, "PhysicalSizeXUnit").map_or(Some(1.0), unit_um)?;
-        attribute(pixels, "PhysicalSizeX")?.parse::<f64>().ok()? * unit
+        ome::Metadata::of(description)?.pixel_um()?
     };
     (side.is_finite() && side > 0.0).then_some(side)
 }
@@ -40,7 +53,8 @@ fn moving(positions: &[f64]) -> bool {
     positions.windows(2).any(|two| two[0] != two[1])
 }
 
-fn image_j(description: &str, pages: usize) -> Result<Option<Vec<f64>>, String> {
+/// Positions in um, and a remark on them.
+fn image_j(description: &str, pages: usize) -> Result<(Option<Vec<f64>>, Option<String>), String> {
     let value = |key: &str| {
         description.lines().find_map(|line| line.strip_prefix(key)?.strip_prefix('=')).map(str::trim)
     };
@@ -52,10 +66,21 @@ fn image_j(description: &str, pages: usize) -> Result<Option<Vec<f64>>, String> 
             "its description has {images} images and the file lists {pages}: open it in ImageJ and save it as an image sequence"
         ));
     }
-    let micrometres = value("unit").and_then(unit_um);
-    let spacing = value("spacing").and_then(|text| text.parse::<f64>().ok()).filter(|v| *v != 0.0);
-    let (Some(spacing), Some(micrometres)) = (spacing, micrometres) else { return Ok(None) };
-    Ok((pages > 1).then(|| (0..pages).map(|page| page as f64 * spacing * micrometres).collect()))
+    let Some(unit) = value("zunit").or(value("unit")) else { return Ok((None, None)) };
+    let spacing = match value("spacing") {
+        Some(text) => text.parse::<f64>().ok().filter(|spacing| spacing.is_finite() && *spacing != 0.0),
+        None => Some(1.0),
+    };
+    let Some(spacing) = spacing.zip(unit_um(unit)).map(|(spacing, um)| spacing * um).filter(|_| pages > 1)
+    else {
+        return Ok((None, None));
+    };
+    let remark = value("spacing").is_none().then(|| {
+        format!(
+            "the file states a unit ({unit}) and no spacing of the planes: it counts as 1 {unit}, as in ImageJ (Image > Properties)"
+        )
+    });
+    Ok((Some((0..pages).map(|page| page as f64 * spacing).collect()), remark))
 }
 
 /// An array in the pages, as `tifffile` describes it: `{"shape": [5, 300, 400], "axes": "ZYX"}`; axes are optional.
@@ -123,81 +148,33 @@ fn one_series(channels: usize, times: usize) -> Result<(), String> {
     Ok(())
 }
 
-fn ome(xml: &str, pixels: &str, pages: &[Page]) -> Result<Option<Vec<f64>>, String> {
-    let count = |name| attribute(pixels, name).and_then(|text| text.parse::<usize>().ok()).unwrap_or(1);
-    let samples = pages.first().map_or(1, |page| page.directory.samples_per_pixel.max(1) as usize);
-    one_series(count("SizeC") / samples.min(count("SizeC").max(1)), count("SizeT"))?;
-    let planes = count("SizeZ");
-    if planes != pages.len() {
-        return Err(format!(
-            "its OME metadata have {planes} planes and the file has {}: give the file with all of them, or a folder of \
-             single images",
-            pages.len()
-        ));
-    }
-    if planes < 2 {
-        return Ok(None);
-    }
-    let mut positions = vec![None; planes];
-    for plane in xml.split("<Plane").skip(1).map(|rest| rest.split('>').next().unwrap_or_default()) {
-        let at = attribute(plane, "TheZ").and_then(|text| text.parse::<usize>().ok());
-        let unit = attribute(plane, "PositionZUnit").map_or(Some(1.0), unit_um);
-        let z = attribute(plane, "PositionZ").and_then(|text| text.parse::<f64>().ok());
-        if let (Some(at), Some(unit), Some(z)) = (at.filter(|at| *at < planes), unit, z) {
-            positions[at] = Some(z * unit);
-        }
-    }
-    if let Some(all) = positions.into_iter().collect::<Option<Vec<f64>>>().filter(|all| moving(all)) {
-        return Ok(Some(all));
-    }
-    let unit = attribute(pixels, "PhysicalSizeZUnit").map_or(Some(1.0), unit_um);
-    let spacing = attribute(pixels, "PhysicalSizeZ").and_then(|text| text.parse::<f64>().ok());
-    let spacing = spacing.zip(unit).map(|(z, unit)| z * unit).filter(|v| v.is_finite() && *v != 0.0);
-    Ok(spacing.map(|spacing| (0..planes).map(|plane| plane as f64 * spacing).collect()))
-}
-
 /// Micrometres per unit; `None` for pixels and unknown units.
 fn unit_um(unit: &str) -> Option<f64> {
-    let unit = unit.replace("\\u00B5", "u").replace("&#181;", "u").replace("&#xB5;", "u");
-    let unit = unit.replace(['\u{b5}', '\u{3bc}'], "u");
-    Some(match unit.trim().to_lowercase().as_str() {
-        "um" | "micron" | "microns" | "micrometer" | "micrometre" | "micrometers" => 1.0,
-        "nm" | "nanometer" | "nanometre" => 1e-3,
-        "mm" | "millimeter" | "millimetre" => 1e3,
-        "cm" | "centimeter" | "centimetre" => 1e4,
-        "m" | "meter" | "metre" => 1e6,
-        "inch" | "in" => 25_400.0,
-        "\u{c5}" | "\u{e5}" | "angstrom" => 1e-4,
+    let mut unit = unit.trim().to_lowercase();
+    for micro in ["\\u00b5", "\\u03bc", "&#181;", "&#xb5;", "&#956;", "&#x3bc;", "\u{b5}", "\u{3bc}"] {
+        unit = unit.replace(micro, "u");
+    }
+    let unit = unit.replace("metre", "meter");
+    // `ms` is no length.
+    let singular = unit.strip_suffix('s').filter(|unit| unit.len() > 3).unwrap_or(&unit);
+    Some(match singular {
+        "um" | "micron" | "micrometer" | "umeter" => 1.0,
+        "nm" | "nanometer" => 1e-3,
+        "mm" | "millimeter" => 1e3,
+        "cm" | "centimeter" => 1e4,
+        "m" | "meter" => 1e6,
+        "inch" | "inche" | "in" => 25_400.0,
+        "\u{e5}" | "angstrom" => 1e-4,
+        "pm" | "picometer" => 1e-6,
         _ => return None,
     })
 }
 
-fn element<'a>(xml: &'a str, name: &str) -> Option<&'a str> {
-    let begin = xml.find(&format!("<{name} "))?;
-    let end = xml[begin..].find('>')?;
-    Some(&xml[begin..begin + end])
-}
-
-fn attribute<'a>(tag: &'a str, name: &str) -> Option<&'a str> {
-    tag.match_indices(name).find_map(|(at, _)| {
-        let before = tag[..at].chars().next_back()?;
-        let rest = tag[at + name.len()..].trim_start().strip_prefix('=')?.trim_start();
-        let quote = rest.chars().next().filter(|c| matches!(c, '"' | '\''))?;
-        before.is_ascii_whitespace().then(|| rest[1..].split(quote).next()).flatten()
-    })
-}
-
-fn json_number(json: &str, key: &str) -> Option<f64> {
-    let rest = json.split(&format!("\"{key}\"")).nth(1)?.trim_start().strip_prefix(':')?.trim_start();
-    let end = rest.find([',', '}', '\n']).unwrap_or(rest.len());
-    rest[..end].trim().trim_matches('"').parse().ok()
-}
-
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
 
-    fn pages(count: usize, description: &str) -> Vec<Page> {
+    pub(super) fn pages(count: usize, description: &str) -> Vec<Page> {
         let directory = |index| Directory {
             description: (index == 0).then(|| description.to_owned()),
             ..Directory::default()
@@ -205,19 +182,50 @@ mod tests {
         (0..count).map(|index| Page { index, directory: directory(index) }).collect()
     }
 
+    pub(super) fn positions(pages: &[Page]) -> Result<Option<Vec<f64>>, String> {
+        of(pages).map(|planes| planes.positions_um)
+    }
+
     #[test]
     fn image_j_gives_the_spacing_with_its_unit() {
         let text = "ImageJ=1.54f\nimages=3\nslices=3\nunit=nm\nspacing=250.0\nloop=false\n";
-        assert_eq!(of(&pages(3, text)), Ok(Some(vec![0.0, 0.25, 0.5])));
+        assert_eq!(positions(&pages(3, text)), Ok(Some(vec![0.0, 0.25, 0.5])));
         assert_eq!(
-            of(&pages(3, "ImageJ=1.54f\nimages=3\nunit=\\u00B5m\nspacing=-2")),
+            positions(&pages(3, "ImageJ=1.54f\nimages=3\nunit=\\u00B5m\nspacing=-2")),
             Ok(Some(vec![0.0, -2.0, -4.0]))
         );
-        assert_eq!(of(&pages(3, "ImageJ=1.54f\nimages=3\nunit=pixel\nspacing=2")), Ok(None));
+        assert_eq!(positions(&pages(3, "ImageJ=1.54f\nimages=3\nunit=pixel\nspacing=2")), Ok(None));
         assert!(
             of(&pages(6, "ImageJ=1.54f\nimages=6\nchannels=2\nslices=3")).unwrap_err().contains("2 channels")
         );
         assert!(of(&pages(1, "ImageJ=1.54f\nimages=900\nslices=900")).unwrap_err().contains("900 images"));
+    }
+
+    #[test]
+    fn image_j_has_a_unit_for_z_and_leaves_a_spacing_of_one_out() {
+        let spaced = |lines: &str| {
+            let planes = of(&pages(2, &format!("ImageJ=1.54f\nimages=2\n{lines}"))).unwrap();
+            (planes.positions_um.map(|positions| positions[1]), planes.remarks.join(""))
+        };
+        let none = String::new;
+        assert_eq!(spaced("unit=mm\nzunit=um\nspacing=2.5\n"), (Some(2.5), none()));
+        assert_eq!(spaced("unit=pixel\nzunit=\\u00B5m\nspacing=2.5\n"), (Some(2.5), none()));
+        for (unit, um) in [
+            ("millimeters", 1e3),
+            ("micrometer", 1.0),
+            ("Microns", 1.0),
+            ("\\u00b5m", 1.0),
+            ("micrometres", 1.0),
+            ("inches", 25_400.0),
+            ("nanometers", 1e-3),
+        ] {
+            assert_eq!(spaced(&format!("unit={unit}\nspacing=2\n")), (Some(2.0 * um), none()), "{unit}");
+        }
+        let (positions, remark) = spaced("unit=um\n");
+        assert!(positions == Some(1.0) && remark.contains("counts as 1 um"), "{remark}");
+        for lines in ["unit=pixel\n", "unit=ms\n", "unit=um\nspacing=0\n", ""] {
+            assert_eq!(spaced(lines), (None, none()), "{lines}");
+        }
     }
 
     #[test]
@@ -228,7 +236,7 @@ mod tests {
                 other.directory =
                     Directory { description: other.directory.description.take(), ..page.clone() };
             }
-            of(&all).map_err(|error| error.split(':').next().unwrap_or_default().to_owned())
+            positions(&all).map_err(|error| error.split(':').next().unwrap_or_default().to_owned())
         };
         let grey =
             Directory { width: 8, height: 6, samples_per_pixel: 1, photometric: 1, ..Directory::default() };
@@ -251,24 +259,6 @@ mod tests {
     }
 
     #[test]
-    fn ome_gives_uneven_positions_or_an_even_spacing() {
-        let even = "<?xml?><OME><Image><Pixels DimensionOrder=\"XYZCT\" SizeC=\"1\" SizeT=\"1\" SizeZ=\"3\" SizeX=\"8\" \
-                    PhysicalSizeZ=\"1.5\" PhysicalSizeZUnit=\"\u{b5}m\"></Pixels></Image></OME>";
-        assert_eq!(of(&pages(3, even)), Ok(Some(vec![0.0, 1.5, 3.0])));
-        let planes = "<Plane TheZ='0' PositionZ='-3'/><Plane TheZ='2' PositionZ='5'/><Plane TheZ='1' PositionZ='0.5'/>";
-        let uneven = even.replace("</Pixels>", &format!("{planes}</Pixels>"));
-        assert_eq!(of(&pages(3, &uneven)), Ok(Some(vec![-3.0, 0.5, 5.0])));
-        // All planes at one place say nothing; two of them are refused where places are needed.
-        let at_once = uneven.replace("'-3'", "'5'").replace("'0.5'", "'5'");
-        assert_eq!(of(&pages(3, &at_once)), Ok(Some(vec![0.0, 1.5, 3.0])));
-        let twice = uneven.replace("'-3'", "'0.5'");
-        assert_eq!(of(&pages(3, &twice)), Ok(Some(vec![0.5, 0.5, 5.0])));
-        assert!(of(&pages(1, even)).unwrap_err().contains("3 planes"));
-        let times = even.replace("SizeT=\"1\"", "SizeT=\"3\"").replace("SizeZ=\"3\"", "SizeZ=\"1\"");
-        assert!(of(&pages(3, &times)).unwrap_err().contains("3 times"));
-    }
-
-    #[test]
     fn the_side_of_a_pixel_comes_from_ome_and_image_j() {
         let ome = "<OME><Pixels SizeX=\"8\" PhysicalSizeX=\"650\" PhysicalSizeXUnit=\"nm\"></Pixels></OME>";
         assert_eq!(object_pixel_um(&pages(2, ome)), Some(0.65));
@@ -277,19 +267,5 @@ mod tests {
         assert_eq!(object_pixel_um(&image_j), None);
         image_j[0].directory.x_resolution = Some(4.0);
         assert_eq!(object_pixel_um(&image_j), Some(0.25));
-    }
-
-    #[test]
-    fn micro_manager_gives_a_position_for_each_page() {
-        let mut pages = pages(3, "");
-        for (page, z) in pages.iter_mut().zip([-1.0, 0.5, 2.0]) {
-            page.directory.micro_manager =
-                Some(format!("{{\"Slice\": 1, \"ZPositionUm\": {z}, \"Width\": 8}}"));
-        }
-        assert_eq!(of(&pages), Ok(Some(vec![-1.0, 0.5, 2.0])));
-        for page in &mut pages {
-            page.directory.micro_manager = Some("{\"ZPositionUm\": 2.0}".into());
-        }
-        assert_eq!(of(&pages), Ok(None));
     }
 }

@@ -257,3 +257,30 @@ fn quantisation_tables_give_the_error_of_a_jpeg() {
         0.0
     );
 }
+
+#[test]
+fn other_programs_files_are_refused_by_format() {
+    for (head, phrase) in [
+        (b"RIFF\x10\0\0\0AVI LIST".as_slice(), "a video"),
+        (b"\0\0\0\x20ftypisom\0\0\x02\0", "a video"),
+        (b"ZISRAWFILE\0\0", "bfconvert"),
+        (b"\xda\xce\xbe\x0a\0\0", "bfconvert"),
+        (b"\x70\0\0\0\x10\0", "bfconvert"),
+        (b"\x89HDF\r\n\x1a\n", "numpy.save"),
+        (b"MATLAB 5.0 MAT-file, Platform", "numpy.save"),
+        (b"PK\x03\x04\x14\0", ".npz"),
+        (b"Pf\n2 1\n-1.0\n", "PFM"),
+        (b"PIEH\x02\0\0\0", ".dpt"),
+        (b"DIGITAL SURF", ".sur"),
+    ] {
+        let error = decode_grey(head).unwrap_err();
+        assert!(error.contains(phrase), "{error}");
+    }
+}
+
+#[test]
+fn a_metamorph_stack_is_refused_with_its_planes() {
+    let page = Page::grey(4, 3, 8, vec![7; 12]).with(33629, &[1; 5]);
+    let error = refusal(&tiff(CLASSIC, &[page]));
+    assert!(error.contains("MetaMorph stack of 5 planes"), "{error}");
+}

@@ -1,0 +1,123 @@
+//! Focus stacks in folders.
+
+use std::{
+    collections::{BTreeMap, HashSet},
+    fs,
+    path::{Path, PathBuf},
+};
+
+use super::{StackError, names::Series};
+use crate::{image_file, order, video::VideoError};
+
+/// Format by the ending of a name.
+fn format(path: &Path) -> Option<&'static str> {
+    Some(match path.extension()?.to_string_lossy().to_lowercase().as_str() {
+        "tif" | "tiff" => "TIFF",
+        "jpg" | "jpeg" | "jfif" | "jpe" => "JPEG",
+        "png" => "PNG",
+        "bmp" => "BMP",
+        "pgm" | "ppm" => "PGM",
+        _ => return None,
+    })
+}
+
+/// The images of a folder that form one focus series. Fails for several series or formats, and if an image of the series
+/// has a format that is not read.
+pub(super) fn images(path: &Path) -> Result<Series, StackError> {
+    let files = files(path).map_err(|source| VideoError::Io { path: path.into(), source })?;
+    let (mut images, others): (Vec<PathBuf>, Vec<PathBuf>) =
+        files.into_iter().partition(|file| format(file).is_some());
+    if images.is_empty() {
+        let known = others.iter().find_map(|file| image_file::unread(file));
+        return Err(
+            known.map_or_else(|| VideoError::NoPictures { path: path.into() }.into(), StackError::from)
+        );
+    }
+    order::sort(&mut images);
+    let stems: HashSet<String> = images.iter().map(|image| order::stem(image)).collect();
+    let mut series = Series::of(images).map_err(|reason| StackError::Series { path: path.into(), reason })?;
+    // Without the images left out, numbers may be decimals.
+    order::sort(&mut series.images);
+    if let Some([first, second]) = order::same_stem(&series.images) {
+        return Err(VideoError::SameStem { first, second }.into());
+    }
+    // A camera's raw file has the name of its JPEG.
+    let missing = |file: &&PathBuf| !stems.contains(&order::stem(file)) && series.would_hold(file);
+    if let Some(unread) = others.iter().filter(missing).find_map(|file| image_file::unread(file)) {
+        return Err(unread.into());
+    }
+    let mut formats: BTreeMap<&str, usize> = BTreeMap::new();
+    series.images.iter().filter_map(|image| format(image)).for_each(|f| *formats.entry(f).or_default() += 1);
+    if formats.len() > 1 {
+        let found = formats.iter().map(|(format, count)| format!("{count} {format}")).collect::<Vec<_>>();
+        return Err(StackError::Mixed { path: path.into(), found: format!("{} files", found.join(" and ")) });
+    }
+    if let Some([before, after]) = order::counter_started_again(&series.images) {
+        let name = |path: &PathBuf| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let (after, before) = (name(after), name(before));
+        series.remarks.push(format!("the camera's counter started again: {after} follows {before}"));
+    }
+    Ok(series)
+}
+
+/// Files that are not hidden (other systems leave `._name.png` next to `name.png`), in order of their names.
+fn files(folder: &Path) -> std::io::Result<Vec<PathBuf>> {
+    let entries = fs::read_dir(folder)?.collect::<Result<Vec<_>, _>>()?;
+    let hidden = |path: &Path| path.file_name().is_some_and(|name| name.to_string_lossy().starts_with('.'));
+    let mut files: Vec<PathBuf> = entries.iter().map(fs::DirEntry::path).collect();
+    files.retain(|path| !hidden(path) && path.is_file());
+    files.sort();
+    Ok(files)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::list;
+    use super::*;
+    use crate::image_file::encode_png;
+    use ndarray::array;
+
+    fn folder(files: &[(&str, &[u8])]) -> tempfile::TempDir {
+        let folder = tempfile::tempdir().unwrap();
+        files.iter().for_each(|(name, bytes)| fs::write(folder.path().join(name), bytes).unwrap());
+        folder
+    }
+
+    #[test]
+    fn an_image_of_the_series_that_is_not_read_is_refused() {
+        let png = encode_png(array![[7]].view(), 16).unwrap();
+        let heic = b"\0\0\0\x18ftypheic\0\0\0\0".as_slice();
+        let webp = b"RIFF\x10\0\0\0WEBPVP8L".as_slice();
+        let raw = b"FUJIFILMCCD-RAW ".as_slice();
+        for (name, bytes, phrase) in [
+            ("i02.HEIC", heic, "HEIC"),
+            ("i02.webp", webp, "WebP"),
+            ("i02.RAF", raw, "raw file"),
+            ("i02.dat", &png, "rename it"),
+        ] {
+            let mixed = folder(&[("i01.png", &png), ("i03.png", &png), (name, bytes)]);
+            let error = list(mixed.path()).unwrap_err().to_string();
+            assert!(error.contains(name) && error.contains(phrase), "{error}");
+        }
+        let only = folder(&[("i1.webp", webp), ("a.txt", b"notes")]);
+        assert!(list(only.path()).unwrap_err().to_string().contains("WebP"));
+        let (note, other) = (b"note".as_slice(), ("other.webp", webp));
+        let twins = folder(&[("i1.png", &png), ("i2.png", &png), ("i2.RAF", raw), ("i3.txt", note), other]);
+        assert_eq!(list(twins.path()).unwrap().images.len(), 2);
+    }
+
+    #[test]
+    fn jfif_is_jpeg() {
+        let mixed = folder(&[("i1.jpg", b"\xff\xd8"), ("i2.jfif", b"\xff\xd8"), ("i3.JPE", b"\xff\xd8")]);
+        assert_eq!(list(mixed.path()).unwrap().images.len(), 3);
+    }
+
+    #[test]
+    fn several_series_are_refused_with_the_folder() {
+        let names = ["z1_c1.png", "z1_c2.png", "z2_c1.png", "z2_c2.png"];
+        let mixed = folder(&names.map(|name| (name, b"".as_slice())));
+        let error = list(mixed.path()).unwrap_err().to_string();
+        let path = mixed.path().display().to_string();
+        assert!(error.starts_with(&path) && error.contains("c (1, 2)"), "{error}");
+    }
+}

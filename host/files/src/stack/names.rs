@@ -1,0 +1,280 @@
+//! Which images of a folder form one focus series, by the numbers in their names.
+
+use std::{
+    collections::{BTreeMap, HashMap, HashSet},
+    path::PathBuf,
+};
+
+use crate::order::{
+    self,
+    name::{Name, Number},
+};
+
+/// Largest share of images outside the pattern of the others, relative to these, that is left out and not refused.
+const FEW: f64 = 0.25;
+const LISTED: usize = 3;
+
+#[derive(Debug, PartialEq)]
+pub(super) struct Series {
+    pub images: Vec<PathBuf>,
+    pub remarks: Vec<String>,
+    /// Of the texts in names; `None` if the images have several.
+    pattern: Option<Vec<String>>,
+}
+
+impl Series {
+    /// Selects from sorted images. Fails if they form several series.
+    pub fn of(images: Vec<PathBuf>) -> Result<Self, String> {
+        let names: Vec<Name> = images.iter().map(|path| Name::of(path)).collect();
+        if images.len() < 2 || names.iter().all(|name| name.numbers.is_empty()) {
+            let remarks = Vec::from_iter((images.len() > 1).then(|| {
+                format!(
+                    "the names have no numbers: the images, {} first, are in alphabetical order",
+                    file(&images[0])
+                )
+            }));
+            return Ok(Self { images, remarks, pattern: None });
+        }
+        let bare = without_number(&images, &names);
+        let mut patterns: BTreeMap<&[String], Vec<usize>> = BTreeMap::new();
+        for (index, name) in names.iter().enumerate().filter(|(index, _)| Some(*index) != bare) {
+            patterns.entry(&name.texts).or_default().push(index);
+        }
+        let Some((pattern, within)) = patterns.iter().max_by_key(|(_, indices)| indices.len()) else {
+            unreachable!("at least one image has a pattern")
+        };
+        let of_pattern: Vec<Name> = within.iter().map(|index| names[*index].clone()).collect();
+        let others = names.len() - within.len() - usize::from(bare.is_some());
+        let mut remarks = Vec::new();
+        if others as f64 > FEW * within.len() as f64 || pattern.len() == 1 {
+            if numbered_first(&names) {
+                return Ok(Self { images, remarks, pattern: None });
+            }
+            return Err(format!(
+                "its images have names of several kinds: {}: a stack is one focus series; move the images that do not belong to it away",
+                kinds(&patterns)
+            ));
+        }
+        let fields = fields(&of_pattern);
+        let unlike = || fields.iter().map(Field::to_string).collect::<Vec<_>>().join(" and ");
+        if fields.len() > 1 {
+            let combinations: usize = fields.iter().map(|field| field.values.len()).product();
+            if combinations == of_pattern.len() {
+                return Err(format!(
+                    "the names differ in {} in every combination: a stack is one focus series; move the images of one series \
+                     into a folder and give that",
+                    unlike()
+                ));
+            }
+            remarks.push(format!(
+                "the names differ in {}, without all combinations: the images count as one series in the order of their names",
+                unlike()
+            ));
+        }
+        if let Some(bare) = bare {
+            remarks.push(format!("{} has no number: it counts as the first image", file(&images[bare])));
+        }
+        let belongs = |index: &usize| bare == Some(*index) || within.binary_search(index).is_ok();
+        for index in (0..images.len()).filter(|index| !belongs(index)) {
+            remarks.push(format!(
+                "left out {}: its name does not belong to the series {}",
+                file(&images[index]),
+                shown(pattern)
+            ));
+        }
+        let pattern = Some(pattern.to_vec());
+        let images = (0..images.len()).filter(belongs).map(|index| images[index].clone()).collect();
+        Ok(Self { images, remarks, pattern })
+    }
+
+    /// Whether a file of this name would be one of the images.
+    pub fn would_hold(&self, path: &std::path::Path) -> bool {
+        self.pattern.as_ref().is_none_or(|pattern| Name::of(path).texts == *pattern)
+    }
+}
+
+fn file(path: &std::path::Path) -> String {
+    path.file_name().unwrap_or_default().to_string_lossy().into_owned()
+}
+
+/// The image whose name begins all others, without their numbers: `a.png` of `a (2).png`, `a (3).png`.
+fn without_number(images: &[PathBuf], names: &[Name]) -> Option<usize> {
+    let shortest = (0..images.len()).min_by_key(|index| order::stem(&images[*index]).len())?;
+    let stem = order::stem(&images[shortest]);
+    let begins = images.iter().all(|path| order::stem(path).starts_with(&stem));
+    let alike = names.iter().filter(|name| name.texts == names[shortest].texts).count();
+    (begins && alike == 1).then_some(shortest)
+}
+
+/// Whether a number after the same text tells all names apart: `1 near`, `2 far`.
+fn numbered_first(names: &[Name]) -> bool {
+    let mut seen = HashSet::new();
+    names.iter().all(|name| {
+        name.texts[0] == names[0].texts[0] && name.numbers.first().is_some_and(|number| seen.insert(number))
+    })
+}
+
+fn shown(pattern: &[String]) -> String {
+    pattern.join("#")
+}
+
+fn kinds(patterns: &BTreeMap<&[String], Vec<usize>>) -> String {
+    let mut kinds: Vec<_> = patterns.iter().map(|(pattern, found)| (found.len(), shown(pattern))).collect();
+    kinds.sort_by_key(|(count, _)| std::cmp::Reverse(*count));
+    let more = if kinds.len() > LISTED { ", ..." } else { "" };
+    let first: Vec<_> =
+        kinds.iter().take(LISTED).map(|(count, pattern)| format!("{count} of {pattern}")).collect();
+    format!("{}{more}", first.join(", "))
+}
+
+/// A number in all names that differs between them.
+struct Field {
+    label: String,
+    /// In order of their first occurrence.
+    values: Vec<String>,
+    /// Index in `values`, for each name.
+    of_names: Vec<usize>,
+}
+
+impl std::fmt::Display for Field {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let mut values: Vec<&str> = self.values.iter().map(String::as_str).collect();
+        let value = |text: &&str| text.parse().unwrap_or(f64::NAN);
+        values.sort_by(|a, b| value(a).total_cmp(&value(b)));
+        match values.as_slice() {
+            [first, .., last] if values.len() > LISTED => write!(f, "{} ({first} to {last})", self.label),
+            few => write!(f, "{} ({})", self.label, few.join(", ")),
+        }
+    }
+}
+
+/// Numbers that differ, without those that another one determines. None if one tells all images apart.
+fn fields(names: &[Name]) -> Vec<Field> {
+    let all: Vec<Field> = (0..names[0].numbers.len()).map(|column| field(names, column)).collect();
+    let mut fields: Vec<Field> = Vec::new();
+    for field in all.into_iter().filter(|field| (2..names.len()).contains(&field.values.len())) {
+        if !fields.iter().any(|other| determines(other, &field)) {
+            fields.retain(|other| !determines(&field, other));
+            fields.push(field);
+        }
+    }
+    fields
+}
+
+fn field(names: &[Name], column: usize) -> Field {
+    let mut seen: HashMap<&Number, usize> = HashMap::new();
+    let mut values = Vec::new();
+    let of_names = names.iter().map(|name| {
+        let number = &name.numbers[column];
+        *seen.entry(number).or_insert_with(|| {
+            values.push(format!(
+                "{}{}",
+                number.sign.filter(|sign| *sign == '-').map(String::from).unwrap_or_default(),
+                number.text
+            ));
+            values.len() - 1
+        })
+    });
+    let of_names = of_names.collect();
+    let before = &names[0].texts[column];
+    let word = before
+        .rfind(|c: char| !c.is_alphabetic())
+        .map_or(0, |at| at + before[at..].chars().next().map_or(0, char::len_utf8));
+    let label =
+        if word < before.len() { before[word..].to_owned() } else { format!("number {}", column + 1) };
+    Field { label, values, of_names }
+}
+
+fn determines(a: &Field, b: &Field) -> bool {
+    let mut of_a = vec![None; a.values.len()];
+    a.of_names.iter().zip(&b.of_names).all(|(a, b)| *of_a[*a].get_or_insert(*b) == *b)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn series<S: AsRef<str>>(names: &[S]) -> Result<Series, String> {
+        let mut images: Vec<PathBuf> = names.iter().map(|name| PathBuf::from(name.as_ref())).collect();
+        order::sort(&mut images);
+        Series::of(images)
+    }
+
+    fn grid(name: impl Fn(u32, u32) -> String) -> Vec<String> {
+        (0..5).flat_map(|z| [1, 2].map(|other| name(z, other))).collect()
+    }
+
+    #[test]
+    fn channels_positions_and_times_are_several_series() {
+        for (names, phrase) in [
+            (
+                grid(|z, c| format!("img_channel{c:03}_position000_time000000000_z{z:03}.tif")),
+                "channel (001, 002) and z (000 to 004)",
+            ),
+            (grid(|z, w| format!("A01_s1_w{w}_z{z}.TIF")), "w (1, 2) and z (0 to 4)"),
+            (grid(|z, p| format!("img_pos{p}_z{z:03}.tif")), "pos (1, 2)"),
+            (grid(|z, t| format!("img_t{t:04}_z{z:03}.tif")), "t (0001, 0002)"),
+            (grid(|z, c| format!("img_z{z:03}_c{c:02}_t0001.tif")), "z (000 to 004) and c (01, 02)"),
+            (grid(|z, c| format!("r01c01f01p{z:02}-ch{c}sk1fk1fl1.tiff")), "p (00 to 04) and ch (1, 2)"),
+            (grid(|z, c| format!("s{:04}_z{z}_c{c}.tif", 2 * z + c)), "z (0 to 4) and c (1, 2)"),
+            (
+                grid(|z, c| format!("z{}um_c{c}_{}nm.tif", 0.5 * f64::from(z), 400 + 88 * c)),
+                "z (0 to 2) and c",
+            ),
+        ] {
+            let error = series(&names).unwrap_err();
+            assert!(error.contains(phrase) && error.contains("one focus series"), "{error}");
+        }
+        assert!(
+            series(&grid(|z, c| format!("z{z}_{}.tif", ["DAPI", "FITC"][c as usize - 1])))
+                .unwrap_err()
+                .contains("5 of z#_DAPI, 5 of z#_FITC")
+        );
+        let incomplete = grid(|z, c| format!("z{z}_c{c}.tif"));
+        assert!(series(&incomplete[1..]).unwrap().remarks[0].contains("z (0 to 4) and c (1, 2)"));
+    }
+
+    #[test]
+    fn numbers_that_vary_together_are_one_series() {
+        let of = |name: &dyn Fn(u32) -> String| series(&(0..6).map(name).collect::<Vec<_>>()).unwrap();
+        for found in [
+            of(&|z| format!("img_{:09}_z{z:03}_{}um.tif", 7 * z, 250 * z)),
+            of(&|z| format!("IMG_2024050{}_{:06}.jpg", 1 + z / 3, 235_958 + z)),
+            of(&|z| format!("z{:.2}.png", 0.25 * f64::from(z))),
+            of(&|z| format!("z{}.png", i64::from(z) - 2)),
+            of(&|z| format!("z{}.png", 1 + 9 * z)),
+            of(&|z| format!("2024-05-01_c1_z{z}.png")),
+        ] {
+            assert_eq!((found.images.len(), found.remarks), (6, vec![]));
+        }
+    }
+
+    #[test]
+    fn names_outside_the_series_are_left_out_by_name() {
+        let sources: Vec<String> = (0..8).map(|z| format!("img{z:03}.tif")).collect();
+        for other in ["2024-05-01 ZS PMax.tif", "stack_fused.tif", "img008_helicon.tif", "0_fused.tif"] {
+            let with_other = [&sources[..], &[other.to_owned()]].concat();
+            let found = series(&with_other).unwrap();
+            assert_eq!(found.images, sources.iter().map(PathBuf::from).collect::<Vec<_>>());
+            assert!(found.remarks[0].starts_with(&format!("left out {other}: ")), "{:?}", found.remarks);
+        }
+        let error = series(&["a1.png", "a2.png", "b1.png"]).unwrap_err();
+        assert!(error.contains("2 of a#, 1 of b#"), "{error}");
+    }
+
+    #[test]
+    fn a_name_that_begins_the_others_is_the_first() {
+        let found = series(&["a (2).png", "a (3).png", "a.png"]).unwrap();
+        assert_eq!(found.images, ["a.png", "a (2).png", "a (3).png"].map(PathBuf::from));
+        assert!(found.remarks[0].contains("a.png has no number"));
+    }
+
+    #[test]
+    fn names_without_one_pattern_keep_their_order() {
+        let found = series(&["near.png", "middle.png"]).unwrap();
+        assert!(found.remarks[0].contains("alphabetical"));
+        let found = series(&["2 far.png", "1 near.png", "3 beyond.png"]).unwrap();
+        assert_eq!(found.images[0], PathBuf::from("1 near.png"));
+        assert_eq!(found.remarks, [""; 0]);
+    }
+}

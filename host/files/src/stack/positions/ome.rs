@@ -1,0 +1,192 @@
+//! OME-XML: https://docs.openmicroscopy.org/ome-model
+
+use std::borrow::Cow;
+
+use super::{Planes, moving, one_series, unit_um};
+use crate::image_file::Page;
+
+/// The first image of a file's OME-XML.
+pub(super) struct Metadata<'a>(Cow<'a, str>);
+
+impl<'a> Metadata<'a> {
+    pub fn of(description: &'a str) -> Option<Self> {
+        let root = description.match_indices("OME").find_map(|(at, _)| {
+            let begin = description[..at].rfind('<')? + 1;
+            let prefix = &description[begin..at];
+            let after = description[at + 3..].starts_with([' ', '>', '\n', '\r', '\t']);
+            (after && (prefix.is_empty() || prefix.ends_with(':'))).then_some(prefix)
+        })?;
+        let xml: Cow<'_, str> = match root {
+            "" => description.into(),
+            prefix => {
+                description.replace(&format!("<{prefix}"), "<").replace(&format!("</{prefix}"), "</").into()
+            }
+        };
+        elements(&xml, "Pixels").next()?;
+        Some(Self(xml))
+    }
+
+    fn pixels(&self) -> &str {
+        elements(&self.0, "Pixels").next().unwrap_or_default()
+    }
+
+    /// Elements in the image's `Pixels`.
+    fn within(&self, name: &'static str) -> impl Iterator<Item = &str> {
+        elements(self.0.split("</Pixels").next().unwrap_or_default(), name)
+    }
+
+    fn length_um(&self, name: &str) -> Option<f64> {
+        let unit = attribute(self.pixels(), &format!("{name}Unit")).map_or(Some(1.0), unit_um)?;
+        Some(attribute(self.pixels(), name)?.parse::<f64>().ok()? * unit)
+    }
+
+    pub fn pixel_um(&self) -> Option<f64> {
+        self.length_um("PhysicalSizeX")
+    }
+
+    pub fn planes(&self, pages: &[Page]) -> Result<Planes, String> {
+        let count = |name| number(self.pixels(), name).unwrap_or(1);
+        let samples = pages.first().map_or(1, |page| page.directory.samples_per_pixel.max(1) as usize);
+        one_series(count("SizeC") / samples.min(count("SizeC").max(1)), count("SizeT"))?;
+        let planes = count("SizeZ");
+        if planes != pages.len() {
+            return Err(format!(
+                "its OME metadata have {planes} planes and the file has {}: give the file with all of them, or a folder of \
+                 single images",
+                pages.len()
+            ));
+        }
+        let order = self.order(pages)?;
+        let positions_um = if planes > 1 { self.positions_um(planes) } else { None };
+        Ok(Planes { pages: order, positions_um, remarks: Vec::new() })
+    }
+
+    /// Index of the page of each plane, by the elements `TiffData`.
+    fn order(&self, pages: &[Page]) -> Result<Vec<usize>, String> {
+        let planes = pages.len();
+        if self.within("TiffData").next().is_none() {
+            return Ok((0..planes).collect());
+        }
+        let mut of_planes = vec![None; planes];
+        for data in self.within("TiffData") {
+            let directory = number(data, "IFD");
+            let count = number(data, "PlaneCount").unwrap_or(if directory.is_some() { 1 } else { planes });
+            let (plane, directory) = (number(data, "FirstZ").unwrap_or(0), directory.unwrap_or(0));
+            for step in 0..count.min(planes) {
+                if let Some(of_plane) = of_planes.get_mut(plane.saturating_add(step)) {
+                    *of_plane = pages.iter().position(|page| page.index == directory.saturating_add(step));
+                }
+            }
+        }
+        let mut distinct: Vec<usize> = of_planes.iter().copied().flatten().collect();
+        distinct.sort_unstable();
+        distinct.dedup();
+        if distinct.len() < planes {
+            return Err(format!(
+                "its OME metadata (TiffData) have pages for {} of {planes} planes: save it again (Bio-Formats: bfconvert), or give a \
+                 folder of single images",
+                distinct.len()
+            ));
+        }
+        Ok(of_planes.into_iter().flatten().collect())
+    }
+
+    fn positions_um(&self, planes: usize) -> Option<Vec<f64>> {
+        let mut positions = vec![None; planes];
+        for plane in self.within("Plane") {
+            let unit = attribute(plane, "PositionZUnit").map_or(Some(1.0), unit_um);
+            let z = attribute(plane, "PositionZ").and_then(|text| text.parse::<f64>().ok());
+            let at = number(plane, "TheZ").and_then(|at| positions.get_mut(at));
+            if let (Some(at), Some(unit), Some(z)) = (at, unit, z) {
+                *at = Some(z * unit);
+            }
+        }
+        let stated = positions.into_iter().collect::<Option<Vec<f64>>>().filter(|all| moving(all));
+        let spacing = self.length_um("PhysicalSizeZ").filter(|um| um.is_finite() && *um != 0.0);
+        stated.or_else(|| spacing.map(|spacing| (0..planes).map(|plane| plane as f64 * spacing).collect()))
+    }
+}
+
+/// The begin tags of a name.
+fn elements<'a>(xml: &'a str, name: &'static str) -> impl Iterator<Item = &'a str> {
+    xml.split('<').filter_map(move |tag| {
+        let attributes = tag.strip_prefix(name)?;
+        attributes.starts_with([' ', '\n', '\r', '\t', '/', '>']).then(|| attributes.split('>').next())?
+    })
+}
+
+fn number(tag: &str, name: &str) -> Option<usize> {
+    attribute(tag, name)?.parse().ok()
+}
+
+fn attribute<'a>(tag: &'a str, name: &str) -> Option<&'a str> {
+    tag.match_indices(name).find_map(|(at, _)| {
+        let before = tag[..at].chars().next_back()?;
+        let rest = tag[at + name.len()..].trim_start().strip_prefix('=')?.trim_start();
+        let quote = rest.chars().next().filter(|c| matches!(c, '"' | '\''))?;
+        before.is_ascii_whitespace().then(|| rest[1..].split(quote).next()).flatten()
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{
+        object_pixel_um, of,
+        tests::{pages, positions},
+    };
+
+    #[test]
+    fn ome_gives_uneven_positions_or_an_even_spacing() {
+        let even = "<?xml?><OME><Image><Pixels DimensionOrder=\"XYZCT\" SizeC=\"1\" SizeT=\"1\" SizeZ=\"3\" SizeX=\"8\" \
+                    PhysicalSizeZ=\"1.5\" PhysicalSizeZUnit=\"\u{b5}m\"></Pixels></Image></OME>";
+        assert_eq!(positions(&pages(3, even)), Ok(Some(vec![0.0, 1.5, 3.0])));
+        let planes = "<Plane TheZ='0' PositionZ='-3'/><Plane TheZ='2' PositionZ='5'/><Plane TheZ='1' PositionZ='0.5'/>";
+        let uneven = even.replace("</Pixels>", &format!("{planes}</Pixels>"));
+        assert_eq!(positions(&pages(3, &uneven)), Ok(Some(vec![-3.0, 0.5, 5.0])));
+        // All planes at one place say nothing; two of them are refused where places are needed.
+        let at_once = uneven.replace("'-3'", "'5'").replace("'0.5'", "'5'");
+        assert_eq!(positions(&pages(3, &at_once)), Ok(Some(vec![0.0, 1.5, 3.0])));
+        let twice = uneven.replace("'-3'", "'0.5'");
+        assert_eq!(positions(&pages(3, &twice)), Ok(Some(vec![0.5, 0.5, 5.0])));
+        assert!(of(&pages(1, even)).unwrap_err().contains("3 planes"));
+        let times = even.replace("SizeT=\"1\"", "SizeT=\"3\"").replace("SizeZ=\"3\"", "SizeZ=\"1\"");
+        assert!(of(&pages(3, &times)).unwrap_err().contains("3 times"));
+    }
+
+    #[test]
+    fn tiff_data_give_the_order_of_pages() {
+        let of_data = |data: &str| {
+            let xml =
+                format!("<OME><Image><Pixels SizeZ=\"3\" PhysicalSizeZ=\"2\">{data}</Pixels></Image></OME>");
+            of(&pages(3, &xml)).map(|planes| planes.pages)
+        };
+        let one = |z: usize, page: usize| {
+            format!("<TiffData FirstZ='{z}' FirstC='0' IFD='{page}' PlaneCount='1'/>")
+        };
+        assert_eq!(of_data(&[one(0, 2), one(1, 1), one(2, 0)].concat()), Ok(vec![2, 1, 0]));
+        assert_eq!(
+            of_data("<TiffData FirstZ='1' IFD='0' PlaneCount='2'/><TiffData IFD='2'/>"),
+            Ok(vec![2, 0, 1])
+        );
+        for all in ["", "<TiffData/>", "<TiffData IFD='0' PlaneCount='3'></TiffData>"] {
+            assert_eq!(of_data(all), Ok(vec![0, 1, 2]), "{all}");
+        }
+        for wrong in [
+            one(0, 0),
+            [one(0, 0), one(1, 0), one(2, 1)].concat(),
+            "<TiffData IFD='1' PlaneCount='3'/>".into(),
+        ] {
+            assert!(of_data(&wrong).unwrap_err().contains("of 3 planes"), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn names_may_have_the_prefix_of_a_namespace() {
+        let xml = "<?xml?><ome:OME xmlns:ome='u'><ome:Image><ome:Pixels SizeC='1' SizeZ='2' PhysicalSizeX='3' PhysicalSizeZ='1.5'>\
+                   <ome:TiffData FirstZ='1'/><ome:TiffData FirstZ='0' IFD='1'/></ome:Pixels></ome:Image></ome:OME>";
+        let planes = of(&pages(2, &xml.replace("FirstZ='1'/", "FirstZ='1' IFD='0'/"))).unwrap();
+        assert_eq!((planes.pages, planes.positions_um), (vec![1, 0], Some(vec![0.0, 1.5])));
+        assert_eq!(object_pixel_um(&pages(2, xml)), Some(3.0));
+        assert!(of(&pages(2, &xml.replace("SizeC='1'", "SizeC='2'"))).unwrap_err().contains("2 channels"));
+    }
+}
