@@ -2,7 +2,7 @@
 //! SMPL, SMPL-H and SMPL-X, which need the licensed body model; such files are rejected.
 
 use super::{
-    body,
+    posture,
     reader::Reader,
     recording::{Found, Known, RecordingError, Source, Unit, Up},
     zip,
@@ -13,7 +13,7 @@ pub const READER: Reader = Reader {
     name: "NPZ",
     extensions: &["npz"],
     about: "joint positions of SMPL bodies (array `joints`, frames x joints x 3), metres; AMASS pose parameters are refused",
-    read,
+    read: |bytes, _| read(bytes),
 };
 
 const POSITIONS: [&str; 8] =
@@ -94,7 +94,7 @@ pub fn read(bytes: &[u8]) -> Result<Found, RecordingError> {
         names: SMPL.iter().map(|name| (*name).to_owned()).collect(),
         rate_hz: rate_hz.unwrap_or(0.0),
         unit: Known { value: Unit { mm: 1000.0 }, source: Source::Format },
-        up: body::upright(&frames, HEAD, &FEET, Up::Z),
+        up: posture::upright(&frames, &[HEAD], &FEET, Up::Z),
         frames,
         others: Vec::new(),
         planar: false,

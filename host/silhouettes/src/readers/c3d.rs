@@ -54,8 +54,12 @@ struct Parameter {
     at: usize,
 }
 
-pub const READER: Reader =
-    Reader { name: "C3D", extensions: &["c3d"], about: "Vicon and most other systems, z up", read };
+pub const READER: Reader = Reader {
+    name: "C3D",
+    extensions: &["c3d"],
+    about: "Vicon and most other systems, z up",
+    read: |bytes, _| read(bytes),
+};
 
 /// Reads the points. The axes are not stated; nearly all files have z up.
 pub fn read(bytes: &[u8]) -> Result<Found, RecordingError> {

@@ -14,7 +14,7 @@ pub const READER: Reader = Reader {
     name: "NTU RGB+D",
     extensions: &["skeleton"],
     about: "25 joints of a Kinect, metres, y up; the body that moves most",
-    read,
+    read: |bytes, _| read(bytes),
 };
 
 /// The sensor follows six bodies.
@@ -145,7 +145,7 @@ mod tests {
                 .map(|joint| {
                     format!(
                         "{x} {} 3 0 0 0 0 0 0 0 0 {}\n",
-                        joint as f64 / 25.0,
+                        (24 - joint) as f64 / 25.0,
                         if joint == 7 { 0 } else { 2 }
                     )
                 })
@@ -161,7 +161,7 @@ mod tests {
         let settled = found.settled(super::super::recording::Choices::default());
         assert_eq!((settled.frames.len(), settled.rate_hz), (2, 30.0));
         let head = settled.by_name(1)["head"];
-        assert!(head.iter().zip([600.0, -3000.0, 120.0]).all(|(a, b)| (a - b).abs() < 1e-9), "{head:?}");
+        assert!(head.iter().zip([600.0, -3000.0, 840.0]).all(|(a, b)| (a - b).abs() < 1e-9), "{head:?}");
         assert!(!settled.by_name(0).contains_key("left hand"));
         assert_eq!(
             settled.remarks(),
@@ -196,7 +196,7 @@ mod tests {
         for (text, line) in [
             (String::new(), 1),
             ("2\n1\n71 0\n24\n".into(), 4),
-            (file().replacen("0.5 0.04 3", "0.5 x 3", 1), 33),
+            (file().replacen("0.5 0.92 3", "0.5 x 3", 1), 33),
             (file().lines().take(40).collect::<Vec<_>>().join("\n"), 41),
             ("99999999999\n".into(), 1),
         ] {
