@@ -2,7 +2,8 @@
 //! of frames; per frame the number of bodies; per body a line (its id first), the number of joints and a line
 //! per joint: x, y, z in metres (x across, y up, z away), eight further numbers, and whether it was tracked.
 //! Of several bodies present for at least half as long as the longest, the one whose joints vary most is
-//! used: the sensor also reports chairs as bodies, and their joints only jitter.
+//! used: the sensor also reports chairs as bodies, and their joints only jitter. Bodies that are never visible together are
+//! one person under changing ids.
 
 use super::kinect::JOINTS_25;
 use super::reader::Reader;
@@ -28,8 +29,11 @@ pub fn read(bytes: &[u8]) -> Result<Found, RecordingError> {
     let mut lines = Lines { lines: content.lines(), at: 0 };
     let count = lines.count("the number of frames")?;
     let mut bodies: BTreeMap<String, Vec<(usize, Body)>> = BTreeMap::new();
+    let mut most_together = 0;
     for frame in 0..count {
-        for _ in 0..lines.count("the number of bodies")? {
+        let together = lines.count("the number of bodies")?;
+        most_together = together.max(most_together);
+        for _ in 0..together {
             let about = lines.next("a line about a body")?;
             let id = about.split_whitespace().next().unwrap_or_default().to_owned();
             let joints = lines.count("the number of joints")?;
@@ -41,6 +45,12 @@ pub fn read(bytes: &[u8]) -> Result<Found, RecordingError> {
         }
     }
     let mut remarks = Vec::new();
+    if most_together == 1 && bodies.len() > 1 {
+        remarks.push(format!("{} ids, never two in a frame: they are read as one person", bodies.len()));
+        let mut whole: Vec<(usize, Body)> = bodies.into_values().flatten().collect();
+        whole.sort_by_key(|(frame, _)| *frame);
+        bodies = BTreeMap::from([(String::new(), whole)]);
+    }
     if bodies.len() > 1 {
         remarks.push(format!(
             "{} bodies in the file: the one that moves most is used (--person 2 reads the next)",
@@ -167,6 +177,19 @@ mod tests {
             settled.remarks(),
             ["2 bodies in the file: the one that moves most is used (--person 2 reads the next)"]
         );
+    }
+
+    #[test]
+    fn bodies_that_are_never_visible_together_are_one_person() {
+        let text = file();
+        let (_, frames) = text.split_once('\n').expect("a count");
+        let one = frames.strip_prefix("2\n").expect("two bodies");
+        let lines: Vec<&str> = one.lines().collect();
+        let (first, rest) = lines.split_at(27);
+        let text = format!("2\n1\n{}\n1\n{}\n", first.join("\n"), rest[..27].join("\n"));
+        let found = read(text.as_bytes()).expect("a skeleton");
+        assert!(found.others.is_empty() && found.frames.iter().all(|frame| frame[0].is_some()));
+        assert!(found.remarks[0].contains("one person"), "{:?}", found.remarks);
     }
 
     #[test]
