@@ -20,6 +20,8 @@ pub mod keypoints;
 pub mod kinect;
 pub mod matlab;
 pub mod ntu;
+mod people;
+mod posture;
 pub mod reader;
 pub mod recording;
 pub mod skeletons;
@@ -27,7 +29,7 @@ pub mod trc;
 mod zip;
 
 use reader::Reader;
-use recording::{Choices, Found, Recording, RecordingError, Source};
+use recording::{Choices, Found, Recording, RecordingError, Source, Up};
 
 pub const READERS: [Reader; 8] = [
     bvh::READER,
@@ -45,22 +47,25 @@ pub fn read(bytes: &[u8], extension: &str, choices: Choices) -> Result<Recording
     let ending = extension.to_lowercase();
     let reader = READERS.iter().find(|reader| reader.extensions.contains(&ending.as_str()));
     let reader = reader.ok_or_else(|| RecordingError::Extension { found: ending, known: extensions() })?;
-    settled((reader.read)(bytes)?, choices)
+    settled((reader.read)(bytes, choices)?, choices)
 }
 
 pub fn read_keypoint_files<'a>(
     files: impl IntoIterator<Item = &'a [u8]>,
     choices: Choices,
 ) -> Result<Recording, RecordingError> {
-    settled(keypoints::read_files(files)?, choices)
+    settled(keypoints::read_files(files, choices)?, choices)
 }
 
 fn settled(found: Found, choices: Choices) -> Result<Recording, RecordingError> {
-    let people = 1 + found.others.len();
-    if let Some(wanted) = choices.person.filter(|wanted| !(1..=people).contains(wanted)) {
-        return Err(RecordingError::Person { wanted, found: people });
+    if let Some(up @ (Up::Z | Up::MinusZ)) = choices.up.filter(|_| found.planar) {
+        return Err(RecordingError::PlanarUp(up));
     }
-    let recording = found.settled(choices);
+    let people = people::of(found);
+    let (wanted, count) = (choices.person.unwrap_or(1), people.len());
+    let person = wanted.checked_sub(1).and_then(|index| people.into_iter().nth(index));
+    let person = person.ok_or(RecordingError::Person { wanted, found: count })?;
+    let recording = person.settled(choices);
     match &recording.unit.source {
         Source::Unknown { stated } => Err(RecordingError::Unit(stated.clone())),
         _ => Ok(recording),

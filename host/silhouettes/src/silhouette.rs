@@ -2,6 +2,7 @@
 //! frame as in Li 2014, chapter 7: x and y span the ground, z points up, millimetres.
 
 pub mod aliases;
+pub mod anatomy;
 pub mod capsule;
 pub mod parts;
 pub mod raster;

@@ -34,6 +34,10 @@ pub enum SilhouettesError {
     Unfit { path: PathBuf, source: TemplateError, fits: Option<&'static str> },
     #[error("{}: the recording holds no frame", path.display())]
     NoFrames { path: PathBuf },
+    #[error(
+        "{}: no .json file in the folder; expected keypoints of OpenPose, COCO, HALPE, MMPose or MediaPipe, a file per frame (labels          of YOLO as .txt are not read: let it write JSON)", path.display()
+    )]
+    NoKeypointFiles { path: PathBuf },
     #[error("{}: no frame has a visible marker, so there is nothing to draw", path.display())]
     NothingVisible { path: PathBuf },
     #[error(

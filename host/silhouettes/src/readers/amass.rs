@@ -2,7 +2,7 @@
 //! SMPL, SMPL-H and SMPL-X, which need the licensed body model; such files are rejected.
 
 use super::{
-    body,
+    posture,
     reader::Reader,
     recording::{Found, Known, RecordingError, Source, Unit, Up},
     zip,
@@ -13,7 +13,7 @@ pub const READER: Reader = Reader {
     name: "NPZ",
     extensions: &["npz"],
     about: "joint positions of SMPL bodies (array `joints`, frames x joints x 3), metres; AMASS pose parameters are refused",
-    read,
+    read: |bytes, _| read(bytes),
 };
 
 const POSITIONS: [&str; 8] =
@@ -50,6 +50,7 @@ const FEET: [usize; 2] = [10, 11];
 struct Array {
     name: String,
     shape: Vec<usize>,
+    kind: String,
     /// Numbers in C order; empty for text.
     values: Vec<f64>,
     text: String,
@@ -69,6 +70,11 @@ pub fn read(bytes: &[u8]) -> Result<Found, RecordingError> {
         })
     });
     let Some(positions) = positions else { return Err(refused(&arrays)) };
+    if positions.values.is_empty() && positions.shape[0] > 0 {
+        let reason =
+            format!("array `{}` has the type {}, expected f2, f4 or f8", positions.name, positions.kind);
+        return Err(RecordingError::Kind { kind: "NPZ", reason });
+    }
     let (count, joints) = (positions.shape[0], positions.shape[1]);
     let frames: Vec<Vec<Option<Point3>>> = (0..count)
         .map(|frame| {
@@ -94,7 +100,7 @@ pub fn read(bytes: &[u8]) -> Result<Found, RecordingError> {
         names: SMPL.iter().map(|name| (*name).to_owned()).collect(),
         rate_hz: rate_hz.unwrap_or(0.0),
         unit: Known { value: Unit { mm: 1000.0 }, source: Source::Format },
-        up: body::upright(&frames, HEAD, &FEET, Up::Z),
+        up: posture::upright(&frames, &[HEAD], &FEET, Up::Z),
         frames,
         others: Vec::new(),
         planar: false,
@@ -158,14 +164,17 @@ fn array(name: &str, bytes: &[u8]) -> Result<Array, RecordingError> {
             raw[..size].reverse();
         }
         match letter {
+            "f2" => half(u16::from_le_bytes([raw[0], raw[1]])),
             "f4" => f64::from(f32::from_le_bytes([raw[0], raw[1], raw[2], raw[3]])),
             "f8" => f64::from_le_bytes(raw),
             "i4" => f64::from(i32::from_le_bytes([raw[0], raw[1], raw[2], raw[3]])),
             _ => i64::from_le_bytes(raw) as f64,
         }
     };
-    let mut found = Array { name: name.into(), shape, values: Vec::new(), text: String::new() };
+    let mut found =
+        Array { name: name.into(), shape, kind: kind.clone(), values: Vec::new(), text: String::new() };
     match letter {
+        "f2" => found.values = data.chunks_exact(2).map(number).collect(),
         "f4" | "i4" => found.values = data.chunks_exact(4).map(number).collect(),
         "f8" | "i8" => found.values = data.chunks_exact(8).map(number).collect(),
         _ if letter.starts_with('U') => {
@@ -185,6 +194,18 @@ fn array(name: &str, bytes: &[u8]) -> Result<Array, RecordingError> {
         return Err(bad("it is in Fortran's order, expected C's"));
     }
     Ok(found)
+}
+
+/// IEEE 754 binary16.
+fn half(bits: u16) -> f64 {
+    let (exponent, fraction) = (i32::from(bits >> 10 & 0x1f), f64::from(bits & 0x3ff) / 1024.0);
+    let size = match exponent {
+        0 => fraction * 2.0_f64.powi(-14),
+        31 if fraction == 0.0 => f64::INFINITY,
+        31 => f64::NAN,
+        _ => (1.0 + fraction) * 2.0_f64.powi(exponent - 15),
+    };
+    if bits >> 15 == 1 { -size } else { size }
 }
 
 #[cfg(test)]
@@ -259,6 +280,28 @@ mod tests {
         let head = found.by_name(1)["head"];
         assert!((head[2] - 1600.0).abs() < 0.1 && (head[0] - 100.0).abs() < 0.1, "{head:?}");
         assert!(found.by_name(0).contains_key("LeftUpLeg"), "matched by alias");
+    }
+
+    #[test]
+    fn halves_are_read_and_other_types_refused_by_name() {
+        let expected = [1.0, -2.5, 0.099_975_585_937_5, 6.103_515_625e-5, 0.0];
+        assert_eq!([0x3c00, 0xc100, 0x2e66, 0x0400, 0x0000].map(half), expected);
+        assert!(half(0x7c00).is_infinite() && half(0x7e00).is_nan());
+        let data: Vec<u8> = (0..66).flat_map(|_| 0x3c00_u16.to_le_bytes()).collect();
+        let found = read(&npz(&[("joints", npy("<f2", "(1, 22, 3)", &data))])).expect("halves");
+        assert_eq!(found.frames[0][21], Some([1.0; 3]));
+        let complex = npz(&[("joints", npy("<c8", "(1, 22, 3)", &vec![0; 66 * 8]))]);
+        let error = read(&complex).expect_err("complex numbers").to_string();
+        assert!(error.contains("`joints` has the type <c8"), "{error}");
+    }
+
+    #[test]
+    fn a_body_with_y_down_is_turned_upright() {
+        let joints = (0..22).flat_map(|joint| [0.1, if joint == HEAD { -1.6 } else { 0.1 }, 0.3]);
+        let file = npz(&[("joints", npy("<f4", "(1, 22, 3)", &floats(joints)))]);
+        let found = super::super::read(&file, "npz", Choices::default()).expect("a recording");
+        assert_eq!(found.up.value, Up::MinusY);
+        assert!(found.by_name(0)["head"][2] > found.by_name(0)["left_foot"][2]);
     }
 
     #[test]

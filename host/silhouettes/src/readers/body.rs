@@ -1,6 +1,7 @@
 //! Common parts of all body recordings: missing points written as zeros, and a plausible size.
 
-use super::recording::{Known, Source, Unit, Up};
+use super::posture::body_points;
+use super::recording::{Known, Source, Unit};
 use crate::silhouette::capsule::Point3;
 
 const POINTS: usize = 4;
@@ -38,13 +39,14 @@ fn inside(frame: &[Option<Point3>]) -> bool {
 }
 
 /// The unit, or the best fitting of mm, cm and m if the size is not human. Keeps the caller's unit.
-pub fn plausible(unit: Known<Unit>, frames: &[Vec<Option<Point3>>]) -> Known<Unit> {
+/// Measures the points `body`.
+pub fn plausible(unit: Known<Unit>, frames: &[Vec<Option<Point3>>], body: &[usize]) -> Known<Unit> {
     let limits = match unit.source {
         Source::Format => USUAL_MM,
         Source::File => POSSIBLE_MM,
         Source::Caller | Source::Unknown { .. } | Source::Guess { .. } => return unit,
     };
-    let Some(extent) = median_extent(frames) else { return unit };
+    let Some(extent) = median_extent(frames, body) else { return unit };
     let stated_mm = extent * unit.value.mm;
     if (limits[0]..=limits[1]).contains(&stated_mm) {
         return unit;
@@ -61,31 +63,10 @@ pub fn plausible(unit: Known<Unit>, frames: &[Vec<Option<Point3>>]) -> Known<Uni
     Known { value: Unit { mm: best }, source: Source::Guess { reason, sure: off(best) < 0.7 } }
 }
 
-/// The axis along which the head is above the feet on average; `usual` without a head or feet.
-pub fn upright(frames: &[Vec<Option<Point3>>], head: usize, feet: &[usize], usual: Up) -> Known<Up> {
-    let mut upward = [0.0; 3];
-    for frame in frames {
-        let at =
-            |place: usize| frame.get(place).copied().flatten().filter(|p| p.iter().all(|v| v.is_finite()));
-        for (head, foot) in
-            at(head).into_iter().flat_map(|head| feet.iter().filter_map(move |foot| Some((head, at(*foot)?))))
-        {
-            (0..3).for_each(|k| upward[k] += head[k] - foot[k]);
-        }
-    }
-    let length = upward.iter().map(|v| v * v).sum::<f64>().sqrt();
-    let axes = [Up::X, Up::Y, Up::Z].into_iter().zip(upward);
-    let best = axes.max_by(|a, b| a.1.total_cmp(&b.1)).filter(|(_, along)| length > 0.0 && *along > 0.0);
-    let (value, part) = best.map_or((usual, 0.0), |(up, along)| (up, along / length));
-    let reason = format!("for {:.0} % of the way from the feet to the head lie along it", 100.0 * part);
-    Known { value, source: Source::Guess { reason, sure: part >= 0.8 } }
-}
-
 /// Median over frames of the largest extent, file units; `None` if no frame has enough points.
-fn median_extent(frames: &[Vec<Option<Point3>>]) -> Option<f64> {
+fn median_extent(frames: &[Vec<Option<Point3>>], body: &[usize]) -> Option<f64> {
     let extent = |frame: &Vec<Option<Point3>>| -> Option<f64> {
-        let points: Vec<Point3> =
-            frame.iter().flatten().copied().filter(|p| p.iter().all(|v| v.is_finite())).collect();
+        let points = body_points(frame, body);
         let along = |k: usize| {
             let values = || points.iter().map(|p| p[k]);
             values().fold(f64::MIN, f64::max) - values().fold(f64::MAX, f64::min)
@@ -133,6 +114,15 @@ mod tests {
         assert!(found.remarks()[0].contains("1.600 mm long"), "{:?}", found.remarks());
         let named = Choices { unit: Some(super::Unit { mm: 10.0 }), ..Choices::default() };
         assert_eq!(read(csv(&[row]).as_bytes(), "csv", named).expect("a table").unit.value.mm, 10.0);
+    }
+
+    #[test]
+    fn the_unit_is_that_of_the_body_and_not_of_forces() {
+        let names = ["LFHD", "C7", "LASI", "LTOE", "Force"];
+        let header = names.map(|name| format!("{name}_x,{name}_y,{name}_z")).join(",");
+        let text = format!("{header}\n.1,.1,1.7,.1,.2,1.5,.1,.2,1,.1,.2,.1,400,1200,9\n");
+        let found = read(text.as_bytes(), "csv", Choices::default()).expect("a table");
+        assert_eq!(found.unit.value.mm, 1000.0);
     }
 
     #[test]

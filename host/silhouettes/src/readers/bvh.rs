@@ -14,7 +14,7 @@ pub const READER: Reader = Reader {
     name: "BVH",
     extensions: &["bvh"],
     about: "joints of a skeleton (CMU's library, Mixamo and many others); unit and up are guessed from the body",
-    read,
+    read: |bytes, _| read(bytes),
 };
 
 pub fn read(bytes: &[u8]) -> Result<Found, RecordingError> {

@@ -1,10 +1,10 @@
 //! C3D motion capture (c3d.org user guide): 3-D points of every frame, integer and floating-point, Intel, DEC
-//! and SGI. Analogue samples are skipped; a negative residual means hidden.
+//! and SGI. Analogue samples and model outputs are skipped; a negative residual means hidden.
 
 use super::reader::Reader;
 use super::recording::{Found, Known, RecordingError, Source, Unit, Up};
-use crate::silhouette::capsule::Point3;
-use std::collections::HashMap;
+use crate::silhouette::{anatomy::without_prefix, capsule::Point3};
+use std::collections::{HashMap, HashSet};
 
 const BLOCK: usize = 512;
 
@@ -54,10 +54,17 @@ struct Parameter {
     at: usize,
 }
 
-pub const READER: Reader =
-    Reader { name: "C3D", extensions: &["c3d"], about: "Vicon and most other systems, z up", read };
+pub const READER: Reader = Reader {
+    name: "C3D",
+    extensions: &["c3d"],
+    about: "Vicon and most other systems, z up",
+    read: |bytes, _| read(bytes),
+};
 
-/// Reads the points. The axes are not stated; nearly all files have z up.
+/// Groups of `POINT` with labels of points that are not positions (Vicon's models, `POINT:TYPE_GROUPS`).
+const MODEL_OUTPUTS: [&str; 6] = ["ANGLES", "FORCES", "MOMENTS", "POWERS", "REACTIONS", "SCALARS"];
+
+/// Reads the points. `POINT:Y_SCREEN` states the upward axis; without it, nearly all files have z up.
 pub fn read(bytes: &[u8]) -> Result<Found, RecordingError> {
     let (file, parameters_at) = opened(bytes)?;
     let parameters = parameters(&file, parameters_at + 4);
@@ -69,18 +76,35 @@ pub fn read(bytes: &[u8]) -> Result<Found, RecordingError> {
     for index in names.len()..layout.points {
         names.push(format!("*{}", index + 1));
     }
-    let (frames, remarks) = layout.count(&file, &declared_frames(&file, &parameters));
+    let (count, mut remarks) = layout.count(&file, &declared_frames(&file, &parameters));
+    let mut frames = layout.frames(&file, count)?;
+    let outputs: HashSet<String> = MODEL_OUTPUTS
+        .iter()
+        .flat_map(|group| text_rows(&file, parameters.get(&format!("POINT:{group}"))))
+        .collect();
+    let is_place = |name: &String| !outputs.contains(name) && !outputs.contains(without_prefix(name));
+    let places: Vec<usize> = (0..names.len()).filter(|place| is_place(&names[*place])).collect();
+    if !places.is_empty() && places.len() < names.len() {
+        remarks.push(format!("{} model outputs (angles, moments) are not read", names.len() - places.len()));
+        frames.iter_mut().for_each(|frame| *frame = places.iter().map(|place| frame[*place]).collect());
+        names = places.iter().map(|place| names[*place].clone()).collect();
+    }
+    let screen = text_rows(&file, parameters.get("POINT:Y_SCREEN")).into_iter().next();
+    let up = match screen.and_then(|axis| axis.parse().ok()) {
+        Some(value) => Known { value, source: Source::File },
+        None => Known { value: Up::Z, source: Source::Format },
+    };
     Ok(Found {
         others: Vec::new(),
         planar: false,
         names,
         rate_hz: if layout.rate_hz.is_finite() { layout.rate_hz } else { 0.0 },
-        frames: layout.frames(&file, frames)?,
+        frames,
         unit: match unit.as_str() {
             "" => Known { value: Unit::MM, source: Source::Format },
             stated => Found::stated_unit(stated),
         },
-        up: Known { value: Up::Z, source: Source::Format },
+        up,
         remarks,
     })
 }

@@ -12,7 +12,7 @@ pub const READER: Reader = Reader {
     name: "CSV",
     extensions: &["csv"],
     about: "a table with columns NAME_x, NAME_y, NAME_z in millimetres, z up, or of Vicon Nexus or OptiTrack Motive",
-    read,
+    read: |bytes, _| read(bytes),
 };
 
 /// Separated by commas, semicolons or tabs. Ignores columns without a coordinate suffix (frame number, time,
@@ -180,7 +180,10 @@ mod tests {
         assert!(
             read(b"A_x,A_y,A_z,A_x\n").expect_err("twice").to_string().contains("two columns are named A_x")
         );
-        assert!(read(b"A_x,A_y,A_z\n1,2\n").expect_err("short").to_string().contains("line 2"));
+        for short in ["A_x,A_y,A_z\n1,2,3\n1,2\n", "A_x,A_y,A_z\r\n1,2,3\r\n1,2\r\n"] {
+            let error = read(short.as_bytes()).expect_err("short").to_string();
+            assert!(error.starts_with("line 3"), "{error}");
+        }
         assert!(read(b"").is_err() && read(b"a,b\n").is_err());
     }
 

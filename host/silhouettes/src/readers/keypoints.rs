@@ -1,23 +1,26 @@
-//! Keypoints of pose estimators as JSON: OpenPose, COCO and HALPE (AlphaPose, MMPose), MediaPipe. One view: x
-//! to the right and y down in the picture. People without numbers are followed by place. Lengths are guessed
-//! from the body: the longest trunk and legs in a frame are those of an adult.
+//! Keypoints of pose estimators as JSON: OpenPose, COCO and HALPE (AlphaPose, MMPose), MediaPipe. In two dimensions there is
+//! one view, x to the right and y down in the picture, and lengths are guessed from the body: the longest trunk and legs in a
+//! frame are those of an adult. In three dimensions lengths are metres. People without numbers are followed by place.
 
 mod document;
 mod layouts;
 mod people;
+mod spatial;
 
 use super::{
+    posture,
     reader::Reader,
-    recording::{Found, Known, RecordingError, Source, Unit, Up},
+    recording::{Choices, Found, Known, RecordingError, Source, Unit, Up},
 };
 use crate::silhouette::capsule::Point3;
-use document::{Document, LEAST_CONFIDENCE};
+use document::{Document, LEAST_CONFIDENCE, Person};
 use layouts::NAMES;
+use people::distance;
 
 pub const READER: Reader = Reader {
     name: "keypoints",
     extensions: &["json"],
-    about: "2-D keypoints of OpenPose (a folder of files), COCO, HALPE, MMPose and MediaPipe; one view, one person of several",
+    about: "keypoints of OpenPose (a folder of files), COCO, HALPE, MMPose and MediaPipe; one view in two dimensions; one person of several",
     read,
 };
 
@@ -26,6 +29,8 @@ const BONES_MM: [([usize; 2], f64); 4] =
     [([16, 18], 420.0), ([17, 19], 420.0), ([18, 20], 420.0), ([19, 21], 420.0)];
 const TRUNK_MM: f64 = 500.0;
 const NECK: usize = 6;
+const HEAD: [usize; 6] = [0, 1, 2, 3, 4, 5];
+const ANKLES: [usize; 2] = [20, 21];
 const SHOULDERS: [usize; 2] = [8, 9];
 const HIPS: [usize; 2] = [16, 17];
 /// Coordinates up to this are shares of the picture's sides, not pixels; points may be outside.
@@ -33,84 +38,95 @@ const NORMALISED: f64 = 3.0;
 /// Aspect ratio if the file does not state it.
 const USUAL_ASPECT: f64 = 16.0 / 9.0;
 
-pub fn read(bytes: &[u8]) -> Result<Found, RecordingError> {
-    found(vec![Document::parse(bytes)?])
+pub fn read(bytes: &[u8], choices: Choices) -> Result<Found, RecordingError> {
+    found(vec![Document::parse(bytes)?], choices)
 }
 
 /// Reads a folder of JSON files, one frame each, in order.
-pub fn read_files<'a>(files: impl IntoIterator<Item = &'a [u8]>) -> Result<Found, RecordingError> {
-    found(files.into_iter().map(Document::parse).collect::<Result<Vec<Document>, RecordingError>>()?)
+pub fn read_files<'a>(
+    files: impl IntoIterator<Item = &'a [u8]>,
+    choices: Choices,
+) -> Result<Found, RecordingError> {
+    found(files.into_iter().map(Document::parse).collect::<Result<Vec<Document>, RecordingError>>()?, choices)
 }
 
-fn found(documents: Vec<Document>) -> Result<Found, RecordingError> {
-    let layout = documents.iter().find_map(|document| document.layout).ok_or_else(|| RecordingError::Kind {
+fn found(documents: Vec<Document>, choices: Choices) -> Result<Found, RecordingError> {
+    let size = documents.iter().find_map(|document| document.size);
+    let mut frames: Vec<Vec<Person>> = documents.into_iter().flat_map(|document| document.frames).collect();
+    let everyone = || frames.iter().flatten();
+    let first = everyone().next().ok_or_else(|| RecordingError::Kind {
         kind: "keypoint JSON",
         reason: format!(
             "it holds no person's points: expected `people`, `annotations`, `keypoints` or `landmarks` of {} points",
             layouts::LAYOUTS.iter().map(|layout| layout.count.to_string()).collect::<Vec<_>>().join(", ")
         ),
     })?;
-    let size = documents.iter().find_map(|document| document.size);
-    let unsure: usize = documents.iter().map(|document| document.unsure).sum();
-    let mut remarks =
-        vec![format!("{} keypoints of the layout {}, seen from one side", layout.count, layout.name)];
+    let has_depth = spatial::has_depth(everyone());
+    let in_picture = !has_depth && !spatial::are_centred(everyone());
+    let layout = if has_depth { spatial::layout(everyone())? } else { first.layout };
+    let seen = if has_depth { "in three dimensions" } else { "seen from one side" };
+    let mut remarks = vec![format!("{} keypoints of the layout {}, {seen}", layout.count, layout.name)];
+    let unsure: usize = frames
+        .iter_mut()
+        .flatten()
+        .map(|person| {
+            let layout = if has_depth { layout } else { person.layout };
+            person.placed(layout, has_depth)
+        })
+        .sum();
     if unsure > 0 {
         remarks
             .push(format!("{unsure} points below a confidence of {LEAST_CONFIDENCE} are treated as missing"));
     }
-    let mut frames: Vec<Vec<document::Person>> =
-        documents.into_iter().flat_map(|document| document.frames).collect();
-    let largest = frames
-        .iter()
-        .flatten()
-        .flat_map(|person| person.points.iter().flatten().flatten())
-        .fold(0.0_f64, |largest, value| largest.max(value.abs()));
-    if largest <= NORMALISED {
+    let points = || frames.iter().flatten().flat_map(|person| person.points.iter().flatten());
+    let largest = points().flatten().fold(0.0_f64, |largest, value| largest.max(value.abs()));
+    if in_picture && largest <= NORMALISED {
         let aspect = size.map_or(USUAL_ASPECT, |[width, height]| width / height);
         let known = if size.is_some() { "stated" } else { "a doubtful guess" };
         remarks.push(format!("coordinates are parts of a picture of {aspect:.3} times its height ({known})"));
+        let across = usize::from(matches!(choices.up, Some(Up::X | Up::MinusX)));
         let points = frames.iter_mut().flatten().flat_map(|person| person.points.iter_mut().flatten());
-        points.for_each(|point| point[0] *= aspect);
+        points.for_each(|point| point[across] *= aspect);
     }
     let (mut tracks, count) = people::followed(&frames);
     if count > 1 {
         remarks.push(format!("{count} people: the one seen most is read (--person 2 reads the next)"));
     }
     tracks.iter_mut().flatten().for_each(|points| add_neck(points));
-    let unit = unit(tracks.first().map_or(&[][..], Vec::as_slice));
-    let mut all = tracks.into_iter().map(|track| track.into_iter().map(|points| in_space(&points)).collect());
+    let mut all = tracks.into_iter();
+    let frames = all.next().unwrap_or_default();
+    let (unit, up) = if has_depth {
+        let metres = Known { value: Unit { mm: 1000.0 }, source: Source::Format };
+        (metres, posture::upright(&frames, &HEAD, &ANKLES, Up::MinusY))
+    } else {
+        (unit(&frames), Known { value: Up::MinusY, source: Source::Format })
+    };
     Ok(Found {
         names: NAMES.iter().map(|name| (*name).to_owned()).collect(),
         rate_hz: 0.0,
-        frames: all.next().unwrap_or_default(),
+        frames,
         others: all.collect(),
-        planar: true,
+        planar: !has_depth,
         unit,
-        up: Known { value: Up::Z, source: Source::Format },
+        up,
         remarks,
     })
 }
 
-fn in_space(points: &[Option<[f64; 2]>]) -> Vec<Option<Point3>> {
-    // Not 0, 0, 0, which is a missing marker.
-    points.iter().map(|point| point.map(|[x, y]| [x, 1e-9, -y])).collect()
-}
-
-fn middle(points: &[Option<[f64; 2]>], [a, b]: [usize; 2]) -> Option<[f64; 2]> {
+fn middle(points: &[Option<Point3>], [a, b]: [usize; 2]) -> Option<Point3> {
     let (a, b) = ((*points.get(a)?)?, (*points.get(b)?)?);
-    Some([0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1])])
+    Some(std::array::from_fn(|k| 0.5 * (a[k] + b[k])))
 }
 
-fn add_neck(points: &mut [Option<[f64; 2]>]) {
+fn add_neck(points: &mut [Option<Point3>]) {
     if !points.is_empty() && points[NECK].is_none() {
         points[NECK] = middle(points, SHOULDERS);
     }
 }
 
 /// Millimetres per unit of the file, for an adult's trunk and legs.
-fn unit(frames: &[Vec<Option<[f64; 2]>>]) -> Known<Unit> {
-    let distance = |a: [f64; 2], b: [f64; 2]| (a[0] - b[0]).hypot(a[1] - b[1]);
-    let per_mm = |points: &Vec<Option<[f64; 2]>>| -> Option<f64> {
+fn unit(frames: &[Vec<Option<Point3>>]) -> Known<Unit> {
+    let per_mm = |points: &Vec<Option<Point3>>| -> Option<f64> {
         let trunk =
             middle(points, SHOULDERS).zip(middle(points, HIPS)).map(|(a, b)| distance(a, b) / TRUNK_MM);
         let bones = BONES_MM

@@ -8,7 +8,7 @@ pub const READER: Reader = Reader {
     name: "Kinect joints",
     extensions: &["txt"],
     about: "20 or 25 joints per line, metres, y up, optionally after a frame number",
-    read,
+    read: |bytes, _| read(bytes),
 };
 
 /// Joints of the second generation; the first 20 are those of the first.

@@ -2,7 +2,8 @@
 //! of frames; per frame the number of bodies; per body a line (its id first), the number of joints and a line
 //! per joint: x, y, z in metres (x across, y up, z away), eight further numbers, and whether it was tracked.
 //! Of several bodies present for at least half as long as the longest, the one whose joints vary most is
-//! used: the sensor also reports chairs as bodies, and their joints only jitter.
+//! used: the sensor also reports chairs as bodies, and their joints only jitter. Bodies that are never visible together are
+//! one person under changing ids.
 
 use super::kinect::JOINTS_25;
 use super::reader::Reader;
@@ -14,7 +15,7 @@ pub const READER: Reader = Reader {
     name: "NTU RGB+D",
     extensions: &["skeleton"],
     about: "25 joints of a Kinect, metres, y up; the body that moves most",
-    read,
+    read: |bytes, _| read(bytes),
 };
 
 /// The sensor follows six bodies.
@@ -28,8 +29,11 @@ pub fn read(bytes: &[u8]) -> Result<Found, RecordingError> {
     let mut lines = Lines { lines: content.lines(), at: 0 };
     let count = lines.count("the number of frames")?;
     let mut bodies: BTreeMap<String, Vec<(usize, Body)>> = BTreeMap::new();
+    let mut most_together = 0;
     for frame in 0..count {
-        for _ in 0..lines.count("the number of bodies")? {
+        let together = lines.count("the number of bodies")?;
+        most_together = together.max(most_together);
+        for _ in 0..together {
             let about = lines.next("a line about a body")?;
             let id = about.split_whitespace().next().unwrap_or_default().to_owned();
             let joints = lines.count("the number of joints")?;
@@ -41,6 +45,12 @@ pub fn read(bytes: &[u8]) -> Result<Found, RecordingError> {
         }
     }
     let mut remarks = Vec::new();
+    if most_together == 1 && bodies.len() > 1 {
+        remarks.push(format!("{} ids, never two in a frame: they are read as one person", bodies.len()));
+        let mut whole: Vec<(usize, Body)> = bodies.into_values().flatten().collect();
+        whole.sort_by_key(|(frame, _)| *frame);
+        bodies = BTreeMap::from([(String::new(), whole)]);
+    }
     if bodies.len() > 1 {
         remarks.push(format!(
             "{} bodies in the file: the one that moves most is used (--person 2 reads the next)",
@@ -145,7 +155,7 @@ mod tests {
                 .map(|joint| {
                     format!(
                         "{x} {} 3 0 0 0 0 0 0 0 0 {}\n",
-                        joint as f64 / 25.0,
+                        (24 - joint) as f64 / 25.0,
                         if joint == 7 { 0 } else { 2 }
                     )
                 })
@@ -161,12 +171,25 @@ mod tests {
         let settled = found.settled(super::super::recording::Choices::default());
         assert_eq!((settled.frames.len(), settled.rate_hz), (2, 30.0));
         let head = settled.by_name(1)["head"];
-        assert!(head.iter().zip([600.0, -3000.0, 120.0]).all(|(a, b)| (a - b).abs() < 1e-9), "{head:?}");
+        assert!(head.iter().zip([600.0, -3000.0, 840.0]).all(|(a, b)| (a - b).abs() < 1e-9), "{head:?}");
         assert!(!settled.by_name(0).contains_key("left hand"));
         assert_eq!(
             settled.remarks(),
             ["2 bodies in the file: the one that moves most is used (--person 2 reads the next)"]
         );
+    }
+
+    #[test]
+    fn bodies_that_are_never_visible_together_are_one_person() {
+        let text = file();
+        let (_, frames) = text.split_once('\n').expect("a count");
+        let one = frames.strip_prefix("2\n").expect("two bodies");
+        let lines: Vec<&str> = one.lines().collect();
+        let (first, rest) = lines.split_at(27);
+        let text = format!("2\n1\n{}\n1\n{}\n", first.join("\n"), rest[..27].join("\n"));
+        let found = read(text.as_bytes()).expect("a skeleton");
+        assert!(found.others.is_empty() && found.frames.iter().all(|frame| frame[0].is_some()));
+        assert!(found.remarks[0].contains("one person"), "{:?}", found.remarks);
     }
 
     #[test]
@@ -196,7 +219,7 @@ mod tests {
         for (text, line) in [
             (String::new(), 1),
             ("2\n1\n71 0\n24\n".into(), 4),
-            (file().replacen("0.5 0.04 3", "0.5 x 3", 1), 33),
+            (file().replacen("0.5 0.92 3", "0.5 x 3", 1), 33),
             (file().lines().take(40).collect::<Vec<_>>().join("\n"), 41),
             ("99999999999\n".into(), 1),
         ] {

@@ -1,6 +1,6 @@
 //! Entry of the table [`super::READERS`].
 
-use super::recording::{Found, RecordingError};
+use super::recording::{Choices, Found, RecordingError};
 
 #[derive(Clone, Copy, Debug)]
 pub struct Reader {
@@ -9,5 +9,5 @@ pub struct Reader {
     pub extensions: &'static [&'static str],
     pub about: &'static str,
     /// Damaged files give errors, never a panic or an allocation beyond a fixed multiple of their size.
-    pub read: fn(&[u8]) -> Result<Found, RecordingError>,
+    pub read: fn(&[u8], Choices) -> Result<Found, RecordingError>,
 }

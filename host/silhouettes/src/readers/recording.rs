@@ -1,8 +1,8 @@
 //! Recordings of named points over time, the common form of all motion-capture files. A reader returns the
 //! file's own unit and axes with their source ([`Found`]); [`Found::settled`] converts to mm and z up.
 
-use super::body;
-use crate::silhouette::{aliases, capsule::Point3};
+use super::{body, posture};
+use crate::silhouette::{anatomy::Anatomy, capsule::Point3};
 use std::borrow::Cow;
 use std::collections::HashMap;
 use std::fmt;
@@ -26,12 +26,13 @@ impl Unit {
     pub const MM: Self = Self { mm: 1.0 };
 
     pub fn named(name: &str) -> Result<Self, RecordingError> {
-        let name = name.trim().trim_matches('\0').to_ascii_lowercase();
-        let short = match name.as_str() {
-            "millimeters" | "millimetres" => "mm",
-            "centimeters" | "centimetres" => "cm",
-            "meters" | "metres" => "m",
-            "inches" => "in",
+        let edge = |c: char| c.is_whitespace() || matches!(c, '\0' | '[' | ']' | '(' | ')' | '.');
+        let name = name.trim_matches(edge).to_ascii_lowercase();
+        let short = match name.strip_suffix('s').unwrap_or(&name) {
+            "millimeter" | "millimetre" => "mm",
+            "centimeter" | "centimetre" => "cm",
+            "meter" | "metre" => "m",
+            "inch" | "inche" => "in",
             other => other,
         };
         let found = Self::NAMED.iter().find(|(known, _, _)| *known == short);
@@ -65,26 +66,65 @@ pub enum Up {
     X,
     Y,
     Z,
+    MinusX,
+    MinusY,
+    MinusZ,
 }
 
 impl Up {
+    /// Read and shown name.
+    pub const NAMED: [(&str, Self); 6] = [
+        ("x", Self::X),
+        ("y", Self::Y),
+        ("z", Self::Z),
+        ("-x", Self::MinusX),
+        ("-y", Self::MinusY),
+        ("-z", Self::MinusZ),
+    ];
+
     /// Rotates (never mirrors) a point with this axis up to z up.
     pub fn to_z(self, [x, y, z]: Point3) -> Point3 {
         match self {
             Self::X => [y, z, x],
             Self::Y => [x, -z, y],
             Self::Z => [x, y, z],
+            Self::MinusX => [y, -z, -x],
+            Self::MinusY => [x, z, -y],
+            Self::MinusZ => [x, -y, -z],
+        }
+    }
+
+    /// The direction that a vector points along most; y for zero.
+    pub fn along(vector: Point3) -> Self {
+        let mut best = Self::Y;
+        for (_, up) in Self::NAMED {
+            if up.height(vector) > best.height(vector) {
+                best = up;
+            }
+        }
+        best
+    }
+
+    pub fn height(self, point: Point3) -> f64 {
+        self.to_z(point)[2]
+    }
+
+    pub fn reversed(self) -> Self {
+        match self {
+            Self::X => Self::MinusX,
+            Self::Y => Self::MinusY,
+            Self::Z => Self::MinusZ,
+            Self::MinusX => Self::X,
+            Self::MinusY => Self::Y,
+            Self::MinusZ => Self::Z,
         }
     }
 }
 
 impl fmt::Display for Up {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::X => "x",
-            Self::Y => "y",
-            Self::Z => "z",
-        })
+        let name = Self::NAMED.iter().find(|(_, up)| up == self).map_or("", |(name, _)| name);
+        f.write_str(name)
     }
 }
 
@@ -92,12 +132,11 @@ impl FromStr for Up {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        match text.to_ascii_lowercase().as_str() {
-            "x" => Ok(Self::X),
-            "y" => Ok(Self::Y),
-            "z" => Ok(Self::Z),
-            _ => Err(format!("unknown axis `{text}`: expected x, y or z")),
-        }
+        let name = text.trim().trim_start_matches('+').to_ascii_lowercase();
+        let found = Self::NAMED.iter().find(|(known, _)| *known == name);
+        found
+            .map(|(_, up)| *up)
+            .ok_or_else(|| format!("unknown axis `{text}`: expected x, y, z, -x, -y or -z"))
     }
 }
 
@@ -149,6 +188,7 @@ pub struct Found {
     /// `frames[f][m]`: point m in frame f.
     pub frames: Vec<Vec<Option<Point3>>>,
     pub others: Vec<Vec<Vec<Option<Point3>>>>,
+    /// Points are in the plane of x and y.
     pub planar: bool,
     pub unit: Known<Unit>,
     pub up: Known<Up>,
@@ -164,35 +204,42 @@ impl Found {
         }
     }
 
+    /// Everything but names, frames and other people.
+    pub(super) fn without_frames(&self) -> Self {
+        Self {
+            names: self.names.clone(),
+            rate_hz: self.rate_hz,
+            frames: Vec::new(),
+            others: Vec::new(),
+            planar: self.planar,
+            unit: self.unit.clone(),
+            up: self.up.clone(),
+            remarks: self.remarks.clone(),
+        }
+    }
+
     /// Converts to millimetres, z up. Hides non-finite points and 0, 0, 0 (missing in many exports).
-    pub fn settled(mut self, choices: Choices) -> Recording {
-        if let Some(number) = choices.person.and_then(|person| person.checked_sub(2))
-            && number < self.others.len()
-        {
-            self.frames = self.others.swap_remove(number);
-        }
-        let hidden = body::hide_zeros(&mut self.frames);
+    pub fn settled(self, choices: Choices) -> Recording {
+        let (mut frames, mut remarks) = (self.frames, self.remarks);
+        let hidden = body::hide_zeros(&mut frames);
         if hidden > 0 {
-            self.remarks.push(format!("{hidden} points at exactly 0, 0, 0 are treated as missing markers"));
+            remarks.push(format!("{hidden} points at exactly 0, 0, 0 are treated as missing markers"));
         }
-        let unit = body::plausible(self.unit.unless(choices.unit), &self.frames);
-        let up = self.up.unless(choices.up);
-        let mut frames = self.frames;
+        let anatomy = Anatomy::of(&self.names);
+        let unit = body::plausible(self.unit.unless(choices.unit), &frames, &anatomy.body);
+        let (up, inverted) = posture::checked(self.up.unless(choices.up), &frames, &anatomy);
+        let lying = posture::lying(up.value, &frames, &anatomy, self.planar);
         for point in frames.iter_mut().flatten() {
             let settled = point.map(|p| up.value.to_z(p.map(|v| unit.value.mm * v)));
             *point = settled.filter(|p| p.iter().all(|v| v.is_finite()));
         }
-        let mut remarks = self.remarks;
-        let aliases = aliases::find(&self.names).map(|found| {
-            remarks.push(found.remark);
-            found.names
-        });
+        remarks.extend(anatomy.remark.into_iter().chain(inverted).chain(lying));
         Recording {
             names: self.names,
             rate_hz: self.rate_hz,
             frames,
             planar: self.planar,
-            aliases: aliases.unwrap_or_default(),
+            aliases: anatomy.aliases,
             unit,
             up,
             remarks,
@@ -208,7 +255,7 @@ pub struct Recording {
     pub frames: Vec<Vec<Option<Point3>>>,
     /// Seen from one side: points are in the plane of x and z, and no other view can be drawn.
     pub planar: bool,
-    /// Names by which built-in templates know points.
+    /// Names without a prefix, and names of built-in templates.
     aliases: Vec<(usize, String)>,
     pub unit: Known<Unit>,
     pub up: Known<Up>,
@@ -218,21 +265,13 @@ pub struct Recording {
 impl Recording {
     /// Positions of a frame without hidden points, by name with and without a prefix (`Nick:LASI`, `LASI`).
     pub fn by_name(&self, frame: usize) -> HashMap<&str, Point3> {
-        let mut found = HashMap::new();
-        for (name, point) in self.names.iter().zip(self.frames.get(frame).into_iter().flatten()) {
-            if let Some(point) = point {
-                found.insert(name.as_str(), *point);
-                if let Some((_, short)) = name.rsplit_once(':') {
-                    found.entry(short).or_insert(*point);
-                }
-            }
-        }
-        for (place, alias) in &self.aliases {
-            if let Some(point) = self.frames.get(frame).and_then(|points| *points.get(*place)?) {
-                found.insert(alias.as_str(), point);
-            }
-        }
-        found
+        let points = self.frames.get(frame).map_or(&[][..], Vec::as_slice);
+        let names = self.names.iter().enumerate();
+        let aliases = self.aliases.iter().map(|(place, alias)| (*place, alias));
+        names
+            .chain(aliases)
+            .filter_map(|(place, name)| Some((name.as_str(), (*points.get(place)?)?)))
+            .collect()
     }
 
     /// Names of all points, with those of built-in templates.
@@ -273,9 +312,13 @@ pub enum RecordingError {
     #[error("line {line}: {reason}")]
     Line { line: usize, reason: String },
     #[error(
-        "unknown unit of length `{0}`: expected mm, cm, m, in, cmu (56.444 mm) or a number of millimetres"
+        "unknown unit of length `{0}`: expected mm, cm, m, in, cmu (56.444 mm) or a number of millimetres (--units)"
     )]
     Unit(String),
+    #[error(
+        "--up {0} does not fit keypoints in two dimensions: expected -y, y, or -x or x where the file has y before x"
+    )]
+    PlanarUp(Up),
 }
 
 /// A number with a point or, as programs of many countries write it, a comma before its decimals.
@@ -283,11 +326,11 @@ pub(super) fn number(text: &str) -> Option<f64> {
     text.parse().or_else(|_| text.replacen(',', ".", 1).parse()).ok()
 }
 
-/// Text without a byte-order mark, with line feeds for lone carriage returns; Latin-1 if it is not UTF-8. Errors have the
+/// Text without a byte-order mark, with line feeds at all ends of lines; Latin-1 if it is not UTF-8. Errors have the
 /// line of the first other byte.
 pub(super) fn text(bytes: &[u8]) -> Result<Cow<'_, str>, RecordingError> {
     let text = decoded(bytes)?;
-    Ok(if text.contains('\n') || !text.contains('\r') { text } else { text.replace('\r', "\n").into() })
+    Ok(if text.contains('\r') { text.replace("\r\n", "\n").replace('\r', "\n").into() } else { text })
 }
 
 fn decoded(bytes: &[u8]) -> Result<Cow<'_, str>, RecordingError> {
@@ -343,16 +386,23 @@ mod tests {
     #[test]
     fn conversion_to_z_up_stays_right_handed() {
         // A right-handed frame stays one: x cross y is z, for every upward axis.
-        for up in [Up::X, Up::Y, Up::Z] {
+        for (_, up) in Up::NAMED {
             let [x, y, z] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(|p| up.to_z(p));
             let cross = [x[1] * y[2] - x[2] * y[1], x[2] * y[0] - x[0] * y[2], x[0] * y[1] - x[1] * y[0]];
             assert_eq!(cross, z, "{up}");
+            assert_eq!(up.to_string().parse(), Ok(up));
+            assert_eq!(up.reversed().reversed(), up);
         }
     }
 
     #[test]
     fn units_are_read_and_shown() {
-        assert_eq!("Meters".parse(), Ok(Unit { mm: 1000.0 }));
+        for (text, mm) in
+            [("Meters", 1000.0), ("metre", 1000.0), ("[m]", 1000.0), ("millimetre", 1.0), ("inch", 25.4)]
+        {
+            assert_eq!(text.parse(), Ok(Unit { mm }), "{text}");
+        }
+        assert!("furlong".parse::<Unit>().is_err_and(|error| error.to_string().contains("--units")));
         assert_eq!("cmu".parse::<Unit>().map(|unit| (unit.mm * 1000.0).round()), Ok(56_444.0));
         assert_eq!("5.5".parse::<Unit>().map(|unit| unit.to_string()), Ok("units of 5.5 mm".into()));
         for bad in ["furlong", "-2", "0", "inf", ""] {

@@ -4,8 +4,12 @@ use super::reader::Reader;
 use super::recording::{Found, Known, RecordingError, Source, Up, number, text};
 use crate::silhouette::capsule::Point3;
 
-pub const READER: Reader =
-    Reader { name: "TRC", extensions: &["trc"], about: "Motion Analysis and OpenSim markers, y up", read };
+pub const READER: Reader = Reader {
+    name: "TRC",
+    extensions: &["trc"],
+    about: "Motion Analysis and OpenSim markers, y up",
+    read: |bytes, _| read(bytes),
+};
 
 /// Most files, such as OpenSim's, have y up. Errors have their line.
 pub fn read(bytes: &[u8]) -> Result<Found, RecordingError> {

@@ -1,12 +1,15 @@
-//! Recordings beyond 65,535 frames, trimmed headers, and unknown units.
+//! Recordings beyond 65,535 frames, trimmed headers, unknown units, and parameters of points.
 
 use farnear_silhouettes::readers::{
     self,
-    recording::{Choices, Recording, RecordingError, Unit},
+    recording::{Choices, Recording, RecordingError, Source, Unit, Up},
 };
 
-/// One marker that moves by 1 unit a frame.
+/// Markers that move by 1 unit a frame.
 struct Made {
+    labels: &'static [&'static str],
+    /// Names and texts of `POINT`.
+    texts: &'static [(&'static str, &'static str)],
     frames: usize,
     /// First and last frame by the header.
     header: (u16, u16),
@@ -19,7 +22,15 @@ struct Made {
 
 impl Default for Made {
     fn default() -> Self {
-        Self { frames: 10, header: (1, 10), trial: None, point_frames: None, units: "mm" }
+        Self {
+            labels: &["HEAD"],
+            texts: &[],
+            frames: 10,
+            header: (1, 10),
+            trial: None,
+            point_frames: None,
+            units: "mm",
+        }
     }
 }
 
@@ -46,7 +57,9 @@ impl Made {
         let mut word = |number: usize, value: u16| {
             header[2 * (number - 1)..2 * number].copy_from_slice(&value.to_le_bytes());
         };
-        for (number, value) in [(1, 0x5002), (2, 1), (4, self.header.0), (5, self.header.1), (9, 4)] {
+        for (number, value) in
+            [(1, 0x5002), (2, self.labels.len() as u16), (4, self.header.0), (5, self.header.1), (9, 4)]
+        {
             word(number, value);
         }
         header[12..16].copy_from_slice(&(-1.0_f32).to_le_bytes());
@@ -54,7 +67,12 @@ impl Made {
         let mut section = vec![0, 0, 2, 84];
         group(&mut section, "POINT", 1);
         group(&mut section, "TRIAL", 2);
-        parameter(&mut section, "LABELS", 1, -1, &[4, 1], b"HEAD");
+        let labels: Vec<u8> =
+            self.labels.iter().flat_map(|label| format!("{label:8}").into_bytes()).collect();
+        parameter(&mut section, "LABELS", 1, -1, &[8, self.labels.len() as u8], &labels);
+        for (name, text) in self.texts {
+            parameter(&mut section, name, 1, -1, &[text.len() as u8, 1], text.as_bytes());
+        }
         parameter(&mut section, "UNITS", 1, -1, &[self.units.len() as u8], self.units.as_bytes());
         if let Some((first, last)) = self.trial {
             for (name, value) in [("ACTUAL_START_FIELD", first), ("ACTUAL_END_FIELD", last)] {
@@ -65,7 +83,9 @@ impl Made {
             parameter(&mut section, "FRAMES", 1, 4, &[], &frames.to_le_bytes());
         }
         section.resize(1024, 0);
-        let frame = |n: usize| [n as f32 + 1.0, 500.0, 1700.0, 0.0].map(f32::to_le_bytes).concat();
+        let frame = |n: usize| {
+            [n as f32 + 1.0, 500.0, 1700.0, 0.0].map(f32::to_le_bytes).concat().repeat(self.labels.len())
+        };
         [header, section, (0..self.frames).flat_map(frame).collect()].concat()
     }
 
@@ -115,4 +135,23 @@ fn the_callers_unit_overrides_an_unknown_one() {
     assert!(error.contains("mete"), "{error}");
     let choices = Choices { unit: Some(Unit { mm: 10.0 }), ..Choices::default() };
     assert_eq!(made.read(choices).expect("a recording").by_name(0)["HEAD"], [10.0, 5000.0, 17_000.0]);
+}
+
+#[test]
+fn the_vertical_axis_of_the_screen_is_up() {
+    let made = Made { texts: &[("Y_SCREEN", "-Z")], ..Made::default() };
+    let found = made.read(Choices::default()).expect("a recording");
+    assert_eq!((found.up.value, &found.up.source), (Up::MinusZ, &Source::File));
+    assert_eq!(found.by_name(0)["HEAD"], [1.0, -500.0, -1700.0]);
+}
+
+#[test]
+fn model_outputs_are_not_points() {
+    let labels = &["HEAD", "LHipAng", "LHipMom"];
+    let texts = &[("ANGLES", "LHipAng"), ("MOMENTS", "LHipMom")];
+    let found = Made { labels, texts, ..Made::default() }.read(Choices::default()).expect("a recording");
+    assert_eq!((found.names.as_slice(), found.frames[0].len()), (["HEAD".to_owned()].as_slice(), 1));
+    assert_eq!(found.remarks(), ["2 model outputs (angles, moments) are not read"]);
+    let unnamed = Made { labels, ..Made::default() }.read(Choices::default()).expect("a recording");
+    assert_eq!(unnamed.names.len(), 3);
 }

@@ -150,7 +150,7 @@ fn recorded(file: &MotionFile, request: &TrainRequest, context: &Context<'_>) ->
     let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let choices = Choices { unit: request.units, up: request.up, person: None };
     let recording = markers::recording(path, choices)?;
-    for remark in markers::remarks(&recording) {
+    for remark in recording.remarks() {
         context.progress.warn(&format!("{}: {remark}", path.display()));
     }
     let template = match &request.template {

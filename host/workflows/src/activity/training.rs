@@ -58,8 +58,8 @@ pub struct TrainRequest {
     /// What makes bodies of the points: a built-in template's name or a TOML file [default: the built-in one that fits best].
     #[cfg_attr(feature = "clap", arg(long, value_name = "NAME|FILE"))]
     pub template: Option<String>,
-    /// Which axis of the motion files points up: x, y or z [default: as they say or suggest].
-    #[cfg_attr(feature = "clap", arg(long))]
+    /// Axis of the motion files that points up: x, y, z, -x, -y or -z [default: as they state or from the body].
+    #[cfg_attr(feature = "clap", arg(long, value_name = "AXIS", allow_hyphen_values = true))]
     #[serde_as(as = "Option<DisplayFromStr>")]
     pub up: Option<Up>,
     /// Their unit of length: mm, cm, m, in, cmu or a number of millimetres [default: as they say or suggest].

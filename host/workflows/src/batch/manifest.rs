@@ -32,7 +32,33 @@ pub(super) struct Manifest {
 
 enum Source {
     Toml { reader: BufReader<File>, next_line: usize, defaults: BTreeMap<String, Fields>, ended: bool },
-    Csv { reader: Box<csv::Reader<File>>, names: csv::StringRecord },
+    Csv { reader: Box<csv::Reader<LineFeeds>>, names: csv::StringRecord },
+}
+
+/// A text file with line feeds for all ends of lines: after a carriage return the CSV reader counts a line too few.
+struct LineFeeds {
+    file: File,
+    after_return: bool,
+}
+
+impl Read for LineFeeds {
+    fn read(&mut self, buffer: &mut [u8]) -> std::io::Result<usize> {
+        loop {
+            let count = self.file.read(buffer)?;
+            let mut kept = 0;
+            for at in 0..count {
+                let byte = buffer[at];
+                if byte != b'\n' || !self.after_return {
+                    buffer[kept] = if byte == b'\r' { b'\n' } else { byte };
+                    kept += 1;
+                }
+                self.after_return = byte == b'\r';
+            }
+            if kept > 0 || count == 0 {
+                return Ok(kept);
+            }
+        }
+    }
 }
 
 impl Manifest {
@@ -161,8 +187,11 @@ fn separator(file: &mut File, path: &Path) -> Result<u8, BatchError> {
 
 fn csv_source(mut file: File, path: &Path) -> Result<Source, BatchError> {
     let delimiter = separator(&mut file, path)?;
-    let mut reader =
-        csv::ReaderBuilder::new().delimiter(delimiter).trim(csv::Trim::All).flexible(true).from_reader(file);
+    let mut reader = csv::ReaderBuilder::new()
+        .delimiter(delimiter)
+        .trim(csv::Trim::All)
+        .flexible(true)
+        .from_reader(LineFeeds { file, after_return: false });
     let names = reader.headers().map_err(|error| wrong_csv(path, &error))?.clone();
     // Spreadsheets write a byte order mark.
     let names: csv::StringRecord = names.iter().map(|name| name.trim_start_matches('\u{feff}')).collect();
@@ -267,6 +296,8 @@ mod tests {
         let (of_toml, of_csv) = (all("a.toml", toml), all("a.csv", csv));
         assert_eq!(of_toml.iter().map(|(line, _)| *line).collect::<Vec<_>>(), [5, 9]);
         assert_eq!(of_csv.iter().map(|(line, _)| *line).collect::<Vec<_>>(), [2, 3]);
+        let of_crlf = all("a.csv", &csv.replace('\n', "\r\n"));
+        assert_eq!(of_crlf.iter().map(|(line, _)| *line).collect::<Vec<_>>(), [2, 3]);
         let of_toml = jobs(of_toml);
         assert_eq!(of_toml, jobs(of_csv));
         assert_eq!(of_toml[0].1["smooth"], ["9"]);

@@ -57,8 +57,8 @@ use crate::{
 #[serde(default)]
 pub struct MarkersRequest {
     /// The recording: .c3d, .trc, .bvh, .skeleton (NTU RGB+D), .txt (20 or 25 Kinect joints a line), .csv with columns NAME_x,
-    /// NAME_y, NAME_z in mm or of Vicon Nexus or OptiTrack Motive, .npz with joint positions of an SMPL body, or 2-D keypoints: .json of OpenPose, COCO, HALPE or
-    /// MediaPipe, or a folder of such files, a frame each. Keypoints have one view.
+    /// NAME_y, NAME_z in mm or of Vicon Nexus or OptiTrack Motive, .npz with joint positions of an SMPL body, or keypoints: .json of OpenPose, COCO, HALPE,
+    /// MMPose or MediaPipe, or a folder of such files, a frame each. 2-D keypoints have one view.
     pub file: PathBuf,
     /// plug-in-gait (also CMU's 41 markers), vicon-53, opencap, thesis, bvh, kinect, keypoints, or a TOML file of `[[part]] name,
     /// markers, thickness_mm` [default: the one of these that fits best, which is reported].
@@ -96,15 +96,16 @@ pub struct MarkersRequest {
     /// Use every nth frame.
     #[cfg_attr(feature = "clap", arg(long, default_value_t = Self::default().every))]
     pub every: usize,
-    /// Axis of the file that points up: x, y or z [default: y in TRC files, found from the body in BVH files, else z].
-    #[cfg_attr(feature = "clap", arg(long))]
+    /// Axis of the file that points up: x, y, z, -x, -y or -z (y in a TRC file, -y in a picture) [default: as the file or its format
+    /// states, or from the body].
+    #[cfg_attr(feature = "clap", arg(long, value_name = "AXIS", allow_hyphen_values = true))]
     #[serde_as(as = "Option<DisplayFromStr>")]
     pub up: Option<Up>,
     /// Unit of length: mm, cm, m, in, cmu (56.444 mm) or a number of millimetres, where the file states none (BVH) or a wrong one.
     #[cfg_attr(feature = "clap", arg(long, value_name = "UNIT"))]
     #[serde_as(as = "Option<DisplayFromStr>")]
     pub units: Option<Unit>,
-    /// Person in a file with several, from 1 [default: the one who moves or is visible most].
+    /// Person in a file with several, from 1 [default: the one who moves or is visible most, or whose markers are first].
     #[cfg_attr(feature = "clap", arg(long, value_name = "NUMBER"))]
     pub person: Option<usize>,
     /// Write masks of 100x100 pixels with the subject centred, instead of full frames.
@@ -258,7 +259,7 @@ pub fn draw(settings: &MarkersRequest, context: &Context<'_>) -> Result<MarkersF
         context.info(&format!("{name}: the template `{}` fits best", template.name));
     }
     let warnings: Vec<String> =
-        remarks(&recording).into_iter().map(|remark| format!("{name}: {remark}")).collect();
+        recording.remarks().into_iter().map(|remark| format!("{name}: {remark}")).collect();
     warnings.iter().for_each(|warning| context.progress.warn(warning));
     if !warnings.is_empty() {
         context.info("--units and --up set the unit and the axis where a guess is wrong");
@@ -335,32 +336,6 @@ pub(crate) fn one_view(recording: &Recording, template: &Template) -> Vec<Track>
     if track.frames() == 0 { Vec::new() } else { vec![track] }
 }
 
-pub(crate) fn remarks(recording: &Recording) -> Vec<String> {
-    recording.remarks().into_iter().chain(lying(recording)).collect()
-}
-
-/// Most frames show a person longer than high: lying, or another axis points up.
-fn lying(recording: &Recording) -> Option<String> {
-    /// The span of spread arms equals the body height; this is clearly more.
-    const LONGER: f64 = 1.4;
-    let extents = recording.frames.iter().filter_map(|frame| {
-        let points: Vec<&Point3> = frame.iter().flatten().collect();
-        let side = |k: usize| {
-            let values = || points.iter().map(|point| point[k]);
-            values().fold(f64::NEG_INFINITY, f64::max) - values().fold(f64::INFINITY, f64::min)
-        };
-        (points.len() > 3).then(|| (side(0).max(side(1)), side(2)))
-    });
-    let (mut frames, mut longer) = (0_usize, 0);
-    for (along, up) in extents {
-        frames += 1;
-        longer += usize::from(along > LONGER * up);
-    }
-    (frames > 0 && 2 * longer > frames).then(|| {
-        format!("longer than high in {longer} of {frames} frames: if the person does not lie, another axis points up (--up x, y or z)")
-    })
-}
-
 /// Over all points and frames.
 fn hidden_percent(recording: &Recording) -> f64 {
     let all: usize = recording.frames.iter().map(Vec::len).sum();
@@ -407,7 +382,7 @@ fn keypoint_files(folder: &Path) -> Result<Vec<PathBuf>> {
     }
     farnear_files::order::sort(&mut files);
     match files.is_empty() {
-        true => Err(SilhouettesError::NoFrames { path: folder.into() }.into()),
+        true => Err(SilhouettesError::NoKeypointFiles { path: folder.into() }.into()),
         false => Ok(files),
     }
 }

@@ -129,10 +129,8 @@ pub fn up(motion: &Motion, kinematics: &Kinematics) -> Known<Up> {
         (sum, "over the frames (the rest pose is folded up)")
     };
     let length = upward.iter().map(|v| v * v).sum::<f64>().sqrt();
-    let axes = [Up::X, Up::Y, Up::Z].into_iter().zip(upward);
-    // BVH files mostly have y up: another axis must be better, not equal.
-    let (value, along) =
-        axes.fold((Up::Y, upward[1]), |best, next| if next.1 > best.1 { next } else { best });
+    let value = Up::along(upward);
+    let along = value.height(upward);
     let part = if length > 0.0 { along / length } else { 0.0 };
     let reason =
         format!("for {:.0} % of the way from the feet to the head {what} lie along it", 100.0 * part);

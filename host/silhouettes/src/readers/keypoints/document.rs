@@ -6,30 +6,75 @@ use std::collections::BTreeMap;
 use serde_json::{Map, Value};
 
 use super::layouts::{Layout, NAMES};
-use crate::readers::recording::RecordingError;
+use crate::{readers::recording::RecordingError, silhouette::capsule::Point3};
 
 /// Points of less confidence are missing.
 pub const LEAST_CONFIDENCE: f64 = 0.1;
 
-/// x to the right and y down, by [`NAMES`].
+#[derive(Clone, Copy, Debug)]
+pub struct Raw {
+    pub x: f64,
+    pub y: f64,
+    /// A depth, or the confidence if it is not `sure`.
+    pub third: Option<f64>,
+    pub sure: Option<f64>,
+}
+
+impl Raw {
+    const MISSING: Self = Self { x: f64::NAN, y: f64::NAN, third: None, sure: None };
+
+    pub fn in_space(&self) -> Option<Point3> {
+        let point = [self.x, self.y, self.third?];
+        point.iter().all(|v| v.is_finite()).then_some(point)
+    }
+
+    fn in_picture(&self) -> Option<Point3> {
+        let zero = self.x == 0.0 && self.y == 0.0;
+        // Not 0, 0, 0, which is a missing marker.
+        (!zero && self.x.is_finite() && self.y.is_finite()).then_some([self.x, self.y, 1e-9])
+    }
+}
+
 #[derive(Clone, Debug)]
 pub struct Person {
-    pub points: Vec<Option<[f64; 2]>>,
+    pub raw: Vec<Raw>,
+    pub layout: &'static Layout,
     pub id: Option<i64>,
+    /// By [`NAMES`], see [`Person::placed`].
+    pub points: Vec<Option<Point3>>,
+}
+
+impl Person {
+    fn of((raw, layout): (Vec<Raw>, &'static Layout)) -> Self {
+        Self { raw, layout, id: None, points: Vec::new() }
+    }
+
+    /// Orders the points; returns the number that are hidden for their low confidence.
+    pub fn placed(&mut self, layout: &Layout, has_depth: bool) -> usize {
+        let mut unsure = 0;
+        self.points = vec![None; NAMES.len()];
+        for (place, raw) in layout.places().zip(&self.raw) {
+            let Some(place) = place else { continue };
+            let third = raw.third.filter(|_| !has_depth && !layout.has_picture_depth());
+            let is_sure = raw.sure.or(third).unwrap_or(1.0) >= LEAST_CONFIDENCE;
+            let point = if has_depth { raw.in_space() } else { raw.in_picture() };
+            unsure += usize::from(point.is_some() && !is_sure);
+            self.points[place] = point.filter(|_| is_sure);
+        }
+        unsure
+    }
 }
 
 #[derive(Debug, Default)]
 pub struct Document {
     pub frames: Vec<Vec<Person>>,
     pub size: Option<[f64; 2]>,
-    pub layout: Option<&'static Layout>,
-    pub unsure: usize,
 }
 
 const PEOPLE: [&str; 8] =
     ["people", "bodies", "instances", "persons", "poses", "predictions", "detections", "annotations"];
 const FRAMES: [&str; 6] = ["frames", "instance_info", "pose_frames", "results", "data", "root"];
-const POINTS: [&str; 9] = [
+const POINTS: [&str; 12] = [
     "pose_keypoints_2d",
     "pose_keypoints",
     "keypoints",
@@ -39,6 +84,9 @@ const POINTS: [&str; 9] = [
     "landmarks",
     "landmark",
     "pose",
+    "pose_world_landmarks",
+    "poseWorldLandmarks",
+    "worldLandmarks",
 ];
 const CONFIDENCES: [&str; 3] = ["keypoint_scores", "keypoints_scores", "keypoint_confidences"];
 
@@ -95,8 +143,8 @@ impl Document {
 
     fn frames_of(&mut self, items: &[Value]) {
         // The points of one person, or people of one frame.
-        if let Some(person) = self.points_of(items, None) {
-            self.frames.push(vec![Person { points: person, id: None }]);
+        if let Some(person) = points_of(items, None) {
+            self.frames.push(vec![Person::of(person)]);
             return;
         }
         for item in items {
@@ -169,15 +217,15 @@ impl Document {
             other => other,
         };
         match people {
-            Value::Array(items) => match self.points(people, None) {
-                Some(points) => vec![Person { points, id: None }],
+            Value::Array(items) => match points(people, None) {
+                Some(points) => vec![Person::of(points)],
                 None => items.iter().filter_map(|item| self.person(item)).collect(),
             },
             Value::Object(map) => {
                 // Several people's landmarks in one list.
                 let several = POINTS.iter().find_map(|key| map.get(*key)?.as_array());
                 if let Some(items) = several
-                    && self.points_of(items, None).is_none()
+                    && points_of(items, None).is_none()
                 {
                     return items.iter().filter_map(|item| self.person(item)).collect();
                 }
@@ -189,7 +237,7 @@ impl Document {
 
     fn person(&mut self, value: &Value) -> Option<Person> {
         let Value::Object(map) = value else {
-            return self.points(value, None).map(|points| Person { points, id: None });
+            return points(value, None).map(Person::of);
         };
         let id = ["person_id", "idx", "track_id"].iter().find_map(|key| first_number(map.get(*key)?));
         let confidences = CONFIDENCES.iter().find_map(|key| map.get(*key)?.as_array());
@@ -197,66 +245,64 @@ impl Document {
             let value = map.get(*key)?;
             // MediaPipe's Python objects keep a list within.
             let value = value.get("landmark").unwrap_or(value);
-            self.points(value, confidences.map(Vec::as_slice))
+            points(value, confidences.map(Vec::as_slice))
         })?;
-        Some(Person { points: found, id: id.filter(|id| *id >= 0.0).map(|id| id as i64) })
+        Some(Person { id: id.filter(|id| *id >= 0.0).map(|id| id as i64), ..Person::of(found) })
     }
+}
 
-    fn points(&mut self, value: &Value, confidences: Option<&[Value]>) -> Option<Vec<Option<[f64; 2]>>> {
-        match value {
-            Value::Object(columns) => self.points_of(&rows(columns)?, confidences),
-            other => self.points_of(other.as_array()?, confidences),
-        }
+type Found = (Vec<Raw>, &'static Layout);
+
+fn points(value: &Value, confidences: Option<&[Value]>) -> Option<Found> {
+    match value {
+        Value::Object(columns) => points_of(&rows(columns)?, confidences),
+        other => points_of(other.as_array()?, confidences),
     }
+}
 
-    /// Points as x, y, c, ... in one list, lists of two to four numbers, or objects with x and y.
-    fn points_of(&mut self, items: &[Value], confidences: Option<&[Value]>) -> Option<Vec<Option<[f64; 2]>>> {
-        let number = |value: &Value| value.as_f64().unwrap_or(f64::NAN);
-        let flat = items.iter().any(Value::is_number);
-        let (layout, triples): (_, Vec<[f64; 3]>) = if flat {
-            // 33 points have depth as well; no two layouts share a length.
-            let (layout, width) = [3, 2, 4].iter().find_map(|width| {
-                let layout =
-                    Layout::of(items.len() / width).filter(|layout| layout.count * width == items.len())?;
-                Some((layout, *width))
-            })?;
-            let of = |c: &[Value]| [number(&c[0]), number(&c[1]), confidence(c, layout)];
-            (layout, items.chunks_exact(width).map(of).collect())
-        } else {
-            let layout = Layout::of(items.len())?;
-            let of = |item: &Value| -> Option<[f64; 3]> {
-                match item {
-                    Value::Array(c) if c.len() >= 2 && c.len() <= 4 => {
-                        Some([number(&c[0]), number(&c[1]), confidence(c, layout)])
-                    }
-                    Value::Object(map) => {
-                        let get = |key: &str| map.get(key).and_then(Value::as_f64);
-                        let sure = ["visibility", "score", "confidence", "c"].iter().find_map(|key| get(key));
-                        // PoseNet nests the position.
-                        let place = map.get("position").and_then(Value::as_object).unwrap_or(map);
-                        Some([number(place.get("x")?), number(place.get("y")?), sure.unwrap_or(1.0)])
-                    }
-                    Value::Null => Some([0.0; 3]),
-                    _ => None,
-                }
-            };
-            (layout, items.iter().map(of).collect::<Option<Vec<_>>>()?)
+/// Points as x, y, c, ... in one list, lists of two to four numbers, or objects with x and y.
+fn points_of(items: &[Value], confidences: Option<&[Value]>) -> Option<Found> {
+    let flat = items.iter().any(|item| number(item).is_some());
+    let (layout, mut raw): (_, Vec<Raw>) = if flat {
+        // No two layouts share a length.
+        let (layout, width) = [3, 2, 4].iter().find_map(|width| {
+            let layout =
+                Layout::of(items.len() / width).filter(|layout| layout.count * width == items.len())?;
+            Some((layout, *width))
+        })?;
+        (layout, items.chunks_exact(width).map(of_numbers).collect())
+    } else {
+        let of = |item: &Value| match item {
+            Value::Array(numbers) if (2..=4).contains(&numbers.len()) => Some(of_numbers(numbers)),
+            Value::Object(map) => of_object(map),
+            Value::Null => Some(Raw::MISSING),
+            _ => None,
         };
-        self.layout = Some(layout);
-        let mut points = vec![None; NAMES.len()];
-        for (index, place) in layout.places().enumerate() {
-            let (Some(place), Some(&[x, y, mut sure])) = (place, triples.get(index)) else { continue };
-            if let Some(given) = confidences.and_then(|all| all.get(index)) {
-                sure = number(given);
-            }
-            let missing = (x == 0.0 && y == 0.0) || !x.is_finite() || !y.is_finite();
-            if !missing && sure < LEAST_CONFIDENCE {
-                self.unsure += 1;
-            }
-            points[place] = (!missing && sure >= LEAST_CONFIDENCE).then_some([x, y]);
-        }
-        Some(points)
+        (Layout::of(items.len())?, items.iter().map(of).collect::<Option<_>>()?)
+    };
+    for (raw, given) in raw.iter_mut().zip(confidences.unwrap_or_default()) {
+        raw.sure = Some(number(given).unwrap_or(f64::NAN));
     }
+    Some((raw, layout))
+}
+
+fn of_numbers(numbers: &[Value]) -> Raw {
+    let at = |k: usize| numbers.get(k).map(|value| number(value).unwrap_or(f64::NAN));
+    Raw { x: at(0).unwrap_or(f64::NAN), y: at(1).unwrap_or(f64::NAN), third: at(2), sure: at(3) }
+}
+
+fn of_object(map: &Map<String, Value>) -> Option<Raw> {
+    let sure =
+        ["visibility", "score", "confidence", "c"].iter().find_map(|key| map.get(*key).and_then(number));
+    // PoseNet nests the position.
+    let place = map.get("position").and_then(Value::as_object).unwrap_or(map);
+    let [x, y] = ["x", "y"].map(|key| place.get(key).map(|value| number(value).unwrap_or(f64::NAN)));
+    Some(Raw { x: x?, y: y?, third: place.get("z").and_then(number), sure: sure.or(Some(1.0)) })
+}
+
+/// Some programs write numbers as text.
+fn number(value: &Value) -> Option<f64> {
+    value.as_f64().or_else(|| value.as_str()?.trim().parse().ok())
 }
 
 /// `NaN` and `Infinity`, which Python's json module writes, as `null`.
@@ -292,17 +338,6 @@ fn rows(columns: &Map<String, Value>) -> Option<Vec<Value>> {
     Some(x.iter().zip(y).enumerate().map(row).collect())
 }
 
-/// The value after x and y; MediaPipe's third number is a depth.
-fn confidence(numbers: &[Value], layout: &Layout) -> f64 {
-    let depth = layout.count == 33;
-    let sure = match numbers.len() {
-        3 if !depth => numbers.get(2),
-        4 => numbers.get(3),
-        _ => None,
-    };
-    sure.and_then(Value::as_f64).unwrap_or(1.0)
-}
-
 fn is_frame(map: &Map<String, Value>) -> bool {
     PEOPLE.iter().chain(&POINTS).any(|key| map.contains_key(*key))
 }
@@ -335,7 +370,7 @@ fn order(name: &str) -> (String, u64, String) {
 fn first_number(value: &Value) -> Option<f64> {
     match value {
         Value::Array(items) => first_number(items.first()?),
-        other => other.as_f64(),
+        other => number(other),
     }
 }
 

@@ -23,6 +23,28 @@ pub const LAYOUTS: [Layout; 10] = [
     Layout { name: "HALPE whole body", count: 136, points: &HALPE_26 },
 ];
 
+/// Estimators of 3-D poses mostly use this order.
+pub const HUMAN36M: Layout = Layout { name: "Human3.6M", count: 17, points: &HUMAN36M_17 };
+
+const HUMAN36M_17: [&str; 17] = [
+    "hip centre",
+    "rh",
+    "rk",
+    "ra",
+    "lh",
+    "lk",
+    "la",
+    "",
+    "neck",
+    "nose",
+    "head top",
+    "ls",
+    "le",
+    "lw",
+    "rs",
+    "re",
+    "rw",
+];
 const MPI_15: [&str; 15] =
     ["head top", "neck", "rs", "re", "rw", "ls", "le", "lw", "rh", "rk", "ra", "lh", "lk", "la", ""];
 const MPII_16: [&str; 16] = [
@@ -235,6 +257,11 @@ impl Layout {
         LAYOUTS.iter().find(|layout| layout.count == count)
     }
 
+    /// MediaPipe gives points of a picture a depth, and points in space about the hips.
+    pub fn has_picture_depth(&self) -> bool {
+        self.count == MEDIAPIPE_33.len()
+    }
+
     pub fn places(&self) -> impl Iterator<Item = Option<usize>> {
         self.points.iter().map(|short| NAMES.iter().position(|name| *name == full_name(short)))
     }
@@ -264,7 +291,7 @@ mod tests {
 
     #[test]
     fn every_layout_has_the_limbs_of_both_sides_once() {
-        for layout in &LAYOUTS {
+        for layout in LAYOUTS.iter().chain([&HUMAN36M]) {
             let places: Vec<usize> = layout.places().flatten().collect();
             let named = layout.points.iter().filter(|point| !point.is_empty()).count();
             assert_eq!(places.len(), named, "{}: an unknown name", layout.name);

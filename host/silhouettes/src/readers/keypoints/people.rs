@@ -3,8 +3,9 @@
 use std::collections::BTreeMap;
 
 use super::{document::Person, layouts::NAMES};
+use crate::silhouette::capsule::Point3;
 
-pub type Track = Vec<Vec<Option<[f64; 2]>>>;
+pub type Track = Vec<Vec<Option<Point3>>>;
 
 /// Limit of people, which bounds the memory.
 const MOST: usize = 16;
@@ -18,7 +19,7 @@ const LEAST_SHARE: f64 = 0.1;
 struct Followed {
     id: Option<i64>,
     last: usize,
-    centre: [f64; 2],
+    centre: Point3,
     height: f64,
     heights: f64,
     /// Frame and index in it.
@@ -50,7 +51,7 @@ pub fn followed(frames: &[Vec<Person>]) -> (Vec<Track>, usize) {
             }
             for (index, track) in all.iter().enumerate() {
                 let recent = track.id.is_none() && frame - track.last <= FORGOTTEN_AFTER;
-                let step = (centre[0] - track.centre[0]).hypot(centre[1] - track.centre[1]);
+                let step = distance(centre, track.centre);
                 let reach = WIDEST_STEP * height.max(track.height);
                 if recent && step <= reach {
                     pairs.push((step, index, place));
@@ -107,11 +108,11 @@ fn numbered(frames: &[Vec<Person>]) -> bool {
     2 * repeated <= several
 }
 
-fn begun(id: Option<i64>, centre: [f64; 2], height: f64) -> Followed {
+fn begun(id: Option<i64>, centre: Point3, height: f64) -> Followed {
     Followed { id, last: 0, centre, height, heights: 0.0, seen: Vec::new() }
 }
 
-fn add(track: &mut Followed, frame: usize, place: usize, centre: [f64; 2], height: f64) {
+fn add(track: &mut Followed, frame: usize, place: usize, centre: Point3, height: f64) {
     // A number that occurs twice in a frame: the first counts.
     if track.seen.last().is_some_and(|(last, _)| *last == frame) {
         return;
@@ -121,14 +122,18 @@ fn add(track: &mut Followed, frame: usize, place: usize, centre: [f64; 2], heigh
     track.seen.push((frame, place));
 }
 
-/// Centre and longer side of the box around a person's points; `None` with fewer than four.
-fn extent(person: &Person) -> Option<([f64; 2], f64)> {
-    let points: Vec<[f64; 2]> = person.points.iter().flatten().copied().collect();
+/// Centre and longest side of the box around a person's points; `None` with fewer than four.
+fn extent(person: &Person) -> Option<(Point3, f64)> {
+    let points: Vec<Point3> = person.points.iter().flatten().copied().collect();
     let side = |k: usize| {
         let values = || points.iter().map(|p| p[k]);
         (values().fold(f64::INFINITY, f64::min), values().fold(f64::NEG_INFINITY, f64::max))
     };
-    let [(left, right), (top, bottom)] = [side(0), side(1)];
-    let height = (right - left).max(bottom - top);
-    (points.len() >= 4 && height > 0.0).then_some(([0.5 * (left + right), 0.5 * (top + bottom)], height))
+    let sides = [side(0), side(1), side(2)];
+    let height = sides.iter().map(|(low, high)| high - low).fold(0.0, f64::max);
+    (points.len() >= 4 && height > 0.0).then_some((sides.map(|(low, high)| 0.5 * (low + high)), height))
+}
+
+pub fn distance(a: Point3, b: Point3) -> f64 {
+    (0..3).map(|k| (a[k] - b[k]).powi(2)).sum::<f64>().sqrt()
 }

@@ -73,8 +73,9 @@ fn a_folder_of_openpose_files_is_a_recording_with_empty_frames() {
     let frame =
         |x: f64| format!(r#"{{"people":[{{"pose_keypoints_2d":{}}}]}}"#, flat(&person(layout(25), x)));
     let files = [frame(100.0), r#"{"people":[]}"#.into(), frame(104.0)];
-    let found =
-        read_files(files.iter().map(String::as_bytes)).expect("keypoints").settled(Choices::default());
+    let found = read_files(files.iter().map(String::as_bytes), Choices::default())
+        .expect("keypoints")
+        .settled(Choices::default());
     assert_eq!(found.frames.len(), 3);
     assert!(found.by_name(1).is_empty());
     let moved = found.by_name(2)["neck"][0] - found.by_name(0)["neck"][0];
@@ -277,4 +278,114 @@ fn not_a_number_is_a_missing_point_and_stays_in_names() {
     let item = |name: &str| format!(r#"{{"image_id":"NaN\"{name}.jpg","keypoints":{numbers}}}"#);
     let found = upright(&format!("[{},{}]", item("1"), item("2")), 2);
     assert!(!found.by_name(0).contains_key("nose") && !found.by_name(0).contains_key("left wrist"));
+}
+
+/// The person of [`person`] in metres, 3-D, z up, turned by 30 degrees about the vertical.
+fn in_space(layout: &Layout) -> Vec<[f64; 3]> {
+    let turned = |[x, y, _]: [f64; 3]| [0.00866 * (x - 100.0), 0.005 * (x - 100.0), 0.01 * (190.0 - y)];
+    person(layout, 100.0).into_iter().map(turned).collect()
+}
+
+fn lists(points: &[[f64; 3]]) -> String {
+    let all: Vec<String> = points.iter().map(|[x, y, z]| format!("[{x},{y},{z}]")).collect();
+    format!("[{}]", all.join(","))
+}
+
+#[track_caller]
+fn upright_in_space(json: &str) -> super::super::recording::Recording {
+    let found =
+        read(json.as_bytes(), "json", Choices::default()).unwrap_or_else(|error| panic!("{error}: {json}"));
+    let points = found.by_name(0);
+    let height = points["left shoulder"][2] - points["left ankle"][2];
+    assert!((height - 1340.0).abs() < 5.0 && !found.planar, "{height} mm {:?}", found.remarks());
+    let wide = points["left shoulder"][0] - points["right shoulder"][0];
+    assert!((wide.abs() - 311.8).abs() < 1.0, "{wide} mm");
+    found
+}
+
+#[test]
+fn points_in_three_dimensions_are_of_human36m_or_coco_by_the_length_of_their_limbs() {
+    for layout in [&layouts::HUMAN36M, layout(17)] {
+        let points = in_space(layout);
+        let scores = ["1.0"; 17].join(",");
+        let inferencer = format!(
+            r#"[[{{"keypoints":{0},"keypoint_scores":[{scores}]}}],[{{"keypoints":{0},"keypoint_scores":[{scores}]}}]]"#,
+            lists(&points)
+        );
+        let found = upright_in_space(&inferencer);
+        assert!(found.remarks().iter().any(|remark| remark.contains(layout.name)), "{:?}", found.remarks());
+        // y down, about the hips, without scores.
+        let camera: Vec<[f64; 3]> = points.iter().map(|[x, y, z]| [*x, 0.9 - z, *y]).collect();
+        upright_in_space(&format!("[{},{}]", lists(&camera), lists(&camera)));
+    }
+}
+
+#[test]
+fn points_in_three_dimensions_of_an_unknown_order_are_refused() {
+    let mut points = in_space(&layouts::HUMAN36M);
+    points.swap(2, 11);
+    points.swap(5, 15);
+    let json =
+        format!(r#"[{{"keypoints":{},"keypoint_scores":[{}]}}]"#, lists(&points), ["1.0"; 17].join(","));
+    let error = read(json.as_bytes(), "json", Choices::default()).expect_err("no order").to_string();
+    assert!(error.contains("three coordinates") && error.contains("NAME_x"), "{error}");
+}
+
+#[test]
+fn visibilities_and_scores_are_not_coordinates() {
+    let mut points = person(layout(17), 100.0);
+    for third in [2.0, 1.1] {
+        points.iter_mut().for_each(|point| point[2] = third);
+        upright(&format!(r#"{{"people":[{{"keypoints":{}}}]}}"#, flat(&points)), 1);
+    }
+    let scores: Vec<String> = points.iter().map(|point| point[2].to_string()).collect();
+    let json = format!(r#"[{{"keypoints":{},"keypoint_scores":[{}]}}]"#, lists(&points), scores.join(","));
+    upright(&json, 1);
+}
+
+#[test]
+fn world_landmarks_of_mediapipe_are_metres_in_space() {
+    let landmarks: Vec<String> = in_space(layout(33))
+        .iter()
+        .map(|[x, y, z]| format!(r#"{{"x":{x},"y":{},"z":{y},"visibility":0.9}}"#, 0.9 - z))
+        .collect();
+    let landmarks = landmarks.join(",");
+    let found = upright_in_space(&format!(r#"[{{"landmarks":[{landmarks}]}}]"#));
+    assert!(found.remarks().iter().all(|remark| !remark.contains("picture")), "{:?}", found.remarks());
+    upright_in_space(&format!(r#"[{{"pose_world_landmarks":[{landmarks}]}}]"#));
+}
+
+#[test]
+fn numbers_as_text_are_numbers() {
+    let points: Vec<String> =
+        person(layout(17), 50.0).iter().map(|[x, y, c]| format!(r#"["{x}","{y}","{c}"]"#)).collect();
+    upright(&format!(r#"[{{"keypoints":[{}]}}]"#, points.join(",")), 1);
+}
+
+#[test]
+fn pictures_with_y_up_are_reversed_and_those_with_y_first_need_the_axis() {
+    let of = |place: fn([f64; 3]) -> [f64; 3]| {
+        let points: Vec<[f64; 3]> = person(layout(17), 100.0).into_iter().map(place).collect();
+        format!(r#"[{{"keypoints":{}}},{{"keypoints":{}}}]"#, lists(&points), lists(&points))
+    };
+    let found = upright(&of(|[x, y, c]| [x, 480.0 - y, c]), 2);
+    assert!(
+        found.remarks().iter().any(|remark| remark.starts_with("y is taken as up")),
+        "{:?}",
+        found.remarks()
+    );
+
+    let swapped = of(|[x, y, c]| [y / 360.0, x / 640.0, c]);
+    let lying = read(swapped.as_bytes(), "json", Choices::default()).expect("keypoints").remarks();
+    assert!(lying.iter().any(|remark| remark.contains("y before x (--up -x)")), "{lying:?}");
+    let up = |up| read(swapped.as_bytes(), "json", Choices { up: Some(up), ..Choices::default() });
+    let points = up(Up::MinusX).expect("keypoints");
+    let points = points.by_name(0);
+    let (wide, high) = (
+        points["left shoulder"][0] - points["right shoulder"][0],
+        points["left shoulder"][2] - points["left ankle"][2],
+    );
+    assert!((high - 1340.0).abs() < 60.0 && (wide / high - 36.0 / 134.0).abs() < 0.001, "{wide} {high}");
+    let error = up(Up::Z).expect_err("no third axis").to_string();
+    assert!(error.contains("--up z") && error.contains("two dimensions"), "{error}");
 }

@@ -1,0 +1,85 @@
+//! Keypoints in three dimensions: whether a file's third numbers are coordinates, and the order of its points.
+
+use super::{
+    document::{Person, Raw},
+    layouts::{HUMAN36M, Layout},
+};
+use crate::readers::recording::RecordingError;
+
+/// Confidences exceed 1 slightly in some programs.
+const HIGHEST_CONFIDENCE: f64 = 1.2;
+/// Share of points outside the range of confidences, or of the picture.
+const LEAST_SHARE: f64 = 0.05;
+const MOST_ASYMMETRY: f64 = 0.25;
+/// Limbs as short names of their ends, without the side.
+const LIMBS: [[char; 2]; 4] = [['s', 'e'], ['e', 'w'], ['h', 'k'], ['k', 'a']];
+
+fn share(raw: &[&Raw], holds: impl Fn(&Raw) -> bool) -> f64 {
+    raw.iter().filter(|point| holds(point)).count() as f64 / raw.len().max(1) as f64
+}
+
+fn seen<'a>(people: impl Iterator<Item = &'a Person>) -> Vec<&'a Raw> {
+    people.flat_map(|person| &person.raw).filter(|point| point.x.is_finite() && point.y.is_finite()).collect()
+}
+
+/// Coordinates on both sides of zero are not those of a picture.
+pub fn are_centred<'a>(people: impl Iterator<Item = &'a Person>) -> bool {
+    const SHARE: f64 = 0.25;
+    share(&seen(people), |point| point.x < 0.0 || point.y < 0.0) >= SHARE
+}
+
+pub fn has_depth<'a>(people: impl Iterator<Item = &'a Person> + Clone) -> bool {
+    if people.clone().any(|person| person.layout.has_picture_depth()) {
+        return are_centred(people);
+    }
+    let thirds: Vec<&Raw> = seen(people).into_iter().filter(|point| point.third.is_some()).collect();
+    let is_visibility = |point: &Raw| point.third.is_some_and(|v| v == 0.0 || v == 1.0 || v == 2.0);
+    let is_outside = |point: &Raw| match (point.third, point.sure) {
+        (Some(third), Some(sure)) => third != sure,
+        (Some(third), None) => !(0.0..=HIGHEST_CONFIDENCE).contains(&third),
+        (None, _) => false,
+    };
+    share(&thirds, |point| !is_visibility(point)) >= LEAST_SHARE && share(&thirds, is_outside) >= LEAST_SHARE
+}
+
+/// The order in which left and right limbs are equally long.
+pub fn layout<'a>(
+    people: impl Iterator<Item = &'a Person> + Clone,
+) -> Result<&'static Layout, RecordingError> {
+    let count = people.clone().next().map_or(0, |person| person.layout.count);
+    let orders =
+        [Some(&HUMAN36M), Layout::of(count)].into_iter().flatten().filter(|order| order.count == count);
+    let measured = orders.map(|order| (asymmetry(people.clone(), order), order));
+    let best =
+        measured.min_by(|a, b| a.0.total_cmp(&b.0)).filter(|(asymmetry, _)| *asymmetry <= MOST_ASYMMETRY);
+    best.map(|(_, order)| order).ok_or_else(|| RecordingError::Kind {
+        kind: "keypoint JSON",
+        reason: format!(
+            "its {count} points have three coordinates, and left and right limbs differ in every known order: write them \
+             to a CSV file with columns NAME_x, NAME_y, NAME_z"
+        ),
+    })
+}
+
+/// Mean difference of left and right limbs relative to their length.
+fn asymmetry<'a>(people: impl Iterator<Item = &'a Person>, order: &Layout) -> f64 {
+    let place =
+        |side: char, joint: char| order.points.iter().position(|short| short.chars().eq([side, joint]));
+    let (mut sum, mut count) = (0.0, 0_usize);
+    for person in people {
+        let length = |side: char, [from, to]: [char; 2]| -> Option<f64> {
+            let at = |joint: char| person.raw.get(place(side, joint)?)?.in_space();
+            let (from, to) = (at(from)?, at(to)?);
+            Some((0..3).map(|k| (from[k] - to[k]).powi(2)).sum::<f64>().sqrt())
+        };
+        for limb in LIMBS {
+            if let (Some(left), Some(right)) = (length('l', limb), length('r', limb))
+                && left + right > 0.0
+            {
+                sum += 2.0 * (left - right).abs() / (left + right);
+                count += 1;
+            }
+        }
+    }
+    sum / count.max(1) as f64
+}

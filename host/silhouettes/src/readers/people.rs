@@ -1,0 +1,160 @@
+//! People of a recording: those that a format separates, or prefixes of names (`Ann:LASI`, `Ben:LASI`) that share names of
+//! body markers. Points of no person, such as props, belong to all.
+
+use std::collections::HashSet;
+
+use super::recording::Found;
+use crate::silhouette::{
+    anatomy::{self, Anatomy},
+    capsule::Point3,
+};
+
+/// Body markers of a person.
+const LEAST: usize = 4;
+
+/// At least one, the default first.
+pub fn of(mut found: Found) -> Vec<Found> {
+    if found.others.is_empty() {
+        return by_prefix(found);
+    }
+    let others = std::mem::take(&mut found.others);
+    let mut people = vec![found];
+    for frames in others {
+        let other = Found { frames, ..people[0].without_frames() };
+        people.push(other);
+    }
+    people
+}
+
+struct Group<'a> {
+    prefix: &'a str,
+    places: Vec<usize>,
+    body: HashSet<&'a str>,
+    visible: usize,
+}
+
+fn by_prefix(found: Found) -> Vec<Found> {
+    let mut groups: Vec<Group<'_>> = Vec::new();
+    for (place, name) in found.names.iter().enumerate() {
+        let prefix = anatomy::prefix(name);
+        match groups.iter_mut().find(|group| group.prefix == prefix) {
+            Some(group) => group.places.push(place),
+            None => groups.push(Group { prefix, places: vec![place], body: HashSet::new(), visible: 0 }),
+        }
+    }
+    if groups.len() < 2 {
+        return vec![found];
+    }
+    for group in &mut groups {
+        let names: Vec<String> = group.places.iter().map(|place| found.names[*place].clone()).collect();
+        let body: Vec<usize> = Anatomy::of(&names).body.iter().map(|index| group.places[*index]).collect();
+        let seen = |frame: &Vec<Option<Point3>>| {
+            body.iter().filter(|place| frame.get(**place).is_some_and(Option::is_some)).count()
+        };
+        group.visible = found.frames.iter().map(seen).sum();
+        group.body = body.iter().map(|place| anatomy::without_prefix(&found.names[*place])).collect();
+    }
+    let shares = |a: usize| {
+        let others = groups.iter().enumerate().filter(|(b, other)| a != *b && other.body.len() >= LEAST);
+        groups[a].body.len() >= LEAST
+            && others.into_iter().any(|(_, other)| !groups[a].body.is_disjoint(&other.body))
+    };
+    let mut people: Vec<usize> = (0..groups.len()).filter(|group| shares(*group)).collect();
+    if people.len() < 2 {
+        return vec![found];
+    }
+    // In the file's order, those who are rarely visible last.
+    let most = people.iter().map(|group| groups[*group].visible).max().unwrap_or(0);
+    people.sort_by_key(|group| 2 * groups[*group].visible < most);
+    let no_person = || {
+        let groups = groups.iter().enumerate().filter(|(group, _)| !people.contains(group));
+        groups.flat_map(|(_, group)| group.places.iter().copied())
+    };
+    let listed: Vec<String> = (1..)
+        .zip(&people)
+        .map(|(number, group)| match groups[*group].prefix {
+            "" => format!("{number} without a prefix"),
+            prefix => format!("{number} {prefix}"),
+        })
+        .collect();
+    let remark = format!("{} people: {} (--person selects one, default 1)", people.len(), listed.join(", "));
+    let person = |group: &usize| {
+        let places: Vec<usize> = groups[*group].places.iter().copied().chain(no_person()).collect();
+        let pick = |frame: &Vec<Option<Point3>>| {
+            places.iter().map(|place| frame.get(*place).copied().flatten()).collect()
+        };
+        let mut remarks = found.remarks.clone();
+        remarks.push(remark.clone());
+        Found {
+            names: places.iter().map(|place| found.names[*place].clone()).collect(),
+            frames: found.frames.iter().map(pick).collect(),
+            remarks,
+            ..found.without_frames()
+        }
+    };
+    people.iter().map(person).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::readers::{
+        read,
+        recording::{Choices, Recording, RecordingError},
+    };
+
+    const SUIT: [&str; 5] = ["LFHD", "C7", "LASI", "LKNE", "LTOE"];
+
+    /// Two people 3 m apart, a box, and a force in newtons; Ann's LASI is hidden in the second frame.
+    fn two() -> String {
+        let names = ["Ann", "Ben"].into_iter().flat_map(|person| SUIT.map(|name| format!("{person}:{name}")));
+        let names: Vec<String> = names.chain(["Box:B1".into(), "Force".into()]).collect();
+        let row = |frame: usize| {
+            let suit = |x: f64| {
+                (0..5).map(move |marker| {
+                    let hidden = frame == 1 && x < 1000.0 && SUIT[marker] == "LASI";
+                    if hidden { ",,".into() } else { format!("{x},{},{}", 10 * marker, 1700 - 400 * marker) }
+                })
+            };
+            let extra = ["700,5,5".to_owned(), "90000,5,5".into()];
+            suit(500.0).chain(suit(3500.0)).chain(extra).collect::<Vec<String>>().join(",")
+        };
+        let header: Vec<String> = names.iter().map(|name| format!("{name}_x,{name}_y,{name}_z")).collect();
+        format!("{}\n{}\n{}\n", header.join(","), row(0), row(1))
+    }
+
+    fn person(text: &str, person: Option<usize>) -> Result<Recording, RecordingError> {
+        read(text.as_bytes(), "csv", Choices { person, ..Choices::default() })
+    }
+
+    #[test]
+    fn prefixes_with_the_same_body_markers_are_people_who_are_never_mixed() {
+        let ann = person(&two(), None).expect("a table");
+        assert_eq!(ann.by_name(0)["LASI"][0], 500.0);
+        assert!(!ann.by_name(1).contains_key("LASI"), "hidden, not Ben's");
+        assert!(ann.by_name(0).contains_key("B1") && ann.names.len() == 7);
+        assert_eq!(ann.remarks(), ["2 people: 1 Ann, 2 Ben (--person selects one, default 1)"]);
+        let ben = person(&two(), Some(2)).expect("a table");
+        assert_eq!((ben.by_name(1)["LASI"][0], ben.by_name(1)["Ben:C7"][0]), (3500.0, 3500.0));
+        assert!(matches!(person(&two(), Some(3)), Err(RecordingError::Person { wanted: 3, found: 2 })));
+    }
+
+    #[test]
+    fn a_person_who_is_hidden_nearly_always_is_not_the_default() {
+        let text = two();
+        let hidden = text.lines().map(|row| {
+            let cells: Vec<&str> = row.split(',').collect();
+            let is_header = row.starts_with("Ann");
+            let ann = if is_header { cells[..15].to_vec() } else { vec![""; 15] };
+            [ann, cells[15..].to_vec()].concat().join(",")
+        });
+        let hidden = hidden.collect::<Vec<String>>().join("\n");
+        assert_eq!(person(&hidden, None).expect("a table").by_name(0)["LASI"][0], 3500.0);
+    }
+
+    #[test]
+    fn prefixes_of_parts_of_one_suit_are_one_person() {
+        let parts = two().replace("Ben:", "Legs:B");
+        let found = person(&parts, None).expect("a table");
+        assert!(found.names.len() == 12 && found.by_name(0).contains_key("BLASI"));
+    }
+}
