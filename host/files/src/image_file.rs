@@ -208,9 +208,21 @@ pub fn read_grey_with(path: &Path, settings: &ReadSettings) -> Result<GreyImage,
 }
 
 /// Reads with 8 bits per sample: grey, or RGB (height, width, 3). 16 bits keep their upper half; floats are rejected.
-pub(crate) fn read_8_bit(path: &Path) -> Result<Samples8, ImageError> {
+pub(crate) fn read_8_bit(path: &Path, bits: u32) -> Result<Samples8, ImageError> {
     let (decoded, path) = read_decoded(path)?;
-    decoded.in_8_bits().map_err(|reason| ImageError::Format { path, reason })
+    decoded.in_8_bits(bits).map_err(|reason| ImageError::Format { path, reason })
+}
+
+/// As [`read_8_bit`] by the image's own largest sample; an image of one colour whose opacity differs is its opacity.
+pub(crate) fn read_labels(path: &Path) -> Result<Samples8, ImageError> {
+    let (decoded, path) = read_decoded(path)?;
+    let decoded = if decoded.only_alpha_differs() { decoded.alpha() } else { decoded };
+    let bits = decoded.used_bits();
+    decoded.in_8_bits(bits).map_err(|reason| ImageError::Format { path, reason })
+}
+
+pub(crate) fn used_bits(path: &Path) -> Result<u32, ImageError> {
+    Ok(read_decoded(path)?.0.used_bits())
 }
 
 /// Why a file is not read that is an image by its content; `None` if it is not.

@@ -38,6 +38,16 @@ pub enum MaskError {
     )]
     Levels { path: PathBuf, levels: Vec<u8> },
     #[error(
+        "{}: grey levels {levels:?}: a mask has two; these are labels of several things: write one mask of what is meant",
+        path.display()
+    )]
+    Labels { path: PathBuf, levels: Vec<u8> },
+    #[error(
+        "{}: {percent} % of the masks' pixels are set: is the person black on white? Masks have the person white, on black",
+        path.display()
+    )]
+    Inverted { path: PathBuf, percent: u64 },
+    #[error(
         "{}: the mask is {}x{}, but `{first}` is {}x{}; the masks of a sequence must be alike",
         path.display(), found.1, found.0, expected.1, expected.0
     )]
@@ -142,4 +152,29 @@ pub fn encoded<T>(pixels: &Array2<T>, level: impl Fn(&T) -> u8) -> Result<Vec<u8
         .write_to(&mut Cursor::new(&mut bytes), ImageFormat::Png)
         .map_err(EncodeError::of("a mask"))?;
     Ok(bytes)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use image::{ImageBuffer, LumaA, Rgba};
+
+    #[test]
+    fn masks_in_the_opacity_and_in_16_bits_are_read() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = |name: &str| folder.path().join(name);
+        let set = |x: u32, y: u32| x == 1 && y < 2;
+        ImageBuffer::from_fn(4, 3, |x, y| Rgba([255_u8, 255, 255, if set(x, y) { 255 } else { 0 }]))
+            .save(path("rgba.png"))
+            .unwrap();
+        ImageBuffer::from_fn(4, 3, |x, y| LumaA([0_u8, if set(x, y) { 200 } else { 0 }]))
+            .save(path("la.png"))
+            .unwrap();
+        ImageBuffer::from_fn(4, 3, |x, y| Luma([u16::from(set(x, y))])).save(path("labels.png")).unwrap();
+        for name in ["rgba.png", "la.png", "labels.png"] {
+            let masks = read_all(&path(name)).unwrap().pixels();
+            let expected = Array2::from_shape_fn((3, 4), |(y, x)| set(x as u32, y as u32));
+            assert_eq!(masks, [expected], "{name}");
+        }
+    }
 }

@@ -210,6 +210,18 @@ mod tests {
     }
 
     #[test]
+    fn frames_of_12_bits_in_16_keep_their_contrast() {
+        let folder = tempfile::tempdir().unwrap();
+        for (number, level) in [(1, 4095_u16), (2, 2048)] {
+            let picture = image::ImageBuffer::from_pixel(4, 3, Luma([level]));
+            picture.save(folder.path().join(format!("{number}.png"))).unwrap();
+        }
+        let frames = Video::open(folder.path()).unwrap().map(|frame| frame.unwrap().pixels);
+        let levels = [255, 128].map(|level| Pixels::Grey(Array2::from_elem((3, 4), level)));
+        assert_eq!(frames.collect::<Vec<_>>(), levels);
+    }
+
+    #[test]
     fn a_frame_of_another_size_ends_the_video_with_its_name() {
         let folder = tempfile::tempdir().unwrap();
         RgbImage::from_pixel(4, 3, Rgb([1, 2, 3])).save(folder.path().join("a.png")).unwrap();

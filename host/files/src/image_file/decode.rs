@@ -214,10 +214,32 @@ impl Decoded {
         }
     }
 
-    pub(crate) fn in_8_bits(self) -> Result<Pixels, String> {
+    /// Opacity as grey.
+    pub(crate) fn alpha(self) -> Self {
+        let values = match &self.values {
+            Values::U8(v) => Values::U8(last_of(v, self.channels)),
+            Values::U16(v) => Values::U16(last_of(v, self.channels)),
+            Values::U32(v) => Values::U32(last_of(v, self.channels)),
+            Values::F32(v) => Values::F32(last_of(v, self.channels)),
+        };
+        Self { values, channels: 1, colours: 1, ..self }
+    }
+
+    /// Bits of the largest of 16-bit samples: 16 may hold 12, or a mask of 0 and 1.
+    pub(crate) fn used_bits(&self) -> u32 {
+        match &self.values {
+            Values::U16(values) => 16 - values.iter().fold(0, |used, value| used | value).leading_zeros(),
+            _ => 8,
+        }
+    }
+
+    /// White is the largest code of this many bits of 16.
+    pub(crate) fn in_8_bits(self, bits: u32) -> Result<Pixels, String> {
+        let white = u32::from(u16::MAX >> (16 - bits.clamp(8, 16)));
+        let scaled = |value: u16| ((u32::from(value) * 255 + white / 2) / white).min(255) as u8;
         let bytes = match self.values {
             Values::U8(values) => values,
-            Values::U16(values) => values.into_iter().map(|v| ((u32::from(v) + 128) / 257) as u8).collect(),
+            Values::U16(values) => values.into_iter().map(scaled).collect(),
             Values::U32(values) => values.into_iter().map(|v| (255.0 * v).round() as u8).collect(),
             Values::F32(_) => {
                 return Err(
@@ -254,6 +276,10 @@ impl Decoded {
         }
         self
     }
+}
+
+fn last_of<T: Copy>(values: &[T], channels: usize) -> Vec<T> {
+    values.chunks_exact(channels).map(|pixel| pixel[channels - 1]).collect()
 }
 
 fn only_last_differ<T: PartialEq>(values: &[T], channels: usize, colours: usize) -> bool {

@@ -16,6 +16,10 @@ const SURVEYED: usize = 8;
 /// JPEG rings: levels this near to black or white (part of the range) are those, save one pixel in [`ONE_BETWEEN_IN`].
 const RINGING: f64 = 0.157;
 const ONE_BETWEEN_IN: u64 = 50;
+/// Fewer levels than this, of which one is near black or white, are labels: JPEG has many.
+const FEW: usize = 6;
+/// Of 100 pixels so many are at most people.
+const MOST_PEOPLE: u64 = 70;
 /// Two levels nearer than this with others between them are a picture, not a mask.
 const LEAST_GAP: u8 = 40;
 
@@ -46,6 +50,22 @@ impl Histogram {
         (0..=u8::MAX).filter(|&level| self.0[usize::from(level)] > 0).collect()
     }
 
+    /// Labels of several things, such as 0, 15 and 255 of PASCAL VOC.
+    #[must_use]
+    pub fn are_labels(&self) -> bool {
+        let present = self.present();
+        let [low, between @ .., high] = present.as_slice() else { return false };
+        let near = |level: &u8| !(low + margin(*low, *high)..=high - margin(*low, *high)).contains(level);
+        let known = present.iter().all(|level| LABELS.contains(level));
+        !known && present.len() < FEW && between.iter().any(near)
+    }
+
+    fn percent_from(&self, level: u8) -> u64 {
+        let all: u64 = self.0.iter().sum();
+        let set: u64 = self.0[usize::from(level)..].iter().sum();
+        100 * set / all.max(1)
+    }
+
     /// Whether other pictures of the folder may hold the person's level.
     fn undecided(&self) -> bool {
         let present = self.present();
@@ -55,6 +75,9 @@ impl Histogram {
     /// The levels of masks; `None` for other pictures.
     #[must_use]
     pub fn levels(&self) -> Option<Levels> {
+        if self.are_labels() {
+            return None;
+        }
         match self.present().as_slice() {
             [] | [_] | [0, 255] => Some(Levels::default()),
             &[low, high] => Some(Levels {
@@ -76,7 +99,7 @@ impl Histogram {
     }
 
     fn two_clusters(&self, low: u8, high: u8) -> Option<Levels> {
-        let margin = (RINGING * f64::from(high - low)) as u8;
+        let margin = margin(low, high);
         let all: u64 = self.0.iter().sum();
         let between: u64 = (low + margin..=high - margin).map(|level| self.0[usize::from(level)]).sum();
         if between * ONE_BETWEEN_IN > all {
@@ -91,6 +114,11 @@ impl Histogram {
     }
 }
 
+/// How far ringing leads from black and white.
+fn margin(low: u8, high: u8) -> u8 {
+    (RINGING * f64::from(high - low)) as u8
+}
+
 fn listed(levels: &[u8]) -> String {
     levels.iter().map(u8::to_string).collect::<Vec<_>>().join(", ")
 }
@@ -102,12 +130,24 @@ impl Default for Levels {
 }
 
 impl Levels {
-    /// The levels of a masks' histogram; `first` is for messages. [`MaskError::Levels`] if nothing would be set.
+    /// The levels of masks of people from their histogram; `first` is for messages. Fails for labels of several things, if
+    /// nothing would be set, and if nearly all would be.
     pub fn of_masks(histogram: &Histogram, first: &std::path::Path) -> Result<Self, MaskError> {
+        let levels = Self::by_histogram(histogram, first)?;
+        match histogram.percent_from(levels.set_from) {
+            percent @ MOST_PEOPLE.. => Err(MaskError::Inverted { path: first.into(), percent }),
+            _ => Ok(levels),
+        }
+    }
+
+    fn by_histogram(histogram: &Histogram, first: &std::path::Path) -> Result<Self, MaskError> {
         if let Some(levels) = histogram.levels() {
             return Ok(levels);
         }
         let present = histogram.present();
+        if histogram.are_labels() {
+            return Err(MaskError::Labels { path: first.into(), levels: present });
+        }
         if present.last().is_none_or(|&level| level < 128) {
             return Err(MaskError::Levels { path: first.into(), levels: present });
         }
@@ -167,11 +207,29 @@ mod tests {
         }
     }
 
+    fn of_masks(counts: &[(u8, u64)]) -> Result<Levels, MaskError> {
+        let mut histogram = Histogram::default();
+        for &(level, count) in counts {
+            histogram.0[usize::from(level)] = count;
+        }
+        Levels::of_masks(&histogram, std::path::Path::new("m.png"))
+    }
+
+    #[test]
+    fn labels_of_several_things_and_inverted_masks_are_refused() {
+        for labels in [&[(0, 900), (15, 200), (255, 60)][..], &[(0, 900), (1, 90), (2, 90), (255, 9)]] {
+            assert!(matches!(of_masks(labels), Err(MaskError::Labels { .. })), "{labels:?}");
+        }
+        assert!(matches!(of_masks(&[(0, 90), (255, 910)]), Err(MaskError::Inverted { percent: 91, .. })));
+        assert!(of_masks(&[(0, 400), (128, 10), (255, 590)]).is_ok());
+        assert!(of_masks(&[(0, 900), (3, 9), (5, 9), (250, 9), (253, 9), (255, 90)]).is_ok());
+    }
+
     #[test]
     fn jpeg_ringing_is_tolerated_and_pictures_are_rejected_as_masks() {
-        let ringing = [(0, 900), (3, 20), (250, 20), (255, 60)];
+        let ringing = [(0, 900), (1, 9), (3, 20), (250, 20), (254, 9), (255, 60)];
         assert_eq!(levels(&ringing), Some(Levels::default()));
-        let dim = [(0, 900), (2, 20), (98, 20), (100, 60)];
+        let dim = [(0, 900), (1, 9), (2, 20), (98, 20), (99, 9), (100, 60)];
         assert_eq!(levels(&dim).map(|levels| levels.set_from), Some(50));
         let picture: Vec<(u8, u64)> = (20..200).map(|level| (level, 5)).collect();
         assert_eq!(levels(&picture), None);

@@ -14,6 +14,9 @@ use crate::{
 /// Lower-case endings of pictures; other files are ignored.
 pub const EXTENSIONS: [&str; 8] = ["png", "tif", "tiff", "jpg", "jpeg", "bmp", "pgm", "ppm"];
 
+/// Frames that are looked at for the bits that a camera uses of 16.
+const SURVEYED: usize = 8;
+
 pub fn list(folder: &Path) -> Result<Vec<PathBuf>, VideoError> {
     let entries = fs::read_dir(folder).map_err(|source| VideoError::io(folder, source))?;
     let mut paths = Vec::new();
@@ -40,16 +43,37 @@ pub(super) fn open(
     folder: &Path,
 ) -> Result<impl Iterator<Item = Result<VideoFrame, VideoError>> + 'static, VideoError> {
     let paths = list(folder)?;
-    Ok(paths.into_iter().map(|path| Ok(VideoFrame { name: stem(&path), pixels: read(&path)? })))
+    let bits = used_bits(&paths);
+    let frame = move |path: PathBuf| {
+        let pixels = image_file::read_8_bit(&path, bits).map_err(unreadable(&path))?;
+        Ok(VideoFrame { name: stem(&path), pixels })
+    };
+    Ok(paths.into_iter().map(frame))
 }
 
-/// Samples of a picture: grey or RGB; 16-bit samples keep their upper half.
+/// Significant bits of 16-bit frames, by some throughout the folder. Frames that cannot be read fail later.
+fn used_bits(paths: &[PathBuf]) -> u32 {
+    let mut most = 0;
+    for path in paths.iter().step_by(paths.len().div_ceil(SURVEYED)) {
+        most = most.max(image_file::used_bits(path).unwrap_or_default());
+        if most == 8 {
+            break;
+        }
+    }
+    most
+}
+
+/// Labels of a picture, such as a mask: grey or RGB.
 pub fn read(path: &Path) -> Result<Pixels, VideoError> {
-    image_file::read_8_bit(path).map_err(|error| match error {
+    image_file::read_labels(path).map_err(unreadable(path))
+}
+
+fn unreadable(path: &Path) -> impl Fn(ImageError) -> VideoError {
+    move |error| match error {
         ImageError::Read { path, source } => VideoError::io(&path, source),
         ImageError::Format { path, reason } => VideoError::Picture { path, reason },
         other => VideoError::Picture { path: path.into(), reason: other.to_string() },
-    })
+    }
 }
 
 pub fn stem(path: &Path) -> String {

@@ -65,11 +65,12 @@ impl ViewKind {
             Err(MaskError::Coloured { .. }) => return Ok(Self::Video),
             Err(error) => return Err(error.into()),
         }
-        if first.levels().is_none() {
+        let are_masks = |seen: &Histogram| seen.levels().is_some() || seen.are_labels();
+        if !are_masks(&first) {
             return Ok(Self::Video);
         }
         match Levels::survey(&files) {
-            Ok(all) => Ok(if all.levels().is_some() { Self::Masks } else { Self::Video }),
+            Ok(all) => Ok(if are_masks(&all) { Self::Masks } else { Self::Video }),
             Err(MaskError::Coloured { .. }) => Ok(Self::Video),
             Err(error) => Err(error.into()),
         }
