@@ -61,11 +61,7 @@ fn settled(found: Found, choices: Choices) -> Result<Recording, RecordingError> 
     if let Some(up @ (Up::Z | Up::MinusZ)) = choices.up.filter(|_| found.planar) {
         return Err(RecordingError::PlanarUp(up));
     }
-    let people = people::of(found);
-    let (wanted, count) = (choices.person.unwrap_or(1), people.len());
-    let person = wanted.checked_sub(1).and_then(|index| people.into_iter().nth(index));
-    let person = person.ok_or(RecordingError::Person { wanted, found: count })?;
-    let recording = person.settled(choices);
+    let recording = people::pick(found, choices.person.unwrap_or(1))?.settled(choices);
     match &recording.unit.source {
         Source::Unknown { stated } => Err(RecordingError::Unit(stated.clone())),
         _ => Ok(recording),

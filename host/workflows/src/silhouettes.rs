@@ -35,7 +35,8 @@ pub enum SilhouettesError {
     #[error("{}: the recording holds no frame", path.display())]
     NoFrames { path: PathBuf },
     #[error(
-        "{}: no .json file in the folder; expected keypoints of OpenPose, COCO, HALPE, MMPose or MediaPipe, a file per frame (labels          of YOLO as .txt are not read: let it write JSON)", path.display()
+        "{}: no .json file in the folder; expected keypoints as JSON, a file per frame (YOLO's .txt labels are not read)",
+        path.display()
     )]
     NoKeypointFiles { path: PathBuf },
     #[error("{}: no frame has a visible marker, so there is nothing to draw", path.display())]

@@ -99,8 +99,11 @@ fn recordings_that_do_not_fit_are_refused_by_name() {
     let other = folder.file("walk.fbx", "Kaydara FBX Binary");
     let one = folder.file("one.toml", "name = 'x'\n[[part]]\nname = 'a'\nmarkers = ['A']\n");
     let doubled = folder.file("doubled.toml", "name = 'x'\n[[part]]\nname = 'a'\nmarkers = []\n");
+    fs::create_dir(folder.path("yolo")).expect("a folder");
+    folder.file("yolo/walk_1.txt", "0 0.5 0.5 0.2 0.6 0.5 0.5 0.9");
     let before = folder.listing();
     for (file, template, phrases) in [
+        (&folder.text("yolo"), "keypoints", vec!["yolo", "no .json file", ".txt"]),
         (&good, "plug-in-gait", vec!["walk.csv", "LFHD", "B1"]),
         (&good, "jacket", vec!["jacket", "vicon-53"]),
         (&good, &doubled, vec!["doubled.toml", "no markers"]),
@@ -128,7 +131,7 @@ fn a_person_who_lies_because_another_axis_points_up_is_warned_of() {
         figures(farnear(&arguments).args(["--up", up, "--out", &folder.text(out), "--json"]))["warnings"]
             .clone()
     };
-    assert!(drawn("z", "upright").is_null());
+    assert!(drawn("z", "upright").is_null() && drawn("-z", "reversed").is_null());
     let lying = drawn("y", "lying").to_string();
     assert!(lying.contains("longer than high in 3 of 3 frames") && lying.contains("--up"), "{lying}");
 }

@@ -3,7 +3,7 @@
 
 use std::collections::HashSet;
 
-use super::recording::Found;
+use super::recording::{Found, RecordingError};
 use crate::silhouette::{
     anatomy::{self, Anatomy},
     capsule::Point3,
@@ -12,18 +12,19 @@ use crate::silhouette::{
 /// Body markers of a person.
 const LEAST: usize = 4;
 
-/// At least one, the default first.
-pub fn of(mut found: Found) -> Vec<Found> {
+/// The person of this number, from 1.
+pub fn pick(mut found: Found, wanted: usize) -> Result<Found, RecordingError> {
+    let missing = |count: usize| RecordingError::Person { wanted, found: count };
+    let index = wanted.checked_sub(1);
     if found.others.is_empty() {
-        return by_prefix(found);
+        return by_prefix(found, index).map_err(missing);
     }
-    let others = std::mem::take(&mut found.others);
-    let mut people = vec![found];
-    for frames in others {
-        let other = Found { frames, ..people[0].without_frames() };
-        people.push(other);
+    let count = 1 + found.others.len();
+    let index = index.filter(|index| *index < count).ok_or_else(|| missing(count))?;
+    if index > 0 {
+        found.frames = found.others.swap_remove(index - 1);
     }
-    people
+    Ok(found)
 }
 
 struct Group<'a> {
@@ -33,7 +34,9 @@ struct Group<'a> {
     visible: usize,
 }
 
-fn by_prefix(found: Found) -> Vec<Found> {
+/// Fails with the number of people.
+fn by_prefix(found: Found, index: Option<usize>) -> Result<Found, usize> {
+    let alone = |found: Found| if index == Some(0) { Ok(found) } else { Err(1) };
     let mut groups: Vec<Group<'_>> = Vec::new();
     for (place, name) in found.names.iter().enumerate() {
         let prefix = anatomy::prefix(name);
@@ -43,9 +46,9 @@ fn by_prefix(found: Found) -> Vec<Found> {
         }
     }
     if groups.len() < 2 {
-        return vec![found];
+        return alone(found);
     }
-    for group in &mut groups {
+    for group in groups.iter_mut().filter(|group| group.places.len() >= LEAST) {
         let names: Vec<String> = group.places.iter().map(|place| found.names[*place].clone()).collect();
         let body: Vec<usize> = Anatomy::of(&names).body.iter().map(|index| group.places[*index]).collect();
         let seen = |frame: &Vec<Option<Point3>>| {
@@ -61,15 +64,11 @@ fn by_prefix(found: Found) -> Vec<Found> {
     };
     let mut people: Vec<usize> = (0..groups.len()).filter(|group| shares(*group)).collect();
     if people.len() < 2 {
-        return vec![found];
+        return alone(found);
     }
     // In the file's order, those who are rarely visible last.
     let most = people.iter().map(|group| groups[*group].visible).max().unwrap_or(0);
     people.sort_by_key(|group| 2 * groups[*group].visible < most);
-    let no_person = || {
-        let groups = groups.iter().enumerate().filter(|(group, _)| !people.contains(group));
-        groups.flat_map(|(_, group)| group.places.iter().copied())
-    };
     let listed: Vec<String> = (1..)
         .zip(&people)
         .map(|(number, group)| match groups[*group].prefix {
@@ -78,21 +77,19 @@ fn by_prefix(found: Found) -> Vec<Found> {
         })
         .collect();
     let remark = format!("{} people: {} (--person selects one, default 1)", people.len(), listed.join(", "));
-    let person = |group: &usize| {
-        let places: Vec<usize> = groups[*group].places.iter().copied().chain(no_person()).collect();
-        let pick = |frame: &Vec<Option<Point3>>| {
-            places.iter().map(|place| frame.get(*place).copied().flatten()).collect()
-        };
-        let mut remarks = found.remarks.clone();
-        remarks.push(remark.clone());
-        Found {
-            names: places.iter().map(|place| found.names[*place].clone()).collect(),
-            frames: found.frames.iter().map(pick).collect(),
-            remarks,
-            ..found.without_frames()
-        }
-    };
-    people.iter().map(person).collect()
+    let person = *index.and_then(|index| people.get(index)).ok_or(people.len())?;
+    let others = groups.iter().enumerate().filter(|(group, _)| !people.contains(group));
+    let of_no_person = others
+        .flat_map(|(_, group)| &group.places)
+        .filter(|place| !groups[person].body.contains(anatomy::without_prefix(&found.names[**place])));
+    let places: Vec<usize> = groups[person].places.iter().chain(of_no_person).copied().collect();
+    let names = places.iter().map(|place| found.names[*place].clone()).collect();
+    let mut all = Found { names, ..found };
+    for frame in &mut all.frames {
+        *frame = places.iter().map(|place| frame.get(*place).copied().flatten()).collect();
+    }
+    all.remarks.push(remark);
+    Ok(all)
 }
 
 #[cfg(test)]
@@ -104,10 +101,10 @@ mod tests {
 
     const SUIT: [&str; 5] = ["LFHD", "C7", "LASI", "LKNE", "LTOE"];
 
-    /// Two people 3 m apart, a box, and a force in newtons; Ann's LASI is hidden in the second frame.
+    /// Two people 3 m apart, a box, and a stray marker; Ann's LASI is hidden in the second frame.
     fn two() -> String {
         let names = ["Ann", "Ben"].into_iter().flat_map(|person| SUIT.map(|name| format!("{person}:{name}")));
-        let names: Vec<String> = names.chain(["Box:B1".into(), "Force".into()]).collect();
+        let names: Vec<String> = names.chain(["Box:B1", "C7"].map(str::to_owned)).collect();
         let row = |frame: usize| {
             let suit = |x: f64| {
                 (0..5).map(move |marker| {
@@ -131,7 +128,9 @@ mod tests {
         let ann = person(&two(), None).expect("a table");
         assert_eq!(ann.by_name(0)["LASI"][0], 500.0);
         assert!(!ann.by_name(1).contains_key("LASI"), "hidden, not Ben's");
-        assert!(ann.by_name(0).contains_key("B1") && ann.names.len() == 7);
+        assert!(
+            ann.by_name(0)["C7"][0] == 500.0 && ann.by_name(0).contains_key("B1") && ann.names.len() == 6
+        );
         assert_eq!(ann.remarks(), ["2 people: 1 Ann, 2 Ben (--person selects one, default 1)"]);
         let ben = person(&two(), Some(2)).expect("a table");
         assert_eq!((ben.by_name(1)["LASI"][0], ben.by_name(1)["Ben:C7"][0]), (3500.0, 3500.0));

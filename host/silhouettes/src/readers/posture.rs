@@ -83,6 +83,7 @@ pub fn lying(up: Up, frames: &Frames, anatomy: &Anatomy, planar: bool) -> Option
     }
     let ways = head_above_feet(frames, &anatomy.head, &anatomy.feet);
     let advice = match Up::along(sum(&ways)) {
+        _ if ways.is_empty() && planar => return None,
         _ if ways.is_empty() => "another axis points up (--up)".to_owned(),
         best if best == up => return None,
         best if planar => format!("the file has y before x (--up {best})"),

@@ -156,6 +156,12 @@ pub enum Source {
     },
 }
 
+impl Source {
+    pub fn is_guess(&self) -> bool {
+        matches!(self, Self::Guess { .. })
+    }
+}
+
 #[derive(Clone, Debug, PartialEq)]
 pub struct Known<T> {
     pub value: T,
@@ -201,20 +207,6 @@ impl Found {
         match Unit::named(stated) {
             Ok(value) => Known { value, source: Source::File },
             Err(_) => Known { value: Unit::MM, source: Source::Unknown { stated: stated.to_owned() } },
-        }
-    }
-
-    /// Everything but names, frames and other people.
-    pub(super) fn without_frames(&self) -> Self {
-        Self {
-            names: self.names.clone(),
-            rate_hz: self.rate_hz,
-            frames: Vec::new(),
-            others: Vec::new(),
-            planar: self.planar,
-            unit: self.unit.clone(),
-            up: self.up.clone(),
-            remarks: self.remarks.clone(),
         }
     }
 

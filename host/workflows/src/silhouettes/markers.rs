@@ -261,7 +261,7 @@ pub fn draw(settings: &MarkersRequest, context: &Context<'_>) -> Result<MarkersF
     let warnings: Vec<String> =
         recording.remarks().into_iter().map(|remark| format!("{name}: {remark}")).collect();
     warnings.iter().for_each(|warning| context.progress.warn(warning));
-    if !warnings.is_empty() {
+    if recording.unit.source.is_guess() || recording.up.source.is_guess() {
         context.info("--units and --up set the unit and the axis where a guess is wrong");
     }
     let out = Staging::new_folder(&settings.out)?;
