@@ -731,7 +731,7 @@ def calibrate_stack(
     images: Sequence[Image],
     *,
     step_mm: float,
-    pixel_um: float = 5.0,
+    object_pixel_um: Optional[float] = None,
     far_mm: Optional[float] = None,
     pair_step: Optional[int] = None,
     bin: Optional[int] = None,
@@ -744,8 +744,8 @@ def calibrate_stack(
         Slices one stage step apart, the one with the farthest focus first.
     step_mm : float
         Distance between neighbouring slices, mm, or in any unit of the stage; all depths are in that unit then.
-    pixel_um : float
-        Pixel pitch, um; only the scale of point clouds depends on it.
+    object_pixel_um : float, optional
+        Side of a pixel at the target, in thousandths of the unit of the steps; without it point clouds have any scale.
     far_mm : float, optional
         Distance of the far-focused plane of a pair, mm; without it depth is relative.
     pair_step : int, optional

@@ -70,8 +70,8 @@ impl StackFit {
 ///     Slices one stage step apart, the one with the farthest focus first.
 /// step_mm : float
 ///     Distance between neighbouring slices, mm, or in any unit of the stage; all depths are in that unit then.
-/// pixel_um : float
-///     Pixel pitch, um; only the scale of point clouds depends on it.
+/// object_pixel_um : float, optional
+///     Side of a pixel at the target, in thousandths of the unit of the steps; without it point clouds have any scale.
 /// far_mm : float, optional
 ///     Distance of the far-focused plane of a pair, mm; without it depth is relative.
 /// pair_step : int, optional
@@ -89,12 +89,12 @@ impl StackFit {
 /// FarnearError
 ///     Too few slices, slices of two sizes, no focus, blur that is too small.
 #[pyfunction]
-#[pyo3(signature = (images, *, step_mm, pixel_um=5.0, far_mm=None, pair_step=None, bin=None))]
+#[pyo3(signature = (images, *, step_mm, object_pixel_um=None, far_mm=None, pair_step=None, bin=None))]
 pub fn calibrate_stack<'py>(
     py: Python<'py>,
     images: Vec<Bound<'py, PyAny>>,
     step_mm: f64,
-    pixel_um: f64,
+    object_pixel_um: Option<f64>,
     far_mm: Option<f64>,
     pair_step: Option<usize>,
     bin: Option<usize>,
@@ -103,8 +103,13 @@ pub fn calibrate_stack<'py>(
     for (index, image) in images.iter().enumerate() {
         slices.push(named::<Image<'py>>(&format!("images[{index}]"), image)?.view().to_owned());
     }
-    let settings =
-        StackSettings { step_mm, moved: Moved::Target { pixel_um, far_mm }, pair_step, bin, coding: 0.0 };
+    let settings = StackSettings {
+        step_mm,
+        moved: Moved::Target { object_pixel_um, far_mm },
+        pair_step,
+        bin,
+        coding: 0.0,
+    };
     let found = py.detach(|| stack::calibrate_stack(&slices, &settings, &|_| true)).map_err(wrong)?;
     let stage = found.optics.stage().ok_or_else(|| FarnearError::new_err("the stack gives no pairs"))?;
     let held_out = &found.held_out;

@@ -36,6 +36,21 @@ pub fn counter_started_again(sorted: &[PathBuf]) -> Option<[&PathBuf; 2]> {
     })
 }
 
+/// Neighbours of a sorted list between which a number is missing, where most numbers are evenly apart.
+pub fn gap(sorted: &[PathBuf]) -> Option<[&PathBuf; 2]> {
+    let names: Vec<Name> = sorted.iter().map(|path| Name::of(path)).collect();
+    let column = last_varying(&names)?;
+    let numbers: Vec<f64> = names.iter().map(|name| name.numbers[column].value()).collect::<Option<_>>()?;
+    let steps: Vec<f64> = numbers.windows(2).map(|two| (two[1] - two[0]).abs()).collect();
+    let mut in_order = steps.clone();
+    in_order.sort_unstable_by(f64::total_cmp);
+    let usual = *in_order.get(steps.len() / 2)?;
+    let wide = |step: f64| step > 1.5 * usual;
+    let few = 4 * steps.iter().filter(|step| wide(**step)).count() <= steps.len();
+    let at = steps.iter().position(|step| few && wide(*step))?;
+    Some([&sorted[at], &sorted[at + 1]])
+}
+
 /// Two files that differ only in their ending.
 pub fn same_stem(paths: &[PathBuf]) -> Option<[PathBuf; 2]> {
     let mut stems = std::collections::HashMap::new();
@@ -289,6 +304,22 @@ mod tests {
         let rolled_over = [&paths[1..], &paths[..1]].concat();
         assert_eq!(sorted_with([30, 10, 20]), rolled_over);
         assert_eq!(sorted_with([10, 10, 10]), rolled_over, "a burst within a second");
+    }
+
+    #[test]
+    fn finds_a_missing_number() {
+        let paths = |numbers: &[f64]| -> Vec<PathBuf> {
+            numbers.iter().map(|number| format!("z{number}_b.png").into()).collect()
+        };
+        let sorted = paths(&[1.0, 2.0, 4.0, 5.0, 6.0, 7.0]);
+        assert_eq!(gap(&sorted), Some([&sorted[1], &sorted[2]]));
+        let tenths = paths(&[-0.2, -0.1, 0.0, 0.1, 0.2, 0.4]);
+        assert_eq!(gap(&tenths), Some([&tenths[4], &tenths[5]]));
+        for even in
+            [&[1.0, 2.0, 3.0, 4.0][..], &[0.0, 0.25, 0.5, 0.75, 1.0], &[0.0, 1.0, 5.0, 9.0, 20.0], &[3.0]]
+        {
+            assert_eq!(gap(&paths(even)), None, "{even:?}");
+        }
     }
 
     #[test]

@@ -130,7 +130,13 @@ impl Inputs {
         };
         let reading = ReadSettings { grey: settings.grey, white_level: settings.white_level };
         let mut pair = Pair::read(&settings.far, &settings.near, &reading)?;
-        let (optics, mut doubts) = (optics, doubts);
+        let mut doubts = doubts;
+        let (height, width) = pair.far.dim();
+        if let Some(slices) = optics.stage().and_then(|stage| stage.image_px)
+            && slices != [width, height]
+        {
+            doubts.push(OpticsDoubt::AnotherSize { slices, images: [width, height] });
+        }
         let bin = settings.bin_for(&optics, &mut doubts);
         if bin > 1 {
             let [far, near] = [&mut pair.far, &mut pair.near].map(|image| binned(std::mem::take(image), bin));

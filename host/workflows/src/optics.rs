@@ -70,6 +70,11 @@ pub enum OpticsDoubt {
     /// An implausible camera value.
     Unusual(Doubt),
     NoPsf,
+    /// Width and height of the slices that the lens was learned from, and of the images.
+    AnotherSize {
+        slices: [usize; 2],
+        images: [usize; 2],
+    },
     TooMuchBlur {
         blur_px: f64,
         /// Side of the square of pixels to average.
@@ -84,6 +89,11 @@ impl fmt::Display for OpticsDoubt {
             Self::Unusual(doubt) => doubt.fmt(f),
             Self::NoPsf => f.write_str(
                 "the optics name no [psf]: a pill-box is assumed, which may be wrong by millimetres; calibrate psf finds it",
+            ),
+            Self::AnotherSize { slices: [w, h], images: [width, height] } => write!(
+                f,
+                "the lens was calibrated with images of {w}x{h} px, these have {width}x{height}: right for a part of such images, \
+                 wrong for scaled ones; calibrate in the mode of the images"
             ),
             Self::TooMuchBlur { blur_px, bin, binned } => {
                 write!(f, "a largest blur of {blur_px:.1} px is more than the 2 to 4 px that can be used: ")?;

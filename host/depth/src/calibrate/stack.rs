@@ -21,7 +21,7 @@ use ndarray::Array2;
 
 use crate::brightness;
 use crate::measure::binned;
-use crate::optics::{FocusSection, LensSection, Optics, OpticsFile, SensorSection};
+use crate::optics::{FocusSection, LensSection, Optics, OpticsFile, SensorSection, Stage};
 use crate::psf::Psf;
 use blur::BlurCurve;
 use focus_plane::FocusPlane;
@@ -38,6 +38,12 @@ const BINS: [usize; 4] = [1, 2, 4, 8];
 const ENOUGH_DEPTHS: usize = 4;
 /// Largest spread of the blocks' focus around the plane, in pair steps.
 const FLAT: f64 = 0.15;
+/// Pitch of the sensor, which a stack does not tell; with the magnification it gives the pixel at the target.
+const ANY_PIXEL_UM: f64 = 5.0;
+/// Magnification where the pixel at the target is unknown.
+const ANY_MAGNIFICATION: f64 = 3.0 / 7.0;
+/// Ranges of a pair between the front focus and the far plane: depth is nearly linear in alpha.
+const FAR_RANGES: f64 = 140.0;
 /// Fewest slices.
 pub const FEWEST: usize = 5;
 
@@ -61,9 +67,9 @@ pub struct StackSettings {
 pub enum Moved {
     /// The target towards the camera, or the whole camera towards the target.
     Target {
-        /// Pixel pitch of the camera.
-        pixel_um: f64,
-        /// Distance of the far plane; `None` is 200 times the range of a pair, where only relative depth is known.
+        /// Side of a pixel at the target, in thousandths of the steps' unit; `None` if unknown.
+        object_pixel_um: Option<f64>,
+        /// Distance of the far plane; `None` is far beyond the range of a pair, where only relative depth is known.
         far_mm: Option<f64>,
     },
     /// The sensor away from this lens. Its far plane, focal length and pixel pitch are kept.
@@ -153,6 +159,12 @@ pub fn calibrate_stack(
         optics_of: &optics_of,
         proceed,
     })?;
+    let scale_known = !matches!(settings.moved, Moved::Target { object_pixel_um: None, .. });
+    let (height, width) = slices[0].dim();
+    let optics = match optics.stage().copied() {
+        Some(stage) => optics.with_stage(Stage { scale_known, image_px: Some([width, height]), ..stage }),
+        None => optics,
+    };
     Ok(StackLens { optics, plane, blur, held_out, trials, foreign })
 }
 
@@ -163,11 +175,12 @@ fn check(slices: &[Array2<f32>], settings: &StackSettings) -> Result<(), StackEr
     if let Some(index) = slices.iter().position(|slice| slice.dim() != slices[0].dim()) {
         return Err(StackError::Size { index: index + 1 });
     }
-    let (pixel_um, far_mm) = match &settings.moved {
-        Moved::Target { pixel_um, far_mm } => (Some(*pixel_um), *far_mm),
+    let (object_pixel_um, far_mm) = match &settings.moved {
+        Moved::Target { object_pixel_um, far_mm } => (*object_pixel_um, *far_mm),
         Moved::Sensor(_) => (None, None),
     };
-    let numbers = [("step_mm", Some(settings.step_mm)), ("pixel_um", pixel_um), ("far_mm", far_mm)];
+    let numbers =
+        [("step_mm", Some(settings.step_mm)), ("object_pixel_um", object_pixel_um), ("far_mm", far_mm)];
     for (name, value) in numbers {
         if let Some(value) = value.filter(|value| !(value.is_finite() && *value > 0.0)) {
             return Err(StackError::NotPositive { name, value });
@@ -218,11 +231,13 @@ fn optics(
 ) -> Result<Optics, StackError> {
     let span_mm = settings.step_mm * pair_step as f64;
     let (focal_length_mm, pixel_um, far_mm, travel_mm, telecentric) = match &settings.moved {
-        Moved::Target { pixel_um, far_mm } => {
-            let far_mm = far_mm.unwrap_or(200.0 * span_mm);
-            let focal_length_mm = 0.3 * far_mm;
+        Moved::Target { object_pixel_um, far_mm } => {
+            let magnification =
+                object_pixel_um.map_or(ANY_MAGNIFICATION, |object_um| ANY_PIXEL_UM / object_um);
+            let far_mm = far_mm.unwrap_or(FAR_RANGES * (1.0 + magnification) * span_mm);
+            let focal_length_mm = far_mm * magnification / (1.0 + magnification);
             let image = |u: f64| focal_length_mm * focal_length_mm / (u - focal_length_mm);
-            (focal_length_mm, *pixel_um, far_mm, image(far_mm - span_mm) - image(far_mm), Some(true))
+            (focal_length_mm, ANY_PIXEL_UM, far_mm, image(far_mm - span_mm) - image(far_mm), Some(true))
         }
         Moved::Sensor(lens) => {
             let far_mm = lens.working_range().far_mm;

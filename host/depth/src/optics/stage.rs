@@ -13,6 +13,12 @@ pub struct Stage {
     pub bin: usize,
     /// Slices from the far to the near image of the learned pairs.
     pub pair_step: usize,
+    /// Width and height of the slices.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub image_px: Option<[usize; 2]>,
+    /// Whether focal length and pixel pitch give the side of a pixel at the target.
+    #[serde(default)]
+    pub scale_known: bool,
     /// Least and largest learned measured normalised depth.
     pub measured: [f64; 2],
     /// True normalised depth at evenly spaced measured ones, rising.
@@ -65,6 +71,8 @@ impl Stage {
         Self {
             bin,
             pair_step,
+            image_px: None,
+            scale_known: false,
             measured,
             response,
             blur_floor_px: 0.0,

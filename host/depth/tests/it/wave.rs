@@ -63,7 +63,7 @@ fn stack(lens: &WaveLens) -> Vec<Array2<f32>> {
 }
 
 fn settings() -> StackSettings {
-    let moved = Moved::Target { pixel_um: 6.0, far_mm: None };
+    let moved = Moved::Target { object_pixel_um: None, far_mm: None };
     StackSettings { step_mm: STEP_MM, moved, pair_step: None, bin: None, coding: 0.0 }
 }
 

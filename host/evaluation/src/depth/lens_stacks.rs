@@ -66,7 +66,7 @@ pub fn measure(page: &mut Page, data: &Path) -> Result<()> {
             slices.iter().map(|slice| slice.slice(s![.., ..half]).to_owned()).collect();
         let settings = StackSettings {
             step_mm: truth.step_mm,
-            moved: Moved::Target { pixel_um: 6.9, far_mm: None },
+            moved: Moved::Target { object_pixel_um: None, far_mm: None },
             pair_step: Some(step),
             bin: Some(bin),
             coding: 0.0,

@@ -60,6 +60,11 @@ impl Name {
 }
 
 impl Number {
+    pub fn value(&self) -> Option<f64> {
+        let value: f64 = self.text.parse().ok()?;
+        Some(if self.sign == Some('-') { -value } else { value })
+    }
+
     pub fn fraction(&self) -> Option<&str> {
         Some(self.text.split_once('.')?.1)
     }

@@ -7,7 +7,7 @@ use std::{
 
 use farnear_depth::corrections::{CdcSettings, Correction, Method, Pattern, fit};
 use farnear_files::{map, staging};
-use ndarray::Array2;
+use ndarray::{Array2, ArrayView2};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_with::{DisplayFromStr, serde_as};
@@ -18,6 +18,11 @@ use crate::{
     figures::rounded,
     request::{PathKind, Request},
 };
+
+/// Largest ratio of a target's distance and the depths measured of it.
+const LARGEST_RATIO: f64 = 2.0;
+/// Remaining error of a pattern relative to the usual one.
+const UNLIKE: f64 = 5.0;
 
 /// Learn a correction of the elliptical distortion from depth maps of flat targets at known depths.
 ///
@@ -97,15 +102,22 @@ pub fn learn(settings: &CalibrateCorrectionRequest, context: &Context<'_>) -> Re
     let patterns: Vec<Pattern<'_>> =
         maps.iter().map(|(map, true_mm)| Pattern { depth_mm: map.view(), true_mm: *true_mm }).collect();
     let cdc = CdcSettings { window: settings.window_px, smoothing_px: settings.smoothing_px };
+    for (index, pattern) in patterns.iter().enumerate() {
+        check_distance(index, pattern)?;
+    }
     let correction = fit(settings.method, &patterns, &cdc)?;
     let (far_mm, near_mm) = correction.range_mm();
+    let after = errors(&maps, Some(&correction))?;
+    for warning in unlike_others(&after) {
+        context.progress.warn(&warning);
+    }
     let figures = CorrectionFigures {
         method: correction.method().to_string(),
         patterns: patterns.len(),
         far_mm,
         near_mm,
-        rmse_before_mm: rounded(rmse_mm(&maps, None)?, 4),
-        rmse_after_mm: rounded(rmse_mm(&maps, Some(&correction))?, 4),
+        rmse_before_mm: rounded(rmse_mm(&errors(&maps, None)?), 4),
+        rmse_after_mm: rounded(rmse_mm(&after), 4),
     };
     context.cancel.check("learning the correction")?;
     staging::write_file(&settings.out, toml::to_string(&correction)?.as_bytes())?;
@@ -143,14 +155,77 @@ pub fn list(list: &Path) -> Result<Vec<(PathBuf, f64)>> {
     Ok(pattern.into_iter().map(|entry| (entry.depth, entry.true_mm)).collect())
 }
 
-fn rmse_mm(maps: &[(Array2<f32>, f64)], correction: Option<&Correction>) -> Result<f64> {
-    let (mut squares, mut count) = (0.0, 0.0);
-    for (map, true_mm) in maps {
-        let corrected = correction.map(|correction| correction.apply(map.view())).transpose()?;
-        for depth in corrected.as_ref().unwrap_or(map).iter().filter(|depth| depth.is_finite()) {
-            squares += (f64::from(*depth) - true_mm).powi(2);
-            count += 1.0;
-        }
+/// Refuses a distance in another unit.
+fn check_distance(index: usize, pattern: &Pattern<'_>) -> Result<()> {
+    let mut depths: Vec<f32> = depths(pattern.depth_mm).collect();
+    if depths.is_empty() {
+        return Ok(());
     }
-    Ok((squares / count).sqrt())
+    let middle = depths.len() / 2;
+    let median = f64::from(*depths.select_nth_unstable_by(middle, f32::total_cmp).1);
+    if (1.0 / LARGEST_RATIO..=LARGEST_RATIO).contains(&(pattern.true_mm / median)) {
+        return Ok(());
+    }
+    let value = format!("{} of pattern {}", pattern.true_mm, index + 1);
+    let expected = format!("expected the target's distance in mm; the median of its map is {median:.3} mm");
+    Err(WorkflowError::parameter("true_mm", value, expected))
+}
+
+fn depths(map: ArrayView2<'_, f32>) -> impl Iterator<Item = f32> {
+    map.into_iter().copied().filter(|depth| depth.is_finite() && *depth > 0.0)
+}
+
+/// Sum of squared errors and number of depths of each pattern.
+fn errors(maps: &[(Array2<f32>, f64)], correction: Option<&Correction>) -> Result<Vec<[f64; 2]>> {
+    let of_map = |(map, true_mm): &(Array2<f32>, f64)| {
+        let corrected = correction.map(|correction| correction.apply(map.view())).transpose()?;
+        let squares = depths(corrected.as_ref().unwrap_or(map).view());
+        let squares = squares.map(|depth| (f64::from(depth) - true_mm).powi(2));
+        Ok(squares.fold([0.0; 2], |[sum, count], square| [sum + square, count + 1.0]))
+    };
+    maps.iter().map(of_map).collect()
+}
+
+fn rmse_mm(errors: &[[f64; 2]]) -> f64 {
+    let [sum, count] = errors.iter().fold([0.0; 2], |[a, b], [sum, count]| [a + sum, b + count]);
+    (sum / count).sqrt()
+}
+
+/// Names patterns whose error remains: a distance that was written down wrongly, or exchanged.
+fn unlike_others(errors: &[[f64; 2]]) -> Vec<String> {
+    let rmse: Vec<f64> = errors.iter().map(|error| rmse_mm(std::slice::from_ref(error))).collect();
+    let mut sorted = rmse.clone();
+    sorted.sort_unstable_by(f64::total_cmp);
+    let median = sorted[sorted.len() / 2];
+    let unlike = |(_, mm): &(usize, &f64)| **mm > UNLIKE * median;
+    let named = |(index, mm): (usize, &f64)| {
+        format!(
+            "pattern {}: an error of {mm:.3} mm remains, {median:.3} mm is usual: is its true_mm right?",
+            index + 1
+        )
+    };
+    rmse.iter().enumerate().filter(unlike).map(named).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_distance_in_metres_is_refused_and_a_wrong_one_is_named() {
+        let map = Array2::from_elem((4, 4), 905.0_f32);
+        let pattern = |true_mm| Pattern { depth_mm: map.view(), true_mm };
+        assert!(check_distance(0, &pattern(900.0)).is_ok());
+        let error = check_distance(2, &pattern(0.9)).unwrap_err().to_string();
+        assert!(error.contains("0.9 of pattern 3") && error.contains("905.000 mm"), "{error}");
+        let maps = vec![(map.clone(), 904.0), (map.clone(), 905.5), (map.clone(), 904.5), (map, 925.0)];
+        let found = unlike_others(&errors(&maps, None).unwrap());
+        assert!(found.len() == 1 && found[0].starts_with("pattern 4: an error of 20.000 mm"), "{found:?}");
+    }
+
+    #[test]
+    fn holes_are_no_depths() {
+        let map = ndarray::arr2(&[[0.0, f32::NAN], [905.0, 907.0]]);
+        assert_eq!(rmse_mm(&errors(&[(map, 906.0)], None).unwrap()), 1.0);
+    }
 }

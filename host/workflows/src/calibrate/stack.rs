@@ -14,7 +14,7 @@ use farnear_depth::{
 };
 use farnear_files::{
     image_file::{Grey, ReadSettings, SharedWhiteLevel},
-    stack, staging,
+    order, stack, staging,
 };
 use ndarray::Array2;
 use schemars::JsonSchema;
@@ -62,9 +62,10 @@ pub struct CalibrateStackRequest {
     /// default that of the TIFF's metadata or of the rig's record.
     #[cfg_attr(feature = "clap", arg(long, value_name = "MM"))]
     pub step_mm: Option<f64>,
-    /// Pixel pitch of the camera, um; only the scale of point clouds depends on it.
-    #[cfg_attr(feature = "clap", arg(long, value_name = "UM", default_value_t = Self::default().pixel_um))]
-    pub pixel_um: f64,
+    /// Side of a pixel at the target, in um, or in thousandths of the unit of the steps [default: by the TIFF's metadata]. Without
+    /// it slopes and meshes are per pixel.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "UM"))]
+    pub object_pixel_um: Option<f64>,
     /// Distance of the far-focused plane of a pair, mm; without it depth is relative.
     #[cfg_attr(feature = "clap", arg(long, value_name = "MM"))]
     pub far_mm: Option<f64>,
@@ -97,7 +98,7 @@ impl Default for CalibrateStackRequest {
         Self {
             stack: PathBuf::new(),
             step_mm: None,
-            pixel_um: 5.0,
+            object_pixel_um: None,
             far_mm: None,
             pair_step: None,
             bin: None,
@@ -179,7 +180,10 @@ pub fn calibrate(request: &CalibrateStackRequest, context: &Context<'_>) -> Resu
     let (slices, coding) = read(&listed.images, request, context)?;
     let moved = match listed.lens {
         Some(lens) => Moved::Sensor(Box::new(lens)),
-        None => Moved::Target { pixel_um: request.pixel_um, far_mm: request.far_mm },
+        None => Moved::Target {
+            object_pixel_um: request.object_pixel_um.or(listed.object_pixel_um),
+            far_mm: request.far_mm,
+        },
     };
     let (step_mm, pair_step, bin) = (listed.step_mm, request.pair_step, request.bin);
     let settings = StackSettings { step_mm, moved, pair_step, bin, coding };
@@ -221,6 +225,7 @@ struct Listed {
     step_mm: f64,
     /// Of the rig whose sensor moved.
     lens: Option<Optics>,
+    object_pixel_um: Option<f64>,
     remarks: Vec<String>,
 }
 
@@ -247,10 +252,20 @@ impl Listed {
                 order.sort_by(|a, b| a.0.total_cmp(&b.0));
                 let (positions, images): (Vec<f64>, Vec<PathBuf>) = order.into_iter().unzip();
                 let step_mm = even_step(&positions, request)?;
-                Self { images, step_mm, lens: Some(lens), remarks: Vec::new() }
+                Self { images, step_mm, lens: Some(lens), object_pixel_um: None, remarks: Vec::new() }
             }
             None => {
-                let stack::Stack { images, positions_um, remarks, .. } = stack::list(&request.stack)?;
+                let stack::Stack { images, positions_um, object_pixel_um, remarks } =
+                    stack::list(&request.stack)?;
+                if let (None, Some([before, after])) = (&positions_um, order::gap(&images)) {
+                    let expected = format!(
+                        "evenly spaced slices, but one is missing between {} and {}: take the stack again, or move the slices on one \
+                         side of the gap away",
+                        before.display(),
+                        after.display()
+                    );
+                    return Err(WorkflowError::parameter("stack", request.stack.display(), expected));
+                }
                 let step_mm = match (request.step_mm, positions_um) {
                     (Some(step_mm), _) => step_mm,
                     (None, Some(positions)) => even_step(&positions, request)? * 1e-3,
@@ -259,7 +274,7 @@ impl Listed {
                         return Err(WorkflowError::parameter("step-mm", "none", expected));
                     }
                 };
-                Self { images, step_mm, lens: None, remarks }
+                Self { images, step_mm, lens: None, object_pixel_um, remarks }
             }
         };
         if request.near_first {

@@ -199,7 +199,9 @@ impl<'a> Results<'a> {
     }
 
     fn mesh(&self, to: &mut Sink) -> io::Result<()> {
-        mesh::write(self.depth(), self.computed.image.view(), Lateral::Lens(self.projection()), "mm", to)
+        let scale_known = self.inputs.optics.stage().is_none_or(|stage| stage.scale_known);
+        let lateral = if scale_known { Lateral::Lens(self.projection()) } else { Lateral::Unknown };
+        mesh::write(self.depth(), self.computed.image.view(), lateral, "mm", to)
     }
 
     fn glb(&self, to: &mut Sink) -> io::Result<()> {

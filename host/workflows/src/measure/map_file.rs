@@ -91,6 +91,9 @@ pub(super) fn read(path: &Path) -> Result<Measured> {
 }
 
 fn lens(optics: &Optics, part: Option<Part>) -> Lateral {
+    if optics.stage().is_some_and(|stage| !stage.scale_known) {
+        return Lateral::Unknown;
+    }
     Lateral::Lens(Projection {
         focal_length_mm: optics.focal_length_mm(),
         pixel_um: optics.pixel_um(),
