@@ -152,8 +152,8 @@ mod tests {
 
     #[test]
     fn prefixes_of_parts_of_one_suit_are_one_person() {
-        let parts = two().replace("Ben:", "Legs:B");
+        let parts = two().replace("Ben:L", "Right:R").replace("Ben:C7", "Right:T10");
         let found = person(&parts, None).expect("a table");
-        assert!(found.names.len() == 12 && found.by_name(0).contains_key("BLASI"));
+        assert!(found.names.len() == 12 && found.by_name(0).contains_key("RASI"));
     }
 }
