@@ -45,9 +45,9 @@ pub fn gap(sorted: &[PathBuf]) -> Option<[&PathBuf; 2]> {
     let mut in_order = steps.clone();
     in_order.sort_unstable_by(f64::total_cmp);
     let usual = *in_order.get(steps.len() / 2)?;
-    let wide = |step: f64| step > 1.5 * usual;
-    let few = 4 * steps.iter().filter(|step| wide(**step)).count() <= steps.len();
-    let at = steps.iter().position(|step| few && wide(*step))?;
+    let even = |step: &&f64| (**step - usual).abs() < 0.1 * usual;
+    let mostly = 4 * steps.iter().filter(even).count() >= 3 * steps.len();
+    let at = steps.iter().position(|step| mostly && *step > 1.5 * usual)?;
     Some([&sorted[at], &sorted[at + 1]])
 }
 
