@@ -233,7 +233,7 @@ pub(crate) fn unread(path: &Path) -> Option<ImageError> {
     if let Some(reason) = complete::unsupported(&head) {
         return Some(refused(reason));
     }
-    let rename = || refused("its name has another ending: rename it to .png, .tif or .jpg");
+    let rename = || refused("its name does not end in .png, .tif, .jpg, .bmp or .pgm: rename it");
     match image::guess_format(&head).ok()? {
         ImageFormat::Tiff => Some(Pages::open(path).err().unwrap_or_else(rename)),
         ImageFormat::Png | ImageFormat::Jpeg => Some(rename()),

@@ -94,7 +94,8 @@ fn decimals(numbers: &[&Number]) -> bool {
     let one_length = lengths().min() == lengths().max();
     // Programs print decimals of several lengths without trailing zeros, apart from `1.0`.
     let shortest = |number: &&Number| number.fraction().is_none_or(|f| f.len() == 1 || !f.ends_with('0'));
-    lengths().any(|length| length > 0) && (one_length || numbers.iter().all(shortest))
+    let exponents = numbers.iter().any(|number| number.has_exponent());
+    exponents || lengths().any(|length| length > 0) && (one_length || numbers.iter().all(shortest))
 }
 
 impl Values {
@@ -230,6 +231,7 @@ mod tests {
             &["1305031103.02.png", "1305031103.1.png"],
             &["z-2.0um.png", "z-1.5um.png", "z0.0um.png", "z0.25um.png", "z0.5um.png"],
             &["z_0.png", "z_0.25.png", "z_0.5.png", "z_1.png"],
+            &["z_0.png", "z_2.5e-05.png", "z_5e-05.png", "z_0.0001.png", "z_0.000125.png"],
         ] {
             let reversed: Vec<&str> = names.iter().rev().copied().collect();
             assert_eq!(sorted(&reversed), names);

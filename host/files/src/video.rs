@@ -103,7 +103,7 @@ type Read = Result<VideoFrame, VideoError>;
 
 enum Frames {
     Direct(Box<dyn Iterator<Item = Read>>),
-    Ffmpeg(ffmpeg::Ffmpeg),
+    Ffmpeg(Box<ffmpeg::Ffmpeg>),
 }
 
 /// Iterator over frames; ends after the first error.
@@ -135,7 +135,7 @@ impl Video {
         } else {
             let timing = timing::Timing::of(path);
             let remark = timing.as_ref().and_then(timing::Timing::remark);
-            (Frames::Ffmpeg(ffmpeg::open(path, timing.as_ref())?), remark)
+            (Frames::Ffmpeg(Box::new(ffmpeg::open(path, timing.as_ref())?)), remark)
         };
         Ok(Self {
             path: path.into(),

@@ -34,7 +34,7 @@ pub struct CompareRequest {
     /// Leave out a rim of this width.
     #[cfg_attr(feature = "clap", arg(long, value_name = "PX", default_value_t = 0))]
     pub border: usize,
-    /// Count only pixels where this image is not black.
+    /// Count only pixels where this image, or .npy of bool or numbers, is not 0.
     #[cfg_attr(feature = "clap", arg(long, value_name = "FILE"))]
     pub mask: Option<PathBuf>,
     /// Leave out pixels that are not farther than this from a step of the true depth.
@@ -49,8 +49,8 @@ impl Request for CompareRequest {
         &[("depth", PathKind::Input), ("truth", PathKind::Input), ("mask", PathKind::Input)];
     type Figures = ComparisonFigures;
 
-    fn run(&self, _: &Context<'_>) -> Result<ComparisonFigures> {
-        compare(self)
+    fn run(&self, context: &Context<'_>) -> Result<ComparisonFigures> {
+        compare(self, context)
     }
 }
 
@@ -80,10 +80,12 @@ impl Serialize for ComparisonFigures {
 }
 
 /// Fails for maps in different units.
-pub fn compare(request: &CompareRequest) -> Result<ComparisonFigures> {
+pub fn compare(request: &CompareRequest, context: &Context<'_>) -> Result<ComparisonFigures> {
     let (depth, truth) = (read_map(&request.depth)?, read_map(&request.truth)?);
     let unit = shared_unit("truth", &depth, &truth)?;
-    let (mut depth, mut truth) = (depth.depth(unit), truth.depth(unit));
+    let mut remarks = Vec::new();
+    let [mut depth, mut truth] = [depth, truth].map(|map| map.depth(unit, &mut remarks));
+    remarks.iter().for_each(|remark| context.progress.warn(remark));
     if unit == Unit::Um {
         // Positions may have any sign; a common offset above 0 keeps the errors.
         let lowest = depth.iter().chain(&truth).copied().fold(0.0, f32::min);

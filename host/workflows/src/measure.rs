@@ -43,6 +43,8 @@ pub struct Measured {
     /// Unit of depth and deviation.
     pub unit: Unit,
     pub lateral: Lateral,
+    /// On values of the file that mark holes or seem to.
+    pub remarks: Vec<String>,
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Serialize, Deserialize)]

@@ -13,7 +13,7 @@ pub(crate) struct Name {
 #[derive(Clone, PartialEq, Eq, Hash, Debug)]
 pub(crate) struct Number {
     pub sign: Option<char>,
-    /// Digits, and a dot and digits if there is exactly one dot: `2024.05.01` is three numbers.
+    /// Digits, a dot and digits if there is exactly one dot (`2024.05.01` is three numbers), and an exponent with a sign.
     pub text: String,
 }
 
@@ -32,8 +32,10 @@ impl Name {
                 continue;
             }
             let sign = last.ends_with(['+', '-']).then(|| last.pop()).flatten();
+            let dots = rest[..length].matches('.').count();
+            let length = if dots < 2 { length + exponent(&rest[length..]) } else { length };
             let (numbers, after) = rest.split_at(length);
-            if numbers.matches('.').count() == 1 {
+            if dots == 1 {
                 name.push(sign, numbers);
             } else {
                 numbers.split('.').enumerate().for_each(|(index, number)| match index {
@@ -66,7 +68,11 @@ impl Number {
     }
 
     pub fn fraction(&self) -> Option<&str> {
-        Some(self.text.split_once('.')?.1)
+        Some(self.text.split_once('.')?.1).filter(|_| !self.has_exponent())
+    }
+
+    pub fn has_exponent(&self) -> bool {
+        self.text.contains(['e', 'E'])
     }
 }
 
@@ -80,6 +86,13 @@ fn dotted(text: &str) -> usize {
         }
     }
     length
+}
+
+/// Length of `e-05` or `e+10` at the beginning.
+fn exponent(text: &str) -> usize {
+    let digits =
+        text.strip_prefix(['e', 'E']).and_then(|text| text.strip_prefix(['+', '-'])).map(super::digits);
+    digits.filter(|digits| *digits > 0).map_or(0, |digits| 2 + digits)
 }
 
 /// The last number that differs between names with one pattern of texts.

@@ -46,11 +46,8 @@ pub(super) fn images(path: &Path) -> Result<Series, StackError> {
     if let Some(unread) = others.iter().filter(missing).find_map(|file| image_file::unread(file)) {
         return Err(unread.into());
     }
-    let mut formats: BTreeMap<&str, usize> = BTreeMap::new();
-    series.images.iter().filter_map(|image| format(image)).for_each(|f| *formats.entry(f).or_default() += 1);
-    if formats.len() > 1 {
-        let found = formats.iter().map(|(format, count)| format!("{count} {format}")).collect::<Vec<_>>();
-        return Err(StackError::Mixed { path: path.into(), found: format!("{} files", found.join(" and ")) });
+    if let Some(mixed) = mixed(path, &series.images) {
+        return Err(mixed);
     }
     if let Some([before, after]) = order::counter_started_again(&series.images) {
         let name = |path: &PathBuf| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
@@ -58,6 +55,14 @@ pub(super) fn images(path: &Path) -> Result<Series, StackError> {
         series.remarks.push(format!("the camera's counter started again: {after} follows {before}"));
     }
     Ok(series)
+}
+
+fn mixed(path: &Path, images: &[PathBuf]) -> Option<StackError> {
+    let mut formats: BTreeMap<&str, usize> = BTreeMap::new();
+    images.iter().filter_map(|image| format(image)).for_each(|f| *formats.entry(f).or_default() += 1);
+    let found = formats.iter().map(|(format, count)| format!("{count} {format}")).collect::<Vec<_>>();
+    let found = format!("{} files", found.join(" and "));
+    (formats.len() > 1).then(|| StackError::Mixed { path: path.into(), found })
 }
 
 /// Files that are not hidden (other systems leave `._name.png` next to `name.png`), in order of their names.

@@ -51,7 +51,8 @@ impl Series {
                 return Ok(Self { images, remarks, pattern: None });
             }
             return Err(format!(
-                "its images have names of several kinds: {}: a stack is one focus series; move the images that do not belong to it away",
+                "its images have names of several kinds ({}; # is a number): a stack is one focus series; move \
+                 the images that do not belong to it away",
                 kinds(&patterns)
             ));
         }

@@ -32,6 +32,8 @@ use crate::{
 
 /// Largest difference of a step from the usual one, relative to it.
 const EVEN: f64 = 0.1;
+/// Largest difference of the given step from the stated one, relative to it.
+const SAME_STEP: f64 = 0.02;
 /// Share of errors within three standard deviations for the verdict `good`.
 const HONEST: f64 = 0.97;
 /// Least share of pixels with a depth.
@@ -255,7 +257,7 @@ impl Listed {
                 Self { images, step_mm, lens: Some(lens), object_pixel_um: None, remarks: Vec::new() }
             }
             None => {
-                let stack::Stack { images, positions_um, object_pixel_um, remarks } =
+                let stack::Stack { images, positions_um, object_pixel_um, mut remarks } =
                     stack::list(&request.stack)?;
                 if let (None, Some([before, after])) = (&positions_um, order::gap(&images)) {
                     let expected = format!(
@@ -267,7 +269,11 @@ impl Listed {
                     return Err(WorkflowError::parameter("stack", request.stack.display(), expected));
                 }
                 let step_mm = match (request.step_mm, positions_um) {
-                    (Some(step_mm), _) => step_mm,
+                    (Some(step_mm), stated) => {
+                        let stated = stated.map(|positions| even_step(&positions, request));
+                        remarks.extend(contradiction(step_mm, stated));
+                        step_mm
+                    }
                     (None, Some(positions)) => even_step(&positions, request)? * 1e-3,
                     (None, None) => {
                         let expected = "the distance between neighbouring slices; these files do not tell it";
@@ -282,6 +288,16 @@ impl Listed {
         }
         Ok(listed)
     }
+}
+
+/// What the files' metadata state otherwise than `--step-mm`.
+fn contradiction(step_mm: f64, stated: Option<Result<f64>>) -> Option<String> {
+    let stated = match stated? {
+        Ok(step_um) if (step_um * 1e-3 - step_mm).abs() <= SAME_STEP * step_mm => return None,
+        Ok(step_um) => format!("a step of {} mm", rounded(step_um * 1e-3, 9)),
+        Err(error) => format!("uneven positions ({error})"),
+    };
+    Some(format!("the file states {stated}, and --step-mm {step_mm} is used: check the unit"))
 }
 
 /// Mean step between positions that are in order, above 0.
@@ -444,6 +460,16 @@ fn learned(found: &StackLens) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_given_step_unlike_the_stated_one_has_a_remark() {
+        assert_eq!(contradiction(0.1, None), None);
+        assert_eq!(contradiction(0.1, Some(Ok(101.0))), None);
+        let remark = contradiction(0.5, Some(Ok(100.0))).unwrap();
+        assert!(remark.contains("0.1 mm") && remark.contains("--step-mm 0.5"), "{remark}");
+        let uneven = even_step(&[0.0, 100.0, 230.0, 300.0], &CalibrateStackRequest::default());
+        assert!(contradiction(0.1, Some(uneven)).unwrap().contains("uneven"));
+    }
 
     #[test]
     fn uneven_positions_are_refused_by_the_slices_between_which_they_are() {

@@ -21,7 +21,7 @@ use farnear_files::{
     stack,
     staging::{Staging, StagingError},
 };
-use ndarray::{Array2, ArrayView2, CowArray, Ix2};
+use ndarray::{Array2, ArrayView2, CowArray, Ix2, s};
 
 use super::FocusStackRequest;
 use crate::{
@@ -35,6 +35,8 @@ pub(super) struct Images<'a> {
     folder: PathBuf,
     /// Where each image begins in the file, bytes, with its height and width.
     images: Vec<(u64, (usize, usize))>,
+    /// Pixels of each image without a value, which have the mean of their neighbours.
+    specks: Vec<Vec<(usize, usize)>>,
     /// Brightness of each image, which is divided by it.
     gains: Vec<f32>,
     /// Pixels are divided by it.
@@ -42,6 +44,32 @@ pub(super) struct Images<'a> {
     /// Step between the codes of the coarsest image, before the division.
     code_step: f32,
     context: &'a Context<'a>,
+}
+
+/// Finite neighbours of 8 of a pixel in a speck; a straight border of pixels without values has 3.
+const AROUND_SPECK: usize = 5;
+/// Least part of a speck in a moved pixel.
+const SPECK: f32 = 0.05;
+
+/// Fills single pixels and small groups without a value by the mean of their neighbours; returns where they are.
+fn fill_specks(image: &mut Array2<f32>) -> Vec<(usize, usize)> {
+    if image.iter().all(|value| value.is_finite()) {
+        return Vec::new();
+    }
+    let (height, width) = image.dim();
+    let original = image.clone();
+    let mut specks = Vec::new();
+    for (at, value) in image.indexed_iter_mut().filter(|(_, value)| !value.is_finite()) {
+        let rows = at.0.saturating_sub(1)..(at.0 + 2).min(height);
+        let columns = at.1.saturating_sub(1)..(at.1 + 2).min(width);
+        let around = original.slice(s![rows, columns]);
+        let known = || around.iter().filter(|value| value.is_finite());
+        if known().count() >= AROUND_SPECK {
+            *value = known().sum::<f32>() / known().count() as f32;
+            specks.push(at);
+        }
+    }
+    specks
 }
 
 const PIXEL: usize = size_of::<f32>();
@@ -60,6 +88,7 @@ impl<'a> Images<'a> {
             file: Mutex::new(file),
             folder: request.out.clone(),
             images: Vec::with_capacity(paths.len()),
+            specks: Vec::with_capacity(paths.len()),
             gains: vec![1.0; paths.len()],
             white_level: 1.0,
             code_step: 0.0,
@@ -68,7 +97,7 @@ impl<'a> Images<'a> {
         let (mut end, mut colour, mut white) = (0, false, SharedWhiteLevel::default());
         let settings = ReadSettings { grey: request.grey, white_level: request.white_level };
         context.cancel.check("reading the stack")?;
-        stack::read(paths, &settings, |index, image| -> Result<()> {
+        stack::read(paths, &settings, |index, mut image| -> Result<()> {
             context.cancel.check("reading the stack")?;
             context.progress.advance("images", index + 1, Some(paths.len()));
             colour |= image.colour;
@@ -76,6 +105,7 @@ impl<'a> Images<'a> {
             if let Samples::Integer(bits) = image.samples {
                 read.code_step = read.code_step.max(1.0 / (2_f32.powi(bits.into()) - 1.0));
             }
+            read.specks.push(fill_specks(&mut image.pixels));
             read.images.push((end, image.pixels.dim()));
             read.write(index, image.pixels.view())?;
             end += (PIXEL * image.pixels.len()) as u64;
@@ -84,12 +114,18 @@ impl<'a> Images<'a> {
         if request.grey == Grey::Mean && colour {
             warnings.push("colour images: grey is the mean of red, green and blue (--grey)".into());
         }
+        let specks: usize = read.specks.iter().map(Vec::len).sum();
+        if specks > 0 {
+            warnings
+                .push(format!("{specks} pixels of the images have no value (NaN): the map has holes there"));
+        }
         read.white_level = white.get().unwrap_or(1.0);
         Ok(read)
     }
 
     pub fn remove(&mut self, index: usize) {
         self.images.remove(index);
+        self.specks.remove(index);
         self.gains.remove(index);
     }
 
@@ -98,9 +134,22 @@ impl<'a> Images<'a> {
     }
 
     /// Removes the lens' distortion from all images and moves each by its warp, NaN where it does not show the scene. Where the
-    /// lens showed nothing, which is the same in all, images keep their own pixels, and the mask returned marks these.
+    /// lens showed nothing, which is the same in all, images keep their own pixels, and the mask returned marks these, and pixels
+    /// that an image has no value for.
     pub fn prepare(&self, distortion: Option<Distortion>, warps: &[Warp]) -> Result<Option<Array2<bool>>> {
         let mut unseen = None;
+        for (index, warp) in warps.iter().enumerate().filter(|(index, _)| !self.specks[*index].is_empty()) {
+            let mut specks = Array2::zeros(self.dim(index));
+            self.specks[index].iter().for_each(|at| specks[*at] = 1.0_f32);
+            if let Some(distortion) = &distortion {
+                specks = straightened(specks.view(), distortion);
+            }
+            if *warp != Warp::IDENTITY {
+                specks = resample(specks.view(), warp);
+            }
+            let unseen = unseen.get_or_insert_with(|| Array2::from_elem(specks.dim(), false));
+            unseen.zip_mut_with(&specks, |unseen, speck| *unseen |= speck.abs() > SPECK);
+        }
         for (index, warp) in warps.iter().enumerate() {
             if distortion.is_none() && *warp == Warp::IDENTITY {
                 continue;
@@ -109,7 +158,8 @@ impl<'a> Images<'a> {
             let mut image = self.stored(index, 0..self.dim(index).0)?;
             if let Some(distortion) = &distortion {
                 let straight = straightened(image.view(), distortion);
-                unseen = Some(straight.mapv(|value| !value.is_finite()));
+                let unseen = unseen.get_or_insert_with(|| Array2::from_elem(straight.dim(), false));
+                unseen.zip_mut_with(&straight, |unseen, value| *unseen |= !value.is_finite());
                 image.zip_mut_with(&straight, |own, straight| {
                     if straight.is_finite() {
                         *own = *straight;
@@ -177,5 +227,21 @@ impl Slices for Images<'_> {
     fn measured(&self, rows: usize, of: usize) -> Result<()> {
         self.context.progress.advance("rows", rows, Some(of));
         self.context.cancel.check("measuring the stack")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn single_pixels_without_a_value_are_filled_and_borders_are_not() {
+        let mut image = Array2::from_elem((9, 9), 0.5);
+        image[(4, 4)] = f32::NAN;
+        image[(6, 6)] = f32::INFINITY;
+        image.row_mut(0).fill(f32::NAN);
+        assert_eq!(fill_specks(&mut image), [(4, 4), (6, 6)]);
+        assert_eq!((image[(4, 4)], image[(6, 6)], image[(0, 4)].is_nan()), (0.5, 0.5, true));
+        assert_eq!(fill_specks(&mut Array2::from_elem((3, 3), 1.0)), []);
     }
 }

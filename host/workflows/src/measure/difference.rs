@@ -6,7 +6,7 @@ use ndarray::{Array2, Zip};
 use serde::{Serialize, Serializer};
 
 use super::{Entries, MapFile, Unit, read_map};
-use crate::error::WorkflowError;
+use crate::{context::Context, error::WorkflowError};
 
 /// In the unit of the maps.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -32,10 +32,17 @@ impl Serialize for DifferenceFigures {
 }
 
 /// The second map minus the first, NaN without a value. Both are result folders or map files of equal size and unit.
-pub fn difference(first: &Path, second: &Path) -> crate::Result<(Array2<f32>, DifferenceFigures)> {
+pub fn difference(
+    first: &Path,
+    second: &Path,
+    context: &Context<'_>,
+) -> crate::Result<(Array2<f32>, DifferenceFigures)> {
     let [first, second] = [read_map(first)?, read_map(second)?];
     let unit = shared_unit("difference", &first, &second)?;
-    of_maps(&first.depth(unit), &second.depth(unit), unit)
+    let mut remarks = Vec::new();
+    let [first, second] = [first, second].map(|map| map.depth(unit, &mut remarks));
+    remarks.iter().for_each(|remark| context.progress.warn(remark));
+    of_maps(&first, &second, unit)
 }
 
 /// The unit of two maps; a map without a record adopts the other's.

@@ -8,7 +8,7 @@ use std::{
 use farnear_depth::optics::Optics;
 use farnear_files::{
     image_file,
-    map::{self, Scale},
+    map::{self, NoData, Scale},
     mesh::{Lateral, Projection},
 };
 use ndarray::Array2;
@@ -44,15 +44,28 @@ enum Record {
 
 /// Values of a file, whose holes depend on the unit.
 pub(crate) struct MapFile {
+    file: PathBuf,
     values: Array2<f32>,
+    nodata: Option<NoData>,
     /// `None` without a record.
     pub unit: Option<Unit>,
 }
 
 impl MapFile {
-    /// Depths in this unit; holes are NaN.
-    pub fn depth(self, unit: Unit) -> Array2<f32> {
-        self.values.mapv_into(|value| if unit.is_depth(value) { value } else { f32::NAN })
+    /// Depths in this unit; holes are NaN. Adds remarks on values that mark holes or seem to.
+    pub fn depth(self, unit: Unit, remarks: &mut Vec<String>) -> Array2<f32> {
+        let depth = self.values.mapv_into(|value| if unit.is_depth(value) { value } else { f32::NAN });
+        let file = self.file.display();
+        remarks.extend(self.nodata.map(|NoData { value, pixels }| {
+            format!("{file}: {pixels} pixels of the value {value:?} are holes (GDAL_NODATA)")
+        }));
+        remarks.extend(map::far_from_others(depth.view()).into_iter().map(|NoData { value, pixels }| {
+            format!(
+                "{file}: {pixels} pixels have the value {value:?}, far from all others: if it marks holes, store NaN there, or the value in \
+                 the tag GDAL_NODATA"
+            )
+        }));
+        depth
     }
 }
 
@@ -72,7 +85,8 @@ pub(super) fn read(path: &Path) -> Result<Measured> {
     let record = record_of(&folder)?;
     let map = values_of(&file, record.as_ref())?;
     let unit = map.unit.unwrap_or_default();
-    let depth = map.depth(unit);
+    let mut remarks = Vec::new();
+    let depth = map.depth(unit, &mut remarks);
     let deviation = deviation_of(&file, &folder, depth.dim())?;
     let lateral = match &record {
         Some(Record::Depth(record)) => lens(&record.optics, record.part),
@@ -87,7 +101,7 @@ pub(super) fn read(path: &Path) -> Result<Measured> {
             Err(error) => return Err(error),
         },
     };
-    Ok(Measured { depth, deviation, unit, lateral })
+    Ok(Measured { depth, deviation, unit, lateral, remarks })
 }
 
 fn lens(optics: &Optics, part: Option<Part>) -> Lateral {
@@ -144,9 +158,10 @@ fn values_of(file: &Path, record: Option<&Record>) -> Result<MapFile> {
         let codes = image_file::read_grey(file)?.pixels.mapv(|value| f64::from(value) * f64::from(u16::MAX));
         let depth = |code: f64| (offset_mm + scale_mm * code.round()) as f32;
         let depth = codes.mapv(|code| if code < 0.5 { f32::NAN } else { depth(code) });
-        return Ok(MapFile { values: depth, unit });
+        return Ok(MapFile { file: file.into(), values: depth, nodata: None, unit });
     }
-    Ok(MapFile { values: map::read(file)?, unit })
+    let (values, nodata) = map::read_with_nodata(file)?;
+    Ok(MapFile { file: file.into(), values, nodata, unit })
 }
 
 fn deviation_of(file: &Path, folder: &Path, dim: (usize, usize)) -> Result<Option<Array2<f32>>> {
@@ -163,4 +178,34 @@ fn deviation_of(file: &Path, folder: &Path, dim: (usize, usize)) -> Result<Optio
     }
     let reason = format!("{:?} rows and columns, the depth map has {dim:?}", deviation.dim());
     Err(WorkflowError::file(&path, "a map of the depth's size")(reason))
+}
+
+#[cfg(test)]
+mod tests {
+    use farnear_files::npy;
+
+    use super::*;
+
+    #[test]
+    fn values_that_mark_holes_have_remarks_in_units_that_allow_them() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("a.npy");
+        let mut depth = Array2::from_shape_fn((8, 8), |(y, x)| 900.0 + (y + x) as f32);
+        depth.row_mut(3).fill(-9999.0);
+        depth.row_mut(5).fill(1e10);
+        fs::write(&path, npy::write(depth.view())).expect("a writable folder");
+        let remarks = |unit| {
+            let mut remarks = Vec::new();
+            read_map(&path).expect("a map").depth(unit, &mut remarks);
+            remarks
+        };
+        let [far] = &remarks(Unit::Mm)[..] else { panic!("negative depths in mm are holes") };
+        assert!(far.contains("8 pixels have the value 10000000000.0"), "{far}");
+        assert_eq!(remarks(Unit::Um).len(), 2);
+        let mut none = Vec::new();
+        let nodata = Some(NoData { value: -1.0, pixels: 3 });
+        let values = Array2::from_elem((1, 2), 5.0);
+        MapFile { file: "b.tif".into(), values, nodata, unit: None }.depth(Unit::Um, &mut none);
+        assert!(none[0].contains("3 pixels of the value -1.0 are holes"), "{none:?}");
+    }
 }

@@ -75,7 +75,7 @@ mod tests {
         depth_mm[[2, 4]] = f32::NAN;
         let projection = Projection { focal_length_mm: 50.0, pixel_um: 7.4, axis_px: None };
         let lateral = Lateral::Lens(projection);
-        let map = Measured { depth: depth_mm, deviation: None, unit: Unit::Mm, lateral };
+        let map = Measured { depth: depth_mm, deviation: None, unit: Unit::Mm, lateral, remarks: vec![] };
         let found = profile(&map, [0, 0], [8, 4]).unwrap().points;
         assert_eq!(found.len(), 9);
         assert_eq!((found[4].x, found[4].y, found[4].depth), (4, 2, None));

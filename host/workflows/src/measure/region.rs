@@ -114,6 +114,7 @@ mod tests {
             depth: depth_mm,
             unit: Unit::Mm,
             lateral: Lateral::Lens(projection),
+            remarks: Vec::new(),
         }
     }
 

@@ -19,7 +19,9 @@ fn read(map: &Path, context: &Context<'_>) -> Result<Measured> {
         let reason = "no depth.toml or stack.toml next to it states the unit";
         context.progress.warn(&format!("the depths of {} are taken as mm: {reason}", map.display()));
     }
-    Measured::read(map)
+    let map = Measured::read(map)?;
+    map.remarks.iter().for_each(|remark| context.progress.warn(remark));
+    Ok(map)
 }
 
 /// Measure a region of a depth map: mean, deviation, fill rate, and the plane through it.
@@ -143,8 +145,8 @@ impl Request for MeasureDifferenceRequest {
         &[("first", PathKind::Input), ("second", PathKind::Input)];
     type Figures = DifferenceFigures;
 
-    fn run(&self, _: &Context<'_>) -> Result<DifferenceFigures> {
-        difference(&self.first, &self.second).map(|(_, figures)| figures)
+    fn run(&self, context: &Context<'_>) -> Result<DifferenceFigures> {
+        difference(&self.first, &self.second, context).map(|(_, figures)| figures)
     }
 }
 

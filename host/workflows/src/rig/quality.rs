@@ -196,7 +196,7 @@ fn figures(
         }
     }
     let lateral = Lateral::Lens(projection);
-    let map = Measured { depth: mean, deviation: None, unit: Unit::Mm, lateral };
+    let map = Measured { depth: mean, deviation: None, unit: Unit::Mm, lateral, remarks: Vec::new() };
     let points: Vec<_> = (0..height)
         .flat_map(|row| (0..width).filter_map(|column| map.point(column, row)).collect::<Vec<_>>())
         .collect();
