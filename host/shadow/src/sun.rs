@@ -22,6 +22,7 @@ pub use place::{Place, SunError};
 
 use chrono::{DateTime, Utc};
 use serde::{Deserialize, Serialize};
+use std::str::FromStr;
 
 /// Parallax of the sun, degrees times cos(elevation) (8.794 arc seconds).
 const PARALLAX_DEG: f64 = 8.794 / 3600.0;
@@ -39,6 +40,19 @@ pub enum Model {
     Thesis,
     /// NREL's Solar Position Algorithm (Reda and Andreas 2004), the reference.
     Spa,
+}
+
+impl FromStr for Model {
+    type Err = SunError;
+    fn from_str(text: &str) -> Result<Self, SunError> {
+        match text {
+            "psa" => Ok(Self::Psa),
+            "almanac" => Ok(Self::Almanac),
+            "thesis" => Ok(Self::Thesis),
+            "spa" => Ok(Self::Spa),
+            other => Err(SunError::UnknownModel(other.to_owned())),
+        }
+    }
 }
 
 /// Elevation and azimuth; neglects UT1 - UTC (0.004 deg). Fails for an invalid place or a time outside SPA.

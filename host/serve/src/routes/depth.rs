@@ -239,7 +239,8 @@ async fn difference(
     Path((name, other)): Path<(String, String)>,
 ) -> Result<Json<Figures>, Failure> {
     let [first, second] = both(&app, [&name, &other])?;
-    let figures = aside(move || Ok(figures(measure::difference(&first, &second)?.1)?)).await?;
+    let figures =
+        aside(move || Ok(figures(measure::difference(&first, &second, &Context::unattended())?.1)?)).await?;
     Ok(Json(Figures { figures }))
 }
 
@@ -248,7 +249,9 @@ async fn difference_map(
     Path((name, other)): Path<(String, String)>,
 ) -> Result<Response, Failure> {
     let [first, second] = both(&app, [&name, &other])?;
-    let bytes = aside(move || Ok(npy::write(measure::difference(&first, &second)?.0.view()))).await?;
+    let bytes =
+        aside(move || Ok(npy::write(measure::difference(&first, &second, &Context::unattended())?.0.view())))
+            .await?;
     Ok(bytes.into_response())
 }
 
