@@ -120,8 +120,8 @@ pub struct StackLens {
     pub held_out: HeldOut,
     /// All that was tried, the best first.
     pub trials: Vec<Trial>,
-    /// A slice that does not fit the others: defocused, exchanged or of something else. Nothing was learned from it.
-    pub foreign: Option<usize>,
+    /// A slice that does not fit the others (defocused, exchanged, of something else), or two of which one does not.
+    pub foreign: Vec<usize>,
 }
 
 /// Calibrates from `slices`, the far-focused first, (height, width). `proceed` is called before each measurement of a pair with

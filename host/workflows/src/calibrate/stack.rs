@@ -3,7 +3,7 @@
 mod plot;
 
 use std::{
-    path::{Path, PathBuf},
+    path::PathBuf,
     sync::atomic::{AtomicUsize, Ordering},
 };
 
@@ -132,9 +132,6 @@ pub struct StackFigures {
     /// How to measure with the lens file.
     pub next: String,
     pub slices: usize,
-    /// A slice that does not fit the others.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub left_out: Option<String>,
     /// Slices from the far to the near image of a pair.
     pub pair_step: usize,
     /// Pixels per side averaged into one.
@@ -205,9 +202,6 @@ pub fn calibrate(request: &CalibrateStackRequest, context: &Context<'_>) -> Resu
         error => WorkflowError::parameter("stack", request.stack.display(), error.to_string()),
     })?;
     let figures = figures(&found, &listed, slices[0].dim(), request);
-    if let Some(slice) = &figures.left_out {
-        context.progress.warn(&format!("{slice} does not fit the other slices and is left out"));
-    }
     let drawn = match plot {
         Some((file, format)) => Some((file, plot::plot(&figures, format)?)),
         None => None,
@@ -372,7 +366,6 @@ fn figures(
         verdict: verdict(found),
         next,
         slices: files.len(),
-        left_out: found.foreign.map(|slice| named(&files[slice], slice)),
         pair_step,
         bin,
         psf: optics.psf().to_string(),
@@ -405,14 +398,16 @@ fn figures(
     }
 }
 
-/// The file, and the number among the slices, which is needed in a file of many.
-fn named(file: &Path, slice: usize) -> String {
-    format!("{} (slice {})", file.display(), slice + 1)
-}
-
 /// `good`, or what to change.
 pub fn verdict(found: &StackLens) -> String {
     let held_out = &found.held_out;
+    let foreign: Vec<String> = found.foreign.iter().map(|slice| (slice + 1).to_string()).collect();
+    if !foreign.is_empty() {
+        return format!(
+            "slice {} does not fit the others: is it defocused, moved or of something else? Take the stack again",
+            foreign.join(" or ")
+        );
+    }
     let learned = learned(found);
     if learned < LEARNED {
         return format!(

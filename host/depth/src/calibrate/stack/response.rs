@@ -122,7 +122,7 @@ pub(super) struct Learned {
     pub optics: Optics,
     pub held_out: HeldOut,
     pub trials: Vec<Trial>,
-    pub foreign: Option<usize>,
+    pub foreign: Vec<usize>,
 }
 
 /// Slices to calibrate, binned.
@@ -230,8 +230,8 @@ pub(super) fn learn(target: &Target<'_>) -> Result<Learned, StackError> {
     }
     trials.sort_by(|a, b| a.robust_mm.total_cmp(&b.robust_mm));
     let unfit = StackError::NoPair(target.pair_step);
-    let Some(Best { degree, optics, mut samples, .. }) = best else { return Err(unfit) };
-    let foreign = foreign::leave_out(&mut samples, degree, target.pair_step, target.slices.len());
+    let Some(Best { degree, optics, samples, .. }) = best else { return Err(unfit) };
+    let foreign = foreign::find(&samples.of, degree, target.pair_step, target.slices.len());
     let Some((stage, held_out)) = finish(&samples, degree, &optics, half_mm) else { return Err(unfit) };
     Ok(Learned { optics: optics.with_stage(stage), held_out, trials, foreign })
 }
