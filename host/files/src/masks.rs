@@ -104,7 +104,7 @@ pub fn levels_of(files: &[PathBuf]) -> Result<Levels, MaskError> {
 
 pub struct Masks {
     pub named: Vec<Named>,
-    pub remark: Option<String>,
+    pub levels: Levels,
 }
 
 impl Masks {
@@ -135,7 +135,7 @@ pub fn read_all(path: &Path) -> Result<Masks, MaskError> {
         name,
         mask: grey.mapv(|level| level >= levels.set_from),
     };
-    Ok(Masks { named: all.into_iter().map(named).collect(), remark: levels.remark.clone() })
+    Ok(Masks { named: all.into_iter().map(named).collect(), levels })
 }
 
 /// PNG with 255 = set.

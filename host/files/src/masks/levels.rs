@@ -28,6 +28,8 @@ pub struct Levels {
     pub set_from: u8,
     /// Notice to the user about the levels; `None` for black and white.
     pub remark: Option<String>,
+    /// Share of the surveyed pixels that are set, per cent.
+    pub percent_set: u64,
 }
 
 #[derive(Clone, Debug)]
@@ -82,11 +84,13 @@ impl Histogram {
             [] | [_] | [0, 255] => Some(Levels::default()),
             &[low, high] => Some(Levels {
                 set_from: high,
+                percent_set: 0,
                 remark: Some(format!("two grey levels, {low} and {high}: {high} is taken as the person")),
             }),
             labels if labels.last() == Some(&255) && labels.iter().all(|level| LABELS.contains(level)) => {
                 Some(Levels {
                     set_from: 255,
+                    percent_set: 0,
                     remark: Some(format!(
                         "grey levels {}: 255 is taken as the person, the levels between as shadow or unknown",
                         listed(labels)
@@ -110,7 +114,7 @@ impl Histogram {
             return Some(Levels::default());
         }
         let remark = format!("grey levels near {low} and near {high}: set from {middle} on");
-        Some(Levels { set_from: middle, remark: Some(remark) })
+        Some(Levels { set_from: middle, remark: Some(remark), percent_set: 0 })
     }
 }
 
@@ -125,18 +129,23 @@ fn listed(levels: &[u8]) -> String {
 
 impl Default for Levels {
     fn default() -> Self {
-        Self { set_from: 128, remark: None }
+        Self { set_from: 128, remark: None, percent_set: 0 }
     }
 }
 
 impl Levels {
-    /// The levels of masks of people from their histogram; `first` is for messages. Fails for labels of several things, if
-    /// nothing would be set, and if nearly all would be.
+    /// The levels of masks from their histogram; `first` is for messages. Fails for labels of several things, and if nothing
+    /// would be set.
     pub fn of_masks(histogram: &Histogram, first: &std::path::Path) -> Result<Self, MaskError> {
         let levels = Self::by_histogram(histogram, first)?;
-        match histogram.percent_from(levels.set_from) {
-            percent @ MOST_PEOPLE.. => Err(MaskError::Inverted { path: first.into(), percent }),
-            _ => Ok(levels),
+        Ok(Self { percent_set: histogram.percent_from(levels.set_from), ..levels })
+    }
+
+    /// Refuses full frames whose background is set.
+    pub fn check_people(&self, path: &std::path::Path) -> Result<(), MaskError> {
+        match self.percent_set {
+            percent @ MOST_PEOPLE.. => Err(MaskError::Inverted { path: path.into(), percent }),
+            _ => Ok(()),
         }
     }
 
@@ -152,7 +161,7 @@ impl Levels {
             return Err(MaskError::Levels { path: first.into(), levels: present });
         }
         let remark = format!("{} grey levels: set from 128 on", present.len());
-        Ok(Self { set_from: 128, remark: Some(remark) })
+        Ok(Self { set_from: 128, remark: Some(remark), percent_set: 0 })
     }
 
     /// Reads pictures throughout a folder until the person's level is among them.
@@ -220,8 +229,9 @@ mod tests {
         for labels in [&[(0, 900), (15, 200), (255, 60)][..], &[(0, 900), (1, 90), (2, 90), (255, 9)]] {
             assert!(matches!(of_masks(labels), Err(MaskError::Labels { .. })), "{labels:?}");
         }
-        assert!(matches!(of_masks(&[(0, 90), (255, 910)]), Err(MaskError::Inverted { percent: 91, .. })));
-        assert!(of_masks(&[(0, 400), (128, 10), (255, 590)]).is_ok());
+        let people = |counts: &[(u8, u64)]| of_masks(counts)?.check_people(std::path::Path::new("masks"));
+        assert!(matches!(people(&[(0, 90), (255, 910)]), Err(MaskError::Inverted { percent: 91, .. })));
+        assert!(people(&[(0, 400), (255, 600)]).is_ok());
         assert!(of_masks(&[(0, 900), (3, 9), (5, 9), (250, 9), (253, 9), (255, 90)]).is_ok());
     }
 

@@ -35,7 +35,9 @@ pub(super) fn images(path: &Path) -> Result<Series, StackError> {
     }
     order::sort(&mut images);
     let stems: HashSet<String> = images.iter().map(|image| order::stem(image)).collect();
-    let mut series = Series::of(images).map_err(|reason| StackError::Series { path: path.into(), reason })?;
+    let in_formats = mixed(path, &images);
+    let mut series = Series::of(images)
+        .map_err(|reason| in_formats.unwrap_or(StackError::Series { path: path.into(), reason }))?;
     // Without the images left out, numbers may be decimals.
     order::sort(&mut series.images);
     if let Some([first, second]) = order::same_stem(&series.images) {

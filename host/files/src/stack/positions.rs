@@ -41,7 +41,8 @@ pub(super) fn object_pixel_um(pages: &[Page]) -> Option<f64> {
     let description = directory.description.as_deref()?;
     let side = if description.starts_with("ImageJ=") {
         let unit = description.lines().find_map(|line| line.strip_prefix("unit="))?;
-        unit_um(unit)? / directory.x_resolution?
+        // One pixel per unit: the scale was never set.
+        unit_um(unit)? / directory.x_resolution.filter(|resolution| *resolution != 1.0)?
     } else {
         ome::Metadata::of(description)?.pixel_um()?
     };

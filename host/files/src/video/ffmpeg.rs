@@ -29,6 +29,7 @@ pub(super) struct Ffmpeg {
 struct Log {
     errors: usize,
     quoted: Vec<String>,
+    last_line: String,
     /// Width, height and ratio of width to height as shown, each time they changed.
     sizes: Vec<(usize, usize, f64)>,
 }
@@ -42,6 +43,9 @@ impl Log {
                 if log.quoted.len() < QUOTED {
                     log.quoted.push(error.trim().to_owned());
                 }
+            }
+            if !line.trim().is_empty() {
+                log.last_line.clone_from(&line);
             }
             if let Some(size) = input_size(&line).filter(|size| log.sizes.last() != Some(size)) {
                 log.sizes.push(size);
@@ -142,7 +146,7 @@ impl Ffmpeg {
             Ok(status) => Some(VideoError::Ffmpeg {
                 path: self.path.clone(),
                 status: status.to_string(),
-                message: log.quoted.join("; "),
+                message: if log.errors > 0 { log.quoted.join("; ") } else { log.last_line },
             }),
             Err(source) => Some(VideoError::io(&self.path, source)),
         }

@@ -216,11 +216,15 @@ fn kinds(one: &Path, other: &Path, one_is_full: bool) -> SamplesError {
 /// Track of a folder of masks, and whether they are full frames.
 fn described(folder: &Path, context: &Context<'_>) -> Result<(Track, bool)> {
     let read = masks::read_all(folder)?;
-    if let Some(remark) = &read.remark {
+    let levels = read.levels.clone();
+    if let Some(remark) = &levels.remark {
         context.progress.warn(&format!("{}: {remark}", folder.display()));
     }
     let read = read.pixels();
     let full = are_full_frames(&read);
+    if full {
+        levels.check_people(folder)?;
+    }
     let track = Track::from_masks(&read, SCALING, full);
     if track.frames() == 0 {
         return Err(SamplesError::NobodySeen { folder: folder.into(), count: read.len() }.into());

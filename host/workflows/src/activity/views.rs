@@ -133,6 +133,9 @@ impl Frames {
             ViewKind::Masks => {
                 let files = masks::listed(&view.path)?;
                 let levels = masks::levels_of(&files)?;
+                if !view.is_cut_out()? {
+                    levels.check_people(&view.path)?;
+                }
                 let remark =
                     levels.remark.as_ref().map(|remark| format!("{}: {remark}", view.path.display()));
                 Self::Masks { files: files.into_iter(), levels, remark, first: None }

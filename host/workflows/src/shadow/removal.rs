@@ -214,8 +214,8 @@ pub fn remove_from_masks(request: &ShadowRemoveRequest, context: &Context<'_>) -
             "the camera looks into the sun (elevation {elevation_deg:.1} deg): expect glare in the masks and shadows that come straight at it"
         ));
     }
-    let masks::Masks { named: all, remark } = masks::read_all(&request.masks)?;
-    if let Some(remark) = remark {
+    let masks::Masks { named: all, levels } = masks::read_all(&request.masks)?;
+    if let Some(remark) = levels.remark {
         context.progress.warn(&format!("{}: {remark}", request.masks.display()));
     }
     let out = Staging::new_folder(&request.out)?;

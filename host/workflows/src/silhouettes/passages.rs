@@ -96,6 +96,7 @@ pub fn cut(settings: &PassagesRequest, context: &Context<'_>) -> Result<Passages
     let out = Staging::new_folder(&settings.out)?;
     let files = masks::listed(&settings.masks)?;
     let levels = masks::levels_of(&files)?;
+    levels.check_people(&settings.masks)?;
     if let Some(remark) = &levels.remark {
         context.progress.warn(&format!("{}: {remark}", settings.masks.display()));
     }
