@@ -1,4 +1,4 @@
-//! OME-XML: https://docs.openmicroscopy.org/ome-model
+//! OME-XML: <https://docs.openmicroscopy.org/ome-model>
 
 use std::borrow::Cow;
 
