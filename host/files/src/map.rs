@@ -100,7 +100,7 @@ pub fn read_mask(path: &Path) -> Result<Array2<bool>, MapError> {
     Ok(grey.pixels.mapv(|value| value != 0.0 && !value.is_nan()))
 }
 
-/// Distance of a value from all others, relative to their range, at which it is no depth.
+/// Distance of a value from all others, relative to their range, beyond which it is not a depth.
 const FAR: f32 = 20.0;
 
 /// Values at the ends of a map that several pixels have, far from all others, with their numbers of pixels.
@@ -271,7 +271,7 @@ mod tests {
         let mut map = Array2::from_shape_fn((8, 8), |(y, x)| 900.0 + (y + x) as f32);
         assert_eq!(far_from_others(map.view()), []);
         map[[0, 0]] = 1e10;
-        assert_eq!(far_from_others(map.view()), [], "one pixel is no constant");
+        assert_eq!(far_from_others(map.view()), [], "one pixel only");
         map[[0, 1]] = 1e10;
         map.row_mut(7).fill(-9999.0);
         let found = [NoData { value: 1e10, pixels: 2 }, NoData { value: -9999.0, pixels: 8 }];

@@ -38,7 +38,7 @@ pub enum MaskError {
     )]
     Levels { path: PathBuf, levels: Vec<u8> },
     #[error(
-        "{}: grey levels {levels:?}: a mask has two; these are labels of several things: write one mask of what is meant",
+        "{}: grey levels {levels:?}: a mask has two, these label several things: write masks of the person alone",
         path.display()
     )]
     Labels { path: PathBuf, levels: Vec<u8> },

@@ -299,7 +299,7 @@ mod tests {
         assert!(remark.is_some_and(|remark| remark.contains("2.000 times as wide as high")));
     }
 
-    /// A recording that begins anew with another size after one second, as browsers' meetings do; `None` without ffmpeg.
+    /// A recording whose size changes after one second, as browsers' meetings do; `None` without ffmpeg.
     fn of_two_sizes(second: &str) -> Option<tempfile::TempDir> {
         let folder = tempfile::tempdir().unwrap();
         let parts = ["64x48", second].map(|size| {

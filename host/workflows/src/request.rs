@@ -198,7 +198,7 @@ pub const TASKS: &[Task] = &[
     Task::of::<crate::sun::SunPositionRequest>(),
 ];
 
-/// Tasks of a rig or a camera. They are no batch jobs.
+/// Tasks of a rig or a camera. Batch does not run them.
 pub const DEVICE_TASKS: &[Task] = &[
     Task::of::<crate::rig::motion::HomeRequest>(),
     Task::of::<crate::rig::motion::MoveRequest>(),

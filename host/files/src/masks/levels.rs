@@ -18,7 +18,7 @@ const RINGING: f64 = 0.157;
 const ONE_BETWEEN_IN: u64 = 50;
 /// Fewer levels than this, of which one is near black or white, are labels: JPEG has many.
 const FEW: usize = 6;
-/// Of 100 pixels so many are at most people.
+/// Largest share of people in a frame, per cent.
 const MOST_PEOPLE: u64 = 70;
 /// Two levels nearer than this with others between them are a picture, not a mask.
 const LEAST_GAP: u8 = 40;

@@ -156,7 +156,7 @@ fn unit_um(unit: &str) -> Option<f64> {
         unit = unit.replace(micro, "u");
     }
     let unit = unit.replace("metre", "meter");
-    // `ms` is no length.
+    // `ms` is a time.
     let singular = unit.strip_suffix('s').filter(|unit| unit.len() > 3).unwrap_or(&unit);
     Some(match singular {
         "um" | "micron" | "micrometer" | "umeter" => 1.0,

@@ -24,7 +24,7 @@ pub(super) struct Ffmpeg {
     pub remarks: Vec<String>,
 }
 
-/// What ffmpeg said.
+/// Contents of ffmpeg's log.
 #[derive(Debug, Default, PartialEq)]
 struct Log {
     errors: usize,

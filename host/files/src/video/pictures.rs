@@ -14,7 +14,7 @@ use crate::{
 /// Lower-case endings of pictures; other files are ignored.
 pub const EXTENSIONS: [&str; 8] = ["png", "tif", "tiff", "jpg", "jpeg", "bmp", "pgm", "ppm"];
 
-/// Frames that are looked at for the bits that a camera uses of 16.
+/// Frames surveyed for the bits that a camera uses of 16.
 const SURVEYED: usize = 8;
 
 pub fn list(folder: &Path) -> Result<Vec<PathBuf>, VideoError> {

@@ -96,7 +96,7 @@ impl Timing {
         })
     }
 
-    /// For regular intervals every frame comes once, whatever its time; else the first frame is at 0.
+    /// For regular intervals every frame comes once, regardless of its time; else the first frame is at 0.
     pub fn input_arguments(&self) -> [String; 2] {
         match self.regular {
             true => ["-r".into(), format!("{:.6}", self.rate_hz)],

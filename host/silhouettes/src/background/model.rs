@@ -39,7 +39,7 @@ impl Frame<'_> {
         }
     }
 
-    /// Whether colours can be told from greys. Infrared and other grey videos come in three channels, equal but for
+    /// Whether the frame has colours. Infrared and other grey videos come in three channels, equal but for
     /// compression. A dark frame, before a recording fades in, counts as colour.
     #[must_use]
     pub fn has_colour(&self) -> bool {

@@ -74,7 +74,7 @@ pub struct ExtractorSettings {
 }
 
 impl ExtractorSettings {
-    /// Settings for people in frames like this one. Without colour, shadow is not told from dark clothes.
+    /// Settings for people in frames like this one. Without colour, shadow and dark clothes look alike.
     #[must_use]
     pub fn for_frame(frame: Frame<'_>) -> Self {
         let size = frame.size();

@@ -55,10 +55,10 @@ pub struct QualityRequest {
     /// Number of pairs, 2 to 50.
     #[cfg_attr(feature = "clap", arg(long, default_value_t = Self::default().pairs))]
     pub pairs: usize,
-    /// The target's distance from the lens, where it is known.
+    /// The target's distance from the lens, for the accuracy.
     #[cfg_attr(feature = "clap", arg(long, value_name = "MM"))]
     pub true_mm: Option<f64>,
-    /// The record to append to; a new file if there is none.
+    /// The record to append to; created if missing.
     #[cfg_attr(feature = "clap", arg(long, value_name = "FILE"))]
     pub record: PathBuf,
 }
