@@ -208,21 +208,32 @@ pub fn read_grey_with(path: &Path, settings: &ReadSettings) -> Result<GreyImage,
 }
 
 /// Reads with 8 bits per sample: grey, or RGB (height, width, 3). 16 bits keep their upper half; floats are rejected.
-pub(crate) fn read_8_bit(path: &Path, bits: u32) -> Result<Samples8, ImageError> {
-    let (decoded, path) = read_decoded(path)?;
-    decoded.in_8_bits(bits).map_err(|reason| ImageError::Format { path, reason })
+/// How 8 bits are made of the images of a folder.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Reading {
+    /// Significant bits of 16.
+    pub bits: u32,
+    /// Whether the content is the opacity of images of one colour.
+    pub opacity: bool,
 }
 
-/// As [`read_8_bit`] by the image's own largest sample; an image of one colour whose opacity differs is its opacity.
-pub(crate) fn read_labels(path: &Path) -> Result<Samples8, ImageError> {
-    let (decoded, path) = read_decoded(path)?;
-    let decoded = if decoded.only_alpha_differs() { decoded.alpha() } else { decoded };
-    let bits = decoded.used_bits();
-    decoded.in_8_bits(bits).map_err(|reason| ImageError::Format { path, reason })
+impl Default for Reading {
+    fn default() -> Self {
+        Self { bits: 16, opacity: false }
+    }
 }
 
-pub(crate) fn used_bits(path: &Path) -> Result<u32, ImageError> {
-    Ok(read_decoded(path)?.0.used_bits())
+pub(crate) fn read_8_bit(path: &Path, reading: Reading) -> Result<Samples8, ImageError> {
+    let (decoded, path) = read_decoded(path)?;
+    let decoded = if reading.opacity { decoded.alpha() } else { decoded };
+    decoded.in_8_bits(reading.bits).map_err(|reason| ImageError::Format { path, reason })
+}
+
+/// The reading of one image, and whether others of its folder may need another.
+pub(crate) fn reading_of(path: &Path) -> Result<(Reading, bool), ImageError> {
+    let (decoded, _) = read_decoded(path)?;
+    let reading = Reading { bits: decoded.used_bits(), opacity: decoded.only_alpha_differs() };
+    Ok((reading, decoded.has_alpha() || decoded.has_16_bits()))
 }
 
 /// Why a file is not read that is an image by its content; `None` if it is not.

@@ -10,6 +10,8 @@ use std::{
 use image::{GrayImage, ImageFormat, Luma};
 use ndarray::{Array2, Axis};
 
+pub use crate::image_file::Reading;
+
 use self::levels::{Histogram, Levels};
 use crate::{
     EncodeError,
@@ -78,8 +80,8 @@ pub fn listed(path: &Path) -> Result<Vec<PathBuf>, MaskError> {
 }
 
 /// Grey levels of a picture; coloured ones must have equal channels.
-pub fn grey(path: &Path) -> Result<Array2<u8>, MaskError> {
-    match pictures::read(path)? {
+pub fn grey(path: &Path, reading: Reading) -> Result<Array2<u8>, MaskError> {
+    match pictures::read(path, reading)? {
         Pixels::Grey(levels) => Ok(levels),
         Pixels::Rgb(rgb) => {
             for ((row, column), pixel) in rgb.map_axis(Axis(2), |p| [p[0], p[1], p[2]]).indexed_iter() {
@@ -94,12 +96,12 @@ pub fn grey(path: &Path) -> Result<Array2<u8>, MaskError> {
 
 /// Reads the mask in a picture, as [`grey`].
 pub fn read(path: &Path, levels: &Levels) -> Result<Mask, MaskError> {
-    Ok(grey(path)?.mapv(|level| level >= levels.set_from))
+    Ok(grey(path, levels.reading)?.mapv(|level| level >= levels.set_from))
 }
 
 pub fn levels_of(files: &[PathBuf]) -> Result<Levels, MaskError> {
     let Some(first) = files.first() else { return Ok(Levels::default()) };
-    Levels::of_masks(&Levels::survey(files)?, first)
+    Levels::of_masks(&Histogram::of(files)?, first)
 }
 
 pub struct Masks {
@@ -117,10 +119,11 @@ impl Masks {
 /// All masks of a folder (or one picture), in natural order; they must have one size.
 pub fn read_all(path: &Path) -> Result<Masks, MaskError> {
     let mut all: Vec<(String, Array2<u8>)> = Vec::new();
-    let mut histogram = Histogram::default();
     let files = listed(path)?;
+    let reading = pictures::reading_of(&files);
+    let mut histogram = Histogram::new(reading);
     for file in &files {
-        let levels = grey(file)?;
+        let levels = grey(file, reading)?;
         if let Some((first, other)) = all.first() {
             let (found, expected) = (levels.dim(), other.dim());
             if found != expected {
@@ -175,6 +178,34 @@ mod tests {
             let masks = read_all(&path(name)).unwrap().pixels();
             let expected = Array2::from_shape_fn((3, 4), |(y, x)| set(x as u32, y as u32));
             assert_eq!(masks, [expected], "{name}");
+        }
+    }
+
+    #[test]
+    fn masks_of_a_folder_are_read_alike() {
+        let folder = tempfile::tempdir().unwrap();
+        let of_kind = |kind: &str| {
+            let path = folder.path().join(kind);
+            std::fs::create_dir(&path).unwrap();
+            path
+        };
+        // Somebody in the first frame only; white with an opacity, and probabilities with noise.
+        let (opacity, probabilities) = (of_kind("opacity"), of_kind("probabilities"));
+        for frame in 0..3_u32 {
+            let set = |x: u32| frame == 0 && x == 1;
+            ImageBuffer::from_fn(4, 3, |x, _| Rgba([255_u8, 255, 255, if set(x) { 255 } else { 0 }]))
+                .save(opacity.join(format!("{frame}.png")))
+                .unwrap();
+            ImageBuffer::from_fn(4, 3, |x, _| Luma([if set(x) { u16::MAX } else { 190 }]))
+                .save(probabilities.join(format!("{frame}.png")))
+                .unwrap();
+        }
+        for path in [opacity, probabilities] {
+            let set = read_all(&path).unwrap().pixels();
+            let set: Vec<usize> = set.iter().map(|mask| mask.iter().filter(|set| **set).count()).collect();
+            assert_eq!(set, [3, 0, 0], "{}", path.display());
+            let files = listed(&path).unwrap();
+            assert!(!read(&files[1], &levels_of(&files).unwrap()).unwrap().iter().any(|set| *set));
         }
     }
 }

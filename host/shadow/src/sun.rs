@@ -21,7 +21,10 @@ pub use clock::parse_time;
 pub use place::{Place, SunError};
 
 use chrono::{DateTime, Utc};
-use serde::{Deserialize, Serialize};
+use serde::{
+    Deserialize, Serialize,
+    de::{IntoDeserializer, value},
+};
 use std::str::FromStr;
 
 /// Parallax of the sun, degrees times cos(elevation) (8.794 arc seconds).
@@ -43,15 +46,10 @@ pub enum Model {
 }
 
 impl FromStr for Model {
-    type Err = SunError;
-    fn from_str(text: &str) -> Result<Self, SunError> {
-        match text {
-            "psa" => Ok(Self::Psa),
-            "almanac" => Ok(Self::Almanac),
-            "thesis" => Ok(Self::Thesis),
-            "spa" => Ok(Self::Spa),
-            other => Err(SunError::UnknownModel(other.to_owned())),
-        }
+    type Err = value::Error;
+
+    fn from_str(text: &str) -> Result<Self, value::Error> {
+        Self::deserialize(text.into_deserializer())
     }
 }
 

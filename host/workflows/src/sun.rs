@@ -33,6 +33,28 @@ impl Moment {
     }
 }
 
+/// Where and when the sun is looked for.
+#[derive(Clone, PartialEq, Debug, Default, Serialize, Deserialize, JsonSchema)]
+#[cfg_attr(feature = "clap", derive(clap::Args))]
+#[serde(default)]
+pub struct PlaceAndTime {
+    /// Latitude in degrees, north positive.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "DEG", allow_negative_numbers = true))]
+    pub lat: f64,
+    /// Longitude in degrees, east positive.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "DEG", allow_negative_numbers = true))]
+    pub lon: f64,
+    /// Time with its zone (RFC 3339), such as 2014-06-23T12:30:00+01:00.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "RFC3339"))]
+    pub time: String,
+}
+
+impl PlaceAndTime {
+    pub fn moment(&self) -> Result<Moment> {
+        Moment::new(self.lat, self.lon, &self.time)
+    }
+}
+
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[cfg_attr(feature = "clap", derive(clap::ValueEnum))]
 #[serde(rename_all = "lowercase")]
@@ -59,24 +81,12 @@ pub enum Formula {
 )]
 #[serde(default)]
 pub struct SunPositionRequest {
-    /// Latitude in degrees, north positive.
-    #[cfg_attr(feature = "clap", arg(long, value_name = "DEG", allow_negative_numbers = true))]
-    pub lat: f64,
-    /// Longitude in degrees, east positive.
-    #[cfg_attr(feature = "clap", arg(long, value_name = "DEG", allow_negative_numbers = true))]
-    pub lon: f64,
-    /// Time with its zone (RFC 3339), such as 2014-06-23T12:30:00+01:00.
-    #[cfg_attr(feature = "clap", arg(long, value_name = "RFC3339"))]
-    pub time: String,
+    #[cfg_attr(feature = "clap", command(flatten))]
+    #[serde(flatten)]
+    pub at: PlaceAndTime,
     /// The formula.
     #[cfg_attr(feature = "clap", arg(long, value_enum, default_value = "psa"))]
     pub model: Formula,
-}
-
-impl SunPositionRequest {
-    pub fn moment(&self) -> Result<Moment> {
-        Moment::new(self.lat, self.lon, &self.time)
-    }
 }
 
 impl Request for SunPositionRequest {
@@ -86,11 +96,11 @@ impl Request for SunPositionRequest {
     type Figures = SunFigures;
 
     fn check(&self) -> Result<()> {
-        self.moment().map(drop)
+        self.at.moment().map(drop)
     }
 
     fn run(&self, _: &Context<'_>) -> Result<SunFigures> {
-        position(&self.moment()?, self.model)
+        position(&self.at.moment()?, self.model)
     }
 }
 

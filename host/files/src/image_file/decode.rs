@@ -214,8 +214,19 @@ impl Decoded {
         }
     }
 
-    /// Opacity as grey.
+    pub(crate) fn has_alpha(&self) -> bool {
+        self.channels > self.colours
+    }
+
+    pub(crate) fn has_16_bits(&self) -> bool {
+        matches!(self.values, Values::U16(_))
+    }
+
+    /// Opacity as grey; an image without one remains.
     pub(crate) fn alpha(self) -> Self {
+        if !self.has_alpha() {
+            return self;
+        }
         let values = match &self.values {
             Values::U8(v) => Values::U8(last_of(v, self.channels)),
             Values::U16(v) => Values::U16(last_of(v, self.channels)),

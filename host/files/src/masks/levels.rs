@@ -1,11 +1,12 @@
 //! The person's grey level in a folder of masks: 0 and 255, any two others, or a background model's labels (0, 127 and
 //! 255 of OpenCV; 0, 50, 85, 170 and 255 of ChangeDetection.net).
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use ndarray::Array2;
 
 use super::{MaskError, grey};
+use crate::{image_file::Reading, video::pictures};
 
 /// Levels that label more than a person: shadow, not evaluated, unknown.
 const LABELS: [u8; 6] = [0, 50, 85, 127, 170, 255];
@@ -30,26 +31,49 @@ pub struct Levels {
     pub remark: Option<String>,
     /// Share of the surveyed pixels that are set, per cent.
     pub percent_set: u64,
+    pub reading: Reading,
 }
 
 #[derive(Clone, Debug)]
-pub struct Histogram([u64; 256]);
-
-impl Default for Histogram {
-    fn default() -> Self {
-        Self([0; 256])
-    }
+pub struct Histogram {
+    counts: [u64; 256],
+    reading: Reading,
 }
 
 impl Histogram {
+    #[must_use]
+    pub fn new(reading: Reading) -> Self {
+        Self { counts: [0; 256], reading }
+    }
+
+    /// Reads pictures throughout a folder until the person's level is among them.
+    pub fn of(files: &[PathBuf]) -> Result<Self, MaskError> {
+        let reading = pictures::reading_of(files);
+        let mut histogram = Self::new(reading);
+        let step = files.len().div_ceil(SURVEYED).max(1);
+        let spread: Vec<usize> = (0..files.len()).step_by(step).collect();
+        for &index in &spread {
+            histogram.add(&grey(&files[index], reading)?);
+        }
+        for (index, file) in files.iter().enumerate() {
+            if !histogram.undecided() {
+                break;
+            }
+            if index % step != 0 {
+                histogram.add(&grey(file, reading)?);
+            }
+        }
+        Ok(histogram)
+    }
+
     pub fn add(&mut self, picture: &Array2<u8>) {
         for &level in picture {
-            self.0[usize::from(level)] += 1;
+            self.counts[usize::from(level)] += 1;
         }
     }
 
     fn present(&self) -> Vec<u8> {
-        (0..=u8::MAX).filter(|&level| self.0[usize::from(level)] > 0).collect()
+        (0..=u8::MAX).filter(|&level| self.counts[usize::from(level)] > 0).collect()
     }
 
     /// Labels of several things, such as 0, 15 and 255 of PASCAL VOC.
@@ -60,12 +84,6 @@ impl Histogram {
         let near = |level: &u8| !(low + margin(*low, *high)..=high - margin(*low, *high)).contains(level);
         let known = present.iter().all(|level| LABELS.contains(level));
         !known && present.len() < FEW && between.iter().any(near)
-    }
-
-    fn percent_from(&self, level: u8) -> u64 {
-        let all: u64 = self.0.iter().sum();
-        let set: u64 = self.0[usize::from(level)..].iter().sum();
-        100 * set / all.max(1)
     }
 
     /// Whether other pictures of the folder may hold the person's level.
@@ -81,21 +99,17 @@ impl Histogram {
             return None;
         }
         match self.present().as_slice() {
-            [] | [_] | [0, 255] => Some(Levels::default()),
-            &[low, high] => Some(Levels {
-                set_from: high,
-                percent_set: 0,
-                remark: Some(format!("two grey levels, {low} and {high}: {high} is taken as the person")),
-            }),
+            [] | [_] | [0, 255] => Some(self.set_from(128, None)),
+            &[low, high] => {
+                let remark = format!("two grey levels, {low} and {high}: {high} is taken as the person");
+                Some(self.set_from(high, Some(remark)))
+            }
             labels if labels.last() == Some(&255) && labels.iter().all(|level| LABELS.contains(level)) => {
-                Some(Levels {
-                    set_from: 255,
-                    percent_set: 0,
-                    remark: Some(format!(
-                        "grey levels {}: 255 is taken as the person, the levels between as shadow or unknown",
-                        listed(labels)
-                    )),
-                })
+                let remark = format!(
+                    "grey levels {}: 255 is taken as the person, the levels between as shadow or unknown",
+                    listed(labels)
+                );
+                Some(self.set_from(255, Some(remark)))
             }
             &[low, .., high] if high - low >= LEAST_GAP => self.two_clusters(low, high),
             _ => None,
@@ -104,17 +118,23 @@ impl Histogram {
 
     fn two_clusters(&self, low: u8, high: u8) -> Option<Levels> {
         let margin = margin(low, high);
-        let all: u64 = self.0.iter().sum();
-        let between: u64 = (low + margin..=high - margin).map(|level| self.0[usize::from(level)]).sum();
+        let all: u64 = self.counts.iter().sum();
+        let between: u64 = (low + margin..=high - margin).map(|level| self.counts[usize::from(level)]).sum();
         if between * ONE_BETWEEN_IN > all {
             return None;
         }
         let middle = low + (high - low).div_ceil(2);
         if (96..=160).contains(&middle) {
-            return Some(Levels::default());
+            return Some(self.set_from(128, None));
         }
         let remark = format!("grey levels near {low} and near {high}: set from {middle} on");
-        Some(Levels { set_from: middle, remark: Some(remark), percent_set: 0 })
+        Some(self.set_from(middle, Some(remark)))
+    }
+
+    fn set_from(&self, set_from: u8, remark: Option<String>) -> Levels {
+        let all: u64 = self.counts.iter().sum();
+        let set: u64 = self.counts[usize::from(set_from)..].iter().sum();
+        Levels { set_from, remark, percent_set: 100 * set / all.max(1), reading: self.reading }
     }
 }
 
@@ -129,27 +149,14 @@ fn listed(levels: &[u8]) -> String {
 
 impl Default for Levels {
     fn default() -> Self {
-        Self { set_from: 128, remark: None, percent_set: 0 }
+        Self { set_from: 128, remark: None, percent_set: 0, reading: Reading::default() }
     }
 }
 
 impl Levels {
     /// The levels of masks from their histogram; `first` is for messages. Fails for labels of several things, and if nothing
     /// would be set.
-    pub fn of_masks(histogram: &Histogram, first: &std::path::Path) -> Result<Self, MaskError> {
-        let levels = Self::by_histogram(histogram, first)?;
-        Ok(Self { percent_set: histogram.percent_from(levels.set_from), ..levels })
-    }
-
-    /// Refuses full frames whose background is set.
-    pub fn check_people(&self, path: &std::path::Path) -> Result<(), MaskError> {
-        match self.percent_set {
-            percent @ MOST_PEOPLE.. => Err(MaskError::Inverted { path: path.into(), percent }),
-            _ => Ok(()),
-        }
-    }
-
-    fn by_histogram(histogram: &Histogram, first: &std::path::Path) -> Result<Self, MaskError> {
+    pub fn of_masks(histogram: &Histogram, first: &Path) -> Result<Self, MaskError> {
         if let Some(levels) = histogram.levels() {
             return Ok(levels);
         }
@@ -160,27 +167,15 @@ impl Levels {
         if present.last().is_none_or(|&level| level < 128) {
             return Err(MaskError::Levels { path: first.into(), levels: present });
         }
-        let remark = format!("{} grey levels: set from 128 on", present.len());
-        Ok(Self { set_from: 128, remark: Some(remark), percent_set: 0 })
+        Ok(histogram.set_from(128, Some(format!("{} grey levels: set from 128 on", present.len()))))
     }
 
-    /// Reads pictures throughout a folder until the person's level is among them.
-    pub fn survey(files: &[PathBuf]) -> Result<Histogram, MaskError> {
-        let mut histogram = Histogram::default();
-        let step = files.len().div_ceil(SURVEYED).max(1);
-        let spread: Vec<usize> = (0..files.len()).step_by(step).collect();
-        for &index in &spread {
-            histogram.add(&grey(&files[index])?);
+    /// Refuses full frames whose background is set.
+    pub fn check_people(&self, path: &Path) -> Result<(), MaskError> {
+        match self.percent_set {
+            percent @ MOST_PEOPLE.. => Err(MaskError::Inverted { path: path.into(), percent }),
+            _ => Ok(()),
         }
-        for (index, file) in files.iter().enumerate() {
-            if !histogram.undecided() {
-                break;
-            }
-            if index % step != 0 {
-                histogram.add(&grey(file)?);
-            }
-        }
-        Ok(histogram)
     }
 }
 
@@ -189,11 +184,15 @@ mod tests {
     use super::*;
 
     fn levels(counts: &[(u8, u64)]) -> Option<Levels> {
-        let mut histogram = Histogram::default();
+        let mut histogram = Histogram::new(Reading::default());
         for &(level, count) in counts {
-            histogram.0[usize::from(level)] = count;
+            histogram.counts[usize::from(level)] = count;
         }
         histogram.levels()
+    }
+
+    fn plain(counts: &[(u8, u64)]) -> Option<(u8, Option<String>)> {
+        levels(counts).map(|levels| (levels.set_from, levels.remark))
     }
 
     #[test]
@@ -203,8 +202,8 @@ mod tests {
             assert_eq!(found.set_from, high);
             assert!(found.remark.is_some_and(|text| text.contains(&format!("{low} and {high}"))));
         }
-        assert_eq!(levels(&[(0, 900), (255, 100)]), Some(Levels::default()));
-        assert_eq!(levels(&[(0, 900)]), Some(Levels::default()));
+        assert_eq!(plain(&[(0, 900), (255, 100)]), Some((128, None)));
+        assert_eq!(plain(&[(0, 900)]), Some((128, None)));
     }
 
     #[test]
@@ -217,11 +216,11 @@ mod tests {
     }
 
     fn of_masks(counts: &[(u8, u64)]) -> Result<Levels, MaskError> {
-        let mut histogram = Histogram::default();
+        let mut histogram = Histogram::new(Reading::default());
         for &(level, count) in counts {
-            histogram.0[usize::from(level)] = count;
+            histogram.counts[usize::from(level)] = count;
         }
-        Levels::of_masks(&histogram, std::path::Path::new("m.png"))
+        Levels::of_masks(&histogram, Path::new("m.png"))
     }
 
     #[test]
@@ -229,7 +228,7 @@ mod tests {
         for labels in [&[(0, 900), (15, 200), (255, 60)][..], &[(0, 900), (1, 90), (2, 90), (255, 9)]] {
             assert!(matches!(of_masks(labels), Err(MaskError::Labels { .. })), "{labels:?}");
         }
-        let people = |counts: &[(u8, u64)]| of_masks(counts)?.check_people(std::path::Path::new("masks"));
+        let people = |counts: &[(u8, u64)]| of_masks(counts)?.check_people(Path::new("masks"));
         assert!(matches!(people(&[(0, 90), (255, 910)]), Err(MaskError::Inverted { percent: 91, .. })));
         assert!(people(&[(0, 400), (255, 600)]).is_ok());
         assert!(of_masks(&[(0, 900), (3, 9), (5, 9), (250, 9), (253, 9), (255, 90)]).is_ok());
@@ -238,7 +237,7 @@ mod tests {
     #[test]
     fn jpeg_ringing_is_tolerated_and_pictures_are_rejected_as_masks() {
         let ringing = [(0, 900), (1, 9), (3, 20), (250, 20), (254, 9), (255, 60)];
-        assert_eq!(levels(&ringing), Some(Levels::default()));
+        assert_eq!(plain(&ringing), Some((128, None)));
         let dim = [(0, 900), (1, 9), (2, 20), (98, 20), (99, 9), (100, 60)];
         assert_eq!(levels(&dim).map(|levels| levels.set_from), Some(50));
         let picture: Vec<(u8, u64)> = (20..200).map(|level| (level, 5)).collect();

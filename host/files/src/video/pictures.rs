@@ -7,14 +7,14 @@ use std::{
 
 use super::{Pixels, VideoError, VideoFrame};
 use crate::{
-    image_file::{self, ImageError},
+    image_file::{self, ImageError, Reading},
     order,
 };
 
 /// Lower-case endings of pictures; other files are ignored.
 pub const EXTENSIONS: [&str; 8] = ["png", "tif", "tiff", "jpg", "jpeg", "bmp", "pgm", "ppm"];
 
-/// Frames surveyed for the bits that a camera uses of 16.
+/// Pictures surveyed for their reading.
 const SURVEYED: usize = 8;
 
 pub fn list(folder: &Path) -> Result<Vec<PathBuf>, VideoError> {
@@ -43,37 +43,31 @@ pub(super) fn open(
     folder: &Path,
 ) -> Result<impl Iterator<Item = Result<VideoFrame, VideoError>> + 'static, VideoError> {
     let paths = list(folder)?;
-    let bits = used_bits(&paths);
-    let frame = move |path: PathBuf| {
-        let pixels = image_file::read_8_bit(&path, bits).map_err(unreadable(&path))?;
-        Ok(VideoFrame { name: stem(&path), pixels })
-    };
-    Ok(paths.into_iter().map(frame))
+    let reading = reading_of(&paths);
+    Ok(paths.into_iter().map(move |path| Ok(VideoFrame { name: stem(&path), pixels: read(&path, reading)? })))
 }
 
-/// Significant bits of 16-bit frames, by some throughout the folder. Frames that cannot be read fail later.
-fn used_bits(paths: &[PathBuf]) -> u32 {
-    let mut most = 0;
-    for path in paths.iter().step_by(paths.len().div_ceil(SURVEYED)) {
-        most = most.max(image_file::used_bits(path).unwrap_or_default());
-        if most == 8 {
+/// How pictures of a folder are read, by some throughout it. Those that cannot be read fail later.
+pub fn reading_of(paths: &[PathBuf]) -> Reading {
+    let mut all = Reading { bits: 0, opacity: false };
+    for path in paths.iter().step_by(paths.len().div_ceil(SURVEYED).max(1)) {
+        let Ok((of_one, may_differ)) = image_file::reading_of(path) else { continue };
+        all.bits = all.bits.max(of_one.bits);
+        all.opacity |= of_one.opacity;
+        if !may_differ {
             break;
         }
     }
-    most
+    all
 }
 
-/// Labels of a picture, such as a mask: grey or RGB.
-pub fn read(path: &Path) -> Result<Pixels, VideoError> {
-    image_file::read_labels(path).map_err(unreadable(path))
-}
-
-fn unreadable(path: &Path) -> impl Fn(ImageError) -> VideoError {
-    move |error| match error {
+/// Samples of a picture: grey or RGB.
+pub fn read(path: &Path, reading: Reading) -> Result<Pixels, VideoError> {
+    image_file::read_8_bit(path, reading).map_err(|error| match error {
         ImageError::Read { path, source } => VideoError::io(&path, source),
         ImageError::Format { path, reason } => VideoError::Picture { path, reason },
         other => VideoError::Picture { path: path.into(), reason: other.to_string() },
-    }
+    })
 }
 
 pub fn stem(path: &Path) -> String {

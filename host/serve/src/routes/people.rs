@@ -17,7 +17,7 @@ use farnear_workflows::{
     rig::{RigAddress, live::LiveSettings},
     sessions,
     shadow::video::{self, VideoShadowSettings},
-    sun::SunPositionRequest,
+    sun::{PlaceAndTime, SunPositionRequest},
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -72,7 +72,7 @@ pub struct ShadowRequest {
     /// A video that was sent.
     pub video: String,
     /// Place and time of a recording.
-    pub sun: SunPositionRequest,
+    pub sun: PlaceAndTime,
     /// How the camera stood.
     pub camera: Standing,
 }
@@ -227,7 +227,7 @@ async fn shadow(
 ) -> Result<Json<Removing>, Failure> {
     require_client(&app, &headers)?;
     let video = video_of(&app, &request.video)?;
-    request.sun.check()?;
+    request.sun.moment()?;
     let out = sessions::free_names(&folder(&app), "shadow", 1)?.remove(0);
     let name = out.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let Standing { height_m, azimuth_deg, pitch_deg, focal_length_mm, pixel_um } = request.camera;

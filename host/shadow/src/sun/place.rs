@@ -6,8 +6,6 @@ pub enum SunError {
     Latitude(f64),
     #[error("longitude {0} deg is outside -180 to 360 deg (east is positive)")]
     Longitude(f64),
-    #[error("unknown sun model `{0}`: expected psa, almanac, thesis or spa")]
-    UnknownModel(String),
     #[error("`{text}` is not an RFC 3339 time such as 2014-06-23T11:30:00Z: {reason}")]
     Time { text: String, reason: String },
     #[error("SPA: {0}")]

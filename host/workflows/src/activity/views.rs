@@ -59,8 +59,9 @@ impl ViewKind {
             return Ok(Self::Video);
         }
         // A video is recognised by its first picture, without surveying the rest.
-        let mut first = Histogram::default();
-        match masks::grey(&files[0]) {
+        let reading = pictures::reading_of(&files);
+        let mut first = Histogram::new(reading);
+        match masks::grey(&files[0], reading) {
             Ok(picture) => first.add(&picture),
             Err(MaskError::Coloured { .. }) => return Ok(Self::Video),
             Err(error) => return Err(error.into()),
@@ -69,7 +70,7 @@ impl ViewKind {
         if !are_masks(&first) {
             return Ok(Self::Video);
         }
-        match Levels::survey(&files) {
+        match Histogram::of(&files) {
             Ok(all) => Ok(if are_masks(&all) { Self::Masks } else { Self::Video }),
             Err(MaskError::Coloured { .. }) => Ok(Self::Video),
             Err(error) => Err(error.into()),
@@ -89,7 +90,7 @@ impl View {
             return Ok(false);
         }
         let first = masks::listed(&self.path)?.into_iter().next();
-        let first = first.map(|file| masks::grey(&file)).transpose()?;
+        let first = first.map(|file| masks::grey(&file, masks::Reading::default())).transpose()?;
         Ok(first.is_some_and(|picture| picture.dim() == (SIDE_PX, SIDE_PX)))
     }
 }

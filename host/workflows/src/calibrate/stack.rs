@@ -64,7 +64,7 @@ pub struct CalibrateStackRequest {
     /// default that of the TIFF's metadata or of the rig's record.
     #[cfg_attr(feature = "clap", arg(long, value_name = "MM"))]
     pub step_mm: Option<f64>,
-    /// Side of a pixel at the target, in um, or in thousandths of the unit of the steps [default: by the TIFF's metadata]. Without
+    /// Side of a pixel at the target, in um, or in thousandths of the unit of the steps [default: that of the TIFF's metadata, if the step is theirs, too]. Without
     /// it slopes and meshes are per pixel.
     #[cfg_attr(feature = "clap", arg(long, value_name = "UM"))]
     pub object_pixel_um: Option<f64>,
@@ -251,7 +251,7 @@ impl Listed {
                 Self { images, step_mm, lens: Some(lens), object_pixel_um: None, remarks: Vec::new() }
             }
             None => {
-                let stack::Stack { images, positions_um, object_pixel_um, mut remarks } =
+                let stack::Stack { images, positions_um, mut object_pixel_um, mut remarks } =
                     stack::list(&request.stack)?;
                 if let (None, Some([before, after])) = (&positions_um, order::gap(&images)) {
                     let expected = format!(
@@ -265,6 +265,10 @@ impl Listed {
                 let step_mm = match (request.step_mm, positions_um) {
                     (Some(step_mm), stated) => {
                         let stated = stated.map(|positions| even_step(&positions, request));
+                        // The metadata's pixel is in um, --step-mm may be in any unit.
+                        if !stated.as_ref().is_some_and(|stated| agrees(step_mm, stated)) {
+                            object_pixel_um = None;
+                        }
                         remarks.extend(contradiction(step_mm, stated));
                         step_mm
                     }
@@ -284,10 +288,13 @@ impl Listed {
     }
 }
 
+fn agrees(step_mm: f64, stated_um: &Result<f64>) -> bool {
+    stated_um.as_ref().is_ok_and(|step_um| (step_um * 1e-3 - step_mm).abs() <= SAME_STEP * step_mm)
+}
+
 /// What the files' metadata state otherwise than `--step-mm`.
 fn contradiction(step_mm: f64, stated: Option<Result<f64>>) -> Option<String> {
-    let stated = match stated? {
-        Ok(step_um) if (step_um * 1e-3 - step_mm).abs() <= SAME_STEP * step_mm => return None,
+    let stated = match stated.filter(|stated| !agrees(step_mm, stated))? {
         Ok(step_um) => format!("a step of {} mm", rounded(step_um * 1e-3, 9)),
         Err(error) => format!("uneven positions ({error})"),
     };

@@ -12,6 +12,7 @@ use crate::{
     context::Context,
     error::{Result, WorkflowError},
     request::{PathKind, Request},
+    sun::PlaceAndTime,
 };
 
 /// Ask the board where the sun is and how a person's shadow lies, and compare its answer with this computer's.
@@ -28,15 +29,9 @@ pub struct SunRequest {
     #[serde(skip)]
     #[cfg_attr(feature = "clap", arg(skip))]
     pub rig: RigAddress,
-    /// Latitude in degrees, north positive.
-    #[cfg_attr(feature = "clap", arg(long, value_name = "DEG", allow_negative_numbers = true))]
-    pub lat: f64,
-    /// Longitude in degrees, east positive.
-    #[cfg_attr(feature = "clap", arg(long, value_name = "DEG", allow_negative_numbers = true))]
-    pub lon: f64,
-    /// The time, RFC 3339.
-    #[cfg_attr(feature = "clap", arg(long, value_name = "RFC3339"))]
-    pub time: String,
+    #[cfg_attr(feature = "clap", command(flatten))]
+    #[serde(flatten)]
+    pub at: PlaceAndTime,
     /// Camera azimuth, ANTICLOCKWISE from north: with it the board computes a shadow.
     #[cfg_attr(feature = "clap", arg(long, value_name = "DEG", allow_negative_numbers = true))]
     pub azimuth: Option<f64>,
@@ -61,9 +56,7 @@ impl Default for SunRequest {
     fn default() -> Self {
         Self {
             rig: RigAddress::default(),
-            lat: 0.0,
-            lon: 0.0,
-            time: String::new(),
+            at: PlaceAndTime::default(),
             azimuth: None,
             camera_height: 1.5,
             distance: 8.0,
@@ -165,9 +158,9 @@ fn shadow_name(shadow: ShadowAnswer) -> &'static str {
 }
 
 fn query(settings: &SunRequest) -> Result<SunQuery> {
-    let time = DateTime::parse_from_rfc3339(&settings.time).map_err(|_| {
+    let time = DateTime::parse_from_rfc3339(&settings.at.time).map_err(|_| {
         let expected = "expected an RFC 3339 time such as 2012-07-17T12:00:00Z";
-        WorkflowError::parameter("time", format!("`{}`", settings.time), expected)
+        WorkflowError::parameter("time", format!("`{}`", settings.at.time), expected)
     })?;
     let shadow = settings.azimuth.map(|azimuth_deg| -> Result<ShadowQuery> {
         Ok(ShadowQuery {
@@ -181,8 +174,8 @@ fn query(settings: &SunRequest) -> Result<SunQuery> {
     });
     Ok(SunQuery {
         unix_seconds: time.timestamp(),
-        latitude_e7: degrees_e7("lat", settings.lat, 90.0)?,
-        longitude_e7: degrees_e7("lon", settings.lon, 180.0)?,
+        latitude_e7: degrees_e7("lat", settings.at.lat, 90.0)?,
+        longitude_e7: degrees_e7("lon", settings.at.lon, 180.0)?,
         shadow: shadow.transpose()?,
     })
 }
@@ -241,7 +234,8 @@ mod tests {
     use super::*;
 
     fn settings(lat: f64) -> SunRequest {
-        SunRequest { lat, lon: -1.56, time: "2012-07-17T12:00:00Z".into(), ..SunRequest::default() }
+        let at = PlaceAndTime { lat, lon: -1.56, time: "2012-07-17T12:00:00Z".into() };
+        SunRequest { at, ..SunRequest::default() }
     }
 
     #[test]
@@ -254,7 +248,13 @@ mod tests {
         for (settings, name) in [
             (settings(91.0), "lat 91"),
             (settings(f64::NAN), "lat NaN"),
-            (SunRequest { time: "noon".into(), ..settings(0.0) }, "time `noon`"),
+            (
+                SunRequest {
+                    at: PlaceAndTime { time: "noon".into(), ..PlaceAndTime::default() },
+                    ..settings(0.0)
+                },
+                "time `noon`",
+            ),
             (SunRequest { height: -1.0, ..person.clone() }, "height -1"),
             (SunRequest { lateral: 1e9, ..person }, "lateral 1000000000"),
         ] {

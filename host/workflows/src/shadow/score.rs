@@ -160,7 +160,7 @@ fn trailing_number(name: &str) -> Option<u64> {
 }
 
 fn truth(path: &Path) -> Result<Array2<Truth>> {
-    let levels = masks::grey(path)?;
+    let levels = masks::grey(path, pictures::reading_of(&[path.into()]))?;
     let nameless = levels.indexed_iter().find(|&(_, &level)| Truth::from_grey(level).is_none());
     if let Some(((row, column), &level)) = nameless {
         return Err(ScoreError::Level { path: path.into(), level, column, row }.into());

@@ -88,7 +88,7 @@ pub(super) fn judge(
     let split = by == Split::Parts && samples.pairs >= PAIRS_TO_SPLIT;
     let part = |s: &Sample| match by {
         Split::Blocks => [s.even, false],
-        Split::Parts => [s.part[0], split && s.part[1]],
+        Split::Parts => [s.left, split && s.far.is_multiple_of(2)],
     };
     let parts: Vec<[bool; 2]> = samples.of.iter().map(part).collect();
     let mut judged = Vec::with_capacity(samples.of.len());

@@ -79,8 +79,8 @@ pub(super) struct Sample {
     pub coarseness: f64,
     /// Colour of its block on a checkerboard.
     pub even: bool,
-    /// Half of the field, and every other pair.
-    pub part: [bool; 2],
+    /// Half of the field.
+    pub left: bool,
     /// Original target, not smoothed.
     pub original: bool,
     /// Far slice of its pair.
@@ -98,7 +98,7 @@ impl Sample {
             misfit: 1.0,
             coarseness: 0.0,
             even: false,
-            part: [false; 2],
+            left: false,
             original: true,
             far: 0,
         }
@@ -335,7 +335,7 @@ impl Target<'_> {
                     misfit: estimate.misfit[(y, x)],
                     coarseness: f64::from(pair.coarseness[(y, x)]),
                     even: (y / BLOCK_PX + x / BLOCK_PX).is_multiple_of(2),
-                    part: [2 * x < width, pair.far.is_multiple_of(2)],
+                    left: 2 * x < width,
                     original: pair.original,
                     far: pair.far,
                 });
