@@ -94,8 +94,8 @@ fn plain(rows: &[StringRecord]) -> Result<Found, RecordingError> {
     })
 }
 
-/// A table with names in a row above `Frame, ..., X, Y, Z, X, Y, Z`: of Vicon Nexus (units below, z up), or of OptiTrack Motive
-/// (metadata in the first row, y up). `None` for other tables.
+/// A table with names in a row above `Frame, ..., X, Y, Z, X, Y, Z`: of Vicon Nexus (units below, z up) and its predecessors
+/// (`Field #`, no units), or of OptiTrack Motive (metadata in the first row, y up). `None` for other tables.
 fn layered(rows: &[StringRecord]) -> Result<Option<Found>, RecordingError> {
     let first =
         |row: &StringRecord, word: &str| row.get(0).is_some_and(|cell| cell.eq_ignore_ascii_case(word));
@@ -105,7 +105,8 @@ fn layered(rows: &[StringRecord]) -> Result<Option<Found>, RecordingError> {
         ["X", "Y", "Z"].iter().zip(column..).all(|(axis, at)| row.get(at).is_some_and(|cell| cell == *axis))
     };
     let header = (from..rows.len()).find(|at| {
-        first(&rows[*at], "Frame") && (1..rows[*at].len()).any(|column| is_axes(&rows[*at], column))
+        let row = &rows[*at];
+        (first(row, "Frame") || first(row, "Field #")) && (1..row.len()).any(|column| is_axes(row, column))
     });
     let Some(header) = header.filter(|header| *header > 0) else { return Ok(None) };
     let motive = rows[..header].iter().position(|row| row.get(1) == Some("Name"));
@@ -125,10 +126,11 @@ fn layered(rows: &[StringRecord]) -> Result<Option<Found>, RecordingError> {
         let cell = rows[0].iter().position(|cell| cell == key)?;
         rows[0].get(cell + 1)
     };
-    let data = header + 1 + usize::from(motive.is_none());
+    let units = rows.get(header + 1).filter(|row| row.get(0).is_none_or(|cell| number(cell).is_none()));
+    let data = header + 1 + usize::from(units.is_some());
     let unit = match motive {
         Some(_) => stated("Length Units"),
-        None => places.first().and_then(|place| rows.get(header + 1)?.get(place[0])),
+        None => places.first().and_then(|place| units?.get(place[0])),
     };
     let rate = match motive {
         Some(_) => stated("Export Frame Rate").or_else(|| stated("Capture Frame Rate")),
@@ -215,6 +217,11 @@ mod tests {
 
         let with_tabs = read(nexus.replace(',', "\t").as_bytes()).expect("valid");
         assert_eq!(with_tabs.frames, found.frames);
+
+        let earlier = "Title\nNotes:,\"\"\n\nTRAJECTORIES\n120,Hz\n,LASI,,,RASI,,\nField #,X,Y,Z,X,Y,Z\n1,1,2,3,,,\n2,4,5,6,7,8,9\n";
+        let earlier = read(earlier.as_bytes()).expect("valid");
+        assert_eq!((earlier.rate_hz, earlier.names), (120.0, vec!["LASI".into(), "RASI".into()]));
+        assert_eq!(earlier.frames, found.frames);
 
         let motive = "Format Version,1.23,Take Name,Walk,Capture Frame Rate,120.0,Export Frame Rate,60.0,Length Units,Meters\n\n\
             ,Type,Bone,Bone,Bone,Bone,Bone,Bone,Bone,Marker,Marker,Marker\n,Name,Ann:Hip,Ann:Hip,Ann:Hip,Ann:Hip,Ann:Hip,Ann:Hip,Ann:Hip,C7,C7,C7\n\
