@@ -9,7 +9,9 @@
 //! the piezo may be anywhere. Retained memory has the code, 0 after power-on; without it nothing is output until the
 //! gauge has given the position. Then the piezo is lowered smoothly, because a stack released suddenly swings into
 //! tension. If the gauge fails or the piezo does not follow, the command is held and the loop opens until the next
-//! move, before a loop that excites an unknown flexure mode can damage the stack.
+//! move, before a loop that excites an unknown flexure mode can damage the stack. A DAC without a wire keeps its output
+//! while the loop pushes the code to its end. A piezo that is still away from its target after the settling deadline is
+//! therefore let go, and the code ramps to the gauge's position: a wire that returns then changes little.
 //!
 //! A piezo at its target for a second is idle: only creep moves it, so rare ticks suffice. The resonance model assumes
 //! control ticks, so after a rest the gauge corrects only disturbance and drift, slowly. Fixed point: nm in 2^-10,
@@ -47,8 +49,11 @@ const INNOVATION_LIMIT: i32 = 15_000 << BITS;
 const INNOVATION_SHIFT: u32 = 4;
 /// Limit per tick, because a single reading may be wrong.
 const INNOVATION_CLIP: i32 = 2 * INNOVATION_LIMIT;
-/// Ticks of the lowering at the start, and the codes (3 um) below which none is needed.
-const RELAX: u32 = TICK_HZ / 10;
+/// Least disturbance of a piezo that is let go. Hysteresis of 15 % and an amplifier 20 % off make 70 um at the far end, but
+/// there the loop reaches its target.
+const LET_GO: i32 = 40_000 << BITS;
+/// Ticks of a ramp after a start or a failure, and the codes (3 um) below which none is needed.
+const RAMP: u32 = TICK_HZ / 10;
 /// Ticks of the lowering while the supply sinks: 4.4 of the 4.8 ms that are left (docs/rig.md).
 const RELAX_FAST: u32 = 22;
 const RELAXED: u16 = 1_000;
@@ -89,8 +94,8 @@ impl Loop {
 enum Start {
     /// The gauge has not given the position.
     Unknown,
-    /// Lowered from a code within `over` ticks.
-    Down { from: u16, ticks: u32, over: u32 },
+    /// The code changes smoothly within `over` ticks.
+    Ramp { from: u16, to: u16, ticks: u32, over: u32 },
     /// Relaxed or controlled.
     Over,
 }
@@ -116,6 +121,8 @@ pub(crate) struct Piezo {
     driven: bool,
     near_ticks: u16,
     still_ticks: u16,
+    /// Ticks away from a target that the set-point has reached.
+    away_ticks: u32,
     /// Middle of the swing, nm in 2^-10.
     middle: i32,
     /// Control ticks since the last executed one; more than one after a rest.
@@ -142,6 +149,7 @@ impl Piezo {
             driven: false,
             near_ticks: 0,
             still_ticks: 0,
+            away_ticks: 0,
             middle: 0,
             passed: 1,
         }
@@ -304,6 +312,15 @@ impl Piezo {
                 let still = control.reference_before.saturating_sub(self.lag.offset());
                 (self.code, self.command) = self.scale.playable(still);
                 (self.control, self.near_ticks, self.failed) = (None, 0, true);
+                return;
+            }
+            let away = !near && control.shaper.arrived(&self.settings.gains.shaper);
+            self.away_ticks = if away { self.away_ticks.saturating_add(1) } else { 0 };
+            let late = self.away_ticks > self.settings.settle_deadline.0 / TICK_US;
+            if late && control.state[2].saturating_abs() > LET_GO {
+                let (to, _) = self.scale.playable(here);
+                self.start = Start::Ramp { from: self.code, to, ticks: 0, over: RAMP };
+                (self.control, self.failed) = (None, true);
             }
         }
     }
@@ -315,7 +332,7 @@ impl Piezo {
             None => self.scale.playable(fixed(self.measured)),
         };
         (self.start, self.code, self.command) = if from > RELAXED {
-            (Start::Down { from, ticks: 0, over: RELAX }, from, command)
+            (Start::Ramp { from, to: 0, ticks: 0, over: RAMP }, from, command)
         } else {
             (Start::Over, 0, 0)
         };
@@ -327,17 +344,18 @@ impl Piezo {
             return;
         }
         (self.control, self.closing, self.driven) = (None, false, false);
-        self.start = Start::Down { from: self.code, ticks: 0, over: RELAX_FAST };
+        self.start = Start::Ramp { from: self.code, to: 0, ticks: 0, over: RELAX_FAST };
         self.target = Nanometres(0);
     }
 
-    fn relax(&mut self) {
-        let Start::Down { from, ticks, over } = &mut self.start else { return };
+    fn ramp(&mut self) {
+        let Start::Ramp { from, to, ticks, over } = &mut self.start else { return };
         *ticks += 1;
-        let (at, over) = (u64::from(*ticks), u64::from(*over));
-        // 3 t^2 - 2 t^3 of the remaining time; 43 bits.
+        let (at, over) = (i64::from(*ticks), i64::from(*over));
+        // 3 t^2 - 2 t^3 of the remaining time; 44 bits.
         let left = over - at;
-        self.code = (u64::from(*from) * left * left * (3 * over - 2 * left) / (over * over * over)) as u16; // at most `from`
+        let way = i64::from(*from) - i64::from(*to);
+        self.code = (i64::from(*to) + way * left * left * (3 * over - 2 * left) / (over * over * over)) as u16; // between the two
         if at >= over {
             self.start = Start::Over;
         }
@@ -375,7 +393,7 @@ impl Piezo {
             );
             control.state = [position, velocity, disturbance.saturating_add(drift), drift];
         } else {
-            self.relax();
+            self.ramp();
             self.lag.push(self.command);
         }
         self.played()

@@ -290,6 +290,30 @@ fn a_loop_that_feeds_a_mode_is_opened_before_the_stack_is_pulled_apart() {
     }
 }
 
+/// The DAC keeps its output while its wire is broken, and takes over the board's code when the wire returns.
+#[test]
+fn a_dac_whose_wire_returns_does_not_jump() {
+    for (from, to) in [(20_000, 176_000), (176_000, 20_000), (100_000, 30_000), (100_000, 110_000)] {
+        let mut piezo = Piezo::new(Settings::DEFAULT.fine);
+        let mut plant = Plant::new(Part { hysteresis: 0.12, creep: 0.015, ..NOMINAL }, 7);
+        step(&mut piezo, &mut plant, from);
+        let kept = piezo.code();
+        piezo.go(Nanometres(to));
+        let mut failed = false;
+        for _ in 0..5_000 {
+            piezo.sense(plant.gauge());
+            piezo.act();
+            plant.tick(None);
+            failed |= piezo.take_failure();
+        }
+        let jump_um = f64::from(piezo.code().abs_diff(kept)) * 200.0 / 65_536.0;
+        std::println!("from {from} to {to} nm: failed {failed}, {jump_um:.1} um when the wire returns");
+        // The bound of a command in a tick; the loop notices 156 um, and what it does not notice is less than the bound.
+        assert!(jump_um < 60.0, "from {from} to {to} nm: {jump_um} um");
+        assert!(step(&mut piezo, &mut plant, from).0 <= 200, "it moves again");
+    }
+}
+
 /// Largest mean innovation of some moves, um.
 fn surprise_um(settings: FineSettings, part: Part) -> f64 {
     let (mut piezo, mut plant, mut worst) = (Piezo::new(settings), Plant::new(part, 7), 0);

@@ -38,7 +38,7 @@ pub fn hard_stop(case: &Case<'_>) -> Vec<Broken> {
 }
 
 pub fn piezo_step(case: &Case<'_>) -> Vec<Broken> {
-    // A DAC whose wire returns takes over the held code at once (docs/silicon.md).
+    // A DAC whose wire returns while a move is under way takes over its code at once (docs/silicon.md).
     if case.has(&["dac-dead"]) {
         return Vec::new();
     }
