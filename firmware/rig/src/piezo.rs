@@ -355,7 +355,8 @@ impl Piezo {
         // 3 t^2 - 2 t^3 of the remaining time; 44 bits.
         let left = over - at;
         let way = i64::from(*from) - i64::from(*to);
-        self.code = (i64::from(*to) + way * left * left * (3 * over - 2 * left) / (over * over * over)) as u16; // between the two
+        self.code =
+            (i64::from(*to) + way * left * left * (3 * over - 2 * left) / (over * over * over)) as u16; // between the two
         if at >= over {
             self.start = Start::Over;
         }

@@ -135,6 +135,8 @@ pub enum Finding {
         /// Its measured size relative to the far image.
         magnification: f64,
     },
+    /// Both images differ by noise alone.
+    EquallySharp,
     /// The model leaves too much.
     Unexplained {
         /// Texture beyond the noise, mean squares.
@@ -188,8 +190,12 @@ impl fmt::Display for Finding {
             Self::Unexplained { left_over, psf, max_blur_px } => write!(
                 f,
                 "the model leaves {:.1} % of the detail unexplained (usual is below 2): is the PSF {psf} with a blur of up to \
-                 {max_blur_px:.3} px right? farnear calibrate psf finds it",
+                 {max_blur_px:.3} px right? farnear calibrate psf finds it. A raw colour mosaic or another black level in one image does the same",
                 100.0 * left_over.sqrt()
+            ),
+            Self::EquallySharp => f.write_str(
+                "the images differ by noise alone: did the focus move between them? Only a plane in the middle of the working range \
+                 looks the same in both",
             ),
             Self::Bands { amplitude } => write!(
                 f,
@@ -461,6 +467,9 @@ fn findings(map: &DepthMap, prepared: &Prepared, estimate: &Estimate, optics: &O
     let of_noise = prepared.noise.coding / prepared.noise.mean_variance;
     if of_noise > COMPRESSED {
         findings.push(Finding::Compressed { of_noise });
+    }
+    if report.equally_sharp {
+        findings.push(Finding::EquallySharp);
     }
     if report.detailed_fraction < 0.01 {
         findings.push(Finding::NothingSharp);

@@ -199,6 +199,9 @@ pub struct Report {
     pub correlation: Option<f64>,
     /// Part of the image in which both have detail above the noise.
     pub detailed_fraction: f64,
+    /// Both images differ by noise alone: a plane in the middle of the range, or the focus did not move.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub equally_sharp: bool,
     /// Part of the pixels that show something else in each image.
     pub moved_fraction: f64,
     /// Part of the pixels that show the same in both images with more blur than a pair has.
@@ -364,6 +367,7 @@ fn finish(
     }
     let agreement = agreement::compare(&thinned, size, &noise);
     drop(thinned);
+    report.equally_sharp = agreement.equally_sharp;
     (report.correlation, report.detailed_fraction) = (agreement.correlation, agreement.detailed);
     let mut far = far;
     if !settings.trust {

@@ -183,9 +183,9 @@ async fn receive_part(body: Body, part: &Path, bytes_max: u64, pause_max: Durati
         };
         bytes += piece.len() as u64;
         if bytes > bytes_max {
-            let error = format!("the upload is larger than {} MB, the space left", bytes_max >> 20);
+            let error = format!("the upload is larger than {:.1} MB, the space left", bytes_max as f64 / 1e6);
             return Err(Failure::new(StatusCode::PAYLOAD_TOO_LARGE, error)
-                .with_hint("Delete videos in the session's folder people, or raise --upload-quota."));
+                .with_hint("Delete videos in the session's folder people, or raise --upload-quota-mb."));
         }
         file.write_all(&piece).map_err(|error| disk(part, &error))?;
     }

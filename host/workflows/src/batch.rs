@@ -323,7 +323,12 @@ impl Work<'_> {
         let wanted = Provenance::new(kind.name, fields, input);
         let place = Place::new(out, makes_file(kind));
         match place.look(&wanted, self.begun, self.settings.verify)? {
-            Found::Done(figures) => Ok((State::Already, figures)),
+            Found::Done(figures) => {
+                if !self.settings.dry_run {
+                    place.claim();
+                }
+                Ok((State::Already, figures))
+            }
             Found::ToDo if self.settings.dry_run => Ok((State::Todo, None)),
             Found::ToDo => {
                 let figures = place.fill(wanted, |out| work.run(out, context))?;

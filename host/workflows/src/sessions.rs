@@ -71,11 +71,18 @@ pub struct Capture {
     pub broken: Option<String>,
 }
 
-pub fn folder_of(session: &Path, name: &str) -> Result<PathBuf> {
+/// Whether a name leads to a visible entry of a folder.
+fn is_plain(name: &str) -> bool {
     let mut parts = Path::new(name).components();
-    let plain = matches!((parts.next(), parts.next()), (Some(Component::Normal(_)), None));
-    let letters = !name.chars().any(|c| c.is_control() || "/\\:*?\"<>|".contains(c));
-    if !plain || !letters || name.starts_with('.') || name.trim() != name || name.len() > 100 {
+    let one = matches!((parts.next(), parts.next()), (Some(Component::Normal(_)), None));
+    one && !name.starts_with('.') && !name.chars().any(char::is_control)
+}
+
+/// Entry of a session by a name that all systems allow.
+pub fn folder_of(session: &Path, name: &str) -> Result<PathBuf> {
+    let everywhere =
+        !name.chars().any(|c| "/\\:*?\"<>|".contains(c)) && name.trim() == name && name.len() <= 100;
+    if !is_plain(name) || !everywhere {
         let expected = "expected a name of at most 100 bytes that does not begin with a dot or a blank, without control characters \
                         and / \\ : * ? \" < > |";
         return Err(WorkflowError::parameter("capture", name, expected));
@@ -99,7 +106,8 @@ pub fn new_capture(session: &Path, name: &str) -> Result<PathBuf> {
 
 /// Folder of an existing capture. Rejects links, FIFOs and devices, which may leave the session or never end.
 pub fn existing(session: &Path, name: &str) -> Result<PathBuf> {
-    let folder = folder_of(session, name)?;
+    // The system's own programs may have given it another name than the page would.
+    let folder = if is_plain(name) { session.join(name) } else { folder_of(session, name)? };
     check_regular(&folder)?;
     Ok(folder)
 }
@@ -359,6 +367,13 @@ mod tests {
         for name in ["..", "../x", "a/b", "/etc", "", ".hidden", "a\\b", "x\0"] {
             assert!(folder_of(Path::new("s"), name).is_err(), "{name:?}");
         }
+        let session = session();
+        for name in ["..", "../x", "pair-001/..", "", ".partial"] {
+            assert!(existing(session.path(), name).is_err(), "{name:?}");
+        }
+        fs::rename(session.path().join("pair-001"), session.path().join("what? 1")).unwrap();
+        assert!(folder_of(session.path(), "what? 1").is_err());
+        assert!(existing(session.path(), "what? 1").is_ok(), "it is listed, so it is found");
         assert_eq!(folder_of(Path::new("s"), "pair-001_b.2").unwrap(), Path::new("s/pair-001_b.2"));
     }
 }

@@ -25,6 +25,11 @@ const DETAIL: f32 = 0.6;
 /// Correlation relative to the largest that noise permits, below which a window differs.
 const DIFFERENT: f32 = 0.5;
 
+/// Variance of the difference of both images, relative to noise, up to which noise explains it.
+const DIFFERENCE: f64 = 1.2;
+/// Variance of detail relative to noise, from which another focus would show.
+const CLEAR: f64 = 25.0;
+
 /// Halvings from the small images to coarse detail.
 const COARSER: usize = 2;
 /// Correlation of coarse detail from which a difference may be blur.
@@ -43,6 +48,8 @@ pub struct Agreement {
     pub correlation: Option<f64>,
     /// Part of the windows that have detail in both images.
     pub detailed: f64,
+    /// Both images differ by noise alone, although their detail is far above it.
+    pub equally_sharp: bool,
     /// Pixels with motion or different objects, (height, width) of the images; `None` without any.
     pub moved: Option<Array2<bool>>,
     /// Pixels with blur beyond the common band.
@@ -97,9 +104,21 @@ pub(super) fn compare(pair: &Thinned, size: (usize, usize), noise: &PairNoise) -
     Agreement {
         correlation: (windows > 0.0).then(|| sum / expected),
         detailed,
+        equally_sharp: equally_sharp([a, b], variance),
         moved: mask(&different),
         too_blurred: mask(&too_blurred),
     }
+}
+
+/// Whether the bands of both images, whose noise has this variance, differ by noise alone.
+fn equally_sharp([a, b]: [&Array2<f32>; 2], variance: f64) -> bool {
+    let (mut detail, mut difference, mut pixels) = (0.0, 0.0, 0.0);
+    for (a, b) in a.iter().zip(b).filter(|(a, b)| a.is_finite() && b.is_finite()) {
+        detail += f64::from(a * b);
+        difference += f64::from((a - b) * (a - b));
+        pixels += 1.0;
+    }
+    difference < DIFFERENCE * 2.0 * variance * pixels && detail > CLEAR * variance * pixels
 }
 
 /// Correlation of coarse detail around each pixel of the small images.

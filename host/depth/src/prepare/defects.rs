@@ -2,7 +2,7 @@
 //! small among the hundreds of pixels for a depth. A clipped highlight is unchanged: its value is a lower bound, and
 //! its neighbours are darker. A patch becomes a hole (NaN), which removes all depths that depend on it.
 
-use ndarray::{Array2, ArrayView2};
+use ndarray::{Array2, ArrayView2, Axis};
 
 use crate::reason::Reason;
 
@@ -14,14 +14,62 @@ const ALONE: usize = 6;
 /// Least mean of the neighbours of a clipped highlight, relative to a saturated pixel; below it the pixel is defective.
 const HIGHLIGHT: f32 = 0.65;
 
+/// Parallel maxima, which the compiler vectorises.
+const LANES: usize = 16;
+/// Largest part of an image above the level at which it is clipped: hot pixels.
+const HOT: f64 = 1e-4;
+
+/// Level at which an image is clipped: the brightest 3x3 patch of one value, if only hot pixels are brighter. A camera
+/// may saturate below full scale, and a float file has none. Cost: some ten operations a pixel.
+fn clipping_level(image: ArrayView2<f32>) -> Option<f32> {
+    let width = image.ncols();
+    let least = |a: f32, b: f32| if a < b { a } else { b };
+    let mut darkest_of_three = vec![0.0_f32; width];
+    let mut level = f32::NEG_INFINITY;
+    let mut is_flat = false;
+    for rows in image.axis_windows(Axis(0), 3) {
+        let rows = [0, 1, 2].map(|row| rows.index_axis_move(Axis(0), row));
+        let [Some(above), Some(row), Some(below)] = rows.each_ref().map(|row| row.to_slice()) else {
+            return None;
+        };
+        let pixels = above.iter().zip(row).zip(below);
+        darkest_of_three.iter_mut().zip(pixels).for_each(|(to, ((a, b), c))| *to = least(least(*a, *b), *c));
+        let mut of_row = [f32::NEG_INFINITY; LANES];
+        let [left, middle, right] =
+            [0, 1, 2].map(|from| darkest_of_three.get(from..width - 2 + from).unwrap_or(&[]));
+        let patches = || left.iter().zip(middle).zip(right).map(|((a, b), c)| least(least(*a, *b), *c));
+        patches().zip((0..LANES).cycle()).for_each(|(darkest, lane)| {
+            if darkest > of_row[lane] {
+                of_row[lane] = darkest;
+            }
+        });
+        let brightest = of_row.into_iter().fold(f32::NEG_INFINITY, f32::max);
+        if brightest < level || brightest == f32::NEG_INFINITY || (brightest == level && is_flat) {
+            continue;
+        }
+        let flat_at =
+            |x: usize| rows.iter().all(|row| row.iter().skip(x).take(3).all(|value| *value == brightest));
+        is_flat = patches().enumerate().any(|(x, darkest)| darkest == brightest && flat_at(x));
+        level = brightest;
+    }
+    let of = |test: fn(&f32, &f32) -> bool| image.iter().filter(|value| test(value, &level)).count() as f64;
+    let pixels = image.len() as f64;
+    (is_flat && of(f32::gt) <= (HOT * pixels).max(4.0) && of(f32::eq) < 0.5 * pixels).then_some(level)
+}
+
 /// Marks the defects of an image: code of the [`Reason`], 0 = none. `limits` are the black and the white level of a
-/// camera that clips, `bad` its bad pixels.
+/// camera that clips, `bad` its bad pixels. An image that is clipped below its white level is marked there.
 pub(super) fn find(
     image: ArrayView2<f32>,
     limits: Option<[f32; 2]>,
     bad: Option<ArrayView2<bool>>,
 ) -> Option<Array2<u8>> {
     let (height, width) = image.dim();
+    let [black, white] = limits.unwrap_or([f32::NEG_INFINITY, f32::INFINITY]);
+    let limits = match clipping_level(image) {
+        Some(level) => Some([black, white.min(level)]),
+        None => limits,
+    };
     let black = |y: isize, x: isize| {
         limits.is_some_and(|[black, _]| {
             image[(y.clamp(0, height as isize - 1) as usize, x.clamp(0, width as isize - 1) as usize)]
@@ -123,6 +171,25 @@ mod tests {
         let marks = find(image.view(), Some([0.0, 1.0]), None).unwrap();
         mend(&mut image, &marks);
         assert_eq!(image[(10, 10)], 1.0);
+    }
+
+    #[test]
+    fn an_image_clipped_below_its_white_level_is_marked_there() {
+        let scene = |y: usize, x: usize| 0.3 + 0.5 * ((y * 7 + x * 13) % 29) as f32 / 29.0;
+        let mut image = Array2::from_shape_fn((60, 80), |(y, x)| scene(y, x));
+        image.slice_mut(ndarray::s![20..30, 40..55]).fill(0.9);
+        image[(5, 5)] = 0.97; // a hot pixel
+        for limits in [None, Some([0.0, 1.0])] {
+            let marks = find(image.view(), limits, None).unwrap();
+            let marked = |at| marks[at] == Reason::Saturated.code();
+            assert!(marked((20, 40)) && marked((29, 54)) && !marked((19, 40)));
+            assert_eq!(marks.iter().filter(|mark| **mark != 0).count(), 151);
+        }
+        // Bright and even, but with noise: not clipped.
+        image.slice_mut(ndarray::s![20..30, 40..55]).indexed_iter_mut().for_each(|((y, x), value)| {
+            *value += 0.002 * ((y * 5 + x * 3) % 4) as f32;
+        });
+        assert!(find(image.view(), Some([0.0, 1.0]), None).is_none());
     }
 
     #[test]

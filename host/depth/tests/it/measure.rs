@@ -277,6 +277,23 @@ fn bands_of_a_rolling_shutter_move_no_depth_and_are_reported() {
 }
 
 #[test]
+fn a_focus_that_did_not_move_is_reported() {
+    let (one, again) = (plain("slant", 3), pair("slant", PSF, Noise::EightBit, &lens(), View::default(), 3));
+    let equally_sharp = |pair: &Pair| {
+        let found = measure(pair, PSF, Window::Fixed(7)).unwrap();
+        found.findings.contains(&Finding::EquallySharp)
+    };
+    assert!(!equally_sharp(&one));
+    // The same exposure with other noise.
+    let mut noise = 1_u32;
+    let near = again.far.mapv(|value| {
+        noise = noise.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        value + ((noise >> 16) % 3) as f32 / 255.0 - 1.0 / 255.0
+    });
+    assert!(equally_sharp(&Pair { near, ..again }));
+}
+
+#[test]
 fn moved_pixels_have_no_depth() {
     let (still, moved) = (
         plain("plane:905", 5),

@@ -164,10 +164,37 @@ fn only_changed_jobs_run_again() {
     fs::write(folder.path("maps/1/depth.npy"), bytes).expect("a writable file");
     assert_eq!(again(), ["already"; 2]);
     assert_eq!(states(&["batch", &manifest, "--verify"]), ["already", "done"], "another byte");
-    // Files in an earlier format do not stay next to new ones.
+    // Files in an earlier format do not stay next to new ones; files of the user do.
+    folder.file("maps/0/notes.txt", "of the user");
     edit("'npy'", "'png'");
     assert_eq!(again(), ["done"; 2]);
     assert!(!folder.path("maps/0/depth.npy").exists() && folder.path("maps/0/depth.png").exists());
+    assert!(folder.path("maps/0/notes.txt").exists());
+    // A job that fails removes its earlier result.
+    fs::remove_file(folder.path("pair/near.png")).expect("an image");
+    assert_eq!(farnear(&["batch", &manifest]).output().expect("the program starts").status.code(), Some(1));
+    assert_eq!(files(&folder.path("maps")).into_keys().collect::<Vec<_>>(), ["0/notes.txt"]);
+    assert!(!folder.path("maps/1").exists(), "an empty folder does not stay");
+}
+
+/// In the second run the first job has nothing to do, and its result is not the second one's to replace.
+#[test]
+fn two_jobs_with_one_folder_fail_in_every_run() {
+    let folder = Folder::new();
+    let manifest = pairs(&folder, 1);
+    let job = fs::read_to_string(&manifest).expect("the manifest");
+    let other = "[[job]]\ndo = 'depth'\nwindow = 9\nout = 'maps/0'\n";
+    fs::write(&manifest, job + other).expect("a writable folder");
+    let run = || {
+        let output = farnear(&["batch", &manifest, "--jobs", "1"]).output().expect("the program starts");
+        let states = lines(&output.stdout).iter().map(|line| line["state"].to_string()).collect::<Vec<_>>();
+        (output.status.code(), states.join(" "), files(&folder.path("maps")))
+    };
+    let first = run();
+    assert_eq!((first.0, first.1.as_str()), (Some(1), r#""done" "failed""#));
+    let second = run();
+    assert_eq!((second.0, second.1.as_str()), (Some(1), r#""already" "failed""#));
+    assert!(second.2 == first.2, "the first job's result stays");
 }
 
 #[test]

@@ -7,10 +7,10 @@ const VIDEO: &str =
     "it is a video: extract its frames (`ffmpeg -i FILE frames/%04d.png`) and give their folder";
 const MICROSCOPE: &str =
     "it is a microscope's file, which is not read: convert it to OME-TIFF (Bio-Formats: bfconvert)";
-const ARRAYS: &str = "it is a file of several arrays: save the one you need as .npy (`numpy.save`)";
+const ARRAYS: &str = "it is a file of several arrays: save an image as float TIFF (`tifffile.imwrite`), a map as .npy (`numpy.save`)";
 
 /// Formats that are not read, by their first bytes.
-const OTHERS: [(&[u8], &str); 21] = [
+const OTHERS: [(&[u8], &str); 22] = [
     (b"GIF8", "GIF is not read: convert it to PNG or TIFF"),
     (b"\x76\x2f\x31\x01", "OpenEXR is not read: convert it to float TIFF"),
     (b"\xff\x0a", "JPEG XL is not read: convert it to PNG or TIFF"),
@@ -24,9 +24,13 @@ const OTHERS: [(&[u8], &str); 21] = [
     (b"\x70\0\0\0", MICROSCOPE),
     (b"\x89HDF\r\n\x1a\n", ARRAYS),
     (b"MATLAB 5.0 MAT-file", ARRAYS),
-    (b"PK\x03\x04", "it is an archive (.zip or .npz): unpack it, and save an array as .npy (`numpy.save`)"),
+    (
+        b"PK\x03\x04",
+        "it is an archive (.zip or .npz): unpack it; save an image as float TIFF (`tifffile.imwrite`), a map as .npy (`numpy.save`)",
+    ),
     (b"Pf\n", "PFM is not read: convert it to float TIFF or .npy"),
     (b"PF\n", "PFM is not read: convert it to float TIFF or .npy"),
+    (b"\x93NUMPY", ".npy is read for maps, not for images: save an image as float TIFF (`tifffile.imwrite`)"),
     (b"PIEH", "Sintel's .dpt is not read: convert it to float TIFF or .npy"),
     (b"DIGITAL SURF", "Digital Surf's .sur is not read: export the heights as float TIFF"),
     (b"DSCOMPRESSED", "Digital Surf's .sur is not read: export the heights as float TIFF"),

@@ -205,7 +205,12 @@ async fn compute_stack(
 
 /// Folder of a capture's map.
 fn with_map(app: &App, name: &str) -> Result<std::path::PathBuf, Failure> {
-    Ok(sessions::with_map(sessions::existing(&app.session, name)?))
+    let folder = sessions::with_map(sessions::existing(&app.session, name)?);
+    if !folder.join("depth.npy").exists() {
+        let error = format!("{name} has no depth yet");
+        return Err(Failure::new(StatusCode::NOT_FOUND, error).with_hint("Compute its depth first."));
+    }
+    Ok(folder)
 }
 
 async fn region(

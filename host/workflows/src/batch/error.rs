@@ -26,7 +26,7 @@ pub enum BatchError {
     Foreign { path: PathBuf },
     #[error("another job of this run has written {}: give each job another `out`", path.display())]
     SharedOut { path: PathBuf },
-    #[error("{} is being made by another program", path.display())]
+    #[error("{} is being made by another job or program: give each job another `out`", path.display())]
     InUse { path: PathBuf },
     #[error("{failed} of {jobs} jobs failed; {} says why; run the batch again to do them again", failures.display())]
     Failed { failed: usize, jobs: usize, failures: PathBuf },

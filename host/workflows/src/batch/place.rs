@@ -1,4 +1,4 @@
-//! Place of a job's result, moved there when complete. Never replaces files that no batch wrote.
+//! Place of a job's result, moved there when complete. Files that no batch wrote stay.
 
 use std::{
     ffi::OsString,
@@ -11,7 +11,7 @@ use std::{
 use serde_json::Value;
 
 use super::{BatchError, provenance::Provenance};
-use crate::error::Result;
+use crate::{error::Result, inputs};
 
 /// Provenance in a result folder; suffix of the provenance of a result file.
 pub(crate) const RECORD: &str = "batch.toml";
@@ -77,8 +77,12 @@ impl Place {
         clear(&aside).map_err(unwritable)?;
         let made = aside.join(name);
         let found = make(&made)?;
+        let strangers = self.strangers().map_err(unwritable)?;
+        if let Some(name) = strangers.iter().find(|name| made.join(name).exists()) {
+            return Err(BatchError::Foreign { path: self.target.join(name) }.into());
+        }
         let record = toml::to_string(&wanted.with_figures(&found).with_output(&made)?)?;
-        self.put(&aside, &made, &record).map_err(unwritable)?;
+        self.put(&aside, &made, &record, &strangers).map_err(unwritable)?;
         drop(clearing);
         Ok(found)
     }
@@ -87,14 +91,37 @@ impl Place {
     /// job of this run (started at `begun`) wrote.
     pub fn discard(&self, begun: SystemTime) -> io::Result<()> {
         let record = self.record();
-        if Provenance::read(&record).is_none() || fs::metadata(&record)?.modified()? > begun {
+        let Some(found) = Provenance::read(&record) else { return Ok(()) };
+        if fs::metadata(&record)?.modified()? > begun {
             return Ok(());
         }
-        if self.is_file {
-            fs::remove_file(record)?;
-            return if self.target.exists() { fs::remove_file(&self.target) } else { Ok(()) };
+        fs::remove_file(record)?;
+        for file in found.outputs().map(|name| self.root().join(name)).filter(|file| file.exists()) {
+            fs::remove_file(&file)?;
+            // A folder that holds other files stays.
+            let folders = file.ancestors().skip(1).take_while(|folder| folder.starts_with(&self.target));
+            folders.map(fs::remove_dir).take_while(io::Result::is_ok).for_each(drop);
         }
-        fs::remove_dir_all(&self.target)
+        Ok(())
+    }
+
+    /// Marks an up-to-date result as one of this run, so that another job of the run does not replace it.
+    pub fn claim(&self) {
+        // A result that cannot be written cannot be replaced either.
+        let _ =
+            File::options().append(true).open(self.record()).and_then(|r| r.set_modified(SystemTime::now()));
+    }
+
+    /// Files of the result's folder that no batch wrote, relative to it.
+    fn strangers(&self) -> io::Result<Vec<PathBuf>> {
+        let Some(found) = Provenance::read(&self.record()).filter(|_| !self.is_file && self.target.exists())
+        else {
+            return Ok(Vec::new());
+        };
+        let files = inputs::files_below(&self.target).map_err(io::Error::other)?;
+        let names = files.iter().filter_map(|file| file.strip_prefix(&self.target).ok());
+        let ours = |name: &Path| name == Path::new(RECORD) || found.outputs().any(|output| output == name);
+        Ok(names.filter(|name| !ours(name)).map(Path::to_path_buf).collect())
     }
 
     /// Locks the temporary folder for this process, so that two runs of a job do not mix.
@@ -112,7 +139,7 @@ impl Place {
         }
     }
 
-    fn put(&self, aside: &Path, made: &Path, record: &str) -> io::Result<()> {
+    fn put(&self, aside: &Path, made: &Path, record: &str, strangers: &[PathBuf]) -> io::Result<()> {
         if self.is_file {
             // Remove the old record first, so that it never accompanies another result.
             let (old, new) = (self.record(), aside.join("record"));
@@ -125,6 +152,12 @@ impl Place {
         }
         fs::write(made.join(RECORD), record)?;
         if self.target.exists() {
+            for name in strangers {
+                if let Some(folder) = made.join(name).parent() {
+                    fs::create_dir_all(folder)?;
+                }
+                fs::rename(self.target.join(name), made.join(name))?;
+            }
             fs::rename(&self.target, aside.join("old"))?;
         }
         fs::rename(made, &self.target)

@@ -99,6 +99,11 @@ impl Provenance {
         Ok(self)
     }
 
+    /// Files of the result, relative to its folder.
+    pub fn outputs(&self) -> impl Iterator<Item = &Path> {
+        self.output.iter().map(|output| Path::new(&output.file))
+    }
+
     /// Reads a record; `None` if missing or of another version.
     pub fn read(file: &Path) -> Option<Self> {
         let text = fs::read_to_string(file).ok()?;

@@ -27,7 +27,12 @@ impl Pair {
         let (far_image, near_image) =
             rayon::join(|| read_grey_with(far, reading), || read_grey_with(near, reading));
         let (mut far_image, mut near_image) = (far_image?, near_image?);
-        let white = shared_white_level([&far_image, &near_image].into_iter());
+        let levels = far_image.white_level.into_iter().chain(near_image.white_level);
+        // A stated level holds for brighter pixels, too: they are saturated.
+        let white = match reading.white_level {
+            Some(_) => levels.reduce(f32::min),
+            None => shared_white_level([&far_image, &near_image].into_iter()),
+        };
         if let Some(white) = white {
             (far_image, near_image) = (far_image.relative_to(white), near_image.relative_to(white));
         }
@@ -109,6 +114,20 @@ mod tests {
         let record = record.replace("[camera]\n", "[camera]\ncoding_variance = 2.5e-5\n");
         std::fs::write(folder.path().join(CAPTURE_FILE), record).unwrap();
         assert_eq!(variance(), 2.5e-5);
+    }
+
+    #[test]
+    fn a_stated_white_level_holds_for_brighter_pixels() {
+        let folder = tempfile::tempdir().unwrap();
+        let [far, near] = ["far.png", "near.png"].map(|name| folder.path().join(name));
+        for (file, code) in [(&far, 1_500_u16), (&near, 900)] {
+            let image = Array2::from_shape_fn((4, 5), |(y, x)| code + (y * x) as u16);
+            std::fs::write(file, encode_png(image.view(), 16).unwrap()).unwrap();
+        }
+        let reading = ReadSettings { white_level: Some(1_000), ..ReadSettings::default() };
+        let pair = Pair::read(&far, &near, &reading).unwrap();
+        assert!(pair.far.iter().all(|value| *value == 1.0), "{:?}", pair.far);
+        assert!((pair.near[(0, 0)] - 0.9).abs() < 1e-6, "{:?}", pair.near);
     }
 
     #[test]

@@ -45,8 +45,18 @@ pub fn difference(
     of_maps(&first, &second, unit)
 }
 
-/// The unit of two maps; a map without a record adopts the other's.
+/// The unit of two maps of one part of the images; a map without a record adopts the other's.
 pub(crate) fn shared_unit(name: &'static str, first: &MapFile, second: &MapFile) -> crate::Result<Unit> {
+    if let (Some(a), Some(b)) = (first.part, second.part)
+        && a != b
+    {
+        let expected = format!("two maps of one region: the first begins at {},{}", a.x, a.y);
+        return Err(WorkflowError::parameter(
+            name,
+            format!("a map that begins at {},{}", b.x, b.y),
+            expected,
+        ));
+    }
     match (first.unit, second.unit) {
         (Some(a), Some(b)) if a != b => {
             let expected = format!("two maps in one unit: the first is in {a}");
@@ -91,6 +101,24 @@ mod tests {
     use ndarray::array;
 
     use super::*;
+
+    #[test]
+    fn maps_of_two_regions_have_no_difference() {
+        let folder = tempfile::tempdir().unwrap();
+        let map = |name: &str, x: usize| {
+            let map = folder.path().join(name);
+            std::fs::create_dir(&map).unwrap();
+            std::fs::write(map.join("depth.npy"), farnear_files::npy::write(array![[900.0]].view())).unwrap();
+            let optics = include_str!("../../../../examples/rig.toml").replace('[', "[optics.");
+            let part = format!("[part]\nx = {x}\ny = 0\nimage_width = 9\nimage_height = 9\n");
+            std::fs::write(map.join("depth.toml"), optics + &part).unwrap();
+            read_map(&map).unwrap()
+        };
+        let (a, b) = (map("a", 0), map("b", 4));
+        assert_eq!(shared_unit("difference", &a, &a).unwrap(), Unit::Mm);
+        let error = shared_unit("difference", &a, &b).unwrap_err();
+        assert!(error.is_usage() && error.to_string().contains("begins at 4,0"), "{error}");
+    }
 
     #[test]
     fn values_that_one_lacks_do_not_count() {

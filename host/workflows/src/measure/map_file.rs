@@ -49,16 +49,24 @@ pub(crate) struct MapFile {
     nodata: Option<NoData>,
     /// `None` without a record.
     pub unit: Option<Unit>,
+    /// Part of the images that the map shows; `None` for all.
+    pub part: Option<Part>,
 }
 
 impl MapFile {
     /// Depths in this unit; holes are NaN. Adds remarks on values that mark holes or seem to.
     pub fn depth(self, unit: Unit, remarks: &mut Vec<String>) -> Array2<f32> {
+        let negative = self.values.iter().filter(|value| **value < 0.0 && !unit.is_depth(**value)).count();
         let depth = self.values.mapv_into(|value| if unit.is_depth(value) { value } else { f32::NAN });
         let file = self.file.display();
         remarks.extend(self.nodata.map(|NoData { value, pixels }| {
             format!("{file}: {pixels} pixels of the value {value:?} are holes (GDAL_NODATA)")
         }));
+        if negative > 0 {
+            remarks.push(format!(
+                "{file}: {negative} negative pixels are holes: a depth is positive; add a constant to heights around 0"
+            ));
+        }
         remarks.extend(map::far_from_others(depth.view()).into_iter().map(|NoData { value, pixels }| {
             format!(
                 "{file}: {pixels} pixels have the value {value:?}, far from all others: if it marks holes, store NaN there, or the value in \
@@ -150,6 +158,10 @@ fn values_of(file: &Path, record: Option<&Record>) -> Result<MapFile> {
         Record::Depth(_) => Unit::Mm,
         Record::Stack(stack) => stack.unit,
     });
+    let part = match record {
+        Some(Record::Depth(record)) => record.part,
+        _ => None,
+    };
     let codes = match record {
         Some(Record::Depth(record)) if file.file_name() == Some("depth.png".as_ref()) => record.png,
         _ => None,
@@ -158,10 +170,10 @@ fn values_of(file: &Path, record: Option<&Record>) -> Result<MapFile> {
         let codes = image_file::read_grey(file)?.pixels.mapv(|value| f64::from(value) * f64::from(u16::MAX));
         let depth = |code: f64| (offset_mm + scale_mm * code.round()) as f32;
         let depth = codes.mapv(|code| if code < 0.5 { f32::NAN } else { depth(code) });
-        return Ok(MapFile { file: file.into(), values: depth, nodata: None, unit });
+        return Ok(MapFile { file: file.into(), values: depth, nodata: None, unit, part });
     }
     let (values, nodata) = map::read_with_nodata(file)?;
-    Ok(MapFile { file: file.into(), values, nodata, unit })
+    Ok(MapFile { file: file.into(), values, nodata, unit, part })
 }
 
 fn deviation_of(file: &Path, folder: &Path, dim: (usize, usize)) -> Result<Option<Array2<f32>>> {
@@ -199,13 +211,14 @@ mod tests {
             read_map(&path).expect("a map").depth(unit, &mut remarks);
             remarks
         };
-        let [far] = &remarks(Unit::Mm)[..] else { panic!("negative depths in mm are holes") };
+        let [negative, far] = &remarks(Unit::Mm)[..] else { panic!("negative depths in mm are holes") };
+        assert!(negative.contains("8 negative pixels are holes"), "{negative}");
         assert!(far.contains("8 pixels have the value 10000000000.0"), "{far}");
         assert_eq!(remarks(Unit::Um).len(), 2);
         let mut none = Vec::new();
         let nodata = Some(NoData { value: -1.0, pixels: 3 });
         let values = Array2::from_elem((1, 2), 5.0);
-        MapFile { file: "b.tif".into(), values, nodata, unit: None }.depth(Unit::Um, &mut none);
+        MapFile { file: "b.tif".into(), values, nodata, unit: None, part: None }.depth(Unit::Um, &mut none);
         assert!(none[0].contains("3 pixels of the value -1.0 are holes"), "{none:?}");
     }
 }
