@@ -97,10 +97,11 @@ pub(super) fn generalised(observations: &[Observation]) -> Result<(Psf, f64), Ca
             }
         }
     }
-    if best_p * P_RATIO > P[1] || best_p / P_RATIO < P[0] {
+    if best_p / P_RATIO < P[0] {
         return Err(CalibrationError::AtSearchEnd { parameter: "p", value: best_p });
     }
-    let p = parabola(best_p, |p| best_k(p).1);
+    // At the upper end the profile is a pill-box.
+    let p = if best_p * P_RATIO > P[1] { best_p } else { parabola(best_p, |p| best_k(p).1) };
     let (k, value, at_end) = best_k(p);
     if at_end {
         return Err(CalibrationError::AtSearchEnd { parameter: "k", value: k });
