@@ -87,7 +87,7 @@ fn a_flickering_lamp_moves_no_depth() {
 
 #[test]
 fn exchanged_slices_are_named() {
-    for pair in [[5, 6], [5, 7], [6, 9]] {
+    for pair in [[5, 6], [5, 7], [4, 7]] {
         let mut stack = stack(&lens(0.0, 0.0));
         stack.swap(pair[0], pair[1]);
         let found = calibrate_stack(&stack, &settings(), &|_| true);
