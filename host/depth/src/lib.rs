@@ -29,5 +29,6 @@ pub mod prepare;
 pub mod psf;
 pub mod reason;
 mod simd;
+pub mod slice_order;
 pub mod stream;
 pub mod validity;

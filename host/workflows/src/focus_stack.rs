@@ -303,6 +303,14 @@ pub fn focus_stack(request: &FocusStackRequest, context: &Context<'_>) -> Result
         ));
     }
     warnings.extend(frames.warnings());
+    for pair in &frames.exchanged {
+        let [one, other] = pair.map(|index| name(&listed.images[index]));
+        let shaken = if pair[1] - pair[0] == 1 { ", or one of them is shaken or defocused" } else { "" };
+        warnings.push(format!(
+            "{one} and {other} look exchanged{shaken}: in the order given, sharpness rises and falls more than once; depth may be \
+             wrong: exchange them or correct the positions (--positions-um)"
+        ));
+    }
     let mut left_out = Vec::new();
     for (index, reason) in &frames.left_out {
         left_out.push(name(&listed.images[*index]));

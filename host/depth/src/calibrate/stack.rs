@@ -23,6 +23,7 @@ use crate::brightness;
 use crate::measure::binned;
 use crate::optics::{FocusSection, LensSection, Optics, OpticsFile, SensorSection, Stage};
 use crate::psf::Psf;
+use crate::slice_order;
 use blur::BlurCurve;
 use focus_plane::FocusPlane;
 
@@ -122,6 +123,8 @@ pub struct StackLens {
     pub trials: Vec<Trial>,
     /// A slice that does not fit the others (defocused, exchanged, of something else), or two of which one does not.
     pub foreign: Vec<usize>,
+    /// Slices that look exchanged.
+    pub exchanged: Vec<[usize; 2]>,
 }
 
 /// Calibrates from `slices`, the far-focused first, (height, width). `proceed` is called before each measurement of a pair with
@@ -165,7 +168,9 @@ pub fn calibrate_stack(
         Some(stage) => optics.with_stage(Stage { scale_known, image_px: Some([width, height]), ..stage }),
         None => optics,
     };
-    Ok(StackLens { optics, plane, blur, held_out, trials, foreign })
+    let sharpness: Vec<Vec<f64>> = slices.iter().map(|slice| slice_order::sharpness(slice.view())).collect();
+    let exchanged = slice_order::exchanged(&sharpness);
+    Ok(StackLens { optics, plane, blur, held_out, trials, foreign, exchanged })
 }
 
 fn check(slices: &[Array2<f32>], settings: &StackSettings) -> Result<(), StackError> {

@@ -82,6 +82,21 @@ fn a_flickering_lamp_moves_no_depth() {
     // As of an even stack; otherwise the plane is 0.55 slices off.
     assert!((middle - TARGET.0[0]).abs() < 0.1, "{middle}");
     assert!((found.held_out.slope - 1.0).abs() < 0.02, "{:?}", found.held_out);
+    assert_eq!(found.exchanged, [[0; 2]; 0]);
+}
+
+#[test]
+fn exchanged_slices_are_named() {
+    for pair in [[5, 6], [5, 7], [4, 7]] {
+        let mut stack = stack(&lens(0.0, 0.0));
+        stack.swap(pair[0], pair[1]);
+        let found = calibrate_stack(&stack, &settings(), &|_| true);
+        assert!(
+            found.as_ref().is_ok_and(|found| found.exchanged == [pair]),
+            "{pair:?}: {:?}",
+            found.map(|f| f.exchanged)
+        );
+    }
 }
 
 #[derive(Debug)]

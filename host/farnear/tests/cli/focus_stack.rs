@@ -175,6 +175,19 @@ fn a_foreign_frame_is_named_and_left_out() {
 }
 
 #[test]
+fn exchanged_images_are_named() {
+    let folder = Folder::new();
+    let (path, out) = (stack(&folder), folder.text("out"));
+    let file = |name: &str| format!("{path}/{name}.png");
+    for (from, to) in [("4", "other"), ("7", "4"), ("other", "7")] {
+        fs::rename(file(from), file(to)).expect("renaming");
+    }
+    let found = figures(&mut farnear(&["focus-stack", &path, "--out", &out, "--json"]));
+    let warnings = found["warnings"].to_string();
+    assert!(warnings.contains("4.png and 7.png look exchanged"), "{found}");
+}
+
+#[test]
 fn a_folder_of_tiff_is_a_stack_and_mixed_formats_are_refused() {
     let folder = Folder::new();
     let (path, out) = (stack(&folder), folder.text("out"));

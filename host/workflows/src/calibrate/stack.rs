@@ -370,7 +370,7 @@ fn figures(
         ),
     };
     StackFigures {
-        verdict: verdict(found),
+        verdict: verdict(found, files),
         next,
         slices: files.len(),
         pair_step,
@@ -406,8 +406,15 @@ fn figures(
 }
 
 /// `good`, or what to change.
-pub fn verdict(found: &StackLens) -> String {
+fn verdict(found: &StackLens, files: &[PathBuf]) -> String {
     let held_out = &found.held_out;
+    if let Some(pair) = found.exchanged.first() {
+        let [one, other] = pair.map(|slice| files[slice].display());
+        return format!(
+            "{one} and {other} look exchanged, or one of them is defocused: in this order sharpness rises and falls more than once; \
+             exchange them, or take the stack again"
+        );
+    }
     let foreign: Vec<String> = found.foreign.iter().map(|slice| (slice + 1).to_string()).collect();
     if !foreign.is_empty() {
         return format!(

@@ -16,6 +16,7 @@ use farnear_depth::{
         align::{self, Model},
         warp::Warp,
     },
+    slice_order,
 };
 use ndarray::{ArrayView2, CowArray, Ix2};
 
@@ -44,6 +45,8 @@ pub(super) struct Frames {
     pub left_out: Vec<(usize, String)>,
     /// First or last images of which it cannot be told whether they are shaken.
     pub untold: Vec<usize>,
+    /// Images that look exchanged.
+    pub exchanged: Vec<[usize; 2]>,
     /// Usual correlation of neighbours; `None` if it was not measured.
     pub usual: Option<f64>,
     /// Farthest displacement of a corner over the stack without alignment, px.
@@ -53,7 +56,8 @@ pub(super) struct Frames {
 impl Frames {
     pub fn unchecked(count: usize) -> Self {
         let (warps, gains) = (vec![Warp::IDENTITY; count], vec![1.0; count]);
-        Self { warps, gains, left_out: Vec::new(), untold: Vec::new(), usual: None, drift_px: 0.0 }
+        let (left_out, untold, exchanged) = (Vec::new(), Vec::new(), Vec::new());
+        Self { warps, gains, left_out, untold, exchanged, usual: None, drift_px: 0.0 }
     }
 
     pub fn warnings(&self) -> Vec<String> {
@@ -131,6 +135,9 @@ where
     }
     frames.gains = brightness::gains(&neighbours.brightness, &members);
     frames.untold = shaken.untold;
+    let of_scene: Vec<Vec<f64>> = members.iter().map(|index| neighbours.sharpness[*index].clone()).collect();
+    let exchanged = slice_order::exchanged(&of_scene);
+    frames.exchanged = exchanged.into_iter().map(|pair| pair.map(|index| members[index])).collect();
     frames.usual = Some(scene.usual);
     if model.is_none() {
         if scene.usual > TELLING {
@@ -219,7 +226,7 @@ where
         let mut before: Option<CowArray<'_, f32, Ix2>> = None;
         for index in 0..count {
             let image = self.image(index)?;
-            found.sharpness.push(shaken::of_blocks(image.view()));
+            found.sharpness.push(slice_order::sharpness(image.view()));
             found.brightness.push(brightness::of_blocks(image.view()));
             found.links.extend(before.map(|before| self.compared(before.view(), image.view())));
             before = Some(image);

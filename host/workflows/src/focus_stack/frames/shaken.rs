@@ -2,9 +2,6 @@
 //! three suggest: blur grows evenly with the distance from the focus, so a power of the sharpness (which one depends on the
 //! texture) is a parabola of the position. A block that is sharpest in the next frame tells nothing: its peak may lie between.
 
-use farnear_depth::{brightness, focus_measure::FocusMeasure};
-use ndarray::{ArrayView2, s};
-
 /// Part of the sharpness of the less sharp neighbour below which a block is shaken, and part of the blocks that must be.
 const SHAKEN: f64 = 0.9;
 const SHAKEN_BLOCKS: f64 = 0.6;
@@ -18,13 +15,6 @@ const POWERS: [f64; 3] = [-1.0, -0.5, -0.25];
 const LEAST_BLUR: f64 = 0.7;
 /// Fewest frames of which one may be left out.
 const LEAST_FRAMES: usize = 5;
-
-/// Sharpness of each block of a frame; empty for images that are too small or dark.
-pub(super) fn of_blocks(image: ArrayView2<f32>) -> Vec<f64> {
-    let measured = brightness::blocks(image.dim())
-        .map(|[rows, columns]| FocusMeasure::Tenengrad.of(image.slice(s![rows, columns])).ok());
-    measured.collect::<Option<Vec<f64>>>().unwrap_or_default()
-}
 
 #[derive(Debug, Default, PartialEq)]
 pub(super) struct Shaken {

@@ -270,3 +270,18 @@ fn flicker_costs_nothing() {
     assert!(untreated > 1.1 * clean, "{untreated} {clean}: the factors must matter");
     assert!(found < 1.05 * clean && known > 0.98, "{found} {clean} {known}");
 }
+
+#[test]
+fn exchanged_images_are_named() {
+    let good = true_stack(&even_positions());
+    assert_eq!(checked(&good, &even_positions(), None).exchanged, [[0; 2]; 0]);
+    for pair in [[5, 7], [6, 9], [5, 9], [7, 8]] {
+        let mut images = good.clone();
+        images.swap(pair[0], pair[1]);
+        assert_eq!(checked(&images, &even_positions(), None).exchanged, [pair]);
+        // Numbers count all images.
+        images[2] = mean(&scene(2), 3);
+        let found = checked(&images, &even_positions(), None);
+        assert_eq!(found.exchanged, [pair], "{:?}", found.left_out);
+    }
+}

@@ -1,0 +1,253 @@
+//! Slices of a focal stack that are out of order. The sharpness of a place rises up to its focus and falls behind it, so the
+//! right order is the shortest path through the sharpness of all places, from no sharpness and back. Exchanged slices are
+//! those whose exchange removes most of the excess. Noise, irregular steps and a single bad slice cause an excess that no
+//! exchange removes.
+
+use ndarray::{ArrayView2, s};
+
+use crate::brightness;
+use crate::focus_measure::FocusMeasure;
+
+/// Fewest slices whose order tells anything.
+const FEWEST: usize = 5;
+/// Largest excess after an exchange, relative to that before, and to that without one of two slices that are no neighbours.
+const LEFT: f64 = 0.65;
+const LEFT_OF_ABSENT: f64 = 0.75;
+/// The same of neighbours less that without one of them: absence also mends a single bad slice.
+const MORE_THAN_ABSENT: f64 = 0.15;
+/// Least excess that is removed, relative to the range of sharpness.
+const LEAST: f64 = 0.04;
+/// Least part of the blocks that gain, least gain of a block relative to its range, and blocks that lose relative to these.
+const GAINING: f64 = 0.4;
+const GAIN: f64 = 0.02;
+const LOSING: f64 = 0.25;
+/// By how much an exchange with the first or the last slice must be better than one without: sharpness has one neighbour there.
+const AT_END: f64 = 0.1;
+
+/// Sharpness of each of the [`brightness::blocks`] of a slice; empty for images that are too small or dark.
+pub fn sharpness(image: ArrayView2<f32>) -> Vec<f64> {
+    let measured = brightness::blocks(image.dim())
+        .map(|[rows, columns]| FocusMeasure::Tenengrad.of(image.slice(s![rows, columns])).ok());
+    measured.collect::<Option<Vec<f64>>>().unwrap_or_default()
+}
+
+/// Pairs of slices that look exchanged, from the [`sharpness`] of each slice in the given order. Not found: neighbours at an
+/// end, slices equally far from the focus of a flat target, and differences below the noise.
+pub fn exchanged(sharpness: &[Vec<f64>]) -> Vec<[usize; 2]> {
+    let mut found = Vec::new();
+    if sharpness.len() < FEWEST || sharpness.iter().any(Vec::is_empty) {
+        return found;
+    }
+    let mut path = Path::of(sharpness);
+    while found.len() < sharpness.len() / 3
+        && let Some([a, b]) = path.exchange()
+    {
+        path.slices.swap(a, b);
+        found.push([a - 1, b - 1]);
+    }
+    found
+}
+
+/// Logarithms of sharpness by slice and block, with the least of each block before the first slice and behind the last one.
+struct Path {
+    slices: Vec<Vec<f64>>,
+    /// Range of each block.
+    ranges: Vec<f64>,
+}
+
+impl Path {
+    fn of(sharpness: &[Vec<f64>]) -> Self {
+        let logarithms =
+            |slice: &Vec<f64>| slice.iter().map(|value| value.max(f64::MIN_POSITIVE).ln()).collect();
+        let mut slices: Vec<Vec<f64>> = sharpness.iter().map(logarithms).collect();
+        let extreme = |of: fn(f64, f64) -> f64| -> Vec<f64> {
+            let blocks = 0..slices[0].len();
+            blocks.map(|block| slices.iter().map(|slice| slice[block]).reduce(of).unwrap_or(0.0)).collect()
+        };
+        let [least, most] = [extreme(f64::min), extreme(f64::max)];
+        let ranges = least.iter().zip(most).map(|(least, most)| most - least).collect();
+        slices.insert(0, least.clone());
+        slices.push(least);
+        Self { slices, ranges }
+    }
+
+    /// Numbers of two slices that look exchanged, from 1.
+    fn exchange(&self) -> Option<[usize; 2]> {
+        let count = self.slices.len() - 2;
+        let order: Vec<usize> = (0..self.slices.len()).collect();
+        let before = self.excess(&order);
+        let total: f64 = before.iter().sum();
+        let is_end = |[a, b]: [usize; 2]| a == 1 || b == count;
+        let cost = |pair| self.change(pair) + if is_end(pair) { AT_END * total } else { 0.0 };
+        let pairs = (1..=count).flat_map(|a| (a + 1..=count).map(move |b| [a, b]));
+        let pair = pairs
+            .filter(|pair| !(is_end(*pair) && pair[1] == pair[0] + 1))
+            .map(|pair| (cost(pair), pair))
+            .min_by(|one, other| one.0.total_cmp(&other.0))?
+            .1;
+        let mut exchanged = order.clone();
+        exchanged.swap(pair[0], pair[1]);
+        let after = self.excess(&exchanged);
+        let left: f64 = after.iter().sum();
+        let absent = pair.map(|absent| {
+            let others: Vec<usize> = order.iter().copied().filter(|slice| *slice != absent).collect();
+            self.excess(&others).iter().sum::<f64>()
+        });
+        let [less, more] = [absent[0].min(absent[1]), absent[0].max(absent[1])];
+        let mended = if pair[1] == pair[0] + 1 {
+            more < LEFT * total && left < less + MORE_THAN_ABSENT * total
+        } else {
+            left < LEFT_OF_ABSENT * less
+        };
+        let blocks = |better: &[f64], worse: &[f64]| {
+            let gains = better.iter().zip(worse).zip(&self.ranges);
+            gains.filter(|((better, worse), range)| *worse - *better > GAIN * *range).count() as f64
+        };
+        let [gaining, losing] = [blocks(&after, &before), blocks(&before, &after)];
+        let agreed = gaining > GAINING * before.len() as f64 && losing < LOSING * gaining;
+        let clear = left < LEFT * total && total - left > LEAST * self.ranges.iter().sum::<f64>();
+        (mended && agreed && clear).then_some(pair)
+    }
+
+    /// By how much an exchange changes the length of the path.
+    fn change(&self, [a, b]: [usize; 2]) -> f64 {
+        let after = |place: usize| {
+            if place == a {
+                b
+            } else if place == b {
+                a
+            } else {
+                place
+            }
+        };
+        let mut steps = [a - 1, a, b - 1, b].to_vec();
+        steps.dedup();
+        let step = |from: usize, to: usize| -> f64 {
+            self.slices[from].iter().zip(&self.slices[to]).map(|(from, to)| (to - from).abs()).sum()
+        };
+        steps.iter().map(|from| step(after(*from), after(from + 1)) - step(*from, from + 1)).sum()
+    }
+
+    /// Length of the path in each block, in this order, beyond the way from the least sharpness to the largest and back.
+    fn excess(&self, order: &[usize]) -> Vec<f64> {
+        let of_block = |block: usize| {
+            let values: Vec<f64> = order.iter().map(|slice| self.slices[*slice][block]).collect();
+            let length: f64 = values.windows(2).map(|two| (two[1] - two[0]).abs()).sum();
+            let most = values.iter().copied().fold(values[0], f64::max);
+            length - 2.0 * (most - values[0])
+        };
+        (0..self.ranges.len()).map(of_block).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use ndarray::Array2;
+
+    use super::*;
+
+    const SIZE: (usize, usize) = (72, 96);
+
+    fn scene(seed: u64) -> Array2<f32> {
+        Array2::from_shape_fn(SIZE, |(y, x)| {
+            let mixed = ((y * SIZE.1 + x) as u64 + seed * 1_000_003).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+            let mixed = (mixed ^ (mixed >> 29)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+            0.3 + 0.4 * (mixed >> 40) as f32 / (1 << 24) as f32
+        })
+    }
+
+    /// Blur of half a pixel squared.
+    fn smoothed(image: &Array2<f32>) -> Array2<f32> {
+        let (height, width) = image.dim();
+        let row = |y: usize, x: usize| {
+            let [left, right] = [x.saturating_sub(1), (x + 1).min(width - 1)];
+            0.25 * image[(y, left)] + 0.5 * image[(y, x)] + 0.25 * image[(y, right)]
+        };
+        Array2::from_shape_fn(image.dim(), |(y, x)| {
+            0.25 * row(y.saturating_sub(1), x) + 0.5 * row(y, x) + 0.25 * row((y + 1).min(height - 1), x)
+        })
+    }
+
+    /// Noisy slices of a plane that is in focus from `depths[0]` to `depths[1]`; the blur grows by 0.45 px per position.
+    fn stack(positions: &[f32], depths: [f32; 2], noise: f32) -> Vec<Array2<f32>> {
+        let passes = |x: usize, position: f32| {
+            let depth = depths[0] + (depths[1] - depths[0]) * x as f32 / SIZE.1 as f32;
+            2.0 * (0.45 * (depth - position)).powi(2)
+        };
+        let most = positions.iter().flat_map(|position| [passes(0, *position), passes(SIZE.1, *position)]);
+        let most = most.fold(0.0, f32::max) as usize;
+        let blurred: Vec<Array2<f32>> =
+            std::iter::successors(Some(scene(1)), |image| Some(smoothed(image))).take(most + 2).collect();
+        let image = |(index, position): (usize, &f32)| {
+            let grain = scene(100 + index as u64);
+            Array2::from_shape_fn(SIZE, |(y, x)| {
+                let passes = passes(x, *position);
+                let below = passes as usize;
+                let part = passes - below as f32;
+                let value = (1.0 - part) * blurred[below][(y, x)] + part * blurred[below + 1][(y, x)];
+                value + noise * (grain[(y, x)] - 0.5)
+            })
+        };
+        positions.iter().enumerate().map(image).collect()
+    }
+
+    fn measured(images: &[Array2<f32>]) -> Vec<Vec<f64>> {
+        images.iter().map(|image| sharpness(image.view())).collect()
+    }
+
+    fn even(count: usize) -> Vec<f32> {
+        (0..count).map(|index| index as f32).collect()
+    }
+
+    #[test]
+    fn exchanged_slices_are_found() {
+        for (count, depths) in [(15, [3.0, 11.0]), (8, [2.0, 5.5]), (15, [8.2, 9.4])] {
+            let good = measured(&stack(&even(count), depths, 0.02));
+            assert!(exchanged(&good).is_empty(), "{depths:?}");
+            let middle = count / 2;
+            for pair in [[middle - 1, middle], [middle - 1, middle + 1], [middle - 3, middle + 1]] {
+                let mut bad = good.clone();
+                bad.swap(pair[0], pair[1]);
+                assert_eq!(exchanged(&bad), [pair], "{depths:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn two_exchanges_are_found() {
+        let mut bad = measured(&stack(&even(15), [3.0, 11.0], 0.02));
+        bad.swap(4, 8);
+        bad.swap(10, 11);
+        assert_eq!(exchanged(&bad), [[4, 8], [10, 11]]);
+    }
+
+    #[test]
+    fn a_right_order_is_right_in_uneven_coarse_or_noisy_stacks() {
+        let uneven: Vec<f32> = even(15).iter().map(|at| at + 0.4 * (1.7 * at).sin()).collect();
+        let coarse: Vec<f32> = even(6).iter().map(|at| 2.8 * at).collect();
+        for positions in [even(15), uneven, coarse] {
+            for depths in [[3.0, 11.0], [7.0, 7.0], [-4.0, 2.0]] {
+                for noise in [0.0, 0.05, 0.4] {
+                    let images = stack(&positions, depths, noise);
+                    assert!(exchanged(&measured(&images)).is_empty(), "{positions:?} {depths:?} {noise}");
+                    let drift = |(index, image): (usize, &Array2<f32>)| image * (1.0 - 0.03 * index as f32);
+                    let drifting: Vec<Array2<f32>> = images.iter().enumerate().map(drift).collect();
+                    assert!(exchanged(&measured(&drifting)).is_empty(), "{positions:?} {depths:?} {noise}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_defocused_or_foreign_slice_is_not_exchanged() {
+        let good = stack(&even(15), [3.0, 11.0], 0.02);
+        for at in 0..good.len() {
+            let defocused = (0..12).fold(good[at].clone(), |image, _| smoothed(&image));
+            for bad in [defocused, scene(2)] {
+                let mut images = good.clone();
+                images[at] = bad;
+                assert_eq!(exchanged(&measured(&images)), [[0; 2]; 0], "{at}");
+            }
+        }
+    }
+}
