@@ -370,7 +370,7 @@ fn figures(
         ),
     };
     StackFigures {
-        verdict: verdict(found, files),
+        verdict: verdict(found),
         next,
         slices: files.len(),
         pair_step,
@@ -406,13 +406,13 @@ fn figures(
 }
 
 /// `good`, or what to change.
-fn verdict(found: &StackLens, files: &[PathBuf]) -> String {
+pub fn verdict(found: &StackLens) -> String {
     let held_out = &found.held_out;
     if let Some(pair) = found.exchanged.first() {
-        let [one, other] = pair.map(|slice| files[slice].display());
+        let [one, other] = pair.map(|slice| slice + 1);
         return format!(
-            "{one} and {other} look exchanged, or one of them is defocused: in this order sharpness rises and falls more than once; \
-             exchange them, or take the stack again"
+            "slices {one} and {other} look exchanged, or one of them is defocused: in this order sharpness rises and falls more than \
+             once; exchange them, or take the stack again"
         );
     }
     let foreign: Vec<String> = found.foreign.iter().map(|slice| (slice + 1).to_string()).collect();
