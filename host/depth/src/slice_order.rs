@@ -10,10 +10,10 @@ use crate::focus_measure::FocusMeasure;
 
 /// Fewest slices whose order tells anything.
 const FEWEST: usize = 5;
-/// Largest excess after an exchange, relative to that before, and to that without one of two slices that are no neighbours.
+/// Largest excess after an exchange, relative to that before, and to that without one of two distant slices.
 const LEFT: f64 = 0.65;
 const LEFT_OF_ABSENT: f64 = 0.75;
-/// The same of neighbours less that without one of them: absence also mends a single bad slice.
+/// Largest excess of exchanged neighbours beyond that without one of them, which also removes the excess of a bad slice.
 const MORE_THAN_ABSENT: f64 = 0.15;
 /// Least excess that is removed, relative to the range of sharpness.
 const LEAST: f64 = 0.04;

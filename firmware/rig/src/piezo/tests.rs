@@ -308,7 +308,7 @@ fn a_dac_whose_wire_returns_does_not_jump() {
         }
         let jump_um = f64::from(piezo.code().abs_diff(kept)) * 200.0 / 65_536.0;
         std::println!("from {from} to {to} nm: failed {failed}, {jump_um:.1} um when the wire returns");
-        // The bound of a command in a tick; the loop notices 156 um, and what it does not notice is less than the bound.
+        // The campaign's bound for a command in a tick.
         assert!(jump_um < 60.0, "from {from} to {to} nm: {jump_um} um");
         assert!(step(&mut piezo, &mut plant, from).0 <= 200, "it moves again");
     }
