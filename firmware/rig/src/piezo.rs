@@ -10,8 +10,8 @@
 //! gauge has given the position. Then the piezo is lowered smoothly, because a stack released suddenly swings into
 //! tension. If the gauge fails or the piezo does not follow, the command is held and the loop opens until the next
 //! move, before a loop that excites an unknown flexure mode can damage the stack. A DAC without a wire keeps its output
-//! while the loop pushes the code to its end. A piezo that is still away from its target after the settling deadline is
-//! therefore let go, and the code ramps to the gauge's position: a wire that returns then changes little.
+//! while the loop pushes the code to its end. If the piezo is still away from its target after the settling deadline, the
+//! loop therefore opens and the code ramps to the gauge's position: a wire that returns then changes little.
 //!
 //! A piezo at its target for a second is idle: only creep moves it, so rare ticks suffice. The resonance model assumes
 //! control ticks, so after a rest the gauge corrects only disturbance and drift, slowly. Fixed point: nm in 2^-10,
@@ -49,9 +49,9 @@ const INNOVATION_LIMIT: i32 = 15_000 << BITS;
 const INNOVATION_SHIFT: u32 = 4;
 /// Limit per tick, because a single reading may be wrong.
 const INNOVATION_CLIP: i32 = 2 * INNOVATION_LIMIT;
-/// Least disturbance of a piezo that is let go. Hysteresis of 15 % and an amplifier 20 % off make 70 um at the far end, but
-/// there the loop reaches its target.
-const LET_GO: i32 = 40_000 << BITS;
+/// Least disturbance at which the loop of a piezo away from its target opens. Hysteresis of 15 % and an amplifier 20 % off
+/// make 70 um at the far end, but there the piezo reaches its target.
+const UNREACHABLE: i32 = 40_000 << BITS;
 /// Ticks of a ramp after a start or a failure, and the codes (3 um) below which none is needed.
 const RAMP: u32 = TICK_HZ / 10;
 /// Ticks of the lowering while the supply sinks: 4.4 of the 4.8 ms that are left (docs/rig.md).
@@ -317,7 +317,7 @@ impl Piezo {
             let away = !near && control.shaper.arrived(&self.settings.gains.shaper);
             self.away_ticks = if away { self.away_ticks.saturating_add(1) } else { 0 };
             let late = self.away_ticks > self.settings.settle_deadline.0 / TICK_US;
-            if late && control.state[2].saturating_abs() > LET_GO {
+            if late && control.state[2].saturating_abs() > UNREACHABLE {
                 let (to, _) = self.scale.playable(here);
                 self.start = Start::Ramp { from: self.code, to, ticks: 0, over: RAMP };
                 (self.control, self.failed) = (None, true);

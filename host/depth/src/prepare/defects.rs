@@ -14,47 +14,49 @@ const ALONE: usize = 6;
 /// Least mean of the neighbours of a clipped highlight, relative to a saturated pixel; below it the pixel is defective.
 const HIGHLIGHT: f32 = 0.65;
 
-/// Parallel maxima, which the compiler vectorises.
-const LANES: usize = 16;
 /// Largest part of an image above the level at which it is clipped: hot pixels.
 const HOT: f64 = 1e-4;
 
 /// Level at which an image is clipped: the brightest 3x3 patch of one value, if only hot pixels are brighter. A camera
 /// may saturate below full scale, and a float file has none. Cost: some ten operations a pixel.
 fn clipping_level(image: ArrayView2<f32>) -> Option<f32> {
-    let width = image.ncols();
     let least = |a: f32, b: f32| if a < b { a } else { b };
-    let mut darkest_of_three = vec![0.0_f32; width];
-    let mut level = f32::NEG_INFINITY;
-    let mut is_flat = false;
+    let mut columns = vec![0.0_f32; image.ncols()];
+    let mut patches = vec![0.0_f32; image.ncols().checked_sub(2)?];
+    let (mut level, mut is_flat) = (f32::NEG_INFINITY, false);
     for rows in image.axis_windows(Axis(0), 3) {
         let rows = [0, 1, 2].map(|row| rows.index_axis_move(Axis(0), row));
         let [Some(above), Some(row), Some(below)] = rows.each_ref().map(|row| row.to_slice()) else {
             return None;
         };
         let pixels = above.iter().zip(row).zip(below);
-        darkest_of_three.iter_mut().zip(pixels).for_each(|(to, ((a, b), c))| *to = least(least(*a, *b), *c));
-        let mut of_row = [f32::NEG_INFINITY; LANES];
-        let [left, middle, right] =
-            [0, 1, 2].map(|from| darkest_of_three.get(from..width - 2 + from).unwrap_or(&[]));
-        let patches = || left.iter().zip(middle).zip(right).map(|((a, b), c)| least(least(*a, *b), *c));
-        patches().zip((0..LANES).cycle()).for_each(|(darkest, lane)| {
-            if darkest > of_row[lane] {
-                of_row[lane] = darkest;
-            }
-        });
-        let brightest = of_row.into_iter().fold(f32::NEG_INFINITY, f32::max);
+        columns.iter_mut().zip(pixels).for_each(|(to, ((a, b), c))| *to = least(least(*a, *b), *c));
+        let three = columns.iter().zip(&columns[1..]).zip(&columns[2..]);
+        patches.iter_mut().zip(three).for_each(|(to, ((a, b), c))| *to = least(least(*a, *b), *c));
+        let brightest = largest(&patches);
         if brightest < level || brightest == f32::NEG_INFINITY || (brightest == level && is_flat) {
             continue;
         }
-        let flat_at =
+        let all =
             |x: usize| rows.iter().all(|row| row.iter().skip(x).take(3).all(|value| *value == brightest));
-        is_flat = patches().enumerate().any(|(x, darkest)| darkest == brightest && flat_at(x));
+        is_flat = patches.iter().enumerate().any(|(x, darkest)| *darkest == brightest && all(x));
         level = brightest;
     }
-    let of = |test: fn(&f32, &f32) -> bool| image.iter().filter(|value| test(value, &level)).count() as f64;
+    let count =
+        |test: fn(&f32, &f32) -> bool| image.iter().filter(|value| test(value, &level)).count() as f64;
     let pixels = image.len() as f64;
-    (is_flat && of(f32::gt) <= (HOT * pixels).max(4.0) && of(f32::eq) < 0.5 * pixels).then_some(level)
+    (is_flat && count(f32::gt) <= (HOT * pixels).max(4.0) && count(f32::eq) < 0.5 * pixels).then_some(level)
+}
+
+/// Largest of values, by parallel maxima, which the compiler vectorises.
+fn largest(values: &[f32]) -> f32 {
+    let most = |a: f32, b: f32| if b > a { b } else { a };
+    let (parts, rest) = values.as_chunks::<16>();
+    let mut largest = [f32::NEG_INFINITY; 16];
+    for part in parts {
+        largest.iter_mut().zip(part).for_each(|(to, value)| *to = most(*to, *value));
+    }
+    largest.iter().chain(rest).copied().fold(f32::NEG_INFINITY, most)
 }
 
 /// Marks the defects of an image: code of the [`Reason`], 0 = none. `limits` are the black and the white level of a
