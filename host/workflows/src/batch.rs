@@ -1,6 +1,6 @@
 //! Runs the jobs of a manifest on all cores, each once, also after interruptions. A job is done if its result is
 //! complete and `batch.toml` lists the same settings, input hashes and program version. Results are moved into place
-//! when complete. Memory does not grow with the manifest.
+//! when complete. Memory grows only by the name of each result that is kept from an earlier run.
 
 mod campaign;
 mod error;
@@ -14,9 +14,10 @@ mod summary;
 mod tally;
 
 use std::{
+    collections::HashSet,
     io,
     path::{Path, PathBuf},
-    sync::{Arc, Mutex, PoisonError},
+    sync::{Arc, Mutex, MutexGuard, PoisonError},
     time::{Instant, SystemTime},
 };
 
@@ -177,6 +178,7 @@ pub fn run(
     let work = Work {
         settings,
         begun: SystemTime::now(),
+        kept: Mutex::default(),
         base: settings.manifest.parent().unwrap_or(Path::new("")).to_path_buf(),
         manifest: Mutex::new(Manifest::open(&settings.manifest)?),
         sums: Sums::default(),
@@ -218,6 +220,8 @@ fn failures_file(settings: &BatchSettings) -> PathBuf {
 struct Work<'a> {
     settings: &'a BatchSettings,
     begun: SystemTime,
+    /// Results of earlier runs that a job of this run found up to date: no other job replaces them.
+    kept: Mutex<HashSet<PathBuf>>,
     base: PathBuf,
     manifest: Mutex<Manifest>,
     sums: Sums,
@@ -309,10 +313,17 @@ impl Work<'_> {
         self.tally.tell(&JobReport { job: number, line, kind, out, state, seconds, figures, warnings, error })
     }
 
+    fn kept(&self) -> MutexGuard<'_, HashSet<PathBuf>> {
+        self.kept.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
     fn discard(&self, kind: &str, out: Option<&str>) {
         let (Ok(kind), Some(out)) = (jobs::kind(kind), out) else { return };
-        // If removal fails, the job's own error most likely has the same cause.
-        let _ = Place::new(self.base.join(out), makes_file(kind)).discard(self.begun);
+        let place = Place::new(self.base.join(out), makes_file(kind));
+        if !self.kept().contains(place.target()) {
+            // If removal fails, the job's own error most likely has the same cause.
+            let _ = place.discard(self.begun);
+        }
     }
 
     fn job(&self, kind: &str, fields: &Fields, context: &Context<'_>) -> Result<(State, Option<Value>)> {
@@ -324,10 +335,11 @@ impl Work<'_> {
         let place = Place::new(out, makes_file(kind));
         match place.look(&wanted, self.begun, self.settings.verify)? {
             Found::Done(figures) => {
-                if !self.settings.dry_run {
-                    place.claim();
-                }
+                self.kept().insert(place.target().into());
                 Ok((State::Already, figures))
+            }
+            Found::ToDo if self.kept().contains(place.target()) => {
+                Err(BatchError::SharedOut { path: place.target().into() }.into())
             }
             Found::ToDo if self.settings.dry_run => Ok((State::Todo, None)),
             Found::ToDo => {

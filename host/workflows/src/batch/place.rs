@@ -37,6 +37,11 @@ pub(super) enum Found {
 }
 
 impl Place {
+    /// The result's folder or file.
+    pub fn target(&self) -> &Path {
+        &self.target
+    }
+
     pub fn new(target: PathBuf, is_file: bool) -> Self {
         let target = target.components().collect(); // without a slash at its end
         Self { target, is_file }
@@ -103,13 +108,6 @@ impl Place {
             folders.map(fs::remove_dir).take_while(io::Result::is_ok).for_each(drop);
         }
         Ok(())
-    }
-
-    /// Marks an up-to-date result as one of this run, so that another job of the run does not replace it.
-    pub fn claim(&self) {
-        // A result that cannot be written cannot be replaced either.
-        let _ =
-            File::options().append(true).open(self.record()).and_then(|r| r.set_modified(SystemTime::now()));
     }
 
     /// Files of the result's folder that no batch wrote, relative to it.
