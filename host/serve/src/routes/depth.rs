@@ -206,7 +206,7 @@ async fn compute_stack(
 /// Folder of a capture's map.
 fn with_map(app: &App, name: &str) -> Result<std::path::PathBuf, Failure> {
     let folder = sessions::with_map(sessions::existing(&app.session, name)?);
-    if !folder.join("depth.npy").exists() {
+    if !["depth.npy", "depth.tiff", "depth.png"].iter().any(|map| folder.join(map).exists()) {
         let error = format!("{name} has no depth yet");
         return Err(Failure::new(StatusCode::NOT_FOUND, error).with_hint("Compute its depth first."));
     }

@@ -3,7 +3,7 @@
 use std::{
     collections::BTreeMap,
     fs,
-    path::{Path, PathBuf},
+    path::{Component, Path, PathBuf},
 };
 
 use serde::{Deserialize, Serialize};
@@ -99,9 +99,10 @@ impl Provenance {
         Ok(self)
     }
 
-    /// Files of the result, relative to its folder.
+    /// Files of the result, relative to its folder. A name that leads out of the folder is not one.
     pub fn outputs(&self) -> impl Iterator<Item = &Path> {
-        self.output.iter().map(|output| Path::new(&output.file))
+        let inside = |name: &&Path| name.components().all(|part| matches!(part, Component::Normal(_)));
+        self.output.iter().map(|output| Path::new(&output.file)).filter(inside)
     }
 
     /// Reads a record; `None` if missing or of another version.
@@ -128,6 +129,15 @@ impl Provenance {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_name_that_leads_out_of_the_folder_is_no_output() {
+        let files = ["a.npy", "sub/b.npy", "../c.npy", "/d.npy", "sub/../../e.npy"];
+        let output = files.map(|file| HashedFile { file: file.into(), bytes: 1, sha256: String::new() });
+        let record =
+            Provenance { output: output.into(), ..Provenance::new("depth", &Fields::default(), Vec::new()) };
+        assert_eq!(record.outputs().collect::<Vec<_>>(), [Path::new("a.npy"), Path::new("sub/b.npy")]);
+    }
 
     #[test]
     fn a_result_is_done_while_nothing_has_changed() {
