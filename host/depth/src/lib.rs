@@ -21,6 +21,7 @@ pub mod hankel;
 pub mod kernel;
 pub mod measure;
 pub mod metrics;
+pub mod mosaic;
 pub mod normalised_ratio;
 pub mod operators;
 pub mod optics;

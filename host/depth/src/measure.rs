@@ -14,6 +14,7 @@ use crate::baselines::{self, BaselineError};
 use crate::coarseness::coarseness;
 use crate::depth_map::{DepthMap, Warning};
 use crate::fill;
+use crate::mosaic::{self, is_mosaic};
 use crate::operators::{DesignError, Operators};
 use crate::optics::{Optics, Stage};
 use crate::pipeline::{RunError, Settings, depth_from_pair, extend_border, fill_border, warnings_after};
@@ -137,6 +138,8 @@ pub enum Finding {
     },
     /// Both images differ by noise alone.
     EquallySharp,
+    /// The images are the raw mosaic of a colour sensor.
+    Mosaic,
     /// The model leaves too much.
     Unexplained {
         /// Texture beyond the noise, mean squares.
@@ -190,13 +193,14 @@ impl fmt::Display for Finding {
             Self::Unexplained { left_over, psf, max_blur_px } => write!(
                 f,
                 "the model leaves {:.1} % of the detail unexplained (usual is below 2): is the PSF {psf} with a blur of up to \
-                 {max_blur_px:.3} px right? farnear calibrate psf finds it. A raw colour mosaic or another black level in one image does the same",
+                 {max_blur_px:.3} px right? farnear calibrate psf finds it. Another black level in one image does the same",
                 100.0 * left_over.sqrt()
             ),
             Self::EquallySharp => f.write_str(
                 "the images differ by noise alone: did the focus move between them? Only a plane in the middle of the working range \
                  looks the same in both",
             ),
+            Self::Mosaic => f.write_str(mosaic::WORDS),
             Self::Bands { amplitude } => write!(
                 f,
                 "bands of brightness of up to {:.1} % across one image were evened out: a lamp that flickers and a rolling shutter?",
@@ -284,9 +288,11 @@ pub(crate) fn measure_after(
         None => images,
     };
     check_pair(images[0].view(), images[1].view())?;
+    let is_mosaic = is_mosaic(images[0].view());
     let prepared = prepare_after(last, images, optics, camera, &prepare)?;
     let (mut map, estimate) = measure(&prepared, white, optics, method, settings)?;
     let mut findings = findings(&map, &prepared, &estimate, optics);
+    findings.extend(is_mosaic.then_some(Finding::Mosaic));
     let (left_over, excess) = (estimate.left_over, estimate.excess);
     let judging = ValiditySettings { least_confidence: settings.least_confidence, filled: settings.run.fill };
     let validity = assess(&mut map, &prepared, estimate, optics, &judging);

@@ -15,6 +15,7 @@ use farnear_depth::{
     corrections::Correction,
     fill::{FillBy, refill_as_thesis},
     measure::{Finding, MeasureSettings, binned, measure_pair},
+    mosaic::is_mosaic,
     optics::Optics,
     pipeline::DepthMap,
     prepare::{CameraFrames, PrepareSettings, Report},
@@ -137,7 +138,7 @@ impl Inputs {
         {
             doubts.push(OpticsDoubt::AnotherSize { slices, images: [width, height] });
         }
-        let bin = settings.bin_for(&optics, &mut doubts);
+        let bin = settings.bin_for(&optics, is_mosaic(pair.far.view()), &mut doubts);
         if bin > 1 {
             let [far, near] = [&mut pair.far, &mut pair.near].map(|image| binned(std::mem::take(image), bin));
             (pair.far, pair.near) = (far, near);

@@ -81,6 +81,11 @@ pub enum OpticsDoubt {
         bin: usize,
         binned: bool,
     },
+    /// The raw mosaic of a colour sensor, which was made grey.
+    Mosaic {
+        /// Side of the square of pixels that were averaged.
+        bin: usize,
+    },
 }
 
 impl fmt::Display for OpticsDoubt {
@@ -94,6 +99,11 @@ impl fmt::Display for OpticsDoubt {
                 f,
                 "the lens was calibrated with images of {w}x{h} px, these have {width}x{height}: right for a part of such images, \
                  wrong for scaled ones; calibrate in the mode of the images"
+            ),
+            Self::Mosaic { bin } => write!(
+                f,
+                "the images look like the raw mosaic of a colour sensor: {bin} x {bin} pixels were averaged into one, which \
+                 makes them grey; bin 1 keeps all pixels"
             ),
             Self::TooMuchBlur { blur_px, bin, binned } => {
                 write!(f, "a largest blur of {blur_px:.1} px is more than the 2 to 4 px that can be used: ")?;

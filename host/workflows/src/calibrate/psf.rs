@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use farnear_depth::{
     calibrate::{CapturedPair, Model, PsfFit, Verdict, fit_psf, made_ready},
+    mosaic::{self, is_mosaic},
     optics::Optics,
     prepare::Align,
     psf::Psf,
@@ -144,6 +145,9 @@ pub fn fit(settings: &CalibratePsfRequest, context: &Context<'_>) -> Result<PsfF
     for ([far, near], depth_mm) in settings.pairs() {
         let alpha = depth_mm.map(|depth_mm| alpha_at(depth_mm, &optics)).transpose()?;
         let read = [read_grey(far)?.pixels, read_grey(near)?.pixels];
+        if is_mosaic(read[0].view()) {
+            context.progress.warn(mosaic::WORDS);
+        }
         let (ready, report) = made_ready(read, &optics, settings.align)
             .about(|| format!("{} and {}", far.display(), near.display()))?;
         images.push((ready, alpha));

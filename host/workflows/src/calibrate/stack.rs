@@ -10,6 +10,7 @@ use std::{
 use farnear_capture::record::read_record;
 use farnear_depth::{
     calibrate::stack::{AtDepth, LENSES, Moved, StackError, StackLens, StackSettings, calibrate_stack},
+    mosaic::{self, is_mosaic},
     optics::{Optics, RESPONSE_POINTS, Stage},
 };
 use farnear_files::{
@@ -335,6 +336,9 @@ fn read(
         context.progress.advance("slices", index + 1, Some(images.len()));
         white.add(&image);
         coding += image.coding_variance / images.len() as f64;
+        if index == 0 && is_mosaic(image.pixels.view()) {
+            context.progress.warn(mosaic::WORDS);
+        }
         slices.push(image.pixels);
         Ok(())
     })?;

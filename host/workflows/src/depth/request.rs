@@ -256,18 +256,21 @@ impl DepthRequest {
         self.region.is_none() && self.camera_frames.is_none() && self.operators.is_none()
     }
 
-    /// Pixels per side to average into one; adds a doubt if needed.
-    pub(super) fn bin_for(&self, optics: &Optics, doubts: &mut Vec<OpticsDoubt>) -> usize {
-        let blur_px = optics.max_blur_px();
-        let needed = (blur_px / USABLE_BLUR_PX).ceil().clamp(1.0, 16.0) as usize;
+    /// Pixels per side to average into one; adds a doubt if needed. A mosaic of colours needs an even number.
+    pub(super) fn bin_for(&self, optics: &Optics, is_mosaic: bool, doubts: &mut Vec<OpticsDoubt>) -> usize {
         if let Some(bin) = self.bin {
             return bin;
         }
-        if needed == 1 {
-            return 1;
-        }
+        let blur_px = optics.max_blur_px();
+        let of_blur = (blur_px / USABLE_BLUR_PX).ceil().clamp(1.0, 16.0) as usize;
+        let needed = if is_mosaic { of_blur.next_multiple_of(2) } else { of_blur };
         let binned = optics.distortion().is_none() && optics.stage().is_none() && self.may_bin();
-        doubts.push(OpticsDoubt::TooMuchBlur { blur_px, bin: needed, binned });
+        if of_blur > 1 {
+            doubts.push(OpticsDoubt::TooMuchBlur { blur_px, bin: needed, binned });
+        }
+        if is_mosaic && binned {
+            doubts.push(OpticsDoubt::Mosaic { bin: needed });
+        }
         if binned { needed } else { 1 }
     }
 

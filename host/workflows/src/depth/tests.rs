@@ -95,3 +95,23 @@ fn a_dark_frame_is_on_the_scale_of_the_images() {
     assert!((inputs.pair.far[(0, 0)] - 1.0).abs() < 1e-5, "{}", inputs.pair.far[(0, 0)]);
     assert!((dark - 200.0 / 4095.0).abs() < 1e-5, "{dark}");
 }
+
+/// Files of a colour camera in its raw mode, saved as grey.
+#[test]
+fn a_raw_mosaic_of_colours_is_averaged_to_grey() {
+    let folder = tempfile::tempdir().unwrap();
+    let settings = settings(folder.path());
+    for (name, spread) in [("near.png", 1.0), ("far.png", 0.8)] {
+        let pixels = Array2::from_shape_fn((96, 128), |(y, x)| {
+            let detail = (0.5 * x as f32).sin() + (0.4 * y as f32).cos();
+            ((120.0 + 20.0 * spread * detail) * [0.6, 1.0, 1.0, 0.8][2 * (y % 2) + x % 2]) as u16
+        });
+        fs::write(folder.path().join(name), encode_png(pixels.view(), 8).unwrap()).unwrap();
+    }
+    let inputs = Inputs::read(&settings, &Context::unattended()).unwrap();
+    assert_eq!(inputs.pair.far.dim(), (48, 64));
+    assert!(inputs.doubts.contains(&OpticsDoubt::Mosaic { bin: 2 }), "{:?}", inputs.doubts);
+    let kept = DepthRequest { bin: Some(1), ..settings };
+    let figures = compute(&kept, &Context::unattended()).unwrap();
+    assert!(figures.warnings.iter().any(|warning| warning.contains("raw mosaic")), "{:?}", figures.warnings);
+}

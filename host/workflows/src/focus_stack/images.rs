@@ -10,6 +10,7 @@ use std::{
 
 use farnear_depth::{
     focus_stack::Slices,
+    mosaic::{self, is_mosaic},
     optics::Distortion,
     prepare::{
         straightened,
@@ -101,6 +102,9 @@ impl<'a> Images<'a> {
             context.cancel.check("reading the stack")?;
             context.progress.advance("images", index + 1, Some(paths.len()));
             colour |= image.colour;
+            if index == 0 && is_mosaic(image.pixels.view()) {
+                warnings.push(mosaic::WORDS.into());
+            }
             white.add(&image);
             if let Samples::Integer(bits) = image.samples {
                 read.code_step = read.code_step.max(1.0 / (2_f32.powi(bits.into()) - 1.0));
