@@ -15,6 +15,7 @@ use axum::{
     http::StatusCode,
 };
 use futures_core::Stream;
+use tempfile::TempPath;
 use zip::{
     CompressionMethod, ZipWriter,
     write::{SimpleFileOptions, StreamWriter},
@@ -144,19 +145,14 @@ pub fn regular_file(path: &Path) -> io::Result<File> {
     }
 }
 
-/// Writes an uploaded body to `path`; a failed upload leaves no file.
+/// Writes an uploaded body to `path`; a failed, broken off or stopped upload leaves no file.
 pub async fn receive(body: Body, path: &Path, bytes_max: u64, pause_max: Duration) -> Result<u64, Failure> {
     let part =
         path.with_file_name(format!(".{}.part", path.file_name().unwrap_or_default().to_string_lossy()));
-    let received = receive_part(body, &part, bytes_max, pause_max).await;
-    let moved = received.and_then(|bytes| {
-        fs::rename(&part, path).map_err(|error| disk(path, &error))?;
-        Ok(bytes)
-    });
-    if moved.is_err() {
-        let _ = fs::remove_file(&part); // it may not have been created
-    }
-    moved
+    let part = TempPath::try_from_path(part).map_err(|error| disk(path, &error))?;
+    let bytes = receive_part(body, &part, bytes_max, pause_max).await?;
+    part.persist(path).map_err(|failed| disk(path, &failed.error))?;
+    Ok(bytes)
 }
 
 fn disk(path: &Path, error: &io::Error) -> Failure {

@@ -131,6 +131,16 @@ fn y4m_gives_the_same_masks_and_learning_first_leaves_no_frame_out() {
 }
 
 #[test]
+fn a_video_without_a_usable_frame_says_why() {
+    let root = tempfile::tempdir().unwrap();
+    let (video, out) = (folder(root.path()), root.path().join("masks"));
+    let learning = ["silhouettes", "video", "--learning-frames", "500", "--out"];
+    let found = figures(farnear().args(learning).arg(&out).arg(&video));
+    assert_eq!(found["silhouettes"], 0);
+    assert!(found["remarks"].to_string().contains("lower learning-frames"), "{found}");
+}
+
+#[test]
 fn centred_masks_are_100x100_and_filled_to_the_height() {
     let root = tempfile::tempdir().unwrap();
     let (video, out) = (folder(root.path()), root.path().join("masks"));

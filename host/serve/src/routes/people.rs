@@ -163,12 +163,13 @@ async fn receive(
 ) -> Result<Json<Done>, Failure> {
     require_control(&app, &headers)?;
     let path = sessions::folder_of(&folder(&app), &name)?;
-    let (within, limits) = (folder(&app), app.limits);
+    let (within, limits, replaced) = (folder(&app), app.limits, path.clone());
     let used = aside(move || {
         fs::create_dir_all(&within)
             .map_err(|source| WorkflowError::Folder { folder: within.clone(), source })?;
         let entries = fs::read_dir(&within).into_iter().flatten().flatten();
-        let files = entries.filter_map(|entry| entry.metadata().ok()).filter(fs::Metadata::is_file);
+        let kept = entries.filter(|entry| entry.path() != replaced);
+        let files = kept.filter_map(|entry| entry.metadata().ok()).filter(fs::Metadata::is_file);
         Ok(files.map(|file| file.len()).sum::<u64>())
     })
     .await?;

@@ -31,7 +31,7 @@ pub struct Served {
     pub session: PathBuf,
     cancel: Cancel,
     thread: Option<JoinHandle<()>>,
-    _folder: tempfile::TempDir,
+    folder: Option<tempfile::TempDir>,
     _board: Option<Box<dyn std::any::Any + Send + Sync>>,
 }
 
@@ -80,7 +80,12 @@ impl Served {
         });
         let address = address.recv_timeout(PATIENCE).unwrap();
         let address = address.trim_start_matches("http://").trim_end_matches('/').to_owned();
-        Self { address, session, cancel, thread: Some(thread), _folder: folder, _board: board }
+        Self { address, session, cancel, thread: Some(thread), folder: Some(folder), _board: board }
+    }
+
+    /// Stops the server and returns the folder that holds its session.
+    pub fn stop(mut self) -> tempfile::TempDir {
+        self.folder.take().unwrap()
     }
 
     /// Sends only these bytes and returns the whole answer.

@@ -143,9 +143,32 @@ fn an_upload_above_the_quota_leaves_nothing() {
     assert_eq!(put("small.y4m", 600 << 10), 200);
     assert_eq!(put("second.y4m", 600 << 10), 413);
     assert_eq!(put("third.y4m", 300 << 10), 200);
+    assert_eq!(put("small.y4m", 700 << 10), 200, "the space of a replaced video is free");
     let names: Vec<_> = fs::read_dir(served.session.join("people"))
         .unwrap()
         .map(|entry| entry.unwrap().file_name())
         .collect();
     assert_eq!(names.len(), 2, "{names:?}");
+}
+
+#[test]
+fn an_upload_under_way_when_the_server_stops_leaves_nothing() {
+    let served = Served::captures_only();
+    let holder = Socket::open(&served);
+    let mut stream = TcpStream::connect(&served.address).unwrap();
+    let head = format!(
+        "PUT /api/people/videos/walk.y4m HTTP/1.1\r\nhost: {}\r\nx-farnear-client: {}\r\ncontent-length: 99\r\n\r\nhalf",
+        served.address, holder.secret
+    );
+    stream.write_all(head.as_bytes()).unwrap();
+    let people = served.session.join("people");
+    let files = || fs::read_dir(&people).into_iter().flatten().flatten().map(|entry| entry.path());
+    let began = Instant::now();
+    while files().next().is_none() {
+        assert!(began.elapsed() < Duration::from_secs(20), "no file is being written");
+        std::thread::sleep(Duration::from_millis(10));
+    }
+    let part = files().next().unwrap();
+    let folder = served.stop();
+    assert!(!part.exists() && folder.path().join("session/people").exists(), "{}", part.display());
 }

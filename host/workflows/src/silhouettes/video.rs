@@ -150,6 +150,18 @@ pub struct VideoFigures {
 }
 
 impl VideoFigures {
+    /// Why no frame has a usable silhouette.
+    fn without_people(&self) -> Option<String> {
+        let reason = match self.learning == self.frames {
+            true => {
+                "all of them were used to learn the background: lower learning-frames, or use learn-first"
+            }
+            false => "silhouettes.toml has the reason of each",
+        };
+        (self.silhouettes == 0)
+            .then(|| format!("none of {} frames has a usable silhouette; {reason}", self.frames))
+    }
+
     fn count(&mut self, flags: &[Flag]) {
         self.frames += 1;
         self.silhouettes += usize::from(!flags.iter().any(|flag| flag.spoils()));
@@ -217,6 +229,7 @@ pub fn extract(settings: &SilhouettesVideoRequest, context: &Context<'_>) -> Res
         }
     }
     context.warn(video.take_remarks(), &mut remarks);
+    context.warn(figures.without_people(), &mut remarks);
     figures.remarks = remarks;
     figures.changes_of_light = work.extractor.changes_of_light();
     let seconds = start.elapsed().as_secs_f64();
