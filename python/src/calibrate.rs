@@ -10,6 +10,7 @@ use crate::{
     arrays::{Image, named, optics_named},
     errors::wrong,
     optics::{Optics, psf_text},
+    work,
 };
 
 /// A calibrated point spread function, as `calibrate_psf` returns it.
@@ -104,7 +105,7 @@ pub fn calibrate_psf<'py>(
         let near: Image<'py> = named(&format!("pairs[{index}][1]"), near)?;
         owned.push(([far.view().to_owned(), near.view().to_owned()], true_mm.map(|mm| optics.0.alpha(mm))));
     }
-    let fit = py.detach(|| {
+    let fit = work::run(py, || {
         let mut ready = Vec::with_capacity(owned.len());
         for (images, alpha) in owned {
             ready.push((made_ready(images, &optics.0, align).map_err(wrong)?.0, alpha));
@@ -114,7 +115,7 @@ pub fn calibrate_psf<'py>(
             .map(|([far, near], alpha)| CapturedPair { far: far.view(), near: near.view(), alpha: *alpha })
             .collect();
         fit_psf(&captured, &optics.0, model).map_err(wrong)
-    })?;
+    })??;
     Ok(PsfFit {
         optics: Optics(optics.0.with_psf(fit.psf)),
         psf: psf_text(fit.psf)?,

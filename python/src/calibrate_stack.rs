@@ -1,5 +1,7 @@
 //! A lens from a z-stack of a flat target.
 
+use std::sync::atomic::Ordering;
+
 use farnear_depth::calibrate::stack::{self, Moved, StackSettings};
 use farnear_workflows::calibrate::stack::verdict;
 use ndarray::Array2;
@@ -10,6 +12,7 @@ use crate::{
     arrays::{Image, named},
     errors::{FarnearError, wrong},
     optics::Optics,
+    work,
 };
 
 /// Lens calibrated by `calibrate_stack`; errors are those on parts of the target that were left out of the fit.
@@ -110,7 +113,10 @@ pub fn calibrate_stack<'py>(
         bin,
         coding: 0.0,
     };
-    let found = py.detach(|| stack::calibrate_stack(&slices, &settings, &|_| true)).map_err(wrong)?;
+    let found = work::interruptibly(py, |stop| {
+        stack::calibrate_stack(&slices, &settings, &|_| !stop.load(Ordering::Relaxed))
+    })?
+    .map_err(wrong)?;
     let stage = found.optics.stage().ok_or_else(|| FarnearError::new_err("the stack gives no pairs"))?;
     let held_out = &found.held_out;
     let rows: Vec<[f64; 4]> =

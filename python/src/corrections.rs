@@ -6,8 +6,11 @@ use farnear_depth::corrections::{self, CdcSettings, Method, Pattern};
 use numpy::{IntoPyArray, PyArray2};
 use pyo3::prelude::*;
 
-use crate::arrays::{Map, named};
-use crate::errors::{FarnearError, wrong};
+use crate::{
+    arrays::{Map, named},
+    errors::{FarnearError, read_text, wrong},
+    work,
+};
 
 /// Correction of field curvature, fitted to depth maps of flat targets or loaded; immutable.
 ///
@@ -44,7 +47,9 @@ impl Correction {
         }
         let patterns: Vec<Pattern<'_>> =
             maps.iter().map(|(map, true_mm)| Pattern { depth_mm: map.view(), true_mm: *true_mm }).collect();
-        py.detach(|| corrections::fit(method, &patterns, &CdcSettings::default())).map(Self).map_err(wrong)
+        work::run(py, || corrections::fit(method, &patterns, &CdcSettings::default()))?
+            .map(Self)
+            .map_err(wrong)
     }
 
     /// Read a correction from the TOML that `farnear calibrate correction --out` writes.
@@ -56,7 +61,7 @@ impl Correction {
     /// Read a file that `farnear calibrate correction --out` wrote.
     #[staticmethod]
     fn load(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
-        let text = std::fs::read_to_string(&path)?;
+        let text = read_text(&path)?;
         Self::loads(py, &text).map_err(|error| FarnearError::new_err(format!("{}: {error}", path.display())))
     }
 
@@ -77,7 +82,7 @@ impl Correction {
     ) -> PyResult<Bound<'py, PyArray2<f32>>> {
         let map: Map<'py> = named("depth_mm", depth_mm)?;
         let map = map.view();
-        Ok(py.detach(|| self.0.apply(map)).map_err(wrong)?.into_pyarray(py))
+        Ok(work::run(py, || self.0.apply(map))?.map_err(wrong)?.into_pyarray(py))
     }
 
     /// Method of the correction.

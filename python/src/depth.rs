@@ -10,6 +10,7 @@ use farnear_depth::{
 };
 use std::sync::{Mutex, PoisonError};
 
+use ndarray::{CowArray, Ix2};
 use numpy::{IntoPyArray, PyArray2};
 use pyo3::{exceptions::PyTypeError, prelude::*};
 
@@ -18,6 +19,7 @@ use crate::{
     depth_map::DepthMap,
     errors::{FarnearError, wrong},
     optics::Operators,
+    work,
 };
 
 /// Fill method for low texture: none, the default of `farnear depth`, or by name.
@@ -136,16 +138,13 @@ pub fn depth(
     if !(0.0..=1.0).contains(&min_confidence) {
         return Err(FarnearError::new_err(format!("min_confidence is {min_confidence}; expected 0 to 1")));
     }
-    if far.full_scale().is_some() != near.full_scale().is_some() {
-        let message = "one of far and near holds uint8 or uint16 and the other does not: give both alike, or their scales differ";
-        return Err(FarnearError::new_err(message));
-    }
+    check_alike(&far, &near)?;
     let designed;
     let usual = if operators.is_some() { "ro" } else { "whitened" };
     let method = match (method.unwrap_or(usual), operators) {
         ("ro", Some(operators)) => DepthMethod::Rational(&operators.0),
         ("ro", None) => {
-            designed = py.detach(|| operators::Operators::for_optics(&optics.0)).map_err(wrong)?;
+            designed = work::run(py, || operators::Operators::for_optics(&optics.0))?.map_err(wrong)?;
             DepthMethod::Rational(&designed)
         }
         ("whitened", None) => DepthMethod::Whitened,
@@ -173,10 +172,28 @@ pub fn depth(
         run: Settings { smoothing_px, median_px, threads, ..filling(&fill, low_texture)? },
         least_confidence: min_confidence,
     };
+    let white = settings.prepare.limits.filter(|_| white_level.is_some()).map(|[_, white]| white);
+    let (far, near) = (up_to(&far, white), up_to(&near, white));
     let (far, near) = (far.view(), near.view());
-    let found =
-        py.detach(|| measure_pair_of_views(far, near, &optics.0, method, None, &settings)).map_err(wrong)?;
+    let found = work::run(py, || measure_pair_of_views(far, near, &optics.0, method, None, &settings))?
+        .map_err(wrong)?;
     Ok(DepthMap::of(py, found, optics))
+}
+
+/// An image without values above a stated white level, which are saturated.
+fn up_to<'a>(image: &'a Image<'_>, white: Option<f32>) -> CowArray<'a, f32, Ix2> {
+    match white {
+        Some(white) => image.view().mapv(|value| value.min(white)).into(),
+        None => image.view().into(),
+    }
+}
+
+fn check_alike(far: &Image<'_>, near: &Image<'_>) -> PyResult<()> {
+    if far.full_scale().is_some() == near.full_scale().is_some() {
+        return Ok(());
+    }
+    let message = "one of far and near holds uint8 or uint16 and the other does not: give both alike, or their scales differ";
+    Err(FarnearError::new_err(message))
 }
 
 /// Black and white of camera codes, scaled as the image is.
@@ -247,7 +264,7 @@ impl Processor {
         };
         match operators {
             Some(operators) => make(&operators.0),
-            None => make(&py.detach(|| operators::Operators::for_optics(&optics.0)).map_err(wrong)?),
+            None => make(&work::run(py, || operators::Operators::for_optics(&optics.0))?.map_err(wrong)?),
         }
     }
 
@@ -270,14 +287,15 @@ impl Processor {
         near: &Bound<'py, PyAny>,
     ) -> PyResult<(Bound<'py, PyArray2<f32>>, Bound<'py, PyArray2<f32>>)> {
         let (far, near): (Image<'py>, Image<'py>) = (named("far", far)?, named("near", near)?);
+        check_alike(&far, &near)?;
         let (far, near) = (far.view(), near.view());
-        let (depth_mm, confidence) = py.detach(|| {
+        let (depth_mm, confidence) = work::run(py, || {
             // After a panic in another thread the next run overwrites the buffers.
             let mut processor = self.0.lock().unwrap_or_else(PoisonError::into_inner);
             let map = processor.run(far, near).map_err(wrong)?;
             // The processor reuses its map for the next pair.
             Ok::<_, PyErr>((map.depth_mm.clone(), map.confidence.clone()))
-        })?;
+        })??;
         Ok((depth_mm.into_pyarray(py), confidence.into_pyarray(py)))
     }
 }

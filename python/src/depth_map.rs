@@ -11,7 +11,7 @@ use pyo3::{prelude::*, types::PyBytes};
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    errors::{FarnearError, wrong},
+    errors::{FarnearError, read_text, wrong},
     optics::Optics,
 };
 
@@ -118,7 +118,7 @@ impl DepthMap {
     #[staticmethod]
     fn load(py: Python<'_>, folder: PathBuf) -> PyResult<Self> {
         let path = folder.join("depth.toml");
-        let text = std::fs::read_to_string(&path)?;
+        let text = read_text(&path)?;
         let record: Record = toml::from_str(&text).map_err(|error| {
             FarnearError::new_err(format!("{} is not the record of a depth map: {error}", path.display()))
         })?;

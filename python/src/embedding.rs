@@ -6,7 +6,10 @@ use farnear_recognition::embedding::{
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyReadonlyArray2};
 use pyo3::prelude::*;
 
-use crate::errors::{DisconnectedError, wrong};
+use crate::{
+    errors::{DisconnectedError, wrong},
+    work,
+};
 
 /// Coordinates, eigenvalues, geodesic distances.
 type Laid<'py> = (Bound<'py, PyArray2<f32>>, Bound<'py, PyArray1<f64>>, Bound<'py, PyArray2<f32>>);
@@ -21,7 +24,7 @@ pub fn isomap<'py>(
     dimensions: usize,
 ) -> PyResult<Laid<'py>> {
     let samples = samples.as_array();
-    let found = py.detach(|| lay_out(samples, Neighbourhood::Nearest(neighbours), dimensions));
+    let found = work::run(py, || lay_out(samples, Neighbourhood::Nearest(neighbours), dimensions))?;
     let found = found.map_err(|error| match &error {
         EmbeddingError::Disconnected { .. } => DisconnectedError::new_err(error.to_string()),
         _ => wrong(error),
@@ -52,7 +55,7 @@ impl Rbf {
         ridge: f64,
     ) -> PyResult<Self> {
         let (samples, targets) = (samples.as_array(), targets.as_array());
-        py.detach(|| rbf::Rbf::train(samples, targets, gamma, ridge)).map(Self).map_err(wrong)
+        work::run(py, || rbf::Rbf::train(samples, targets, gamma, ridge))?.map(Self).map_err(wrong)
     }
 
     /// Coordinates, float32 (m, d), of samples, float32 (m, features).
@@ -62,7 +65,7 @@ impl Rbf {
         samples: PyReadonlyArray2<'py, f32>,
     ) -> PyResult<Bound<'py, PyArray2<f32>>> {
         let samples = samples.as_array();
-        Ok(py.detach(|| self.0.embed_all(samples)).map_err(wrong)?.into_pyarray(py))
+        Ok(work::run(py, || self.0.embed_all(samples))?.map_err(wrong)?.into_pyarray(py))
     }
 
     /// A map from what [`Self::__reduce__`] gives.

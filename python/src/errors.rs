@@ -1,6 +1,6 @@
 //! Errors as exceptions.
 
-use std::error::Error;
+use std::{error::Error, io, path::Path};
 
 use pyo3::{
     create_exception,
@@ -21,6 +21,12 @@ create_exception!(
     "The neighbour graph of an embedding is disconnected: raise the number of neighbours."
 );
 create_exception!(farnear, RigError, PyRuntimeError, "The rig, its camera or the way to them failed.");
+
+/// Text of a file; the message of an error names the path.
+pub fn read_text(path: &Path) -> PyResult<String> {
+    std::fs::read_to_string(path)
+        .map_err(|error| io::Error::new(error.kind(), format!("{}: {error}", path.display())).into())
+}
 
 /// A library's error with its causes in one line, as a `FarnearError`.
 pub fn wrong(error: impl Error) -> PyErr {

@@ -1,17 +1,23 @@
 //! Depth from a focus stack.
 
+use std::{
+    ops::Range,
+    sync::atomic::{AtomicBool, Ordering},
+};
+
 use farnear_depth::{
-    focus_stack::{StackSettings, depth_from_positions},
+    focus_stack::{Slices, StackError, StackSettings, depth_from_positions},
     prepare::align::Model,
 };
 use farnear_workflows::focus_stack::{depth_of_places, even_positions, prepare_stack};
-use ndarray::ArrayView2;
+use ndarray::{ArrayView2, CowArray, Ix2};
 use numpy::{IntoPyArray, PyArray2};
-use pyo3::prelude::*;
+use pyo3::{exceptions::PyKeyboardInterrupt, prelude::*};
 
 use crate::{
     arrays::{Image, named},
     errors::{FarnearError, wrong},
+    work,
 };
 
 /// Depth from a focus stack, as `focus_stack` returns it; arrays are float32 (height, width).
@@ -25,7 +31,7 @@ use crate::{
 /// reliability : array float32
 ///     How clear and how well fitted the maximum of sharpness is, 0 to 1.
 /// all_in_focus : array float32
-///     Each pixel from the image in which it is sharpest, in the scale of the images.
+///     Each pixel from the image in which it is sharpest: 0 to 1 for uint8 and uint16, else in the scale of the images.
 /// moved_px : float
 ///     Farthest that alignment moved a pixel, px.
 #[pyclass(frozen, get_all, module = "farnear")]
@@ -124,17 +130,25 @@ pub fn focus_stack<'py>(
         min_reliability,
     };
     let mut owned = Vec::with_capacity(images.len());
+    let mut full_scale = None;
     for (index, image) in images.iter().enumerate() {
-        owned.push(named::<Image<'py>>(&format!("images[{index}]"), image)?.view().to_owned());
+        let image = named::<Image<'py>>(&format!("images[{index}]"), image)?;
+        if *full_scale.get_or_insert(image.full_scale().is_some()) != image.full_scale().is_some() {
+            let message =
+                format!("images[0] and images[{index}]: one holds uint8 or uint16 and the other does not");
+            return Err(FarnearError::new_err(format!("{message}: give all alike, or their scales differ")));
+        }
+        owned.push(image.view().to_owned());
     }
-    let (map, depth, moved_px) = py.detach(|| -> PyResult<_> {
+    let (map, depth, moved_px) = work::interruptibly(py, |stop| -> PyResult<_> {
         let moved_px = prepare_stack(&mut owned, model).map_err(wrong)?;
         let views: Vec<ArrayView2<'_, f32>> = owned.iter().map(|image| image.view()).collect();
         let positions = even_positions(views.len(), focused_at_mm.as_deref());
-        let map = depth_from_positions(&views[..], &positions, &settings).map_err(wrong)?;
-        let depth = depth_of_places(&map.place, views.len(), focused_at_mm.as_deref());
+        let map = depth_from_positions(&Stoppable { views, stop }, &positions, &settings)
+            .map_err(|Stopped(error)| error.map_or_else(|| PyKeyboardInterrupt::new_err(()), wrong))?;
+        let depth = depth_of_places(&map.place, positions.len(), focused_at_mm.as_deref());
         Ok((map, depth, moved_px))
-    })?;
+    })??;
     Ok(FocusStack {
         depth: depth.into_pyarray(py).unbind(),
         unit: if focused_at_mm.is_some() { "mm" } else { "image" },
@@ -142,6 +156,40 @@ pub fn focus_stack<'py>(
         all_in_focus: map.all_in_focus.into_pyarray(py).unbind(),
         moved_px,
     })
+}
+
+/// No map: for this reason, or because it was stopped.
+struct Stopped(Option<StackError>);
+
+impl From<StackError> for Stopped {
+    fn from(error: StackError) -> Self {
+        Self(Some(error))
+    }
+}
+
+/// Images whose reading fails once `stop` is set.
+struct Stoppable<'a> {
+    views: Vec<ArrayView2<'a, f32>>,
+    stop: &'a AtomicBool,
+}
+
+impl Slices for Stoppable<'_> {
+    type Error = Stopped;
+
+    fn count(&self) -> usize {
+        self.views.len()
+    }
+
+    fn dim(&self, index: usize) -> (usize, usize) {
+        self.views[index].dim()
+    }
+
+    fn rows(&self, index: usize, rows: Range<usize>) -> Result<CowArray<'_, f32, Ix2>, Stopped> {
+        match self.stop.load(Ordering::Relaxed) {
+            true => Err(Stopped(None)),
+            false => Ok(self.views[..].rows(index, rows)?),
+        }
+    }
 }
 
 fn check_distances(distances: &[f64], images: usize) -> PyResult<()> {

@@ -19,10 +19,13 @@ mod recogniser;
 mod render;
 mod rig;
 mod synthetic;
+mod work;
 
 /// The module behind the package `farnear`.
 #[pyo3::pymodule]
 mod _farnear {
+    use pyo3::prelude::*;
+
     #[pymodule_export]
     use super::calibrate::{PsfFit, calibrate_psf};
     #[pymodule_export]
@@ -56,6 +59,12 @@ mod _farnear {
     use super::rig::RigClient;
     #[pymodule_export]
     use super::synthetic::synthetic_masks;
+    #[pymodule_init]
+    fn init(_module: &Bound<'_, PyModule>) -> PyResult<()> {
+        super::work::remember_process();
+        Ok(())
+    }
+
     #[pymodule_export]
     #[allow(non_upper_case_globals)] // a name of Python
     const __version__: &str = env!("CARGO_PKG_VERSION");

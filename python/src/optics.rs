@@ -10,7 +10,10 @@ use farnear_depth::{
 use numpy::{IntoPyArray, PyArray2};
 use pyo3::prelude::*;
 
-use crate::errors::{FarnearError, wrong};
+use crate::{
+    errors::{FarnearError, read_text, wrong},
+    work,
+};
 
 /// A point spread function as text: `MODEL:NAME=VALUE`, or the TOML of a measured profile.
 pub fn psf_text(psf: Psf) -> PyResult<String> {
@@ -93,7 +96,7 @@ impl Optics {
     /// Read an `optics.toml` file.
     #[staticmethod]
     fn load(path: PathBuf) -> PyResult<Self> {
-        let text = std::fs::read_to_string(&path)?;
+        let text = read_text(&path)?;
         Self::loads(&text).map_err(|error| FarnearError::new_err(format!("{}: {error}", path.display())))
     }
 
@@ -224,7 +227,7 @@ impl Operators {
         let family: Family = family.map_or(Ok(usual.family), str::parse).map_err(wrong)?;
         let design: Design = design.parse().map_err(wrong)?;
         let request = Request { family, design, kernel_size, ..usual };
-        py.detach(|| operators::design(&request)).map(Self).map_err(wrong)
+        work::run(py, || operators::design(&request))?.map(Self).map_err(wrong)
     }
 
     /// Read operators from the TOML that `farnear operators --out` writes.

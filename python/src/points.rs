@@ -3,7 +3,10 @@
 use numpy::{IntoPyArray, PyArray3};
 use pyo3::prelude::*;
 
-use crate::arrays::{Map, named, optics_named};
+use crate::{
+    arrays::{Map, named, optics_named},
+    work,
+};
 
 /// Object point that each pixel of a whole depth map sees.
 ///
@@ -33,5 +36,5 @@ pub fn points_mm<'py>(
     let depth_mm: Map<'py> = named("depth_mm", depth_mm)?;
     let optics = &*optics_named("optics", optics)?;
     let depth_mm = depth_mm.view();
-    Ok(py.detach(|| farnear_workflows::measure::points_mm(depth_mm, &optics.0)).into_pyarray(py))
+    Ok(work::run(py, || farnear_workflows::measure::points_mm(depth_mm, &optics.0))?.into_pyarray(py))
 }

@@ -13,6 +13,7 @@ use pyo3::{
 use crate::{
     arrays::Mask,
     errors::{FarnearError, wrong},
+    work,
 };
 
 /// Recogniser of activities of people, from the masks of a clip.
@@ -83,15 +84,18 @@ impl Recogniser {
                 "there is no activity {unknown:?}; the model knows {known}"
             )));
         }
+        if among.as_ref().is_some_and(Vec::is_empty) {
+            return Err(FarnearError::new_err("among names no activity"));
+        }
         let full =
             views.first().and_then(|view| view.first()).is_none_or(|mask| mask.dim() != (SIDE_PX, SIDE_PX));
         let recogniser = self.model.recogniser(full);
-        let answer = py.detach(|| {
+        let answer = work::run(py, || {
             let scaling = recogniser.settings.scaling;
             let tracks: Vec<Track> =
                 views.iter().map(|masks| Track::from_masks(masks, scaling, full)).collect();
             recogniser.recognise(&tracks)
-        });
+        })?;
         let mut answer = answer.map_err(wrong)?;
         if let Some(among) = among {
             answer = answer.among(&among);

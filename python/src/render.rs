@@ -5,7 +5,7 @@ use ndarray::Array2;
 use numpy::{IntoPyArray, PyArray2};
 use pyo3::prelude::*;
 
-use crate::{errors::wrong, optics::Optics};
+use crate::{errors::wrong, optics::Optics, work};
 
 /// Far image, near image, true depth.
 type Rendered<'py> = (Bound<'py, PyAny>, Bound<'py, PyAny>, Bound<'py, PyArray2<f32>>);
@@ -68,7 +68,7 @@ pub fn render<'py>(
         let near = renderer.expose(lens.sensor_near_mm, 1).map_err(wrong)?;
         Ok((far, near, truth(&scene, &lens, &camera)))
     };
-    let (far, near, truth) = py.detach(expose)?;
+    let (far, near, truth) = work::run(py, expose)??;
     let bits = noise.bits();
     Ok((of_codes(py, far, bits), of_codes(py, near, bits), truth.into_pyarray(py)))
 }

@@ -1,13 +1,6 @@
 //! The board for `farnear.rig.Rig`: Ctrl-C interrupts each call and stops all motion.
 
-use std::{
-    collections::BTreeMap,
-    sync::{
-        Arc,
-        atomic::{AtomicBool, Ordering},
-    },
-    time::Duration,
-};
+use std::{collections::BTreeMap, sync::Arc, time::Duration};
 
 use farnear_capture::{
     Client,
@@ -33,10 +26,8 @@ use pyo3::{prelude::*, types::PyDict};
 use crate::{
     errors::{FarnearError, RigError, rig, wrong},
     optics::Optics,
+    work,
 };
-
-/// Polling interval for interruptions.
-const LOOK: Duration = Duration::from_millis(2);
 
 /// An image (height, width), its bit depth, and its record.
 type Taken<'py> = (Bound<'py, PyArray2<u16>>, u8, Bound<'py, PyDict>);
@@ -226,28 +217,11 @@ impl RigClient {
         work: impl FnOnce(&Client) -> Result<T, Failed> + Send,
     ) -> PyResult<T> {
         let mut client = self.0.clone();
-        let wish = Arc::new(AtomicBool::new(false));
-        client.interrupt_by(Arc::clone(&wish));
-        std::thread::scope(|scope| {
-            let worker = scope.spawn(move || work(&client));
-            let mut interrupted = None;
-            while !worker.is_finished() {
-                py.detach(|| std::thread::sleep(LOOK));
-                if interrupted.is_none()
-                    && let Err(error) = py.check_signals()
-                {
-                    wish.store(true, Ordering::Relaxed);
-                    interrupted = Some(error);
-                }
-            }
-            let done = worker
-                .join()
-                .map_err(|_| RigError::new_err("the work ended with a panic, a mistake of farnear's"))?;
-            match interrupted {
-                Some(error) => Err(error),
-                None => done.map_err(|Failed(message)| RigError::new_err(message)),
-            }
-        })
+        let done = work::interruptibly(py, move |stop| {
+            client.interrupt_by(Arc::clone(stop));
+            work(&client)
+        })?;
+        done.map_err(|Failed(message)| RigError::new_err(message))
     }
 }
 

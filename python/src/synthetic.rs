@@ -7,7 +7,7 @@ use ndarray::{Array3, Axis};
 use numpy::{IntoPyArray, PyArray3};
 use pyo3::prelude::*;
 
-use crate::errors::FarnearError;
+use crate::{errors::FarnearError, work};
 
 const MM_PER_PX: f64 = 10.0;
 const MARGIN_PX: usize = 2;
@@ -49,10 +49,13 @@ pub fn synthetic_masks<'py>(
             "there is no activity {activity:?}; expected one of {known}"
         )));
     };
+    if !azimuth_deg.is_finite() {
+        return Err(FarnearError::new_err(format!("azimuth_deg is {azimuth_deg}; expected an angle")));
+    }
     if !(1.0..=1000.0).contains(&rate_hz) {
         return Err(FarnearError::new_err(format!("rate_hz = {rate_hz} is not in 1 to 1000")));
     }
-    let frames = py.detach(|| {
+    let frames = work::run(py, || {
         let bodies = performance(subject, number, 0, rate_hz);
         let view = View { alpha_deg: 0.0, beta_deg: 0.0, gamma_deg: azimuth_deg };
         let reach: Vec<_> = bodies.iter().flat_map(|body| extent(body, &view)).collect();
@@ -60,6 +63,6 @@ pub fn synthetic_masks<'py>(
         let masks: Vec<Mask> = bodies.iter().map(|body| draw(body, &view, &canvas)).collect();
         let views: Vec<_> = masks.iter().map(|mask| mask.view().insert_axis(Axis(0))).collect();
         ndarray::concatenate(Axis(0), &views).ok()
-    });
+    })?;
     Ok(frames.unwrap_or_else(|| Array3::default((0, 0, 0))).into_pyarray(py))
 }

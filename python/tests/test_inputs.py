@@ -1,6 +1,7 @@
 """What scientists have in memory: masked arrays, any numeric type, results that travel and are stored."""
 
 import copy
+import multiprocessing
 import pickle
 import threading
 
@@ -229,3 +230,45 @@ def test_a_lens_is_calibrated_from_a_stack_and_measures_its_pairs():
     assert np.nanmedian(found.depth_mm) == pytest.approx(100 - 0.05 * (20 - first), abs=0.017)
     with pytest.raises(farnear.FarnearError, match="2 slices"):
         farnear.calibrate_stack(slices[:2], step_mm=0.1)
+
+
+def _median_mm(far, near, optics):
+    return float(np.nanmedian(farnear.depth(far, near, optics).depth_mm))
+
+
+@pytest.mark.skipif("fork" not in multiprocessing.get_all_start_methods(), reason="this system has no fork")
+@pytest.mark.filterwarnings("ignore:.*fork.*:DeprecationWarning")
+def test_a_child_by_fork_has_threads_of_its_own(optics, slant):
+    pair = (*slant[:2], optics)
+    expected = _median_mm(*pair)
+    with multiprocessing.get_context("fork").Pool(2) as pool:
+        assert pool.starmap_async(_median_mm, [pair] * 2).get(timeout=60) == [expected] * 2
+
+
+def test_images_of_different_scales_are_refused(optics, slant):
+    far, near, _ = slant
+    with pytest.raises(farnear.FarnearError, match="scales differ"):
+        farnear.Processor(optics).run(far, near.astype("f4"))
+    with pytest.raises(farnear.FarnearError, match=r"images\[2\].*scales differ"):
+        farnear.focus_stack([far, near, far.astype("f4")])
+
+
+def test_a_white_level_saturates_brighter_pixels(optics, slant):
+    far, near, _ = slant
+    white = int(np.percentile(far, 99))
+    found = farnear.depth(far, near, optics, white_level=white)
+    clipped = farnear.depth(np.minimum(far, white), np.minimum(near, white), optics, white_level=white)
+    np.testing.assert_array_equal(found.depth_mm, clipped.depth_mm)
+
+
+def test_missing_files_are_named(tmp_path):
+    for load in (farnear.DepthMap.load, farnear.Correction.load, farnear.Optics.load):
+        with pytest.raises(FileNotFoundError, match="missing"):
+            load(tmp_path / "missing")
+
+
+def test_arguments_without_a_meaning_are_refused():
+    with pytest.raises(farnear.FarnearError, match="azimuth_deg"):
+        farnear.synthetic_masks("walk", azimuth_deg=float("nan"))
+    with pytest.raises(farnear.FarnearError, match="among"):
+        farnear.Recogniser().recognise(farnear.synthetic_masks("walk"), among=[])

@@ -1,8 +1,8 @@
 use std::time::{Duration, Instant};
 
 use farnear_protocol::{
-    message::{EventKind, Limits, Shot, ShotRecord, TriggerMode, sensor_distance_nm},
-    units::Micros,
+    message::{Axis, EventKind, Limits, Shot, ShotRecord, TriggerMode, sensor_distance_nm},
+    units::{Micros, Nanometres},
 };
 
 use crate::{
@@ -155,8 +155,27 @@ fn expect_no_more(client: &Client, camera: &mut dyn Camera) -> Result<(), Captur
     }
 }
 
-pub fn check_exposures(client: &Client, shots: &[Shot]) -> Result<(), PlanError> {
-    shots.iter().try_for_each(|shot| check_exposure(client, shot.exposure))
+/// Whether the board can take these shots, by its limits.
+pub fn check_shots(client: &Client, shots: &[Shot]) -> Result<(), CaptureError> {
+    one_trigger(shots)?;
+    let max = client.hello().limits.shots_max;
+    if shots.is_empty() || shots.len() > usize::from(max) {
+        return Err(PlanError::Shots { asked: shots.len(), max }.into());
+    }
+    for shot in shots {
+        check_exposure(client, shot.exposure)?;
+        check_position(client, shot.axis, shot.target)?;
+    }
+    Ok(())
+}
+
+/// Whether a position is within the board's limits for this axis.
+pub fn check_position(client: &Client, axis: Axis, asked: Nanometres) -> Result<(), PlanError> {
+    let (min, max) = client.hello().limits.of(axis);
+    match (min..=max).contains(&asked) {
+        true => Ok(()),
+        false => Err(PlanError::Position { axis: axis.name(), asked, min, max }),
+    }
 }
 
 pub fn check_exposure(client: &Client, asked: Micros) -> Result<(), PlanError> {

@@ -94,7 +94,7 @@ pub enum FocusSearchError {
     },
     #[error(
         "no focus within {range_mm} mm of the start at {start_mm:.4} mm (last looked at {last_mm:.4} mm): is there a textured \
-         target, is the lens cap off, does the start suit the target's distance?"
+         target, is the lens cap off, do start and range suit the target's distance?"
     )]
     NotFound { range_mm: f64, start_mm: f64, last_mm: f64 },
 }
@@ -238,8 +238,12 @@ impl Search<'_> {
                 self.mm(looked_at),
                 (around - looked_at) / 1e3
             ));
-            if (around - looked_at).abs() <= GOOD_NM {
+            if (estimated - looked_at).abs() <= GOOD_NM {
                 return Ok((around, place));
+            }
+            if (around - looked_at).abs() <= GOOD_NM {
+                // At the end of the range, and the focus is beyond it.
+                return Err(self.not_found(start));
             }
             let wanted = around - f64::from(self.middle());
             let (min, max) = (f64::from(self.limits.coarse_min.0), f64::from(self.limits.coarse_max.0));

@@ -20,6 +20,13 @@ pub enum PlanError {
     #[error("an exposure of {} us is outside the board's limits, {} to {} us", asked.0, min.0, max.0)]
     Exposure { asked: Micros, min: Micros, max: Micros },
     #[error(
+        "{axis} to {:.3} um is outside the board's limits, {:.3} to {:.3} um",
+        um(asked.0), um(min.0), um(max.0)
+    )]
+    Position { axis: &'static str, asked: Nanometres, min: Nanometres, max: Nanometres },
+    #[error("the board holds 1 to {max} shots at a time, {asked} are asked for")]
+    Shots { asked: usize, max: u8 },
+    #[error(
         "the optics ask for {travel_um:.2} um between the two images, the piezo has {piezo_um:.2} um; \
          a smaller max_blur_px or f-number needs less"
     )]

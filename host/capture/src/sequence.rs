@@ -154,15 +154,15 @@ pub fn nanometres(position_um: f64) -> Option<Nanometres> {
     (nm.is_finite() && nm.abs() <= f64::from(i32::MAX)).then_some(Nanometres(nm as i32))
 }
 
-/// Reads a program file; the board checks the shots when armed.
-pub fn read_program(text: &str) -> Result<Vec<Shot>, ProgramError> {
+/// Reads a program file; `exposure` is that of shots whose file names none. The board checks the shots when armed.
+pub fn read_program(text: &str, exposure: Micros) -> Result<Vec<Shot>, ProgramError> {
     let ProgramFile { exposure_us, settle_window_nm, settle_dwell_us, repeat, trigger, shot } =
         toml::from_str(text)?;
     let options = Options { exposure_us, settle_window_nm, settle_dwell_us, repeat, trigger };
     if shot.is_empty() {
         return Err(ProgramError::Empty);
     }
-    let defaults = options.over(&ShotDefaults::default());
+    let defaults = options.over(&ShotDefaults { exposure, ..ShotDefaults::default() });
     let shots = shot.into_iter().enumerate().map(|(index, entry)| {
         let ShotEntry { axis, to_um, exposure_us, settle_window_nm, settle_dwell_us, repeat, trigger } =
             entry;
@@ -198,6 +198,7 @@ mod tests {
             "exposure_us = 3000\ntrigger = \"software\"\n\
              [[shot]]\naxis = \"coarse\"\nto_um = 5800.0\nsettle_window_nm = 700\n\
              [[shot]]\naxis = \"fine\"\nto_um = -0.5\nexposure_us = 20\nrepeat = 3\n",
+            Micros(7),
         )
         .unwrap();
         let modes = shots.iter().all(|shot| shot.mode == TriggerMode::Software);
@@ -211,6 +212,12 @@ mod tests {
     }
 
     #[test]
+    fn a_program_that_names_no_exposure_has_the_given_one() {
+        let shots = read_program("[[shot]]\naxis = \"fine\"\nto_um = 1.0\n", Micros(2_000)).unwrap();
+        assert_eq!(shots[0].exposure, Micros(2_000));
+    }
+
+    #[test]
     fn invalid_programs_are_rejected_with_a_reason() {
         for (text, phrase) in [
             ("exposure_us = 3", "no [[shot]]"),
@@ -220,7 +227,7 @@ mod tests {
             ("exposre_us = 3\n[[shot]]\naxis = \"fine\"\nto_um = 1.0", "exposre_us"),
             ("[[shot]]\naxis = \"fine\"\nto_um = 1.0\nexposre_us = 3", "exposre_us"),
         ] {
-            let error = read_program(text).unwrap_err().to_string();
+            let error = read_program(text, Micros(7)).unwrap_err().to_string();
             assert!(error.contains(phrase), "{error}");
         }
     }

@@ -38,6 +38,8 @@ pub enum EmbeddingError {
         "the RBF system is singular with ridge {ridge}: raise it (1e-4 to 1e-2 are usual) or remove duplicate samples"
     )]
     Singular { ridge: f64 },
+    #[error("{name} is {value}: expected 0 or more")]
+    Parameter { name: &'static str, value: f64 },
     #[error("{what}: expected {expected}, found {found}")]
     Shape { what: &'static str, expected: usize, found: usize },
 }

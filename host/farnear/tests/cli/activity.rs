@@ -293,8 +293,17 @@ fn damaged_models_and_samples_are_named_and_nothing_is_written() {
         ),
         (
             "twice.toml",
-            (sample("people/p00-dig-1/view1", "dig") + "clip = \"x\"\n").repeat(2),
+            ["people/p00-dig-1/view1", "people/p00-dig-1/view2"]
+                .map(|folder| sample(folder, "dig") + "clip = \"x\"\n")
+                .concat(),
             vec!["twice.toml", "clip `x`", "view 1 twice"],
+        ),
+        (
+            "again.toml",
+            ["people/p00-dig-1/view1", "people/../people/p00-dig-1/view1"]
+                .map(|folder| sample(folder, "dig"))
+                .concat(),
+            vec!["again.toml", "view1 are listed twice"],
         ),
     ] {
         let file = people.folder.file(name, text);

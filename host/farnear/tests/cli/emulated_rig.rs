@@ -69,8 +69,10 @@ fn the_stage_homes_moves_and_stops_and_keeps_its_limits() {
     }
     let fine = figures(&mut on_the_rig(&["move", "--axis", "fine", "--to-um", "50", "--json"]));
     assert!((number(&fine, "measured_um") - 50.0).abs() <= 0.05, "{fine}");
+    let again = ["home", "--axis", "lens", "--axis", "lens"];
+    fails(&mut on_the_rig(&again), 2, &["axis lens", "each axis once"]);
     let beyond = ["move", "--axis", "fine", "--to-um", "500"];
-    fails(&mut on_the_rig(&beyond), 1, &["refused", "500.000 um", "5.000 to 195.000 um"]);
+    fails(&mut on_the_rig(&beyond), 1, &["outside the board's limits", "500.000 um", "5.000 to 195.000 um"]);
     let below = ["move", "--axis", "fine", "--to-um", "-1"];
     fails(&mut on_the_rig(&below), 1, &["-1.000 um", "5.000 to 195.000 um"]);
     fails(

@@ -50,6 +50,14 @@ fn focusing_from_a_millimetre_off_is_quick_and_lands_where_the_image_is_sharpest
 
 #[test]
 #[cfg_attr(not(emulated_rig), ignore = "needs farnear-sim: cargo xtask test")]
+fn a_focus_beyond_the_range_is_not_found_at_its_end() {
+    // The image of a plane at 500 mm is 2.7 mm behind that at 933 mm, where the search begins.
+    let focus = ["focus", "--scene", "plane:500", "--optics", rig_optics()];
+    fails(&mut on_the_rig(&focus), 1, &["no focus within 1 mm", "range"]);
+}
+
+#[test]
+#[cfg_attr(not(emulated_rig), ignore = "needs farnear-sim: cargo xtask test")]
 fn a_stack_and_a_program_leave_their_images_and_what_was_measured() {
     let folder = Folder::new();
     // Near the focus: the simulator takes long to draw strong blur.
@@ -75,7 +83,7 @@ fn a_stack_and_a_program_leave_their_images_and_what_was_measured() {
     assert_eq!(number(&figures(&mut on_the_rig(&run)), "exposures"), 8.0);
     let bad = folder.file("bad.toml", "[[shot]]\naxis = \"fine\"\nto_um = 300.0\n");
     let run = ["sequence", "--program", &bad, "--out", &folder.text("bad")];
-    fails(&mut on_the_rig(&run), 1, &["refused", "300.000 um", "195.000 um"]);
+    fails(&mut on_the_rig(&run), 1, &["outside the board's limits", "300.000 um", "195.000 um"]);
     assert!(!folder.path("bad").exists());
 }
 

@@ -43,6 +43,12 @@ impl Rbf {
         ridge: f64,
     ) -> Result<Self, EmbeddingError> {
         check(samples, 2)?;
+        check(coordinates, 0)?;
+        for (name, value) in [("gamma", f64::from(gamma)), ("ridge", ridge)] {
+            if !(value.is_finite() && value >= 0.0) {
+                return Err(EmbeddingError::Parameter { name, value });
+            }
+        }
         if coordinates.nrows() != samples.nrows() {
             return Err(EmbeddingError::Shape {
                 what: "rows of the coordinates",
@@ -73,6 +79,7 @@ impl Rbf {
         ridge: f64,
         condition: f64,
     ) -> Self {
+        let centres = centres.as_standard_layout().into_owned();
         let fits = centres.iter().all(|v| (0.0..=LARGEST).contains(v));
         let fixed = fits.then(|| centres.rows().into_iter().flat_map(quantised).collect());
         let by_dimension = weights.t().as_standard_layout().to_owned();
@@ -108,8 +115,10 @@ impl Rbf {
         Ok(out)
     }
 
-    /// Embeds samples (N x d) to N x D coordinates on the current rayon pool; fails for another width.
+    /// Embeds samples (N x d) to N x D coordinates on the current rayon pool; fails for another width or values that are
+    /// not finite.
     pub fn embed_all(&self, samples: ArrayView2<f32>) -> Result<Array2<f32>, EmbeddingError> {
+        check(samples, 0)?;
         let rows: Result<Vec<Array1<f32>>, EmbeddingError> =
             samples.outer_iter().into_par_iter().map(|row| self.embed(row)).collect();
         let mut out = Array2::zeros((samples.nrows(), self.dimensions()));
@@ -248,6 +257,32 @@ mod tests {
         let worst =
             (&found - &targets.slice(ndarray::s![350.., ..])).mapv(f32::abs).fold(0.0_f32, |m, v| m.max(*v));
         assert!(worst < 0.6, "off by {worst} of 10");
+    }
+
+    #[test]
+    fn the_order_of_samples_in_memory_does_not_matter() {
+        let (samples, targets) = data(60, 40);
+        // Beyond the fixed point's range.
+        let samples = samples * 10.0;
+        let by_columns = samples.t().as_standard_layout().into_owned().reversed_axes();
+        let map =
+            |samples: ArrayView2<f32>| Rbf::train(samples, targets.view(), 0.01, 1e-3).expect("solvable");
+        let (rows, columns) = (map(samples.view()), map(by_columns.view()));
+        let found = columns.embed_all(by_columns.view()).expect("same width");
+        assert_eq!(found, rows.embed_all(samples.view()).expect("same width"));
+    }
+
+    #[test]
+    fn parameters_and_samples_without_a_meaning_are_refused() {
+        let (samples, targets) = data(20, 8);
+        for (gamma, ridge) in [(-1.0, 1e-3), (f32::NAN, 1e-3), (0.1, -1.0)] {
+            let error = Rbf::train(samples.view(), targets.view(), gamma, ridge).unwrap_err();
+            assert!(matches!(error, EmbeddingError::Parameter { .. }), "{error}");
+        }
+        let rbf = Rbf::train(samples.view(), targets.view(), 0.1, 1e-3).expect("solvable");
+        let mut odd = samples;
+        odd[(3, 2)] = f32::NAN;
+        assert_eq!(rbf.embed_all(odd.view()), Err(EmbeddingError::NotFinite { row: 3 }));
     }
 
     #[test]

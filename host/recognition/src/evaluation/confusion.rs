@@ -50,9 +50,9 @@ impl Confusion {
 
     /// Markdown table in per cent of each truth, as the thesis' tables 9.1 to 9.3.
     pub fn to_markdown(&self) -> String {
-        let mut text =
-            format!("| | {} |\n|---|{}\n", self.classes.join(" | "), "---|".repeat(self.classes.len()));
-        for (name, row) in self.classes.iter().zip(&self.counts) {
+        let classes: Vec<String> = self.classes.iter().map(|name| name.replace('|', "\\|")).collect();
+        let mut text = format!("| | {} |\n|---|{}\n", classes.join(" | "), "---|".repeat(classes.len()));
+        for (name, row) in classes.iter().zip(&self.counts) {
             let total = row.iter().sum::<u32>().max(1);
             let cells: Vec<String> = row
                 .iter()

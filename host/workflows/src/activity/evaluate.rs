@@ -143,6 +143,12 @@ impl Request for EvaluateRequest {
         if let Some(model) = &self.model {
             none_of("model", model.display(), learning)?;
             none_of("model", model.display(), [align, ("options of the method", !self.method.is_default())])?;
+            let sets: Vec<&PathBuf> = std::iter::once(&self.samples).chain(&self.leave_one_set_out).collect();
+            let twice = (1..sets.len()).find(|at| sets[..*at].iter().any(|set| same_file(set, sets[*at])));
+            if let Some(at) = twice {
+                let expected = "expected each set once: a limit from the set itself says nothing";
+                return Err(WorkflowError::parameter("leave-one-set-out", sets[at].display(), expected));
+            }
             return set.map_or(Ok(()), |set| none_of("leave-one-set-out", set.display(), [views, adapt]));
         }
         let of_models = [
@@ -194,10 +200,18 @@ impl Request for EvaluateRequest {
 }
 
 impl EvaluateRequest {
-    pub(super) fn name_in_model(&self, activity: &str) -> String {
-        let pairs = self.same.iter().filter_map(|same| pair(same).ok());
-        pairs.into_iter().find(|(own, _)| *own == activity).map_or(activity, |(_, known)| known).to_owned()
+    /// Names in the samples and in the model.
+    pub(super) fn same(&self) -> impl Iterator<Item = (&str, &str)> {
+        self.same.iter().filter_map(|same| pair(same).ok())
     }
+
+    pub(super) fn name_in_model(&self, activity: &str) -> String {
+        self.same().find(|(own, _)| *own == activity).map_or(activity, |(_, known)| known).to_owned()
+    }
+}
+
+fn same_file(a: &Path, b: &Path) -> bool {
+    a == b || a.canonicalize().is_ok_and(|a| b.canonicalize().is_ok_and(|b| a == b))
 }
 
 fn pair(same: &str) -> Result<(&str, &str)> {

@@ -1,6 +1,8 @@
 //! Evaluates a finished model on labelled clips.
 
-use farnear_files::staging::Staging;
+use std::{collections::BTreeSet, io, path::Path};
+
+use farnear_files::staging::{Staging, StagingError};
 use farnear_recognition::choice::Views;
 use farnear_recognition::clip::{Clip, Track};
 use farnear_recognition::evaluation::{
@@ -18,7 +20,12 @@ use super::{
     recognition::Model,
     samples::{Samples, SamplesError},
 };
-use crate::{context::Context, counter::Counter, error::Result, figures::rounded};
+use crate::{
+    context::Context,
+    counter::Counter,
+    error::{Result, WorkflowError},
+    figures::rounded,
+};
 
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct JudgingFigures {
@@ -64,6 +71,7 @@ pub(super) fn judge(
     context: &Context<'_>,
 ) -> Result<JudgingFigures> {
     let samples = Samples::read_opened(&request.samples, request.open_blind_set.as_deref(), context)?;
+    check_same(request, samples.clips.iter().map(|clip| &clip.activity), model)?;
     let activities = model.activities();
     let name = |activity: &str| request.name_in_model(activity);
     let fused = request.views == Some(Views::Fused);
@@ -107,9 +115,37 @@ pub(super) fn judge(
     if let Some(out) = out {
         out.write("confusion.png", &confusion_picture::png(&figures.confusion)?)?;
         out.write("confusion.md", figures.confusion.to_markdown().as_bytes())?;
-        out.write("wrong.csv", wrong(&known, &among).as_bytes())?;
+        out.write(
+            "wrong.csv",
+            &wrong(&known, &among)
+                .map_err(io::Error::from)
+                .map_err(StagingError::at(Path::new("wrong.csv")))?,
+        )?;
     }
     Ok(figures)
+}
+
+/// Refuses pairs of names of which neither the samples nor the model know one.
+pub(super) fn check_same<'a>(
+    request: &EvaluateRequest,
+    of_samples: impl Iterator<Item = &'a String>,
+    model: &Model,
+) -> Result<()> {
+    let of_samples: BTreeSet<&str> = of_samples.map(String::as_str).collect();
+    for (own, known) in request.same() {
+        let same = || format!("{own}={known}");
+        if !of_samples.contains(own) {
+            let found = of_samples.into_iter().collect::<Vec<_>>().join(", ");
+            let expected = format!("`{own}` is no activity of the samples, which hold {found}");
+            return Err(WorkflowError::parameter("same", same(), expected));
+        }
+        if !model.activities().iter().any(|activity| activity == known) {
+            let expected =
+                format!("`{known}` is no activity of the model: {}", model.activities().join(", "));
+            return Err(WorkflowError::parameter("same", same(), expected));
+        }
+    }
+    Ok(())
 }
 
 pub(super) fn answers<'a>(
@@ -181,21 +217,23 @@ fn figures(known: &[Judged], strange: &[Judged], among: &[String], not_known: Ve
     }
 }
 
-/// Misclassified clips, the most confident first.
-fn wrong(known: &[Judged], among: &[String]) -> String {
-    let mut found: Vec<(f32, String)> = known
+/// Misclassified clips, the most confident first, as CSV.
+fn wrong(known: &[Judged], among: &[String]) -> Result<Vec<u8>, csv::Error> {
+    let mut found: Vec<(f32, [String; 6])> = known
         .iter()
         .filter_map(|judged| {
             let answer = judged.answer.among(among);
-            let best = answer.best().filter(|best| *best != &judged.truth)?;
-            let Clip { subject, activity, .. } = judged.clip;
-            let frames = judged.clip.views.get(judged.view - 1).map_or(0, Track::frames);
-            let line =
-                format!("{subject},{activity},{},{frames},{best},{:.4}\n", judged.view, answer.confidence);
-            Some((answer.confidence, line))
+            let best = answer.best().filter(|best| *best != &judged.truth)?.clone();
+            let Clip { subject, activity, views } = judged.clip;
+            let frames = views.get(judged.view - 1).map_or(0, Track::frames);
+            let [view, frames] = [judged.view, frames].map(|number| number.to_string());
+            let confidence = format!("{:.4}", answer.confidence);
+            Some((answer.confidence, [subject.clone(), activity.clone(), view, frames, best, confidence]))
         })
         .collect();
     found.sort_by(|a, b| b.0.total_cmp(&a.0));
-    let head = "subject,activity,view,frames,answer,confidence\n".to_owned();
-    found.into_iter().fold(head, |text, (_, line)| text + &line)
+    let mut table = csv::Writer::from_writer(Vec::new());
+    table.write_record(["subject", "activity", "view", "frames", "answer", "confidence"])?;
+    found.iter().try_for_each(|(_, row)| table.write_record(row))?;
+    table.into_inner().map_err(|error| error.into_error().into())
 }

@@ -2,7 +2,7 @@
 //! `clip` name form a clip. Without names, the n-th samples of each view do.
 
 use std::{
-    collections::{BTreeMap, BTreeSet, HashMap},
+    collections::{BTreeMap, BTreeSet, HashMap, HashSet},
     fs,
     io::Write,
     path::{Path, PathBuf},
@@ -65,6 +65,8 @@ pub enum SamplesError {
         "the masks of {} are full frames, those of {} cut out at 100x100; samples must be alike", full.display(), cut_out.display()
     )]
     Kinds { full: PathBuf, cut_out: PathBuf },
+    #[error("the masks of {} are listed twice: a clip that is in training and test says nothing", folder.display())]
+    ListedTwice { folder: PathBuf },
     #[error("clip `{clip}` of {subject} at {activity} has view {view} twice")]
     Twice { clip: String, subject: String, activity: String, view: u32 },
     #[error(
@@ -154,6 +156,13 @@ impl Samples {
             return Err(SamplesError::None.into());
         }
         let folders: Vec<PathBuf> = samples.iter().map(|sample| base.join(&sample.masks)).collect();
+        let mut listed = HashSet::new();
+        if let Some(folder) = folders
+            .iter()
+            .find(|folder| !listed.insert(folder.canonicalize().unwrap_or_else(|_| folder.to_path_buf())))
+        {
+            return Err(SamplesError::ListedTwice { folder: folder.clone() }.into());
+        }
         let counter = Counter::new(context, "samples read");
         let described: Result<Vec<(Track, bool)>> = folders
             .par_iter()

@@ -1,7 +1,7 @@
 //! Leave-one-set-out: evaluates a finished model, and thresholds from the other sets, on each set. A blind set
 //! (`blind = "why"`) needs a reason, which is recorded in `openings.csv` next to it.
 
-use std::path::Path;
+use std::{collections::BTreeSet, path::Path};
 
 use farnear_recognition::evaluation::calibration::{Reliability, area_under_roc};
 use farnear_recognition::model::Recogniser;
@@ -10,7 +10,7 @@ use serde::Serialize;
 
 use super::{
     evaluate::EvaluateRequest,
-    judging::{Judged, answers},
+    judging::{Judged, answers, check_same},
     recognition::Model,
     samples::{Samples, SamplesError},
 };
@@ -28,10 +28,10 @@ pub struct SetFigures {
     pub calibration_error_among: f64,
     /// Share of known clips called unknown by the model's own limits.
     pub unknown_of_known: f64,
-    /// As `unknown_of_known`, by `limit_of_other_sets`.
-    pub unknown_of_known_by_other_sets: f64,
-    /// Outlier score that gives the promised share on the other sets together.
-    pub limit_of_other_sets: f64,
+    /// As `unknown_of_known`, by `limit_of_other_sets`; `None` without a limit.
+    pub unknown_of_known_by_other_sets: Option<f64>,
+    /// Outlier score that gives the promised share on the other sets together; `None` where they hold too few clips.
+    pub limit_of_other_sets: Option<f64>,
     pub strangers: usize,
     /// Share of unknown activities called unknown by `limit_of_other_sets`; `None` without any.
     pub unknown_of_strangers_by_other_sets: Option<f64>,
@@ -49,12 +49,13 @@ pub struct SetsFigures {
     /// Largest measured share on a left-out set: the expectation for a new one.
     pub worst_unknown_of_known: f64,
     /// As `worst_unknown_of_known`, by the limits of the other sets.
-    pub worst_unknown_of_known_by_other_sets: f64,
+    pub worst_unknown_of_known_by_other_sets: Option<f64>,
     pub sets: Vec<SetFigures>,
 }
 
 struct Measured {
     name: String,
+    activities: BTreeSet<String>,
     known: Vec<(f32, bool)>,
     strange: Vec<f32>,
     right: usize,
@@ -74,10 +75,11 @@ pub(super) fn leave_one_set_out(
         .map(|path| measured(model, path, request, context))
         .collect::<Result<Vec<Measured>>>()?;
     let sets: Vec<SetFigures> = (0..measured.len()).map(|left_out| figures(&measured, left_out)).collect();
-    let worst = |of: fn(&SetFigures) -> f64| sets.iter().map(of).fold(0.0, f64::max);
+    check_same(request, measured.iter().flat_map(|set| &set.activities), model)?;
+    let worst = |of: fn(&SetFigures) -> Option<f64>| sets.iter().filter_map(of).reduce(f64::max);
     Ok(SetsFigures {
         promised_unknown_of_known: rounded(f64::from(Limits::FALSE_ALARMS), 4),
-        worst_unknown_of_known: worst(|set| set.unknown_of_known),
+        worst_unknown_of_known: worst(|set| Some(set.unknown_of_known)).unwrap_or_default(),
         worst_unknown_of_known_by_other_sets: worst(|set| set.unknown_of_known_by_other_sets),
         sets,
     })
@@ -106,6 +108,7 @@ fn measured(
     among.sort();
     among.dedup();
     let mut measured = Measured {
+        activities: samples.clips.iter().map(|clip| clip.activity.clone()).collect(),
         name: path
             .parent()
             .and_then(Path::file_name)
@@ -166,10 +169,10 @@ fn figures(measured: &[Measured], left_out: usize) -> SetFigures {
         accuracy_among: share(set.right_among, known.len()),
         calibration_error_among: rounded(set.reliability.expected_error(), 4),
         unknown_of_known: share(beyond(&known, 1.0), known.len()),
-        unknown_of_known_by_other_sets: share(beyond(&known, limit), known.len()),
-        limit_of_other_sets: rounded(f64::from(limit), 4),
+        unknown_of_known_by_other_sets: limit.is_finite().then(|| share(beyond(&known, limit), known.len())),
+        limit_of_other_sets: limit.is_finite().then(|| rounded(f64::from(limit), 4)),
         strangers: set.strange.len(),
-        unknown_of_strangers_by_other_sets: any
+        unknown_of_strangers_by_other_sets: (any && limit.is_finite())
             .then(|| share(beyond(&set.strange, limit), set.strange.len())),
         outlier_auroc: any.then(|| rounded(area_under_roc(&known, &set.strange), 4)),
         left_out_auroc: set.left_out_auroc.map(|area| rounded(area, 4)),
@@ -183,6 +186,7 @@ mod tests {
     fn set(name: &str, scores: impl Iterator<Item = f32>) -> Measured {
         Measured {
             name: name.into(),
+            activities: BTreeSet::new(),
             known: scores.map(|score| (score, true)).collect(),
             strange: vec![5.0, 6.0],
             right: 10,
@@ -198,11 +202,20 @@ mod tests {
         let scores = |factor: f32| (0..100).map(move |n| factor * n as f32 / 100.0);
         let sets = [set("far", scores(2.0)), set("a", scores(1.0)), set("b", scores(1.0))];
         let far = figures(&sets, 0);
-        assert!((far.limit_of_other_sets - 0.95).abs() < 0.03, "{far:?}");
-        assert!((far.unknown_of_known_by_other_sets - 0.52).abs() < 0.03, "{far:?}");
+        assert!((far.limit_of_other_sets.unwrap() - 0.95).abs() < 0.03, "{far:?}");
+        assert!((far.unknown_of_known_by_other_sets.unwrap() - 0.52).abs() < 0.03, "{far:?}");
         assert!((far.unknown_of_known - 0.49).abs() < 0.02, "{far:?}");
         assert_eq!((far.unknown_of_strangers_by_other_sets, far.outlier_auroc), (Some(1.0), Some(1.0)));
         let near = figures(&sets, 1);
-        assert!(near.limit_of_other_sets > 1.5 && near.unknown_of_known_by_other_sets == 0.0, "{near:?}");
+        assert!(near.limit_of_other_sets > Some(1.5), "{near:?}");
+        assert_eq!(near.unknown_of_known_by_other_sets, Some(0.0), "{near:?}");
+    }
+
+    #[test]
+    fn too_few_clips_in_the_other_sets_give_no_limit() {
+        let scores = || (0..5).map(|n| n as f32 / 10.0);
+        let found = figures(&[set("a", scores()), set("b", scores())], 0);
+        assert_eq!((found.limit_of_other_sets, found.unknown_of_known_by_other_sets), (None, None));
+        assert_eq!(found.unknown_of_strangers_by_other_sets, None);
     }
 }

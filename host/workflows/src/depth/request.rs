@@ -25,6 +25,9 @@ use crate::{
     request::{self, PathKind, Request},
 };
 
+/// Beyond any machine's cores; thousands of threads bring a machine to a halt.
+const THREADS_MAX: usize = 1024;
+
 /// Compute a depth map from a far- and a near-focused image.
 ///
 /// Writes depth.npy and depth.tiff (mm, NaN = no value), depth.png (16 bit), confidence.npy (0 to 1), mesh.ply, view.png
@@ -196,6 +199,10 @@ impl Request for DepthRequest {
         if self.fill.is_none() && self.low_texture != LowTexture::default() {
             let expected = "it defines the regions that `fill` fills: give `fill` too";
             return Err(WorkflowError::parameter("low-texture", self.low_texture, expected));
+        }
+        if self.threads > THREADS_MAX {
+            let expected = format!("0 (all cores) to {THREADS_MAX}");
+            return Err(WorkflowError::parameter("threads", self.threads, expected));
         }
         if let Some(bin) = self.bin.filter(|bin| !(1..=16).contains(bin)) {
             return Err(WorkflowError::parameter("bin", bin, "1 to 16 pixels"));

@@ -7,7 +7,7 @@ use std::{fs, path::PathBuf};
 
 use farnear_capture::{
     continuous::{Continuous, Cycles, Frame, Outcome, Pace},
-    expose::{CaptureError, check_exposures},
+    expose::check_shots,
     pair::{Exposures, Reach, reach},
     plan::SensorPair,
     ready::ensure_homed,
@@ -131,7 +131,8 @@ pub fn run(settings: &ContinuousRequest, context: &Context<'_>) -> Result<Contin
         (None, Some(optics)) => (None, Some(GivenOptics::read(optics)?)),
         (Some(path), _) => {
             let text = fs::read_to_string(path).map_err(WorkflowError::read("the program", path))?;
-            (Some(read_program(&text).about(|| format!("the program {}", path.display()))?), None)
+            let shots = read_program(&text, settings.camera.exposure);
+            (Some(shots.about(|| format!("the program {}", path.display()))?), None)
         }
     };
     let mut folder = settings.out.as_deref().map(Folder::begin).transpose()?;
@@ -161,7 +162,7 @@ fn make_ready(
     let (client, say) = (&equipped.rig.client, &mut |what: &str| context.info(what));
     let Some(optics) = optics else {
         let shots = program.unwrap_or_default();
-        check_exposures(client, &shots).map_err(CaptureError::from)?;
+        check_shots(client, &shots)?;
         ensure_homed(client, say)?;
         return Ok(Ready { shots, pair: None });
     };

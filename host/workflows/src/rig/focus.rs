@@ -20,7 +20,6 @@ use serde_with::{DisplayFromStr, serde_as};
 use super::{
     RigAddress,
     camera::{CameraSettings, EquippedRig},
-    motion::nanometres,
 };
 use crate::{
     context::Context,
@@ -167,7 +166,13 @@ fn begin_at(client: &Client, start_mm: f64, context: &Context<'_>) -> Result<()>
     let limits = client.hello().limits;
     let middle = i64::from(limits.fine_min.0 + limits.fine_max.0) / 2;
     let coarse_nm = start_mm * 1e6 - (base_nm(client, &client.status()?) + middle) as f64;
-    let coarse = nanometres("start-mm", coarse_nm / 1e3)?;
+    let (min, max) = (f64::from(limits.coarse_min.0), f64::from(limits.coarse_max.0));
+    if !(min..=max).contains(&coarse_nm) {
+        let [min_mm, max_mm] = [min, max].map(|end| start_mm + (end - coarse_nm) / 1e6);
+        let expected = format!("the stage reaches {min_mm:.4} to {max_mm:.4} mm");
+        return Err(WorkflowError::parameter("start-mm", start_mm, expected));
+    }
+    let coarse = Nanometres(coarse_nm as i32);
     context.info(&format!("starting at a sensor distance of {start_mm:.4} mm"));
     client.move_to(Axis::SensorCoarse, coarse)?;
     client.move_to(Axis::SensorFine, Nanometres(middle as i32))?;

@@ -13,7 +13,7 @@ use ndarray::Axis;
 use super::{
     RigAddress,
     camera::{ADDRESSES, CameraAddress, CameraSettings},
-    pair::{AVERAGED_MAX, CaptureRequest, PairFigures, noted},
+    pair::{AVERAGED_MAX, CaptureRequest, PairFigures, noted, warn_of_images},
 };
 use crate::{
     context::Context,
@@ -64,6 +64,7 @@ pub(super) fn capture(settings: &CaptureRequest, context: &Context<'_>) -> Resul
     if settings.second_mirrored {
         pair.near.image.pixels.invert_axis(Axis(1));
     }
+    warn_of_images(&pair, context);
     let mut record = noted(&pair, &equipped, &optics, camera, *averaged);
     record.half_mirror = Some(HalfMirrorRecord {
         second_camera: second.kind().into(),

@@ -1,5 +1,6 @@
 use farnear_capture::{
     describe::um,
+    expose::{CaptureError, check_position},
     ready::{ensure_homed, steppers},
     sequence,
 };
@@ -36,6 +37,10 @@ impl Request for HomeRequest {
     const REQUIRED: &'static [&'static str] = &[];
     const PATHS: &'static [(&'static str, PathKind)] = &[];
     type Figures = HomeFigures;
+
+    fn check(&self) -> Result<()> {
+        each_once(&self.axis)
+    }
 
     fn run(&self, context: &Context<'_>) -> Result<HomeFigures> {
         home(self, context)
@@ -107,14 +112,18 @@ impl MoveRequest {
             let expected = format!("expected {axes} positions, one for each axis");
             return Err(WorkflowError::parameter("to-um", given.join(", "), expected));
         }
-        let twice = (1..axes).find(|at| self.axis[..*at].contains(&self.axis[*at]));
-        if let Some(at) = twice {
-            let expected = "expected each axis once";
-            return Err(WorkflowError::parameter("axis", Axis::from(self.axis[at]).name(), expected));
-        }
+        each_once(&self.axis)?;
         let pairs = self.axis.iter().zip(&self.to_um);
         pairs.map(|(axis, to_um)| Ok((Axis::from(*axis), nanometres("to-um", *to_um)?))).collect()
     }
+}
+
+fn each_once(axes: &[AxisName]) -> Result<()> {
+    let twice = (1..axes.len()).find(|at| axes[..*at].contains(&axes[*at]));
+    twice.map_or(Ok(()), |at| {
+        let expected = "expected each axis once";
+        Err(WorkflowError::parameter("axis", Axis::from(axes[at]).name(), expected))
+    })
 }
 
 #[derive(Clone, PartialEq, Debug, Serialize)]
@@ -141,6 +150,7 @@ pub fn nanometres(name: &'static str, position_um: f64) -> Result<Nanometres> {
 
 /// Homes the axes simultaneously.
 pub fn home(request: &HomeRequest, context: &Context<'_>) -> Result<HomeFigures> {
+    request.check()?;
     let rig = Rig::connect(&request.rig, None, context)?;
     let axes = match &request.axis[..] {
         [] => steppers(&rig.client.hello().capabilities),
@@ -160,6 +170,9 @@ pub fn home(request: &HomeRequest, context: &Context<'_>) -> Result<HomeFigures>
 pub fn move_to(request: &MoveRequest, context: &Context<'_>) -> Result<MoveFigures> {
     let targets = request.targets()?;
     let rig = Rig::connect(&request.rig, None, context)?;
+    for (axis, target) in &targets {
+        check_position(&rig.client, *axis, *target).map_err(CaptureError::from)?;
+    }
     if request.home {
         ensure_homed(&rig.client, &mut |what| context.info(what))?;
     }

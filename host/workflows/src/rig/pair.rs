@@ -6,7 +6,7 @@ use farnear_capture::{
     plan::SensorPair,
     record::{CaptureRecord, begin_folder, finish_folder, record_of},
 };
-use farnear_depth::prepare::CameraFrames;
+use farnear_depth::{focus_measure::FocusMeasure, prepare::CameraFrames};
 use ndarray::Zip;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -22,6 +22,7 @@ use crate::{
     error::{Result, WorkflowError},
     optics::GivenOptics,
     parameters::within,
+    picture,
     request::{PathKind, Request},
 };
 
@@ -229,6 +230,7 @@ fn take_by(
     if let Some(doubt) = doubt_of_light(&pair) {
         context.progress.warn(&doubt);
     }
+    warn_of_images(&pair, context);
     let mut record = noted(&pair, equipped, optics, settings, exposures.averaged);
     record.camera.ambient_subtracted = exposures.subtract_ambient;
     Ok((pair, record))
@@ -236,6 +238,15 @@ fn take_by(
 
 /// A lens that is not telecentric changes the brightness by about 1 % with its focus.
 const BRIGHTNESS_RATIO_MAX: f64 = 1.03;
+
+/// Warns of images that are unfit for depth.
+pub(super) fn warn_of_images(pair: &Pair, context: &Context<'_>) {
+    for (which, image) in [("far", &pair.far.image), ("near", &pair.near.image)] {
+        for warning in picture::figures(image, FocusMeasure::Tenengrad).warnings {
+            context.progress.warn(&format!("the {which} image: {warning}"));
+        }
+    }
+}
 
 /// Doubt about a pair whose images differ in brightness.
 fn doubt_of_light(pair: &Pair) -> Option<String> {

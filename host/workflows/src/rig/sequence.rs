@@ -3,7 +3,7 @@
 use std::{fs, path::PathBuf};
 
 use farnear_capture::{
-    expose::{CaptureError, check_exposures, expose},
+    expose::{CaptureError, check_shots, expose},
     ready::ensure_homed,
     record::{begin_folder, finish_sequence, record_of_sequence},
     sequence::{SequenceShot, ShotDefaults, image_name, read_program},
@@ -151,7 +151,7 @@ pub(super) fn take(
     folder: Staging,
     context: &Context<'_>,
 ) -> Result<Vec<SequenceShot>> {
-    check_exposures(&rig.rig.client, shots).map_err(CaptureError::from)?;
+    check_shots(&rig.rig.client, shots)?;
     ensure_homed(&rig.rig.client, &mut |what| context.info(what))?;
     let mut taken = Vec::new();
     for run in 0..settings.runs {
@@ -194,7 +194,8 @@ impl SequenceRequest {
     fn shots(&self) -> Result<Vec<Shot>> {
         if let Some(path) = &self.program {
             let text = fs::read_to_string(path).map_err(WorkflowError::read("the program", path))?;
-            return read_program(&text).about(|| format!("the program {}", path.display()));
+            return read_program(&text, self.camera.exposure)
+                .about(|| format!("the program {}", path.display()));
         }
         let (Some(axis), Some(from), Some(to), Some(steps)) = (self.axis, self.from, self.to, self.steps)
         else {
