@@ -372,7 +372,7 @@ class FocusStack:
     reliability : array float32
         How clear and how well fitted the maximum of sharpness is, 0 to 1.
     all_in_focus : array float32
-        Each pixel from the image in which it is sharpest, in the scale of the images.
+        Each pixel from the image in which it is sharpest: 0 to 1 for uint8 and uint16, else in the scale of the images.
     moved_px : float
         Farthest that alignment moved a pixel, px.
     """

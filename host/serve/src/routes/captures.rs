@@ -9,6 +9,7 @@ use axum::{
 };
 use farnear_workflows::{
     Context,
+    request::Request,
     rig::{
         AxisName, RigAddress,
         pair::{self, CaptureRequest as PairRequest},
@@ -244,6 +245,7 @@ async fn capture(
                 out: out.clone(),
                 ..PairRequest::default()
             };
+            settings.check()?;
             let capture = name_of(&out);
             let work = move |app: &App, context: &Context<'_>| {
                 let captured = pair::capture_seen(&settings, context, |pair| {

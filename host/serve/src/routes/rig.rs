@@ -301,8 +301,12 @@ async fn live(
     Body(request): Body<LiveRequest>,
 ) -> Result<Json<Done>, Failure> {
     require_control(&app, &headers)?;
-    if let Some(us) = request.exposure_us.filter(|us| !(1..=EXPOSURE_MAX_US).contains(us)) {
-        let error = format!("exposure_us {us}: expected 1 to {EXPOSURE_MAX_US} us");
+    let info = app.state().rig.info;
+    let limit = |name: &str| info.as_ref().and_then(|info| u32::try_from(info[name].as_u64()?).ok());
+    let min_us = limit("exposure_min_us").unwrap_or(1);
+    let max_us = limit("exposure_max_us").unwrap_or(EXPOSURE_MAX_US);
+    if let Some(us) = request.exposure_us.filter(|us| !(min_us..=max_us).contains(us)) {
+        let error = format!("exposure_us {us}: expected {min_us} to {max_us} us");
         return Err(Failure::new(StatusCode::BAD_REQUEST, error));
     }
     let wrong = |reason: String| Failure::new(StatusCode::BAD_REQUEST, format!("light_percent: {reason}"));

@@ -92,7 +92,7 @@ pub struct DepthRequest {
     #[cfg_attr(feature = "clap", arg(long, value_name = "X,Y,W,H"))]
     #[serde_as(as = "Option<DisplayFromStr>")]
     pub region: Option<Rectangle>,
-    /// Average this many pixels per side into one first; 1 keeps all [default: as many as a largest blur of more than 4.5 px needs].
+    /// Average this many pixels per side into one first; 1 keeps all [default: as many as a largest blur of more than 4.5 px needs, 2 for a raw mosaic of colours].
     #[cfg_attr(feature = "clap", arg(long, value_name = "PX"))]
     pub bin: Option<usize>,
     /// Folder with the camera's dark and flat frames, from `farnear calibrate camera`.

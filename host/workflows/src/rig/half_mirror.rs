@@ -13,13 +13,14 @@ use ndarray::Axis;
 use super::{
     RigAddress,
     camera::{ADDRESSES, CameraAddress, CameraSettings},
-    pair::{AVERAGED_MAX, CaptureRequest, PairFigures, noted, warn_of_images},
+    pair::{CaptureRequest, PairFigures, noted, warn_of_images},
 };
 use crate::{
     context::Context,
     error::{Result, WorkflowError},
     optics::GivenOptics,
     parameters::within,
+    request::Request,
 };
 
 /// Distance between both sensors along the axis, um: a thousandth of a piezo's travel to far more than any lens needs.
@@ -31,7 +32,7 @@ const UNLIKE: f64 = 0.005;
 pub(super) fn capture(settings: &CaptureRequest, context: &Context<'_>) -> Result<PairFigures> {
     let CaptureRequest { camera, average: averaged, out, .. } = settings;
     let optics = GivenOptics::read(&settings.optics)?;
-    within("average", *averaged, &(1..=AVERAGED_MAX), "exposures")?;
+    settings.check()?;
     let range = optics.optics.working_range();
     let sensor = SensorPair { far_mm: range.sensor_far_mm, near_mm: range.sensor_near_mm };
     let further_um = settings.second_further_um.unwrap_or((sensor.near_mm - sensor.far_mm) * 1e3);

@@ -107,6 +107,10 @@ impl Request for CaptureRequest {
         &[("optics", PathKind::Input), ("camera_frames", PathKind::Input), ("out", PathKind::OutputFolder)];
     type Figures = PairFigures;
 
+    fn check(&self) -> Result<()> {
+        within("average", self.average, &(1..=AVERAGED_MAX), "exposures")
+    }
+
     fn run(&self, context: &Context<'_>) -> Result<PairFigures> {
         capture(self, context)
     }
@@ -163,7 +167,7 @@ pub fn capture_seen(
     on_pair: impl FnOnce(&Pair),
 ) -> Result<PairFigures> {
     let optics = GivenOptics::read(&settings.optics)?;
-    within("average", settings.average, &(1..=AVERAGED_MAX), "exposures")?;
+    settings.check()?;
     if settings.subtract_ambient && settings.camera.light_with(Some(&optics)).is_none() {
         let expected = "expected light to switch: --light 100, or [light] in the optics file";
         return Err(WorkflowError::parameter("subtract-ambient", "true", expected));

@@ -34,7 +34,7 @@ use crate::{
     feature = "clap",
     command(after_help = "\
 PROGRAM.toml:
-  exposure_us = 5000            # also: settle_window_nm, settle_dwell_us, repeat, trigger
+  exposure_us = 5000            # without it --exposure-us; also: settle_window_nm, settle_dwell_us, repeat, trigger
   [[shot]]
   axis = \"fine\"                 # coarse, fine, lens
   to_um = 20.0
@@ -110,6 +110,15 @@ impl Request for SequenceRequest {
         &[("program", PathKind::Input), ("optics", PathKind::Input), ("out", PathKind::OutputFolder)];
     type Figures = SequenceFigures;
 
+    fn check(&self) -> Result<()> {
+        for (name, count) in [("runs", Some(self.runs)), ("steps", self.steps)] {
+            if count == Some(0) {
+                return Err(WorkflowError::parameter(name, 0, "it takes no images, expected 1 or more"));
+            }
+        }
+        Ok(())
+    }
+
     fn run(&self, context: &Context<'_>) -> Result<SequenceFigures> {
         run(self, context)
     }
@@ -131,9 +140,7 @@ pub struct SequenceFigures {
 
 /// The folder appears when it is complete. Checks everything before any motion.
 pub fn run(settings: &SequenceRequest, context: &Context<'_>) -> Result<SequenceFigures> {
-    if settings.runs == 0 {
-        return Err(WorkflowError::parameter("runs", 0, "it takes no images, expected 1 or more"));
-    }
+    settings.check()?;
     let shots = settings.shots()?;
     let optics = settings.optics.as_deref().map(GivenOptics::read).transpose()?;
     let folder = begin_folder(&settings.out)?;
@@ -202,9 +209,6 @@ impl SequenceRequest {
             let expected = "expected a program, or axis, from, to and steps";
             return Err(WorkflowError::parameter("program", "none", expected));
         };
-        if steps == 0 {
-            return Err(WorkflowError::parameter("steps", 0, "it takes no images, expected 1 or more"));
-        }
         let (from, to) = (nanometres("from", from)?, nanometres("to", to)?);
         let defaults = ShotDefaults { exposure: self.camera.exposure, ..ShotDefaults::default() };
         Ok(defaults.stack(axis.into(), from, to, steps))
