@@ -1,6 +1,8 @@
 //! Rendering of scenes.
 
-use farnear_scene::{Camera, EllipticalDistortion, Lens, Noise, OpticsFile, Psf, Renderer, Scene, truth};
+use farnear_scene::{
+    Camera, EllipticalDistortion, Lens, Noise, OpticsFile, Psf, RenderError, Renderer, Scene, truth,
+};
 use ndarray::Array2;
 use numpy::{IntoPyArray, PyArray2};
 use pyo3::prelude::*;
@@ -62,14 +64,14 @@ pub fn render<'py>(
         lens = lens.with_distortion(EllipticalDistortion::default());
     }
     let camera = Camera::new(width, height, noise);
-    let expose = || -> PyResult<_> {
-        let renderer = Renderer::new(&scene, &lens, &spread, &camera, seed).map_err(wrong)?;
-        let far = renderer.expose(lens.sensor_far_mm, 0).map_err(wrong)?;
-        let near = renderer.expose(lens.sensor_near_mm, 1).map_err(wrong)?;
-        Ok((far, near, truth(&scene, &lens, &camera)))
-    };
-    let (far, near, truth) = work::run(py, expose)??;
     let bits = noise.bits();
+    let expose = move || -> Result<_, RenderError> {
+        let renderer = Renderer::new(&scene, &lens, &spread, &camera, seed)?;
+        let [far, near] =
+            [(lens.sensor_far_mm, 0), (lens.sensor_near_mm, 1)].map(|(at_mm, n)| renderer.expose(at_mm, n));
+        Ok((far?, near?, truth(&scene, &lens, &camera)))
+    };
+    let (far, near, truth) = work::watched(py, expose)?.map_err(wrong)?;
     Ok((of_codes(py, far, bits), of_codes(py, near, bits), truth.into_pyarray(py)))
 }
 

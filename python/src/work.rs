@@ -1,6 +1,7 @@
 //! Computation without the interpreter's lock.
 
 use std::{
+    any::Any,
     process,
     sync::{
         Arc, LazyLock, Mutex, PoisonError,
@@ -31,10 +32,14 @@ pub fn remember_process() {
 /// Runs `work` without the interpreter's lock, on threads that this process has.
 pub fn run<T: Send>(py: Python<'_>, work: impl FnOnce() -> T + Send) -> PyResult<T> {
     let pool = of_child()?;
-    Ok(py.detach(|| match pool {
+    Ok(py.detach(|| in_pool(pool.as_deref(), work)))
+}
+
+fn in_pool<T: Send>(pool: Option<&ThreadPool>, work: impl FnOnce() -> T + Send) -> T {
+    match pool {
         Some(pool) => pool.install(work),
         None => work(),
-    }))
+    }
 }
 
 /// As [`run`], in a thread, while this one polls for Ctrl-C; `work` is to end soon after it has set the flag.
@@ -45,10 +50,7 @@ pub fn interruptibly<T: Send>(
     let pool = of_child()?;
     let stop = Arc::new(AtomicBool::new(false));
     thread::scope(|scope| {
-        let worker = scope.spawn(|| match pool {
-            Some(pool) => pool.install(|| work(&stop)),
-            None => work(&stop),
-        });
+        let worker = scope.spawn(|| in_pool(pool.as_deref(), || work(&stop)));
         let mut interrupted = None;
         while !worker.is_finished() {
             py.detach(|| thread::sleep(LOOK));
@@ -59,10 +61,24 @@ pub fn interruptibly<T: Send>(
                 interrupted = Some(error);
             }
         }
-        let panicked = |_| FarnearError::new_err("the work ended with a panic, a mistake of farnear's");
         let done = worker.join().map_err(panicked)?;
         interrupted.map_or(Ok(done), Err)
     })
+}
+
+/// As [`run`], for work that cannot be stopped: in a thread that Ctrl-C leaves behind.
+pub fn watched<T: Send + 'static>(py: Python<'_>, work: impl FnOnce() -> T + Send + 'static) -> PyResult<T> {
+    let pool = of_child()?;
+    let worker = thread::spawn(move || in_pool(pool.as_deref(), work));
+    while !worker.is_finished() {
+        py.detach(|| thread::sleep(LOOK));
+        py.check_signals()?;
+    }
+    worker.join().map_err(panicked)
+}
+
+fn panicked(_: Box<dyn Any + Send>) -> PyErr {
+    FarnearError::new_err("the work ended with a panic, a mistake of farnear's")
 }
 
 fn of_child() -> PyResult<Option<Arc<ThreadPool>>> {

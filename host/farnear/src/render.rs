@@ -5,7 +5,7 @@ use std::fs;
 use anyhow::{Context as _, Result};
 use farnear_depth::psf::Psf as OpticsPsf;
 use farnear_files::{image_file::encode_png, npy, staging::Staging};
-use farnear_scene::{Camera, EllipticalDistortion, Lens, OpticsFile, Psf, Renderer, truth};
+use farnear_scene::{Camera, EllipticalDistortion, Lens, OpticsFile, Psf, RenderError, Renderer, truth};
 use farnear_workflows::{Context, optics};
 use serde::Serialize;
 
@@ -34,16 +34,18 @@ pub fn render(arguments: Arguments, context: &Context<'_>) -> Result<RenderFigur
         lens = lens.with_distortion(EllipticalDistortion::default());
     }
     let scene = scene.read()?;
-    let renderer = Renderer::new(&scene, &lens, &spread, &camera, seed)?;
     let staged = Staging::into_folder(&out)?;
-    for (number, name, sensor_mm) in
-        [(0, "far.png", lens.sensor_far_mm), (1, "near.png", lens.sensor_near_mm)]
-    {
-        let pixels = renderer.expose(sensor_mm, number)?;
-        context.cancel.check("rendering")?;
-        staged.write(name, &encode_png(pixels.view(), camera.noise.bits())?)?;
+    let bits = camera.noise.bits();
+    let expose = move || -> Result<_, RenderError> {
+        let renderer = Renderer::new(&scene, &lens, &spread, &camera, seed)?;
+        let [far, near] =
+            [(lens.sensor_far_mm, 0), (lens.sensor_near_mm, 1)].map(|(at_mm, n)| renderer.expose(at_mm, n));
+        Ok((far?, near?, truth(&scene, &lens, &camera)))
+    };
+    let (far, near, depth) = context.cancel.watch("rendering", expose)??;
+    for (name, pixels) in [("far.png", far), ("near.png", near)] {
+        staged.write(name, &encode_png(pixels.view(), bits)?)?;
     }
-    let depth = truth(&scene, &lens, &camera);
     staged.write("truth.npy", &npy::write(depth.view()))?;
     staged.write("optics.toml", toml::to_string(&optics.with_psf(psf))?.as_bytes())?;
     staged.finish()?;

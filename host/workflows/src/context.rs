@@ -5,6 +5,7 @@ use std::{
         Arc,
         atomic::{AtomicBool, Ordering},
     },
+    thread,
     time::Duration,
 };
 
@@ -34,6 +35,9 @@ pub trait Questions: Sync {
     fn ask(&self, question: &str, cancel: &Cancel) -> Result<String>;
 }
 
+/// Polling interval of work that cannot be stopped.
+const LOOK: Duration = Duration::from_millis(10);
+
 /// Cancellation token, shared by its clones; cannot be reset. A cancelled rig workflow stops the rig before it returns.
 #[derive(Clone, Debug, Default)]
 pub struct Cancel(Arc<AtomicBool>);
@@ -52,6 +56,20 @@ impl Cancel {
             true => Err(WorkflowError::Cancelled { during: during.into() }),
             false => Ok(()),
         }
+    }
+
+    /// Runs `work`, which cannot be stopped, in a thread that is left behind when this is cancelled.
+    pub fn watch<T: Send + 'static>(
+        &self,
+        during: &str,
+        work: impl FnOnce() -> T + Send + 'static,
+    ) -> Result<T> {
+        let worker = thread::spawn(work);
+        while !worker.is_finished() {
+            self.check(during)?;
+            thread::sleep(LOOK);
+        }
+        worker.join().or_else(|panic| std::panic::resume_unwind(panic))
     }
 
     pub fn flag(&self) -> Arc<AtomicBool> {
