@@ -10,10 +10,11 @@ use farnear_protocol::{
 
 use crate::{error::ClientError, link::Link, timing::Timing};
 
-/// Timeouts of hello, 3 s in total, as the board may be starting or emulated; in between at the link's other rates.
+/// Timeouts of hello, 3 s in total: at the link's rate, at its other rates, and once more for a board that is starting or
+/// emulated, the longest at the rate after a reset.
 const FIRST_MS: [u64; 4] = [50, 100, 200, 400];
 const OTHER_RATE_MS: [u64; 2] = [50, 50];
-const LAST_MS: [u64; 2] = [800, 1500];
+const LAST_MS: [[u64; 1]; 2] = [[800], [1500]];
 const DURING: &str = "asking the board who it is";
 /// Fixed session of an emulated board: a random one would change the run. Programs differ by request ids.
 const EMULATED_SESSION: u32 = 0x5eed_0001;
@@ -24,13 +25,15 @@ pub(crate) fn shake_hands(link: &mut Link, known_emulated: bool) -> Result<(Hell
     let millis = |waits: &[u64]| waits.iter().map(|ms| Duration::from_millis(*ms)).collect::<Vec<_>>();
     let (first, other, last) = if known_emulated {
         let patient = Timing::EMULATED.reply;
-        (vec![patient; Timing::EMULATED.retries as usize + 1], vec![patient], Vec::new())
+        (vec![patient; Timing::EMULATED.retries as usize + 1], vec![patient], [Vec::new(), Vec::new()])
     } else {
-        (millis(&FIRST_MS), millis(&OTHER_RATE_MS), millis(&LAST_MS))
+        (millis(&FIRST_MS), millis(&OTHER_RATE_MS), LAST_MS.map(|waits| millis(&waits)))
     };
     let present = link.rate();
     let others = LinkRate::ALL.into_iter().filter(|rate| *rate != present).map(|rate| (rate, other.clone()));
-    let rounds = std::iter::once((present, first)).chain(others).chain([(present, last)]);
+    let rounds = std::iter::once((present, first))
+        .chain(others)
+        .chain([present, LinkRate::START].into_iter().zip(last));
     let packet = say_hello(link, rounds)?;
     let hello = read_answer(&packet)?;
     let version = agree(&hello)?;

@@ -26,6 +26,13 @@ fn sets_the_requested_rate_and_the_next_program_finds_the_board() {
 }
 
 #[test]
+fn a_board_that_starts_slowly_is_found_at_the_rate_after_a_reset() {
+    // It answers neither of the short looks at that rate.
+    let peer = Peer::new(Faults { lose_answers: 2, ..Faults::default() });
+    assert_eq!(connect_at(&peer, SLOW).link_rate(), SLOW);
+}
+
+#[test]
 fn restores_the_requested_rate_after_a_reset() {
     let peer = Peer::new(Faults::default());
     let mut client = connect_at(&peer, SLOW);
