@@ -21,7 +21,7 @@ pub const WORDS: &str = "the images look like the raw mosaic of a colour sensor,
                          alternate: average 2x2 pixels, or save them in colour or grey";
 
 /// Whether an image in grey seems to be the raw mosaic of a colour sensor. Averaging 2x2 pixels makes it grey. Cost:
-/// some 600,000 operations at most, whatever the size.
+/// at most some 600,000 operations, for any size.
 pub fn is_mosaic(image: ArrayView2<f32>) -> bool {
     let weights = weights();
     let starts = |n: usize| (0..=n.saturating_sub(BLOCK_PX)).step_by((n / BLOCKS).max(BLOCK_PX));

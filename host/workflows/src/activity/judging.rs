@@ -136,12 +136,12 @@ pub(super) fn check_same<'a>(
         let same = || format!("{own}={known}");
         if !of_samples.contains(own) {
             let found = of_samples.into_iter().collect::<Vec<_>>().join(", ");
-            let expected = format!("`{own}` is no activity of the samples, which hold {found}");
+            let expected = format!("the samples have no activity `{own}`, only {found}");
             return Err(WorkflowError::parameter("same", same(), expected));
         }
         if !model.activities().iter().any(|activity| activity == known) {
             let expected =
-                format!("`{known}` is no activity of the model: {}", model.activities().join(", "));
+                format!("the model has no activity `{known}`, only {}", model.activities().join(", "));
             return Err(WorkflowError::parameter("same", same(), expected));
         }
     }
