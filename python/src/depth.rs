@@ -183,7 +183,7 @@ pub fn depth(
 /// An image without values above a stated white level, which are saturated.
 fn up_to<'a>(image: &'a Image<'_>, white: Option<f32>) -> CowArray<'a, f32, Ix2> {
     match white {
-        Some(white) => image.view().mapv(|value| value.min(white)).into(),
+        Some(white) => image.view().mapv(|value| if value > white { white } else { value }).into(),
         None => image.view().into(),
     }
 }

@@ -68,6 +68,13 @@ fn a_finished_model_is_judged_and_its_mistakes_are_listed() {
     let fused = figures(farnear(&evaluate).args(["--views", "fused", "--same", "walk=sneak"]));
     assert_eq!(number(&fused, "answers"), 12.0);
     assert_eq!(fused["confusion"]["classes"], serde_json::json!(["crouch", "dig", "sneak"]));
+    let refused = |arguments: [&str; 2], words: &[&str]| {
+        let evaluate = ["activity", "evaluate", &people.samples, "--model", "everyday"];
+        fails(farnear(&evaluate).args(arguments), 2, words);
+    };
+    refused(["--same", "wlak=walk"], &["wlak=walk", "crouch, dig, walk"]);
+    refused(["--same", "walk=wlak"], &["walk=wlak", "jumping jack"]);
+    refused(["--leave-one-set-out", &people.samples], &["samples.toml", "each set once"]);
 
     // Activities that the model does not know are unknown, not wrong; without any known activity there is no accuracy.
     let all = fs::read_to_string(&people.samples).expect("samples");
