@@ -20,7 +20,7 @@ pub enum PlanError {
     #[error("an exposure of {} us is outside the board's limits, {} to {} us", asked.0, min.0, max.0)]
     Exposure { asked: Micros, min: Micros, max: Micros },
     #[error(
-        "{axis} to {:.3} um is outside the board's limits, {:.3} to {:.3} um",
+        "{axis} to {:.3} um is outside the limits, {:.3} to {:.3} um",
         um(asked.0), um(min.0), um(max.0)
     )]
     Position { axis: &'static str, asked: Nanometres, min: Nanometres, max: Nanometres },

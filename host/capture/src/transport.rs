@@ -169,8 +169,11 @@ pub fn ports() -> Vec<String> {
 }
 
 fn absent(path: &str) -> PortError {
-    let ports = find::present();
-    PortError::Absent { port: path.into(), present: ports.into_iter().map(|port| port.port_name).collect() }
+    let present = find::present().into_iter().map(|port| port.port_name).collect();
+    match path {
+        "" => PortError::Nameless { present },
+        _ => PortError::Absent { port: path.into(), present },
+    }
 }
 
 fn explain(path: &str, error: serialport::Error) -> PortError {
@@ -378,5 +381,11 @@ mod tests {
         assert_eq!(first.receive(&mut buffer, Duration::from_millis(5)).unwrap(), 0);
         drop(master);
         assert!(first.receive(&mut buffer, Duration::from_millis(5)).is_err());
+    }
+
+    #[test]
+    fn an_empty_name_is_said_to_be_empty() {
+        let error = SerialTransport::open("").err().unwrap();
+        assert!(matches!(error, PortError::Nameless { .. }), "{error}");
     }
 }

@@ -11,7 +11,7 @@ use std::{
 
 #[derive(Debug, thiserror::Error)]
 pub enum StagingError {
-    #[error("{} exists already and is not empty; name another folder or remove it", path.display())]
+    #[error("{} exists already and is not an empty folder; name another folder or remove it", path.display())]
     Exists { path: PathBuf },
     #[error("cannot write {}: {source}", path.display())]
     Io { path: PathBuf, source: io::Error },

@@ -72,7 +72,7 @@ fn the_stage_homes_moves_and_stops_and_keeps_its_limits() {
     let again = ["home", "--axis", "lens", "--axis", "lens"];
     fails(&mut on_the_rig(&again), 2, &["axis lens", "each axis once"]);
     let beyond = ["move", "--axis", "fine", "--to-um", "500"];
-    fails(&mut on_the_rig(&beyond), 1, &["outside the board's limits", "500.000 um", "5.000 to 195.000 um"]);
+    fails(&mut on_the_rig(&beyond), 1, &["outside the limits", "500.000 um", "5.000 to 195.000 um"]);
     let below = ["move", "--axis", "fine", "--to-um", "-1"];
     fails(&mut on_the_rig(&below), 1, &["-1.000 um", "5.000 to 195.000 um"]);
     fails(
@@ -136,7 +136,7 @@ fn two_captures_with_one_seed_are_the_same_to_the_byte_and_give_the_depth() {
     }
 
     let again = ["capture", "--optics", rig_optics(), "--out", &folder.text("a")];
-    fails(&mut on_the_rig(&again), 1, &["exists already and is not empty"]);
+    fails(&mut on_the_rig(&again), 1, &["exists already and is not an empty folder"]);
 
     let scene = folder.text("scene");
     succeeds(&mut farnear(&["render", "--optics", rig_optics(), "--out", &scene]));

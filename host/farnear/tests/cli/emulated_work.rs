@@ -83,7 +83,7 @@ fn a_stack_and_a_program_leave_their_images_and_what_was_measured() {
     assert_eq!(number(&figures(&mut on_the_rig(&run)), "exposures"), 8.0);
     let bad = folder.file("bad.toml", "[[shot]]\naxis = \"fine\"\nto_um = 300.0\n");
     let run = ["sequence", "--program", &bad, "--out", &folder.text("bad")];
-    fails(&mut on_the_rig(&run), 1, &["outside the board's limits", "300.000 um", "195.000 um"]);
+    fails(&mut on_the_rig(&run), 1, &["outside the limits", "300.000 um", "195.000 um"]);
     assert!(!folder.path("bad").exists());
 }
 
