@@ -28,7 +28,7 @@ view = 2
 clip = "one"
 
 [[sample]]
-masks = "a"
+masks = "c"
 subject = "ben"
 activity = "sit down"
 "#;
@@ -55,11 +55,11 @@ const JOBS_CSV: &str = "do,masks,camera,lamp,out\nshadow-remove,a,camera.toml,\"
 
 const CAMERA: &str = "[camera]\nheight_m = 1.2\nazimuth_deg = 140.0\nfocal_length_mm = 4.0\npixel_um = 120.0\nwidth_px = 32\nheight_px = 32\n";
 
-/// Two folders of small masks (a person and half of one), and their camera.
+/// Three folders of small masks (a person, half of one, another person), and their camera.
 fn folder() -> tempfile::TempDir {
     let root = tempfile::tempdir().expect("a folder");
     fs::write(root.path().join("camera.toml"), CAMERA).expect("a file");
-    for (name, rows) in [("a", 30), ("b", 12)] {
+    for (name, rows) in [("a", 30), ("b", 12), ("c", 28)] {
         fs::create_dir(root.path().join(name)).expect("a folder");
         let level = |x, y| Luma([if (12..20).contains(&x) && y < rows { 255 } else { 0 }]);
         GrayImage::from_fn(32, 32, level).save(root.path().join(name).join("m1.png")).expect("a picture");
