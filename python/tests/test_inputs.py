@@ -259,6 +259,10 @@ def test_a_white_level_saturates_brighter_pixels(optics, slant):
     found = farnear.depth(far, near, optics, white_level=white)
     clipped = farnear.depth(np.minimum(far, white), np.minimum(near, white), optics, white_level=white)
     np.testing.assert_array_equal(found.depth_mm, clipped.depth_mm)
+    masked = np.ma.masked_array(far)
+    masked[100:140, 50:90] = np.ma.masked
+    reasons = farnear.depth(masked, near, optics, white_level=white).reasons
+    assert set(np.unique(reasons[105:135, 55:85])) == {9}
 
 
 def test_missing_files_are_named(tmp_path):

@@ -11,7 +11,10 @@ use crate::describe::{axis_name, cause_name, failure_text, refusal_text};
 
 #[derive(Clone, Debug, thiserror::Error)]
 pub enum PortError {
-    #[error("the name of the port is empty: give one, or leave it out for the only board; {}", present_ports(present))]
+    #[error(
+        "the name of the port is empty: give one, or leave it out for the only board; {}",
+        present_ports(present)
+    )]
     Nameless { present: Vec<String> },
     #[error("there is no port {port}; {}", present_ports(present))]
     Absent { port: String, present: Vec<String> },

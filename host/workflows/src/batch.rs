@@ -43,6 +43,7 @@ use crate::{
     context::{Cancel, Context, Progress, Unattended},
     error::Result,
     figures::rounded,
+    parameters::{THREADS, within},
     request::{PathKind, Task},
 };
 
@@ -160,6 +161,7 @@ pub fn run(
     context: &Context<'_>,
     on_job: &(dyn Fn(&JobReport) -> io::Result<()> + Sync),
 ) -> Result<BatchFigures> {
+    within("jobs", settings.jobs, &THREADS, "")?;
     let start = Instant::now();
     let jobs = Manifest::count(&settings.manifest)?;
     if jobs == 0 {

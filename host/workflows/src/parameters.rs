@@ -2,6 +2,9 @@ use std::{fmt::Display, ops::RangeInclusive};
 
 use crate::error::{Result, WorkflowError};
 
+/// Number of threads, 0 = all cores. Thousands bring a machine to a halt.
+pub(crate) const THREADS: RangeInclusive<usize> = 0..=1024;
+
 pub(crate) fn within<T: PartialOrd + Display>(
     name: &'static str,
     value: T,

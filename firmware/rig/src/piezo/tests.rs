@@ -310,7 +310,7 @@ fn a_dac_whose_wire_returns_does_not_jump() {
         std::println!("from {from} to {to} nm: failed {failed}, {jump_um:.1} um when the wire returns");
         // The campaign's bound for a command in a tick.
         assert!(jump_um < 60.0, "from {from} to {to} nm: {jump_um} um");
-        // A full stroke with this hysteresis takes up to 150 ticks, and what is left of the jump is a disturbance.
+        // A full stroke with this hysteresis takes up to 150 ticks; the rest of the jump is a disturbance.
         assert!(step(&mut piezo, &mut plant, from).0 <= 200, "it moves again");
     }
 }

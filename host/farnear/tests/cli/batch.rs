@@ -107,6 +107,7 @@ fn a_bad_job_does_not_stop_the_others() {
     let bad: String = wrong.iter().map(|(job, _)| format!("[[job]]\n{job}\n")).collect();
     fs::write(&manifest, good.clone() + &bad).expect("a writable folder");
     // One after the other, so that the order of the two jobs with one folder is known.
+    fails(&mut farnear(&["batch", &manifest, "--jobs", "5000"]), 2, &["jobs 5000", "0 to 1024"]);
     let output = farnear(&["batch", &manifest, "--jobs", "1"]).output().expect("the program starts");
     assert_eq!(output.status.code(), Some(1));
     let reports = lines(&output.stdout);

@@ -21,12 +21,10 @@ use crate::{
     error::{Result, WorkflowError},
     measure::Rectangle,
     optics::{self, OpticsDoubt},
+    parameters::{THREADS, within},
     psf::PsfSource,
     request::{self, PathKind, Request},
 };
-
-/// Beyond any machine's cores; thousands of threads bring a machine to a halt.
-const THREADS_MAX: usize = 1024;
 
 /// Compute a depth map from a far- and a near-focused image.
 ///
@@ -200,10 +198,7 @@ impl Request for DepthRequest {
             let expected = "it defines the regions that `fill` fills: give `fill` too";
             return Err(WorkflowError::parameter("low-texture", self.low_texture, expected));
         }
-        if self.threads > THREADS_MAX {
-            let expected = format!("0 (all cores) to {THREADS_MAX}");
-            return Err(WorkflowError::parameter("threads", self.threads, expected));
-        }
+        within("threads", self.threads, &THREADS, "")?;
         if let Some(bin) = self.bin.filter(|bin| !(1..=16).contains(bin)) {
             return Err(WorkflowError::parameter("bin", bin, "1 to 16 pixels"));
         }

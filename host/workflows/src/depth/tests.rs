@@ -59,13 +59,14 @@ fn a_cancelled_map_leaves_nothing_behind() {
 }
 
 #[test]
-fn options_without_effect_on_a_method_are_bad_usage() {
+fn options_that_cannot_be_met_are_bad_usage() {
     let folder = tempfile::tempdir().unwrap();
     let other = Method::Baseline(farnear_depth::baselines::Method::Subbarao);
     let settings = DepthRequest { method: Some(other), ..settings(folder.path()) };
     for settings in [
         DepthRequest { operators: Some("gro".into()), ..settings.clone() },
-        DepthRequest { uncertainty: Some(CameraNoise::Estimated), ..settings },
+        DepthRequest { uncertainty: Some(CameraNoise::Estimated), ..settings.clone() },
+        DepthRequest { method: None, threads: 5_000, ..settings },
     ] {
         let error = compute(&settings, &Context::unattended()).unwrap_err();
         assert!(error.is_usage(), "{error}");
