@@ -296,9 +296,11 @@ pub(crate) fn measure_after(
     let (left_over, excess) = (estimate.left_over, estimate.excess);
     let judging = ValiditySettings { least_confidence: settings.least_confidence, filled: settings.run.fill };
     let validity = assess(&mut map, &prepared, estimate, optics, &judging);
-    let lost =
-        validity.lost.iter().filter(|lost| lost.fraction > LEAST_REPORTED && lost.reason != Reason::Unsure);
-    findings.extend(lost.copied().map(Finding::Lost));
+    // The loss that the caller asked for is news only if nothing is left.
+    let reported = |lost: &&Lost| {
+        lost.fraction > LEAST_REPORTED && (lost.reason != Reason::Unsure || validity.valid_fraction == 0.0)
+    };
+    findings.extend(validity.lost.iter().filter(reported).copied().map(Finding::Lost));
     if validity.valid_fraction < TELLING {
         // With nearly no depth, the residual carries no information on the lens.
         findings.retain(|finding| !matches!(finding, Finding::Unexplained { .. }));

@@ -52,11 +52,11 @@ pub fn is_mosaic(image: ArrayView2<f32>) -> bool {
     is_line[0] || (is_line[1] && is_line[2])
 }
 
-/// Hann's window times each frequency; orthogonal to each other's main lobes.
-fn weights() -> [[f32; BLOCK_PX]; WEIGHTS] {
+/// Of each pixel: Hann's window times each frequency; orthogonal to each other's main lobes.
+fn weights() -> [[f64; WEIGHTS]; BLOCK_PX] {
     use std::f64::consts::TAU;
-    std::array::from_fn(|i| {
-        std::array::from_fn(|x| {
+    std::array::from_fn(|x| {
+        std::array::from_fn(|i| {
             let phase = (x as f64 + 0.5) / BLOCK_PX as f64;
             let window = 0.5 - 0.5 * (TAU * phase).cos();
             let alternating = if x % 2 == 0 { 1.0 } else { -1.0 };
@@ -66,7 +66,7 @@ fn weights() -> [[f32; BLOCK_PX]; WEIGHTS] {
                 i if i % 2 == 0 => alternating * (TAU * CLOSE_BY[i / 2 - 1] * phase).cos(),
                 i => alternating * (TAU * CLOSE_BY[i / 2 - 1] * phase).sin(),
             };
-            (window * value) as f32
+            window * value
         })
     })
 }
@@ -75,16 +75,17 @@ fn weights() -> [[f32; BLOCK_PX]; WEIGHTS] {
 fn amplitudes(
     image: ArrayView2<f32>,
     [top, left]: [usize; 2],
-    weights: &[[f32; BLOCK_PX]; WEIGHTS],
+    weights: &[[f64; WEIGHTS]; BLOCK_PX],
 ) -> [[f64; WEIGHTS]; WEIGHTS] {
     let mut amplitude = [[0.0_f64; WEIGHTS]; WEIGHTS];
-    for y in 0..BLOCK_PX {
+    for (y, down) in weights.iter().enumerate() {
         let row = image.slice(ndarray::s![top + y, left..left + BLOCK_PX]);
-        let of_row = weights.each_ref().map(|weights| {
-            row.iter().zip(weights).map(|(value, weight)| f64::from(value * weight)).sum::<f64>()
-        });
-        for (amplitude, weights) in amplitude.iter_mut().zip(weights) {
-            amplitude.iter_mut().zip(of_row).for_each(|(sum, of_row)| *sum += f64::from(weights[y]) * of_row);
+        let mut of_row = [0.0_f64; WEIGHTS];
+        for (value, across) in row.iter().zip(weights) {
+            of_row.iter_mut().zip(across).for_each(|(sum, weight)| *sum += f64::from(*value) * weight);
+        }
+        for (amplitude, weight) in amplitude.iter_mut().zip(down) {
+            amplitude.iter_mut().zip(of_row).for_each(|(sum, of_row)| *sum += weight * of_row);
         }
     }
     amplitude

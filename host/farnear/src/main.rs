@@ -173,10 +173,11 @@ fn without_equals(words: &[String]) -> Option<String> {
 
 /// An error and its causes in one line, without causes that the error's message already contains.
 fn message(error: &anyhow::Error) -> String {
-    error.chain().map(ToString::to_string).fold(String::new(), |message, cause| match message {
-        empty if empty.is_empty() => cause.trim_end().into(),
+    let causes = error.chain().map(|cause| cause.to_string().trim_end().to_owned());
+    causes.fold(String::new(), |message, cause| match message {
+        empty if empty.is_empty() => cause,
         message if message.contains(&cause) => message,
-        message => format!("{message}: {}", cause.trim_end()),
+        message => format!("{message}: {cause}"),
     })
 }
 
@@ -192,6 +193,13 @@ mod tests {
 
     /// Options of the command line only.
     const ONLY_HERE: [&str; 3] = ["json", "help", "version"];
+
+    #[test]
+    fn a_cause_that_the_message_contains_is_not_repeated() {
+        let cause = anyhow::anyhow!("line 2\n  bad\n");
+        let error = cause.context("samples.toml: line 2\n  bad\n").context("training");
+        assert_eq!(message(&error), "training: samples.toml: line 2\n  bad");
+    }
 
     #[test]
     fn options_of_commands_are_the_fields_of_their_requests() {

@@ -9,8 +9,8 @@
 //!
 //! A window of side w has a standard deviation within 6 % of the bound for unknown texture (`docs/accuracy.md`):
 //! `1 / (w sqrt J)`, `J = mean over frequencies of P D^2 / (s^2 (H1^2 + H2^2))`, `D = H1 H2' - H2 H1'`, P the texture's
-//! power, s^2 the noise's. Cost of [`Whitened::design`]: 153 x 13 points, 60 unknowns, some ms; at run time five 7x7
-//! kernels.
+//! power, s^2 the noise's. Cost of [`Whitened::design`]: 153 frequencies x 13 depths, 40 unknowns, 1 to 2 ms; at run time
+//! five 7x7 kernels.
 
 use std::f64::consts::PI;
 
@@ -139,27 +139,24 @@ fn at_zero() -> Vec<f64> {
 /// R0 to R3: texture nulled at its depth, noise white and of unit gain.
 fn residual(points: &[Point], samples: &[[Sample; ALPHAS]]) -> Result<[Kernel; 4], DesignError> {
     let n = kernel::free_coefficients(SIZE);
-    let mut rows = Vec::with_capacity(3 * points.len() * ALPHAS + 4 * n);
+    let mut rows = Vec::with_capacity(4 * points.len() + 4 * n);
     for (point, samples) in points.iter().zip(samples) {
+        let mut equations = Vec::with_capacity(3 * ALPHAS);
         for s in samples {
             let wiener = point.power * s.q / (point.power * s.q + NOISE);
             let powers: [f64; 4] = std::array::from_fn(|k| s.alpha.powi(k as i32));
             let signs = [1.0, -1.0, 1.0, -1.0];
-            let row = |factor: &dyn Fn(usize) -> f64, weight: f64, right: f64| {
+            let mut equation = |factor: &dyn Fn(usize) -> f64, weight: f64, right: f64| {
                 let weight = (point.at.multiplicity * s.multiplicity * weight).sqrt();
-                let taps = (0..4)
-                    .flat_map(|k| point.basis.iter().map(move |b| (k, b)))
-                    .map(|(k, b)| weight * factor(k) * b);
-                (taps.collect::<Vec<f64>>(), weight * right)
+                equations.push(((0..4).map(|k| weight * factor(k)).collect::<Vec<f64>>(), weight * right));
             };
-            let of_a = |k: usize| powers[k];
-            let of_b = |k: usize| signs[k] * powers[k];
-            let nulled = |k: usize| powers[k] * (s.h[0] - signs[k] * s.h[1]);
             let root = s.q.sqrt().max(1e-9);
-            rows.push(row(&nulled, NULLING * point.power * (wiener + 1e-3), 0.0));
-            rows.push(row(&of_a, wiener + 0.05, s.h[1] / root));
-            rows.push(row(&of_b, wiener + 0.05, s.h[0] / root));
+            let nulled = |k: usize| powers[k] * (s.h[0] - signs[k] * s.h[1]);
+            equation(&nulled, NULLING * point.power * (wiener + 1e-3), 0.0);
+            equation(&|k| powers[k], wiener + 0.05, s.h[1] / root);
+            equation(&|k| signs[k] * powers[k], wiener + 0.05, s.h[0] / root);
         }
+        rows.extend(least_squares::in_taps(&equations, &point.basis));
     }
     rows.extend(ridge(4 * n));
     // R1 and R3 act on the sum, whose mean carries no depth.
@@ -180,9 +177,10 @@ fn matched(
     residual: &[Kernel; 4],
 ) -> Result<Kernel, DesignError> {
     let n = kernel::free_coefficients(SIZE);
-    let mut rows = Vec::with_capacity(2 * points.len() * ALPHAS + 2 * n);
+    let mut rows = Vec::with_capacity(2 * points.len() + 2 * n);
     for (point, samples) in points.iter().zip(samples) {
         let responses = [0, 1, 2, 3].map(|k| residual[k].response(point.at.u, point.at.v));
+        let mut equations = Vec::with_capacity(2 * ALPHAS);
         for s in samples {
             let sum = |sign: f64| (0..4).map(|k| (sign * s.alpha).powi(k as i32) * responses[k]).sum::<f64>();
             let gain = sum(1.0).hypot(sum(-1.0)).max(0.15);
@@ -190,11 +188,10 @@ fn matched(
             let target = s.turn * point.power / (s.q.sqrt().max(1e-9) * energy * gain);
             let weight = (point.at.multiplicity * s.multiplicity * energy).sqrt();
             for (h, sign) in s.h.iter().zip([1.0, -1.0]) {
-                let own = point.basis.iter().map(|b| weight * b);
-                let with_alpha = point.basis.iter().map(|b| weight * sign * s.alpha * b);
-                rows.push((own.chain(with_alpha).collect::<Vec<f64>>(), weight * h * target));
+                equations.push((vec![weight, weight * sign * s.alpha], weight * h * target));
             }
         }
+        rows.extend(least_squares::in_taps(&equations, &point.basis));
     }
     rows.extend(ridge(2 * n));
     let taps: Vec<f64> = kernel::offsets(SIZE).map(kernel::taps).collect();

@@ -27,6 +27,17 @@ pub fn reduced(rows: &[(Vec<f64>, f64)]) -> (DMatrix<f64>, DVector<f64>) {
     (left.remove_column(columns - 1), right)
 }
 
+/// Equations of one frequency in factors of several kernels, as equations in their taps, of these `responses`. As all
+/// equations have the same responses, as many as factors remain (a triangular factor's Kronecker product with them).
+pub fn in_taps(equations: &[(Vec<f64>, f64)], responses: &[f64]) -> Vec<(Vec<f64>, f64)> {
+    let (matrix, right) = reduced(equations);
+    let row = |i: usize| {
+        let factors = matrix.row(i);
+        (factors.iter().flat_map(|factor| responses.iter().map(move |r| factor * r)).collect(), right[i])
+    };
+    (0..matrix.nrows().min(matrix.ncols())).map(row).collect()
+}
+
 /// Minimises `|matrix x - rhs|^2` by QR and SVD. Returns [`DesignError::Singular`] without a finite solution.
 pub fn solve(matrix: DMatrix<f64>, rhs: DVector<f64>) -> Result<DVector<f64>, DesignError> {
     let unknowns = matrix.ncols();

@@ -4,12 +4,9 @@
 //! the three kernels. `W ~ m Q'^2 max(w, 0.19)^-2` (sum 1) is the power of a natural texture (amplitude 1/f) behind the
 //! pre-filter `Q'`. The second term fixes the common scale and spectral shape, which the first leaves free:
 //! `LOG = (w / wp)^2 exp(1 - (w / wp)^2)`, `wp = 0.4 pi` (W&N 1998's band-pass). Eq. 5.18 of Li 2014 as printed divides
-//! by Gm1 (poles) and weights only the NIR with Q. Cost: 153 x 21 + 153 equations in 30 unknowns for 7x7, a few ms.
+//! by Gm1 (poles) and weights only the NIR with Q. Cost: 153 frequencies x 21 depths, 30 unknowns for 7x7, 1 ms.
 
-use nalgebra::{DMatrix, DVector};
-
-use super::DesignError;
-use super::least_squares::solve;
+use super::{DesignError, least_squares};
 use crate::kernel::{self, Kernel};
 use crate::normalised_ratio::{GRID, GridPoint, alphas, sum_and_difference};
 use crate::psf::Otf;
@@ -47,13 +44,12 @@ pub fn design(
     grid: &[GridPoint],
     size: usize,
 ) -> Result<[Kernel; 3], DesignError> {
-    let n = kernel::free_coefficients(size);
     let samples = alphas();
     let weights = weights(prefilter, grid);
     let multiplicities: f64 = grid.iter().map(|p| p.multiplicity).sum();
-    let mut rows: Vec<(Vec<f64>, f64)> = Vec::with_capacity(grid.len() * (samples.len() + 1));
+    let mut rows: Vec<(Vec<f64>, f64)> = Vec::with_capacity(3 * grid.len());
     for (p, weight) in grid.iter().zip(&weights) {
-        let basis = kernel::basis_responses(size, p.u, p.v);
+        let mut equations = Vec::with_capacity(samples.len() + 1);
         for alpha in samples {
             let [sum, difference] = sum_and_difference(otf, max_blur_px, p.w, alpha);
             let normalised_ratio = difference / sum;
@@ -62,15 +58,12 @@ pub fn design(
                 continue;
             }
             let scale = (weight / samples.len() as f64).sqrt();
-            let factors = [normalised_ratio, -alpha, -alpha.powi(3)].map(|f| f * scale);
-            rows.push((factors.iter().flat_map(|f| basis.iter().map(move |b| f * b)).collect(), 0.0));
+            equations.push((vec![scale * normalised_ratio, -scale * alpha, -scale * alpha.powi(3)], 0.0));
         }
         let scale = (BAND_PASS_WEIGHT * p.multiplicity / multiplicities).sqrt();
-        let pull =
-            (0..3 * n).map(|j| if (n..2 * n).contains(&j) { scale * basis[j - n] } else { 0.0 }).collect();
-        rows.push((pull, scale * band_pass(p.w)));
+        equations.push((vec![0.0, scale, 0.0], scale * band_pass(p.w)));
+        rows.extend(least_squares::in_taps(&equations, &kernel::basis_responses(size, p.u, p.v)));
     }
-    let matrix = DMatrix::from_fn(rows.len(), 3 * n, |i, j| rows[i].0[j]);
-    let rhs = DVector::from_fn(rows.len(), |i, _| rows[i].1);
-    Ok(Kernel::several(size, solve(matrix, rhs)?.as_slice())?)
+    let (matrix, right) = least_squares::reduced(&rows);
+    Ok(Kernel::several(size, least_squares::solve(matrix, right)?.as_slice())?)
 }

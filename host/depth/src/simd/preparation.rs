@@ -3,6 +3,7 @@
 
 use super::dispatch;
 use super::lanes::Lanes;
+use super::windows::add_products_generic;
 
 dispatch! {
     /// Adds the first row to `sums` and takes the second one off; `to` is their `share`.
@@ -55,18 +56,35 @@ dispatch! {
 
 #[inline(always)]
 fn add_energies_generic<L: Lanes>(rows: [[&[f32]; 3]; 2], [far, near, both, brightness]: [&mut [f32]; 4]) {
+    const TOGETHER: usize = 64;
     let width = far.len();
-    let (near, both, brightness) = (&mut near[..width], &mut both[..width], &mut brightness[..width]);
-    let [of_far, of_near] = rows.map(|rows| rows.map(|row| [0, 1, 2].map(|d| &row[d..d + width])));
+    let [of_far, of_near] = rows;
+    for begin in (0..width).step_by(TOGETHER) {
+        let end = width.min(begin + TOGETHER);
+        let (mut a, mut b) = ([0.0; TOGETHER], [0.0; TOGETHER]);
+        second_differences(of_far, begin, &mut a[..end - begin]);
+        second_differences(of_near, begin, &mut b[..end - begin]);
+        add_products_generic::<L>(&a, &a, &mut far[begin..end]);
+        add_products_generic::<L>(&b, &b, &mut near[begin..end]);
+        add_products_generic::<L>(&a, &b, &mut both[begin..end]);
+        let (of_far, of_near) = (&of_far[1][begin + 1..=end], &of_near[1][begin + 1..=end]);
+        let brightness = &mut brightness[begin..end];
+        for x in 0..brightness.len() {
+            brightness[x] += 0.5 * (of_far[x] + of_near[x]);
+        }
+    }
+}
+
+#[inline(always)]
+fn second_differences(rows: [&[f32]; 3], begin: usize, to: &mut [f32]) {
+    let width = to.len();
+    let end = begin + width + 2;
+    let (above, here, below) = (&rows[0][begin..end], &rows[1][begin..end], &rows[2][begin..end]);
     for x in 0..width {
-        let [a, b] = [&of_far, &of_near].map(|rows| {
-            let [left, here, right] = [0, 1, 2].map(|d| rows[0][d][x] - 2.0 * rows[1][d][x] + rows[2][d][x]);
-            left - 2.0 * here + right
-        });
-        far[x] += a * a;
-        near[x] += b * b;
-        both[x] += a * b;
-        brightness[x] += 0.5 * (of_far[1][1][x] + of_near[1][1][x]);
+        let left = above[x] - 2.0 * here[x] + below[x];
+        let middle = above[x + 1] - 2.0 * here[x + 1] + below[x + 1];
+        let right = above[x + 2] - 2.0 * here[x + 2] + below[x + 2];
+        to[x] = left - 2.0 * middle + right;
     }
 }
 
@@ -96,9 +114,10 @@ fn compare_generic<L: Lanes>(
         for i in 0..count {
             let x = begin + i;
             let (a, b) = (of_far[x], of_near[x]);
-            let detail = [a, b].map(|energy| 1.0 - noise / energy.max(f32::MIN_POSITIVE));
-            let counts = (detail[0] > least_detail) & (detail[1] > least_detail);
-            let largest = (detail[0] * detail[1]).sqrt();
+            let detail_far = 1.0 - noise / a.max(f32::MIN_POSITIVE);
+            let detail_near = 1.0 - noise / b.max(f32::MIN_POSITIVE);
+            let counts = (detail_far > least_detail) & (detail_near > least_detail);
+            let largest = (detail_far * detail_near).sqrt();
             let correlation = product[x] / (a * b).sqrt();
             different[x] = counts & (correlation < least_correlation * largest);
             sums[0][i] += if counts { correlation } else { 0.0 };

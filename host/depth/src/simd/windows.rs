@@ -184,7 +184,7 @@ dispatch! {
 }
 
 #[inline(always)]
-fn add_products_generic<L: Lanes>(a: &[f32], b: &[f32], sums: &mut [f32]) {
+pub(super) fn add_products_generic<L: Lanes>(a: &[f32], b: &[f32], sums: &mut [f32]) {
     let width = sums.len();
     let (a, b) = (&a[..width], &b[..width]);
     for x in 0..width {

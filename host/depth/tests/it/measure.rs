@@ -162,6 +162,23 @@ fn a_good_pair_goes_through_untouched() {
     }
 }
 
+#[test]
+fn a_confidence_that_nothing_reaches_is_reported() {
+    let pair = plain("staircase", 1);
+    let optics = rig(PSF);
+    let lost = |least_confidence: f32| {
+        let settings = MeasureSettings { least_confidence, ..settings(Window::Fixed(7)) };
+        let (far, near) = (pair.far.view(), pair.near.view());
+        let found =
+            measure_pair_of_views(far, near, &optics, DepthMethod::Whitened, None, &settings).unwrap();
+        let unsure = |f: &Finding| matches!(f, Finding::Lost(lost) if lost.reason == Reason::Unsure);
+        (found.validity.valid_fraction, found.findings.iter().any(unsure))
+    };
+    assert_eq!(lost(1.0), (0.0, true));
+    let (valid, reported) = lost(0.9);
+    assert!(valid > 0.5 && !reported, "{valid} {reported}");
+}
+
 /// Aims of the measured page: 0.75 mm on 640x480; smaller images determine gain and geometry less well.
 #[test]
 fn geometry_and_brightness_are_corrected() {
