@@ -249,7 +249,7 @@ impl Client {
                 Err(RecvTimeoutError::Timeout) if stopping || !self.interrupted() => {}
                 Err(RecvTimeoutError::Timeout) => {
                     if interrupted.get_or_insert_with(Instant::now).elapsed() >= ANSWER_GRACE {
-                        return Err(ClientError::Interrupted { during: during.into() });
+                        return Err(ClientError::Interrupted { during: during.into(), stopped: false });
                     }
                 }
             }

@@ -124,8 +124,15 @@ pub enum ClientError {
     TooManyShots { shots: usize, max: u8 },
     #[error("no exposure program is armed")]
     NotArmed,
-    #[error("interrupted while {during}; the rig was stopped")]
-    Interrupted { during: String },
+    #[error(
+        "interrupted while {during}{}",
+        if *stopped { "; the rig was stopped" } else { ", without an answer of the board: its keep-alive timeout ends any motion" }
+    )]
+    Interrupted {
+        during: String,
+        /// Whether the board has answered since.
+        stopped: bool,
+    },
 }
 
 fn what_came(bad_frames: u64, bytes: u64) -> String {

@@ -146,7 +146,8 @@ fn expect_no_more(client: &Client, camera: &mut dyn Camera) -> Result<(), Captur
     let until = Instant::now() + camera.quiet_time();
     loop {
         if client.interrupted() {
-            return Err(ClientError::Interrupted { during: "waiting for surplus images".into() }.into());
+            let during = "waiting for surplus images".into();
+            return Err(ClientError::Interrupted { during, stopped: true }.into());
         }
         camera.finish(until.saturating_duration_since(Instant::now()).min(SLICE))?;
         if Instant::now() >= until {
@@ -218,7 +219,7 @@ pub(crate) fn wait_for_image(
             Err(CameraError::Late { camera, trigger_number, .. }) => {
                 if client.interrupted() {
                     let during = "waiting for the camera's image".into();
-                    return Err(ClientError::Interrupted { during }.into());
+                    return Err(ClientError::Interrupted { during, stopped: true }.into());
                 }
                 if Instant::now() >= until {
                     return Err(CameraError::Late { camera, trigger_number, waited: allowed }.into());

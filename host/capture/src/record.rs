@@ -8,7 +8,7 @@ use farnear_files::{
     image_file::encode_png,
     staging::{Staging, StagingError},
 };
-use farnear_protocol::message::{Hello, SCHEMA_KEY, ShotRecord};
+use farnear_protocol::message::{Hello, LightLevels, SCHEMA_KEY, ShotRecord};
 use serde::{Deserialize, Serialize};
 
 use crate::{
@@ -105,6 +105,9 @@ pub struct CameraRecord {
     pub coding_variance: Option<f64>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub averaged: Option<u16>,
+    /// Brightness of both light outputs, percent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub light_percent: Option<[f64; 2]>,
     /// Whether exposures without the board's light were subtracted.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub ambient_subtracted: bool,
@@ -226,6 +229,7 @@ fn record(
             bits: image.bits,
             coding_variance: Some(image.coding_variance).filter(|variance| *variance > 0.0),
             averaged: None,
+            light_percent: client.light(0).map(LightLevels::percent),
             ambient_subtracted: false,
             corrected: false,
             settings: BTreeMap::new(),

@@ -79,7 +79,9 @@ impl Work {
         let until = Instant::now() + wait;
         loop {
             if self.client.interrupted() {
-                return Err(self.stop_with(ClientError::Interrupted { during: self.during.clone() }));
+                return Err(
+                    self.stop_with(ClientError::Interrupted { during: self.during.clone(), stopped: true })
+                );
             }
             let begin = Instant::now();
             let slice = SLICE.min(until.saturating_duration_since(begin)).min(self.left);
@@ -165,7 +167,7 @@ impl Work {
             // The stop may have been sent by the caller of the interruption; its event may come first.
             EventKind::Failed { reason: Failure::Stopped, .. } if self.client.interrupted() => {
                 self.over = true;
-                Err(ClientError::Interrupted { during: during() })
+                Err(ClientError::Interrupted { during: during(), stopped: true })
             }
             EventKind::Failed { axis, reason, .. } => {
                 self.over = true;
@@ -240,7 +242,7 @@ impl Client {
         }
         let during = plans.iter().map(|plan| plan.during.as_str()).collect::<Vec<_>>().join(" and ");
         if self.interrupted() {
-            return Err(ClientError::Interrupted { during });
+            return Err(ClientError::Interrupted { during, stopped: true });
         }
         let (mut questions, mut ends) = (Vec::new(), Vec::new());
         for plan in &plans {

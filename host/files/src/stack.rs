@@ -1,6 +1,6 @@
 //! Focus stacks: files of a folder, or pages of a TIFF with positions. Positions come from the ImageJ description
 //! (`spacing`, `unit`), OME-XML (`PositionZ` of each plane, else `PhysicalSizeZ`) or Micro-Manager's page tag
-//! (`ZPositionUm`); the pixel size from OME-XML (`PhysicalSizeX`) or an ImageJ file's resolution.
+//! (`ZPositionUm`), for files with one plane each from the OME-XML of the first; the pixel size from OME-XML (`PhysicalSizeX`) or an ImageJ file's resolution.
 
 mod folder;
 mod names;
@@ -58,7 +58,21 @@ fn folder(path: &Path) -> Result<Stack, StackError> {
     if let [only] = images.as_slice() {
         return file(only).map(|stack| Stack { remarks: [remarks, stack.remarks].concat(), ..stack });
     }
-    Ok(Stack { remarks, images, ..Stack::default() })
+    let name = |image: &PathBuf| image.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let names: Vec<String> = images.iter().map(name).collect();
+    let Some(Pages { pages, .. }) = Pages::open(&images[0])? else {
+        return Ok(Stack { remarks, images, ..Stack::default() });
+    };
+    let of_files = positions::of_files(&pages, &names);
+    let Some(planes) = of_files.map_err(|reason| StackError::Planes { path: path.into(), reason })? else {
+        return Ok(Stack { remarks, images, ..Stack::default() });
+    };
+    Ok(Stack {
+        images: planes.pages.into_iter().map(|index| images[index].clone()).collect(),
+        positions_um: planes.positions_um,
+        object_pixel_um: positions::object_pixel_um(&pages),
+        remarks: [remarks, planes.remarks].concat(),
+    })
 }
 
 fn file(path: &Path) -> Result<Stack, StackError> {

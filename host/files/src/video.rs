@@ -61,6 +61,8 @@ pub enum VideoError {
     NoPictures { path: PathBuf },
     #[error("{} and {} have one name: they may be the same picture twice; move one of them away", first.display(), second.display())]
     SameStem { first: PathBuf, second: PathBuf },
+    #[error("{}: a link to a file that does not exist, or no file: restore the picture, or remove the name", path.display())]
+    NotAFile { path: PathBuf },
     #[error("{}: no frame in this video", path.display())]
     NoFrames { path: PathBuf },
     #[error("{}: not a picture that can be read: {reason}", path.display())]

@@ -5,14 +5,14 @@ import { key } from "./keys.js";
 
 /** @type {HTMLElement | null} */
 let warnings = null;
-/** @type {{ open: (name: string) => void, again: (name: string) => void }} */
-let depths = { open: () => {}, again: () => {} };
+/** @type {(name: string) => void} */
+let depths = () => {};
 /** The capture whose depth is wished as soon as there is any. @type {string | null} */
 let awaited = null;
 
-/** Told by the page: what opens the depth of a capture, what shows it before it is in any file, and what does so again when it is. */
-export function whenCaptured(open, again, show) {
-  depths = { open, again };
+/** Told by the page: what opens the depth of a capture, and what shows it before it is in any file. */
+export function whenCaptured(open, show) {
+  depths = open;
   on("fresh", (header, pixels) => {
     if (header.capture !== awaited) return;
     awaited = null;
@@ -33,6 +33,7 @@ export function make() {
   const depth = h("input", { type: "checkbox", checked: true });
   const averaged = h("input", { type: "number", value: 1, min: 1, max: 256, "aria-label": "Exposures of each image, averaged" });
   const ambient = h("input", { type: "checkbox" });
+  const subtract = h("label", { class: "check" }, ambient, "subtract images without the board's light");
   const amount = h("input", { type: "number", value: 10, min: 1, max: 500, "aria-label": "Pairs of the series" });
   const every = h("input", { type: "number", value: 0, min: 0, max: 86400, step: "any", "aria-label": "Seconds from pair to pair; 0 is at once" });
   const axis = choice([["fine", "Piezo"], ["coarse", "Coarse"], ["lens", "Lens"]], "fine", () => {}, { "aria-label": "Axis of the stack" });
@@ -49,12 +50,16 @@ export function make() {
   on("state", (state) => {
     const able = hasControl() && state.rig.phase === "ready" && state.job?.phase !== "running";
     for (const control of all) control.disabled = !able;
+    const lit = state.live.light_percent.some((percent) => percent > 0);
+    ambient.disabled = !lit;
+    ambient.checked &&= lit;
+    subtract.title = lit ? "" : "The board's light is off: set Light 1 or Light 2 under Camera first";
   });
   key("c", "Capture a pair", () => !pair.disabled && pair.click());
   return panel("Capture", warnings, h("div", { class: "capture" }, pair, h("label", { class: "check" }, depth, "compute depth")),
     h("details", {}, h("summary", {}, "Average, series, still, stack"),
       h("div", { class: "row" }, h("span", {}, "Average"), averaged, h("span", { class: "unit" }, "exposures")),
-      h("label", { class: "check" }, ambient, "subtract images without the board's light"),
+      subtract,
       h("div", { class: "row" }, all[1], amount, h("span", { class: "unit" }, "pairs, every"), every, h("span", { class: "unit" }, "s")),
       h("div", { class: "row" }, all[2], h("span", { class: "dim" }, "at the present focus")),
       h("div", { class: "row" }, all[3], axis), h("div", { class: "three" }, from, to, steps)));
@@ -71,9 +76,7 @@ async function take(wish, depth) {
   const computing = await act(`/api/captures/${encodeURIComponent(name)}/depth`, { uncertainty: "estimated" });
   if (!computing) return;
   const computed = await ended("computation", computing.job);
-  if (computed.phase !== "done") return;
-  if (awaited === name) depths.open(name);
-  else depths.again(name);
+  if (computed.phase === "done" && awaited === name) depths(name);
 }
 
 /** Whether a job is under way. */

@@ -1,5 +1,5 @@
 // Depth of a capture: map, confidence, deviation, images, surface; probe, profile, region; two layers compared by a wipe.
-import { act, bytes, ended, get, on, store } from "./link.js";
+import { act, bytes, ended, get, on, onJob, store } from "./link.js";
 import { h, button, choice, field, number, panel, notice } from "./ui.js";
 import { Viewer } from "./viewer.js";
 import { bars } from "./plot.js";
@@ -269,6 +269,8 @@ export function make(host, remember) {
     }
   }
 
+  // The files of the capture that is shown have changed.
+  onJob("depth", ({ phase, title }, old) => { if (phase === "done" && !old && title === `Depth of ${show.name}`) open(show.name, true); });
   let seen = -1;
   on("state", (state) => {
     if (state.captures === seen || host.hidden) return;
@@ -278,8 +280,6 @@ export function make(host, remember) {
   return {
     open,
     fresh,
-    /** Its files are there: what is shown of it is shown from them. */
-    again: (name) => name === show.name && open(name, true),
     shown: (name) => {
       seen = store.state?.captures ?? -1;
       list().then(() => name && open(name)).catch(() => {});

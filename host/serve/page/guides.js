@@ -1,5 +1,5 @@
 // Guides with pictures: first power-up, point spread function, flat series, and people before the camera.
-import { act, call, hasControl, ended, get, on, store } from "./link.js";
+import { act, call, hasControl, ended, get, on, onJob, store } from "./link.js";
 import { h, button, choice, field, notice, number, panel, rows } from "./ui.js";
 import * as draw from "./guide-pictures.js";
 import * as people from "./people.js";
@@ -78,18 +78,16 @@ function powerUp() {
     }
     said.textContent = `${result.passed} passed, ${result.failed} failed, ${result.passed_over} passed over`;
   };
-  const start = async () => {
-    for (const { sign } of verdicts.values()) delete sign.dataset.verdict;
-    const begun = await act("/api/rig/check");
-    const job = begun && (await ended("job", begun.job));
-    if (job?.phase === "done") show(job.result);
-    else if (job) said.textContent = job.error ?? "stopped";
-  };
+  onJob("check", ({ phase, result, error }) => {
+    if (phase === "done") show(result);
+    else if (phase === "running") for (const { sign } of verdicts.values()) delete sign.dataset.verdict;
+    else said.textContent = error ?? "stopped";
+  });
   on("state", ({ job }) => { if (job?.kind === "check" && job.phase === "running") said.textContent = job.said ?? "…"; });
   const element = h("div", { class: "guide-body" },
     h("section", { class: "panel" }, h("h2", {}, "First power-up"),
       h("p", {}, "Take the next step only when the one before succeeded. The board measures what it can; the page asks for manual steps. The first seven steps are done with the motors disconnected."),
-      h("div", { class: "buttons" }, button("Start the checklist", start, { class: "primary", "data-needs": "rig" })), said),
+      h("div", { class: "buttons" }, button("Start the checklist", () => act("/api/rig/check"), { class: "primary", "data-needs": "rig" })), said),
     h("ol", { class: "check-steps" }, items));
   return { element };
 }
@@ -104,14 +102,12 @@ function psf() {
     const begun = await act("/api/captures", { kind: "pair" });
     if (begun && (await ended("job", begun.job)).phase === "done") await shown();
   };
-  const find = async () => {
+  const find = () => {
     const targets = [...pairs.querySelectorAll("li")].filter((row) => row.querySelector("[type=checkbox]")?.checked).map((row) => {
       const mm = row.querySelector("[type=number]").value;
       return mm === "" ? { capture: row.dataset.name } : { capture: row.dataset.name, depth_mm: Number(mm) };
     });
-    const begun = await act("/api/calibrate/psf", { targets, series: Boolean(useSeries?.checked), model: model.value });
-    const job = begun && (await ended("computation", begun.job));
-    if (job?.phase === "done") show(job.result);
+    act("/api/calibrate/psf", { targets, series: Boolean(useSeries?.checked), model: model.value });
   };
   const show = (found) => {
     const apply = async () => {
@@ -123,6 +119,7 @@ function psf() {
     result.replaceChildren(rows([["point spread function", found.psf], ["residual", number(found.residual, 5)], ["pairs", targets.length], ["targets", targets.map((mm) => number(mm, 1)).join(", ") + " mm"]]),
       button("Use it", apply, { class: "primary", "data-needs": "rig" }));
   };
+  onJob("psf", ({ phase, result: found }) => { if (phase === "done") show(found); });
   async function shown() {
     try {
       const [{ captures }, found] = await Promise.all([get("/api/captures"), get("/api/calibrate")]);
@@ -166,11 +163,8 @@ function lens() {
     plots[1].plot.set(columns(found.response));
     plots[2].plot.set([found.by_depth.map(({ depth }) => depth), found.by_depth.map(({ rms_mm }) => rms_mm), found.by_depth.map(({ predicted_mm }) => predicted_mm)]);
   };
-  const start = async () => {
-    const begun = await act("/api/calibrate/stack", { slices: Math.round(Number(slices.value)) });
-    const job = begun && (await ended("job", begun.job));
-    if (job?.phase === "done") show(job.result);
-  };
+  onJob("lens-stack", ({ phase, result: found }) => { if (phase === "done") show(found); });
+  const start = () => act("/api/calibrate/stack", { slices: Math.round(Number(slices.value)) });
   const element = h("div", { class: "guide-body" },
     step(1, "Place the target", draw.target(), h("p", {}, "A flat, finely textured target that fills the image, in the middle of the working range. A slight tilt helps. The emulated rig places its own.")),
     step(2, "Take the stack", draw.slices(), h("p", {}, "Finds the focus and takes slices on both sides of it, a fifth of a pair's sensor travel apart. The slices stay in the session."), field("Slices", slices),
@@ -183,7 +177,7 @@ function series() {
   const count = h("input", { type: "number", value: 6, min: 2, max: 60 });
   const own = h("input", { type: "text", placeholder: "e.g. 890, 905, 930", "aria-label": "Distances in mm" });
   const captured = h("p", { class: "status", "aria-live": "polite" });
-  const result = h("div", { "aria-live": "polite" });
+  const [taken, learned] = [h("div", { "aria-live": "polite" }), h("div", { "aria-live": "polite" })];
   const method = h("select", {});
   const distances = async () => {
     if (own.value.trim()) return own.value.split(/[\s,;]+/).filter(Boolean).map(Number);
@@ -197,29 +191,29 @@ function series() {
     try {
       const given = await distances();
       if (given.some((mm) => !Number.isFinite(mm))) return notice("Distances are numbers in mm, with commas between them.", "error");
-      const begun = await act("/api/calibrate/series", { distances: given });
-      const job = begun && (await ended("job", begun.job));
-      if (job?.phase === "done") result.replaceChildren(rows([["targets", job.result.targets], ["error before correction, RMS", number(job.result.rmse_mm, 2, "mm")]]));
-      await shown();
+      await act("/api/calibrate/series", { distances: given });
     } catch (error) {
       notice(error.message, "error", error.hint);
     }
   };
-  const learn = async () => {
-    const begun = await act("/api/calibrate/correction", { method: method.value });
-    const job = begun && (await ended("computation", begun.job));
-    if (job?.phase !== "done") return;
-    const found = job.result;
-    result.replaceChildren(rows([["method", found.method], ["targets", found.patterns], ["range", `${number(found.near_mm, 1)} to ${number(found.far_mm, 1)} mm`],
+  const learn = () => act("/api/calibrate/correction", { method: method.value });
+  onJob("flat-series", ({ phase, result }) => {
+    if (phase === "done") taken.replaceChildren(rows([["targets", result.targets], ["error before correction, RMS", number(result.rmse_mm, 2, "mm")]]));
+    if (phase !== "running") shown();
+  });
+  onJob("correction", ({ phase, result: found }) => {
+    if (phase !== "done") return;
+    learned.replaceChildren(rows([["method", found.method], ["targets", found.patterns], ["range", `${number(found.near_mm, 1)} to ${number(found.far_mm, 1)} mm`],
       ["RMS before", number(found.rmse_before_mm, 3, "mm")], ["RMS after", number(found.rmse_after_mm, 3, "mm")]]),
       h("p", { class: "dim" }, "In Depth, under Compute, tick “correction of this session”."));
     shown();
-  };
-  const forget = async () => { if (await act("/api/calibrate/series/forget")) setTimeout(shown, 400); };
+  });
+  onJob("forget", ({ phase }) => { if (phase === "done") shown(); });
   async function shown() {
     try {
       const { series_mm, corrected, methods } = await get("/api/calibrate");
       captured.textContent = series_mm.length ? `${series_mm.length} targets: ${series_mm.map((mm) => number(mm, 1)).join(", ")} mm${corrected ? " · a correction is learned" : ""}` : "No target yet.";
+      if (!series_mm.length) for (const place of [taken, learned]) place.replaceChildren();
       if (!method.children.length) method.append(...methods.map((name) => h("option", { value: name }, name)));
     } catch (error) {
       notice(error.message, "error", error.hint);
@@ -227,8 +221,8 @@ function series() {
   }
   const element = h("div", { class: "guide-body" },
     step(1, "Flat targets through the range", draw.series(), h("p", {}, "A flat, textured target at several known distances; the page asks for each. On the emulated rig it moves automatically. An interrupted series continues where it stopped."),
-      field("Targets", count), field("Distances", own, "mm"), h("div", { class: "buttons" }, button("Capture the series", start, { class: "primary", "data-needs": "rig" }), button("Forget it", forget, { "data-needs": "rig" })), captured),
+      field("Targets", count), field("Distances", own, "mm"), h("div", { class: "buttons" }, button("Capture the series", start, { class: "primary", "data-needs": "rig" }), button("Forget it", () => act("/api/calibrate/series/forget"), { "data-needs": "rig" })), captured),
     step(2, "Learn the correction", draw.curve(), h("p", {}, "What the lens bends is learned from the maps of planes, and taken off other maps."), field("Method", method), h("div", { class: "buttons" }, button("Learn", learn, { class: "primary", "data-needs": "client" }))),
-    panel("Result", result));
+    panel("Result", taken, learned));
   return { element, shown };
 }

@@ -109,6 +109,22 @@ export async function bytes(path) {
   return answer.ok ? answer.arrayBuffer() : null;
 }
 
+/** Tells each job of a kind, whichever page began it, once when it runs and once when it has ended; `old`: it had ended before this page
+ * was opened. What a job found is shown by this alone, so it is also there after a reload.
+ * @param {string} kind @param {(job: import("./state").Job, old: boolean) => void} tell */
+export function onJob(kind, tell) {
+  const told = { job: "", computation: "" };
+  on("state", (state, before) => {
+    for (const queue of ["job", "computation"]) {
+      const job = state[queue];
+      const now = `${job?.id} ${job?.phase}`;
+      if (told[queue] === now) continue;
+      told[queue] = now;
+      if (job?.kind === kind) tell(job, !before && job.phase !== "running");
+    }
+  });
+}
+
 /** Waits for the end of a job. `queue` is `job` (on the rig) or `computation`. */
 export function ended(queue, id) {
   return new Promise((done) => {

@@ -1,5 +1,5 @@
 // The live image with what one focuses by: histogram, saturation, peaking, focus value; and live depth.
-import { act, hasControl, ended, get, on, store } from "./link.js";
+import { act, hasControl, ended, get, on, onJob, store } from "./link.js";
 import { h, button, choice, field, keep, notice, number, panel, rows } from "./ui.js";
 import { Viewer } from "./viewer.js";
 import { Plot, bars } from "./plot.js";
@@ -86,17 +86,27 @@ export function make(host) {
   let shown = false;
   const off = button("Live image", () => mode("image"), { "aria-pressed": "false", title: "L" });
   const deep = button("Live depth", () => mode("depth"), { "aria-pressed": "false", title: "Pair after pair by the piezo" });
-  const record = button("Record", () => act("/api/recordings", { on: !store.state?.live.recording }), { "aria-pressed": "false", title: "Keeps the pairs of live depth" });
+  /** Whether this page ends the recording. */
+  let ending = false;
+  const record = button("Record", () => {
+    ending = Boolean(store.state?.live.recording);
+    act("/api/recordings", { on: !ending });
+  }, { "aria-pressed": "false", title: "Keeps the pairs of live depth" });
   const recordings = h("select", { "aria-label": "Recording" });
   const fast = h("input", { type: "checkbox" });
   const played = h("p", { class: "dim", "aria-live": "polite" });
-  const play = button("Play", async () => {
-    const begun = await act("/api/recordings/play", { recording: recordings.value, fast: fast.checked });
-    if (!begun) return;
-    depth.element.hidden = false;
-    const job = await ended("computation", begun.job);
-    if (job.phase === "done") played.textContent = `${job.result.pairs} pairs, ${number(job.result.maps_per_second, 1)} maps/s, ${number(job.result.latency_ms, 1)} ms a map (median)`;
+  const play = button("Play", () => act("/api/recordings/play", { recording: recordings.value, fast: fast.checked }));
+  onJob("play", ({ phase, result }) => {
+    if (phase === "done") played.textContent = `${result.pairs} pairs, ${number(result.maps_per_second, 1)} maps/s, ${number(result.latency_ms, 1)} ms a map (median)`;
   });
+  const lost = h("p", { class: "bad", "aria-live": "polite" });
+  /** Tells of a recording that this page did not end; the program's log knows its pairs. */
+  const sayEnded = async (name) => {
+    const { lines } = await get("/api/log").catch(() => ({ lines: [] }));
+    const line = lines.findLast(({ text }) => text.startsWith(`recorded ${name}: `));
+    const pairs = line && /: (\d+) pairs/.exec(line.text)?.[1];
+    if (!store.state?.live.recording) lost.textContent = `Recording ended: ${name}${pairs ? `, ${pairs} pairs` : ""}.`;
+  };
   const listed = async () => {
     const { recordings: found } = await get("/api/recordings").catch(() => ({ recordings: [] }));
     const present = recordings.value;
@@ -135,7 +145,7 @@ export function make(host) {
     h("div", { class: "side" },
       capture.make(),
       panel("Focus value", h("div", { class: "reading" }, focus, forget), place, field("Measure", measure)),
-      panel("Recordings", h("div", { class: "row record-row" }, play, recordings), h("label", { class: "check" }, fast, "as fast as it goes"), played),
+      panel("Recordings", h("div", { class: "row record-row" }, play, recordings), h("label", { class: "check" }, fast, "as fast as it goes"), played, lost),
       panel("Camera", field("Exposure", exposure, "µs"), h("div", { class: "row" }, auto), ...light.map((level, at) => field(`Light ${at + 1}`, level, "%")), histogram, figures, warnings, camera.make()))));
   image.onshape = (_, [x0, y0], [x1, y1]) => {
     image.use("pan");
@@ -196,7 +206,12 @@ export function make(host) {
     record.disabled = !hasControl() || live.mode !== "depth";
     record.setAttribute("aria-pressed", Boolean(live.recording));
     write(record, live.recording ? "Stop recording" : "Record");
-    if (before?.live.recording !== live.recording) listed();
+    if (before?.live.recording !== live.recording) {
+      listed();
+      lost.textContent = "";
+      if (before?.live.recording && !live.recording && !ending) sayEnded(before.live.recording);
+      ending = false;
+    }
     if (before && live.recording_ended && live.recording_ended !== before.live.recording_ended) notice(live.recording_ended, "warning");
     const moving = state.job?.phase === "running";
     if (!seen) write(status, "");

@@ -193,7 +193,6 @@ function begin() {
   const { parts } = views.get("depth");
   whenCaptured(
     (name) => { go("depth", name); parts.open(name, true); },
-    parts.again,
     (header, pixels) => { parts.fresh(header, pixels); go("depth", header.capture); },
   );
   on("link", () => { showLink(); if (store.state) showControl(store.state); });

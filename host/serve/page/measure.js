@@ -51,10 +51,13 @@ export function make() {
   return { elements: [panel("Under the pointer", probe), profile, area], under, shape, plot };
 }
 
-/** Step from one region to the next: difference of their means, with its standard deviation. */
+/** Step from one region to the next: difference of their means, with its standard error. */
 function stepOf(first, second) {
-  const variance = ({ standard_deviation_mm: sd, region, fill_rate }) => sd ** 2 / Math.max(1, region.width * region.height * fill_rate);
-  return rows([["step to the region before", number(second.mean_mm - first.mean_mm, 3, "mm")], ["± of the means", number(Math.sqrt(variance(first) + variance(second)), 3, "mm")]]);
+  const errors = [first.standard_error_mm, second.standard_error_mm];
+  const known = errors.every((error) => error != null);
+  const about = known ? "from the scatter of the means of 24 × 24 px: neighbouring depths are not independent" : "Each region needs four blocks of 24 × 24 px with depth: neighbouring depths are not independent.";
+  return rows([["step to the region before", number(second.mean_mm - first.mean_mm, 3, "mm")],
+    ["± of the means", h("span", { title: about }, number(known ? Math.hypot(...errors) : null, 3, "mm"))]]);
 }
 
 /** Saves a text as a file. */

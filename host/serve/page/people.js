@@ -1,5 +1,5 @@
 // Guides about people: their shadow by the sun, and what they do.
-import { act, call, ended, get, on, store } from "./link.js";
+import { act, call, get, on, onJob, store } from "./link.js";
 import { h, button, field, keep, notice, number, panel, rows } from "./ui.js";
 import * as draw from "./guide-pictures.js";
 
@@ -55,20 +55,24 @@ export function activity() {
   const past = [];
   // The answer for the whole stays: pictures that were on the way may come after it.
   let answered = false;
-  const start = async (wish, queue) => {
+  const forget = () => {
     past.length = 0;
     answered = false;
     answer.textContent = "–";
     details.replaceChildren();
     delete details.dataset.key;
-    const begun = await act("/api/people/recognise", wish);
-    if (!begun) return;
-    const job = await ended(queue, begun.job);
-    if (job.phase !== "done" || !job.result) return;
-    answered = true;
-    const best = job.result.probabilities.toSorted((a, b) => b.probability - a.probability).slice(0, 3);
-    tell({ ...job.result, best }, `of all ${job.result.frames} frames`);
   };
+  const start = (wish) => {
+    forget(); // a job that fails at once is never seen to run
+    act("/api/people/recognise", wish);
+  };
+  onJob("recognise", ({ phase, result }) => {
+    if (phase === "running") forget();
+    if (phase !== "done" || !result) return;
+    answered = true;
+    const best = result.probabilities.toSorted((a, b) => b.probability - a.probability).slice(0, 3);
+    tell({ ...result, best }, `of all ${result.frames} frames`);
+  });
   const tell = (found, of) => {
     const [first] = found.best ?? [];
     const likely = first?.probability;
@@ -87,7 +91,7 @@ export function activity() {
   const element = h("div", { class: "guide-body" },
     h("section", { class: "panel guide-step" }, h("div", { class: "guide-picture" }, draw.person()), h("div", { class: "guide-words" }, h("h2", {}, "Activity of a person"),
       h("p", {}, "A fixed camera and one person who moves. The first frames teach the background. Stop ends it."), video.parts, known,
-      h("div", { class: "buttons" }, button("Recognise the video", () => start({ video: video.name() }, "computation"), { class: "primary", "data-needs": "computation" }), button("Watch the camera", () => start({}, "job"), { "data-needs": "rig" })))),
+      h("div", { class: "buttons" }, button("Recognise the video", () => start({ video: video.name() }), { class: "primary", "data-needs": "computation" }), button("Watch the camera", () => start({}), { "data-needs": "rig" })))),
     panel("Answer", h("div", { class: "person-answer" }, canvas, h("div", {}, answer, strip, details))));
   const shown = async () => {
     await video.shown();
@@ -148,16 +152,19 @@ export function shadow() {
   }
   let waiting = 0;
   for (const control of [time, inputs.latitude, inputs.longitude]) control.addEventListener("input", () => { clearTimeout(waiting); waiting = setTimeout(shown, 150); });
+  /** What this page began: the name of its folder. */
+  let begun = null;
   const start = async () => {
     const camera = { height_m: value(inputs.height), azimuth_deg: value(inputs.azimuth), pitch_deg: value(inputs.pitch), focal_length_mm: value(inputs.focal), pixel_um: value(inputs.pixel) };
-    const begun = await act("/api/people/shadow", { video: video.name(), sun: sunlight(), camera });
-    const job = begun && (await ended("computation", begun.job));
-    if (job?.phase !== "done") return;
-    const found = job.result;
-    const mask = (folder, file) => h("img", { src: `/api/people/shadows/${begun.shadow}/${folder}/${file}`, alt: `${file}, ${folder.replace("-", " ")}`, loading: "lazy" });
-    results.replaceChildren(rows([["frames", found.frames], ["cut", found.cut], ["doubtful", found.flagged], ["removed, mean", found.removed_percent == null ? "–" : `${number(found.removed_percent, 1)} %`]]),
-      h("div", { class: "masks" }, found.samples.map((file) => h("figure", {}, mask("with-shadow", file), mask("without-shadow", file), h("figcaption", { class: "dim" }, file)))));
+    begun = await act("/api/people/shadow", { video: video.name(), sun: sunlight(), camera });
   };
+  onJob("shadow", ({ id, phase, result: found }) => {
+    if (phase !== "done") return;
+    const name = found.shadow ?? (begun?.job === id ? begun.shadow : null);
+    const mask = (folder, file) => h("img", { src: `/api/people/shadows/${name}/${folder}/${file}`, alt: `${file}, ${folder.replace("-", " ")}`, loading: "lazy" });
+    results.replaceChildren(rows([["frames", found.frames], ["cut", found.cut], ["doubtful", found.flagged], ["removed, mean", found.removed_percent == null ? "–" : `${number(found.removed_percent, 1)} %`]]),
+      name ? h("div", { class: "masks" }, found.samples.map((file) => h("figure", {}, mask("with-shadow", file), mask("without-shadow", file), h("figcaption", { class: "dim" }, file)))) : "");
+  });
   const element = h("div", { class: "guide-body" },
     h("section", { class: "panel guide-step" }, picture, h("div", { class: "guide-words" }, h("h2", {}, "1. Where and when"),
       field("Latitude", inputs.latitude, "°"), field("Longitude", inputs.longitude, "°"), field("Time", time), facts)),

@@ -1,5 +1,5 @@
 // How good depth is, as owners of depth cameras ask: fill rate, plane fit, noise over time, accuracy against a known distance.
-import { act, ended, get, on, store } from "./link.js";
+import { act, get, on, onJob, store } from "./link.js";
 import { h, button, field, number, panel, notice } from "./ui.js";
 
 /** Makes the view. */
@@ -15,14 +15,10 @@ export function make(host) {
       field("Pairs", pairs), field("True distance", distance, "mm"), start))));
   results.append(h("p", { class: "empty" }, "Nothing measured yet."));
 
-  async function measure() {
+  function measure() {
     const wish = { pairs: Math.round(Number(pairs.value)) };
     if (distance.value !== "") wish.true_mm = Number(distance.value);
-    const begun = await act("/api/quality", wish);
-    if (!begun) return;
-    const job = await ended("job", begun.job);
-    if (job.phase === "done") show(job.result);
-    refresh();
+    act("/api/quality", wish);
   }
 
   function show(found) {
@@ -47,6 +43,7 @@ export function make(host) {
       notice(error.message, "error", error.hint);
     }
   }
+  onJob("quality", ({ phase }, old) => { if (phase === "done" && !old) refresh(); });
   on("state", (state) => { start.disabled = state.rig.phase !== "ready" || state.job?.phase === "running" || state.control.holder !== store.client?.client; });
   return { shown: refresh };
 }

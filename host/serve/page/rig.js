@@ -89,7 +89,7 @@ function phaseWords(rig) {
   const again = button("Connect again", () => act("/api/rig/connect"), { "data-needs": "client" });
   if (rig.phase === "absent") return [h("p", { class: "dim" }, "No rig: captures only. Start farnear serve with --rig sim or a port to drive one.")];
   if (rig.phase === "connecting") return [h("p", {}, `Connecting to ${rig.name} …`)];
-  if (rig.phase === "lost" && rig.emulated) return [h("p", { class: "bad" }, "The emulated rig has ended."), h("p", { class: "dim" }, "Connect again to restart it; its stages are not homed then."), again, ...scene];
+  if (rig.phase === "lost" && rig.emulated) return [h("p", { class: "bad" }, "The emulated rig has ended, or does not answer."), h("p", { class: "dim" }, `${rig.error ?? ""} Connect again to restart it; its stages are not homed then.`), again, ...scene];
   if (rig.phase === "lost") return [h("p", { class: "bad" }, rig.error ?? "The rig does not answer."), again];
   return [h("p", { class: "rig-name" }, rig.name, rig.emulated ? h("span", { class: "badge", title: "No hardware is involved" }, "emulated") : null), ...scene];
 }

@@ -53,7 +53,8 @@ function card(capture, open) {
   const file = capture.has_depth ? "view.png" : capture.images[0];
   const path = `/api/captures/${encodeURIComponent(capture.name)}`;
   const focus = capture.optics?.focus;
-  const facts = [capture.kind, `${capture.width} × ${capture.height}`, `${capture.exposure_us} µs`, focus && `far ${number(focus.far_mm, 0)} mm`, capture.scene && `scene ${capture.scene}`, capture.time ?? (capture.written_unix_s && new Date(1000 * capture.written_unix_s).toLocaleString())];
+  const kind = capture.kind === "pair" ? "pair" : capture.images.length === 1 ? "still" : "stack";
+  const facts = [kind, `${capture.width} × ${capture.height}`, `${capture.exposure_us} µs`, focus && `far ${number(focus.far_mm, 0)} mm`, capture.scene && `scene ${capture.scene}`, capture.time ?? (capture.written_unix_s && new Date(1000 * capture.written_unix_s).toLocaleString())];
   return h("li", { class: "capture-card" },
     h("button", { type: "button", class: "thumbnail", onclick: () => open(capture.name), "aria-label": `Open ${capture.name}` },
       capture.broken ? h("span", { class: "bad" }, "broken") : h("img", { src: `${path}/files/${encodeURIComponent(file)}`, alt: "", loading: "lazy" })),

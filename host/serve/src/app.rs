@@ -2,12 +2,12 @@
 
 use std::{
     collections::VecDeque,
-    fs,
     path::PathBuf,
     sync::{
         Arc, Mutex, MutexGuard, PoisonError,
         atomic::{AtomicBool, Ordering},
     },
+    time::Duration,
 };
 
 use axum::body::Bytes;
@@ -21,7 +21,7 @@ use farnear_workflows::{
     optics::GivenOptics,
     rig::{
         RigAddress,
-        camera::{CameraAddress, CameraSettings, percent_of_light},
+        camera::{CameraAddress, CameraSettings},
         open::OpenRig,
         recording::Recorder,
     },
@@ -35,7 +35,7 @@ use crate::{
     guard::{Guard, Throttle},
     job_queue::{JobQueue, Task},
     server::ServeSettings,
-    stopping::{Stop, Stops},
+    stopping::{PATIENCE, Stop, StopError, Stops},
     view::{ControlState, LiveMode, LiveState, LogLine, Phase, RigState, State},
 };
 
@@ -92,11 +92,9 @@ pub fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 }
 
 impl App {
-    /// Creates the session's folder and its optics if they are missing.
+    /// Creates the session's optics if they are missing.
     pub fn new(settings: ServeSettings, guard: Guard) -> Result<Arc<Self>, WorkflowError> {
         let ServeSettings { rig, camera, session, optics, limits, .. } = settings;
-        fs::create_dir_all(&session)
-            .map_err(|source| WorkflowError::Folder { folder: session.clone(), source })?;
         let own = session.join("optics.toml");
         if let Some(given) = optics {
             let given = GivenOptics::read(&given)?;
@@ -211,7 +209,7 @@ impl App {
             state.live = LiveState {
                 mode,
                 exposure_us: exposure.0,
-                light_percent: percent_of_light(light.unwrap_or_default()),
+                light_percent: light.unwrap_or_default().percent(),
                 measure,
                 region: region.map(Into::into),
                 error: None,
@@ -325,17 +323,30 @@ impl App {
         stop
     }
 
-    /// Ends jobs and live depth and stops the rig, without waiting. The jobs end even if the board does not answer.
-    pub fn stop(&self) -> Result<(), WorkflowError> {
-        self.begin_stop().tell()
+    /// Ends jobs and live depth and stops the rig, without waiting for the jobs.
+    pub fn stop(&self) -> Result<(), StopError> {
+        self.tell_stop(self.begin_stop())
     }
 
-    /// Stops the rig and all computations when the program ends.
-    pub fn stop_everything(&self) {
+    /// Sends a stop. Every browser sees if the board does not answer.
+    pub fn tell_stop(&self, stop: Stop) -> Result<(), StopError> {
+        stop.tell(PATIENCE).inspect_err(|error| {
+            self.note(format!("stop: {error}"));
+            if matches!(error, StopError::Unanswered) {
+                self.change(|state| {
+                    state.rig.phase = Phase::Lost;
+                    state.rig.error = Some(error.to_string());
+                });
+            }
+        })
+    }
+
+    /// Stops the rig and all computations when the program ends. Waits at most `patience` for the board.
+    pub fn stop_everything(&self, patience: Duration) -> Result<(), StopError> {
         self.end();
         self.computing.cancel();
         self.set_live(|live| live.mode = LiveMode::Off);
-        let _ = self.stop(); // the board has its deadline
+        self.begin_stop().tell(patience)
     }
 
     pub fn end(&self) {
@@ -388,7 +399,7 @@ fn beginning(address: Option<&RigAddress>, camera: &CameraSettings, live: &Live)
         live: LiveState {
             mode: live.mode,
             exposure_us: live.exposure.0,
-            light_percent: percent_of_light(live.light.unwrap_or_default()),
+            light_percent: live.light.unwrap_or_default().percent(),
             measure: live.measure,
             region: None,
             error: None,

@@ -11,6 +11,8 @@ use farnear_workflows::{WorkflowError, simulator::SimulatorError};
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use crate::stopping::StopError;
+
 /// Why a request was not carried out.
 #[derive(Clone, PartialEq, Eq, Debug, Serialize, JsonSchema)]
 pub struct Failure {
@@ -60,6 +62,15 @@ impl From<WorkflowError> for Failure {
         };
         let hint = hint(&error).map(Into::into);
         Self { error: error.to_string(), hint, status }
+    }
+}
+
+impl From<StopError> for Failure {
+    fn from(error: StopError) -> Self {
+        match error {
+            StopError::Unanswered => Self::new(StatusCode::GATEWAY_TIMEOUT, error.to_string()),
+            StopError::Workflow(error) => error.into(),
+        }
     }
 }
 

@@ -17,6 +17,7 @@ pub mod picture_message;
 pub mod rig_watch;
 pub mod routes;
 pub mod server;
+pub mod session_lock;
 pub mod socket;
 pub mod stopping;
 pub mod transfer;

@@ -5,7 +5,7 @@ use std::{cell::RefCell, path::Path, time::Instant};
 use farnear_capture::camera::Image;
 use farnear_protocol::message::ShotRecord;
 use farnear_workflows::{
-    Context, Result, Unattended, WorkflowError, camera, optics, picture,
+    Context, Progress, Result, Unattended, WorkflowError, camera, optics, picture,
     rig::{
         RigAddress,
         camera::CameraSettings,
@@ -35,7 +35,8 @@ pub fn look(app: &App) {
     if rig.is_none() && !app.has_camera_alone() {
         return;
     }
-    let context = Context::new(&Unattended, &Unattended, live.cancel.clone());
+    let notices = Notices(app);
+    let context = Context::new(&notices, &Unattended, live.cancel.clone());
     let rate = Rate::default();
     let ended = match (live.mode, rig) {
         (LiveMode::Off, _) => return,
@@ -58,6 +59,25 @@ pub fn look(app: &App) {
             app.change(|state| state.live.error = Some(error.to_string()));
         }
         _ => {}
+    }
+}
+
+/// Shows why pairs have no depth. The next depth removes it.
+struct Notices<'a>(&'a App);
+
+impl Progress for Notices<'_> {
+    fn info(&self, _: &str) {}
+
+    fn warn(&self, what: &str) {
+        let Self(app) = self;
+        let state = app.state();
+        if enough(app).is_err() {
+            return app.interrupt_live();
+        }
+        if state.live.mode == LiveMode::Depth && state.live.error.as_deref() != Some(what) {
+            app.note(format!("live: {what}"));
+            app.change(|state| state.live.error = Some(what.into()));
+        }
     }
 }
 
@@ -102,6 +122,9 @@ fn look_at_depth(app: &App, rig: RigAddress, context: &Context<'_>, rate: &Rate)
     let ends = ends(&optics::read(&app.optics_file())?);
     let settings = LiveDepthSettings { rig, camera: app.camera(), optics: app.optics_file() };
     let ended = live_depth::watch(&settings, context, |depth: LiveDepth<'_>| {
+        if app.state().live.error.is_some() {
+            app.change(|state| state.live.error = None);
+        }
         record(app, &depth);
         app.pictures.send_replace(depth_message::live(&depth, ends, rate.next()));
         enough(app)
@@ -145,5 +168,51 @@ impl Rate {
         };
         *last = Some((now, rate));
         (rate * 10.0).round() / 10.0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::{path::Path, sync::Arc, time::Duration};
+
+    use farnear_protocol::Micros;
+    use farnear_workflows::rig::camera::CameraAddress;
+
+    use super::*;
+    use crate::{Limits, Listen, ServeSettings, guard::Guard};
+
+    fn app(folder: &Path) -> Arc<App> {
+        let camera = CameraSettings {
+            address: CameraAddress::Folder(folder.into()),
+            exposure: Micros(5_000),
+            image_wait: Duration::from_secs(1),
+            settings: Vec::new(),
+            light: None,
+        };
+        let listen = Listen::Loopback { port: 0 };
+        let guard = Guard::new(&listen);
+        let limits = Limits::default();
+        let settings =
+            ServeSettings { rig: None, camera, session: folder.into(), optics: None, listen, limits };
+        App::new(settings, guard).expect("a session")
+    }
+
+    #[test]
+    fn a_pair_without_depth_is_reported_and_live_depth_goes_on_while_somebody_watches() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let app = app(folder.path());
+        app.set_live(|live| live.mode = LiveMode::Depth);
+        let cancel = app.live().cancel;
+        let _client = app.with_control(|control| control.join(None));
+        for _ in 0..2 {
+            Notices(&app).warn("the far image is constant (1): depth needs texture");
+        }
+        let live = app.state().live;
+        assert_eq!(live.mode, LiveMode::Depth);
+        assert_eq!(live.error.as_deref(), Some("the far image is constant (1): depth needs texture"));
+        assert_eq!((app.log().len(), cancel.is_cancelled()), (1, false));
+        app.end();
+        Notices(&app).warn("the near image is constant (0): depth needs texture");
+        assert!(cancel.is_cancelled(), "otherwise it would go on without a single depth");
     }
 }

@@ -1,4 +1,10 @@
-use std::{net::SocketAddr, path::PathBuf, sync::Arc, time::Duration};
+use std::{
+    net::SocketAddr,
+    path::PathBuf,
+    sync::Arc,
+    thread::JoinHandle,
+    time::{Duration, Instant},
+};
 
 use farnear_workflows::{
     Cancel, Context, WorkflowError,
@@ -9,12 +15,15 @@ use crate::{
     app::App,
     connections::{LimitedListener, Limits, Peer},
     guard::{Guard, Listen},
-    job_queue, rig_watch, routes,
+    job_queue, rig_watch, routes, session_lock,
+    stopping::StopError,
 };
 
 const LOOK: Duration = Duration::from_millis(50);
-/// Longest wait for running requests at the end.
-const FAREWELL: Duration = Duration::from_secs(2);
+/// Longest wait for running requests, and then for threads, at the end.
+const FAREWELL: Duration = Duration::from_millis(300);
+/// Longest wait for the board's answer to the last stop.
+const LAST_STOP: Duration = Duration::from_millis(500);
 
 #[derive(Debug)]
 pub struct ServeSettings {
@@ -37,6 +46,14 @@ pub enum ServeError {
         #[from]
         source: std::io::Error,
     },
+    #[error(
+        "the session {} is in use by another farnear serve: end that one, or name another folder with --session",
+        session.display()
+    )]
+    InUse { session: PathBuf },
+    /// At the end.
+    #[error(transparent)]
+    Stop(#[from] StopError),
     #[error(transparent)]
     Workflow(#[from] WorkflowError),
 }
@@ -53,6 +70,7 @@ pub fn serve(
     let listener = runtime.block_on(tokio::net::TcpListener::bind(address)).map_err(failed)?;
     let bound = listener.local_addr()?;
     let guard = Guard::new(&settings.listen);
+    let _lock = session_lock::lock(&settings.session)?;
     let app = App::new(settings, guard)?;
     let workers = job_queue::start(&app)?;
     let watch = rig_watch::start(&app)?;
@@ -71,11 +89,26 @@ pub fn serve(
             () = patience => Ok(()), // a browser that does not let go of its connection
         }
     });
-    app.stop_everything();
+    let stopped = app.stop_everything(LAST_STOP);
+    if matches!(stopped, Err(StopError::Unanswered)) || !ends_soon(&watch) {
+        // What waits for a silent board is left behind, also the line, whose end would wait for its thread.
+        std::mem::forget(app);
+        runtime.shutdown_background();
+        served?;
+        return Ok(stopped?);
+    }
     workers.join();
-    let _ = watch.join(); // it never panics
     runtime.shutdown_timeout(FAREWELL);
     Ok(served?)
+}
+
+/// Whether the thread ends before [`FAREWELL`] is over.
+fn ends_soon(thread: &JoinHandle<()>) -> bool {
+    let until = Instant::now() + FAREWELL;
+    while !thread.is_finished() && Instant::now() < until {
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    thread.is_finished()
 }
 
 async fn ended(cancel: Cancel, app: Arc<App>) {

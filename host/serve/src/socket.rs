@@ -71,7 +71,7 @@ async fn run(mut socket: WebSocket, app: Arc<App>, resumed: Option<String>) {
         app.with_control(|control| control.expire(client.id).then(|| app.begin_stop_because(DISCONNECTED)));
     if let Some(stop) = stop {
         app.note(format!("{DISCONNECTED}: stopping"));
-        let _ = tokio::task::spawn_blocking(move || stop.tell()).await; // the board has its deadline
+        let _ = tokio::task::spawn_blocking(move || app.tell_stop(stop)).await; // a failure is in the log
     }
 }
 
@@ -138,11 +138,7 @@ fn hear(said: Message, app: &Arc<App>) -> Heard {
             Ok(ClientMessage::Stop) => {
                 app.note("stop");
                 let (app, stop) = (Arc::clone(app), app.begin_stop());
-                drop(tokio::task::spawn_blocking(move || {
-                    if let Err(error) = stop.tell() {
-                        app.note(format!("stop: {error}"));
-                    }
-                }));
+                drop(tokio::task::spawn_blocking(move || app.tell_stop(stop)));
                 Heard::Nothing
             }
             Ok(ClientMessage::Seen) => Heard::Seen,

@@ -1,10 +1,29 @@
 //! Pending stops: nothing begins until they have reached the board, because a stop must not end later work.
 
-use std::sync::{Arc, Condvar, Mutex, PoisonError};
+use std::{
+    sync::{Arc, Condvar, Mutex, PoisonError, mpsc::channel},
+    thread::Builder,
+    time::Duration,
+};
 
+use farnear_capture::ClientError;
 use farnear_workflows::{WorkflowError, rig::open::OpenRig};
 
 use crate::app::lock;
+
+/// Longest wait for the board's answer to a stop.
+pub const PATIENCE: Duration = Duration::from_secs(1);
+
+#[derive(Debug, thiserror::Error)]
+pub enum StopError {
+    #[error(
+        "the board has not answered the stop; its keep-alive ends the motion within seconds: check the rig, and use its \
+         emergency stop if something moves"
+    )]
+    Unanswered,
+    #[error(transparent)]
+    Workflow(#[from] WorkflowError),
+}
 
 #[derive(Default)]
 pub struct Stops {
@@ -31,8 +50,30 @@ impl Stops {
 }
 
 impl Stop {
-    pub fn tell(self) -> Result<(), WorkflowError> {
-        self.rig.as_ref().map_or(Ok(()), OpenRig::stop)
+    /// Sends the stop and waits at most `patience` for the answer. It stays pending until the board answers or all repeats have failed.
+    pub fn tell(self, patience: Duration) -> Result<(), StopError> {
+        let Some(rig) = self.rig.clone() else { return Ok(()) };
+        answered_within(patience, move || {
+            let told = rig.stop();
+            drop(self);
+            told
+        })
+    }
+}
+
+/// Tells the board something in a thread, which is left behind if the answer takes longer than `patience`.
+pub fn answered_within(
+    patience: Duration,
+    tell: impl FnOnce() -> Result<(), WorkflowError> + Send + 'static,
+) -> Result<(), StopError> {
+    let (sender, answer) = channel();
+    let failed = |error: std::io::Error| WorkflowError::Thread { reason: error.to_string() };
+    // The receiver may have ended.
+    let tell = move || drop(sender.send(tell()));
+    Builder::new().name("stop".into()).spawn(tell).map_err(failed)?;
+    match answer.recv_timeout(patience) {
+        Ok(Err(WorkflowError::Client(ClientError::Silent { .. }))) | Err(_) => Err(StopError::Unanswered),
+        Ok(told) => Ok(told?),
     }
 }
 
@@ -54,7 +95,7 @@ mod tests {
         let stops = Arc::new(Stops::default());
         stops.wait();
         let (first, second) = (stops.begin(None), stops.begin(None));
-        second.tell().unwrap();
+        second.tell(PATIENCE).unwrap();
         let (begun, begins) = channel();
         let waiting = Arc::clone(&stops);
         let thread = thread::spawn(move || {
@@ -62,7 +103,7 @@ mod tests {
             begun.send(()).unwrap();
         });
         assert!(begins.recv_timeout(Duration::from_millis(50)).is_err(), "the first has not arrived");
-        first.tell().unwrap();
+        first.tell(PATIENCE).unwrap();
         begins.recv_timeout(Duration::from_secs(20)).unwrap();
         thread.join().unwrap();
     }

@@ -474,7 +474,7 @@ test("an emulated rig that has ended is restarted, also with another scene, and 
     await page.locator("#view-live .status", { hasText: "frames/s" }).waitFor();
     const [child] = readFileSync(`/proc/${own.pid}/task/${own.pid}/children`, "utf8").trim().split(/\s+/).concat(readdirSync(`/proc/${own.pid}/task`).flatMap((task) => readFileSync(`/proc/${own.pid}/task/${task}/children`, "utf8").trim().split(/\s+/))).filter(Boolean).map(Number);
     process.kill(child, "SIGKILL");
-    await page.getByText("The emulated rig has ended.").waitFor();
+    await page.getByText("The emulated rig has ended, or does not answer.").waitFor();
     await page.getByRole("button", { name: "Connect again" }).click();
     await page.locator("#link[data-phase=ready]").waitFor();
     await page.locator("#view-live .status", { hasText: "frames/s" }).waitFor();

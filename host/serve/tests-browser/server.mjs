@@ -1,4 +1,5 @@
 // `farnear serve` on the emulated rig, and a browser that looks at it.
+import assert from "node:assert/strict";
 import { spawn, spawnSync } from "node:child_process";
 import { existsSync, mkdtempSync, rmSync } from "node:fs";
 import { tmpdir } from "node:os";
@@ -105,4 +106,13 @@ export async function open(browser, address, options = {}, phase = "ready") {
   await page.goto(address);
   await page.locator(`#link[data-phase=${phase}]`).waitFor();
   return page;
+}
+
+/** Begins a job by `act`, waits until it runs, and loads the page again under it. */
+export async function reloaded(server, page, kind, act) {
+  await act();
+  const job = async () => (await server.ask("/api/state")).job;
+  while ((await job())?.kind !== kind) await page.waitForTimeout(20);
+  assert.equal((await job()).phase, "running", "the page is loaded again during the job");
+  await page.reload();
 }

@@ -1,6 +1,6 @@
 //! Runs the jobs of a manifest on all cores, each once, also after interruptions. A job is done if its result is
 //! complete and `batch.toml` lists the same settings, input hashes and program version. Results are moved into place
-//! when complete. Memory grows only by the name of each result that is kept from an earlier run.
+//! when complete. Memory grows by some bytes for each job.
 
 mod campaign;
 mod error;
@@ -8,17 +8,17 @@ mod fields;
 mod generate;
 mod jobs;
 mod manifest;
+mod outs;
 mod place;
 mod provenance;
 mod summary;
 mod tally;
 
 use std::{
-    collections::HashSet,
     io,
     path::{Path, PathBuf},
-    sync::{Arc, Mutex, MutexGuard, PoisonError},
-    time::{Instant, SystemTime},
+    sync::{Arc, Mutex, PoisonError},
+    time::Instant,
 };
 
 use farnear_files::staging::write_file;
@@ -33,6 +33,7 @@ pub use self::{
 use self::{
     fields::Fields,
     manifest::{Entry, Manifest},
+    outs::{Outs, are_same},
     place::{Found, Place},
     provenance::{Provenance, Sums},
     summary::Summary,
@@ -41,7 +42,7 @@ use self::{
 use crate::{
     cache::Cache,
     context::{Cancel, Context, Progress, Unattended},
-    error::Result,
+    error::{Result, WorkflowError},
     figures::rounded,
     parameters::{THREADS, within},
     request::{PathKind, Task},
@@ -163,12 +164,20 @@ pub fn run(
 ) -> Result<BatchFigures> {
     within("jobs", settings.jobs, &THREADS, "")?;
     let start = Instant::now();
-    let jobs = Manifest::count(&settings.manifest)?;
-    if jobs == 0 {
+    let outs = Outs::of(&settings.manifest)?;
+    if outs.jobs() == 0 {
         return Err(BatchError::Empty { path: settings.manifest.clone() }.into());
     }
-    let total = settings.shard.share(jobs);
+    let total = settings.shard.share(outs.jobs());
     let failures = settings.failures.clone().unwrap_or_else(|| failures_file(settings));
+    outs.check_report("failures", &failures, Tally::begins)?;
+    if let Some(path) = &settings.summary {
+        outs.check_report("summary", path, Summary::begins)?;
+        if are_same(path, &failures)? {
+            let reason = "the failures are written there".into();
+            return Err(BatchError::Report { what: "summary", path: path.clone(), reason }.into());
+        }
+    }
     let summary = Mutex::new(Summary::default());
     let on_job = |report: &JobReport| {
         if settings.summary.is_some() {
@@ -179,8 +188,7 @@ pub fn run(
     let tally = Tally::new(total, &failures, context, &on_job)?;
     let work = Work {
         settings,
-        begun: SystemTime::now(),
-        kept: Mutex::default(),
+        outs,
         base: settings.manifest.parent().unwrap_or(Path::new("")).to_path_buf(),
         manifest: Mutex::new(Manifest::open(&settings.manifest)?),
         sums: Sums::default(),
@@ -221,9 +229,7 @@ fn failures_file(settings: &BatchSettings) -> PathBuf {
 
 struct Work<'a> {
     settings: &'a BatchSettings,
-    begun: SystemTime,
-    /// Results of earlier runs that a job of this run found up to date: no other job replaces them.
-    kept: Mutex<HashSet<PathBuf>>,
+    outs: Outs,
     base: PathBuf,
     manifest: Mutex<Manifest>,
     sums: Sums,
@@ -293,7 +299,9 @@ impl Work<'_> {
         let cache = Arc::clone(&self.cache);
         let context = Context { cache, ..Context::new(&warnings, &Unattended, self.cancel.clone()) };
         let out = fields.text("out").ok();
-        let ended = match unreadable {
+        let refused = out.as_deref().and_then(|out| self.outs.check(line, out).err());
+        let ours = refused.is_none();
+        let ended = match unreadable.or(refused) {
             Some(error) => Err(error.into()),
             None => self.job(&kind, &fields, &context),
         };
@@ -301,11 +309,13 @@ impl Work<'_> {
             Ok((state, figures)) => (state, figures, None),
             // The next run does it.
             Err(error) if error.is_cancelled() => return Ok(()),
-            Err(error) => (State::Failed, None, Some(error.to_string())),
+            Err(error) => {
+                if ours && !is_in_use(&error) && !self.settings.dry_run {
+                    self.discard(&kind, out.as_deref());
+                }
+                (State::Failed, None, Some(error.to_string()))
+            }
         };
-        if state == State::Failed && !self.settings.dry_run {
-            self.discard(&kind, out.as_deref());
-        }
         let seconds = rounded(start.elapsed().as_secs_f64(), 6);
         let mut warnings = warnings.0.into_inner().unwrap_or_else(PoisonError::into_inner);
         // Report warnings once.
@@ -315,17 +325,11 @@ impl Work<'_> {
         self.tally.tell(&JobReport { job: number, line, kind, out, state, seconds, figures, warnings, error })
     }
 
-    fn kept(&self) -> MutexGuard<'_, HashSet<PathBuf>> {
-        self.kept.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
     fn discard(&self, kind: &str, out: Option<&str>) {
         let (Ok(kind), Some(out)) = (jobs::kind(kind), out) else { return };
         let place = Place::new(self.base.join(out), makes_file(kind));
-        if !self.kept().contains(place.target()) {
-            // If removal fails, the job's own error most likely has the same cause.
-            let _ = place.discard(self.begun);
-        }
+        // If removal fails, the job's own error most likely has the same cause.
+        let _ = place.discard();
     }
 
     fn job(&self, kind: &str, fields: &Fields, context: &Context<'_>) -> Result<(State, Option<Value>)> {
@@ -335,14 +339,8 @@ impl Work<'_> {
         let input = self.sums.of(&work.inputs(), &self.base)?;
         let wanted = Provenance::new(kind.name, fields, input);
         let place = Place::new(out, makes_file(kind));
-        match place.look(&wanted, self.begun, self.settings.verify)? {
-            Found::Done(figures) => {
-                self.kept().insert(place.target().into());
-                Ok((State::Already, figures))
-            }
-            Found::ToDo if self.kept().contains(place.target()) => {
-                Err(BatchError::SharedOut { path: place.target().into() }.into())
-            }
+        match place.look(&wanted, self.settings.verify)? {
+            Found::Done(figures) => Ok((State::Already, figures)),
             Found::ToDo if self.settings.dry_run => Ok((State::Todo, None)),
             Found::ToDo => {
                 let figures = place.fill(wanted, |out| work.run(out, context))?;
@@ -350,6 +348,12 @@ impl Work<'_> {
             }
         }
     }
+}
+
+/// Whether another batch makes the result now. It is then not this one's to remove.
+fn is_in_use(error: &WorkflowError) -> bool {
+    let WorkflowError::Library(error) = error else { return false };
+    matches!(error.downcast_ref(), Some(BatchError::InUse { .. }))
 }
 
 fn makes_file(task: &Task) -> bool {

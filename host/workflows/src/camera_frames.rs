@@ -22,6 +22,8 @@ use crate::{
 const DARK: &str = "dark.npy";
 const RESPONSE: &str = "response.npy";
 const BAD: &str = "bad.png";
+/// Least brightness of a flat frame relative to the brightest.
+const DARKEST: f32 = 0.5;
 
 /// Learn a camera's dark frame, the response of its pixels and its bad ones, for `farnear depth --camera-frames`.
 #[derive(Clone, PartialEq, Debug, Default, Serialize, Deserialize, JsonSchema)]
@@ -80,7 +82,9 @@ pub fn calibrate(settings: &CalibrateCameraRequest, context: &Context<'_>) -> Re
         }
         Ok(exposures)
     };
-    let frames = CameraFrames::learn(&read(&settings.dark, "dark")?, &read(&settings.flat, "flat")?)?;
+    let (dark, flat) = (read(&settings.dark, "dark")?, read(&settings.flat, "flat")?);
+    check_flats(&flat, &settings.flat)?;
+    let frames = CameraFrames::learn(&dark, &flat)?;
     let staged = Staging::into_folder(&settings.out)?;
     staged.write(DARK, &npy::write(frames.dark()))?;
     staged.write(RESPONSE, &npy::write(frames.response()))?;
@@ -97,6 +101,32 @@ pub fn calibrate(settings: &CalibrateCameraRequest, context: &Context<'_>) -> Re
         response_sd_percent: rounded(100.0 * f64::from(frames.response().std(0.0)), 4),
         bad_pixels: frames.bad_count(),
     })
+}
+
+/// Fails if two flat frames are one image, or one is much darker than the brightest.
+fn check_flats(flats: &[Array2<f32>], files: &[PathBuf]) -> Result<()> {
+    let refused = |index: usize, expected: String| {
+        Err(WorkflowError::parameter("flat", files[index].display(), expected))
+    };
+    let means: Vec<f32> = flats.iter().map(|flat| flat.mean().unwrap_or(0.0)).collect();
+    let brightest = means.iter().copied().fold(0.0, f32::max);
+    for (index, flat) in flats.iter().enumerate() {
+        if let Some(same) = flats[..index].iter().position(|other| other == flat) {
+            let same = files[same].display();
+            return refused(index, format!("it is the same image as {same}, and adds nothing: leave it out"));
+        }
+        let mean = means[index];
+        if mean < DARKEST * brightest {
+            return refused(
+                index,
+                format!(
+                    "its mean is {mean:.3} of full scale, the brightest flat frame has {brightest:.3}: all need one exposure; \
+                     a dark frame belongs to --dark"
+                ),
+            );
+        }
+    }
+    Ok(())
 }
 
 pub fn read(folder: &Path) -> Result<CameraFrames> {

@@ -1,5 +1,6 @@
 //! Depth from focus: a depth map and an all-in-focus image from images at different focus.
 
+mod black_border;
 mod frames;
 mod images;
 mod positions;

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use schemars::{JsonSchema, Schema};
 use serde::{Serialize, de::DeserializeOwned};
-use serde_json::{Map, Value};
+use serde_json::{Map, Number, Value};
 
 use crate::{
     context::Context,
@@ -132,7 +132,7 @@ pub fn parse<R: Request>(fields: Map<String, Value>, paths: Paths<'_>) -> Result
             let known = properties(&schema).keys().filter(usable).cloned().collect();
             return Err(RequestError::UnknownField { task: R::NAME, name, known });
         };
-        accepted.insert(name, coerce(value, property, &schema));
+        accepted.insert(name, in_shortest_form(coerce(value, property, &schema)));
     }
     for name in R::REQUIRED {
         let given_elsewhere = is_path(name) && matches!(paths, Paths::Refused);
@@ -347,6 +347,18 @@ fn accepts(property: &Value, kind: &str, schema: &Value) -> bool {
     alternatives.flatten().any(|one| accepts(one, kind, schema))
 }
 
+/// Numbers as serde_json writes them: flattened fields take no others with `arbitrary_precision`, which defmt-decoder enables.
+fn in_shortest_form(value: Value) -> Value {
+    match value {
+        Value::Number(number) if number.as_i64().is_none() && number.as_u64().is_none() => {
+            number.as_f64().and_then(Number::from_f64).map_or(Value::Number(number), Value::Number)
+        }
+        Value::Array(items) => items.into_iter().map(in_shortest_form).collect(),
+        Value::Object(all) => all.into_iter().map(|(name, one)| (name, in_shortest_form(one))).collect(),
+        other => other,
+    }
+}
+
 fn coerce(value: Value, property: &Value, schema: &Value) -> Value {
     let accepts = |kind: &str| accepts(property, kind, schema);
     match value {
@@ -389,6 +401,14 @@ mod tests {
         share: f64,
         fill: bool,
         out: PathBuf,
+        #[serde(flatten)]
+        place: Place,
+    }
+
+    #[derive(Clone, Default, PartialEq, Debug, Serialize, Deserialize, JsonSchema)]
+    #[serde(default)]
+    struct Place {
+        lat: f64,
     }
 
     impl Request for Sample {
@@ -423,6 +443,14 @@ mod tests {
         assert_eq!(request.views, [Path::new("/base/b"), Path::new("/c")]);
         assert_eq!(request.psf.as_deref(), Some("gaussian:k=0.4,n=1"));
         assert_eq!(request.inputs(), ["/base/a", "/base/b", "/c"].map(PathBuf::from));
+    }
+
+    #[test]
+    fn numbers_may_have_any_form() {
+        for (text, lat) in [("52.50", 52.5), ("1e-05", 1e-5), ("-0.10", -0.1), ("52", 52.0)] {
+            let fields = serde_json::from_str(&format!(r#"{{"file":"a","lat":{text}}}"#)).unwrap();
+            assert_eq!(read(fields, Paths::RelativeTo(Path::new(""))).expect("a request").place.lat, lat);
+        }
     }
 
     #[test]

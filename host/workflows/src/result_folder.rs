@@ -25,10 +25,18 @@ pub(crate) fn holds_stack(folder: &Path) -> bool {
     is_ours(&folder.join(STACK_RECORD))
 }
 
-/// Begins a depth map's result in a new or existing folder, except that of a focus stack.
+/// Begins a depth map's result in a new or existing folder, except that of a focus stack, or with files that look like a
+/// depth map's, but that no record describes.
 pub fn depth(out: &Path) -> Result<Staging> {
     if holds_stack(out) {
         let expected = "it holds the result of focus-stack: name another folder";
+        return Err(WorkflowError::parameter("out", out.display(), expected));
+    }
+    let foreign = output::files().find(|file| out.join(file).exists());
+    if let Some(file) = foreign.filter(|_| !is_ours(&out.join(DEPTH_RECORD))) {
+        let expected = format!(
+            "it holds {file}, but no {DEPTH_RECORD} of a run of depth that made it: move the file away, or name another folder"
+        );
         return Err(WorkflowError::parameter("out", out.display(), expected));
     }
     let stale_batch = batch_of(out, "depth");

@@ -23,6 +23,11 @@ impl LightLevels {
     /// Both outputs at brightness 0.
     pub const OFF: Self = Self { first: 0, second: 0 };
 
+    /// Brightness of both outputs in percent.
+    pub fn percent(self) -> [f64; 2] {
+        [self.first, self.second].map(|level| 100.0 * f64::from(level) / f64::from(LIGHT_LEVEL_MAX))
+    }
+
     /// Whether either output is on.
     pub const fn is_on(self) -> bool {
         self.first > 0 || self.second > 0

@@ -25,6 +25,9 @@ fn format(path: &Path) -> Option<&'static str> {
 /// has a format that is not read.
 pub(super) fn images(path: &Path) -> Result<Series, StackError> {
     let files = files(path).map_err(|source| VideoError::Io { path: path.into(), source })?;
+    if let Some(path) = files.iter().find(|path| format(path).is_some() && !path.is_file()) {
+        return Err(VideoError::NotAFile { path: path.clone() }.into());
+    }
     let (mut images, others): (Vec<PathBuf>, Vec<PathBuf>) =
         files.into_iter().partition(|file| format(file).is_some());
     if images.is_empty() {
@@ -67,12 +70,12 @@ fn mixed(path: &Path, images: &[PathBuf]) -> Option<StackError> {
     (formats.len() > 1).then(|| StackError::Mixed { path: path.into(), found })
 }
 
-/// Files that are not hidden (other systems leave `._name.png` next to `name.png`), in order of their names.
+/// Everything but folders and hidden files (other systems leave `._name.png` next to `name.png`), in order of the names.
 fn files(folder: &Path) -> std::io::Result<Vec<PathBuf>> {
     let entries = fs::read_dir(folder)?.collect::<Result<Vec<_>, _>>()?;
     let hidden = |path: &Path| path.file_name().is_some_and(|name| name.to_string_lossy().starts_with('.'));
     let mut files: Vec<PathBuf> = entries.iter().map(fs::DirEntry::path).collect();
-    files.retain(|path| !hidden(path) && path.is_file());
+    files.retain(|path| !hidden(path) && !path.is_dir());
     files.sort();
     Ok(files)
 }
@@ -111,6 +114,18 @@ mod tests {
         let (note, other) = (b"note".as_slice(), ("other.webp", webp));
         let twins = folder(&[("i1.png", &png), ("i2.png", &png), ("i2.RAF", raw), ("i3.txt", note), other]);
         assert_eq!(list(twins.path()).unwrap().images.len(), 2);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_link_to_a_missing_image_is_an_error() {
+        let linked = folder(&[("i1.png", b""), ("i3.png", b"")]);
+        std::os::unix::fs::symlink("absent.png", linked.path().join("i2.png")).unwrap();
+        let error = list(linked.path()).unwrap_err().to_string();
+        assert!(error.contains("i2.png: a link to a file that does not exist"), "{error}");
+        std::os::unix::fs::symlink("absent", linked.path().join("notes")).unwrap();
+        fs::remove_file(linked.path().join("i2.png")).unwrap();
+        assert_eq!(list(linked.path()).unwrap().images.len(), 2);
     }
 
     #[test]

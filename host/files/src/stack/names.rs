@@ -13,6 +13,22 @@ use crate::order::{
 /// Largest share of images outside the pattern of the others, relative to these, that is left out and not refused.
 const FEW: f64 = 0.25;
 const LISTED: usize = 3;
+/// How microscopes name channels, times and places: an acquisition that was stopped lacks some of their combinations.
+const NO_FOCUS: [&str; 13] = [
+    "c",
+    "ch",
+    "channel",
+    "w",
+    "wavelength",
+    "t",
+    "time",
+    "timepoint",
+    "frame",
+    "pos",
+    "position",
+    "xy",
+    "tile",
+];
 
 #[derive(Debug, PartialEq)]
 pub(super) struct Series {
@@ -60,10 +76,11 @@ impl Series {
         let unlike = || fields.iter().map(Field::to_string).collect::<Vec<_>>().join(" and ");
         if fields.len() > 1 {
             let combinations: usize = fields.iter().map(|field| field.values.len()).product();
-            if combinations == of_pattern.len() {
+            let every = if combinations == of_pattern.len() { " in every combination" } else { "" };
+            if !every.is_empty() || fields.iter().any(Field::is_no_focus) {
                 return Err(format!(
-                    "the names differ in {} in every combination: a stack is one focus series; move the images of one series \
-                     into a folder and give that",
+                    "the names differ in {}{every}: a stack is one focus series; move the images of one series into a folder and \
+                     give that",
                     unlike()
                 ));
             }
@@ -135,6 +152,13 @@ struct Field {
     values: Vec<String>,
     /// Index in `values`, for each name.
     of_names: Vec<usize>,
+}
+
+impl Field {
+    /// Whether its name is that of a channel, a time or a place.
+    fn is_no_focus(&self) -> bool {
+        NO_FOCUS.contains(&self.label.to_lowercase().as_str())
+    }
 }
 
 impl std::fmt::Display for Field {
@@ -232,7 +256,14 @@ mod tests {
                 .contains("5 of z#_DAPI, 5 of z#_FITC")
         );
         let incomplete = grid(|z, c| format!("z{z}_c{c}.tif"));
-        assert!(series(&incomplete[1..]).unwrap().remarks[0].contains("z (0 to 4) and c (1, 2)"));
+        for stopped in [&incomplete[1..], &incomplete[..9]] {
+            assert!(
+                series(stopped).unwrap_err().contains("z (0 to 4) and c (1, 2): a stack is one focus series")
+            );
+        }
+        let coarse_and_fine = grid(|coarse, fine| format!("coarse{coarse}_fine{fine}.tif"));
+        let found = series(&coarse_and_fine[..9]).unwrap();
+        assert!(found.remarks[0].contains("coarse (0 to 4) and fine (1, 2), without all combinations"));
     }
 
     #[test]

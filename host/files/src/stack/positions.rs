@@ -35,6 +35,13 @@ pub(super) fn of(pages: &[Page]) -> Result<Planes, String> {
     Ok(micro_manager::planes(pages))
 }
 
+/// The planes in files of these names, of which the first one has `pages`; `None` if its metadata are of one file.
+pub(super) fn of_files(pages: &[Page], names: &[String]) -> Result<Option<Planes>, String> {
+    let description =
+        pages.first().and_then(|page| page.directory.description.as_deref()).unwrap_or_default();
+    ome::Metadata::of(description).map_or(Ok(None), |metadata| metadata.files(names))
+}
+
 /// Side of a pixel at the object; `None` if not stated.
 pub(super) fn object_pixel_um(pages: &[Page]) -> Option<f64> {
     let directory = &pages.first()?.directory;

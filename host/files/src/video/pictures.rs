@@ -25,9 +25,13 @@ pub fn list(folder: &Path) -> Result<Vec<PathBuf>, VideoError> {
         let extension = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
         // Other systems leave `._name.png` next to `name.png`.
         let hidden = path.file_name().is_some_and(|name| name.to_string_lossy().starts_with('.'));
-        if !hidden && path.is_file() && EXTENSIONS.contains(&extension.as_str()) {
-            paths.push(path);
+        if hidden || path.is_dir() || !EXTENSIONS.contains(&extension.as_str()) {
+            continue;
         }
+        if !path.is_file() {
+            return Err(VideoError::NotAFile { path });
+        }
+        paths.push(path);
     }
     if paths.is_empty() {
         return Err(VideoError::NoPictures { path: folder.into() });

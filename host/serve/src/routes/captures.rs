@@ -19,8 +19,8 @@ use farnear_workflows::{
     sessions::{self, Note},
 };
 use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
-use serde_json::Value;
+use serde::{Deserialize, Deserializer, Serialize, de::Error};
+use serde_json::{Number, Value};
 
 use super::{Body, Shared, aside, require_client, require_control};
 use crate::{
@@ -56,7 +56,7 @@ pub enum CaptureRequest {
         /// Number of pairs.
         pairs: usize,
         /// Seconds from the start of a pair to that of the next, 0 to 86,400; a pair that takes longer delays the next one.
-        #[serde(default)]
+        #[serde(default, deserialize_with = "number")]
         interval_s: f64,
     },
     /// One image where the sensor stands.
@@ -66,8 +66,10 @@ pub enum CaptureRequest {
         /// The axis that goes through it.
         axis: AxisName,
         /// First position, um.
+        #[serde(deserialize_with = "number")]
         from_um: f64,
         /// Last position, um.
+        #[serde(deserialize_with = "number")]
         to_um: f64,
         /// Number of images.
         steps: usize,
@@ -76,6 +78,13 @@ pub enum CaptureRequest {
 
 fn once() -> u16 {
     1
+}
+
+/// Reads the fields of a tagged enum: with serde_json's `arbitrary_precision`, which a dependency enables, they are
+/// stored in a form that `f64` does not accept.
+fn number<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
+    let number = Number::deserialize(deserializer)?;
+    number.as_f64().ok_or_else(|| D::Error::custom(format!("{number}: expected a number below 1e308")))
 }
 
 /// That a capture was begun.

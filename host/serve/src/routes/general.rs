@@ -17,6 +17,7 @@ use crate::{
     control::HandOverError,
     failure::Failure,
     socket,
+    stopping::{PATIENCE, answered_within},
     view::{self, DONE, Done, Nothing},
 };
 
@@ -96,7 +97,7 @@ async fn halt(State(app): Shared, Body(Nothing {}): Body<Nothing>) -> Result<Jso
     let Some(rig) = app.rig() else { return Err(Failure::missing("rig")) };
     app.note("emergency stop");
     aside(move || {
-        let halted = rig.halt();
+        let halted = answered_within(PATIENCE, move || rig.halt());
         app.rig_jobs.cancel();
         Ok(halted?)
     })

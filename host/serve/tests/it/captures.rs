@@ -42,7 +42,7 @@ fn depth_is_computed_measured_compared_and_taken_along() {
     put(&served, "pair-001", 0);
     put(&served, "pair-002", 77);
     for name in ["pair-001", "pair-002"] {
-        let job = computed(&served, &client, name, &json!({}));
+        let job = computed(&served, &client, name, &json!({ "min_confidence": 0.05 }));
         assert_eq!(job["phase"], "done", "{job:#}");
         assert_eq!((&job["result"]["width"], &job["result"]["height"]), (&96.into(), &64.into()));
     }

@@ -13,7 +13,7 @@ use std::{
 
 use farnear_protocol::Micros;
 use farnear_scripted_board::{Faults, plug_in};
-use farnear_serve::{Limits, Listen, ServeSettings, serve};
+use farnear_serve::{Limits, Listen, ServeError, ServeSettings, serve, stopping::StopError};
 use farnear_workflows::{
     Cancel, Context, Unattended,
     rig::{
@@ -25,6 +25,21 @@ use serde_json::Value;
 
 /// Longest wait for something that takes milliseconds on an idle computer.
 const PATIENCE: Duration = Duration::from_secs(60);
+
+/// A server without a rig, whose session is in this folder.
+pub fn settings(folder: &Path, listen: Listen) -> ServeSettings {
+    let shots = folder.join("shots");
+    fs::create_dir_all(&shots).unwrap();
+    let camera = CameraSettings {
+        address: CameraAddress::Folder(shots),
+        exposure: Micros(5_000),
+        image_wait: Duration::from_secs(5),
+        settings: Vec::new(),
+        light: None,
+    };
+    let (session, limits) = (folder.join("session"), Limits::default());
+    ServeSettings { rig: None, camera, session, optics: None, listen, limits }
+}
 
 pub struct Served {
     pub address: String,
@@ -60,23 +75,16 @@ impl Served {
         limits: Limits,
     ) -> Self {
         let folder = tempfile::tempdir().unwrap();
-        let session = folder.path().join("session");
-        let shots = folder.path().join("shots");
-        fs::create_dir(&shots).unwrap();
-        let camera = CameraSettings {
-            address: CameraAddress::Folder(shots),
-            exposure: Micros(5_000),
-            image_wait: Duration::from_secs(5),
-            settings: Vec::new(),
-            light: None,
-        };
         let listen = listen(folder.path());
-        let settings = ServeSettings { rig, camera, session: session.clone(), optics: None, listen, limits };
+        let settings = ServeSettings { rig, limits, ..settings(folder.path(), listen) };
+        let session = settings.session.clone();
         let (cancel, (sender, address)) = (Cancel::default(), channel());
         let request = cancel.clone();
         let thread = std::thread::spawn(move || {
             let context = Context::new(&Unattended, &Unattended, request);
-            serve(settings, &context, |address| sender.send(address.to_owned()).unwrap()).unwrap();
+            let served = serve(settings, &context, |address| sender.send(address.to_owned()).unwrap());
+            // A server whose board is silent reports it at its end.
+            assert!(matches!(served, Ok(()) | Err(ServeError::Stop(StopError::Unanswered))), "{served:?}");
         });
         let address = address.recv_timeout(PATIENCE).unwrap();
         let address = address.trim_start_matches("http://").trim_end_matches('/').to_owned();

@@ -47,38 +47,48 @@ fn the_document_describes_the_routes_and_refers_to_nothing_that_is_not_there() {
     }
 }
 
+/// Numbers that may have a fraction have one.
 fn body_of(method: &str, path: &str) -> &'static str {
     match (method, path) {
         ("post", "/api/answer") => r#"{"text":""}"#,
         ("post", "/api/control/answer") => r#"{"to":1,"give":false}"#,
         ("post", "/login") => r#"{"token":"x"}"#,
-        ("post", "/api/rig/move") => r#"{"axis":["fine"],"to_um":[20]}"#,
+        ("post", "/api/rig/move") => r#"{"axis":["fine"],"to_um":[20.50]}"#,
         ("post", "/api/rig/goto") => r#"{"focus":"far"}"#,
         ("post", "/api/rig/scene") => r#"{"scene":"plane:900"}"#,
-        ("post", "/api/live") => r#"{"mode":"off"}"#,
+        ("post", "/api/live") => r#"{"mode":"off","light_percent":[0.50,1.25]}"#,
         ("post", "/api/rig/alarms/clear") => r#"{"number":1}"#,
         ("put", "/api/optics") => {
-            r#"{"optics":{"lens":{"focal_length_mm":50,"aperture_mm":12.8},"sensor":{"pixel_um":7.4},"focus":{"far_mm":900,"max_blur_px":2.7},"psf":{"model":"pillbox"}}}"#
+            r#"{"optics":{"lens":{"focal_length_mm":50.50,"aperture_mm":12.8},"sensor":{"pixel_um":7.4},"focus":{"far_mm":900.50,"max_blur_px":2.7},"psf":{"model":"pillbox"}}}"#
         }
         ("post", "/api/optics/calculate") => {
-            r#"{"optics":{"lens":{"focal_length_mm":50,"aperture_mm":12.8},"sensor":{"pixel_um":7.4},"focus":{"far_mm":900,"max_blur_px":2.7}}}"#
+            r#"{"optics":{"lens":{"focal_length_mm":50.50,"aperture_mm":12.8},"sensor":{"pixel_um":7.4},"focus":{"far_mm":900.50,"max_blur_px":2.7}}}"#
         }
-        ("post", "/api/captures") => r#"{"kind":"still"}"#,
+        ("post", "/api/captures") => {
+            r#"{"kind":"stack","axis":"fine","from_um":20.50,"to_um":180.25,"steps":3}"#
+        }
+        ("post", "/api/captures/{capture}/stack") => {
+            r#"{"smoothing_px":1.50,"min_reliability":0.50,"positions_um":[0.50,1.50]}"#
+        }
         ("post", "/api/captures/{capture}/rename") => r#"{"name":"renamed"}"#,
         ("put", "/api/captures/{capture}/note") => r#"{"rating":1,"text":"n"}"#,
         ("post", "/api/captures/{capture}/region") => r#"{"x":0,"y":0,"width":2,"height":2}"#,
         ("post", "/api/captures/{capture}/profile") => r#"{"from":[0,0],"to":[3,3]}"#,
-        ("post", "/api/calibrate/psf") => r#"{"targets":[{"capture":"absent"}],"model":"gaussian"}"#,
+        ("post", "/api/calibrate/psf") => {
+            r#"{"targets":[{"capture":"absent","depth_mm":900.50}],"model":"gaussian"}"#
+        }
         ("post", "/api/calibrate/stack") => r#"{"slices":11}"#,
-        ("post", "/api/calibrate/correction") => r#"{"method":"cdc"}"#,
+        ("post", "/api/calibrate/series") => r#"{"distances":[890.50,900.50]}"#,
+        ("post", "/api/rig/focus") => r#"{"start_mm":900.50,"range_mm":20.50}"#,
+        ("post", "/api/calibrate/correction") => r#"{"method":"cdc","smoothing_px":1.50}"#,
         ("post", "/api/people/recognise") => r#"{"video":"absent.y4m"}"#,
-        ("post", "/api/people/sun") => r#"{"lat":52,"lon":-1,"time":"2026-06-21T12:00:00Z"}"#,
+        ("post", "/api/people/sun") => r#"{"lat":52.50,"lon":-1.50,"time":"2026-06-21T12:00:00Z"}"#,
         ("post", "/api/people/shadow") => {
-            r#"{"video":"absent.y4m","sun":{"lat":52,"lon":-1,"time":"2026-06-21T12:00:00Z"},"camera":{"height_m":1,"azimuth_deg":0,"pitch_deg":0,"focal_length_mm":4,"pixel_um":6}}"#
+            r#"{"video":"absent.y4m","sun":{"lat":52.50,"lon":-1.50,"time":"2026-06-21T12:00:00Z"},"camera":{"height_m":1.50,"azimuth_deg":0.50,"pitch_deg":0.50,"focal_length_mm":4.50,"pixel_um":6.50}}"#
         }
         ("post", "/api/recordings") => r#"{"on":true}"#,
         ("post", "/api/recordings/play") => r#"{"recording":"absent.pairs"}"#,
-        ("post", "/api/quality") => r#"{"pairs":2}"#,
+        ("post", "/api/quality") => r#"{"pairs":2,"true_mm":920.50}"#,
         _ => "{}",
     }
 }
@@ -117,6 +127,33 @@ fn every_route_answers_in_its_own_words() {
         }
     }
     assert!(asked >= 35, "{asked} routes");
+}
+
+#[test]
+fn captures_take_numbers_of_any_form() {
+    let served = Served::with_board(Faults::default());
+    served.ready();
+    let socket = Socket::open(&served);
+    for body in [
+        r#"{"kind":"series","pairs":2,"interval_s":2.5}"#,
+        r#"{"kind":"series","pairs":2,"interval_s":2}"#,
+        r#"{"kind":"series","pairs":2,"interval_s":2.50}"#,
+        r#"{"kind":"stack","axis":"fine","from_um":20.5,"to_um":1.8e2,"steps":3}"#,
+    ] {
+        let answer = served.post("/api/captures", &socket.secret, body);
+        assert_eq!(answer.status, 200, "{body}: {answer:?}");
+        served.post("/api/stop", "", "{}");
+        served.ended("job", &answer.json()["job"]);
+    }
+    for (wrong, words) in [
+        ("1e999", "expected a number below 1e308"),
+        (r#""2""#, "expected a JSON number"),
+        ("-0.5", "0 to 86400"),
+    ] {
+        let body = format!(r#"{{"kind":"series","pairs":2,"interval_s":{wrong}}}"#);
+        let answer = served.post("/api/captures", &socket.secret, &body);
+        assert!((400..500).contains(&answer.status) && answer.error().contains(words), "{body}: {answer:?}");
+    }
 }
 
 #[test]

@@ -9,3 +9,5 @@ mod control;
 mod exhaustion;
 mod garbage;
 mod interface;
+mod silence;
+mod two_servers;

@@ -18,16 +18,18 @@ pub enum BatchError {
     UnknownKind { name: String, known: String },
     #[error("the field `{name}` is missing")]
     MissingField { name: &'static str },
+    #[error("the field `{name}` is given twice: expected each field once")]
+    RepeatedField { name: String },
     #[error("the field `{name}` is {value}: {reason}")]
     Field { name: String, value: String, reason: String },
     #[error(
         "{} exists and was not made by a batch (batch.toml is missing): name another place or remove it", path.display()
     )]
     Foreign { path: PathBuf },
-    #[error("another job of this run has written {}: give each job another `out`", path.display())]
-    SharedOut { path: PathBuf },
-    #[error("{} is being made by another job or program: give each job another `out`", path.display())]
+    #[error("another batch is making {} now: run the batch again after it has ended", path.display())]
     InUse { path: PathBuf },
+    #[error("cannot write the {what} to {}: {reason}; name another file", path.display())]
+    Report { what: &'static str, path: PathBuf, reason: String },
     #[error("{failed} of {jobs} jobs failed; {} says why; run the batch again to do them again", failures.display())]
     Failed { failed: usize, jobs: usize, failures: PathBuf },
     #[error("cannot start a thread: {0}")]

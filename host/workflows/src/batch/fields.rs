@@ -21,9 +21,12 @@ impl Fields {
         Self { base: base.into(), ..Self::default() }
     }
 
-    /// `min-confidence` and `min_confidence` are the same field.
-    pub fn insert(&mut self, name: &str, values: Vec<String>) {
-        self.values.insert(name.trim().replace('-', "_"), values);
+    /// `min-confidence` and `min_confidence` are the same field. Each may be given once.
+    pub fn insert(&mut self, name: &str, values: Vec<String>) -> Result<(), BatchError> {
+        match self.values.insert(name.trim().replace('-', "_"), values) {
+            Some(_) => Err(BatchError::RepeatedField { name: name.trim().into() }),
+            None => Ok(()),
+        }
     }
 
     pub fn of_table(table: &toml::Table, base: &Path) -> Result<Self, BatchError> {
@@ -36,7 +39,7 @@ impl Fields {
             let values = values.ok_or_else(|| {
                 BatchError::field(name, value, "expected a text, a number, true or false, or a list of these")
             })?;
-            fields.insert(name, values);
+            fields.insert(name, values)?;
         }
         Ok(fields)
     }
@@ -113,5 +116,12 @@ mod tests {
         let all = fields.all();
         assert_eq!(all["views"], serde_json::json!(["x", "y;z"]));
         assert_eq!(all["far"], "a/far.png");
+    }
+
+    #[test]
+    fn a_field_is_given_once() {
+        let table = "min-confidence = 0.5\nmin_confidence = 0.6".parse().expect("TOML");
+        let error = Fields::of_table(&table, Path::new("/base")).expect_err("twice").to_string();
+        assert!(error.contains("`min_confidence` is given twice"), "{error}");
     }
 }

@@ -8,7 +8,7 @@ use std::{
 
 use farnear_files::staging::write_file;
 
-use super::{BatchError, jobs, manifest::KIND};
+use super::{BatchError, fields::Fields, jobs, manifest::KIND};
 use crate::error::Result;
 
 /// A field and its value. Each `*` stands for the text matched by the same `*` of the first pattern.
@@ -48,6 +48,10 @@ pub fn generate(manifest: &Path, kind: &str, fields: &[Pattern]) -> Result<usize
     let Some(first) = fields.first() else {
         return Err(pattern("name a field with a pattern, such as far=*/far.png".into()).into());
     };
+    let mut names = Fields::default();
+    std::iter::once(KIND)
+        .chain(fields.iter().map(|field| field.name.as_str()))
+        .try_for_each(|name| names.insert(name, Vec::new()))?;
     let stars = first.value.matches('*').count();
     if let Some(wrong) = fields.iter().find(|field| field.value.matches('*').count() > stars) {
         let reason = format!(
@@ -167,6 +171,7 @@ mod tests {
         assert!(error("depth", &["far=*/none.png"]).contains("no file matches"));
         assert!(error("depth", &["far=a.png", "out=*"]).contains("more *"));
         assert!(error("dept", &["far=*"]).contains("dept"));
+        assert!(error("depth", &["far=*", "out=a", "out=b"]).contains("`out` is given twice"));
         assert!("far".parse::<Pattern>().is_err() && "=x".parse::<Pattern>().is_err());
     }
 }

@@ -12,7 +12,7 @@ use std::{
 use super::{BatchError, fields::Fields};
 
 /// Most bytes of a job, so that memory does not depend on the file.
-const JOB_BYTES_MAX: u64 = 1 << 20;
+pub(super) const JOB_BYTES_MAX: u64 = 1 << 20;
 const JOB: &str = "[[job]]";
 pub(super) const KIND: &str = "do";
 
@@ -74,23 +74,6 @@ impl Manifest {
         Ok(Self { path: path.into(), base, source, number: 0 })
     }
 
-    /// Number of jobs. Reads the file once.
-    pub fn count(path: &Path) -> Result<usize, BatchError> {
-        let mut all = Self::open(path)?;
-        let mut jobs = 0;
-        if let Source::Csv { reader, .. } = &mut all.source {
-            let mut row = csv::ByteRecord::new();
-            while reader.read_byte_record(&mut row).map_err(|error| wrong_csv(path, &error))? {
-                jobs += 1;
-            }
-            return Ok(jobs);
-        }
-        while all.next_table()?.is_some() {
-            jobs += 1;
-        }
-        Ok(jobs)
-    }
-
     /// Returns `None` at the end.
     pub fn next(&mut self) -> Result<Option<Entry>, BatchError> {
         let found = match &mut self.source {
@@ -101,7 +84,8 @@ impl Manifest {
                     Ok(false) => None,
                     Ok(true) => {
                         let line = row.position().map_or(line, |position| position.line() as usize);
-                        Some((line, of_row(names, &row, &self.base)))
+                        let wrong = |reason| BatchError::Manifest { path: self.path.clone(), line, reason };
+                        Some((line, of_row(names, &row, &self.base, wrong)))
                     }
                     Err(error) if matches!(error.kind(), csv::ErrorKind::Io(_)) => {
                         return Err(wrong_csv(&self.path, &error));
@@ -161,15 +145,15 @@ fn of_row(
     names: &csv::StringRecord,
     row: &csv::StringRecord,
     base: &Path,
+    wrong: impl FnOnce(String) -> BatchError,
 ) -> Result<(String, Fields), BatchError> {
-    let mut fields = Fields::new(base);
     if row.len() != names.len() {
-        let cells = row.iter().collect::<Vec<_>>().join(",");
-        let reason = format!("{} cells, the header names {} fields", row.len(), names.len());
-        return Err(BatchError::field("row", cells, reason));
+        let reason = format!("found {} fields, expected {} as in the header", row.len(), names.len());
+        return Err(wrong(reason));
     }
+    let mut fields = Fields::new(base);
     for (name, cell) in names.iter().zip(row).filter(|(_, cell)| !cell.is_empty()) {
-        fields.insert(name, vec![cell.into()]);
+        fields.insert(name, vec![cell.into()])?;
     }
     split(fields)
 }
@@ -195,11 +179,17 @@ fn csv_source(mut file: File, path: &Path) -> Result<Source, BatchError> {
     let names = reader.headers().map_err(|error| wrong_csv(path, &error))?.clone();
     // Spreadsheets write a byte order mark.
     let names: csv::StringRecord = names.iter().map(|name| name.trim_start_matches('\u{feff}')).collect();
+    let wrong = |reason| BatchError::Manifest { path: path.into(), line: 1, reason };
     if !names.iter().any(|name| name == KIND) {
         let header = names.iter().collect::<Vec<_>>().join(",");
-        let reason =
-            format!("its header is \"{header}\"; expected the names of fields with `{KIND}` among them");
-        return Err(BatchError::Manifest { path: path.into(), line: 1, reason });
+        return Err(wrong(format!(
+            "its header is \"{header}\"; expected the names of fields with `{KIND}` among them"
+        )));
+    }
+    let mut fields = Fields::default();
+    // Spreadsheets may add empty columns.
+    for name in names.iter().filter(|name| !name.is_empty()) {
+        fields.insert(name, Vec::new()).map_err(|error| wrong(error.to_string()))?;
     }
     Ok(Source::Csv { reader: Box::new(reader), names })
 }
@@ -278,7 +268,6 @@ mod tests {
             assert_eq!(entry.number, found.len() + 1);
             found.push((entry.line, entry.job.map_err(|error| error.to_string())));
         }
-        assert_eq!(Manifest::count(&path).expect("readable"), found.len());
         found
     }
 
@@ -327,7 +316,11 @@ mod tests {
         assert!(found[1].1.as_ref().is_err_and(|error| error.contains("`do`")));
         assert!(found[2].1.is_ok());
         let found = all("a.csv", "do,far\ndepth,a,b\ncorrect,c\n");
-        assert!(found[0].1.is_err() && found[1].1.is_ok());
+        let error = found[0].1.as_ref().expect_err("a cell too many");
+        assert!(error.contains("a.csv, line 2: found 3 fields, expected 2"), "{error}");
+        assert!(found[1].1.is_ok());
+        let found = all("a.csv", "do,far,,\ndepth,a,,\n");
+        assert!(found[0].1.is_ok(), "empty columns of a spreadsheet");
     }
 
     #[test]
@@ -336,6 +329,7 @@ mod tests {
         for (name, text, phrase) in [
             ("a.txt", "", ".toml or .csv"),
             ("a.csv", "far,near\n", "`do`"),
+            ("a.csv", "do,out,out\n", "line 1: the field `out` is given twice"),
             ("a.toml", "[dept]\nsmooth = 1\n", "dept"),
             ("a.toml", "[depth\n", "line 1"),
             ("b.csv", "", "header"),

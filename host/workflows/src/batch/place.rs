@@ -5,7 +5,6 @@ use std::{
     fs::{self, File},
     io,
     path::{Path, PathBuf},
-    time::SystemTime,
 };
 
 use serde_json::Value;
@@ -37,29 +36,17 @@ pub(super) enum Found {
 }
 
 impl Place {
-    /// The result's folder or file.
-    pub fn target(&self) -> &Path {
-        &self.target
-    }
-
     pub fn new(target: PathBuf, is_file: bool) -> Self {
         let target = target.components().collect(); // without a slash at its end
         Self { target, is_file }
     }
 
-    /// Examines the place. Returns [`BatchError::Foreign`] for files that no batch wrote, and
-    /// [`BatchError::SharedOut`] if another job of this run (started at `begun`) wrote them.
-    pub fn look(&self, wanted: &Provenance, begun: SystemTime, verify: bool) -> Result<Found> {
+    /// Examines the place. Returns [`BatchError::Foreign`] for files that no batch wrote.
+    pub fn look(&self, wanted: &Provenance, verify: bool) -> Result<Found> {
         let (record, root) = (self.record(), self.root());
         if let Some(found) = Provenance::read(&record) {
-            if found.fulfils(wanted, root, verify) {
-                return Ok(Found::Done(found.figures()));
-            }
-            let written = fs::metadata(&record).and_then(|record| record.modified());
-            if written.is_ok_and(|written| written > begun) {
-                return Err(BatchError::SharedOut { path: self.target.clone() }.into());
-            }
-            return Ok(Found::ToDo);
+            let done = found.fulfils(wanted, root, verify);
+            return Ok(if done { Found::Done(found.figures()) } else { Found::ToDo });
         }
         let empty = fs::read_dir(&self.target).is_ok_and(|mut entries| entries.next().is_none());
         // An unreadable record still marks a batch's file.
@@ -92,14 +79,10 @@ impl Place {
         Ok(found)
     }
 
-    /// Removes the result of an earlier run after a failure. Keeps files that no batch wrote, or that another
-    /// job of this run (started at `begun`) wrote.
-    pub fn discard(&self, begun: SystemTime) -> io::Result<()> {
+    /// Removes the result of an earlier run after a failure. Keeps files that no batch wrote.
+    pub fn discard(&self) -> io::Result<()> {
         let record = self.record();
         let Some(found) = Provenance::read(&record) else { return Ok(()) };
-        if fs::metadata(&record)?.modified()? > begun {
-            return Ok(());
-        }
         fs::remove_file(record)?;
         for file in found.outputs().map(|name| self.root().join(name)).filter(|file| file.exists()) {
             fs::remove_file(&file)?;

@@ -149,8 +149,8 @@ mod tests {
         write(&result.join("map"), "1234");
         let sums = || Sums::default().of(std::slice::from_ref(&input), folder.path()).expect("readable");
         let mut fields = Fields::new(folder.path());
-        fields.insert("out", vec!["result".into()]);
-        fields.insert("smooth", vec!["7".into()]);
+        fields.insert("out", vec!["result".into()]).expect("a new field");
+        fields.insert("smooth", vec!["7".into()]).expect("a new field");
         let wanted = |fields: &Fields| Provenance::new("depth", fields, sums());
         let made = wanted(&fields).with_output(&result).expect("readable");
         // Output of sha256sum.
@@ -159,7 +159,8 @@ mod tests {
         assert!(made.fulfils(&wanted(&fields), &result, true));
 
         let mut other = fields.clone();
-        other.insert("smooth", vec!["9".into()]);
+        other.remove("smooth");
+        other.insert("smooth", vec!["9".into()]).expect("a new field");
         assert!(!made.fulfils(&wanted(&other), &result, false), "another setting");
         assert!(!Provenance { made_by: "farnear 0".into(), ..made.clone() }.fulfils(
             &wanted(&fields),

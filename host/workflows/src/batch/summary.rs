@@ -33,6 +33,11 @@ impl Summary {
         self.rows.insert(report.job, (fixed, figures));
     }
 
+    /// Whether a file with this first line is a summary.
+    pub fn begins(line: &str) -> bool {
+        line.trim_end().split(',').take(FIXED.len()).eq(FIXED)
+    }
+
     /// CSV; missing figures are empty cells.
     pub fn csv(&self) -> Result<Vec<u8>, csv::Error> {
         let names: BTreeSet<&String> = self.rows.values().flat_map(|(_, figures)| figures.keys()).collect();
@@ -92,6 +97,8 @@ mod tests {
         let text = String::from_utf8(summary.csv().unwrap()).unwrap();
         let lines: Vec<&str> = text.lines().collect();
         assert_eq!(lines[0], "job,line,do,out,state,error,noise.mm,valid,warnings");
+        assert!(Summary::begins(lines[0]) && Summary::begins("job,line,do,out,state,error\n"));
+        assert!(!Summary::begins(lines[1]) && !Summary::begins("do,far,out") && !Summary::begins("job,line"));
         assert_eq!(lines[1], "1,2,depth,1/depth,already,,0.5,0.9,a; b");
         assert_eq!(lines[2], "2,3,depth,2/depth,failed,\"no such file, \"\"b.png\"\"\",,,");
     }

@@ -8,6 +8,8 @@ use std::{
     time::Instant,
 };
 
+use serde_json::Value;
+
 use super::{BatchError, BatchFigures, JobReport, State};
 use crate::{
     context::Context,
@@ -46,6 +48,12 @@ impl<'a> Tally<'a> {
         }
         context.progress.advance("jobs", 0, Some(total));
         Ok(Self { total, context, on_job, failures: failures.into(), inner: Mutex::default() })
+    }
+
+    /// Whether a file with this first line is a file of failures.
+    pub fn begins(line: &str) -> bool {
+        let report: Value = serde_json::from_str(line).unwrap_or_default();
+        report["job"].is_u64() && report["state"] == "failed"
     }
 
     pub fn tell(&self, report: &JobReport) -> Result<()> {

@@ -232,8 +232,7 @@ impl Listed {
         let mut listed = match record {
             Some(record) => {
                 if request.step_mm.is_some() || request.far_mm.is_some() {
-                    let expected =
-                        "the rig's record has the steps and the optics: leave --step-mm and --far-mm out";
+                    let expected = "the rig's record has them: leave --step-mm and --far-mm out";
                     return Err(WorkflowError::parameter("stack", request.stack.display(), expected));
                 }
                 let (lens, _) = optics::of_pair(None, &request.stack.join("slice.png"))?;
@@ -312,9 +311,8 @@ fn even_step(positions: &[f64], request: &CalibrateStackRequest) -> Result<f64> 
     match steps.iter().enumerate().find(|(_, step)| !even(**step)) {
         Some((index, step)) => {
             let (from, to) = (index + 1, index + 2);
-            let expected = format!(
-                "even steps, but slices {from} and {to} are {step:.6} apart, and {usual:.6} is usual"
-            );
+            let expected =
+                format!("even steps, but slices {from} and {to} are {step:.6} apart, {usual:.6} is usual");
             Err(WorkflowError::parameter("stack", request.stack.display(), expected))
         }
         None => Ok(rounded((steps.iter().sum::<f64>() / steps.len().max(1) as f64).abs(), 9)),
@@ -335,6 +333,11 @@ fn read(
         context.cancel.check("reading the slices")?;
         context.progress.advance("slices", index + 1, Some(images.len()));
         white.add(&image);
+        let holes = image.pixels.iter().filter(|value| !value.is_finite()).count();
+        if holes > 0 {
+            let expected = format!("a value in each pixel; {holes} have none (NaN): crop or fill them");
+            return Err(WorkflowError::parameter("stack", images[index].display(), expected));
+        }
         coding += image.coding_variance / images.len() as f64;
         if index == 0 && is_mosaic(image.pixels.view()) {
             context.progress.warn(mosaic::WORDS);

@@ -24,7 +24,7 @@ use farnear_files::{
 };
 use ndarray::{Array2, ArrayView2, CowArray, Ix2, s};
 
-use super::FocusStackRequest;
+use super::{FocusStackRequest, black_border};
 use crate::{
     context::Context,
     error::{Result, WorkflowError},
@@ -96,6 +96,7 @@ impl<'a> Images<'a> {
             context,
         };
         let (mut end, mut colour, mut white) = (0, false, SharedWhiteLevel::default());
+        let (mut without_value, mut black) = (0, 0);
         let settings = ReadSettings { grey: request.grey, white_level: request.white_level };
         context.cancel.check("reading the stack")?;
         stack::read(paths, &settings, |index, mut image| -> Result<()> {
@@ -109,6 +110,8 @@ impl<'a> Images<'a> {
             if let Samples::Integer(bits) = image.samples {
                 read.code_step = read.code_step.max(1.0 / (2_f32.powi(bits.into()) - 1.0));
             }
+            without_value += image.pixels.iter().filter(|value| !value.is_finite()).count();
+            black += usize::from(black_border::erase(&mut image.pixels));
             read.specks.push(fill_specks(&mut image.pixels));
             read.images.push((end, image.pixels.dim()));
             read.write(index, image.pixels.view())?;
@@ -118,10 +121,15 @@ impl<'a> Images<'a> {
         if request.grey == Grey::Mean && colour {
             warnings.push("colour images: grey is the mean of red, green and blue (--grey)".into());
         }
-        let specks: usize = read.specks.iter().map(Vec::len).sum();
-        if specks > 0 {
-            warnings
-                .push(format!("{specks} pixels of the images have no value (NaN): the map has holes there"));
+        if without_value > 0 {
+            warnings.push(format!(
+                "{without_value} pixels of the images have no value (NaN): the map has holes there"
+            ));
+        }
+        if black > 0 {
+            warnings.push(format!(
+                "{black} images have a border of zeros, which counts as not seen: the map has holes there"
+            ));
         }
         read.white_level = white.get().unwrap_or(1.0);
         Ok(read)

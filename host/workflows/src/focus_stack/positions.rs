@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use farnear_capture::record::{CAPTURE_FILE, CaptureRecord, read_record};
 use farnear_depth::optics::{Distortion, Optics};
-use farnear_files::stack;
+use farnear_files::{order, stack};
 use ndarray::Array2;
 
 use super::FocusStackRequest;
@@ -43,7 +43,7 @@ pub(super) fn of(request: &FocusStackRequest) -> Result<Listed> {
         },
         None => stack::list(&request.stack)?,
     };
-    let images = listed.images;
+    let (images, mut remarks) = (listed.images, listed.remarks);
     let (axis, positions) = match (&request.distances_mm, &request.sensor_mm, &request.positions_um, &record)
     {
         (Some(distances), ..) => (Axis::ObjectMm, distances.clone()),
@@ -52,7 +52,17 @@ pub(super) fn of(request: &FocusStackRequest) -> Result<Listed> {
         (.., Some(record)) => (Axis::ObjectMm, objects(&sensors(record), request)?),
         (.., None) => match listed.positions_um {
             Some(positions) => (Axis::StageUm, positions),
-            None => (Axis::Number, (1..=images.len()).map(|number| number as f64).collect()),
+            None => {
+                remarks.extend(order::gap(&images).map(|[before, after]| {
+                    format!(
+                        "the numbers in the names have a gap between {} and {}: images are counted without it; if one is missing \
+                         there, give --positions-um",
+                        before.display(),
+                        after.display()
+                    )
+                }));
+                (Axis::Number, (1..=images.len()).map(|number| number as f64).collect())
+            }
         },
     };
     let optics = lens(request)?;
@@ -79,7 +89,7 @@ pub(super) fn of(request: &FocusStackRequest) -> Result<Listed> {
     let capture = record.map(|_| request.stack.join(CAPTURE_FILE));
     let mut described_by: Vec<PathBuf> = described_by.into_iter().chain(capture).collect();
     described_by.dedup();
-    Ok(Listed { images, axis, positions, described_by, optics, object_pixel_um, remarks: listed.remarks })
+    Ok(Listed { images, axis, positions, described_by, optics, object_pixel_um, remarks })
 }
 
 fn lens(request: &FocusStackRequest) -> Result<Option<Optics>> {

@@ -136,11 +136,6 @@ pub fn light_of_percent([first, second]: [f64; 2]) -> std::result::Result<LightL
     Ok(LightLevels { first: level(first)?, second: level(second)? })
 }
 
-/// Brightness of both outputs in percent.
-pub fn percent_of_light(levels: LightLevels) -> [f64; 2] {
-    [levels.first, levels.second].map(|level| 100.0 * f64::from(level) / f64::from(LIGHT_LEVEL_MAX))
-}
-
 impl Default for CameraSettings {
     fn default() -> Self {
         Self {

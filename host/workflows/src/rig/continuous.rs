@@ -142,11 +142,11 @@ pub fn run(settings: &ContinuousRequest, context: &Context<'_>) -> Result<Contin
     let mut tally = Tally::new(pace.period, &ready.shots);
     let captured = capture(&mut equipped, &ready, (settings, pace), &mut tally, folder.as_mut(), context);
     match captured {
-        Err(error) if !error.is_cancelled() => return Err(error),
-        _ => {}
+        // Fails if the board is silent, and so perhaps not stopped.
+        Err(error) if error.is_cancelled() => equipped.rig.client.stop()?,
+        captured => captured?,
     }
-    if let Some(folder) = folder {
-        folder.finish()?;
+    if folder.is_some() {
         context.info(&format!("wrote {}", settings.out.as_deref().unwrap_or(".".as_ref()).display()));
     }
     Ok(tally.figures())
@@ -199,7 +199,7 @@ fn capture(
         tally.count(&outcome);
         context.progress.advance("frames", tally.exposures(), None);
         if let Some(folder) = &mut folder {
-            folder.note(&outcome);
+            folder.note(&outcome)?;
         }
         let Outcome::Taken(frame) = outcome else { continue };
         match (&mut folder, &ready.pair, &circumstances) {

@@ -14,6 +14,7 @@ use farnear_capture::{
 use farnear_depth::{
     measure::{DepthMethod, MeasureError, MeasureSettings, Measurement},
     optics::Optics,
+    pipeline::RunError,
     prepare::{PrepareError, PrepareSettings},
     stream::Stream,
 };
@@ -50,11 +51,23 @@ pub fn stream(optics: &Optics) -> Result<Stream> {
     Ok(Stream::new(optics, &MeasureSettings { prepare, ..usual })?)
 }
 
-/// Depth of the next pair; `None` if the scene changed between its exposures, as it may before a running camera.
-pub(super) fn measure(stream: &mut Stream, pair: [Array2<f32>; 2]) -> Result<Option<Measurement>> {
+/// Depth of the next pair; `None` if the scene changed between its exposures, as it may before a running camera, and with a
+/// warning if an image is constant, as under a covered lens.
+pub(super) fn measure(
+    stream: &mut Stream,
+    pair: [Array2<f32>; 2],
+    context: &Context<'_>,
+) -> Result<Option<Measurement>> {
     match stream.measure(pair) {
         Ok(found) => Ok(Some(found)),
         Err(MeasureError::Prepare(PrepareError::Unrelated { .. })) => Ok(None),
+        Err(
+            MeasureError::Run(error @ RunError::Constant { .. })
+            | MeasureError::Prepare(PrepareError::Pair(error @ RunError::Constant { .. })),
+        ) => {
+            context.progress.warn(&error.to_string());
+            Ok(None)
+        }
         Err(error) => Err(error.into()),
     }
 }
@@ -102,7 +115,8 @@ pub fn watch(
         let arrived = Instant::now();
         (shown, waited) = (Some(arrived), Duration::ZERO);
         depths.set_coding(0.5 * (far.image.coding_variance + near.image.coding_variance));
-        let Some(found) = measure(&mut depths, [&far, &near].map(|frame| frame.image.grey()))? else {
+        let Some(found) = measure(&mut depths, [&far, &near].map(|frame| frame.image.grey()), context)?
+        else {
             continue;
         };
         let pair_us = near.record.strobe_end.0.saturating_sub(far.record.strobe_start.0);

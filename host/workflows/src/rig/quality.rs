@@ -140,6 +140,12 @@ pub fn measure(request: &QualityRequest, context: &Context<'_>) -> Result<Qualit
     request.check()?;
     let optics = GivenOptics::read(&request.optics)?;
     let mut record = read_record(&request.record)?;
+    if let Some(folder) =
+        request.record.parent().filter(|folder| !folder.as_os_str().is_empty() && !folder.is_dir())
+    {
+        let expected = format!("the folder {} does not exist: make it first", folder.display());
+        return Err(WorkflowError::parameter("record", request.record.display(), expected));
+    }
     let method = DepthMethod::Whitened;
     let computation = MeasureSettings { window: method.usual_window(), ..MeasureSettings::default() };
     let mut rig = request.camera.connect(&request.rig, Some(&optics), context)?;

@@ -263,7 +263,7 @@ pub fn play(
             }
             context.cancel.check("playing a recording")?;
             let arrived = Instant::now();
-            let Some(found) = measure(&mut depths, grey)? else {
+            let Some(found) = measure(&mut depths, grey, context)? else {
                 unrelated_pairs += 1;
                 continue;
             };

@@ -5,7 +5,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use farnear_capture::record::{begin_folder, finish_folder};
+use farnear_capture::record::{begin_folder, finish_folder, read_record};
 use farnear_depth::{
     operators::Operators,
     optics::Optics,
@@ -113,6 +113,7 @@ pub fn capture(settings: &TargetSeriesRequest, context: &Context<'_>) -> Result<
     fs::create_dir_all(&settings.out)
         .map_err(|source| WorkflowError::Folder { folder: settings.out.clone(), source })?;
     let mut list = read_list(&settings.out.join(LIST))?;
+    check_same_optics(&list, &optics, settings)?;
     let series = Series { settings, optics: &optics, operators: &operators, context };
     let mut standing = match settings.rig.is_emulated() {
         true => None,
@@ -220,6 +221,23 @@ fn distances(asked_mm: &[f64], optics: &Optics) -> Result<Vec<f64>> {
     let step = (range.far_mm - range.near_mm) / (USUAL_TARGETS - 1) as f64;
     // Rounded to 0.1 mm, which can be set on a rail.
     Ok((0..USUAL_TARGETS).map(|i| rounded(range.near_mm + step * i as f64, 1)).collect())
+}
+
+/// Fails if the series was begun with other optics.
+fn check_same_optics(list: &List, optics: &GivenOptics, settings: &TargetSeriesRequest) -> Result<()> {
+    for entry in &list.pattern {
+        let folder = entry.depth.parent().unwrap_or(Path::new(""));
+        let record = read_record(&settings.out.join(folder))?;
+        if record.is_some_and(|record| record.optics != optics.table) {
+            let expected = format!(
+                "the target at {} mm in {} was captured with other optics: take these, or another folder",
+                entry.true_mm,
+                settings.out.display()
+            );
+            return Err(WorkflowError::parameter("optics", settings.optics.display(), expected));
+        }
+    }
+    Ok(())
 }
 
 fn read_list(path: &Path) -> Result<List> {

@@ -154,7 +154,7 @@ impl VideoFigures {
     fn without_people(&self) -> Option<String> {
         let reason = match self.learning == self.frames {
             true => {
-                "all of them were used to learn the background: lower learning-frames, or use learn-first"
+                "all of them were used to learn the background: lower learning-frames, or give a longer video"
             }
             false => "silhouettes.toml has the reason of each",
         };

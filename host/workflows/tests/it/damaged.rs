@@ -56,7 +56,7 @@ const JOBS_CSV: &str = "do,masks,camera,lamp,out\nshadow-remove,a,camera.toml,\"
 const CAMERA: &str = "[camera]\nheight_m = 1.2\nazimuth_deg = 140.0\nfocal_length_mm = 4.0\npixel_um = 120.0\nwidth_px = 32\nheight_px = 32\n";
 
 /// Three folders of small masks (a person, half of one, another person), and their camera.
-fn folder() -> tempfile::TempDir {
+pub fn folder() -> tempfile::TempDir {
     let root = tempfile::tempdir().expect("a folder");
     fs::write(root.path().join("camera.toml"), CAMERA).expect("a file");
     for (name, rows) in [("a", 30), ("b", 12), ("c", 28)] {

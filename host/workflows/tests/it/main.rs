@@ -1,6 +1,7 @@
 //! Public interface tests of farnear-workflows, in one binary.
 #![allow(clippy::unwrap_used)] // a test that panics has failed, which is what it is for
 
+mod batch;
 mod damaged;
 mod people;
 // The scripted board needs a Linux pseudo-terminal.

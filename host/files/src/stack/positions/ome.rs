@@ -1,6 +1,9 @@
 //! OME-XML: <https://docs.openmicroscopy.org/ome-model>
 
-use std::borrow::Cow;
+use std::{
+    borrow::Cow,
+    collections::{HashMap, HashSet},
+};
 
 use super::{Planes, moving, one_series, unit_um};
 use crate::image_file::Page;
@@ -59,6 +62,49 @@ impl<'a> Metadata<'a> {
         let order = self.order(pages)?;
         let positions_um = if planes > 1 { self.positions_um(planes) } else { None };
         Ok(Planes { pages: order, positions_um, remarks: Vec::new() })
+    }
+
+    /// The planes of a focus series with one file each, from the names that `TiffData` has for them. `None` if the metadata are of
+    /// one file. Fails for other names, channels and times.
+    pub fn files(&self, names: &[String]) -> Result<Option<Planes>, String> {
+        let mut of_name: HashMap<&str, [usize; 3]> = HashMap::new();
+        let mut at = [0; 3];
+        for tag in self.0.split("</Pixels").next().unwrap_or_default().split('<') {
+            if tag.starts_with("TiffData") {
+                at = ["FirstZ", "FirstC", "FirstT"].map(|name| number(tag, name).unwrap_or(0));
+            } else if let (true, Some(name)) = (tag.starts_with("UUID"), attribute(tag, "FileName")) {
+                of_name.insert(name, at);
+            }
+        }
+        if of_name.len() < 2 {
+            return Ok(None);
+        }
+        let known: Vec<[usize; 3]> =
+            names.iter().filter_map(|name| of_name.get(name.as_str()).copied()).collect();
+        if known.len() < names.len() {
+            let name = names.iter().find(|name| !of_name.contains_key(name.as_str()));
+            return Err(format!(
+                "the OME metadata of its files are of {} files with other names, without {}: rename the files as they were, or save \
+                 the stack again without them (Bio-Formats: bfconvert)",
+                of_name.len(),
+                name.map_or("", String::as_str)
+            ));
+        }
+        let distinct = |axis: usize| known.iter().map(|at| at[axis]).collect::<HashSet<_>>().len();
+        one_series(distinct(1), distinct(2))?;
+        let count = number(self.pixels(), "SizeZ").unwrap_or(1);
+        if distinct(0) < names.len() || known.iter().any(|at| at[0] >= count) {
+            return Err("the OME metadata of its files have one plane (FirstZ) for several of them".into());
+        }
+        let mut pages: Vec<usize> = (0..names.len()).collect();
+        pages.sort_by_key(|index| known[*index][0]);
+        let positions_um = self
+            .positions_um(count)
+            .map(|positions| pages.iter().map(|index| positions[known[*index][0]]).collect());
+        let missing = count - names.len();
+        let remark = (missing > 0)
+            .then(|| format!("{missing} of {count} planes of the OME metadata are not in the folder"));
+        Ok(Some(Planes { pages, positions_um, remarks: Vec::from_iter(remark) }))
     }
 
     /// Index of the page of each plane, by the elements `TiffData`.
@@ -130,9 +176,12 @@ fn attribute<'a>(tag: &'a str, name: &str) -> Option<&'a str> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{
-        object_pixel_um, of,
-        tests::{pages, positions},
+    use super::{
+        super::{
+            object_pixel_um, of,
+            tests::{pages, positions},
+        },
+        Metadata,
     };
 
     #[test]
@@ -178,6 +227,31 @@ mod tests {
         ] {
             assert!(of_data(&wrong).unwrap_err().contains("of 3 planes"), "{wrong}");
         }
+    }
+
+    #[test]
+    fn files_of_one_plane_each_have_the_order_of_their_metadata() {
+        let data = |z: usize, c: usize, name: &str| {
+            format!(
+                "<TiffData FirstZ='{z}' FirstC='{c}' IFD='0'><UUID FileName='{name}'>urn:uuid:1</UUID></TiffData>"
+            )
+        };
+        let ome = |data: &str| {
+            format!("<OME><Image><Pixels SizeZ='4' SizeC='2' PhysicalSizeZ='2'>{data}</Pixels></Image></OME>")
+        };
+        let of = |xml: &str, names: &[&str]| {
+            let names: Vec<String> = names.iter().map(|name| (*name).to_owned()).collect();
+            Metadata::of(xml).unwrap().files(&names)
+        };
+        let all = ome(&[data(2, 0, "a1"), data(0, 0, "a2"), data(3, 0, "a3"), data(1, 1, "b1")].concat());
+        let found = of(&all, &["a1", "a2", "a3"]).unwrap().unwrap();
+        assert_eq!((found.pages, found.positions_um), (vec![1, 0, 2], Some(vec![0.0, 4.0, 6.0])));
+        assert!(found.remarks[0].contains("1 of 4 planes"), "{:?}", found.remarks);
+        assert!(of(&all, &["a1", "a2", "b1"]).unwrap_err().contains("2 channels"));
+        assert!(of(&all, &["a1", "z9"]).unwrap_err().contains("without z9"));
+        let twice = ome(&[data(2, 0, "a1"), data(2, 0, "a2")].concat());
+        assert!(of(&twice, &["a1", "a2"]).unwrap_err().contains("one plane"));
+        assert_eq!(of(&ome(&data(0, 0, "a1")), &["a1", "a2"]), Ok(None));
     }
 
     #[test]

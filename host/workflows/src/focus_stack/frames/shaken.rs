@@ -47,9 +47,11 @@ pub(super) fn find(sharpness: &[Vec<f64>], positions: &[f64], members: &[usize])
 fn inside(sharpness: &[Vec<f64>], members: &[usize]) -> Vec<usize> {
     let three = members.array_windows().filter(|indices: &&[usize; 3]| {
         let [before, own, after] = indices.map(|index| &sharpness[index]);
+        let blocks = own.iter().zip(before.iter().zip(after));
         let dull =
-            (0..own.len()).filter(|block| own[*block] < SHAKEN * before[*block].min(after[*block])).count();
-        !own.is_empty() && dull as f64 >= SHAKEN_BLOCKS * own.len() as f64
+            blocks.clone().filter(|(own, (before, after))| **own < SHAKEN * before.min(**after)).count();
+        // A frame with pixels without a value has no sharpness.
+        blocks.len() > 0 && dull as f64 >= SHAKEN_BLOCKS * blocks.len() as f64
     });
     three.map(|[_, own, _]| *own).collect()
 }

@@ -1,7 +1,8 @@
 //! A capture folder per pair or an image per exposure, and `frames.csv` with a row per frame.
 
 use std::{
-    fmt::Write,
+    fs::File,
+    io::Write,
     path::{Path, PathBuf},
 };
 
@@ -16,14 +17,16 @@ use farnear_capture::{
 };
 use farnear_files::{
     image_file::encode_png,
-    staging::{Staging, write_file},
+    staging::{Staging, StagingError, write_file},
 };
 
-use crate::error::{Result, WorkflowError};
+use crate::error::Result;
+
+const ROWS: &str = "frames.csv";
 
 pub struct Folder {
     path: PathBuf,
-    rows: String,
+    rows: File,
     pairs: u32,
 }
 
@@ -33,20 +36,19 @@ impl Folder {
         Staging::new_folder(path)
             .and_then(Staging::finish)
             .map_err(farnear_capture::record::RecordError::from)?;
-        let rows =
-            "frame,shot,repeat,trigger_number,trigger_us,strobe_end_us,settle_us,deviation_nm,dropped\n"
-                .into();
-        Ok(Self { path: path.into(), rows, pairs: 0 })
+        let head =
+            b"frame,shot,repeat,trigger_number,trigger_us,strobe_end_us,settle_us,deviation_nm,dropped\n";
+        let csv = path.join(ROWS);
+        let rows = File::create_new(&csv).and_then(|mut rows| rows.write_all(head).map(|()| rows));
+        Ok(Self { path: path.into(), rows: rows.map_err(StagingError::at(&csv))?, pairs: 0 })
     }
 
-    pub fn note(&mut self, outcome: &Outcome) {
-        // Writing to a string cannot fail.
-        let _ = match outcome {
+    pub fn note(&mut self, outcome: &Outcome) -> Result<()> {
+        let row = match outcome {
             Outcome::Taken(frame) => {
                 let (record, deviation) = (&frame.record, frame.deviation.0);
-                writeln!(
-                    self.rows,
-                    "{},{},{},{},{},{},{},{deviation},",
+                format!(
+                    "{},{},{},{},{},{},{},{deviation},\n",
                     frame.number,
                     record.index,
                     record.repeat,
@@ -62,9 +64,11 @@ impl Folder {
                     Loss::EventLost => "the board's event was lost".into(),
                     Loss::Image { reason, .. } => reason.clone(),
                 };
-                writeln!(self.rows, "{number},,,,,,,,\"{}\"", why.replace('"', "'"))
+                format!("{number},,,,,,,,\"{}\"\n", why.replace('"', "'"))
             }
         };
+        let written = self.rows.write_all(row.as_bytes());
+        Ok(written.map_err(StagingError::at(&self.path.join(ROWS)))?)
     }
 
     pub fn pair(
@@ -88,9 +92,5 @@ impl Folder {
         let image = encode_png(frame.image.pixels.view(), frame.image.bits)
             .map_err(farnear_capture::record::RecordError::from)?;
         Ok(write_file(&path, &image)?)
-    }
-
-    pub fn finish(self) -> Result<()> {
-        write_file(&self.path.join("frames.csv"), self.rows.as_bytes()).map_err(WorkflowError::from)
     }
 }

@@ -1,0 +1,28 @@
+//! One server for a session: two would overwrite each other's files.
+
+use std::{
+    fs::{self, File, TryLockError},
+    path::Path,
+};
+
+use farnear_workflows::WorkflowError;
+
+use crate::server::ServeError;
+
+/// Hidden, so that it is no capture.
+const FILE: &str = ".serve.lock";
+
+/// Creates the session's folder if it is missing, and locks it until the file is dropped or the process ends. `None`
+/// where files cannot be locked, or neither written nor locked.
+pub fn lock(session: &Path) -> Result<Option<File>, ServeError> {
+    fs::create_dir_all(session).map_err(|source| WorkflowError::Folder { folder: session.into(), source })?;
+    let path = session.join(FILE);
+    // Another user's lock file may be read only.
+    let opened = File::options().append(true).create(true).open(&path).or_else(|_| File::open(&path));
+    let Ok(file) = opened else { return Ok(None) };
+    match file.try_lock() {
+        Ok(()) => Ok(Some(file)),
+        Err(TryLockError::WouldBlock) => Err(ServeError::InUse { session: session.into() }),
+        Err(TryLockError::Error(_)) => Ok(None),
+    }
+}

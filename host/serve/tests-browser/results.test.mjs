@@ -1,0 +1,154 @@
+// Results that the page shows: of jobs after a reload, of regions, of recordings, of captures.
+import assert from "node:assert/strict";
+import { after, afterEach, before, test } from "node:test";
+import { browser as launch, open, reloaded, serve } from "./server.mjs";
+
+let browser, server;
+before(async () => {
+  browser = await launch();
+  server = await serve();
+});
+afterEach(async () => {
+  for (const context of browser.contexts()) await context.close();
+  await server.released();
+});
+after(async () => {
+  await browser?.close();
+  assert.equal(await server?.close(), 0);
+});
+
+test("flat series, correction, point spread function and quality are shown after a reload", async () => {
+  const page = await open(browser, `${server.address}#guides/series`);
+  const guide = page.locator("#view-guides");
+  await guide.getByLabel("Distances in mm").fill("890, 910, 930");
+  await reloaded(server, page, "flat-series", () => page.getByRole("button", { name: "Capture the series" }).click());
+  await guide.locator("dt", { hasText: "error before correction" }).waitFor();
+  await guide.locator(".status", { hasText: "3 targets: 890.0, 910.0, 930.0 mm" }).waitFor();
+  await guide.getByLabel("Method", { exact: true }).selectOption("cdc");
+  await page.getByRole("button", { name: "Learn", exact: true }).click();
+  await guide.locator("dt", { hasText: "RMS after" }).waitFor();
+  await page.reload();
+  await guide.locator("dt", { hasText: "RMS after" }).waitFor();
+  await guide.locator("dt", { hasText: "error before correction" }).waitFor();
+  await page.locator("button[data-guide=psf]").click();
+  await page.getByLabel("the flat series: 3 targets at known distances").check();
+  await page.getByRole("button", { name: "Find", exact: true }).click();
+  const found = guide.locator("dt", { hasText: "point spread function" });
+  await found.waitFor();
+  await page.reload();
+  await found.waitFor();
+  await page.locator("button[data-guide=series]").click();
+  await page.getByRole("button", { name: "Forget it" }).click();
+  await guide.locator(".status", { hasText: "No target yet." }).waitFor();
+  assert.equal(await guide.locator("dt", { hasText: "RMS after" }).count(), 0, "what is forgotten is not shown");
+  await page.locator("#tab-quality").click();
+  await page.getByLabel("Pairs", { exact: true }).fill("2");
+  await reloaded(server, page, "quality", () => page.getByRole("button", { name: "Measure" }).click());
+  await page.locator(".tile", { hasText: "temporal noise" }).waitFor();
+  assert.equal(await page.locator("#view-quality tbody tr").count(), 1);
+  assert.deepEqual(page.complaints, []);
+});
+
+test("the error of a step is that of means of blocks, and none where a region is too small for it", async () => {
+  const page = await open(browser, server.address);
+  await page.getByRole("button", { name: "Capture pair" }).click();
+  await page.locator("button[data-layer=surface]:enabled").waitFor();
+  const box = await page.locator("#view-depth .viewer canvas").boundingBox();
+  const region = async (from, to) => {
+    const answer = page.waitForResponse((one) => one.url().endsWith("/region"));
+    await page.mouse.move(box.x + from[0] * box.width, box.y + from[1] * box.height);
+    await page.mouse.down();
+    await page.mouse.move(box.x + to[0] * box.width, box.y + to[1] * box.height, { steps: 4 });
+    await page.mouse.up();
+    return (await (await answer).json()).figures.standard_error_mm;
+  };
+  const shown = page.locator("dt", { hasText: "± of the means" }).locator("+ dd span");
+  const told = async (text) => {
+    await shown.filter({ hasText: text }).waitFor();
+    return shown.getAttribute("title");
+  };
+  await page.getByRole("button", { name: "Region", exact: true }).click();
+  const first = await region([0.3, 0.35], [0.48, 0.65]);
+  const second = await region([0.52, 0.35], [0.7, 0.65]);
+  assert.ok(first > 0 && second > 0, `${first}, ${second}`);
+  assert.match(await told(`${Math.hypot(first, second).toFixed(3)} mm`), /24 × 24 px/);
+  assert.equal((await region([0.5, 0.5], [0.52, 0.52])) ?? null, null);
+  assert.match(await told("–"), /needs four blocks/);
+  assert.deepEqual(page.complaints, []);
+});
+
+test("depth that another browser computes replaces the map that is shown", async () => {
+  const first = await open(browser, `${server.address}#depth/pair-001`);
+  await first.locator("canvas[data-layer=depth]").waitFor();
+  const watching = await open(browser, `${server.address}#depth/pair-001`);
+  await watching.locator("canvas[data-layer=depth]").waitFor();
+  await watching.waitForLoadState("networkidle");
+  const map = watching.waitForRequest((request) => request.url().endsWith("/pair-001/files/depth.npy"));
+  await first.getByRole("button", { name: "Compute depth", exact: true }).click();
+  await map;
+  await watching.locator("canvas[data-layer=depth]").waitFor();
+  assert.deepEqual(watching.complaints, []);
+});
+
+test("a recording that a capture ends says so, with its pairs; one that is stopped does not", async () => {
+  const page = await open(browser, server.address);
+  const record = page.getByRole("button", { name: "Record", exact: true });
+  const said = page.getByText("Recording ended: ");
+  await page.getByText("Average, series, still, stack").click();
+  await page.getByRole("button", { name: "Live depth" }).click();
+  for (const stopped of [true, false]) {
+    await page.locator("#view-live .status", { hasText: "ms from image to map" }).waitFor();
+    await record.click();
+    const stop = page.getByRole("button", { name: "Stop recording" });
+    await stop.waitFor();
+    await page.waitForTimeout(2000);
+    if (stopped) await stop.click();
+    else await page.getByRole("button", { name: "Still" }).click();
+    await record.waitFor();
+    if (stopped) {
+      await page.waitForTimeout(500);
+      assert.equal(await said.count(), 0);
+    }
+  }
+  await said.waitFor();
+  assert.match(await said.textContent(), /^Recording ended: live-002\.pairs, [1-9]\d* pairs\.$/);
+  await record.click();
+  await said.waitFor({ state: "detached" });
+  await page.keyboard.press("Escape");
+  assert.deepEqual(page.complaints, []);
+});
+
+test("images without the board's light are subtracted only where a light is set", async () => {
+  const page = await open(browser, server.address);
+  await page.getByText("Average, series, still, stack").click();
+  const subtract = page.getByLabel("subtract images without the board's light");
+  const light = page.getByLabel("Light 1", { exact: true });
+  await page.locator("label[title*='set Light 1 or Light 2']").waitFor();
+  assert.ok(await subtract.isDisabled());
+  await light.fill("50");
+  await light.press("Tab");
+  await page.waitForFunction(() => !document.querySelector("#view-live .side details input[type=checkbox]").disabled);
+  await subtract.check();
+  await light.fill("0");
+  await light.press("Tab");
+  await page.locator("label[title*='set Light 1 or Light 2']").waitFor();
+  assert.ok(!(await subtract.isChecked()));
+  assert.deepEqual(page.complaints, []);
+});
+
+test("a still and a stack are called so among the captures", async () => {
+  const page = await open(browser, server.address);
+  await page.getByText("Average, series, still, stack").click();
+  await page.getByLabel("Images", { exact: true }).fill("3");
+  for (const [name, kind] of [["Still", "still"], ["Stack", "stack"]]) {
+    await page.locator("#tab-live").click();
+    const button = page.getByRole("button", { name, exact: true });
+    await button.and(page.locator(":enabled")).click();
+    const job = async () => (await server.ask("/api/state")).job;
+    for (let now = await job(); now.kind !== kind || now.phase === "running"; now = await job()) await page.waitForTimeout(100);
+    await page.locator("#tab-captures").click();
+    await page.locator(".capture-card", { hasText: `${kind}-001` }).locator("p", { hasText: new RegExp(`^${kind} · `) }).waitFor();
+  }
+  assert.equal(await page.locator(".capture-card", { hasText: "sequence" }).count(), 0);
+  assert.deepEqual(page.complaints, []);
+});
