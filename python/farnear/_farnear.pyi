@@ -259,9 +259,9 @@ class Plane:
     z_mm : float
         Distance from the lens in the middle of the points, mm.
     slope_x, slope_y : float
-        Slopes to the right and upwards, mm per mm.
+        Slopes to the right and upwards, mm per mm; mm per px for optics of `calibrate_stack` without `object_pixel_um`.
     tilt_deg : float
-        Angle to a plane perpendicular to the optical axis, degrees.
+        Angle to a plane perpendicular to the optical axis, degrees; NaN if slopes are per px.
     rms_mm : float
         Root mean square distance of the points from the plane along the axis, mm.
     peak_to_valley_mm : float
@@ -411,7 +411,7 @@ def focus_stack(
     Parameters
     ----------
     images : sequence of array (height, width)
-        At least three grey images of one size, in the order of their focus.
+        At least three grey images of one size, in the order of their focus. NaN and borders of zeros count as not seen.
     focused_at_mm : sequence of float, optional
         Object distance in mm at which each image is sharp, ascending or descending.
     measure : str
@@ -451,7 +451,7 @@ def points_mm(depth_mm: Map, optics: Optics) -> NDArray[np.float32]:
     depth_mm : array (height, width)
         Depth map, mm; NaN where there is none.
     optics : Optics
-        The optics of the map.
+        The optics of the map; those of `calibrate_stack` need its `object_pixel_um`.
 
     Returns
     -------

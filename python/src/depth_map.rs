@@ -3,7 +3,7 @@
 use std::{collections::BTreeMap, path::PathBuf};
 
 use farnear_depth::{measure::Measurement, reason::Reason};
-use farnear_files::{image_file, map, npy, view::view_png};
+use farnear_files::{image_file, map, mesh::Lateral, npy, view::view_png};
 use farnear_workflows::{MADE_BY, measure, result_folder};
 use ndarray::Array2;
 use numpy::{IntoPyArray, PyArray2, PyArrayMethods, PyUntypedArrayMethods};
@@ -227,14 +227,14 @@ impl DepthMap {
             );
             return Err(FarnearError::new_err(message));
         }
-        let points = measure::points_mm(depth, &self.optics.0);
+        let lateral = measure::lateral(&self.optics.0, None);
         let mut kept = Vec::new();
         for row in y..bottom {
             for column in x..right {
-                let [px, py, pz] = [0, 1, 2].map(|axis| f64::from(points[(row, column, axis)]));
-                if pz.is_finite() {
-                    // `points_mm` has z towards the viewer.
-                    kept.push([px, py, pz.abs()]);
+                let z = f64::from(depth[(row, column)]);
+                if z.is_finite() {
+                    let [px, py] = lateral.beside_axis((height, width), column, row, z);
+                    kept.push([px, py, z]);
                 }
             }
         }
@@ -244,7 +244,7 @@ impl DepthMap {
             z_mm: plane.z_mm,
             slope_x: plane.slope_x,
             slope_y: plane.slope_y,
-            tilt_deg: plane.tilt_deg,
+            tilt_deg: if lateral == Lateral::Unknown { f64::NAN } else { plane.tilt_deg },
             rms_mm: plane.rms_mm,
             peak_to_valley_mm: plane.peak_to_valley_mm,
         })
@@ -325,9 +325,9 @@ impl DepthMap {
 /// z_mm : float
 ///     Distance from the lens in the middle of the points, mm.
 /// slope_x, slope_y : float
-///     Slopes to the right and upwards, mm per mm.
+///     Slopes to the right and upwards, mm per mm; mm per px for optics of `calibrate_stack` without `object_pixel_um`.
 /// tilt_deg : float
-///     Angle to a plane perpendicular to the optical axis, degrees.
+///     Angle to a plane perpendicular to the optical axis, degrees; NaN if slopes are per px.
 /// rms_mm : float
 ///     Root mean square distance of the points from the plane along the axis, mm.
 /// peak_to_valley_mm : float

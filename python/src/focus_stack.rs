@@ -57,7 +57,7 @@ impl FocusStack {
 /// Parameters
 /// ----------
 /// images : sequence of array (height, width)
-///     At least three grey images of one size, in the order of their focus.
+///     At least three grey images of one size, in the order of their focus. NaN and borders of zeros count as not seen.
 /// focused_at_mm : sequence of float, optional
 ///     Object distance in mm at which each image is sharp, ascending or descending.
 /// measure : str

@@ -5,6 +5,7 @@ use pyo3::prelude::*;
 
 use crate::{
     arrays::{Map, named, optics_named},
+    errors::wrong,
     work,
 };
 
@@ -15,7 +16,7 @@ use crate::{
 /// depth_mm : array (height, width)
 ///     Depth map, mm; NaN where there is none.
 /// optics : Optics
-///     The optics of the map.
+///     The optics of the map; those of `calibrate_stack` need its `object_pixel_um`.
 ///
 /// Returns
 /// -------
@@ -36,5 +37,6 @@ pub fn points_mm<'py>(
     let depth_mm: Map<'py> = named("depth_mm", depth_mm)?;
     let optics = &*optics_named("optics", optics)?;
     let depth_mm = depth_mm.view();
-    Ok(work::run(py, || farnear_workflows::measure::points_mm(depth_mm, &optics.0))?.into_pyarray(py))
+    let points = work::run(py, || farnear_workflows::measure::points_mm(depth_mm, &optics.0))?;
+    Ok(points.map_err(wrong)?.into_pyarray(py))
 }

@@ -228,6 +228,11 @@ def test_a_lens_is_calibrated_from_a_stack_and_measures_its_pairs():
     found = farnear.depth(slices[first], slices[first + fit.pair_step], fit.optics, method="whitened")
     # The target is in focus at slice 20: so many steps nearer than the far plane. Within a third of a step.
     assert np.nanmedian(found.depth_mm) == pytest.approx(100 - 0.05 * (20 - first), abs=0.017)
+    # Without the size of a pixel at the target only depth is in mm.
+    plane = found.plane()
+    assert np.isnan(plane.tilt_deg) and abs(plane.slope_x) < 0.01
+    with pytest.raises(farnear.FarnearError, match="object-pixel-um"):
+        farnear.points_mm(found.depth_mm, fit.optics)
     with pytest.raises(farnear.FarnearError, match="2 slices"):
         farnear.calibrate_stack(slices[:2], step_mm=0.1)
 

@@ -266,6 +266,7 @@ impl Run {
                 self.expose_when_due(settled, stage, camera, now)
             }
             Phase::Exposing { number, frame, places, ref mut deviation } => {
+                self.positioning.wait_from(now);
                 *deviation = self.positioning.deviation(stage).max(*deviation);
                 let deviation = *deviation;
                 match camera.result(number) {

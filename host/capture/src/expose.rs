@@ -14,6 +14,8 @@ use crate::{
 };
 
 const SLICE: Duration = Duration::from_millis(50);
+/// Longest wait: a longer one may be beyond the end of the clock.
+const A_DAY: Duration = Duration::from_secs(86_400);
 
 #[derive(Debug, thiserror::Error)]
 pub enum CaptureError {
@@ -212,7 +214,7 @@ pub(crate) fn wait_for_image(
     record: &ShotRecord,
     allowed: Duration,
 ) -> Result<Image, CaptureError> {
-    let until = Instant::now() + allowed;
+    let until = Instant::now() + allowed.min(A_DAY);
     loop {
         let left = until.saturating_duration_since(Instant::now());
         match camera.image(record, left.min(SLICE)) {

@@ -88,7 +88,7 @@ impl FromStr for Model {
     }
 }
 
-/// Why a calibration failed.
+/// Why a calibration failed. An `index` is of the given pairs from 0; messages count from 1.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[allow(missing_docs, reason = "the messages name the fields")]
 pub enum CalibrationError {
@@ -97,18 +97,18 @@ pub enum CalibrationError {
     #[error("no pair to calibrate on")]
     NoPair,
     #[error(
-        "pair {index}: the far image is {far_width}x{far_height}, the near image {near_width}x{near_height}"
+        "pair {}: the far image is {far_width}x{far_height}, the near image {near_width}x{near_height}", .index + 1
     )]
     SizeMismatch { index: usize, far_width: usize, far_height: usize, near_width: usize, near_height: usize },
-    #[error("pair {index}, {which} image: {reason}")]
+    #[error("pair {}, {which} image: {reason}", .index + 1)]
     Image { index: usize, which: &'static str, reason: SpectrumError },
     #[error(
-        "pair {index}: at alpha = {alpha:.2} both images are blurred alike; put the target at the far or the near focus"
+        "pair {}: at alpha = {alpha:.2} both images are blurred alike; put the target at the far or the near focus", .index + 1
     )]
     MiddleOfRange { index: usize, alpha: f64 },
     #[error(
-        "pair {index}: the far image has {ratio:.2} times the detail of the near one, so neither is in focus; \
-         put the target at the far or the near focus, or say at which depth it stands"
+        "pair {}: the far image has {ratio:.2} times the detail of the near one, so neither is in focus; \
+         put the target at the far or the near focus, or say at which depth it stands", .index + 1
     )]
     NeitherSharp { index: usize, ratio: f64 },
     #[error(
@@ -118,7 +118,7 @@ pub enum CalibrationError {
     AtSearchEnd { parameter: &'static str, value: f64 },
     #[error("no round point spread function makes one image of the other: {0}")]
     Profile(String),
-    #[error("flat target {index} at {true_mm} mm: {reason}")]
+    #[error("flat target {} at {true_mm} mm: {reason}", .index + 1)]
     FlatTarget { index: usize, true_mm: f64, reason: RunError },
 }
 
@@ -321,4 +321,25 @@ pub fn measure_patterns(
         Ok(MeasuredPattern { depth_mm, true_mm })
     };
     targets.iter().enumerate().map(measure).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn messages_count_pairs_from_one() {
+        let blurred = CalibrationError::NeitherSharp { index: 0, ratio: 1.0 };
+        assert!(blurred.to_string().starts_with("pair 1: "), "{blurred}");
+        let middle = CalibrationError::MiddleOfRange { index: 1, alpha: 0.1 };
+        assert!(middle.to_string().starts_with("pair 2: at alpha = 0.10"), "{middle}");
+        let sizes = CalibrationError::SizeMismatch {
+            index: 1,
+            far_width: 4,
+            far_height: 3,
+            near_width: 5,
+            near_height: 3,
+        };
+        assert!(sizes.to_string().starts_with("pair 2: the far image is 4x3"), "{sizes}");
+    }
 }

@@ -127,7 +127,8 @@ impl Optics {
     /// The same optics for images with `bin` x `bin` pixels averaged into one.
     pub fn binned(self, bin: usize) -> Self {
         let bin = bin.max(1) as f64;
-        Self { pixel_um: self.pixel_um * bin, max_blur_px: self.max_blur_px / bin, ..self }
+        let distortion = self.distortion.map(|distortion| distortion.binned(bin));
+        Self { pixel_um: self.pixel_um * bin, max_blur_px: self.max_blur_px / bin, distortion, ..self }
     }
 
     fn half_travel_mm(&self) -> f64 {

@@ -69,7 +69,7 @@ pub fn shared_white_level<'a>(images: impl Iterator<Item = &'a GreyImage> + Clon
     images.clone().find_map(|image| image.white_level)?;
     let mut shared = SharedWhiteLevel::default();
     images.for_each(|image| shared.add(image));
-    shared.get()
+    shared.get(false)
 }
 
 /// [`shared_white_level`] of images that are not in memory together.
@@ -87,8 +87,9 @@ impl SharedWhiteLevel {
         self.float |= image.samples == Samples::Float;
     }
 
-    pub fn get(self) -> Option<f32> {
-        self.lowest.filter(|white| !self.float && self.brightest <= white * 1.000_001)
+    /// The level, which brighter pixels contradict, unless it `is_stated` by the user: they are saturated then.
+    pub fn get(self, is_stated: bool) -> Option<f32> {
+        self.lowest.filter(|white| is_stated || !self.float && self.brightest <= white * 1.000_001)
     }
 }
 
@@ -190,9 +191,17 @@ pub enum ImageError {
 
 /// Splits `stack.tif#3` into file and page, unless a file has that name.
 pub fn file_and_page(path: &Path) -> (PathBuf, Option<usize>) {
-    let named = || {
-        let (file, page) = path.to_str()?.rsplit_once('#')?;
-        Some((PathBuf::from(file), Some(page.parse().ok()?)))
+    let split = |text: &str| {
+        let (file, page) = text.rsplit_once('#')?;
+        Some((PathBuf::from(file), Some(page.parse::<usize>().ok()?)))
+    };
+    // A name need not be UTF-8; its ending is.
+    let named = || match path.to_str() {
+        Some(text) => split(text),
+        None => {
+            let (ending, page) = split(path.extension()?.to_str()?)?;
+            Some((path.with_extension(ending), page))
+        }
     };
     if path.exists() { (path.into(), None) } else { named().unwrap_or_else(|| (path.into(), None)) }
 }
@@ -229,11 +238,10 @@ pub(crate) fn read_8_bit(path: &Path, reading: Reading) -> Result<Samples8, Imag
     decoded.in_8_bits(reading.bits).map_err(|reason| ImageError::Format { path, reason })
 }
 
-/// The reading of one image, and whether others of its folder may need another.
-pub(crate) fn reading_of(path: &Path) -> Result<(Reading, bool), ImageError> {
+/// Used bits of an image of 16 bits, and whether its content is the opacity.
+pub(crate) fn reading_of(path: &Path) -> Result<(Option<u32>, bool), ImageError> {
     let (decoded, _) = read_decoded(path)?;
-    let reading = Reading { bits: decoded.used_bits(), opacity: decoded.only_alpha_differs() };
-    Ok((reading, decoded.has_alpha() || decoded.has_16_bits()))
+    Ok((decoded.used_bits(), decoded.only_alpha_differs()))
 }
 
 /// Why a file is not read that is an image by its content; `None` if it is not.

@@ -36,7 +36,8 @@ pub fn counter_started_again(sorted: &[PathBuf]) -> Option<[&PathBuf; 2]> {
     })
 }
 
-/// Neighbours of a sorted list between which a number is missing, where most numbers are evenly apart.
+/// Neighbours of a sorted list between which a number is missing, where most numbers are evenly apart. A counter that starts
+/// again is no gap.
 pub fn gap(sorted: &[PathBuf]) -> Option<[&PathBuf; 2]> {
     let names: Vec<Name> = sorted.iter().map(|path| Name::of(path)).collect();
     let column = last_varying(&names)?;
@@ -47,8 +48,10 @@ pub fn gap(sorted: &[PathBuf]) -> Option<[&PathBuf; 2]> {
     let usual = *in_order.get(steps.len() / 2)?;
     let even = |step: &&f64| (**step - usual).abs() < 0.1 * usual;
     let mostly = 4 * steps.iter().filter(even).count() >= 3 * steps.len();
-    let at = steps.iter().position(|step| mostly && *step > 1.5 * usual)?;
-    Some([&sorted[at], &sorted[at + 1]])
+    let again = counter_started_again(sorted);
+    let mut apart = sorted.windows(2).zip(&steps).filter(|(_, step)| mostly && **step > 1.5 * usual);
+    let is_gap = |two: &&[PathBuf]| again.is_none_or(|[before, _]| *before != two[0]);
+    apart.by_ref().map(|(two, _)| two).find(is_gap).map(|two| [&two[0], &two[1]])
 }
 
 /// Two files that differ only in their ending.
@@ -200,6 +203,10 @@ mod tests {
         let paths: Vec<PathBuf> = expected.iter().map(PathBuf::from).collect();
         assert_eq!(counter_started_again(&paths), Some([&paths[2], &paths[3]]));
         assert_eq!(counter_started_again(&paths[..3]), None);
+        let stack: Vec<PathBuf> =
+            [9995, 9996, 9997, 9998, 9999, 1, 2, 3, 5].map(|n| format!("IMG_{n:04}.jpg").into()).to_vec();
+        assert_eq!(gap(&stack[..8]), None);
+        assert_eq!(gap(&stack), Some([&stack[7], &stack[8]]));
         assert_eq!(sorted(&["DSC00001.tif", "DSC09999.tif"]), ["DSC09999.tif", "DSC00001.tif"]);
         // Some pictures around the end were deleted.
         assert_eq!(sorted(&["p0004.png", "p0006.png", "p9990.png"]), ["p9990.png", "p0004.png", "p0006.png"]);

@@ -84,7 +84,11 @@ fn file(path: &Path) -> Result<Stack, StackError> {
     };
     let positions::Planes { pages: order, positions_um, remarks } =
         positions::of(&pages).map_err(|reason| StackError::Planes { path: path.into(), reason })?;
-    let page = |index: usize| PathBuf::from(format!("{}#{}", path.display(), index + 1));
+    let page = |index: usize| {
+        let mut page = path.as_os_str().to_owned();
+        page.push(format!("#{}", index + 1));
+        PathBuf::from(page)
+    };
     let images = order.into_iter().map(page).collect();
     Ok(Stack { images, positions_um, object_pixel_um: positions::object_pixel_um(&pages), remarks })
 }
@@ -128,4 +132,30 @@ fn hash(pixels: &Array2<f32>) -> u64 {
     pixels.dim().hash(&mut hasher);
     pixels.iter().for_each(|value| hasher.write_u32(value.to_bits()));
     hasher.finish()
+}
+
+#[cfg(test)]
+#[cfg(target_os = "linux")]
+mod tests {
+    use std::{ffi::OsStr, fs, os::unix::ffi::OsStrExt};
+
+    use super::*;
+    use crate::image_file::encode_tiff;
+
+    #[test]
+    fn a_name_need_not_be_utf_8() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join(OsStr::from_bytes(b"Prob\xe4.tif"));
+        fs::write(&path, encode_tiff(Array2::from_elem((3, 4), 51).view(), 8).unwrap()).unwrap();
+        let Stack { images, .. } = list(&path).unwrap();
+        assert_eq!(image_file::file_and_page(&images[0]), (path, Some(1)));
+        let mut levels = Vec::new();
+        let settings = ReadSettings::default();
+        read(&images, &settings, |_, image| -> Result<(), StackError> {
+            levels.push(image.pixels[(0, 0)]);
+            Ok(())
+        })
+        .unwrap();
+        assert_eq!(levels, [0.2]);
+    }
 }

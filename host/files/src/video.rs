@@ -224,6 +224,19 @@ mod tests {
     }
 
     #[test]
+    fn frames_of_8_bits_do_not_whiten_those_of_16() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = |number: u8| folder.path().join(format!("{number}.png"));
+        GrayImage::from_pixel(4, 3, Luma([128])).save(path(1)).unwrap();
+        for (number, level) in [(2, u16::MAX), (3, 128 * 257)] {
+            image::ImageBuffer::from_pixel(4, 3, Luma([level])).save(path(number)).unwrap();
+        }
+        let frames = Video::open(folder.path()).unwrap().map(|frame| frame.unwrap().pixels);
+        let levels = [128, 255, 128].map(|level| Pixels::Grey(Array2::from_elem((3, 4), level)));
+        assert_eq!(frames.collect::<Vec<_>>(), levels);
+    }
+
+    #[test]
     fn a_frame_of_another_size_ends_the_video_with_its_name() {
         let folder = tempfile::tempdir().unwrap();
         RgbImage::from_pixel(4, 3, Rgb([1, 2, 3])).save(folder.path().join("a.png")).unwrap();

@@ -6,8 +6,10 @@ use rayon::prelude::*;
 
 use crate::{EncodeError, image_file::encode_to, quantiles::Quantiles, text::Writer};
 
-/// Small maps are enlarged by an integer factor to at least this height.
+/// Small maps are enlarged by an integer factor to at least this height, if [`MAX_WIDTH_PX`] allows it.
 const MIN_HEIGHT_PX: usize = 320;
+/// Maps are not enlarged beyond this width.
+const MAX_WIDTH_PX: usize = 4096;
 /// Part of outliers on either side that do not affect the colours.
 const OUTLIERS: f64 = 0.005;
 const MARGIN_PX: u32 = 24;
@@ -41,7 +43,8 @@ pub fn view_png_in(
 
 fn draw(unit: &str, depth_mm: ArrayView2<f32>, confidence: ArrayView2<f32>) -> Result<RgbImage, EncodeError> {
     let (rows, columns) = depth_mm.dim();
-    let zoom = MIN_HEIGHT_PX.div_ceil(rows.max(1)).max(1) as u32;
+    let widest = MAX_WIDTH_PX / columns.max(1);
+    let zoom = MIN_HEIGHT_PX.div_ceil(rows.max(1)).min(widest).max(1) as u32;
     let (width, height) = (columns as u32 * zoom, rows as u32 * zoom);
     let range = Range::of(depth_mm);
     // Text height is 3.5 % of the picture within limits.
@@ -75,6 +78,7 @@ fn draw(unit: &str, depth_mm: ArrayView2<f32>, confidence: ArrayView2<f32>) -> R
     let step = tick_step(f64::from(far - near));
     let decimals = usize::from(step < 1.0) + usize::from(step < 0.1);
     let mut tick = (f64::from(near) / step).ceil() * step;
+    let mut last_label = u32::MAX;
     while tick <= f64::from(far) + 1e-6 * step {
         let from_top = (f64::from(far) - tick) / f64::from(far - near) * f64::from(height - 1);
         let y = MARGIN_PX + from_top.round() as u32;
@@ -82,7 +86,11 @@ fn draw(unit: &str, depth_mm: ArrayView2<f32>, confidence: ArrayView2<f32>) -> R
             canvas.put_pixel(bar_left + BAR_PX + x, y, INK);
         }
         let top = y.saturating_sub(writer.height() / 2);
-        writer.write(&mut canvas, bar_left + BAR_PX + 12, top, &format!("{tick:.decimals$} {unit}"), INK);
+        // In a low picture labels would overlap.
+        if last_label - y >= writer.height() {
+            writer.write(&mut canvas, bar_left + BAR_PX + 12, top, &format!("{tick:.decimals$} {unit}"), INK);
+            last_label = y;
+        }
         tick += step;
     }
     Ok(canvas)
@@ -182,12 +190,22 @@ mod tests {
     fn any_map_gives_a_picture() {
         for map in [
             Array2::from_elem((16, 16), f32::NAN),
-            Array2::from_elem((16, 700), 900.0),
+            Array2::from_elem((16, 200), 900.0),
             Array2::from_shape_fn((400, 300), |(y, x)| 600.0 + (x + y) as f32),
         ] {
             let png = view_png(map.view(), Array2::ones(map.dim()).view()).unwrap();
             let picture = image::load_from_memory(&png).unwrap();
             assert!(picture.height() >= MIN_HEIGHT_PX as u32 && picture.width() > map.dim().1 as u32);
+        }
+    }
+
+    #[test]
+    fn a_row_is_not_enlarged_to_a_huge_picture() {
+        for columns in [300, 4000, 6000] {
+            let map = Array2::from_shape_fn((1, columns), |(_, x)| 600.0 + x as f32);
+            let picture = draw("mm", map.view(), Array2::ones(map.dim()).view()).unwrap();
+            let width = picture.width() as usize;
+            assert!(width > columns && width < MAX_WIDTH_PX.max(columns) + 300, "{columns}: {width}");
         }
     }
 

@@ -152,18 +152,15 @@ export function shadow() {
   }
   let waiting = 0;
   for (const control of [time, inputs.latitude, inputs.longitude]) control.addEventListener("input", () => { clearTimeout(waiting); waiting = setTimeout(shown, 150); });
-  /** What this page began: the name of its folder. */
-  let begun = null;
-  const start = async () => {
+  const start = () => {
     const camera = { height_m: value(inputs.height), azimuth_deg: value(inputs.azimuth), pitch_deg: value(inputs.pitch), focal_length_mm: value(inputs.focal), pixel_um: value(inputs.pixel) };
-    begun = await act("/api/people/shadow", { video: video.name(), sun: sunlight(), camera });
+    act("/api/people/shadow", { video: video.name(), sun: sunlight(), camera });
   };
-  onJob("shadow", ({ id, phase, result: found }) => {
+  onJob("shadow", ({ phase, result: found }) => {
     if (phase !== "done") return;
-    const name = found.shadow ?? (begun?.job === id ? begun.shadow : null);
-    const mask = (folder, file) => h("img", { src: `/api/people/shadows/${name}/${folder}/${file}`, alt: `${file}, ${folder.replace("-", " ")}`, loading: "lazy" });
+    const mask = (folder, file) => h("img", { src: `/api/people/shadows/${found.shadow}/${folder}/${file}`, alt: `${file}, ${folder.replace("-", " ")}`, loading: "lazy" });
     results.replaceChildren(rows([["frames", found.frames], ["cut", found.cut], ["doubtful", found.flagged], ["removed, mean", found.removed_percent == null ? "–" : `${number(found.removed_percent, 1)} %`]]),
-      name ? h("div", { class: "masks" }, found.samples.map((file) => h("figure", {}, mask("with-shadow", file), mask("without-shadow", file), h("figcaption", { class: "dim" }, file)))) : "");
+      h("div", { class: "masks" }, found.samples.map((file) => h("figure", {}, mask("with-shadow", file), mask("without-shadow", file), h("figcaption", { class: "dim" }, file)))));
   });
   const element = h("div", { class: "guide-body" },
     h("section", { class: "panel guide-step" }, picture, h("div", { class: "guide-words" }, h("h2", {}, "1. Where and when"),

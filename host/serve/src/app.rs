@@ -102,11 +102,11 @@ impl App {
         } else if !own.exists() {
             write_file(&own, USUAL_OPTICS.as_bytes())?;
         }
-        GivenOptics::read(&own)?;
+        let of_optics = GivenOptics::read(&own)?.light;
         let live = Live {
             mode: LiveMode::Image,
             exposure: camera.exposure,
-            light: camera.light,
+            light: camera.light.or(of_optics),
             measure: FocusMeasure::ModifiedLaplacian,
             region: None,
             cancel: Cancel::default(),

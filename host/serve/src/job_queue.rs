@@ -2,6 +2,7 @@
 
 use std::{
     io,
+    panic::{AssertUnwindSafe, catch_unwind},
     sync::{
         Arc, Mutex,
         mpsc::{Receiver, RecvTimeoutError, Sender, channel},
@@ -126,6 +127,7 @@ pub fn start(app: &Arc<App>) -> io::Result<Workers> {
 fn run_rig(app: &App, jobs: &Receiver<Begun>) {
     loop {
         let seen = app.live().mode != LiveMode::Off
+            && !app.is_to_connect()
             && (app.rig().is_some() || app.has_camera_alone())
             && app.state().control.clients > 0;
         let begun = if seen && !app.is_ending() {
@@ -168,7 +170,9 @@ fn run(app: &App, begun: Begun, queue: &JobQueue, place: Place) {
     app.note(job.title.clone());
     let face = Face { app, place, counted: Mutex::default() };
     let context = Context::new(&face, &face, cancel);
-    let ended = work(app, &context);
+    let ended = catch_unwind(AssertUnwindSafe(|| work(app, &context))).unwrap_or_else(|_| {
+        Err(WorkflowError::Library("it ended with a panic, a mistake of farnear's".into()))
+    });
     // The board may report the stop before the work notices the cancellation.
     let stopped = |error: &WorkflowError| error.is_cancelled() || context.cancel.is_cancelled();
     queue.free();

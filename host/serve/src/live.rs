@@ -31,6 +31,10 @@ pub fn look(app: &App) {
     let live = app.live();
     // After `live` was read: a later stop ends this view.
     app.stops.wait();
+    // A job that begins later ends this view.
+    if app.rig_jobs.is_busy() {
+        return;
+    }
     let rig = app.rig();
     if rig.is_none() && !app.has_camera_alone() {
         return;
@@ -173,10 +177,10 @@ impl Rate {
 
 #[cfg(test)]
 mod tests {
-    use std::{path::Path, sync::Arc, time::Duration};
+    use std::{fs, path::Path, sync::Arc, time::Duration};
 
-    use farnear_protocol::Micros;
-    use farnear_workflows::rig::camera::CameraAddress;
+    use farnear_protocol::{Micros, message::LightLevels};
+    use farnear_workflows::{optics::GivenOptics, rig::camera::CameraAddress};
 
     use super::*;
     use crate::{Limits, Listen, ServeSettings, guard::Guard};
@@ -195,6 +199,19 @@ mod tests {
         let settings =
             ServeSettings { rig: None, camera, session: folder.into(), optics: None, listen, limits };
         App::new(settings, guard).expect("a session")
+    }
+
+    #[test]
+    fn the_light_of_the_optics_is_on_until_it_is_switched_off() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let optics = folder.path().join("optics.toml");
+        let text = format!("{}\n[light]\nfirst = 30\nsecond = 0\n", include_str!("optics.toml"));
+        fs::write(&optics, text).expect("a writable folder");
+        let (app, optics) = (app(folder.path()), GivenOptics::read(&optics).expect("optics"));
+        let light = || app.camera().light_with(Some(&optics)).map(LightLevels::percent);
+        assert_eq!((app.state().live.light_percent, light()), ([30.0, 0.0], Some([30.0, 0.0])));
+        app.set_live(|live| live.light = Some(LightLevels::OFF));
+        assert_eq!((app.state().live.light_percent, light()), ([0.0; 2], None));
     }
 
     #[test]

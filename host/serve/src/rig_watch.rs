@@ -61,6 +61,8 @@ fn connect(app: &App) {
         state.rig.error = None;
     });
     app.set_rig(None);
+    // A view that began meanwhile has the rig of before.
+    app.interrupt_live();
     let log = ToLog(app);
     let context = Context::new(&log, &Unattended, Cancel::default());
     let opened =

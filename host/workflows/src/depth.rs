@@ -129,6 +129,7 @@ impl Inputs {
             }
             None => (optics, doubts),
         };
+        settings.write.check(&optics)?;
         let reading = ReadSettings { grey: settings.grey, white_level: settings.white_level };
         let mut pair = Pair::read(&settings.far, &settings.near, &reading)?;
         let mut doubts = doubts;
@@ -137,6 +138,13 @@ impl Inputs {
             && slices != [width, height]
         {
             doubts.push(OpticsDoubt::AnotherSize { slices, images: [width, height] });
+        }
+        if let (Some(bin @ 2..), Some(stage)) = (settings.bin, optics.stage()) {
+            let expected = format!(
+                "the optics of calibrate stack average {0} x {0} pixels by themselves: give no bin",
+                stage.bin
+            );
+            return Err(WorkflowError::parameter("bin", bin, expected));
         }
         let bin = settings.bin_for(&optics, is_mosaic(pair.far.view()), &mut doubts);
         if bin > 1 {

@@ -384,9 +384,12 @@ fn name(path: &Path) -> String {
     path.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
-/// Evens out the brightness of a stack's images and aligns them, NaN where they do not show the scene; returns the farthest
-/// distance that a pixel was moved, px.
+/// Evens out the brightness of a stack's images and aligns them, NaN where they do not show the scene, also in borders of zeros;
+/// returns the farthest distance that a pixel was moved, px.
 pub fn prepare_stack(images: &mut [Array2<f32>], model: Option<Model>) -> Result<f64> {
+    for image in images.iter_mut() {
+        black_border::erase(image);
+    }
     let views: Vec<ArrayView2<f32>> = images.iter().map(|image| image.view()).collect();
     let positions = even_positions(views.len(), None);
     let frames::Frames { warps, gains, .. } =

@@ -32,7 +32,14 @@ pub use requests::{
 pub(crate) use unit::Entries;
 pub use unit::Unit;
 
-use crate::error::{Result, WorkflowError};
+use crate::{
+    depth::part::Part,
+    error::{Result, WorkflowError},
+};
+
+/// Why some results of such a lens are refused.
+pub(crate) const NO_SCALE: &str = "the lens was calibrated without the size of a pixel at the target: lateral positions \
+     are not known in mm; calibrate the stack with --object-pixel-um";
 
 /// A depth map with standard deviation (if computed) and lateral positions.
 #[derive(Clone, Debug)]
@@ -113,11 +120,26 @@ impl Measured {
     }
 }
 
-/// Object points of a depth map, (height, width, 3) in mm as in the mesh: right, up, towards the viewer.
-pub fn points_mm(depth_mm: ArrayView2<f32>, optics: &Optics) -> Array3<f32> {
+/// Lateral positions in a map in mm; unknown for a lens that was calibrated without the size of a pixel at the target.
+pub fn lateral(optics: &Optics, part: Option<Part>) -> Lateral {
+    projection(optics, part).map_or(Lateral::Unknown, Lateral::Lens)
+}
+
+/// `None` where [`lateral()`] is unknown.
+pub(crate) fn projection(optics: &Optics, part: Option<Part>) -> Option<Projection> {
+    optics.stage().is_none_or(|stage| stage.scale_known).then(|| Projection {
+        focal_length_mm: optics.focal_length_mm(),
+        pixel_um: optics.pixel_um(),
+        axis_px: part.map(|part| part.axis_px()),
+    })
+}
+
+/// Object points of a depth map, (height, width, 3) in mm as in the mesh: right, up, towards the viewer. Fails where
+/// [`lateral()`] is unknown.
+pub fn points_mm(depth_mm: ArrayView2<f32>, optics: &Optics) -> Result<Array3<f32>> {
     let dim = depth_mm.dim();
-    let projection =
-        Projection { focal_length_mm: optics.focal_length_mm(), pixel_um: optics.pixel_um(), axis_px: None };
+    let projection = projection(optics, None)
+        .ok_or_else(|| WorkflowError::parameter("optics", "scale_known = false", NO_SCALE))?;
     let mut points = Array3::zeros((dim.0, dim.1, 3));
     for ((row, column), &z) in depth_mm.indexed_iter() {
         let [x, y] = projection.beside_axis_mm(dim, column, row, f64::from(z));
@@ -125,7 +147,7 @@ pub fn points_mm(depth_mm: ArrayView2<f32>, optics: &Optics) -> Array3<f32> {
             *place = if z.is_finite() { value } else { f32::NAN };
         }
     }
-    points
+    Ok(points)
 }
 
 impl Rectangle {
@@ -141,5 +163,27 @@ impl Rectangle {
         let Rectangle { x, y, width: columns, height: rows } = at;
         let value = format!("{columns}x{rows} at ({x}, {y})");
         Err(WorkflowError::parameter("region", value, format!("expected a part of {width}x{height} pixels")))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use farnear_depth::optics::Stage;
+
+    use super::*;
+
+    #[test]
+    fn points_need_the_size_of_a_pixel() {
+        let optics: Optics = toml::from_str(
+            "[lens]\nfocal_length_mm = 50.0\naperture_mm = 12.8\n[sensor]\npixel_um = 7.4\n\
+             [focus]\nfar_mm = 933.0\nmax_blur_px = 2.703\n",
+        )
+        .unwrap();
+        let depth = Array2::from_elem((3, 4), 900.0);
+        let with = |scale_known| optics.with_stage(Stage { scale_known, ..Stage::identity(1, 1) });
+        assert!(points_mm(depth.view(), &optics).is_ok() && points_mm(depth.view(), &with(true)).is_ok());
+        let error = points_mm(depth.view(), &with(false)).unwrap_err();
+        assert!(error.is_usage() && error.to_string().contains("--object-pixel-um"), "{error}");
+        assert_eq!(lateral(&with(false), None), Lateral::Unknown);
     }
 }

@@ -64,6 +64,11 @@ impl Positioning {
         (since(waiting_since, now) > self.patience).then_some(Err(Failure::NotSettled { error }))
     }
 
+    /// Waits from `now` for the axis to settle, as after an exposure, in which it was not watched.
+    pub(crate) const fn wait_from(&mut self, now: BoardMicros) {
+        self.waiting_since = Some(now);
+    }
+
     /// Target minus measured.
     pub(crate) fn error(&self, stage: &Stage) -> Nanometres {
         Nanometres(self.target.0.saturating_sub(stage.measured(self.axis).0))

@@ -208,6 +208,27 @@ fn a_failed_program_is_reported_and_the_next_run_works() {
     assert!(error.0.abs() > 100_000, "{error:?}: it stood at the other end");
 }
 
+/// A missed conversion of the gauge. The board waits 300 ms for an axis to settle.
+#[test]
+fn an_axis_may_settle_again_after_a_long_exposure() {
+    let mut bench = Bench::homed();
+    load(&mut bench, &[Shot { repeat: 2, exposure: Micros(500_000), ..shot(FAR) }]);
+    bench.accepted(&Request::ArmProgram { shots: 1 });
+    bench.events.clear();
+    let id = bench.accepted(&RUN);
+    let is_done = |bench: &Bench| {
+        bench.events.iter().any(|(_, event)| matches!(event.kind, EventKind::ShotDone { .. }))
+    };
+    while !is_done(&bench) {
+        bench.tick();
+    }
+    bench.hardware.faults.gauge = Some(None);
+    bench.tick();
+    bench.hardware.faults.gauge = None;
+    let end = bench.end_of(id);
+    assert!(matches!(end, EventKind::ProgramDone { exposures: 2, .. }), "{end:?}");
+}
+
 #[test]
 fn a_pushed_stage_ends_a_program_of_the_other_axis() {
     let mut bench = Bench::homed();

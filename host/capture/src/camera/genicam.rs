@@ -20,9 +20,7 @@ use farnear_protocol::{
 };
 
 use super::{
-    Camera, CameraError, Control, Frame, Image, Range, Setting, Stamp,
-    pairing::{Belongs, Pairing},
-    pixels::Layout,
+    Camera, CameraError, Control, Frame, Image, Range, Setting, Stamp, pairing::Pairing, pixels::Layout,
 };
 use crate::describe::trigger_name;
 
@@ -165,6 +163,11 @@ impl GenicamCamera {
             self.camera.stop_acquisition().map_err(self.failed())?;
         }
         Ok(())
+    }
+
+    /// The frame that came too early, or the next one; `None` at the timeout.
+    fn next(&mut self, wait: Duration) -> Result<Option<Frame>, CameraError> {
+        self.pairing.early().map_or_else(|| self.take(wait), |frame| Ok(Some(frame)))
     }
 
     fn start(&mut self) -> Result<(), CameraError> {
@@ -314,18 +317,12 @@ impl Camera for GenicamCamera {
     }
 
     fn image(&mut self, shot: &ShotRecord, wait: Duration) -> Result<Image, CameraError> {
-        let wanted = shot.trigger_number;
-        while let Some(frame) = self.take(wait)? {
-            match self.pairing.judge(&self.id, frame.stamp, shot)? {
-                Belongs::Here => return Ok(frame.image),
-                Belongs::Earlier => {}
-                Belongs::Later(by) => {
-                    let by = u32::try_from(by).unwrap_or(u32::MAX);
-                    return Err(CameraError::Skipped { wanted, came: wanted.wrapping_add(by) });
-                }
+        while let Some(frame) = self.next(wait)? {
+            if let Some(image) = self.pairing.image(&self.id, frame, shot)? {
+                return Ok(image);
             }
         }
-        Err(CameraError::Late { camera: self.id.clone(), trigger_number: wanted, waited: wait })
+        Err(CameraError::Late { camera: self.id.clone(), trigger_number: shot.trigger_number, waited: wait })
     }
 
     fn reported(&mut self, shot: &ShotRecord, received: Instant) {
@@ -337,7 +334,7 @@ impl Camera for GenicamCamera {
     }
 
     fn finish(&mut self, wait: Duration) -> Result<(), CameraError> {
-        match self.take(wait)? {
+        match self.next(wait)? {
             Some(_) => Err(CameraError::Surplus { camera: self.id.clone() }),
             None => Ok(()),
         }

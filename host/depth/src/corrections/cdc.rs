@@ -87,7 +87,7 @@ impl Learned for Cdc {
             let smoothed = smooth::on_grid(pattern.depth_mm, settings.smoothing_px, grid_px);
             if let Some(((row, column), _)) = smoothed.indexed_iter().find(|(_, v)| !v.is_finite()) {
                 let (row, column) = ((row * grid_px).min(height - 1), (column * grid_px).min(width - 1));
-                let true_mm = pattern.true_mm;
+                let (index, true_mm) = (series.given(index), pattern.true_mm);
                 return Err(CorrectionError::PatternHole { index, true_mm, column, row });
             }
             distortion_um.extend(smoothed.iter().map(|v| ((v - pattern.true_mm) * 1e3).round() as i32));
@@ -137,5 +137,25 @@ impl Learned for Cdc {
             grid_px: self.grid_px,
         };
         scan::correct(depth_mm, &patterns, self.window, scale);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use ndarray::Array2;
+
+    use super::*;
+    use crate::corrections::{Method, Pattern, fit};
+
+    #[test]
+    fn a_pattern_with_a_hole_is_named_by_its_place_in_the_list() {
+        let depths = [900.0, 905.0, 910.0, 915.0];
+        let mut maps = depths.map(|depth| Array2::from_elem((24, 24), depth as f32));
+        maps[1].fill(f32::NAN);
+        let patterns: Vec<Pattern<'_>> =
+            maps.iter().zip(depths).map(|(map, true_mm)| Pattern { depth_mm: map.view(), true_mm }).collect();
+        let error = fit(Method::Cdc, &patterns, &CdcSettings::default()).unwrap_err();
+        assert!(matches!(error, CorrectionError::PatternHole { index: 1, .. }), "{error}");
+        assert!(error.to_string().starts_with("pattern 2 (905 mm)"), "{error}");
     }
 }

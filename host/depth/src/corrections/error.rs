@@ -2,7 +2,7 @@
 
 use super::{FORMAT, Method};
 
-/// Why a correction cannot be learned, loaded or applied.
+/// Why a correction cannot be learned, loaded or applied. An `index` is of the given patterns from 0; messages count from 1.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[allow(missing_docs, reason = "the messages name the fields")]
 pub enum CorrectionError {
@@ -12,10 +12,10 @@ pub enum CorrectionError {
     TooFewPatterns { method: Method, given: usize, needed: usize },
     #[error("two patterns at {0} mm: each needs another depth")]
     RepeatedDepth(f64),
-    #[error("the true depth {true_mm} mm of pattern {index} is not a positive, finite number")]
+    #[error("the true depth {true_mm} mm of pattern {} is not a positive, finite number", .index + 1)]
     TrueDepth { index: usize, true_mm: f64 },
     #[error(
-        "pattern {index} is {found_width}x{found_height}, the first {width}x{height}: patterns must have one size"
+        "pattern {} is {found_width}x{found_height}, the first {width}x{height}: patterns must have one size", .index + 1
     )]
     PatternSize { index: usize, width: usize, height: usize, found_width: usize, found_height: usize },
     #[error("maps of {width}x{height} px: at least {least}x{least} are needed")]
@@ -24,7 +24,7 @@ pub enum CorrectionError {
         "{what}: {samples} valid samples do not determine {terms} terms; take targets whose depth maps have fewer holes"
     )]
     Underdetermined { what: String, samples: usize, terms: usize },
-    #[error("pattern {index} ({true_mm} mm) has no value within reach of column {column}, row {row}")]
+    #[error("pattern {} ({true_mm} mm) has no value within reach of column {column}, row {row}", .index + 1)]
     PatternHole { index: usize, true_mm: f64, column: usize, row: usize },
     #[error("{name} = {value}: must lie between {least} and {most}")]
     Setting { name: &'static str, value: f64, least: f64, most: f64 },
@@ -46,4 +46,23 @@ pub enum CorrectionError {
     NotOnBoard(Method),
     #[error("not for the board: {0}")]
     Board(#[from] farnear_maths::clsf::Error),
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn messages_count_patterns_from_one() {
+        let size = CorrectionError::PatternSize {
+            index: 1,
+            width: 24,
+            height: 12,
+            found_width: 20,
+            found_height: 10,
+        };
+        assert!(size.to_string().starts_with("pattern 2 is 20x10, the first 24x12"), "{size}");
+        let depth = CorrectionError::TrueDepth { index: 0, true_mm: -1.0 };
+        assert!(depth.to_string().contains("of pattern 1 is"), "{depth}");
+    }
 }

@@ -18,37 +18,46 @@ pub struct Pattern<'a> {
 }
 
 pub(super) struct Series<'a> {
+    /// From far to near.
     patterns: Vec<Pattern<'a>>,
+    /// Index of each among the given ones.
+    order: Vec<usize>,
     scale: DepthScale,
 }
 
 impl<'a> Series<'a> {
     pub(super) fn new(method: Method, patterns: &[Pattern<'a>]) -> Result<Self, CorrectionError> {
-        let mut sorted = patterns.to_vec();
-        for (index, pattern) in sorted.iter().enumerate() {
+        for (index, pattern) in patterns.iter().enumerate() {
             if !(pattern.true_mm.is_finite() && pattern.true_mm > 0.0) {
                 return Err(CorrectionError::TrueDepth { index, true_mm: pattern.true_mm });
             }
-            let (height, width) = sorted[0].depth_mm.dim();
+            let (height, width) = patterns[0].depth_mm.dim();
             let (found_height, found_width) = pattern.depth_mm.dim();
             if (found_height, found_width) != (height, width) {
                 return Err(CorrectionError::PatternSize { index, width, height, found_width, found_height });
             }
         }
-        let (given, needed) = (sorted.len(), method.patterns_needed());
+        let (given, needed) = (patterns.len(), method.patterns_needed());
         if given < needed {
             return Err(CorrectionError::TooFewPatterns { method, given, needed });
         }
-        let (height, width) = sorted[0].depth_mm.dim();
+        let (height, width) = patterns[0].depth_mm.dim();
         if height < SMALLEST_PX || width < SMALLEST_PX {
             return Err(CorrectionError::TooSmall { width, height, least: SMALLEST_PX });
         }
-        sorted.sort_by(|a, b| b.true_mm.total_cmp(&a.true_mm));
+        let mut order: Vec<usize> = (0..given).collect();
+        order.sort_by(|a, b| patterns[*b].true_mm.total_cmp(&patterns[*a].true_mm));
+        let sorted: Vec<Pattern<'a>> = order.iter().map(|index| patterns[*index]).collect();
         if let Some(pair) = sorted.windows(2).find(|pair| pair[0].true_mm == pair[1].true_mm) {
             return Err(CorrectionError::RepeatedDepth(pair[0].true_mm));
         }
         let scale = scale(sorted[0].true_mm, sorted[given - 1].true_mm)?;
-        Ok(Self { patterns: sorted, scale })
+        Ok(Self { patterns: sorted, order, scale })
+    }
+
+    /// The index among the given patterns of one of [`Self::patterns`].
+    pub(super) fn given(&self, index: usize) -> usize {
+        self.order[index]
     }
 
     pub(super) fn patterns(&self) -> &[Pattern<'a>] {

@@ -52,6 +52,13 @@ impl DistortionSection {
 }
 
 impl Distortion {
+    /// The same lens for images with `bin` x `bin` pixels averaged into one; the first pixel's centre is at 0.
+    pub(super) fn binned(self, bin: f64) -> Self {
+        let focal_px = self.focal_px.map(|focal| focal / bin);
+        let centre_px = self.centre_px.map(|centre| (centre + 0.5) / bin - 0.5);
+        Self { focal_px, centre_px, ..self }
+    }
+
     /// Sensor position of the pinhole's pixel `[u, v]`.
     pub fn distorted(&self, [u, v]: [f64; 2]) -> [f64; 2] {
         let [[fx, fy], [cx, cy]] = [self.focal_px, self.centre_px];

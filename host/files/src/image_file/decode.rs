@@ -214,12 +214,8 @@ impl Decoded {
         }
     }
 
-    pub(crate) fn has_alpha(&self) -> bool {
+    fn has_alpha(&self) -> bool {
         self.channels > self.colours
-    }
-
-    pub(crate) fn has_16_bits(&self) -> bool {
-        matches!(self.values, Values::U16(_))
     }
 
     /// Opacity as grey; an image without one remains.
@@ -236,12 +232,10 @@ impl Decoded {
         Self { values, channels: 1, colours: 1, ..self }
     }
 
-    /// Bits of the largest of 16-bit samples: 16 may hold 12, or a mask of 0 and 1.
-    pub(crate) fn used_bits(&self) -> u32 {
-        match &self.values {
-            Values::U16(values) => 16 - values.iter().fold(0, |used, value| used | value).leading_zeros(),
-            _ => 8,
-        }
+    /// Bits of the largest of 16-bit samples: 16 may hold 12, or a mask of 0 and 1. `None` for other samples.
+    pub(crate) fn used_bits(&self) -> Option<u32> {
+        let Values::U16(values) = &self.values else { return None };
+        Some(16 - values.iter().fold(0, |used, value| used | value).leading_zeros())
     }
 
     /// White is the largest code of this many bits of 16.

@@ -53,16 +53,15 @@ pub(super) fn open(
 
 /// How pictures of a folder are read, by some throughout it. Those that cannot be read fail later.
 pub fn reading_of(paths: &[PathBuf]) -> Reading {
-    let mut all = Reading { bits: 0, opacity: false };
+    let mut bits: Option<u32> = None;
+    let mut opacity = false;
     for path in paths.iter().step_by(paths.len().div_ceil(SURVEYED).max(1)) {
-        let Ok((of_one, may_differ)) = image_file::reading_of(path) else { continue };
-        all.bits = all.bits.max(of_one.bits);
-        all.opacity |= of_one.opacity;
-        if !may_differ {
-            break;
-        }
+        let Ok((of_one, is_opacity)) = image_file::reading_of(path) else { continue };
+        // A picture of 8 bits does not tell how others are read.
+        bits = bits.max(of_one);
+        opacity |= is_opacity;
     }
-    all
+    Reading { bits: bits.unwrap_or(Reading::default().bits), opacity }
 }
 
 /// Samples of a picture: grey or RGB.

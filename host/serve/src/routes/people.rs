@@ -254,7 +254,12 @@ async fn shadow(
         time: request.sun.time,
         out,
     };
-    let work = move |_: &App, context: &Context<'_>| figures(video::remove_from_video(&settings, context)?);
+    let masks = name.clone();
+    let work = move |_: &App, context: &Context<'_>| {
+        let mut found = figures(video::remove_from_video(&settings, context)?)?;
+        found["shadow"] = masks.into();
+        Ok(found)
+    };
     let title = format!("Shadow of {}", request.video);
     let task = Task { kind: "shadow", title, work: Box::new(work) };
     let job = app.begin_computing(task).map_err(|title| Failure::busy(&title))?;

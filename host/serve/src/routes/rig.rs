@@ -314,7 +314,7 @@ async fn live(
     let measure = request.measure.as_deref().map(measure).transpose()?;
     app.set_live(|live| {
         if let Some(levels) = light {
-            live.light = Some(levels).filter(|levels| levels.is_on());
+            live.light = Some(levels);
         }
         live.mode = request.mode.unwrap_or(live.mode);
         live.exposure = request.exposure_us.map_or(live.exposure, Micros);

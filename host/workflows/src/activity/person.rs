@@ -95,15 +95,13 @@ impl<'m> Person<'m> {
     fn stretches(&self, passage: Range<usize>) -> Result<(Vec<Part>, Vec<Part>)> {
         let numbers = &self.numbers[passage.clone()];
         let views: Vec<&[Track]> = self.tracks.iter().map(|view| &view[passage.clone()]).collect();
-        let whole: Vec<Track> = views.iter().map(|view| joined(view.iter())).collect();
-        // Frames without a silhouette are not in the tracks.
-        let numbers: Vec<usize> = views
-            .iter()
-            .find(|view| view.iter().any(|track| track.frames() > 0))
-            .into_iter()
-            .flat_map(|view| numbers.iter().zip(*view).filter(|(_, track)| track.frames() > 0))
-            .map(|(number, _)| *number)
-            .collect();
+        let kept = aligned(&views, self.model.views > 1);
+        let Some(frames) = kept.first().map(|(_, frames)| frames) else {
+            return Ok((Vec::new(), Vec::new()));
+        };
+        let numbers: Vec<usize> = frames.iter().map(|frame| numbers[*frame]).collect();
+        let whole: Vec<Track> =
+            kept.iter().map(|(view, frames)| joined(frames.iter().map(|frame| &view[*frame]))).collect();
         let part = |from: usize, to: usize, activity: Option<String>, confidence: f32| {
             let last = numbers.len().saturating_sub(1);
             let number = |frame: usize| numbers.get(frame.min(last)).copied().unwrap_or(1);
@@ -130,6 +128,24 @@ impl<'m> Person<'m> {
     }
 }
 
+/// The views that see the person in a passage, and the frames in which all of these do. A model of several views needs each; of
+/// others, views that see less than half as much as the best are left out.
+fn aligned<'t>(views: &[&'t [Track]], all_needed: bool) -> Vec<(&'t [Track], Vec<usize>)> {
+    let is_seen = |view: &[Track], frame: usize| view[frame].frames() > 0;
+    let seen = |view: &[Track]| (0..view.len()).filter(|frame| is_seen(view, *frame)).count();
+    let most = views.iter().map(|view| seen(view)).max().unwrap_or(0);
+    let counts = |view: &&[Track]| all_needed || 2 * seen(view) >= most.max(1);
+    let views: Vec<&[Track]> = views.iter().copied().filter(counts).collect();
+    let length = views.iter().map(|view| view.len()).min().unwrap_or(0);
+    let frames: Vec<usize> =
+        (0..length).filter(|frame| views.iter().all(|view| is_seen(view, *frame))).collect();
+    if frames.is_empty() {
+        Vec::new()
+    } else {
+        views.into_iter().map(|view| (view, frames.clone())).collect()
+    }
+}
+
 /// Splits the frames `seen` where more than [`GAP_FRAMES`] of the recording lie between two.
 fn passages(seen: &[usize], numbers: &[usize]) -> Vec<Range<usize>> {
     let near = |a: &usize, b: &usize| numbers[*b] - numbers[*a] <= GAP_FRAMES + 1;
@@ -138,7 +154,31 @@ fn passages(seen: &[usize], numbers: &[usize]) -> Vec<Range<usize>> {
 
 #[cfg(test)]
 mod tests {
+    use farnear_recognition::embedding::descriptor::Scaling;
+    use farnear_silhouettes::mask::centre::SIDE_PX;
+    use ndarray::Array2;
+
     use super::*;
+
+    #[test]
+    fn views_are_compared_in_frames_that_all_of_them_see() {
+        let frame = |is_seen: bool| {
+            let mask = Array2::from_elem((SIDE_PX, SIDE_PX), is_seen);
+            Track::from_masks(&[mask], Scaling::default(), false)
+        };
+        let view =
+            |seen: std::ops::Range<usize>| (0..10).map(|at| frame(seen.contains(&at))).collect::<Vec<_>>();
+        let [whole, late, little, none] = [view(0..10), view(3..10), view(0..2), view(0..0)];
+        let frames = |views: &[&[Track]], all_needed| {
+            let kept = aligned(views, all_needed);
+            (kept.len(), kept.first().map(|(_, frames)| frames.clone()).unwrap_or_default())
+        };
+        assert_eq!(frames(&[&whole, &late], true), (2, (3..10).collect()));
+        assert_eq!(frames(&[&whole, &late, &little, &none], false), (2, (3..10).collect()));
+        assert_eq!(frames(&[&whole, &little], true), (2, vec![0, 1]));
+        assert_eq!(frames(&[&whole, &none], true), (0, vec![]));
+        assert_eq!(frames(&[&none], false), (0, vec![]));
+    }
 
     #[test]
     fn a_recording_is_split_at_long_gaps_without_a_person() {

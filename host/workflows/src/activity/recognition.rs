@@ -214,15 +214,25 @@ impl<'m> Recognition<'m> {
         }
     }
 
-    /// The first view's next frame and the answer up to it; `None` at the end of the first view.
+    /// The first view's next frame and the answer up to it; `None` at the end of the shortest view.
     pub(super) fn next(&mut self, context: &Context<'_>) -> Result<Option<(Seen, FrameAnswer)>> {
         context.cancel.check("recognising")?;
         if self.frames == 0 {
             self.remarks.iter().for_each(|remark| context.progress.warn(remark));
         }
         let start = Instant::now();
-        let moment: Option<Vec<Seen>> =
-            self.views.iter_mut().map(Frames::next).collect::<Result<Option<Vec<Seen>>>>()?;
+        let moment: Vec<Option<Seen>> = self.views.iter_mut().map(Frames::next).collect::<Result<_>>()?;
+        if let Some(ended) = moment.iter().position(Option::is_none)
+            && moment.iter().any(Option::is_some)
+        {
+            let remark = format!(
+                "view {} ends after {} frames and others do not: the rest of them is left out",
+                ended + 1,
+                self.frames
+            );
+            context.warn([remark], &mut self.remarks);
+        }
+        let moment: Option<Vec<Seen>> = moment.into_iter().collect();
         context.warn(self.views.iter_mut().flat_map(Frames::take_remarks), &mut self.remarks);
         self.seconds += start.elapsed().as_secs_f64();
         moment.map_or(Ok(None), |moment| self.take(moment))

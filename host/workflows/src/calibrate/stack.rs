@@ -345,7 +345,7 @@ fn read(
         slices.push(image.pixels);
         Ok(())
     })?;
-    if let Some(white) = white.get() {
+    if let Some(white) = white.get(request.white_level.is_some()) {
         slices.iter_mut().for_each(|slice| slice.mapv_inplace(|value| (value / white).min(1.0)));
         coding /= f64::from(white).powi(2);
     }

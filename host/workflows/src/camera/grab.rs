@@ -23,6 +23,8 @@ use crate::{
 
 pub const GRAB_FILE: &str = "grab.toml";
 const SLICE: Duration = Duration::from_millis(200);
+/// Longest wait, s: a longer one may be beyond the end of the clock.
+const A_DAY_S: u64 = 86_400;
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default, Serialize, Deserialize, JsonSchema)]
 #[cfg_attr(feature = "clap", derive(clap::ValueEnum))]
@@ -132,7 +134,7 @@ struct FrameRecord {
 /// Captures images. The folder appears when it is complete.
 pub fn grab(request: &GrabRequest, context: &Context<'_>) -> Result<GrabFigures> {
     request.check()?;
-    let wait = Duration::from_secs(request.image_wait_s);
+    let wait = Duration::from_secs(request.image_wait_s.min(A_DAY_S));
     let staged = Staging::new_folder(&request.out)?;
     let mut camera = request.camera.open()?;
     let mut record = GrabRecord {

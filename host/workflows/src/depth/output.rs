@@ -9,22 +9,23 @@ use std::{
     str::FromStr,
 };
 
+use farnear_depth::optics::Optics;
 use farnear_files::{
     exr, glb,
     image_file::{png_to, png8_to},
     map::{self, Scale},
-    mesh::{self, Lateral, Projection},
-    npy, view,
+    mesh, npy, view,
 };
 use ndarray::ArrayView2;
 use rayon::prelude::*;
 
-use super::{Computed, DepthRequest, Inputs, record::record};
+use super::{Computed, DepthRequest, Inputs, part::Part, record::record};
 use crate::{
     MADE_BY,
     context::Context,
-    error::Result,
+    error::{Result, WorkflowError},
     inputs::hashed,
+    measure::{NO_SCALE, lateral, projection},
     request::Request,
     result_folder::{self, DEPTH_RECORD},
 };
@@ -90,6 +91,14 @@ impl Outputs {
 
     pub(super) fn show_image(&self) -> bool {
         [MESH, GLB].iter().any(|name| self.0.contains(name))
+    }
+
+    /// Fails where the optics do not suffice: positions in glTF are in metres.
+    pub(super) fn check(&self, optics: &Optics) -> Result<()> {
+        if self.0.contains(GLB) && projection(optics, None).is_none() {
+            return Err(WorkflowError::parameter("write", GLB, NO_SCALE));
+        }
+        Ok(())
     }
 
     fn outputs(&self) -> impl Iterator<Item = &'static Output> {
@@ -189,23 +198,19 @@ impl<'a> Results<'a> {
         to.write_all(&view::view_png(self.depth(), self.confidence()).map_err(io::Error::other)?)
     }
 
-    fn projection(&self) -> Projection {
-        let optics = &self.inputs.optics;
-        Projection {
-            focal_length_mm: optics.focal_length_mm(),
-            pixel_um: optics.pixel_um(),
-            axis_px: self.inputs.cut.map(|cut| cut.part().axis_px()),
-        }
+    fn part(&self) -> Option<Part> {
+        self.inputs.cut.map(|cut| cut.part())
     }
 
     fn mesh(&self, to: &mut Sink) -> io::Result<()> {
-        let scale_known = self.inputs.optics.stage().is_none_or(|stage| stage.scale_known);
-        let lateral = if scale_known { Lateral::Lens(self.projection()) } else { Lateral::Unknown };
+        let lateral = lateral(&self.inputs.optics, self.part());
         mesh::write(self.depth(), self.computed.image.view(), lateral, "mm", to)
     }
 
     fn glb(&self, to: &mut Sink) -> io::Result<()> {
-        glb::write(self.depth(), self.computed.image.view(), self.projection(), to)
+        let projection =
+            projection(&self.inputs.optics, self.part()).ok_or_else(|| io::Error::other(NO_SCALE))?;
+        glb::write(self.depth(), self.computed.image.view(), projection, to)
     }
 
     /// Depth channel `Z` as used by compositors, here in mm; its origin is in the header.

@@ -116,3 +116,17 @@ fn a_raw_mosaic_of_colours_is_averaged_to_grey() {
     let figures = compute(&kept, &Context::unattended()).unwrap();
     assert!(figures.warnings.iter().any(|warning| warning.contains("raw mosaic")), "{:?}", figures.warnings);
 }
+
+#[test]
+fn a_lens_without_the_size_of_a_pixel_gives_no_glb() {
+    let folder = tempfile::tempdir().unwrap();
+    let settings = settings(folder.path());
+    let optics: Optics = toml::from_str(OPTICS).unwrap();
+    let optics = optics.with_stage(farnear_depth::optics::Stage::identity(1, 1));
+    fs::write(folder.path().join("optics.toml"), toml::to_string(&optics).unwrap()).unwrap();
+    let before = names(folder.path());
+    let settings = DepthRequest { write: "mesh,glb".parse().unwrap(), ..settings };
+    let error = compute(&settings, &Context::unattended()).unwrap_err();
+    assert!(error.is_usage() && error.to_string().contains("glb"), "{error}");
+    assert_eq!(names(folder.path()), before);
+}

@@ -131,7 +131,7 @@ impl<'a> Images<'a> {
                 "{black} images have a border of zeros, which counts as not seen: the map has holes there"
             ));
         }
-        read.white_level = white.get().unwrap_or(1.0);
+        read.white_level = white.get(request.white_level.is_some()).unwrap_or(1.0);
         Ok(read)
     }
 
@@ -224,7 +224,8 @@ impl Slices for Images<'_> {
     fn rows(&self, index: usize, rows: Range<usize>) -> Result<CowArray<'_, f32, Ix2>> {
         let mut image = self.stored(index, rows)?;
         if self.white_level != 1.0 {
-            image.mapv_inplace(|value| (value / self.white_level).min(1.0));
+            // `min` would make pixels without a value white.
+            image.mapv_inplace(|value| if value > self.white_level { 1.0 } else { value / self.white_level });
         }
         if self.gains[index] != 1.0 {
             image /= self.gains[index];

@@ -9,12 +9,12 @@ use farnear_depth::optics::Optics;
 use farnear_files::{
     image_file,
     map::{self, NoData, Scale},
-    mesh::{Lateral, Projection},
+    mesh::Lateral,
 };
 use ndarray::Array2;
 use serde::Deserialize;
 
-use super::{Measured, Unit};
+use super::{Measured, Unit, lateral};
 use crate::{
     depth::part::Part,
     error::{Result, WorkflowError},
@@ -97,30 +97,19 @@ pub(super) fn read(path: &Path) -> Result<Measured> {
     let depth = map.depth(unit, &mut remarks);
     let deviation = deviation_of(&file, &folder, depth.dim())?;
     let lateral = match &record {
-        Some(Record::Depth(record)) => lens(&record.optics, record.part),
+        Some(Record::Depth(record)) => lateral(&record.optics, record.part),
         Some(Record::Stack(record)) => match (record.unit, &record.optics, record.object_pixel_um) {
-            (Unit::Mm, Some(optics), _) => lens(optics, None),
+            (Unit::Mm, Some(optics), _) => lateral(optics, None),
             (Unit::Um, _, Some(side)) => Lateral::Pixel(side),
             _ => Lateral::Unknown,
         },
         None => match optics::of_pair(None, &folder.join("far.png")) {
-            Ok((optics, _)) => lens(&optics, None),
+            Ok((optics, _)) => lateral(&optics, None),
             Err(WorkflowError::NoOptics { .. }) => Lateral::Unknown,
             Err(error) => return Err(error),
         },
     };
     Ok(Measured { depth, deviation, unit, lateral, remarks })
-}
-
-fn lens(optics: &Optics, part: Option<Part>) -> Lateral {
-    if optics.stage().is_some_and(|stage| !stage.scale_known) {
-        return Lateral::Unknown;
-    }
-    Lateral::Lens(Projection {
-        focal_length_mm: optics.focal_length_mm(),
-        pixel_um: optics.pixel_um(),
-        axis_px: part.map(|part| part.axis_px()),
-    })
 }
 
 /// In a folder the first of depth.npy, depth.tiff and depth.png.

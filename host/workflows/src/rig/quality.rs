@@ -29,6 +29,8 @@ use crate::{
 const PAIRS: std::ops::RangeInclusive<usize> = 2..=50;
 /// Measured part of the image along each side: the border has less light and more distortion.
 const MIDDLE: f64 = 0.8;
+/// Distance from the plane, relative to the noise, from which a warning is given.
+const BENT: f64 = 5.0;
 
 /// Measure fill rate, plane fit, noise and accuracy of depth on a flat target, and append them to a record.
 ///
@@ -120,6 +122,19 @@ pub struct QualityFigures {
     pub accuracy_mm: Option<f64>,
 }
 
+impl QualityFigures {
+    fn warning(&self) -> Option<String> {
+        let Self { plane_rms_mm, tilt_deg, .. } = self;
+        let noise_mm = self.temporal_noise_mm.max(self.predicted_noise_mm);
+        (*plane_rms_mm > BENT * noise_mm).then(|| {
+            format!(
+                "the map is {plane_rms_mm} mm (RMS) from a plane tilted by {tilt_deg} degrees, with a noise of {noise_mm} mm: the target \
+                 is not flat, or the optics are not those of this lens"
+            )
+        })
+    }
+}
+
 #[derive(Clone, PartialEq, Debug, Default, Serialize, Deserialize)]
 pub struct QualityRecord {
     #[serde(default, rename = "measurement")]
@@ -169,6 +184,9 @@ pub fn measure(request: &QualityRequest, context: &Context<'_>) -> Result<Qualit
     };
     let found = figures(&maps, predicted.as_ref(), projection, request.true_mm)?;
     let found = QualityFigures { time: (!emulated).then(clock::now_rfc3339).flatten(), ..found };
+    if let Some(warning) = found.warning() {
+        context.progress.warn(&warning);
+    }
     record.measurements.push(found.clone());
     write_file(&request.record, toml::to_string(&record)?.as_bytes())?;
     Ok(found)
@@ -256,6 +274,19 @@ mod tests {
     fn maps(noise: f32) -> Vec<Array2<f32>> {
         let sign = |index: usize| if index.is_multiple_of(2) { 1.0 } else { -1.0 };
         (0..4).map(|index| Array2::from_shape_fn((50, 60), |_| 900.0 + noise * sign(index))).collect()
+    }
+
+    #[test]
+    fn a_target_that_is_not_flat_is_reported() {
+        let stair = |map: &mut Array2<f32>| map.slice_mut(s![.., 30..]).mapv_inplace(|z| z + 10.0);
+        for is_flat in [true, false] {
+            let mut maps = maps(0.2);
+            if !is_flat {
+                maps.iter_mut().for_each(stair);
+            }
+            let found = figures(&maps, None, PROJECTION, None).unwrap();
+            assert_eq!(found.warning().is_none(), is_flat, "{found:?}");
+        }
     }
 
     #[test]

@@ -53,7 +53,8 @@ pub fn capture(settings: &SeriesSettings, context: &Context<'_>) -> Result<Serie
     let mut due = Instant::now();
     for out in &settings.out {
         wait(due, context)?;
-        due += settings.interval;
+        // A late pair delays the next one: they are at least an interval apart.
+        due = if due.elapsed() > LOOK { Instant::now() } else { due } + settings.interval;
         let folder = begin_folder(out)?;
         let (pair, record) = take(&mut rig, &optics, &settings.camera, context)?;
         finish_folder(folder, &pair, &record)?;

@@ -103,6 +103,32 @@ struct Entry {
     true_mm: f64,
 }
 
+fn name(true_mm: f64) -> String {
+    format!("target-{true_mm:.3}")
+}
+
+impl List {
+    fn has(&self, true_mm: f64) -> bool {
+        self.pattern.iter().any(|entry| (entry.true_mm - true_mm).abs() < 1e-6)
+    }
+
+    fn add(&mut self, out: &Path, true_mm: f64) -> Result<()> {
+        self.pattern.push(Entry { depth: Path::new(&name(true_mm)).join("depth.npy"), true_mm });
+        self.pattern.sort_by(|a, b| a.true_mm.total_cmp(&b.true_mm));
+        Ok(staging::write_file(&out.join(LIST), toml::to_string(self)?.as_bytes())?)
+    }
+
+    /// Adds targets that were captured when a run ended before it listed them.
+    fn add_complete(&mut self, out: &Path, distances_mm: &[f64]) -> Result<()> {
+        for true_mm in distances_mm.iter().copied() {
+            if !self.has(true_mm) && out.join(name(true_mm)).is_dir() {
+                self.add(out, true_mm)?;
+            }
+        }
+        Ok(())
+    }
+}
+
 /// Computes and lists the depth maps. The same folder resumes an interrupted series. A real rig stays
 /// connected; an emulated one restarts per target. Checks everything before any motion.
 pub fn capture(settings: &TargetSeriesRequest, context: &Context<'_>) -> Result<TargetFigures> {
@@ -113,6 +139,7 @@ pub fn capture(settings: &TargetSeriesRequest, context: &Context<'_>) -> Result<
     fs::create_dir_all(&settings.out)
         .map_err(|source| WorkflowError::Folder { folder: settings.out.clone(), source })?;
     let mut list = read_list(&settings.out.join(LIST))?;
+    list.add_complete(&settings.out, &distances_mm)?;
     check_same_optics(&list, &optics, settings)?;
     let series = Series { settings, optics: &optics, operators: &operators, context };
     let mut standing = match settings.rig.is_emulated() {
@@ -121,11 +148,11 @@ pub fn capture(settings: &TargetSeriesRequest, context: &Context<'_>) -> Result<
     };
     let (mut captured, mut error) = (0, MeanSquare::default());
     for (number, true_mm) in distances_mm.iter().copied().enumerate() {
-        if list.pattern.iter().any(|entry| (entry.true_mm - true_mm).abs() < 1e-6) {
+        if list.has(true_mm) {
             context.info(&format!("target {} at {true_mm} mm is there already", number + 1));
             continue;
         }
-        let name = format!("target-{true_mm:.3}");
+        let name = name(true_mm);
         let depth_mm = match &mut standing {
             Some(rig) => {
                 series.place(number, distances_mm.len(), true_mm)?;
@@ -135,9 +162,7 @@ pub fn capture(settings: &TargetSeriesRequest, context: &Context<'_>) -> Result<
         };
         error.add(&depth_mm, true_mm);
         captured += 1;
-        list.pattern.push(Entry { depth: Path::new(&name).join("depth.npy"), true_mm });
-        list.pattern.sort_by(|a, b| a.true_mm.total_cmp(&b.true_mm));
-        staging::write_file(&settings.out.join(LIST), toml::to_string(&list)?.as_bytes())?;
+        list.add(&settings.out, true_mm)?;
         context.info(&format!("target {} of {} at {true_mm} mm is captured", number + 1, distances_mm.len()));
     }
     Ok(TargetFigures {
@@ -245,5 +270,22 @@ fn read_list(path: &Path) -> Result<List> {
         Ok(text) => toml::from_str(&text).map_err(WorkflowError::file(path, "a list of targets")),
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(List::default()),
         Err(error) => Err(WorkflowError::read("the list of targets", path)(error)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_target_that_was_not_listed_before_the_end_of_a_run_is_listed() {
+        let out = tempfile::tempdir().unwrap();
+        fs::create_dir(out.path().join("target-900.000")).unwrap();
+        let mut list = List::default();
+        list.add(out.path(), 890.0).unwrap();
+        list.add_complete(out.path(), &[890.0, 900.0, 910.0]).unwrap();
+        let listed = read_list(&out.path().join(LIST)).unwrap();
+        assert_eq!(listed.pattern.iter().map(|entry| entry.true_mm).collect::<Vec<_>>(), [890.0, 900.0]);
+        assert_eq!(listed.pattern[1].depth, Path::new("target-900.000/depth.npy"));
     }
 }

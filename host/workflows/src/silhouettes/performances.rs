@@ -87,8 +87,7 @@ pub(super) fn write(
         .zip(&names)
         .map(|(performance, name)| {
             for (number, view) in (1..).zip(&views) {
-                counter.check(DURING)?;
-                draw_view(performance, name, number, view, drawing.mm_per_px, &out)?;
+                draw_view(performance, name, (number, view), drawing.mm_per_px, &out, &counter)?;
             }
             counter.one(Some(performances.len()));
             Ok(performance.bodies.len() * views.len())
@@ -128,10 +127,10 @@ fn names(performances: &[Performance]) -> Vec<String> {
 fn draw_view(
     performance: &Performance,
     name: &str,
-    number: usize,
-    view: &View,
+    (number, view): (usize, &View),
     mm_per_px: f64,
     out: &Staging,
+    counter: &Counter<'_>,
 ) -> Result<()> {
     let folder = format!("{name}/view{number}");
     out.make_folder(&folder)?;
@@ -139,6 +138,7 @@ fn draw_view(
     let canvas = Canvas::fitting(&reach, mm_per_px, MARGIN_PX)
         .ok_or_else(|| SilhouettesError::too_large(name, &reach, mm_per_px))?;
     for (frame, body) in (1..).zip(&performance.bodies) {
+        counter.check(DURING)?;
         let mask = draw(body, view, &canvas);
         out.write(&format!("{folder}/frame_{frame:06}.png"), &masks::png(&mask)?)?;
     }

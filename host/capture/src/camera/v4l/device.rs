@@ -26,9 +26,7 @@ use farnear_protocol::{
 use super::{best_format, check_path, refused, unusable};
 use crate::{
     camera::{
-        Camera, CameraError, Control, Frame, Image, Range, Setting, Stamp,
-        pairing::{Belongs, Pairing},
-        pixels::Layout,
+        Camera, CameraError, Control, Frame, Image, Range, Setting, Stamp, pairing::Pairing, pixels::Layout,
     },
     describe::trigger_name,
 };
@@ -131,15 +129,23 @@ impl V4lCamera {
         Ok(())
     }
 
+    /// The frame that came too early, or the next one; `None` at the timeout.
+    fn next(&mut self, wait: Duration) -> Result<Option<Frame>, CameraError> {
+        self.pairing.early().map_or_else(|| self.take(wait), |frame| Ok(Some(frame)))
+    }
+
     /// The next frame; `None` at the timeout.
     fn take(&mut self, wait: Duration) -> Result<Option<Frame>, CameraError> {
         let Some(stream) = &mut self.stream else { return Ok(None) };
         let failed = |error: io::Error| refused(&self.path, &error);
         // Polls before `next`, which would queue a buffer twice after its own timeout.
         let wait_ms = i32::try_from(wait.as_millis()).unwrap_or(i32::MAX);
-        if self.device.handle().poll(POLLIN, wait_ms).map_err(failed)? == 0 {
-            return Ok(None);
-        }
+        match self.device.handle().poll(POLLIN, wait_ms) {
+            Ok(0) => return Ok(None),
+            // A signal, such as Ctrl-C: the caller looks whether it is to end.
+            Err(error) if error.kind() == io::ErrorKind::Interrupted => return Ok(None),
+            polled => polled.map_err(failed)?,
+        };
         let (bytes, metadata) = stream.next().map_err(failed)?;
         let number = metadata.sequence;
         let incomplete = |reason: String| CameraError::Incomplete {
@@ -239,18 +245,12 @@ impl Camera for V4lCamera {
 
     fn image(&mut self, shot: &ShotRecord, wait: Duration) -> Result<Image, CameraError> {
         let camera = self.path.display().to_string();
-        let wanted = shot.trigger_number;
-        while let Some(frame) = self.take(wait)? {
-            match self.pairing.judge(&camera, frame.stamp, shot)? {
-                Belongs::Here => return Ok(frame.image),
-                Belongs::Earlier => {}
-                Belongs::Later(by) => {
-                    let by = u32::try_from(by).unwrap_or(u32::MAX);
-                    return Err(CameraError::Skipped { wanted, came: wanted.wrapping_add(by) });
-                }
+        while let Some(frame) = self.next(wait)? {
+            if let Some(image) = self.pairing.image(&camera, frame, shot)? {
+                return Ok(image);
             }
         }
-        Err(CameraError::Late { camera, trigger_number: wanted, waited: wait })
+        Err(CameraError::Late { camera, trigger_number: shot.trigger_number, waited: wait })
     }
 
     fn reported(&mut self, shot: &ShotRecord, received: Instant) {
@@ -262,7 +262,7 @@ impl Camera for V4lCamera {
     }
 
     fn finish(&mut self, wait: Duration) -> Result<(), CameraError> {
-        match self.take(wait)? {
+        match self.next(wait)? {
             Some(_) => Err(CameraError::Surplus { camera: self.path.display().to_string() }),
             None => Ok(()),
         }

@@ -96,6 +96,12 @@ impl<'a> Metadata<'a> {
         if distinct(0) < names.len() || known.iter().any(|at| at[0] >= count) {
             return Err("the OME metadata of its files have one plane (FirstZ) for several of them".into());
         }
+        if count > of_name.len() {
+            return Err(format!(
+                "its OME metadata have {count} planes in {} files: expected a file for each",
+                of_name.len()
+            ));
+        }
         let mut pages: Vec<usize> = (0..names.len()).collect();
         pages.sort_by_key(|index| known[*index][0]);
         let positions_um = self

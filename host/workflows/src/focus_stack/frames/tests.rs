@@ -54,6 +54,15 @@ fn a_good_stack_loses_no_frame() {
 }
 
 #[test]
+fn a_patch_without_values_condemns_no_frame() {
+    for at in [0, 4, COUNT - 1] {
+        let mut images = stack();
+        images[at].slice_mut(s![30..40, 50..60]).fill(f32::NAN);
+        assert_eq!(left_out(&images, None), [0; 0], "{at}");
+    }
+}
+
+#[test]
 fn warns_of_a_breathing_lens_unless_the_images_are_aligned() {
     let positions: Vec<f64> = (0..COUNT).map(|index| index as f64).collect();
     let still = stack();
