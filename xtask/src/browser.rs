@@ -15,6 +15,8 @@ use crate::{
 /// Used if `CHROMIUM` is not set.
 const BROWSERS: [&str; 3] = ["/usr/bin/chromium", "/usr/bin/chromium-browser", "/usr/bin/google-chrome"];
 
+const TESTS: [&str; 3] = ["page.test.mjs", "rows.test.mjs", "results.test.mjs"];
+
 #[derive(Default)]
 pub struct Counts {
     pub passed: u32,
@@ -29,13 +31,14 @@ pub fn run() -> Result<Counts> {
     if let Some(missing) = missing(folder) {
         let read =
             |name: &str| std::fs::read_to_string(folder.join(name)).context("the page's tests are not there");
-        let text = read("page.test.mjs")? + &read("rows.test.mjs")?;
+        let text = TESTS.into_iter().map(read).collect::<Result<String>>()?;
         eprintln!("skipped: the page in a browser ({missing})");
         return Ok(Counts { skipped: written(&text), ended_well: true, ..Counts::default() });
     }
     let ended = limited::run(
         Command::new("node")
-            .args(["--test", "--test-concurrency=1", "--test-reporter=tap", "page.test.mjs", "rows.test.mjs"])
+            .args(["--test", "--test-concurrency=1", "--test-reporter=tap"])
+            .args(TESTS)
             .current_dir(folder)
             .env("FARNEAR", target_folder().join("debug/farnear")),
     )?;

@@ -37,7 +37,7 @@ pub fn counter_started_again(sorted: &[PathBuf]) -> Option<[&PathBuf; 2]> {
 }
 
 /// Neighbours of a sorted list between which a number is missing, where most numbers are evenly apart. A counter that starts
-/// again is no gap.
+/// again leaves none.
 pub fn gap(sorted: &[PathBuf]) -> Option<[&PathBuf; 2]> {
     let names: Vec<Name> = sorted.iter().map(|path| Name::of(path)).collect();
     let column = last_varying(&names)?;

@@ -134,7 +134,7 @@ impl Pairing {
         self.longest.max(QUIET)
     }
 
-    /// The frame that came before its exposure was asked for.
+    /// The frame that was ahead of the last exposure.
     pub fn early(&mut self) -> Option<Frame> {
         self.early.take()
     }
