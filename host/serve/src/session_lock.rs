@@ -9,7 +9,7 @@ use farnear_workflows::WorkflowError;
 
 use crate::server::ServeError;
 
-/// Hidden, so that it is no capture.
+/// Hidden: the list of captures leaves it out.
 const FILE: &str = ".serve.lock";
 
 /// Creates the session's folder if it is missing, and locks it until the file is dropped or the process ends. `None`

@@ -40,7 +40,7 @@ test("flat series, correction, point spread function and quality are shown after
   await page.locator("button[data-guide=series]").click();
   await page.getByRole("button", { name: "Forget it" }).click();
   await guide.locator(".status", { hasText: "No target yet." }).waitFor();
-  assert.equal(await guide.locator("dt", { hasText: "RMS after" }).count(), 0, "what is forgotten is not shown");
+  assert.equal(await guide.locator("dt", { hasText: "RMS after" }).count(), 0, "forgotten results are not shown");
   await page.locator("#tab-quality").click();
   await page.getByLabel("Pairs", { exact: true }).fill("2");
   await reloaded(server, page, "quality", () => page.getByRole("button", { name: "Measure" }).click());
@@ -90,7 +90,7 @@ test("depth that another browser computes replaces the map that is shown", async
   assert.deepEqual(watching.complaints, []);
 });
 
-test("a recording that a capture ends says so, with its pairs; one that is stopped does not", async () => {
+test("a recording that a capture ends is reported with its pairs, one that is stopped is not", async () => {
   const page = await open(browser, server.address);
   const record = page.getByRole("button", { name: "Record", exact: true });
   const said = page.getByText("Recording ended: ");
