@@ -73,6 +73,11 @@ fn fill_specks(image: &mut Array2<f32>) -> Vec<(usize, usize)> {
     specks
 }
 
+/// The value where white is 1. Brighter pixels are saturated; those without a value stay so.
+fn relative(value: f32, white_level: f32) -> f32 {
+    if value > white_level { 1.0 } else { value / white_level }
+}
+
 const PIXEL: usize = size_of::<f32>();
 
 impl<'a> Images<'a> {
@@ -224,8 +229,7 @@ impl Slices for Images<'_> {
     fn rows(&self, index: usize, rows: Range<usize>) -> Result<CowArray<'_, f32, Ix2>> {
         let mut image = self.stored(index, rows)?;
         if self.white_level != 1.0 {
-            // `min` would make pixels without a value white.
-            image.mapv_inplace(|value| if value > self.white_level { 1.0 } else { value / self.white_level });
+            image.mapv_inplace(|value| relative(value, self.white_level));
         }
         if self.gains[index] != 1.0 {
             image /= self.gains[index];
@@ -246,6 +250,12 @@ impl Slices for Images<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn unseen_pixels_are_not_white() {
+        assert_eq!([0.1, 0.25, 0.3].map(|value| relative(value, 0.25)), [0.4, 1.0, 1.0]);
+        assert!(relative(f32::NAN, 0.25).is_nan());
+    }
 
     #[test]
     fn single_pixels_without_a_value_are_filled_and_borders_are_not() {

@@ -204,4 +204,7 @@ fn images_of_one_camera_share_the_lowest_white_level() {
     assert_eq!(of(&[image(Some(white), white), image(None, 0.05)]), Some(white));
     assert_eq!(of(&[image(Some(white), white), image(None, 0.3)]), None);
     assert_eq!(of(&[image(None, 0.25), image(None, 0.3)]), None);
+    let mut stated = SharedWhiteLevel::default();
+    [image(Some(0.25), 0.2), image(Some(0.25), 0.9)].iter().for_each(|image| stated.add(image));
+    assert_eq!((stated.get(true), stated.get(false)), (Some(0.25), None));
 }
