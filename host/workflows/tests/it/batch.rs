@@ -16,7 +16,7 @@ use crate::damaged::folder;
 const SHARED: &str =
     "[shadow-remove]\ncamera = 'camera.toml'\nlat = 52.38\nlon = -1.56\ntime = '2014-06-23T11:30:00Z'\n";
 
-fn settings(manifest: &Path) -> BatchSettings {
+pub fn settings(manifest: &Path) -> BatchSettings {
     BatchSettings {
         manifest: manifest.into(),
         jobs: 1,

@@ -6,7 +6,7 @@ use farnear_test_data::damaged;
 use farnear_workflows::{
     Context,
     activity::samples::Samples,
-    batch::{self, BatchSettings, JobReport, Shard},
+    batch::{self, BatchSettings, JobReport},
 };
 use image::{GrayImage, Luma};
 use proptest::prelude::*;
@@ -69,16 +69,7 @@ pub fn folder() -> tempfile::TempDir {
 
 /// Runs a list's jobs and returns the number of reports.
 fn done(list: &Path) -> usize {
-    let settings = BatchSettings {
-        manifest: list.into(),
-        jobs: 1,
-        shard: Shard::default(),
-        verify: false,
-        failures: None,
-        summary: None,
-        dry_run: false,
-        allow_failures: false,
-    };
+    let settings = BatchSettings { allow_failures: false, ..crate::batch::settings(list) };
     let warnings = std::sync::atomic::AtomicUsize::new(0);
     let on_job = |_: &JobReport| {
         warnings.fetch_add(1, std::sync::atomic::Ordering::Relaxed);

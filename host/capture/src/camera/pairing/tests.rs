@@ -229,7 +229,7 @@ proptest! {
         let mut pairing = Pairing::default();
         for (index, lost) in lost.iter().enumerate().map(|(index, lost)| (index as u64, *lost)) {
             if lost {
-                continue; // told by `Late` or `Incomplete`; the next exposure goes on
+                continue; // the camera reports `Late` or `Incomplete`
             }
             let of_short_count = start <= 65_535;
             let count = if of_short_count { (start + index - 1) % 65_535 + 1 } else { start + index };
