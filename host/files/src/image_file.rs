@@ -57,19 +57,27 @@ impl GreyImage {
         let of_camera =
             if code == 0xffff << shifted & 0xffff { 16 - shifted } else { 32 - code.leading_zeros() };
         self.samples = Samples::Integer(bits.min(of_camera as u8).max(1));
-        self.pixels.mapv_inplace(|value| (value / white_level).min(1.0));
+        self.pixels.mapv_inplace(|value| relative(value, white_level));
         self.coding_variance /= f64::from(white_level).powi(2);
         self.white_level = None;
         self
     }
 }
 
-/// Common white level of images of one camera: the lowest of all, if no image exceeds it.
-pub fn shared_white_level<'a>(images: impl Iterator<Item = &'a GreyImage> + Clone) -> Option<f32> {
+/// The value where white is 1. Brighter pixels are saturated; those without a value stay so.
+pub fn relative(value: f32, white_level: f32) -> f32 {
+    if value > white_level { 1.0 } else { value / white_level }
+}
+
+/// Common white level of images of one camera: the lowest of all, if no image exceeds it or it `is_stated` by the user.
+pub fn shared_white_level<'a>(
+    images: impl Iterator<Item = &'a GreyImage> + Clone,
+    is_stated: bool,
+) -> Option<f32> {
     images.clone().find_map(|image| image.white_level)?;
     let mut shared = SharedWhiteLevel::default();
     images.for_each(|image| shared.add(image));
-    shared.get(false)
+    shared.get(is_stated)
 }
 
 /// [`shared_white_level`] of images that are not in memory together.

@@ -14,7 +14,7 @@ use farnear_depth::{
     optics::{Optics, RESPONSE_POINTS, Stage},
 };
 use farnear_files::{
-    image_file::{Grey, ReadSettings, SharedWhiteLevel},
+    image_file::{Grey, ReadSettings, SharedWhiteLevel, relative},
     order, stack, staging,
 };
 use ndarray::Array2;
@@ -346,7 +346,7 @@ fn read(
         Ok(())
     })?;
     if let Some(white) = white.get(request.white_level.is_some()) {
-        slices.iter_mut().for_each(|slice| slice.mapv_inplace(|value| (value / white).min(1.0)));
+        slices.iter_mut().for_each(|slice| slice.mapv_inplace(|value| relative(value, white)));
         coding /= f64::from(white).powi(2);
     }
     Ok((slices, coding))

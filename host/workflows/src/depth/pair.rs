@@ -27,12 +27,8 @@ impl Pair {
         let (far_image, near_image) =
             rayon::join(|| read_grey_with(far, reading), || read_grey_with(near, reading));
         let (mut far_image, mut near_image) = (far_image?, near_image?);
-        let levels = far_image.white_level.into_iter().chain(near_image.white_level);
-        // A stated level holds for brighter pixels, too: they are saturated.
-        let white = match reading.white_level {
-            Some(_) => levels.reduce(f32::min),
-            None => shared_white_level([&far_image, &near_image].into_iter()),
-        };
+        let images = [&far_image, &near_image].into_iter();
+        let white = shared_white_level(images, reading.white_level.is_some());
         if let Some(white) = white {
             (far_image, near_image) = (far_image.relative_to(white), near_image.relative_to(white));
         }

@@ -18,7 +18,7 @@ use farnear_depth::{
     },
 };
 use farnear_files::{
-    image_file::{Grey, ReadSettings, Samples, SharedWhiteLevel},
+    image_file::{Grey, ReadSettings, Samples, SharedWhiteLevel, relative},
     stack,
     staging::{Staging, StagingError},
 };
@@ -71,11 +71,6 @@ fn fill_specks(image: &mut Array2<f32>) -> Vec<(usize, usize)> {
         }
     }
     specks
-}
-
-/// The value where white is 1. Brighter pixels are saturated; those without a value stay so.
-fn relative(value: f32, white_level: f32) -> f32 {
-    if value > white_level { 1.0 } else { value / white_level }
 }
 
 const PIXEL: usize = size_of::<f32>();
@@ -250,12 +245,6 @@ impl Slices for Images<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn unseen_pixels_are_not_white() {
-        assert_eq!([0.1, 0.25, 0.3].map(|value| relative(value, 0.25)), [0.4, 1.0, 1.0]);
-        assert!(relative(f32::NAN, 0.25).is_nan());
-    }
 
     #[test]
     fn single_pixels_without_a_value_are_filled_and_borders_are_not() {

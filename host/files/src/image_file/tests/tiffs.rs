@@ -191,6 +191,12 @@ fn written_files_keep_the_white_level() {
 }
 
 #[test]
+fn pixels_without_a_value_are_not_white() {
+    assert_eq!([0.1, 0.25, 0.3].map(|value| relative(value, 0.25)), [0.4, 1.0, 1.0]);
+    assert!(relative(f32::NAN, 0.25).is_nan());
+}
+
+#[test]
 fn images_of_one_camera_share_the_lowest_white_level() {
     let image = |white_level, value| GreyImage {
         pixels: array![[value]],
@@ -199,7 +205,7 @@ fn images_of_one_camera_share_the_lowest_white_level() {
         white_level,
         coding_variance: 0.0,
     };
-    let of = |images: &[GreyImage]| shared_white_level(images.iter());
+    let of = |images: &[GreyImage]| shared_white_level(images.iter(), false);
     let white = 4095.0 / 65535.0;
     assert_eq!(of(&[image(Some(white), white), image(None, 0.05)]), Some(white));
     assert_eq!(of(&[image(Some(white), white), image(None, 0.3)]), None);
