@@ -268,7 +268,8 @@ impl CameraPort {
         critical_section::with(|cs| {
             let mut strobe = EXPOSURE.borrow_ref_mut(cs);
             match (listen, &*strobe) {
-                (true, Strobe::Ignored) => {
+                // A triggered exposure without strobe is still there.
+                (true, Strobe::Ignored | Strobe::Triggered(Exposure { pulse_ended: true, .. })) => {
                     *strobe = Strobe::Listening { start: None, ended: None };
                     // An earlier edge belongs to an exposure begun before.
                     pac::TIM2.sr().write(|w| {

@@ -92,7 +92,7 @@ impl Loop {
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Start {
-    /// The gauge has not given the position.
+    /// The DAC's code is not known, and the gauge has not given the position.
     Unknown,
     /// The code changes smoothly within `over` ticks.
     Ramp { from: u16, to: u16, ticks: u32, over: u32 },
@@ -106,7 +106,6 @@ pub(crate) struct Piezo {
     scale: Scale,
     gauge: GaugeScale,
     start: Start,
-    kept_code: Option<u16>,
     lag: Lag,
     control: Option<Loop>,
     /// A move was ordered: close the loop at the next valid reading.
@@ -136,7 +135,6 @@ impl Piezo {
             scale: Scale::new(settings.gain_pm_per_code),
             gauge: GaugeScale::new(settings.gauge_gain_ppm, settings.gauge_offset),
             start: Start::Unknown,
-            kept_code: None,
             lag: Lag::new(settings.hysteresis_ppm, settings.creep_ppm_per_decade),
             control: None,
             closing: false,
@@ -155,8 +153,11 @@ impl Piezo {
         }
     }
 
+    /// Lowers the piezo from the code that the DAC kept, also without the gauge. Unknown: from the gauge's position.
     pub(crate) const fn start_at(&mut self, code: Option<u16>) {
-        self.kept_code = code;
+        if let Some(code) = code {
+            self.begin_to_relax((code, self.scale.played(code)));
+        }
     }
 
     /// Interval to the next control tick, in ticks.
@@ -192,11 +193,18 @@ impl Piezo {
         self.gauge_missing_ticks == 0
     }
 
-    pub(crate) const fn apply(&mut self, settings: FineSettings) {
+    /// A closed loop is closed anew: a changed scale becomes a disturbance, and the shaper leads to the target.
+    pub(crate) fn apply(&mut self, settings: FineSettings) {
+        if settings == self.settings {
+            return;
+        }
         self.settings = settings;
         self.scale = Scale::new(settings.gain_pm_per_code);
         self.gauge = GaugeScale::new(settings.gauge_gain_ppm, settings.gauge_offset);
         self.lag = self.lag.with(settings.hysteresis_ppm, settings.creep_ppm_per_decade);
+        self.closing |= self.control.take().is_some();
+        self.command = self.scale.played(self.code);
+        self.lag.push(self.command);
     }
 
     pub(crate) fn lowest(&self) -> Nanometres {
@@ -222,7 +230,7 @@ impl Piezo {
     pub(crate) fn is_moving(&self) -> bool {
         !self.arrived()
             || self.control.is_some() && self.still_ticks < NEAR_TICKS
-            || self.start != Start::Over
+            || matches!(self.start, Start::Ramp { .. })
     }
 
     pub(crate) const fn go(&mut self, target: Nanometres) {
@@ -240,8 +248,9 @@ impl Piezo {
         self.target = Nanometres(0);
     }
 
-    pub(crate) const fn code(&self) -> u16 {
-        self.code
+    /// The code from which a calibration may drive: known, and the gauge answers.
+    pub(crate) fn driven_from(&self) -> Option<u16> {
+        self.played().filter(|_| self.gauge_fresh())
     }
 
     /// The output code, once known.
@@ -291,7 +300,7 @@ impl Piezo {
         self.near_ticks = if near { self.near_ticks.saturating_add(1) } else { 0 };
         self.still_ticks = if still { self.still_ticks.saturating_add(1) } else { 0 };
         if self.start == Start::Unknown {
-            self.begin_to_relax();
+            self.begin_to_relax(self.scale.playable(fixed(self.measured)));
         }
         if self.closing {
             return self.close();
@@ -325,12 +334,8 @@ impl Piezo {
         }
     }
 
-    fn begin_to_relax(&mut self) {
-        // A gauge that is off, or whose front end is dead, would make the DAC jump by as much.
-        let (from, command) = match self.kept_code {
-            Some(code) => (code, self.scale.played(code)),
-            None => self.scale.playable(fixed(self.measured)),
-        };
+    /// From a code and its command.
+    const fn begin_to_relax(&mut self, (from, command): (u16, i32)) {
         (self.start, self.code, self.command) = if from > RELAXED {
             (Start::Ramp { from, to: 0, ticks: 0, over: RAMP }, from, command)
         } else {

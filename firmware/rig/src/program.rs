@@ -270,7 +270,7 @@ impl Run {
                 *deviation = self.positioning.deviation(stage).max(*deviation);
                 let deviation = *deviation;
                 match camera.result(number) {
-                    None => self.pass_while_exposing(now),
+                    None => Progress::On,
                     Some(Err(NoAnswer)) => self.go_without(frame),
                     Some(Ok(edges)) => {
                         let shot = self.record(number, places, &edges);
@@ -308,24 +308,17 @@ impl Run {
             return if ready { self.expose(stage, camera, (0, now), now) } else { Progress::On };
         };
         let Some(due) = pace.due(now) else { return Progress::On };
+        let late = pace.is_late(due, now);
         let reason = match (settled, camera.is_ready(due)) {
-            (true, true) => {
+            (true, true) if !late => {
                 let frame = pace.take(due);
                 return self.expose(stage, camera, (frame, due), now);
             }
             _ if !pace.presses() => return Progress::On,
-            (true, false) => DropReason::CameraBusy,
-            (false, _) => DropReason::NotSettled { error: self.positioning.error(stage) },
+            (false, _) if !late => DropReason::NotSettled { error: self.positioning.error(stage) },
+            _ => DropReason::CameraBusy,
         };
         Progress::Dropped { frame: pace.drop_frame(), reason }
-    }
-
-    /// A period may pass during the previous exposure.
-    fn pass_while_exposing(&mut self, now: BoardMicros) -> Progress {
-        match self.pace.as_mut().filter(|pace| pace.presses() && pace.due(now).is_some()) {
-            Some(pace) => Progress::Dropped { frame: pace.drop_frame(), reason: DropReason::CameraBusy },
-            None => Progress::On,
-        }
     }
 
     /// No answer of the camera: a continuous run continues without the frame, unless several fail in a row.

@@ -91,9 +91,9 @@ impl Rig {
         Response::Accepted
     }
 
-    fn reboot(&mut self, request: u32, asked: BoardMicros) -> Response {
+    fn reboot(&mut self, request: u32, now: BoardMicros) -> Response {
         self.stop();
-        self.reboot.get_or_insert(Reboot { request, asked, quiet_since: None });
+        self.reboot.get_or_insert(Reboot { request, waiting_since: now, quiet_since: None });
         Response::Accepted
     }
 

@@ -27,7 +27,8 @@ use crate::work::Works;
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Reboot {
     pub(crate) request: u32,
-    pub(crate) asked: BoardMicros,
+    /// Start of the deadline: the request, or the end of the motion.
+    pub(crate) waiting_since: BoardMicros,
     /// Start of the idle time with nothing to send or write.
     pub(crate) quiet_since: Option<BoardMicros>,
 }
@@ -440,15 +441,19 @@ impl Rig {
         }
     }
 
-    /// Everything is sent, written and at rest, or it took too long.
+    /// Everything is at rest, and sent and written, or that took too long. A stepper brakes as long as its ramp.
     fn reset_is_due(&mut self, now: BoardMicros) -> bool {
         let all_sent = self.session.all_sent() && self.events.all_sent();
         let quiet = self.works.any().is_none() && all_sent && self.store.is_idle();
+        let moving = !self.stage.steppers_still();
         let link = &self.settings.link;
         let Some(reboot) = &mut self.reboot else { return false };
+        if moving {
+            reboot.waiting_since = now;
+        }
         if !quiet {
             reboot.quiet_since = None;
-            return since(reboot.asked, now) > link.reset_deadline;
+            return since(reboot.waiting_since, now) > link.reset_deadline;
         }
         let quiet_since = *reboot.quiet_since.get_or_insert(now);
         since(quiet_since, now) >= link.reset_drain

@@ -108,7 +108,7 @@ pub struct CameraSettings {
 pub struct LinkSettings {
     /// From the last answer to the reset.
     pub reset_drain: Micros,
-    /// Limit of a reboot's wait for motion and answers.
+    /// Limit of a reboot's wait for answers and memory, from the end of the motion.
     pub reset_deadline: Micros,
     pub silence_min: Micros,
     pub silence_max: Micros,
@@ -243,7 +243,7 @@ const PARTS: Settings = Settings {
     link: LinkSettings {
         // 256 bytes at 2 Mbaud take 1.3 ms; several may wait.
         reset_drain: Micros(10_000),
-        // Longest ramp-down is 0.13 s.
+        // A host that reads nothing is left after this.
         reset_deadline: Micros(1_000_000),
         // A host on a busy machine answers within some 10 ms.
         silence_min: Micros(100_000),

@@ -66,6 +66,11 @@ impl Works {
         self.axes[axis as usize].is_some()
     }
 
+    /// The axis is homed, or waits for its switch to settle.
+    pub(crate) const fn homes(&self, axis: Axis) -> bool {
+        matches!(&self.axes[axis as usize], Some(Active { work: AxisWork::Home(_), .. }))
+    }
+
     /// Active request with the shortest silence.
     pub(crate) fn shortest_silence(&self) -> Option<(u32, Micros)> {
         let axes = self.axes.iter().flatten();

@@ -321,7 +321,9 @@ impl Owner {
             if let Some(event) = self.events.pop() {
                 self.deliver(&event.kind);
             } else if !self.events.arrived.is_empty() {
-                self.fetch_due_event();
+                if !self.fetch_due_event() {
+                    return; // read again later; a line that stays silent ends the session
+                }
             } else if std::mem::take(&mut self.still_there) {
                 // Any valid frame suffices; errors end the session or appear at the next poll.
                 let _ = self.status("answering whether this program is still there");
@@ -355,28 +357,32 @@ impl Owner {
         }
     }
 
-    fn fetch_due_event(&mut self) {
+    /// Returns whether the board has answered.
+    fn fetch_due_event(&mut self) -> bool {
         let number = self.events.due;
-        match self.ask(&Request::ReadEvent { number }, "reading an event that got lost") {
+        let forgotten = match self.ask(&Request::ReadEvent { number }, "reading an event that got lost") {
             Ok((_, Response::Event(event))) => {
                 self.events.arrived.insert(number, event);
+                return true;
             }
+            Err(ClientError::Silent { .. }) => return false,
             Err(ClientError::Refused { error: RequestError::EventGone { oldest, next }, .. }) => {
-                // Events that arrived are not lost, whatever the board stores.
-                let arrived = self.events.arrived.keys().next().copied();
-                let forgotten = oldest.min(next).max(number + 1);
-                self.events.due = arrived.map_or(forgotten, |first| first.clamp(number + 1, forgotten));
-                let to = self.events.due - 1;
-                self.works.retain(|_, work| {
-                    if !work.bears_loss {
-                        let _ = work.messages.send(Message::EventsLost { from: number, to });
-                    }
-                    work.bears_loss
-                });
+                oldest.min(next).max(number + 1)
             }
-            // No answer: skip the event, so that later ones are delivered. The session has ended anyway.
-            Ok(_) | Err(_) => self.events.due += 1,
-        }
+            // An answer that cannot be read, or the session has ended.
+            Ok(_) | Err(_) => number + 1,
+        };
+        // Events that arrived are not lost, even if the board has forgotten them.
+        let arrived = self.events.arrived.keys().next().copied();
+        self.events.due = arrived.map_or(forgotten, |first| first.clamp(number + 1, forgotten));
+        let to = self.events.due - 1;
+        self.works.retain(|_, work| {
+            if !work.bears_loss {
+                let _ = work.messages.send(Message::EventsLost { from: number, to });
+            }
+            work.bears_loss
+        });
+        true
     }
 
     /// Polls during work after a silence: fetches lost events, and detects work that ended without one.
@@ -404,7 +410,8 @@ impl Owner {
             return;
         }
         if status.next_event > self.events.due {
-            return self.fetch_due_event();
+            self.fetch_due_event();
+            return;
         }
         self.works.retain(|id, work| {
             let goes_on = is_under_way(*id, &status);

@@ -8,11 +8,9 @@ use farnear_protocol::{
     units::Micros,
 };
 
-use crate::{client::Client, error::ClientError, owner::nonsense};
+use crate::{client::Client, error::ClientError, owner::nonsense, timing::BRAKING};
 
 const RESTART: Duration = Duration::from_secs(5);
-/// Longest braking time at the fastest settings.
-const BRAKING: Duration = Duration::from_secs(3);
 const LOOK: Duration = Duration::from_millis(10);
 
 impl Client {
@@ -56,7 +54,7 @@ impl Client {
             Ok(()) | Err(ClientError::Reset { .. }) => {}
             Err(error) => return Err(error),
         }
-        let allowed = self.timing().allowance(RESTART);
+        let allowed = self.timing().allowance(BRAKING + RESTART);
         let until = std::time::Instant::now() + allowed;
         loop {
             self.reopen_within(until.saturating_duration_since(std::time::Instant::now()))?;

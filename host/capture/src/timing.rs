@@ -13,11 +13,15 @@ const SEARCH_NM_PER_S: u64 = 4_000_000;
 const LEAVE_NM_PER_S: u64 = 1_000_000;
 /// The motor driver needs 0.14 s at power-on, plus a general margin.
 const SLACK: Duration = Duration::from_millis(500);
+/// Longest braking time: from 6.25 mm/s at the least acceleration and jerk that the settings allow, 6.4 s.
+pub(crate) const BRAKING: Duration = Duration::from_secs(7);
 /// Longest settling time of a healthy axis.
 const SETTLE: Duration = Duration::from_secs(2);
 /// Homing's slow second approach, over less than a millimetre.
 const SLOW_APPROACH: Duration = Duration::from_secs(10);
 
+/// The board looks for a switch over this distance, also where the limits are narrower.
+const SEARCH_NM: u64 = 14_500_000;
 /// Above the distances around a switch during homing, and any backlash.
 const SWITCH_NM: u64 = 1_500_000;
 const BACKLASH_NM: u64 = 200_000;
@@ -157,19 +161,24 @@ pub fn calibration_time(routine: Routine, limits: &Limits, pace: Pace) -> Durati
 
 fn travel(axis: Axis, limits: &Limits) -> u64 {
     let (min, max) = limits.of(axis);
-    u64::from(max.0.abs_diff(min.0))
+    u64::from(max.0.abs_diff(min.0)).max(SEARCH_NM)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use farnear_protocol::Micros;
 
     fn pace(speed_nm_per_s: i32) -> Pace {
+        pace_of(speed_nm_per_s, 50_000, 1_600_000)
+    }
+
+    fn pace_of(speed_nm_per_s: i32, acceleration_um_per_s2: i32, jerk_um_per_s3: i32) -> Pace {
         let setting = |key| {
             Ok::<_, ()>(match key {
                 SettingKey::CoarseSpeedNmPerS => speed_nm_per_s,
-                SettingKey::CoarseAccelerationUmPerS2 => 50_000,
-                SettingKey::CoarseJerkUmPerS3 => 1_600_000,
+                SettingKey::CoarseAccelerationUmPerS2 => acceleration_um_per_s2,
+                SettingKey::CoarseJerkUmPerS3 => jerk_um_per_s3,
                 _ => return Err(()),
             })
         };
@@ -187,5 +196,39 @@ mod tests {
         }
         assert!(move_time(Axis::SensorFine, near, far, Pace::AT_ONCE) <= 3 * SETTLE);
         assert!(Timing::EMULATED.allowance(SETTLE) > Timing::REAL.allowance(SETTLE));
+    }
+
+    #[test]
+    fn the_slowest_ramp_ends_within_the_braking_time() {
+        assert!(pace_of(6_250_000, 1_000, 10_000).ramps < BRAKING);
+    }
+
+    #[test]
+    fn the_search_for_a_switch_may_take_longer_than_the_way_between_the_limits() {
+        let limits = Limits {
+            datum: Nanometres(47_000_000),
+            coarse_min: Nanometres(5_000_000),
+            coarse_max: Nanometres(7_000_000),
+            coarse_step_pm: 156_250,
+            fine_min: Nanometres(5_000),
+            fine_max: Nanometres(195_000),
+            shots_max: 64,
+            exposure_min: Micros(20),
+            exposure_max: Micros(1_000_000),
+            lens_min: Nanometres(0),
+            lens_max: Nanometres(13_000_000),
+            lens_step_pm: 156_250,
+            distance_min: Nanometres(46_450_000),
+            silence_min: Micros(100_000),
+            silence_max: Micros(60_000_000),
+            row_pixels_max: 1024,
+        };
+        let axis = Axis::SensorCoarse;
+        for speed in [500_000, 300_000, 160_000] {
+            let search = Duration::from_secs_f64(14_500_000.0 / f64::from(speed));
+            assert!(homing_time(axis, &limits, pace(speed)) > search + SLOW_APPROACH, "{speed} nm/s");
+            let both_ways = calibration_time(Routine::Travel { axis }, &limits, pace(speed));
+            assert!(both_ways > 3 * search + 2 * SLOW_APPROACH, "{speed} nm/s: {both_ways:?}");
+        }
     }
 }

@@ -84,7 +84,10 @@ impl GaugeScale {
         let (stepper, piezo, numbers) = (&mut stage.coarse, &mut stage.fine, &settings.coarse);
         self.ticks += 1;
         let next = match &mut self.phase {
-            Phase::Begin => Phase::Lower(piezo.code()),
+            Phase::Begin => match piezo.driven_from() {
+                None => return Step::Failed(Axis::SensorFine, Failure::Gauge),
+                Some(from) => Phase::Lower(from),
+            },
             Phase::Lower(from) if ramp(piezo, self.ticks, LOWER, *from, 0) => Phase::Rest,
             Phase::Rest => match self.mean(piezo, REST) {
                 None => return Step::On,
@@ -154,7 +157,7 @@ impl GaugeScale {
     /// The phase after a leg; `None` if the switch was elsewhere.
     fn after_leg(&mut self, stepper: &Stepper, piezo: &Piezo) -> Option<Phase> {
         match (&self.phase, self.leg.edge()) {
-            (Phase::Lift, _) if self.met == 2 * ROUNDS => Some(Phase::LowerAgain(piezo.code())),
+            (Phase::Lift, _) if self.met == 2 * ROUNDS => piezo.played().map(Phase::LowerAgain),
             (Phase::Lift, _) => Some(Phase::Place),
             (Phase::Near, _) => (!stepper.home_closed()).then_some(Phase::Approach),
             (_, Some(edge)) => {

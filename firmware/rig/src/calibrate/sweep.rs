@@ -70,7 +70,10 @@ impl Sweep {
 
     pub(crate) fn tick(&mut self, piezo: &mut Piezo) -> Step {
         let Some(phase) = self.phase else {
-            self.phase = Some(Phase::Down { from: piezo.code() });
+            let Some(from) = piezo.driven_from() else {
+                return Step::Failed(Axis::SensorFine, Failure::Gauge);
+            };
+            self.phase = Some(Phase::Down { from });
             return Step::On;
         };
         self.ticks += 1;

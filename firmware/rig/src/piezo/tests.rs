@@ -4,6 +4,8 @@ use crate::piezo::plant::{NOMINAL, Part, Plant};
 use crate::settings::{Settings, Values};
 use farnear_protocol::message::SettingKey;
 
+mod start;
+
 /// Returns the ticks until the plant stays within 50 nm, and its largest overshoot in nm.
 fn step(piezo: &mut Piezo, plant: &mut Plant, target: i32) -> (usize, f64) {
     let up = f64::from(target) > plant.at();
@@ -297,7 +299,7 @@ fn a_dac_whose_wire_returns_does_not_jump() {
         let mut piezo = Piezo::new(Settings::DEFAULT.fine);
         let mut plant = Plant::new(Part { hysteresis: 0.12, creep: 0.015, ..NOMINAL }, 7);
         step(&mut piezo, &mut plant, from);
-        let kept = piezo.code();
+        let kept = piezo.code;
         piezo.go(Nanometres(to));
         let mut failed = false;
         for _ in 0..5_000 {
@@ -306,7 +308,7 @@ fn a_dac_whose_wire_returns_does_not_jump() {
             plant.tick(None);
             failed |= piezo.take_failure();
         }
-        let jump_um = f64::from(piezo.code().abs_diff(kept)) * 200.0 / 65_536.0;
+        let jump_um = f64::from(piezo.code.abs_diff(kept)) * 200.0 / 65_536.0;
         std::println!("from {from} to {to} nm: failed {failed}, {jump_um:.1} um when the wire returns");
         // The campaign's bound for a command in a tick.
         assert!(jump_um < 60.0, "from {from} to {to} nm: {jump_um} um");
@@ -456,22 +458,24 @@ fn calibration_improves_the_trajectory() {
 }
 
 #[test]
-fn after_a_reset_it_ramps_down_from_its_position() {
-    let mut plant = Plant::new(NOMINAL, 5);
-    for _ in 0..5_000 {
-        plant.tick(Some(51_000));
+fn a_setting_changed_under_the_closed_loop_makes_no_jump() {
+    let fine = Settings::DEFAULT.fine;
+    for changed in [
+        FineSettings { gain_pm_per_code: 2_800, ..fine },
+        FineSettings { gain_pm_per_code: 3_300, ..fine },
+        FineSettings { hysteresis_ppm: 120_000, ..fine },
+    ] {
+        let mut piezo = Piezo::new(fine);
+        let mut plant = Plant::new(Part { hysteresis: 0.12, ..NOMINAL }, 7);
+        step(&mut piezo, &mut plant, 180_000);
+        piezo.apply(changed);
+        for _ in 0..500 {
+            let before = piezo.code;
+            piezo.sense(plant.gauge());
+            plant.tick(piezo.act());
+            assert!(piezo.code.abs_diff(before) <= 200, "{} after {before}: {changed:?}", piezo.code);
+        }
+        assert!(!piezo.is_moving() && !piezo.take_failure());
+        assert!((plant.position - 180e3).abs() < 50.0, "{} nm", plant.position);
     }
-    let mut piezo = Piezo::new(Settings::DEFAULT.fine);
-    // The converter does not answer immediately.
-    piezo.sense(None);
-    assert_eq!(piezo.act(), None, "no output while the position is unknown");
-    let mut lowest = f64::MAX;
-    for _ in 0..2_000 {
-        let gauge = plant.gauge();
-        piezo.sense(gauge);
-        plant.tick(piezo.act());
-        lowest = lowest.min(plant.position);
-    }
-    assert_eq!(piezo.act(), Some(0));
-    assert!(lowest > -1_000.0 && plant.position.abs() < 100.0, "{lowest} nm, {} nm", plant.position);
 }

@@ -46,6 +46,11 @@ impl Pace {
         self.begin.is_some()
     }
 
+    /// The frame's time came during the previous exposure, whose event precedes its own.
+    pub(crate) const fn is_late(&self, due: BoardMicros, now: BoardMicros) -> bool {
+        self.presses() && due.0 < now.0 + TICK_US as u64 / 2
+    }
+
     pub(crate) fn take(&mut self, due: BoardMicros) -> u32 {
         if self.period.0 > 0 {
             self.begin.get_or_insert((self.frame, due));
@@ -95,6 +100,8 @@ mod tests {
         assert_eq!(pace.take(BoardMicros(1_400)), 0);
         assert_eq!((pace.due(BoardMicros(40_999)), pace.presses()), (None, true));
         assert_eq!(pace.due(BoardMicros(41_050)), Some(BoardMicros(41_400)));
+        let late = |now| pace.is_late(BoardMicros(41_400), BoardMicros(now));
+        assert_eq!([41_000, 41_199, 41_400, 90_000].map(late), [false, false, true, true]);
         assert_eq!(pace.drop_frame(), 1);
         assert_eq!(pace.due(BoardMicros(81_200)), Some(BoardMicros(81_400)));
         assert_eq!((pace.take(BoardMicros(81_400)), pace.answered()), (2, None));

@@ -61,9 +61,9 @@ impl Rig {
     /// Lowest position of the current move.
     pub(super) fn lowest(&self, axis: Axis) -> Nanometres {
         let Some(stepper) = self.stage.stepper(axis) else { return self.stage.fine.lowest() };
-        let lowest = stepper.lowest();
-        let homes = !stepper.is_still() && lowest <= stepper.lowest_of_homing();
-        if homes { self.below_carried(axis, lowest) } else { lowest }
+        let (lowest, of_homing) = (stepper.lowest(), stepper.lowest_of_homing());
+        let homes = self.works.homes(axis) || !stepper.is_still() && lowest <= of_homing;
+        if homes { self.below_carried(axis, lowest.min(of_homing)) } else { lowest }
     }
 
     /// Lowest position of homing with the present piezo; for the piezo, relaxed.

@@ -97,7 +97,19 @@ impl Bench {
     /// Power cycle: `boot` is the number in retained RAM, 1 if lost.
     pub fn restart(&mut self, boot: u32, cause: ResetCause) {
         self.hardware.power_off();
-        self.rig = Rig::new(identity(boot, cause), Some(&self.memory), BoardMicros(0));
+        self.begin(identity(boot, cause));
+    }
+
+    /// Reset over which the piezo's DAC keeps its code; `piezo_code` is that in retained RAM.
+    pub fn reset(&mut self, piezo_code: Option<u16>) {
+        let dac = self.hardware.dac;
+        self.hardware.power_off();
+        self.hardware.dac = dac;
+        self.begin(Identity { piezo_code, ..identity(self.boot + 1, ResetCause::Software) });
+    }
+
+    fn begin(&mut self, identity: Identity) {
+        self.rig = Rig::new(identity, Some(&self.memory), BoardMicros(0));
         (self.boot, self.now, self.reset_at) = (self.rig.boot(), 0, None);
         self.events.clear();
         self.answers.clear();

@@ -155,3 +155,33 @@ fn stage_a_is_homed_only_where_it_is_known_how_far_the_piezo_holds_its_switch_aw
     let off = f64::from(bench.status().coarse.measured.0) - 1e3 * bench.hardware.coarse.position_um();
     assert!(off.abs() < 10e3, "{off} nm");
 }
+
+#[test]
+fn a_routine_drives_the_piezo_only_from_a_known_code() {
+    for (piezo_code, left_at) in [(Some(50_000), 0), (None, 50_000)] {
+        for routine in [Routine::Piezo, Routine::Gauge] {
+            let mut bench = Bench::new(2_000.0);
+            bench.hardware.dac = 50_000;
+            bench.hardware.faults.gauge = Some(None);
+            bench.reset(piezo_code);
+            let mut before = bench.hardware.dac;
+            let id = bench.accepted(&calibrate(routine));
+            for _ in 0..1_000 {
+                let dac = bench.hardware.dac;
+                assert!(dac.abs_diff(before) <= 200, "{dac} after {before}");
+                before = dac;
+                bench.tick();
+            }
+            assert_eq!(failure(&bench.end_of(id)), Failure::Gauge);
+            assert_eq!((bench.hardware.dac, bench.status().fine.moving), (left_at, false));
+        }
+    }
+}
+
+#[test]
+fn stage_a_is_homed_without_a_gauge_where_the_piezo_has_not_been_driven() {
+    let mut bench = Bench::new(2_000.0);
+    bench.hardware.faults.gauge = Some(None);
+    bench.reset(Some(0));
+    assert!(matches!(bench.work(&home(Axis::SensorCoarse)), EventKind::Homed { .. }));
+}

@@ -2,7 +2,7 @@
 
 use crate::bench::motor::MotorFaults as Faults;
 use crate::bench::{self, Bench, SILENCE, failure};
-use farnear_protocol::message::{Alarm, Axis, EventKind, Failure, PositionState};
+use farnear_protocol::message::{Alarm, Axis, EventKind, Failure, PositionState, SettingKey};
 use farnear_protocol::{Nanometres, Request, RequestError};
 use proptest::prelude::*;
 
@@ -10,6 +10,20 @@ const HOME: Request = Request::Home { axis: Axis::SensorCoarse, silence: SILENCE
 
 fn go(nm: i32) -> Request {
     bench::go(Axis::SensorCoarse, nm)
+}
+
+#[test]
+fn a_homing_that_waits_for_its_switch_counts_as_under_way() {
+    // Both brake a quarter of a millimetre beyond their switches: 46.5 mm.
+    let mut bench = Bench::both_homed();
+    let setting = Request::WriteSetting { key: SettingKey::DistanceMinNm, value: 46_700_000 };
+    bench.ask(&setting).1.expect("in range");
+    let bounced = !bench.status().home_switch;
+    bench.hardware.coarse.faults.home_switch = Some(bounced);
+    bench.accepted(&HOME);
+    bench.hardware.coarse.faults.home_switch = None;
+    let refused = bench.ask(&bench::home(Axis::Lens)).1;
+    assert!(matches!(refused, Err(RequestError::TooClose { .. })), "{refused:?}");
 }
 
 #[test]

@@ -146,6 +146,28 @@ fn one_missing_strobe_costs_a_frame_and_a_dead_camera_the_run() {
 }
 
 #[test]
+fn periods_that_pass_during_an_exposure_are_reported_after_it() {
+    const SHORT: u64 = 20_000;
+    let mut bench = Bench::new(700.0);
+    arm(&mut bench, &[Shot { mode: TriggerMode::FreeRunning, ..on(Axis::SensorFine, FAR, 50) }]);
+    bench.hardware.free_running = Some((33_333, 8_000));
+    let end = bench.work(&run(SHORT, 20));
+    let EventKind::ContinuousDone { exposures: 20, dropped, .. } = end else { panic!("{end:?}") };
+    let frames = frames(&bench);
+    assert_eq!(frames.len() as u32, 20 + dropped);
+    let first = frames[0].expect("taken").1.trigger.0;
+    for (number, frame) in (0..).zip(&frames) {
+        match frame {
+            // Ordered up to two ticks ahead.
+            Ok((_, shot)) => {
+                assert!((0..400).contains(&(shot.trigger.0 - first - number * SHORT)), "{shot:?}")
+            }
+            Err(reason) => assert_eq!(*reason, DropReason::CameraBusy),
+        }
+    }
+}
+
+#[test]
 fn a_run_continues_until_stopped_and_a_pause_restarts_the_period() {
     let mut bench = Bench::new(700.0);
     pair(&mut bench);

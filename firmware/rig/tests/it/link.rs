@@ -2,7 +2,7 @@
 
 use crate::bench::{self, BOOT, Bench, SESSION};
 use farnear_protocol::frame::{self, Header, Kind};
-use farnear_protocol::message::{Axis, EventKind, Failure, ResetCause, SCHEMA_KEY};
+use farnear_protocol::message::{Axis, EventKind, Failure, ResetCause, SCHEMA_KEY, SettingKey};
 use farnear_protocol::{
     BoardMicros, Nanometres, PROTOCOL_CURRENT, PROTOCOL_MIN, Request, RequestError, Response,
 };
@@ -165,6 +165,21 @@ fn a_reboot_stops_answers_and_then_resets() {
     assert_eq!(bench.hardware.coarse.edges, edges);
     let reset = bench.reset_at.expect("it resets");
     assert!((135_000..180_000).contains(&(reset - asked)), "{} us", reset - asked);
+}
+
+#[test]
+fn a_reboot_waits_for_the_slowest_ramp() {
+    let mut bench = Bench::homed();
+    let key = SettingKey::CoarseAccelerationUmPerS2;
+    bench.ask(&Request::WriteSetting { key, value: 1_000 }).1.expect("in range");
+    let id = bench.accepted(&bench::go(Axis::SensorCoarse, 12_000_000));
+    bench.run_ms(2_500);
+    bench.accepted(&Request::Reboot);
+    let end = bench.end_of(id);
+    assert!(matches!(end, EventKind::Failed { reason: Failure::Stopped, .. }), "{end:?}");
+    assert_eq!(bench.reset_at, None, "it braked for two seconds");
+    bench.run_ms(30);
+    assert!(bench.reset_at.is_some());
 }
 
 #[test]

@@ -3,7 +3,7 @@
 use crate::bench::{Bench, SILENCE, fine_shot};
 use farnear_protocol::{
     EventKind, Micros, Nanometres, Request,
-    message::{Shot, ShotRecord, TriggerMode},
+    message::{Failure, Shot, ShotRecord, TriggerMode},
 };
 
 /// Far and near settings of the 50 mm lens (933 and 886.81 mm).
@@ -92,6 +92,31 @@ fn exposures_have_the_requested_duration() {
 fn a_software_triggered_shot_ends_with_the_strobe() {
     let mut bench = Bench::new(3);
     bench.arm(&[Shot { mode: TriggerMode::Software, repeat: 2, ..fine_shot(60_000, 4_000, 100, 1_000) }]);
+    let answered = run_by_host(&mut bench);
+    let records = records(&bench);
+    let shots = bench.rig.take_shots();
+    assert_eq!((answered, records.len(), shots.len()), (2, 2, 2), "{:?}", bench.events.last());
+    for (record, shot) in records.iter().zip(&shots) {
+        assert_eq!(record.trigger_number, shot.id);
+        assert!(record.strobe_start.0.abs_diff(shot.board_us) <= 1);
+        assert_eq!(record.strobe_end.0 - record.strobe_start.0, 4_000);
+    }
+    assert_eq!(bench.report().triggers, 0, "the board's own line stayed still");
+}
+
+#[test]
+fn a_software_triggered_shot_is_taken_after_a_missed_strobe() {
+    let mut bench = Bench::new(5);
+    bench.access(|rig| rig.set_camera_ignores_triggers(true));
+    bench.arm(&[fine_shot(60_000, 4_000, 100, 1_000)]);
+    let end = bench.run();
+    assert!(matches!(end, EventKind::Failed { reason: Failure::NoStrobe, .. }), "{end:?}");
+    bench.arm(&[Shot { mode: TriggerMode::Software, ..fine_shot(60_000, 4_000, 100, 1_000) }]);
+    assert_eq!((run_by_host(&mut bench), records(&bench).len()), (1, 1), "{:?}", bench.events.last());
+}
+
+/// Runs the armed program for half a second; the host triggers each shot that is ready. Returns their number.
+fn run_by_host(bench: &mut Bench) -> usize {
     let run = bench.send(&Request::RunProgram { silence: SILENCE });
     let mut answered = 0;
     for _ in 0..1_000 {
@@ -112,15 +137,7 @@ fn a_software_triggered_shot_ends_with_the_strobe() {
             bench.access(move |rig| rig.expose(4_000, id));
         }
     }
-    let records = records(&bench);
-    let shots = bench.rig.take_shots();
-    assert_eq!((answered, records.len(), shots.len()), (2, 2, 2), "{:?}", bench.events.last());
-    for (record, shot) in records.iter().zip(&shots) {
-        assert_eq!(record.trigger_number, shot.id);
-        assert!(record.strobe_start.0.abs_diff(shot.board_us) <= 1);
-        assert_eq!(record.strobe_end.0 - record.strobe_start.0, 4_000);
-    }
-    assert_eq!(bench.report().triggers, 0, "the board's own line stayed still");
+    answered
 }
 
 #[test]

@@ -6,6 +6,7 @@
 
 use std::{
     cmp::Ordering,
+    collections::VecDeque,
     path::{Path, PathBuf},
     time::{Duration, Instant, SystemTime},
 };
@@ -18,6 +19,12 @@ use super::{CameraError, Frame, Image};
 const JITTER: Duration = Duration::from_millis(2);
 /// Delay until a picture from a pipe is stamped; it never counts as earlier.
 const ARRIVAL_JITTER: Duration = Duration::from_millis(10);
+/// Pictures in a row, all late by an exposure, that prove one missing: a single one may be delayed.
+const LATE_MAX: u32 = 4;
+/// Part of the exposures' interval by which a picture counts as late.
+const LATE: f64 = 0.7;
+/// Exposures that may wait for their pictures.
+const REPORTED_MAX: usize = 256;
 /// Shortest quiet time after a program.
 const QUIET: Duration = Duration::from_millis(200);
 /// Two crystals differ by 50 ppm each, plus a margin.
@@ -84,6 +91,7 @@ pub struct Pairing {
     contents: Vec<(u64, u32)>,
     /// Longest interval of two exposures.
     longest: Duration,
+    delays: Delays,
     /// Of a later exposure, whose image it is.
     early: Option<Frame>,
 }
@@ -105,6 +113,7 @@ impl Pairing {
             in_real_time: false,
             contents: Vec::new(),
             longest: Duration::ZERO,
+            delays: Delays::default(),
             early: None,
         }
     }
@@ -121,6 +130,10 @@ impl Pairing {
         }
         let over = self.at_least(shot.strobe_end.0);
         self.in_real_time &= over.is_some_and(|over| over <= received);
+        if self.delays.reported.len() == REPORTED_MAX {
+            self.delays.reported.pop_front();
+        }
+        self.delays.reported.push_back((shot.trigger_number, received));
     }
 
     /// The program began after arming.
@@ -195,6 +208,13 @@ impl Pairing {
         {
             return Err(CameraError::Stale { camera: camera.into(), wanted, early });
         }
+        if let (None, Some(arrived), true) = (evidence.stamp.count, evidence.arrived, self.in_real_time) {
+            let interval =
+                self.last.as_ref().map(|(_, last)| shot.strobe_start.0.saturating_sub(last.strobe_start.0));
+            if let Some(reason) = self.delays.one_is_missing(wanted, arrived, interval) {
+                return Err(mispaired(camera, shot, reason));
+            }
+        }
         self.contents.extend(evidence.content.map(|content| (content, wanted)));
         let (from, to) = match &self.last {
             Some((_, last)) => (last.strobe_start.0, shot.strobe_start.0),
@@ -237,6 +257,54 @@ impl Pairing {
             }
         }
         Ok(Belongs::Here)
+    }
+}
+
+/// Delays of pictures after the reports of their exposures. Without a count, a missing picture makes each later one
+/// the next exposure's, which is late by an interval of exposures.
+#[derive(Clone, Debug, Default)]
+struct Delays {
+    /// Trigger numbers of exposures without a picture, and when the board reported them.
+    reported: VecDeque<(u32, Instant)>,
+    least_s: Option<f64>,
+    shortest_interval_s: Option<f64>,
+    late_in_a_row: u32,
+}
+
+impl Delays {
+    /// Why a picture before this one is missing. `interval_us` is the time since the exposure before.
+    fn one_is_missing(
+        &mut self,
+        trigger_number: u32,
+        arrived: Instant,
+        interval_us: Option<u64>,
+    ) -> Option<String> {
+        let reported = loop {
+            let (number, reported) = self.reported.pop_front()?;
+            if number == trigger_number {
+                break reported;
+            }
+        };
+        let delay_s = match arrived.checked_duration_since(reported) {
+            Some(after) => after.as_secs_f64(),
+            None => -reported.duration_since(arrived).as_secs_f64(),
+        };
+        let least_s = self.least_s.map_or(delay_s, |least| least.min(delay_s));
+        self.least_s = Some(least_s);
+        let interval_s = interval_us? as f64 * 1e-6;
+        let shortest_s = self.shortest_interval_s.map_or(interval_s, |shortest| shortest.min(interval_s));
+        self.shortest_interval_s = Some(shortest_s);
+        let is_late = delay_s - least_s > LATE * shortest_s;
+        self.late_in_a_row = if is_late { self.late_in_a_row + 1 } else { 0 };
+        (self.late_in_a_row == LATE_MAX).then(|| {
+            format!(
+                "it and the {} before it came {:.0} ms later after their exposures than earlier ones, and exposures are \
+                 {:.0} ms apart, so that a picture is missing or the program cannot keep up",
+                LATE_MAX - 1,
+                1e3 * (delay_s - least_s),
+                1e3 * shortest_s
+            )
+        })
     }
 }
 

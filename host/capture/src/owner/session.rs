@@ -132,6 +132,7 @@ impl Owner {
 
     pub(super) fn reconnect(&mut self) -> Result<(), ClientError> {
         if self.broken.as_ref().is_some_and(Break::has_no_line) {
+            self.link.close(); // of an attempt that was not answered
             let opened = (self.connect)();
             self.next_attempt = Instant::now() + RECONNECT;
             self.link.replace(opened?);
@@ -151,7 +152,7 @@ impl Owner {
             self.break_off(&error);
             return Err(error);
         }
-        let was_broken = self.broken.take().is_some();
+        let was_broken = self.broken.is_some();
         self.session.version = version;
         if hello.boot == before && !was_broken {
             self.session.hello = Arc::new(hello);
@@ -160,7 +161,6 @@ impl Owner {
         if !was_broken {
             let (was, now, cause) = (before, hello.boot, Some(hello.reset_cause));
             self.break_off(&ClientError::Reset { during: "saying hello".into(), was, now, cause });
-            self.broken = None;
         }
         let opened = open_session(&mut self.link, (&hello, version));
         opened.inspect_err(|error| self.break_off(error))?;
@@ -175,7 +175,9 @@ impl Owner {
         self.events = Events { boot: hello.boot, ..Events::default() };
         self.next_log = None;
         self.session.hello = Arc::new(hello);
-        self.join_events()
+        self.join_events()?;
+        self.broken = None;
+        Ok(())
     }
 
     pub(super) fn join_events(&mut self) -> Result<(), ClientError> {

@@ -1,9 +1,18 @@
 //! A client connected to the scripted board.
 
-use std::time::Duration;
+use std::{
+    io,
+    sync::{
+        Arc,
+        atomic::{AtomicU32, Ordering},
+    },
+    time::Duration,
+};
 
-use farnear_capture::{Client, ClientError, Timing};
+use farnear_capture::{Client, ClientError, Connect, Timing, Transport};
 use farnear_protocol::{
+    Call, Request,
+    frame::Decoder,
     message::{Axis, EventKind, Shot, ShotRecord, TriggerMode},
     units::{Micros, Nanometres},
 };
@@ -37,6 +46,50 @@ pub fn connect(faults: Faults) -> (Client, Peer) {
     let client = Client::connect(peer.connect(), "scripted").unwrap();
     client.set_timing(SHORT);
     (client, peer)
+}
+
+/// A line that loses the next `left` requests of a kind.
+struct Gap {
+    line: Box<dyn Transport>,
+    loses: fn(&Request) -> bool,
+    left: Arc<AtomicU32>,
+}
+
+impl Transport for Gap {
+    fn receive(&mut self, buffer: &mut [u8], wait: Duration) -> io::Result<usize> {
+        self.line.receive(buffer, wait)
+    }
+
+    fn send(&mut self, bytes: &[u8], wait: Duration) -> io::Result<()> {
+        let mut decoder = Decoder::new();
+        let mut calls = bytes
+            .iter()
+            .filter_map(|byte| decoder.push(*byte)?.ok())
+            .filter_map(|packet| packet.message::<Call>());
+        let left = self.left.load(Ordering::SeqCst);
+        if left > 0 && calls.any(|call| (self.loses)(&call.request)) {
+            self.left.store(left - 1, Ordering::SeqCst);
+            return Ok(());
+        }
+        self.line.send(bytes, wait)
+    }
+
+    fn discard_input(&mut self) -> io::Result<()> {
+        self.line.discard_input()
+    }
+}
+
+/// Connects over lines that lose requests of a kind, as many as are stored in the number that is returned.
+pub fn connect_with_gaps(peer: &Peer, loses: fn(&Request) -> bool) -> (Client, Arc<AtomicU32>) {
+    let (mut connect, left) = (peer.connect(), Arc::new(AtomicU32::new(0)));
+    let of_lines = Arc::clone(&left);
+    let connect: Connect = Box::new(move || {
+        let gap = Gap { line: connect()?, loses, left: Arc::clone(&of_lines) };
+        Ok(Box::new(gap) as Box<dyn Transport>)
+    });
+    let client = Client::connect(connect, "scripted").unwrap();
+    client.set_timing(SHORT);
+    (client, left)
 }
 
 pub fn connect_error(faults: Faults, change: impl FnOnce(&mut Board)) -> ClientError {

@@ -10,12 +10,13 @@ use std::{
 
 use farnear_capture::{Client, ClientError, Timing, Transport};
 use farnear_protocol::{
+    Request,
     message::{Axis, EventKind, ResetCause},
     units::Nanometres,
 };
 use farnear_scripted_board::{Faults, Peer};
 
-use crate::scripted::{OVERDUE_SOON, SHORT, connect, connect_error};
+use crate::scripted::{OVERDUE_SOON, SHORT, connect, connect_error, connect_with_gaps};
 
 #[test]
 fn hello_gives_the_board_and_its_boot() {
@@ -62,6 +63,23 @@ fn finds_an_unplugged_board_again() {
     client.reopen_within(Duration::from_secs(20)).unwrap();
     assert_eq!(client.hello().boot, 7, "the board went on");
     client.stop().unwrap();
+}
+
+#[test]
+fn a_session_that_could_not_be_opened_is_not_used() {
+    let peer = Peer::new(Faults::default());
+    let (mut client, left) = connect_with_gaps(&peer, |request| *request == Request::OpenSession);
+    peer.board().gone = true;
+    assert!(matches!(client.status(), Err(ClientError::Gone { .. })));
+    left.store(4, Ordering::SeqCst);
+    peer.board().gone = false;
+    let unopened = client.clone().reopen().err().unwrap();
+    assert!(matches!(unopened, ClientError::Silent { .. }), "{unopened:?}");
+    let error = client.status().err().unwrap();
+    assert!(matches!(error, ClientError::Gone { .. }), "{error:?}");
+    client.reopen_within(Duration::from_secs(20)).unwrap();
+    client.status().unwrap();
+    assert_eq!(peer.board().connections, 1);
 }
 
 #[test]

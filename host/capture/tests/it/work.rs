@@ -1,18 +1,22 @@
 //! Long work: end, deadline, interruption, lost events.
 
 use std::{
-    sync::{Arc, atomic::AtomicBool},
+    sync::{
+        Arc,
+        atomic::{AtomicBool, Ordering},
+    },
     time::{Duration, Instant},
 };
 
 use farnear_capture::{ClientError, Step, Timing};
 use farnear_protocol::{
+    Request,
     message::{Axis, EventKind, Shot, TriggerMode},
     units::{Micros, Nanometres},
 };
-use farnear_scripted_board::Faults;
+use farnear_scripted_board::{Faults, Peer};
 
-use crate::scripted::{OVERDUE_SOON, SHOT, connect, run_shots};
+use crate::scripted::{OVERDUE_SOON, SHOT, connect, connect_with_gaps, run_shots};
 
 #[test]
 fn homing_and_moving_end_with_their_events() {
@@ -40,6 +44,15 @@ fn rereads_lost_events() {
         assert_eq!((exposures, seen), (2, vec![0, 1]), "lost {lost:?}");
         assert_eq!(peer.board().acts, 3);
     }
+}
+
+#[test]
+fn a_lost_event_is_reread_after_a_gap_of_the_line() {
+    let peer = Peer::new(Faults { lose_events: vec![1], ..Faults::default() });
+    let (client, left) = connect_with_gaps(&peer, |request| matches!(request, Request::ReadEvent { .. }));
+    left.store(4, Ordering::SeqCst); // a request with its repeats
+    client.home(Axis::SensorCoarse).unwrap();
+    assert_eq!(left.load(Ordering::SeqCst), 0);
 }
 
 #[test]
@@ -72,7 +85,7 @@ fn an_interruption_stops_the_rig() {
     client.interrupt_by(flag.clone());
     let interrupter = std::thread::spawn(move || {
         std::thread::sleep(Duration::from_millis(20));
-        flag.store(true, std::sync::atomic::Ordering::Relaxed);
+        flag.store(true, Ordering::Relaxed);
     });
     let error = client.home(Axis::SensorCoarse).err().unwrap();
     interrupter.join().unwrap();

@@ -106,9 +106,6 @@ pub fn correct(settings: &BoardCorrectRequest, context: &Context<'_>) -> Result<
     let board = correction.for_board()?;
     let rig = Rig::connect(&settings.rig, None, context)?;
     rig.client.send_correction(&board)?;
-    if settings.store {
-        rig.client.store_correction()?;
-    }
     let (height, width) = depth.dim();
     let begin = Instant::now();
     let codes = encode(depth.view(), board.scale);
@@ -122,6 +119,9 @@ pub fn correct(settings: &BoardCorrectRequest, context: &Context<'_>) -> Result<
     staging::write_file(&settings.out, &format.encode(corrected.view())?)?;
     context.info(&format!("wrote {}", settings.out.display()));
     let (different_pixels, first_difference) = compare(&corrected, &expected);
+    if settings.store && different_pixels == 0 {
+        rig.client.store_correction()?;
+    }
     Ok(BoardCorrectFigures {
         method: correction.method().to_string(),
         width,

@@ -50,6 +50,29 @@ fn refuses_a_picture_that_arrived_before_its_exposure() {
 }
 
 #[test]
+fn a_missing_picture_without_a_count_is_found_by_the_delay_of_the_later_ones() {
+    // Exposures 100 ms apart, pictures 12 to 20 ms after them.
+    let delays_ms = [15, 12, 20, 14];
+    let run = |lost: Option<u32>, delayed: Option<u32>| {
+        let mut pairing = Pairing::default();
+        pairing.begin();
+        (1..=20).find_map(|number| {
+            let of = number + u32::from(lost.is_some_and(|lost| number >= lost));
+            let delay = delays_ms[number as usize % 4] + if delayed == Some(number) { 90 } else { 0 };
+            let arrived_ms = 100 * u64::from(of) + 15 - 90 + delay;
+            let shot = long_shot(number, 900_000 + 100_000 * u64::from(number));
+            arrive(&mut pairing, shot, arrived_ms).err().map(|error| (number, error))
+        })
+    };
+    assert!(run(None, None).is_none());
+    assert!(run(None, Some(9)).is_none(), "a single late picture is only late");
+    let (number, error) = run(Some(7), None).unwrap();
+    assert_eq!(number, 10);
+    assert!(matches!(error, CameraError::Mispaired { wanted: 10, .. }), "{error:?}");
+    assert!(error.to_string().contains("a picture is missing"), "{error}");
+}
+
+#[test]
 fn accepts_pictures_whose_board_runs_faster_than_the_clock() {
     let mut pairing = Pairing::default();
     pairing.begin();

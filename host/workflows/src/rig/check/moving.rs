@@ -49,9 +49,15 @@ pub(super) fn slow_homing(checkup: &mut Checkup<'_>) -> Found {
         client.set_setting(speed_key(*axis), SLOW_NM_PER_S.clamp(usual.min, usual.max))?;
         let homed = client.home(*axis);
         // Restore the speed in any case.
-        let restored = client.set_setting(speed_key(*axis), usual.value);
+        if let Err(error) = client.set_setting(speed_key(*axis), usual.value) {
+            let (key, value) = (speed_key(*axis).name(), usual.value);
+            let homing = homed.err().map(|error| format!("{error}; ")).unwrap_or_default();
+            return failed(format!(
+                "{homing}{key} may still be {SLOW_NM_PER_S} instead of {value} ({error}); set it back by `farnear rig \
+                 settings set {key} {value}`"
+            ));
+        }
         homed?;
-        restored?;
         if checkup.actuation && !checkup.yes(&format!("did the {} move smoothly?", axis_name(*axis)))? {
             return failed(format!("the {} did not move smoothly", axis_name(*axis)));
         }

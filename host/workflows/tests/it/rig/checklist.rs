@@ -97,3 +97,13 @@ fn a_latched_alarm_is_reported_and_ends_the_checklist() {
     assert!(list.steps[2].detail.starts_with("alarm 1 is latched"), "{list:?}");
     assert_eq!(list.alarm, Some(1));
 }
+
+#[test]
+fn a_speed_that_could_not_be_restored_is_named() {
+    let (port, board) = plug_in(Faults { reset_at_move: true, ..Faults::default() });
+    board.board().hello.capabilities.memory = false;
+    let (list, _) = go_through(board, port, false, false);
+    let last = list.steps.last().unwrap();
+    assert_eq!((last.step, last.verdict), ("first slow homing", Verdict::Failed), "{list:?}");
+    assert!(last.detail.contains("farnear rig settings set coarse_speed_nm_per_s 1000"), "{list:?}");
+}

@@ -1,0 +1,52 @@
+//! From a reset to the relaxed piezo.
+
+use super::*;
+
+#[test]
+fn after_a_reset_it_ramps_down_from_its_position() {
+    let mut plant = Plant::new(NOMINAL, 5);
+    for _ in 0..5_000 {
+        plant.tick(Some(51_000));
+    }
+    let mut piezo = Piezo::new(Settings::DEFAULT.fine);
+    // The converter does not answer immediately.
+    piezo.sense(None);
+    assert_eq!(piezo.act(), None, "no output while the position is unknown");
+    let mut lowest = f64::MAX;
+    for _ in 0..2_000 {
+        let gauge = plant.gauge();
+        piezo.sense(gauge);
+        plant.tick(piezo.act());
+        lowest = lowest.min(plant.position);
+    }
+    assert_eq!(piezo.act(), Some(0));
+    assert!(lowest > -1_000.0 && plant.position.abs() < 100.0, "{lowest} nm, {} nm", plant.position);
+}
+
+#[test]
+fn a_kept_code_is_lowered_without_the_gauge() {
+    for kept in [0, 50_000, u16::MAX] {
+        let mut piezo = Piezo::new(Settings::DEFAULT.fine);
+        piezo.start_at(Some(kept));
+        let mut before = kept;
+        for _ in 0..RAMP {
+            piezo.sense(None);
+            let code = piezo.act().expect("a known code");
+            assert!(before.abs_diff(code) <= 200, "{code} after {before}");
+            before = code;
+        }
+        assert_eq!((piezo.act(), piezo.extension()), (Some(0), Some(Nanometres(0))));
+        assert!(!piezo.is_moving() && !piezo.take_failure());
+    }
+}
+
+#[test]
+fn a_piezo_whose_code_is_unknown_is_left_where_it_is() {
+    let mut piezo = Piezo::new(Settings::DEFAULT.fine);
+    for _ in 0..TICK_HZ {
+        piezo.sense(None);
+        assert_eq!(piezo.act(), None);
+    }
+    assert!(!piezo.is_moving(), "nothing is output");
+    assert_eq!((piezo.extension(), piezo.driven_from()), (None, None));
+}
