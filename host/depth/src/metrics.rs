@@ -163,20 +163,23 @@ pub fn near_steps(truth: ArrayView2<f32>, distance: usize) -> Array2<bool> {
 
 pub(crate) fn dilate_square(mask: &Array2<bool>, distance: usize) -> Array2<bool> {
     let (height, width) = mask.dim();
-    let mut along = mask.clone();
-    for (from, mut to) in mask.rows().into_iter().zip(along.rows_mut()) {
-        if let (Some(from), Some(to)) = (from.as_slice(), to.as_slice_mut()) {
-            spread(from, to, distance);
-        }
+    let mask = mask.as_standard_layout();
+    let Some(mask) = mask.as_slice() else { unreachable!("made in standard layout") };
+    let mut along = mask.to_vec();
+    for (from, to) in mask.chunks(width.max(1)).zip(along.chunks_mut(width.max(1))) {
+        spread(from, to, distance);
     }
     // Steps since the last true value, a row at a time, in 16 bits: the loop is done in vectors.
-    let mut wider = along.clone();
+    let mut wider = Array2::from_elem((height, width), false);
+    let Some(to) = wider.as_slice_mut() else { unreachable!("made in standard layout") };
+    to.copy_from_slice(&along);
     let distance = distance.min(usize::from(u16::MAX - 1)) as u16;
     let mut since = vec![u16::MAX; width];
     let mut pass = |rows: &mut dyn Iterator<Item = usize>| {
         since.fill(u16::MAX);
         for y in rows {
-            for ((value, own), since) in wider.row_mut(y).iter_mut().zip(along.row(y)).zip(&mut since) {
+            let row = y * width..(y + 1) * width;
+            for ((value, own), since) in to[row.clone()].iter_mut().zip(&along[row]).zip(&mut since) {
                 *since = if *own { 0 } else { since.saturating_add(1) };
                 *value |= *since <= distance;
             }

@@ -95,6 +95,6 @@ impl Agreement {
         let [small, large] = [&self.small, &self.large]
             .map(|planes| planes.each_ref().map(|plane| &plane.row(at)[first..last]));
         let sums = [&of_windows[..width], &of_windows[stride..][..width]];
-        simd::decide_row(backend, sums, small, large, to);
+        simd::decide_row(backend, self.of.doubt, sums, small, large, to);
     }
 }

@@ -89,12 +89,20 @@ impl Holes {
         if whole {
             return None;
         }
-        let holes =
-            Array2::from_shape_fn((place.rows + 2 * halo[0], place.columns + 2 * halo[1]), |(y, x)| {
-                let y = reflect((place.top + y) as isize - halo[0] as isize, height);
-                let x = reflect((place.left + x) as isize - halo[1] as isize, width);
-                !(far[(y, x)].is_finite() && near[(y, x)].is_finite())
-            });
+        let mut holes = Array2::from_elem((place.rows + 2 * halo[0], place.columns + 2 * halo[1]), false);
+        let first = columns.start + halo[1] - place.left;
+        let inside = first..first + columns.len();
+        for (y, mut row) in holes.rows_mut().into_iter().enumerate() {
+            let y = reflect((place.top + y) as isize - halo[0] as isize, height);
+            let [far, near] = [far.row(y), near.row(y)];
+            let is_hole = |x: usize| !(far[x].is_finite() && near[x].is_finite());
+            for (hole, x) in row.slice_mut(s![inside.clone()]).iter_mut().zip(columns.clone()) {
+                *hole = is_hole(x);
+            }
+            for x in (0..inside.start).chain(inside.end..row.len()) {
+                row[x] = is_hole(reflect((place.left + x) as isize - halo[1] as isize, width));
+            }
+        }
         holes.iter().any(|hole| *hole).then(|| {
             let wide = dilate_square(&holes, reach + side / 2);
             let own = s![halo[0]..halo[0] + place.rows, halo[1]..halo[1] + place.columns];

@@ -24,6 +24,12 @@ const BORDER_PX: usize = 14;
 const LEAST_EVIDENCE: f32 = 0.02;
 /// Standard deviation of alpha by the operators' own error: 0.003 on noise-free slants.
 const FLOOR: f32 = 0.0026;
+/// Part of the windows' disagreement beyond noise by which the larger one's variance grows. Chosen on rendered spheres, cones
+/// and slants for an error over deviation of 0.9 to 1.25.
+const DOUBT: f32 = 0.5;
+/// The same for a learned lens, whose windows are larger: a window of 41 px is off by 1.08 of its difference from one of 11 px
+/// where the surface curves evenly.
+const DOUBT_LEARNED: f32 = 1.0;
 /// Standard deviation of alpha from which a window tells nothing about the surface.
 const UNINFORMATIVE: f32 = 0.045;
 /// Standard deviation of alpha, at alpha = 0, that is certain enough.
@@ -146,8 +152,9 @@ impl<'a> Tile<'a> {
             agreement: (compared > 0).then(|| {
                 // The model error of a learned lens must not count as a depth step.
                 let tolerance = job.optics.stage().map_or(0.0, |stage| stage.window_tolerance as f32).powi(2);
-                let of =
-                    Contrast { gain: variance_gain, tolerance, largest: UNINFORMATIVE.powi(2) + tolerance };
+                let doubt = if job.optics.stage().is_some() { DOUBT_LEARNED } else { DOUBT };
+                let largest = UNINFORMATIVE.powi(2) + tolerance;
+                let of = Contrast { gain: variance_gain, tolerance, largest, doubt };
                 Agreement::new(2 * compared + 1, wide, of)
             }),
             alpha: Plane::new(WAITING, wide),

@@ -152,6 +152,14 @@ pub fn calibrate_stack(
     let plane_of_bins = plane.binned(bin);
     let radius = (blur.px_per_slice() * pair_step as f64 / bin as f64).clamp(1.0, 4.0);
     let optics_of = |psf: Psf, max_blur_px: f64| optics(psf, max_blur_px, bin, pair_step, settings);
+    let truth_of = |optics: &Optics, place: f64| match settings.moved {
+        // Steps of the target are equal in depth, those of the sensor in normalised depth.
+        Moved::Target { .. } => {
+            let range = optics.working_range();
+            optics.alpha(range.far_mm - 0.5 * (1.0 + place) * settings.step_mm * pair_step as f64)
+        }
+        Moved::Sensor(_) => place,
+    };
     let response::Learned { optics, held_out, trials, foreign } = response::learn(&response::Target {
         slices: &small,
         plane: &plane_of_bins,
@@ -160,6 +168,7 @@ pub fn calibrate_stack(
         coding: settings.coding / (bin * bin) as f64,
         radius_px: radius,
         optics_of: &optics_of,
+        truth_of: &truth_of,
         proceed,
     })?;
     let scale_known = !matches!(settings.moved, Moved::Target { object_pixel_um: None, .. });

@@ -9,6 +9,8 @@
 
 mod step;
 
+use std::ops::Range;
+
 use ndarray::{Array2, ArrayView2};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -207,20 +209,45 @@ fn levels(pair: &Thinned) -> Option<Vec<Level>> {
     }
 }
 
-/// Interpolated value; `None` in the border and outside.
-fn between(image: &Array2<f32>, [x, y]: [f64; 2]) -> Option<f32> {
-    let (height, width) = image.dim();
-    let border = BORDER_PX as f64;
-    if !(x >= border && y >= border && x < (width - 1) as f64 - border && y < (height - 1) as f64 - border) {
-        return None;
+/// A row of the far image in the near one.
+struct MovedRow<'a> {
+    pixels: &'a [f32],
+    width: usize,
+    warp: &'a Warp,
+    y: f64,
+    /// Columns whose places lie within the near image's border.
+    inside: Range<usize>,
+}
+
+impl<'a> MovedRow<'a> {
+    fn new(image: &'a Array2<f32>, warp: &'a Warp, y: usize, columns: Range<usize>) -> Self {
+        let (height, width) = image.dim();
+        let (border, y) = (BORDER_PX as f64, y as f64);
+        let is_inside = |column: &usize| {
+            let [x, y] = warp.at([*column as f64, y]);
+            let [right, bottom] = [width, height].map(|n| (n - 1) as f64 - border);
+            x >= border && y >= border && x < right && y < bottom
+        };
+        let pixels = image.as_slice().unwrap_or_default();
+        // An affine map sends one stretch of a row into the image.
+        let start = columns.clone().find(is_inside).unwrap_or(columns.end);
+        let end = (start..columns.end).rev().find(is_inside).map_or(start, |last| last + 1);
+        Self { pixels, width, warp, y, inside: start..end }
     }
-    let (column, row) = (x as usize, y as usize);
-    let (fx, fy) = ((x - column as f64) as f32, (y - row as f64) as f32);
-    let pixels = image.as_slice()?;
-    let at = row * width + column;
-    let upper = pixels[at] + fx * (pixels[at + 1] - pixels[at]);
-    let lower = pixels[at + width] + fx * (pixels[at + width + 1] - pixels[at + width]);
-    Some(upper + fy * (lower - upper))
+
+    /// Bilinear value at a column that is inside.
+    #[inline(always)]
+    fn value(&self, column: usize) -> f32 {
+        let [x, y] = self.warp.at([column as f64, self.y]);
+        let (left, top) = (x as i32, y as i32);
+        let (fx, fy) = ((x - f64::from(left)) as f32, (y - f64::from(top)) as f32);
+        let at = top as usize * self.width + left as usize;
+        let [upper, lower] = [at, at + self.width].map(|at| {
+            let pair = &self.pixels[at..at + 2];
+            pair[0] + fx * (pair[1] - pair[0])
+        });
+        upper + fy * (lower - upper)
+    }
 }
 
 /// The best shift of all up to a quarter of the image.
@@ -249,15 +276,14 @@ fn correlation(level: &Level, warp: &Warp) -> f64 {
     let [mut product, mut of_far, mut of_near, mut count] = [0.0_f64; 4];
     let step = (level.far.len() / STEP_PX).max(1);
     for y in (BORDER_PX..height - BORDER_PX).step_by(step) {
-        for x in BORDER_PX..width - BORDER_PX {
-            if let Some(near) = between(&level.near, warp.at([x as f64, y as f64])) {
-                let [far, near] = [level.far[(y, x)], near].map(f64::from);
-                product += far * near;
-                of_far += far * far;
-                of_near += near * near;
-                count += 1.0;
-            }
+        let row = MovedRow::new(&level.near, warp, y, BORDER_PX..width - BORDER_PX);
+        for x in row.inside.clone() {
+            let [far, near] = [level.far[(y, x)], row.value(x)].map(f64::from);
+            product += far * near;
+            of_far += far * far;
+            of_near += near * near;
         }
+        count += row.inside.len() as f64;
     }
     let enough = count * step as f64 > 0.25 * level.far.len() as f64;
     if enough && of_far > 0.0 && of_near > 0.0 { product / (of_far * of_near).sqrt() } else { 0.0 }

@@ -139,11 +139,11 @@ impl Lanczos {
     }
 
     /// First tap and phase of a place along an axis, from -1 on.
-    fn at(place: f64) -> (isize, usize) {
+    fn at(place: f64) -> (i32, u16) {
         // Positive, so truncation is the floor, without a call.
-        let whole = (place + 1.0) as isize - 1;
-        let phase = ((place - whole as f64) * PHASES as f64 + 0.5) as usize;
-        (whole - 2, phase.min(PHASES))
+        let whole = (place + 1.0) as i32 - 1;
+        let phase = ((place - f64::from(whole)) * PHASES as f64 + 0.5) as i32;
+        (whole - 2, phase.min(PHASES as i32) as u16)
     }
 }
 
@@ -186,8 +186,8 @@ pub(crate) fn resample_by(image: ArrayView2<f32>, map: impl Fn([f64; 2]) -> [f64
 /// Source of a pixel of the result.
 #[derive(Clone, Copy)]
 struct Taps {
-    first: [isize; 2],
-    phase: [usize; 2],
+    first: [i32; 2],
+    phase: [u16; 2],
     inside: Option<bool>,
 }
 
@@ -197,13 +197,14 @@ impl Taps {
             return Self { first: [0; 2], phase: [0; 2], inside: None };
         }
         let ((left, across), (top, down)) = (Lanczos::at(x), Lanczos::at(y));
-        let inside = left >= 0 && top >= 0 && left as usize + TAPS <= width && top as usize + TAPS <= height;
+        let whole = |first: i32, n: usize| first >= 0 && first as usize + TAPS <= n;
+        let inside = whole(left, width) && whole(top, height);
         Self { first: [left, top], phase: [across, down], inside: Some(inside) }
     }
 
     /// First row and vertical phase, if all taps lie in the image.
     fn rows(&self) -> Option<[usize; 2]> {
-        self.inside.filter(|inside| *inside).map(|_| [self.first[1] as usize, self.phase[1]])
+        self.inside.filter(|inside| *inside).map(|_| [self.first[1] as usize, self.phase[1].into()])
     }
 
     /// Value near the border: taps beyond it take the nearest pixel. NaN outside.
@@ -211,8 +212,8 @@ impl Taps {
         if self.inside.is_none() {
             return f32::NAN;
         }
-        let [across, down] = self.phase.map(|phase| &lanczos.0[phase]);
-        let [left, top] = self.first;
+        let [across, down] = self.phase.map(|phase| &lanczos.0[usize::from(phase)]);
+        let [left, top] = self.first.map(|first| first as isize);
         let inside = |i: isize, n: usize| i.clamp(0, n as isize - 1) as usize;
         let column = |column: isize| -> f32 {
             let at = inside(left + column, width);
@@ -246,7 +247,7 @@ fn along_rows(
     }
     for (to, taps) in to.iter_mut().zip(places) {
         let at = taps.first[0] as usize - from;
-        let weights = &lanczos.0[taps.phase[0]];
+        let weights = &lanczos.0[usize::from(taps.phase[0])];
         *to = columns[at..at + TAPS].iter().zip(weights).map(|(value, weight)| value * weight).sum();
     }
 }

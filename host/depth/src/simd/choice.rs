@@ -38,6 +38,8 @@ pub(crate) struct Contrast {
     pub tolerance: f32,
     /// Variance of alpha from which a window tells nothing.
     pub largest: f32,
+    /// Part of the difference's excess over noise by which the larger window's variance grows.
+    pub doubt: f32,
 }
 
 /// Largest counted squared difference, relative to the variance.
@@ -45,10 +47,8 @@ const LARGEST_CONTRAST: f32 = 100.0;
 /// Mean square difference of two windows, relative to the smaller one's variance, from which the surface is not flat
 /// over the larger one. On planes 99 % are below 1.9.
 const NOT_FLAT: f32 = 2.0;
-/// The same mean square of a flat surface (75 % are below), and the part of any excess by which the larger window's
-/// variance grows. Chosen on rendered spheres, cones and slants for an error over deviation of 0.9 to 1.25.
+/// The same mean square of a flat surface: 75 % are below.
 const FLAT: f32 = 1.05;
-const DOUBT: f32 = 0.5;
 /// Largest growth of the smaller one's variance: a certain depth next to a large step remains certain.
 const LARGEST_GROWTH: f32 = 9.0;
 
@@ -82,11 +82,17 @@ fn contrast_generic<L: Lanes>(of: Contrast, small: [&[f32]; 2], large: [&[f32]; 
 dispatch! {
     /// Alpha and variance of the larger window where the surface is flat, else of the smaller one. `sums` are of
     /// [`contrast_row`]'s differences and counts.
-    fn decide_row(sums: [&[f32]; 2], small: [&[f32]; 2], large: [&[f32]; 2], to: [&mut [f32]; 2]) = decide_generic
+    fn decide_row(doubt: f32, sums: [&[f32]; 2], small: [&[f32]; 2], large: [&[f32]; 2], to: [&mut [f32]; 2]) = decide_generic
 }
 
 #[inline(always)]
-fn decide_generic<L: Lanes>(sums: [&[f32]; 2], small: [&[f32]; 2], large: [&[f32]; 2], to: [&mut [f32]; 2]) {
+fn decide_generic<L: Lanes>(
+    doubt: f32,
+    sums: [&[f32]; 2],
+    small: [&[f32]; 2],
+    large: [&[f32]; 2],
+    to: [&mut [f32]; 2],
+) {
     let [alpha, variance] = to;
     let width = alpha.len();
     let variance = &mut variance[..width];
@@ -96,7 +102,7 @@ fn decide_generic<L: Lanes>(sums: [&[f32]; 2], small: [&[f32]; 2], large: [&[f32
         let mean = differences[x] / counts[x].max(1.0);
         let flat = mean <= NOT_FLAT;
         // An infinite variance times 0 would be none.
-        let widened = of_large[x] + of_small[x].min(f32::MAX) * (DOUBT * (mean - FLAT).max(0.0));
+        let widened = of_large[x] + of_small[x].min(f32::MAX) * (doubt * (mean - FLAT).max(0.0));
         alpha[x] = if flat { large[x] } else { small[x] };
         variance[x] = if flat { widened } else { of_small[x] * mean.min(LARGEST_GROWTH) };
     }
@@ -110,7 +116,7 @@ mod tests {
     /// A plane, and a step of 0.2 in the middle, seen by windows with a variance of 1e-3 and 1e-4.
     #[test]
     fn the_larger_window_counts_where_the_surface_is_flat() {
-        let of = Contrast { gain: [1.0, 0.0, 0.0, 0.0], tolerance: 0.0, largest: 2e-3 };
+        let of = Contrast { gain: [1.0, 0.0, 0.0, 0.0], tolerance: 0.0, largest: 2e-3, doubt: 0.5 };
         for backend in Backend::available() {
             let small = [[0.13, 0.30, 0.3], [1e-3, 1e-3, f32::NAN]];
             let large = [[0.11, 0.20, 0.2], [1e-4; 3]];
@@ -122,7 +128,14 @@ mod tests {
             assert!((difference[0] - 0.4).abs() < 1e-4 && (difference[1] - 10.0).abs() < 1e-3);
             let (mut chosen, mut of_chosen) = ([0.0; 3], [0.0; 3]);
             let small = [&alpha[..], &variance];
-            decide_row(backend, [&difference, &counted], small, large, [&mut chosen, &mut of_chosen]);
+            decide_row(
+                backend,
+                of.doubt,
+                [&difference, &counted],
+                small,
+                large,
+                [&mut chosen, &mut of_chosen],
+            );
             assert_eq!(chosen, [0.11, 0.30, 0.2]);
             assert!((of_chosen[1] - 9e-3).abs() < 1e-6 && of_chosen[0] == 1e-4 && of_chosen[2] == 1e-4);
         }

@@ -72,7 +72,7 @@ pub(super) enum Split {
 pub(super) struct Judged {
     pub error: f64,
     truth: f64,
-    noise: f64,
+    pub noise: f64,
     unexplained: f32,
     pub original: bool,
 }

@@ -32,7 +32,7 @@ pub(super) const LEARNED: f64 = 1.12;
 /// Standard deviation of normalised depth by noise beyond which a pixel has no depth.
 const TOO_NOISY: f64 = 0.12;
 /// Lenses that are tried.
-pub const LENSES: usize = PSFS.len() * FACTORS.len() + 2 * FLOORS_PX.len() + TOLERANCES.len();
+pub const LENSES: usize = PSFS.len() * FACTORS.len() + 2 * FLOORS_PX.len() + 3;
 const PSFS: [Psf; 4] = [
     Psf::PillBox,
     Psf::Generalised { p: 3.0, k: 0.62 },
@@ -46,8 +46,14 @@ const FACTORS: [f64; 5] = [0.7, 0.85, 1.0, 1.2, 1.4];
 const UNLIKELY: f64 = 0.5;
 /// Least blur radii that are tried with the best PSF, px.
 const FLOORS_PX: [f64; 3] = [0.5, 0.9, 1.3];
-/// Differences between windows that are tried with the best lens.
-const TOLERANCES: [f64; 4] = [0.0, 0.03, 0.07, 0.15];
+/// Model error in the smallest adaptive window, relative to the noise there, from which windows may differ by it.
+const MODEL_LIMITED: f64 = 0.5;
+/// Accepted difference between windows relative to that error, which is not the same everywhere. Chosen on a metal plate.
+const TOLERATED: f64 = 2.0;
+/// Largest accepted difference.
+const LARGEST_TOLERANCE: f64 = 0.15;
+/// Largest squared error, relative to its variance, that counts.
+const LARGEST_SQUARE: f64 = 100.0;
 /// Improvement that justifies a lens with one more parameter.
 pub(super) const WORTH: f64 = 0.97;
 /// Part of the noise's variance that smoothing leaves: sum of the squared taps.
@@ -135,6 +141,8 @@ pub(super) struct Target<'a> {
     /// Largest blur radius as measured, px.
     pub radius_px: f64,
     pub optics_of: &'a (dyn Fn(Psf, f64) -> Result<Optics, StackError> + Sync),
+    /// True normalised depth of a lens at a place between the slices of a pair, -1 to 1.
+    pub truth_of: &'a (dyn Fn(&Optics, f64) -> f64 + Sync),
     pub proceed: &'a (dyn Fn(usize) -> bool + Sync),
 }
 
@@ -224,7 +232,12 @@ pub(super) fn learn(target: &Target<'_>) -> Result<Learned, StackError> {
         }
     }
     if let Some(Best { lens, .. }) = best.take() {
-        for tolerance in TOLERANCES {
+        // On a flat target any tolerance is good, so it is taken from the model's error there.
+        let mut of_small = None;
+        attempt(lens, Window::Fixed(LEARNED_PX[0]), &mut of_small)?;
+        let tolerance = of_small.and_then(|small| tolerance(&small)).unwrap_or(0.0);
+        attempt(lens, Window::Adaptive, &mut best)?;
+        if tolerance > 0.0 {
             attempt(Candidate { tolerance, ..lens }, Window::Adaptive, &mut best)?;
         }
     }
@@ -236,8 +249,28 @@ pub(super) fn learn(target: &Target<'_>) -> Result<Learned, StackError> {
     Ok(Learned { optics: optics.with_stage(stage), held_out, trials, foreign })
 }
 
+/// Difference between windows that the model's error explains; `None` if noise explains most of it.
+fn tolerance(small: &Best) -> Option<f64> {
+    let (judged, _) = judge(&small.samples, small.degree, Split::Blocks, false)?;
+    let original = || judged.iter().filter(|j| j.original);
+    let explains = |error: f64| {
+        let squares = original().map(|j| (j.error / j.noise.hypot(error)).powi(2).min(LARGEST_SQUARE));
+        squares.sum::<f64>() <= original().count() as f64
+    };
+    let [mut low, mut error] = [0.0, 1.0];
+    for _ in 0..20 {
+        let middle = 0.5 * (low + error);
+        if explains(middle) { error = middle } else { low = middle }
+    }
+    let mut noise: Vec<f64> = original().map(|j| j.noise).collect();
+    let middle = noise.len() / 2;
+    let usual = *noise.select_nth_unstable_by(middle, f64::total_cmp).1;
+    (error > MODEL_LIMITED * usual).then(|| (TOLERATED * error).min(LARGEST_TOLERANCE))
+}
+
 impl Target<'_> {
-    fn alpha(&self, far: usize, y: usize, x: usize) -> f64 {
+    /// Where the target is between the slices of a pair, -1 at the far one to 1.
+    fn place(&self, far: usize, y: usize, x: usize) -> f64 {
         -1.0 + 2.0 * (self.plane.at(y as f64, x as f64) - far as f64) / self.pair_step as f64
     }
 
@@ -246,8 +279,8 @@ impl Target<'_> {
         let (height, width) = self.slices[0].dim();
         let usable = |far: &usize| {
             let corners = [(0, 0), (0, width - 1), (height - 1, 0), (height - 1, width - 1)];
-            let alphas = corners.map(|(y, x)| self.alpha(*far, y, x));
-            let [low, high] = alphas.iter().fold([f64::MAX, f64::MIN], |[a, b], v| [a.min(*v), b.max(*v)]);
+            let places = corners.map(|(y, x)| self.place(*far, y, x));
+            let [low, high] = places.iter().fold([f64::MAX, f64::MIN], |[a, b], v| [a.min(*v), b.max(*v)]);
             low < 1.05 && high > -1.05
         };
         let optics = (self.optics_of)(Psf::PillBox, 2.0)?;
@@ -317,7 +350,7 @@ impl Target<'_> {
             .step_by(THIN)
             .flat_map(|y| (BORDER_PX..width.saturating_sub(BORDER_PX)).step_by(THIN).map(move |x| (y, x)));
         for (y, x) in places {
-            let truth = self.alpha(pair.far, y, x);
+            let truth = (self.truth_of)(optics, self.place(pair.far, y, x));
             if truth.abs() > LEARNED {
                 continue;
             }

@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use super::{BORDER_PX, Level, Model, STEP_PX, between};
+use super::{BORDER_PX, Level, Model, MovedRow, STEP_PX};
 use crate::prepare::warp::{Warp, middle};
 
 /// Least RMS difference of the bands for the outlier limit: that of equal images is 0.
@@ -143,7 +143,6 @@ fn sums_of_row<const N: usize>(
     let mut normal = [[NONE; N]; N];
     let (mut right, mut squares, mut count) = ([NONE; N], NONE, 0_usize);
     let row_of_field = ((y as f64 - centre[1]) / unit) as f32;
-    let [above, here, below] = [y - 1, y, y + 1].map(|y| &far[y * width..(y + 1) * width]);
     // Where nothing is displaced nothing is interpolated.
     let in_place = match level.near.as_slice() {
         Some(near) if *warp == Warp::IDENTITY && y + 1 + BORDER_PX < level.near.nrows() => {
@@ -151,31 +150,25 @@ fn sums_of_row<const N: usize>(
         }
         _ => &[],
     };
+    let row = MovedRow::new(&level.near, warp, y, BORDER_PX..width - BORDER_PX);
     for left in (BORDER_PX..width - BORDER_PX).step_by(SIDE_BY_SIDE) {
-        let (mut gx, mut gy, mut difference, mut present, mut column) = (NONE, NONE, NONE, NONE, NONE);
-        if let Some(near) = in_place.get(left..left + SIDE_BY_SIDE) {
-            for i in 0..SIDE_BY_SIDE {
-                let x = left + i;
-                gx[i] = 0.5 * (here[x + 1] - here[x - 1]);
-                gy[i] = 0.5 * (below[x] - above[x]);
-                difference[i] = near[i] - here[x];
-                column[i] = ((x as f64 - centre[0]) / unit) as f32;
-            }
-            present = [1.0; SIDE_BY_SIDE];
-            count += SIDE_BY_SIDE;
+        let [start, end] =
+            [row.inside.start, row.inside.end].map(|column| column.clamp(left, left + SIDE_BY_SIDE) - left);
+        let (mut near, mut present) = (NONE, NONE);
+        match in_place.get(left..left + SIDE_BY_SIDE) {
+            Some(values) => near.copy_from_slice(values),
+            None => (start..end).for_each(|i| near[i] = row.value(left + i)),
         }
-        let first = if present[0] > 0.0 { SIDE_BY_SIDE } else { 0 };
-        for i in first..SIDE_BY_SIDE.min(width - BORDER_PX - left) {
-            let x = left + i;
-            if let Some(near) = between(&level.near, warp.at([x as f64, y as f64])) {
-                gx[i] = 0.5 * (here[x + 1] - here[x - 1]);
-                gy[i] = 0.5 * (below[x] - above[x]);
-                difference[i] = near - here[x];
-                present[i] = 1.0;
-                column[i] = ((x as f64 - centre[0]) / unit) as f32;
-                count += 1;
-            }
-        }
+        present[start..end].fill(1.0);
+        count += end - start;
+        // Beyond the row's end are pixels of the next one, without weight.
+        let at = y * width + left;
+        let [before, here, after, above, below] =
+            [at - 1, at, at + 1, at - width, at + width].map(|from| &far[from..from + SIDE_BY_SIDE]);
+        let gx: [f32; SIDE_BY_SIDE] = std::array::from_fn(|i| 0.5 * (after[i] - before[i]));
+        let gy: [f32; SIDE_BY_SIDE] = std::array::from_fn(|i| 0.5 * (below[i] - above[i]));
+        let difference: [f32; SIDE_BY_SIDE] = std::array::from_fn(|i| near[i] - here[i]);
+        let column = std::array::from_fn(|i| (((left + i) as f64 - centre[0]) / unit) as f32);
         let weight: [f32; SIDE_BY_SIDE] = std::array::from_fn(|i| {
             let relative = difference[i] * of_scale;
             present[i] / (1.0 + relative * relative)
