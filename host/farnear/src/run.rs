@@ -4,7 +4,7 @@ use anyhow::Result;
 use clap::Args;
 use farnear_workflows::{
     Context,
-    request::{CameraRequest, Request, RigRequest},
+    request::{CameraRequest, Request, RigRequest, outputs},
 };
 
 use crate::{
@@ -31,7 +31,7 @@ impl<R: Request + Args> Run<R> {
 
     fn run_in(self, context: &Context<'_>) -> Result<()> {
         let Self { request, json } = self;
-        request.check()?;
+        outputs::check(&request)?;
         let figures = request.run(context)?;
         report::print(&figures, json)?;
         Ok(R::verdict(&figures)?)

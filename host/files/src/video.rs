@@ -63,6 +63,11 @@ pub enum VideoError {
     SameStem { first: PathBuf, second: PathBuf },
     #[error("{}: a link to a file that does not exist, or no file: restore the picture, or remove the name", path.display())]
     NotAFile { path: PathBuf },
+    #[error(
+        "{}: a pipe, a device or another file that can be read only once; a video is read twice: save it as a file, and name that",
+        path.display()
+    )]
+    NotRegular { path: PathBuf },
     #[error("{}: no frame in this video", path.display())]
     NoFrames { path: PathBuf },
     #[error("{}: not a picture that can be read: {reason}", path.display())]
@@ -124,11 +129,14 @@ impl std::fmt::Debug for Video {
 }
 
 impl Video {
-    /// Opens a folder of pictures, a `.y4m` file, or any other file through ffmpeg. Frames report later errors.
+    /// Opens a folder of pictures, a `.y4m` file, or any other file through ffmpeg. Frames report later errors. Fails for pipes
+    /// and devices, because their times, or a background that is learned first, need a second reading.
     pub fn open(path: &Path) -> Result<Self, VideoError> {
         let metadata = path.metadata().map_err(|source| VideoError::io(path, source))?;
         let (frames, remark) = if metadata.is_dir() {
             (Frames::Direct(Box::new(pictures::open(path)?)), None)
+        } else if !metadata.is_file() {
+            return Err(VideoError::NotRegular { path: path.into() });
         } else if path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("y4m")) {
             let file = std::fs::File::open(path).map_err(|source| VideoError::io(path, source))?;
             let video = y4m::Y4m::new(path, io::BufReader::new(file))?;
@@ -256,6 +264,19 @@ mod tests {
         assert!(matches!(empty, VideoError::NoPictures { .. }), "{empty}");
         let missing = Video::open(&folder.path().join("none.y4m")).unwrap_err();
         assert!(missing.to_string().contains("none.y4m"), "{missing}");
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_pipe_is_refused_without_waiting() {
+        let folder = tempfile::tempdir().unwrap();
+        for name in ["walk.y4m", "walk.mp4"] {
+            let pipe = folder.path().join(name);
+            assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+            let error = Video::open(&pipe).unwrap_err();
+            assert!(matches!(error, VideoError::NotRegular { .. }), "{error}");
+            assert!(error.to_string().contains(name) && error.to_string().contains("save it"), "{error}");
+        }
     }
 
     #[test]

@@ -76,8 +76,9 @@ pub fn names<'a>(all: impl Iterator<Item = &'a String>) -> Vec<String> {
     all.cloned().collect::<BTreeSet<_>>().into_iter().collect()
 }
 
-/// Selects space, sharpness and classifier for clips with equal views; labels index `classes`. Uses the first
-/// values for fewer than two subjects. One choice serves all arrangements: their answers count together.
+/// Selects space, sharpness and classifier for clips with equal views; labels index `classes`. Clips of classes
+/// that the other folds lack do not count; without any other clip, the first values are used. One choice serves all
+/// arrangements: their answers count together.
 /// Fails if a space cannot be learned, or with [`EmbeddingError::Stopped`].
 pub fn choose(
     clips: &[&Clip],
@@ -89,10 +90,14 @@ pub fn choose(
     let subjects = names(clips.iter().map(|clip| &clip.subject));
     let folds = experiment.inner_folds.clamp(2, subjects.len().max(2));
     let place = |names: &[String], name: &String| names.iter().position(|n| n == name).unwrap_or(0);
+    let labels: Vec<usize> = clips.iter().map(|clip| place(classes, &clip.activity)).collect();
+    let group: Vec<usize> = clips.iter().map(|clip| place(&subjects, &clip.subject) % folds).collect();
+    let taught = |i: usize| (0..clips.len()).any(|j| labels[j] == labels[i] && group[j] != group[i]);
     let problem = Problem {
         clips,
-        labels: clips.iter().map(|clip| place(classes, &clip.activity)).collect(),
-        group: clips.iter().map(|clip| place(&subjects, &clip.subject) % folds).collect(),
+        counted: (0..clips.len()).filter(|&i| taught(i)).collect(),
+        labels,
+        group,
         classes: classes.len(),
         folds,
         arrangements: {
@@ -105,7 +110,7 @@ pub fn choose(
     let mut galleries = Galleries::default();
     let single =
         experiment.sweeps.is_empty() && experiment.sharpness.len() * experiment.classifiers.len() == 1;
-    let compare = !single && subjects.len() > 1;
+    let compare = !single && !problem.counted.is_empty();
     let mut best = problem.best_of(&experiment.space, &mut galleries, compare)?;
     if compare {
         for sweep in &experiment.sweeps {
@@ -116,7 +121,7 @@ pub fn choose(
                 }
             }
         }
-        let of = clips.len() * problem.arrangements.len();
+        let of = problem.counted.len() * problem.arrangements.len();
         best.chosen.inner_accuracy = Some(best.right as f64 / of.max(1) as f64);
     }
     Ok(best.chosen)
@@ -126,6 +131,8 @@ struct Problem<'a> {
     clips: &'a [&'a Clip],
     labels: Vec<usize>,
     group: Vec<usize>,
+    /// Clips that a fold of other subjects can name.
+    counted: Vec<usize>,
     classes: usize,
     folds: usize,
     arrangements: Vec<Vec<usize>>,
@@ -190,8 +197,9 @@ impl Problem<'_> {
         (0..self.folds)
             .into_par_iter()
             .map(|fold| {
-                let all = 0..self.labels.len();
-                let (held, kept): (Vec<usize>, Vec<usize>) = all.partition(|&i| self.group[i] == fold);
+                let kept: Vec<usize> = (0..self.labels.len()).filter(|&i| self.group[i] != fold).collect();
+                let held: Vec<usize> =
+                    self.counted.iter().copied().filter(|&i| self.group[i] == fold).collect();
                 let (gram, labels) = (gram.view(), self.labels.as_slice());
                 kind.right(&Fold { gram, kept: &kept, held: &held, labels, classes: self.classes })
             })

@@ -104,6 +104,12 @@ impl SavedPattern {
     }
 }
 
+/// Whether a file that begins with `bytes` is a model, of any version.
+#[must_use]
+pub fn is_model(bytes: &[u8]) -> bool {
+    bytes.starts_with(MAGIC)
+}
+
 type SavedAuxiliary = (Vec<u8>, Array2<f32>, Limits);
 
 fn framed(version: u32, body: &[u8]) -> Vec<u8> {

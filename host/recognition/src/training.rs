@@ -35,7 +35,7 @@ impl Recogniser {
     }
 
     /// Trains with settings chosen by cross-validation over the subjects. Also returns the accuracy over the
-    /// folds (slightly optimistic), `None` without alternatives or with one subject. `watch` may stop it.
+    /// folds (slightly optimistic), `None` without alternatives or activities of several subjects. `watch` may stop it.
     pub fn train_searched(
         clips: &[Clip],
         experiment: &Experiment,

@@ -51,7 +51,7 @@ pub fn read(bytes: &[u8], extension: &str, choices: Choices) -> Result<Recording
 }
 
 pub fn read_keypoint_files<'a>(
-    files: impl IntoIterator<Item = &'a [u8]>,
+    files: impl IntoIterator<Item = (&'a str, &'a [u8])>,
     choices: Choices,
 ) -> Result<Recording, RecordingError> {
     settled(keypoints::read_files(files, choices)?, choices)

@@ -1,6 +1,7 @@
 //! Request structs, one per task, shared by the command line, the page, batch and Python. Doc comments are
 //! the help text; [`Default`] holds the defaults.
 
+pub mod outputs;
 pub mod reference;
 
 use std::path::{Path, PathBuf};
@@ -238,7 +239,7 @@ impl Task {
             paths: R::PATHS,
             job: |fields, base| {
                 let request: R = parse(fields.clone(), Paths::RelativeTo(base))?;
-                request.check()?;
+                outputs::check(&request)?;
                 Ok(Box::new(Parsed { request, fields, base: base.to_path_buf() }))
             },
         }

@@ -1,8 +1,14 @@
-//! Result folders: a run removes files of an earlier run that it does not write itself.
+//! Result folders: a run removes files of an earlier run that it does not write itself. Of other files, only a model may be
+//! replaced by a model.
 
-use std::{fs, path::Path};
+use std::{
+    fs::{self, File},
+    io::{self, Read},
+    path::Path,
+};
 
 use farnear_files::staging::{Staging, StagingError};
+use farnear_recognition::model_file::is_model;
 
 use crate::{
     batch::RECORD as BATCH_RECORD,
@@ -52,6 +58,29 @@ pub(crate) fn stack(out: &Path, images: &Path) -> Result<Staging, StagingError> 
     }
     let stale_batch = batch_of(out, "focus-stack");
     Ok(Staging::into_folder(out)?.replacing(STACK_RECORD, STACK_FILES.into_iter().chain(stale_batch)))
+}
+
+/// Checks that a model may be written to `out`: a file that exists is a model or empty.
+pub(crate) fn check_model(out: &Path) -> Result<()> {
+    match may_become_model(out) {
+        Ok(true) => Ok(()),
+        Ok(false) => {
+            let expected = "it exists and is not a model of farnear: name another file, or move it away";
+            Err(WorkflowError::parameter("out", out.display(), expected))
+        }
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
+        Err(error) => Err(WorkflowError::read("the file to replace", out)(error)),
+    }
+}
+
+fn may_become_model(out: &Path) -> io::Result<bool> {
+    // Opening a pipe would wait for its other end.
+    if !out.metadata()?.is_file() {
+        return Ok(false);
+    }
+    let mut first = Vec::new();
+    File::open(out)?.take(64).read_to_end(&mut first)?;
+    Ok(first.is_empty() || is_model(&first))
 }
 
 /// A batch's record of such a job: it lists files that will be replaced.

@@ -108,6 +108,12 @@ fn other_samples_can_be_learned_from_but_never_the_same_people() {
     // Training without p0 is the same as leaving p0 out.
     let left_out = figures(&mut evaluate(&one, &["--train", &people.samples, "--leave-one-subject-out"]));
     assert_eq!(found["confusion"], left_out["confusion"]);
+    let renamed =
+        fs::read_to_string(&one).expect("samples").replace("activity = \"dig\"", "activity = \"delve\"");
+    let renamed = people.folder.file("people/renamed.toml", renamed);
+    let apart = figures(&mut evaluate(&renamed, &["--train", &others]));
+    assert_eq!((number(&apart, "answers"), &apart["not_known"]), (2.0, &serde_json::json!(["delve"])));
+    assert!(found["not_known"].is_null(), "{found}");
     fails(&mut evaluate(&one, &["--train", &people.samples]), 1, &["`p00`", "--leave-one-subject-out"]);
     fails(&mut evaluate(&one, &["--leave-one-subject-out"]), 1, &["at least 3 subjects", "1"]);
     fails(&mut evaluate(&one, &[]), 2, &["--leave-one-subject-out", "--train"]);
@@ -238,6 +244,14 @@ fn damaged_models_and_samples_are_named_and_nothing_is_written() {
     fs::create_dir(people.folder.path("mixed")).expect("a folder");
     GrayImage::new(50, 40).save(people.folder.path("mixed/0.png")).expect("a picture");
     GrayImage::new(51, 40).save(people.folder.path("mixed/1.png")).expect("a picture");
+    // An earlier model is replaced, other files are not.
+    people.folder.file("whole.fnm", "farnearA, damaged");
+    for file in [&people.samples, &people.folder.file("notes.txt", "mine")] {
+        let before = fs::read(file).expect("a file");
+        let train = ["activity", "train", &people.samples, "--no-search", "--out", file];
+        fails(&mut farnear(&train), 2, &[file.as_str(), "not a model", "name another file"]);
+        assert_eq!(fs::read(file).expect("a file"), before);
+    }
     succeeds(&mut farnear(&[
         "activity",
         "train",

@@ -175,13 +175,15 @@ fn doubtful_frames_are_flagged() {
 fn nights_and_wrong_files_are_refused() {
     let folder = Folder::new();
     save(&folder, "masks/a1.png", |y, x| if person(y, x) { 255 } else { 0 });
+    save(&folder, "white/a1.png", |y, x| if person(y, x) { 0 } else { 255 });
     save(&folder, "none/readme.png", |_, _| 0);
     std::fs::remove_file(folder.path("none/readme.png")).expect("the file");
     let camera = folder.file("camera.toml", CAMERA);
     let wide = folder.file("wide.toml", format!("{CAMERA}width_px = 1280\n"));
     let wrong = folder.file("wrong.toml", CAMERA.replace("1.5", "-1.5"));
     let unknown = folder.file("unknown.toml", format!("{CAMERA}hight = 3\n"));
-    let [masks, none, absent, out] = ["masks", "none", "absent.toml", "out"].map(|name| folder.text(name));
+    let [masks, white, none, absent, out] =
+        ["masks", "white", "none", "absent.toml", "out"].map(|name| folder.text(name));
     let before = folder.listing();
     let noon = "2014-06-23T12:00:00Z";
     for (masks, camera, time, phrases) in [
@@ -196,6 +198,7 @@ fn nights_and_wrong_files_are_refused() {
         (&masks, &unknown, noon, vec!["unknown.toml", "hight"]),
         (&masks, &wide, noon, vec!["a1", "480 x 640", "480 x 1280"]),
         (&none, &camera, noon, vec!["none", "no picture"]),
+        (&white, &camera, noon, vec!["white", "96 %", "black on white"]),
     ] {
         let arguments = ["shadow", "remove", masks, "--camera", camera, "--time", time, "--out", &out];
         fails(farnear(&arguments).args(["--lat", "52.38", "--lon", "-1.56"]), 1, &phrases);

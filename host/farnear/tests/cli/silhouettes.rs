@@ -141,6 +141,25 @@ fn a_video_without_a_usable_frame_says_why() {
 }
 
 #[test]
+fn learning_decides_what_becomes_background() {
+    let root = tempfile::tempdir().unwrap();
+    let video = root.path().join("video");
+    fs::create_dir(&video).unwrap();
+    // The block stops after four steps.
+    for frame in 0..130 {
+        picture(frame.min(EMPTY_FRAMES + 4)).save(video.join(format!("in{frame:04}.png"))).unwrap();
+    }
+    let masked = |learning: &[&str], out: &str| {
+        let out = root.path().join(out);
+        let options = ["silhouettes", "video", "--history-frames", "50"];
+        farnear().args(options).args(learning).arg("--out").arg(&out).arg(&video).assert().success();
+        bounds(&mask(&out, "in0129.png")).is_some()
+    };
+    assert!(masked(&[], "usual") && masked(&["--learning", "never"], "never"));
+    assert!(!masked(&["--learning", "always"], "always"));
+}
+
+#[test]
 fn centred_masks_are_100x100_and_filled_to_the_height() {
     let root = tempfile::tempdir().unwrap();
     let (video, out) = (folder(root.path()), root.path().join("masks"));
@@ -208,6 +227,22 @@ fn bad_input_is_named_and_leaves_nothing_behind() {
     fails(&mut run(&broken), &out, &["broken.y4m", "header"]);
     fs::write(&broken, b"YUV4MPEG2 W4 H4 F25:1\n").unwrap();
     fails(&mut run(&broken), &out, &["no frame"]);
+}
+
+#[test]
+fn labels_in_the_place_of_the_masks_are_refused_before_the_work() {
+    let root = tempfile::tempdir().unwrap();
+    let (video, out) = (folder(root.path()), root.path().join("masks"));
+    for labels in [out.clone(), out.join("labels"), video.join("../masks")] {
+        let mut command = farnear();
+        command.args(["silhouettes", "video", "--out"]).arg(&out).arg("--labels").arg(&labels).arg(&video);
+        let output = command.output().unwrap();
+        let text = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(2), "{text}");
+        let expected = format!("labels {}: expected another place", labels.display());
+        assert!(text.contains(&expected), "{text}");
+        assert!(!out.exists());
+    }
 }
 
 #[test]

@@ -121,11 +121,9 @@ impl Timing {
 
     /// Notice to the user about irregular times and pixels that are not square.
     pub fn remark(&self) -> Option<String> {
-        let read = (self.seconds * self.rate_hz).round() as usize + 1;
         let times = (!self.regular).then(|| {
             format!(
-                "the frame rate varies: {} frames in {:.2} s, at most {:.2} s apart; resampled by their time stamps to {read} \
-                 frames at {:.2} frames/s",
+                "the frame rate varies: {} frames in {:.2} s, at most {:.2} s apart; resampled by their time stamps to {:.2} frames/s",
                 self.frames, self.seconds, self.longest_s, self.rate_hz
             )
         });
@@ -190,7 +188,9 @@ mod tests {
             (0..90).filter(|n| n % 7 != 3).map(|n| f64::from(n) / 30.0 + f64::from(n % 3) * 0.003).collect();
         let timing = Timing::of_times(times).expect("times");
         assert_eq!((timing.regular, timing.rate_hz), (false, 30.0));
-        assert!(timing.remark().expect("a remark").contains("30.00 frames/s"));
+        let remark = timing.remark().expect("a remark");
+        // The number of frames that can be decoded is not known yet.
+        assert!(remark.ends_with("by their time stamps to 30.00 frames/s"), "{remark}");
     }
 
     #[test]

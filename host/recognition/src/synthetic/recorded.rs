@@ -11,7 +11,7 @@ use farnear_silhouettes::silhouette::{
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 /// A person's body frame by frame, millimetres, z up.
 #[derive(Clone, Debug)]
@@ -34,7 +34,7 @@ const LOOKS: usize = 8;
 /// A recording from `count` sides, one track each; fewer without a visible person.
 pub fn tracks(bodies: &Bodies, rate_hz: f64, count: usize, seed: u64, scaling: Scaling) -> Vec<Track> {
     let mut bodies = bodies.clone();
-    bodies.drop_empty();
+    bodies.drop_undrawn();
     let Some(stature_mm) = bodies.set_down() else { return Vec::new() };
     (0..count)
         .into_par_iter()
@@ -86,10 +86,16 @@ impl Bodies<'_> {
         }
     }
 
-    fn drop_empty(&mut self) {
+    /// Keeps points that the template draws, and frames with any.
+    fn drop_undrawn(&mut self) {
         match self {
             Self::Capsules(frames) => frames.retain(|body| body.iter().any(Capsule::is_finite)),
-            Self::Parts(frames, _) => frames.retain(|points| !points.is_empty()),
+            Self::Parts(frames, template) => {
+                let markers = template.parts.iter().flat_map(|part| &part.markers);
+                let drawn: HashSet<&str> = markers.map(String::as_str).collect();
+                frames.iter_mut().for_each(|points| points.retain(|name, _| drawn.contains(*name)));
+                frames.retain(|points| !points.is_empty());
+            }
         }
     }
 
@@ -211,7 +217,7 @@ mod tests {
         )
         .expect("a template");
         let bodies = capsules(60);
-        let frames = bodies
+        let frames: Vec<HashMap<&str, Point3>> = bodies
             .iter()
             .map(|body| {
                 [
@@ -223,7 +229,16 @@ mod tests {
                 .into()
             })
             .collect();
+        // A tripod that no part names, also before the person comes.
+        let before = vec![HashMap::new(); 20];
+        let with_tripod = before.iter().chain(&frames).map(|frame| {
+            let mut frame: HashMap<&str, Point3> = frame.clone();
+            frame.insert("tripod", [12_000.0, 500.0, -800.0]);
+            frame
+        });
+        let with_tripod = Bodies::Parts(with_tripod.collect(), template.clone());
         let suit = tracks(&Bodies::Parts(frames, template), 30.0, 4, 9, Scaling::default());
+        assert_eq!(tracks(&with_tripod, 30.0, 4, 9, Scaling::default()), suit);
         let post = tracks(&Bodies::Capsules(bodies), 30.0, 4, 9, Scaling::default());
         for (a, b) in suit.iter().zip(&post) {
             assert_eq!(a.frames(), b.frames());

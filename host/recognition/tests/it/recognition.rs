@@ -2,7 +2,7 @@
 
 use farnear_recognition::auxiliary_model::AuxiliaryModel;
 use farnear_recognition::choice::names;
-use farnear_recognition::classifier::ClassifierKind;
+use farnear_recognition::classifier::{ClassifierKind, Family};
 use farnear_recognition::clip::Clip;
 use farnear_recognition::embedding::descriptor::Scaling;
 use farnear_recognition::evaluation::leave_one_out::leave_one_subject_out;
@@ -13,6 +13,7 @@ use farnear_recognition::model::{ModelError, Recogniser, RecogniserSettings};
 use farnear_recognition::space::{PatternKind, SpaceSettings};
 use farnear_recognition::synthetic::activities::{clips, performance};
 use farnear_recognition::unknown::Limits;
+use farnear_recognition::watch::Unwatched;
 use farnear_silhouettes::mask::Mask;
 use farnear_silhouettes::silhouette::view::{Canvas, draw, extent, views_round};
 use ndarray::Array2;
@@ -75,6 +76,19 @@ fn unseen_people_are_recognised_and_neither_order_nor_speed_matters_much() {
     assert!((free - plain).abs() < 0.02, "{free} {plain}");
     let ordered = evaluated(Mode::Ordered);
     assert!(ordered > 0.75, "{ordered}");
+}
+
+#[test]
+fn activities_of_one_subject_each_have_no_inner_accuracy() {
+    let mut people = clips(2, 1, 8.0, Scaling::KeepAspect);
+    let searched = Experiment { classifiers: Family::Knn.tried(), ..experiment(Mode::OrderFree) };
+    let accuracy = |people: &[Clip]| {
+        let trained = Recogniser::train_searched(people, &searched, Scaling::KeepAspect, &Unwatched);
+        trained.expect("trained").1
+    };
+    assert!(accuracy(&people).is_some());
+    people.iter_mut().for_each(|clip| clip.subject.clone_from(&clip.activity));
+    assert_eq!(accuracy(&people), None);
 }
 
 fn trained() -> &'static (Vec<Clip>, Recogniser) {

@@ -34,6 +34,8 @@ pub const fn component_len(channels: usize) -> usize {
     (MEAN + channels) * TILE
 }
 
+pub const VARIANCE_OFFSET: usize = VARIANCE * TILE;
+
 /// Offset of a channel's means within a component.
 pub const fn mean_offset(channel: usize) -> usize {
     (MEAN + channel) * TILE

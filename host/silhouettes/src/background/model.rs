@@ -209,6 +209,28 @@ impl BackgroundModel {
         }))
     }
 
+    /// Replaces the background by the frame's pixels where `places` is set. Both have the model's size and channels.
+    pub fn replace(&mut self, frame: Frame<'_>, places: &Array2<bool>) {
+        let component_len = kernel::component_len(self.channels);
+        let stride = self.used.len() * component_len;
+        let (_, width) = self.size;
+        for ((row, column), _) in places.indexed_iter().filter(|(_, set)| **set) {
+            let (tile, lane) = split(row * width + column);
+            let first = tile * component_len + lane;
+            for component in 0..usize::from(self.used[tile]) {
+                self.state[first + component * stride] = if component == 0 { 1.0 } else { 0.0 };
+            }
+            self.state[first + kernel::VARIANCE_OFFSET] = self.settings.initial_variance;
+            for channel in 0..self.channels {
+                let level = match frame {
+                    Frame::Grey(pixels) => pixels[[row, column]],
+                    Frame::Rgb(pixels) => pixels[[row, column, channel]],
+                };
+                self.state[first + kernel::mean_offset(channel)] = f32::from(level);
+            }
+        }
+    }
+
     fn update<const CHANNELS: usize>(&mut self, pixels: &[u8], rate: f32, held: &[bool]) {
         self.arch.dispatch(Update::<CHANNELS> {
             settings: &self.settings,
@@ -364,6 +386,24 @@ mod tests {
                     (0..5).map(|k| model.state[k * stride + tile * component_len + lane]).collect();
                 assert!((weights.iter().sum::<f32>() - 1.0).abs() < 1e-5, "{weights:?}");
                 assert!(weights.windows(2).all(|pair| pair[0] >= pair[1]), "{weights:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn replaced_pixels_know_only_the_new_background() {
+        let size = (8, 20);
+        let level = |level: u8| Array3::from_elem((8, 20, 3), level);
+        let mut model = BackgroundModel::new(size, 3, Settings::default()).unwrap();
+        for number in 0..40 {
+            model.apply(Frame::Rgb(level(if number % 2 == 0 { 60 } else { 120 }).view())).unwrap();
+        }
+        let places = Array2::from_shape_fn(size, |(row, column)| row == 2 && (14..18).contains(&column));
+        model.replace(Frame::Rgb(level(200).view()), &places);
+        for (shade, new) in [(200, true), (60, false)] {
+            let labels = model.apply_at(Frame::Rgb(level(shade).view()), 0.0).unwrap();
+            for (place, label) in places.iter().zip(&labels) {
+                assert_eq!(*label == Label::Background, *place == new, "{shade}");
             }
         }
     }

@@ -12,7 +12,7 @@ use super::{
 };
 use crate::background::{
     BackgroundError, BackgroundModel, Frame, Label, Settings,
-    light::{Light, STEP_PX},
+    light::{Light, Relit, STEP_PX},
     shake::{self, Shift},
 };
 
@@ -117,9 +117,13 @@ struct Sighted {
     people: Result<(Mask, Vec<Person>), Flag>,
     labels: Array2<Label>,
     shift: Shift,
+    /// The frame in the background's light and place; `None` if it is there already.
+    seen: Option<Relit>,
 }
 
 const ANEW: f32 = 1.0 / 15.0;
+/// Least memory of [`Extractor::learn`], frames. With a shorter one people who enter early are learned.
+const SHORTEST_MEMORY: u32 = 30;
 
 impl Extractor {
     pub fn like(frame: Frame<'_>, settings: ExtractorSettings) -> Result<Self, BackgroundError> {
@@ -133,21 +137,41 @@ impl Extractor {
         })
     }
 
-    /// Learns a frame without choosing a subject; people are excluded if [`Learning`] says so. Fails for a
-    /// frame of another size or kind and leaves the extractor unchanged.
+    /// Learns a frame without choosing a subject, outside people except for [`Learning::Always`]. Fails for a frame of
+    /// another size or kind and leaves the extractor unchanged.
+    ///
+    /// The first frames teach their people too. So the memory is half of the frames seen: at the end the first tenth has a
+    /// weight of about 1 %, and not of 30 % as at the model's usual rate.
     pub fn learn(&mut self, frame: Frame<'_>) -> Result<(), BackgroundError> {
-        let usual = self.settings.learning;
-        if usual != Learning::Always {
-            self.settings.learning = Learning::OutsidePeople;
-        }
-        let learned = self.sighted(frame).map(|_| ());
-        self.settings.learning = usual;
-        learned
+        let usual = self.model.usual_rate();
+        let memory = (self.model.frames_seen() / 2).max(SHORTEST_MEMORY);
+        let rate =
+            if self.settings.learning == Learning::Always { usual } else { usual.max(1.0 / memory as f32) };
+        self.sighted(frame, rate).map(|_| ())
+    }
+
+    /// Goes back to the first frame of a learned video. The background is kept, and no more frames are only learned.
+    pub fn rewind(&mut self, first: Frame<'_>) {
+        self.settings.learning_frames = 0;
+        self.feedback.forget();
+        self.light = Light::unchanged(self.model.channels());
+        self.adapted(first);
+        self.changes_of_light = 0;
     }
 
     /// Processes the next frame. After an error the extractor is unchanged.
     pub fn extract(&mut self, frame: Frame<'_>) -> Result<Extracted, BackgroundError> {
-        let Sighted { people, labels, shift } = self.sighted(frame)?;
+        self.extract_without(frame, |_, _, _| Ok(()))
+    }
+
+    /// [`Self::extract`] without the pixels that `remove` unsets in the subject's mask. It gets the frame in the light and
+    /// place of the background.
+    pub fn extract_without<E: From<BackgroundError>>(
+        &mut self,
+        frame: Frame<'_>,
+        remove: impl FnOnce(Frame<'_>, &BackgroundModel, &mut Mask) -> Result<(), E>,
+    ) -> Result<Extracted, E> {
+        let Sighted { people, labels, shift, seen } = self.sighted(frame, self.rate())?;
         let mut subject = match people {
             Ok((_, people)) => self.chooser.among(people, labels.dim()),
             Err(flag) => {
@@ -157,17 +181,25 @@ impl Extractor {
         if subject.bounds.is_some_and(|bounds| self.feedback.stopped(bounds)) {
             subject.flags.push(Flag::StoppedMoving);
         }
+        match &seen {
+            Some(seen) => remove(seen.frame(), &self.model, &mut subject.mask)?,
+            None => remove(frame, &self.model, &mut subject.mask)?,
+        }
         if shift != (0, 0) {
             subject.mask = shake::moved_forth(&subject.mask, shift, false);
-            subject.bounds = subject.bounds.and_then(|_| BoundingBox::of(subject.mask.view()));
-            return Ok(Extracted { subject, labels: shake::moved_forth(&labels, shift, Label::Background) });
         }
+        if subject.bounds.is_some() {
+            subject.bounds = BoundingBox::of(subject.mask.view());
+            subject.flags.extend(subject.bounds.is_none().then_some(Flag::Empty));
+        }
+        let labels =
+            if shift == (0, 0) { labels } else { shake::moved_forth(&labels, shift, Label::Background) };
         Ok(Extracted { subject, labels })
     }
 
     /// [`Self::extract`] for all moving regions.
     pub fn moving(&mut self, frame: Frame<'_>) -> Result<Moving, BackgroundError> {
-        let Sighted { people, labels, shift } = self.sighted(frame)?;
+        let Sighted { people, labels, shift, .. } = self.sighted(frame, self.rate())?;
         let moving = Moving { mask: people.map(|(mask, _)| mask), labels };
         if shift == (0, 0) {
             return Ok(moving);
@@ -193,41 +225,50 @@ impl Extractor {
         if learns { self.model.usual_rate() } else { 0.0 }
     }
 
-    fn sighted(&mut self, frame: Frame<'_>) -> Result<Sighted, BackgroundError> {
+    fn sighted(&mut self, frame: Frame<'_>, rate: f32) -> Result<Sighted, BackgroundError> {
+        let (shift, seen) = self.adapted(frame);
+        let sighted = match &seen {
+            Some(seen) => self.sighted_in_place(seen.frame(), rate)?,
+            None => self.sighted_in_place(frame, rate)?,
+        };
+        Ok(Sighted { shift, seen, ..sighted })
+    }
+
+    /// The frame's shift, and the frame in the background's light and place; `None` if it is there already.
+    fn adapted(&mut self, frame: Frame<'_>) -> (Shift, Option<Relit>) {
         let alone = self.settings.learning != Learning::Always;
         let known = self.model.frames_seen() >= self.settings.learning_frames.max(1);
         let same_kind = frame.size() == self.model.size() && frame.channels() == self.model.channels();
         if !(alone && known && same_kind) {
-            return self.sighted_in_place(frame, (0, 0));
+            return ((0, 0), None);
         }
         let shift = self.model.shift(frame, STEP_PX);
-        if shift != (0, 0) {
-            let back = shake::moved_back(frame, shift);
-            return self.sighted_in_old_light(back.frame(), shift);
-        }
-        self.sighted_in_old_light(frame, shift)
+        let back = (shift != (0, 0)).then(|| shake::moved_back(frame, shift));
+        let relit = match &back {
+            Some(back) => self.relit(back.frame()),
+            None => self.relit(frame),
+        };
+        (shift, relit.or(back))
     }
 
-    fn sighted_in_old_light(&mut self, frame: Frame<'_>, shift: Shift) -> Result<Sighted, BackgroundError> {
+    /// The frame in the background's light; `None` if it is unchanged.
+    fn relit(&mut self, frame: Frame<'_>) -> Option<Relit> {
         let pairs = self.model.compared(frame, STEP_PX);
         if let Some(light) = self.light.changed(&pairs) {
             self.light = light;
             self.changes_of_light += 1;
         }
-        match self.light.relit(frame) {
-            Some(relit) => self.sighted_in_place(relit.frame(), shift),
-            None => self.sighted_in_place(frame, shift),
-        }
+        self.light.relit(frame)
     }
 
-    fn sighted_in_place(&mut self, frame: Frame<'_>, shift: Shift) -> Result<Sighted, BackgroundError> {
+    fn sighted_in_place(&mut self, frame: Frame<'_>, rate: f32) -> Result<Sighted, BackgroundError> {
+        let of = |people, labels| Sighted { people, labels, shift: (0, 0), seen: None };
         let alone = self.settings.learning != Learning::Always;
-        let rate = self.rate();
         let held = if alone { self.feedback.held() } else { None };
         let labels = self.model.apply_outside(frame, rate, held)?;
         let moving = labels.mapv(|label| label == Label::Foreground);
         if self.model.frames_seen() <= self.settings.learning_frames {
-            return Ok(Sighted { people: Err(Flag::Learning), labels, shift });
+            return Ok(of(Err(Flag::Learning), labels));
         }
         let share = super::area(moving.view()) as f64 / moving.len() as f64;
         if share >= self.settings.scene_change_share {
@@ -236,14 +277,17 @@ impl Extractor {
                 self.model.apply_at(frame, ANEW)?;
             }
             let flag = Flag::SceneChanged { moving_percent: (100.0 * share) as u8 };
-            return Ok(Sighted { people: Err(flag), labels, shift });
+            return Ok(of(Err(flag), labels));
         }
         let mask = self.settings.cleaning.clean(moving.view());
         let people = people(mask.view(), &self.settings.subject);
         if alone {
-            self.feedback.follow(&people, frame, || self.model.background());
+            let holes = self.feedback.follow(&people, frame, || self.model.background());
+            if let Some(holes) = holes.filter(|_| rate > 0.0) {
+                self.model.replace(frame, &holes);
+            }
         }
-        Ok(Sighted { people: Ok((mask, people)), labels, shift })
+        Ok(of(Ok((mask, people)), labels))
     }
 
     #[must_use]

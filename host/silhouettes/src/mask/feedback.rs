@@ -1,7 +1,7 @@
 //! Feedback from people to the background, which would learn a motionless person within seconds. A region that entered
 //! over the picture's edge or walked is a person for as long as it exists. A region that appears and never moves is
 //! furniture, a change of light, or a hole left by a person who was part of the background; it is learned. The outline
-//! of a hole is sharper in the background than in the frame.
+//! of a hole is sharper in the background than in the frame. A hole shows the background, which is learned at once.
 
 use ndarray::ArrayView3;
 
@@ -67,17 +67,23 @@ impl Feedback {
         })
     }
 
-    /// Adds the people of a frame; `background` is the empty scene for the comparison of outlines.
+    /// Adds the people of a frame and returns the pixels of holes, if any; `background` is the empty scene for the
+    /// comparison of outlines.
     pub fn follow(
         &mut self,
         people: &[Person],
         frame: Frame<'_>,
         background: impl Fn() -> ndarray::Array3<u8>,
-    ) {
+    ) -> Option<Mask> {
         let mut order: Vec<&Person> = people.iter().collect();
         order.sort_by_key(|person| std::cmp::Reverse(person.area));
         let mut tracks = Vec::with_capacity(order.len());
-        let mut held: Option<Mask> = None;
+        let size = self.size;
+        let (mut held, mut holes) = (None, None);
+        let paint = |person: &Person, mask: &mut Option<Mask>| {
+            let mask = mask.get_or_insert_with(|| Mask::from_elem(size, false));
+            person.fragments.iter().for_each(|fragment| fragment.paint(mask, true));
+        };
         for person in order {
             let mut track = self.taken(person.bounds).unwrap_or_else(|| Track {
                 bounds: person.bounds,
@@ -95,17 +101,16 @@ impl Feedback {
             let way = (middle.0 - track.origin.0).hypot(middle.1 - track.origin.1);
             track.walked |= way >= WALKED * height || person.bounds.touches_edge(self.size);
             (track.bounds, track.middle, track.unseen_frames) = (person.bounds, middle, 0);
-            if track.walked && track.still_frames > 0 && track.still_frames % OUTLINE_FRAMES == STOPPED_FRAMES
-            {
+            if track.still_frames % OUTLINE_FRAMES == STOPPED_FRAMES {
                 let mask = person.mask(self.size);
                 let empty = background();
                 if sharpness(&mask, Frame::Rgb(empty.view())) > HOLE * sharpness(&mask, frame) {
                     (track.walked, track.origin) = (false, middle);
+                    paint(person, &mut holes);
                 }
             }
             if track.walked {
-                let held = held.get_or_insert_with(|| Mask::from_elem(self.size, false));
-                person.fragments.iter().for_each(|fragment| fragment.paint(held, true));
+                paint(person, &mut held);
             }
             tracks.push(track);
         }
@@ -118,7 +123,13 @@ impl Feedback {
         }
         self.tracks = tracks;
         let margin = (self.size.0 / MARGIN).max(2);
-        self.held = held.map(|mask| BitMask::pack(mask.view()).dilated(margin).unpack());
+        let widened = |mask: Mask| BitMask::pack(mask.view()).dilated(margin).unpack();
+        self.held = held.map(widened);
+        let mut holes = holes.map(widened);
+        if let (Some(holes), Some(held)) = (&mut holes, &self.held) {
+            holes.zip_mut_with(held, |hole, held| *hole &= !held);
+        }
+        holes
     }
 
     fn taken(&mut self, bounds: BoundingBox) -> Option<Track> {

@@ -18,7 +18,7 @@ use motion::Motion;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TrackingSettings {
     pub subject: SubjectSettings,
-    /// Frames before a new person is reported; earlier it may be a speck.
+    /// Frames, not cut by the left or right edge, before a new person is reported; earlier it may be a speck.
     pub confirmed_after_frames: usize,
     /// Frames without detection after which a person has left.
     pub gone_after_frames: usize,
@@ -76,6 +76,9 @@ const HIDDEN: f64 = 0.4;
 /// A blob up to this multiple of a person's area may hold one person.
 const ONE_ALONE: f64 = 1.15;
 const FOLLOWING: f64 = 0.2;
+/// Frames before a person is reported whom the left or right edge cuts; earlier it may be a hand or a foot of somebody who
+/// comes in or leaves.
+const CUT_FRAMES: usize = 12;
 
 #[derive(Clone, Debug)]
 struct Track {
@@ -88,6 +91,8 @@ struct Track {
     area: f64,
     seen: usize,
     missed: usize,
+    /// Frames in which neither the left nor the right edge cut the person.
+    uncut: usize,
     before: Vec<Mask>,
     /// People in the same crossing, until they separate.
     crossing: Vec<usize>,
@@ -106,6 +111,7 @@ impl Track {
             area: blob.area as f64,
             seen: 0,
             missed: 0,
+            uncut: 0,
             before: Vec::new(),
             crossing: Vec::new(),
         }
@@ -207,10 +213,12 @@ impl Tracker {
                 shared[index] = *blob;
             }
         }
-        // A single track in another's blob is not sharing it.
+        let is_cut = |track: usize| self.tracks[track].uncut < self.settings.confirmed_after_frames;
+        // A single track in another's blob is not sharing it. Tracks that the edge has always cut are pieces of one person.
         let alone: Vec<usize> = (0..shared.len())
             .filter(|&index| {
-                shared[index].is_some() && shared.iter().filter(|other| **other == shared[index]).count() == 1
+                let sharing = || (0..shared.len()).filter(|&other| shared[other] == shared[index]);
+                shared[index].is_some() && (sharing().count() == 1 || sharing().all(is_cut))
             })
             .collect();
         for index in alone {
@@ -275,9 +283,10 @@ impl Tracker {
         }
         track.correct(blob);
         (track.seen, track.missed) = (track.seen + 1, 0);
+        track.uncut += usize::from(bounds.left > 0 && bounds.right < size.1);
         let mask = blob.mask(size);
         if track.person == 0 {
-            if track.seen < self.settings.confirmed_after_frames {
+            if track.uncut < self.settings.confirmed_after_frames && track.seen < CUT_FRAMES {
                 track.before.push(mask);
                 return Sight::Missed;
             }
@@ -377,6 +386,56 @@ mod tests {
         }
         assert_eq!(parted.len(), 2, "{parted:?}");
         assert!(parted.iter().all(|parting| parting.ambiguous), "{parted:?}");
+    }
+
+    /// A body of which a hand and a foot come in over the left edge first, and leave over the right edge last.
+    fn walker(at: f64) -> Mask {
+        let mut mask = Mask::from_elem(SIZE, false);
+        for (rows, left, right) in [(20..90, 0.0, 20.0), (30..50, -18.0, 38.0), (75..90, -18.0, 38.0)] {
+            let [left, right] = [left, right].map(|x: f64| (at + x).clamp(0.0, SIZE.1 as f64) as usize);
+            mask.slice_mut(s![rows, left..right]).fill(true);
+        }
+        mask
+    }
+
+    #[test]
+    fn pieces_of_one_person_who_comes_in_over_the_edge_are_one_person() {
+        // The pieces are apart for 18 pixels: 4, 9 and 36 frames.
+        for pace in [4.0, 2.0, 0.5] {
+            let mut tracker = tracker();
+            let (mut alone, mut last) = (0, 0);
+            for n in 0..((SIZE.1 as f64 + 60.0) / pace) as usize {
+                for followed in tracker.follow(walker(n as f64 * pace - 40.0).view()) {
+                    assert!(!matches!(followed.sight, Sight::Crossing { .. }), "frame {n}: {followed:?}");
+                    if let Sight::Alone { before, .. } = &followed.sight {
+                        alone += 1 + before.len();
+                        last = last.max(followed.person);
+                    }
+                }
+            }
+            // Pieces that are apart for longer than that are numbered, but never cross.
+            assert!(pace < 1.0 || last == 1, "{last} people");
+            assert!(alone as f64 > SIZE.1 as f64 / pace * 0.9, "{alone} at {pace}");
+        }
+    }
+
+    #[test]
+    fn somebody_whom_the_edge_cuts_is_reported_later_with_all_masks() {
+        let mut tracker = tracker();
+        let found: Vec<usize> = (0..20)
+            .map(|_| tracker.follow(frame(&[(310.0, 20, 70)]).view()))
+            .map(|found| {
+                found
+                    .iter()
+                    .map(|followed| match &followed.sight {
+                        Sight::Alone { before, cut_by_edge: true, .. } => 1 + before.len(),
+                        other => panic!("{other:?}"),
+                    })
+                    .sum()
+            })
+            .collect();
+        assert_eq!(found.iter().position(|count| *count > 0), Some(CUT_FRAMES - 1));
+        assert_eq!(found.iter().sum::<usize>(), 20);
     }
 
     #[test]

@@ -155,7 +155,7 @@ fn array(name: &str, bytes: &[u8]) -> Result<Array, RecordingError> {
         .ok_or_else(|| bad("its header has no shape"))?;
     let fortran = after("'fortran_order':").is_some_and(|rest| rest.trim_start().starts_with("True"));
     let data = bytes.get(header_end.unwrap_or(0)..).unwrap_or_default();
-    let (order, letter) = kind.split_at(kind.len().min(1));
+    let (order, letter) = kind.split_at_checked(1).unwrap_or_default();
     let big = order == ">";
     let number = |raw: &[u8]| -> f64 {
         let mut raw: [u8; 8] = std::array::from_fn(|k| raw.get(k).copied().unwrap_or(0));
@@ -321,6 +321,16 @@ mod tests {
         let error =
             super::super::read(&other, "npz", Choices::default()).expect_err("no positions").to_string();
         assert!(error.contains("betas") && error.contains("joints"), "{error}");
+    }
+
+    #[test]
+    fn damaged_archives_are_read_or_refused() {
+        let file = npz(&[("joints", npy("<f4", "(1, 22, 3)", &floats(vec![0.5; 66])))]);
+        for at in 0..file.len() {
+            let mut damaged = file.clone();
+            damaged[at] ^= 0x80;
+            let _ = read(&damaged);
+        }
     }
 
     #[test]

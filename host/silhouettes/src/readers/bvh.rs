@@ -8,6 +8,7 @@ pub mod parse;
 
 use super::reader::Reader;
 use super::recording::{Found, RecordingError, text};
+use crate::silhouette::capsule::Point3;
 use kinematics::Kinematics;
 
 pub const READER: Reader = Reader {
@@ -20,8 +21,10 @@ pub const READER: Reader = Reader {
 pub fn read(bytes: &[u8]) -> Result<Found, RecordingError> {
     let motion = parse::parse(&text(bytes)?)?;
     let kinematics = Kinematics::new(&motion);
+    // Not 0, 0, 0, which is a missing marker.
+    let joint = |place: Point3| Some(if place == [0.0; 3] { [f64::MIN_POSITIVE; 3] } else { place });
     let frames =
-        motion.frames.iter().map(|frame| kinematics.places(frame).into_iter().map(Some).collect()).collect();
+        motion.frames.iter().map(|frame| kinematics.places(frame).into_iter().map(joint).collect()).collect();
     let rate_hz = 1.0 / motion.frame_time_s;
     Ok(Found {
         others: Vec::new(),

@@ -4,7 +4,7 @@
 use csv::StringRecord;
 
 use super::reader::Reader;
-use super::recording::{Found, Known, RecordingError, Source, Unit, Up, number, text};
+use super::recording::{Found, Known, RecordingError, Source, Unit, Up, number, promised_frames, text};
 use super::trc::point;
 use crate::silhouette::capsule::Point3;
 
@@ -14,6 +14,9 @@ pub const READER: Reader = Reader {
     about: "a table with columns NAME_x, NAME_y, NAME_z in millimetres, z up, or of Vicon Nexus or OptiTrack Motive",
     read: |bytes, _| read(bytes),
 };
+
+/// Motive's key of the number of frames.
+const MOTIVE_FRAMES: &str = "Total Exported Frames";
 
 /// Separated by commas, semicolons or tabs. Ignores columns without a coordinate suffix (frame number, time,
 /// visibility). Errors have their line.
@@ -137,17 +140,38 @@ fn layered(rows: &[StringRecord]) -> Result<Option<Found>, RecordingError> {
         None => header.checked_sub(2).and_then(|row| rows[row].get(0)),
     };
     let is_frame = |row: &&StringRecord| row.get(0).is_some_and(|cell| number(cell).is_some());
-    let frames = rows.iter().skip(data).take_while(is_frame).map(|row| points(row, &places));
+    let frames: Vec<&StringRecord> = rows.iter().skip(data).take_while(is_frame).collect();
+    if data + frames.len() == rows.len() {
+        check_last(&frames, &places)?;
+    }
+    let mut remarks = Vec::new();
+    if let Some(promised) = stated(MOTIVE_FRAMES).and_then(number).filter(|_| motive.is_some()) {
+        let remark = promised_frames(MOTIVE_FRAMES, promised, frames.len());
+        remarks.extend(remark.map_err(|reason| RecordingError::Line { line: 1, reason })?);
+    }
     Ok(Some(Found {
         others: Vec::new(),
         planar: false,
         names: markers,
         rate_hz: rate.and_then(number).unwrap_or_default(),
-        frames: frames.collect::<Result<_, _>>()?,
+        frames: frames.into_iter().map(|row| points(row, &places)).collect::<Result<_, _>>()?,
         unit: Found::stated_unit(unit.unwrap_or("mm")),
         up: Known { value: if motive.is_some() { Up::Y } else { Up::Z }, source: Source::Format },
-        remarks: Vec::new(),
+        remarks,
     }))
+}
+
+/// Refuses a table that ends in the middle of its last row. Programs that leave out empty cells at the end of a row do so in
+/// other rows, too.
+fn check_last(rows: &[&StringRecord], places: &[[usize; 3]]) -> Result<(), RecordingError> {
+    let width = places.iter().map(|place| place[2] + 1).max().unwrap_or(0);
+    match rows.split_last() {
+        Some((last, others)) if last.len() < width && others.iter().all(|row| row.len() >= width) => {
+            let reason = format!("{} values, the header names {width}: the file was cut short", last.len());
+            Err(RecordingError::Line { line: line(last), reason })
+        }
+        _ => Ok(()),
+    }
 }
 
 fn points(row: &StringRecord, places: &[[usize; 3]]) -> Result<Vec<Option<Point3>>, RecordingError> {
@@ -215,6 +239,14 @@ mod tests {
         );
         assert_eq!((found.rate_hz, found.unit.value.mm, found.up.value), (100.0, 10.0, Up::Z));
 
+        // Cut in the middle of a row; with empty cells left out; with another table below.
+        let cut = nexus.trim_end().trim_end_matches("8,9");
+        let error = read(cut.as_bytes()).expect_err("cut short").to_string();
+        assert!(error.starts_with("line 14: 7 values, the header names 8"), "{error}");
+        let short = read(nexus.replace(",3,,,", ",3").replace(",7,8,9", "").as_bytes()).expect("valid");
+        assert_eq!(short.frames, [vec![Some([1.0, 2.0, 3.0]), None], vec![Some([4.0, 5.0, 6.0]), None]]);
+        assert!(read(format!("{cut}\n\nModel Outputs\n100\n").as_bytes()).is_ok());
+
         let with_tabs = read(nexus.replace(',', "\t").as_bytes()).expect("valid");
         assert_eq!(with_tabs.frames, found.frames);
 
@@ -231,5 +263,14 @@ mod tests {
         assert_eq!(found.names, ["Ann:Hip", "C7"]);
         assert_eq!(found.frames, [[Some([0.1, 0.9, 0.2]), Some([0.1, 1.5, 0.2])]]);
         assert_eq!((found.rate_hz, found.unit.value.mm, found.up.value), (60.0, 1000.0, Up::Y));
+        let promising = |frames: &str| {
+            let stated = format!("Export Frame Rate,60.0,Total Exported Frames,{frames}");
+            read(motive.replace("Export Frame Rate,60.0", &stated).as_bytes())
+        };
+        let remarks = |frames: &str| promising(frames).expect("valid").remarks;
+        assert_eq!((remarks("1"), remarks("")), (Vec::new(), Vec::new()));
+        assert_eq!(remarks("2"), ["Total Exported Frames promises 2 frames, the file has 1"]);
+        let error = promising("600").expect_err("cut short").to_string();
+        assert!(error.starts_with("line 1") && error.contains("600") && error.contains("after 1"), "{error}");
     }
 }

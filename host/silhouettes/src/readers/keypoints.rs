@@ -13,7 +13,7 @@ use super::{
     recording::{Choices, Found, Known, RecordingError, Source, Unit, Up},
 };
 use crate::silhouette::capsule::Point3;
-use document::{Document, LEAST_CONFIDENCE, Person};
+use document::{Document, LEAST_CONFIDENCE};
 use layouts::NAMES;
 use people::distance;
 
@@ -33,26 +33,26 @@ const HEAD: [usize; 6] = [0, 1, 2, 3, 4, 5];
 const ANKLES: [usize; 2] = [20, 21];
 const SHOULDERS: [usize; 2] = [8, 9];
 const HIPS: [usize; 2] = [16, 17];
-/// Coordinates up to this are shares of the picture's sides, not pixels; points may be outside.
+/// Coordinates up to this are shares of the picture's sides, not pixels; points may be outside, and few far outside.
 const NORMALISED: f64 = 3.0;
+const MOST_FAR_OUTSIDE: f64 = 0.05;
 /// Aspect ratio if the file does not state it.
 const USUAL_ASPECT: f64 = 16.0 / 9.0;
 
 pub fn read(bytes: &[u8], choices: Choices) -> Result<Found, RecordingError> {
-    found(vec![Document::parse(bytes)?], choices)
+    found(Document::parse(bytes)?, choices)
 }
 
-/// Reads a folder of JSON files, one frame each, in order.
+/// Reads names and contents of a folder's JSON files, one frame each, in order.
 pub fn read_files<'a>(
-    files: impl IntoIterator<Item = &'a [u8]>,
+    files: impl IntoIterator<Item = (&'a str, &'a [u8])>,
     choices: Choices,
 ) -> Result<Found, RecordingError> {
-    found(files.into_iter().map(Document::parse).collect::<Result<Vec<Document>, RecordingError>>()?, choices)
+    found(Document::of_files(files)?, choices)
 }
 
-fn found(documents: Vec<Document>, choices: Choices) -> Result<Found, RecordingError> {
-    let size = documents.iter().find_map(|document| document.size);
-    let mut frames: Vec<Vec<Person>> = documents.into_iter().flat_map(|document| document.frames).collect();
+fn found(document: Document, choices: Choices) -> Result<Found, RecordingError> {
+    let Document { mut frames, size, has_wide_gaps } = document;
     let everyone = || frames.iter().flatten();
     let first = everyone().next().ok_or_else(|| RecordingError::Kind {
         kind: "keypoint JSON",
@@ -66,6 +66,9 @@ fn found(documents: Vec<Document>, choices: Choices) -> Result<Found, RecordingE
     let layout = if has_depth { spatial::layout(everyone())? } else { first.layout };
     let seen = if has_depth { "in three dimensions" } else { "seen from one side" };
     let mut remarks = vec![format!("{} keypoints of the layout {}, {seen}", layout.count, layout.name)];
+    if has_wide_gaps {
+        remarks.push("most numbers of frames are missing: the gaps between the others are closed".into());
+    }
     let unsure: usize = frames
         .iter_mut()
         .flatten()
@@ -78,9 +81,10 @@ fn found(documents: Vec<Document>, choices: Choices) -> Result<Found, RecordingE
         remarks
             .push(format!("{unsure} points below a confidence of {LEAST_CONFIDENCE} are treated as missing"));
     }
-    let points = || frames.iter().flatten().flat_map(|person| person.points.iter().flatten());
-    let largest = points().flatten().fold(0.0_f64, |largest, value| largest.max(value.abs()));
-    if in_picture && largest <= NORMALISED {
+    let points: Vec<&Point3> =
+        frames.iter().flatten().flat_map(|person| person.points.iter().flatten()).collect();
+    let far = points.iter().filter(|point| point.iter().any(|value| value.abs() > NORMALISED)).count();
+    if in_picture && !points.is_empty() && far as f64 <= MOST_FAR_OUTSIDE * points.len() as f64 {
         let aspect = size.map_or(USUAL_ASPECT, |[width, height]| width / height);
         let known = if size.is_some() { "stated" } else { "a doubtful guess" };
         remarks.push(format!("coordinates are parts of a picture of {aspect:.3} times its height ({known})"));
@@ -90,11 +94,11 @@ fn found(documents: Vec<Document>, choices: Choices) -> Result<Found, RecordingE
     }
     let (mut tracks, count) = people::followed(&frames);
     if count > 1 {
-        remarks.push(format!("{count} people: the one seen most is read (--person 2 reads the next)"));
+        remarks.push(format!("{count} people, the one seen most first (--person selects one, default 1)"));
     }
     tracks.iter_mut().flatten().for_each(|points| add_neck(points));
     let mut all = tracks.into_iter();
-    let frames = all.next().unwrap_or_default();
+    let frames = all.next().unwrap_or_else(|| vec![vec![None; NAMES.len()]; frames.len()]);
     let (unit, up) = if has_depth {
         let metres = Known { value: Unit { mm: 1000.0 }, source: Source::Format };
         (metres, posture::upright(&frames, &HEAD, &ANKLES, Up::MinusY))

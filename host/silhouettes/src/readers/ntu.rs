@@ -51,18 +51,19 @@ pub fn read(bytes: &[u8]) -> Result<Found, RecordingError> {
         whole.sort_by_key(|(frame, _)| *frame);
         bodies = BTreeMap::from([(String::new(), whole)]);
     }
-    if bodies.len() > 1 {
-        remarks.push(format!(
-            "{} bodies in the file: the one that moves most is used (--person 2 reads the next)",
-            bodies.len()
-        ));
-    }
     let longest = bodies.values().map(Vec::len).max().unwrap_or(0);
     let present =
         bodies.into_values().filter(|body| 2 * body.len() >= longest.max(2) || body.len() == longest);
     let mut present: Vec<Vec<(usize, Body)>> = present.collect();
     present.sort_by(|a, b| variance(b).total_cmp(&variance(a)));
-    let mut all = present.into_iter().take(MOST_BODIES).map(|body| {
+    present.truncate(MOST_BODIES);
+    if present.len() > 1 {
+        remarks.push(format!(
+            "{} bodies in the file, the one that moves most first (--person selects one, default 1)",
+            present.len()
+        ));
+    }
+    let mut all = present.into_iter().map(|body| {
         let mut frames = vec![vec![None; JOINTS_25.len()]; count];
         for (frame, joints) in body {
             frames[frame] = joints;
@@ -175,8 +176,16 @@ mod tests {
         assert!(!settled.by_name(0).contains_key("left hand"));
         assert_eq!(
             settled.remarks(),
-            ["2 bodies in the file: the one that moves most is used (--person 2 reads the next)"]
+            ["2 bodies in the file, the one that moves most first (--person selects one, default 1)"]
         );
+    }
+
+    #[test]
+    fn bodies_that_are_left_out_are_not_counted() {
+        let text = file();
+        let last = text.rfind("1\n72").map(|at| &text[at..]).expect("the second frame");
+        let found = read(format!("3{}{last}", &text[1..]).as_bytes()).expect("a skeleton");
+        assert!(found.frames.len() == 3 && found.others.is_empty() && found.remarks.is_empty());
     }
 
     #[test]

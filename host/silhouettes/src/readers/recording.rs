@@ -217,6 +217,13 @@ impl Found {
         if hidden > 0 {
             remarks.push(format!("{hidden} points at exactly 0, 0, 0 are treated as missing markers"));
         }
+        let repeated = repeated(&self.names);
+        if !repeated.is_empty() {
+            remarks.push(format!(
+                "points share a name ({}): in each frame the last visible one is used; rename the others",
+                repeated.join(", ")
+            ));
+        }
         let anatomy = Anatomy::of(&self.names);
         let unit = body::plausible(self.unit.unless(choices.unit), &frames, &anatomy.body);
         let (up, inverted) = posture::checked(self.up.unless(choices.up), &frames, &anatomy);
@@ -313,6 +320,25 @@ pub enum RecordingError {
     PlanarUp(Up),
 }
 
+/// Compares the frames of a file with the number that it states. Some exporters count one too many, which gives a remark; a
+/// file that lacks more is an error.
+pub(super) fn promised_frames(what: &str, promised: f64, found: usize) -> Result<Option<String>, String> {
+    let missing = promised - found as f64;
+    if missing > 1.0 {
+        return Err(format!(
+            "{what} promises {promised} frames, the file ends after {found}: it was cut short"
+        ));
+    }
+    Ok((missing > 0.0).then(|| format!("{what} promises {promised} frames, the file has {found}")))
+}
+
+/// Names that several points have.
+fn repeated(names: &[String]) -> Vec<&str> {
+    let mut sorted: Vec<&str> = names.iter().map(String::as_str).filter(|name| !name.is_empty()).collect();
+    sorted.sort_unstable();
+    sorted.chunk_by(|a, b| a == b).filter(|same| same.len() > 1).map(|same| same[0]).collect()
+}
+
 /// A number with a point or, as programs of many countries write it, a comma before its decimals.
 pub(super) fn number(text: &str) -> Option<f64> {
     text.parse().or_else(|_| text.replacen(',', ".", 1).parse()).ok()
@@ -373,6 +399,19 @@ mod tests {
             found([1.0, 2.0, 3.0]).settled(Choices { unit: Some(Unit::MM), up: Some(Up::X), person: None });
         assert_eq!(given.frames[0], vec![Some([2.0, 3.0, 1.0])]);
         assert_eq!((given.unit.source.clone(), given.remarks().len()), (Source::Caller, 0));
+    }
+
+    #[test]
+    fn points_of_one_name_are_reported() {
+        let named = |name: &str| {
+            let names = ["LASI", name, "", ""].map(str::to_owned).to_vec();
+            Found { names, frames: vec![vec![Some([1.0, 2.0, 3.0]); 4]], ..found([0.0; 3]) }
+        };
+        let remarks = |name: &str| {
+            named(name).settled(Choices { unit: Some(Unit::MM), ..Choices::default() }).remarks()
+        };
+        assert!(remarks("LASI").iter().any(|remark| remark.contains("share a name (LASI)")));
+        assert!(remarks("RASI").iter().all(|remark| !remark.contains("share a name")));
     }
 
     #[test]

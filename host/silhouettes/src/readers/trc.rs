@@ -1,7 +1,7 @@
 //! TRC files (Motion Analysis, OpenSim): marker trajectories separated by tabs, or as spreadsheets save them.
 
 use super::reader::Reader;
-use super::recording::{Found, Known, RecordingError, Source, Up, number, text};
+use super::recording::{Found, Known, RecordingError, Source, Up, number, promised_frames, text};
 use crate::silhouette::capsule::Point3;
 
 pub const READER: Reader = Reader {
@@ -70,20 +70,17 @@ pub fn read(bytes: &[u8]) -> Result<Found, RecordingError> {
         remarks.push(format!("{unnamed} of {count} trajectories have no name and are not read"));
     }
     let frames = rows(&lines, &places, separator)?;
-    // Without the number all frames are read; a larger promised number means truncation.
-    if let Ok(promised) = stated("NumFrames")
-        && promised > frames.len() as f64
-    {
-        // Some exporters count one frame too many.
-        if promised - frames.len() as f64 > 1.0 {
-            let reason = format!(
-                "NumFrames promises {promised} frames, the file ends after {}: it was cut short",
-                frames.len()
-            );
-            return Err(RecordingError::Line { line: 3, reason });
-        }
-        remarks.push(format!("NumFrames promises {promised} frames, the file has {}", frames.len()));
+    // Without the number all frames are read.
+    if let Ok(promised) = stated("NumFrames") {
+        let remark = promised_frames("NumFrames", promised, frames.len());
+        remarks.extend(remark.map_err(|reason| RecordingError::Line { line: 3, reason })?);
     }
+    let has_rate = rate_hz.is_finite() && rate_hz > 0.0;
+    if !has_rate {
+        remarks
+            .push(format!("DataRate = {rate_hz}, expected more than 0: the frame rate is taken as unknown"));
+    }
+    let rate_hz = if has_rate { rate_hz } else { 0.0 };
     let up = Known { value: Up::Y, source: Source::Format };
     Ok(Found { names, rate_hz, frames, others: Vec::new(), planar: false, unit, up, remarks })
 }

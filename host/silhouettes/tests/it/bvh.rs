@@ -163,6 +163,14 @@ fn every_truncation_is_an_error_with_a_line_and_that_of_the_last_frame_is_said()
     }
 }
 
+#[test]
+fn joints_at_the_origin_are_not_missing() {
+    let text = walk(2).replace("0 17.6 0.0000", "0 0 0.0000");
+    let found = readers::read(text.as_bytes(), "bvh", Choices::default()).expect("a walker");
+    assert!(found.by_name(0).contains_key("Hips") && found.by_name(0).contains_key("LowerBack"));
+    assert!(found.remarks().iter().all(|remark| !remark.contains("missing")), "{:?}", found.remarks());
+}
+
 proptest! {
     #![proptest_config(ProptestConfig { cases: cases(256), failure_persistence: None, ..ProptestConfig::default() })]
 

@@ -202,6 +202,21 @@ fn a_trc_file_cut_short_is_refused_with_both_numbers() {
     assert!(error.contains("139") && error.contains("ends after 2") && error.contains("line 3"), "{error}");
 }
 
+#[test]
+fn a_trc_file_without_a_rate_or_with_one_name_twice_is_reported() {
+    let remarks = |text: &str| {
+        let recording = read(text.as_bytes(), "trc").expect("a TRC file");
+        (recording.rate_hz, recording.remarks().join("; "))
+    };
+    assert_eq!(remarks(TRC).0, 100.0);
+    for rate in ["0", "-5", "nan"] {
+        let (rate_hz, remarks) = remarks(&TRC.replace("\n100\t2", &format!("\n{rate}\t2")));
+        assert!(rate_hz == 0.0 && remarks.contains("DataRate = "), "{rate}: {remarks}");
+    }
+    let (_, twice) = remarks(&TRC.replace("A\t\t\tB", "A\t\t\tA"));
+    assert!(twice.contains("share a name (A)"), "{twice}");
+}
+
 fn ntu_skeleton() -> String {
     let joints = "0.1 0.9 3.2 1 2 3 4 0 0 0 1 2\n".repeat(25);
     let person = |id: u32| format!("{id} 0 1 1 0 0 0 0.1 0.2 2\n25\n{joints}");

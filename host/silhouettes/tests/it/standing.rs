@@ -1,6 +1,6 @@
 //! A room's camera: empty for a while, then a person enters and stands while a light is switched.
 
-use farnear_silhouettes::background::Frame;
+use farnear_silhouettes::background::{BackgroundError, Frame};
 use farnear_silhouettes::mask::{
     Mask,
     extractor::{Extractor, ExtractorSettings, Learning},
@@ -116,6 +116,28 @@ fn learning_can_be_limited_or_stopped() {
 }
 
 #[test]
+fn pixels_are_removed_in_the_light_of_the_background_and_an_emptied_mask_is_flagged() {
+    let first = picture(0);
+    let first = Frame::Rgb(first.view());
+    let mut extractor = Extractor::like(first, ExtractorSettings::for_frame(first)).expect("settings hold");
+    for frame in 0..310 {
+        let dimmed = frame >= 300;
+        let found = extractor.extract_without(Frame::Rgb(picture(frame).view()), |seen, model, mask| {
+            if let (Frame::Rgb(seen), true) = (seen, dimmed) {
+                let apart =
+                    seen.iter().zip(&model.background()).filter(|(a, b)| a.abs_diff(**b) > 25).count();
+                assert!(5 * apart < seen.len(), "{apart} of {} in frame {frame}", seen.len());
+                mask.fill(false);
+            }
+            Ok::<(), BackgroundError>(())
+        });
+        let subject = found.expect("a frame").subject;
+        let emptied = subject.bounds.is_none() && subject.flags.contains(&Flag::Empty);
+        assert!(emptied || !dimmed, "{:?}", subject.flags);
+    }
+}
+
+#[test]
 fn learns_an_object_that_appears_without_walking() {
     let first = picture(0);
     let first = Frame::Rgb(first.view());
@@ -158,4 +180,45 @@ fn a_shaking_camera_is_registered() {
         }
     }
     assert!(masked * 10 >= person * 9, "{masked} of {person}");
+}
+
+/// Overlaps of masks and people in these frames, which are learned first, and the changes of light.
+fn learned_first(frames: std::ops::Range<usize>) -> (Vec<f64>, usize) {
+    let first = picture(frames.start);
+    let first = Frame::Rgb(first.view());
+    let mut extractor = Extractor::like(first, ExtractorSettings::for_frame(first)).expect("settings hold");
+    for frame in frames.clone() {
+        extractor.learn(Frame::Rgb(picture(frame).view())).expect("a frame");
+    }
+    extractor.rewind(first);
+    let mut overlap = |frame| {
+        let subject = extractor.extract(Frame::Rgb(picture(frame).view())).expect("a frame").subject;
+        assert!(!subject.flags.contains(&Flag::Learning));
+        iou(&subject.mask, &person(frame))
+    };
+    (frames.map(&mut overlap).collect(), extractor.changes_of_light())
+}
+
+#[test]
+fn people_of_the_first_frame_are_masked_if_the_video_is_learned_first() {
+    // The person leaves at once, or after standing for 50 frames.
+    for frames in [490..590, 440..640] {
+        let (overlaps, _) = learned_first(frames.clone());
+        assert!(overlaps[..=20].iter().all(|overlap| *overlap >= 0.7), "{frames:?}: {:?}", &overlaps[..=20]);
+    }
+}
+
+#[test]
+fn a_person_who_stops_early_is_not_learned_first() {
+    let (overlaps, _) = learned_first(145..300);
+    let inside = &overlaps[15..];
+    let masked = inside.iter().filter(|overlap| **overlap >= 0.7).count();
+    assert!(masked * 10 >= inside.len() * 9, "{masked} of {}", inside.len());
+}
+
+#[test]
+fn changes_of_light_are_counted_once_if_the_video_is_learned_first() {
+    assert_eq!(learned_first(0..600).1, 2);
+    // The light of the end is not that of the beginning.
+    assert_eq!(learned_first(250..350).1, 1);
 }

@@ -52,6 +52,9 @@ pub struct EvaluationFigures {
     /// From a mask in memory to its part of an answer, one thread.
     pub seconds_per_frame: f64,
     pub seconds: f64,
+    /// Activities of the samples that were not trained; their clips do not count.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub not_known: Vec<String>,
     /// `counts[truth][answer]`.
     pub confusion: Confusion,
 }
@@ -78,11 +81,17 @@ pub(super) fn evaluate(
     let train = request.train.as_deref().map(|path| Samples::read(path, context)).transpose()?;
     let (frames, empty_frames, full_frames) = (test.frames, test.empty_frames, test.full_frames);
     let folders = test.folders.clone();
-    let Clips { views, test, train } = Clips::of(test, train, request.views)?;
+    let Clips { views, mut test, train } = Clips::of(test, train, request.views)?;
+    let not_known = match &train {
+        Some(train) => take_unknown(request, &mut test, train)?,
+        None => Vec::new(),
+    };
+    if !not_known.is_empty() {
+        context.progress.warn(&format!("not trained, so their clips do not count: {}", not_known.join(", ")));
+    }
     let subjects = names(test.iter().map(|clip| &clip.subject));
     let learned = train.as_deref().unwrap_or(&test);
     check_subjects(request, &subjects, learned)?;
-    check_activities(request, &test, learned)?;
     let self_training = if request.adapt { ROUNDS } else { 0 };
     let experiment = Experiment { align: request.align, self_training, ..method.experiment(full_frames)? };
     let outcome =
@@ -105,6 +114,7 @@ pub(super) fn evaluate(
         empty_frames,
         seconds_per_frame: 0.0,
         seconds: 0.0,
+        not_known,
         confusion: confusion.clone(),
     };
     if let Some(out) = out {
@@ -195,14 +205,16 @@ fn check_subjects(request: &EvaluateRequest, subjects: &[String], learned: &[Cli
     }
 }
 
-/// Rejects activities outside the training set: different names would give an accuracy of 0.
-fn check_activities(request: &EvaluateRequest, test: &[Clip], learned: &[Clip]) -> Result<()> {
-    let (found, known) =
-        (names(test.iter().map(|clip| &clip.activity)), names(learned.iter().map(|clip| &clip.activity)));
-    if found.iter().any(|activity| known.contains(activity)) {
-        return Ok(());
+/// Removes clips of activities outside the training set and returns these activities. Fails if no clip is left.
+fn take_unknown(request: &EvaluateRequest, test: &mut Vec<Clip>, train: &[Clip]) -> Result<Vec<String>> {
+    let known = names(train.iter().map(|clip| &clip.activity));
+    let mut found = names(test.iter().map(|clip| &clip.activity));
+    test.retain(|clip| known.contains(&clip.activity));
+    if test.is_empty() {
+        return Err(SamplesError::NothingInCommon { samples: request.samples.clone(), found, known }.into());
     }
-    Err(SamplesError::NothingInCommon { samples: request.samples.clone(), found, known }.into())
+    found.retain(|activity| !known.contains(activity));
+    Ok(found)
 }
 
 fn write(figures: &EvaluationFigures, outcome: &Outcome, out: &Staging) -> Result<()> {

@@ -15,7 +15,7 @@ use super::{
 use crate::{
     context::Context,
     error::{Result, WorkflowError},
-    request::{PathKind, Request, json},
+    request::{PathKind, Request, json, outputs},
 };
 
 /// Recognises what a person does, frame by frame.
@@ -124,7 +124,7 @@ impl RecogniseRequest {
         context: &Context<'_>,
         each: &mut dyn FnMut(&StreamingAnswer) -> std::io::Result<()>,
     ) -> Result<RecogniseFigures> {
-        self.check()?;
+        outputs::check(self)?;
         let model = match self.adapt_to.as_slice() {
             [] => context.cache.model(&self.model)?,
             clips => Model::read(&self.model)?.adapted_to(clips, context)?.into(),

@@ -24,6 +24,7 @@ use crate::{
     figures::rounded,
     parameters::{at_least, within},
     request::{PathKind, Request},
+    result_folder,
 };
 
 const WINDOW_MIN: usize = 5;
@@ -78,7 +79,7 @@ pub struct TrainRequest {
     /// Use every view as a separate clip, so that the model recognises from any single view.
     #[cfg_attr(feature = "clap", arg(long))]
     pub any_view: bool,
-    /// The model to write.
+    /// The model to write. An existing file is replaced only if it is a model.
     #[cfg_attr(feature = "clap", arg(long, value_name = "FILE"))]
     pub out: PathBuf,
 }
@@ -168,6 +169,7 @@ pub struct TrainingFigures {
 
 fn train(request: &TrainRequest, context: &Context<'_>) -> Result<TrainingFigures> {
     request.check()?;
+    result_folder::check_model(&request.out)?;
     let method = request.method.method()?;
     method.announce(context);
     let start = Instant::now();
@@ -177,6 +179,14 @@ fn train(request: &TrainRequest, context: &Context<'_>) -> Result<TrainingFigure
         Some(length) => clips.iter().flat_map(|clip| clip.windows(length)).collect(),
         None => clips,
     };
+    let alone = of_one_subject(&clips);
+    if !alone.is_empty() {
+        context.progress.warn(&format!(
+            "{}: one subject each, so cross-validation does not test them, and they give no limit for unknown; give clips of \
+             one person the same subject, or add clips of a second person",
+            alone.join(", ")
+        ));
+    }
     let experiment = method.experiment(full_frames)?;
     let trained =
         Recogniser::train_searched(&clips, &experiment, SCALING, &training_progress::Training::new(context));
@@ -203,6 +213,17 @@ fn train(request: &TrainRequest, context: &Context<'_>) -> Result<TrainingFigure
         inner_accuracy: inner_accuracy.map(|value| rounded(value, 4)),
         seconds: rounded(start.elapsed().as_secs_f64(), 3),
     })
+}
+
+/// Activities of one subject, where there are several subjects.
+fn of_one_subject(clips: &[Clip]) -> Vec<String> {
+    let subjects = |activity: Option<&String>| {
+        let of = clips.iter().filter(|clip| activity.is_none_or(|activity| clip.activity == *activity));
+        names(of.map(|clip| &clip.subject)).len()
+    };
+    let mut activities = names(clips.iter().map(|clip| &clip.activity));
+    activities.retain(|activity| subjects(Some(activity)) == 1 && subjects(None) > 1);
+    activities
 }
 
 struct Learned {

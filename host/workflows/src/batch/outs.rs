@@ -5,13 +5,14 @@ use std::{
     fs::File,
     hash::{BuildHasher, RandomState},
     io::{BufRead, BufReader, ErrorKind, Read},
-    path::{Component, Path, PathBuf},
+    path::{Path, PathBuf},
 };
 
 use super::{
     BatchError,
     manifest::{JOB_BYTES_MAX, Manifest},
 };
+use crate::request::outputs::on_disk;
 
 pub(super) struct Outs {
     jobs: usize,
@@ -105,46 +106,4 @@ fn is_report(path: &Path, begins: fn(&str) -> bool) -> std::io::Result<bool> {
 
 fn current_folder() -> Result<PathBuf, BatchError> {
     std::env::current_dir().map_err(|source| BatchError::Read { path: ".".into(), source })
-}
-
-/// `path` from the folder `base` without `.`, `..` and symbolic links. It need not exist.
-fn on_disk(base: &Path, path: &Path) -> PathBuf {
-    let mut found = base.to_path_buf();
-    for part in path.components() {
-        match part {
-            Component::CurDir => {}
-            Component::ParentDir => drop(found.pop()),
-            part => found.push(part),
-        }
-        if found.is_symlink() {
-            found = found.canonicalize().unwrap_or(found);
-        }
-    }
-    found
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_place_is_found_by_all_its_names() {
-        let folder = tempfile::tempdir().expect("a folder");
-        let base = folder.path().canonicalize().expect("a folder");
-        std::fs::create_dir_all(base.join("real/below")).expect("a writable folder");
-        let place = base.join("real/x");
-        let absolute = place.to_string_lossy();
-        for name in ["real/x", "./real/x", "real//x", "real/x/", "real/./x", "gone/../real/x", &absolute] {
-            assert_eq!(on_disk(&base, Path::new(name)), place, "{name}");
-        }
-        assert_ne!(on_disk(&base, Path::new("real/y")), place);
-        #[cfg(unix)]
-        {
-            std::os::unix::fs::symlink("real/below", base.join("link")).expect("a writable folder");
-            // The folder above a link is the one above its target.
-            for name in ["link/../x", "gone/../link/../x"] {
-                assert_eq!(on_disk(&base, Path::new(name)), place, "{name}");
-            }
-        }
-    }
 }

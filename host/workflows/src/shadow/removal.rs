@@ -27,7 +27,7 @@ use crate::{
     error::{About, Result, WorkflowError},
     figures::rounded,
     parameters::within,
-    request::{PathKind, Request},
+    request::{PathKind, Request, outputs},
     sun::Moment,
 };
 
@@ -120,8 +120,7 @@ impl Request for ShadowRemoveRequest {
     type Figures = RemovalFigures;
 
     fn check(&self) -> Result<()> {
-        self.light()?.check()?;
-        self.check_folders()
+        self.light()?.check()
     }
 
     fn run(&self, context: &Context<'_>) -> Result<RemovalFigures> {
@@ -202,7 +201,7 @@ struct Cut {
 /// Also writes `shadow.toml`, which flags doubtful masks. Writes nothing on failure.
 pub fn remove_from_masks(request: &ShadowRemoveRequest, context: &Context<'_>) -> Result<RemovalFigures> {
     let start = Instant::now();
-    request.check()?;
+    outputs::check(request)?;
     let camera = camera(&request.camera)?;
     let source = request.light()?;
     let (light, _) = source.at(0)?;
@@ -215,6 +214,7 @@ pub fn remove_from_masks(request: &ShadowRemoveRequest, context: &Context<'_>) -
         ));
     }
     let masks::Masks { named: all, levels } = masks::read_all(&request.masks)?;
+    levels.check_people(&request.masks)?;
     if let Some(remark) = levels.remark {
         context.progress.warn(&format!("{}: {remark}", request.masks.display()));
     }
@@ -307,16 +307,6 @@ impl ShadowRemoveRequest {
             ([], ..) => Err(wrong("none")),
             (names, ..) => Err(wrong(&names.join(" and "))),
         }
-    }
-
-    /// Neither new folder may contain the other, because each appears when it is complete.
-    fn check_folders(&self) -> Result<()> {
-        let Some(stages) = &self.stages else { return Ok(()) };
-        if stages.starts_with(&self.out) || self.out.starts_with(stages) {
-            let expected = format!("another folder, neither inside {} nor around it", self.out.display());
-            return Err(WorkflowError::parameter("stages' folder", stages.display(), expected));
-        }
-        Ok(())
     }
 }
 

@@ -358,7 +358,9 @@ pub(crate) fn recording(path: &Path, choices: Choices) -> Result<Recording> {
     let read = if path.is_dir() {
         let files = keypoint_files(path)?;
         let contents = files.iter().map(|file| read_file(file)).collect::<Result<Vec<Vec<u8>>>>()?;
-        readers::read_keypoint_files(contents.iter().map(Vec::as_slice), choices)
+        let names: Vec<String> = files.iter().map(|file| file.display().to_string()).collect();
+        let named = names.iter().map(String::as_str).zip(contents.iter().map(Vec::as_slice));
+        readers::read_keypoint_files(named, choices)
     } else {
         let ending = path.extension().unwrap_or_default().to_string_lossy();
         readers::read(&read_file(path)?, &ending, choices)

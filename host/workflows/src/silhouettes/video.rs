@@ -9,9 +9,8 @@ use farnear_files::{
     video::{Pixels, Video, VideoError, VideoFrame},
 };
 use farnear_shadow::detectors::{Detector, Images, Method};
-use farnear_silhouettes::background::Label;
+use farnear_silhouettes::background::{Frame, Label};
 use farnear_silhouettes::mask::{
-    Mask,
     extractor::{Extracted, Extractor, ExtractorSettings, Learning},
     subject::Flag,
 };
@@ -215,15 +214,16 @@ pub fn extract(settings: &SilhouettesVideoRequest, context: &Context<'_>) -> Res
             context.cancel.check("learning the background")?;
             work.extractor.learn(frame_of(&prepared(frame?, settings.grey).pixels))?;
         }
+        work.extractor.rewind(frame_of(&first.pixels));
     }
     let mut figures = VideoFigures::default();
     let mut index = Index::default();
     for frame in std::iter::once(Ok(first)).chain(video.by_ref()) {
         context.cancel.check(DURING)?;
         let frame = prepared(frame?, settings.grey);
-        let (found, mask) = work.mask(&frame)?;
+        let found = work.extract(&frame)?;
         figures.count(&found.subject.flags);
-        index.frame.push(keep(&frame.name, &found, &mask, settings.centred, &out, labels.as_ref())?);
+        index.frame.push(keep(&frame.name, &found, settings.centred, &out, labels.as_ref())?);
         if figures.frames.is_multiple_of(PROGRESS_FRAMES) {
             context.progress.advance("frames", figures.frames, None);
         }
@@ -248,12 +248,12 @@ pub fn extract(settings: &SilhouettesVideoRequest, context: &Context<'_>) -> Res
 fn keep(
     name: &str,
     found: &Extracted,
-    mask: &Mask,
     centred: bool,
     out: &Staging,
     labels: Option<&Staging>,
 ) -> Result<Entry> {
     let file = format!("{name}.png");
+    let mask = &found.subject.mask;
     let png = if centred { masks::png(&cut_out(mask))? } else { masks::png(mask)? };
     out.write(&file, &png)?;
     if let Some(labels) = labels {
@@ -295,6 +295,7 @@ impl Work {
         let frame = frame_of(&first.pixels);
         let mut settings = ExtractorSettings::for_frame(frame);
         settings.learning_frames = asked.learning_frames;
+        settings.learning = asked.learning;
         settings.background.history_frames = asked.history_frames;
         if asked.keep_shadow || asked.shadow_detector.is_some() {
             settings.background.shadow = None;
@@ -306,15 +307,16 @@ impl Work {
         Ok(Self { extractor: Extractor::like(frame, settings)?, detector })
     }
 
-    fn mask(&mut self, frame: &VideoFrame) -> Result<(Extracted, Mask)> {
-        let found = self.extractor.extract(frame_of(&frame.pixels))?;
-        let mut mask = found.subject.mask.clone();
-        if let (Some(detector), Pixels::Rgb(pixels)) = (&mut self.detector, &frame.pixels) {
-            let background: Array3<u8> = self.extractor.background().background();
-            let images = Images::new(pixels.view(), background.view(), mask.view())?;
-            let shadow = detector.detect(&images);
-            mask.zip_mut_with(&shadow, |set, &shadow| *set &= !shadow);
-        }
-        Ok((found, mask))
+    fn extract(&mut self, frame: &VideoFrame) -> Result<Extracted> {
+        let detector = &mut self.detector;
+        self.extractor.extract_without(frame_of(&frame.pixels), |frame, model, mask| {
+            if let (Some(detector), Frame::Rgb(pixels)) = (detector, frame) {
+                let background: Array3<u8> = model.background();
+                let images = Images::new(pixels.view(), background.view(), mask.view())?;
+                let shadow = detector.detect(&images);
+                mask.zip_mut_with(&shadow, |set, &shadow| *set &= !shadow);
+            }
+            Ok(())
+        })
     }
 }

@@ -88,6 +88,6 @@ fn every_mask_has_a_picture_of_its_stages() {
         ..hybrid
     };
     let error = remove_from_masks(&inside, &Context::unattended()).expect_err("one inside of the other");
-    assert!(matches!(error, WorkflowError::Parameter { name: "stages' folder", .. }), "{error}");
+    assert!(matches!(error, WorkflowError::Parameter { name: "stages", .. }), "{error}");
     assert!(!root.path().join("more").exists());
 }

@@ -27,7 +27,7 @@ const BLOCK_PX: usize = 48;
 const BORDER_PX: usize = 12;
 /// One of this many pixels is used, along both axes.
 const THIN: usize = 5;
-/// True normalised depths that are learned; a little beyond the range.
+/// Places between the slices of a pair that are learned; a little beyond the range.
 pub(super) const LEARNED: f64 = 1.12;
 /// Standard deviation of normalised depth by noise beyond which a pixel has no depth.
 const TOO_NOISY: f64 = 0.12;
@@ -350,10 +350,11 @@ impl Target<'_> {
             .step_by(THIN)
             .flat_map(|y| (BORDER_PX..width.saturating_sub(BORDER_PX)).step_by(THIN).map(move |x| (y, x)));
         for (y, x) in places {
-            let truth = (self.truth_of)(optics, self.place(pair.far, y, x));
-            if truth.abs() > LEARNED {
+            let place = self.place(pair.far, y, x);
+            if place.abs() > LEARNED {
                 continue;
             }
+            let truth = (self.truth_of)(optics, place);
             looked_at += 1;
             let Some((map, estimate)) = &found else { continue };
             let measured = optics.alpha(f64::from(map.depth_mm[(y, x)]));

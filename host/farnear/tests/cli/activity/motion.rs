@@ -51,6 +51,15 @@ fn motion_files_teach_and_become_samples() {
     assert_eq!((number(&trained, "subjects"), number(&trained, "activities")), (2.0, 2.0));
     assert_eq!((number(&trained, "clips"), number(&trained, "views")), (40.0, 1.0));
 
+    // Each activity by another person: nothing to cross-validate.
+    let alone = [("raise arms", "ann-up.txt"), ("stoop", "bob-down.txt")]
+        .map(|(activity, file)| format!("{activity}={}", folder.text(file)));
+    let unlike = folder.text("alone.fnm");
+    let search = ["activity", "train", "--out", &unlike, "--cameras", "10", "--json", "--motion"];
+    let (trained, stderr) = succeeds(farnear(&search).args(&alone));
+    assert!(trained.contains("\"inner_accuracy\":null"), "{trained}");
+    assert!(stderr.contains("raise arms, stoop: one subject each"), "{stderr}");
+
     let eve = folder.file("eve.txt", kinect(1.0, 1.0, 0.0));
     let out = folder.text("eve");
     let draw =

@@ -125,6 +125,13 @@ fn crossings_are_reported_and_untrackable_videos_rejected() {
     }
     let two = ["activity", "recognise", &path, &path, "--as", "masks", "--model", "everyday", "--people"];
     fails(&mut farnear(&two), 2, &["number of views 2", "one view"]);
+    let [out, inside] = ["answers", "answers/pictures"].map(|name| folder.text(name));
+    for (out, pictures) in [(&out, &out), (&out, &inside), (&inside, &out)] {
+        let mut command = farnear(&recognise);
+        command.args(["--out", out, "--video-out", pictures]);
+        fails(&mut command, 2, &["video_out", pictures.as_str(), "expected another place"]);
+    }
+    assert!(!folder.path("answers").exists());
     let small = written(&folder, "small", &[GrayImage::from_pixel(100, 100, Luma([255]))]);
     let cut_out = ["activity", "recognise", &small, "--as", "masks", "--model", "everyday", "--people"];
     fails(&mut farnear(&cut_out), 1, &["cut out at 100x100", "full frames"]);

@@ -69,6 +69,8 @@ impl Person {
 pub struct Document {
     pub frames: Vec<Vec<Person>>,
     pub size: Option<[f64; 2]>,
+    /// Whether gaps in the numbers are too long to be filled.
+    pub has_wide_gaps: bool,
 }
 
 const PEOPLE: [&str; 8] =
@@ -90,8 +92,9 @@ const POINTS: [&str; 12] = [
 ];
 const CONFIDENCES: [&str; 3] = ["keypoint_scores", "keypoints_scores", "keypoint_confidences"];
 
-/// Frames by the sort keys of their names.
-type Named = BTreeMap<(String, u64, String), Vec<Person>>;
+/// A name's texts, each with the number after it, so that `frame_9` sorts before `frame_10`.
+type Name = Vec<(String, u128)>;
+type Named = BTreeMap<Name, Vec<Person>>;
 
 impl Document {
     pub fn parse(bytes: &[u8]) -> Result<Self, RecordingError> {
@@ -102,6 +105,25 @@ impl Document {
         let mut document = Self { size: size(&value), ..Self::default() };
         document.whole(&value);
         Ok(document)
+    }
+
+    /// Reads a folder's files in order: a frame each, or a recording in a single file.
+    pub fn of_files<'a>(
+        files: impl IntoIterator<Item = (&'a str, &'a [u8])>,
+    ) -> Result<Self, RecordingError> {
+        let mut documents = files
+            .into_iter()
+            .map(|(name, bytes)| Ok((split(name), Self::parse(bytes)?)))
+            .collect::<Result<Vec<(Name, Self)>, RecordingError>>()?;
+        if documents.len() < 2 {
+            return Ok(documents.pop().map(|(_, document)| document).unwrap_or_default());
+        }
+        let size = documents.iter().find_map(|(_, document)| document.size);
+        let mut whole = Self { size, ..Self::default() };
+        // A list in such a file holds people, not frames.
+        let people = |document: Self| -> Vec<Person> { document.frames.into_iter().flatten().collect() };
+        whole.numbered(documents.into_iter().map(|(name, document)| (name, people(document))));
+        Ok(whole)
     }
 
     fn whole(&mut self, value: &Value) {
@@ -127,15 +149,13 @@ impl Document {
                     return self.by_names(map);
                 }
                 // Frames by picture names.
-                let mut named: Vec<(&String, &Value)> = map
-                    .iter()
-                    .filter(|(_, frame)| frame.as_object().is_some_and(is_frame) || frame.is_array())
-                    .collect();
-                named.sort_by_key(|frame| order(frame.0));
-                for (_, frame) in named {
-                    let frame = self.frame(frame);
-                    self.frames.push(frame);
+                let mut frames: Named = BTreeMap::new();
+                for (name, frame) in map {
+                    if frame.as_object().is_some_and(is_frame) || frame.is_array() {
+                        frames.entry(split(name)).or_default().extend(self.frame(frame));
+                    }
                 }
+                self.numbered(frames);
             }
             _ => {}
         }
@@ -159,15 +179,15 @@ impl Document {
         let mut names: BTreeMap<String, String> = BTreeMap::new();
         for picture in pictures {
             if let (Some(id), Some(name)) =
-                (picture.get("id"), picture.get("file_name").and_then(Value::as_str))
+                (picture.get("id").and_then(text), picture.get("file_name").and_then(Value::as_str))
             {
-                names.insert(id.to_string(), name.into());
-                frames.entry(order(name)).or_default();
+                names.insert(id, name.into());
+                frames.entry(split(name)).or_default();
             }
         }
         for item in items {
             let Some(picture) = picture_of(item) else { continue };
-            let key = order(names.get(&picture).unwrap_or(&picture));
+            let key = split(names.get(&picture).unwrap_or(&picture));
             let person = self.person(item);
             frames.entry(key).or_default().extend(person);
         }
@@ -184,29 +204,24 @@ impl Document {
                 let (id, frame) = if are_frames { (own, name) } else { (name, own) };
                 let person = self.person(value);
                 let person = person.map(|person| Person { id: id.parse().ok().or(person.id), ..person });
-                frames.entry(order(frame)).or_default().extend(person);
+                frames.entry(split(frame)).or_default().extend(person);
             }
         }
         self.numbered(frames);
     }
 
-    fn numbered(&mut self, frames: Named) {
+    /// Missing numbers are frames without people.
+    fn numbered(&mut self, frames: impl IntoIterator<Item = (Name, Vec<Person>)>) {
         /// Gaps are filled if the recording grows at most by this factor.
-        const LONGEST: u64 = 10;
-        let numbers: Vec<u64> = frames.keys().map(|(_, number, _)| *number).collect();
-        let step =
-            numbers.windows(2).map(|pair| pair[1].saturating_sub(pair[0])).filter(|step| *step > 0).min();
-        let reach =
-            numbers.last().zip(numbers.first()).map_or(0, |(last, first)| last.saturating_sub(*first));
-        let mut last: Option<u64> = None;
-        for ((_, number, _), people) in frames {
-            if let (Some(last), Some(step)) = (last, step)
-                && reach / step <= LONGEST * numbers.len() as u64
-            {
-                let missing = number.saturating_sub(last) / step;
-                (1..missing).for_each(|_| self.frames.push(Vec::new()));
-            }
-            last = Some(number);
+        const LONGEST: u128 = 10;
+        let (names, people): (Vec<Name>, Vec<Vec<Person>>) = frames.into_iter().unzip();
+        let steps: Vec<u128> = names.windows(2).map(|pair| step(&pair[0], &pair[1]).unwrap_or(0)).collect();
+        let least = steps.iter().copied().filter(|step| *step > 0).min().unwrap_or(1);
+        let reach = steps.iter().fold(0, |sum: u128, step| sum.saturating_add(*step));
+        self.has_wide_gaps = reach / least > LONGEST * names.len() as u128;
+        for (people, step) in people.into_iter().zip(std::iter::once(0).chain(steps)) {
+            let missing = if self.has_wide_gaps { 0 } else { (step / least).saturating_sub(1) };
+            self.frames.extend((0..missing).map(|_| Vec::new()));
             self.frames.push(people);
         }
     }
@@ -349,22 +364,39 @@ fn is_track(value: &Value) -> bool {
 }
 
 fn picture_of(item: &Value) -> Option<String> {
-    match item.get("image_id").or_else(|| item.get("frame_id")).or_else(|| item.get("image_name"))? {
+    let id = item.get("image_id").or_else(|| item.get("frame_id")).or_else(|| item.get("image_name"))?;
+    text(id).filter(|_| item.get("instances").is_none())
+}
+
+/// An id as text. Decimals of one length sort by value.
+fn text(id: &Value) -> Option<String> {
+    match id {
         Value::String(name) => Some(name.clone()),
+        Value::Number(number) if number.is_f64() => Some(format!("{:.6}", number.as_f64()?)),
         Value::Number(number) => Some(number.to_string()),
         _ => None,
     }
-    .filter(|_| item.get("instances").is_none())
 }
 
-/// Sort key of names: by their last number.
-fn order(name: &str) -> (String, u64, String) {
-    let stem = name.rsplit_once('.').map_or(name, |(stem, _)| stem);
-    let end = stem.rfind(|c: char| c.is_ascii_digit()).map_or(0, |at| at + 1);
-    let begin = stem[..end]
-        .rfind(|c: char| !c.is_ascii_digit())
-        .map_or(0, |at| at + stem[at..].chars().next().map_or(1, char::len_utf8));
-    (stem[..begin].into(), stem[begin..end].parse().unwrap_or(0), stem[end..].into())
+fn split(name: &str) -> Name {
+    let mut pieces = Name::new();
+    let mut rest = name;
+    while let Some(at) = rest.find(|c: char| c.is_ascii_digit()) {
+        let (text, numbers) = rest.split_at(at);
+        let end = numbers.find(|c: char| !c.is_ascii_digit()).unwrap_or(numbers.len());
+        pieces.push((text.into(), numbers[..end].parse().unwrap_or(u128::MAX)));
+        rest = &numbers[end..];
+    }
+    pieces.push((rest.into(), 0));
+    pieces
+}
+
+/// How far the one number rises in which the names differ.
+fn step(from: &Name, to: &Name) -> Option<u128> {
+    let mut differing = from.iter().zip(to).filter(|(from, to)| from != to);
+    let (before, after) = differing.next().filter(|_| from.len() == to.len())?;
+    let alone = differing.next().is_none() && before.0 == after.0;
+    after.1.checked_sub(before.1).filter(|_| alone)
 }
 
 fn first_number(value: &Value) -> Option<f64> {

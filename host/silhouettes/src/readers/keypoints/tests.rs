@@ -68,18 +68,101 @@ fn openpose_files_of_all_layouts_are_one_frame_each() {
     }
 }
 
+fn folder(names: &[&str], files: &[String]) -> super::super::recording::Recording {
+    let files = names.iter().copied().zip(files.iter().map(String::as_bytes));
+    read_files(files, Choices::default()).expect("keypoints").settled(Choices::default())
+}
+
 #[test]
 fn a_folder_of_openpose_files_is_a_recording_with_empty_frames() {
     let frame =
         |x: f64| format!(r#"{{"people":[{{"pose_keypoints_2d":{}}}]}}"#, flat(&person(layout(25), x)));
     let files = [frame(100.0), r#"{"people":[]}"#.into(), frame(104.0)];
-    let found = read_files(files.iter().map(String::as_bytes), Choices::default())
-        .expect("keypoints")
-        .settled(Choices::default());
+    let found = folder(&["1.json", "2.json", "3.json"], &files);
     assert_eq!(found.frames.len(), 3);
     assert!(found.by_name(1).is_empty());
     let moved = found.by_name(2)["neck"][0] - found.by_name(0)["neck"][0];
     assert!((moved - 40.0).abs() < 3.0, "{moved} mm");
+}
+
+#[test]
+fn frames_without_a_sure_point_are_frames() {
+    let mut points = person(layout(25), 100.0);
+    points.iter_mut().for_each(|point| point[2] = 0.05);
+    let json = format!(r#"{{"people":[{{"pose_keypoints_2d":{}}}]}}"#, flat(&points));
+    let found = folder(&["1.json", "2.json"], &[json.clone(), json]);
+    assert_eq!(found.frames.len(), 2);
+    assert!(found.by_name(0).is_empty() && found.by_name(1).is_empty());
+    let remarks = found.remarks();
+    assert!(remarks.iter().any(|remark| remark.contains("below a confidence of 0.1")), "{remarks:?}");
+    assert!(remarks.iter().all(|remark| !remark.contains("parts of a picture")), "{remarks:?}");
+}
+
+#[test]
+fn a_list_in_a_file_of_a_folder_holds_the_people_of_one_frame() {
+    let person = |x: f64| format!(r#"{{"keypoints":{}}}"#, flat(&person(layout(17), x)));
+    let both = |x: f64| format!("[{},{}]", person(x), person(400.0 - x));
+    let files = [both(100.0), "[]".into(), "null".into(), both(104.0)];
+    let found = folder(&["1.json", "2.json", "3.json", "4.json"], &files);
+    assert_eq!(found.frames.len(), 4);
+    assert!(found.by_name(1).is_empty() && found.by_name(2).is_empty());
+    assert!(found.remarks().iter().any(|remark| remark.starts_with("2 people")), "{:?}", found.remarks());
+    // A folder with one file holds a recording.
+    assert_eq!(folder(&["all.json"], &files).frames.len(), 2);
+}
+
+#[test]
+fn files_missing_from_a_folder_are_frames_without_people() {
+    let file = format!(r#"{{"people":[{{"pose_keypoints_2d":{}}}]}}"#, flat(&person(layout(25), 100.0)));
+    let files = [&file; 3].map(String::clone);
+    let found = |names: [&str; 3]| folder(&names, &files);
+    let few = found(["walk_0009_keypoints.json", "walk_0010_keypoints.json", "walk_0013_keypoints.json"]);
+    assert_eq!(few.frames.len(), 5);
+    assert!(few.by_name(2).is_empty() && !few.by_name(4).is_empty());
+    let many = found(["1.json", "2.json", "90.json"]);
+    assert_eq!(many.frames.len(), 3);
+    assert!(many.remarks().iter().any(|remark| remark.contains("are missing")), "{:?}", many.remarks());
+    assert!(few.remarks().iter().all(|remark| !remark.contains("are missing")), "{:?}", few.remarks());
+}
+
+#[test]
+fn pictures_are_in_the_order_of_all_numbers_of_their_names() {
+    let x = |n: usize| 100.0 + n as f64;
+    for [first, second, last] in [
+        ["frame_9_cam1.jpg", "frame_10_cam1.jpg", "frame_12_cam1.jpg"],
+        ["9_640x480.png", "10_640x480.png", "12_640x480.png"],
+        ["walk.0009", "walk.0010", "walk.0012"],
+    ] {
+        let points = [2, 0, 1].map(|n| flat(&person(layout(17), x(n))));
+        let names = [last, first, second];
+        let list: Vec<String> = names
+            .iter()
+            .zip(&points)
+            .map(|(name, points)| format!(r#"{{"image_id":"{name}","keypoints":{points}}}"#))
+            .collect();
+        let map: Vec<String> = names
+            .iter()
+            .zip(&points)
+            .map(|(name, points)| format!(r#""{name}":{{"people":[{{"keypoints":{points}}}]}}"#))
+            .collect();
+        for json in [format!("[{}]", list.join(",")), format!("{{{}}}", map.join(","))] {
+            let found = upright(&json, 4);
+            assert!(found.by_name(2).is_empty(), "{json}");
+            let hips: Vec<f64> = [0, 1, 3].map(|n| found.by_name(n)["left hip"][0]).to_vec();
+            assert!(hips.is_sorted(), "{hips:?}");
+        }
+    }
+    // Seconds as numbers.
+    let list: Vec<String> = [0.1, 0.0, 0.067, 0.033]
+        .iter()
+        .map(|second| {
+            let points = flat(&person(layout(17), 100.0 + 100.0 * second));
+            format!(r#"{{"frame_id":{second:?},"keypoints":{points}}}"#)
+        })
+        .collect();
+    let found = upright(&format!("[{}]", list.join(",")), 4);
+    let hips: Vec<f64> = (0..4).map(|n| found.by_name(n)["left hip"][0]).collect();
+    assert!(hips.is_sorted(), "{hips:?}");
 }
 
 #[test]
@@ -160,6 +243,9 @@ fn coco_annotations_take_the_order_of_their_pictures() {
     let found = read(json.as_bytes(), "json", Choices::default()).expect("keypoints");
     assert_eq!(found.frames.len(), 2);
     assert!(found.by_name(0).is_empty() && !found.by_name(1).is_empty());
+    let as_text = json.replace(r#""id":7,"#, r#""id":"7","#).replace(r#""image_id":7"#, r#""image_id":"7""#);
+    let text = read(as_text.as_bytes(), "json", Choices::default()).expect("keypoints");
+    assert_eq!(text.frames, found.frames);
 }
 
 #[test]
@@ -181,6 +267,12 @@ fn mediapipe_landmarks_are_parts_of_the_picture() {
         let found = upright(&json, 2);
         assert!(found.remarks().iter().any(|remark| remark.contains("stated")), "{:?}", found.remarks());
     }
+    // A point guessed far outside the picture does not make the others pixels.
+    let far = landmarks.replacen(&format!(r#""x":{}"#, 103.0 / 320.0), r#""x":4.5"#, 1);
+    assert_ne!(far, landmarks);
+    let json = format!(r#"{{"width":320,"height":200,"frames":[[{landmarks}],[{landmarks}],[{far}]]}}"#);
+    let found = upright(&json, 3);
+    assert!(found.remarks().iter().any(|remark| remark.contains("stated")), "{:?}", found.remarks());
     // Without a size the shape is a guess, which is reported.
     let bare = format!("[[{landmarks}],[{landmarks}]]");
     let found = read(bare.as_bytes(), "json", Choices::default()).expect("keypoints");

@@ -1,0 +1,127 @@
+//! Places of a request's results. They are compared on disk, not by their spelling.
+
+use std::{
+    io,
+    path::{Component, Path, PathBuf},
+};
+
+use serde_json::Value;
+
+use super::{PathKind, Request};
+use crate::error::{Result, WorkflowError};
+
+/// Checks a request before its work. No field may contradict another, and no result may be inside another, because each
+/// appears when it is complete.
+pub fn check<R: Request>(request: &R) -> Result<()> {
+    request.check()?;
+    // A path that is not UTF-8 is checked when it is written.
+    let Ok(Value::Object(fields)) = serde_json::to_value(request) else { return Ok(()) };
+    let outputs: Vec<(&'static str, &str)> = R::PATHS
+        .iter()
+        .filter(|(_, kind)| matches!(kind, PathKind::OutputFile | PathKind::OutputFolder))
+        .filter_map(|(name, _)| Some((*name, fields.get(*name)?.as_str()?)))
+        .filter(|(_, path)| !path.is_empty())
+        .collect();
+    for (index, &(name, path)) in outputs.iter().enumerate() {
+        for (other, taken) in &outputs[..index] {
+            let current = WorkflowError::read("the current folder", Path::new("."));
+            if overlap(path.as_ref(), taken.as_ref()).map_err(current)? {
+                let expected =
+                    format!("expected another place, neither inside {taken} ({other}) nor around it");
+                return Err(WorkflowError::parameter(name, path, expected));
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Whether two paths name one place, or one names a place inside the other.
+fn overlap(a: &Path, b: &Path) -> io::Result<bool> {
+    let current = std::env::current_dir()?;
+    let [a, b] = [a, b].map(|path| on_disk(&current, path));
+    Ok(a.starts_with(&b) || b.starts_with(&a))
+}
+
+/// `path` from the folder `base` without `.`, `..` and symbolic links. It need not exist.
+pub(crate) fn on_disk(base: &Path, path: &Path) -> PathBuf {
+    let mut found = base.to_path_buf();
+    for part in path.components() {
+        match part {
+            Component::CurDir => {}
+            Component::ParentDir => drop(found.pop()),
+            part => found.push(part),
+        }
+        if found.is_symlink() {
+            found = found.canonicalize().unwrap_or(found);
+        }
+    }
+    found
+}
+
+#[cfg(test)]
+mod tests {
+    use schemars::JsonSchema;
+    use serde::{Deserialize, Serialize};
+
+    use super::*;
+    use crate::context::Context;
+
+    #[derive(Clone, Default, Debug, Serialize, Deserialize, JsonSchema)]
+    #[serde(default)]
+    struct Sample {
+        file: PathBuf,
+        out: PathBuf,
+        plot: Option<PathBuf>,
+    }
+
+    impl Request for Sample {
+        const NAME: &'static str = "sample";
+        const REQUIRED: &'static [&'static str] = &["out"];
+        const PATHS: &'static [(&'static str, PathKind)] =
+            &[("file", PathKind::Input), ("out", PathKind::OutputFolder), ("plot", PathKind::OutputFile)];
+        type Figures = ();
+
+        fn run(&self, _: &Context<'_>) -> Result<()> {
+            Ok(())
+        }
+    }
+
+    #[test]
+    fn results_may_not_be_inside_each_other() {
+        let sample = |out: &str, plot: Option<&str>| Sample {
+            file: "a".into(),
+            out: out.into(),
+            plot: plot.map(PathBuf::from),
+        };
+        for (out, plot) in [("a", "a"), ("a/b", "a"), ("a", "a/b"), ("a/b/../c", "./a/c/")] {
+            let error = check(&sample(out, Some(plot))).expect_err("refused");
+            assert!(error.is_usage());
+            let expected = format!("plot {plot}: expected another place, neither inside {out} (out)");
+            assert!(error.to_string().starts_with(&expected), "{error}");
+        }
+        for (out, plot) in [("b", Some("ba")), ("b/c", Some("b/d")), ("b", Some("")), ("b", None)] {
+            assert!(check(&sample(out, plot)).is_ok(), "{out} {plot:?}");
+        }
+    }
+
+    #[test]
+    fn a_place_is_found_by_all_its_names() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let base = folder.path().canonicalize().expect("a folder");
+        std::fs::create_dir_all(base.join("real/below")).expect("a writable folder");
+        let place = base.join("real/x");
+        let absolute = place.to_string_lossy();
+        for name in ["real/x", "./real/x", "real//x", "real/x/", "real/./x", "gone/../real/x", &absolute] {
+            assert_eq!(on_disk(&base, Path::new(name)), place, "{name}");
+        }
+        assert_ne!(on_disk(&base, Path::new("real/y")), place);
+        #[cfg(unix)]
+        {
+            std::os::unix::fs::symlink("real/below", base.join("link")).expect("a writable folder");
+            // The folder above a link is the one above its target.
+            for name in ["link/../x", "gone/../link/../x"] {
+                assert_eq!(on_disk(&base, Path::new(name)), place, "{name}");
+            }
+        }
+    }
+}
