@@ -272,7 +272,7 @@ pub(crate) fn prepare_after(
     let size = far.dim();
     check_sizes(size, near.dim())?;
     if let Some(frames) = camera {
-        frames.check(size)?;
+        [&far, &near].into_iter().try_for_each(|image| frames.check(image.view()))?;
     }
     let bad = camera.and_then(CameraFrames::bad);
     let find = |image: &Array2<f32>| defects::find(image.view(), settings.limits, bad);

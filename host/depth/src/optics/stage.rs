@@ -99,9 +99,12 @@ impl Stage {
             interpolated(self.measured, &coarser.of_target, measured)?,
             interpolated(self.measured, &coarser.coarseness, measured)?,
         ];
-        let part = (coarseness - fine) / (coarse - fine);
-        let part = if part.is_finite() { part.clamp(MIXED[0], MIXED[1]) } else { 0.0 };
-        let mixed = MIXING_ERROR * (4.0 * part * (1.0 - part) * (other - value)).abs();
+        let place = (coarseness - fine) / (coarse - fine);
+        let place = if place.is_finite() { place } else { 0.0 };
+        let part = place.clamp(MIXED[0], MIXED[1]);
+        // Beyond the textures that were learned the response is not known.
+        let unknown = MIXING_ERROR * (4.0 * part * (1.0 - part)).abs() + (place - part).abs();
+        let mixed = unknown * (other - value).abs();
         Some([value + part * (other - value), slope + part * (its_slope - slope), mixed])
     }
 

@@ -19,6 +19,10 @@ const SMOOTHED_PX: usize = 7;
 const STRUCTURE: f64 = 0.04;
 /// Part of bad pixels from which the light was not even; no camera has as many.
 const MANY_BAD: f64 = 0.02;
+/// Part of an image below half of the dark frame, by more than a part of the image's mean, from which they do not belong
+/// together. Noise and hot pixels are less.
+const DARKER: f64 = 0.01;
+const CLEARLY_DARKER: f32 = 0.05;
 /// Least and largest response of a good pixel.
 const RESPONSE: [f32; 2] = [0.5, 1.5];
 
@@ -58,6 +62,11 @@ pub enum CameraError {
          exposure time"
     )]
     Uneven { percent: f64 },
+    #[error(
+        "{percent:.0} % of the image are darker than half of the camera's dark frame: give dark exposures with the images' settings, \
+         exposure time and bits"
+    )]
+    Darker { percent: f64 },
 }
 
 /// Rejects exposures of which too many pixels reach `white`.
@@ -115,7 +124,7 @@ impl CameraFrames {
     /// Stored frames. Returns [`CameraError::Size`] if they differ in size.
     pub fn new(dark: Array2<f32>, response: Array2<f32>, bad: Array2<bool>) -> Result<Self, CameraError> {
         let frames = Self { dark, response, bad };
-        frames.check(frames.response.dim())?;
+        frames.check_size(frames.response.dim())?;
         let (height, width) = frames.bad.dim();
         if frames.response.dim() != frames.bad.dim() {
             let (image_height, image_width) = frames.response.dim();
@@ -202,7 +211,7 @@ impl CameraFrames {
     /// Corrects an image with values from 0 to 1 for dark signal, response and single bad pixels; patches of bad pixels
     /// are unchanged. Returns [`CameraError::Size`] for an image of another size.
     pub fn correct(&self, image: ArrayView2<f32>) -> Result<Array2<f32>, CameraError> {
-        self.check(image.dim())?;
+        self.check(image)?;
         let seen = self.apply(image);
         let Some(bad) = self.bad() else { return Ok(seen) };
         let marks = bad.mapv(|bad| if bad { Reason::BadPixel.code() } else { 0 });
@@ -216,7 +225,18 @@ impl CameraFrames {
         Ok(mended)
     }
 
-    pub(super) fn check(&self, (image_height, image_width): (usize, usize)) -> Result<(), CameraError> {
+    /// Whether an image was taken as the frames were.
+    pub(super) fn check(&self, image: ArrayView2<f32>) -> Result<(), CameraError> {
+        self.check_size(image.dim())?;
+        let finite = || image.iter().filter(|value| value.is_finite());
+        let mean = finite().map(|value| f64::from(*value)).sum::<f64>() / finite().count().max(1) as f64;
+        let margin = CLEARLY_DARKER * mean as f32;
+        let darker = image.iter().zip(&self.dark).filter(|(value, dark)| **value + margin < 0.5 * **dark);
+        let part = darker.count() as f64 / image.len().max(1) as f64;
+        if part > DARKER { Err(CameraError::Darker { percent: 100.0 * part }) } else { Ok(()) }
+    }
+
+    fn check_size(&self, (image_height, image_width): (usize, usize)) -> Result<(), CameraError> {
         let (height, width) = self.dark.dim();
         if (height, width) == (image_height, image_width) {
             return Ok(());
@@ -300,7 +320,23 @@ mod tests {
             Err(CameraError::NoLight { .. })
         ));
         let frames = CameraFrames::learn(&[], &[image(30, 0.5)]).unwrap();
-        assert!(frames.check((31, 40)).unwrap_err().to_string().contains("40x30"));
+        assert!(frames.check(image(31, 0.5).view()).unwrap_err().to_string().contains("40x30"));
+    }
+
+    #[test]
+    fn dark_frames_of_another_scale_are_refused() {
+        let scene = Array2::from_shape_fn((30, 40), |(y, x)| 0.02 + 0.3 * ((x + y) % 40) as f32 / 40.0);
+        let frames = |dark: f32| {
+            CameraFrames::learn(&[Array2::from_elem((30, 40), dark)], &[Array2::from_elem((30, 40), 0.6)])
+                .unwrap()
+        };
+        assert!(frames(0.02).check(scene.view()).is_ok());
+        // Four bits more.
+        let error = frames(16.0 * 0.02).check(scene.view()).unwrap_err();
+        assert!(matches!(error, CameraError::Darker { percent } if percent > 10.0), "{error}");
+        // A black background without a black level.
+        let black = scene.mapv(|v| if v < 0.2 { 0.0 } else { v });
+        assert!(frames(1e-3).check(black.view()).is_ok());
     }
 
     #[test]

@@ -52,7 +52,7 @@ pub fn read_files<'a>(
 }
 
 fn found(document: Document, choices: Choices) -> Result<Found, RecordingError> {
-    let Document { mut frames, size, has_wide_gaps } = document;
+    let Document { mut frames, size, has_wide_gaps, .. } = document;
     let everyone = || frames.iter().flatten();
     let first = everyone().next().ok_or_else(|| RecordingError::Kind {
         kind: "keypoint JSON",

@@ -99,7 +99,7 @@ mod tests {
             let expected = format!("plot {plot}: expected another place, neither inside {out} (out)");
             assert!(error.to_string().starts_with(&expected), "{error}");
         }
-        for (out, plot) in [("b", Some("ba")), ("b/c", Some("b/d")), ("b", Some("")), ("b", None)] {
+        for (out, plot) in [("b", Some("b2")), ("b/c", Some("b/d")), ("b", Some("")), ("b", None)] {
             assert!(check(&sample(out, plot)).is_ok(), "{out} {plot:?}");
         }
     }

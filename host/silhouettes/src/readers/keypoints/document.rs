@@ -71,6 +71,8 @@ pub struct Document {
     pub size: Option<[f64; 2]>,
     /// Whether gaps in the numbers are too long to be filled.
     pub has_wide_gaps: bool,
+    /// A list, whose items may be frames, or people of one frame.
+    is_list: bool,
 }
 
 const PEOPLE: [&str; 8] =
@@ -113,16 +115,24 @@ impl Document {
     ) -> Result<Self, RecordingError> {
         let mut documents = files
             .into_iter()
-            .map(|(name, bytes)| Ok((split(name), Self::parse(bytes)?)))
-            .collect::<Result<Vec<(Name, Self)>, RecordingError>>()?;
+            .map(|(name, bytes)| Ok((name, Self::parse(bytes)?)))
+            .collect::<Result<Vec<(&str, Self)>, RecordingError>>()?;
         if documents.len() < 2 {
             return Ok(documents.pop().map(|(_, document)| document).unwrap_or_default());
+        }
+        let is_recording = |document: &Self| document.frames.len() > 1 && !document.is_list;
+        if let Some((name, document)) = documents.iter().find(|(_, document)| is_recording(document)) {
+            let frames = document.frames.len();
+            let reason = format!(
+                "{name} holds {frames} frames, and the folder other files: give each recording alone"
+            );
+            return Err(RecordingError::Kind { kind: "keypoint JSON", reason });
         }
         let size = documents.iter().find_map(|(_, document)| document.size);
         let mut whole = Self { size, ..Self::default() };
         // A list in such a file holds people, not frames.
         let people = |document: Self| -> Vec<Person> { document.frames.into_iter().flatten().collect() };
-        whole.numbered(documents.into_iter().map(|(name, document)| (name, people(document))));
+        whole.numbered(documents.into_iter().map(|(name, document)| (split(name), people(document))));
         Ok(whole)
     }
 
@@ -131,7 +141,10 @@ impl Document {
             Value::Array(items) if items.iter().any(|item| picture_of(item).is_some()) => {
                 self.by_picture(items, &[]);
             }
-            Value::Array(items) => self.frames_of(items),
+            Value::Array(items) => {
+                self.is_list = true;
+                self.frames_of(items);
+            }
             Value::Object(map) => {
                 if let Some(items) = map.get("annotations").and_then(Value::as_array) {
                     let pictures = map.get("images").and_then(Value::as_array).map_or(&[][..], Vec::as_slice);

@@ -109,6 +109,10 @@ fn a_list_in_a_file_of_a_folder_holds_the_people_of_one_frame() {
     assert!(found.remarks().iter().any(|remark| remark.starts_with("2 people")), "{:?}", found.remarks());
     // A folder with one file holds a recording.
     assert_eq!(folder(&["all.json"], &files).frames.len(), 2);
+    let recording = format!(r#"{{"frames":[[{0}],[{0}]]}}"#, person(100.0));
+    let two = [("a.json", recording.as_bytes()), ("b.json", recording.as_bytes())];
+    let error = read_files(two, Choices::default()).unwrap_err().to_string();
+    assert!(error.contains("a.json holds 2 frames") && error.contains("alone"), "{error}");
 }
 
 #[test]
