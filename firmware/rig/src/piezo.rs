@@ -193,7 +193,7 @@ impl Piezo {
         self.gauge_missing_ticks == 0
     }
 
-    /// A closed loop is closed anew: a changed scale becomes a disturbance, and the shaper leads to the target.
+    /// A closed loop is opened and closed again: a changed scale becomes a disturbance, and the shaper leads to the target.
     pub(crate) fn apply(&mut self, settings: FineSettings) {
         if settings == self.settings {
             return;

@@ -76,7 +76,7 @@ const HIDDEN: f64 = 0.4;
 /// A blob up to this multiple of a person's area may hold one person.
 const ONE_ALONE: f64 = 1.15;
 const FOLLOWING: f64 = 0.2;
-/// Frames before a person is reported whom the left or right edge cuts; earlier it may be a hand or a foot of somebody who
+/// Frames before a person is reported whom the left or right edge cuts; earlier it may be a hand or a foot of a person who
 /// comes in or leaves.
 const CUT_FRAMES: usize = 12;
 
