@@ -92,13 +92,13 @@ pub fn fine_for(
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
     use proptest::prelude::*;
 
     const BASE: i64 = 47_000_000;
 
-    fn limits() -> Limits {
+    pub(crate) fn limits() -> Limits {
         Limits {
             datum: Nanometres(47_000_000),
             coarse_min: Nanometres(0),

@@ -167,7 +167,6 @@ fn travel(axis: Axis, limits: &Limits) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use farnear_protocol::Micros;
 
     fn pace(speed_nm_per_s: i32) -> Pace {
         pace_of(speed_nm_per_s, 50_000, 1_600_000)
@@ -205,24 +204,8 @@ mod tests {
 
     #[test]
     fn the_search_for_a_switch_may_take_longer_than_the_way_between_the_limits() {
-        let limits = Limits {
-            datum: Nanometres(47_000_000),
-            coarse_min: Nanometres(5_000_000),
-            coarse_max: Nanometres(7_000_000),
-            coarse_step_pm: 156_250,
-            fine_min: Nanometres(5_000),
-            fine_max: Nanometres(195_000),
-            shots_max: 64,
-            exposure_min: Micros(20),
-            exposure_max: Micros(1_000_000),
-            lens_min: Nanometres(0),
-            lens_max: Nanometres(13_000_000),
-            lens_step_pm: 156_250,
-            distance_min: Nanometres(46_450_000),
-            silence_min: Micros(100_000),
-            silence_max: Micros(60_000_000),
-            row_pixels_max: 1024,
-        };
+        let (coarse_min, coarse_max) = (Nanometres(5_000_000), Nanometres(7_000_000));
+        let limits = Limits { coarse_min, coarse_max, ..crate::plan::tests::limits() };
         let axis = Axis::SensorCoarse;
         for speed in [500_000, 300_000, 160_000] {
             let search = Duration::from_secs_f64(14_500_000.0 / f64::from(speed));
