@@ -52,6 +52,7 @@ class Rig:
     """A board and its camera; a context manager that stops all motion at its end.
 
     Positions are absolute, um, of the axes `coarse` and `fine` (sensor) and `lens`. Ctrl-C interrupts every method and stops the rig.
+    A child process by `fork` cannot use the rig of its parent: every method raises `RigError`. Open the rig after the fork.
 
     Parameters
     ----------

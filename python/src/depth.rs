@@ -3,11 +3,12 @@
 use farnear_depth::{
     adaptive_window::Window,
     fill::{FillBy, LowTexture},
-    measure::{DepthMethod, MeasureSettings, measure_pair_of_views},
+    measure::{DepthMethod, Finding, MeasureSettings, measure_pair_of_views},
     operators,
     pipeline::{self, Settings},
     prepare::{Align, Balance, PrepareSettings},
 };
+use farnear_workflows::optics::another_size;
 use std::sync::{Mutex, PoisonError};
 
 use ndarray::{CowArray, Ix2};
@@ -175,8 +176,10 @@ pub fn depth(
     let white = settings.prepare.limits.filter(|_| white_level.is_some()).map(|[_, white]| white);
     let (far, near) = (up_to(&far, white), up_to(&near, white));
     let (far, near) = (far.view(), near.view());
-    let found = work::run(py, || measure_pair_of_views(far, near, &optics.0, method, None, &settings))?
+    let mut found = work::run(py, || measure_pair_of_views(far, near, &optics.0, method, None, &settings))?
         .map_err(wrong)?;
+    let doubt = another_size(&optics.0, far.dim());
+    found.findings.extend(doubt.map(|doubt| Finding::Run(doubt.to_string())));
     Ok(DepthMap::of(py, found, optics))
 }
 

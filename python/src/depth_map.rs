@@ -4,7 +4,11 @@ use std::{collections::BTreeMap, path::PathBuf};
 
 use farnear_depth::{measure::Measurement, reason::Reason};
 use farnear_files::{image_file, map, mesh::Lateral, npy, view::view_png};
-use farnear_workflows::{MADE_BY, measure, result_folder};
+use farnear_workflows::{
+    MADE_BY,
+    measure::{self, Rectangle},
+    result_folder,
+};
 use ndarray::Array2;
 use numpy::{IntoPyArray, PyArray2, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::{prelude::*, types::PyBytes};
@@ -228,17 +232,8 @@ impl DepthMap {
             return Err(FarnearError::new_err(message));
         }
         let lateral = measure::lateral(&self.optics.0, None);
-        let mut kept = Vec::new();
-        for row in y..bottom {
-            for column in x..right {
-                let z = f64::from(depth[(row, column)]);
-                if z.is_finite() {
-                    let [px, py] = lateral.beside_axis((height, width), column, row, z);
-                    kept.push([px, py, z]);
-                }
-            }
-        }
-        let plane = measure::fit(&kept)
+        let part = Rectangle { x, y, width: columns, height: rows };
+        let plane = measure::fit(depth, lateral, part)
             .ok_or_else(|| FarnearError::new_err("fewer than three depths, or all in a line: no plane"))?;
         Ok(Plane {
             z_mm: plane.z_mm,

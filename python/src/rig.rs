@@ -1,6 +1,6 @@
 //! The board for `farnear.rig.Rig`: Ctrl-C interrupts each call and stops all motion.
 
-use std::{collections::BTreeMap, sync::Arc, time::Duration};
+use std::{collections::BTreeMap, process, sync::Arc, time::Duration};
 
 use farnear_capture::{
     Client,
@@ -34,13 +34,28 @@ type Taken<'py> = (Bound<'py, PyArray2<u16>>, u8, Bound<'py, PyDict>);
 
 /// A board on a serial port, connected.
 #[pyclass(module = "farnear._farnear")]
-pub struct RigClient(Client);
+pub struct RigClient {
+    /// `None` while it is dropped.
+    client: Option<Client>,
+    /// The process that has the port's thread. A child by `os.fork` does not.
+    opened_by: u32,
+}
+
+impl Drop for RigClient {
+    fn drop(&mut self) {
+        if self.opened_by != process::id() {
+            // Dropping a client joins the port's thread, which would never return here.
+            std::mem::forget(self.client.take());
+        }
+    }
+}
 
 #[pymethods]
 impl RigClient {
     #[new]
     fn new(py: Python<'_>, port: &str) -> PyResult<Self> {
-        py.detach(|| Client::open(port)).map(Self).map_err(rig)
+        let client = py.detach(|| Client::open(port)).map_err(rig)?;
+        Ok(Self { client: Some(client), opened_by: process::id() })
     }
 
     /// Homes axes at the same time, all that have a home switch where none are named; gives their encoders' shifts in um.
@@ -48,7 +63,7 @@ impl RigClient {
     fn home(&self, py: Python<'_>, axes: Option<Vec<String>>) -> PyResult<BTreeMap<&'static str, f64>> {
         let axes = match axes {
             Some(names) => names.iter().map(|name| axis(name)).collect::<PyResult<Vec<_>>>()?,
-            None => steppers(&self.0.hello().capabilities),
+            None => steppers(&self.client()?.hello().capabilities),
         };
         self.interruptibly(py, |client| {
             let started = axes.iter().zip(client.start_homing(&axes)?);
@@ -90,7 +105,7 @@ impl RigClient {
 
     /// Who the board is and how far it goes.
     fn info<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let hello = self.0.hello();
+        let hello = self.client()?.hello();
         let limits = hello.limits;
         let dict = PyDict::new(py);
         dict.set_item("board", hello.board.as_str())?;
@@ -111,17 +126,20 @@ impl RigClient {
 
     /// Stops all motion along the ramps.
     fn stop(&self, py: Python<'_>) -> PyResult<()> {
-        py.detach(|| self.0.stop()).map_err(rig)
+        let client = self.client()?;
+        py.detach(|| client.stop()).map_err(rig)
     }
 
     /// Emergency stop; raises an alarm.
     fn halt(&self, py: Python<'_>) -> PyResult<()> {
-        py.detach(|| self.0.halt()).map_err(rig)
+        let client = self.client()?;
+        py.detach(|| client.halt()).map_err(rig)
     }
 
     /// Clears an alarm by its number.
     fn clear_alarm(&self, py: Python<'_>, number: u32) -> PyResult<()> {
-        py.detach(|| self.0.clear_alarm(number)).map_err(rig)
+        let client = self.client()?;
+        py.detach(|| client.clear_alarm(number)).map_err(rig)
     }
 
     /// Runs a program of positions (axis, um) on the board; gives an image with its record for each.
@@ -140,7 +158,7 @@ impl RigClient {
         let usual = ShotDefaults { exposure: Micros(exposure_us), ..ShotDefaults::default() };
         let shots = shots.iter().map(|(name, to_um)| Ok(usual.shot(axis(name)?, position(*to_um)?)));
         let shots = shots.collect::<PyResult<Vec<_>>>()?;
-        let limits = self.0.hello().limits;
+        let limits = self.client()?.hello().limits;
         let taken = self.interruptibly(py, |client| {
             let mut camera = open(&address)?;
             let mut client = client.clone();
@@ -188,7 +206,7 @@ impl RigClient {
             subtract_ambient,
             ..Exposures::default()
         };
-        let limits = self.0.hello().limits;
+        let limits = self.client()?.hello().limits;
         let pair = self.interruptibly(py, |client| {
             let mut camera = open(&address)?;
             let mut client = client.clone();
@@ -210,13 +228,24 @@ impl<E: std::error::Error> From<E> for Failed {
 }
 
 impl RigClient {
+    fn client(&self) -> PyResult<&Client> {
+        let here = process::id();
+        self.client.as_ref().filter(|_| self.opened_by == here).ok_or_else(|| {
+            RigError::new_err(format!(
+                "this rig was opened by another process ({}, this one is {here}), and its connection does not survive fork: use it \
+                 there, or open the rig after the fork",
+                self.opened_by
+            ))
+        })
+    }
+
     /// Runs `work` in a thread and polls for interruptions; an interruption first stops the rig.
     fn interruptibly<T: Send>(
         &self,
         py: Python<'_>,
         work: impl FnOnce(&Client) -> Result<T, Failed> + Send,
     ) -> PyResult<T> {
-        let mut client = self.0.clone();
+        let mut client = self.client()?.clone();
         let done = work::interruptibly(py, move |stop| {
             client.interrupt_by(Arc::clone(stop));
             work(&client)

@@ -228,6 +228,9 @@ def test_a_lens_is_calibrated_from_a_stack_and_measures_its_pairs():
     found = farnear.depth(slices[first], slices[first + fit.pair_step], fit.optics, method="whitened")
     # The target is in focus at slice 20: so many steps nearer than the far plane. Within a third of a step.
     assert np.nanmedian(found.depth_mm) == pytest.approx(100 - 0.05 * (20 - first), abs=0.017)
+    assert not any("320x240" in finding for finding in found.findings)
+    upper = farnear.depth(slices[first][:120], slices[first + fit.pair_step][:120], fit.optics, method="whitened")
+    assert any("320x240 px, these have 320x120" in finding for finding in upper.findings), upper.findings
     # Without the size of a pixel at the target only depth is in mm.
     plane = found.plane()
     assert np.isnan(plane.tilt_deg) and abs(plane.slope_x) < 0.01

@@ -1,8 +1,10 @@
 """The emulated rig as a fixture: what a test of one's own measuring program looks like. Also the rig's client itself."""
 
-import numpy as np
+import os
+import signal
 import time
 
+import numpy as np
 import pytest
 
 import farnear
@@ -97,6 +99,52 @@ def test_a_rig_that_was_left_is_closed(emulated_rig):
         assert rig.info()["emulated"]
     with pytest.raises(farnear.RigError, match="closed"):
         rig.status()
+
+
+def _outcomes_in_child(rig):
+    """What each method does in a child process that is killed if one of them hangs."""
+    calls = {
+        "move": lambda: rig.move(fine=30),
+        "home": rig.home,
+        "status": rig.status,
+        "info": rig.info,
+        "expose": lambda: rig.expose([("fine", 50)]),
+        "stop": rig.stop,
+        "halt": rig.halt,
+        "clear_alarm": lambda: rig.clear_alarm(1),
+        "close": rig.close,
+    }
+    reading, writing = os.pipe()
+    child = os.fork()
+    if child == 0:
+        signal.signal(signal.SIGALRM, signal.SIG_DFL)
+        signal.alarm(30)
+        try:
+            for name, call in calls.items():
+                try:
+                    call()
+                    os.write(writing, f"{name}: done\n".encode())
+                except farnear.RigError as error:
+                    os.write(writing, f"{name}: {error}\n".encode())
+        finally:
+            os._exit(0)
+    os.close(writing)
+    with os.fdopen(reading) as pipe:
+        text = pipe.read()
+    assert os.waitpid(child, 0)[1] == 0, f"the child was killed after {text!r}"
+    return dict(line.split(": ", 1) for line in text.splitlines())
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="this system has no fork")
+@pytest.mark.filterwarnings("ignore:.*fork.*:DeprecationWarning")
+def test_a_rig_is_refused_in_a_child_by_fork(emulated_rig):
+    outcomes = _outcomes_in_child(emulated_rig)
+    assert outcomes.pop("close") == "done"
+    assert len(outcomes) == 8
+    for name, error in outcomes.items():
+        assert f"opened by another process ({os.getpid()}," in error and "after the fork" in error, name
+    assert emulated_rig.status()["fine"]["state"]
+    assert not emulated_rig.status()["emergency_stop"]
 
 
 def test_a_port_that_is_none_is_said():

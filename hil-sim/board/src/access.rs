@@ -70,10 +70,11 @@ impl RigAccess<'_, '_> {
         self.chip().disconnect(chip, cut);
     }
 
+    /// Below the brown-out level the chip stays in reset until the supply has risen above it.
     pub fn set_supply_mv(&mut self, millivolts: u32) {
-        if self.chip().dips(millivolts) {
-            self.press_reset();
-        }
+        let at = self.stop.at;
+        let held = self.chip().dips(millivolts);
+        self.chip().hold(at, held);
         self.chip().part().set_supply(millivolts);
     }
 
@@ -96,7 +97,7 @@ impl RigAccess<'_, '_> {
 
     /// Lets the supply dip to 2 V; a chip without brown-out reset keeps running.
     pub fn brown_out(&mut self) {
-        if self.chip().dips(DIP_MV) {
+        if !self.chip().is_off() && self.chip().dips(DIP_MV) {
             self.press_reset();
         }
     }

@@ -49,6 +49,8 @@ const UNIQUE_ID_AT: u64 = 0x1FFF_7A10;
 /// RCC_CSR after resets that the emulator lacks (RM0090, 6.3.21): power-on also sets PORRSTF, brown-out not.
 const CSR_POWER_ON: u64 = 0x0e00_0000;
 const CSR_BROWN_OUT: u64 = 0x0600_0000;
+/// Rise above the falling threshold that ends a brown-out reset (DS9405, table 22, V_BORhyst, typical).
+const BROWN_OUT_HYSTERESIS_MV: u32 = 100;
 
 /// SPI3, SPI4 and USART3 in the emulator's tables.
 const SPI3: usize = 2;
@@ -152,6 +154,10 @@ pub struct Chip {
     supply: SupplyParts,
     /// Brown-out level read from the option bytes at the last reset.
     brown_out: u64,
+    /// The power is off.
+    cut: bool,
+    /// The supply is below the brown-out level.
+    held: bool,
     clock: Arc<OuterClock>,
 }
 
@@ -233,9 +239,33 @@ impl Chip {
     }
 
     pub fn power(&mut self, at: VirtualNanos, on: bool) {
-        if on && let Some(memory) = self.memory() {
+        self.cut = !on;
+        if !on {
+            self.reset_flags = None; // those of a power-on follow
+        } else if let Some(memory) = self.memory() {
             memory.power_up(at);
         }
+        self.request_power(at);
+    }
+
+    /// Holds the chip in reset, or releases it. The volatile memory and the other chips keep their supply.
+    pub fn hold(&mut self, at: VirtualNanos, held: bool) {
+        if std::mem::replace(&mut self.held, held) != held {
+            self.request_power(at);
+        }
+    }
+
+    pub fn is_cut(&self) -> bool {
+        self.cut
+    }
+
+    /// Without power, or held in reset.
+    pub fn is_off(&self) -> bool {
+        self.cut || self.held
+    }
+
+    fn request_power(&mut self, at: VirtualNanos) {
+        let on = !self.is_off();
         self.part.drive_port(at, 0, |_, _, context| {
             context.request_power(on);
             // The emulator checks a model's requests only at events.
@@ -243,13 +273,17 @@ impl Chip {
         });
     }
 
-    /// Returns whether the chip resets; without brown-out reset it keeps running.
+    /// Returns whether this supply resets the chip, or keeps it in reset; without brown-out reset it keeps running.
     pub fn dips(&mut self, millivolts: u32) -> bool {
-        if millivolts >= self.supply.reset_mv(self.brown_out) {
+        let hysteresis_mv = if self.held { BROWN_OUT_HYSTERESIS_MV } else { 0 };
+        if millivolts >= self.supply.reset_mv(self.brown_out) + hysteresis_mv {
             return false;
         }
-        let brown_out = millivolts >= self.supply.power_down_mv;
-        self.reset_flags = Some(if brown_out { CSR_BROWN_OUT } else { CSR_POWER_ON });
+        if !self.cut {
+            let brown_out = millivolts >= self.supply.power_down_mv;
+            let flags = if brown_out { CSR_BROWN_OUT } else { CSR_POWER_ON };
+            self.reset_flags = Some(self.reset_flags.unwrap_or(0) | flags);
+        }
         true
     }
 
@@ -309,9 +343,12 @@ impl Mcu for Chip {
     }
 
     fn reset(&mut self, at: VirtualNanos, cause: ResetCause) {
-        // The emulator has no power-on reset; only the flags differ.
+        // The emulator has no power-on reset; only the flags differ. It also resets the part when its supply is cut.
+        let off = self.is_off();
         let (cause, flags) = match cause {
-            ResetCause::PowerOn => (ResetCause::Pin, Some(CSR_POWER_ON)),
+            ResetCause::PowerOn if off => (ResetCause::Pin, None),
+            ResetCause::PowerOn => (ResetCause::Pin, Some(self.reset_flags.take().unwrap_or(CSR_POWER_ON))),
+            other if off => (other, None),
             other => (other, self.reset_flags.take()),
         };
         self.part.reset(at, cause);
@@ -382,6 +419,8 @@ impl RigBoard {
             reset_flags: None,
             supply: parts.supply,
             brown_out: parts.supply.brown_out.bits(),
+            cut: false,
+            held: false,
             clock: Arc::default(),
         };
         let start = VirtualNanos(0);

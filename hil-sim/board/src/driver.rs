@@ -360,7 +360,7 @@ impl Driver {
         if powered != self.powered {
             self.observer.note(at.0, Seen::Powered(powered));
         }
-        if powered != self.powered && !powered {
+        if powered != self.powered && !powered && session.board_mut().chip.is_cut() {
             // The DAC's output drops with its supply; the amplifier stays on.
             with_plant(&self.plant, |plant| plant.disturb_dac(at.0, 0));
         } else if !self.parts.wires.resistors {
@@ -438,8 +438,8 @@ impl emulator::Driver<RigBoard> for Driver {
             Settled::Access { access, .. }
                 if access.kind == AccessKind::Write && LinkRates::watches(access.address) =>
             {
-                // The register has 16 bits.
-                self.rates.divide(access.value as u32);
+                // These registers have 16 bits.
+                self.rates.write(access.address, access.value as u32);
                 return;
             }
             Settled::Access { access, .. }

@@ -80,8 +80,8 @@ struct Run {
     /// steps.
     #[arg(long, visible_alias = "faults", value_name = "FILE")]
     scenario: Option<PathBuf>,
-    /// TOML file with part properties that differ from the standard rig; `parts.toml` in the sources lists
-    /// all of them with their origin.
+    /// TOML file with part properties that differ from the standard rig and from the scenario's; `parts.toml`
+    /// in the sources lists all of them with their origin.
     #[arg(long, value_name = "FILE")]
     parts: Option<PathBuf>,
     /// Follow the wall clock. By default time passes only while the board has an answer or event outstanding,
@@ -190,11 +190,14 @@ fn count(elf: &Path) -> Result<()> {
 /// The command line overrides the scenario.
 fn config(run: &Run) -> Result<RigConfig> {
     let scenario = run.scenario.as_deref().map(Scenario::read).transpose()?.unwrap_or_default();
-    let own = scenario.parts().map_err(anyhow::Error::msg)?;
+    let parts = match run.parts.as_deref() {
+        Some(path) => Parts::read(path, &scenario.parts)?,
+        None => scenario.parts().map_err(anyhow::Error::msg)?,
+    };
     Ok(RigConfig {
         firmware: run.firmware.clone(),
         seed: run.seed.or(scenario.seed).unwrap_or(standard::SEED),
-        parts: run.parts.as_deref().map(Parts::read).transpose()?.unwrap_or(own),
+        parts,
         costs_by_kind: false,
         pace: if run.paced { Pace::Realtime } else { Pace::Lockstep },
         scenario,

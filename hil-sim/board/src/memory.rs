@@ -97,6 +97,22 @@ impl MemoryChip {
         self.fails_at = None;
     }
 
+    /// Flips a bit of a spoilt answer: in the first byte of a read, or in the manufacturer's byte of the identification.
+    fn spoil(&mut self, answer: u32) -> u32 {
+        let (count, opcode) = self.command;
+        let (spoilt, left) = match opcode {
+            READ_ID => (8, &mut self.spoilt.0),
+            READ => (4, &mut self.spoilt.1),
+            _ => return answer,
+        };
+        if count != spoilt || *left == 0 {
+            return answer;
+        }
+        *left -= 1;
+        // Another bit each time.
+        answer ^ 1 << (*left % 8)
+    }
+
     /// The emulator's chip has no method for this, so a new one is created.
     fn rebuild(&mut self, contents: &[u8], ready_at: VirtualNanos) {
         let described = serde_json::to_value(Fm25v02::new()).and_then(|mut chip| {
@@ -131,18 +147,7 @@ impl Peer for MemoryChip {
             _ => None,
         };
         let answer = self.chip.transfer(mosi, bits, context);
-        let answer = altered.unwrap_or(answer);
-        let left = match *opcode {
-            READ_ID => &mut self.spoilt.0,
-            READ => &mut self.spoilt.1,
-            _ => return answer,
-        };
-        // A position in the answer (after opcode and address) that differs each time.
-        if *count == 8 && *left > 0 {
-            *left -= 1;
-            return answer ^ 1 << (*left % 8);
-        }
-        answer
+        self.spoil(altered.unwrap_or(answer))
     }
 
     fn select(&mut self, context: &mut Timeline<'_, '_>) {
@@ -168,6 +173,22 @@ impl Store for MemoryChip {}
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn spoils_reads_of_any_length() {
+        let mut chip = MemoryChip::new(MemoryMake::Fm25v02a);
+        chip.spoil_answers(1, 2);
+        let mut answer = |opcode, bytes: u32| {
+            let spoilt = (1..=bytes).filter(|count| {
+                chip.command = (*count, opcode);
+                chip.spoil(0xa5) != 0xa5
+            });
+            spoilt.count()
+        };
+        // Opcode, two bytes of address, one byte of data.
+        assert_eq!([(); 3].map(|()| answer(READ, 4)), [1, 1, 0]);
+        assert_eq!([(); 2].map(|()| answer(READ_ID, 10)), [1, 0]);
+    }
 
     #[test]
     fn contents_survive_a_power_loss() {

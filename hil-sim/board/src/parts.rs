@@ -282,17 +282,21 @@ impl Default for Parts {
 }
 
 impl Parts {
-    /// Reads a file with the values that differ from the default.
-    pub fn read(path: &Path) -> Result<Self, SimError> {
+    /// Reads a file with the values that differ from the default and from `base` (a scenario's `[parts]`).
+    pub fn read(path: &Path, base: &toml::Table) -> Result<Self, SimError> {
         let wrong = |reason: String| SimError::Parts { path: path.into(), reason };
         let text = std::fs::read_to_string(path).map_err(|error| wrong(error.to_string()))?;
-        Self::parse(&text).map_err(wrong)
+        Self::parse_over(base, &text).map_err(wrong)
     }
 
     pub(crate) fn parse(text: &str) -> Result<Self, String> {
+        Self::parse_over(&toml::Table::new(), text)
+    }
+
+    fn parse_over(base: &toml::Table, text: &str) -> Result<Self, String> {
         let mut table: toml::Table = toml::from_str(STANDARD).map_err(|error| error.to_string())?;
         let other: toml::Table = toml::from_str(text).map_err(|error| error.to_string())?;
-        for (part, values) in other {
+        for (part, values) in base.clone().into_iter().chain(other) {
             match (table.get_mut(&part), values) {
                 (Some(toml::Value::Table(known)), toml::Value::Table(values)) => known.extend(values),
                 (Some(_), _) => return Err(format!("{part} is a table: [{part}]")),
@@ -346,7 +350,34 @@ impl Parts {
                 return Err(format!("{name} = {value} is not in {min} to {max}"));
             }
         }
-        Ok(())
+        self.check_whole_numbers()
+    }
+
+    fn check_whole_numbers(&self) -> Result<(), String> {
+        let (converter, supply, switches, wires, driver) =
+            (&self.gauge_converter, &self.supply, &self.switches, &self.wires, &self.driver);
+        let [level_1, level_2, level_3] = supply.brown_out_mv.map(u64::from);
+        let ranges: [(&str, u64, u64, u64); 14] = [
+            ("gauge_converter.pulse_min_ns", converter.pulse_min_ns, 0, 1_000_000),
+            ("gauge_converter.conversion_min_ns", converter.conversion_min_ns, 0, 1_000_000),
+            ("gauge_converter.conversion_max_ns", converter.conversion_max_ns, 0, 1_000_000),
+            // Below the 3.3 V of the supply with their hysteresis.
+            ("supply.brown_out_mv, level 1", level_1, 1_000, 3_100),
+            ("supply.brown_out_mv, level 2", level_2, 1_000, 3_100),
+            ("supply.brown_out_mv, level 3", level_3, 1_000, 3_100),
+            ("supply.power_down_mv", supply.power_down_mv.into(), 0, 3_100),
+            ("switches.bounce_us", switches.bounce_us, 0, 100_000),
+            ("switches.glitch_us", switches.glitch_us, 0, 1_000_000),
+            ("wires.break_rise_us", wires.break_rise_us, 0, 1_000_000),
+            ("wires.break_bounce_us", wires.break_bounce_us, 0, 100_000),
+            ("driver.direction_setup_ns", driver.direction_setup_ns, 0, 1_000_000),
+            ("driver.direction_hold_ns", driver.direction_hold_ns, 0, 1_000_000),
+            ("driver.standstill_ms", driver.standstill_ms, 0, 100_000),
+        ];
+        match ranges.into_iter().find(|(_, value, min, max)| !(min..=max).contains(&value)) {
+            Some((name, value, min, max)) => Err(format!("{name} = {value} is not in {min} to {max}")),
+            None => Ok(()),
+        }
     }
 }
 
@@ -368,6 +399,23 @@ mod tests {
         refused("[gouge]\ngain = 1.0", "gouge");
         refused("gauge = 1", "gauge is a table");
         refused("[memory]\nmake = \"FM25V05\"", "FM25V05");
+        refused(
+            "[switches]\nbounce_us = 10000000000000000",
+            "switches.bounce_us = 10000000000000000 is not in 0 to 100000",
+        );
+        refused("[switches]\nglitch_us = 10000000000000000", "switches.glitch_us");
+        refused("[wires]\nbreak_rise_us = 10000000000000000", "wires.break_rise_us");
+        refused("[supply]\nbrown_out_mv = [2190, 2500, 3300]", "supply.brown_out_mv, level 3 = 3300");
+    }
+
+    #[test]
+    fn a_file_overrides_a_scenarios_parts_and_keeps_the_others() {
+        let scenario: toml::Table =
+            toml::from_str("[gauge]\ngain = 1.01\noffset_um = 0.5\n").expect("a good table");
+        let parts = Parts::parse_over(&scenario, "[gauge]\ngain = 1.02\n[piezo]\nsecond_mode_share = 0.1")
+            .expect("a good file");
+        assert_eq!((parts.gauge.gain, parts.gauge.offset_um), (1.02, 0.5));
+        assert_eq!(parts.piezo.second_mode_share, 0.1);
     }
 
     #[test]

@@ -80,6 +80,8 @@ pub struct Wiring {
     exposures_begun: u64,
     begun: Option<(u32, u64, u64)>,
     shots: Vec<Shot>,
+    /// Time of the board's last reset.
+    reset_ns: u64,
 }
 
 pub fn channel(number: u8) -> Channel {
@@ -246,6 +248,7 @@ impl Wiring {
             exposures_begun: 0,
             begun: None,
             shots: Vec::new(),
+            reset_ns: 0,
         };
         for stage in &mut wiring.stages {
             stage.put_encoder(chip, VirtualNanos(0));
@@ -311,10 +314,8 @@ impl Wiring {
                 self.lights.begin_exposure(at_ns);
                 with_plant(&self.plant, |plant| plant.begin_exposure(at_ns));
                 let low = Operate::peek(chip, at, TIM2_CNT, Width::W32).unwrap_or(0);
-                // The counter is the lower 32 bits of about the virtual time, which exceeds few of its
-                // periods.
-                let high = (at_ns / 1000) & !0xffff_ffff;
-                self.begun = Some((id, high | low, at_ns));
+                let since_reset_us = at_ns.saturating_sub(self.reset_ns) / 1000;
+                self.begun = Some((id, board_us(since_reset_us, low as u32), at_ns));
             }
             Edge::End => {
                 let truth = with_plant(&self.plant, |plant| plant.end_exposure(at_ns));
@@ -447,6 +448,7 @@ impl Wiring {
     }
 
     pub fn board_reset(&mut self, at: VirtualNanos) {
+        self.reset_ns = at.0;
         for stage in &mut self.stages {
             // A resistor holds EN while the chip's pins float.
             (stage.step, stage.driver.enabled_ns) = (false, None);
@@ -459,6 +461,12 @@ impl Wiring {
     }
 }
 
+/// The board time with these lower 32 bits nearest to the time since the reset: the firmware's clock starts a moment later.
+fn board_us(since_reset_us: u64, low: u32) -> u64 {
+    let behind_us = (since_reset_us as u32).wrapping_sub(low) as i32;
+    since_reset_us.saturating_add_signed(-i64::from(behind_us))
+}
+
 pub fn is_high(
     chip: &mut Chip,
     name: PinName,
@@ -466,4 +474,20 @@ pub fn is_high(
     read: impl FnOnce(&mut Chip) -> Option<Level>,
 ) -> bool {
     read(chip) == Some(Level::High) && chip.function(name) == Some(function)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::board_us;
+
+    #[test]
+    fn board_time_counts_from_the_reset_beyond_the_counters_period() {
+        const PERIOD_US: u64 = 1 << 32;
+        // The firmware's clock started 0.2 s after the reset.
+        for board in [0, 5_000_000, PERIOD_US - 1, PERIOD_US, PERIOD_US + 100_000, 5 * PERIOD_US + 7] {
+            assert_eq!(board_us(board + 200_000, board as u32), board);
+        }
+        assert_eq!(board_us(PERIOD_US, 3), PERIOD_US + 3, "a clock that is slightly ahead");
+        assert_eq!(board_us(0, 3), 3);
+    }
 }

@@ -4,10 +4,10 @@
 //! | `hard-stop` | no driver pushes a stage against its hard stop if the home switch works, and at most until a stall otherwise |
 //! | `piezo-step` | the piezo's command never changes by more than 60 um in a tick: a quarter of the stroke and the loop's correction; not with `dac-dead` |
 //! | `step-after-alarm` | no STEP pulse later than 2 ms after an alarm until it is cleared |
-//! | `acts-twice` | no request acts twice: one end each, equal answers to repeats, no extra exposures |
+//! | `acts-twice` | no request acts twice: one end each, equal answers to repeats, no more exposures than accepted |
 //! | `moves-unasked` | no motor moves without requested work |
 //! | `exposure` | each exposure is reported with its own stamps, and was within its tolerance or reported otherwise |
-//! | `position` | a position reported as homed was homed in this boot and is correct within its stated error |
+//! | `position` | a position reported as homed was homed by an accepted request in this boot and is correct within its stated error |
 //! | `records` | settings, alarms and boot numbers survive everything, or their loss is reported |
 //! | `works-after` | without faults the alarms can be cleared, and the rig homes, moves and captures |
 //!

@@ -58,6 +58,14 @@ pub struct Campaign {
     pub out: PathBuf,
 }
 
+impl Campaign {
+    /// The seeds of this shard.
+    pub fn own_seeds(&self) -> Vec<u64> {
+        let Shard { index, count } = self.shard;
+        self.seeds.clone().filter(|seed| seed % count == index - 1).collect()
+    }
+}
+
 #[derive(Clone, Default, Debug)]
 pub struct Summary {
     pub played: u64,
@@ -138,8 +146,7 @@ pub fn play_alone(scenario: &Scenario, firmware: Option<&Path>) -> Result<Outcom
 
 /// `progress` is called when a scenario ends. Violations are not errors.
 pub fn run(campaign: &Campaign, mut progress: impl FnMut(u64, &Outcome)) -> Result<Summary, SimError> {
-    let Shard { index, count } = campaign.shard;
-    let seeds: Vec<u64> = campaign.seeds.clone().filter(|seed| seed % count == index - 1).collect();
+    let seeds = campaign.own_seeds();
     let next = AtomicU64::new(0);
     let stopped = Mutex::new(None);
     let mut summary = Summary::default();

@@ -93,6 +93,14 @@ fn play_seeds(seeds: &Seeds) -> Result<()> {
         firmware: seeds.firmware.clone(),
         out: seeds.out.clone(),
     };
+    anyhow::ensure!(
+        !campaign.own_seeds().is_empty(),
+        "shard {}/{} has none of the {} seeds from {}: expected at least as many seeds as shards; give more --seeds",
+        seeds.shard.index,
+        seeds.shard.count,
+        seeds.seeds,
+        seeds.first
+    );
     let mut played = 0;
     let summary = farnear_campaign::run(&campaign, |seed, outcome| {
         played += 1;

@@ -37,6 +37,8 @@ const PACKET_BYTES_MAX: usize = 65_507;
 const PACKET_BYTES: u32 = 0xFFFF;
 /// Minimum time between free-running exposures: read-out and a margin.
 pub(super) const BETWEEN_EXPOSURES_US: u32 = 15_000;
+/// Features that may not change during an acquisition, because they change the size of a frame.
+const LOCKED: [u32; 5] = [OFFSET_X, OFFSET_Y, WIDTH, HEIGHT, PIXEL_FORMAT];
 /// First id of software-triggered pictures, far from the board's numbers.
 const SOFTWARE_SHOTS: u32 = 0x4000_0000;
 
@@ -68,7 +70,8 @@ pub struct Device {
     frames: u64,
     triggers: u32,
     sent_frames: VecDeque<(u16, Vec<Vec<u8>>)>,
-    free_run: bool,
+    /// Period and exposure of the requested free run.
+    free_run: Option<(Micros, Micros)>,
 }
 
 impl Device {
@@ -83,7 +86,7 @@ impl Device {
             frames: 0,
             triggers: 0,
             sent_frames: VecDeque::new(),
-            free_run: false,
+            free_run: None,
         }
     }
 
@@ -153,6 +156,9 @@ impl Device {
         if register != PRIVILEGE && self.controller.is_none() {
             return Err(Refusal::AccessDenied);
         }
+        if LOCKED.contains(&register) && self.acquires_since_ns.is_some() {
+            return Err(Refusal::WriteProtect);
+        }
         self.registers.write(register, value)?;
         match register {
             PRIVILEGE if value & PRIVILEGE_CONTROL != 0 => self.controller = Some((from, now)),
@@ -195,15 +201,18 @@ impl Device {
         free.then(|| Micros(by_rate.max(exposure.saturating_add(BETWEEN_EXPOSURES_US))))
     }
 
-    /// Request to start or stop free running, if it changes.
+    /// Request to start, change or stop free running, if it differs from the last one.
     fn change_free_run(&mut self) -> Option<Control> {
-        let period = self.free_period();
-        if period.is_some() == self.free_run {
-            return None;
-        }
-        self.free_run = period.is_some();
         let exposure = Micros(self.registers.get(EXPOSURE_US));
-        Some(Control::FreeRun { period: period.unwrap_or(Micros(0)), exposure })
+        let wanted = self.free_period().map(|period| (period, exposure));
+        let last = std::mem::replace(&mut self.free_run, wanted);
+        match (last, wanted) {
+            (last, wanted) if last == wanted => None,
+            (_, Some((period, exposure))) => Some(Control::FreeRun { period, exposure }),
+            // The last exposure may still be running.
+            (Some((_, exposure)), None) => Some(Control::FreeRun { period: Micros(0), exposure }),
+            (None, None) => None,
+        }
     }
 
     fn release(&mut self) -> Option<Control> {
@@ -280,7 +289,7 @@ impl Device {
         let (sensor_width, sensor_height) =
             (usize::from(picture.header.width), usize::from(picture.header.height));
         let (left, top) = (get(OFFSET_X).min(sensor_width), get(OFFSET_Y).min(sensor_height));
-        // Clip the region at the sensor's edge: the offset may have been set after the size.
+        // The registers keep the region within the sensor; this also keeps it within a smaller picture.
         let (width, height) = (get(WIDTH).min(sensor_width - left), get(HEIGHT).min(sensor_height - top));
         let format = self.registers.get(PIXEL_FORMAT);
         let (gain, black) = (self.registers.get(GAIN), self.registers.get(BLACK_LEVEL));
@@ -309,5 +318,63 @@ impl Device {
             pixels: bytes,
             chunks,
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::net::Ipv4Addr;
+
+    use super::*;
+
+    /// A device with a controlling client, and what its rig is asked at each write.
+    struct Client(Device);
+
+    impl Client {
+        fn new() -> Self {
+            let config = GigeConfig {
+                address: Ipv4Addr::LOCALHOST,
+                seed: 7,
+                lost_per_thousand: 0,
+                sensor_px: (640, 480),
+                bits: 12,
+            };
+            let mut client = Self(Device::new(&config));
+            assert_eq!(client.write(PRIVILEGE, 2), Ok(vec![]));
+            client
+        }
+
+        fn write(&mut self, register: u32, value: u32) -> Result<Vec<Control>, Refusal> {
+            let mut done = Done::default();
+            let from = (Ipv4Addr::LOCALHOST, 7_000).into();
+            self.0.write(register, value, from, Instant::now(), 0, &mut done)?;
+            Ok(done.asks)
+        }
+    }
+
+    #[test]
+    fn exposure_and_rate_change_a_running_acquisition() {
+        let run = |period, exposure| -> Result<Vec<Control>, Refusal> {
+            Ok(vec![Control::FreeRun { period: Micros(period), exposure: Micros(exposure) }])
+        };
+        let mut client = Client::new();
+        assert_eq!(client.write(EXPOSURE_US, 4_000), Ok(vec![]), "nothing runs yet");
+        assert_eq!(client.write(ACQUISITION, START), run(40_000, 4_000));
+        assert_eq!(client.write(GAIN, 200), Ok(vec![]));
+        assert_eq!(client.write(EXPOSURE_US, 6_000), run(40_000, 6_000));
+        assert_eq!(client.write(FRAME_RATE, 10_000), run(100_000, 6_000));
+        assert_eq!(client.write(EXPOSURE_US, 200_000), run(200_000 + BETWEEN_EXPOSURES_US, 200_000));
+        assert_eq!(client.write(ACQUISITION, STOP), run(0, 200_000));
+    }
+
+    #[test]
+    fn the_size_of_a_frame_is_locked_during_an_acquisition() {
+        let mut client = Client::new();
+        assert!(client.write(ACQUISITION, START).is_ok());
+        for (register, value) in [(WIDTH, 320), (HEIGHT, 240), (OFFSET_X, 0), (PIXEL_FORMAT, MONO_8)] {
+            assert_eq!(client.write(register, value), Err(Refusal::WriteProtect), "{register:x}");
+        }
+        assert!(client.write(ACQUISITION, STOP).is_ok());
+        assert_eq!(client.write(WIDTH, 320), Ok(vec![]));
     }
 }

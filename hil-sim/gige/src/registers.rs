@@ -6,8 +6,8 @@ use crate::{
     GigeConfig,
     description::{CHUNKS, FILE, MODEL, TICKS_PER_SECOND, VENDOR, description},
     features::{
-        CHUNK_ENABLE, CHUNK_MODE, CHUNK_SELECTOR, Feature, HEIGHT, MONO_8, PAYLOAD_SIZE, PIXEL_FORMAT, Value,
-        WIDTH, table,
+        CHUNK_ENABLE, CHUNK_MODE, CHUNK_SELECTOR, Feature, HEIGHT, MONO_8, OFFSET_X, OFFSET_Y, PAYLOAD_SIZE,
+        PIXEL_FORMAT, SENSOR_HEIGHT, SENSOR_WIDTH, Value, WIDTH, table,
     },
     stream,
 };
@@ -153,7 +153,7 @@ impl Registers {
             Some((min, max)) => (min..=max).contains(&value),
             None => self.feature_allows(register, value)?,
         };
-        if !allowed {
+        if !allowed || !self.region_fits(register, value) {
             return Err(Refusal::InvalidParameter);
         }
         self.put(register, value);
@@ -183,6 +183,18 @@ impl Registers {
             may_write = true;
         }
         if may_write { Ok(false) } else { Err(Refusal::WriteProtect) }
+    }
+
+    /// Whether the region is still within the sensor after this write.
+    fn region_fits(&self, register: u32, value: u32) -> bool {
+        let (other, sensor) = match register {
+            WIDTH => (OFFSET_X, SENSOR_WIDTH),
+            OFFSET_X => (WIDTH, SENSOR_WIDTH),
+            HEIGHT => (OFFSET_Y, SENSOR_HEIGHT),
+            OFFSET_Y => (HEIGHT, SENSOR_HEIGHT),
+            _ => return true,
+        };
+        value.saturating_add(self.get(other)) <= self.get(sensor)
     }
 
     fn settle(&mut self) {
@@ -242,6 +254,18 @@ mod tests {
         }
         assert_eq!(registers.read(0xFFFF_FFFC, 8), Err(Refusal::InvalidAddress));
         assert_eq!(registers.read(0, DISCOVERY_BYTES).map(<[u8]>::len), Ok(DISCOVERY_BYTES));
+    }
+
+    #[test]
+    fn a_region_beyond_the_sensor_is_rejected() {
+        let mut registers = Registers::new(&config());
+        assert_eq!(registers.write(OFFSET_X, 16), Err(Refusal::InvalidParameter), "the width is still 640");
+        for (register, value) in [(WIDTH, 600), (OFFSET_X, 40), (HEIGHT, 80), (OFFSET_Y, 400)] {
+            assert_eq!(registers.write(register, value), Ok(()), "{register:x}");
+        }
+        for (register, value) in [(WIDTH, 601), (OFFSET_X, 41), (HEIGHT, 81), (OFFSET_Y, 401)] {
+            assert_eq!(registers.write(register, value), Err(Refusal::InvalidParameter), "{register:x}");
+        }
     }
 
     #[test]

@@ -1,13 +1,14 @@
-//! The image-side telecentric thin lens: blur of an object distance at a sensor position. `1/F = 1/u + 1/w`,
-//! blur radius `|s - w(u)| D / 2F`; mm from the lens, `u` to the object, `w` and `s` to the image. The
-//! aperture in the front focal plane makes magnification independent of `s` (Watanabe & Nayar 1997).
+//! The thin lens: blur of an object distance at a sensor position. `1/F = 1/u + 1/w`; mm from the lens, `u` to the object,
+//! `w` and `s` to the image. Telecentric on the image side: blur radius `|s - w| D / 2F`; the aperture in the front focal
+//! plane makes magnification independent of `s` (Watanabe & Nayar 1997). Otherwise the aperture is at the lens, and the
+//! radius is `|s - w| D / 2w`.
 
 use thiserror::Error;
 
 use crate::optics::OpticsFile;
 pub use crate::thin_lens::image_distance_mm;
 
-/// Telecentric lens with its two focus settings.
+/// Lens with its two focus settings.
 #[derive(Debug, Clone, PartialEq)]
 #[allow(missing_docs, reason = "names and types describe these fields")]
 pub struct Lens {
@@ -103,7 +104,8 @@ impl Lens {
     /// Signed blur radius on the sensor, px: positive for objects beyond the focused plane.
     #[must_use]
     pub fn signed_blur_px(&self, sensor_distance_mm: f64, image_mm: f64) -> f64 {
-        (sensor_distance_mm - image_mm) * self.aperture_mm / (2.0 * self.focal_length_mm * self.pixel_mm)
+        let cone_mm = if self.telecentric { self.focal_length_mm } else { image_mm };
+        (sensor_distance_mm - image_mm) * self.aperture_mm / (2.0 * cone_mm * self.pixel_mm)
     }
 }
 
@@ -171,6 +173,18 @@ pub(crate) mod tests {
         assert!((lens.signed_blur_px(lens.sensor_near_mm, far) - 2.703).abs() < 1e-9);
         let near = lens.image_distance_mm(lens.near_mm).unwrap();
         assert!((lens.signed_blur_px(lens.sensor_far_mm, near) + 2.703).abs() < 1e-9);
+    }
+
+    #[test]
+    fn an_aperture_at_the_lens_blurs_by_the_image_distance() {
+        let text = "[lens]\nfocal_length_mm = 50.0\naperture_mm = 10.0\ntelecentric = false\n[sensor]\npixel_um = 7.4\n\
+                    [focus]\nfar_mm = 150.0\nmax_blur_px = 3.0";
+        let lens = Lens::from_optics(&OpticsFile::parse(text).unwrap()).unwrap();
+        let [far, near] = [lens.far_mm, lens.near_mm].map(|u| lens.image_distance_mm(u).unwrap());
+        let of_far = lens.signed_blur_px(lens.sensor_near_mm, far);
+        let of_near = -lens.signed_blur_px(lens.sensor_far_mm, near);
+        assert!((of_far - (near - far) * 10.0 / (2.0 * far) / 0.0074).abs() < 1e-9);
+        assert!(of_near < 3.0 && of_far > 3.0 && (0.5 * (of_near + of_far) - 3.0).abs() < 1e-3);
     }
 
     #[test]

@@ -82,6 +82,7 @@ impl OpticsFile {
             focal_length_mm,
             sensor_far_mm: image_distance_mm(focal_length_mm, far_mm),
             per_blur_mm: 2.0 * f_number * pixel_um * 1e-3,
+            telecentric: raw.lens.telecentric.unwrap_or(true),
         };
         let (near_mm, max_blur_px) = raw.focus.range(&travel)?;
         let bin = f64::from(raw.stage.map_or(1, |stage| stage.bin.max(1)));
@@ -94,18 +95,29 @@ impl OpticsFile {
 struct Travel {
     focal_length_mm: f64,
     sensor_far_mm: f64,
-    /// Travel per px of the largest blur.
+    /// Travel per px of the largest blur of a telecentric lens.
     per_blur_mm: f64,
+    telecentric: bool,
 }
 
 impl Travel {
     fn near_mm(&self, blur_px: f64) -> f64 {
-        let sensor_near_mm = self.sensor_far_mm + self.per_blur_mm * blur_px;
-        1.0 / (1.0 / self.focal_length_mm - 1.0 / sensor_near_mm)
+        let telecentric_mm = self.per_blur_mm * blur_px;
+        let travel_mm = if self.telecentric {
+            telecentric_mm
+        } else {
+            telecentric_mm * self.sensor_far_mm / (self.focal_length_mm - 0.5 * telecentric_mm)
+        };
+        1.0 / (1.0 / self.focal_length_mm - 1.0 / (self.sensor_far_mm + travel_mm))
     }
 
+    /// The cone of light has its tip in the image and its base in the aperture: at the lens, or at the front focal plane
+    /// of a telecentric lens.
     fn blur_px(&self, near_mm: f64) -> f64 {
-        (image_distance_mm(self.focal_length_mm, near_mm) - self.sensor_far_mm) / self.per_blur_mm
+        let travel_mm = image_distance_mm(self.focal_length_mm, near_mm) - self.sensor_far_mm;
+        let cone_mm =
+            if self.telecentric { self.focal_length_mm } else { self.sensor_far_mm + 0.5 * travel_mm };
+        travel_mm / self.per_blur_mm * self.focal_length_mm / cone_mm
     }
 }
 

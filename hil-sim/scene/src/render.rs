@@ -212,7 +212,7 @@ impl Renderer {
             return Err(RenderError::Sensor { sensor_distance_mm });
         }
         let blur_px = |offset_mm: f64| {
-            self.lens.signed_blur_px(sensor_distance_mm - self.lens.sensor_far_mm, offset_mm) as f32
+            self.lens.signed_blur_px(sensor_distance_mm, self.lens.sensor_far_mm + offset_mm) as f32
         };
         let widest = |offsets: &mut dyn Iterator<Item = &f32>| {
             offsets.map(|&offset_mm| blur_px(offset_mm.into()).abs()).fold(0.0, f32::max)

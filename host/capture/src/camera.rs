@@ -102,6 +102,11 @@ pub trait Camera {
     /// Prepares for exposures of this kind and drops earlier images. Free-running ones keep the exposure.
     fn arm(&mut self, mode: TriggerMode, exposure: Micros) -> Result<(), CameraError>;
 
+    /// Whether it exposes for the time of [`Self::arm`] and not for the length of the trigger pulse.
+    fn sets_exposure(&mut self) -> bool {
+        false
+    }
+
     /// Software trigger of one exposure.
     fn trigger(&mut self, trigger_number: u32, exposure: Micros) -> Result<(), CameraError>;
 

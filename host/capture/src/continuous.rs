@@ -16,7 +16,7 @@ use crate::{
     camera::{Camera, CameraError, Image},
     client::Client,
     error::ClientError,
-    expose::{CaptureError, one_trigger, wait_for_image},
+    expose::{CaptureError, check_exposures, one_trigger, wait_for_image},
     work::{Step, Work},
 };
 
@@ -90,6 +90,7 @@ impl<'c> Continuous<'c> {
         image_wait: Duration,
     ) -> Result<Self, CaptureError> {
         let (mode, exposure) = one_trigger(shots)?;
+        check_exposures(camera, shots)?;
         client.arm(shots)?;
         camera.arm(mode, exposure)?;
         let work = Some(client.start_continuous(shots, pace.period, pace.exposures)?);

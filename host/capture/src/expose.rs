@@ -16,6 +16,8 @@ use crate::{
 const SLICE: Duration = Duration::from_millis(50);
 /// Longest wait: a longer one may be beyond the end of the clock.
 const A_DAY: Duration = Duration::from_secs(86_400);
+/// Permitted difference of strobe and exposure, as of the board: cameras count exposure in lines of some 10 us.
+const STROBE_OFF_US: u64 = 100;
 
 #[derive(Debug, thiserror::Error)]
 pub enum CaptureError {
@@ -44,6 +46,11 @@ pub enum CaptureError {
         "shot {index} is triggered by {found}, the ones before by {first}; a program's shots must have one trigger"
     )]
     MixedTriggers { index: usize, found: &'static str, first: &'static str },
+    #[error(
+        "shot {index} exposes for {found} us, the ones before for {first} us; a camera of the kind `{camera}` exposes for the one \
+         time that is set before the program: give all shots the same exposure_us, or set the camera to expose for the trigger pulse"
+    )]
+    MixedExposures { camera: &'static str, index: usize, found: u32, first: u32 },
 }
 
 /// Runs a program; passes each exposure with its image (within `image_wait`) to `on_image`, whose error stops the rig.
@@ -66,6 +73,9 @@ pub fn expose_together<E: From<CaptureError> + From<ClientError>>(
     mut on_image: impl FnMut(usize, ShotRecord, Image) -> Result<(), E>,
 ) -> Result<(), E> {
     let (mode, exposure) = one_trigger(shots)?;
+    for camera in cameras.iter_mut() {
+        check_exposures(&mut **camera, shots)?;
+    }
     let count = cameras.len();
     let of = |at: usize| {
         move |source: CameraError| match count {
@@ -203,6 +213,32 @@ pub(crate) fn one_trigger(shots: &[Shot]) -> Result<(TriggerMode, Micros), Captu
     }
 }
 
+/// Whether the camera can take these shots: one that sets its own exposure cannot change it within a program.
+pub fn check_exposures(camera: &mut dyn Camera, shots: &[Shot]) -> Result<(), CaptureError> {
+    let Some(first) = shots.first() else { return Ok(()) };
+    match shots.iter().position(|shot| shot.exposure != first.exposure) {
+        Some(index) if camera.sets_exposure() => Err(CaptureError::MixedExposures {
+            camera: camera.kind(),
+            index,
+            found: shots[index].exposure.0,
+            first: first.exposure.0,
+        }),
+        _ => Ok(()),
+    }
+}
+
+/// A message if the camera's strobe was longer or shorter than the exposure.
+pub(crate) fn strobe_note(record: &ShotRecord) -> Option<String> {
+    let asked_us = u64::from(record.exposure.0);
+    let strobe_us = record.strobe_end.0.saturating_sub(record.strobe_start.0);
+    (strobe_us.abs_diff(asked_us) > STROBE_OFF_US + asked_us / 100).then(|| {
+        format!(
+            "the strobe of exposure {} lasted {strobe_us} us, expected {asked_us} us; check the camera's own exposure time",
+            record.trigger_number
+        )
+    })
+}
+
 /// Sensor distance by encoders and gauge, mm.
 pub fn sensor_mm(record: &ShotRecord, limits: &Limits) -> f64 {
     sensor_distance_nm(limits.datum, |axis| record.measured(axis)) as f64 / 1e6
@@ -229,5 +265,37 @@ pub(crate) fn wait_for_image(
             }
             result => return Ok(result?),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use farnear_protocol::units::BoardMicros;
+
+    use super::*;
+
+    #[test]
+    fn reports_a_strobe_of_another_length_than_the_exposure() {
+        let note = |exposure_us: u32, strobe_us: u64| {
+            strobe_note(&ShotRecord {
+                index: 0,
+                repeat: 0,
+                trigger_number: 7,
+                axis: Axis::SensorFine,
+                asked: Nanometres(0),
+                coarse: Nanometres(0),
+                fine: Nanometres(0),
+                lens: Nanometres(0),
+                settle: Micros(0),
+                trigger: BoardMicros(980),
+                strobe_start: BoardMicros(1_000),
+                strobe_end: BoardMicros(1_000 + strobe_us),
+                exposure: Micros(exposure_us),
+            })
+        };
+        assert_eq!([note(2_000, 1_900), note(2_000, 2_120), note(100_000, 101_000)], [None, None, None]);
+        let longer = note(2_000, 5_000).unwrap_or_default();
+        assert!(longer.contains("exposure 7 lasted 5000 us, expected 2000 us"), "{longer}");
+        assert!(note(2_000, 1_000).is_some());
     }
 }

@@ -25,6 +25,7 @@ use crate::{
     describe::um,
     error::ClientError,
     expose::{CaptureError, expose},
+    plan::PlanError,
     ready::base_nm,
 };
 use model::{Spectrum, estimate};
@@ -35,6 +36,7 @@ const GOOD_NM: f64 = 45_000.0;
 /// Steps of the fine sweep on either side, and their size.
 const FINE_STEPS: i32 = 4;
 const FINE_STEP_NM: i32 = 14_000;
+const FINE_REACH_NM: i32 = FINE_STEPS * FINE_STEP_NM;
 const SWEEPS_MAX: usize = 3;
 
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -113,8 +115,9 @@ pub fn find_focus(
     settings: &FocusSettings,
     say: &mut dyn FnMut(&str),
 ) -> Result<Focus, FocusSearchError> {
-    let status = client.status()?;
     let limits = client.hello().limits;
+    check_range(&limits).map_err(CaptureError::from)?;
+    let status = client.status()?;
     let mut search = Search {
         client,
         camera,
@@ -275,7 +278,7 @@ impl Search<'_> {
     ) -> Result<(f64, Vec<(f64, f64)>), FocusSearchError> {
         let mut around = around;
         for _ in 0..SWEEPS_MAX {
-            let reach = FINE_STEPS * FINE_STEP_NM;
+            let reach = FINE_REACH_NM;
             let middle =
                 self.fine_at(around).0.clamp(self.limits.fine_min.0 + reach, self.limits.fine_max.0 - reach);
             let mut targets: Vec<i32> =
@@ -315,6 +318,18 @@ impl Search<'_> {
     }
 }
 
+/// Whether the fine sweep fits between the piezo's limits.
+fn check_range(limits: &Limits) -> Result<(), PlanError> {
+    let (piezo_nm, needed_nm) = (limits.fine_max.0 - limits.fine_min.0, 2 * FINE_REACH_NM);
+    match piezo_nm >= needed_nm {
+        true => Ok(()),
+        false => {
+            let [piezo_um, needed_um] = [piezo_nm, needed_nm].map(|nm| um(Nanometres(nm)));
+            Err(PlanError::Sweep { piezo_um, needed_um })
+        }
+    }
+}
+
 fn cut(image: &Image, region: Option<[usize; 4]>) -> Result<Array2<f32>, FocusSearchError> {
     let (height, width) = image.pixels.dim();
     let [column, row, region_width, region_height] = region.unwrap_or([0, 0, width, height]);
@@ -340,6 +355,14 @@ fn binned(image: &Array2<f32>, bin: usize) -> Array2<f32> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_piezo_range_shorter_than_the_sweep_is_rejected() {
+        let limits = |fine_max| Limits { fine_max: Nanometres(fine_max), ..crate::plan::tests::limits() };
+        assert_eq!(check_range(&limits(117_000)), Ok(()));
+        let error = check_range(&limits(105_000)).unwrap_err().to_string();
+        assert!(error.contains("100.0 um") && error.contains("needs 112.0 um"), "{error}");
+    }
 
     #[test]
     fn bins_images_and_crops_regions() {

@@ -7,7 +7,7 @@ use crate::{
     camera::Camera,
     client::Client,
     describe::um,
-    expose::{CaptureError, expose_together},
+    expose::{CaptureError, expose_together, strobe_note},
     pair::{Exposures, Pair, pair_of, reach},
     plan::SensorPair,
 };
@@ -45,6 +45,9 @@ pub fn capture_behind_mirror(
     });
     images?;
     let [Some(far), Some(near)] = taken else { return Err(CaptureError::Count { reported, asked }) };
+    if let Some(note) = strobe_note(&far.0) {
+        say(&note);
+    }
     let both = [far, near].map(|(record, average)| (record, average.finish()));
     let mut pair = pair_of(both, sensor, reach.coarse, &client.hello().limits)?;
     pair.near.sensor_measured_mm += further_mm;

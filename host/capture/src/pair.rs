@@ -13,7 +13,7 @@ use crate::{
     camera::{Camera, Image},
     client::Client,
     describe::um,
-    expose::{check_exposure, expose, sensor_mm},
+    expose::{check_exposure, expose, sensor_mm, strobe_note},
     meter,
     plan::{SensorPair, coarse_for, fine_for},
     ready::{base_nm, base_when_homed_nm, ensure_homed},
@@ -158,6 +158,7 @@ pub fn capture_pair(
         }
         _ => return Err(CaptureError::Count { reported, asked }),
     };
+    both.iter().filter_map(|(record, _)| strobe_note(record)).for_each(|note| say(&note));
     pair_of(both, sensor, reach.coarse, &client.hello().limits)
 }
 

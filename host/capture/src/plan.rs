@@ -37,6 +37,11 @@ pub enum PlanError {
     )]
     Reach { sensor_mm: f64, min_mm: f64, max_mm: f64 },
     #[error(
+        "the piezo has {piezo_um:.1} um between fine_min_nm and fine_max_nm, the focus search needs {needed_um:.1} um; widen these \
+         settings"
+    )]
+    Sweep { piezo_um: f64, needed_um: f64 },
+    #[error(
         "with the coarse stage at {coarse_um:.3} um the piezo would have to go to {fine_um:.3} um, outside {min_um:.3} to {max_um:.3} um"
     )]
     CoarseOff { coarse_um: f64, fine_um: f64, min_um: f64, max_um: f64 },

@@ -97,6 +97,11 @@ pub enum CalibrationError {
     #[error("no pair to calibrate on")]
     NoPair,
     #[error(
+        "the optics have a response that calibrate stack learned for their own point spread function: give the optics file of the \
+         camera"
+    )]
+    LearnedLens,
+    #[error(
         "pair {}: the far image is {far_width}x{far_height}, the near image {near_width}x{near_height}", .index + 1
     )]
     SizeMismatch { index: usize, far_width: usize, far_height: usize, near_width: usize, near_height: usize },
@@ -193,7 +198,8 @@ impl PsfFit {
 }
 
 /// The PSF of `model` that turns the images of each pair into each other, jointly for all pairs. Returns
-/// [`CalibrationError`] for pairs without texture, of different size, or only in the middle of the range.
+/// [`CalibrationError`] for pairs without texture, of different size, or only in the middle of the range, and for optics
+/// with a learned response, which holds for their own PSF only.
 pub fn fit_psf(
     pairs: &[CapturedPair<'_>],
     optics: &Optics,
@@ -201,6 +207,9 @@ pub fn fit_psf(
 ) -> Result<PsfFit, CalibrationError> {
     if pairs.is_empty() {
         return Err(CalibrationError::NoPair);
+    }
+    if optics.stage().is_some() {
+        return Err(CalibrationError::LearnedLens);
     }
     let mut observations = Vec::with_capacity(pairs.len());
     let mut alphas = Vec::with_capacity(pairs.len());

@@ -33,11 +33,12 @@ mod table;
 mod two_step;
 
 use farnear_maths::clsf::DepthScale;
-use ndarray::{Array2, ArrayView2, ArrayViewMut2};
+use ndarray::{Array2, ArrayView2, ArrayViewMut2, CowArray, Ix2};
 use serde::{Deserialize, Serialize};
 
 use self::pattern::Series;
 use self::table::{Learned, corrections};
+use crate::metrics::is_depth;
 use crate::optics::WorkingRange;
 
 pub use board::{BoardCorrection, BoardForm};
@@ -116,11 +117,26 @@ pub fn fit(
     patterns: &[Pattern<'_>],
     cdc: &CdcSettings,
 ) -> Result<Correction, CorrectionError> {
-    let series = Series::new(method, patterns)?;
+    let maps: Vec<CowArray<'_, f32, Ix2>> =
+        patterns.iter().map(|pattern| without_invalid(pattern.depth_mm)).collect();
+    let patterns: Vec<Pattern<'_>> = maps
+        .iter()
+        .zip(patterns)
+        .map(|(map, pattern)| Pattern { depth_mm: map.view(), true_mm: pattern.true_mm })
+        .collect();
+    let series = Series::new(method, &patterns)?;
     let map = Map::learn(method, &series, cdc)?;
     let (height, width) = series.dim();
     let (far_mm, near_mm) = series.range_mm();
     Ok(Correction { width, height, far_mm, near_mm, scale: series.scale(), map })
+}
+
+/// A copy with NaN for values that are not depths, or the map where all others are NaN.
+fn without_invalid(map: ArrayView2<'_, f32>) -> CowArray<'_, f32, Ix2> {
+    if map.iter().all(|value| value.is_nan() || is_depth(*value)) {
+        return map.into();
+    }
+    map.mapv(|value| if is_depth(value) { value } else { f32::NAN }).into()
 }
 
 impl Correction {

@@ -79,6 +79,29 @@ impl Default for StackSettings {
     }
 }
 
+impl StackSettings {
+    /// Checks what does not depend on the images. Returns the [`StackError`] of the first setting out of range.
+    pub fn check(&self) -> Result<(), StackError> {
+        let odd = |what, value: usize, least, most| {
+            let fits = value % 2 == 1 && (least..=most).contains(&value);
+            if fits { Ok(()) } else { Err(StackError::Odd { what, value, least, most }) }
+        };
+        odd("the window", self.window_px, 3, 101)?;
+        odd("the number of points", self.fit_points, 3, 31)?;
+        odd("the median's window", self.median_px, 1, 31)?;
+        if !(0.0..=MOST_SMOOTHING_PX).contains(&self.smoothing_px) {
+            return Err(StackError::Smoothing(self.smoothing_px));
+        }
+        if self.guided_px != 0.0 && !(1.0..=MOST_GUIDED_PX).contains(&self.guided_px) {
+            return Err(StackError::Guided(self.guided_px));
+        }
+        if !(0.0..=1.0).contains(&self.min_reliability) {
+            return Err(StackError::Reliability(self.min_reliability));
+        }
+        Ok(())
+    }
+}
+
 /// Maps of a stack, (height, width).
 #[derive(Debug, Clone)]
 pub struct StackMap {
@@ -218,19 +241,7 @@ fn median(map: Array2<f32>, side: usize) -> Array2<f32> {
 }
 
 fn check<S: Slices + ?Sized>(images: &S, settings: &StackSettings) -> Result<(), StackError> {
-    let odd = |what, value: usize, least, most| {
-        let fits = value % 2 == 1 && (least..=most).contains(&value);
-        if fits { Ok(()) } else { Err(StackError::Odd { what, value, least, most }) }
-    };
-    odd("the window", settings.window_px, 3, 101)?;
-    odd("the number of points", settings.fit_points, 3, 31)?;
-    odd("the median's window", settings.median_px, 1, 31)?;
-    if !(0.0..=MOST_SMOOTHING_PX).contains(&settings.smoothing_px) {
-        return Err(StackError::Smoothing(settings.smoothing_px));
-    }
-    if settings.guided_px != 0.0 && !(1.0..=MOST_GUIDED_PX).contains(&settings.guided_px) {
-        return Err(StackError::Guided(settings.guided_px));
-    }
+    settings.check()?;
     if images.count() < LEAST_IMAGES {
         return Err(StackError::TooFew { count: images.count() });
     }

@@ -32,7 +32,7 @@ const OUT_OF_RANGE_ALPHA: f64 = 1.2;
 /// Least part of the estimated noise that the residual may leave.
 const LEAST_NOISE: f64 = 0.1;
 /// Part of the pixels lost for one reason above which it is reported.
-const LEAST_REPORTED: f64 = 0.01;
+pub const LEAST_REPORTED: f64 = 0.01;
 /// Part of the noise by lossy compression that is worth a word: JPEG of quality 95 has 0.3, 90 has 0.4.
 const COMPRESSED: f64 = 0.35;
 /// Deviation of a band's brightness that is worth a word.

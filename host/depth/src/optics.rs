@@ -1,10 +1,11 @@
-//! Telecentric thin-lens geometry of a depth-from-defocus pair whose *sensor* moves.
+//! Thin-lens geometry of a depth-from-defocus pair whose *sensor* moves.
 //!
 //! The far-focused image is taken with the sensor at `s1`, the near-focused one at `s2 = s1 + 2e`. An object imaged at
 //! the distance `w` from the lens has the normalised depth `alpha` with `w = s1 + (1 + alpha) e`: -1 at the far focus,
 //! +1 at the near focus, rising as the object comes nearer. The blur radii are `R1 = (1 + alpha) e / (2 Fe)` and
 //! `R2 = (1 - alpha) e / (2 Fe)`, so `2e = 2 Fe Rmax` (Li 2014, eqs. 4.1, 4.3 and 5.11; the thin lens is
-//! `1/F = 1/u + 1/w`). Units: millimetres unless a name says otherwise; blur radii in pixels. Every function is O(1).
+//! `1/F = 1/u + 1/w`). `Fe` is the f-number of a lens that is telecentric on the image side; an aperture at the lens makes it
+//! `(s1 + e) / F` times larger. Units: millimetres unless a name says otherwise; blur radii in pixels. Every function is O(1).
 
 mod distortion;
 mod doubt;
@@ -68,7 +69,7 @@ impl Optics {
         self.focal_length_mm
     }
 
-    /// f-number Fe.
+    /// f-number, the focal length over the diameter of the aperture.
     pub fn f_number(&self) -> f64 {
         self.f_number
     }
@@ -131,8 +132,28 @@ impl Optics {
         Self { pixel_um: self.pixel_um * bin, max_blur_px: self.max_blur_px / bin, distortion, ..self }
     }
 
+    /// The optics of images that are not averaged, from those of a lens with a learned response, which is dropped: it is of
+    /// averaged pixels. Unchanged without a response.
+    pub fn unbinned(self) -> Self {
+        let Some(stage) = self.stage else { return self };
+        let bin = stage.bin as f64;
+        let distortion = self.distortion.map(|distortion| distortion.binned(1.0 / bin));
+        let (pixel_um, max_blur_px) = (self.pixel_um / bin, self.max_blur_px * bin);
+        Self { pixel_um, max_blur_px, distortion, stage: None, ..self }
+    }
+
+    /// The blur is `travel / (2 F_e)`. The cone of light of a telecentric lens is as long as the focal length: `F_e` is the
+    /// f-number `N`. That of an aperture at the lens is as long as the image distance: `F_e = N (s_1 + e) / F` in the middle
+    /// of the travel.
     fn half_travel_mm(&self) -> f64 {
-        self.f_number * self.max_blur_px * self.pixel_um * 1e-3
+        let telecentric_mm = self.f_number * self.max_blur_px * self.pixel_um * 1e-3;
+        match self.telecentric {
+            Some(false) => {
+                let sensor_far_mm = image_mm(self.focal_length_mm, self.far_mm);
+                telecentric_mm * sensor_far_mm / (self.focal_length_mm - telecentric_mm)
+            }
+            Some(true) | None => telecentric_mm,
+        }
     }
 
     /// Object and sensor distances of the pair.
@@ -223,6 +244,14 @@ mod tests {
             assert!((got - want).abs() < if want < 100.0 { 1e-4 } else { 6e-3 }, "{got} for {want}");
         }
         assert!((range.sensor_travel_mm - 0.15627).abs() < 1e-5);
+    }
+
+    #[test]
+    fn a_learned_lens_has_its_geometry_without_averaging() {
+        let optics = rig().check().unwrap();
+        assert_eq!(optics.unbinned(), optics);
+        let learned = optics.binned(4).with_stage(Stage::identity(4, 2));
+        assert_eq!(learned.unbinned(), optics);
     }
 
     #[test]

@@ -34,8 +34,8 @@ pub(crate) use rows::{
     vertical_sums_of_seven,
 };
 pub(crate) use windows::{
-    Believed, CubicSums, Deviation, Found, Residual, add_products, add_row, believe_row, deviation_row,
-    dimensionless_row, evidence_row, move_products, residual_row, roots, row_sums, sum_rows, without_noise,
+    Believed, CubicSums, Deviation, Found, OfNoise, Residual, add_products, add_row, believe_row,
+    deviation_row, dimensionless_row, evidence_row, move_products, residual_row, roots, row_sums, sum_rows,
 };
 
 /// Calls the generic function inside one with the backend's instructions enabled, so that it is compiled with them.

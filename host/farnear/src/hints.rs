@@ -28,7 +28,9 @@ fn of_workflow(error: &WorkflowError) -> Option<String> {
         WorkflowError::File { expected: correction_file::KIND, .. } => {
             Some("`farnear calibrate correction --out` saves one".into())
         }
-        WorkflowError::NoOptics { .. } => Some("name a file with --optics".into()),
+        WorkflowError::NoOptics { .. } | WorkflowError::NoStackOptics { .. } => {
+            Some("name a file with --optics".into())
+        }
         WorkflowError::Simulator(SimulatorError::Missing { .. }) => {
             Some("`cargo xtask install` installs both, `cargo xtask demo` builds them".into())
         }

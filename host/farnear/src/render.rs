@@ -4,9 +4,9 @@ use std::fs;
 
 use anyhow::{Context as _, Result};
 use farnear_depth::psf::Psf as OpticsPsf;
-use farnear_files::{image_file::encode_png, npy, staging::Staging};
+use farnear_files::{image_file::encode_png, npy};
 use farnear_scene::{Camera, EllipticalDistortion, Lens, OpticsFile, Psf, RenderError, Renderer, truth};
-use farnear_workflows::{Context, optics};
+use farnear_workflows::{Context, optics, result_folder};
 use serde::Serialize;
 
 use crate::commands::render::Arguments;
@@ -26,6 +26,9 @@ pub fn render(arguments: Arguments, context: &Context<'_>) -> Result<RenderFigur
     } = arguments;
     let camera = Camera::new(width, height, noise);
     let optics = optics::read(&file)?;
+    if let Some(name) = &psf {
+        optics::check_new_psf(&optics, name)?;
+    }
     let psf = psf.map_or(Ok(optics.psf()), |name| name.parse::<OpticsPsf>())?;
     let spread: Psf =
         psf.to_string().parse().context("the renderer does not know this point spread function")?;
@@ -34,7 +37,7 @@ pub fn render(arguments: Arguments, context: &Context<'_>) -> Result<RenderFigur
         lens = lens.with_distortion(EllipticalDistortion::default());
     }
     let scene = scene.read()?;
-    let staged = Staging::into_folder(&out)?;
+    let staged = result_folder::rendered(&out)?;
     let bits = camera.noise.bits();
     let expose = move || -> Result<_, RenderError> {
         let renderer = Renderer::new(&scene, &lens, &spread, &camera, seed)?;

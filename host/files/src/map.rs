@@ -84,7 +84,7 @@ fn nodata(tiff: &[u8]) -> Option<f32> {
     text.trim().parse::<f64>().ok().map(|value| value as f32)
 }
 
-/// Where a mask is not 0: an image, or a `.npy` of bool, integers or floats.
+/// Where a mask is not 0: an image without lossy compression, or a `.npy` of bool, integers or floats.
 pub fn read_mask(path: &Path) -> Result<Array2<bool>, MapError> {
     let bytes = image_file::read_bytes(path)?;
     if bytes.starts_with(npy::MAGIC) {
@@ -97,6 +97,11 @@ pub fn read_mask(path: &Path) -> Result<Array2<bool>, MapError> {
         return Err(refused(reason).into());
     }
     let grey = decoded.grey(&ReadSettings::default()).map_err(refused)?;
+    if grey.coding_variance > 0.0 {
+        let reason =
+            "its lossy compression (JPEG) changes values next to edges: store the mask as PNG".into();
+        return Err(refused(reason).into());
+    }
     Ok(grey.pixels.mapv(|value| value != 0.0 && !value.is_nan()))
 }
 
@@ -295,6 +300,13 @@ mod tests {
         let (_folder, path) = stored("alpha.png", png.get_ref());
         let error = read_mask(&path).unwrap_err().to_string();
         assert!(error.contains("only in alpha"), "{error}");
+        // Ringing leaves small values around the mask.
+        let mut jpeg = Cursor::new(Vec::new());
+        let image = image::GrayImage::from_fn(16, 16, |x, _| image::Luma([255 * u8::from(x > 5)]));
+        image.write_to(&mut jpeg, image::ImageFormat::Jpeg).unwrap();
+        let (_folder, path) = stored("mask.jpg", jpeg.get_ref());
+        let error = read_mask(&path).unwrap_err().to_string();
+        assert!(error.contains("JPEG") && error.contains("PNG"), "{error}");
     }
 
     #[test]

@@ -61,14 +61,15 @@ impl Lateral {
         }
     }
 
-    /// The same for a map of every `step`-th row and column.
+    /// The same for every `step`-th row and column of a map of (height, width).
     #[must_use]
-    pub fn thinned(self, step: usize) -> Self {
+    pub fn thinned(self, dim: (usize, usize), step: usize) -> Self {
         let step = step as f64;
         match self {
             Self::Lens(lens) => Self::Lens(Projection {
                 pixel_um: lens.pixel_um * step,
-                axis_px: lens.axis_px.map(|axis| axis.map(|place| place / step)),
+                // The middle of the remaining pixels is elsewhere.
+                axis_px: Some(lens.axis_in(dim).map(|place| place / step)),
                 ..lens
             }),
             Self::Pixel(side) => Self::Pixel(side * step),
@@ -263,6 +264,21 @@ fn mark_faces([upper, lower]: [&[f32]; 2], step: f32, marks: &mut [u8]) {
 mod tests {
     use super::*;
     use ndarray::array;
+
+    #[test]
+    fn a_thinned_map_has_the_axis_of_the_whole_one() {
+        let projection = Projection { focal_length_mm: 50.0, pixel_um: 7.4, axis_px: None };
+        let (dim, step) = ((1537, 2050), 6);
+        for axis_px in [None, Some([100.0, 7.5])] {
+            let lateral = Lateral::Lens(Projection { axis_px, ..projection });
+            let (whole, thinned) = (lateral, lateral.thinned(dim, step));
+            let of_whole = whole.beside_axis(dim, 30 * step, 11 * step, 900.0);
+            let of_thinned = thinned.beside_axis((257, 342), 30, 11, 900.0);
+            for (a, b) in of_whole.into_iter().zip(of_thinned) {
+                assert!((a - b).abs() < 1e-9, "{of_whole:?} {of_thinned:?}");
+            }
+        }
+    }
 
     #[test]
     fn holes_have_no_vertices_and_steps_no_faces() {

@@ -353,6 +353,39 @@ mod tests {
     }
 
     #[test]
+    fn of_several_streams_the_default_one_is_read_and_reported() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("two.mkv");
+        let source = |size: &str| format!("testsrc=size={size}:rate=30:duration=1");
+        let made = std::process::Command::new("ffmpeg")
+            .args(["-nostdin", "-v", "error", "-f", "lavfi", "-i", &source("64x48")])
+            .args([
+                "-f",
+                "lavfi",
+                "-i",
+                &source("128x96"),
+                "-map",
+                "0:v",
+                "-map",
+                "1:v",
+                "-c:v",
+                "mpeg2video",
+            ])
+            .args(["-disposition:v:0", "0", "-disposition:v:1", "default"])
+            .arg(&file)
+            .status();
+        if !made.is_ok_and(|status| status.success()) {
+            eprintln!("skipped: no ffmpeg");
+            return;
+        }
+        let mut video = Video::open(&file).unwrap();
+        let remark = video.take_remarks().concat();
+        assert!(remark.contains("0:0 (64x48), 0:1 (128x96): ffmpeg chose 0:1"), "{remark}");
+        let kind = video.next().unwrap().unwrap().pixels.kind().to_string();
+        assert!(kind.contains("128x96"), "{kind}");
+    }
+
+    #[test]
     fn frames_after_a_change_of_size_are_kept_and_another_shape_is_refused() {
         let (Some(larger), Some(turned)) = (of_two_sizes("128x96"), of_two_sizes("48x64")) else {
             eprintln!("skipped: no ffmpeg");

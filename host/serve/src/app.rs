@@ -36,6 +36,7 @@ use crate::{
     job_queue::{JobQueue, Task},
     server::ServeSettings,
     stopping::{PATIENCE, Stop, StopError, Stops},
+    upload_quota::UploadQuota,
     view::{ControlState, LiveMode, LiveState, LogLine, Phase, RigState, State},
 };
 
@@ -46,7 +47,7 @@ const USUAL_OPTICS: &str = include_str!("optics.toml");
 pub struct App {
     pub guard: Guard,
     pub limits: Limits,
-    /// Delays guesses of the token.
+    /// Delays answers to wrong tokens.
     pub throttle: Throttle,
     pub session: PathBuf,
     pub address: Option<RigAddress>,
@@ -63,8 +64,9 @@ pub struct App {
     pub pictures: watch::Sender<Bytes>,
     live: Mutex<Live>,
     log: Mutex<VecDeque<LogLine>>,
-    /// The running recording of live depth.
+    /// The running recording of live depth; `state.live.recording` changes while it is locked.
     pub recorder: Mutex<Option<Recorder>>,
+    pub uploads: Arc<UploadQuota>,
     /// The answer to a prompt, until the job takes it.
     pub answer: Mutex<Option<String>>,
     ending: watch::Sender<bool>,
@@ -132,6 +134,7 @@ impl App {
             log: Mutex::default(),
             answer: Mutex::default(),
             recorder: Mutex::default(),
+            uploads: Arc::default(),
             ending: watch::Sender::new(false),
             stop_reason: Mutex::default(),
             stops: Arc::default(),
@@ -282,7 +285,9 @@ impl App {
     }
 
     pub fn finish_recording(&self) {
-        let Some(recorder) = lock(&self.recorder).take() else { return };
+        // Held until the state agrees: the next recording may begin meanwhile.
+        let mut running = lock(&self.recorder);
+        let Some(recorder) = running.take() else { return };
         let name = self.state().live.recording.unwrap_or_default();
         match recorder.finish() {
             Ok(found) => self.note(format!("recorded {name}: {} pairs, {} s", found.pairs, found.seconds)),

@@ -64,9 +64,17 @@ impl Questions for Face<'_> {
     fn ask(&self, question: &str, cancel: &Cancel) -> Result<String, WorkflowError> {
         *lock(&self.app.answer) = None;
         self.app.change(|state| state.question = Some(question.trim().into()));
+        let answered = self.answer(cancel);
+        // Here, not at the end of a job: the other queue's jobs end while this one waits.
+        self.app.change(|state| state.question = None);
+        answered
+    }
+}
+
+impl Face<'_> {
+    fn answer(&self, cancel: &Cancel) -> Result<String, WorkflowError> {
         loop {
             if let Some(answer) = lock(&self.app.answer).take() {
-                self.app.change(|state| state.question = None);
                 return Ok(answer);
             }
             cancel.check("waiting for an answer")?;

@@ -170,7 +170,8 @@ impl Guard {
     }
 }
 
-/// Delays wrong tokens: one guess per second and address.
+/// Delays answers to wrong tokens: one per second and address. A right cookie or bearer is answered immediately, so this
+/// does not limit guesses; the token's length does.
 #[derive(Debug, Default)]
 pub struct Throttle(Mutex<HashSet<IpAddr>>);
 

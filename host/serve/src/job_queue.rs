@@ -23,6 +23,7 @@ use crate::{
 
 /// Poll interval for the end of the program.
 const LOOK: Duration = Duration::from_millis(100);
+const PANIC: &str = "the live view ended with a panic, a mistake of farnear's; begin it again, and report the message on stderr";
 
 pub type Work = Box<dyn FnOnce(&App, &Context<'_>) -> Result<Value, WorkflowError> + Send>;
 
@@ -117,14 +118,14 @@ pub fn start(app: &Arc<App>) -> io::Result<Workers> {
     let (on_rig, computing) = (app.rig_jobs.open(), app.computing.open());
     let (rig, computer) = (Arc::clone(app), Arc::clone(app));
     let threads = [
-        Builder::new().name("rig jobs".into()).spawn(move || run_rig(&rig, &on_rig))?,
+        Builder::new().name("rig jobs".into()).spawn(move || run_rig(&rig, &on_rig, live::look))?,
         Builder::new().name("computing".into()).spawn(move || run_computing(&computer, &computing))?,
     ];
     Ok(Workers(threads.into()))
 }
 
-/// Runs jobs on the rig, and live views between them.
-fn run_rig(app: &App, jobs: &Receiver<Begun>) {
+/// Runs jobs on the rig, and live views (`look`) between them.
+fn run_rig(app: &App, jobs: &Receiver<Begun>, look: fn(&App)) {
     loop {
         let seen = app.live().mode != LiveMode::Off
             && !app.is_to_connect()
@@ -134,7 +135,10 @@ fn run_rig(app: &App, jobs: &Receiver<Begun>) {
             match jobs.try_recv() {
                 Ok(begun) => Some(begun),
                 Err(_) => {
-                    live::look(app);
+                    // This thread also runs the jobs.
+                    if catch_unwind(AssertUnwindSafe(|| look(app))).is_err() {
+                        live::fail(app, PANIC);
+                    }
                     None
                 }
             }
@@ -181,7 +185,6 @@ fn run(app: &App, begun: Begun, queue: &JobQueue, place: Place) {
         app.note(format!("{}: {error}", job.title));
     }
     app.change(|state| {
-        state.question = None;
         let Some(job) = place(state) else { return };
         match ended {
             Ok(result) => {
@@ -195,4 +198,42 @@ fn run(app: &App, begun: Begun, queue: &JobQueue, place: Place) {
             }
         }
     });
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::Instant;
+
+    use super::*;
+    use crate::live::tests::app;
+
+    fn wait_for(app: &App, fits: impl Fn(&State) -> bool) {
+        let until = Instant::now() + Duration::from_secs(60);
+        while !fits(&app.state()) {
+            assert!(Instant::now() < until, "{:#?}", app.state());
+            std::thread::sleep(Duration::from_millis(5));
+        }
+    }
+
+    fn panics(_: &App) {
+        panic!("of the test's live view");
+    }
+
+    #[test]
+    fn jobs_run_after_a_live_view_has_panicked() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let app = app(folder.path());
+        let _client = app.with_control(|control| control.join(None));
+        let jobs = app.rig_jobs.open();
+        let rig = Arc::clone(&app);
+        let thread = std::thread::spawn(move || run_rig(&rig, &jobs, panics));
+        wait_for(&app, |state| state.live.error.as_ref().is_some_and(|error| error.contains("panic")));
+        assert_eq!(app.state().live.mode, LiveMode::Off);
+        let work: Work = Box::new(|_, _| Ok(Value::Null));
+        let begun = app.begin_on_rig(Task { kind: "home", title: "Home".into(), work });
+        assert_eq!(begun, Ok(1));
+        wait_for(&app, |state| state.job.as_ref().is_some_and(|job| job.phase == JobPhase::Done));
+        app.end();
+        thread.join().expect("the thread ends with the program");
+    }
 }

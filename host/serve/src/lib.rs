@@ -21,6 +21,7 @@ pub mod session_lock;
 pub mod socket;
 pub mod stopping;
 pub mod transfer;
+pub mod upload_quota;
 pub mod view;
 
 pub use connections::Limits;

@@ -57,13 +57,19 @@ pub fn look(app: &App) {
     // The rig's report of this stop must not end the next view.
     let cancelled = context.cancel.is_cancelled() || app.is_ending();
     match ended {
-        Err(error) if !error.is_cancelled() && !cancelled => {
-            app.note(format!("live: {error}"));
-            app.set_live(|live| live.mode = LiveMode::Off);
-            app.change(|state| state.live.error = Some(error.to_string()));
-        }
+        Err(error) if !error.is_cancelled() && !cancelled => fail(app, &error.to_string()),
+        _ if live.mode == LiveMode::Depth => app.finish_recording(),
         _ => {}
     }
+}
+
+/// Switches the live view off because of an error.
+pub fn fail(app: &App, error: &str) {
+    app.note(format!("live: {error}"));
+    app.set_live(|live| live.mode = LiveMode::Off);
+    app.change(|state| state.live.error = Some(error.into()));
+    // After the mode has changed: no recording begins any more.
+    app.finish_recording();
 }
 
 /// Shows why pairs have no depth. The next depth removes it.
@@ -125,16 +131,14 @@ fn image_message(record: Option<&ShotRecord>, image: &Image, live: &Live, rate_h
 fn look_at_depth(app: &App, rig: RigAddress, context: &Context<'_>, rate: &Rate) -> Result<()> {
     let ends = ends(&optics::read(&app.optics_file())?);
     let settings = LiveDepthSettings { rig, camera: app.camera(), optics: app.optics_file() };
-    let ended = live_depth::watch(&settings, context, |depth: LiveDepth<'_>| {
+    live_depth::watch(&settings, context, |depth: LiveDepth<'_>| {
         if app.state().live.error.is_some() {
             app.change(|state| state.live.error = None);
         }
         record(app, &depth);
         app.pictures.send_replace(depth_message::live(&depth, ends, rate.next()));
         enough(app)
-    });
-    app.finish_recording();
-    ended
+    })
 }
 
 fn record(app: &App, depth: &LiveDepth<'_>) {
@@ -176,7 +180,7 @@ impl Rate {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use std::{fs, path::Path, sync::Arc, time::Duration};
 
     use farnear_protocol::{Micros, message::LightLevels};
@@ -185,7 +189,7 @@ mod tests {
     use super::*;
     use crate::{Limits, Listen, ServeSettings, guard::Guard};
 
-    fn app(folder: &Path) -> Arc<App> {
+    pub(crate) fn app(folder: &Path) -> Arc<App> {
         let camera = CameraSettings {
             address: CameraAddress::Folder(folder.into()),
             exposure: Micros(5_000),

@@ -15,13 +15,16 @@ use axum::{
     http::StatusCode,
 };
 use futures_core::Stream;
-use tempfile::TempPath;
 use zip::{
     CompressionMethod, ZipWriter,
     write::{SimpleFileOptions, StreamWriter},
 };
 
-use crate::{app::lock, failure::Failure};
+use crate::{
+    app::lock,
+    failure::Failure,
+    upload_quota::{PART, Upload},
+};
 
 const PIECE: usize = 64 * 1024;
 
@@ -145,29 +148,59 @@ pub fn regular_file(path: &Path) -> io::Result<File> {
     }
 }
 
-/// Writes an uploaded body to `path`; a failed, broken off or stopped upload leaves no file.
-pub async fn receive(body: Body, path: &Path, bytes_max: u64, pause_max: Duration) -> Result<u64, Failure> {
-    let part =
-        path.with_file_name(format!(".{}.part", path.file_name().unwrap_or_default().to_string_lossy()));
-    let part = TempPath::try_from_path(part).map_err(|error| disk(path, &error))?;
-    let bytes = receive_part(body, &part, bytes_max, pause_max).await?;
-    part.persist(path).map_err(|failed| disk(path, &failed.error))?;
-    Ok(bytes)
+/// Whether there is a regular file at `path`, not a link to one.
+pub fn is_regular(path: &Path) -> bool {
+    fs::symlink_metadata(path).is_ok_and(|found| found.is_file())
+}
+
+/// A folder of the session. A link is refused: it may lead out of the session.
+pub fn session_folder(session: &Path, name: &str) -> Result<PathBuf, Failure> {
+    let folder = session.join(name);
+    if folder.is_symlink() {
+        let error = format!("{} is a link; expected a folder", folder.display());
+        return Err(Failure::new(StatusCode::CONFLICT, error)
+            .with_hint("Replace it by a folder, or name a session on the other disk with --session."));
+    }
+    Ok(folder)
+}
+
+/// Writes an uploaded body to its target; a failed, broken off or stopped upload leaves no file.
+pub async fn receive(body: Body, mut upload: Upload, pause_max: Duration) -> Result<(), Failure> {
+    let target = upload.target().to_path_buf();
+    let prefix = format!(".{}.", target.file_name().unwrap_or_default().to_string_lossy());
+    // Random: two uploads of one name do not write into one file.
+    let part = tempfile::Builder::new()
+        .prefix(&prefix)
+        .suffix(PART)
+        .make_in(target.parent().unwrap_or(Path::new(".")), |path| {
+            OpenOptions::new().write(true).create_new(true).open(path)
+        });
+    let mut part = part.map_err(|error| disk(&target, &error))?;
+    receive_part(body, part.as_file_mut(), &mut upload, pause_max).await?;
+    if part.as_file().metadata().is_ok_and(|file| file.len() == 0) {
+        let name = target.file_name().unwrap_or_default().to_string_lossy();
+        let error = format!("the upload {name} has 0 bytes; expected a video");
+        return Err(Failure::new(StatusCode::BAD_REQUEST, error).with_hint("Choose a file with contents."));
+    }
+    let published = upload.finish(|target| part.persist(target).map(drop).map_err(|failed| failed.error));
+    published.map_err(|error| disk(&target, &error))
 }
 
 fn disk(path: &Path, error: &io::Error) -> Failure {
     Failure::new(StatusCode::INTERNAL_SERVER_ERROR, format!("cannot write {}: {error}", path.display()))
 }
 
-async fn receive_part(body: Body, part: &Path, bytes_max: u64, pause_max: Duration) -> Result<u64, Failure> {
-    let opened = OpenOptions::new().write(true).create(true).truncate(true).open(part);
-    let mut file = opened.map_err(|error| disk(part, &error))?;
+async fn receive_part(
+    body: Body,
+    part: &mut File,
+    upload: &mut Upload,
+    pause_max: Duration,
+) -> Result<(), Failure> {
     let mut stream = pin!(body.into_data_stream());
-    let mut bytes = 0;
     loop {
         let next = std::future::poll_fn(|cx| stream.as_mut().poll_next(cx));
         let piece = match tokio::time::timeout(pause_max, next).await {
-            Ok(None) => return Ok(bytes),
+            Ok(None) => return Ok(()),
             Ok(Some(Ok(piece))) => piece,
             Ok(Some(Err(error))) => {
                 return Err(Failure::new(StatusCode::BAD_REQUEST, format!("the upload broke off: {error}")));
@@ -177,12 +210,11 @@ async fn receive_part(body: Body, part: &Path, bytes_max: u64, pause_max: Durati
                 return Err(Failure::new(StatusCode::REQUEST_TIMEOUT, error));
             }
         };
-        bytes += piece.len() as u64;
-        if bytes > bytes_max {
-            let error = format!("the upload is larger than {:.1} MB, the space left", bytes_max as f64 / 1e6);
-            return Err(Failure::new(StatusCode::PAYLOAD_TOO_LARGE, error)
-                .with_hint("Delete videos in the session's folder people, or raise --upload-quota-mb."));
-        }
-        file.write_all(&piece).map_err(|error| disk(part, &error))?;
+        upload.add(piece.len() as u64).map_err(|left| {
+            let error = format!("the upload is larger than {:.1} MB, the space left", left as f64 / 1e6);
+            Failure::new(StatusCode::PAYLOAD_TOO_LARGE, error)
+                .with_hint("Delete videos in the session's folder people, or raise --upload-quota-mb.")
+        })?;
+        part.write_all(&piece).map_err(|error| disk(upload.target(), &error))?;
     }
 }

@@ -2,10 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use farnear_files::{
-    map::{self, Format},
-    staging,
-};
+use farnear_files::{map::Format, staging};
+use ndarray::Array2;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -14,6 +12,7 @@ use crate::{
     correction_file,
     error::{Result, WorkflowError},
     figures::rounded,
+    measure::read_map,
     request::{PathKind, Request},
 };
 
@@ -72,10 +71,18 @@ pub fn format_of(out: &Path) -> Result<Format> {
     Format::of(out).ok_or_else(|| WorkflowError::parameter("out", out.display(), expected))
 }
 
+/// Depths in mm of the map to correct; holes are NaN.
+pub(crate) fn read_depth(path: &Path, context: &Context<'_>) -> Result<Array2<f32>> {
+    let mut remarks = Vec::new();
+    let depth = read_map(path)?.depth_mm("depth", &mut remarks)?;
+    remarks.iter().for_each(|remark| context.progress.warn(remark));
+    Ok(depth)
+}
+
 pub fn apply(settings: &CorrectRequest, context: &Context<'_>) -> Result<CorrectFigures> {
     let format = format_of(&settings.out)?;
     let correction = correction_file::read(&settings.correction)?;
-    let depth = map::read(&settings.depth)?;
+    let depth = read_depth(&settings.depth, context)?;
     context.cancel.check("reading the map")?;
     let corrected = match settings.as_board {
         true => correction.apply_as_board(depth.view())?,
@@ -98,4 +105,23 @@ pub fn apply(settings: &CorrectRequest, context: &Context<'_>) -> Result<Correct
         mean_change_mm: rounded(mean_mm, 4),
         lost_pixels: had - changes.len(),
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use farnear_files::npy;
+
+    use super::*;
+
+    #[test]
+    fn a_map_in_another_unit_is_refused_and_holes_are_nan() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("depth.npy");
+        std::fs::write(&path, npy::write(ndarray::array![[0.0, 905.0]].view())).unwrap();
+        let depth = read_depth(&path, &Context::unattended()).unwrap();
+        assert!(depth[(0, 0)].is_nan() && depth[(0, 1)] == 905.0);
+        std::fs::write(folder.path().join("stack.toml"), "unit = \"image\"\n").unwrap();
+        let error = read_depth(&path, &Context::unattended()).unwrap_err();
+        assert!(error.is_usage() && error.to_string().contains("in mm"), "{error}");
+    }
 }

@@ -14,7 +14,7 @@ use farnear_depth::{
     adaptive_window::Window,
     corrections::Correction,
     fill::{FillBy, refill_as_thesis},
-    measure::{Finding, MeasureSettings, binned, measure_pair},
+    measure::{Finding, LEAST_REPORTED, MeasureSettings, binned, measure_pair},
     mosaic::is_mosaic,
     optics::Optics,
     pipeline::DepthMap,
@@ -124,6 +124,7 @@ impl Inputs {
         let (optics, doubts) = optics::of_pair(settings.optics.as_deref(), &settings.far)?;
         let (optics, doubts) = match &settings.psf {
             Some(source) => {
+                optics::check_new_psf(&optics, source)?;
                 let doubts = doubts.into_iter().filter(|doubt| *doubt != OpticsDoubt::NoPsf).collect();
                 (optics.with_psf(source.read(context)?), doubts)
             }
@@ -133,18 +134,20 @@ impl Inputs {
         let reading = ReadSettings { grey: settings.grey, white_level: settings.white_level };
         let mut pair = Pair::read(&settings.far, &settings.near, &reading)?;
         let mut doubts = doubts;
-        let (height, width) = pair.far.dim();
-        if let Some(slices) = optics.stage().and_then(|stage| stage.image_px)
-            && slices != [width, height]
-        {
-            doubts.push(OpticsDoubt::AnotherSize { slices, images: [width, height] });
-        }
+        doubts.extend(optics::another_size(&optics, pair.far.dim()));
         if let (Some(bin @ 2..), Some(stage)) = (settings.bin, optics.stage()) {
             let expected = format!(
                 "the optics of calibrate stack average {0} x {0} pixels by themselves: give no bin",
                 stage.bin
             );
             return Err(WorkflowError::parameter("bin", bin, expected));
+        }
+        if let (Some(region), Some(stage)) = (settings.region, optics.stage())
+            && stage.bin > 1
+        {
+            let expected =
+                format!("the optics of calibrate stack average {0} x {0} pixels: give no region", stage.bin);
+            return Err(WorkflowError::parameter("region", region, expected));
         }
         let bin = settings.bin_for(&optics, is_mosaic(pair.far.view()), &mut doubts);
         if bin > 1 {
@@ -216,9 +219,12 @@ impl Inputs {
             if real.run.fill && real.run.fill_by == FillBy::Thesis {
                 refill_as_thesis(&mut map);
             }
+            lost = lost_pixels(&reasons);
         }
         let mut findings: Vec<String> = self.doubts.iter().map(ToString::to_string).collect();
         findings.extend(found.findings.iter().map(ToString::to_string));
+        let beyond = |lost: &&Lost| lost.reason == Reason::BeyondCorrection && lost.fraction > LEAST_REPORTED;
+        findings.extend(lost.iter().find(beyond).map(|lost| Finding::Lost(*lost).to_string()));
         if !found.findings.iter().any(Finding::is_swapped) {
             findings.extend(pair::swapped_by_names(&settings.far, &settings.near));
         }

@@ -76,6 +76,12 @@ pub enum WorkflowError {
     Unanswered { question: String },
     #[error("no optics: none were named, and neither capture.toml nor optics.toml is next to {}", far.display())]
     NoOptics { far: PathBuf },
+    #[error(
+        "no optics: distances from lens to sensor give object distances only with a lens; none was named, and the stack {} has \
+         neither capture.toml nor optics.toml",
+        stack.display()
+    )]
+    NoStackOptics { stack: PathBuf },
     #[error("{} and {}: {reason}", far.display(), near.display())]
     Pair { far: PathBuf, near: PathBuf, reason: String },
     #[error("{about}: {source}")]

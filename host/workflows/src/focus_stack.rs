@@ -183,7 +183,7 @@ impl Request for FocusStackRequest {
             let expected = "one of distances-mm, sensor-mm and positions-um";
             return Err(WorkflowError::parameter("distances-mm", "several kinds of positions", expected));
         }
-        Ok(())
+        Ok(self.computation().check()?)
     }
 
     fn run(&self, context: &Context<'_>) -> Result<FocusStackFigures> {
@@ -435,5 +435,28 @@ fn figures(
         median,
         moved_px: rounded(moved_px, 2),
         warnings,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn settings_are_checked_before_the_images_are_read() {
+        let usual = FocusStackRequest::default;
+        assert!(usual().check().is_ok());
+        for (request, phrase) in [
+            (FocusStackRequest { window_px: 8, ..usual() }, "the window is 8"),
+            (FocusStackRequest { median_px: 2, ..usual() }, "median's window is 2"),
+            (FocusStackRequest { fit_points: 1, ..usual() }, "number of points is 1"),
+            (FocusStackRequest { guided_px: 0.5, ..usual() }, "0.5 px"),
+            (FocusStackRequest { smoothing_px: f32::NAN, ..usual() }, "NaN px"),
+            (FocusStackRequest { min_reliability: 5.0, ..usual() }, "reliability below 5"),
+            (FocusStackRequest { min_reliability: f32::NAN, ..usual() }, "reliability below NaN"),
+        ] {
+            let error = request.check().unwrap_err().to_string();
+            assert!(error.contains(phrase), "{error}");
+        }
     }
 }

@@ -103,13 +103,6 @@ impl Measured {
         map_file::read(path)
     }
 
-    /// Object point of a pixel: right, up, away from the lens. `None` without a depth.
-    pub fn point(&self, column: usize, row: usize) -> Option<[f64; 3]> {
-        let z = f64::from(*self.depth.get((row, column))?);
-        let [x, y] = self.lateral.beside_axis(self.depth.dim(), column, row, z);
-        z.is_finite().then_some([x, y, z])
-    }
-
     fn check(&self, at: &Rectangle) -> Result<()> {
         at.check_within(self.depth.dim())
     }

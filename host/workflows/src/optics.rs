@@ -81,6 +81,11 @@ pub enum OpticsDoubt {
         bin: usize,
         binned: bool,
     },
+    LittleBlur {
+        blur_px: f64,
+        /// Side of the square of pixels that were averaged.
+        bin: usize,
+    },
     /// The raw mosaic of a colour sensor, which was made grey.
     Mosaic {
         /// Side of the square of pixels that were averaged.
@@ -104,6 +109,11 @@ impl fmt::Display for OpticsDoubt {
                 f,
                 "the images look like the raw mosaic of a colour sensor: {bin} x {bin} pixels were averaged into one, which \
                  makes them grey; bin 1 keeps all pixels"
+            ),
+            Self::LittleBlur { blur_px, bin } => write!(
+                f,
+                "averaging {bin} x {bin} pixels leaves a largest blur of {blur_px:.2} px: fine texture aliases then, and depth may be \
+                 off by several of its standard deviations; average fewer pixels, or choose planes that are farther apart"
             ),
             Self::TooMuchBlur { blur_px, bin, binned } => {
                 write!(f, "a largest blur of {blur_px:.1} px is more than the 2 to 4 px that can be used: ")?;
@@ -138,6 +148,23 @@ pub fn of_pair(named: Option<&Path>, far: &Path) -> Result<(Optics, Vec<OpticsDo
     Err(WorkflowError::NoOptics { far: far.into() })
 }
 
+/// A doubt about a lens that was learned from images of another size (height, width).
+pub fn another_size(optics: &Optics, (height, width): (usize, usize)) -> Option<OpticsDoubt> {
+    let slices = optics.stage()?.image_px?;
+    let images = [width, height];
+    (slices != images).then_some(OpticsDoubt::AnotherSize { slices, images })
+}
+
+/// Fails for a lens with a learned response, which holds for its own point spread function only.
+pub fn check_new_psf(optics: &Optics, psf: impl ToString) -> Result<()> {
+    if optics.stage().is_none() {
+        return Ok(());
+    }
+    let expected = "the lens of calibrate stack has a response that was learned for its own point spread function: leave psf out, or \
+                    give the optics file of the camera";
+    Err(WorkflowError::parameter("psf", psf, expected))
+}
+
 /// `None` if [`of_pair`] reads no file.
 pub(crate) fn file_of_pair(named: Option<&Path>, far: &Path) -> Option<PathBuf> {
     let folder = far.parent().unwrap_or(Path::new(""));
@@ -148,4 +175,21 @@ pub(crate) fn file_of_pair(named: Option<&Path>, far: &Path) -> Option<PathBuf> 
 
 fn about(path: &Path) -> String {
     format!("the optics in {}", path.display())
+}
+
+#[cfg(test)]
+mod tests {
+    use farnear_depth::optics::Stage;
+
+    use super::*;
+
+    #[test]
+    fn images_of_another_size_than_the_learned_ones_are_doubted() {
+        let optics: Optics = toml::from_str(include_str!("../../../examples/rig.toml")).unwrap();
+        assert_eq!(another_size(&optics, (480, 640)), None);
+        let learned = optics.with_stage(Stage { image_px: Some([640, 480]), ..Stage::identity(2, 1) });
+        assert_eq!(another_size(&learned, (480, 640)), None);
+        let doubt = another_size(&learned, (240, 320)).unwrap().to_string();
+        assert!(doubt.contains("640x480") && doubt.contains("320x240"), "{doubt}");
+    }
 }

@@ -60,6 +60,11 @@ pub struct ReportFigures {
 }
 
 pub fn write(request: &ReportRequest) -> Result<ReportFigures> {
+    let is_page = request.out.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("html"));
+    if request.out.exists() && !is_page {
+        let expected = "it exists and does not end with .html: name another file";
+        return Err(WorkflowError::parameter("out", request.out.display(), expected));
+    }
     let page = html(&request.folder)?;
     write_file(&request.out, page.as_bytes())?;
     Ok(ReportFigures { pictures: page.matches("<figure").count(), bytes: page.len() })
@@ -151,6 +156,10 @@ mod tests {
         assert!(!page.contains("http:") && !page.contains("https:"), "nothing is fetched");
         assert!(page.contains("<td>95.00 %</td>") && page.contains("<td>0.700 mm</td>"));
         assert!(page.contains("scene = &quot;staircase&quot;"));
+        let far = folder.path().join("far.png");
+        let error =
+            super::write(&ReportRequest { folder: folder.path().into(), out: far.clone() }).unwrap_err();
+        assert!(error.is_usage() && fs::read(far).unwrap() == image, "{error}");
     }
 
     #[test]

@@ -7,6 +7,7 @@ use std::{
     path::Path,
 };
 
+use farnear_capture::record::CAPTURE_FILE;
 use farnear_files::staging::{Staging, StagingError};
 use farnear_recognition::model_file::is_model;
 
@@ -49,6 +50,23 @@ pub fn depth(out: &Path) -> Result<Staging> {
     Ok(Staging::into_folder(out)?.replacing(DEPTH_RECORD, output::files().chain(stale_batch)))
 }
 
+/// Begins a rendered pair in a new or existing folder, except that of a capture, or with a pair that was not rendered.
+pub fn rendered(out: &Path) -> Result<Staging> {
+    let has = |name: &str| out.join(name).exists();
+    if has(CAPTURE_FILE) {
+        let expected = format!("it holds a capture ({CAPTURE_FILE}): name another folder");
+        return Err(WorkflowError::parameter("out", out.display(), expected));
+    }
+    let foreign = ["far.png", "near.png", "optics.toml"].into_iter().find(|name| has(name));
+    if let Some(file) = foreign.filter(|_| !has("truth.npy")) {
+        let expected = format!(
+            "it holds {file}, but no truth.npy of a run of render that made it: move the file away, or name another folder"
+        );
+        return Err(WorkflowError::parameter("out", out.display(), expected));
+    }
+    Ok(Staging::into_folder(out)?)
+}
+
 /// Begins a focus stack's result in a new folder, an empty one, or that of an earlier focus stack.
 pub(crate) fn stack(out: &Path, images: &Path) -> Result<Staging, StagingError> {
     let same =
@@ -88,4 +106,24 @@ fn batch_of(folder: &Path, kind: &str) -> Option<&'static str> {
     let text = fs::read_to_string(folder.join(BATCH_RECORD)).ok()?;
     let of = text.parse::<toml::Table>().ok()?.get("do")?.as_str()? == kind;
     of.then_some(BATCH_RECORD)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_pair_is_rendered_over_a_rendered_one_only() {
+        let folder = tempfile::tempdir().unwrap();
+        let write = |name: &str| fs::write(folder.path().join(name), "").unwrap();
+        assert!(rendered(folder.path()).is_ok());
+        write("far.png");
+        let error = rendered(folder.path()).unwrap_err();
+        assert!(error.is_usage() && error.to_string().contains("far.png"), "{error}");
+        write("truth.npy");
+        assert!(rendered(folder.path()).is_ok());
+        write(CAPTURE_FILE);
+        let error = rendered(folder.path()).unwrap_err();
+        assert!(error.is_usage() && error.to_string().contains("capture.toml"), "{error}");
+    }
 }

@@ -80,12 +80,17 @@ fn is_plain(name: &str) -> bool {
 
 /// Entry of a session by a name that all systems allow.
 pub fn folder_of(session: &Path, name: &str) -> Result<PathBuf> {
+    entry_of(session, name, "capture")
+}
+
+/// As [`folder_of`], for something that is not a capture; `kind` names it in errors.
+pub fn entry_of(session: &Path, name: &str, kind: &'static str) -> Result<PathBuf> {
     let everywhere =
         !name.chars().any(|c| "/\\:*?\"<>|".contains(c)) && name.trim() == name && name.len() <= 100;
     if !is_plain(name) || !everywhere {
         let expected = "expected a name of at most 100 bytes that does not begin with a dot or a blank, without control characters \
                         and / \\ : * ? \" < > |";
-        return Err(WorkflowError::parameter("capture", name, expected));
+        return Err(WorkflowError::parameter(kind, name, expected));
     }
     Ok(session.join(name))
 }
@@ -367,6 +372,8 @@ mod tests {
         for name in ["..", "../x", "a/b", "/etc", "", ".hidden", "a\\b", "x\0"] {
             assert!(folder_of(Path::new("s"), name).is_err(), "{name:?}");
         }
+        let error = entry_of(Path::new("s"), "../x", "video").unwrap_err().to_string();
+        assert!(error.starts_with("video ../x: expected a name"), "{error}");
         let session = session();
         for name in ["..", "../x", "pair-001/..", "", ".partial"] {
             assert!(existing(session.path(), name).is_err(), "{name:?}");

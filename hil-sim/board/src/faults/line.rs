@@ -90,11 +90,8 @@ impl NoisyLine {
         if self.rates.lost > 0.0 || self.rates.inserted > 0.0 {
             let mut carried = Vec::with_capacity(bytes.len());
             for byte in bytes.drain(..) {
-                while self.insert.strikes() {
+                if self.insert.strikes() {
                     carried.push(self.insert.noise.bits() as u8);
-                    if self.rates.inserted >= 1.0 {
-                        break; // at most one per byte
-                    }
                 }
                 if !self.lose.strikes() {
                     carried.push(byte);
@@ -174,6 +171,10 @@ mod tests {
         // Binomial with mean 1000: five standard deviations are 157.
         assert!((98_843..99_157).contains(&carry(|rates| rates.lost = 0.01)));
         assert!((100_843..101_157).contains(&carry(|rates| rates.inserted = 0.01)));
+        // Binomial with standard deviation 158 and 95.
+        assert!((149_210..150_790).contains(&carry(|rates| rates.inserted = 0.5)));
+        assert!((189_525..190_475).contains(&carry(|rates| rates.inserted = 0.9)));
+        assert_eq!(carry(|rates| rates.inserted = 1.0), 200_000);
         assert_eq!(carry(|rates| rates.cut = true), 0);
         assert_eq!(carry(|rates| rates.lost = 1.0), 0);
         let mut line = NoisyLine::new(0.0, 1, "test");

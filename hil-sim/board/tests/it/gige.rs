@@ -8,8 +8,8 @@ use std::{
 
 use farnear_gige::{
     features::{
-        ACQUISITION, CHUNK_ENABLE, CHUNK_MODE, EXPOSURE_US, GAIN, HEIGHT, OFFSET_X, OFFSET_Y, PAYLOAD_SIZE,
-        SOFTWARE, START, STOP, TRIGGER_MODE, TRIGGER_SOFTWARE, TRIGGER_SOURCE, WIDTH,
+        ACQUISITION, CHUNK_ENABLE, CHUNK_MODE, EXPOSURE_US, FRAME_RATE, GAIN, HEIGHT, OFFSET_X, OFFSET_Y,
+        PAYLOAD_SIZE, SOFTWARE, START, STOP, TRIGGER_MODE, TRIGGER_SOFTWARE, TRIGGER_SOURCE, WIDTH,
     },
     registers::{HEARTBEAT_MS, PRIVILEGE, STREAM_ADDRESS, STREAM_PORT},
 };
@@ -22,6 +22,7 @@ const PATIENCE: Duration = Duration::from_secs(600);
 const GAP: Duration = Duration::from_millis(300);
 /// Frames of which a camera can send packets again.
 const FRAMES_RETAINED: usize = 8;
+const WRITE_PROTECT: u16 = 0x8004;
 const ACCESS_DENIED: u16 = 0x8006;
 
 struct Client {
@@ -255,7 +256,7 @@ fn free_running_and_software_trigger_with_region_gain_and_format() {
     let (camera, text) = address(3);
     let program = Program::start(&["--scene", "plane:900", "--noise", "12bit", "--gige", &text]);
     let mut client = Client::controlling(camera);
-    for (register, value) in [(OFFSET_X, 16), (OFFSET_Y, 8), (WIDTH, 64), (HEIGHT, 32), (ACQUISITION, START)]
+    for (register, value) in [(WIDTH, 64), (HEIGHT, 32), (OFFSET_X, 16), (OFFSET_Y, 8), (ACQUISITION, START)]
     {
         assert_eq!(client.write(register, value), 0);
     }
@@ -263,6 +264,14 @@ fn free_running_and_software_trigger_with_region_gain_and_format() {
     assert_eq!((first.payload.len(), first.number, second.number), (64 * 32 * 2, 1, 2));
     // 25 frames a second of rig time, independent of the computer's speed.
     assert_eq!(second.time_ns - first.time_ns, 40_000_000);
+    // Another rate takes effect while it runs; the size of a frame is locked.
+    assert_eq!((client.write(FRAME_RATE, 10_000), client.write(WIDTH, 32)), (0, WRITE_PROTECT));
+    let mut last_ns = second.time_ns;
+    let is_slower = (0..20).any(|_| {
+        let at_ns = client.frame().time_ns;
+        at_ns - std::mem::replace(&mut last_ns, at_ns) == 100_000_000
+    });
+    assert!(is_slower, "10 frames a second after the change");
     assert_eq!(client.write(ACQUISITION, STOP), 0);
     client.drain();
     let mean = |frame: &Frame| {

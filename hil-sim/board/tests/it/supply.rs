@@ -28,10 +28,25 @@ fn the_firmware_never_programs_the_option_bytes() {
 #[test]
 fn a_supply_below_the_brown_out_level_resets_the_chip() {
     let mut bench = rig_with(|parts| parts.supply.brown_out = BrownOut::Level3);
-    bench.access(|rig| rig.set_supply_mv(2_800));
+    bench.move_to(Axis::SensorFine, Nanometres(100_000));
+    let before = bench.report();
+    // The second is above the falling threshold of 2.83 V and below the rising one.
+    for millivolts in [2_800, 2_900] {
+        bench.access(move |rig| rig.set_supply_mv(millivolts));
+        let held = bench.rig.advance_us(100_000).expect("runs");
+        assert_eq!((held.powered, held.resets), (false, before.resets), "{millivolts} mV: it stays in reset");
+        // It creeps by less than 2 um.
+        assert!(
+            (held.piezo_um - before.piezo_um).abs() < 5.0,
+            "the DAC keeps its output: {} um",
+            held.piezo_um
+        );
+    }
+    bench.access(|rig| rig.set_supply_mv(3_300));
     bench.settle();
-    let hello = bench.say_hello();
+    let (hello, report) = (bench.say_hello(), bench.report());
     assert_eq!((hello.boot, hello.reset_cause), (2, ResetCause::BrownOut));
+    assert_eq!((report.powered, report.resets), (true, before.resets + 1));
 }
 
 #[test]

@@ -1,4 +1,4 @@
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use farnear_protocol::{
     EventKind, Request, Response,
@@ -38,23 +38,32 @@ fn truly_um(truth: &Truth, axis: Axis) -> f64 {
 
 pub fn position(case: &Case<'_>) -> Vec<Broken> {
     let mut homed: BTreeSet<(u32, &str)> = BTreeSet::new();
+    let mut asked: BTreeMap<(u32, u32), Option<Axis>> = BTreeMap::new();
     let mut broken = Vec::new();
     // A repeat returns the first answer, which may be outdated.
     let mut answered = BTreeSet::new();
     for sight in case.sights {
         let off = match &sight.seen {
-            // The edge is found before the homing ends; calibrations home, too.
-            Seen::Asked { boot, call, .. } => {
-                homed.extend(homes(&call.request).map(|axis| (*boot, axis.name())));
+            Seen::Asked { id, boot, call } => {
+                asked.insert((*boot, *id), homes(&call.request));
                 continue;
             }
-            Seen::Reported { event, truth, .. } => match &event.kind {
+            Seen::Reported { event, boot, truth, .. } => match &event.kind {
+                EventKind::Homed { axis, .. } => {
+                    homed.insert((*boot, axis.name()));
+                    continue;
+                }
                 EventKind::MoveDone { axis, measured, .. } => {
                     off(case, *axis, measured.0, truth).map(|what| format!("a move is done, {what}"))
                 }
                 _ => continue,
             },
             Seen::Answered { id, boot, answer, truth } => {
+                // The edge is found before the homing ends; calibrations home, too.
+                if **answer == Ok(Response::Accepted) {
+                    let axis = asked.get(&(*boot, *id)).copied().flatten();
+                    homed.extend(axis.map(|axis| (*boot, axis.name())));
+                }
                 let Ok(Response::Status(status)) = &**answer else { continue };
                 if !answered.insert((*boot, *id)) {
                     continue;

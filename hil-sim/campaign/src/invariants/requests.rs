@@ -5,7 +5,7 @@ use farnear_protocol::{
 };
 
 use super::{Broken, Case, motion::ended};
-use farnear_sim::observer::Seen;
+use farnear_sim::observer::{Seen, Sight};
 
 type Answer = Result<Response, RequestError>;
 
@@ -66,14 +66,16 @@ fn answers(case: &Case<'_>) -> Vec<Broken> {
     broken
 }
 
-/// No more exposures than requested plus those repeated by a continuous run.
+/// No more exposures than by accepted requests plus those repeated by a continuous run.
 fn exposures(case: &Case<'_>) -> Vec<Broken> {
+    // An exposure may end before the answer has left.
+    let accepted: BTreeSet<(u32, u32)> = case.sights.iter().filter_map(accepted_request).collect();
     let mut unseen = BTreeSet::new();
     let mut runs: BTreeMap<(u32, u32), u64> = BTreeMap::new();
     let (mut armed, mut taken) = (0, 0);
     for sight in case.sights {
         match &sight.seen {
-            Seen::Asked { id, boot, call } => {
+            Seen::Asked { id, boot, call } if accepted.contains(&(*boot, *id)) => {
                 let exposures = match call.request {
                     Request::ArmProgram { shots } => {
                         armed = armed.max(u64::from(shots));
@@ -95,9 +97,16 @@ fn exposures(case: &Case<'_>) -> Vec<Broken> {
         }
         let asked = runs.values().sum::<u64>() + unseen.len() as u64;
         if taken > asked {
-            let what = format!("{taken} exposures were taken, {asked} requested");
+            let what = format!("{taken} exposures were taken, {asked} requested and accepted");
             return vec![twice(sight.at_ns, what)];
         }
     }
     Vec::new()
+}
+
+fn accepted_request(sight: &Sight) -> Option<(u32, u32)> {
+    match &sight.seen {
+        Seen::Answered { id, boot, answer, .. } if **answer == Ok(Response::Accepted) => Some((*boot, *id)),
+        _ => None,
+    }
 }

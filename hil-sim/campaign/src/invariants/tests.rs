@@ -1,7 +1,7 @@
 //! Each property on a run that violates it, and on one that does not.
 
 use farnear_protocol::{
-    BoardMicros, Call, Event, EventKind, Micros, Nanometres, Request, Response,
+    BoardMicros, Call, Event, EventKind, Micros, Nanometres, Request, RequestError, Response,
     message::{
         Alarm, AlarmRecord, Axis, AxisStatus, DropReason, LinkCounters, PositionState, ProgramState,
         ProgramStatus, ResetCause, SettingKey, Status,
@@ -28,6 +28,11 @@ fn reported(at_ms: u64, number: u32, kind: EventKind, truth: Truth) -> Sight {
 
 fn answered(at_ms: u64, id: u32, response: Response) -> Sight {
     let answer = Box::new(Ok(response));
+    Sight { at_ns: at_ms * MS, seen: Seen::Answered { id, boot: 1, answer, truth: Truth::default() } }
+}
+
+fn refused(at_ms: u64, id: u32) -> Sight {
+    let answer = Box::new(Err(RequestError::NotHomed { axis: Axis::Lens, state: PositionState::Unknown }));
     Sight { at_ns: at_ms * MS, seen: Seen::Answered { id, boot: 1, answer, truth: Truth::default() } }
 }
 
@@ -128,6 +133,25 @@ fn detects_work_that_ends_twice_and_changed_answers() {
 #[test]
 fn detects_a_wrong_position() {
     assert_eq!(broken("", &[asked(1, 7, go()), reported(9, 0, done(7, 5_000), at(19.0))]), ["position"]);
+}
+
+#[test]
+fn detects_an_axis_that_is_called_homed_without_a_homing() {
+    let violations = |answer: Option<Sight>| {
+        let mut status = status(3);
+        status.lens.state = PositionState::Homed;
+        let home = asked(1, 4, Request::Home { axis: Axis::Lens, silence: Micros(1_000_000) });
+        let run: Vec<Sight> = [Some(home), answer, Some(answered(3, 5, Response::Status(status)))]
+            .into_iter()
+            .flatten()
+            .collect();
+        broken("", &run)
+    };
+    assert_eq!(violations(Some(answered(2, 4, Response::Accepted))), [""; 0]);
+    let homed = EventKind::Homed { request: 4, axis: Axis::Lens, shift: Nanometres(0) };
+    assert_eq!(violations(Some(reported(2, 0, homed, Truth::default()))), [""; 0]);
+    assert_eq!(violations(Some(refused(2, 4))), ["position"]);
+    assert_eq!(violations(None), ["position"]);
 }
 
 #[test]
@@ -236,8 +260,13 @@ fn detects_an_extra_exposure_and_permits_a_repeated_one() {
     let reason = DropReason::NoStrobe;
     let dropped =
         reported(4, 0, EventKind::FrameDropped { request: 7, frame: 0, index: 0, reason }, Truth::default());
-    assert_eq!(broken("", &[asked(1, 7, run.clone()), exposed(2, 0), exposed(5, 1)]), ["acts-twice"]);
-    assert_eq!(broken("", &[asked(1, 7, run), exposed(2, 0), dropped, exposed(5, 1)]), [""; 0]);
+    let accepted = [asked(1, 7, run.clone()), answered(1, 7, Response::Accepted), exposed(2, 0)];
+    assert_eq!(broken("", &accepted), [""; 0]);
+    assert_eq!(broken("", &[&accepted[..], &[exposed(5, 1)]].concat()), ["acts-twice"]);
+    assert_eq!(broken("", &[&accepted[..], &[dropped, exposed(5, 1)]].concat()), [""; 0]);
+    // A refused run, and one that the board did not receive, allow no exposure.
+    assert_eq!(broken("", &[asked(1, 7, run.clone()), refused(1, 7), exposed(2, 0)]), ["acts-twice"]);
+    assert_eq!(broken("", &[asked(1, 7, run), exposed(2, 0)]), ["acts-twice"]);
 }
 
 #[test]

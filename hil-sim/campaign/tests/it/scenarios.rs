@@ -39,6 +39,19 @@ fn every_property_holds_in_each_recorded_scenario() {
 }
 
 #[test]
+fn a_shard_without_a_seed_is_an_error() {
+    let program = Command::new(env!("CARGO_BIN_EXE_farnear-campaign"))
+        .args(["run", "--seeds", "3", "--shard", "8/8"])
+        .output()
+        .expect("farnear-campaign starts");
+    let stderr = String::from_utf8_lossy(&program.stderr);
+    assert!(
+        !program.status.success() && stderr.contains("shard 8/8 has none of the 3 seeds from 1"),
+        "{stderr}"
+    );
+}
+
+#[test]
 fn plays_a_scenario_and_rejects_an_invalid_one_with_line_and_field() {
     let folder = tempfile::tempdir().expect("a folder");
     let run = |text: &str| {

@@ -179,8 +179,8 @@ impl Camera for FolderCamera {
     }
 
     fn arm(&mut self, mode: TriggerMode, _: Micros) -> Result<(), CameraError> {
-        // Files of a free-running camera cannot be assigned to exposures.
-        if mode == TriggerMode::FreeRunning {
+        // Files of a free-running camera cannot be assigned to exposures, and a folder takes no software trigger.
+        if mode != TriggerMode::Hardware {
             return Err(CameraError::Trigger { camera: self.kind(), mode: trigger_name(mode) });
         }
         self.pairing.begin();

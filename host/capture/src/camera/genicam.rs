@@ -312,6 +312,14 @@ impl Camera for GenicamCamera {
         self.start()
     }
 
+    fn sets_exposure(&mut self) -> bool {
+        // The bindings report success for absent features.
+        let has_mode = self.camera.is_feature_available("ExposureMode").unwrap_or(false);
+        let by_pulse =
+            has_mode && self.camera.string("ExposureMode").is_ok_and(|mode| mode.as_str() == "TriggerWidth");
+        !by_pulse
+    }
+
     fn trigger(&mut self, _: u32, _: Micros) -> Result<(), CameraError> {
         self.camera.software_trigger().map_err(self.failed())
     }

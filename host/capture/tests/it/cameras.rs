@@ -148,6 +148,17 @@ fn used_folder(first: &str) -> (tempfile::TempDir, FolderCamera) {
     (folder, camera)
 }
 
+#[test]
+fn a_folder_is_armed_for_hardware_triggers_only() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut camera = FolderCamera::watch(folder.path()).unwrap();
+    for mode in [TriggerMode::Software, TriggerMode::FreeRunning] {
+        let error = camera.arm(mode, Micros(1)).unwrap_err();
+        assert!(matches!(error, CameraError::Trigger { camera: "folder", .. }), "{error:?}");
+    }
+    camera.arm(TriggerMode::Hardware, Micros(1)).unwrap();
+}
+
 fn second_picture(camera: &mut FolderCamera) -> Result<Image, CameraError> {
     camera.image(&shot(1), Duration::from_secs(5))
 }

@@ -6,7 +6,7 @@ use farnear_capture::{
     ClientError,
     camera::{Camera, CameraError, Image},
     continuous::{Continuous, Loss, Outcome, Pace},
-    expose::CaptureError,
+    expose::{CaptureError, expose},
 };
 use farnear_protocol::{
     message::{DropReason, RequestError, Shot, ShotRecord, TriggerMode},
@@ -103,6 +103,46 @@ fn dropping_stops_the_run_and_waiting_frames_are_counted() {
     drop(stream);
     assert_eq!(peer.board().stops, 1);
     assert!(client.status().is_ok());
+}
+
+/// Exposes for its own time.
+struct SelfTimed;
+
+impl Camera for SelfTimed {
+    fn kind(&self) -> &'static str {
+        "self-timed"
+    }
+    fn arm(&mut self, _: TriggerMode, _: Micros) -> Result<(), CameraError> {
+        Ok(())
+    }
+    fn sets_exposure(&mut self) -> bool {
+        true
+    }
+    fn trigger(&mut self, _: u32, _: Micros) -> Result<(), CameraError> {
+        Ok(())
+    }
+    fn image(&mut self, shot: &ShotRecord, wait: Duration) -> Result<Image, CameraError> {
+        Losing::default().image(shot, wait)
+    }
+}
+
+#[test]
+fn a_camera_with_its_own_exposure_takes_no_program_of_several() {
+    let (client, peer) = connect(Faults::default());
+    let mixed = [SHOT, Shot { exposure: Micros(5_000), ..SHOT }];
+    let once = |camera: &mut dyn Camera, shots: &[Shot]| {
+        expose(&client, camera, shots, WAIT, |_, _| -> Result<(), CaptureError> { Ok(()) })
+    };
+    let acts = peer.board().acts;
+    let error = once(&mut SelfTimed, &mixed).unwrap_err();
+    assert!(matches!(error, CaptureError::MixedExposures { index: 1, .. }), "{error:?}");
+    assert!(error.to_string().contains("shot 1 exposes for 5000 us, the ones before for 1000 us"), "{error}");
+    let pace = Pace { period: Micros(40_000), exposures: 2 };
+    let error = Continuous::start(&client, &mut SelfTimed, &mixed, pace, WAIT).err().unwrap();
+    assert!(matches!(error, CaptureError::MixedExposures { index: 1, .. }), "{error:?}");
+    assert_eq!(peer.board().acts, acts, "nothing has begun");
+    once(&mut SelfTimed, &[SHOT, SHOT]).unwrap();
+    once(&mut Losing::default(), &mixed).unwrap();
 }
 
 #[test]

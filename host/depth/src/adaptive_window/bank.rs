@@ -6,7 +6,10 @@ use super::whitened::Whitened;
 use crate::kernel::Kernel;
 use crate::operators::DesignError;
 use crate::optics::Optics;
-use crate::simd::{self, Backend, MAX_ROWS, Plane, Taps};
+use crate::simd::{self, Backend, MAX_ROWS, OfNoise, Plane, Taps};
+
+/// Least part of the energy that counts as evidence.
+const LEAST_EVIDENCE: f32 = 0.02;
 
 /// The last design: a stream or series of pairs has one lens, and a design takes as long as a map of 640x480.
 static LAST: Mutex<Option<(Optics, Whitened)>> = Mutex::new(None);
@@ -31,19 +34,18 @@ impl Bank {
         super::whitened::SIZE / 2
     }
 
-    /// Least c1 in energies of the matched filter: half of the expected value.
-    pub(super) fn least_slope(&self) -> f32 {
-        0.5 * self.0.slope_in_energy as f32
-    }
-
     /// Variance of `alpha` for noise of unit variance, in energies / slope^2: a polynomial in alpha^2.
     pub(super) fn variance_gain(&self) -> [f32; 4] {
         self.0.variance_gain
     }
 
-    /// Energy of the matched filter's output for noise of unit variance.
-    pub(super) fn noise_energy(&self) -> f32 {
-        2.0 * product(&self.0.matched, &self.0.matched) as f32
+    /// What noise of unit variance adds to a pixel's products. R1, R3 and U0 act on the sum of the images, so their products
+    /// have a mean; without its removal noise would draw depth to alpha = 0. The least slope is half of the expected one.
+    pub(super) fn of_noise(&self) -> OfNoise {
+        let Whitened { residual: [_, r1, _, r3], matched, slope_in_energy, .. } = &self.0;
+        let [c1, c3, energy] = [r1, r3, matched].map(|kernel| 2.0 * product(kernel, matched) as f32);
+        let least_slope = 0.5 * *slope_in_energy as f32;
+        OfNoise { c1, c3, energy, least_evidence: LEAST_EVIDENCE, least_slope }
     }
 
     /// Mean square of the residual at `alpha` for noise of unit variance: a polynomial in alpha^2. The design aims at

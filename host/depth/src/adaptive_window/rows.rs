@@ -11,7 +11,7 @@ use super::{ADAPTIVE_PX, Job, LEARNED_PX, Maps, Window};
 use crate::border::reflect;
 use crate::depth_of_alpha::DepthOfAlpha;
 use crate::operators::linearise;
-use crate::simd::{self, Contrast, CubicSums, Deviation, Found, MAX_ROWS, Plane, Residual};
+use crate::simd::{self, Contrast, CubicSums, Deviation, Found, MAX_ROWS, OfNoise, Plane, Residual};
 
 /// Rows of a band: its halo of about 20 rows on either side is computed twice.
 const ROWS: usize = 256;
@@ -20,8 +20,6 @@ const COLUMNS: usize = 640;
 const MISFIT_PX: [usize; 2] = [7, 21];
 /// Border in which filters and windows depend on reflections, which no model explains, px.
 const BORDER_PX: usize = 14;
-/// Least part of the energy that counts as evidence.
-const LEAST_EVIDENCE: f32 = 0.02;
 /// Standard deviation of alpha by the operators' own error: 0.003 on noise-free slants.
 const FLOOR: f32 = 0.0026;
 /// Part of the windows' disagreement beyond noise by which the larger one's variance grows. Chosen on rendered spheres, cones
@@ -69,7 +67,7 @@ pub(super) struct Tile<'a> {
     depth_of: DepthOfAlpha,
     deviation: Deviation,
     of_residual: Residual,
-    noise_energy: f32,
+    of_noise: OfNoise,
     inner: Inner,
 }
 
@@ -170,7 +168,7 @@ impl<'a> Tile<'a> {
                 floor: FLOOR.powi(2),
             },
             of_residual,
-            noise_energy: job.bank.noise_energy(),
+            of_noise: job.bank.of_noise(),
             inner: Inner { size: job.far.dim(), reach },
         }
     }
@@ -367,9 +365,9 @@ impl<'a> Tile<'a> {
 
     fn row(&mut self, place: Place, index: usize, line: usize, wide: usize) {
         let [above, beside] = self.outer;
-        let Self { job, row, radius, inner, noise_energy, .. } = self;
+        let Self { job, row, radius, inner, of_noise, .. } = self;
         let Columns { side, sums } = &self.columns[index];
-        let (side, backend, scales, bank) = (*side, job.backend, job.scales, job.bank);
+        let (side, backend, scales) = (*side, job.backend, job.scales);
         let from = *radius - side / 2;
         let of = |k: usize| &sums.row(k)[from..from + wide + side - 1];
         for k in 0..=ENERGY {
@@ -388,13 +386,12 @@ impl<'a> Tile<'a> {
         }
         let [c0, c1, c2, c3, energy] = row.sums.each_ref().map(|sums| &sums[..wide]);
         let (alpha, variance) = (&mut row.alpha[..wide], &mut row.variance[..wide]);
-        let found = Found { alpha: &mut *alpha, variance: &mut *variance };
-        simd::roots(backend, CubicSums { c: [c0, c1, c2, c3], energy }, bank.least_slope(), found);
         let rows = inner.rows_of_window((place.top + line) as isize - above as isize, side);
-        let of_noise = *noise_energy * (rows * side) as f32;
         let of_pixels = &mut row.work[..wide];
         inner.share_columns(place.left as isize - beside as isize, side, noise, of_pixels);
-        simd::without_noise(backend, energy, of_pixels, [of_noise, LEAST_EVIDENCE], variance);
+        let sums = CubicSums { c: [c0, c1, c2, c3], energy, noise: of_pixels };
+        let found = Found { alpha: &mut *alpha, variance: &mut *variance };
+        simd::roots(backend, sums, of_noise.times((rows * side) as f32), found);
         let [small, of_small] = row.small.each_mut().map(|values| &mut values[..wide]);
         if index == 0 {
             small.copy_from_slice(alpha);

@@ -4,8 +4,9 @@
 //! `r = R0 * m + alpha R1 * p + alpha^2 R2 * m + alpha^3 R3 * p`. A texture F gives `(A H1 - B H2) F` with
 //! `A = sum alpha^k R_k`, `B = sum (-alpha)^k R_k`. It vanishes at the true depth for `A : B = H2 : H1`; noise stays
 //! white with unit gain for `A^2 + B^2 = 1`. A linear least squares approximates both within 7x7 taps; a second one
-//! designs `U0`: `u = U0 * p` is the matched filter for the residual's change with depth, under the exact constraint
-//! that noise, which enters both, does not bias `sum r u`.
+//! designs `U0 * p + alpha U1 * m`, the matched filter for the residual's change with depth, under the exact constraint that
+//! noise, which enters both, does not bias `sum r u`. Only `u = U0 * p` is used. What noise adds to `sum r u` without U1 is
+//! removed from the sums (`Bank::of_noise`).
 //!
 //! A window of side w has a standard deviation within 6 % of the bound for unknown texture (`docs/accuracy.md`):
 //! `1 / (w sqrt J)`, `J = mean over frequencies of P D^2 / (s^2 (H1^2 + H2^2))`, `D = H1 H2' - H2 H1'`, P the texture's

@@ -45,6 +45,8 @@ const ANY_PIXEL_UM: f64 = 5.0;
 const ANY_MAGNIFICATION: f64 = 3.0 / 7.0;
 /// Ranges of a pair between the front focus and the far plane: depth is nearly linear in alpha.
 const FAR_RANGES: f64 = 140.0;
+/// Least side of a binned image, px.
+const LEAST_SIDE: usize = 64;
 /// Fewest slices.
 pub const FEWEST: usize = 5;
 
@@ -87,14 +89,24 @@ pub enum StackError {
     Size { index: usize },
     #[error("{name} = {value}: expected a positive number")]
     NotPositive { name: &'static str, value: f64 },
-    #[error("{0}")]
-    NoFocus(String),
+    #[error("{name} = {value}: expected {expected}")]
+    OutOfRange { name: &'static str, value: usize, expected: String },
     #[error(
-        "no pair of slices has a largest blur of {low} to {high} px: it is {per_slice:.2} px per slice; use a {hint} step",
+        "far_mm = {far_mm}: a pair ({pair_step} steps of {step_mm}) spans {range_mm:.3}, so the far plane is at more than {least_mm:.3}; give \
+         its distance from the lens in the unit of the steps, or leave far_mm out"
+    )]
+    FarTooNear { far_mm: f64, pair_step: usize, step_mm: f64, range_mm: f64, least_mm: f64 },
+    #[error(
+        "{blocks} of {of} blocks are sharpest inside the stack: the target must be textured, and the stack must go through its \
+         focus"
+    )]
+    NoFocus { blocks: usize, of: usize },
+    #[error(
+        "no pair of slices has a largest blur of {low} to {high} px: it is {per_slice:.2} px per slice{given}; use a {hint}",
         low = USABLE_PX[0],
         high = USABLE_PX[1]
     )]
-    NoSeparation { per_slice: f64, hint: &'static str },
+    NoSeparation { per_slice: f64, given: String, hint: &'static str },
     #[error("no pair of slices {0} apart has its target within the range: take more slices around the focus")]
     NoPair(usize),
     #[error(
@@ -136,13 +148,11 @@ pub fn calibrate_stack(
     proceed: &(dyn Fn(usize) -> bool + Sync),
 ) -> Result<StackLens, StackError> {
     check(slices, settings)?;
-    let go_on = || if proceed(0) { Ok(()) } else { Err(StackError::Stopped) };
+    let not_stopped = || proceed(0);
     let evened = brightness::evened(slices);
-    let plane = FocusPlane::of(&evened).map_err(StackError::NoFocus)?;
-    go_on()?;
-    let blur = BlurCurve::of(&evened, &plane);
+    let plane = FocusPlane::of(&evened, &not_stopped)?;
+    let blur = BlurCurve::of(&evened, &plane, &not_stopped)?;
     drop(evened);
-    go_on()?;
     let (bin, pair_step) = separation(&blur, slices.len(), settings)?;
     let limit = FLAT * pair_step as f64;
     if plane.spread > limit {
@@ -171,13 +181,20 @@ pub fn calibrate_stack(
         truth_of: &truth_of,
         proceed,
     })?;
-    let scale_known = !matches!(settings.moved, Moved::Target { object_pixel_um: None, .. });
+    let scale_known = match &settings.moved {
+        Moved::Target { object_pixel_um, .. } => object_pixel_um.is_some(),
+        Moved::Sensor(lens) => lens.stage().is_none_or(|stage| stage.scale_known),
+    };
     let (height, width) = slices[0].dim();
     let optics = match optics.stage().copied() {
         Some(stage) => optics.with_stage(Stage { scale_known, image_px: Some([width, height]), ..stage }),
         None => optics,
     };
-    let sharpness: Vec<Vec<f64>> = slices.iter().map(|slice| slice_order::sharpness(slice.view())).collect();
+    let sharpness: Vec<Vec<f64>> = slices
+        .iter()
+        .map(|slice| not_stopped().then(|| slice_order::sharpness(slice.view())))
+        .collect::<Option<_>>()
+        .ok_or(StackError::Stopped)?;
     let exchanged = slice_order::exchanged(&sharpness);
     Ok(StackLens { optics, plane, blur, held_out, trials, foreign, exchanged })
 }
@@ -200,6 +217,15 @@ fn check(slices: &[Array2<f32>], settings: &StackSettings) -> Result<(), StackEr
             return Err(StackError::NotPositive { name, value });
         }
     }
+    let (height, width) = slices[0].dim();
+    let largest_bin = (height.min(width) / LEAST_SIDE).clamp(1, Stage::LARGEST_BIN);
+    let counts = [("bin", settings.bin, largest_bin), ("pair_step", settings.pair_step, slices.len() - 2)];
+    for (name, value, most) in counts {
+        if let Some(value) = value.filter(|value| !(1..=most).contains(value)) {
+            let expected = format!("1 to {most} for {} slices of {width}x{height}", slices.len());
+            return Err(StackError::OutOfRange { name, value, expected });
+        }
+    }
     Ok(())
 }
 
@@ -211,10 +237,9 @@ fn separation(
     settings: &StackSettings,
 ) -> Result<(usize, usize), StackError> {
     let per_slice = blur.px_per_slice();
-    let bins = settings.bin.map_or(BINS.to_vec(), |bin| vec![bin.max(1)]);
+    let bins = settings.bin.map_or(BINS.to_vec(), |bin| vec![bin]);
     let most = (slices - 1) / 2;
-    let steps =
-        settings.pair_step.map_or((1..=most.max(1)).collect(), |step| vec![step.clamp(1, slices - 1)]);
+    let steps = settings.pair_step.map_or((1..=most.max(1)).collect(), |step| vec![step]);
     let forced = settings.bin.is_some() && settings.pair_step.is_some();
     bins.iter()
         .flat_map(|bin| steps.iter().map(move |step| (*bin, *step)))
@@ -228,9 +253,16 @@ fn separation(
             cost(a).total_cmp(&cost(b))
         })
         .map(|(bin, step, _)| (bin, step))
-        .ok_or(StackError::NoSeparation {
-            per_slice,
-            hint: if per_slice > 1.0 { "finer" } else { "coarser" },
+        .ok_or_else(|| {
+            let named =
+                |name: &str, value: Option<usize>| value.map(|value| format!(" with {name} = {value}"));
+            let given = [named("bin", settings.bin), named("pair_step", settings.pair_step)];
+            let hint = match (settings.bin, settings.pair_step) {
+                (None, None) if per_slice > 1.0 => "finer step of the stage",
+                (None, None) => "coarser step of the stage or more slices",
+                _ => "other value, or leave it out",
+            };
+            StackError::NoSeparation { per_slice, given: given.into_iter().flatten().collect(), hint }
         })
 }
 
@@ -248,18 +280,29 @@ fn optics(
         Moved::Target { object_pixel_um, far_mm } => {
             let magnification =
                 object_pixel_um.map_or(ANY_MAGNIFICATION, |object_um| ANY_PIXEL_UM / object_um);
-            let far_mm = far_mm.unwrap_or(FAR_RANGES * (1.0 + magnification) * span_mm);
+            // The near plane of a nearer far plane is within the focal length.
+            let least_mm = (1.0 + magnification) * span_mm;
+            let far_mm = far_mm.unwrap_or(FAR_RANGES * least_mm);
+            if far_mm <= least_mm {
+                let (step_mm, range_mm) = (settings.step_mm, span_mm);
+                return Err(StackError::FarTooNear { far_mm, pair_step, step_mm, range_mm, least_mm });
+            }
             let focal_length_mm = far_mm * magnification / (1.0 + magnification);
             let image = |u: f64| focal_length_mm * focal_length_mm / (u - focal_length_mm);
             (focal_length_mm, ANY_PIXEL_UM, far_mm, image(far_mm - span_mm) - image(far_mm), Some(true))
         }
         Moved::Sensor(lens) => {
+            let lens = lens.unbinned();
             let far_mm = lens.working_range().far_mm;
             (lens.focal_length_mm(), lens.pixel_um(), far_mm, span_mm, lens.telecentric())
         }
     };
     let pixel_um = pixel_um * bin as f64;
-    let f_number = travel_mm / (2.0 * max_blur_px * pixel_um * 1e-3);
+    let cone_mm = match telecentric {
+        Some(false) => focal_length_mm * far_mm / (far_mm - focal_length_mm) + 0.5 * travel_mm,
+        Some(true) | None => focal_length_mm,
+    };
+    let f_number = travel_mm / (2.0 * max_blur_px * pixel_um * 1e-3) * focal_length_mm / cone_mm;
     let file = OpticsFile {
         lens: LensSection { focal_length_mm, aperture_mm: None, f_number: Some(f_number), telecentric },
         sensor: SensorSection { pixel_um },
@@ -270,4 +313,25 @@ fn optics(
         light: None,
     };
     Ok(file.check()?)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_far_plane_within_the_range_of_a_pair_is_refused() {
+        let of = |far_mm: f64| {
+            let moved = Moved::Target { object_pixel_um: None, far_mm: Some(far_mm) };
+            let settings = StackSettings { step_mm: 0.5, moved, pair_step: None, bin: None, coding: 0.0 };
+            optics(Psf::PillBox, 2.5, 1, 4, &settings)
+        };
+        for far_mm in [1.0, 2.0, 2.8] {
+            let error = of(far_mm).unwrap_err().to_string();
+            let phrases =
+                [format!("far_mm = {far_mm}:"), "4 steps of 0.5) spans 2.000".into(), "2.857".into()];
+            assert!(phrases.iter().all(|phrase| error.contains(phrase)), "{error}");
+        }
+        assert!(of(3.0).is_ok() && of(900.0).is_ok());
+    }
 }

@@ -11,7 +11,7 @@ const SMALLEST_PX: usize = 12;
 /// Depth map and true depth of a flat target.
 #[derive(Debug, Clone, Copy)]
 pub struct Pattern<'a> {
-    /// Measured depth, mm, (height, width), NaN = no value.
+    /// Measured depth, mm, (height, width); NaN, 0, negative = no value.
     pub depth_mm: ArrayView2<'a, f32>,
     /// True depth, mm.
     pub true_mm: f64,

@@ -26,6 +26,8 @@ pub enum StackError {
     Smoothing(f32),
     #[error("places are to be corrected within {0} px: 0 (off) or 1 to {MOST_GUIDED_PX} is possible")]
     Guided(f32),
+    #[error("places of a reliability below {0} are to be removed: 0 to 1 is possible")]
+    Reliability(f32),
     #[error(
         "{positions} positions of {images} images: one for each is needed, all different, rising or falling"
     )]

@@ -13,6 +13,8 @@ pub struct Doubt {
     usual: [f64; 2],
 }
 
+const LARGEST_BLUR: &str = "the largest blur";
+
 impl fmt::Display for Doubt {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { what, value, unit, usual: [low, high] } = self;
@@ -24,8 +26,9 @@ impl fmt::Display for Doubt {
 }
 
 impl Optics {
-    /// Values that are probably wrong.
+    /// Values that are probably wrong. Most values of a lens that was learned without a scale are assumed ones.
     pub fn doubts(&self) -> Vec<Doubt> {
+        let has_scale = self.stage.is_none_or(|stage| stage.scale_known);
         let range = self.working_range();
         let span = (range.far_mm - range.near_mm) / range.far_mm * 100.0;
         [
@@ -33,11 +36,12 @@ impl Optics {
             ("the f-number", self.f_number, "", [0.7, 64.0]),
             ("pixel_um", self.pixel_um, "um", [0.5, 50.0]),
             ("far_mm in focal lengths", self.far_mm / self.focal_length_mm, "", [1.5, 2000.0]),
-            ("the largest blur", self.max_blur_px, "px", [0.5, 8.0]),
+            (LARGEST_BLUR, self.max_blur_px, "px", [0.5, 8.0]),
             ("the sensor's travel", range.sensor_travel_mm, "mm", [1e-3, 20.0]),
             ("the working range in percent of far_mm", span, "%", [0.05, 75.0]),
         ]
         .into_iter()
+        .filter(|(what, ..)| has_scale || *what == LARGEST_BLUR)
         .filter(|(_, value, _, [low, high])| !(low..=high).contains(&value))
         .map(|(what, value, unit, usual)| Doubt { what, value, unit, usual })
         .collect()
@@ -46,7 +50,7 @@ impl Optics {
 
 #[cfg(test)]
 mod tests {
-    use crate::optics::{FocusSection, LensSection, OpticsFile, SensorSection};
+    use crate::optics::{FocusSection, LensSection, OpticsFile, SensorSection, Stage};
 
     #[test]
     fn other_units_are_noticed() {
@@ -77,6 +81,8 @@ mod tests {
             let doubts = wrong.doubts();
             assert!(!doubts.is_empty());
             assert!(doubts[0].to_string().contains("usual is"), "{}", doubts[0]);
+            // Of a lens without a scale they are assumed.
+            assert!(wrong.with_stage(Stage::identity(1, 1)).doubts().is_empty());
         }
     }
 }

@@ -21,7 +21,8 @@ pub struct LensSection {
     /// f-number `Fe = F / (2a)`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub f_number: Option<f64>,
-    /// Whether the lens is telecentric on the image side, so that moving the sensor does not change the magnification.
+    /// Whether the lens is telecentric on the image side, so that moving the sensor changes neither the magnification nor the
+    /// blur by the image distance. Taken as telecentric where it is not given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub telecentric: Option<bool>,
 }
@@ -114,8 +115,13 @@ impl OpticsFile {
             if near_mm >= far_mm {
                 return Err(OpticsError::NearBeyondFar { far_mm, near_mm });
             }
-            let travel_mm = image_mm(focal_length_mm, near_mm) - image_mm(focal_length_mm, far_mm);
-            Ok(of_blur(travel_mm / (2.0 * f_number) / (pixel_um * 1e-3)))
+            let [sensor_far_mm, sensor_near_mm] = [far_mm, near_mm].map(|u| image_mm(focal_length_mm, u));
+            let half_travel_mm = 0.5 * (sensor_near_mm - sensor_far_mm);
+            let longer = match telecentric {
+                Some(false) => (sensor_far_mm + half_travel_mm) / focal_length_mm,
+                Some(true) | None => 1.0,
+            };
+            Ok(of_blur(half_travel_mm / (f_number * longer) / (pixel_um * 1e-3)))
         };
         let blur =
             self.focus.max_blur_px.map(|r| positive("focus", "max_blur_px", r, " of px")).transpose()?;
@@ -247,6 +253,29 @@ mod tests {
         let near_mm = file.check().unwrap().working_range().near_mm;
         file.focus = FocusSection { far_mm: 933.0, max_blur_px: None, near_mm: Some(near_mm) };
         assert!((file.check().unwrap().max_blur_px() - 2.703).abs() < 1e-9);
+    }
+
+    #[test]
+    fn an_aperture_at_the_lens_has_a_cone_as_long_as_the_image_distance() {
+        // A macro lens at about 1:2. By similar triangles a point at w makes a disc of radius |s - w| D / 2w on a sensor at s.
+        let mut file = rig();
+        file.lens = LensSection {
+            focal_length_mm: 50.0,
+            aperture_mm: Some(10.0),
+            f_number: None,
+            telecentric: Some(false),
+        };
+        file.focus = FocusSection { far_mm: 150.0, max_blur_px: None, near_mm: Some(149.0) };
+        let [far, near] = [150.0, 149.0].map(|u: f64| 50.0 * u / (u - 50.0));
+        let discs_px = [far, near].map(|w| (near - far) * 10.0 / (2.0 * w) / 0.0074);
+        let optics = file.check().unwrap();
+        assert!((discs_px[1]..discs_px[0]).contains(&optics.max_blur_px()), "{}", optics.max_blur_px());
+        file.focus =
+            FocusSection { far_mm: 150.0, max_blur_px: Some(optics.max_blur_px()), near_mm: Some(149.0) };
+        assert!((file.check().unwrap().working_range().near_mm - 149.0).abs() < 1e-9);
+        file.lens.telecentric = Some(true);
+        file.focus.max_blur_px = None;
+        assert!((file.check().unwrap().max_blur_px() / optics.max_blur_px() - 1.5).abs() < 0.01);
     }
 
     #[test]

@@ -64,6 +64,9 @@ pub fn unexplained(misfit: f32, deviation: f32) -> f32 {
 }
 
 impl Stage {
+    /// Largest [`bin`](Self::bin).
+    pub const LARGEST_BIN: usize = 64;
+
     /// A neutral stage, to learn from.
     pub fn identity(bin: usize, pair_step: usize) -> Self {
         let measured = [-1.19, 1.19];
@@ -110,7 +113,7 @@ impl Stage {
 
     pub(super) fn problem(&self) -> Option<&'static str> {
         let finite = self.response.iter().chain(&self.measured).all(|v| v.is_finite() && v.abs() < 2.0);
-        if !(1..=64).contains(&self.bin) {
+        if !(1..=Self::LARGEST_BIN).contains(&self.bin) {
             return Some("bin must be 1 to 64");
         }
         if !finite || self.measured[0] >= self.measured[1] {

@@ -34,6 +34,8 @@ const STEPS: usize = 12;
 const SETTLED_PX: f64 = 2e-3;
 /// The same on levels that only start the next finer one.
 const COARSELY_SETTLED_PX: f64 = 2e-2;
+/// Part of the correlation from which the alignment nearest to the start is as good, as on stripes and repeated patterns.
+const ALIKE: f64 = 0.95;
 /// Ignored border of a level, px.
 const BORDER_PX: usize = 3;
 
@@ -129,18 +131,30 @@ pub(super) fn estimate_thinned(pair: &Thinned, model: Model, start: Warp) -> Opt
             warp = warp.doubled();
         }
     }
-    let (_, standard_error) = found?;
+    let (_, mut standard_error) = found?;
     let mut first = start;
     for _ in 0..skipped {
         first = first.halved();
     }
-    let [correlation, correlation_before] = [&warp, &first].map(|warp| correlation(&levels[0], warp));
+    let of = |warp: &Warp| correlation(&levels[0], warp);
+    let mut correlation = of(&warp);
+    if let Some((nearest, error)) = refine(&levels[0], model, first, SETTLED_PX)
+        && of(&nearest) >= ALIKE * correlation
+        && moved_px(&nearest, &first, &levels[0]) < moved_px(&warp, &first, &levels[0])
+    {
+        (warp, standard_error, correlation) = (nearest, error, of(&nearest));
+    }
+    let correlation_before = of(&first);
     let mut scale = 1.0;
     for _ in 0..skipped {
         warp = warp.doubled();
         scale *= 2.0;
     }
     Some(Alignment { warp, correlation, correlation_before, standard_error_px: scale * standard_error })
+}
+
+fn moved_px(warp: &Warp, start: &Warp, level: &Level) -> f64 {
+    start.inverse().map_or(f64::INFINITY, |back| warp.after(&back).rms_px(level.far.dim()))
 }
 
 /// Displacement from `start`, RMS with its standard error, px: a few steps on one level, without a search. `None` if
@@ -334,6 +348,31 @@ mod tests {
         for (shift, expected) in [(0.0, true), (0.02, true), (0.1, false), (0.5, false), (25.0, false)] {
             let pair = Thinned::new(far.view(), texture(shift).view());
             assert_eq!(stays(&pair, Model::Similarity, far.dim(), 0.06), expected, "{shift}");
+        }
+    }
+
+    /// Cells of 8 px and stripes without detail along them look the same in many places.
+    #[test]
+    fn of_equal_alignments_the_nearest_is_found() {
+        let stripe = |x: usize| [0.2, 0.8][(x * x * 7 / 13 + x / 3) % 2];
+        let chessboard = |x: usize, y: usize| [0.2, 0.8][(x / 8 + y / 8) % 2];
+        let image = |value: &dyn Fn(usize, usize) -> f32, seed: u32| {
+            let mut noise = seed;
+            Array2::from_shape_fn((240, 320), |(y, x)| {
+                noise = noise.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+                value(x, y) + 0.02 * (noise >> 16) as f32 / 65_536.0
+            })
+        };
+        for shift in [0, 3] {
+            let patterns: [&dyn Fn(usize, usize) -> f32; 2] =
+                [&|x, y| chessboard(x + shift, y), &|x, _| stripe((x + shift) / 4)];
+            let still: [&dyn Fn(usize, usize) -> f32; 2] = [&chessboard, &|x, _| stripe(x / 4)];
+            for (still, moved) in still.into_iter().zip(patterns) {
+                let [far, near] = [image(still, 1), image(moved, 2)];
+                let found = estimate(far.view(), near.view(), Model::Similarity, Warp::IDENTITY).unwrap();
+                let [x, y] = found.warp.shift_of_middle_px(far.dim());
+                assert!((x + shift as f64).abs() < 0.3 && y.abs() < 2.0, "{shift}: {x} {y}");
+            }
         }
     }
 

@@ -11,6 +11,10 @@ use crate::reason::Reason;
 const SURROUNDINGS_PX: usize = 31;
 /// Robust standard deviations from which a pixel is bad.
 const BAD: f32 = 8.0;
+/// Part of the flats' mean by which a pixel's dark value may differ from the others: subtracting it is exact enough.
+const DARK_OF_FLAT: f64 = 0.01;
+/// Differences of values that are rounding errors, in full scales.
+const SAME: f32 = 1e-6;
 /// Part of saturated pixels from which an exposure is rejected; hot pixels are fewer.
 const SATURATED: f64 = 0.01;
 /// Side of the window whose mean has little noise left, and the least structure in it that dust and falloff cannot
@@ -145,6 +149,7 @@ impl CameraFrames {
                 check_exposure(kind, index + 1, exposure, of_flat)?;
             }
         }
+        let dark_exposures = dark;
         let dark = if dark.is_empty() { Array2::zeros(flat.dim()) } else { mean(dark, "dark")? };
         if dark.dim() != flat.dim() {
             let ((height, width), (image_height, image_width)) = (dark.dim(), flat.dim());
@@ -157,13 +162,16 @@ impl CameraFrames {
         }
         let around = box_mean(light.view(), SURROUNDINGS_PX);
         let response = &light / &around.mapv(|v| v.max(1e-6));
-        let far_off = |image: &Array2<f32>| {
-            let middle = median(image.iter().copied());
+        let far_off = |image: &Array2<f32>, middle: f32, least: f32| {
             let spread = 1.4826 * median(image.iter().map(|v| (v - middle).abs()));
-            let limit = BAD * spread.max(1e-6);
+            let limit = (BAD * spread.max(SAME)).max(least);
             image.mapv(|v| (v - middle).abs() > limit)
         };
-        let [of_dark, of_response] = [far_off(&dark), far_off(&response)];
+        let [of_dark, of_response] = [&dark, &response].map(|image| median(image.iter().copied()));
+        // Where most dark pixels have one code, as black ones have, their spread is that of rounding.
+        let rounding = step_from(of_dark, dark_exposures) / 12_f32.sqrt();
+        let least = (BAD * rounding).max((DARK_OF_FLAT * of_flat) as f32);
+        let [of_dark, of_response] = [far_off(&dark, of_dark, least), far_off(&response, of_response, 0.0)];
         let [least, largest] = RESPONSE;
         let bad = Zip::from(&of_dark)
             .and(&of_response)
@@ -266,6 +274,13 @@ fn mean(images: &[Array2<f32>], kind: &'static str) -> Result<Array2<f32>, Camer
     Ok(sum / images.len() as f32)
 }
 
+/// Least difference of the exposures' values from `middle`, a code in most exposures; 0 if all are equal.
+fn step_from(middle: f32, exposures: &[Array2<f32>]) -> f32 {
+    let differences = exposures.iter().flatten().map(|value| (value - middle).abs());
+    let least = differences.filter(|difference| *difference > SAME).fold(f32::INFINITY, f32::min);
+    if least.is_finite() { least } else { 0.0 }
+}
+
 fn median(values: impl Iterator<Item = f32>) -> f32 {
     let mut values: Vec<f32> = values.collect();
     let middle = values.len() / 2;
@@ -291,6 +306,25 @@ mod tests {
         let seen = frames.apply(flat.view());
         for ((y, x), value) in seen.indexed_iter().filter(|(at, _)| *at != (20, 30)) {
             assert!((value - 0.5).abs() < 0.01, "({x}, {y}): {value}");
+        }
+    }
+
+    /// Eight bits, clipped at black: most dark pixels are 0, and some are one code in some of the exposures.
+    #[test]
+    fn one_code_of_dark_signal_is_not_bad() {
+        let dark = |exposure: usize| {
+            Array2::from_shape_fn((60, 80), |(y, x)| match (y * 7919 + x * 104_729 + exposure * 31) % 10 {
+                _ if (y, x) == (10, 10) => 0.3,
+                0..2 => 1.0 / 255.0,
+                _ => 0.0,
+            })
+        };
+        let darks = [dark(0), dark(1), dark(2)];
+        let flat = Array2::from_shape_fn((60, 80), |(y, x)| 0.5 * response(y, x)) + &darks[0];
+        for darks in [&darks[..1], &darks[..]] {
+            let frames = CameraFrames::learn(darks, std::slice::from_ref(&flat)).unwrap();
+            assert_eq!(frames.bad_count(), 1, "{} exposures", darks.len());
+            assert!(frames.bad().unwrap()[(10, 10)]);
         }
     }
 

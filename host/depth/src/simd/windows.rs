@@ -92,6 +92,27 @@ fn row_sums_generic<L: Lanes>(values: &[f32], window: usize, work: &mut [f32], s
 pub(crate) struct CubicSums<'a> {
     pub c: [&'a [f32]; 4],
     pub energy: &'a [f32],
+    /// Mean noise variance of a window's pixels.
+    pub noise: &'a [f32],
+}
+
+/// What noise of unit variance adds to a window's sums, and their limits.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct OfNoise {
+    pub c1: f32,
+    pub c3: f32,
+    pub energy: f32,
+    /// Least part of the energy that remains without noise.
+    pub least_evidence: f32,
+    /// Least c1, in energies without noise.
+    pub least_slope: f32,
+}
+
+impl OfNoise {
+    /// That of a window of `pixels`.
+    pub fn times(self, pixels: f32) -> Self {
+        Self { c1: self.c1 * pixels, c3: self.c3 * pixels, energy: self.energy * pixels, ..self }
+    }
 }
 
 pub(crate) struct Found<'a> {
@@ -101,30 +122,35 @@ pub(crate) struct Found<'a> {
 }
 
 dispatch! {
-    /// Roots of `c0 + c1 a + c2 a^2 + c3 a^3` near `-c0 / c1`, `c1` at least `floor` energies, and their variance.
-    fn roots(sums: CubicSums<'_>, floor: f32, found: Found<'_>) = roots_generic
+    /// Roots of `c0 + c1 a + c2 a^2 + c3 a^3` near `-c0 / c1`, without what noise adds to `c1` and `c3`, and their variance.
+    /// The variance is infinite where the energy is below half of the noise's: a rounding error of running sums.
+    fn roots(sums: CubicSums<'_>, of_noise: OfNoise, found: Found<'_>) = roots_generic
 }
 
 #[inline(always)]
-fn roots_generic<L: Lanes>(sums: CubicSums<'_>, floor: f32, found: Found<'_>) {
+fn roots_generic<L: Lanes>(sums: CubicSums<'_>, of_noise: OfNoise, found: Found<'_>) {
     let width = found.alpha.len();
     let [c0, c1, c2, c3] = sums.c.map(|c| &c[..width]);
-    let energy = &sums.energy[..width];
+    let (energy, noise) = (&sums.energy[..width], &sums.noise[..width]);
     let (alphas, variances) = (&mut found.alpha[..width], &mut found.variance[..width]);
     for x in 0..width {
         // In constant regions rounding leaves energies of 0 or below.
         let energy = energy[x].max(f32::MIN_POSITIVE);
-        let c1 = c1[x].max(floor * energy);
+        let expected = of_noise.energy * noise[x];
+        let evidence = (energy - expected).max(of_noise.least_evidence * energy);
+        let c1 = (c1[x] - of_noise.c1 * noise[x]).max(of_noise.least_slope * evidence);
+        let c3 = c3[x] - of_noise.c3 * noise[x];
         let least = SLOPE_FLOOR * c1;
         let mut alpha = (-c0[x] / c1).clamp(-LARGEST_ALPHA, LARGEST_ALPHA);
         let mut slope = c1;
         for _ in 0..STEPS {
-            let value = ((c3[x] * alpha + c2[x]) * alpha + c1) * alpha + c0[x];
-            slope = ((3.0 * c3[x] * alpha + 2.0 * c2[x]) * alpha + c1).max(least);
+            let value = ((c3 * alpha + c2[x]) * alpha + c1) * alpha + c0[x];
+            slope = ((3.0 * c3 * alpha + 2.0 * c2[x]) * alpha + c1).max(least);
             alpha = (alpha - value / slope).clamp(-LARGEST_ALPHA, LARGEST_ALPHA);
         }
         alphas[x] = alpha;
-        variances[x] = energy / (slope * slope);
+        let known = expected > 0.0 && energy > 0.5 * expected;
+        variances[x] = if known { energy / (slope * slope) } else { f32::INFINITY };
     }
 }
 
@@ -202,32 +228,6 @@ fn move_products_generic<L: Lanes>(gone: [&[f32]; 2], come: [&[f32]; 2], sums: &
     let [[gone_a, gone_b], [come_a, come_b]] = [gone, come].map(|rows| rows.map(|row| &row[..width]));
     for x in 0..width {
         sums[x] += come_a[x] * come_b[x] - gone_a[x] * gone_b[x];
-    }
-}
-
-dispatch! {
-    /// Increases variances for noise in the energy, `of_noise` times the noise; at least the part `least` remains. Energy
-    /// below half of the noise is a rounding error of running sums: the variance is infinite.
-    fn without_noise(energy: &[f32], noise: &[f32], of_noise_and_least: [f32; 2], variance: &mut [f32]) =
-        without_noise_generic
-}
-
-#[inline(always)]
-fn without_noise_generic<L: Lanes>(
-    energy: &[f32],
-    noise: &[f32],
-    [of_noise, least]: [f32; 2],
-    variance: &mut [f32],
-) {
-    let width = variance.len();
-    let (energy, noise) = (&energy[..width], &noise[..width]);
-    for x in 0..width {
-        let energy = energy[x];
-        let expected = of_noise * noise[x];
-        let evidence = (energy - expected).max(least * energy);
-        let known = expected > 0.0 && energy > 0.5 * expected;
-        let widened = energy / evidence;
-        variance[x] = if known { variance[x] * widened * widened } else { f32::INFINITY };
     }
 }
 
@@ -410,10 +410,12 @@ mod tests {
             let value = |a: f32| 2.0 * a + 0.1 * a * a + 0.2 * a * a * a;
             let n = wanted.len();
             let c0: Vec<f32> = wanted.iter().map(|a| -value(*a)).collect();
-            let [c1, c2, c3, energy] = [2.0, 0.1, 0.2, 1.0].map(|c| vec![c; n]);
+            // Noise of variance 0.1 has added 0.05 to c1, -0.02 to c3 and 0.04 to the energy.
+            let [c1, c2, c3, energy, noise] = [2.05, 0.1, 0.18, 1.0, 0.1].map(|c| vec![c; n]);
             let (mut alpha, mut variance) = (vec![0.0; n], vec![0.0; n]);
-            let sums = CubicSums { c: [&c0, &c1, &c2, &c3], energy: &energy };
-            roots(backend, sums, 0.5, Found { alpha: &mut alpha, variance: &mut variance });
+            let sums = CubicSums { c: [&c0, &c1, &c2, &c3], energy: &energy, noise: &noise };
+            let of_noise = OfNoise { c1: 0.5, c3: -0.2, energy: 0.4, least_evidence: 0.02, least_slope: 0.5 };
+            roots(backend, sums, of_noise, Found { alpha: &mut alpha, variance: &mut variance });
             for ((found, wanted), variance) in alpha.iter().zip(&wanted).zip(&variance) {
                 assert!((found - wanted).abs() < 1e-5, "{found} {wanted}");
                 let slope = 2.0 + 0.2 * wanted + 0.6 * wanted * wanted;

@@ -8,6 +8,7 @@ use farnear_depth::calibrate::{
 use farnear_depth::corrections::{CdcSettings, Method, fit};
 use farnear_depth::focus_measure::{FocusMeasure, peak};
 use farnear_depth::operators::Operators;
+use farnear_depth::optics::Stage;
 use farnear_depth::pipeline::Settings;
 use farnear_depth::prepare::Align;
 use farnear_depth::psf::Psf;
@@ -91,6 +92,9 @@ fn pairs_that_say_nothing_of_the_psf_are_refused() {
         fit_psf(&[pair], &optics, Model::Gaussian).unwrap_err()
     };
     assert_eq!(fit_psf(&[], &optics, Model::Gaussian).unwrap_err(), CalibrationError::NoPair);
+    let learned = optics.with_stage(Stage::identity(2, 1));
+    let given = [CapturedPair { far: far.view(), near: near.view(), alpha: None }];
+    assert_eq!(fit_psf(&given, &learned, Model::Gaussian).unwrap_err(), CalibrationError::LearnedLens);
     let narrow = near.slice(ndarray::s![.., 1..]).to_owned();
     assert!(matches!(of(&far, &narrow, None), CalibrationError::SizeMismatch { near_width: 95, .. }));
     let flat = Array2::from_elem((96, 96), 90.0);

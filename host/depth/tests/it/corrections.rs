@@ -284,6 +284,19 @@ fn patterns_with_holes_still_teach() {
         let correction = fit(method, &series.patterns(), &CdcSettings::default()).unwrap();
         let rmse = series.rmse_mm(|map| correction.apply(map.view()).unwrap());
         assert!(rmse < 0.9, "{method}: {rmse} mm");
+        // Other programs mark holes by 0 or -1.
+        for hole in [0.0, -1.0] {
+            let marked: Vec<_> = series
+                .maps
+                .iter()
+                .map(|(true_mm, map)| (*true_mm, map.mapv(|z| if z.is_nan() { hole } else { z })))
+                .collect();
+            let patterns: Vec<Pattern<'_>> = marked
+                .iter()
+                .map(|(true_mm, map)| Pattern { depth_mm: map.view(), true_mm: *true_mm })
+                .collect();
+            assert_eq!(fit(method, &patterns, &CdcSettings::default()).unwrap(), correction, "{method}");
+        }
     }
 }
 

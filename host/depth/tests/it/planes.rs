@@ -3,9 +3,13 @@
 #![allow(clippy::unwrap_used)] // Helpers of tests may fail like tests.
 
 use crate::common::{Texture, eight_bit, rig};
+use crate::measure::{PSF, rendered};
+use farnear_depth::adaptive_window::Window;
+use farnear_depth::measure::{DepthMethod, MeasureSettings, measure_pair};
 use farnear_depth::metrics::{CompareSettings, compare};
 use farnear_depth::operators::Operators;
 use farnear_depth::pipeline::{Settings, depth_from_pair};
+use farnear_scene::View;
 use ndarray::Array2;
 
 fn rmse_of_planes(psf: &str, noisy: bool) -> f64 {
@@ -42,5 +46,30 @@ fn planes_are_flat_and_where_they_are() {
         println!("{psf}: clean {clean:.4} mm, 8 bit {noisy:.4} mm");
         assert!(clean < clean_limit, "{psf} clean: {clean}");
         assert!(noisy < 0.75, "{psf} noisy: {noisy}");
+    }
+}
+
+/// A window has a standard deviation of 1.3 mm here, the mean of a map one of 0.1 mm. Noise that is counted as texture draws
+/// depth to the middle of the range, at 910 mm: by 2 mm.
+#[test]
+fn noise_draws_no_weak_texture_to_the_middle() {
+    for (seed, plane_mm) in [(1, 892.0), (2, 928.0)] {
+        let scene = format!("plane:{plane_mm},texture=fractal,contrast=0.05");
+        for window in [Window::Adaptive, Window::Fixed(41)] {
+            let settings = MeasureSettings { window, ..MeasureSettings::default() };
+            let pair = rendered(&scene, View::default(), seed);
+            let found = measure_pair(pair, &rig(PSF), DepthMethod::Whitened, None, &settings).unwrap();
+            let deviations = found.validity.deviation_mm.iter();
+            let errors: Vec<(f64, f64)> = std::iter::zip(&found.map.depth_mm, deviations)
+                .map(|(depth, deviation)| (f64::from(*depth) - plane_mm, f64::from(*deviation)))
+                .filter(|(error, _)| error.is_finite())
+                .collect();
+            let count = errors.len() as f64;
+            let bias = errors.iter().map(|(error, _)| error).sum::<f64>() / count;
+            let held = errors.iter().filter(|(error, deviation)| error.abs() < 3.0 * deviation).count();
+            let within = held as f64 / count;
+            println!("{plane_mm} {window}: {count} depths, bias {bias:.3} mm, within 3 SD {within:.4}");
+            assert!(bias.abs() < 0.5 && within > 0.98, "{plane_mm} {window}: {bias} {within}");
+        }
     }
 }

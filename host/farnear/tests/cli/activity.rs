@@ -246,10 +246,11 @@ fn damaged_models_and_samples_are_named_and_nothing_is_written() {
     GrayImage::new(51, 40).save(people.folder.path("mixed/1.png")).expect("a picture");
     // An earlier model is replaced, other files are not.
     people.folder.file("whole.fnm", "farnearA, damaged");
-    for file in [&people.samples, &people.folder.file("notes.txt", "mine")] {
+    let notes = people.folder.file("notes.txt", "mine");
+    for (file, why) in [(&people.samples, "replace the input"), (&notes, "not a model")] {
         let before = fs::read(file).expect("a file");
         let train = ["activity", "train", &people.samples, "--no-search", "--out", file];
-        fails(&mut farnear(&train), 2, &[file.as_str(), "not a model", "name another file"]);
+        fails(&mut farnear(&train), 2, &[file.as_str(), why, "name another file"]);
         assert_eq!(fs::read(file).expect("a file"), before);
     }
     succeeds(&mut farnear(&[

@@ -217,6 +217,28 @@ fn other_methods_give_depth_and_say_who_they_are() {
     bench.fails(1, &[&depth[..], &["--correction", "c.toml"]].concat(), "160x120");
 }
 
+/// Patterns through a quarter of the working range, and a scene through more of it.
+#[test]
+fn depths_beyond_the_correction_are_counted_and_reported() {
+    let bench = Bench::new();
+    bench.render("slant", "none", "slant");
+    let mut list = String::new();
+    for true_mm in [887.0_f32, 890.0, 893.0, 896.0, 899.0] {
+        let name = format!("{true_mm}.npy");
+        bench.map(&name, &Array2::from_elem((240, 320), true_mm));
+        list += &format!("[[pattern]]\ndepth = \"{name}\"\ntrue_mm = {true_mm}.0\n");
+    }
+    fs::write(bench.0.path().join("patterns.toml"), list).unwrap();
+    let learn = ["calibrate", "correction", "patterns.toml", "--method", "clsf-full", "--out", "c.toml"];
+    bench.figures(&learn);
+    let depth = ["depth", "slant/far.png", "slant/near.png", "--optics", "optics.toml", "--out", "out"];
+    let found = bench.figures(&[&depth[..], &["--correction", "c.toml"]].concat());
+    assert!(found["valid_fraction"].as_f64().unwrap() < 0.9, "{found}");
+    assert!(found["warnings"].to_string().contains("beyond what the correction was taught"), "{found}");
+    let record = fs::read_to_string(bench.0.path().join("out/depth.toml")).unwrap();
+    assert!(record.contains("reason = \"beyond-correction\""), "{record}");
+}
+
 #[test]
 fn operators_are_drawn() {
     let bench = Bench::new();

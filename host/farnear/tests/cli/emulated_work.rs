@@ -132,8 +132,10 @@ fn a_continuous_capture_leaves_pairs_and_a_row_for_each_frame() {
         assert_eq!(record["exposure"].as_array().map(Vec::len), Some(2));
     }
     // A rate above the camera's is refused with the highest possible one.
-    let run = ["continuous", "--optics", rig_optics(), "--rate", "100", "--frames", "7"];
+    let out = folder.text("refused");
+    let run = ["continuous", "--optics", rig_optics(), "--rate", "100", "--frames", "7", "--out", &out];
     fails(&mut on_the_rig(&run), 1, &["refused", "15500 us"]);
+    assert!(!folder.path("refused").exists());
 }
 
 #[test]

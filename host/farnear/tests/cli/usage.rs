@@ -169,6 +169,10 @@ fn bad_usage_ends_with_2() {
         (vec!["rig", "calibrate", "backlash", "--port", "x", "--axis", "fine"], vec!["fine", "piezo"]),
         (vec!["rig", "sequence", "--port", "sim", "--out", "x"], vec!["expected a program", "steps"]),
         (vec!["rig", "sequence", "--port", "sim", "--out", "x", "--steps", "3"], vec!["--axis"]),
+        (
+            "rig sequence --port sim --out x --axis fine --from 20 --to 180 --steps 1".split(' ').collect(),
+            vec!["steps 1", "20 um to 180 um"],
+        ),
         (vec!["rig", "focus", "--port", "sim", "--optics", optics, "--region", "1,2"], vec!["--region"]),
         (
             vec!["rig", "sun", "--port", "x", "--lat", "91", "--lon", "0", "--time", "2012-07-17T12:00:00Z"],

@@ -158,11 +158,8 @@ fn unsupported(page: &Directory) -> Option<String> {
     if page.fill_order == 2 {
         return Some("its bits are in reverse order (FillOrder 2), which is not read: rewrite it (`tiffcp -f msb2lsb`)".into());
     }
-    if page.image_depth > 1 {
-        return Some(format!(
-            "its page is a volume of {} slices, which is not read: store each slice as a page",
-            page.image_depth
-        ));
+    if let Some(volume) = page.volume() {
+        return Some(volume);
     }
     // The decoder takes the padding below the lowest tiles for pixels in all planes but the first.
     if page.planar == 2

@@ -132,6 +132,17 @@ impl Directory {
     pub fn mask(&self) -> bool {
         self.subfile & 4 != 0
     }
+
+    /// Why a page that holds a volume is refused.
+    pub fn volume(&self) -> Option<String> {
+        (self.image_depth > 1).then(|| {
+            format!(
+                "its page is a volume of {} slices (tag ImageDepth), which is not read: store each slice as a page (tifffile: without \
+                 volumetric=True)",
+                self.image_depth
+            )
+        })
+    }
 }
 
 pub(crate) fn is_tiff(bytes: &[u8]) -> bool {

@@ -26,6 +26,9 @@ pub(super) fn of(pages: &[Page]) -> Result<Planes, String> {
         let (positions_um, remark) = image_j(description, pages.len())?;
         return Ok(Planes { remarks: Vec::from_iter(remark), ..in_order(positions_um) });
     }
+    if let Some(volume) = first.directory.volume() {
+        return Err(volume);
+    }
     if let Some(array) = Array::of(description) {
         return array.check(&first.directory, pages.len()).map(|()| in_order(None));
     }
@@ -260,6 +263,8 @@ pub(super) mod tests {
         assert!(
             refused(1, &grey, "{\"shape\": [5, 6, 8], \"truncated\": true}").contains("lists 1 of 5 images")
         );
+        let volume = Directory { image_depth: 5, ..grey.clone() };
+        assert!(refused(1, &volume, "{\"shape\": [5, 6, 8]}").contains("a volume of 5 slices"));
         assert!(refused(3, &planes, "{\"shape\": [3, 4, 6, 8]}").contains("4 planes are marked as colours"));
         assert_eq!(of_array(3, &planes, "{\"shape\": [3, 4, 6, 8], \"axes\": \"ZSYX\"}"), Ok(None));
         // Written one by one, each with its own description.

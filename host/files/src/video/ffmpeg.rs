@@ -9,6 +9,8 @@ use std::{
 
 use super::{VideoError, VideoFrame, timing::Timing, y4m::Y4m};
 
+/// Without `-map` ffmpeg chooses a stream of each kind.
+pub(super) const ONE_VIDEO_STREAM: [&str; 3] = ["-an", "-sn", "-dn"];
 /// Errors quoted from ffmpeg's log.
 const QUOTED: usize = 3;
 /// Relative difference of two shapes of a frame.
@@ -96,7 +98,7 @@ pub(super) fn open(path: &Path, timing: Option<&Timing>) -> Result<Ffmpeg, Video
         .args(timing.into_iter().flat_map(Timing::input_arguments))
         .arg("-i")
         .arg(as_file(path))
-        .args(["-map", "0:v:0"])
+        .args(ONE_VIDEO_STREAM)
         .args(timing.into_iter().flat_map(Timing::output_arguments))
         .args(["-pix_fmt", "yuv444p", "-f", "yuv4mpegpipe", "-"])
         .stdin(Stdio::null())

@@ -1,12 +1,13 @@
 //! Frame times and the shape of pixels from ffmpeg's list of packets (without decoding), and the rate for reading. Browsers, phones and
-//! meetings record at no constant rate, and their files state 1000 frames a second or none: ffmpeg would repeat frames.
+//! meetings record at no constant rate, and their files state 1000 frames a second or none: ffmpeg would repeat frames. Of several video
+//! streams ffmpeg's choice is read, by size and default mark.
 
 use std::{
     path::Path,
     process::{Command, Stdio},
 };
 
-use super::ffmpeg::as_file;
+use super::ffmpeg::{ONE_VIDEO_STREAM, as_file};
 
 /// Relative deviation of an irregular interval. Millisecond time stamps of 60 frames/s are off by 6 %.
 const IRREGULAR: f64 = 0.25;
@@ -45,22 +46,24 @@ pub(super) struct Timing {
     first_s: f64,
     /// Width of a pixel over its height.
     aspect: f64,
+    /// Notice about the choice among several video streams.
+    choice: Option<String>,
 }
 
 impl Timing {
-    /// Times of the first video stream; `None` if ffmpeg cannot list them.
+    /// Times of the video stream that is read; `None` if ffmpeg cannot list them.
     pub fn of(path: &Path) -> Option<Self> {
         let listed = Command::new("ffmpeg")
-            .args(["-nostdin", "-v", "error", "-i"])
+            .args(["-nostdin", "-nostats", "-v", "info", "-i"])
             .arg(as_file(path))
-            .args(["-map", "0:v:0", "-c", "copy", "-f", "framecrc", "-"])
+            .args(ONE_VIDEO_STREAM)
+            .args(["-c", "copy", "-f", "framecrc", "-"])
             .stdin(Stdio::null())
-            .stderr(Stdio::null())
             .output()
             .ok()?;
         let Listed { tick_s, ticks, aspect } = parsed(&String::from_utf8_lossy(&listed.stdout))?;
         let timing = Self::of_times(ticks.into_iter().map(|tick| tick as f64 * tick_s).collect())?;
-        Some(Self { aspect, ..timing })
+        Some(Self { aspect, choice: choice(&String::from_utf8_lossy(&listed.stderr)), ..timing })
     }
 
     fn of_times(mut times: Vec<f64>) -> Option<Self> {
@@ -93,6 +96,7 @@ impl Timing {
             first_s: times.first().copied().unwrap_or(0.0),
             longest_s: sorted.last().copied().unwrap_or(median),
             aspect: 1.0,
+            choice: None,
         })
     }
 
@@ -119,7 +123,7 @@ impl Timing {
         (self.aspect - 1.0).abs() < SQUARE
     }
 
-    /// Notice to the user about irregular times and pixels that are not square.
+    /// Notice to the user about several streams, irregular times and pixels that are not square.
     pub fn remark(&self) -> Option<String> {
         let times = (!self.regular).then(|| {
             format!(
@@ -130,9 +134,48 @@ impl Timing {
         let shape = (!self.is_square()).then(|| {
             format!("its pixels are {:.3} times as wide as high: the frames are widened", self.aspect)
         });
-        let remarks: Vec<String> = times.into_iter().chain(shape).collect();
+        let remarks: Vec<String> = self.choice.iter().cloned().chain(times).chain(shape).collect();
         (!remarks.is_empty()).then(|| remarks.join("; "))
     }
+}
+
+/// Which of several video streams is read, by ffmpeg's log:
+/// `  Stream #0:1: Video: h264 (High), yuv420p, 480x270, 25 fps (default)` for each, and `  Stream #0:1 -> #0:0 (copy)`.
+fn choice(log: &str) -> Option<String> {
+    let (inputs, _) = log.split_once("Output #")?;
+    let videos: Vec<&str> = streams(inputs)
+        .filter(|text| text.contains(": Video: ") && !text.contains("(attached pic)"))
+        .collect();
+    let chosen = streams(log).find(|text| text.contains(" -> #0:0")).map(number)?;
+    if videos.len() < 2 {
+        return None;
+    }
+    let listed: Vec<String> =
+        videos.iter().map(|text| format!("0:{} ({})", number(text), size(text))).collect();
+    Some(format!(
+        "it has {} video streams, {}: ffmpeg chose 0:{chosen} by size and default mark; for another one write it to a file \
+         (ffmpeg -i VIDEO -map 0:NUMBER -c copy PART.mkv)",
+        videos.len(),
+        listed.join(", ")
+    ))
+}
+
+fn streams(log: &str) -> impl Iterator<Item = &str> {
+    log.lines().filter_map(|line| line.trim_start().strip_prefix("Stream #0:"))
+}
+
+/// Number at the begin of a stream's text.
+fn number(text: &str) -> &str {
+    text.split(|c: char| !c.is_ascii_digit()).next().unwrap_or_default()
+}
+
+fn size(text: &str) -> &str {
+    let is_size = |word: &&str| {
+        let sides = word.split_once('x').map(|(width, height)| [width, height]);
+        // Not the code `0x31637661`.
+        sides.is_some_and(|sides| sides.iter().all(|side| side.parse::<u32>().is_ok_and(|side| side > 0)))
+    };
+    text.split([' ', ',']).find(is_size).unwrap_or("of unknown size")
 }
 
 /// ffmpeg's list of packets.
@@ -205,6 +248,30 @@ mod tests {
         assert_eq!(wide.output_arguments()[1], "scale=round(iw*sar):ih,setsar=1");
         assert!(wide.remark().expect("a remark").contains("1.422 times as wide"));
         assert_eq!(parsed("#tb 0: 1/25\n#sar 0: 0/1\n").expect("a list").aspect, 1.0);
+    }
+
+    #[test]
+    fn the_stream_that_is_read_is_reported_where_there_are_several() {
+        let log = |streams: &str, chosen: u8| {
+            format!(
+                "Input #0, matroska,webm, from 'two.mkv':\n{streams}Output #0, framecrc, to 'pipe:':\n  Stream #0:0: Video: h264 \
+                 (High), yuv420p, 480x270, q=2-31 (default)\nStream mapping:\n  Stream #0:{chosen} -> #0:0 (copy)\n"
+            )
+        };
+        let small = "  Stream #0:0[0x1](und): Video: h264 (High) (avc1 / 0x31637661), yuv420p, 160x120 [SAR 1:1 DAR 4:3], 25 fps\n";
+        let large = "  Stream #0:1: Video: h264 (High), yuv420p(tv, progressive), 480x270, 25 fps, 1k tbn (default)\n";
+        let cover = "  Stream #0:2: Video: png, rgb24(pc), 600x600, 90k tbr (attached pic)\n";
+        let sound = "  Stream #0:3: Audio: aac (LC), 44100 Hz, mono, fltp (default)\n";
+        let remark = choice(&log(&[small, large, cover, sound].concat(), 1)).expect("a remark");
+        assert!(
+            remark.contains("2 video streams, 0:0 (160x120), 0:1 (480x270): ffmpeg chose 0:1"),
+            "{remark}"
+        );
+        assert_eq!(choice(&log(&[small, cover, sound].concat(), 0)), None);
+        assert_eq!(choice(""), None);
+        let timing =
+            Timing { choice: Some(remark), ..Timing::of_times(vec![0.0, 0.04, 0.08]).expect("times") };
+        assert!(timing.remark().is_some_and(|remark| remark.contains("ffmpeg chose 0:1")));
     }
 
     #[test]

@@ -33,7 +33,9 @@ use crate::{
     view::{Begun, DONE, Done, Nothing},
 };
 
-const STACK_MAX: usize = 500;
+const SERIES_MAX: usize = 500;
+/// Shots of a program on the NUCLEO board, until the connected one has reported its own.
+const SHOTS_MAX: usize = 64;
 
 /// Kind of capture.
 #[derive(Deserialize, JsonSchema)]
@@ -71,7 +73,7 @@ pub enum CaptureRequest {
         /// Last position, um.
         #[serde(deserialize_with = "number")]
         to_um: f64,
-        /// Number of images.
+        /// Number of images, 1 to the board's `shots_max`.
         steps: usize,
     },
 }
@@ -269,10 +271,10 @@ async fn capture(
                 let expected = format!("interval_s {interval_s}: expected 0 to 86400");
                 return Err(Failure::new(StatusCode::BAD_REQUEST, expected));
             }
-            if !(1..=STACK_MAX).contains(&pairs) {
+            if !(1..=SERIES_MAX).contains(&pairs) {
                 return Err(Failure::new(
                     StatusCode::BAD_REQUEST,
-                    format!("pairs {pairs}: expected 1 to {STACK_MAX}"),
+                    format!("pairs {pairs}: expected 1 to {SERIES_MAX}"),
                 ));
             }
             let out = free("series", pairs)?;
@@ -310,11 +312,12 @@ async fn capture(
             (Task { kind: "still", title: "Capture a still".into(), work: Box::new(work) }, vec![out])
         }
         CaptureRequest::Stack { axis, from_um, to_um, steps } => {
-            if !(1..=STACK_MAX).contains(&steps) {
-                return Err(Failure::new(
-                    StatusCode::BAD_REQUEST,
-                    format!("steps {steps}: expected 1 to {STACK_MAX}"),
-                ));
+            let shots_max = shots_max(&app);
+            if !(1..=shots_max).contains(&steps) {
+                let error =
+                    format!("steps {steps}: expected 1 to {shots_max}, the shots that the board holds");
+                return Err(Failure::new(StatusCode::BAD_REQUEST, error)
+                    .with_hint("Take fewer images, or several stacks."));
             }
             let out = free("stack", 1)?.remove(0);
             let settings = SequenceRequest {
@@ -328,6 +331,7 @@ async fn capture(
                 out: out.clone(),
                 ..SequenceRequest::default()
             };
+            settings.check()?;
             let work = move |app: &App, context: &Context<'_>| {
                 kept(app, figures(sequence::run(&settings, context)?))
             };
@@ -340,6 +344,12 @@ async fn capture(
     let names = out.iter().map(|folder| name_of(folder)).collect();
     let Json(Begun { job }) = begin(&app, task)?;
     Ok(Json(Capturing { job, names }))
+}
+
+/// A stack is one program.
+fn shots_max(app: &App) -> usize {
+    let reported = app.state().rig.info.and_then(|info| info["shots_max"].as_u64());
+    reported.and_then(|max| usize::try_from(max).ok()).unwrap_or(SHOTS_MAX)
 }
 
 fn name_of(folder: &std::path::Path) -> String {

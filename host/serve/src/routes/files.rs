@@ -53,7 +53,7 @@ async fn variant(
 }
 
 async fn send(folder: PathBuf, file: String) -> Result<Response, Failure> {
-    let path = sessions::folder_of(&folder, &file)?;
+    let path = sessions::entry_of(&folder, &file, "file")?;
     let missing = format!("file {file} in {}", folder.file_name().unwrap_or_default().to_string_lossy());
     let opened = aside(move || match regular_file(&path) {
         Ok(file) => Ok(file),

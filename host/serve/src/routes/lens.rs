@@ -1,7 +1,7 @@
 //! The optics and quantities derived from them.
 
 use axum::{Json, extract::State, http::HeaderMap};
-use farnear_depth::optics::OpticsFile;
+use farnear_depth::optics::{LightSection, OpticsFile};
 use farnear_files::staging::write_file;
 use farnear_workflows::{
     WorkflowError,
@@ -20,11 +20,11 @@ use crate::{
     view::{DONE, Done},
 };
 
-/// Optics, as `optics.toml` has them: `lens`, `sensor`, `focus`, `psf`.
+/// Optics, as `optics.toml` has them: `lens`, `sensor`, `focus`, `psf`, `light`.
 #[derive(Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Optics {
-    /// The tables of the file.
+    /// The tables of the file. Without `light`, the session's `[light]` stays.
     #[schemars(with = "Value")]
     pub optics: OpticsFile,
 }
@@ -67,7 +67,13 @@ pub fn routes(api: Api) -> Api {
 
 async fn read(State(app): Shared) -> Result<Json<Optics>, Failure> {
     let given = GivenOptics::read(&app.optics_file())?;
-    Ok(Json(Optics { optics: OpticsFile::from(given.optics) }))
+    let light = light_of(&given);
+    Ok(Json(Optics { optics: OpticsFile { light, ..OpticsFile::from(given.optics) } }))
+}
+
+/// `[light]` as the file has it: [`GivenOptics::light`] is in steps of the outputs, and absent if it is off.
+fn light_of(given: &GivenOptics) -> Option<LightSection> {
+    given.table.get("light").and_then(|light| light.clone().try_into().ok())
 }
 
 async fn write(
@@ -76,10 +82,14 @@ async fn write(
     Body(given): Body<Optics>,
 ) -> Result<Json<Done>, Failure> {
     require_control(&app, &headers)?;
+    let file = app.optics_file();
     // Invalid values are refused before the file changes.
     let checked = lens_table::calculate(&given.optics, Readings::default())?.optics;
-    let text = toml::to_string(&checked).map_err(WorkflowError::from)?;
-    write_file(&app.optics_file(), text.as_bytes()).map_err(WorkflowError::from)?;
+    // A lens that was calculated or calibrated has no light.
+    let light = given.optics.light.or_else(|| light_of(&GivenOptics::read(&file).ok()?));
+    let text = toml::to_string(&OpticsFile { light, ..checked }).map_err(WorkflowError::from)?;
+    GivenOptics::parse(&text, &file)?;
+    write_file(&file, text.as_bytes()).map_err(WorkflowError::from)?;
     app.change(|state| state.optics += 1);
     app.interrupt_live();
     Ok(Json(DONE))

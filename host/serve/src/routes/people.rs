@@ -1,6 +1,6 @@
 //! Activities and shadows of people.
 
-use std::{fs, path::PathBuf};
+use std::{fs, path::PathBuf, sync::Arc};
 
 use axum::{
     Json,
@@ -32,7 +32,8 @@ use crate::{
     options::Options,
     picture_message::person,
     routes::rig::{begin, connected, figures},
-    transfer,
+    transfer::{self, file_body, is_regular, regular_file, session_folder},
+    upload_quota::Upload,
     view::{Begun, DONE, Done},
 };
 
@@ -130,13 +131,13 @@ pub fn routes(api: Api) -> Api {
         .get_bytes("/api/people/shadows/{shadow}/{masks}/{file}", "A mask.", "image/png", mask)
 }
 
-fn folder(app: &App) -> PathBuf {
-    app.session.join(FOLDER)
+fn folder(app: &App) -> Result<PathBuf, Failure> {
+    session_folder(&app.session, FOLDER)
 }
 
 fn video_of(app: &App, name: &str) -> Result<PathBuf, Failure> {
-    let path = sessions::folder_of(&folder(app), name)?;
-    match path.is_file() {
+    let path = sessions::entry_of(&folder(app)?, name, "video")?;
+    match is_regular(&path) {
         true => Ok(path),
         false => Err(Failure::missing(&format!("video {name}"))),
     }
@@ -144,10 +145,11 @@ fn video_of(app: &App, name: &str) -> Result<PathBuf, Failure> {
 
 async fn people(State(app): Shared) -> Result<Json<People>, Failure> {
     aside(move || {
-        let entries = fs::read_dir(folder(&app)).into_iter().flatten().flatten();
-        let files = entries.filter(|entry| entry.path().is_file());
-        let mut videos: Vec<String> =
-            files.map(|entry| entry.file_name().to_string_lossy().into_owned()).collect();
+        let entries = fs::read_dir(folder(&app)?).into_iter().flatten().flatten();
+        let files = entries.filter(|entry| is_regular(&entry.path()));
+        let names = files.map(|entry| entry.file_name().to_string_lossy().into_owned());
+        // Unfinished uploads begin with a dot.
+        let mut videos: Vec<String> = names.filter(|name| !name.starts_with('.')).collect();
         videos.sort();
         let activities = Model::read(USUAL_MODEL.as_ref())?.activities().to_vec();
         Ok(Json(People { videos, activities }))
@@ -162,19 +164,16 @@ async fn receive(
     body: AxumBody,
 ) -> Result<Json<Done>, Failure> {
     require_control(&app, &headers)?;
-    let path = sessions::folder_of(&folder(&app), &name)?;
-    let (within, limits, replaced) = (folder(&app), app.limits, path.clone());
-    let used = aside(move || {
+    let within = folder(&app)?;
+    let path = sessions::entry_of(&within, &name, "video")?;
+    let (limits, quota) = (app.limits, Arc::clone(&app.uploads));
+    let upload = aside(move || {
         fs::create_dir_all(&within)
             .map_err(|source| WorkflowError::Folder { folder: within.clone(), source })?;
-        let entries = fs::read_dir(&within).into_iter().flatten().flatten();
-        let kept = entries.filter(|entry| entry.path() != replaced);
-        let files = kept.filter_map(|entry| entry.metadata().ok()).filter(fs::Metadata::is_file);
-        Ok(files.map(|file| file.len()).sum::<u64>())
+        Ok(Upload::begin(quota, path, limits.upload_quota_bytes, VIDEO_MAX_BYTES))
     })
     .await?;
-    let left = limits.upload_quota_bytes.saturating_sub(used).min(VIDEO_MAX_BYTES);
-    transfer::receive(body, &path, left, limits.body_timeout).await?;
+    transfer::receive(body, upload, limits.body_timeout).await?;
     Ok(Json(DONE))
 }
 
@@ -229,7 +228,7 @@ async fn shadow(
     require_client(&app, &headers)?;
     let video = video_of(&app, &request.video)?;
     request.sun.moment()?;
-    let out = sessions::free_names(&folder(&app), "shadow", 1)?.remove(0);
+    let out = sessions::free_names(&folder(&app)?, "shadow", 1)?.remove(0);
     let name = out.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let Standing { height_m, azimuth_deg, pitch_deg, focal_length_mm, pixel_um } = request.camera;
     let camera = camera::Camera {
@@ -270,12 +269,17 @@ async fn mask(
     State(app): Shared,
     Path((shadow, masks, file)): Path<(String, String, String)>,
 ) -> Result<Response, Failure> {
-    let folder = sessions::folder_of(&sessions::folder_of(&folder(&app), &shadow)?, &masks)?;
-    let path = sessions::folder_of(&folder, &file)?;
+    let result = sessions::entry_of(&folder(&app)?, &shadow, "shadow")?;
+    let folder = sessions::entry_of(&result, &masks, "masks")?;
+    let path = sessions::entry_of(&folder, &file, "mask")?;
     if path.extension().is_none_or(|ending| ending != "png") {
         return Err(Failure::new(StatusCode::BAD_REQUEST, format!("file {file}: expected a mask, NAME.png")));
     }
-    let missing = move |_| Failure::missing(&format!("mask {file}"));
-    let bytes = aside(move || fs::read(&path).map_err(missing)).await?;
-    Ok(([(header::CONTENT_TYPE, "image/png")], bytes).into_response())
+    let missing = move || Failure::missing(&format!("mask {file}"));
+    let opened = aside(move || match result.is_symlink() || folder.is_symlink() {
+        true => Err(missing()),
+        false => regular_file(&path).map_err(|_| missing()),
+    })
+    .await?;
+    Ok(([(header::CONTENT_TYPE, "image/png")], file_body(opened)).into_response())
 }

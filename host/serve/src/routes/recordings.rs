@@ -17,6 +17,7 @@ use crate::{
     job_queue::Task,
     live,
     routes::rig::figures,
+    transfer::{is_regular, session_folder},
     view::{Begun, DONE, Done, LiveMode},
 };
 
@@ -47,7 +48,7 @@ pub struct PlayRequest {
 pub struct OneRecording {
     /// Name of its file.
     pub name: String,
-    /// Size of its file, bytes.
+    /// Size of its file, MB.
     pub megabytes: f64,
 }
 
@@ -74,13 +75,13 @@ pub fn routes(api: Api) -> Api {
         )
 }
 
-fn folder(app: &App) -> PathBuf {
-    app.session.join(FOLDER)
+fn folder(app: &App) -> Result<PathBuf, Failure> {
+    session_folder(&app.session, FOLDER)
 }
 
 async fn list(State(app): Shared) -> Result<Json<Recordings>, Failure> {
     aside(move || {
-        let entries = fs::read_dir(folder(&app)).into_iter().flatten().flatten();
+        let entries = fs::read_dir(folder(&app)?).into_iter().flatten().flatten();
         let mut recordings: Vec<OneRecording> = entries
             .filter_map(|entry| {
                 let name = entry.file_name().to_string_lossy().into_owned();
@@ -102,26 +103,35 @@ async fn record(
     Body(RecordRequest { on }): Body<RecordRequest>,
 ) -> Result<Json<Done>, Failure> {
     require_control(&app, &headers)?;
-    if !on {
-        app.finish_recording();
-        return Ok(Json(DONE));
-    }
+    // Both wait for the disk, also for the pair that is being written.
+    aside(move || match on {
+        true => begin_recording(&app),
+        false => {
+            app.finish_recording();
+            Ok(())
+        }
+    })
+    .await?;
+    Ok(Json(DONE))
+}
+
+fn begin_recording(app: &App) -> Result<(), Failure> {
+    // Held until the state shows the recording: live depth that ends meanwhile finishes it afterwards.
+    let mut recorder = lock(&app.recorder);
     if app.live().mode != LiveMode::Depth {
         return Err(Failure::new(StatusCode::CONFLICT, "live depth is off: there is nothing to record")
             .with_hint("Begin live depth first."));
     }
-    let mut recorder = lock(&app.recorder);
     if recorder.is_some() {
         return Err(Failure::busy("a recording"));
     }
-    let folder = folder(&app);
+    let folder = folder(app)?;
     let free =
         (1..).map(|number| format!("live-{number:03}{ENDING}")).find(|name| !folder.join(name).exists());
     let name = free.unwrap_or_default();
     *recorder = Some(Recorder::begin(&folder.join(&name), &GivenOptics::read(&app.optics_file())?)?);
-    drop(recorder);
     app.change(|state| (state.live.recording, state.live.recording_ended) = (Some(name), None));
-    Ok(Json(DONE))
+    Ok(())
 }
 
 async fn play(
@@ -130,8 +140,8 @@ async fn play(
     Body(PlayRequest { recording, fast }): Body<PlayRequest>,
 ) -> Result<Json<Begun>, Failure> {
     require_client(&app, &headers)?;
-    let path = sessions::folder_of(&folder(&app), &recording)?;
-    if !path.is_file() {
+    let path = sessions::entry_of(&folder(&app)?, &recording, "recording")?;
+    if !is_regular(&path) {
         return Err(Failure::missing(&format!("recording {recording}")));
     }
     let work = move |app: &App, context: &Context<'_>| -> Result<_, WorkflowError> {
@@ -140,4 +150,57 @@ async fn play(
     let task = Task { kind: "play", title: format!("Play {recording}"), work: Box::new(work) };
     let job = app.begin_computing(task).map_err(|title| Failure::busy(&title))?;
     Ok(Json(Begun { job }))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::{
+        future::poll_fn,
+        sync::Arc,
+        task::Poll,
+        thread::{scope, sleep},
+        time::Duration,
+    };
+
+    use super::*;
+    use crate::{api::CLIENT_HEADER, live::tests::app};
+
+    #[test]
+    fn no_recording_begins_while_live_depth_ends() {
+        let session = tempfile::tempdir().unwrap();
+        let app = app(session.path());
+        app.set_live(|live| live.mode = LiveMode::Depth);
+        let ending = lock(&app.recorder);
+        scope(|threads| {
+            let begun = threads.spawn(|| begin_recording(&app));
+            sleep(Duration::from_millis(200));
+            app.set_live(|live| live.mode = LiveMode::Off);
+            drop(ending);
+            let refused = begun.join().unwrap().unwrap_err();
+            assert!(refused.error.contains("live depth is off"), "{refused:?}");
+        });
+        assert!(lock(&app.recorder).is_none() && app.state().live.recording.is_none());
+    }
+
+    #[test]
+    fn the_server_answers_while_a_recording_waits_for_the_disk() {
+        let session = tempfile::tempdir().unwrap();
+        let app = app(session.path());
+        app.set_live(|live| live.mode = LiveMode::Depth);
+        begin_recording(&app).unwrap();
+        assert_eq!(app.state().live.recording.as_deref(), Some("live-001.pairs"));
+        let client = app.with_control(|control| control.join(None)).unwrap();
+        let mut headers = HeaderMap::new();
+        headers.insert(CLIENT_HEADER, client.secret.parse().unwrap());
+        let runtime = tokio::runtime::Builder::new_current_thread().build().unwrap();
+        let writing = lock(&app.recorder);
+        let request = record(State(Arc::clone(&app)), headers, Body(RecordRequest { on: false }));
+        let mut request = Box::pin(request);
+        let waits = poll_fn(|context| Poll::Ready(request.as_mut().poll(context).is_pending()));
+        assert!(runtime.block_on(waits), "it waits in another thread");
+        drop(writing);
+        assert!(runtime.block_on(request).is_ok());
+        assert!(lock(&app.recorder).is_none() && app.state().live.recording.is_none());
+        assert!(session.path().join(FOLDER).join("live-001.pairs").is_file());
+    }
 }

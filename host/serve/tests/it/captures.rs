@@ -133,6 +133,31 @@ fn optics_are_checked_before_they_are_kept() {
     assert!((found["figures"]["reading_near"]["mm"].as_f64().unwrap() - 5.3263).abs() < 1e-3, "{found:#}");
 }
 
+#[test]
+fn the_light_of_the_session_stays_when_its_lens_changes() {
+    let served = Served::captures_only();
+    let socket = Socket::open(&served);
+    let client = [("x-farnear-client", socket.secret.as_str())];
+    let file = served.session.join("optics.toml");
+    let text = fs::read_to_string(&file).unwrap();
+    fs::write(&file, format!("{text}\n[light]\nfirst = 30.25\nsecond = 0.0\n")).unwrap();
+    let mut given = served.get("/api/optics").json();
+    let write = |given: &Value| served.ask("PUT", "/api/optics", &client, &given.to_string());
+    let first = || served.get("/api/optics").json()["optics"]["light"]["first"].as_f64();
+    assert_eq!(first(), Some(30.25));
+    // As the page sends a calculated or a calibrated lens.
+    given["optics"].as_object_mut().unwrap().remove("light");
+    given["optics"]["focus"]["far_mm"] = json!(800.0);
+    assert_eq!(write(&given).status, 200);
+    assert_eq!(first(), Some(30.25));
+    given["optics"]["light"] = json!({ "first": 5.5, "second": 100.0 });
+    assert_eq!((write(&given).status, first()), (200, Some(5.5)));
+    given["optics"]["light"] = json!({ "first": 101.0 });
+    let refused = write(&given);
+    assert!(refused.status == 400 && refused.error().contains("101"), "{refused:?}");
+    assert_eq!(first(), Some(5.5));
+}
+
 /// The files of a capture, including temporary ones.
 fn names(folder: &Path) -> Vec<String> {
     let entries = fs::read_dir(folder).unwrap();

@@ -5,6 +5,7 @@ use farnear_workflows::rig::RigAddress;
 
 use super::{
     attacks::{TOKEN, network},
+    captures::put,
     client::{Served, Socket},
 };
 
@@ -83,6 +84,37 @@ fn control_is_given_to_the_browser_named_in_the_answer() {
     assert_eq!(served.post("/api/control/answer", &holder.secret, &answer(99)).status, 409);
     assert_eq!(served.post("/api/control/answer", &holder.secret, &answer(b.client)).status, 200);
     served.state_when(|state| state["control"]["holder"] == b.client);
+}
+
+#[test]
+fn a_question_stays_until_it_is_answered_or_its_job_is_stopped() {
+    let served = Served::with_board(Faults::default());
+    served.ready();
+    let holder = Socket::open(&served);
+    put(&served, "pair-001", 0);
+    let series = || {
+        let begun = served.post("/api/calibrate/series", &holder.secret, r#"{"distances":[900.5]}"#);
+        assert_eq!(begun.status, 200, "{begun:?}");
+        let state = served.state_when(|state| !state["question"].is_null());
+        assert!(state["question"].as_str().unwrap().contains("900.5 mm"), "{state:#}");
+        begun.json()["job"].clone()
+    };
+    let stopped = series();
+    assert_eq!(served.post("/api/stop", "", "{}").status, 200);
+    assert_eq!(served.ended("job", &stopped)["phase"], "stopped");
+    assert!(served.get("/api/state").json()["question"].is_null());
+
+    let waiting = series();
+    let computed = served.post("/api/captures/pair-001/depth", &holder.secret, "{}");
+    assert_eq!(computed.status, 200, "{computed:?}");
+    served.ended("computation", &computed.json()["job"]);
+    let state = served.get("/api/state").json();
+    assert!(state["question"].is_string(), "of the job that still waits: {state:#}");
+    let answered = served.post("/api/answer", &holder.secret, r#"{"text":""}"#);
+    assert_eq!(answered.status, 200, "{answered:?}");
+    served.state_when(|state| state["question"].is_null());
+    served.post("/api/stop", "", "{}");
+    served.ended("job", &waiting);
 }
 
 #[test]
@@ -165,7 +197,17 @@ fn impossible_requests_are_rejected_before_any_motion() {
         (
             "/api/captures",
             r#"{"kind":"stack","axis":"fine","from_um":1,"to_um":2,"steps":100000}"#,
-            "expected 1 to 500",
+            "expected 1 to 16, the shots that the board holds",
+        ),
+        (
+            "/api/captures",
+            r#"{"kind":"stack","axis":"fine","from_um":1,"to_um":2,"steps":17}"#,
+            "steps 17: expected 1 to 16",
+        ),
+        (
+            "/api/captures",
+            r#"{"kind":"stack","axis":"fine","from_um":1,"to_um":2,"steps":1}"#,
+            "steps 1: a single image is taken at one position",
         ),
         ("/api/answer", r#"{"text":""}"#, "nothing was asked"),
     ] {

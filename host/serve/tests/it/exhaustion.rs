@@ -4,6 +4,7 @@ use std::{
     fs,
     io::{Read, Write},
     net::TcpStream,
+    path::PathBuf,
     time::{Duration, Instant},
 };
 
@@ -12,7 +13,7 @@ use farnear_serve::{Limits, Listen};
 use super::{
     attacks::{TOKEN, network},
     captures::put,
-    client::{Served, Socket},
+    client::{Answer, Served, Socket},
 };
 
 fn memory_mb() -> u64 {
@@ -152,23 +153,89 @@ fn an_upload_above_the_quota_leaves_nothing() {
 }
 
 #[test]
-fn an_upload_under_way_when_the_server_stops_leaves_nothing() {
+fn an_empty_upload_and_a_bad_name_are_refused() {
     let served = Served::captures_only();
     let holder = Socket::open(&served);
+    let client = [("x-farnear-client", holder.secret.as_str())];
+    let put = |name: &str, body: &str| {
+        let answer = served.ask("PUT", &format!("/api/people/videos/{name}"), &client, body);
+        (answer.status, answer.error())
+    };
+    let empty = put("walk.y4m", "");
+    assert!(empty.0 == 400 && empty.1.contains("walk.y4m has 0 bytes"), "{empty:?}");
+    assert_eq!(fs::read_dir(served.session.join("people")).unwrap().count(), 0);
+    let bad = put("..%2Fx.mp4", "x");
+    assert!(bad.0 == 400 && bad.1.starts_with("video ../x.mp4: expected a name"), "{bad:?}");
+}
+
+/// An upload of `length` bytes, of which the server has written `begin`; and its unfinished file.
+fn upload(served: &Served, client: &str, name: &str, length: usize, begin: &[u8]) -> (TcpStream, PathBuf) {
     let mut stream = TcpStream::connect(&served.address).unwrap();
     let head = format!(
-        "PUT /api/people/videos/walk.y4m HTTP/1.1\r\nhost: {}\r\nx-farnear-client: {}\r\ncontent-length: 99\r\n\r\nhalf",
-        served.address, holder.secret
+        "PUT /api/people/videos/{name} HTTP/1.1\r\nhost: {}\r\nconnection: close\r\nx-farnear-client: {client}\r\n\
+         content-length: {length}\r\n\r\n",
+        served.address
     );
-    stream.write_all(head.as_bytes()).unwrap();
+    stream.write_all(&[head.as_bytes(), begin].concat()).unwrap();
     let people = served.session.join("people");
-    let files = || fs::read_dir(&people).into_iter().flatten().flatten().map(|entry| entry.path());
     let began = Instant::now();
-    while files().next().is_none() {
+    loop {
+        let entries = fs::read_dir(&people).into_iter().flatten().flatten();
+        let part = entries.map(|entry| entry.path()).find(|path| {
+            let hidden = path.file_name().unwrap().to_string_lossy().starts_with('.');
+            hidden && fs::metadata(path).is_ok_and(|file| file.len() == begin.len() as u64)
+        });
+        if let Some(part) = part {
+            return (stream, part);
+        }
         assert!(began.elapsed() < Duration::from_secs(20), "no file is being written");
         std::thread::sleep(Duration::from_millis(10));
     }
-    let part = files().next().unwrap();
+}
+
+/// Sends the rest of an upload and returns the answer's status.
+fn rest(mut upload: TcpStream, rest: &[u8]) -> u16 {
+    let _ = upload.write_all(rest); // the server may have refused it
+    let mut answer = Vec::new();
+    let _ = upload.read_to_end(&mut answer);
+    Answer::parse(&answer).status
+}
+
+#[test]
+fn two_uploads_of_one_name_leave_one_of_them_whole() {
+    let served = Served::captures_only();
+    let holder = Socket::open(&served);
+    let (slow, part) = upload(&served, &holder.secret, "walk.y4m", 2000, &[b'a'; 1000]);
+    let client = [("x-farnear-client", holder.secret.as_str())];
+    let second = served.ask("PUT", "/api/people/videos/walk.y4m", &client, &"b".repeat(1500));
+    assert_eq!(second.status, 200, "{second:?}");
+    let video = served.session.join("people/walk.y4m");
+    assert_eq!(fs::read(&video).unwrap(), [b'b'; 1500]);
+    assert_eq!(fs::read(&part).unwrap(), [b'a'; 1000]);
+    assert_eq!(rest(slow, &[b'a'; 1000]), 200);
+    assert_eq!(fs::read(&video).unwrap(), [b'a'; 2000]);
+    assert_eq!(fs::read_dir(served.session.join("people")).unwrap().count(), 1);
+}
+
+#[test]
+fn simultaneous_uploads_share_the_quota() {
+    let limits = Limits { upload_quota_bytes: 1 << 20, ..Limits::default() };
+    let served = Served::limited(None, None, |_| Listen::Loopback { port: 0 }, limits);
+    let holder = Socket::open(&served);
+    let (first, _) = upload(&served, &holder.secret, "a.y4m", 600 << 10, &vec![0; 500 << 10]);
+    let client = [("x-farnear-client", holder.secret.as_str())];
+    let second = served.ask("PUT", "/api/people/videos/b.y4m", &client, &"x".repeat(600 << 10));
+    assert!(second.status == 413 && second.error().contains("the space left"), "{second:?}");
+    assert_eq!(rest(first, &vec![0; 100 << 10]), 200);
+    assert_eq!(fs::metadata(served.session.join("people/a.y4m")).unwrap().len(), 600 << 10);
+    assert!(!served.session.join("people/b.y4m").exists());
+}
+
+#[test]
+fn an_upload_under_way_when_the_server_stops_leaves_nothing() {
+    let served = Served::captures_only();
+    let holder = Socket::open(&served);
+    let (_stream, part) = upload(&served, &holder.secret, "walk.y4m", 99, b"half");
     let folder = served.stop();
     assert!(!part.exists() && folder.path().join("session/people").exists(), "{}", part.display());
 }

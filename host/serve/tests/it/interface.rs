@@ -34,6 +34,8 @@ fn the_document_describes_the_routes_and_refers_to_nothing_that_is_not_there() {
         let pointer = reference.strip_prefix('#').unwrap();
         assert!(document.pointer(pointer).is_some(), "{reference} leads nowhere");
     }
+    let size = &document["components"]["schemas"]["OneRecording"]["properties"]["megabytes"]["description"];
+    assert_eq!(size, "Size of its file, MB.");
     let mut ids = BTreeSet::new();
     for (path, methods) in document["paths"].as_object().unwrap() {
         for (method, operation) in methods.as_object().unwrap() {

@@ -28,7 +28,7 @@ use crate::{
 const DURING: &str = "drawing motion files";
 const MATLAB: &str = "mat";
 
-#[derive(Clone, PartialEq, Eq, Debug)]
+#[derive(Clone, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub struct MotionFile {
     /// `None` for files with names of activities: a set's MATLAB file, or NTU's file names.
     pub activity: Option<String>,
@@ -94,7 +94,10 @@ enum Joints {
 pub(super) fn clips(request: &TrainRequest, context: &Context<'_>) -> Result<Vec<Clip>> {
     let mut all = Vec::new();
     let counter = Counter::new(context, "motion files");
-    for file in &request.motion {
+    // The trained model depends on the order of clips.
+    let mut files: Vec<&MotionFile> = request.motion.iter().collect();
+    files.sort();
+    for file in files {
         counter.check(DURING)?;
         let mut found = Vec::new();
         for recorded in recorded(file, request, context)? {

@@ -82,7 +82,7 @@ pub struct MultiPersonTracker<'m> {
 
 impl<'m> MultiPersonTracker<'m> {
     pub(super) fn begin(model: &'m Model, view: &View, request: &RecogniseRequest) -> Result<Self> {
-        model.check_known(&request.among)?;
+        let among = model.named(&request.among)?;
         if view.is_cut_out()? {
             return Err(MultiPersonError::CutOut { path: view.path.clone() }.into());
         }
@@ -98,7 +98,7 @@ impl<'m> MultiPersonTracker<'m> {
             frames: Frames::open(view)?,
             tracker: None,
             window,
-            among: request.among.clone(),
+            among,
             people: Vec::new(),
             annotated_video: request.video_out.as_deref().map(AnnotatedVideo::begin).transpose()?,
             count: 0,

@@ -43,8 +43,8 @@ pub struct RecogniseRequest {
     /// The model: a file, or the name of one that comes with the program (farnear activity models).
     #[cfg_attr(feature = "clap", arg(long, value_name = "FILE|NAME"))]
     pub model: PathBuf,
-    /// Restrict answers to these activities (comma separated); fewer candidates give better answers.
-    #[cfg_attr(feature = "clap", arg(long, value_name = "ACTIVITIES", value_delimiter = ','))]
+    /// Restrict answers to these activities (comma separated, names with commas too); fewer candidates give better answers.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "ACTIVITIES"))]
     pub among: Vec<String>,
     /// Frames of the streaming answer and of windows over a long recording [default: as many as a training clip had].
     #[cfg_attr(feature = "clap", arg(long, value_name = "FRAMES"))]

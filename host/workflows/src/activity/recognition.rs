@@ -105,13 +105,33 @@ impl Model {
         &self.recogniser.activities
     }
 
-    pub(super) fn check_known(&self, activities: &[String]) -> Result<()> {
-        let Some(unknown) = activities.iter().find(|name| !self.activities().contains(name)) else {
-            return Ok(());
-        };
-        let expected = format!("the model knows {}", self.activities().join(", "));
-        Err(WorkflowError::parameter("activity", unknown, expected))
+    /// Activities of the model that are named, each text a name or a comma-separated list of names.
+    pub(super) fn named(&self, texts: &[String]) -> Result<Vec<String>> {
+        let mut all = Vec::new();
+        for text in texts {
+            all.extend(named(text, self.activities()).map_err(|unknown| {
+                let expected = format!("the model knows {}", self.activities().join(", "));
+                WorkflowError::parameter("activity", unknown, expected)
+            })?);
+        }
+        Ok(all)
     }
+}
+
+/// Splits a list at its commas. Names may have commas too: the longest known one is taken. Fails with a name that is unknown.
+fn named(text: &str, known: &[String]) -> Result<Vec<String>, String> {
+    let find = |name: &str| known.iter().find(|known| *known == name || *known == name.trim()).cloned();
+    let parts: Vec<&str> = text.split(',').collect();
+    let mut found = Vec::new();
+    let mut from = 0;
+    while from < parts.len() {
+        let longest =
+            (from + 1..=parts.len()).rev().find_map(|to| Some((find(&parts[from..to].join(","))?, to)));
+        let (name, to) = longest.ok_or_else(|| parts[from].trim().to_owned())?;
+        found.push(name);
+        from = to;
+    }
+    Ok(found)
 }
 
 #[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
@@ -182,7 +202,7 @@ pub(super) struct Recognition<'m> {
 
 impl<'m> Recognition<'m> {
     pub(super) fn begin(model: &'m Model, views: &[View], request: &RecogniseRequest) -> Result<Self> {
-        model.check_known(&request.among)?;
+        let among = model.named(&request.among)?;
         let first = views.first().map(View::is_cut_out).transpose()?;
         let recogniser = model.recogniser(first != Some(true));
         let (expected, found) = (recogniser.views, views.len());
@@ -195,7 +215,7 @@ impl<'m> Recognition<'m> {
             annotated_video: request.video_out.as_deref().map(AnnotatedVideo::begin).transpose()?,
             remarks: model.expectation().into_iter().collect(),
             views: frames,
-            ..Self::of_frames(recogniser, found, window, &request.among)
+            ..Self::of_frames(recogniser, found, window, &among)
         })
     }
 
@@ -321,4 +341,23 @@ fn in_frame(mask: &Mask, answer: &Answer, flags: &[Flag]) -> Option<PersonInFram
         outlier_score: outlier_score(answer),
         flags: flags.iter().copied().map(PersonFlag::Mask).collect(),
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_with_commas_are_found_in_a_list() {
+        let known = ["geh", "geh, schnell", "lauf", "a,b,c"].map(str::to_owned);
+        let of = |text: &str| named(text, &known);
+        let names = |names: &[&str]| Ok(names.iter().map(|name| (*name).to_owned()).collect::<Vec<_>>());
+        assert_eq!(of("geh,lauf"), names(&["geh", "lauf"]));
+        assert_eq!(of("geh, schnell"), names(&["geh, schnell"]));
+        assert_eq!(of("lauf, geh, schnell,geh"), names(&["lauf", "geh, schnell", "geh"]));
+        assert_eq!(of("a,b,c,lauf"), names(&["a,b,c", "lauf"]));
+        assert_eq!(of("lauf,schnell"), Err("schnell".into()));
+        assert_eq!(of("a,b"), Err("a".into()));
+        assert_eq!(of(""), Err(String::new()));
+    }
 }

@@ -1,5 +1,5 @@
 //! Reads SAMPLES.toml (folders of masks with subject, activity and view) into described clips. Views with the same
-//! `clip` name form a clip. Without names, the n-th samples of each view do.
+//! `clip` name form a clip. Without names, the n-th samples of each view do. Otherwise the order of the list has no effect.
 
 use std::{
     collections::{BTreeMap, BTreeSet, HashMap, HashSet},
@@ -241,12 +241,21 @@ fn described(folder: &Path, context: &Context<'_>) -> Result<(Track, bool)> {
     Ok((track, full))
 }
 
+/// Views of a clip with their masks; the sample has the clip's names.
+type Grouped<'a> = (&'a Sample, BTreeMap<u32, (Track, &'a Path)>);
+
+/// A clip's place in the training, whose result depends on the order.
+fn place<'a>((sample, views): &Grouped<'a>) -> (&'a str, &'a str, Option<&'a str>, Option<&'a Path>) {
+    let masks = views.values().next().map(|(_, masks)| *masks);
+    (sample.subject.as_str(), sample.activity.as_str(), sample.clip.as_deref(), masks)
+}
+
 fn grouped<'a>(
     samples: impl Iterator<Item = (&'a Sample, Track)>,
 ) -> Result<(Vec<Clip>, Option<Vec<u32>>), SamplesError> {
     let mut seen: HashMap<(&str, &str, u32), usize> = HashMap::new();
-    let mut places: HashMap<(&str, &str, String), usize> = HashMap::new();
-    let mut clips: Vec<(&Sample, BTreeMap<u32, Track>)> = Vec::new();
+    let mut indices: HashMap<(&str, &str, String), usize> = HashMap::new();
+    let mut clips: Vec<Grouped<'a>> = Vec::new();
     for (sample, track) in samples {
         let (subject, activity) = (sample.subject.as_str(), sample.activity.as_str());
         if subject.is_empty() || activity.is_empty() {
@@ -260,11 +269,11 @@ fn grouped<'a>(
                 format!("\0{count}") // no name that a user can give
             }
         };
-        let place = *places.entry((subject, activity, name)).or_insert_with(|| {
+        let index = *indices.entry((subject, activity, name)).or_insert_with(|| {
             clips.push((sample, BTreeMap::new()));
             clips.len() - 1
         });
-        if clips[place].1.insert(sample.view, track).is_some() {
+        if clips[index].1.insert(sample.view, (track, sample.masks.as_path())).is_some() {
             return Err(SamplesError::Twice {
                 clip: sample.clip.clone().unwrap_or_default(),
                 subject: subject.into(),
@@ -273,12 +282,13 @@ fn grouped<'a>(
             });
         }
     }
+    clips.sort_by_key(place);
     let kinds: BTreeSet<Vec<u32>> = clips.iter().map(|(_, views)| views.keys().copied().collect()).collect();
     let common = (kinds.len() == 1).then(|| kinds.into_iter().next().unwrap_or_default());
-    let clip = |(sample, views): (&Sample, BTreeMap<u32, Track>)| Clip {
+    let clip = |(sample, views): Grouped<'_>| Clip {
         subject: sample.subject.clone(),
         activity: sample.activity.clone(),
-        views: views.into_values().collect(),
+        views: views.into_values().map(|(track, _)| track).collect(),
     };
     Ok((clips.into_iter().map(clip).collect(), common))
 }
@@ -310,13 +320,48 @@ mod tests {
         fn info(&self, _what: &str) {}
     }
 
+    fn write_masks(folder: &Path, width: usize) {
+        fs::create_dir(folder).expect("a folder");
+        let mask =
+            Mask::from_shape_fn((40, 30), |(row, column)| (10..35).contains(&row) && column + width > 30);
+        fs::write(folder.join("a.png"), masks::png(&mask).expect("a picture")).expect("written");
+    }
+
+    #[test]
+    fn the_order_of_the_list_does_not_change_the_clips() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let sample = |masks: &str, subject: &str, activity: &str, more: &str| {
+            format!(
+                "[[sample]]\nmasks = \"{masks}\"\nsubject = \"{subject}\"\nactivity = \"{activity}\"\n{more}"
+            )
+        };
+        let listed = [
+            sample("m8", "b", "walk", ""),
+            sample("m5", "a", "walk", ""),
+            sample("m7", "a", "walk", ""),
+            sample("m9", "a", "dig", "clip = \"x\"\nview = 2\n"),
+            sample("m6", "a", "dig", "clip = \"x\"\n"),
+        ];
+        for width in 5..10 {
+            write_masks(&folder.path().join(format!("m{width}")), width);
+        }
+        let clips = |list: Vec<&String>| {
+            let path = folder.path().join("samples.toml");
+            fs::write(&path, list.into_iter().map(String::as_str).collect::<String>()).expect("written");
+            let context = Context::new(&Silent, &Unattended, Cancel::default());
+            Samples::read(&path, &context).expect("samples").clips
+        };
+        let found = clips(listed.iter().collect());
+        assert_eq!(found.len(), 4);
+        assert_ne!(found[1], found[2]);
+        assert!(found == clips(listed.iter().rev().collect()), "the order changes the clips");
+    }
+
     #[test]
     fn a_blind_set_is_refused_and_its_openings_are_recorded() {
         let folder = tempfile::tempdir().expect("a folder");
         let masks = folder.path().join("m");
-        fs::create_dir(&masks).expect("a folder");
-        let mask = Mask::from_shape_fn((40, 30), |(row, column)| (10..35).contains(&row) && column > 20);
-        fs::write(masks.join("a.png"), masks::png(&mask).expect("a picture")).expect("written");
+        write_masks(&masks, 9);
         let samples = folder.path().join("samples.toml");
         let text = "blind = \"kept for releases\"\n[[sample]]\nmasks = \"m\"\nsubject = \"a\"\nactivity = \"walk\"\n";
         fs::write(&samples, text).expect("written");

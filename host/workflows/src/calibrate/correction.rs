@@ -6,7 +6,7 @@ use std::{
 };
 
 use farnear_depth::corrections::{CdcSettings, Correction, Method, Pattern, fit};
-use farnear_files::{map, staging};
+use farnear_files::staging;
 use ndarray::{Array2, ArrayView2};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -16,6 +16,7 @@ use crate::{
     context::Context,
     error::{Result, WorkflowError},
     figures::rounded,
+    measure::read_map,
     request::{PathKind, Request},
 };
 
@@ -93,11 +94,12 @@ pub struct CorrectionFigures {
     pub near_mm: f64,
     /// Error of the maps before correction.
     pub rmse_before_mm: f64,
+    /// Of the same maps, over the pixels whose depth the correction keeps. Errors of other maps are larger.
     pub rmse_after_mm: f64,
 }
 
 pub fn learn(settings: &CalibrateCorrectionRequest, context: &Context<'_>) -> Result<CorrectionFigures> {
-    let maps = read(&settings.patterns)?;
+    let maps = read(&settings.patterns, context)?;
     context.cancel.check("reading the maps")?;
     let patterns: Vec<Pattern<'_>> =
         maps.iter().map(|(map, true_mm)| Pattern { depth_mm: map.view(), true_mm: *true_mm }).collect();
@@ -139,10 +141,27 @@ struct Entry {
     true_mm: f64,
 }
 
-/// Reads the maps and true depths (mm) of `[[pattern]]` entries: `depth = FILE` (relative), `true_mm = MM`.
-pub fn read(list: &Path) -> Result<Vec<(Array2<f32>, f64)>> {
+/// Reads the maps (mm, holes are NaN) and true depths (mm) of `[[pattern]]` entries: `depth = FILE` (relative),
+/// `true_mm = MM`. Fails for maps of several regions of the images.
+pub fn read(list: &Path, context: &Context<'_>) -> Result<Vec<(Array2<f32>, f64)>> {
     let folder = list.parent().unwrap_or(Path::new(""));
-    self::list(list)?.into_iter().map(|(depth, mm)| Ok((map::read(&folder.join(depth))?, mm))).collect()
+    let (mut maps, mut remarks) = (Vec::new(), Vec::new());
+    let mut part = None;
+    for (depth, true_mm) in self::list(list)? {
+        let file = folder.join(depth);
+        let map = read_map(&file)?;
+        if let Some(own) = map.part {
+            let first = *part.get_or_insert(own);
+            if own != first {
+                let value = format!("{}, which begins at {},{}", file.display(), own.x, own.y);
+                let expected = format!("maps of one region: the first begins at {},{}", first.x, first.y);
+                return Err(WorkflowError::parameter("patterns", value, expected));
+            }
+        }
+        maps.push((map.depth_mm("patterns", &mut remarks)?, true_mm));
+    }
+    remarks.iter().for_each(|remark| context.progress.warn(remark));
+    Ok(maps)
 }
 
 pub fn list(list: &Path) -> Result<Vec<(PathBuf, f64)>> {
@@ -221,6 +240,46 @@ mod tests {
         let maps = vec![(map.clone(), 904.0), (map.clone(), 905.5), (map.clone(), 904.5), (map, 925.0)];
         let found = unlike_others(&errors(&maps, None).unwrap());
         assert!(found.len() == 1 && found[0].starts_with("pattern 4: an error of 20.000 mm"), "{found:?}");
+    }
+
+    /// A list of maps, each in its folder with a record.
+    fn listed(folder: &Path, maps: &[(&str, Array2<f32>, &str)]) -> PathBuf {
+        let mut text = String::new();
+        for (name, map, record) in maps {
+            fs::create_dir(folder.join(name)).unwrap();
+            fs::write(folder.join(name).join("depth.npy"), farnear_files::npy::write(map.view())).unwrap();
+            if !record.is_empty() {
+                let optics = include_str!("../../../../examples/rig.toml").replace('[', "[optics.");
+                let (file, record) = match record.starts_with("unit") {
+                    true => ("stack.toml", (*record).to_string()),
+                    false => ("depth.toml", optics + *record),
+                };
+                fs::write(folder.join(name).join(file), record).unwrap();
+            }
+            text += &format!("[[pattern]]\ndepth = \"{name}/depth.npy\"\ntrue_mm = 900.0\n");
+        }
+        let list = folder.join("patterns.toml");
+        fs::write(&list, text).unwrap();
+        list
+    }
+
+    #[test]
+    fn maps_are_read_with_their_holes_unit_and_region() {
+        let map = ndarray::arr2(&[[0.0, -1.0], [905.0, 907.0]]);
+        let part = |x: usize| format!("[part]\nx = {x}\ny = 0\nimage_width = 9\nimage_height = 9\n");
+        let read = |maps: &[(&str, Array2<f32>, &str)]| {
+            let folder = tempfile::tempdir().unwrap();
+            read(&listed(folder.path(), maps), &Context::unattended())
+        };
+        let [left, right] = [part(0), part(4)];
+        let found = read(&[("a", map.clone(), ""), ("b", map.clone(), right.as_str())]).unwrap();
+        for (depth, _) in found {
+            assert!(depth[(0, 0)].is_nan() && depth[(0, 1)].is_nan() && depth[(1, 0)] == 905.0, "{depth}");
+        }
+        let error = read(&[("a", map.clone(), "unit = \"um\"\n")]).unwrap_err();
+        assert!(error.is_usage() && error.to_string().contains("states um"), "{error}");
+        let error = read(&[("a", map.clone(), left.as_str()), ("b", map, right.as_str())]).unwrap_err();
+        assert!(error.is_usage() && error.to_string().contains("begins at 4,0"), "{error}");
     }
 
     #[test]

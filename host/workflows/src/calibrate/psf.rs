@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use farnear_depth::{
-    calibrate::{CapturedPair, Model, PsfFit, Verdict, fit_psf, made_ready},
+    calibrate::{CalibrationError, CapturedPair, Model, PsfFit, Verdict, fit_psf, made_ready},
     mosaic::{self, is_mosaic},
     optics::Optics,
     prepare::Align,
@@ -141,6 +141,10 @@ pub struct PsfFigures {
 
 pub fn fit(settings: &CalibratePsfRequest, context: &Context<'_>) -> Result<PsfFigures> {
     let optics = optics::read(&settings.optics)?;
+    if optics.stage().is_some() {
+        let expected = CalibrationError::LearnedLens.to_string();
+        return Err(WorkflowError::parameter("optics", settings.optics.display(), expected));
+    }
     let (mut images, mut moved_px) = (Vec::new(), Vec::new());
     for ([far, near], depth_mm) in settings.pairs() {
         let alpha = depth_mm.map(|depth_mm| alpha_at(depth_mm, &optics)).transpose()?;
@@ -223,7 +227,7 @@ fn alpha_at(depth_mm: f64, optics: &Optics) -> Result<f64> {
         let expected = format!(
             "a target there has no image behind a lens of {focal_length_mm} mm: give its distance from the lens in mm"
         );
-        return Err(WorkflowError::parameter("depth", depth_mm, expected));
+        return Err(WorkflowError::parameter("depth-mm", depth_mm, expected));
     }
     Ok(optics.alpha(depth_mm))
 }
@@ -234,5 +238,25 @@ fn rounded_psf(psf: Psf) -> Psf {
         Psf::PillBox | Psf::Ring { .. } | Psf::Radial(_) => psf,
         Psf::Gaussian { k } => Psf::Gaussian { k: rounded(k, of_k) },
         Psf::Generalised { p, k } => Psf::Generalised { p: rounded(p, of_p), k: rounded(k, of_k) },
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use farnear_depth::optics::Stage;
+
+    use super::*;
+
+    #[test]
+    fn a_learned_lens_is_refused_before_the_images_are_read() {
+        let folder = tempfile::tempdir().unwrap();
+        let optics: Optics = toml::from_str(include_str!("../../../../examples/rig.toml")).unwrap();
+        let file = folder.path().join("lens.toml");
+        let text = toml::to_string(&optics.with_stage(Stage::identity(2, 1))).unwrap();
+        std::fs::write(&file, text).unwrap();
+        let images = ["far.png", "near.png"].map(|name| folder.path().join(name)).to_vec();
+        let request = CalibratePsfRequest { images, optics: file, ..CalibratePsfRequest::default() };
+        let error = fit(&request, &Context::unattended()).unwrap_err();
+        assert!(error.is_usage() && error.to_string().contains("lens.toml"), "{error}");
     }
 }

@@ -200,6 +200,7 @@ pub fn calibrate(request: &CalibrateStackRequest, context: &Context<'_>) -> Resu
     context.cancel.check("calibrating the lens")?;
     let found = found.map_err(|error| match error {
         StackError::NotPositive { name, value } => WorkflowError::parameter(name, value, "a positive number"),
+        StackError::OutOfRange { name, value, expected } => WorkflowError::parameter(name, value, expected),
         error => WorkflowError::parameter("stack", request.stack.display(), error.to_string()),
     })?;
     let figures = figures(&found, &listed, slices[0].dim(), request);
@@ -229,10 +230,11 @@ struct Listed {
 impl Listed {
     fn of(request: &CalibrateStackRequest) -> Result<Self> {
         let record = if request.stack.is_dir() { read_record(&request.stack)? } else { None };
-        let mut listed = match record {
+        Ok(match record {
             Some(record) => {
-                if request.step_mm.is_some() || request.far_mm.is_some() {
-                    let expected = "the rig's record has them: leave --step-mm and --far-mm out";
+                let given = request.step_mm.or(request.far_mm).or(request.object_pixel_um);
+                if given.is_some() || request.near_first {
+                    let expected = "the rig's record has them: leave --step-mm, --far-mm, --object-pixel-um and --near-first out";
                     return Err(WorkflowError::parameter("stack", request.stack.display(), expected));
                 }
                 let (lens, _) = optics::of_pair(None, &request.stack.join("slice.png"))?;
@@ -251,7 +253,7 @@ impl Listed {
                 Self { images, step_mm, lens: Some(lens), object_pixel_um: None, remarks: Vec::new() }
             }
             None => {
-                let stack::Stack { images, positions_um, mut object_pixel_um, mut remarks } =
+                let stack::Stack { mut images, positions_um, mut object_pixel_um, mut remarks } =
                     stack::list(&request.stack)?;
                 if let (None, Some([before, after])) = (&positions_um, order::gap(&images)) {
                     let expected = format!(
@@ -278,13 +280,12 @@ impl Listed {
                         return Err(WorkflowError::parameter("step-mm", "none", expected));
                     }
                 };
+                if request.near_first {
+                    images.reverse();
+                }
                 Self { images, step_mm, lens: None, object_pixel_um, remarks }
             }
-        };
-        if request.near_first {
-            listed.images.reverse();
-        }
-        Ok(listed)
+        })
     }
 }
 
@@ -474,26 +475,4 @@ fn learned(found: &StackLens) -> f64 {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_given_step_unlike_the_stated_one_has_a_remark() {
-        assert_eq!(contradiction(0.1, None), None);
-        assert_eq!(contradiction(0.1, Some(Ok(101.0))), None);
-        let remark = contradiction(0.5, Some(Ok(100.0))).unwrap();
-        assert!(remark.contains("0.1 mm") && remark.contains("--step-mm 0.5"), "{remark}");
-        let uneven = even_step(&[0.0, 100.0, 230.0, 300.0], &CalibrateStackRequest::default());
-        assert!(contradiction(0.1, Some(uneven)).unwrap().contains("uneven"));
-    }
-
-    #[test]
-    fn uneven_positions_are_refused_by_the_slices_between_which_they_are() {
-        let request = CalibrateStackRequest::default();
-        assert!((even_step(&[5.0, 4.0, 3.02, 2.0], &request).unwrap() - 1.0).abs() < 1e-12);
-        let error = even_step(&[0.0, 1.0, 2.0, 3.5], &request).unwrap_err().to_string();
-        assert!(error.contains("slices 3 and 4 are 1.5"), "{error}");
-        let standing = even_step(&[1.0, 1.0, 2.0], &request).unwrap_err().to_string();
-        assert!(standing.contains("slices 1 and 2 are 0"), "{standing}");
-    }
-}
+mod tests;

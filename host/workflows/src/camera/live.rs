@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-use farnear_capture::camera::{Camera, Frame, Image, Setting};
+use farnear_capture::camera::{Camera, CameraError, Frame, Image, Setting};
 use farnear_depth::focus_measure::FocusMeasure;
 use farnear_protocol::Micros;
 use serde::Serialize;
@@ -15,6 +15,8 @@ use crate::{
 };
 
 const SLICE: Duration = Duration::from_millis(100);
+/// Consecutive damaged frames after which a view fails: a camera may begin with some.
+const DAMAGED_MAX: u32 = 8;
 
 #[derive(Clone, PartialEq, Debug)]
 pub struct LiveSettings {
@@ -49,13 +51,12 @@ pub fn live(
     if let Some(seconds) = settings.seconds.filter(|seconds| !(0.0..1e9).contains(seconds)) {
         return Err(WorkflowError::parameter("seconds", seconds, "expected a positive time"));
     }
-    let mut camera = settings.camera.open()?;
-    camera.watch()?;
+    let mut camera = Watched::new(settings.camera.open()?)?;
     let begin = Instant::now();
     let until = settings.seconds.map(|seconds| begin + Duration::from_secs_f64(seconds));
     let (mut all, mut since, mut frames, mut last) = (0, begin, 0_usize, None);
     while until.is_none_or(|until| Instant::now() < until) && !context.cancel.is_cancelled() {
-        if let Some(frame) = camera.newest(SLICE)? {
+        if let Some(frame) = camera.newest(context)? {
             (frames, last) = (frames + 1, Some(frame.image));
         }
         let passed = since.elapsed();
@@ -86,11 +87,41 @@ pub fn watch(
     if camera.controls()?.iter().any(|control| control.name == exposure.name()) {
         camera.set(&exposure)?;
     }
-    camera.watch()?;
+    let mut camera = Watched::new(camera)?;
     loop {
         context.cancel.check("looking through the camera")?;
-        if let Some(frame) = camera.newest(SLICE)? {
+        if let Some(frame) = camera.newest(context)? {
             on_frame(frame)?;
+        }
+    }
+}
+
+/// A camera in live view, which may lose frames.
+struct Watched {
+    camera: Box<dyn Camera>,
+    /// Consecutive damaged frames.
+    damaged: u32,
+}
+
+impl Watched {
+    fn new(mut camera: Box<dyn Camera>) -> Result<Self> {
+        camera.watch()?;
+        Ok(Self { camera, damaged: 0 })
+    }
+
+    /// Waits at most [`SLICE`].
+    fn newest(&mut self, context: &Context<'_>) -> Result<Option<Frame>> {
+        match self.camera.newest(SLICE) {
+            Err(error @ CameraError::Incomplete { .. }) if self.damaged + 1 < DAMAGED_MAX => {
+                self.damaged += 1;
+                context.info(&format!("live image: {error}"));
+                Ok(None)
+            }
+            Ok(Some(frame)) => {
+                self.damaged = 0;
+                Ok(Some(frame))
+            }
+            other => Ok(other?),
         }
     }
 }
@@ -115,8 +146,65 @@ fn figures(image: &Image, measure: FocusMeasure, frames_per_s: f64) -> LiveFigur
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use farnear_capture::camera::Stamp;
+    use farnear_protocol::message::{ShotRecord, TriggerMode};
     use ndarray::Array2;
+
+    use super::*;
+
+    /// Frames that are whole (`true`) or damaged; it waits after the last.
+    struct Damaged(std::vec::IntoIter<bool>);
+
+    impl Camera for Damaged {
+        fn kind(&self) -> &'static str {
+            "damaged"
+        }
+
+        fn arm(&mut self, _: TriggerMode, _: Micros) -> std::result::Result<(), CameraError> {
+            Ok(())
+        }
+
+        fn trigger(&mut self, _: u32, _: Micros) -> std::result::Result<(), CameraError> {
+            Ok(())
+        }
+
+        fn image(&mut self, _: &ShotRecord, _: Duration) -> std::result::Result<Image, CameraError> {
+            Ok(Image::new(Array2::zeros((2, 2)), 8))
+        }
+
+        fn watch(&mut self) -> std::result::Result<(), CameraError> {
+            Ok(())
+        }
+
+        fn newest(&mut self, _: Duration) -> std::result::Result<Option<Frame>, CameraError> {
+            match self.0.next() {
+                Some(true) => {
+                    let image = Image::new(Array2::zeros((2, 2)), 8);
+                    Ok(Some(Frame { image, stamp: Stamp::default() }))
+                }
+                Some(false) => Err(CameraError::Incomplete {
+                    camera: "damaged".into(),
+                    frame: 0,
+                    reason: "packets were lost".into(),
+                }),
+                None => Ok(None),
+            }
+        }
+    }
+
+    #[test]
+    fn live_view_tolerates_seven_consecutive_damaged_frames() {
+        let seven = [false; DAMAGED_MAX as usize - 1];
+        let frames = [&seven[..], &[true], &seven, &[true, false], &seven, &[true]].concat();
+        let mut whole = 0;
+        let camera = Box::new(Damaged(frames.into_iter()));
+        let ended = watch(camera, Micros(5_000), &Context::unattended(), |_| {
+            whole += 1;
+            Ok(())
+        });
+        let error = ended.unwrap_err().to_string();
+        assert!(whole == 2 && error.contains("packets were lost"), "{whole}: {error}");
+    }
 
     #[test]
     fn a_pictures_figures_follow_from_its_pixels() {

@@ -9,8 +9,8 @@ use serde::Serialize;
 
 use crate::{error::Result, figures::rounded};
 
-/// Step for a correction's slope, mm: far above rounding, far below the correction's curvature.
-const SLOPE_STEP_MM: f32 = 0.5;
+/// Step for a correction's slope in parts of the correction's range: far above rounding, far below the curvature.
+const SLOPE_STEP: f64 = 0.02;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum CameraNoise {
@@ -137,11 +137,19 @@ pub fn corrected(
         }
     });
     if let Some(correction) = correction {
-        let moved = |step: f32| correction.apply(raw.depth_mm.mapv(|depth_mm| depth_mm + step).view());
-        let (nearer, farther) = (moved(-0.5 * SLOPE_STEP_MM)?, moved(0.5 * SLOPE_STEP_MM)?);
-        Zip::from(&mut deviation).and(&nearer).and(&farther).for_each(|deviation, nearer, farther| {
-            *deviation *= (farther - nearer).abs() / SLOPE_STEP_MM;
-        });
+        let (far_mm, near_mm) = correction.range_mm();
+        let half_mm = (0.5 * SLOPE_STEP * (far_mm - near_mm)) as f32;
+        let moved = |step_mm: f32| correction.apply(raw.depth_mm.mapv(|depth_mm| depth_mm + step_mm).view());
+        let [nearer, middle, farther] = [moved(-half_mm)?, moved(0.0)?, moved(half_mm)?];
+        Zip::from(&mut deviation).and(&nearer).and(&middle).and(&farther).for_each(
+            |deviation, nearer, middle, farther| {
+                // One end of the step may be beyond the correction's scale.
+                let ends = [nearer, farther].map(|end| if end.is_nan() { *middle } else { *end });
+                let halves = f32::from(!nearer.is_nan()) + f32::from(!farther.is_nan());
+                let slope = (ends[1] - ends[0]).abs() / (halves * half_mm);
+                *deviation = if middle.is_nan() { f32::NAN } else { *deviation * slope };
+            },
+        );
     }
     let quantiles = Quantiles::new(deviation.view());
     let quantile = |part: f64| {
@@ -155,6 +163,8 @@ pub fn corrected(
 
 #[cfg(test)]
 mod tests {
+    use farnear_depth::corrections::{CdcSettings, Method, Pattern, fit};
+
     use super::*;
 
     #[test]
@@ -201,5 +211,39 @@ mod tests {
         let read = (12.0 * codes_per_electron).powi(2);
         assert!((at(100.0) - read).abs() < 1e-9, "{}", at(100.0));
         assert!((at(1023.0) - read - 923.0 * codes_per_electron).abs() < 1e-9);
+    }
+
+    /// Patterns over half a millimetre, as of a macro lens, whose depths are 1.1 times as far apart as the targets.
+    #[test]
+    fn a_small_range_has_its_slope_up_to_the_end_of_the_scale() {
+        let patterns: Vec<(Array2<f32>, f64)> = (0..5)
+            .map(|index| 0.125 * f64::from(index) - 0.25)
+            .map(|away| (Array2::from_elem((12, 12), (100.0 + 1.1 * away) as f32), 100.0 + away))
+            .collect();
+        let patterns: Vec<Pattern<'_>> = patterns
+            .iter()
+            .map(|(map, true_mm)| Pattern { depth_mm: map.view(), true_mm: *true_mm })
+            .collect();
+        let correction = fit(Method::ClsfFull, &patterns, &CdcSettings::default()).unwrap();
+        let mut depth_mm = Array2::from_elem((12, 12), 100.0_f32);
+        // The scale ends 0.325 mm from the middle.
+        for (place, value) in [((0, 0), 100.323), ((0, 1), 99.677), ((0, 2), 100.4), ((0, 3), f32::NAN)] {
+            depth_mm[place] = value;
+        }
+        let raw = DepthMap {
+            confidence: Array2::ones((12, 12)),
+            depth_mm,
+            filled: None,
+            low_texture_fraction: 0.0,
+            warnings: Vec::new(),
+        };
+        let deviation = Array2::from_elem((12, 12), 0.01);
+        let (deviation, found) =
+            corrected(CameraNoise::Estimated, deviation, &raw, Some(&correction)).unwrap();
+        for place in [(5, 5), (0, 0), (0, 1)] {
+            assert!((deviation[place] * 1.1 - 0.01).abs() < 3e-4, "{place:?}: {}", deviation[place]);
+        }
+        assert!(deviation[(0, 2)].is_nan() && deviation[(0, 3)].is_nan());
+        assert!((found.median_sd_mm - 0.0091).abs() < 1e-4, "{found:?}");
     }
 }

@@ -130,3 +130,34 @@ fn a_lens_without_the_size_of_a_pixel_gives_no_glb() {
     assert!(error.is_usage() && error.to_string().contains("glb"), "{error}");
     assert_eq!(names(folder.path()), before);
 }
+
+#[test]
+fn a_learned_lens_takes_neither_another_point_spread_function_nor_a_region_of_averaged_pixels() {
+    let folder = tempfile::tempdir().unwrap();
+    let settings = settings(folder.path());
+    let optics: Optics = toml::from_str(OPTICS).unwrap();
+    let optics = optics.with_stage(farnear_depth::optics::Stage::identity(2, 1));
+    fs::write(folder.path().join("optics.toml"), toml::to_string(&optics).unwrap()).unwrap();
+    for settings in [
+        DepthRequest { psf: Some("gaussian:k=0.4".parse().unwrap()), ..settings.clone() },
+        DepthRequest { region: Some([4, 4, 40, 30].into()), ..settings },
+    ] {
+        let error = compute(&settings, &Context::unattended()).unwrap_err();
+        assert!(error.is_usage() && error.to_string().contains("calibrate stack"), "{error}");
+    }
+}
+
+#[test]
+fn averaging_to_a_small_blur_is_doubted() {
+    let optics: Optics = toml::from_str(OPTICS).unwrap();
+    let doubts = |bin: Option<usize>, is_mosaic: bool| {
+        let mut doubts = Vec::new();
+        let request = DepthRequest { bin, ..DepthRequest::default() };
+        (request.bin_for(&optics, is_mosaic, &mut doubts), doubts)
+    };
+    let little = OpticsDoubt::LittleBlur { blur_px: 0.5 * optics.max_blur_px(), bin: 2 };
+    assert!(0.5 * optics.max_blur_px() < 1.5, "{}", optics.max_blur_px());
+    assert_eq!(doubts(None, false), (1, vec![]));
+    assert_eq!(doubts(Some(2), false), (2, vec![little.clone()]));
+    assert_eq!(doubts(None, true), (2, vec![OpticsDoubt::Mosaic { bin: 2 }, little]));
+}

@@ -96,7 +96,9 @@ fn lens(request: &FocusStackRequest) -> Result<Option<Optics>> {
     // A far image's path gives the folder; any name in it works.
     let found = optics::of_pair(request.optics.as_deref(), &request.stack.join("stack.png"));
     match found {
-        Ok((lens, _)) => Ok(Some(lens)),
+        // Of a lens without a scale, lateral positions are not known. The images are not binned.
+        Ok((lens, _)) if lens.stage().is_some_and(|stage| !stage.scale_known) => Ok(None),
+        Ok((lens, _)) => Ok(Some(lens.unbinned())),
         Err(error) if request.optics.is_some() || request.stack.join("optics.toml").is_file() => Err(error),
         Err(_) => Ok(None),
     }
@@ -108,7 +110,11 @@ fn sensors(record: &CaptureRecord) -> Vec<f64> {
 
 /// Object distances in focus at these sensor distances; thin lens, u = F w / (w - F).
 fn objects(sensor_mm: &[f64], request: &FocusStackRequest) -> Result<Vec<f64>> {
-    let (lens, _) = optics::of_pair(request.optics.as_deref(), &request.stack.join("stack.png"))?;
+    let found = optics::of_pair(request.optics.as_deref(), &request.stack.join("stack.png"));
+    let (lens, _) = found.map_err(|error| match error {
+        WorkflowError::NoOptics { .. } => WorkflowError::NoStackOptics { stack: request.stack.clone() },
+        error => error,
+    })?;
     let focal_length_mm = lens.focal_length_mm();
     let object = |&sensor_mm: &f64| {
         if sensor_mm > focal_length_mm {
@@ -211,6 +217,32 @@ mod tests {
         assert!((depth[(0, 1)] - 666.667).abs() < 1e-2);
         assert_eq!(depth[(0, 2)], 1000.0);
         assert!(depth[(0, 3)].is_nan());
+    }
+
+    #[test]
+    fn sensor_distances_without_a_lens_name_the_stack() {
+        let folder = tempfile::tempdir().unwrap();
+        let stack = folder.path().to_path_buf();
+        let request = FocusStackRequest { stack, ..FocusStackRequest::default() };
+        let error = objects(&[52.0, 53.0], &request).unwrap_err().to_string();
+        assert!(error.contains(&format!("the stack {} has neither", folder.path().display())), "{error}");
+        assert!(!error.contains("stack.png"), "{error}");
+    }
+
+    #[test]
+    fn a_learned_lens_is_that_of_the_unbinned_images() {
+        use farnear_depth::optics::Stage;
+
+        let folder = tempfile::tempdir().unwrap();
+        let optics: Optics = toml::from_str(include_str!("../../../../examples/rig.toml")).unwrap();
+        let found = |scale_known| {
+            let stage = Stage { scale_known, ..Stage::identity(4, 2) };
+            let text = toml::to_string(&optics.binned(4).with_stage(stage)).unwrap();
+            std::fs::write(folder.path().join("optics.toml"), text).unwrap();
+            lens(&FocusStackRequest { stack: folder.path().into(), ..FocusStackRequest::default() }).unwrap()
+        };
+        assert_eq!(found(true), Some(optics));
+        assert_eq!(found(false), None);
     }
 
     #[test]

@@ -54,6 +54,17 @@ pub(crate) struct MapFile {
 }
 
 impl MapFile {
+    /// Depths in mm, as [`depth`](Self::depth). Fails for a map whose record states another unit.
+    pub fn depth_mm(self, name: &'static str, remarks: &mut Vec<String>) -> Result<Array2<f32>> {
+        match self.unit {
+            None | Some(Unit::Mm) => Ok(self.depth(Unit::Mm, remarks)),
+            Some(unit) => {
+                let expected = format!("expected a map in mm, its record states {unit}");
+                Err(WorkflowError::parameter(name, self.file.display(), expected))
+            }
+        }
+    }
+
     /// Depths in this unit; holes are NaN. Adds remarks on values that mark holes or seem to.
     pub fn depth(self, unit: Unit, remarks: &mut Vec<String>) -> Array2<f32> {
         let negative = self.values.iter().filter(|value| **value < 0.0 && !unit.is_depth(**value)).count();
@@ -167,15 +178,13 @@ fn values_of(file: &Path, record: Option<&Record>) -> Result<MapFile> {
 
 fn deviation_of(file: &Path, folder: &Path, dim: (usize, usize)) -> Result<Option<Array2<f32>>> {
     let path = folder.join("uncertainty.npy");
-    if !path.exists() {
+    // Another map in the folder, such as the true depth, has no deviation.
+    if file.file_stem() != Some("depth".as_ref()) || !path.exists() {
         return Ok(None);
     }
     let deviation = map::read(&path)?;
     if deviation.dim() == dim {
         return Ok(Some(deviation));
-    }
-    if file.file_stem() != Some("depth".as_ref()) {
-        return Ok(None); // another map in the folder
     }
     let reason = format!("{:?} rows and columns, the depth map has {dim:?}", deviation.dim());
     Err(WorkflowError::file(&path, "a map of the depth's size")(reason))
@@ -186,6 +195,18 @@ mod tests {
     use farnear_files::npy;
 
     use super::*;
+
+    #[test]
+    fn only_the_depth_map_has_the_deviation_next_to_it() {
+        let folder = tempfile::tempdir().expect("a folder");
+        for name in ["depth.npy", "truth.npy", "uncertainty.npy"] {
+            let map = npy::write(Array2::from_elem((3, 4), 900.0).view());
+            fs::write(folder.path().join(name), map).expect("a writable folder");
+        }
+        let found = |name: &str| read(&folder.path().join(name)).expect("a map").deviation;
+        assert!(found("").is_some() && found("depth.npy").is_some());
+        assert_eq!(found("truth.npy"), None);
+    }
 
     #[test]
     fn values_that_mark_holes_have_remarks_in_units_that_allow_them() {

@@ -21,7 +21,8 @@ pub fn mesh(folder: &Path, points: usize) -> Result<Vec<u8>> {
     }
     let step = step(depth.len(), points);
     let window = s![..;step, ..;step];
-    Ok(ply(depth.slice(window), grey.slice(window), lateral.thinned(step), &unit.to_string()))
+    let lateral = lateral.thinned(depth.dim(), step);
+    Ok(ply(depth.slice(window), grey.slice(window), lateral, &unit.to_string()))
 }
 
 fn step(pixels: usize, points: usize) -> usize {

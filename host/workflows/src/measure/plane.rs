@@ -1,9 +1,13 @@
-//! Least-squares plane along the optical axis: z = z0 + a x + b y.
+//! Least-squares plane: z = z0 + a x + b y. Behind a lens of focal length F, a point's position follows from its depth: pixel
+//! (u, v) from the axis lies at `x = s u (z - F)`, `s = pitch / F`. Depth fitted over such positions is biased by noise, most in
+//! regions of a few rows. `1 / (z - F) = (1 - s (a u + b v)) / (z0 - F)` is linear in the pixels, and the noise of depth from
+//! defocus is even there.
 
-use farnear_files::mesh::Lateral;
+use farnear_files::mesh::{Lateral, Projection};
+use ndarray::{ArrayView2, s};
 use serde::{Serialize, Serializer};
 
-use super::{Entries, Measured, Unit};
+use super::{Entries, Measured, Rectangle, Unit};
 
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Plane {
@@ -29,9 +33,9 @@ pub struct PlaneFigures {
 }
 
 impl PlaneFigures {
-    pub(super) fn of(points: &[[f64; 3]], map: &Measured) -> Option<Self> {
+    pub(super) fn of(map: &Measured, at: Rectangle) -> Option<Self> {
         let per_pixel = map.lateral == Lateral::Unknown;
-        fit(points).map(|plane| Self { unit: map.unit, per_pixel, plane })
+        fit(map.depth.view(), map.lateral, at).map(|plane| Self { unit: map.unit, per_pixel, plane })
     }
 }
 
@@ -54,32 +58,25 @@ impl Serialize for PlaneFigures {
     }
 }
 
-/// Fits a plane in three passes; `None` for fewer than three points or collinear ones.
-pub fn fit(points_mm: &[[f64; 3]]) -> Option<Plane> {
-    let count = points_mm.len();
-    if count < 3 {
-        return None;
-    }
-    let mean = |axis: usize| points_mm.iter().map(|point| point[axis]).sum::<f64>() / count as f64;
-    let [mx, my, mz] = [mean(0), mean(1), mean(2)];
-    let [mut xx, mut xy, mut yy, mut xz, mut yz] = [0.0; 5];
-    for [x, y, z] in points_mm {
-        let (x, y, z) = (x - mx, y - my, z - mz);
-        xx += x * x;
-        xy += x * y;
-        yy += y * y;
-        xz += x * z;
-        yz += y * z;
-    }
-    let determinant = xx * yy - xy * xy;
-    // Relative to points that spread in both directions.
-    if determinant <= 1e-9 * (xx * yy) || determinant.is_nan() {
-        return None;
-    }
-    let (a, b) = ((xz * yy - yz * xy) / determinant, (yz * xx - xz * xy) / determinant);
-    let off = |[x, y, z]: &[f64; 3]| z - mz - a * (x - mx) - b * (y - my);
+/// Fits a plane to a part of a map, which must be inside the map; `None` for fewer than three depths or collinear ones.
+pub fn fit(depth: ArrayView2<f32>, lateral: Lateral, at: Rectangle) -> Option<Plane> {
+    let dim = depth.dim();
+    let part = depth.slice(s![at.y..at.y + at.height, at.x..at.x + at.width]);
+    let pixels: Vec<(usize, usize, f64)> = part
+        .indexed_iter()
+        .filter(|(_, z)| z.is_finite())
+        .map(|((row, column), z)| (at.x + column, at.y + row, f64::from(*z)))
+        .collect();
+    let [a, b] = slopes(&pixels, dim, lateral)?;
+    let points = || {
+        pixels.iter().map(|&(column, row, z)| {
+            let [x, y] = lateral.beside_axis(dim, column, row, z);
+            [x, y, z]
+        })
+    };
+    let [mx, my, mz] = mean(points());
     let (mut squares, mut low, mut high) = (0.0, f64::MAX, f64::MIN);
-    for off in points_mm.iter().map(off) {
+    for off in points().map(|[x, y, z]| z - mz - a * (x - mx) - b * (y - my)) {
         squares += off * off;
         low = low.min(off);
         high = high.max(off);
@@ -89,30 +86,139 @@ pub fn fit(points_mm: &[[f64; 3]]) -> Option<Plane> {
         slope_x: a,
         slope_y: b,
         tilt_deg: a.hypot(b).atan().to_degrees(),
-        rms_mm: (squares / count as f64).sqrt(),
+        rms_mm: (squares / pixels.len() as f64).sqrt(),
         peak_to_valley_mm: high - low,
     })
 }
 
+/// Slopes to the right and upwards.
+fn slopes(pixels: &[(usize, usize, f64)], dim: (usize, usize), lateral: Lateral) -> Option<[f64; 2]> {
+    let at = |value: f64, (column, row, _): (usize, usize, f64)| [column as f64, row as f64, value];
+    let even = |side: f64| {
+        let found = Linear::of(pixels.iter().map(|&pixel| at(pixel.2, pixel)))?;
+        Some([found.per_column / side, -found.per_row / side])
+    };
+    let slopes = match lateral {
+        Lateral::Lens(lens) => {
+            let Projection { focal_length_mm, pixel_um, .. } = lens;
+            let found =
+                Linear::of(pixels.iter().map(|&pixel| at((pixel.2 - focal_length_mm).recip(), pixel)))?;
+            let unit = found.at(lens.axis_in(dim)) * pixel_um * 1e-3 / focal_length_mm;
+            [-found.per_column / unit, found.per_row / unit]
+        }
+        Lateral::Pixel(side) => even(side)?,
+        Lateral::Unknown => even(1.0)?,
+    };
+    slopes.iter().all(|slope| slope.is_finite()).then_some(slopes)
+}
+
+/// A value that is linear in column and row.
+struct Linear {
+    /// Column, row and value.
+    mean: [f64; 3],
+    per_column: f64,
+    per_row: f64,
+}
+
+impl Linear {
+    /// By least squares; `None` for fewer than three points or collinear ones.
+    fn of(points: impl Iterator<Item = [f64; 3]> + Clone) -> Option<Self> {
+        let mean = mean(points.clone());
+        let [mut xx, mut xy, mut yy, mut xz, mut yz] = [0.0; 5];
+        for [x, y, z] in points {
+            let (x, y, z) = (x - mean[0], y - mean[1], z - mean[2]);
+            xx += x * x;
+            xy += x * y;
+            yy += y * y;
+            xz += x * z;
+            yz += y * z;
+        }
+        let determinant = xx * yy - xy * xy;
+        // Relative to points that spread in both directions.
+        if determinant <= 1e-9 * (xx * yy) || determinant.is_nan() {
+            return None;
+        }
+        let [per_column, per_row] = [(xz * yy - yz * xy) / determinant, (yz * xx - xz * xy) / determinant];
+        Some(Self { mean, per_column, per_row })
+    }
+
+    fn at(&self, [column, row]: [f64; 2]) -> f64 {
+        self.mean[2] + self.per_column * (column - self.mean[0]) + self.per_row * (row - self.mean[1])
+    }
+}
+
+/// NaN without points.
+fn mean(points: impl Iterator<Item = [f64; 3]>) -> [f64; 3] {
+    let (mut count, mut sums) = (0.0_f64, [0.0_f64; 3]);
+    for point in points {
+        count += 1.0;
+        sums = std::array::from_fn(|axis| sums[axis] + point[axis]);
+    }
+    sums.map(|sum| sum / count)
+}
+
 #[cfg(test)]
 mod tests {
+    use ndarray::Array2;
+
     use super::*;
 
-    fn grid(z: impl Fn(f64, f64) -> f64) -> Vec<[f64; 3]> {
-        (0..400).map(|i| (f64::from(i % 20) - 4.0, f64::from(i / 20))).map(|(x, y)| [x, y, z(x, y)]).collect()
+    const LENS: Projection = Projection { focal_length_mm: 50.0, pixel_um: 7.4, axis_px: None };
+
+    fn whole(depth: &Array2<f32>, lateral: Lateral) -> Option<Plane> {
+        let (height, width) = depth.dim();
+        fit(depth.view(), lateral, Rectangle { x: 0, y: 0, width, height })
+    }
+
+    /// 1 or -1, without a slope in any even part.
+    fn noise((row, column): (usize, usize)) -> f32 {
+        if (row + column).is_multiple_of(2) { 1.0 } else { -1.0 }
     }
 
     #[test]
     fn a_plane_is_found() {
-        let plane = fit(&grid(|x, y| 900.0 + 0.3 * x - 0.4 * y)).unwrap();
-        assert!((plane.slope_x - 0.3).abs() < 1e-9 && (plane.slope_y + 0.4).abs() < 1e-9, "{plane:?}");
-        assert!((plane.tilt_deg - 0.5f64.atan().to_degrees()).abs() < 1e-9);
+        let depth = Array2::from_shape_fn((20, 30), |(row, column)| {
+            900.0 + (0.25 * column as f32 + 0.5 * row as f32)
+        });
+        let plane = whole(&depth, Lateral::Pixel(2.0)).unwrap();
+        assert!((plane.slope_x - 0.125).abs() < 1e-9 && (plane.slope_y + 0.25).abs() < 1e-9, "{plane:?}");
+        assert!((plane.tilt_deg - 0.125f64.hypot(0.25).atan().to_degrees()).abs() < 1e-9);
         assert!(plane.rms_mm < 1e-9 && plane.peak_to_valley_mm < 1e-9);
     }
 
     #[test]
+    fn a_steep_plane_behind_a_lens_has_its_slopes_in_any_part() {
+        let (a, b, s) = (1.5, -0.8, 7.4e-3 / 50.0);
+        let depth = Array2::from_shape_fn((480, 640), |(row, column)| {
+            let (u, v) = (column as f64 - 319.5, 239.5 - row as f64);
+            (50.0 + 850.0 / (1.0 - s * (a * u + b * v))) as f32
+        });
+        for at in [[0, 0, 640, 480], [500, 10, 100, 80]] {
+            let plane = fit(depth.view(), Lateral::Lens(LENS), at.into()).unwrap();
+            assert!((plane.slope_x - a).abs() < 1e-3 && (plane.slope_y - b).abs() < 1e-3, "{plane:?}");
+            assert!(plane.rms_mm < 1e-3, "{plane:?}");
+        }
+    }
+
+    /// With noise, the position of a pixel far from the axis varies with its depth.
+    #[test]
+    fn noise_tilts_no_thin_region() {
+        let depth = Array2::from_shape_fn((480, 640), |at| 900.0 + 0.5 * noise(at));
+        for height in [2, 4, 10] {
+            let at = Rectangle { x: 0, y: 0, width: 640, height };
+            let plane = fit(depth.view(), Lateral::Lens(LENS), at).unwrap();
+            assert!(plane.tilt_deg < 0.01 && (plane.rms_mm - 0.5).abs() < 1e-3, "{height}: {plane:?}");
+        }
+        for [width, height] in [[640, 1], [1, 480]] {
+            let at = Rectangle { x: 0, y: 0, width, height };
+            assert_eq!(fit(depth.view(), Lateral::Lens(LENS), at), None);
+        }
+    }
+
+    #[test]
     fn deviations_from_the_plane_are_measured() {
-        let plane = fit(&grid(|x, y| 900.0 + if (x + y) as i64 % 2 == 0 { 1.0 } else { -1.0 })).unwrap();
+        let depth = Array2::from_shape_fn((20, 20), |at| 900.0 + noise(at));
+        let plane = whole(&depth, Lateral::Unknown).unwrap();
         assert!(
             (plane.rms_mm - 1.0).abs() < 0.01 && (plane.peak_to_valley_mm - 2.0).abs() < 0.05,
             "{plane:?}"
@@ -121,8 +227,9 @@ mod tests {
 
     #[test]
     fn too_few_points_or_a_line_make_no_plane() {
-        assert_eq!(fit(&[[0.0, 0.0, 1.0], [1.0, 0.0, 1.0]]), None);
-        let line: Vec<_> = (0..9).map(|i| [f64::from(i), 2.0 * f64::from(i), 1.0]).collect();
-        assert_eq!(fit(&line), None);
+        assert_eq!(whole(&Array2::from_elem((1, 2), 1.0), Lateral::Unknown), None);
+        let line =
+            Array2::from_shape_fn((9, 18), |(row, column)| if column == 2 * row { 1.0 } else { f32::NAN });
+        assert_eq!(whole(&line, Lateral::Unknown), None);
     }
 }

@@ -61,9 +61,6 @@ pub fn region(map: &Measured, at: Rectangle) -> crate::Result<RegionFigures> {
             deviation.slice(window).iter().filter(|d| d.is_finite()).map(|d| f64::from(*d).powi(2)).collect();
         (!squares.is_empty()).then(|| (squares.iter().sum::<f64>() / squares.len() as f64).sqrt())
     });
-    let points: Vec<_> = (y..y + height)
-        .flat_map(|row| (x..x + width).filter_map(move |column| map.point(column, row)))
-        .collect();
     Ok(RegionFigures {
         unit: map.unit,
         region: at,
@@ -76,7 +73,7 @@ pub fn region(map: &Measured, at: Rectangle) -> crate::Result<RegionFigures> {
         range: some
             .then(|| depths.iter().fold([f64::MAX, f64::MIN], |[low, high], z| [low.min(*z), high.max(*z)])),
         predicted_deviation: predicted,
-        plane: PlaneFigures::of(&points, map),
+        plane: PlaneFigures::of(map, at),
     })
 }
 

@@ -85,7 +85,7 @@ impl Request for MeasurePlaneRequest {
         let found = MeasureRegionRequest { map, region }.run(context)?;
         found.plane.ok_or_else(|| {
             let value = format!("{} pixels with a depth", found.pixels);
-            WorkflowError::parameter("region", value, "too few for a plane")
+            WorkflowError::parameter("region", value, "expected some in several rows and columns")
         })
     }
 }

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use farnear_depth::{
-    optics::{FocusSection, LensSection, Optics, OpticsFile, SensorSection, WorkingRange},
+    optics::{FocusSection, LensSection, Optics, OpticsFile, SensorSection},
     psf::Psf,
     validity::LARGEST_ALPHA,
 };
@@ -16,6 +16,7 @@ use crate::{
     context::Context,
     error::{Result, WorkflowError},
     figures::rounded,
+    measure::NO_SCALE,
     request::{PathKind, Request},
 };
 
@@ -130,7 +131,8 @@ impl Request for OpticsRequest {
         self.check()?;
         if let Some(path) = &self.optics {
             let (optics, doubts) = GivenOptics::read(path)?.with_doubts();
-            let mut found = figures(&optics, 1, self.contrast, None);
+            let binning = optics.stage().map_or(1, |stage| stage.bin);
+            let mut found = figures(&optics, binning, self.contrast, None);
             found.advice.extend(doubts.iter().map(ToString::to_string));
             return Ok(found);
         }
@@ -143,14 +145,27 @@ impl Request for OpticsRequest {
     }
 }
 
+/// A lens of `calibrate stack` without the size of a pixel at the target has no figures of sensor and aperture.
 #[derive(Clone, PartialEq, Debug, Serialize)]
 pub struct OpticsFigures {
-    #[serde(flatten)]
-    pub range: WorkingRange,
-    pub focal_length_mm: f64,
-    pub f_number: f64,
+    pub far_mm: f64,
+    pub near_mm: f64,
+    /// Lens to sensor for the far-focused image.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sensor_far_mm: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sensor_near_mm: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sensor_travel_mm: Option<f64>,
+    /// Object distance between both focus distances in the sensor's travel.
+    pub alpha0_mm: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub focal_length_mm: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub f_number: Option<f64>,
     /// Of the image, with binning.
-    pub pixel_um: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub pixel_um: Option<f64>,
     /// Sensor pixels per side of an image pixel.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub binning: Option<usize>,
@@ -161,13 +176,18 @@ pub struct OpticsFigures {
     pub farthest_usable_mm: f64,
     pub nearest_usable_mm: f64,
     /// Side of a pixel at the object at mid-range.
-    pub pixel_at_object_mm: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub pixel_at_object_mm: Option<f64>,
     pub advice: Vec<String>,
     /// From noise, root mean square; absent where it exceeds the range.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub expected_error_ro_mm: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub expected_error_whitened_mm: Option<f64>,
+}
+
+fn has_scale(optics: &Optics) -> bool {
+    optics.stage().is_none_or(|stage| stage.scale_known)
 }
 
 fn figures(optics: &Optics, binning: usize, contrast: f64, accepted_mm: Option<f64>) -> OpticsFigures {
@@ -183,20 +203,29 @@ fn figures(optics: &Optics, binning: usize, contrast: f64, accepted_mm: Option<f
             error.whitened_mm
         ));
     }
+    let scaled = |value: f64| has_scale(optics).then_some(value);
+    if !has_scale(optics) {
+        advice.push(NO_SCALE.into());
+    }
     OpticsFigures {
-        range,
-        focal_length_mm: optics.focal_length_mm(),
-        f_number: rounded(optics.f_number(), 3),
-        pixel_um: optics.pixel_um(),
+        far_mm: range.far_mm,
+        near_mm: range.near_mm,
+        sensor_far_mm: scaled(range.sensor_far_mm),
+        sensor_near_mm: scaled(range.sensor_near_mm),
+        sensor_travel_mm: scaled(range.sensor_travel_mm),
+        alpha0_mm: range.alpha0_mm,
+        focal_length_mm: scaled(optics.focal_length_mm()),
+        f_number: scaled(rounded(optics.f_number(), 3)),
+        pixel_um: scaled(optics.pixel_um()),
         binning: accepted_mm.map(|_| binning),
         averaged_exposures: averaged.map(|count| count as usize),
         max_blur_px: rounded(optics.max_blur_px(), 3),
         farthest_usable_mm: rounded(optics.depth_mm(-LARGEST_ALPHA), 3),
         nearest_usable_mm: rounded(optics.depth_mm(LARGEST_ALPHA), 3),
-        pixel_at_object_mm: rounded(
+        pixel_at_object_mm: scaled(rounded(
             optics.pixel_um() * 1e-3 * (range.alpha0_mm / optics.focal_length_mm() - 1.0),
             4,
-        ),
+        )),
         advice,
         expected_error_ro_mm: estimate(error.ro_mm),
         expected_error_whitened_mm: estimate(error.whitened_mm),
@@ -204,7 +233,7 @@ fn figures(optics: &Optics, binning: usize, contrast: f64, accepted_mm: Option<f
 }
 
 fn advice(optics: &Optics) -> Vec<String> {
-    let blur = optics.max_blur_px();
+    let (blur, scaled) = (optics.max_blur_px(), has_scale(optics));
     let [least, most] = USABLE_BLUR_PX;
     let mut advice = Vec::new();
     if blur > most {
@@ -217,7 +246,11 @@ fn advice(optics: &Optics) -> Vec<String> {
                 optics.working_range().near_mm
             )
         });
-        let stop = if f_number <= 22.0 { format!(", stop down to f/{f_number:.1}") } else { String::new() };
+        let stop = if scaled && f_number <= 22.0 {
+            format!(", stop down to f/{f_number:.1}")
+        } else {
+            String::new()
+        };
         advice.push(format!(
             "the largest blur radius is {blur:.1} px, usable is {least} to {most} px: bin {binning} x {binning} pixels{stop}{near}"
         ));
@@ -225,7 +258,9 @@ fn advice(optics: &Optics) -> Vec<String> {
         let f_number = optics.f_number() * blur / BEST_BLUR_PX;
         let near = of_blur(optics, BEST_BLUR_PX)
             .map_or(String::new(), |near| format!(", or focus the near image at {near:.2} mm"));
-        let stop = if f_number >= 0.95 {
+        let stop = if !scaled {
+            "open the aperture".into()
+        } else if f_number >= 0.95 {
             format!("open the aperture to f/{f_number:.1}")
         } else {
             "use a longer lens".into()
@@ -235,7 +270,7 @@ fn advice(optics: &Optics) -> Vec<String> {
         ));
     }
     let airy_px = AIRY_UM * optics.f_number() / optics.pixel_um();
-    if airy_px > 0.7 * blur {
+    if scaled && airy_px > 0.7 * blur {
         advice.push(format!(
             "diffraction blurs by {airy_px:.1} px, as much as defocus does: open the aperture or use larger pixels"
         ));
@@ -321,6 +356,8 @@ fn propose(request: &OpticsRequest) -> Result<(Optics, OpticsFigures)> {
 
 #[cfg(test)]
 mod tests {
+    use farnear_depth::optics::Stage;
+
     use super::*;
 
     fn rig(blur: f64) -> Optics {
@@ -360,6 +397,36 @@ mod tests {
         let wide = of_blur(&rig(133.0), BEST_BLUR_PX).unwrap();
         assert!((wide - rig(BEST_BLUR_PX).working_range().near_mm).abs() < 1e-9);
         assert!(advice(&rig(0.5)).join("; ").contains("open the aperture"));
+    }
+
+    #[test]
+    fn a_lens_without_a_scale_has_no_figures_of_sensor_and_aperture() {
+        let mut file = OpticsFile::from(rig(2.703));
+        file.lens.f_number = Some(60.0);
+        let optics = file.check().unwrap();
+        let figures = |scale_known| {
+            let optics = optics.with_stage(Stage { scale_known, ..Stage::identity(2, 1) });
+            let folder = tempfile::tempdir().unwrap();
+            let path = folder.path().join("lens.toml");
+            std::fs::write(&path, toml::to_string(&optics).unwrap()).unwrap();
+            let request = OpticsRequest { optics: Some(path), ..OpticsRequest::default() };
+            request.run(&Context::unattended()).unwrap()
+        };
+        let (known, unknown) = (figures(true), figures(false));
+        assert!(known.f_number == Some(60.0) && known.pixel_at_object_mm.is_some(), "{known:?}");
+        let text = serde_json::to_string(&unknown).unwrap();
+        for name in ["sensor", "focal_length", "f_number", "pixel_um", "pixel_at_object"] {
+            assert!(!text.contains(name), "{name}: {text}");
+        }
+        let diffraction = |found: &OpticsFigures| found.advice.join("; ").contains("diffraction");
+        assert!(
+            diffraction(&known) && !diffraction(&unknown) && text.contains("--object-pixel-um"),
+            "{text}"
+        );
+        // The noise of averaged pixels.
+        let of_pixels = expected_error(&optics, 0.2, 1).whitened_mm;
+        let error = unknown.expected_error_whitened_mm.unwrap();
+        assert!((2.0 * error / of_pixels - 1.0).abs() < 1e-3, "{error} {of_pixels}");
     }
 
     #[test]

@@ -10,20 +10,23 @@ use serde_json::Value;
 use super::{PathKind, Request};
 use crate::error::{Result, WorkflowError};
 
-/// Checks a request before its work. No field may contradict another, and no result may be inside another, because each
-/// appears when it is complete.
+/// Endings of files that a folder with inputs holds.
+const PICTURES: [&str; 8] = ["png", "tif", "tiff", "jpg", "jpeg", "pgm", "bmp", "npy"];
+
+/// Checks a request before its work. No field may contradict another, no result may be inside another, because each
+/// appears when it is complete, and no file may replace an input.
 pub fn check<R: Request>(request: &R) -> Result<()> {
     request.check()?;
     // A path that is not UTF-8 is checked when it is written.
     let Ok(Value::Object(fields)) = serde_json::to_value(request) else { return Ok(()) };
-    let outputs: Vec<(&'static str, &str)> = R::PATHS
+    let outputs: Vec<(&'static str, PathKind, &str)> = R::PATHS
         .iter()
         .filter(|(_, kind)| matches!(kind, PathKind::OutputFile | PathKind::OutputFolder))
-        .filter_map(|(name, _)| Some((*name, fields.get(*name)?.as_str()?)))
-        .filter(|(_, path)| !path.is_empty())
+        .filter_map(|(name, kind)| Some((*name, *kind, fields.get(*name)?.as_str()?)))
+        .filter(|(.., path)| !path.is_empty())
         .collect();
-    for (index, &(name, path)) in outputs.iter().enumerate() {
-        for (other, taken) in &outputs[..index] {
+    for (index, &(name, _, path)) in outputs.iter().enumerate() {
+        for (other, _, taken) in &outputs[..index] {
             let current = WorkflowError::read("the current folder", Path::new("."));
             if overlap(path.as_ref(), taken.as_ref()).map_err(current)? {
                 let expected =
@@ -32,7 +35,27 @@ pub fn check<R: Request>(request: &R) -> Result<()> {
             }
         }
     }
+    let files = outputs.iter().filter(|(_, kind, _)| *kind == PathKind::OutputFile);
+    let current = std::env::current_dir().unwrap_or_default();
+    let inputs = request.inputs();
+    for &(name, _, path) in files {
+        if let Some(input) = inputs.iter().find(|input| replaces(&current, path.as_ref(), input)) {
+            let expected = format!("it would replace the input {}: name another file", input.display());
+            return Err(WorkflowError::parameter(name, path, expected));
+        }
+    }
     Ok(())
+}
+
+/// Whether a file would replace an input, or a picture in a folder of inputs.
+fn replaces(current: &Path, output: &Path, input: &Path) -> bool {
+    let [output, input] = [output, input].map(|path| on_disk(current, path));
+    let is_picture = |path: &Path| {
+        let ending = path.extension().unwrap_or_default().to_ascii_lowercase();
+        PICTURES.iter().any(|picture| ending == *picture)
+    };
+    output == input
+        || (output.starts_with(&input) && input.is_dir() && output.is_file() && is_picture(&output))
 }
 
 /// Whether two paths name one place, or one names a place inside the other.
@@ -101,6 +124,25 @@ mod tests {
         }
         for (out, plot) in [("b", Some("b2")), ("b/c", Some("b/d")), ("b", Some("")), ("b", None)] {
             assert!(check(&sample(out, plot)).is_ok(), "{out} {plot:?}");
+        }
+    }
+
+    #[test]
+    fn a_file_may_not_replace_an_input() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let place = |name: &str| folder.path().join(name);
+        std::fs::write(place("far.png"), "").expect("a writable folder");
+        std::fs::write(place("note.txt"), "").expect("a writable folder");
+        let sample =
+            |file: &str, plot: &str| Sample { file: place(file), out: place("out"), plot: Some(place(plot)) };
+        for (file, plot) in [("far.png", "far.png"), ("far.png", "gone/../far.png"), (".", "far.png")] {
+            let error = check(&sample(file, plot)).expect_err("refused");
+            assert!(error.is_usage() && error.to_string().contains("would replace the input"), "{error}");
+        }
+        for (file, plot) in
+            [("far.png", "near.png"), (".", "near.png"), (".", "note.txt"), ("far.png", "far")]
+        {
+            assert!(check(&sample(file, plot)).is_ok(), "{file} {plot}");
         }
     }
 

@@ -146,8 +146,8 @@ pub fn run(settings: &ContinuousRequest, context: &Context<'_>) -> Result<Contin
         Err(error) if error.is_cancelled() => equipped.rig.client.stop()?,
         captured => captured?,
     }
-    if folder.is_some() {
-        context.info(&format!("wrote {}", settings.out.as_deref().unwrap_or(".".as_ref()).display()));
+    if let Some(folder) = folder.filter(|folder| !folder.is_empty()) {
+        context.info(&format!("wrote {}", folder.path().display()));
     }
     Ok(tally.figures())
 }

@@ -3,7 +3,7 @@
 use std::{path::PathBuf, time::Instant};
 
 use farnear_capture::board_correction::{decode, encode};
-use farnear_files::{map, staging};
+use farnear_files::staging;
 use ndarray::Array2;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use super::{Rig, RigAddress};
 use crate::{
     context::Context,
-    correct::format_of,
+    correct::{format_of, read_depth},
     correction_file,
     error::{Result, WorkflowError},
     figures::rounded,
@@ -100,7 +100,7 @@ impl BoardCorrectFigures {
 pub fn correct(settings: &BoardCorrectRequest, context: &Context<'_>) -> Result<BoardCorrectFigures> {
     let format = format_of(&settings.out)?;
     let correction = correction_file::read(&settings.correction)?;
-    let depth = map::read(&settings.depth)?;
+    let depth = read_depth(&settings.depth, context)?;
     // The expected result. Also checks that map and correction match.
     let expected = correction.apply_as_board(depth.view())?;
     let board = correction.for_board()?;

@@ -112,7 +112,7 @@ pub fn fit(settings: &FitRequest, context: &Context<'_>) -> Result<FitFigures> {
         let expected = format!("the board fits {}", Method::board_names());
         return Err(WorkflowError::parameter("method", settings.method, expected));
     }
-    let maps = correction::read(&settings.patterns)?;
+    let maps = correction::read(&settings.patterns, context)?;
     let (frame, scale) = frame_and_scale(&maps)?;
     let targets: Vec<CodedTarget> = maps
         .iter()

@@ -22,7 +22,12 @@ use farnear_protocol::{Micros, Settle, message::Axis};
 use ndarray::Array2;
 
 use super::{RigAddress, camera::CameraSettings, camera::EquippedRig};
-use crate::{context::Context, depth::DepthRequest, error::Result, optics::GivenOptics};
+use crate::{
+    context::Context,
+    depth::DepthRequest,
+    error::Result,
+    optics::{GivenOptics, another_size},
+};
 
 /// Longest time for which pairs may be skipped in favour of newer ones.
 const PASSED_OVER: Duration = Duration::from_millis(100);
@@ -111,6 +116,11 @@ pub fn watch(
         let skips = |shown: Instant| shown.elapsed() < PASSED_OVER && waited < shown.elapsed() / 10;
         if stream.waiting()? >= shots.len() && shown.is_some_and(skips) {
             continue;
+        }
+        if shown.is_none()
+            && let Some(doubt) = another_size(&optics.optics, far.image.pixels.dim())
+        {
+            context.progress.warn(&doubt.to_string());
         }
         let arrived = Instant::now();
         (shown, waited) = (Some(arrived), Duration::ZERO);

@@ -20,7 +20,7 @@ use crate::{
     context::Context,
     error::{Result, WorkflowError},
     figures::rounded,
-    measure::{Measured, Unit, fit},
+    measure::{Rectangle, fit},
     optics::GivenOptics,
     request::{PathKind, Request},
     text_file,
@@ -219,15 +219,11 @@ fn figures(
             noise.push(deviation);
         }
     }
-    let lateral = Lateral::Lens(projection);
-    let map = Measured { depth: mean, deviation: None, unit: Unit::Mm, lateral, remarks: Vec::new() };
-    let points: Vec<_> = (0..height)
-        .flat_map(|row| (0..width).filter_map(|column| map.point(column, row)).collect::<Vec<_>>())
-        .collect();
-    let plane = fit(&points).ok_or_else(|| {
+    let whole = Rectangle { x: 0, y: 0, width, height };
+    let plane = fit(mean.view(), Lateral::Lens(projection), whole).ok_or_else(|| {
         WorkflowError::parameter(
             "target",
-            format!("{} pixels with a depth", points.len()),
+            format!("{} pixels with a depth", noise.len()),
             "expected a textured plane within the working range",
         )
     })?;

@@ -27,7 +27,7 @@ use crate::{
     context::Context,
     error::{Result, WorkflowError},
     figures::rounded,
-    optics::GivenOptics,
+    optics::{GivenOptics, another_size},
 };
 
 const MAGIC: &[u8; 8] = b"FNPAIRS1";
@@ -262,6 +262,12 @@ pub fn play(
                 thread::sleep(LOOK.min(at.saturating_sub(begin.elapsed())));
             }
             context.cancel.check("playing a recording")?;
+            if latencies_ms.is_empty()
+                && unrelated_pairs == 0
+                && let Some(doubt) = another_size(&optics, far.pixels.dim())
+            {
+                context.progress.warn(&doubt.to_string());
+            }
             let arrived = Instant::now();
             let Some(found) = measure(&mut depths, grey, context)? else {
                 unrelated_pairs += 1;

@@ -72,7 +72,7 @@ pub struct SequenceRequest {
         arg(long, value_name = "UM", allow_negative_numbers = true, requires = "steps")
     )]
     pub to: Option<f64>,
-    /// Positions of the stack.
+    /// Positions of the stack, both ends included.
     #[cfg_attr(feature = "clap", arg(long, requires_all = ["axis", "from", "to"]))]
     pub steps: Option<usize>,
     /// Run the armed program so often; the images of all runs are kept.
@@ -115,6 +115,15 @@ impl Request for SequenceRequest {
             if count == Some(0) {
                 return Err(WorkflowError::parameter(name, 0, "it takes no images, expected 1 or more"));
             }
+        }
+        if let (Some(1), Some(from), Some(to)) = (self.steps, self.from, self.to)
+            && from != to
+        {
+            let expected = format!(
+                "a single image is taken at one position, but the stack goes from {from} um to {to} um; expected 2 or more, or \
+                 equal positions"
+            );
+            return Err(WorkflowError::parameter("steps", 1, expected));
         }
         Ok(())
     }

@@ -239,6 +239,10 @@ impl Camera for V4lCamera {
         self.restart()
     }
 
+    fn sets_exposure(&mut self) -> bool {
+        self.control_of(&Setting::ExposureUs(0.0)).is_some()
+    }
+
     fn trigger(&mut self, _: u32, _: Micros) -> Result<(), CameraError> {
         Err(CameraError::Trigger { camera: self.kind(), mode: trigger_name(TriggerMode::Software) })
     }

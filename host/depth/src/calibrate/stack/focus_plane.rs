@@ -7,6 +7,7 @@ use ndarray::{Array2, s};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
+use super::StackError;
 use crate::border::reflect;
 
 /// Side of the smallest block in parts of the shorter side.
@@ -51,8 +52,8 @@ impl FocusPlane {
         Self { x_per_px: self.x_per_px * b, y_per_px: self.y_per_px * b, at_origin, ..*self }
     }
 
-    /// Finds the plane. Returns a message if too few blocks have a peak inside the stack.
-    pub fn of(slices: &[Array2<f32>]) -> Result<Self, String> {
+    /// Finds the plane. Fails if too few blocks have a peak inside the stack, and when `proceed` returns false.
+    pub fn of(slices: &[Array2<f32>], proceed: &(dyn Fn() -> bool + Sync)) -> Result<Self, StackError> {
         let (height, width) = slices[0].dim();
         let side = (height.min(width) / BLOCKS).clamp(12, 64);
         let mut smooth: Vec<Array2<f32>> = slices.to_vec();
@@ -61,11 +62,12 @@ impl FocusPlane {
         let mut passes = 0;
         for blurs in BLURS {
             while passes < blurs {
-                smooth = smooth.par_iter().map(blurred).collect();
+                let slices = smooth.par_iter().map(|slice| proceed().then(|| blurred(slice)));
+                smooth = slices.collect::<Option<_>>().ok_or(StackError::Stopped)?;
                 passes += 1;
             }
-            let energies: Vec<Array2<f64>> =
-                smooth.par_iter().map(|slice| laplacian_energy(slice, side)).collect();
+            let energies = smooth.par_iter().map(|slice| proceed().then(|| laplacian_energy(slice, side)));
+            let energies: Vec<Array2<f64>> = energies.collect::<Option<_>>().ok_or(StackError::Stopped)?;
             for merged in MERGED {
                 let points = peaks(&energies, merged, side);
                 let all = (energies[0].nrows() / merged) * (energies[0].ncols() / merged);
@@ -82,12 +84,7 @@ impl FocusPlane {
                 }
             }
         }
-        best.map(|(_, found)| found).ok_or_else(|| {
-            format!(
-                "{most} of {of_most} blocks are sharpest inside the stack: the target must be textured, and the stack must go \
-                 through its focus"
-            )
-        })
+        best.map(|(_, found)| found).ok_or(StackError::NoFocus { blocks: most, of: of_most })
     }
 }
 

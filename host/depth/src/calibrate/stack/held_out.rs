@@ -188,7 +188,8 @@ pub(super) fn finish(
                 [n + 1.0, held + f64::from(u8::from(square <= 9.0)), sum + square]
             });
         let [n, held, sum] = relative;
-        [held / f64::max(n, 1.0), (sum / f64::max(n, 1.0)).sqrt()]
+        // Noise may hide the coarser texture everywhere.
+        if n > 0.0 { [held / n, (sum / n).sqrt()] } else { [1.0, 0.0] }
     };
     let [mut low, mut high] = [0.0, 1.0];
     for _ in 0..30 {

@@ -198,8 +198,10 @@ pub(super) fn learn(target: &Target<'_>) -> Result<Learned, StackError> {
             let fill = inside * samples.of.len() as f64 / samples.looked_at.max(1) as f64;
             let of =
                 |original: bool| robust(judged.iter().filter(|j| j.original == original).map(|j| j.error));
-            // A right lens fits any texture.
-            let robust = (of(true) * of(false)).sqrt() * half_mm;
+            // A right lens fits any texture. Noise may hide the coarser one.
+            let coarser = of(false);
+            let coarser = if coarser.is_finite() { coarser } else { of(true) };
+            let robust = (of(true) * coarser).sqrt() * half_mm;
             // The response compensates a wrong blur, so errors hardly discriminate: prefer the measured blur.
             let unlikely = 1.0 + UNLIKELY * factor.ln().powi(2);
             let cost = unlikely * robust / fill.clamp(0.05, 1.0).powi(2);

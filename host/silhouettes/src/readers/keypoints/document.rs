@@ -40,13 +40,21 @@ pub struct Person {
     pub raw: Vec<Raw>,
     pub layout: &'static Layout,
     pub id: Option<i64>,
+    /// Whether the points were triples in one list.
+    in_triples: bool,
     /// By [`NAMES`], see [`Person::placed`].
     pub points: Vec<Option<Point3>>,
 }
 
 impl Person {
-    fn of((raw, layout): (Vec<Raw>, &'static Layout)) -> Self {
-        Self { raw, layout, id: None, points: Vec::new() }
+    /// For formats that define the third number of a triple as a visibility or a score, of any range.
+    fn scored(mut self) -> Self {
+        if self.in_triples && !self.layout.has_picture_depth() {
+            for raw in &mut self.raw {
+                raw.sure = raw.third.take().or(raw.sure);
+            }
+        }
+        self
     }
 
     /// Orders the points; returns the number that are hidden for their low confidence.
@@ -92,6 +100,8 @@ const POINTS: [&str; 12] = [
     "poseWorldLandmarks",
     "worldLandmarks",
 ];
+/// Keys that only OpenPose and its relatives use.
+const OPENPOSE: [&str; 2] = ["pose_keypoints_2d", "pose_keypoints"];
 const CONFIDENCES: [&str; 3] = ["keypoint_scores", "keypoints_scores", "keypoint_confidences"];
 
 /// A name's texts, each with the number after it, so that `frame_9` sorts before `frame_10`.
@@ -177,7 +187,7 @@ impl Document {
     fn frames_of(&mut self, items: &[Value]) {
         // The points of one person, or people of one frame.
         if let Some(person) = points_of(items, None) {
-            self.frames.push(vec![Person::of(person)]);
+            self.frames.push(vec![person]);
             return;
         }
         for item in items {
@@ -200,8 +210,9 @@ impl Document {
         }
         for item in items {
             let Some(picture) = picture_of(item) else { continue };
+            let is_coco = item.get("image_id").is_some();
             let key = split(names.get(&picture).unwrap_or(&picture));
-            let person = self.person(item);
+            let person = self.person(item).map(|person| if is_coco { person.scored() } else { person });
             frames.entry(key).or_default().extend(person);
         }
         self.numbered(frames);
@@ -216,7 +227,8 @@ impl Document {
             for (own, value) in inner.as_object().into_iter().flatten() {
                 let (id, frame) = if are_frames { (own, name) } else { (name, own) };
                 let person = self.person(value);
-                let person = person.map(|person| Person { id: id.parse().ok().or(person.id), ..person });
+                let person =
+                    person.map(|person| Person { id: id.parse().ok().or(person.id), ..person.scored() });
                 frames.entry(split(frame)).or_default().extend(person);
             }
         }
@@ -246,7 +258,7 @@ impl Document {
         };
         match people {
             Value::Array(items) => match points(people, None) {
-                Some(points) => vec![Person::of(points)],
+                Some(person) => vec![person],
                 None => items.iter().filter_map(|item| self.person(item)).collect(),
             },
             Value::Object(map) => {
@@ -265,7 +277,7 @@ impl Document {
 
     fn person(&mut self, value: &Value) -> Option<Person> {
         let Value::Object(map) = value else {
-            return points(value, None).map(Person::of);
+            return points(value, None);
         };
         let id = ["person_id", "idx", "track_id"].iter().find_map(|key| first_number(map.get(*key)?));
         let confidences = CONFIDENCES.iter().find_map(|key| map.get(*key)?.as_array());
@@ -273,15 +285,14 @@ impl Document {
             let value = map.get(*key)?;
             // MediaPipe's Python objects keep a list within.
             let value = value.get("landmark").unwrap_or(value);
-            points(value, confidences.map(Vec::as_slice))
+            let person = points(value, confidences.map(Vec::as_slice))?;
+            Some(if OPENPOSE.contains(key) { person.scored() } else { person })
         })?;
-        Some(Person { id: id.filter(|id| *id >= 0.0).map(|id| id as i64), ..Person::of(found) })
+        Some(Person { id: id.filter(|id| *id >= 0.0).map(|id| id as i64), ..found })
     }
 }
 
-type Found = (Vec<Raw>, &'static Layout);
-
-fn points(value: &Value, confidences: Option<&[Value]>) -> Option<Found> {
+fn points(value: &Value, confidences: Option<&[Value]>) -> Option<Person> {
     match value {
         Value::Object(columns) => points_of(&rows(columns)?, confidences),
         other => points_of(other.as_array()?, confidences),
@@ -289,16 +300,16 @@ fn points(value: &Value, confidences: Option<&[Value]>) -> Option<Found> {
 }
 
 /// Points as x, y, c, ... in one list, lists of two to four numbers, or objects with x and y.
-fn points_of(items: &[Value], confidences: Option<&[Value]>) -> Option<Found> {
+fn points_of(items: &[Value], confidences: Option<&[Value]>) -> Option<Person> {
     let flat = items.iter().any(|item| number(item).is_some());
-    let (layout, mut raw): (_, Vec<Raw>) = if flat {
+    let (layout, in_triples, mut raw): (_, _, Vec<Raw>) = if flat {
         // No two layouts share a length.
         let (layout, width) = [3, 2, 4].iter().find_map(|width| {
             let layout =
                 Layout::of(items.len() / width).filter(|layout| layout.count * width == items.len())?;
             Some((layout, *width))
         })?;
-        (layout, items.chunks_exact(width).map(of_numbers).collect())
+        (layout, width == 3, items.chunks_exact(width).map(of_numbers).collect())
     } else {
         let of = |item: &Value| match item {
             Value::Array(numbers) if (2..=4).contains(&numbers.len()) => Some(of_numbers(numbers)),
@@ -306,12 +317,12 @@ fn points_of(items: &[Value], confidences: Option<&[Value]>) -> Option<Found> {
             Value::Null => Some(Raw::MISSING),
             _ => None,
         };
-        (Layout::of(items.len())?, items.iter().map(of).collect::<Option<_>>()?)
+        (Layout::of(items.len())?, false, items.iter().map(of).collect::<Option<_>>()?)
     };
     for (raw, given) in raw.iter_mut().zip(confidences.unwrap_or_default()) {
         raw.sure = Some(number(given).unwrap_or(f64::NAN));
     }
-    Some((raw, layout))
+    Some(Person { raw, layout, id: None, in_triples, points: Vec::new() })
 }
 
 fn of_numbers(numbers: &[Value]) -> Raw {

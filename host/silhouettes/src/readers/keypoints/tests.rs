@@ -2,6 +2,8 @@ use super::super::{read, recording::Choices};
 use super::*;
 use layouts::{LAYOUTS, Layout};
 
+mod scores;
+
 /// An upright person at x, 170 pixels tall: 1 px is 10 mm.
 fn person(layout: &Layout, x: f64) -> Vec<[f64; 3]> {
     let place = |name: &str| -> [f64; 2] {

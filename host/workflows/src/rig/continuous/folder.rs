@@ -1,8 +1,8 @@
 //! A capture folder per pair or an image per exposure, and `frames.csv` with a row per frame.
 
 use std::{
-    fs::File,
-    io::Write,
+    fs::{self, File},
+    io::{self, Write},
     path::{Path, PathBuf},
 };
 
@@ -23,24 +23,42 @@ use farnear_files::{
 use crate::error::Result;
 
 const ROWS: &str = "frames.csv";
+const HEAD: &[u8] =
+    b"frame,shot,repeat,trigger_number,trigger_us,strobe_end_us,settle_us,deviation_nm,dropped\n";
 
+/// Dropping it removes the folder if it is new and nothing was captured.
 pub struct Folder {
     path: PathBuf,
-    rows: File,
+    is_new: bool,
+    /// `None` before the first frame.
+    rows: Option<File>,
     pairs: u32,
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        if self.is_new && self.is_empty() {
+            let _ = fs::remove_dir(&self.path); // fails if something else is in it
+        }
+    }
 }
 
 impl Folder {
     /// Creates the folder, which must be new or empty. Complete captures remain if the run ends early.
     pub fn begin(path: &Path) -> Result<Self> {
+        let is_new = !path.exists();
         Staging::new_folder(path)
             .and_then(Staging::finish)
             .map_err(farnear_capture::record::RecordError::from)?;
-        let head =
-            b"frame,shot,repeat,trigger_number,trigger_us,strobe_end_us,settle_us,deviation_nm,dropped\n";
-        let csv = path.join(ROWS);
-        let rows = File::create_new(&csv).and_then(|mut rows| rows.write_all(head).map(|()| rows));
-        Ok(Self { path: path.into(), rows: rows.map_err(StagingError::at(&csv))?, pairs: 0 })
+        Ok(Self { path: path.into(), is_new, rows: None, pairs: 0 })
+    }
+
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    pub fn is_empty(&self) -> bool {
+        self.rows.is_none()
     }
 
     pub fn note(&mut self, outcome: &Outcome) -> Result<()> {
@@ -67,8 +85,20 @@ impl Folder {
                 format!("{number},,,,,,,,\"{}\"\n", why.replace('"', "'"))
             }
         };
-        let written = self.rows.write_all(row.as_bytes());
-        Ok(written.map_err(StagingError::at(&self.path.join(ROWS)))?)
+        self.write(row.as_bytes()).map_err(StagingError::at(&self.path.join(ROWS)))?;
+        Ok(())
+    }
+
+    fn write(&mut self, row: &[u8]) -> io::Result<()> {
+        let rows = match &mut self.rows {
+            Some(rows) => rows,
+            none => {
+                let rows = none.insert(File::create_new(self.path.join(ROWS))?);
+                rows.write_all(HEAD)?;
+                rows
+            }
+        };
+        rows.write_all(row)
     }
 
     pub fn pair(
@@ -92,5 +122,29 @@ impl Folder {
         let image = encode_png(frame.image.pixels.view(), frame.image.bits)
             .map_err(farnear_capture::record::RecordError::from)?;
         Ok(write_file(&path, &image)?)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_folder_without_a_frame_is_removed() {
+        let parent = tempfile::tempdir().unwrap();
+        let out = parent.path().join("out");
+        drop(Folder::begin(&out).unwrap());
+        assert!(!out.exists());
+        let dropped = Outcome::Dropped { number: 0, loss: Loss::EventLost };
+        let mut folder = Folder::begin(&out).unwrap();
+        folder.note(&dropped).unwrap();
+        folder.note(&dropped).unwrap();
+        drop(folder);
+        assert_eq!(fs::read_to_string(out.join(ROWS)).unwrap().lines().count(), 1 + 2);
+
+        let own = parent.path().join("own");
+        fs::create_dir(&own).unwrap();
+        drop(Folder::begin(&own).unwrap());
+        assert!(own.exists(), "it was there before");
     }
 }

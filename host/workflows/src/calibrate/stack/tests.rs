@@ -1,0 +1,38 @@
+use super::*;
+
+#[test]
+fn a_given_step_unlike_the_stated_one_has_a_remark() {
+    assert_eq!(contradiction(0.1, None), None);
+    assert_eq!(contradiction(0.1, Some(Ok(101.0))), None);
+    let remark = contradiction(0.5, Some(Ok(100.0))).unwrap();
+    assert!(remark.contains("0.1 mm") && remark.contains("--step-mm 0.5"), "{remark}");
+    let uneven = even_step(&[0.0, 100.0, 230.0, 300.0], &CalibrateStackRequest::default());
+    assert!(contradiction(0.1, Some(uneven)).unwrap().contains("uneven"));
+}
+
+#[test]
+fn uneven_positions_are_refused_by_the_slices_between_which_they_are() {
+    let request = CalibrateStackRequest::default();
+    assert!((even_step(&[5.0, 4.0, 3.02, 2.0], &request).unwrap() - 1.0).abs() < 1e-12);
+    let error = even_step(&[0.0, 1.0, 2.0, 3.5], &request).unwrap_err().to_string();
+    assert!(error.contains("slices 3 and 4 are 1.5"), "{error}");
+    let standing = even_step(&[1.0, 1.0, 2.0], &request).unwrap_err().to_string();
+    assert!(standing.contains("slices 1 and 2 are 0"), "{standing}");
+}
+
+#[test]
+fn the_record_of_a_rig_gives_order_and_scale() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("capture.toml"), include_bytes!("../../sessions/capture.toml"))
+        .unwrap();
+    let stack = || CalibrateStackRequest { stack: folder.path().into(), ..CalibrateStackRequest::default() };
+    assert_eq!(Listed::of(&stack()).unwrap().images.len(), 2);
+    for request in [
+        CalibrateStackRequest { near_first: true, ..stack() },
+        CalibrateStackRequest { object_pixel_um: Some(3.0), ..stack() },
+        CalibrateStackRequest { step_mm: Some(0.1), ..stack() },
+    ] {
+        let error = Listed::of(&request).err().unwrap();
+        assert!(error.is_usage() && error.to_string().contains("--near-first"), "{error}");
+    }
+}
