@@ -40,11 +40,13 @@ impl Bank {
     }
 
     /// What noise of unit variance adds to a pixel's products. R1, R3 and U0 act on the sum of the images, so their products
-    /// have a mean; without its removal noise would draw depth to alpha = 0. The least slope is half of the expected one.
-    pub(super) fn of_noise(&self) -> OfNoise {
+    /// have a mean; without its removal noise would draw depth to alpha = 0. `white` is the part of the noise that these
+    /// products are known of. The least slope is half of the expected one.
+    pub(super) fn of_noise(&self, white: f32) -> OfNoise {
         let Whitened { residual: [_, r1, _, r3], matched, slope_in_energy, .. } = &self.0;
         let [c1, c3, energy] = [r1, r3, matched].map(|kernel| 2.0 * product(kernel, matched) as f32);
         let least_slope = 0.5 * *slope_in_energy as f32;
+        let [c1, c3] = [c1, c3].map(|of_white| white * of_white);
         OfNoise { c1, c3, energy, least_evidence: LEAST_EVIDENCE, least_slope }
     }
 

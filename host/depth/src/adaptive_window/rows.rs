@@ -168,7 +168,7 @@ impl<'a> Tile<'a> {
                 floor: FLOOR.powi(2),
             },
             of_residual,
-            of_noise: job.bank.of_noise(),
+            of_noise: job.bank.of_noise(job.scales.white),
             inner: Inner { size: job.far.dim(), reach },
         }
     }

@@ -8,12 +8,17 @@ use crate::prepare::noise::PairNoise;
 /// Least variance of a pixel, in squared means: above the rounding errors of running sums.
 const LEAST_NOISE: f64 = 1e-8;
 
+/// Part of the noise of lossy compression that is coarser than a pixel. Chosen between 0.1 (JPEG of quality 92) and 0.6 (85).
+const LOW_PASS: f64 = 0.5;
+
 pub(super) struct Scales {
     pub mean: f32,
     pub gain: f32,
     /// Variance of a pixel of brightness b (in means): `constant + per_unit b`.
     pub noise: [f32; 2],
     pub least_noise: f32,
+    /// Part of the variance that is noise of single pixels.
+    pub white: f32,
     pub whole: bool,
 }
 
@@ -40,6 +45,7 @@ impl Scales {
                 (noise.per_unit * scale / square) as f32,
             ],
             least_noise: (noise.variance(mean) / square * 0.1).max(LEAST_NOISE) as f32,
+            white: (1.0 - LOW_PASS * noise.added / noise.mean_variance.max(f64::MIN_POSITIVE)) as f32,
             whole,
         }
     }

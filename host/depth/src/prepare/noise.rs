@@ -37,6 +37,9 @@ pub struct PairNoise {
     /// The part of `constant` that lossy compression made.
     #[serde(default)]
     pub coding: f64,
+    /// The part of `constant` that [`Self::coded`] added. It has other frequencies than noise of single pixels.
+    #[serde(default)]
+    pub added: f64,
 }
 
 impl PairNoise {
@@ -53,6 +56,7 @@ impl PairNoise {
             constant: self.constant + added,
             mean_variance: self.mean_variance + added,
             coding: coding + DETAIL * hidden,
+            added,
             ..self
         }
     }
@@ -97,7 +101,7 @@ pub fn of_pair(far: ArrayView2<f32>, near: ArrayView2<f32>) -> Option<PairNoise>
     let tells = to[0] - from[0] > 0.1 * to[0].abs() && slope.is_finite() && slope > 0.0;
     let per_unit = if tells { slope } else { 0.0 };
     let constant = if tells { from[1] - slope * from[0] } else { mean_variance };
-    Some(PairNoise { constant, per_unit, mean_variance, coding: 0.0 })
+    Some(PairNoise { constant, per_unit, mean_variance, ..PairNoise::default() })
 }
 
 /// Variance of the far image, of the near one, their covariance, and the mean brightness, of each block of a row.

@@ -63,7 +63,7 @@ fn every_processor_gives_what_avx2_gave() {
     let operators = Operators::for_optics(&optics).unwrap();
     let bank = Bank::whitened(&optics).unwrap();
     let [far, near] = pair();
-    let noise = PairNoise { constant: 0.25, per_unit: 0.0, mean_variance: 0.25, coding: 0.0 };
+    let noise = PairNoise { constant: 0.25, per_unit: 0.0, mean_variance: 0.25, ..PairNoise::default() };
     for backend in Backend::available() {
         let settings = Settings { backend: Some(backend), ..Settings::default() };
         let map = depth_from_pair(far.view(), near.view(), &operators, &optics, &settings).unwrap();

@@ -112,7 +112,7 @@ impl CameraNoise {
         let constant = ((1.0 - black) * read_noise_e / full_well_e).powi(2) + rounding - per_unit * black;
         // At half of full scale.
         let mean_variance = (constant + 0.5 * per_unit).max(0.0);
-        Some(PairNoise { constant, per_unit, mean_variance, coding: 0.0 })
+        Some(PairNoise { constant, per_unit, mean_variance, ..PairNoise::default() })
     }
 }
 

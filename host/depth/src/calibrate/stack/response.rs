@@ -301,9 +301,13 @@ impl Target<'_> {
                 let [far_image, near_image] = [&prepared.far, &prepared.near].map(blurred);
                 let mut coarse = Prepared { far: far_image, near: near_image, ..prepared.clone() };
                 let noise = &mut coarse.noise;
-                for value in
-                    [&mut noise.constant, &mut noise.per_unit, &mut noise.mean_variance, &mut noise.coding]
-                {
+                for value in [
+                    &mut noise.constant,
+                    &mut noise.per_unit,
+                    &mut noise.mean_variance,
+                    &mut noise.coding,
+                    &mut noise.added,
+                ] {
                     *value *= SMOOTHED_NOISE;
                 }
                 let pair =
