@@ -80,7 +80,7 @@ impl Default for StackSettings {
 }
 
 impl StackSettings {
-    /// Checks what does not depend on the images. Returns the [`StackError`] of the first setting out of range.
+    /// Checks all settings. Returns the [`StackError`] of the first setting out of range.
     pub fn check(&self) -> Result<(), StackError> {
         let odd = |what, value: usize, least, most| {
             let fits = value % 2 == 1 && (least..=most).contains(&value);
