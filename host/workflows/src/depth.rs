@@ -149,6 +149,11 @@ impl Inputs {
                 format!("the optics of calibrate stack average {0} x {0} pixels: give no region", stage.bin);
             return Err(WorkflowError::parameter("region", region, expected));
         }
+        if let Some(frames) = settings.camera_frames.as_ref().filter(|_| pair.is_without_dark) {
+            let expected = "the dark signal of this capture was subtracted with its ambient light or by camera frames: give no \
+                            camera frames";
+            return Err(WorkflowError::parameter("camera-frames", frames.display(), expected));
+        }
         let bin = settings.bin_for(&optics, is_mosaic(pair.far.view()), &mut doubts);
         if bin > 1 {
             let [far, near] = [&mut pair.far, &mut pair.near].map(|image| binned(std::mem::take(image), bin));

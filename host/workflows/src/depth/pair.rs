@@ -17,6 +17,8 @@ pub struct Pair {
     pub samples: Samples,
     /// Mean variance of a pixel by lossy compression.
     pub coding_variance: f64,
+    /// Whether the record of the capture says that the dark signal was subtracted.
+    pub is_without_dark: bool,
 }
 
 impl Pair {
@@ -49,9 +51,12 @@ impl Pair {
         let white = white.unwrap_or(1.0);
         let of_files = 0.5 * (far_image.coding_variance + near_image.coding_variance);
         // A capture's pictures are PNG; its record tells what the camera gave.
-        let record = far.parent().filter(|_| of_files == 0.0).and_then(|folder| read_record(folder).ok()?);
-        let of_camera = record.and_then(|record| record.camera.coding_variance);
+        let record = far.parent().and_then(|folder| read_record(folder).ok()?);
+        let of_camera =
+            record.as_ref().filter(|_| of_files == 0.0).and_then(|record| record.camera.coding_variance);
         Ok(Self {
+            is_without_dark: record
+                .is_some_and(|record| record.camera.corrected || record.camera.ambient_subtracted),
             coding_variance: of_files + of_camera.map_or(0.0, |variance| variance / f64::from(white).powi(2)),
             far: far_image.pixels,
             near: near_image.pixels,
@@ -110,6 +115,24 @@ mod tests {
         let record = record.replace("[camera]\n", "[camera]\ncoding_variance = 2.5e-5\n");
         std::fs::write(folder.path().join(CAPTURE_FILE), record).unwrap();
         assert_eq!(variance(), 2.5e-5);
+    }
+
+    #[test]
+    fn the_record_of_a_capture_tells_of_a_subtracted_dark_signal() {
+        let folder = tempfile::tempdir().unwrap();
+        let [far, near] = ["far.png", "near.png"].map(|name| folder.path().join(name));
+        for (file, code) in [(&far, 10_u16), (&near, 20)] {
+            std::fs::write(file, encode_png(Array2::from_elem((4, 5), code).view(), 8).unwrap()).unwrap();
+        }
+        for (line, expected) in
+            [("", false), ("corrected = true\n", true), ("ambient_subtracted = true\n", true)]
+        {
+            let record = include_str!("../sessions/capture.toml");
+            let record = record.replace("[camera]\n", &format!("[camera]\n{line}"));
+            std::fs::write(folder.path().join(CAPTURE_FILE), record).unwrap();
+            let pair = Pair::read(&far, &near, &ReadSettings::default()).unwrap();
+            assert_eq!(pair.is_without_dark, expected, "{line}");
+        }
     }
 
     #[test]

@@ -108,6 +108,10 @@ impl Request for CaptureRequest {
     type Figures = PairFigures;
 
     fn check(&self) -> Result<()> {
+        if let Some(frames) = self.camera_frames.as_ref().filter(|_| self.subtract_ambient) {
+            let expected = "subtracting the ambient light subtracts the dark signal, too: give one of both";
+            return Err(WorkflowError::parameter("camera-frames", frames.display(), expected));
+        }
         within("average", self.average, &(1..=AVERAGED_MAX), "exposures")
     }
 
@@ -279,4 +283,19 @@ pub(super) fn noted(
     record.camera.settings =
         settings.settings.iter().map(|setting| (setting.name().to_owned(), setting.value())).collect();
     record
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_dark_signal_is_subtracted_once() {
+        let frames = Some(PathBuf::from("frames"));
+        let request =
+            CaptureRequest { camera_frames: frames, subtract_ambient: true, ..CaptureRequest::default() };
+        let error = request.check().unwrap_err();
+        assert!(error.is_usage() && error.to_string().contains("dark signal"), "{error}");
+        assert!(CaptureRequest { subtract_ambient: false, ..request }.check().is_ok());
+    }
 }
