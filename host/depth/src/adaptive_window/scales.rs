@@ -8,9 +8,6 @@ use crate::prepare::noise::PairNoise;
 /// Least variance of a pixel, in squared means: above the rounding errors of running sums.
 const LEAST_NOISE: f64 = 1e-8;
 
-/// Part of the noise of lossy compression that is coarser than a pixel. Chosen between 0.1 (JPEG of quality 92) and 0.6 (85).
-const LOW_PASS: f64 = 0.5;
-
 pub(super) struct Scales {
     pub mean: f32,
     pub gain: f32,
@@ -45,7 +42,9 @@ impl Scales {
                 (noise.per_unit * scale / square) as f32,
             ],
             least_noise: (noise.variance(mean) / square * 0.1).max(LEAST_NOISE) as f32,
-            white: (1.0 - LOW_PASS * noise.added / noise.mean_variance.max(f64::MIN_POSITIVE)) as f32,
+            // The more of the noise a lossy coding makes, the coarser is what it adds.
+            white: 1.0
+                - (noise.coding * noise.added / noise.mean_variance.powi(2).max(f64::MIN_POSITIVE)) as f32,
             whole,
         }
     }
