@@ -287,97 +287,74 @@ mod tests {
         assert!(error.to_string().contains("a.png"), "{error}");
     }
 
-    /// Frames written by ffmpeg with the times of `filter`, read back; `None` without ffmpeg or its encoder.
-    fn through_ffmpeg(filter: &str) -> Option<(usize, Option<String>)> {
+    /// What ffmpeg writes for its own test picture with these arguments.
+    fn by_ffmpeg(arguments: &str) -> Vec<u8> {
+        let output = std::process::Command::new("ffmpeg")
+            .args(["-nostdin", "-v", "error"])
+            .args(arguments.split(' '))
+            .arg("-")
+            .output()
+            .unwrap();
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        output.stdout
+    }
+
+    /// Frames written by ffmpeg with the times of `filter`, read back.
+    fn through_ffmpeg(filter: &str) -> (usize, Option<String>) {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("recorded.webm");
-        let made = std::process::Command::new("ffmpeg")
-            .args([
-                "-nostdin",
-                "-v",
-                "error",
-                "-f",
-                "lavfi",
-                "-i",
-                "testsrc=size=64x48:rate=30:duration=2",
-                "-vf",
-            ])
-            .args([filter, "-vsync", "passthrough", "-enc_time_base", "1/1000", "-c:v", "libvpx"])
-            .arg(&file)
-            .status();
-        if !made.is_ok_and(|status| status.success()) {
-            return None;
-        }
+        let recorded = by_ffmpeg(&format!(
+            "-f lavfi -i testsrc=size=64x48:rate=30:duration=2 -vf {filter} -vsync passthrough -enc_time_base 1/1000 -c:v libvpx \
+             -f webm"
+        ));
+        std::fs::write(&file, recorded).unwrap();
         let mut video = Video::open(&file).unwrap();
         let frames = video.by_ref().map(Result::unwrap).count();
-        Some((frames, video.take_remarks().pop()))
+        (frames, video.take_remarks().pop())
     }
 
     #[test]
+    #[cfg_attr(not(ffmpeg), ignore = "needs ffmpeg")]
     fn uneven_times_of_a_browser_are_resampled_to_the_nominal_rate() {
         // Every seventh frame dropped, the others late by up to 2 ms, and a pause of half a second.
         let filter = "select='not(eq(mod(n\\,7)\\,3))',settb=1/1000,setpts='PTS+mod(N*7\\,3)+500*gt(N\\,20)'";
-        let Some((frames, remark)) = through_ffmpeg(filter) else {
-            eprintln!("skipped: no ffmpeg");
-            return;
-        };
+        let (frames, remark) = through_ffmpeg(filter);
         assert!((74..=76).contains(&frames), "{frames} frames of 2.5 s at 30 frames/s");
         let remark = remark.expect("a remark");
         assert!(remark.contains("frame rate varies") && remark.contains("30.00 frames/s"), "{remark}");
     }
 
     #[test]
+    #[cfg_attr(not(ffmpeg), ignore = "needs ffmpeg")]
     fn pixels_that_are_not_square_are_widened() {
-        let Some((_, remark)) = through_ffmpeg("setsar=2/1") else {
-            eprintln!("skipped: no ffmpeg");
-            return;
-        };
+        let (_, remark) = through_ffmpeg("setsar=2/1");
         assert!(remark.is_some_and(|remark| remark.contains("2.000 times as wide as high")));
     }
 
-    /// A recording whose size changes after one second, as browsers' meetings do; `None` without ffmpeg.
-    fn of_two_sizes(second: &str) -> Option<tempfile::TempDir> {
+    /// A recording whose size changes after one second, as browsers' meetings do.
+    fn of_two_sizes(second: &str) -> tempfile::TempDir {
         let folder = tempfile::tempdir().unwrap();
-        let parts = ["64x48", second].map(|size| {
-            let offset = if size == "64x48" { "0" } else { "1" };
-            let source = format!("testsrc=size={size}:rate=30:duration=1");
-            let output = std::process::Command::new("ffmpeg")
-                .args(["-nostdin", "-v", "error", "-f", "lavfi", "-i", &source, "-output_ts_offset", offset])
-                .args(["-c:v", "mpeg2video", "-f", "mpegts", "-"])
-                .output();
-            output.ok().filter(|output| output.status.success()).map(|output| output.stdout)
+        let parts = [("64x48", 0), (second, 1)].map(|(size, offset)| {
+            by_ffmpeg(&format!(
+                "-f lavfi -i testsrc=size={size}:rate=30:duration=1 -output_ts_offset {offset} -c:v mpeg2video -f mpegts"
+            ))
         });
-        let [first, second] = parts;
-        std::fs::write(folder.path().join("call.ts"), [first?, second?].concat()).unwrap();
-        Some(folder)
+        std::fs::write(folder.path().join("call.ts"), parts.concat()).unwrap();
+        folder
     }
 
     #[test]
+    #[cfg_attr(not(ffmpeg), ignore = "needs ffmpeg")]
     fn of_several_streams_the_default_one_is_read_and_reported() {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("two.mkv");
-        let source = |size: &str| format!("testsrc=size={size}:rate=30:duration=1");
-        let made = std::process::Command::new("ffmpeg")
-            .args(["-nostdin", "-v", "error", "-f", "lavfi", "-i", &source("64x48")])
-            .args([
-                "-f",
-                "lavfi",
-                "-i",
-                &source("128x96"),
-                "-map",
-                "0:v",
-                "-map",
-                "1:v",
-                "-c:v",
-                "mpeg2video",
-            ])
-            .args(["-disposition:v:0", "0", "-disposition:v:1", "default"])
-            .arg(&file)
-            .status();
-        if !made.is_ok_and(|status| status.success()) {
-            eprintln!("skipped: no ffmpeg");
-            return;
-        }
+        let source = |size: &str| format!("-f lavfi -i testsrc=size={size}:rate=30:duration=1");
+        let recorded = by_ffmpeg(&format!(
+            "{} {} -map 0:v -map 1:v -c:v mpeg2video -disposition:v:0 0 -disposition:v:1 default -f matroska",
+            source("64x48"),
+            source("128x96")
+        ));
+        std::fs::write(&file, recorded).unwrap();
         let mut video = Video::open(&file).unwrap();
         let remark = video.take_remarks().concat();
         assert!(remark.contains("0:0 (64x48), 0:1 (128x96): ffmpeg chose 0:1"), "{remark}");
@@ -386,11 +363,9 @@ mod tests {
     }
 
     #[test]
+    #[cfg_attr(not(ffmpeg), ignore = "needs ffmpeg")]
     fn frames_after_a_change_of_size_are_kept_and_another_shape_is_refused() {
-        let (Some(larger), Some(turned)) = (of_two_sizes("128x96"), of_two_sizes("48x64")) else {
-            eprintln!("skipped: no ffmpeg");
-            return;
-        };
+        let [larger, turned] = ["128x96", "48x64"].map(of_two_sizes);
         let mut video = Video::open(&larger.path().join("call.ts")).unwrap();
         let frames = video.by_ref().map(Result::unwrap).count();
         assert!((58..=61).contains(&frames), "{frames}");
@@ -400,13 +375,10 @@ mod tests {
     }
 
     #[test]
+    #[cfg_attr(not(ffmpeg), ignore = "needs ffmpeg")]
     fn a_constant_rate_in_milliseconds_is_read_frame_by_frame() {
         for filter in ["settb=1/1000", "settb=1/1000,setpts=N*59"] {
-            let Some((frames, remark)) = through_ffmpeg(filter) else {
-                eprintln!("skipped: no ffmpeg");
-                return;
-            };
-            assert_eq!((frames, remark), (60, None), "{filter}");
+            assert_eq!(through_ffmpeg(filter), (60, None), "{filter}");
         }
     }
 }
