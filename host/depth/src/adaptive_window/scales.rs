@@ -42,7 +42,7 @@ impl Scales {
                 (noise.per_unit * scale / square) as f32,
             ],
             least_noise: (noise.variance(mean) / square * 0.1).max(LEAST_NOISE) as f32,
-            // The more of the noise a lossy coding makes, the coarser is what it adds.
+            // Strong compression leaves little noise of single pixels: the white part falls with the share of the coding.
             white: 1.0
                 - (noise.coding * noise.added / noise.mean_variance.powi(2).max(f64::MIN_POSITIVE)) as f32,
             whole,

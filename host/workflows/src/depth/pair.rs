@@ -17,7 +17,7 @@ pub struct Pair {
     pub samples: Samples,
     /// Mean variance of a pixel by lossy compression.
     pub coding_variance: f64,
-    /// Whether the record of the capture says that the dark signal was subtracted.
+    /// The dark signal was subtracted, by the record of the capture.
     pub is_without_dark: bool,
 }
 
