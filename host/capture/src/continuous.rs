@@ -262,11 +262,11 @@ impl Client {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
     use farnear_protocol::{message::Axis, units::BoardMicros};
 
-    fn frame(number: u32, index: u8) -> Frame {
+    pub(crate) fn frame(number: u32, index: u8) -> Frame {
         let record = ShotRecord {
             index,
             repeat: 0,

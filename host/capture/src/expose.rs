@@ -273,24 +273,16 @@ mod tests {
     use farnear_protocol::units::BoardMicros;
 
     use super::*;
+    use crate::continuous::tests::frame;
 
     #[test]
     fn reports_a_strobe_of_another_length_than_the_exposure() {
         let note = |exposure_us: u32, strobe_us: u64| {
             strobe_note(&ShotRecord {
-                index: 0,
-                repeat: 0,
-                trigger_number: 7,
-                axis: Axis::SensorFine,
-                asked: Nanometres(0),
-                coarse: Nanometres(0),
-                fine: Nanometres(0),
-                lens: Nanometres(0),
-                settle: Micros(0),
-                trigger: BoardMicros(980),
                 strobe_start: BoardMicros(1_000),
                 strobe_end: BoardMicros(1_000 + strobe_us),
                 exposure: Micros(exposure_us),
+                ..frame(7, 0).record
             })
         };
         assert_eq!([note(2_000, 1_900), note(2_000, 2_120), note(100_000, 101_000)], [None, None, None]);
