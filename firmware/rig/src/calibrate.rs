@@ -54,6 +54,15 @@ impl Calibrating {
         }
     }
 
+    /// Positions that the piezo must be allowed to reach.
+    pub(crate) const fn places(&self) -> &'static [Nanometres] {
+        match self {
+            Self::Travel(_) | Self::Backlash(_) => &[],
+            Self::Piezo(_) => &sweep::WHOLE_STROKE,
+            Self::Gauge(_) => &gauge::PLACES,
+        }
+    }
+
     pub(crate) fn tick(&mut self, stage: &mut Stage, settings: &Settings) -> Step {
         match self {
             Self::Travel(travel) => travel.tick(stage, settings),

@@ -49,7 +49,10 @@ impl Rig {
             Request::ReadSetting { key } => Ok(Response::Setting(self.values.setting(*key))),
             Request::WriteSetting { key, value } => self.write_setting(*key, *value),
             Request::ReadCounters => Ok(Response::Counters(self.counters())),
-            Request::Sun(query) => Ok(Response::Sun(sun_query::answer(query))),
+            Request::Sun(query) => {
+                self.must_stand()?;
+                Ok(Response::Sun(sun_query::answer(query)))
+            }
             Request::OpenCorrection(info) => accepted(self.correction()?.open(*info)),
             Request::LoadCorrection => answer(self.correction()?.load(), Response::Correction),
             Request::StoreCorrection => self.store_correction(),

@@ -9,8 +9,8 @@ use farnear_protocol::{Micros, Nanometres, Settle};
 use crate::gains::{Gains, PiezoModel, Poles};
 use crate::io::TICK_US;
 
-pub(crate) use self::table::KEYS;
 pub use self::table::Values;
+pub(crate) use self::table::{FINE_MAX_NM, KEYS};
 
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Settings {

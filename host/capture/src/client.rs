@@ -43,12 +43,19 @@ pub struct Client {
     alternating: bool,
 }
 
+/// Cached settings of the board on which timeouts depend.
+#[derive(Default)]
+pub(crate) struct Known {
+    pub paces: Vec<(Axis, Pace)>,
+    pub readout: Option<Duration>,
+}
+
 /// Channel to the port's thread, which ends with the last handle.
 struct Port {
     name: String,
     timing: Arc<Mutex<Timing>>,
     wanted: Option<LinkRate>,
-    paces: Mutex<Vec<(Axis, Pace)>>,
+    known: Mutex<Known>,
     inbox: Option<Sender<Command>>,
     thread: Option<JoinHandle<()>>,
 }
@@ -68,6 +75,13 @@ impl Client {
     pub fn open(port: &str) -> Result<Self, ClientError> {
         let (port, wanted) = with_rate(port)?;
         Self::start(serial(port), port, false, wanted)
+    }
+
+    /// As [`Client::open`] for a stop or a halt, which a change of the link rate would delay: says hello at the port's
+    /// rate first, and keeps the board's.
+    pub fn open_to_stop(port: &str) -> Result<Self, ClientError> {
+        let (port, first) = with_rate(port)?;
+        Self::start_at(serial(port), port, false, (first, None))
     }
 
     /// As [`Client::open`] for an emulated board: hello has a long timeout, because a repeat would change the run.
@@ -91,6 +105,16 @@ impl Client {
         emulated: bool,
         wanted: Option<LinkRate>,
     ) -> Result<Self, ClientError> {
+        Self::start_at(connect, port, emulated, (wanted, wanted))
+    }
+
+    /// `rates`: of the first hello, and requested.
+    fn start_at(
+        connect: Connect,
+        port: &str,
+        emulated: bool,
+        rates: (Option<LinkRate>, Option<LinkRate>),
+    ) -> Result<Self, ClientError> {
         let (inbox, commands) = channel();
         let timing = Arc::new(Mutex::new(Timing::REAL));
         let choose = |hello: &Hello| {
@@ -99,14 +123,14 @@ impl Client {
             }
             Arc::clone(&timing)
         };
-        let owner = Owner::start(connect, port, emulated, wanted, choose, commands)?;
+        let owner = Owner::start(connect, port, emulated, rates, choose, commands)?;
         let session = owner.session();
         let thread = std::thread::spawn(move || owner.run());
         let port = Port {
             name: port.into(),
             timing,
-            wanted,
-            paces: Mutex::default(),
+            wanted: rates.1,
+            known: Mutex::default(),
             inbox: Some(inbox),
             thread: Some(thread),
         };
@@ -132,7 +156,7 @@ impl Client {
         let (answer, joined) = sync_channel(1);
         self.command(Command::Join { known: self.session.number, answer }, "saying hello")?;
         self.session = joined.recv().map_err(|_| self.ended("saying hello"))??;
-        self.paces().clear();
+        *self.known() = Known::default();
         Ok(())
     }
 
@@ -148,9 +172,9 @@ impl Client {
         }
     }
 
-    /// Cached speeds of the axes; cleared if they may have changed.
-    pub(crate) fn paces(&self) -> MutexGuard<'_, Vec<(Axis, Pace)>> {
-        self.port.paces.lock().unwrap_or_else(PoisonError::into_inner)
+    /// Cleared if they may have changed.
+    pub(crate) fn known(&self) -> MutexGuard<'_, Known> {
+        self.port.known.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     pub fn hello(&self) -> &Hello {
@@ -181,7 +205,7 @@ impl Client {
         let (wanted, has) = (self.port.wanted?, self.link_rate());
         (wanted != has).then(|| {
             format!(
-                "the link stays at {} baud: the board is not heard at {}; its adapter or its firmware cannot have that rate",
+                "the link stays at {} baud: the board is not heard at {}; its adapter or its firmware cannot have that rate, or the rig was moving",
                 has.baud(),
                 wanted.baud()
             )

@@ -11,6 +11,10 @@ use farnear_protocol::{
 pub use alarm::{alarm_text, failure_text};
 pub use refusal::refusal_text;
 
+/// Remedy for a camera that is slower than the board expects.
+const SLOW_READOUT: &str = "if the first exposure succeeds and later ones fail, the camera reads out for longer than \
+                            camera_readout_us: `farnear rig settings set camera_readout_us ...`";
+
 pub fn um(position: Nanometres) -> f64 {
     f64::from(position.0) / 1000.0
 }
@@ -52,7 +56,9 @@ pub fn drop_text(reason: DropReason) -> String {
     match reason {
         DropReason::NotSettled { error } => format!("not settled, {:.3} um off", um(error)),
         DropReason::CameraBusy => "the camera was not ready".into(),
-        DropReason::NoStrobe => "the camera's exposure signal did not come or was too short".into(),
+        DropReason::NoStrobe => {
+            format!("the camera's exposure signal did not come or was too short; {SLOW_READOUT}")
+        }
     }
 }
 

@@ -228,7 +228,7 @@ pub fn check_exposures(camera: &mut dyn Camera, shots: &[Shot]) -> Result<(), Ca
 }
 
 /// A message if the camera's strobe was longer or shorter than the exposure.
-pub(crate) fn strobe_note(record: &ShotRecord) -> Option<String> {
+pub fn strobe_note(record: &ShotRecord) -> Option<String> {
     let asked_us = u64::from(record.exposure.0);
     let strobe_us = record.strobe_end.0.saturating_sub(record.strobe_start.0);
     (strobe_us.abs_diff(asked_us) > STROBE_OFF_US + asked_us / 100).then(|| {

@@ -17,7 +17,7 @@ const CHANGE: Duration = Duration::from_millis(20);
 const LOOKS: u32 = 20;
 const LOOK: Duration = Duration::from_millis(100);
 
-/// Changes the link rate. Keeps the old rate if the request is unknown or the board is silent at the new one.
+/// Changes the link rate. Keeps the old rate if the request is unknown, the board moves, or it is silent at the new one.
 pub(crate) fn change(
     link: &mut Link,
     address: (u8, u32),
@@ -43,7 +43,7 @@ pub(crate) fn change(
     link.ask(address, &Request::Status, &waits, DURING, &mut |_| Ok(())).map(|_| ())
 }
 
-/// Whether the board accepts; `false` if it does not know the request.
+/// Whether the board accepts; `false` if it does not know the request, or if its motion does not end.
 fn is_granted(
     link: &mut Link,
     address: (u8, u32),
@@ -64,8 +64,8 @@ fn is_granted(
             };
         }
         match packet.message() {
-            Some(RequestError::Malformed) => return Ok(false),
             Some(RequestError::Busy { .. }) if look < LOOKS => sleep(LOOK),
+            Some(RequestError::Malformed | RequestError::Busy { .. }) => return Ok(false),
             Some(error) => return Err(ClientError::Refused { during: during(), error }),
             None => {
                 return Err(ClientError::Nonsense { during: during(), answer: "an unreadable error".into() });

@@ -5,7 +5,7 @@ use std::time::Duration;
 use farnear_protocol::{message::Shot, units::Micros};
 
 use crate::{
-    camera::{Camera, Image},
+    camera::{Camera, Control, Image, Range, Setting},
     client::Client,
     expose::{CaptureError, expose},
 };
@@ -22,7 +22,8 @@ const SATURATED: f64 = 0.98;
 const STEP_MAX: f64 = 8.0;
 const EXPOSURES_MAX: usize = 8;
 
-/// Finds the brightest unsaturated exposure, by up to 8 of `shot`; returns the nearest time within the board's limits.
+/// Finds the brightest unsaturated exposure, by up to 8 of `shot`; returns the nearest time within the limits of board and
+/// camera.
 pub fn exposure(
     client: &Client,
     camera: &mut dyn Camera,
@@ -30,7 +31,9 @@ pub fn exposure(
     image_wait: Duration,
 ) -> Result<Micros, CaptureError> {
     let limits = &client.hello().limits;
-    let mut shot = shot;
+    let own = if camera.sets_exposure() { camera.controls()? } else { Vec::new() };
+    let (min, max) = within((limits.exposure_min, limits.exposure_max), &own);
+    let mut shot = Shot { exposure: shot.exposure.clamp(min, max), ..shot };
     for _ in 0..EXPOSURES_MAX {
         let mut brightness = 0.0;
         expose(client, camera, &[shot], image_wait, |_, image| -> Result<(), CaptureError> {
@@ -43,13 +46,25 @@ pub fn exposure(
         let factor =
             if brightness > SATURATED { 0.25 } else { (TARGET / brightness.max(1e-3)).min(STEP_MAX) };
         let next = Micros((f64::from(shot.exposure.0) * factor).round() as u32);
-        let next = next.clamp(limits.exposure_min, limits.exposure_max);
+        let next = next.clamp(min, max);
         if next == shot.exposure {
             break;
         }
         shot.exposure = next;
     }
     Ok(shot.exposure)
+}
+
+/// Limits of the board within the camera's range, if it states one.
+fn within((min, max): (Micros, Micros), controls: &[Control]) -> (Micros, Micros) {
+    let own = controls.iter().find(|control| control.name == Setting::ExposureUs(0.0).name());
+    match own.map(|control| &control.range) {
+        Some(Range::Number { min: shortest, max: longest, .. }) => {
+            let min = min.max(Micros(shortest.ceil() as u32));
+            (min, max.min(Micros(longest.floor() as u32)).max(min))
+        }
+        _ => (min, max),
+    }
 }
 
 /// Brightness that a share [`BRIGHTER`] of the pixels exceeds, as a share of white.
@@ -72,6 +87,23 @@ mod tests {
     use ndarray::Array2;
 
     use super::*;
+
+    #[test]
+    fn the_exposure_stays_within_the_cameras_range() {
+        let board = (Micros(10), Micros(1_000_000));
+        let control = |name: &str, min, max| Control {
+            name: name.into(),
+            value: "1000".into(),
+            range: Range::Number { min, max, unit: "us" },
+        };
+        assert_eq!(within(board, &[]), board);
+        assert_eq!(within(board, &[control("gain", 1.0, 16.0)]), board);
+        let own = [control("gain", 1.0, 16.0), control("exposure_us", 20.5, 30_000.5)];
+        assert_eq!(within(board, &own), (Micros(21), Micros(30_000)));
+        assert_eq!(within(board, &[control("exposure_us", 1.0, 1e9)]), board);
+        let disjoint = within(board, &[control("exposure_us", 2e6, 3e6)]);
+        assert_eq!(disjoint, (Micros(2_000_000), Micros(2_000_000)), "the board refuses it by name");
+    }
 
     #[test]
     fn few_bright_pixels_do_not_count() {

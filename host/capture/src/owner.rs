@@ -111,13 +111,13 @@ impl Owner {
         mut connect: Connect,
         port: &str,
         emulated: bool,
-        wanted: Option<LinkRate>,
+        (first, wanted): (Option<LinkRate>, Option<LinkRate>),
         timing: impl FnOnce(&Hello) -> Arc<Mutex<Timing>>,
         inbox: Receiver<Command>,
     ) -> Result<Self, ClientError> {
         let mut link = Link::new(connect()?, port);
         // An earlier host may have set this rate.
-        link.set_rate(wanted.unwrap_or(LinkRate::START), "opening the port")?;
+        link.set_rate(first.unwrap_or(LinkRate::START), "opening the port")?;
         let (hello, version) = shake_hands(&mut link, emulated)?;
         open_session(&mut link, (&hello, version))?;
         let timing = timing(&hello);

@@ -183,9 +183,10 @@ pub fn record_of(pair: &Pair, client: &Client, circumstances: Circumstances) -> 
     record(client, circumstances, stage, exposure, &pair.far.image)
 }
 
-/// The record of a sequence; `None` without images.
+/// The record of a sequence with its first image; `None` without shots.
 pub fn record_of_sequence(
     shots: &[SequenceShot],
+    image: &Image,
     client: &Client,
     circumstances: Circumstances,
 ) -> Option<CaptureRecord> {
@@ -204,7 +205,7 @@ pub fn record_of_sequence(
         triggered_by: Some(trigger_name(shot.mode).into()),
         ..exposure_record(&shot.name, &shot.record, sensor_mm(&shot.record, limits))
     });
-    Some(record(client, circumstances, stage, exposure.collect(), &first.image))
+    Some(record(client, circumstances, stage, exposure.collect(), image))
 }
 
 fn record(
@@ -286,27 +287,19 @@ pub fn begin_folder(folder: &Path) -> Result<Staging, RecordError> {
 
 /// Writes pair and record, and publishes the folder.
 pub fn finish_folder(staged: Staging, pair: &Pair, record: &CaptureRecord) -> Result<(), RecordError> {
-    finish_with(staged, [("far.png", &pair.far.image), ("near.png", &pair.near.image)], record)
+    write_image(&staged, "far.png", &pair.far.image)?;
+    write_image(&staged, "near.png", &pair.near.image)?;
+    finish_sequence(staged, record)
 }
 
-/// Writes a sequence and its record, and publishes the folder.
-pub fn finish_sequence(
-    staged: Staging,
-    shots: &[SequenceShot],
-    record: &CaptureRecord,
-) -> Result<(), RecordError> {
-    finish_with(staged, shots.iter().map(|shot| (shot.name.as_str(), &shot.image)), record)
+/// Writes an image of a sequence.
+pub fn write_image(staged: &Staging, name: &str, image: &Image) -> Result<(), RecordError> {
+    let png = encode_png(image.pixels.view(), image.bits)?;
+    Ok(staged.write(name, &png)?)
 }
 
-fn finish_with<'a>(
-    staged: Staging,
-    images: impl IntoIterator<Item = (&'a str, &'a Image)>,
-    record: &CaptureRecord,
-) -> Result<(), RecordError> {
-    for (name, image) in images {
-        let png = encode_png(image.pixels.view(), image.bits)?;
-        staged.write(name, &png)?;
-    }
+/// Writes the record, and publishes the folder.
+pub fn finish_sequence(staged: Staging, record: &CaptureRecord) -> Result<(), RecordError> {
     staged.write(CAPTURE_FILE, toml::to_string(record)?.as_bytes())?;
     Ok(staged.finish()?)
 }

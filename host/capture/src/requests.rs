@@ -8,7 +8,12 @@ use farnear_protocol::{
     units::Micros,
 };
 
-use crate::{client::Client, error::ClientError, owner::nonsense, timing::BRAKING};
+use crate::{
+    client::{Client, Known},
+    error::ClientError,
+    owner::nonsense,
+    timing::BRAKING,
+};
 
 const RESTART: Duration = Duration::from_secs(5);
 const LOOK: Duration = Duration::from_millis(10);
@@ -108,7 +113,7 @@ impl Client {
 
     /// Changes a setting permanently. [`Client::reopen`] updates derived limits. Rejected out of range or in motion.
     pub fn set_setting(&self, key: SettingKey, value: i32) -> Result<Setting, ClientError> {
-        self.paces().clear();
+        *self.known() = Known::default();
         let during = format!("setting {} to {value}", key.name());
         self.setting_by(&Request::WriteSetting { key, value }, &during)
     }

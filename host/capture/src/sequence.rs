@@ -21,8 +21,6 @@ use farnear_protocol::{
 };
 use serde::{Deserialize, Deserializer, de::Error};
 
-use crate::camera::Image;
-
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct ShotDefaults {
     pub exposure: Micros,
@@ -178,7 +176,6 @@ pub struct SequenceShot {
     pub name: String,
     pub record: ShotRecord,
     pub mode: TriggerMode,
-    pub image: Image,
 }
 
 pub fn image_name(record: &ShotRecord, repeats: u16) -> String {

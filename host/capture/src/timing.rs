@@ -121,8 +121,8 @@ pub fn move_time(axis: Axis, from: Nanometres, to: Nanometres, pace: Pace) -> Du
     pace.time(u64::from(distance_nm)) + pace.time(BACKLASH_NM) + 2 * SETTLE + SLACK
 }
 
-/// Longest time of an exposure program.
-pub fn program_time(shots: &[Shot], status: &Status, paces: &[(Axis, Pace)]) -> Duration {
+/// Longest time of an exposure program; `readout` is the camera's.
+pub fn program_time(shots: &[Shot], status: &Status, paces: &[(Axis, Pace)], readout: Duration) -> Duration {
     let mut stands = Axis::ALL.map(|axis| (axis, status.axis(axis).measured));
     shots
         .iter()
@@ -135,8 +135,7 @@ pub fn program_time(shots: &[Shot], status: &Status, paces: &[(Axis, Pace)]) -> 
                 // Time for the camera's own exposure or the host's trigger.
                 TriggerMode::Software | TriggerMode::FreeRunning => FOREIGN_TRIGGER,
             };
-            // Read-out before the next picture.
-            let once = exposure + Duration::from_millis(100) + trigger;
+            let once = exposure + readout + Duration::from_millis(100) + trigger;
             let pace =
                 paces.iter().find(|(axis, _)| *axis == shot.axis).map_or(Pace::AT_ONCE, |(_, pace)| *pace);
             move_time(shot.axis, from, shot.target, pace) + once * u32::from(shot.repeat)
@@ -166,7 +165,46 @@ fn travel(axis: Axis, limits: &Limits) -> u64 {
 
 #[cfg(test)]
 mod tests {
+    use farnear_protocol::{
+        BoardMicros, Micros,
+        message::{AxisStatus, LinkCounters, PositionState, ProgramState, ProgramStatus},
+    };
+
     use super::*;
+    use crate::sequence::ShotDefaults;
+
+    #[test]
+    fn a_program_may_take_as_long_as_its_camera_reads_out() {
+        let axis = AxisStatus {
+            state: PositionState::Homed,
+            asked: Nanometres(0),
+            measured: Nanometres(0),
+            moving: false,
+            request: None,
+        };
+        let status = Status {
+            time: BoardMicros(0),
+            coarse: axis,
+            fine: axis,
+            lens: axis,
+            home_switch: false,
+            far_switch: false,
+            lens_home_switch: false,
+            lens_far_switch: false,
+            emergency_stop: false,
+            supply_low: false,
+            alarm: None,
+            program: ProgramStatus { state: ProgramState::Armed, shots: 1, index: 0, exposures: 0 },
+            next_event: 0,
+            triggers: 0,
+            steps: 0,
+            link: LinkCounters::default(),
+        };
+        let defaults = ShotDefaults { exposure: Micros(5_000), repeat: 60, ..ShotDefaults::default() };
+        let shots = [defaults.shot(Axis::SensorFine, Nanometres(10_000))];
+        let time = |readout_ms| program_time(&shots, &status, &[], Duration::from_millis(readout_ms));
+        assert_eq!(time(1_000) - time(0), Duration::from_secs(60));
+    }
 
     fn pace(speed_nm_per_s: i32) -> Pace {
         pace_of(speed_nm_per_s, 50_000, 1_600_000)

@@ -13,7 +13,10 @@ use std::{
 
 use farnear_protocol::{
     Request, Response,
-    message::{AlarmRecord, Axis, Calibration, EventKind, Failure, ProgramState, Routine, Shot, ShotLight},
+    message::{
+        AlarmRecord, Axis, Calibration, EventKind, Failure, ProgramState, Routine, SettingKey, Shot,
+        ShotLight,
+    },
     units::{Micros, Nanometres},
 };
 
@@ -293,12 +296,12 @@ impl Client {
 
     /// Speed of an axis by the board's settings, read on first use.
     fn pace(&self, axis: Axis) -> Result<Pace, ClientError> {
-        let known = self.paces().iter().find(|(of, _)| *of == axis).map(|(_, pace)| *pace);
+        let known = self.known().paces.iter().find(|(of, _)| *of == axis).map(|(_, pace)| *pace);
         if let Some(pace) = known {
             return Ok(pace);
         }
         let pace = Pace::of(axis, |key| self.setting(key).map(|setting| setting.value))?;
-        self.paces().push((axis, pace));
+        self.known().paces.push((axis, pace));
         Ok(pace)
     }
 
@@ -395,7 +398,19 @@ impl Client {
                 paces.push((axis, self.pace(axis)?));
             }
         }
-        Ok(program_time(shots, &status, &paces))
+        Ok(program_time(shots, &status, &paces, self.readout()?))
+    }
+
+    /// Read-out time of the camera by the board's settings, read on first use.
+    fn readout(&self) -> Result<Duration, ClientError> {
+        let known = self.known().readout;
+        if let Some(readout) = known {
+            return Ok(readout);
+        }
+        let micros = self.setting(SettingKey::CameraReadoutUs)?.value;
+        let readout = Duration::from_micros(u64::try_from(micros).unwrap_or(0));
+        self.known().readout = Some(readout);
+        Ok(readout)
     }
 
     /// Arms and runs a program. `on_event` receives [`EventKind::ShotDone`] and [`EventKind::ShotReady`] immediately;

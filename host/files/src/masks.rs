@@ -119,26 +119,54 @@ impl Masks {
 /// All masks of a folder (or one picture), in natural order; they must have one size.
 pub fn read_all(path: &Path) -> Result<Masks, MaskError> {
     let mut all: Vec<(String, Array2<u8>)> = Vec::new();
-    let files = listed(path)?;
-    let reading = pictures::reading_of(&files);
-    let mut histogram = Histogram::new(reading);
-    for file in &files {
-        let levels = grey(file, reading)?;
-        if let Some((first, other)) = all.first() {
-            let (found, expected) = (levels.dim(), other.dim());
-            if found != expected {
-                return Err(MaskError::Size { path: file.clone(), found, first: first.clone(), expected });
-            }
-        }
-        histogram.add(&levels);
-        all.push((pictures::stem(file), levels));
-    }
-    let levels = Levels::of_masks(&histogram, files.first().map_or(path, PathBuf::as_path))?;
+    let Sequence { levels, .. } = surveyed(path, |file, grey| all.push((pictures::stem(file), grey)))?;
     let named = |(name, grey): (String, Array2<u8>)| Named {
         name,
         mask: grey.mapv(|level| level >= levels.set_from),
     };
     Ok(Masks { named: all.into_iter().map(named).collect(), levels })
+}
+
+/// Masks that are read one at a time.
+pub struct Sequence {
+    pub files: Vec<PathBuf>,
+    pub levels: Levels,
+}
+
+impl Sequence {
+    /// Reads every picture for the levels and sizes, and keeps none; fails as [`read_all`].
+    pub fn open(path: &Path) -> Result<Self, MaskError> {
+        surveyed(path, |_, _| ())
+    }
+
+    /// In natural order.
+    pub fn named(&self) -> impl ExactSizeIterator<Item = Result<Named, MaskError>> {
+        let named = move |file: &PathBuf| {
+            read(file, &self.levels).map(|mask| Named { name: pictures::stem(file), mask })
+        };
+        self.files.iter().map(named)
+    }
+}
+
+/// Reads all pictures once; the levels are those of all.
+fn surveyed(path: &Path, mut each: impl FnMut(&Path, Array2<u8>)) -> Result<Sequence, MaskError> {
+    let files = listed(path)?;
+    let reading = pictures::reading_of(&files);
+    let mut histogram = Histogram::new(reading);
+    let mut size = None;
+    for file in &files {
+        let grey = grey(file, reading)?;
+        let found = grey.dim();
+        let (first, expected) = size.get_or_insert_with(|| (pictures::stem(file), found));
+        if found != *expected {
+            let (path, first, expected) = (file.clone(), first.clone(), *expected);
+            return Err(MaskError::Size { path, found, first, expected });
+        }
+        histogram.add(&grey);
+        each(file, grey);
+    }
+    let levels = Levels::of_masks(&histogram, files.first().map_or(path, PathBuf::as_path))?;
+    Ok(Sequence { files, levels })
 }
 
 /// PNG with 255 = set.
@@ -204,6 +232,9 @@ mod tests {
             let set = read_all(&path).unwrap().pixels();
             let set: Vec<usize> = set.iter().map(|mask| mask.iter().filter(|set| **set).count()).collect();
             assert_eq!(set, [3, 0, 0], "{}", path.display());
+            let one_by_one = Sequence::open(&path).unwrap();
+            let masks: Vec<Mask> = one_by_one.named().map(|named| named.unwrap().mask).collect();
+            assert_eq!(masks, read_all(&path).unwrap().pixels());
             let files = listed(&path).unwrap();
             assert!(!read(&files[1], &levels_of(&files).unwrap()).unwrap().iter().any(|set| *set));
         }

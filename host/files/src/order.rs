@@ -54,6 +54,20 @@ pub fn gap(sorted: &[PathBuf]) -> Option<[&PathBuf; 2]> {
     apart.by_ref().map(|(two, _)| two).find(is_gap).map(|two| [&two[0], &two[1]])
 }
 
+/// The numbers that count files: the last that varies between names of one pattern, else the last of each name.
+pub fn numbers(paths: &[PathBuf]) -> Vec<Option<f64>> {
+    let names: Vec<Name> = paths.iter().map(|path| Name::of(path)).collect();
+    let column = last_varying(&names);
+    let number = |name: &Name| match column {
+        Some(column) => name.numbers[column].value(),
+        None => name.numbers.last()?.value(),
+    };
+    let numbers: Vec<Option<f64>> = names.iter().map(number).collect();
+    // A minus before all numbers separates.
+    let are_separated = numbers.iter().flatten().all(|number| *number <= 0.0);
+    numbers.into_iter().map(|number| number.map(|n| if are_separated { n.abs() } else { n })).collect()
+}
+
 /// Two files that differ only in their ending.
 pub fn same_stem(paths: &[PathBuf]) -> Option<[PathBuf; 2]> {
     let mut stems = std::collections::HashMap::new();
@@ -177,6 +191,19 @@ fn digits(text: &str) -> usize {
 mod tests {
     use super::*;
     use crate::image_file::metadata::tests::png_with_exif;
+
+    #[test]
+    fn files_are_counted_by_their_last_varying_number() {
+        for (names, expected) in [
+            (["000007_p1", "000010_p1"], [Some(7.0), Some(10.0)]),
+            (["f_0001_512x512", "f_0002_512x512"], [Some(1.0), Some(2.0)]),
+            (["a-1", "a-2"], [Some(1.0), Some(2.0)]),
+            (["a3", "b4c"], [Some(3.0), Some(4.0)]),
+            (["walk", "run2"], [None, Some(2.0)]),
+        ] {
+            assert_eq!(numbers(&names.map(PathBuf::from)), expected, "{names:?}");
+        }
+    }
 
     #[test]
     fn numbers_sort_by_value_and_letters_by_letter() {

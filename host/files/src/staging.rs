@@ -1,6 +1,7 @@
 //! Atomic output: written to a temporary name, then renamed.
 
 use std::{
+    collections::BTreeSet,
     ffi::{OsStr, OsString},
     fs::{self, File},
     io::{self, BufWriter, Write},
@@ -32,6 +33,9 @@ const LEFT_BEHIND_MAX: u32 = 100;
 
 /// Longer pieces, such as the rows of a large mesh, go to the file without a copy.
 const BUFFER_BYTES: usize = 1 << 15;
+
+/// Parents that were searched for leftovers: a series of folders would list its parent for each one.
+static SWEPT: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
 
 /// Folders of this process that are not published, and the targets created for them. Locked while something is published.
 static UNPUBLISHED: Mutex<Vec<(PathBuf, Option<PathBuf>)>> = Mutex::new(Vec::new());
@@ -107,7 +111,10 @@ impl Staging {
             }
             free = folder.with_added_extension(number.to_string());
         }
-        sweep(folder.parent().unwrap_or(Path::new(".")));
+        let parent = folder.parent().unwrap_or(Path::new("."));
+        if SWEPT.lock().unwrap_or_else(PoisonError::into_inner).insert(parent.into()) {
+            sweep(parent);
+        }
         fs::create_dir(&free).map_err(StagingError::at(&target))?;
         unpublished().push((free.clone(), made_target.then(|| target.clone())));
         let in_use = File::open(&free).ok().filter(|folder| folder.try_lock().is_ok());
@@ -295,12 +302,26 @@ mod tests {
         for path in [&living.folder, &dead, &bystander] {
             old(path);
         }
-        let staged = Staging::new_folder(&root.path().join("new")).unwrap();
+        sweep(root.path());
         assert!(!dead.exists());
         assert!(living.folder.exists() && young.exists() && bystander.exists());
-        staged.finish().unwrap();
         living.finish().unwrap();
         assert!(root.path().join("living").exists());
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn searches_a_parent_for_leftovers_once() {
+        let root = tempfile::tempdir().unwrap();
+        let begin = |name: &str| {
+            let dead = root.path().join(".dead.partial-1");
+            fs::create_dir_all(&dead).unwrap();
+            let long_ago = std::time::SystemTime::now() - 2 * JUST_BEGUN;
+            File::open(&dead).unwrap().set_modified(long_ago).unwrap();
+            Staging::new_folder(&root.path().join(name)).unwrap().finish().unwrap();
+            dead.exists()
+        };
+        assert_eq!([begin("first"), begin("second")], [false, true]);
     }
 
     #[test]

@@ -120,6 +120,7 @@ pub struct Video {
     first: Option<Kind>,
     ended: bool,
     remarks: Vec<String>,
+    rate_hz: Option<f64>,
 }
 
 impl std::fmt::Debug for Video {
@@ -133,19 +134,20 @@ impl Video {
     /// and devices, because their times, or a background that is learned first, need a second reading.
     pub fn open(path: &Path) -> Result<Self, VideoError> {
         let metadata = path.metadata().map_err(|source| VideoError::io(path, source))?;
-        let (frames, remark) = if metadata.is_dir() {
-            (Frames::Direct(Box::new(pictures::open(path)?)), None)
+        let (frames, remark, rate_hz) = if metadata.is_dir() {
+            (Frames::Direct(Box::new(pictures::open(path)?)), None, None)
         } else if !metadata.is_file() {
             return Err(VideoError::NotRegular { path: path.into() });
         } else if path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("y4m")) {
             let file = std::fs::File::open(path).map_err(|source| VideoError::io(path, source))?;
             let video = y4m::Y4m::new(path, io::BufReader::new(file))?;
-            let remark = video.remark();
-            (Frames::Direct(Box::new(video)), remark)
+            let (remark, rate_hz) = (video.remark(), video.rate_hz());
+            (Frames::Direct(Box::new(video)), remark, rate_hz)
         } else {
             let timing = timing::Timing::of(path);
             let remark = timing.as_ref().and_then(timing::Timing::remark);
-            (Frames::Ffmpeg(Box::new(ffmpeg::open(path, timing.as_ref())?)), remark)
+            let rate_hz = timing.as_ref().map(|timing| timing.rate_hz);
+            (Frames::Ffmpeg(Box::new(ffmpeg::open(path, timing.as_ref())?)), remark, rate_hz)
         };
         Ok(Self {
             path: path.into(),
@@ -153,7 +155,13 @@ impl Video {
             first: None,
             ended: false,
             remarks: remark.into_iter().collect(),
+            rate_hz,
         })
+    }
+
+    /// Frames per second; `None` for a folder of pictures, and where the file states none.
+    pub fn rate_hz(&self) -> Option<f64> {
+        self.rate_hz
     }
 
     /// New notices to the user about how it is read; some come at the end.

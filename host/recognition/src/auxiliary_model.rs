@@ -3,7 +3,6 @@
 //! training clips. A clip's distance is the Bhattacharyya distance, -ln of the scalar product (Kailath, IEEE Trans.
 //! Communication Technology 15, 1967). Background clips: Hendrycks et al., ICLR 2019.
 
-use super::classifier::largest;
 use super::clip::Clip;
 use super::model::{Answer, ModelError, Recogniser};
 use super::unknown::Limits;
@@ -60,10 +59,7 @@ impl AuxiliaryModel {
         Ok(Self { recogniser, profiles, limits })
     }
 
-    pub(super) fn outlier_score(&self, auxiliary: &Answer, answer: &Answer) -> f32 {
-        let probabilities: Vec<f32> =
-            answer.probabilities.iter().map(|(_, probability)| *probability).collect();
-        let (class, _) = largest(&probabilities);
+    pub(super) fn outlier_score(&self, auxiliary: &Answer, class: usize) -> f32 {
         self.limits.score(class, distance(roots_of(auxiliary).view(), self.profiles.row(class)))
     }
 

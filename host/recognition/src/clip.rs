@@ -125,7 +125,8 @@ impl Track {
 }
 
 impl Clip {
-    /// Mirrored performance. Views are at equal steps from the front: view v becomes the mirror of n - v.
+    /// Mirrored performance: view v becomes the mirror of view n - v. Several views are assumed at equal steps all
+    /// round, the first from the front; for others the mirrored views do not belong to one performance.
     pub fn mirrored(&self) -> Self {
         let n = self.views.len();
         let views = (0..n).map(|v| self.views[(n - v) % n].mirrored()).collect();

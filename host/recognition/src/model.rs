@@ -62,6 +62,8 @@ pub struct Recogniser {
     pub typical_frames: usize,
     /// Clip lengths by class; empty in older models.
     pub lengths: Vec<Lengths>,
+    /// Classes that are answered; empty for all. Not part of a model file.
+    pub among: Vec<usize>,
 }
 
 /// Answer for a clip, with all probabilities.
@@ -78,8 +80,8 @@ pub struct Answer {
 }
 
 impl Answer {
-    pub(super) fn without_person(activities: &[String]) -> Self {
-        let probabilities = activities.iter().map(|activity| (activity.clone(), 0.0)).collect();
+    fn without_person<'a>(activities: impl Iterator<Item = &'a String>) -> Self {
+        let probabilities = activities.map(|activity| (activity.clone(), 0.0)).collect();
         Self { activity: None, confidence: 0.0, probabilities, outlier_score: f32::INFINITY }
     }
 
@@ -182,8 +184,24 @@ impl Recogniser {
             return Ok(answer);
         }
         let Some(second) = &self.second else { return Ok(answer) };
-        let outlier_score = second.outlier_score(&second.recogniser.recognise(views)?, &answer);
+        let Some(class) = self.activities.iter().position(|activity| Some(activity) == answer.best()) else {
+            return Ok(answer);
+        };
+        let outlier_score = second.outlier_score(&second.recogniser.recognise(views)?, class);
         Ok(Answer::of(answer.probabilities, outlier_score))
+    }
+
+    /// Answers with some of the activities only, and measures the outlier score for these. Unknown names are ignored;
+    /// an empty list restricts nothing.
+    #[must_use]
+    pub fn restricted_to(&self, activities: &[String]) -> Self {
+        let is_kept = |class: &usize| activities.contains(&self.activities[*class]);
+        Self { among: (0..self.activities.len()).filter(is_kept).collect(), ..self.clone() }
+    }
+
+    /// Classes that are answered.
+    fn answered(&self) -> Vec<usize> {
+        if self.among.is_empty() { (0..self.activities.len()).collect() } else { self.among.clone() }
     }
 
     pub(super) fn check(&self, views: &[Track]) -> Result<(), ModelError> {
@@ -222,7 +240,7 @@ impl Recogniser {
     /// The joint answer of several views; empty means that no person is visible.
     pub(super) fn joint(&self, answers: &[Answer]) -> Answer {
         match answers {
-            [] => Answer::without_person(&self.activities),
+            [] => Answer::without_person(self.answered().into_iter().map(|class| &self.activities[class])),
             [one] => one.clone(),
             several => {
                 let joint = Answer::joint(several);
@@ -238,10 +256,18 @@ impl Recogniser {
         self.entropy_score(&answer.among(&others).probabilities)
     }
 
-    /// Entropy over its limit, which all activities of a network share; `None` with patterns.
+    /// Entropy over its limit, which all activities of a network share; `None` with patterns. The limit of a few
+    /// activities is lower by the ratio of the largest possible entropies.
     fn entropy_score(&self, probabilities: &[(String, f32)]) -> Option<f32> {
         let nats = entropy(probabilities.iter().map(|(_, probability)| *probability));
-        (self.patterns.nrows() == 0).then(|| self.limits.score(0, nats))
+        let largest = |classes: usize| (classes as f32).ln();
+        let lower = match self.among.len() {
+            0 => 1.0,
+            // A single answer is certain.
+            1 => return Some(0.0).filter(|_| self.patterns.nrows() == 0),
+            few => largest(few) / largest(self.activities.len()),
+        };
+        (self.patterns.nrows() == 0).then(|| self.limits.score(0, nats) / lower)
     }
 
     pub(super) fn answer(&self, pattern: ArrayView1<f32>) -> Answer {
@@ -249,9 +275,13 @@ impl Recogniser {
     }
 
     pub(super) fn answer_by(&self, pattern: ArrayView1<f32>, squared_distance: f32) -> Answer {
-        let probabilities = self.classifier.probabilities(pattern);
-        let (best, _) = largest(&probabilities);
-        let probabilities: Vec<(String, f32)> = self.activities.iter().cloned().zip(probabilities).collect();
+        let all = self.classifier.probabilities(pattern);
+        let classes = self.answered();
+        let kept: Vec<f32> = classes.iter().map(|&class| all[class]).collect();
+        let best = classes.get(largest(&kept).0).copied().unwrap_or(0);
+        let total = if self.among.is_empty() { 1.0 } else { kept.iter().sum::<f32>().max(f32::MIN_POSITIVE) };
+        let names = classes.iter().map(|&class| self.activities[class].clone());
+        let probabilities: Vec<(String, f32)> = names.zip(kept.iter().map(|share| share / total)).collect();
         let outlier_score =
             self.entropy_score(&probabilities).unwrap_or_else(|| self.limits.score(best, squared_distance));
         Answer::of(probabilities, outlier_score)

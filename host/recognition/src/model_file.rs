@@ -238,6 +238,7 @@ impl Recogniser {
             patterns: body.patterns,
             labels,
             second,
+            among: Vec::new(),
             typical_frames: body.typical_frames as usize,
             lengths,
         };

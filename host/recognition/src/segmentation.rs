@@ -1,7 +1,8 @@
 //! Segmentation of recordings by a hidden semi-Markov model (Yu, Artificial Intelligence 174, 2010). The score of a
 //! segment from frame a to b is `(b - a) (ln p(a, b) - strange * outlier(a, b)) - change - unlikely(b - a)` for the
 //! best activity. Dynamic programming over a grid of borders finds the best sequence; borders are then refined frame by
-//! frame. O(frames / step x lengths) answers; frames are embedded once.
+//! frame. O(frames / step x lengths) answers; frames are embedded once. The step depends on the model only, so that time
+//! is linear in frames and short activities are found in long recordings too.
 
 use super::clip::Track;
 use super::lengths::Lengths;
@@ -11,7 +12,6 @@ use super::nearest::Nearest;
 use super::patterns::joined;
 use ndarray::{Array1, Array2, s};
 use rayon::prelude::*;
-use std::collections::HashMap;
 
 /// Score parameters of a segmentation.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -32,7 +32,6 @@ impl Default for Worth {
 
 /// Grid borders per typical clip.
 const PLACES: usize = 12;
-const MOST_PLACES: usize = 1500;
 /// Ratio of successive lengths.
 const LONGER: f32 = 1.15;
 const LEAST: usize = 4;
@@ -46,7 +45,6 @@ struct Recording<'a> {
     recogniser: &'a Recogniser,
     nearest: Nearest<'a>,
     groups: Vec<Vec<Embedded>>,
-    among: &'a [String],
     typical: f32,
     step: usize,
     worth: Worth,
@@ -58,11 +56,28 @@ struct Valued {
     confidence: f32,
 }
 
-impl Recording<'_> {
+impl<'a> Recording<'a> {
+    /// Embeds all frames.
+    fn new(recogniser: &'a Recogniser, views: &[Track], worth: Worth) -> Result<Self, ModelError> {
+        let boxed = recogniser.uses_boxes();
+        let embedded = |track: &Track| -> Result<Embedded, ModelError> {
+            Ok(Embedded {
+                points: recogniser.space.points(track)?,
+                boxes: track.boxes.clone().filter(|_| boxed),
+            })
+        };
+        let groups = recogniser.groups(views);
+        let groups: Result<Vec<Vec<Embedded>>, ModelError> =
+            groups.iter().map(|group| group.iter().map(embedded).collect()).collect();
+        let typical = recogniser.typical_frames.max(LEAST);
+        let step = (typical / PLACES).max(1);
+        let nearest = Nearest::new(recogniser.patterns.view());
+        Ok(Self { recogniser, nearest, groups: groups?, typical: typical as f32, step, worth })
+    }
+
     fn valued(&self, from: usize, to: usize) -> Valued {
         let answers: Vec<Answer> = self.groups.iter().map(|group| self.answer(group, from, to)).collect();
-        let answer = Answer::joint(&answers);
-        let answer = if self.among.is_empty() { answer } else { answer.among(self.among) };
+        let answer = self.recogniser.joint(&answers);
         let frames = (to - from) as f32;
         let strange = self.worth.strange * answer.outlier_score.min(5.0);
         let worths = answer.probabilities.iter().map(|(activity, share)| {
@@ -102,14 +117,9 @@ impl Recording<'_> {
     }
 }
 
-/// Cuts a recording into segments of one activity each, optionally restricted to `among`. Frames are counted
+/// Cuts a recording into segments of one activity each. Frames are counted
 /// as in the tracks. Fails if the views do not fit the model.
-pub fn segmented(
-    recogniser: &Recogniser,
-    views: &[Track],
-    among: &[String],
-    worth: Worth,
-) -> Result<Vec<Segment>, ModelError> {
+pub fn segmented(recogniser: &Recogniser, views: &[Track], worth: Worth) -> Result<Vec<Segment>, ModelError> {
     // One frame of each view checks the shape.
     let first: Vec<Track> = views.iter().map(|view| view.select(&[0][..view.frames().min(1)])).collect();
     recogniser.recognise(&first)?;
@@ -117,17 +127,7 @@ pub fn segmented(
     if frames == 0 {
         return Ok(Vec::new());
     }
-    let boxed = recogniser.uses_boxes();
-    let embedded = |track: &Track| -> Result<Embedded, ModelError> {
-        Ok(Embedded { points: recogniser.space.points(track)?, boxes: track.boxes.clone().filter(|_| boxed) })
-    };
-    let groups = recogniser.groups(views);
-    let groups: Result<Vec<Vec<Embedded>>, ModelError> =
-        groups.iter().map(|group| group.iter().map(embedded).collect()).collect();
-    let typical = recogniser.typical_frames.max(LEAST) as f32;
-    let step = (typical as usize / PLACES).max(frames / MOST_PLACES).max(1);
-    let nearest = Nearest::new(recogniser.patterns.view());
-    let recording = Recording { recogniser, nearest, groups: groups?, among, typical, step, worth };
+    let recording = Recording::new(recogniser, views, worth)?;
     let borders = refined(&recording, best_borders(&recording, frames));
     Ok(merged(&recording, &borders))
 }
@@ -177,21 +177,18 @@ fn best_borders(recording: &Recording, frames: usize) -> Vec<usize> {
 /// Moves every border within a step to the best frame.
 fn refined(recording: &Recording, mut borders: Vec<usize>) -> Vec<usize> {
     let step = recording.step;
-    let mut known: HashMap<(usize, usize), f32> = HashMap::new();
     for place in 1..borders.len().saturating_sub(1) {
         let (before, at, after) = (borders[place - 1], borders[place], borders[place + 1]);
         let low = at.saturating_sub(step).max(before + 1);
         let high = (at + step).min(after - 1);
-        let mut value =
-            |from, to| *known.entry((from, to)).or_insert_with(|| recording.valued(from, to).worth);
-        let mut best = (value(before, at) + value(at, after), at);
+        let value =
+            |border: usize| recording.valued(before, border).worth + recording.valued(border, after).worth;
+        let values: Vec<f32> = (low..=high).into_par_iter().map(value).collect();
         for border in low..=high {
-            let found = value(before, border) + value(border, after);
-            if found > best.0 {
-                best = (found, border);
+            if values[border - low] > values[borders[place] - low] {
+                borders[place] = border;
             }
         }
-        borders[place] = best.1;
     }
     borders
 }
@@ -264,7 +261,7 @@ mod tests {
         let model = model(&mut rng);
         let parts =
             [(0, 30), (2, 22), (1, 41), (0, 26)].map(|(activity, frames)| track(activity, frames, &mut rng));
-        let found = segmented(&model, &[joined(parts.iter())], &[], Worth::default()).expect("fits");
+        let found = segmented(&model, &[joined(parts.iter())], Worth::default()).expect("fits");
         let names: Vec<Option<&str>> = found.iter().map(|s| s.activity.as_deref()).collect();
         assert_eq!(names, [Some("star"), Some("turn"), Some("stretch"), Some("star")], "{found:?}");
         assert_eq!((found[0].from, found[3].to), (0, 119));
@@ -274,14 +271,47 @@ mod tests {
         assert!(found.windows(2).all(|pair| pair[0].to == pair[1].from));
         // Excluded activities are never answered, and one activity is one segment of any length.
         let two = ["star".to_owned(), "turn".to_owned()];
-        let among = segmented(&model, &[joined(parts.iter())], &two, Worth::default()).expect("fits");
+        let among =
+            segmented(&model.restricted_to(&two), &[joined(parts.iter())], Worth::default()).expect("fits");
         assert!(among.iter().all(|s| s.activity.as_deref() != Some("stretch")));
         for frames in [3, 25, 140] {
-            let one = segmented(&model, &[track(1, frames, &mut rng)], &[], Worth::default()).expect("fits");
+            let one = segmented(&model, &[track(1, frames, &mut rng)], Worth::default()).expect("fits");
             assert_eq!((one.len(), one[0].from, one[0].to), (1, 0, frames), "{one:?}");
         }
-        assert!(segmented(&model, &[parts[0].select(&[])], &[], Worth::default()).expect("fits").is_empty());
-        assert!(segmented(&model, &[], &[], Worth::default()).is_err());
+        assert!(segmented(&model, &[parts[0].select(&[])], Worth::default()).expect("fits").is_empty());
+        assert!(segmented(&model, &[], Worth::default()).is_err());
+    }
+
+    #[test]
+    fn the_grid_of_borders_is_as_fine_in_long_recordings() {
+        let mut rng = ChaCha8Rng::seed_from_u64(3);
+        let model = model(&mut rng);
+        let step = |frames: usize, rng: &mut ChaCha8Rng| {
+            let views = [track(0, frames, rng)];
+            Recording::new(&model, &views, Worth::default()).expect("fits").step
+        };
+        let long = step(6000, &mut rng);
+        assert_eq!(long, step(30, &mut rng));
+        assert!(long <= model.typical_frames / PLACES, "{long}");
+    }
+
+    #[test]
+    fn segments_are_unknown_by_the_rule_of_whole_clips() {
+        let mut rng = ChaCha8Rng::seed_from_u64(7);
+        let mut model = model(&mut rng);
+        // Without patterns, as in a network, the outlier score is the entropy of the joint probabilities.
+        model.patterns = Array2::zeros((0, model.patterns.ncols()));
+        model.limits.distances.fill(1.0);
+        let views = [track(0, 25, &mut rng), track(1, 25, &mut rng)];
+        let score = |views: &[Track]| model.recognise(views).expect("fits").outlier_score;
+        let mean = 0.5 * (score(&views[..1]) + score(&views[1..]));
+        let joint = score(&views);
+        // Each view is sure of another activity.
+        assert!(mean < joint, "{mean} {joint}");
+        model.limits.distances.fill(0.5 * (mean + joint));
+        assert_eq!(model.recognise(&views).expect("fits").activity, None);
+        let recording = Recording::new(&model, &views, Worth::default()).expect("fits");
+        assert_eq!(recording.valued(0, 25).activity, None);
     }
 
     #[test]

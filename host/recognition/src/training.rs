@@ -42,6 +42,19 @@ impl Recogniser {
         scaling: Scaling,
         watch: &dyn Watch,
     ) -> Result<(Self, Option<f64>), ModelError> {
+        Self::train_performances(clips, &[], experiment, scaling, watch)
+    }
+
+    /// [`Self::train_searched`] for clips of which several may show one performance (views, windows).
+    /// `performances` numbers the performance of each clip; empty if each clip is another. Limits for unknown of a
+    /// single subject compare different performances only, and need as many as a limit needs clips.
+    pub fn train_performances(
+        clips: &[Clip],
+        performances: &[usize],
+        experiment: &Experiment,
+        scaling: Scaling,
+        watch: &dyn Watch,
+    ) -> Result<(Self, Option<f64>), ModelError> {
         let activities = names(clips.iter().map(|clip| &clip.activity));
         if activities.len() < 2 {
             return Err(ModelError::Activities(activities.len()));
@@ -69,12 +82,24 @@ impl Recogniser {
             all.iter().map(|clip| activities.iter().position(|a| *a == clip.activity).unwrap_or(0)).collect();
         let mut lengths: Vec<usize> = clips.iter().map(|clip| clip.views[0].frames()).collect();
         lengths.sort_unstable();
+        let renamed = by_performance(clips, performances);
+        let compared = renamed.as_deref().unwrap_or(clips);
+        let independent = names(compared.iter().map(|clip| &clip.subject)).len();
+        let limited = renamed.is_none() || independent >= Limits::fewest(Limits::FALSE_ALARMS);
         let other = experiment.second.clone();
         let second = other
-            .map(|other| AuxiliaryModel::learned(other, clips, &labels[..clips.len()], activities.len()));
+            .map(|other| AuxiliaryModel::learned(other, compared, &labels[..clips.len()], activities.len()));
+        let mut second = second.transpose()?;
+        if let Some(second) = second.as_mut().filter(|_| !limited) {
+            second.limits = Limits::none(activities.len());
+        }
         let recogniser = Self {
             typical_frames: lengths[lengths.len() / 2],
-            limits: limits(&all, &labels, activities.len(), clips.len(), &patterns),
+            limits: if limited {
+                limits(compared, &labels, activities.len(), &patterns)
+            } else {
+                Limits::none(activities.len())
+            },
             settings: RecogniserSettings {
                 scaling,
                 space: space.settings.clone(),
@@ -89,7 +114,8 @@ impl Recogniser {
             space,
             patterns,
             labels,
-            second: second.transpose()?,
+            second,
+            among: Vec::new(),
         };
         Ok((recogniser, inner_accuracy))
     }
@@ -107,25 +133,85 @@ fn fits(clip: &Clip, expected: usize, expected_boxes: bool) -> Result<(), ModelE
     Err(ModelError::Clip { found, found_boxes, expected, expected_boxes })
 }
 
-/// Unknown limits: every clip is compared with all other subjects' patterns, or with a single subject's other
-/// clips. Mirrors, if trained on, follow `clips`; `patterns` are in the same order.
-fn limits(
-    clips: &[&Clip],
-    labels: &[usize],
-    classes: usize,
-    originals: usize,
-    patterns: &Array2<f32>,
-) -> Limits {
-    let alone = clips.iter().all(|clip| clip.subject == clips[0].subject);
-    let scored: Vec<(usize, f32)> = (0..originals)
+/// Clips of a single subject with their performances as subjects; `None` for several subjects.
+fn by_performance(clips: &[Clip], performances: &[usize]) -> Option<Vec<Clip>> {
+    let single = clips.iter().all(|clip| clip.subject == clips[0].subject);
+    let renamed = clips.iter().enumerate().map(|(number, clip)| Clip {
+        subject: performances.get(number).unwrap_or(&number).to_string(),
+        activity: clip.activity.clone(),
+        views: clip.views.clone(),
+    });
+    single.then(|| renamed.collect())
+}
+
+/// Unknown limits: every clip is compared with all other subjects' patterns. Mirrors, if trained on, follow
+/// `clips`; `patterns` are in the same order.
+fn limits(clips: &[Clip], labels: &[usize], classes: usize, patterns: &Array2<f32>) -> Limits {
+    let scored: Vec<(usize, f32)> = (0..clips.len())
         .into_par_iter()
         .map(|i| {
-            let other =
-                |j: usize| if alone { j % originals != i } else { clips[j].subject != clips[i].subject };
+            let other = |j: usize| clips[j % clips.len()].subject != clips[i].subject;
             let others =
                 patterns.rows().into_iter().enumerate().filter(|(j, _)| other(*j)).map(|(_, row)| row);
             (labels[i], nearest(others, patterns.row(i)))
         })
         .collect();
     Limits::conformal(&scored, classes, Limits::FALSE_ALARMS)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::clip::Track;
+    use crate::embedding::descriptor::{ANGLES, CELLS};
+    use crate::space::{PatternKind, SpaceSettings};
+    use rand::{Rng, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    /// Performances of two activities by one subject, each there several times, with their numbers.
+    fn copies(performances: usize, count: usize) -> (Vec<Clip>, Vec<usize>) {
+        let mut rng = ChaCha8Rng::seed_from_u64(21);
+        let (mut clips, mut numbers) = (Vec::new(), Vec::new());
+        for number in 0..performances {
+            let (phase, size) = (rng.random_range(0.0..6.0_f32), rng.random_range(0.05..0.15_f32));
+            let descriptors = Array2::from_shape_fn((20, ANGLES), |(frame, angle)| {
+                let waves = (number % 2 + 2) as f32 * (angle as f32).to_radians();
+                let noise = rng.random_range(-0.01..0.01_f32);
+                0.35 + size * (waves + 0.2 * frame as f32 + phase).sin() + noise
+            });
+            let view = Track { descriptors, cells: Array2::zeros((20, CELLS)), boxes: None, empty_frames: 0 };
+            let activity = ["turn", "star"][number % 2].to_owned();
+            for _ in 0..count {
+                let (activity, views) = (activity.clone(), vec![view.clone()]);
+                clips.push(Clip { subject: "ben".into(), activity, views });
+                numbers.push(number);
+            }
+        }
+        (clips, numbers)
+    }
+
+    #[test]
+    fn limits_of_a_single_subject_come_from_different_performances() {
+        let space = SpaceSettings {
+            dimensions: 4,
+            pattern: PatternKind::Codebook(8),
+            residuals: 0,
+            ..SpaceSettings::default()
+        };
+        let experiment = Experiment::codebook(space).fixed();
+        let limits = |clips: &[Clip], performances: &[usize]| {
+            let scaling = Scaling::default();
+            let trained =
+                Recogniser::train_performances(clips, performances, &experiment, scaling, &Unwatched);
+            trained.expect("trained").0.limits.distances
+        };
+        let (clips, numbers) = copies(20, 2);
+        // A copy is at distance 0.
+        assert!(limits(&clips, &[]).iter().all(|limit| *limit < 1e-6));
+        let found = limits(&clips, &numbers);
+        assert!(found.iter().all(|limit| *limit > 1e-6 && limit.is_finite()), "{found:?}");
+        // Many clips, but fewer than 19 performances: nothing is unknown.
+        let (clips, numbers) = copies(2, 24);
+        assert!(limits(&clips, &numbers).iter().all(|limit| limit.is_infinite()));
+    }
 }

@@ -1,18 +1,20 @@
 //! Standard deviation of the cutting angle beta: error propagation (Li 2014, eq. 8.21 to 8.37, corrected).
 //!
 //! The printed chain (elevation twice, wrong root, no covariances) is ten times too large. Here beta is differentiated
-//! as a whole. With `A = -Hc r_y`, `B = u r_x - X0 r_y` (X0 = u times a fixed image slope) and `D = A^2 + B^2`:
+//! as a whole, by central differences. For a level camera, with `A = -Hc r_y`, `B = u r_x - X0 r_y` (X0 = u times a fixed image
+//! slope) and `D = A^2 + B^2`, the result is
 //!
 //! `s_beta^2 = 1/4 [ (Hc u s^2 / D)^2 (s_psi^2 + s_alpha^2) + (A B / (u D))^2 s_u^2 + (B r_y / D)^2 s_Hc^2
 //! ]`, `s_u^2 = (v / w_i)^2 s_w^2 + (w / w_i)^2 s_v^2 + (u / w_i)^2 s_wi^2`.
 //!
 //! Agrees with Monte Carlo to 2 %, unless the shadow's tip nears the camera ([`Uncertainty::first_order_holds`]).
 
-use super::camera::CameraFile;
-use super::projection::{GroundShadow, ShadowError, Subject, on_ground};
+use super::camera::{Camera, CameraFile};
+use super::projection::{GroundShadow, ShadowError, Subject, in_image, on_ground};
 use crate::sun::{self, Equatorial, Model, Place, SunError};
 use chrono::{DateTime, TimeDelta, Utc};
 use serde::{Deserialize, Serialize};
+use std::f64::consts::{PI, TAU};
 
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Uncertainty {
@@ -64,7 +66,8 @@ fn per_day(time: DateTime<Utc>, model: Model) -> [f64; 2] {
     [0.5 * (after.declination_rad - before.declination_rad), 0.5 * hour_angle]
 }
 
-/// Propagates the camera file's standard deviations to beta. Fails for an invalid place or too low a sun.
+/// Propagates the camera file's standard deviations to beta. Fails for an invalid place, too low a sun, and a subject not in
+/// front of the lens.
 pub fn propagate(
     file: &CameraFile,
     time: DateTime<Utc>,
@@ -92,7 +95,7 @@ pub fn propagate(
     let known = file.subject.distance_m.is_some();
     let distance = if known { 0.0 } else { distance_variance(file, subject.distance_m) };
     let tip = tip_variance(file, position.elevation_deg.to_radians(), shadow, azimuth, elevation) + distance;
-    let beta = beta_variance(file, shadow, subject, azimuth, distance);
+    let beta = beta_variance(file, shadow, subject, azimuth, distance)?;
     let tip_m = subject.distance_m + shadow.ry_m;
     Ok(Uncertainty {
         azimuth_rad: azimuth.sqrt(),
@@ -130,21 +133,43 @@ fn tip_variance(
         + shadow.rx_m.powi(2) * (azimuth_var + sd.azimuth_deg.to_radians().powi(2))
 }
 
+/// Variance of beta, half of that of the shadow's direction in the image, which does not depend on the shadow's length.
 fn beta_variance(
     file: &CameraFile,
     shadow: GroundShadow,
     subject: Subject,
     azimuth_var: f64,
     distance_var: f64,
-) -> f64 {
-    let (hc, sd) = (file.camera.height_m, &file.standard_deviations);
-    let u = subject.distance_m;
-    let (a, b) = (-hc * shadow.ry_m, u * shadow.rx_m - subject.offset_m * shadow.ry_m);
-    let d = a * a + b * b;
-    let direction = hc * u * shadow.length_m.powi(2) / d;
-    0.25 * (direction.powi(2) * (azimuth_var + sd.azimuth_deg.to_radians().powi(2))
-        + (a * b / (u * d)).powi(2) * distance_var
-        + (b * shadow.ry_m / d).powi(2) * sd.camera_height_m.powi(2))
+) -> Result<f64, ShadowError> {
+    /// Of the central differences: radians of the direction on the ground, and shares of distance and camera height.
+    const STEP: f64 = 1e-4;
+    let sd = &file.standard_deviations;
+    let direction = |[turn, further, higher]: [f64; 3]| -> Result<f64, ShadowError> {
+        let (sin, cos) = turn.sin_cos();
+        let turned = GroundShadow {
+            rx_m: cos * shadow.rx_m - sin * shadow.ry_m,
+            ry_m: sin * shadow.rx_m + cos * shadow.ry_m,
+            ..shadow
+        };
+        let subject = Subject {
+            distance_m: (1.0 + further) * subject.distance_m,
+            offset_m: (1.0 + further) * subject.offset_m,
+            ..subject
+        };
+        let camera = Camera { height_m: (1.0 + higher) * file.camera.height_m, ..file.camera.clone() };
+        Ok(in_image(turned, subject, &camera)?.eta_rad)
+    };
+    let mut variance = 0.0;
+    for (step, step_variance) in [
+        ([STEP, 0.0, 0.0], azimuth_var + sd.azimuth_deg.to_radians().powi(2)),
+        ([0.0, STEP, 0.0], distance_var / subject.distance_m.powi(2)),
+        ([0.0, 0.0, STEP], (sd.camera_height_m / file.camera.height_m).powi(2)),
+    ] {
+        let change = direction(step)? - direction(step.map(|part| -part))?;
+        let slope = ((change + PI).rem_euclid(TAU) - PI) / (2.0 * STEP);
+        variance += 0.25 * slope * slope * step_variance;
+    }
+    Ok(variance)
 }
 
 #[cfg(test)]
@@ -208,6 +233,44 @@ mod tests {
         let found = tip_variance(&file, elevation_deg.to_radians(), shadow, azimuth_var, elevation_var);
         // Third derivatives times the squared step, and rounding divided by it.
         assert!((found / expected - 1.0).abs() < 1e-7, "{found} {expected}");
+    }
+
+    /// For a level camera, in closed form.
+    fn beta_variance_if_level(
+        file: &CameraFile,
+        shadow: GroundShadow,
+        subject: Subject,
+        vars: [f64; 2],
+    ) -> f64 {
+        let (hc, sd) = (file.camera.height_m, &file.standard_deviations);
+        let u = subject.distance_m;
+        let (a, b) = (-hc * shadow.ry_m, u * shadow.rx_m - subject.offset_m * shadow.ry_m);
+        let d = a * a + b * b;
+        let direction = hc * u * shadow.length_m.powi(2) / d;
+        0.25 * (direction.powi(2) * (vars[0] + sd.azimuth_deg.to_radians().powi(2))
+            + (a * b / (u * d)).powi(2) * vars[1]
+            + (b * shadow.ry_m / d).powi(2) * sd.camera_height_m.powi(2))
+    }
+
+    #[test]
+    fn the_variance_of_beta_is_the_closed_form_for_a_level_camera_and_another_with_pitch() {
+        let mut file = file();
+        file.camera.height_m = 3.0;
+        let subject = Subject { distance_m: 3.0, offset_m: 0.3, height_m: 1.75 };
+        let vars = [0.02_f64.powi(2), 0.3_f64.powi(2)];
+        for (rx_m, ry_m) in [(2.4_f64, 0.8_f64), (-1.0, 1.5), (0.4, -2.0), (-2.0, -4.0)] {
+            let shadow = GroundShadow { rx_m, ry_m, length_m: rx_m.hypot(ry_m) };
+            let found = beta_variance(&file, shadow, subject, vars[0], vars[1]).expect("visible");
+            let level = beta_variance_if_level(&file, shadow, subject, vars);
+            // Third derivatives times the squared step.
+            assert!((found / level - 1.0).abs() < 1e-5, "{rx_m} {ry_m}: {found} {level}");
+        }
+        // From a camera that looks down, a sideways shadow turns less with its direction and distance.
+        file.camera.pitch_deg = 40.0;
+        let shadow = GroundShadow { rx_m: 2.4, ry_m: 0.8, length_m: 2.4_f64.hypot(0.8) };
+        let found = beta_variance(&file, shadow, subject, vars[0], vars[1]).expect("visible");
+        let level = beta_variance_if_level(&file, shadow, subject, vars);
+        assert!(found < 0.8 * level, "{found} {level}");
     }
 
     #[test]

@@ -46,8 +46,18 @@ pub enum SilhouettesError {
          unit may be wrong"
     )]
     TooLarge { what: String, low_mm: f64, high_mm: f64, mm_per_px: f64 },
-    #[error("{}: no person in {least} successive frames", path.display())]
-    NoPassage { path: PathBuf, least: usize },
+    #[error("{}: no person in {least} successive frames{}", path.display(), leaping(.leap.as_ref()))]
+    NoPassage {
+        path: PathBuf,
+        least: usize,
+        /// Names between which the first number is missing.
+        leap: Option<[String; 2]>,
+    },
+    #[error(
+        "{count} silhouettes: --keep compares every two, of at most {limit}: use every {every}th frame (--every {every}), or \
+         fewer views"
+    )]
+    TooMany { count: usize, limit: usize, every: usize },
     #[error("no performance to draw")]
     NoPerformance,
     #[error("the shadow detector {} compares colours, but the video is grey", method.name())]
@@ -56,6 +66,10 @@ pub enum SilhouettesError {
 
 fn fitting(template: Option<&str>) -> String {
     template.map_or(String::new(), |name| format!("; the built-in template `{name}` fits it"))
+}
+
+fn leaping(leap: Option<&[String; 2]>) -> String {
+    leap.map_or(String::new(), |[before, after]| format!("; numbers leap from `{before}` to `{after}`"))
 }
 
 impl SilhouettesError {

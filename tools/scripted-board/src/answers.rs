@@ -98,7 +98,12 @@ impl Board {
             Request::SetLinkRate { .. } if self.faults.one_rate => {
                 self.answer(id, Err(RequestError::Malformed));
             }
+            Request::SetLinkRate { .. } if self.faults.busy => {
+                self.rate_requests += 1;
+                self.answer(id, Err(RequestError::Busy { request: 1 }));
+            }
             Request::SetLinkRate { rate } => {
+                self.rate_requests += 1;
                 self.answer(id, Ok(Response::Accepted));
                 self.change_rate(rate);
             }

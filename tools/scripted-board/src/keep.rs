@@ -2,7 +2,7 @@
 
 use farnear_protocol::{
     Request, RequestError, Response,
-    message::{Alarm, CorrectionFault, EventKind, Failure, Setting, SettingKey},
+    message::{Alarm, CorrectionFault, EventKind, Failure, ResetCause, Setting, SettingKey},
 };
 
 use crate::Board;
@@ -46,6 +46,11 @@ impl Board {
                 } else {
                     Err(RequestError::SettingRange(setting))
                 }
+            }
+            Request::ReadCounters
+                if self.faults.no_counters_after_reset && self.hello.reset_cause == ResetCause::Software =>
+            {
+                Err(RequestError::Malformed)
             }
             Request::ReadCounters => Ok(Response::Counters(self.counters)),
             _ => Err(RequestError::Correction(CorrectionFault::None)),

@@ -66,6 +66,10 @@ pub struct Faults {
     pub other_version: Option<u8>,
     /// The board rejects rate changes.
     pub one_rate: bool,
+    /// The board moves, and refuses rate changes.
+    pub busy: bool,
+    pub no_counters_after_reset: bool,
+    pub strobe_longer_us: u64,
     /// Rate at which the adapter passes nothing.
     pub no_rate: Option<LinkRate>,
 }
@@ -110,6 +114,7 @@ pub struct Board {
     pub braking: u32,
     asking: u32,
     logs: u32,
+    pub rate_requests: u32,
     /// Board rate, fallback rate with its time, and host rate.
     pub rate: LinkRate,
     trial: Option<(LinkRate, Instant)>,
@@ -207,6 +212,7 @@ impl Peer {
             braking: 0,
             asking: 0,
             logs: 0,
+            rate_requests: 0,
             rate: LinkRate::START,
             trial: None,
             host_rate: LinkRate::START,

@@ -205,7 +205,9 @@ impl Board {
             settle: Micros(9_000),
             trigger: BoardMicros(self.time),
             strobe_start,
-            strobe_end: BoardMicros(strobe_start.0 + u64::from(shot.exposure.0)),
+            strobe_end: BoardMicros(
+                strobe_start.0 + u64::from(shot.exposure.0) + self.faults.strobe_longer_us,
+            ),
             exposure: shot.exposure,
         }
     }

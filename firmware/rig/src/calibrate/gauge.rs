@@ -22,7 +22,7 @@ use crate::piezo::Piezo;
 use crate::settings::{Settings, StepperSettings};
 
 /// Piezo positions for the two contacts, by gauge.
-const PLACES: [Nanometres; 2] = [Nanometres(20_000), Nanometres(180_000)];
+pub(super) const PLACES: [Nanometres; 2] = [Nanometres(20_000), Nanometres(180_000)];
 const ROUNDS: usize = 4;
 /// Start of the exact approach above the switch: more than the gauge's error.
 const NEAR_NM: i32 = 30_000;

@@ -5,11 +5,13 @@
 //!    hysteresis. Smooth ends do not excite the resonance; creep adds less than a tenth to the hysteresis.
 //! 3. Rest, then up to half the range; positions 0.15 and 1.5 s later give a decade of creep.
 
-use farnear_protocol::message::{Axis, Calibration, Failure, SettingKey};
+use farnear_protocol::Nanometres;
+use farnear_protocol::message::{Axis, Calibration, Failure, Setting, SettingKey};
 
 use super::Step;
 use crate::io::{DAC_CODE_MAX, TICK_HZ};
 use crate::piezo::Piezo;
+use crate::settings::{FINE_MAX_NM, Values};
 
 const SWEEP: u32 = TICK_HZ / 2;
 /// Ticks of rest, and of the step.
@@ -21,6 +23,8 @@ const LATE: u32 = TICK_HZ * 15 / 10;
 const MEAN: u32 = 50;
 const PLACES: usize = 16;
 const HALF: u16 = DAC_CODE_MAX / 2;
+/// The sweep reaches both ends of the stroke, so a smaller limit excludes it.
+pub(super) const WHOLE_STROKE: [Nanometres; 1] = [Nanometres(FINE_MAX_NM)];
 
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Phase {
@@ -131,7 +135,7 @@ impl Sweep {
         }
     }
 
-    /// `None` for implausible readings.
+    /// `None` for implausible readings, and for figures that are not permitted as settings.
     fn evaluate(&self) -> Option<Found> {
         let stroke = i64::from(self.up[PLACES]) - i64::from(self.up[0]);
         let pairs = self.up.iter().zip(self.down.iter().rev());
@@ -146,7 +150,18 @@ impl Sweep {
             hysteresis_ppm: (width.max(0) * 1_000_000 / stroke) as i32,
             creep_ppm_per_decade: (creep.max(0) * 1_000_000 / step) as i32,
         };
-        Some(found)
+        // All or nothing is stored.
+        let fits = [
+            (SettingKey::PiezoGainPmPerCode, found.gain_pm_per_code),
+            (SettingKey::PiezoHysteresisPpm, found.hysteresis_ppm),
+            (SettingKey::PiezoCreepPpmPerDecade, found.creep_ppm_per_decade),
+        ]
+        .into_iter()
+        .all(|(key, value)| {
+            let Setting { min, max, .. } = Values::DEFAULT.setting(key);
+            (min..=max).contains(&value)
+        });
+        fits.then_some(found)
     }
 }
 
@@ -215,5 +230,25 @@ mod tests {
         let mut sweep = Sweep { up: [5; PLACES + 1], phase: Some(Phase::Tell(0)), ..Sweep::new() };
         let mut piezo = Piezo::new(Settings::DEFAULT.fine);
         assert_eq!(sweep.tick(&mut piezo), Step::Failed(Axis::SensorFine, Failure::Implausible));
+    }
+
+    #[test]
+    fn stores_nothing_if_one_figure_is_out_of_range() {
+        let first = |width: i32, creep: i32| {
+            let up: [i32; PLACES + 1] = core::array::from_fn(|place| place as i32 * 12_500);
+            let mut down = up;
+            down.reverse();
+            down[PLACES / 2] += width;
+            let early = 100_000 * MEAN as i32;
+            let late = early + creep * MEAN as i32;
+            let phase = Some(Phase::Tell(0));
+            let mut sweep = Sweep { up, down, early, late, phase, ..Sweep::new() };
+            sweep.tick(&mut Piezo::new(Settings::DEFAULT.fine))
+        };
+        assert_eq!(first(20_000, 1_000), Step::Set(SettingKey::PiezoGainPmPerCode, 3_051));
+        // Hysteresis of 40 % and creep of 12 % a decade; 30 % and 10 % are permitted.
+        for (width, creep) in [(80_000, 1_000), (20_000, 12_000)] {
+            assert_eq!(first(width, creep), Step::Failed(Axis::SensorFine, Failure::Implausible));
+        }
     }
 }

@@ -7,6 +7,7 @@ use super::Answer;
 use crate::motion::axis::Stepper;
 use crate::notes::Note;
 use crate::rig::Rig;
+use crate::settings::Settings;
 
 impl Rig {
     pub(super) fn clear_alarm(&mut self, number: u32, now: BoardMicros) -> Answer {
@@ -39,8 +40,20 @@ impl Rig {
     }
 
     pub(crate) fn apply_settings(&mut self) {
+        // Homing finds position 0 with these.
+        let used = |Settings { coarse, fine, lens, .. }: &Settings| {
+            ((coarse.backlash, fine.gauge_gain_ppm, fine.gauge_offset), lens.backlash)
+        };
+        let (coarse, lens) = used(&self.settings);
         self.settings = self.parts.with(&self.values);
         self.stage.apply(&self.settings);
+        let (coarse_now, lens_now) = used(&self.settings);
+        if coarse_now != coarse {
+            self.stage.coarse.lose();
+        }
+        if lens_now != lens {
+            self.stage.lens.lose();
+        }
         self.camera.apply(self.settings.camera);
         self.shots.arm(0); // it was checked with other numbers
         self.store.mark(RecordName::Settings);

@@ -124,7 +124,7 @@ const fn range(key: SettingKey) -> (i32, i32, i32) {
 const TRAVEL_NM: i32 = 13_000_000;
 /// 5 um at each end of the stroke are the loop's: hysteresis and creep move the ends, and saturation prevents damping.
 const FINE_MIN_NM: i32 = 5_000;
-const FINE_MAX_NM: i32 = 195_000;
+pub(crate) const FINE_MAX_NM: i32 = 195_000;
 
 impl Settings {
     pub const fn with(mut self, values: &Values) -> Self {

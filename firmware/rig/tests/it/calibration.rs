@@ -185,3 +185,56 @@ fn stage_a_is_homed_without_a_gauge_where_the_piezo_has_not_been_driven() {
     bench.reset(Some(0));
     assert!(matches!(bench.work(&home(Axis::SensorCoarse)), EventKind::Homed { .. }));
 }
+
+#[test]
+fn a_changed_backlash_or_gauge_scale_requires_homing() {
+    let (none, coarse, lens) = ([false; 2], [true, false], [false, true]);
+    for (key, value, lost) in [
+        (SettingKey::CoarseBacklashNm, 3_000, coarse),
+        (SettingKey::LensBacklashNm, 3_000, lens),
+        (SettingKey::GaugeGainPpm, 1_010_000, coarse),
+        (SettingKey::GaugeOffsetNm, 500, coarse),
+        (SettingKey::CameraReadoutUs, 9_000, none),
+    ] {
+        let mut bench = Bench::both_homed();
+        let unchanged = setting(&mut bench, key);
+        for (value, lost) in [(unchanged, none), (value, lost)] {
+            bench.ask(&Request::WriteSetting { key, value }).1.expect("in range");
+            let status = bench.status();
+            let found = [status.coarse.state, status.lens.state].map(|state| state == PositionState::Lost);
+            assert_eq!(found, lost, "{key:?} = {value}");
+        }
+    }
+}
+
+#[test]
+fn a_routine_that_would_pass_the_piezos_limits_is_refused() {
+    let mut bench = Bench::new(2_000.0);
+    let outside = |bench: &mut Bench, routine| match bench.ask(&calibrate(routine)).1 {
+        Err(RequestError::OutOfRange { axis: Axis::SensorFine, asked, .. }) => asked.0,
+        other => panic!("{routine:?}: {other:?}"),
+    };
+    let limit = |bench: &mut Bench, key, value| {
+        bench.ask(&Request::WriteSetting { key, value }).1.expect("in range");
+    };
+    limit(&mut bench, SettingKey::FineMaxNm, 179_000);
+    assert_eq!(outside(&mut bench, Routine::Piezo), 195_000);
+    assert_eq!(outside(&mut bench, Routine::Gauge), 180_000);
+    limit(&mut bench, SettingKey::FineMaxNm, 180_000);
+    limit(&mut bench, SettingKey::FineMinNm, 21_000);
+    assert_eq!(outside(&mut bench, Routine::Gauge), 20_000);
+    limit(&mut bench, SettingKey::FineMinNm, 20_000);
+    bench.accepted(&calibrate(Routine::Gauge));
+}
+
+#[test]
+fn the_piezo_rests_while_stage_a_is_homed() {
+    let mut bench = Bench::homed();
+    let request = bench.accepted(&go(Axis::SensorFine, 100_000));
+    assert_eq!(bench.ask(&home(Axis::SensorCoarse)).1, Err(RequestError::Busy { request }));
+    bench.end_of(request);
+    let request = bench.accepted(&home(Axis::SensorCoarse));
+    assert_eq!(bench.ask(&go(Axis::SensorFine, 20_000)).1, Err(RequestError::Busy { request }));
+    assert!(matches!(bench.end_of(request), EventKind::Homed { .. }));
+    bench.work(&go(Axis::SensorFine, 20_000));
+}

@@ -6,7 +6,7 @@ use farnear_maths::clsf::{
 };
 use farnear_protocol::message::{
     Axis, CODES_MAX, COEFFICIENTS_MAX, Codes, CoefficientBits, CorrectionFault, CorrectionForm,
-    CorrectionInfo, ResetCause,
+    CorrectionInfo, ResetCause, SunQuery,
 };
 use farnear_protocol::{Request, RequestError, Response};
 use proptest::prelude::*;
@@ -200,6 +200,8 @@ fn nothing_is_calculated_while_something_moves() {
         let request = bench.accepted(&go(axis, 100_000));
         let busy = Err(RequestError::Busy { request });
         assert_eq!(bench.ask(&Request::OpenCorrection(info(CorrectionForm::Full))).1, busy);
+        let sun = SunQuery { unix_seconds: 0, latitude_e7: 0, longitude_e7: 0, shadow: None };
+        assert_eq!(bench.ask(&Request::Sun(sun)).1, busy);
         bench.end_of(request);
     }
     bench.accepted(&Request::OpenCorrection(info(CorrectionForm::Full)));

@@ -1,6 +1,6 @@
 use farnear_protocol::message::{Alarm, AlarmRecord, Failure};
 
-use super::{axis_name, record_name, um};
+use super::{SLOW_READOUT, axis_name, record_name, um};
 
 pub fn alarm_text(alarm: Alarm) -> String {
     match alarm {
@@ -71,7 +71,10 @@ pub fn failure_text(reason: Failure, alarm: Option<&AlarmRecord>) -> String {
         Failure::NotSettled { error } => {
             format!("it did not settle in time ({:.3} um off at the end); is something shaking the rig?", um(error))
         }
-        Failure::NoStrobe => "the camera's exposure signal did not come or was shorter than the pulse; is the camera armed and its cable in?".into(),
+        Failure::NoStrobe => format!(
+            "the camera's exposure signal did not come or was shorter than the pulse; is the camera armed and its cable in? \
+             {SLOW_READOUT}"
+        ),
         Failure::DriverFault => "the motor driver reports a fault; check its supply and temperature".into(),
         Failure::StepUnderrun => "the step timer ran dry; home again, and report this as a bug".into(),
         Failure::Gauge => alarm_text(Alarm::Gauge),

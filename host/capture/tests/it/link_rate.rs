@@ -58,3 +58,12 @@ fn keeps_the_old_rate_with_older_firmware() {
     assert!(client.link_note().is_some());
     client.home(Axis::SensorCoarse).unwrap();
 }
+
+#[test]
+fn keeps_the_old_rate_of_a_board_that_moves() {
+    let peer = Peer::new(Faults { busy: true, ..Faults::default() });
+    let client = connect_at(&peer, SLOW);
+    assert_eq!((client.link_rate(), peer.board().rate), (LinkRate::START, LinkRate::START));
+    let note = client.link_note().unwrap();
+    assert!(note.contains("the rig was moving"), "{note}");
+}

@@ -86,7 +86,7 @@ fn of_person(clips: &[Clip], person: &str, mirror: bool) -> Result<[Found; 2]> {
     let recording = Recording::of(&own);
     let window = model.typical_frames;
     let by_windows = segments(&windows(&model, &recording.views, window, window.div_ceil(2))?);
-    let by_worth = segmented(&model, &recording.views, &[], Worth::default())?;
+    let by_worth = segmented(&model, &recording.views, Worth::default())?;
     Ok([recording.judged(&by_windows), recording.judged(&by_worth)])
 }
 

@@ -23,7 +23,7 @@ fn recording() -> String {
         points.push((format!("H{}", i + 1), [x, 200.0, if i == 2 { 1300.0 } else { 1000.0 }]));
     }
     let columns: Vec<String> = points.iter().map(|(n, _)| format!("{n}_x,{n}_y,{n}_z")).collect();
-    let mut text = format!("frame,{}\n", columns.join(","));
+    let mut text = format!("time,{}\n", columns.join(","));
     for frame in 0..3 {
         let cells: Vec<String> = points
             .iter()

@@ -65,6 +65,14 @@ impl<R: Read> Y4m<R> {
         Ok(Self { path: path.into(), decoder, bytes, frames: 0, full_range })
     }
 
+    /// Frames per second by the header (`F30000:1001`); `None` without it or for `F0:0`.
+    pub(super) fn rate_hz(&self) -> Option<f64> {
+        let mut parameters = self.decoder.get_raw_params().split(|&byte| byte == b' ');
+        let is_stated = parameters.any(|parameter| parameter.starts_with(b"F"));
+        let rate = self.decoder.get_framerate();
+        (is_stated && rate.num > 0 && rate.den > 0).then(|| rate.num as f64 / rate.den as f64)
+    }
+
     /// Notice to the user about pixels that are not square (`A64:45`).
     pub(super) fn remark(&self) -> Option<String> {
         let mut parameters = self.decoder.get_raw_params().split(|&byte| byte == b' ');

@@ -189,11 +189,8 @@ fn one_fold(
             let opinions: Vec<Vec<f32>> =
                 rows.rows().into_iter().map(|row| classifier.probabilities(row)).collect();
             for (clip, &truth) in test_labels.iter().enumerate() {
-                let mut joint = opinions[clip].clone();
-                if let Some(second) = opinions.get(test.len() + clip) {
-                    joint.iter_mut().zip(second).for_each(|(first, second)| *first *= second);
-                }
-                confusion.count(truth, largest(&joint).0);
+                let mirror = opinions.get(test.len() + clip);
+                confusion.count(truth, joint_answer(&opinions[clip], mirror.map(Vec::as_slice)));
             }
         }
         outcome.chosen.push(Choice {
@@ -213,6 +210,15 @@ fn one_fold(
     Ok(outcome)
 }
 
+/// Class of the largest product of a clip's and its mirror's probabilities. As in a model's joint answers, a
+/// probability of 0 does not exclude a class: nearest neighbours give 0 to all but a few.
+fn joint_answer(clip: &[f32], mirror: Option<&[f32]>) -> usize {
+    const LEAST: f32 = 1e-9;
+    let Some(mirror) = mirror else { return largest(clip).0 };
+    let products: Vec<f32> = clip.iter().zip(mirror).map(|(a, b)| a.max(LEAST) * b.max(LEAST)).collect();
+    largest(&products).0
+}
+
 fn aligned(
     align: Alignment,
     seen: Vec<Vec<Array2<f32>>>,
@@ -222,4 +228,16 @@ fn aligned(
     let (Some(own), Some(wanted)) = (of(&seen), of(learned)) else { return seen };
     let brought = own.to(&wanted, align);
     seen.iter().map(|views| views.iter().map(|view| brought.apply(view)).collect()).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_mirror_with_another_vote_does_not_give_the_first_class() {
+        assert_eq!(joint_answer(&[0.0, 1.0, 0.0], Some(&[0.0, 0.0, 1.0])), 1);
+        assert_eq!(joint_answer(&[0.0, 0.4, 0.6], Some(&[0.0, 0.9, 0.1])), 1);
+        assert_eq!(joint_answer(&[0.0, 0.4, 0.6], None), 2);
+    }
 }

@@ -70,6 +70,7 @@ impl Recogniser {
             patterns: Array2::zeros((0, width)),
             labels: Vec::new(),
             second: None,
+            among: Vec::new(),
             lengths: Lengths::of(clips, &activities),
             activities,
             views: 1,

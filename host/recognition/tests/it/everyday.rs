@@ -4,7 +4,7 @@ use farnear_recognition::clip::Clip;
 use farnear_recognition::embedding::descriptor::Scaling;
 use farnear_recognition::evaluation::open_set::open_set;
 use farnear_recognition::experiment::Experiment;
-use farnear_recognition::model::Recogniser;
+use farnear_recognition::model::{Answer, Recogniser};
 use farnear_recognition::network::training::NetworkSettings;
 use farnear_recognition::space::{PatternKind, SpaceSettings};
 use farnear_recognition::synthetic::everyday;
@@ -99,6 +99,40 @@ fn the_shipped_models_are_small_and_know_people_they_never_saw() {
         let unknown = unknown.count();
         assert!(10 * unknown <= 2 * people.len(), "model {index}: {unknown} of {} unknown", people.len());
     }
+}
+
+#[test]
+fn a_restricted_model_measures_the_outlier_score_for_the_activities_it_answers() {
+    let model = Recogniser::from_bytes(SHIPPED[0]).expect("whole");
+    let names: Vec<String> = ["walk", "lie down"].map(str::to_owned).to_vec();
+    let restricted = model.restricted_to(&names);
+    let mut clips = few(700_000, 6);
+    clips.retain(|clip| names.contains(&clip.activity));
+    for clip in &clips {
+        let [all, few] = [&model, &restricted].map(|model| model.recognise(&clip.views).expect("fits"));
+        let mut found: Vec<&String> = few.probabilities.iter().map(|(name, _)| name).collect();
+        found.sort();
+        assert_eq!(found, ["lie down", "walk"]);
+        assert!((few.probabilities.iter().map(|(_, share)| share).sum::<f32>() - 1.0).abs() < 1e-5);
+        assert_eq!(few.best(), all.among(&names).best());
+        // Sure among two, the clip is known, even if its probability is spread over the other 27.
+        assert!(few.confidence < 0.99 || few.outlier_score < 0.5, "{few:?}");
+    }
+    // Undecided between the two: unknown, although the same entropy is small among 29.
+    let undecided = few_of(&restricted, &[0.5, 0.5]);
+    assert!(undecided > 1.0, "{undecided}");
+}
+
+/// Outlier score of a restricted network for these probabilities.
+fn few_of(model: &Recogniser, shares: &[f32]) -> f32 {
+    let names = model.among.iter().map(|&class| model.activities[class].clone());
+    let answer = Answer {
+        activity: None,
+        confidence: 0.0,
+        probabilities: names.zip(shares.iter().copied()).collect(),
+        outlier_score: 0.0,
+    };
+    model.outlier_score_without(&answer, "none of these").expect("a network")
 }
 
 #[test]

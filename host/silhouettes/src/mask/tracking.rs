@@ -73,7 +73,7 @@ const SURE: f64 = 6.0;
 const HEIGHT_SPREAD: f64 = 0.2;
 /// Share of a person's predicted box in a blob that occludes them.
 const HIDDEN: f64 = 0.4;
-/// A blob up to this multiple of a person's area may hold one person.
+/// A blob up to this multiple of the largest person's area may hold one person.
 const ONE_ALONE: f64 = 1.15;
 const FOLLOWING: f64 = 0.2;
 /// Frames before a person is reported whom the left or right edge cuts; earlier it may be a hand or a foot of a person who
@@ -176,12 +176,16 @@ impl Tracker {
         let partings = self.partings(&costs, &blob_of, &shared);
         for (index, parted) in partings.into_iter().enumerate() {
             let at = shared[index].or(blob_of[index]);
-            let together: Vec<usize> = (0..self.tracks.len())
+            let others: Vec<&Track> = (0..self.tracks.len())
                 .filter(|&other| other != index && shared[other].is_some() && shared[other] == shared[index])
-                .map(|other| self.tracks[other].person)
+                .map(|other| &self.tracks[other])
                 .collect();
-            let hidden = blob_of[index].is_none();
-            let sight = self.sight(index, at.map(|at| &blobs[at]), (together, hidden), size);
+            let together: Vec<usize> = others.iter().map(|other| other.person).collect();
+            let largest = others.iter().map(|other| other.area).fold(self.tracks[index].area, f64::max);
+            // In a blob no larger than the largest of its people the occluded one may have left.
+            let gone =
+                blob_of[index].is_none() && at.is_some_and(|at| blobs[at].area as f64 <= ONE_ALONE * largest);
+            let sight = self.sight(index, at.map(|at| &blobs[at]), (together, gone), size);
             found.push(Followed { person: self.tracks[index].person, sight, parted });
         }
         let taken = |blob: &usize| blob_of.contains(&Some(*blob)) || shared.contains(&Some(*blob));
@@ -254,12 +258,12 @@ impl Tracker {
         partings
     }
 
-    /// Updates the track; it may share its blob or be occluded.
+    /// Updates the track; it may share its blob, or be occluded and perhaps gone.
     fn sight(
         &mut self,
         index: usize,
         blob: Option<&Person>,
-        (together, hidden): (Vec<usize>, bool),
+        (together, gone): (Vec<usize>, bool),
         size: (usize, usize),
     ) -> Sight {
         let track = &mut self.tracks[index];
@@ -269,8 +273,6 @@ impl Tracker {
         };
         let bounds = blob.bounds;
         if !together.is_empty() {
-            // In a blob no larger than one person the occluded one may have left.
-            let gone = hidden && blob.area as f64 <= ONE_ALONE * track.area;
             track.missed = if gone { track.missed + 1 } else { 0 };
             track.row.keep_within(bounds.top, bounds.bottom);
             track.column.keep_within(bounds.left, bounds.right);
@@ -367,6 +369,22 @@ mod tests {
         let sure = |from: usize| Parting { from, ambiguous: false };
         assert_eq!(parted, [(1, sure(2)), (2, sure(1))]);
         assert_eq!([left_of(&last, 1), left_of(&last, 2)], [Some(256), Some(34)]);
+    }
+
+    #[test]
+    fn a_smaller_person_who_stays_behind_a_larger_one_is_dropped() {
+        let mut tracker = tracker();
+        let mut crossed = false;
+        let mut last = Vec::new();
+        for n in 0..60 {
+            // The smaller one walks behind the larger one and is not seen again.
+            let left = (80.0 + 3.0 * f64::from(n)).min(150.0);
+            last = tracker.follow(frame(&[(150.0, 15, 100), (left, 40, 60)]).view());
+            crossed |= last.iter().any(|followed| matches!(followed.sight, Sight::Crossing { .. }));
+        }
+        assert!(crossed);
+        assert_eq!(last.len(), 1, "{last:?}");
+        assert!(matches!(last[0].sight, Sight::Alone { .. }), "{last:?}");
     }
 
     #[test]

@@ -1,25 +1,36 @@
-//! CSV markers: header `frame,NAME_x,NAME_y,NAME_z,...` (or `NAME:x`, `NAME.X`), a frame per row, mm, empty = hidden; or with
-//! names above the axes, as Vicon Nexus and OptiTrack Motive export them.
+//! CSV markers: header `frame,NAME_x,NAME_y,NAME_z,...` (or `NAME:x`, `NAME.X`), a frame per row, mm, empty = hidden; with
+//! `NAMEX,NAMEY,NAMEZ` as the Kinect SDK names joints (metres, y up); or with names above the axes, as Vicon Nexus and
+//! OptiTrack Motive export them.
+
+use std::collections::HashSet;
 
 use csv::StringRecord;
 
 use super::reader::Reader;
-use super::recording::{Found, Known, RecordingError, Source, Unit, Up, number, promised_frames, text};
+use super::recording::{
+    Found, Known, RecordingError, Source, Unit, Up, check_last_row, number, promised_frames, text,
+};
 use super::trc::point;
 use crate::silhouette::capsule::Point3;
 
 pub const READER: Reader = Reader {
     name: "CSV",
     extensions: &["csv"],
-    about: "a table with columns NAME_x, NAME_y, NAME_z in millimetres, z up, or of Vicon Nexus or OptiTrack Motive",
+    about: "a table with columns NAME_x, NAME_y, NAME_z in millimetres, z up, or of the Kinect SDK, Vicon Nexus or OptiTrack Motive",
     read: |bytes, _| read(bytes),
 };
 
 /// Motive's key of the number of frames.
 const MOTIVE_FRAMES: &str = "Total Exported Frames";
+/// Some joints under the Kinect SDK's names.
+const KINECT: [&str; 4] = ["ShoulderLeft", "WristRight", "KneeLeft", "AnkleRight"];
+/// Columns of times.
+const TIMES: [&str; 4] = ["time", "t", "time (s)", "timestamp"];
+/// Times further apart than this are milliseconds, others seconds.
+const MOST_SECONDS: f64 = 2.0;
 
-/// Separated by commas, semicolons or tabs. Ignores columns without a coordinate suffix (frame number, time,
-/// visibility). Errors have their line.
+/// Separated by commas, semicolons or tabs. Ignores columns without a coordinate suffix (frame number, visibility), except
+/// times. Errors have their line.
 pub fn read(bytes: &[u8]) -> Result<Found, RecordingError> {
     let text = text(bytes)?;
     const SEPARATORS: [char; 3] = ['\t', ';', ','];
@@ -47,20 +58,13 @@ fn plain(rows: &[StringRecord]) -> Result<Found, RecordingError> {
     let (columns, rows) = rows
         .split_first()
         .ok_or_else(|| RecordingError::Kind { kind: "CSV", reason: "it is empty".into() })?;
-    let mut markers: Vec<(String, [Option<usize>; 3])> = Vec::new();
-    for (index, column) in columns.iter().enumerate() {
-        let Some((name, axis)) = coordinate(column) else {
-            continue;
-        };
-        let known = markers.iter().position(|(known, _)| known == name);
-        let marker = known.unwrap_or_else(|| {
-            markers.push((name.to_owned(), [None; 3]));
-            markers.len() - 1
-        });
-        if markers[marker].1[axis].replace(index).is_some() {
-            let reason = format!("two columns are named {column}");
-            return Err(RecordingError::Line { line: 1, reason });
-        }
+    let mut markers = markers_of(columns, coordinate)?;
+    let is_separated = !markers.is_empty();
+    if !is_separated {
+        let all: HashSet<&str> = columns.iter().collect();
+        let has_all =
+            |name: &str| ["X", "Y", "Z"].iter().all(|axis| all.contains(format!("{name}{axis}").as_str()));
+        markers = markers_of(columns, |column| unseparated(column).filter(|(name, _)| has_all(name)))?;
     }
     if markers.is_empty() {
         return Err(RecordingError::Kind {
@@ -68,6 +72,13 @@ fn plain(rows: &[StringRecord]) -> Result<Found, RecordingError> {
             reason: "its header names no marker (NAME_x,NAME_y,NAME_z)".into(),
         });
     }
+    let is_kinect = !is_separated && KINECT.iter().all(|joint| markers.iter().any(|(name, _)| name == joint));
+    let (mm, up, source) = if is_kinect {
+        let reason = "for joints are named as the Kinect SDK does".into();
+        (1000.0, Up::Y, Source::Guess { reason, sure: true })
+    } else {
+        (1.0, Up::Z, Source::Format)
+    };
     let mut places = Vec::new();
     for (name, columns) in &markers {
         let [Some(x), Some(y), Some(z)] = *columns else {
@@ -85,16 +96,55 @@ fn plain(rows: &[StringRecord]) -> Result<Found, RecordingError> {
         }
         frames.push(points(row, &places)?);
     }
+    let rate_hz = rate_hz(columns, rows);
+    let unknown = "the file states no frame rate";
     Ok(Found {
         others: Vec::new(),
         planar: false,
         names: markers.into_iter().map(|(name, _)| name).collect(),
-        rate_hz: 0.0,
+        rate_hz: rate_hz.unwrap_or_default(),
         frames,
-        unit: Known { value: Unit::MM, source: Source::Format },
-        up: Known { value: Up::Z, source: Source::Format },
-        remarks: Vec::new(),
+        unit: Known { value: Unit { mm }, source: source.clone() },
+        up: Known { value: up, source },
+        remarks: rate_hz.is_none().then(|| unknown.to_owned()).into_iter().collect(),
     })
+}
+
+type Marker = (String, [Option<usize>; 3]);
+
+/// Names, with the columns of x, y and z.
+fn markers_of(
+    columns: &StringRecord,
+    coordinate: impl Fn(&str) -> Option<(&str, usize)>,
+) -> Result<Vec<Marker>, RecordingError> {
+    let mut markers: Vec<Marker> = Vec::new();
+    for (index, column) in columns.iter().enumerate() {
+        let Some((name, axis)) = coordinate(column) else {
+            continue;
+        };
+        let known = markers.iter().position(|(known, _)| known == name);
+        let marker = known.unwrap_or_else(|| {
+            markers.push((name.to_owned(), [None; 3]));
+            markers.len() - 1
+        });
+        if markers[marker].1[axis].replace(index).is_some() {
+            let reason = format!("two columns are named {column}");
+            return Err(RecordingError::Line { line: 1, reason });
+        }
+    }
+    Ok(markers)
+}
+
+/// Frames per second by a column of times and the median of its steps, to three decimals.
+fn rate_hz(columns: &StringRecord, rows: &[StringRecord]) -> Option<f64> {
+    let is_time = |column: &str| TIMES.iter().any(|known| column.eq_ignore_ascii_case(known));
+    let column = columns.iter().position(is_time)?;
+    let times: Vec<f64> = rows.iter().filter_map(|row| number(row.get(column)?)).collect();
+    let mut steps: Vec<f64> = times.windows(2).map(|two| two[1] - two[0]).collect();
+    steps.sort_unstable_by(f64::total_cmp);
+    let step = steps.get(steps.len() / 2).copied()?;
+    let rate_hz = if step > MOST_SECONDS { 1000.0 / step } else { 1.0 / step };
+    Some((1000.0 * rate_hz).round() / 1000.0).filter(|rate| rate.is_finite() && *rate > 0.0)
 }
 
 /// A table with names in a row above `Frame, ..., X, Y, Z, X, Y, Z`: of Vicon Nexus (units below, z up) and its predecessors
@@ -142,7 +192,9 @@ fn layered(rows: &[StringRecord]) -> Result<Option<Found>, RecordingError> {
     let is_frame = |row: &&StringRecord| row.get(0).is_some_and(|cell| number(cell).is_some());
     let frames: Vec<&StringRecord> = rows.iter().skip(data).take_while(is_frame).collect();
     if data + frames.len() == rows.len() {
-        check_last(&frames, &places)?;
+        let width = places.iter().map(|place| place[2] + 1).max().unwrap_or(0);
+        let cells: Vec<(usize, usize)> = frames.iter().map(|row| (line(row), row.len())).collect();
+        check_last_row(&cells, width)?;
     }
     let mut remarks = Vec::new();
     if let Some(promised) = stated(MOTIVE_FRAMES).and_then(number).filter(|_| motive.is_some()) {
@@ -161,19 +213,6 @@ fn layered(rows: &[StringRecord]) -> Result<Option<Found>, RecordingError> {
     }))
 }
 
-/// Refuses a table that ends in the middle of its last row. Programs that leave out empty cells at the end of a row do so in
-/// other rows, too.
-fn check_last(rows: &[&StringRecord], places: &[[usize; 3]]) -> Result<(), RecordingError> {
-    let width = places.iter().map(|place| place[2] + 1).max().unwrap_or(0);
-    match rows.split_last() {
-        Some((last, others)) if last.len() < width && others.iter().all(|row| row.len() >= width) => {
-            let reason = format!("{} values, the header names {width}: the file was cut short", last.len());
-            Err(RecordingError::Line { line: line(last), reason })
-        }
-        _ => Ok(()),
-    }
-}
-
 fn points(row: &StringRecord, places: &[[usize; 3]]) -> Result<Vec<Option<Point3>>, RecordingError> {
     let cells = |place: &[usize; 3]| place.map(|column| row.get(column).unwrap_or_default());
     places.iter().map(|place| point(cells(place), line(row))).collect()
@@ -190,9 +229,83 @@ fn coordinate(column: &str) -> Option<(&str, usize)> {
     Some((name, axis))
 }
 
+/// Name and axis (0 to 2) of a column `NameX`, as the Kinect SDK's `HipCenterX`.
+fn unseparated(column: &str) -> Option<(&str, usize)> {
+    let axis = ["X", "Y", "Z"].iter().position(|axis| column.ends_with(axis))?;
+    let name = &column[..column.len() - 1];
+    name.ends_with(|c: char| c.is_lowercase() || c.is_ascii_digit()).then_some((name, axis))
+}
+
 #[cfg(test)]
 mod tests {
+    use super::super::recording::Choices;
     use super::*;
+
+    #[test]
+    fn tables_of_the_kinect_sdk_are_read_in_metres_with_y_up_and_their_rate() {
+        const JOINTS: [&str; 20] = [
+            "HipCenter",
+            "Spine",
+            "ShoulderCenter",
+            "Head",
+            "ShoulderLeft",
+            "ElbowLeft",
+            "WristLeft",
+            "HandLeft",
+            "ShoulderRight",
+            "ElbowRight",
+            "WristRight",
+            "HandRight",
+            "HipLeft",
+            "KneeLeft",
+            "AnkleLeft",
+            "FootLeft",
+            "HipRight",
+            "KneeRight",
+            "AnkleRight",
+            "FootRight",
+        ];
+        let header = JOINTS.map(|joint| format!("{joint}X,{joint}Y,{joint}Z")).join(",");
+        // The head is above, the feet are below the sensor.
+        let high = |joint: &str| if joint == "Head" { 0.7 } else { -0.8 };
+        let row = JOINTS.map(|joint| format!("0.1,{},3.3", high(joint))).join(",");
+        let table = |header: &str| {
+            format!("Timestamp,{header},User-ID,Action,\n7000.5,{row},5,Wave,\n7032.5,{row},5,Wave,\n")
+        };
+        let found = read(table(&header).as_bytes()).expect("valid").settled(Choices::default());
+        assert_eq!((found.names.len(), found.rate_hz), (20, 31.25));
+        let head = found.by_name(1)["head"];
+        assert!(head.iter().zip([100.0, -3300.0, 700.0]).all(|(a, b)| (a - b).abs() < 1e-9), "{head:?}");
+        assert!(
+            found.by_name(0).contains_key("left hip") && found.by_name(0).contains_key("shoulder centre")
+        );
+        let remarks = found.remarks().join("; ");
+        for guess in ["lengths are taken as metres: a guess", "y is taken as up: a guess", "20 of 20 names"] {
+            assert!(remarks.contains(guess), "{guess}: {remarks}");
+        }
+        // A name without all three axes is another column; a name in capitals is not split.
+        let other = read(b"HeadX,HeadY,HeadZ,ForceX\n1,2,3,4\n").expect("valid");
+        assert_eq!((other.names, other.unit.value), (vec!["Head".to_owned()], Unit::MM));
+        assert!(read(b"AX,AY,AZ\n1,2,3\n").is_err());
+    }
+
+    #[test]
+    fn the_rate_is_that_of_a_column_of_times_and_its_absence_is_reported() {
+        for (times, expected) in [
+            ("t,0;0.01;0.02;0.5", 100.0),
+            ("Time (s),10;10.5", 2.0),
+            ("TIME,0;40;80", 25.0),
+            ("time,0;0;0", 0.0),
+            ("frame,0;40;80", 0.0),
+        ] {
+            let (column, times) = times.split_once(',').expect("a column");
+            let rows: String = times.split(';').map(|time| format!("{time},1,2,3\n")).collect();
+            let found = read(format!("{column},A_x,A_y,A_z\n{rows}").as_bytes()).expect("valid");
+            assert_eq!(found.rate_hz, expected, "{column}");
+            let remarks: &[&str] = if expected > 0.0 { &[] } else { &["the file states no frame rate"] };
+            assert_eq!(found.remarks, remarks, "{column}");
+        }
+    }
 
     #[test]
     fn tables_are_read_and_bad_ones_named() {

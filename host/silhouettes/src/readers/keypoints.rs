@@ -92,9 +92,14 @@ fn found(document: Document, choices: Choices) -> Result<Found, RecordingError> 
         let points = frames.iter_mut().flatten().flat_map(|person| person.points.iter_mut().flatten());
         points.for_each(|point| point[across] *= aspect);
     }
-    let (mut tracks, count) = people::followed(&frames);
-    if count > 1 {
-        remarks.push(format!("{count} people, the one seen most first (--person selects one, default 1)"));
+    let (mut tracks, others) = people::followed(&frames);
+    if tracks.len() > 1 {
+        let left_out =
+            if others > 0 { format!("; {others} who are seen less are left out") } else { String::new() };
+        let count = tracks.len();
+        remarks.push(format!(
+            "{count} people, the one seen most first (--person selects one, default 1){left_out}"
+        ));
     }
     tracks.iter_mut().flatten().for_each(|points| add_neck(points));
     let mut all = tracks.into_iter();

@@ -2,8 +2,8 @@
 //! of frames; per frame the number of bodies; per body a line (its id first), the number of joints and a line
 //! per joint: x, y, z in metres (x across, y up, z away), eight further numbers, and whether it was tracked.
 //! Of several bodies present for at least half as long as the longest, the one whose joints vary most is
-//! used: the sensor also reports chairs as bodies, and their joints only jitter. Bodies that are never visible together are
-//! one person under changing ids.
+//! used: the sensor also reports chairs as bodies, and their joints only jitter. Ids that are never in one frame are one person
+//! if no frame has two bodies, or if one begins near the place where another ends.
 
 use super::kinect::JOINTS_25;
 use super::reader::Reader;
@@ -21,14 +21,18 @@ pub const READER: Reader = Reader {
 /// The sensor follows six bodies.
 const MOST_BODIES: usize = 6;
 const RATE_HZ: f64 = 30.0;
+/// Largest distance between a body and the same person under the next id, metres.
+const HAND_OVER_M: f64 = 0.5;
 
 type Body = Vec<Option<Point3>>;
+/// Bodies by frame.
+type Track = BTreeMap<usize, Body>;
 
 pub fn read(bytes: &[u8]) -> Result<Found, RecordingError> {
     let content = text(bytes)?;
     let mut lines = Lines { lines: content.lines(), at: 0 };
     let count = lines.count("the number of frames")?;
-    let mut bodies: BTreeMap<String, Vec<(usize, Body)>> = BTreeMap::new();
+    let mut bodies: BTreeMap<String, Track> = BTreeMap::new();
     let mut most_together = 0;
     for frame in 0..count {
         let together = lines.count("the number of bodies")?;
@@ -41,20 +45,25 @@ pub fn read(bytes: &[u8]) -> Result<Found, RecordingError> {
                 return Err(lines.wrong(&format!("{joints} joints, expected {}", JOINTS_25.len())));
             }
             let body = (0..joints).map(|_| lines.joint()).collect::<Result<Body, RecordingError>>()?;
-            bodies.entry(id).or_default().push((frame, body));
+            bodies.entry(id).or_default().insert(frame, body);
         }
     }
     let mut remarks = Vec::new();
-    if most_together == 1 && bodies.len() > 1 {
-        remarks.push(format!("{} ids, never two in a frame: they are read as one person", bodies.len()));
-        let mut whole: Vec<(usize, Body)> = bodies.into_values().flatten().collect();
-        whole.sort_by_key(|(frame, _)| *frame);
-        bodies = BTreeMap::from([(String::new(), whole)]);
-    }
-    let longest = bodies.values().map(Vec::len).max().unwrap_or(0);
-    let present =
-        bodies.into_values().filter(|body| 2 * body.len() >= longest.max(2) || body.len() == longest);
-    let mut present: Vec<Vec<(usize, Body)>> = present.collect();
+    let ids = bodies.len();
+    let people: Vec<Track> = if most_together == 1 && ids > 1 {
+        remarks.push(format!("{ids} ids, never two in a frame: they are read as one person"));
+        vec![bodies.into_values().flatten().collect()]
+    } else {
+        let people = joined(bodies.into_values().collect());
+        if people.len() < ids {
+            let count = people.len();
+            remarks.push(format!("{ids} ids are read as {count} bodies: some begin where others end"));
+        }
+        people
+    };
+    let longest = people.iter().map(Track::len).max().unwrap_or(0);
+    let present = people.into_iter().filter(|body| 2 * body.len() >= longest.max(2) || body.len() == longest);
+    let mut present: Vec<Track> = present.collect();
     present.sort_by(|a, b| variance(b).total_cmp(&variance(a)));
     present.truncate(MOST_BODIES);
     if present.len() > 1 {
@@ -84,12 +93,57 @@ pub fn read(bytes: &[u8]) -> Result<Found, RecordingError> {
     })
 }
 
+/// Joins ids that are never in one frame, where one begins near the place where another ends.
+fn joined(mut ids: Vec<Track>) -> Vec<Track> {
+    ids.sort_by_key(|track| track.keys().next().copied());
+    let mut people: Vec<Track> = Vec::new();
+    for track in ids {
+        let nearest = (0..people.len())
+            .filter_map(|person| Some((hand_over_m(&people[person], &track)?, person)))
+            .filter(|(distance_m, _)| *distance_m < HAND_OVER_M)
+            .min_by(|a, b| a.0.total_cmp(&b.0));
+        match nearest {
+            Some((_, person)) => people[person].extend(track),
+            None => people.push(track),
+        }
+    }
+    people
+}
+
+/// Largest distance at the changes between two ids; `None` if they share a frame, or no joint is tracked at a change.
+fn hand_over_m(person: &Track, track: &Track) -> Option<f64> {
+    let is_between = |from: usize, to: usize| track.range(from + 1..to).next().is_some();
+    let mut widest_m = 0.0_f64;
+    for (&frame, body) in track {
+        if person.contains_key(&frame) {
+            return None;
+        }
+        let before = person.range(..frame).next_back().filter(|(at, _)| !is_between(**at, frame));
+        let after = person.range(frame + 1..).next().filter(|(at, _)| !is_between(frame, **at));
+        for (_, neighbour) in before.into_iter().chain(after) {
+            widest_m = widest_m.max(distance_m(body, neighbour)?);
+        }
+    }
+    Some(widest_m)
+}
+
+/// Mean over the joints that both have.
+fn distance_m(a: &[Option<Point3>], b: &[Option<Point3>]) -> Option<f64> {
+    let both: Vec<f64> = a
+        .iter()
+        .zip(b)
+        .filter_map(|(a, b)| a.zip(*b))
+        .map(|(a, b)| (0..3).map(|k| (a[k] - b[k]).powi(2)).sum::<f64>().sqrt())
+        .collect();
+    (!both.is_empty()).then(|| both.iter().sum::<f64>() / both.len() as f64)
+}
+
 /// Variance of joint positions over time, summed over joints, file units squared.
-fn variance(body: &[(usize, Body)]) -> f64 {
-    let joints = body.first().map_or(0, |(_, joints)| joints.len());
+fn variance(body: &Track) -> f64 {
+    let joints = body.values().next().map_or(0, Vec::len);
     let of = |joint: usize, axis: usize| {
         let values: Vec<f64> =
-            body.iter().filter_map(|(_, joints)| joints.get(joint)?.map(|p| p[axis])).collect();
+            body.values().filter_map(|joints| joints.get(joint)?.map(|p| p[axis])).collect();
         let count = values.len().max(1) as f64;
         let mean = values.iter().sum::<f64>() / count;
         values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / count
@@ -201,13 +255,35 @@ mod tests {
         assert!(found.remarks[0].contains("one person"), "{:?}", found.remarks);
     }
 
+    fn standing(id: &str, x: f64) -> String {
+        let joints: String =
+            (0..25).map(|j| format!("{x} {} 3 0 0 0 0 0 0 0 0 2\n", f64::from(j) / 25.0 + 0.01)).collect();
+        format!("{id} 0 1 1 1 1 0 0 0 2\n25\n{joints}")
+    }
+
+    #[test]
+    fn an_actor_whose_id_changes_is_one_body_although_another_appears() {
+        let mut text = String::from("20\n");
+        for frame in 0..20 {
+            let actor = standing(if frame < 10 { "1" } else { "2" }, 0.05 * f64::from(frame));
+            // Another body in one frame, too far away to be the actor.
+            text += &match frame {
+                5 => format!("2\n{actor}{}", standing("3", 4.0)),
+                _ => format!("1\n{actor}"),
+            };
+        }
+        let found = read(text.as_bytes()).expect("bodies");
+        assert!(found.others.is_empty() && found.frames.iter().all(|frame| frame[0].is_some()));
+        assert_eq!(found.remarks, ["3 ids are read as 2 bodies: some begin where others end"]);
+        // Another person, a metre away.
+        let apart = text.replace("\n0.5 ", "\n1.5 ");
+        let found = read(apart.as_bytes()).expect("bodies");
+        assert!(found.others.len() == 1 && found.remarks[0].starts_with("2 bodies"), "{:?}", found.remarks);
+    }
+
     #[test]
     fn a_chair_that_is_visible_longer_is_not_the_actor() {
-        let body = |id: &str, x: f64| {
-            let joints: String =
-                (0..25).map(|j| format!("{x} {} 3 0 0 0 0 0 0 0 0 2\n", j as f64 / 25.0 + 0.01)).collect();
-            format!("{id} 0 1 1 1 1 0 0 0 2\n25\n{joints}")
-        };
+        let body = standing;
         let mut text = String::from("20\n");
         for frame in 0..20 {
             // The chair jitters; the actor walks a metre and is lost for three frames.

@@ -131,7 +131,8 @@ mod tests {
         assert!(
             ann.by_name(0)["C7"][0] == 500.0 && ann.by_name(0).contains_key("B1") && ann.names.len() == 6
         );
-        assert_eq!(ann.remarks(), ["2 people: 1 Ann, 2 Ben (--person selects one, default 1)"]);
+        let people = "2 people: 1 Ann, 2 Ben (--person selects one, default 1)";
+        assert_eq!(ann.remarks(), ["the file states no frame rate", people]);
         let ben = person(&two(), Some(2)).expect("a table");
         assert_eq!((ben.by_name(1)["LASI"][0], ben.by_name(1)["Ben:C7"][0]), (3500.0, 3500.0));
         assert!(matches!(person(&two(), Some(3)), Err(RecordingError::Person { wanted: 3, found: 2 })));

@@ -127,7 +127,7 @@ mod tests {
         ];
         let header = points.map(|(name, _)| format!("{name}_x,{name}_y,{name}_z")).join(",");
         let row = points.map(|(_, point)| turned(point)).join(",");
-        format!("{header}\n{row}\n{row}\n")
+        format!("time,{header}\n0,{row}\n0.01,{row}\n")
     }
 
     fn recording(text: &str, up: Option<Up>) -> Recording {

@@ -332,6 +332,20 @@ pub(super) fn promised_frames(what: &str, promised: f64, found: usize) -> Result
     Ok((missing > 0.0).then(|| format!("{what} promises {promised} frames, the file has {found}")))
 }
 
+/// Refuses a table that ends in the middle of its last row. Programs that leave out empty cells at the end of a row do so in
+/// other rows, too. A row is its line and its number of cells.
+pub(super) fn check_last_row(rows: &[(usize, usize)], width: usize) -> Result<(), RecordingError> {
+    match rows.split_last() {
+        Some((&(line, cells), others))
+            if cells < width && others.iter().all(|(_, cells)| *cells >= width) =>
+        {
+            let reason = format!("{cells} values, the header names {width}: the file was cut short");
+            Err(RecordingError::Line { line, reason })
+        }
+        _ => Ok(()),
+    }
+}
+
 /// Names that several points have.
 fn repeated(names: &[String]) -> Vec<&str> {
     let mut sorted: Vec<&str> = names.iter().map(String::as_str).filter(|name| !name.is_empty()).collect();

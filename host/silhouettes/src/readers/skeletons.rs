@@ -157,6 +157,8 @@ pub fn read_cells(bytes: &[u8], layout: &Layout) -> Result<Vec<SkeletonClip>, Sk
             return Err(form(dimensions));
         }
         let unit = layout.unit_mm;
+        // [x, z, y] mirrors the body, which `kinect` and `ntu` rotate to [x, -z, y]. It stays because published figures
+        // of these sets are measured on it; a rotation would change the views.
         let frames = values
             .chunks_exact(3 * layout.joints.len())
             .map(|frame| frame.chunks_exact(3).map(|p| [unit * p[0], unit * p[2], unit * p[1]]).collect())

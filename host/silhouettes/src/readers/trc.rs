@@ -1,7 +1,9 @@
 //! TRC files (Motion Analysis, OpenSim): marker trajectories separated by tabs, or as spreadsheets save them.
 
 use super::reader::Reader;
-use super::recording::{Found, Known, RecordingError, Source, Up, number, promised_frames, text};
+use super::recording::{
+    Found, Known, RecordingError, Source, Up, check_last_row, number, promised_frames, text,
+};
 use crate::silhouette::capsule::Point3;
 
 pub const READER: Reader = Reader {
@@ -91,13 +93,16 @@ fn rows(
     places: &[usize],
     separator: char,
 ) -> Result<Vec<Vec<Option<Point3>>>, RecordingError> {
-    let mut frames = Vec::new();
+    let width = places.iter().map(|place| 5 + 3 * place).max().unwrap_or(0);
+    let (mut frames, mut all) = (Vec::new(), Vec::new());
     for (index, row) in lines.iter().enumerate().skip(5) {
         // Trailing tabs are common; a blank row separates header and data.
         let cells: Vec<&str> = row.trim_end_matches([separator, '\r']).split(separator).collect();
         if row.trim_matches(|c: char| c.is_whitespace() || c == separator).is_empty() {
             continue;
         }
+        // Tabs are those of hidden markers.
+        all.push((index + 1, row.split(separator).count()));
         let mut points = Vec::with_capacity(places.len());
         for &m in places {
             let cell = |k: usize| cells.get(2 + 3 * m + k).map_or("", |cell| cell.trim());
@@ -105,6 +110,7 @@ fn rows(
         }
         frames.push(points);
     }
+    check_last_row(&all, width)?;
     Ok(frames)
 }
 

@@ -11,7 +11,7 @@ struct Naming {
     names: &'static [(&'static str, &'static str)],
 }
 
-const NAMINGS: [Naming; 5] = [
+const NAMINGS: [Naming; 6] = [
     Naming {
         about: "joints named as Biovision and SMPL do",
         template: "bvh",
@@ -90,18 +90,15 @@ const NAMINGS: [Naming; 5] = [
             ("@uarm", "#Arm"),
             ("@shldrbend", "#Arm"),
             ("@upperarm", "#Arm"),
-            ("upperarm@", "#Arm"),
             ("#upperarm", "#Arm"),
             ("#arm", "#Arm"),
             ("@forearm", "#ForeArm"),
             ("@farm", "#ForeArm"),
             ("@forearmbend", "#ForeArm"),
-            ("lowerarm@", "#ForeArm"),
             ("@lowerarm", "#ForeArm"),
             ("#lowerarm", "#ForeArm"),
             ("#forearm", "#ForeArm"),
             ("@hand", "#Hand"),
-            ("hand@", "#Hand"),
             ("#hand", "#Hand"),
             ("@handend", "#Hand_End"),
             ("#handend", "#Hand_End"),
@@ -109,25 +106,26 @@ const NAMINGS: [Naming; 5] = [
             ("@mid1", "#HandMiddle1"),
             ("@thigh", "#UpLeg"),
             ("@thighbend", "#UpLeg"),
-            ("thigh@", "#UpLeg"),
             ("#thigh", "#UpLeg"),
             ("#upperleg", "#UpLeg"),
+            ("@upperleg", "#UpLeg"),
             ("#upleg", "#UpLeg"),
             ("@shin", "#Leg"),
             ("#shin", "#Leg"),
             ("@calf", "#Leg"),
-            ("calf@", "#Leg"),
             ("#lowerleg", "#Leg"),
+            ("@lowerleg", "#Leg"),
             ("#leg", "#Leg"),
             ("@foot", "#Foot"),
-            ("foot@", "#Foot"),
             ("#foot", "#Foot"),
             ("@toe", "#ToeBase"),
             ("@toe0", "#ToeBase"),
-            ("ball@", "#ToeBase"),
+            ("@ball", "#ToeBase"),
             ("#toe", "#ToeBase"),
             ("#toes", "#ToeBase"),
+            ("@toes", "#ToeBase"),
             ("#toebase", "#ToeBase"),
+            ("@toebase", "#ToeBase"),
             ("@footend", "#ToeBase"),
             ("@toeend", "#ToeBase_End"),
             ("#toeend", "#ToeBase_End"),
@@ -205,6 +203,30 @@ const NAMINGS: [Naming; 5] = [
         ],
     },
     Naming {
+        about: "joints named as the Kinect SDK does",
+        template: "kinect",
+        names: &[
+            ("hipcenter", "hip centre"),
+            ("spinebase", "hip centre"),
+            ("spine", "spine"),
+            ("spinemid", "spine"),
+            ("shouldercenter", "shoulder centre"),
+            ("spineshoulder", "shoulder centre"),
+            ("neck", "neck"),
+            ("head", "head"),
+            ("shoulder#", "# shoulder"),
+            ("elbow#", "# elbow"),
+            ("wrist#", "# wrist"),
+            ("hand#", "# hand"),
+            ("handtip#", "# hand tip"),
+            ("thumb#", "# thumb"),
+            ("hip#", "# hip"),
+            ("knee#", "# knee"),
+            ("ankle#", "# ankle"),
+            ("foot#", "# foot"),
+        ],
+    },
+    Naming {
         about: "laboratory markers named as OpenCap's augmenter does",
         template: "opencap",
         names: &[
@@ -218,7 +240,8 @@ const NAMINGS: [Naming; 5] = [
 ];
 
 /// Text before or after the names of one body's points.
-const PREFIXES: [&str; 4] = ["mixamorig", "bip001", "bip01", "skeleton"];
+/// Of Mixamo, 3ds Max, VRoid and Character Creator.
+const PREFIXES: [&str; 7] = ["mixamorig", "bip001", "bip01", "skeleton", "jbipc", "jbip", "ccbase"];
 const SUFFIXES: [&str; 1] = ["study"];
 
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -273,7 +296,10 @@ fn matched(simple: &[String], template: &Template, naming: Option<&Naming>) -> V
     for (place, name) in simple.iter().enumerate() {
         for (theirs, ours) in naming.into_iter().flat_map(|naming| naming.names) {
             for [side, short] in [["left", "l"], ["right", "r"]] {
-                if *name == theirs.replace('#', side).replace('@', short) {
+                let sided = |theirs: &str| theirs.replace('#', side).replace('@', short);
+                // `UpperLeg_L` is `LUpperLeg`.
+                let turned = theirs.strip_prefix(['#', '@']).map(|joint| [joint, &theirs[..1]].concat());
+                if *name == sided(theirs) || turned.is_some_and(|turned| *name == sided(&turned)) {
                     let capital = if side == "left" { "Left" } else { "Right" };
                     let side = if template.name == "bvh" { capital } else { side };
                     add(place, &ours.replace('#', side).replace('&', &short.to_uppercase()));
@@ -359,6 +385,18 @@ mod tests {
                  rclavicle rhumerus rradius rhand",
                 "bvh",
                 17,
+            ),
+            (
+                "joint_Root Hips Spine Chest Neck Head Shoulder_L UpperArm_L LowerArm_L Hand_L Shoulder_R UpperArm_R LowerArm_R \
+                 Hand_R UpperLeg_L LowerLeg_L Foot_L Toes_L UpperLeg_R LowerLeg_R Foot_R Toes_R",
+                "bvh",
+                19,
+            ),
+            (
+                "spine spine.001 spine.002 spine.004 head upper_arm.L forearm.L hand.L upper_arm.R forearm.R hand.R thigh.L shin.L \
+                 foot.L toe.L thigh.R shin.R foot.R toe.R",
+                "bvh",
+                16,
             ),
             (
                 "Ann:Hip Ann:Ab Ann:Chest Ann:Neck Ann:Head Ann:LShoulder Ann:LUArm Ann:LFArm Ann:LHand Ann:RShoulder Ann:RUArm \

@@ -203,6 +203,19 @@ fn a_trc_file_cut_short_is_refused_with_both_numbers() {
 }
 
 #[test]
+fn a_trc_file_cut_in_its_last_row_is_refused() {
+    let whole = TRC.replace("0.3\t\t\t\n", "0.3\t7\t8\t9\n");
+    let hidden = whole.replace("3\t4\t5\t6\n", "3\t\t\t\n");
+    assert_eq!(trc::read(hidden.as_bytes()).expect("hidden").frames[1], [Some([1.0, 2.0, 3.0]), None]);
+    let cut = whole.trim_end().trim_end_matches("\t5\t6");
+    let error = trc::read(cut.as_bytes()).expect_err("cut short").to_string();
+    assert!(error.starts_with("line 8: 6 values, the header names 8"), "{error}");
+    // A program that leaves out empty cells does so in other rows, too.
+    let short = whole.replace("0.3\t7\t8\t9\n", "0.3\n").replace("3\t4\t5\t6\n", "3\n");
+    assert_eq!(trc::read(short.as_bytes()).expect("hidden").frames.len(), 2);
+}
+
+#[test]
 fn a_trc_file_without_a_rate_or_with_one_name_twice_is_reported() {
     let remarks = |text: &str| {
         let recording = read(text.as_bytes(), "trc").expect("a TRC file");

@@ -115,11 +115,6 @@ pub(super) fn probabilities(answer: &Answer) -> Vec<Probability> {
     answer.probabilities.iter().map(probability).collect()
 }
 
-/// Restricts the answer to some activities; all if `among` is empty.
-pub(super) fn restricted(answer: Answer, among: &[String]) -> Answer {
-    if among.is_empty() { answer } else { answer.among(among) }
-}
-
 fn unknown_because(answer: &Answer, frames: usize) -> Option<String> {
     if answer.activity.is_some() {
         return None;
@@ -128,7 +123,7 @@ fn unknown_because(answer: &Answer, frames: usize) -> Option<String> {
     Some(match answer.best() {
         _ if frames == 0 => "there is no frame".into(),
         Some(best) if score.is_finite() => {
-            format!("most like `{best}`, but {score:.2} times as far from it as what the model knows")
+            format!("most like `{best}`, but the outlier score is {score:.2}, above the limit of 1")
         }
         _ => format!("no person in any of the {frames} frames"),
     })

@@ -85,7 +85,7 @@ pub struct EvaluateRequest {
     #[serde(flatten)]
     pub method: MethodOptions,
     /// each: every view by itself, answers counted together; fused: all views of a clip at once [default: fused, or each where clips
-    /// differ in their views].
+    /// differ in their views; with --model: each for a model of one view, fused for a model of several, which refuses each].
     #[cfg_attr(feature = "clap", arg(long))]
     #[schemars(with = "Option<String>")]
     pub views: Option<Views>,

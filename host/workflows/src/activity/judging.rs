@@ -70,6 +70,7 @@ pub(super) fn judge(
     out: Option<&Staging>,
     context: &Context<'_>,
 ) -> Result<JudgingFigures> {
+    check_views(request.views, model.recogniser(true).views)?;
     let samples = Samples::read_opened(&request.samples, request.open_blind_set.as_deref(), context)?;
     check_same(request, samples.clips.iter().map(|clip| &clip.activity), model)?;
     let activities = model.activities();
@@ -123,6 +124,16 @@ pub(super) fn judge(
         )?;
     }
     Ok(figures)
+}
+
+/// Refuses single views for a model that fuses several.
+fn check_views(asked: Option<Views>, of_model: usize) -> Result<()> {
+    if of_model > 1 && asked == Some(Views::Each) {
+        let expected =
+            format!("expected fused: the model fuses {of_model} views and does not answer for one");
+        return Err(WorkflowError::parameter("views", "each", expected));
+    }
+    Ok(())
 }
 
 /// Refuses pairs of names of which neither the samples nor the model know one.
@@ -236,4 +247,16 @@ fn wrong(known: &[Judged], among: &[String]) -> Result<Vec<u8>, csv::Error> {
     table.write_record(["subject", "activity", "view", "frames", "answer", "confidence"])?;
     found.iter().try_for_each(|(_, row)| table.write_record(row))?;
     table.into_inner().map_err(|error| error.into_error().into())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn single_views_are_refused_for_a_model_of_several() {
+        let error = check_views(Some(Views::Each), 4).expect_err("refused").to_string();
+        assert!(error.contains("views each") && error.contains("4 views"), "{error}");
+        assert!(check_views(Some(Views::Each), 1).is_ok() && check_views(None, 4).is_ok());
+    }
 }

@@ -90,8 +90,9 @@ enum Joints {
     Points(Recording, Template),
 }
 
-/// Single-view clips of motion files. Fails for a file without an activity or without visible people.
-pub(super) fn clips(request: &TrainRequest, context: &Context<'_>) -> Result<Vec<Clip>> {
+/// Single-view clips of motion files, a list for each performance. Fails for a file without an activity or without
+/// visible people.
+pub(super) fn performances(request: &TrainRequest, context: &Context<'_>) -> Result<Vec<Vec<Clip>>> {
     let mut all = Vec::new();
     let counter = Counter::new(context, "motion files");
     // The trained model depends on the order of clips.
@@ -100,10 +101,15 @@ pub(super) fn clips(request: &TrainRequest, context: &Context<'_>) -> Result<Vec
     for file in files {
         counter.check(DURING)?;
         let mut found = Vec::new();
+        let mut clips = 0;
         for recorded in recorded(file, request, context)? {
             counter.check(DURING)?;
-            let seed = seed_of(&file.path, found.len());
-            found.extend(seen(&recorded, request.cameras, seed));
+            let seed = seed_of(&file.path, clips);
+            let views = seen(&recorded, request.cameras, seed);
+            clips += views.len();
+            if !views.is_empty() {
+                found.push(views);
+            }
         }
         if found.is_empty() {
             return Err(MotionError::NobodySeen { path: file.path.clone() }.into());
@@ -155,6 +161,10 @@ fn recorded(file: &MotionFile, request: &TrainRequest, context: &Context<'_>) ->
     let recording = markers::recording(path, choices)?;
     for remark in recording.remarks() {
         context.progress.warn(&format!("{}: {remark}", path.display()));
+    }
+    // A recording from one side is not resampled.
+    if recording.rate_hz <= 0.0 && !recording.planar {
+        context.progress.warn(&format!("{}: the frame rate is unknown, 30/s is assumed", path.display()));
     }
     let template = match &request.template {
         Some(name) => markers::template(name)?,
@@ -220,7 +230,53 @@ fn seed_of(path: &Path, number: usize) -> u64 {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Mutex;
+
     use super::*;
+    use crate::{Cancel, Progress, Unattended};
+
+    #[derive(Default)]
+    struct Heard(Mutex<Vec<String>>);
+
+    impl Progress for Heard {
+        fn info(&self, what: &str) {
+            self.0.lock().expect("no panic").push(what.into());
+        }
+    }
+
+    #[test]
+    fn a_recording_without_a_frame_rate_is_reported_and_its_views_are_one_performance() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let mut csv = String::from("frame,HEAD_x,HEAD_y,HEAD_z,HIP_x,HIP_y,HIP_z,HAND_x,HAND_y,HAND_z\n");
+        for frame in 0..12 {
+            csv += &format!("{frame},0,0,1700,0,0,900,400,0,{}\n", 800 + 80 * frame);
+        }
+        let path = folder.path().join("walk.csv");
+        fs::write(&path, csv).expect("written");
+        let template = folder.path().join("doll.toml");
+        let text = "name = 'doll'\n\
+             [[part]]\nname = 'trunk'\nmarkers = ['HEAD', 'HIP']\nthickness_mm = 120.0\n\
+             [[part]]\nname = 'arm'\nmarkers = ['HIP', 'HAND']\nthickness_mm = 50.0\n";
+        fs::write(&template, text).expect("written");
+        let request = TrainRequest {
+            motion: vec![MotionFile { activity: Some("walk".into()), subject: None, path }],
+            template: Some(template.display().to_string()),
+            cameras: 3,
+            ..TrainRequest::default()
+        };
+        let heard = Heard::default();
+        let found = performances(&request, &Context::new(&heard, &Unattended, Cancel::default()));
+        let found = found.expect("clips");
+        assert!(
+            found.len() == 1 && found[0].len() > 1,
+            "{:?}",
+            found.iter().map(Vec::len).collect::<Vec<_>>()
+        );
+        let heard = heard.0.into_inner().expect("no panic");
+        assert!(
+            heard.iter().any(|line| line.ends_with("walk.csv: the frame rate is unknown, 30/s is assumed"))
+        );
+    }
 
     #[test]
     fn files_are_named_with_what_is_done_by_whom() {

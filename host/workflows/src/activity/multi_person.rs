@@ -70,7 +70,6 @@ pub struct MultiPersonTracker<'m> {
     frames: Frames,
     tracker: Option<Tracker>,
     window: usize,
-    among: Vec<String>,
     people: Vec<Tracked<'m>>,
     annotated_video: Option<AnnotatedVideo>,
     count: usize,
@@ -82,7 +81,6 @@ pub struct MultiPersonTracker<'m> {
 
 impl<'m> MultiPersonTracker<'m> {
     pub(super) fn begin(model: &'m Model, view: &View, request: &RecogniseRequest) -> Result<Self> {
-        let among = model.named(&request.among)?;
         if view.is_cut_out()? {
             return Err(MultiPersonError::CutOut { path: view.path.clone() }.into());
         }
@@ -98,7 +96,6 @@ impl<'m> MultiPersonTracker<'m> {
             frames: Frames::open(view)?,
             tracker: None,
             window,
-            among,
             people: Vec::new(),
             annotated_video: request.video_out.as_deref().map(AnnotatedVideo::begin).transpose()?,
             count: 0,
@@ -120,13 +117,8 @@ impl<'m> MultiPersonTracker<'m> {
         context.warn(self.frames.take_remarks(), &mut self.remarks);
         let Some(moved) = moved else { return Ok(None) };
         self.count += 1;
-        let (followed, flag) = match &moved.mask {
-            Ok(mask) => {
-                let like = || Tracker::new(TrackingSettings::for_size(mask.dim()));
-                (self.tracker.get_or_insert_with(like).follow(mask.view()), None)
-            }
-            Err(flag) => (Vec::new(), Some(flag.to_string())),
-        };
+        let followed = follow(&mut self.tracker, moved.mask.as_ref().ok());
+        let flag = moved.mask.as_ref().err().map(Flag::to_string);
         let people = followed
             .into_iter()
             .map(|followed| self.answered(followed).about(|| moved.name.clone()))
@@ -156,7 +148,7 @@ impl<'m> MultiPersonTracker<'m> {
         let Followed { person, sight, parted } = followed;
         while self.people.len() < person {
             self.people.push(Tracked {
-                person: Person::new(self.model, 1, self.window, &self.among),
+                person: Person::new(self.model, 1, self.window),
                 answer: None,
                 crossing_frames: 0,
                 perhaps_swapped_with: Vec::new(),
@@ -230,6 +222,21 @@ impl<'m> MultiPersonTracker<'m> {
     }
 }
 
+/// People in the next frame; none in one without a mask, in which they age: the next person in that place is another one.
+fn follow(tracker: &mut Option<Tracker>, mask: Option<&Mask>) -> Vec<Followed> {
+    match (mask, tracker) {
+        (Some(mask), tracker) => {
+            let like = || Tracker::new(TrackingSettings::for_size(mask.dim()));
+            tracker.get_or_insert_with(like).follow(mask.view())
+        }
+        (None, Some(tracker)) => {
+            tracker.follow(Mask::from_elem((1, 1), false).view());
+            Vec::new()
+        }
+        (None, None) => Vec::new(),
+    }
+}
+
 fn shown(person: &PersonInFrame) -> Option<Shown> {
     let spans = person.top_left_bottom_right?;
     let crossing = person.flags.iter().any(|flag| matches!(flag, PersonFlag::Crossing(_)));
@@ -240,4 +247,28 @@ fn shown(person: &PersonInFrame) -> Option<Shown> {
         None => "unknown".to_owned(),
     };
     Some(Shown { spans, text: format!("{}: {what}", person.person), known })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_person_after_a_changed_scene_is_another_one() {
+        let person = Mask::from_shape_fn((120, 320), |(row, column)| {
+            (20..90).contains(&row) && (100..120).contains(&column)
+        });
+        let mut tracker = None;
+        assert!(follow(&mut tracker, None).is_empty() && tracker.is_none());
+        let mut numbers = |frames: usize, mask: Option<&Mask>| -> Vec<usize> {
+            let mut last = Vec::new();
+            for _ in 0..frames {
+                last = follow(&mut tracker, mask);
+            }
+            last.iter().map(|followed| followed.person).collect()
+        };
+        assert_eq!(numbers(5, Some(&person)), [1]);
+        assert!(numbers(20, None).is_empty());
+        assert_eq!(numbers(5, Some(&person)), [2]);
+    }
 }

@@ -7,7 +7,7 @@ use farnear_recognition::live::{Live, joined, windows};
 use farnear_recognition::model::{Answer, ModelError, Recogniser};
 use farnear_recognition::segmentation::{Worth, segmented};
 
-use super::answer::{AnswerSummary, Part, PersonFigures, restricted, rounded_probability};
+use super::answer::{AnswerSummary, Part, PersonFigures, rounded_probability};
 use crate::error::Result;
 
 /// Frames without the person after which a new part begins.
@@ -17,7 +17,6 @@ pub(super) struct Person<'m> {
     model: &'m Recogniser,
     live: Live<'m>,
     window: usize,
-    among: Vec<String>,
     /// Indexed as `[view][frame]`.
     tracks: Vec<Vec<Track>>,
     /// The recording's number of each frame, from 1.
@@ -25,13 +24,12 @@ pub(super) struct Person<'m> {
 }
 
 impl<'m> Person<'m> {
-    /// Answers among some activities (all if empty) for the last `window` frames of `views` views.
-    pub fn new(model: &'m Recogniser, views: usize, window: usize, among: &[String]) -> Self {
+    /// Answers for the last `window` frames of `views` views.
+    pub fn new(model: &'m Recogniser, views: usize, window: usize) -> Self {
         Self {
             live: Live::new(model, window, true),
             model,
             window,
-            among: among.to_vec(),
             tracks: vec![Vec::new(); views],
             numbers: Vec::new(),
         }
@@ -43,7 +41,7 @@ impl<'m> Person<'m> {
             track.push(frame.clone());
         }
         self.numbers.push(number);
-        Ok(restricted(self.live.push_described(views)?, &self.among))
+        self.live.push_described(views)
     }
 
     /// Drops the frames but those of the running window.
@@ -60,8 +58,7 @@ impl<'m> Person<'m> {
     /// The answer for all frames.
     pub fn summary(&self) -> Result<AnswerSummary> {
         let whole: Vec<Track> = self.tracks.iter().map(|frames| joined(frames.iter())).collect();
-        let answer = restricted(self.model.recognise(&whole)?, &self.among);
-        Ok(AnswerSummary::new(answer, self.numbers.len()))
+        Ok(AnswerSummary::new(self.model.recognise(&whole)?, self.numbers.len()))
     }
 
     /// Answers for all frames, for windows and for segments; `None` if no frame has a silhouette.
@@ -113,12 +110,11 @@ impl<'m> Person<'m> {
             }
         };
         let of_windows = windows(self.model, &whole, self.window, self.window.div_ceil(2))?;
-        let of_segments = segmented(self.model, &whole, &self.among, Worth::default())?;
+        let of_segments = segmented(self.model, &whole, Worth::default())?;
         Ok((
             of_windows
                 .into_iter()
-                .map(|window| (window.from, window.to, restricted(window.answer, &self.among)))
-                .map(|(from, to, answer)| part(from, to, answer.activity, answer.confidence))
+                .map(|window| part(window.from, window.to, window.answer.activity, window.answer.confidence))
                 .collect(),
             of_segments
                 .into_iter()

@@ -129,6 +129,7 @@ impl RecogniseRequest {
             [] => context.cache.model(&self.model)?,
             clips => Model::read(&self.model)?.adapted_to(clips, context)?.into(),
         };
+        let model = if self.among.is_empty() { model } else { model.restricted_to(&self.among)?.into() };
         let views = self.views.iter().map(|path| self.view(path, context)).collect::<Result<Vec<View>>>()?;
         let mut lines = String::new();
         let mut pass = |answer: StreamingAnswer| {

@@ -10,8 +10,9 @@ use farnear_files::masks;
 use farnear_recognition::clip::Track;
 use farnear_recognition::model::{Answer, Recogniser};
 use farnear_recognition::self_training::ROUNDS;
+use farnear_recognition::space::Pattern;
 use farnear_silhouettes::mask::{BoundingBox, Mask, centre::SIDE_PX, subject::Flag};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::{
     annotated_video::AnnotatedVideo,
@@ -23,7 +24,7 @@ use super::{
     recognise::RecogniseRequest,
     samples::{SCALING, are_full_frames},
     shipped::Shipped,
-    views::{Frames, Seen, View},
+    views::{Frames, Seen, View, ViewKind},
 };
 use crate::{
     context::Context,
@@ -105,8 +106,8 @@ impl Model {
         &self.recogniser.activities
     }
 
-    /// Activities of the model that are named, each text a name or a comma-separated list of names.
-    pub(super) fn named(&self, texts: &[String]) -> Result<Vec<String>> {
+    /// The model with some of its activities only. Each text is a name or a list of names with commas.
+    pub(super) fn restricted_to(&self, texts: &[String]) -> Result<Self> {
         let mut all = Vec::new();
         for text in texts {
             all.extend(named(text, self.activities()).map_err(|unknown| {
@@ -114,7 +115,11 @@ impl Model {
                 WorkflowError::parameter("activity", unknown, expected)
             })?);
         }
-        Ok(all)
+        Ok(Self {
+            path: self.path.clone(),
+            recogniser: self.recogniser.restricted_to(&all),
+            cut_out: self.cut_out.as_ref().map(|model| model.restricted_to(&all)),
+        })
     }
 }
 
@@ -202,7 +207,6 @@ pub(super) struct Recognition<'m> {
 
 impl<'m> Recognition<'m> {
     pub(super) fn begin(model: &'m Model, views: &[View], request: &RecogniseRequest) -> Result<Self> {
-        let among = model.named(&request.among)?;
         let first = views.first().map(View::is_cut_out).transpose()?;
         let recogniser = model.recogniser(first != Some(true));
         let (expected, found) = (recogniser.views, views.len());
@@ -213,16 +217,16 @@ impl<'m> Recognition<'m> {
         let frames = views.iter().map(Frames::open).collect::<Result<Vec<Frames>>>()?;
         Ok(Self {
             annotated_video: request.video_out.as_deref().map(AnnotatedVideo::begin).transpose()?,
-            remarks: model.expectation().into_iter().collect(),
+            remarks: model.expectation().into_iter().chain(rate_remark(recogniser, views)).collect(),
             views: frames,
-            ..Self::of_frames(recogniser, found, window, &among)
+            ..Self::of_frames(recogniser, found, window)
         })
     }
 
     /// A recognition whose frames are given to [`Self::take`].
-    pub(super) fn of_frames(model: &'m Recogniser, views: usize, window: usize, among: &[String]) -> Self {
+    pub(super) fn of_frames(model: &'m Recogniser, views: usize, window: usize) -> Self {
         Self {
-            person: Person::new(model, views, window, among),
+            person: Person::new(model, views, window),
             model,
             views: Vec::new(),
             window,
@@ -324,6 +328,42 @@ pub(super) fn window(model: &Recogniser, request: &RecogniseRequest) -> Result<u
     Ok(request.window.unwrap_or(model.typical_frames).max(1))
 }
 
+/// A remark on masks with a higher frame rate than those that a network learned from. Other models learn the user's rate.
+fn rate_remark(model: &Recogniser, views: &[View]) -> Option<String> {
+    /// Highest rate of the networks' training clips.
+    const LEARNED_HZ: f64 = 26.0;
+    /// Windows are too short above it.
+    const HIGH_HZ: f64 = 30.0;
+    if !matches!(model.space.pattern, Pattern::Network(_)) {
+        return None;
+    }
+    let is_high = |rate_hz: &f64| *rate_hz > HIGH_HZ && rate_hz.is_finite();
+    let (view, rate_hz) =
+        views.iter().find_map(|view| Some((view, stated_rate_hz(view).filter(is_high)?)))?;
+    let every = (rate_hz / LEARNED_HZ).ceil();
+    Some(format!(
+        "{}: {rate_hz:.0} masks a second, the model learned from at most {LEARNED_HZ}: draw one frame in {every} of these \
+         (farnear silhouettes markers --every {every})",
+        view.path.display()
+    ))
+}
+
+/// The masks' frame rate in `silhouettes.toml`, in their folder or next to it.
+fn stated_rate_hz(view: &View) -> Option<f64> {
+    #[derive(Deserialize)]
+    struct Index {
+        rate_hz: f64,
+    }
+    if view.kind != ViewKind::Masks {
+        return None;
+    }
+    let stated = |folder: &Path| {
+        let text = fs::read_to_string(folder.join("silhouettes.toml")).ok()?;
+        Some(toml::from_str::<Index>(&text).ok()?.rate_hz)
+    };
+    stated(&view.path).or_else(|| stated(view.path.parent()?))
+}
+
 fn best(answer: &Answer) -> Vec<Probability> {
     let mut probabilities = probabilities(answer);
     probabilities.sort_by(|a, b| b.probability.total_cmp(&a.probability));
@@ -346,6 +386,30 @@ fn in_frame(mask: &Mask, answer: &Answer, flags: &[Flag]) -> Option<PersonInFram
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn masks_of_a_high_frame_rate_are_reported_for_a_network() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("view1");
+        fs::create_dir(&path).expect("a folder");
+        let mask = Mask::from_shape_fn((60, 40), |(row, column)| {
+            (10..50).contains(&row) && (15..25).contains(&column)
+        });
+        fs::write(path.join("a.png"), masks::png(&mask).expect("a picture")).expect("written");
+        let model = Model::read(Path::new("everyday")).expect("shipped");
+        let views = [View { path, kind: ViewKind::Masks }];
+        let remarks = |rate_hz: &str| {
+            let index = format!("template = \"bvh\"\nrate_hz = {rate_hz}\n");
+            fs::write(folder.path().join("silhouettes.toml"), index).expect("written");
+            let begun = Recognition::begin(&model, &views, &RecogniseRequest::default());
+            begun.expect("masks").remarks.join("\n")
+        };
+        let high = remarks("100.0");
+        assert!(high.contains("100 masks a second") && high.contains("--every 4"), "{high}");
+        for rate_hz in ["30.0", "0.0", "inf"] {
+            assert!(!remarks(rate_hz).contains("masks a second"), "{rate_hz}");
+        }
+    }
 
     #[test]
     fn names_with_commas_are_found_in_a_list() {

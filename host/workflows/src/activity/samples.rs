@@ -205,15 +205,18 @@ impl Samples {
 
     /// Every view of every clip as a separate clip.
     pub fn split(self) -> Vec<Clip> {
-        let alone = |clip: Clip| {
+        self.split_by_performance().into_iter().flatten().collect()
+    }
+
+    /// [`Self::split`], a list for the views of each clip.
+    pub fn split_by_performance(self) -> Vec<Vec<Clip>> {
+        let alone = |clip: Clip| -> Vec<Clip> {
             let Clip { subject, activity, views } = clip;
-            views.into_iter().map(move |view| Clip {
-                subject: subject.clone(),
-                activity: activity.clone(),
-                views: vec![view],
-            })
+            let clip =
+                |view| Clip { subject: subject.clone(), activity: activity.clone(), views: vec![view] };
+            views.into_iter().map(clip).collect()
         };
-        self.clips.into_iter().flat_map(alone).collect()
+        self.clips.into_iter().map(alone).collect()
     }
 }
 

@@ -48,7 +48,7 @@ pub fn camera(
     mut on_moment: impl FnMut(&Moment<'_>) -> Result<()>,
 ) -> Result<()> {
     let model = model.recogniser(true);
-    let mut recognition = Recognition::of_frames(model, 1, model.typical_frames.max(1), &[]);
+    let mut recognition = Recognition::of_frames(model, 1, model.typical_frames.max(1));
     let mut extractor = None;
     live::watch(settings, context, |_, image| {
         let frame = VideoFrame { name: String::new(), pixels: Pixels::Grey(eight_bits(&image)) };

@@ -7,6 +7,7 @@ use farnear_recognition::choice::names;
 use farnear_recognition::clip::{Clip, Track};
 use farnear_recognition::model::Recogniser;
 use farnear_recognition::space::{Map, PatternKind};
+use farnear_recognition::unknown::Limits;
 use farnear_silhouettes::readers::recording::{Unit, Up};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -174,11 +175,19 @@ fn train(request: &TrainRequest, context: &Context<'_>) -> Result<TrainingFigure
     method.announce(context);
     let start = Instant::now();
     let learned = Learned::read(request, context)?;
-    let Learned { clips, frames, empty_frames, full_frames, what } = learned;
-    let clips: Vec<Clip> = match request.window {
-        Some(length) => clips.iter().flat_map(|clip| clip.windows(length)).collect(),
-        None => clips,
+    let Learned { performances, frames, empty_frames, full_frames, what } = learned;
+    let windows = |clip: Clip| match request.window {
+        Some(length) => clip.windows(length),
+        None => vec![clip],
     };
+    let (numbers, clips): (Vec<usize>, Vec<Clip>) = performances
+        .into_iter()
+        .enumerate()
+        .flat_map(|(number, clips)| clips.into_iter().flat_map(windows).map(move |clip| (number, clip)))
+        .unzip();
+    if let Some(warning) = too_few_performances(&clips, &numbers) {
+        context.progress.warn(&warning);
+    }
     let alone = of_one_subject(&clips);
     if !alone.is_empty() {
         context.progress.warn(&format!(
@@ -188,8 +197,8 @@ fn train(request: &TrainRequest, context: &Context<'_>) -> Result<TrainingFigure
         ));
     }
     let experiment = method.experiment(full_frames)?;
-    let trained =
-        Recogniser::train_searched(&clips, &experiment, SCALING, &training_progress::Training::new(context));
+    let watch = training_progress::Training::new(context);
+    let trained = Recogniser::train_performances(&clips, &numbers, &experiment, SCALING, &watch);
     let (model, inner_accuracy) = training_progress::outcome(trained, context, "training").about(|| what)?;
     staging::write_file(&request.out, &model.to_bytes()?)?;
     context.info(&format!("wrote {}", request.out.display()));
@@ -226,8 +235,22 @@ fn of_one_subject(clips: &[Clip]) -> Vec<String> {
     activities
 }
 
+/// Why clips of a single subject give no limit for unknown; `numbers` are those of their performances.
+fn too_few_performances(clips: &[Clip], numbers: &[usize]) -> Option<String> {
+    let fewest = Limits::fewest(Limits::FALSE_ALARMS);
+    let found = numbers.chunk_by(|a, b| a == b).count();
+    let single = names(clips.iter().map(|clip| &clip.subject)).len() == 1;
+    (single && found < fewest).then(|| {
+        format!(
+            "a single subject needs {fewest} performances for a limit of unknown, found {found} (views and windows of one \
+             count once): nothing is called unknown; add performances, or clips of a second person"
+        )
+    })
+}
+
 struct Learned {
-    clips: Vec<Clip>,
+    /// Clips of each performance: its views, or one clip of all views.
+    performances: Vec<Vec<Clip>>,
     frames: usize,
     empty_frames: usize,
     full_frames: bool,
@@ -237,7 +260,7 @@ struct Learned {
 impl Learned {
     fn read(request: &TrainRequest, context: &Context<'_>) -> Result<Self> {
         let mut learned = Self {
-            clips: Vec::new(),
+            performances: Vec::new(),
             frames: 0,
             empty_frames: 0,
             full_frames: true,
@@ -250,15 +273,21 @@ impl Learned {
             learned.full_frames = samples.full_frames;
             learned.what = path.display().to_string();
             let apart = request.any_view || !request.motion.is_empty();
-            learned.clips = if apart { samples.split() } else { samples.fused()? };
+            learned.performances = if apart {
+                samples.split_by_performance()
+            } else {
+                samples.fused()?.into_iter().map(|clip| vec![clip]).collect()
+            };
         }
         if !request.motion.is_empty() {
-            let mut clips = motion::clips(request, context)?;
-            learned.frames += clips.iter().flat_map(|clip| &clip.views).map(Track::frames).sum::<usize>();
+            let mut found = motion::performances(request, context)?;
+            let views = || found.iter().flatten().flat_map(|clip| &clip.views);
+            learned.frames += views().map(Track::frames).sum::<usize>();
             if !learned.full_frames {
-                clips.iter_mut().flat_map(|clip| &mut clip.views).for_each(|view| view.boxes = None);
+                let views = found.iter_mut().flatten().flat_map(|clip| &mut clip.views);
+                views.for_each(|view| view.boxes = None);
             }
-            learned.clips.extend(clips);
+            learned.performances.extend(found);
         }
         Ok(learned)
     }
@@ -279,5 +308,41 @@ fn pattern(model: &Recogniser) -> String {
         }
         PatternKind::Codebook(size) => format!("codebook:{size}"),
         PatternKind::Network => "network".into(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use farnear_files::masks;
+    use farnear_silhouettes::mask::Mask;
+
+    use super::*;
+
+    #[test]
+    fn views_of_one_clip_are_one_performance_and_few_give_no_limit() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let mut text = String::new();
+        for view in 1..=2 {
+            let name = format!("view{view}");
+            std::fs::create_dir(folder.path().join(&name)).expect("a folder");
+            let mask = Mask::from_shape_fn((40, 30), |(row, column)| {
+                (10..35).contains(&row) && (10..15 + 2 * view).contains(&column)
+            });
+            let file = folder.path().join(&name).join("a.png");
+            std::fs::write(file, masks::png(&mask).expect("a picture")).expect("written");
+            let sample = "subject = \"ben\"\nactivity = \"walk\"\n";
+            text += &format!("[[sample]]\nmasks = \"{name}\"\n{sample}view = {view}\n");
+        }
+        let samples = folder.path().join("samples.toml");
+        std::fs::write(&samples, text).expect("written");
+        let request = TrainRequest { samples: Some(samples), any_view: true, ..TrainRequest::default() };
+        let learned = Learned::read(&request, &Context::unattended()).expect("samples");
+        assert_eq!(learned.performances.iter().map(Vec::len).collect::<Vec<_>>(), [2]);
+
+        let mut clips = learned.performances.concat();
+        let warning = too_few_performances(&clips, &[0, 0]).expect("one subject");
+        assert!(warning.contains("19 performances") && warning.contains("found 1 "), "{warning}");
+        clips[1].subject = "ann".into();
+        assert_eq!(too_few_performances(&clips, &[0, 1]), None);
     }
 }

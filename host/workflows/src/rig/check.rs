@@ -57,6 +57,7 @@ const PHASES: [Phase; 3] = [
         moves: true,
         in_turn: true,
         steps: &[
+            Step { name: "piezo ready", check: actuation::piezo_ready },
             Step { name: "motors on", check: actuation::connect_motors },
             Step { name: "first slow homing", check: moving::slow_homing },
             Step { name: "homing repeats", check: moving::homing_repeats },

@@ -7,13 +7,16 @@ use std::{fs, path::PathBuf};
 
 use farnear_capture::{
     continuous::{Continuous, Cycles, Frame, Outcome, Pace},
-    expose::check_shots,
+    expose::{check_shots, strobe_note},
     pair::{Exposures, Reach, reach},
     plan::SensorPair,
     ready::ensure_homed,
     sequence::read_program,
 };
-use farnear_protocol::{Micros, message::Shot};
+use farnear_protocol::{
+    Micros,
+    message::{Shot, TriggerMode},
+};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -189,6 +192,8 @@ fn capture(
     let wait = settings.camera.image_wait;
     let mut stream = Continuous::start(&rig.client, camera.as_mut(), &ready.shots, pace, wait)?;
     let mut cycles = Cycles::of(&ready.shots);
+    // A free-running camera has its own exposure time. A wrong one is wrong in every frame.
+    let mut noted = ready.shots.iter().any(|shot| shot.mode == TriggerMode::FreeRunning);
     while let Some(outcome) = stream.outcome()? {
         context.cancel.check("capturing continuously")?;
         if let (Some(seconds), Outcome::Taken(frame)) = (settings.r#for, &outcome)
@@ -202,6 +207,10 @@ fn capture(
             folder.note(&outcome)?;
         }
         let Outcome::Taken(frame) = outcome else { continue };
+        if let Some(note) = strobe_note(&frame.record).filter(|_| !noted) {
+            context.info(&note);
+            noted = true;
+        }
         match (&mut folder, &ready.pair, &circumstances) {
             (Some(folder), Some((_, sensor, reach)), Some(circumstances)) => {
                 let Some(cycle) = cycles.push(*frame) else { continue };

@@ -1,9 +1,12 @@
 //! Depth correction on the board, row by row over the link, compared bit by bit with this computer.
 
-use std::{path::PathBuf, time::Instant};
+use std::{
+    path::{Path, PathBuf},
+    time::Instant,
+};
 
 use farnear_capture::board_correction::{decode, encode};
-use farnear_files::staging;
+use farnear_files::{map::Format, staging};
 use ndarray::Array2;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -116,11 +119,12 @@ pub fn correct(settings: &BoardCorrectRequest, context: &Context<'_>) -> Result<
     })?;
     let seconds = begin.elapsed().as_secs_f64();
     let corrected = decode(corrected.view(), board.scale);
-    staging::write_file(&settings.out, &format.encode(corrected.view())?)?;
-    context.info(&format!("wrote {}", settings.out.display()));
-    let (different_pixels, first_difference) = compare(&corrected, &expected);
-    if settings.store && different_pixels == 0 {
-        rig.client.store_correction()?;
+    let (different_pixels, first_difference) = publish(&settings.out, format, &corrected, &expected)?;
+    if different_pixels == 0 {
+        context.info(&format!("wrote {}", settings.out.display()));
+        if settings.store {
+            rig.client.store_correction()?;
+        }
     }
     Ok(BoardCorrectFigures {
         method: correction.method().to_string(),
@@ -131,6 +135,20 @@ pub fn correct(settings: &BoardCorrectRequest, context: &Context<'_>) -> Result<
         rows_per_second: rounded(height as f64 / seconds, 1),
         first_difference,
     })
+}
+
+/// Writes the board's map if it equals the host's; returns the differences.
+fn publish(
+    out: &Path,
+    format: Format,
+    board: &Array2<f32>,
+    host: &Array2<f32>,
+) -> Result<(usize, Option<PixelDifference>)> {
+    let found = compare(board, host);
+    if found.0 == 0 {
+        staging::write_file(out, &format.encode(board.view())?)?;
+    }
+    Ok(found)
 }
 
 fn compare(board: &Array2<f32>, host: &Array2<f32>) -> (usize, Option<PixelDifference>) {
@@ -167,5 +185,16 @@ mod tests {
         assert_eq!(count, 2);
         assert_eq!(first, Some(PixelDifference { row: 1, column: 0, board_mm: 3.5, host_mm: 3.0 }));
         assert_eq!(mean_change_mm(&host, &board), (0.0 + 0.5 - 8.0) / 3.0);
+    }
+
+    #[test]
+    fn a_map_with_differences_is_not_written() {
+        let folder = tempfile::tempdir().unwrap();
+        let out = folder.path().join("map.npy");
+        let host = ndarray::array![[1.0, 2.0]];
+        let differs = publish(&out, Format::Npy, &ndarray::array![[1.0, 2.5]], &host).unwrap();
+        assert_eq!((differs.0, out.exists()), (1, false));
+        let equal = publish(&out, Format::Npy, &host, &host).unwrap();
+        assert_eq!((equal, out.exists()), ((0, None), true));
     }
 }

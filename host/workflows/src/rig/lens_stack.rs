@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use farnear_capture::{record::begin_folder, sequence::ShotDefaults};
+use farnear_capture::{expose::CaptureError, plan::PlanError, record::begin_folder, sequence::ShotDefaults};
 use farnear_depth::optics::Optics;
 use farnear_protocol::{Nanometres, message::Axis};
 use schemars::JsonSchema;
@@ -102,6 +102,10 @@ pub fn run(settings: &RigStackRequest, context: &Context<'_>) -> Result<StackFig
     let optics = given.optics;
     let folder = begin_folder(&settings.out)?;
     let mut rig = settings.camera.connect(&settings.rig, Some(&given), context)?;
+    let (asked, max) = (settings.slices, rig.rig.client.hello().limits.shots_max);
+    if asked > usize::from(max) {
+        return Err(CaptureError::from(PlanError::Shots { asked, max }).into());
+    }
     let focused = focus::search(
         &mut rig,
         &optics,

@@ -1,4 +1,5 @@
 use farnear_capture::{
+    Client,
     describe::um,
     expose::{CaptureError, check_position},
     ready::{ensure_homed, steppers},
@@ -76,7 +77,7 @@ pub struct MoveRequest {
     /// The axis; may be given again, each with its position.
     #[cfg_attr(feature = "clap", arg(long, value_name = "AXIS", required = true))]
     pub axis: Vec<AxisName>,
-    /// The position in micrometres, positive = sensor and lens away from each other; 0 = home switch, or relaxed piezo.
+    /// The position in micrometres, positive = sensor and lens away from each other; 0 = home switch. The piezo moves within fine_min_nm and fine_max_nm; `farnear rig reset` relaxes it.
     #[cfg_attr(
         feature = "clap",
         arg(long, value_name = "UM", allow_negative_numbers = true, required = true)
@@ -189,10 +190,17 @@ pub fn move_to(request: &MoveRequest, context: &Context<'_>) -> Result<MoveFigur
 
 /// Stops all motion along the ramps and ends a running program; positions stay known.
 pub fn stop(rig: &RigAddress, context: &Context<'_>) -> Result<()> {
-    Ok(Rig::connect(rig, None, context)?.client.stop()?)
+    Ok(connect_to_stop(rig, context)?.client.stop()?)
 }
 
 /// Emergency stop: moving axes lose their positions, and the alarm must be cleared.
 pub fn halt(rig: &RigAddress, context: &Context<'_>) -> Result<()> {
-    Ok(Rig::connect(rig, None, context)?.client.halt()?)
+    Ok(connect_to_stop(rig, context)?.client.halt()?)
+}
+
+fn connect_to_stop(rig: &RigAddress, context: &Context<'_>) -> Result<Rig> {
+    let RigAddress::Port(port) = rig else { return Rig::connect(rig, None, context) };
+    let mut client = Client::open_to_stop(port)?;
+    client.interrupt_by(context.cancel.flag());
+    Ok(Rig { client, emulation: None })
 }

@@ -3,13 +3,14 @@
 use std::{fs, path::PathBuf};
 
 use farnear_capture::{
-    expose::{CaptureError, check_shots, expose},
+    camera::Image,
+    expose::{CaptureError, check_shots, expose, strobe_note},
     ready::ensure_homed,
-    record::{begin_folder, finish_sequence, record_of_sequence},
+    record::{begin_folder, finish_sequence, record_of_sequence, write_image},
     sequence::{SequenceShot, ShotDefaults, image_name, read_program},
 };
 use farnear_files::staging::Staging;
-use farnear_protocol::message::Shot;
+use farnear_protocol::message::{Shot, TriggerMode};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -169,7 +170,7 @@ pub(super) fn take(
 ) -> Result<Vec<SequenceShot>> {
     check_shots(&rig.rig.client, shots)?;
     ensure_homed(&rig.rig.client, &mut |what| context.info(what))?;
-    let mut taken = Vec::new();
+    let mut taken = Taken { folder, shots: Vec::new(), first: None };
     for run in 0..settings.runs {
         context.info(&format!("running {} shots", shots.len()));
         let name = |name: String| if settings.runs > 1 { format!("run-{run:02}-{name}") } else { name };
@@ -179,11 +180,25 @@ pub(super) fn take(
         Some(given) => (given.optics.psf(), given.table),
         None => (USUAL_PSF, toml::Table::new()),
     };
-    let record = record_of_sequence(&taken, &rig.rig.client, rig.circumstances(psf, table))
+    let Taken { folder, shots: taken, first } = taken;
+    let record = first
+        .and_then(|image| record_of_sequence(&taken, &image, &rig.rig.client, rig.circumstances(psf, table)))
         .ok_or(CaptureError::Count { reported: 0, asked: shots.len() })?;
-    finish_sequence(folder, &taken, &record)?;
+    // A free-running camera has its own exposure time. A wrong one is wrong in every shot.
+    let triggered = taken.iter().filter(|shot| shot.mode != TriggerMode::FreeRunning);
+    if let Some(note) = triggered.map(|shot| &shot.record).find_map(strobe_note) {
+        context.info(&note);
+    }
+    finish_sequence(folder, &record)?;
     context.info(&format!("wrote {}", settings.out.display()));
     Ok(taken)
+}
+
+/// Shots whose images are in the folder.
+struct Taken {
+    folder: Staging,
+    shots: Vec<SequenceShot>,
+    first: Option<Image>,
 }
 
 fn run_once(
@@ -191,17 +206,19 @@ fn run_once(
     shots: &[Shot],
     settings: &SequenceRequest,
     name: impl Fn(String) -> String,
-    taken: &mut Vec<SequenceShot>,
+    taken: &mut Taken,
     context: &Context<'_>,
-) -> Result<(), CaptureError> {
+) -> Result<()> {
     let exposures: usize = shots.iter().map(|shot| usize::from(shot.repeat.max(1))).sum();
     let EquippedRig { camera, rig } = rig;
     let wait = settings.camera.image_wait;
-    expose(&rig.client, camera.as_mut(), shots, wait, |record, image| {
+    expose(&rig.client, camera.as_mut(), shots, wait, |record, image| -> Result<()> {
         let shot = &shots[usize::from(record.index).min(shots.len() - 1)];
         let name = name(image_name(&record, shot.repeat));
-        taken.push(SequenceShot { name, record, mode: shot.mode, image });
-        context.progress.advance("images", taken.len(), Some(exposures * settings.runs));
+        write_image(&taken.folder, &name, &image)?;
+        taken.first.get_or_insert(image);
+        taken.shots.push(SequenceShot { name, record, mode: shot.mode });
+        context.progress.advance("images", taken.shots.len(), Some(exposures * settings.runs));
         Ok(())
     })
 }

@@ -9,9 +9,9 @@ use std::{
 use chrono::TimeDelta;
 use farnear_files::{masks, staging::Staging};
 use farnear_shadow::cut::SIDEWAYS;
-use farnear_shadow::projection::ShadowError;
+use farnear_shadow::projection::{LOWEST_SUN_DEG, ShadowError};
 use farnear_shadow::sun::{Model, position};
-use farnear_shadow::uncertainty::propagate;
+use farnear_shadow::uncertainty::{Uncertainty, UncertaintyError, propagate};
 use farnear_shadow::{CameraFile, CutReport, Lamp, Light, Method, remove, subject_of};
 use farnear_silhouettes::mask::{
     Mask,
@@ -42,7 +42,8 @@ const MUCH: f64 = 0.6;
 /// (height_m = 1.75, head_width_m = 0.17; optionally distance_m) and `standard_deviations` change the defaults (docs/people.md).
 ///
 /// `shadow.toml` next to the masks flags doubtful frames: no person or several, the shadow behind the person or cut off by the
-/// lower edge of the picture, much removed, an uncertain angle.
+/// lower edge of the picture, much removed, an uncertain angle. After the first mask a sun that is too low and a person who is
+/// too near are flagged, too, and the mask is written unchanged.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize, JsonSchema)]
 #[cfg_attr(feature = "clap", derive(clap::Args))]
 #[cfg_attr(
@@ -148,6 +149,8 @@ pub struct RemovalFigures {
     pub cut: usize,
     pub flagged: usize,
     pub empty: usize,
+    /// Masks of a person that are written unchanged: the sun is too low or the person too near.
+    pub unchanged: usize,
     /// At the first mask. This and the next two are for the sun only.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sun_elevation_deg: Option<f64>,
@@ -213,9 +216,9 @@ pub fn remove_from_masks(request: &ShadowRemoveRequest, context: &Context<'_>) -
             "the camera looks into the sun (elevation {elevation_deg:.1} deg): expect glare in the masks and shadows that come straight at it"
         ));
     }
-    let masks::Masks { named: all, levels } = masks::read_all(&request.masks)?;
-    levels.check_people(&request.masks)?;
-    if let Some(remark) = levels.remark {
+    let masks = masks::Sequence::open(&request.masks)?;
+    masks.levels.check_people(&request.masks)?;
+    if let Some(remark) = &masks.levels.remark {
         context.progress.warn(&format!("{}: {remark}", request.masks.display()));
     }
     let out = Staging::new_folder(&request.out)?;
@@ -227,20 +230,32 @@ pub fn remove_from_masks(request: &ShadowRemoveRequest, context: &Context<'_>) -
         chooser: None,
         stages,
         cut_seconds: 0.0,
+        uncut: [0; 2],
     };
-    let mut index = Index { sun, frame: Vec::with_capacity(all.len()) };
+    let frames = masks.files.len();
+    let mut index = Index { sun, frame: Vec::with_capacity(frames) };
     let counter = Counter::new(context, "masks");
-    for (number, named) in all.iter().enumerate() {
+    for (number, named) in masks.named().enumerate() {
         counter.check("cutting shadow off")?;
+        let named = named?;
         let file = format!("{}.png", named.name);
         let (mask, entry) = work.frame(number, &named.mask, file).about(|| named.name.clone())?;
         out.write(&entry.file, &masks::png(&mask)?)?;
         index.frame.push(entry);
-        counter.one(Some(all.len()));
+        counter.one(Some(frames));
     }
     out.write("shadow.toml", toml::to_string(&index)?.as_bytes())?;
     out.finish()?;
     context.info(&format!("wrote {}", request.out.display()));
+    let [low, near] = work.uncut;
+    if low + near > 0 {
+        context.progress.warn(&format!(
+            "{}: {} of {frames} masks are unchanged: {low} with a sun below {LOWEST_SUN_DEG} deg (low-sun), {near} of a person \
+             who is too near (no-distance)",
+            request.masks.display(),
+            low + near
+        ));
+    }
     if let (Some(stages), Some(folder)) = (work.stages.take(), &request.stages) {
         stages.finish()?;
         context.info(&format!("wrote {}", folder.display()));
@@ -249,10 +264,11 @@ pub fn remove_from_masks(request: &ShadowRemoveRequest, context: &Context<'_>) -
         index.frame.iter().filter_map(|entry| Some(entry.cut.as_ref()?.removed_percent)).collect();
     let mean = removed.iter().sum::<f64>() / removed.len().max(1) as f64;
     Ok(RemovalFigures {
-        frames: all.len(),
+        frames,
         cut: removed.len(),
         flagged: index.frame.iter().filter(|entry| !entry.flags.is_empty()).count(),
-        empty: all.len() - removed.len(),
+        empty: frames - removed.len() - low - near,
+        unchanged: low + near,
         sun_elevation_deg: index.sun.map(|sun| sun.elevation_deg),
         sun_azimuth_deg: index.sun.map(|sun| sun.azimuth_deg),
         sun_in_view: index.sun.map(|sun| sun.in_view),
@@ -355,6 +371,8 @@ struct Work<'a> {
     chooser: Option<SubjectChooser>,
     stages: Option<Stages>,
     cut_seconds: f64,
+    /// Masks with a sun that is too low, and of a person without a usable distance.
+    uncut: [usize; 2],
 }
 
 impl Work<'_> {
@@ -368,27 +386,20 @@ impl Work<'_> {
         let mask = if several { &chosen.mask } else { mask };
         let (light, moment) = self.light.at(number)?;
         let start = Instant::now();
-        let subject = match subject_of(mask, self.camera) {
-            Ok(subject) => subject,
-            Err(ShadowError::EmptyMask) => {
-                if flags.is_empty() {
-                    flags.push(Flag::Empty.to_string());
+        let (clean, cut, sure) = match self.cut(mask, light, moment) {
+            Ok(cut) => cut,
+            Err(UncertaintyError::Shadow(error)) => {
+                let Some(reason) = self.left_out(&error, number) else { return Err(error.into()) };
+                if reason != Flag::Empty.to_string() || flags.is_empty() {
+                    flags.push(reason.clone());
                 }
                 if let Some(stages) = &mut self.stages {
-                    stages.without_person(&file, mask)?;
+                    stages.unchanged(&file, mask, &reason)?;
                 }
                 return Ok((mask.clone(), Entry { file, flags, cut: None }));
             }
             Err(error) => return Err(error.into()),
         };
-        // The angle's uncertainty follows from the sun's time and place. It is unknown for lamps and
-        // measurements.
-        let sure = match moment {
-            Some(Moment { place, time }) => Some(propagate(self.camera, time, place, Model::Psa, subject)?),
-            None => None,
-        };
-        let sd_rad = sure.map_or(0.0, |sure| sure.beta_rad);
-        let (clean, cut) = remove(mask, self.camera, light, sd_rad, self.method)?;
         self.cut_seconds += start.elapsed().as_secs_f64();
         if let Some(stages) = &mut self.stages {
             let (camera, method) = (self.camera, self.method);
@@ -412,6 +423,44 @@ impl Work<'_> {
         });
         Ok((clean, Entry { file, flags, cut }))
     }
+
+    /// The angle's uncertainty follows from the sun's time and place; it is unknown for lamps and measurements.
+    fn cut(
+        &self,
+        mask: &Mask,
+        light: Light,
+        moment: Option<Moment>,
+    ) -> Result<(Mask, CutReport, Option<Uncertainty>), UncertaintyError> {
+        let sure = |subject| {
+            moment.map(|Moment { place, time }| propagate(self.camera, time, place, Model::Psa, subject))
+        };
+        // Only the thesis' method searches about the angle; its subject is not fitted.
+        let sd_rad = match self.method {
+            Method::Thesis => {
+                sure(subject_of(mask, self.camera)?).transpose()?.map_or(0.0, |sure| sure.beta_rad)
+            }
+            Method::Hybrid => 0.0,
+        };
+        let (clean, report) = remove(mask, self.camera, light, sd_rad, self.method)?;
+        let sure = sure(report.subject).transpose()?;
+        Ok((clean, report, sure))
+    }
+
+    /// Flag of a mask that is written unchanged; counts it. `None` if the error ends the work: an unusable light or camera shows
+    /// at the first mask.
+    fn left_out(&mut self, error: &ShadowError, number: usize) -> Option<String> {
+        let (flag, kind) = match error {
+            ShadowError::EmptyMask => return Some(Flag::Empty.to_string()),
+            ShadowError::SunTooLow { .. } => ("low-sun", 0),
+            ShadowError::Distance { .. } => ("no-distance", 1),
+            ShadowError::LampTooLow { .. } | ShadowError::Shape { .. } => return None,
+        };
+        if number == 0 {
+            return None;
+        }
+        self.uncut[kind] += 1;
+        Some(flag.into())
+    }
 }
 
 fn doubts(cut: &CutReport, light: Light) -> Vec<&'static str> {
@@ -425,3 +474,6 @@ fn doubts(cut: &CutReport, light: Light) -> Vec<&'static str> {
     ];
     found.into_iter().filter_map(|(holds, name)| holds.then_some(name)).collect()
 }
+
+#[cfg(test)]
+mod tests;

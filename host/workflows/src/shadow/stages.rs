@@ -58,10 +58,10 @@ impl Stages {
         Ok(self.out.finish()?)
     }
 
-    pub fn without_person(&mut self, file: &str, mask: &Mask) -> Result<()> {
+    pub fn unchanged(&mut self, file: &str, mask: &Mask, reason: &str) -> Result<()> {
         let frame = Frame::of([0, 0, mask.nrows(), mask.ncols()]);
         let panel = frame.panel(|y, x| if mask[[y, x]] { SEEN } else { DARK });
-        self.write(file, &[(vec!["mask: no person".into()], panel)])
+        self.write(file, &[(vec![format!("mask: {reason}")], panel)])
     }
 
     pub fn draw(&mut self, file: &str, stage: Stage<'_>) -> Result<()> {

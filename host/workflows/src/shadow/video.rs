@@ -3,7 +3,7 @@
 use std::{fs, path::PathBuf};
 
 use farnear_files::{
-    staging,
+    masks, staging,
     video::{Video, VideoError},
 };
 use farnear_shadow::CameraFile;
@@ -52,7 +52,9 @@ pub fn remove_from_video(
     context: &Context<'_>,
 ) -> Result<VideoShadowFigures> {
     let none = || VideoError::NoFrames { path: settings.video.clone() };
-    let first = Video::open(&settings.video)?.next().ok_or_else(none)??;
+    let mut frames = Video::open(&settings.video)?;
+    let (first, rate_hz) = (frames.next().ok_or_else(none)??, frames.rate_hz());
+    drop(frames);
     let (height, width) = frame_of(&first.pixels).size();
     let mut camera = settings.camera.clone();
     (camera.camera.width_px, camera.camera.height_px) = (width, height);
@@ -73,28 +75,61 @@ pub fn remove_from_video(
         ..SilhouettesVideoRequest::default()
     };
     let made = video::extract(&masks, context)?;
-    let removal = removal::remove_from_masks(
-        &ShadowRemoveRequest {
-            masks: with.clone(),
-            camera: file,
-            lat: Some(settings.lat),
-            lon: Some(settings.lon),
-            time: Some(settings.time.clone()),
-            out: without,
-            ..ShadowRemoveRequest::default()
-        },
-        context,
-    )?;
+    let paths = ShadowRemoveRequest {
+        masks: with.clone(),
+        camera: file,
+        out: without,
+        ..ShadowRemoveRequest::default()
+    };
+    let removal = removal::remove_from_masks(&in_the_sun(paths, settings, rate_hz), context)?;
     Ok(VideoShadowFigures { silhouettes: made.silhouettes, samples: samples(&with)?, removal })
 }
 
+/// The sun moves if the video states its rate.
+fn in_the_sun(
+    paths: ShadowRemoveRequest,
+    settings: &VideoShadowSettings,
+    rate_hz: Option<f64>,
+) -> ShadowRemoveRequest {
+    let (lat, lon) = (Some(settings.lat), Some(settings.lon));
+    ShadowRemoveRequest { lat, lon, time: Some(settings.time.clone()), rate_hz, ..paths }
+}
+
 fn samples(folder: &std::path::Path) -> Result<Vec<String>> {
-    let masks = farnear_files::masks::read_all(folder)?.named;
-    let seen: Vec<&String> = masks
-        .iter()
-        .filter(|named| named.mask.iter().any(|person| *person))
-        .map(|named| &named.name)
-        .collect();
+    let files = masks::listed(folder)?;
+    let levels = masks::levels_of(&files)?;
+    let mut seen = Vec::new();
+    for file in &files {
+        if masks::read(file, &levels)?.iter().any(|person| *person) {
+            seen.push(file.file_stem().unwrap_or_default().to_string_lossy());
+        }
+    }
     let step = (seen.len() / SAMPLES).max(1);
     Ok(seen.into_iter().step_by(step).take(SAMPLES).map(|name| format!("{name}.png")).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::request::Request;
+
+    #[test]
+    fn the_sun_moves_at_the_rate_of_the_video() {
+        let folder = tempfile::tempdir().unwrap();
+        let video = folder.path().join("walk.y4m");
+        fs::write(&video, b"YUV4MPEG2 W2 H2 F25:2 Cmono\nFRAME\n\x10\x10\x10\x10").unwrap();
+        let rate_hz = Video::open(&video).unwrap().rate_hz();
+        let camera = "[camera]\nheight_m = 1.5\nazimuth_deg = 0\nfocal_length_mm = 4.0\npixel_um = 6.0\n";
+        let settings = VideoShadowSettings {
+            video,
+            camera: CameraFile::parse(camera).unwrap(),
+            lat: 52.38,
+            lon: -1.56,
+            time: "2014-06-23T12:00:00Z".into(),
+            out: folder.path().join("out"),
+        };
+        let request = in_the_sun(ShadowRemoveRequest::default(), &settings, rate_hz);
+        assert_eq!((request.rate_hz, request.time.as_deref()), (Some(12.5), Some("2014-06-23T12:00:00Z")));
+        assert!(request.check().is_ok());
+    }
 }

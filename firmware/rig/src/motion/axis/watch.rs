@@ -138,8 +138,8 @@ impl Stepper {
         }
     }
 
-    /// Steps and encoder may disagree.
-    pub(super) const fn lose(&mut self) {
+    /// The axis must be homed again: steps and encoder may disagree, or position 0 has changed.
+    pub(crate) const fn lose(&mut self) {
         if matches!(self.state, PositionState::Homed) {
             self.state = PositionState::Lost;
         }

@@ -16,7 +16,8 @@ const UPRIGHT: f64 = 0.8;
 const FRAMES_ASKED: usize = 100;
 
 struct Body {
-    root: usize,
+    /// Last joint on the way to the head and to all feet: the hips, also below a root at the origin of the world.
+    hips: usize,
     head: usize,
     feet: Vec<usize>,
 }
@@ -36,11 +37,9 @@ impl Body {
             among.into_iter().max_by(|&a, &b| length(joints, a).total_cmp(&length(joints, b)))
         };
         let (head, feet) = (longest(named(&["head"]))?, named(&["foot", "ankle", "toe"]));
-        let mut root = head;
-        while let Some(parent) = joints[root].parent {
-            root = parent;
-        }
-        (!feet.is_empty()).then_some(Self { root, head, feet })
+        let leads_to = |hips: usize, foot: usize| above(joints, foot).any(|joint| joint == hips);
+        let hips = above(joints, head).find(|&hips| feet.iter().all(|&foot| leads_to(hips, foot)))?;
+        (!feet.is_empty()).then_some(Self { hips, head, feet })
     }
 
     fn upward(&self, places: &[Point3]) -> Point3 {
@@ -50,29 +49,32 @@ impl Body {
         std::array::from_fn(|k| places[self.head][k] - feet[k])
     }
 
-    /// Whether head and feet are on opposite sides of the root.
+    /// Whether head and feet are on opposite sides of the hips.
     fn unfolded(&self, places: &[Point3]) -> bool {
-        let root = places[self.root];
+        let hips = places[self.hips];
         let up = self.upward(places);
-        let head: f64 = (0..3).map(|k| (places[self.head][k] - root[k]) * up[k]).sum();
+        let head: f64 = (0..3).map(|k| (places[self.head][k] - hips[k]) * up[k]).sum();
         let all: f64 = up.iter().map(|v| v * v).sum();
         0.0 < head && head < all
     }
 
     fn stature(&self, joints: &[Joint]) -> f64 {
-        let leg = self.feet.iter().map(|&foot| length(joints, foot)).fold(0.0, f64::max);
-        length(joints, self.head) + leg
+        let bones = |joint: usize| length(joints, joint) - length(joints, self.hips);
+        bones(self.head) + self.feet.iter().map(|&foot| bones(foot)).fold(0.0, f64::max)
     }
 }
 
+/// A joint and all above it, to the root.
+fn above(joints: &[Joint], joint: usize) -> impl Iterator<Item = usize> + '_ {
+    std::iter::successors(Some(joint), |&joint| joints[joint].parent)
+}
+
 /// Path length from a joint to its root; the root's own offset is a position, not a bone.
-fn length(joints: &[Joint], mut joint: usize) -> f64 {
-    let mut sum = 0.0;
-    while let Some(parent) = joints[joint].parent {
-        sum += joints[joint].offset.iter().map(|v| v * v).sum::<f64>().sqrt();
-        joint = parent;
-    }
-    sum
+fn length(joints: &[Joint], joint: usize) -> f64 {
+    above(joints, joint)
+        .filter(|&joint| joints[joint].parent.is_some())
+        .map(|joint| joints[joint].offset.iter().map(|v| v * v).sum::<f64>().sqrt())
+        .sum()
 }
 
 pub fn unit(joints: &[Joint]) -> Known<Unit> {
@@ -117,8 +119,11 @@ pub fn up(motion: &Motion, kinematics: &Kinematics) -> Known<Up> {
         return Known { value: Up::Y, source: Source::Guess { reason, sure: false } };
     };
     let rest = at_rest(&motion.joints);
-    let (upward, what) = if body.unfolded(&rest) {
-        (body.upward(&rest), "in the rest pose")
+    let at_rest = body.upward(&rest);
+    // Files have y or z up; bones along x are in the hips' own axes.
+    let in_own_axes = !matches!(Up::along(at_rest), Up::Y | Up::Z);
+    let (upward, what) = if body.unfolded(&rest) && !in_own_axes {
+        (at_rest, "in the rest pose")
     } else {
         let step = motion.frames.len().div_ceil(FRAMES_ASKED).max(1);
         let mut sum = [0.0; 3];
@@ -126,7 +131,7 @@ pub fn up(motion: &Motion, kinematics: &Kinematics) -> Known<Up> {
             let upward = body.upward(&kinematics.places(frame));
             (0..3).for_each(|k| sum[k] += upward[k]);
         }
-        (sum, "over the frames (the rest pose is folded up)")
+        (sum, "over the frames (the rest pose is folded up or on its side)")
     };
     let length = upward.iter().map(|v| v * v).sum::<f64>().sqrt();
     let value = Up::along(upward);
@@ -202,6 +207,30 @@ mod tests {
             matches!(&found.source, Source::Guess { reason, .. } if reason.contains("over the frames")),
             "{found:?}"
         );
+    }
+
+    #[test]
+    fn a_root_at_the_origin_of_the_world_is_not_a_bone() {
+        // As in the public set of Bandai Namco: centimetres, bones along x, hips far from the root.
+        let bone = |name: &str, x: f64, ends: &str| {
+            format!("JOINT {name}\n{{ OFFSET {x} 0 0 CHANNELS 3 Zrotation Xrotation Yrotation\n{ends} }}\n")
+        };
+        let end = |x: f64| format!("End Site {{ OFFSET {x} 0 0 }}");
+        let (head, foot) = (bone("Head", 60.0, &end(15.0)), bone("Foot_L", 45.0, &end(1.0)));
+        let leg = bone("UpperLeg_L", 10.0, &bone("LowerLeg_L", 40.0, &foot));
+        let hips = format!(
+            "JOINT Hips\n{{ OFFSET -17 93 453 CHANNELS 6 Xposition Yposition Zposition Zrotation Xrotation Yrotation\n{head}{leg} }}\n"
+        );
+        // The hips turn their x upwards, the leg turns it down again.
+        let motion = parse(&format!(
+            "HIERARCHY\nROOT joint_Root\n{{ OFFSET 0 0 0 CHANNELS 3 Xposition Yposition Zposition\n{hips} }}\nMOTION\nFrames: 1\nFrame Time: 1\n\
+             0 0 0 -2 93 -1 90 0 0 0 0 0 180 0 0 0 0 0 0 0 0\n"
+        ))
+        .expect("a BVH file");
+        let found = unit(&motion.joints);
+        assert!(found.value.mm == 10.0 && sure(&found), "{found:?}");
+        let found = up(&motion, &Kinematics::new(&motion));
+        assert!(found.value == Up::Y && sure(&found), "{found:?}");
     }
 
     #[test]

@@ -1,13 +1,13 @@
 //! Follows people through frames by the file's own numbers, else by place.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashSet};
 
 use super::{document::Person, layouts::NAMES};
 use crate::silhouette::capsule::Point3;
 
 pub type Track = Vec<Vec<Option<Point3>>>;
 
-/// Limit of people, which bounds the memory.
+/// Limit of people, which bounds the memory; those seen least are left out.
 const MOST: usize = 16;
 /// After this many frames without a person, the next one in that place is another person.
 const FORGOTTEN_AFTER: usize = 30;
@@ -17,7 +17,6 @@ const WIDEST_STEP: f64 = 0.5;
 const LEAST_SHARE: f64 = 0.1;
 
 struct Followed {
-    id: Option<i64>,
     last: usize,
     centre: Point3,
     height: f64,
@@ -26,14 +25,17 @@ struct Followed {
     seen: Vec<(usize, usize)>,
 }
 
+/// The people seen most, and the number of others.
 pub fn followed(frames: &[Vec<Person>]) -> (Vec<Track>, usize) {
     let numbered = numbered(frames);
     let mut all: Vec<Followed> = Vec::new();
+    // Those without a number who are not forgotten.
+    let mut recent: Vec<usize> = Vec::new();
     let mut of_id: BTreeMap<i64, usize> = BTreeMap::new();
     for (frame, people) in frames.iter().enumerate() {
         let mut pairs: Vec<(f64, usize, usize)> = Vec::new();
         let mut taken = vec![false; people.len()];
-        let mut used = vec![false; all.len()];
+        recent.retain(|index| frame - all[*index].last <= FORGOTTEN_AFTER);
         for (place, person) in people.iter().enumerate() {
             let Some((centre, height)) = extent(person) else {
                 taken[place] = true;
@@ -42,26 +44,26 @@ pub fn followed(frames: &[Vec<Person>]) -> (Vec<Track>, usize) {
             if let Some(id) = person.id.filter(|_| numbered) {
                 taken[place] = true;
                 let index = *of_id.entry(id).or_insert_with(|| {
-                    all.push(begun(Some(id), centre, height));
-                    used.push(false);
+                    all.push(begun(centre, height));
                     all.len() - 1
                 });
                 add(&mut all[index], frame, place, centre, height);
                 continue;
             }
-            for (index, track) in all.iter().enumerate() {
-                let recent = track.id.is_none() && frame - track.last <= FORGOTTEN_AFTER;
+            for &index in &recent {
+                let track = &all[index];
                 let step = distance(centre, track.centre);
                 let reach = WIDEST_STEP * height.max(track.height);
-                if recent && step <= reach {
+                if step <= reach {
                     pairs.push((step, index, place));
                 }
             }
         }
         pairs.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let mut used = HashSet::new();
         for (_, index, place) in pairs {
-            if !taken[place] && !used[index] {
-                (taken[place], used[index]) = (true, true);
+            if !taken[place] && used.insert(index) {
+                taken[place] = true;
                 if let Some((centre, height)) = extent(&people[place]) {
                     add(&mut all[index], frame, place, centre, height);
                 }
@@ -69,8 +71,9 @@ pub fn followed(frames: &[Vec<Person>]) -> (Vec<Track>, usize) {
         }
         for (place, person) in people.iter().enumerate().filter(|(place, _)| !taken[*place]) {
             if let Some((centre, height)) = extent(person) {
-                let mut track = begun(None, centre, height);
+                let mut track = begun(centre, height);
                 add(&mut track, frame, place, centre, height);
+                recent.push(all.len());
                 all.push(track);
             }
         }
@@ -78,7 +81,7 @@ pub fn followed(frames: &[Vec<Person>]) -> (Vec<Track>, usize) {
     all.sort_by(|a, b| b.heights.total_cmp(&a.heights));
     let longest = all.iter().map(|track| track.seen.len()).max().unwrap_or(0);
     all.retain(|track| track.seen.len() as f64 >= LEAST_SHARE * longest as f64);
-    let count = all.len();
+    let others = all.len().saturating_sub(MOST);
     let points = |track: &Followed| {
         let mut whole: Track = vec![Vec::new(); frames.len()];
         for &(frame, place) in &track.seen {
@@ -90,7 +93,7 @@ pub fn followed(frames: &[Vec<Person>]) -> (Vec<Track>, usize) {
             .for_each(|points| points.resize(NAMES.len(), None));
         whole
     };
-    (all.iter().take(MOST).map(points).collect(), count)
+    (all.iter().take(MOST).map(points).collect(), others)
 }
 
 /// Whether the file's numbers tell people apart: not if most frames of several people repeat one, as those of AlphaPose
@@ -108,8 +111,8 @@ fn numbered(frames: &[Vec<Person>]) -> bool {
     2 * repeated <= several
 }
 
-fn begun(id: Option<i64>, centre: Point3, height: f64) -> Followed {
-    Followed { id, last: 0, centre, height, heights: 0.0, seen: Vec::new() }
+fn begun(centre: Point3, height: f64) -> Followed {
+    Followed { last: 0, centre, height, heights: 0.0, seen: Vec::new() }
 }
 
 fn add(track: &mut Followed, frame: usize, place: usize, centre: Point3, height: f64) {

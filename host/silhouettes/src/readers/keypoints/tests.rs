@@ -2,6 +2,7 @@ use super::super::{read, recording::Choices};
 use super::*;
 use layouts::{LAYOUTS, Layout};
 
+mod crowd;
 mod scores;
 
 /// An upright person at x, 170 pixels tall: 1 px is 10 mm.

@@ -4,7 +4,7 @@ use farnear_capture::{
     describe::{axis_name, um},
     ready::steppers,
 };
-use farnear_protocol::message::{Alarm, Status};
+use farnear_protocol::message::{Alarm, SettingKey, Status};
 
 use super::{Checkup, Found, failed, passed, passed_over};
 use crate::error::Result;
@@ -123,6 +123,30 @@ pub(super) fn encoders(checkup: &mut Checkup<'_>) -> Found {
         }
     }
     passed(format!("{} encoders count up on the way away from home", axes.len()))
+}
+
+/// The fast piezo loop damages a stack whose flexure has a second mode, so the data sheet is asked about first.
+pub(super) fn piezo_ready(checkup: &mut Checkup<'_>) -> Found {
+    if !checkup.client().hello().capabilities.sensor_fine {
+        return passed_over("the rig has no piezo");
+    }
+    if !checkup.actuation {
+        return passed_over("without actuation its supplies and its flexure are not asked about");
+    }
+    if !checkup.yes("are the gauge electronics and the piezo amplifier on?")? {
+        return failed("switch the gauge electronics on, then the piezo amplifier");
+    }
+    let key = SettingKey::PiezoSecondMode;
+    if checkup.client().setting(key)?.value != 0 {
+        return passed("the loop for a flexure with a second mode is selected");
+    }
+    if !checkup.yes("does the flexure have one resonance only, and nothing else below 2.5 kHz?")? {
+        return failed(format!(
+            "the default loop excites a second mode; select the slower one by `farnear rig settings set {} 1`",
+            key.name()
+        ));
+    }
+    passed("the loop for a flexure with one resonance is selected")
 }
 
 pub(super) fn connect_motors(checkup: &mut Checkup<'_>) -> Found {

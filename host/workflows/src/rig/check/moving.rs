@@ -20,7 +20,7 @@ const SLOW_NM_PER_S: i32 = 500_000;
 const REPEATS_UM: f64 = 1.5;
 /// Exposures of the strobe check, and tolerance of the strobe's length.
 const EXPOSURES: u16 = 5;
-const STROBE_US: u64 = 200;
+const STROBE_US: u64 = 100;
 
 fn range(axis: Axis, limits: &Limits) -> (i32, i32) {
     let (min, max) = limits.of(axis);

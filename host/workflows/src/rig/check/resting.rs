@@ -6,6 +6,7 @@ use farnear_capture::describe::{alarm_text, cause_name};
 use farnear_protocol::message::SettingKey;
 
 use super::{Checkup, Found, failed, passed, passed_over};
+use crate::error::Result;
 
 const QUESTIONS: usize = 200;
 /// Most attempts. One fast attempt shows that the line is good and this computer was late.
@@ -85,10 +86,22 @@ pub(super) fn memory(checkup: &mut Checkup<'_>) -> Found {
     let key = SettingKey::CameraReadoutUs;
     let (old, boots) = (checkup.client().setting(key)?, checkup.client().counters()?.boots);
     let other = if old.value < old.max { old.value + 1 } else { old.value - 1 };
-    checkup.client().set_setting(key, other)?;
-    checkup.equipped.rig.client.reboot()?;
-    let (kept, boots_now) = (checkup.client().setting(key)?.value, checkup.client().counters()?.boots);
-    checkup.client().set_setting(key, old.value)?;
+    let found = outlasts_reset(checkup, key, other);
+    // Restore the setting in any case.
+    let client = &mut checkup.equipped.rig.client;
+    let restored = client.set_setting(key, old.value).or_else(|_| {
+        client.reopen()?;
+        client.set_setting(key, old.value)
+    });
+    if let Err(error) = restored {
+        let (name, value) = (key.name(), old.value);
+        let before = found.err().map(|error| format!("{error}; ")).unwrap_or_default();
+        return failed(format!(
+            "{before}{name} may still be {other} instead of {value} ({error}); set it back by `farnear rig settings set \
+             {name} {value}`"
+        ));
+    }
+    let (kept, boots_now) = found?;
     if kept != other {
         return failed(format!("{} was set to {other} and is {kept} after a reset", key.name()));
     }
@@ -96,4 +109,11 @@ pub(super) fn memory(checkup: &mut Checkup<'_>) -> Found {
         return failed(format!("the counter of boots went from {boots} to {boots_now} at one reset"));
     }
     passed(format!("a setting and the counters outlast a reset (boot {boots_now} of this board's life)"))
+}
+
+/// Returns the setting and the number of boots after a change and a reset.
+fn outlasts_reset(checkup: &mut Checkup<'_>, key: SettingKey, value: i32) -> Result<(i32, u32)> {
+    checkup.client().set_setting(key, value)?;
+    checkup.equipped.rig.client.reboot()?;
+    Ok((checkup.client().setting(key)?.value, checkup.client().counters()?.boots))
 }

@@ -26,6 +26,8 @@ const CLOSED_MM: f64 = 126.0;
 const CLOSED_BETWEEN_THICK_PARTS_MM: f64 = 40.0;
 const UNIT: &str = "masks";
 const DURING: &str = "drawing silhouettes";
+/// Largest number of silhouettes of which every two are compared: their differences need 1.8 GB.
+const MOST_COMPARED: usize = 30_000;
 
 pub struct Job<'a> {
     pub settings: &'a MarkersRequest,
@@ -66,6 +68,7 @@ impl Job<'_> {
 
     /// Draws the `keep` least similar silhouettes of all views into one folder; returns their number.
     pub fn gallery(&self, views: &[View], keep: usize, out: &Staging) -> Result<usize> {
+        check_compared(self.frames.len(), self.views, self.settings.every)?;
         let counter = Counter::new(self.context, UNIT);
         let all: Result<Vec<Vec<(String, Mask)>>> = views
             .par_iter()
@@ -106,5 +109,29 @@ impl Job<'_> {
         let mm_per_px = self.settings.mm_per_px;
         let canvas = Canvas::fitting(&reach, mm_per_px, MARGIN_PX);
         Ok(canvas.ok_or_else(|| SilhouettesError::too_large("the recording", &reach, mm_per_px))?)
+    }
+}
+
+/// Refuses more silhouettes than can be compared, with a step between frames that fits.
+fn check_compared(frames: usize, views: usize, every: usize) -> Result<(), SilhouettesError> {
+    let (count, limit) = (frames * views, MOST_COMPARED);
+    if count <= limit {
+        return Ok(());
+    }
+    let every = every * frames.div_ceil((limit / views).max(1));
+    Err(SilhouettesError::TooMany { count, limit, every })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn more_silhouettes_than_can_be_compared_are_refused_with_a_step_that_fits() {
+        assert!(check_compared(3750, 8, 1).is_ok());
+        let error = check_compared(20_000, 8, 2).expect_err("too many").to_string();
+        assert!(error.starts_with("160000 silhouettes") && error.contains("30000"), "{error}");
+        assert!(error.contains("--every 12"), "{error}");
+        assert!(check_compared(20_000_usize.div_ceil(6), 8, 12).is_ok());
     }
 }

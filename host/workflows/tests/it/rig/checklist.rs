@@ -16,6 +16,8 @@ use super::{Face, camera};
 struct Person {
     board: Peer,
     face: Face,
+    /// Part of the question that is answered with no.
+    denies: Option<&'static str>,
 }
 
 impl Progress for Person {
@@ -40,14 +42,24 @@ impl Progress for Person {
 
 impl Questions for Person {
     fn ask(&self, question: &str, cancel: &Cancel) -> Result<String> {
-        self.face.ask(question, cancel)
+        let answer = self.face.ask(question, cancel)?;
+        Ok(if self.denies.is_some_and(|part| question.contains(part)) { "n\n".into() } else { answer })
     }
 }
 
 fn go_through(board: Peer, port: String, hands: bool, resting_only: bool) -> (Checklist, Person) {
+    deny(None, board, port, (hands, resting_only))
+}
+
+fn deny(
+    denies: Option<&'static str>,
+    board: Peer,
+    port: String,
+    (hands, resting_only): (bool, bool),
+) -> (Checklist, Person) {
     let images = tempfile::tempdir().unwrap();
     board.board().hello.firmware = env!("CARGO_PKG_VERSION").try_into().unwrap();
-    let person = Person { board, face: Face::default() };
+    let person = Person { board, face: Face::default(), denies };
     let context = Context::new(&person, &person, Cancel::default());
     let rig = RigAddress::Port(port);
     let settings = CheckRequest { rig, camera: camera(images.path()), resting_only, no_actuation: !hands };
@@ -106,4 +118,32 @@ fn a_speed_that_could_not_be_restored_is_named() {
     let last = list.steps.last().unwrap();
     assert_eq!((last.step, last.verdict), ("first slow homing", Verdict::Failed), "{list:?}");
     assert!(last.detail.contains("farnear rig settings set coarse_speed_nm_per_s 1000"), "{list:?}");
+}
+
+#[test]
+fn asks_about_the_piezo_before_anything_moves() {
+    for (denies, second_mode, expected) in [
+        (Some("amplifier on"), 1, "switch the gauge electronics on"),
+        (Some("one resonance only"), 0, "farnear rig settings set piezo_second_mode 1"),
+        (None, 0, "one resonance is selected"),
+        (Some("one resonance only"), 1, "with a second mode is selected"),
+    ] {
+        let (port, board) = plug_in(Faults::default());
+        board.board().hello.capabilities.memory = false;
+        board.board().settings.insert("piezo_second_mode", second_mode);
+        let (list, person) = deny(denies, board, port, (true, false));
+        let ready = list.steps.iter().find(|outcome| outcome.step == "piezo ready").unwrap();
+        assert!(ready.detail.contains(expected), "{list:?}");
+        let acts = person.board.board().acts;
+        assert_eq!(acts > 0, ready.verdict == Verdict::Passed, "{list:?}");
+    }
+}
+
+#[test]
+fn the_memory_step_restores_its_setting_after_an_error() {
+    let (port, board) = plug_in(Faults { no_counters_after_reset: true, ..Faults::default() });
+    let (list, person) = go_through(board, port, false, true);
+    let last = list.steps.last().unwrap();
+    assert_eq!((last.step, last.verdict), ("memory", Verdict::Failed), "{list:?}");
+    assert_eq!(person.board.board().settings.get("camera_readout_us"), Some(&1_000), "{list:?}");
 }

@@ -9,6 +9,7 @@ use farnear_workflows::{
     request::Request,
     rig::{
         AxisName, RigAddress, alarms, board,
+        lens_stack::RigStackRequest,
         log::{self, LogSettings},
         mechanics::{self, MechanicsFigures},
         motion::{self, MoveFigures, MoveRequest},
@@ -107,4 +108,30 @@ fn a_log_without_its_texts_is_given_as_bytes_until_it_is_cancelled() {
     teller.join().unwrap();
     assert_eq!((count, lines), (1, vec!["ab01".to_owned()]));
     assert!(face.heard("1 lines"));
+}
+
+#[test]
+fn a_stop_and_a_halt_leave_the_link_rate_alone() {
+    let (port, board) = plug_in(Faults { busy: true, ..Faults::default() });
+    let (rig, context) = (RigAddress::Port(format!("{port}@921600")), Context::unattended());
+    motion::stop(&rig, &context).unwrap();
+    motion::halt(&rig, &context).unwrap();
+    let board = board.board();
+    assert_eq!((board.stops, board.halts, board.rate_requests), (1, 1, 0));
+}
+
+#[test]
+fn a_stack_of_more_slices_than_the_board_holds_is_refused_before_any_motion() {
+    let (port, board) = plug_in(Faults::default());
+    let folder = tempfile::tempdir().unwrap();
+    let request = RigStackRequest {
+        rig: RigAddress::Port(port),
+        camera: camera(folder.path()),
+        optics: optics(),
+        slices: 17,
+        out: folder.path().join("out"),
+    };
+    let error = request.run(&Context::unattended()).unwrap_err().to_string();
+    assert!(error.contains("holds 1 to 16 shots") && error.contains("has 17"), "{error}");
+    assert_eq!(board.board().acts, 0);
 }

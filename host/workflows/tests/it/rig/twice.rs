@@ -213,3 +213,77 @@ fn a_second_run_takes_no_longer_than_the_first() {
         ended.unwrap();
     });
 }
+
+#[test]
+fn a_sequence_writes_each_image_when_it_comes() {
+    let (images, root) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    let (port, board) = plug_in(Faults::default());
+    let face = Face::default();
+    let context = face.context();
+    let (rig, camera, out) = (RigAddress::Port(port), camera(images.path()), root.path().join("out"));
+    let settings = SequenceRequest { rig, camera, out, ..stack() };
+    let written = || {
+        let mut folders = root.path().read_dir().unwrap().flatten();
+        folders.any(|folder| folder.path().join("shot-00.png").exists())
+    };
+    let wait_for = |reached: &dyn Fn() -> bool| {
+        let until = Instant::now() + Duration::from_secs(30);
+        while !reached() && Instant::now() < until {
+            thread::sleep(Duration::from_millis(5));
+        }
+    };
+    let first = || {
+        board.board().events.iter().find_map(|event| match &event.kind {
+            EventKind::ShotDone { shot, .. } => Some(*shot),
+            _ => None,
+        })
+    };
+    thread::scope(|scope| {
+        let one = scope.spawn(|| {
+            wait_for(&|| first().is_some());
+            let draft = images.path().join("draft");
+            std::fs::write(&draft, picture(&first().unwrap())).unwrap();
+            std::fs::rename(draft, images.path().join("image-00000.png")).unwrap();
+            wait_for(&written);
+            let found = written();
+            context.cancel.cancel();
+            found
+        });
+        let error = sequence::run(&settings, &context).unwrap_err();
+        assert!(one.join().unwrap(), "the other images have not come: {error}");
+    });
+    assert_eq!(root.path().read_dir().unwrap().count(), 0);
+}
+
+#[test]
+fn a_strobe_of_another_length_is_reported_once_by_a_sequence_and_by_a_continuous_run() {
+    let folder = tempfile::tempdir().unwrap();
+    let images = |run: usize| folder.path().join(run.to_string());
+    let jobs: [Job<'_>; 2] = [
+        Box::new(|rig, run, context| {
+            let (camera, out) = (camera(&images(run)), folder.path().join("sequence"));
+            let settings = SequenceRequest { rig, camera, out, ..stack() };
+            sequence::run(&settings, context).map(drop)
+        }),
+        Box::new(|rig, run, context| {
+            let (camera, optics, frames) = (camera(&images(run)), Some(optics()), Some(4));
+            let settings = ContinuousRequest { rig, camera, optics, frames, ..Default::default() };
+            continuous::run(&settings, context).map(drop)
+        }),
+    ];
+    for (run, job) in jobs.iter().enumerate() {
+        std::fs::create_dir(images(run)).unwrap();
+        let (port, board) = plug_in(Faults { strobe_longer_us: 3_000, ..Faults::default() });
+        let face = Face::default();
+        let over = AtomicBool::new(false);
+        let ended = thread::scope(|scope| {
+            scope.spawn(|| feed(&images(run), &board, &over));
+            let ended = job(RigAddress::Port(port), run, &face.context());
+            over.store(true, Ordering::Relaxed);
+            ended
+        });
+        ended.unwrap();
+        let notes = face.messages.lock().unwrap();
+        assert_eq!(notes.iter().filter(|note| note.contains("lasted 8000 us")).count(), 1, "{notes:?}");
+    }
+}

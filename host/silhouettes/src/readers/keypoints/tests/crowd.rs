@@ -1,0 +1,35 @@
+//! More people than are read, as of detectors with many false detections.
+
+use super::*;
+
+#[test]
+fn the_number_of_people_in_the_remark_is_the_number_that_can_be_selected() {
+    let of = |x: f64| format!(r#"{{"pose_keypoints_2d":{}}}"#, flat(&person(layout(25), x)));
+    let people = (1..=40).map(|n| of(200.0 * f64::from(n))).collect::<Vec<_>>().join(",");
+    let json = format!(r#"{{"frames":[{{"people":[{people}]}},{{"people":[{people}]}}]}}"#);
+    let select = |number: usize| {
+        let choices = Choices { person: Some(number), ..Choices::default() };
+        read(json.as_bytes(), "json", choices)
+    };
+    let remarks = select(16).expect("the last").remarks().join("; ");
+    assert!(remarks.contains("16 people") && remarks.contains("24 who are seen less"), "{remarks}");
+    let error = select(17).expect_err("one too many").to_string();
+    assert_eq!(error, "no person 17: 16 are in the file");
+}
+
+/// A detection somewhere else in every frame: each begins a track, and those before are soon forgotten.
+#[test]
+fn a_person_is_followed_among_false_detections() {
+    let of = |x: f64| format!(r#"{{"pose_keypoints_2d":{}}}"#, flat(&person(layout(25), x)));
+    let frames: Vec<String> = (0..100)
+        .map(|n| {
+            let other = of(1000.0 + 300.0 * f64::from(n * 7 % 100));
+            // The person is hidden for 20 frames.
+            let people = if (40..60).contains(&n) { other } else { format!("{other},{}", of(100.0)) };
+            format!(r#"{{"people":[{people}]}}"#)
+        })
+        .collect();
+    let found = upright(&format!(r#"{{"frames":[{}]}}"#, frames.join(",")), 100);
+    let seen = (0..100).filter(|n| found.by_name(*n).contains_key("neck")).count();
+    assert_eq!(seen, 80);
+}
