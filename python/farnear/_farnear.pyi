@@ -187,6 +187,8 @@ class DepthMap:
         Part of the pixels with a depth, 0 to 1.
     optics : Optics
         The optics of the map.
+    part : (int, int, int, int) or None
+        Column and row of the map in its images, and width and height of these, px; None if the map shows whole images.
 
     Examples
     --------
@@ -218,6 +220,9 @@ class DepthMap:
     @property
     def optics(self) -> Optics:
         """The optics of the map."""
+    @property
+    def part(self) -> Optional[tuple[int, int, int, int]]:
+        """Column and row of the map in its images, and width and height of these, px; None if the map shows whole images."""
     @staticmethod
     def load(folder: Path) -> "DepthMap":
         """Read a folder that `farnear depth` or `DepthMap.save` wrote, with `depth.npy` or `depth.tiff` and `depth.toml`.
@@ -252,7 +257,7 @@ class DepthMap:
         """Picture of the map for notebooks."""
 
 class Plane:
-    """Plane through a depth map, as `DepthMap.plane` returns it.
+    """Plane through a depth map, as `DepthMap.plane` returns it. Can be pickled and copied.
 
     Attributes
     ----------
@@ -304,7 +309,7 @@ def depth(
     white_level: Optional[int] = None,
     threads: int = 1,
 ) -> DepthMap:
-    """Depth map of a far- and a near-focused image, as `farnear depth` computes it.
+    """Depth map of a far- and a near-focused image, as `farnear depth --bin 1` computes it.
 
     Parameters
     ----------
@@ -350,6 +355,9 @@ def depth(
 
     Notes
     -----
+    Pixels are not averaged, except by optics of `calibrate_stack`. For a largest blur of more than 4.5 px `findings` states how
+    many pixels to average into one first; the optics of such images have a larger `pixel_um` and a smaller `max_blur_px`.
+
     640x480 take 0.2 s. Other Python threads run meanwhile; Ctrl-C takes effect when the map is done.
 
     Examples
@@ -361,7 +369,7 @@ def depth(
     """
 
 class FocusStack:
-    """Depth from a focus stack, as `focus_stack` returns it; arrays are float32 (height, width).
+    """Depth from a focus stack, as `focus_stack` returns it; arrays are float32 (height, width). Can be pickled and copied.
 
     Attributes
     ----------
@@ -375,6 +383,10 @@ class FocusStack:
         Each pixel from the image in which it is sharpest: 0 to 1 for uint8 and uint16, else in the scale of the images.
     moved_px : float
         Farthest that alignment moved a pixel, px.
+    left_out : list of int
+        Indices in `images` of those that were not used, see `findings`.
+    findings : list of str
+        What to know before trusting the map.
     """
 
     @property
@@ -392,6 +404,12 @@ class FocusStack:
     @property
     def moved_px(self) -> float:
         """-"""
+    @property
+    def left_out(self) -> list[int]:
+        """-"""
+    @property
+    def findings(self) -> list[str]:
+        """-"""
 
 def focus_stack(
     images: Sequence[Image],
@@ -405,13 +423,15 @@ def focus_stack(
     guided_px: float = 10.0,
     min_reliability: float = 0.1,
     align: Literal["none", "shift", "similarity", "affine"] = "none",
+    use_all: bool = False,
 ) -> FocusStack:
     """Depth and all-in-focus image of a stack of images at different focus, as `farnear focus-stack` computes them.
 
     Parameters
     ----------
     images : sequence of array (height, width)
-        At least three grey images of one size, in the order of their focus. NaN and borders of zeros count as not seen.
+        At least three grey images of one size and one kind, in the order of their focus. NaN and borders of zeros count as not
+        seen.
     focused_at_mm : sequence of float, optional
         Object distance in mm at which each image is sharp, ascending or descending.
     measure : str
@@ -430,6 +450,8 @@ def focus_stack(
         Depths below this reliability are NaN, 0 to 1.
     align : {"none", "shift", "similarity", "affine"}
         Alignment of the images.
+    use_all : bool
+        Use all images, also those that show another scene, are turned or shaken.
 
     Returns
     -------
@@ -443,8 +465,10 @@ def focus_stack(
     'mm'
     """
 
-def points_mm(depth_mm: Map, optics: Optics) -> NDArray[np.float32]:
-    """Object point that each pixel of a whole depth map sees.
+def points_mm(
+    depth_mm: Map, optics: Optics, *, part: Optional[tuple[int, int, int, int]] = None
+) -> NDArray[np.float32]:
+    """Object point that each pixel of a depth map sees.
 
     Parameters
     ----------
@@ -452,6 +476,9 @@ def points_mm(depth_mm: Map, optics: Optics) -> NDArray[np.float32]:
         Depth map, mm; NaN where there is none.
     optics : Optics
         The optics of the map; those of `calibrate_stack` need its `object_pixel_um`.
+    part : (int, int, int, int), optional
+        `DepthMap.part`: column and row of the map in its images, and width and height of these, px; by default the map shows
+        whole images.
 
     Returns
     -------
@@ -471,7 +498,7 @@ class Processor:
     Parameters
     ----------
     optics : Optics
-        The optics of the pairs.
+        The optics of the pairs; those of `calibrate_stack` are for `depth`.
     operators : Operators, optional
         By default they are designed for the optics.
     smoothing_px : int
@@ -574,7 +601,7 @@ class Correction:
         """True distances in mm of the farthest and the nearest target."""
 
 class PsfFit:
-    """A calibrated point spread function, as `calibrate_psf` returns it.
+    """A calibrated point spread function, as `calibrate_psf` returns it. Can be pickled and copied.
 
     Attributes
     ----------
@@ -641,8 +668,8 @@ def calibrate_psf(
     Parameters
     ----------
     pairs : sequence of (far, near, distance_mm)
-        Far- and near-focused image, each (height, width), and the distance of the target in mm, or None if the target is at
-        the focus of the sharper image.
+        Far- and near-focused image of one kind, each (height, width), and the distance of the target in mm, or None if the
+        target is at the focus of the sharper image.
     optics : Optics
         The optics; their own point spread function is ignored.
     model : {"gaussian", "generalised", "free"}
@@ -664,7 +691,8 @@ def calibrate_psf(
     """
 
 class StackFit:
-    """Lens calibrated by `calibrate_stack`; errors are those on parts of the target that were left out of the fit.
+    """Lens calibrated by `calibrate_stack`; errors are those on parts of the target that were left out of the fit. Can be pickled
+    and copied.
 
     Attributes
     ----------
@@ -741,7 +769,7 @@ def calibrate_stack(
     Parameters
     ----------
     images : sequence of array (height, width)
-        Slices one stage step apart, the one with the farthest focus first.
+        Slices of one size and one kind, one stage step apart, the one with the farthest focus first.
     step_mm : float
         Distance between neighbouring slices, mm, or in any unit of the stage; all depths are in that unit then.
     object_pixel_um : float, optional
@@ -761,7 +789,7 @@ def calibrate_stack(
     Raises
     ------
     FarnearError
-        Too few slices, slices of two sizes, no focus, blur that is too small.
+        Too few slices, slices of two sizes or kinds, no focus, blur that is too small.
     """
 
 def render(

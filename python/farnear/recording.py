@@ -9,7 +9,7 @@ from typing import Any, Optional, Union
 import numpy as np
 from numpy.typing import NDArray
 
-from ._farnear import DepthMap, FarnearError, points_mm
+from ._farnear import DepthMap, FarnearError, Optics, points_mm
 
 __all__ = ["McapRecording"]
 
@@ -39,14 +39,26 @@ def camera_matrix(found: DepthMap) -> list[float]:
     with the focal length F / p.
     """
     height, width = found.depth_mm.shape
+    column, row, image_width, image_height = found.part or (0, 0, width, height)
     focal_px = found.optics.focal_length_mm / (1e-3 * found.optics.pixel_um)
-    return [focal_px, 0.0, 0.5 * (width - 1), 0.0, focal_px, 0.5 * (height - 1), 0.0, 0.0, 1.0]
+    axis_px = (0.5 * (image_width - 1) - column, 0.5 * (image_height - 1) - row)
+    return [focal_px, 0.0, axis_px[0], 0.0, focal_px, axis_px[1], 0.0, 0.0, 1.0]
 
 
-def points_m(found: DepthMap) -> NDArray[np.float32]:
-    """Points of a map in m, (height, width, 3): x to the right, y down, z away from the lens."""
-    points = points_mm(found.depth_mm, found.optics) * np.array([1e-3, -1e-3, -1e-3], np.float32)
-    return np.ascontiguousarray(points).astype("<f4")
+def points_if_known(found: DepthMap, optics: Optics) -> Optional[NDArray[np.float32]]:
+    """Points of a map in mm, (height, width, 3); None if the lens was calibrated without the size of a pixel at the target."""
+    try:
+        return points_mm(found.depth_mm, optics, part=found.part)
+    except FarnearError:  # of a map `points_mm` raises it for this reason only
+        return None
+
+
+def points_m(found: DepthMap) -> Optional[NDArray[np.float32]]:
+    """Points of a map in m, (height, width, 3): x to the right, y down, z away from the lens; None as `points_if_known`."""
+    points = points_if_known(found, found.optics)
+    if points is None:
+        return None
+    return np.ascontiguousarray(points * np.array([1e-3, -1e-3, -1e-3], np.float32)).astype("<f4")
 
 
 class McapRecording:
@@ -54,7 +66,8 @@ class McapRecording:
 
     Topics: `/farnear/far/image` and `/farnear/near/image` (sensor_msgs/Image, mono8 or mono16), `/farnear/depth/image` (32FC1, m,
     NaN = no depth), `/farnear/confidence/image` (32FC1, 0 to 1), `/farnear/depth/camera_info`, `/farnear/points` (PointCloud2, m; x to
-    the right, y down, z away from the lens, as ROS has it).
+    the right, y down, z away from the lens, as ROS has it). The last two are missing for a lens of `calibrate_stack` without
+    `object_pixel_um`.
 
     Depth is measured from the lens, while rays of a telecentric lens meet in its front focus: the point cloud is exact; a cloud that a
     viewer computes from the depth image as of a pinhole is wider by F / (z - F).
@@ -63,15 +76,17 @@ class McapRecording:
     ----------
     path : path
         The file to write.
+    overwrite : bool
+        Replace an existing file; by default it raises FileExistsError.
     """
 
-    def __init__(self, path: Union[str, os.PathLike[str]]) -> None:
+    def __init__(self, path: Union[str, os.PathLike[str]], *, overwrite: bool = False) -> None:
         try:
             from mcap_ros2.writer import Writer
         except ImportError as error:
             message = "mcap-ros2-support is not installed; `pip install mcap-ros2-support` installs it"
             raise FarnearError(message) from error
-        self._file = open(path, "wb")
+        self._file = open(path, "wb" if overwrite else "xb")
         self._writer: Any = Writer(self._file)
         schema = self._writer.register_msgdef
         self._image = schema("sensor_msgs/msg/Image", _IMAGE)
@@ -105,10 +120,13 @@ class McapRecording:
         for name, pixels in (("far", far), ("near", near)):
             if pixels.shape != (height, width) or pixels.dtype not in (np.dtype("u1"), np.dtype("u2")):
                 raise FarnearError(f"{name} is {pixels.dtype} of {pixels.shape}; expected uint8 or uint16 of {(height, width)}")
+        points = points_m(found)
         for name, pixels in (("far", far), ("near", near)):
             image(f"{name}/image", pixels, "mono8" if pixels.dtype == np.uint8 else "mono16")
         image("depth/image", found.depth_mm * np.float32(1e-3), "32FC1")
         image("confidence/image", found.confidence, "32FC1")
+        if points is None:
+            return
         k = camera_matrix(found)
         write(
             "depth/camera_info",
@@ -125,7 +143,7 @@ class McapRecording:
             },
         )
         fields = [{"name": name, "offset": 4 * index, "datatype": 7, "count": 1} for index, name in enumerate("xyz")]
-        data = points_m(found).tobytes()
+        data = points.tobytes()
         cloud = {"fields": fields, "is_bigendian": False, "point_step": 12, "row_step": 12 * width, "data": data, "is_dense": False}
         write("points", self._cloud, cloud)
 

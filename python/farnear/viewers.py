@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ._farnear import DepthMap, FarnearError, Optics, depth, points_mm
-from .recording import FRAME, camera_matrix, points_m
+from .recording import FRAME, camera_matrix, points_if_known, points_m
 
 if TYPE_CHECKING:
     import open3d
@@ -61,7 +61,7 @@ def to_open3d(
     open3d = _imported("open3d")
     keep = np.isfinite(found.depth_mm) & (found.confidence >= min_confidence)
     cloud = open3d.geometry.PointCloud()
-    cloud.points = open3d.utility.Vector3dVector(points_mm(found.depth_mm, optics)[keep].astype(np.float64))
+    cloud.points = open3d.utility.Vector3dVector(points_mm(found.depth_mm, optics, part=found.part)[keep].astype(np.float64))
     if image is not None:
         _check_size(image, found)
         grey = _grey(image)[keep]
@@ -71,6 +71,8 @@ def to_open3d(
 
 class RerunView:
     """Pairs on Rerun's time line: both images, depth, confidence and point cloud (mm); a context manager.
+
+    The cloud is missing for a lens of `calibrate_stack` without `object_pixel_um`.
 
     Parameters
     ----------
@@ -110,6 +112,7 @@ class RerunView:
         """
         rerun, recording = self._rerun, self._recording
         _check_size(far, found)
+        points = points_if_known(found, self._optics)
         recording.set_time("pair", sequence=self._pairs)
         if board_us is not None:
             recording.set_time("board", duration=board_us * 1e-6)
@@ -118,10 +121,11 @@ class RerunView:
             recording.log(f"images/{name}", rerun.Image(np.round(255 * _grey(image)).astype(np.uint8), color_model="L"))
         recording.log("depth", rerun.DepthImage(np.nan_to_num(found.depth_mm), meter=1000.0))
         recording.log("confidence", rerun.Tensor(found.confidence, dim_names=("row", "column")))
+        if points is None:
+            return
         keep = np.isfinite(found.depth_mm) & (found.confidence >= min_confidence)
         shade = np.round(255 * _grey(far)[keep]).astype(np.uint8)
-        points = points_mm(found.depth_mm, self._optics)[keep]
-        recording.log("cloud", rerun.Points3D(points, colors=np.repeat(shade[:, None], 3, axis=1)))
+        recording.log("cloud", rerun.Points3D(points[keep], colors=np.repeat(shade[:, None], 3, axis=1)))
 
     def close(self) -> None:
         """Finish the recording."""
@@ -185,6 +189,7 @@ class FoxgloveView:
         messages = self._messages
         _check_size(far, found)
         _check_size(near, found)
+        points = points_m(found)
         height, width = found.depth_mm.shape
         ns = time.time_ns() if board_us is None else 1000 * board_us
         stamp = {"timestamp": messages.Timestamp(ns // 10**9, ns % 10**9), "frame_id": FRAME}
@@ -201,6 +206,8 @@ class FoxgloveView:
                 image(f"{name}/image", np.round(65535 * _grey(pixels)).astype(np.uint16), "mono16")
         image("depth/image", found.depth_mm * np.float32(1e-3), "32FC1")
         image("confidence/image", found.confidence, "32FC1")
+        if points is None:
+            return
         k = camera_matrix(found)
         p = [*k[:3], 0.0, *k[3:6], 0.0, *k[6:], 0.0]
         size = {"width": width, "height": height}
@@ -208,7 +215,7 @@ class FoxgloveView:
         keep = np.isfinite(found.depth_mm) & (found.confidence >= min_confidence)
         kind = messages.PackedElementFieldNumericType.Float32
         fields = [messages.PackedElementField(name=name, offset=4 * index, type=kind) for index, name in enumerate("xyz")]
-        cloud = messages.PointCloud(**stamp, point_stride=12, fields=fields, data=points_m(found)[keep].tobytes())
+        cloud = messages.PointCloud(**stamp, point_stride=12, fields=fields, data=points[keep].tobytes())
         self._points.log(cloud, log_time=ns)
 
     def close(self) -> None:

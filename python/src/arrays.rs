@@ -8,7 +8,7 @@ use pyo3::{
     types::{PyBool, PyBytes, PyList, PyString, PyTuple},
 };
 
-use crate::optics::Optics;
+use crate::{errors::FarnearError, optics::Optics};
 
 /// Extracts an argument and puts its name into a `TypeError`; exception notes need Python 3.11.
 pub fn named<'py, T>(name: &str, object: &Bound<'py, PyAny>) -> PyResult<T>
@@ -58,6 +58,39 @@ impl Image<'_> {
     pub fn full_scale(&self) -> Option<f32> {
         self.full_scale
     }
+}
+
+/// Fails for images whose scales differ. Each is a name and [`Image::full_scale`].
+pub fn check_alike(first: (&str, Option<f32>), second: (&str, Option<f32>)) -> PyResult<()> {
+    if first.1 == second.1 {
+        return Ok(());
+    }
+    let kind = |full_scale: Option<f32>| match full_scale {
+        Some(full) if full > f32::from(u8::MAX) => "uint16",
+        Some(_) => "uint8",
+        None => "other numbers",
+    };
+    Err(FarnearError::new_err(format!(
+        "{} holds {} and {} {}: give all alike, or their scales differ",
+        first.0,
+        kind(first.1),
+        second.0,
+        kind(second.1)
+    )))
+}
+
+/// Copies of `images`, which must be alike, and their full scale.
+pub fn stack_of<'py>(images: &[Bound<'py, PyAny>]) -> PyResult<(Vec<Array2<f32>>, Option<f32>)> {
+    let mut owned = Vec::with_capacity(images.len());
+    let mut first = None;
+    for (index, image) in images.iter().enumerate() {
+        let name = format!("images[{index}]");
+        let image = named::<Image<'py>>(&name, image)?;
+        let first = *first.get_or_insert(image.full_scale());
+        check_alike(("images[0]", first), (name.as_str(), image.full_scale()))?;
+        owned.push(image.view().to_owned());
+    }
+    Ok((owned, first.flatten()))
 }
 
 impl<'py> FromPyObject<'_, 'py> for Image<'py> {
@@ -116,6 +149,33 @@ impl<'py> FromPyObject<'_, 'py> for Mask {
     }
 }
 
+/// Samples (n, features) of `float32`.
+pub struct Samples<'py>(PyReadonlyArray2<'py, f32>);
+
+impl Samples<'_> {
+    pub fn view(&self) -> ArrayView2<'_, f32> {
+        self.0.as_array()
+    }
+}
+
+impl<'py> FromPyObject<'_, 'py> for Samples<'py> {
+    type Error = PyErr;
+
+    fn extract(object: Borrowed<'_, 'py, PyAny>) -> PyResult<Self> {
+        in_place(object.extract()?).map(Self)
+    }
+}
+
+/// The array, or a copy if its elements are unaligned or not a whole number of elements apart, as in packed structures.
+fn in_place(array: PyReadonlyArray2<'_, f32>) -> PyResult<PyReadonlyArray2<'_, f32>> {
+    let aligned: bool = array.getattr("flags")?.getattr("aligned")?.extract()?;
+    let whole = |stride: &isize| stride.unsigned_abs().is_multiple_of(size_of::<f32>());
+    if aligned && array.strides().iter().all(whole) {
+        return Ok(array);
+    }
+    array.call_method1("astype", ("=f4",))?.extract()
+}
+
 struct Untyped<'py> {
     data: Bound<'py, PyAny>,
     masked: Option<PyReadonlyArray2<'py, bool>>,
@@ -156,7 +216,7 @@ impl<'py> Untyped<'py> {
 
     fn values(&self) -> PyResult<Values<'py>> {
         let lent = match self.data.extract::<PyReadonlyArray2<'py, f32>>() {
-            Ok(native) => native,
+            Ok(native) => in_place(native)?,
             Err(_) => self.data.call_method1("astype", ("=f4",))?.extract()?,
         };
         let Some(masked) = &self.masked else { return Ok(Values::Lent(lent)) };

@@ -7,13 +7,13 @@ use farnear_depth::{
 use pyo3::prelude::*;
 
 use crate::{
-    arrays::{Image, named, optics_named},
-    errors::wrong,
+    arrays::{Image, check_alike, named, optics_named},
+    errors::{FarnearError, wrong},
     optics::{Optics, psf_text},
     work,
 };
 
-/// A calibrated point spread function, as `calibrate_psf` returns it.
+/// A calibrated point spread function, as `calibrate_psf` returns it. Can be pickled and copied.
 ///
 /// Attributes
 /// ----------
@@ -49,8 +49,55 @@ pub struct PsfFit {
     otf: Vec<(f64, f64, f64)>,
 }
 
+/// Arguments of `PsfFit._assemble`.
+type Parts = (Optics, String, String, f64, [Option<f64>; 2], [f64; 2], Vec<f64>, Vec<(f64, f64, f64)>);
+
 #[pymethods]
 impl PsfFit {
+    /// For pickle and copy.
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, Parts)> {
+        let parts = (
+            self.optics.clone(),
+            self.psf.clone(),
+            self.verdict.clone(),
+            self.k,
+            [self.standard_error_k, self.standard_error_p],
+            [self.residual, self.noise_residual],
+            self.alphas.clone(),
+            self.otf.clone(),
+        );
+        Ok((py.get_type::<Self>().getattr("_assemble")?, parts))
+    }
+
+    /// A fit from its parts, for pickle.
+    #[staticmethod]
+    #[allow(clippy::too_many_arguments)] // the attributes
+    fn _assemble(
+        optics: Optics,
+        psf: String,
+        verdict: String,
+        k: f64,
+        standard_errors: [Option<f64>; 2],
+        residuals: [f64; 2],
+        alphas: Vec<f64>,
+        otf: Vec<(f64, f64, f64)>,
+    ) -> Self {
+        let [standard_error_k, standard_error_p] = standard_errors;
+        let [residual, noise_residual] = residuals;
+        Self {
+            optics,
+            psf,
+            verdict,
+            k,
+            standard_error_k,
+            standard_error_p,
+            residual,
+            noise_residual,
+            alphas,
+            otf,
+        }
+    }
+
     fn __repr__(&self) -> String {
         let error = self.standard_error_k.map_or(String::new(), |error| format!(" +- {error:.5}"));
         format!(
@@ -67,8 +114,8 @@ impl PsfFit {
 /// Parameters
 /// ----------
 /// pairs : sequence of (far, near, distance_mm)
-///     Far- and near-focused image, each (height, width), and the distance of the target in mm, or None if the target is at
-///     the focus of the sharper image.
+///     Far- and near-focused image of one kind, each (height, width), and the distance of the target in mm, or None if the
+///     target is at the focus of the sharper image.
 /// optics : Optics
 ///     The optics; their own point spread function is ignored.
 /// model : {"gaussian", "generalised", "free"}
@@ -101,8 +148,16 @@ pub fn calibrate_psf<'py>(
     let optics = &*optics_named("optics", optics)?;
     let mut owned = Vec::with_capacity(pairs.len());
     for (index, (far, near, true_mm)) in pairs.iter().enumerate() {
-        let far: Image<'py> = named(&format!("pairs[{index}][0]"), far)?;
-        let near: Image<'py> = named(&format!("pairs[{index}][1]"), near)?;
+        let names = [0, 1].map(|image| format!("pairs[{index}][{image}]"));
+        let far: Image<'py> = named(&names[0], far)?;
+        let near: Image<'py> = named(&names[1], near)?;
+        check_alike((names[0].as_str(), far.full_scale()), (names[1].as_str(), near.full_scale()))?;
+        let focal_length_mm = optics.0.focal_length_mm();
+        if let Some(mm) = true_mm.filter(|mm| !(mm.is_finite() && *mm > focal_length_mm)) {
+            return Err(FarnearError::new_err(format!(
+                "pairs[{index}][2] is {mm} mm; expected a distance above the focal length of {focal_length_mm} mm, or None"
+            )));
+        }
         owned.push(([far.view().to_owned(), near.view().to_owned()], true_mm.map(|mm| optics.0.alpha(mm))));
     }
     let fit = work::run(py, || {

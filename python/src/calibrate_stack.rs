@@ -9,13 +9,14 @@ use numpy::{IntoPyArray, PyArray2};
 use pyo3::prelude::*;
 
 use crate::{
-    arrays::{Image, named},
+    arrays::stack_of,
     errors::{FarnearError, wrong},
     optics::Optics,
     work,
 };
 
-/// Lens calibrated by `calibrate_stack`; errors are those on parts of the target that were left out of the fit.
+/// Lens calibrated by `calibrate_stack`; errors are those on parts of the target that were left out of the fit. Can be pickled
+/// and copied.
 ///
 /// Attributes
 /// ----------
@@ -55,8 +56,53 @@ pub struct StackFit {
     response: Py<PyArray2<f64>>,
 }
 
+/// Arguments of `StackFit._assemble`.
+type Parts<'py> =
+    (Optics, String, [usize; 2], [f64; 6], Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<f64>>);
+
 #[pymethods]
 impl StackFit {
+    /// For pickle and copy.
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, Parts<'py>)> {
+        let parts = (
+            self.optics.clone(),
+            self.verdict.clone(),
+            [self.pair_step, self.bin],
+            [self.robust_mm, self.rms_mm, self.bias_mm, self.slope, self.fill, self.within_three],
+            self.by_depth.bind(py).clone(),
+            self.response.bind(py).clone(),
+        );
+        Ok((py.get_type::<Self>().getattr("_assemble")?, parts))
+    }
+
+    /// A fit from its parts, for pickle.
+    #[staticmethod]
+    fn _assemble(
+        optics: Optics,
+        verdict: String,
+        steps: [usize; 2],
+        errors: [f64; 6],
+        by_depth: Bound<'_, PyArray2<f64>>,
+        response: Bound<'_, PyArray2<f64>>,
+    ) -> Self {
+        let [pair_step, bin] = steps;
+        let [robust_mm, rms_mm, bias_mm, slope, fill, within_three] = errors;
+        Self {
+            optics,
+            verdict,
+            pair_step,
+            bin,
+            robust_mm,
+            rms_mm,
+            bias_mm,
+            slope,
+            fill,
+            within_three,
+            by_depth: by_depth.unbind(),
+            response: response.unbind(),
+        }
+    }
+
     fn __repr__(&self) -> String {
         format!(
             "StackFit(pairs {} slices apart, {:.4} mm RMS, {})",
@@ -70,7 +116,7 @@ impl StackFit {
 /// Parameters
 /// ----------
 /// images : sequence of array (height, width)
-///     Slices one stage step apart, the one with the farthest focus first.
+///     Slices of one size and one kind, one stage step apart, the one with the farthest focus first.
 /// step_mm : float
 ///     Distance between neighbouring slices, mm, or in any unit of the stage; all depths are in that unit then.
 /// object_pixel_um : float, optional
@@ -90,7 +136,7 @@ impl StackFit {
 /// Raises
 /// ------
 /// FarnearError
-///     Too few slices, slices of two sizes, no focus, blur that is too small.
+///     Too few slices, slices of two sizes or kinds, no focus, blur that is too small.
 #[pyfunction]
 #[pyo3(signature = (images, *, step_mm, object_pixel_um=None, far_mm=None, pair_step=None, bin=None))]
 pub fn calibrate_stack<'py>(
@@ -102,10 +148,7 @@ pub fn calibrate_stack<'py>(
     pair_step: Option<usize>,
     bin: Option<usize>,
 ) -> PyResult<StackFit> {
-    let mut slices = Vec::with_capacity(images.len());
-    for (index, image) in images.iter().enumerate() {
-        slices.push(named::<Image<'py>>(&format!("images[{index}]"), image)?.view().to_owned());
-    }
+    let (slices, _) = stack_of(&images)?;
     let settings = StackSettings {
         step_mm,
         moved: Moved::Target { object_pixel_um, far_mm },

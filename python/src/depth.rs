@@ -3,12 +3,12 @@
 use farnear_depth::{
     adaptive_window::Window,
     fill::{FillBy, LowTexture},
-    measure::{DepthMethod, Finding, MeasureSettings, measure_pair_of_views},
+    measure::{DepthMethod, Finding, MeasureError, MeasureSettings, measure_pair_of_views},
     operators,
     pipeline::{self, Settings},
     prepare::{Align, Balance, PrepareSettings},
 };
-use farnear_workflows::optics::another_size;
+use farnear_workflows::optics::{OpticsDoubt, another_size, usable_bin};
 use std::sync::{Mutex, PoisonError};
 
 use ndarray::{CowArray, Ix2};
@@ -16,7 +16,7 @@ use numpy::{IntoPyArray, PyArray2};
 use pyo3::{exceptions::PyTypeError, prelude::*};
 
 use crate::{
-    arrays::{Image, named, optics_named},
+    arrays::{Image, check_alike, named, optics_named},
     depth_map::DepthMap,
     errors::{FarnearError, wrong},
     optics::Operators,
@@ -59,7 +59,7 @@ fn filling(fill: &Fill, low_texture: &str) -> PyResult<Settings> {
     })
 }
 
-/// Depth map of a far- and a near-focused image, as `farnear depth` computes it.
+/// Depth map of a far- and a near-focused image, as `farnear depth --bin 1` computes it.
 ///
 /// Parameters
 /// ----------
@@ -105,6 +105,9 @@ fn filling(fill: &Fill, low_texture: &str) -> PyResult<Settings> {
 ///
 /// Notes
 /// -----
+/// Pixels are not averaged, except by optics of `calibrate_stack`. For a largest blur of more than 4.5 px `findings` states how
+/// many pixels to average into one first; the optics of such images have a larger `pixel_um` and a smaller `max_blur_px`.
+///
 /// 640x480 take 0.2 s. Other Python threads run meanwhile; Ctrl-C takes effect when the map is done.
 ///
 /// Examples
@@ -139,7 +142,7 @@ pub fn depth(
     if !(0.0..=1.0).contains(&min_confidence) {
         return Err(FarnearError::new_err(format!("min_confidence is {min_confidence}; expected 0 to 1")));
     }
-    check_alike(&far, &near)?;
+    check_alike(("far", far.full_scale()), ("near", near.full_scale()))?;
     let designed;
     let usual = if operators.is_some() { "ro" } else { "whitened" };
     let method = match (method.unwrap_or(usual), operators) {
@@ -178,8 +181,10 @@ pub fn depth(
     let (far, near) = (far.view(), near.view());
     let mut found = work::run(py, || measure_pair_of_views(far, near, &optics.0, method, None, &settings))?
         .map_err(wrong)?;
-    let doubt = another_size(&optics.0, far.dim());
-    found.findings.extend(doubt.map(|doubt| Finding::Run(doubt.to_string())));
+    let (blur_px, bin) = (optics.0.max_blur_px(), usable_bin(&optics.0));
+    let too_much = (bin > 1).then_some(OpticsDoubt::TooMuchBlur { blur_px, bin, binned: false });
+    let doubts = another_size(&optics.0, far.dim()).into_iter().chain(too_much);
+    found.findings.extend(doubts.map(|doubt| Finding::Run(doubt.to_string())));
     Ok(DepthMap::of(py, found, optics))
 }
 
@@ -189,14 +194,6 @@ fn up_to<'a>(image: &'a Image<'_>, white: Option<f32>) -> CowArray<'a, f32, Ix2>
         Some(white) => image.view().mapv(|value| if value > white { white } else { value }).into(),
         None => image.view().into(),
     }
-}
-
-fn check_alike(far: &Image<'_>, near: &Image<'_>) -> PyResult<()> {
-    if far.full_scale().is_some() == near.full_scale().is_some() {
-        return Ok(());
-    }
-    let message = "one of far and near holds uint8 or uint16 and the other does not: give both alike, or their scales differ";
-    Err(FarnearError::new_err(message))
 }
 
 /// Black and white of camera codes, scaled as the image is.
@@ -217,7 +214,7 @@ fn limits(image: &Image<'_>, white_level: Option<u32>) -> PyResult<Option<[f32; 
 /// Parameters
 /// ----------
 /// optics : Optics
-///     The optics of the pairs.
+///     The optics of the pairs; those of `calibrate_stack` are for `depth`.
 /// operators : Operators, optional
 ///     By default they are designed for the optics.
 /// smoothing_px : int
@@ -259,6 +256,9 @@ impl Processor {
         threads: usize,
     ) -> PyResult<Self> {
         let optics = &*optics_named("optics", optics)?;
+        if optics.0.stage().is_some() {
+            return Err(wrong(MeasureError::LearnedForWhitened));
+        }
         let settings = Settings { smoothing_px, median_px, threads, ..filling(&fill, low_texture)? };
         let make = |operators: &operators::Operators| {
             pipeline::Processor::new(operators, &optics.0, &settings)
@@ -290,7 +290,7 @@ impl Processor {
         near: &Bound<'py, PyAny>,
     ) -> PyResult<(Bound<'py, PyArray2<f32>>, Bound<'py, PyArray2<f32>>)> {
         let (far, near): (Image<'py>, Image<'py>) = (named("far", far)?, named("near", near)?);
-        check_alike(&far, &near)?;
+        check_alike(("far", far.full_scale()), ("near", near.full_scale()))?;
         let (far, near) = (far.view(), near.view());
         let (depth_mm, confidence) = work::run(py, || {
             // After a panic in another thread the next run overwrites the buffers.

@@ -6,6 +6,7 @@ use farnear_depth::{measure::Measurement, reason::Reason};
 use farnear_files::{image_file, map, mesh::Lateral, npy, view::view_png};
 use farnear_workflows::{
     MADE_BY,
+    depth::part::Part,
     measure::{self, Rectangle},
     result_folder,
 };
@@ -17,7 +18,15 @@ use serde::{Deserialize, Serialize};
 use crate::{
     errors::{FarnearError, read_text, wrong},
     optics::Optics,
+    work,
 };
+
+/// Column and row of a map in its images, and width and height of these.
+pub type Place = (usize, usize, usize, usize);
+
+pub fn part_of((x, y, image_width, image_height): Place) -> Part {
+    Part { x, y, image_width, image_height }
+}
 
 /// Used contents of `depth.toml`; the command line writes more.
 #[derive(Serialize, Deserialize)]
@@ -28,6 +37,8 @@ struct Record {
     units: String,
     #[serde(default)]
     warnings: Vec<String>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    part: Option<Part>,
     optics: farnear_depth::optics::Optics,
 }
 
@@ -49,6 +60,8 @@ struct Record {
 ///     Part of the pixels with a depth, 0 to 1.
 /// optics : Optics
 ///     The optics of the map.
+/// part : (int, int, int, int) or None
+///     Column and row of the map in its images, and width and height of these, px; None if the map shows whole images.
 ///
 /// Examples
 /// --------
@@ -72,6 +85,8 @@ pub struct DepthMap {
     valid_fraction: f64,
     /// The optics of the map.
     optics: Optics,
+    /// Column and row of the map in its images, and width and height of these, px; None if the map shows whole images.
+    part: Option<Place>,
 }
 
 /// Arguments of `DepthMap._assemble`.
@@ -83,6 +98,7 @@ type Parts<'py> = (
     Vec<String>,
     f64,
     Optics,
+    Option<Place>,
 );
 
 impl DepthMap {
@@ -96,12 +112,14 @@ impl DepthMap {
             findings: found.findings.iter().map(ToString::to_string).collect(),
             valid_fraction: validity.valid_fraction,
             optics: optics.clone(),
+            part: None,
         }
     }
 
     fn view_png(&self, py: Python<'_>) -> PyResult<Vec<u8>> {
         let (depth, confidence) = (self.depth_mm.bind(py).readonly(), self.confidence.bind(py).readonly());
-        view_png(depth.as_array(), confidence.as_array()).map_err(wrong)
+        let (depth, confidence) = (depth.as_array(), confidence.as_array());
+        work::run(py, move || view_png(depth, confidence))?.map_err(wrong)
     }
 }
 
@@ -172,6 +190,7 @@ impl DepthMap {
             reasons: reasons.into_pyarray(py).unbind(),
             findings: record.warnings,
             optics: Optics(record.optics),
+            part: record.part.map(|part| (part.x, part.y, part.image_width, part.image_height)),
         })
     }
 
@@ -197,6 +216,7 @@ impl DepthMap {
             made_by: MADE_BY.into(),
             units: "mm".into(),
             warnings: self.findings.clone(),
+            part: self.part.map(part_of),
             optics: self.optics.0,
         };
         write("depth.toml", toml::to_string(&record).map_err(wrong)?.as_bytes())?;
@@ -231,7 +251,7 @@ impl DepthMap {
             );
             return Err(FarnearError::new_err(message));
         }
-        let lateral = measure::lateral(&self.optics.0, None);
+        let lateral = measure::lateral(&self.optics.0, self.part.map(part_of));
         let part = Rectangle { x, y, width: columns, height: rows };
         let plane = measure::fit(depth, lateral, part)
             .ok_or_else(|| FarnearError::new_err("fewer than three depths, or all in a line: no plane"))?;
@@ -281,12 +301,15 @@ impl DepthMap {
             self.findings.clone(),
             self.valid_fraction,
             self.optics.clone(),
+            self.part,
         );
         Ok((py.get_type::<Self>().getattr("_assemble")?, parts))
     }
 
     /// A map from its parts, for pickle.
     #[staticmethod]
+    #[pyo3(signature = (depth_mm, confidence, deviation_mm, reasons, findings, valid_fraction, optics, part=None))]
+    #[allow(clippy::too_many_arguments)] // the attributes
     fn _assemble(
         depth_mm: Bound<'_, PyArray2<f32>>,
         confidence: Bound<'_, PyArray2<f32>>,
@@ -295,6 +318,7 @@ impl DepthMap {
         findings: Vec<String>,
         valid_fraction: f64,
         optics: Optics,
+        part: Option<Place>,
     ) -> Self {
         Self {
             depth_mm: depth_mm.unbind(),
@@ -304,6 +328,7 @@ impl DepthMap {
             findings,
             valid_fraction,
             optics,
+            part,
         }
     }
 
@@ -313,7 +338,7 @@ impl DepthMap {
     }
 }
 
-/// Plane through a depth map, as `DepthMap.plane` returns it.
+/// Plane through a depth map, as `DepthMap.plane` returns it. Can be pickled and copied.
 ///
 /// Attributes
 /// ----------
@@ -337,8 +362,31 @@ pub struct Plane {
     peak_to_valley_mm: f64,
 }
 
+/// Arguments of `Plane._assemble`.
+type PlaneParts = (f64, f64, f64, f64, f64, f64);
+
 #[pymethods]
 impl Plane {
+    /// For pickle and copy.
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, PlaneParts)> {
+        let Self { z_mm, slope_x, slope_y, tilt_deg, rms_mm, peak_to_valley_mm } = *self;
+        let parts = (z_mm, slope_x, slope_y, tilt_deg, rms_mm, peak_to_valley_mm);
+        Ok((py.get_type::<Self>().getattr("_assemble")?, parts))
+    }
+
+    /// A plane from its parts, for pickle.
+    #[staticmethod]
+    fn _assemble(
+        z_mm: f64,
+        slope_x: f64,
+        slope_y: f64,
+        tilt_deg: f64,
+        rms_mm: f64,
+        peak_to_valley_mm: f64,
+    ) -> Self {
+        Self { z_mm, slope_x, slope_y, tilt_deg, rms_mm, peak_to_valley_mm }
+    }
+
     fn __repr__(&self) -> String {
         format!("Plane({:.3} mm, tilt {:.3} deg, rms {:.3} mm)", self.z_mm, self.tilt_deg, self.rms_mm)
     }

@@ -3,10 +3,11 @@
 use farnear_recognition::embedding::{
     EmbeddingError, isomap::isomap as lay_out, neighbours::Neighbourhood, rbf,
 };
-use numpy::{IntoPyArray, PyArray1, PyArray2, PyReadonlyArray2};
+use numpy::{IntoPyArray, PyArray1, PyArray2};
 use pyo3::prelude::*;
 
 use crate::{
+    arrays::Samples,
     errors::{DisconnectedError, wrong},
     work,
 };
@@ -19,11 +20,11 @@ type Laid<'py> = (Bound<'py, PyArray2<f32>>, Bound<'py, PyArray1<f64>>, Bound<'p
 #[pyo3(signature = (samples, *, neighbours=5, dimensions=2))]
 pub fn isomap<'py>(
     py: Python<'py>,
-    samples: PyReadonlyArray2<'py, f32>,
+    samples: Samples<'py>,
     neighbours: usize,
     dimensions: usize,
 ) -> PyResult<Laid<'py>> {
-    let samples = samples.as_array();
+    let samples = samples.view();
     let found = work::run(py, || lay_out(samples, Neighbourhood::Nearest(neighbours), dimensions))?;
     let found = found.map_err(|error| match &error {
         EmbeddingError::Disconnected { .. } => DisconnectedError::new_err(error.to_string()),
@@ -49,35 +50,25 @@ impl Rbf {
     #[pyo3(signature = (samples, targets, *, gamma, ridge=1e-3))]
     fn new(
         py: Python<'_>,
-        samples: PyReadonlyArray2<'_, f32>,
-        targets: PyReadonlyArray2<'_, f32>,
+        samples: Samples<'_>,
+        targets: Samples<'_>,
         gamma: f32,
         ridge: f64,
     ) -> PyResult<Self> {
-        let (samples, targets) = (samples.as_array(), targets.as_array());
+        let (samples, targets) = (samples.view(), targets.view());
         work::run(py, || rbf::Rbf::train(samples, targets, gamma, ridge))?.map(Self).map_err(wrong)
     }
 
     /// Coordinates, float32 (m, d), of samples, float32 (m, features).
-    fn embed<'py>(
-        &self,
-        py: Python<'py>,
-        samples: PyReadonlyArray2<'py, f32>,
-    ) -> PyResult<Bound<'py, PyArray2<f32>>> {
-        let samples = samples.as_array();
+    fn embed<'py>(&self, py: Python<'py>, samples: Samples<'py>) -> PyResult<Bound<'py, PyArray2<f32>>> {
+        let samples = samples.view();
         Ok(work::run(py, || self.0.embed_all(samples))?.map_err(wrong)?.into_pyarray(py))
     }
 
     /// A map from what [`Self::__reduce__`] gives.
     #[staticmethod]
-    fn assemble(
-        centres: PyReadonlyArray2<'_, f32>,
-        weights: PyReadonlyArray2<'_, f32>,
-        gamma: f32,
-        ridge: f64,
-        condition: f64,
-    ) -> Self {
-        let (centres, weights) = (centres.as_array().to_owned(), weights.as_array().to_owned());
+    fn assemble(centres: Samples<'_>, weights: Samples<'_>, gamma: f32, ridge: f64, condition: f64) -> Self {
+        let (centres, weights) = (centres.view().to_owned(), weights.view().to_owned());
         Self(rbf::Rbf::assemble(centres, weights, gamma, ridge, condition))
     }
 

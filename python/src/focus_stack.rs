@@ -2,25 +2,31 @@
 
 use std::{
     ops::Range,
-    sync::atomic::{AtomicBool, Ordering},
+    sync::{
+        Arc,
+        atomic::{AtomicBool, Ordering},
+    },
 };
 
 use farnear_depth::{
     focus_stack::{Slices, StackError, StackSettings, depth_from_positions},
     prepare::align::Model,
 };
-use farnear_workflows::focus_stack::{depth_of_places, even_positions, prepare_stack};
+use farnear_workflows::{
+    Cancel, Context, Unattended,
+    focus_stack::{depth_of_places, even_positions, prepare_stack},
+};
 use ndarray::{ArrayView2, CowArray, Ix2};
 use numpy::{IntoPyArray, PyArray2};
 use pyo3::{exceptions::PyKeyboardInterrupt, prelude::*};
 
 use crate::{
-    arrays::{Image, named},
+    arrays::stack_of,
     errors::{FarnearError, wrong},
     work,
 };
 
-/// Depth from a focus stack, as `focus_stack` returns it; arrays are float32 (height, width).
+/// Depth from a focus stack, as `focus_stack` returns it; arrays are float32 (height, width). Can be pickled and copied.
 ///
 /// Attributes
 /// ----------
@@ -34,6 +40,10 @@ use crate::{
 ///     Each pixel from the image in which it is sharpest: 0 to 1 for uint8 and uint16, else in the scale of the images.
 /// moved_px : float
 ///     Farthest that alignment moved a pixel, px.
+/// left_out : list of int
+///     Indices in `images` of those that were not used, see `findings`.
+/// findings : list of str
+///     What to know before trusting the map.
 #[pyclass(frozen, get_all, module = "farnear")]
 pub struct FocusStack {
     depth: Py<PyArray2<f32>>,
@@ -41,10 +51,60 @@ pub struct FocusStack {
     reliability: Py<PyArray2<f32>>,
     all_in_focus: Py<PyArray2<f32>>,
     moved_px: f64,
+    left_out: Vec<usize>,
+    findings: Vec<String>,
 }
+
+/// Arguments of `FocusStack._assemble`.
+type Parts<'py> = (
+    Bound<'py, PyArray2<f32>>,
+    &'static str,
+    Bound<'py, PyArray2<f32>>,
+    Bound<'py, PyArray2<f32>>,
+    f64,
+    Vec<usize>,
+    Vec<String>,
+);
 
 #[pymethods]
 impl FocusStack {
+    /// For pickle and copy.
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, Parts<'py>)> {
+        let bind = |array: &Py<PyArray2<f32>>| array.bind(py).clone();
+        let parts = (
+            bind(&self.depth),
+            self.unit,
+            bind(&self.reliability),
+            bind(&self.all_in_focus),
+            self.moved_px,
+            self.left_out.clone(),
+            self.findings.clone(),
+        );
+        Ok((py.get_type::<Self>().getattr("_assemble")?, parts))
+    }
+
+    /// A result from its parts, for pickle.
+    #[staticmethod]
+    fn _assemble(
+        depth: Bound<'_, PyArray2<f32>>,
+        unit: &str,
+        reliability: Bound<'_, PyArray2<f32>>,
+        all_in_focus: Bound<'_, PyArray2<f32>>,
+        moved_px: f64,
+        left_out: Vec<usize>,
+        findings: Vec<String>,
+    ) -> Self {
+        Self {
+            depth: depth.unbind(),
+            unit: unit_of(unit == "mm"),
+            reliability: reliability.unbind(),
+            all_in_focus: all_in_focus.unbind(),
+            moved_px,
+            left_out,
+            findings,
+        }
+    }
+
     fn __repr__(&self, py: Python<'_>) -> String {
         use numpy::PyUntypedArrayMethods;
         let [height, width] = self.depth.bind(py).shape() else { return "FocusStack()".into() };
@@ -52,12 +112,17 @@ impl FocusStack {
     }
 }
 
+fn unit_of(in_mm: bool) -> &'static str {
+    if in_mm { "mm" } else { "image" }
+}
+
 /// Depth and all-in-focus image of a stack of images at different focus, as `farnear focus-stack` computes them.
 ///
 /// Parameters
 /// ----------
 /// images : sequence of array (height, width)
-///     At least three grey images of one size, in the order of their focus. NaN and borders of zeros count as not seen.
+///     At least three grey images of one size and one kind, in the order of their focus. NaN and borders of zeros count as not
+///     seen.
 /// focused_at_mm : sequence of float, optional
 ///     Object distance in mm at which each image is sharp, ascending or descending.
 /// measure : str
@@ -76,6 +141,8 @@ impl FocusStack {
 ///     Depths below this reliability are NaN, 0 to 1.
 /// align : {"none", "shift", "similarity", "affine"}
 ///     Alignment of the images.
+/// use_all : bool
+///     Use all images, also those that show another scene, are turned or shaken.
 ///
 /// Returns
 /// -------
@@ -89,7 +156,7 @@ impl FocusStack {
 /// 'mm'
 #[pyfunction]
 #[pyo3(signature = (images, *, focused_at_mm=None, measure="modified-laplacian", smoothing_px=1.0, window_px=9, fit_points=11, median_px=9,
-                    guided_px=10.0, min_reliability=0.1, align="none"))]
+                    guided_px=10.0, min_reliability=0.1, align="none", use_all=false))]
 #[allow(clippy::too_many_arguments)] // keywords in Python
 pub fn focus_stack<'py>(
     py: Python<'py>,
@@ -103,6 +170,7 @@ pub fn focus_stack<'py>(
     guided_px: f32,
     min_reliability: f32,
     align: &str,
+    use_all: bool,
 ) -> PyResult<FocusStack> {
     if !(0.0..=1.0).contains(&min_reliability) {
         return Err(FarnearError::new_err(format!("min_reliability is {min_reliability}; expected 0 to 1")));
@@ -129,32 +197,29 @@ pub fn focus_stack<'py>(
         guided_px,
         min_reliability,
     };
-    let mut owned = Vec::with_capacity(images.len());
-    let mut full_scale = None;
-    for (index, image) in images.iter().enumerate() {
-        let image = named::<Image<'py>>(&format!("images[{index}]"), image)?;
-        if *full_scale.get_or_insert(image.full_scale().is_some()) != image.full_scale().is_some() {
-            let message =
-                format!("images[0] and images[{index}]: one holds uint8 or uint16 and the other does not");
-            return Err(FarnearError::new_err(format!("{message}: give all alike, or their scales differ")));
-        }
-        owned.push(image.view().to_owned());
-    }
-    let (map, depth, moved_px) = work::interruptibly(py, |stop| -> PyResult<_> {
-        let moved_px = prepare_stack(&mut owned, model).map_err(wrong)?;
-        let views: Vec<ArrayView2<'_, f32>> = owned.iter().map(|image| image.view()).collect();
-        let positions = even_positions(views.len(), focused_at_mm.as_deref());
-        let map = depth_from_positions(&Stoppable { views, stop }, &positions, &settings)
+    let (images, full_scale) = stack_of(&images)?;
+    let in_mm = focused_at_mm.is_some();
+    let positions = even_positions(images.len(), focused_at_mm.as_deref());
+    let code_step = full_scale.map_or(0.0, f32::recip);
+    let (map, depth, prepared) = work::interruptibly(py, |stop| -> PyResult<_> {
+        let context = Context::new(&Unattended, &Unattended, Cancel::from(Arc::clone(stop)));
+        let prepared = prepare_stack(images, positions, model, use_all, &context).map_err(wrong)?;
+        let views: Vec<ArrayView2<'_, f32>> = prepared.images.iter().map(|image| image.view()).collect();
+        let stack = Stoppable { views, code_step, stop };
+        let mut map = depth_from_positions(&stack, &prepared.positions, &settings)
             .map_err(|Stopped(error)| error.map_or_else(|| PyKeyboardInterrupt::new_err(()), wrong))?;
-        let depth = depth_of_places(&map.place, positions.len(), focused_at_mm.as_deref());
-        Ok((map, depth, moved_px))
+        prepared.withhold(&mut map);
+        let depth = depth_of_places(&map.place, &prepared.positions, in_mm);
+        Ok((map, depth, prepared))
     })??;
     Ok(FocusStack {
         depth: depth.into_pyarray(py).unbind(),
-        unit: if focused_at_mm.is_some() { "mm" } else { "image" },
+        unit: unit_of(in_mm),
         reliability: map.reliability.into_pyarray(py).unbind(),
         all_in_focus: map.all_in_focus.into_pyarray(py).unbind(),
-        moved_px,
+        moved_px: prepared.moved_px,
+        left_out: prepared.left_out,
+        findings: prepared.warnings,
     })
 }
 
@@ -170,6 +235,7 @@ impl From<StackError> for Stopped {
 /// Images whose reading fails once `stop` is set.
 struct Stoppable<'a> {
     views: Vec<ArrayView2<'a, f32>>,
+    code_step: f32,
     stop: &'a AtomicBool,
 }
 
@@ -187,6 +253,10 @@ impl Slices for Stoppable<'_> {
     fn rows(&self, index: usize, rows: Range<usize>) -> Result<CowArray<'_, f32, Ix2>, Stopped> {
         self.measured(0, 0)?;
         Ok(self.views[..].rows(index, rows)?)
+    }
+
+    fn code_step(&self) -> f32 {
+        self.code_step
     }
 
     fn measured(&self, _: usize, _: usize) -> Result<(), Stopped> {

@@ -5,11 +5,12 @@ use pyo3::prelude::*;
 
 use crate::{
     arrays::{Map, named, optics_named},
+    depth_map::{Place, part_of},
     errors::wrong,
     work,
 };
 
-/// Object point that each pixel of a whole depth map sees.
+/// Object point that each pixel of a depth map sees.
 ///
 /// Parameters
 /// ----------
@@ -17,6 +18,9 @@ use crate::{
 ///     Depth map, mm; NaN where there is none.
 /// optics : Optics
 ///     The optics of the map; those of `calibrate_stack` need its `object_pixel_um`.
+/// part : (int, int, int, int), optional
+///     `DepthMap.part`: column and row of the map in its images, and width and height of these, px; by default the map shows
+///     whole images.
 ///
 /// Returns
 /// -------
@@ -29,14 +33,17 @@ use crate::{
 /// >>> farnear.points_mm(np.full((4, 6), 900.0), optics).shape
 /// (4, 6, 3)
 #[pyfunction]
+#[pyo3(signature = (depth_mm, optics, *, part=None))]
 pub fn points_mm<'py>(
     py: Python<'py>,
     depth_mm: &Bound<'py, PyAny>,
     optics: &Bound<'py, PyAny>,
+    part: Option<Place>,
 ) -> PyResult<Bound<'py, PyArray3<f32>>> {
     let depth_mm: Map<'py> = named("depth_mm", depth_mm)?;
     let optics = &*optics_named("optics", optics)?;
     let depth_mm = depth_mm.view();
-    let points = work::run(py, || farnear_workflows::measure::points_mm(depth_mm, &optics.0))?;
+    let part = part.map(part_of);
+    let points = work::run(py, || farnear_workflows::measure::points_mm(depth_mm, &optics.0, part))?;
     Ok(points.map_err(wrong)?.into_pyarray(py))
 }

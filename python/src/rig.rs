@@ -54,7 +54,8 @@ impl Drop for RigClient {
 impl RigClient {
     #[new]
     fn new(py: Python<'_>, port: &str) -> PyResult<Self> {
-        let client = py.detach(|| Client::open(port)).map_err(rig)?;
+        let port = port.to_owned();
+        let client = work::watched(py, move || Client::open(&port))?.map_err(rig)?;
         Ok(Self { client: Some(client), opened_by: process::id() })
     }
 

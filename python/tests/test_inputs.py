@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 
 import farnear
+from farnear import _farnear
+from farnear.recording import camera_matrix
 
 
 @pytest.fixture(scope="module")
@@ -43,6 +45,20 @@ def test_every_numeric_type_and_byte_order_is_accepted(optics, slant, dtype):
     assert np.sqrt(np.nanmean(error**2)) < 1.5
     depth_mm, _ = farnear.Processor(optics).run(far.astype(dtype), near.astype(dtype))
     assert np.isfinite(depth_mm).mean() > 0.9
+
+
+def test_fields_of_packed_structures_are_read_as_their_copies(optics, found):
+    packed = np.zeros(found.depth_mm.shape, dtype=[("depth", "<f4"), ("valid", "u1")])
+    packed["depth"] = found.depth_mm
+    field = packed["depth"]
+    assert not field.flags.aligned
+    np.testing.assert_array_equal(farnear.points_mm(field, optics), farnear.points_mm(field.copy(), optics))
+    packed["depth"] = np.random.default_rng(1).random(field.shape)
+    samples, targets = field[:30, :6], field[:30, 6:8]
+    laid = [_farnear.isomap(given, neighbours=10)[0] for given in (samples, samples.copy())]
+    np.testing.assert_array_equal(*laid)
+    maps = [_farnear.Rbf(*given, gamma=1.0) for given in ((samples, targets), (samples.copy(), targets.copy()))]
+    np.testing.assert_array_equal(maps[0].embed(samples), maps[1].embed(samples.copy()))
 
 
 def test_types_without_an_order_are_refused_by_the_name_of_the_argument(optics, slant):
@@ -82,6 +98,28 @@ def test_a_depth_map_is_pickled_copied_saved_and_loaded(found, tmp_path):
     assert found.depth_mm[0, 0] != 1.0, "a deep copy owns its arrays"
     found.save(tmp_path / "result")
     same(farnear.DepthMap.load(tmp_path / "result"), found)
+
+
+def test_a_map_of_a_region_keeps_its_place(optics, slant, tmp_path):
+    place = (slice(10, 110), slice(200, 300))
+    farnear.depth(slant[0][place], slant[1][place], optics).save(tmp_path / "region")
+    with open(tmp_path / "region" / "depth.toml", "a") as record:  # as `farnear depth --region` writes it
+        record.write("\n[part]\nx = 200\ny = 10\nimage_width = 320\nimage_height = 240\n")
+    region = farnear.DepthMap.load(tmp_path / "region")
+    assert region.part == (200, 10, 320, 240)
+    region.save(tmp_path / "again")
+    for copied in (farnear.DepthMap.load(tmp_path / "again"), pickle.loads(pickle.dumps(region))):
+        assert copied.part == region.part
+    depth_mm = np.full((240, 320), np.nan, np.float32)
+    depth_mm[place] = region.depth_mm
+    points = farnear.points_mm(region.depth_mm, optics, part=region.part)
+    np.testing.assert_array_equal(points, farnear.points_mm(depth_mm, optics)[place])
+    whole = farnear.DepthMap._assemble(depth_mm, depth_mm, depth_mm, np.zeros((240, 320), np.uint8), [], 1.0, optics)
+    assert whole.part is None
+    for name in ("slope_x", "slope_y", "tilt_deg"):
+        expected = getattr(whole.plane((200, 10, 100, 100)), name)
+        assert getattr(region.plane(), name) == pytest.approx(expected, rel=1e-6), name
+    assert camera_matrix(region)[2] == camera_matrix(whole)[2] - 200 and camera_matrix(region)[5] == camera_matrix(whole)[5] - 10
 
 
 def test_a_folder_that_is_no_result_is_named(tmp_path, found):
@@ -135,6 +173,10 @@ def test_optics_accept_a_calibrated_point_spread_function(optics, model):
     assert 0 < fit.standard_error_k < 0.02 and 0 <= fit.residual < 0.1
     assert (fit.standard_error_p is not None) == (model == "generalised")
     assert bool(fit.otf) == (model == "free")
+    copied = pickle.loads(pickle.dumps(fit))
+    assert copied.optics == fit.optics and (copied.psf, copied.verdict, copied.k) == (fit.psf, fit.verdict, fit.k)
+    for name in ("standard_error_k", "standard_error_p", "residual", "noise_residual", "alphas", "otf"):
+        assert getattr(copied, name) == getattr(fit, name), name
     assert np.isfinite(farnear.depth(*pairs[0][:2], fit.optics).depth_mm).mean() > 0.8
 
 
@@ -142,6 +184,9 @@ def test_a_plane_is_measured(optics):
     far, near, _ = farnear.render(optics, "plane:910", width=160, height=120)
     plane = farnear.depth(far, near, optics).plane()
     assert plane.z_mm == pytest.approx(910, abs=0.5) and plane.tilt_deg < 3 and 0 < plane.rms_mm < 2
+    copied = copy.deepcopy(plane)
+    for name in ("z_mm", "slope_x", "slope_y", "tilt_deg", "rms_mm", "peak_to_valley_mm"):
+        assert getattr(copied, name) == getattr(plane, name), name
     with pytest.raises(farnear.FarnearError, match="160x120"):
         farnear.depth(far, near, optics).plane((150, 0, 20, 20))
 
@@ -224,6 +269,10 @@ def test_a_lens_is_calibrated_from_a_stack_and_measures_its_pairs():
     assert np.all(np.diff(depth) > 0) and np.all(np.abs(bias) <= rms) and np.all(predicted > 0), fit.by_depth
     measured, true = fit.response.T
     assert np.all(np.diff(measured) > 0) and np.all(np.diff(true) >= 0) and true[0] < -0.5 and true[-1] > 0.5, fit.response
+    copied = pickle.loads(pickle.dumps(fit))
+    assert copied.optics == fit.optics and copied.verdict == fit.verdict
+    for name in ("pair_step", "bin", "robust_mm", "rms_mm", "bias_mm", "slope", "fill", "within_three", "by_depth", "response"):
+        assert np.array_equal(getattr(copied, name), getattr(fit, name), equal_nan=True), name
     first = 20 - fit.pair_step // 2
     found = farnear.depth(slices[first], slices[first + fit.pair_step], fit.optics, method="whitened")
     # The target is in focus at slice 20: so many steps nearer than the far plane. Within a third of a step.
@@ -244,21 +293,55 @@ def _median_mm(far, near, optics):
     return float(np.nanmedian(farnear.depth(far, near, optics).depth_mm))
 
 
+def _saved_median_mm(far, near, optics, folder):
+    found = farnear.depth(far, near, optics)
+    found.save(folder)
+    assert found._repr_html_()
+    return float(np.nanmedian(farnear.DepthMap.load(folder).depth_mm))
+
+
 @pytest.mark.skipif("fork" not in multiprocessing.get_all_start_methods(), reason="this system has no fork")
 @pytest.mark.filterwarnings("ignore:.*fork.*:DeprecationWarning")
-def test_a_child_by_fork_has_threads_of_its_own(optics, slant):
+def test_a_child_by_fork_has_threads_of_its_own(optics, slant, tmp_path):
     pair = (*slant[:2], optics)
     expected = _median_mm(*pair)
     with multiprocessing.get_context("fork").Pool(2) as pool:
-        assert pool.starmap_async(_median_mm, [pair] * 2).get(timeout=60) == [expected] * 2
+        arguments = [(*pair, tmp_path / name) for name in ("first", "second")]
+        assert pool.starmap_async(_saved_median_mm, arguments).get(timeout=60) == [expected] * 2
 
 
 def test_images_of_different_scales_are_refused(optics, slant):
     far, near, _ = slant
-    with pytest.raises(farnear.FarnearError, match="scales differ"):
-        farnear.Processor(optics).run(far, near.astype("f4"))
-    with pytest.raises(farnear.FarnearError, match=r"images\[2\].*scales differ"):
-        farnear.focus_stack([far, near, far.astype("f4")])
+    for other, kind in [(near.astype("f4"), "other numbers"), (near.astype("u2"), "uint16")]:
+        with pytest.raises(farnear.FarnearError, match=f"far holds uint8 and near {kind}.*scales differ"):
+            farnear.depth(far, other, optics)
+        with pytest.raises(farnear.FarnearError, match="scales differ"):
+            farnear.Processor(optics).run(far, other)
+        with pytest.raises(farnear.FarnearError, match=rf"images\[2\] {kind}.*scales differ"):
+            farnear.focus_stack([far, near, other])
+        with pytest.raises(farnear.FarnearError, match=rf"images\[2\] {kind}.*scales differ"):
+            farnear.calibrate_stack([far, near, other], step_mm=0.1)
+        with pytest.raises(farnear.FarnearError, match=rf"pairs\[0\]\[1\] {kind}.*scales differ"):
+            farnear.calibrate_psf([(far, other, 900.0)], optics)
+
+
+@pytest.mark.parametrize("distance_mm", [0.0, 50.0, -900.0, float("nan")])
+def test_a_target_inside_the_focal_length_is_refused(optics, slant, distance_mm):
+    with pytest.raises(farnear.FarnearError, match=r"pairs\[0\]\[2\].*focal length of 50 mm"):
+        farnear.calibrate_psf([(*slant[:2], distance_mm)], optics)
+
+
+def test_a_processor_refuses_optics_that_were_learned_for_another_method(learned, slant):
+    for use in (lambda: farnear.Processor(learned), lambda: farnear.depth(*slant[:2], learned, method="ro")):
+        with pytest.raises(farnear.FarnearError, match="learned by calibrate stack for method whitened"):
+            use()
+
+
+def test_a_blur_that_is_too_large_is_a_finding(optics):
+    wide = farnear.Optics(focal_length_mm=50, aperture_mm=12.8, pixel_um=7.4, far_mm=933, max_blur_px=5, psf=optics.psf)
+    far, near, _ = farnear.render(wide, "slant", width=160, height=120)
+    findings = farnear.depth(far, near, wide).findings
+    assert any("average 2 x 2 pixels" in finding for finding in findings), findings
 
 
 def test_a_white_level_saturates_brighter_pixels(optics, slant):

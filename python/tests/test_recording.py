@@ -49,3 +49,25 @@ def test_images_that_do_not_fit_are_refused(optics, slant, tmp_path):
     with McapRecording(tmp_path / "pairs.mcap") as recording:
         with pytest.raises(farnear.FarnearError, match="near"):
             recording.add(far, near[1:], farnear.depth(far, near, optics))
+
+
+def test_a_lens_without_scale_has_no_cloud_and_no_camera_info(without_scale, slant, tmp_path):
+    reader = pytest.importorskip("mcap.reader")
+    pytest.importorskip("mcap_ros2.writer")
+    path = tmp_path / "pairs.mcap"
+    with McapRecording(path) as recording:
+        recording.add(*slant[:2], without_scale)
+    with open(path, "rb") as file:
+        topics = {channel.topic for _, channel, _ in reader.make_reader(file).iter_messages()}
+    assert topics == {f"/farnear/{name}/image" for name in ("far", "near", "depth", "confidence")}
+
+
+def test_an_existing_file_is_kept(tmp_path):
+    pytest.importorskip("mcap_ros2.writer")
+    path = tmp_path / "pairs.mcap"
+    path.write_bytes(b"an earlier recording")
+    with pytest.raises(FileExistsError):
+        McapRecording(path)
+    assert path.read_bytes() == b"an earlier recording"
+    McapRecording(path, overwrite=True).close()
+    assert path.read_bytes() != b"an earlier recording"

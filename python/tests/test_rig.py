@@ -2,6 +2,8 @@
 
 import os
 import signal
+import socket
+import threading
 import time
 
 import numpy as np
@@ -152,3 +154,15 @@ def test_a_port_that_is_none_is_said():
 
     with pytest.raises(farnear.RigError, match="/dev/does-not-exist"):
         Rig("/dev/does-not-exist")
+
+
+def test_ctrl_c_interrupts_the_opening_of_a_rig():
+    from farnear.rig import Rig
+
+    with socket.create_server(("127.0.0.1", 0)) as silent:
+        interrupt = threading.Timer(0.3, os.kill, (os.getpid(), signal.SIGINT))
+        begin = time.monotonic()
+        interrupt.start()
+        with pytest.raises(KeyboardInterrupt):
+            Rig(f"tcp:127.0.0.1:{silent.getsockname()[1]}")
+        assert time.monotonic() - begin < 1.5

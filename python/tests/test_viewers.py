@@ -76,6 +76,16 @@ def test_foxglove_gets_a_pair_over_its_own_protocol(found, slant):
     assert (found.depth_mm * np.float32(1e-3)).tobytes() in message
 
 
+def test_viewers_show_maps_of_a_lens_without_scale(without_scale, learned, slant, tmp_path):
+    far, near, _ = slant
+    pytest.importorskip("rerun")
+    with RerunView(learned, save=str(tmp_path / "pairs.rrd")) as view:
+        view.show(far, near, without_scale)
+    pytest.importorskip("foxglove")
+    with FoxgloveView(port=0) as view:
+        view.show(far, near, without_scale)
+
+
 def test_a_viewer_that_is_not_installed_is_named(monkeypatch, optics):
     import importlib
 

@@ -6,10 +6,11 @@
 //! | `step-after-alarm` | no STEP pulse later than 2 ms after an alarm until it is cleared |
 //! | `acts-twice` | no request acts twice: one end each, equal answers to repeats, no more exposures than accepted |
 //! | `moves-unasked` | no motor moves without requested work |
-//! | `exposure` | each exposure is reported with its own stamps, and was within its tolerance or reported otherwise |
+//! | `exposure` | each exposure is reported with its stamps and a loaded length, and was within its tolerance or reported otherwise |
 //! | `position` | a position reported as homed was homed by an accepted request in this boot and is correct within its stated error |
 //! | `records` | settings, alarms and boot numbers survive everything, or their loss is reported |
 //! | `works-after` | without faults the alarms can be cleared, and the rig homes, moves and captures |
+//! | `runs` | the emulator plays the scenario to its end without an error (checked by [`crate::run`]) |
 //!
 //! A new property is a file of this module, a line in [`check`] and a row above.
 

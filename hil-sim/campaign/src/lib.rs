@@ -156,7 +156,8 @@ pub fn run(campaign: &Campaign, mut progress: impl FnMut(u64, &Outcome)) -> Resu
             let (tell, next, seeds, stopped) = (tell.clone(), &next, &seeds, &stopped);
             scope.spawn(move || {
                 while let Some(seed) = seeds.get(next.fetch_add(1, Ordering::Relaxed) as usize) {
-                    match one(campaign, *seed) {
+                    let play = |scenario: &Scenario| play_alone(scenario, campaign.firmware.as_deref());
+                    match one(campaign, *seed, play) {
                         Ok(result) => drop(tell.send((*seed, result))), // the receiver may have gone
                         Err(error) => {
                             *stopped.lock().unwrap_or_else(PoisonError::into_inner) = Some(error);
@@ -180,18 +181,35 @@ pub fn run(campaign: &Campaign, mut progress: impl FnMut(u64, &Outcome)) -> Resu
     stopped.map_or(Ok(summary), Err)
 }
 
-fn one(campaign: &Campaign, seed: u64) -> Result<(Outcome, Option<PathBuf>), SimError> {
+/// `play` runs a scenario.
+fn one(
+    campaign: &Campaign,
+    seed: u64,
+    play: impl Fn(&Scenario) -> Result<Outcome, SimError>,
+) -> Result<(Outcome, Option<PathBuf>), SimError> {
     let scenario = draw(seed);
-    let firmware = campaign.firmware.as_deref();
-    let outcome = play_alone(&scenario, firmware)?;
+    let play = |scenario: &Scenario| play(scenario).or_else(as_violation);
+    let outcome = play(&scenario)?;
     let Some(broken) = outcome.broken.first() else { return Ok((outcome, None)) };
-    let small = shrink(&scenario, broken.property, |scenario| play_alone(scenario, firmware))?;
+    let small = shrink(&scenario, broken.property, play)?;
     let path = campaign.out.join(format!("{}-{seed}.toml", broken.property));
     let io = |source| SimError::Io { what: format!("cannot write {}", path.display()), source };
     fs::create_dir_all(&campaign.out).map_err(io)?;
-    let text = format!("# Breaks \"{}\": {}\n\n{}", broken.property, broken.what, small.text());
+    let what = broken.what.replace('\n', " "); // a comment ends with its line
+    let text = format!("# Breaks \"{}\": {what}\n\n{}", broken.property, small.text());
     fs::write(&path, text).map_err(io)?;
     Ok((outcome, Some(path)))
+}
+
+/// A run that ends with an error violates `runs`, unless every scenario would fail for the same reason.
+fn as_violation(error: SimError) -> Result<Outcome, SimError> {
+    match error {
+        SimError::NoFirmware(_) | SimError::Firmware { .. } | SimError::Io { .. } => Err(error),
+        error => {
+            let broken = vec![Broken { property: "runs", at_ns: 0, what: error.to_string() }];
+            Ok(Outcome { broken, ..Outcome::default() })
+        }
+    }
 }
 
 #[cfg(test)]
@@ -220,6 +238,45 @@ mod tests {
         // All but those that only revert another one, gauge drift, and a renamed port.
         assert!(!kinds.contains("gauge-drifts") && !kinds.contains("link-renamed"));
         assert_eq!(kinds.len(), farnear_sim::faults::KINDS.len() - 7, "{kinds:?}");
+    }
+
+    fn campaign(out: &Path) -> Campaign {
+        let shard = Shard { index: 1, count: 1 };
+        Campaign { seeds: 7..8, shard, jobs: 1, firmware: None, out: out.into() }
+    }
+
+    #[test]
+    fn an_error_of_the_emulator_is_a_violation_with_a_scenario_file() {
+        let out = tempfile::tempdir().expect("a folder");
+        let fails = |_: &Scenario| Err(SimError::Emulator("unmapped read\nat 0x0".into()));
+        let (outcome, file) = one(&campaign(out.path()), 7, fails).expect("a violation");
+        assert_eq!(outcome.broken[0].property, "runs");
+        let file = file.expect("a file");
+        assert_eq!(file, out.path().join("runs-7.toml"));
+        let text = fs::read_to_string(file).expect("readable");
+        assert!(text.contains("unmapped read at 0x0") && Scenario::parse(&text).is_ok(), "{text}");
+
+        let missing = |_: &Scenario| Err(SimError::NoFirmware("farnear-board".into()));
+        let error = one(&campaign(out.path()), 7, missing).expect_err("no scenario can be played");
+        assert!(matches!(error, SimError::NoFirmware(_)), "{error}");
+    }
+
+    #[test]
+    fn an_error_while_shrinking_keeps_the_violation() {
+        let out = tempfile::tempdir().expect("a folder");
+        let whole = draw(7);
+        let play = |scenario: &Scenario| {
+            if *scenario != whole {
+                return Err(SimError::Stopped);
+            }
+            let broken = vec![Broken { property: "position", at_ns: 0, what: String::new() }];
+            Ok(Outcome { broken, ..Outcome::default() })
+        };
+        let (_, file) = one(&campaign(out.path()), 7, play).expect("a violation");
+        let file = file.expect("a file");
+        assert_eq!(file, out.path().join("position-7.toml"));
+        let text = fs::read_to_string(file).expect("readable");
+        assert_eq!(Scenario::parse(&text), Ok(whole));
     }
 
     #[test]

@@ -310,7 +310,9 @@ impl Slab {
         let spacing = (last - first) / (self.radii_px.len() - 1) as f32;
         let level = (((radius - first) / spacing) as usize).min(self.radii_px.len() - 2);
         let (low, high) = (self.radii_px[level], self.radii_px[level + 1]);
-        let fraction = (radius * radius - low * low) / (high * high - low * low);
+        let span = high * high - low * low;
+        // A single depth has two equal levels.
+        let fraction = if span > 0.0 { (radius * radius - low * low) / span } else { 0.0 };
         (level, fraction.clamp(0.0, 1.0))
     }
 }

@@ -25,7 +25,7 @@ impl StagingError {
 }
 
 /// Part of all temporary names.
-const PARTIAL: &str = ".partial-";
+pub const PARTIAL: &str = ".partial-";
 /// A younger folder may be about to be locked by its program.
 const JUST_BEGUN: Duration = Duration::from_secs(10);
 /// Limit of leftover folders of one name, before the user must check.

@@ -18,6 +18,9 @@ const BACKGROUND: Rgb<u8> = Rgb([250, 250, 248]);
 const INK: Rgb<u8> = Rgb([40, 40, 44]);
 const NO_VALUE: Rgb<u8> = Rgb([150, 150, 152]);
 
+/// Floats have no more digits.
+const DECIMALS_MAX: f64 = 9.0;
+
 /// Confidence with full colour.
 const CONFIDENT: f32 = 0.5;
 /// Part of colour at confidence 0.
@@ -49,7 +52,13 @@ fn draw(unit: &str, depth_mm: ArrayView2<f32>, confidence: ArrayView2<f32>) -> R
     let range = Range::of(depth_mm);
     // Text height is 3.5 % of the picture within limits.
     let mut writer = Writer::new((height as f32 * 0.035).clamp(13.0, 60.0))?;
-    let label_width = writer.width(&format!("0000.0 {unit}"));
+    let (step, decimals) = range.0.map_or((1.0, 0), |(near, far)| ticks(f64::from(far - near)));
+    let label = |tick: f64| format!("{tick:.decimals$} {unit}");
+    let mut label_width = writer.width(&format!("0000.0 {unit}"));
+    if let (Some((near, far)), 3..) = (range.0, decimals) {
+        let ends = [near, far].map(|end| writer.width(&label(f64::from(end))));
+        label_width = label_width.max(ends[0]).max(ends[1]);
+    }
     let bar_left = MARGIN_PX * 2 + width;
     let canvas_width = bar_left + BAR_PX + 14 + label_width + MARGIN_PX;
     let mut canvas = RgbImage::from_pixel(canvas_width, height + 2 * MARGIN_PX, BACKGROUND);
@@ -75,8 +84,6 @@ fn draw(unit: &str, depth_mm: ArrayView2<f32>, confidence: ArrayView2<f32>) -> R
             canvas.put_pixel(bar_left + x, MARGIN_PX + y, range.colour(depth));
         }
     }
-    let step = tick_step(f64::from(far - near));
-    let decimals = usize::from(step < 1.0) + usize::from(step < 0.1);
     let mut tick = (f64::from(near) / step).ceil() * step;
     let mut last_label = u32::MAX;
     while tick <= f64::from(far) + 1e-6 * step {
@@ -88,7 +95,7 @@ fn draw(unit: &str, depth_mm: ArrayView2<f32>, confidence: ArrayView2<f32>) -> R
         let top = y.saturating_sub(writer.height() / 2);
         // In a low picture labels would overlap.
         if last_label - y >= writer.height() {
-            writer.write(&mut canvas, bar_left + BAR_PX + 12, top, &format!("{tick:.decimals$} {unit}"), INK);
+            writer.write(&mut canvas, bar_left + BAR_PX + 12, top, &label(tick), INK);
             last_label = y;
         }
         tick += step;
@@ -161,6 +168,14 @@ fn faded(colour: Rgb<u8>, confidence: f32) -> Rgb<u8> {
     Rgb(std::array::from_fn(|channel| mix(colour[channel], NO_VALUE[channel])))
 }
 
+/// Distance of the ticks, and decimals with which their labels differ.
+fn ticks(span: f64) -> (f64, usize) {
+    let step = tick_step(span);
+    // The addend covers rounding of powers of ten; a span of zero has no tick.
+    let decimals = if step > 0.0 { -(step.log10() + 1e-9).floor() } else { 0.0 };
+    (step, decimals.clamp(0.0, DECIMALS_MAX) as usize)
+}
+
 /// Tick distance: 1, 2 or 5 times a power of ten, for five to eleven ticks.
 fn tick_step(span: f64) -> f64 {
     let rough = span / 8.0;
@@ -214,6 +229,16 @@ mod tests {
         for span in [0.9, 4.6, 46.2, 250.0, 3000.0] {
             let step = tick_step(span);
             assert!((4.0..=11.0).contains(&(span / step)), "{span} {step}");
+        }
+    }
+
+    #[test]
+    fn labels_of_neighbouring_ticks_differ() {
+        assert_eq!(ticks(0.0).1, 0);
+        for (span, expected) in [(3000.0, 0), (8.0, 0), (0.8, 1), (0.09, 2), (0.008, 3), (2e-5, 6)] {
+            let (step, decimals) = ticks(span);
+            assert_eq!(decimals, expected, "{span}");
+            assert_ne!(format!("{:.decimals$}", 20.0), format!("{:.decimals$}", 20.0 + step), "{span}");
         }
     }
 }

@@ -1,6 +1,6 @@
 // Capturing: a pair, a series, a still, a stack; and depth at once where that is wished.
 import { act, hasControl, ended, on, store } from "./link.js";
-import { h, button, choice, field, panel } from "./ui.js";
+import { h, button, choice, field, numeric, panel } from "./ui.js";
 import { key } from "./keys.js";
 
 /** @type {HTMLElement | null} */
@@ -38,14 +38,14 @@ export function make() {
   const every = h("input", { type: "number", value: 0, min: 0, max: 86400, step: "any", "aria-label": "Seconds from pair to pair; 0 is at once" });
   const axis = choice([["fine", "Piezo"], ["coarse", "Coarse"], ["lens", "Lens"]], "fine", () => {}, { "aria-label": "Axis of the stack" });
   const [from, to, steps] = [["From", 20], ["To", 180], ["Images", 17]].map(([text, value]) => field(text, h("input", { type: "number", value, step: "any" }), text === "Images" ? "" : "µm"));
-  const value = (place) => Number(place.querySelector("input").value);
+  const value = (place) => numeric(place.querySelector("input"));
   warnings = h("ul", { class: "warnings", hidden: true, "aria-label": "Before you capture" });
-  const pair = button("Capture pair", () => take({ kind: "pair", averaged: Math.round(Number(averaged.value)), subtract_ambient: ambient.checked }, depth.checked), { class: "primary", title: "C", "data-capture": "" });
+  const pair = button("Capture pair", () => take(() => ({ kind: "pair", averaged: Math.round(numeric(averaged)), subtract_ambient: ambient.checked }), depth.checked), { class: "primary", title: "C", "data-capture": "" });
   const all = [
     pair,
-    button("Series", () => take({ kind: "series", pairs: Math.round(Number(amount.value)), interval_s: Number(every.value) }, false), { "data-capture": "" }),
+    button("Series", () => take(() => ({ kind: "series", pairs: Math.round(numeric(amount)), interval_s: numeric(every) }), false), { "data-capture": "" }),
     button("Still", () => take({ kind: "still" }, false), { "data-capture": "", title: "One image where the sensor stands" }),
-    button("Stack", () => take({ kind: "stack", axis: axis.value, from_um: value(from), to_um: value(to), steps: value(steps) }, false), { "data-capture": "" }),
+    button("Stack", () => take(() => ({ kind: "stack", axis: axis.value, from_um: value(from), to_um: value(to), steps: value(steps) }), false), { "data-capture": "" }),
   ];
   on("state", (state) => {
     const able = hasControl() && state.rig.phase === "ready" && state.job?.phase !== "running";

@@ -1,6 +1,6 @@
 // Depth of a capture: map, confidence, deviation, images, surface; probe, profile, region; two layers compared by a wipe.
 import { act, bytes, ended, get, on, onJob, store } from "./link.js";
-import { h, button, choice, field, number, panel, notice } from "./ui.js";
+import { h, button, choice, field, number, optional, panel, notice } from "./ui.js";
 import { Viewer } from "./viewer.js";
 import { bars } from "./plot.js";
 import { NAMES, bar, paint, range } from "./maps.js";
@@ -19,13 +19,17 @@ const GREY = ["far", "near", "sharp"];
 const OF_STACKS = ["sharp"];
 const OF_PAIRS = ["deviation", "near", "reason"];
 
+/** Picture to the right of the wipe, and the figures of a difference.
+ * @typedef {{ second?: ImageData, figures?: string }} Compared */
+
 /** Makes the view. `open(name)` shows a capture. */
 export function make(host, remember) {
   const viewer = new Viewer("Depth map");
   const surface = h("div", { class: "surface", hidden: true });
   const side = measure.make();
-  /** @type {{ name: string | null, layer: string, colours: string, other: string, maps: any, loading: number, capture: any, mesh?: Promise<ArrayBuffer | null> | null }} */
-  const show = { name: null, layer: "depth", colours: "viridis", other: "", maps: {}, loading: 0, capture: null };
+  /** `of` is the capture of the maps; while another one is loaded it differs from `name`.
+   * @type {{ name: string | null, of: string | null, layer: string, colours: string, other: string, maps: any, loading: number, painting: number, capture: any, mesh?: Promise<ArrayBuffer> | null }} */
+  const show = { name: null, of: null, layer: "depth", colours: "viridis", other: "", maps: {}, loading: 0, painting: 0, capture: null };
   const captures = h("select", { "aria-label": "Capture", onchange: (event) => open(event.target.value) });
   const layers = h("div", { class: "group", role: "group", "aria-label": "Layer" }, LAYERS.map(([name, text]) => button(text, () => pick(name), { "data-layer": name })));
   const tools = h("div", { class: "group", role: "group", "aria-label": "Tool" }, [["pan", "Probe"], ["line", "Profile"], ["region", "Region"]].map(([name, text]) => button(text, () => use(name), { "data-tool": name })));
@@ -59,16 +63,21 @@ export function make(host, remember) {
       panel("Compare", field("With", other), field("Wipe", wipe), against), settings, stacking,
       panel("Files", links(() => show.name)))));
 
-  viewer.onprobe = (at) => side.under(show.maps, at);
+  viewer.onprobe = (at) => side.under(show.maps, at, viewer.source);
   viewer.overlay = (context, point) => {
-    const map = show.maps.depth ?? show.maps.far;
+    const picture = viewer.source;
     const middle = show.maps.depth ? range(show.maps.depth, 0.5)[0] : show.capture?.optics?.focus?.far_mm;
-    const mm = pixelAt(middle, show.capture?.optics);
-    if (map && mm > 0) viewer.canvas.dataset.scale = scaleBar(context, point, map, mm);
+    // A map of averaged pixels has fewer of them than the image.
+    const mm = (pixelAt(middle, show.capture?.optics) * show.capture?.width) / picture.width;
+    if (mm > 0) viewer.canvas.dataset.scale = scaleBar(context, point, picture, mm);
     else delete viewer.canvas.dataset.scale;
   };
   const has_map = (capture) => capture?.has_depth || capture?.variants.includes(STACK);
-  viewer.onshape = (kind, from, to) => show.name && has_map(show.capture) && side.shape(show.name, kind, from, to);
+  viewer.onshape = (kind, from, to) => {
+    const { name, of, maps, capture } = show;
+    if (!name || of !== name || !maps.depth || !has_map(capture)) return;
+    side.shape(name, kind, measure.pixelOf(maps.depth, from, viewer.source), measure.pixelOf(maps.depth, to, viewer.source));
+  };
 
   const use = (tool) => {
     viewer.use(tool);
@@ -76,8 +85,9 @@ export function make(host, remember) {
   };
   use("pan");
 
+  /** Ends the surface that turns. @type {(() => void) | null} */
   let turning = null;
-  /** The mesh that turns: what is loaded after it must not begin it anew. */
+  /** The mesh that turns: what is loaded after it must not restart it. */
   let turned = null;
   /** Told once of the next picture that is painted. @type {(() => void) | undefined} */
   let aged;
@@ -86,7 +96,21 @@ export function make(host, remember) {
     refresh();
   };
 
+  /** Selects a capture. A comparison with another map of the capture before ends. @param {string} name */
+  const select = (name) => {
+    if (name !== show.name && /^(variant|minus):/.test(show.other)) other.value = show.other = "";
+    show.name = name;
+  };
+  /** Replaces the maps. Figures and surface of those before are removed. */
+  const replace = (maps) => {
+    [show.of, show.maps, show.mesh, viewer.shape] = [show.name, maps, null, null];
+    side.forget();
+    turning?.();
+    turning = null;
+  };
+
   async function list() {
+    const wanted = show.other;
     const found = (await get("/api/captures")).captures.filter((capture) => !capture.broken);
     captures.replaceChildren(...found.map((capture) => h("option", { value: capture.name, selected: capture.name === show.name }, capture.name + (capture.has_depth ? "" : capture.kind === "pair" ? " (no depth)" : ` (${capture.images.length} image${capture.images.length === 1 ? "" : "s"})`))));
     const present = show.other;
@@ -97,6 +121,11 @@ export function make(host, remember) {
       ...(own?.variants ?? []).map((name) => option(`variant:${name}`, `this, by ${name}`)),
       ...(own?.variants ?? []).map((name) => option(`minus:${name}`, `difference: ${name} minus this`)),
       ...found.filter((capture) => capture.has_depth && capture.name !== show.name).flatMap((capture) => [option(`depth:${capture.name}`, `depth of ${capture.name}`), option(`difference:${capture.name}`, `difference to ${capture.name}`)]));
+    // The compared map may have been deleted. A choice made while the list was loaded stays.
+    if (show.other === wanted && other.value !== wanted) {
+      other.value = show.other = "";
+      refresh();
+    }
     const pairs = found.filter((capture) => capture.kind === "pair");
     if (!show.name && found.length) open((pairs.at(-1) ?? found.at(-1)).name);
     return found;
@@ -105,7 +134,7 @@ export function make(host, remember) {
   async function open(name, again = false) {
     if (!name || (name === show.name && !again)) return;
     const loading = ++show.loading;
-    show.name = name;
+    select(name);
     remember(name);
     try {
       const { capture } = await get(`/api/captures/${encodeURIComponent(name)}`);
@@ -113,20 +142,26 @@ export function make(host, remember) {
       if (loading !== show.loading) return;
       show.capture = capture;
       pages(capture);
-      if (capture.kind !== "pair") return stack(name, capture, loading);
-      if (!names.includes(show.layer) && show.layer !== "surface") show.layer = capture.has_depth ? "depth" : "far";
+      if (capture.kind !== "pair") return await stack(name, capture, loading);
+      if (!names.includes(show.layer) && !(show.layer === "surface" && capture.has_depth)) show.layer = capture.has_depth ? "depth" : "far";
       // The visible layer is loaded first, the rest after it is drawn.
       const first = names.filter((layer) => layer === show.layer || layer === "confidence" || (show.layer === "surface" && layer === "depth"));
       for (const part of [first, names.filter((layer) => !first.includes(layer))]) {
         const loaded = await Promise.all(part.map((layer) => load(`/api/captures/${encodeURIComponent(name)}/files/${FILES[layer]}`)));
         if (loading !== show.loading) return;
-        if (part === first) [show.maps, show.mesh, viewer.shape] = [{}, null, null];
+        if (part === first) replace({});
         part.forEach((layer, at) => { show.maps[layer] = loaded[at]; });
         await refresh();
       }
       await list();
     } catch (error) {
+      if (loading !== show.loading) return;
       notice(error.message, "error", error.hint);
+      if (show.of === name) return;
+      // The picture of the capture before does not stay under this name.
+      show.capture = null;
+      replace({});
+      refresh();
     }
   }
 
@@ -135,7 +170,7 @@ export function make(host, remember) {
   const which = h("span", { class: "dim" });
   const slider = h("div", { class: "toolbar", hidden: true }, index, which);
   host.querySelector(".stage .toolbar").after(slider);
-  index.addEventListener("input", () => show.capture && stack(show.name, show.capture, show.loading));
+  index.addEventListener("input", () => show.capture && stack(show.name, show.capture, ++show.loading).catch((error) => notice(error.message, "error", error.hint)));
 
   function pages({ kind, images }) {
     settings.hidden = kind !== "pair";
@@ -153,7 +188,7 @@ export function make(host, remember) {
     /** @type {Record<string, import("./maps.js").NumberMap>} */
     const maps = { far: await image, ...Object.fromEntries(of.map((layer, at) => [layer, computed[at]])) };
     if (loading !== show.loading) return;
-    [show.maps, show.mesh, viewer.shape] = [maps, null, null];
+    replace(maps);
     if (!(show.layer in maps) && !(show.layer === "surface" && maps.depth)) show.layer = "far";
     which.textContent = `${Number(index.value) + 1} of ${capture.images.length}: ${capture.images[Number(index.value)]}`;
     await refresh();
@@ -163,10 +198,10 @@ export function make(host, remember) {
   /** Depth of a pair that was just taken; what is measured and kept is computed from its files, and follows. */
   function fresh(header, pixels) {
     show.loading++; // pending requests belong to another capture
-    show.name = header.capture;
+    select(header.capture);
     show.capture = null;
-    [show.layer, show.mesh, viewer.shape] = ["depth", null, null];
-    show.maps = decoded(header, pixels);
+    show.layer = "depth";
+    replace(decoded(header, pixels));
     // As in live.js: both have one clock where the program runs on this computer.
     aged = () => { viewer.canvas.dataset.ageMs = String(Math.round(performance.timeOrigin + performance.now() - header.arrived_ms)); };
     refresh();
@@ -174,6 +209,7 @@ export function make(host, remember) {
 
   async function refresh() {
     const { layer, maps } = show;
+    const painting = ++show.painting;
     empty.hidden = Boolean(maps.far || maps.depth);
     for (const control of layers.children) {
       control.setAttribute("aria-pressed", control.dataset.layer === layer);
@@ -193,14 +229,25 @@ export function make(host, remember) {
     turning?.();
     turning = null;
     const map = maps[layer];
-    if (!map) return;
+    if (!map) {
+      viewer.clear();
+      delete viewer.canvas.dataset.layer;
+      return;
+    }
     const ends = limits(layer, map);
     const picture = layer === "reason" ? paintReasons(map) : paint(map, ends, colours(layer), layer === "depth" ? maps.confidence?.data : null);
     reasons.replaceChildren(...(layer === "reason" ? reasonLegend(map) : []));
     for (const part of [low, legend, high]) part.hidden = layer === "reason";
     viewer.wipe = wipe.value / 100;
+    const { second = null, figures = "" } = await compared().catch(/** @returns {Compared} */ (error) => {
+      if (painting === show.painting) notice(error.message, "error", error.hint);
+      return {};
+    });
+    // A later choice is painted instead.
+    if (painting !== show.painting) return;
+    against.replaceChildren(...(figures ? [h("p", { class: "dim" }, figures)] : []));
     viewer.onpainted = () => { performance.mark("depth-shown"); aged?.(); [viewer.onpainted, aged] = [undefined, undefined]; };
-    viewer.show(picture, await beside());
+    viewer.show(picture, second);
     viewer.canvas.dataset.layer = layer;
     bar(legend, colours(layer), ends, UNITS[layer]);
     const decimals = layer === "confidence" ? 1 : 2;
@@ -209,63 +256,61 @@ export function make(host, remember) {
     bars(histogram, counts(map, ends));
   }
 
-  /** Another map minus this one, with its figures. */
+  /** Another map minus this one, with its figures. @param {import("./maps.js").NumberMap} map @returns {Compared} */
   function minus(map) {
     const own = show.maps.depth;
+    if (map.width !== own.width || map.height !== own.height) throw new Error(`The maps have different sizes, ${map.width} × ${map.height} and ${own.width} × ${own.height} pixels: they have no difference.`);
     const data = map.data.map((value, at) => value - own.data[at]);
     const found = data.filter(Number.isFinite);
     const mean = found.reduce((sum, value) => sum + value, 0) / found.length;
     const sd = Math.sqrt(found.reduce((sum, value) => sum + (value - mean) ** 2, 0) / found.length);
     const difference = { ...map, data };
     const most = Math.max(...range(difference, 0.02).map(Math.abs));
-    against.replaceChildren(h("p", { class: "dim" }, `${found.length} pixels: mean ${number(mean, 3)}, SD ${number(sd, 3)}, RMS ${number(Math.hypot(mean, sd), 3)} mm; blue to red = ∓${number(most, 1)} mm`));
-    return paint(difference, [-most, most], "difference");
+    return { second: paint(difference, [-most, most], "difference"), figures: `${found.length} pixels: mean ${number(mean, 3)}, SD ${number(sd, 3)}, RMS ${number(Math.hypot(mean, sd), 3)} mm; blue to red = ∓${number(most, 1)} mm` };
   }
 
   const colours = (layer) => (GREY.includes(layer) ? "grey" : show.colours);
   const limits = (layer, map) => (layer === "confidence" ? [0, 1] : layer === "reason" ? [0, REASONS.length - 1] : layer === "depth" && manual() ? /** @type {[number, number]} */ (manual()) : GREY.includes(layer) ? [0, 255] : layer === "deviation" ? [0, range(map, 0.03)[1]] : range(map));
 
-  /** What is right of the wipe. */
-  async function beside() {
-    against.replaceChildren();
+  /** Picture to the right of the wipe. @returns {Promise<Compared>} */
+  async function compared() {
     const [kind, name] = show.other.split(":");
-    if (!name) return null;
+    if (!name) return {};
     if (kind === "layer") {
       const map = show.maps[name];
-      return !map ? null : name === "reason" ? paintReasons(map) : paint(map, limits(name, map), colours(name));
+      return !map ? {} : { second: name === "reason" ? paintReasons(map) : paint(map, limits(name, map), colours(name)) };
     }
+    const own = `/api/captures/${encodeURIComponent(show.name ?? "")}`;
+    const variant = `${own}/variants/${encodeURIComponent(name)}/depth.npy`;
     // Depth on the right uses the scale of this capture's depth, also next to another layer.
-    const depths = (map) => paint(map, show.maps.depth ? limits("depth", show.maps.depth) : range(map), show.colours);
-    if (kind === "minus" && show.maps.depth) return minus(await load(`/api/captures/${encodeURIComponent(show.name ?? "")}/variants/${encodeURIComponent(name)}/depth.npy`));
-    if (kind === "variant") return depths(await load(`/api/captures/${encodeURIComponent(show.name ?? "")}/variants/${encodeURIComponent(name)}/depth.npy`));
+    const depths = (map) => ({ second: paint(map, show.maps.depth ? limits("depth", show.maps.depth) : range(map), show.colours) });
+    if (kind === "minus" && show.maps.depth) return minus(await load(variant));
+    if (kind === "variant") return depths(await load(variant));
     if (kind === "depth") return depths(await load(`/api/captures/${encodeURIComponent(name)}/files/depth.npy`));
-    try {
-      const path = `/api/captures/${encodeURIComponent(show.name ?? "")}/difference/${encodeURIComponent(name)}`;
-      const { figures } = await get(path);
-      const map = await load(`${path}/map.npy`);
-      const most = Math.max(...range(map, 0.02).map(Math.abs));
-      against.replaceChildren(h("p", { class: "dim" }, `mean ${number(figures.mean_mm, 3)}, SD ${number(figures.standard_deviation_mm, 3)}, RMS ${number(figures.rms_mm, 3)} mm; blue to red = ∓${number(most, 1)} mm`));
-      return paint(map, [-most, most], "difference");
-    } catch (error) {
-      notice(error.message, "error", error.hint);
-      return null;
-    }
+    if (kind !== "difference") return {};
+    const path = `${own}/difference/${encodeURIComponent(name)}`;
+    const { figures } = await get(path);
+    const map = await load(`${path}/map.npy`);
+    const most = Math.max(...range(map, 0.02).map(Math.abs));
+    return { second: paint(map, [-most, most], "difference"), figures: `mean ${number(figures.mean_mm, 3)}, SD ${number(figures.standard_deviation_mm, 3)}, RMS ${number(figures.rms_mm, 3)} mm; blue to red = ∓${number(most, 1)} mm` };
   }
 
   async function turn() {
     // Calls share one pending request.
     const mesh = (show.mesh ??= bytes(`/api/captures/${encodeURIComponent(show.name ?? "")}/mesh.ply`));
-    const { show: begin, sorry } = await import("./mesh.js");
     try {
-      const buffer = await mesh;
-      if (!buffer && show.mesh === mesh) show.mesh = null; // not there yet: asked again by the next look
-      if (show.layer !== "surface" || show.mesh !== mesh || !buffer || (turning && turned === mesh)) return;
-      turning?.();
+      const [buffer, { show: begin, sorry }] = await Promise.all([mesh, import("./mesh.js")]);
+      if (show.layer !== "surface" || show.mesh !== mesh || (turning && turned === mesh)) return;
       turned = mesh;
-      turning = begin(surface, buffer);
+      try {
+        turning = begin(surface, buffer);
+      } catch (error) {
+        sorry(surface, error);
+      }
     } catch (error) {
-      if (show.mesh === mesh) show.mesh = null;
-      sorry(surface, error);
+      if (show.mesh !== mesh) return;
+      show.mesh = null; // requested again by the next look
+      surface.replaceChildren(h("p", { class: "empty" }, `No surface: ${error.message}${error.hint ? ` ${error.hint}` : ""}`));
     }
   }
 
@@ -325,7 +370,6 @@ function reasonLegend({ data }) {
 /** A map or an image as numbers. */
 async function load(path) {
   const buffer = await bytes(path);
-  if (!buffer) throw new Error(`${path.split("/").at(-1)} is not there any more`);
   if (path.endsWith(".npy")) return parse(buffer);
   const picture = await createImageBitmap(new Blob([buffer]));
   const canvas = h("canvas", { width: picture.width, height: picture.height });
@@ -355,11 +399,10 @@ function compute(name, done) {
   const start = async () => {
     if (!name()) return;
     /** @type {Record<string, any>} */
-    const wish = { ...more.values(), method: method.value, median_px: Number(median.value), fill: filled.checked ? "surface" : null, corrected: corrected.checked };
-    if (smooth.value) wish.window = smooth.value;
+    const wish = { method: method.value, median_px: Number(median.value), fill: filled.checked ? "surface" : null, corrected: corrected.checked };
     if (["ro", "whitened"].includes(method.value)) wish.uncertainty = "estimated";
     if (keep.checked) wish.variant = `${method.value}-${smooth.value || "default"}-${median.value}${filled.checked ? "-filled" : ""}${corrected.checked ? "-corrected" : ""}`;
-    const begun = await act(`/api/captures/${encodeURIComponent(name())}/depth`, wish);
+    const begun = await act(`/api/captures/${encodeURIComponent(name())}/depth`, () => ({ ...more.values(), ...(optional(smooth) === null ? {} : { window: smooth.value }), ...wish }));
     if (begun && (await ended("computation", begun.job)).phase === "done") done(wish.variant);
   };
   return panel("Compute", field("Method", method), field("Window", smooth, "px"), field("Median", median),
@@ -375,7 +418,7 @@ const SHOWN = ["method", "window", "median_px", "fill", "corrected", "variant", 
 function computeStack(name, done) {
   const more = furtherOptions("CaptureStackRequest");
   const start = async () => {
-    const begun = name() && (await act(`/api/captures/${encodeURIComponent(name())}/stack`, more.values()));
+    const begun = name() && (await act(`/api/captures/${encodeURIComponent(name())}/stack`, more.values));
     if (begun && (await ended("computation", begun.job)).phase === "done") done();
   };
   const element = panel("Depth from focus", more.element, button("Compute stack", start));
@@ -404,14 +447,14 @@ function furtherOptions(request) {
       notice(error.message, "error", error.hint);
     }
   });
-  const values = () => Object.fromEntries(inputs.filter(([, kind, input]) => (kind === "boolean" ? input.checked : input.value !== ""))
-    .map(([name, kind, input]) => [name, kind === "boolean" ? true : kind === "string" ? input.value : Number(input.value)]));
+  const values = () => Object.fromEntries(inputs.map(([name, kind, input]) => [name, kind === "boolean" ? input.checked || null : kind === "string" ? input.value || null : optional(input)])
+    .filter(([, value]) => value !== null));
   return { element, values };
 }
 
-/** Lateral size of a pixel at a distance of a thin lens, mm. */
+/** Lateral size of a pixel of the image at a distance of a thin lens, mm. A lens calibrated from a stack may give that of averaged pixels. */
 function pixelAt(mm, optics) {
-  const [pixel, focal] = [optics?.sensor?.pixel_um, optics?.lens?.focal_length_mm];
+  const [pixel, focal] = [optics?.sensor?.pixel_um / (optics?.stage?.bin ?? 1), optics?.lens?.focal_length_mm];
   return pixel > 0 && mm > focal ? ((pixel / 1000) * (mm - focal)) / focal : NaN;
 }
 

@@ -1,6 +1,6 @@
 // Guides with pictures: first power-up, point spread function, flat series, and people before the camera.
 import { act, call, hasControl, ended, get, on, onJob, store } from "./link.js";
-import { h, button, choice, field, notice, number, panel, rows } from "./ui.js";
+import { h, button, choice, field, notice, number, numeric, optional, panel, rows } from "./ui.js";
 import * as draw from "./guide-pictures.js";
 import * as people from "./people.js";
 import { Plot } from "./plot.js";
@@ -99,17 +99,22 @@ function psf() {
   const result = h("div", { "aria-live": "polite" });
   const model = choice([["gaussian", "Gaussian: k"], ["generalised", "Generalised Gaussian: p and k"]], "gaussian", () => {});
   let useSeries = null;
+  /** What was entered for a pair, by its name: the list is built again after each capture. @type {Map<string, { checked: boolean, mm: string }>} */
+  const entered = new Map();
+  const remember = () => {
+    for (const row of pairs.querySelectorAll("[data-name]")) entered.set(row.dataset.name, { checked: row.querySelector("[type=checkbox]").checked, mm: row.querySelector("[type=number]").value });
+  };
   const capture = async () => {
     const begun = await act("/api/captures", { kind: "pair" });
     if (begun && (await ended("job", begun.job)).phase === "done") await shown();
   };
-  const find = () => {
+  const find = () => act("/api/calibrate/psf", () => {
     const targets = [...pairs.querySelectorAll("li")].filter((row) => row.querySelector("[type=checkbox]")?.checked).map((row) => {
-      const mm = row.querySelector("[type=number]").value;
-      return mm === "" ? { capture: row.dataset.name } : { capture: row.dataset.name, depth_mm: Number(mm) };
+      const mm = optional(row.querySelector("[type=number]"));
+      return mm === null ? { capture: row.dataset.name } : { capture: row.dataset.name, depth_mm: mm };
     });
-    act("/api/calibrate/psf", { targets, series: Boolean(useSeries?.checked), model: model.value });
-  };
+    return { targets, series: Boolean(useSeries?.checked), model: model.value };
+  });
   const show = (found) => {
     const apply = async () => {
       const { optics } = await get("/api/optics");
@@ -124,11 +129,13 @@ function psf() {
   async function shown() {
     try {
       const [{ captures }, found] = await Promise.all([get("/api/captures"), get("/api/calibrate")]);
+      remember();
+      const withSeries = Boolean(useSeries?.checked);
       pairs.replaceChildren(...captures.filter(({ kind, broken }) => kind === "pair" && !broken).map(({ name }) => h("li", { "data-name": name },
-        h("label", { class: "check" }, h("input", { type: "checkbox" }), name),
-        h("input", { type: "number", step: "any", placeholder: "at its focus", "aria-label": `Distance of the target of ${name}, mm` }), h("span", { class: "unit" }, "mm"))));
+        h("label", { class: "check" }, h("input", { type: "checkbox", checked: entered.get(name)?.checked }), name),
+        h("input", { type: "number", step: "any", value: entered.get(name)?.mm, placeholder: "at its focus", "aria-label": `Distance of the target of ${name}, mm` }), h("span", { class: "unit" }, "mm"))));
       if (!pairs.children.length) pairs.append(h("li", { class: "dim" }, "No pair yet."));
-      useSeries = h("input", { type: "checkbox", disabled: !found.series_mm.length });
+      useSeries = h("input", { type: "checkbox", disabled: !found.series_mm.length, checked: withSeries && found.series_mm.length > 0 });
       taught.replaceChildren(h("label", { class: "check" }, useSeries, `the flat series: ${found.series_mm.length} targets at known distances`));
     } catch (error) {
       notice(error.message, "error", error.hint);
@@ -165,7 +172,7 @@ function lens() {
     plots[2].plot.set([found.by_depth.map(({ depth }) => depth), found.by_depth.map(({ rms_mm }) => rms_mm), found.by_depth.map(({ predicted_mm }) => predicted_mm)]);
   };
   onJob("lens-stack", ({ phase, result: found }) => { if (phase === "done") show(found); });
-  const start = () => act("/api/calibrate/stack", { slices: Math.round(Number(slices.value)) });
+  const start = () => act("/api/calibrate/stack", () => ({ slices: Math.round(numeric(slices)) }));
   const element = h("div", { class: "guide-body" },
     step(1, "Place the target", draw.target(), h("p", {}, "A flat, finely textured target that fills the image, in the middle of the working range. A slight tilt helps. The emulated rig places its own.")),
     step(2, "Take the stack", draw.slices(), h("p", {}, "Finds the focus and takes slices on both sides of it, a fifth of a pair's sensor travel apart. The slices stay in the session."), field("Slices", slices),
@@ -181,22 +188,22 @@ function series() {
   const [taken, learned] = [h("div", { "aria-live": "polite" }), h("div", { "aria-live": "polite" })];
   const method = h("select", {});
   const distances = async () => {
-    if (own.value.trim()) return own.value.split(/[\s,;]+/).filter(Boolean).map(Number);
     const { optics } = await get("/api/optics");
+    const text = own.value.trim();
+    if (text) {
+      // With semicolons between the distances, a comma is the decimal mark.
+      const parts = (text.includes(";") ? text.replaceAll(",", ".").split(";") : text.split(/[\s,]+/)).map((part) => part.trim()).filter(Boolean);
+      const focal = optics.lens.focal_length_mm;
+      const wrong = parts.find((part) => !(Number.isFinite(Number(part)) && Number(part) > focal));
+      if (wrong !== undefined) throw Object.assign(new Error(`Distance ${wrong}: expected a number of mm above the focal length, ${focal} mm.`), { hint: "Separate distances by commas; with decimal commas, by semicolons." });
+      return parts.map(Number);
+    }
     const { range } = (await call("POST", "/api/optics/calculate", { optics })).figures;
-    const steps = Math.max(2, Math.round(Number(count.value)));
+    const steps = Math.max(2, Math.round(numeric(count)));
     // To a tenth of a millimetre, which can be set on a rail.
     return Array.from({ length: steps }, (_, at) => Number((range.near_mm + ((range.far_mm - range.near_mm) * at) / (steps - 1)).toFixed(1)));
   };
-  const start = async () => {
-    try {
-      const given = await distances();
-      if (given.some((mm) => !Number.isFinite(mm))) return notice("Distances are numbers in mm, with commas between them.", "error");
-      await act("/api/calibrate/series", { distances: given });
-    } catch (error) {
-      notice(error.message, "error", error.hint);
-    }
-  };
+  const start = () => act("/api/calibrate/series", async () => ({ distances: await distances() }));
   const learn = () => act("/api/calibrate/correction", { method: method.value });
   onJob("flat-series", ({ phase, result }) => {
     if (phase === "done") taken.replaceChildren(rows([["targets", result.targets], ["error before correction, RMS", number(result.rmse_mm, 2, "mm")]]));

@@ -1,6 +1,6 @@
 // The keyboard. Esc stops the rig from anywhere, also while something is typed.
 import { stop } from "./link.js";
-import { h, button } from "./ui.js";
+import { h, button, popUp } from "./ui.js";
 
 const keys = new Map();
 
@@ -29,11 +29,8 @@ export function listen() {
 
 /** Shows the keys. */
 export function help() {
-  const dialog = h("dialog", { class: "dialog", "aria-label": "Keys", onclose: () => dialog.remove() },
-    h("h2", {}, "Keys"),
+  const close = popUp("Keys", [h("h2", {}, "Keys"),
     h("dl", { class: "rows" }, h("dt", {}, h("kbd", {}, "Esc")), h("dd", {}, "Stop all motion"),
       [...keys].map(([name, { about }]) => [h("dt", {}, h("kbd", {}, name)), h("dd", {}, about)]).flat()),
-    h("div", { class: "actions" }, button("Close", () => dialog.close(), { class: "primary" })));
-  document.body.append(dialog);
-  dialog.showModal();
+    h("div", { class: "actions" }, button("Close", () => close(), { class: "primary" }))], () => close());
 }

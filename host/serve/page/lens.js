@@ -1,6 +1,6 @@
 // The optics as they are typed, drawn to scale, and what follows from them.
 import { act, call, hasControl, get, on } from "./link.js";
-import { h, s, button, choice, field, number, panel, rows } from "./ui.js";
+import { h, s, button, choice, field, number, optional, panel, rows } from "./ui.js";
 import { Plot } from "./plot.js";
 
 const MODELS = [["pillbox", "Pill-box"], ["gaussian", "Gaussian"], ["generalised", "Generalised Gaussian"]];
@@ -12,6 +12,7 @@ export function make(host) {
     m1: input("", "–"), m2: input("", "–"), k: input(0.4578), p: input(1.8),
   };
   const model = choice(MODELS, "gaussian", () => later());
+  model.append(h("option", { value: "", disabled: true }, "as in the file"));
   const wrong = h("p", { class: "bad", role: "alert" });
   const drawing = h("div", { class: "drawing" });
   const results = h("div", { class: "columns" });
@@ -34,26 +35,43 @@ export function make(host) {
   let waiting = 0;
   const later = () => { clearTimeout(waiting); waiting = setTimeout(calculate, 120); };
   for (const control of Object.values(inputs)) control.addEventListener("input", later);
-  const value = (control) => (control.value === "" ? null : Number(control.value));
+  const fields = [...Object.values(inputs), model];
+  /** The optics in use. @type {any} */
+  let read = null;
+  /** Whether one of these fields differs from the optics in use. */
+  const changed = (...controls) => controls.some((control) => control.value !== control.dataset.was || control.validity.badInput);
 
+  /** The optics in use with the changed fields: what has no field here stays. A changed lens has no calibration. */
   function typed() {
-    const psf = { model: model.value };
-    if (psf.model !== "pillbox") psf.k = value(inputs.k);
-    if (psf.model === "generalised") psf.p = value(inputs.p);
-    return {
-      lens: { focal_length_mm: value(inputs.focal), aperture_mm: value(inputs.aperture) },
-      sensor: { pixel_um: value(inputs.pixel) },
-      focus: { far_mm: value(inputs.far), max_blur_px: value(inputs.blur) },
-      psf,
-    };
+    const optics = structuredClone(read);
+    const { lens, sensor, focus } = optics;
+    if (changed(inputs.focal, inputs.aperture)) {
+      [lens.focal_length_mm, lens.aperture_mm] = [optional(inputs.focal), optional(inputs.aperture)];
+      delete lens.f_number;
+    }
+    if (changed(inputs.pixel)) sensor.pixel_um = optional(inputs.pixel);
+    if (changed(inputs.far)) focus.far_mm = optional(inputs.far);
+    if (changed(inputs.blur)) {
+      focus.max_blur_px = optional(inputs.blur);
+      delete focus.near_mm;
+    }
+    if (model.value && changed(model, inputs.k, inputs.p)) {
+      optics.psf = { model: model.value };
+      if (model.value !== "pillbox") optics.psf.k = optional(inputs.k);
+      if (model.value === "generalised") optics.psf.p = optional(inputs.p);
+    }
+    const measured = inputs.m1.value !== "" && inputs.m2.value !== "";
+    if (measured || changed(inputs.focal, inputs.aperture, inputs.pixel, inputs.far, inputs.blur, model, inputs.k, inputs.p)) delete optics.stage;
+    return optics;
   }
 
   let complete = null;
   async function calculate() {
     p.hidden = model.value !== "generalised";
-    inputs.k.parentElement.hidden = model.value === "pillbox";
+    inputs.k.parentElement.hidden = model.value === "pillbox" || model.value === "";
+    if (!read) return;
     try {
-      const readings = { far_mm: value(inputs.m1), near_mm: value(inputs.m2) };
+      const readings = { far_mm: optional(inputs.m1), near_mm: optional(inputs.m2) };
       const { figures } = await call("POST", "/api/optics/calculate", { optics: typed(), readings });
       wrong.textContent = "";
       complete = figures.optics;
@@ -93,17 +111,21 @@ export function make(host) {
     inputs.pixel.value = optics.sensor.pixel_um;
     inputs.far.value = optics.focus.far_mm;
     inputs.blur.value = Number((optics.focus.max_blur_px ?? 0).toFixed(4)) || "";
-    model.value = optics.psf.model;
+    model.value = MODELS.some(([name]) => name === optics.psf.model) ? optics.psf.model : "";
     if (optics.psf.k != null) inputs.k.value = optics.psf.k;
     if (optics.psf.p != null) inputs.p.value = optics.psf.p;
-    using.textContent = optics.stage ? "In use: a lens calibrated from a stack. “Use these optics” replaces the calibration by the typed values." : "";
+    using.textContent = optics.stage ? "In use: a lens calibrated from a stack. A changed field removes its calibration." : "";
+    read = optics;
+    for (const control of fields) control.dataset.was = control.value;
     await calculate();
   }
   let loaded = -1;
   on("state", (state) => {
     use.disabled = !complete || !hasControl();
-    if (state.optics !== loaded && !host.contains(document.activeElement)) load();
+    // Optics that change while a field is in use are loaded after that.
+    if (state.optics === loaded || host.contains(document.activeElement)) return;
     loaded = state.optics;
+    load();
   });
   return { shown: () => plot.size() };
 }

@@ -12,6 +12,8 @@ const listeners = new Map();
 /** @type {WebSocket | null} */
 let socket = null;
 let wait = 250;
+/** Version of the server that this page is of. */
+let version = "";
 /** Where the secret of this page survives a reload. */
 const SECRET = "farnear-client";
 
@@ -49,6 +51,9 @@ export function open() {
 
 function told(message) {
   if (message.type === "hello") {
+    // A server of another version has another page.
+    if (version && version !== message.hello.version) return location.reload();
+    version = message.hello.version;
     store.client = message.hello;
     sessionStorage.setItem(SECRET, message.hello.secret);
     store.connected = true;
@@ -79,34 +84,41 @@ export async function call(method, path, body) {
   } catch {
     throw new Error("farnear does not answer; does it still run?");
   }
+  if (!answer.ok) throw await failure(answer);
+  return answer.json().catch(() => ({}));
+}
+
+/** The error of an answer, with `hint` and `status`. @param {Response} answer */
+export async function failure(answer) {
   const given = await answer.json().catch(() => ({}));
-  if (!answer.ok) throw Object.assign(new Error(given.error ?? `failed (${answer.status})`), { hint: given.hint, status: answer.status });
-  return given;
+  return Object.assign(new Error(given.error ?? `failed (${answer.status})`), { hint: given.hint, status: answer.status });
 }
 
 export const get = (path) => call("GET", path);
 export const put = (path, body) => call("PUT", path, body);
 
-/** Does something and tells what went wrong; gives the answer, or null. */
+/** Does something and reports what went wrong; gives the answer, or null. `body` may be a function that returns the body: its errors are reported too.
+ * @param {string} path @param {any} body */
 export async function act(path, body = {}, method = "POST") {
   try {
-    return await call(method, path, body);
+    return await call(method, path, typeof body === "function" ? await body() : body);
   } catch (error) {
     notice(error.message, "error", error.hint);
     return null;
   }
 }
 
-/** Stops the rig by the shortest way. */
+/** Stops the rig. The socket is the shortest way, but a dead connection loses the message. A request that fails is reported. */
 export function stop() {
   if (socket?.readyState === WebSocket.OPEN) socket.send('{"type":"stop"}');
-  else act("/api/stop");
+  act("/api/stop");
 }
 
-/** Bytes of a file; null where there is none. */
+/** Bytes of a file. @param {string} path */
 export async function bytes(path) {
   const answer = await fetch(path);
-  return answer.ok ? answer.arrayBuffer() : null;
+  if (!answer.ok) throw await failure(answer);
+  return answer.arrayBuffer();
 }
 
 /** Tells each job of a kind, whichever page began it, once when it runs and once when it has ended; `old`: it had ended before this page

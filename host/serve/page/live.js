@@ -1,6 +1,6 @@
 // The live image with what one focuses by: histogram, saturation, peaking, focus value; and live depth.
 import { act, hasControl, ended, get, on, onJob, store } from "./link.js";
-import { h, button, choice, field, keep, notice, number, panel, rows } from "./ui.js";
+import { h, button, choice, field, keep, notice, number, numeric, panel, rows } from "./ui.js";
 import { Viewer } from "./viewer.js";
 import { Plot, bars } from "./plot.js";
 import { bar, paintCodes } from "./maps.js";
@@ -95,7 +95,11 @@ export function make(host) {
   const recordings = h("select", { "aria-label": "Recording" });
   const fast = h("input", { type: "checkbox" });
   const played = h("p", { class: "dim", "aria-live": "polite" });
-  const play = button("Play", () => act("/api/recordings/play", { recording: recordings.value, fast: fast.checked }));
+  const play = button("Play", async () => {
+    // Live pictures would be mixed with those of the recording.
+    if (store.state?.live.mode !== "off" && !(await act("/api/live", { mode: "off" }))) return;
+    act("/api/recordings/play", { recording: recordings.value, fast: fast.checked });
+  });
   onJob("play", ({ phase, result }) => {
     if (phase === "done") played.textContent = `${result.pairs} pairs, ${number(result.maps_per_second, 1)} maps/s, ${number(result.latency_ms, 1)} ms a map (median)`;
   });
@@ -114,7 +118,7 @@ export function make(host) {
     play.disabled = !found.length;
   };
   const exposure = h("input", { type: "number", min: 1, max: 1000000, step: 100, inputmode: "numeric" });
-  exposure.addEventListener("change", () => act("/api/live", { exposure_us: Math.round(Number(exposure.value)) }));
+  exposure.addEventListener("change", () => act("/api/live", () => ({ exposure_us: Math.round(numeric(exposure)) })));
   /** Exposure times that may still be tried. */
   let tries = 0;
   const auto = button("Auto", () => { tries = TRIES; }, { title: "Finds the time at which the brightest pixels have 80 % of white" });
@@ -131,7 +135,7 @@ export function make(host) {
     } else act("/api/live", { exposure_us: next });
   };
   const light = [0, 1].map(() => h("input", { type: "number", min: 0, max: 100, title: "Light output of the board during captures and live depth" }));
-  for (const level of light) level.addEventListener("change", () => act("/api/live", { light_percent: light.map((input) => Number(input.value)) }));
+  for (const level of light) level.addEventListener("change", () => act("/api/live", () => ({ light_percent: light.map(numeric) })));
   const forgetValues = () => { values.length = 0; best = 0; };
   const measure = choice(MEASURES, MEASURES[0][0], (name) => { forgetValues(); act("/api/live", { measure: name }); });
   const forget = button("Reset", forgetValues, { title: "Forgets the largest value" });

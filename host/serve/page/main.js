@@ -89,16 +89,32 @@ function showControl(state) {
   });
 }
 
-let asked = null;
-async function handOver(state) {
-  const asking = state.control.requested_by;
-  if (!hasControl() || asking == null || asking === asked) {
-    if (asking == null) asked = null;
-    return;
-  }
-  asked = asking;
-  const given = await ask("Another browser asks for control.", { yes: "Hand over", no: "Keep" });
-  act("/api/control/answer", { to: asking, give: given !== null });
+/** A question that is open while its key stays the same; null closes it. An answer to a closed question is dropped. */
+function asking() {
+  let present = null;
+  let closing = new AbortController();
+  return async (key, question, options, answered) => {
+    if (key === present) return;
+    present = key;
+    closing.abort();
+    if (key === null) return;
+    closing = new AbortController();
+    const { signal } = closing;
+    const answer = await ask(question, { ...options, signal });
+    if (!signal.aborted) answered(answer);
+  };
+}
+const [askForControl, askForJob] = [asking(), asking()];
+
+/** Questions to the browser that has control. */
+function showQuestions({ control: { requested_by: to }, question }) {
+  const mine = hasControl();
+  askForControl(mine ? to : null, "Another browser asks for control.", { yes: "Hand over", no: "Keep" },
+    (answer) => act("/api/control/answer", { to, give: answer !== null }));
+  askForJob(mine ? question : null, question, { text: true, yes: "Answer", no: "Give up" }, (answer) => {
+    if (answer !== null) act("/api/answer", { text: answer });
+    else if (store.state?.question === question) stop();
+  });
 }
 
 function showAlarm({ rig: { info } }) {
@@ -157,16 +173,6 @@ function ended(job, before, fresh) {
   else if (job.warnings.length) showWarnings(job);
 }
 
-let question = null;
-async function showQuestion(state) {
-  if (state.question === question) return;
-  question = state.question;
-  if (!question || !hasControl()) return;
-  const answer = await ask(question, { text: true, yes: "Answer", no: "Give up" });
-  if (answer === null) stop();
-  else act("/api/answer", { text: answer });
-}
-
 /** A fault of the page itself is reported: silence would look like a dead button. */
 function reportFaults() {
   // Delayed size notifications are not errors.
@@ -188,6 +194,8 @@ function begin() {
   addView("log", "Log", log.make);
   $("tabs").addEventListener("keydown", tabKeys);
   $("stop").addEventListener("click", stop);
+  // The link's address would leave the view.
+  document.querySelector(".skip")?.addEventListener("click", (event) => { event.preventDefault(); $("view").focus(); });
   $("theme").addEventListener("click", turnTheme);
   key("t", "Light or dark", turnTheme);
   const { parts } = views.get("depth");
@@ -195,14 +203,13 @@ function begin() {
     (name) => { go("depth", name); parts.open(name, true); },
     (header, pixels) => { parts.fresh(header, pixels); go("depth", header.capture); },
   );
-  on("link", () => { showLink(); if (store.state) showControl(store.state); });
+  on("link", () => { showLink(); if (store.state) { showControl(store.state); showQuestions(store.state); } });
   on("state", (state, before) => {
     showLink();
     showControl(state);
     showAlarm(state);
     showJob(state, before);
-    handOver(state);
-    showQuestion(state);
+    showQuestions(state);
   });
   listen();
   open();

@@ -21,18 +21,34 @@ export function make() {
   profile.hidden = true;
   area.hidden = true;
 
-  /** Under the pointer. `maps` by name; `at` is [column, row] or null. */
-  const under = (maps, at) => {
-    const value = (name) => (at && maps[name] ? maps[name].data[at[1] * maps[name].width + at[0]] : null);
+  /** Grows with every change of the maps: answers about those before are dropped. */
+  let changes = 0;
+  /** Removes the figures: other maps are shown. */
+  const forget = () => {
+    changes++;
+    [earlier, last, points] = [null, null, []];
+    profile.hidden = area.hidden = true;
+  };
+
+  /** Under the pointer. `maps` by name; `at` is [column, row] of the picture, or null.
+   * @param {any} maps @param {number[] | null} at @param {{ width: number, height: number }} [picture] */
+  const under = (maps, at, picture) => {
+    const value = (name) => {
+      const map = maps[name];
+      if (!at || !picture || !map) return null;
+      const [column, row] = pixelOf(map, at, picture);
+      return map.data[row * map.width + column];
+    };
     probe.replaceChildren(h("output", { class: "big" }, number(value("depth"), 2, "mm")),
       rows([["pixel", at ? `${at[0]}, ${at[1]}` : "–"], ["± deviation", number(value("deviation"), 2, "mm")], ["confidence", number(value("confidence"), 2)], maps.reason && ["no depth because", value("reason") ? REASONS[value("reason")] : "–"]]));
   };
 
   /** Of a shape that was drawn. */
   const shape = async (capture, kind, from, to) => {
+    const asked = changes;
     if (kind === "line") {
       const found = await act(`/api/captures/${encodeURIComponent(capture)}/profile`, { from, to });
-      if (!found) return;
+      if (!found || asked !== changes) return;
       points = found.figures.points;
       profile.hidden = false;
       const band = (sign) => points.map((p) => (p.depth_mm == null || p.deviation_mm == null ? null : p.depth_mm + sign * p.deviation_mm));
@@ -42,13 +58,19 @@ export function make() {
     }
     const [x, y] = [Math.min(from[0], to[0]), Math.min(from[1], to[1])];
     const found = await act(`/api/captures/${encodeURIComponent(capture)}/region`, { x, y, width: Math.abs(to[0] - from[0]) + 1, height: Math.abs(to[1] - from[1]) + 1 });
-    if (!found) return;
+    if (!found || asked !== changes) return;
     area.hidden = false;
     [earlier, last] = [last?.capture === capture ? last : null, { capture, ...found.figures }];
     region.replaceChildren(figuresOf(found.figures), earlier ? stepOf(earlier, last) : h("p", { class: "dim" }, "Draw a second region for the step between the two."));
   };
   under({}, null);
-  return { elements: [panel("Under the pointer", probe), profile, area], under, shape, plot };
+  return { elements: [panel("Under the pointer", probe), profile, area], under, shape, forget, plot };
+}
+
+/** Pixel of a map under a pixel of the picture. A map of averaged pixels is smaller than the image.
+ * @param {{ width: number, height: number }} map @param {number[]} at @param {{ width: number, height: number }} picture */
+export function pixelOf(map, [column, row], picture) {
+  return [Math.floor(((column + 0.5) * map.width) / picture.width), Math.floor(((row + 0.5) * map.height) / picture.height)];
 }
 
 /** Step from one region to the next: difference of their means, with its standard error. */

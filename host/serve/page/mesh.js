@@ -46,7 +46,7 @@ export function show(host, buffer, shade = "depth") {
   const pixel = new Uint8Array(4);
   const gl = renderer.getContext();
   renderer.setAnimationLoop(() => {
-    if (performance.now() < next) return;
+    if (!host.clientWidth || performance.now() < next) return;
     const begin = performance.now();
     controls.update();
     renderer.render(scene, camera);
@@ -60,6 +60,7 @@ export function show(host, buffer, shade = "depth") {
     controls.dispose();
     geometry.dispose();
     renderer.dispose();
+    renderer.forceContextLoss(); // a browser allows few contexts, and frees them late
     host.replaceChildren();
   };
 }

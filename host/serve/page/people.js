@@ -1,9 +1,11 @@
 // Guides about people: their shadow by the sun, and what they do.
-import { act, call, get, on, onJob, store } from "./link.js";
-import { h, button, field, keep, notice, number, panel, rows } from "./ui.js";
+import { act, call, failure, get, on, onJob, store } from "./link.js";
+import { h, button, field, keep, notice, number, numeric, panel, rows } from "./ui.js";
 import * as draw from "./guide-pictures.js";
 
 const LAST = 240;
+/** Largest video that the server accepts. */
+const VIDEO_MAX_BYTES = 256 * 2 ** 20;
 
 /** A choice of the videos that were sent, with a way to send one. */
 function videos() {
@@ -28,20 +30,34 @@ function videos() {
     const [video] = file.files;
     if (!video) return;
     said.textContent = `sending ${video.name} …`;
-    // Names on the rig's computer are plain.
-    const name = video.name.replace(/[^A-Za-z0-9._-]+/g, "-").replace(/^\.+/, "").slice(-80) || "video";
     try {
-      const answer = await fetch(`/api/people/videos/${name}`, { method: "PUT", body: video, headers: { "x-farnear-client": store.client?.secret ?? "" } });
-      const given = await answer.json().catch(() => ({}));
-      if (!answer.ok) throw Object.assign(new Error(given.error ?? `failed (${answer.status})`), { hint: given.hint });
+      if (video.size > VIDEO_MAX_BYTES) throw new Error(`${video.name} has ${number(video.size / 2 ** 20, 0)} MB: expected 256 MB at most`);
+      const name = free(video.name, (await get("/api/people")).videos);
+      const answer = await fetch(`/api/people/videos/${encodeURIComponent(name)}`, { method: "PUT", body: video, headers: { "x-farnear-client": store.client?.secret ?? "" } });
+      if (!answer.ok) throw await failure(answer);
       await shown(name);
       said.textContent = `${name} is there`;
     } catch (error) {
       said.textContent = "";
       notice(error.message, "error", error.hint);
+    } finally {
+      file.value = ""; // the same file can be chosen again
     }
   });
   return { parts: [field("Video", chosen), field("Send one", file), said], shown, name: () => chosen.value };
+}
+
+/** A name for a file, of letters and digits, that none of the others has. The server accepts 100 bytes.
+ * @param {string} name @param {string[]} others */
+function free(name, others) {
+  const plain = name.normalize("NFC").replace(/[^\p{L}\p{N}._-]+/gu, "-").replace(/^\.+/, "");
+  const [, stem, ending] = /^(.*?)(\.[A-Za-z0-9]{1,8})?$/.exec(plain) ?? ["", plain, ""];
+  const short = [...stem];
+  while (new TextEncoder().encode(short.join("")).length > 80) short.pop();
+  for (let count = 1; ; count++) {
+    const found = `${short.join("") || "video"}${count > 1 ? `-${count}` : ""}${ending ?? ""}`;
+    if (!others.includes(found)) return found;
+  }
 }
 
 /** Activity of a person: the streaming answer next to the picture. */
@@ -136,8 +152,7 @@ export function shadow() {
   const picture = h("div", { class: "guide-picture wide" }, draw.sun(30, 0, 1.7));
   const facts = h("div", { "aria-live": "polite" });
   const results = h("div", { "aria-live": "polite" });
-  const value = (control) => Number(control.value);
-  const sunlight = () => ({ lat: value(inputs.latitude), lon: value(inputs.longitude), time: new Date(time.value).toISOString() });
+  const sunlight = () => ({ lat: numeric(inputs.latitude), lon: numeric(inputs.longitude), time: new Date(time.value).toISOString() });
   async function shown() {
     if (!time.value) return;
     try {
@@ -152,10 +167,10 @@ export function shadow() {
   }
   let waiting = 0;
   for (const control of [time, inputs.latitude, inputs.longitude]) control.addEventListener("input", () => { clearTimeout(waiting); waiting = setTimeout(shown, 150); });
-  const start = () => {
-    const camera = { height_m: value(inputs.height), azimuth_deg: value(inputs.azimuth), pitch_deg: value(inputs.pitch), focal_length_mm: value(inputs.focal), pixel_um: value(inputs.pixel) };
-    act("/api/people/shadow", { video: video.name(), sun: sunlight(), camera });
-  };
+  const start = () => act("/api/people/shadow", () => {
+    const camera = { height_m: numeric(inputs.height), azimuth_deg: numeric(inputs.azimuth), pitch_deg: numeric(inputs.pitch), focal_length_mm: numeric(inputs.focal), pixel_um: numeric(inputs.pixel) };
+    return { video: video.name(), sun: sunlight(), camera };
+  });
   onJob("shadow", ({ phase, result: found }) => {
     if (phase !== "done") return;
     const mask = (folder, file) => h("img", { src: `/api/people/shadows/${found.shadow}/${folder}/${file}`, alt: `${file}, ${folder.replace("-", " ")}`, loading: "lazy" });

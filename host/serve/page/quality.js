@@ -1,6 +1,6 @@
 // How good depth is, as owners of depth cameras ask: fill rate, plane fit, noise over time, accuracy against a known distance.
 import { act, get, on, onJob, store } from "./link.js";
-import { h, button, field, number, panel, notice } from "./ui.js";
+import { h, button, field, number, numeric, optional, panel, notice } from "./ui.js";
 
 /** Makes the view. */
 export function make(host) {
@@ -16,9 +16,10 @@ export function make(host) {
   results.append(h("p", { class: "empty" }, "Nothing measured yet."));
 
   function measure() {
-    const wish = { pairs: Math.round(Number(pairs.value)) };
-    if (distance.value !== "") wish.true_mm = Number(distance.value);
-    act("/api/quality", wish);
+    act("/api/quality", () => {
+      const true_mm = optional(distance);
+      return { pairs: Math.round(numeric(pairs)), ...(true_mm === null ? {} : { true_mm }) };
+    });
   }
 
   function show(found) {

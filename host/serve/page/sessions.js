@@ -34,7 +34,7 @@ export function make(host, open) {
       const { captures } = await get(`/api/captures?search=${encodeURIComponent(search.value)}`);
       count.textContent = captures.length === 1 ? "1 capture" : `${captures.length} captures`;
       shown = captures.filter(wanted).sort((a, b) => b.written_unix_s - a.written_unix_s || b.name.localeCompare(a.name));
-      list.replaceChildren(...shown.map((capture) => card(capture, open)));
+      list.replaceChildren(...shown.map((capture) => card(capture, open, refresh)));
       if (!captures.length) list.append(h("li", { class: "empty" }, search.value ? "Nothing holds all of these words." : "Nothing captured yet."));
     } catch (error) {
       notice(error.message, "error", error.hint);
@@ -49,7 +49,8 @@ export function make(host, open) {
   return { shown: () => { seen = store.state?.captures ?? -1; refresh(); } };
 }
 
-function card(capture, open) {
+/** `changed` is called after a capture was renamed or deleted. */
+function card(capture, open, changed) {
   const file = capture.has_depth ? "view.png" : capture.images[0];
   const path = `/api/captures/${encodeURIComponent(capture.name)}`;
   const focus = capture.optics?.focus;
@@ -64,9 +65,9 @@ function card(capture, open) {
       h("a", { class: "button", href: `${path}/zip`, download: `${capture.name}.zip` }, "ZIP"),
       button("Rename", async () => {
         const name = await ask(`New name of ${capture.name}`, { text: true, yes: "Rename" });
-        if (name) act(`${path}/rename`, { name: name.trim() });
+        if (name && (await act(`${path}/rename`, { name: name.trim() }))) changed();
       }), button("Delete", async () => {
-        if ((await ask(`Delete ${capture.name} with all of its files?`, { yes: "Delete", no: "Keep" })) !== null) act(path, {}, "DELETE");
+        if ((await ask(`Delete ${capture.name} with all of its files?`, { yes: "Delete", no: "Keep" })) !== null && (await act(path, {}, "DELETE"))) changed();
       }, { class: "danger" })));
 }
 

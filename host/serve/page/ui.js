@@ -83,19 +83,57 @@ export function colour(name) {
   return getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
 }
 
-/** Asks for a text; null where the person gave up. */
-export function ask(question, { text = false, yes = "Continue", no = "Cancel" } = {}) {
+/** Opens a dialog above the page. It is not modal: Stop must work while it is open. Esc calls `onescape`.
+ * Returns the function that closes the dialog; the focus goes back to where it was.
+ * @param {string} label @param {any[]} children @param {() => void} onescape */
+export function popUp(label, children, onescape) {
+  const dialog = h("dialog", { class: "dialog", "aria-label": label }, children);
+  /** @param {KeyboardEvent} event */
+  const escape = (event) => event.key === "Escape" && onescape();
+  addEventListener("keydown", escape);
+  document.body.append(dialog);
+  dialog.show();
+  return () => {
+    removeEventListener("keydown", escape);
+    dialog.close();
+    dialog.remove();
+  };
+}
+
+/** Asks for a text; null where the person gave up, or where `signal` withdrew the question.
+ * @param {string} question @param {{ text?: boolean, yes?: string, no?: string, signal?: AbortSignal }} options @returns {Promise<string | null>} */
+export function ask(question, { text = false, yes = "Continue", no = "Cancel", signal } = {}) {
   return new Promise((done) => {
     const input = h("input", { type: "text", "aria-label": "Answer", hidden: !text });
-    const dialog = h("dialog", { class: "dialog", "aria-label": "Question", oncancel: () => finish(null) },
-      h("p", {}, question), input,
-      h("div", { class: "actions" }, button(no, () => finish(null)), button(yes, () => finish(input.value), { class: "primary" })));
-    const finish = (answer) => { dialog.remove(); done(answer); };
-    input.addEventListener("keydown", (event) => { if (event.key === "Enter") finish(input.value); });
-    document.body.append(dialog);
-    dialog.showModal();
+    /** @param {string | null} answer */
+    const finish = (answer) => { close(); done(answer); };
+    const close = popUp("Question", [h("p", {}, question), input,
+      h("div", { class: "actions" }, button(no, () => finish(null)), button(yes, () => finish(input.value), { class: "primary" }))], () => finish(null));
+    input.addEventListener("keydown", (event) => {
+      if (event.key !== "Enter") return;
+      event.preventDefault(); // the button that gets the focus back is not pressed
+      finish(input.value);
+    });
+    signal?.addEventListener("abort", () => finish(null), { once: true });
   });
 }
+
+/** The number in an input; null where it is empty. The browser gives an empty value also for a text that is not a number: only `badInput` differs.
+ * @param {HTMLInputElement} input @returns {number | null} */
+export function optional(input) {
+  if (input.validity.badInput) throw new Error(`${nameOf(input)}: expected a number`);
+  return input.value === "" ? null : Number(input.value);
+}
+
+/** The number in an input that must have one. @param {HTMLInputElement} input */
+export function numeric(input) {
+  const value = optional(input);
+  if (value === null) throw new Error(`${nameOf(input)}: expected a number, the field is empty`);
+  return value;
+}
+
+/** @param {HTMLInputElement} input */
+const nameOf = (input) => input.getAttribute("aria-label") ?? input.labels?.[0]?.textContent ?? "value";
 
 /** Fills a place anew only when `key` changes: a button that is replaced under a click is not pressed. */
 export function keep(host, key, build) {

@@ -109,8 +109,11 @@ impl JobQueue {
         receiver
     }
 
-    fn free(&self) {
-        lock(&self.inner).running = None;
+    /// Ends the job. `publish` ends before another job can begin.
+    fn free(&self, publish: impl FnOnce()) {
+        let mut inner = lock(&self.inner);
+        inner.running = None;
+        publish();
     }
 }
 
@@ -179,12 +182,11 @@ fn run(app: &App, begun: Begun, queue: &JobQueue, place: Place) {
     });
     // The board may report the stop before the work notices the cancellation.
     let stopped = |error: &WorkflowError| error.is_cancelled() || context.cancel.is_cancelled();
-    queue.free();
     let reason = ended.as_ref().err().filter(|error| stopped(error)).and_then(|_| app.take_stop_reason());
     if let Err(error) = &ended {
         app.note(format!("{}: {error}", job.title));
     }
-    app.change(|state| {
+    let publish = |state: &mut State| {
         let Some(job) = place(state) else { return };
         match ended {
             Ok(result) => {
@@ -197,12 +199,16 @@ fn run(app: &App, begun: Begun, queue: &JobQueue, place: Place) {
                 job.error = Some(reason.unwrap_or_else(|| error.to_string()));
             }
         }
-    });
+    };
+    queue.free(|| app.change(publish));
 }
 
 #[cfg(test)]
 mod tests {
-    use std::time::Instant;
+    use std::{
+        sync::atomic::{AtomicBool, Ordering},
+        time::Instant,
+    };
 
     use super::*;
     use crate::live::tests::app;
@@ -233,6 +239,44 @@ mod tests {
         let begun = app.begin_on_rig(Task { kind: "home", title: "Home".into(), work });
         assert_eq!(begun, Ok(1));
         wait_for(&app, |state| state.job.as_ref().is_some_and(|job| job.phase == JobPhase::Done));
+        app.end();
+        thread.join().expect("the thread ends with the program");
+    }
+
+    #[test]
+    fn a_queue_is_busy_until_the_result_of_its_job_is_published() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let app = app(folder.path());
+        let jobs = app.computing.open();
+        let computer = Arc::clone(&app);
+        let thread = std::thread::spawn(move || run_computing(&computer, &jobs));
+        let (begins, begun) = channel();
+        let (end, may_end) = channel::<()>();
+        let work: Work = Box::new(move |_, _| {
+            let _ = begins.send(());
+            let _ = may_end.recv();
+            Ok(Value::Null)
+        });
+        assert_eq!(app.begin_computing(Task { kind: "depth", title: "Depth".into(), work }), Ok(1));
+        begun.recv().expect("the job runs");
+        let (free, mut freed_early) = (AtomicBool::new(false), false);
+        std::thread::scope(|scope| {
+            scope.spawn(|| {
+                while app.computing.is_busy() {
+                    std::thread::sleep(Duration::from_millis(1));
+                }
+                free.store(true, Ordering::Relaxed);
+            });
+            // The result cannot be published while the state is locked here.
+            app.change(|_| {
+                end.send(()).expect("the job waits");
+                std::thread::sleep(Duration::from_millis(300));
+                freed_early = free.load(Ordering::Relaxed);
+            });
+        });
+        assert!(!freed_early, "the next job can begin before the result of this one is published");
+        let ended = app.state().computation.map(|job| job.phase);
+        assert_eq!(ended, Some(JobPhase::Done));
         app.end();
         thread.join().expect("the thread ends with the program");
     }

@@ -185,7 +185,10 @@ test("a second browser watches, asks, and is given the controls", async () => {
   await second.locator("#who", { hasText: "another browser has control" }).waitFor();
   assert.ok(await second.getByRole("button", { name: "Home", exact: true }).isDisabled());
   await second.getByRole("button", { name: "Ask for control" }).click();
-  await first.getByRole("button", { name: "Hand over" }).click();
+  const handOver = first.getByRole("button", { name: "Hand over" });
+  await handOver.waitFor();
+  await first.locator("#stop").click();
+  await handOver.click();
   await second.locator("#who", { hasText: "you have control" }).waitFor();
   await first.locator("#who", { hasText: "another browser has control" }).waitFor();
   assert.ok(await first.getByRole("button", { name: "Home", exact: true }).isDisabled());

@@ -1,5 +1,7 @@
 // Results that the page shows: of jobs after a reload, of regions, of recordings, of captures.
 import assert from "node:assert/strict";
+import { cpSync, readdirSync, rmSync } from "node:fs";
+import { join } from "node:path";
 import { after, afterEach, before, test } from "node:test";
 import { browser as launch, open, reloaded, serve } from "./server.mjs";
 
@@ -150,5 +152,117 @@ test("a still and a stack are called so among the captures", async () => {
     await page.locator(".capture-card", { hasText: `${kind}-001` }).locator("p", { hasText: new RegExp(`^${kind} · `) }).waitFor();
   }
   assert.equal(await page.locator(".capture-card", { hasText: "sequence" }).count(), 0);
+  assert.deepEqual(page.complaints, []);
+});
+
+/** A copy of the first pair under another name, without the entries that `dropped` names. */
+function copy(name, dropped) {
+  const folder = join(server.session, name);
+  cpSync(join(server.session, "pair-001"), folder, { recursive: true });
+  for (const entry of readdirSync(folder).filter((entry) => dropped.test(entry))) rmSync(join(folder, entry), { recursive: true });
+}
+
+/** The depth of the first pair. */
+async function depthOfPair() {
+  const page = await open(browser, `${server.address}#depth/pair-001`);
+  await page.locator("#who", { hasText: "you have control" }).waitFor();
+  await page.locator("canvas[data-layer=depth]").waitFor();
+  await page.waitForLoadState("networkidle");
+  return page;
+}
+
+/** Opens a capture from the list of the depth view, which is read again. */
+async function choose(page, name) {
+  await page.locator("#tab-depth").click();
+  await page.getByLabel("Capture", { exact: true }).selectOption(name);
+}
+
+test("a comparison with another method ends when another capture is opened", async () => {
+  const page = await depthOfPair();
+  await page.getByLabel("Method", { exact: true }).first().selectOption("favaro");
+  await page.getByLabel("keep as another map, to compare").check();
+  await page.getByRole("button", { name: "Compute depth", exact: true }).click();
+  const compared = page.getByLabel("Compare with");
+  await page.waitForFunction(() => document.querySelector("[aria-label='Compare with']").value.startsWith("variant:favaro"));
+  copy("pair-plain", /favaro/);
+  const last = page.waitForResponse((one) => one.url().endsWith("/pair-plain/files/near.png"));
+  await choose(page, "pair-plain");
+  await last;
+  await page.waitForTimeout(500);
+  assert.equal(await compared.inputValue(), "");
+  assert.deepEqual(page.complaints, []);
+});
+
+test("the surface is not shown for a capture without depth", async () => {
+  copy("pair-images", /^(depth|confidence|uncertainty|reason)\./);
+  const page = await depthOfPair();
+  await page.locator("button[data-layer=surface]:enabled").click();
+  await page.locator(".surface canvas").waitFor();
+  await choose(page, "pair-images");
+  await page.locator("canvas[data-layer=far]").waitFor();
+  assert.equal(await page.locator(".surface canvas").count(), 0);
+  assert.deepEqual(page.complaints, []);
+});
+
+test("figures of a region are removed with the map", async () => {
+  const page = await depthOfPair();
+  const box = await page.locator("#view-depth .viewer canvas").boundingBox();
+  const hint = page.getByText("Draw a second region");
+  const region = async () => {
+    await page.mouse.move(box.x + 0.4 * box.width, box.y + 0.4 * box.height);
+    await page.mouse.down();
+    await page.mouse.move(box.x + 0.5 * box.width, box.y + 0.6 * box.height, { steps: 4 });
+    await page.mouse.up();
+    await hint.waitFor();
+  };
+  await page.getByRole("button", { name: "Region", exact: true }).click();
+  await region();
+  await page.getByRole("button", { name: "Compute depth", exact: true }).click();
+  await hint.waitFor({ state: "hidden" });
+  await page.waitForTimeout(500);
+  await region();
+  assert.equal(await page.locator("dt", { hasText: "step to the region before" }).count(), 0);
+  assert.deepEqual(page.complaints, []);
+});
+
+test("sections without a field in Optics stay in the file", async () => {
+  const page = await open(browser, `${server.address}#optics`);
+  await page.locator("#who", { hasText: "you have control" }).waitFor();
+  await page.locator(".to-scale").waitFor();
+  const put = (optics) => page.evaluate(async (optics) => (await import("/link.js")).act("/api/optics", { optics }, "PUT"), optics);
+  const { optics: before } = await server.ask("/api/optics");
+  const distortion = { camera_matrix: [[6700, 0, 320], [0, 6700, 240], [0, 0, 1]], coefficients: [0.01, 0, 0, 0] };
+  await put({ ...before, lens: { ...before.lens, telecentric: false }, distortion, psf: { model: "ring", inner: 0.5 } });
+  await page.waitForFunction(() => document.querySelector("#view-optics select").value === "");
+  await page.getByLabel("Far focus", { exact: true }).fill("900");
+  await page.locator(".to-scale text", { hasText: "900.0 mm" }).waitFor();
+  await page.getByRole("button", { name: "Use these optics" }).click();
+  await page.getByText("In use for captures from now on.").waitFor();
+  const { optics } = await server.ask("/api/optics");
+  await put(before);
+  assert.equal(optics.focus.far_mm, 900);
+  assert.equal(optics.lens.telecentric, false);
+  assert.deepEqual(optics.psf, { model: "ring", inner: 0.5 });
+  assert.deepEqual(optics.distortion, distortion);
+  assert.deepEqual(page.complaints, []);
+});
+
+test("a field without a number is reported by name, and distances may have decimal commas", async () => {
+  const page = await open(browser, `${server.address}#quality`);
+  await page.getByLabel("True distance", { exact: true }).pressSequentially("1e");
+  await page.getByRole("button", { name: "Measure" }).click();
+  await page.locator(".notice.error", { hasText: "True distance: expected a number" }).waitFor();
+  await page.locator("#tab-guides").click();
+  await page.locator("button[data-guide=series]").click();
+  const own = page.locator("#view-guides").getByLabel("Distances in mm");
+  const start = page.getByRole("button", { name: "Capture the series" });
+  await own.fill("890,5, 905");
+  await start.click();
+  await page.locator(".notice.error", { hasText: "Distance 5: expected a number of mm above the focal length" }).waitFor();
+  await page.route("**/api/calibrate/series", (route) => route.fulfill({ json: { job: 0 } }));
+  const request = page.waitForRequest((one) => one.url().endsWith("/api/calibrate/series"));
+  await own.fill("890,5; 905; 920");
+  await start.click();
+  assert.deepEqual((await request).postDataJSON(), { distances: [890.5, 905, 920] });
   assert.deepEqual(page.complaints, []);
 });

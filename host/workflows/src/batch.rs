@@ -15,6 +15,7 @@ mod summary;
 mod tally;
 
 use std::{
+    ffi::{OsStr, OsString},
     io,
     path::{Path, PathBuf},
     sync::{Arc, Mutex, PoisonError},
@@ -25,7 +26,7 @@ use farnear_files::staging::write_file;
 use serde::Serialize;
 use serde_json::Value;
 
-pub(crate) use self::place::{RECORD, final_place};
+pub(crate) use self::place::{RECORD, final_place, is_unfinished, result_of};
 pub use self::{
     error::BatchError,
     generate::{Pattern, generate},
@@ -60,7 +61,7 @@ pub struct BatchSettings {
     pub verify: bool,
     /// JSON lines of failures. Default: `NAME.failures.jsonl` next to the manifest.
     pub failures: Option<PathBuf>,
-    /// CSV table of the shard's jobs with their figures.
+    /// CSV table of the shard's jobs with their figures; `figures.2of4.csv` for one of several shards. A dry run writes none.
     pub summary: Option<PathBuf>,
     pub dry_run: bool,
     /// Return success even if jobs failed.
@@ -101,6 +102,17 @@ impl Shard {
     /// `number` counts from 1.
     fn has(self, number: usize) -> bool {
         (number - 1) % self.of == self.index - 1
+    }
+
+    /// `path` with another ending, and with the number of the shard if there are several: `pairs.2of3.csv`.
+    fn report(self, path: &Path, ending: &OsStr) -> PathBuf {
+        let Self { index, of } = self;
+        let mut name = path.file_stem().unwrap_or_default().to_os_string();
+        if of > 1 {
+            name.push(format!(".{index}of{of}"));
+        }
+        name.push(ending);
+        path.with_file_name(name)
     }
 
     /// Number of jobs in this shard, of `jobs`.
@@ -156,7 +168,7 @@ fn is_zero(count: &usize) -> bool {
 }
 
 /// Runs a manifest's jobs and calls `on_job` as each ends, one at a time. Returns [`BatchError::Failed`]
-/// after the last job if any failed. An error from `on_job` stops the run.
+/// after the last job if any failed, in a dry run [`BatchError::WouldFail`]. An error from `on_job` stops the run.
 pub fn run(
     settings: &BatchSettings,
     context: &Context<'_>,
@@ -171,7 +183,8 @@ pub fn run(
     let total = settings.shard.share(outs.jobs());
     let failures = settings.failures.clone().unwrap_or_else(|| failures_file(settings));
     outs.check_report("failures", &failures, Tally::begins)?;
-    if let Some(path) = &settings.summary {
+    let table = summary_file(settings);
+    if let Some(path) = &table {
         outs.check_report("summary", path, Summary::begins)?;
         if are_same(path, &failures)? {
             let reason = "the failures are written there".into();
@@ -180,12 +193,13 @@ pub fn run(
     }
     let summary = Mutex::new(Summary::default());
     let on_job = |report: &JobReport| {
-        if settings.summary.is_some() {
+        if table.is_some() {
             summary.lock().unwrap_or_else(PoisonError::into_inner).add(report);
         }
         on_job(report)
     };
-    let tally = Tally::new(total, &failures, context, &on_job)?;
+    let kept = (!settings.dry_run).then_some(failures.as_path());
+    let tally = Tally::new(total, kept, context, &on_job)?;
     let work = Work {
         settings,
         outs,
@@ -204,27 +218,33 @@ pub fn run(
     let sum = format!("{planned}{done} done, {already} already done, {failed} failed, of {jobs} jobs");
     context.cancel.check(&format!("doing jobs ({sum}); the same command continues"))?;
     context.info(&format!("{sum}, in {seconds} s"));
-    if let Some(path) = &settings.summary {
-        let table = summary.lock().unwrap_or_else(PoisonError::into_inner).csv();
-        write_file(
-            path,
-            &table.map_err(|error| BatchError::Write { path: path.clone(), source: error.into() })?,
-        )?;
+    if let Some(path) = &table {
+        let text = summary.lock().unwrap_or_else(PoisonError::into_inner).csv();
+        let unwritable = |error: csv::Error| BatchError::Write { path: path.clone(), source: error.into() };
+        write_file(path, &text.map_err(unwritable)?)?;
     }
     if failed > 0 && !settings.allow_failures {
+        if settings.dry_run {
+            return Err(BatchError::WouldFail { failed, jobs }.into());
+        }
         return Err(BatchError::Failed { failed, jobs, failures }.into());
     }
     Ok(figures)
 }
 
 fn failures_file(settings: &BatchSettings) -> PathBuf {
-    let mut name = settings.manifest.file_stem().unwrap_or_default().to_os_string();
-    let Shard { index, of } = settings.shard;
-    if of > 1 {
-        name.push(format!(".{index}of{of}"));
+    settings.shard.report(&settings.manifest, ".failures.jsonl".as_ref())
+}
+
+/// `None` in a dry run.
+fn summary_file(settings: &BatchSettings) -> Option<PathBuf> {
+    let path = settings.summary.as_deref().filter(|_| !settings.dry_run)?;
+    let mut ending = OsString::new();
+    if let Some(extension) = path.extension() {
+        ending.push(".");
+        ending.push(extension);
     }
-    name.push(".failures.jsonl");
-    settings.manifest.with_file_name(name)
+    Some(settings.shard.report(path, &ending))
 }
 
 struct Work<'a> {
@@ -334,9 +354,10 @@ impl Work<'_> {
 
     fn job(&self, kind: &str, fields: &Fields, context: &Context<'_>) -> Result<(State, Option<Value>)> {
         let kind = jobs::kind(kind)?;
+        jobs::check_outputs(kind, fields)?;
         let out = fields.base().join(fields.text("out")?);
         let work = (kind.job)(fields.all(), fields.base())?;
-        let input = self.sums.of(&work.inputs(), &self.base)?;
+        let input = self.sums.of(&work.inputs(), &self.base, &|path: &Path| self.outs.makes(path))?;
         let wanted = Provenance::new(kind.name, fields, input);
         let place = Place::new(out, makes_file(kind));
         match place.look(&wanted, self.settings.verify)? {
@@ -398,18 +419,21 @@ mod tests {
     }
 
     #[test]
-    fn failures_are_written_next_to_the_manifest() {
+    fn each_shard_has_its_own_reports() {
         let settings = |shard: &str| BatchSettings {
             manifest: "a/pairs.toml".into(),
             jobs: 0,
             shard: shard.parse().expect("a shard"),
             verify: false,
             failures: None,
-            summary: None,
+            summary: Some("b/figures.csv".into()),
             dry_run: false,
             allow_failures: false,
         };
         assert_eq!(failures_file(&settings("1/1")), Path::new("a/pairs.failures.jsonl"));
         assert_eq!(failures_file(&settings("2/3")), Path::new("a/pairs.2of3.failures.jsonl"));
+        assert_eq!(summary_file(&settings("1/1")), Some("b/figures.csv".into()));
+        assert_eq!(summary_file(&settings("2/3")), Some("b/figures.2of3.csv".into()));
+        assert_eq!(summary_file(&BatchSettings { dry_run: true, ..settings("1/1") }), None);
     }
 }

@@ -77,6 +77,13 @@ impl Cancel {
     }
 }
 
+/// A token that is cancelled by setting the flag.
+impl From<Arc<AtomicBool>> for Cancel {
+    fn from(flag: Arc<AtomicBool>) -> Self {
+        Self(flag)
+    }
+}
+
 #[derive(Clone)]
 pub struct Context<'a> {
     pub progress: &'a dyn Progress,

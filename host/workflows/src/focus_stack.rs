@@ -3,6 +3,7 @@
 mod black_border;
 mod frames;
 mod images;
+mod in_memory;
 mod positions;
 
 use std::{
@@ -14,21 +15,19 @@ use std::{
 use farnear_depth::{
     focus_stack::{self, Sharpness, Slices, StackMap, StackSettings},
     optics::{DistortionSection, Optics},
-    prepare::{
-        align::Model,
-        warp::{Warp, resample},
-    },
+    prepare::align::Model,
 };
 use farnear_files::{
     image_file::{self, Grey},
     npy, view,
 };
 use images::Images;
-use ndarray::{Array2, ArrayView2};
+use ndarray::Array2;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_with::{DisplayFromStr, serde_as};
 
+pub use in_memory::{PreparedStack, prepare_stack};
 pub use positions::{depth_of_places, even_positions};
 
 use crate::{
@@ -288,35 +287,11 @@ pub fn focus_stack(request: &FocusStackRequest, context: &Context<'_>) -> Result
     let inputs: Vec<PathBuf> = listed.images.iter().cloned().chain(listed.described_by.clone()).collect();
     let mut warnings = std::mem::take(&mut listed.remarks);
     let mut images = Images::read(&listed.images, request, &mut warnings, &staging, context)?;
-    let mut frames = if request.use_all && request.align.0.is_none() {
-        frames::Frames { gains: frames::gains(&images)?, ..frames::Frames::unchecked(images.count()) }
-    } else {
-        frames::check(&images, &listed.even_positions(), request.align.0, context)?
-    };
-    if request.use_all {
-        frames.left_out.clear();
-    } else if !frames.untold.is_empty() {
-        let names: Vec<String> = frames.untold.iter().map(|index| name(&listed.images[*index])).collect();
-        warnings.push(format!(
-            "could not check whether {} is shaken or defocused: the images next to it do not tell how sharp it should be (the scene is \
-             sharpest there, or the images are irregular or fewer than 5)",
-            names.join(" or ")
-        ));
-    }
-    warnings.extend(frames.warnings());
-    for pair in &frames.exchanged {
-        let [one, other] = pair.map(|index| name(&listed.images[index]));
-        let shaken = if pair[1] - pair[0] == 1 { ", or one of them is shaken or defocused" } else { "" };
-        warnings.push(format!(
-            "{one} and {other} look exchanged{shaken}: in the order given, sharpness rises and falls more than once; depth may be \
-             wrong: exchange them or correct the positions (--positions-um)"
-        ));
-    }
-    let mut left_out = Vec::new();
-    for (index, reason) in &frames.left_out {
-        left_out.push(name(&listed.images[*index]));
-        warnings.push(format!("left out {}: {reason}", name(&listed.images[*index])));
-    }
+    let mut frames =
+        frames::of_stack(&images, &listed.even_positions(), request.align.0, request.use_all, context)?;
+    warnings.extend(frames.remarks(|index| name(&listed.images[index])));
+    let left_out: Vec<String> =
+        frames.left_out.iter().map(|(index, _)| name(&listed.images[*index])).collect();
     let indices: Vec<usize> = frames.left_out.iter().map(|(index, _)| *index).collect();
     for index in indices.iter().rev() {
         images.remove(*index);
@@ -337,9 +312,7 @@ pub fn focus_stack(request: &FocusStackRequest, context: &Context<'_>) -> Result
     let mut map =
         focus_stack::depth_from_positions(&images, &listed.even_positions(), &request.computation())?;
     drop(images);
-    for (at, _) in unseen.iter().flat_map(|unseen| unseen.indexed_iter()).filter(|(_, unseen)| **unseen) {
-        (map.place[at], map.reliability[at]) = (f32::NAN, 0.0);
-    }
+    withhold(&mut map, unseen.as_ref());
     context.cancel.check("writing the results")?;
     let depth = listed.depth(&map.place);
     let figures = figures(&depth, &listed, &map, moved_px, left_out, warnings);
@@ -384,25 +357,12 @@ fn name(path: &Path) -> String {
     path.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
-/// Evens out the brightness of a stack's images and aligns them, NaN where they do not show the scene, also in borders of zeros;
-/// returns the farthest distance that a pixel was moved, px.
-pub fn prepare_stack(images: &mut [Array2<f32>], model: Option<Model>) -> Result<f64> {
-    for image in images.iter_mut() {
-        black_border::erase(image);
+/// Removes the places of pixels that an image has no value for.
+fn withhold(map: &mut StackMap, unseen: Option<&Array2<bool>>) {
+    let Some(unseen) = unseen else { return };
+    for (at, _) in unseen.indexed_iter().filter(|(_, unseen)| **unseen) {
+        (map.place[at], map.reliability[at]) = (f32::NAN, 0.0);
     }
-    let views: Vec<ArrayView2<f32>> = images.iter().map(|image| image.view()).collect();
-    let positions = even_positions(views.len(), None);
-    let frames::Frames { warps, gains, .. } =
-        frames::check(&views[..], &positions, model, &Context::unattended())?;
-    for ((image, warp), gain) in images.iter_mut().zip(&warps).zip(gains) {
-        if gain != 1.0 {
-            *image /= gain as f32;
-        }
-        if *warp != Warp::IDENTITY {
-            *image = resample(image.view(), warp);
-        }
-    }
-    Ok(images.first().map_or(0.0, |first| frames::farthest_px(&warps, first.dim())))
 }
 
 fn figures(

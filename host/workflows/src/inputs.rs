@@ -14,6 +14,7 @@ use sha2::{Digest, Sha256};
 use crate::{
     batch,
     error::{Result, WorkflowError},
+    request::outputs::on_disk,
 };
 
 const BUFFER_BYTES: usize = 1 << 16;
@@ -27,17 +28,21 @@ pub struct HashedFile {
     pub sha256: String,
 }
 
-/// Hashes inputs of a result in `out`: all files of a folder; the file of a TIFF page (`stack.tif#3`).
+/// Hashes inputs of a result in `out`: all files of a folder except that result; the file of a TIFF page (`stack.tif#3`).
 pub(crate) fn hashed(inputs: &[PathBuf], out: &Path) -> Result<Vec<HashedFile>> {
     let place = batch::final_place(out);
-    files(inputs)?.par_iter().map(|file| hash(file, &relative(file, &place))).collect()
+    let current = std::env::current_dir().unwrap_or_default();
+    let result = on_disk(&current, &place);
+    let files = files(inputs, &|path: &Path| on_disk(&current, path) == result)?;
+    files.par_iter().map(|file| hash(file, &relative(file, &place))).collect()
 }
 
-pub(crate) fn files(inputs: &[PathBuf]) -> Result<Vec<PathBuf>> {
+/// All files of the inputs, each once. Below a folder, results with their records and unfinished files are left out.
+pub(crate) fn files(inputs: &[PathBuf], is_result: &dyn Fn(&Path) -> bool) -> Result<Vec<PathBuf>> {
     let mut files: Vec<PathBuf> = Vec::new();
     for input in inputs {
         let (input, _) = file_and_page(input);
-        let found = if input.is_dir() { files_below(&input)? } else { vec![input] };
+        let found = if input.is_dir() { inputs_below(&input, is_result)? } else { vec![input] };
         for file in found {
             if !files.contains(&file) {
                 files.push(file);
@@ -47,15 +52,43 @@ pub(crate) fn files(inputs: &[PathBuf]) -> Result<Vec<PathBuf>> {
     Ok(files)
 }
 
+/// Follows links to folders, each folder once, because they may form a cycle.
+fn inputs_below(folder: &Path, is_result: &dyn Fn(&Path) -> bool) -> Result<Vec<PathBuf>> {
+    let real = |path: &Path| path.canonicalize().unwrap_or_else(|_| path.into());
+    let is_record = |path: &Path| batch::result_of(path).is_some_and(|result| is_result(&result));
+    let mut followed = vec![real(folder)];
+    let mut skips = |path: &Path| {
+        if batch::is_unfinished(path) || is_result(path) || is_record(path) {
+            return true;
+        }
+        if !path.is_symlink() || !path.is_dir() {
+            return false;
+        }
+        let place = real(path);
+        let again = followed.contains(&place);
+        followed.push(place);
+        again
+    };
+    below(folder, true, &mut skips)
+}
+
+/// All files in a folder and its subfolders. A link is one file.
 pub(crate) fn files_below(folder: &Path) -> Result<Vec<PathBuf>> {
+    below(folder, false, &mut |_| false)
+}
+
+fn below(folder: &Path, follow: bool, skips: &mut dyn FnMut(&Path) -> bool) -> Result<Vec<PathBuf>> {
     let entries = fs::read_dir(folder).and_then(Iterator::collect::<io::Result<Vec<_>>>);
     let entries = entries.map_err(WorkflowError::read("the folder", folder))?;
     let mut entries: Vec<PathBuf> = entries.iter().map(fs::DirEntry::path).collect();
     entries.sort();
     let mut files = Vec::new();
     for entry in entries {
-        if entry.is_dir() {
-            files.extend(files_below(&entry)?);
+        if skips(&entry) {
+            continue;
+        }
+        if entry.is_dir() && (follow || !entry.is_symlink()) {
+            files.extend(below(&entry, follow, skips)?);
         } else {
             files.push(entry);
         }
@@ -134,5 +167,36 @@ mod tests {
         assert_eq!(names, ["../b.tif", "../camera/dark.npy"]);
         // Output of sha256sum.
         assert_eq!(found[0].sha256, "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn results_and_unfinished_files_are_not_inputs() {
+        let folder = tempfile::tempdir().expect("a folder");
+        for name in [
+            "1.png",
+            "sub/2.png",
+            "depth/map.npy",
+            ".other.batch-partial/other/map.npy",
+            ".next.partial-7/map.npy",
+            "page.html",
+            "page.html.batch.toml",
+            "x.batch.toml",
+        ] {
+            let path = folder.path().join(name);
+            fs::create_dir_all(path.parent().expect("a parent")).expect("a folder");
+            fs::write(path, "abc").expect("a writable folder");
+        }
+        for (to, name) in [(".", "again"), ("sub", "linked"), ("..", "sub/up")] {
+            std::os::unix::fs::symlink(to, folder.path().join(name)).expect("a writable folder");
+        }
+        let results = ["depth", "page.html"].map(|name| folder.path().join(name));
+        let is_result = |path: &Path| results.iter().any(|result| result == path);
+        let found = files(&[folder.path().into()], &is_result).expect("readable");
+        let names: Vec<_> =
+            found.iter().filter_map(|file| file.strip_prefix(folder.path()).ok()?.to_str()).collect();
+        assert_eq!(names, ["1.png", "linked/2.png", "sub/2.png", "x.batch.toml"]);
+        let found = hashed(&[folder.path().into()], &folder.path().join("depth")).expect("readable");
+        assert!(found.iter().all(|file| !file.file.contains("map.npy")), "{found:?}");
     }
 }

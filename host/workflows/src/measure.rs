@@ -129,9 +129,9 @@ pub(crate) fn projection(optics: &Optics, part: Option<Part>) -> Option<Projecti
 
 /// Object points of a depth map, (height, width, 3) in mm as in the mesh: right, up, towards the viewer. Fails where
 /// [`lateral()`] is unknown.
-pub fn points_mm(depth_mm: ArrayView2<f32>, optics: &Optics) -> Result<Array3<f32>> {
+pub fn points_mm(depth_mm: ArrayView2<f32>, optics: &Optics, part: Option<Part>) -> Result<Array3<f32>> {
     let dim = depth_mm.dim();
-    let projection = projection(optics, None)
+    let projection = projection(optics, part)
         .ok_or_else(|| WorkflowError::parameter("optics", "scale_known = false", NO_SCALE))?;
     let mut points = Array3::zeros((dim.0, dim.1, 3));
     for ((row, column), &z) in depth_mm.indexed_iter() {
@@ -174,8 +174,9 @@ mod tests {
         .unwrap();
         let depth = Array2::from_elem((3, 4), 900.0);
         let with = |scale_known| optics.with_stage(Stage { scale_known, ..Stage::identity(1, 1) });
-        assert!(points_mm(depth.view(), &optics).is_ok() && points_mm(depth.view(), &with(true)).is_ok());
-        let error = points_mm(depth.view(), &with(false)).unwrap_err();
+        let points = |optics: &Optics| points_mm(depth.view(), optics, None);
+        assert!(points(&optics).is_ok() && points(&with(true)).is_ok());
+        let error = points(&with(false)).unwrap_err();
         assert!(error.is_usage() && error.to_string().contains("--object-pixel-um"), "{error}");
         assert_eq!(lateral(&with(false), None), Lateral::Unknown);
     }

@@ -10,7 +10,7 @@ use std::{
 
 use farnear_capture::record::{CAPTURE_FILE, read_record};
 use farnear_depth::{
-    optics::{Doubt, LightSection, Optics, OpticsFile},
+    optics::{Doubt, LightSection, Optics, OpticsFile, USABLE_BLUR_PX},
     psf::Psf,
 };
 use farnear_protocol::message::LightLevels;
@@ -146,6 +146,11 @@ pub fn of_pair(named: Option<&Path>, far: &Path) -> Result<(Optics, Vec<OpticsDo
         return GivenOptics::read(&beside).map(|given| given.with_doubts());
     }
     Err(WorkflowError::NoOptics { far: far.into() })
+}
+
+/// Pixels per side to average into one for a blur that can be used; 1 = none.
+pub fn usable_bin(optics: &Optics) -> usize {
+    (optics.max_blur_px() / USABLE_BLUR_PX).ceil().clamp(1.0, 16.0) as usize
 }
 
 /// A doubt about a lens that was learned from images of another size (height, width).

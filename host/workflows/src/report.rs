@@ -24,7 +24,7 @@ use crate::{
     result_folder::{DEPTH_RECORD, STACK_RECORD},
 };
 use page::Page;
-use pictures::{colours, histogram};
+use pictures::{colours, decimals, histogram};
 
 /// Write a self-contained HTML page about a capture or a result: pictures, figures and what made them.
 ///
@@ -95,7 +95,8 @@ fn depth(page: &mut Page, folder: &Path) -> Result<()> {
         Err(_) => {
             let ends = [0.005, 0.995].map(|part| pictures::quantile(measured.depth.view(), part));
             if let [Some(low), Some(high)] = ends {
-                let caption = format!("depth, dark = {low:.2} to bright = {high:.2} {unit}");
+                let decimals = decimals(f64::from(high - low), 2);
+                let caption = format!("depth, dark = {low:.decimals$} to bright = {high:.decimals$} {unit}");
                 page.picture(&colours(measured.depth.view(), [low, high])?, &caption);
             }
         }
@@ -105,7 +106,8 @@ fn depth(page: &mut Page, folder: &Path) -> Result<()> {
     }
     if let Some(deviation) = &measured.deviation {
         let largest = pictures::quantile(deviation.view(), 0.98).unwrap_or(1.0);
-        let caption = format!("standard deviation, dark = 0 to bright = {largest:.2} {unit}");
+        let decimals = decimals(f64::from(largest), 2);
+        let caption = format!("standard deviation, dark = 0 to bright = {largest:.decimals$} {unit}");
         page.picture(&colours(deviation.view(), [0.0, largest])?, &caption);
     }
     if let Ok(image) = image_file::read_grey(&folder.join("all-in-focus.png")) {

@@ -2,6 +2,7 @@
 //! the help text; [`Default`] holds the defaults.
 
 pub mod outputs;
+mod paths;
 pub mod reference;
 
 use std::path::{Path, PathBuf};
@@ -10,6 +11,7 @@ use schemars::{JsonSchema, Schema};
 use serde::{Serialize, de::DeserializeOwned};
 use serde_json::{Map, Number, Value};
 
+use self::paths::{file_part, rebase};
 use crate::{
     context::Context,
     error::{Result, WorkflowError},
@@ -302,29 +304,6 @@ fn paths_of<R: Request>(request: &R) -> Vec<(PathKind, PathBuf)> {
     found
 }
 
-fn file_part(text: &str, kind: PathKind) -> &str {
-    match kind {
-        PathKind::InputOrName => text.split(',').next().unwrap_or(text),
-        PathKind::NamedInput => text.split_once('=').map_or(text, |(_, file)| file),
-        _ => text,
-    }
-}
-
-fn rebase(value: &mut Value, kind: PathKind, base: &Path) {
-    match value {
-        Value::String(text) => {
-            let file = file_part(text, kind);
-            let is_name = kind == PathKind::InputOrName && !base.join(file).exists();
-            if !is_name {
-                let joined = base.join(file).display().to_string();
-                *text = text.replace(file, &joined);
-            }
-        }
-        Value::Array(list) => list.iter_mut().for_each(|item| rebase(item, kind, base)),
-        _ => {}
-    }
-}
-
 fn properties(schema: &Value) -> Map<String, Value> {
     schema.get("properties").and_then(Value::as_object).cloned().unwrap_or_default()
 }
@@ -474,19 +453,6 @@ mod tests {
         assert!(read(json!({"file": "/etc/passwd"}), Paths::Refused).is_err());
         let schema = without_paths::<Sample>(schemars::schema_for!(Sample)).to_value();
         assert!(property(&schema, "file").is_none() && property(&schema, "share").is_some());
-    }
-
-    #[test]
-    fn a_file_after_a_name_is_relative_to_the_base() {
-        for (given, expected) in [
-            ("anna:walk=a.bvh", "anna:walk=/base/a.bvh"),
-            ("a.mat", "/base/a.mat"),
-            ("walk=/a.bvh", "walk=/a.bvh"),
-        ] {
-            let mut value = json!([given]);
-            rebase(&mut value, PathKind::NamedInput, Path::new("/base"));
-            assert_eq!(value, json!([expected]));
-        }
     }
 
     #[test]

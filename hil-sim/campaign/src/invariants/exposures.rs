@@ -1,5 +1,7 @@
+use std::collections::{BTreeMap, BTreeSet};
+
 use farnear_protocol::{
-    EventKind,
+    EventKind, Request,
     camera::FREE_RUNNING,
     message::{Axis, ShotRecord},
 };
@@ -23,14 +25,17 @@ pub fn exposure(case: &Case<'_>) -> Vec<Broken> {
     let mut found = Vec::new();
     // Exposures since the last reset, and whether they were reported.
     let mut taken: Vec<(Shot, bool)> = Vec::new();
-    let mut shots: std::collections::BTreeMap<u32, u32> = std::collections::BTreeMap::new();
+    let mut shots: BTreeMap<u32, u32> = BTreeMap::new();
     let mut windows: Vec<i32> = Vec::new();
+    // Index and exposure of the loaded shots. The board keeps them over a reset.
+    let mut loaded: BTreeSet<(u8, u32)> = BTreeSet::new();
     let mut reset_ns = 0;
     for sight in case.sights {
         match &sight.seen {
             Seen::Asked { call, .. } => {
-                if let farnear_protocol::Request::LoadShot { shot, .. } = &call.request {
+                if let Request::LoadShot { index, shot } = &call.request {
                     windows.push(shot.settle_window.0);
+                    loaded.insert((*index, shot.exposure.0));
                 }
             }
             // The camera completes an exposure even if the board was reset meanwhile.
@@ -60,6 +65,12 @@ pub fn exposure(case: &Case<'_>) -> Vec<Broken> {
                     continue;
                 };
                 *reported = true;
+                if !loaded.contains(&(record.index, record.exposure.0)) {
+                    let (number, index, us) = (record.trigger_number, record.index, record.exposure.0);
+                    let what =
+                        format!("trigger {number} has {us} us, which shot {index} was never loaded with");
+                    found.push(broken(sight.at_ns, what));
+                }
                 // The record has no tolerance; the widest requested one applies.
                 let window_nm = windows.iter().copied().max().unwrap_or(0);
                 let reported_off = deviation.is_some_and(|nm| nm > window_nm);
@@ -103,13 +114,19 @@ fn check_exposure(
     (shot, record): (&Shot, &ShotRecord),
     (window_nm, reported_off): (i32, bool),
 ) -> Option<Broken> {
-    let stamped = record.strobe_start.0;
-    if stamped.abs_diff(shot.board_us) > STAMP_US {
-        let what = format!(
-            "trigger {} is stamped {stamped} us and was taken at {} us",
-            record.trigger_number, shot.board_us
-        );
-        return Some(broken(sight.at_ns, what));
+    // A cut strobe wire and a lost clock change the end as the board measures it.
+    let has_end = !case.has(&["clock-dead", "strobe-dead"]);
+    let length_us = (shot.end_ns - shot.begin_ns + 500) / 1000;
+    let stamps = [
+        ("taken", record.strobe_start.0, shot.board_us, true),
+        ("ended", record.strobe_end.0, shot.board_us + length_us, has_end),
+    ];
+    for (what, stamped, truly, checked) in stamps {
+        if checked && stamped.abs_diff(truly) > STAMP_US {
+            let number = record.trigger_number;
+            let what = format!("trigger {number} is stamped {stamped} us and was {what} at {truly} us");
+            return Some(broken(sight.at_ns, what));
+        }
     }
     let asked_um = 1e-3 * f64::from(record.asked.0);
     let truth = &shot.truth;

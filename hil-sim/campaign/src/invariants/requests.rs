@@ -75,10 +75,11 @@ fn exposures(case: &Case<'_>) -> Vec<Broken> {
     let (mut armed, mut taken) = (0, 0);
     for sight in case.sights {
         match &sight.seen {
+            Seen::Reset => armed = 0,
             Seen::Asked { id, boot, call } if accepted.contains(&(*boot, *id)) => {
                 let exposures = match call.request {
                     Request::ArmProgram { shots } => {
-                        armed = armed.max(u64::from(shots));
+                        armed = u64::from(shots);
                         continue;
                     }
                     Request::RunProgram { .. } => armed,

@@ -4,7 +4,7 @@ use farnear_protocol::{
     BoardMicros, Call, Event, EventKind, Micros, Nanometres, Request, RequestError, Response,
     message::{
         Alarm, AlarmRecord, Axis, AxisStatus, DropReason, LinkCounters, PositionState, ProgramState,
-        ProgramStatus, ResetCause, SettingKey, Status,
+        ProgramStatus, ResetCause, SettingKey, ShotRecord, Status, TriggerMode,
     },
 };
 
@@ -239,24 +239,86 @@ fn detects_a_lost_alarm_and_ignores_an_earlier_answer() {
     assert_eq!(broken("", &[alarm, cleared, without_alarm(12, 12)]), [""; 0]);
 }
 
+/// An exposure of a millisecond.
+fn exposed(ms: u64, id: u32) -> Sight {
+    let (begin_ns, end_ns) = (ms * MS, (ms + 1) * MS);
+    let truth = ExposureTruth {
+        sensor_mm: 0.0,
+        coarse_um: 0.0,
+        lens_um: 0.0,
+        piezo_um: 0.0,
+        piezo_min_um: 0.0,
+        piezo_max_um: 0.0,
+    };
+    let shot = Shot { id, board_us: ms * 1000, begin_ns, end_ns, truth, light: [0.0; 2] };
+    Sight { at_ns: end_ns, seen: Seen::Exposed(shot) }
+}
+
+fn accepted(at_ms: u64, id: u32, request: Request) -> [Sight; 2] {
+    [asked(at_ms, id, request), answered(at_ms, id, Response::Accepted)]
+}
+
+#[test]
+fn counts_only_the_exposures_of_the_program_armed_last_in_this_boot() {
+    let arm = |id, shots| accepted(1, id, Request::ArmProgram { shots });
+    let run = |at_ms| accepted(at_ms, 9, Request::RunProgram { silence: Micros(1_000_000) });
+    let armed = [arm(1, 2), arm(2, 1), run(1)].concat();
+    assert_eq!(broken("", &[&armed[..], &[exposed(2, 0)]].concat()), [""; 0]);
+    assert_eq!(broken("", &[&armed[..], &[exposed(2, 0), exposed(5, 1)]].concat()), ["acts-twice"]);
+    let reset = Sight { at_ns: 2 * MS, seen: Seen::Reset };
+    let after_reset = [&arm(1, 1)[..], &[reset], &run(3), &[exposed(4, 0)]].concat();
+    assert_eq!(broken("", &after_reset), ["acts-twice"]);
+}
+
+#[test]
+fn detects_wrong_stamps_and_a_wrong_exposure_in_a_record() {
+    let shot = farnear_protocol::message::Shot {
+        axis: Axis::SensorFine,
+        target: Nanometres(0),
+        exposure: Micros(1_000),
+        settle_window: Nanometres(100),
+        settle_dwell: Micros(2_000),
+        repeat: 1,
+        mode: TriggerMode::Hardware,
+    };
+    let run = [
+        accepted(1, 1, Request::LoadShot { index: 0, shot }),
+        accepted(1, 2, Request::ArmProgram { shots: 1 }),
+        accepted(1, 3, Request::RunProgram { silence: Micros(1_000_000) }),
+    ]
+    .concat();
+    let violations = |scenario: &str, [start_us, end_us]: [u64; 2], exposure_us: u32| {
+        let record = ShotRecord {
+            index: 0,
+            repeat: 0,
+            trigger_number: 0,
+            axis: Axis::SensorFine,
+            asked: Nanometres(0),
+            coarse: Nanometres(0),
+            fine: Nanometres(0),
+            lens: Nanometres(0),
+            settle: Micros(0),
+            trigger: BoardMicros(1_980),
+            strobe_start: BoardMicros(start_us),
+            strobe_end: BoardMicros(end_us),
+            exposure: Micros(exposure_us),
+        };
+        let shot_done = EventKind::ShotDone { request: 3, shot: record };
+        let end = [exposed(2, 0), reported(4, 0, shot_done, Truth::default())];
+        broken(scenario, &[&run[..], &end].concat())
+    };
+    assert_eq!(violations("", [2_001, 2_999], 1_000), [""; 0]);
+    assert_eq!(violations("", [2_005, 3_000], 1_000), ["exposure"]);
+    assert_eq!(violations("", [2_000, 3_005], 1_000), ["exposure"]);
+    assert_eq!(violations("", [2_000, 3_000], 5_000), ["exposure"]);
+    // The wire was cut during the exposure.
+    let cut = "[[happens]]\nafter_ms = 2.95\nwhat = \"strobe-dead\"";
+    assert_eq!(violations(cut, [2_000, 2_950], 1_000), [""; 0]);
+}
+
 #[test]
 fn detects_an_extra_exposure_and_permits_a_repeated_one() {
     let run = Request::RunContinuously { period: Micros(0), exposures: 1, silence: Micros(1_000_000) };
-    let exposed = |ms: u64, id| {
-        let (begin_ns, end_ns) = (ms * MS, (ms + 1) * MS);
-        let truth = ExposureTruth {
-            sensor_mm: 0.0,
-            coarse_um: 0.0,
-            lens_um: 0.0,
-            piezo_um: 0.0,
-            piezo_min_um: 0.0,
-            piezo_max_um: 0.0,
-        };
-        Sight {
-            at_ns: end_ns,
-            seen: Seen::Exposed(Shot { id, board_us: ms * 1000, begin_ns, end_ns, truth, light: [0.0; 2] }),
-        }
-    };
     let reason = DropReason::NoStrobe;
     let dropped =
         reported(4, 0, EventKind::FrameDropped { request: 7, frame: 0, index: 0, reason }, Truth::default());

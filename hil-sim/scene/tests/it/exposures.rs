@@ -171,6 +171,18 @@ fn far_from_focus_only_the_mean_is_left() {
 }
 
 #[test]
+fn a_constant_height_map_equals_a_plane_at_20_px_of_blur() {
+    let (lens, camera) = (thesis_lens(), Camera::new(64, 48, Noise::None));
+    let flat = HeightMap::new(Array2::from_elem((6, 8), 933.0)).unwrap();
+    let sensor_mm = lens.sensor_far_mm + 20.0 / 2.703 * (lens.sensor_near_mm - lens.sensor_far_mm);
+    let image = |scene: &Scene| render_f32(scene, &lens, &Psf::PillBox, sensor_mm, &camera, 1).unwrap();
+    let (mapped, plane) = (image(&Scene::new(Shape::HeightMap(flat))), image(&scene("plane:933")));
+    for (a, b) in mapped.iter().zip(&plane) {
+        assert!((a - b).abs() < 1e-4, "{a} {b}");
+    }
+}
+
+#[test]
 fn impossible_exposures_are_refused_by_name() {
     let (lens, camera) = (thesis_lens(), Camera::new(16, 16, Noise::None));
     let shot = |text: &str, sensor_mm: f64| {

@@ -51,10 +51,10 @@ pub struct Arguments {
     /// File for failures, a JSON line each [default: MANIFEST's name with .failures.jsonl].
     #[arg(long, value_name = "FILE")]
     failures: Option<PathBuf>,
-    /// Write a table (CSV) with a row per job and a column per figure, of results made now and before.
-    #[arg(long, value_name = "FILE")]
+    /// Write a table (CSV) with a row per job and a column per figure, of results made now and before; share 2 of 4 writes FILE with .2of4 before its ending.
+    #[arg(long, value_name = "FILE", conflicts_with = "dry_run")]
     summary: Option<PathBuf>,
-    /// Only report the state of each job: "todo", "already", or "failed" with its message.
+    /// Only report the state of each job: "todo", "already", or "failed" with its message. Writes and removes no file.
     #[arg(long)]
     dry_run: bool,
     /// Exit with 0 even if jobs failed; they are in the file of failures.

@@ -406,6 +406,21 @@ fn a_dry_run_reports_what_would_be_done_and_does_nothing() {
     assert!(!folder.path("maps").exists());
     succeeds(&mut farnear(&["batch", &manifest, "--shard", "2/2"]));
     assert_eq!(states(&["batch", &manifest, "--dry-run"]), ["todo", "already"]);
+    // It neither removes nor writes reports, and no failures.
+    let text = fs::read_to_string(&manifest).expect("the manifest");
+    let bad = "[[job]]\ndo = 'depth'\nnear = 'gone.png'\nout = 'maps/a'\n";
+    fs::write(&manifest, text + bad).expect("a writable folder");
+    let failures = folder.path("pairs.failures.jsonl");
+    let output = farnear(&["batch", &manifest, "--dry-run"]).output().expect("the program starts");
+    let message = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.code() == Some(1) && message.contains("1 of 3 jobs would fail"), "{message}");
+    assert!(!failures.exists());
+    let report = format!("{}\n", json!({"job": 3, "state": "failed"}));
+    fs::write(&failures, &report).expect("a writable folder");
+    succeeds(&mut farnear(&["batch", &manifest, "--dry-run", "--allow-failures"]));
+    assert_eq!(fs::read_to_string(&failures).expect("failures of an earlier run"), report);
+    let both = ["--dry-run", "--summary", "figures.csv"];
+    fails(farnear(&["batch", &manifest]).args(both), 2, &["--summary", "--dry-run"]);
 }
 
 #[test]

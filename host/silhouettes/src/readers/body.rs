@@ -139,9 +139,9 @@ mod tests {
 
     #[test]
     fn trc_files_as_cortex_and_rokoko_write_them_are_read() {
-        let text = b"PathFileType\t4\t(X/Y/Z)\tM\xfcller.trc\nDataRate\tNumFrames\tNumMarkers\tUnits\n100\t3\t3\tmete\nFrame#\tTime\tA\t\t\t\t\t\tC\t\t\n\t\tX1\tY1\tZ1\tX2\tY2\tZ2\tX3\tY3\tZ3\n\n1\t0.0\t1\t2\t3\t4\t5\t6\t7\t8\t9\n2\t0.01\t1\t2\t3\t4\t5\t6\t7\t8\t9\n";
+        let text = b"PathFileType\t4\t(X/Y/Z)\tM\xfcller.trc\nDataRate\tNumFrames\tNumMarkers\tUnits\n100\t3\t3\tyard\nFrame#\tTime\tA\t\t\t\t\t\tC\t\t\n\t\tX1\tY1\tZ1\tX2\tY2\tZ2\tX3\tY3\tZ3\n\n1\t0.0\t1\t2\t3\t4\t5\t6\t7\t8\t9\n2\t0.01\t1\t2\t3\t4\t5\t6\t7\t8\t9\n";
         let error = read(text, "trc", Choices::default()).expect_err("an unknown unit");
-        assert!(error.to_string().contains("mete"), "{error}");
+        assert!(error.to_string().contains("yard"), "{error}");
         let named = Choices { unit: Some(super::Unit::MM), ..Choices::default() };
         let found = read(text, "trc", named).expect("a recording");
         assert_eq!(

@@ -33,6 +33,10 @@ impl Unit {
             "centimeter" | "centimetre" => "cm",
             "meter" | "metre" => "m",
             "inch" | "inche" => "in",
+            // Cut to four characters in some C3D files.
+            "mill" => "mm",
+            "cent" => "cm",
+            "mete" | "metr" => "m",
             other => other,
         };
         let found = Self::NAMED.iter().find(|(known, _, _)| *known == short);

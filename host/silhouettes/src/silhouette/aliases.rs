@@ -11,7 +11,7 @@ struct Naming {
     names: &'static [(&'static str, &'static str)],
 }
 
-const NAMINGS: [Naming; 6] = [
+const NAMINGS: [Naming; 7] = [
     Naming {
         about: "joints named as Biovision and SMPL do",
         template: "bvh",
@@ -129,6 +129,32 @@ const NAMINGS: [Naming; 6] = [
             ("@footend", "#ToeBase"),
             ("@toeend", "#ToeBase_End"),
             ("#toeend", "#ToeBase_End"),
+        ],
+    },
+    Naming {
+        about: "joints without wrists and ankles, as of MakeHuman and MocapNET",
+        template: "bvh",
+        names: &[
+            ("hip", "Hips"),
+            ("hips", "Hips"),
+            ("abdomen", "Spine"),
+            ("spine", "Spine"),
+            ("chest", "Spine1"),
+            ("neck", "Neck"),
+            ("neck1", "Neck1"),
+            ("head", "Head"),
+            ("@shoulder", "#Arm"),
+            ("#shoulder", "#Arm"),
+            ("@elbow", "#ForeArm"),
+            ("#elbow", "#ForeArm"),
+            ("@hand", "#Hand"),
+            ("#hand", "#Hand"),
+            ("@hip", "#UpLeg"),
+            ("#hip", "#UpLeg"),
+            ("@knee", "#Leg"),
+            ("#knee", "#Leg"),
+            ("@foot", "#Foot"),
+            ("#foot", "#Foot"),
         ],
     },
     Naming {
@@ -391,6 +417,12 @@ mod tests {
                  Hand_R UpperLeg_L LowerLeg_L Foot_L Toes_L UpperLeg_R LowerLeg_R Foot_R Toes_R",
                 "bvh",
                 19,
+            ),
+            (
+                "hip abdomen chest neck neck1 head jaw rcollar rshoulder relbow rhand lcollar lshoulder lelbow lhand rbuttock rhip \
+                 rknee rfoot lbuttock lhip lknee lfoot",
+                "bvh",
+                18,
             ),
             (
                 "spine spine.001 spine.002 spine.004 head upper_arm.L forearm.L hand.L upper_arm.R forearm.R hand.R thigh.L shin.L \

@@ -130,11 +130,14 @@ fn a_trimmed_header_yields_to_the_parameters_and_what_is_left_over_is_reported()
 
 #[test]
 fn the_callers_unit_overrides_an_unknown_one() {
-    let made = Made { units: "mete", ..Made::default() };
+    let made = Made { units: "yard", ..Made::default() };
     let error = made.read(Choices::default()).expect_err("an unknown unit").to_string();
-    assert!(error.contains("mete"), "{error}");
+    assert!(error.contains("yard"), "{error}");
     let choices = Choices { unit: Some(Unit { mm: 10.0 }), ..Choices::default() };
     assert_eq!(made.read(choices).expect("a recording").by_name(0)["HEAD"], [10.0, 5000.0, 17_000.0]);
+    // Metres, cut to four characters.
+    let metres = Made { units: "mete", ..Made::default() };
+    assert_eq!(metres.read(Choices::default()).expect("a recording").unit.value.mm, 1000.0);
 }
 
 #[test]

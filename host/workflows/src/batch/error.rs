@@ -32,6 +32,8 @@ pub enum BatchError {
     Report { what: &'static str, path: PathBuf, reason: String },
     #[error("{failed} of {jobs} jobs failed; {} says why; run the batch again to do them again", failures.display())]
     Failed { failed: usize, jobs: usize, failures: PathBuf },
+    #[error("{failed} of {jobs} jobs would fail; their lines of the output say why")]
+    WouldFail { failed: usize, jobs: usize },
     #[error("cannot start a thread: {0}")]
     Threads(String),
 }

@@ -14,6 +14,8 @@ use super::{BatchError, fields::Fields};
 /// Most bytes of a job, so that memory does not depend on the file.
 pub(super) const JOB_BYTES_MAX: u64 = 1 << 20;
 const JOB: &str = "[[job]]";
+/// Spreadsheets and editors write it.
+const BYTE_ORDER_MARK: &str = "\u{feff}";
 pub(super) const KIND: &str = "do";
 
 pub(super) struct Entry {
@@ -78,9 +80,16 @@ impl Manifest {
     pub fn next(&mut self) -> Result<Option<Entry>, BatchError> {
         let found = match &mut self.source {
             Source::Csv { reader, names } => {
-                let line = reader.position().line() as usize;
                 let mut row = csv::StringRecord::new();
-                match reader.read_record(&mut row) {
+                // Spreadsheets write rows of empty cells.
+                let (line, read) = loop {
+                    let line = reader.position().line() as usize;
+                    let read = reader.read_record(&mut row);
+                    if !matches!(read, Ok(true)) || row.iter().any(|cell| !cell.is_empty()) {
+                        break (line, read);
+                    }
+                };
+                match read {
                     Ok(false) => None,
                     Ok(true) => {
                         let line = row.position().map_or(line, |position| position.line() as usize);
@@ -177,8 +186,8 @@ fn csv_source(mut file: File, path: &Path) -> Result<Source, BatchError> {
         .flexible(true)
         .from_reader(LineFeeds { file, after_return: false });
     let names = reader.headers().map_err(|error| wrong_csv(path, &error))?.clone();
-    // Spreadsheets write a byte order mark.
-    let names: csv::StringRecord = names.iter().map(|name| name.trim_start_matches('\u{feff}')).collect();
+    let names = names.iter().map(|name| name.trim_start_matches(BYTE_ORDER_MARK));
+    let names: csv::StringRecord = names.collect();
     let wrong = |reason| BatchError::Manifest { path: path.into(), line: 1, reason };
     if !names.iter().any(|name| name == KIND) {
         let header = names.iter().collect::<Vec<_>>().join(",");
@@ -196,6 +205,10 @@ fn csv_source(mut file: File, path: &Path) -> Result<Source, BatchError> {
 
 fn toml_source(file: File, path: &Path, base: &Path) -> Result<Source, BatchError> {
     let mut reader = BufReader::new(file);
+    let unreadable = |source| BatchError::Read { path: path.into(), source };
+    if reader.fill_buf().map_err(unreadable)?.starts_with(BYTE_ORDER_MARK.as_bytes()) {
+        reader.consume(BYTE_ORDER_MARK.len());
+    }
     let mut next_line = 1;
     let (head, more) = until_job(&mut reader, path, &mut next_line)?;
     let table = head.parse::<toml::Table>().map_err(|error| wrong_toml(path, 0, &head, &error))?;
@@ -305,6 +318,18 @@ mod tests {
             );
             assert_eq!(fields.without("out")["views"], [list]);
         }
+    }
+
+    #[test]
+    fn a_byte_order_mark_and_empty_rows_are_ignored() {
+        let job = "[[job]]\ndo = 'depth'\nfar = 'a.png'\n";
+        for head in ["", "# shared\n", "[depth]\nsmooth = 9\n"] {
+            let found = all("a.toml", &format!("\u{feff}{head}{job}"));
+            assert!(found.len() == 1 && found[0].1.is_ok(), "{found:?}");
+        }
+        let found = all("a.csv", "do,far,near\n,,\ndepth,a,b\n , ,\n,,,,\ndepth,c,d\n,,\n");
+        assert_eq!(found.iter().map(|(line, _)| *line).collect::<Vec<_>>(), [3, 6]);
+        assert!(found.iter().all(|(_, job)| job.is_ok()), "{found:?}");
     }
 
     #[test]

@@ -43,6 +43,12 @@ impl Outs {
         self.jobs
     }
 
+    /// Whether a job makes `path`.
+    pub fn makes(&self, path: &Path) -> bool {
+        current_folder()
+            .is_ok_and(|current| self.lines.contains_key(&self.hasher.hash_one(on_disk(&current, path))))
+    }
+
     /// Checks that the job on `line` may make `out`: no earlier job makes it, and no job makes a folder around it.
     pub fn check(&self, line: usize, out: &str) -> Result<(), BatchError> {
         match self.maker(&on_disk(&self.base, out.as_ref()), Some(line)) {

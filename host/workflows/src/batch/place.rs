@@ -1,12 +1,14 @@
-//! Place of a job's result, moved there when complete. Files that no batch wrote stay.
+//! Place of a job's result, moved there when complete. Files that no batch wrote stay where they are.
 
 use std::{
+    collections::BTreeSet,
     ffi::OsString,
     fs::{self, File},
     io,
     path::{Path, PathBuf},
 };
 
+use farnear_files::staging::PARTIAL;
 use serde_json::Value;
 
 use super::{BatchError, provenance::Provenance};
@@ -21,6 +23,18 @@ pub(crate) fn final_place(out: &Path) -> PathBuf {
     let aside = out.parent().filter(|parent| parent.to_string_lossy().ends_with(ASIDE));
     let beside = aside.and_then(|aside| Some(aside.parent()?.join(out.file_name()?)));
     beside.unwrap_or_else(|| out.into())
+}
+
+/// Whether `path` is named as unfinished files of a batch or a command.
+pub(crate) fn is_unfinished(path: &Path) -> bool {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    name.starts_with('.') && (name.ends_with(ASIDE) || name.contains(PARTIAL))
+}
+
+/// The result file whose record is at `path`, by its name.
+pub(crate) fn result_of(path: &Path) -> Option<PathBuf> {
+    let name = path.file_name()?.to_str()?.strip_suffix(RECORD)?.strip_suffix('.')?;
+    (!name.is_empty()).then(|| path.with_file_name(name))
 }
 
 pub(super) struct Place {
@@ -69,12 +83,17 @@ impl Place {
         clear(&aside).map_err(unwritable)?;
         let made = aside.join(name);
         let found = make(&made)?;
-        let strangers = self.strangers().map_err(unwritable)?;
-        if let Some(name) = strangers.iter().find(|name| made.join(name).exists()) {
+        let earlier = Provenance::read(&self.record());
+        let strangers = earlier.as_ref().map_or(Ok(Vec::new()), |earlier| self.strangers(earlier))?;
+        let is_in_the_way = |name: &&PathBuf| {
+            made.join(name).exists() || name.ancestors().any(|part| made.join(part).is_file())
+        };
+        if let Some(name) = strangers.iter().find(is_in_the_way) {
             return Err(BatchError::Foreign { path: self.target.join(name) }.into());
         }
-        let record = toml::to_string(&wanted.with_figures(&found).with_output(&made)?)?;
-        self.put(&aside, &made, &record, &strangers).map_err(unwritable)?;
+        let new = wanted.with_figures(&found).with_output(&made)?;
+        let records = [toml::to_string(&new.unfinished(earlier.as_ref()))?, toml::to_string(&new)?];
+        self.put(&made, earlier.as_ref(), records).map_err(unwritable)?;
         drop(clearing);
         Ok(found)
     }
@@ -84,9 +103,14 @@ impl Place {
         let record = self.record();
         let Some(found) = Provenance::read(&record) else { return Ok(()) };
         fs::remove_file(record)?;
-        for file in found.outputs().map(|name| self.root().join(name)).filter(|file| file.exists()) {
+        found.outputs().try_for_each(|name| self.remove(name))
+    }
+
+    /// Removes a file of the result and the folders that it leaves empty.
+    fn remove(&self, name: &Path) -> io::Result<()> {
+        let file = self.root().join(name);
+        if file.exists() {
             fs::remove_file(&file)?;
-            // A folder that holds other files stays.
             let folders = file.ancestors().skip(1).take_while(|folder| folder.starts_with(&self.target));
             folders.map(fs::remove_dir).take_while(io::Result::is_ok).for_each(drop);
         }
@@ -94,15 +118,14 @@ impl Place {
     }
 
     /// Files of the result's folder that no batch wrote, relative to it.
-    fn strangers(&self) -> io::Result<Vec<PathBuf>> {
-        let Some(found) = Provenance::read(&self.record()).filter(|_| !self.is_file && self.target.exists())
-        else {
+    fn strangers(&self, earlier: &Provenance) -> Result<Vec<PathBuf>> {
+        if self.is_file || !self.target.exists() {
             return Ok(Vec::new());
-        };
-        let files = inputs::files_below(&self.target).map_err(io::Error::other)?;
+        }
+        let ours: BTreeSet<&Path> = earlier.outputs().chain([Path::new(RECORD)]).collect();
+        let files = inputs::files_below(&self.target)?;
         let names = files.iter().filter_map(|file| file.strip_prefix(&self.target).ok());
-        let ours = |name: &Path| name == Path::new(RECORD) || found.outputs().any(|output| output == name);
-        Ok(names.filter(|name| !ours(name)).map(Path::to_path_buf).collect())
+        Ok(names.filter(|name| !ours.contains(name)).map(Path::to_path_buf).collect())
     }
 
     /// Locks the temporary folder for this process, so that two runs of a job do not mix.
@@ -120,28 +143,40 @@ impl Place {
         }
     }
 
-    fn put(&self, aside: &Path, made: &Path, record: &str, strangers: &[PathBuf]) -> io::Result<()> {
-        if self.is_file {
-            // Remove the old record first, so that it never accompanies another result.
-            let (old, new) = (self.record(), aside.join("record"));
-            fs::write(&new, record)?;
-            if old.exists() {
-                fs::remove_file(&old)?;
-            }
-            fs::rename(made, &self.target)?;
-            return fs::rename(new, old);
+    /// Moves a result to its place: a new folder whole, otherwise each file alone. Until the last file is moved the
+    /// record is `unfinished`: the next run of an interrupted batch knows which files are its own.
+    fn put(
+        &self,
+        made: &Path,
+        earlier: Option<&Provenance>,
+        [unfinished, finished]: [String; 2],
+    ) -> io::Result<()> {
+        if !self.is_file && !self.target.exists() {
+            fs::write(made.join(RECORD), finished)?;
+            return fs::rename(made, &self.target);
         }
-        fs::write(made.join(RECORD), record)?;
-        if self.target.exists() {
-            for name in strangers {
-                if let Some(folder) = made.join(name).parent() {
-                    fs::create_dir_all(folder)?;
-                }
-                fs::rename(self.target.join(name), made.join(name))?;
+        let (from, files) = if self.is_file {
+            (made.parent().unwrap_or(Path::new("")), vec![made.to_path_buf()])
+        } else {
+            (made, inputs::files_below(made).map_err(io::Error::other)?)
+        };
+        let names: BTreeSet<&Path> = files.iter().filter_map(|file| file.strip_prefix(from).ok()).collect();
+        let waiting = made.with_added_extension(RECORD);
+        let write = |record: String| {
+            fs::write(&waiting, record)?;
+            fs::rename(&waiting, self.record())
+        };
+        write(unfinished)?;
+        let stale = earlier.into_iter().flat_map(Provenance::outputs);
+        stale.filter(|name| !names.contains(name)).try_for_each(|name| self.remove(name))?;
+        for name in names {
+            let place = self.root().join(name);
+            if let Some(folder) = place.parent() {
+                fs::create_dir_all(folder)?;
             }
-            fs::rename(&self.target, aside.join("old"))?;
+            fs::rename(from.join(name), place)?;
         }
-        fs::rename(made, &self.target)
+        write(finished)
     }
 
     fn record(&self) -> PathBuf {
@@ -175,4 +210,88 @@ fn clear(folder: &Path) -> io::Result<()> {
         if path.is_dir() { fs::remove_dir_all(path)? } else { fs::remove_file(path)? }
     }
     Ok(())
+}
+
+#[cfg(all(test, unix))]
+mod tests {
+    use std::os::unix::fs::{MetadataExt, symlink};
+
+    use super::*;
+    use crate::batch::fields::Fields;
+
+    fn fill(place: &Place, names: &[&str]) -> Result<Value> {
+        place.fill(Provenance::new("depth", &Fields::default(), Vec::new()), |made| {
+            for name in names {
+                let file = if place.is_file { made.to_path_buf() } else { made.join(name) };
+                fs::create_dir_all(file.parent().expect("a parent")).expect("a folder");
+                fs::write(file, name).expect("a writable folder");
+            }
+            Ok(Value::Null)
+        })
+    }
+
+    fn listing(folder: &Path) -> Vec<String> {
+        let entries =
+            fs::read_dir(folder).expect("a folder").map(|entry| entry.expect("an entry").file_name());
+        let mut names: Vec<_> = entries.map(|name| name.to_string_lossy().into_owned()).collect();
+        names.sort();
+        names
+    }
+
+    #[test]
+    fn files_that_no_batch_wrote_are_not_moved() {
+        let root = tempfile::tempdir().expect("a folder");
+        let target = root.path().join("result");
+        let (raw, notes) = (root.path().join("raw/1.png"), target.join("notes.txt"));
+        let place = Place::new(target.clone(), false);
+        fill(&place, &["a", "b", "sub/x"]).expect("a result");
+        fs::create_dir(root.path().join("raw")).expect("a folder");
+        fs::write(&raw, "original").expect("a writable folder");
+        fs::write(&notes, "mine").expect("a writable folder");
+        symlink("../raw", target.join("raw")).expect("a link");
+        symlink(".", target.join("loop")).expect("a link");
+        let folder = fs::metadata(&target).expect("a folder").ino();
+
+        fill(&place, &["b", "c"]).expect("a result");
+        assert_eq!(listing(&target), ["b", "batch.toml", "c", "loop", "notes.txt", "raw"]);
+        assert_eq!(fs::metadata(&target).expect("a folder").ino(), folder, "the folder is the same");
+        assert!(raw.exists() && target.join("raw").is_symlink(), "a linked folder is not entered");
+        for names in [&["notes.txt"][..], &["notes.txt/x"], &["raw"], &["raw/2.png"]] {
+            let error = fill(&place, names).expect_err("a file of the user").to_string();
+            assert!(error.contains("was not made by a batch"), "{error}");
+        }
+        assert_eq!(listing(&root.path().join("raw")), ["1.png"]);
+        assert_eq!(fs::read_to_string(notes).expect("the notes"), "mine");
+    }
+
+    #[test]
+    fn an_interrupted_replacement_is_resumed() {
+        let root = tempfile::tempdir().expect("a folder");
+        let target = root.path().join("result");
+        let place = Place::new(target.clone(), false);
+        fill(&place, &["a", "b"]).expect("a result");
+        fs::write(target.join("notes.txt"), "mine").expect("a writable folder");
+        // A file cannot replace a folder.
+        fs::create_dir(target.join("d")).expect("a folder");
+        fill(&place, &["c", "d"]).expect_err("no place for a file");
+        assert_eq!(listing(&target), ["batch.toml", "c", "d", "notes.txt"]);
+        assert_eq!(listing(root.path()), ["result"]);
+        let wanted = Provenance::new("depth", &Fields::default(), Vec::new());
+        assert!(matches!(place.look(&wanted, false), Ok(Found::ToDo)));
+        fs::remove_dir(target.join("d")).expect("an empty folder");
+        fill(&place, &["d"]).expect("a result");
+        assert_eq!(listing(&target), ["batch.toml", "d", "notes.txt"]);
+        assert!(matches!(place.look(&wanted, false), Ok(Found::Done(_))));
+    }
+
+    #[test]
+    fn a_result_file_may_have_the_name_of_a_record() {
+        let root = tempfile::tempdir().expect("a folder");
+        let place = Place::new(root.path().join("record"), true);
+        for text in ["one", "two"] {
+            fill(&place, &[text]).expect("a result");
+            assert_eq!(fs::read_to_string(root.path().join("record")).expect("a file"), text);
+            assert_eq!(listing(root.path()), ["record", "record.batch.toml"]);
+        }
+    }
 }

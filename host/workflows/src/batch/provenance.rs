@@ -1,7 +1,7 @@
 //! `batch.toml`: what a result was made from. The next run skips a job with matching provenance.
 
 use std::{
-    collections::BTreeMap,
+    collections::{BTreeMap, BTreeSet},
     fs,
     path::{Component, Path, PathBuf},
 };
@@ -48,8 +48,14 @@ impl Default for Sums {
 }
 
 impl Sums {
-    pub fn of(&self, paths: &[PathBuf], base: &Path) -> Result<Vec<HashedFile>> {
-        let files = inputs::files(paths)?;
+    /// Hashes the files of a job's inputs, except the results of jobs in an input folder.
+    pub fn of(
+        &self,
+        paths: &[PathBuf],
+        base: &Path,
+        is_result: &dyn Fn(&Path) -> bool,
+    ) -> Result<Vec<HashedFile>> {
+        let files = inputs::files(paths, is_result)?;
         let sum = |file: &PathBuf| {
             // Relative to the manifest, so that the whole can be moved.
             let name = file.strip_prefix(base).unwrap_or(file).display().to_string();
@@ -97,6 +103,17 @@ impl Provenance {
         };
         self.output = files.iter().map(summed).collect::<Result<_>>()?;
         Ok(self)
+    }
+
+    /// The record while files of this result replace those of `earlier`: it lists both and matches no job.
+    pub fn unfinished(&self, earlier: Option<&Self>) -> Self {
+        let new: BTreeSet<&str> = self.output.iter().map(|output| output.file.as_str()).collect();
+        let stale = earlier.into_iter().flat_map(|earlier| &earlier.output);
+        let stale = stale.filter(|output| !new.contains(output.file.as_str())).cloned();
+        let mut record = self.clone();
+        record.made_by.clear();
+        record.output.extend(stale);
+        record
     }
 
     /// Files of the result, relative to its folder. A name that leads out of the folder is not one.
@@ -147,7 +164,11 @@ mod tests {
         fs::create_dir(&result).expect("a writable folder");
         write(&input, "abc");
         write(&result.join("map"), "1234");
-        let sums = || Sums::default().of(std::slice::from_ref(&input), folder.path()).expect("readable");
+        let no_result = |_: &Path| false;
+        let sums = || {
+            let inputs = std::slice::from_ref(&input);
+            Sums::default().of(inputs, folder.path(), &no_result).expect("readable")
+        };
         let mut fields = Fields::new(folder.path());
         fields.insert("out", vec!["result".into()]).expect("a new field");
         fields.insert("smooth", vec!["7".into()]).expect("a new field");
@@ -184,7 +205,7 @@ mod tests {
         let sums = Sums::default();
         let sum = |text: &str| {
             fs::write(&file, text).expect("a writable folder");
-            sums.of(std::slice::from_ref(&file), folder.path()).expect("readable")
+            sums.of(std::slice::from_ref(&file), folder.path(), &|_| false).expect("readable")
         };
         assert_ne!(sum("a"), sum("longer"));
     }

@@ -20,7 +20,8 @@ pub(super) struct Tally<'a> {
     total: usize,
     context: &'a Context<'a>,
     on_job: &'a (dyn Fn(&JobReport) -> io::Result<()> + Sync),
-    failures: PathBuf,
+    /// `None` in a dry run.
+    failures: Option<PathBuf>,
     inner: Mutex<Inner>,
 }
 
@@ -36,18 +37,21 @@ impl<'a> Tally<'a> {
     /// Discards the failures of the last run.
     pub fn new(
         total: usize,
-        failures: &Path,
+        failures: Option<&Path>,
         context: &'a Context<'a>,
         on_job: &'a (dyn Fn(&JobReport) -> io::Result<()> + Sync),
     ) -> Result<Self, BatchError> {
-        match fs::remove_file(failures) {
-            Err(source) if source.kind() != io::ErrorKind::NotFound => {
-                return Err(BatchError::Write { path: failures.into(), source });
+        if let Some(path) = failures {
+            match fs::remove_file(path) {
+                Err(source) if source.kind() != io::ErrorKind::NotFound => {
+                    return Err(BatchError::Write { path: path.into(), source });
+                }
+                _ => {}
             }
-            _ => {}
         }
         context.progress.advance("jobs", 0, Some(total));
-        Ok(Self { total, context, on_job, failures: failures.into(), inner: Mutex::default() })
+        let failures = failures.map(Path::to_path_buf);
+        Ok(Self { total, context, on_job, failures, inner: Mutex::default() })
     }
 
     /// Whether a file with this first line is a file of failures.
@@ -83,10 +87,11 @@ impl<'a> Tally<'a> {
     }
 
     fn keep(&self, file: &mut Option<File>, report: &JobReport) -> Result<()> {
-        let unwritable = |source| BatchError::Write { path: self.failures.clone(), source };
+        let Some(path) = &self.failures else { return Ok(()) };
+        let unwritable = |source| BatchError::Write { path: path.clone(), source };
         let file = match file {
             Some(file) => file,
-            None => file.insert(File::create(&self.failures).map_err(unwritable)?),
+            None => file.insert(File::create(path).map_err(unwritable)?),
         };
         let line = serde_json::to_string(report).map_err(|error| unwritable(error.into()))?;
         writeln!(file, "{line}").map_err(unwritable)?;

@@ -6,7 +6,7 @@ use farnear_depth::{
     adaptive_window::Window,
     fill::{FillBy, LowTexture},
     measure::{DepthMethod, MeasureSettings},
-    optics::{Optics, USABLE_BLUR_PX},
+    optics::Optics,
     pipeline::Settings,
     prepare::{Align, Balance, PrepareSettings},
 };
@@ -273,7 +273,7 @@ impl DepthRequest {
 
     fn chosen_bin(&self, optics: &Optics, is_mosaic: bool, doubts: &mut Vec<OpticsDoubt>) -> usize {
         let blur_px = optics.max_blur_px();
-        let of_blur = (blur_px / USABLE_BLUR_PX).ceil().clamp(1.0, 16.0) as usize;
+        let of_blur = optics::usable_bin(optics);
         let needed = if is_mosaic { of_blur.next_multiple_of(2) } else { of_blur };
         let binned = optics.distortion().is_none() && optics.stage().is_none() && self.may_bin();
         if of_blur > 1 {

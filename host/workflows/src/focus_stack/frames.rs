@@ -60,6 +60,31 @@ impl Frames {
         Self { warps, gains, left_out, untold, exchanged, usual: None, drift_px: 0.0 }
     }
 
+    /// All warnings; `name` gives the name of an image.
+    pub fn remarks(&self, name: impl Fn(usize) -> String) -> Vec<String> {
+        let mut remarks = Vec::new();
+        if !self.untold.is_empty() {
+            let names: Vec<String> = self.untold.iter().map(|index| name(*index)).collect();
+            remarks.push(format!(
+                "could not check whether {} is shaken or defocused: the images next to it do not tell how sharp it should be (the scene is \
+                 sharpest there, or the images are irregular or fewer than 5)",
+                names.join(" or ")
+            ));
+        }
+        remarks.extend(self.warnings());
+        for pair in &self.exchanged {
+            let [one, other] = pair.map(&name);
+            let shaken = if pair[1] - pair[0] == 1 { ", or one of them is shaken or defocused" } else { "" };
+            remarks.push(format!(
+                "{one} and {other} look exchanged{shaken}: in the order given, sharpness rises and falls more than once; depth may be \
+                 wrong: exchange them or correct the positions (--positions-um)"
+            ));
+        }
+        let left_out = self.left_out.iter();
+        remarks.extend(left_out.map(|(index, reason)| format!("left out {}: {reason}", name(*index))));
+        remarks
+    }
+
     pub fn warnings(&self) -> Vec<String> {
         let mut warnings = Vec::new();
         if let Some(usual) = self.usual.filter(|usual| *usual < COARSE) {
@@ -78,6 +103,29 @@ impl Frames {
         }
         warnings
     }
+}
+
+/// [`check`]; `use_all` leaves out no image, and without alignment it skips the comparison.
+pub(super) fn of_stack<S>(
+    images: &S,
+    positions: &[f64],
+    model: Option<Model>,
+    use_all: bool,
+    context: &Context<'_>,
+) -> Result<Frames>
+where
+    S: Slices + ?Sized,
+    WorkflowError: From<S::Error>,
+{
+    if use_all && model.is_none() {
+        return Ok(Frames { gains: gains(images)?, ..Frames::unchecked(images.count()) });
+    }
+    let mut frames = check(images, positions, model, context)?;
+    if use_all {
+        frames.left_out.clear();
+        frames.untold.clear();
+    }
+    Ok(frames)
 }
 
 pub(super) fn check<S>(

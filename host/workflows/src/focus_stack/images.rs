@@ -53,7 +53,7 @@ const AROUND_SPECK: usize = 5;
 const SPECK: f32 = 0.05;
 
 /// Fills single pixels and small groups without a value by the mean of their neighbours; returns where they are.
-fn fill_specks(image: &mut Array2<f32>) -> Vec<(usize, usize)> {
+pub(super) fn fill_specks(image: &mut Array2<f32>) -> Vec<(usize, usize)> {
     if image.iter().all(|value| value.is_finite()) {
         return Vec::new();
     }
@@ -71,6 +71,32 @@ fn fill_specks(image: &mut Array2<f32>) -> Vec<(usize, usize)> {
         }
     }
     specks
+}
+
+/// Adds an image's specks to the mask `unseen`, where the lens' distortion and the warp move them. The measure refuses images
+/// of another size.
+pub(super) fn mark_specks(
+    unseen: &mut Option<Array2<bool>>,
+    dim: (usize, usize),
+    specks: &[(usize, usize)],
+    distortion: Option<&Distortion>,
+    warp: &Warp,
+) {
+    if specks.is_empty() {
+        return;
+    }
+    let mut image = Array2::zeros(dim);
+    specks.iter().for_each(|at| image[*at] = 1.0_f32);
+    if let Some(distortion) = distortion {
+        image = straightened(image.view(), distortion);
+    }
+    if *warp != Warp::IDENTITY {
+        image = resample(image.view(), warp);
+    }
+    let unseen = unseen.get_or_insert_with(|| Array2::from_elem(image.dim(), false));
+    if unseen.dim() == image.dim() {
+        unseen.zip_mut_with(&image, |unseen, speck| *unseen |= speck.abs() > SPECK);
+    }
 }
 
 const PIXEL: usize = size_of::<f32>();
@@ -150,17 +176,8 @@ impl<'a> Images<'a> {
     /// that an image has no value for.
     pub fn prepare(&self, distortion: Option<Distortion>, warps: &[Warp]) -> Result<Option<Array2<bool>>> {
         let mut unseen = None;
-        for (index, warp) in warps.iter().enumerate().filter(|(index, _)| !self.specks[*index].is_empty()) {
-            let mut specks = Array2::zeros(self.dim(index));
-            self.specks[index].iter().for_each(|at| specks[*at] = 1.0_f32);
-            if let Some(distortion) = &distortion {
-                specks = straightened(specks.view(), distortion);
-            }
-            if *warp != Warp::IDENTITY {
-                specks = resample(specks.view(), warp);
-            }
-            let unseen = unseen.get_or_insert_with(|| Array2::from_elem(specks.dim(), false));
-            unseen.zip_mut_with(&specks, |unseen, speck| *unseen |= speck.abs() > SPECK);
+        for (index, warp) in warps.iter().enumerate() {
+            mark_specks(&mut unseen, self.dim(index), &self.specks[index], distortion.as_ref(), warp);
         }
         for (index, warp) in warps.iter().enumerate() {
             if distortion.is_none() && *warp == Warp::IDENTITY {

@@ -175,10 +175,9 @@ pub fn even_positions(count: usize, focused_at_mm: Option<&[f64]>) -> Vec<f64> {
     }
 }
 
-/// In mm if the distances are known, else the image number from 1.
-pub fn depth_of_places(place: &Array2<f32>, count: usize, focused_at_mm: Option<&[f64]>) -> Array2<f32> {
-    let axis = if focused_at_mm.is_some() { Axis::ObjectMm } else { Axis::Number };
-    depth_at(place, axis, &even_positions(count, focused_at_mm))
+/// Depths of places among images at these [`even_positions`]: in mm if these are of distances, else image numbers from 1.
+pub fn depth_of_places(place: &Array2<f32>, even: &[f64], in_mm: bool) -> Array2<f32> {
+    depth_at(place, if in_mm { Axis::ObjectMm } else { Axis::Number }, even)
 }
 
 fn depth_at(place: &Array2<f32>, axis: Axis, even: &[f64]) -> Array2<f32> {

@@ -2,7 +2,7 @@ use std::fmt::Write as _;
 
 use base64::{Engine as _, engine::general_purpose::STANDARD};
 
-use super::style::STYLE;
+use super::{pictures::decimals, style::STYLE};
 use crate::{
     MADE_BY,
     measure::{PlaneFigures, RegionFigures},
@@ -31,19 +31,23 @@ impl Page {
 
     pub fn figures(&mut self, found: &RegionFigures) {
         let unit = found.unit;
-        let length =
-            |value: Option<f64>| value.map_or_else(|| "-".into(), |value| format!("{value:.3} {unit}"));
+        // `scale` is the least length that must not be rounded away.
+        let length = |value: Option<f64>, scale: Option<f64>| {
+            let decimals = decimals(scale.unwrap_or_default(), 3);
+            value.map_or_else(|| "-".into(), |value| format!("{value:.decimals$} {unit}"))
+        };
         let mut rows = vec![
             ("fill rate", format!("{:.2} %", 100.0 * found.fill_rate)),
-            ("mean depth", length(found.mean)),
-            ("standard deviation", length(found.standard_deviation)),
-            ("predicted deviation (RMS)", length(found.predicted_deviation)),
+            ("mean depth", length(found.mean, found.standard_deviation)),
+            ("standard deviation", length(found.standard_deviation, found.standard_deviation)),
+            ("predicted deviation (RMS)", length(found.predicted_deviation, found.predicted_deviation)),
         ];
         if let Some([low, high]) = found.range {
-            rows.push(("range", format!("{low:.2} to {high:.2} {unit}")));
+            let decimals = decimals(high - low, 2);
+            rows.push(("range", format!("{low:.decimals$} to {high:.decimals$} {unit}")));
         }
         if let Some(PlaneFigures { per_pixel, plane, .. }) = &found.plane {
-            rows.push(("plane fit: RMS", length(Some(plane.rms_mm))));
+            rows.push(("plane fit: RMS", length(Some(plane.rms_mm), Some(plane.rms_mm))));
             if !per_pixel {
                 rows.push(("plane fit: tilt", format!("{:.3}°", plane.tilt_deg)));
             }

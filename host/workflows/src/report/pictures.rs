@@ -9,6 +9,8 @@ use ndarray::ArrayView2;
 use crate::error::Result;
 
 const BINS: usize = 96;
+/// Floats have no more digits.
+const DECIMALS_MAX: f64 = 9.0;
 const NONE: Rgb<u8> = Rgb([150, 150, 152]);
 
 /// Quantile of the finite values; `None` without any.
@@ -19,6 +21,12 @@ pub fn quantile(map: ArrayView2<f32>, part: f64) -> Option<f32> {
     }
     let at = (part * (finite.len() - 1) as f64) as usize;
     Some(*finite.select_nth_unstable_by(at, f32::total_cmp).1)
+}
+
+/// Decimals for values of a range of this width, at least `least`: steps of a tenth of the range differ.
+pub fn decimals(range: f64, least: usize) -> usize {
+    let needed = if range > 0.0 { (1.0 - range.log10()).ceil() } else { 0.0 };
+    least.max(needed.clamp(0.0, DECIMALS_MAX) as usize)
 }
 
 /// A map as PNG, from dark at `low` to bright at `high`.
@@ -43,7 +51,8 @@ pub fn histogram(depth: ArrayView2<f32>, unit: &str) -> String {
     let (Some(low), Some(high)) = (quantile(depth, 0.005), quantile(depth, 0.995)) else {
         return "<p>no depth</p>".into();
     };
-    let span = (high - low).max(1e-3);
+    let span = if high > low { high - low } else { 1e-3 };
+    let decimals = decimals(f64::from(span), 1);
     let mut counts = [0u32; BINS];
     for value in depth.iter().copied().filter(|value| (low..=high).contains(value)) {
         let bin = ((value - low) / span * BINS as f32) as usize;
@@ -58,8 +67,30 @@ pub fn histogram(depth: ArrayView2<f32>, unit: &str) -> String {
         let _ = write!(svg, "<rect x={x} y={y:.1} width=9 height={height:.1} fill=\"#31688e\"/>");
     }
     for (x, anchor, value) in [(0, "start", low), (480, "middle", low + 0.5 * span), (960, "end", high)] {
-        let _ = write!(svg, "<text x={x} y=170 font-size=14 text-anchor={anchor}>{value:.1} {unit}</text>");
+        let _ = write!(
+            svg,
+            "<text x={x} y=170 font-size=14 text-anchor={anchor}>{value:.decimals$} {unit}</text>"
+        );
     }
     svg.push_str("</svg>");
     svg
+}
+
+#[cfg(test)]
+mod tests {
+    use ndarray::Array2;
+
+    use super::*;
+
+    #[test]
+    fn labels_of_a_small_range_differ() {
+        for (range, expected) in [(46.0, 2), (0.5, 2), (0.08, 3), (2e-4, 5), (0.0, 2), (f64::NAN, 2)] {
+            assert_eq!(decimals(range, 2), expected, "{range}");
+        }
+        let of_microscope = Array2::from_shape_fn((10, 10), |(_, x)| 2.0 + 1e-4 * x as f32);
+        let plot = histogram(of_microscope.view(), "mm");
+        for label in [">2.00000 mm<", ">2.00045 mm<", ">2.00090 mm<"] {
+            assert!(plot.contains(label), "{plot}");
+        }
+    }
 }

@@ -28,7 +28,10 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_with::{DisplayFromStr, serde_as};
 
-use self::{drawing::Job, missing::MissingParts};
+use self::{
+    drawing::{Drawn, Job},
+    missing::MissingParts,
+};
 use super::{MM_PER_PX, SilhouettesError, VIEWS, performances::samples_entry};
 use crate::{
     activity::samples::SCALING,
@@ -278,10 +281,21 @@ pub fn draw(settings: &MarkersRequest, context: &Context<'_>) -> Result<MarkersF
     }
     let job =
         Job { settings, views: views.len(), template: &template, frames: &frames, names: &names, context };
-    let silhouettes = match settings.keep {
-        Some(keep) => job.gallery(&views, keep, &out)?,
+    let drawn = match settings.keep {
+        Some(keep) => Drawn { silhouettes: job.gallery(&views, keep, &out)?, in_pieces: 0 },
         None => job.sequences(&views, &out)?,
     };
+    let Drawn { silhouettes, in_pieces } = drawn;
+    let apart = (2 * in_pieces > silhouettes).then(|| {
+        format!(
+            "{name}: {in_pieces} of {silhouettes} silhouettes are in several pieces: points between them are missing, or names mean \
+             other points than those of the template `{}` (--template)",
+            template.name
+        )
+    });
+    if let Some(apart) = &apart {
+        context.progress.warn(apart);
+    }
     for part in &missing.always {
         context.info(&format!("{name}: no marker of `{part}` was recorded; it is not drawn"));
     }
@@ -313,7 +327,7 @@ pub fn draw(settings: &MarkersRequest, context: &Context<'_>) -> Result<MarkersF
         markers: recording.names.len(),
         hidden_markers_percent: rounded(hidden_percent(&recording), 2),
         seconds: rounded(start.elapsed().as_secs_f64(), 3),
-        warnings: warnings.clone(),
+        warnings: warnings.iter().cloned().chain(apart).collect(),
     })
 }
 

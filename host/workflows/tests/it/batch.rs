@@ -143,6 +143,34 @@ fn no_job_writes_into_the_result_of_another() {
     }
 }
 
+#[test]
+fn results_in_the_folder_of_the_input_are_not_inputs() {
+    let root = folder();
+    let manifest = manifest(root.path(), &[("a", "a/clean"), ("a", "a/other"), ("a/m1.png", "b/clean")]);
+    assert_eq!(states(&run(&settings(&manifest)).unwrap()), [State::Done; 3]);
+    // Unfinished files of another process.
+    for name in [".clean.partial-1", ".third.batch-partial"] {
+        fs::create_dir(root.path().join("a").join(name)).unwrap();
+        fs::write(root.path().join("a").join(name).join("half.png"), "").unwrap();
+    }
+    assert_eq!(states(&run(&settings(&manifest)).unwrap()), [State::Already; 3]);
+    fs::copy(root.path().join("a/m1.png"), root.path().join("a/m2.png")).unwrap();
+    let expected = [State::Done, State::Done, State::Already];
+    assert_eq!(states(&run(&settings(&manifest)).unwrap()), expected, "another picture");
+}
+
+#[test]
+fn a_field_for_a_further_result_is_refused() {
+    let root = folder();
+    let path = manifest(root.path(), &[("a", "one")]);
+    let text = fs::read_to_string(&path).unwrap() + "stages = 'stages'\n";
+    fs::write(&path, text).unwrap();
+    let reports = run(&settings(&path)).unwrap();
+    let error = reports[0].error.as_deref().unwrap();
+    assert!(error.contains("`stages`") && error.contains("leave `stages` out in a batch"), "{error}");
+    assert!(!root.path().join("stages").exists() && !root.path().join("one").exists());
+}
+
 #[cfg(unix)]
 #[test]
 fn a_result_that_another_batch_makes_is_left_to_it() {

@@ -12,6 +12,8 @@ const STATURE_M: std::ops::RangeInclusive<f64> = 1.4..=2.1;
 const TYPICAL_M: f64 = 1.7;
 /// Share of the feet-to-head vector along an axis for a sure up axis.
 const UPRIGHT: f64 = 0.8;
+/// Height of the hips over the length of a leg, of a person who does not lie.
+const STANDING: std::ops::RangeInclusive<f64> = 0.4..=1.4;
 /// Frames sampled for the up axis.
 const FRAMES_ASKED: usize = 100;
 
@@ -59,8 +61,16 @@ impl Body {
     }
 
     fn stature(&self, joints: &[Joint]) -> f64 {
-        let bones = |joint: usize| length(joints, joint) - length(joints, self.hips);
-        bones(self.head) + self.feet.iter().map(|&foot| bones(foot)).fold(0.0, f64::max)
+        self.bones(joints, self.head) + self.leg(joints)
+    }
+
+    fn leg(&self, joints: &[Joint]) -> f64 {
+        self.feet.iter().map(|&foot| self.bones(joints, foot)).fold(0.0, f64::max)
+    }
+
+    /// Path length from the hips.
+    fn bones(&self, joints: &[Joint], joint: usize) -> f64 {
+        length(joints, joint) - length(joints, self.hips)
     }
 }
 
@@ -119,19 +129,23 @@ pub fn up(motion: &Motion, kinematics: &Kinematics) -> Known<Up> {
         return Known { value: Up::Y, source: Source::Guess { reason, sure: false } };
     };
     let rest = at_rest(&motion.joints);
-    let at_rest = body.upward(&rest);
-    // Files have y or z up; bones along x are in the hips' own axes.
-    let in_own_axes = !matches!(Up::along(at_rest), Up::Y | Up::Z);
-    let (upward, what) = if body.unfolded(&rest) && !in_own_axes {
-        (at_rest, "in the rest pose")
+    let step = motion.frames.len().div_ceil(FRAMES_ASKED).max(1);
+    let frames: Vec<Vec<Point3>> =
+        motion.frames.iter().step_by(step).map(|frame| kinematics.places(frame)).collect();
+    let of_frames: Point3 = std::array::from_fn(|k| frames.iter().map(|places| body.upward(places)[k]).sum());
+    let of_rest = body.upward(&rest);
+    // Some writers have the rest pose in other axes than the motion: bones along x, or y up and a motion with z up.
+    let [rests, moves] = [of_rest, of_frames].map(Up::along);
+    let leg = body.leg(&motion.joints);
+    let stands = |up: Up| {
+        let hips = frames.iter().map(|places| up.height(places[body.hips])).sum::<f64>();
+        STANDING.contains(&(hips / frames.len().max(1) as f64 / leg))
+    };
+    let in_other_axes = !matches!(rests, Up::Y | Up::Z) || (stands(moves) && !stands(rests));
+    let (upward, what) = if body.unfolded(&rest) && !in_other_axes {
+        (of_rest, "in the rest pose")
     } else {
-        let step = motion.frames.len().div_ceil(FRAMES_ASKED).max(1);
-        let mut sum = [0.0; 3];
-        for frame in motion.frames.iter().step_by(step) {
-            let upward = body.upward(&kinematics.places(frame));
-            (0..3).for_each(|k| sum[k] += upward[k]);
-        }
-        (sum, "over the frames (the rest pose is folded up or on its side)")
+        (of_frames, "over the frames (the rest pose is folded up or in other axes)")
     };
     let length = upward.iter().map(|v| v * v).sum::<f64>().sqrt();
     let value = Up::along(upward);
@@ -231,6 +245,30 @@ mod tests {
         assert!(found.value.mm == 10.0 && sure(&found), "{found:?}");
         let found = up(&motion, &Kinematics::new(&motion));
         assert!(found.value == Up::Y && sure(&found), "{found:?}");
+    }
+
+    #[test]
+    fn a_motion_in_other_axes_than_the_rest_pose_is_upright_and_who_lies_stays_lying() {
+        // The skeleton has y up. Root 8 above the ground along z, turned by 90 deg about x: z is up.
+        let text = |frame: &str| {
+            let joint = "CHANNELS 3 Zrotation Xrotation Yrotation";
+            format!(
+                "HIERARCHY\nROOT Hips\n{{ OFFSET 0 0 0 CHANNELS 6 Xposition Yposition Zposition Zrotation Xrotation Yrotation\n\
+                 JOINT Head\n{{ OFFSET 0 5 0 {joint} End Site {{ OFFSET 0 3 0 }} }}\n\
+                 JOINT Leg\n{{ OFFSET 0 -4 0 {joint}\nJOINT LeftFoot\n{{ OFFSET 0 -5 0 {joint} End Site {{ OFFSET 0 0 1 }} }} }} }}\n\
+                 MOTION\nFrames: 1\nFrame Time: 1\n{frame} 0 0 0 0 0 0 0 0 0\n"
+            )
+        };
+        for (frame, expected) in [
+            ("2 0.3 8 0 90 0", Up::Z),
+            ("2 8 30 0 0 0", Up::Y),
+            // Lying on the ground with y up, the head towards z, somewhere in the room.
+            ("2 1 40 0 90 0", Up::Y),
+        ] {
+            let motion = parse(&text(frame)).expect("a BVH file");
+            let found = up(&motion, &Kinematics::new(&motion));
+            assert_eq!(found.value, expected, "{frame}: {found:?}");
+        }
     }
 
     #[test]

@@ -268,14 +268,16 @@ fn flicker_costs_nothing() {
     let (clean, ..) = error(&good, Vec::new());
     let factors = [1.0, 1.1, 0.85, 1.0, 1.25, 0.9, 1.0, 0.8];
     let flickering = || good.iter().zip(factors.iter().cycle()).map(|(image, factor)| image * *factor);
-    let mut images: Vec<Array2<f32>> = flickering().collect();
+    let images: Vec<Array2<f32>> = flickering().collect();
     assert_eq!(left_out(&images, None), [0; 0]);
     let (untreated, ..) = error(&images, Vec::new());
     let views: Vec<ArrayView2<f32>> = images.iter().map(|image| image.view()).collect();
     let uncompared = gains(&views[..]).unwrap();
     assert_eq!(checked(&images, &even_positions(), None).gains, uncompared, "as by --use-all");
-    super::super::prepare_stack(&mut images, None).unwrap();
-    let (found, known, _) = error(&images, Vec::new());
+    let context = Context::unattended();
+    let prepared = super::super::prepare_stack(images, even_positions(), None, false, &context).unwrap();
+    assert_eq!(prepared.left_out, [0; 0]);
+    let (found, known, _) = error(&prepared.images, Vec::new());
     assert!(untreated > 1.1 * clean, "{untreated} {clean}: the factors must matter");
     assert!(found < 1.05 * clean && known > 0.98, "{found} {clean} {known}");
 }

@@ -4,6 +4,7 @@ use farnear_files::{masks, staging::Staging};
 use farnear_silhouettes::mask::{
     Mask,
     centre::{SIDE_PX, centred},
+    regions::{Connectivity, regions},
 };
 use farnear_silhouettes::silhouette::{
     capsule::Point3,
@@ -40,30 +41,35 @@ pub struct Job<'a> {
 }
 
 impl Job<'_> {
-    /// Draws a folder of masks per view; returns the number of masks with a person.
-    pub fn sequences(&self, views: &[View], out: &Staging) -> Result<usize> {
+    /// Draws a folder of masks per view.
+    pub fn sequences(&self, views: &[View], out: &Staging) -> Result<Drawn> {
         let counter = Counter::new(self.context, UNIT);
-        let drawn: Result<Vec<usize>> = views
+        let drawn: Result<Vec<Drawn>> = views
             .par_iter()
             .enumerate()
             .map(|(index, view)| self.sequence(view, &format!("view{}", index + 1), out, &counter))
             .collect();
-        Ok(drawn?.iter().sum())
+        let add = |sum: Drawn, next: Drawn| Drawn {
+            silhouettes: sum.silhouettes + next.silhouettes,
+            in_pieces: sum.in_pieces + next.in_pieces,
+        };
+        Ok(drawn?.into_iter().fold(Drawn::default(), add))
     }
 
-    fn sequence(&self, view: &View, folder: &str, out: &Staging, counter: &Counter<'_>) -> Result<usize> {
+    fn sequence(&self, view: &View, folder: &str, out: &Staging, counter: &Counter<'_>) -> Result<Drawn> {
         let canvas = self.canvas(view)?;
         out.make_folder(folder)?;
-        let mut silhouettes = 0;
+        let mut drawn = Drawn::default();
         for (frame, name) in self.frames.iter().zip(self.names) {
             counter.check(DURING)?;
             let mask = self.mask(frame, view, &canvas);
-            silhouettes += usize::from(mask.iter().any(|&set| set));
+            drawn.silhouettes += usize::from(mask.iter().any(|&set| set));
+            drawn.in_pieces += usize::from(is_in_pieces(&mask));
             let mask = if self.settings.centred { cut_out(&mask) } else { mask };
             out.write(&format!("{folder}/{name}.png"), &masks::png(&mask)?)?;
             counter.one(Some(self.views * self.frames.len()));
         }
-        Ok(silhouettes)
+        Ok(drawn)
     }
 
     /// Draws the `keep` least similar silhouettes of all views into one folder; returns their number.
@@ -112,6 +118,21 @@ impl Job<'_> {
     }
 }
 
+/// Masks with a person, and those of them whose person is in several pieces.
+#[derive(Clone, Copy, Default)]
+pub struct Drawn {
+    pub silhouettes: usize,
+    pub in_pieces: usize,
+}
+
+fn is_in_pieces(mask: &Mask) -> bool {
+    /// A finger's end is smaller.
+    const LEAST_SHARE: f64 = 0.005;
+    let pieces = regions(mask.view(), true, Connectivity::Eight);
+    let least = LEAST_SHARE * pieces.iter().map(|piece| piece.area).sum::<usize>() as f64;
+    pieces.iter().filter(|piece| piece.area as f64 >= least).count() > 1
+}
+
 /// Refuses more silhouettes than can be compared, with a step between frames that fits.
 fn check_compared(frames: usize, views: usize, every: usize) -> Result<(), SilhouettesError> {
     let (count, limit) = (frames * views, MOST_COMPARED);
@@ -125,6 +146,18 @@ fn check_compared(frames: usize, views: usize, every: usize) -> Result<(), Silho
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_person_of_separate_parts_is_in_pieces() {
+        let mask = |gap: std::ops::Range<usize>| {
+            Mask::from_shape_fn((100, 20), |(row, _)| (10..90).contains(&row) && !gap.contains(&row))
+        };
+        assert!(!is_in_pieces(&mask(0..100)) && !is_in_pieces(&mask(0..0)));
+        assert!(is_in_pieces(&mask(40..60)));
+        let mut fingertip = mask(0..0);
+        fingertip[[95, 3]] = true;
+        assert!(!is_in_pieces(&fingertip));
+    }
 
     #[test]
     fn more_silhouettes_than_can_be_compared_are_refused_with_a_step_that_fits() {
