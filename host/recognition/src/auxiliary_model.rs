@@ -22,11 +22,12 @@ pub struct AuxiliaryModel {
 }
 
 impl AuxiliaryModel {
-    /// Profiles and conformal limits from the training clips. Each clip is compared with other subjects'
-    /// profile of its class, or with that of a single subject's other clips.
+    /// Profiles and conformal limits from the training clips. Each clip is compared with other groups' profile of its
+    /// class: of other subjects, or other performances of a single one.
     pub(super) fn learned(
         recogniser: Arc<Recogniser>,
         clips: &[Clip],
+        groups: &[String],
         labels: &[usize],
         classes: usize,
     ) -> Result<Self, ModelError> {
@@ -44,12 +45,11 @@ impl AuxiliaryModel {
         for (class, mut row) in profiles.rows_mut().into_iter().enumerate() {
             row.assign(&profile(class, &|_| true));
         }
-        let alone = clips.iter().all(|clip| clip.subject == clips[0].subject);
         let scored: Vec<(usize, f32)> = (0..clips.len())
             .into_par_iter()
             .filter_map(|i| {
-                let other = |j: usize| if alone { j != i } else { clips[j].subject != clips[i].subject };
-                // Classes of a single subject have no comparison.
+                let other = |j: usize| groups[j] != groups[i];
+                // Classes of a single group have no comparison.
                 let others =
                     Some(profile(labels[i], &other)).filter(|sum| sum.iter().any(|root| *root > 0.0))?;
                 Some((labels[i], distance(auxiliary[i].as_ref()?.view(), others.view())))

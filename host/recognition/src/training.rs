@@ -82,13 +82,16 @@ impl Recogniser {
             all.iter().map(|clip| activities.iter().position(|a| *a == clip.activity).unwrap_or(0)).collect();
         let mut lengths: Vec<usize> = clips.iter().map(|clip| clip.views[0].frames()).collect();
         lengths.sort_unstable();
-        let renamed = by_performance(clips, performances);
-        let compared = renamed.as_deref().unwrap_or(clips);
-        let independent = names(compared.iter().map(|clip| &clip.subject)).len();
-        let limited = renamed.is_none() || independent >= Limits::fewest(Limits::FALSE_ALARMS);
+        let is_single = clips.iter().all(|clip| clip.subject == clips[0].subject);
+        let groups: Vec<String> = if is_single {
+            (0..clips.len()).map(|clip| performances.get(clip).unwrap_or(&clip).to_string()).collect()
+        } else {
+            clips.iter().map(|clip| clip.subject.clone()).collect()
+        };
+        let limited = !is_single || names(groups.iter()).len() >= Limits::fewest(Limits::FALSE_ALARMS);
         let other = experiment.second.clone();
-        let second = other
-            .map(|other| AuxiliaryModel::learned(other, compared, &labels[..clips.len()], activities.len()));
+        let second =
+            other.map(|other| AuxiliaryModel::learned(other, clips, &groups, &labels, activities.len()));
         let mut second = second.transpose()?;
         if let Some(second) = second.as_mut().filter(|_| !limited) {
             second.limits = Limits::none(activities.len());
@@ -96,7 +99,7 @@ impl Recogniser {
         let recogniser = Self {
             typical_frames: lengths[lengths.len() / 2],
             limits: if limited {
-                limits(compared, &labels, activities.len(), &patterns)
+                limits(&groups, &labels, activities.len(), &patterns)
             } else {
                 Limits::none(activities.len())
             },
@@ -133,24 +136,13 @@ fn fits(clip: &Clip, expected: usize, expected_boxes: bool) -> Result<(), ModelE
     Err(ModelError::Clip { found, found_boxes, expected, expected_boxes })
 }
 
-/// Clips of a single subject with their performances as subjects; `None` for several subjects.
-fn by_performance(clips: &[Clip], performances: &[usize]) -> Option<Vec<Clip>> {
-    let single = clips.iter().all(|clip| clip.subject == clips[0].subject);
-    let renamed = clips.iter().enumerate().map(|(number, clip)| Clip {
-        subject: performances.get(number).unwrap_or(&number).to_string(),
-        activity: clip.activity.clone(),
-        views: clip.views.clone(),
-    });
-    single.then(|| renamed.collect())
-}
-
-/// Unknown limits: every clip is compared with all other subjects' patterns. Mirrors, if trained on, follow
-/// `clips`; `patterns` are in the same order.
-fn limits(clips: &[Clip], labels: &[usize], classes: usize, patterns: &Array2<f32>) -> Limits {
-    let scored: Vec<(usize, f32)> = (0..clips.len())
+/// Unknown limits: every clip is compared with all patterns of other groups (subjects, or performances of a single one).
+/// Mirrors, if trained on, follow the clips; `patterns` are in the same order.
+fn limits(groups: &[String], labels: &[usize], classes: usize, patterns: &Array2<f32>) -> Limits {
+    let scored: Vec<(usize, f32)> = (0..groups.len())
         .into_par_iter()
         .map(|i| {
-            let other = |j: usize| clips[j % clips.len()].subject != clips[i].subject;
+            let other = |j: usize| groups[j % groups.len()] != groups[i];
             let others =
                 patterns.rows().into_iter().enumerate().filter(|(j, _)| other(*j)).map(|(_, row)| row);
             (labels[i], nearest(others, patterns.row(i)))

@@ -265,9 +265,9 @@ const NAMINGS: [Naming; 7] = [
     },
 ];
 
-/// Text before or after the names of one body's points.
-/// Of Mixamo, 3ds Max, VRoid and Character Creator.
+/// Text before the names of one body's points: of Mixamo, 3ds Max, Motive, VRoid and Character Creator.
 const PREFIXES: [&str; 7] = ["mixamorig", "bip001", "bip01", "skeleton", "jbipc", "jbip", "ccbase"];
+/// Text after them: of OpenCap.
 const SUFFIXES: [&str; 1] = ["study"];
 
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -3,7 +3,8 @@
 use std::{fs, path::PathBuf};
 
 use farnear_files::{
-    masks, staging,
+    masks::{Named, Sequence},
+    staging,
     video::{Video, VideoError},
 };
 use farnear_shadow::CameraFile;
@@ -96,12 +97,11 @@ fn in_the_sun(
 }
 
 fn samples(folder: &std::path::Path) -> Result<Vec<String>> {
-    let files = masks::listed(folder)?;
-    let levels = masks::levels_of(&files)?;
     let mut seen = Vec::new();
-    for file in &files {
-        if masks::read(file, &levels)?.iter().any(|person| *person) {
-            seen.push(file.file_stem().unwrap_or_default().to_string_lossy());
+    for named in Sequence::open(folder)?.named() {
+        let Named { name, mask } = named?;
+        if mask.iter().any(|person| *person) {
+            seen.push(name);
         }
     }
     let step = (seen.len() / SAMPLES).max(1);
