@@ -166,7 +166,7 @@ fn a_routine_drives_the_piezo_only_from_a_known_code() {
             bench.reset(piezo_code);
             let mut before = bench.hardware.dac;
             let id = bench.accepted(&calibrate(routine));
-            for _ in 0..1_000 {
+            for _ in 0..2_000 {
                 let dac = bench.hardware.dac;
                 assert!(dac.abs_diff(before) <= 200, "{dac} after {before}");
                 before = dac;
