@@ -12,8 +12,8 @@ const listeners = new Map();
 /** @type {WebSocket | null} */
 let socket = null;
 let wait = 250;
-/** Version of the server that this page is of. */
-let version = "";
+/** The run of the server that this page is of. */
+let server = "";
 /** Where the secret of this page survives a reload. */
 const SECRET = "farnear-client";
 
@@ -51,9 +51,9 @@ export function open() {
 
 function told(message) {
   if (message.type === "hello") {
-    // A server of another version has another page.
-    if (version && version !== message.hello.version) return location.reload();
-    version = message.hello.version;
+    // A restarted server has other jobs, and perhaps another page.
+    if (server && server !== message.hello.server) return location.reload();
+    server = message.hello.server;
     store.client = message.hello;
     sessionStorage.setItem(SECRET, message.hello.secret);
     store.connected = true;

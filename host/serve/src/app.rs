@@ -45,6 +45,8 @@ const LOG_MAX: usize = 1000;
 const USUAL_OPTICS: &str = include_str!("optics.toml");
 
 pub struct App {
+    /// Identifies this run of the server.
+    pub run: String,
     pub guard: Guard,
     pub limits: Limits,
     /// Delays answers to wrong tokens.
@@ -115,6 +117,7 @@ impl App {
         };
         let state = beginning(rig.as_ref(), &camera, &live);
         Ok(Arc::new(Self {
+            run: format!("{} {}", env!("CARGO_PKG_VERSION"), unix_ms()),
             guard,
             limits,
             throttle: Throttle::default(),

@@ -57,8 +57,7 @@ pub async fn open(
 
 async fn run(socket: WebSocket, app: Arc<App>, resumed: Option<String>) {
     let Ok(client) = app.with_control(|control| control.join(resumed.as_deref())) else { return };
-    let version = env!("CARGO_PKG_VERSION").into();
-    let hello = Hello { client: client.id, secret: client.secret, version };
+    let hello = Hello { client: client.id, secret: client.secret, server: app.run.clone() };
     let hello = json!({ "type": "hello", "hello": hello }).to_string();
     // In two halves, because a stop must be received while a picture is sent.
     let (mut sink, mut stream) = socket.split();

@@ -171,8 +171,8 @@ pub struct Hello {
     pub client: u32,
     /// Its secret, for the header `x-farnear-client`.
     pub secret: String,
-    /// Version of this program.
-    pub version: String,
+    /// Version and start of this server. A page of another one must be reloaded: its job numbers mean other jobs.
+    pub server: String,
 }
 
 /// That a job was begun.

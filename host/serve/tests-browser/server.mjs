@@ -11,11 +11,11 @@ const BROWSERS = [process.env.CHROMIUM, "/usr/bin/chromium", "/usr/bin/chromium-
 
 /** Serves until `close`; the emulated rig where nothing else is named. With `blocks` it can write no file that is larger than so many
  * blocks (of 512 bytes, or of 1024: the shell's), as on a disk that is full. */
-export async function serve(what = ["--rig", "sim"], blocks = 0) {
+export async function serve(what = ["--rig", "sim"], blocks = 0, port = 0) {
   const session = mkdtempSync(join(tmpdir(), "farnear-page-"));
   const limited = blocks ? ["sh", "-c", `trap "" XFSZ; ulimit -f ${blocks}; exec "$0" "$@"`] : [];
   const [program, ...first] = [...limited, FARNEAR];
-  const child = spawn(program, [...first, "serve", ...what, "--session", session, "--port", "0"], { stdio: ["ignore", "pipe", "inherit"] });
+  const child = spawn(program, [...first, "serve", ...what, "--session", session, "--port", String(port)], { stdio: ["ignore", "pipe", "inherit"] });
   const address = await new Promise((done, failed) => {
     child.stdout.once("data", (data) => done(String(data).trim()));
     child.once("exit", (code) => failed(new Error(`farnear serve ended with ${code}`)));
