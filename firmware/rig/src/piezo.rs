@@ -56,8 +56,6 @@ const UNREACHABLE: i32 = 40_000 << BITS;
 const RAMP: u32 = TICK_HZ / 10;
 /// Ticks of the lowering while the supply sinks: 4.4 of the 4.8 ms that are left (docs/rig.md).
 const RELAX_FAST: u32 = 22;
-/// Ticks in which the command of a loop that opens goes to the set-point: few, because the swing grows; two halve the step.
-const OPENING: u32 = 2;
 const RELAXED: u16 = 1_000;
 
 /// A piezo whose loop has opened swings freely. At 200 Hz and a damping of 3 % a swing of 20 um is 10 nm after this time.
@@ -328,8 +326,7 @@ impl Piezo {
             if control.innovation > INNOVATION_LIMIT {
                 // The last command is part of its swing; the set-point does not swing.
                 let still = control.reference_before.saturating_sub(self.lag.offset());
-                let (to, _) = self.scale.playable(still);
-                self.start = Start::Ramp { from: self.code, to, ticks: 0, over: OPENING };
+                (self.code, self.command) = self.scale.playable(still);
                 (self.control, self.near_ticks, self.failed) = (None, 0, true);
                 return;
             }

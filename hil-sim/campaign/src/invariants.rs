@@ -2,7 +2,7 @@
 //! | property | meaning |
 //! |---|---|
 //! | `hard-stop` | no driver pushes a stage against its hard stop if the home switch works, and at most until a stall otherwise |
-//! | `piezo-step` | the piezo's command never changes by more than 60 um in a tick: a quarter of the stroke and the loop's correction; not with `dac-dead` |
+//! | `piezo-step` | the piezo's command never changes by more than 60 um in a tick: a quarter of the stroke and the loop's correction; not with `dac-dead` or `piezo-dead` |
 //! | `step-after-alarm` | no STEP pulse later than 2 ms after an alarm until it is cleared |
 //! | `acts-twice` | no request acts twice: one end each, equal answers to repeats, no more exposures than accepted |
 //! | `moves-unasked` | no motor moves without requested work |
