@@ -379,8 +379,8 @@ impl Piezo {
     pub(crate) fn act(&mut self) -> Option<u16> {
         // Output during the rest.
         (1..self.passed).for_each(|_| self.lag.push(self.command));
-        let driven = self.control.is_some() || matches!(self.start, Start::Ramp { .. });
-        self.open_ticks = if driven { 0 } else { self.open_ticks.saturating_add(self.passed) };
+        let led = self.control.is_some() || matches!(self.start, Start::Ramp { .. });
+        self.open_ticks = if led { 0 } else { self.open_ticks.saturating_add(self.passed) };
         self.passed = 1;
         let gains = &self.settings.gains;
         if let Some(control) = &mut self.control {

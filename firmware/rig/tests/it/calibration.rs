@@ -166,6 +166,7 @@ fn a_routine_drives_the_piezo_only_from_a_known_code() {
             bench.reset(piezo_code);
             let mut before = bench.hardware.dac;
             let id = bench.accepted(&calibrate(routine));
+            // Ramp, 0.1 s, and swing, 0.2 s.
             for _ in 0..2_000 {
                 let dac = bench.hardware.dac;
                 assert!(dac.abs_diff(before) <= 200, "{dac} after {before}");
