@@ -58,7 +58,8 @@ const RAMP: u32 = TICK_HZ / 10;
 const RELAX_FAST: u32 = 22;
 const RELAXED: u16 = 1_000;
 
-/// A piezo whose loop has opened swings freely. At 200 Hz and a damping of 3 % a swing of 20 um is 10 nm after this time.
+/// A piezo whose loop has opened, or whose DAC has dropped with the power, swings freely. At 200 Hz and a damping of 3 %
+/// a swing of 20 um is 10 nm after this time.
 const SWINGING_TICKS: u32 = TICK_HZ / 5;
 
 /// Fraction bits of a position.
@@ -123,7 +124,7 @@ pub(crate) struct Piezo {
     driven: bool,
     near_ticks: u16,
     still_ticks: u16,
-    /// Ticks since the loop opened or the ramp ended.
+    /// Ticks since the start, the loop opened or the ramp ended.
     open_ticks: u32,
     /// Ticks away from a target that the set-point has reached.
     away_ticks: u32,
@@ -161,6 +162,7 @@ impl Piezo {
 
     /// Lowers the piezo from the code that the DAC kept, also without the gauge. Unknown: from the gauge's position.
     pub(crate) const fn start_at(&mut self, code: Option<u16>) {
+        self.open_ticks = 0;
         if let Some(code) = code {
             self.begin_to_relax((code, self.scale.played(code)));
         }
@@ -208,7 +210,9 @@ impl Piezo {
         self.scale = Scale::new(settings.gain_pm_per_code);
         self.gauge = GaugeScale::new(settings.gauge_gain_ppm, settings.gauge_offset);
         self.lag = self.lag.with(settings.hysteresis_ppm, settings.creep_ppm_per_decade);
-        self.closing |= self.control.take().is_some();
+        if self.control.take().is_some() {
+            (self.closing, self.open_ticks) = (true, SWINGING_TICKS);
+        }
         self.command = self.scale.played(self.code);
         self.lag.push(self.command);
     }
@@ -237,7 +241,12 @@ impl Piezo {
         !self.arrived()
             || self.control.is_some() && self.still_ticks < NEAR_TICKS
             || matches!(self.start, Start::Ramp { .. })
-            || self.control.is_none() && self.open_ticks < SWINGING_TICKS
+            || self.is_swinging()
+    }
+
+    /// A loop that closes now would take the swing for a disturbance and jump by it.
+    const fn is_swinging(&self) -> bool {
+        self.control.is_none() && self.open_ticks < SWINGING_TICKS
     }
 
     pub(crate) const fn go(&mut self, target: Nanometres) {
@@ -309,7 +318,7 @@ impl Piezo {
         if self.start == Start::Unknown {
             self.begin_to_relax(self.scale.playable(fixed(self.measured)));
         }
-        if self.closing {
+        if self.closing && !self.is_swinging() {
             return self.close();
         }
         if let Some(control) = &mut self.control {
