@@ -141,11 +141,13 @@ fn fits(clip: &Clip, expected: usize, expected_boxes: bool) -> Result<(), ModelE
 fn limits(groups: &[String], labels: &[usize], classes: usize, patterns: &Array2<f32>) -> Limits {
     let scored: Vec<(usize, f32)> = (0..groups.len())
         .into_par_iter()
-        .map(|i| {
+        .filter_map(|i| {
             let other = |j: usize| groups[j % groups.len()] != groups[i];
+            // Classes of a single group have no comparison.
+            (0..groups.len()).find(|j| labels[*j] == labels[i] && other(*j))?;
             let others =
                 patterns.rows().into_iter().enumerate().filter(|(j, _)| other(*j)).map(|(_, row)| row);
-            (labels[i], nearest(others, patterns.row(i)))
+            Some((labels[i], nearest(others, patterns.row(i))))
         })
         .collect();
     Limits::conformal(&scored, classes, Limits::FALSE_ALARMS)
@@ -182,8 +184,7 @@ mod tests {
         (clips, numbers)
     }
 
-    #[test]
-    fn limits_of_a_single_subject_come_from_different_performances() {
+    fn distances(clips: &[Clip], performances: &[usize]) -> Vec<f32> {
         let space = SpaceSettings {
             dimensions: 4,
             pattern: PatternKind::Codebook(8),
@@ -191,19 +192,29 @@ mod tests {
             ..SpaceSettings::default()
         };
         let experiment = Experiment::codebook(space).fixed();
-        let limits = |clips: &[Clip], performances: &[usize]| {
-            let scaling = Scaling::default();
-            let trained =
-                Recogniser::train_performances(clips, performances, &experiment, scaling, &Unwatched);
-            trained.expect("trained").0.limits.distances
-        };
+        let scaling = Scaling::default();
+        let trained = Recogniser::train_performances(clips, performances, &experiment, scaling, &Unwatched);
+        trained.expect("trained").0.limits.distances
+    }
+
+    #[test]
+    fn an_activity_of_one_subject_of_several_takes_the_limit_of_the_others() {
+        let (mut clips, _) = copies(40, 1);
+        // Half of the clips of one activity; the other is the first subject's alone.
+        clips.iter_mut().step_by(4).for_each(|clip| clip.subject = "ann".into());
+        let found = distances(&clips, &[]);
+        assert!(found[0] == found[1] && found[0].is_finite(), "{found:?}");
+    }
+
+    #[test]
+    fn limits_of_a_single_subject_come_from_different_performances() {
         let (clips, numbers) = copies(20, 2);
         // A copy is at distance 0.
-        assert!(limits(&clips, &[]).iter().all(|limit| *limit < 1e-6));
-        let found = limits(&clips, &numbers);
+        assert!(distances(&clips, &[]).iter().all(|limit| *limit < 1e-6));
+        let found = distances(&clips, &numbers);
         assert!(found.iter().all(|limit| *limit > 1e-6 && limit.is_finite()), "{found:?}");
         // Many clips, but fewer than 19 performances: nothing is unknown.
         let (clips, numbers) = copies(2, 24);
-        assert!(limits(&clips, &numbers).iter().all(|limit| limit.is_infinite()));
+        assert!(distances(&clips, &numbers).iter().all(|limit| limit.is_infinite()));
     }
 }
