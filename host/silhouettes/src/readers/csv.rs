@@ -6,9 +6,10 @@ use std::collections::HashSet;
 
 use csv::StringRecord;
 
+use super::keypoints::table;
 use super::reader::Reader;
 use super::recording::{
-    Found, Known, RecordingError, Source, Unit, Up, check_last_row, number, promised_frames, text,
+    Choices, Found, Known, RecordingError, Source, Unit, Up, check_last_row, number, promised_frames, text,
 };
 use super::trc::point;
 use crate::silhouette::capsule::Point3;
@@ -16,8 +17,8 @@ use crate::silhouette::capsule::Point3;
 pub const READER: Reader = Reader {
     name: "CSV",
     extensions: &["csv"],
-    about: "a table with columns NAME_x, NAME_y, NAME_z in millimetres, z up, or of the Kinect SDK, Vicon Nexus or OptiTrack Motive",
-    read: |bytes, _| read(bytes),
+    about: "a table with columns NAME_x, NAME_y, NAME_z in millimetres, z up, or of the Kinect SDK, Vicon Nexus or OptiTrack Motive; keypoints with NAME_x and NAME_y, or of SLEAP, DeepLabCut or MocapNET",
+    read,
 };
 
 /// Motive's key of the number of frames.
@@ -31,7 +32,7 @@ const MOST_SECONDS: f64 = 2.0;
 
 /// Separated by commas, semicolons or tabs. Ignores columns without a coordinate suffix (frame number, visibility), except
 /// times. Errors have their line.
-pub fn read(bytes: &[u8]) -> Result<Found, RecordingError> {
+pub fn read(bytes: &[u8], choices: Choices) -> Result<Found, RecordingError> {
     let text = text(bytes)?;
     const SEPARATORS: [char; 3] = ['\t', ';', ','];
     let header = text.lines().find(|line| line.contains(SEPARATORS) && !line.starts_with('#'));
@@ -47,17 +48,37 @@ pub fn read(bytes: &[u8]) -> Result<Found, RecordingError> {
         .records()
         .collect::<Result<_, _>>()
         .map_err(|error| RecordingError::Kind { kind: "CSV", reason: error.to_string() })?;
-    match layered(&rows)? {
+    let rows = joined(rows);
+    let (columns, below) = rows
+        .split_first()
+        .ok_or_else(|| RecordingError::Kind { kind: "CSV", reason: "it is empty".into() })?;
+    if let Some(found) = layered(&rows)? {
+        return Ok(found);
+    }
+    match table::read(columns, below, choices)? {
         Some(found) => Ok(found),
-        None => plain(&rows),
+        None => plain(columns, below),
     }
 }
 
+/// DeepLabCut's rows `scorer`, `individuals` (of several), `bodyparts` and `coords` as one row of `INDIVIDUAL:PART_x`.
+fn joined(mut rows: Vec<StringRecord>) -> Vec<StringRecord> {
+    let begins = |word: &str| rows.iter().take(4).position(|row| row.get(0) == Some(word));
+    let (Some(parts), Some(coords)) = (begins("bodyparts"), begins("coords")) else { return rows };
+    let individuals = begins("individuals");
+    let name = |(column, axis): (usize, &str)| {
+        let cell = |row: usize| rows[row].get(column).unwrap_or_default();
+        let person = individuals.map(|row| format!("{}:", cell(row))).unwrap_or_default();
+        if column == 0 { "coords".to_owned() } else { format!("{person}{}_{axis}", cell(parts)) }
+    };
+    let header: StringRecord = rows[coords].iter().enumerate().map(name).collect();
+    rows.drain(..coords);
+    rows[0] = header;
+    rows
+}
+
 /// A table with one row of names.
-fn plain(rows: &[StringRecord]) -> Result<Found, RecordingError> {
-    let (columns, rows) = rows
-        .split_first()
-        .ok_or_else(|| RecordingError::Kind { kind: "CSV", reason: "it is empty".into() })?;
+fn plain(columns: &StringRecord, rows: &[StringRecord]) -> Result<Found, RecordingError> {
     let mut markers = markers_of(columns, coordinate)?;
     let is_separated = !markers.is_empty();
     if !is_separated {
@@ -89,11 +110,7 @@ fn plain(rows: &[StringRecord]) -> Result<Found, RecordingError> {
     }
     let mut frames = Vec::new();
     for row in rows {
-        let line = line(row);
-        if row.len() != columns.len() {
-            let reason = format!("{} values, the header has {}", row.len(), columns.len());
-            return Err(RecordingError::Line { line, reason });
-        }
+        check_width(row, columns)?;
         frames.push(points(row, &places)?);
     }
     let rate_hz = rate_hz(columns, rows);
@@ -110,10 +127,18 @@ fn plain(rows: &[StringRecord]) -> Result<Found, RecordingError> {
     })
 }
 
+pub(super) fn check_width(row: &StringRecord, columns: &StringRecord) -> Result<(), RecordingError> {
+    if row.len() == columns.len() {
+        return Ok(());
+    }
+    let reason = format!("{} values, the header has {}", row.len(), columns.len());
+    Err(RecordingError::Line { line: line(row), reason })
+}
+
 type Marker = (String, [Option<usize>; 3]);
 
 /// Names, with the columns of x, y and z.
-fn markers_of(
+pub(super) fn markers_of(
     columns: &StringRecord,
     coordinate: impl Fn(&str) -> Option<(&str, usize)>,
 ) -> Result<Vec<Marker>, RecordingError> {
@@ -218,12 +243,12 @@ fn points(row: &StringRecord, places: &[[usize; 3]]) -> Result<Vec<Option<Point3
     places.iter().map(|place| point(cells(place), line(row))).collect()
 }
 
-fn line(row: &StringRecord) -> usize {
+pub(super) fn line(row: &StringRecord) -> usize {
     row.position().map_or(0, |position| position.line() as usize)
 }
 
 /// Name and axis (0 to 2) of a column `NAME_x`.
-fn coordinate(column: &str) -> Option<(&str, usize)> {
+pub(super) fn coordinate(column: &str) -> Option<(&str, usize)> {
     let (name, axis) = column.rsplit_once(['_', ':', '.', ' '])?;
     let axis = ["x", "y", "z"].iter().position(|known| axis.eq_ignore_ascii_case(known))?;
     Some((name, axis))
@@ -238,8 +263,11 @@ fn unseparated(column: &str) -> Option<(&str, usize)> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::recording::Choices;
     use super::*;
+
+    fn read(bytes: &[u8]) -> Result<Found, RecordingError> {
+        super::read(bytes, Choices::default())
+    }
 
     #[test]
     fn tables_of_the_kinect_sdk_are_read_in_metres_with_y_up_and_their_rate() {

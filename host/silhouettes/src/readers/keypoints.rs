@@ -1,11 +1,13 @@
-//! Keypoints of pose estimators as JSON: OpenPose, COCO and HALPE (AlphaPose, MMPose), MediaPipe. In two dimensions there is
+//! Keypoints of pose estimators: OpenPose, COCO and HALPE (AlphaPose, MMPose), MediaPipe as JSON, others in tables. In two dimensions there is
 //! one view, x to the right and y down in the picture, and lengths are guessed from the body: the longest trunk and legs in a
 //! frame are those of an adult. In three dimensions lengths are metres. People without numbers are followed by place.
 
 mod document;
+mod labels;
 mod layouts;
 mod people;
 mod spatial;
+pub mod table;
 
 use super::{
     posture,
@@ -33,6 +35,8 @@ const HEAD: [usize; 6] = [0, 1, 2, 3, 4, 5];
 const ANKLES: [usize; 2] = [20, 21];
 const SHOULDERS: [usize; 2] = [8, 9];
 const HIPS: [usize; 2] = [16, 17];
+/// Frames with values that are no person's points, per frame with a person, in a file that holds something else.
+const MOST_UNREAD: usize = 9;
 /// Coordinates up to this are shares of the picture's sides, not pixels; points may be outside, and few far outside.
 const NORMALISED: f64 = 3.0;
 const MOST_FAR_OUTSIDE: f64 = 0.05;
@@ -52,20 +56,35 @@ pub fn read_files<'a>(
 }
 
 fn found(document: Document, choices: Choices) -> Result<Found, RecordingError> {
-    let Document { mut frames, size, has_wide_gaps, .. } = document;
+    let Document { mut frames, size, has_wide_gaps, unread, .. } = document;
+    let labelled = labels::order(&mut frames)?;
     let everyone = || frames.iter().flatten();
-    let first = everyone().next().ok_or_else(|| RecordingError::Kind {
-        kind: "keypoint JSON",
-        reason: format!(
-            "it holds no person's points: expected `people`, `annotations`, `keypoints` or `landmarks` of {} points",
-            layouts::LAYOUTS.iter().map(|layout| layout.count.to_string()).collect::<Vec<_>>().join(", ")
-        ),
+    let with_people = frames.iter().filter(|people| !people.is_empty()).count();
+    let is_read = unread <= MOST_UNREAD * with_people;
+    let first = everyone().next().filter(|_| is_read).ok_or_else(|| {
+        let what = match with_people {
+            0 => "it holds no person's points".to_owned(),
+            _ => format!("{with_people} of its frames hold a person's points, and {unread} other values"),
+        };
+        let counts: Vec<String> = layouts::LAYOUTS.iter().map(|layout| layout.count.to_string()).collect();
+        let reason = format!(
+            "{what}: expected `people`, `annotations`, `keypoints` or `landmarks` of {} points",
+            counts.join(", ")
+        );
+        RecordingError::Kind { kind: "keypoint JSON", reason }
     })?;
     let has_depth = spatial::has_depth(everyone());
     let in_picture = !has_depth && !spatial::are_centred(everyone());
     let layout = if has_depth { spatial::layout(everyone())? } else { first.layout };
     let seen = if has_depth { "in three dimensions" } else { "seen from one side" };
-    let mut remarks = vec![format!("{} keypoints of the layout {}, {seen}", layout.count, layout.name)];
+    let about =
+        labelled.unwrap_or_else(|| format!("{} keypoints of the layout {}", layout.count, layout.name));
+    let mut remarks = vec![format!("{about}, {seen}")];
+    if unread > 0 {
+        remarks.push(format!(
+            "{unread} frames hold values that are not the points of a person in a known layout: they are taken as empty"
+        ));
+    }
     if has_wide_gaps {
         remarks.push("most numbers of frames are missing: the gaps between the others are closed".into());
     }

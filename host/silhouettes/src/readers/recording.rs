@@ -310,6 +310,9 @@ pub enum RecordingError {
          {file}; write the joints that it gives to an array `joints` of frames x joints x 3"
     )]
     BodyModel { array: String, shape: String, model: &'static str, file: String },
+    /// In one of several files.
+    #[error("{name}: {error}")]
+    File { name: String, error: Box<Self> },
     #[error("no person {wanted}: {found} are in the file")]
     Person { wanted: usize, found: usize },
     #[error("line {line}: {reason}")]

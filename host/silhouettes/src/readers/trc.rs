@@ -31,8 +31,16 @@ pub fn read(bytes: &[u8]) -> Result<Found, RecordingError> {
     }
     let separator =
         line(0)?.chars().nth("PathFileType".len()).filter(|c| matches!(c, ',' | ';')).unwrap_or('\t');
-    let keys: Vec<&str> = line(1)?.split(separator).map(str::trim).collect();
-    let values: Vec<&str> = line(2)?.split(separator).map(str::trim).collect();
+    let cells = |n: usize| -> Result<Vec<&str>, RecordingError> {
+        Ok(line(n)?.split(separator).map(str::trim).collect())
+    };
+    let (mut keys, mut values) = (cells(1)?, cells(2)?);
+    // Some programs write two tabs between the values.
+    let [filled_keys, filled_values] = [&keys, &values]
+        .map(|cells| cells.iter().copied().filter(|cell| !cell.is_empty()).collect::<Vec<&str>>());
+    if filled_keys.len() == filled_values.len() {
+        (keys, values) = (filled_keys, filled_values);
+    }
     let value = |key: &str| {
         let found = keys.iter().position(|k| *k == key).and_then(|index| values.get(index).copied());
         found.ok_or_else(|| RecordingError::Line { line: 3, reason: format!("no value of {key}") })
@@ -47,7 +55,7 @@ pub fn read(bytes: &[u8]) -> Result<Found, RecordingError> {
     let unit = Found::stated_unit(value("Units")?);
     let (rate_hz, count) = (stated("DataRate")?, stated("NumMarkers")?);
     // A name is above the first of its three columns; Cortex omits names of unidentified trajectories.
-    let cells: Vec<&str> = line(3)?.split(separator).skip(2).map(str::trim).collect();
+    let cells: Vec<&str> = cells(3)?.into_iter().skip(2).collect();
     let all: Vec<(usize, String)> = (0..)
         .zip(cells.chunks(3))
         .filter(|(_, group)| !group[0].is_empty())
@@ -55,12 +63,23 @@ pub fn read(bytes: &[u8]) -> Result<Found, RecordingError> {
         .collect();
     let packed = cells.iter().any(|c| !c.is_empty())
         && cells.iter().skip_while(|c| c.is_empty()).take(3).filter(|c| !c.is_empty()).count() > 1;
-    let (places, names): (Vec<usize>, Vec<String>) = if packed {
+    let (mut places, mut names): (Vec<usize>, Vec<String>) = if packed {
         cells.iter().filter(|name| !name.is_empty()).map(|name| (*name).to_owned()).enumerate().unzip()
     } else {
         all.into_iter().unzip()
     };
     let mut remarks = Vec::new();
+    // Cortex names virtual markers, too, and writes no columns of them.
+    let within = places.iter().filter(|place| (**place as f64) < count).count();
+    if (1..names.len()).contains(&within) && columns(&lines, separator) as f64 <= count {
+        remarks.push(format!(
+            "{} names after the {count} markers have no columns and are not read ({}, ...)",
+            names.len() - within,
+            names[within]
+        ));
+        places.truncate(within);
+        names.truncate(within);
+    }
     let unnamed = count - names.len() as f64;
     if unnamed < 0.0 || names.is_empty() {
         return Err(RecordingError::Line {
@@ -85,6 +104,13 @@ pub fn read(bytes: &[u8]) -> Result<Found, RecordingError> {
     let rate_hz = if has_rate { rate_hz } else { 0.0 };
     let up = Known { value: Up::Y, source: Source::Format };
     Ok(Found { names, rate_hz, frames, others: Vec::new(), planar: false, unit, up, remarks })
+}
+
+/// Points with values in the longest row.
+fn columns(lines: &[&str], separator: char) -> usize {
+    let is_blank = |c: char| c.is_whitespace() || c == separator;
+    let cells = lines.iter().skip(5).map(|row| row.trim_end_matches(is_blank).split(separator).count());
+    cells.max().unwrap_or(0).saturating_sub(2).div_ceil(3)
 }
 
 /// Rows after the header: number, time, then x, y, z in these columns; missing cells at the end are hidden.

@@ -2,268 +2,10 @@
 //! begins there or the side. Conventions clash (`LeftShoulder` is the collar bone or the shoulder joint), so
 //! the one that explains most of a recording's names is used for all.
 
+mod namings;
+
 use super::template::Template;
-
-struct Naming {
-    about: &'static str,
-    template: &'static str,
-    /// Simplified names and the template's; `#` is `left` or `right`, `@` is `l` or `r`.
-    names: &'static [(&'static str, &'static str)],
-}
-
-const NAMINGS: [Naming; 7] = [
-    Naming {
-        about: "joints named as Biovision and SMPL do",
-        template: "bvh",
-        names: &[
-            ("hips", "Hips"),
-            ("pelvis", "Hips"),
-            ("spine", "Spine"),
-            ("chest", "Spine1"),
-            ("chest2", "Spine2"),
-            ("chest3", "Spine3"),
-            ("spine1", "Spine"),
-            ("spine2", "Spine1"),
-            ("spine3", "Spine2"),
-            ("neck", "Neck"),
-            ("head", "Head"),
-            ("headend", "Head_End"),
-            ("#hip", "#UpLeg"),
-            ("@hip", "#UpLeg"),
-            ("#knee", "#Leg"),
-            ("@knee", "#Leg"),
-            ("#ankle", "#Foot"),
-            ("@ankle", "#Foot"),
-            ("#foot", "#ToeBase"),
-            ("@foot", "#ToeBase"),
-            ("#ankleend", "#ToeBase"),
-            ("#toe", "#ToeBase"),
-            ("#toeend", "#ToeBase_End"),
-            ("#footend", "#ToeBase_End"),
-            ("#shoulder", "#Arm"),
-            ("@shoulder", "#Arm"),
-            ("#elbow", "#ForeArm"),
-            ("@elbow", "#ForeArm"),
-            ("#wrist", "#Hand"),
-            ("@wrist", "#Hand"),
-            ("#wristend", "#Hand_End"),
-            ("#hand", "#Hand_End"),
-            ("@hand", "#Hand_End"),
-            ("#handend", "#HandIndex1_End"),
-        ],
-    },
-    Naming {
-        about: "segments named as DAZ, 3ds Max, Unreal, Unity, Xsens and Motive do",
-        template: "bvh",
-        names: &[
-            ("hip", "Hips"),
-            ("hips", "Hips"),
-            ("pelvis", "Hips"),
-            ("abdomen", "Spine"),
-            ("ab", "Spine"),
-            ("abdomenlower", "Spine"),
-            ("abdomen2", "Spine1"),
-            ("abdomenupper", "Spine1"),
-            ("chest", "Spine2"),
-            ("chestlower", "Spine2"),
-            ("chestupper", "Spine3"),
-            ("upperchest", "Spine3"),
-            ("spine", "Spine"),
-            ("spine1", "Spine1"),
-            ("spine2", "Spine2"),
-            ("spine3", "Spine3"),
-            ("spine01", "Spine"),
-            ("spine02", "Spine1"),
-            ("spine03", "Spine2"),
-            ("l5", "Spine"),
-            ("l3", "Spine1"),
-            ("t12", "Spine2"),
-            ("t8", "Spine3"),
-            ("neck", "Neck"),
-            ("neck01", "Neck"),
-            ("necklower", "Neck"),
-            ("neckupper", "Neck1"),
-            ("head", "Head"),
-            ("headend", "Head_End"),
-            ("headnub", "Head_End"),
-            ("@shldr", "#Arm"),
-            ("@uarm", "#Arm"),
-            ("@shldrbend", "#Arm"),
-            ("@upperarm", "#Arm"),
-            ("#upperarm", "#Arm"),
-            ("#arm", "#Arm"),
-            ("@forearm", "#ForeArm"),
-            ("@farm", "#ForeArm"),
-            ("@forearmbend", "#ForeArm"),
-            ("@lowerarm", "#ForeArm"),
-            ("#lowerarm", "#ForeArm"),
-            ("#forearm", "#ForeArm"),
-            ("@hand", "#Hand"),
-            ("#hand", "#Hand"),
-            ("@handend", "#Hand_End"),
-            ("#handend", "#Hand_End"),
-            ("@index1", "#HandIndex1"),
-            ("@mid1", "#HandMiddle1"),
-            ("@thigh", "#UpLeg"),
-            ("@thighbend", "#UpLeg"),
-            ("#thigh", "#UpLeg"),
-            ("#upperleg", "#UpLeg"),
-            ("@upperleg", "#UpLeg"),
-            ("#upleg", "#UpLeg"),
-            ("@shin", "#Leg"),
-            ("#shin", "#Leg"),
-            ("@calf", "#Leg"),
-            ("#lowerleg", "#Leg"),
-            ("@lowerleg", "#Leg"),
-            ("#leg", "#Leg"),
-            ("@foot", "#Foot"),
-            ("#foot", "#Foot"),
-            ("@toe", "#ToeBase"),
-            ("@toe0", "#ToeBase"),
-            ("@ball", "#ToeBase"),
-            ("#toe", "#ToeBase"),
-            ("#toes", "#ToeBase"),
-            ("@toes", "#ToeBase"),
-            ("#toebase", "#ToeBase"),
-            ("@toebase", "#ToeBase"),
-            ("@footend", "#ToeBase"),
-            ("@toeend", "#ToeBase_End"),
-            ("#toeend", "#ToeBase_End"),
-        ],
-    },
-    Naming {
-        about: "joints without wrists and ankles, as of MakeHuman and MocapNET",
-        template: "bvh",
-        names: &[
-            ("hip", "Hips"),
-            ("hips", "Hips"),
-            ("abdomen", "Spine"),
-            ("spine", "Spine"),
-            ("chest", "Spine1"),
-            ("neck", "Neck"),
-            ("neck1", "Neck1"),
-            ("head", "Head"),
-            ("@shoulder", "#Arm"),
-            ("#shoulder", "#Arm"),
-            ("@elbow", "#ForeArm"),
-            ("#elbow", "#ForeArm"),
-            ("@hand", "#Hand"),
-            ("#hand", "#Hand"),
-            ("@hip", "#UpLeg"),
-            ("#hip", "#UpLeg"),
-            ("@knee", "#Leg"),
-            ("#knee", "#Leg"),
-            ("@foot", "#Foot"),
-            ("#foot", "#Foot"),
-        ],
-    },
-    Naming {
-        about: "bones named as ASF files of Acclaim and CMU do",
-        template: "bvh",
-        names: &[
-            ("root", "Hips"),
-            ("pelvis", "Hips"),
-            ("lowerback", "Spine"),
-            ("upperback", "Spine1"),
-            ("thorax", "Spine"),
-            ("thorax", "Spine2"),
-            ("lowerneck", "Neck"),
-            ("neck", "Neck"),
-            ("upperneck", "Neck1"),
-            ("neck", "Neck1"),
-            ("head", "Head"),
-            ("headend", "Head_End"),
-            ("@humerus", "#Arm"),
-            ("@radius", "#ForeArm"),
-            ("@wrist", "#Hand"),
-            ("@hand", "#Hand"),
-            ("@hand", "#HandIndex1"),
-            ("@fingers", "#HandIndex1_End"),
-            ("@handend", "#Hand_End"),
-            ("@femur", "#UpLeg"),
-            ("@tibia", "#Leg"),
-            ("@foot", "#Foot"),
-            ("@toes", "#ToeBase"),
-            ("@toesend", "#ToeBase_End"),
-        ],
-    },
-    Naming {
-        about: "keypoints named as OpenPose, HALPE and Pose2Sim do",
-        template: "keypoints",
-        names: &[
-            ("nose", "nose"),
-            ("head", "head top"),
-            ("headtop", "head top"),
-            ("neck", "neck"),
-            ("hip", "hip centre"),
-            ("midhip", "hip centre"),
-            ("chip", "hip centre"),
-            ("pelvis", "hip centre"),
-            ("@eye", "# eye"),
-            ("#eye", "# eye"),
-            ("@ear", "# ear"),
-            ("#ear", "# ear"),
-            ("@shoulder", "# shoulder"),
-            ("#shoulder", "# shoulder"),
-            ("@elbow", "# elbow"),
-            ("#elbow", "# elbow"),
-            ("@wrist", "# wrist"),
-            ("#wrist", "# wrist"),
-            ("@hip", "# hip"),
-            ("#hip", "# hip"),
-            ("@knee", "# knee"),
-            ("#knee", "# knee"),
-            ("@ankle", "# ankle"),
-            ("#ankle", "# ankle"),
-            ("@heel", "# heel"),
-            ("#heel", "# heel"),
-            ("@bigtoe", "# big toe"),
-            ("#bigtoe", "# big toe"),
-            ("#footindex", "# big toe"),
-            ("@smalltoe", "# small toe"),
-            ("#smalltoe", "# small toe"),
-            ("#index", "# hand"),
-            ("@index", "# hand"),
-            ("@hand", "# hand"),
-            ("#hand", "# hand"),
-        ],
-    },
-    Naming {
-        about: "joints named as the Kinect SDK does",
-        template: "kinect",
-        names: &[
-            ("hipcenter", "hip centre"),
-            ("spinebase", "hip centre"),
-            ("spine", "spine"),
-            ("spinemid", "spine"),
-            ("shouldercenter", "shoulder centre"),
-            ("spineshoulder", "shoulder centre"),
-            ("neck", "neck"),
-            ("head", "head"),
-            ("shoulder#", "# shoulder"),
-            ("elbow#", "# elbow"),
-            ("wrist#", "# wrist"),
-            ("hand#", "# hand"),
-            ("handtip#", "# hand tip"),
-            ("thumb#", "# thumb"),
-            ("hip#", "# hip"),
-            ("knee#", "# knee"),
-            ("ankle#", "# ankle"),
-            ("foot#", "# foot"),
-        ],
-    },
-    Naming {
-        about: "laboratory markers named as OpenCap's augmenter does",
-        template: "opencap",
-        names: &[
-            ("@lelbow", "&_elbow_lat"),
-            ("@melbow", "&_elbow_med"),
-            ("@lwrist", "&_wrist_radius"),
-            ("@mwrist", "&_wrist_ulna"),
-            ("@hjc", "&_HJC"),
-        ],
-    },
-];
+use namings::{NAMINGS, Naming};
 
 /// Text before the names of one body's points: of Mixamo, 3ds Max, Motive, VRoid and Character Creator.
 const PREFIXES: [&str; 7] = ["mixamorig", "bip001", "bip01", "skeleton", "jbipc", "jbip", "ccbase"];
@@ -277,12 +19,11 @@ pub struct Aliases {
     pub remark: String,
 }
 
-/// `None` if a template fits without aliases, or none does.
+/// `None` if a template fits as well without aliases, or none does.
 pub fn find(names: &[String]) -> Option<Aliases> {
     let templates = || Template::names().filter_map(|name| Template::named(name).ok());
-    if templates().any(|template| template.check(names).is_ok()) {
-        return None;
-    }
+    let fitting = templates().filter(|template| template.check(names).is_ok());
+    let known = fitting.map(|template| template.coverage(names).0).max().unwrap_or(0);
     let simple: Vec<String> = names.iter().map(|name| simplified(name)).collect();
     let of = |template: &Template| -> Vec<Aliases> {
         let table = |naming: Option<&Naming>| {
@@ -305,7 +46,19 @@ pub fn find(names: &[String]) -> Option<Aliases> {
     };
     // The first of equals.
     let all: Vec<Aliases> = templates().flat_map(|template| of(&template)).collect();
-    all.into_iter().rev().max_by_key(|aliases| aliases.names.len())
+    let best = all.into_iter().rev().max_by_key(|aliases| aliases.names.len());
+    best.filter(|aliases| aliases.names.len() > known)
+}
+
+/// Matches names to the template `keypoints` only; empty if it does not fit.
+pub fn keypoints(names: &[String]) -> Vec<(usize, String)> {
+    let simple: Vec<String> = names.iter().map(|name| simplified(name)).collect();
+    let Ok(template) = Template::named("keypoints") else { return Vec::new() };
+    let namings = NAMINGS.iter().filter(|naming| naming.template == template.name);
+    let all = namings.map(|naming| matched(&simple, &template, Some(naming)));
+    let best = all.rev().max_by_key(Vec::len).unwrap_or_default();
+    let known: Vec<String> = best.iter().map(|(_, name)| name.clone()).collect();
+    if template.check(&known).is_ok() { best } else { Vec::new() }
 }
 
 /// Each point of the template once, with the first matching name.
@@ -337,6 +90,11 @@ fn matched(simple: &[String], template: &Template, naming: Option<&Naming>) -> V
         {
             add(place, marker);
         }
+    }
+    // Trunks have one to four joints; the hips and the neck of the template reach to `Spine`.
+    let trunk = found.iter_mut().map(|(_, name)| name).filter(|name| name.starts_with("Spine"));
+    if let Some(lowest) = trunk.min() {
+        "Spine".clone_into(lowest);
     }
     found
 }
@@ -456,6 +214,33 @@ mod tests {
             let (found, matched) = template_of(names);
             assert_eq!(found, template, "{names}");
             assert!(matched >= count, "{matched} of {count}: {names}");
+        }
+    }
+
+    #[test]
+    fn a_trunk_of_one_joint_reaches_from_the_hips_to_the_neck() {
+        for (names, limbs) in [
+            (
+                "Hips Chest Neck Head Head_End LeftCollar LeftShoulder LeftElbow LeftWrist LeftWrist_End RightCollar \
+                 RightShoulder RightElbow RightWrist RightWrist_End LeftHip LeftKnee LeftAnkle LeftAnkle_End RightHip \
+                 RightKnee RightAnkle RightAnkle_End",
+                ["LeftShoulder", "RightElbow", "LeftKnee"],
+            ),
+            (
+                "Hips Chest Neck Head Head_End LeftCollar LeftUpArm LeftLowArm LeftHand LeftHand_End RightCollar RightUpArm \
+                 RightLowArm RightHand RightHand_End LeftUpLeg LeftLowLeg LeftFoot LeftFoot_End RightUpLeg RightLowLeg \
+                 RightFoot RightFoot_End",
+                ["LeftUpArm", "RightLowArm", "LeftLowLeg"],
+            ),
+        ] {
+            let names: Vec<String> = names.split_whitespace().map(str::to_owned).collect();
+            let found = find(&names).expect("a template").names;
+            let of = |name: &str| {
+                let known = found.iter().find(|(place, _)| names[*place] == name);
+                known.map(|(_, known)| known.as_str())
+            };
+            assert_eq!(of("Chest"), Some("Spine"));
+            assert_eq!(limbs.map(of), [Some("LeftArm"), Some("RightForeArm"), Some("LeftLeg")]);
         }
     }
 

@@ -38,9 +38,7 @@ pub enum TemplateError {
     Name(String),
     #[error("template: part `{part}` {reason}")]
     Part { part: String, reason: String },
-    #[error(
-        "the recording lacks {} of the {of} markers of template `{template}` ({}); it has {}", .missing.len(), listed(.missing), listed(.present)
-    )]
+    #[error("{}", lacking(.missing, *.of, .template, .present))]
     UnknownMarkers {
         missing: Vec<String>,
         of: usize,
@@ -48,6 +46,19 @@ pub enum TemplateError {
         /// Some markers of the recording.
         present: Vec<String>,
     },
+}
+
+fn lacking(missing: &[String], of: usize, template: &str, present: &[String]) -> String {
+    let (names, count) = (listed(present), missing.len());
+    let missing = listed(missing);
+    if count == of {
+        return format!(
+            "none of the recording's names ({names}) is one of the {of} markers of template `{template}` ({missing})"
+        );
+    }
+    format!(
+        "the recording lacks {count} of the {of} markers of template `{template}` ({missing}); it has {names}"
+    )
 }
 
 fn listed(names: &[String]) -> String {

@@ -50,7 +50,7 @@ proptest! {
         let _ = ntu::read(hurt(&ntu_file()).as_bytes());
         let _ = kinect::read(hurt(&kinect_file()).as_bytes());
         let _ = trc::read(hurt(TRC).as_bytes());
-        let _ = csv::read(hurt(CSV).as_bytes());
+        let _ = csv::read(hurt(CSV).as_bytes(), Choices::default());
         let _ = Template::parse(&hurt(TEMPLATE));
         // Accepted data are also turned upright and their units guessed.
         for (text, ending) in [(TRC.to_owned(), "trc"), (CSV.to_owned(), "csv"), (ntu_file(), "skeleton"), (kinect_file(), "txt"), (keypoints(), "json")] {

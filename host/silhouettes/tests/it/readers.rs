@@ -135,7 +135,7 @@ proptest! {
             keyed[1] = 0x50;
         }
         let _ = c3d::read(&keyed);
-        let _ = csv::read(text.as_bytes());
+        let _ = csv::read(text.as_bytes(), Choices::default());
         let _ = ntu::read(text.as_bytes());
         let _ = kinect::read(text.as_bytes());
         let headed =
@@ -230,6 +230,31 @@ fn a_trc_file_without_a_rate_or_with_one_name_twice_is_reported() {
     assert!(twice.contains("share a name (A)"), "{twice}");
 }
 
+#[test]
+fn a_trc_file_with_doubled_tabs_between_its_values_is_read() {
+    let doubled = TRC.replace("\n100\t2\tm\n", "\n  100.0\t\t  2\t\t m\n");
+    assert_ne!(doubled, TRC);
+    assert_eq!(trc::read(doubled.as_bytes()), trc::read(TRC.as_bytes()));
+    let missing = TRC.replace("\n100\t2\tm\n", "\n100\t\tm\n");
+    let error = trc::read(missing.as_bytes()).expect_err("no number of markers").to_string();
+    assert!(error.starts_with("line 3: NumMarkers = ``"), "{error}");
+}
+
+#[test]
+fn names_of_a_trc_file_without_columns_are_reported_and_not_read() {
+    let whole = trc::read(TRC.as_bytes()).expect("a TRC file");
+    let named = TRC.replace("A\t\t\tB\n", "A\t\t\tB\t\t\tV_Hip\t\t\tV_Knee\t\t\t\n");
+    let empty = named.replace("4\t5\t6\n", "4\t5\t6\t\t\t\t\t\t\t\n");
+    for text in [&named, &empty] {
+        let found = trc::read(text.as_bytes()).expect("two markers");
+        assert_eq!((&found.names, &found.frames), (&whole.names, &whole.frames));
+        assert!(found.remarks.join("; ").contains("2 names after the 2 markers"), "{:?}", found.remarks);
+    }
+    let full = named.replace("4\t5\t6\n", "4\t5\t6\t7\t8\t9\t1\t2\t3\n");
+    let error = trc::read(full.as_bytes()).expect_err("a wrong number").to_string();
+    assert!(error.contains("4 marker names, NumMarkers says 2"), "{error}");
+}
+
 fn ntu_skeleton() -> String {
     let joints = "0.1 0.9 3.2 1 2 3 4 0 0 0 1 2\n".repeat(25);
     let person = |id: u32| format!("{id} 0 1 1 0 0 0 0.1 0.2 2\n25\n{joints}");
@@ -257,7 +282,7 @@ proptest! {
         let _ = c3d::read(&bytes);
         let _ = c3d::read(&bytes[..cut.index(bytes.len())]);
         let _ = trc::read(&damaged(TRC.as_bytes()));
-        let _ = csv::read(&damaged(CSV.as_bytes()));
+        let _ = csv::read(&damaged(CSV.as_bytes()), Choices::default());
         let skeleton = ntu_skeleton();
         assert!(ntu::read(skeleton.as_bytes()).is_ok());
         let _ = ntu::read(&damaged(skeleton.as_bytes()));

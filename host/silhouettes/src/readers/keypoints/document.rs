@@ -5,7 +5,10 @@ use std::collections::BTreeMap;
 
 use serde_json::{Map, Value};
 
-use super::layouts::{Layout, NAMES};
+use super::{
+    labels::labels,
+    layouts::{Layout, NAMED, NAMES},
+};
 use crate::{readers::recording::RecordingError, silhouette::capsule::Point3};
 
 /// Points of less confidence are missing.
@@ -21,7 +24,7 @@ pub struct Raw {
 }
 
 impl Raw {
-    const MISSING: Self = Self { x: f64::NAN, y: f64::NAN, third: None, sure: None };
+    pub const MISSING: Self = Self { x: f64::NAN, y: f64::NAN, third: None, sure: None };
 
     pub fn in_space(&self) -> Option<Point3> {
         let point = [self.x, self.y, self.third?];
@@ -40,6 +43,8 @@ pub struct Person {
     pub raw: Vec<Raw>,
     pub layout: &'static Layout,
     pub id: Option<i64>,
+    /// Of the points, see [`labels`].
+    pub labels: Vec<String>,
     /// Whether the points were triples in one list.
     in_triples: bool,
     /// By [`NAMES`], see [`Person::placed`].
@@ -47,6 +52,11 @@ pub struct Person {
 }
 
 impl Person {
+    /// Points in the order of [`NAMES`].
+    pub fn named(raw: Vec<Raw>, id: Option<i64>) -> Self {
+        Self { raw, layout: &NAMED, id, labels: Vec::new(), in_triples: false, points: Vec::new() }
+    }
+
     /// For formats that define the third number of a triple as a visibility or a score, of any range.
     fn scored(mut self) -> Self {
         if self.in_triples && !self.layout.has_picture_depth() {
@@ -79,6 +89,8 @@ pub struct Document {
     pub size: Option<[f64; 2]>,
     /// Whether gaps in the numbers are too long to be filled.
     pub has_wide_gaps: bool,
+    /// Frames with values that are no person's points.
+    pub unread: usize,
     /// A list, whose items may be frames, or people of one frame.
     is_list: bool,
 }
@@ -119,13 +131,26 @@ impl Document {
         Ok(document)
     }
 
+    /// People by the names of their frames; a frame may occur several times.
+    pub fn of_frames(people: impl IntoIterator<Item = (String, Vec<Person>)>) -> Self {
+        let (mut frames, mut document) = (Named::new(), Self::default());
+        for (frame, people) in people {
+            frames.entry(split(&frame)).or_default().extend(people);
+        }
+        document.numbered(frames);
+        document
+    }
+
     /// Reads a folder's files in order: a frame each, or a recording in a single file.
     pub fn of_files<'a>(
         files: impl IntoIterator<Item = (&'a str, &'a [u8])>,
     ) -> Result<Self, RecordingError> {
         let mut documents = files
             .into_iter()
-            .map(|(name, bytes)| Ok((name, Self::parse(bytes)?)))
+            .map(|(name, bytes)| match Self::parse(bytes) {
+                Ok(document) => Ok((name, document)),
+                Err(error) => Err(RecordingError::File { name: name.into(), error: error.into() }),
+            })
             .collect::<Result<Vec<(&str, Self)>, RecordingError>>()?;
         if documents.len() < 2 {
             return Ok(documents.pop().map(|(_, document)| document).unwrap_or_default());
@@ -139,7 +164,8 @@ impl Document {
             return Err(RecordingError::Kind { kind: "keypoint JSON", reason });
         }
         let size = documents.iter().find_map(|(_, document)| document.size);
-        let mut whole = Self { size, ..Self::default() };
+        let unread = documents.iter().map(|(_, document)| document.unread).sum();
+        let mut whole = Self { size, unread, ..Self::default() };
         // A list in such a file holds people, not frames.
         let people = |document: Self| -> Vec<Person> { document.frames.into_iter().flatten().collect() };
         whole.numbered(documents.into_iter().map(|(name, document)| (split(name), people(document))));
@@ -252,6 +278,12 @@ impl Document {
     }
 
     fn frame(&mut self, value: &Value) -> Vec<Person> {
+        let people = self.people(value);
+        self.unread += usize::from(people.is_empty() && holds_values(value));
+        people
+    }
+
+    fn people(&mut self, value: &Value) -> Vec<Person> {
         let people = match value {
             Value::Object(map) => PEOPLE.iter().find_map(|key| map.get(*key)).unwrap_or(value),
             other => other,
@@ -302,6 +334,7 @@ fn points(value: &Value, confidences: Option<&[Value]>) -> Option<Person> {
 /// Points as x, y, c, ... in one list, lists of two to four numbers, or objects with x and y.
 fn points_of(items: &[Value], confidences: Option<&[Value]>) -> Option<Person> {
     let flat = items.iter().any(|item| number(item).is_some());
+    let labels = labels(items);
     let (layout, in_triples, mut raw): (_, _, Vec<Raw>) = if flat {
         // No two layouts share a length.
         let (layout, width) = [3, 2, 4].iter().find_map(|width| {
@@ -317,12 +350,13 @@ fn points_of(items: &[Value], confidences: Option<&[Value]>) -> Option<Person> {
             Value::Null => Some(Raw::MISSING),
             _ => None,
         };
-        (Layout::of(items.len())?, false, items.iter().map(of).collect::<Option<_>>()?)
+        let layout = Layout::of(items.len()).or((!labels.is_empty()).then_some(&NAMED))?;
+        (layout, false, items.iter().map(of).collect::<Option<_>>()?)
     };
     for (raw, given) in raw.iter_mut().zip(confidences.unwrap_or_default()) {
         raw.sure = Some(number(given).unwrap_or(f64::NAN));
     }
-    Some(Person { raw, layout, id: None, in_triples, points: Vec::new() })
+    Some(Person { raw, layout, id: None, labels, in_triples, points: Vec::new() })
 }
 
 fn of_numbers(numbers: &[Value]) -> Raw {
@@ -331,6 +365,10 @@ fn of_numbers(numbers: &[Value]) -> Raw {
 }
 
 fn of_object(map: &Map<String, Value>) -> Option<Raw> {
+    // A person's box has a place, too.
+    if is_frame(map) {
+        return None;
+    }
     let sure =
         ["visibility", "score", "confidence", "c"].iter().find_map(|key| map.get(*key).and_then(number));
     // PoseNet nests the position.
@@ -379,6 +417,20 @@ fn rows(columns: &Map<String, Value>) -> Option<Vec<Value>> {
 
 fn is_frame(map: &Map<String, Value>) -> bool {
     PEOPLE.iter().chain(&POINTS).any(|key| map.contains_key(*key))
+}
+
+/// Whether anything is where people's points are expected.
+fn holds_values(value: &Value) -> bool {
+    match value {
+        Value::Array(items) => items.iter().any(holds_values),
+        Value::Object(map) => PEOPLE
+            .iter()
+            .chain(&POINTS)
+            .chain(&["x", "position"])
+            .any(|key| map.get(*key).is_some_and(holds_values)),
+        Value::Number(_) | Value::String(_) => true,
+        Value::Null | Value::Bool(_) => false,
+    }
 }
 
 fn is_track(value: &Value) -> bool {

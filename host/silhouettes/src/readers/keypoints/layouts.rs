@@ -23,6 +23,9 @@ pub const LAYOUTS: [Layout; 10] = [
     Layout { name: "HALPE whole body", count: 136, points: &HALPE_26 },
 ];
 
+/// Points by name instead of number.
+pub const NAMED: Layout = Layout { name: "named points", count: NAMES.len(), points: &NAMES };
+
 /// Estimators of 3-D poses mostly use this order.
 pub const HUMAN36M: Layout = Layout { name: "Human3.6M", count: 17, points: &HUMAN36M_17 };
 

@@ -46,9 +46,9 @@ pub fn has_depth<'a>(people: impl Iterator<Item = &'a Person> + Clone) -> bool {
 pub fn layout<'a>(
     people: impl Iterator<Item = &'a Person> + Clone,
 ) -> Result<&'static Layout, RecordingError> {
-    let count = people.clone().next().map_or(0, |person| person.layout.count);
-    let orders =
-        [Some(&HUMAN36M), Layout::of(count)].into_iter().flatten().filter(|order| order.count == count);
+    let own = people.clone().next().map(|person| person.layout);
+    let count = own.map_or(0, |layout| layout.count);
+    let orders = [Some(&HUMAN36M), own].into_iter().flatten().filter(|order| order.count == count);
     let measured = orders.map(|order| (asymmetry(people.clone(), order), order));
     let best =
         measured.min_by(|a, b| a.0.total_cmp(&b.0)).filter(|(asymmetry, _)| *asymmetry <= MOST_ASYMMETRY);

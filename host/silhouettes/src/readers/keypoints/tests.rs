@@ -3,7 +3,9 @@ use super::*;
 use layouts::{LAYOUTS, Layout};
 
 mod crowd;
+mod damaged;
 mod scores;
+mod unordered;
 
 /// An upright person at x, 170 pixels tall: 1 px is 10 mm.
 fn person(layout: &Layout, x: f64) -> Vec<[f64; 3]> {

@@ -1,0 +1,230 @@
+//! Keypoints in a table: columns of x, y and perhaps a confidence for each named point, as SLEAP (`nose.x`) and MocapNET
+//! (`2DX_neck`) write them, and DeepLabCut in rows of names that the CSV reader joins (`nose_x`, `Ann:nose_x`).
+
+use std::collections::HashMap;
+
+use csv::StringRecord;
+
+use super::{
+    document::{Document, Person, Raw},
+    found,
+    layouts::NAMES,
+};
+use crate::{
+    readers::{
+        csv::{check_width, coordinate, line, markers_of},
+        recording::{Choices, Found, RecordingError, number},
+        trc::point,
+    },
+    silhouette::{aliases, anatomy},
+};
+
+const CONFIDENCES: [&str; 5] = ["likelihood", "score", "confidence", "conf", "visibility"];
+/// MocapNET writes x, y and the visibility before the name.
+const MOCAPNET: [&str; 3] = ["2DX_", "2DY_", "visible_"];
+const FRAMES: [&str; 3] = ["frame_idx", "frameNumber", "frame"];
+const PEOPLE: [&str; 4] = ["track", "track_id", "person_id", "skeletonID"];
+
+struct Column {
+    name: String,
+    place: [usize; 2],
+    sure: Option<usize>,
+}
+
+/// `None` for a table with a z, or without points.
+pub fn read(
+    columns: &StringRecord,
+    rows: &[StringRecord],
+    choices: Choices,
+) -> Result<Option<Found>, RecordingError> {
+    if columns.iter().any(|column| coordinate(column).is_some_and(|(_, axis)| axis == 2)) {
+        return Ok(None);
+    }
+    let points: Vec<Column> = markers_of(columns, field)?
+        .into_iter()
+        .filter_map(|(name, [x, y, sure])| Some(Column { name, place: [x?, y?], sure }))
+        .collect();
+    if points.is_empty() {
+        return Ok(None);
+    }
+    let bodies = bodies(&points);
+    let known: usize = bodies.iter().map(|(_, body)| body.len()).sum();
+    if known == 0 {
+        let names: Vec<&str> = points.iter().take(6).map(|point| point.name.as_str()).collect();
+        let reason = format!(
+            "too few of the points ({}) are those of a person, expected names such as nose, left_shoulder and right_hip: \
+             rename the columns, or add columns NAME_z if the points are markers in space",
+            names.join(", ")
+        );
+        return Err(RecordingError::Line { line: 1, reason });
+    }
+    let is_of = |column: &str, known: &[&str]| known.iter().any(|name| column.eq_ignore_ascii_case(name));
+    let frame = columns.iter().position(|column| is_of(column, &FRAMES));
+    let track = columns.iter().position(|column| is_of(column, &PEOPLE));
+    let mut ids: HashMap<(&str, &str), i64> = HashMap::new();
+    let mut frames: Vec<(String, Vec<Person>)> = Vec::new();
+    for (index, row) in rows.iter().enumerate() {
+        check_width(row, columns)?;
+        let track = track.map_or("", |column| cell(row, column));
+        let mut people = Vec::new();
+        for (prefix, body) in &bodies {
+            let mut raw = vec![Raw::MISSING; NAMES.len()];
+            for (place, column) in body {
+                let [x, y] = column.place.map(|column| cell(row, column));
+                if let Some([x, y, _]) = point([x, y, "0"], line(row))? {
+                    let sure = column.sure.and_then(|column| number(cell(row, column)));
+                    let sure = sure.filter(|sure| sure.is_finite());
+                    raw[*place] = Raw { x, y, third: None, sure };
+                }
+            }
+            let next = ids.len() as i64;
+            let is_named = !(track.is_empty() && prefix.is_empty());
+            let id = is_named.then(|| *ids.entry((track, *prefix)).or_insert(next));
+            people.push(Person::named(raw, id));
+        }
+        let name = frame.map_or_else(|| index.to_string(), |column| cell(row, column).to_owned());
+        frames.push((name, people));
+    }
+    if frames.is_empty() {
+        return Err(RecordingError::Kind { kind: "CSV", reason: "it has no row below its header".into() });
+    }
+    let mut found = found(Document::of_frames(frames), choices)?;
+    if let Some(remark) = found.remarks.first_mut() {
+        *remark = format!("{known} of {} named points are keypoints, seen from one side", points.len());
+    }
+    Ok(Some(found))
+}
+
+fn cell(row: &StringRecord, column: usize) -> &str {
+    row.get(column).unwrap_or_default()
+}
+
+/// Points of a person with their places in [`NAMES`].
+type Body<'a> = Vec<(usize, &'a Column)>;
+
+/// People by the prefixes of their points' names.
+fn bodies(points: &[Column]) -> Vec<(&str, Body<'_>)> {
+    let mut prefixes: Vec<&str> = points.iter().map(|point| anatomy::prefix(&point.name)).collect();
+    prefixes.sort_unstable();
+    prefixes.dedup();
+    let bodies = prefixes.into_iter().map(|prefix| (prefix, body(points, prefix)));
+    bodies.filter(|(_, body)| !body.is_empty()).collect()
+}
+
+fn body<'a>(points: &'a [Column], prefix: &str) -> Body<'a> {
+    let own: Vec<&Column> = points.iter().filter(|point| anatomy::prefix(&point.name) == prefix).collect();
+    let names: Vec<String> = own.iter().map(|point| point.name.clone()).collect();
+    let place = |name: &str| NAMES.iter().position(|known| *known == name);
+    let known = aliases::keypoints(&names).into_iter();
+    known.filter_map(|(at, name)| Some((place(&name)?, *own.get(at)?))).collect()
+}
+
+/// Name of a point, and 0 for x, 1 for y, 2 for the confidence.
+fn field(column: &str) -> Option<(&str, usize)> {
+    let mocapnet = MOCAPNET.iter().enumerate().find_map(|(axis, start)| {
+        let (begin, name) = column.split_at_checked(start.len())?;
+        begin.eq_ignore_ascii_case(start).then_some((name, axis))
+    });
+    let sure = || {
+        let (name, last) = column.rsplit_once(['_', ':', '.', ' '])?;
+        CONFIDENCES.iter().any(|known| last.eq_ignore_ascii_case(known)).then_some((name, 2))
+    };
+    mocapnet.or_else(|| coordinate(column)).or_else(sure)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::readers::{self, recording::Recording};
+
+    /// A person 170 pixels tall; the left wrist is further to the right in the picture, and the right arm raised.
+    const BODY: [(&str, [f64; 2]); 13] = [
+        ("nose", [100.0, 30.0]),
+        ("left_shoulder", [118.0, 50.0]),
+        ("right_shoulder", [82.0, 50.0]),
+        ("left_elbow", [124.0, 78.0]),
+        ("right_elbow", [76.0, 25.0]),
+        ("left_wrist", [126.0, 104.0]),
+        ("right_wrist", [74.0, 2.0]),
+        ("left_hip", [109.0, 100.0]),
+        ("right_hip", [91.0, 100.0]),
+        ("left_knee", [109.0, 142.0]),
+        ("right_knee", [91.0, 142.0]),
+        ("left_ankle", [109.0, 184.0]),
+        ("right_ankle", [91.0, 184.0]),
+    ];
+
+    fn read(text: &str, person: Option<usize>) -> Result<Recording, RecordingError> {
+        readers::read(text.as_bytes(), "csv", Choices { person, ..Choices::default() })
+    }
+
+    /// The cells of all points, `x` to the right.
+    fn cells(of: impl Fn(&str, [f64; 2]) -> String) -> String {
+        BODY.iter().map(|(name, place)| format!(",{}", of(name, *place))).collect()
+    }
+
+    #[track_caller]
+    fn expect_person(text: &str, frames: usize) -> Recording {
+        let found = read(text, None).unwrap_or_else(|error| panic!("{error}: {text}"));
+        assert_eq!(found.frames.len(), frames);
+        let points = found.by_name(0);
+        assert!(found.planar && points["left wrist"][0] > points["right wrist"][0]);
+        assert!(points["right wrist"][2] > points["nose"][2] && points["nose"][2] > points["left wrist"][2]);
+        let height = points["nose"][2] - points["left ankle"][2];
+        assert!((1300.0..1800.0).contains(&height), "{height} mm");
+        assert!(found.remarks().iter().any(|remark| remark.contains("named points are keypoints")));
+        found
+    }
+
+    #[test]
+    fn tables_of_sleap_are_read_by_names_frames_and_tracks() {
+        let header =
+            format!("track,frame_idx,instance.score{}", cells(|n, _| format!("{n}.x,{n}.y,{n}.score")));
+        let row = |track: &str, frame: usize, x: f64| {
+            format!("{track},{frame},0.9{}", cells(|_, [at, y]| format!("{},{y},0.9", at + x)))
+        };
+        // Nobody is seen in frame 1; a score that is empty is that of a labelled point.
+        let rows = [0, 2, 3].map(|frame| [row("ann", frame, 0.0), row("ben", frame, 300.0)].join("\n"));
+        let text = format!("{header}\n{}\n", rows.join("\n")).replacen("0.9,118", ",118", 1);
+        let ann = expect_person(&text, 4);
+        assert!(ann.by_name(1).is_empty());
+        assert!(ann.remarks().iter().any(|remark| remark.starts_with("2 people")), "{:?}", ann.remarks());
+        assert!(read(&text, Some(2)).is_ok() && read(&text, Some(3)).is_err());
+        let error = read(&text.replacen(",82,50", ",82", 1), None).expect_err("a cell too few").to_string();
+        assert!(error.starts_with("line 2") && error.contains("the header has"), "{error}");
+    }
+
+    #[test]
+    fn tables_of_deeplabcut_are_read_by_their_rows_of_names() {
+        let kinds = cells(|_, _| "x,y,likelihood".into());
+        let names = cells(|name, _| format!("{name},{name},{name}"));
+        let scorer = cells(|_, _| "DLC,DLC,DLC".into());
+        let row = |x: f64| cells(|_, [at, y]| format!("{},{y},0.9", at + x));
+        let text = format!("scorer{scorer}\nbodyparts{names}\ncoords{kinds}\n0{}\n1{}\n", row(0.0), row(5.0));
+        expect_person(&text, 2);
+        let of = |person: &str| cells(|_, _| [person; 3].join(","));
+        let two = format!(
+            "scorer{scorer}{scorer}\nindividuals{}{}\nbodyparts{names}{names}\ncoords{kinds}{kinds}\n0{}{}\n",
+            of("ann"),
+            of("ben"),
+            row(0.0),
+            row(300.0)
+        );
+        expect_person(&two, 1);
+        assert!(read(&two, Some(2)).is_ok() && read(&two, Some(3)).is_err());
+        let mouse = text.replace("_shoulder", "_paw").replace("_hip", "_whisker").replace("_knee", "_toe");
+        let error = read(&mouse.replace("_wrist", "_claw"), None).expect_err("a mouse").to_string();
+        assert!(error.contains("nose, left_paw") && error.contains("rename the columns"), "{error}");
+    }
+
+    #[test]
+    fn tables_of_mocapnet_are_parts_of_the_picture_whose_hands_and_feet_are_wrists_and_ankles() {
+        let name = |name: &str| {
+            let short = name.replace("left_", "l").replace("right_", "r");
+            short.replace("wrist", "hand").replace("ankle", "foot").replace("nose", "head")
+        };
+        let header = cells(|part, _| format!("2DX_{0},2DY_{0},visible_{0}", name(part)));
+        let row = cells(|_, [x, y]| format!("{},{},1", x / 320.0, y / 200.0));
+        expect_person(&format!("frameNumber,skeletonID,totalSkeletons{header}\n0,0,1{row}\n1,0,1{row}\n"), 2);
+    }
+}

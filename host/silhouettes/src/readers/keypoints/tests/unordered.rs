@@ -1,0 +1,127 @@
+//! Points that state their name or number, in any order and incomplete.
+
+use super::*;
+
+const COCO: [&str; 17] = [
+    "nose",
+    "left_eye",
+    "right_eye",
+    "left_ear",
+    "right_ear",
+    "left_shoulder",
+    "right_shoulder",
+    "left_elbow",
+    "right_elbow",
+    "left_wrist",
+    "right_wrist",
+    "left_hip",
+    "right_hip",
+    "left_knee",
+    "right_knee",
+    "left_ankle",
+    "right_ankle",
+];
+
+/// Frames with these points of COCO, in this order.
+fn frames(shown: &[Vec<usize>], label: impl Fn(usize) -> String) -> String {
+    let points = person(layout(17), 100.0);
+    let frame = |order: &Vec<usize>| {
+        let point = |n: &usize| {
+            let [x, y, c] = points[*n];
+            format!(r#"{{{},"x":{x},"y":{y},"confidence":{c}}}"#, label(*n))
+        };
+        format!(r#"{{"keypoints":[{}]}}"#, order.iter().map(point).collect::<Vec<_>>().join(","))
+    };
+    format!("[{}]", shown.iter().map(frame).collect::<Vec<_>>().join(","))
+}
+
+/// Reversed, without a head, two points, and everything in order.
+fn shown() -> [Vec<usize>; 4] {
+    [(0..17).rev().collect(), (5..17).collect(), vec![9, 13], (0..17).collect()]
+}
+
+#[track_caller]
+fn expect_placed(json: &str, about: &str) -> super::super::super::recording::Recording {
+    let found = upright(json, 4);
+    assert_eq!(found.frames[0], found.frames[3]);
+    let (part, whole) = (found.by_name(1), found.by_name(3));
+    assert!(!part.contains_key("nose") && part["left wrist"] == whole["left wrist"]);
+    assert!(found.by_name(2).is_empty(), "two points are not a body");
+    assert!(found.remarks().iter().any(|remark| remark.contains(about)), "{:?}", found.remarks());
+    found
+}
+
+#[test]
+fn points_are_placed_by_their_numbers() {
+    let from_zero =
+        expect_placed(&frames(&shown(), |n| format!(r#""id":{n}"#)), "up to 16, in the layout COCO");
+    let from_one = frames(&shown(), |n| format!(r#""id":"{}""#, n + 1));
+    assert_eq!(expect_placed(&from_one, "up to 17, in the layout COCO").frames, from_zero.frames);
+    // Nobody has all points, and the ankles are never seen.
+    let cut = frames(&[(0..15).collect(), (0..13).rev().collect()], |n| format!(r#""id":{n}"#));
+    let found = read(cut.as_bytes(), "json", Choices::default()).expect("keypoints");
+    assert_eq!(found.by_name(0)["left hip"], found.by_name(1)["left hip"]);
+    assert!(found.remarks().iter().any(|remark| remark.contains("layout COCO")), "{:?}", found.remarks());
+}
+
+#[test]
+fn points_are_placed_by_their_names() {
+    for key in ["name", "part"] {
+        let json = frames(&shown(), |n| format!(r#""id":7,"{key}":"{}""#, COCO[n]));
+        expect_placed(&json, "17 of 17 named points are keypoints");
+    }
+    // Never more than a trunk, limbs and a nose.
+    let few = [vec![15, 0, 16, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14]];
+    upright(&frames(&few, |n| format!(r#""name":"{}""#, COCO[n])), 1);
+}
+
+#[test]
+fn named_points_of_mediapipe_have_the_depth_of_a_picture() {
+    let names = "nose left_eye_inner left_eye left_eye_outer right_eye_inner right_eye right_eye_outer left_ear right_ear \
+                 mouth_left mouth_right left_shoulder right_shoulder left_elbow right_elbow left_wrist right_wrist \
+                 left_pinky right_pinky left_index right_index left_thumb right_thumb left_hip right_hip left_knee \
+                 right_knee left_ankle right_ankle left_heel right_heel left_foot_index right_foot_index";
+    let mut all: Vec<String> = names
+        .split_whitespace()
+        .zip(person(layout(33), 100.0))
+        .map(|(name, [x, y, _])| format!(r#"{{"x":{x},"y":{y},"z":-{x},"score":0.9,"name":"{name}"}}"#))
+        .collect();
+    assert_eq!(all.len(), 33);
+    all.reverse();
+    let found = upright(&format!(r#"[{{"keypoints":[{}]}}]"#, all.join(",")), 1);
+    assert!(found.by_name(0).contains_key("left big toe"));
+}
+
+#[test]
+fn named_points_may_be_in_space() {
+    let points = in_space(layout(17));
+    let of = |n: &usize| {
+        let ([x, y, z], name) = (points[*n], COCO[*n]);
+        format!(r#"{{"name":"{name}","x":{x},"y":{y},"z":{z}}}"#)
+    };
+    let order = [16, 0, 15, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14];
+    let json = order.iter().map(of).collect::<Vec<_>>().join(",");
+    upright_in_space(&format!(r#"[{{"keypoints":[{json}]}}]"#));
+}
+
+#[test]
+fn unknown_names_leave_the_order_of_the_file_or_are_refused() {
+    let whole: Vec<usize> = (0..17).collect();
+    let unknown = |n: usize| format!(r#""name":"p{n}""#);
+    let found = upright(&frames(&[whole.clone(), whole.clone(), vec![9, 13]], unknown), 3);
+    let remarks = found.remarks().join("; ");
+    assert!(
+        remarks.contains("by their order in the layout COCO") && remarks.contains("; 1 with"),
+        "{remarks}"
+    );
+    upright(&frames(&[whole], |n| format!(r#""id":{}"#, 100 + n)), 1);
+    let error = read(frames(&[vec![9, 13], vec![4]], unknown).as_bytes(), "json", Choices::default());
+    let error = error.expect_err("no names").to_string();
+    assert!(error.contains("p13") && error.contains("left_shoulder"), "{error}");
+}
+
+#[test]
+fn the_place_of_a_persons_box_is_not_a_point() {
+    let points = lists(&person(layout(17), 100.0));
+    upright(&format!(r#"{{"people":[{{"id":3,"x":10,"y":20,"keypoints":{points}}}]}}"#), 1);
+}
