@@ -384,6 +384,21 @@ mod tests {
 
     #[test]
     #[cfg_attr(not(ffmpeg), ignore = "needs ffmpeg")]
+    fn frames_without_presentation_times_are_all_read() {
+        let folder = tempfile::tempdir().unwrap();
+        for (name, form) in [("b.avi", "mpeg4 -bf 2 -f avi"), ("b.mpg", "mpeg2video -bf 2 -f mpeg")] {
+            let recorded =
+                by_ffmpeg(&format!("-f lavfi -i testsrc=size=64x48:rate=25:duration=4 -c:v {form}"));
+            std::fs::write(folder.path().join(name), recorded).unwrap();
+            let mut video = Video::open(&folder.path().join(name)).unwrap();
+            let rate_hz = video.rate_hz();
+            assert_eq!((video.by_ref().map(Result::unwrap).count(), rate_hz), (100, Some(25.0)), "{name}");
+            assert_eq!(video.take_remarks(), Vec::<String>::new(), "{name}");
+        }
+    }
+
+    #[test]
+    #[cfg_attr(not(ffmpeg), ignore = "needs ffmpeg")]
     fn a_constant_rate_in_milliseconds_is_read_frame_by_frame() {
         for filter in ["settb=1/1000", "settb=1/1000,setpts=N*59"] {
             assert_eq!(through_ffmpeg(filter), (60, None), "{filter}");

@@ -65,7 +65,9 @@ pub enum SilhouettesError {
 }
 
 fn fitting(template: Option<&str>) -> String {
-    template.map_or(String::new(), |name| format!("; the built-in template `{name}` fits it"))
+    let none = "; no built-in template fits it: name a file of your own with --template (TOML: `[[part]]` with name, markers, \
+                thickness_mm)";
+    template.map_or(none.to_owned(), |name| format!("; the built-in template `{name}` fits it"))
 }
 
 fn leaping(leap: Option<&[String; 2]>) -> String {

@@ -132,7 +132,10 @@ impl Timing {
             )
         });
         let shape = (!self.is_square()).then(|| {
-            format!("its pixels are {:.3} times as wide as high: the frames are widened", self.aspect)
+            format!(
+                "as stored, its pixels are {:.3} times as wide as high: the frames are scaled to square pixels",
+                self.aspect
+            )
         });
         let remarks: Vec<String> = self.choice.iter().cloned().chain(times).chain(shape).collect();
         (!remarks.is_empty()).then(|| remarks.join("; "))
@@ -182,7 +185,7 @@ fn size(text: &str) -> &str {
 #[derive(Debug, PartialEq)]
 struct Listed {
     tick_s: f64,
-    /// Presentation times.
+    /// Presentation times. Packets of AVI files and MPEG program streams may have none: decoding times then.
     ticks: Vec<i64>,
     aspect: f64,
 }
@@ -191,7 +194,7 @@ fn parsed(text: &str) -> Option<Listed> {
     /// ffmpeg's mark of a packet without a time.
     const NO_TIME: i64 = i64::MIN;
     let (mut tick_s, mut aspect) = (None, 1.0);
-    let mut ticks = Vec::new();
+    let mut packets = Vec::new();
     let ratio = |text: &str| {
         let (over, under) = text.trim().split_once('/')?;
         let ratio = over.parse::<f64>().ok()? / under.parse::<f64>().ok()?;
@@ -204,10 +207,15 @@ fn parsed(text: &str) -> Option<Listed> {
             aspect = ratio(shape).unwrap_or(1.0);
         } else if !line.starts_with('#') {
             // Stream, decoding time, presentation time, duration, size, checksum.
-            let tick = line.split(',').nth(2).and_then(|cell| cell.trim().parse::<i64>().ok());
-            ticks.extend(tick.filter(|tick| *tick != NO_TIME));
+            let mut times = line.split(',').skip(1).map(|cell| cell.trim().parse::<i64>());
+            if let (Some(Ok(decoded)), Some(Ok(presented))) = (times.next(), times.next()) {
+                packets.push([decoded, presented]);
+            }
         }
     }
+    let are_presented = packets.iter().all(|[_, presented]| *presented != NO_TIME);
+    let times = packets.iter().map(|[decoded, presented]| if are_presented { *presented } else { *decoded });
+    let ticks = times.filter(|tick| *tick != NO_TIME).collect();
     Some(Listed { tick_s: tick_s?, ticks, aspect })
 }
 
@@ -237,9 +245,23 @@ mod tests {
     }
 
     #[test]
-    fn packets_without_a_time_are_left_out_and_pixels_have_a_shape() {
+    fn decoding_times_replace_missing_presentation_times() {
+        // As ffmpeg lists an AVI file with two B-frames between others: presentation times of the B-frames alone.
+        let packet = |n: i64| {
+            let presented = if n > 0 && n % 3 != 1 { n } else { i64::MIN };
+            format!("0, {n}, {presented}, 1, 640, 0x96991d38, F=0x0\n")
+        };
+        let list = "#tb 0: 1/25\n".to_owned() + &(0..60).map(packet).collect::<String>();
+        let Listed { tick_s, ticks, .. } = parsed(&list).expect("a list");
+        let timing = Timing::of_times(ticks.iter().map(|tick| *tick as f64 * tick_s).collect());
+        let timing = timing.expect("times");
+        assert_eq!((timing.regular, timing.rate_hz, timing.frames), (true, 25.0, 60));
+    }
+
+    #[test]
+    fn packets_without_any_time_are_left_out_and_pixels_have_a_shape() {
         let listed = parsed(
-            "#tb 0: 1/90000\n#sar 0: 64/45\n0, -3600, 0, 3600, 28, 0xd3\n0, 0, -9223372036854775808, 3600, 11, 0xe3\n0, 3600, 3600, 3600, 9, 0x1\n",
+            "#tb 0: 1/90000\n#sar 0: 64/45\n0, 0, 0, 3600, 28, 0xd3\n0, -9223372036854775808, -9223372036854775808, 3600, 11, 0xe3\n0, 3600, 3600, 3600, 9, 0x1\n",
         )
         .expect("a list");
         assert_eq!(listed, Listed { tick_s: 1.0 / 90_000.0, ticks: vec![0, 3600], aspect: 64.0 / 45.0 });
@@ -247,6 +269,12 @@ mod tests {
             Timing { aspect: listed.aspect, ..Timing::of_times(vec![0.0, 0.04, 0.08]).expect("times") };
         assert_eq!(wide.output_arguments()[1], "scale=round(iw*sar):ih,setsar=1");
         assert!(wide.remark().expect("a remark").contains("1.422 times as wide"));
+        // A video that is rotated when shown is scaled by the inverse ratio.
+        let remark = Timing { aspect: 0.55, ..wide }.remark().expect("a remark");
+        assert_eq!(
+            remark,
+            "as stored, its pixels are 0.550 times as wide as high: the frames are scaled to square pixels"
+        );
         assert_eq!(parsed("#tb 0: 1/25\n#sar 0: 0/1\n").expect("a list").aspect, 1.0);
     }
 

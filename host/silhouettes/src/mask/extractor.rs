@@ -210,6 +210,12 @@ impl Extractor {
         })
     }
 
+    /// Why the masks of all frames so far are doubtful.
+    #[must_use]
+    pub fn doubt(&self) -> Option<String> {
+        self.chooser.doubt()
+    }
+
     #[must_use]
     pub fn changes_of_light(&self) -> usize {
         self.changes_of_light

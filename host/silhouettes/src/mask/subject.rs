@@ -1,7 +1,7 @@
 //! The subject among the regions of a cleaned mask: the person nearest to the last one, or the largest
 //! without a last one. Doubts are flagged; a frame without a person gives an empty mask.
 
-use std::fmt;
+use std::{collections::VecDeque, fmt};
 
 use ndarray::ArrayView2;
 
@@ -64,8 +64,12 @@ pub struct SubjectSettings {
     pub widest_break_px: usize,
     /// A second person counts from this share of the largest's area.
     pub rival_share: f64,
+    /// A person counts from this share of the usual area of earlier ones; less is noise or a rest of a person.
+    pub usual_share: f64,
     /// Frames without a person after which the last place is forgotten.
     pub forget_after_frames: u32,
+    /// Frames with only smaller regions after which the usual area is forgotten: they may be people far away.
+    pub forget_area_after_frames: u32,
 }
 
 impl SubjectSettings {
@@ -77,7 +81,9 @@ impl SubjectSettings {
             smallest_fragment_px: (pixels / 10_000).max(1),
             widest_break_px: height / 40,
             rival_share: 0.3,
+            usual_share: 0.1,
             forget_after_frames: 10,
+            forget_area_after_frames: 500,
         }
     }
 }
@@ -92,18 +98,58 @@ pub struct Subject {
     pub flags: Vec<Flag>,
 }
 
-/// Chooses the subject frame by frame and remembers its place.
+/// Subjects after which their usual area and number of pieces are known.
+const KNOWN_AFTER: usize = 10;
+/// Subjects whose usual area is remembered.
+const REMEMBERED: usize = 100;
+/// Mean number of pieces above which masks are doubtful. Measured on public videos: mostly 1 to 4; 16 with a camera in the hand,
+/// 14 with a drifting exposure.
+const MOST_PIECES: f64 = 5.0;
+
+/// Chooses the subject frame by frame and remembers its place and usual area.
 #[derive(Clone, Debug)]
 pub struct SubjectChooser {
     settings: SubjectSettings,
     last: Option<(f64, f64)>,
     absent_frames: u32,
+    /// Areas of the last subjects that no edge cuts.
+    areas: VecDeque<usize>,
+    smaller_frames: u32,
+    subjects: usize,
+    pieces: usize,
 }
 
 impl SubjectChooser {
     #[must_use]
     pub fn new(settings: SubjectSettings) -> Self {
-        Self { settings, last: None, absent_frames: 0 }
+        Self {
+            settings,
+            last: None,
+            absent_frames: 0,
+            areas: VecDeque::new(),
+            smaller_frames: 0,
+            subjects: 0,
+            pieces: 0,
+        }
+    }
+
+    /// Why the masks of all frames so far are doubtful.
+    #[must_use]
+    pub fn doubt(&self) -> Option<String> {
+        let pieces = self.pieces as f64 / self.subjects.max(1) as f64;
+        (self.subjects >= KNOWN_AFTER && pieces > MOST_PIECES).then(|| {
+            format!(
+                "the person is in {pieces:.0} pieces on average, so that masks and answers are doubtful: does the camera move, does \
+                 its exposure drift, or do the clothes resemble the background?"
+            )
+        })
+    }
+
+    /// Median; `None` as long as it is unknown.
+    fn usual_area(&self) -> Option<usize> {
+        let mut areas: Vec<usize> = self.areas.iter().copied().collect();
+        areas.sort_unstable();
+        areas.get(areas.len() / 2).copied().filter(|_| areas.len() >= KNOWN_AFTER)
     }
 
     /// The subject of the next frame's cleaned mask.
@@ -114,7 +160,10 @@ impl SubjectChooser {
     /// [`Self::choose`] among the people of a mask of this (height, width).
     pub fn among(&mut self, mut people: Vec<Person>, size: (usize, usize)) -> Subject {
         let largest = people.iter().map(|person| person.area).max().unwrap_or(0);
-        people.retain(|person| person.area as f64 >= self.settings.rival_share * largest as f64);
+        let usual = self.usual_area().unwrap_or(0);
+        let least =
+            (self.settings.rival_share * largest as f64).max(self.settings.usual_share * usual as f64);
+        people.retain(|person| person.area as f64 >= least);
         let subject = match self.last {
             Some(last) => people.iter().min_by(|a, b| distance(a, last).total_cmp(&distance(b, last))),
             None => people.iter().max_by_key(|person| person.area),
@@ -124,16 +173,25 @@ impl SubjectChooser {
             if self.absent_frames >= self.settings.forget_after_frames {
                 self.last = None;
             }
+            self.smaller_frames = self.smaller_frames.saturating_add(u32::from(largest > 0));
+            if self.smaller_frames >= self.settings.forget_area_after_frames {
+                self.areas.clear();
+            }
             return Subject { mask: Mask::from_elem(size, false), bounds: None, flags: vec![Flag::Empty] };
         };
-        self.absent_frames = 0;
+        (self.absent_frames, self.smaller_frames) = (0, 0);
         self.last = Some(subject.centroid());
+        self.subjects += 1;
+        self.pieces += subject.fragments.len();
         let mut flags = Vec::new();
         if people.len() > 1 {
             flags.push(Flag::SeveralPeople { count: people.len() });
         }
         if subject.bounds.touches_edge(size) {
             flags.push(Flag::CutByEdge);
+        } else {
+            self.areas.truncate(REMEMBERED - 1);
+            self.areas.push_front(subject.area);
         }
         if subject.fragments.len() > 1 {
             flags.push(Flag::Fragments { count: subject.fragments.len() });
@@ -212,6 +270,39 @@ mod tests {
         }
         let subject = chooser.choose(people(&[[60, 10, 120, 40], [40, 200, 160, 250]]).view());
         assert_eq!(subject.mask, people(&[[40, 200, 160, 250]]));
+    }
+
+    #[test]
+    fn regions_much_smaller_than_the_people_before_are_no_person() {
+        let (person, noise) = (people(&[[60, 40, 140, 70]]), people(&[[100, 100, 107, 120]]));
+        let mut chooser = chooser();
+        let mut is_chosen = |mask: &Mask| chooser.choose(mask.view()).bounds.is_some();
+        assert!(is_chosen(&noise));
+        for _ in 0..30 {
+            assert!(is_chosen(&person));
+        }
+        for _ in 0..200 {
+            assert!(!is_chosen(&noise));
+        }
+        // Half as high, and so a quarter of the area: farther away.
+        assert!(is_chosen(&people(&[[60, 40, 100, 55]])));
+        let refused = (0..1000).take_while(|_| !is_chosen(&noise)).count();
+        assert_eq!(refused, 500);
+    }
+
+    #[test]
+    fn people_in_many_pieces_make_the_recording_doubtful() {
+        let stripes: Vec<[usize; 4]> =
+            (0..8).map(|stripe| [40 + 14 * stripe, 100, 50 + 14 * stripe, 140]).collect();
+        for (pieces, expected) in [(1, None), (4, None), (8, Some("in 8 pieces on average"))] {
+            let mut chooser = chooser();
+            for _ in 0..20 {
+                chooser.choose(people(&stripes[..pieces]).view());
+            }
+            let doubt = chooser.doubt();
+            assert_eq!(doubt.is_some(), expected.is_some(), "{doubt:?}");
+            assert!(expected.is_none_or(|part| doubt.is_some_and(|doubt| doubt.contains(part))), "{pieces}");
+        }
     }
 
     #[test]

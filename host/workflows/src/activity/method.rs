@@ -78,8 +78,7 @@ impl MethodOptions {
             (None, Some(name)) => {
                 none_of("features", name, [("--mode", mode.is_some())])?;
                 let model = Shipped::named(name).ok_or_else(|| {
-                    let names: Vec<&str> = shipped::MODELS.iter().map(|model| model.name).collect();
-                    WorkflowError::parameter("features", name, format!("expected {}", names.join(" or ")))
+                    WorkflowError::parameter("features", name, format!("expected {}", shipped::names()))
                 })?;
                 Pattern::Features { model, classifier: classifier.unwrap_or(Family::Svc) }
             }

@@ -61,12 +61,22 @@ impl<'m> Person<'m> {
         Ok(AnswerSummary::new(self.model.recognise(&whole)?, self.numbers.len()))
     }
 
-    /// Answers for all frames, for windows and for segments; `None` if no frame has a silhouette.
-    pub fn figures(&self, person: usize, answer: AnswerSummary) -> Result<Option<PersonFigures>> {
+    /// Passages of more than [`GAP_FRAMES`] silhouettes, with more frames than that without the person between them.
+    pub fn passages(&self) -> usize {
+        passages(&self.seen(), &self.numbers).iter().filter(|passage| passage.len() > GAP_FRAMES).count()
+    }
+
+    /// Frames with a silhouette in a view.
+    fn seen(&self) -> Vec<usize> {
         let is_seen = |frame: &usize| {
             self.tracks.iter().any(|view| view.get(*frame).is_some_and(|track| track.frames() > 0))
         };
-        let seen: Vec<usize> = (0..self.numbers.len()).filter(is_seen).collect();
+        (0..self.numbers.len()).filter(is_seen).collect()
+    }
+
+    /// Answers for all frames, for windows and for segments; `None` if no frame has a silhouette.
+    pub fn figures(&self, person: usize, answer: AnswerSummary) -> Result<Option<PersonFigures>> {
+        let seen = self.seen();
         let number = |frame: Option<&usize>| frame.and_then(|frame| self.numbers.get(*frame)).copied();
         let (Some(from), Some(to)) = (number(seen.first()), number(seen.last())) else { return Ok(None) };
         let (mut in_windows, mut in_segments) = (Vec::new(), Vec::new());

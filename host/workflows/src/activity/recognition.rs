@@ -34,6 +34,8 @@ use crate::{
     parameters::at_least,
 };
 
+pub const MODEL_FILE: &str = "the model";
+
 pub struct Model {
     path: PathBuf,
     recogniser: Recogniser,
@@ -47,7 +49,7 @@ impl Model {
             let [recogniser, cut_out] = shipped.recognisers()?;
             return Ok(Self { path: path.into(), recogniser, cut_out: Some(cut_out) });
         }
-        let bytes = fs::read(path).map_err(WorkflowError::read("the model", path))?;
+        let bytes = fs::read(path).map_err(WorkflowError::read(MODEL_FILE, path))?;
         let recogniser = Recogniser::from_bytes(&bytes).about(|| path.display().to_string())?;
         Ok(Self { path: path.into(), recogniser, cut_out: None })
     }
@@ -217,7 +219,7 @@ impl<'m> Recognition<'m> {
         let frames = views.iter().map(Frames::open).collect::<Result<Vec<Frames>>>()?;
         Ok(Self {
             annotated_video: request.video_out.as_deref().map(AnnotatedVideo::begin).transpose()?,
-            remarks: model.expectation().into_iter().chain(rate_remark(recogniser, views)).collect(),
+            remarks: model.expectation().into_iter().chain(rate_remark(recogniser, views, &frames)).collect(),
             views: frames,
             ..Self::of_frames(recogniser, found, window)
         })
@@ -258,8 +260,26 @@ impl<'m> Recognition<'m> {
         }
         let moment: Option<Vec<Seen>> = moment.into_iter().collect();
         context.warn(self.views.iter_mut().flat_map(Frames::take_remarks), &mut self.remarks);
+        if moment.is_none() {
+            context.warn(self.closing_remarks(), &mut self.remarks);
+        }
         self.seconds += start.elapsed().as_secs_f64();
         moment.map_or(Ok(None), |moment| self.take(moment))
+    }
+
+    /// Notices about the whole recording.
+    fn closing_remarks(&self) -> Vec<String> {
+        let doubts = (1..)
+            .zip(&self.views)
+            .filter_map(|(view, frames)| Some(format!("view {view}: {}", frames.doubt()?)));
+        let passages = self.person.passages();
+        let joined = (passages > 1).then(|| {
+            format!(
+                "the person leaves and returns: {passages} passages, which the answer for the whole joins; use `windows` and \
+                 `segments`, or cut the masks (farnear silhouettes passages) and recognise each passage"
+            )
+        });
+        doubts.chain(joined).collect()
     }
 
     /// [`Self::next`] for a frame of each view.
@@ -328,8 +348,8 @@ pub(super) fn window(model: &Recogniser, request: &RecogniseRequest) -> Result<u
     Ok(request.window.unwrap_or(model.typical_frames).max(1))
 }
 
-/// A remark on masks with a higher frame rate than those that a network learned from. Other models learn the user's rate.
-fn rate_remark(model: &Recogniser, views: &[View]) -> Option<String> {
+/// A remark on views with a higher frame rate than those that a network learned from. Other models learn the user's rate.
+fn rate_remark(model: &Recogniser, views: &[View], frames: &[Frames]) -> Option<String> {
     /// Highest rate of the networks' training clips.
     const LEARNED_HZ: f64 = 26.0;
     /// Windows are too short above it.
@@ -338,24 +358,27 @@ fn rate_remark(model: &Recogniser, views: &[View]) -> Option<String> {
         return None;
     }
     let is_high = |rate_hz: &f64| *rate_hz > HIGH_HZ && rate_hz.is_finite();
-    let (view, rate_hz) =
-        views.iter().find_map(|view| Some((view, stated_rate_hz(view).filter(is_high)?)))?;
+    let (view, rate_hz) = views
+        .iter()
+        .zip(frames)
+        .find_map(|(view, frames)| Some((view, stated_rate_hz(view, frames).filter(is_high)?)))?;
     let every = (rate_hz / LEARNED_HZ).ceil();
     Some(format!(
-        "{}: {rate_hz:.0} masks a second, the model learned from at most {LEARNED_HZ}: draw one frame in {every} of these \
-         (farnear silhouettes markers --every {every})",
-        view.path.display()
+        "{}: {rate_hz:.0} frames a second, the model learned from at most {LEARNED_HZ}: use one frame in {every} of these (motion \
+         capture: farnear silhouettes markers --every {every}; video: ffmpeg -i VIDEO -r {:.2} -c:v ffv1 SLOWER.mkv)",
+        view.path.display(),
+        rate_hz / every
     ))
 }
 
-/// The masks' frame rate in `silhouettes.toml`, in their folder or next to it.
-fn stated_rate_hz(view: &View) -> Option<f64> {
+/// The frame rate of a video, or of masks in `silhouettes.toml`, in their folder or next to it.
+fn stated_rate_hz(view: &View, frames: &Frames) -> Option<f64> {
     #[derive(Deserialize)]
     struct Index {
         rate_hz: f64,
     }
-    if view.kind != ViewKind::Masks {
-        return None;
+    if view.kind == ViewKind::Video {
+        return frames.rate_hz();
     }
     let stated = |folder: &Path| {
         let text = fs::read_to_string(folder.join("silhouettes.toml")).ok()?;
@@ -388,6 +411,47 @@ mod tests {
     use super::*;
 
     #[test]
+    fn a_video_of_a_high_frame_rate_is_reported_for_a_network() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("fast.y4m");
+        let model = Model::read(Path::new("everyday")).expect("shipped");
+        let views = [View { path: path.clone(), kind: ViewKind::Video }];
+        let remarks = |rate: &str| {
+            fs::write(&path, format!("YUV4MPEG2 W4 H2 {rate} Cmono\nFRAME\n12345678")).expect("written");
+            let begun = Recognition::begin(&model, &views, &RecogniseRequest::default());
+            begun.expect("a video").remarks.join("\n")
+        };
+        let high = remarks("F50:1");
+        assert!(high.contains("fast.y4m: 50 frames a second") && high.contains("-r 25.00"), "{high}");
+        assert!(!remarks("F30:1").contains("frames a second"));
+    }
+
+    #[test]
+    fn a_person_in_pieces_and_one_who_returns_are_reported() {
+        let folder = tempfile::tempdir().expect("a folder");
+        for frame in 0..48 {
+            // Eight stripes, no person in the middle third of the frames.
+            let mask = Mask::from_shape_fn((240, 160), |(row, column)| {
+                !(16..32).contains(&frame)
+                    && (42..154).contains(&row)
+                    && row % 14 < 10
+                    && (60..100).contains(&column)
+            });
+            let png = masks::png(&mask).expect("a picture");
+            fs::write(folder.path().join(format!("{frame:02}.png")), png).expect("written");
+        }
+        let model = Model::read(Path::new("everyday")).expect("shipped");
+        let views = [View { path: folder.path().into(), kind: ViewKind::Masks }];
+        let begun = Recognition::begin(&model, &views, &RecogniseRequest::default());
+        let mut recognition = begun.expect("masks");
+        let context = Context::unattended();
+        while recognition.next(&context).expect("an answer").is_some() {}
+        let remarks = recognition.remarks.join("\n");
+        assert!(remarks.contains("view 1: the person is in 8 pieces on average"), "{remarks}");
+        assert!(remarks.contains("2 passages") && remarks.contains("silhouettes passages"), "{remarks}");
+    }
+
+    #[test]
     fn masks_of_a_high_frame_rate_are_reported_for_a_network() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("view1");
@@ -405,9 +469,9 @@ mod tests {
             begun.expect("masks").remarks.join("\n")
         };
         let high = remarks("100.0");
-        assert!(high.contains("100 masks a second") && high.contains("--every 4"), "{high}");
+        assert!(high.contains("100 frames a second") && high.contains("--every 4"), "{high}");
         for rate_hz in ["30.0", "0.0", "inf"] {
-            assert!(!remarks(rate_hz).contains("masks a second"), "{rate_hz}");
+            assert!(!remarks(rate_hz).contains("frames a second"), "{rate_hz}");
         }
     }
 

@@ -82,6 +82,11 @@ pub const MODELS: &[Shipped] = &[
     },
 ];
 
+/// Names of [`MODELS`], as in "everyday or everyday-order-free".
+pub fn names() -> String {
+    MODELS.iter().map(|model| model.name).collect::<Vec<_>>().join(" or ")
+}
+
 /// The sequence model, which supplies the outlier score for trained models.
 pub fn auxiliary_model(full_frames: bool) -> Result<Recogniser> {
     let [full, cut_out] = MODELS[0].recognisers()?;

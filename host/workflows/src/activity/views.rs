@@ -118,8 +118,16 @@ pub(super) fn size(picture: &Pixels) -> (usize, usize) {
 }
 
 pub(super) enum Frames {
-    Masks { files: std::vec::IntoIter<PathBuf>, levels: Levels, remark: Option<String>, first: Option<First> },
-    Video { video: Box<Video>, extractor: Option<Box<Extractor>> },
+    Masks {
+        files: std::vec::IntoIter<PathBuf>,
+        levels: Levels,
+        remark: Option<String>,
+        first: Option<Box<First>>,
+    },
+    Video {
+        video: Box<Video>,
+        extractor: Option<Box<Extractor>>,
+    },
 }
 
 pub(super) struct First {
@@ -150,6 +158,22 @@ impl Frames {
         match self {
             Self::Masks { remark, .. } => remark.take().into_iter().collect(),
             Self::Video { video, .. } => video.take_remarks(),
+        }
+    }
+
+    /// Frames per second of a video; `None` for masks.
+    pub fn rate_hz(&self) -> Option<f64> {
+        match self {
+            Self::Masks { .. } => None,
+            Self::Video { video, .. } => video.rate_hz(),
+        }
+    }
+
+    /// Why the masks of all frames so far are doubtful.
+    pub fn doubt(&self) -> Option<String> {
+        match self {
+            Self::Masks { first, .. } => first.as_ref()?.chooser.doubt(),
+            Self::Video { extractor, .. } => extractor.as_ref()?.doubt(),
         }
     }
 
@@ -193,14 +217,16 @@ impl Frames {
 fn like_first<'f>(
     file: &Path,
     levels: &Levels,
-    first: &'f mut Option<First>,
+    first: &'f mut Option<Box<First>>,
 ) -> Result<(String, Mask, &'f mut First)> {
     let mask = masks::read(file, levels)?;
     let (name, found) = (pictures::stem(file), mask.dim());
-    let first = first.get_or_insert_with(|| First {
-        name: name.clone(),
-        size: found,
-        chooser: SubjectChooser::new(SubjectSettings::for_size(found)),
+    let first = first.get_or_insert_with(|| {
+        Box::new(First {
+            name: name.clone(),
+            size: found,
+            chooser: SubjectChooser::new(SubjectSettings::for_size(found)),
+        })
     });
     if found != first.size {
         let (path, expected) = (file.into(), first.size);
@@ -220,7 +246,7 @@ fn extractor_for<'e>(
     })
 }
 
-fn seen_in_mask(file: &Path, levels: &Levels, first: &mut Option<First>) -> Result<Seen> {
+fn seen_in_mask(file: &Path, levels: &Levels, first: &mut Option<Box<First>>) -> Result<Seen> {
     let (name, mask, first) = like_first(file, levels, first)?;
     let found = mask.dim();
     let mut flags = first.chooser.choose(mask.view()).flags;

@@ -227,7 +227,8 @@ pub struct MarkersFigures {
 #[derive(Serialize)]
 struct Index<'a> {
     template: &'a str,
-    rate_hz: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    rate_hz: Option<f64>,
     mm_per_px: f64,
     elevation_deg: f64,
     view_directions_deg: Vec<f64>,
@@ -301,7 +302,7 @@ pub fn draw(settings: &MarkersRequest, context: &Context<'_>) -> Result<MarkersF
     }
     let index = Index {
         template: &template.name,
-        rate_hz: recording.rate_hz / settings.every as f64,
+        rate_hz: (recording.rate_hz > 0.0).then(|| recording.rate_hz / settings.every as f64),
         mm_per_px: settings.mm_per_px,
         elevation_deg: settings.elevation_deg,
         view_directions_deg: views.iter().map(|view| view.gamma_deg).collect(),
@@ -372,7 +373,8 @@ pub(crate) fn recording(path: &Path, choices: Choices) -> Result<Recording> {
     let read = if path.is_dir() {
         let files = keypoint_files(path)?;
         let contents = files.iter().map(|file| read_file(file)).collect::<Result<Vec<Vec<u8>>>>()?;
-        let names: Vec<String> = files.iter().map(|file| file.display().to_string()).collect();
+        let name = |file: &PathBuf| file.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let names: Vec<String> = files.iter().map(name).collect();
         let named = names.iter().map(String::as_str).zip(contents.iter().map(Vec::as_slice));
         readers::read_keypoint_files(named, choices)
     } else {

@@ -151,11 +151,13 @@ pub struct VideoFigures {
 impl VideoFigures {
     /// Why no frame has a usable silhouette.
     fn without_people(&self) -> Option<String> {
-        let reason = match self.learning == self.frames {
-            true => {
-                "all of them were used to learn the background: lower learning-frames, or give a longer video"
-            }
-            false => "silhouettes.toml has the reason of each",
+        let reason = if self.learning == self.frames {
+            "all of them were used to learn the background: lower learning-frames, or give a longer video"
+        } else if self.learning + self.empty == self.frames {
+            "nothing of a person's size moves in them, and people who are motionless throughout are background: record the \
+             place without people, too"
+        } else {
+            "silhouettes.toml has the reason of each"
         };
         (self.silhouettes == 0)
             .then(|| format!("none of {} frames has a usable silhouette; {reason}", self.frames))
@@ -179,8 +181,10 @@ impl VideoFigures {
 }
 
 /// `silhouettes.toml`: one entry per frame.
-#[derive(Debug, Default, Serialize)]
+#[derive(Debug, Serialize)]
 struct Index {
+    #[serde(skip_serializing_if = "Option::is_none")]
+    rate_hz: Option<f64>,
     frame: Vec<Entry>,
 }
 
@@ -217,7 +221,7 @@ pub fn extract(settings: &SilhouettesVideoRequest, context: &Context<'_>) -> Res
         work.extractor.rewind(frame_of(&first.pixels));
     }
     let mut figures = VideoFigures::default();
-    let mut index = Index::default();
+    let mut index = Index { rate_hz: video.rate_hz(), frame: Vec::new() };
     for frame in std::iter::once(Ok(first)).chain(video.by_ref()) {
         context.cancel.check(DURING)?;
         let frame = prepared(frame?, settings.grey);
@@ -230,6 +234,8 @@ pub fn extract(settings: &SilhouettesVideoRequest, context: &Context<'_>) -> Res
     }
     context.warn(video.take_remarks(), &mut remarks);
     context.warn(figures.without_people(), &mut remarks);
+    let doubt = work.extractor.doubt();
+    context.warn(doubt.map(|doubt| format!("{}: {doubt}", settings.video.display())), &mut remarks);
     figures.remarks = remarks;
     figures.changes_of_light = work.extractor.changes_of_light();
     let seconds = start.elapsed().as_secs_f64();
@@ -318,5 +324,47 @@ impl Work {
             }
             Ok(())
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// 25 frames of a person in seven pieces, after 15 frames without one.
+    fn in_pieces() -> Vec<u8> {
+        let mut video = b"YUV4MPEG2 W160 H120 F50:1 Cmono XCOLORRANGE=FULL\n".to_vec();
+        for frame in 0..40 {
+            video.extend(b"FRAME\n");
+            for (row, column) in
+                (0..120_usize).flat_map(|row| (0..160_usize).map(move |column| (row, column)))
+            {
+                let noise = ((frame * 7919 + row * 104_729 + column * 1_299_709) % 7) as u8;
+                let left = 20 + 2 * frame;
+                let is_person = frame >= 15
+                    && (27..90).contains(&row)
+                    && row % 9 < 6
+                    && (left..left + 20).contains(&column);
+                video.push(if is_person { 220 - noise } else { 80 + 20 * ((column / 9) % 2) as u8 + noise });
+            }
+        }
+        video
+    }
+
+    #[test]
+    fn the_frame_rate_is_written_and_people_in_pieces_are_reported() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let (video, out) = (folder.path().join("walk.y4m"), folder.path().join("masks"));
+        std::fs::write(&video, in_pieces()).expect("written");
+        let request =
+            SilhouettesVideoRequest { video, out: out.clone(), ..SilhouettesVideoRequest::default() };
+        let figures = extract(&request, &Context::unattended()).expect("masks");
+        assert_eq!((figures.silhouettes, figures.fragments), (25, 25));
+        let remarks = figures.remarks.join("\n");
+        assert!(remarks.contains("walk.y4m: the person is in 7 pieces on average"), "{remarks}");
+        let index = std::fs::read_to_string(out.join("silhouettes.toml")).expect("an index");
+        let index: toml::Table = index.parse().expect("an index");
+        assert_eq!(index["rate_hz"].as_float(), Some(50.0));
+        assert_eq!(index["frame"].as_array().map(Vec::len), Some(40));
     }
 }
