@@ -40,6 +40,8 @@ pub struct Explanation {
     pub subject: Subject,
     /// Pixels explained by neither, plus shadow outside the silhouette, relative to the silhouette.
     pub unexplained: f64,
+    /// Cast shadow outside the silhouette, relative to that not hidden by the body; large for a wrong direction of the light.
+    pub missing: f64,
 }
 
 /// `None` without a light position, or if no distance explains enough. Fails without a usable shadow.
@@ -163,7 +165,9 @@ impl Scene<'_> {
             }
             std::mem::swap(&mut above, &mut runs);
         }
-        let beside = self.mask.iter().zip(&split.thrown).filter(|&(&seen, &thrown)| thrown && !seen).count();
+        let thrown_outside =
+            |mask: &Mask| mask.iter().zip(&split.thrown).filter(|&(&set, &thrown)| thrown && !set).count();
+        let (beside, visible) = (thrown_outside(self.mask), thrown_outside(&split.body));
         let area = farnear_silhouettes::mask::area(self.mask.view()).max(1);
         let offset_m = if split.thigh_pixels > 0 {
             split.thighs_m / split.thigh_pixels as f64
@@ -175,6 +179,7 @@ impl Scene<'_> {
             thrown: split.thrown,
             subject: Subject { distance_m, offset_m, height_m: self.stature_m },
             unexplained: (split.unexplained + beside) as f64 / area as f64,
+            missing: beside as f64 / visible.max(1) as f64,
         })
     }
 

@@ -61,6 +61,8 @@ pub struct CutReport {
     pub edge_px: Option<f64>,
     /// Share not explained by body and shadow, 0 to 1; `None` for a cut by angles.
     pub unexplained: Option<f64>,
+    /// Share of the visible cast shadow outside the silhouette, 0 to 1; `None` for a cut by angles.
+    pub missing: Option<f64>,
     pub shadow: ImageShadow,
     pub subject: Subject,
     /// False if more than half was removed or the shadow points away: check the frame.
@@ -132,7 +134,8 @@ pub fn remove(
             removed_fraction,
             half_plane: edge.half_plane,
             edge_px: edge.limit.map(f64::from),
-            unexplained: explained.map(|found| found.unexplained),
+            unexplained: explained.as_ref().map(|found| found.unexplained),
+            missing: explained.map(|found| found.missing),
             shadow,
             subject,
             trustworthy: removed_fraction <= 0.6 && !away && !shadow.shortened,

@@ -1,5 +1,7 @@
 //! Removes a person's shadow from masks, given the camera's pose and the light or shadow direction.
 
+mod doubts;
+
 use std::{
     fs,
     path::{Path, PathBuf},
@@ -8,7 +10,6 @@ use std::{
 
 use chrono::TimeDelta;
 use farnear_files::{masks, staging::Staging};
-use farnear_shadow::cut::SIDEWAYS;
 use farnear_shadow::projection::{LOWEST_SUN_DEG, ShadowError};
 use farnear_shadow::sun::{Model, position};
 use farnear_shadow::uncertainty::{Uncertainty, UncertaintyError, propagate};
@@ -30,10 +31,9 @@ use crate::{
     request::{PathKind, Request, outputs},
     sun::Moment,
 };
+use doubts::{POOR_FIT, doubts};
 
 pub const CAMERA_FILE: &str = "the camera file";
-
-const MUCH: f64 = 0.6;
 
 /// Remove a person's shadow from masks, from the pose of the camera and the place of the sun, of a lamp, or a measured direction.
 ///
@@ -42,8 +42,8 @@ const MUCH: f64 = 0.6;
 /// (height_m = 1.75, head_width_m = 0.17; optionally distance_m) and `standard_deviations` change the defaults (docs/people.md).
 ///
 /// `shadow.toml` next to the masks flags doubtful frames: no person or several, the shadow behind the person or cut off by the
-/// lower edge of the picture, much removed, an uncertain angle. After the first mask a sun that is too low and a person who is
-/// too near are flagged, too, and the mask is written unchanged.
+/// lower edge of the picture, much removed, an uncertain angle, a shadow that is not where the light casts it. After the first
+/// mask a sun that is too low and a person who is too near are flagged, too, and the mask is written unchanged.
 #[derive(Clone, PartialEq, Debug, Serialize, Deserialize, JsonSchema)]
 #[cfg_attr(feature = "clap", derive(clap::Args))]
 #[cfg_attr(
@@ -199,6 +199,9 @@ struct Cut {
     /// Pixels explained by neither body nor shadow. Missing if the cut used angles only.
     #[serde(skip_serializing_if = "Option::is_none")]
     unexplained_percent: Option<f64>,
+    /// Expected shadow that the mask does not have. Missing as above.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    missing_shadow_percent: Option<f64>,
 }
 
 /// Also writes `shadow.toml`, which flags doubtful masks. Writes nothing on failure.
@@ -262,6 +265,10 @@ pub fn remove_from_masks(request: &ShadowRemoveRequest, context: &Context<'_>) -
     }
     let removed: Vec<f64> =
         index.frame.iter().filter_map(|entry| Some(entry.cut.as_ref()?.removed_percent)).collect();
+    let poor = index.frame.iter().filter(|entry| entry.flags.iter().any(|flag| flag == POOR_FIT)).count();
+    if 2 * poor > removed.len() {
+        context.progress.warn(&source.of_poor_fits(poor, removed.len(), &request.masks));
+    }
     let mean = removed.iter().sum::<f64>() / removed.len().max(1) as f64;
     Ok(RemovalFigures {
         frames,
@@ -407,7 +414,7 @@ impl Work<'_> {
                 Stage { mask, clean: &clean, camera, light, method, report: &cut, sure: sure.as_ref() };
             stages.draw(&file, stage)?;
         }
-        flags.extend(doubts(&cut, light).into_iter().map(str::to_owned));
+        flags.extend(doubts(&cut, light, self.method).into_iter().map(str::to_owned));
         if sure.is_some_and(|sure| !sure.first_order_holds) {
             flags.push("angle-unsure".into());
         }
@@ -420,6 +427,7 @@ impl Work<'_> {
             distance_m: rounded(cut.subject.distance_m, 2),
             removed_percent: rounded(100.0 * cut.removed_fraction, 2),
             unexplained_percent: cut.unexplained.map(|share| rounded(100.0 * share, 2)),
+            missing_shadow_percent: cut.missing.map(|share| rounded(100.0 * share, 2)),
         });
         Ok((clean, Entry { file, flags, cut }))
     }
@@ -461,18 +469,6 @@ impl Work<'_> {
         self.uncut[kind] += 1;
         Some(flag.into())
     }
-}
-
-fn doubts(cut: &CutReport, light: Light) -> Vec<&'static str> {
-    /// Below this, small errors change the long shadow's direction too much.
-    const LOW_DEG: f64 = 8.0;
-    let found = [
-        (cut.shadow.eta_rad.sin() < -SIDEWAYS, "shadow-behind"),
-        (cut.shadow.shortened, "shadow-leaves-picture"),
-        (cut.removed_fraction > MUCH, "much-removed"),
-        (matches!(light, Light::Sun(sun) if sun.elevation_deg < LOW_DEG), "low-sun"),
-    ];
-    found.into_iter().filter_map(|(holds, name)| holds.then_some(name)).collect()
 }
 
 #[cfg(test)]

@@ -94,3 +94,26 @@ fn the_uncertainty_is_that_of_the_fitted_person() {
     assert_eq!(sure, Some(fitted));
     assert_ne!(report.subject, subject_of(&drawn.silhouette, &drawn.camera).unwrap());
 }
+
+#[test]
+fn a_light_from_the_opposite_side_is_flagged_as_a_poor_fit() {
+    use farnear_shadow::{
+        sun::SunPosition,
+        synthetic::scene::{Kind, scene},
+    };
+    const SCENES: u64 = 20;
+    let is_poor = |seed: u64, light: fn(SunPosition) -> Light| {
+        let drawn = scene(Kind::Standard, seed);
+        let light = light(drawn.sun);
+        let (_, report) = remove(&drawn.silhouette, &drawn.camera, light, 0.0, Method::Hybrid).unwrap();
+        doubts(&report, light, Method::Hybrid).contains(&POOR_FIT)
+    };
+    let poor = |light: fn(SunPosition) -> Light| (0..SCENES).filter(|seed| is_poor(*seed, light)).count();
+    let opposite = |sun: SunPosition| {
+        Light::Sun(SunPosition { azimuth_deg: (sun.azimuth_deg + 180.0).rem_euclid(360.0), ..sun })
+    };
+    let (right, wrong) = (poor(Light::Sun), poor(opposite));
+    assert!(right <= 1 && wrong >= 15, "{right} and {wrong} of {SCENES}");
+    // Without a fit there is no misfit.
+    assert_eq!(poor(|_| Light::Direction { eta_rad: 0.3 }), 0);
+}
