@@ -307,6 +307,7 @@ def depth(
     balance: Literal["auto", "none", "gain", "local"] = "auto",
     min_confidence: float = 0.0,
     white_level: Optional[int] = None,
+    bin: Union[int, Literal["auto"]] = 1,
     threads: int = 1,
 ) -> DepthMap:
     """Depth map of a far- and a near-focused image, as `farnear depth --bin 1` computes it.
@@ -340,13 +341,16 @@ def depth(
         Least confidence of a depth, 0 to 1.
     white_level : int, optional
         Code of a saturated pixel in `uint8` and `uint16`, e.g. 4095 for 12 bits; by default the largest of the type.
+    bin : int or "auto"
+        Side in px, up to 16, of the squares of pixels that are averaged into one; "auto" chooses it as `farnear depth` does.
     threads : int
         Threads; 0 = one per core.
 
     Returns
     -------
     DepthMap
-        Depth in mm, confidence, standard deviation and reasons, each (height, width).
+        Depth in mm, confidence, standard deviation and reasons, each (height, width) of the averaged image; its `optics` are those
+        of the averaged pixels.
 
     Raises
     ------
@@ -355,8 +359,8 @@ def depth(
 
     Notes
     -----
-    Pixels are not averaged, except by optics of `calibrate_stack`. For a largest blur of more than 4.5 px `findings` states how
-    many pixels to average into one first; the optics of such images have a larger `pixel_um` and a smaller `max_blur_px`.
+    By default pixels are not averaged, except by optics of `calibrate_stack`. For a largest blur of more than 4.5 px `findings`
+    states how many pixels to average.
 
     640x480 take 0.2 s. Other Python threads run meanwhile; Ctrl-C takes effect when the map is done.
 

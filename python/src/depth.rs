@@ -3,13 +3,20 @@
 use farnear_depth::{
     adaptive_window::Window,
     fill::{FillBy, LowTexture},
-    measure::{DepthMethod, Finding, MeasureError, MeasureSettings, measure_pair_of_views},
+    measure::{DepthMethod, Finding, MeasureError, MeasureSettings, binned, measure_pair_of_views},
+    mosaic::is_mosaic,
     operators,
     pipeline::{self, Settings},
     prepare::{Align, Balance, PrepareSettings},
 };
-use farnear_workflows::optics::{OpticsDoubt, another_size, usable_bin};
-use std::sync::{Mutex, PoisonError};
+use farnear_workflows::{
+    depth::DepthRequest,
+    optics::{OpticsDoubt, another_size, usable_bin},
+};
+use std::{
+    path::PathBuf,
+    sync::{Mutex, PoisonError},
+};
 
 use ndarray::{CowArray, Ix2};
 use numpy::{IntoPyArray, PyArray2};
@@ -19,7 +26,7 @@ use crate::{
     arrays::{Image, check_alike, named, optics_named},
     depth_map::DepthMap,
     errors::{FarnearError, wrong},
-    optics::Operators,
+    optics::{Operators, Optics},
     work,
 };
 
@@ -40,6 +47,23 @@ impl<'py> FromPyObject<'_, 'py> for Fill {
             ))
         })?;
         name.parse().map(|by| Self(Some(by))).map_err(wrong)
+    }
+}
+
+/// Side of the squares of pixels that are averaged into one, or `None` for "auto".
+pub struct Bin(Option<usize>);
+
+impl<'py> FromPyObject<'_, 'py> for Bin {
+    type Error = PyErr;
+
+    fn extract(object: Borrowed<'_, 'py, PyAny>) -> PyResult<Self> {
+        match object.extract::<usize>() {
+            Ok(side @ 1..=16) => Ok(Self(Some(side))),
+            Err(_) if object.extract::<String>().is_ok_and(|name| name == "auto") => Ok(Self(None)),
+            _ => {
+                Err(FarnearError::new_err(format!("bin is {}; expected 1 to 16 or \"auto\"", object.repr()?)))
+            }
+        }
     }
 }
 
@@ -90,13 +114,16 @@ fn filling(fill: &Fill, low_texture: &str) -> PyResult<Settings> {
 ///     Least confidence of a depth, 0 to 1.
 /// white_level : int, optional
 ///     Code of a saturated pixel in `uint8` and `uint16`, e.g. 4095 for 12 bits; by default the largest of the type.
+/// bin : int or "auto"
+///     Side in px, up to 16, of the squares of pixels that are averaged into one; "auto" chooses it as `farnear depth` does.
 /// threads : int
 ///     Threads; 0 = one per core.
 ///
 /// Returns
 /// -------
 /// DepthMap
-///     Depth in mm, confidence, standard deviation and reasons, each (height, width).
+///     Depth in mm, confidence, standard deviation and reasons, each (height, width) of the averaged image; its `optics` are those
+///     of the averaged pixels.
 ///
 /// Raises
 /// ------
@@ -105,8 +132,8 @@ fn filling(fill: &Fill, low_texture: &str) -> PyResult<Settings> {
 ///
 /// Notes
 /// -----
-/// Pixels are not averaged, except by optics of `calibrate_stack`. For a largest blur of more than 4.5 px `findings` states how
-/// many pixels to average into one first; the optics of such images have a larger `pixel_um` and a smaller `max_blur_px`.
+/// By default pixels are not averaged, except by optics of `calibrate_stack`. For a largest blur of more than 4.5 px `findings`
+/// states how many pixels to average.
 ///
 /// 640x480 take 0.2 s. Other Python threads run meanwhile; Ctrl-C takes effect when the map is done.
 ///
@@ -118,7 +145,7 @@ fn filling(fill: &Fill, low_texture: &str) -> PyResult<Settings> {
 /// (120, 160)
 #[pyfunction]
 #[pyo3(signature = (far, near, optics, *, operators=None, method=None, window=None, median_px=3, fill=Fill(None), low_texture="energy", align="auto",
-                    balance="auto", min_confidence=0.0, white_level=None, threads=1))]
+                    balance="auto", min_confidence=0.0, white_level=None, bin=Bin(Some(1)), threads=1))]
 #[allow(clippy::too_many_arguments)] // keywords in Python
 pub fn depth(
     py: Python<'_>,
@@ -135,6 +162,7 @@ pub fn depth(
     balance: &str,
     min_confidence: f32,
     white_level: Option<u32>,
+    bin: Bin,
     threads: usize,
 ) -> PyResult<DepthMap> {
     let (far, near): (Image<'_>, Image<'_>) = (named("far", far)?, named("near", near)?);
@@ -143,6 +171,10 @@ pub fn depth(
         return Err(FarnearError::new_err(format!("min_confidence is {min_confidence}; expected 0 to 1")));
     }
     check_alike(("far", far.full_scale()), ("near", near.full_scale()))?;
+    let mut doubts: Vec<OpticsDoubt> = another_size(&optics.0, far.view().dim()).into_iter().collect();
+    let side = bin.side(&optics.0, &far, operators.is_some(), &mut doubts)?;
+    let averaged = (side > 1).then(|| Optics(optics.0.binned(side)));
+    let optics = averaged.as_ref().unwrap_or(optics);
     let designed;
     let usual = if operators.is_some() { "ro" } else { "whitened" };
     let method = match (method.unwrap_or(usual), operators) {
@@ -177,23 +209,46 @@ pub fn depth(
         least_confidence: min_confidence,
     };
     let white = settings.prepare.limits.filter(|_| white_level.is_some()).map(|[_, white]| white);
-    let (far, near) = (up_to(&far, white), up_to(&near, white));
+    let (far, near) = (up_to(&far, white, side), up_to(&near, white, side));
     let (far, near) = (far.view(), near.view());
     let mut found = work::run(py, || measure_pair_of_views(far, near, &optics.0, method, None, &settings))?
         .map_err(wrong)?;
-    let (blur_px, bin) = (optics.0.max_blur_px(), usable_bin(&optics.0));
-    let too_much = (bin > 1).then_some(OpticsDoubt::TooMuchBlur { blur_px, bin, binned: false });
-    let doubts = another_size(&optics.0, far.dim()).into_iter().chain(too_much);
-    found.findings.extend(doubts.map(|doubt| Finding::Run(doubt.to_string())));
+    found.findings.extend(doubts.into_iter().map(|doubt| Finding::Run(doubt.to_string())));
     Ok(DepthMap::of(py, found, optics))
 }
 
-/// An image without values above a stated white level, which are saturated.
-fn up_to<'a>(image: &'a Image<'_>, white: Option<f32>) -> CowArray<'a, f32, Ix2> {
-    match white {
+impl Bin {
+    /// The number of pixels, with doubts about it.
+    fn side(
+        &self,
+        optics: &farnear_depth::optics::Optics,
+        far: &Image<'_>,
+        has_operators: bool,
+        doubts: &mut Vec<OpticsDoubt>,
+    ) -> PyResult<usize> {
+        if self.0 == Some(1) {
+            let (blur_px, bin) = (optics.max_blur_px(), usable_bin(optics));
+            doubts.extend((bin > 1).then_some(OpticsDoubt::TooMuchBlur { blur_px, bin, binned: false }));
+            return Ok(1);
+        }
+        if let Some(side) = self.0.filter(|_| has_operators || optics.stage().is_some()) {
+            return Err(FarnearError::new_err(format!(
+                "bin is {side}; operators and optics of calibrate_stack are for pixels of one size: give no bin"
+            )));
+        }
+        let operators = has_operators.then(PathBuf::new);
+        let request = DepthRequest { bin: self.0, operators, ..DepthRequest::default() };
+        Ok(request.bin_for(optics, is_mosaic(far.view()), doubts))
+    }
+}
+
+/// An image without values above a stated white level, which are saturated, with `bin` x `bin` pixels averaged into one.
+fn up_to<'a>(image: &'a Image<'_>, white: Option<f32>, bin: usize) -> CowArray<'a, f32, Ix2> {
+    let clipped: CowArray<'a, f32, Ix2> = match white {
         Some(white) => image.view().mapv(|value| if value > white { white } else { value }).into(),
         None => image.view().into(),
-    }
+    };
+    if bin > 1 { binned(clipped.into_owned(), bin).into() } else { clipped }
 }
 
 /// Black and white of camera codes, scaled as the image is.

@@ -4,8 +4,9 @@ use std::{collections::BTreeMap, process, sync::Arc, time::Duration};
 
 use farnear_capture::{
     Client,
+    camera::Image,
     describe::{alarm_text, state_name, um},
-    expose::{CaptureError, expose, sensor_mm},
+    expose::{CaptureError, expose_in_parts, sensor_mm},
     pair::{Exposures, capture_pair},
     plan::SensorPair,
     ready::{ensure_homed, steppers},
@@ -143,7 +144,7 @@ impl RigClient {
         py.detach(|| client.clear_alarm(number)).map_err(rig)
     }
 
-    /// Runs a program of positions (axis, um) on the board; gives an image with its record for each.
+    /// Runs programs of positions (axis, um) on the board; gives an image with its record for each.
     #[pyo3(signature = (camera, shots, *, exposure_us=5000, wait_s=30.0, light=None))]
     fn expose<'py>(
         &self,
@@ -165,10 +166,11 @@ impl RigClient {
             let mut client = client.clone();
             client.set_light(light);
             let mut taken = Vec::with_capacity(shots.len());
-            expose(&client, camera.as_mut(), &shots, wait, |record, image| -> Result<(), CaptureError> {
+            let on_image = |_, record, image: Image| -> Result<(), CaptureError> {
                 taken.push((image.pixels, image.bits, record));
                 Ok(())
-            })?;
+            };
+            expose_in_parts(&client, camera.as_mut(), &shots, wait, on_image)?;
             Ok(taken)
         })?;
         taken.into_iter().map(|taken| of_image(py, taken, &limits)).collect()

@@ -344,6 +344,19 @@ def test_a_blur_that_is_too_large_is_a_finding(optics):
     assert any("average 2 x 2 pixels" in finding for finding in findings), findings
 
 
+def test_pixels_are_averaged_on_request(optics, learned):
+    wide = farnear.Optics(focal_length_mm=50, aperture_mm=12.8, pixel_um=7.4, far_mm=933, max_blur_px=5, psf=optics.psf)
+    far, near, _ = farnear.render(wide, "slant", width=160, height=120)
+    found = farnear.depth(far, near, wide, bin="auto")
+    assert found.depth_mm.shape == (60, 80) and found.optics.max_blur_px == pytest.approx(2.5)
+    assert np.array_equal(found.depth_mm, farnear.depth(far, near, wide, bin=2).depth_mm, equal_nan=True)
+    for side in (0, 17, "2"):
+        with pytest.raises(farnear.FarnearError, match="expected 1 to 16"):
+            farnear.depth(far, near, wide, bin=side)
+    with pytest.raises(farnear.FarnearError, match="give no bin"):
+        farnear.depth(far, near, learned, bin=2)
+
+
 def test_a_white_level_saturates_brighter_pixels(optics, slant):
     far, near, _ = slant
     white = int(np.percentile(far, 99))

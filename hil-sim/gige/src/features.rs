@@ -64,6 +64,8 @@ pub const CHUNK_MODE: u32 = 0xA04C;
 pub const CHUNK_SELECTOR: u32 = 0xA050;
 /// Enables the timestamp chunk; the next register enables the frame id.
 pub const CHUNK_ENABLE: u32 = 0xA054;
+/// `TriggerWidth` is the only mode: the pulse of a hardware trigger is the exposure.
+pub const EXPOSURE_MODE: u32 = 0xA05C;
 pub const START: u32 = 1;
 pub const STOP: u32 = 2;
 /// The board's trigger line.
@@ -123,6 +125,7 @@ pub fn table((width, height): (u16, u16), bits: u8) -> Vec<Feature> {
         ),
         feature("TriggerActivation", acquisition, TRIGGER_ACTIVATION, only("RisingEdge"), 0),
         feature("TriggerSoftware", acquisition, TRIGGER_SOFTWARE, Value::Command(1), 0),
+        feature("ExposureMode", acquisition, EXPOSURE_MODE, only("TriggerWidth"), 0),
         feature(
             "ExposureTime",
             acquisition,

@@ -7,7 +7,10 @@ use farnear_protocol::{
     message::{AlarmRecord, Axis, Failure, LinkRate, ResetCause},
 };
 
-use crate::describe::{axis_name, cause_name, failure_text, refusal_text};
+use crate::{
+    describe::{axis_name, cause_name, failure_text, refusal_text},
+    transport::SCHEME,
+};
 
 #[derive(Clone, Debug, thiserror::Error)]
 pub enum PortError {
@@ -16,7 +19,7 @@ pub enum PortError {
         present_ports(present)
     )]
     Nameless { present: Vec<String> },
-    #[error("there is no port {port}; {}", present_ports(present))]
+    #[error("there is no port {port}{}; {}", tcp_hint(port), present_ports(present))]
     Absent { port: String, present: Vec<String> },
     #[error(
         "the board has not come back as {port}; if it has another name now, start again with that one, or with one that stays: on \
@@ -36,7 +39,7 @@ pub enum PortError {
         "cannot connect to {port}: {reason}; expected tcp:HOST:PORT of a running farnear-sim or serial server"
     )]
     Connect { port: String, reason: String },
-    #[error("{port} is not a serial port")]
+    #[error("{port} is not a serial port; expected one such as /dev/ttyACM0, or tcp:HOST:PORT")]
     NoPort { port: String },
     #[error(
         "port {port} is busy: another program holds it; end that program (a terminal, another farnear) first"
@@ -46,7 +49,9 @@ pub enum PortError {
         "no permission to open {port}; on Linux, add yourself to its group (often `dialout`) and log in again"
     )]
     Denied { port: String },
-    #[error("cannot open port {port}: {reason}")]
+    #[error(
+        "cannot open port {port}: {reason}; expected a serial port such as /dev/ttyACM0, or tcp:HOST:PORT"
+    )]
     Open { port: String, reason: String },
 }
 
@@ -61,6 +66,24 @@ fn present_ports(present: &[String]) -> String {
     }
 }
 
+/// For an address without its scheme.
+fn tcp_hint(port: &str) -> String {
+    let is_address = |(host, number): (&str, &str)| !host.contains('/') && number.parse::<u16>().is_ok();
+    match port.rsplit_once(':').is_some_and(is_address) {
+        true => format!(" (expected tcp:{port} for a TCP port)"),
+        false => String::new(),
+    }
+}
+
+fn what_to_check(port: &str) -> &'static str {
+    match port.starts_with(SCHEME) {
+        true => {
+            "check that a farnear-sim or serial server listens there, and that no other program is connected to it"
+        }
+        false => "plug the board in again and check its cable",
+    }
+}
+
 fn unique_id_text(id: &[u8; 12]) -> String {
     id.iter().map(|byte| format!("{byte:02x}")).collect()
 }
@@ -70,8 +93,8 @@ pub enum ClientError {
     #[error(transparent)]
     Port(#[from] PortError),
     #[error(
-        "port {port} went away while {during}; plug the board in again and check its cable ({source}); motion is \
-         stopped by the board's keep-alive timeout"
+        "port {port} went away while {during}; {} ({source}); motion is stopped by the board's keep-alive timeout",
+        what_to_check(port)
     )]
     Gone { port: String, during: String, source: Arc<std::io::Error> },
     #[error(
@@ -144,5 +167,27 @@ fn what_came(bad_frames: u64, bytes: u64) -> String {
                 "; {bytes} bytes with {frames} broken frames came: is it the right port, is the line disturbed?"
             )
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_remedy_suits_the_kind_of_port() {
+        let absent = |port: &str| PortError::Absent { port: port.into(), present: Vec::new() }.to_string();
+        assert!(absent("127.0.0.1:5000").contains("expected tcp:127.0.0.1:5000"));
+        assert!(!absent("/dev/serial/by-path/pci-0:1").contains("tcp:"));
+        let gone = |port: &str| {
+            let source = Arc::new(std::io::ErrorKind::UnexpectedEof.into());
+            ClientError::Gone { port: port.into(), during: "homing".into(), source }.to_string()
+        };
+        assert!(gone("/dev/ttyACM0").contains("check its cable"));
+        let closed = gone("tcp:localhost:5000");
+        assert!(
+            closed.contains("a farnear-sim or serial server listens there") && !closed.contains("cable"),
+            "{closed}"
+        );
     }
 }

@@ -64,6 +64,26 @@ pub fn expose<E: From<CaptureError> + From<ClientError>>(
     expose_together(client, &mut [camera], shots, image_wait, |_, shot, image| on_image(shot, image))
 }
 
+/// As [`expose`] for any number of shots: one program after the other, each as long as the board can hold. `on_image`
+/// receives the index of the shot.
+pub fn expose_in_parts<E: From<CaptureError> + From<ClientError>>(
+    client: &Client,
+    camera: &mut dyn Camera,
+    shots: &[Shot],
+    image_wait: Duration,
+    mut on_image: impl FnMut(usize, ShotRecord, Image) -> Result<(), E>,
+) -> Result<(), E> {
+    one_trigger(shots)?;
+    check_exposures(camera, shots)?;
+    let length = usize::from(client.hello().limits.shots_max.max(1));
+    for (part, shots) in shots.chunks(length).enumerate() {
+        expose(client, camera, shots, image_wait, |record, image| {
+            on_image(part * length + usize::from(record.index), record, image)
+        })?;
+    }
+    Ok(())
+}
+
 /// As [`expose`] with several cameras on one trigger: `on_image` receives each image with its camera's index.
 pub fn expose_together<E: From<CaptureError> + From<ClientError>>(
     client: &Client,
@@ -168,13 +188,18 @@ fn expect_no_more(client: &Client, camera: &mut dyn Camera) -> Result<(), Captur
     }
 }
 
-/// Whether the board can take these shots, by its limits.
+/// Whether the board can take these shots in one program, by its limits.
 pub fn check_shots(client: &Client, shots: &[Shot]) -> Result<(), CaptureError> {
-    one_trigger(shots)?;
     let max = client.hello().limits.shots_max;
     if shots.is_empty() || shots.len() > usize::from(max) {
         return Err(PlanError::Shots { asked: shots.len(), max }.into());
     }
+    check_each_shot(client, shots)
+}
+
+/// As [`check_shots`] for [`expose_in_parts`], without a limit of their number.
+pub fn check_each_shot(client: &Client, shots: &[Shot]) -> Result<(), CaptureError> {
+    one_trigger(shots)?;
     for shot in shots {
         check_exposure(client, shot.exposure)?;
         check_position(client, shot.axis, shot.target)?;

@@ -178,10 +178,12 @@ pub struct SequenceShot {
     pub mode: TriggerMode,
 }
 
-pub fn image_name(record: &ShotRecord, repeats: u16) -> String {
+/// File name of an image of the shot with this index; the names of all `shots` sort in their order.
+pub fn image_name(index: usize, shots: usize, record: &ShotRecord, repeats: u16) -> String {
+    let digits = shots.saturating_sub(1).to_string().len().max(2);
     match repeats {
-        0..=1 => format!("shot-{:02}.png", record.index),
-        _ => format!("shot-{:02}-{:03}.png", record.index, record.repeat),
+        0..=1 => format!("shot-{index:0digits$}.png"),
+        _ => format!("shot-{index:0digits$}-{:03}.png", record.repeat),
     }
 }
 
@@ -227,6 +229,16 @@ mod tests {
             let error = read_program(text, Micros(7)).unwrap_err().to_string();
             assert!(error.contains(phrase), "{error}");
         }
+    }
+
+    #[test]
+    fn the_names_of_the_images_sort_by_shot() {
+        let record = crate::continuous::tests::frame(0, 0).record;
+        let names =
+            |shots: usize| (0..shots).map(|index| image_name(index, shots, &record, 1)).collect::<Vec<_>>();
+        assert_eq!((&*names(64)[7], &*names(101)[7]), ("shot-07.png", "shot-007.png"));
+        assert!([64, 100, 101].into_iter().all(|shots| names(shots).is_sorted()));
+        assert_eq!(image_name(7, 8, &record, 2), "shot-07-000.png");
     }
 
     #[test]

@@ -12,6 +12,7 @@ use serialport::{ClearBuffer, SerialPort, SerialPortInfo, SerialPortType};
 
 use crate::{error::PortError, find};
 
+pub(crate) use tcp::SCHEME;
 pub use tcp::TcpTransport;
 
 pub trait Transport: Send {
@@ -96,7 +97,7 @@ impl Place {
 
     /// Remembers the port's adapter.
     pub(crate) fn open(&mut self) -> Result<Box<dyn Transport>, PortError> {
-        if self.name.starts_with(tcp::SCHEME) {
+        if self.name.starts_with(SCHEME) {
             return Ok(Box::new(TcpTransport::open(&self.name)?));
         }
         let present = find::present();
@@ -153,7 +154,7 @@ pub(crate) fn with_rate(given: &str) -> Result<(&str, Option<LinkRate>), PortErr
     let Some((port, rate)) = parts.filter(|_| !std::path::Path::new(given).exists()) else {
         return Ok((given, None));
     };
-    if port.starts_with(tcp::SCHEME) {
+    if port.starts_with(SCHEME) {
         return Err(PortError::TcpRate { port: port.into() });
     }
     let known = rate.parse().ok().and_then(LinkRate::of);

@@ -92,16 +92,21 @@ impl Rig {
         optics: Option<(&Path, Psf)>,
         context: &Context<'_>,
     ) -> Result<Self> {
+        // A silent port takes seconds.
+        let open = |port: String, by: fn(&str) -> Result<Client, ClientError>| {
+            context.cancel.watch("connecting to the board", move || by(&port))
+        };
         let (mut client, emulation) = match address {
             RigAddress::Attached => {
                 let port = find::board_port().map_err(ClientError::Port)?;
-                (Client::open(&port)?, None)
+                (open(port, Client::open)??, None)
             }
-            RigAddress::Port(port) => (Client::open(port)?, None),
-            RigAddress::Open(open) => return Ok(open.connect(context)),
+            RigAddress::Port(port) => (open(port.clone(), Client::open)??, None),
+            RigAddress::Open(rig) => return Ok(rig.connect(context)),
             RigAddress::Emulated(scenery) => {
                 let simulator = Simulator::start(scenery, optics, context)?;
-                (Client::open_emulated(simulator.port())?, Some((Arc::new(simulator), scenery.clone())))
+                let client = open(simulator.port().into(), Client::open_emulated)??;
+                (client, Some((Arc::new(simulator), scenery.clone())))
             }
         };
         client.interrupt_by(context.cancel.flag());
@@ -109,5 +114,32 @@ impl Rig {
             context.info(&note);
         }
         Ok(Self { client, emulation })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::{
+        net::TcpListener,
+        thread,
+        time::{Duration, Instant},
+    };
+
+    use super::*;
+
+    #[test]
+    fn cancelling_ends_the_wait_for_a_silent_port() {
+        let silent = TcpListener::bind("127.0.0.1:0").unwrap();
+        let port = format!("tcp:{}", silent.local_addr().unwrap());
+        let context = Context::unattended();
+        let cancel = context.cancel.clone();
+        let cancelling = thread::spawn(move || {
+            thread::sleep(Duration::from_millis(100));
+            cancel.cancel();
+        });
+        let begin = Instant::now();
+        let error = Rig::connect(&RigAddress::Port(port), None, &context).err().unwrap();
+        assert!(error.is_cancelled() && begin.elapsed() < Duration::from_secs(2), "{error}");
+        cancelling.join().unwrap();
     }
 }

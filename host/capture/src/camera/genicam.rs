@@ -305,8 +305,8 @@ impl Camera for GenicamCamera {
                 return Err(CameraError::Trigger { camera: self.kind(), mode: trigger_name(mode) });
             }
         };
-        // Some cameras leave TriggerWidth when their exposure time is set.
-        if exposure.0 > 0 && self.sets_exposure() {
+        // Some cameras leave TriggerWidth when their exposure time is set; a software trigger has no width.
+        if exposure.0 > 0 && (mode == TriggerMode::Software || self.sets_exposure()) {
             self.set(&Setting::ExposureUs(f64::from(exposure.0)))?;
         }
         self.camera.set_trigger(&source).map_err(self.failed())?;

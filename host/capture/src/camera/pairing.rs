@@ -231,6 +231,12 @@ impl Pairing {
     }
 
     fn by_stamp(&self, camera: &str, stamp: Stamp, shot: &ShotRecord) -> Result<Belongs, CameraError> {
+        let awaited = self.delays.reported.front().map(|(earlier, _)| *earlier);
+        if let (None, None, Some(earlier)) = (&self.last, stamp.count, awaited)
+            && (shot.trigger_number.wrapping_sub(earlier) as i32) > 0
+        {
+            return Err(mispaired(camera, shot, format!("exposure {earlier} before it has no picture")));
+        }
         if let Some((Evidence { stamp: last, .. }, last_shot)) = &self.last {
             let triggers = shot.trigger_number.wrapping_sub(last_shot.trigger_number);
             if let (Some(from), Some(to)) = (last.count, stamp.count) {

@@ -9,17 +9,20 @@ use std::{
 use farnear_capture::{
     Client, ClientError, Timing,
     camera::{Camera, CameraError, FolderCamera, Image},
+    expose::expose_in_parts,
     half_mirror::capture_behind_mirror,
     pair::{CaptureError, Exposures, capture_pair},
     plan::SensorPair,
     record::{Circumstances, begin_folder, finish_folder, read_record, record_of},
 };
 use farnear_protocol::{
-    message::{ShotRecord, TriggerMode},
-    units::Micros,
+    message::{Shot, ShotRecord, TriggerMode},
+    units::{Micros, Nanometres},
 };
 use farnear_scripted_board::{Faults, Peer};
 use ndarray::Array2;
+
+use crate::scripted::SHOT;
 
 const SENSOR: SensorPair = SensorPair { far_mm: 52.8313, near_mm: 52.9875 };
 
@@ -229,4 +232,20 @@ fn optics_out_of_reach_move_nothing() {
     let error = capture_pair(&client, &mut numbered(), &far_away, &exposures(), &mut |_| {}).unwrap_err();
     assert!(matches!(error, CaptureError::Plan(_)), "{error:?}");
     assert_eq!(peer.board().acts, 0);
+}
+
+#[test]
+fn more_shots_than_the_board_can_hold_run_as_several_programs() {
+    let (client, peer) = client();
+    assert_eq!(client.hello().limits.shots_max, 16);
+    let shots: Vec<Shot> = (0..40).map(|step| Shot { target: Nanometres(1_000 * step), ..SHOT }).collect();
+    let mut taken = Vec::new();
+    let on_image = |index, record: ShotRecord, image: Image| -> Result<(), CaptureError> {
+        taken.push((index, record.asked, image.pixels[[0, 0]]));
+        Ok(())
+    };
+    expose_in_parts(&client, &mut numbered(), &shots, Duration::from_secs(1), on_image).unwrap();
+    let expected = (0_u16..).zip(&shots).map(|(number, shot)| (usize::from(number), shot.target, number));
+    assert_eq!(taken, expected.collect::<Vec<_>>());
+    assert_eq!(peer.board().acts, 3);
 }

@@ -34,8 +34,6 @@ use crate::{
 };
 
 const SERIES_MAX: usize = 500;
-/// Shots of a program on the NUCLEO board, until the connected one has reported its own.
-const SHOTS_MAX: usize = 64;
 
 /// Kind of capture.
 #[derive(Deserialize, JsonSchema)]
@@ -73,7 +71,7 @@ pub enum CaptureRequest {
         /// Last position, um.
         #[serde(deserialize_with = "number")]
         to_um: f64,
-        /// Number of images, 1 to the board's `shots_max`.
+        /// Number of images, 1 to 10,000.
         steps: usize,
     },
 }
@@ -312,13 +310,6 @@ async fn capture(
             (Task { kind: "still", title: "Capture a still".into(), work: Box::new(work) }, vec![out])
         }
         CaptureRequest::Stack { axis, from_um, to_um, steps } => {
-            let shots_max = shots_max(&app);
-            if !(1..=shots_max).contains(&steps) {
-                let error =
-                    format!("steps {steps}: expected 1 to {shots_max}, the shots that the board holds");
-                return Err(Failure::new(StatusCode::BAD_REQUEST, error)
-                    .with_hint("Take fewer images, or several stacks."));
-            }
             let out = free("stack", 1)?.remove(0);
             let settings = SequenceRequest {
                 rig,
@@ -344,12 +335,6 @@ async fn capture(
     let names = out.iter().map(|folder| name_of(folder)).collect();
     let Json(Begun { job }) = begin(&app, task)?;
     Ok(Json(Capturing { job, names }))
-}
-
-/// A stack is one program.
-fn shots_max(app: &App) -> usize {
-    let reported = app.state().rig.info.and_then(|info| info["shots_max"].as_u64());
-    reported.and_then(|max| usize::try_from(max).ok()).unwrap_or(SHOTS_MAX)
 }
 
 fn name_of(folder: &std::path::Path) -> String {

@@ -4,7 +4,7 @@ use std::{fs, path::PathBuf};
 
 use farnear_capture::{
     camera::Image,
-    expose::{CaptureError, check_shots, expose, strobe_note},
+    expose::{CaptureError, check_each_shot, expose_in_parts, strobe_note},
     ready::ensure_homed,
     record::{begin_folder, finish_sequence, record_of_sequence, write_image},
     sequence::{SequenceShot, ShotDefaults, image_name, read_program},
@@ -26,6 +26,9 @@ use crate::{
     request::{PathKind, Request},
     simulator::USUAL_PSF,
 };
+
+/// Most positions of a stack.
+const STEPS_MAX: usize = 10_000;
 
 /// Run an exposure program on the board: shots from a file, or a focus stack. Write the images and capture.toml with the position
 /// asked and measured, trigger and strobe times of each shot.
@@ -73,7 +76,7 @@ pub struct SequenceRequest {
         arg(long, value_name = "UM", allow_negative_numbers = true, requires = "steps")
     )]
     pub to: Option<f64>,
-    /// Positions of the stack, both ends included.
+    /// Positions of the stack, both ends included, at most 10,000.
     #[cfg_attr(feature = "clap", arg(long, requires_all = ["axis", "from", "to"]))]
     pub steps: Option<usize>,
     /// Run the armed program so often; the images of all runs are kept.
@@ -116,6 +119,9 @@ impl Request for SequenceRequest {
             if count == Some(0) {
                 return Err(WorkflowError::parameter(name, 0, "it takes no images, expected 1 or more"));
             }
+        }
+        if let Some(steps) = self.steps.filter(|steps| *steps > STEPS_MAX) {
+            return Err(WorkflowError::parameter("steps", steps, format!("expected 1 to {STEPS_MAX}")));
         }
         if let (Some(1), Some(from), Some(to)) = (self.steps, self.from, self.to)
             && from != to
@@ -168,7 +174,7 @@ pub(super) fn take(
     folder: Staging,
     context: &Context<'_>,
 ) -> Result<Vec<SequenceShot>> {
-    check_shots(&rig.rig.client, shots)?;
+    check_each_shot(&rig.rig.client, shots)?;
     ensure_homed(&rig.rig.client, &mut |what| context.info(what))?;
     let mut taken = Taken { folder, shots: Vec::new(), first: None };
     for run in 0..settings.runs {
@@ -212,9 +218,10 @@ fn run_once(
     let exposures: usize = shots.iter().map(|shot| usize::from(shot.repeat.max(1))).sum();
     let EquippedRig { camera, rig } = rig;
     let wait = settings.camera.image_wait;
-    expose(&rig.client, camera.as_mut(), shots, wait, |record, image| -> Result<()> {
-        let shot = &shots[usize::from(record.index).min(shots.len() - 1)];
-        let name = name(image_name(&record, shot.repeat));
+    expose_in_parts(&rig.client, camera.as_mut(), shots, wait, |index, record, image| -> Result<()> {
+        let asked = shots.len();
+        let shot = shots.get(index).ok_or(CaptureError::Count { reported: index + 1, asked })?;
+        let name = name(image_name(index, asked, &record, shot.repeat));
         write_image(&taken.folder, &name, &image)?;
         taken.first.get_or_insert(image);
         taken.shots.push(SequenceShot { name, record, mode: shot.mode });

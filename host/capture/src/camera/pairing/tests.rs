@@ -240,6 +240,17 @@ fn frames_without_count_or_time_require_consecutive_triggers() {
     assert!(pairing.judge("c", nothing, &shot(11, 0)).is_err());
 }
 
+#[test]
+fn the_picture_that_the_first_exposure_waited_for_in_vain_is_not_the_next_ones() {
+    let mut pairing = Pairing::default();
+    pairing.begin();
+    let (first, second) = (long_shot(1, 1_000_000), long_shot(2, 1_040_000));
+    pairing.reported(&first, Instant::now());
+    let error = arrive(&mut pairing, second, 200).unwrap_err();
+    assert!(matches!(error, CameraError::Mispaired { wanted: 2, .. }), "{error:?}");
+    assert!(error.to_string().contains("exposure 1 before it has no picture"), "{error}");
+}
+
 proptest! {
     // Also, no received frame is rejected.
     #[test]
